@@ -1,0 +1,17 @@
+"""Names of the kernels and where they are; a kernel's module, and with it numba, is imported only when asked for."""
+
+from __future__ import annotations
+
+from kernels.interface import Kernel, load
+
+KERNELS = {
+    "foliot": "kernels.foliot:FOLIOT",
+    "foliot_motion": "kernels.foliot_motion:FOLIOT_MOTION",
+    "foliot_design": "kernels.foliot_design:FOLIOT_DESIGN",
+}
+
+
+def get(name: str) -> Kernel:
+    """The kernel of that name. Raises KeyError."""
+    kernel: Kernel = load(KERNELS[name])
+    return kernel

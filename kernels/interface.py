@@ -1,0 +1,122 @@
+"""The whole contract between physics and engine.
+
+A *cell* is one scene. Cells are independent. A kernel's functions take one float64 column per parameter (C-contiguous,
+one value per cell) and fill one column per output, shape `(n_cells,)` or `(n_cells, *dims)`, and an int8 `status`
+column. They hold no lock (nogil), raise nothing and always end; what goes wrong is said by a `Status`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+
+class Status(IntEnum):
+    """What became of a cell: OK, a remark (1..63, values given) or a refusal (64..126, every output NaN).
+
+    Numbers are stored in files and never reused.
+    """
+
+    OK = 0, "right to the wanted rtol"
+    INACCURATE = 1, "the method's error bound exceeds rtol; values are given"
+    BAD_INPUT = 64, "a parameter is NaN, infinite or outside its limits"
+    NEVER_STARTS = 65, "the drive cannot set the scene in motion"
+    NO_LIMIT_CYCLE = 66, "nothing dissipates energy, so no limit cycle exists"
+    OUT_OF_RANGE = 67, "a result cannot be written as a normal float64"
+    NOT_CONVERGED = 68, "the iteration limit was reached before the stated convergence"
+    STEP_LIMIT = 69, "the integrator reached its limit of steps"
+    NO_METHOD = 70, "no method of the kernel promises the wanted rtol here"
+    PENDING = 127, "not computed yet; only the engine writes it"
+
+    doc: str
+
+    def __new__(cls, value: int, doc: str) -> Status:
+        member = int.__new__(cls, value)
+        member._value_ = value
+        member.doc = doc
+        return member
+
+    @property
+    def refused(self) -> bool:
+        return 64 <= self < 127
+
+
+FIRST_REFUSAL = 64
+"""Every status from here on means NaN in every output."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """A parameter, an output, or a coordinate that all cells share.
+
+    `default`: None makes a parameter required; a str means "as that parameter". `lower`, `upper` are inclusive
+    unless `open_lower`; the kernel's `check` enforces them cell by cell, they are declared for people and plans.
+    `dims` names the axes of an array ("phase",); `choices` maps words of a study to the numbers in the column.
+    """
+
+    name: str
+    unit: str
+    doc: str
+    default: float | str | None = None
+    lower: float = -math.inf
+    upper: float = math.inf
+    open_lower: bool = False
+    dims: tuple[str, ...] = ()
+    choices: Mapping[str, int] = field(default_factory=dict)
+    integer: bool = False
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to solve a cell.
+
+    `solve(*parameters, rtol, *along, *outputs, status)` fills every output column of the kernel and the status of
+    every cell. Bad cells reach it too: it must end, but its values there are not used.
+
+    `bound(*parameters, asked, out)` fills `out` with a bound on the largest relative error (of traces: relative to
+    the amplitude) over the outputs whose entry in the uint8 array `asked` is 1. None: the method itself holds
+    `rtol` or says by its status that it cannot.
+    """
+
+    name: str
+    doc: str
+    solve: Callable[..., None]
+    bound: Callable[..., None] | None = None
+    excludes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A scene: what may be swept, what comes out, and the methods from the cheapest to the dearest.
+
+    `check(*parameters, status)` writes OK or a refusal for every cell, before any method is asked.
+    `along` are coordinates shared by all cells (phase, frequency); a study gives their values.
+    """
+
+    name: str
+    doc: str
+    source: str
+    parameters: tuple[Field, ...]
+    outputs: tuple[Field, ...]
+    check: Callable[..., None]
+    methods: tuple[Method, ...]
+    along: tuple[Field, ...] = ()
+
+    def method(self, name: str) -> Method:
+        """The method of that name. Raises KeyError."""
+        return {m.name: m for m in self.methods}[name]
+
+    def parameter(self, name: str) -> Field:
+        """The parameter of that name. Raises KeyError."""
+        return {p.name: p for p in self.parameters}[name]
+
+
+def load(entry: str) -> Any:
+    """The object that "package.module:NAME" names. Raises ImportError, AttributeError."""
+    from importlib import import_module
+
+    module, _, name = entry.partition(":")
+    return getattr(import_module(module), name)
