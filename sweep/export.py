@@ -1,0 +1,118 @@
+"""Results for other programs: csv for spreadsheets and statistics packages, nc (netCDF4) for everything that reads CF."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+import xarray as xr
+
+from sweep.errors import SweepError
+
+ROWS = 65536
+"""Rows of csv in memory at a time."""
+
+LARGE = 256 * 2**20
+"""Bytes from which a Dataset is written to netCDF4 piece by piece."""
+
+
+def export(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+    """Write a Dataset to `path`, as its suffix says: .csv or .nc. A file that is there is replaced once all is written.
+
+    csv: one row per cell (per cell and phase, for outputs along a phase), one column per coordinate and output,
+    `status` and `method_used` as words, numbers with all their digits. Lines that start with "#" name the unit of
+    each column; `pandas.read_csv(path, comment="#")` reads it, and so does the `file` of an axis of a study.
+    Memory does not grow with the number of cells.
+
+    nc: netCDF4 with units, flags and all attributes.
+
+    Raises
+    ------
+    SweepError
+        If the suffix is another, or the file cannot be written.
+    """
+    target = Path(path)
+    writers: dict[str, Callable[[xr.Dataset, Path], None]] = {".csv": _write_csv, ".nc": _write_netcdf}
+    if target.suffix.lower() not in writers:
+        found = f'"{target.suffix}"' if target.suffix else "no suffix"
+        raise SweepError(f"{target}: found {found}; export writes {' and '.join(writers)}, as the file's suffix says")
+    if target.is_dir():
+        raise SweepError(f"{target} is a folder; name a file in it")
+    part = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    try:
+        writers[target.suffix.lower()](dataset, part)
+        part.replace(target)
+    except OSError as error:
+        raise SweepError(f"{target} cannot be written: {error.strerror or error}") from None
+    finally:
+        part.unlink(missing_ok=True)
+    return target
+
+
+def _write_csv(dataset: xr.Dataset, path: Path) -> None:
+    names = [str(name) for name in (*dataset.coords, *dataset.data_vars)]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        _write_units(dataset, names, file)
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(names)
+        for block in _blocks(dataset):
+            writer.writerows(zip(*(_column(block, name) for name in names), strict=True))
+
+
+def _write_units(dataset: xr.Dataset, names: list[str], file: TextIO) -> None:
+    for name in names:
+        attrs = dataset[name].attrs
+        unit = f" [{attrs['units']}]" if "units" in attrs else ""
+        # a quotation mark could open a quoted field that swallows the lines below
+        about = " ".join(str(attrs.get("long_name", "")).replace('"', "'").split())
+        file.write(f"# {name}{unit}{': ' + about if about else ''}\n")
+
+
+def _blocks(dataset: xr.Dataset) -> Iterator[xr.Dataset]:
+    """Parts of at most about `ROWS` rows, in C order of the dimensions."""
+    dims = _dimensions(dataset)
+    inner = 1
+    chunks: dict[str, int] = {}
+    for dim in reversed(dims):
+        chunks[dim] = max(1, min(dataset.sizes[dim], ROWS // inner))
+        inner *= dataset.sizes[dim]
+    starts = (range(0, dataset.sizes[dim], chunks[dim]) for dim in dims)
+    for corner in itertools.product(*starts):
+        pieces = {dim: slice(start, start + chunks[dim]) for dim, start in zip(dims, corner, strict=True)}
+        yield dataset.isel(pieces).load() if dims else dataset.load()
+
+
+def _dimensions(dataset: xr.Dataset) -> list[str]:
+    """Dimensions of the cells as the status has them, then those of traces."""
+    cells = dataset["status"].dims if "status" in dataset else ()
+    return list(dict.fromkeys(str(dim) for dim in (*cells, *dataset.sizes)))
+
+
+def _column(block: xr.Dataset, name: str) -> list[Any]:
+    """Values of one column, one for each row of the block."""
+    sizes = {dim: block.sizes[dim] for dim in _dimensions(block)}
+    column = block[name].variable.set_dims(sizes).transpose(*sizes).values.reshape(-1)
+    words = _flag_words(block[name])
+    return [words.get(code, code) for code in column.tolist()] if words else column.tolist()
+
+
+def _flag_words(variable: xr.DataArray) -> dict[int, str]:
+    values = np.atleast_1d(variable.attrs.get("flag_values", ())).tolist()
+    words = dict(zip(values, str(variable.attrs.get("flag_meanings", "")).split(), strict=False))
+    return {-1: "none", **words} if words else {}
+
+
+def _write_netcdf(dataset: xr.Dataset, path: Path) -> None:
+    whole = dataset.chunk("auto") if dataset.nbytes > LARGE and not dataset.chunks else dataset
+    bare = whole.drop_encoding()
+    encoding: dict[str, dict[str, Any]] = {str(name): {"_FillValue": None} for name in bare.variables}
+    for name, variable in bare.data_vars.items():
+        if variable.dtype.kind in "iu" and math.prod(variable.shape) > 1:
+            encoding[str(name)] |= {"zlib": True, "complevel": 1}
+    bare.to_netcdf(path, engine="h5netcdf", encoding=encoding)
