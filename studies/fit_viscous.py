@@ -1,0 +1,89 @@
+# How few coefficients hold the viscous foliot's limit cycle to a few 1e-16?
+"""Fits the polynomials of `kernels/_viscous_fit.py` in 50-digit arithmetic and prints that module.
+
+    python studies/fit_viscous.py > kernels/_viscous_fit.py
+
+With k = 1/alpha = a^2 phi0/mu, the cycle is q - tanh q = k, and everything is smooth in
+    w = y^2, y = cbrt(3 k)            for k <  SPLIT (strong drive)
+    x = exp(-2 (k + 1))               for k >= SPLIT (weak drive).
+Chebyshev interpolation, then monomials; the leading coefficients are known and kept out of the fit.
+"""
+
+from mpmath import chebyt, cos, exp, findroot, log, log1p, mp, mpf, pi, tanh, taylor
+
+mp.dps = 50
+SPLIT = mpf(7) / 10
+
+
+def quarter_phase(k):
+    """q of q - tanh q = k."""
+    start = (3 * k) ** (mpf(1) / 3) if k < 1 else k + 1
+    return findroot(lambda q: q - tanh(q) - k, start)
+
+
+def strong(w):
+    """(q/y - 1)/w, (A y/1.5 - 1)/w, (s - 1/3)/w at w = y^2; lambda = q - k needs no fit of its own."""
+    y = w ** (mpf(1) / 2)
+    k = y**3 / 3
+    q = quarter_phase(k)
+    lam = tanh(q)
+    amplitude = log(mp.cosh(q)) / k
+    s = k / (q * lam**2)
+    return (q / y - 1) / w, (amplitude * y * 2 / 3 - 1) / w, (s - mpf(1) / 3) / w
+
+
+def weak(x):
+    """(1 - lambda)/x and (k (A - 1) - (1 - ln 2))/x at x = exp(-2(k + 1))."""
+    k = -log(x) / 2 - 1
+    gap = findroot(lambda d: d - 2 / (exp(2 * (k + 1 - d)) + 1), 2 * x)  # d = 1 - lambda
+    q = k + 1 - gap
+    return gap / x, (log1p(exp(-2 * q)) - gap) / x
+
+
+def interpolate(function, low, high, degree, outputs):
+    """Monomial coefficients on [low, high], lowest first, one list for each output of the function."""
+    n = degree + 1
+    nodes = [cos(pi * (2 * j + 1) / (2 * n)) for j in range(n)]
+    values = [function((high - low) / 2 * t + (high + low) / 2) for t in nodes]
+    fits = []
+    for output in range(outputs):
+        sums = [sum(values[j][output] * chebyt(m, nodes[j]) for j in range(n)) * 2 / n for m in range(n)]
+        sums[0] /= 2
+
+        def series(z, sums=sums):
+            t = (2 * z - high - low) / (high - low)
+            return sum(c * chebyt(m, t) for m, c in enumerate(sums))
+
+        fits.append(taylor(series, 0, degree))
+    return fits
+
+
+def log_tail(v):
+    """(atanh(s)/s - 1)/s^2 at v = s^2: ln((1 + s)/(1 - s)) = 2 s (1 + v T(v))."""
+    s = v ** (mpf(1) / 2)
+    return ((mp.atanh(s) / s - 1) / v,)
+
+
+def show(name, doc, coefficients):
+    rows = "\n".join(f"    {float(c)!r}," for c in coefficients)
+    return f'\n{name} = (\n{rows}\n)\n"""{doc}"""\n'
+
+
+def main():
+    top = (3 * SPLIT) ** (mpf(2) / 3)
+    tiny = mpf(10) ** -14
+    q, amplitude, s = interpolate(strong, tiny, top * mpf("1.0001"), 15, 3)
+    gap, overshoot = interpolate(weak, tiny, exp(-2 * (SPLIT + 1)) * mpf("1.0001"), 12, 2)
+    (log_coefficients,) = interpolate(log_tail, tiny, mpf("0.112"), 11, 1)
+    print('"""Polynomial coefficients, lowest power first, written by studies/fit_viscous.py; not to be edited."""')
+    print(f"\nSPLIT = {float(SPLIT)!r}\n", '"""k = 1/alpha at which the fits change over."""', sep="")
+    print(show("Q_STRONG", "(q/y - 1)/w, w = y^2, y = cbrt(3 k).", q), end="")
+    print(show("AMPLITUDE_STRONG", "(A y/1.5 - 1)/w.", amplitude), end="")
+    print(show("SENSITIVITY_STRONG", "(s - 1/3)/w.", s), end="")
+    print(show("GAP_WEAK", "(1 - lambda)/x, x = exp(-2(k + 1)).", gap), end="")
+    print(show("OVERSHOOT_WEAK", "(k (A - 1) - (1 - ln 2))/x.", overshoot), end="")
+    print(show("LOG_TAIL", "(atanh(s)/s - 1)/s^2 in s^2, 0 <= s <= 1/3.", log_coefficients), end="")
+
+
+if __name__ == "__main__":
+    main()
