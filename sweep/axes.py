@@ -1,0 +1,97 @@
+"""The values of one axis: evenly or geometrically spaced, listed, or from a file.
+
+Spacing and units are computed in decimals of 50 digits and rounded once, so that a value is the float64 nearest to
+what the study says (0.3, 0.001, the endpoints), on every machine.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from decimal import Context, Decimal, localcontext
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+LARGEST_AXIS = 10_000_000
+DIGITS = Context(prec=50)
+
+
+def linear(start: float, stop: float, num: int, factor: Decimal | None = None) -> NDArray[np.float64]:
+    """`num` >= 2 values from `start` to `stop`, both included, times `factor`."""
+
+    def values() -> Iterator[float]:
+        first, last, scale = _decimal(start), _decimal(stop), factor or Decimal(1)
+        for i in range(num):
+            yield float((first * (num - 1 - i) + last * i) / (num - 1) * scale)
+
+    return _collect(values(), num)
+
+
+def logarithmic(start: float, stop: float, num: int, factor: Decimal | None = None) -> NDArray[np.float64]:
+    """`num` >= 2 values in equal ratios from `start` > 0 to `stop` > 0, both included, times `factor`."""
+
+    def values() -> Iterator[float]:
+        value, last = _decimal(start) * (factor or 1), _decimal(stop) * (factor or 1)
+        ratio = (last / value) ** (1 / Decimal(num - 1))
+        for _ in range(num - 1):
+            yield float(value)
+            value *= ratio
+        yield float(last)
+
+    return _collect(values(), num)
+
+
+def scaled(values: NDArray[np.float64], factor: Decimal | None) -> NDArray[np.float64]:
+    """`values` times `factor`, each rounded once."""
+    if factor is None:
+        return values
+    return _collect((float(_decimal(v) * factor) for v in values.tolist()), len(values))
+
+
+def _decimal(value: float) -> Decimal:
+    """The shortest decimal that is this float64: what the user wrote."""
+    return Decimal(repr(value))
+
+
+def _collect(values: Iterator[float], num: int) -> NDArray[np.float64]:
+    with localcontext(DIGITS):
+        return np.fromiter(values, np.float64, count=num)
+
+
+def read_column(path: Path, name: str) -> list[tuple[int, str]]:
+    """Line numbers and texts of the column `name` of a csv file with a heading, or of a file's only column.
+
+    Empty lines and lines that start with "#" are left out.
+
+    Raises
+    ------
+    ValueError
+        With the text for the user.
+    """
+    rows = _rows(path)
+    headings = [cell.strip() for cell in rows[0][1]] if rows else []
+    if name in headings:
+        rows, column = rows[1:], headings.index(name)
+    elif len(headings) > 1:
+        raise ValueError(f'{path} has no column "{name}"; its first line is {",".join(headings)[:60]}')
+    else:
+        column = 0
+    for line, row in rows:
+        if len(row) != max(len(headings), 1):
+            raise ValueError(f"{path}, line {line}: expected {max(len(headings), 1)} columns, found {len(row)}")
+    if not rows:
+        raise ValueError(f"{path} holds no values")
+    return [(line, row[column].strip()) for line, row in rows]
+
+
+def _rows(path: Path) -> list[tuple[int, list[str]]]:
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.reader(file, skipinitialspace=True)
+            return [(reader.line_num, row) for row in reader if any(row) and not row[0].startswith("#")]
+    except OSError as error:
+        raise ValueError(f"{path} cannot be read: {error.strerror}") from None
+    except (UnicodeDecodeError, csv.Error, ValueError) as error:
+        raise ValueError(f"{path} is not a csv file: {error}") from None

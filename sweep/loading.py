@@ -1,0 +1,56 @@
+"""A kernel by the name that a study gives it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from kernels import catalogue
+from kernels.interface import Kernel, load
+from sweep.checks import did_you_mean, listed, show
+from sweep.errors import SweepError
+
+
+def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path] = ()) -> Kernel:
+    """The kernel called `name` in the catalogue, or, where allowed, found at "module:NAME".
+
+    Parameters
+    ----------
+    folders : iterable of Path
+        Where to look for the module after Python's own path.
+
+    Raises
+    ------
+    SweepError
+        There is no such kernel, it may not be imported, or importing it fails.
+    """
+    known = list(catalogue.KERNELS)
+    if not isinstance(name, str) or not name:
+        raise SweepError(f"expected the name of a kernel, found {show(name)}; there are {listed(known)}")
+    if ":" not in name and name not in known:
+        raise SweepError(f"no kernel {show(name)}{did_you_mean(name, known) or ';'} there are {listed(known)}")
+    if ":" in name and not allow_import:
+        raise SweepError(
+            f"{show(name)} runs code of your own; allow it with --allow-import (Python: allow_import=True)"
+        )
+    try:
+        with _searched(folders):
+            kernel = load(name) if ":" in name else catalogue.get(name)
+    except Exception as error:
+        raise SweepError(f"{show(name)} cannot be loaded: {type(error).__name__}: {error}") from error
+    if not isinstance(kernel, Kernel):
+        raise SweepError(f"{show(name)} is a {type(kernel).__name__}, not a kernels.interface.Kernel")
+    return kernel
+
+
+@contextmanager
+def _searched(folders: Iterable[Path]) -> Iterator[None]:
+    """Python's path with `folders` at its end."""
+    before = list(sys.path)
+    sys.path.extend(str(f.resolve()) for f in folders)
+    try:
+        yield
+    finally:
+        sys.path[:] = before

@@ -1,0 +1,214 @@
+"""A checked study, and its exact JSON form."""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.interface import Field, Kernel, Method
+from sweep.errors import SweepError
+
+FORMAT = 1
+LONGEST_LIST = 1000
+"""Longer arrays are written as base64 of little-endian float64."""
+
+AUTO = -1
+"""Number of the word "auto" on a method axis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """Values of one swept quantity.
+
+    Attributes
+    ----------
+    name : str
+        A parameter of the kernel, "method" or "rtol".
+    values : ndarray, shape (n,), read-only float64
+        In the unit of the kernel's field. On a method axis: positions in `kernel.methods`, -1 for "auto".
+        Of a parameter with choices: their numbers.
+    spacing : str
+        "linear", "log", "values" or "file".
+    words : tuple of str, optional
+        What the study calls the values of a method axis or of a parameter with choices.
+    """
+
+    name: str
+    values: NDArray[np.float64]
+    spacing: str
+    words: tuple[str, ...] | None = None
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def label(self, index: int) -> str:
+        """Value number `index`, as people write it."""
+        return self.words[index] if self.words else f"{self.values[index]:.6g}"
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """One sweep, complete and free of mistakes. Made by `read_study` or `build_study`.
+
+    Attributes
+    ----------
+    question : str
+        First comment line of the study file.
+    kernel_name : str
+        As the study names it: of the catalogue, or "module:NAME".
+    method, rtol : str, float
+        Used where they are not an axis.
+    outputs : tuple of str
+        In the kernel's order.
+    axes : dict of str to Axis
+        In the study's order, which is the order of the dataset's dimensions.
+    fixed : dict of str to float
+        Every parameter of the kernel that neither is nor follows an axis, defaults filled in.
+    follows : dict of str to str
+        Parameters that are not given and by default equal another one, which is an axis.
+    along : dict of str to ndarray
+        Every coordinate of the kernel; of length 0 where no output asked for needs it.
+    text : str
+        The study file, or "" of a study built in Python.
+    """
+
+    title: str
+    question: str
+    kernel_name: str
+    kernel: Kernel
+    method: str
+    rtol: float
+    outputs: tuple[str, ...]
+    design: str
+    axes: dict[str, Axis]
+    fixed: dict[str, float]
+    follows: dict[str, str]
+    along: dict[str, NDArray[np.float64]]
+    text: str = ""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Study) and self.to_json() == other.to_json()
+
+    def __hash__(self) -> int:
+        return hash(self.to_json())
+
+    @property
+    def asked(self) -> tuple[Field, ...]:
+        """The output fields asked for."""
+        return tuple(o for o in self.kernel.outputs if o.name in self.outputs)
+
+    def to_json(self) -> str:
+        """The study on one line of JSON: floats exactly, also NaN and infinities; the kernel as it declares itself."""
+        keys = {name: getattr(self, name) for name in PLAIN}
+        axes = [
+            {"name": a.name, "values": a.values, "spacing": a.spacing, "words": a.words} for a in self.axes.values()
+        ]
+        keys |= {"format": FORMAT, "axes": axes, "kernel": _declaration(self.kernel)}
+        return json.dumps(_plain(keys), allow_nan=False, ensure_ascii=False)
+
+    @classmethod
+    def from_json(cls, text: str, *, allow_import: bool = False, declared: bool = False) -> Study:
+        """The study that `to_json` wrote.
+
+        Parameters
+        ----------
+        allow_import : bool
+            Allow a kernel named "module:NAME", whose module is imported.
+        declared : bool
+            Do not import the kernel: take what it declared at the time of writing, which suffices to read results.
+            Its functions are missing.
+
+        Raises
+        ------
+        SweepError
+            The text is not a study of ours, or its kernel cannot be loaded.
+        """
+        try:
+            keys = json.loads(text, object_hook=_decode)
+            if keys["format"] != FORMAT:
+                raise SweepError(f"study of format {keys['format']}; this version of foliot reads format {FORMAT}")
+            axes = {
+                a["name"]: Axis(a["name"], _array(a["values"]), a["spacing"], _words(a["words"])) for a in keys["axes"]
+            }
+            along = {name: _array(values) for name, values in keys["along"].items()}
+            known = {name: keys[name] for name in PLAIN} | {"axes": axes, "along": along}
+            known["outputs"] = tuple(known["outputs"])
+            kernel = _kernel_as_declared(keys["kernel"])
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise SweepError(f"not the JSON of a study: {type(error).__name__} {error}") from None
+        if not declared:
+            from sweep.loading import load_kernel
+
+            kernel = load_kernel(known["kernel_name"], allow_import)
+        return cls(kernel=kernel, **known)
+
+
+PLAIN = (
+    "title", "question", "kernel_name", "method", "rtol", "outputs", "design", "fixed", "follows", "along", "text",
+)  # fmt: skip
+"""Attributes that are written as they are."""
+
+
+def frozen(values: Any) -> NDArray[np.float64]:
+    """A read-only float64 copy."""
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array
+
+
+def _array(values: Any) -> NDArray[np.float64]:
+    return frozen(values)
+
+
+def _words(words: list[str] | None) -> tuple[str, ...] | None:
+    return None if words is None else tuple(words)
+
+
+def _plain(value: Any) -> Any:
+    """`value` as what JSON has; `_decode` undoes it."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return {"float": repr(float(value))}
+    if isinstance(value, np.ndarray):
+        if len(value) > LONGEST_LIST:
+            return {"float64": base64.b64encode(value.astype("<f8").tobytes()).decode("ascii")}
+        return _plain(value.tolist())
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _decode(item: dict[str, Any]) -> Any:
+    if item.keys() == {"float"} and isinstance(item["float"], str):
+        return float(item["float"])
+    if item.keys() == {"float64"} and isinstance(item["float64"], str):
+        return np.frombuffer(base64.b64decode(item["float64"]), dtype="<f8")
+    return item
+
+
+def _declaration(kernel: Kernel) -> dict[str, Any]:
+    """All of a kernel but its functions."""
+    fields = {group: [asdict(f) for f in getattr(kernel, group)] for group in ("parameters", "outputs", "along")}
+    methods = [{"name": m.name, "doc": m.doc, "excludes": m.excludes} for m in kernel.methods]
+    return {"name": kernel.name, "doc": kernel.doc, "source": kernel.source, **fields, "methods": methods}
+
+
+def _kernel_as_declared(keys: dict[str, Any]) -> Kernel:
+    groups = {
+        group: tuple(Field(**{**f, "dims": tuple(f["dims"])}) for f in keys[group])
+        for group in ("parameters", "outputs", "along")
+    }
+    methods = tuple(Method(m["name"], m["doc"], _missing, excludes=tuple(m["excludes"])) for m in keys["methods"])
+    return Kernel(keys["name"], keys["doc"], keys["source"], check=_missing, methods=methods, **groups)
+
+
+def _missing(*columns: Any) -> None:
+    raise SweepError("this study was read without its kernel, so it cannot be run")

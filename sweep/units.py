@@ -1,0 +1,117 @@
+"""Units at the border of the engine: what a study writes becomes the unit of the kernel's field.
+
+Only this module imports pint, and only when a unit has to be converted.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from decimal import Decimal
+from functools import cache
+from typing import Any
+
+DIMENSIONS = {
+    "1": ("a plain number", '"1" or "percent"'),
+    "rad": ("an angle", '"rad" or "degree"'),
+    "rad/s": ("an angular frequency", '"rad/s" or "Hz"'),
+    "rad/s^2": ("an angular acceleration", '"rad/s^2" or "degree/s^2"'),
+    "Hz": ("a frequency", '"Hz" or "rad/s"'),
+    "s": ("a time", '"s" or "ms"'),
+    "1/s": ("a rate", '"1/s" or "1/minute"'),
+    "1/s^2": ("a squared rate", '"1/s^2"'),
+    "m": ("a length", '"m" or "mm"'),
+    "m^2": ("an area", '"m^2" or "mm^2"'),
+    "m^3": ("a volume", '"m^3" or "mm^3"'),
+    "m/s": ("a speed", '"m/s" or "mm/s"'),
+    "m/s^2": ("an acceleration", '"m/s^2"'),
+    "kg": ("a mass", '"kg" or "g"'),
+    "kg m^2": ("a moment of inertia", '"kg m^2" or "g cm^2"'),
+    "N": ("a force", '"N" or "mN"'),
+    "N m": ("a torque or an energy", '"N m" or "J"'),
+    "N/m": ("a stiffness", '"N/m" or "N/mm"'),
+    "N m/rad": ("an angular stiffness", '"N m/rad" or "N m/degree"'),
+    "N m s/rad": ("an angular damping", '"N m s/rad"'),
+    "Pa": ("a pressure", '"Pa" or "kPa"'),
+    "W": ("a power", '"W" or "mW"'),
+    "K": ("a temperature", '"K"'),
+}
+"""What a unit measures, in words, and what one may write for it."""
+
+COMMON = ("m", "mm", "cm", "kg", "g", "s", "ms", "minute", "hour", "day", "rad", "degree", "turn", "Hz", "kHz", "rpm")
+"""What a misspelt unit is likely to mean."""
+
+
+class UnitMistake(Exception):
+    """The unit cannot be used here; the text says why and what to write."""
+
+
+def scale(text: str, wanted: str, name: str) -> Decimal | None:
+    """Factor from the unit `text` to the unit `wanted` of the field `name`; None where no conversion is needed.
+
+    Leaving out "rad" is allowed; "Hz" counts full turns: 1 Hz = 2 pi rad/s.
+
+    Raises
+    ------
+    UnitMistake
+        The unit is unknown, has an offset, or measures something else.
+    """
+    if text == wanted:
+        return None
+    factor, given = _root(text)
+    wanted_factor, needed = _root(wanted)
+    if "radian" not in given and "radian" in needed:
+        wanted_factor, needed = _root(wanted.replace("Hz", "s^-1"))
+        needed.pop("radian", None)
+    if given != needed:
+        _, example = DIMENSIONS.get(wanted, ("", f'"{wanted}"'))
+        raise UnitMistake(f'"{text}" is {_describe(text)}; {name} is {_describe(wanted)}, e.g. {example}')
+    return factor / wanted_factor
+
+
+def _describe(text: str) -> str:
+    root = _root(text)[1]
+    same = (words for unit, (words, _) in DIMENSIONS.items() if _root(unit)[1] == root)
+    return (
+        DIMENSIONS[text][0] if text in DIMENSIONS else next(same, f"of another kind ({_registry().parse_units(text)})")
+    )
+
+
+def _root(text: str) -> tuple[Decimal, dict[str, Decimal]]:
+    """Factor and exponents of `text` in root units, radian among them; "Hz" is a turn per second."""
+    registry = _registry()
+    unit = _parse(text)
+    if "hertz" in str(unit):
+        if not re.fullmatch(r"\w*hertz", str(unit)):
+            raise UnitMistake(f'"{text}" has Hz inside a longer unit; write turns or radians, e.g. "turn/s^2"')
+        unit = unit / registry.parse_units("hertz") * registry.parse_units("turn/second")
+    try:
+        zero = registry.Quantity(Decimal(0), unit).to_root_units()
+        one = registry.Quantity(Decimal(1), unit).to_root_units()
+    except Exception as error:
+        raise UnitMistake(f'"{text}" cannot be converted: {error}') from None
+    if zero.magnitude != 0:
+        raise UnitMistake(f'"{text}" has an offset; give an absolute unit, e.g. "K"')
+    return Decimal(one.magnitude), dict(one.unit_items())
+
+
+def _parse(text: str) -> Any:
+    from pint.errors import UndefinedUnitError
+
+    try:
+        return _registry().parse_units("dimensionless" if text.strip() == "1" else text)
+    except UndefinedUnitError as error:
+        unknown = str(error.unit_names) if isinstance(error.unit_names, str) else str(next(iter(error.unit_names)))
+        near = difflib.get_close_matches(unknown, COMMON, n=1)
+        hint = f"did you mean {near[0]}?" if near else 'write it like "rad/s^2" or "kg m^2"'
+        raise UnitMistake(f'"{unknown}" is not a known unit; {hint}') from None
+    except Exception:
+        # pint's parser fails on malformed text in many ways (AssertionError, TokenError, TypeError, ValueError)
+        raise UnitMistake(f'"{text}" cannot be read as a unit; write it like "rad/s^2" or "kg m^2"') from None
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry(non_int_type=Decimal)
