@@ -89,8 +89,10 @@ def read_column(path: Path, name: str) -> list[tuple[int, str]]:
 def _rows(path: Path) -> list[tuple[int, list[str]]]:
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file, skipinitialspace=True)
-            return [(reader.line_num, row) for row in reader if any(row) and not row[0].startswith("#")]
+            # a comment becomes an empty line before csv sees it, since a quotation mark in it would open a field
+            lines = ("\n" if line.startswith("#") else line for line in file)
+            reader = csv.reader(lines, skipinitialspace=True)
+            return [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except OSError as error:
         raise ValueError(f"{path} cannot be read: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error, ValueError) as error:

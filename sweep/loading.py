@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 
 from kernels import catalogue
@@ -36,21 +35,12 @@ def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path
             f"{show(name)} runs code of your own; allow it with --allow-import (Python: allow_import=True)"
         )
     try:
-        with _searched(folders):
-            kernel = load(name) if ":" in name else catalogue.get(name)
+        if ":" in name:
+            # for good: a kernel may import modules beside it later
+            sys.path.extend(folder for f in folders if (folder := str(f.resolve())) not in sys.path)
+        kernel = load(name) if ":" in name else catalogue.get(name)
     except Exception as error:
         raise SweepError(f"{show(name)} cannot be loaded: {type(error).__name__}: {error}") from error
     if not isinstance(kernel, Kernel):
         raise SweepError(f"{show(name)} is a {type(kernel).__name__}, not a kernels.interface.Kernel")
     return kernel
-
-
-@contextmanager
-def _searched(folders: Iterable[Path]) -> Iterator[None]:
-    """Python's path with `folders` at its end."""
-    before = list(sys.path)
-    sys.path.extend(str(f.resolve()) for f in folders)
-    try:
-        yield
-    finally:
-        sys.path[:] = before

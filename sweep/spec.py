@@ -197,14 +197,21 @@ class _Reader:
         field = self._setting("method")
         if "method" not in keys or field is None:
             return "auto"
+        self._only_once("method", keys)
         return self.mistakes.word(keys["method"], "method", field.choices) or "auto"
 
     def _rtol(self, keys: Mapping[str, Any]) -> float:
+        self._only_once("rtol", keys)
         before = len(self.mistakes)
         rtol = self.mistakes.number(keys.get("rtol", DEFAULT_RTOL), "rtol")
         if not SMALLEST_RTOL <= rtol < 1 and len(self.mistakes) == before:
             self.mistakes.add("rtol", f"expected {SMALLEST_RTOL:g} <= rtol < 1, found {rtol:g}")
         return rtol
+
+    def _only_once(self, name: str, keys: Mapping[str, Any]) -> None:
+        axes = keys.get("axes")
+        if name in keys and isinstance(axes, Mapping) and name in axes:
+            self.mistakes.add(name, f"{name} is an axis as well; keep one of the two")
 
     def _outputs(self, found: Any) -> tuple[str, ...]:
         """Outputs asked for, in the kernel's order; all of them where the study names none."""

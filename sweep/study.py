@@ -157,8 +157,9 @@ PLAIN = (
 
 
 def frozen(values: Any) -> NDArray[np.float64]:
-    """A read-only float64 copy."""
+    """A read-only float64 copy; NaN has one bit pattern only."""
     array = np.array(values, dtype=np.float64)
+    array[np.isnan(array)] = math.nan
     array.flags.writeable = False
     return array
 

@@ -1,0 +1,132 @@
+"""What decides the numbers of a result: the study, the sources of its kernel, and the compiler."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.util
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from kernels import catalogue
+from sweep.study import Study
+
+COMPILERS = ("numba", "llvmlite", "numpy")
+OURS = ("kernels",)
+"""Packages whose modules count even where a kernel of another package imports them."""
+
+ENGINE = "sweep.solve"
+"""The one module of the engine that decides values: it chooses the method of each cell."""
+
+SOURCE = "source "
+
+
+def fingerprint(study: Study) -> dict[str, str]:
+    """Everything that decides the numbers of a result, as texts: equal fingerprints, equal bits.
+
+    Returns
+    -------
+    dict of str to str
+        "study" is one digest of all that the study says but for its words; what it says follows in short, under its
+        names in a study file. Then a digest per source file of the kernel ("source kernels.foliot"), and the
+        versions of compiler and arrays. The processor is not in it: kernels give the same bits on each.
+    """
+    said = _said(study)
+    whole = hashlib.sha256(json.dumps(said).encode()).hexdigest()
+    return {"study": whole, **said, **_sources(study.kernel_name), **{name: _version(name) for name in COMPILERS}}
+
+
+def difference(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
+    """What two fingerprints differ in, a line each: 'axes.mu: was 401 values ..., now 101 values ...'."""
+    names = [*new, *(name for name in old if name not in new)]
+    changed = [name for name in names if old.get(name) != new.get(name)]
+    # the digest of the whole study tells nothing where its parts do
+    told = [name for name in changed if name != "study"] or changed
+    return [_change(name, old.get(name), new.get(name)) for name in told]
+
+
+def _change(name: str, old: str | None, new: str | None) -> str:
+    if old is None:
+        return f"{name}: new" if name.startswith(SOURCE) else f"{name}: new, {new}"
+    if new is None:
+        return f"{name}: gone" if name.startswith(SOURCE) else f"{name}: gone, was {old}"
+    return f"{name}: changed" if name.startswith(SOURCE) or name == "study" else f"{name}: was {old}, now {new}"
+
+
+def _said(study: Study) -> dict[str, str]:
+    """What the study says, exactly."""
+    said = {
+        "kernel": study.kernel_name,
+        "method": study.method,
+        "rtol": repr(study.rtol),
+        "outputs": ", ".join(study.outputs),
+        "design": study.design,
+        "axes": ", ".join(study.axes),
+    }
+    said |= {f"axes.{name}": _values(axis.values) for name, axis in study.axes.items()}
+    said |= {f"fixed.{name}": repr(value) for name, value in study.fixed.items()}
+    said |= {f"fixed.{name}": f"as {axis}" for name, axis in study.follows.items()}
+    return said | {f"along.{name}": _values(values) for name, values in study.along.items() if len(values)}
+
+
+def _values(values: Any) -> str:
+    """'401 values, 0.0001 to 1e+06 (digest 0123456789abcdef)'."""
+    digest = hashlib.sha256(values.astype("<f8").tobytes()).hexdigest()[:16]
+    ends = f"{values[0]:.6g}" if len(values) == 1 else f"{values[0]:.6g} to {values[-1]:.6g}"
+    return f"{len(values)} value{'s' * (len(values) > 1)}, {ends} (digest {digest})"
+
+
+def _sources(kernel_name: str) -> dict[str, str]:
+    """A digest of every source file that takes part in solving a cell."""
+    entry = catalogue.KERNELS.get(kernel_name, kernel_name).partition(":")[0]
+    packages = {entry.partition(".")[0], *OURS}
+    found: dict[str, str] = {}
+    waiting = [entry]
+    while waiting:
+        name = waiting.pop()
+        path = _path(name)
+        if name in found or path is None:
+            continue
+        text = path.read_bytes()
+        found[name] = hashlib.sha256(text).hexdigest()
+        if path.suffix == ".py":
+            waiting += [m for m in _imported(text, name, path) if m.partition(".")[0] in packages]
+    engine = _path(ENGINE)
+    if engine is not None:
+        found[ENGINE] = hashlib.sha256(engine.read_bytes()).hexdigest()
+    return {SOURCE + name: found[name] for name in sorted(found)}
+
+
+def _path(name: str) -> Path | None:
+    """File of a module, which is not imported; None of what has no file, or is no module."""
+    try:
+        spec = importlib.util.find_spec(name)
+    except (ImportError, ValueError, AttributeError):
+        file = getattr(sys.modules.get(name), "__file__", None)
+        return Path(file) if file else None
+    path = Path(spec.origin) if spec is not None and spec.origin else None
+    return path if path is not None and path.is_file() else None
+
+
+def _imported(text: bytes, name: str, path: Path) -> Iterator[str]:
+    """Names of modules that a source may import; of `from a import b` both a and a.b, as b may be a module."""
+    package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else []
+            base = ".".join([*above, *filter(None, [node.module])])
+            yield base
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "not installed"
