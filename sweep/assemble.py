@@ -1,0 +1,222 @@
+"""From parts to one file that netCDF4 and HDF5 readers open.
+
+HDF5 writes the frame: dimensions, coordinates, attributes, statuses, and the places of the outputs. These are
+contiguous, so a block's cells are consecutive bytes there, and threads copy them in by plain writes at disk speed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import queue
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sweep import disk
+from sweep.errors import SweepError
+from sweep.image import unfilled
+from sweep.layout import METHOD_USED, STATUS, Column, Coordinate, Layout
+from sweep.parts import digest
+from sweep.pool import each
+from sweep.store import Store
+
+CHUNK_CELLS = 1 << 18
+"""Cells of one compressed piece of status and method_used; HDF5 keeps at least four of them in memory."""
+SYNC_BYTES = 128 << 20
+"""Bytes after which the disk is set to work, long before the end."""
+FLAGS = (STATUS, METHOD_USED)
+FLAGS_JOB = -1
+
+
+def assemble(store: Store, layout: Layout, output: Path, attrs: Mapping[str, Any], threads: int) -> list[int]:
+    """Puts the parts together under the output's name; then the parts are not needed any more.
+
+    Returns
+    -------
+    list of int
+        Blocks whose part turned out to be damaged. Then there is no output; compute them again.
+
+    Raises
+    ------
+    SweepError
+        The disk is full or fails. All parts are kept.
+    """
+    temporary = store.temporary("result.h5")
+    try:
+        damaged = _build(store, layout, temporary, attrs, threads)
+        if not damaged:
+            _check(store, layout, temporary)
+            disk.rename(temporary, output)
+            disk.sync_folder(output.parent)
+        return damaged
+    except OSError as fault:
+        raise disk.refusal(fault, output) from fault
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def _build(store: Store, layout: Layout, path: Path, attrs: Mapping[str, Any], threads: int) -> list[int]:
+    write_frame(path, layout, attrs)
+    fd = disk.open_file(path, os.O_RDWR)
+    try:
+        damaged = _fill(store, layout, path, fd, threads)
+        if not damaged:
+            disk.fsync(fd)
+        return damaged
+    finally:
+        os.close(fd)
+
+
+def write_frame(path: Path, layout: Layout, attrs: Mapping[str, Any]) -> None:
+    """Writes everything but the columns' numbers. Raises OSError."""
+    import h5netcdf
+
+    with h5netcdf.File(path, "w") as file:
+        file.attrs.update({**layout.attrs, **attrs})
+        file.dimensions = layout.sizes
+        for coordinate in layout.coordinates:
+            _write_coordinate(file, coordinate)
+        away = " ".join(c.name for c in layout.coordinates if c.dims != (c.name,))
+        for column in layout.columns:
+            variable = _declare(file, layout, column)
+            variable.attrs.update({**column.attrs, **({"coordinates": away} if away else {})})
+
+
+def _write_coordinate(file: Any, coordinate: Coordinate) -> None:
+    import h5py
+
+    values = np.asarray(coordinate.values)
+    text = values.dtype.kind == "U"
+    dtype = h5py.string_dtype() if text else values.dtype
+    data = values.astype(object) if text else values
+    file.create_variable(coordinate.name, coordinate.dims, dtype, data=data).attrs.update(coordinate.attrs)
+
+
+def _declare(file: Any, layout: Layout, column: Column) -> Any:
+    dims = (*layout.grid.dims, *column.dims)
+    if column.name not in FLAGS or not layout.grid.shape:
+        return file.create_variable(column.name, dims, column.dtype, dcpl=unfilled())
+    chunks = chunk_shape(layout.grid.shape)
+    return file.create_variable(column.name, dims, column.dtype, chunks=chunks, compression="gzip", compression_opts=1)
+
+
+def chunk_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Chunks that follow the cells' order: whole trailing dimensions, part of one, single ones before."""
+    chunks: list[int] = []
+    room = CHUNK_CELLS
+    for length in reversed(shape):
+        chunks.append(max(1, min(length, room)))
+        room //= chunks[-1] if chunks[-1] == length else room
+    return tuple(reversed(chunks))
+
+
+def _fill(store: Store, layout: Layout, path: Path, fd: int, threads: int) -> list[int]:
+    """Copies all parts, on a pool of threads; returns those that are damaged."""
+    copier = _Copier(store, fd, _places(path, layout), threads)
+
+    def work(job: int) -> None:
+        if job == FLAGS_JOB:
+            _write_flags(store, layout, path)
+        else:
+            copier.copy(job)
+
+    each([FLAGS_JOB, *range(store.blocks.count)], work, threads + 1, lambda job: None)
+    return sorted(copier.damaged)
+
+
+class _Copier:
+    """Copies the outputs of verified parts to their places."""
+
+    def __init__(self, store: Store, fd: int, places: Mapping[str, int], threads: int) -> None:
+        self.damaged: list[int] = []
+        self._store, self._fd, self._places = store, fd, places
+        self._unsynced = 0
+        self._buffers: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+        cells = min(store.blocks.cells, store.blocks.size)
+        for _ in range(threads + 1):
+            self._buffers.put({column.name: column.empty(cells) for column in store.columns})
+
+    def copy(self, index: int) -> None:
+        buffers = self._buffers.get()
+        try:
+            arrays = self._store.get(index, buffers)
+            if arrays is None:
+                self.damaged.append(index)
+            else:
+                self._write(self._store.blocks.bounds(index)[0], arrays)
+        finally:
+            self._buffers.put(buffers)
+
+    def _write(self, start: int, arrays: Mapping[str, Any]) -> None:
+        for column in self._store.columns:
+            if column.name in self._places:
+                at = self._places[column.name] + start * column.cell_bytes
+                disk.pwrite_all(self._fd, arrays[column.name], at)
+                self._unsynced += arrays[column.name].nbytes
+        if self._unsynced > SYNC_BYTES:
+            self._unsynced = 0
+            disk.fsync(self._fd)
+
+
+def _places(path: Path, layout: Layout) -> dict[str, int]:
+    """Where in the file every output begins."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        return {c.name: file[c.name].id.get_offset() for c in layout.columns if c.name not in FLAGS}
+
+
+def _write_flags(store: Store, layout: Layout, path: Path) -> None:
+    """Writes statuses and methods in the order of cells, so that HDF5 compresses each chunk once."""
+    import h5py
+
+    with h5py.File(path, "r+") as file:
+        for index in range(store.blocks.count):
+            flags = _flags(store, index)
+            if flags is None:
+                return
+            for name, column in flags.items():
+                _write_cells(file[name], layout, store.blocks.bounds(index), column)
+
+
+def _flags(store: Store, index: int) -> dict[str, Any] | None:
+    """Statuses and methods of a block; None where its part is damaged, which its copier finds as well."""
+    import h5py
+
+    try:
+        with h5py.File(store.folder / store.names[index], "r", locking=False) as part:
+            return {name: part[name][...] for name in FLAGS}
+    except (OSError, KeyError, RuntimeError):
+        return None
+
+
+def _write_cells(dataset: Any, layout: Layout, bounds: tuple[int, int], column: Any) -> None:
+    for slices, begin, end in layout.grid.pieces(*bounds):
+        if dataset.shape:
+            dataset[slices] = column[begin:end].reshape([s.stop - s.start for s in slices])
+        else:
+            dataset[()] = column[0]
+
+
+def _check(store: Store, layout: Layout, path: Path) -> None:
+    """Reads some blocks back as any reader would. Raises SweepError."""
+    import h5py
+
+    last = store.blocks.count - 1
+    with h5py.File(path, "r") as file:
+        for index in sorted({0, last // 2, last}):
+            bounds = store.blocks.bounds(index)
+            arrays = {c.name: _read_cells(file[c.name], layout, bounds, c) for c in layout.columns}
+            if digest(layout.columns, arrays) not in store.names[index]:
+                raise SweepError(f"{path}: cells {bounds[0]} to {bounds[1]} read back differ from what was written")
+
+
+def _read_cells(dataset: Any, layout: Layout, bounds: tuple[int, int], column: Column) -> Any:
+    arrays = column.empty(bounds[1] - bounds[0])
+    for slices, begin, end in layout.grid.pieces(*bounds):
+        arrays[begin:end] = dataset[slices if dataset.shape else ()].reshape(end - begin, *column.shape)
+    return arrays

@@ -1,0 +1,137 @@
+"""How a grid is cut into blocks, and in which order they are computed: from a timed sample spread over the grid."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sweep.layout import METHOD_USED, STATUS, Column
+
+if TYPE_CHECKING:
+    from sweep.solve import Solver
+
+POSITIONS = 64
+BUDGET = 0.06
+"""Seconds a sample may take, unless one call takes longer."""
+LANES = 32
+"""Cells that a lane kernel solves at once: it takes as long for one of them."""
+BLOCK_SECONDS = (0.05, 1.0)
+BLOCK_BYTES = 32 << 20
+MOST_BLOCKS = 100_000
+
+
+@dataclass(frozen=True)
+class Partition:
+    """Blocks of `cells` flat cells in C order, the last one shorter."""
+
+    size: int
+    cells: int
+
+    @property
+    def count(self) -> int:
+        """Number of blocks."""
+        return -(-self.size // self.cells)
+
+    def bounds(self, index: int) -> tuple[int, int]:
+        """Flat range `start, stop` of a block."""
+        start = index * self.cells
+        return start, min(start + self.cells, self.size)
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Timed probes: cell each starts at (ascending), its seconds per cell, and what the probed cells gave."""
+
+    positions: Any
+    costs: Any
+    cells: int
+    status: Any
+    method_used: Any
+
+    @property
+    def cost(self) -> float:
+        """Mean seconds per cell over the grid."""
+        return float(np.mean(self.costs))
+
+    def weights(self, partition: Partition) -> Any:
+        """Estimated seconds of every block."""
+        starts = np.arange(partition.count, dtype=np.float64) * partition.cells
+        stops = np.minimum(starts + partition.cells, partition.size)
+        return np.interp((starts + stops) / 2, self.positions, self.costs) * (stops - starts)
+
+
+def take_sample(solver: Solver, columns: Sequence[Column], size: int) -> Sample:
+    """Times a few cells at up to 64 places of the grid, in about a twentieth of a second."""
+    cells = _probe_cells(solver, columns, size)
+    count = max(1, min(POSITIONS, size // (4 * cells)))
+    arrays = {column.name: column.empty(cells) for column in columns}
+    probes: dict[int, tuple[float, Any, Any]] = {}
+    deadline = time.perf_counter() + BUDGET
+    for index in _scattered(count):
+        start = _place(index, count, cells, size)
+        seconds = _timed(solver, arrays, start, cells)
+        probes[start] = seconds / cells, arrays[STATUS].copy(), arrays[METHOD_USED].copy()
+        if time.perf_counter() > deadline:
+            break
+    places = sorted(probes)
+    costs, status, used = zip(*(probes[p] for p in places), strict=True)
+    return Sample(np.array(places), np.array(costs), cells, np.concatenate(status), np.concatenate(used))
+
+
+def partition(sample: Sample, size: int, cell_bytes: int, workers: int) -> Partition:
+    """Blocks of about 1/200 of each worker's share, within bounds of time, bytes and number."""
+    cost = max(sample.cost, 1e-12)
+    shortest, longest = BLOCK_SECONDS
+    seconds = min(max(cost * size / (200 * workers), shortest), longest)
+    cells = min(seconds / cost, BLOCK_BYTES / cell_bytes, size)
+    if sample.cells < LANES:
+        cells = max(cells, min(LANES, size / (4 * workers)))
+    cells = max(1, math.floor(cells), -(-size // MOST_BLOCKS))
+    return Partition(size, cells if cells < LANES or cells >= size else -(-cells // LANES) * LANES)
+
+
+def order(sample: Sample, blocks: Partition) -> Any:
+    """Block numbers, dear ones first, lest a worker be left alone with one; as they come where all cost alike."""
+    weights = np.maximum(sample.weights(blocks), 1e-300)
+    if weights.max() < 1.5 * np.median(weights):
+        return np.arange(blocks.count)
+    return np.argsort(-np.round(2 * np.log2(weights)), kind="stable")
+
+
+def _probe_cells(solver: Solver, columns: Sequence[Column], size: int) -> int:
+    """Cells a probe: few enough for 64 probes in the budget, enough to see past the cost of a call."""
+    cells = 1
+    while True:
+        arrays = {column.name: column.empty(cells) for column in columns}
+        start = _place(0, 1, cells, size)
+        seconds = min(_timed(solver, arrays, start, cells) for _ in range(2 if cells == 1 else 1))
+        more = LANES if cells == 1 else 4 * cells
+        dear = seconds * (more / cells) * POSITIONS > BUDGET
+        worth_a_look = cells == 1 and (seconds < BUDGET / 4 or more * 50 < size)
+        if 4 * more > size or (dear and not worth_a_look):
+            return cells
+        cells = more
+
+
+def _timed(solver: Solver, arrays: dict[str, Any], start: int, cells: int) -> float:
+    outputs = {name: array for name, array in arrays.items() if name not in (STATUS, METHOD_USED)}
+    begun = time.perf_counter()
+    solver.solve(start, start + cells, outputs, arrays[STATUS], arrays[METHOD_USED])
+    return time.perf_counter() - begun
+
+
+def _place(index: int, count: int, cells: int, size: int) -> int:
+    middle = (2 * index + 1) * size // (2 * count)
+    return min(max(middle - cells // 2, 0), size - cells)
+
+
+def _scattered(count: int) -> list[int]:
+    """0 .. count-1 so that every beginning of the list is spread over all of it (bits reversed)."""
+    bits = max(1, (count - 1).bit_length())
+    turned = (int(f"{i:0{bits}b}"[::-1], 2) for i in range(1 << bits))
+    return [i for i in turned if i < count]

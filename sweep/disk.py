@@ -1,0 +1,127 @@
+"""Every call that changes the disk, in one place, so that a test can make any of them fail.
+
+A file is either there whole or not there at all: written under a temporary name, fsynced, renamed, and the folder
+fsynced. Callers use the functions as attributes of this module (`disk.fsync`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from sweep.errors import SweepError
+
+NEW = os.O_CREAT | os.O_EXCL | os.O_WRONLY
+
+
+def open_file(path: Path, flags: int) -> int:
+    """A file descriptor. Raises OSError."""
+    return os.open(path, flags | getattr(os, "O_CLOEXEC", 0), 0o666)
+
+
+def write(fd: int, piece: Any) -> int:
+    """Bytes written, which may be fewer than asked. Raises OSError."""
+    return os.write(fd, piece)
+
+
+def pwrite(fd: int, piece: Any, offset: int) -> int:
+    """Bytes written at `offset`, which may be fewer than asked. Raises OSError."""
+    return os.pwrite(fd, piece, offset)
+
+
+def fsync(fd: int) -> None:
+    """Returns when the file is on the disk. Raises OSError."""
+    os.fsync(fd)
+
+
+def rename(old: Path, new: Path) -> None:
+    """Takes the place of `new` in one step. Raises OSError."""
+    old.replace(new)
+
+
+def remove(path: Path) -> None:
+    """Removes a file; one that is gone already is no fault. Raises OSError."""
+    path.unlink(missing_ok=True)
+
+
+def make_folder(path: Path) -> None:
+    """Makes a folder; one that is there already is no fault. Raises OSError."""
+    path.mkdir(exist_ok=True)
+
+
+def write_all(fd: int, pieces: Iterable[Any]) -> None:
+    """Writes bytes or C-contiguous arrays one after the other. Raises OSError."""
+    for piece in pieces:
+        view = _as_bytes(piece)
+        while view:
+            view = view[write(fd, view) :]
+
+
+def pwrite_all(fd: int, piece: Any, offset: int) -> None:
+    """Writes bytes or a C-contiguous array at `offset`. Raises OSError."""
+    view = _as_bytes(piece)
+    while view:
+        count = pwrite(fd, view, offset)
+        view, offset = view[count:], offset + count
+
+
+def read_into(fd: int, buffer: Any, offset: int) -> None:
+    """Fills an array from the bytes at `offset`. Raises EOFError where the file ends early, OSError."""
+    view = _as_bytes(buffer)
+    while view:
+        count = os.preadv(fd, [view], offset)
+        if not count:
+            raise EOFError(f"the file ends {len(view)} bytes early")
+        view, offset = view[count:], offset + count
+
+
+def sync_folder(path: Path) -> None:
+    """Returns when the names in a folder are on the disk. Raises OSError."""
+    fd = open_file(path, os.O_RDONLY)
+    try:
+        fsync(fd)
+    finally:
+        os.close(fd)
+
+
+def publish(pieces: Iterable[Any], temporary: Path, final: Path) -> None:
+    """Writes a file that appears under its final name only when it is whole and on the disk. Raises OSError."""
+    try:
+        fd = open_file(temporary, NEW)
+        try:
+            write_all(fd, pieces)
+            fsync(fd)
+        finally:
+            os.close(fd)
+        rename(temporary, final)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise
+    sync_folder(final.parent)
+
+
+def try_lock(fd: int) -> bool:
+    """Whether this process now holds the lock; the system frees it when the process ends, however it ends."""
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def refusal(fault: OSError, path: Path) -> SweepError:
+    """One line for a call that the system refused."""
+    if fault.errno in (errno.ENOSPC, errno.EDQUOT):
+        return SweepError(f"{path}: the disk is full; free some space, then run the same command again to continue")
+    return SweepError(f"{path}: cannot be written ({fault.strerror or fault})")
+
+
+def _as_bytes(piece: Any) -> memoryview:
+    view = memoryview(piece)
+    return view.cast("B") if view.nbytes else memoryview(b"")

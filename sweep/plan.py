@@ -1,0 +1,176 @@
+"""What a study will take, before it runs: cells, bytes, memory, time."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kernels.interface import Status
+from sweep.blocks import Sample, partition, take_sample
+from sweep.errors import SweepError
+from sweep.layout import Layout, layout
+from sweep.pool import cores
+from sweep.progress import duration
+from sweep.result import memory
+
+if TYPE_CHECKING:
+    from sweep.study import Study
+
+FRAME_BYTES = 20_000
+"""Names, units and attributes of a file, about."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A forecast; `str` of it is what `sweep plan` prints.
+
+    Attributes
+    ----------
+    cells, blocks, cells_per_block, workers : int
+    shape : dict of str to int
+        Length of every axis ("cell" of a zip).
+    part_bytes, output_bytes : int
+        Parts are removed when the output is complete; for a moment both are there.
+    memory_bytes : int
+        While it runs with an output; without one, `output_bytes` come on top.
+    free_bytes : int
+        On the disk of the output.
+    cell_seconds, seconds : float
+        On one core; and altogether, without the time of the disk.
+    methods, statuses : dict of str to float
+        Shares of the sampled cells.
+    """
+
+    title: str
+    kernel: str
+    cells: int
+    shape: dict[str, int]
+    outputs: tuple[str, ...]
+    blocks: int
+    cells_per_block: int
+    workers: int
+    part_bytes: int
+    output_bytes: int
+    memory_bytes: int
+    free_bytes: int
+    folder: str
+    cell_seconds: float
+    seconds: float
+    methods: dict[str, float] = field(default_factory=dict)
+    statuses: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What should be seen to before the run."""
+        found = []
+        if self.part_bytes + self.output_bytes > self.free_bytes:
+            needed = quantity(self.part_bytes + self.output_bytes)
+            found.append(f"the disk is too small: {needed} needed, {quantity(self.free_bytes)} free in {self.folder}")
+        if self.memory_bytes > memory():
+            found.append(f"the memory is too small: {quantity(self.memory_bytes)} needed, {quantity(memory())} there")
+        return found
+
+    def __str__(self) -> str:
+        shape = " x ".join(f"{name} {n:,}" for name, n in self.shape.items())
+        rows = {
+            "kernel": self.kernel,
+            "outputs": ", ".join(self.outputs),
+            "cells": f"{self.cells:,} = {shape}"
+            if len(self.shape) > 1
+            else f"{self.cells:,}" + f" ({shape})" * bool(shape),
+            "blocks": f"{self.blocks:,} of {self.cells_per_block:,} cells",
+            "parts": f"{quantity(self.part_bytes)}, while it runs",
+            "output": quantity(self.output_bytes),
+            "disk": f"{quantity(self.free_bytes)} free in {self.folder}",
+            "memory": quantity(self.memory_bytes),
+            "time": f"{duration(self.seconds)} on {self.workers} core{'s' * (self.workers > 1)}, "
+            f"{small_duration(self.cell_seconds)} a cell, plus writing",
+            "methods": _shares(self.methods),
+            "statuses": _shares(self.statuses),
+        }
+        lines = [self.title] if self.title else []
+        lines += [f"  {name:9} {text}" for name, text in rows.items() if text]
+        return "\n".join([*lines, *(f"  warning   {text}" for text in self.warnings)])
+
+
+def plan(study: Study, workers: int | None = None, path: str | os.PathLike[str] | None = None) -> Plan:
+    """Forecast of a run, from the times of a few cells spread over the grid.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Cores; default: all this process may use.
+    path : path, optional
+        Where the output would be; default: the current folder.
+
+    Raises
+    ------
+    SweepError
+        The folder of the output is not there.
+    """
+    from sweep.solve import Solver
+
+    crew = workers or cores()
+    folder = Path(path).absolute().parent if path is not None else Path.cwd()
+    if not folder.is_dir():
+        raise SweepError(f"{path}: there is no folder {folder}")
+    content = layout(study, {})
+    solver = Solver(study)
+    solver.warm()
+    return _forecast(study, content, take_sample(solver, content.columns, content.grid.size), crew, folder)
+
+
+def _forecast(study: Study, content: Layout, sample: Sample, workers: int, folder: Path) -> Plan:
+    size = content.grid.size
+    blocks = partition(sample, size, content.cell_bytes, workers)
+    coordinates = sum(np.asarray(c.values).nbytes for c in content.coordinates)
+    names = [m.name for m in study.kernel.methods]
+    return Plan(
+        title=study.title,
+        kernel=study.kernel_name,
+        cells=size,
+        shape=dict(zip(content.grid.dims, content.grid.shape, strict=True)),
+        outputs=study.outputs,
+        blocks=blocks.count,
+        cells_per_block=blocks.cells,
+        workers=workers,
+        part_bytes=size * content.cell_bytes + blocks.count * 4096,
+        output_bytes=size * content.cell_bytes + coordinates + FRAME_BYTES,
+        memory_bytes=2 * workers * blocks.cells * content.cell_bytes + coordinates,
+        free_bytes=shutil.disk_usage(folder).free,
+        folder=str(folder),
+        cell_seconds=sample.cost,
+        seconds=sample.cost * size / min(workers, blocks.count),
+        methods=_counted(sample.method_used, dict(enumerate(names)) | {-1: "none"}),
+        statuses=_counted(sample.status, {int(s): s.name for s in Status}),
+    )
+
+
+def _counted(numbers: np.ndarray, names: dict[int, str]) -> dict[str, float]:
+    found, counts = np.unique(numbers, return_counts=True)
+    return {names[int(n)]: float(c / len(numbers)) for n, c in zip(found, counts, strict=True)}
+
+
+def _shares(shares: dict[str, float]) -> str:
+    return ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares.items()) + " of a sample" * bool(shares)
+
+
+def quantity(count: float) -> str:
+    """Bytes as people say them: `812 B`, `1.3 kB`, `42 MB`."""
+    units = ["B", "kB", "MB", "GB", "TB", "PB"]
+    while count >= 999.5 and len(units) > 1:
+        count, units = count / 1000, units[1:]
+    return f"{count:.3g} {units[0]}"
+
+
+def small_duration(seconds: float) -> str:
+    """Seconds as people say them where there may be few: `5.1 ns`, `20 us`, `3.4 ms`, `2.0 s`."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        if seconds >= 0.9995 * size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns"

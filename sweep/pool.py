@@ -1,0 +1,80 @@
+"""One pool of threads over many jobs, a few of them submitted at a time."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Iterable
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+
+TICK = 0.5
+"""Seconds after which progress is told even if nothing has finished."""
+
+Jobs = dict["Future[None]", int]
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class Halt:
+    """Tells the jobs that wait for their turn that they need not start."""
+
+    def __init__(self, slots: int) -> None:
+        self._event = threading.Event()
+        self._slots = threading.Semaphore(slots)
+
+    def set(self) -> None:
+        """No job computes from now on, except those that do already."""
+        self._event.set()
+
+    def compute(self, work: Callable[[], None]) -> bool:
+        """Does `work` as soon as a core is free; False where it is not wanted any more."""
+        with self._slots:
+            if self._event.is_set():
+                return False
+            work()
+            return True
+
+
+def each(
+    jobs: Iterable[int],
+    work: Callable[[int], None],
+    threads: int,
+    finished: Callable[[int | None], None],
+    halt: Halt | None = None,
+) -> None:
+    """Calls `work` for every job on a pool of threads.
+
+    After a fault, or Ctrl-C, the jobs at work are ended, no other is begun, and the fault is raised.
+
+    Parameters
+    ----------
+    finished : called in this thread with each job that is done, and with None now and then
+    """
+    waiting: Jobs = {}
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            for job in jobs:
+                waiting[pool.submit(work, job)] = job
+                while len(waiting) >= 2 * threads:
+                    _settle(waiting, finished)
+            while waiting:
+                _settle(waiting, finished)
+        except BaseException:
+            if halt is not None:
+                halt.set()
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+
+
+def _settle(waiting: Jobs, finished: Callable[[int | None], None]) -> None:
+    done, _ = wait(waiting, timeout=TICK, return_when=FIRST_COMPLETED)
+    for future in done:
+        job = waiting.pop(future)
+        future.result()
+        finished(job)
+    finished(None)

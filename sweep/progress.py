@@ -1,0 +1,160 @@
+"""How far a sweep has come: one line redrawn on a terminal, plain lines now and then in a log."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from typing import TextIO
+
+QUIET_SECONDS = 1.0
+"""A run that ends sooner says nothing."""
+LINE_SECONDS = 30.0
+LINE_SHARE = 0.05
+REDRAW_SECONDS = 0.1
+
+
+class Progress:
+    """Tells how many cells are done, how fast, and how long it will take.
+
+    Parameters
+    ----------
+    total : int
+        Cells of the grid.
+    stream : text stream, optional
+        None: say nothing.
+    name : str
+        Begins every line.
+    done : int
+        Cells that were there before.
+    work : float
+        Estimated cost of the cells to come, in any unit; None: as many as there are cells.
+    clock : callable
+        Seconds.
+    """
+
+    def __init__(
+        self,
+        total: int,
+        stream: TextIO | None,
+        name: str = "sweep",
+        done: int = 0,
+        work: float | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.total, self.done, self.computed = total, done, 0
+        self._stream, self._name, self._clock = stream, name, clock
+        self._work, self._worked = float(total - done) if work is None else work, 0.0
+        self._live = stream is not None and stream.isatty()
+        self._begun = clock()
+        self._told: float | None = None
+        self._told_share = 0.0
+        self._width = 0
+
+    @property
+    def seconds(self) -> float:
+        """Since the beginning."""
+        return self._clock() - self._begun
+
+    @property
+    def rate(self) -> float:
+        """Cells per second computed here."""
+        return self.computed / max(self.seconds, 1e-9)
+
+    def add(self, cells: int, work: float | None = None) -> None:
+        """Counts cells as done."""
+        self.done += cells
+        self.computed += cells
+        self._worked += cells if work is None else work
+        self.tick()
+
+    def again(self, cells: int) -> None:
+        """Takes back cells that have to be computed once more."""
+        self.done -= cells
+        self._work += cells * self._work / max(self.total, 1)
+
+    def tick(self) -> None:
+        """Says something if it is time to."""
+        if self._stream is not None and self.seconds >= QUIET_SECONDS and self._due():
+            self._say(self.line())
+
+    def note(self, text: str) -> None:
+        """Says something out of turn."""
+        if self._stream is not None:
+            self._end_line()
+            self._stream.write(self._stamp() + f"{self._name}: {text}\n")
+            self._stream.flush()
+
+    def end(self) -> None:
+        """Says how it ended, where anything was said before."""
+        if self._told is not None:
+            self._say(f"{self._counts()}, {self.rate:,.0f} cells/s, took {duration(self.seconds)}")
+        self._end_line()
+
+    def stop(self) -> None:
+        """Leaves the terminal's line as it is and begins a new one."""
+        self._end_line()
+
+    def line(self) -> str:
+        """What is told now: `12,300/1,000,000 cells (1.2 %), 5,100 cells/s, 3 min left`."""
+        left = self.seconds * (self._work - self._worked) / self._worked if self._worked > 0 else None
+        tail = "" if left is None else f", {self.rate:,.0f} cells/s, {duration(max(left, 0.0))} left"
+        return self._counts() + tail
+
+    def _counts(self) -> str:
+        share = 100 * self.done / self.total if self.total else 100.0
+        # 100 % only when all is done
+        shown = f"{min(share, 99.9):.1f}" if self.done < self.total else "100"
+        return f"{self.done:,}/{self.total:,} cells ({shown} %)"
+
+    def _due(self) -> bool:
+        now = self._clock()
+        if self._told is None:
+            return True
+        if self._live:
+            return now - self._told >= REDRAW_SECONDS
+        share = self.done / max(self.total, 1)
+        # lines by share no oftener than every few seconds, or a short run would be all lines
+        by_share = share - self._told_share >= LINE_SHARE and now - self._told >= LINE_SECONDS / 6
+        return now - self._told >= LINE_SECONDS or by_share
+
+    def _say(self, text: str) -> None:
+        assert self._stream is not None
+        line = f"{self._name}: {text}"
+        if self._live:
+            self._stream.write("\r" + line.ljust(self._width))
+            self._width = len(line)
+        else:
+            self._stream.write(self._stamp() + line + "\n")
+        self._stream.flush()
+        self._told, self._told_share = self._clock(), self.done / max(self.total, 1)
+
+    def _stamp(self) -> str:
+        return "" if self._live else time.strftime("%Y-%m-%d %H:%M:%S  ")
+
+    def _end_line(self) -> None:
+        if self._live and self._width and self._stream is not None:
+            self._stream.write("\n")
+            self._stream.flush()
+            self._width = 0
+
+
+def stream_of(progress: bool | TextIO | None) -> TextIO | None:
+    """Where to tell: None or True is stderr, False nowhere."""
+    if progress is None or progress is True:
+        return sys.stderr
+    return None if progress is False else progress
+
+
+def duration(seconds: float) -> str:
+    """Seconds as people say them: `0.4 s`, `42 s`, `3 min 05 s`, `7 h 12 min`, `3 d 4 h`."""
+    if seconds < 9.95:
+        return f"{seconds:.1f} s"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    if whole < 86400:
+        return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+    return f"{whole // 86400} d {whole % 86400 // 3600} h"

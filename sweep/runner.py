@@ -1,0 +1,239 @@
+"""Runs a study: blocks of cells on a pool of threads, into memory or into a store that survives a kill."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+import numpy as np
+
+from sweep.assemble import assemble
+from sweep.errors import SweepError
+from sweep.fingerprint import difference, fingerprint
+from sweep.layout import columns
+from sweep.pool import cores
+from sweep.progress import Progress, stream_of
+from sweep.result import in_memory, memory, open_result, stored_fingerprint
+from sweep.session import Session, Solve, Spares
+from sweep.store import Store, folder_of, opened, read_spec
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from sweep.store import Spec
+    from sweep.study import Study
+
+MOST_ATTEMPTS = 3
+"""Times that damaged parts are computed again before the disk is given up."""
+
+
+def run(
+    study: Study,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    workers: int | None = None,
+    force: bool = False,
+    progress: bool | TextIO | None = None,
+    block_cells: int | None = None,
+) -> xr.Dataset:
+    """Computes every cell of a study. The same study gives the same bits, however it is cut and continued.
+
+    Parameters
+    ----------
+    study : Study
+    path : path, optional
+        The output, an HDF5 (netCDF4) file. A run that was stopped or killed is continued; an output that is complete
+        for the same study is opened and left alone. None: in memory.
+    workers : int, optional
+        Cells are computed on so many cores at once; default: all this process may use.
+    force : bool
+        Overwrite the result of another study, give up its unfinished parts, compute a complete one anew.
+    progress : bool or text stream, optional
+        Where to tell how far it is; None and True: stderr, False: nowhere. A run of less than a second is silent.
+    block_cells : int, optional
+        Cells a block, instead of a size taken from a timed sample. A run that is continued keeps its own.
+
+    Raises
+    ------
+    SweepError
+        The output cannot be written, belongs to another study or another run, the disk is full, or a kernel failed.
+        What is finished is kept.
+    KeyboardInterrupt
+        After Ctrl-C, when the blocks at work have been stored.
+    """
+    cells = None if block_cells is None else _count("block_cells", block_cells)
+    crew = cores() if workers is None else _count("workers", workers)
+    task = _Task(study, fingerprint(study), crew, stream_of(progress), cells, force)
+    if path is None:
+        return _run_in_memory(task)
+    output = _checked_output(path)
+    if not _done(task, output) or folder_of(output).exists():
+        _run_to_file(task, output)
+    return open_result(output)
+
+
+@dataclass(frozen=True)
+class _Task:
+    study: Study
+    mark: Mapping[str, str]
+    workers: int
+    stream: TextIO | None
+    block_cells: int | None
+    force: bool
+
+
+def _run_in_memory(task: _Task) -> xr.Dataset:
+    session = Session(task.study, task.mark, task.workers, block_cells=task.block_cells)
+    plan = session.layout
+    needed = plan.grid.size * plan.cell_bytes
+    if needed > memory():
+        raise SweepError(f"the result takes {needed / 1e9:.1f} GB, more than the memory; give a path to store it")
+    arrays = {c.name: c.empty(plan.grid.size) for c in plan.columns}
+
+    def work(job: int, solve: Solve) -> None:
+        start, stop = session.blocks.bounds(job)
+        solve(start, stop, {name: array[start:stop] for name, array in arrays.items()})
+
+    jobs = range(session.blocks.count)
+    progress = session.progress(task.stream, task.study.title or "sweep", jobs)
+    try:
+        session.compute(jobs, min(task.workers, len(jobs)), work, progress)
+        progress.end()
+    finally:
+        progress.stop()
+    return in_memory(plan, arrays, session.attrs(progress, session.began))
+
+
+def _run_to_file(task: _Task, output: Path) -> None:
+    with opened(output, columns(task.study)) as store:
+        spec = _spec(store, task)
+        # looked at again, for another run may have ended before this one had the lock
+        if _done(task, output):
+            _tidy(store, spec, task)
+            return
+        _take_up(store, spec, task)
+        blocks = None if store.spec is None else store.blocks
+        session = Session(task.study, task.mark, task.workers, blocks, task.block_cells)
+        if store.spec is None:
+            store.begin(task.study.to_json(), task.mark, session.blocks)
+        progress = session.progress(task.stream, output.name, store.missing())
+        _warn_of_space(session, output, progress)
+        try:
+            _finish(session, store, output, progress)
+        except KeyboardInterrupt:
+            kept = f"{len(store.names)} of {store.blocks.count} blocks are kept"
+            progress.note(f"stopped; {kept}, run the same command again to continue")
+            raise
+        finally:
+            progress.stop()
+        store.clear()
+
+
+def _spec(store: Store, task: _Task) -> Spec | None:
+    """What an earlier run left, if it can be read. Raises SweepError where it cannot, unless forced."""
+    try:
+        return read_spec(store.folder)
+    except SweepError:
+        if task.force:
+            return None
+        raise
+
+
+def _take_up(store: Store, spec: Spec | None, task: _Task) -> None:
+    """Continues what an earlier run left. Raises SweepError where that was another study, unless forced."""
+    if spec is not None and dict(spec.fingerprint) == dict(task.mark):
+        store.resume(spec)
+    elif spec is None or task.force:
+        store.clear()
+    else:
+        raise SweepError(
+            f"{store.folder}: unfinished parts of another study or version; finish that one first, choose another "
+            "name, or give its parts up with --force\n" + _listed(spec.fingerprint, task.mark)
+        )
+
+
+def _tidy(store: Store, spec: Spec | None, task: _Task) -> None:
+    """Removes parts that were left over although their output is complete; not those of another study."""
+    if spec is None or dict(spec.fingerprint) == dict(task.mark):
+        store.clear()
+
+
+def _finish(session: Session, store: Store, output: Path, progress: Progress) -> None:
+    """Computes what is missing and puts the result together, again where a part turns out to be damaged."""
+    for _ in range(MOST_ATTEMPTS):
+        _store_blocks(session, store, progress)
+        assert store.spec is not None
+        attrs = session.attrs(progress, store.spec.begun)
+        damaged = assemble(store, session.layout, output, attrs, session.workers)
+        if not damaged:
+            progress.end()
+            return
+        for index in damaged:
+            path = store.set_aside(index)
+            start, stop = store.blocks.bounds(index)
+            progress.note(f"cells {start} to {stop} were damaged on the disk and are computed again; see {path}")
+            progress.again(stop - start)
+    raise SweepError(f"{store.folder}: what is written there comes back damaged again and again; the disk is failing")
+
+
+def _store_blocks(session: Session, store: Store, progress: Progress) -> None:
+    jobs = store.missing()
+    if not jobs:
+        return
+    # twice as many threads as cores: some wait for the disk while the others compute
+    threads = min(2 * session.workers, len(jobs))
+    cells = min(store.blocks.cells, store.blocks.size)
+    buffers = Spares(lambda: {c.name: c.empty(cells) for c in store.columns}, threads)
+
+    def work(job: int, solve: Solve) -> None:
+        start, stop = store.blocks.bounds(job)
+        with buffers.lent() as columns:
+            arrays = {name: column[: stop - start] for name, column in columns.items()}
+            if solve(start, stop, arrays):
+                store.put(job, arrays)
+
+    session.compute(jobs, threads, work, progress)
+
+
+def _warn_of_space(session: Session, output: Path, progress: Progress) -> None:
+    """Parts to come and the output have room on the disk, or somebody is told."""
+    needed = session.layout.cell_bytes * (progress.total - progress.done + progress.total)
+    free = shutil.disk_usage(output.parent).free
+    if needed > free:
+        progress.note(f"needs {needed / 1e9:.1f} GB, only {free / 1e9:.1f} GB are free here")
+
+
+def _done(task: _Task, output: Path) -> bool:
+    """Whether the output is complete for this study. Raises SweepError where it is something else."""
+    if not output.exists():
+        return False
+    stored = stored_fingerprint(output)
+    if task.force:
+        return False
+    if stored == dict(task.mark):
+        return True
+    raise SweepError(
+        f"{output}: holds the result of another study or version; choose another name, or overwrite it with --force\n"
+        + _listed(stored, task.mark)
+    )
+
+
+def _listed(old: Mapping[str, str], new: Mapping[str, str]) -> str:
+    return "\n".join(f"  {line}" for line in difference(dict(old), dict(new)))
+
+
+def _checked_output(path: str | os.PathLike[str]) -> Path:
+    output = Path(os.path.realpath(path))
+    if not output.parent.is_dir():
+        raise SweepError(f"{path}: there is no folder {output.parent}")
+    return output
+
+
+def _count(name: str, number: int) -> int:
+    if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 1:
+        raise SweepError(f"{name}: expected a whole number from 1 on, found {number!r}")
+    return int(number)

@@ -1,0 +1,144 @@
+"""One run of a study: its layout, how it is cut into blocks, and the threads that compute them."""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any, Generic, TextIO, TypeVar
+
+from sweep.blocks import Partition, Sample, order, partition, take_sample
+from sweep.errors import SweepError
+from sweep.layout import METHOD_USED, STATUS, Layout, layout
+from sweep.pool import Halt, each
+from sweep.progress import Progress
+
+if TYPE_CHECKING:
+    from sweep.study import Study
+
+T = TypeVar("T")
+
+Solve = Callable[[int, int, Mapping[str, Any]], bool]
+"""Computes the cells start .. stop into columns of that length; False where the run is being stopped."""
+
+
+class Session:
+    """Compiles the kernel, times a sample of the grid, and cuts it.
+
+    Parameters
+    ----------
+    study : Study
+    mark : fingerprint of the study
+    workers : cores to compute on
+    blocks : how the grid is cut, where that is settled already
+    block_cells : cells a block, instead of a size taken from the sample
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        mark: Mapping[str, str],
+        workers: int,
+        blocks: Partition | None = None,
+        block_cells: int | None = None,
+    ) -> None:
+        from sweep.solve import Solver
+
+        self.study, self.workers = study, workers
+        self.began = now()
+        self.layout: Layout = layout(study, mark)
+        solver = Solver(study)
+        solver.warm()
+        size = self.layout.grid.size
+        self.sample: Sample = take_sample(solver, self.layout.columns, size)
+        if blocks is None and block_cells is not None:
+            blocks = Partition(size, min(block_cells, size))
+        self.blocks = blocks or partition(self.sample, size, self.layout.cell_bytes, workers)
+        self._weights = self.sample.weights(self.blocks)
+
+    def progress(self, stream: TextIO | None, name: str, jobs: Iterable[int]) -> Progress:
+        """Where the run stands when `jobs` are still to do."""
+        left, work = 0, 0.0
+        for job in jobs:
+            start, stop = self.blocks.bounds(job)
+            left, work = left + stop - start, work + float(self._weights[job])
+        size = self.layout.grid.size
+        return Progress(size, stream, name, size - left, work)
+
+    def attrs(self, progress: Progress, began: str) -> dict[str, Any]:
+        """Times of the run, for the result."""
+        end = now()
+        return {"created": end, "start": began, "end": end, "cells_per_second": progress.rate}
+
+    def compute(
+        self, jobs: Iterable[int], threads: int, work: Callable[[int, Solve], None], progress: Progress
+    ) -> None:
+        """Calls `work(job, solve)` for every block, dear ones first, on a pool of threads.
+
+        No more than `workers` threads are inside `solve` at a time. Raises SweepError where `work` fails.
+        """
+        halt = Halt(self.workers)
+        solvers = Spares(lambda: self._solver(halt), threads)
+
+        def guarded(job: int) -> None:
+            with self._faults_told(job), solvers.lent() as solve:
+                work(job, solve)
+
+        def finished(job: int | None) -> None:
+            if job is None:
+                progress.tick()
+            else:
+                start, stop = self.blocks.bounds(job)
+                progress.add(stop - start, float(self._weights[job]))
+
+        wanted = set(jobs)
+        each((j for j in map(int, order(self.sample, self.blocks)) if j in wanted), guarded, threads, finished, halt)
+
+    def _solver(self, halt: Halt) -> Solve:
+        from sweep.solve import Solver
+
+        solver = Solver(self.study)
+
+        def solve(start: int, stop: int, arrays: Mapping[str, Any]) -> bool:
+            outputs = {name: array for name, array in arrays.items() if name not in (STATUS, METHOD_USED)}
+            return halt.compute(lambda: solver.solve(start, stop, outputs, arrays[STATUS], arrays[METHOD_USED]))
+
+        return solve
+
+    @contextlib.contextmanager
+    def _faults_told(self, job: int) -> Iterator[None]:
+        try:
+            yield
+        except SweepError:
+            raise
+        except MemoryError as fault:
+            raise SweepError("out of memory; fewer workers need less; what is finished is kept") from fault
+        except Exception as fault:
+            start, stop = self.blocks.bounds(job)
+            raise SweepError(
+                f"cells {start} to {stop}: the kernel failed ({type(fault).__name__}: {fault}); what is finished is kept"
+            ) from fault
+
+
+class Spares(Generic[T]):
+    """Things that one thread at a time may use, made once and lent out again and again."""
+
+    def __init__(self, make: Callable[[], T], count: int) -> None:
+        self._free: queue.SimpleQueue[T] = queue.SimpleQueue()
+        for _ in range(count):
+            self._free.put(make())
+
+    @contextlib.contextmanager
+    def lent(self) -> Iterator[T]:
+        """Waits for a free one."""
+        one = self._free.get()
+        try:
+            yield one
+        finally:
+            self._free.put(one)
+
+
+def now() -> str:
+    """The time as ISO 8601 in UTC."""
+    return datetime.now(UTC).isoformat(timespec="seconds")

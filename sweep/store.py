@@ -1,0 +1,242 @@
+"""Finished blocks on the disk while a sweep runs: OUT.h5.parts/.
+
+    spec.json                      the study, its fingerprint, and how the grid is cut into blocks
+    lock                           held while a sweep runs; the system frees it when the process ends
+    <start>-<stop>.<digest>.h5     one block: a small HDF5 file that is written once, or not at all
+
+A block counts as done when its file bears this name. The digest (xxh3, 128 bits) is of its numbers, in the order of
+the columns: a block computed twice has the same name, and a damaged file is known from its name.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import secrets
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from sweep import disk
+from sweep.blocks import Partition
+from sweep.errors import SweepError
+from sweep.image import Images
+from sweep.layout import Column
+from sweep.parts import PART_NAME, digest, part_name, read_part
+
+FORMAT = 1
+SPEC = "spec.json"
+LOCK = "lock"
+
+
+@dataclass(frozen=True)
+class Spec:
+    """What spec.json says: all that a sweep needs to be continued or read."""
+
+    study: str
+    fingerprint: Mapping[str, str]
+    blocks: Partition
+    begun: str
+
+    def to_json(self) -> str:
+        """The text of spec.json."""
+        return json.dumps(
+            {
+                "format": FORMAT,
+                "cells": self.blocks.size,
+                "cells_per_block": self.blocks.cells,
+                "begun": self.begun,
+                "fingerprint": dict(self.fingerprint),
+                "study": self.study,
+            },
+            indent=1,
+        )
+
+
+def read_spec(folder: Path) -> Spec | None:
+    """The spec of a sweep that has not ended, or None where there is none. Raises SweepError."""
+    path = folder / SPEC
+    try:
+        keys = json.loads(path.read_text("utf-8"))
+        if keys["format"] != FORMAT:
+            raise SweepError(f"{path}: format {keys['format']}; this version of foliot reads format {FORMAT}")
+        blocks = Partition(int(keys["cells"]), int(keys["cells_per_block"]))
+        return Spec(keys["study"], keys["fingerprint"], blocks, keys["begun"])
+    except FileNotFoundError:
+        return None
+    except OSError as fault:
+        raise SweepError(f"{path}: cannot be read ({fault.strerror})") from None
+    except (ValueError, KeyError, TypeError) as fault:
+        raise SweepError(f"{path}: damaged ({fault}); remove the folder {folder} to start anew") from None
+
+
+def folder_of(output: Path) -> Path:
+    """Where the parts of a result are kept while its sweep runs."""
+    return output.with_name(output.name + ".parts")
+
+
+class Store:
+    """The parts of one sweep, locked for this process. Made by `opened`.
+
+    Attributes
+    ----------
+    folder : Path
+    columns : tuple of Column
+    spec : Spec or None
+        None until `begin`, where the sweep is new.
+    names : dict of int to str
+        File of every finished block.
+    """
+
+    def __init__(self, folder: Path, columns: Sequence[Column]) -> None:
+        self.folder = folder
+        self.columns = tuple(columns)
+        self.spec: Spec | None = None
+        self.names: dict[int, str] = {}
+        self.run = secrets.token_hex(4)
+        self._images = Images(columns)
+
+    @property
+    def blocks(self) -> Partition:
+        """How the grid is cut."""
+        assert self.spec is not None, "the sweep has not begun"
+        return self.spec.blocks
+
+    def missing(self) -> list[int]:
+        """Numbers of the blocks that are not done, ascending."""
+        return [i for i in range(self.blocks.count) if i not in self.names]
+
+    def begin(self, study: str, fingerprint: Mapping[str, str], blocks: Partition) -> None:
+        """Fixes study and partition for good. Raises SweepError."""
+        begun = datetime.now(UTC).isoformat(timespec="seconds")
+        spec = Spec(study, fingerprint, blocks, begun)
+        path = self.folder / SPEC
+        try:
+            disk.publish([spec.to_json().encode()], self.temporary(SPEC), path)
+        except OSError as fault:
+            raise disk.refusal(fault, path) from fault
+        self.spec = spec
+
+    def resume(self, spec: Spec) -> None:
+        """Takes up the parts that are there. Raises SweepError."""
+        self.spec = spec
+        try:
+            self._sort_out()
+        except OSError as fault:
+            raise disk.refusal(fault, self.folder) from fault
+
+    def put(self, index: int, arrays: Mapping[str, Any]) -> None:
+        """Stores a block: on return it is on the disk. Raises SweepError."""
+        start, stop = self.blocks.bounds(index)
+        name = part_name(start, stop, digest(self.columns, arrays))
+        pieces = self._images.pieces(start, stop, arrays)
+        try:
+            disk.publish(pieces, self.temporary(f"{start:012d}"), self.folder / name)
+        except OSError as fault:
+            raise disk.refusal(fault, self.folder / name) from fault
+        self.names[index] = name
+
+    def get(self, index: int, buffers: Mapping[str, Any] | None = None) -> dict[str, Any] | None:
+        """The numbers of a finished block, or None where its file is damaged. Raises FileNotFoundError."""
+        return read_part(self.folder / self.names[index], self.columns, *self.blocks.bounds(index), buffers)
+
+    def set_aside(self, index: int) -> Path:
+        """Takes a damaged block out of the finished ones, keeping its file for a look. Raises OSError."""
+        path = self.folder / self.names.pop(index)
+        return _set_aside(path)
+
+    def temporary(self, name: str) -> Path:
+        """A name for a file that is not whole yet."""
+        return self.folder / f"{name}.{self.run}.tmp"
+
+    def clear(self) -> None:
+        """Removes all but the lock, the spec last, so that what is left of a removal cut short can be taken up."""
+        for path in self.folder.iterdir():
+            if path.name not in (SPEC, LOCK):
+                disk.remove(path)
+        disk.remove(self.folder / SPEC)
+        self.spec, self.names = None, {}
+
+    def _sort_out(self) -> None:
+        for entry in os.scandir(self.folder):
+            if entry.name.endswith(".tmp"):
+                disk.remove(Path(entry.path))
+            elif match := PART_NAME.fullmatch(entry.name):
+                self._take_up(entry, int(match[1]), int(match[2]))
+
+    def _take_up(self, entry: os.DirEntry[str], start: int, stop: int) -> None:
+        index = start // self.blocks.cells
+        least = (stop - start) * sum(column.cell_bytes for column in self.columns)
+        if self.blocks.bounds(index) != (start, stop) or entry.stat().st_size < least:
+            _set_aside(Path(entry.path))
+        elif index in self.names:
+            self._compare(index, entry.name)
+        else:
+            self.names[index] = entry.name
+
+    def _compare(self, index: int, other: str) -> None:
+        """Of two files of one block, one must be damaged."""
+        start, stop = self.blocks.bounds(index)
+        both = (self.names[index], other)
+        sound = [name for name in both if read_part(self.folder / name, self.columns, start, stop) is not None]
+        if len(sound) == 2:
+            raise SweepError(
+                f"{self.folder}: cells {start} to {stop} came out differently twice; the kernel is not deterministic"
+            )
+        del self.names[index]
+        for name in set(both) - set(sound):
+            _set_aside(self.folder / name)
+        if sound:
+            self.names[index] = sound[0]
+
+
+@contextlib.contextmanager
+def opened(output: Path, columns: Sequence[Column]) -> Iterator[Store]:
+    """The store beside an output, made where there is none and held by this process alone.
+
+    It is removed at the end where nothing is left in it. Raises SweepError.
+    """
+    folder = folder_of(output)
+    try:
+        fd = _lock(folder)
+    except OSError as fault:
+        raise disk.refusal(fault, folder) from fault
+    store = Store(folder, columns)
+    try:
+        yield store
+    finally:
+        if store.spec is None:
+            _remove_folder(folder)
+        os.close(fd)
+
+
+def _lock(folder: Path) -> int:
+    while True:
+        disk.make_folder(folder)
+        try:
+            fd = disk.open_file(folder / LOCK, os.O_CREAT | os.O_RDWR)
+        except FileNotFoundError:
+            continue
+        if not disk.try_lock(fd):
+            os.close(fd)
+            raise SweepError(f"{folder}: another run is at work on this output; wait for it, or choose another with -o")
+        # the run that held the lock may have removed the folder meanwhile
+        with contextlib.suppress(FileNotFoundError):
+            if (folder / LOCK).stat().st_ino == os.fstat(fd).st_ino:
+                return fd
+        os.close(fd)
+
+
+def _remove_folder(folder: Path) -> None:
+    with contextlib.suppress(OSError):
+        disk.remove(folder / LOCK)
+        folder.rmdir()
+
+
+def _set_aside(path: Path) -> Path:
+    aside = path.with_name(path.name + ".damaged")
+    disk.rename(path, aside)
+    return aside
