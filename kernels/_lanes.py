@@ -355,11 +355,17 @@ def _cells_pointer(context, builder, array_type, array, i):
     return builder.bitcast(first, ir.VectorType(element, WIDTH).as_pointer()), element
 
 
+def _align(element):
+    """Bytes of one cell: a column's cells need not lie on a register's border."""
+    return element.width // 8 if isinstance(element, ir.IntType) else 8
+
+
 @intrinsic
 def _load(typing_context, column, i):
     def codegen(context, builder, signature, values):
-        pointer, _ = _cells_pointer(context, builder, signature.args[0], *values)
-        return builder.load(pointer, align=8)
+        pointer, element = _cells_pointer(context, builder, signature.args[0], *values)
+        cells = builder.load(pointer, align=_align(element))
+        return builder.sitofp(cells, ir.VectorType(_F64, WIDTH)) if isinstance(element, ir.IntType) else cells
 
     return _lanes(column, i), codegen
 
@@ -371,7 +377,7 @@ def _store(typing_context, column, i, value):
         cells = context.cast(builder, values[2], signature.args[2], _lanes)
         if isinstance(element, ir.IntType):
             cells = builder.fptosi(cells, ir.VectorType(element, WIDTH))
-        builder.store(cells, pointer, align=element.width // 8 if isinstance(element, ir.IntType) else 8)
+        builder.store(cells, pointer, align=_align(element))
         return context.get_dummy_value()
 
     return types.void(column, i, value), codegen

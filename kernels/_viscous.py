@@ -12,8 +12,8 @@ A *cycle* below is the tuple (q, lambda, A, s, m).
 import math
 
 from kernels._jit import jit
-from kernels._lanes import fma, isnt, some, where
-from kernels._vecmath import cbrt, exp, horner, mantissa_exponent, scale
+from kernels._lanes import fma, isnt, magnitude, some, sqrt, where
+from kernels._vecmath import cbrt, exp, exp_remainder, horner, log_remainder, mantissa_exponent, scale
 from kernels._viscous_fit import AMPLITUDE_STRONG, GAP_WEAK, OVERSHOOT_WEAK, Q_STRONG, SENSITIVITY_STRONG, SPLIT
 
 ROUNDING = 1e-15
@@ -23,6 +23,12 @@ _TAME_LOW, _TAME_HIGH = 2.0**-240, 2.0**240  # a^2 phi0/mu and its rounding erro
 _NORMAL_LOW, _NORMAL_HIGH = 2.3e-308, 1.79e308
 _OVERSHOOT = 1.0 - math.log(2.0)
 _EXP_MINUS_2 = math.exp(-2.0)
+MAP_LIMIT = 10_000
+"""Half swings after which `iterated` gives up: at rtol 1e-9 enough up to alpha of about 1e9."""
+
+_Q_SERIES = (2 / 15, 3 / 175, 2 / 1575)
+_AMPLITUDE_SERIES = (1 / 10, 4 / 525, -1 / 31500)
+_SENSITIVITY_SERIES = (4 / 45, 52 / 4725, -32 / 70875)
 
 
 @jit
@@ -107,3 +113,100 @@ def _closed_weak(k, rest, decay):
     q = k + (lam + rest)
     amplitude = 1.0 + fma(x, horner(x, OVERSHOOT_WEAK), _OVERSHOOT) / k
     return q, lam, amplitude, k / (q * (lam * lam)), gap / (2.0 - gap)
+
+
+@jit
+def asymptotic(k):
+    """The cycle from two series: b = cbrt(3k) small (strong drive), x = exp(-2(k + 1)) small (weak drive).
+
+    Strong: q = b (1 + 2 b^2/15 + 3 b^4/175 + 2 b^6/1575), A = 1.5/b (1 + b^2/10 + 4 b^4/525 - b^6/31500),
+    s = 1/3 + 4 b^2/45 + 52 b^4/4725 - 32 b^6/70875. Weak: lambda = 1 - 2x, A = 1 + alpha (1 - ln 2 - x).
+    """
+    strong = k < SPLIT
+    q, lam, amplitude, s = 0.0 * k, 0.0 * k, 0.0 * k, 0.0 * k
+    if some(strong):
+        b = cbrt(3.0 * k)
+        w = b * b
+        tail = horner(w, _Q_SERIES)
+        q, lam = fma(b * w, tail, b), fma(b * w, tail - 1.0 / 3.0, b)
+        amplitude = fma(w, horner(w, _AMPLITUDE_SERIES), 1.0) * (1.5 / b)
+        s = fma(w, horner(w, _SENSITIVITY_SERIES), 1.0 / 3.0)
+    decay = exp(-2.0 * where(strong, q, k))
+    if some(isnt(strong)):
+        x = decay * _EXP_MINUS_2
+        weak_lam = 1.0 - 2.0 * x
+        weak_q = k + weak_lam
+        q, lam = where(strong, q, weak_q), where(strong, lam, weak_lam)
+        amplitude = where(strong, amplitude, 1.0 + (_OVERSHOOT - x) / k)
+        s = where(strong, s, k / (weak_q * (weak_lam * weak_lam)))
+        decay = where(strong, decay, x)
+    return q, lam, amplitude, s, decay
+
+
+@jit
+def asymptotic_bound(k):
+    """Bounds on the relative errors of `asymptotic`: of period, amplitude, speed and sensitivity, and of m.
+
+    Strong: the first term left out, b^8, with the largest coefficient over the side doubled. Weak: (1 - lambda)/x - 2
+    = 6x + ... <= 7.3x, squared away twice in s; m = x (1 + 4x + ...), where the rounding of k counts 2k-fold.
+    """
+    strong = k < SPLIT
+    w = 0.0 * k
+    if some(strong):
+        b = cbrt(3.0 * k)
+        w = b * b
+    x = exp(-2.0 * (where(strong, 1.0, k) + 1.0))
+    cycle = where(strong, 2e-3 * (w * w) * (w * w), 20.0 * (x * x)) + ROUNDING
+    rounding = where(k < 400.0, 1e-15 * k, 0.0)  # below exp(-800) the multiplier is 0 for good
+    return cycle, where(strong, 2.0 * cycle, 5.0 * x + rounding) + ROUNDING
+
+
+@jit
+def next_speed(y):
+    """u and -ln(1 - u) of the flight that ends at speed u: -ln(1 - u) - u = y, for y > 0.
+
+    Solved for z = -ln(1 - u) by three Halley steps from a start within 2 %; u = z - y cancels for large z,
+    1 - exp(-z) for small z.
+    """
+    t = sqrt(2.0 * y)
+    z = where(y < 0.8, t + t * t * (1.0 / 6.0 + t * (1.0 / 36.0)), y + 1.0 - exp(-1.0 - y))
+    for _ in range(3):
+        decay = exp(-z)
+        slope = where(z < 0.01, z - 0.5 * z * z, 1.0 - decay)
+        miss = exp_remainder(z) - y
+        z = z - miss * slope / (slope * slope - 0.5 * miss * decay)
+    return where(z < 1.0, z - y, 1.0 - exp(-z)), z
+
+
+@jit
+def iterated(k, rtol):
+    """The cycle from the exact map of the switching speed, iterated from rest at phi = 0; and where it has not settled.
+
+    Half swing: -ln(1 - u') - u' = 2k + u - ln(1 + u). The speed rises monotonically to lambda and no later step
+    shrinks the distance by a factor above r = (1 - u')/(1 + u), so the distance left is at most (u' - u) r/(1 - r).
+    A cell has settled when that is below rtol/4 of u', and, for the multiplier, below rtol/4 of 1 - u'.
+    """
+    u, z = next_speed(k)
+    active = u > -1.0
+    for _ in range(MAP_LIMIT):
+        if not some(active):
+            break
+        new, new_z = next_speed(fma(2.0, k, log_remainder(u)))
+        room = where(new < 1.0 - new, new / (1.0 - new), 1.0)
+        unsettled = magnitude(new - u) > 0.25 * rtol * (u + new) * room
+        u, z = where(active, new, u), where(active, new_z, z)
+        active = active & unsettled
+    q = u + k
+    decay = exp(-z)  # 1 - u
+    return (q, u, 1.0 + log_remainder(u) / k, k / (q * (u * u)), decay / (2.0 - decay)), active
+
+
+@jit
+def iterated_bound(k):
+    """Four times the rounding error of `iterated`: its map forgets only a share 2b of an error, b = cbrt(3k) small."""
+    strong = k < SPLIT
+    b = 0.0 * k + 1.0
+    if some(strong):
+        b = cbrt(3.0 * where(strong, k, 1.0))
+    cycle = 8e-15 + 2e-15 / b
+    return cycle, cycle + where(k < 400.0, 4e-15 * k, 0.0)

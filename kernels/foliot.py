@@ -11,26 +11,133 @@ import math
 from kernels import _viscous
 from kernels._jit import entry, jit
 from kernels._lanes import each_cell, where
-from kernels.interface import Status
+from kernels.interface import Field, Kernel, Method, Status
 
-_OK, _OUT_OF_RANGE = float(Status.OK), float(Status.OUT_OF_RANGE)
+_OK, _BAD_INPUT, _OUT_OF_RANGE = float(Status.OK), float(Status.BAD_INPUT), float(Status.OUT_OF_RANGE)
+_NEVER_STARTS, _NO_LIMIT_CYCLE = float(Status.NEVER_STARTS), float(Status.NO_LIMIT_CYCLE)
+_NOT_CONVERGED = float(Status.NOT_CONVERGED)
 
 
 @jit
-def _write(i, scene, cycle, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+def _write(i, scene, cycle, verdict, period, amplitude, crossing_speed, sensitivity, multiplier, status):
     period[i], amplitude[i], crossing_speed[i], normal = _viscous.dimensional(scene, cycle)
     sensitivity[i], multiplier[i] = cycle[3], cycle[4]
-    status[i] = where(normal, _OK, _OUT_OF_RANGE)
+    status[i] = where(normal, verdict, _OUT_OF_RANGE)
 
 
 @jit
 def _closed(i, mu, phi0, a, period, amplitude, crossing_speed, sensitivity, multiplier, status):
     k, rest, scene = _viscous.without_dimensions(mu[i], phi0[i], a[i])
     cycle = _viscous.closed(k, rest)
-    _write(i, scene, cycle, period, amplitude, crossing_speed, sensitivity, multiplier, status)
+    _write(i, scene, cycle, _OK, period, amplitude, crossing_speed, sensitivity, multiplier, status)
 
 
 @entry
 def closed(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
     """The root q of q - tanh q = 1/alpha from fitted polynomials: 1e-15 at every drive, no iteration."""
     each_cell(_closed, (mu, phi0, a, period, amplitude, crossing_speed, sensitivity, multiplier, status))
+
+
+@jit
+def _asymptotic(i, mu, phi0, a, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+    k, _, scene = _viscous.without_dimensions(mu[i], phi0[i], a[i])
+    cycle = _viscous.asymptotic(k)
+    _write(i, scene, cycle, _OK, period, amplitude, crossing_speed, sensitivity, multiplier, status)
+
+
+@entry
+def asymptotic(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+    """Weak and strong series: within 3 % at every drive, to 1e-9 outside 5 > 1/alpha > 1e-3."""
+    each_cell(_asymptotic, (mu, phi0, a, period, amplitude, crossing_speed, sensitivity, multiplier, status))
+
+
+
+@jit
+def _iterated(i, mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+    k, _, scene = _viscous.without_dimensions(mu[i], phi0[i], a[i])
+    cycle, unsettled = _viscous.iterated(k, rtol[i])
+    verdict = where(unsettled, _NOT_CONVERGED, _OK)
+    _write(i, scene, cycle, verdict, period, amplitude, crossing_speed, sensitivity, multiplier, status)
+
+
+@entry
+def iterated(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+    """The exact map from switch to switch, iterated from rest; slow at strong drive, where each swing forgets little."""
+    each_cell(_iterated, (mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status))
+
+
+@jit
+def _worst(asked, cycle, multiplier):
+    """The larger of the two bounds that the outputs asked for can meet; the multiplier is the last output."""
+    return where((asked[4] == 1) & (multiplier > cycle), multiplier, cycle)
+
+
+@jit
+def _asymptotic_bound(i, mu, phi0, a, out, asked):
+    k, _, _ = _viscous.without_dimensions(mu[i], phi0[i], a[i])
+    out[i] = _worst(asked, *_viscous.asymptotic_bound(k))
+
+
+@entry
+def asymptotic_bound(mu, phi0, a, asked, out):
+    """Bound on the error of `asymptotic`: the first terms left out."""
+    each_cell(_asymptotic_bound, (mu, phi0, a, out, asked))
+
+
+@jit
+def _iterated_bound(i, mu, phi0, a, out, asked):
+    k, _, _ = _viscous.without_dimensions(mu[i], phi0[i], a[i])
+    out[i] = _worst(asked, *_viscous.iterated_bound(k))
+
+
+@entry
+def iterated_bound(mu, phi0, a, asked, out):
+    """What rounding leaves of the iterated map; that it settles to rtol, its status says."""
+    each_cell(_iterated_bound, (mu, phi0, a, out, asked))
+
+
+@entry
+def closed_bound(mu, phi0, a, asked, out):
+    """`closed` is right to rounding everywhere."""
+    out[:] = _viscous.ROUNDING
+
+
+@jit
+def _check(i, mu, phi0, a, status):
+    finite = (mu[i] < math.inf) & (phi0[i] < math.inf) & (a[i] < math.inf)
+    allowed = finite & (mu[i] >= 0.0) & (phi0[i] > 0.0) & (a[i] >= 0.0)  # NaN fails
+    cycle = where(a[i] > 0.0, _OK, _NO_LIMIT_CYCLE)
+    status[i] = where(allowed, where(mu[i] > 0.0, cycle, _NEVER_STARTS), _BAD_INPUT)
+
+
+@entry
+def check(mu, phi0, a, status):
+    """BAD_INPUT for what is NaN, infinite or negative; NEVER_STARTS without torque; NO_LIMIT_CYCLE without friction."""
+    each_cell(_check, (mu, phi0, a, status))
+
+
+PARAMETERS = (
+    Field("mu", "rad/s^2", "drive torque per moment of inertia", lower=0.0, open_lower=True),
+    Field("phi0", "rad", "switching angle", lower=0.0, open_lower=True),
+    Field("a", "1/s", "viscous friction per moment of inertia", default=0.0, lower=0.0),
+)
+
+FOLIOT = Kernel(
+    name="foliot",
+    doc="limit cycle of a verge and foliot with viscous friction",
+    source="Hoyng & Nieuwenhuizen, arXiv:1604.06681",
+    parameters=PARAMETERS,
+    outputs=(
+        Field("period", "s", "period of the limit cycle"),
+        Field("amplitude", "rad", "largest angle"),
+        Field("crossing_speed", "rad/s", "angular speed just before the switch"),
+        Field("sensitivity", "1", "s = -dlnP/dlnmu, the share of a torque error that reaches the period"),
+        Field("multiplier", "1", "multiplier of the half-cycle map; a disturbance shrinks by it each half swing"),
+    ),
+    check=check,
+    methods=(
+        Method("asymptotic", "weak and strong series with a bound each", asymptotic, asymptotic_bound),
+        Method("closed", "root of q - tanh q = 1/alpha by fitted polynomials", closed, closed_bound),
+        Method("map", "exact map from switch to switch, iterated from rest", iterated, iterated_bound),
+    ),
+)
