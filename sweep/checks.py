@@ -137,6 +137,11 @@ def listed(words: Iterable[str], quote: bool = False, word: str = "or") -> str:
     return f" {word} ".join([", ".join(texts[:-1]), texts[-1]]) if len(texts) > 1 else "".join(texts)
 
 
+def quoted(words: Iterable[str]) -> str:
+    """'"a", "b"'."""
+    return ", ".join(f'"{word}"' for word in words)
+
+
 def did_you_mean(found: Any, words: Iterable[str]) -> str:
     """'; did you mean x?', or nothing where no word is near."""
     if not isinstance(found, str):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kernels.interface import Field
 from sweep import axes
-from sweep.checks import Mistakes, did_you_mean, exact_float, listed, show
+from sweep.checks import Mistakes, did_you_mean, exact_float, listed, quoted, show
 from sweep.study import Axis, frozen
 from sweep.units import UnitMistake, scale
 
@@ -109,9 +109,7 @@ class Entries:
     def _spaced(self, table: Mapping[str, Any], field: Field | None, where: str, factor: Decimal | None) -> Floats:
         before = len(self.mistakes)
         if field and field.choices:
-            self.mistakes.add(
-                where, f"{field.name} takes words; write e.g. values = [{listed(field.choices, quote=True, word=',')}]"
-            )
+            self.mistakes.add(where, f"{field.name} takes words; write e.g. values = [{quoted(field.choices)}]")
             return NONE
         spacing = self.mistakes.word(table["spacing"], f"{where}.spacing", SPACINGS)
         for key in SPACING_KEYS:

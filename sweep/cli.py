@@ -1,0 +1,234 @@
+"""The command `sweep`. Every fault that a user can act on ends in one message and exit status 2, never in a traceback.
+
+Modules are imported by the command that needs them, so that `sweep --help` is quick.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sweep.errors import SweepError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from sweep.study import Study
+
+OK, FAULT, MISTAKE, INTERRUPTED = 0, 1, 2, 130
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Returns
+    -------
+    int
+        0; 2 for a mistake of the user or a fault of the machine; 130 after Ctrl-C; 1 for a fault of ours.
+    """
+    arguments = parser().parse_args(argv)
+    try:
+        arguments.command(arguments)
+        sys.stdout.flush()
+    except SweepError as error:
+        return _fail(str(error), MISTAKE)
+    except KeyboardInterrupt:
+        return _fail("stopped", INTERRUPTED)
+    except BrokenPipeError:
+        # whoever read our output has had enough; Python would complain again when it closes stdout
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return OK
+    except MemoryError:
+        return _fail("out of memory; choose fewer cells, fewer outputs or fewer workers", MISTAKE)
+    except OSError as error:
+        return _fail(f"{error.filename or 'the system'}: {error.strerror or error}", MISTAKE)
+    except Exception as error:
+        if os.environ.get("SWEEP_TRACEBACK"):
+            raise
+        return _fail(
+            f"a fault in foliot: {type(error).__name__}: {error}\n"
+            "Please report it; with SWEEP_TRACEBACK=1 in the environment the same command says where.",
+            FAULT,
+        )
+    return OK
+
+
+def parser() -> argparse.ArgumentParser:
+    """All commands and their options."""
+    top = argparse.ArgumentParser(prog="sweep", description="Sweep a kernel over a grid of parameters.")
+    top.add_argument("--version", action="version", version=_version())
+    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    kernels = _command(commands, "kernels", _kernels, "what can be swept: parameters, units, outputs, methods")
+    kernels.add_argument("name", metavar="NAME", nargs="?", help="tell all about this one")
+    _add_allow_import(kernels)
+
+    plan = _command(commands, "plan", _plan, "cells, bytes, memory and a timed forecast, before anything runs")
+    _add_study(plan)
+
+    run = _command(commands, "run", _run, "compute a study, or continue where it stopped")
+    _add_study(run)
+    run.add_argument("-o", "--output", metavar="OUT.h5", type=Path, help="default: the study's name with .h5, here")
+    run.add_argument("--force", action="store_true", help="overwrite the result of another study")
+
+    show = _command(commands, "show", _show, "what is in a result, how much is done, what became of its cells")
+    _add_result(show)
+
+    fit = _command(commands, "fit", _fit, "exponent of a power law, and where two laws meet")
+    _add_result(fit)
+    fit.add_argument("--y", metavar="OUTPUT", required=True)
+    fit.add_argument("--x", metavar="AXIS", required=True)
+    window = "part of the axis to fit over; given twice, also tells where the two laws meet"
+    fit.add_argument("--window", nargs=2, type=float, metavar=("LO", "HI"), action="append", help=window)
+    _add_at(fit)
+
+    plot = _command(commands, "plot", _plot, "a figure of one output")
+    _add_result(plot)
+    plot.add_argument(
+        "-o", "--output", metavar="FILE.png", type=Path, help="default: the result's name with .png, here"
+    )
+    plot.add_argument("--y", metavar="OUTPUT", help="default: the first output")
+    plot.add_argument("--x", metavar="AXIS", help="default: the first axis")
+    _add_at(plot)
+
+    export = _command(commands, "export", _export, "write a result as csv or netCDF4")
+    _add_result(export)
+    export.add_argument("-o", "--output", metavar="FILE.csv|FILE.nc", type=Path, required=True)
+    return top
+
+
+def _command(commands: Any, name: str, function: Callable[[argparse.Namespace], None], text: str) -> Any:
+    command = commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
+    command.set_defaults(command=function)
+    return command
+
+
+def _add_study(command: Any) -> None:
+    command.add_argument("study", metavar="STUDY.toml", type=Path)
+    command.add_argument("--workers", metavar="N", type=int, help="cores to use; default: all")
+    _add_allow_import(command)
+
+
+def _add_result(command: Any) -> None:
+    command.add_argument("result", metavar="OUT.h5", type=Path)
+
+
+def _add_allow_import(command: Any) -> None:
+    command.add_argument("--allow-import", action="store_true", help='allow a kernel "module:NAME" of your own')
+
+
+def _add_at(command: Any) -> None:
+    command.add_argument(
+        "--at", metavar="AXIS=VALUE", nargs="+", action="extend", default=[], help="pick one value of another axis"
+    )
+
+
+def _kernels(arguments: argparse.Namespace) -> None:
+    from sweep.describe import catalogue_text, kernel_text
+
+    print(kernel_text(arguments.name, arguments.allow_import) if arguments.name else catalogue_text())
+
+
+def _plan(arguments: argparse.Namespace) -> None:
+    from sweep.plan import plan
+
+    print(plan(_study(arguments), workers=arguments.workers))
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    study = _study(arguments)
+    from sweep.report import summary_text
+    from sweep.runner import run
+
+    output = arguments.output or Path(f"{arguments.study.stem}.h5")
+    before = _mark(output)
+    dataset = run(study, output, workers=arguments.workers, force=arguments.force)
+    print(
+        f"{output}: "
+        + ("done before; " if before is not None and _mark(output) == before else "")
+        + summary_text(dataset)
+    )
+
+
+def _show(arguments: argparse.Namespace) -> None:
+    from sweep.report import result_text
+
+    print(result_text(arguments.result, _result(arguments)))
+
+
+def _fit(arguments: argparse.Namespace) -> None:
+    from sweep.fitting import fit_text
+
+    print(fit_text(_picked(arguments), arguments.y, arguments.x, arguments.window or []))
+
+
+def _plot(arguments: argparse.Namespace) -> None:
+    from sweep.charts import plot
+
+    output = arguments.output or Path(f"{arguments.result.stem}.png")
+    plot(_picked(arguments), output, y=arguments.y, x=arguments.x)
+    print(output)
+
+
+def _export(arguments: argparse.Namespace) -> None:
+    from sweep.export import export
+
+    print(export(_result(arguments), arguments.output))
+
+
+def _study(arguments: argparse.Namespace) -> Study:
+    from sweep.spec import read_study
+
+    path = arguments.study
+    if path.suffix == ".py":
+        raise SweepError(f"{path} is a study in Python; run it with: python {path}")
+    if path.suffix in (".h5", ".nc"):
+        raise SweepError(f"{path} is a result, not a study; look at it with: sweep show {path}")
+    return read_study(path, allow_import=arguments.allow_import)
+
+
+def _result(arguments: argparse.Namespace) -> xr.Dataset:
+    from sweep.result import open_result
+
+    path = arguments.result
+    if path.suffix == ".toml":
+        raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
+    return open_result(path)
+
+
+def _picked(arguments: argparse.Namespace) -> xr.Dataset:
+    """The result at the values that `--at` names."""
+    from sweep.fitting import pick
+
+    return pick(_result(arguments), arguments.at)
+
+
+def _mark(path: Path) -> tuple[int, int] | None:
+    """What changes when a file is written anew."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_ino
+
+
+def _fail(message: str, code: int) -> int:
+    print(message, file=sys.stderr)
+    return code
+
+
+def _version() -> str:
+    from importlib import metadata
+
+    try:
+        return f"foliot {metadata.version('foliot')}"
+    except metadata.PackageNotFoundError:
+        return "foliot (not installed)"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,118 @@
+"""What `sweep kernels` prints: what can be swept."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from kernels import catalogue
+from kernels.interface import Field, Kernel, Method
+from sweep.checks import listed, quoted
+from sweep.errors import SweepError
+from sweep.loading import load_kernel
+from sweep.table import columns, page, section
+
+
+def catalogue_text() -> str:
+    """Every kernel of the catalogue in a few lines."""
+    return page(*(_short(name) for name in catalogue.KERNELS), "`sweep kernels NAME` tells more of one of them.")
+
+
+def kernel_text(name: str, allow_import: bool = False) -> str:
+    """All about one kernel, and a study to begin with. Raises SweepError."""
+    kernel = load_kernel(name, allow_import)
+    return page(
+        f"{name}: {kernel.doc}",
+        f"Source: {kernel.source}" if kernel.source else "",
+        section("parameters", map(_parameter, kernel.parameters)),
+        section("outputs", map(_output, kernel.outputs)),
+        section("coordinates that all cells share", map(_coordinate, kernel.along)),
+        section(
+            'methods, cheapest first; "auto" takes the first whose error bound meets rtol', map(_method, kernel.methods)
+        ),
+        "a study to begin with\n" + _example(name, kernel),
+    )
+
+
+def _short(name: str) -> str:
+    try:
+        kernel = load_kernel(name)
+    except SweepError as error:
+        return f"{name}\n  {error}"
+    rows = [
+        ("parameters", ", ".join(map(_name_and_default, kernel.parameters))),
+        ("outputs", ", ".join(f"{o.name} [{o.unit}]{_along(o)}" for o in kernel.outputs)),
+        ("methods", ", ".join(m.name for m in kernel.methods)),
+    ]
+    return f"{name}: {kernel.doc.splitlines()[0]}\n{columns(rows)}"
+
+
+def _name_and_default(field: Field) -> str:
+    return f"{field.name} [{field.unit}]" + ("" if field.default is None else f" = {_plain(field.default)}")
+
+
+def _parameter(field: Field) -> tuple[str, ...]:
+    default = "required" if field.default is None else f"default {_plain(field.default)}"
+    return field.name, f"[{field.unit}]", _limits(field), default, field.doc
+
+
+def _output(field: Field) -> tuple[str, ...]:
+    return field.name, f"[{field.unit}]", _along(field).strip(), field.doc
+
+
+def _coordinate(field: Field) -> tuple[str, ...]:
+    return field.name, f"[{field.unit}]", _limits(field), field.doc
+
+
+def _method(method: Method) -> tuple[str, ...]:
+    cannot = f"; cannot do {listed(method.excludes)}" if method.excludes else ""
+    return method.name, "states its error" if method.bound else "keeps rtol", method.doc + cannot
+
+
+def _along(field: Field) -> str:
+    return f" along {listed(field.dims, word='and')}" if field.dims else ""
+
+
+def _limits(field: Field) -> str:
+    """'> 0', '0 to 1', or the words it takes."""
+    if field.choices:
+        return listed(field.choices, quote=True)
+    low = f"{'>' if field.open_lower else '>='} {field.lower:g}" if field.lower > -math.inf else ""
+    high = f"<= {field.upper:g}" if field.upper < math.inf else ""
+    return ", ".join(filter(None, [low, high]))
+
+
+def _plain(default: float | str) -> str:
+    return default if isinstance(default, str) else f"{default:g}"
+
+
+def _example(name: str, kernel: Kernel) -> str:
+    """A study that sweeps the first parameter."""
+    first, *others = kernel.parameters
+    fixed = [p for p in others if p.default is None]
+    lines = [f'kernel = "{name}"', "", *_axis(first)]
+    if fixed:
+        lines += ["", "[fixed]", *map(_entry, fixed)]
+    for field in kernel.along:
+        lines += ["", f"[along.{field.name}]", *_range(field)]
+    return "\n".join(f"  {line}".rstrip() for line in lines)
+
+
+def _axis(field: Field) -> Iterable[str]:
+    yield f"[axes.{field.name}]"
+    if field.choices:
+        yield f"values = [{quoted(field.choices)}]"
+    else:
+        yield from ('spacing = "log"', "start = 0.1", "stop = 10", "num = 41", f'unit = "{field.unit}"')
+
+
+def _entry(field: Field) -> str:
+    if field.choices:
+        return f'{field.name} = "{next(iter(field.choices))}"'
+    return f'{field.name} = {{ value = 1.0, unit = "{field.unit}" }}'
+
+
+def _range(field: Field) -> Iterable[str]:
+    if math.isfinite(field.upper - field.lower):
+        return ["num = 200"]
+    return ['spacing = "log"', "start = 0.1", "stop = 10", "num = 200"]
