@@ -1,4 +1,4 @@
-"""Results for other programs: csv for spreadsheets and statistics packages, nc (netCDF4) for everything that reads CF."""
+"""Results for other programs: csv for spreadsheets and statistics, nc (netCDF4) for whatever reads CF."""
 
 from __future__ import annotations
 
@@ -96,13 +96,16 @@ def _dimensions(dataset: xr.Dataset) -> list[str]:
 
 def _column(block: xr.Dataset, name: str) -> list[Any]:
     """Values of one column, one for each row of the block."""
-    sizes = {dim: block.sizes[dim] for dim in _dimensions(block)}
-    column = block[name].variable.set_dims(sizes).transpose(*sizes).values.reshape(-1)
-    words = _flag_words(block[name])
-    return [words.get(code, code) for code in column.tolist()] if words else column.tolist()
+    dims, variable = _dimensions(block), block[name]
+    values = variable.transpose(*(dim for dim in dims if dim in variable.dims)).values
+    values = values.reshape([block.sizes[dim] if dim in variable.dims else 1 for dim in dims])
+    column = np.broadcast_to(values, [block.sizes[dim] for dim in dims]).reshape(-1).tolist()
+    words = flag_words(variable)
+    return [words.get(code, code) for code in column] if words else column
 
 
-def _flag_words(variable: xr.DataArray) -> dict[int, str]:
+def flag_words(variable: xr.DataArray) -> dict[int, str]:
+    """What the codes of a flag variable mean, {} for others; -1 is "none" where the flags do not say."""
     values = np.atleast_1d(variable.attrs.get("flag_values", ())).tolist()
     words = dict(zip(values, str(variable.attrs.get("flag_meanings", "")).split(), strict=False))
     return {-1: "none", **words} if words else {}
