@@ -87,6 +87,8 @@ class Mistakes:
 
 def exact_float(value: Any) -> float:
     """A number as float64. Raises ValueError with the text for the user."""
+    if getattr(value, "ndim", None) == 0:
+        value = value.item()  # of numpy
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise ValueError(f"expected a number, found {show(value)}{_cure(value)}")
     try:

@@ -113,17 +113,20 @@ def _parse(text: str, source: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        match = re.fullmatch(r"(.*) \(at line (\d+), column (\d+)\)", str(error), re.DOTALL)
-        if not match:
-            raise StudyError(
-                source, [Mistake("end of file", str(error).removesuffix(" (at end of document)"))]
-            ) from None
-        what, line, column = match.groups()
-        what = "this key or table stands here a second time" if re.match("Cannot (overwrite|declare)", what) else what
-        written = text.splitlines()[int(line) - 1].strip()
-        raise StudyError(source, [Mistake(f"line {line}, column {column}", f"{what}: {written[:80]}")]) from None
+        raise StudyError(source, [_syntax_mistake(str(error), text)]) from None
     except RecursionError:
         raise StudyError(source, [Mistake("file", "lists or tables are nested too deeply")]) from None
+
+
+def _syntax_mistake(error: str, text: str) -> Mistake:
+    """What tomllib says ("... (at line 3, column 6)"), with the line as it is written."""
+    what, _, place = error.rpartition(" (at ")
+    if what.startswith(("Cannot overwrite", "Cannot declare")):
+        what = "this key or table stands here a second time"
+    numbers = re.fullmatch(r"line (\d+), column (\d+)\)", place)
+    lines = text.splitlines()
+    line = int(numbers[1]) if numbers else len(lines)
+    return Mistake(f"line {line}" if numbers else "end of file", f"{what}: {lines[line - 1].strip()[:80]}")
 
 
 class _Reader:
@@ -331,7 +334,7 @@ class _Reader:
         """Methods that cannot do a term which the study has."""
         terms = [p.name for p in self.kernel.parameters if p.name in axes or self._differs(p, fixed)]
         lacking = {m.name: [t for t in m.excludes if t in terms] for m in self.kernel.methods}
-        able = [name for name, terms in lacking.items() if not terms]
+        able = [name for name, found in lacking.items() if not found]
         if "method" in axes:
             where, words = "axes.method", sorted(set(axes["method"].words or ()))
         else:
@@ -341,7 +344,8 @@ class _Reader:
                 cure = f"use {listed(['auto', *able])}" if able else "leave it out"
                 self.mistakes.add(where, f"{word} cannot do {listed(lacking[word], word='and')}; {cure}")
             if word == "auto" and self.kernel.methods and not able:
-                self.mistakes.add(where, f"no method of {self.kernel.name} can do {listed(terms, word='and')} together")
+                hard = [term for term in terms if any(term in found for found in lacking.values())]
+                self.mistakes.add(where, f"no method of {self.kernel.name} can do {listed(hard, word='and')} together")
 
     def _differs(self, field: Field, fixed: Mapping[str, float]) -> bool:
         """Whether the study fixes it to something else than its default."""

@@ -99,6 +99,8 @@ def _parse(text: str) -> Any:
     from pint.errors import UndefinedUnitError
 
     try:
+        if not re.fullmatch(r"[\w\s^*/().+°%-]*", text):
+            raise ValueError  # pint would read "m;m" as m^2
         return _registry().parse_units("dimensionless" if text.strip() == "1" else text)
     except UndefinedUnitError as error:
         unknown = str(error.unit_names) if isinstance(error.unit_names, str) else str(next(iter(error.unit_names)))

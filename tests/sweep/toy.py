@@ -67,3 +67,22 @@ KERNEL = Kernel(
         Method("exact", "root of the quadratic", exact),
     ),
 )
+
+RICH = Kernel(
+    name="rich",
+    doc="Declared with everything a declaration can have; it cannot be run.",
+    source="",
+    parameters=(
+        Field("load", "N", "load"),
+        Field("shape", "1", "shape of the arm", default=0.0, choices={"round": 0, "square": 3}),
+        Field("drag", "1/s", "drag", default=0.0),
+        Field("grip", "N", "grip", default="load"),
+        Field("hold", "N", "hold", default="grip"),
+    ),
+    outputs=(Field("work", "J", "work done"),),
+    check=check,
+    methods=(
+        Method("quick", "neither drag nor grip", exact, excludes=("drag", "grip")),
+        Method("slow", "everything but hold", exact, excludes=("hold",)),
+    ),
+)

@@ -1,0 +1,30 @@
+"""Studies of the toy kernel, from text."""
+
+import pytest
+from toy_studies import HEAD
+
+import sweep
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Reads a study from text; `head` goes before it."""
+
+    def read(text, head=HEAD, allow_import=True):
+        path = tmp_path / "fall.toml"
+        path.write_text(head + text, encoding="utf-8")
+        return sweep.read_study(path, allow_import=allow_import)
+
+    return read
+
+
+@pytest.fixture
+def mistakes(read):
+    """What a study is told: {where: message}."""
+
+    def mistakes(text, **options):
+        with pytest.raises(sweep.StudyError) as caught:
+            read(text, **options)
+        return {m.where: m.message for m in caught.value.mistakes}
+
+    return mistakes
