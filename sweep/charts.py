@@ -184,8 +184,10 @@ def _draw_lines(axes: Any, shown: View) -> None:
     for code, mark, colour in zip(shown.codes(), itertools.cycle(MARKS), itertools.cycle(FLAGGED), strict=False):
         _mark(axes, x, lines, np.atleast_2d(shown.status) == code, mark, colour)
         axes.plot([], [], mark, color=colour, markerfacecolor="none", label=shown.meanings.get(code, str(code)))
-    if shown.across or shown.codes():
+    if (shown.across or shown.codes()) and shown.joined:
         axes.legend()
+    elif shown.across or shown.codes():  # points lie everywhere
+        axes.figure.legend(loc="outside lower center", ncols=3)
 
 
 def _look(i: int, joined: bool) -> dict[str, Any]:

@@ -1,0 +1,410 @@
+"""How does the period of a foliot fall with its drive torque, from weak to strong drive?
+
+    sweep run studies/foliot_scaling.toml
+    python studies/foliot_scaling.py foliot_scaling.h5
+
+draws foliot_scaling.png and prints what Hoyng & Nieuwenhuizen ("the paper", arXiv:1604.06681) say beside what comes
+out here. Only alpha = mu/(a^2 phi0) counts: a P and A = phi_max/phi0 are functions of it alone.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import sweep
+from sweep.analysis import crossover, fit_exponent, local_exponent, where_exponent, where_value
+
+WEAK: tuple[float | None, float | None] = (None, 1e-5)
+STRONG: tuple[float | None, float | None] = (1e5, None)
+"""Windows of alpha for the straight lines."""
+
+SHOWN = {"weak": 0.1, "moderate": 1.463, "strong": 100.0}
+"""alpha of the trajectories."""
+
+WANTED = ((2.0, 32.0), (4.0, 45.0), (4.0, 100.0))
+"""Periods [s] and amplitudes [degree] that inverse design is asked for."""
+
+STRONG_P, STRONG_A = 4 * 3 ** (1 / 3), 3 ** (2 / 3) / 2
+"""At strong drive a P = STRONG_P alpha^(-1/3) and A = STRONG_A alpha^(1/3)."""
+
+NOTES = """\
+paper: Hoyng & Nieuwenhuizen, arXiv:1604.06681; A = phi_max/phi0; (...) is exact, and not in the paper
+*: masked in the text at hand; here as it follows from the paper's equations
+deviation: relative; of exponents the difference. A limit holds if the next term of its series accounts for it
+±: of lines the standard error of least squares. Nothing here is noisy, so it measures the curvature of the truth in
+the window, and is no bound on the distance to the limit. Of places it is the estimated error of the interpolation"""
+
+DAY = 24 * 60.0
+"""Minutes in a day."""
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One line of the table; `holds` is None where the paper says nothing that could be checked."""
+
+    what: str
+    paper: str
+    here: str
+    off: float | None = None
+    holds: bool | None = None
+
+
+@dataclass(frozen=True)
+class HalfPoint:
+    """The drive at which the exponent of the period is -1/2."""
+
+    alpha: float
+    error: float
+    aP: float
+    A: float
+
+
+def scaled(ds: xr.Dataset) -> xr.Dataset:
+    """`ds` with its dimensionless groups: coordinate `alpha`, variables `aP`, `A` and `s`."""
+    ds = ds.assign_coords(alpha=ds.mu / (ds.a**2 * ds.phi0))
+    return ds.assign(aP=ds.a * ds.period, A=ds.amplitude / ds.phi0, s=ds.sensitivity)
+
+
+def sweep_of_alpha(ds: xr.Dataset, alpha: Iterable[float], **outputs: Any) -> xr.Dataset:
+    """`foliot` at other alpha, with the friction and the switching angle of `ds`."""
+    unit = float(ds.a**2 * ds.phi0)
+    study = sweep.build_study(
+        kernel="foliot",
+        rtol=1e-15,
+        method="closed",
+        axes={"mu": unit * np.asarray(list(alpha))},
+        fixed={"a": float(ds.a), "phi0": float(ds.phi0)},
+    )
+    return scaled(sweep.run(study))
+
+
+def half_point(ds: xr.Dataset) -> HalfPoint:
+    """Where s = 1/2, bracketed on the sweep and refined by a sweep of its neighbourhood."""
+    near = float(where_value(ds.s, "alpha", 0.5).abscissa)
+    close = sweep_of_alpha(ds, near * np.geomspace(0.99, 1.01, 21))
+    found = where_value(close.s, "alpha", 0.5)
+    there = sweep_of_alpha(ds, [float(found.abscissa)]).isel(mu=0)
+    return HalfPoint(float(there.alpha), float(found.abscissa_error), float(there.aP), float(there.A))
+
+
+def limits(ds: xr.Dataset) -> list[Statement]:
+    """Leading terms, at the two ends of the sweep."""
+    first, last = ds.isel(mu=0), ds.isel(mu=-1)
+    weak, strong = float(first.alpha), float(last.alpha)
+    b2 = (3 / strong) ** (2 / 3)  # square of the strong drive's small parameter
+    ends = f"alpha = {weak:.2g}", f"alpha = {strong:.2g}"
+    return [
+        _limit(f"weak drive: a P alpha at {ends[0]}", "4 *", float(first.aP) * weak, 4.0, 1.01 * weak),
+        _limit(f"weak drive: A at {ends[0]}", "1 *", float(first.A), 1.0, 0.31 * weak),
+        _limit(
+            f"strong drive: a P alpha^(1/3) at {ends[1]}",
+            f"4 3^(1/3) = {STRONG_P:.5f} *",
+            float(last.aP) * strong ** (1 / 3),
+            STRONG_P,
+            0.14 * b2,
+        ),
+        _limit(
+            f"strong drive: A alpha^(-1/3) at {ends[1]}",
+            f"3^(2/3)/2 = {STRONG_A:.5f} *",
+            float(last.A) / strong ** (1 / 3),
+            STRONG_A,
+            0.11 * b2,
+        ),
+    ]
+
+
+def _limit(what: str, paper: str, here: float, limit: float, allowed: float) -> Statement:
+    off = here / limit - 1
+    return Statement(what, paper, f"{here:.8g}", off, abs(off) <= allowed)
+
+
+def straight_lines(ds: xr.Dataset) -> list[Statement]:
+    """Exponents over the two windows, and where the two laws of the period meet."""
+    laws = [("a P", ds.aP, WEAK, "-1 *", -1.0), ("a P", ds.aP, STRONG, "-1/3 *", -1 / 3)]
+    laws += [("A", ds.A, WEAK, "0 *", 0.0), ("A", ds.A, STRONG, "1/3 *", 1 / 3)]
+    lines = []
+    for name, y, window, paper, limit in laws:
+        fit = fit_exponent(y, "alpha", window)
+        off = float(fit.exponent) - limit
+        span = f"{float(fit.low):.1e} to {float(fit.high):.1e}"
+        here = f"{float(fit.exponent):.7f} ± {float(fit.exponent_error):.1g}, prefactor {float(fit.prefactor):.5f}"
+        what = f"exponent of {name}, alpha = {span} ({int(fit.points)} points)"
+        lines.append(Statement(what, paper, here, off, abs(off) <= _curvature(fit, limit)))
+    meet = crossover(fit_exponent(ds.aP, "alpha", WEAK), fit_exponent(ds.aP, "alpha", STRONG))
+    here = f"alpha = {float(meet.abscissa):.5f} ± {float(meet.abscissa_error):.1g}, a P = {float(meet.ordinate):.4f}"
+    exact = "(3^(-1/2) = 0.57735, 6.9282)"
+    lines.append(Statement("the two laws of a P meet at", exact, here, float(meet.abscissa) * math.sqrt(3) - 1))
+    return lines
+
+
+def _curvature(fit: xr.Dataset, limit: float) -> float:
+    """Distance of the local exponent from its limit at the inner end of a window, by the next term of the series."""
+    return float(fit.high) if limit in (-1.0, 0.0) else 4 / 45 * (3 / float(fit.low)) ** (2 / 3)
+
+
+def sliding(ds: xr.Dataset, half: HalfPoint) -> list[Statement]:
+    """What becomes of the exponent in between."""
+    slope = local_exponent(ds.aP, "alpha")
+    rough = float(np.diff(np.log(ds.alpha)).max() ** 4)  # differences are of fourth order
+    ends = float(slope.min()), float(slope.max())
+    slides = bool((slope.diff("mu") > -rough).all()) and abs(ends[0] + 1) < 0.01 and abs(ends[1] + 1 / 3) < 0.01
+    by_period = where_exponent(ds.aP, "alpha", -0.5)
+    place, error = float(by_period.abscissa), float(by_period.abscissa_error)
+    read, roup = "read off a figure", "exponent -1/2 (at all torques for Roup et al. and Denny)"
+    return [
+        Statement("exponent of P changes gradually", "-1 to -1/3 *", f"{ends[0]:.7f} to {ends[1]:.7f}", None, slides),
+        Statement("  differences of ln P against the exact -s", "", "largest distance", float(abs(slope + ds.s).max())),
+        Statement(roup, "one drive", "one drive"),
+        Statement("  at alpha, from the exact s", read, f"{half.alpha:.13f}"),
+        Statement("  at alpha, from differences of ln P", read, f"{place:.10f} ± {error:.0e}", place / half.alpha - 1),
+        Statement("  a P there", read, f"{half.aP:.13f}"),
+        Statement("  A there", read, f"{half.A:.13f}"),
+    ]
+
+
+def general(ds: xr.Dataset, half: HalfPoint) -> list[Statement]:
+    """Statements about all drives."""
+    solved = f"{int((ds.status == 0).sum())} of {ds.status.size} cells swing"
+    other = sweep_of_alpha(ds.assign_coords(a=3 * ds.a, phi0=ds.phi0 / 7), ds.alpha.values)
+    apart = max(float(abs(other[y].values / ds[y].values - 1).max()) for y in ("aP", "A"))
+    blind = friction_exponent(ds, half)
+    return [
+        Statement("no least torque, self-starting", "yes", solved, None, bool((ds.status == 0).all())),
+        Statement(
+            "A is always larger than 1",
+            "yes",
+            f"smallest A - 1 = {float(ds.A.min() - 1):.2g}",
+            None,
+            bool((ds.A > 1).all()),
+        ),
+        Statement("a P and A depend on alpha alone", "yes *", "a and phi0 changed: same", apart, apart < 1e-12),
+        Statement(
+            "at exponent -1/2 friction does not count", "yes *", f"dlnP/dlna = {blind:.1e}", blind, abs(blind) < 1e-8
+        ),
+    ]
+
+
+def friction_exponent(ds: xr.Dataset, half: HalfPoint) -> float:
+    """dlnP/dlna at the drive of exponent -1/2, by differences over a sweep of the friction alone."""
+    a = float(ds.a) * np.exp(np.linspace(-0.02, 0.02, 9))
+    study = sweep.build_study(
+        kernel="foliot", method="closed", outputs=["period"], axes={"a": a},
+        fixed={"mu": half.alpha * float(ds.a**2 * ds.phi0), "phi0": float(ds.phi0)},
+    )  # fmt: skip
+    return float(local_exponent(sweep.run(study).period, "a")[4])
+
+
+def torque(ds: xr.Dataset) -> list[Statement]:
+    """What a change of the torque does."""
+    last = float(ds.alpha[-1])
+    once, tenfold = (sweep_of_alpha(ds, [alpha]).isel(mu=0) for alpha in (last / 10, last))
+    factor, allowed = 10 ** (1 / 3), 0.14 * (30 / last) ** (2 / 3)
+    cube, strong = f"10^(1/3) = {factor:.5f} *", "tenfold torque at strong drive:"
+    rows = [
+        _limit(f"{strong} P falls by", cube, float(once.period / tenfold.period), factor, allowed),
+        _limit(f"{strong} phi_max grows by", cube, float(tenfold.amplitude / once.amplitude), factor, allowed),
+    ]
+    drives = {"weak": float(ds.s[0]), "s = 1/2": 0.5, "strong": float(ds.s[-1])}
+    said = {(15, "weak"): ("1 % *", 1.0), (15, "strong"): ("3 % *", 3.0)}
+    for minutes in (15, 1):
+        for drive, s in drives.items():
+            needed = 100 * minutes / DAY / s
+            paper, percent = said.get((minutes, drive), ("", math.nan))
+            holds = None if not paper else f"{needed:.0f}" == f"{percent:.0f}"
+            rows.append(
+                Statement(f"torque stability for {minutes} min/day, {drive}", paper, f"{needed:.4g} %", None, holds)
+            )
+    return rows
+
+
+def inverse_design(ds: xr.Dataset) -> list[tuple[str, ...]]:
+    """Friction and torque that give a wanted clock, and the period and amplitude they do give."""
+    period, degrees = (np.array(column) for column in zip(*WANTED, strict=True))
+    wanted = {"period": period, "amplitude": np.radians(degrees)}
+    fixed = {"phi0": float(ds.phi0)}
+    found = sweep.run(sweep.build_study(kernel="foliot_design", design="zip", axes=wanted, fixed=fixed, rtol=1e-13))
+    axes = {"mu": found.mu.values, "a": found.a.values}
+    back = sweep.run(sweep.build_study(kernel="foliot", method="closed", design="zip", axes=axes, fixed=fixed))
+    rows = [("wanted P [s]", "phi_max [degree]", "a [1/s]", "mu [rad/s^2]", "P back, off by", "phi_max back, off by")]
+    for i, (p, degree) in enumerate(WANTED):
+        off = float(back.period[i]) / p - 1, float(back.amplitude[i]) / math.radians(degree) - 1
+        rows.append(
+            (
+                f"{p:g}",
+                f"{degree:g}",
+                f"{float(found.a[i]):.10g}",
+                f"{float(found.mu[i]):.10g}",
+                *(f"{x:.0e}" for x in off),
+            )
+        )
+    return rows
+
+
+def statements(ds: xr.Dataset) -> dict[str, list[Statement]]:
+    """Every line of the table, by heading."""
+    half = half_point(ds)
+    return {
+        "Limits": limits(ds) + straight_lines(ds),
+        "In between": sliding(ds, half),
+        "At every drive": general(ds, half),
+        "Torque": torque(ds),
+    }
+
+
+def report(ds: xr.Dataset) -> str:
+    """The table "paper | here" and the inverse design, as plain text."""
+    rows: list[tuple[str, ...]] = [("", "paper", "here", "deviation", "holds")]
+    for heading, lines in statements(ds).items():
+        rows += [("",), (heading.upper(),)]
+        rows += [
+            (s.what, s.paper, s.here, _number(s.off), {None: "", True: "yes", False: "NO"}[s.holds]) for s in lines
+        ]
+    phi0 = math.degrees(float(ds.phi0))
+    return "\n".join(
+        [
+            *columns(rows, " | "), "", *NOTES.splitlines(), "",
+            f"INVERSE DESIGN, phi0 = {phi0:g} degree (not in the paper)", *columns(inverse_design(ds), "   "),
+        ]
+    )  # fmt: skip
+
+
+def columns(rows: Sequence[Sequence[str]], between: str) -> list[str]:
+    """Rows as lines of text with aligned columns; a row of one cell is a heading."""
+    full = [row for row in rows if len(row) > 1]
+    widths = [max(map(len, column)) for column in zip(*full, strict=True)]
+    padded = [[cell.ljust(width) for cell, width in zip(row, widths, strict=False)] for row in rows]
+    return [row[0] if len(row) == 1 else between.join(cells).rstrip() for row, cells in zip(rows, padded, strict=True)]
+
+
+def _number(off: float | None) -> str:
+    return "" if off is None else f"{off:+.1e}"
+
+
+def trajectories(ds: xr.Dataset) -> xr.Dataset:
+    """Motion over one period at the drives of `SHOWN`, and the period `aP` there."""
+    unit = float(ds.a**2 * ds.phi0)
+    study = sweep.build_study(
+        kernel="foliot_motion", method="closed", outputs=["angle"],
+        axes={"mu": unit * np.array(list(SHOWN.values()))}, along={"phase": np.linspace(0, 1, 801)},
+        fixed={"a": float(ds.a), "phi0": float(ds.phi0)},
+    )  # fmt: skip
+    return sweep.run(study).assign(aP=("mu", sweep_of_alpha(ds, SHOWN.values()).aP.values))
+
+
+def figure(ds: xr.Dataset) -> Any:
+    """Period and amplitude, the sliding exponent, and trajectories, in one figure for two columns of print."""
+    from sweep import charts
+
+    with charts.style():
+        page = charts.new_figure(charts.PAGE, 118.0)
+        left, right = page.subfigures(1, 2, width_ratios=(1.12, 1))
+        upper, lower = left.subplots(2, 1, sharex=True, height_ratios=(1.15, 1))
+        half = half_point(ds)
+        draw_scaling(upper, ds, half)
+        draw_exponent(lower, ds, half)
+        draw_trajectories(right.subplots(3, 1, sharex=True), trajectories(ds), float(ds.phi0))
+        for axes, text in ((upper, "a"), (lower, "b"), (right.axes[0], "c")):
+            charts.letter(axes, text)
+    return page
+
+
+def draw_scaling(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
+    """a P and A against alpha, with the asymptotes of both."""
+    from sweep.charts import COLOURS
+
+    alpha = ds.alpha.values
+    axes.loglog(alpha, ds.aP, color=COLOURS[0], label=r"period, $aP$")
+    axes.loglog(alpha, ds.A, color=COLOURS[1], linestyle=(0, (6, 1.5)), label=r"amplitude, $\varphi_{\max}/\varphi_0$")
+    weak, strong = alpha[alpha < 30], alpha[alpha > 0.02]
+    for x, prefactor, power, place, text in (
+        (weak, 4, -1, (2e-5, 1.5e6), r"$4/\alpha$"),
+        (strong, STRONG_P, -1 / 3, (2e4, 0.9), r"$4\,(3/\alpha)^{1/3}$"),
+        (weak, 1, 0, (2e-5, 2.2), "1"),
+        (strong, STRONG_A, 1 / 3, (1e4, 1.2e2), r"$\frac{1}{2}\,3^{2/3}\,\alpha^{1/3}$"),
+    ):
+        (line,) = axes.loglog(x, prefactor * x**power, color="black", linewidth=0.8, linestyle=(0, (1, 1.5)))
+        axes.text(*place, text)
+    line.set_label("asymptotes")
+    axes.plot(half.alpha, half.aP, "o", color="black", label=r"exponent $-1/2$")
+    axes.set(ylabel=r"$aP$ and $\varphi_{\max}/\varphi_0$")
+    axes.legend(loc="upper right")
+
+
+def draw_exponent(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
+    """Local exponent by differences of ln P, the exact -s, and the drive at which it is -1/2."""
+    from sweep.charts import COLOURS
+
+    slope = local_exponent(ds.aP, "alpha")
+    few = slice(None, None, max(1, slope.size // 56))
+    for value in (-1, -1 / 2, -1 / 3):
+        axes.axhline(value, color="0.6", linewidth=0.6, linestyle=(0, (4, 2)))
+    axes.semilogx(ds.alpha, -ds.s, color=COLOURS[0], label=r"exact, $-s$")
+    axes.plot(
+        ds.alpha[few],
+        slope[few],
+        "o",
+        markersize=3,
+        color=COLOURS[1],
+        markerfacecolor="white",
+        label=r"differences of $\ln P$",
+    )
+    axes.plot(half.alpha, -0.5, "o", color="black")
+    axes.annotate(rf"$\alpha = {half.alpha:.6f}$", (half.alpha, -0.5), (8, -12), textcoords="offset points")
+    axes.set(
+        xlabel=r"drive torque, $\alpha = \mu/(a^2\varphi_0)$",
+        ylabel=r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$",
+        ylim=(-1.06, -0.27),
+    )
+    axes.set_yticks([-1, -1 / 2, -1 / 3], labels=["$-1$", r"$-\frac{1}{2}$", r"$-\frac{1}{3}$"])
+    axes.set_yticks([-0.9, -0.8, -0.7, -0.6, -0.4], minor=True)
+    axes.legend(loc="center right", bbox_to_anchor=(1, 0.35))
+
+
+def draw_trajectories(panels: Sequence[Any], motion: xr.Dataset, phi0: float) -> None:
+    """Two periods of phi(t)/phi0 at each drive; shaded while the torque is positive."""
+    from sweep.charts import COLOURS
+
+    phase = np.concatenate([motion.phase.values, 1 + motion.phase.values[1:]])
+    for i, (axes, (name, alpha)) in enumerate(zip(panels, SHOWN.items(), strict=True)):
+        angle = motion.angle.isel(mu=i).values / phi0
+        for start in (0.5, 1.5):
+            axes.axvspan(start, start + 0.5, color="0.92", linewidth=0)
+        for switch in (-1, 1):
+            axes.axhline(switch, color="black", linewidth=0.6, linestyle=(0, (4, 2)))
+        axes.plot(phase, np.concatenate([angle, angle[1:]]), color=COLOURS[0])
+        top = 1.5 * float(abs(angle).max())
+        axes.set(xlim=(0, 2), ylim=(-top, top), ylabel=r"$\varphi/\varphi_0$")
+        axes.set_title(rf"{name} drive, $\alpha = {alpha:g}$, $aP = {float(motion.aP[i]):.4g}$", loc="right")
+        for k, sign in enumerate(("-", "+", "-", "+")):
+            axes.text(0.25 + 0.5 * k, 0.84 * top, rf"${sign}\mu$", ha="center", va="center")
+    panels[-1].set_xticks([0, 0.5, 1, 1.5, 2])
+    panels[-1].set_xlabel(r"time, $t/P$")
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Figure and table of the result that is named; 1 if a statement of the paper does not hold."""
+    if len(arguments) != 1:
+        print(f"use: python {Path(__file__).name} foliot_scaling.h5", file=sys.stderr)
+        return 2
+    from sweep import charts
+
+    try:
+        ds = scaled(sweep.open_result(arguments[0], strict=True).load())
+        print(report(ds))
+        print(f"\nfigure: {charts.save(figure(ds), Path(arguments[0]).with_suffix('.png'))}")
+    except sweep.SweepError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
