@@ -4,8 +4,8 @@ No fast-math: with explicit `fma` and no contraction the same source gives the s
 on every CPU. `error_model="numpy"`: 1/0 is inf, nothing raises.
 
 numba's own cache is stale when a *called* module changes, so ours lives in a folder named by a digest of all kernel
-sources, numba, llvmlite and the CPU. Only entry functions are cached (`entry`): each is compiled for one signature,
-so two processes that race write the same file.
+sources, numba, llvmlite and the CPU. Only entry functions are cached: each is compiled for one signature, so two
+processes that race write the same file.
 """
 
 import hashlib
@@ -47,6 +47,6 @@ def jit_call(function):
     return njit(**_OPTIONS)(function)
 
 
-def entry(function):
-    """A loop over columns that the engine calls; kept in the disk cache."""
+def cached(function):
+    """As `jit_call`, kept in the disk cache; called from Python with one signature only."""
     return njit(cache=True, **_OPTIONS)(function)

@@ -9,7 +9,7 @@ an integer means one cell, `lanes_at(i)` means cells i .. i + WIDTH - 1:
 
 Branches become `where(condition, x, y)`; `some(condition)` ends a masked loop. In such a loop a finished lane is frozen
 by `where(active, new, old)`, or its bits would depend on its neighbours.
-Under NUMBA_DISABLE_JIT=1 only the one-cell form exists.
+Under NUMBA_DISABLE_JIT=1 only the one-cell form exists. `_columns` has the loops.
 """
 
 import math
@@ -20,9 +20,9 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.typeconv import Conversion
-from numba.extending import intrinsic, lower_cast, models, overload, register_model
+from numba.extending import lower_builtin, lower_cast, models, register_model, type_callable
 
-from kernels._jit import COMPILED, jit
+from kernels._jit import jit
 
 WIDTH = 32
 """8 lanes reach half the speed, 16 85 %, 64 no more than 32: several registers hide the latency of a recurrence."""
@@ -103,75 +103,53 @@ def _is_wide(*numba_types):
     return any(isinstance(t, LanesType | MaskType) for t in numba_types)
 
 
-def _elementwise(build, arity, wide_result=_lanes, narrow_result=types.float64):
-    """An intrinsic of float64 or Lanes arguments; `build(builder, *values)` emits the instructions for both."""
-
-    def apply(args):
-        wide = _is_wide(*args)
-        operand = _lanes if wide else types.float64
-
-        def codegen(context, builder, signature, values):
-            return build(
-                builder, *(context.cast(builder, v, t, operand) for v, t in zip(values, signature.args, strict=True))
-            )
-
-        return (wide_result if wide else narrow_result)(*args), codegen
-
-    return (
-        intrinsic(lambda typing_context, x: apply((x,))),
-        intrinsic(lambda typing_context, x, y: apply((x, y))),
-        intrinsic(lambda typing_context, x, y, z: apply((x, y, z))),
-    )[arity - 1]
+_BINARY_OPERANDS = (
+    (LanesType, LanesType),
+    (LanesType, types.Number),
+    (types.Number, LanesType),
+    (MaskType, MaskType),
+    (MaskType, types.Boolean),
+    (types.Boolean, MaskType),
+)
 
 
-def _operator(python_operator, build, wide_result=_lanes):
-    """Gives a Python operator a meaning for Lanes; plain numbers keep numba's own."""
-    apply = _elementwise(build, 2, wide_result)
+def _emit(build, operand=None):
+    """Lowers a call: casts its arguments to `operand` (None: Lanes if one is wide, else float64), then builds."""
 
-    @overload(python_operator)
-    def overloaded(x, y):
-        if _is_wide(x, y):
-            return lambda x, y: apply(x, y)
-        return None
+    def lower(context, builder, signature, values):
+        target = operand or (_lanes if _is_wide(*signature.args) else types.float64)
+        return build(
+            builder, *(context.cast(builder, v, t, target) for v, t in zip(values, signature.args, strict=True))
+        )
 
-
-_operator(operator.add, lambda b, x, y: b.fadd(x, y))
-_operator(operator.sub, lambda b, x, y: b.fsub(x, y))
-_operator(operator.mul, lambda b, x, y: b.fmul(x, y))
-_operator(operator.truediv, lambda b, x, y: b.fdiv(x, y))
-_operator(operator.lt, lambda b, x, y: b.fcmp_ordered("<", x, y), _mask)
-_operator(operator.le, lambda b, x, y: b.fcmp_ordered("<=", x, y), _mask)
-_operator(operator.gt, lambda b, x, y: b.fcmp_ordered(">", x, y), _mask)
-_operator(operator.ge, lambda b, x, y: b.fcmp_ordered(">=", x, y), _mask)
+    return lower
 
 
-def _logic(python_operator, instruction):
-    """& and | of masks, a plain boolean beside a mask included."""
+def _operator(python_operator, build, operand=_lanes, result=_lanes):
+    """Gives a Python operator a meaning for Lanes or Mask; plain numbers keep numba's own."""
 
-    @intrinsic
-    def apply(typing_context, x, y):
-        def codegen(context, builder, signature, values):
-            bits = (context.cast(builder, v, t, _mask) for v, t in zip(values, signature.args, strict=True))
-            return getattr(builder, instruction)(*bits)
+    @type_callable(python_operator)
+    def _(context):
+        return lambda x, y: result if isinstance(x, type(operand)) or isinstance(y, type(operand)) else None
 
-        return _mask(x, y), codegen
-
-    @overload(python_operator)
-    def overloaded(x, y):
-        if _is_wide(x, y):
-            return lambda x, y: apply(x, y)
-        return None
+    for operands in _BINARY_OPERANDS:
+        if type(operand) in operands:
+            lower_builtin(python_operator, *operands)(_emit(build, operand))
 
 
-_logic(operator.and_, "and_")
-_logic(operator.or_, "or_")
+def _function(python_function, arity, result, lower):
+    """Gives a Python function a compiled meaning, emitted where it is called; `result(*types)` is what it returns."""
+    typers = (
+        lambda x: result(x),
+        lambda x, y: result(x, y),
+        lambda x, y, z: result(x, y, z),
+    )
+    type_callable(python_function)(lambda context: typers[arity - 1])
+    lower_builtin(python_function, *[types.Any] * arity)(lower)
 
-_negative = _elementwise(lambda b, x: b.fneg(x), 1)
 
-
-@overload(operator.neg)
-def _neg(x):
-    return (lambda x: _negative(x)) if _is_wide(x) else None
+def _number(*numba_types):
+    return _lanes if _is_wide(*numba_types) else types.float64
 
 
 def _called(name):
@@ -188,9 +166,18 @@ def _called(name):
     return build
 
 
-_fma = _elementwise(_called("fma"), 3)
-_sqrt = _elementwise(_called("sqrt"), 1)
-_fabs = _elementwise(_called("fabs"), 1)
+_operator(operator.add, lambda b, x, y: b.fadd(x, y))
+_operator(operator.sub, lambda b, x, y: b.fsub(x, y))
+_operator(operator.mul, lambda b, x, y: b.fmul(x, y))
+_operator(operator.truediv, lambda b, x, y: b.fdiv(x, y))
+_operator(operator.lt, lambda b, x, y: b.fcmp_ordered("<", x, y), result=_mask)
+_operator(operator.le, lambda b, x, y: b.fcmp_ordered("<=", x, y), result=_mask)
+_operator(operator.gt, lambda b, x, y: b.fcmp_ordered(">", x, y), result=_mask)
+_operator(operator.ge, lambda b, x, y: b.fcmp_ordered(">=", x, y), result=_mask)
+_operator(operator.and_, lambda b, x, y: b.and_(x, y), operand=_mask, result=_mask)
+_operator(operator.or_, lambda b, x, y: b.or_(x, y), operand=_mask, result=_mask)
+type_callable(operator.neg)(lambda context: lambda x: _lanes if _is_wide(x) else None)
+lower_builtin(operator.neg, LanesType)(_emit(lambda b, x: b.fneg(x)))
 
 
 def fma(x, y, z):
@@ -204,19 +191,9 @@ def fma(x, y, z):
         return math.copysign(math.inf, exact)
 
 
-@overload(fma)
-def _fma_overload(x, y, z):
-    return lambda x, y, z: _fma(x, y, z)
-
-
 def sqrt(x):
     """Square root; NaN below 0."""
     return math.sqrt(x) if x >= 0.0 else math.nan
-
-
-@overload(sqrt)
-def _sqrt_overload(x):
-    return lambda x: _sqrt(x)
 
 
 def magnitude(x):
@@ -224,36 +201,9 @@ def magnitude(x):
     return abs(x)
 
 
-@overload(magnitude)
-def _magnitude_overload(x):
-    return lambda x: _fabs(x)
-
-
-def _vector_like(ty, element):
-    return ir.VectorType(element, WIDTH) if isinstance(ty, ir.VectorType) else element
-
-
-def _bits(ty, value):
-    """The 64-bit constant `value`, in every lane of a vector."""
-    return ir.Constant(ty, [value] * WIDTH if isinstance(ty, ir.VectorType) else value)
-
-
-def _build_pow2(builder, n):
-    wide = _vector_like(n.type, _I64)
-    magic = ir.Constant(n.type, [_MAGIC + 1023.0] * WIDTH if isinstance(n.type, ir.VectorType) else _MAGIC + 1023.0)
-    exponent = builder.bitcast(builder.fadd(n, magic), wide)
-    return builder.bitcast(builder.shl(exponent, _bits(wide, 52)), n.type)
-
-
-def _build_exponent(builder, x):
-    wide = _vector_like(x.type, _I64)
-    field = builder.and_(builder.lshr(builder.bitcast(x, wide), _bits(wide, 52)), _bits(wide, 0x7FF))
-    as_float = builder.bitcast(builder.or_(field, _bits(wide, 0x4330000000000000)), x.type)  # 2^52 + field
-    offset = 2.0**52 + 1023.0
-    return builder.fsub(as_float, ir.Constant(x.type, [offset] * WIDTH if isinstance(x.type, ir.VectorType) else offset))
-
-
-_pow2, _exponent = _elementwise(_build_pow2, 1), _elementwise(_build_exponent, 1)
+_function(fma, 3, _number, _emit(_called("fma")))
+_function(sqrt, 1, _number, _emit(_called("sqrt")))
+_function(magnitude, 1, _number, _emit(_called("fabs")))
 
 
 def pow2(n):
@@ -261,19 +211,36 @@ def pow2(n):
     return math.ldexp(1.0, int(n))
 
 
-@overload(pow2)
-def _pow2_overload(n):
-    return lambda n: _pow2(n)
-
-
 def exponent(x):
     """floor(log2(abs(x))) as a float64, for normal x."""
     return float(math.frexp(x)[1] - 1)
 
 
-@overload(exponent)
-def _exponent_overload(x):
-    return lambda x: _exponent(x)
+def _constant(ty, value):
+    """A constant of the type `ty`: in every lane of a vector."""
+    return ir.Constant(ty, [value] * WIDTH if isinstance(ty, ir.VectorType) else value)
+
+
+def _as_integers(ty):
+    return ir.VectorType(_I64, WIDTH) if isinstance(ty, ir.VectorType) else _I64
+
+
+def _build_pow2(builder, n):
+    integers = _as_integers(n.type)
+    biased = builder.bitcast(builder.fadd(n, _constant(n.type, _MAGIC + 1023.0)), integers)
+    return builder.bitcast(builder.shl(biased, _constant(integers, 52)), n.type)
+
+
+def _build_exponent(builder, x):
+    integers = _as_integers(x.type)
+    biased = builder.lshr(builder.bitcast(x, integers), _constant(integers, 52))
+    biased = builder.and_(biased, _constant(integers, 0x7FF))
+    shifted = builder.bitcast(builder.or_(biased, _constant(integers, 0x4330000000000000)), x.type)  # 2^52 + biased
+    return builder.fsub(shifted, _constant(x.type, 2.0**52 + 1023.0))
+
+
+_function(pow2, 1, _number, _emit(_build_pow2))
+_function(exponent, 1, _number, _emit(_build_exponent))
 
 
 @jit
@@ -282,34 +249,22 @@ def nearest(x):
     return (x + _MAGIC) - _MAGIC
 
 
-@intrinsic
-def _select(typing_context, condition, x, y):
-    def codegen(context, builder, signature, values):
-        operands = (context.cast(builder, v, t, _lanes) for v, t in zip(values[1:], signature.args[1:], strict=True))
-        return builder.select(values[0], *operands)
-
-    return _lanes(condition, x, y), codegen
-
-
 def where(condition, x, y):
     """x where the condition holds, else y; both are computed."""
     return x if condition else y
 
 
-@overload(where)
-def _where_overload(condition, x, y):
-    if isinstance(condition, MaskType):
-        return lambda condition, x, y: _select(condition, x, y)
-    return lambda condition, x, y: x if condition else y
-
-
-@intrinsic
-def _any_set(typing_context, condition):
-    def codegen(context, builder, signature, values):
-        wide = builder.bitcast(values[0], ir.IntType(WIDTH))
-        return builder.icmp_unsigned("!=", wide, ir.Constant(ir.IntType(WIDTH), 0))
-
-    return types.boolean(condition), codegen
+def _lower_where(context, builder, signature, values):
+    wide = isinstance(signature.return_type, LanesType)
+    mask = _mask if wide and isinstance(signature.args[0], MaskType) else types.boolean
+    condition = context.cast(builder, values[0], signature.args[0], mask)
+    if mask is types.boolean:
+        condition = builder.icmp_unsigned("!=", condition, ir.Constant(condition.type, 0))
+    operands = (
+        context.cast(builder, v, t, signature.return_type)
+        for v, t in zip(values[1:], signature.args[1:], strict=True)
+    )
+    return builder.select(condition, *operands)
 
 
 def some(condition):
@@ -317,19 +272,11 @@ def some(condition):
     return bool(condition)
 
 
-@overload(some)
-def _some_overload(condition):
-    if isinstance(condition, MaskType):
-        return lambda condition: _any_set(condition)
-    return lambda condition: condition
-
-
-@intrinsic
-def _invert(typing_context, condition):
-    def codegen(context, builder, signature, values):
-        return builder.not_(values[0])
-
-    return _mask(condition), codegen
+def _lower_some(context, builder, signature, values):
+    if not isinstance(signature.args[0], MaskType):
+        return context.cast(builder, values[0], signature.args[0], types.boolean)
+    bits = builder.bitcast(values[0], ir.IntType(WIDTH))
+    return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 
 
 def isnt(condition):
@@ -337,16 +284,21 @@ def isnt(condition):
     return not condition
 
 
-@overload(isnt)
-def _isnt_overload(condition):
-    if isinstance(condition, MaskType):
-        return lambda condition: _invert(condition)
-    return lambda condition: not condition
+def _lower_isnt(context, builder, signature, values):
+    return builder.not_(values[0])
 
 
-@intrinsic
-def _lanes_at(typing_context, i):
-    return _lane_index(types.int64), lambda context, builder, signature, values: values[0]
+_function(where, 3, lambda condition, x, y: _number(condition, x, y), _lower_where)
+_function(some, 1, lambda condition: types.boolean, _lower_some)
+_function(isnt, 1, lambda condition: condition, _lower_isnt)
+
+
+def lanes_at(i):
+    """The index of cells i .. i + WIDTH - 1; compiled code only."""
+    raise NotImplementedError
+
+
+_function(lanes_at, 1, lambda i: _lane_index, lambda context, builder, signature, values: values[0])
 
 
 def _cells_pointer(context, builder, array_type, array, i):
@@ -360,60 +312,32 @@ def _align(element):
     return element.width // 8 if isinstance(element, ir.IntType) else 8
 
 
-@intrinsic
-def _load(typing_context, column, i):
-    def codegen(context, builder, signature, values):
-        pointer, element = _cells_pointer(context, builder, signature.args[0], *values)
-        cells = builder.load(pointer, align=_align(element))
-        return builder.sitofp(cells, ir.VectorType(_F64, WIDTH)) if isinstance(element, ir.IntType) else cells
-
-    return _lanes(column, i), codegen
+@type_callable(operator.getitem)
+def _type_load(context):
+    return lambda column, i: _lanes if isinstance(column, types.Array) and isinstance(i, LaneIndexType) else None
 
 
-@intrinsic
-def _store(typing_context, column, i, value):
-    def codegen(context, builder, signature, values):
-        pointer, element = _cells_pointer(context, builder, signature.args[0], *values[:2])
-        cells = context.cast(builder, values[2], signature.args[2], _lanes)
-        if isinstance(element, ir.IntType):
-            cells = builder.fptosi(cells, ir.VectorType(element, WIDTH))
-        builder.store(cells, pointer, align=_align(element))
-        return context.get_dummy_value()
-
-    return types.void(column, i, value), codegen
+@lower_builtin(operator.getitem, types.Array, LaneIndexType)
+def _lower_load(context, builder, signature, values):
+    pointer, element = _cells_pointer(context, builder, signature.args[0], *values)
+    cells = builder.load(pointer, align=_align(element))
+    return builder.sitofp(cells, ir.VectorType(_F64, WIDTH)) if isinstance(element, ir.IntType) else cells
 
 
-@overload(operator.getitem)
-def _getitem(column, i):
-    if isinstance(i, LaneIndexType) and isinstance(column, types.Array):
-        return lambda column, i: _load(column, i)
-    return None
+@type_callable(operator.setitem)
+def _type_store(context):
+    def typer(column, i, value):
+        wide = isinstance(column, types.Array) and isinstance(i, LaneIndexType)
+        return types.void(column, i, _lanes) if wide else None
+
+    return typer
 
 
-@overload(operator.setitem)
-def _setitem(column, i, value):
-    if isinstance(i, LaneIndexType) and isinstance(column, types.Array):
-        return lambda column, i, value: _store(column, i, value)
-    return None
-
-
-def _each_cell(body, columns):
-    for i in range(columns[0].shape[0]):
-        body(i, *columns)
-
-
-@jit
-def _each_lane(body, columns):
-    n = columns[0].shape[0]
-    whole = n - n % WIDTH
-    for i in range(0, whole, WIDTH):
-        body(_lanes_at(i), *columns)
-    for i in range(whole, n):
-        body(i, *columns)
-
-
-each_cell = _each_lane if COMPILED else _each_cell
-"""each_cell(body, columns): body(i, *columns) for all cells, WIDTH at a time where there are as many."""
-
-one_by_one = jit(_each_cell)
-"""The same one cell at a time: the rival that lanes are measured against."""
+@lower_builtin(operator.setitem, types.Array, LaneIndexType, LanesType)
+def _lower_store(context, builder, signature, values):
+    pointer, element = _cells_pointer(context, builder, signature.args[0], *values[:2])
+    cells = values[2]
+    if isinstance(element, ir.IntType):
+        cells = builder.fptosi(cells, ir.VectorType(element, WIDTH))
+    builder.store(cells, pointer, align=_align(element))
+    return context.get_dummy_value()

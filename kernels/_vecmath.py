@@ -9,6 +9,7 @@ from kernels._jit import jit
 from kernels._lanes import exponent, fma, nearest, pow2, where
 from kernels._viscous_fit import LOG_TAIL
 
+LN2 = math.log(2.0)
 _LOG2_E = 1.4426950408889634
 _LN2_HIGH, _LN2_LOW = 0.6931471805599453, 2.3190468138462996e-17
 _INVERSE_FACTORIALS = tuple(1.0 / math.factorial(n) for n in range(2, 14))

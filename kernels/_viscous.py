@@ -123,40 +123,53 @@ def asymptotic(k):
     s = 1/3 + 4 b^2/45 + 52 b^4/4725 - 32 b^6/70875. Weak: lambda = 1 - 2x, A = 1 + alpha (1 - ln 2 - x).
     """
     strong = k < SPLIT
-    q, lam, amplitude, s = 0.0 * k, 0.0 * k, 0.0 * k, 0.0 * k
+    q, lam, amplitude, s, decay = 0.0 * k, 0.0 * k, 0.0 * k, 0.0 * k, 0.0 * k
     if some(strong):
-        b = cbrt(3.0 * k)
-        w = b * b
-        tail = horner(w, _Q_SERIES)
-        q, lam = fma(b * w, tail, b), fma(b * w, tail - 1.0 / 3.0, b)
-        amplitude = fma(w, horner(w, _AMPLITUDE_SERIES), 1.0) * (1.5 / b)
-        s = fma(w, horner(w, _SENSITIVITY_SERIES), 1.0 / 3.0)
-    decay = exp(-2.0 * where(strong, q, k))
+        q, lam, amplitude, s, decay = _asymptotic_strong(k)
     if some(isnt(strong)):
-        x = decay * _EXP_MINUS_2
-        weak_lam = 1.0 - 2.0 * x
-        weak_q = k + weak_lam
-        q, lam = where(strong, q, weak_q), where(strong, lam, weak_lam)
-        amplitude = where(strong, amplitude, 1.0 + (_OVERSHOOT - x) / k)
-        s = where(strong, s, k / (weak_q * (weak_lam * weak_lam)))
-        decay = where(strong, decay, x)
+        weak = _asymptotic_weak(k)
+        q, lam = where(strong, q, weak[0]), where(strong, lam, weak[1])
+        amplitude, s, decay = where(strong, amplitude, weak[2]), where(strong, s, weak[3]), where(strong, decay, weak[4])
     return q, lam, amplitude, s, decay
+
+
+@jit
+def _asymptotic_strong(k):
+    b = cbrt(3.0 * k)
+    w = b * b
+    tail = horner(w, _Q_SERIES)
+    lam = fma(b * w, tail - 1.0 / 3.0, b)
+    amplitude = fma(w, horner(w, _AMPLITUDE_SERIES), 1.0) * (1.5 / b)
+    s = fma(w, horner(w, _SENSITIVITY_SERIES), 1.0 / 3.0)
+    return fma(b * w, tail, b), lam, amplitude, s, (1.0 - lam) / (1.0 + lam)
+
+
+@jit
+def _asymptotic_weak(k):
+    x = exp(-2.0 * k) * _EXP_MINUS_2
+    lam = 1.0 - 2.0 * x
+    q = k + lam
+    return q, lam, 1.0 + (_OVERSHOOT - x) / k, k / (q * (lam * lam)), x
 
 
 @jit
 def asymptotic_bound(k):
     """Bounds on the relative errors of `asymptotic`: of period, amplitude, speed and sensitivity, and of m.
 
-    Strong: the first term left out, b^8, with the largest coefficient over the side doubled. Weak: (1 - lambda)/x - 2
-    = 6x + ... <= 7.3x, squared away twice in s; m = x (1 + 4x + ...), where the rounding of k counts 2k-fold.
+    Strong: the first term left out is below 2e-3 b^8 in each, b^8 = (3k)^(8/3) <= 1.15 (3k)^2 sqrt(3k) up to the
+    split. Weak: (1 - lambda)/x - 2 = 6x + ... <= 7.3x, squared away twice in s, gives 20 x^2; m = x (1 + 4x + ...),
+    where the rounding of k counts 2k-fold. Needs no exp: exp(-y) <= 1/(1 + y + y^2/2), y = k/16, to the 32nd power.
     """
     strong = k < SPLIT
-    w = 0.0 * k
-    if some(strong):
-        b = cbrt(3.0 * k)
-        w = b * b
-    x = exp(-2.0 * (where(strong, 1.0, k) + 1.0))
-    cycle = where(strong, 2e-3 * (w * w) * (w * w), 20.0 * (x * x)) + ROUNDING
+    y = k * 0.0625
+    x = 1.0 / fma(fma(0.5, y, 1.0), y, 1.0)
+    x = x * x
+    x = x * x
+    x = x * x
+    x = x * x
+    x = _EXP_MINUS_2 * (x * x)
+    b3 = 3.0 * k
+    cycle = where(strong, 2.3e-3 * (b3 * b3) * sqrt(b3), 20.0 * (x * x)) + ROUNDING
     rounding = where(k < 400.0, 1e-15 * k, 0.0)  # below exp(-800) the multiplier is 0 for good
     return cycle, where(strong, 2.0 * cycle, 5.0 * x + rounding) + ROUNDING
 

@@ -8,21 +8,23 @@ the pallets, the fine structure of the torque. Source: Hoyng & Nieuwenhuizen, ar
 
 import math
 
-from kernels import _viscous
-from kernels._jit import entry, jit
-from kernels._lanes import each_cell, where
+from kernels import _viscous, _viscous_dopri5
+from kernels._columns import each_cell, entry
+from kernels._jit import jit
+from kernels._lanes import where
 from kernels.interface import Field, Kernel, Method, Status
 
 _OK, _BAD_INPUT, _OUT_OF_RANGE = float(Status.OK), float(Status.BAD_INPUT), float(Status.OUT_OF_RANGE)
 _NEVER_STARTS, _NO_LIMIT_CYCLE = float(Status.NEVER_STARTS), float(Status.NO_LIMIT_CYCLE)
-_NOT_CONVERGED = float(Status.NOT_CONVERGED)
+_NOT_CONVERGED, _STEP_LIMIT = float(Status.NOT_CONVERGED), float(Status.STEP_LIMIT)
+_INACCURATE = float(Status.INACCURATE)
 
 
 @jit
 def _write(i, scene, cycle, verdict, period, amplitude, crossing_speed, sensitivity, multiplier, status):
     period[i], amplitude[i], crossing_speed[i], normal = _viscous.dimensional(scene, cycle)
     sensitivity[i], multiplier[i] = cycle[3], cycle[4]
-    status[i] = where(normal, verdict, _OUT_OF_RANGE)
+    status[i] = where(normal | (verdict > _OK), verdict, _OUT_OF_RANGE)
 
 
 @jit
@@ -32,7 +34,7 @@ def _closed(i, mu, phi0, a, period, amplitude, crossing_speed, sensitivity, mult
     _write(i, scene, cycle, _OK, period, amplitude, crossing_speed, sensitivity, multiplier, status)
 
 
-@entry
+@entry()
 def closed(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
     """The root q of q - tanh q = 1/alpha from fitted polynomials: 1e-15 at every drive, no iteration."""
     each_cell(_closed, (mu, phi0, a, period, amplitude, crossing_speed, sensitivity, multiplier, status))
@@ -45,7 +47,7 @@ def _asymptotic(i, mu, phi0, a, period, amplitude, crossing_speed, sensitivity, 
     _write(i, scene, cycle, _OK, period, amplitude, crossing_speed, sensitivity, multiplier, status)
 
 
-@entry
+@entry()
 def asymptotic(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
     """Weak and strong series: within 3 % at every drive, to 1e-9 outside 5 > 1/alpha > 1e-3."""
     each_cell(_asymptotic, (mu, phi0, a, period, amplitude, crossing_speed, sensitivity, multiplier, status))
@@ -60,10 +62,24 @@ def _iterated(i, mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivi
     _write(i, scene, cycle, verdict, period, amplitude, crossing_speed, sensitivity, multiplier, status)
 
 
-@entry
+@entry()
 def iterated(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
     """The exact map from switch to switch, iterated from rest; slow at strong drive, where each swing forgets little."""
     each_cell(_iterated, (mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status))
+
+
+@jit
+def _integrated(i, mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+    k, _, scene = _viscous.without_dimensions(mu[i], phi0[i], a[i])
+    cycle, unfinished, unsettled, loose = _viscous_dopri5.integrated(k, rtol[i])
+    verdict = where(unfinished, _STEP_LIMIT, where(unsettled, _NOT_CONVERGED, where(loose, _INACCURATE, _OK)))
+    _write(i, scene, cycle, verdict, period, amplitude, crossing_speed, sensitivity, multiplier, status)
+
+
+@entry()
+def integrated(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+    """Dormand-Prince 5(4) over half swings, each switch located and restarted at, and Newton on their map."""
+    each_cell(_integrated, (mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status))
 
 
 @jit
@@ -78,7 +94,7 @@ def _asymptotic_bound(i, mu, phi0, a, out, asked):
     out[i] = _worst(asked, *_viscous.asymptotic_bound(k))
 
 
-@entry
+@entry("asked")
 def asymptotic_bound(mu, phi0, a, asked, out):
     """Bound on the error of `asymptotic`: the first terms left out."""
     each_cell(_asymptotic_bound, (mu, phi0, a, out, asked))
@@ -90,13 +106,13 @@ def _iterated_bound(i, mu, phi0, a, out, asked):
     out[i] = _worst(asked, *_viscous.iterated_bound(k))
 
 
-@entry
+@entry("asked")
 def iterated_bound(mu, phi0, a, asked, out):
     """What rounding leaves of the iterated map; that it settles to rtol, its status says."""
     each_cell(_iterated_bound, (mu, phi0, a, out, asked))
 
 
-@entry
+@entry("asked")
 def closed_bound(mu, phi0, a, asked, out):
     """`closed` is right to rounding everywhere."""
     out[:] = _viscous.ROUNDING
@@ -110,7 +126,7 @@ def _check(i, mu, phi0, a, status):
     status[i] = where(allowed, where(mu[i] > 0.0, cycle, _NEVER_STARTS), _BAD_INPUT)
 
 
-@entry
+@entry()
 def check(mu, phi0, a, status):
     """BAD_INPUT for what is NaN, infinite or negative; NEVER_STARTS without torque; NO_LIMIT_CYCLE without friction."""
     each_cell(_check, (mu, phi0, a, status))
@@ -139,5 +155,6 @@ FOLIOT = Kernel(
         Method("asymptotic", "weak and strong series with a bound each", asymptotic, asymptotic_bound),
         Method("closed", "root of q - tanh q = 1/alpha by fitted polynomials", closed, closed_bound),
         Method("map", "exact map from switch to switch, iterated from rest", iterated, iterated_bound),
+        Method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", integrated),
     ),
 )

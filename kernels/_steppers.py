@@ -1,0 +1,195 @@
+"""Runge-Kutta steps for second-order scenes x'' = f(x, x'), generic in one cell or lanes.
+
+A scene carries its motion and two tangents of it, so a state is (x, v, x1, v1, x2, v2), each pair a position and its
+rate, and a right-hand side is `accelerations(state, scene) -> (x'', x1'', x2'')`. Because every position is the
+integral of a rate, the stages of a position are folded into those of its rate (Nystroem form), which halves the work:
+    V_i = v + h sum_j a_ij F_j,  X_i = x + c_i h v + h^2 sum_j (sum_m a_im a_mj) F_j.                     (1)
+"""
+
+import numpy as np
+
+from kernels._jit import jit, jit_call
+from kernels._lanes import exponent, fma, isnt, magnitude, pow2, some, where
+from kernels._vecmath import LN2, exp
+
+SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
+STEP_LIMIT = 10_000
+"""Steps between two events after which a cell is given up."""
+ROOT_LIMIT = 60
+
+# Dormand & Prince, J. Comput. Appl. Math. 6:19 (1980), RK5(4)7M; the last row is the fifth-order result
+_A = np.zeros((7, 7))
+_A[1, :1] = (1 / 5,)
+_A[2, :2] = 3 / 40, 9 / 40
+_A[3, :3] = 44 / 45, -56 / 15, 32 / 9
+_A[4, :4] = 19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729
+_A[5, :5] = 9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656
+_A[6, :6] = 35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84
+_E = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+_AA = _A @ _A
+
+
+def _row(i):
+    """What stage i takes: its node, and the weights of earlier stages in its rate and in its position."""
+    return float(_A[i].sum()), tuple(map(float, _A[i, :i])), tuple(map(float, _AA[i, :i]))
+
+
+_STAGE_1, _STAGE_2, _STAGE_3, _STAGE_4, _STAGE_5, _RESULT = (_row(i) for i in range(1, 7))
+_RATE_ERROR, _POSITION_ERROR = tuple(map(float, _E)), tuple(map(float, _E @ _A))
+
+
+@jit
+def _mix(weights, stages, part):
+    """Sum of weights[j] stages[j][part]."""
+    total = weights[0] * stages[0][part]
+    for j in range(1, len(weights)):
+        total = fma(weights[j], stages[j][part], total)
+    return total
+
+
+@jit
+def _pair(state, h, row, stages, part):
+    node, rate, position = row
+    x, v = state[2 * part], state[2 * part + 1]
+    rise = fma(h, _mix(position, stages, part), node * v)
+    return fma(h, rise, x), fma(h, _mix(rate, stages, part), v)
+
+
+@jit
+def _at(state, h, row, stages):
+    """The state at a stage, by (1)."""
+    return (
+        *_pair(state, h, row, stages, 0),
+        *_pair(state, h, row, stages, 1),
+        *_pair(state, h, row, stages, 2),
+    )
+
+
+@jit
+def _stages(accelerations, state, scene, h):
+    """The six stages of a step and its fifth-order result."""
+    f0 = accelerations(state, scene)
+    f1 = accelerations(_at(state, h, _STAGE_1, (f0,)), scene)
+    f2 = accelerations(_at(state, h, _STAGE_2, (f0, f1)), scene)
+    f3 = accelerations(_at(state, h, _STAGE_3, (f0, f1, f2)), scene)
+    f4 = accelerations(_at(state, h, _STAGE_4, (f0, f1, f2, f3)), scene)
+    f5 = accelerations(_at(state, h, _STAGE_5, (f0, f1, f2, f3, f4)), scene)
+    stages = (f0, f1, f2, f3, f4, f5)
+    return stages, _at(state, h, _RESULT, stages)
+
+
+@jit
+def _larger(x, y):
+    return where(x > y, x, y)
+
+
+@jit
+def _miss(h, stages, scale, part):
+    """Estimated error of a pair over its scale."""
+    rate = magnitude(h * _mix(_RATE_ERROR, stages, part)) / scale[2 * part + 1]
+    position = magnitude(h * h * _mix(_POSITION_ERROR, stages, part)) / scale[2 * part]
+    return _larger(rate, position)
+
+
+@jit_call
+def dopri5_step(accelerations, state, scene, h, scale):
+    """One step of Dormand-Prince 5(4).
+
+    Returns
+    -------
+    state : tuple
+        After the step, fifth order.
+    error : float64 or Lanes
+        The largest estimated error of a component over its entry in `scale`.
+    """
+    stages, new = _stages(accelerations, state, scene, h)
+    full = (*stages, accelerations(new, scene))
+    return new, _larger(_miss(h, full, scale, 0), _larger(_miss(h, full, scale, 1), _miss(h, full, scale, 2)))
+
+
+@jit
+def _step_factor(ratio):
+    """0.9 ratio^(-1/5), from 0.2 to 5, for a step whose error was `ratio` of what is allowed."""
+    ratio = where(ratio > 1e-6, ratio, 1e-6)
+    ratio = where(ratio < 1e6, ratio, 1e6)
+    e = exponent(ratio)
+    m = ratio * pow2(-e) - 1.0
+    log2_ratio = e + m * (4.0 / 3.0 - m * (1.0 / 3.0))  # within 0.01
+    factor = SAFETY * exp(-0.2 * LN2 * log2_ratio)
+    factor = where(factor > SHRINK, factor, SHRINK)
+    return where(factor < GROW, factor, GROW)
+
+
+@jit
+def _blend(active, new, old):
+    """The new state in active lanes; a finished lane is frozen."""
+    return (
+        where(active, new[0], old[0]),
+        where(active, new[1], old[1]),
+        where(active, new[2], old[2]),
+        where(active, new[3], old[3]),
+        where(active, new[4], old[4]),
+        where(active, new[5], old[5]),
+    )
+
+
+@jit
+def integrate_until(event, accelerations, scales, state, scene, h, tolerance, active):
+    """Follow the motion of the active cells until `event` falls through 0, and stop there.
+
+    Parameters
+    ----------
+    event(state, acceleration) -> (value, rate) : positive at the start, falling monotonically through 0
+    accelerations(state, scene) : tuple of the three second derivatives
+    scales(state, scene) : tuple of six, what `tolerance` is relative to
+    h : first step
+
+    Returns
+    -------
+    state : at the event
+    t : time taken
+    h : last whole step, a first step for what follows
+    moving : cells that have not met the event after STEP_LIMIT steps
+    """
+    moving = active
+    t = 0.0 * h
+    for _ in range(STEP_LIMIT):
+        if not some(moving):
+            break
+        new, error = dopri5_step(accelerations, state, scene, h, scales(state, scene))
+        ratio = error / tolerance
+        accepted = moving & (ratio <= 1.0)
+        passed = accepted & (event(new, 0.0)[0] <= 0.0)
+        moving = moving & isnt(passed)
+        accepted = accepted & moving
+        state = _blend(accepted, new, state)
+        t = where(accepted, t + h, t)
+        h = where(moving, h * _step_factor(ratio), h)
+    state, last = _locate(event, accelerations, scales, state, scene, h, active)
+    return state, t + last, h, moving
+
+
+@jit
+def _locate(event, accelerations, scales, state, scene, h, active):
+    """Shorten the step `h`, in which the event lies, until it ends there: Newton, bisection where that leaves h's bracket.
+
+    Each trial is a whole Runge-Kutta step from the same state, so the root has the order of the method.
+    """
+    scale = scales(state, scene)
+    low, high = 0.0 * h, h
+    part = 0.5 * h
+    new, _ = dopri5_step(accelerations, state, scene, part, scale)
+    searching = active
+    for _ in range(ROOT_LIMIT):
+        if not some(searching):
+            break
+        value, rate = event(new, accelerations(new, scene)[0])
+        low, high = where(value > 0.0, part, low), where(value > 0.0, high, part)
+        guess = part - value / rate
+        guess = where((guess > low) & (guess < high), guess, 0.5 * (low + high))
+        settled = magnitude(guess - part) <= 4e-16 * h
+        part = where(searching, guess, part)
+        trial, _ = dopri5_step(accelerations, state, scene, part, scale)
+        new = _blend(searching, trial, new)
+        searching = searching & isnt(settled)
+    return _blend(active, new, state), where(active, part, 0.0)
