@@ -146,38 +146,40 @@ def _run(arguments: argparse.Namespace) -> None:
 
     output = arguments.output or Path(f"{arguments.study.stem}.h5")
     before = _mark(output)
-    dataset = run(study, output, workers=arguments.workers, force=arguments.force)
-    print(
-        f"{output}: "
-        + ("done before; " if before is not None and _mark(output) == before else "")
-        + summary_text(dataset)
-    )
+    with run(study, output, workers=arguments.workers, force=arguments.force) as dataset:
+        told = "done before; " if before is not None and _mark(output) == before else ""
+        print(f"{output}: {told}{summary_text(dataset)}")
 
 
 def _show(arguments: argparse.Namespace) -> None:
     from sweep.report import result_text
 
-    print(result_text(arguments.result, _result(arguments)))
+    with _result(arguments) as dataset:
+        print(result_text(arguments.result, dataset))
 
 
 def _fit(arguments: argparse.Namespace) -> None:
-    from sweep.fitting import fit_text
+    from sweep.fitting import fit_text, pick
 
-    print(fit_text(_picked(arguments), arguments.y, arguments.x, arguments.window or []))
+    with _result(arguments) as dataset:
+        print(fit_text(pick(dataset, arguments.at), arguments.y, arguments.x, arguments.window or []))
 
 
 def _plot(arguments: argparse.Namespace) -> None:
     from sweep.charts import plot
+    from sweep.fitting import pick
 
     output = arguments.output or Path(f"{arguments.result.stem}.png")
-    plot(_picked(arguments), output, y=arguments.y, x=arguments.x)
+    with _result(arguments) as dataset:
+        plot(pick(dataset, arguments.at), output, y=arguments.y, x=arguments.x)
     print(output)
 
 
 def _export(arguments: argparse.Namespace) -> None:
     from sweep.export import export
 
-    print(export(_result(arguments), arguments.output))
+    with _result(arguments) as dataset:
+        print(export(dataset, arguments.output))
 
 
 def _study(arguments: argparse.Namespace) -> Study:
@@ -198,13 +200,6 @@ def _result(arguments: argparse.Namespace) -> xr.Dataset:
     if path.suffix == ".toml":
         raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
     return open_result(path)
-
-
-def _picked(arguments: argparse.Namespace) -> xr.Dataset:
-    """The result at the values that `--at` names."""
-    from sweep.fitting import pick
-
-    return pick(_result(arguments), arguments.at)
 
 
 def _mark(path: Path) -> tuple[int, int] | None:

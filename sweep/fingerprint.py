@@ -8,6 +8,7 @@ import importlib.util
 import json
 import sys
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -91,14 +92,22 @@ def _sources(kernel_name: str) -> dict[str, str]:
         path = _path(name)
         if name in found or path is None:
             continue
-        text = path.read_bytes()
-        found[name] = hashlib.sha256(text).hexdigest()
-        if path.suffix == ".py":
-            waiting += [m for m in _imported(text, name, path) if m.partition(".")[0] in packages]
+        found[name], imported = _read(path, name, path.stat().st_mtime_ns)
+        names = [name, *imported]
+        # with a.b.c Python also runs a and a.b
+        parents = (n.rsplit(".", k)[0] for n in names for k in range(n.count(".") + 1))
+        waiting += [n for n in parents if n.partition(".")[0] in packages]
     engine = _path(ENGINE)
     if engine is not None:
         found[ENGINE] = hashlib.sha256(engine.read_bytes()).hexdigest()
     return {SOURCE + name: found[name] for name in sorted(found)}
+
+
+@lru_cache(maxsize=1000)
+def _read(path: Path, name: str, modified: int) -> tuple[str, tuple[str, ...]]:
+    """Digest of a source file, and what it imports; kept while the file's time of modification stays."""
+    text = path.read_bytes()
+    return hashlib.sha256(text).hexdigest(), tuple(_imported(text, name, path)) if path.suffix == ".py" else ()
 
 
 def _path(name: str) -> Path | None:

@@ -18,7 +18,7 @@ from sweep.checks import Mistakes, did_you_mean, listed, show
 from sweep.entries import EXAMPLE, Entries
 from sweep.errors import Mistake, StudyError, SweepError
 from sweep.loading import load_kernel
-from sweep.study import AUTO, Axis, Study, frozen
+from sweep.study import AUTO, Axis, Study, differs, frozen
 
 __all__ = ["Axis", "Study", "build_study", "read_study"]
 
@@ -332,7 +332,7 @@ class _Reader:
 
     def _excluded(self, method: str, axes: Mapping[str, Axis], fixed: Mapping[str, float]) -> None:
         """Methods that cannot do a term which the study has."""
-        terms = [p.name for p in self.kernel.parameters if p.name in axes or self._differs(p, fixed)]
+        terms = [p.name for p in self.kernel.parameters if p.name in axes or differs(p, fixed)]
         lacking = {m.name: [t for t in m.excludes if t in terms] for m in self.kernel.methods}
         able = [name for name, found in lacking.items() if not found]
         if "method" in axes:
@@ -346,10 +346,3 @@ class _Reader:
             if word == "auto" and self.kernel.methods and not able:
                 hard = [term for term in terms if any(term in found for found in lacking.values())]
                 self.mistakes.add(where, f"no method of {self.kernel.name} can do {listed(hard, word='and')} together")
-
-    def _differs(self, field: Field, fixed: Mapping[str, float]) -> bool:
-        """Whether the study fixes it to something else than its default."""
-        if field.default is None or field.name not in fixed:
-            return False
-        default = fixed.get(field.default) if isinstance(field.default, str) else field.default
-        return fixed[field.name] != default

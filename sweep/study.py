@@ -104,6 +104,11 @@ class Study:
         """The output fields asked for."""
         return tuple(o for o in self.kernel.outputs if o.name in self.outputs)
 
+    @property
+    def terms(self) -> frozenset[str]:
+        """Parameters that are an axis or differ from their default: what a method must be able to do."""
+        return frozenset(p.name for p in self.kernel.parameters if p.name in self.axes or differs(p, self.fixed))
+
     def to_json(self) -> str:
         """The study on one line of JSON: floats exactly, also NaN and infinities; the kernel as it declares itself."""
         keys = {name: getattr(self, name) for name in PLAIN}
@@ -154,6 +159,14 @@ PLAIN = (
     "title", "question", "kernel_name", "method", "rtol", "outputs", "design", "fixed", "follows", "along", "text",
 )  # fmt: skip
 """Attributes that are written as they are."""
+
+
+def differs(field: Field, fixed: Mapping[str, float]) -> bool:
+    """Whether a parameter is fixed to something else than its default."""
+    if field.default is None or field.name not in fixed:
+        return False
+    default = fixed.get(field.default) if isinstance(field.default, str) else field.default
+    return fixed[field.name] != default
 
 
 def frozen(values: Any) -> NDArray[np.float64]:

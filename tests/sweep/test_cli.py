@@ -1,0 +1,416 @@
+"""The command line: what it prints, and that no fault of a user or a machine ends in a traceback."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from toy_studies import HEAD
+
+import sweep
+from sweep import cli
+
+STUDY = """# How fast does a stone fall?
+title = "Falling stones"
+kernel = "toy:KERNEL"
+rtol = 1e-3
+[axes.height]
+spacing = "log"
+start = 1
+stop = 1000
+num = 31
+[axes.v0]
+values = [0.0, 1.0, -1.0, nan]
+[along.phase]
+num = 5
+"""
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty folder, which is the current one, with the study in it."""
+    monkeypatch.chdir(tmp_path)
+    Path("stones.toml").write_text(STUDY)
+    return tmp_path
+
+
+@pytest.fixture
+def call(capsys):
+    """Runs a command: exit status, what it printed, what it complained of."""
+
+    def call(*argv):
+        code = cli.main([str(word) for word in argv])
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
+
+    return call
+
+
+@pytest.fixture
+def done(here, call):
+    """The same folder with the study computed."""
+    assert call("run", "stones.toml", "--allow-import")[0] == 0
+    return here
+
+
+def in_a_process(*argv, **options):
+    path = os.pathsep.join([str(Path(sweep.__file__).parents[1]), str(Path(__file__).parent)])
+    command = [sys.executable, "-m", "sweep", *argv]
+    return subprocess.Popen(
+        command,
+        env={**os.environ, "PYTHONPATH": path},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **options,
+    )
+
+
+# what is quick
+
+
+@pytest.mark.parametrize("statement", ["import sweep", "import sweep.cli; sweep.cli.parser()"])
+def test_nothing_heavy_is_imported_before_it_is_needed(statement):
+    heavy = "{'numpy', 'numba', 'xarray', 'pint', 'h5py', 'matplotlib', 'dask'}"
+    code = f"import sys; {statement}; assert not {heavy} & set(sys.modules), {heavy} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(sweep.__file__).parents[1])
+
+
+def test_a_study_without_foreign_units_is_read_without_pint(here):
+    code = "import sys, sweep; sweep.read_study('stones.toml', True); assert not {'pint', 'xarray'} & set(sys.modules)"
+    path = os.pathsep.join([str(Path(sweep.__file__).parents[1]), str(Path(__file__).parent)])
+    subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "PYTHONPATH": path})
+
+
+# public names
+
+
+def test_every_public_name_is_there():
+    for name in sweep.__all__:
+        assert callable(getattr(sweep, name)), name
+        assert name in dir(sweep)
+
+
+def test_plan_and_export_stay_functions_once_their_modules_are_imported():
+    import sweep.export
+    import sweep.plan
+
+    assert not isinstance(sweep.plan, type(sys))
+    assert not isinstance(sweep.export, type(sys))
+
+
+def test_an_unknown_name_is_no_attribute():
+    with pytest.raises(AttributeError, match="no attribute 'runn'"):
+        sweep.runn  # noqa: B018
+
+
+# kernels
+
+
+def test_kernels_lists_the_catalogue(call):
+    code, out, _ = call("kernels")
+    assert code == 0
+    assert "foliot: " in out
+    assert "mu [rad/s^2]" in out
+    assert "closed" in out
+
+
+def test_a_kernel_is_told_with_all_it_takes_and_gives(call):
+    code, out, _ = call("kernels", "toy:KERNEL", "--allow-import")
+    assert code == 0
+    for line in (
+        "toy:KERNEL: A stone thrown downwards from a height.",
+        "height  [m]      > 0   required         height above the ground",
+        "v0      [m/s]    >= 0  default 0        downward speed at the start",
+        "drop          [m]    along phase  way fallen",
+        "rough  states its error  no initial speed",
+        "exact  keeps rtol        root of the quadratic",
+    ):
+        assert line in out
+
+
+@pytest.mark.parametrize("kernel", ["toy:KERNEL", "toy:RICH", "foliot"])
+def test_the_study_to_begin_with_is_sound(call, here, kernel):
+    _, out, _ = call("kernels", kernel, "--allow-import")
+    text = out.split("a study to begin with\n")[1]
+    Path("begin.toml").write_text(text)
+    assert sweep.read_study("begin.toml", allow_import=True).kernel_name == kernel
+
+
+def test_words_and_what_a_method_cannot_do_are_told(call):
+    _, out, _ = call("kernels", "toy:RICH", "--allow-import")
+    assert '"round" or "square"' in out
+    assert "default load" in out
+    assert "cannot do drag or grip" in out
+
+
+def test_an_unknown_kernel_is_told_with_the_catalogue(call):
+    code, out, err = call("kernels", "folio")
+    assert (code, out) == (2, "")
+    assert 'no kernel "folio"; did you mean foliot?' in err
+
+
+# plan, run, show
+
+
+def test_plan_tells_the_number_of_cells(here, call):
+    code, out, _ = call("plan", "stones.toml", "--allow-import")
+    assert code == 0
+    assert "124" in out
+
+
+def test_run_writes_beside_the_caller_and_counts_what_failed(here, call):
+    code, out, err = call("run", "stones.toml", "--allow-import")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0].startswith("stones.h5: 124 cells; solved by rough ")
+    assert lines[1].startswith("62 of 124 cells: BAD_INPUT, e.g. height=1.0 v0=-1.0")
+    with sweep.open_result("stones.h5") as dataset:
+        np.testing.assert_allclose(dataset.fall_time.sel(height=1.0, v0=0.0), np.sqrt(2 / 9.80665), rtol=1e-15)
+
+
+def test_run_again_leaves_a_finished_result_alone(done, call):
+    before = Path("stones.h5").stat()
+    code, out, _ = call("run", "stones.toml", "--allow-import")
+    assert code == 0
+    assert out.startswith("stones.h5: done before; 124 cells")
+    assert Path("stones.h5").stat() == before
+
+
+def test_force_computes_anew(done, call):
+    before = Path("stones.h5").stat().st_ino, Path("stones.h5").stat().st_mtime_ns
+    code, out, _ = call("run", "stones.toml", "--allow-import", "--force")
+    assert code == 0
+    assert "done before" not in out
+    assert before != (Path("stones.h5").stat().st_ino, Path("stones.h5").stat().st_mtime_ns)
+
+
+def test_the_result_of_another_study_is_not_overwritten(done, call):
+    Path("stones.toml").write_text(STUDY.replace("num = 31", "num = 4"))
+    code, out, err = call("run", "stones.toml", "--allow-import")
+    assert (code, out) == (2, "")
+    assert "stones.h5" in err
+    assert "--force" in err
+    assert "axes.height: was 31 values" in err
+
+
+def test_run_writes_where_it_is_told(here, call):
+    (here / "results").mkdir()
+    assert call("run", "stones.toml", "--allow-import", "-o", "results/a.h5")[0] == 0
+    assert Path("results/a.h5").exists()
+    assert not Path("stones.h5").exists()
+
+
+def test_show_tells_what_is_in_a_result(done, call):
+    code, out, err = call("show", "stones.h5")
+    assert (code, err) == (0, "")
+    for text in (
+        "stones.h5: complete, 124 cells\nFalling stones\nHow fast does a stone fall?",
+        "kernel    toy:KERNEL",
+        "height  [m]    31 values  1 to 1000",
+        "v0      [m/s]  4 values   0, 1, -1, nan",
+        "g  [m/s^2]  9.80665",
+        "phase  [1]  5 values  0, 0.25, 0.5, 0.75, 1",
+        "62  OK",
+        "v0 -1 and nan; e.g. height=1.0 v0=-1.0",
+    ):
+        assert text in out
+    assert "fall_time     [s]" in out
+
+
+def test_show_tells_how_much_of_a_sweep_is_done(here, call):
+    process = slow_run()
+    folder = Path("slow.h5.parts")
+    wait_for(lambda: len(list(folder.glob("*-*.h5"))) >= 2)
+    code, out, _ = call("show", "slow.h5")
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=20)
+    assert code == 0
+    assert "slow.h5: unfinished: " in out
+    assert "PENDING" in out
+
+
+# fit, plot, export
+
+
+def test_fit_tells_the_exponent(done, call):
+    code, out, err = call("fit", "stones.h5", "--y", "fall_time", "--x", "height", "--at", "v0=0")
+    assert (code, err) == (0, "")
+    assert "fall_time ~ height^p" in out
+    assert "1 to 1000  0.5 " in out
+    assert "31" in out
+
+
+def test_two_windows_tell_where_the_laws_meet(done, call):
+    windows = ("--window", "100", "1000", "--window", "1", "10")
+    code, out, _ = call("fit", "stones.h5", "--y", "fall_time", "--x", "height", "--at", "v0=1", *windows)
+    assert code == 0
+    assert out.index("1 to 10 ") < out.index("100 to 1000 ")
+    assert "the two laws meet" in out
+
+
+def test_without_a_choice_every_other_axis_has_its_line(done, call):
+    code, out, _ = call("fit", "stones.h5", "--y", "impact_speed", "--x", "height", "--at", "v0=1")
+    assert (code, len(out.split("\n\n")[0].splitlines())) == (0, 3)
+    Path("all.toml").write_text(STUDY.replace("-1.0, nan", "2.0, 3.0"))
+    call("run", "all.toml", "--allow-import")
+    code, out, _ = call("fit", "all.h5", "--y", "impact_speed", "--x", "height")
+    assert (code, len(out.split("\n\n")[0].splitlines())) == (0, 6)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--y", "fal_time", "--x", "height"), "--y fal_time: no such output; did you mean fall_time?"),
+        (("--y", "fall_time", "--x", "heigth", "--at", "v0=0"), "did you mean height?"),
+        (("--y", "fall_time", "--x", "height", "--at", "v0"), "--at v0: expected axis=value"),
+        (("--y", "fall_time", "--x", "height", "--at", "v1=0"), "--at v1=0: no axis v1; did you mean v0?"),
+        (("--y", "fall_time", "--x", "height", "--at", "v0=0.4"), "v0 has no such value; nearest is 0 or 1"),
+        (("--y", "fall_time", "--x", "height", "--at", "v0=x"), "--at v0=x: expected a number after ="),
+        (("--y", "fall_time", "--x", "height", "--window", "10", "1", "--at", "v0=0"), "the window 10 to 1"),
+        (("--y", "fall_time", "--x", "height", *("--window", "1", "9") * 3), "--window: expected one or two, found 3"),
+    ],
+)
+def test_a_fit_that_cannot_be_made_is_told(done, call, options, message):
+    code, out, err = call("fit", "stones.h5", *options)
+    assert (code, out) == (2, "")
+    assert message in err
+
+
+def test_export_writes_csv(done, call):
+    code, out, _ = call("export", "stones.h5", "-o", "stones.csv")
+    assert (code, out) == (0, "stones.csv\n")
+    assert "fall_time" in Path("stones.csv").read_text()
+
+
+def test_an_exported_column_is_an_axis_of_the_next_study(done, call):
+    call("export", "stones.h5", "-o", "stones.csv")
+    Path("again.toml").write_text(HEAD + 'design = "zip"\naxes.height.file = "stones.csv"\naxes.v0.file = "stones.csv"')
+    study = sweep.read_study("again.toml", allow_import=True)
+    assert set(study.axes["height"].values) == set(sweep.open_result("stones.h5").height.values)
+
+
+def test_plot_writes_a_picture(done, call):
+    code, out, err = call("plot", "stones.h5", "--y", "fall_time", "--x", "height", "--at", "v0=1")
+    assert (code, out, err) == (0, "stones.png\n", "")
+    assert Path("stones.png").read_bytes().startswith(b"\x89PNG")
+
+
+# mistakes and faults
+
+
+@pytest.mark.parametrize(
+    ("argv", "message"),
+    [
+        (("run", "no.toml"), "no.toml: no such file"),
+        (("run", "stone.toml"), "did you mean stones.toml?"),
+        (("run", "."), "is a folder"),
+        (("run", "study.py"), "run it with: python study.py"),
+        (("run", "stones.h5"), "is a result, not a study; look at it with: sweep show stones.h5"),
+        (("show", "stones.toml"), "is a study, not a result; compute it with: sweep run stones.toml"),
+        (("show", "no.h5"), "no.h5"),
+        (("run", "stones.toml"), "allow it with --allow-import"),
+        (("run", "stones.toml", "--allow-import", "--workers", "0"), "workers"),
+        (("run", "stones.toml", "--allow-import", "-o", "nowhere/a.h5"), "nowhere"),
+        (("run", "stones.toml", "--allow-import", "-o", "stones.toml"), "stones.toml"),
+        (("plan", "broken.toml", "--allow-import"), "broken.toml: 4 mistakes"),
+        (("export", "no.h5", "-o", "a.csv"), "no.h5"),
+    ],
+)
+def test_a_mistake_ends_in_one_message_and_status_2(here, call, argv, message):
+    Path("broken.toml").write_text('kernel = "toy:KERNEL"\nrtol = 2\n')
+    code, out, err = call(*argv)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    "argv", [(), ("rum", "x"), ("fit", "x.h5"), ("fit", "x.h5", "--y", "a", "--x", "b", "--window", "1", "b")]
+)
+def test_a_misused_command_shows_its_usage(argv, capsys):
+    with pytest.raises(SystemExit) as caught:
+        cli.main(list(argv))
+    assert caught.value.code == 2
+    assert "usage: sweep" in capsys.readouterr().err
+
+
+def test_a_fault_of_ours_is_one_message_too(here, call, monkeypatch):
+    monkeypatch.setattr(cli, "_study", lambda arguments: 1 / 0)
+    code, _, err = call("run", "stones.toml")
+    assert code == 1
+    assert err.startswith("a fault in foliot: ZeroDivisionError: division by zero\nPlease report it")
+    monkeypatch.setenv("SWEEP_TRACEBACK", "1")
+    with pytest.raises(ZeroDivisionError):
+        call("run", "stones.toml")
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "message"),
+    [
+        (MemoryError(), 2, "out of memory"),
+        (OSError(28, "No space left on device", "/x/y"), 2, "/x/y: No space left on device"),
+        (KeyboardInterrupt(), 130, "stopped"),
+    ],
+)
+def test_faults_of_the_machine_are_told_in_one_line(here, call, monkeypatch, error, code, message):
+    def fail(arguments):
+        raise error
+
+    monkeypatch.setattr(cli, "_study", fail)
+    found, _, err = call("run", "stones.toml")
+    assert found == code
+    assert message in err
+    assert len(err.splitlines()) == 1
+
+
+def test_a_reader_who_has_had_enough_is_no_fault(done):
+    process = in_a_process("show", "stones.h5", cwd=done)
+    process.stdout.close()
+    assert process.wait(timeout=60) == 0
+    with process.stderr:
+        assert process.stderr.read() == ""
+
+
+SLOW = """
+import time, numpy as np
+from dataclasses import replace
+from toy import KERNEL, exact, check
+def slow(height, v0, g, rtol, phase, *outputs):
+    time.sleep(0.01 * len(height))
+    exact(height, v0, g, rtol, phase, *outputs)
+KERNEL = replace(KERNEL, methods=(replace(KERNEL.methods[1], solve=slow),))
+"""
+
+
+def slow_run():
+    Path("slowstones.py").write_text(SLOW)
+    Path("slow.toml").write_text(
+        'kernel = "slowstones:KERNEL"\noutputs = ["fall_time"]\n'
+        'axes.height = { spacing = "log", start = 1, stop = 9, num = 2000 }'
+    )
+    return in_a_process("run", "slow.toml", "--allow-import", "--workers", "2")
+
+
+def wait_for(condition):
+    limit = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < limit, "waited for a minute"
+        time.sleep(0.05)
+
+
+def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(here):
+    process = slow_run()
+    folder = Path("slow.h5.parts")
+    wait_for(lambda: len(list(folder.glob("*-*.h5"))) >= 2)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert "continue" in err
+    assert "Traceback" not in err
+    assert len(list(folder.glob("*-*.h5"))) >= 2
+    assert not Path("slow.h5").exists()
