@@ -289,7 +289,7 @@ def _missing_is_nan(y: xr.DataArray) -> xr.DataArray:
 def _log(y: xr.DataArray) -> xr.DataArray:
     """Natural logarithm, NaN where there is none."""
     numbers = _missing_is_nan(y)
-    logs: xr.DataArray = xr.apply_ufunc(np.log, numbers.where(numbers > 0), dask="allowed", keep_attrs=False)
+    logs: xr.DataArray = xr.apply_ufunc(np.log, numbers.where(numbers > 0), dask="allowed", keep_attrs=True)
     return logs.rename(y.name)
 
 
@@ -301,6 +301,7 @@ def _along(function: Callable[[Array], Array], y: xr.DataArray, dimension: str, 
         input_core_dims=[[dimension]],
         output_core_dims=[[to or dimension]],
         exclude_dims={dimension} if to else set(),
+        keep_attrs=True,  # those of the coordinates; the caller writes those of the result
     )
     return found if to else found.transpose(*y.dims)
 
@@ -355,7 +356,7 @@ def _where(
         count = int(error.max())
         said = f"passes {value:g} {count} times" if count else f"does not pass {value:g}"
         raise SweepError(f"{_title(curve)} {said} along {dim} in the window; choose another window")
-    abscissa: xr.DataArray = xr.apply_ufunc(np.exp, place)
+    abscissa: xr.DataArray = xr.apply_ufunc(np.exp, place, keep_attrs=True)
     found = xr.Dataset({"abscissa": abscissa, "abscissa_error": (abscissa * error).where(place.notnull())})
     units = str(curve.coords[dim].attrs.get("units", "1"))
     found.abscissa.attrs = {"units": units, "long_name": f"where {_title(curve)} is {value:g}"}
