@@ -206,6 +206,53 @@ _function(sqrt, 1, _number, _emit(_called("sqrt")))
 _function(magnitude, 1, _number, _emit(_called("fabs")))
 
 
+def dot(weights, terms):
+    """Sum of weights[j] terms[j] by a chain of multiply-adds from the first term on; both are tuples."""
+    total = weights[0] * terms[0]
+    for weight, term in zip(weights[1:], terms[1:], strict=True):
+        total = fma(weight, term, total)
+    return total
+
+
+def horner(x, coefficients):
+    """Polynomial in x, lowest power first; the coefficients are a tuple."""
+    value = coefficients[-1]
+    for coefficient in coefficients[-2::-1]:
+        value = fma(value, x, coefficient)
+    return value
+
+
+def _items(context, builder, numba_type, value, target):
+    """The elements of a tuple, each as `target`."""
+    items = cgutils.unpack_tuple(builder, value)
+    return [context.cast(builder, v, t, target) for v, t in zip(items, numba_type, strict=True)]
+
+
+def _lower_dot(context, builder, signature, values):
+    target = signature.return_type
+    weights, terms = (
+        _items(context, builder, t, v, target) for v, t in zip(values, signature.args, strict=True)
+    )
+    total = builder.fmul(weights[0], terms[0])
+    for weight, term in zip(weights[1:], terms[1:], strict=True):
+        total = _called("fma")(builder, weight, term, total)
+    return total
+
+
+def _lower_horner(context, builder, signature, values):
+    target = signature.return_type
+    x = context.cast(builder, values[0], signature.args[0], target)
+    coefficients = _items(context, builder, signature.args[1], values[1], target)
+    value = coefficients[-1]
+    for coefficient in coefficients[-2::-1]:
+        value = _called("fma")(builder, value, x, coefficient)
+    return value
+
+
+_function(dot, 2, lambda weights, terms: _number(*terms), _lower_dot)
+_function(horner, 2, lambda x, coefficients: _number(x), _lower_horner)
+
+
 def pow2(n):
     """2^n for an integer-valued n from -1022 to 1023."""
     return math.ldexp(1.0, int(n))

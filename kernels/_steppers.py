@@ -9,7 +9,7 @@ integral of a rate, the stages of a position are folded into those of its rate (
 import numpy as np
 
 from kernels._jit import jit, jit_call
-from kernels._lanes import exponent, fma, isnt, magnitude, pow2, some, where
+from kernels._lanes import dot, exponent, fma, isnt, magnitude, pow2, some, where
 from kernels._vecmath import LN2, exp
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
@@ -39,43 +39,18 @@ _RATE_ERROR, _POSITION_ERROR = tuple(map(float, _E)), tuple(map(float, _E @ _A))
 
 
 @jit
-def _mix(weights, stages, part):
-    """Sum of weights[j] stages[j][part]."""
-    total = weights[0] * stages[0][part]
-    for j in range(1, len(weights)):
-        total = fma(weights[j], stages[j][part], total)
-    return total
-
-
-@jit
-def _pair(state, h, row, stages, part):
+def _at(state, h, row, f0, f1, f2):
+    """The state at a stage, by (1), from the accelerations of earlier stages: of the motion and of each tangent."""
     node, rate, position = row
-    x, v = state[2 * part], state[2 * part + 1]
-    rise = fma(h, _mix(position, stages, part), node * v)
-    return fma(h, rise, x), fma(h, _mix(rate, stages, part), v)
-
-
-@jit
-def _at(state, h, row, stages):
-    """The state at a stage, by (1)."""
+    x, v, x1, v1, x2, v2 = state
     return (
-        *_pair(state, h, row, stages, 0),
-        *_pair(state, h, row, stages, 1),
-        *_pair(state, h, row, stages, 2),
+        fma(h, fma(h, dot(position, f0), node * v), x),
+        fma(h, dot(rate, f0), v),
+        fma(h, fma(h, dot(position, f1), node * v1), x1),
+        fma(h, dot(rate, f1), v1),
+        fma(h, fma(h, dot(position, f2), node * v2), x2),
+        fma(h, dot(rate, f2), v2),
     )
-
-
-@jit
-def _stages(accelerations, state, scene, h):
-    """The six stages of a step and its fifth-order result."""
-    f0 = accelerations(state, scene)
-    f1 = accelerations(_at(state, h, _STAGE_1, (f0,)), scene)
-    f2 = accelerations(_at(state, h, _STAGE_2, (f0, f1)), scene)
-    f3 = accelerations(_at(state, h, _STAGE_3, (f0, f1, f2)), scene)
-    f4 = accelerations(_at(state, h, _STAGE_4, (f0, f1, f2, f3)), scene)
-    f5 = accelerations(_at(state, h, _STAGE_5, (f0, f1, f2, f3, f4)), scene)
-    stages = (f0, f1, f2, f3, f4, f5)
-    return stages, _at(state, h, _RESULT, stages)
 
 
 @jit
@@ -84,10 +59,10 @@ def _larger(x, y):
 
 
 @jit
-def _miss(h, stages, scale, part):
+def _miss(h, accelerations, rate_scale, position_scale):
     """Estimated error of a pair over its scale."""
-    rate = magnitude(h * _mix(_RATE_ERROR, stages, part)) / scale[2 * part + 1]
-    position = magnitude(h * h * _mix(_POSITION_ERROR, stages, part)) / scale[2 * part]
+    rate = magnitude(h * dot(_RATE_ERROR, accelerations)) / rate_scale
+    position = magnitude(h * h * dot(_POSITION_ERROR, accelerations)) / position_scale
     return _larger(rate, position)
 
 
@@ -102,9 +77,20 @@ def dopri5_step(accelerations, state, scene, h, scale):
     error : float64 or Lanes
         The largest estimated error of a component over its entry in `scale`.
     """
-    stages, new = _stages(accelerations, state, scene, h)
-    full = (*stages, accelerations(new, scene))
-    return new, _larger(_miss(h, full, scale, 0), _larger(_miss(h, full, scale, 1), _miss(h, full, scale, 2)))
+    a0, a1, a2 = accelerations(state, scene)
+    b0, b1, b2 = accelerations(_at(state, h, _STAGE_1, (a0,), (a1,), (a2,)), scene)
+    c0, c1, c2 = accelerations(_at(state, h, _STAGE_2, (a0, b0), (a1, b1), (a2, b2)), scene)
+    d0, d1, d2 = accelerations(_at(state, h, _STAGE_3, (a0, b0, c0), (a1, b1, c1), (a2, b2, c2)), scene)
+    f0, f1, f2 = (a0, b0, c0, d0), (a1, b1, c1, d1), (a2, b2, c2, d2)
+    e0, e1, e2 = accelerations(_at(state, h, _STAGE_4, f0, f1, f2), scene)
+    f0, f1, f2 = (*f0, e0), (*f1, e1), (*f2, e2)
+    g0, g1, g2 = accelerations(_at(state, h, _STAGE_5, f0, f1, f2), scene)
+    f0, f1, f2 = (*f0, g0), (*f1, g1), (*f2, g2)
+    new = _at(state, h, _RESULT, f0, f1, f2)
+    z0, z1, z2 = accelerations(new, scene)
+    motion = _miss(h, (*f0, z0), scale[1], scale[0])
+    tangents = _larger(_miss(h, (*f1, z1), scale[3], scale[2]), _miss(h, (*f2, z2), scale[5], scale[4]))
+    return new, _larger(motion, tangents)
 
 
 @jit

@@ -6,7 +6,7 @@ numba's wheels give lanes no vector math library, and a library's last digits di
 import math
 
 from kernels._jit import jit
-from kernels._lanes import exponent, fma, nearest, pow2, where
+from kernels._lanes import exponent, fma, horner, nearest, pow2, where
 from kernels._viscous_fit import LOG_TAIL
 
 LN2 = math.log(2.0)
@@ -17,15 +17,6 @@ _TAIL_FACTORIALS = tuple((-1.0) ** n / math.factorial(n + 2) for n in range(17))
 # r with r^-3 within 2.6e-4 of m on [1, 2), and the cube roots of 1, 1/2, 1/4
 _CBRT_START = (1.541886, -0.80995816, 0.31775564, -0.04993657)
 _CBRT_HALF, _CBRT_QUARTER = 0.7937005259840998, 0.6299605249474366
-
-
-@jit
-def horner(x, coefficients):
-    """Polynomial with the lowest power first."""
-    value = coefficients[len(coefficients) - 1]
-    for j in range(len(coefficients) - 2, -1, -1):
-        value = fma(value, x, coefficients[j])
-    return value
 
 
 @jit

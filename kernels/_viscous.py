@@ -12,8 +12,8 @@ A *cycle* below is the tuple (q, lambda, A, s, m).
 import math
 
 from kernels._jit import jit
-from kernels._lanes import fma, isnt, magnitude, some, sqrt, where
-from kernels._vecmath import cbrt, exp, exp_remainder, horner, log_remainder, mantissa_exponent, scale
+from kernels._lanes import fma, horner, isnt, magnitude, some, sqrt, where
+from kernels._vecmath import cbrt, exp, exp_remainder, log_remainder, mantissa_exponent, scale
 from kernels._viscous_fit import AMPLITUDE_STRONG, GAP_WEAK, OVERSHOOT_WEAK, Q_STRONG, SENSITIVITY_STRONG, SPLIT
 
 ROUNDING = 1e-15

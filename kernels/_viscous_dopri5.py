@@ -77,7 +77,7 @@ def _half_swing(start, drag, tolerance, active):
 def _enough(k, rtol, v, multiplier, time):
     """Tolerance of a step: an error of the map counts 1/(1 - multiplier)-fold in v, d T-fold in exp(-d T)."""
     exponent = sqrt(k) * time
-    exponent = where(exponent < 750.0, exponent, 750.0)
+    exponent = where(exponent < 750.0, exponent, 0.0)  # beyond, the multiplier is 0 for good
     return _SHARE * rtol * (1.0 - multiplier) / (1.0 + exponent)
 
 
