@@ -46,10 +46,12 @@ def export(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         raise SweepError(f"{target} is a folder; name a file in it")
     part = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
+        part.touch()  # says in plain words that there is no such folder, or no permission
         writers[target.suffix.lower()](dataset, part)
         part.replace(target)
-    except OSError as error:
-        raise SweepError(f"{target} cannot be written: {error.strerror or error}") from None
+    except (OSError, RuntimeError) as error:  # the latter from HDF5
+        reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else error
+        raise SweepError(f"{target} cannot be written: {reason}") from None
     finally:
         part.unlink(missing_ok=True)
     return target
