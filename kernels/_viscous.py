@@ -67,11 +67,12 @@ def dimensional(scene, cycle):
     period, swing, speed = 4.0 * q / a, amplitude * phi0, lam * mu / a
     if some(wild):
         period, swing, speed = scale(period, -e_a), scale(swing, e_phi), scale(speed, e_mu - e_a)
-    return period, swing, speed, _normal(period) & _normal(swing) & _normal(speed)
+    return period, swing, speed, normal(period) & normal(swing) & normal(speed)
 
 
 @jit
-def _normal(x):
+def normal(x):
+    """Whether a positive result is a normal float64."""
     return (x >= _NORMAL_LOW) & (x <= _NORMAL_HIGH)
 
 
@@ -113,6 +114,15 @@ def _closed_weak(k, rest, decay):
     q = k + (lam + rest)
     amplitude = 1.0 + fma(x, horner(x, OVERSHOOT_WEAK), _OVERSHOOT) / k
     return q, lam, amplitude, k / (q * (lam * lam)), gap / (2.0 - gap)
+
+
+@jit
+def overshoot(k):
+    """A - 1, which at weak drive is (1 - ln 2)/k + ... and would be lost in A."""
+    strong = k < SPLIT
+    x = exp(-2.0 * k) * _EXP_MINUS_2
+    weak = fma(x, horner(x, OVERSHOOT_WEAK), _OVERSHOOT) / k
+    return where(strong, _closed_strong(where(strong, k, 0.5))[2] - 1.0, weak)
 
 
 @jit
