@@ -28,3 +28,9 @@ def mistakes(read):
         return {m.where: m.message for m in caught.value.mistakes}
 
     return mistakes
+
+
+@pytest.fixture(autouse=True)
+def _width(monkeypatch):
+    """Texts are wrapped at 120 columns, whatever terminal the tests run in."""
+    monkeypatch.setenv("COLUMNS", "120")
