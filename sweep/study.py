@@ -99,6 +99,10 @@ class Study:
     def __hash__(self) -> int:
         return hash(self.to_json())
 
+    def __repr__(self) -> str:
+        axes = ", ".join(f"{name} ({len(axis)})" for name, axis in self.axes.items())
+        return f"<Study {self.title!r}: {self.kernel_name} over {axes}>"
+
     @property
     def asked(self) -> tuple[Field, ...]:
         """The output fields asked for."""

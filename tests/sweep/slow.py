@@ -1,0 +1,46 @@
+"""Kernels for tests of faults: the stone of `toy`, slow, uneven, or failing."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+
+import toy
+
+CELL_SECONDS = 0.002
+
+
+def slow(height, *rest):
+    """As `toy.exact`, two milliseconds a cell."""
+    time.sleep(CELL_SECONDS * len(height))
+    toy.exact(height, *rest)
+
+
+def uneven(height, *rest):
+    """As `toy.exact`; a cell takes as many milliseconds as it is high."""
+    time.sleep(1e-3 * height.sum())
+    toy.exact(height, *rest)
+
+
+def failing(height, *rest):
+    """As `toy.exact`, but 13 m is more than it can bear."""
+    if (height == 13).any():
+        raise ZeroDivisionError("thirteen")
+    toy.exact(height, *rest)
+
+
+def hungry(height, *rest):
+    """As `toy.exact`, but 13 m is more than the memory."""
+    if (height == 13).any():
+        raise MemoryError
+    toy.exact(height, *rest)
+
+
+def kernel(solve):
+    """The toy kernel with one method."""
+    return dataclasses.replace(
+        toy.KERNEL, name=solve.__name__, methods=(dataclasses.replace(toy.KERNEL.methods[1], solve=solve),)
+    )
+
+
+SLOW, UNEVEN, FAILING, HUNGRY = map(kernel, (slow, uneven, failing, hungry))

@@ -1,0 +1,474 @@
+import errno
+import io
+import os
+import random
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kernels.interface import Status
+from sweep import disk
+from sweep.errors import SweepError
+from sweep.result import open_result
+from sweep.runner import run
+from sweep.solve import Solver
+from sweep.spec import build_study
+from sweep.store import SPEC, folder_of, opened
+
+HEIGHTS = [-1.0, 1.0, 2.0, 5.0, float("nan"), 13.5, 100.0]
+SPEEDS = [0.0, 0.5, 3.0, 1e-9, 1e4]
+
+
+def stone(kernel="toy:KERNEL", **keys):
+    keys = {"axes": {"height": HEIGHTS, "v0": SPEEDS}, "along": {"phase": [0.0, 0.25, 1.0]}, **keys}
+    return build_study(allow_import=True, kernel=kernel, title="A stone", **keys)
+
+
+def tall(count, kernel="toy:KERNEL"):
+    """As many cells, of height 1, 2, 3 ... m."""
+    return stone(kernel, axes={"height": np.arange(1.0, count + 1)}, outputs=["fall_time"], along={})
+
+
+def same(left, right):
+    """Bit for bit, NaN included."""
+    assert list(left.data_vars) == list(right.data_vars)
+    for name in left.data_vars:
+        assert left[name].dims == right[name].dims
+        assert left[name].values.tobytes() == right[name].values.tobytes(), name
+    for name in left.coords:
+        xr.testing.assert_identical(left[name].drop_attrs(), right[name].drop_attrs())
+
+
+@pytest.fixture
+def output(tmp_path):
+    return tmp_path / "out.h5"
+
+
+@pytest.fixture(scope="module")
+def undisturbed():
+    return run(stone(), progress=False)
+
+
+def quiet(study, path=None, **keys):
+    return run(study, path, **{"progress": False, "workers": 2, **keys})
+
+
+def test_numbers_are_those_of_the_formula(undisturbed):
+    cell = undisturbed.sel(height=2.0, v0=3.0)
+    # the larger root of 2 = 3 t + 9.80665 t^2 / 2
+    assert cell.fall_time.item() == pytest.approx((-3 + 48.2266**0.5) / 9.80665, rel=1e-14)
+    assert undisturbed.status.sel(height=-1.0).values.tolist() == [Status.BAD_INPUT] * 5
+    assert np.isnan(undisturbed.fall_time.sel(height=-1.0)).all()
+
+
+@settings(max_examples=40)
+@given(cells=st.integers(1, 40), workers=st.integers(1, 4), stored=st.booleans())
+def test_the_same_bits_for_any_block_shape_and_thread_count(tmp_path_factory, undisturbed, cells, workers, stored):
+    path = tmp_path_factory.mktemp("run") / "out.h5" if stored else None
+    same(quiet(stone(), path, workers=workers, block_cells=cells), undisturbed)
+
+
+def test_a_zip_of_axes_is_stored_along_cells(output):
+    study = stone(design="zip", axes={"height": [1.0, 2.0, 3.0], "method": ["auto", "exact", "rough"]})
+    found = quiet(study, output, block_cells=2)
+    same(found, quiet(study))
+    assert found.fall_time.dims == ("cell",)
+    assert found.method.values.tolist() == ["auto", "exact", "rough"]
+    assert found.sizes == {"cell": 3, "phase": 3}
+
+
+def test_what_is_in_memory_and_what_is_in_the_file_is_the_same_dataset(output, undisturbed):
+    found = quiet(stone(), output).load()
+    times = {"created", "start", "end", "cells_per_second"}
+    assert found.attrs.keys() == undisturbed.attrs.keys()
+    assert {k: v for k, v in found.attrs.items() if k not in times} == {
+        k: v for k, v in undisturbed.attrs.items() if k not in times
+    }
+    xr.testing.assert_identical(found.drop_attrs(deep=False), undisturbed.drop_attrs(deep=False))
+
+
+def test_nothing_but_the_output_is_left(output):
+    quiet(stone(), output, block_cells=3)
+    assert list(output.parent.iterdir()) == [output]
+
+
+def test_a_complete_output_is_left_alone(output, monkeypatch):
+    quiet(stone(), output)
+    before = output.stat()
+    monkeypatch.setattr(Solver, "solve", None)
+    quiet(stone(), output)
+    assert output.stat() == before
+
+
+def test_a_complete_output_is_computed_anew_when_forced(output):
+    quiet(stone(), output).close()
+    before = output.stat()
+    quiet(stone(), output, force=True)
+    assert output.stat().st_ino != before.st_ino
+
+
+def test_parts_left_over_beside_a_complete_output_are_removed(output, monkeypatch):
+    with monkeypatch.context() as patch:
+        fail_on(patch, "remove", 2, errno.EIO)
+        with pytest.raises(SweepError, match="Input/output"):
+            quiet(stone(), output)
+    assert folder_of(output).exists()
+    monkeypatch.setattr(Solver, "solve", None)
+    quiet(stone(), output)
+    assert list(output.parent.iterdir()) == [output]
+
+
+def test_the_output_of_another_study_is_kept_unless_forced(output):
+    quiet(tall(3), output).close()
+    with pytest.raises(SweepError, match=r"another study(.|\n)*axes\.height: was 3 values"):
+        quiet(tall(4), output)
+    assert open_result(output).sizes["height"] == 3
+    assert quiet(tall(4), output, force=True).sizes["height"] == 4
+
+
+@pytest.fixture
+def unfinished(output):
+    """An output whose cells 10 and on are missing."""
+    interrupted(tall(23), output)
+    assert not output.exists()
+    return output
+
+
+def interrupted(study, output):
+    """Computes the first cells of a study and fails at the eleventh."""
+    real = Solver.solve
+
+    def failing(self, start, stop, *rest):
+        if (start, stop) == (10, 15):
+            raise RuntimeError("stop here")
+        real(self, start, stop, *rest)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Solver, "solve", failing)
+        with pytest.raises(SweepError, match="stop here"):
+            quiet(study, output, block_cells=5, workers=1)
+
+
+def names(output):
+    return sorted(path.name for path in folder_of(output).glob("*.h5"))
+
+
+def test_finished_blocks_survive_a_fault_and_are_not_computed_again(unfinished, monkeypatch):
+    before = names(unfinished)
+    assert before
+    starts = []
+    real = Solver.solve
+    monkeypatch.setattr(
+        Solver, "solve", lambda self, start, stop, *rest: starts.append((start, stop)) or real(self, start, stop, *rest)
+    )
+    found = quiet(tall(23), unfinished)
+    computed = {pair for pair in starts if pair[1] - pair[0] == 5}
+    assert not computed & {tuple(int(n) for n in name.split(".")[0].split("-")) for name in before}
+    same(found, quiet(tall(23)))
+
+
+def test_a_run_that_is_continued_keeps_its_blocks(unfinished, monkeypatch):
+    seen = []
+    monkeypatch.setattr("sweep.runner.assemble", lambda store, *rest: seen.append(store.blocks.cells) or [])
+    with pytest.raises(SweepError, match="no such file"):
+        quiet(tall(23), unfinished, block_cells=7, workers=4)
+    assert seen == [5]
+
+
+def test_the_parts_of_another_study_are_kept_unless_forced(unfinished):
+    before = names(unfinished)
+    with pytest.raises(SweepError, match=r"unfinished parts of another study(.|\n)*axes\.height: was 23 values"):
+        quiet(tall(24), unfinished)
+    assert names(unfinished) == before
+    same(quiet(tall(24), unfinished, force=True), quiet(tall(24)))
+
+
+def test_a_damaged_spec_is_refused_unless_forced(unfinished):
+    (folder_of(unfinished) / SPEC).write_text("?")
+    with pytest.raises(SweepError, match="damaged"):
+        quiet(tall(23), unfinished)
+    same(quiet(tall(23), unfinished, force=True), quiet(tall(23)))
+
+
+@pytest.mark.parametrize("harm", ["flip", "cut", "empty", "text"])
+def test_a_damaged_part_is_told_set_aside_and_computed_again(unfinished, harm):
+    path = folder_of(unfinished) / names(unfinished)[0]
+    whole = path.read_bytes()
+    with h5py.File(path) as file:
+        place = file["fall_time"].id.get_offset() + 3
+    harmed = {"flip": whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :], "cut": whole[:-1], "empty": b""}
+    path.write_bytes(harmed.get(harm, b"x" * len(whole)))
+    log = io.StringIO()
+    same(quiet(tall(23), unfinished, progress=log), quiet(tall(23)))
+    assert harm == "empty" or "cells 0 to 5 were damaged" in log.getvalue()
+
+
+def test_a_disk_that_damages_everything_is_given_up(output, monkeypatch):
+    real = disk.write
+
+    def bad(fd, piece):
+        return real(fd, bytes(b ^ 1 for b in piece) if len(piece) == 23 * 8 else piece)
+
+    monkeypatch.setattr(disk, "write", bad)
+    with pytest.raises(SweepError, match="disk is failing"):
+        quiet(tall(23), output, block_cells=23)
+    assert not output.exists()
+
+
+def test_an_assembled_file_that_reads_back_wrong_is_refused(output, monkeypatch):
+    real = disk.pwrite
+    outputs = 1003 * 8
+    monkeypatch.setattr(disk, "pwrite", lambda fd, piece, at: real(fd, piece, at + 8 * (len(piece) == outputs)))
+    with pytest.raises(SweepError, match="differs when read back"):
+        quiet(tall(1003), output, block_cells=1003)
+    assert not output.exists()
+    monkeypatch.undo()
+    same(quiet(tall(1003), output), quiet(tall(1003)))
+
+
+def fail_on(monkeypatch, name, turn, number):
+    """Lets the call number `turn` of a function of `disk` fail; returns the calls."""
+    real, calls = getattr(disk, name), []
+
+    def failing(*args):
+        calls.append(args)
+        if len(calls) == turn:
+            raise OSError(number, os.strerror(number))
+        return real(*args)
+
+    monkeypatch.setattr(disk, name, failing)
+    return calls
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO])
+@pytest.mark.parametrize("name", ["open_file", "write", "pwrite", "fsync", "rename", "make_folder"])
+def test_whichever_call_fails_nothing_acknowledged_is_lost(tmp_path, name, number):
+    study = tall(23)
+    whole = quiet(study)
+    turn, failed = 0, True
+    while failed:
+        turn += 1 if turn < 12 else 7
+        output = tmp_path / f"out{turn}.h5"
+        with pytest.MonkeyPatch.context() as patch:
+            calls = fail_on(patch, name, turn, number)
+            words = "disk is full" if number == errno.ENOSPC else "cannot be written"
+            try:
+                quiet(study, output, block_cells=10, workers=1).close()
+            except SweepError as fault:
+                assert words in str(fault)
+                assert "\n" not in str(fault)
+            failed = len(calls) >= turn
+        kept = set(names(output)) if folder_of(output).exists() else set()
+        if output.exists():
+            same(open_result(output), whole)
+        found = quiet(study, output)
+        assert not list(folder_of(output).glob("*"))
+        same(found, whole)
+        assert kept <= {name for name in kept if int(name.split("-")[0]) % 10 == 0}
+    assert turn > 1
+
+
+def test_a_file_too_large_for_hdf5_itself_is_one_clear_line(output):
+    """The limit on a file's size stands in for a full disk that HDF5, not this program, runs into."""
+    code = f"""
+        import resource
+        from pathlib import Path
+        import numpy as np
+        import toy
+        from sweep.errors import SweepError
+        from sweep.runner import run
+        from sweep.spec import build_study
+        study = build_study(allow_import=True, kernel="toy:KERNEL", axes=dict(height=np.arange(1.0, 20001)),
+                            outputs=["fall_time"])
+        for limit in (20_000, 60_000, 168_000, 230_000, 330_000, 345_000):
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, -1))
+            try:
+                run(study, {str(output)!r}, block_cells=1000, progress=False)
+            except SweepError as fault:
+                assert "cannot be written" in str(fault) and "\\n" not in str(fault), str(fault)
+                assert not Path({str(output)!r}).exists()
+            else:
+                raise SystemExit(f"{{limit}} bytes were enough")
+        resource.setrlimit(resource.RLIMIT_FSIZE, (-1, -1))
+        run(study, {str(output)!r}, progress=False)
+    """
+    done = python(code)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    same(open_result(output), quiet(stone(axes={"height": np.arange(1.0, 20001)}, outputs=["fall_time"], along={})))
+
+
+def environment():
+    here = Path(__file__)
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(here.parents[2]), str(here.parent)])}
+
+
+def python(code):
+    return subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], env=environment(), capture_output=True, text=True, timeout=120
+    )
+
+
+RUN_SLOWLY = """
+    import sys
+    from sweep.runner import run
+    from sweep.spec import build_study
+    study = build_study(allow_import=True, kernel="slow:SLOW", title="A stone", outputs=["fall_time"],
+                        axes=dict(height=[float(h) for h in range(1, 401)]))
+    run(study, sys.argv[1], workers=int(sys.argv[2]), block_cells=int(sys.argv[3]))
+"""
+
+
+def slow_run(output, workers, cells):
+    words = [sys.executable, "-c", textwrap.dedent(RUN_SLOWLY), str(output), str(workers), str(cells)]
+    return subprocess.Popen(words, env=environment(), stderr=subprocess.PIPE, text=True)
+
+
+def wait_for(condition, process):
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+
+
+@pytest.mark.parametrize(("workers", "cells"), [(1, 7), (3, 20)])
+def test_a_killed_run_continues_and_ends_with_the_same_bits(output, workers, cells):
+    with slow_run(output, workers, cells) as process:
+        wait_for(lambda: len(names(output)) >= 1, process)
+        time.sleep(random.random() * 0.1)
+        process.kill()
+        process.wait()
+        process.stderr.close()
+    before = names(output)
+    assert before
+    log = io.StringIO()
+    found = quiet(tall(400, "slow:SLOW"), output, workers=4 - workers, progress=log)
+    same(found, quiet(tall(400, "slow:SLOW")))
+    assert list(output.parent.iterdir()) == [output]
+
+
+def test_ctrl_c_ends_within_a_block_keeps_what_is_finished_and_says_how_to_go_on(output):
+    with slow_run(output, 2, 10) as process:
+        wait_for(lambda: len(names(output)) >= 2, process)
+        process.send_signal(signal.SIGINT)
+        begun = time.monotonic()
+        _, told = process.communicate(timeout=30)
+    assert time.monotonic() - begun < 5
+    assert process.returncode == -signal.SIGINT
+    assert "run the same command again to continue" in told
+    assert "KeyboardInterrupt" in told
+    assert len(names(output)) >= 2
+    same(quiet(tall(400, "slow:SLOW"), output), quiet(tall(400, "slow:SLOW")))
+
+
+def test_a_second_run_on_the_same_output_is_told_so_and_leaves(output):
+    with slow_run(output, 2, 10) as process:
+        wait_for(lambda: folder_of(output).exists() and names(output), process)
+        with pytest.raises(SweepError, match="another run is at work"):
+            quiet(tall(400, "slow:SLOW"), output)
+        assert process.wait(60) == 0
+        process.stderr.close()
+    same(open_result(output), quiet(tall(400, "slow:SLOW")))
+
+
+def test_a_kernel_that_raises_ends_the_run_with_one_line(output):
+    study = tall(1000, "slow:FAILING")
+    with pytest.raises(SweepError, match=r"cells 12 to 13: the kernel failed \(ZeroDivisionError: thirteen\)"):
+        quiet(study, output, block_cells=1, workers=1)
+    assert names(output)
+    with pytest.raises(SweepError, match="ZeroDivisionError"):
+        quiet(study, block_cells=1)
+
+
+def test_too_little_memory_is_one_line():
+    with pytest.raises(SweepError, match="out of memory"):
+        quiet(tall(1000, "slow:HUNGRY"), block_cells=1)
+
+
+@pytest.mark.parametrize("content", [b"", b"words", b"\x89HDF\r\n\x1a\n" + bytes(100)])
+@pytest.mark.parametrize("force", [False, True])
+def test_a_foreign_file_is_never_overwritten(output, content, force):
+    output.write_bytes(content)
+    with pytest.raises(SweepError, match="not the result of a sweep"):
+        quiet(stone(), output, force=force)
+    assert output.read_bytes() == content
+
+
+def test_an_hdf5_file_of_somebody_else_is_never_overwritten(output):
+    with h5py.File(output, "w") as file:
+        file["precious"] = 1.0
+    with pytest.raises(SweepError, match="not the result of a sweep"):
+        quiet(stone(), output, force=True)
+
+
+@pytest.mark.parametrize("path", ["nowhere/out.h5", "file/out.h5", "."])
+def test_an_output_that_cannot_be_is_one_clear_line(tmp_path, path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr(Solver, "solve", None)
+    with pytest.raises(SweepError) as told:
+        quiet(stone(), tmp_path / path)
+    assert "\n" not in str(told.value)
+
+
+def test_a_folder_that_may_not_be_written_is_told_before_anything_is_computed(output, monkeypatch):
+    monkeypatch.setattr(Solver, "solve", None)
+    fail_on(monkeypatch, "make_folder", 1, errno.EACCES)
+    with pytest.raises(SweepError, match="Permission denied"):
+        quiet(stone(), output)
+
+
+@pytest.mark.parametrize(
+    "keys", [{"workers": 0}, {"workers": -1}, {"workers": True}, {"block_cells": 0}, {"workers": 1.5}]
+)
+def test_nonsense_is_refused(keys):
+    with pytest.raises(SweepError, match="expected a whole number"):
+        quiet(stone(), **keys)
+
+
+def test_no_more_threads_compute_than_there_are_workers(output, monkeypatch):
+    inside, most, lock = [], [], threading.Lock()
+    real = Solver.solve
+
+    def counted(self, *rest):
+        with lock:
+            inside.append(self)
+            most.append(len(inside))
+        time.sleep(0.002)
+        real(self, *rest)
+        with lock:
+            inside.remove(self)
+
+    monkeypatch.setattr(Solver, "solve", counted)
+    quiet(tall(60), output, workers=2, block_cells=2)
+    assert max(most) == 2
+
+
+def test_the_output_may_be_a_link_to_another_folder(tmp_path):
+    (tmp_path / "far").mkdir()
+    link = tmp_path / "out.h5"
+    link.symlink_to(tmp_path / "far" / "real.h5")
+    quiet(stone(), link)
+    assert link.is_symlink()
+    assert (tmp_path / "far" / "real.h5").is_file()
+
+
+def test_a_disk_that_is_too_small_is_told_at_once(output, monkeypatch):
+    import shutil
+
+    usage = shutil.disk_usage(output.parent)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage._replace(free=10))
+    log = io.StringIO()
+    quiet(stone(), output, progress=log)
+    assert "are free here" in log.getvalue()
