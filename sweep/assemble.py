@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 
 from sweep import disk
+from sweep.canvas import Canvas
 from sweep.errors import SweepError
 from sweep.image import unfilled
 from sweep.layout import METHOD_USED, STATUS, Column, Coordinate, Layout
-from sweep.parts import digest
-from sweep.pool import each
+from sweep.parts import DAMAGE, digest
+from sweep.pool import CtrlC, each
 from sweep.store import Store
 
 CHUNK_CELLS = 1 << 18
@@ -48,11 +49,11 @@ def assemble(store: Store, layout: Layout, output: Path, attrs: Mapping[str, Any
     try:
         damaged = _build(store, layout, temporary, attrs, threads)
         if not damaged:
-            _check(store, layout, temporary)
+            _check(store, layout, temporary, output)
             disk.rename(temporary, output)
             disk.sync_folder(output.parent)
         return damaged
-    except OSError as fault:
+    except (OSError, RuntimeError) as fault:
         raise disk.refusal(fault, output) from fault
     finally:
         with contextlib.suppress(OSError):
@@ -60,10 +61,11 @@ def assemble(store: Store, layout: Layout, output: Path, attrs: Mapping[str, Any
 
 
 def _build(store: Store, layout: Layout, path: Path, attrs: Mapping[str, Any], threads: int) -> list[int]:
-    write_frame(path, layout, attrs)
-    fd = disk.open_file(path, os.O_RDWR)
+    fd = disk.open_file(path, os.O_CREAT | os.O_EXCL | os.O_RDWR)
     try:
-        damaged = _fill(store, layout, path, fd, threads)
+        canvas = Canvas(fd)
+        damaged = _fill(store, layout, canvas, attrs, fd, threads)
+        canvas.finish()
         if not damaged:
             disk.fsync(fd)
         return damaged
@@ -71,8 +73,29 @@ def _build(store: Store, layout: Layout, path: Path, attrs: Mapping[str, Any], t
         os.close(fd)
 
 
-def write_frame(path: Path, layout: Layout, attrs: Mapping[str, Any]) -> None:
-    """Writes everything but the columns' numbers. Raises OSError."""
+def _fill(store: Store, layout: Layout, canvas: Canvas, attrs: Mapping[str, Any], fd: int, threads: int) -> list[int]:
+    """Writes the frame, then copies all parts on a pool of threads; returns those that are damaged."""
+    import h5py
+
+    with CtrlC():
+        write_frame(canvas, layout, attrs)
+    canvas.check()
+    with h5py.File(canvas, "r+") as file:
+        places = {c.name: file[c.name].id.get_offset() for c in layout.columns if c.name not in FLAGS}
+        copier = _Copier(store, fd, places, threads)
+
+        def work(job: int) -> None:
+            if job == FLAGS_JOB:
+                _write_flags(store, layout, file, canvas)
+            else:
+                copier.copy(job)
+
+        each([FLAGS_JOB, *range(store.blocks.count)], work, threads + 1, lambda job: None)
+        return sorted(copier.damaged)
+
+
+def write_frame(path: Any, layout: Layout, attrs: Mapping[str, Any]) -> None:
+    """Writes everything but the columns' numbers to a file, or what HDF5 takes for one."""
     import h5netcdf
 
     with h5netcdf.File(path, "w") as file:
@@ -98,7 +121,7 @@ def _write_coordinate(file: Any, coordinate: Coordinate) -> None:
 
 def _declare(file: Any, layout: Layout, column: Column) -> Any:
     dims = (*layout.grid.dims, *column.dims)
-    if column.name not in FLAGS or not layout.grid.shape:
+    if column.name not in FLAGS:
         return file.create_variable(column.name, dims, column.dtype, dcpl=unfilled())
     chunks = chunk_shape(layout.grid.shape)
     return file.create_variable(column.name, dims, column.dtype, chunks=chunks, compression="gzip", compression_opts=1)
@@ -112,20 +135,6 @@ def chunk_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
         chunks.append(max(1, min(length, room)))
         room //= chunks[-1] if chunks[-1] == length else room
     return tuple(reversed(chunks))
-
-
-def _fill(store: Store, layout: Layout, path: Path, fd: int, threads: int) -> list[int]:
-    """Copies all parts, on a pool of threads; returns those that are damaged."""
-    copier = _Copier(store, fd, _places(path, layout), threads)
-
-    def work(job: int) -> None:
-        if job == FLAGS_JOB:
-            _write_flags(store, layout, path)
-        else:
-            copier.copy(job)
-
-    each([FLAGS_JOB, *range(store.blocks.count)], work, threads + 1, lambda job: None)
-    return sorted(copier.damaged)
 
 
 class _Copier:
@@ -162,25 +171,15 @@ class _Copier:
             disk.fsync(self._fd)
 
 
-def _places(path: Path, layout: Layout) -> dict[str, int]:
-    """Where in the file every output begins."""
-    import h5py
-
-    with h5py.File(path, "r") as file:
-        return {c.name: file[c.name].id.get_offset() for c in layout.columns if c.name not in FLAGS}
-
-
-def _write_flags(store: Store, layout: Layout, path: Path) -> None:
+def _write_flags(store: Store, layout: Layout, file: Any, canvas: Canvas) -> None:
     """Writes statuses and methods in the order of cells, so that HDF5 compresses each chunk once."""
-    import h5py
-
-    with h5py.File(path, "r+") as file:
-        for index in range(store.blocks.count):
-            flags = _flags(store, index)
-            if flags is None:
-                return
-            for name, column in flags.items():
-                _write_cells(file[name], layout, store.blocks.bounds(index), column)
+    for index in range(store.blocks.count):
+        flags = _flags(store, index)
+        if flags is None:
+            return
+        for name, column in flags.items():
+            _write_cells(file[name], layout, store.blocks.bounds(index), column)
+        canvas.check()
 
 
 def _flags(store: Store, index: int) -> dict[str, Any] | None:
@@ -190,33 +189,37 @@ def _flags(store: Store, index: int) -> dict[str, Any] | None:
     try:
         with h5py.File(store.folder / store.names[index], "r", locking=False) as part:
             return {name: part[name][...] for name in FLAGS}
-    except (OSError, KeyError, RuntimeError):
+    except DAMAGE:
         return None
 
 
 def _write_cells(dataset: Any, layout: Layout, bounds: tuple[int, int], column: Any) -> None:
     for slices, begin, end in layout.grid.pieces(*bounds):
-        if dataset.shape:
-            dataset[slices] = column[begin:end].reshape([s.stop - s.start for s in slices])
-        else:
-            dataset[()] = column[0]
+        dataset[slices] = column[begin:end].reshape([s.stop - s.start for s in slices])
 
 
-def _check(store: Store, layout: Layout, path: Path) -> None:
-    """Reads some blocks back as any reader would. Raises SweepError."""
+def _check(store: Store, layout: Layout, path: Path, output: Path) -> None:
+    """Reads some blocks back as any reader would. Raises SweepError where they differ."""
     import h5py
 
     last = store.blocks.count - 1
-    with h5py.File(path, "r") as file:
-        for index in sorted({0, last // 2, last}):
-            bounds = store.blocks.bounds(index)
-            arrays = {c.name: _read_cells(file[c.name], layout, bounds, c) for c in layout.columns}
-            if digest(layout.columns, arrays) not in store.names[index]:
-                raise SweepError(f"{path}: cells {bounds[0]} to {bounds[1]} read back differ from what was written")
+    try:
+        with h5py.File(path, "r") as file:
+            same = all(_reads_back(store, layout, file, index) for index in {0, last // 2, last})
+    except DAMAGE:
+        same = False
+    if not same:
+        raise SweepError(f"{output}: differs when read back from what was written; the disk may be failing")
+
+
+def _reads_back(store: Store, layout: Layout, file: Any, index: int) -> bool:
+    bounds = store.blocks.bounds(index)
+    arrays = {c.name: _read_cells(file[c.name], layout, bounds, c) for c in layout.columns}
+    return digest(layout.columns, arrays) in store.names[index]
 
 
 def _read_cells(dataset: Any, layout: Layout, bounds: tuple[int, int], column: Column) -> Any:
     arrays = column.empty(bounds[1] - bounds[0])
     for slices, begin, end in layout.grid.pieces(*bounds):
-        arrays[begin:end] = dataset[slices if dataset.shape else ()].reshape(end - begin, *column.shape)
+        arrays[begin:end] = dataset[slices].reshape(end - begin, *column.shape)
     return arrays

@@ -113,7 +113,7 @@ def _probe_cells(solver: Solver, columns: Sequence[Column], size: int) -> int:
         more = LANES if cells == 1 else 4 * cells
         dear = seconds * (more / cells) * POSITIONS > BUDGET
         worth_a_look = cells == 1 and (seconds < BUDGET / 4 or more * 50 < size)
-        if 4 * more > size or (dear and not worth_a_look):
+        if size < (4 if cells == 1 else POSITIONS) * more or (dear and not worth_a_look):
             return cells
         cells = more
 

@@ -115,11 +115,13 @@ def try_lock(fd: int) -> bool:
     return True
 
 
-def refusal(fault: OSError, path: Path) -> SweepError:
-    """One line for a call that the system refused."""
-    if fault.errno in (errno.ENOSPC, errno.EDQUOT):
+def refusal(fault: OSError | RuntimeError, path: Path) -> SweepError:
+    """One line for a call that the system refused; HDF5 tells of some as RuntimeError."""
+    number = getattr(fault, "errno", None)
+    if number in (errno.ENOSPC, errno.EDQUOT):
         return SweepError(f"{path}: the disk is full; free some space, then run the same command again to continue")
-    return SweepError(f"{path}: cannot be written ({fault.strerror or fault})")
+    reason = os.strerror(number) if number else str(fault).splitlines()[0]
+    return SweepError(f"{path}: cannot be written ({reason})")
 
 
 def _as_bytes(piece: Any) -> memoryview:

@@ -19,6 +19,10 @@ from sweep.layout import Column
 PART_NAME = re.compile(r"(\d+)-(\d+)\.([0-9a-f]{32})\.h5")
 
 
+DAMAGE = (OSError, EOFError, LookupError, ValueError, TypeError, AttributeError, RuntimeError)
+"""What comes of reading a damaged file."""
+
+
 def part_name(start: int, stop: int, digest: str) -> str:
     """File name of the cells `start` to `stop`."""
     return f"{start:012d}-{stop:012d}.{digest}.h5"
@@ -55,7 +59,7 @@ def read_part(
             os.close(fd)
     except FileNotFoundError:
         raise
-    except (OSError, EOFError, KeyError, ValueError, RuntimeError):
+    except DAMAGE:
         return None
     return arrays if digest(columns, arrays) == match[3] else None
 

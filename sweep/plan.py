@@ -80,9 +80,7 @@ class Plan:
         rows = {
             "kernel": self.kernel,
             "outputs": ", ".join(self.outputs),
-            "cells": f"{self.cells:,} = {shape}"
-            if len(self.shape) > 1
-            else f"{self.cells:,}" + f" ({shape})" * bool(shape),
+            "cells": f"{self.cells:,} = {shape}" if len(self.shape) > 1 else f"{self.cells:,}",
             "blocks": f"{self.blocks:,} of {self.cells_per_block:,} cells",
             "parts": f"{quantity(self.part_bytes)}, while it runs",
             "output": quantity(self.output_bytes),

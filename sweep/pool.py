@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import signal
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 
-TICK = 0.5
+TICK = 0.2
 """Seconds after which progress is told even if nothing has finished."""
 
 Jobs = dict["Future[None]", int]
@@ -56,14 +57,16 @@ def each(
     finished : called in this thread with each job that is done, and with None now and then
     """
     waiting: Jobs = {}
-    with ThreadPoolExecutor(threads) as pool:
+    with CtrlC() as ctrl_c, ThreadPoolExecutor(threads) as pool:
         try:
             for job in jobs:
                 waiting[pool.submit(work, job)] = job
                 while len(waiting) >= 2 * threads:
                     _settle(waiting, finished)
+                    ctrl_c.check()
             while waiting:
                 _settle(waiting, finished)
+                ctrl_c.check()
         except BaseException:
             if halt is not None:
                 halt.set()
@@ -78,3 +81,36 @@ def _settle(waiting: Jobs, finished: Callable[[int | None], None]) -> None:
         future.result()
         finished(job)
     finished(None)
+
+
+class CtrlC:
+    """Holds Ctrl-C back until `check`, for Python's locks are left in disorder where it strikes inside them.
+
+    The second one strikes at once. Other handlers than Python's own are left alone.
+    """
+
+    def __init__(self) -> None:
+        self._pressed = False
+        self._ours = False
+
+    def __enter__(self) -> CtrlC:
+        main = threading.current_thread() is threading.main_thread()
+        self._ours = main and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        if self._ours:
+            signal.signal(signal.SIGINT, self._press)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
+        if self._ours:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        if kind is None:
+            self.check()
+
+    def check(self) -> None:
+        """Raises KeyboardInterrupt if Ctrl-C was pressed."""
+        if self._pressed:
+            raise KeyboardInterrupt
+
+    def _press(self, number: int, frame: object) -> None:
+        self._pressed = True
+        signal.signal(signal.SIGINT, signal.default_int_handler)

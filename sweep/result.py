@@ -168,12 +168,14 @@ def _in_pieces(plan: Layout, spec: Spec, parts: Mapping[int, Path]) -> dict[str,
     from dask.delayed import delayed
 
     read = delayed(partial(_block, plan), pure=False)
+    from_delayed: Any = da.from_delayed
+    concatenate: Any = da.concatenate
     bounds = [spec.blocks.bounds(i) for i in range(spec.blocks.count)]
     blocks = [read(parts.get(i), *b) for i, b in enumerate(bounds)]
 
     def pieces(column: Column) -> list[Any]:
         shapes = [(stop - start, *column.shape) for start, stop in bounds]
         named = zip(blocks, shapes, strict=True)
-        return [da.from_delayed(block[column.name], shape, column.dtype) for block, shape in named]
+        return [from_delayed(block[column.name], shape, column.dtype) for block, shape in named]
 
-    return {c.name: da.concatenate(pieces(c)) for c in plan.columns}
+    return {c.name: concatenate(pieces(c)) for c in plan.columns}

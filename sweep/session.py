@@ -48,10 +48,11 @@ class Session:
         self.study, self.workers = study, workers
         self.began = now()
         self.layout: Layout = layout(study, mark)
-        solver = Solver(study)
-        solver.warm()
         size = self.layout.grid.size
-        self.sample: Sample = take_sample(solver, self.layout.columns, size)
+        with faults_told(f"{study.kernel_name}: the kernel failed"):
+            solver = Solver(study)
+            solver.warm()
+            self.sample: Sample = take_sample(solver, self.layout.columns, size)
         if blocks is None and block_cells is not None:
             blocks = Partition(size, min(block_cells, size))
         self.blocks = blocks or partition(self.sample, size, self.layout.cell_bytes, workers)
@@ -82,7 +83,8 @@ class Session:
         solvers = Spares(lambda: self._solver(halt), threads)
 
         def guarded(job: int) -> None:
-            with self._faults_told(job), solvers.lent() as solve:
+            start, stop = self.blocks.bounds(job)
+            with faults_told(f"cells {start} to {stop}: the kernel failed"), solvers.lent() as solve:
                 work(job, solve)
 
         def finished(job: int | None) -> None:
@@ -106,19 +108,18 @@ class Session:
 
         return solve
 
-    @contextlib.contextmanager
-    def _faults_told(self, job: int) -> Iterator[None]:
-        try:
-            yield
-        except SweepError:
-            raise
-        except MemoryError as fault:
-            raise SweepError("out of memory; fewer workers need less; what is finished is kept") from fault
-        except Exception as fault:
-            start, stop = self.blocks.bounds(job)
-            raise SweepError(
-                f"cells {start} to {stop}: the kernel failed ({type(fault).__name__}: {fault}); what is finished is kept"
-            ) from fault
+
+@contextlib.contextmanager
+def faults_told(what: str) -> Iterator[None]:
+    """Every fault as a SweepError of one line."""
+    try:
+        yield
+    except SweepError:
+        raise
+    except MemoryError as fault:
+        raise SweepError("out of memory; fewer workers need less; what is finished is kept") from fault
+    except Exception as fault:
+        raise SweepError(f"{what} ({type(fault).__name__}: {fault}); what is finished is kept") from fault
 
 
 class Spares(Generic[T]):

@@ -153,15 +153,18 @@ class Store:
         return self.folder / f"{name}.{self.run}.tmp"
 
     def clear(self) -> None:
-        """Removes all but the lock, the spec last, so that what is left of a removal cut short can be taken up."""
-        for path in self.folder.iterdir():
-            if path.name not in (SPEC, LOCK):
-                disk.remove(path)
-        disk.remove(self.folder / SPEC)
+        """Removes all but the lock, the spec last, so that a removal cut short leaves a store. Raises SweepError."""
+        try:
+            for path in self.folder.iterdir():
+                if path.name not in (SPEC, LOCK):
+                    disk.remove(path)
+            disk.remove(self.folder / SPEC)
+        except OSError as fault:
+            raise disk.refusal(fault, self.folder) from fault
         self.spec, self.names = None, {}
 
     def _sort_out(self) -> None:
-        for entry in os.scandir(self.folder):
+        for entry in list(os.scandir(self.folder)):
             if entry.name.endswith(".tmp"):
                 disk.remove(Path(entry.path))
             elif match := PART_NAME.fullmatch(entry.name):
