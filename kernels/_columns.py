@@ -9,9 +9,16 @@ from kernels._jit import COMPILED, cached, jit
 from kernels._lanes import WIDTH, lanes_at
 
 
+@jit
 def _one_by_one(body, columns):
     for i in range(columns[0].shape[0]):
         body(i, *columns)
+
+
+def _plain(body, columns):
+    with np.errstate(all="ignore"):
+        for i in range(columns[0].shape[0]):
+            body(i, *columns)
 
 
 @jit
@@ -22,10 +29,10 @@ def _in_lanes(body, columns):
         body(lanes_at(min(i, n - WIDTH)), *columns)
 
 
-each_cell = _in_lanes if COMPILED else _one_by_one
+each_cell = _in_lanes if COMPILED else _plain
 """each_cell(body, columns): body(i, *columns) for all cells, WIDTH at a time; called by an `entry`."""
 
-one_by_one = jit(_one_by_one)
+one_by_one = _one_by_one if COMPILED else _plain
 """The same one cell at a time: the rival that lanes are measured against."""
 
 

@@ -16,6 +16,7 @@ import math
 import operator
 from fractions import Fraction
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -182,18 +183,19 @@ lower_builtin(operator.neg, LanesType)(_emit(lambda b, x: b.fneg(x)))
 
 def fma(x, y, z):
     """x*y + z, rounded once, also in plain Python."""
-    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
+    x, y, z = np.float64(x), np.float64(y), np.float64(z)
+    if not (np.isfinite(x) and np.isfinite(y) and np.isfinite(z)):
         return x * y + z
-    exact = Fraction(x) * Fraction(y) + Fraction(z)
+    exact = Fraction(float(x)) * Fraction(float(y)) + Fraction(float(z))
     try:
-        return float(exact) if exact else x * y + z
+        return np.float64(float(exact)) if exact else x * y + z
     except OverflowError:
-        return math.copysign(math.inf, exact)
+        return np.float64(math.copysign(math.inf, exact))
 
 
 def sqrt(x):
     """Square root; NaN below 0."""
-    return math.sqrt(x) if x >= 0.0 else math.nan
+    return np.sqrt(np.float64(x))
 
 
 def magnitude(x):
@@ -230,9 +232,7 @@ def _items(context, builder, numba_type, value, target):
 
 def _lower_dot(context, builder, signature, values):
     target = signature.return_type
-    weights, terms = (
-        _items(context, builder, t, v, target) for v, t in zip(values, signature.args, strict=True)
-    )
+    weights, terms = (_items(context, builder, t, v, target) for v, t in zip(values, signature.args, strict=True))
     total = builder.fmul(weights[0], terms[0])
     for weight, term in zip(weights[1:], terms[1:], strict=True):
         total = _called("fma")(builder, weight, term, total)
@@ -255,12 +255,12 @@ _function(horner, 2, lambda x, coefficients: _number(x), _lower_horner)
 
 def pow2(n):
     """2^n for an integer-valued n from -1022 to 1023."""
-    return math.ldexp(1.0, int(n))
+    return np.float64(math.ldexp(1.0, int(n)) if -1023.0 < n < 1024.0 else math.nan)
 
 
 def exponent(x):
     """floor(log2(abs(x))) as a float64, for normal x."""
-    return float(math.frexp(x)[1] - 1)
+    return np.float64(math.frexp(x)[1] - 1)
 
 
 def _constant(ty, value):
@@ -308,8 +308,7 @@ def _lower_where(context, builder, signature, values):
     if mask is types.boolean:
         condition = builder.icmp_unsigned("!=", condition, ir.Constant(condition.type, 0))
     operands = (
-        context.cast(builder, v, t, signature.return_type)
-        for v, t in zip(values[1:], signature.args[1:], strict=True)
+        context.cast(builder, v, t, signature.return_type) for v, t in zip(values[1:], signature.args[1:], strict=True)
     )
     return builder.select(condition, *operands)
 

@@ -157,7 +157,7 @@ def integrate_until(event, accelerations, scales, state, scene, h, tolerance, ac
 
 @jit
 def _locate(event, accelerations, scales, state, scene, h, active):
-    """Shorten the step `h`, in which the event lies, until it ends there: Newton, bisection where that leaves h's bracket.
+    """Shorten the step `h` until it ends at the event: Newton, bisection where that leaves the bracket.
 
     Each trial is a whole Runge-Kutta step from the same state, so the root has the order of the method.
     """

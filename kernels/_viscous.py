@@ -90,7 +90,11 @@ def closed(k, rest):
     if some(isnt(strong)):
         weak = _closed_weak(k, rest, decay)
         q, lam = where(strong, q, weak[0]), where(strong, lam, weak[1])
-        amplitude, s, decay = where(strong, amplitude, weak[2]), where(strong, s, weak[3]), where(strong, decay, weak[4])
+        amplitude, s, decay = (
+            where(strong, amplitude, weak[2]),
+            where(strong, s, weak[3]),
+            where(strong, decay, weak[4]),
+        )
     return q, lam, amplitude, s, decay
 
 
@@ -139,7 +143,11 @@ def asymptotic(k):
     if some(isnt(strong)):
         weak = _asymptotic_weak(k)
         q, lam = where(strong, q, weak[0]), where(strong, lam, weak[1])
-        amplitude, s, decay = where(strong, amplitude, weak[2]), where(strong, s, weak[3]), where(strong, decay, weak[4])
+        amplitude, s, decay = (
+            where(strong, amplitude, weak[2]),
+            where(strong, s, weak[3]),
+            where(strong, decay, weak[4]),
+        )
     return q, lam, amplitude, s, decay
 
 

@@ -53,7 +53,6 @@ def asymptotic(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity
     each_cell(_asymptotic, (mu, phi0, a, period, amplitude, crossing_speed, sensitivity, multiplier, status))
 
 
-
 @jit
 def _iterated(i, mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
     k, _, scene = _viscous.without_dimensions(mu[i], phi0[i], a[i])
@@ -64,7 +63,7 @@ def _iterated(i, mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivi
 
 @entry()
 def iterated(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
-    """The exact map from switch to switch, iterated from rest; slow at strong drive, where each swing forgets little."""
+    """The exact map from switch to switch, iterated from rest; slow at strong drive, where a swing forgets little."""
     each_cell(_iterated, (mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status))
 
 

@@ -1,4 +1,4 @@
-"""Hypothesis profiles, and the toy kernel as an importable module `toy`."""
+"""Hypothesis profiles; and the helpers of the tests (`oracles`, `columns`, `toy`) as importable modules."""
 
 import os
 import sys
@@ -10,4 +10,5 @@ settings.register_profile("local", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("ci" if os.environ.get("CI") else "local")
 
-sys.path.insert(0, str(Path(__file__).parent / "sweep"))
+TESTS = Path(__file__).parent
+sys.path += [str(TESTS), str(TESTS / "kernels"), str(TESTS / "sweep")]

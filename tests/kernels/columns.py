@@ -1,0 +1,39 @@
+"""Columns for tests of kernels."""
+
+import numpy as np
+from mpmath import mpf
+
+from kernels.interface import Kernel
+
+
+def solve(kernel: Kernel, method: str, *parameters, rtol=1e-9, along=()):
+    """Outputs by name, and status, of one method; nothing is checked before or filled after."""
+    columns = [np.ascontiguousarray(np.broadcast_to(np.asarray(p, float), np.shape(parameters[0]))) for p in parameters]
+    n = len(columns[0])
+    lengths = {field.name: len(values) for field, values in zip(kernel.along, along, strict=True)}
+    outputs = {f.name: np.full((n, *(lengths[d] for d in f.dims)), np.nan) for f in kernel.outputs}
+    status = np.full(n, 99, np.int8)
+    tolerances = np.ascontiguousarray(np.broadcast_to(np.asarray(rtol, float), (n,)))
+    kernel.method(method).solve(*columns, tolerances, *along, *outputs.values(), status)
+    return outputs, status
+
+
+def bounds(kernel: Kernel, method: str, *parameters, asked=None):
+    """The error bound of one method for every cell."""
+    columns = [np.ascontiguousarray(p, float) for p in parameters]
+    out = np.full(len(columns[0]), np.nan)
+    asked = np.array([f.name in (asked or [o.name for o in kernel.outputs]) for f in kernel.outputs], np.uint8)
+    kernel.method(method).bound(*columns, asked, out)
+    return out
+
+
+def checked(kernel: Kernel, *parameters):
+    """The status that `check` gives every cell."""
+    status = np.full(len(parameters[0]), 99, np.int8)
+    kernel.check(*(np.ascontiguousarray(p, float) for p in parameters), status)
+    return status
+
+
+def relative_error(values, truths):
+    """abs(value/truth - 1), each taken in high precision."""
+    return np.array([float(abs(mpf(float(v)) / t - 1)) for v, t in zip(values, truths, strict=True)])

@@ -1,0 +1,126 @@
+"""Elementary functions against 50 digits, and lanes against one cell."""
+
+import numpy as np
+import pytest
+from columns import relative_error
+from hypothesis import given
+from hypothesis import strategies as st
+from mpmath import cbrt, exp, expm1, log1p, mp, mpf
+
+from kernels import _vecmath
+from kernels._columns import each_cell, entry, one_by_one
+from kernels._jit import jit
+from kernels._lanes import exponent, fma, isnt, nearest, pow2, some, where
+
+mp.dps = 50
+
+
+@jit
+def _functions(i, x, u, power, root, late, lost):
+    power[i] = _vecmath.exp(x[i])
+    root[i] = _vecmath.cbrt(u[i])
+    late[i] = _vecmath.exp_remainder(u[i])
+    lost[i] = _vecmath.log_remainder(u[i])
+
+
+@entry()
+def functions(x, u, power, root, late, lost):
+    each_cell(_functions, (x, u, power, root, late, lost))
+
+
+@entry()
+def functions_one_by_one(x, u, power, root, late, lost):
+    one_by_one(_functions, (x, u, power, root, late, lost))
+
+
+def evaluate(x, u, function=functions):
+    outputs = [np.empty(len(x)) for _ in range(4)]
+    function(np.ascontiguousarray(x, float), np.ascontiguousarray(u, float), *outputs)
+    return outputs
+
+
+def test_exp_is_right_to_an_ulp_from_underflow_to_overflow():
+    x = np.concatenate([np.random.default_rng(1).uniform(-700, 700, 300), np.linspace(-1, 1, 101)])
+    power = evaluate(x, np.ones_like(x))[0]
+    assert relative_error(power, [exp(mpf(v)) for v in x]).max() < 2.3e-16
+
+
+def test_exp_ends_in_zero_and_infinity():
+    assert evaluate([-1e300, -800.0, 0.0, 800.0, 1e300], np.ones(5))[0].tolist() == [0.0, 0.0, 1.0, np.inf, np.inf]
+
+
+def test_cube_root_is_right_to_an_ulp_over_all_exponents():
+    u = np.exp2(np.concatenate([np.random.default_rng(2).uniform(-1000, 1000, 400), np.arange(-4, 5)]))
+    assert relative_error(evaluate(np.zeros_like(u), u)[1], [cbrt(mpf(v)) for v in u]).max() < 1.5e-16
+
+
+@pytest.mark.parametrize("top", [1e-12, 1e-3, 0.9999, 1.0])
+def test_remainders_keep_their_digits_where_the_plain_forms_cancel(top):
+    u = np.append(top * np.random.default_rng(3).uniform(0.01, 1, 200), top)
+    _, _, late, lost = evaluate(np.zeros_like(u), u)
+    assert relative_error(late, [mpf(v) + expm1(-mpf(v)) for v in u]).max() < 6e-16
+    assert relative_error(lost, [mpf(v) - log1p(mpf(v)) for v in u]).max() < 6e-16
+
+
+def test_the_remainder_of_exp_goes_on_beyond_one():
+    u = np.geomspace(1, 1e15, 200)
+    assert relative_error(evaluate(np.zeros_like(u), u)[2], [mpf(v) + expm1(-mpf(v)) for v in u]).max() < 6e-16
+
+
+def test_lanes_give_the_bits_of_one_cell():
+    random = np.random.default_rng(4)
+    x, u = random.uniform(-760, 730, 1003), 10 ** random.uniform(-300, 0, 1003)
+    for wide, narrow in zip(evaluate(x, u), evaluate(x, u, functions_one_by_one), strict=True):
+        assert np.array_equal(wide, narrow)
+
+
+@jit
+def _halvings(i, x, count, status):
+    """How often x can be halved before it is below 1: cells of very different length in one group."""
+    value, n = x[i], 0.0 * x[i]
+    active = value >= 1.0
+    for _ in range(2000):
+        if not some(active):
+            break
+        value, n = where(active, 0.5 * value, value), where(active, n + 1.0, n)
+        active = active & (value >= 1.0)
+    count[i] = n
+    status[i] = where(isnt(x[i] > 2.0) | (x[i] > 1e9), 7, -3)
+
+
+@entry()
+def halvings(x, count, status):
+    each_cell(_halvings, (x, count, status))
+
+
+@pytest.mark.parametrize("n", [0, 1, 31, 32, 33, 64, 100])
+def test_masked_loops_conditions_and_tails(n):
+    x = 2.0 ** np.random.default_rng(n).integers(-3, 60, n)
+    count, status = np.full(n, np.nan), np.full(n, 99, np.int8)
+    halvings(x, count, status)
+    assert np.array_equal(count, np.maximum(np.log2(x) + 1, 0) if n else [])
+    assert np.array_equal(status, np.where((x <= 2) | (x > 1e9), 7, -3))
+
+
+@jit
+def _parts(i, x, e, m, r, product):
+    e[i] = exponent(x[i])
+    m[i] = x[i] * pow2(-exponent(x[i]))
+    r[i] = nearest(x[i])
+    product[i] = fma(x[i], x[i], -x[i])
+
+
+@entry()
+def parts(x, e, m, r, product):
+    each_cell(_parts, (x, e, m, r, product))
+
+
+@given(st.floats(2.0**-500, 2.0**50))
+def test_exponent_mantissa_rounding_and_multiply_add_are_exact(x):
+    out = [np.empty(1) for _ in range(4)]
+    parts(np.array([x]), *out)
+    e, m, r, product = (column[0] for column in out)
+    assert m * 2.0**e == x
+    assert 1 <= m < 2
+    assert r == round(x)
+    assert product == float(mpf(x) * mpf(x) - mpf(x))

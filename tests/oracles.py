@@ -1,0 +1,68 @@
+"""Truth in 50 digits, by mpmath; imports nothing of ours.
+
+Arguments are float64 and taken as exact.
+"""
+
+from mpmath import exp, expm1, findroot, log, log1p, mp, mpf, tanh
+
+DIGITS = 50
+
+
+def quarter_phase(k):
+    """q of q - tanh q = k, k > 0, by Newton from the side on which it is monotone."""
+    small = max(0, int(-mp.log10(k)))
+    with mp.workdps(DIGITS + small + 10):
+        q = k + 1 if k > 1 else (3 * k) ** (mpf(1) / 3) * (1 + (3 * k) ** (mpf(2) / 3))
+        for _ in range(200):
+            step = (q - tanh(q) - k) / tanh(q) ** 2
+            q -= step
+            if abs(step) < abs(q) * mpf(10) ** (-DIGITS):
+                return +q
+    raise AssertionError(f"no root for k = {k}")
+
+
+def foliot(mu, phi0, a):
+    """(period, amplitude, crossing speed, sensitivity, multiplier) of the viscous foliot's limit cycle."""
+    mu, phi0, a = mpf(mu), mpf(phi0), mpf(a)
+    with mp.workdps(2 * DIGITS):
+        k = a * a * phi0 / mu
+        q = quarter_phase(k)
+        lam = tanh(q)
+        log_cosh = q - log(2) + log1p(exp(-2 * q))
+        return 4 * q / a, phi0 * log_cosh / k, mu * lam / a, k / (q * lam**2), exp(-2 * q)
+
+
+def foliot_angle(mu, phi0, a, phase):
+    """(angle, speed) at a phase of the period, from the switch at +phi0 on."""
+    period, _, v0, _, _ = foliot(mu, phi0, a)
+    mu, phi0, a, phase = mpf(mu), mpf(phi0), mpf(a), mpf(phase)
+    with mp.workdps(2 * DIGITS):
+        sign = 1 if phase < mpf(1) / 2 else -1
+        t = period * (phase if sign > 0 else phase - mpf(1) / 2)
+        forgotten = -expm1(-a * t) / a
+        return sign * (phi0 + (v0 + mu / a) * forgotten - mu / a * t), sign * (v0 - (a * v0 + mu) * forgotten)
+
+
+def foliot_by_waiting(mu, phi0, a, half_swings):
+    """Period, amplitude and crossing speed after that many half swings from rest at phi = 0.
+
+    Follows the motion x = v E/a -+ mu (t - E/a)/a, E = 1 - exp(-a t), from switch to switch: nothing of the limit
+    cycle's equations is used.
+    """
+    mu, phi0, a = mpf(mu), mpf(phi0), mpf(a)
+
+    def way(v, t):  # along the drive
+        forgotten = -expm1(-a * t) / a
+        return v * forgotten + mu / a * (t - forgotten)
+
+    def flight(v, distance):  # v: speed along the drive at the start, <= 0 after a switch
+        guess = (abs(v) + (v * v + 2 * mu * distance) ** mpf("0.5")) / mu + a * distance / mu
+        t = findroot(lambda t: way(v, t) - distance, (guess, guess * mpf("1.01")))
+        return t, v + (mu - a * v) * -expm1(-a * t) / a
+
+    _, v = flight(mpf(0), phi0)
+    for _ in range(half_swings):
+        before = v
+        t, v = flight(-before, 2 * phi0)
+    turning = log1p(a * before / mu) / a
+    return 2 * t, phi0 - way(-before, turning), v
