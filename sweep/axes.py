@@ -7,6 +7,7 @@ what the study says (0.3, 0.001, the endpoints), on every machine.
 from __future__ import annotations
 
 import csv
+import itertools
 from collections.abc import Iterator
 from decimal import Context, Decimal, localcontext
 from pathlib import Path
@@ -87,12 +88,16 @@ def read_column(path: Path, name: str) -> list[tuple[int, str]]:
 
 
 def _rows(path: Path) -> list[tuple[int, list[str]]]:
+    if path.exists() and not path.is_file():
+        raise ValueError(f"{path} cannot be read: it is no regular file")
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             # a comment becomes an empty line before csv sees it, since a quotation mark in it would open a field
             lines = ("\n" if line.startswith("#") else line for line in file)
             reader = csv.reader(lines, skipinitialspace=True)
-            return [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+            rows = ((reader.line_num, row) for row in reader if any(cell.strip() for cell in row))
+            # a heading and one value too many suffice to know that there are too many
+            return list(itertools.islice(rows, LARGEST_AXIS + 2))
     except OSError as error:
         raise ValueError(f"{path} cannot be read: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error, ValueError) as error:

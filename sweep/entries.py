@@ -158,7 +158,8 @@ class Entries:
         except ValueError as error:
             self.mistakes.add(where, str(error))
             return NONE
-        if not self._allowed_length(len(cells), where):
+        if len(cells) > axes.LARGEST_AXIS:
+            self.mistakes.add(where, f"expected at most {axes.LARGEST_AXIS} values, found more")
             return NONE
         texts = [text for _, text in cells]
         return self._numbers(

@@ -95,6 +95,10 @@ def _parse(text: str, source: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise StudyError(source, [_syntax_mistake(str(error), text)]) from None
+    except ValueError:
+        raise StudyError(
+            source, [Mistake("file", "an integer has thousands of digits; no float64 is that large")]
+        ) from None
     except RecursionError:
         raise StudyError(source, [Mistake("file", "lists or tables are nested too deeply")]) from None
 

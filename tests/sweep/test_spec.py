@@ -49,6 +49,17 @@ def test_a_whole_study_is_read(read):
     assert "spacing" in study.text
 
 
+def test_a_study_shows_itself_in_one_line():
+    study = build(axes={"height": [1.0, 2.0], "v0": [0.5]}, title="Falling stones")
+    assert repr(study) == "<Study 'Falling stones': toy:KERNEL over height (2), v0 (1)>"
+
+
+def test_terms_are_what_a_method_must_be_able_to_do():
+    assert build_rich().terms == {"load"}
+    assert build_rich(fixed={"drag": 0, "grip": 3}).terms == {"load", "grip"}
+    assert build_rich(axes={"drag": [0.0]}, fixed={"load": 1, "grip": 1, "shape": "square"}).terms == {"drag", "shape"}
+
+
 def test_defaults_are_filled_in(read):
     study = read("axes.height = [1.0]")
     assert (study.method, study.rtol, study.design, study.question) == ("auto", 1e-9, "product", "")
@@ -237,7 +248,14 @@ def test_of_many_bad_cells_the_first_are_told_and_the_rest_counted(read, tmp_pat
     ]
 
 
-@pytest.mark.parametrize("name", ["nowhere.csv", "."])
+def test_a_csv_file_with_too_many_lines_is_refused(mistakes, tmp_path, monkeypatch):
+    monkeypatch.setattr("sweep.axes.LARGEST_AXIS", 10)
+    (tmp_path / "points.csv").write_text("height\n" + "".join(f"{k}\n" for k in range(1, 1000)))
+    found = mistakes('axes.height.file = "points.csv"')
+    assert found["axes.height.file"] == "expected at most 10 values, found more"
+
+
+@pytest.mark.parametrize("name", ["nowhere.csv", ".", "/dev/zero"])
 def test_a_csv_file_that_cannot_be_read_is_a_mistake(mistakes, name):
     assert "cannot be read" in mistakes(f'axes.height.file = "{name}"')["axes.height.file"]
 

@@ -275,6 +275,7 @@ def test_a_kernel_beside_the_study_is_found(read, tmp_path, monkeypatch):
         ("[axes.mu]\nnum = 1\n[axes.mu]\n", "line 3", "this key or table stands here a second time: [axes.mu]"),
         ("a = 'x", "end of file", "Expected"),
         ("a = [1, 2", "end of file", "Unclosed array"),
+        ("a = " + "1" * 5000, "file", "an integer has thousands of digits"),
         ("a = " + "[" * 50_000, "file", "lists or tables are nested too deeply"),
     ],
 )

@@ -7,7 +7,7 @@ from decimal import Decimal
 
 import pytest
 
-from sweep.units import UnitMistake, scale
+from sweep.units import KNOWN, UnitMistake, scale
 
 
 @pytest.mark.parametrize(
@@ -32,6 +32,13 @@ def test_a_unit_becomes_the_factor_to_the_field(given, wanted, factor):
 def test_the_unit_of_the_field_needs_no_conversion_and_no_pint():
     code = "import sys; from sweep.units import scale; scale('rad/s', 'rad/s', 'x'); assert 'pint' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize(("given", "wanted"), KNOWN)
+def test_factors_known_by_heart_are_those_of_pint(monkeypatch, given, wanted):
+    by_heart = scale(given, wanted, "x")
+    monkeypatch.setattr("sweep.units.KNOWN", {})
+    assert by_heart == scale(given, wanted, "x")
 
 
 @pytest.mark.parametrize(("given", "wanted", "turns"), [("Hz", "rad/s", 1), ("kHz", "rad/s", 1000)])
