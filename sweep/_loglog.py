@@ -127,10 +127,12 @@ def _drift(u: Array, off: Array, present: NDArray[np.bool_], width: Array) -> Ar
 
 
 def brackets(c: Array, value: float) -> list[int]:
-    """Indices i such that a curve passes `value` in [c[i], c[i + 1]); both ends present, a point on it counts once."""
-    above = c >= value
-    joined = np.isfinite(c[:-1]) & np.isfinite(c[1:])
-    found: list[int] = np.flatnonzero(joined & (above[:-1] != above[1:])).tolist()
+    """Indices i such that a curve passes `value` in [c[i], c[i + 1]), or meets it at either end of a run."""
+    present, above, on = np.isfinite(c), c >= value, c == value
+    alone = np.concatenate([[True], ~present, [True]])  # whether the point before is missing; shifted by 2: after
+    starts, ends = alone[:-2][:-1] & on[:-1] & above[1:], alone[2:][1:] & on[1:] & above[:-1]
+    passes = (above[:-1] != above[1:]) | starts | ends
+    found: list[int] = np.flatnonzero(present[:-1] & present[1:] & passes).tolist()
     return found
 
 

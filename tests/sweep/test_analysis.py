@@ -60,6 +60,20 @@ def test_error_falls_as_the_fourth_power_of_the_spacing_inside_and_at_the_ends(p
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4, abs=0.4)
 
 
+def test_on_an_even_grid_the_stencils_are_the_textbooks():
+    h = 0.1
+    for place, weights in (
+        (5, {3: 1, 4: -8, 6: 8, 7: -1}),
+        (0, {0: -25, 1: 48, 2: -36, 3: 16, 4: -3}),
+        (10, {10: 25, 9: -48, 8: 36, 7: -16, 6: 3}),
+    ):
+        for k in range(11):
+            y = np.ones(11)
+            y[k] = np.e  # its logarithm is one at k alone
+            found = float(local_exponent(curve(np.exp(h * np.arange(11)), y), "mu")[place])
+            assert found == pytest.approx(weights.get(k, 0) / (12 * h), abs=1e-11)
+
+
 def test_an_uneven_grid_is_differentiated_as_well_as_an_even_one():
     t = np.linspace(-1, 1, 81)
     x = np.exp(t + 0.3 * t**2)
@@ -346,9 +360,24 @@ def test_laws_that_do_not_meet_and_windows_that_overlap_are_refused():
         crossover(low, fit_exponent(y.rename("amplitude"), "mu", (2, None)))
 
 
-def test_windows_may_share_an_end_point():
+@pytest.mark.parametrize("fit", [0, 1])
+@pytest.mark.parametrize("source", ["exponent_error", "level_error"])
+def test_each_error_of_the_two_fits_reaches_the_crossover(fit, source):
+    x = grid()
+    y = curve(x, np.where(x < 1, 8 / x, 5 * x ** (-1 / 3)))
+    fits = [fit_exponent(y, "mu", w).assign(exponent_error=0.0, level_error=0.0) for w in ((None, 1e-2), (10, None))]
+    fits[fit] = fits[fit].assign({source: 1e-3})
+    place = 1.6**1.5
+    lever = 1.0 if source == "level_error" else abs(np.log(place / float(fits[fit].centre)))
+    found = float(crossover(*fits).abscissa_error)
+    assert found == pytest.approx(place * lever * 1e-3 / (2 / 3), rel=1e-9)
+
+
+def test_windows_may_share_an_end_point_in_either_order():
     x = grid(-2, 2)
     y = curve(x, np.where(x < 1, 1 / x, x))
+    fits = fit_exponent(y, "mu", (None, 1)), fit_exponent(y, "mu", (1, None))
+    assert float(crossover(fits[1], fits[0]).abscissa) == pytest.approx(1)
     assert float(
         crossover(fit_exponent(y, "mu", (None, 1)), fit_exponent(y, "mu", (1, None))).abscissa
     ) == pytest.approx(1)
@@ -396,6 +425,58 @@ def test_a_grid_point_on_the_value_is_found_exactly_and_once():
     c = curve(x, x.copy())
     c[7] = x[7]
     assert float(where_value(c, "mu", float(x[7])).abscissa) == pytest.approx(x[7], rel=1e-14)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("end", [0, -1])
+def test_a_value_met_just_at_the_end_is_found(sign, end):
+    x = grid(-1, 1, 10)
+    assert float(where_value(curve(x, sign * x), "mu", sign * float(x[end])).abscissa) == pytest.approx(
+        x[end], rel=1e-14
+    )
+
+
+def test_a_curve_that_stays_on_a_value_passes_it_nowhere():
+    with pytest.raises(SweepError, match="passes 1 2 times"):
+        where_value(curve(grid(-1, 1, 10), np.ones(21)), "mu", 1.0)
+
+
+@pytest.mark.parametrize("value", [-0.99, -0.6, -0.36])
+def test_a_mirrored_curve_has_its_place_mirrored_to_the_last_digits(value):
+    x = np.geomspace(1e-3, 1e3, 13)
+    c = bend_exponent(x)
+    there = float(where_value(curve(x, c), "mu", value).abscissa)
+    mirrored = float(where_value(curve(1 / x[::-1], c[::-1]), "mu", value).abscissa)
+    assert mirrored * there == pytest.approx(1, rel=1e-12)
+
+
+def test_a_place_next_to_the_end_is_as_good_as_five_intervals_allow():
+    x = np.geomspace(1, 10, 21)
+    for bracket in (0, 19):
+        truth = float((x[bracket] * x[bracket + 1]) ** 0.5)
+        t = np.log(x / truth)
+        found = where_value(
+            curve(x, t - 0.3 * t**2 + 0.05 * t**3 - 0.01 * t**4 + 0.002 * t**5), "mu", 0.0, (x[bracket], x[bracket + 1])
+        )
+        assert float(found.abscissa) == pytest.approx(truth, rel=1e-13)  # exact for degree five
+
+
+def test_an_infinite_value_elsewhere_does_no_harm():
+    x = grid(-1, 1)
+    c = x.copy()
+    c[-1] = np.inf
+    found = where_value(curve(x, c), "mu", 0.5)
+    assert float(found.abscissa_error) < 1e-7
+
+
+def test_a_window_limits_where_one_looks_and_not_what_is_differentiated():
+    x = grid(-3, 3)
+    y = curve(x, bend(x))
+    whole = where_exponent(y, "mu", -0.5)
+    place = float(whole.abscissa)
+    part = where_exponent(y, "mu", -0.5, (0.9 * place, 1.1 * place))
+    assert float(part.abscissa) == place
+    assert float(part.abscissa_error) == float(whole.abscissa_error)
 
 
 def test_each_line_has_its_own_place_and_those_without_one_are_nan():

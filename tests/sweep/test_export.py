@@ -173,6 +173,13 @@ def test_netcdf_of_a_result_larger_than_memory_is_written_piece_by_piece(tmp_pat
         xr.testing.assert_identical(back.load(), ds)
 
 
+def test_netcdf_keeps_full_precision_however_the_source_was_packed(tmp_path):
+    ds = result()
+    ds.period.encoding = {"dtype": "float32", "scale_factor": 2.0}
+    with xr.open_dataset(sweep.export(ds, tmp_path / "out.nc"), engine="h5netcdf") as back:
+        np.testing.assert_array_equal(back.period, ds.period)
+
+
 def test_netcdf_holds_an_axis_of_words(tmp_path):
     ds = xr.Dataset({"period": ("method", [1.0, 2.0])}, coords={"method": ["map", "closed"]})
     with xr.open_dataset(sweep.export(ds, tmp_path / "out.nc"), engine="h5netcdf") as back:
