@@ -55,9 +55,7 @@ class Solver:
         self._asked = np.array([field.name in study.outputs for field in kernel.outputs], np.uint8)
         self._rtol, self._bound = np.empty(room), np.empty(room)
 
-    def solve(
-        self, start: int, stop: int, outputs: Mapping[str, Floats], status: Codes, method_used: Codes
-    ) -> None:
+    def solve(self, start: int, stop: int, outputs: Mapping[str, Floats], status: Codes, method_used: Codes) -> None:
         """Fill the rows of every output asked for, and status and method number, of the cells `start` to `stop`.
 
         Parameters
@@ -71,9 +69,8 @@ class Solver:
         for low in range(start, stop, STRIP):
             high = min(low + STRIP, stop)
             rows = slice(low - start, high - start)
-            whole = outputs | self._unasked
             columns = [
-                whole[f.name][rows] if f.name in outputs else whole[f.name][: high - low]
+                outputs[f.name][rows] if f.name in outputs else self._unasked[f.name][: high - low]
                 for f in self.study.kernel.outputs
             ]
             self._solve_strip(low, high, columns, status[rows], method_used[rows])
@@ -148,19 +145,19 @@ class _Strip:
         if not _count(cells):
             return
         columns = [column[cells] for column in (*self.parameters, self.rtol)]
-        results: list[NDArray[Any]] = [column[cells] for column in (*self.outputs, self.status)]
+        targets: list[NDArray[Any]] = [*self.outputs, self.status]
+        results = [column[cells] for column in targets]
         self.kernel.methods[number].solve(*columns, *self.along, *results)
         if not isinstance(cells, slice):
-            for column, result in zip((*self.outputs, self.status), results, strict=True):
+            for column, result in zip(targets, results, strict=True):
                 column[cells] = result
         self.used[cells] = number
 
 
 def usable_methods(study: Study) -> tuple[int, ...]:
     """Numbers of the methods that can do every term the study sets."""
-    defaults = {field.name: field.default for field in study.kernel.parameters}
-    terms = {name for name, value in study.fixed.items() if value != defaults[name]} | set(study.axes)
-    return tuple(number for number, method in enumerate(study.kernel.methods) if not terms.intersection(method.excludes))
+    methods = enumerate(study.kernel.methods)
+    return tuple(number for number, method in methods if study.terms.isdisjoint(method.excludes))
 
 
 def _pick(cells: Cells, condition: NDArray[np.bool_]) -> Cells:
@@ -169,10 +166,12 @@ def _pick(cells: Cells, condition: NDArray[np.bool_]) -> Cells:
     if hits.size == condition.size:
         return cells
     if not isinstance(cells, slice):
-        return cells[hits]
+        chosen: NDArray[np.intp] = cells[hits]
+        return chosen
     if hits.size and hits[-1] - hits[0] + 1 == hits.size:
         return slice(cells.start + int(hits[0]), cells.start + int(hits[-1]) + 1)
-    return hits + cells.start
+    shifted: NDArray[np.intp] = hits + int(cells.start)
+    return shifted
 
 
 def _count(cells: Cells) -> int:
