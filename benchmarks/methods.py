@@ -1,0 +1,95 @@
+# How fast are the foliot's methods, against numpy and against one cell at a time, and how right?
+"""Prints ratios measured in this run, on one core: python benchmarks/methods.py"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from kernels import foliot
+from kernels._columns import entry, one_by_one
+
+BLOCK = 8192
+REPEATS = 7
+OUTPUTS = ("period", "amplitude", "crossing_speed", "sensitivity", "multiplier")
+
+
+@entry()
+def map_one_by_one(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+    """The iterated map one cell at a time: the same function, without lanes."""
+    one_by_one(
+        foliot._iterated, (mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status)
+    )
+
+
+def numpy_newton(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+    """q - tanh q = k by three Newton steps on whole arrays, series where the differences cancel."""
+    k = a * a * phi0 / mu
+    y = np.cbrt(3 * k)
+    w = y * y
+    q = np.where(k < 1, y * (1 + w * (2 / 15 + w * (3 / 175 + w * (2 / 1575)))), k + 1)
+    for _ in range(3):
+        t, v = np.tanh(q), q * q
+        series = q * v * (1 / 3 + v * (-2 / 15 + v * (17 / 315 + v * (-62 / 2835 + v * 1382 / 155925))))
+        q -= (np.where(q < 0.3, series, q - t) - k) / (t * t)
+    t = np.tanh(q)
+    period[:] = 4 * q / a
+    half = np.sinh(np.minimum(q, 20) / 2)
+    amplitude[:] = phi0 * np.where(q < 20, np.log1p(2 * half * half), q - np.log(2)) / k
+    crossing_speed[:] = mu * t / a
+    sensitivity[:] = k / (q * t * t)
+    multiplier[:] = np.exp(-2 * q)
+    status[:] = 0
+
+
+def columns(n):
+    """mu, phi0, a and rtol of foliots with alpha over 24 decades, in order; outputs and status."""
+    alpha = np.geomspace(1e-12, 1e12, n)
+    return [alpha * 0.09 * 0.7, np.full(n, 0.7), np.full(n, 0.3), np.full(n, 1e-9)], [
+        *(np.empty(n) for _ in OUTPUTS),
+        np.empty(n, np.int8),
+    ]
+
+
+def seconds(solve, inputs, outputs):
+    """Best time of a pass over all blocks."""
+    n, best = len(inputs[0]), np.inf
+    for _ in range(REPEATS):
+        start = time.perf_counter()
+        for low in range(0, n, BLOCK):
+            rows = slice(low, low + BLOCK)
+            solve(*(c[rows] for c in inputs), *(c[rows] for c in outputs))
+        best = min(best, time.perf_counter() - start)
+    return best
+
+
+def paired(one, other, inputs):
+    """Times of both in turn: median of the ratio other/one, and the best time of each."""
+    outputs = columns(len(inputs[0]))[1]
+    one(*(c[:64] for c in inputs), *(c[:64] for c in outputs))
+    other(*(c[:64] for c in inputs), *(c[:64] for c in outputs))
+    times = [(seconds(one, inputs, outputs), seconds(other, inputs, outputs)) for _ in range(5)]
+    return float(np.median([b / a for a, b in times])), min(a for a, _ in times), min(b for _, b in times)
+
+
+def report(title, ratio, ours, theirs, cells):
+    """One line: million cells a second of both, and the ratio."""
+    print(f"{title:58} {cells / ours / 1e6:8.2f} {cells / theirs / 1e6:8.2f} {ratio:7.2f}")
+
+
+def main():
+    """Measure and print."""
+    print(f"{'one core, million cells/s':58} {'ours':>8} {'rival':>8} {'ratio':>7}")
+    inputs, _ = columns(64 * BLOCK)
+    report("closed, in order; numpy Newton in blocks of 8192", *paired(foliot.closed, numpy_newton, inputs), 64 * BLOCK)
+    shuffled = [np.random.default_rng(0).permutation(inputs[0]), *inputs[1:]]
+    report("closed, shuffled; the same", *paired(foliot.closed, numpy_newton, shuffled), 64 * BLOCK)
+    report("asymptotic, in order; closed", *paired(foliot.asymptotic, foliot.closed, inputs), 64 * BLOCK)
+    some = [c[:: 64 * 8].copy() for c in inputs]
+    some[0] = np.geomspace(1e-3, 1e6, len(some[0])) * 0.09 * 0.7
+    report("map in lanes; one cell at a time, alpha 1e-3 to 1e6", *paired(foliot.iterated, map_one_by_one, some), 1024)
+
+
+if __name__ == "__main__":
+    main()
