@@ -115,9 +115,8 @@ def flag_words(variable: xr.DataArray) -> dict[int, str]:
 
 def _write_netcdf(dataset: xr.Dataset, path: Path) -> None:
     whole = dataset.chunk("auto") if dataset.nbytes > LARGE and not dataset.chunks else dataset
-    bare = whole.drop_encoding()
-    encoding: dict[str, dict[str, Any]] = {str(name): {"_FillValue": None} for name in bare.variables}
-    for name, variable in bare.data_vars.items():
+    encoding: dict[str, dict[str, Any]] = {str(name): {"_FillValue": None} for name in whole.variables}
+    for name, variable in whole.data_vars.items():
         if variable.dtype.kind in "iu" and math.prod(variable.shape) > 1:
             encoding[str(name)] |= {"zlib": True, "complevel": 1}
-    bare.to_netcdf(path, engine="h5netcdf", encoding=encoding)
+    whole.to_netcdf(path, engine="h5netcdf", encoding=encoding)
