@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+import textwrap
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -59,8 +60,8 @@ class View:
     def values(self, name: str) -> NDArray[Any]:
         return coordinate(self.y, name).values
 
-    def label(self, name: str) -> str:
-        return label(coordinate(self.y, name))
+    def label(self, name: str, width: int = 44) -> str:
+        return label(coordinate(self.y, name), width)
 
     def codes(self) -> list[int]:
         """Statuses other than OK that occur."""
@@ -173,12 +174,14 @@ def unit_text(unit: str) -> str:
     return "" if unit in ("", "1") else re.sub(r"\^(-?\d+)", r"$^{\1}$", unit)
 
 
-def label(variable: xr.DataArray) -> str:
-    """Text for an axis: long name, symbol, unit."""
+def label(variable: xr.DataArray, width: int = 44) -> str:
+    """Text for an axis: long name, symbol, unit; in lines of so many letters."""
     name = str(variable.name)
     sign, unit = symbol(name), unit_text(str(variable.attrs.get("units", "")))
     words = str(variable.attrs.get("long_name", "")) or ("" if sign else name.replace("_", " "))
-    return ", ".join(part for part in (words, sign) if part) + (f" [{unit}]" if unit else "")
+    text = ", ".join(part for part in (words, sign) if part) + (f" [{unit}]" if unit else "")
+    width += sum(map(len, re.findall(r"\$.*?\$", text)))  # symbols are longer in writing than in print
+    return "\n".join(textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False))
 
 
 def setting(value: xr.DataArray) -> str:

@@ -174,7 +174,7 @@ def letter(axes: Any, text: str) -> None:
 
 
 def _draw_lines(axes: Any, shown: View) -> None:
-    axes.set(xlabel=shown.label(shown.x), ylabel=label(shown.y))
+    axes.set(xlabel=shown.label(shown.x, 80), ylabel=label(shown.y))
     axes.set_xscale("log" if is_logarithmic(shown.values(shown.x)) else "linear")
     axes.set_yscale("log" if spans_decades(shown.y) else "linear")
     x, lines = shown.values(shown.x), np.atleast_2d(shown.y.values)
@@ -207,7 +207,7 @@ def _mark(axes: Any, x: Any, lines: Any, flagged: Any, mark: str, colour: str) -
 
 def _draw_map(axes: Any, shown: View) -> None:
     across = str(shown.across)
-    axes.set(xlabel=shown.label(shown.x), ylabel=shown.label(across))
+    axes.set(xlabel=shown.label(shown.x, 80), ylabel=shown.label(across))
     corners = []
     for scale, grid in ((axes.set_xscale, shown.values(shown.x)), (axes.set_yscale, shown.values(across))):
         scale("log" if is_logarithmic(grid) else "linear")

@@ -330,3 +330,11 @@ def test_labels_and_units():
     assert label(mu) == r"drive torque, $\mu$ [rad/s$^{2}$]"
     assert setting(mu) == r"$\mu$ = 0.5 rad/s$^{2}$"
     assert setting(xr.DataArray("map", name="method")) == "method = map"
+
+
+def test_a_long_name_is_broken_into_lines_that_fit_the_picture():
+    text = "s = -dlnP/dlnmu, the share of a torque error that reaches the period"
+    lines = label(xr.DataArray(1.0, name="sensitivity", attrs={"units": "1", "long_name": text})).split("\n")
+    assert " ".join(lines) == text
+    assert len(lines) == 2
+    assert max(map(len, lines)) <= 44
