@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import queue
+import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -144,6 +145,7 @@ class _Copier:
         self.damaged: list[int] = []
         self._store, self._fd, self._places = store, fd, places
         self._unsynced = 0
+        self._lock = threading.Lock()
         self._buffers: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         cells = min(store.blocks.cells, store.blocks.size)
         for _ in range(threads + 1):
@@ -161,13 +163,16 @@ class _Copier:
             self._buffers.put(buffers)
 
     def _write(self, start: int, arrays: Mapping[str, Any]) -> None:
-        for column in self._store.columns:
-            if column.name in self._places:
-                at = self._places[column.name] + start * column.cell_bytes
-                disk.pwrite_all(self._fd, arrays[column.name], at)
-                self._unsynced += arrays[column.name].nbytes
-        if self._unsynced > SYNC_BYTES:
-            self._unsynced = 0
+        # the system lets one thread at a time write to a file; those that wait for it there burn time
+        with self._lock:
+            for column in self._store.columns:
+                if column.name in self._places:
+                    at = self._places[column.name] + start * column.cell_bytes
+                    disk.pwrite_all(self._fd, arrays[column.name], at)
+                    self._unsynced += arrays[column.name].nbytes
+            due = self._unsynced > SYNC_BYTES
+            self._unsynced = 0 if due else self._unsynced
+        if due:
             disk.fsync(self._fd)
 
 
@@ -187,7 +192,7 @@ def _flags(store: Store, index: int) -> dict[str, Any] | None:
     import h5py
 
     try:
-        with h5py.File(store.folder / store.names[index], "r", locking=False) as part:
+        with h5py.File(store.folder / store.names[index], "r") as part:
             return {name: part[name][...] for name in FLAGS}
     except DAMAGE:
         return None

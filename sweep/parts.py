@@ -69,7 +69,7 @@ def _places(path: Path, columns: Sequence[Column], start: int, stop: int) -> lis
     import h5py
 
     places = []
-    with h5py.File(path, "r", locking=False) as file:
+    with h5py.File(path, "r") as file:
         if (int(file.attrs["start"]), int(file.attrs["stop"])) != (start, stop):
             raise ValueError("holds other cells than its name says")
         for column in columns:

@@ -90,7 +90,7 @@ def stored_fingerprint(output: Path) -> dict[str, str]:
     import h5py
 
     try:
-        with h5py.File(output, "r", locking=False) as file:
+        with h5py.File(output, "r") as file:
             text = file.attrs["fingerprint"]
             file.attrs["study_json"], file[STATUS]
         return dict(json.loads(text))

@@ -1,0 +1,113 @@
+import re
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from sweep.errors import SweepError
+from sweep.plan import plan, quantity, small_duration
+from sweep.runner import run
+from sweep.spec import build_study
+
+
+def stone(**keys):
+    keys = {"axes": {"height": np.linspace(-1.0, 9.0, 500), "v0": [0.0, 0.5]}, "outputs": ["fall_time"], **keys}
+    return build_study(allow_import=True, kernel="toy:KERNEL", title="A stone", **keys)
+
+
+def test_a_plan_forecasts_bytes_that_a_run_then_takes(tmp_path):
+    study = stone()
+    found = plan(study, path=tmp_path / "out.h5")
+    assert found.cells == 1000
+    # a float64, a status and a method
+    assert 10_000 <= found.part_bytes <= 20_000
+    run(study, tmp_path / "out.h5", progress=False).close()
+    assert (tmp_path / "out.h5").stat().st_size == pytest.approx(found.output_bytes, rel=0.5)
+
+
+def test_traces_count_with_their_length():
+    traces = stone(outputs=["drop"], along={"phase": np.linspace(0, 1, 200)})
+    assert plan(traces).output_bytes > 1000 * (200 * 8 + 2)
+
+
+def test_a_plan_forecasts_the_time_of_a_run():
+    keys = {"axes": {"height": np.arange(1.0, 201)}, "outputs": ["fall_time"]}
+    study = build_study(allow_import=True, kernel="slow:SLOW", **keys)
+    found = plan(study, workers=2)
+    # 2 ms a cell by sleeping
+    assert found.cell_seconds == pytest.approx(2e-3, rel=0.3)
+    assert found.seconds == pytest.approx(0.2, rel=0.4)
+    assert found.blocks >= 2
+
+
+def test_a_plan_tells_what_auto_would_choose_and_what_becomes_of_cells():
+    found = plan(stone(rtol=0.5))
+    assert found.methods.keys() == {"none", "rough"}
+    assert sum(found.methods.values()) == pytest.approx(1)
+    assert found.statuses["BAD_INPUT"] == pytest.approx(0.1, abs=0.05)
+
+
+def test_a_plan_reads_well():
+    text = str(plan(stone(), workers=2))
+    assert text.startswith(
+        "A stone\n  kernel    toy:KERNEL\n  outputs   fall_time\n  cells     1,000 = height 500 x v0 2\n"
+    )
+    for row in ("blocks", "parts", "output", "disk", "memory", "time", "methods", "statuses"):
+        assert re.search(rf"^  {row:9} \S", text, re.MULTILINE), row
+    assert "warning" not in text
+
+
+def test_a_plan_warns_of_a_disk_that_is_too_small(monkeypatch):
+    free = shutil.disk_usage(".")._replace(free=1000)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: free)
+    assert re.search(r"warning +the disk is too small: .* needed, 1 kB free", str(plan(stone())))
+
+
+def test_a_plan_warns_of_a_memory_that_is_too_small(monkeypatch):
+    monkeypatch.setattr(sys.modules["sweep.plan"], "memory", lambda: 1000)
+    assert "the memory is too small" in str(plan(stone()))
+
+
+def test_a_plan_of_a_folder_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(SweepError, match="there is no folder"):
+        plan(stone(), path=tmp_path / "nowhere" / "out.h5")
+
+
+def test_a_plan_leaves_nothing_on_the_disk(tmp_path):
+    plan(stone(), path=tmp_path / "out.h5")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("count", "text"),
+    [
+        (0, "0 B"),
+        (812, "812 B"),
+        (999, "999 B"),
+        (1000, "1 kB"),
+        (1340, "1.34 kB"),
+        (42_000_000, "42 MB"),
+        (3.2e12, "3.2 TB"),
+    ],
+)
+def test_bytes_read_as_people_say_them(count, text):
+    assert quantity(count) == text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(5.1e-9, "5.1 ns"), (999e-9, "999 ns"), (0.9996e-6, "1 us"), (2e-5, "20 us"), (3.4e-3, "3.4 ms"), (2.0, "2 s")],
+)
+def test_short_times_read_as_people_say_them(seconds, text):
+    assert small_duration(seconds) == text
+
+
+def test_the_engine_is_imported_without_heavy_libraries():
+    code = """
+import sys, sweep.runner, sweep.plan, sweep.result, sweep.store, sweep.progress
+print(sorted({"numba", "xarray", "h5py", "h5netcdf", "pint", "dask", "pandas"} & set(sys.modules)))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
