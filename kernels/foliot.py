@@ -146,8 +146,8 @@ FOLIOT = Kernel(
         Field("period", "s", "period of the limit cycle"),
         Field("amplitude", "rad", "largest angle"),
         Field("crossing_speed", "rad/s", "angular speed just before the switch"),
-        Field("sensitivity", "1", "s = -dlnP/dlnmu, the share of a torque error that reaches the period"),
-        Field("multiplier", "1", "multiplier of the half-cycle map; a disturbance shrinks by it each half swing"),
+        Field("sensitivity", "1", "sensitivity of the period to torque, -dlnP/dlnmu"),
+        Field("multiplier", "1", "multiplier of the half-cycle map"),
     ),
     check=check,
     methods=(
@@ -156,4 +156,5 @@ FOLIOT = Kernel(
         Method("map", "exact map from switch to switch, iterated from rest", iterated, iterated_bound),
         Method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", integrated),
     ),
+    example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
 )

@@ -87,4 +87,5 @@ FOLIOT_DESIGN = Kernel(
     ),
     check=check,
     methods=(Method("newton", "Newton's method on the closed-form cycle", newton),),
+    example={"period": 4.0, "amplitude": 0.8, "phi0": 0.5},
 )

@@ -64,4 +64,5 @@ FOLIOT_MOTION = Kernel(
     along=(Field("phase", "1", "time over period, from the switch at +phi0 on", lower=0.0, upper=1.0),),
     check=check,
     methods=(Method("closed", "exponentials on the closed-form cycle", closed, closed_bound),),
+    example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
 )

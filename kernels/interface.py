@@ -94,6 +94,7 @@ class Kernel:
 
     `check(*parameters, status)` writes OK or a refusal for every cell, before any method is asked.
     `along` are coordinates shared by all cells (phase, frequency); a study gives their values.
+    `example` has the values of parameters at which the scene runs well: a study to begin with.
     """
 
     name: str
@@ -104,6 +105,7 @@ class Kernel:
     check: Callable[..., None]
     methods: tuple[Method, ...]
     along: tuple[Field, ...] = ()
+    example: Mapping[str, float] = field(default_factory=dict)
 
     def method(self, name: str) -> Method:
         """The method of that name. Raises KeyError."""

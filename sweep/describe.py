@@ -89,27 +89,29 @@ def _plain(default: float | str) -> str:
 def _example(name: str, kernel: Kernel) -> str:
     """A study that sweeps the first parameter."""
     first, *others = kernel.parameters
-    fixed = [p for p in others if p.default is None]
-    lines = [f'kernel = "{name}"', "", *_axis(first)]
+    values = {p.name: kernel.example.get(p.name, 1.0) for p in kernel.parameters}
+    fixed = [p for p in others if p.default is None or p.name in kernel.example]
+    lines = [f'kernel = "{name}"', "", *_axis(first, values[first.name])]
     if fixed:
-        lines += ["", "[fixed]", *map(_entry, fixed)]
+        lines += ["", "[fixed]", *(_entry(p, values[p.name]) for p in fixed)]
     for field in kernel.along:
         lines += ["", f"[along.{field.name}]", *_range(field)]
     return "\n".join(f"  {line}".rstrip() for line in lines)
 
 
-def _axis(field: Field) -> Iterable[str]:
+def _axis(field: Field, middle: float) -> Iterable[str]:
     yield f"[axes.{field.name}]"
     if field.choices:
         yield f"values = [{quoted(field.choices)}]"
     else:
-        yield from ('spacing = "log"', "start = 0.1", "stop = 10", "num = 41", f'unit = "{field.unit}"')
+        yield from ('spacing = "log"', f"start = {middle / 10:g}", f"stop = {middle * 10:g}", "num = 41")
+        yield f'unit = "{field.unit}"'
 
 
-def _entry(field: Field) -> str:
+def _entry(field: Field, value: float) -> str:
     if field.choices:
         return f'{field.name} = "{next(iter(field.choices))}"'
-    return f'{field.name} = {{ value = 1.0, unit = "{field.unit}" }}'
+    return f'{field.name} = {{ value = {value:g}, unit = "{field.unit}" }}'
 
 
 def _range(field: Field) -> Iterable[str]:

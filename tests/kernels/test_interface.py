@@ -2,7 +2,9 @@
 
 import inspect
 
+import numpy as np
 import pytest
+from columns import checked, solve
 
 from kernels.catalogue import KERNELS, get
 from kernels.interface import Status
@@ -39,3 +41,15 @@ def test_status_numbers_fit_their_kind():
     assert all(s.refused == (64 <= s <= 126) for s in Status)
     assert all(s.doc for s in Status)
     assert max(Status) == Status.PENDING == 127
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_example_of_every_kernel_runs(name):
+    kernel = get(name)
+    cell = [[kernel.example.get(p.name, p.default)] for p in kernel.parameters]
+    along = [np.linspace(0.0, 1.0, 5) for _ in kernel.along]
+    assert checked(kernel, *cell)[0] == Status.OK
+    for method in kernel.methods:
+        outputs, status = solve(kernel, method.name, *cell, along=along)
+        assert status[0] == Status.OK
+        assert all(np.isfinite(column).all() for column in outputs.values())
