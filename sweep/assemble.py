@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import queue
 import threading
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,7 +21,7 @@ from sweep.errors import SweepError
 from sweep.image import unfilled
 from sweep.layout import METHOD_USED, STATUS, Column, Coordinate, Layout
 from sweep.parts import DAMAGE, digest
-from sweep.pool import CtrlC, each
+from sweep.pool import CtrlC, Spares, each
 from sweep.store import Store
 
 CHUNK_CELLS = 1 << 18
@@ -30,7 +29,6 @@ CHUNK_CELLS = 1 << 18
 SYNC_BYTES = 128 << 20
 """Bytes after which the disk is set to work, long before the end."""
 FLAGS = (STATUS, METHOD_USED)
-FLAGS_JOB = -1
 
 
 def assemble(store: Store, layout: Layout, output: Path, attrs: Mapping[str, Any], threads: int) -> list[int]:
@@ -83,16 +81,9 @@ def _fill(store: Store, layout: Layout, canvas: Canvas, attrs: Mapping[str, Any]
     canvas.check()
     with h5py.File(canvas, "r+") as file:
         places = {c.name: file[c.name].id.get_offset() for c in layout.columns if c.name not in FLAGS}
-        copier = _Copier(store, fd, places, threads)
-
-        def work(job: int) -> None:
-            if job == FLAGS_JOB:
-                _write_flags(store, layout, file, canvas)
-            else:
-                copier.copy(job)
-
-        each([FLAGS_JOB, *range(store.blocks.count)], work, threads + 1, lambda job: None)
-        return sorted(copier.damaged)
+        copier = _Copier(store, fd, places, _Flags(store, layout, file, canvas), threads)
+        each(range(store.blocks.count), copier.copy, threads, lambda job: None)
+    return sorted(copier.damaged)
 
 
 def write_frame(path: Any, layout: Layout, attrs: Mapping[str, Any]) -> None:
@@ -139,28 +130,24 @@ def chunk_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
 
 
 class _Copier:
-    """Copies the outputs of verified parts to their places."""
+    """Copies verified parts to their places; after the first damaged one it only looks for others."""
 
-    def __init__(self, store: Store, fd: int, places: Mapping[str, int], threads: int) -> None:
+    def __init__(self, store: Store, fd: int, places: Mapping[str, int], flags: _Flags, threads: int) -> None:
         self.damaged: list[int] = []
-        self._store, self._fd, self._places = store, fd, places
+        self._store, self._fd, self._places, self._flags = store, fd, places, flags
         self._unsynced = 0
         self._lock = threading.Lock()
-        self._buffers: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         cells = min(store.blocks.cells, store.blocks.size)
-        for _ in range(threads + 1):
-            self._buffers.put({column.name: column.empty(cells) for column in store.columns})
+        self._buffers = Spares(lambda: {column.name: column.empty(cells) for column in store.columns}, threads)
 
     def copy(self, index: int) -> None:
-        buffers = self._buffers.get()
-        try:
+        with self._buffers.lent() as buffers:
             arrays = self._store.get(index, buffers)
             if arrays is None:
                 self.damaged.append(index)
-            else:
+            elif not self.damaged:
+                self._flags.put(index, arrays)
                 self._write(self._store.blocks.bounds(index)[0], arrays)
-        finally:
-            self._buffers.put(buffers)
 
     def _write(self, start: int, arrays: Mapping[str, Any]) -> None:
         # the system lets one thread at a time write to a file; those that wait for it there burn time
@@ -176,26 +163,28 @@ class _Copier:
             disk.fsync(self._fd)
 
 
-def _write_flags(store: Store, layout: Layout, file: Any, canvas: Canvas) -> None:
-    """Writes statuses and methods in the order of cells, so that HDF5 compresses each chunk once."""
-    for index in range(store.blocks.count):
-        flags = _flags(store, index)
-        if flags is None:
-            return
-        for name, column in flags.items():
-            _write_cells(file[name], layout, store.blocks.bounds(index), column)
-        canvas.check()
+class _Flags:
+    """Writes statuses and methods in the order of cells, so that HDF5 compresses each chunk once.
 
+    Blocks that come early wait in memory, two bytes a cell.
+    """
 
-def _flags(store: Store, index: int) -> dict[str, Any] | None:
-    """Statuses and methods of a block; None where its part is damaged, which its copier finds as well."""
-    import h5py
+    def __init__(self, store: Store, layout: Layout, file: Any, canvas: Canvas) -> None:
+        self._store, self._layout, self._canvas = store, layout, canvas
+        self._datasets = {name: file[name] for name in FLAGS}
+        self._early: dict[int, dict[str, Any]] = {}
+        self._next = 0
+        self._lock = threading.Lock()
 
-    try:
-        with h5py.File(store.folder / store.names[index], "r") as part:
-            return {name: part[name][...] for name in FLAGS}
-    except DAMAGE:
-        return None
+    def put(self, index: int, arrays: Mapping[str, Any]) -> None:
+        """Raises OSError where the disk fails."""
+        with self._lock:
+            self._early[index] = {name: arrays[name].copy() for name in FLAGS}
+            while self._next in self._early:
+                for name, column in self._early.pop(self._next).items():
+                    _write_cells(self._datasets[name], self._layout, self._store.blocks.bounds(self._next), column)
+                self._next += 1
+        self._canvas.check()
 
 
 def _write_cells(dataset: Any, layout: Layout, bounds: tuple[int, int], column: Any) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,22 @@ from sweep.layout import Column
 
 START, STOP = 0x5EED0F0115EA5E01, 0x5EED0F0115EA5E02
 """Marks that HDF5 writes for the attributes start and stop; every part has its own numbers there."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """An HDF5 file without the numbers of its columns.
+
+    Attributes
+    ----------
+    pieces : the bytes between the columns, and in place of each column its name, in the order of the file
+    places : where each column begins
+    size : bytes of the file
+    """
+
+    pieces: tuple[bytes | str, ...]
+    places: Mapping[str, int]
+    size: int
 
 
 class Images:
@@ -27,30 +44,37 @@ class Images:
     """
 
     def __init__(self, columns: Sequence[Column]) -> None:
-        self._columns = tuple(columns)
-        self._frames: dict[int, list[bytes | str]] = {}
+        self.columns = tuple(columns)
+        self._frames: dict[int, Frame] = {}
         self._lock = threading.Lock()
+
+    def frame(self, cells: int) -> Frame:
+        """The frame of blocks of that length."""
+        with self._lock:
+            if cells not in self._frames:
+                self._frames[cells] = _frame(self.columns, cells)
+            return self._frames[cells]
 
     def pieces(self, start: int, stop: int, arrays: Mapping[str, Any]) -> list[Any]:
         """What to write one after the other: bytes, and the C-contiguous arrays themselves."""
-        with self._lock:
-            if stop - start not in self._frames:
-                self._frames[stop - start] = _frame(self._columns, stop - start)
-        marks = {_mark(START): _mark(start), _mark(STOP): _mark(stop)}
-        return [
-            arrays[piece] if isinstance(piece, str) else _patched(piece, marks) for piece in self._frames[stop - start]
-        ]
+        frame = self.frame(stop - start)
+        return [arrays[p] if isinstance(p, str) else _patched(p, start, stop) for p in frame.pieces]
+
+    def head(self, start: int, stop: int) -> bytes:
+        """The bytes of a part before its first column."""
+        first = self.frame(stop - start).pieces[0]
+        assert isinstance(first, bytes)
+        return _patched(first, start, stop)
 
 
-def _frame(columns: Sequence[Column], cells: int) -> list[bytes | str]:
-    """Bytes between the columns, and in place of each column its name, in the order of the file."""
-    image, offsets = _empty_file(columns, cells)
-    frame: list[bytes | str] = []
+def _frame(columns: Sequence[Column], cells: int) -> Frame:
+    image, places = _empty_file(columns, cells)
+    pieces: list[bytes | str] = []
     at = 0
-    for column in sorted(columns, key=lambda c: offsets[c.name]):
-        frame += [bytes(image[at : offsets[column.name]]), column.name]
-        at = offsets[column.name] + cells * column.cell_bytes
-    return [*frame, bytes(image[at:])]
+    for column in sorted(columns, key=lambda c: places[c.name]):
+        pieces += [bytes(image[at : places[column.name]]), column.name]
+        at = places[column.name] + cells * column.cell_bytes
+    return Frame((*pieces, bytes(image[at:])), places, len(image))
 
 
 def _empty_file(columns: Sequence[Column], cells: int) -> tuple[memoryview, dict[str, int]]:
@@ -79,11 +103,9 @@ def unfilled() -> Any:
     return properties
 
 
+def _patched(piece: bytes, start: int, stop: int) -> bytes:
+    return piece.replace(_mark(START), _mark(start)).replace(_mark(STOP), _mark(stop))
+
+
 def _mark(number: int) -> bytes:
     return np.int64(number).tobytes()
-
-
-def _patched(piece: bytes, marks: Mapping[bytes, bytes]) -> bytes:
-    for mark, value in marks.items():
-        piece = piece.replace(mark, value)
-    return piece

@@ -14,6 +14,7 @@ from typing import Any
 import xxhash
 
 from sweep import disk
+from sweep.image import Images
 from sweep.layout import Column
 
 PART_NAME = re.compile(r"(\d+)-(\d+)\.([0-9a-f]{32})\.h5")
@@ -37,24 +38,28 @@ def digest(columns: Sequence[Column], arrays: Mapping[str, Any]) -> str:
 
 
 def read_part(
-    path: Path, columns: Sequence[Column], start: int, stop: int, buffers: Mapping[str, Any] | None = None
+    path: Path, images: Images, start: int, stop: int, buffers: Mapping[str, Any] | None = None
 ) -> dict[str, Any] | None:
     """The numbers of one block, each of shape `(stop - start, ...)`; None where the file is damaged.
 
     Parameters
     ----------
     buffers : arrays at least as long as the block, to be filled and returned in part
+
+    Raises
+    ------
+    FileNotFoundError
     """
     match = PART_NAME.fullmatch(path.name)
     assert match is not None
-    cells = stop - start
+    columns, cells = images.columns, stop - start
     arrays = {c.name: c.empty(cells) if buffers is None else buffers[c.name][:cells] for c in columns}
     try:
-        places = _places(path, columns, start, stop)
         fd = disk.open_file(path, os.O_RDONLY)
         try:
-            for column, place in zip(columns, places, strict=True):
-                disk.read_into(fd, arrays[column.name], place)
+            places = _places(fd, images, start, stop) or _places_by_hdf5(path, columns, start, stop)
+            for column in columns:
+                disk.read_into(fd, arrays[column.name], places[column.name])
         finally:
             os.close(fd)
     except FileNotFoundError:
@@ -64,11 +69,18 @@ def read_part(
     return arrays if digest(columns, arrays) == match[3] else None
 
 
-def _places(path: Path, columns: Sequence[Column], start: int, stop: int) -> list[int]:
-    """Where each column begins in a part. Raises OSError, KeyError, RuntimeError or ValueError where it is damaged."""
+def _places(fd: int, images: Images, start: int, stop: int) -> Mapping[str, int] | None:
+    """Where each column begins, in a file that begins as this program writes it; None in any other."""
+    frame, head = images.frame(stop - start), images.head(start, stop)
+    same = os.fstat(fd).st_size == frame.size and os.pread(fd, len(head), 0) == head
+    return frame.places if same else None
+
+
+def _places_by_hdf5(path: Path, columns: Sequence[Column], start: int, stop: int) -> dict[str, int]:
+    """The same in a file that another version of HDF5 wrote. Raises one of DAMAGE where it is none of ours."""
     import h5py
 
-    places = []
+    places = {}
     with h5py.File(path, "r") as file:
         if (int(file.attrs["start"]), int(file.attrs["stop"])) != (start, stop):
             raise ValueError("holds other cells than its name says")
@@ -76,5 +88,5 @@ def _places(path: Path, columns: Sequence[Column], start: int, stop: int) -> lis
             dataset = file[column.name]
             if dataset.shape != (stop - start, *column.shape) or dataset.dtype != column.dtype:
                 raise ValueError(f"{column.name} has another shape or type")
-            places.append(dataset.id.get_offset())
+            places[column.name] = dataset.id.get_offset()
     return places

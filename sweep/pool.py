@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import queue
 import signal
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from typing import Generic, TypeVar
 
 TICK = 0.2
 """Seconds after which progress is told even if nothing has finished."""
 
+T = TypeVar("T")
 Jobs = dict["Future[None]", int]
 
 
@@ -39,6 +43,24 @@ class Halt:
                 return False
             work()
             return True
+
+
+class Spares(Generic[T]):
+    """Things that one thread at a time may use, made once and lent out again and again."""
+
+    def __init__(self, make: Callable[[], T], count: int) -> None:
+        self._free: queue.SimpleQueue[T] = queue.SimpleQueue()
+        for _ in range(count):
+            self._free.put(make())
+
+    @contextlib.contextmanager
+    def lent(self) -> Iterator[T]:
+        """Waits for a free one."""
+        one = self._free.get()
+        try:
+            yield one
+        finally:
+            self._free.put(one)
 
 
 def each(

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sweep.errors import SweepError
+from sweep.image import Images
 from sweep.layout import STATUS, Column, Layout, layout
 from sweep.parts import PART_NAME, read_part
 from sweep.statuses import StatusCount, count_methods, count_statuses, failures
@@ -147,19 +148,20 @@ def _open_parts(output: Path, spec: Spec, strict: bool) -> xr.Dataset:
 
 
 def _at_once(plan: Layout, spec: Spec, parts: Mapping[int, Path]) -> dict[str, Any]:
+    images = Images(plan.columns)
     arrays = {c.name: c.empty(plan.grid.size) for c in plan.columns}
     for index in range(spec.blocks.count):
         start, stop = spec.blocks.bounds(index)
-        block = _block(plan, parts.get(index), start, stop)
+        block = _block(images, parts.get(index), start, stop)
         for name, values in block.items():
             arrays[name][start:stop] = values
     return arrays
 
 
-def _block(plan: Layout, part: Path | None, start: int, stop: int) -> dict[str, Any]:
+def _block(images: Images, part: Path | None, start: int, stop: int) -> dict[str, Any]:
     """A block's numbers; of a missing or damaged one NaN and PENDING."""
-    found = None if part is None else read_part(part, plan.columns, start, stop)
-    return found or {c.name: np.full((stop - start, *c.shape), c.missing, c.dtype) for c in plan.columns}
+    found = None if part is None else read_part(part, images, start, stop)
+    return found or {c.name: np.full((stop - start, *c.shape), c.missing, c.dtype) for c in images.columns}
 
 
 def _in_pieces(plan: Layout, spec: Spec, parts: Mapping[int, Path]) -> dict[str, Any]:
@@ -167,7 +169,7 @@ def _in_pieces(plan: Layout, spec: Spec, parts: Mapping[int, Path]) -> dict[str,
     import dask.array as da
     from dask.delayed import delayed
 
-    read = delayed(partial(_block, plan), pure=False)
+    read = delayed(partial(_block, Images(plan.columns)), pure=False)
     from_delayed: Any = da.from_delayed
     concatenate: Any = da.concatenate
     bounds = [spec.blocks.bounds(i) for i in range(spec.blocks.count)]

@@ -15,10 +15,10 @@ from sweep.assemble import assemble
 from sweep.errors import SweepError
 from sweep.fingerprint import difference, fingerprint
 from sweep.layout import columns
-from sweep.pool import cores
+from sweep.pool import Spares, cores
 from sweep.progress import Progress, stream_of
 from sweep.result import in_memory, memory, open_result, stored_fingerprint
-from sweep.session import Session, Solve, Spares
+from sweep.session import Session, Solve
 from sweep.store import Store, folder_of, opened, read_spec
 
 if TYPE_CHECKING:

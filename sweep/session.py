@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import contextlib
-import queue
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any, Generic, TextIO, TypeVar
+from typing import TYPE_CHECKING, Any, TextIO
 
 from sweep.blocks import Partition, Sample, order, partition, take_sample
 from sweep.errors import SweepError
 from sweep.layout import METHOD_USED, STATUS, Layout, layout
-from sweep.pool import Halt, each
+from sweep.pool import Halt, Spares, each
 from sweep.progress import Progress
 
 if TYPE_CHECKING:
     from sweep.study import Study
-
-T = TypeVar("T")
 
 Solve = Callable[[int, int, Mapping[str, Any]], bool]
 """Computes the cells start .. stop into columns of that length; False where the run is being stopped."""
@@ -120,24 +117,6 @@ def faults_told(what: str) -> Iterator[None]:
         raise SweepError("out of memory; fewer workers need less; what is finished is kept") from fault
     except Exception as fault:
         raise SweepError(f"{what} ({type(fault).__name__}: {fault}); what is finished is kept") from fault
-
-
-class Spares(Generic[T]):
-    """Things that one thread at a time may use, made once and lent out again and again."""
-
-    def __init__(self, make: Callable[[], T], count: int) -> None:
-        self._free: queue.SimpleQueue[T] = queue.SimpleQueue()
-        for _ in range(count):
-            self._free.put(make())
-
-    @contextlib.contextmanager
-    def lent(self) -> Iterator[T]:
-        """Waits for a free one."""
-        one = self._free.get()
-        try:
-            yield one
-        finally:
-            self._free.put(one)
 
 
 def now() -> str:

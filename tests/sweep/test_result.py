@@ -75,6 +75,7 @@ def test_the_file_opens_with_plain_xarray(stored, engine):
 
 def test_the_file_opens_with_the_netcdf_library(stored):
     import netCDF4 as netcdf
+
     with netcdf.Dataset(stored) as file:
         assert file["drop"].dimensions == ("height", "v0", "method", "phase")
         assert file["status"].dtype == np.int8

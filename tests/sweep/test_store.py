@@ -26,6 +26,7 @@ COLUMNS = (
     Column("status", "i1", (), (), {}),
     Column("method_used", "i1", (), (), {}),
 )
+IMAGES = Images(COLUMNS)
 MARK = {"study": "abc"}
 
 
@@ -134,9 +135,9 @@ def test_every_flipped_bit_of_the_numbers_is_found(filled):
         changed = bytearray(whole)
         changed[place] ^= 1 << place % 8
         path.write_bytes(changed)
-        assert read_part(path, COLUMNS, 0, 10) is None
+        assert read_part(path, IMAGES, 0, 10) is None
     path.write_bytes(whole)
-    assert read_part(path, COLUMNS, 0, 10) is not None
+    assert read_part(path, IMAGES, 0, 10) is not None
 
 
 def test_no_damaged_file_is_read_as_something_else(filled):
@@ -145,7 +146,7 @@ def test_no_damaged_file_is_read_as_something_else(filled):
     whole = path.read_bytes()
     for place in range(0, len(whole), 7):
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 0xFF]) + whole[place + 1 :])
-        found = read_part(path, COLUMNS, 0, 10)
+        found = read_part(path, IMAGES, 0, 10)
         if found is not None:
             np.testing.assert_array_equal(found["angle"], numbers(0, 10)["angle"])
 
@@ -155,15 +156,25 @@ def test_a_part_cut_off_anywhere_is_found(filled):
     whole = path.read_bytes()
     for length in [0, 1, 100, *range(2000, len(whole), 13)]:
         path.write_bytes(whole[:length])
-        found = read_part(path, COLUMNS, 0, 10)
+        found = read_part(path, IMAGES, 0, 10)
         assert found is None or digest(COLUMNS, found) in path.name
+
+
+def test_a_part_that_another_version_of_hdf5_laid_out_is_read_as_well(filled):
+    path = part_files(filled)[0]
+    with h5py.File(filled / "other", "w", libver="latest") as file:
+        file.attrs.update(start=0, stop=10)
+        for name, values in reversed(numbers(0, 10).items()):
+            file[name] = values
+    (filled / "other").rename(path)
+    np.testing.assert_array_equal(read_part(path, IMAGES, 0, 10)["angle"], numbers(0, 10)["angle"])
 
 
 def test_a_part_under_the_name_of_another_range_is_found(filled):
     first, second, _ = part_files(filled)
     path = first.with_name(second.name.split(".")[0] + "." + first.name.split(".")[1] + ".h5")
     first.rename(path)
-    assert read_part(path, COLUMNS, 10, 20) is None
+    assert read_part(path, IMAGES, 10, 20) is None
 
 
 def test_a_short_file_is_set_aside_at_the_start(output, filled):
