@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +30,15 @@ SYNC_BYTES = 128 << 20
 """Bytes after which the disk is set to work, long before the end."""
 FLAGS = (STATUS, METHOD_USED)
 
+Tell = Callable[[int, int], None]
 
-def assemble(store: Store, layout: Layout, output: Path, attrs: Mapping[str, Any], threads: int) -> list[int]:
+
+def assemble(store: Store, layout: Layout, output: Path, threads: int, tell: Tell) -> list[int]:
     """Puts the parts together under the output's name; then the parts are not needed any more.
+
+    Parameters
+    ----------
+    tell : called with the number of parts written, and of all parts
 
     Returns
     -------
@@ -46,7 +52,7 @@ def assemble(store: Store, layout: Layout, output: Path, attrs: Mapping[str, Any
     """
     temporary = store.temporary("result.h5")
     try:
-        damaged = _build(store, layout, temporary, attrs, threads)
+        damaged = _build(store, layout, temporary, threads, tell)
         if not damaged:
             _check(store, layout, temporary, output)
             disk.rename(temporary, output)
@@ -59,11 +65,11 @@ def assemble(store: Store, layout: Layout, output: Path, attrs: Mapping[str, Any
             temporary.unlink(missing_ok=True)
 
 
-def _build(store: Store, layout: Layout, path: Path, attrs: Mapping[str, Any], threads: int) -> list[int]:
+def _build(store: Store, layout: Layout, path: Path, threads: int, tell: Tell) -> list[int]:
     fd = disk.open_file(path, os.O_CREAT | os.O_EXCL | os.O_RDWR)
     try:
         canvas = Canvas(fd)
-        damaged = _fill(store, layout, canvas, attrs, fd, threads)
+        damaged = _fill(store, layout, canvas, fd, threads, tell)
         canvas.finish()
         if not damaged:
             disk.fsync(fd)
@@ -72,26 +78,26 @@ def _build(store: Store, layout: Layout, path: Path, attrs: Mapping[str, Any], t
         os.close(fd)
 
 
-def _fill(store: Store, layout: Layout, canvas: Canvas, attrs: Mapping[str, Any], fd: int, threads: int) -> list[int]:
+def _fill(store: Store, layout: Layout, canvas: Canvas, fd: int, threads: int, tell: Tell) -> list[int]:
     """Writes the frame, then copies all parts on a pool of threads; returns those that are damaged."""
     import h5py
 
     with CtrlC():
-        write_frame(canvas, layout, attrs)
+        write_frame(canvas, layout)
     canvas.check()
     with h5py.File(canvas, "r+") as file:
         places = {c.name: file[c.name].id.get_offset() for c in layout.columns if c.name not in FLAGS}
         copier = _Copier(store, fd, places, _Flags(store, layout, file, canvas), threads)
-        each(range(store.blocks.count), copier.copy, threads, lambda job: None)
+        each(range(store.blocks.count), copier.copy, threads, lambda job: tell(copier.copied, store.blocks.count))
     return sorted(copier.damaged)
 
 
-def write_frame(path: Any, layout: Layout, attrs: Mapping[str, Any]) -> None:
+def write_frame(path: Any, layout: Layout) -> None:
     """Writes everything but the columns' numbers to a file, or what HDF5 takes for one."""
     import h5netcdf
 
     with h5netcdf.File(path, "w") as file:
-        file.attrs.update({**layout.attrs, **attrs})
+        file.attrs.update(layout.attrs)
         file.dimensions = layout.sizes
         for coordinate in layout.coordinates:
             _write_coordinate(file, coordinate)
@@ -134,6 +140,7 @@ class _Copier:
 
     def __init__(self, store: Store, fd: int, places: Mapping[str, int], flags: _Flags, threads: int) -> None:
         self.damaged: list[int] = []
+        self.copied = 0
         self._store, self._fd, self._places, self._flags = store, fd, places, flags
         self._unsynced = 0
         self._lock = threading.Lock()
@@ -157,6 +164,7 @@ class _Copier:
                     at = self._places[column.name] + start * column.cell_bytes
                     disk.pwrite_all(self._fd, arrays[column.name], at)
                     self._unsynced += arrays[column.name].nbytes
+            self.copied += 1
             due = self._unsynced > SYNC_BYTES
             self._unsynced = 0 if due else self._unsynced
         if due:

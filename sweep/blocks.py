@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from sweep.solve import Solver
 
 POSITIONS = 64
-BUDGET = 0.06
+BUDGET = 0.03
 """Seconds a sample may take, unless one call takes longer;"""
 SHARE = 0.005
 """or this share of the run, where that is more."""
 LANES = 32
 """Cells that a lane kernel solves at once: it takes as long for one of them."""
 BLOCK_SECONDS = (0.05, 1.0)
-BLOCK_BYTES = 16 << 20
+BLOCK_BYTES = 8 << 20
 MOST_BLOCKS = 100_000
 
 
@@ -68,7 +68,7 @@ class Sample:
 
 
 def take_sample(solver: Solver, columns: Sequence[Column], size: int) -> Sample:
-    """Times a few cells at up to 64 places of the grid, in less than a tenth of a second or a hundredth of the run."""
+    """Times a few cells at up to 64 places of the grid, in a few hundredths of a second or a hundredth of the run."""
     cells = _probe_cells(solver, columns, size)
     count = max(1, min(POSITIONS, size // (4 * cells)))
     arrays = {column.name: column.empty(cells) for column in columns}

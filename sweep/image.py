@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from sweep.canvas import Canvas
 from sweep.layout import Column
 
 START, STOP = 0x5EED0F0115EA5E01, 0x5EED0F0115EA5E02
@@ -68,29 +69,28 @@ class Images:
 
 
 def _frame(columns: Sequence[Column], cells: int) -> Frame:
-    image, places = _empty_file(columns, cells)
+    canvas, places = _empty_file(columns, cells)
     pieces: list[bytes | str] = []
     at = 0
     for column in sorted(columns, key=lambda c: places[c.name]):
-        pieces += [bytes(image[at : places[column.name]]), column.name]
+        pieces += [canvas.piece(at, places[column.name]), column.name]
         at = places[column.name] + cells * column.cell_bytes
-    return Frame((*pieces, bytes(image[at:])), places, len(image))
+    return Frame((*pieces, canvas.piece(at, canvas.size)), places, canvas.size)
 
 
-def _empty_file(columns: Sequence[Column], cells: int) -> tuple[memoryview, dict[str, int]]:
+def _empty_file(columns: Sequence[Column], cells: int) -> tuple[Canvas, dict[str, int]]:
     import h5py
 
+    canvas = Canvas()
     # "earliest" writes attributes without checksums, so that they can be patched
-    with h5py.File("part", "w", driver="core", backing_store=False, libver="earliest") as file:
+    with h5py.File(canvas, "w", libver="earliest") as file:
         file.attrs["start"], file.attrs["stop"] = np.int64(START), np.int64(STOP)
         for column in columns:
             dataset = file.create_dataset(column.name, (cells, *column.shape), column.dtype, dcpl=unfilled())
             for key in ("units", "long_name", "flag_values", "flag_meanings"):
                 if key in column.attrs:
                     dataset.attrs[key] = column.attrs[key]
-        offsets = {column.name: file[column.name].id.get_offset() for column in columns}
-        file.flush()
-        return memoryview(file.id.get_file_image()), offsets
+        return canvas, {column.name: file[column.name].id.get_offset() for column in columns}
 
 
 def unfilled() -> Any:

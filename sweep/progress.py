@@ -46,6 +46,7 @@ class Progress:
         self._stream, self._name, self._clock = stream, name, clock
         self._work, self._worked = float(total - done) if work is None else work, 0.0
         self._live = stream is not None and stream.isatty()
+        self._pause = REDRAW_SECONDS if self._live else LINE_SECONDS
         self._begun = clock()
         self._told: float | None = None
         self._told_share = 0.0
@@ -77,6 +78,15 @@ class Progress:
         """Says something if it is time to."""
         if self._stream is not None and self.seconds >= QUIET_SECONDS and self._due():
             self._say(self.line())
+
+    def gather(self, done: int, total: int) -> None:
+        """Tells how many parts are in the output, if it is time to."""
+        if (
+            self._stream is not None
+            and self.seconds >= QUIET_SECONDS
+            and self._clock() - (self._told or 0) >= self._pause
+        ):
+            self._say(f"all cells computed, output {100 * done // total} % written")
 
     def note(self, text: str) -> None:
         """Says something out of turn."""
@@ -112,11 +122,11 @@ class Progress:
         if self._told is None:
             return True
         if self._live:
-            return now - self._told >= REDRAW_SECONDS
+            return now - self._told >= self._pause
         share = self.done / max(self.total, 1)
         # lines by share no oftener than every few seconds, or a short run would be all lines
         by_share = share - self._told_share >= LINE_SHARE and now - self._told >= LINE_SECONDS / 6
-        return now - self._told >= LINE_SECONDS or by_share
+        return now - self._told >= self._pause or by_share
 
     def _say(self, text: str) -> None:
         assert self._stream is not None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -69,7 +70,7 @@ def open_result(path: str | os.PathLike[str], strict: bool = False) -> xr.Datase
     raise SweepError(f"{output}: its parts are vanishing while they are read; try again")
 
 
-def in_memory(plan: Layout, arrays: Mapping[str, Any], attrs: Mapping[str, Any]) -> xr.Dataset:
+def in_memory(plan: Layout, arrays: Mapping[str, Any]) -> xr.Dataset:
     """A Dataset of columns of shape `(size, ...)`."""
     import xarray as xr
 
@@ -77,7 +78,7 @@ def in_memory(plan: Layout, arrays: Mapping[str, Any], attrs: Mapping[str, Any])
         c.name: ((*plan.grid.dims, *c.dims), arrays[c.name].reshape(plan.shape(c)), dict(c.attrs)) for c in plan.columns
     }
     coordinates = {c.name: (c.dims, c.values, dict(c.attrs)) for c in plan.coordinates}
-    return xr.Dataset(variables, coordinates, {**plan.attrs, **attrs})
+    return xr.Dataset(variables, coordinates, dict(plan.attrs))
 
 
 def stored_fingerprint(output: Path) -> dict[str, str]:
@@ -144,7 +145,7 @@ def _open_parts(output: Path, spec: Spec, strict: bool) -> xr.Dataset:
     plan = layout(Study.from_json(spec.study, declared=True), spec.fingerprint)
     large = plan.grid.size * plan.cell_bytes > MEMORY_SHARE * memory()
     arrays = _in_pieces(plan, spec, parts) if large else _at_once(plan, spec, parts)
-    return in_memory(plan, arrays, {"start": spec.begun})
+    return in_memory(replace(plan, attrs={**plan.attrs, "start": spec.begun}), arrays)
 
 
 def _at_once(plan: Layout, spec: Spec, parts: Mapping[int, Path]) -> dict[str, Any]:

@@ -105,7 +105,7 @@ def _run_in_memory(task: _Task) -> xr.Dataset:
         progress.end()
     finally:
         progress.stop()
-    return in_memory(plan, arrays, session.attrs(progress, session.began))
+    return in_memory(session.dated(progress, session.began), arrays)
 
 
 def _run_to_file(task: _Task, output: Path) -> None:
@@ -167,8 +167,8 @@ def _finish(session: Session, store: Store, output: Path, progress: Progress) ->
     for _ in range(MOST_ATTEMPTS):
         _store_blocks(session, store, progress)
         assert store.spec is not None
-        attrs = session.attrs(progress, store.spec.begun)
-        damaged = assemble(store, session.layout, output, attrs, session.workers)
+        layout = session.dated(progress, store.spec.begun)
+        damaged = assemble(store, layout, output, session.workers, progress.gather)
         if not damaged:
             progress.end()
             return

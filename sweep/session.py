@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -64,10 +65,11 @@ class Session:
         size = self.layout.grid.size
         return Progress(size, stream, name, size - left, work)
 
-    def attrs(self, progress: Progress, began: str) -> dict[str, Any]:
-        """Times of the run, for the result."""
+    def dated(self, progress: Progress, began: str) -> Layout:
+        """The layout with the times of the run, which now is at its end."""
         end = now()
-        return {"created": end, "start": began, "end": end, "cells_per_second": progress.rate}
+        times = {"created": end, "start": began, "end": end, "cells_per_second": progress.rate}
+        return replace(self.layout, attrs={**self.layout.attrs, **times})
 
     def compute(
         self, jobs: Iterable[int], threads: int, work: Callable[[int, Solve], None], progress: Progress

@@ -139,6 +139,17 @@ def test_cells_that_come_again_are_taken_back(clock):
     assert progress.line().endswith("left")
 
 
+def test_a_long_time_of_writing_the_output_is_told(clock):
+    log = io.StringIO()
+    progress = Progress(100, log, clock=clock)
+    clock.now += 100
+    progress.add(100)
+    for part in range(100):
+        clock.now += 1
+        progress.gather(part, 100)
+    assert [line.split()[-3] for line in lines(log)[1:]] == ["29", "59", "89"]
+
+
 def test_nothing_done_yet_says_nothing_about_time(clock):
     progress = Progress(100, None, clock=clock)
     clock.now += 5
