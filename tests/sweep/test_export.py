@@ -87,6 +87,7 @@ def test_csv_says_the_unit_of_each_column_in_lines_that_readers_skip(tmp_path):
 
 def test_csv_reads_back_with_pandas(tmp_path):
     import pandas
+
     ds = result()
     frame = pandas.read_csv(sweep.export(ds, tmp_path / "out.csv"), comment="#")
     back = frame.set_index(["mu", "a", "phase"]).to_xarray()
