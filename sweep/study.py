@@ -220,12 +220,12 @@ def _declaration(kernel: Kernel) -> dict[str, Any]:
 
 
 def _kernel_as_declared(keys: dict[str, Any]) -> Kernel:
-    groups = {
-        group: tuple(Field(**{**f, "dims": tuple(f["dims"])}) for f in keys[group])
+    parameters, outputs, along = (
+        tuple(Field(**{**f, "dims": tuple(f["dims"])}) for f in keys[group])
         for group in ("parameters", "outputs", "along")
-    }
+    )
     methods = tuple(Method(m["name"], m["doc"], _missing, excludes=tuple(m["excludes"])) for m in keys["methods"])
-    return Kernel(keys["name"], keys["doc"], keys["source"], check=_missing, methods=methods, **groups)
+    return Kernel(keys["name"], keys["doc"], keys["source"], parameters, outputs, _missing, methods, along)
 
 
 def _missing(*columns: Any) -> None:
