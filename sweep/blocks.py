@@ -95,7 +95,8 @@ def partition(sample: Sample, size: int, cell_bytes: int, workers: int) -> Parti
     if sample.cells < LANES:
         cells = max(cells, min(LANES, size / (4 * workers)))
     cells = max(1, math.floor(cells), -(-size // MOST_BLOCKS))
-    return Partition(size, cells if cells < LANES or cells >= size else -(-cells // LANES) * LANES)
+    whole_lanes = cells if cells < LANES else -(-cells // LANES) * LANES
+    return Partition(size, min(whole_lanes, size))
 
 
 def order(sample: Sample, blocks: Partition) -> Any:

@@ -2,7 +2,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sweep.blocks import BLOCK_BYTES, LANES, MOST_BLOCKS, Partition, Sample, order, partition, take_sample
@@ -33,6 +33,7 @@ def test_blocks_cover_the_grid_without_gap_or_overlap(size, cells):
     cell_bytes=st.integers(10, 10**5),
     workers=st.integers(1, 64),
 )
+@example(cost=1e-3, size=51, cell_bytes=10, workers=1)
 def test_blocks_keep_their_bounds_in_time_bytes_and_number(cost, size, cell_bytes, workers):
     blocks = partition(sample(cost, size), size, cell_bytes, workers)
     assert 1 <= blocks.cells <= size

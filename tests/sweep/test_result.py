@@ -304,6 +304,18 @@ def test_hdf5_never_notices_that_the_disk_fails(tmp_path, monkeypatch):
             canvas.finish()
 
 
+def test_what_hdf5_never_wrote_is_zero_and_the_file_gets_its_size(tmp_path):
+    with (tmp_path / "file").open("w+b") as raw:
+        canvas = Canvas(raw.fileno())
+        canvas.seek(10)
+        canvas.write(b"abc")
+        canvas.truncate(100)
+        assert canvas.piece(0, 20) == bytes(10) + b"abc" + bytes(7)
+        assert (canvas.seek(-1, 2), canvas.seek(-9, 1)) == (99, 90)
+        canvas.finish()
+    assert (tmp_path / "file").stat().st_size == 100
+
+
 def test_results_open_without_a_warning(stored):
     with warnings.catch_warnings(), open_result(stored) as found:
         warnings.simplefilter("error")

@@ -156,6 +156,7 @@ def interrupted(study, output):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Solver, "solve", failing)
+        patch.setattr("sweep.session.order", lambda sample, blocks: np.arange(blocks.count))
         with pytest.raises(SweepError, match="stop here"):
             quiet(study, output, block_cells=5, workers=1)
 
@@ -226,15 +227,47 @@ def test_a_disk_that_damages_everything_is_given_up(output, monkeypatch):
     assert not output.exists()
 
 
-def test_an_assembled_file_that_reads_back_wrong_is_refused(output, monkeypatch):
+def test_the_output_is_on_the_disk_before_it_has_its_name(output, monkeypatch):
+    events = []
+    for name in ("pwrite", "fsync", "rename"):
+        real = getattr(disk, name)
+        monkeypatch.setattr(disk, name, lambda *args, name=name, real=real: (events.append(name), real(*args))[1])
+    quiet(tall(23), output, block_cells=5).close()
+    last = len(events) - events[::-1].index("pwrite")
+    assert events[last:] == ["fsync", "rename", "fsync"]
+
+
+@pytest.mark.parametrize("back", [0, 1, 2, 3, 4, 5])
+def test_a_disk_that_is_full_at_the_very_end_is_noticed(tmp_path, back):
+    with pytest.MonkeyPatch.context() as patch:
+        calls = fail_on(patch, "pwrite", -1, errno.ENOSPC)
+        quiet(tall(23), tmp_path / "first.h5", block_cells=30).close()
+    with pytest.MonkeyPatch.context() as patch:
+        fail_on(patch, "pwrite", len(calls) - back, errno.ENOSPC)
+        with pytest.raises(SweepError, match="disk is full"):
+            quiet(tall(23), tmp_path / "out.h5", block_cells=30)
+    assert not (tmp_path / "out.h5").exists()
+
+
+def test_writes_of_the_output_that_take_only_a_part_are_carried_on(output, monkeypatch):
     real = disk.pwrite
-    outputs = 1003 * 8
-    monkeypatch.setattr(disk, "pwrite", lambda fd, piece, at: real(fd, piece, at + 8 * (len(piece) == outputs)))
+    monkeypatch.setattr(disk, "pwrite", lambda fd, piece, at: real(fd, piece[:97], at))
+    same(quiet(tall(50), output, block_cells=20), quiet(tall(50)))
+
+
+@pytest.mark.parametrize("block", [0, 1, 2])
+def test_an_assembled_file_that_reads_back_wrong_is_refused(output, monkeypatch, block):
+    real, first = disk.pwrite, quiet(tall(3003)).fall_time.values[1001 * block].tobytes()
+
+    def misplaced(fd, piece, at):
+        return real(fd, piece, at + 8 * (len(piece) == 1001 * 8 and bytes(piece[:8]) == first))
+
+    monkeypatch.setattr(disk, "pwrite", misplaced)
     with pytest.raises(SweepError, match="differs when read back"):
-        quiet(tall(1003), output, block_cells=1003)
+        quiet(tall(3003), output, block_cells=1001, workers=1)
     assert not output.exists()
     monkeypatch.undo()
-    same(quiet(tall(1003), output), quiet(tall(1003)))
+    same(quiet(tall(3003), output), quiet(tall(3003)))
 
 
 def fail_on(monkeypatch, name, turn, number):

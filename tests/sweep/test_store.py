@@ -241,6 +241,24 @@ def environment():
     return {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
 
 
+def test_a_lock_in_a_folder_that_was_removed_meanwhile_is_no_lock(output, monkeypatch):
+    """The run before this one ends, and removes its folder, just as this one takes the lock."""
+    real, turns = disk.try_lock, []
+
+    def lock(fd):
+        turns.append(fd)
+        if len(turns) == 1:
+            (folder_of(output) / LOCK).unlink()
+            folder_of(output).rmdir()
+        return real(fd)
+
+    monkeypatch.setattr(disk, "try_lock", lock)
+    with opened(output, COLUMNS) as store:
+        assert (store.folder / LOCK).exists()
+        with pytest.raises(SweepError, match="another run is at work"), opened(output, COLUMNS):
+            pass
+
+
 def test_nothing_is_left_of_a_store_that_was_not_begun(output):
     with opened(output, COLUMNS) as store:
         assert (store.folder / LOCK).exists()
@@ -252,6 +270,15 @@ def test_nothing_is_left_of_a_store_that_was_cleared(output, filled):
     with opened(output, COLUMNS) as store:
         resumed(store).clear()
     assert list(output.parent.iterdir()) == []
+
+
+def test_the_spec_is_removed_after_the_parts_and_the_lock_last(output, filled, monkeypatch):
+    removed, real = [], disk.remove
+    monkeypatch.setattr(disk, "remove", lambda path: (removed.append(path.name), real(path)))
+    with opened(output, COLUMNS) as store:
+        resumed(store).clear()
+    assert removed[-2:] == [SPEC, LOCK]
+    assert len(removed) == 5
 
 
 def test_a_removal_cut_short_leaves_a_store_that_can_be_taken_up(output, filled, monkeypatch):
