@@ -1,7 +1,7 @@
 """Columns for tests of kernels."""
 
 import numpy as np
-from mpmath import mpf
+from mpmath import mp, mpf
 
 from kernels.interface import Kernel
 
@@ -36,4 +36,5 @@ def checked(kernel: Kernel, *parameters):
 
 def relative_error(values, truths):
     """abs(value/truth - 1), each taken in high precision."""
-    return np.array([float(abs(mpf(float(v)) / t - 1)) for v, t in zip(values, truths, strict=True)])
+    with mp.workdps(60):
+        return np.array([float(abs(mpf(float(v)) / t - 1)) for v, t in zip(values, truths, strict=True)])

@@ -44,6 +44,15 @@ def test_closed_form_is_right_to_1e_15_over_24_decades(low, high):
         assert error[worst] < 1e-15, (name, [float(c[worst]) for c in columns])
 
 
+def test_the_closed_form_promises_what_it_keeps():
+    columns = scenes(-12, 12)
+    outputs, _ = solve(FOLIOT, "closed", *columns)
+    limit = bounds(FOLIOT, "closed", *columns)
+    assert (limit == 1e-15).all()
+    for name, error in errors(outputs, columns, NAMES[:4]).items():
+        assert (error <= limit).all(), name
+
+
 def test_multiplier_keeps_its_digits_down_to_the_smallest_float():
     columns = scenes(-2.5, 6)
     outputs, _ = solve(FOLIOT, "closed", *columns)
@@ -192,6 +201,12 @@ def test_dopri5_is_right_to_rtol(rtol):
         assert error.max() <= rtol, name
 
 
+@pytest.mark.skipif(not COMPILED, reason="sixty Newton steps at the finest tolerance in plain Python")
+def test_dopri5_says_where_rounding_keeps_newton_from_settling():
+    _, status = solve(FOLIOT, "dopri5", np.array([1e6, 1e12, 1.0]), np.ones(3), np.ones(3), rtol=[1e-15, 1e-12, 1e-12])
+    assert status.tolist() == [Status.NOT_CONVERGED, Status.NOT_CONVERGED, Status.OK]
+
+
 def test_dopri5_refuses_what_is_too_stiff_and_remarks_what_rounding_spoils():
     _, status = solve(FOLIOT, "dopri5", np.array([1e-8, 1e11, 1.0]), np.ones(3), np.ones(3), rtol=[1e-3, 1e-12, 1e-3])
     assert status[0] == Status.STEP_LIMIT
@@ -240,6 +255,7 @@ INF, NAN = np.inf, np.nan
         (1, 1, -1, Status.BAD_INPUT), (NAN, 1, 1, Status.BAD_INPUT), (1, NAN, 1, Status.BAD_INPUT),
         (1, 1, NAN, Status.BAD_INPUT), (INF, 1, 1, Status.BAD_INPUT), (1, INF, 1, Status.BAD_INPUT),
         (1, 1, INF, Status.BAD_INPUT), (-INF, 1, 1, Status.BAD_INPUT), (0, NAN, 1, Status.BAD_INPUT),
+        (0, 1, 0, Status.NEVER_STARTS),
     ],
 )  # fmt: skip
 def test_what_cannot_run_is_refused_by_name(mu, phi0, a, status):

@@ -1,8 +1,10 @@
 """Friction and torque from period and amplitude: the foliot they give has them."""
 
 import numpy as np
+import oracles
 import pytest
-from columns import checked, solve
+from columns import checked, relative_error, solve
+from mpmath import mp, mpf
 
 from kernels.foliot import FOLIOT
 from kernels.foliot_design import FOLIOT_DESIGN
@@ -24,6 +26,26 @@ def test_the_designed_foliot_has_the_wanted_period_and_amplitude():
     assert np.abs(back["amplitude"] / amplitude - 1).max() < 2e-15
 
 
+def test_the_overshoot_keeps_its_digits_where_the_amplitude_loses_them():
+    period, amplitude, phi0 = designs(100)
+    found, _ = solve(FOLIOT_DESIGN, "newton", period, amplitude, phi0)
+    truths = [oracles.foliot(*cell) for cell in zip(found["mu"], phi0, found["a"], strict=True)]
+    with mp.workdps(60):
+        wanted = [mpf(float(whole)) - mpf(float(switch)) for whole, switch in zip(amplitude, phi0, strict=True)]
+        overshoot = [t[1] - mpf(float(switch)) for t, switch in zip(truths, phi0, strict=True)]
+        assert max(abs(o / w - 1) for o, w in zip(overshoot, wanted, strict=True)) < 1e-15
+    assert relative_error(period, [t[0] for t in truths]).max() < 1e-15
+
+
+def test_a_design_has_the_same_bits_alone_and_beside_others():
+    columns = designs(75)
+    together, status = solve(FOLIOT_DESIGN, "newton", *columns)
+    for i in range(75):
+        alone, verdict = solve(FOLIOT_DESIGN, "newton", *(c[i : i + 1] for c in columns))
+        assert verdict[0] == status[i]
+        assert (alone["a"][0], alone["mu"][0]) == (together["a"][i], together["mu"][i])
+
+
 def test_it_finds_the_foliot_that_was_there_to_what_the_overshoot_allows():
     alpha = np.geomspace(1e-6, 1e12, 200)
     made, _ = solve(FOLIOT, "closed", alpha, np.ones(200), np.ones(200))
@@ -38,6 +60,14 @@ def test_an_amplitude_that_does_not_exceed_the_switching_angle_is_refused(amplit
     assert checked(FOLIOT_DESIGN, [1.0], [amplitude], [1.0])[0] == Status.BAD_INPUT
 
 
-def test_results_beyond_float64_are_out_of_range():
-    _, status = solve(FOLIOT_DESIGN, "newton", [1e-300, 1.0], [2.0, 1e150], [1.0, 1.0])
-    assert status.tolist() == [Status.OUT_OF_RANGE, Status.OUT_OF_RANGE]
+@pytest.mark.parametrize(
+    ("period", "amplitude", "phi0"),
+    [
+        (1e-300, 2.0, 1.0),  # mu too large
+        (1.0, 1e150, 1.0),  # all of them
+        (1.7e308, 1.5e308, 5e307),  # a too small
+        (1.0, 55.0, 1e-101),  # 1/alpha too small
+    ],
+)
+def test_results_beyond_float64_are_out_of_range(period, amplitude, phi0):
+    assert solve(FOLIOT_DESIGN, "newton", [period], [amplitude], [phi0])[1][0] == Status.OUT_OF_RANGE

@@ -3,7 +3,7 @@
 import numpy as np
 import oracles
 import pytest
-from columns import checked, solve
+from columns import bounds, checked, solve
 from mpmath import mpf
 
 from kernels.foliot import FOLIOT
@@ -16,13 +16,15 @@ def test_angle_and_speed_are_right_to_4e_15_of_their_largest():
     alpha, a, phi0 = 10 ** random.uniform(-12, 12, 40), 10 ** random.uniform(-2, 2, 40), np.full(40, 0.3)
     mu, phase = alpha * a * a * phi0, np.sort(random.uniform(0, 1, 12))
     outputs, status = solve(FOLIOT_MOTION, "closed", mu, phi0, a, along=[phase])
+    limit = bounds(FOLIOT_MOTION, "closed", mu, phi0, a)
     assert (status == Status.OK).all()
+    assert (limit == 4e-15).all()
     for i in range(40):
         _, amplitude, speed, _, _ = oracles.foliot(mu[i], phi0[i], a[i])
         for j in range(12):
             x, v = oracles.foliot_angle(mu[i], phi0[i], a[i], phase[j])
-            assert abs(mpf(outputs["angle"][i, j]) - x) < 4e-15 * amplitude
-            assert abs(mpf(outputs["speed"][i, j]) - v) < 4e-15 * speed
+            assert abs(mpf(outputs["angle"][i, j]) - x) < limit[i] * amplitude
+            assert abs(mpf(outputs["speed"][i, j]) - v) < limit[i] * speed
 
 
 @pytest.mark.parametrize("alpha", [0.05, 1.46, 100.0])
@@ -41,11 +43,26 @@ def test_it_starts_at_the_switch_rises_to_the_amplitude_and_turns_over_at_half_t
     motion, _ = solve(FOLIOT_MOTION, "closed", [3.0], [0.5], [1.1], along=[phase])
     cycle, _ = solve(FOLIOT, "closed", [3.0], [0.5], [1.1])
     angle, speed = motion["angle"][0], motion["speed"][0]
-    assert angle[0] == 0.5
+    assert angle[0] == 0.5 == -angle[10000]
+    assert speed[0] == -speed[10000]
     assert speed[0] == pytest.approx(cycle["crossing_speed"][0], rel=1e-15)
     assert angle.max() == pytest.approx(cycle["amplitude"][0], rel=1e-7)
     assert np.allclose(angle[:10000], -angle[10000:20000], atol=1e-14)
     assert np.allclose(np.gradient(angle, phase * cycle["period"][0])[1:-1], speed[1:-1], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("mu", "phi0", "a"), [(1e-200, 1e100, 1e-150), (1e-150, 1e-250, 1e60), (1e90, 1e90, 1e90), (1e-90, 1e-90, 1e-90)]
+)
+def test_units_beyond_the_usual_lose_no_digits(mu, phi0, a):
+    phase = np.array([0.1, 0.3, 0.7])
+    outputs, status = solve(FOLIOT_MOTION, "closed", [mu], [phi0], [a], along=[phase])
+    assert status[0] == Status.OK
+    _, amplitude, speed, _, _ = oracles.foliot(mu, phi0, a)
+    for j in range(3):
+        x, v = oracles.foliot_angle(mu, phi0, a, phase[j])
+        assert abs(mpf(outputs["angle"][0, j]) - x) < 4e-15 * amplitude
+        assert abs(mpf(outputs["speed"][0, j]) - v) < 4e-15 * speed
 
 
 def test_it_refuses_what_the_cycle_refuses():

@@ -7,7 +7,7 @@ import pytest
 from columns import checked, solve
 
 from kernels.catalogue import KERNELS, get
-from kernels.interface import Status
+from kernels.interface import FIRST_REFUSAL, Status
 
 NAMES = sorted(KERNELS)
 
@@ -41,6 +41,23 @@ def test_status_numbers_fit_their_kind():
     assert all(s.refused == (64 <= s <= 126) for s in Status)
     assert all(s.doc for s in Status)
     assert max(Status) == Status.PENDING == 127
+
+
+def refusals(kernel, name, value):
+    """The status of the kernel's example with another value of one parameter."""
+    cell = {p.name: kernel.example.get(p.name, p.default) for p in kernel.parameters} | {name: value}
+    return checked(kernel, *([v] for v in cell.values()))[0]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_just_what_lies_outside_the_declared_limits_is_bad_input(name):
+    kernel = get(name)
+    for field in kernel.parameters:
+        for value in (np.nan, np.inf, -np.inf, np.nextafter(field.lower, -np.inf), np.nextafter(field.upper, np.inf)):
+            assert refusals(kernel, field.name, value) == Status.BAD_INPUT, (field.name, value)
+        if np.isfinite(field.lower):
+            at_limit = refusals(kernel, field.name, field.lower)
+            assert at_limit >= FIRST_REFUSAL if field.open_lower else at_limit != Status.BAD_INPUT, field.name
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -8,6 +8,7 @@ from toy import KERNEL
 
 import sweep
 from kernels.interface import FIRST_REFUSAL, Kernel, Status
+from sweep.grid import Grid
 from sweep.solve import NONE, STRIP, Solver, usable_methods
 
 NAMES = [m.name for m in KERNEL.methods]
@@ -89,16 +90,51 @@ def test_a_trace_is_nan_all_along_where_its_cell_is_refused():
     assert np.isnan(outputs["drop"][1]).all()
 
 
-def test_auto_goes_on_where_a_method_gives_up():
+@pytest.mark.parametrize("verdict", [Status.NOT_CONVERGED, Status.STEP_LIMIT])
+def test_auto_goes_on_where_a_method_gives_up(verdict):
     def gives_up(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
         fall_time[...], impact_speed[...], drop[...] = 1.0, 1.0, 1.0
-        status[...] = np.where(height > 1.5, Status.NOT_CONVERGED, Status.OK)
+        status[...] = np.where(height > 1.5, verdict, Status.OK)
 
     study = toy_study(axes={"height": np.array([1.0, 2.0, 1.2, 3.0])})
     outputs, status, used = solved(with_kernel(study, stand_in(rough=(gives_up, None))))
     assert used.tolist() == [0, 1, 0, 1]
     assert (status == Status.OK).all()
     assert outputs["impact_speed"] == pytest.approx([1.0, np.sqrt(4 * 9.80665), 1.0, np.sqrt(6 * 9.80665)])
+
+
+def test_auto_does_not_go_on_where_the_result_itself_is_out_of_range():
+    def too_large(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
+        status[...] = Status.OUT_OF_RANGE
+
+    study = toy_study(axes={"height": [1.0, 2.0]})
+    _, status, used = solved(with_kernel(study, stand_in(rough=(too_large, None))))
+    assert (status == Status.OUT_OF_RANGE).all()
+    assert (used == NONE).all()
+
+
+@pytest.mark.parametrize("method", ["auto", "rough"])
+def test_a_bound_that_equals_rtol_meets_it(method):
+    def just(height, v0, g, asked, out):
+        out[...] = 1e-6
+
+    kernel = stand_in(rough=(KERNEL.methods[0].solve, just))
+    study = toy_study(axes={"height": [1.0, 2.0]}, method=method, rtol=1e-6)
+    _, status, used = solved(with_kernel(study, kernel))
+    assert status.tolist() == [Status.OK, Status.OK]
+    assert used.tolist() == [0, 0]
+
+
+def test_a_method_that_gives_up_is_not_said_to_be_merely_inaccurate():
+    def gives_up(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
+        fall_time[...], impact_speed[...], drop[...] = 1.0, 1.0, 1.0
+        status[...] = Status.NOT_CONVERGED
+
+    study = toy_study(axes={"v0": [1.0, 2.0]}, fixed={"height": 1.0}, method="rough", rtol=1e-6)
+    outputs, status, used = solved(with_kernel(study, stand_in(rough=(gives_up, KERNEL.methods[0].bound))))
+    assert (status == Status.NOT_CONVERGED).all()
+    assert (used == NONE).all()
+    assert np.isnan(outputs["impact_speed"]).all()
 
 
 def test_a_cell_that_no_method_promises_is_refused():
@@ -129,6 +165,29 @@ def test_method_and_rtol_as_axes_are_settings_of_each_cell():
     _, status, used = solved(study)
     assert used.reshape(3, 2, 2).tolist() == [[[1, 1], [1, 1]], [[0, 0], [0, 1]], [[0, 0], [0, 0]]]
     assert status.reshape(3, 2, 2)[2].tolist() == [[0, 0], [0, Status.INACCURATE]]
+
+
+def test_refused_cells_stay_refused_on_a_method_axis():
+    _, status, used = solved(toy_study(axes={"method": ["exact", "auto", "rough"], "height": [1.0, -1.0, 2.0]}))
+    assert status.reshape(3, 3).tolist() == [[Status.OK, Status.BAD_INPUT, Status.OK]] * 3
+    assert used.reshape(3, 3).tolist() == [[1, NONE, 1], [0, NONE, 0], [0, NONE, 0]]
+
+
+def test_methods_are_told_apart_behind_a_refused_cell():
+    study = toy_study(axes={"v0": [-1.0, 1e-6, 1.0, 2e-6, 2.0]}, fixed={"height": 1.0}, rtol=1e-6)
+    outputs, status, used = solved(study)
+    assert status.tolist() == [Status.BAD_INPUT] + [Status.OK] * 4
+    assert used.tolist() == [NONE, 0, 1, 0, 1]
+    assert outputs["impact_speed"][1:] == pytest.approx(np.sqrt(2 * 9.80665 + np.array([0.0, 1.0, 0.0, 4.0])))
+
+
+def test_a_parameter_that_follows_an_axis_runs_along_with_it():
+    from dataclasses import replace
+
+    study = replace(toy_study(axes={"height": [1.0, 2.0, 5.0]}), fixed={"v0": 0.0}, follows={"g": "height"})
+    columns = [np.full(2, -1.0) for _ in KERNEL.parameters]
+    Grid(study).columns(1, 3, columns)
+    assert [column.tolist() for column in columns] == [[2.0, 5.0], [-1.0, -1.0], [2.0, 5.0]]
 
 
 def test_a_term_that_a_method_excludes_keeps_auto_from_it():
@@ -179,6 +238,29 @@ def test_strips_join_without_a_seam():
     assert (status < FIRST_REFUSAL).all()
     assert np.array_equal(outputs["period"][STRIP - 50 : STRIP + 50], seam["period"])
     assert np.all(np.diff(outputs["period"]) < 0)
+
+
+@pytest.mark.parametrize("strip", [1, 7, 8, 20, 21, 22])
+def test_strips_of_any_length_give_the_same_cells(monkeypatch, strip):
+    monkeypatch.setattr("sweep.solve.STRIP", strip)
+    heights = np.arange(1.0, 22.0)
+    outputs, status, used = solved(toy_study(axes={"height": heights}), 1, 21)
+    assert outputs["impact_speed"].tolist() == np.sqrt(2 * 9.80665 * heights[1:]).tolist()
+    assert (status == Status.OK).all()
+    assert (used == 0).all()
+
+
+def test_warming_up_reaches_both_ends_of_the_grid():
+    seen = []
+
+    def watched(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
+        seen.extend(height.tolist())
+        status[...] = Status.OK
+
+    study = toy_study(axes={"height": np.arange(1.0, 101.0)})
+    Solver(with_kernel(study, stand_in(rough=(watched, None)))).warm()
+    assert min(seen) == seen[0] == 1.0
+    assert max(seen) == seen[-1] == 100.0
 
 
 def test_warming_up_changes_nothing():
