@@ -10,7 +10,7 @@ from mpmath import cbrt, exp, expm1, log1p, mp, mpf
 from kernels import _vecmath
 from kernels._columns import each_cell, entry, one_by_one
 from kernels._jit import jit
-from kernels._lanes import exponent, fma, isnt, nearest, pow2, some, where
+from kernels._lanes import dot, exponent, fma, isnt, nearest, pow2, some, where
 
 mp.dps = 50
 
@@ -102,9 +102,64 @@ def test_masked_loops_conditions_and_tails(n):
     assert np.array_equal(status, np.where((x <= 2) | (x > 1e9), 7, -3))
 
 
+@pytest.mark.parametrize("n", [33, 40, 64])
+def test_no_cell_beyond_the_columns_is_written(n):
+    x, count, status = np.ones(n + 64), np.full(n + 64, -1.0), np.full(n + 64, 99, np.int8)
+    halvings(x[32 : 32 + n], count[32 : 32 + n], status[32 : 32 + n])
+    outside = np.r_[0:32, 32 + n : n + 64]
+    assert (count[outside] == -1).all()
+    assert (status[outside] == 99).all()
+
+
+@jit
+def _compared(i, x, y, z, below, within, above, beyond, signed, chain):
+    below[i], within[i] = where(x[i] < y[i], 1, 0), where(x[i] <= y[i], 1, 0)
+    above[i], beyond[i] = where(x[i] > y[i], 1, 0), where(x[i] >= y[i], 1, 0)
+    signed[i] = where(x[i] < y[i], 1.0 * z[i], -(1.0 * z[i]))
+    chain[i] = dot((x[i], y[i], 0.1), (0.3, x[i], y[i]))
+
+
+@entry()
+def compared(x, y, z, below, within, above, beyond, signed, chain):
+    each_cell(_compared, (x, y, z, below, within, above, beyond, signed, chain))
+
+
+def test_comparisons_signs_and_chains_are_those_of_numpy():
+    values = np.array([-np.inf, -1.5, -0.0, 0.0, 0.7, 1e100, np.inf, np.nan])
+    x, y = (np.ascontiguousarray(v.ravel()) for v in np.meshgrid(values, values))
+    z = np.random.default_rng(6).integers(-128, 128, 64).astype(np.int8)
+    z[:8] = 0
+    *verdicts, signed, chain = [np.full(64, 99, np.int8) for _ in range(4)] + [np.empty(64), np.empty(64)]
+    compared(x, y, z, *verdicts, signed, chain)
+    for verdict, expected in zip(verdicts, (x < y, x <= y, x > y, x >= y), strict=True):
+        assert np.array_equal(verdict, expected)
+    assert np.array_equal(signed.view(np.int64), np.where(x < y, 1.0 * z, -(1.0 * z)).view(np.int64))
+    with np.errstate(all="ignore"):
+        truth = [fma(0.1, b, fma(b, a, a * 0.3)) for a, b in zip(x, y, strict=True)]
+    assert np.array_equal(chain, truth, equal_nan=True)
+
+
+@jit
+def _scaled(i, x, n, result):
+    result[i] = _vecmath.scale(x[i], n[i])
+
+
+@entry()
+def scaled(x, n, result):
+    each_cell(_scaled, (x, n, result))
+
+
+def test_scaling_by_any_power_of_two_is_exact_or_ends_in_zero_and_infinity():
+    n = np.array([-1e9, -5000.0, -2100.0, -1022.0, -1.0, 0.0, 7.0, 1023.0, 1024.0, 2100.0, 5000.0, 1e9])
+    result = np.empty(12)
+    scaled(np.full(12, 1.5), n, result)
+    exact = [1.5 * 2.0**-1022, 0.75, 1.5, 192.0, 1.5 * 2.0**1023]
+    assert result.tolist() == [0.0, 0.0, 0.0, *exact, np.inf, np.inf, np.inf, np.inf]
+
+
 @jit
 def _parts(i, x, e, m, r, product):
-    e[i] = exponent(x[i])
+    e[i] = exponent(-x[i])
     m[i] = x[i] * pow2(-exponent(x[i]))
     r[i] = nearest(x[i])
     product[i] = fma(x[i], x[i], -x[i])
