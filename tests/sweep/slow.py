@@ -43,4 +43,9 @@ def kernel(solve):
     )
 
 
+DAYS = dataclasses.replace(
+    toy.KERNEL, outputs=tuple(dataclasses.replace(output, unit="days") for output in toy.KERNEL.outputs)
+)
+"""Output in a unit that readers are tempted to turn into dates."""
+
 SLOW, UNEVEN, FAILING, HUNGRY = map(kernel, (slow, uneven, failing, hungry))

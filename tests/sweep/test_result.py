@@ -230,6 +230,13 @@ def test_a_result_cut_short_is_one_clear_line(stored, tmp_path):
         open_result(path)
 
 
+def test_times_stay_numbers(tmp_path):
+    study = build_study(allow_import=True, kernel="slow:DAYS", axes={"height": [1.0]}, outputs=["fall_time"])
+    with run(study, tmp_path / "days.h5", progress=False) as found:
+        assert found.fall_time.dtype == np.float64
+        assert found.fall_time.attrs["units"] == "days"
+
+
 def test_statuses_are_counted_with_an_example(stored):
     with open_result(stored) as found:
         told = [str(count) for count in count_statuses(found)]

@@ -195,6 +195,19 @@ def test_the_parts_of_another_study_are_kept_unless_forced(unfinished):
     same(quiet(tall(24), unfinished, force=True), quiet(tall(24)))
 
 
+def test_parts_of_another_study_beside_a_complete_output_are_left_alone(output):
+    quiet(tall(3), output).close()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sweep.runner.assemble", lambda *rest: pytest.fail("far enough"))
+        with pytest.raises(pytest.fail.Exception):
+            quiet(tall(4), output, force=True)
+    before = names(output)
+    assert before
+    same(quiet(tall(3), output), quiet(tall(3)))
+    assert names(output) == before
+    same(quiet(tall(4), output, force=True), quiet(tall(4)))
+
+
 def test_a_damaged_spec_is_refused_unless_forced(unfinished):
     (folder_of(unfinished) / SPEC).write_text("?")
     with pytest.raises(SweepError, match="damaged"):
@@ -203,7 +216,8 @@ def test_a_damaged_spec_is_refused_unless_forced(unfinished):
 
 
 @pytest.mark.parametrize("harm", ["flip", "cut", "empty", "text"])
-def test_a_damaged_part_is_told_set_aside_and_computed_again(unfinished, harm):
+def test_a_damaged_part_is_told_set_aside_and_computed_again(unfinished, harm, monkeypatch):
+    monkeypatch.setattr("sweep.progress.QUIET_SECONDS", 0.0)
     path = folder_of(unfinished) / names(unfinished)[0]
     whole = path.read_bytes()
     with h5py.File(path) as file:
@@ -213,6 +227,7 @@ def test_a_damaged_part_is_told_set_aside_and_computed_again(unfinished, harm):
     log = io.StringIO()
     same(quiet(tall(23), unfinished, progress=log), quiet(tall(23)))
     assert harm == "empty" or "cells 0 to 5 were damaged" in log.getvalue()
+    assert "23/23 cells (100 %)" in log.getvalue().splitlines()[-1]
 
 
 def test_a_disk_that_damages_everything_is_given_up(output, monkeypatch):
