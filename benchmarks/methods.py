@@ -19,7 +19,7 @@ OUTPUTS = ("period", "amplitude", "crossing_speed", "sensitivity", "multiplier")
 def map_one_by_one(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
     """The iterated map one cell at a time: the same function, without lanes."""
     one_by_one(
-        foliot._iterated, (mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status)
+        foliot._event_map, (mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status)
     )
 
 
@@ -88,7 +88,7 @@ def main():
     report("asymptotic, in order; closed", *paired(foliot.asymptotic, foliot.closed, inputs), 64 * BLOCK)
     some = [c[:: 64 * 8].copy() for c in inputs]
     some[0] = np.geomspace(1e-3, 1e6, len(some[0])) * 0.09 * 0.7
-    report("map in lanes; one cell at a time, alpha 1e-3 to 1e6", *paired(foliot.iterated, map_one_by_one, some), 1024)
+    report("map in lanes; one cell at a time, alpha 1e-3 to 1e6", *paired(foliot.event_map, map_one_by_one, some), 1024)
 
 
 if __name__ == "__main__":

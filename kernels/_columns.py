@@ -37,7 +37,7 @@ one_by_one = _one_by_one if COMPILED else _plain
 
 
 def entry(*shared):
-    """Makes a function of columns one that the engine can call; its machine code is kept in the disk cache.
+    """Makes a function of columns one that the engine can call; its machine code is kept on the disk.
 
     Columns hold one cell a row; those named in `shared` belong to all cells. Fewer cells than lanes are filled up with
     copies of the last one, so that no second version for one cell is compiled.

@@ -190,7 +190,7 @@ def fma(x, y, z):
     try:
         return np.float64(float(exact)) if exact else x * y + z
     except OverflowError:
-        return np.float64(math.copysign(math.inf, exact))
+        return np.float64(math.inf if exact > 0 else -math.inf)
 
 
 def sqrt(x):
@@ -301,6 +301,25 @@ def where(condition, x, y):
     return x if condition else y
 
 
+def choose(condition, xs, ys):
+    """`where` for each pair of two tuples."""
+    return tuple(where(condition, x, y) for x, y in zip(xs, ys, strict=True))
+
+
+def _type_choose(condition, xs, ys):
+    return types.Tuple([_number(condition, x, y) for x, y in zip(xs, ys, strict=True)])
+
+
+def _lower_choose(context, builder, signature, values):
+    condition, xs, ys = signature.args
+    items = (cgutils.unpack_tuple(builder, v) for v in values[1:])
+    chosen = [
+        _lower_where(context, builder, result(condition, x, y), (values[0], a, b))
+        for result, x, y, a, b in zip(signature.return_type, xs, ys, *items, strict=True)
+    ]
+    return context.make_tuple(builder, signature.return_type, chosen)
+
+
 def _lower_where(context, builder, signature, values):
     wide = isinstance(signature.return_type, LanesType)
     mask = _mask if wide and isinstance(signature.args[0], MaskType) else types.boolean
@@ -335,6 +354,7 @@ def _lower_isnt(context, builder, signature, values):
 
 
 _function(where, 3, lambda condition, x, y: _number(condition, x, y), _lower_where)
+_function(choose, 3, _type_choose, _lower_choose)
 _function(some, 1, lambda condition: types.boolean, _lower_some)
 _function(isnt, 1, lambda condition: condition, _lower_isnt)
 
@@ -358,9 +378,19 @@ def _align(element):
     return element.width // 8 if isinstance(element, ir.IntType) else 8
 
 
+def _is_column(numba_type):
+    """Whether lanes can be loaded from it: cells side by side, in one dimension. Anything else is a TypingError."""
+    return (
+        isinstance(numba_type, types.Array)
+        and numba_type.ndim == 1
+        and numba_type.layout == "C"
+        and numba_type.dtype in (types.float64, types.int8)
+    )
+
+
 @type_callable(operator.getitem)
 def _type_load(context):
-    return lambda column, i: _lanes if isinstance(column, types.Array) and isinstance(i, LaneIndexType) else None
+    return lambda column, i: _lanes if _is_column(column) and isinstance(i, LaneIndexType) else None
 
 
 @lower_builtin(operator.getitem, types.Array, LaneIndexType)
@@ -373,7 +403,7 @@ def _lower_load(context, builder, signature, values):
 @type_callable(operator.setitem)
 def _type_store(context):
     def typer(column, i, value):
-        wide = isinstance(column, types.Array) and isinstance(i, LaneIndexType)
+        wide = _is_column(column) and isinstance(i, LaneIndexType)
         return types.void(column, i, _lanes) if wide else None
 
     return typer

@@ -9,7 +9,7 @@ integral of a rate, the stages of a position are folded into those of its rate (
 import numpy as np
 
 from kernels._jit import jit, jit_call
-from kernels._lanes import dot, exponent, fma, isnt, magnitude, pow2, some, where
+from kernels._lanes import choose, dot, exponent, fma, isnt, magnitude, pow2, some, where
 from kernels._vecmath import LN2, exp
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
@@ -96,27 +96,14 @@ def dopri5_step(accelerations, state, scene, h, scale):
 @jit
 def _step_factor(ratio):
     """0.9 ratio^(-1/5), from 0.2 to 5, for a step whose error was `ratio` of what is allowed."""
+    ratio = where(ratio < 1e6, ratio, 1e6)  # NaN too: the step overflowed
     ratio = where(ratio > 1e-6, ratio, 1e-6)
-    ratio = where(ratio < 1e6, ratio, 1e6)
     e = exponent(ratio)
     m = ratio * pow2(-e) - 1.0
     log2_ratio = e + m * (4.0 / 3.0 - m * (1.0 / 3.0))  # within 0.01
     factor = SAFETY * exp(-0.2 * LN2 * log2_ratio)
     factor = where(factor > SHRINK, factor, SHRINK)
     return where(factor < GROW, factor, GROW)
-
-
-@jit
-def _blend(active, new, old):
-    """The new state in active lanes; a finished lane is frozen."""
-    return (
-        where(active, new[0], old[0]),
-        where(active, new[1], old[1]),
-        where(active, new[2], old[2]),
-        where(active, new[3], old[3]),
-        where(active, new[4], old[4]),
-        where(active, new[5], old[5]),
-    )
 
 
 @jit
@@ -148,7 +135,7 @@ def integrate_until(event, accelerations, scales, state, scene, h, tolerance, ac
         passed = accepted & (event(new, 0.0)[0] <= 0.0)
         moving = moving & isnt(passed)
         accepted = accepted & moving
-        state = _blend(accepted, new, state)
+        state = choose(accepted, new, state)
         t = where(accepted, t + h, t)
         h = where(moving, h * _step_factor(ratio), h)
     state, last = _locate(event, accelerations, scales, state, scene, h, active)
@@ -176,6 +163,6 @@ def _locate(event, accelerations, scales, state, scene, h, active):
         settled = magnitude(guess - part) <= 4e-16 * h
         part = where(searching, guess, part)
         trial, _ = dopri5_step(accelerations, state, scene, part, scale)
-        new = _blend(searching, trial, new)
+        new = choose(searching, trial, new)
         searching = searching & isnt(settled)
-    return _blend(active, new, state), where(active, part, 0.0)
+    return choose(active, new, state), where(active, part, 0.0)

@@ -21,7 +21,7 @@ _CBRT_HALF, _CBRT_QUARTER = 0.7937005259840998, 0.6299605249474366
 
 @jit
 def scale(x, n):
-    """x 2^n for an integer-valued n of any size; overflows to inf and underflows to 0."""
+    """x 2^n for an integer-valued n and x between 1e-300 and 1e300; overflows to inf and underflows to 0."""
     n = where(n > -2040.0, n, -2040.0)
     n = where(n < 2040.0, n, 2040.0)
     half = nearest(0.5 * n)

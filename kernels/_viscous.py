@@ -12,7 +12,7 @@ A *cycle* below is the tuple (q, lambda, A, s, m).
 import math
 
 from kernels._jit import jit
-from kernels._lanes import fma, horner, isnt, magnitude, some, sqrt, where
+from kernels._lanes import choose, fma, horner, isnt, magnitude, some, sqrt, where
 from kernels._vecmath import cbrt, exp, exp_remainder, log_remainder, mantissa_exponent, scale
 from kernels._viscous_fit import AMPLITUDE_STRONG, GAP_WEAK, OVERSHOOT_WEAK, Q_STRONG, SENSITIVITY_STRONG, SPLIT
 
@@ -24,7 +24,7 @@ _NORMAL_LOW, _NORMAL_HIGH = 2.3e-308, 1.79e308
 _OVERSHOOT = 1.0 - math.log(2.0)
 _EXP_MINUS_2 = math.exp(-2.0)
 MAP_LIMIT = 10_000
-"""Half swings after which `iterated` gives up: at rtol 1e-9 enough up to alpha of about 1e9."""
+"""Half swings after which `event_map` gives up: at rtol 1e-9 enough up to alpha of about 1e9."""
 
 _Q_SERIES = (2 / 15, 3 / 175, 2 / 1575)
 _AMPLITUDE_SERIES = (1 / 10, 4 / 525, -1 / 31500)
@@ -51,7 +51,7 @@ def without_dimensions(mu, phi0, a):
     if some(wild):
         n = 2.0 * e_a + e_phi - e_mu
         k, rest = scale(k, n), scale(rest, n)
-    return k, rest, (mu, phi0, a, e_mu, e_phi, e_a, wild)
+    return k, rest, (mu, phi0, a, e_mu, e_phi, e_a, wild, normal(k))
 
 
 @jit
@@ -61,13 +61,13 @@ def _tame(x):
 
 @jit
 def dimensional(scene, cycle):
-    """Period [s], amplitude [rad], crossing speed [rad/s], and whether all three are normal numbers."""
-    mu, phi0, a, e_mu, e_phi, e_a, wild = scene
+    """Period [s], amplitude [rad], crossing speed [rad/s], and whether these and k are normal numbers."""
+    mu, phi0, a, e_mu, e_phi, e_a, wild, representable = scene
     q, lam, amplitude, _, _ = cycle
-    period, swing, speed = 4.0 * q / a, amplitude * phi0, lam * mu / a
+    period, swing, speed = q / (0.25 * a), amplitude * phi0, lam * mu / a
     if some(wild):
         period, swing, speed = scale(period, -e_a), scale(swing, e_phi), scale(speed, e_mu - e_a)
-    return period, swing, speed, normal(period) & normal(swing) & normal(speed)
+    return period, swing, speed, representable & normal(period) & normal(swing) & normal(speed)
 
 
 @jit
@@ -83,19 +83,13 @@ def closed(k, rest):
     A group of cells that lies on one side pays for that side only.
     """
     strong = k < SPLIT
-    q, lam, amplitude, s = 0.0 * k, 0.0 * k, 0.0 * k, 0.0 * k
+    cycle = (0.0 * k, 0.0 * k, 0.0 * k, 0.0 * k)
     if some(strong):
-        q, lam, amplitude, s = _closed_strong(k)
-    decay = exp(-2.0 * where(strong, q, k))
+        cycle = _closed_strong(k)
+    decay = exp(-2.0 * where(strong, cycle[0], k))
     if some(isnt(strong)):
-        weak = _closed_weak(k, rest, decay)
-        q, lam = where(strong, q, weak[0]), where(strong, lam, weak[1])
-        amplitude, s, decay = (
-            where(strong, amplitude, weak[2]),
-            where(strong, s, weak[3]),
-            where(strong, decay, weak[4]),
-        )
-    return q, lam, amplitude, s, decay
+        return choose(strong, (*cycle, decay), _closed_weak(k, rest, decay))
+    return (*cycle, decay)
 
 
 @jit
@@ -112,12 +106,20 @@ def _closed_strong(k):
 @jit
 def _closed_weak(k, rest, decay):
     """`decay` is exp(-2k); `rest` corrects it, for an error of k counts 2k-fold in the multiplier."""
-    x = decay * (_EXP_MINUS_2 * (1.0 - 2.0 * rest))
+    x = decay * (_EXP_MINUS_2 * (1.0 - 2.0 * rest)) + 0.0  # no -0 where nothing is left
     gap = x * horner(x, GAP_WEAK)  # 1 - lambda = 2/(exp(2q) + 1)
     lam = 1.0 - gap
     q = k + (lam + rest)
     amplitude = 1.0 + fma(x, horner(x, OVERSHOOT_WEAK), _OVERSHOOT) / k
     return q, lam, amplitude, k / (q * (lam * lam)), gap / (2.0 - gap)
+
+
+@jit
+def gap(k):
+    """1 - lambda = 2/(exp(2q) + 1), which at weak drive would be lost in lambda."""
+    strong = k < SPLIT
+    x = exp(-2.0 * k) * _EXP_MINUS_2
+    return where(strong, 1.0 - _closed_strong(where(strong, k, 0.5))[1], x * horner(x, GAP_WEAK))
 
 
 @jit
@@ -137,18 +139,12 @@ def asymptotic(k):
     s = 1/3 + 4 b^2/45 + 52 b^4/4725 - 32 b^6/70875. Weak: lambda = 1 - 2x, A = 1 + alpha (1 - ln 2 - x).
     """
     strong = k < SPLIT
-    q, lam, amplitude, s, decay = 0.0 * k, 0.0 * k, 0.0 * k, 0.0 * k, 0.0 * k
+    cycle = (0.0 * k, 0.0 * k, 0.0 * k, 0.0 * k, 0.0 * k)
     if some(strong):
-        q, lam, amplitude, s, decay = _asymptotic_strong(k)
+        cycle = _asymptotic_strong(k)
     if some(isnt(strong)):
-        weak = _asymptotic_weak(k)
-        q, lam = where(strong, q, weak[0]), where(strong, lam, weak[1])
-        amplitude, s, decay = (
-            where(strong, amplitude, weak[2]),
-            where(strong, s, weak[3]),
-            where(strong, decay, weak[4]),
-        )
-    return q, lam, amplitude, s, decay
+        return choose(strong, cycle, _asymptotic_weak(k))
+    return cycle
 
 
 @jit
@@ -172,11 +168,12 @@ def _asymptotic_weak(k):
 
 @jit
 def asymptotic_bound(k):
-    """Bounds on the relative errors of `asymptotic`: of period, amplitude, speed and sensitivity, and of m.
+    """Bounds on the relative errors of `asymptotic`: of period, amplitude and speed; of s; and of m.
 
-    Strong: the first term left out is below 2e-3 b^8 in each, b^8 = (3k)^(8/3) <= 1.15 (3k)^2 sqrt(3k) up to the
-    split. Weak: (1 - lambda)/x - 2 = 6x + ... <= 7.3x, squared away twice in s, gives 20 x^2; m = x (1 + 4x + ...),
-    where the rounding of k counts 2k-fold. Needs no exp: exp(-y) <= 1/(1 + y + y^2/2), y = k/16, to the 32nd power.
+    Strong: the first terms left out are below 2.2e-4 b^8, in s 2e-3 b^8, and up to the split b^8 = (3k)^(8/3) is at
+    most 1.15 (3k)^2 sqrt(3k). Weak: (1 - lambda)/x - 2 = 6x + ... <= 7.3x gives 8 x^2, and 20 x^2 in s, which has
+    lambda^2; m = x (1 + 4x + ...), where the rounding of k counts 2k-fold. No exp is needed: exp(-y) is at most
+    1/(1 + y + y^2/2), y = k/16, to the 32nd power.
     """
     strong = k < SPLIT
     y = k * 0.0625
@@ -187,9 +184,11 @@ def asymptotic_bound(k):
     x = x * x
     x = _EXP_MINUS_2 * (x * x)
     b3 = 3.0 * k
-    cycle = where(strong, 2.3e-3 * (b3 * b3) * sqrt(b3), 20.0 * (x * x)) + ROUNDING
+    b8 = 1.15 * (b3 * b3) * sqrt(b3)
+    cycle = where(strong, 2.2e-4 * b8, 8.0 * (x * x)) + ROUNDING
+    sensitivity = where(strong, 2e-3 * b8, 20.0 * (x * x)) + ROUNDING
     rounding = where(k < 400.0, 1e-15 * k, 0.0)  # below exp(-800) the multiplier is 0 for good
-    return cycle, where(strong, 2.0 * cycle, 5.0 * x + rounding) + ROUNDING
+    return cycle, sensitivity, where(strong, 4e-3 * b8, 5.0 * x + rounding) + 2.0 * ROUNDING
 
 
 @jit
@@ -210,7 +209,7 @@ def next_speed(y):
 
 
 @jit
-def iterated(k, rtol):
+def event_map(k, rtol):
     """The cycle from the exact map of the switching speed, iterated from rest at phi = 0; and where it has not settled.
 
     Half swing: -ln(1 - u') - u' = 2k + u - ln(1 + u). The speed rises monotonically to lambda and no later step
@@ -224,7 +223,7 @@ def iterated(k, rtol):
             break
         new, new_z = next_speed(fma(2.0, k, log_remainder(u)))
         room = where(new < 1.0 - new, new / (1.0 - new), 1.0)
-        unsettled = magnitude(new - u) > 0.25 * rtol * (u + new) * room
+        unsettled = isnt(magnitude(new - u) <= 0.25 * rtol * (u + new) * room)
         u, z = where(active, new, u), where(active, new_z, z)
         active = active & unsettled
     q = u + k
@@ -233,11 +232,11 @@ def iterated(k, rtol):
 
 
 @jit
-def iterated_bound(k):
-    """Four times the rounding error of `iterated`: its map forgets only a share 2b of an error, b = cbrt(3k) small."""
+def event_map_bound(k):
+    """Four times the rounding error of `event_map`: its map forgets only a share 2b of an error, b = cbrt(3k) small."""
     strong = k < SPLIT
     b = 0.0 * k + 1.0
     if some(strong):
         b = cbrt(3.0 * where(strong, k, 1.0))
     cycle = 8e-15 + 2e-15 / b
-    return cycle, cycle + where(k < 400.0, 4e-15 * k, 0.0)
+    return cycle, cycle, cycle + where(k < 400.0, 4e-15 * k, 0.0)

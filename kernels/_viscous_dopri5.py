@@ -82,7 +82,7 @@ def _enough(k, rtol, v, multiplier, time):
 
 
 @jit
-def integrated(k, rtol):
+def dopri5(k, rtol):
     """The cycle; cells that met the step limit; cells that did not settle; cells whose rounding exceeds rtol."""
     drag = sqrt(k)
     stiff = isnt(k < _STIFFEST)
@@ -90,19 +90,19 @@ def integrated(k, rtol):
     unfinished = stiff
     v = 0.0 * k
     tolerance = 0.01 * rtol
-    top, period, slope, sensitivity, multiplier = v, v, v, v, v
+    top, period, sensitivity = v, v, v
     for _ in range(NEWTON_LIMIT):
         if not some(active):
             break
-        got = _half_swing(v, drag, where(tolerance > _FINEST, tolerance, _FINEST), active)
-        end, time, time_by_start, end_by_drag, time_by_drag, lost = got[1], got[2], got[3], got[4], got[5], got[6]
+        step_tolerance = where(tolerance > _FINEST, tolerance, _FINEST)
+        swing = _half_swing(v, drag, step_tolerance, active)
+        turning, end, time, time_by_start, end_by_drag, time_by_drag, lost = swing
         slope = exp(-drag * time) * v / end
         step = (end - v) / (1.0 - slope)
         change = time_by_drag + time_by_start * end_by_drag / (1.0 - slope)
-        top = where(active, got[0], top)
+        top = where(active, turning, top)
         period = where(active, time + time_by_start * step, period)
         sensitivity = where(active, 0.5 + 0.5 * change / time, sensitivity)
-        multiplier = where(active, slope, multiplier)
         wanted = _enough(k, rtol, v, slope, time)
         settled = (magnitude(step) <= 0.1 * rtol * v) & (tolerance <= 2.0 * wanted)
         v = where(active, v + step, v)

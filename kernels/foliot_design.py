@@ -31,9 +31,9 @@ def _inverse_alpha(overshoot):
     for _ in range(_NEWTON_LIMIT):
         if not some(active):
             break
-        _, lam, amplitude, _, _ = _viscous.closed(k, 0.0 * k)
+        gap = _viscous.gap(k)
         now = _viscous.overshoot(k)
-        step = (now - overshoot) / (amplitude - 1.0 / lam)
+        step = (now - overshoot) / (now - gap / (1.0 - gap))  # A - 1/lambda without its two ones
         step = where(step > -0.5, step, -0.5)
         k = where(active, k + k * step, k)
         active = active & (magnitude(step) > 1e-9)  # quadratic: the step just made was the last
@@ -57,6 +57,12 @@ def _solve(i, period, amplitude, phi0, a, mu, status):
 def newton(period, amplitude, phi0, rtol, a, mu, status):
     """Newton on (1) from a start within 15 %."""
     each_cell(_solve, (period, amplitude, phi0, a, mu, status))
+
+
+@entry("asked")
+def newton_bound(period, amplitude, phi0, rtol, asked, out):
+    """Rounding: amplitude and phi0 are taken as exact."""
+    out[:] = 2.0 * _viscous.ROUNDING
 
 
 @jit
@@ -86,6 +92,6 @@ FOLIOT_DESIGN = Kernel(
         Field("mu", "rad/s^2", "drive torque per moment of inertia"),
     ),
     check=check,
-    methods=(Method("newton", "Newton's method on the closed-form cycle", newton),),
+    methods=(Method("newton", "Newton's method on the closed-form cycle", newton, newton_bound),),
     example={"period": 4.0, "amplitude": 0.8, "phi0": 0.5},
 )

@@ -32,7 +32,7 @@ def _closed(i, mu, phi0, a, phase, angle, speed, status):
     k, rest, scene = _viscous.without_dimensions(mu[i], phi0[i], a[i])
     cycle = _viscous.closed(k, rest)
     _, _, _, normal = _viscous.dimensional(scene, cycle)
-    unit_mu, unit_phi, unit_a, e_mu, e_phi, e_a, _ = scene
+    unit_mu, unit_phi, unit_a, e_mu, e_phi, e_a, _, _ = scene
     for j in range(phase.size):
         x, u = _shape(phase[j], k, cycle[0], cycle[1])
         angle[i, j] = scale(unit_phi * x, e_phi)
@@ -46,8 +46,8 @@ def closed(mu, phi0, a, rtol, phase, angle, speed, status):
     one_by_one(_closed, (mu, phi0, a, phase, angle, speed, status))
 
 
-@entry("asked")
-def closed_bound(mu, phi0, a, asked, out):
+@entry("phase", "asked")
+def closed_bound(mu, phi0, a, rtol, phase, asked, out):
     """Rounding, relative to the amplitude and to the crossing speed."""
     out[:] = 4.0 * _viscous.ROUNDING
 

@@ -25,7 +25,7 @@ class Status(IntEnum):
     BAD_INPUT = 64, "a parameter is NaN, infinite or outside its limits"
     NEVER_STARTS = 65, "the drive cannot set the scene in motion"
     NO_LIMIT_CYCLE = 66, "nothing dissipates energy, so no limit cycle exists"
-    OUT_OF_RANGE = 67, "a result cannot be written as a normal float64"
+    OUT_OF_RANGE = 67, "a result, or a dimensionless group it hangs on, is no normal float64"
     NOT_CONVERGED = 68, "the iteration limit was reached before the stated convergence"
     STEP_LIMIT = 69, "the integrator reached its limit of steps"
     NO_METHOD = 70, "no method of the kernel promises the wanted rtol here"
@@ -53,7 +53,7 @@ class Field:
     """A parameter, an output, or a coordinate that all cells share.
 
     `default`: None makes a parameter required; a str means "as that parameter". `lower`, `upper` are inclusive
-    unless `open_lower`; the kernel's `check` enforces them cell by cell, they are declared for people and plans.
+    unless `open_lower`; the kernel's `check` enforces them cell by cell (those of `along` are checked in the study).
     `dims` names the axes of an array ("phase",); `choices` maps words of a study to the numbers in the column.
     """
 
@@ -74,11 +74,14 @@ class Method:
     """One way to solve a cell.
 
     `solve(*parameters, rtol, *along, *outputs, status)` fills every output column of the kernel and the status of
-    every cell. Bad cells reach it too: it must end, but its values there are not used.
+    every cell. It gets no cell that `check` refused.
 
-    `bound(*parameters, asked, out)` fills `out` with a bound on the largest relative error (of traces: relative to
-    the amplitude) over the outputs whose entry in the uint8 array `asked` is 1. None: the method itself holds
-    `rtol` or says by its status that it cannot.
+    `bound(*parameters, rtol, *along, asked, out)` fills `out` with a bound on the largest relative error (of traces:
+    relative to the amplitude) over the outputs whose entry in the uint8 array `asked` is 1. None: the method itself
+    holds `rtol` or says by its status that it cannot.
+
+    `excludes` are parameters it cannot do: where a study sets one, away from its default or as an axis, the method is
+    not to be had in the whole study.
     """
 
     name: str

@@ -1,8 +1,8 @@
 """Solves runs of cells: checks them, chooses their methods, and says what became of each.
 
-A cell that `check` refuses is never solved. With a method given, the cell is solved by it and remarked INACCURATE
-where the method's bound exceeds rtol. With `auto` it goes to the first method, cheapest first, whose bound meets
-rtol, and on to the next where that one gives up.
+A cell that `check` refuses is never solved. With a method given, the cell is solved by it and remarked INACCURATE,
+whatever else is special about it, where the method's bound exceeds rtol. With `auto` it goes to the first method,
+cheapest first, whose bound meets rtol, and on to the next where that one gives up or says INACCURATE.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from sweep.grid import Grid
 from sweep.study import AUTO, Study
 
 STRIP = 16384
-"""Cells solved at a time: their columns stay in the processor's cache."""
+"""Cells solved at a time: their columns, where outputs are numbers, stay in the processor's cache."""
 NONE = -1
 """In place of a method's number: no method solved the cell."""
-GIVEN_UP = (Status.NOT_CONVERGED, Status.STEP_LIMIT)
+GIVEN_UP = (Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.INACCURATE)
 """After these `auto` tries the next method."""
-WARM_UP_CELLS = 33
+WARM_UP_CELLS = 3
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -76,7 +76,7 @@ class Solver:
             self._solve_strip(low, high, columns, status[rows], method_used[rows])
 
     def warm(self) -> None:
-        """Solve a few cells spread over the grid, so that what they need is compiled before threads start."""
+        """Solve a few cells spread over the grid: what they need is compiled before threads start."""
         outputs = {name: np.empty((1, *shape)) for name, shape in self._shapes().items()}
         status, used = np.empty(1, np.int8), np.empty(1, np.int8)
         for index in np.unique(np.linspace(0, self.grid.size - 1, WARM_UP_CELLS).astype(np.int64)):
@@ -118,8 +118,8 @@ class _Strip:
         method = self.kernel.methods[number]
         self.run(number, cells)
         if method.bound is not None and _count(cells):
-            loose = _pick(cells, (self.bound(method, cells) > self.rtol[cells]) & (self.status[cells] == Status.OK))
-            self.status[loose] = Status.INACCURATE
+            loose = ~(self.bound(method, cells) <= self.rtol[cells])  # NaN is loose
+            self.status[_pick(cells, loose & (self.status[cells] < FIRST_REFUSAL))] = Status.INACCURATE
 
     def choose(self, cells: Cells) -> None:
         """Solve each cell by the first method whose bound meets rtol and which does not give up."""
@@ -130,14 +130,14 @@ class _Strip:
             method = self.kernel.methods[number]
             meets = None if method.bound is None else self.bound(method, cells) <= self.rtol[cells]
             self.run(number, cells if meets is None else _pick(cells, meets))
-            left = np.isin(self.status[cells], (Status.NO_METHOD, *GIVEN_UP))
-            cells = _pick(cells, left)
+            cells = _pick(cells, np.isin(self.status[cells], GIVEN_UP))
 
     def bound(self, method: Method, cells: Cells) -> Floats:
         """The method's error bound for the cells, over the outputs asked for."""
         assert method.bound is not None
         out = self._bound[: _count(cells)]
-        method.bound(*(column[cells] for column in self.parameters), self.asked, out)
+        columns = [column[cells] for column in (*self.parameters, self.rtol)]
+        method.bound(*columns, *self.along, self.asked, out)
         return out
 
     def run(self, number: int, cells: Cells) -> None:

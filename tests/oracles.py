@@ -3,7 +3,7 @@
 Arguments are float64 and taken as exact.
 """
 
-from mpmath import exp, expm1, findroot, log, log1p, mp, mpf, tanh
+from mpmath import exp, expm1, findroot, log, log1p, mp, mpf, sinh, tanh
 
 DIGITS = 50
 
@@ -28,8 +28,7 @@ def foliot(mu, phi0, a):
         k = a * a * phi0 / mu
         q = quarter_phase(k)
         lam = tanh(q)
-        log_cosh = q - log(2) + log1p(exp(-2 * q))
-        return 4 * q / a, phi0 * log_cosh / k, mu * lam / a, k / (q * lam**2), exp(-2 * q)
+        return 4 * q / a, phi0 * _log_cosh(q) / k, mu * lam / a, k / (q * lam**2), exp(-2 * q)
 
 
 def foliot_angle(mu, phi0, a, phase):
@@ -66,3 +65,19 @@ def foliot_by_waiting(mu, phi0, a, half_swings):
         t, v = flight(-before, 2 * phi0)
     turning = log1p(a * before / mu) / a
     return 2 * t, phi0 - way(-before, turning), v
+
+
+def foliot_design(period, amplitude, phi0):
+    """(a, mu) of the foliot with that period and amplitude: ln(cosh q)/(q - tanh q) = amplitude/phi0, by bisection."""
+    with mp.workdps(2 * DIGITS):
+        ratio = mpf(amplitude) / mpf(phi0)
+        low, high = mpf(10) ** -12, mpf(10) ** 18
+        while high > low * (1 + mpf(10) ** -DIGITS):
+            q = (low * high) ** mpf("0.5")
+            low, high = (q, high) if _log_cosh(q) > ratio * (q - tanh(q)) else (low, q)
+        a = 4 * q / mpf(period)
+        return a, a * a * mpf(phi0) / (q - tanh(q))
+
+
+def _log_cosh(q):
+    return log1p(2 * sinh(q / 2) ** 2) if q < 1 else q - log(2) + log1p(exp(-2 * q))

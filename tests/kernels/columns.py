@@ -18,12 +18,12 @@ def solve(kernel: Kernel, method: str, *parameters, rtol=1e-9, along=()):
     return outputs, status
 
 
-def bounds(kernel: Kernel, method: str, *parameters, asked=None):
+def bounds(kernel: Kernel, method: str, *parameters, asked=None, rtol=1e-9, along=()):
     """The error bound of one method for every cell."""
     columns = [np.ascontiguousarray(p, float) for p in parameters]
     out = np.full(len(columns[0]), np.nan)
     asked = np.array([f.name in (asked or [o.name for o in kernel.outputs]) for f in kernel.outputs], np.uint8)
-    kernel.method(method).bound(*columns, asked, out)
+    kernel.method(method).bound(*columns, np.full(len(out), rtol), *along, asked, out)
     return out
 
 

@@ -11,6 +11,7 @@ import pytest
 from columns import bounds, checked, relative_error, solve
 from hypothesis import given
 from hypothesis import strategies as st
+from mpmath import mpf
 
 from kernels._jit import COMPILED
 from kernels.foliot import FOLIOT
@@ -47,10 +48,10 @@ def test_closed_form_is_right_to_1e_15_over_24_decades(low, high):
 def test_the_closed_form_promises_what_it_keeps():
     columns = scenes(-12, 12)
     outputs, _ = solve(FOLIOT, "closed", *columns)
-    limit = bounds(FOLIOT, "closed", *columns)
-    assert (limit == 1e-15).all()
-    for name, error in errors(outputs, columns, NAMES[:4]).items():
-        assert (error <= limit).all(), name
+    for names, promise in ((NAMES[:4], 1e-15), (NAMES, 2e-15)):
+        assert (bounds(FOLIOT, "closed", *columns, asked=names) == promise).all()
+        found = errors(outputs, columns, names)
+        assert all((found[n][outputs["multiplier"] > 1e-300] <= promise).all() for n in names)
 
 
 def test_multiplier_keeps_its_digits_down_to_the_smallest_float():
@@ -78,6 +79,9 @@ def test_closed_form_holds_from_1e_minus_30_to_1e30():
         (1.0, 1e-120, 1e60),
         (1.7e308, 1.7e308, 1.0),
         (1e300, 1e-300, 1e300),
+        (1e70, 1e60, 1e150),
+        (4e-308, 1e308, 2e-308),  # only the period is too large
+        (1e-300, 1e-300, 1e10),  # only the speed is too small
     ],
 )
 def test_nothing_overflows_or_loses_digits_on_the_way(mu, phi0, a):
@@ -187,8 +191,23 @@ def test_the_iterated_map_is_right_to_rtol_or_says_that_it_has_not_settled(rtol)
 
 @pytest.mark.skipif(not COMPILED, reason="ten thousand half swings in plain Python")
 def test_the_iterated_map_gives_up_at_strong_drive():
-    _, status = solve(FOLIOT, "map", np.array([1e12, 1.0]), np.ones(2), np.ones(2), rtol=1e-9)
-    assert status.tolist() == [Status.NOT_CONVERGED, Status.OK]
+    _, status = solve(FOLIOT, "map", np.array([1e12, 1e9, 1.0]), np.ones(3), np.ones(3), rtol=1e-9)
+    assert status.tolist() == [Status.NOT_CONVERGED, Status.OK, Status.OK]
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of half swings in plain Python")
+def test_what_rounding_leaves_of_the_iterated_map_stays_below_its_bound():
+    columns = scenes(-3, 8, seed=3)
+    outputs, status = solve(FOLIOT, "map", *columns, rtol=1e-16)
+    settled = status == Status.OK
+    assert settled.mean() > 0.5
+    kept = [c[settled] for c in columns]
+    found = errors({n: v[settled] for n, v in outputs.items()}, kept)
+    found["multiplier"][outputs["multiplier"][settled] < 1e-300] = 0.0
+    for name, error in found.items():
+        ratio = error / bounds(FOLIOT, "map", *kept, asked=[name])
+        assert ratio.max() < 1, name
+    assert max(error.max() for error in found.values()) > 1e-14
 
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9] if COMPILED else [1e-3])
@@ -261,3 +280,33 @@ INF, NAN = np.inf, np.nan
 def test_what_cannot_run_is_refused_by_name(mu, phi0, a, status):
     for n in (1, 40):
         assert (checked(FOLIOT, np.full(n, mu), np.full(n, phi0), np.full(n, a)) == status).all()
+
+
+@pytest.mark.parametrize("method", ["closed", "asymptotic", "map"])
+def test_over_the_whole_range_of_float64_a_cell_is_right_or_refused(method):
+    random = np.random.default_rng(11)
+    mu, phi0, a = (10 ** random.uniform(-307, 307, SOME) for _ in range(3))
+    edges = np.array([[1.0, 1.0, 1e-155], [1.0, 1.0, 1e-160], [1e10, 1.0, 1e-150], [1e300, 1e-10, 1.0]])
+    near = np.array([[1.0, 1.0, 2.0**e] for e in (-241, -240, -239, 239, 240, 241, -511, 511)])
+    columns = np.concatenate([np.stack([mu, phi0, a], axis=1), edges, near]).T
+    outputs, status = solve(FOLIOT, method, *columns, rtol=1e-9)
+    good = status == Status.OK
+    kept = [c[good] for c in columns]
+    limit = np.maximum(bounds(FOLIOT, method, *kept, asked=NAMES[:4]), 1e-9 if method == "map" else 0.0)
+    for name, error in errors({n: v[good] for n, v in outputs.items()}, kept, NAMES[:4]).items():
+        assert (error <= limit).all(), (name, [float(c[(error / limit).argmax()]) for c in kept])
+    for cell in columns.T[status == Status.OUT_OF_RANGE][:50]:
+        k = mpf(cell[2]) ** 2 * mpf(cell[1]) / mpf(cell[0])
+        values = [*oracles.foliot(*cell)[:3], k] if mpf(10) ** -320 < k < mpf(10) ** 320 else [mpf(0)]
+        assert any(not 2.3e-308 < v < mpf("1.79e308") for v in values), cell
+
+
+def test_an_overflow_is_refused_whatever_else_is_remarked():
+    _, status = solve(FOLIOT, "dopri5", [1e308], [1.7e308], [1.0], rtol=1e-15)
+    assert status[0] == Status.OUT_OF_RANGE
+
+
+@pytest.mark.parametrize("rtol", [np.nan, -1.0])
+def test_the_iterated_map_never_settles_to_a_senseless_rtol(rtol):
+    _, status = solve(FOLIOT, "map", [0.5], [1.0], [1.0], rtol=rtol)
+    assert status[0] == Status.NOT_CONVERGED

@@ -3,7 +3,7 @@
 import numpy as np
 import oracles
 import pytest
-from columns import checked, relative_error, solve
+from columns import bounds, checked, relative_error, solve
 from mpmath import mp, mpf
 
 from kernels.foliot import FOLIOT
@@ -71,3 +71,15 @@ def test_an_amplitude_that_does_not_exceed_the_switching_angle_is_refused(amplit
 )
 def test_results_beyond_float64_are_out_of_range(period, amplitude, phi0):
     assert solve(FOLIOT_DESIGN, "newton", [period], [amplitude], [phi0])[1][0] == Status.OUT_OF_RANGE
+
+
+def test_friction_and_torque_are_right_to_1e_15_down_to_overshoots_of_a_few_ulp():
+    overshoot = np.concatenate([2.0**-52 * np.array([1, 2, 3, 7, 50]), np.geomspace(1e-14, 1e6, 60)])
+    phi0 = np.full(65, 0.7)
+    amplitude = phi0 + np.maximum(phi0 * overshoot, np.spacing(phi0))
+    found, status = solve(FOLIOT_DESIGN, "newton", np.full(65, 1.3), amplitude, phi0)
+    assert (status == Status.OK).all()
+    truths = [oracles.foliot_design(1.3, *cell) for cell in zip(amplitude, phi0, strict=True)]
+    limit = bounds(FOLIOT_DESIGN, "newton", np.full(65, 1.3), amplitude, phi0)
+    assert np.all(relative_error(found["a"], [t[0] for t in truths]) <= limit)
+    assert np.all(relative_error(found["mu"], [t[1] for t in truths]) <= limit)

@@ -16,7 +16,7 @@ def test_angle_and_speed_are_right_to_4e_15_of_their_largest():
     alpha, a, phi0 = 10 ** random.uniform(-12, 12, 40), 10 ** random.uniform(-2, 2, 40), np.full(40, 0.3)
     mu, phase = alpha * a * a * phi0, np.sort(random.uniform(0, 1, 12))
     outputs, status = solve(FOLIOT_MOTION, "closed", mu, phi0, a, along=[phase])
-    limit = bounds(FOLIOT_MOTION, "closed", mu, phi0, a)
+    limit = bounds(FOLIOT_MOTION, "closed", mu, phi0, a, along=[phase])
     assert (status == Status.OK).all()
     assert (limit == 4e-15).all()
     for i in range(40):

@@ -21,7 +21,7 @@ def test_functions_take_the_columns_they_declare(name):
     for method in kernel.methods:
         assert list(inspect.signature(method.solve).parameters) == [*parameters, "rtol", *along, *outputs, "status"]
         if method.bound:
-            assert list(inspect.signature(method.bound).parameters) == [*parameters, "asked", "out"]
+            assert list(inspect.signature(method.bound).parameters) == [*parameters, "rtol", *along, "asked", "out"]
 
 
 @pytest.mark.parametrize("name", NAMES)

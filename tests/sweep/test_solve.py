@@ -115,7 +115,7 @@ def test_auto_does_not_go_on_where_the_result_itself_is_out_of_range():
 
 @pytest.mark.parametrize("method", ["auto", "rough"])
 def test_a_bound_that_equals_rtol_meets_it(method):
-    def just(height, v0, g, asked, out):
+    def just(height, v0, g, rtol, phase, asked, out):
         out[...] = 1e-6
 
     kernel = stand_in(rough=(KERNEL.methods[0].solve, just))
@@ -138,7 +138,7 @@ def test_a_method_that_gives_up_is_not_said_to_be_merely_inaccurate():
 
 
 def test_a_cell_that_no_method_promises_is_refused():
-    def never(height, v0, g, asked, out):
+    def never(height, v0, g, rtol, phase, asked, out):
         out[...] = np.inf
 
     kernel = stand_in(rough=(KERNEL.methods[0].solve, never), exact=(KERNEL.methods[1].solve, never))
@@ -270,3 +270,27 @@ def test_warming_up_changes_nothing():
     status, used = np.empty(372, np.int8), np.empty(372, np.int8)
     solver.solve(0, 372, outputs, status, used)
     assert np.array_equal(outputs["period"], WHOLE[0]["period"], equal_nan=True)
+
+
+def test_auto_does_not_keep_an_inaccurate_value_while_a_method_is_left():
+    def loose(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
+        fall_time[...], impact_speed[...], drop[...] = 1.0, 1.0, 1.0
+        status[...] = Status.INACCURATE
+
+    study = toy_study(axes={"height": [1.0, 2.0]})
+    _, status, used = solved(with_kernel(study, stand_in(rough=(loose, None))))
+    assert used.tolist() == [1, 1]
+    assert (status == Status.OK).all()
+    only = stand_in(rough=(loose, None), exact=(loose, None))
+    assert solved(with_kernel(study, only))[1].tolist() == [Status.INACCURATE] * 2
+
+
+def test_a_bound_that_is_no_number_promises_nothing():
+    def no_number(height, v0, g, rtol, phase, asked, out):
+        out[...] = np.nan
+
+    kernel = stand_in(rough=(KERNEL.methods[0].solve, no_number))
+    study = toy_study(axes={"height": [1.0, 2.0]})
+    assert solved(with_kernel(study, kernel))[2].tolist() == [1, 1]
+    asked = with_kernel(toy_study(axes={"height": [1.0, 2.0]}, method="rough"), kernel)
+    assert solved(asked)[1].tolist() == [Status.INACCURATE] * 2

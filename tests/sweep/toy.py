@@ -37,7 +37,7 @@ def rough(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
     status[...] = Status.OK
 
 
-def rough_bound(height, v0, g, asked, out):
+def rough_bound(height, v0, g, rtol, phase, asked, out):
     """With s = v0 / sqrt(2 g h): speeds are off by less than s^2/2, times and traces by less than s + s^2/2."""
     with np.errstate(all="ignore"):
         s = v0 / np.sqrt(2 * g * height)
