@@ -80,6 +80,12 @@ def read_into(fd: int, buffer: Any, offset: int) -> None:
         view, offset = view[count:], offset + count
 
 
+def forget(fd: int) -> None:
+    """Gives the memory that holds the file's bytes back: what is written next takes it, where new memory is dearer."""
+    if hasattr(os, "posix_fadvise"):
+        os.posix_fadvise(fd, 0, 0, os.POSIX_FADV_DONTNEED)
+
+
 def sync_folder(path: Path) -> None:
     """Returns when the names in a folder are on the disk. Raises OSError."""
     fd = open_file(path, os.O_RDONLY)

@@ -61,6 +61,7 @@ def read_part(
             for column in columns:
                 disk.read_into(fd, arrays[column.name], places[column.name])
         finally:
+            disk.forget(fd)
             os.close(fd)
     except FileNotFoundError:
         raise
