@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -12,10 +10,13 @@ if TYPE_CHECKING:
     from sweep.analysis import exponent as exponent
     from sweep.analysis import fit_exponent as fit_exponent
     from sweep.analysis import local_exponent as local_exponent
+    from sweep.analysis import where_exponent as where_exponent
+    from sweep.analysis import where_value as where_value
+    from sweep.charts import plot as plot
     from sweep.errors import StudyError as StudyError
     from sweep.errors import SweepError as SweepError
-    from sweep.export import export as export
-    from sweep.plan import plan as plan
+    from sweep.exporting import export as export
+    from sweep.planning import plan as plan
     from sweep.result import open_result as open_result
     from sweep.runner import run as run
     from sweep.spec import build_study as build_study
@@ -24,14 +25,17 @@ if TYPE_CHECKING:
 _HOMES = {
     "read_study": "spec",
     "build_study": "spec",
-    "plan": "plan",
+    "plan": "planning",
     "run": "runner",
     "open_result": "result",
     "local_exponent": "analysis",
     "exponent": "analysis",
     "fit_exponent": "analysis",
     "crossover": "analysis",
-    "export": "export",
+    "where_exponent": "analysis",
+    "where_value": "analysis",
+    "plot": "charts",
+    "export": "exporting",
     "SweepError": "errors",
     "StudyError": "errors",
 }
@@ -48,14 +52,3 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *_HOMES})
-
-
-class _Package(ModuleType):
-    """Keeps `sweep.plan` and `sweep.export` the functions, also once the modules of the same names are imported."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if not (name in _HOMES and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package

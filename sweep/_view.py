@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from sweep.errors import SweepError
-from sweep.export import flag_words
+from sweep.exporting import flag_words
 
 GREEK = frozenset(
     (

@@ -134,7 +134,7 @@ def _kernels(arguments: argparse.Namespace) -> None:
 
 
 def _plan(arguments: argparse.Namespace) -> None:
-    from sweep.plan import plan
+    from sweep.planning import plan
 
     print(plan(_study(arguments), workers=arguments.workers))
 
@@ -176,7 +176,7 @@ def _plot(arguments: argparse.Namespace) -> None:
 
 
 def _export(arguments: argparse.Namespace) -> None:
-    from sweep.export import export
+    from sweep.exporting import export
 
     with _result(arguments) as dataset:
         print(export(dataset, arguments.output))

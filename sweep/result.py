@@ -130,7 +130,9 @@ def _unreadable(output: Path, fault: Exception) -> SweepError:
 def _with_plain_text(dataset: xr.Dataset) -> xr.Dataset:
     """Words as fixed-width text, as in a Dataset that was never in a file."""
     words = {name: c for name, c in dataset.coords.items() if c.dtype.kind not in "fi"}
-    return dataset.assign_coords({name: (c.dims, c.values.astype(str), c.attrs) for name, c in words.items()})
+    plain = dataset.assign_coords({name: (c.dims, c.values.astype(str), c.attrs) for name, c in words.items()})
+    plain.set_close(dataset.close)
+    return plain
 
 
 def _open_parts(output: Path, spec: Spec, strict: bool) -> xr.Dataset:

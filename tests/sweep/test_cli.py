@@ -95,14 +95,6 @@ def test_every_public_name_is_there():
         assert name in dir(sweep)
 
 
-def test_plan_and_export_stay_functions_once_their_modules_are_imported():
-    import sweep.export
-    import sweep.plan
-
-    assert not isinstance(sweep.plan, type(sys))
-    assert not isinstance(sweep.export, type(sys))
-
-
 def test_an_unknown_name_is_no_attribute():
     with pytest.raises(AttributeError, match="no attribute 'runn'"):
         sweep.runn  # noqa: B018

@@ -327,3 +327,15 @@ def test_results_open_without_a_warning(stored):
     with warnings.catch_warnings(), open_result(stored) as found:
         warnings.simplefilter("error")
         assert found.load() is found
+
+
+def test_a_result_that_is_open_can_be_opened_and_run_again_and_closing_it_frees_the_file(tmp_path):
+    study = build_study(kernel="foliot", axes={"mu": [1.0, 2.0]}, fixed={"a": 1.0, "phi0": 1.0})
+    path = tmp_path / "out.h5"
+    first = run(study, path, progress=False)
+    second, third = run(study, path, progress=False), open_result(path)
+    assert first.period.values.tolist() == second.period.values.tolist() == third.period.values.tolist()
+    for dataset in (first, second, third):
+        dataset.close()
+    with h5py.File(path, "r+") as file:
+        assert file["period"].shape == (2,)

@@ -135,12 +135,12 @@ def test_csv_of_one_cell_and_of_none(tmp_path):
 @pytest.mark.parametrize("rows", [1, 3, 5, 8, 9, 100])
 def test_csv_is_the_same_whatever_the_size_of_its_blocks(tmp_path, monkeypatch, rows):
     whole = sweep.export(result(), tmp_path / "whole.csv").read_text()
-    monkeypatch.setattr(sys.modules["sweep.export"], "ROWS", rows)
+    monkeypatch.setattr(sys.modules["sweep.exporting"], "ROWS", rows)
     assert sweep.export(result(), tmp_path / "blocks.csv").read_text() == whole
 
 
 def test_csv_needs_no_more_memory_for_more_cells(tmp_path, monkeypatch):
-    monkeypatch.setattr(sys.modules["sweep.export"], "ROWS", 1000)
+    monkeypatch.setattr(sys.modules["sweep.exporting"], "ROWS", 1000)
     peaks = []
     for cells in (20_000, 100_000):
         path = tmp_path / f"{cells}.nc"
@@ -168,7 +168,7 @@ def test_netcdf_reads_back_bit_for_bit_with_units_and_flags(tmp_path, engine):
 
 
 def test_netcdf_of_a_result_larger_than_memory_is_written_piece_by_piece(tmp_path, monkeypatch):
-    monkeypatch.setattr(sys.modules["sweep.export"], "LARGE", 0)
+    monkeypatch.setattr(sys.modules["sweep.exporting"], "LARGE", 0)
     ds = result()
     with xr.open_dataset(sweep.export(ds, tmp_path / "out.nc"), engine="h5netcdf") as back:
         xr.testing.assert_identical(back.load(), ds)
@@ -240,7 +240,7 @@ def test_an_interruption_leaves_no_half_written_file(tmp_path, monkeypatch):
     def stop(*args):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sys.modules["sweep.export"], "_column", stop)
+    monkeypatch.setattr(sys.modules["sweep.exporting"], "_column", stop)
     with pytest.raises(KeyboardInterrupt):
         sweep.export(result(), tmp_path / "out.csv")
     assert list(tmp_path.iterdir()) == []

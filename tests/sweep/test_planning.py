@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sweep.errors import SweepError
-from sweep.plan import plan, quantity, small_duration
+from sweep.planning import plan, quantity, small_duration
 from sweep.runner import run
 from sweep.spec import build_study
 
@@ -68,7 +68,7 @@ def test_a_plan_warns_of_a_disk_that_is_too_small(monkeypatch):
 
 
 def test_a_plan_warns_of_a_memory_that_is_too_small(monkeypatch):
-    monkeypatch.setattr(sys.modules["sweep.plan"], "memory", lambda: 1000)
+    monkeypatch.setattr(sys.modules["sweep.planning"], "memory", lambda: 1000)
     assert "the memory is too small" in str(plan(stone()))
 
 
@@ -108,7 +108,7 @@ def test_short_times_read_as_people_say_them(seconds, text):
 
 def test_the_engine_is_imported_without_heavy_libraries():
     code = """
-import sys, sweep.runner, sweep.plan, sweep.result, sweep.store, sweep.progress
+import sys, sweep.runner, sweep.planning, sweep.result, sweep.store, sweep.progress
 print(sorted({"numba", "xarray", "h5py", "h5netcdf", "pint", "dask", "pandas"} & set(sys.modules)))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
