@@ -1,17 +1,32 @@
 # How fast are the foliot's methods, against numpy and against one cell at a time, and how right?
-"""Prints ratios measured in this run, on one core: python benchmarks/methods.py"""
+"""Prints ratios measured in this run, on one core, and errors against 50 digits (needs mpmath):
+
+python benchmarks/methods.py
+"""
 
 from __future__ import annotations
 
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 
 from kernels import foliot
 from kernels._columns import entry, one_by_one
+from kernels.interface import Status
+
+sys.path.append(str(Path(__file__).parents[1] / "tests"))
+import oracles
+from mpmath import mpf
 
 BLOCK = 8192
 REPEATS = 7
+# q - tanh q = q^3 (1/3 - 2 q^2/15 + ...), to 1e-16 for q < 0.2
+SERIES = (
+    1 / 3, -2 / 15, 17 / 315, -62 / 2835, 1382 / 155925, -21844 / 6081075, 929569 / 638512875,
+    -6404582 / 10854718875, 443861162 / 1856156927625,
+)  # fmt: skip
 OUTPUTS = ("period", "amplitude", "crossing_speed", "sensitivity", "multiplier")
 
 
@@ -31,8 +46,10 @@ def numpy_newton(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivi
     q = np.where(k < 1, y * (1 + w * (2 / 15 + w * (3 / 175 + w * (2 / 1575)))), k + 1)
     for _ in range(3):
         t, v = np.tanh(q), q * q
-        series = q * v * (1 / 3 + v * (-2 / 15 + v * (17 / 315 + v * (-62 / 2835 + v * 1382 / 155925))))
-        q -= (np.where(q < 0.3, series, q - t) - k) / (t * t)
+        series = np.full_like(v, SERIES[-1])
+        for coefficient in SERIES[-2::-1]:
+            series = series * v + coefficient
+        q -= (np.where(q < 0.2, q * v * series, q - t) - k) / (t * t)
     t = np.tanh(q)
     period[:] = 4 * q / a
     half = np.sinh(np.minimum(q, 20) / 2)
@@ -78,17 +95,48 @@ def report(title, ratio, ours, theirs, cells):
     print(f"{title:58} {cells / ours / 1e6:8.2f} {cells / theirs / 1e6:8.2f} {ratio:7.2f}")
 
 
-def main():
-    """Measure and print."""
+def speed():
+    """Both sides of each pair in turn, in this run."""
     print(f"{'one core, million cells/s':58} {'ours':>8} {'rival':>8} {'ratio':>7}")
     inputs, _ = columns(64 * BLOCK)
     report("closed, in order; numpy Newton in blocks of 8192", *paired(foliot.closed, numpy_newton, inputs), 64 * BLOCK)
     shuffled = [np.random.default_rng(0).permutation(inputs[0]), *inputs[1:]]
     report("closed, shuffled; the same", *paired(foliot.closed, numpy_newton, shuffled), 64 * BLOCK)
     report("asymptotic, in order; closed", *paired(foliot.asymptotic, foliot.closed, inputs), 64 * BLOCK)
-    some = [c[:: 64 * 8].copy() for c in inputs]
-    some[0] = np.geomspace(1e-3, 1e6, len(some[0])) * 0.09 * 0.7
+    some, _ = columns(1024)
+    some[0] = np.geomspace(1e-3, 1e6, 1024) * 0.09 * 0.7
     report("map in lanes; one cell at a time, alpha 1e-3 to 1e6", *paired(foliot.event_map, map_one_by_one, some), 1024)
+    report("dopri5 in lanes; map in lanes, the same cells", *paired(foliot.dopri5, foliot.event_map, some), 1024)
+
+
+def errors(name, solve, low, high, rtol=1e-9, cells=2000):
+    """The largest relative error of each output over random cells that came out OK, and where it is."""
+    random = np.random.default_rng(1)
+    alpha = 10 ** random.uniform(low, high, cells)
+    a, phi0 = 10 ** random.uniform(-3, 3, cells), 10 ** random.uniform(-2, 2, cells)
+    inputs = [alpha * a * a * phi0, phi0, a, np.full(cells, rtol)]
+    outputs = columns(cells)[1]
+    solve(*inputs, *outputs)
+    good = outputs[-1] == Status.OK
+    truths = [oracles.foliot(*cell) for cell in zip(*(c[good] for c in inputs[:3]), strict=True)]
+    print(f"{name}, alpha 1e{low} to 1e{high}, rtol {rtol:g}: {good.sum()} of {cells} cells OK, largest errors")
+    for j, output in enumerate(OUTPUTS):
+        found = [
+            float(abs(mpf(float(v)) / t[j] - 1)) if t[j] > 1e-300 else 0.0
+            for v, t in zip(outputs[j][good], truths, strict=True)
+        ]
+        worst = int(np.argmax(found))
+        print(f"  {output:15} {found[worst]:8.1e} at alpha = {alpha[good][worst]:.4g}")
+
+
+def main():
+    """Measure and print."""
+    speed()
+    errors("closed", foliot.closed, -12, 12)
+    errors("asymptotic", foliot.asymptotic, -12, 12)
+    errors("map", foliot.event_map, -12, 9)
+    errors("dopri5", foliot.dopri5, -4, 9)
+    errors("numpy Newton", numpy_newton, -12, 12)
 
 
 if __name__ == "__main__":
