@@ -307,10 +307,10 @@ def _along(function: Callable[[Array], Array], y: xr.DataArray, dimension: str, 
 
 
 def _require_fit_for_logarithms(part: xr.DataArray, dim: str) -> None:
-    wrong = part.where(part <= 0)
-    count = int(wrong.notnull().sum())
+    cells = np.argwhere(np.asarray(part.values <= 0))
+    count = len(cells)
     if count:
-        first = wrong.stack(cell=wrong.dims).dropna("cell")[0]
+        first = part[tuple(cells[0])]
         raise SweepError(
             f"a power law needs positive values; {count} of {part.size} of {_title(part)} in the window are not, "
             f"e.g. {float(first):g} at {dim} = {float(first.coords[dim]):g}; choose a window without them"

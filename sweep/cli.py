@@ -199,6 +199,8 @@ def _result(arguments: argparse.Namespace) -> xr.Dataset:
     path = arguments.result
     if path.suffix == ".toml":
         raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
+    if not path.exists() and path.with_name(path.name + ".parts").is_dir():
+        print(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
     return open_result(path)
 
 

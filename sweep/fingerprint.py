@@ -20,8 +20,8 @@ COMPILERS = ("numba", "llvmlite", "numpy")
 OURS = ("kernels",)
 """Packages whose modules count even where a kernel of another package imports them."""
 
-ENGINE = "sweep.solve"
-"""The one module of the engine that decides values: it chooses the method of each cell."""
+ENGINE = ("sweep.solve", "sweep.grid")
+"""Modules of the engine that decide values: the method of each cell, and its parameters."""
 
 SOURCE = "source "
 
@@ -96,11 +96,21 @@ def _sources(kernel_name: str) -> dict[str, str]:
         names = [name, *imported]
         # with a.b.c Python also runs a and a.b
         parents = (n.rsplit(".", k)[0] for n in names for k in range(n.count(".") + 1))
-        waiting += [n for n in parents if n.partition(".")[0] in packages]
-    engine = _path(ENGINE)
-    if engine is not None:
-        found[ENGINE] = hashlib.sha256(engine.read_bytes()).hexdigest()
+        waiting += [n for n in parents if n.partition(".")[0] in packages or _is_own(n.partition(".")[0])]
+    for name in ENGINE:
+        path = _path(name)
+        if path is not None:
+            found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
     return {SOURCE + name: found[name] for name in sorted(found)}
+
+
+@lru_cache(maxsize=1000)
+def _is_own(package: str) -> bool:
+    """Whether a package is source of somebody's own: neither Python's nor installed from a distribution."""
+    if package in sys.stdlib_module_names or package == "sweep":
+        return False
+    path = _path(package)
+    return path is not None and not {"site-packages", "dist-packages"}.intersection(path.parts)
 
 
 @lru_cache(maxsize=1000)

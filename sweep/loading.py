@@ -11,6 +11,9 @@ from kernels.interface import Kernel, load
 from sweep.checks import did_you_mean, listed, show
 from sweep.errors import SweepError
 
+RESERVED = ("status", "method_used", "method", "rtol", "cell")
+"""Names that a result has in any case."""
+
 
 def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path] = ()) -> Kernel:
     """The kernel called `name` in the catalogue, or, where allowed, found at "module:NAME".
@@ -43,4 +46,18 @@ def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path
         raise SweepError(f"{show(name)} cannot be loaded: {type(error).__name__}: {error}") from error
     if not isinstance(kernel, Kernel):
         raise SweepError(f"{show(name)} is a {type(kernel).__name__}, not a kernels.interface.Kernel")
+    _check_declaration(str(name), kernel)
     return kernel
+
+
+def _check_declaration(name: str, kernel: Kernel) -> None:
+    """Raises SweepError where no result could hold what the kernel declares."""
+    fields = [*kernel.parameters, *kernel.outputs, *kernel.along]
+    names = [*RESERVED, *(field.name for field in fields)]
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise SweepError(f"kernel {name} declares {listed(twice)} more than once, or takes a name of the result's own")
+    known = {field.name for field in kernel.along}
+    lost = sorted({d for field in kernel.outputs for d in field.dims} - known)
+    if lost:
+        raise SweepError(f"kernel {name} has outputs along {listed(lost)}, which it does not declare in `along`")

@@ -14,9 +14,10 @@ from kernels.interface import Status
 from sweep.blocks import Sample, partition, take_sample
 from sweep.errors import SweepError
 from sweep.layout import Layout, layout
-from sweep.pool import cores
+from sweep.pool import cores, whole_number
 from sweep.progress import duration
 from sweep.result import memory
+from sweep.session import faults_told
 
 if TYPE_CHECKING:
     from sweep.study import Study
@@ -113,14 +114,16 @@ def plan(study: Study, workers: int | None = None, path: str | os.PathLike[str] 
     """
     from sweep.solve import Solver
 
-    crew = workers or cores()
+    crew = cores() if workers is None else whole_number("workers", workers)
     folder = Path(path).absolute().parent if path is not None else Path.cwd()
     if not folder.is_dir():
         raise SweepError(f"{path}: there is no folder {folder}")
     content = layout(study, {})
-    solver = Solver(study)
-    solver.warm()
-    return _forecast(study, content, take_sample(solver, content.columns, content.grid.size), crew, folder)
+    with faults_told(f"{study.kernel_name}: the kernel failed"):
+        solver = Solver(study)
+        solver.warm()
+        sample = take_sample(solver, content.columns, content.grid.size)
+    return _forecast(study, content, sample, crew, folder)
 
 
 def _forecast(study: Study, content: Layout, sample: Sample, workers: int, folder: Path) -> Plan:

@@ -11,6 +11,10 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import Generic, TypeVar
 
+import numpy as np
+
+from sweep.errors import SweepError
+
 TICK = 0.2
 """Seconds after which progress is told even if nothing has finished."""
 
@@ -136,3 +140,10 @@ class CtrlC:
     def _press(self, number: int, frame: object) -> None:
         self._pressed = True
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def whole_number(name: str, number: int) -> int:
+    """The number, if it is a whole one from 1 on. Raises SweepError."""
+    if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 1:
+        raise SweepError(f"{name}: expected a whole number from 1 on, found {number!r}")
+    return int(number)

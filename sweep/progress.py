@@ -92,8 +92,7 @@ class Progress:
         """Says something out of turn."""
         if self._stream is not None:
             self._end_line()
-            self._stream.write(self._stamp() + f"{self._name}: {text}\n")
-            self._stream.flush()
+            self._write(self._stamp() + f"{self._name}: {text}\n")
 
     def end(self) -> None:
         """Says how it ended, where anything was said before."""
@@ -129,14 +128,12 @@ class Progress:
         return now - self._told >= self._pause or by_share
 
     def _say(self, text: str) -> None:
-        assert self._stream is not None
         line = f"{self._name}: {text}"
         if self._live:
-            self._stream.write("\r" + line.ljust(self._width))
+            self._write("\r" + line.ljust(self._width))
             self._width = len(line)
         else:
-            self._stream.write(self._stamp() + line + "\n")
-        self._stream.flush()
+            self._write(self._stamp() + line + "\n")
         self._told, self._told_share = self._clock(), self.done / max(self.total, 1)
 
     def _stamp(self) -> str:
@@ -144,9 +141,18 @@ class Progress:
 
     def _end_line(self) -> None:
         if self._live and self._width and self._stream is not None:
-            self._stream.write("\n")
-            self._stream.flush()
+            self._write("\n")
             self._width = 0
+
+    def _write(self, text: str) -> None:
+        """Tells; a reader who has gone, or a full disk behind the log, does not stop the run."""
+        if self._stream is None:
+            return
+        try:
+            self._stream.write(text)
+            self._stream.flush()
+        except (OSError, ValueError):
+            self._stream = None
 
 
 def stream_of(progress: bool | TextIO | None) -> TextIO | None:

@@ -139,6 +139,8 @@ def _open_parts(output: Path, spec: Spec, strict: bool) -> xr.Dataset:
     folder = folder_of(output)
     matches = (PART_NAME.fullmatch(path.name) for path in folder.iterdir())
     parts = {int(m[1]) // spec.blocks.cells: folder / m[0] for m in matches if m}
+    if strict and len(parts) == spec.blocks.count:
+        raise SweepError(f"{output}: all is computed but not put together yet; run its sweep again to finish")
     if strict:
         left = spec.blocks.count - len(parts)
         raise SweepError(

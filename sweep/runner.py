@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
-import numpy as np
-
 from sweep.assemble import assemble
 from sweep.errors import SweepError
 from sweep.fingerprint import difference, fingerprint
 from sweep.layout import columns
-from sweep.pool import Spares, cores
+from sweep.pool import Spares, cores, whole_number
 from sweep.progress import Progress, stream_of
 from sweep.result import in_memory, memory, open_result, stored_fingerprint
 from sweep.session import Session, Solve
@@ -65,8 +63,8 @@ def run(
     KeyboardInterrupt
         After Ctrl-C, when the blocks at work have been stored.
     """
-    cells = None if block_cells is None else _count("block_cells", block_cells)
-    crew = cores() if workers is None else _count("workers", workers)
+    cells = None if block_cells is None else whole_number("block_cells", block_cells)
+    crew = cores() if workers is None else whole_number("workers", workers)
     task = _Task(study, fingerprint(study), crew, stream_of(progress), cells, force)
     if path is None:
         return _run_in_memory(task)
@@ -117,7 +115,8 @@ def _run_to_file(task: _Task, output: Path) -> None:
             return
         _take_up(store, spec, task)
         blocks = None if store.spec is None else store.blocks
-        session = Session(task.study, task.mark, task.workers, blocks, task.block_cells)
+        all_there = store.spec is not None and not store.missing()
+        session = Session(task.study, task.mark, task.workers, blocks, task.block_cells, sampled=not all_there)
         if store.spec is None:
             store.begin(task.study.to_json(), task.mark, session.blocks)
         progress = session.progress(task.stream, output.name, store.missing())
@@ -147,6 +146,11 @@ def _take_up(store: Store, spec: Spec | None, task: _Task) -> None:
     """Continues what an earlier run left. Raises SweepError where that was another study, unless forced."""
     if spec is not None and dict(spec.fingerprint) == dict(task.mark):
         store.resume(spec)
+    elif spec is None and store.orphans() and not task.force:
+        raise SweepError(
+            f"{store.folder}: {store.orphans()} finished blocks, but no spec.json that says of which study; "
+            "put it back, or give the blocks up with --force"
+        )
     elif spec is None or task.force:
         store.clear()
     else:
@@ -231,9 +235,3 @@ def _checked_output(path: str | os.PathLike[str]) -> Path:
     if not output.parent.is_dir():
         raise SweepError(f"{path}: there is no folder {output.parent}")
     return output
-
-
-def _count(name: str, number: int) -> int:
-    if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 1:
-        raise SweepError(f"{name}: expected a whole number from 1 on, found {number!r}")
-    return int(number)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, TextIO
 
-from sweep.blocks import Partition, Sample, order, partition, take_sample
+from sweep.blocks import UNSAMPLED, Partition, Sample, order, partition, take_sample
 from sweep.errors import SweepError
 from sweep.layout import METHOD_USED, STATUS, Layout, layout
 from sweep.pool import Halt, Spares, each
@@ -31,6 +31,7 @@ class Session:
     workers : cores to compute on
     blocks : how the grid is cut, where that is settled already
     block_cells : cells a block, instead of a size taken from the sample
+    sampled : False where nothing is left to compute
     """
 
     def __init__(
@@ -40,21 +41,25 @@ class Session:
         workers: int,
         blocks: Partition | None = None,
         block_cells: int | None = None,
+        sampled: bool = True,
     ) -> None:
-        from sweep.solve import Solver
-
         self.study, self.workers = study, workers
         self.began = now()
         self.layout: Layout = layout(study, mark)
         size = self.layout.grid.size
-        with faults_told(f"{study.kernel_name}: the kernel failed"):
-            solver = Solver(study)
-            solver.warm()
-            self.sample: Sample = take_sample(solver, self.layout.columns, size)
+        self.sample: Sample = self._take_sample(size) if sampled else UNSAMPLED
         if blocks is None and block_cells is not None:
             blocks = Partition(size, min(block_cells, size))
         self.blocks = blocks or partition(self.sample, size, self.layout.cell_bytes, workers)
         self._weights = self.sample.weights(self.blocks)
+
+    def _take_sample(self, size: int) -> Sample:
+        from sweep.solve import Solver
+
+        with faults_told(f"{self.study.kernel_name}: the kernel failed"):
+            solver = Solver(self.study)
+            solver.warm()
+            return take_sample(solver, self.layout.columns, size)
 
     def progress(self, stream: TextIO | None, name: str, jobs: Iterable[int]) -> Progress:
         """Where the run stands when `jobs` are still to do."""

@@ -7,6 +7,7 @@ cheapest first, whose bound meets rtol, and on to the next where that one gives 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -19,6 +20,8 @@ from sweep.study import AUTO, Study
 
 STRIP = 16384
 """Cells solved at a time: their columns, where outputs are numbers, stay in the processor's cache."""
+STRIP_BYTES = 16 << 20
+"""Bytes that the outputs of a strip may take, where they are traces."""
 NONE = -1
 """In place of a method's number: no method solved the cell."""
 GIVEN_UP = (Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.INACCURATE)
@@ -41,14 +44,15 @@ class Solver:
     def __init__(self, study: Study) -> None:
         self.study, self.grid = study, Grid(study)
         kernel = study.kernel
-        room = min(STRIP, self.grid.size)
+        lengths = {field.name: len(study.along[field.name]) for field in kernel.along}
+        cell_bytes = sum(8 * math.prod(lengths[d] for d in field.dims) for field in kernel.outputs)
+        room = self._strip = max(1, min(STRIP, self.grid.size, STRIP_BYTES // cell_bytes))
         self._parameters = [np.empty(room) for _ in kernel.parameters]
         for k, value in self.grid.constants().items():
             self._parameters[k][:] = value
         self._along = [np.array(study.along[field.name]) for field in kernel.along]
-        shape = {field.name: len(values) for field, values in zip(kernel.along, self._along, strict=True)}
         self._unasked = {
-            field.name: np.empty((room, *(shape[d] for d in field.dims)))
+            field.name: np.empty((room, *(lengths[d] for d in field.dims)))
             for field in kernel.outputs
             if field.name not in study.outputs
         }
@@ -66,8 +70,8 @@ class Solver:
         status, method_used : ndarray of int8, shape (stop - start,)
             A `Status`; the position in `kernel.methods`, or -1 where the cell is refused.
         """
-        for low in range(start, stop, STRIP):
-            high = min(low + STRIP, stop)
+        for low in range(start, stop, self._strip):
+            high = min(low + self._strip, stop)
             rows = slice(low - start, high - start)
             columns = [
                 outputs[f.name][rows] if f.name in outputs else self._unasked[f.name][: high - low]

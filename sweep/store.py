@@ -153,15 +153,19 @@ class Store:
         return self.folder / f"{name}.{self.run}.tmp"
 
     def clear(self) -> None:
-        """Removes all but the lock, the spec last, so that a removal cut short leaves a store. Raises SweepError."""
+        """Removes what a sweep writes, the spec last, so that a removal cut short leaves a store. Raises SweepError."""
         try:
-            for path in self.folder.iterdir():
-                if path.name not in (SPEC, LOCK):
+            for path in list(self.folder.iterdir()):
+                if PART_NAME.fullmatch(path.name) or path.suffix in (".tmp", ".damaged"):
                     disk.remove(path)
             disk.remove(self.folder / SPEC)
         except OSError as fault:
             raise disk.refusal(fault, self.folder) from fault
         self.spec, self.names = None, {}
+
+    def orphans(self) -> int:
+        """Parts that are there although no spec says of what."""
+        return 0 if self.spec else sum(bool(PART_NAME.fullmatch(path.name)) for path in self.folder.iterdir())
 
     def _sort_out(self) -> None:
         for entry in list(os.scandir(self.folder)):
@@ -219,6 +223,7 @@ def opened(output: Path, columns: Sequence[Column]) -> Iterator[Store]:
 def _lock(folder: Path) -> int:
     while True:
         disk.make_folder(folder)
+        disk.sync_folder(folder.parent)
         try:
             fd = disk.open_file(folder / LOCK, os.O_CREAT | os.O_RDWR)
         except FileNotFoundError:
