@@ -168,3 +168,13 @@ def test_a_source_that_came_or_went_is_told_without_digests():
 def test_the_digest_of_the_study_is_told_only_where_nothing_else_differs():
     assert difference({"study": "1", "rtol": "a"}, {"study": "2", "rtol": "b"}) == ["rtol: was a, now b"]
     assert difference({"study": "1"}, {"study": "2"}) == ["study: changed"]
+
+
+def test_a_module_beside_the_kernel_counts(tmp_path, monkeypatch):
+    (tmp_path / "lonely_scene.py").write_text("import lonely_helper\nfrom toy import KERNEL\n")
+    (tmp_path / "lonely_helper.py").write_text("FACTOR = 1\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    study = build(kernel="lonely_scene:KERNEL", axes={"height": [1.0]})
+    old = fingerprint(study)
+    (tmp_path / "lonely_helper.py").write_text("FACTOR = 2 \n")
+    assert difference(old, fingerprint(study)) == ["source lonely_helper: changed"]

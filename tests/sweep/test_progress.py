@@ -174,3 +174,18 @@ def test_progress_goes_to_stderr_unless_told_otherwise(capsys):
     assert stream_of(False) is None
     log = io.StringIO()
     assert stream_of(log) is log
+
+
+@pytest.mark.parametrize("fault", [BrokenPipeError(), OSError(28, "No space left on device"), ValueError("closed")])
+def test_a_log_that_cannot_be_written_any_more_stops_nothing(clock, fault):
+    class Gone(io.StringIO):
+        def write(self, text):
+            raise fault
+
+    progress = Progress(100, Gone(), clock=clock)
+    clock.now += 60
+    progress.add(50)
+    progress.note("something")
+    progress.add(50)
+    progress.end()
+    assert progress.done == 100

@@ -527,3 +527,32 @@ def test_a_disk_that_is_too_small_is_told_at_once(output, monkeypatch):
     log = io.StringIO()
     quiet(stone(), output, progress=log)
     assert "are free here" in log.getvalue()
+
+
+def test_blocks_without_a_spec_are_not_thrown_away(unfinished):
+    study, output = tall(23), unfinished
+    (folder_of(output) / "spec.json").unlink()
+    before = names(output)
+    with pytest.raises(SweepError, match="finished blocks, but no spec"):
+        quiet(study, output)
+    assert names(output) == before != []
+
+
+def test_a_file_of_somebody_elses_in_the_folder_of_the_parts_is_left_there(tmp_path):
+    output = tmp_path / "out.h5"
+    folder_of(output).mkdir()
+    note = folder_of(output) / "notes.txt"
+    note.write_text("mine")
+    quiet(stone(axes={"height": [1.0, 2.0]}), output).close()
+    assert note.read_text() == "mine"
+    assert sorted(p.name for p in folder_of(output).iterdir() if p.name != "lock") == ["notes.txt"]
+
+
+def test_nothing_is_solved_where_only_the_output_has_to_be_put_together(tmp_path, monkeypatch):
+    study, output = stone(axes={"height": [1.0, 2.0, 3.0]}), tmp_path / "out.h5"
+    with monkeypatch.context() as patch:
+        patch.setattr("sweep.runner.assemble", lambda *a, **k: (_ for _ in ()).throw(SweepError("stopped here")))
+        with pytest.raises(SweepError, match="stopped here"):
+            quiet(study, output, block_cells=1)
+    monkeypatch.setattr("sweep.solve.Solver.solve", None)
+    assert quiet(study, output).fall_time.shape == (3,)

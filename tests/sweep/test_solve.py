@@ -294,3 +294,32 @@ def test_a_bound_that_is_no_number_promises_nothing():
     assert solved(with_kernel(study, kernel))[2].tolist() == [1, 1]
     asked = with_kernel(toy_study(axes={"height": [1.0, 2.0]}, method="rough"), kernel)
     assert solved(asked)[1].tolist() == [Status.INACCURATE] * 2
+
+
+def test_traces_are_solved_a_few_cells_at_a_time():
+    phase = np.linspace(0, 1, 100_000)
+    study = toy_study(
+        axes={"height": np.linspace(1, 2, 50)}, outputs=["drop", "fall_time"], along={"phase": phase}, method="exact"
+    )
+    assert Solver(study)._strip == 20
+    outputs, _, _ = solved(study, 0, 45)
+    assert outputs["drop"][44, -1] == pytest.approx(1 + 44 / 49, rel=1e-15)
+    only = Solver(toy_study(axes={"height": [1.0, 2.0]}, outputs=["fall_time"]))
+    assert only._strip == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda k: {"outputs": (*k.outputs, k.outputs[0])}, "fall_time more than once"),
+        (lambda k: {"along": ()}, "phase, which it does not declare"),
+    ],
+)
+def test_a_kernel_that_no_result_could_hold_is_refused_at_once(monkeypatch, change, message):
+    from dataclasses import replace
+
+    import toy
+
+    monkeypatch.setattr(toy, "KERNEL", replace(KERNEL, **change(KERNEL)))
+    with pytest.raises(sweep.SweepError, match=message):
+        toy_study(axes={"height": [1.0]})
