@@ -66,7 +66,8 @@ def dimensional(scene, cycle):
     q, lam, amplitude, _, _ = cycle
     period, swing, speed = q / (0.25 * a), amplitude * phi0, lam * mu / a
     if some(wild):
-        period, swing, speed = scale(period, -e_a), scale(swing, e_phi), scale(speed, e_mu - e_a)
+        period = scale(0.0625 * q / a, 6.0 - e_a)  # 4 q may be too large where 4 q/a is not
+        swing, speed = scale(swing, e_phi), scale(speed, e_mu - e_a)
     return period, swing, speed, representable & normal(period) & normal(swing) & normal(speed)
 
 

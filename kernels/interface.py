@@ -29,7 +29,7 @@ class Status(IntEnum):
     NOT_CONVERGED = 68, "the iteration limit was reached before the stated convergence"
     STEP_LIMIT = 69, "the integrator reached its limit of steps"
     NO_METHOD = 70, "no method of the kernel promises the wanted rtol here"
-    PENDING = 127, "not computed yet; only the engine writes it"
+    PENDING = 127, "not computed yet"
 
     doc: str
 

@@ -208,7 +208,7 @@ def _warn_of_space(session: Session, output: Path, progress: Progress) -> None:
     needed = session.layout.cell_bytes * (progress.total - progress.done + progress.total)
     free = shutil.disk_usage(output.parent).free
     if needed > free:
-        progress.note(f"needs {needed / 1e9:.1f} GB, only {free / 1e9:.1f} GB are free here")
+        progress.note(f"needs {needed / 1e6:,.1f} MB, only {free / 1e6:,.1f} MB are free here")
 
 
 def _done(task: _Task, output: Path) -> bool:

@@ -282,7 +282,7 @@ def test_what_cannot_run_is_refused_by_name(mu, phi0, a, status):
         assert (checked(FOLIOT, np.full(n, mu), np.full(n, phi0), np.full(n, a)) == status).all()
 
 
-@pytest.mark.parametrize("method", ["closed", "asymptotic", "map"])
+@pytest.mark.parametrize("method", ["closed", "asymptotic", "map"] if COMPILED else ["closed"])
 def test_over_the_whole_range_of_float64_a_cell_is_right_or_refused(method):
     random = np.random.default_rng(11)
     mu, phi0, a = (10 ** random.uniform(-307, 307, SOME) for _ in range(3))
@@ -295,7 +295,7 @@ def test_over_the_whole_range_of_float64_a_cell_is_right_or_refused(method):
     limit = np.maximum(bounds(FOLIOT, method, *kept, asked=NAMES[:4]), 1e-9 if method == "map" else 0.0)
     for name, error in errors({n: v[good] for n, v in outputs.items()}, kept, NAMES[:4]).items():
         assert (error <= limit).all(), (name, [float(c[(error / limit).argmax()]) for c in kept])
-    for cell in columns.T[status == Status.OUT_OF_RANGE][:50]:
+    for cell in columns.T[status == Status.OUT_OF_RANGE][-50:]:
         k = mpf(cell[2]) ** 2 * mpf(cell[1]) / mpf(cell[0])
         values = [*oracles.foliot(*cell)[:3], k] if mpf(10) ** -320 < k < mpf(10) ** 320 else [mpf(0)]
         assert any(not 2.3e-308 < v < mpf("1.79e308") for v in values), cell
@@ -306,6 +306,7 @@ def test_an_overflow_is_refused_whatever_else_is_remarked():
     assert status[0] == Status.OUT_OF_RANGE
 
 
+@pytest.mark.skipif(not COMPILED, reason="ten thousand half swings in plain Python")
 @pytest.mark.parametrize("rtol", [np.nan, -1.0])
 def test_the_iterated_map_never_settles_to_a_senseless_rtol(rtol):
     _, status = solve(FOLIOT, "map", [0.5], [1.0], [1.0], rtol=rtol)
