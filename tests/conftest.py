@@ -1,6 +1,7 @@
 """Hypothesis profiles; and the helpers of the tests (`oracles`, `columns`, `toy`) as importable modules."""
 
 import os
+import signal
 import sys
 from pathlib import Path
 
@@ -12,3 +13,6 @@ settings.load_profile("ci" if os.environ.get("CI") else "local")
 
 TESTS = Path(__file__).parent
 sys.path += [str(TESTS), str(TESTS / "kernels"), str(TESTS / "sweep")]
+
+# a shell ignores Ctrl-C for what it runs in the background, and children inherit that; here it is under test
+signal.signal(signal.SIGINT, signal.default_int_handler)
