@@ -22,6 +22,11 @@ class Status(IntEnum):
 
     OK = 0, "right to the wanted rtol"
     INACCURATE = 1, "the method's error bound exceeds rtol; values are given"
+    NOT_SELF_STARTING = 2, "a limit cycle exists, but from rest at the centre the scene does not come to it"
+    COMES_TO_REST = 3, "the motion ends within the time followed; what would come after is NaN"
+    GRAZING = 4, "the last digits of the input decide whether there is one more swing"
+    OVERDAMPED = 5, "the motion creeps and never turns; it takes no finite time to end"
+    TOO_SHORT = 6, "too short a run for some outputs, which are NaN"
     BAD_INPUT = 64, "a parameter is NaN, infinite or outside its limits"
     NEVER_STARTS = 65, "the drive cannot set the scene in motion"
     NO_LIMIT_CYCLE = 66, "nothing dissipates energy, so no limit cycle exists"
@@ -29,6 +34,7 @@ class Status(IntEnum):
     NOT_CONVERGED = 68, "the iteration limit was reached before the stated convergence"
     STEP_LIMIT = 69, "the integrator reached its limit of steps"
     NO_METHOD = 70, "no method of the kernel promises the wanted rtol here"
+    STICKS = 71, "the scene comes to rest before the next switch"
     PENDING = 127, "not computed yet"
 
     doc: str
