@@ -5,12 +5,12 @@ import pytest
 from columns import relative_error
 from hypothesis import given
 from hypothesis import strategies as st
-from mpmath import cbrt, exp, expm1, log1p, mp, mpf
+from mpmath import atan, atanh, cbrt, cos, exp, expm1, log, log1p, mp, mpf, sin
 
 from kernels import _vecmath
 from kernels._columns import each_cell, entry, one_by_one
-from kernels._jit import jit
-from kernels._lanes import dot, exponent, fma, isnt, nearest, pow2, some, where
+from kernels._jit import COMPILED, jit
+from kernels._lanes import dot, exponent, fma, isnt, magnitude, nearest, pow2, some, where
 
 mp.dps = 50
 
@@ -179,3 +179,68 @@ def test_exponent_mantissa_rounding_and_multiply_add_are_exact(x):
     assert 1 <= m < 2
     assert r == round(x)
     assert product == float(mpf(x) * mpf(x) - mpf(x))
+
+
+@jit
+def _more(i, x, u, y, logs, logs1, powers_less, sines, cosines, angles, powers, artanhs, thirds):
+    logs[i] = _vecmath.log(magnitude(x[i]))
+    logs1[i] = _vecmath.log1p(u[i])
+    powers_less[i] = _vecmath.expm1(x[i])
+    sines[i], cosines[i] = _vecmath.sincos(x[i])
+    angles[i] = _vecmath.arctan(x[i])
+    powers[i] = _vecmath.power(magnitude(x[i]), y[i])
+    ratio = u[i] / (1.0 + magnitude(u[i]))
+    artanhs[i] = _vecmath.artanh(ratio)
+    thirds[i] = _vecmath.log_remainder3(0.5 * ratio)
+
+
+@entry()
+def more(x, u, y, logs, logs1, powers_less, sines, cosines, angles, powers, artanhs, thirds):
+    each_cell(_more, (x, u, y, logs, logs1, powers_less, sines, cosines, angles, powers, artanhs, thirds))
+
+
+def evaluate_more(x, u, y):
+    outputs = [np.empty(len(x)) for _ in range(9)]
+    more(*(np.ascontiguousarray(c, float) for c in (x, u, y)), *outputs)
+    return outputs
+
+
+@pytest.mark.parametrize("top", [1e-8, 0.1, 1.0, 3.0, 30.0, 300.0])
+def test_elementary_functions_are_right_to_a_few_ulp(top):
+    random = np.random.default_rng(7)
+    n = 400 if COMPILED else 40
+    x, y = random.uniform(-top, top, n), random.uniform(0, 4, n)
+    u = np.where(x < 0, np.expm1(np.maximum(x, -30)), x)
+    logs, logs1, powers_less, sines, cosines, angles, powers, artanhs, thirds = evaluate_more(x, u, y)
+    exact = [mpf(float(v)) for v in x]
+    ratios = [mpf(float(v)) for v in u / (1.0 + np.abs(u))]
+    assert relative_error(logs, [log(abs(v)) for v in exact]).max() < 2e-16
+    assert relative_error(logs1, [log1p(mpf(float(v))) for v in u]).max() < 2e-16
+    assert relative_error(powers_less, [expm1(v) for v in exact]).max() < 3e-16
+    assert relative_error(sines, [sin(v) for v in exact]).max() < 2.5e-16
+    assert max(abs(float(mpf(float(c)) - cos(v))) for c, v in zip(cosines, exact, strict=True)) < 1.6e-16
+    assert relative_error(angles, [atan(v) for v in exact]).max() < 3.5e-16
+    assert relative_error(powers, [abs(v) ** mpf(float(w)) for v, w in zip(exact, y, strict=True)]).max() < 8e-16
+    assert relative_error(artanhs, [atanh(r) for r in ratios]).max() < 4e-16
+    assert relative_error(thirds, [log1p(r / 2) - r / 2 + r * r / 8 for r in ratios]).max() < 7e-16
+
+
+def test_logarithms_and_powers_hold_over_all_exponents():
+    x = 10.0 ** np.random.default_rng(8).uniform(-300, 300, 300 if COMPILED else 30)
+    logs, logs1, _, _, _, angles, powers, _, _ = evaluate_more(x, x, np.full_like(x, 0.37))
+    exact = [mpf(float(v)) for v in x]
+    assert relative_error(logs, [log(v) for v in exact]).max() < 2e-16
+    assert relative_error(logs1, [log1p(v) for v in exact]).max() < 2e-16
+    assert relative_error(angles, [atan(v) for v in exact]).max() < 3e-16
+    assert relative_error(powers, [v ** mpf(0.37) for v in exact]).max() < 6e-16
+
+
+def test_elementary_functions_at_the_ends_of_their_ranges():
+    outputs = evaluate_more([0.0, 1e-310, np.inf, -np.inf, np.nan], [-1.0, 0.0, np.inf, -2.0, np.nan], [0, 1, 0, 0, 0])
+    logs, logs1, powers_less, sines, _, angles, powers, _, _ = outputs
+    np.testing.assert_array_equal(logs[[0, 2, 3, 4]], [-np.inf, np.inf, np.inf, np.nan])
+    np.testing.assert_array_equal(logs1, [-np.inf, 0.0, np.inf, np.nan, np.nan])
+    assert powers_less[:4].tolist() == [0.0, 1e-310, np.inf, -1.0]
+    assert sines[0] == 0.0
+    assert angles[2:4].tolist() == [np.pi / 2, -np.pi / 2]
+    assert powers[:2].tolist() == [1.0, 1e-310]  # 0^0 = 1
