@@ -4,6 +4,8 @@ A scene carries its motion and two tangents of it, so a state is (x, v, x1, v1, 
 rate, and a right-hand side is `accelerations(state, scene) -> (x'', x1'', x2'')`. Because every position is the
 integral of a rate, the stages of a position are folded into those of its rate (Nystroem form), which halves the work:
     V_i = v + h sum_j a_ij F_j,  X_i = x + c_i h v + h^2 sum_j (sum_m a_im a_mj) F_j.                     (1)
+An integral y along the motion may follow as a seventh entry of the state; its rate y' is then the fourth of the
+right-hand side.
 """
 
 import numpy as np
@@ -39,11 +41,11 @@ _RATE_ERROR, _POSITION_ERROR = tuple(map(float, _E)), tuple(map(float, _E @ _A))
 
 
 @jit
-def _at(state, h, row, f0, f1, f2):
+def _at(state, h, row, f0, f1, f2, f3):
     """The state at a stage, by (1), from the accelerations of earlier stages: of the motion and of each tangent."""
     node, rate, position = row
-    x, v, x1, v1, x2, v2 = state
-    return (
+    x, v, x1, v1, x2, v2 = state[:6]
+    pairs = (
         fma(h, fma(h, dot(position, f0), node * v), x),
         fma(h, dot(rate, f0), v),
         fma(h, fma(h, dot(position, f1), node * v1), x1),
@@ -51,6 +53,23 @@ def _at(state, h, row, f0, f1, f2):
         fma(h, fma(h, dot(position, f2), node * v2), x2),
         fma(h, dot(rate, f2), v2),
     )
+    return _with_integral(pairs, state, h, rate, f3)
+
+
+@jit
+def _with_integral(pairs, state, h, weights, rates):
+    """The pairs, and behind them the integral, where the state has one (known when compiled)."""
+    if len(state) == 6:
+        return pairs
+    return (*pairs, fma(h, dot(weights, rates), state[6]))
+
+
+@jit
+def _integral_miss(state, h, rates, scale):
+    """Estimated error of the integral over its scale; 0 where there is none."""
+    if len(state) == 6:
+        return 0.0
+    return magnitude(h * dot(_RATE_ERROR, rates)) / scale[6]
 
 
 @jit
@@ -66,6 +85,13 @@ def _miss(h, accelerations, rate_scale, position_scale):
     return _larger(rate, position)
 
 
+@jit
+def _rates(accelerations, state, scene):
+    """The right-hand side, with an entry (repeated where there is none) for the integral."""
+    rates = accelerations(state, scene)
+    return rates[0], rates[1], rates[2], rates[-1]
+
+
 @jit_call
 def dopri5_step(accelerations, state, scene, h, scale):
     """One step of Dormand-Prince 5(4).
@@ -77,20 +103,24 @@ def dopri5_step(accelerations, state, scene, h, scale):
     error : float64 or Lanes
         The largest estimated error of a component over its entry in `scale`.
     """
-    a0, a1, a2 = accelerations(state, scene)
-    b0, b1, b2 = accelerations(_at(state, h, _STAGE_1, (a0,), (a1,), (a2,)), scene)
-    c0, c1, c2 = accelerations(_at(state, h, _STAGE_2, (a0, b0), (a1, b1), (a2, b2)), scene)
-    d0, d1, d2 = accelerations(_at(state, h, _STAGE_3, (a0, b0, c0), (a1, b1, c1), (a2, b2, c2)), scene)
-    f0, f1, f2 = (a0, b0, c0, d0), (a1, b1, c1, d1), (a2, b2, c2, d2)
-    e0, e1, e2 = accelerations(_at(state, h, _STAGE_4, f0, f1, f2), scene)
-    f0, f1, f2 = (*f0, e0), (*f1, e1), (*f2, e2)
-    g0, g1, g2 = accelerations(_at(state, h, _STAGE_5, f0, f1, f2), scene)
-    f0, f1, f2 = (*f0, g0), (*f1, g1), (*f2, g2)
-    new = _at(state, h, _RESULT, f0, f1, f2)
-    z0, z1, z2 = accelerations(new, scene)
+    a0, a1, a2, a3 = _rates(accelerations, state, scene)
+    f0, f1, f2, f3 = (a0,), (a1,), (a2,), (a3,)
+    b0, b1, b2, b3 = _rates(accelerations, _at(state, h, _STAGE_1, f0, f1, f2, f3), scene)
+    f0, f1, f2, f3 = (a0, b0), (a1, b1), (a2, b2), (a3, b3)
+    c0, c1, c2, c3 = _rates(accelerations, _at(state, h, _STAGE_2, f0, f1, f2, f3), scene)
+    f0, f1, f2, f3 = (*f0, c0), (*f1, c1), (*f2, c2), (*f3, c3)
+    d0, d1, d2, d3 = _rates(accelerations, _at(state, h, _STAGE_3, f0, f1, f2, f3), scene)
+    f0, f1, f2, f3 = (*f0, d0), (*f1, d1), (*f2, d2), (*f3, d3)
+    e0, e1, e2, e3 = _rates(accelerations, _at(state, h, _STAGE_4, f0, f1, f2, f3), scene)
+    f0, f1, f2, f3 = (*f0, e0), (*f1, e1), (*f2, e2), (*f3, e3)
+    g0, g1, g2, g3 = _rates(accelerations, _at(state, h, _STAGE_5, f0, f1, f2, f3), scene)
+    f0, f1, f2, f3 = (*f0, g0), (*f1, g1), (*f2, g2), (*f3, g3)
+    new = _at(state, h, _RESULT, f0, f1, f2, f3)
+    z0, z1, z2, z3 = _rates(accelerations, new, scene)
     motion = _miss(h, (*f0, z0), scale[1], scale[0])
     tangents = _larger(_miss(h, (*f1, z1), scale[3], scale[2]), _miss(h, (*f2, z2), scale[5], scale[4]))
-    return new, _larger(motion, tangents)
+    integral = _integral_miss(state, h, (*f3, z3), scale)
+    return new, _larger(_larger(motion, tangents), integral)
 
 
 @jit
