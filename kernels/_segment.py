@@ -187,8 +187,9 @@ def first_reversal(beta, kappa, v, f):
 
 
 @jit
-def _reach(beta, kappa, v, f, until):
+def reach(beta, kappa, v, f):
     """The way to the first reversal, or what a motion without one tends to."""
+    until = first_reversal(beta, kappa, v, f)
     turns = until < math.inf
     turning, _ = motion(beta, kappa, v, f, where(turns, until, 0.0))
     rest = where(kappa > 0.0, f / where(kappa > 0.0, kappa, 1.0), math.inf)
@@ -205,7 +206,7 @@ def first_crossing(beta, kappa, v, f, way):
     bracket. `beta` >= 0.
     """
     until = first_reversal(beta, kappa, v, f)
-    meets = (way <= _reach(beta, kappa, v, f, until)) & ((v > 0.0) | (f > 0.0))
+    meets = (way <= reach(beta, kappa, v, f)) & ((v > 0.0) | (f > 0.0))
     fast = where(f > 0.0, f, 0.0)
     low = 2.0 * way / where(meets, v + sqrt(fma(v, v, 2.0 * fast * way)), 1.0)
     high, t, active = until, low, meets
