@@ -1,164 +1,170 @@
 """Verge and foliot: the limit cycle.
 
-    phi'' + a phi' = +-mu                                                                          (1)
+    phi'' + a phi' + (R + c abs(phi')^n) sgn phi' + k phi = +-mu                                       (1)
 
-The torque changes sign as phi passes +-phi0 on its way out. Leaves out: recoil of the crown wheel, the geometry of
-the pallets, the fine structure of the torque. Source: Hoyng & Nieuwenhuizen, arXiv:1604.06681.
+The torque changes sign as phi passes +-phi0 on its way out, and the speed is then multiplied by e. Leaves out: recoil
+of the crown wheel, the geometry of the pallets, the fine structure of the torque (`foliot_ripple`, `foliot_noise`).
+Source: Hoyng & Nieuwenhuizen, arXiv:1604.06681, for friction a phi' alone; the other terms are derived in the modules
+that solve them. What a swing loses grows strictly with the swing, so where a limit cycle exists it is the only one and
+stable; where the foliot does not come to it from rest at phi = 0, the cell is remarked NOT_SELF_STARTING.
 """
 
 import math
 
-from kernels import _viscous, _viscous_dopri5
+from kernels import _coulomb, _foliot_scene, _foliot_viscous, _linear_swing
 from kernels._columns import each_cell, entry
+from kernels._foliot_viscous import worst
 from kernels._jit import jit
-from kernels._lanes import where
+from kernels._lanes import isnt, where
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
-
-SENSITIVITY, MULTIPLIER = 3, 4
-"""Positions of these outputs."""
 
 _OK, _BAD_INPUT, _OUT_OF_RANGE = float(Status.OK), float(Status.BAD_INPUT), float(Status.OUT_OF_RANGE)
 _NEVER_STARTS, _NO_LIMIT_CYCLE = float(Status.NEVER_STARTS), float(Status.NO_LIMIT_CYCLE)
-_NOT_CONVERGED, _STEP_LIMIT = float(Status.NOT_CONVERGED), float(Status.STEP_LIMIT)
-_INACCURATE = float(Status.INACCURATE)
 
 
 @jit
-def _write(i, scene, cycle, verdict, period, amplitude, crossing_speed, sensitivity, multiplier, status):
-    period[i], amplitude[i], crossing_speed[i], normal = _viscous.dimensional(scene, cycle)
+def write(i, units, cycle, verdict, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+    """One cell's cycle, or the lanes', in SI units."""
+    period[i], amplitude[i], crossing_speed[i], normal = _foliot_scene.dimensional(units, cycle)
     sensitivity[i], multiplier[i] = cycle[3], cycle[4]
     status[i] = where(normal | (verdict >= FIRST_REFUSAL), verdict, _OUT_OF_RANGE)
 
 
 @jit
-def _closed(i, mu, phi0, a, period, amplitude, crossing_speed, sensitivity, multiplier, status):
-    k, rest, scene = _viscous.without_dimensions(mu[i], phi0[i], a[i])
-    cycle = _viscous.closed(k, rest)
-    _write(i, scene, cycle, _OK, period, amplitude, crossing_speed, sensitivity, multiplier, status)
+def _coulomb_cell(i, mu, phi0, a, R, R_s, c, n, k, e, rtol, *outputs):
+    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
+    scene, units = _foliot_scene.without_dimensions(*terms)
+    cycle, verdict = _coulomb.limit_cycle(scene)
+    write(i, units, cycle, verdict, *outputs)
 
 
 @entry()
-def closed(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
-    """The root q of q - tanh q = 1/alpha from fitted polynomials: 1e-15 at every drive, no iteration."""
-    each_cell(_closed, (mu, phi0, a, period, amplitude, crossing_speed, sensitivity, multiplier, status))
-
-
-@jit
-def _asymptotic(i, mu, phi0, a, period, amplitude, crossing_speed, sensitivity, multiplier, status):
-    k, _, scene = _viscous.without_dimensions(mu[i], phi0[i], a[i])
-    cycle = _viscous.asymptotic(k)
-    _write(i, scene, cycle, _OK, period, amplitude, crossing_speed, sensitivity, multiplier, status)
-
-
-@entry()
-def asymptotic(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
-    """Weak and strong series: the period within 0.5 %, the sensitivity within 2.2 % at every drive."""
-    each_cell(_asymptotic, (mu, phi0, a, period, amplitude, crossing_speed, sensitivity, multiplier, status))
-
-
-@jit
-def _event_map(i, mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
-    k, _, scene = _viscous.without_dimensions(mu[i], phi0[i], a[i])
-    cycle, unsettled = _viscous.event_map(k, rtol[i])
-    verdict = where(unsettled, _NOT_CONVERGED, _OK)
-    _write(i, scene, cycle, verdict, period, amplitude, crossing_speed, sensitivity, multiplier, status)
-
-
-@entry()
-def event_map(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
-    """The exact map from switch to switch, iterated from rest; slow at strong drive, where a swing forgets little."""
-    each_cell(_event_map, (mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status))
-
-
-@jit
-def _dopri5(i, mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
-    k, _, scene = _viscous.without_dimensions(mu[i], phi0[i], a[i])
-    cycle, unfinished, unsettled, loose = _viscous_dopri5.dopri5(k, rtol[i])
-    verdict = where(unfinished, _STEP_LIMIT, where(unsettled, _NOT_CONVERGED, where(loose, _INACCURATE, _OK)))
-    _write(i, scene, cycle, verdict, period, amplitude, crossing_speed, sensitivity, multiplier, status)
-
-
-@entry()
-def dopri5(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
-    """Dormand-Prince 5(4) over half swings, each switch located and restarted at, and Newton on their map."""
-    each_cell(_dopri5, (mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status))
-
-
-@jit
-def _worst(asked, cycle, sensitivity, multiplier):
-    """The largest bound of the outputs asked for: period, amplitude and speed share the first."""
-    worst = where(asked[SENSITIVITY] == 1, sensitivity, cycle)
-    return where((asked[MULTIPLIER] == 1) & (multiplier > worst), multiplier, worst)
-
-
-@jit
-def _asymptotic_bound(i, mu, phi0, a, out, asked):
-    k, _, _ = _viscous.without_dimensions(mu[i], phi0[i], a[i])
-    out[i] = _worst(asked, *_viscous.asymptotic_bound(k))
+def coulomb(mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+    """One transcendental equation by Halley's steps: 4e-15 at every drive."""
+    each_cell(
+        _coulomb_cell,
+        (mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status),
+    )
 
 
 @entry("asked")
-def asymptotic_bound(mu, phi0, a, rtol, asked, out):
-    """Bound on the error of `asymptotic`: the first terms left out."""
-    each_cell(_asymptotic_bound, (mu, phi0, a, out, asked))
+def coulomb_bound(mu, phi0, a, R, R_s, c, n, k, e, rtol, asked, out):
+    """Rounding; the multiplier exp(-tau), a normal number up to tau = 708, repeats that of tau."""
+    out[:] = worst(asked, _coulomb.ROUNDING, _coulomb.ROUNDING, 3e-13)
 
 
 @jit
-def _event_map_bound(i, mu, phi0, a, out, asked):
-    k, _, _ = _viscous.without_dimensions(mu[i], phi0[i], a[i])
-    out[i] = _worst(asked, *_viscous.event_map_bound(k))
-
-
-@entry("asked")
-def event_map_bound(mu, phi0, a, rtol, asked, out):
-    """What rounding leaves of the iterated map; that it settles to rtol, its status says."""
-    each_cell(_event_map_bound, (mu, phi0, a, out, asked))
-
-
-@entry("asked")
-def closed_bound(mu, phi0, a, rtol, asked, out):
-    """`closed` is right to rounding everywhere."""
-    out[:] = _worst(asked, _viscous.ROUNDING, _viscous.ROUNDING, 2.0 * _viscous.ROUNDING)
-
-
-@jit
-def _check(i, mu, phi0, a, status):
-    finite = (mu[i] < math.inf) & (phi0[i] < math.inf) & (a[i] < math.inf)
-    allowed = finite & (mu[i] >= 0.0) & (phi0[i] > 0.0) & (a[i] >= 0.0)  # NaN fails
-    cycle = where(a[i] > 0.0, _OK, _NO_LIMIT_CYCLE)
-    status[i] = where(allowed, where(mu[i] > 0.0, cycle, _NEVER_STARTS), _BAD_INPUT)
+def _segments_cell(i, mu, phi0, a, R, R_s, c, n, k, e, rtol, *outputs):
+    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
+    scene, units = _foliot_scene.without_dimensions(*terms)
+    cycle, verdict = _linear_swing.limit_cycle(scene, rtol[i])
+    write(i, units, cycle, verdict, *outputs)
 
 
 @entry()
-def check(mu, phi0, a, status):
-    """BAD_INPUT for what is NaN, infinite or negative; NEVER_STARTS without torque; NO_LIMIT_CYCLE without friction."""
-    each_cell(_check, (mu, phi0, a, status))
+def segments(mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+    """Exact pieces of the swing and Newton on their map; INACCURATE where conditioning leaves less than rtol."""
+    each_cell(
+        _segments_cell,
+        (mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status),
+    )
+
+
+@jit
+def refusal(mu, phi0, a, R, R_s, c, n, k, e):
+    """The status of `check` for one cell, or for lanes; OK where a method is to decide."""
+    known = (mu >= 0.0) & (phi0 > 0.0) & (a >= 0.0) & (R >= 0.0) & (c >= 0.0) & (n >= 0.0) & (k >= 0.0)  # NaN fails
+    small = (mu < math.inf) & (phi0 < math.inf) & (a < math.inf) & (R_s < math.inf) & (c < math.inf)
+    allowed = known & small & (n < math.inf) & (k < math.inf) & (R_s >= R) & (e > -1.0) & (e <= 1.0)
+    solid = R + where(n > 0.0, 0.0, c)
+    held = where(k > 0.0, solid, where(R_s > solid, R_s, solid))  # a spring helps stiction be overcome
+    lossless = isnt((a > 0.0) | (R > 0.0) | (c > 0.0) | (e < 1.0))
+    verdict = where(mu > held, where(lossless, _NO_LIMIT_CYCLE, _OK), _NEVER_STARTS)
+    return where(allowed, verdict, _BAD_INPUT)
+
+
+@jit
+def _check(i, mu, phi0, a, R, R_s, c, n, k, e, status):
+    status[i] = refusal(mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
+
+
+@entry()
+def check(mu, phi0, a, R, R_s, c, n, k, e, status):
+    """What no method is asked.
+
+    BAD_INPUT: NaN, infinite, outside its limits, or stiction below the friction of motion. NEVER_STARTS: torque that
+    cannot overcome solid friction. NO_LIMIT_CYCLE: nothing that takes energy.
+    """
+    each_cell(_check, (mu, phi0, a, R, R_s, c, n, k, e, status))
 
 
 PARAMETERS = (
     Field("mu", "rad/s^2", "drive torque per moment of inertia", lower=0.0, open_lower=True),
     Field("phi0", "rad", "switching angle", lower=0.0, open_lower=True),
     Field("a", "1/s", "viscous friction per moment of inertia", default=0.0, lower=0.0),
+    Field("R", "rad/s^2", "Coulomb friction per moment of inertia", default=0.0, lower=0.0),
+    Field("R_s", "rad/s^2", "stiction per moment of inertia, at least R", default="R", lower=0.0),
+    Field("c", "1", "drag c abs(v)^n per moment of inertia, in rad/s^2 for v in rad/s", default=0.0, lower=0.0),
+    Field("n", "1", "exponent of the drag", default=1.0, lower=0.0),
+    Field("k", "1/s^2", "hairspring stiffness per moment of inertia", default=0.0, lower=0.0),
+    Field(
+        "e",
+        "1",
+        "restitution: share of the speed kept at a switch",
+        default=1.0,
+        lower=-1.0,
+        upper=1.0,
+        open_lower=True,
+    ),
 )
+
+OUTPUTS = (
+    Field("period", "s", "period of the limit cycle"),
+    Field("amplitude", "rad", "largest angle"),
+    Field("crossing_speed", "rad/s", "angular speed just before the switch"),
+    Field("sensitivity", "1", "sensitivity of the period to torque, -dlnP/dlnmu"),
+    Field("multiplier", "1", "multiplier of the half-cycle map (0 where below 1e-308)"),
+)
+
+_VISCOUS_ONLY = ("R", "c", "k", "e")
 
 FOLIOT = Kernel(
     name="foliot",
-    doc="limit cycle of a verge and foliot with viscous friction",
-    source="Hoyng & Nieuwenhuizen, arXiv:1604.06681",
+    doc="limit cycle of a verge and foliot",
+    source="Hoyng & Nieuwenhuizen, arXiv:1604.06681; terms beyond viscous friction derived here",
     parameters=PARAMETERS,
-    outputs=(
-        Field("period", "s", "period of the limit cycle"),
-        Field("amplitude", "rad", "largest angle"),
-        Field("crossing_speed", "rad/s", "angular speed just before the switch"),
-        Field("sensitivity", "1", "sensitivity of the period to torque, -dlnP/dlnmu"),
-        Field("multiplier", "1", "multiplier of the half-cycle map (0 where below 1e-308)"),
-    ),
+    outputs=OUTPUTS,
     check=check,
     methods=(
-        Method("asymptotic", "weak and strong series with a bound each", asymptotic, asymptotic_bound),
-        Method("closed", "root of q - tanh q = 1/alpha by fitted polynomials", closed, closed_bound),
-        Method("map", "exact map from switch to switch, iterated from rest", event_map, event_map_bound),
-        Method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", dopri5),
+        Method(
+            "asymptotic",
+            "weak and strong series with a bound each",
+            _foliot_viscous.asymptotic,
+            _foliot_viscous.asymptotic_bound,
+            _VISCOUS_ONLY,
+        ),
+        Method(
+            "closed",
+            "root of q - tanh q = 1/alpha by fitted polynomials",
+            _foliot_viscous.closed,
+            _foliot_viscous.closed_bound,
+            _VISCOUS_ONLY,
+        ),
+        Method(
+            "coulomb",
+            "viscous and Coulomb friction: one equation by Halley's steps",
+            coulomb,
+            coulomb_bound,
+            ("c", "k", "e"),
+        ),
+        Method("segments", "exact pieces of linear terms, Newton on the half-swing map", segments, excludes=("c",)),
+        Method(
+            "map",
+            "exact map from switch to switch, iterated from rest",
+            _foliot_viscous.event_map,
+            _foliot_viscous.event_map_bound,
+            _VISCOUS_ONLY,
+        ),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
 )

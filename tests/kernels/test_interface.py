@@ -45,8 +45,7 @@ def test_status_numbers_fit_their_kind():
 
 def refusals(kernel, name, value):
     """The status of the kernel's example with another value of one parameter."""
-    cell = {p.name: kernel.example.get(p.name, p.default) for p in kernel.parameters} | {name: value}
-    return checked(kernel, *([v] for v in cell.values()))[0]
+    return checked(kernel, **{k: [v] for k, v in (dict(kernel.example) | {name: value}).items()})[0]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -63,10 +62,10 @@ def test_just_what_lies_outside_the_declared_limits_is_bad_input(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_the_example_of_every_kernel_runs(name):
     kernel = get(name)
-    cell = [[kernel.example.get(p.name, p.default)] for p in kernel.parameters]
+    cell = {name: [value] for name, value in kernel.example.items()}
     along = [np.linspace(0.0, 1.0, 5) for _ in kernel.along]
-    assert checked(kernel, *cell)[0] == Status.OK
+    assert checked(kernel, **cell)[0] == Status.OK
     for method in kernel.methods:
-        outputs, status = solve(kernel, method.name, *cell, along=along)
+        outputs, status = solve(kernel, method.name, along=along, **cell)
         assert status[0] == Status.OK
         assert all(np.isfinite(column).all() for column in outputs.values())
