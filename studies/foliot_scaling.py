@@ -13,11 +13,11 @@ import math
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from _common import Groups, Statement, columns, compared, read_result, report
 
 import sweep
 from sweep.analysis import crossover, fit_exponent, local_exponent, where_exponent, where_value
@@ -35,8 +35,6 @@ WANTED = ((2.0, 32.0), (4.0, 45.0), (4.0, 100.0))
 STRONG_P, STRONG_A = 4 * 3 ** (1 / 3), 3 ** (2 / 3) / 2
 """At strong drive a P = STRONG_P alpha^(-1/3) and A = STRONG_A alpha^(1/3)."""
 
-VERDICT = {None: "", True: "yes", False: "NO"}
-
 NOTES = """\
 paper: Hoyng & Nieuwenhuizen, arXiv:1604.06681; A = phi_max/phi0; (...) is exact, and not in the paper
 *: masked in the text at hand; here as it follows from the paper's equations
@@ -46,17 +44,6 @@ the window, and is no bound on the distance to the limit. Of places it is the es
 
 DAY = 24 * 60.0
 """Minutes in a day."""
-
-
-@dataclass(frozen=True)
-class Statement:
-    """One line of the table; `holds` is None where the paper says nothing that could be checked."""
-
-    what: str
-    paper: str
-    here: str
-    off: float | None = None
-    holds: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -103,16 +90,16 @@ def limits(ds: xr.Dataset) -> list[Statement]:
     b2 = (3 / strong) ** (2 / 3)  # square of the strong drive's small parameter
     ends = f"alpha = {weak:.2g}", f"alpha = {strong:.2g}"
     return [
-        _limit(f"weak drive: a P alpha at {ends[0]}", "4 *", float(first.aP) * weak, 4.0, 1.01 * weak),
-        _limit(f"weak drive: A at {ends[0]}", "1 *", float(first.A), 1.0, 0.31 * weak),
-        _limit(
+        compared(f"weak drive: a P alpha at {ends[0]}", "4 *", float(first.aP) * weak, 4.0, 1.01 * weak),
+        compared(f"weak drive: A at {ends[0]}", "1 *", float(first.A), 1.0, 0.31 * weak),
+        compared(
             f"strong drive: a P alpha^(1/3) at {ends[1]}",
             f"4 3^(1/3) = {STRONG_P:.5f} *",
             float(last.aP) * strong ** (1 / 3),
             STRONG_P,
             0.14 * b2,
         ),
-        _limit(
+        compared(
             f"strong drive: A alpha^(-1/3) at {ends[1]}",
             f"3^(2/3)/2 = {STRONG_A:.5f} *",
             float(last.A) / strong ** (1 / 3),
@@ -120,11 +107,6 @@ def limits(ds: xr.Dataset) -> list[Statement]:
             0.11 * b2,
         ),
     ]
-
-
-def _limit(what: str, paper: str, here: float, limit: float, allowed: float) -> Statement:
-    off = here / limit - 1
-    return Statement(what, paper, f"{here:.8g}", off, abs(off) <= allowed)
 
 
 def straight_lines(ds: xr.Dataset) -> list[Statement]:
@@ -207,8 +189,8 @@ def torque(ds: xr.Dataset) -> list[Statement]:
     factor, allowed = 10 ** (1 / 3), 0.14 * (30 / last) ** (2 / 3)
     cube, strong = f"10^(1/3) = {factor:.5f} *", "tenfold torque at strong drive:"
     rows = [
-        _limit(f"{strong} P falls by", cube, float(once.period / tenfold.period), factor, allowed),
-        _limit(f"{strong} phi_max grows by", cube, float(tenfold.amplitude / once.amplitude), factor, allowed),
+        compared(f"{strong} P falls by", cube, float(once.period / tenfold.period), factor, allowed),
+        compared(f"{strong} phi_max grows by", cube, float(tenfold.amplitude / once.amplitude), factor, allowed),
     ]
     drives = {"weak": float(ds.s[0]), "s = 1/2": 0.5, "strong": float(ds.s[-1])}
     said = {(15, "weak"): ("1 % *", 1.0), (15, "strong"): ("3 % *", 3.0)}
@@ -246,7 +228,7 @@ def inverse_design(ds: xr.Dataset) -> list[tuple[str, ...]]:
     return rows
 
 
-def statements(ds: xr.Dataset) -> dict[str, list[Statement]]:
+def statements(ds: xr.Dataset) -> Groups:
     """Every line of the table, by heading."""
     half = half_point(ds)
     return {
@@ -255,27 +237,6 @@ def statements(ds: xr.Dataset) -> dict[str, list[Statement]]:
         "At every drive": general(ds, half),
         "Torque": torque(ds),
     }
-
-
-def table(groups: dict[str, list[Statement]]) -> list[str]:
-    """Lines of the table "paper | here"."""
-    rows: list[tuple[str, ...]] = [("", "paper", "here", "deviation", "holds")]
-    for heading, lines in groups.items():
-        rows += [("",), (heading.upper(),)]
-        rows += [(s.what, s.paper, s.here, _number(s.off), VERDICT[s.holds]) for s in lines]
-    return columns(rows, " | ")
-
-
-def columns(rows: Sequence[Sequence[str]], between: str) -> list[str]:
-    """Rows as lines of text with aligned columns; a row of one cell is a heading."""
-    full = [row for row in rows if len(row) > 1]
-    widths = [max(map(len, column)) for column in zip(*full, strict=True)]
-    padded = [[cell.ljust(width) for cell, width in zip(row, widths, strict=False)] for row in rows]
-    return [row[0] if len(row) == 1 else between.join(cells).rstrip() for row, cells in zip(rows, padded, strict=True)]
-
-
-def _number(off: float | None) -> str:
-    return "" if off is None else f"{off:+.1e}"
 
 
 def trajectories(ds: xr.Dataset) -> xr.Dataset:
@@ -381,29 +342,19 @@ def draw_trajectories(panels: Sequence[Any], motion: xr.Dataset, phi0: float) ->
 
 def read(path: str) -> xr.Dataset:
     """The sweep with its dimensionless groups. Raises SweepError where it is none of this study."""
-    ds = sweep.open_result(path, strict=True)
-    if ds.attrs.get("kernel") != "foliot" or ds.period.dims != ("mu",):
-        raise sweep.SweepError(f"{path} is no sweep of the foliot over mu alone; make it from foliot_scaling.toml")
-    return scaled(ds.load())
+    return scaled(read_result(path, "foliot", ["mu"], "foliot_scaling.toml"))
+
+
+def conclude(path: str) -> tuple[Groups, list[str], Any]:
+    """Statements of the paper, inverse design, and the figure."""
+    ds = read(path)
+    heading = f"INVERSE DESIGN, phi0 = {math.degrees(float(ds.phi0)):g} degree (not in the paper)"
+    return statements(ds), [NOTES, "", heading, *columns(inverse_design(ds), "   ")], figure(ds)
 
 
 def main(arguments: Sequence[str]) -> int:
     """Table and figure of the result that is named; 1 if a statement of the paper does not hold."""
-    if len(arguments) != 1:
-        print(f"use: python {Path(__file__).name} foliot_scaling.h5", file=sys.stderr)
-        return 2
-    try:
-        from sweep import charts
-
-        ds = read(arguments[0])
-        groups, phi0 = statements(ds), math.degrees(float(ds.phi0))
-        print("\n".join([*table(groups), "", NOTES, "", f"INVERSE DESIGN, phi0 = {phi0:g} degree (not in the paper)"]))
-        print("\n".join([*columns(inverse_design(ds), "   "), ""]))
-        print(f"figure: {charts.save(figure(ds), Path(arguments[0]).with_suffix('.png'))}")
-    except sweep.SweepError as error:
-        print(error, file=sys.stderr)
-        return 2
-    return int(any(s.holds is False for lines in groups.values() for s in lines))
+    return report(__file__, ["foliot_scaling.h5"], arguments, conclude, "paper")
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import re
 import sys
 from pathlib import Path
 
+import _common
 import mpmath
 import numpy as np
 import pytest
@@ -182,7 +183,7 @@ def test_trajectories_follow_the_solution_between_the_switches(scaling, ds):
 
 
 def test_the_table_has_aligned_columns(scaling, groups):
-    lines = scaling.table(groups)
+    lines = _common.table(groups)
     bars = [[k for k, sign in enumerate(line) if sign == "|"] for line in lines if "|" in line]
     assert len(bars) == 1 + sum(map(len, groups.values()))
     assert all(row == bars[0][: len(row)] and len(row) == 4 for row in bars)

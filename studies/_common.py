@@ -1,0 +1,128 @@
+"""What the scripts of the studies share: opening a result, the table of statements, and the look of their figures.
+
+A script `<question>.py` stands beside its `<question>.toml`, reads the dataset that `sweep run` made of it, prints what
+theory says beside what comes out, and draws `<question>.png` beside the dataset.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+import sweep
+
+VERDICT = {None: "", True: "yes", False: "NO"}
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One line of the table; `holds` is None where nothing is said that could be checked."""
+
+    what: str
+    paper: str
+    here: str
+    off: float | None = None
+    holds: bool | None = None
+
+
+Groups = dict[str, list[Statement]]
+"""Statements by heading."""
+
+
+def compared(what: str, theory: str, here: float, value: float, allowed: float, digits: int = 8) -> Statement:
+    """A number beside what theory says; it holds if the relative deviation is at most `allowed`."""
+    off = here / value - 1
+    return Statement(what, theory, f"{here:.{digits}g}", off, abs(off) <= allowed)
+
+
+def differing(what: str, theory: str, here: float, value: float, allowed: float, digits: int = 8) -> Statement:
+    """As `compared`, of exponents and what else may be 0: the deviation is the difference."""
+    off = here - value
+    return Statement(what, theory, f"{here:.{digits}g}", off, abs(off) <= allowed)
+
+
+def table(groups: Groups, source: str = "paper") -> list[str]:
+    """Lines of the table "`source` | here"."""
+    rows: list[tuple[str, ...]] = [("", source, "here", "deviation", "holds")]
+    for heading, lines in groups.items():
+        rows += [("",), (heading.upper(),)]
+        rows += [(s.what, s.paper, s.here, _number(s.off), VERDICT[s.holds]) for s in lines]
+    return columns(rows, " | ")
+
+
+def columns(rows: Sequence[Sequence[str]], between: str) -> list[str]:
+    """Rows as lines of text with aligned columns; a row of one cell is a heading."""
+    full = [row for row in rows if len(row) > 1]
+    widths = [max(map(len, column)) for column in zip(*full, strict=True)]
+    padded = [[cell.ljust(width) for cell, width in zip(row, widths, strict=False)] for row in rows]
+    return [row[0] if len(row) == 1 else between.join(cells).rstrip() for row, cells in zip(rows, padded, strict=True)]
+
+
+def _number(off: float | None) -> str:
+    return "" if off is None else f"{off:+.1e}"
+
+
+def read_result(path: str, kernel: str, dims: Sequence[str], toml: str) -> xr.Dataset:
+    """The finished sweep of a kernel over these axes, in memory. Raises SweepError where it is none."""
+    ds = sweep.open_result(path, strict=True)
+    if ds.attrs.get("kernel") != kernel or ds.status.dims != tuple(dims):
+        over = " and ".join(dims) + (" alone" if len(dims) == 1 else "")
+        raise sweep.SweepError(f"{path} is no sweep of the {kernel} over {over}; make it from {toml}")
+    return ds.load()
+
+
+def report(
+    script: str,
+    inputs: Sequence[str],
+    arguments: Sequence[str],
+    conclude: Callable[..., tuple[Groups, Sequence[str], Any]],
+    source: str = "theory",
+) -> int:
+    """Prints what a study concludes from the results named, and saves its figure beside the first of them.
+
+    Parameters
+    ----------
+    script : path of the script, for the line on its use
+    inputs : what its arguments are called there
+    conclude : gives the statements, further lines of text, and the figure, from the paths
+    source : heading of what the numbers are compared with
+
+    Returns
+    -------
+    int
+        Exit status: 1 if a statement does not hold, 2 if the results are not there or not of this study.
+    """
+    if len(arguments) != len(inputs):
+        print(f"use: python {Path(script).name} {' '.join(inputs)}", file=sys.stderr)
+        return 2
+    try:
+        from sweep import charts
+
+        groups, notes, page = conclude(*arguments)
+        print("\n".join([*table(groups, source), "", *notes, ""]))
+        print(f"figure: {charts.save(page, Path(arguments[0]).with_suffix('.png'))}")
+    except sweep.SweepError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return int(any(s.holds is False for lines in groups.values() for s in lines))
+
+
+def hatch(axes: Any, x: Any, y: Any, where: Any, pattern: str, colour: str = "0.45") -> None:
+    """Hatches the cells of a map for which `where`, of shape (y, x), is true, and draws their edge."""
+    import matplotlib
+
+    shown = where.astype(float)
+    with matplotlib.rc_context({"hatch.color": colour, "hatch.linewidth": 0.4}):
+        axes.contourf(x, y, shown, levels=[0.5, 1.5], colors="none", hatches=[pattern])
+    axes.contour(x, y, shown, levels=[0.5], colors=[colour], linewidths=0.8)
+
+
+def direct_label(axes: Any, x: float, y: float, text: str, colour: str = "black", **how: Any) -> None:
+    """Text in the colour of the line it names, readable where it crosses others."""
+    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
+    axes.text(x, y, text, color=colour, bbox=box, **{"fontsize": 8, "ha": "center", "va": "center", **how})
