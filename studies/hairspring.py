@@ -1,0 +1,297 @@
+"""By how much does a balance spring steady a foliot against changes of its drive torque, and at what price?
+
+    sweep run studies/hairspring.toml
+    python studies/hairspring.py hairspring.h5
+
+draws hairspring.png and prints theory beside what comes out. kappa = k phi0/mu is the spring's torque at the switching
+angle over the drive, alpha = mu/(a^2 phi0) the drive as Hoyng & Nieuwenhuizen have it, Q = sqrt(k)/a.
+
+Theory, to first order in the torque: phi = A sin wt, w = sqrt(k), and the torque, which lags by asin(phi0/A), pushes
+against the displacement with first harmonic (4 mu/pi) cos(asin(phi0/A)), while friction pi a w A^2/2 takes 2 mu phi0:
+    P = (2 pi/w) (1 - (2 mu/(pi k A)) sqrt(1 - y)),  y = (phi0/A)^2 = (pi/4) a sqrt(k) phi0/mu,
+    s = kappa^(-3/4) alpha^(-1/4) / (2 sqrt(pi)) / sqrt(1 - y).                                        (1)
+At given drive and friction (1) is least at y = 3/4; at given Q it is least at y = 1/2; y = 1 is the end. Derived here.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from _common import Groups, Statement, columns, compared, differing, direct_label, hatch, read_result, report
+
+import sweep
+from kernels.interface import Status
+from sweep.analysis import fit_exponent, local_exponent, where_exponent, where_value
+
+SHOWN = (1e6, 1e4, 1e2, 1.0)
+"""alpha of the lines in the figure."""
+
+DAY = 86400.0
+GOALS = {"1 min/day": 15, "1 s/day": 900}
+"""How many times less than the verge's 15 min/day."""
+
+NOTES = """\
+s = -dlnP/dlnmu; theory is of first order in the torque, exact for alpha and kappa large; a number holds if the next
+order in 1/sqrt(alpha) or 1/kappa accounts for the deviation, which is relative; of exponents it is the difference
+paper: Hoyng & Nieuwenhuizen, arXiv:1604.06681, "if they had only mounted some kind of a spring on the foliot"\
+"""
+
+
+def scaled(ds: xr.Dataset) -> xr.Dataset:
+    """`ds` over kappa and alpha, with `s`, amplitude `A` in phi0, and Q."""
+    alpha, kappa = ds.mu / (ds.a**2 * ds.phi0), ds.k * ds.phi0 / ds.mu
+    ds = ds.assign_coords(alpha=alpha, kappa=kappa, Q=np.sqrt(ds.k) / ds.a)
+    return ds.assign(s=ds.sensitivity, A=ds.amplitude / ds.phi0)
+
+
+def at(alpha: Any, kappa: Any, design: str = "product") -> xr.Dataset:
+    """The same foliot at other alpha and kappa."""
+    axes = {"a": np.atleast_1d(alpha) ** -0.5, "k": np.atleast_1d(kappa)}
+    study = sweep.build_study(kernel="foliot", design=design, rtol=1e-7, axes=axes, fixed={"mu": 1.0, "phi0": 1.0})
+    return scaled(sweep.run(study))
+
+
+def lines(ds: xr.Dataset, alpha: float) -> xr.Dataset:
+    """The sweep of the spring at the drive next to `alpha`."""
+    return ds.isel({ds.alpha.dims[0]: int(np.argmin(abs(np.log(ds.alpha.values / float(alpha)))))})
+
+
+def first_order(alpha: Any, kappa: Any) -> Any:
+    """Equation (1); NaN where the spring cannot be thrown over."""
+    y = math.pi / 4 * np.sqrt(kappa / alpha)
+    return kappa**-0.75 * alpha**-0.25 / np.sqrt(4 * math.pi * np.where(y < 1, 1 - y, np.nan))
+
+
+def laws(ds: xr.Dataset) -> list[Statement]:
+    """How the sensitivity falls with the spring, from that of the foliot to the line of (1)."""
+    strong = lines(ds, ds.alpha.max())
+    alpha, bare = float(strong.alpha), at(strong.alpha.values, 0.0).s.item()
+    window = 10.0, 1000.0
+    fall = fit_exponent(strong.s, "kappa", window)
+    by_drive = fit_exponent(ds.s.sel(k=100.0, method="nearest"), "alpha", (1e5, None))
+    middle = strong.sel(k=100.0, method="nearest")
+    theory = float(first_order(alpha, middle.kappa.item()))
+    slack = (math.pi / 16) * math.sqrt(window[1] / alpha) + 1 / window[0] ** 1.75  # of (1), and of the next order
+    return [
+        compared(
+            f"s at kappa = {ds.kappa[0]:.0e}: still the foliot's", f"{bare:.6f}", float(strong.s[0]), bare, 1e-2, 6
+        ),
+        differing(
+            f"exponent of s in kappa, 10 to 1000, alpha = {alpha:.0e}", "-3/4", fall.exponent.item(), -0.75, slack
+        ),
+        differing("exponent of s in alpha at kappa = 100", "-1/4", by_drive.exponent.item(), -0.25, 0.02),
+        compared(f"s at kappa = {middle.kappa:.4g}", f"(1) = {theory:.6g}", middle.s.item(), theory, 1e-3, 6),
+        agreement(ds),
+    ]
+
+
+def agreement(ds: xr.Dataset) -> Statement:
+    """The exact s against differences of ln P: P sqrt(mu/phi0) is a function of a sqrt(phi0/mu) and kappa."""
+    inner = ds.isel(a=slice(None, 41)).where(ds.kappa < 100)
+    by_a, by_k = local_exponent(inner.period, "a"), local_exponent(inner.period, "k")
+    off = float(abs(0.5 + by_a / 2 + by_k - inner.s).max())
+    return Statement("differences of ln P against the exact s", "", "largest distance", off, off < 1e-3)
+
+
+def best_springs(ds: xr.Dataset) -> xr.Dataset:
+    """The cells with the springs of least sensitivity, for every drive of the grid from alpha = 10 on."""
+    strong = ds.where(ds.alpha > 9.99, drop=True)
+    place = where_exponent(strong.s, "kappa", 0.0).abscissa
+    return at(strong.alpha.values, place.values, "zip")
+
+
+def end(ds: xr.Dataset, alpha: float) -> float:
+    """The strongest spring [kappa] that the drive still throws over, to one part in 2000."""
+    line = lines(ds, alpha)
+    last = int(np.flatnonzero(line.s.notnull())[-1])
+    fine = at(line.alpha.item(), np.geomspace(*line.kappa.values[last : last + 2], 201)).isel(a=0)
+    return float(fine.kappa[fine.s.notnull()][-1])
+
+
+def optimum(ds: xr.Dataset, springs: xr.Dataset) -> list[Statement]:
+    """The best spring, where there is no cycle any more, and what is told from rest."""
+    found = []
+    for alpha in (1e6, 1e4, 1e2):
+        cell, next_order = lines(springs, alpha), 1e-4 + 1 / alpha
+        found += [
+            compared(
+                f"alpha = {alpha:.0e}: best spring, kappa/alpha",
+                "9/pi^2 = 0.91189",
+                float(cell.kappa / cell.alpha),
+                9 / math.pi**2,
+                next_order,
+                6,
+            ),
+            compared(
+                "  s alpha there", "pi/27^(1/2) = 0.60460", float(cell.s * cell.alpha), math.pi / 27**0.5, next_order, 6
+            ),
+            compared("  A/phi0 there", "2/3^(1/2) = 1.15470", float(cell.A), 2 / 3**0.5, next_order, 6),
+            compared(
+                "  strongest with a cycle",
+                "16/pi^2 = 1.6211",
+                end(ds, alpha) / alpha,
+                16 / math.pi**2,
+                1e-3 + 4 / alpha,
+                5,
+            ),
+        ]
+    return [*found, envelope(1000.0), from_rest(ds)]
+
+
+def envelope(Q: float) -> Statement:
+    """The least sensitivity at given Q."""
+    kappa = np.geomspace(Q / 10, Q, 61)
+    ds = at(Q**2 / kappa, kappa, "zip")
+    place = where_exponent(ds.s, "kappa", 0.0).abscissa.item()
+    cell = at(Q**2 / place, place).isel(a=0, k=0)
+    return compared(
+        f"least s Q at Q = {Q:g}, there kappa/Q = {place / Q:.4f}", "1/2", float(cell.s * cell.Q), 0.5, 3 / Q, 6
+    )
+
+
+def from_rest(ds: xr.Dataset) -> Statement:
+    """Self-starting is where the first swing of a free balance under constant torque passes phi0."""
+    zeta = np.minimum(1 / (2 * ds.Q), 1 - 1e-15)
+    reach = (1 + np.exp(-math.pi * zeta / np.sqrt(1 - zeta**2))) / ds.kappa
+    cells = ds.s.notnull()
+    wrong = int((((ds.status == Status.NOT_SELF_STARTING) != (reach < 1)) & cells).sum())
+    here = f"{wrong} of {int(cells.sum())} cells"
+    return Statement(
+        "not self-starting unless kappa < 1 + e^(-pi zeta/(1-zeta^2)^(1/2))", "0 cells", here, None, not wrong
+    )
+
+
+def improvement(ds: xr.Dataset) -> list[Statement]:
+    """What the paper expects of a spring: by what factor the sensitivity falls at best."""
+    gain = {alpha: at(alpha, 0.0).s.item() / float(lines(ds, alpha).s.min()) for alpha in (1e4, 1e2, 1.0, 1e-2)}
+    said = {1e4: True, 1e2: True}
+    return [
+        Statement(f"best spring, s of alpha = {alpha:g} falls by", "dramatically" if alpha in said else "", f"{x:.4g}",
+                  None, x > 10 if alpha in said else None)
+        for alpha, x in gain.items()
+    ]  # fmt: skip
+
+
+def per_day(s: float) -> str:
+    """Seconds a day by 1 % of torque."""
+    return f"{0.01 * DAY * s:.3g}"
+
+
+def wanted(line: xr.Dataset, least: xr.Dataset, s: float) -> str:
+    """The spring for a sensitivity at one drive: kappa and Q; * where it is not self-starting."""
+    if not s > float(least.s):
+        return "out of reach"
+    kappa = where_value(line.s, "kappa", s, (None, float(least.kappa))).abscissa.item()
+    cell = at(line.alpha.item(), kappa).isel(a=0, k=0)
+    return f"{kappa:.3g}, {float(cell.Q):.3g}" + "*" * int(cell.status == Status.NOT_SELF_STARTING)
+
+
+def clock(ds: xr.Dataset, springs: xr.Dataset) -> list[str]:
+    """Springs for the clockmaker, by drive."""
+    rows: list[tuple[str, ...]] = [("alpha", "s/day by 1 % of torque", "torque steady to", *GOALS, "best spring")]
+    for alpha in (10.0, 1e2, 1e3, 1e4, 1e6):
+        line, least, bare = lines(ds, alpha), lines(springs, alpha), at(alpha, 0.0).s.item()
+        found = (wanted(line, least, bare / factor) for factor in GOALS.values())
+        last = f"{float(least.kappa):.3g}, {float(least.Q):.3g}*: {per_day(least.s)} s/day"
+        rows.append((f"{alpha:g}", per_day(bare), f"{1.5 / 1.44 / bare:.2f} %", *found, last))
+    heading = "THE VERGE'S 15 MIN/DAY, and the springs (kappa, Q) that make less of it; *: not self-starting"
+    return [heading, *columns(rows, "   ")]
+
+
+def figure(ds: xr.Dataset, springs: xr.Dataset) -> Any:
+    """Sensitivity against the spring, and a map of it over spring and drive."""
+    from sweep import charts
+
+    with charts.style():
+        page = charts.new_figure(charts.PAGE, 84.0)
+        left, right = page.subplots(1, 2, width_ratios=(1, 1.05))
+        draw_lines(left, ds, springs)
+        draw_map(right, ds)
+        for axes, text in ((left, "a"), (right, "b")):
+            charts.letter(axes, text)
+    return page
+
+
+def draw_lines(axes: Any, ds: xr.Dataset, springs: xr.Dataset) -> None:
+    """s against kappa at several drives: exact, by (1), and the best springs."""
+    from sweep.charts import COLOURS
+
+    for alpha, colour in zip(SHOWN, COLOURS, strict=False):
+        line = lines(ds, alpha)
+        started = line.status == Status.OK
+        axes.loglog(line.kappa, line.s.where(started), color=colour)
+        axes.loglog(line.kappa, line.s.where(~started), color=colour, linestyle=(0, (2.5, 1)))
+        power = round(math.log10(alpha))
+        if power == 0:
+            direct_label(axes, 3, 0.45, r"$\alpha = 1$", colour, ha="left")
+            continue
+        cell, few = lines(springs, alpha), line.kappa.values[::10]
+        few = few[(few > alpha ** (-1 / 3)) & (few < 1.6 * alpha)]
+        axes.plot(few, first_order(alpha, few), "x", color="black", markersize=3.5, markeredgewidth=0.7)
+        axes.plot(cell.kappa, cell.s, "o", color=colour)
+        direct_label(axes, 3 * cell.kappa, cell.s, rf"$10^{{{power}}}$", colour, ha="left")
+    axes.set(xlabel=r"spring, $\kappa = k\varphi_0/\mu$", ylabel=r"sensitivity to torque, $s$")
+    axes.set(xlim=(ds.kappa.min(), ds.kappa.max()), ylim=(2e-7, 1.5))
+    key(axes)
+    day = axes.secondary_yaxis("right", functions=(lambda s: 0.01 * DAY * s, lambda rate: rate / (0.01 * DAY)))
+    day.set_ylabel("rate [s/day] by 1 % of torque")
+    axes.tick_params(axis="y", which="both", right=False)
+
+
+def key(axes: Any) -> None:
+    """What lines and marks mean, whatever their colour."""
+    looks = {"self-starting": {}, "not self-starting": {"linestyle": (0, (2.5, 1))}}
+    looks |= {"equation (1)": {"marker": "x", "linestyle": ""}, "best spring": {"marker": "o", "linestyle": ""}}
+    for name, look in looks.items():
+        axes.plot([], [], color="black", label=name, **look)
+    axes.legend(loc="lower left")
+
+
+def draw_map(axes: Any, ds: xr.Dataset) -> None:
+    """s over spring and drive; hatched where there is no cycle, and where it does not start by itself."""
+    from matplotlib.colors import LogNorm
+
+    kappa, alpha, rate = ds.kappa.values, ds.alpha.values, 0.01 * DAY * ds.s.values
+    axes.set(xscale="log", yscale="log", xlabel=r"spring, $\kappa = k\varphi_0/\mu$")
+    axes.set(ylabel=r"drive, $\alpha = \mu/(a^2\varphi_0)$", ylim=(alpha.min(), alpha.max()))
+    shown = np.ma.masked_invalid(rate)
+    axes.pcolormesh(kappa, alpha, shown, norm=LogNorm(1e-4, 1e3), cmap="viridis", alpha=0.75, rasterized=True)
+    levels = (1e-3, 1e-2, 0.1, 1, 10, 100, 400)
+    axes.clabel(axes.contour(kappa, alpha, rate, levels=levels, colors="black", linewidths=0.7), fmt="%g", fontsize=7)
+    hatch(axes, kappa, alpha, (ds.status == Status.STICKS).values, "////")
+    hatch(axes, kappa, alpha, (ds.status == Status.NOT_SELF_STARTING).values, "..", "white")
+    line = alpha[alpha > 9.9]
+    axes.plot(9 / math.pi**2 * line, line, color="white", linestyle=(0, (5, 1.5)))
+    direct_label(axes, 3e4, 0.3, "sticks: no cycle")
+    direct_label(axes, 1e-3, 3e2, "rate [s/day]\nby 1 % of torque")
+    how = {"fontsize": 8, "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 1}, "ha": "center"}
+    arrow = {"arrowstyle": "->", "linewidth": 0.6}
+    axes.annotate("not self-starting", (60, 600), (1.5e5, 12), arrowprops=arrow, **how)
+    axes.annotate("best spring", (3e3, 3e3), (1e6, 4e2), arrowprops=arrow, **how)
+
+
+def read(path: str) -> xr.Dataset:
+    """The sweep with its dimensionless groups. Raises SweepError where it is none of this study."""
+    return scaled(read_result(path, "foliot", ["a", "k"], "hairspring.toml"))
+
+
+def conclude(path: str) -> tuple[Groups, list[str], Any]:
+    """Statements, springs for the clockmaker, and the figure."""
+    ds = read(path)
+    springs = best_springs(ds)
+    groups = {"The law": laws(ds), "How far it goes": optimum(ds, springs), "The paper's spring": improvement(ds)}
+    return groups, [NOTES, "", *clock(ds, springs)], figure(ds, springs)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Table and figure of the result that is named; 1 if a statement does not hold."""
+    return report(__file__, ["hairspring.h5"], arguments, conclude)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
