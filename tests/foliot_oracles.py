@@ -94,8 +94,8 @@ def _cycle(cell, method, digits):
         mp.dps = 60
         law = law_of(*cell)
         _refuse(law)
-        spare = _lost(law.d, law.kappa, 1 - law.rho, law.rho, 1 - law.e * abs(law.e), *method.groups(law))
-        mp.dps = 20 + spare
+        spare = method.lost(law)
+        mp.dps = 15 + spare
         rough = method.search(law_of(*cell))
         mp.dps = spare + method.working(law, rough, digits)
         law = law_of(*cell)
@@ -165,6 +165,10 @@ def _chord(miss, x, slope):
 class _Mapped:
     """The search for v1 as the fixed point of a half swing; what Flows and Series share."""
 
+    @staticmethod
+    def lost(law):
+        return _lost(law.d, law.kappa, 1 - law.rho, law.rho, law.gamma, 1 - law.e * abs(law.e))
+
     @classmethod
     def search(cls, law):
         """v1 of the cycle, roughly. The loss grows with the swing: it exists if the half swing from rest arrives."""
@@ -200,10 +204,6 @@ class _Mapped:
 
 class Flows(_Mapped):
     """Linear pieces: v and x in closed form, with sigma^2 = kappa - d^2/4 of either sign."""
-
-    @staticmethod
-    def groups(law):
-        return ()
 
     @staticmethod
     def working(law, v1, digits):
@@ -303,8 +303,10 @@ class Integrals:
     """
 
     @staticmethod
-    def groups(law):
-        return (law.gamma,)
+    def lost(law):
+        """Digits that the energy kept loses where friction is weak, and those of the slope where it is almost 1."""
+        losses = (1 - law.e * abs(law.e), law.rho, law.d, law.gamma)
+        return 10 - int(log(min(mpf(1), sum(losses)), 10)) - int(2 * log(1 - law.rho, 10))
 
     @staticmethod
     def working(law, z, digits):
@@ -378,7 +380,7 @@ def _top_speed(law):
 def _gain(law, top, z):
     """1 - f(V (1 - exp(-z)))."""
     w = exp(-z)
-    power = -expm1(law.n * log1p(-w)) if w < 1 else mpf(1)
+    power = -expm1(law.n * (log1p(-w) if z > 1 else log(-expm1(-z)))) if law.gamma and z else mpf(1)
     return law.d * top * w + (law.gamma * top**law.n * power if law.gamma else 0)
 
 
@@ -391,8 +393,10 @@ def _drive_integral(law, top, z, weight, start=0):
         w = exp(-z)
         return weight(-top * expm1(-z)) * top * w / _gain(law, top, z)
 
-    marks = [start, *(m for m in (mpf(1), mpf(4), mpf(12), mpf(40), flat) if start < m < z), min(z, max(flat, start))]
-    total = quad(slice_, marks)
+    marks = [*(m for m in (mpf(1), mpf(4), mpf(12), mpf(40), flat) if start < m < z), min(z, max(flat, start))]
+    total = quad(slice_, [start, marks[0]])
+    if len(marks) > 1:  # smooth here
+        total += quad(slice_, marks, method="gauss-legendre")
     return total + (z - marks[-1]) * slice_(marks[-1]) if z > marks[-1] else total
 
 
@@ -411,10 +415,6 @@ def _energy(law, top, z):
 
 class Series(_Mapped):
     """Spring and power law together: Taylor series. From u = |v| follow u^n in time, and x, t in ln u near u = 0."""
-
-    @staticmethod
-    def groups(law):
-        return (law.gamma,)
 
     @staticmethod
     def working(law, v1, digits):
