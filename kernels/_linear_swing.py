@@ -19,7 +19,7 @@ from kernels.interface import Status
 
 NEWTON_LIMIT = 100
 """Newton steps or bisections on the map of E; about eight are usual."""
-ROUNDING = 4e-15
+ROUNDING = 2e-15
 """Relative error of one half swing: of time, amplitude, speed and of the terms of (4)."""
 
 _OK, _NOT_CONVERGED, _INACCURATE = float(Status.OK), float(Status.NOT_CONVERGED), float(Status.INACCURATE)

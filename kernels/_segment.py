@@ -221,7 +221,7 @@ def first_crossing(beta, kappa, v, f, way):
         inside = (guess >= low) & (guess <= high)
         fallback = where(high < math.inf, 0.5 * (low + high), 2.0 * t)
         guess = where(inside, guess, fallback)
-        settled = magnitude(guess - t) <= 1e-11 * t
+        settled = (magnitude(guess - t) <= 1e-11 * t) | (magnitude(miss) <= 4e-16 * way)
         t = where(active, guess, t)
         active = active & isnt(settled)
-    return where(meets & isnt(active), t, math.inf)
+    return where(meets, t, math.inf)
