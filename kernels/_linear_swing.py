@@ -170,8 +170,8 @@ def limit_cycle(scene, rtol):
     loose = noise / (rest * energy) + ROUNDING * (1.0 + (1.0 + top) / (speed * time))
     loose_s = 2.0 * loose * terms / magnitude(s)
     loose_m = loose + where(area > 1e-300, 0.1 * ROUNDING * d * time, 0.0)
-    verdict = where((loose_s <= rtol) & (loose_m <= rtol), _OK, _INACCURATE)
-    verdict = where(_self_starting(d, kappa, slack, rho_s), verdict, _NOT_SELF_STARTING)
+    verdict = where(_self_starting(d, kappa, slack, rho_s), _OK, _NOT_SELF_STARTING)
+    verdict = where((loose_s <= rtol) & (loose_m <= rtol), verdict, _INACCURATE)
     verdict = where(unsettled, _NOT_CONVERGED, verdict)
     verdict = where(comes & (1.0 + kappa * top > rho_s), verdict, _STICKS)
     return (time, top, sqrt(2.0 * energy), s, e * e * area), verdict
