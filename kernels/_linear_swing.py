@@ -169,7 +169,7 @@ def limit_cycle(scene, rtol):
     s, terms = _sensitivity(scene, energy, (balanced, top, speed, legs), time, rest)
     loose = noise / (rest * energy) + ROUNDING * (1.0 + (1.0 + top) / (speed * time))
     loose_s = 2.0 * loose * terms / magnitude(s)
-    loose_m = loose + where(area > 1e-300, 0.1 * ROUNDING * d * time, 0.0)
+    loose_m = loose + where(area > 1e-300, 0.3 * ROUNDING * d * time, 0.0)
     verdict = where(_self_starting(d, kappa, slack, rho_s), _OK, _NOT_SELF_STARTING)
     verdict = where((loose_s <= rtol) & (loose_m <= rtol), verdict, _INACCURATE)
     verdict = where(unsettled, _NOT_CONVERGED, verdict)
