@@ -5,12 +5,12 @@ rate, and a right-hand side is `accelerations(state, scene) -> (x'', x1'', x2'')
 integral of a rate, the stages of a position are folded into those of its rate (Nystroem form), which halves the work:
     V_i = v + h sum_j a_ij F_j,  X_i = x + c_i h v + h^2 sum_j (sum_m a_im a_mj) F_j.                     (1)
 An integral y along the motion may follow as a seventh entry of the state; its rate y' is then the fourth of the
-right-hand side.
+right-hand side. Entries behind it do not change in a step: what an event or a right-hand side knows a cell by.
 """
 
 import numpy as np
 
-from kernels._jit import jit, jit_call
+from kernels._jit import jit, jit_call, jit_inline
 from kernels._lanes import choose, dot, exponent, fma, isnt, magnitude, pow2, some, where
 from kernels._vecmath import LN2, exp
 
@@ -18,6 +18,8 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 STEP_LIMIT = 10_000
 """Steps between two events after which a cell is given up."""
 ROOT_LIMIT = 60
+SETTLED = 1e-9
+"""Newton's step, over the whole one, after which the event is where the next trial ends: its error is the square."""
 
 # Dormand & Prince, J. Comput. Appl. Math. 6:19 (1980), RK5(4)7M; the last row is the fifth-order result
 _A = np.zeros((7, 7))
@@ -61,28 +63,29 @@ def _with_integral(pairs, state, h, weights, rates):
     """The pairs, and behind them the integral, where the state has one (known when compiled)."""
     if len(state) == 6:
         return pairs
-    return (*pairs, fma(h, dot(weights, rates), state[6]))
+    return (*pairs, fma(h, dot(weights, rates), state[6]), *state[7:])
 
 
 @jit
-def _integral_miss(state, h, rates, scale):
-    """Estimated error of the integral over its scale; 0 where there is none."""
-    if len(state) == 6:
-        return 0.0
-    return magnitude(h * dot(_RATE_ERROR, rates)) / scale[6]
+def _worse(error, scale, other, other_scale):
+    """Of two errors with their scales the one that is larger in its scale; the first where it is NaN."""
+    smaller = error * other_scale <= other * scale
+    return where(smaller, other, error), where(smaller, other_scale, scale)
 
 
 @jit
-def _larger(x, y):
-    return where(x > y, x, y)
-
-
-@jit
-def _miss(h, accelerations, rate_scale, position_scale):
-    """Estimated error of a pair over its scale."""
-    rate = magnitude(h * dot(_RATE_ERROR, accelerations)) / rate_scale
-    position = magnitude(h * h * dot(_POSITION_ERROR, accelerations)) / position_scale
-    return _larger(rate, position)
+def _worst(h, f0, f1, f2, f3, scale):
+    """The largest estimated error over its scale; one division in all, for they are dear."""
+    square = h * h
+    error, over = magnitude(h * dot(_RATE_ERROR, f0)), scale[1]
+    error, over = _worse(error, over, magnitude(square * dot(_POSITION_ERROR, f0)), scale[0])
+    error, over = _worse(error, over, magnitude(h * dot(_RATE_ERROR, f1)), scale[3])
+    error, over = _worse(error, over, magnitude(square * dot(_POSITION_ERROR, f1)), scale[2])
+    error, over = _worse(error, over, magnitude(h * dot(_RATE_ERROR, f2)), scale[5])
+    error, over = _worse(error, over, magnitude(square * dot(_POSITION_ERROR, f2)), scale[4])
+    if len(scale) > 6:
+        error, over = _worse(error, over, magnitude(h * dot(_RATE_ERROR, f3)), scale[6])
+    return error / over
 
 
 @jit
@@ -117,10 +120,7 @@ def dopri5_step(accelerations, state, scene, h, scale):
     f0, f1, f2, f3 = (*f0, g0), (*f1, g1), (*f2, g2), (*f3, g3)
     new = _at(state, h, _RESULT, f0, f1, f2, f3)
     z0, z1, z2, z3 = _rates(accelerations, new, scene)
-    motion = _miss(h, (*f0, z0), scale[1], scale[0])
-    tangents = _larger(_miss(h, (*f1, z1), scale[3], scale[2]), _miss(h, (*f2, z2), scale[5], scale[4]))
-    integral = _integral_miss(state, h, (*f3, z3), scale)
-    return new, _larger(_larger(motion, tangents), integral)
+    return new, _worst(h, (*f0, z0), (*f1, z1), (*f2, z2), (*f3, z3), scale)
 
 
 @jit
@@ -136,7 +136,7 @@ def _step_factor(ratio):
     return where(factor < GROW, factor, GROW)
 
 
-@jit
+@jit_inline
 def integrate_until(event, accelerations, scales, state, scene, h, tolerance, active):
     """Follow the motion of the active cells until `event` falls through 0, and stop there.
 
@@ -172,7 +172,7 @@ def integrate_until(event, accelerations, scales, state, scene, h, tolerance, ac
     return state, t + last, h, moving
 
 
-@jit
+@jit_inline
 def _locate(event, accelerations, scales, state, scene, h, active):
     """Shorten the step `h` until it ends at the event: Newton, bisection where that leaves the bracket.
 
@@ -189,8 +189,8 @@ def _locate(event, accelerations, scales, state, scene, h, active):
         value, rate = event(new, accelerations(new, scene)[0])
         low, high = where(value > 0.0, part, low), where(value > 0.0, high, part)
         guess = part - value / rate
-        guess = where((guess > low) & (guess < high), guess, 0.5 * (low + high))
-        settled = magnitude(guess - part) <= 4e-16 * h
+        settled = magnitude(guess - part) <= SETTLED * h
+        guess = where(settled | ((guess > low) & (guess < high)), guess, 0.5 * (low + high))
         part = where(searching, guess, part)
         trial, _ = dopri5_step(accelerations, state, scene, part, scale)
         new = choose(searching, trial, new)
