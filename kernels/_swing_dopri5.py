@@ -40,9 +40,14 @@ _STIFFEST_UNIFORM = 1e6
 """The same where the motion becomes uniform and need not be followed so far."""
 _SHARE = 0.3
 """Of rtol that a single step may take; the rest is left to their sum."""
+_ROUGH_SHARE = 0.03
+"""The same for friction whose slope is not smooth at rest."""
 _CHECK = 4.0
 """The last swing but one has a tolerance so much wider than the last: how far the two differ is the error's measure."""
-_COARSE = 1e-3
+_COARSE, _ORDERLY = 1e-3, 3e-5
+"""Tolerances to begin with, and below which an error falls as the tolerance does."""
+_NOISE = 100.0
+"""Tolerances within which the sign of F - v may be wrong."""
 _FINEST = 3e-15
 """Tolerance of a step that rounding leaves possible."""
 _CAREFUL = 1e-5
@@ -289,21 +294,6 @@ def _held(gamma, n, floor):
 
 
 @jit
-def _relative(new, old):
-    return magnitude(new - old) / (magnitude(new) + 1e-300)
-
-
-@jit
-def _difference(new, old):
-    """The largest relative difference between two tuples of five."""
-    worst = _relative(new[0], old[0])
-    worst = _larger(worst, _relative(new[1], old[1]))
-    worst = _larger(worst, _relative(new[2], old[2]))
-    worst = _larger(worst, _relative(new[3], old[3]))
-    return _larger(worst, _relative(new[4], old[4]))
-
-
-@jit
 def _larger(x, y):
     return where(x > y, x, y)
 
@@ -314,99 +304,129 @@ def _smaller(x, y):
 
 
 @jit
+def _relative(new, old):
+    return magnitude(new - old) / (magnitude(new) + 1e-300)
+
+
+@jit
+def _difference(new, old):
+    """The largest relative difference between two cycles."""
+    worst = _relative(new[0], old[0])
+    worst = _larger(worst, _relative(new[1], old[1]))
+    worst = _larger(worst, _relative(new[2], old[2]))
+    worst = _larger(worst, _relative(new[3], old[3]))
+    return _larger(worst, _relative(new[4], old[4]))
+
+
+@jit
 def _enough(share, rtol, slope, decay):
     """Tolerance of a step: an error of the map counts 1/(1 - slope)-fold in v, Y-fold in exp(-Y)."""
     decay = where(decay < 750.0, decay, 0.0)  # beyond, the multiplier is 0 for good
-    return _smaller(share * rtol * (1.0 - slope) / (1.0 + decay), 3e-5)
+    return _smaller(share * rtol * (1.0 - slope) / (1.0 + decay), _ORDERLY)
+
+
+@jit
+def _newton(v, end, slope, low, high):
+    """The next speed: Newton's, or where that leaves the bracket, one that narrows it. Also whether it is Newton's."""
+    newton = v + (end - v) / (1.0 - slope)
+    newton = _larger(newton, 0.0 * v)
+    furthest = 8.0 * v + 8.0
+    inside = (newton > low) & (newton < high) & (newton < furthest)
+    other = where(high < math.inf, 0.5 * (_larger(low, 0.0 * v) + high), furthest)
+    return where(inside, newton, other), inside
+
+
+@jit
+def _cycle(state, end, top, top_by_start, time, shrink, turns, e, slope, new, step, terms):
+    """The cycle by (4) from a half swing close to it: time and amplitude follow v1 by its last `step`."""
+    force = accelerations(state, terms)[0]
+    time_by_mu, time_by_start = state[2] / end, e * state[4] / end
+    end_by_mu = -fma(force, time_by_mu, state[3])
+    s = -fma(time_by_start, end_by_mu / (1.0 - slope), time_by_mu) / time
+    amplitude = where(turns, fma(top_by_start, e * step, top), 1.0)
+    return fma(time_by_start, step, time), amplitude, new, s, e * e * shrink
+
+
+@jit
+def _next_tolerance(tolerance, wanted, relative, slope, steady):
+    """Of a swing: following the square of Newton's relative step, but not below what is wanted of the last but one."""
+    square = _smaller(0.1 * relative * relative, 0.03 * (1.0 - slope))
+    return _larger(_CHECK * wanted, where(steady, _smaller(tolerance, square), tolerance))
 
 
 @jit_inline
 def dopri5(scene, ripple, rtol):
-    """The cycle, and a Status: OK, INACCURATE, STICKS, NOT_CONVERGED or STEP_LIMIT.
+    """The limit cycle.
+
+    Newton's method on v1 within a bracket, first with a coarse tolerance, then with one that follows the square of
+    its step, and at last with the wanted one. The last swing but one has `_CHECK` times that; what the last two give
+    must agree to 0.3 rtol, or the tolerance is lowered further.
 
     Parameters
     ----------
-    scene : (d, rho, rho_s, gamma, n, kappa, e), as `_foliot_scene` gives it
+    scene : (d, rho, rho_s, gamma, n, kappa, e) and, if wanted, 1 - rho, as `_foliot_scene` gives it
     ripple : (depth, harmonic) of (2), or SMOOTH
 
-    Newton's method on v1 within a bracket, first with a coarse tolerance, then with one that follows the square of
-    its step, and at last with the wanted one. The last but one is `_CHECK` times wider; the outputs of the last two
-    swings must agree to rtol/2, or the tolerance is lowered further.
+    Returns
+    -------
+    cycle : half period, amplitude, speed before the switch, s, multiplier
+    verdict : OK, INACCURATE, STICKS, NOT_CONVERGED or STEP_LIMIT
     """
     rho_s, e = scene[2], scene[6]
     dry, terms, pace, stiffness = _legs(scene, ripple, rtol)
-    turns = e > 0.0
+    zero, turns = 0.0 * e, e > 0.0
     possible = dry[1] - dry[2] > 0.0
     varied = (terms[2] > 0.0) | (ripple[0] > 0.0)
-    stiff = possible & isnt(stiffness * pace < where(varied, _STIFFEST, _STIFFEST_UNIFORM))
-    share = where((terms[1][0] > 0.0) & (terms[1][1] < 2.0), 0.1 * _SHARE, _SHARE)
+    stiff = isnt(stiffness * pace < where(varied, _STIFFEST, _STIFFEST_UNIFORM))
+    share = where((terms[1][0] > 0.0) & (terms[1][1] < 2.0), _ROUGH_SHARE, _SHARE)
     first = 0.1 / (1.0 + stiffness + sqrt(scene[5]))
-    zero = 0.0 * e
-    active = possible & isnt(stiff)
-    verdict = where(possible, where(stiff, _STEP_LIMIT, _NOT_CONVERGED), _STICKS)
-    v = where(pace > 3.0, 1.0 / pace, 2.0 / sqrt(1.0 + 4.0 * pace * pace))
-    low, high = zero - 1.0, zero + math.inf
-    decay = 2.0 * stiffness * pace
-    wanted = _enough(share, rtol, zero, decay)
-    tolerance = where(pace > 3.0, _CHECK * wanted, _COARSE)
-    tighter = zero + 1.0
+
+    slow = pace > 3.0  # friction soon balances the drive: v1 = V, and steps are short whatever the tolerance
+    v = where(slow, 1.0 / pace, 2.0 / sqrt(1.0 + 4.0 * pace * pace))
+    tolerance = where(slow, _CHECK * _enough(share, rtol, zero, 2.0 * stiffness * pace), _COARSE)
+    low, high, tighter, before = zero - 1.0, zero + math.inf, zero + 1.0, zero + 1.0
     cycle = (zero, zero, zero, zero, zero)
-    before = zero + 1.0
+    verdict = where(possible, where(stiff, _STEP_LIMIT, _NOT_CONVERGED), _STICKS)
+    active = possible & isnt(stiff)
     for _ in range(NEWTON_LIMIT):
         if not some(active):
             break
-        step_tolerance = _larger(tolerance, _FINEST + zero)
-        swing = _half_swing(e * v, turns, dry, terms, stiffness, first, step_tolerance, active)
+        of_step = _larger(tolerance, _FINEST + zero)
+        swing = _half_swing(e * v, turns, dry, terms, stiffness, first, of_step, active)
         end, state, top, top_by_start, time, shrink, helped, lost = swing
-        free = isnt(helped)
-        shrink = where(free, shrink, 0.0)
+        shrink = where(helped, 0.0, shrink)
         slope = where(end > 0.0, e * e * v / end * shrink, 0.0)
-        miss = end - v
-        noise = 100.0 * step_tolerance * (v + end)
-        low, high = where(active & (miss > noise), v, low), where(active & (-miss > noise), v, high)
-        new = _larger(v + miss / (1.0 - slope), zero)
-        inside = (new > low) & (new < high) & (new < 8.0 * v + 8.0)
-        away = where(high < math.inf, 0.5 * (_larger(low, zero) + high), 8.0 * v + 8.0)
-        new = where(inside, new, away)
-        step = new - v
-        relative = magnitude(step) / (magnitude(new) + 1e-300)
-
-        force = accelerations(state, terms)[0]
-        time_by_mu, time_by_start = state[2] / end, state[4] / end
-        end_by_mu = -fma(force, time_by_mu, state[3])
-        s = -fma(e * time_by_start, end_by_mu / (1.0 - slope), time_by_mu) / time
-        amplitude = where(turns, fma(top_by_start, e * step, top), 1.0)
-        found = (fma(time_by_start, e * step, time), amplitude, new, s, e * e * shrink)
+        noise = _NOISE * of_step * (v + end)
+        low, high = where(active & (end - v > noise), v, low), where(active & (v - end > noise), v, high)
+        new, newton = _newton(v, end, slope, low, high)
+        relative = _relative(new, v)
+        found = _cycle(state, end, top, top_by_start, time, shrink, turns, e, slope, new, new - v, terms)
         apart = _larger(_difference(found, cycle), relative)
         cycle = choose(active, found, cycle)
 
         wanted = tighter * _enough(share, rtol, slope, state[6])
-        fine = tolerance <= 1.5 * wanted
-        near = tolerance <= 1.5 * _CHECK * wanted
+        last_but_one, last = tolerance <= 1.5 * _CHECK * wanted, tolerance <= 1.5 * wanted
         at_rest = (end <= 0.0) & (v <= 0.0)
         held = (e >= 0.0) & isnt(1.0 + _pull(top, terms) > rho_s)
-        stuck = active & near & ((helped & (relative < 1e-9)) | at_rest)
-        settled = active & fine & free & (relative <= 0.2 * rtol) & (apart <= 0.3 * rtol)
-        floor = active & (wanted < _FINEST) & (tolerance < _FINEST) & free & (relative <= rtol)
-        done = settled | stuck | floor | (active & lost)
-
-        tight = fine & free & (before < 0.5 * rtol) & isnt(apart <= 0.3 * rtol)
-        tighter = where(
-            active & tight, tighter * _larger(_smaller(0.2 * rtol / apart, 0.25 + zero), zero + 1e-3), tighter
+        stuck = last_but_one & ((helped & (relative < 1e-9)) | at_rest)
+        settled = last & isnt(helped) & (relative <= 0.2 * rtol) & (apart <= 0.3 * rtol)
+        at_floor = (wanted < _FINEST) & (tolerance < _FINEST) & isnt(helped) & (relative <= rtol)
+        done = active & (settled | stuck | at_floor | lost)
+        right = settled & (wanted >= _FINEST)
+        verdict = where(
+            done, where(lost, _STEP_LIMIT, where(stuck | held, _STICKS, where(right, _OK, _INACCURATE))), verdict
         )
-        wanted = where(tight, wanted * 0.25, wanted)
-        following = _larger(
-            _CHECK * wanted, _smaller(_smaller(tolerance, 0.03 * (1.0 - slope)), 0.1 * relative * relative)
-        )
-        following = where(inside & free, following, _larger(_CHECK * wanted, tolerance))
-        following = where(near & (relative < 0.5 * rtol), wanted, following)
-        following = where(at_rest, wanted, following)
-        result = where(
-            lost, _STEP_LIMIT, where(stuck | held, _STICKS, where(settled & (wanted >= _FINEST), _OK, _INACCURATE))
-        )
-        verdict = where(done, result, verdict)
-        v = where(active & isnt(done), new, v)
-        tolerance = where(active & isnt(done), following, tolerance)
-        before = where(active, relative, before)
         active = active & isnt(done)
+
+        loose = last & isnt(helped) & (before < 0.5 * rtol) & isnt(apart <= 0.3 * rtol)
+        factor = _larger(_smaller(0.2 * rtol / apart, 0.25 + zero), zero + 1e-3)
+        tighter = where(active & loose, tighter * factor, tighter)
+        following = _next_tolerance(
+            tolerance, where(loose, 0.25 * wanted, wanted), relative, slope, newton & isnt(helped)
+        )
+        following = where(
+            (last_but_one & (relative < 0.5 * rtol)) | at_rest, where(loose, 0.25 * wanted, wanted), following
+        )
+        v, tolerance = where(active, new, v), where(active, following, tolerance)
+        before = where(active, relative, before)
     return cycle, verdict
