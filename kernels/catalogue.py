@@ -7,6 +7,7 @@ from kernels.interface import Kernel, load
 KERNELS = {
     "foliot": "kernels.foliot:FOLIOT",
     "foliot_motion": "kernels.foliot_motion:FOLIOT_MOTION",
+    "foliot_ripple": "kernels.foliot_ripple:FOLIOT_RIPPLE",
     "foliot_design": "kernels.foliot_design:FOLIOT_DESIGN",
 }
 
