@@ -63,7 +63,7 @@ def test_just_what_lies_outside_the_declared_limits_is_bad_input(name):
 def test_the_example_of_every_kernel_runs(name):
     kernel = get(name)
     cell = {name: [value] for name, value in kernel.example.items()}
-    along = [np.linspace(0.0, 1.0, 5) for _ in kernel.along]
+    along = [np.arange(1.0, 6.0) if field.integer else np.linspace(0.0, 1.0, 5) for field in kernel.along]
     assert checked(kernel, **cell)[0] == Status.OK
     for method in kernel.methods:
         outputs, status = solve(kernel, method.name, along=along, **cell)
