@@ -8,6 +8,8 @@ KERNELS = {
     "foliot": "kernels.foliot:FOLIOT",
     "foliot_motion": "kernels.foliot_motion:FOLIOT_MOTION",
     "foliot_ripple": "kernels.foliot_ripple:FOLIOT_RIPPLE",
+    "foliot_start": "kernels.foliot_start:FOLIOT_START",
+    "foliot_noise": "kernels.foliot_noise:FOLIOT_NOISE",
     "foliot_design": "kernels.foliot_design:FOLIOT_DESIGN",
 }
 
