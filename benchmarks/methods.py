@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kernels import foliot
+from kernels import _foliot_viscous, foliot
 from kernels._columns import entry, one_by_one
 from kernels.interface import Status
 
@@ -31,14 +31,19 @@ OUTPUTS = ("period", "amplitude", "crossing_speed", "sensitivity", "multiplier")
 
 
 @entry()
-def map_one_by_one(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+def map_one_by_one(
+    mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status
+):
     """The iterated map one cell at a time: the same function, without lanes."""
     one_by_one(
-        foliot._event_map, (mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status)
+        _foliot_viscous._event_map,
+        (mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status),
     )
 
 
-def numpy_newton(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+def numpy_newton(
+    mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status
+):
     """q - tanh q = k by three Newton steps on whole arrays, series where the differences cancel."""
     k = a * a * phi0 / mu
     y = np.cbrt(3 * k)
@@ -60,10 +65,16 @@ def numpy_newton(mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivi
     status[:] = 0
 
 
+def no_more(n):
+    """R, R_s, c, n, k and e of a foliot with viscous friction alone."""
+    zero, one = np.zeros(n), np.ones(n)
+    return [zero, zero, zero, one, zero, one]
+
+
 def columns(n):
     """mu, phi0, a and rtol of foliots with alpha over 24 decades, in order; outputs and status."""
     alpha = np.geomspace(1e-12, 1e12, n)
-    return [alpha * 0.09 * 0.7, np.full(n, 0.7), np.full(n, 0.3), np.full(n, 1e-9)], [
+    return [alpha * 0.09 * 0.7, np.full(n, 0.7), np.full(n, 0.3), *no_more(n), np.full(n, 1e-9)], [
         *(np.empty(n) for _ in OUTPUTS),
         np.empty(n, np.int8),
     ]
@@ -99,14 +110,31 @@ def speed():
     """Both sides of each pair in turn, in this run."""
     print(f"{'one core, million cells/s':58} {'ours':>8} {'rival':>8} {'ratio':>7}")
     inputs, _ = columns(64 * BLOCK)
-    report("closed, in order; numpy Newton in blocks of 8192", *paired(foliot.closed, numpy_newton, inputs), 64 * BLOCK)
+    report(
+        "closed, in order; numpy Newton in blocks of 8192",
+        *paired(_foliot_viscous.closed, numpy_newton, inputs),
+        64 * BLOCK,
+    )
     shuffled = [np.random.default_rng(0).permutation(inputs[0]), *inputs[1:]]
-    report("closed, shuffled; the same", *paired(foliot.closed, numpy_newton, shuffled), 64 * BLOCK)
-    report("asymptotic, in order; closed", *paired(foliot.asymptotic, foliot.closed, inputs), 64 * BLOCK)
+    report("closed, shuffled; the same", *paired(_foliot_viscous.closed, numpy_newton, shuffled), 64 * BLOCK)
+    report(
+        "asymptotic, in order; closed", *paired(_foliot_viscous.asymptotic, _foliot_viscous.closed, inputs), 64 * BLOCK
+    )
     some, _ = columns(1024)
     some[0] = np.geomspace(1e-3, 1e6, 1024) * 0.09 * 0.7
-    report("map in lanes; one cell at a time, alpha 1e-3 to 1e6", *paired(foliot.event_map, map_one_by_one, some), 1024)
-    report("dopri5 in lanes; map in lanes, the same cells", *paired(foliot.dopri5, foliot.event_map, some), 1024)
+    report(
+        "map in lanes; one cell at a time, alpha 1e-3 to 1e6",
+        *paired(_foliot_viscous.event_map, map_one_by_one, some),
+        1024,
+    )
+    report(
+        "dopri5 in lanes; map in lanes, the same cells", *paired(foliot.dopri5, _foliot_viscous.event_map, some), 1024
+    )
+    some[3] = some[4] = 0.5 * some[0]
+    title = "with Coulomb friction R = mu/2: "
+    report(f"{title}coulomb; segments", *paired(foliot.coulomb, foliot.segments, some), 1024)
+    report(f"{title}segments; quadrature", *paired(foliot.segments, foliot.quadrature, some), 1024)
+    report(f"{title}quadrature; dopri5", *paired(foliot.quadrature, foliot.dopri5, some), 1024)
 
 
 def errors(name, solve, low, high, rtol=1e-9, cells=2000):
@@ -114,7 +142,7 @@ def errors(name, solve, low, high, rtol=1e-9, cells=2000):
     random = np.random.default_rng(1)
     alpha = 10 ** random.uniform(low, high, cells)
     a, phi0 = 10 ** random.uniform(-3, 3, cells), 10 ** random.uniform(-2, 2, cells)
-    inputs = [alpha * a * a * phi0, phi0, a, np.full(cells, rtol)]
+    inputs = [alpha * a * a * phi0, phi0, a, *no_more(cells), np.full(cells, rtol)]
     outputs = columns(cells)[1]
     solve(*inputs, *outputs)
     good = outputs[-1] == Status.OK
@@ -132,9 +160,9 @@ def errors(name, solve, low, high, rtol=1e-9, cells=2000):
 def main():
     """Measure and print."""
     speed()
-    errors("closed", foliot.closed, -12, 12)
-    errors("asymptotic", foliot.asymptotic, -12, 12)
-    errors("map", foliot.event_map, -12, 9)
+    errors("closed", _foliot_viscous.closed, -12, 12)
+    errors("asymptotic", _foliot_viscous.asymptotic, -12, 12)
+    errors("map", _foliot_viscous.event_map, -12, 9)
     errors("dopri5", foliot.dopri5, -4, 9)
     errors("numpy Newton", numpy_newton, -12, 12)
 

@@ -11,7 +11,7 @@ stable; where the foliot does not come to it from rest at phi = 0, the cell is r
 
 import math
 
-from kernels import _coulomb, _foliot_scene, _foliot_viscous, _linear_swing
+from kernels import _coulomb, _foliot_scene, _foliot_viscous, _friction_quadrature, _linear_swing, _swing_dopri5
 from kernels._columns import each_cell, entry
 from kernels._foliot_viscous import worst
 from kernels._jit import jit
@@ -20,6 +20,11 @@ from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
 
 _OK, _BAD_INPUT, _OUT_OF_RANGE = float(Status.OK), float(Status.BAD_INPUT), float(Status.OUT_OF_RANGE)
 _NEVER_STARTS, _NO_LIMIT_CYCLE = float(Status.NEVER_STARTS), float(Status.NO_LIMIT_CYCLE)
+_NO_METHOD = float(Status.NO_METHOD)
+
+PURE_ROUNDING = 2e-15
+QUADRATURE = 1e-13
+"""What `quadrature` is right to."""
 
 
 @jit
@@ -28,6 +33,37 @@ def write(i, units, cycle, verdict, period, amplitude, crossing_speed, sensitivi
     period[i], amplitude[i], crossing_speed[i], normal = _foliot_scene.dimensional(units, cycle)
     sensitivity[i], multiplier[i] = cycle[3], cycle[4]
     status[i] = where(normal | (verdict >= FIRST_REFUSAL), verdict, _OUT_OF_RANGE)
+
+
+@jit
+def _pure_cell(i, mu, phi0, a, R, R_s, c, n, k, e, rtol, *outputs):
+    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
+    scene, units = _foliot_scene.without_dimensions(*terms)
+    cycle, applies = _friction_quadrature.pure(scene)
+    write(i, units, cycle, where(applies, _OK, _NO_METHOD), *outputs)
+
+
+@entry()
+def pure(mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+    """Closed forms where one loss acts alone: Coulomb friction, quadratic drag or restitution; else NO_METHOD."""
+    each_cell(
+        _pure_cell,
+        (mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status),
+    )
+
+
+@jit
+def _pure_bound(i, mu, phi0, a, R, R_s, c, n, k, e, out, asked):
+    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
+    scene, _ = _foliot_scene.without_dimensions(*terms)
+    _, applies = _friction_quadrature.pure(scene)
+    out[i] = where(applies, worst(asked, PURE_ROUNDING, PURE_ROUNDING, 2.0 * PURE_ROUNDING), math.inf)
+
+
+@entry("asked")
+def pure_bound(mu, phi0, a, R, R_s, c, n, k, e, rtol, asked, out):
+    """Rounding where one loss acts alone, infinite elsewhere."""
+    each_cell(_pure_bound, (mu, phi0, a, R, R_s, c, n, k, e, out, asked))
 
 
 @jit
@@ -66,6 +102,48 @@ def segments(mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_
     """Exact pieces of the swing and Newton on their map; INACCURATE where conditioning leaves less than rtol."""
     each_cell(
         _segments_cell,
+        (mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status),
+    )
+
+
+@jit
+def _quadrature_cell(i, mu, phi0, a, R, R_s, c, n, k, e, rtol, *outputs):
+    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
+    scene, units = _foliot_scene.without_dimensions(*terms)
+    cycle, verdict = _friction_quadrature.solve_quadrature(scene, rtol[i])
+    write(i, units, cycle, verdict, *outputs)
+
+
+@entry()
+def quadrature(
+    mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status
+):
+    """Integrals over the speed for any sum of friction laws, and Newton on their balance."""
+    each_cell(
+        _quadrature_cell,
+        (mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status),
+    )
+
+
+@entry("asked")
+def quadrature_bound(mu, phi0, a, R, R_s, c, n, k, e, rtol, asked, out):
+    """The error of the rule and rounding."""
+    out[:] = worst(asked, QUADRATURE, QUADRATURE, 3.0 * QUADRATURE)
+
+
+@jit
+def _dopri5_cell(i, mu, phi0, a, R, R_s, c, n, k, e, rtol, *outputs):
+    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
+    scene, units = _foliot_scene.without_dimensions(*terms)
+    cycle, verdict = _swing_dopri5.dopri5(scene, _swing_dopri5.SMOOTH, rtol[i])
+    write(i, units, cycle, verdict, *outputs)
+
+
+@entry()
+def dopri5(mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+    """Dormand-Prince 5(4) over half swings, each switch located and restarted at, and Newton on their map."""
+    each_cell(
+        _dopri5_cell,
         (mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status),
     )
 
@@ -150,6 +228,7 @@ FOLIOT = Kernel(
             _foliot_viscous.closed_bound,
             _VISCOUS_ONLY,
         ),
+        Method("pure", "closed forms where one loss acts alone", pure, pure_bound, ("a", "k")),
         Method(
             "coulomb",
             "viscous and Coulomb friction: one equation by Halley's steps",
@@ -158,6 +237,7 @@ FOLIOT = Kernel(
             ("c", "k", "e"),
         ),
         Method("segments", "exact pieces of linear terms, Newton on the half-swing map", segments, excludes=("c",)),
+        Method("quadrature", "integrals over the speed, for any friction", quadrature, quadrature_bound, ("k",)),
         Method(
             "map",
             "exact map from switch to switch, iterated from rest",
@@ -165,6 +245,7 @@ FOLIOT = Kernel(
             _foliot_viscous.event_map_bound,
             _VISCOUS_ONLY,
         ),
+        Method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", dopri5),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
 )

@@ -223,7 +223,8 @@ def test_dopri5_is_right_to_rtol(rtol):
 @pytest.mark.skipif(not COMPILED, reason="sixty Newton steps at the finest tolerance in plain Python")
 def test_dopri5_says_where_rounding_keeps_newton_from_settling():
     _, status = solve(FOLIOT, "dopri5", np.array([1e6, 1e12, 1.0]), np.ones(3), np.ones(3), rtol=[1e-15, 1e-12, 1e-12])
-    assert status.tolist() == [Status.NOT_CONVERGED, Status.NOT_CONVERGED, Status.OK]
+    assert set(status[:2]) <= {Status.NOT_CONVERGED, Status.INACCURATE}
+    assert status[2] == Status.OK
 
 
 def test_dopri5_refuses_what_is_too_stiff_and_remarks_what_rounding_spoils():
