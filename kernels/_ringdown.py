@@ -40,9 +40,9 @@ _UNIT_LIMIT = 2.0**900
 @jit
 def in_units(r, r_s, theta0):
     """r, r_s and abs(theta0) in units of 2^e, e, and whether they are not too large there; powers of two are exact."""
-    some_unit = where(r > 0.0, r, where(r_s > 0.0, r_s, 1.0))
-    _, e = mantissa_exponent(some_unit)
-    release = _in_unit(magnitude(theta0), e)
+    angle = magnitude(theta0)
+    _, e = mantissa_exponent(where(r > 0.0, r, where(r_s > 0.0, r_s, where(angle > 0.0, angle, 1.0))))
+    release = _in_unit(angle, e)
     held = _in_unit(r_s, e)
     return _in_unit(r, e), held, release, e, (release < _UNIT_LIMIT) & (held < _UNIT_LIMIT)
 
@@ -62,9 +62,16 @@ def decrement(zeta):
     return _pairs.over(_pairs.scaled(_pairs.PI, zeta), root), root
 
 
+@jit
+def tame(zeta, delta):
+    """zeta and delta, 0 where they count for nothing: products of their parts would be no normal numbers."""
+    felt = zeta > FAINT
+    return where(felt, zeta, 0.0), (where(felt, delta[0], 0.0), where(felt, delta[1], 0.0))
+
+
 @jit_call
 def turning_point(zeta, delta, share, r, start, k):
-    """a_k of (3), for k > 0, as a pair, and its first term a_0 E^k."""
+    """a_k of (3), as a pair, and its first term a_0 E^k; `zeta` and `delta` are tame, `share` is of `share_kept`."""
     _, lost = share
     q, n = _pairs.exponential(_pairs.negative(_pairs.scaled(delta, k)))
     kept = _pairs.scaled(_pairs.shifted(q, 1.0), start)
@@ -136,7 +143,7 @@ def closed(scene):
     countless = isnt(guess < COUNT_LIMIT)
     k = _whole(where(countless, 0.0, guess * (1.0 - 4e-15) - 1e-6)) - 1.0
     k = where(k > 0.0, k, 0.0)
-    above, kept = turning_point(where(zeta > FAINT, zeta, 0.0), _faint(delta, zeta), share, r, start, k)
+    above, kept = turning_point(*tame(zeta, delta), share, r, start, k)
     sure = above[0] - r_s + above[1] > 0.0
     below = next_turning_point(share, r, above)
     active = moves & isnt(countless) & _exceeds(below, r_s)
@@ -160,12 +167,6 @@ def closed(scene):
     doubt = where(moves & (zeta > FAINT), _PAIR_ERROR / _TWO_ULP * blur, 0.0)
     unsure = moves & isnt(countless) & (active | isnt(sure))
     return count, last, where(countless, 0.0, margin), grazes | countless, doubt, unsure
-
-
-@jit
-def _faint(delta, zeta):
-    """delta, 0 where it counts for nothing: products of its parts would be no normal numbers."""
-    return where(zeta > FAINT, delta[0], 0.0), where(zeta > FAINT, delta[1], 0.0)
 
 
 @jit

@@ -84,13 +84,14 @@ def _write(i, scene, units, ring, verdict, omega_n, theta0, half_swings, stop_an
 
 
 @jit
-def _scene(zeta, r, r_s, theta0):
+def without_units(zeta, r, r_s, theta0):
+    """The scene, the exponent of its unit, and whether it is in range."""
     r, r_s, start, e, fine = _ringdown.in_units(r, r_s, theta0)
     return (zeta, r, r_s, start), (e, fine)
 
 
 @jit
-def _swinging(scene):
+def swinging(scene):
     """The scene with a tame damping where it is overdamped and nothing is counted."""
     zeta, r, r_s, start = scene
     return where(zeta < 1.0, zeta, 0.5), r, r_s, start
@@ -98,8 +99,8 @@ def _swinging(scene):
 
 @jit
 def _closed(i, zeta, omega_n, r, r_s, theta0, rtol, *outputs):
-    scene, units = _scene(zeta[i], r[i], r_s[i], theta0[i])
-    ring = _ringdown.closed(_swinging(scene))
+    scene, units = without_units(zeta[i], r[i], r_s[i], theta0[i])
+    ring = _ringdown.closed(swinging(scene))
     _write(i, scene, units, ring, _verdict(ring, scene, rtol[i], _NOT_CONVERGED), omega_n[i], theta0[i], *outputs)
 
 
@@ -120,8 +121,8 @@ def closed_bound(zeta, omega_n, r, r_s, theta0, rtol, asked, out):
 
 @jit
 def _recursion(i, zeta, omega_n, r, r_s, theta0, rtol, *outputs):
-    scene, units = _scene(zeta[i], r[i], r_s[i], theta0[i])
-    ring = _ringdown.recursion(_swinging(scene))
+    scene, units = without_units(zeta[i], r[i], r_s[i], theta0[i])
+    ring = _ringdown.recursion(swinging(scene))
     _write(i, scene, units, ring, _verdict(ring, scene, rtol[i], _STEP_LIMIT), omega_n[i], theta0[i], *outputs)
 
 

@@ -15,6 +15,7 @@ from mpmath import mp, mpf
 
 from kernels._jit import COMPILED
 from kernels.balance import BALANCE
+from kernels.balance_trace import BALANCE_TRACE
 from kernels.interface import Status
 
 ROOT = Path(__file__).parents[2]
@@ -277,17 +278,91 @@ def test_the_same_bits_alone_in_lanes_and_in_tails(method):
             assert np.array_equal(alone[name][:1], together[name][i : i + 1], equal_nan=True), (name, i)
 
 
+def trace(*columns, half_swing):
+    outputs, status = solve(BALANCE_TRACE, "closed", *columns, along=[np.asarray(half_swing, float)])
+    return outputs["turning_point"], status
+
+
+@pytest.mark.parametrize("kind", ["light", "moderate", "nearly critical", "none"])
+def test_turning_points_are_right_to_1e_15_of_the_release(kind):
+    columns = scenes(kind, -4, 0, SOME // 4)
+    counts = [oracles.half_swings(*cell) for cell in zip(*(columns[k] for k in (0, 2, 3, 4)), strict=True)]
+    asked = [0, 1, 2, 3, 7, 20, 1000]
+    found, status = trace(*columns, half_swing=asked)
+    assert (status == Status.OK).all()
+    for i, (zeta, _, r, _, theta0) in enumerate(zip(*columns, strict=True)):
+        for k, value in zip(asked, found[i], strict=True):
+            if k > counts[i]:
+                assert np.isnan(value)
+            else:
+                true = np.sign(theta0) * (-1) ** k * oracles.turning_point(zeta, r, theta0, k)
+                assert abs(mpf(float(value)) - true) <= 1e-15 * abs(theta0)
+
+
+def test_the_trace_ends_where_the_ring_down_does():
+    columns = scenes("moderate", -2.5, 0)
+    found, _ = trace(*columns, half_swing=np.arange(400))
+    outputs, _ = solve(BALANCE, "closed", *columns)
+    assert (np.isfinite(found).sum(axis=1) == outputs["half_swings"] + 1).all()
+    last = found[np.arange(len(found)), outputs["half_swings"].astype(int)]
+    assert (abs(last - outputs["stop_angle"]) <= 1e-15 * abs(columns[4])).all()
+
+
+def test_turning_points_do_not_depend_on_the_order_or_the_company_in_which_they_are_asked_for():
+    columns = scenes("light", -2, 0, 41 if COMPILED else 3, units=3)
+    forward, status = trace(*columns, half_swing=np.arange(9))
+    backward, _ = trace(*columns, half_swing=np.arange(9)[::-1])
+    assert np.array_equal(forward, backward[:, ::-1], equal_nan=True)
+    for i in range(len(status)):
+        alone, verdict = trace(*(c[i : i + 1] for c in columns), half_swing=[4])
+        assert np.array_equal(alone[0], forward[i, 4:5], equal_nan=True)
+        assert verdict[0] == status[i]
+
+
+def test_a_trace_shows_what_there_is_of_an_overdamped_and_of_an_endless_motion():
+    found, status = trace(
+        [1.0, 0.0, 0.1], [1.0], [0.1, 0.0, 0.0], [0.1, 0.0, 0.0], [-2.0, 2.0, -2.0], half_swing=[0, 1, 6]
+    )
+    assert status.tolist() == [Status.OVERDAMPED, Status.OK, Status.OK]
+    assert np.array_equal(found[0], [-2.0, NAN, NAN], equal_nan=True)
+    assert found[1].tolist() == [2.0, -2.0, 2.0]
+    share = np.exp(-np.pi * 0.1 / np.sqrt(0.99))
+    np.testing.assert_allclose(found[2], [-2.0, 2.0 * share, -2.0 * share**6], rtol=1e-14)
+
+
+def test_a_trace_is_grazing_only_if_it_reaches_the_turning_point_in_doubt():
+    columns = grazing(1e-12)
+    assert (trace(*columns, half_swing=[0, 1, 2])[1] == Status.OK).all()
+    assert (trace(*columns, half_swing=[0, 1, 2, 3])[1] == Status.GRAZING).all()
+
+
+@pytest.mark.parametrize("coordinate", [[0.5], [-1.0], [0.0, NAN], [1e30], [1.0, INF, 2.0]])
+def test_a_coordinate_that_does_not_count_half_swings_is_bad_input(coordinate):
+    _, status = trace([0.1], [1.0], [0.1], [0.1], [1.0], half_swing=coordinate)
+    assert status[0] == Status.BAD_INPUT
+
+
+def test_a_trace_is_refused_as_the_ring_down_is_but_for_what_never_ends():
+    columns = [0.0, -0.1, 0.1, NAN], [1.0], [0.0, 0.1, 0.1, 0.1], [0.0, 0.1, 0.01, 0.1], [1.0]
+    expected = [Status.OK, Status.BAD_INPUT, Status.BAD_INPUT, Status.BAD_INPUT]
+    assert checked(BALANCE_TRACE, *columns).tolist() == expected
+
+
 PLAIN = """
 import sys
 sys.path.append("tests/kernels")
 import numpy as np
 from columns import solve
 from kernels.balance import BALANCE
+from kernels.balance_trace import BALANCE_TRACE
 for method in ("closed", "recursion"):
     outputs, status = solve(
         BALANCE, method, [0.0, 1e-9, 0.01, 0.5, 0.999, 2.0], [3.0], [0.01] * 6, [0.011] * 6, [1.0, -1, 2, 1, 1, 1]
     )
     print(*(float(v).hex() for column in outputs.values() for v in column), *status)
+along = [np.array([0.0, 1, 2, 5])]
+outputs, status = solve(BALANCE_TRACE, "closed", [0.0, 0.1, 0.9], [3.0], [0.05], [0.06], [1.0], along=along)
+print(*(float(v).hex() for v in outputs["turning_point"].ravel()), *status)
 """
 
 
