@@ -41,7 +41,7 @@ _STIFFEST_UNIFORM = 1e6
 _SHARE = 0.3
 """Of rtol that a single step may take; the rest is left to their sum."""
 _ROUGH_SHARE = 0.03
-"""The same for friction whose slope is not smooth at rest."""
+"""The same for friction whose slope is not smooth at rest, and for torque that varies: errors of v count more there."""
 _CHECK = 4.0
 """The last swing but one has a tolerance so much wider than the last: how far the two differ is the error's measure."""
 _COARSE, _ORDERLY = 1e-3, 3e-5
@@ -378,7 +378,7 @@ def dopri5(scene, ripple, rtol):
     possible = dry[1] - dry[2] > 0.0
     varied = (terms[2] > 0.0) | (ripple[0] > 0.0)
     stiff = isnt(stiffness * pace < where(varied, _STIFFEST, _STIFFEST_UNIFORM))
-    share = where((terms[1][0] > 0.0) & (terms[1][1] < 2.0), _ROUGH_SHARE, _SHARE)
+    share = where((ripple[0] > 0.0) | ((terms[1][0] > 0.0) & (terms[1][1] < 2.0)), _ROUGH_SHARE, _SHARE)
     first = 0.1 / (1.0 + stiffness + sqrt(scene[5]))
 
     slow = pace > 3.0  # friction soon balances the drive: v1 = V, and steps are short whatever the tolerance
@@ -421,9 +421,7 @@ def dopri5(scene, ripple, rtol):
         loose = last & isnt(helped) & (before < 0.5 * rtol) & isnt(apart <= 0.3 * rtol)
         factor = _larger(_smaller(0.2 * rtol / apart, 0.25 + zero), zero + 1e-3)
         tighter = where(active & loose, tighter * factor, tighter)
-        following = _next_tolerance(
-            tolerance, where(loose, 0.25 * wanted, wanted), relative, slope, newton & isnt(helped)
-        )
+        following = _next_tolerance(tolerance, where(loose, 0.25 * wanted, wanted), relative, slope, newton)
         following = where(
             (last_but_one & (relative < 0.5 * rtol)) | at_rest, where(loose, 0.25 * wanted, wanted), following
         )

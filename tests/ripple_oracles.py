@@ -9,7 +9,7 @@ the half swing is followed by Taylor series in time, and the turning point and t
 Sensitivities are differences of solved cycles at high precision.
 """
 
-from mpmath import cos, findroot, mp, mpf, pi, quad, sin, sqrt
+from mpmath import cos, fdot, findroot, mp, mpf, pi, quad, sin, sqrt
 
 DIGITS = 22
 
@@ -113,12 +113,17 @@ def _follow(cell, sign, x, v, event):
         )
 
         def at(h, xs=xs, vs=vs):
-            return mp.polyval(xs[::-1], h), mp.polyval(vs[::-1], h)
+            return fdot(xs, _powers(h)), fdot(vs, _powers(h))
 
         if event(*at(h)) <= 0:
             h = findroot(lambda h: event(*at(h)), (mpf(0), h), solver="anderson", tol=mpf(10) ** (-2 * DIGITS))
             return t + h, at(h)
         t, (x, v) = t + h, at(h)
+
+
+def _powers(h):
+    """1, h, h^2 ... h^DIGITS."""
+    return [h**j for j in range(DIGITS + 1)]
 
 
 def _series(cell, sign, x, v):
