@@ -37,13 +37,13 @@ Groups = dict[str, list[Statement]]
 def compared(what: str, theory: str, here: float, value: float, allowed: float, digits: int = 8) -> Statement:
     """A number beside what theory says; it holds if the relative deviation is at most `allowed`."""
     off = here / value - 1
-    return Statement(what, theory, f"{here:.{digits}g}", off, abs(off) <= allowed)
+    return Statement(what, theory, f"{here:.{digits}g}", off, bool(abs(off) <= allowed))
 
 
 def differing(what: str, theory: str, here: float, value: float, allowed: float, digits: int = 8) -> Statement:
     """As `compared`, of exponents and what else may be 0: the deviation is the difference."""
     off = here - value
-    return Statement(what, theory, f"{here:.{digits}g}", off, abs(off) <= allowed)
+    return Statement(what, theory, f"{here:.{digits}g}", off, bool(abs(off) <= allowed))
 
 
 def table(groups: Groups, source: str = "paper") -> list[str]:
@@ -109,7 +109,7 @@ def report(
     except sweep.SweepError as error:
         print(error, file=sys.stderr)
         return 2
-    return int(any(s.holds is False for lines in groups.values() for s in lines))
+    return int(any(s.holds is not None and not s.holds for lines in groups.values() for s in lines))
 
 
 def hatch(axes: Any, x: Any, y: Any, where: Any, pattern: str, colour: str = "0.45") -> None:
