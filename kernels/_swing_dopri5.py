@@ -408,7 +408,7 @@ def dopri5(scene, ripple, rtol):
         last_but_one, last = tolerance <= 1.5 * _CHECK * wanted, tolerance <= 1.5 * wanted
         at_rest = (end <= 0.0) & (v <= 0.0)
         held = (e >= 0.0) & isnt(1.0 + _pull(top, terms) > rho_s)
-        stuck = last_but_one & ((helped & (relative < 1e-9)) | at_rest)
+        stuck = last_but_one & ((helped & (relative <= 0.2 * rtol)) | at_rest)
         settled = last & isnt(helped) & (relative <= 0.2 * rtol) & (apart <= 0.3 * rtol)
         at_floor = (wanted < _FINEST) & (tolerance < _FINEST) & isnt(helped) & (relative <= rtol)
         done = active & (settled | stuck | at_floor | lost)
