@@ -89,9 +89,9 @@ def _averages(marks, before, gain, time, nominal, tau):
 
 @jit_call
 def _beat(state, z, clock):
-    """One half swing with the torque of (1). A *run* is (x, speed, t, its low part, D, half swings cut, *marks)."""
+    """One half swing with the torque of (1). A *run* is (x, speed, t, D, half swings cut, *marks)."""
     scene, (sigma, remembered, fresh, floor), nominal, tau = clock
-    x, before, t, low, gain, truncated, closed, reading, rate, squares = state
+    x, before, t, gain, truncated, closed, reading, rate, squares = state
     x = where(t > 0.0, fma(remembered, x, fresh * z), z)
     torque = fma(sigma, x, 1.0)
     short = isnt(torque > floor)
@@ -100,12 +100,11 @@ def _beat(state, z, clock):
     time, top, speed, comes, _ = _linear_swing.half_swing(torque, scene, start)
     goes_on = comes & ((start < 0.0) | (fma(scene[5], top, torque) > scene[2]))
     marks = (closed, reading, rate, squares)
-    passes = t + time >= (closed + 1.0) * tau
+    later = t + time
+    passes = later >= (closed + 1.0) * tau
     if some(passes):
         marks = choose(passes, _averages(marks, t, gain, time, nominal, tau), marks)
-    later = t + time
-    low = low + (time - (later - t))
-    run = (x, speed, later, low, gain + (nominal - time), where(short, truncated + 1.0, truncated))
+    run = (x, speed, later, gain + (nominal - time), where(short, truncated + 1.0, truncated))
     return (*run, *marks), goes_on
 
 
@@ -122,7 +121,7 @@ def _run(first, seed, half_swings, clock, speed, active, radii, turns):
     """All half swings of the active cells of a group, and those of them that did not come to a switch."""
     count = half_swings[cells_at(first)]
     zero = 0.0 * speed
-    state = (zero, speed, zero, zero, zero, zero, zero, zero, zero, zero)
+    state = (zero, speed, zero, zero, zero, zero, zero, zero, zero)
     stopped = count < 0.0
     for chunk in range(int(_longest(first, half_swings)) // (2 * PAIRS) + 1):
         _philox.fill(first, seed, chunk * PAIRS, PAIRS, radii, turns)
@@ -167,8 +166,8 @@ def _cells(
     runs = units[4] & (found < FIRST_REFUSAL) & (least < 1.0)
     clock = (scene, (sigma[i], *_correlation(tau_c[i]), floor), nominal, tau)
     state, stopped = _run(first, seed, half_swings, clock, speed, runs, radii, turns)
-    _, _, t, low, gain, short, closed, _, _, squares = state
-    t = where(runs, t + low, 1.0)
+    _, _, t, gain, short, closed, _, _, squares = state
+    t = where(runs, t, 1.0)
     enough = closed > 1.0
     deviation = sqrt(squares / (2.0 * where(enough, closed - 1.0, 1.0)))
     rate_error_s_per_day[i] = SECONDS_PER_DAY * gain / t

@@ -171,6 +171,7 @@ CASES = [
     ({"a": 0.05}, 0.3, 3.0, 17.0),
     ({"a": 4.0}, 0.5, 0.0, 50.0),  # torque is cut in 2 % of the half swings
     (LINEAR, 0.1, 10.0, 2.0),  # shorter than a half swing
+    (LINEAR, 0.6, 0.0, 20.0),  # cut, with a spring
     ({"k": 0.4, "e": -0.5, "a": 0.1}, 0.1, 0.0, 11.0),
 ]  # fmt: skip
 SHORT = 120 if COMPILED else 40
@@ -325,6 +326,7 @@ def test_the_mean_rate_is_that_of_second_order_theory(a):
         ({"a": 1.0}, 2.0), ({"a": 0.1, "R": 0.5}, 1.0), ({"a": 0.1, "R": 0.5, "R_s": 0.9}, 0.5),
         ({"a": 0.5, "k": 0.3}, 1.0), ({"a": 0.1, "k": 0.3, "R": 0.2, "R_s": 1.2}, 1.0),
         ({"e": -0.9, "k": 0.5}, 3.0), ({"e": 0.0, "k": 0.2}, 1.0),
+        ({"e": 0.0, "k": 0.2, "R": 0.3, "R_s": 1.1}, 1.0),
     ],
 )  # fmt: skip
 def test_noise_never_stops_the_clock(terms, sigma):
