@@ -13,6 +13,7 @@ Derived here from the general law of friction; scene and cycle as in `_foliot_sc
 
 from kernels._jit import jit, jit_call
 from kernels._lanes import choose, fma, magnitude, some, sqrt, where
+from kernels._pure_laws import dry as dry_cycle
 from kernels._vecmath import cbrt, exp, expm1, log1p, log_remainder, log_remainder3
 from kernels.interface import Status
 
@@ -81,20 +82,13 @@ def _viscous_and_coulomb(d, rho, slack):
     return (tau / d, top, u / d, s, exp(-tau) * slack / (1.0 + rho)), unsettled
 
 
-@jit
-def _coulomb(rho, slack):
-    """T = 2 sqrt(2/(rho (1 - rho^2))), A = 1/rho, v^2 = 2 (1 - rho^2)/rho, s = rho^2/(1 - rho^2)."""
-    rest = slack * (1.0 + rho)
-    return 2.0 * sqrt(2.0 / (rho * rest)), 1.0 / rho, sqrt(2.0 * rest / rho), rho * rho / rest, slack / (1.0 + rho)
-
-
 @jit_call
 def limit_cycle(scene):
     """The cycle, and its verdict."""
     d, rho, _, _, _, _, _, slack = scene
     dry = d < _FAINT
     cycle, unsettled = _viscous_and_coulomb(where(dry, 1.0, d), rho, slack)
-    alone = _coulomb(where(rho > _FAINT_COULOMB, rho, 0.5), slack)
+    alone = dry_cycle(where(rho > _FAINT_COULOMB, rho, 0.5), slack)
     verdict = where(unsettled, _NOT_CONVERGED, _OK)
     verdict = where(dry, where(rho > _FAINT_COULOMB, _OK, _OUT_OF_RANGE), verdict)
     return choose(dry, alone, cycle), verdict

@@ -18,8 +18,9 @@ from decimal import Decimal, localcontext
 import numpy as np
 
 from kernels._jit import jit, jit_call
-from kernels._lanes import choose, fma, isnt, magnitude, some, sqrt, where
-from kernels._vecmath import arctan, exp, expm1, log, log1p
+from kernels._lanes import fma, isnt, magnitude, some, sqrt, where
+from kernels._pure_laws import without_degree_0
+from kernels._vecmath import exp, expm1, log, log1p
 from kernels.interface import Status
 
 NEWTON_LIMIT = 60
@@ -64,16 +65,6 @@ def _rule():
 
 
 _S, _REST, _LOG_S, _WEIGHT = _rule()
-
-
-@jit
-def _without_degree_0(scene):
-    """The law with drag of degree 0 counted as dry friction, and a degree that does no harm where there is no drag."""
-    d, rho, _, gamma, n, _, e, slack = scene
-    dry = isnt(n > 0.0)
-    rho, slack = where(dry, rho + gamma, rho), where(dry, slack - gamma, slack)
-    gamma = where(dry, 0.0, gamma)
-    return d, rho, gamma, where(gamma > 0.0, n, 1.0), e, slack
 
 
 @jit_call
@@ -322,7 +313,7 @@ def _weak(law, terminal, y):
 @jit
 def solve_quadrature(scene, rtol):
     """The cycle of a scene with kappa = 0, right to what `quadrature_bound` promises whatever rtol, and its verdict."""
-    law = _without_degree_0(scene)
+    law = without_degree_0(scene)
     terminal = _terminal(law)
     y, unsettled = _solve(law, terminal)
     v1, _, z, _, _, F1, _, a, b, _, _ = _speeds(law, terminal, y)
@@ -351,7 +342,7 @@ def quadrature_bound(scene):
     the multiplier exp(-z). For n > 4 singularities at v = V exp(+-i pi/n) come near: the rule misses (n/4)^11 4e-14.
     """
     kappa = scene[5]
-    law = _without_degree_0(scene)
+    law = without_degree_0(scene)
     log_V, D, G = _terminal(law)
     n, e = law[3], law[4]
     high, deep = where(log_V > 0.0, log_V, 0.0), where(log_V < 0.0, -log_V, 0.0)
@@ -363,46 +354,3 @@ def quadrature_bound(scene):
     cycle = where((kappa > 0.0) | (n > 16.0) | (log_V < -350.0), math.inf, cycle)
     z = 2.0 * fma(n, G, D) * exp(-2.0 * log_V) + 2.0
     return cycle, 2.0 * cycle, 10.0 * cycle + where(z < 800.0, 4e-15 * z, 0.0)
-
-
-@jit
-def pure(scene):
-    """The cycle in closed form where one loss acts alone, and whether one does.
-
-    Dry friction: A = 1/rho. Drag of degree 2, lambda = v1/V: lambda^4 = 1 - exp(-4 gamma), half period
-    (artanh lambda + arctan lambda)/sqrt(gamma), where artanh lambda = 2 gamma + ln(1 + lambda) + ln(1 + lambda^2)/2
-    holds its digits up to lambda = 1. Restitution: A = (1 + e^2)/(1 - e^2), half period 2 sqrt((1 + e)/(1 - e)).
-    """
-    kappa = scene[5]
-    d, rho, gamma, n, e, slack = _without_degree_0(scene)
-    smooth, elastic = isnt(d > 0.0) & isnt(kappa > 0.0), e >= 1.0
-    dry = smooth & elastic & (rho > 0.0) & isnt(gamma > 0.0)
-    drag = smooth & elastic & isnt(rho > 0.0) & (gamma > 0.0) & (n >= 2.0) & (n <= 2.0)
-    switch = smooth & isnt(elastic) & isnt(rho > 0.0) & isnt(gamma > 0.0)
-    cycle = choose(dry, _dry(where(dry, rho, 0.5), where(dry, slack, 0.5)), _switch(where(switch, e, 0.0)))
-    if some(drag):
-        cycle = choose(drag, _drag(where(drag, gamma, 1.0)), cycle)
-    return cycle, dry | drag | switch
-
-
-@jit
-def _dry(rho, slack):
-    left = slack * (1.0 + rho)  # 1 - rho^2
-    half = 2.0 * sqrt(2.0 / (rho * left))
-    return half, 1.0 / rho, sqrt(2.0 * left / rho), rho * rho / left, slack / (1.0 + rho)
-
-
-@jit
-def _switch(e):
-    lost = (1.0 - e) * (1.0 + e)
-    amplitude = where(e > 0.0, fma(e, e, 1.0) / lost, 1.0)
-    return 2.0 * sqrt((1.0 + e) / (1.0 - e)), amplitude, 2.0 / sqrt(lost), 0.5, e * e
-
-
-@jit
-def _drag(gamma):
-    square = sqrt(-expm1(-4.0 * gamma))
-    lam, root, swell = sqrt(square), sqrt(gamma), log1p(square)
-    half = (2.0 * gamma + log1p(lam) + 0.5 * swell + arctan(lam)) / root
-    kept = exp(-2.0 * gamma) / (1.0 + square)
-    return half, 1.0 + swell / (2.0 * gamma), lam / root, 0.5, kept * kept

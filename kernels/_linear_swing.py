@@ -173,7 +173,7 @@ def limit_cycle(scene, rtol):
     verdict = where(_self_starting(d, kappa, slack, rho_s), _OK, _NOT_SELF_STARTING)
     verdict = where((loose_s <= rtol) & (loose_m <= rtol), verdict, _INACCURATE)
     verdict = where(unsettled, _NOT_CONVERGED, verdict)
-    verdict = where(comes & (1.0 + kappa * top > rho_s), verdict, _STICKS)
+    verdict = where(comes & (energy > 0.0) & (1.0 + kappa * top > rho_s), verdict, _STICKS)
     return (time, top, sqrt(2.0 * energy), s, e * e * area), verdict
 
 

@@ -206,7 +206,7 @@ def first_crossing(beta, kappa, v, f, way):
     bracket. `beta` >= 0.
     """
     until = first_reversal(beta, kappa, v, f)
-    meets = (way <= reach(beta, kappa, v, f)) & ((v > 0.0) | (f > 0.0))
+    meets = (way < reach(beta, kappa, v, f)) & ((v > 0.0) | (f > 0.0))
     fast = where(f > 0.0, f, 0.0)
     low = 2.0 * way / where(meets, v + sqrt(fma(v, v, 2.0 * fast * way)), 1.0)
     high, t, active = until, low, meets

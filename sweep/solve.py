@@ -133,8 +133,20 @@ class _Strip:
                 return
             method = self.kernel.methods[number]
             meets = None if method.bound is None else self.bound(method, cells) <= self.rtol[cells]
-            self.run(number, cells if meets is None else _pick(cells, meets))
+            self._improve(number, cells if meets is None else _pick(cells, meets))
             cells = _pick(cells, np.isin(self.status[cells], GIVEN_UP))
+
+    def _improve(self, number: int, cells: Cells) -> None:
+        """Run a method, but keep INACCURATE values of an earlier one in cells that this one refuses."""
+        columns: list[NDArray[Any]] = [*self.outputs, self.status, self.used]
+        usable = _pick(cells, self.status[cells] == Status.INACCURATE)
+        kept = [column[usable].copy() for column in columns] if _count(usable) else []
+        self.run(number, cells)
+        if kept:
+            refused = self.status[usable] >= FIRST_REFUSAL
+            back = _pick(usable, refused)
+            for column, values in zip(columns, kept, strict=True):
+                column[back] = values[refused]
 
     def bound(self, method: Method, cells: Cells) -> Floats:
         """The method's error bound for the cells, over the outputs asked for."""

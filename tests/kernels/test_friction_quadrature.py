@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from mpmath import atan, atanh, exp, expm1, findroot, hyp2f1, log, log1p, mp, mpf, sqrt
 
 from kernels import _friction_quadrature as quadrature
+from kernels import _pure_laws
 from kernels._columns import each_cell, entry, one_by_one
 from kernels._jit import COMPILED, jit
 from kernels._lanes import where
@@ -41,7 +42,7 @@ def solved_one_by_one(d, rho, slack, gamma, n, e, half, amplitude, speed, s, m, 
 
 @jit
 def _pure(i, d, rho, slack, gamma, n, kappa, e, half, amplitude, speed, s, m, status):
-    cycle, applies = quadrature.pure((d[i], rho[i], rho[i], gamma[i], n[i], kappa[i], e[i], slack[i]))
+    cycle, applies = _pure_laws.pure((d[i], rho[i], rho[i], gamma[i], n[i], kappa[i], e[i], slack[i]))
     half[i], amplitude[i], speed[i], s[i], m[i] = cycle
     status[i] = where(applies, 1.0, 0.0)
 

@@ -103,6 +103,23 @@ def test_auto_goes_on_where_a_method_gives_up(verdict):
     assert outputs["impact_speed"] == pytest.approx([1.0, np.sqrt(4 * 9.80665), 1.0, np.sqrt(6 * 9.80665)])
 
 
+def test_auto_keeps_inaccurate_values_that_no_later_method_betters():
+    def loose(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
+        fall_time[...], impact_speed[...], drop[...] = 1.0, height, 1.0
+        status[...] = Status.INACCURATE
+
+    def refuses(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
+        fall_time[...], impact_speed[...], drop[...] = 2.0, 2.0, 2.0
+        status[...] = np.where(height > 1.5, Status.STICKS, Status.OK)
+
+    study = toy_study(axes={"height": np.array([1.0, 2.0, 1.2, 3.0])})
+    kernel = stand_in(rough=(loose, None), exact=(refuses, None))
+    outputs, status, used = solved(with_kernel(study, kernel))
+    assert used.tolist() == [1, 0, 1, 0]
+    assert status.tolist() == [Status.OK, Status.INACCURATE, Status.OK, Status.INACCURATE]
+    assert outputs["impact_speed"].tolist() == [2.0, 2.0, 2.0, 3.0]
+
+
 def test_auto_does_not_go_on_where_the_result_itself_is_out_of_range():
     def too_large(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
         status[...] = Status.OUT_OF_RANGE
