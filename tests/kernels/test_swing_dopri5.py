@@ -76,7 +76,7 @@ CELLS = [
 @pytest.fixture(scope="module")
 def truths():
     """Of `CELLS`; and half periods, as the cells have no dimensions."""
-    cells = CELLS if COMPILED else CELLS[5:12]
+    cells = CELLS if COMPILED else [CELLS[i] for i in (5, 10, 12, 14)]
     found = []
     for cell in cells:
         terms = {
@@ -152,12 +152,15 @@ def test_stiction_holds_a_turning_point_that_the_spring_does_not_free():
     assert status.tolist() == [Status.OK, Status.STICKS, Status.OK, Status.OK]
 
 
-def test_what_is_too_stiff_or_lost_in_rounding_is_said():
-    d, rho = np.array([2e3, 101.0, 0.0]), np.array([0.0, 0.0, 0.1492])
-    kappa = np.array([0.0, 1e-3, 77.15])
-    _, status = run(np.array([1e-3, 1e-3, 1e-9]), d=d, rho=rho, kappa=kappa)
-    assert status.tolist()[:2] == [Status.STEP_LIMIT, Status.STEP_LIMIT]
-    assert status[2] == Status.INACCURATE
+def test_what_is_too_stiff_is_refused():
+    _, status = run(1e-3, d=np.array([2e3, 101.0]), kappa=np.array([0.0, 1e-3]))
+    assert (status == Status.STEP_LIMIT).all()
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps in plain Python")
+def test_what_rounding_spoils_is_remarked():
+    _, status = run(1e-9, rho=0.1492, kappa=77.15)
+    assert status[0] == Status.INACCURATE
 
 
 def test_the_same_bits_alone_and_among_others():
@@ -178,7 +181,8 @@ def test_the_same_bits_alone_and_among_others():
         assert all(np.array_equal(alone[name][0], together[name][i], equal_nan=True) for name in NAMES), i
 
 
-@pytest.mark.parametrize("rtol", [np.nan, -1.0] if COMPILED else [])
+@pytest.mark.skipif(not COMPILED, reason="sixty half swings at the finest tolerance in plain Python")
+@pytest.mark.parametrize("rtol", [np.nan, -1.0])
 def test_a_senseless_rtol_is_never_met(rtol):
     _, status = run(rtol, d=1.0)
     assert status[0] != Status.OK
