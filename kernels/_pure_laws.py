@@ -1,8 +1,8 @@
 """The foliot with one loss alone: limit cycles in closed form.
 
-Dry friction rho: A = 1/rho, T = 2 sqrt(2/(rho (1 - rho^2))), v^2 = 2 (1 - rho^2)/rho, s = rho^2/(1 - rho^2).          (1)
-Drag gamma v^2, lambda = v/V: lambda^4 = 1 - exp(-4 gamma), T = (artanh lambda + arctan lambda)/sqrt(gamma), s = 1/2.  (2)
-Restitution e: A = (1 + e^2)/(1 - e^2), or 1 for e < 0, T = 2 sqrt((1 + e)/(1 - e)), s = 1/2.                          (3)
+Dry friction rho: A = 1/rho, T = 2 sqrt(2/(rho (1 - rho^2))), v^2 = 2 (1 - rho^2)/rho, s = rho^2/(1 - rho^2).        (1)
+Drag gamma v^2, lambda = v/V: lambda^4 = 1 - exp(-4 gamma), T = (artanh lambda + arctan lambda)/sqrt(gamma), s = 1/2. (2)
+Restitution e: A = (1 + e^2)/(1 - e^2), or 1 for e < 0, T = 2 sqrt((1 + e)/(1 - e)), s = 1/2.                        (3)
 T is half the period; units, *scene* and *cycle* as in `_foliot_scene`. Derived from the general law of friction.
 """
 
@@ -57,7 +57,7 @@ def _switch(e):
 
 @jit
 def _drag(gamma):
-    """The cycle (2); artanh lambda = 2 gamma + ln(1 + lambda) + ln(1 + lambda^2)/2 holds its digits up to lambda = 1."""
+    """The cycle (2); artanh lambda = 2 gamma + ln(1 + lambda) + ln(1 + lambda^2)/2 has all digits up to lambda = 1."""
     square = sqrt(-expm1(-4.0 * gamma))
     lam, root, swell = sqrt(square), sqrt(gamma), log1p(square)
     half = (2.0 * gamma + log1p(lam) + 0.5 * swell + arctan(lam)) / root
