@@ -1,7 +1,7 @@
 """The foliot with one loss alone: limit cycles in closed form.
 
 Dry friction rho: A = 1/rho, T = 2 sqrt(2/(rho (1 - rho^2))), v^2 = 2 (1 - rho^2)/rho, s = rho^2/(1 - rho^2).        (1)
-Drag gamma v^2, lambda = v/V: lambda^4 = 1 - exp(-4 gamma), T = (artanh lambda + arctan lambda)/sqrt(gamma), s = 1/2. (2)
+Drag gamma v^2, lambda = v/V: lambda^4 = 1 - exp(-4 gamma), T = (artanh lambda + arctan lambda)/sqrt(gamma), s = 1/2 (2)
 Restitution e: A = (1 + e^2)/(1 - e^2), or 1 for e < 0, T = 2 sqrt((1 + e)/(1 - e)), s = 1/2.                        (3)
 T is half the period; units, *scene* and *cycle* as in `_foliot_scene`. Derived from the general law of friction.
 """
