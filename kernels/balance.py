@@ -68,7 +68,7 @@ def _write(i, scene, units, ring, verdict, omega_n, theta0, half_swings, stop_an
     creeps, moves = zeta >= 1.0, start > r_s
     endless = moves & isnt(creeps) & isnt((r > 0.0) | (r_s > 0.0))
     half = half_swing_time(where(creeps, 0.0, zeta), omega_n)
-    whole = where(count < _ringdown.COUNT_LIMIT, count, 0.0)
+    whole = where((count < _ringdown.COUNT_LIMIT) & isnt(creeps), count, 0.0)
     angle = side(theta0, whole) * where(creeps & moves, r, where(endless, 0.0, last))
     angle = where(moves, scale(angle, e), theta0)
     time = where(moves, count * half, 0.0)

@@ -194,6 +194,13 @@ def test_an_overdamped_balance_never_turns_and_creeps_to_where_friction_holds_th
     np.testing.assert_allclose(outputs["margin"], [9, 9, 0.5], rtol=1e-15)
 
 
+def test_the_creep_ends_on_the_side_of_release_at_any_friction():
+    r = np.geomspace(1e-4, 0.9, 40)
+    for side in (-1.0, 1.0):
+        outputs, _ = solve(BALANCE, "closed", [1.5] * 40, [1.0], r, r, [side])
+        assert (outputs["stop_angle"] == side * r).all()
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_just_below_critical_damping_one_half_swing_ends_where_above_it_the_creep_does(method):
     outputs, status = solve(BALANCE, method, [1 - 1e-12], [3.0], [0.1], [0.1], [-2.0])
