@@ -11,6 +11,9 @@ KERNELS = {
     "foliot_start": "kernels.foliot_start:FOLIOT_START",
     "foliot_noise": "kernels.foliot_noise:FOLIOT_NOISE",
     "foliot_design": "kernels.foliot_design:FOLIOT_DESIGN",
+    "balance": "kernels.balance:BALANCE",
+    "balance_trace": "kernels.balance_trace:BALANCE_TRACE",
+    "balance_driven": "kernels.balance_driven:BALANCE_DRIVEN",
 }
 
 
