@@ -245,6 +245,6 @@ FOLIOT_NOISE = Kernel(
         Field("truncated", "1", "share of half swings whose torque was raised to the floor"),
     ),
     check=check,
-    methods=(Method("segments", "every half swing from exact pieces of linear terms", segments, excludes=("c", "n")),),
+    methods=(Method("segments", "every half swing from exact pieces of linear terms", segments, excludes=("c",)),),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0, "sigma": 0.01, "half_swings": 1000.0, "averaging_time": 600.0},
 )

@@ -212,6 +212,6 @@ FOLIOT_START = Kernel(
     ),
     along=(Field("flip", "1", "number of the flip, from 1 on", lower=1.0, upper=FLIP_LIMIT, integer=True),),
     check=check,
-    methods=(Method("segments", "exact pieces of linear terms, from switch to switch", segments, excludes=("c", "n")),),
+    methods=(Method("segments", "exact pieces of linear terms, from switch to switch", segments, excludes=("c",)),),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
 )
