@@ -115,6 +115,8 @@ def _entry(field: Field, value: float) -> str:
 
 
 def _range(field: Field) -> Iterable[str]:
+    if field.integer:
+        return ["num = 10"]
     if math.isfinite(field.upper - field.lower):
         return ["num = 200"]
     return ['spacing = "log"', "start = 0.1", "stop = 10", "num = 200"]

@@ -222,13 +222,17 @@ class Reader:
         return along
 
     def _coordinate(self, field: Field, entry: Any, where: str) -> NDArray[np.float64]:
-        """From one limit of the field to the other, where the study gives nothing but `num`."""
+        """Where the study gives nothing but `num`: from one limit to the other, or the first whole numbers."""
         if isinstance(entry, Mapping) and set(entry) == {"num"} and math.isfinite(field.upper - field.lower):
-            entry = {"spacing": "linear", "start": field.lower, "stop": field.upper, **entry}
+            counted = field.integer and isinstance(entry["num"], int)
+            last = min(field.upper, field.lower + entry["num"] - 1) if counted else field.upper
+            entry = {"spacing": "linear", "start": field.lower, "stop": last, **entry}
         values = self.entries.axis(field.name, entry, field, where).values
-        bad = values[~((values >= field.lower) & (values <= field.upper) & np.isfinite(values))]
+        inside = (values >= field.lower) & (values <= field.upper) & np.isfinite(values)
+        bad = values[~(inside & (values == np.round(values)) if field.integer else inside)]
         if len(bad):
-            self.mistakes.add(where, f"expected values from {field.lower:g} to {field.upper:g}, found {bad[0]:g}")
+            kind = "whole numbers" if field.integer else "values"
+            self.mistakes.add(where, f"expected {kind} from {field.lower:g} to {field.upper:g}, found {bad[0]:g}")
         return values
 
     def _excluded(self, method: str, axes: Mapping[str, Axis], fixed: Mapping[str, float]) -> None:

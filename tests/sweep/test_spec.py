@@ -80,6 +80,23 @@ def test_a_coordinate_that_no_output_needs_is_empty():
     assert build(axes={"height": [1.0]}, along={"phase": {"num": 5}}).along["phase"].size == 0
 
 
+FLIPS = """
+kernel = "foliot_start"
+axes.mu = [1.0]
+fixed = {{ phi0 = 1, a = 1 }}
+along.flip = {}
+"""
+
+
+def test_a_coordinate_that_counts_takes_the_first_whole_numbers(tmp_path):
+    path = tmp_path / "flips.toml"
+    path.write_text(FLIPS.format("{ num = 4 }"))
+    assert sweep.read_study(path).along["flip"].tolist() == [1.0, 2.0, 3.0, 4.0]
+    path.write_text(FLIPS.format("[1, 2.5]"))
+    with pytest.raises(sweep.SweepError, match="expected whole numbers from 1 to 1e\\+06, found 2.5"):
+        sweep.read_study(path)
+
+
 def test_python_and_toml_give_the_same_study(read):
     toml = read(
         """
