@@ -93,7 +93,7 @@ def test_a_coordinate_that_counts_takes_the_first_whole_numbers(tmp_path):
     path.write_text(FLIPS.format("{ num = 4 }"))
     assert sweep.read_study(path).along["flip"].tolist() == [1.0, 2.0, 3.0, 4.0]
     path.write_text(FLIPS.format("[1, 2.5]"))
-    with pytest.raises(sweep.SweepError, match="expected whole numbers from 1 to 1e\\+06, found 2.5"):
+    with pytest.raises(sweep.SweepError, match=r"expected whole numbers from 1 to 1e\+06, found 2.5"):
         sweep.read_study(path)
 
 
