@@ -174,6 +174,30 @@ def test_the_recursion_is_right_to_rtol_or_says_that_it_is_not(kind, rtol):
         assert found[name][status == Status.OK].max() <= max(rtol, 1e-15), name
 
 
+def test_the_recursion_counts_the_rounding_of_its_factor():
+    """Without solid friction nothing else is there to be rounded but the product: half of the error."""
+    n = 1000 if COMPILED else 40
+    zeta = np.random.default_rng(8).uniform(0.05, 0.9, n)
+    columns = zeta, np.ones(n), np.zeros(n), np.full(n, 1e-60), np.ones(n)
+    exact = truths(columns)
+    seen = 0.0
+    for rtol in np.geomspace(1e-15, 1e-12, 31):
+        outputs, status = solve(BALANCE, "recursion", *columns, rtol=rtol)
+        error = errors(outputs, exact, ["stop_angle"])["stop_angle"][status == Status.OK]
+        assert (error <= rtol).all()
+        seen = max(seen, error.max(initial=0.0) / rtol)
+    assert seen > 0.1
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_turning_point_exactly_at_the_stiction_is_rest(method):
+    outputs, status = solve(BALANCE, method, [0.0], [2.0], [0.125], [0.25], [1.0])
+    assert status[0] == Status.GRAZING
+    assert outputs["half_swings"][0] == 3
+    assert outputs["stop_angle"][0] == -0.25
+    assert outputs["margin"][0] == 0
+
+
 @pytest.mark.skipif(not COMPILED, reason="a hundred thousand half swings in plain Python")
 def test_the_recursion_gives_up_beyond_its_limit():
     r = np.array([4.9e-6, 5.1e-6])
