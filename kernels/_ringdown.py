@@ -32,6 +32,7 @@ FAINT = 1e-100
 
 _CONFIRM_LIMIT = 24
 _PAIR_ERROR = 1e-30
+_LOST = 1e-300  # what a share E below normal numbers may lose
 _TWO_ULP = 2.0**-51
 _UNIT_LIMIT = 2.0**900
 """theta0/r beyond which products would leave float64."""
@@ -159,12 +160,19 @@ def closed(scene):
     over, under = _pairs.shifted(above, -r_s)[0], where(moves, -_pairs.shifted(below, -r_s)[0], r_s - start)
     steep = 1.0 / (root[0] * root[0])
     drift = 2.0 * share[0][0] * where(zeta > FAINT, delta[0] / where(zeta > FAINT, share[1][0], 1.0), 1.0)
-    blur = _blur(steep, drift, delta[0], r_s, below[0], share[0][0] * kept, k)
-    blur_above = _blur(steep, drift, delta[0], r_s, above[0], kept, k)
-    blur_above = where(k > 1.0, blur_above, _TWO_ULP * (start + r_s))
-    margin, grazes = _margin(over, under, where(moves, blur_above, 0.0), where(moves, blur, 0.0), r_s, moves)
+    blur = _blur(steep, drift, delta[0], below[0], share[0][0] * kept, k)
+    blur_above = _blur(steep, drift, delta[0], above[0], kept, k)
+    blur_above = where(k > 1.0, blur_above, _TWO_ULP * start)
+    margin, grazes = _margin(
+        over,
+        under,
+        where(moves, blur_above + _TWO_ULP * r_s, 0.0),
+        where(moves, blur + _TWO_ULP * r_s, 0.0),
+        r_s,
+        moves,
+    )
     count = where(moves, where(countless, _whole(guess), k), 0.0)
-    doubt = where(moves & (zeta > FAINT), _PAIR_ERROR / _TWO_ULP * blur, 0.0)
+    doubt = where(moves & (zeta > FAINT), fma(_PAIR_ERROR / _TWO_ULP, blur, _LOST), 0.0)
     unsure = moves & isnt(countless) & (active | isnt(sure))
     return count, last, where(countless, 0.0, margin), grazes | countless, doubt, unsure
 
@@ -189,14 +197,14 @@ def unit(r_s):
 
 
 @jit
-def _blur(steep, drift, delta, r_s, a, kept, k):
-    """What two units in the last place of a_0, r, r_s and zeta are worth in a_k - r_s.
+def _blur(steep, drift, delta, a, kept, k):
+    """What two units in the last place of a_0, r and zeta are worth in a_k.
 
     da/dln a_0 = a_0 E^k, da/dln r = -r (1 + E)(1 - E^k)/(1 - E), and ln zeta counts through ln delta, `steep` times:
     k delta-fold in the first, at most `drift`-fold in the second.
     """
     friction = magnitude(kept - a)
-    return _TWO_ULP * (kept * fma(k * delta, steep, 1.0) + friction * fma(drift, steep, 1.0) + r_s)
+    return _TWO_ULP * (kept * fma(k * delta, steep, 1.0) + friction * fma(drift, steep, 1.0))
 
 
 @jit_call
@@ -214,6 +222,7 @@ def recursion(scene):
             break
         new = fma(share, a, -loss)
         more = fma(share, error, fma(rounding, share * a, 4e-16 * loss)) + 1.2e-16 * magnitude(new)
+        more = more + _LOST
         before, error_before = where(active, a, before), where(active, error, error_before)
         a, error = where(active, new, a), where(active, more, error)
         count = where(active, count + 1.0, count)

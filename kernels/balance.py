@@ -78,7 +78,8 @@ def _write(i, scene, units, ring, verdict, omega_n, theta0, half_swings, stop_an
     stop_angle[i], stop_time[i] = angle, where(lasting, time, math.nan)
     margin[i], period[i] = where(endless, math.nan, distance), where(creeps, math.nan, 2.0 * half)
     verdict = where(creeps, _OVERDAMPED, where(endless, _TOO_SHORT, verdict))
-    small = moves & (magnitude(angle) > 0.0) & (magnitude(angle) < _NORMAL_LOW)
+    faded = isnt(r > 0.0) & lasting  # to a positive angle, however small
+    small = moves & (magnitude(angle) < _NORMAL_LOW) & (faded | (magnitude(angle) > 0.0))
     fine = fine & (creeps | _normal(half)) & isnt(lasting & (time > _NORMAL_HIGH)) & isnt(small)
     status[i] = where(fine, verdict, _OUT_OF_RANGE)
 

@@ -252,6 +252,16 @@ def test_stiction_alone_ends_a_viscous_ring_down(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
+def test_an_angle_of_rest_that_no_float64_can_hold_is_refused(method):
+    zeta = [0.9999, 0.999999999, 0.99]
+    outputs, status = solve(BALANCE, method, zeta, [1.0], [0.0], [1e-3], [1.0], rtol=1e-10)
+    assert status.tolist() == [Status.OK, Status.OUT_OF_RANGE, Status.OK]
+    for i in (0, 2):
+        true = oracles.balance(zeta[i], 1.0, 0.0, 1e-3, 1.0)[1]
+        assert relative_error(outputs["stop_angle"][i : i + 1], [true])[0] < (1e-15 if method == "closed" else 1e-12)
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_released_within_stiction_it_stays_where_it_is(method):
     theta0 = [0.05, -0.05, 0.0, -0.1, 0.1]
     outputs, status = solve(BALANCE, method, [0.3] * 5, [2.0], [0.1], [0.1], theta0)
