@@ -92,13 +92,14 @@ def test_noise_makes_every_clock_lose_by_its_square(clocks):
     assert ratio == pytest.approx(0.01, rel=0.1)
 
 
-def test_a_long_correlation_loses_as_the_period_curves_with_torque(clocks):
-    ds = clocks["verge"]
+@pytest.mark.parametrize("name", list(timekeeping.CLOCKS))
+def test_a_long_correlation_loses_as_the_period_curves_with_torque(name, clocks):
+    ds = clocks[name]
     step, mu, P = 1e-3, float(ds.mu), []
     for torque in (mu * (1 - step), mu, mu * (1 + step)):
         P.append(float(timekeeping.without_noise(ds.assign_coords(mu=torque)).period))
     curved = 86400 * (P[0] - 2 * P[1] + P[2]) / step**2 / P[1] / 2
-    assert timekeeping.second_order(ds, 1e7) == pytest.approx(curved, rel=1e-4)
+    assert timekeeping.second_order(ds, 1e7) == pytest.approx(curved, rel=1e-3)  # differences of second order
 
 
 def test_the_table_gives_the_noise_that_scatters_by_the_goal(clocks):
