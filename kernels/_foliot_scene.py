@@ -4,12 +4,14 @@ In units of phi0 and of T0 = sqrt(phi0/mu) the half swing after the switch at x 
     x'' = -1 - (d x' + (rho + gamma abs(x')^n) sgn x') - kappa x                                     (1)
     d = a T0,  rho = R/mu,  rho_s = R_s/mu,  gamma = c (phi0 mu)^(n/2)/mu,  kappa = k T0^2.
 It starts with e times the speed before the switch and ends at x = -1; the other half mirrors it. Drive work is 2.
-A *scene* is the tuple (d, rho, rho_s, gamma, n, kappa, e, slack), slack = 1 - rho without the rounding of rho.
+A *scene* is the tuple (d, rho, rho_s, gamma, n, kappa, e, slack), slack = 1 - rho without the rounding of rho. Drag of
+degree 0 is Coulomb friction: it is counted in rho, rho_s and slack, and gamma is 0.
 A *cycle* is the tuple (half period, amplitude, speed before the switch, s = -dlnP/dlnmu, multiplier).
 """
 
 from kernels._jit import jit
 from kernels._lanes import isnt, nearest, sqrt, where
+from kernels._pairs import two_sum
 from kernels._vecmath import mantissa_exponent, power, scale
 
 _NORMAL_LOW, _NORMAL_HIGH = 2.3e-308, 1.79e308
@@ -29,10 +31,19 @@ def without_dimensions(mu, phi0, a, R, R_s, c, n, k, e):
     t, e_t = _root(m_phi / m_mu, e_phi - e_mu)
     v, e_v = _root(m_phi * m_mu, e_phi + e_mu)
     d, kappa = _in_units(a, t, e_t), _in_units(k, t * t, 2.0 * e_t)
-    gamma = _strength(mu, c, n, scale(v, e_v))
-    rho, slack = R / mu, (mu - R) / mu
-    fine = _kept(a, d) & _kept(k, kappa) & _kept(c, gamma) & _kept(R, rho)
-    return (d, rho, R_s / mu, gamma, n, kappa, e, slack), (t, e_t, m_phi, e_phi, fine)
+    solid, drag = where(n > 0.0, 0.0, c), where(n > 0.0, c, 0.0)
+    gamma = _strength(mu, drag, n, scale(v, e_v))
+    rho, slack = (R + solid) / mu, spare_torque(mu, R, solid) / mu
+    fine = _kept(a, d) & _kept(k, kappa) & _kept(drag, gamma) & _kept(R + solid, rho)
+    return (d, rho, (R_s + solid) / mu, gamma, where(n > 0.0, n, 1.0), kappa, e, slack), (t, e_t, m_phi, e_phi, fine)
+
+
+@jit
+def spare_torque(mu, R, solid):
+    """mu - R - solid, rounded once: what is left of the torque may be a small difference of large ones."""
+    first, lost = two_sum(mu, -R)
+    rest, lost_again = two_sum(first, -solid)
+    return rest + (lost + lost_again)
 
 
 @jit

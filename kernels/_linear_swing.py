@@ -19,10 +19,13 @@ from kernels.interface import Status
 
 NEWTON_LIMIT = 100
 """Newton steps or bisections on the map of E; about eight are usual."""
+_STIFFEST = 1e60
+"""Viscous friction d beyond which its powers leave float64."""
 ROUNDING = 2e-15
 """Relative error of one half swing: of time, amplitude, speed and of the terms of (4)."""
 
 _OK, _NOT_CONVERGED, _INACCURATE = float(Status.OK), float(Status.NOT_CONVERGED), float(Status.INACCURATE)
+_NO_METHOD = float(Status.NO_METHOD)
 _STICKS, _NOT_SELF_STARTING = float(Status.STICKS), float(Status.NOT_SELF_STARTING)
 
 
@@ -173,7 +176,9 @@ def limit_cycle(scene, rtol):
     verdict = where(_self_starting(d, kappa, slack, rho_s), _OK, _NOT_SELF_STARTING)
     verdict = where((loose_s <= rtol) & (loose_m <= rtol), verdict, _INACCURATE)
     verdict = where(unsettled, _NOT_CONVERGED, verdict)
-    verdict = where(comes & (energy > 0.0) & (1.0 + kappa * top > rho_s), verdict, _STICKS)
+    passes = (e < 0.0) | (1.0 + kappa * top > rho_s)  # for e < 0 nothing comes to rest at the switch
+    verdict = where(comes & (energy > 0.0) & passes, verdict, _STICKS)
+    verdict = where(d < _STIFFEST, verdict, _NO_METHOD)
     return (time, top, sqrt(2.0 * energy), s, e * e * area), verdict
 
 

@@ -55,8 +55,8 @@ _CAREFUL = 1e-5
 _FORGOTTEN = 40.0
 """Y after which a motion that no force varies along the way is uniform, to exp(-40)."""
 _SCAN, _BISECTIONS = 32, 40
-_ARRIVED = -1.0 + 1e-12
-"""How far x may be from the switch for having reached it."""
+_ARRIVED, _ROUNDED = 1e-12, 4e-15
+"""How far x may be from the switch for having reached it: so much, and so much of the largest x."""
 
 
 @jit_call
@@ -236,7 +236,7 @@ def _half_swing(start, turns, dry, scene, forgetting, first, tolerance, active):
         if some(uniform):
             rest, coast = _coasted(state, scene)
             state, time = choose(uniform, rest, state), where(uniform, time + coast, time)
-        stopped = moving & isnt(rising) & (state[0] > _ARRIVED)
+        stopped = moving & isnt(rising) & (state[0] + 1.0 > _ARRIVED + _ROUNDED * top)
         helped = helped | stopped
         rising = rising & isnt(turning)
         if some(stopped):

@@ -6,7 +6,7 @@ is the stiction, as an angle. Leaves out: an escapement (`balance_driven`), fric
 Source: "Theory of Horology", section 2-3; the count of half swings is derived in `_ringdown`.
 
 Where there is no such end, the cell is remarked and what exists is given: OVERDAMPED for zeta >= 1 (never turns, creeps
-to r on the side of release, where `stop_angle` is), TOO_SHORT without any solid friction (a motion of any length is:
+to r on the side of release, where `stop_angle` is), NEVER_ENDS without any solid friction (a motion of any length is:
 it fades to 0 and never ends). GRAZING: the count hangs on the last digits of the input.
 """
 
@@ -24,7 +24,7 @@ ROUNDING = 2e-15
 """What `closed` is right to."""
 
 _OK, _INACCURATE, _GRAZING = float(Status.OK), float(Status.INACCURATE), float(Status.GRAZING)
-_OVERDAMPED, _TOO_SHORT = float(Status.OVERDAMPED), float(Status.TOO_SHORT)
+_OVERDAMPED, _NEVER_ENDS = float(Status.OVERDAMPED), float(Status.NEVER_ENDS)
 _BAD_INPUT, _NO_LIMIT_CYCLE = float(Status.BAD_INPUT), float(Status.NO_LIMIT_CYCLE)
 _OUT_OF_RANGE, _NOT_CONVERGED = float(Status.OUT_OF_RANGE), float(Status.NOT_CONVERGED)
 _STEP_LIMIT = float(Status.STEP_LIMIT)
@@ -72,12 +72,14 @@ def _write(i, scene, units, ring, verdict, omega_n, theta0, half_swings, stop_an
     angle = side(theta0, whole) * where(creeps & moves, r, where(endless, 0.0, last))
     angle = where(moves, scale(angle, e), theta0)
     time = where(moves, count * half, 0.0)
-    distance = where(creeps, magnitude(start - r_s) / _ringdown.unit(r_s), where(r_s > 0.0, distance, 0.0))
+    away = where(r_s > 0.0, magnitude(start - r_s) / _ringdown.unit(r_s), math.nan)
+    distance = where(creeps, away, where(r_s > 0.0, distance, 0.0))
     lasting = isnt((creeps & moves) | endless)
     half_swings[i] = where(creeps, 0.0, where(endless, math.nan, count))
     stop_angle[i], stop_time[i] = angle, where(lasting, time, math.nan)
     margin[i], period[i] = where(endless, math.nan, distance), where(creeps, math.nan, 2.0 * half)
-    verdict = where(creeps, _OVERDAMPED, where(endless, _TOO_SHORT, verdict))
+    verdict = where(start > 0.0, verdict, _OK)
+    verdict = where(creeps, _OVERDAMPED, where(endless, _NEVER_ENDS, verdict))
     faded = isnt(r > 0.0) & lasting  # to a positive angle, however small
     small = moves & (magnitude(angle) < _NORMAL_LOW) & (faded | (magnitude(angle) > 0.0))
     fine = fine & (creeps | _normal(half)) & isnt(lasting & (time > _NORMAL_HIGH)) & isnt(small)

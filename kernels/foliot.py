@@ -6,7 +6,8 @@ The torque changes sign as phi passes +-phi0 on its way out, and the speed is th
 of the crown wheel, the geometry of the pallets, the fine structure of the torque (`foliot_ripple`, `foliot_noise`).
 Source: Hoyng & Nieuwenhuizen, arXiv:1604.06681, for friction a phi' alone; the other terms are derived in the modules
 that solve them. What a swing loses grows strictly with the swing, so where a limit cycle exists it is the only one and
-stable; where the foliot does not come to it from rest at phi = 0, the cell is remarked NOT_SELF_STARTING.
+stable; where the foliot does not come to it from rest at phi = 0, `segments` remarks the cell NOT_SELF_STARTING (a
+spring; `dopri5`, which does what `segments` cannot, follows the cycle only and does not say so).
 """
 
 import math
@@ -165,10 +166,10 @@ def refusal(mu, phi0, a, R, R_s, c, n, k, e):
     known = (mu >= 0.0) & (phi0 > 0.0) & (a >= 0.0) & (R >= 0.0) & (c >= 0.0) & (n >= 0.0) & (k >= 0.0)  # NaN fails
     small = (mu < math.inf) & (phi0 < math.inf) & (a < math.inf) & (R_s < math.inf) & (c < math.inf)
     allowed = known & small & (n < math.inf) & (k < math.inf) & (R_s >= R) & (e > -1.0) & (e <= 1.0)
-    solid = R + where(n > 0.0, 0.0, c)
-    held = where(k > 0.0, solid, where(R_s > solid, R_s, solid))  # a spring helps stiction be overcome
+    friction = where(k > 0.0, R, R_s)  # a spring helps stiction be overcome
+    spare = _foliot_scene.spare_torque(mu, friction, where(n > 0.0, 0.0, c))
     lossless = isnt((a > 0.0) | (R > 0.0) | (c > 0.0) | (e < 1.0))
-    verdict = where(mu > held, where(lossless, _NO_LIMIT_CYCLE, _OK), _NEVER_STARTS)
+    verdict = where(spare > 0.0, where(lossless, _NO_LIMIT_CYCLE, _OK), _NEVER_STARTS)
     return where(allowed, verdict, _BAD_INPUT)
 
 

@@ -32,6 +32,7 @@ UNSURE = 0.5
 _OK, _BAD_INPUT, _INACCURATE = float(Status.OK), float(Status.BAD_INPUT), float(Status.INACCURATE)
 _COMES_TO_REST, _GRAZING = float(Status.COMES_TO_REST), float(Status.GRAZING)
 _NEVER_STARTS, _OUT_OF_RANGE = float(Status.NEVER_STARTS), float(Status.OUT_OF_RANGE)
+_STICKS = float(Status.STICKS)
 _REFUSED = int(Status.BAD_INPUT)
 _NORMAL_LOW, _NORMAL_HIGH = 2.3e-308, 1.79e308
 
@@ -169,7 +170,9 @@ def _follow(first, mu, phi0, a, R, R_s, c, n, k, e, phi_start, rtol, flip, row, 
         write_row(first, j, where(going, speed, math.nan), row, flip_speed)
     verdict = where(going, _OK, _COMES_TO_REST)
     verdict = where(accurate, verdict, _INACCURATE)
-    verdict = where(unsure, _GRAZING, where(starts, verdict, _NEVER_STARTS))
+    held = isnt(magnitude(fma(scene[5], x, 1.0)) > scene[2])
+    verdict = where(starts, verdict, where(held, _NEVER_STARTS, _STICKS))
+    verdict = where(unsure, _GRAZING, verdict)
     status[i] = where(right, verdict, _OUT_OF_RANGE)
 
 

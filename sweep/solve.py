@@ -137,16 +137,16 @@ class _Strip:
             cells = _pick(cells, np.isin(self.status[cells], GIVEN_UP))
 
     def _improve(self, number: int, cells: Cells) -> None:
-        """Run a method, but keep INACCURATE values of an earlier one in cells that this one refuses."""
+        """Run a method, but keep INACCURATE values of an earlier one in cells where this one is not better."""
         columns: list[NDArray[Any]] = [*self.outputs, self.status, self.used]
         usable = _pick(cells, self.status[cells] == Status.INACCURATE)
         kept = [column[usable].copy() for column in columns] if _count(usable) else []
         self.run(number, cells)
         if kept:
-            refused = self.status[usable] >= FIRST_REFUSAL
-            back = _pick(usable, refused)
+            worse = (self.status[usable] >= FIRST_REFUSAL) | (self.status[usable] == Status.INACCURATE)
+            back = _pick(usable, worse)
             for column, values in zip(columns, kept, strict=True):
-                column[back] = values[refused]
+                column[back] = values[worse]
 
     def bound(self, method: Method, cells: Cells) -> Floats:
         """The method's error bound for the cells, over the outputs asked for."""

@@ -236,7 +236,7 @@ def test_just_below_critical_damping_one_half_swing_ends_where_above_it_the_cree
 @pytest.mark.parametrize("method", METHODS)
 def test_without_solid_friction_the_swing_fades_and_never_ends(method):
     outputs, status = solve(BALANCE, method, [0.1], [3.0], [0.0], [0.0], [-2.0])
-    assert status[0] == Status.TOO_SHORT
+    assert status[0] == Status.NEVER_ENDS
     assert outputs["stop_angle"][0] == 0
     assert np.isnan([outputs[name][0] for name in ("half_swings", "stop_time", "margin")]).all()
     assert outputs["period"][0] == pytest.approx(2 * np.pi / (3 * np.sqrt(0.99)), rel=1e-15)
@@ -273,9 +273,9 @@ def test_released_within_stiction_it_stays_where_it_is(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_at_rest_at_the_zero_without_friction_the_last_digit_decides(method):
+def test_at_rest_at_the_zero_without_friction_it_stays_there(method):
     outputs, status = solve(BALANCE, method, [0.3], [2.0], [0.0], [0.0], [0.0])
-    assert status[0] == Status.GRAZING
+    assert status[0] == Status.OK
     assert [outputs[name][0] for name in NAMES[:4]] == [0, 0, 0, 0]
 
 

@@ -21,8 +21,9 @@ ROOT = Path(__file__).parents[2]
 PERIOD = """
 import numpy as np
 from kernels import _cache, foliot
-x = [np.ones(1) for _ in range(3)]
+x = [np.ones(1) for _ in range(9)]
 status = np.zeros(1, np.int8)
+x[3], x[4] = 0.5 * x[3], 0.5 * x[4]  # R, R_s
 foliot.check(*x, status)
 print(status[0], sum(foliot.check.compiled.stats.cache_hits.values()), _cache.FOLDER)
 """

@@ -6,6 +6,7 @@ import pytest
 from columns import bounds, checked, relative_error, solve
 from hypothesis import given
 from hypothesis import strategies as st
+from mpmath import mp, mpf, sqrt
 
 from kernels._jit import COMPILED
 from kernels.foliot import FOLIOT
@@ -226,3 +227,36 @@ def test_nothing_is_wrong_in_silence_in_the_wildest_units():
         for position, name in enumerate(NAMES[:4]):
             error = relative_error(outputs[name][good], [t[position] for t in exact])
             assert error.max(initial=0.0) < 1e-9, (method, name, worst_cell(error, kept))
+
+
+@pytest.mark.parametrize("method", ["pure", "quadrature", "dopri5"])
+@pytest.mark.parametrize(("mu", "R", "c"), [(3.0, 1.1, 1.9 - 1e-12), (0.8, 0.1, 0.7 - 1e-9), (2.0, 0.5, 0.25)])
+def test_drag_of_degree_0_is_coulomb_friction_to_the_last_digit_of_what_is_left(method, mu, R, c):
+    """P = 4 sqrt(2 phi0/F)/sqrt(1 - (F/mu)^2), F = R + c, in exact arithmetic on the floats."""
+    with mp.workdps(50):
+        friction = mpf(R) + mpf(c)
+        rho = friction / mpf(mu)
+        period, s = 4 * sqrt(2 / friction) / sqrt(1 - rho**2), rho**2 / (1 - rho**2)
+    rtol = 1e-6 if method == "dopri5" else 1e-12
+    outputs, status = solve(FOLIOT, method, [mu], 1.0, R=R, c=c, n=0.0, rtol=rtol)
+    assert relative_error(outputs["period"], [period])[0] < rtol or status[0] != Status.OK
+    assert relative_error(outputs["sensitivity"], [s])[0] < rtol or status[0] != Status.OK
+    assert status[0] == Status.OK or method == "dopri5"
+
+
+def test_nothing_rests_at_a_switch_that_throws_back():
+    cell = {"a": 0.1, "R": 0.1, "R_s": 3.0, "k": 1.0}
+    outputs, status = solve(FOLIOT, "segments", [1.0, 1.0], 1.0, **cell, e=[-0.5, 0.5])
+    assert status.tolist() == [Status.NOT_SELF_STARTING, Status.STICKS]
+    assert outputs["crossing_speed"][0] == pytest.approx(1.96733823, rel=1e-8)
+
+
+def test_beyond_their_range_segments_leave_the_cell_to_others():
+    assert solve(FOLIOT, "segments", [1.0, 1.0], 1.0, [1e80, 1e50], e=0.5)[1].tolist() == [Status.NO_METHOD, Status.OK]
+
+
+def test_integration_arrives_at_the_switch_from_a_wide_swing():
+    e = np.array([0.999, 0.9999])
+    outputs, status = solve(FOLIOT, "dopri5", np.ones(2), 1.0, e=e, rtol=1e-6)
+    assert (status == Status.OK).all()
+    np.testing.assert_allclose(outputs["period"], 4 * np.sqrt((1 + e) / (1 - e)), rtol=1e-6)

@@ -110,7 +110,7 @@ def test_auto_keeps_inaccurate_values_that_no_later_method_betters():
 
     def refuses(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
         fall_time[...], impact_speed[...], drop[...] = 2.0, 2.0, 2.0
-        status[...] = np.where(height > 1.5, Status.STICKS, Status.OK)
+        status[...] = np.where(height > 1.5, np.where(height > 2.5, Status.INACCURATE, Status.STICKS), Status.OK)
 
     study = toy_study(axes={"height": np.array([1.0, 2.0, 1.2, 3.0])})
     kernel = stand_in(rough=(loose, None), exact=(refuses, None))
