@@ -18,7 +18,7 @@ import math
 from kernels import _pairs, _ringdown, _segment
 from kernels._jit import jit, jit_call
 from kernels._lanes import fma, isnt, magnitude, nearest, some, sqrt, where
-from kernels._vecmath import arctan, exp, expm1, mantissa_exponent, scale
+from kernels._vecmath import arctan, exp, expm1, in_unit, mantissa_exponent
 from kernels.interface import Status
 
 NEWTON_LIMIT = 100
@@ -41,15 +41,9 @@ def without_units(zeta, r, w, m, beta):
     half = nearest(0.5 * e_w - 0.25)
     e = where(lifts, e_beta, half)
     energy = where(lifts, 0.0, m_w * where(e_w - 2.0 * half > 0.5, 2.0, 1.0))
-    friction, torque = _in_unit(r, e), _in_unit(m, e)
+    friction, torque = in_unit(r, e), in_unit(m, e)
     fine = (isnt(r > 0.0) | (friction > 1e-300)) & (friction < 1e300) & (isnt(lifts) | (torque > 1e-300))
-    return (zeta, friction, torque, _in_unit(beta, e), energy), e, fine & (torque < 1e300)
-
-
-@jit
-def _in_unit(x, e):
-    m, own = mantissa_exponent(where(x > 0.0, x, 1.0))
-    return where(x > 0.0, scale(m, own - e), 0.0)
+    return (zeta, friction, torque, in_unit(beta, e), energy), e, fine & (torque < 1e300)
 
 
 @jit_call

@@ -12,9 +12,7 @@ A *cycle* is the tuple (half period, amplitude, speed before the switch, s = -dl
 from kernels._jit import jit
 from kernels._lanes import isnt, nearest, sqrt, where
 from kernels._pairs import two_sum
-from kernels._vecmath import mantissa_exponent, power, scale
-
-_NORMAL_LOW, _NORMAL_HIGH = 2.3e-308, 1.79e308
+from kernels._vecmath import is_normal, mantissa_exponent, power, scale
 
 
 @jit
@@ -61,7 +59,7 @@ def _strength(mu, c, n, speed):
 @jit
 def _kept(x, group):
     """Whether a group is a normal number where its parameter is not zero."""
-    return isnt(x > 0.0) | ((group >= _NORMAL_LOW) & (group <= _NORMAL_HIGH))
+    return isnt(x > 0.0) | is_normal(group)
 
 
 @jit
@@ -71,9 +69,4 @@ def dimensional(units, cycle):
     half_period, amplitude, speed, _, _ = cycle
     period = scale(2.0 * t * half_period, e_t)
     swing, fast = scale(m_phi * amplitude, e_phi), scale(m_phi / t * speed, e_phi - e_t)
-    return period, swing, fast, fine & _normal(period) & _normal(swing) & _normal(fast)
-
-
-@jit
-def _normal(x):
-    return (x >= _NORMAL_LOW) & (x <= _NORMAL_HIGH)
+    return period, swing, fast, fine & is_normal(period) & is_normal(swing) & is_normal(fast)

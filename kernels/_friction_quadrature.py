@@ -20,7 +20,7 @@ import numpy as np
 from kernels._jit import jit, jit_call
 from kernels._lanes import fma, isnt, magnitude, some, sqrt, where
 from kernels._pure_laws import without_degree_0
-from kernels._vecmath import exp, expm1, log, log1p
+from kernels._vecmath import exp, expm1, is_normal, log, log1p
 from kernels.interface import Status
 
 NEWTON_LIMIT = 60
@@ -30,7 +30,6 @@ SETTLED = 1e-8
 """A Newton step in ln v1 below which the next one, about its square, would be below rounding."""
 
 _OK, _NOT_CONVERGED, _OUT_OF_RANGE = float(Status.OK), float(Status.NOT_CONVERGED), float(Status.OUT_OF_RANGE)
-_NORMAL_LOW, _NORMAL_HIGH = 2.3e-308, 1.79e308
 _NEAR = 1.1  # from this z on the pole is taken out; below, where V > 1.5 v1, the rule does without
 _FAR = 1e300  # ln V where there is no drag
 _WIDEST = 750.0  # no ln v1 of a float64 is beyond
@@ -329,7 +328,7 @@ def solve_quadrature(scene, rtol):
     amplitude = 1.0 + where(e > 0.0, v1 * v1 * (e * e) * rise, 0.0)
     half = v1 * time
     cycle = (half, amplitude, v1, s, e * e * (F1 / (F1 + (m0 + m1 + m2))))
-    fine = (half >= _NORMAL_LOW) & (half <= _NORMAL_HIGH) & (v1 >= _NORMAL_LOW) & (v1 <= _NORMAL_HIGH)
+    fine = is_normal(half) & is_normal(v1)
     return cycle, where(unsettled, _NOT_CONVERGED, where(fine, _OK, _OUT_OF_RANGE))
 
 

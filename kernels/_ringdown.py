@@ -19,7 +19,7 @@ import math
 from kernels import _pairs
 from kernels._jit import jit, jit_call
 from kernels._lanes import choose, fma, isnt, magnitude, nearest, some, where
-from kernels._vecmath import exp, log1p, mantissa_exponent, scale
+from kernels._vecmath import exp, in_unit, log1p, mantissa_exponent, scale
 
 COUNT_LIMIT = 2.0**50
 """Half swings from which on they are only known to 1e-15: 32 digits do not tell two turning points apart."""
@@ -43,15 +43,9 @@ def in_units(r, r_s, theta0):
     """r, r_s and abs(theta0) in units of 2^e, e, and whether they are not too large there; powers of two are exact."""
     angle = magnitude(theta0)
     _, e = mantissa_exponent(where(r > 0.0, r, where(r_s > 0.0, r_s, where(angle > 0.0, angle, 1.0))))
-    release = _in_unit(angle, e)
-    held = _in_unit(r_s, e)
-    return _in_unit(r, e), held, release, e, (release < _UNIT_LIMIT) & (held < _UNIT_LIMIT)
-
-
-@jit
-def _in_unit(x, e):
-    m, own = mantissa_exponent(where(x > 0.0, x, 1.0))
-    return where(x > 0.0, scale(m, own - e), 0.0)
+    release = in_unit(angle, e)
+    held = in_unit(r_s, e)
+    return in_unit(r, e), held, release, e, (release < _UNIT_LIMIT) & (held < _UNIT_LIMIT)
 
 
 @jit

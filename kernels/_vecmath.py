@@ -10,6 +10,7 @@ from kernels._lanes import exponent, fma, horner, magnitude, nearest, pow2, wher
 from kernels._viscous_fit import LOG_TAIL
 
 LN2 = math.log(2.0)
+NORMAL_LOW, NORMAL_HIGH = 2.3e-308, 1.79e308
 _LOG2_E = 1.4426950408889634
 _LN2_HIGH, _LN2_LOW = 0.6931471805599453, 2.3190468138462996e-17
 _INVERSE_FACTORIALS = tuple(1.0 / math.factorial(n) for n in range(2, 14))
@@ -28,6 +29,12 @@ _ARCTAN = tuple((-1.0) ** (j + 1) / (2 * j + 3) for j in range(20))
 
 
 @jit
+def is_normal(x):
+    """Whether a positive result is a normal float64."""
+    return (x >= NORMAL_LOW) & (x <= NORMAL_HIGH)
+
+
+@jit
 def scale(x, n):
     """x 2^n for an integer-valued n and x between 1e-300 and 1e300; overflows to inf and underflows to 0."""
     n = where(n > -2040.0, n, -2040.0)
@@ -43,6 +50,13 @@ def mantissa_exponent(x):
     normal = where(small, x * 2.0**128, x)
     e = exponent(normal)
     return scale(normal, -e), where(small, e - 128.0, e)
+
+
+@jit
+def in_unit(x, e):
+    """x over 2^e for x >= 0, without overflow on the way."""
+    m, own = mantissa_exponent(where(x > 0.0, x, 1.0))
+    return where(x > 0.0, scale(m, own - e), 0.0)
 
 
 @jit

@@ -13,14 +13,13 @@ import math
 
 from kernels._jit import jit
 from kernels._lanes import choose, fma, horner, isnt, magnitude, some, sqrt, where
-from kernels._vecmath import cbrt, exp, exp_remainder, log_remainder, mantissa_exponent, scale
+from kernels._vecmath import cbrt, exp, exp_remainder, is_normal, log_remainder, mantissa_exponent, scale
 from kernels._viscous_fit import AMPLITUDE_STRONG, GAP_WEAK, OVERSHOOT_WEAK, Q_STRONG, SENSITIVITY_STRONG, SPLIT
 
 ROUNDING = 1e-15
 """What a closed form is right to: about 4 ulp."""
 
 _TAME_LOW, _TAME_HIGH = 2.0**-240, 2.0**240  # a^2 phi0/mu and its rounding error stay normal inside
-_NORMAL_LOW, _NORMAL_HIGH = 2.3e-308, 1.79e308
 _OVERSHOOT = 1.0 - math.log(2.0)
 _EXP_MINUS_2 = math.exp(-2.0)
 MAP_LIMIT = 10_000
@@ -51,7 +50,7 @@ def without_dimensions(mu, phi0, a):
     if some(wild):
         n = 2.0 * e_a + e_phi - e_mu
         k, rest = scale(k, n), scale(rest, n)
-    return k, rest, (mu, phi0, a, e_mu, e_phi, e_a, wild, normal(k))
+    return k, rest, (mu, phi0, a, e_mu, e_phi, e_a, wild, is_normal(k))
 
 
 @jit
@@ -68,13 +67,7 @@ def dimensional(scene, cycle):
     if some(wild):
         period = scale(0.0625 * q / a, 6.0 - e_a)  # 4 q may be too large where 4 q/a is not
         swing, speed = scale(swing, e_phi), scale(speed, e_mu - e_a)
-    return period, swing, speed, representable & normal(period) & normal(swing) & normal(speed)
-
-
-@jit
-def normal(x):
-    """Whether a positive result is a normal float64."""
-    return (x >= _NORMAL_LOW) & (x <= _NORMAL_HIGH)
+    return period, swing, speed, representable & is_normal(period) & is_normal(swing) & is_normal(speed)
 
 
 @jit

@@ -17,7 +17,7 @@ from kernels._columns import each_cell, entry
 from kernels._jit import jit
 from kernels._lanes import isnt, magnitude, nearest, where
 from kernels._ringdown import RECURSION_LIMIT
-from kernels._vecmath import scale
+from kernels._vecmath import NORMAL_HIGH, NORMAL_LOW, is_normal, scale
 from kernels.interface import Field, Kernel, Method, Status
 
 ROUNDING = 2e-15
@@ -28,7 +28,6 @@ _OVERDAMPED, _NEVER_ENDS = float(Status.OVERDAMPED), float(Status.NEVER_ENDS)
 _BAD_INPUT, _NO_LIMIT_CYCLE = float(Status.BAD_INPUT), float(Status.NO_LIMIT_CYCLE)
 _OUT_OF_RANGE, _NOT_CONVERGED = float(Status.OUT_OF_RANGE), float(Status.NOT_CONVERGED)
 _STEP_LIMIT = float(Status.STEP_LIMIT)
-_NORMAL_LOW, _NORMAL_HIGH = 2.3e-308, 1.79e308
 
 
 @jit
@@ -55,11 +54,6 @@ def _verdict(ring, scene, rtol, unsettled):
 
 
 @jit
-def _normal(x):
-    return (x >= _NORMAL_LOW) & (x <= _NORMAL_HIGH)
-
-
-@jit
 def _write(i, scene, units, ring, verdict, omega_n, theta0, half_swings, stop_angle, stop_time, margin, period, status):
     """One cell, or the lanes', in SI units; overdamped and endless motions get what exists of them."""
     zeta, r, r_s, start = scene
@@ -81,8 +75,8 @@ def _write(i, scene, units, ring, verdict, omega_n, theta0, half_swings, stop_an
     verdict = where(start > 0.0, verdict, _OK)
     verdict = where(creeps, _OVERDAMPED, where(endless, _NEVER_ENDS, verdict))
     faded = isnt(r > 0.0) & lasting  # to a positive angle, however small
-    small = moves & (magnitude(angle) < _NORMAL_LOW) & (faded | (magnitude(angle) > 0.0))
-    fine = fine & (creeps | _normal(half)) & isnt(lasting & (time > _NORMAL_HIGH)) & isnt(small)
+    small = moves & (magnitude(angle) < NORMAL_LOW) & (faded | (magnitude(angle) > 0.0))
+    fine = fine & (creeps | is_normal(half)) & isnt(lasting & (time > NORMAL_HIGH)) & isnt(small)
     status[i] = where(fine, verdict, _OUT_OF_RANGE)
 
 

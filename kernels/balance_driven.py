@@ -15,7 +15,7 @@ from kernels import _driven_swing
 from kernels._columns import each_cell, entry
 from kernels._jit import jit
 from kernels._lanes import isnt, where
-from kernels._vecmath import scale
+from kernels._vecmath import is_normal, scale
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
 
 ROUNDING = 4e-15
@@ -23,12 +23,6 @@ ROUNDING = 4e-15
 
 _OK, _OUT_OF_RANGE = float(Status.OK), float(Status.OUT_OF_RANGE)
 _BAD_INPUT, _NO_LIMIT_CYCLE = float(Status.BAD_INPUT), float(Status.NO_LIMIT_CYCLE)
-_NORMAL_LOW, _NORMAL_HIGH = 2.3e-308, 1.79e308
-
-
-@jit
-def _normal(x):
-    return (x >= _NORMAL_LOW) & (x <= _NORMAL_HIGH)
 
 
 @jit
@@ -37,7 +31,7 @@ def _write(i, cycle, units, omega_n, amplitude, period, multiplier, status):
     e, fine = units
     swing, whole = scale(a, e), 2.0 * time / omega_n
     amplitude[i], period[i], multiplier[i] = swing, whole, kept
-    fine = fine & ((verdict >= FIRST_REFUSAL) | (_normal(swing) & _normal(whole)))
+    fine = fine & ((verdict >= FIRST_REFUSAL) | (is_normal(swing) & is_normal(whole)))
     status[i] = where(fine, verdict, _OUT_OF_RANGE)
 
 

@@ -12,7 +12,7 @@ from kernels import _viscous
 from kernels._columns import each_cell, entry
 from kernels._jit import jit
 from kernels._lanes import magnitude, some, where
-from kernels._vecmath import mantissa_exponent, scale
+from kernels._vecmath import is_normal, mantissa_exponent, scale
 from kernels.interface import Field, Kernel, Method, Status
 
 _OK, _BAD_INPUT = float(Status.OK), float(Status.BAD_INPUT)
@@ -49,7 +49,7 @@ def _solve(i, period, amplitude, phi0, a, mu, status):
     unit_k, e_k = mantissa_exponent(k)
     a[i] = scale(unit_a, -e_p)
     mu[i] = scale(unit_a * unit_a * f / unit_k, e_f - 2.0 * e_p - e_k)
-    normal = _viscous.normal(a[i]) & _viscous.normal(mu[i]) & _viscous.normal(k)
+    normal = is_normal(a[i]) & is_normal(mu[i]) & is_normal(k)
     status[i] = where(normal, where(unsettled, _NOT_CONVERGED, _OK), _OUT_OF_RANGE)
 
 

@@ -25,7 +25,7 @@ from kernels._columns import each_cell, entry
 from kernels._groups import GROUP, cells_at, each_group
 from kernels._jit import jit, jit_call
 from kernels._lanes import choose, fma, isnt, magnitude, nearest, some, sqrt, where
-from kernels._vecmath import exp, expm1, mantissa_exponent, scale
+from kernels._vecmath import exp, expm1, is_normal, mantissa_exponent, scale
 from kernels.foliot import PARAMETERS as FOLIOT_PARAMETERS
 from kernels.foliot import refusal
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
@@ -40,7 +40,6 @@ PAIRS = 64
 _OK, _BAD_INPUT, _INACCURATE = float(Status.OK), float(Status.BAD_INPUT), float(Status.INACCURATE)
 _NOT_SELF_STARTING = float(Status.NOT_SELF_STARTING)
 _TOO_SHORT, _STICKS, _OUT_OF_RANGE = float(Status.TOO_SHORT), float(Status.STICKS), float(Status.OUT_OF_RANGE)
-_NORMAL_LOW, _NORMAL_HIGH = 2.3e-308, 1.79e308
 _COUNTABLE = 2.0**50
 
 
@@ -178,7 +177,7 @@ def _cells(
     verdict = where(_uncertainty(scene, nominal, speed) <= rtol[i], verdict, _INACCURATE)
     verdict = where(stopped | isnt(least < 1.0), _STICKS, verdict)
     verdict = where(found < FIRST_REFUSAL, verdict, found)
-    fine = units[4] & (tau >= _NORMAL_LOW) & (tau <= _NORMAL_HIGH) & (t < _COUNTABLE * tau)
+    fine = units[4] & is_normal(tau) & (t < _COUNTABLE * tau)
     status[i] = where(fine | (verdict >= FIRST_REFUSAL), verdict, _OUT_OF_RANGE)
 
 

@@ -19,7 +19,7 @@ from kernels._columns import each_cell, entry
 from kernels._groups import GROUP, cells_at, each_group, write_row
 from kernels._jit import jit, jit_call
 from kernels._lanes import choose, fma, isnt, magnitude, some, where
-from kernels._vecmath import scale
+from kernels._vecmath import is_normal, scale
 from kernels.foliot import PARAMETERS as FOLIOT_PARAMETERS
 from kernels.foliot import refusal
 from kernels.interface import Field, Kernel, Method, Status
@@ -34,7 +34,6 @@ _COMES_TO_REST, _GRAZING = float(Status.COMES_TO_REST), float(Status.GRAZING)
 _NEVER_STARTS, _OUT_OF_RANGE = float(Status.NEVER_STARTS), float(Status.OUT_OF_RANGE)
 _STICKS = float(Status.STICKS)
 _REFUSED = int(Status.BAD_INPUT)
-_NORMAL_LOW, _NORMAL_HIGH = 2.3e-308, 1.79e308
 
 
 @jit
@@ -131,8 +130,7 @@ def _in_units(units, flip):
     """Time [s] and speed [rad/s], and whether they are normal numbers."""
     t, e_t, m_phi, e_phi, _ = units
     time, speed = scale(t * (flip[0] + flip[1]), e_t), scale(m_phi / t * flip[2], e_phi - e_t)
-    normal = (time >= _NORMAL_LOW) & (time <= _NORMAL_HIGH) & (speed >= _NORMAL_LOW) & (speed <= _NORMAL_HIGH)
-    return time, speed, normal
+    return time, speed, is_normal(time) & is_normal(speed)
 
 
 @jit
@@ -148,7 +146,7 @@ def _follow(first, mu, phi0, a, R, R_s, c, n, k, e, phi_start, rtol, flip, row, 
     i = cells_at(first)
     scene, units = _foliot_scene.without_dimensions(mu[i], phi0[i], a[i], R[i], R_s[i], 0.0 * c[i], 1.0, k[i], e[i])
     x, way = _place(phi0[i], phi_start[i])
-    fine = units[4] & (way >= _NORMAL_LOW) & (way <= _NORMAL_HIGH)
+    fine = units[4] & is_normal(way)
     released, starts, doubt = _release(scene, x, where(fine, way, 1.0))
     now, going, unsure = released, starts, doubt
     right, here = fine, 1.0
