@@ -28,6 +28,14 @@ class Status(IntEnum):
     OVERDAMPED = 5, "damping beyond critical: what moves creeps, and never turns nor ends"
     TOO_SHORT = 6, "too short a run for some outputs, which are NaN"
     NEVER_ENDS = 7, "the motion fades but never ends; what would come at its end is NaN"
+    UNSTABLE = 8, "the cycle exists, but small disturbances of it grow"
+    PERIOD_2 = 9, "the motion repeats only after two cycles; the values are of both together"
+    NOT_PERIODIC = 10, "the motion never settles; the values are means over the time followed"
+    TOOTH_JUMPED = 11, "the wheel goes on by more than one tooth a cycle"
+    LOCK_UP = 12, "the linkage locks before the crank has turned fully"
+    CHANGE_POINT = 13, "the linkage can be folded flat, where its arm may leave its branch"
+    DOUBLE_CRANK = 14, "the arm turns fully with the crank and has no extreme angles"
+    DAMPERS_OUT_OF_RANGE = 15, "merged dampers hold only up to valid_to, which is below f_max"
     BAD_INPUT = 64, "a parameter is NaN, infinite or outside its limits, or two contradict each other"
     NEVER_STARTS = 65, "the drive cannot set the scene in motion"
     NO_LIMIT_CYCLE = 66, "nothing dissipates energy, so no limit cycle exists"
@@ -36,6 +44,9 @@ class Status(IntEnum):
     STEP_LIMIT = 69, "the integrator reached its limit of steps"
     NO_METHOD = 70, "no method of the kernel promises the wanted rtol here"
     STICKS = 71, "the scene comes to rest before the next switch"
+    NO_CYCLE = 72, "a cycle of this kind does not exist here"
+    NEVER_MEETS = 73, "the pallets never meet a tooth"
+    NO_ASSEMBLY = 74, "the links are too short or too long to be joined"
     PENDING = 127, "not computed yet"
 
     doc: str
@@ -88,7 +99,8 @@ class Method:
     holds `rtol` or says by its status that it cannot.
 
     `excludes` are parameters it cannot do: where a study sets one, away from its default or as an axis, the method is
-    not to be had in the whole study.
+    not to be had in the whole study. `lacks` are outputs it does not give: it cannot be had where one of them is asked
+    for, and fills them with NaN.
     """
 
     name: str
@@ -96,6 +108,7 @@ class Method:
     solve: Callable[..., None]
     bound: Callable[..., None] | None = None
     excludes: tuple[str, ...] = ()
+    lacks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

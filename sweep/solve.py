@@ -24,7 +24,14 @@ STRIP_BYTES = 16 << 20
 """Bytes that the outputs of a strip may take, where they are traces."""
 NONE = -1
 """In place of a method's number: no method solved the cell."""
-GIVEN_UP = (Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.INACCURATE)
+GIVEN_UP = (
+    Status.NO_METHOD,
+    Status.NO_CYCLE,
+    Status.NOT_CONVERGED,
+    Status.STEP_LIMIT,
+    Status.INACCURATE,
+    Status.UNSTABLE,
+)
 """After these `auto` tries the next method."""
 WARM_UP_CELLS = 3
 
