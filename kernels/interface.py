@@ -8,7 +8,7 @@ column. They hold no lock (nogil), raise nothing and always end; what goes wrong
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
@@ -72,7 +72,9 @@ class Field:
 
     `default`: None makes a parameter required; a str means "as that parameter". `lower`, `upper` are inclusive
     unless `open_lower`; the kernel's `check` enforces them cell by cell (those of `along` are checked in the study).
-    `dims` names the axes of an array ("phase",); `choices` maps words of a study to the numbers in the column.
+    `dims` names the axes of an array: coordinates of `Kernel.along` ("phase",), or what array parameters share
+    ("mass",), whose length a study gives with their values; a column then has the shape `(n_cells, *dims)`.
+    `choices` maps words of a study to the numbers in the column.
     """
 
     name: str
@@ -118,6 +120,7 @@ class Kernel:
     `check(*parameters, status)` writes OK or a refusal for every cell, before any method is asked.
     `along` are coordinates shared by all cells (phase, frequency); a study gives their values.
     `example` has the values of parameters at which the scene runs well: a study to begin with.
+    `same_length` maps further dims of outputs to the array parameters' dim that is as long: {"mode": "mass"}.
     """
 
     name: str
@@ -128,7 +131,8 @@ class Kernel:
     check: Callable[..., None]
     methods: tuple[Method, ...]
     along: tuple[Field, ...] = ()
-    example: Mapping[str, float] = field(default_factory=dict)
+    example: Mapping[str, float | Sequence[float]] = field(default_factory=dict)
+    same_length: Mapping[str, str] = field(default_factory=dict)
 
     def method(self, name: str) -> Method:
         """The method of that name. Raises KeyError."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -97,14 +97,22 @@ def write_frame(path: Any, layout: Layout) -> None:
     import h5netcdf
 
     with h5netcdf.File(path, "w") as file:
-        file.attrs.update(layout.attrs)
+        shared = [c.name for c in layout.coordinates if c.dims and not set(c.dims) & {c.name, *layout.grid.dims}]
+        # xarray's way to mark what belongs to the coordinates of all variables
+        file.attrs.update({**layout.attrs, **({"coordinates": " ".join(shared)} if shared else {})})
         file.dimensions = layout.sizes
         for coordinate in layout.coordinates:
             _write_coordinate(file, coordinate)
-        away = " ".join(c.name for c in layout.coordinates if c.dims != (c.name,))
         for column in layout.columns:
+            away = " ".join(_auxiliary(layout, column))
             variable = _declare(file, layout, column)
             variable.attrs.update({**column.attrs, **({"coordinates": away} if away else {})})
+
+
+def _auxiliary(layout: Layout, column: Column) -> Iterator[str]:
+    """Coordinates of a variable that are not among its dimensions."""
+    dims = {*layout.grid.dims, *column.dims}
+    return (c.name for c in layout.coordinates if c.dims != (c.name,) and set(c.dims) <= dims)
 
 
 def _write_coordinate(file: Any, coordinate: Coordinate) -> None:

@@ -48,7 +48,7 @@ def scaled(values: NDArray[np.float64], factor: Decimal | None) -> NDArray[np.fl
     """`values` times `factor`, each rounded once."""
     if factor is None:
         return values
-    return _collect((float(_decimal(v) * factor) for v in values.tolist()), len(values))
+    return _collect((float(_decimal(v) * factor) for v in values.ravel().tolist()), values.size).reshape(values.shape)
 
 
 def _decimal(value: float) -> Decimal:
@@ -85,6 +85,22 @@ def read_column(path: Path, name: str) -> list[tuple[int, str]]:
     if not rows:
         raise ValueError(f"{path} holds no values")
     return [(line, row[column].strip()) for line, row in rows]
+
+
+def numbered_columns(path: Path, name: str) -> int:
+    """How many columns `name_1`, `name_2`, ... a csv file has.
+
+    Raises
+    ------
+    ValueError
+        With the text for the user.
+    """
+    rows = _rows(path)
+    headings = [cell.strip() for cell in rows[0][1]] if rows else []
+    count = next(i for i in itertools.count() if f"{name}_{i + 1}" not in headings)
+    if not count:
+        raise ValueError(f"{path} has no columns {name}_1, {name}_2, ...; its first line is {','.join(headings)[:60]}")
+    return count
 
 
 def _rows(path: Path) -> list[tuple[int, list[str]]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import Any
 
 from kernels import catalogue
 from kernels.interface import Field, Kernel, Method
@@ -48,12 +49,18 @@ def _short(name: str) -> str:
 
 
 def _name_and_default(field: Field) -> str:
-    return f"{field.name} [{field.unit}]" + ("" if field.default is None else f" = {_plain(field.default)}")
+    return f"{field.name} [{field.unit}]" + ("" if field.default is None else f" = {_default(field)}")
 
 
 def _parameter(field: Field) -> tuple[str, ...]:
-    default = "required" if field.default is None else f"default {_plain(field.default)}"
-    return field.name, f"[{field.unit}]", _limits(field), default, field.doc
+    default = "required" if field.default is None else f"default {_default(field)}"
+    return (
+        field.name,
+        f"[{field.unit}]",
+        _limits(field),
+        default,
+        field.doc + _along(field).replace(" along", ", one for each"),
+    )
 
 
 def _output(field: Field) -> tuple[str, ...]:
@@ -66,7 +73,8 @@ def _coordinate(field: Field) -> tuple[str, ...]:
 
 def _method(method: Method) -> tuple[str, ...]:
     cannot = f"; cannot do {listed(method.excludes)}" if method.excludes else ""
-    return method.name, "states its error" if method.bound else "keeps rtol", method.doc + cannot
+    lacks = f"; does not give {listed(method.lacks)}" if method.lacks else ""
+    return method.name, "states its error" if method.bound else "keeps rtol", method.doc + cannot + lacks
 
 
 def _along(field: Field) -> str:
@@ -82,15 +90,18 @@ def _limits(field: Field) -> str:
     return ", ".join(filter(None, [low, high]))
 
 
-def _plain(default: float | str) -> str:
-    return default if isinstance(default, str) else f"{default:g}"
+def _default(field: Field) -> str:
+    if field.default is None or isinstance(field.default, str):
+        return field.default or "required"
+    words = {float(number): word for word, number in field.choices.items()}
+    return words.get(field.default, f"{field.default:g}")
 
 
 def _example(name: str, kernel: Kernel) -> str:
-    """A study that sweeps the first parameter."""
-    first, *others = kernel.parameters
+    """A study that sweeps the first parameter that is a number."""
+    first = next(p for p in kernel.parameters if not p.dims)
     values = {p.name: kernel.example.get(p.name, 1.0) for p in kernel.parameters}
-    fixed = [p for p in others if p.default is None or p.name in kernel.example]
+    fixed = [p for p in kernel.parameters if p is not first and (p.default is None or p.name in kernel.example)]
     lines = [f'kernel = "{name}"', "", *_axis(first, values[first.name])]
     if fixed:
         lines += ["", "[fixed]", *(_entry(p, values[p.name]) for p in fixed)]
@@ -99,7 +110,7 @@ def _example(name: str, kernel: Kernel) -> str:
     return "\n".join(f"  {line}".rstrip() for line in lines)
 
 
-def _axis(field: Field, middle: float) -> Iterable[str]:
+def _axis(field: Field, middle: Any) -> Iterable[str]:
     yield f"[axes.{field.name}]"
     if field.choices:
         yield f"values = [{quoted(field.choices)}]"
@@ -108,10 +119,11 @@ def _axis(field: Field, middle: float) -> Iterable[str]:
         yield f'unit = "{field.unit}"'
 
 
-def _entry(field: Field, value: float) -> str:
+def _entry(field: Field, value: Any) -> str:
     if field.choices:
         return f'{field.name} = "{next(iter(field.choices))}"'
-    return f'{field.name} = {{ value = {value:g}, unit = "{field.unit}" }}'
+    text = f"[{', '.join(f'{v:g}' for v in value)}]" if field.dims else f"{value:g}"
+    return f'{field.name} = {{ value = {text}, unit = "{field.unit}" }}'
 
 
 def _range(field: Field) -> Iterable[str]:

@@ -43,8 +43,13 @@ class Entries:
     mistakes: Mistakes
     folder: Path
 
-    def quantity(self, entry: Any, field: Field | None, where: str) -> float:
-        """A number, a table { value, unit }, or a word of the field, as the number in the kernel's column."""
+    def quantity(self, entry: Any, field: Field | None, where: str) -> float | Floats:
+        """A number, a table { value, unit }, or a word of the field, as the number in the kernel's column.
+
+        Of an array parameter also a list, or a table { file, unit }; one number stands for all its values.
+        """
+        if field is not None and field.dims:
+            return self._array(entry, field, where)
         factor = None
         if isinstance(entry, Mapping):
             self.mistakes.keys(entry, ("value", "unit"), where)
@@ -58,20 +63,42 @@ class Entries:
         values = self._numbers([entry], lambda item: _number(item, field), lambda _: (where, ""))
         return float(axes.scaled(values, factor)[0]) if len(values) else math.nan
 
+    def _array(self, entry: Any, field: Field, where: str) -> float | Floats:
+        table = entry if isinstance(entry, Mapping) else {"value": entry}
+        self.mistakes.keys(table, ("value", "file", "unit"), where)
+        factor = self._factor(table, field, where)
+        if "file" in table:
+            if "value" in table:
+                self.mistakes.add(where, "value and file exclude each other; keep one")
+            return frozen(axes.scaled(self._file(table["file"], field.name, field, f"{where}.file"), factor))
+        found, at = table.get("value"), where if table is not entry else f"{where}.value"
+        if hasattr(found, "__array__"):
+            found = np.asarray(found).tolist()
+        if not isinstance(found, list | tuple):
+            return float(axes.scaled(np.array([self.mistakes.number(found, at)]), factor)[0])
+        return frozen(axes.scaled(self._list(found, field, at), factor))
+
     def axis(self, name: str, entry: Any, field: Field | None, where: str) -> Axis:
-        """An axis or coordinate: a list of values, or a table with `spacing`, `values` or `file`."""
+        """An axis or coordinate: a list of values, or a table with `spacing`, `values` or `file`.
+
+        Of an array parameter a list of lists, or a csv file with a column for each value: J_1, J_2, ...
+        """
         table = entry if isinstance(entry, Mapping) else {"values": entry}
         form = self._form(table, where)
         factor = self._factor(table, field, where)
         values, kind = NONE, form
-        if form == "spacing":
+        if form == "spacing" and field and field.dims:
+            self.mistakes.add(f"{where}.spacing", f"{name} has a value for each {field.dims[0]}; give values or a file")
+        elif form == "spacing":
             values, kind = self._spaced(table, field, where, factor), str(table["spacing"])
         elif form == "values":
+            read = self._rows if field and field.dims else self._list
             values = axes.scaled(
-                self._list(table["values"], field, where if table is not entry else f"{where}.values"), factor
+                read(table["values"], field, where if table is not entry else f"{where}.values"), factor
             )
         elif form == "file":
-            values = axes.scaled(self._file(table["file"], name, field, f"{where}.file"), factor)
+            from_file = self._row_file if field and field.dims else self._file
+            values = axes.scaled(from_file(table["file"], name, field, f"{where}.file"), factor)
         return Axis(name, frozen(values), kind, _words(values, field))
 
     def _form(self, table: Mapping[str, Any], where: str) -> str:
@@ -147,6 +174,38 @@ class Entries:
         if not self._allowed_length(len(found), where):
             return NONE
         return self._numbers(found, lambda item: _number(item, field), lambda i: (f"{where}[{i}]", ""))
+
+    def _rows(self, found: Any, field: Field | None, where: str) -> Floats:
+        """A list of lists of equal length: a row for each value of the axis."""
+        if hasattr(found, "__array__"):
+            found = np.asarray(found, np.float64) if np.ndim(found) == 2 else np.asarray(found).tolist()
+            if isinstance(found, np.ndarray):
+                return found if self._allowed_length(len(found), where) else NONE
+        if not isinstance(found, list | tuple) or not all(isinstance(row, list | tuple) for row in found):
+            self.mistakes.add(where, "expected a list of lists, one for each cell; write e.g. [[1.0, 2.0], [1.5, 2.0]]")
+            return NONE
+        if not self._allowed_length(len(found), where):
+            return NONE
+        rows = [self._list(row, field, f"{where}[{i}]") for i, row in enumerate(found)]
+        return self._stacked(rows, where)
+
+    def _stacked(self, rows: list[Floats], where: str) -> Floats:
+        lengths = sorted({len(row) for row in rows})
+        if len(lengths) > 1 and lengths[0]:
+            self.mistakes.add(where, f"expected lists of equal length, found {lengths[0]} and {lengths[-1]} values")
+        return np.array(rows) if len(lengths) == 1 and lengths[0] else NONE
+
+    def _row_file(self, found: Any, name: str, field: Field | None, where: str) -> Floats:
+        """Columns name_1, name_2, ... of a csv file, a row for each value of the axis."""
+        if not isinstance(found, str | Path):
+            return self._file(found, name, field, where)
+        try:
+            count = axes.numbered_columns(self.folder / found, name)
+        except ValueError as error:
+            self.mistakes.add(where, str(error))
+            return NONE
+        columns = [self._file(found, f"{name}_{i}", field, where) for i in range(1, count + 1)]
+        return self._stacked(columns, where).T.copy() if columns else NONE
 
     def _file(self, found: Any, name: str, field: Field | None, where: str) -> Floats:
         if not isinstance(found, str | Path):

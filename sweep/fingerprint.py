@@ -13,8 +13,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kernels import catalogue
-from sweep.study import Study
+from sweep.study import Study, short
 
 COMPILERS = ("numba", "llvmlite", "numpy")
 OURS = ("kernels",)
@@ -69,7 +71,7 @@ def _said(study: Study) -> dict[str, str]:
         "axes": ", ".join(study.axes),
     }
     said |= {f"axes.{name}": _values(axis.values) for name, axis in study.axes.items()}
-    said |= {f"fixed.{name}": repr(value) for name, value in study.fixed.items()}
+    said |= {f"fixed.{n}": _values(value) if np.ndim(value) else repr(value) for n, value in study.fixed.items()}
     said |= {f"fixed.{name}": f"as {axis}" for name, axis in study.follows.items()}
     return said | {f"along.{name}": _values(values) for name, values in study.along.items() if len(values)}
 
@@ -77,7 +79,7 @@ def _said(study: Study) -> dict[str, str]:
 def _values(values: Any) -> str:
     """'401 values, 0.0001 to 1e+06 (digest 0123456789abcdef)'."""
     digest = hashlib.sha256(values.astype("<f8").tobytes()).hexdigest()[:16]
-    ends = f"{values[0]:.6g}" if len(values) == 1 else f"{values[0]:.6g} to {values[-1]:.6g}"
+    ends = short(values[0]) if len(values) == 1 else f"{short(values[0])} to {short(values[-1])}"
     return f"{len(values)} value{'s' * (len(values) > 1)}, {ends} (digest {digest})"
 
 

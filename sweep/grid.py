@@ -49,7 +49,7 @@ class Grid:
             if (source := study.follows.get(field.name, field.name)) in study.axes
         ]
 
-    def constants(self) -> dict[int, float]:
+    def constants(self) -> dict[int, float | Floats]:
         """Column number and value of every parameter that is the same in all cells."""
         fixed = self.study.fixed
         return {k: fixed[field.name] for k, field in enumerate(self.study.kernel.parameters) if field.name in fixed}
@@ -61,11 +61,14 @@ class Grid:
         ----------
         start, stop : int
             0 <= start <= stop <= size.
-        out : sequence of ndarray, each of shape (>= stop - start,)
+        out : sequence of ndarray, each of shape (>= stop - start, ...)
             One column per parameter of the kernel, in its order; constant ones are left alone.
         """
         for k, axis in self._varying:
-            self._fill(axis, start, out[k][: stop - start])
+            if axis.values.ndim > 1:  # of a zip
+                out[k][: stop - start] = axis.values[start:stop]
+            else:
+                self._fill(axis, start, out[k][: stop - start])
 
     def settings(self, start: int, stop: int) -> tuple[int | NDArray[np.int8], float | Floats]:
         """Method number (-1: auto) and rtol of the cells: one for all where they agree, else one per cell."""

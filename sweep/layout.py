@@ -52,7 +52,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Coordinate:
-    """A coordinate of the result: an axis, a fixed parameter (no dims), or one that all cells share (phase)."""
+    """A coordinate of the result: an axis, a fixed parameter, or one that all cells share (phase, number of a mass)."""
 
     name: str
     dims: tuple[str, ...]
@@ -78,6 +78,7 @@ class Layout:
     def sizes(self) -> dict[str, int]:
         """Length of every dimension, those of the grid first."""
         own = {d: n for column in self.columns for d, n in zip(column.dims, column.shape, strict=True)}
+        own |= {d: n for c in self.coordinates for d, n in zip(c.dims, np.shape(c.values), strict=True)}
         return {**dict(zip(self.grid.dims, self.grid.shape, strict=True)), **own}
 
     def shape(self, column: Column) -> tuple[int, ...]:
@@ -100,10 +101,17 @@ def coordinates(study: Study) -> tuple[Coordinate, ...]:
     product = study.design == "product"
     fields = {f.name: f for f in (*study.kernel.parameters, *study.kernel.along)}
     axes = [_axis(axis, (axis.name,) if product else ("cell",), fields) for axis in study.axes.values()]
-    fixed = [Coordinate(k, (), np.float64(v), _field_attrs(fields[k])) for k, v in study.fixed.items()]
-    used = {d for f in study.asked for d in f.dims}
+    fixed = [Coordinate(k, fields[k].dims, np.float64(v), _field_attrs(fields[k])) for k, v in study.fixed.items()]
+    used = {d for f in (*study.kernel.parameters, *study.asked) for d in f.dims}
     along = [Coordinate(k, (k,), v, _field_attrs(fields[k])) for k, v in study.along.items() if k in used]
-    return (*axes, *fixed, *along)
+    lengths = study.lengths
+    counted = [_counting(d, lengths[d]) for d in lengths if d in used and d not in study.along]
+    return (*axes, *fixed, *along, *counted)
+
+
+def _counting(dim: str, length: int) -> Coordinate:
+    """1, 2, ... along a dim of arrays."""
+    return Coordinate(dim, (dim,), np.arange(1, length + 1), {"units": "1", "long_name": f"number of the {dim}"})
 
 
 def attributes(study: Study, fingerprint: Mapping[str, str]) -> dict[str, Any]:
@@ -126,7 +134,7 @@ def attributes(study: Study, fingerprint: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _output(field: Field, study: Study) -> Column:
-    shape = tuple(len(study.along[d]) for d in field.dims)
+    shape = tuple(study.lengths[d] for d in field.dims)
     attrs = {**_field_attrs(field), "ancillary_variables": f"{STATUS} {METHOD_USED}"}
     return Column(field.name, "f8", field.dims, shape, attrs)
 
@@ -158,6 +166,7 @@ def _axis(axis: Axis, dims: tuple[str, ...], fields: Mapping[str, Field]) -> Coo
             "method": {"long_name": "method asked for"},
             "rtol": {"units": "1", "long_name": "relative error asked for"},
         }[axis.name]
+    dims = dims if field is None else (*dims, *field.dims)
     return Coordinate(axis.name, dims, axis.values if axis.words is None else np.array(axis.words), attrs)
 
 

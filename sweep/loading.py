@@ -57,7 +57,8 @@ def _check_declaration(name: str, kernel: Kernel) -> None:
     twice = sorted({n for n in names if names.count(n) > 1})
     if twice:
         raise SweepError(f"kernel {name} declares {listed(twice)} more than once, or takes a name of the result's own")
-    known = {field.name for field in kernel.along}
+    known = {field.name for field in kernel.along} | set(kernel.same_length)
+    known |= {dim for field in kernel.parameters for dim in field.dims}
     lost = sorted({d for field in kernel.outputs for d in field.dims} - known)
     if lost:
-        raise SweepError(f"kernel {name} has outputs along {listed(lost)}, which it does not declare in `along`")
+        raise SweepError(f"kernel {name} has outputs along {listed(lost)}, which is neither in `along` nor a dim of its array parameters")

@@ -52,6 +52,7 @@ class Reader:
         along = self._along(keys.get("along", {}), outputs)
         fixed, follows = self._complete(axes, given)
         self._excluded(method, axes, fixed)
+        self._lacked(method, axes, outputs)
         self.mistakes.raise_if_any(self.source)
         return Study(
             title=title or f"{self.kernel.name} over {listed(axes, word='and')}",
@@ -154,16 +155,19 @@ class Reader:
         if design == "zip" and len(set(lengths.values())) > 1:
             found = listed((f"{name} has {n}" for name, n in lengths.items()), word="and")
             self.mistakes.add("axes", f'design "zip" needs axes of equal length; {found} values')
+        for name, axis in axes.items() if design == "product" else ():
+            if axis.values.ndim > 1:
+                self.mistakes.add(f"axes.{name}", f'{name} is an array; as an axis it needs design = "zip"')
         if design == "product" and math.prod(lengths.values()) > LARGEST_GRID:
             product = " x ".join(str(n) for n in lengths.values())
             self.mistakes.add("axes", f"{product} cells; a study may have at most {LARGEST_GRID:.0e}")
         for name, axis in axes.items() if design == "product" else ():
             values, counts = np.unique(axis.values, return_counts=True)
-            if counts.max() > 1:
+            if axis.values.ndim == 1 and counts.max() > 1:
                 twice = axis.label(int(np.flatnonzero(axis.values == values[counts.argmax()])[0]))
                 self.mistakes.add(f"axes.{name}", f"{twice} stands more than once; give every value once")
 
-    def _fixed(self, found: Any, axes: Mapping[str, Axis]) -> dict[str, float]:
+    def _fixed(self, found: Any, axes: Mapping[str, Axis]) -> dict[str, float | NDArray[np.float64]]:
         given = {}
         for name, entry in self.mistakes.table(found, "fixed", "[fixed] with mu = 1.0").items():
             where = f"fixed.{name}"
@@ -175,9 +179,11 @@ class Reader:
                 self.mistakes.add(where, f"{name} is an axis as well; keep one of the two")
         return given
 
-    def _complete(self, axes: Mapping[str, Axis], given: dict[str, float]) -> tuple[dict[str, float], dict[str, str]]:
+    def _complete(
+        self, axes: Mapping[str, Axis], given: Mapping[str, float | NDArray[np.float64]]
+    ) -> tuple[dict[str, float | NDArray[np.float64]], dict[str, str]]:
         """Every parameter that is no axis: its fixed value, or the axis it follows."""
-        fixed: dict[str, float] = {}
+        fixed: dict[str, float | NDArray[np.float64]] = {}
         follows: dict[str, str] = {}
         for field in self.kernel.parameters:
             source = self._source(field, axes, given)
@@ -191,9 +197,30 @@ class Reader:
             elif source is field:
                 what = f"{field.name} ({field.doc}, {field.unit}) has no default"
                 self.mistakes.add(f"fixed.{field.name}", f"missing; {what}: give it here or as an axis")
-        return fixed, follows
+        return self._filled(axes, fixed), follows
 
-    def _source(self, field: Field, axes: Mapping[str, Axis], given: Mapping[str, float]) -> Field:
+    def _filled(
+        self, axes: Mapping[str, Axis], fixed: dict[str, float | NDArray[np.float64]]
+    ) -> dict[str, float | NDArray[np.float64]]:
+        """Array parameters of one length, single numbers repeated; mistakes where their lengths differ."""
+        arrays = {p.name: p.dims[0] for p in self.kernel.parameters if p.dims}
+        lengths = {name: axes[name].values.shape[-1] for name in arrays if name in axes and len(axes[name])}
+        lengths |= {
+            name: np.size(fixed[name]) for name in arrays if np.ndim(fixed.get(name, 0.0)) and np.size(fixed[name])
+        }
+        for dim in dict.fromkeys(arrays.values()):
+            found = {name: n for name, n in lengths.items() if arrays[name] == dim}
+            if len(set(found.values())) > 1:
+                counts = listed((f"{name} has {n}" for name, n in found.items()), word="and")
+                self.mistakes.add("fixed", f"arrays along {dim} need equal length; {counts} values")
+            elif not found and not any(name in axes for name in arrays):
+                self.mistakes.add("fixed", f"how many of {dim}? Give at least one of {listed(arrays)} as a list")
+            for name in arrays:
+                if arrays[name] == dim and name in fixed and not np.ndim(fixed[name]):
+                    fixed[name] = frozen(np.full(max(found.values(), default=1), fixed[name]))
+        return fixed
+
+    def _source(self, field: Field, axes: Mapping[str, Axis], given: Mapping[str, Any]) -> Field:
         """The parameter whose value `field` takes: itself, or the one its default names, and so on."""
         while field.name not in axes and field.name not in given and isinstance(field.default, str):
             field = self.kernel.parameter(field.default)
@@ -235,15 +262,22 @@ class Reader:
             self.mistakes.add(where, f"expected {kind} from {field.lower:g} to {field.upper:g}, found {bad[0]:g}")
         return values
 
-    def _excluded(self, method: str, axes: Mapping[str, Axis], fixed: Mapping[str, float]) -> None:
+    def _lacked(self, method: str, axes: Mapping[str, Axis], outputs: tuple[str, ...]) -> None:
+        """Methods that do not give an output asked for."""
+        lacking = {m.name: [name for name in m.lacks if name in outputs] for m in self.kernel.methods}
+        able = [name for name, found in lacking.items() if not found]
+        where, words = _methods_named(method, axes)
+        for word in words:
+            if lacking.get(word):
+                cure = f"use {listed(['auto', *able])}, or name the outputs you want" if able else "name other outputs"
+                self.mistakes.add(where, f"{word} does not give {listed(lacking[word], word='and')}; {cure}")
+
+    def _excluded(self, method: str, axes: Mapping[str, Axis], fixed: Mapping[str, Any]) -> None:
         """Methods that cannot do a term which the study has."""
         terms = [p.name for p in self.kernel.parameters if p.name in axes or differs(p, fixed)]
         lacking = {m.name: [t for t in m.excludes if t in terms] for m in self.kernel.methods}
         able = [name for name, found in lacking.items() if not found]
-        if "method" in axes:
-            where, words = "axes.method", sorted(set(axes["method"].words or ()))
-        else:
-            where, words = "method", [method]
+        where, words = _methods_named(method, axes)
         for word in words:
             if lacking.get(word):
                 cure = f"use {listed(['auto', *able])}" if able else "leave it out"
@@ -251,3 +285,10 @@ class Reader:
             if word == "auto" and self.kernel.methods and not able:
                 hard = [term for term in terms if any(term in found for found in lacking.values())]
                 self.mistakes.add(where, f"no method of {self.kernel.name} can do {listed(hard, word='and')} together")
+
+
+def _methods_named(method: str, axes: Mapping[str, Axis]) -> tuple[str, list[str]]:
+    """Where a study names its methods, and which."""
+    if "method" in axes:
+        return "axes.method", sorted(set(axes["method"].words or ()))
+    return "method", [method]

@@ -12,6 +12,7 @@ import numpy as np
 from kernels.interface import Status
 from sweep.layout import METHOD_USED, STATUS
 from sweep.statuses import count_methods, count_statuses, failures
+from sweep.study import short
 from sweep.table import columns, page, section
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def result_text(path: Path, dataset: xr.Dataset) -> str:
         _head(path, dataset),
         columns(_settings(dataset)),
         section("axes", (_coordinate(dataset[name]) for name in _axes(dataset))),
-        section("fixed", (_scalar(c) for c in dataset.coords.values() if not c.dims)),
+        section("fixed", map(_fixed, _given(dataset))),
         section("along", (_coordinate(dataset[name]) for name in _along(dataset))),
         section("outputs", (_output(dataset[name]) for name in _outputs(dataset))),
         section("status", statuses),
@@ -71,12 +72,19 @@ def _settings(dataset: xr.Dataset) -> Iterator[tuple[str, str]]:
 def _axes(dataset: xr.Dataset) -> list[str]:
     """Coordinates of the cells."""
     cells = set(dataset[STATUS].dims)
-    return [str(name) for name, c in dataset.coords.items() if c.dims and set(c.dims) <= cells]
+    return [str(name) for name, c in dataset.coords.items() if set(c.dims) & cells]
 
 
 def _along(dataset: xr.Dataset) -> list[str]:
     """Coordinates that all cells share."""
-    return [str(name) for name, c in dataset.coords.items() if c.dims and not set(c.dims) & set(dataset[STATUS].dims)]
+    cells = set(dataset[STATUS].dims)
+    return [str(name) for name, c in dataset.coords.items() if c.dims == (name,) and name not in cells]
+
+
+def _given(dataset: xr.Dataset) -> list[xr.DataArray]:
+    """Fixed parameters: numbers, and arrays that all cells share."""
+    cells = set(dataset[STATUS].dims)
+    return [c for name, c in dataset.coords.items() if not set(c.dims) & cells and c.dims != (name,)]
 
 
 def _outputs(dataset: xr.Dataset) -> list[str]:
@@ -86,7 +94,9 @@ def _outputs(dataset: xr.Dataset) -> list[str]:
 def _coordinate(coordinate: xr.DataArray) -> tuple[str, ...]:
     values = coordinate.values
     count = f"{len(values):,} value{'s' * (len(values) > 1)}"
-    if values.dtype.kind not in "fiu":
+    if values.ndim > 1:
+        shown = f"{short(values[0])} to {short(values[-1])}"
+    elif values.dtype.kind not in "fiu":
         shown = ", ".join(dict.fromkeys(map(str, values[:20])))
     elif len(values) <= 6:
         shown = ", ".join(f"{v:.6g}" for v in values)
@@ -95,8 +105,9 @@ def _coordinate(coordinate: xr.DataArray) -> tuple[str, ...]:
     return str(coordinate.name), _unit(coordinate), count, shown, _doc(coordinate)
 
 
-def _scalar(coordinate: xr.DataArray) -> tuple[str, ...]:
-    return str(coordinate.name), _unit(coordinate), f"{coordinate.item():.10g}", _doc(coordinate)
+def _fixed(coordinate: xr.DataArray) -> tuple[str, ...]:
+    shown = short(coordinate.values) if coordinate.dims else f"{coordinate.item():.10g}"
+    return str(coordinate.name), _unit(coordinate), shown, _doc(coordinate)
 
 
 def _output(output: xr.DataArray) -> tuple[str, ...]:

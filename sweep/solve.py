@@ -51,15 +51,16 @@ class Solver:
     def __init__(self, study: Study) -> None:
         self.study, self.grid = study, Grid(study)
         kernel = study.kernel
-        lengths = {field.name: len(study.along[field.name]) for field in kernel.along}
-        cell_bytes = sum(8 * math.prod(lengths[d] for d in field.dims) for field in kernel.outputs)
+        lengths = study.lengths
+        shapes = {field.name: tuple(lengths[d] for d in field.dims) for field in (*kernel.parameters, *kernel.outputs)}
+        cell_bytes = sum(8 * math.prod(shapes[field.name]) for field in kernel.outputs)
         room = self._strip = max(1, min(STRIP, self.grid.size, STRIP_BYTES // cell_bytes))
-        self._parameters = [np.empty(room) for _ in kernel.parameters]
+        self._parameters = [np.empty((room, *shapes[field.name])) for field in kernel.parameters]
         for k, value in self.grid.constants().items():
             self._parameters[k][:] = value
         self._along = [np.array(study.along[field.name]) for field in kernel.along]
         self._unasked = {
-            field.name: np.empty((room, *(lengths[d] for d in field.dims)))
+            field.name: np.empty((room, *shapes[field.name]))
             for field in kernel.outputs
             if field.name not in study.outputs
         }
@@ -94,7 +95,7 @@ class Solver:
             self.solve(int(index), int(index) + 1, outputs, status, used)
 
     def _shapes(self) -> dict[str, tuple[int, ...]]:
-        return {f.name: tuple(len(self.study.along[d]) for d in f.dims) for f in self.study.asked}
+        return {f.name: tuple(self.study.lengths[d] for d in f.dims) for f in self.study.asked}
 
     def _solve_strip(self, low: int, high: int, outputs: Sequence[Floats], status: Codes, used: Codes) -> None:
         strip = _Strip(self, high - low, outputs, status, used)
@@ -178,9 +179,13 @@ class _Strip:
 
 
 def usable_methods(study: Study) -> tuple[int, ...]:
-    """Numbers of the methods that can do every term the study sets."""
+    """Numbers of the methods that can do every term the study sets and give every output it asks for."""
     methods = enumerate(study.kernel.methods)
-    return tuple(number for number, method in methods if study.terms.isdisjoint(method.excludes))
+    return tuple(
+        number
+        for number, method in methods
+        if study.terms.isdisjoint(method.excludes) and set(study.outputs).isdisjoint(method.lacks)
+    )
 
 
 def _pick(cells: Cells, condition: NDArray[np.bool_]) -> Cells:

@@ -31,7 +31,7 @@ class Axis:
     ----------
     name : str
         A parameter of the kernel, "method" or "rtol".
-    values : ndarray, shape (n,), read-only float64
+    values : ndarray, shape (n,), of an array parameter (n, length), read-only float64
         In the unit of the kernel's field. On a method axis: positions in `kernel.methods`, -1 for "auto".
         Of a parameter with choices: their numbers.
     spacing : str
@@ -50,7 +50,7 @@ class Axis:
 
     def label(self, index: int) -> str:
         """Value number `index`, as people write it."""
-        return self.words[index] if self.words else f"{self.values[index]:.6g}"
+        return self.words[index] if self.words else short(self.values[index])
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ class Study:
         In the kernel's order.
     axes : dict of str to Axis
         In the study's order, which is the order of the dataset's dimensions.
-    fixed : dict of str to float
+    fixed : dict of str to float, or to read-only float64 ndarray of an array parameter
         Every parameter of the kernel that neither is nor follows an axis, defaults filled in.
     follows : dict of str to str
         Parameters that are not given and by default equal another one, which is an axis.
@@ -88,7 +88,7 @@ class Study:
     outputs: tuple[str, ...]
     design: str
     axes: dict[str, Axis]
-    fixed: dict[str, float]
+    fixed: dict[str, float | NDArray[np.float64]]
     follows: dict[str, str]
     along: dict[str, NDArray[np.float64]]
     text: str = ""
@@ -112,6 +112,21 @@ class Study:
     def terms(self) -> frozenset[str]:
         """Parameters that are an axis or differ from their default: what a method must be able to do."""
         return frozenset(p.name for p in self.kernel.parameters if p.name in self.axes or differs(p, self.fixed))
+
+    @property
+    def lengths(self) -> dict[str, int]:
+        """Length of every dimension that a column may have behind the cells'."""
+        arrays = {p.dims: self.array(p.name) for p in self.kernel.parameters if p.dims}
+        found = {
+            dim: n for dims, values in arrays.items() for dim, n in zip(dims, values.shape[-len(dims) :], strict=True)
+        }
+        found |= {name: len(values) for name, values in self.along.items()}
+        return found | {dim: found[other] for dim, other in self.kernel.same_length.items()}
+
+    def array(self, name: str) -> NDArray[np.float64]:
+        """What is given of an array parameter: its values, or those of all cells."""
+        source = self.follows.get(name, name)
+        return self.axes[source].values if source in self.axes else np.asarray(self.fixed[name])
 
     def to_json(self) -> str:
         """The study on one line of JSON: floats exactly, also NaN and infinities; the kernel as it declares itself."""
@@ -149,6 +164,7 @@ class Study:
             along = {name: _array(values) for name, values in keys["along"].items()}
             known = {name: keys[name] for name in PLAIN} | {"axes": axes, "along": along}
             known["outputs"] = tuple(known["outputs"])
+            known["fixed"] = {name: _value(value) for name, value in keys["fixed"].items()}
             kernel = _kernel_as_declared(keys["kernel"])
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise SweepError(f"not the JSON of a study: {type(error).__name__} {error}") from None
@@ -165,12 +181,19 @@ PLAIN = (
 """Attributes that are written as they are."""
 
 
-def differs(field: Field, fixed: Mapping[str, float]) -> bool:
+def short(value: Any) -> str:
+    """A value as people write it: `0.9`, or of an array `(25.7, 0.22, ...)`."""
+    if np.ndim(value) == 0:
+        return f"{value:.6g}"
+    return f"({', '.join(f'{v:.6g}' for v in value[:3])}{', ...' * (len(value) > 3)})"
+
+
+def differs(field: Field, fixed: Mapping[str, float | NDArray[np.float64]]) -> bool:
     """Whether a parameter is fixed to something else than its default."""
     if field.default is None or field.name not in fixed:
         return False
     default = fixed.get(field.default) if isinstance(field.default, str) else field.default
-    return fixed[field.name] != default
+    return not np.array_equal(fixed[field.name], np.broadcast_to(np.asarray(default), np.shape(fixed[field.name])))
 
 
 def frozen(values: Any) -> NDArray[np.float64]:
@@ -185,6 +208,10 @@ def _array(values: Any) -> NDArray[np.float64]:
     return frozen(values)
 
 
+def _value(value: Any) -> float | NDArray[np.float64]:
+    return _array(value) if np.ndim(value) else value
+
+
 def _words(words: list[str] | None) -> tuple[str, ...] | None:
     return None if words is None else tuple(words)
 
@@ -194,8 +221,9 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return {"float": repr(float(value))}
     if isinstance(value, np.ndarray):
-        if len(value) > LONGEST_LIST:
-            return {"float64": base64.b64encode(value.astype("<f8").tobytes()).decode("ascii")}
+        if value.size > LONGEST_LIST:
+            text = base64.b64encode(value.astype("<f8").tobytes()).decode("ascii")
+            return {"float64": text} | ({"shape": list(value.shape)} if value.ndim > 1 else {})
         return _plain(value.tolist())
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}
@@ -207,16 +235,17 @@ def _plain(value: Any) -> Any:
 def _decode(item: dict[str, Any]) -> Any:
     if item.keys() == {"float"} and isinstance(item["float"], str):
         return float(item["float"])
-    if item.keys() == {"float64"} and isinstance(item["float64"], str):
-        return np.frombuffer(base64.b64decode(item["float64"]), dtype="<f8")
+    if "float64" in item and item.keys() <= {"float64", "shape"} and isinstance(item["float64"], str):
+        return np.frombuffer(base64.b64decode(item["float64"]), dtype="<f8").reshape(item.get("shape", -1))
     return item
 
 
 def _declaration(kernel: Kernel) -> dict[str, Any]:
     """All of a kernel but its functions."""
     fields = {group: [asdict(f) for f in getattr(kernel, group)] for group in ("parameters", "outputs", "along")}
-    methods = [{"name": m.name, "doc": m.doc, "excludes": m.excludes} for m in kernel.methods]
-    return {"name": kernel.name, "doc": kernel.doc, "source": kernel.source, **fields, "methods": methods}
+    methods = [{key: getattr(m, key) for key in ("name", "doc", "excludes", "lacks")} for m in kernel.methods]
+    plain = {key: getattr(kernel, key) for key in ("name", "doc", "source", "same_length")}
+    return {**plain, **fields, "methods": methods}
 
 
 def _kernel_as_declared(keys: dict[str, Any]) -> Kernel:
@@ -224,8 +253,20 @@ def _kernel_as_declared(keys: dict[str, Any]) -> Kernel:
         tuple(Field(**{**f, "dims": tuple(f["dims"])}) for f in keys[group])
         for group in ("parameters", "outputs", "along")
     )
-    methods = tuple(Method(m["name"], m["doc"], _missing, excludes=tuple(m["excludes"])) for m in keys["methods"])
-    return Kernel(keys["name"], keys["doc"], keys["source"], parameters, outputs, _missing, methods, along)
+    methods = tuple(
+        Method(m["name"], m["doc"], _missing, excludes=tuple(m["excludes"]), lacks=tuple(m.get("lacks", ())))
+        for m in keys["methods"]
+    )
+    plain = {key: keys[key] for key in ("name", "doc", "source")}
+    return Kernel(
+        **plain,
+        parameters=parameters,
+        outputs=outputs,
+        check=_missing,
+        methods=methods,
+        along=along,
+        same_length=keys.get("same_length", {}),
+    )
 
 
 def _missing(*columns: Any) -> None:

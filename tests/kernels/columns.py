@@ -7,12 +7,17 @@ from kernels.interface import Kernel
 
 
 def columns_of(kernel: Kernel, parameters, named):
-    """One column per parameter of the kernel: the first ones in order, others by name, the rest at their defaults."""
+    """One column per parameter of the kernel: the first ones in order, others by name, the rest at their defaults.
+
+    Array parameters have the shape (length,) or (n_cells, length).
+    """
     values = {p.name: p.default for p in kernel.parameters}
     values |= dict(zip(values, parameters, strict=False)) | named
-    cells = np.broadcast_shapes(*(np.shape(v) for v in values.values() if not isinstance(v, str)))
     values = {name: values[v] if isinstance(v, str) else v for name, v in values.items()}
-    return [np.array(np.broadcast_to(np.asarray(v, float), cells)) for v in values.values()]
+    given = [(np.asarray(values[p.name], float), bool(p.dims)) for p in kernel.parameters]
+    cells = np.broadcast_shapes(*(v.shape[:-1] if array else v.shape for v, array in given))
+    length = max((v.shape[-1] for v, array in given if array and v.ndim), default=0)
+    return [np.array(np.broadcast_to(v, (*cells, length) if array else cells)) for v, array in given]
 
 
 def solve(kernel: Kernel, method: str, *parameters, rtol=1e-9, along=(), **named):
@@ -20,6 +25,8 @@ def solve(kernel: Kernel, method: str, *parameters, rtol=1e-9, along=(), **named
     columns = columns_of(kernel, parameters, named)
     n = len(columns[0])
     lengths = {field.name: len(values) for field, values in zip(kernel.along, along, strict=True)}
+    lengths |= {d: c.shape[1] for p, c in zip(kernel.parameters, columns, strict=True) for d in p.dims}
+    lengths |= {dim: lengths[other] for dim, other in kernel.same_length.items()}
     outputs = {f.name: np.full((n, *(lengths[d] for d in f.dims)), np.nan) for f in kernel.outputs}
     status = np.full(n, 99, np.int8)
     tolerances = np.ascontiguousarray(np.broadcast_to(np.asarray(rtol, float), (n,)))
