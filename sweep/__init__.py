@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from sweep.analysis import where_exponent as where_exponent
     from sweep.analysis import where_value as where_value
     from sweep.charts import plot as plot
+    from sweep.customary import in_units as in_units
     from sweep.errors import StudyError as StudyError
     from sweep.errors import SweepError as SweepError
     from sweep.exporting import export as export
@@ -35,6 +36,7 @@ _HOMES = {
     "where_exponent": "analysis",
     "where_value": "analysis",
     "plot": "charts",
+    "in_units": "customary",
     "export": "exporting",
     "SweepError": "errors",
     "StudyError": "errors",

@@ -94,10 +94,12 @@ def parser() -> argparse.ArgumentParser:
     plot.add_argument("--y", metavar="OUTPUT", help="default: the first output")
     plot.add_argument("--x", metavar="AXIS", help="default: the first axis")
     _add_at(plot)
+    _add_units(plot)
 
     export = _command(commands, "export", _export, "write a result as csv or netCDF4")
     _add_result(export)
     export.add_argument("-o", "--output", metavar="FILE.csv|FILE.nc", type=Path, required=True)
+    _add_units(export)
     return top
 
 
@@ -125,6 +127,11 @@ def _add_at(command: Any) -> None:
     command.add_argument(
         "--at", metavar="AXIS=VALUE", nargs="+", action="extend", default=[], help="pick one value of another axis"
     )
+
+
+def _add_units(command: Any) -> None:
+    text = "give a variable in another unit, e.g. A0=degree e=mm wear=mm/hour"
+    command.add_argument("--unit", metavar="NAME=UNIT", nargs="+", action="extend", default=[], help=text)
 
 
 def _kernels(arguments: argparse.Namespace) -> None:
@@ -171,7 +178,7 @@ def _plot(arguments: argparse.Namespace) -> None:
 
     output = arguments.output or Path(f"{arguments.result.stem}.png")
     with _result(arguments) as dataset:
-        plot(pick(dataset, arguments.at), output, y=arguments.y, x=arguments.x)
+        plot(_in_units(pick(dataset, arguments.at), arguments.unit), output, y=arguments.y, x=arguments.x)
     print(output)
 
 
@@ -179,7 +186,16 @@ def _export(arguments: argparse.Namespace) -> None:
     from sweep.exporting import export
 
     with _result(arguments) as dataset:
-        print(export(dataset, arguments.output))
+        print(export(_in_units(dataset, arguments.unit), arguments.output))
+
+
+def _in_units(dataset: xr.Dataset, given: Sequence[str]) -> xr.Dataset:
+    from sweep.customary import in_units
+
+    for text in given:
+        if not all(text.partition("=")):
+            raise SweepError(f'--unit: expected NAME=UNIT, found "{text}"; write e.g. --unit A0=degree')
+    return in_units(dataset, {name: unit for name, _, unit in (text.partition("=") for text in given)})
 
 
 def _study(arguments: argparse.Namespace) -> Study:

@@ -61,4 +61,6 @@ def _check_declaration(name: str, kernel: Kernel) -> None:
     known |= {dim for field in kernel.parameters for dim in field.dims}
     lost = sorted({d for field in kernel.outputs for d in field.dims} - known)
     if lost:
-        raise SweepError(f"kernel {name} has outputs along {listed(lost)}, which is neither in `along` nor a dim of its array parameters")
+        raise SweepError(
+            f"kernel {name} has outputs along {listed(lost)}, neither in `along` nor a dim of array parameters"
+        )
