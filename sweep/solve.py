@@ -145,13 +145,15 @@ class _Strip:
             cells = _pick(cells, np.isin(self.status[cells], GIVEN_UP))
 
     def _improve(self, number: int, cells: Cells) -> None:
-        """Run a method, but keep INACCURATE values of an earlier one in cells where this one is not better."""
+        """Run a method, but keep values of an earlier one in cells where this one is not better."""
         columns: list[NDArray[Any]] = [*self.outputs, self.status, self.used]
-        usable = _pick(cells, self.status[cells] == Status.INACCURATE)
+        usable = _pick(cells, self.status[cells] < FIRST_REFUSAL)
         kept = [column[usable].copy() for column in columns] if _count(usable) else []
+        before = self.status[usable].copy()
         self.run(number, cells)
         if kept:
-            worse = (self.status[usable] >= FIRST_REFUSAL) | (self.status[usable] == Status.INACCURATE)
+            now = self.status[usable]
+            worse = (now >= FIRST_REFUSAL) | ((now == before) & (now == Status.INACCURATE))
             back = _pick(usable, worse)
             for column, values in zip(columns, kept, strict=True):
                 column[back] = values[worse]

@@ -340,3 +340,21 @@ def test_a_kernel_that_no_result_could_hold_is_refused_at_once(monkeypatch, chan
     monkeypatch.setattr(toy, "KERNEL", replace(KERNEL, **change(KERNEL)))
     with pytest.raises(sweep.SweepError, match=message):
         toy_study(axes={"height": [1.0]})
+
+
+def test_auto_keeps_an_unstable_cycle_only_where_no_later_method_has_values():
+    def cycle(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
+        fall_time[...], impact_speed[...], drop[...] = 1.0, 1.0, 1.0
+        status[...] = Status.UNSTABLE
+
+    def motion(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
+        fall_time[...], impact_speed[...], drop[...] = 2.0, 2.0, 2.0
+        status[...] = np.where(
+            height > 1.5, np.where(height > 2.5, Status.INACCURATE, Status.STEP_LIMIT), Status.PERIOD_2
+        )
+
+    study = toy_study(axes={"height": [1.0, 2.0, 3.0]})
+    outputs, status, used = solved(with_kernel(study, stand_in(rough=(cycle, None), exact=(motion, None))))
+    assert status.tolist() == [Status.PERIOD_2, Status.UNSTABLE, Status.INACCURATE]
+    assert used.tolist() == [1, 0, 1]
+    assert outputs["fall_time"].tolist() == [2.0, 1.0, 2.0]
