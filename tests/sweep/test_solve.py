@@ -357,4 +357,4 @@ def test_auto_keeps_an_unstable_cycle_only_where_no_later_method_has_values():
     outputs, status, used = solved(with_kernel(study, stand_in(rough=(cycle, None), exact=(motion, None))))
     assert status.tolist() == [Status.PERIOD_2, Status.UNSTABLE, Status.INACCURATE]
     assert used.tolist() == [1, 0, 1]
-    assert outputs["fall_time"].tolist() == [2.0, 1.0, 2.0]
+    assert outputs["impact_speed"].tolist() == [2.0, 1.0, 2.0]
