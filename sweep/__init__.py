@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from sweep.errors import SweepError as SweepError
     from sweep.exporting import export as export
     from sweep.planning import plan as plan
+    from sweep.regimes import fit_two_laws as fit_two_laws
     from sweep.result import open_result as open_result
     from sweep.runner import run as run
     from sweep.spec import build_study as build_study
@@ -33,6 +34,7 @@ _HOMES = {
     "exponent": "analysis",
     "fit_exponent": "analysis",
     "crossover": "analysis",
+    "fit_two_laws": "regimes",
     "where_exponent": "analysis",
     "where_value": "analysis",
     "plot": "charts",

@@ -6,19 +6,26 @@ coordinate along a dimension, such as an axis of a zip design: `local_exponent(d
 
 from __future__ import annotations
 
-import difflib
-import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from sweep._curves import (
+    Window,
+    along,
+    ends,
+    inside_window,
+    log_of,
+    logarithm,
+    missing_is_nan,
+    positive_axis,
+    scatter_is_noise,
+    title,
+)
 from sweep._loglog import EPSILON, FEWEST, LINE, Array, brackets, line, root, slopes
 from sweep.errors import SweepError
 
-Window = tuple[float | None, float | None]
 Finder = Callable[[Array, Array, int], tuple[float, float]]
 
 LEAST_SQUARES = (
@@ -32,6 +39,9 @@ FIT_NAMES = {
     "exponent_error": "standard error of the exponent",
     "prefactor": "y at x = 1 on the line",
     "prefactor_error": "standard error of the prefactor",
+    "exponent_low": "lower end of the confidence interval of the exponent",
+    "exponent_high": "upper end of the confidence interval of the exponent",
+    "noisy": "1 where the interval is of noise, 0 where of the curvature of noise-free values",
     "drift": "change of the exponent across the window, by a parabola",
     "residual": "largest relative distance of a point from the line",
     "points": "points in the fit",
@@ -68,22 +78,28 @@ def local_exponent(y: xr.DataArray, dim: str) -> xr.DataArray:
     SweepError
         If `dim` is unknown, not positive, not monotone, or shorter than three.
     """
-    dimension, x = _abscissa(y, dim)
-    found = _along(lambda z: slopes(np.log(x), z, 5), _log(y), dimension)
+    dimension, x = positive_axis(y, dim)
+    found = along(lambda z: slopes(np.log(x), z, 5), log_of(y), dimension)
     found.name = f"{y.name}_exponent" if y.name is not None else "exponent"
-    found.attrs = {"units": "1", "long_name": f"local exponent of {_title(y)} in {dim}"}
+    found.attrs = {"units": "1", "long_name": f"local exponent of {title(y)} in {dim}"}
     return found
 
 
 exponent = local_exponent
 
 
-def fit_exponent(y: xr.DataArray, dim: str, window: Window | None = None) -> xr.Dataset:
+def fit_exponent(
+    y: xr.DataArray, dim: str, window: Window | None = None, *, confidence: float = 0.95, noise: bool | None = None
+) -> xr.Dataset:
     """Power law y = prefactor dim^exponent by a straight line in log-log over a window.
 
     Standard errors are those of ordinary least squares: the scatter about the line is taken as independent noise.
     A deterministic model has none; there they measure the curvature of the truth inside the window, and they
     shrink as 1/sqrt(points) although the curvature does not. `drift` does not shrink.
+
+    The confidence interval of the exponent knows the difference. With noise it is that of least squares, by Student's
+    t. Without, the exponent itself varies over the window, and the interval is the range of the local exponent there,
+    in which the exponent of every window inside lies.
 
     Parameters
     ----------
@@ -93,11 +109,16 @@ def fit_exponent(y: xr.DataArray, dim: str, window: Window | None = None) -> xr.
         Dimension of `y`, or 1-D coordinate along one; positive and strictly monotone.
     window : (low, high), optional
         Ends in the unit of `dim`, both included; None leaves an end open.
+    confidence : float
+        Of the interval, where there is noise.
+    noise : bool, optional
+        Whether the values carry independent noise. Default: as the scatter of neighbours about the line shows.
 
     Returns
     -------
     Dataset
-        `exponent`, `exponent_error` [1]; `prefactor`, `prefactor_error` (y at dim = 1, in the unit of y); `drift`
+        `exponent`, `exponent_error`, `exponent_low`, `exponent_high` [1]; `noisy`, 1 where the interval is of noise;
+        `prefactor`, `prefactor_error` (y at dim = 1, in the unit of y); `drift`
         [1], the change of the exponent from one end of the window to the other by a parabola through the same
         points; `residual` [1], the largest relative distance of a point from the line; `points`; `low`, `high`,
         the first and last abscissa used; `centre`, `level`, `level_error`, the geometric means of dim and y, where
@@ -108,18 +129,23 @@ def fit_exponent(y: xr.DataArray, dim: str, window: Window | None = None) -> xr.
     SweepError
         If `dim` is unknown or unfit, if y is not positive somewhere in the window, or if no line has three points.
     """
-    dimension, x = _abscissa(y, dim)
-    inside = np.flatnonzero(_inside(x, window, dim))
+    if not 0 < confidence < 1:
+        raise SweepError(f"confidence: expected a number between 0 and 1, found {confidence}")
+    dimension, x = positive_axis(y, dim)
+    inside = np.flatnonzero(inside_window(x, window, dim))
     part = y.isel({dimension: inside})
-    _require_fit_for_logarithms(part, dim)
-    numbers = _along(lambda z: line(np.log(x[inside]), z), _log(part), dimension, "number")
+    logs = logarithm(part, dim)
+    numbers = along(lambda z: line(np.log(x[inside]), z), logs, dimension, "number")
     fit = xr.Dataset({name: numbers.isel(number=k, drop=True) for k, name in enumerate(LINE)})
     if not bool(fit.exponent.notnull().any()):
         raise SweepError(
-            f"a line needs at least {FEWEST} points, found {int(fit.points.max())} of {_title(y)} in the window "
-            f"{_ends(window, dim)[0]:g} to {_ends(window, dim)[1]:g} of {dim}; choose a wider one"
+            f"a line needs at least {FEWEST} points, found {int(fit.points.max())} of {title(y)} in the window "
+            f"{ends(window, dim)[0]:g} to {ends(window, dim)[1]:g} of {dim}; choose a wider one"
         )
     fit["points"] = fit.points.astype(np.int64)
+    bounds = along(lambda z: _interval(np.log(x[inside]), z, confidence, noise), logs, dimension, "number")
+    for k, name in enumerate(("exponent_low", "exponent_high", "noisy")):
+        fit[name] = bounds.isel(number=k, drop=True)
     return _describe_fit(fit, y, dim)
 
 
@@ -191,7 +217,7 @@ def where_value(curve: xr.DataArray, dim: str, value: float, window: Window | No
         fine, coarse = (root(t, c, bracket, value, points) for points in (6, 4))
         return fine, abs(fine - coarse) + _rounding(t, c, bracket, EPSILON * _largest(c))
 
-    return _where(_missing_is_nan(curve), dim, value, window, (lambda t, c: c, find))
+    return _where(missing_is_nan(curve), dim, value, window, (lambda t, c: c, find))
 
 
 def where_exponent(y: xr.DataArray, dim: str, value: float, window: Window | None = None) -> xr.Dataset:
@@ -225,96 +251,27 @@ def where_exponent(y: xr.DataArray, dim: str, value: float, window: Window | Non
         noise = EPSILON * _largest(z) / float(abs(np.diff(t)).min())
         return fine, apart + _rounding(t, sixth, bracket, noise)
 
-    found = _where(_log(y), dim, value, window, (lambda t, z: slopes(t, z, 7), find))
-    found.abscissa.attrs["long_name"] = f"where the exponent of {_title(y)} is {value:g}"
+    found = _where(log_of(y), dim, value, window, (lambda t, z: slopes(t, z, 7), find))
+    found.abscissa.attrs["long_name"] = f"where the exponent of {title(y)} is {value:g}"
     return found
 
 
-def _abscissa(y: xr.DataArray, dim: str) -> tuple[str, Array]:
-    """Dimension that `dim` runs along, and its values, fit to take logarithms of."""
-    dimension, values = _coordinate(y, dim)
-    if values.dtype.kind not in "fiu":
-        raise SweepError(f"{dim} holds words, not numbers; a power law needs a number axis")
-    x = values.astype(np.float64)
-    fit = np.isfinite(x) & (x > 0)
-    if not fit.all():
-        raise SweepError(f"{dim} must be positive and finite to take logarithms; found {x[~fit][0]:g}, select a part")
-    if x.size < FEWEST:
-        raise SweepError(f"{dim} has {x.size} of the at least {FEWEST} points that an exponent needs")
-    rises = np.diff(x) > 0
-    if not ((rises.all() or not rises.any()) and np.diff(x).all()):
-        raise SweepError(f"{dim} neither rises nor falls throughout; sort first, e.g. ds.sortby({dim!r})")
-    return dimension, x
+def _interval(t: Array, z: Array, confidence: float, noise: bool | None) -> Array:
+    """Ends of the confidence interval of a line's slope, and 1 where it is of noise; (..., n) to (..., 3)."""
+    from scipy.special import stdtrit
 
-
-def _coordinate(y: xr.DataArray, dim: str) -> tuple[str, NDArray[Any]]:
-    if not isinstance(y, xr.DataArray):
-        raise SweepError(f"expected one output, e.g. ds.period; found a {type(y).__name__}")
-    known = [str(name) for name, coordinate in y.coords.items() if coordinate.ndim == 1]
-    if dim in known:
-        return str(y.coords[dim].dims[0]), y.coords[dim].values
-    there = f"{_title(y)} runs along {', '.join(known)}" if known else f"{_title(y)} runs along no axis with values"
-    if dim in y.coords:
-        raise SweepError(f"{dim} has one value here, so nothing can be fitted along it; {there}")
-    close = difflib.get_close_matches(str(dim), known, 1)
-    raise SweepError(f"{_title(y)} has no axis {dim!r}; " + (f"did you mean {close[0]}?" if close else there))
-
-
-def _inside(x: Array, window: Window | None, dim: str) -> NDArray[np.bool_]:
-    low, high = _ends(window, dim)
-    # an end that is a grid point up to rounding is meant to be in
-    return (x >= low * (1 - 8 * EPSILON)) & (x <= high * (1 + 8 * EPSILON))
-
-
-def _ends(window: Window | None, dim: str) -> tuple[float, float]:
-    try:
-        low, high = (None, None) if window is None else window
-        ends = 0.0 if low is None else float(low), math.inf if high is None else float(high)
-    except (TypeError, ValueError):
-        raise SweepError(f"a window of {dim} is a pair (low, high) of numbers or None; found {window!r}") from None
-    if not ends[0] < ends[1]:
-        raise SweepError(f"the window {ends[0]:g} to {ends[1]:g} of {dim} is empty; give (low, high) with low < high")
-    return ends
-
-
-def _title(y: xr.DataArray) -> str:
-    return str(y.name) if y.name is not None else "the array"
-
-
-def _missing_is_nan(y: xr.DataArray) -> xr.DataArray:
-    numbers = y.astype(np.float64)
-    return numbers.where(np.isfinite(numbers))
-
-
-def _log(y: xr.DataArray) -> xr.DataArray:
-    """Natural logarithm, NaN where there is none."""
-    numbers = _missing_is_nan(y)
-    logs: xr.DataArray = xr.apply_ufunc(np.log, numbers.where(numbers > 0), dask="allowed", keep_attrs=True)
-    return logs.rename(y.name)
-
-
-def _along(function: Callable[[Array], Array], y: xr.DataArray, dimension: str, to: str | None = None) -> xr.DataArray:
-    """`function` of the last axis, put along `dimension`: in its place, or as a new last dimension `to`."""
-    found: xr.DataArray = xr.apply_ufunc(
-        function,
-        y.compute(),
-        input_core_dims=[[dimension]],
-        output_core_dims=[[to or dimension]],
-        exclude_dims={dimension} if to else set(),
-        keep_attrs=True,  # those of the coordinates; the caller writes those of the result
-    )
-    return found if to else found.transpose(*y.dims)
-
-
-def _require_fit_for_logarithms(part: xr.DataArray, dim: str) -> None:
-    cells = np.argwhere(np.asarray(part.values <= 0))
-    count = len(cells)
-    if count:
-        first = part[tuple(cells[0])]
-        raise SweepError(
-            f"a power law needs positive values; {count} of {part.size} of {_title(part)} in the window are not, "
-            f"e.g. {float(first):g} at {dim} = {float(first.coords[dim]):g}; choose a window without them"
-        )
+    numbers = line(t, z)
+    slope, error, count = (numbers[..., LINE.index(name)] for name in ("exponent", "exponent_error", "points"))
+    level, centre = (np.log(numbers[..., LINE.index(name)])[..., None] for name in ("level", "centre"))
+    noisy = scatter_is_noise(z - level - slope[..., None] * (t - centre), z) if noise is None else np.array(noise)
+    reach = stdtrit(np.maximum(count - 2, 1), (1 + confidence) / 2) * error
+    local, rough = slopes(t, z, 5), slopes(t, z, 7)
+    least = EPSILON * np.nanmax(abs(z), axis=-1, initial=1.0) / abs(np.diff(t)).min()  # rounding of the differences
+    doubt = np.nanmax(abs(local - rough), axis=-1, initial=0.0) + least
+    low = np.fmin(np.nanmin(local, axis=-1, initial=np.inf) - doubt, slope)
+    high = np.fmax(np.nanmax(local, axis=-1, initial=-np.inf) + doubt, slope)
+    ends = np.where(noisy, slope - reach, low), np.where(noisy, slope + reach, high)
+    return np.stack([*ends, np.broadcast_to(noisy, slope.shape).astype(float)], axis=-1)
 
 
 def _describe_fit(fit: xr.Dataset, y: xr.DataArray, dim: str) -> xr.Dataset:
@@ -322,7 +279,7 @@ def _describe_fit(fit: xr.Dataset, y: xr.DataArray, dim: str) -> xr.Dataset:
     of = {"prefactor": units, "prefactor_error": units, "level": units, "low": place, "high": place, "centre": place}
     for name, variable in fit.data_vars.items():
         variable.attrs = {"units": of.get(str(name), "1"), "long_name": FIT_NAMES[str(name)]}
-    fit.attrs = {"law": f"{_title(y)} = prefactor {dim}^exponent", "y": _title(y), "x": dim, "method": LEAST_SQUARES}
+    fit.attrs = {"law": f"{title(y)} = prefactor {dim}^exponent", "y": title(y), "x": dim, "method": LEAST_SQUARES}
     return fit
 
 
@@ -338,8 +295,8 @@ def _where(
     curve: xr.DataArray, dim: str, value: float, window: Window | None, ways: tuple[Callable[..., Array], Finder]
 ) -> xr.Dataset:
     """The one passage of each line: ways[0] gives what passes `value`, ways[1] the place and its error in ln dim."""
-    dimension, x = _abscissa(curve, dim)
-    inside, t = _inside(x, window, dim), np.log(x)
+    dimension, x = positive_axis(curve, dim)
+    inside, t = inside_window(x, window, dim), np.log(x)
     seen, find = ways
 
     def one(z: Array) -> tuple[float, float]:
@@ -350,16 +307,16 @@ def _where(
         lines = np.array([one(z) for z in values.reshape(-1, t.size)])
         return lines.reshape(*values.shape[:-1], 2)
 
-    numbers = _along(all_lines, curve, dimension, "number")
+    numbers = along(all_lines, curve, dimension, "number")
     place, error = numbers.isel(number=0, drop=True), numbers.isel(number=1, drop=True)
     if not bool(place.notnull().any()):
         count = int(error.max())
         said = f"passes {value:g} {count} times" if count else f"does not pass {value:g}"
-        raise SweepError(f"{_title(curve)} {said} along {dim} in the window; choose another window")
+        raise SweepError(f"{title(curve)} {said} along {dim} in the window; choose another window")
     abscissa: xr.DataArray = xr.apply_ufunc(np.exp, place, keep_attrs=True)
     found = xr.Dataset({"abscissa": abscissa, "abscissa_error": (abscissa * error).where(place.notnull())})
     units = str(curve.coords[dim].attrs.get("units", "1"))
-    found.abscissa.attrs = {"units": units, "long_name": f"where {_title(curve)} is {value:g}"}
+    found.abscissa.attrs = {"units": units, "long_name": f"where {title(curve)} is {value:g}"}
     found.abscissa_error.attrs = {"units": units, "long_name": "estimated error of the place"}
     return found
 
