@@ -9,7 +9,7 @@ Source: the drivetrain of a milling machine, type-a and type-b partial systems a
 import math
 
 from kernels._jit import jit, jit_call
-from kernels._lanes import where
+from kernels._lanes import exponent, isnt, nearest, where
 from kernels._vecmath import NORMAL_HIGH, NORMAL_LOW
 from kernels.interface import Status
 
@@ -38,6 +38,23 @@ def extremes(n, at, column):
     return low, high
 
 
+@jit
+def units(n, at, J, k):
+    """Exponents e_J, e_k of 2^e near the largest inertia and stiffness, both even; and whether all is in range."""
+    low_J, high_J = extremes(n, at, J)
+    low_k, high_k = extremes(n, at, k)
+    free = isnt(high_k > 0.0)  # one inertia alone
+    sound = normal_spread(low_J, high_J) & (free | normal_spread(low_k, high_k))
+    e_J, e_k = exponent(where(sound, high_J, 1.0)), exponent(where(sound & isnt(free), high_k, 1.0))
+    return 2.0 * nearest(0.5 * e_J), 2.0 * nearest(0.5 * e_k), sound
+
+
+@jit
+def normal_spread(low, high):
+    """Whether positive numbers from `low` to `high` are normal and within SPREAD of each other."""
+    return (low >= NORMAL_LOW) & (high <= NORMAL_HIGH) & (low >= high / SPREAD)
+
+
 @jit_call
 def refusal(n, J, k, h):
     """BAD_INPUT, OUT_OF_RANGE or OK of one chain of n inertias."""
@@ -47,13 +64,4 @@ def refusal(n, J, k, h):
         sound = (J[j] > 0.0) & (J[j] < math.inf) & (k[j] < math.inf) & (h[j] >= 0.0) & (h[j] < math.inf)
         if not (sound & ((k[j] > 0.0) | ((k[j] >= 0.0) & (j == n - 1)))):
             return _BAD_INPUT
-    return _OK if in_range(n, J) & in_range(n, k) else _OUT_OF_RANGE
-
-
-@jit
-def in_range(n, column):
-    """Whether n positive numbers are normal and within SPREAD of each other; there may be none."""
-    low, high = extremes(n, same, column)
-    if not (high > 0.0):
-        return True
-    return (low >= NORMAL_LOW) & (high <= NORMAL_HIGH) & (low >= high / SPREAD)
+    return _OK if units(n, same, J, k)[2] else _OUT_OF_RANGE

@@ -17,10 +17,10 @@ Source: Fernando & Parlett, Numer. Math. 67:191 (1994), sections 4 and 6; traces
 
 import math
 
-from kernels._chain import SPREAD, extremes, same
+from kernels._chain import same, units
 from kernels._jit import jit, jit_call, jit_inline
-from kernels._lanes import exponent, fma, isnt, magnitude, nearest, some, sqrt, where
-from kernels._vecmath import NORMAL_LOW, is_normal, scale
+from kernels._lanes import fma, isnt, magnitude, some, sqrt, where
+from kernels._vecmath import is_normal, scale
 from kernels.interface import Status
 
 SWEEP_LIMIT = 200
@@ -77,20 +77,6 @@ def _sweep(m, n, at, rows, shift, active):
 
 
 @jit
-def _unit(n, at, J, k):
-    """Powers of two near the largest inertia and stiffness, their exponents even together; and whether all is in range."""
-    low_J, high_J = extremes(n, at, J)
-    low_k, high_k = extremes(n, at, k)
-    free = isnt(high_k > 0.0)  # one inertia alone
-    high_k = where(free, 1.0, high_k)
-    sound = (low_J >= NORMAL_LOW) & (low_J >= high_J / SPREAD)
-    sound = sound & (free | ((low_k >= NORMAL_LOW) & (low_k >= high_k / SPREAD)))
-    e_J, e_k = exponent(high_J), exponent(high_k)
-    odd = (e_k - e_J) - 2.0 * nearest(0.5 * (e_k - e_J))
-    return e_J, e_k - odd, sound
-
-
-@jit
 def _fill(n, at, J, k, rows, e_J, e_k):
     """The entries (1), without units."""
     for j in range(n):
@@ -103,7 +89,7 @@ def _fill(n, at, J, k, rows, e_J, e_k):
 
 @jit
 def _joined(j, n, at, rows, limit):
-    """Whether row j hangs on those before it by more than the last digit of a frequency, theirs or one above `limit`."""
+    """Whether row j hangs on those before it by more than the last digit of theirs, or of what is above `limit`."""
     e = rows[at(n + j - 1)]
     return (e > _NEGLIGIBLE * limit) & (e * rows[at(2 * n + j - 1)] > _NEGLIGIBLE)
 
@@ -193,8 +179,8 @@ def frequencies(n, at, J, k, frequency, rows):
 
     `rows` has room for 4 n entries. Free at both ends the first is exactly 0.
     """
-    e_J, e_k, sound = _unit(n, at, J, k)
-    _fill(n, at, J, k, rows, where(sound, e_J, 0.0), where(sound, e_k, 0.0))
+    e_J, e_k, sound = units(n, at, J, k)
+    _fill(n, at, J, k, rows, e_J, e_k)
     failed = _eigenvalues(n, at, rows, frequency)
     for j in range(n):
         f = scale(sqrt(frequency[at(j)]) * _TURNS, 0.5 * (e_k - e_J))

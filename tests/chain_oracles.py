@@ -27,7 +27,7 @@ def numbers(values):
 
 
 def modes(J, k, digits=160):
-    """(frequencies, shapes): ascending, shapes[i, j] of mass i in mode j with sum_i J_i shape^2 = 1, shapes[0, j] > 0."""
+    """(frequencies, shapes): shapes[i, j] is mass i in mode j, sum_i J_i shapes[i, j]^2 = 1, shapes[0, j] > 0."""
     with mp.workdps(digits):
         J = numbers(J)
         n = len(J)
@@ -72,7 +72,7 @@ def receptance(J, k, h, frequency, drive, read):
 
 
 def polynomial(J, k, h):
-    """Coefficients of det(s^2 J + s H + K), the highest power first, from the three-term expansion of the determinant."""
+    """Coefficients of det(s^2 J + s H + K), the highest power first, by expansion of the determinant."""
     J, k, h = numbers(J), numbers(k), numbers(h)
     before, now = [], [mpf(1)]
     for j in range(len(J)):
