@@ -1,0 +1,206 @@
+"""Where the impact clock ends up, whatever it does on the way: contact by contact, then Newton on what repeats.
+
+From the symmetric cycle of one impact, a little disturbed (or from what its formula gives where there is none), half
+swings are followed in blocks. When the motion all but repeats after k of them, Newton finds where it does (k = 1: a
+symmetric cycle; even k: k/2 swings to and fro; other k: k of them). It is taken if it is stable, else left behind.
+A cycle lasts until the next tooth, or, should more than one pass in it, one swing to and fro.
+"""
+
+import math
+
+from kernels import _impact_swing as swing
+from kernels._impact_repeat import chain, distance, errors, invert, multiplier, newton
+from kernels._impact_scene import bend
+from kernels._impact_swing import half_swing
+from kernels._jit import jit, jit_call
+from kernels._lanes import magnitude, nearest, sqrt
+from kernels.interface import Status
+
+HALF_SWINGS = 2048
+"""Half swings after which a motion that does not repeat is called so; means are over the second half of them."""
+EVENT_LIMIT = 1_000_000
+"""Events of the second half, or of the first."""
+BLOCK = 16
+"""Half swings between two looks at whether the motion repeats, and the most after which it is seen to."""
+DISTURBANCE = 1e-6
+
+_CLOSE = 1e-3
+"""Relative distance of two half swings' beginnings at which Newton is tried."""
+_NEAR = 0.05
+"""How far from there a cycle may be found."""
+_SAME = 1e-9
+"""The distance of two beginnings that are one."""
+_KICK, _KICKS = 0.01, 8
+"""How far an unstable cycle is left behind, and how often that is tried."""
+_ROUNDING = 2.3e-16
+_OK, _INACCURATE, _GRAZING = float(Status.OK), float(Status.INACCURATE), float(Status.GRAZING)
+_UNSTABLE, _PERIOD_2, _NOT_PERIODIC = float(Status.UNSTABLE), float(Status.PERIOD_2), float(Status.NOT_PERIODIC)
+_TOOTH_JUMPED, _STEP_LIMIT = float(Status.TOOTH_JUMPED), float(Status.STEP_LIMIT)
+_NO_METHOD = float(Status.NO_METHOD)
+
+
+@jit
+def plain_scene(scene):
+    """The scene of `_impact_swing`."""
+    wheel, pallet, _, eta, _, e, _ = scene
+    c, y_i = bend(scene)
+    return wheel[0], pallet[0], min(eta[0], 0.25), e, c, y_i
+
+
+@jit
+def beginning(scene, disturbance):
+    """Start of a half swing on the symmetric cycle of one impact, by its formula, with its speeds so much changed.
+
+    w = kappa T/2 and V = T (kappa (1 - e) - 2 e)/(2 (1 + e)) after the impact at y = -Y; it is followed back to the
+    release at y = -eta. Where it is not one, y = -eta is where it begins all the same.
+    """
+    wheel, pallet, eta, e, c, y_i = scene
+    kappa = wheel / pallet
+    if not (e > 0.0):
+        c_0 = 0.5 * sqrt(kappa + 4.0 * eta)
+        return swing.reduced(2.0 * eta - 0.5), c_0 * (1.0 + 0.5 * disturbance), -c_0 * (1.0 + disturbance)
+    half = sqrt((1.0 + e) / (1.0 - e) * pallet)
+    w = 0.5 * kappa * half
+    V = half * (kappa * (1.0 - e) - 2.0 * e) / (2.0 * (1.0 + e)) + half
+    away = max(-eta - y_i, 0.0)
+    t = away / w
+    V, w = (V - t) * (1.0 + 0.5 * disturbance), w * (1.0 + disturbance)
+    gap = -(V + 0.5 * t) * t - away * (1.0 + 0.5 * c * away)
+    return swing.reduced(gap), V, -w
+
+
+@jit_call
+def follow(scene, start, n, history, tally, slopes):
+    """The start after n half swings, and what became of them; `history` gets n + 1 starts."""
+    history[0, 0], history[0, 1], history[0, 2] = start
+    for i in range(n):
+        start, verdict = half_swing(scene, start, tally, slopes, False)
+        if verdict != swing.DONE:
+            return start, verdict
+        history[i + 1, 0], history[i + 1, 1], history[i + 1, 2] = start
+    return start, swing.DONE
+
+
+@jit
+def _past(history, i):
+    return history[i, 0], history[i, 1], history[i, 2]
+
+
+@jit_call
+def _repeats_after(history, n):
+    """The least number of half swings after which the motion all but repeats; 0 if it does not."""
+    for k in range(1, n + 1):
+        if distance(_past(history, n - k), _past(history, n)) < _CLOSE:
+            return k
+    return 0
+
+
+@jit_call
+def _shortest(scene, start, k, history, work):
+    """The shortest repetition of a motion that repeats after k half swings."""
+    follow(scene, start, k, history, work[0], work[1])
+    for shorter in range(1, k):
+        if k % shorter == 0 and distance(_past(history, shorter), start) < _SAME:
+            return shorter
+    return k
+
+
+@jit
+def _cycles(k, way):
+    """Half swings of the whole motion, teeth that pass in it, and the cycles that this is."""
+    teeth = nearest(2.0 * way)
+    if k % 2 == 0:
+        return 1.0 * k, 0.5 * teeth, min(0.5 * teeth, 0.5 * k)
+    return 2.0 * k, teeth, min(teeth, 1.0 * k)
+
+
+@jit_call
+def _left_behind(start, cycle):
+    """A start further from an unstable cycle, the way the motion leaves it."""
+    away = distance(start, cycle)
+    more = _KICK / max(away, 1e-12) if away < _KICK else 1.0
+    gap, V = cycle[0] + more * (start[0] - cycle[0]), cycle[1] + more * (start[1] - cycle[1])
+    w = cycle[2] + more * (start[2] - cycle[2])
+    return (swing.reduced(gap), V, w) if w < 0.0 else start
+
+
+@jit
+def _answer(tally, n, half, pace):
+    """The cycle as in `_impact_scene`, the middle of the swing, the share of time in contact, and impacts."""
+    beats = tally[swing.BEATS]
+    rim, pallet = (tally[swing.RIM] / beats, tally[swing.PALLET] / beats) if beats > 0.0 else (math.nan, math.nan)
+    impacts = tally[swing.IMPACTS] * half / tally[swing.TIME]
+    cycle = half, tally[swing.DIPS] / n, rim, pallet, pace, tally[swing.RECOIL]
+    offset = magnitude(tally[swing.LEAN]) / n if n % 2 == 0 else 0.0
+    return cycle, offset, tally[swing.HELD] / tally[swing.TIME], impacts
+
+
+@jit
+def _none():
+    """No answer."""
+    nan = math.nan
+    return (nan, nan, nan, nan, nan, nan), nan, nan, nan
+
+
+@jit
+def _verdict(tally, teeth, cycles, worst, gap, rounding, rtol):
+    """The status of a stable motion."""
+    status = _OK if teeth == 1.0 else _PERIOD_2
+    if teeth > cycles:
+        status = _TOOTH_JUMPED
+    if not (worst <= rtol):
+        status = _INACCURATE
+    return _GRAZING if tally[swing.MARGIN] <= 4.0 * gap + rounding else status
+
+
+@jit_call
+def _judged(scene, start, k, work, rtol):
+    """The answer for a motion that repeats after k half swings, and its status; UNSTABLE where it leaves that."""
+    tally, slopes, chained, inverse = work
+    swing.clear(tally)
+    image, _ = chain(scene, start, k, tally, slopes, chained)
+    invert(chained, inverse)
+    rest = image[0] - start[0], image[1] - start[1], image[2] - start[2]
+    half_swings, teeth, cycles = _cycles(k, tally[swing.WAY])
+    half = 0.5 * tally[swing.TIME] * half_swings / (k * cycles)
+    modulus, blur = multiplier(chained)
+    answer = _answer(tally, k, half, modulus ** (1.0 / k))
+    _, travel, rim, pallet, _, _ = answer[0]
+    rounding = _ROUNDING * (2.0 + tally[swing.EVENTS] / k) * (1.0 + travel)
+    gap, V, w, late = errors(start, rest, inverse, chained, rounding, tally[swing.TIME])
+    noise = blur * (rounding * k + gap)
+    worst = max(max(late, gap / travel), max(V / magnitude(rim), w / magnitude(pallet)))
+    worst = max(worst, noise / (k * modulus) if modulus > 0.0 else 0.0)
+    status = _verdict(tally, teeth, cycles, worst, gap, rounding, rtol)
+    if modulus > 1.0 - noise:
+        status = _UNSTABLE if modulus > 1.0 + noise else _GRAZING
+    return answer, status
+
+
+@jit_call
+def attractor(scene, rtol, total, work, history):
+    """The cycle, the middle of the swing, the share of time in contact, impacts in half a period, and the status."""
+    start, kicks = beginning(scene, DISTURBANCE), 0
+    swing.clear(total)
+    blocks = HALF_SWINGS // BLOCK
+    for block in range(blocks):
+        if 2 * block == blocks:
+            swing.clear(total)
+        start, verdict = follow(scene, start, BLOCK, history, total, work[1])
+        if verdict != swing.DONE or total[swing.EVENTS] > EVENT_LIMIT:
+            return _none(), _NO_METHOD if verdict == swing.BENT_CONTACT else _STEP_LIMIT
+        k = _repeats_after(history, BLOCK)
+        if k == 0:
+            continue
+        cycle, found = newton(scene, start, k, work)
+        if not (found and distance(start, cycle) < _NEAR):
+            continue
+        k = _shortest(scene, cycle, k, history, work)
+        answer, status = _judged(scene, cycle, k, work, rtol)
+        if status != _UNSTABLE:
+            return answer, status
+        if 2 * block < blocks and kicks < _KICKS:
+            start, kicks = _left_behind(start, cycle), kicks + 1
+    half_swings = HALF_SWINGS // 2
+    cycles = max(min(total[swing.WAY], 0.5 * half_swings), 1.0)
+    return _answer(total, half_swings, 0.5 * total[swing.TIME] / cycles, math.nan), _NOT_PERIODIC
