@@ -14,6 +14,7 @@ KERNELS = {
     "balance": "kernels.balance:BALANCE",
     "balance_trace": "kernels.balance_trace:BALANCE_TRACE",
     "balance_driven": "kernels.balance_driven:BALANCE_DRIVEN",
+    "impact": "kernels.impact:IMPACT",
 }
 
 
