@@ -6,8 +6,8 @@ from b, alpha the arm's, P = abs(p), side = +1 for type A (the arm is counterclo
     rz^2 = ((d+f)^2 - P^2)(P^2 - (d-f)^2) = (S (d+f-b-e) + 4 b e sin^2(theta/2))
                                             ((b+f-e-d)(b+d-e-f) + 4 b e cos^2(theta/2)),  S = b+d+f+e    (2)
     alpha' = (e (e + b cos theta) + side b e sin theta Q/rz)/P^2,  Q = P^2 + f^2 - d^2                (3)
-Source: Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (9)-(13), where a radical sign is lost in (10), (11),
-(13) and (15), (16) are misprinted; (2) is Heron's form of (13), which keeps its digits where d and f are in line.
+Source: Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (9)-(13), where a radical sign is lost in (10), (11)
+and (13), and (15), (16) are misprinted; (2) is Heron's form of (13), which keeps its digits where d and f are in line.
 
 Derivatives are by theta: rates per unit rate of the crank. Lengths are in units of a power of two near the longest,
 from `in_units`, and differences of them are sums without error, so that nothing but the last operations rounds.

@@ -10,6 +10,8 @@ from kernels.catalogue import KERNELS, get
 from kernels.interface import FIRST_REFUSAL, Status
 
 NAMES = sorted(KERNELS)
+REMARKED_ONLY = {"polisher": {"theta_lock", "theta_lock_outer"}}
+"""Outputs that exist only where a remark says so: NaN in a scene that runs well."""
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -79,8 +81,9 @@ def test_the_example_of_every_kernel_runs(name):
     for method in kernel.methods:
         if any(cell[term] != [kernel.parameter(term).default] for term in method.excludes if term in cell):
             continue  # it cannot do a term of the example
-        given = {o.name for o in kernel.outputs if o.name not in method.lacks}
+        absent = {*method.lacks, *REMARKED_ONLY.get(name, ())}
+        given = {o.name for o in kernel.outputs} - absent
         outputs, status = solve(kernel, method.name, along=along, **cell)
         assert status[0] == Status.OK
-        assert all(np.isfinite(outputs[name]).all() for name in given)
-        assert all(np.isnan(outputs[name]).all() for name in method.lacks)
+        assert all(np.isfinite(outputs[o]).all() for o in given)
+        assert all(np.isnan(outputs[o]).all() for o in absent)
