@@ -84,6 +84,8 @@ def parser() -> argparse.ArgumentParser:
     fit.add_argument("--x", metavar="AXIS", required=True)
     window = "part of the axis to fit over; given twice, also tells where the two laws meet"
     fit.add_argument("--window", nargs=2, type=float, metavar=("LO", "HI"), action="append", help=window)
+    fit.add_argument("--confidence", type=float, default=0.95, metavar="SHARE", help="of the intervals; default: 0.95")
+    fit.add_argument("-o", "--output", metavar="FILE.csv", type=Path, help="also write the table")
     _add_at(fit)
 
     plot = _command(commands, "plot", _plot, "a figure of one output")
@@ -166,10 +168,15 @@ def _show(arguments: argparse.Namespace) -> None:
 
 
 def _fit(arguments: argparse.Namespace) -> None:
-    from sweep.fitting import fit_text, pick
+    from sweep.fitting import laws, laws_text, pick, write_laws
 
     with _result(arguments) as dataset:
-        print(fit_text(pick(dataset, arguments.at), arguments.y, arguments.x, arguments.window or []))
+        part = pick(dataset, arguments.at)
+        found = laws(part, arguments.y, arguments.x, arguments.window or [], arguments.confidence)
+    print(laws_text(found))
+    if arguments.output:
+        write_laws(found, arguments.output)
+        print(arguments.output)
 
 
 def _plot(arguments: argparse.Namespace) -> None:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import itertools
+import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,8 +23,9 @@ if TYPE_CHECKING:
 MOST_ROWS = 40
 
 EXPLANATION = (
-    "+- is the standard error, taking the scatter about the line as noise; drift is how far the exponent changes "
-    "across the window; residual is the largest relative distance of a point from the line"
+    "The interval is of {confidence:g} % confidence where the values scatter; where they do not, it is the range of "
+    "the local exponent in the window (of two laws: also of where that tends). Drift is how far the exponent changes "
+    "across the window; residual is the largest relative distance of a point from the curve."
 )
 
 
@@ -52,8 +57,22 @@ def pick(dataset: xr.Dataset, choices: Sequence[str]) -> xr.Dataset:
     return dataset
 
 
-def fit_text(dataset: xr.Dataset, y: str, x: str, windows: Sequence[Sequence[float]]) -> str:
-    """Power laws y ~ x^p over each window, and where the laws of two windows meet. Raises SweepError."""
+@dataclass(frozen=True)
+class Laws:
+    """Power laws y ~ x^p over each window; for one window also two laws with a bend, for two where they meet."""
+
+    y: str
+    x: str
+    fits: tuple[xr.Dataset, ...]
+    bend: xr.Dataset | None
+    meeting: xr.Dataset | None
+    confidence: float
+
+
+def laws(
+    dataset: xr.Dataset, y: str, x: str, windows: Sequence[Sequence[float]] = (), confidence: float = 0.95
+) -> Laws:
+    """What `sweep fit` finds. Raises SweepError."""
     from sweep.analysis import crossover, fit_exponent
 
     outputs = [str(name) for name in dataset.data_vars if name not in (STATUS, METHOD_USED)]
@@ -63,12 +82,58 @@ def fit_text(dataset: xr.Dataset, y: str, x: str, windows: Sequence[Sequence[flo
     if len(windows) > 2:
         raise SweepError(f"--window: expected one or two, found {len(windows)}")
     limits: list[tuple[float, float] | None] = [*sorted((low, high) for low, high in windows)] or [None]
-    fits = [fit_exponent(dataset[y], x, window) for window in limits]
-    texts = [f"{y} ~ {x}^p", columns([_heading(fits[0]), *_rows(fits, _fit_cells)])]
+    fits = tuple(fit_exponent(dataset[y], x, window, confidence=confidence) for window in limits)
     if len(fits) == 2:
-        meeting = crossover(fits[0], fits[1])
-        texts += ["the two laws meet", columns([(*_dims(meeting), x, "", y), *_rows([meeting], _meeting_cells)])]
-    return page("\n".join(texts[:2]), "\n".join(texts[2:]), columns([(EXPLANATION,)], indent=""))
+        return Laws(y, x, fits, None, crossover(fits[0], fits[1]), confidence)
+    return Laws(y, x, fits, _bend(dataset[y], x, limits[0], confidence), None, confidence)
+
+
+def _bend(y: xr.DataArray, x: str, window: tuple[float, float] | None, confidence: float) -> xr.Dataset | None:
+    """Two laws, where any line has points enough for them and is not straight."""
+    from sweep.regimes import FEWEST_POINTS, fit_two_laws
+
+    if y.sizes[str(y[x].dims[0])] < FEWEST_POINTS:
+        return None
+    try:
+        found = fit_two_laws(y, x, window, confidence=confidence)
+    except SweepError:  # the window leaves too few points
+        return None
+    return found if bool((found.regimes == 2).any()) else None
+
+
+def laws_text(found: Laws) -> str:
+    """The laws as people read them."""
+    texts = [_table(f"{found.y} ~ {found.x}^p", _heading(found.fits[0]), found.fits, _fit_cells)]
+    if found.bend is not None:
+        heading = (*_dims(found.bend, "law"), "p low", "interval", "p high", "interval", found.x, "interval", "bend")
+        texts.append(_table("two laws with a smooth bend", heading, [found.bend], _bend_cells))
+    if found.meeting is not None:
+        heading = (*_dims(found.meeting), found.x, "", found.y)
+        texts.append(_table("the two laws meet", heading, [found.meeting], _meeting_cells))
+    return page(*texts, columns([(EXPLANATION.format(confidence=100 * found.confidence),)], indent=""))
+
+
+def write_laws(found: Laws, path: Path) -> None:
+    """The laws as csv: a row for each line and window; of two laws a row each. Raises SweepError."""
+    rows = [row for fit in found.fits for row in _table_rows(fit, "one")]
+    if found.bend is not None:
+        rows += [row for law in ("low", "high") for row in _table_rows(found.bend.sel(law=law), law)]
+    if found.meeting is not None:
+        rows += list(_table_rows(found.meeting, "meeting"))
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    try:
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, names, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
+    except OSError as error:
+        raise SweepError(f"{path} cannot be written: {error.strerror}") from None
+
+
+def _table_rows(fit: xr.Dataset, law: str) -> Iterator[dict[str, Any]]:
+    for labels, point in _points(fit):
+        start = {"y": fit.attrs["y"], "x": fit.attrs["x"], "law": law, **dict(zip(_dims(fit), labels, strict=True))}
+        yield start | {str(name): variable.item() for name, variable in point.data_vars.items()}
 
 
 def _positions(coordinate: xr.DataArray, value: str, choice: str) -> Any:
@@ -92,26 +157,33 @@ def _positions(coordinate: xr.DataArray, value: str, choice: str) -> Any:
     return found
 
 
-def _dims(dataset: xr.Dataset) -> list[str]:
-    return [str(dim) for dim in dataset.sizes]
+def _dims(dataset: xr.Dataset, *without: str) -> list[str]:
+    return [str(dim) for dim in dataset.sizes if dim not in without]
 
 
 def _heading(fit: xr.Dataset) -> tuple[str, ...]:
-    return (*_dims(fit), "window", "p", "", "points", "drift", "residual", "law")
+    return (
+        *_dims(fit),
+        "window",
+        "p",
+        "interval",
+        "points",
+        "drift",
+        "residual",
+        f"{fit.attrs['y']} at {fit.attrs['x']} = 1",
+    )
 
 
-def _rows(datasets: Sequence[xr.Dataset], cells: Any) -> Iterator[tuple[str, ...]]:
+def _table(title: str, heading: Sequence[str], datasets: Sequence[xr.Dataset], cells: Any) -> str:
     """A line for each point of each Dataset, at most `MOST_ROWS` of them."""
-    points = [point for dataset in datasets for point in _points(dataset)]
-    for labels, point in points[:MOST_ROWS]:
-        yield (*labels, *cells(point))
-    if len(points) > MOST_ROWS:
-        width = len(points[0][0]) + len(cells(points[0][1]))
-        yield (*[""] * (width - 1), f"and {len(points) - MOST_ROWS} more; choose with --at axis=value")
+    points = [point for dataset in datasets for point in _points(dataset, "law")]
+    rows = [(*labels, *cells(point)) for labels, point in points[:MOST_ROWS]]
+    more = f"\n  and {len(points) - MOST_ROWS} more; choose with --at axis=value" * (len(points) > MOST_ROWS)
+    return f"{title}\n{columns([heading, *rows])}{more}"
 
 
-def _points(dataset: xr.Dataset) -> Iterator[tuple[list[str], xr.Dataset]]:
-    dims = _dims(dataset)
+def _points(dataset: xr.Dataset, *without: str) -> Iterator[tuple[list[str], xr.Dataset]]:
+    dims = _dims(dataset, *without)
     for position in itertools.product(*(range(dataset.sizes[dim]) for dim in dims)):
         point = dataset.isel(dict(zip(dims, position, strict=True)))
         yield (
@@ -129,16 +201,37 @@ def _label(value: Any) -> str:
 
 def _fit_cells(fit: xr.Dataset) -> tuple[str, ...]:
     v = {str(name): variable.item() for name, variable in fit.data_vars.items()}
-    law = f"{fit.attrs['y']} = {v['prefactor']:.6g} {fit.attrs['x']}^{v['exponent']:.6g}"
     return (
         f"{v['low']:.4g} to {v['high']:.4g}",
         f"{v['exponent']:.8g}",
-        f"+- {v['exponent_error']:.1e}",
+        _interval(v["exponent_low"], v["exponent_high"]),
         f"{v['points']}",
         f"{v['drift']:.1e}",
         f"{v['residual']:.1e}",
-        law,
+        f"{v['prefactor']:.6g}",
     )
+
+
+def _interval(low: float, high: float) -> str:
+    """Both ends, with as many digits as tell them apart, and two more."""
+    apart = abs(high - low)
+    digits = (
+        8 if not math.isfinite(apart) or apart == 0 else 2 - math.floor(math.log10(apart / max(abs(low), abs(high))))
+    )
+    digits = max(3, min(digits, 15))
+    return f"{low:.{digits}g} to {high:.{digits}g}"
+
+
+def _bend_cells(bend: xr.Dataset) -> tuple[str, ...]:
+    cells = []
+    for law in ("low", "high"):
+        one = bend.sel(law=law)
+        cells += [f"{one.exponent.item():.6g}", _interval(one.exponent_low.item(), one.exponent_high.item())]
+    place = _interval(bend.crossover_low.item(), bend.crossover_high.item())
+    told = f"{bend.width.item():.2g} decades wide, residual {bend.residual.item():.1e}"
+    if bend.regimes.item() == 1:
+        told += "; one law does as well"
+    return *cells, f"{bend.crossover.item():.6g}", place, told
 
 
 def _meeting_cells(meeting: xr.Dataset) -> tuple[str, ...]:

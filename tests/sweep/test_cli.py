@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from toy_studies import HEAD
 
@@ -227,6 +228,16 @@ def test_show_tells_how_much_of_a_sweep_is_done(here, call):
 
 
 # fit, plot, export
+
+
+def test_fit_writes_its_table(done, call):
+    code, out, _ = call("fit", "stones.h5", "--y", "fall_time", "--x", "height", "--at", "v0=0", "-o", "laws.csv")
+    assert (code, out.splitlines()[-1]) == (0, "laws.csv")
+    table = pd.read_csv("laws.csv")
+    assert table.law.tolist() == ["one"]
+    assert table.exponent[0] == pytest.approx(0.5, abs=1e-12)
+    assert table.exponent_low[0] <= 0.5 <= table.exponent_high[0]
+    assert call("fit", "stones.h5", "--y", "fall_time", "--x", "height", "--confidence", "95")[0] == 2
 
 
 def test_fit_tells_the_exponent(done, call):

@@ -7,7 +7,7 @@ from toy_studies import build
 import sweep
 from kernels.interface import Status
 from sweep import report
-from sweep.fitting import fit_text, pick
+from sweep.fitting import laws, laws_text, pick
 from sweep.report import result_text, summary_text
 
 
@@ -95,5 +95,5 @@ def test_a_word_is_picked_as_it_is_written():
 
 def test_a_long_table_of_fits_is_cut_and_says_so():
     axes = {"height": [1.0, 2.0, 4.0, 8.0], "v0": np.linspace(0, 1, 50)}
-    text = fit_text(sweep.run(build(axes=axes), progress=False), "fall_time", "height", [])
+    text = laws_text(laws(sweep.run(build(axes=axes), progress=False), "fall_time", "height"))
     assert "and 10 more; choose with --at axis=value" in text
