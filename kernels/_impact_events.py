@@ -8,6 +8,8 @@ A cycle lasts until the next tooth, or, should more than one pass in it, one swi
 
 import math
 
+import numpy as np
+
 from kernels import _impact_swing as swing
 from kernels._impact_repeat import chain, distance, errors, invert, multiplier, newton
 from kernels._impact_scene import bend
@@ -125,13 +127,15 @@ def _left_behind(start, cycle):
 
 
 @jit
-def _answer(tally, n, half, pace):
-    """The cycle as in `_impact_scene`, the middle of the swing, the share of time in contact, and impacts."""
+def _answer(tally, n, halves, pace, e):
+    """The cycle as in `_impact_scene`, the middle of the swing, the share of time in contact, and impacts, from the
+    tally of n half swings that are so many half periods."""
     beats = tally[swing.BEATS]
     rim, pallet = (tally[swing.RIM] / beats, tally[swing.PALLET] / beats) if beats > 0.0 else (math.nan, math.nan)
-    impacts = tally[swing.IMPACTS] * half / tally[swing.TIME]
-    cycle = half, tally[swing.DIPS] / n, rim, pallet, pace, tally[swing.RECOIL]
+    endless = e > 0.0 and tally[swing.TRAINS] > 0.0
+    impacts = math.inf if endless else tally[swing.IMPACTS] / halves
     offset = magnitude(tally[swing.LEAN]) / n if n % 2 == 0 else 0.0
+    cycle = tally[swing.TIME] / halves, tally[swing.DIPS] / n, rim, pallet, pace, tally[swing.RECOIL]
     return cycle, offset, tally[swing.HELD] / tally[swing.TIME], impacts
 
 
@@ -162,9 +166,8 @@ def _judged(scene, start, k, work, rtol):
     invert(chained, inverse)
     rest = image[0] - start[0], image[1] - start[1], image[2] - start[2]
     half_swings, teeth, cycles = _cycles(k, tally[swing.WAY])
-    half = 0.5 * tally[swing.TIME] * half_swings / (k * cycles)
     modulus, blur = multiplier(chained)
-    answer = _answer(tally, k, half, modulus ** (1.0 / k))
+    answer = _answer(tally, k, 2.0 * cycles * k / half_swings, modulus ** (1.0 / k), scene[3])
     _, travel, rim, pallet, _, _ = answer[0]
     rounding = _ROUNDING * (2.0 + tally[swing.EVENTS] / k) * (1.0 + travel)
     gap, V, w, late = errors(start, rest, inverse, chained, rounding, tally[swing.TIME])
@@ -203,4 +206,12 @@ def attractor(scene, rtol, total, work, history):
             start, kicks = _left_behind(start, cycle), kicks + 1
     half_swings = HALF_SWINGS // 2
     cycles = max(min(total[swing.WAY], 0.5 * half_swings), 1.0)
-    return _answer(total, half_swings, 0.5 * total[swing.TIME] / cycles, math.nan), _NOT_PERIODIC
+    return _answer(total, half_swings, 2.0 * cycles, math.nan, scene[3]), _NOT_PERIODIC
+
+
+@jit
+def settled(scene, rtol):
+    """`attractor` of a scene of `_impact_scene`, in one row."""
+    work = np.empty(swing.TALLIES), np.empty((5, 3)), np.empty((4, 3)), np.empty((3, 3))
+    answer, status = attractor(plain_scene(scene), rtol, np.empty(swing.TALLIES), work, np.empty((BLOCK + 1, 3)))
+    return answer[0], answer[1], answer[2], answer[3], status

@@ -29,8 +29,9 @@ def distance(start, other):
 @jit_call
 def chain(scene, start, k, tally, slopes, chained):
     """The start after k half swings; `chained` becomes its changes (gap, V, w) and that of the time by `start`."""
-    chained[:, :] = 0.0
-    chained[0, 0] = chained[1, 1] = chained[2, 2] = 1.0
+    for j in range(3):
+        chained[0, j], chained[1, j], chained[2, j], chained[3, j] = 0.0, 0.0, 0.0, 0.0
+        chained[j, j] = 1.0
     for _ in range(k):
         start, verdict = half_swing(scene, start, tally, slopes, True)
         if verdict != DONE:

@@ -114,6 +114,12 @@ def dimensional(units, cycle):
 
 
 @jit
+def length(units, x):
+    """A length without dimensions in metres."""
+    return scale(units[2] * x, units[3])
+
+
+@jit
 def _normal_or_none(x, result):
     """Whether a result is a normal number where what it comes from is not 0."""
     return isnt(magnitude(x) > 0.0) | is_normal(magnitude(result))

@@ -49,7 +49,8 @@ TALLIES = 17
 @jit
 def clear(tally):
     """A tally of nothing."""
-    tally[:] = 0.0
+    for i in range(TALLIES):
+        tally[i] = 0.0
     tally[MARGIN] = math.inf
 
 
@@ -222,8 +223,9 @@ def _begun(scene, start, tally, slopes, follows):
     tally[DIP] = -scene[2]
     tally[STRUCK] = 0.0
     if follows:
-        slopes[:, :] = 0.0
-        slopes[0, 0] = slopes[2, 1] = slopes[3, 2] = 1.0
+        for j in range(3):
+            slopes[0, j], slopes[1, j], slopes[2, j], slopes[3, j], slopes[4, j] = 0.0, 0.0, 0.0, 0.0, 0.0
+        slopes[0, 0], slopes[2, 1], slopes[3, 2] = 1.0, 1.0, 1.0
     return gap, 0.0, -scene[2], V, w, False
 
 
