@@ -1,0 +1,153 @@
+"""Drivetrain: how far one inertia turns for a torque at another, against frequency.
+
+A chain of n inertias, J_1 -k_1- J_2 - ... - J_n -k_n- ground, each spring with a damper h_j beside it. For a torque
+exp(i w t) at `drive_mass` the angle at `read_mass` is H exp(i w t), with
+    (-w^2 J + i w h + k) H = unit torque,  w = 2 pi frequency,                                          (1)
+J diagonal, k and h tridiagonal. The answer to a torque of any size is that times H. k_n = 0 leaves the end free.
+Leaves out: backlash, solid friction, damping that is not viscous. Source: the drivetrain of a milling machine after
+Rivin; how (1) is solved, and the bound by which a cell is called INACCURATE, is told in `_chain_frf`.
+
+An undamped resonance, or 0 Hz without a spring to ground, is OUT_OF_RANGE: there H is infinite.
+"""
+
+import math
+
+import numpy as np
+
+from kernels import _chain_frf
+from kernels._chain import refusal as chain_refusal
+from kernels._columns import entry, one_by_one
+from kernels._groups import GROUP, cells_at
+from kernels._jit import jit, jit_call
+from kernels._lanes import exponent, fma, magnitude, sqrt, where
+from kernels._vecmath import arctan, is_normal, log, scale
+from kernels.interface import Field, Kernel, Method, Status
+
+_OK, _INACCURATE = float(Status.OK), float(Status.INACCURATE)
+_BAD_INPUT, _OUT_OF_RANGE = float(Status.BAD_INPUT), float(Status.OUT_OF_RANGE)
+_TWO_PI, _DB = 2.0 * math.pi, 20.0 / math.log(10.0)
+
+
+@jit
+def row_at(j):
+    """Where the j-th row of a buffer of a group begins."""
+    return cells_at(j * GROUP)
+
+
+@jit_call
+def modulus(re, im):
+    """abs(re + i im), also where a square would leave the range."""
+    size = magnitude(re) + magnitude(im)
+    e = exponent(where(is_normal(size), size, 1.0))
+    x, y = scale(re, -e), scale(im, -e)
+    return scale(sqrt(fma(x, x, y * y)), e)
+
+
+@jit_call
+def argument(re, im):
+    """The angle of re + i im in [-pi, pi), for re + i im not 0."""
+    steep = magnitude(im) > magnitude(re)
+    low, high = where(steep, re, im), where(steep, im, re)
+    angle = arctan(low / where(magnitude(high) > 0.0, high, 1.0))
+    turned = where(im < 0.0, -0.5 * math.pi, 0.5 * math.pi) - angle
+    flat = where(re < 0.0, where(im > 0.0, angle + math.pi, angle - math.pi), angle)
+    return where(steep, turned, flat)
+
+
+@jit_call
+def _write(i, j, lanes, values, output, rows):
+    """output[i, j ...] = values of the lanes that are frequencies."""
+    rows[row_at(0)] = values
+    for lane in range(lanes):
+        output[i, j + lane] = rows[lane]
+
+
+@jit_call
+def _group(i, j, J, k, h, drive, read, frequency, outputs, rows):
+    """Outputs at frequencies j ... j + GROUP - 1 of a cell; the largest error of them, inf where there is none."""
+    n, lanes = J.shape[1], min(GROUP, frequency.size - j)
+    for lane in range(GROUP):
+        rows[lane] = frequency[min(j + lane, frequency.size - 1)]
+    omega = rows[row_at(0)] * _TWO_PI
+    re, im, error = _chain_frf.receptance(n, J[i], k[i], h[i], omega, drive, read, row_at, rows)
+    amplitude = modulus(re, im)
+    sound = is_normal(amplitude)
+    _write(i, j, lanes, re, outputs[0], rows)
+    _write(i, j, lanes, im, outputs[1], rows)
+    _write(i, j, lanes, amplitude, outputs[2], rows)
+    _write(i, j, lanes, argument(re, im), outputs[3], rows)
+    _write(i, j, lanes, _DB * log(where(sound, amplitude, 1.0)), outputs[4], rows)
+    rows[row_at(0)] = where(sound, error, math.inf)
+    largest = 0.0
+    for lane in range(lanes):
+        largest = max(largest, rows[lane])
+    return largest
+
+
+@jit
+def _cell(i, J, k, h, drive, read, rtol, frequency, re, im, amplitude, phase, decibel, status, rows):
+    outputs, error = (re, im, amplitude, phase, decibel), 0.0
+    for j in range(0, frequency.size, GROUP):
+        error = max(error, _group(i, j, J, k, h, int(drive[i]), int(read[i]), frequency, outputs, rows))
+    status[i] = where(error <= rtol[i], _OK, where(error < math.inf, _INACCURATE, _OUT_OF_RANGE))
+
+
+@entry("frequency")
+def continued(
+    J, k, h, drive_mass, read_mass, rtol, frequency,
+    receptance_re, receptance_im, amplitude, phase, amplitude_dB, status,
+):  # fmt: skip
+    """Both ends followed to the inertia that is turned, GROUP frequencies at a time: they share their chain."""
+    rows = np.empty(3 * J.shape[1] * GROUP)
+    outputs = receptance_re, receptance_im, amplitude, phase, amplitude_dB
+    one_by_one(_cell, (J, k, h, drive_mass, read_mass, rtol, frequency, *outputs, status, rows))
+
+
+@jit
+def _names_a_mass(number, n):
+    return (number >= 1.0) & (number <= n) & (number == math.floor(number))
+
+
+@jit
+def _check(i, J, k, h, drive, read, status):
+    n = J.shape[1]
+    sound = _names_a_mass(drive[i], n) & _names_a_mass(read[i], n)
+    status[i] = where(sound, chain_refusal(n, J[i], k[i], h[i]), _BAD_INPUT)
+
+
+@entry()
+def check(J, k, h, drive_mass, read_mass, status):
+    """BAD_INPUT: an inertia or a spring that is not positive (the last spring may be 0), a negative damper, no such mass.
+
+    OUT_OF_RANGE: inertias, or springs, more than 2^300 apart.
+    """
+    one_by_one(_check, (J, k, h, drive_mass, read_mass, status))
+
+
+PARAMETERS = (
+    Field("J", "kg m^2", "inertias, from the free end on", lower=0.0, open_lower=True, dims=("mass",)),
+    Field("k", "N m/rad", "springs behind each inertia; the last one to ground, 0 for none", lower=0.0, dims=("mass",)),
+    Field("h", "N m s/rad", "dampers beside the springs", lower=0.0, dims=("mass",)),
+)
+
+DRIVETRAIN_FRF = Kernel(
+    name="drivetrain_frf",
+    doc="angle of one inertia of a drivetrain per torque at another, against frequency",
+    source="drivetrain of a milling machine after Rivin; solution and error bound derived in kernels/_chain_frf.py",
+    parameters=(
+        *PARAMETERS,
+        Field("drive_mass", "1", "number of the inertia with the torque", 1.0, lower=1.0, upper=64.0, integer=True),
+        Field("read_mass", "1", "number of the inertia whose angle is told", "drive_mass", 1.0, 64.0, integer=True),
+    ),
+    outputs=(
+        Field("receptance_re", "rad/(N m)", "receptance, real part", dims=("frequency",)),
+        Field("receptance_im", "rad/(N m)", "receptance, imaginary part", dims=("frequency",)),
+        Field("amplitude", "rad/(N m)", "modulus of the receptance", dims=("frequency",)),
+        Field("phase", "rad", "angle of the receptance, in [-pi, pi): negative where it lags", dims=("frequency",)),
+        Field("amplitude_dB", "1", "amplitude over 1 rad/(N m), in decibel", dims=("frequency",)),
+    ),
+    check=check,
+    methods=(Method("continued", "the chain followed from both ends at each frequency", continued),),
+    along=(Field("frequency", "Hz", "frequency of the torque", lower=0.0),),
+    example={"J": 1.0, "k": 1.0e4, "h": 1.0},
+)
