@@ -13,6 +13,7 @@ Source: (2) is the Green's function of a three-term recurrence; bound derived he
 
 import math
 
+from kernels import _complex
 from kernels._chain import extremes, same, units
 from kernels._jit import jit, jit_call
 from kernels._lanes import choose, exponent, fma, magnitude, some, where
@@ -26,31 +27,6 @@ _FAR = 2.0**100
 
 
 @jit
-def _square(z):
-    """Squared modulus."""
-    return fma(z[0], z[0], z[1] * z[1])
-
-
-@jit
-def _product(y, z):
-    """Product of two complex numbers."""
-    return fma(y[0], z[0], -(y[1] * z[1])), fma(y[0], z[1], y[1] * z[0])
-
-
-@jit
-def _over(y, z):
-    """Quotient of two complex numbers, z between 1e-150 and 1e150."""
-    inverse = 1.0 / _square(z)
-    return _product(y, (z[0] * inverse, -z[1] * inverse))
-
-
-@jit_call
-def _scaled(z, n):
-    """z 2^n."""
-    return scale(z[0], n), scale(z[1], n)
-
-
-@jit
 def _renormed(way):
     """A way, its numbers over a power of two where they leave the middle of the range; exact."""
     x, g, e, work = way
@@ -58,15 +34,9 @@ def _renormed(way):
     off = (size > _FAR) | (size < 1.0 / _FAR)
     if some(off):
         own = where(off, exponent(where(size > 0.0, size, 1.0)), 0.0)
-        x, g = _scaled(x, -own), _scaled(g, -own)
+        x, g = _complex.scaled(x, -own), _complex.scaled(g, -own)
         e, work = e + own, scale(work, -2.0 * own)
     return x, g, e, work
-
-
-@jit
-def _size(z):
-    """Modulus, or up to sqrt 2 more."""
-    return magnitude(z[0]) + magnitude(z[1])
 
 
 @jit
@@ -79,10 +49,10 @@ def _turned(x, g, inertia):
 def _on(way, inertia, spring):
     """The way across an inertia and a spring: x, g, their exponent, and the sum of (3) so far, without W."""
     x, g, e, work = way
-    work = fma(inertia, _square(x), work)
+    work = fma(inertia, _complex.square(x), work)
     g = _turned(x, g, inertia)
-    wound = _over(g, spring)
-    return _renormed(((x[0] + wound[0], x[1] + wound[1]), g, e, fma(_size(g), _size(wound), work)))
+    wound = _complex.over(g, spring)
+    return _renormed(((x[0] + wound[0], x[1] + wound[1]), g, e, fma(_complex.size(g), _complex.size(wound), work)))
 
 
 @jit
@@ -103,8 +73,8 @@ def _from_left(p, q, chain, w, n, at, rows):
         if j == p:
             first = way
         if j >= p:
-            rows[at(j)], rows[at(2 * n + j)] = _size(way[0]), way[2]
-            rows[at(n + j)] = _size(_turned(way[0], way[1], inertia))
+            rows[at(j)], rows[at(2 * n + j)] = _complex.size(way[0]), way[2]
+            rows[at(n + j)] = _complex.size(_turned(way[0], way[1], inertia))
         if j < q:
             way = _on(way, inertia, spring)
     return first, way
@@ -115,7 +85,7 @@ def _from_right(q, chain, w, n):
     """The way as it comes to q."""
     zero = 0.0 * w
     _, spring = _element(n - 1, chain, w)
-    way = (zero + 1.0, zero), spring, zero, _size(spring)
+    way = (zero + 1.0, zero), spring, zero, _complex.size(spring)
     for j in range(n - 1, q, -1):
         way = _on(way, _element(j, chain, w)[0], _element(j - 1, chain, w)[1])
     return way
@@ -127,10 +97,10 @@ def _between(p, q, way, e_W, chain, w, n, at, rows):
     total = 0.0 * w
     for j in range(q, p - 1, -1):
         inertia, _ = _element(j, chain, w)
-        total = total + scale(inertia * rows[at(j)] * _size(way[0]), rows[at(2 * n + j)] + way[2] - e_W)
+        total = total + scale(inertia * rows[at(j)] * _complex.size(way[0]), rows[at(2 * n + j)] + way[2] - e_W)
         if j > p:
             _, spring = _element(j - 1, chain, w)
-            wound = _size(_over(_turned(way[0], way[1], inertia), spring))
+            wound = _complex.size(_complex.over(_turned(way[0], way[1], inertia), spring))
             total = total + scale(rows[at(n + j - 1)] * wound, rows[at(2 * n + j - 1)] + way[2] - e_W)
             way = _on(way, inertia, spring)
     return total, way
@@ -139,8 +109,8 @@ def _between(p, q, way, e_W, chain, w, n, at, rows):
 @jit
 def _net(left, right, inertia):
     """W of (2)."""
-    one, other = _product(left[1], right[0]), _product(right[1], left[0])
-    third = _product(left[0], right[0])
+    one, other = _complex.product(left[1], right[0]), _complex.product(right[1], left[0])
+    third = _complex.product(left[0], right[0])
     return fma(-inertia, third[0], one[0] + other[0]), fma(-inertia, third[1], one[1] + other[1])
 
 
@@ -159,15 +129,15 @@ def receptance(n, J, k, h, omega, drive, read, at, rows):
     right = _from_right(q, chain, w, n)
     inertia, _ = _element(q, chain, w)
     net = _net(left, right, inertia)
-    own = exponent(where(_size(net) > 0.0, _size(net), 1.0))
-    ratio = _over(_product(near[0], right[0]), _scaled(net, -own))
+    own = exponent(where(_complex.size(net) > 0.0, _complex.size(net), 1.0))
+    ratio = _complex.over(_complex.product(near[0], right[0]), _complex.scaled(net, -own))
     e_W = left[2] + right[2]
     total, far = _between(p, q, right, e_W, chain, w, n, at, rows)
-    outer = near[3] * (_size(far[0]) / _size(near[0]))
+    outer = near[3] * (_complex.size(far[0]) / _complex.size(near[0]))
     total = total + scale(outer, near[2] + far[2] - e_W)
-    total = total + right[3] * (_size(left[0]) / _size(right[0]))
-    error = ROUNDING * (1.0 + total / _size(net))
+    total = total + right[3] * (_complex.size(left[0]) / _complex.size(right[0]))
+    error = ROUNDING * (1.0 + total / _complex.size(net))
     sound = sound & (w < REACH) & (w * scale(extremes(n, same, h)[1], -0.5 * (e_J + e_k)) < REACH)
     shift = near[2] - left[2] - e_k - own
-    re, im = choose(sound, _scaled(ratio, shift), (math.nan * w, math.nan * w))
+    re, im = choose(sound, _complex.scaled(ratio, shift), (math.nan * w, math.nan * w))
     return re, im, where(sound & (error < math.inf), error, math.inf)

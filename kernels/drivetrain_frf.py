@@ -117,18 +117,28 @@ def _check(i, J, k, h, drive, read, status):
 
 @entry()
 def check(J, k, h, drive_mass, read_mass, status):
-    """BAD_INPUT: an inertia or a spring that is not positive (the last spring may be 0), a negative damper, no such mass.
+    """BAD_INPUT where an inertia or spring is not positive (the last spring may be 0), a damper negative, no such mass.
 
-    OUT_OF_RANGE: inertias, or springs, more than 2^300 apart.
+    OUT_OF_RANGE where inertias, or springs, are more than 2^300 apart.
     """
     one_by_one(_check, (J, k, h, drive_mass, read_mass, status))
 
 
 PARAMETERS = (
     Field("J", "kg m^2", "inertias, from the free end on", lower=0.0, open_lower=True, dims=("mass",)),
-    Field("k", "N m/rad", "springs behind each inertia; the last one to ground, 0 for none", lower=0.0, dims=("mass",)),
+    Field(
+        "k", "N m/rad", "springs behind each inertia; only the last one, to ground, may also be 0",
+        lower=0.0, open_lower=True, dims=("mass",),
+    ),
     Field("h", "N m s/rad", "dampers beside the springs", lower=0.0, dims=("mass",)),
-)
+)  # fmt: skip
+
+MILLING_MACHINE = {
+    "J": (0.2520, 0.01226, 0.002785, 0.007541, 0.01422, 0.06374, 0.9414, 0.9752),
+    "k": (73844.0, 37167.0, 8228.0, 13455.0, 39325.0, 27459.0, 51485.0, 11690.0),
+    "h": (1.765, 0.4119, 0.1863, 0.3628, 0.9561, 1.834, 7.061, 127.5),
+}
+"""Main drive of a milling machine, spindle first (Baran & Marchelek, Mech. Teor. Stos. 9:201 (1971), table 1, in SI)."""
 
 DRIVETRAIN_FRF = Kernel(
     name="drivetrain_frf",
@@ -149,5 +159,5 @@ DRIVETRAIN_FRF = Kernel(
     check=check,
     methods=(Method("continued", "the chain followed from both ends at each frequency", continued),),
     along=(Field("frequency", "Hz", "frequency of the torque", lower=0.0),),
-    example={"J": 1.0, "k": 1.0e4, "h": 1.0},
+    example=MILLING_MACHINE,
 )
