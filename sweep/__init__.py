@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from sweep.regimes import fit_two_laws as fit_two_laws
     from sweep.result import open_result as open_result
     from sweep.runner import run as run
+    from sweep.scaling import collapse_quality as collapse_quality
+    from sweep.scaling import rescaled as rescaled
+    from sweep.scaling import scaling as scaling
     from sweep.spec import build_study as build_study
     from sweep.spec import read_study as read_study
 
@@ -37,6 +40,9 @@ _HOMES = {
     "fit_two_laws": "regimes",
     "where_exponent": "analysis",
     "where_value": "analysis",
+    "scaling": "scaling",
+    "rescaled": "scaling",
+    "collapse_quality": "scaling",
     "plot": "charts",
     "in_units": "customary",
     "export": "exporting",

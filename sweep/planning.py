@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -45,6 +45,8 @@ class Plan:
         On one core; and altogether, without the time of the disk.
     methods, statuses : dict of str to float
         Shares of the sampled cells.
+    scaling : str
+        Which axes are superfluous, since they change nothing but the units; "" where none is.
     """
 
     title: str
@@ -64,6 +66,7 @@ class Plan:
     seconds: float
     methods: dict[str, float] = field(default_factory=dict)
     statuses: dict[str, float] = field(default_factory=dict)
+    scaling: str = ""
 
     @property
     def warnings(self) -> list[str]:
@@ -91,6 +94,7 @@ class Plan:
             f"{small_duration(self.cell_seconds)} a cell, plus writing",
             "methods": _shares(self.methods),
             "statuses": _shares(self.statuses),
+            "scaling": self.scaling,
         }
         lines = [self.title] if self.title else []
         lines += [f"  {name:9} {text}" for name, text in rows.items() if text]
@@ -112,6 +116,7 @@ def plan(study: Study, workers: int | None = None, path: str | os.PathLike[str] 
     SweepError
         The folder of the output is not there.
     """
+    from sweep.scaling import scaling
     from sweep.solve import Solver
 
     crew = cores() if workers is None else whole_number("workers", workers)
@@ -123,7 +128,8 @@ def plan(study: Study, workers: int | None = None, path: str | os.PathLike[str] 
         solver = Solver(study)
         solver.warm()
         sample = take_sample(solver, content.columns, content.grid.size)
-    return _forecast(study, content, sample, crew, folder)
+        advice = scaling(study).advice
+    return replace(_forecast(study, content, sample, crew, folder), scaling=advice)
 
 
 def _forecast(study: Study, content: Layout, sample: Sample, workers: int, folder: Path) -> Plan:

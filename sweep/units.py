@@ -8,6 +8,7 @@ from __future__ import annotations
 import difflib
 import re
 from decimal import Decimal
+from fractions import Fraction
 from functools import cache
 from typing import Any
 
@@ -79,6 +80,11 @@ def scale(text: str, wanted: str, name: str) -> Decimal | None:
         _, example = DIMENSIONS.get(wanted, ("", f'"{wanted}"'))
         raise UnitMistake(f'"{text}" is {_describe(text)}; {name} is {_describe(wanted)}, e.g. {example}')
     return factor / wanted_factor
+
+
+def exponents(text: str) -> dict[str, Fraction]:
+    """Powers of the base units in a unit, radian among them: {"radian": 1, "second": -2}. Raises UnitMistake."""
+    return {base: Fraction(str(power)).limit_denominator(1000) for base, power in _root(text)[1].items()}
 
 
 def _describe(text: str) -> str:
