@@ -44,31 +44,32 @@ def _follow(n, J, k, e_J, e_k, square, step, ways):
 
 
 @jit_call
-def _joint(n, J, e_J, ways):
-    """The inertia r at which J x(left) x(right) is largest."""
-    best, top, power = 0, 0.0, 0.0
-    for j in range(n):
-        size = magnitude(ways[j] * ways[3 * n + j]) * scale(J[j], -e_J)
-        e = ways[2 * n + j] + ways[5 * n + j]
-        if size > 0.0 and (not top > 0.0 or size > scale(top, power - e)):
-            best, top, power = j, size, e
-    return best
-
-
-@jit_call
-def _join(n, J, e_J, square, ways, shape, j):
-    """The shape into column j, 1 at the joint in size; its sum J x^2, and what is missing in w^2, without units."""
+def _join(n, J, e_J, square, ways):
+    """The shape into the first n of `ways`, 1 at the joint in size; its sum J x^2, and what is missing in w^2."""
     r = _joint(n, J, e_J, ways)
     missing = ways[n + r] / ways[r] + ways[4 * n + r] / ways[3 * n + r] - square * scale(J[r], -e_J)
     side = 1.0 if ways[r] > 0.0 else -1.0
-    total = 0.0
-    for i in range(n):
-        offset = 0 if i <= r else 3 * n
-        x = ways[offset + i] / ways[offset + r] * side
-        x = scale(x, ways[offset + 2 * n + i] - ways[offset + 2 * n + r])
-        shape[i, j] = x
-        total = fma(scale(J[i], -e_J) * x, x, total)
+    left, right, total = ways[r], ways[3 * n + r], 0.0
+    for j in range(n):
+        x = ways[j] / left if j <= r else ways[3 * n + j] / right
+        offset = 2 * n if j <= r else 5 * n
+        x = scale(x * side, ways[offset + j] - ways[offset + r])
+        ways[j] = x
+        total = fma(scale(J[j], -e_J) * x, x, total)
     return total, missing / total
+
+
+@jit
+def follow_mode(n, J, k, e_J, e_k, frequency, work):
+    """Puts the shape at a natural frequency, 1 at some inertia in size, into `work`; its sum J x^2, without units."""
+    root = scale(frequency * _TWO_PI, -0.5 * (e_k - e_J)) if frequency > 0.0 else 0.0
+    square, total = root * root, 0.0
+    for _ in range(PASSES):
+        _follow(n, J, k, e_J, e_k, square, 1, work)
+        _follow(n, J, k, e_J, e_k, square, -1, work)
+        total, less = _join(n, J, e_J, square, work)
+        square = square + less if frequency > 0.0 else 0.0
+    return total
 
 
 @jit_call
@@ -79,14 +80,8 @@ def mode_shapes(n, J, k, frequency, shape, work):
     """
     e_J, e_k, sound = units(n, same, J, k)
     for j in range(n):
-        root = scale(frequency[j] * _TWO_PI, -0.5 * (e_k - e_J)) if frequency[j] > 0.0 else 0.0
-        square, total = root * root, 0.0
-        for _ in range(PASSES):
-            _follow(n, J, k, e_J, e_k, square, 1, work)
-            _follow(n, J, k, e_J, e_k, square, -1, work)
-            total, less = _join(n, J, e_J, square, work, shape, j)
-            square = square + less if frequency[j] > 0.0 else 0.0
+        total = follow_mode(n, J, k, e_J, e_k, frequency[j], work)
         sound = sound & is_normal(total)
         for i in range(n):
-            shape[i, j] = scale(shape[i, j] / sqrt(total), -0.5 * e_J)
+            shape[i, j] = scale(work[i] / sqrt(total), -0.5 * e_J)
     return _OK if sound else _OUT_OF_RANGE

@@ -19,7 +19,7 @@ from kernels._chain import refusal as chain_refusal
 from kernels._columns import entry, one_by_one
 from kernels._groups import GROUP, cells_at
 from kernels._jit import jit, jit_call
-from kernels._lanes import exponent, fma, magnitude, sqrt, where
+from kernels._lanes import exponent, fma, magnitude, nearest, sqrt, where
 from kernels._vecmath import arctan, is_normal, log, scale
 from kernels.interface import Field, Kernel, Method, Status
 
@@ -105,7 +105,7 @@ def continued(
 
 @jit
 def _names_a_mass(number, n):
-    return (number >= 1.0) & (number <= n) & (number == math.floor(number))
+    return (number >= 1.0) & (number <= n) & (number == nearest(number))
 
 
 @jit
@@ -138,7 +138,7 @@ MILLING_MACHINE = {
     "k": (73844.0, 37167.0, 8228.0, 13455.0, 39325.0, 27459.0, 51485.0, 11690.0),
     "h": (1.765, 0.4119, 0.1863, 0.3628, 0.9561, 1.834, 7.061, 127.5),
 }
-"""Main drive of a milling machine, spindle first (Baran & Marchelek, Mech. Teor. Stos. 9:201 (1971), table 1, in SI)."""
+"""Drive of a milling machine, spindle first (Baran & Marchelek, Mech. Teor. Stos. 9:201 (1971), table 1, in SI)."""
 
 DRIVETRAIN_FRF = Kernel(
     name="drivetrain_frf",
