@@ -44,6 +44,18 @@ def _follow(n, J, k, e_J, e_k, square, step, ways):
 
 
 @jit_call
+def _joint(n, J, e_J, ways):
+    """The inertia r at which J x(left) x(right) is largest."""
+    best, top, power = 0, 0.0, 0.0
+    for j in range(n):
+        size = magnitude(ways[j] * ways[3 * n + j]) * scale(J[j], -e_J)
+        e = ways[2 * n + j] + ways[5 * n + j]
+        if size > 0.0 and (not top > 0.0 or size > scale(top, power - e)):
+            best, top, power = j, size, e
+    return best
+
+
+@jit_call
 def _join(n, J, e_J, square, ways):
     """The shape into the first n of `ways`, 1 at the joint in size; its sum J x^2, and what is missing in w^2."""
     r = _joint(n, J, e_J, ways)
