@@ -97,15 +97,16 @@ def stability(scene, nu):
     """The least share by which (4), (5) and (6) hold; negative where disturbances grow."""
     wheel, pallet, kappa, _, _, e, _ = scene
     d = _excess(scene)[0]
-    straight, bend = 4.0 * pallet[0], nu * wheel[0] * d
-    first = (straight - bend) / (straight + magnitude(bend))
-    steep, lost = (1.0 + e) * (1.0 + e), kappa[0] * ((1.0 - e) * (1.0 - e))
-    flat, bend = 4.0 * steep, nu * fma(2.0, fma(e, e, 1.0), lost)
+    steep, lost = 4.0 * (1.0 + e) * (1.0 + e), kappa[0] * ((1.0 - e) * (1.0 - e))
+    curved = nu * wheel[0]  # nu alone may be too large to be multiplied
+    flat, bend = 4.0 * pallet[0], curved * d
+    first = (flat - bend) / (flat + magnitude(bend))
+    flat, bend = steep * wheel[0], curved * fma(2.0, fma(e, e, 1.0), lost)
     second = (flat + bend) / (flat + magnitude(bend))
     flip = _lesser(magnitude(d), magnitude(second)) * where((d > 0.0) & (second > 0.0), 1.0, -1.0)
     flip = where((d < 0.0) & (second < 0.0), -flip, flip)
-    whole, bend = fma(8.0 * e, e, 8.0), d * fma(nu, lost, flat)
-    third = (whole - bend) / (whole + magnitude(d) * fma(magnitude(nu), lost, flat))
+    whole, bend = fma(8.0 * e, e, 8.0), d * fma(nu, lost, steep)
+    third = (whole - bend) / (whole + magnitude(d) * fma(magnitude(nu), lost, steep))
     return _lesser(_lesser(first, flip), third)
 
 
@@ -121,12 +122,15 @@ def _polynomial(scene, nu):
     wheel, pallet, kappa, _, _, e, _ = scene
     d, one = _excess(scene), _number(1.0, e)
     more, less, square = _pairs.shifted(one, e), _pairs.shifted(one, -e), _pairs.two_product(e, e)
-    bend = _pairs.scaled(_pairs.times(wheel, d), -nu)
-    plus = _pairs.times(_pairs.times(more, less), _pairs.add((4.0 * pallet[0], 4.0 * pallet[1]), bend))
-    bend = _pairs.times(kappa, _pairs.times(less, less))
-    bend = _pairs.scaled(_pairs.add(bend, _pairs.shifted((2.0 * square[0], 2.0 * square[1]), 2.0)), nu)
+    excess = _pairs.times(wheel, d)
+    bend = _pairs.scaled(excess, nu)
+    flat = (4.0 * pallet[0], 4.0 * pallet[1])
+    plus = _pairs.times(_pairs.times(more, less), _pairs.add(flat, _pairs.negative(bend)))
+    lost = _pairs.times(kappa, _pairs.times(less, less))
+    lost = _pairs.add(lost, _pairs.shifted((2.0 * square[0], 2.0 * square[1]), 2.0))
     steep = _pairs.times(more, more)
-    minus = _pairs.times(_pairs.times(wheel, d), _pairs.add((4.0 * steep[0], 4.0 * steep[1]), bend))
+    flat = _pairs.times(excess, (4.0 * steep[0], 4.0 * steep[1]))
+    minus = _pairs.add(flat, _pairs.times(bend, lost))
     minus = (-0.5 * minus[0], -0.5 * minus[1])
     sum_, gap = _pairs.add(plus, minus), _pairs.add(plus, _pairs.negative(minus))
     a2 = _pairs.add((0.5 * sum_[0], 0.5 * sum_[1]), square)
@@ -140,9 +144,10 @@ def impact_cycle(scene, nu):
     loss = (1.0 - e) / (1.0 + e)
     half_period = sqrt(pallet[0] / loss)
     rim = _pairs.add(wheel, _pairs.scaled(_pairs.shifted(pallet, 1.0), -e))[0]  # wheel (1 - e) - 2 e pallet
-    rim = 0.5 * rim / sqrt(((1.0 - e) * (1.0 + e)) * pallet[0])
+    lossy = ((1.0 - e) * (1.0 + e)) * pallet[0]
     multiplier, doubt = largest_modulus(*_polynomial(scene, nu))
-    back = where(rim < 0.0, 0.5 * rim * rim, 0.0)
+    back = where(rim < 0.0, 0.125 * rim * rim / lossy, 0.0)
+    rim = 0.5 * rim / sqrt(lossy)
     return (half_period, 0.25 * wheel[0] / loss, rim, 0.5 * kappa[0] * half_period, multiplier, back), doubt
 
 

@@ -6,7 +6,7 @@ sqrt(p M m/(F (M + m))), so the wheel falls with x'' = pallet. The state just af
     x + V t + pallet t^2/2 - 1/2 = U(-wheel (Y + W t)),  x = U(wheel Y),                                 (1)
 with the speed of closing C = V + pallet t + u wheel W, where u = U'; and the next state, reflected, is
     Y' = -(Y + W t),  V' = V + pallet (t - J),  W' = u J - W,  J = (1 + e) C/(pallet + wheel u^2).       (2)
-Newton starts at t = 1/sqrt(1 - e), with speeds that an impact would repeat after that time, whatever the way.
+Newton starts at t = sqrt(2/(1 - e)), with speeds that an impact would repeat after that time, whatever the way.
 Residuals are those of (2), t - J instead of V' - V, which would be blind to V where m is small. They and the derivative
 of (2) are pairs of `_pairs`: no digits are lost in V near 0 or where two multipliers meet.
 The lever is bent about the fixed point of the flat one, which it leaves as it is: only the derivative and the passages
@@ -27,6 +27,8 @@ NEWTON_LIMIT = 40
 _CONVERGED = 1e-22
 """A step that was this small leaves 1e-30."""
 _PAIR_ERROR = 1e-29
+_LEAST = 1e-24
+"""A share of mass or of speed below this is lost among 32 digits."""
 
 _OK, _INACCURATE, _NO_METHOD = float(Status.OK), float(Status.INACCURATE), float(Status.NO_METHOD)
 _NO_CYCLE, _NOT_CONVERGED = float(Status.NO_CYCLE), float(Status.NOT_CONVERGED)
@@ -140,7 +142,7 @@ def _solved(rows, right):
 def _start(scene):
     """The crude state that Newton starts from."""
     wheel, pallet, _, _, _, e, _ = scene
-    t = 1.0 / sqrt(1.0 - e)
+    t = sqrt(2.0 / (1.0 - e))
     zero = 0.0 * t
     rim = t * (1.0 / (1.0 + e) - pallet[0] - 0.5 * wheel[0])
     return (-0.25 * t * t, zero), (rim, zero), (0.5 * t, zero)
@@ -204,24 +206,24 @@ def polynomial(scene, slopes, J):
 
 @jit
 def _stability(scene, coefficients):
-    """The least share by which p(1) > 0, p(-1) < 0 and 1 - a0^2 > a1 - a0 a2 hold, each for what it is small with."""
+    """The least of p(1) > 0, -p(-1) > 0 and 1 - a0^2 > a1 - a0 a2, each over what it is small with."""
     wheel, pallet, _, _, _, e, _ = scene
     a2, a1, a0 = coefficients
     even, odd = shifted(a1, 1.0), add(a2, a0)
-    size = 1.0 + magnitude(a2[0]) + magnitude(a1[0])
     lossy = (1.0 - e) * (1.0 + e)
-    jury = _less(shifted(negative(times(a0, a0)), 1.0), _less(a1, times(a0, a2)))[0]
-    worst = _share(add(even, odd)[0], pallet[0] * lossy, size)
-    flip = _share(_less(even, odd)[0], wheel[0], size)
-    worst = where(flip < worst, flip, worst)
-    swell = _share(jury, wheel[0] * lossy, size)
-    return where(swell < worst, swell, worst)
+    fades = 0.25 * add(even, odd)[0] / (pallet[0] * lossy)
+    flips = 0.25 * _less(even, odd)[0] / wheel[0]
+    swells = _less(shifted(negative(times(a0, a0)), 1.0), _less(a1, times(a0, a2)))[0]
+    swells = 0.25 * swells / (wheel[0] * lossy)
+    worst = where(flips < fades, flips, fades)
+    return where(swells < worst, swells, worst)
 
 
 @jit
-def _share(value, unit, size):
-    """A value over what it is small with; 0 where 32 digits do not tell its sign."""
-    return where(magnitude(value) > _PAIR_ERROR * size, 0.25 * value / unit, 0.0)
+def _told_apart(scene):
+    """Whether both masses and the restitution are large enough for 32 digits."""
+    wheel, pallet, _, _, _, e, _ = scene
+    return (wheel[0] > _LEAST) & (pallet[0] > _LEAST) & ((e > _LEAST) | isnt(e > 0.0))
 
 
 @jit
@@ -234,7 +236,7 @@ def passages(scene, bend, state, t):
     wheel, pallet, _, eta, _, _, _ = scene
     Y, V, W = state
     speed = wheel[0] * W[0]
-    out = speed - V[0]
+    out = _less(times(wheel, W), V)[0]
     home = fma(pallet[0], t[0], V[0]) + speed
     bent_by = bend[0] * W[0] * speed
     G, size = pallet[0] - bent_by, pallet[0] + magnitude(bent_by)
@@ -290,8 +292,11 @@ def push(scene, c):
 
 @jit_call
 def escape_speed(scene):
-    """The speed c that (3) repeats, and whether Newton did not come to rest; the residual is (c'^2 - c^2)/wheel."""
-    wheel, pallet, _, eta, _, _, _ = scene
+    """The speed c that (3) repeats, and whether Newton did not come to rest.
+
+    The residual is (c'^2 - c^2)/(wheel pallet) = wheel t (R + 2 c) - 4 (c^2 - eta).
+    """
+    wheel, _, _, eta, _, _, _ = scene
     start = sqrt(fma(2.0, eta[0], 0.5 * wheel[0]))
     c = (start, 0.0 * start)
     active = isnt(start < 0.0)
@@ -299,9 +304,10 @@ def escape_speed(scene):
         if not some(active):
             break
         (t, R, _), (delay, faster, _) = push(scene, c)
-        way = add(_twice(eta), times(c, t))
-        residual = add(times(_less(times(wheel, R), _twice(c)), R), _twice(times(pallet, way)))[0]
-        slope = 2.0 * (fma(wheel[0], R[0], -c[0]) * faster[0] - R[0] + pallet[0] * fma(c[0], delay[0], t[0]))
+        speeds = add(R, _twice(c))
+        square = _less(times(c, c), eta)
+        residual = _less(times(wheel, times(t, speeds)), (4.0 * square[0], 4.0 * square[1]))[0]
+        slope = wheel[0] * fma(delay[0], speeds[0], t[0] * (faster[0] + 2.0)) - 8.0 * c[0]
         step = residual / slope
         c = choose(active, shifted(c, -step), c)
         active = active & isnt(magnitude(step) <= _CONVERGED * c[0])
@@ -337,4 +343,5 @@ def half_cycle(scene, rtol):
     status = where(tame, status, _NO_CYCLE)
     straight = isnt(magnitude(scene[6]) > 0.0)
     status = where(plastic, where(straight, verdict, _NO_METHOD), status)
+    status = where(_told_apart(scene), status, _NO_METHOD)
     return choose(plastic, pushed, cycle), where(plastic, held, 0.0), status

@@ -14,8 +14,8 @@ where it does not exist, UNSTABLE where it exists and disturbances grow, GRAZING
 decide on either (kappa = 1 with a flat lever: they neither grow nor fade).
 """
 
-from kernels import _impact_cycle, _impact_scene
-from kernels._columns import each_cell, entry
+from kernels import _impact_cycle, _impact_events, _impact_map, _impact_scene
+from kernels._columns import each_cell, entry, one_by_one
 from kernels._jit import jit
 from kernels._lanes import where
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
@@ -26,11 +26,11 @@ _OUT_OF_RANGE = float(Status.OUT_OF_RANGE)
 @jit
 def write(
     i, units, cycle, held, count, verdict,
-    period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, status,
+    period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status,
 ):  # fmt: skip
-    """One cell's cycle, or the lanes', in SI units."""
+    """One cell's symmetric cycle, or the lanes', in SI units."""
     period[i], swing[i], wheel_speed[i], pallet_speed[i], recoil[i], fine = _impact_scene.dimensional(units, cycle)
-    multiplier[i], contact_share[i], impacts[i] = cycle[4], held, count
+    multiplier[i], contact_share[i], impacts[i], offset[i] = cycle[4], held, count, 0.0 * count
     status[i] = where(fine | (verdict >= FIRST_REFUSAL), verdict, _OUT_OF_RANGE)
 
 
@@ -46,10 +46,10 @@ def _closed(i, torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs):
 @entry()
 def closed(
     torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol,
-    period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, status,
+    period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status,
 ):  # fmt: skip
     """The symmetric cycle by formula, with its existence and its multipliers."""
-    outputs = (period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, status)
+    outputs = (period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status)
     each_cell(_closed, (torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs))
 
 
@@ -57,6 +57,45 @@ def closed(
 def closed_bound(torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, asked, out):
     """Rounding; where two multipliers nearly meet and lose more, the status says so."""
     out[:] = _impact_cycle.ROUNDING
+
+
+@jit
+def _events(i, torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs):
+    scene, units = _impact_scene.without_dimensions(
+        torque[i], I_c[i], I_v[i], r_c[i], r_v[i], teeth[i], h[i], e[i], nu[i]
+    )
+    cycle, offset, held, count, verdict = _impact_events.settled(scene, rtol[i])
+    write(i, units, cycle, held, count, verdict, *outputs)
+    outputs[-2][i] = _impact_scene.length(units, offset)
+
+
+@entry()
+def events(
+    torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol,
+    period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status,
+):  # fmt: skip
+    """Followed contact by contact, cell by cell: no two clocks have the same contacts to be followed in lanes."""
+    outputs = (period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status)
+    one_by_one(_events, (torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs))
+
+
+@jit
+def _map(i, torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs):
+    scene, units = _impact_scene.without_dimensions(
+        torque[i], I_c[i], I_v[i], r_c[i], r_v[i], teeth[i], h[i], e[i], nu[i]
+    )
+    cycle, held, verdict = _impact_map.half_cycle(scene, rtol[i])
+    write(i, units, cycle, held, 0.0 * held + 1.0, verdict, *outputs)
+
+
+@entry()
+def half_cycle_map(
+    torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol,
+    period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status,
+):  # fmt: skip
+    """The symmetric cycle as the fixed point of the half-cycle map, by Newton, and its multipliers."""
+    outputs = (period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status)
+    each_cell(_map, (torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs))
 
 
 @jit
@@ -96,6 +135,7 @@ OUTPUTS = (
     Field("recoil", "rad", "angle that the crown wheel is thrown back at each impact (0 where it is not)"),
     Field("contact_share", "1", "share of the time that a tooth and a pallet are in contact"),
     Field("impacts", "1", "impacts in half a period (inf where bounces die out in contact)"),
+    Field("offset", "m", "how far the middle of the pallet's swing is from the middle of its teeth"),
 )
 
 IMPACT = Kernel(
@@ -105,7 +145,13 @@ IMPACT = Kernel(
     parameters=PARAMETERS,
     outputs=OUTPUTS,
     check=check,
-    methods=(Method("closed", "formula of the symmetric cycle, where it exists and is stable", closed, closed_bound),),
+    methods=(
+        Method("closed", "formula of the symmetric cycle, where it exists and is stable", closed, closed_bound),
+        Method("events", "whatever the clock does, contact by contact, and Newton on what repeats", events),
+        Method(
+            "map", "the cycle of `closed` as fixed point of the half-cycle map, by Newton in 32 digits", half_cycle_map
+        ),
+    ),
     example={
         "torque": 1e-3,
         "I_c": 4e-5,

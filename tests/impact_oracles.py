@@ -136,7 +136,7 @@ def bent(clock):
 
 
 def impact_cycle(*cell):
-    """(period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts), and whether it exists."""
+    """(period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset), and whether it exists."""
     with mp.workdps(DIGITS):
         clock = Clock(*cell)
         state = bent(clock)
@@ -145,7 +145,7 @@ def impact_cycle(*cell):
         T = flight(clock, y, V, w)
         recoil = V * V / (2 * clock.g * clock.r_c) if V < 0 else mpf(0)
         largest = multiplier(derivative(clock, state))
-        values = (2 * T, -y, V / clock.r_c, w / clock.r_v, largest, recoil, mpf(0), mpf(1))
+        values = (2 * T, -y, V / clock.r_c, w / clock.r_v, largest, recoil, mpf(0), mpf(1), mpf(0))
         return values, exists(clock, state)
 
 
@@ -182,4 +182,4 @@ def plastic_cycle(*cell):
         fall, held, y, start, _ = escape(clock, speed)
         back = start * start * (clock.M + clock.m) / (2 * clock.F) if start < 0 else mpf(0)
         values = (2 * (fall + held), back - y, start / clock.r_c, start / clock.r_v, slope, back / clock.r_c)
-        return (*values, held / (fall + held), mpf(1))
+        return (*values, held / (fall + held), mpf(1), mpf(0))
