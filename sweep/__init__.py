@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from sweep.errors import StudyError as StudyError
     from sweep.errors import SweepError as SweepError
     from sweep.exporting import export as export
+    from sweep.filtering import where as where
     from sweep.planning import plan as plan
     from sweep.regimes import fit_two_laws as fit_two_laws
     from sweep.result import open_result as open_result
@@ -45,6 +46,7 @@ _HOMES = {
     "collapse_quality": "scaling",
     "plot": "charts",
     "in_units": "customary",
+    "where": "filtering",
     "export": "exporting",
     "SweepError": "errors",
     "StudyError": "errors",

@@ -98,9 +98,11 @@ def parser() -> argparse.ArgumentParser:
     _add_at(plot)
     _add_units(plot)
 
-    export = _command(commands, "export", _export, "write a result as csv or netCDF4")
+    export = _command(commands, "export", _export, "write a result as csv, parquet, netCDF4 or zarr")
     _add_result(export)
-    export.add_argument("-o", "--output", metavar="FILE.csv|FILE.nc", type=Path, required=True)
+    export.add_argument("-o", "--output", metavar="FILE.csv|.parquet|.nc|.zarr", type=Path, required=True)
+    text = "only cells for which this holds, e.g. \"status == 'OK' and R < 0.1\""
+    export.add_argument("--where", metavar="CONDITION", help=text)
     _add_units(export)
     return top
 
@@ -191,9 +193,11 @@ def _plot(arguments: argparse.Namespace) -> None:
 
 def _export(arguments: argparse.Namespace) -> None:
     from sweep.exporting import export
+    from sweep.filtering import where
 
     with _result(arguments) as dataset:
-        print(export(_in_units(dataset, arguments.unit), arguments.output))
+        chosen = where(dataset, arguments.where) if arguments.where else dataset
+        print(export(_in_units(chosen, arguments.unit), arguments.output))
 
 
 def _in_units(dataset: xr.Dataset, given: Sequence[str]) -> xr.Dataset:

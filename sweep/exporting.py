@@ -1,4 +1,4 @@
-"""Results for other programs: csv for spreadsheets and statistics, nc (netCDF4) for whatever reads CF."""
+"""Results for other programs: csv and parquet for tables, nc (netCDF4) and zarr for whatever reads CF."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ import csv
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterator
+import shutil
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
 import xarray as xr
 
+from sweep.checks import listed
 from sweep.errors import SweepError
 
 ROWS = 65536
@@ -23,36 +25,47 @@ LARGE = 256 * 2**20
 
 
 def export(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
-    """Write a Dataset to `path`, as its suffix says: .csv or .nc. A file that is there is replaced once all is written.
+    """Write a Dataset to `path`, as its suffix says: .csv, .parquet, .nc or .zarr.
+
+    What is there is replaced once all is written.
 
     csv: one row per cell (per cell and phase, for outputs along a phase), one column per coordinate and output,
     `status` and `method_used` as words, numbers with all their digits. Lines that start with "#" name the unit of
     each column; `pandas.read_csv(path, comment="#")` reads it, and so does the `file` of an axis of a study.
     Memory does not grow with the number of cells.
 
-    nc: netCDF4 with units, flags and all attributes.
+    parquet: the same table with types; units and meanings are in the metadata of each field, the Dataset's attributes
+    in that of the schema.
+
+    nc, zarr: netCDF4, or a folder of zarr, with units, flags and all attributes.
 
     Raises
     ------
     SweepError
-        If the suffix is another, or the file cannot be written.
+        If the suffix is another, what writes it is not installed, or the file cannot be written.
     """
     target = Path(path)
-    writers: dict[str, Callable[[xr.Dataset, Path], None]] = {".csv": _write_csv, ".nc": _write_netcdf}
-    if target.suffix.lower() not in writers:
+    kind = target.suffix.lower()
+    if kind not in WRITERS:
         found = f'"{target.suffix}"' if target.suffix else "no suffix"
-        raise SweepError(f"{target}: found {found}; export writes {' and '.join(writers)}, as the file's suffix says")
-    if target.is_dir():
+        raise SweepError(f"{target}: found {found}; export writes {listed(WRITERS, word='and')}, as the suffix says")
+    if target.is_dir() and kind != ".zarr":
         raise SweepError(f"{target} is a folder; name a file in it")
     part = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
         part.touch()  # says in plain words that there is no such folder, or no permission
-        writers[target.suffix.lower()](dataset, part)
+        WRITERS[kind](dataset, part)
+        if target.is_dir():
+            shutil.rmtree(target)
         part.replace(target)
+    except ImportError as error:
+        raise SweepError(f'{target}: needs {error.name}; install it with: pip install "foliot[export]"') from None
     except (OSError, RuntimeError) as error:  # the latter from HDF5
         reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else error
         raise SweepError(f"{target} cannot be written: {reason}") from None
     finally:
+        if part.is_dir():
+            shutil.rmtree(part, ignore_errors=True)
         part.unlink(missing_ok=True)
     return target
 
@@ -65,6 +78,36 @@ def _write_csv(dataset: xr.Dataset, path: Path) -> None:
         writer.writerow(names)
         for block in _blocks(dataset):
             writer.writerows(zip(*(_column(block, name) for name in names), strict=True))
+
+
+def _write_parquet(dataset: xr.Dataset, path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    names = [str(name) for name in (*dataset.coords, *dataset.data_vars)]
+    fields = [pa.field(name, _arrow_type(dataset[name], pa), metadata=_text(dataset[name].attrs)) for name in names]
+    schema = pa.schema(fields, metadata=_text(dataset.attrs))
+    with pq.ParquetWriter(path, schema) as writer:
+        for block in _blocks(dataset):
+            writer.write_table(pa.table([_column(block, name) for name in names], schema=schema))
+
+
+def _arrow_type(variable: xr.DataArray, pa: Any) -> Any:
+    words = flag_words(variable) or variable.dtype.kind not in "fiu"
+    return pa.string() if words else pa.from_numpy_dtype(variable.dtype)
+
+
+def _text(attrs: Mapping[Any, Any]) -> dict[str, str]:
+    """Attributes as text, as parquet wants them; flags are words in a table."""
+    return {str(name): str(value) for name, value in attrs.items() if name not in ("flag_values", "flag_meanings")}
+
+
+def _write_zarr(dataset: xr.Dataset, path: Path) -> None:
+    import zarr  # noqa: F401  xarray would say in other words that it is missing
+
+    path.unlink()
+    whole = dataset.chunk("auto") if dataset.nbytes > LARGE and not dataset.chunks else dataset
+    whole.drop_encoding().to_zarr(path, mode="w", consolidated=False)
 
 
 def _write_units(dataset: xr.Dataset, names: list[str], file: TextIO) -> None:
@@ -120,3 +163,12 @@ def _write_netcdf(dataset: xr.Dataset, path: Path) -> None:
         if variable.dtype.kind in "iu" and math.prod(variable.shape) > 1:
             encoding[str(name)] |= {"zlib": True, "complevel": 1}
     whole.to_netcdf(path, engine="h5netcdf", encoding=encoding)
+
+
+WRITERS: dict[str, Callable[[xr.Dataset, Path], None]] = {
+    ".csv": _write_csv,
+    ".parquet": _write_parquet,
+    ".nc": _write_netcdf,
+    ".zarr": _write_zarr,
+}
+"""Kinds of file, by suffix."""

@@ -189,7 +189,7 @@ def test_netcdf_holds_an_axis_of_words(tmp_path):
 
 @pytest.mark.parametrize(("name", "found"), [("out.h5", '".h5"'), ("out.xlsx", '".xlsx"'), ("out", "no suffix")])
 def test_another_suffix_is_refused_with_those_there_are(tmp_path, name, found):
-    with pytest.raises(SweepError, match=f"{name}: found {found}; export writes .csv and .nc"):
+    with pytest.raises(SweepError, match=f"{name}: found {found}; export writes .csv, .parquet, .nc and .zarr"):
         sweep.export(result(), tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 
@@ -244,3 +244,40 @@ def test_an_interruption_leaves_no_half_written_file(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         sweep.export(result(), tmp_path / "out.csv")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_parquet_reads_back_to_the_last_bit_with_units(tmp_path):
+    import pyarrow.parquet as pq
+
+    ds = result()
+    path = sweep.export(ds, tmp_path / "out.parquet")
+    table, frame = (
+        pq.read_table(path),
+        ds.drop_vars(["status", "method_used"]).to_dataframe(dim_order=["mu", "a", "phase"]),
+    )
+    np.testing.assert_array_equal(table["angle"].to_numpy(), frame.angle)
+    np.testing.assert_array_equal(table["period"].to_numpy(), frame.period)
+    assert table["status"].to_pylist()[12:16] == ["BAD_INPUT"] * 4
+    assert table["method_used"].to_pylist()[12:16] == ["none"] * 4
+    assert table.schema.field("mu").metadata[b"units"] == b"rad/s^2"
+    assert table.schema.metadata[b"study"] == ds.attrs["study"].encode()
+    assert table.schema.field("angle").type == "double"
+
+
+def test_zarr_opens_as_the_same_dataset_and_replaces_an_older_one(tmp_path):
+    path = tmp_path / "out.zarr"
+    for factor in (1.0, 2.0):
+        ds = result()
+        ds["period"] = factor * ds.period.assign_attrs()
+        sweep.export(ds, path)
+        with xr.open_zarr(path, consolidated=False) as read:
+            xr.testing.assert_equal(read.load(), ds)
+            assert read.status.attrs["flag_meanings"] == FLAGS["flag_meanings"]
+    assert [p.name for p in tmp_path.iterdir()] == ["out.zarr"]
+
+
+def test_a_kind_of_file_whose_library_is_missing_is_told(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(SweepError, match=r"needs pyarrow; install it with: pip install \"foliot\[export\]\""):
+        sweep.export(result(), tmp_path / "out.parquet")
+    assert not list(tmp_path.iterdir())
