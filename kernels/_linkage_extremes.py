@@ -20,7 +20,7 @@ f = 5, e = 10 has two angles by the arccos, and locks).
 
 import math
 
-from kernels._jit import jit
+from kernels._jit import jit, jit_call
 from kernels._lanes import fma, horner, magnitude, sqrt, where
 from kernels._linkage import larger, sum4
 from kernels._pairs import two_product
@@ -83,7 +83,7 @@ def roots(lengths, margin):
     return k, sqrt(m1 * m2), sqrt(((b + d) + (f + e)) * m3), n
 
 
-@jit
+@jit_call
 def angle(y, x):
     """Direction of (x, y) for x, y >= 0, within 2 ulp; 0 for (0, 0)."""
     low, high = smaller(x, y), larger(x, y)

@@ -17,10 +17,13 @@ rates, no derivatives). A crank e = 0 swings nothing; crank angles are those for
 
 import math
 
-from kernels import _linkage_extremes, _linkage_textbook
+import numpy as np
+
+from kernels import _linkage_extremes, _linkage_textbook, _linkage_waveform
 from kernels._columns import each_cell, entry
+from kernels._groups import GROUP, cells_at, each_group
 from kernels._jit import jit
-from kernels._lanes import magnitude, where
+from kernels._lanes import isnt, magnitude, where
 from kernels._linkage import side_of
 from kernels._polisher_cell import CHANGE_POINT, DOUBLE_CRANK, OK, judged, no_rates, said, write
 from kernels.interface import Field, Kernel, Method, Status
@@ -28,7 +31,7 @@ from kernels.interface import Field, Kernel, Method, Status
 ROUNDING = 3e-15
 """What `stable` is right to."""
 
-_BAD_INPUT = float(Status.BAD_INPUT)
+_BAD_INPUT, _INACCURATE = float(Status.BAD_INPUT), float(Status.INACCURATE)
 _PRESSED, _FIRST_SLOPE = 8, 12  # positions of the transmission angle and of A0_b among the outputs
 
 
@@ -119,6 +122,44 @@ def textbook_bound(b, d, f, e, type, rtol, asked, out):
 
 
 @jit
+def _waveform(first, b, d, f, e, type, rtol, buffers, *outputs):
+    i = cells_at(first)
+    cell = judged(b[i], d[i], f[i], e[i])
+    lengths, _, margin, code = cell
+    flat = _linkage_extremes.flattened(margin)
+    root = _linkage_extremes.roots(lengths, flat)
+    angles = _linkage_extremes.extremes(lengths, root)
+    crank_angles = _linkage_extremes.crank_angles(lengths, flat, root)
+    pressed = _linkage_extremes.transmission(lengths, margin)
+    slopes = _linkage_extremes.tolerances(lengths, root)
+    forward, backward, bends, openings = buffers[0], buffers[1], buffers[2], buffers[3]
+    scanned = _linkage_waveform.scan(lengths, margin, forward, backward, bends, openings)
+    thd, thd_doubt = _linkage_waveform.distortion(lengths, margin, scanned, bends, openings)
+    most, least, rate_doubt = _linkage_waveform.rates(lengths, margin, forward, backward)
+    wide = isnt(rate_doubt <= rtol[i]) | isnt(rtol[i] >= ROUNDING)
+    wide = (said(code, DOUBLE_CRANK) & wide) | (said(code, OK) & (wide | isnt(thd_doubt <= rtol[i])))
+    verdict = where(wide, _INACCURATE, code)
+    write(
+        i, side_of(type[i]), cell, angles, crank_angles, pressed, (thd, most, least), slopes, verdict, *outputs
+    )  # fmt: skip
+
+
+@entry()
+def waveform(
+    b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
+    transmission_angle, thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
+):  # fmt: skip
+    """As `stable`, and the motion over a turn by `_linkage_waveform`, which estimates its rounding."""
+    n = _linkage_waveform.NODES * GROUP
+    columns = (
+        b, d, f, e, type, rtol, np.empty((4, n)),
+        A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer, transmission_angle,
+        thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
+    )  # fmt: skip
+    each_group(_waveform, columns)
+
+
+@jit
 def allowed(b, d, f, e, type):
     """Whether the parameters are numbers within their limits; NaN fails."""
     positive = (b > 0.0) & (d > 0.0) & (f > 0.0) & (e >= 0.0)
@@ -191,6 +232,7 @@ POLISHER = Kernel(
             textbook_bound,
             lacks=_RATES,
         ),
+        Method("waveform", "stable, and integrals and extremes of the rate over a turn", waveform),
     ),
     example=EXAMPLE,
 )

@@ -3,7 +3,7 @@
 Arguments are float64 and taken as exact. The arm's end is where two circles meet; nothing else is used of a linkage.
 """
 
-from mpmath import atan2, cos, mp, mpf, pi, sin, sqrt
+from mpmath import atan2, cos, exp, mp, mpf, pi, quad, sin, sqrt
 
 DIGITS = 50
 
@@ -40,3 +40,45 @@ def middle_turn(angle, near):
     while near - angle > pi:
         angle += 2 * pi
     return angle
+
+
+def rate(b, d, f, e, side, theta):
+    """alpha' as e x f over d x f, of the vectors crank, coupler and arm."""
+    alpha = arm(b, d, f, e, side, theta)
+    ex, ey, dx, dy = e * cos(theta), e * sin(theta), d * cos(alpha), d * sin(alpha)
+    fx, fy = b + ex - dx, ey - dy
+    return (ex * fy - ey * fx) / (dx * fy - dy * fx)
+
+
+def distortion(b, d, f, e):
+    """thd of the arm of type A: root of the mean square of alpha without mean and first harmonic, over the first."""
+    with mp.workdps(DIGITS):
+        b, d, f, e = map(mpf, (b, d, f, e))
+
+        def mean(function):
+            return quad(lambda t: function(arm(b, d, f, e, 1, t), t), [-pi, 0, pi]) / (2 * pi)
+
+        middle = mean(lambda a, t: a)
+        even, odd = 2 * mean(lambda a, t: a * cos(t)), 2 * mean(lambda a, t: a * sin(t))
+        rest = mean(lambda a, t: (a - middle - even * cos(t) - odd * sin(t)) ** 2)
+        return sqrt(2 * rest) / sqrt(even**2 + odd**2)
+
+
+def fastest(b, d, f, e, sign, n=300):
+    """The largest sign alpha' over a turn of type A: best of a scan, dense next to 0 and pi, then golden section."""
+    with mp.workdps(40):
+        b, d, f, e = map(mpf, (b, d, f, e))
+
+        def height(u, half):
+            return sign * rate(b, d, f, e, 1, half * pi / (1 + exp(-u)))
+
+        grid = [mpf(60) * k / n - 30 for k in range(n + 1)]
+        _, u, half = max((height(u, half), u, half) for u in grid for half in (-1, 1))
+        low, high, ratio = u - mpf(60) / n, u + mpf(60) / n, (sqrt(5) - 1) / 2
+        while high - low > mpf(10) ** -12:
+            first, second = high - ratio * (high - low), low + ratio * (high - low)
+            if height(first, half) > height(second, half):
+                high = second
+            else:
+                low = first
+        return height((low + high) / 2, half)
