@@ -15,6 +15,8 @@ KERNELS = {
     "balance_trace": "kernels.balance_trace:BALANCE_TRACE",
     "balance_driven": "kernels.balance_driven:BALANCE_DRIVEN",
     "impact": "kernels.impact:IMPACT",
+    "polisher": "kernels.polisher:POLISHER",
+    "polisher_motion": "kernels.polisher_motion:POLISHER_MOTION",
 }
 
 
