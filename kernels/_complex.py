@@ -3,9 +3,11 @@
 Products and quotients are right to 4 roundings of the modulus.
 """
 
+import math
+
 from kernels._jit import jit, jit_call
-from kernels._lanes import fma, magnitude
-from kernels._vecmath import scale
+from kernels._lanes import exponent, fma, magnitude, sqrt, where
+from kernels._vecmath import arctan, is_normal, scale
 
 
 @jit
@@ -49,3 +51,30 @@ def plus(y, z):
 def times(z, number):
     """z times a real number."""
     return z[0] * number, z[1] * number
+
+
+@jit
+def quotient(y, z):
+    """Quotient of two complex numbers of any size; NaN or infinite for z = 0."""
+    own = -exponent(where(size(z) > 0.0, size(z), 1.0))
+    return scaled(over(y, scaled(z, own)), own)
+
+
+@jit_call
+def modulus(re, im):
+    """abs(re + i im), also where a square would leave the range."""
+    size = magnitude(re) + magnitude(im)
+    e = exponent(where(is_normal(size), size, 1.0))
+    x, y = scale(re, -e), scale(im, -e)
+    return scale(sqrt(fma(x, x, y * y)), e)
+
+
+@jit_call
+def argument(re, im):
+    """The angle of re + i im in [-pi, pi), for re + i im not 0."""
+    steep = magnitude(im) > magnitude(re)
+    low, high = where(steep, re, im), where(steep, im, re)
+    angle = arctan(low / where(magnitude(high) > 0.0, high, 1.0))
+    turned = where(im < 0.0, -0.5 * math.pi, 0.5 * math.pi) - angle
+    flat = where(re < 0.0, where(im > 0.0, angle + math.pi, angle - math.pi), angle)
+    return where(steep, turned, flat)

@@ -14,13 +14,13 @@ import math
 
 import numpy as np
 
-from kernels import _chain_frf
+from kernels import _chain_frf, _complex
 from kernels._chain import refusal as chain_refusal
 from kernels._columns import entry, one_by_one
 from kernels._groups import GROUP, cells_at
 from kernels._jit import jit, jit_call
-from kernels._lanes import exponent, fma, magnitude, nearest, sqrt, where
-from kernels._vecmath import arctan, is_normal, log, scale
+from kernels._lanes import nearest, where
+from kernels._vecmath import is_normal, log
 from kernels.interface import Field, Kernel, Method, Status
 
 _OK, _INACCURATE = float(Status.OK), float(Status.INACCURATE)
@@ -32,26 +32,6 @@ _TWO_PI, _DB = 2.0 * math.pi, 20.0 / math.log(10.0)
 def row_at(j):
     """Where the j-th row of a buffer of a group begins."""
     return cells_at(j * GROUP)
-
-
-@jit_call
-def modulus(re, im):
-    """abs(re + i im), also where a square would leave the range."""
-    size = magnitude(re) + magnitude(im)
-    e = exponent(where(is_normal(size), size, 1.0))
-    x, y = scale(re, -e), scale(im, -e)
-    return scale(sqrt(fma(x, x, y * y)), e)
-
-
-@jit_call
-def argument(re, im):
-    """The angle of re + i im in [-pi, pi), for re + i im not 0."""
-    steep = magnitude(im) > magnitude(re)
-    low, high = where(steep, re, im), where(steep, im, re)
-    angle = arctan(low / where(magnitude(high) > 0.0, high, 1.0))
-    turned = where(im < 0.0, -0.5 * math.pi, 0.5 * math.pi) - angle
-    flat = where(re < 0.0, where(im > 0.0, angle + math.pi, angle - math.pi), angle)
-    return where(steep, turned, flat)
 
 
 @jit_call
@@ -70,12 +50,12 @@ def _group(i, j, J, k, h, drive, read, frequency, outputs, rows):
         rows[lane] = frequency[min(j + lane, frequency.size - 1)]
     omega = rows[row_at(0)] * _TWO_PI
     re, im, error = _chain_frf.receptance(n, J[i], k[i], h[i], omega, drive, read, row_at, rows)
-    amplitude = modulus(re, im)
+    amplitude = _complex.modulus(re, im)
     sound = is_normal(amplitude)
     _write(i, j, lanes, re, outputs[0], rows)
     _write(i, j, lanes, im, outputs[1], rows)
     _write(i, j, lanes, amplitude, outputs[2], rows)
-    _write(i, j, lanes, argument(re, im), outputs[3], rows)
+    _write(i, j, lanes, _complex.argument(re, im), outputs[3], rows)
     _write(i, j, lanes, _DB * log(where(sound, amplitude, 1.0)), outputs[4], rows)
     rows[row_at(0)] = where(sound, error, math.inf)
     largest = 0.0
