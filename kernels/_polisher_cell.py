@@ -50,7 +50,7 @@ def locks(code, lengths, margin):
 
 @jit
 def write(
-    i, kind, cell, angles, crank_angles, pressed, rates, slopes, verdict,
+    i, kind, cell, angles, crank_angles, stops, pressed, rates, slopes, verdict,
     A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer, transmission_angle,
     thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
 ):  # fmt: skip
@@ -61,17 +61,18 @@ def write(
     kind : +1 or -1, of `side_of`
     cell : of `judged`
     angles, crank_angles, pressed, slopes : of `_linkage_extremes`, its transmission and tolerances
+    stops : of `locks`
     rates : thd and the largest and least rate of that type
     verdict : status where the linkage is OK, or a double crank
     """
-    lengths, unit, margin, code = cell
+    lengths, unit, _, code = cell
     flat, turns = said(code, CHANGE_POINT), said(code, OK)
     exists = turns | (flat & (lengths[3] <= lengths[0]))
     there = where(exists, kind, math.nan)
     A0[i], A1[i] = there * angles[0], where(exists, angles[1], math.nan)
     eta_plus[i], eta_minus[i] = there * angles[2], there * angles[3]
     theta_plus[i], theta_minus[i] = there * crank_angles[0], there * crank_angles[1]
-    theta_lock[i], theta_lock_outer[i] = locks(code, lengths, margin)
+    theta_lock[i], theta_lock_outer[i] = stops
     locked, whirls = said(code, LOCK_UP), said(code, DOUBLE_CRANK)
     transmission_angle[i] = where(turns | flat | whirls, pressed, where(locked, 0.0, math.nan))
     thd[i] = where(turns, rates[0], math.nan)

@@ -19,14 +19,14 @@ import math
 
 import numpy as np
 
-from kernels import _linkage_extremes, _linkage_textbook, _linkage_waveform
-from kernels._columns import each_cell, entry
+from kernels import _linkage_extremes, _linkage_sampled, _linkage_textbook, _linkage_waveform
+from kernels._columns import each_cell, entry, one_by_one
 from kernels._groups import GROUP, cells_at, each_group
 from kernels._jit import jit
 from kernels._lanes import isnt, magnitude, where
-from kernels._linkage import side_of
-from kernels._polisher_cell import CHANGE_POINT, DOUBLE_CRANK, OK, judged, no_rates, said, write
-from kernels.interface import Field, Kernel, Method, Status
+from kernels._linkage import larger, side_of
+from kernels._polisher_cell import CHANGE_POINT, DOUBLE_CRANK, LOCK_UP, OK, judged, locks, no_rates, said, write
+from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
 
 ROUNDING = 3e-15
 """What `stable` is right to."""
@@ -45,7 +45,8 @@ def _stable(i, b, d, f, e, type, *outputs):
     crank_angles = _linkage_extremes.crank_angles(lengths, flat, root)
     pressed = _linkage_extremes.transmission(lengths, margin)
     slopes = _linkage_extremes.tolerances(lengths, root)
-    write(i, side_of(type[i]), cell, angles, crank_angles, pressed, no_rates(code), slopes, code, *outputs)
+    stops = locks(code, lengths, margin)
+    write(i, side_of(type[i]), cell, angles, crank_angles, stops, pressed, no_rates(code), slopes, code, *outputs)
 
 
 @entry()
@@ -70,12 +71,13 @@ def stable_bound(b, d, f, e, type, rtol, asked, out):
 @jit
 def _textbook(i, b, d, f, e, type, *outputs):
     cell = judged(b[i], d[i], f[i], e[i])
-    lengths, _, _, code = cell
+    lengths, _, margin, code = cell
     angles = _linkage_textbook.extremes(lengths)
     crank_angles = _linkage_textbook.crank_angles(lengths)
     pressed = _linkage_textbook.transmission(lengths)
     slopes = _linkage_textbook.tolerances(lengths)
-    write(i, side_of(type[i]), cell, angles, crank_angles, pressed, no_rates(code), slopes, code, *outputs)
+    stops = locks(code, lengths, margin)
+    write(i, side_of(type[i]), cell, angles, crank_angles, stops, pressed, no_rates(code), slopes, code, *outputs)
 
 
 @entry()
@@ -139,9 +141,8 @@ def _waveform(first, b, d, f, e, type, rtol, buffers, *outputs):
     wide = isnt(rate_doubt <= rtol[i]) | isnt(rtol[i] >= ROUNDING)
     wide = (said(code, DOUBLE_CRANK) & wide) | (said(code, OK) & (wide | isnt(thd_doubt <= rtol[i])))
     verdict = where(wide, _INACCURATE, code)
-    write(
-        i, side_of(type[i]), cell, angles, crank_angles, pressed, (thd, most, least), slopes, verdict, *outputs
-    )  # fmt: skip
+    stops, rates = locks(code, lengths, margin), (thd, most, least)
+    write(i, side_of(type[i]), cell, angles, crank_angles, stops, pressed, rates, slopes, verdict, *outputs)
 
 
 @entry()
@@ -157,6 +158,45 @@ def waveform(
         thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
     )  # fmt: skip
     each_group(_waveform, columns)
+
+
+@jit
+def _sampled(i, b, d, f, e, type, rtol, alphas, speeds, bends, *outputs):
+    cell = judged(b[i], d[i], f[i], e[i])
+    lengths, _, margin, code = cell
+    arm, none = (lengths, margin), math.nan
+    angles, crank_angles, rates = (none, none, none, none), (none, none), (none, none, none)
+    stops, pressed, doubt = (none, none), none, 0.0
+    if said(code, LOCK_UP):
+        stops, doubt = _linkage_sampled.locks(arm)
+    elif said(code, OK) or said(code, DOUBLE_CRANK):
+        doubt = _linkage_sampled.sample(arm, alphas, speeds, bends)
+        pressed = _linkage_sampled.pressed(arm)
+        rates, lost = _linkage_sampled.rates(arm, alphas, speeds)
+        doubt = larger(doubt, lost)
+        if said(code, OK):
+            angles, crank_angles, lost = _linkage_sampled.extremes(arm, alphas)
+            doubt = larger(doubt, lost)
+    elif said(code, CHANGE_POINT):
+        doubt = math.inf
+    slopes = (none, none, none, none, none, none)
+    verdict = where((doubt <= rtol[i]) | (code > float(FIRST_REFUSAL) - 0.5), code, _INACCURATE)
+    write(i, side_of(type[i]), cell, angles, crank_angles, stops, pressed, rates, slopes, verdict, *outputs)
+
+
+@entry()
+def sampled(
+    b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
+    transmission_angle, thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
+):  # fmt: skip
+    """Samples of a turn, followed up; one cell at a time, since every search goes its own way."""
+    n = _linkage_sampled.SAMPLES
+    columns = (
+        b, d, f, e, type, rtol, np.empty(n), np.empty(n), np.empty(n),
+        A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer, transmission_angle,
+        thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
+    )  # fmt: skip
+    one_by_one(_sampled, columns)
 
 
 @jit
@@ -215,6 +255,7 @@ OUTPUTS = (
 )
 
 _RATES = ("thd", "rate_max", "rate_min")
+_SLOPES = ("A0_b", "A0_d", "A0_f", "A0_e", "A1_b", "A1_d", "A1_f", "A1_e")
 
 POLISHER = Kernel(
     name="polisher",
@@ -233,6 +274,7 @@ POLISHER = Kernel(
             lacks=_RATES,
         ),
         Method("waveform", "stable, and integrals and extremes of the rate over a turn", waveform),
+        Method("sampled", "2048 samples of the motion over a turn, followed up", sampled, lacks=_SLOPES),
     ),
     example=EXAMPLE,
 )
