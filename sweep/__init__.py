@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from sweep.exporting import export as export
     from sweep.filtering import where as where
     from sweep.planning import plan as plan
+    from sweep.refining import refine as refine
+    from sweep.refining import study_of as study_of
     from sweep.regimes import fit_two_laws as fit_two_laws
     from sweep.result import open_result as open_result
     from sweep.runner import run as run
@@ -46,6 +48,8 @@ _HOMES = {
     "collapse_quality": "scaling",
     "plot": "charts",
     "in_units": "customary",
+    "refine": "refining",
+    "study_of": "refining",
     "where": "filtering",
     "export": "exporting",
     "SweepError": "errors",
