@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from sweep.errors import SweepError as SweepError
     from sweep.exporting import export as export
     from sweep.filtering import where as where
+    from sweep.mapping import contours as contours
+    from sweep.mapping import exponent_map as exponent_map
     from sweep.planning import plan as plan
     from sweep.refining import refine as refine
     from sweep.refining import study_of as study_of
@@ -48,6 +50,8 @@ _HOMES = {
     "collapse_quality": "scaling",
     "plot": "charts",
     "in_units": "customary",
+    "contours": "mapping",
+    "exponent_map": "mapping",
     "refine": "refining",
     "study_of": "refining",
     "where": "filtering",
