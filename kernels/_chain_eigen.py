@@ -17,7 +17,11 @@ Source: Fernando & Parlett, Numer. Math. 67:191 (1994), sections 4 and 6; traces
 
 import math
 
+import numpy as np
+
 from kernels._chain import same, units
+from kernels._columns import entry
+from kernels._groups import GROUP, cells_at, each_group, write_row
 from kernels._jit import jit, jit_call, jit_inline
 from kernels._lanes import fma, isnt, magnitude, some, sqrt, where
 from kernels._vecmath import is_normal, scale
@@ -193,3 +197,32 @@ def frequencies(n, at, J, k, frequency, rows):
 def natural_frequencies(n, J, k, frequency, work):
     """`frequencies` of one chain: the first n entries of J [kg m^2], k [N m/rad] and frequency [Hz]."""
     return frequencies(n, same, J, k, frequency, work)
+
+
+@jit
+def row_at(j):
+    """Where the j-th row of a buffer of a group begins."""
+    return cells_at(j * GROUP)
+
+
+@jit
+def _group(first, J, k, frequency, status, rows):
+    n = J.shape[1]
+    part = GROUP * n
+    inertias, springs, found, entries = rows, rows[part:], rows[2 * part :], rows[3 * part :]
+    for j in range(n):
+        for cell in range(GROUP):
+            inertias[j * GROUP + cell] = J[first + cell, j]
+            springs[j * GROUP + cell] = k[first + cell, j]
+    verdict = frequencies(n, row_at, inertias, springs, found, entries)
+    for j in range(n):
+        write_row(first, j, found[row_at(j)], entries, frequency)
+    entries[row_at(0)] = verdict
+    for cell in range(GROUP):
+        status[first + cell] = entries[cell]
+
+
+@entry()
+def natural_frequencies_of_all(J, k, frequency, status):
+    """`natural_frequencies` of every row of J, k and frequency, of shape (n_cells, n); and every status."""
+    each_group(_group, (J, k, frequency, status, np.empty(7 * J.shape[1] * GROUP)))

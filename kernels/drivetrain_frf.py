@@ -16,8 +16,9 @@ import numpy as np
 
 from kernels import _chain_frf, _complex
 from kernels._chain import refusal as chain_refusal
+from kernels._chain_eigen import row_at
 from kernels._columns import entry, one_by_one
-from kernels._groups import GROUP, cells_at
+from kernels._groups import GROUP
 from kernels._jit import jit, jit_call
 from kernels._lanes import nearest, where
 from kernels._vecmath import is_normal, log
@@ -26,12 +27,6 @@ from kernels.interface import Field, Kernel, Method, Status
 _OK, _INACCURATE = float(Status.OK), float(Status.INACCURATE)
 _BAD_INPUT, _OUT_OF_RANGE = float(Status.BAD_INPUT), float(Status.OUT_OF_RANGE)
 _TWO_PI, _DB = 2.0 * math.pi, 20.0 / math.log(10.0)
-
-
-@jit
-def row_at(j):
-    """Where the j-th row of a buffer of a group begins."""
-    return cells_at(j * GROUP)
 
 
 @jit_call

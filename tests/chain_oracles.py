@@ -72,7 +72,7 @@ def receptance(J, k, h, frequency, drive, read):
 
 
 def polynomial(J, k, h):
-    """Coefficients of det(s^2 J + s H + K), the highest power first, by expansion of the determinant."""
+    """Coefficients of det(s^2 J + s H + K), the lowest power first, by expansion of the determinant."""
     J, k, h = numbers(J), numbers(k), numbers(h)
     before, now = [], [mpf(1)]
     for j in range(len(J)):
@@ -82,7 +82,7 @@ def polynomial(J, k, h):
         for power, value in enumerate(_product(_product(left, left), before)):
             new[power] -= value
         before, now = now, new
-    return now[::-1]
+    return now
 
 
 def _product(a, b):
@@ -97,4 +97,4 @@ def _product(a, b):
 def poles(J, k, h, digits=120):
     """All 2n roots of det(s^2 J + s H + K)."""
     with mp.workdps(digits):
-        return polyroots(polynomial(J, k, h), maxsteps=2000, extraprec=4 * digits, error=False)
+        return polyroots(polynomial(J, k, h), maxsteps=2000, extraprec=4 * digits, error=False, asc=True)
