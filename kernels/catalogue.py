@@ -17,6 +17,7 @@ KERNELS = {
     "impact": "kernels.impact:IMPACT",
     "polisher": "kernels.polisher:POLISHER",
     "polisher_motion": "kernels.polisher_motion:POLISHER_MOTION",
+    "polisher_wear": "kernels.polisher_wear:POLISHER_WEAR",
     "drivetrain_frf": "kernels.drivetrain_frf:DRIVETRAIN_FRF",
 }
 

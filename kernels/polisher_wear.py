@@ -1,0 +1,124 @@
+"""Wear of a turning workpiece under the tool of a polishing machine, along its radius (Preston's law).
+
+    dh/dt = preston p v,  v = alpha' J x - Omega J (x - w)                                           (1)
+with x from the arm's pivot, J the turn by 90 degrees and v the speed between tool and workpiece. The tool is fixed to
+the arm: its centre at L (cos, sin)(alpha + beta), its X axis along the arm, its outline abs(X/a)^n + abs(Y/b)^m = 1.
+Over many turns every point of a ring of the workpiece wears alike (unless the rates of crank and workpiece are in the
+ratio of small whole numbers: then this is the mean of the ring), and that is what is given:
+    wear(r) = preston p/(4 pi^2) int_0^2pi dtheta int_contact v dpsi                                 (2)
+by the exact integral along the tool's outline of `_wear_profile`. Leaves out: a tool that turns in its socket, pressure
+that varies under the tool. Source: Preston, J. Soc. Glass Technol. 11:214 (1927); Cordero-Davila et al., Opticheskii
+Zhurnal 78(3):55 (2011), (12) and (20), corrected.
+
+LOCK_UP: the crank does not turn fully, so there is no wear (NaN). CHANGE_POINT: values if the arm keeps to its branch.
+DOUBLE_CRANK: the arm turns fully, too; values are given.
+"""
+
+import math
+
+import numpy as np
+
+from kernels import _wear_profile, _wear_quadrature, _wear_scene, _wear_tool
+from kernels._columns import entry, one_by_one
+from kernels._jit import jit, jit_inline
+from kernels._vecmath import in_unit, is_normal
+from kernels._wear_call import entry_of_cells
+from kernels._wear_scene import BAD_INPUT, OK, OUT_OF_RANGE, allowed
+from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
+
+_INACCURATE = float(Status.INACCURATE)
+_FAINT = 2.0**-100
+_FOUR_PI2 = 4.0 * math.pi * math.pi
+
+
+@jit_inline
+def _wear_at(r, scene, unit, amount, rtol, work):
+    """Wear and its error at one radius [m], and the status of both."""
+    preston, pressure, units = amount
+    near = in_unit(r, unit)
+    near = near if near > _FAINT or scene[2][3] == 0.0 else 0.0
+    value, error, fine = _wear_profile.profile((scene[0], scene[1], scene[2], near), 0.5 * rtol, work)
+    wear = _wear_scene.with_units(value / _FOUR_PI2, preston, pressure, units)
+    doubt = _wear_scene.with_units(error / _FOUR_PI2, preston, pressure, units)
+    if value > 0.0 and not is_normal(wear):
+        return wear, doubt, OUT_OF_RANGE
+    return wear, doubt, OK if fine and error <= rtol * value else _INACCURATE
+
+
+@jit_inline
+def _cell(p, rtol, radius, wear, wear_error, work):
+    """Fills the profile of one cell and returns its status; p: its parameters."""
+    arm, _, _, verdict = _wear_scene.arm_without_units(p[0], p[1], p[2], p[3])
+    tool, ride, unit, pace, fine = _wear_scene.work_without_units(p)
+    verdict = verdict if fine or verdict >= FIRST_REFUSAL else OUT_OF_RANGE
+    turns = _wear_scene.turns_fully(verdict)
+    for k in range(radius.size):
+        wear[k], wear_error[k] = math.nan, math.nan
+        if turns:
+            amount = p[16], p[17], unit + pace
+            wear[k], wear_error[k], said = _wear_at(radius[k], (arm, tool, ride), unit, amount, rtol, work)
+            verdict = verdict if said == OK or verdict >= FIRST_REFUSAL else said
+    return verdict
+
+
+@entry_of_cells("radius")
+def contour(
+    b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
+    rtol, radius, wear, wear_error, status,
+):  # fmt: skip
+    """(2) as integrals along the outline, split where contact ends; one cell at a time, for no two split alike."""
+    cells = _wear_scene.side_by_side((
+        b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
+    ))  # fmt: skip
+    work = (
+        np.empty(_wear_quadrature.POOL), np.empty(_wear_tool.ARC_LIMIT), np.empty(_wear_tool.ARC_LIMIT),
+        np.empty(_wear_tool.STACK), np.empty(21),
+    )  # fmt: skip
+    for i in range(status.size):
+        status[i] = _cell(cells[i], rtol[i], radius, wear[i], wear_error[i], work)
+
+
+@jit
+def _check(
+    i, b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
+    status,
+):  # fmt: skip
+    fine = allowed(
+        b[i], d[i], f[i], e[i], type[i], omega[i], b_angle[i], L[i], beta[i], w_x[i], w_y[i], Omega[i],
+        tool_a[i], tool_b[i], tool_n[i], tool_m[i], preston[i],
+    )  # fmt: skip
+    status[i] = OK if fine and pressure[i] > 0.0 and pressure[i] < math.inf else BAD_INPUT
+
+
+@entry()
+def check(
+    b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
+    status,
+):  # fmt: skip
+    """BAD_INPUT: NaN, infinite or outside its limits."""
+    one_by_one(
+        _check,
+        (
+            b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston,
+            pressure, status,
+        ),
+    )  # fmt: skip
+
+
+POLISHER_WEAR = Kernel(
+    name="polisher_wear",
+    doc="Preston wear of a turning workpiece along its radius, under the tool of a polishing machine",
+    source="Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), corrected and completed; the integral is ours",
+    parameters=(
+        *_wear_scene.PARAMETERS,
+        Field("pressure", "Pa", "pressure under the tool", lower=0.0, open_lower=True),
+    ),
+    outputs=(
+        Field("wear", "m/s", "depth worn away per time, mean of the ring", dims=("radius",)),
+        Field("wear_error", "m/s", "what it may be wrong by", dims=("radius",)),
+    ),
+    along=(Field("radius", "m", "distance from the workpiece's centre", lower=0.0),),
+    check=check,
+    methods=(Method("contour", "integral along the tool's outline, adaptive to rtol at every radius", contour),),
+    example=_wear_scene.EXAMPLE,
+)
