@@ -21,7 +21,8 @@ from sweep.errors import SweepError
 try:
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.colors import ListedColormap, LogNorm, Normalize
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import LogNorm, Normalize
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -69,6 +70,7 @@ STYLE = {
     "savefig.dpi": 300,
     "svg.hashsalt": "foliot",
     "pdf.fonttype": 42,
+    "hatch.linewidth": 0.4,
 }
 
 MARKS = "osD^vPX*"
@@ -76,6 +78,12 @@ MARKS = "osD^vPX*"
 
 FLAGGED = ("#D55E00", "#000000", "#CC79A7", "#666666")
 """Colours of cells that are not OK."""
+
+HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "----")
+"""Patterns of cells without a value, told apart without colour."""
+
+NAME_ROOM = 0.11
+"""Part of a map's height that a region must reach from the place of its name in all directions."""
 
 METADATA: dict[str, dict[str, Any]] = {
     ".png": {"Software": None},
@@ -215,23 +223,50 @@ def _draw_map(axes: Any, shown: View) -> None:
     norm = LogNorm() if spans_decades(shown.y) else Normalize()
     mesh = axes.pcolormesh(*corners, np.ma.masked_invalid(shown.y.values), norm=norm, cmap="viridis", rasterized=True)
     axes.figure.colorbar(mesh, ax=axes, label=label(shown.y))
-    keys = [
-        _cover(axes, corners, shown, code, colour)
-        for code, colour in zip(shown.codes(), itertools.cycle(FLAGGED), strict=False)
-    ]
+    marks = zip(shown.codes(), itertools.cycle(HATCHES), itertools.cycle(FLAGGED), strict=False)
+    keys = [_cover(axes, corners, shown, code, hatch, colour) for code, hatch, colour in marks]
     if keys:
         axes.figure.legend(handles=keys, loc="outside lower center", ncols=3)
 
 
-def _cover(axes: Any, corners: list[Any], shown: View, code: int, colour: str) -> Any:
-    """Cells of one status: painted over where they have no value, outlined where they have one."""
+def _cover(axes: Any, corners: list[Any], shown: View, code: int, hatch: str, colour: str) -> Any:
+    """Cells of one status: hatched where they have no value, outlined where they have one; named if there is room."""
     here, name = shown.status == code, shown.meanings.get(code, str(code))
-    if not np.isfinite(shown.y.values[here]).any():
-        flat = np.ma.masked_where(~here, here.astype(float))
-        axes.pcolormesh(*corners, flat, cmap=ListedColormap([colour]), rasterized=True)
-        return Patch(color=colour, label=name)
-    axes.contour(shown.values(shown.x), shown.values(str(shown.across)), here, levels=[0.5], colors=[colour])
-    return Line2D([], [], color=colour, label=name)
+    empty = here & ~np.isfinite(shown.y.values)
+    _name(axes, corners, here, name)
+    if not empty.any():
+        axes.contour(shown.values(shown.x), shown.values(str(shown.across)), here, levels=[0.5], colors=[colour])
+        return Line2D([], [], color=colour, label=name)
+    look: dict[str, Any] = {"facecolor": "0.94", "edgecolor": "0.45", "linewidth": 0.0, "hatch": hatch}
+    axes.add_collection(PolyCollection(list(_runs(corners, empty)), **look))
+    return Patch(label=name, **look)
+
+
+def _runs(corners: list[Any], here: Any) -> Iterator[Any]:
+    """A rectangle for each run of cells side by side."""
+    x, y = corners
+    for row, cells in enumerate(here):
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], cells, [False]]).astype(int)))
+        for left, right in zip(x[ends[::2]], x[ends[1::2]], strict=True):
+            yield [(left, y[row]), (right, y[row]), (right, y[row + 1]), (left, y[row + 1])]
+
+
+def _name(axes: Any, corners: list[Any], here: Any, name: str) -> None:
+    """The name of a region where it is widest, if it has room there."""
+    from scipy.ndimage import distance_transform_edt
+
+    inside = np.pad(here, 1)
+    aspect = here.shape[0] / here.shape[1]
+    depth = distance_transform_edt(inside, sampling=(1.0, aspect))[1:-1, 1:-1]
+    row, column = np.unravel_index(int(depth.argmax()), depth.shape)
+    if depth[row, column] < NAME_ROOM * here.shape[0]:
+        return
+    at = [
+        np.sqrt(c[i] * c[i + 1]) if c[0] > 0 else (c[i] + c[i + 1]) / 2
+        for c, i in zip(corners, (column, row), strict=True)
+    ]
+    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}
+    axes.text(*at, name.replace("_", " "), ha="center", va="center", fontsize=7, bbox=box, zorder=5)
 
 
 def _edges(grid: Any, logarithmic: bool) -> Any:

@@ -158,18 +158,32 @@ def test_cells_that_are_not_ok_are_marked_on_the_line_or_at_its_foot():
     assert words(figure) == ["INACCURATE", "BAD_INPUT"]
 
 
-def test_a_map_paints_refused_cells_and_outlines_remarks():
+def test_a_map_hatches_refused_cells_and_outlines_remarks():
     ds = dataset(mu=log(), a=np.linspace(1, 2, 21))
     ds["status"][:3, :4] = 64
     ds["period"][:3, :4] = np.nan
     ds["status"][20:30, 5:10] = 1
     figure = plot(ds)
     _, outline, paint = figure.axes[0].collections
-    painted = ~np.ma.getmaskarray(paint.get_array())
-    assert painted[:4, :3].all()
-    assert painted.sum() == 12
+    assert len(paint.get_paths()) == 4  # a run of three cells in each of four rows
+    assert paint.get_hatch()
+    corner = paint.get_paths()[0].get_extents()
+    assert corner.x0 < ds.mu[0] < ds.mu[2] < corner.x1 < ds.mu[3]
+    assert corner.y0 < 1 < corner.y1 < ds.a[1]
     assert outline.get_paths()[0].get_extents().width > 0
     assert sorted(words(figure)) == ["BAD_INPUT", "INACCURATE"]
+
+
+def test_a_wide_region_is_named_where_it_is_widest():
+    ds = dataset(mu=log(), a=np.linspace(1, 2, 21))
+    wide = np.arange(ds.sizes["mu"]) < ds.sizes["mu"] // 2
+    ds["status"][wide] = 64
+    ds["period"][wide] = np.nan
+    text = plot(ds).axes[0].texts[0]
+    assert text.get_text() == "BAD INPUT"
+    x, y = text.get_position()
+    assert ds.mu[0] < x < ds.mu[ds.sizes["mu"] // 2]
+    assert y == pytest.approx(1.5, abs=0.1)
 
 
 @pytest.mark.parametrize(
