@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sweep.granules import Granules
 from sweep.layout import METHOD_USED, STATUS, Column
 
 if TYPE_CHECKING:
@@ -64,10 +65,10 @@ class Sample:
         """Mean seconds per cell over the grid."""
         return float(np.mean(self.costs))
 
-    def weights(self, partition: Partition) -> Any:
-        """Estimated seconds of every block."""
-        starts = np.arange(partition.count, dtype=np.float64) * partition.cells
-        stops = np.minimum(starts + partition.cells, partition.size)
+    def weights(self, partition: Partition, first: Callable[[Any], Any] | None = None) -> Any:
+        """Estimated seconds of every block; `first` tells the first cells of rows where a row is more than a cell."""
+        edges = np.minimum(np.arange(partition.count + 1, dtype=np.int64) * partition.cells, partition.size)
+        starts, stops = (found := edges if first is None else first(edges))[:-1], found[1:]
         return np.interp((starts + stops) / 2, self.positions, self.costs) * (stops - starts)
 
 
@@ -95,7 +96,7 @@ def take_sample(solver: Solver, columns: Sequence[Column], size: int) -> Sample:
     return Sample(np.array(places), np.array(costs), cells, np.concatenate(status), np.concatenate(used))
 
 
-def partition(sample: Sample, size: int, cell_bytes: int, workers: int) -> Partition:
+def partition(sample: Sample, size: int, cell_bytes: float, workers: int) -> Partition:
     """Blocks of about 1/200 of each worker's share, within bounds of time, bytes and number."""
     cost = max(sample.cost, 1e-12)
     shortest, longest = BLOCK_SECONDS
@@ -108,9 +109,16 @@ def partition(sample: Sample, size: int, cell_bytes: int, workers: int) -> Parti
     return Partition(size, min(whole_lanes, size))
 
 
-def order(sample: Sample, blocks: Partition) -> Any:
+def row_partition(sample: Sample, grains: Granules, row_bytes: float, workers: int) -> Partition:
+    """The same of rows."""
+    blocks = partition(sample, grains.size, row_bytes / grains.mean, workers)
+    rows = min(grains.count, math.ceil(blocks.cells / grains.mean))
+    return Partition(grains.count, rows)
+
+
+def order(sample: Sample, blocks: Partition, first: Callable[[Any], Any] | None = None) -> Any:
     """Block numbers, dear ones first, lest a worker be left alone with one; as they come where all cost alike."""
-    weights = np.maximum(sample.weights(blocks), 1e-300)
+    weights = np.maximum(sample.weights(blocks, first), 1e-300)
     if weights.max() < 1.5 * np.median(weights):
         return np.arange(blocks.count)
     return np.argsort(-np.round(2 * np.log2(weights)), kind="stable")

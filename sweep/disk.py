@@ -57,14 +57,14 @@ def make_folder(path: Path) -> None:
 def write_all(fd: int, pieces: Iterable[Any]) -> None:
     """Writes bytes or C-contiguous arrays one after the other. Raises OSError."""
     for piece in pieces:
-        view = _as_bytes(piece)
+        view = as_bytes(piece)
         while view:
             view = view[write(fd, view) :]
 
 
 def pwrite_all(fd: int, piece: Any, offset: int) -> None:
     """Writes bytes or a C-contiguous array at `offset`. Raises OSError."""
-    view = _as_bytes(piece)
+    view = as_bytes(piece)
     while view:
         count = pwrite(fd, view, offset)
         view, offset = view[count:], offset + count
@@ -72,7 +72,7 @@ def pwrite_all(fd: int, piece: Any, offset: int) -> None:
 
 def read_into(fd: int, buffer: Any, offset: int) -> None:
     """Fills an array from the bytes at `offset`. Raises EOFError where the file ends early, OSError."""
-    view = _as_bytes(buffer)
+    view = as_bytes(buffer)
     while view:
         count = os.preadv(fd, [view], offset)
         if not count:
@@ -130,6 +130,7 @@ def refusal(fault: OSError | RuntimeError, path: Path) -> SweepError:
     return SweepError(f"{path}: cannot be written ({reason})")
 
 
-def _as_bytes(piece: Any) -> memoryview:
+def as_bytes(piece: Any) -> memoryview:
+    """The bytes of bytes or of a C-contiguous array."""
     view = memoryview(piece)
     return view.cast("B") if view.nbytes else memoryview(b"")

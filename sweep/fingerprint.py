@@ -7,7 +7,7 @@ import hashlib
 import importlib.util
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from kernels import catalogue
-from sweep.study import Study, short
+from sweep.study import Study, Summary, short
 
 COMPILERS = ("numba", "llvmlite", "numpy")
 OURS = ("kernels",)
@@ -24,6 +24,9 @@ OURS = ("kernels",)
 
 ENGINE = ("sweep.solve", "sweep.grid")
 """Modules of the engine that decide values: the method of each cell, and its parameters."""
+
+REDUCING = ("sweep.granules", "sweep.reducing", "sweep.contents")
+"""Those that decide the values of a summary."""
 
 SOURCE = "source "
 
@@ -40,7 +43,13 @@ def fingerprint(study: Study) -> dict[str, str]:
     """
     said = _said(study)
     whole = hashlib.sha256(json.dumps(said).encode()).hexdigest()
-    return {"study": whole, **said, **_sources(study.kernel_name), **{name: _version(name) for name in COMPILERS}}
+    engine = ENGINE if study.summary is None else (*ENGINE, *REDUCING)
+    return {
+        "study": whole,
+        **said,
+        **_sources(study.kernel_name, engine),
+        **{name: _version(name) for name in COMPILERS},
+    }
 
 
 def difference(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
@@ -73,7 +82,15 @@ def _said(study: Study) -> dict[str, str]:
     said |= {f"axes.{name}": _values(axis.values) for name, axis in study.axes.items()}
     said |= {f"fixed.{n}": _values(value) if np.ndim(value) else repr(value) for n, value in study.fixed.items()}
     said |= {f"fixed.{name}": f"as {axis}" for name, axis in study.follows.items()}
-    return said | {f"along.{name}": _values(values) for name, values in study.along.items() if len(values)}
+    said |= {f"along.{name}": _values(values) for name, values in study.along.items() if len(values)}
+    return said if study.summary is None else said | _kept(study.summary)
+
+
+def _kept(summary: Summary) -> dict[str, str]:
+    """What the study says of its summary."""
+    said = {"summary.over": ", ".join(summary.over)}
+    said |= {f"summary.outputs.{name}": ", ".join(words) for name, words in summary.outputs.items()}
+    return said | {f"summary.edges.{name}": _values(edges) for name, edges in summary.edges.items()}
 
 
 def _values(values: Any) -> str:
@@ -83,7 +100,7 @@ def _values(values: Any) -> str:
     return f"{len(values)} value{'s' * (len(values) > 1)}, {ends} (digest {digest})"
 
 
-def _sources(kernel_name: str) -> dict[str, str]:
+def _sources(kernel_name: str, engine: Sequence[str]) -> dict[str, str]:
     """A digest of every source file that takes part in solving a cell."""
     entry = catalogue.KERNELS.get(kernel_name, kernel_name).partition(":")[0]
     packages = {entry.partition(".")[0], *OURS}
@@ -99,7 +116,7 @@ def _sources(kernel_name: str) -> dict[str, str]:
         # with a.b.c Python also runs a and a.b
         parents = (n.rsplit(".", k)[0] for n in names for k in range(n.count(".") + 1))
         waiting += [n for n in parents if n.partition(".")[0] in packages or _is_own(n.partition(".")[0])]
-    for name in ENGINE:
+    for name in engine:
         path = _path(name)
         if path is not None:
             found[name] = hashlib.sha256(path.read_bytes()).hexdigest()

@@ -20,25 +20,46 @@ SHORT_RUN = 16
 """Below this many equal cells in a row, filling every n-th cell is faster than filling runs."""
 
 
-class Grid:
-    """The cells of a study.
+class Box:
+    """Places in C order.
 
     Attributes
     ----------
     dims : tuple of str
-        Axis names of a product; ("cell",) of a zip.
     shape : tuple of int
     size : int
-        Number of cells.
+        Number of places.
     """
+
+    def __init__(self, dims: tuple[str, ...], shape: tuple[int, ...]) -> None:
+        self.dims, self.shape, self.size = dims, shape, math.prod(shape)
+
+    def pieces(self, start: int, stop: int) -> list[Piece]:
+        """Cut the places `start` to `stop` into hyperslabs of `shape`, at most 2 ndim - 1 of them.
+
+        Returns
+        -------
+        list of (slices, sub_start, sub_stop)
+            A slice per dimension; and the hyperslab's places, counted from `start`: the places
+            `block[sub_start:sub_stop]` in C order fill `dataset[slices]`.
+        """
+        found: list[Piece] = []
+        done = 0
+        for slices in _hyperslabs(self.shape, start, stop):
+            size = math.prod(s.stop - s.start for s in slices)
+            found.append((slices, done, done + size))
+            done += size
+        return found
+
+
+class Grid(Box):
+    """The cells of a study; its dims are the axes of a product, ("cell",) of a zip."""
 
     def __init__(self, study: Study) -> None:
         lengths = tuple(len(axis) for axis in study.axes.values())
         product = study.design == "product"
+        super().__init__(tuple(study.axes) if product else ("cell",), lengths if product else lengths[:1])
         self.study = study
-        self.dims: tuple[str, ...] = tuple(study.axes) if product else ("cell",)
-        self.shape: tuple[int, ...] = lengths if product else lengths[:1]
-        self.size = math.prod(self.shape)
         # cells in a row that share one value of the axis
         self._runs = {
             name: math.prod(lengths[position + 1 :]) if product else 1 for position, name in enumerate(study.axes)
@@ -81,23 +102,6 @@ class Grid:
             column = self._column("rtol", start, stop)
             rtol = float(column[0]) if _all_equal(column) else column
         return method, rtol
-
-    def pieces(self, start: int, stop: int) -> list[Piece]:
-        """Cut the cells `start` to `stop` into hyperslabs of `shape`, at most 2 ndim - 1 of them.
-
-        Returns
-        -------
-        list of (slices, sub_start, sub_stop)
-            A slice per dimension; and the hyperslab's cells, counted from `start`: the cells
-            `block[sub_start:sub_stop]` in C order fill `dataset[slices]`.
-        """
-        found: list[Piece] = []
-        done = 0
-        for slices in _hyperslabs(self.shape, start, stop):
-            size = math.prod(s.stop - s.start for s in slices)
-            found.append((slices, done, done + size))
-            done += size
-        return found
 
     def cell(self, index: int) -> dict[str, str]:
         """The axes' values of one cell, as people write them: {"mu": "0.9", "method": "closed"}."""
@@ -151,8 +155,8 @@ def _hyperslabs(shape: tuple[int, ...], start: int, stop: int) -> list[tuple[sli
     """Hyperslabs that hold the flat cells `start` to `stop` of `shape`, in order."""
     if start == stop:
         return []
-    if len(shape) == 1:
-        return [(slice(start, stop),)]
+    if len(shape) < 2:
+        return [(slice(start, stop),)[: len(shape)]]
     row = math.prod(shape[1:])
     (first, head), (last, tail) = divmod(start, row), divmod(stop, row)
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels.interface import Field, Kernel, Status
-from sweep.grid import Grid
+from sweep.grid import Box, Grid
 
 if TYPE_CHECKING:
     from sweep.study import Axis, Study
@@ -64,7 +64,7 @@ class Coordinate:
 class Layout:
     """Everything of a result except its numbers."""
 
-    grid: Grid
+    grid: Box
     columns: tuple[Column, ...]
     coordinates: tuple[Coordinate, ...]
     attrs: Mapping[str, Any]

@@ -5,18 +5,28 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xxhash
 
 from sweep import disk
+from sweep.blocks import Partition
+from sweep.errors import SweepError
 from sweep.image import Images
-from sweep.layout import Column
+from sweep.layout import METHOD_USED, STATUS, Column
 
+READERS = 8
+"""Parts read at a time: small files wait for the disk most of the time."""
+MOST_FLAGS = 1 << 28
+"""Cells up to which statuses and methods are kept in memory."""
+FLAGS = (STATUS, METHOD_USED)
 PART_NAME = re.compile(r"(\d+)-(\d+)\.([0-9a-f]{32})\.h5")
 
 
@@ -38,13 +48,19 @@ def digest(columns: Sequence[Column], arrays: Mapping[str, Any]) -> str:
 
 
 def read_part(
-    path: Path, images: Images, start: int, stop: int, buffers: Mapping[str, Any] | None = None
+    path: Path,
+    images: Images,
+    start: int,
+    stop: int,
+    buffers: Mapping[str, Any] | None = None,
+    keep: bool = False,
 ) -> dict[str, Any] | None:
     """The numbers of one block, each of shape `(stop - start, ...)`; None where the file is damaged.
 
     Parameters
     ----------
     buffers : arrays at least as long as the block, to be filled and returned in part
+    keep : leave the file in the system's memory, as it may soon be read again
 
     Raises
     ------
@@ -52,22 +68,37 @@ def read_part(
     """
     match = PART_NAME.fullmatch(path.name)
     assert match is not None
-    columns, cells = images.columns, stop - start
+    arrays = _read(path, images, start, stop, images.columns, buffers, keep)
+    return arrays if arrays is not None and digest(images.columns, arrays) == match[3] else None
+
+
+def _read(
+    path: Path,
+    images: Images,
+    start: int,
+    stop: int,
+    columns: Sequence[Column],
+    buffers: Mapping[str, Any] | None = None,
+    keep: bool = False,
+) -> dict[str, Any] | None:
+    """Some columns of a part, whatever its digest."""
+    cells = stop - start
     arrays = {c.name: c.empty(cells) if buffers is None else buffers[c.name][:cells] for c in columns}
     try:
         fd = disk.open_file(path, os.O_RDONLY)
         try:
-            places = _places(fd, images, start, stop) or _places_by_hdf5(path, columns, start, stop)
+            places = _places(fd, images, start, stop) or _places_by_hdf5(path, images.columns, start, stop)
             for column in columns:
                 disk.read_into(fd, arrays[column.name], places[column.name])
         finally:
-            disk.forget(fd)
+            if not keep:
+                disk.forget(fd)
             os.close(fd)
     except FileNotFoundError:
         raise
     except DAMAGE:
         return None
-    return arrays if digest(columns, arrays) == match[3] else None
+    return arrays
 
 
 def _places(fd: int, images: Images, start: int, stop: int) -> Mapping[str, int] | None:
@@ -91,3 +122,62 @@ def _places_by_hdf5(path: Path, columns: Sequence[Column], start: int, stop: int
                 raise ValueError(f"{column.name} has another shape or type")
             places[column.name] = dataset.id.get_offset()
     return places
+
+
+class Parts:
+    """The parts that are there. Before numbers of a part are used its digest is checked; for its statuses it is not."""
+
+    def __init__(self, images: Images, blocks: Partition, paths: Mapping[int, Path]) -> None:
+        self.images, self.blocks = images, blocks
+        self._paths = dict(paths)
+        self._sound: set[int] = set()
+        self._flags: dict[tuple[int, str], Any] = {}
+
+    def read(self, column: Column, cells: Any) -> Any:
+        """A column of the cells of these numbers, in any order; what is missing or damaged is NaN or PENDING."""
+        out = np.full((len(cells), *column.shape), column.missing, column.dtype)
+        blocks = cells // self.blocks.cells
+        cuts = [0, *(np.flatnonzero(np.diff(blocks)) + 1).tolist(), len(cells)]
+        pieces = [(low, high) for low, high in itertools.pairwise(cuts) if int(blocks[low]) in self._paths]
+
+        def fill(piece: tuple[int, int]) -> None:
+            wanted = slice(*piece)
+            index = int(blocks[piece[0]])
+            found = self._column(index, column)
+            if found is not None:
+                out[wanted] = found[cells[wanted] - self.blocks.bounds(index)[0]]
+
+        with ThreadPoolExecutor(READERS) as pool:
+            list(pool.map(fill, pieces))
+        return out
+
+    def _column(self, index: int, column: Column) -> Any:
+        path = self._paths[index]
+        start, stop = self.blocks.bounds(index)
+        try:
+            if column.name in FLAGS:
+                return self._flag(index, column.name)
+            if index in self._sound:
+                found = _read(path, self.images, start, stop, [column], keep=True)
+            else:
+                found = read_part(path, self.images, start, stop, keep=True)
+        except FileNotFoundError:
+            raise SweepError(f"{path.parent}: the sweep has ended meanwhile; open its result again") from None
+        if found is None:
+            self._paths.pop(index, None)
+            return None
+        self._sound.add(index)
+        return found[column.name]
+
+    def _flag(self, index: int, name: str) -> Any:
+        """Statuses or methods of a block; the others are kept until they are asked for, as they soon will be."""
+        kept = self._flags.pop((index, name), None)
+        if kept is not None:
+            return kept
+        flags = [c for c in self.images.columns if c.name in FLAGS]
+        found = _read(self._paths[index], self.images, *self.blocks.bounds(index), flags, keep=True)
+        if found is None:
+            return None
+        if self.blocks.size <= MOST_FLAGS:
+            self._flags |= {(index, other): found[other] for other in found if other != name}
+        return found[name]

@@ -17,8 +17,9 @@ from sweep.entries import EXAMPLE, Entries
 from sweep.errors import SweepError
 from sweep.loading import load_kernel
 from sweep.study import AUTO, Axis, Study, differs, frozen
+from sweep.summary import SummaryEntry
 
-KEYS = ("title", "question", "kernel", "method", "rtol", "outputs", "design", "axes", "fixed", "along")
+KEYS = ("title", "question", "kernel", "method", "rtol", "outputs", "design", "axes", "fixed", "along", "summary")
 DESIGNS = ("product", "zip")
 SETTINGS = ("method", "rtol")
 """What may be an axis although it is no parameter of the kernel."""
@@ -45,7 +46,7 @@ class Reader:
         title, question = (self.mistakes.text(keys.get(key, ""), key) for key in ("title", "question"))
         method = self._method(keys)
         rtol = self._rtol(keys)
-        outputs = self._outputs(keys.get("outputs"))
+        outputs = self._outputs(keys.get("outputs", self._named(keys.get("summary"))))
         design = self.mistakes.word(keys.get("design", "product"), "design", DESIGNS) or ""
         axes = self._axes(keys.get("axes", {}), design)
         given = self._fixed(keys.get("fixed", {}), axes)
@@ -53,6 +54,11 @@ class Reader:
         fixed, follows = self._complete(axes, given)
         self._excluded(method, axes, fixed)
         self._lacked(method, axes, outputs)
+        summary = None
+        if "summary" in keys:
+            asked = [o for o in self.kernel.outputs if o.name in outputs]
+            summary = SummaryEntry(self.entries).read(keys["summary"], axes, design, asked)
+            axes = dict(sorted(axes.items(), key=lambda item: item[0] in summary.over))
         self.mistakes.raise_if_any(self.source)
         return Study(
             title=title or f"{self.kernel.name} over {listed(axes, word='and')}",
@@ -68,6 +74,7 @@ class Reader:
             follows=follows,
             along=along,
             text=text,
+            summary=summary,
         )
 
     def _kernel(self, keys: Mapping[str, Any]) -> Kernel:
@@ -117,6 +124,14 @@ class Reader:
         axes = keys.get("axes")
         if name in keys and isinstance(axes, Mapping) and name in axes:
             self.mistakes.add(name, f"{name} is an axis as well; keep one of the two")
+
+    def _named(self, summary: Any) -> list[str] | None:
+        """Outputs that the summary names, which are those asked for where the study does not say."""
+        found = summary.get("outputs") if isinstance(summary, Mapping) else None
+        known = [o.name for o in self.kernel.outputs]
+        if not isinstance(found, Mapping) or not set(found) <= set(known):
+            return None
+        return [name for name in known if name in found] or None
 
     def _outputs(self, found: Any) -> tuple[str, ...]:
         """Outputs asked for, in the kernel's order; all of them where the study names none."""

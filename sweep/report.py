@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels.interface import Status
+from sweep.exporting import flag_words
 from sweep.layout import METHOD_USED, STATUS
-from sweep.statuses import count_methods, count_statuses, failures
+from sweep.reducing import BY_METHOD, BY_STATUS
+from sweep.statuses import account, count_methods, count_statuses, failures, is_summary
 from sweep.study import short
 from sweep.table import columns, page, section
 
@@ -26,14 +28,20 @@ CELLS_AT_ONCE = 1 << 22
 
 def result_text(path: Path, dataset: xr.Dataset) -> str:
     """All about a result."""
+    if is_summary(dataset):
+        return _summary_page(path, dataset)
+    for name in (STATUS, METHOD_USED):
+        if dataset[name].nbytes <= LARGEST_SCAN:
+            dataset[name].load()  # once, for they are looked at several times
     statuses = _status_rows(dataset)
+    complete = dataset.nbytes <= LARGEST_SCAN or "end" in dataset.attrs
     return page(
         _head(path, dataset),
         columns(_settings(dataset)),
         section("axes", (_coordinate(dataset[name]) for name in _axes(dataset))),
         section("fixed", map(_fixed, _given(dataset))),
         section("along", (_coordinate(dataset[name]) for name in _along(dataset))),
-        section("outputs", (_output(dataset[name]) for name in _outputs(dataset))),
+        section("outputs", (_output(dataset[name], complete) for name in _outputs(dataset))),
         section("status", statuses),
         section("methods used", _method_rows(dataset)),
     )
@@ -41,18 +49,60 @@ def result_text(path: Path, dataset: xr.Dataset) -> str:
 
 def summary_text(dataset: xr.Dataset) -> str:
     """After a run: what the cells were solved with, and what became of those that are not OK."""
-    total = dataset[STATUS].size
     used = ", ".join(f"{name} {cells:,}" for name, cells in count_methods(dataset).items())
-    lines = [f"{total:,} cells" + (f"; solved by {used}" if used else "")]
+    lines = [f"{account(dataset)}" + (f"; solved by {used}" if used else "")]
     return "\n".join([*lines, *map(str, failures(dataset))])
 
 
+def _summary_page(path: Path, dataset: xr.Dataset) -> str:
+    """All about a summary."""
+    over = str(dataset.attrs["over"]).split()
+    reduced = {name for name in over for dim in dataset[name].dims if dim in dataset.dims}
+    kept = [str(d) for d in dataset[BY_STATUS].dims[:-1]]
+    along = [n for n in _along_of(dataset, {*kept, *reduced, "cell"}) if n not in ("status_name", "method_name")]
+    bins = {str(d) for name, c in dataset.coords.items() if str(name).endswith("_bin_lower") for d in c.dims}
+    given = [c for c in dataset.coords.values() if not c.dims or set(map(str, c.dims)) & set(along) - {str(c.name)}]
+    counts = count_statuses(dataset)
+    return page(
+        _head(path, dataset),
+        columns(_settings(dataset)),
+        section("axes", (_coordinate(dataset[name]) for name in kept)),
+        section("reduced over", (_coordinate(dataset[name]) for name in over)),
+        section("fixed", map(_fixed, given)),
+        section("along", (_coordinate(dataset[name]) for name in along)),
+        section("reductions", (_reduction(dataset[name], bins) for name in _reductions(dataset))),
+        section("status", ((f"{c.cells:,}", c.name, _status_doc(c.name)) for c in counts)),
+        section("methods used", _method_rows(dataset)),
+    )
+
+
+def _reductions(dataset: xr.Dataset) -> list[str]:
+    return [str(name) for name in dataset.data_vars if name not in (BY_STATUS, BY_METHOD)]
+
+
+def _reduction(variable: xr.DataArray, bins: set[str]) -> tuple[str, ...]:
+    if set(map(str, variable.dims)) & bins:
+        shown = f"{variable.sizes[variable.dims[-1]]} bins"
+    elif variable.size == 1:
+        value = variable.item()
+        shown = f"{value:,}" if isinstance(value, int) else f"{value:.10g}"
+        words = flag_words(variable)
+        shown = words.get(value, shown) if words else shown
+    else:
+        shown = _extent(variable)
+    return str(variable.name), _unit(variable), shown, _doc(variable)
+
+
+def _status_doc(name: str) -> str:
+    return Status[name].doc if name in Status.__members__ else ""
+
+
 def _head(path: Path, dataset: xr.Dataset) -> str:
-    total = dataset[STATUS].size
-    waiting = next((c.cells for c in count_statuses(dataset) if c.name == Status.PENDING.name), 0)
+    found = account(dataset)
+    total, waiting = found.total, found.pending
     share = f"{math.floor(1000 * (total - waiting) / total) / 10:g} %"
     done = f"unfinished: {total - waiting:,} of {total:,} cells ({share})" if waiting else f"complete, {total:,} cells"
-    texts = [f"{path}: {done}", dataset.attrs.get("title", ""), dataset.attrs.get("question", "")]
+    texts = [f"{path}: {done}", dataset.attrs.get("title", ""), dataset.attrs.get("question", ""), str(found)]
     return "\n".join(dict.fromkeys(str(text) for text in texts if text))
 
 
@@ -77,7 +127,10 @@ def _axes(dataset: xr.Dataset) -> list[str]:
 
 def _along(dataset: xr.Dataset) -> list[str]:
     """Coordinates that all cells share."""
-    cells = set(dataset[STATUS].dims)
+    return _along_of(dataset, set(map(str, dataset[STATUS].dims)))
+
+
+def _along_of(dataset: xr.Dataset, cells: set[str]) -> list[str]:
     return [str(name) for name, c in dataset.coords.items() if c.dims == (name,) and name not in cells]
 
 
@@ -110,8 +163,8 @@ def _fixed(coordinate: xr.DataArray) -> tuple[str, ...]:
     return str(coordinate.name), _unit(coordinate), shown, _doc(coordinate)
 
 
-def _output(output: xr.DataArray) -> tuple[str, ...]:
-    return str(output.name), _unit(output), _extent(output), _doc(output)
+def _output(output: xr.DataArray, complete: bool) -> tuple[str, ...]:
+    return str(output.name), _unit(output), _extent(output) if complete else "", _doc(output)
 
 
 def _extent(output: xr.DataArray) -> str:
@@ -138,7 +191,7 @@ def _status_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
 
 
 def _method_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
-    total = dataset[STATUS].size
+    total = account(dataset).total
     return [(name, f"{cells:,}", f"{100 * cells / total:.1f} %") for name, cells in count_methods(dataset).items()]
 
 

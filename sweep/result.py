@@ -5,19 +5,22 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sweep.contents import contents, gathered, part_columns
 from sweep.errors import SweepError
+from sweep.granules import granules
 from sweep.image import Images
-from sweep.layout import STATUS, Column, Layout, layout
-from sweep.parts import PART_NAME, read_part
+from sweep.layout import STATUS, Layout
+from sweep.parts import PART_NAME, READERS, Parts, read_part
+from sweep.reducing import BY_STATUS, pending
 from sweep.statuses import StatusCount, count_methods, count_statuses, failures
-from sweep.store import Spec, folder_of, read_spec
+from sweep.store import SPEC, Spec, folder_of, read_spec
 from sweep.study import Study
 
 if TYPE_CHECKING:
@@ -34,6 +37,8 @@ __all__ = [
     "stored_fingerprint",
 ]
 
+LARGEST_AT_ONCE = 1 << 28
+"""Bytes of an unfinished result that are read at once; of larger ones, parts are read when they are used."""
 MEMORY_SHARE = 0.25
 """Results larger than this share of the memory are opened in pieces (dask)."""
 
@@ -94,7 +99,7 @@ def stored_fingerprint(output: Path) -> dict[str, str]:
     try:
         with h5py.File(output, "r") as file:
             text = file.attrs["fingerprint"]
-            file.attrs["study_json"], file[STATUS]
+            file.attrs["study_json"], file[STATUS if STATUS in file else BY_STATUS]
         return dict(json.loads(text))
     except (OSError, KeyError, ValueError, TypeError, RuntimeError) as fault:
         raise _unreadable(output, fault) from None
@@ -137,7 +142,8 @@ def _with_plain_text(dataset: xr.Dataset) -> xr.Dataset:
 
 def _open_parts(output: Path, spec: Spec, strict: bool) -> xr.Dataset:
     folder = folder_of(output)
-    matches = (PART_NAME.fullmatch(path.name) for path in folder.iterdir())
+    study = checked_study(folder, spec)
+    matches = (PART_NAME.fullmatch(entry.name) for entry in os.scandir(folder))
     parts = {int(m[1]) // spec.blocks.cells: folder / m[0] for m in matches if m}
     if strict and len(parts) == spec.blocks.count:
         raise SweepError(f"{output}: all is computed but not put together yet; run its sweep again to finish")
@@ -146,43 +152,48 @@ def _open_parts(output: Path, spec: Spec, strict: bool) -> xr.Dataset:
         raise SweepError(
             f"{output}: unfinished, {left} of {spec.blocks.count} blocks are missing; run its sweep again to continue"
         )
-    plan = layout(Study.from_json(spec.study, declared=True), spec.fingerprint)
-    large = plan.grid.size * plan.cell_bytes > MEMORY_SHARE * memory()
-    arrays = _in_pieces(plan, spec, parts) if large else _at_once(plan, spec, parts)
-    return in_memory(replace(plan, attrs={**plan.attrs, "start": spec.begun}), arrays)
+    plan = contents(study, spec.fingerprint)
+    plan = replace(plan, attrs={**plan.attrs, "start": spec.begun})
+    if study.summary is not None:
+        return in_memory(plan, gathered(study, _read_all(study, spec, parts, pending(study, 0, spec.blocks.size))))
+    if plan.grid.size * plan.cell_bytes > min(LARGEST_AT_ONCE, MEMORY_SHARE * memory()):
+        return _lazily(plan, Parts(Images(plan.columns), spec.blocks, parts))
+    empty = {c.name: np.full((plan.grid.size, *c.shape), c.missing, c.dtype) for c in plan.columns}
+    return in_memory(plan, _read_all(study, spec, parts, empty))
 
 
-def _at_once(plan: Layout, spec: Spec, parts: Mapping[int, Path]) -> dict[str, Any]:
-    images = Images(plan.columns)
-    arrays = {c.name: c.empty(plan.grid.size) for c in plan.columns}
-    for index in range(spec.blocks.count):
+def checked_study(folder: Path, spec: Spec) -> Study:
+    """The study of an unfinished sweep. Raises SweepError where its grid is not the one that was cut."""
+    study = Study.from_json(spec.study, declared=True)
+    rows = granules(study).count
+    if spec.blocks.size != rows or not 1 <= spec.blocks.cells <= rows:
+        raise SweepError(f"{folder / SPEC}: damaged (its blocks do not fit its study)")
+    return study
+
+
+def _read_all(study: Study, spec: Spec, parts: Mapping[int, Path], rows: dict[str, Any]) -> dict[str, Any]:
+    """The rows, with those of all sound parts filled in."""
+    images = Images(part_columns(study))
+
+    def fill(index: int) -> None:
         start, stop = spec.blocks.bounds(index)
-        block = _block(images, parts.get(index), start, stop)
-        for name, values in block.items():
-            arrays[name][start:stop] = values
-    return arrays
+        for name, values in (read_part(parts[index], images, start, stop, keep=True) or {}).items():
+            rows[name][start:stop] = values
+
+    with ThreadPoolExecutor(READERS) as pool:
+        list(pool.map(fill, sorted(parts)))
+    return rows
 
 
-def _block(images: Images, part: Path | None, start: int, stop: int) -> dict[str, Any]:
-    """A block's numbers; of a missing or damaged one NaN and PENDING."""
-    found = None if part is None else read_part(part, images, start, stop)
-    return found or {c.name: np.full((stop - start, *c.shape), c.missing, c.dtype) for c in images.columns}
+def _lazily(plan: Layout, parts: Parts) -> xr.Dataset:
+    """A Dataset that reads parts when their numbers are used."""
+    import xarray as xr
 
+    from sweep.lazy import lazy
 
-def _in_pieces(plan: Layout, spec: Spec, parts: Mapping[int, Path]) -> dict[str, Any]:
-    """The same as dask arrays, a block a piece."""
-    import dask.array as da
-    from dask.delayed import delayed
-
-    read = delayed(partial(_block, Images(plan.columns)), pure=False)
-    from_delayed: Any = da.from_delayed
-    concatenate: Any = da.concatenate
-    bounds = [spec.blocks.bounds(i) for i in range(spec.blocks.count)]
-    blocks = [read(parts.get(i), *b) for i, b in enumerate(bounds)]
-
-    def pieces(column: Column) -> list[Any]:
-        shapes = [(stop - start, *column.shape) for start, stop in bounds]
-        named = zip(blocks, shapes, strict=True)
-        return [from_delayed(block[column.name], shape, column.dtype) for block, shape in named]
-
-    return {c.name: concatenate(pieces(c)) for c in plan.columns}
+    variables = {
+        c.name: ((*plan.grid.dims, *c.dims), lazy(parts, c, plan.grid.shape), dict(c.attrs)) for c in plan.columns
+    }
+    coordinates = {c.name: (c.dims, c.values, dict(c.attrs)) for c in plan.coordinates}
+    dataset = xr.Dataset(variables, coordinates, dict(plan.attrs))
+    return dataset.chunk("auto") if dataset.nbytes > MEMORY_SHARE * memory() else dataset

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from sweep.assemble import assemble
+from sweep.contents import gathered, part_columns
 from sweep.errors import SweepError
 from sweep.fingerprint import difference, fingerprint
-from sweep.layout import columns
 from sweep.pool import Spares, cores, whole_number
 from sweep.progress import Progress, stream_of
 from sweep.result import in_memory, memory, open_result, stored_fingerprint
@@ -86,11 +86,11 @@ class _Task:
 
 def _run_in_memory(task: _Task) -> xr.Dataset:
     session = Session(task.study, task.mark, task.workers, block_cells=task.block_cells)
-    plan = session.layout
-    needed = plan.grid.size * plan.cell_bytes
+    rows = session.granules.count
+    needed = rows * session.row_bytes
     if needed > memory():
         raise SweepError(f"the result takes {needed / 1e9:.1f} GB, more than the memory; give a path to store it")
-    arrays = {c.name: c.empty(plan.grid.size) for c in plan.columns}
+    arrays = {c.name: c.empty(rows) for c in session.columns}
 
     def work(job: int, solve: Solve) -> None:
         start, stop = session.blocks.bounds(job)
@@ -103,11 +103,12 @@ def _run_in_memory(task: _Task) -> xr.Dataset:
         progress.end()
     finally:
         progress.stop()
-    return in_memory(session.dated(progress, session.began), arrays)
+    found = arrays if task.study.summary is None else gathered(task.study, arrays)
+    return in_memory(session.dated(progress, session.began), found)
 
 
 def _run_to_file(task: _Task, output: Path) -> None:
-    with opened(output, columns(task.study)) as store:
+    with opened(output, part_columns(task.study)) as store:
         spec = _spec(store, task)
         # looked at again, for another run may have ended before this one had the lock
         if _done(task, output):
@@ -172,13 +173,13 @@ def _finish(session: Session, store: Store, output: Path, progress: Progress) ->
         _store_blocks(session, store, progress)
         assert store.spec is not None
         layout = session.dated(progress, store.spec.begun)
-        damaged = assemble(store, layout, output, session.workers, progress.gather)
+        damaged = assemble(store, session.study, layout, output, session.workers, progress.gather)
         if not damaged:
             progress.end()
             return
         for index in damaged:
             path = store.set_aside(index)
-            start, stop = store.blocks.bounds(index)
+            start, stop = session.cells(index)
             progress.note(f"cells {start} to {stop} were damaged on the disk and are computed again; see {path}")
             progress.again(stop - start)
     raise SweepError(f"{store.folder}: what is written there comes back damaged again and again; the disk is failing")
@@ -205,7 +206,8 @@ def _store_blocks(session: Session, store: Store, progress: Progress) -> None:
 
 def _warn_of_space(session: Session, output: Path, progress: Progress) -> None:
     """Parts to come and the output have room on the disk, or somebody is told."""
-    needed = session.layout.cell_bytes * (progress.total - progress.done + progress.total)
+    missing = session.row_bytes * (progress.total - progress.done) / session.granules.mean
+    needed = missing + session.layout.cell_bytes * session.layout.grid.size
     free = shutil.disk_usage(output.parent).free
     if needed > free:
         progress.note(f"needs {needed / 1e6:,.1f} MB, only {free / 1e6:,.1f} MB are free here")

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, TextIO
 
-from sweep.blocks import UNSAMPLED, Partition, Sample, order, partition, take_sample
+from sweep.blocks import UNSAMPLED, Partition, Sample, order, row_partition, take_sample
+from sweep.contents import contents, part_columns
 from sweep.errors import SweepError
-from sweep.layout import METHOD_USED, STATUS, Layout, layout
+from sweep.granules import granules
+from sweep.layout import METHOD_USED, STATUS, Layout, columns
 from sweep.pool import Halt, Spares, each
 from sweep.progress import Progress
+from sweep.reducing import Reducer
 
 if TYPE_CHECKING:
     from sweep.study import Study
 
 Solve = Callable[[int, int, Mapping[str, Any]], bool]
-"""Computes the cells start .. stop into columns of that length; False where the run is being stopped."""
+"""Computes the rows start .. stop into columns of that length; False where the run is being stopped."""
 
 
 class Session:
@@ -45,30 +49,31 @@ class Session:
     ) -> None:
         self.study, self.workers = study, workers
         self.began = now()
-        self.layout: Layout = layout(study, mark)
-        size = self.layout.grid.size
-        self.sample: Sample = self._take_sample(size) if sampled else UNSAMPLED
+        self.layout: Layout = contents(study, mark)
+        self.columns = part_columns(study)
+        self.granules = grains = granules(study)
+        self.sample: Sample = sampled_study(study) if sampled else UNSAMPLED
         if blocks is None and block_cells is not None:
-            blocks = Partition(size, min(block_cells, size))
-        self.blocks = blocks or partition(self.sample, size, self.layout.cell_bytes, workers)
-        self._weights = self.sample.weights(self.blocks)
+            blocks = Partition(grains.count, min(math.ceil(block_cells / grains.mean), grains.count))
+        self.blocks = blocks or row_partition(self.sample, grains, self.row_bytes, workers)
+        self._weights = self.sample.weights(self.blocks, grains.first)
 
-    def _take_sample(self, size: int) -> Sample:
-        from sweep.solve import Solver
+    @property
+    def row_bytes(self) -> int:
+        """Bytes of one row over all columns of a part."""
+        return sum(column.cell_bytes for column in self.columns)
 
-        with faults_told(f"{self.study.kernel_name}: the kernel failed"):
-            solver = Solver(self.study)
-            solver.warm()
-            return take_sample(solver, self.layout.columns, size)
+    def cells(self, job: int) -> tuple[int, int]:
+        """The cells of a block."""
+        return self.granules.cells(*self.blocks.bounds(job))
 
     def progress(self, stream: TextIO | None, name: str, jobs: Iterable[int]) -> Progress:
         """Where the run stands when `jobs` are still to do."""
         left, work = 0, 0.0
         for job in jobs:
-            start, stop = self.blocks.bounds(job)
+            start, stop = self.cells(job)
             left, work = left + stop - start, work + float(self._weights[job])
-        size = self.layout.grid.size
-        return Progress(size, stream, name, size - left, work)
+        return Progress(self.granules.size, stream, name, self.granules.size - left, work)
 
     def dated(self, progress: Progress, began: str) -> Layout:
         """The layout with the times of the run, which now is at its end."""
@@ -87,7 +92,7 @@ class Session:
         solvers = Spares(lambda: self._solver(halt), threads)
 
         def guarded(job: int) -> None:
-            start, stop = self.blocks.bounds(job)
+            start, stop = self.cells(job)
             with faults_told(f"cells {start} to {stop}: the kernel failed"), solvers.lent() as solve:
                 work(job, solve)
 
@@ -95,22 +100,41 @@ class Session:
             if job is None:
                 progress.tick()
             else:
-                start, stop = self.blocks.bounds(job)
+                start, stop = self.cells(job)
                 progress.add(stop - start, float(self._weights[job]))
 
         wanted = set(jobs)
-        each((j for j in map(int, order(self.sample, self.blocks)) if j in wanted), guarded, threads, finished, halt)
+        inorder = map(int, order(self.sample, self.blocks, self.granules.first))
+        each((j for j in inorder if j in wanted), guarded, threads, finished, halt)
 
     def _solver(self, halt: Halt) -> Solve:
-        from sweep.solve import Solver
+        compute = _cells_solver(self.study) if self.study.summary is None else Reducer(self.study).solve
+        return lambda start, stop, arrays: halt.compute(lambda: compute(start, stop, arrays))
 
-        solver = Solver(self.study)
 
-        def solve(start: int, stop: int, arrays: Mapping[str, Any]) -> bool:
-            outputs = {name: array for name, array in arrays.items() if name not in (STATUS, METHOD_USED)}
-            return halt.compute(lambda: solver.solve(start, stop, outputs, arrays[STATUS], arrays[METHOD_USED]))
+def _cells_solver(study: Study) -> Callable[[int, int, Any], None]:
+    from sweep.solve import Solver
 
-        return solve
+    solver = Solver(study)
+
+    def solve(start: int, stop: int, arrays: Mapping[str, Any]) -> None:
+        outputs = {name: array for name, array in arrays.items() if name not in (STATUS, METHOD_USED)}
+        solver.solve(start, stop, outputs, arrays[STATUS], arrays[METHOD_USED])
+
+    return solve
+
+
+def sampled_study(study: Study) -> Sample:
+    """Compiles the kernel and times a sample of the grid. Raises SweepError where the kernel fails."""
+    from sweep.solve import Solver
+
+    with faults_told(f"{study.kernel_name}: the kernel failed"):
+        solver = Solver(study)
+        solver.warm()
+        sample = take_sample(solver, columns(study), granules(study).size)
+        if study.summary is not None:
+            sample = replace(sample, costs=sample.costs + Reducer(study).seconds())
+        return sample
 
 
 @contextlib.contextmanager

@@ -54,6 +54,25 @@ class Axis:
 
 
 @dataclass(frozen=True, eq=False)
+class Summary:
+    """What is kept instead of every cell.
+
+    Attributes
+    ----------
+    over : tuple of str
+        Axes that are reduced; the others stay dimensions, and come first in the study's axes.
+    outputs : dict of str to tuple of str
+        Reductions of every output asked for.
+    edges : dict of str to ndarray
+        Bounds of the bins of every histogram, ascending.
+    """
+
+    over: tuple[str, ...]
+    outputs: dict[str, tuple[str, ...]]
+    edges: dict[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True, eq=False)
 class Study:
     """One sweep, complete and free of mistakes. Made by `read_study` or `build_study`.
 
@@ -77,6 +96,8 @@ class Study:
         Every coordinate of the kernel; of length 0 where no output asked for needs it.
     text : str
         The study file, or "" of a study built in Python.
+    summary : Summary, optional
+        None: every cell is kept.
     """
 
     title: str
@@ -92,6 +113,7 @@ class Study:
     follows: dict[str, str]
     along: dict[str, NDArray[np.float64]]
     text: str = ""
+    summary: Summary | None = None
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Study) and self.to_json() == other.to_json()
@@ -135,6 +157,7 @@ class Study:
             {"name": a.name, "values": a.values, "spacing": a.spacing, "words": a.words} for a in self.axes.values()
         ]
         keys |= {"format": FORMAT, "axes": axes, "kernel": _declaration(self.kernel)}
+        keys |= {} if self.summary is None else {"summary": vars(self.summary)}
         return json.dumps(_plain(keys), allow_nan=False, ensure_ascii=False)
 
     @classmethod
@@ -165,8 +188,9 @@ class Study:
             known = {name: keys[name] for name in PLAIN} | {"axes": axes, "along": along}
             known["outputs"] = tuple(known["outputs"])
             known["fixed"] = {name: _value(value) for name, value in keys["fixed"].items()}
+            known["summary"] = _summary(keys["summary"]) if "summary" in keys else None
             kernel = _kernel_as_declared(keys["kernel"])
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise SweepError(f"not the JSON of a study: {type(error).__name__} {error}") from None
         if not declared:
             from sweep.loading import load_kernel
@@ -210,6 +234,11 @@ def _array(values: Any) -> NDArray[np.float64]:
 
 def _value(value: Any) -> float | NDArray[np.float64]:
     return _array(value) if np.ndim(value) else value
+
+
+def _summary(keys: dict[str, Any]) -> Summary:
+    outputs = {name: tuple(reductions) for name, reductions in keys["outputs"].items()}
+    return Summary(tuple(keys["over"]), outputs, {name: _array(edges) for name, edges in keys["edges"].items()})
 
 
 def _words(words: list[str] | None) -> tuple[str, ...] | None:

@@ -54,7 +54,7 @@ def unfinished(tmp_path):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Solver, "solve", failing)
-        patch.setattr("sweep.session.order", lambda sample, blocks: np.array([0, 1, 3, 4, 2]))
+        patch.setattr("sweep.session.order", lambda sample, blocks, first: np.array([0, 1, 3, 4, 2]))
         with pytest.raises(SweepError, match="stop here"):
             run(stone(), path, block_cells=5, workers=1, progress=False)
     for index in (3, 4):
@@ -194,11 +194,11 @@ def test_large_results_come_in_pieces_and_are_the_same(unfinished, stored, monke
 def test_a_sweep_that_ends_while_it_is_read_is_opened_finished(unfinished, stored, monkeypatch):
     real = result.read_part
 
-    def ending(*rest):
+    def ending(*rest, **keys):
         monkeypatch.setattr(result, "read_part", real)
         shutil.rmtree(folder_of(unfinished))
         shutil.copy(stored, unfinished)
-        return real(*rest)
+        return real(*rest, **keys)
 
     monkeypatch.setattr(result, "read_part", ending)
     assert (open_result(unfinished).status != Status.PENDING).all()

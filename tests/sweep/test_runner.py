@@ -156,7 +156,7 @@ def interrupted(study, output):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Solver, "solve", failing)
-        patch.setattr("sweep.session.order", lambda sample, blocks: np.arange(blocks.count))
+        patch.setattr("sweep.session.order", lambda sample, blocks, first: np.arange(blocks.count))
         with pytest.raises(SweepError, match="stop here"):
             quiet(study, output, block_cells=5, workers=1)
 
