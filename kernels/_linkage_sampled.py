@@ -7,7 +7,7 @@ time: every search goes its own way.
 
 import math
 
-from kernels._jit import jit, jit_call
+from kernels._jit import jit, jit_call, jit_inline
 from kernels._lanes import magnitude, sqrt
 from kernels._linkage import crank, dead_gaps, larger, motion, squares
 from kernels._linkage_extremes import angle, smaller
@@ -33,7 +33,7 @@ def step(j):
     return math.pi * (2 * j - SAMPLES) / SAMPLES
 
 
-@jit_call
+@jit_inline
 def sample(cell, alphas, rates, bends):
     """Fills the three columns of a turn; returns inf where a dead point is passed between two samples, else 0."""
     for j in range(SAMPLES):
@@ -70,7 +70,7 @@ def turning(cell, order, sign, j):
     return 0.5 * (low + high)
 
 
-@jit_call
+@jit_inline
 def extremes(cell, alphas):
     """A0, A1, eta_plus, eta_minus; theta_plus, theta_minus; and their largest relative error."""
     at_plus, at_minus = turning(cell, 1, 1.0, largest(alphas, 1.0)), turning(cell, 1, -1.0, largest(alphas, -1.0))
@@ -115,7 +115,7 @@ def distortion(alphas, stride):
     return math.sqrt(rest) / first, first
 
 
-@jit_call
+@jit_inline
 def rates(cell, alphas, speeds):
     """thd, the largest and the least rate, and the largest of their relative errors."""
     most, least = fastest(cell, 1.0, speeds), fastest(cell, -1.0, speeds)
@@ -128,7 +128,7 @@ def rates(cell, alphas, speeds):
     return (thd, most, least), larger(lost, (magnitude(thd - coarse) + 4.0 * ROUNDING / first) / thd)
 
 
-@jit_call
+@jit_inline
 def pressed(cell):
     """The least angle between coupler and arm, or their extensions, of all samples."""
     least = math.pi
@@ -165,7 +165,7 @@ def lock(cell, goal):
     return math.nan if free else start, 0.0 if free else lost
 
 
-@jit_call
+@jit_inline
 def locks(cell):
     """The locks nearest to 0 and to pi, as `_linkage_extremes.locks`; and their largest relative error."""
     inner, inner_lost = lock(cell, 0.0)

@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from kernels._groups import GROUP, cells_at
-from kernels._jit import jit, jit_call
+from kernels._jit import jit, jit_call, jit_inline
 from kernels._lanes import choose, fma, isnt, magnitude, some, sqrt, where
 from kernels._linkage import acceleration, dead_gaps, direction, larger, opening, squares
 from kernels._linkage_extremes import smaller
@@ -86,7 +86,7 @@ def smooth(lengths, margin):
     return (m1 * ((b + d) + (f + e)) > far) & (m2 * m3 > far) & (b > 5.3 * e)
 
 
-@jit_call
+@jit_inline
 def scan(lengths, margin, forward, backward, bends, angles):
     """Fills buffers of a group: alpha' on either half of the turn (type A), psi_xx and psi.
 
@@ -106,7 +106,7 @@ def scan(lengths, margin, forward, backward, bends, angles):
     return first, mean, gross
 
 
-@jit
+@jit_inline
 def few_harmonics(ratio, bends):
     """sum (a_k^2 + psi_k^2) over k from 2 to HARMONICS, and the sum of terms that make psi_2."""
     zero = 0.0 * ratio
@@ -123,7 +123,7 @@ def few_harmonics(ratio, bends):
     return total, gross
 
 
-@jit
+@jit_inline
 def all_harmonics(lengths, ratio, first, mean, angles):
     """The same sum over all k, as twice the mean square of what the first harmonic leaves."""
     zero = 0.0 * ratio
@@ -136,7 +136,7 @@ def all_harmonics(lengths, ratio, first, mean, angles):
     return total
 
 
-@jit_call
+@jit_inline
 def distortion(lengths, margin, scanned, bends, angles):
     """thd of (2), and its relative error; `scanned` is what `scan` returns."""
     b, _, _, e = lengths
@@ -157,7 +157,7 @@ def distortion(lengths, margin, scanned, bends, angles):
     return where(moves, rest / fundamental, 0.0), where(moves, doubt, ROUNDING)
 
 
-@jit
+@jit_inline
 def _two_peaks(sign, buffer, half, found):
     """The two highest local maxima of sign alpha' among `found` and the nodes of one half of the turn.
 
@@ -239,7 +239,7 @@ def fastest(lengths, margin, sign, forward, backward):
     return where(over, other, highest), where(over, more, missing)
 
 
-@jit_call
+@jit_inline
 def rates(lengths, margin, forward, backward):
     """Largest and least alpha' of a crank that turns, and the larger of their relative errors."""
     moves = lengths[3] > 0.0

@@ -124,40 +124,37 @@ def textbook_bound(b, d, f, e, type, rtol, asked, out):
 
 
 @jit
-def _waveform(first, b, d, f, e, type, rtol, buffers, *outputs):
+def _over_a_turn(first, b, d, f, e, rtol, buffers, thd, rate_max, rate_min, status):
     i = cells_at(first)
-    cell = judged(b[i], d[i], f[i], e[i])
-    lengths, _, margin, code = cell
-    flat = _linkage_extremes.flattened(margin)
-    root = _linkage_extremes.roots(lengths, flat)
-    angles = _linkage_extremes.extremes(lengths, root)
-    crank_angles = _linkage_extremes.crank_angles(lengths, flat, root)
-    pressed = _linkage_extremes.transmission(lengths, margin)
-    slopes = _linkage_extremes.tolerances(lengths, root)
+    lengths, _, margin, code = judged(b[i], d[i], f[i], e[i])
     forward, backward, bends, openings = buffers[0], buffers[1], buffers[2], buffers[3]
     scanned = _linkage_waveform.scan(lengths, margin, forward, backward, bends, openings)
-    thd, thd_doubt = _linkage_waveform.distortion(lengths, margin, scanned, bends, openings)
+    distortion, doubt = _linkage_waveform.distortion(lengths, margin, scanned, bends, openings)
     most, least, rate_doubt = _linkage_waveform.rates(lengths, margin, forward, backward)
-    wide = isnt(rate_doubt <= rtol[i]) | isnt(rtol[i] >= ROUNDING)
-    wide = (said(code, DOUBLE_CRANK) & wide) | (said(code, OK) & (wide | isnt(thd_doubt <= rtol[i])))
-    verdict = where(wide, _INACCURATE, code)
-    stops, rates = locks(code, lengths, margin), (thd, most, least)
-    write(i, side_of(type[i]), cell, angles, crank_angles, stops, pressed, rates, slopes, verdict, *outputs)
+    swings, turns = said(code, OK), said(code, OK) | said(code, DOUBLE_CRANK)
+    thd[i] = where(swings, distortion, math.nan)
+    rate_max[i], rate_min[i] = where(turns, most, math.nan), where(turns, least, math.nan)
+    wide = (turns & isnt(rate_doubt <= rtol[i])) | (swings & isnt(doubt <= rtol[i])) | isnt(rtol[i] >= ROUNDING)
+    status[i] = where(wide & (code < FIRST_REFUSAL), _INACCURATE, code)
 
 
 @entry()
+def over_a_turn(b, d, f, e, rtol, thd, rate_max, rate_min, status):
+    """The outputs that `stable` lacks; `_linkage_waveform` estimates their rounding."""
+    buffers = np.empty((4, _linkage_waveform.NODES * GROUP))
+    each_group(_over_a_turn, (b, d, f, e, rtol, buffers, thd, rate_max, rate_min, status))
+
+
 def waveform(
     b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
     transmission_angle, thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
 ):  # fmt: skip
-    """As `stable`, and the motion over a turn by `_linkage_waveform`, which estimates its rounding."""
-    n = _linkage_waveform.NODES * GROUP
-    columns = (
-        b, d, f, e, type, rtol, np.empty((4, n)),
-        A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer, transmission_angle,
-        thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
+    """As `stable`, and then the motion over a turn."""
+    stable(
+        b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
+        transmission_angle, thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
     )  # fmt: skip
-    each_group(_waveform, columns)
+    over_a_turn(b, d, f, e, rtol, thd, rate_max, rate_min, status)
 
 
 @jit
