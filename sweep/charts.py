@@ -258,7 +258,8 @@ def _name(axes: Any, corners: list[Any], here: Any, name: str) -> None:
     inside = np.pad(here, 1)
     aspect = here.shape[0] / here.shape[1]
     depth = distance_transform_edt(inside, sampling=(1.0, aspect))[1:-1, 1:-1]
-    row, column = np.unravel_index(int(depth.argmax()), depth.shape)
+    widest = np.argwhere(depth > 0.999 * depth.max())
+    row, column = widest[abs(widest - widest.mean(axis=0)).sum(axis=1).argmin()]
     if depth[row, column] < NAME_ROOM * here.shape[0]:
         return
     at = [
