@@ -27,6 +27,7 @@ ROUNDING = 2.0**-50
 REACH = 2.0**300
 """Largest h without units."""
 _SETTLED = 1e-12  # correction over root, after which (2) takes over
+_NEAR = 1e-6  # step over root, above which another joint may do better
 _LIGHT = 0.03
 _OK, _NOT_CONVERGED, _OUT_OF_RANGE = float(Status.OK), float(Status.NOT_CONVERGED), float(Status.OUT_OF_RANGE)
 _TURNS = 0.15915494309189535  # 1/(2 pi)
@@ -123,12 +124,10 @@ def _joint(n, chain, ways):
 
 
 @jit_call
-def _look(n, chain, s, ways):
-    """Newton's step (2) of a pole, the bound (3) on its relative error, and x* J x, x* h x."""
+def _look(n, chain, s, r, ways):
+    """Newton's step (2) of a pole from the joint r, the bound (3) on its relative error, and x* J x, x* h x."""
     J, k, h, e_J, e_k = chain
-    _follow(n, chain, s, 1, ways)
-    _follow(n, chain, s, -1, ways)
-    r, right = _joint(n, chain, ways), ways[7 * n :]
+    right = ways[7 * n :]
     rigid, lost, solid, viscous, elastic = (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0
     for j in range(n):
         x = _entry(ways if j <= r else right, n, 0, j, r)
@@ -149,11 +148,28 @@ def _look(n, chain, s, ways):
 
 
 @jit_call
+def _best_joint(n, chain, s, ways):
+    """The joint whose step is the shortest: the largest inertia may hardly move with what a damper lets creep."""
+    r = _joint(n, chain, ways)
+    least = _complex.size(_look(n, chain, s, r, ways)[0])
+    if least > _NEAR * _complex.size(s):
+        for other in range(n):
+            size = _complex.size(_look(n, chain, s, other, ways)[0])
+            if size < least:
+                r, least = other, size
+    return r
+
+
+@jit_call
 def _refined(n, chain, s, ways):
     """A pole to its last digits, and a bound on its relative error."""
-    error, solid, viscous = 0.0, 1.0, 0.0
+    error, solid, viscous, r = 0.0, 1.0, 0.0, -1
     for attempt in range(2 * REFINEMENTS):
-        step, error, solid, viscous = _look(n, chain, s, ways)
+        _follow(n, chain, s, 1, ways)
+        _follow(n, chain, s, -1, ways)
+        if r < 0:
+            r = _best_joint(n, chain, s, ways)
+        step, error, solid, viscous = _look(n, chain, s, r, ways)
         s = _complex.plus(s, step)
         late = _complex.size(step) / _complex.size(s)
         error = error if late <= 4.0 * error else error + late

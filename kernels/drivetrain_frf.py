@@ -7,6 +7,7 @@ J diagonal, k and h tridiagonal. The answer to a torque of any size is that time
 Leaves out: backlash, solid friction, damping that is not viscous. Source: the drivetrain of a milling machine after
 Rivin; how (1) is solved, and the bound by which a cell is called INACCURATE, is told in `_chain_frf`.
 
+rtol is of abs(dH)/abs(H) at every frequency: the phase is right to it in radian, the decibel to 8.7 times it.
 An undamped resonance, or 0 Hz without a spring to ground, is OUT_OF_RANGE: there H is infinite.
 """
 
