@@ -18,7 +18,7 @@ import numpy as np
 from sweep import disk
 from sweep.blocks import Partition
 from sweep.canvas import Canvas
-from sweep.contents import gathered
+from sweep.contents import gathered, part_columns
 from sweep.errors import SweepError
 from sweep.granules import granules
 from sweep.grid import Box
@@ -59,7 +59,7 @@ def assemble(store: Store, study: Study, layout: Layout, output: Path, threads: 
     """
     temporary = store.temporary("result.h5")
     try:
-        seals = Seals(layout.columns, _chunks(store, study))
+        seals = Seals(layout.columns, chunks(study, store.blocks))
         damaged = _build(store, study, layout, seals, temporary, threads, tell)
         if not damaged:
             _check(layout, seals, temporary, output)
@@ -73,12 +73,12 @@ def assemble(store: Store, study: Study, layout: Layout, output: Path, threads: 
             temporary.unlink(missing_ok=True)
 
 
-def _chunks(store: Store, study: Study) -> Partition:
+def chunks(study: Study, blocks: Partition) -> Partition:
     """The output's cells that are written, and have a digest, together: those of a part, or some groups."""
     if study.summary is None:
-        return store.blocks
+        return blocks
     grains = granules(study)
-    row_bytes = sum(column.cell_bytes for column in store.columns)
+    row_bytes = sum(column.cell_bytes for column in part_columns(study))
     return Partition(grains.groups, min(grains.groups, max(1, CHUNK_BYTES // (row_bytes * grains.per_group))))
 
 
@@ -237,7 +237,7 @@ class _Gatherer:
     """Reduces the rows of verified parts to groups, in their order."""
 
     def __init__(self, store: Store, study: Study, writer: _Writer) -> None:
-        self._study, self._writer, self._chunks = study, writer, _chunks(store, study)
+        self._study, self._writer, self._chunks = study, writer, chunks(study, store.blocks)
         self._rows = granules(study).per_group
         self._store = store
         self._last: tuple[int, dict[str, Any]] | None = None

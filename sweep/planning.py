@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
+import tempfile
+import time
+import zlib
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,19 +15,32 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kernels.interface import Status
-from sweep.blocks import Sample, partition, take_sample
+from sweep.assemble import chunks, write_frame
+from sweep.blocks import Partition, Sample, row_partition
+from sweep.canvas import Canvas
+from sweep.contents import contents, part_columns
 from sweep.errors import SweepError
-from sweep.layout import Layout, layout
+from sweep.granules import granules
+from sweep.grid import Grid
+from sweep.image import Images
+from sweep.integrity import Seals
+from sweep.layout import Column
+from sweep.parts import FLAGS
 from sweep.pool import cores, whole_number
 from sweep.progress import duration
+from sweep.reducing import strip_bytes
 from sweep.result import memory
-from sweep.session import faults_told
+from sweep.session import faults_told, sampled_study
 
 if TYPE_CHECKING:
     from sweep.study import Study
 
-FRAME_BYTES = 20_000
-"""Names, units and attributes of a file, about."""
+TRIAL = 32 << 20
+"""Bytes written to see how fast the disk is,"""
+WORTH_A_TRIAL = 1 << 28
+"""where so many are to be written."""
+UNIFORM = 0.0012
+"""Share of their size that statuses take compressed where all are the same."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +59,7 @@ class Plan:
     free_bytes : int
         On the disk of the output.
     cell_seconds, seconds : float
-        On one core; and altogether, without the time of the disk.
+        On one core; and altogether, with the time of the disk where that matters.
     methods, statuses : dict of str to float
         Shares of the sampled cells.
     scaling : str
@@ -91,7 +108,7 @@ class Plan:
             "disk": f"{quantity(self.free_bytes)} free in {self.folder}",
             "memory": quantity(self.memory_bytes),
             "time": f"{duration(self.seconds)} on {self.workers} core{'s' * (self.workers > 1)}, "
-            f"{small_duration(self.cell_seconds)} a cell, plus writing",
+            f"{small_duration(self.cell_seconds)} a cell",
             "methods": _shares(self.methods),
             "statuses": _shares(self.statuses),
             "scaling": self.scaling,
@@ -117,45 +134,77 @@ def plan(study: Study, workers: int | None = None, path: str | os.PathLike[str] 
         The folder of the output is not there.
     """
     from sweep.scaling import scaling
-    from sweep.solve import Solver
 
     crew = cores() if workers is None else whole_number("workers", workers)
     folder = Path(path).absolute().parent if path is not None else Path.cwd()
     if not folder.is_dir():
         raise SweepError(f"{path}: there is no folder {folder}")
-    content = layout(study, {})
+    sample = sampled_study(study)
     with faults_told(f"{study.kernel_name}: the kernel failed"):
-        solver = Solver(study)
-        solver.warm()
-        sample = take_sample(solver, content.columns, content.grid.size)
         advice = scaling(study).advice
-    return replace(_forecast(study, content, sample, crew, folder), scaling=advice)
+    return replace(_forecast(study, sample, crew, folder), scaling=advice)
 
 
-def _forecast(study: Study, content: Layout, sample: Sample, workers: int, folder: Path) -> Plan:
-    size = content.grid.size
-    blocks = partition(sample, size, content.cell_bytes, workers)
-    coordinates = sum(np.asarray(c.values).nbytes for c in content.coordinates)
+def _forecast(study: Study, sample: Sample, workers: int, folder: Path) -> Plan:
+    grains, columns = granules(study), part_columns(study)
+    row_bytes = sum(c.cell_bytes for c in columns)
+    blocks = row_partition(sample, grains, row_bytes, workers)
+    parts = _part_bytes(columns, blocks)
+    output, frame = _output_bytes(study, sample, blocks)
     names = [m.name for m in study.kernel.methods]
+    computing = sample.cost * grains.size / min(workers, blocks.count)
+    speed = _disk_speed(folder) if parts + output > WORTH_A_TRIAL else math.inf
     return Plan(
         title=study.title,
         kernel=study.kernel_name,
-        cells=size,
-        shape=dict(zip(content.grid.dims, content.grid.shape, strict=True)),
+        cells=grains.size,
+        shape=dict(zip((grid := Grid(study)).dims, grid.shape, strict=True)),
         outputs=study.outputs,
         blocks=blocks.count,
-        cells_per_block=blocks.cells,
+        cells_per_block=grains.cells(0, blocks.cells)[1],
         workers=workers,
-        part_bytes=size * content.cell_bytes + blocks.count * 4096,
-        output_bytes=size * content.cell_bytes + coordinates + FRAME_BYTES,
-        memory_bytes=2 * workers * blocks.cells * content.cell_bytes + coordinates,
+        part_bytes=parts,
+        output_bytes=output,
+        memory_bytes=2 * workers * (blocks.cells * row_bytes + strip_bytes(study)) + frame,
         free_bytes=shutil.disk_usage(folder).free,
         folder=str(folder),
         cell_seconds=sample.cost,
-        seconds=sample.cost * size / min(workers, blocks.count),
+        # parts are written while others are computed
+        seconds=max(computing, parts / speed) + output / speed,
         methods=_counted(sample.method_used, dict(enumerate(names)) | {-1: "none"}),
         statuses=_counted(sample.status, {int(s): s.name for s in Status}),
     )
+
+
+def _part_bytes(columns: tuple[Column, ...], blocks: Partition) -> int:
+    """All parts, as files."""
+    images = Images(columns)
+    last = blocks.bounds(blocks.count - 1)
+    return (blocks.count - 1) * images.frame(blocks.cells).size + images.frame(last[1] - last[0]).size
+
+
+def _output_bytes(study: Study, sample: Sample, blocks: Partition) -> tuple[int, int]:
+    """The output, and all of it but the outputs' numbers; its frame is made for this, in memory."""
+    content, canvas = contents(study, {}), Canvas()
+    write_frame(canvas, content, Seals(content.columns, chunks(study, blocks)))
+    numbers = sum(c.cell_bytes for c in content.columns if c.name not in FLAGS) * content.grid.size
+    flags = sum(c.name in FLAGS for c in content.columns) * content.grid.size
+    told = len(zlib.compress(sample.status.tobytes(), 1)) / max(len(sample.status), 1)
+    uniform = len(set(sample.status.tolist())) < 2
+    return canvas.size + int(flags * (UNIFORM if uniform else told)), canvas.size - numbers
+
+
+def _disk_speed(folder: Path) -> float:
+    """Bytes a second that are written and synced here, from a short trial; infinite where nothing can be written."""
+    piece = np.random.default_rng(0).bytes(TRIAL)
+    try:
+        with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
+            begun = time.perf_counter()
+            file.write(piece)
+            os.fsync(file.fileno())
+            return TRIAL / (time.perf_counter() - begun)
+    except OSError:
+        return math.inf
 
 
 def _counted(numbers: np.ndarray, names: dict[int, str]) -> dict[str, float]:

@@ -121,10 +121,8 @@ class Reducer:
 
         assert study.summary is not None
         self.study, self.granules, self.solver = study, granules(study), Solver(study)
-        shapes = {f.name: tuple(study.lengths[d] for d in f.dims) for f in study.asked}
-        cell_bytes = sum(8 * math.prod(shape) for shape in shapes.values())
-        # of the study alone, for sums hang on it
-        self.room = min(STRIP, 1 << max(0, (STRIP_BYTES // cell_bytes).bit_length() - 1))
+        shapes = _shapes(study)
+        self.room = _room(study)
         room = min(self.room, self.granules.size)
         self._outputs = {name: np.empty((room, *shape)) for name, shape in shapes.items()}
         self._status, self._used = np.empty(room, np.int8), np.empty(room, np.int8)
@@ -187,6 +185,24 @@ class Reducer:
         if "histogram" in reductions:
             found["histogram"] = _histogram(values, missing, self.study.summary.edges[name])
         return found
+
+
+def strip_bytes(study: Study) -> int:
+    """Bytes of the cells that a thread holds while it reduces them."""
+    return 0 if study.summary is None else _room(study) * (_cell_bytes(study) + 2)
+
+
+def _room(study: Study) -> int:
+    """Cells of a strip, of the study alone, for sums hang on it."""
+    return min(STRIP, 1 << max(0, (STRIP_BYTES // _cell_bytes(study)).bit_length() - 1))
+
+
+def _cell_bytes(study: Study) -> int:
+    return sum(8 * math.prod(shape) for shape in _shapes(study).values())
+
+
+def _shapes(study: Study) -> dict[str, tuple[int, ...]]:
+    return {f.name: tuple(study.lengths[d] for d in f.dims) for f in study.asked}
 
 
 def _column(name: str, dtype: str, *shape: int) -> Column:

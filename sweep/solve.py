@@ -50,6 +50,7 @@ class Solver:
 
     def __init__(self, study: Study) -> None:
         self.study, self.grid = study, Grid(study)
+        self.usable = usable_methods(study)
         kernel = study.kernel
         lengths = study.lengths
         shapes = {field.name: tuple(lengths[d] for d in field.dims) for field in (*kernel.parameters, *kernel.outputs)}
@@ -123,7 +124,7 @@ class _Strip:
         self.parameters = [column[:n] for column in solver._parameters]
         self.rtol, self._bound = solver._rtol[:n], solver._bound[:n]
         self.outputs, self.status, self.used = outputs, status, used
-        self.usable = usable_methods(solver.study)
+        self.usable = solver.usable
 
     def take(self, number: int, cells: Cells) -> None:
         """Solve the cells by one method; remark those for which it promises less than rtol."""
