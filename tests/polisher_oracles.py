@@ -3,7 +3,9 @@
 Arguments are float64 and taken as exact. The arm's end is where two circles meet; nothing else is used of a linkage.
 """
 
-from mpmath import atan2, cos, exp, mp, mpf, pi, quad, sin, sqrt
+from fractions import Fraction
+
+from mpmath import acos, atan2, cos, exp, mp, mpf, pi, quad, sin, sqrt
 
 DIGITS = 50
 
@@ -82,3 +84,49 @@ def fastest(b, d, f, e, sign, n=300):
             else:
                 low = first
         return height((low + high) / 2, half)
+
+
+def closed(b, d, f, e):
+    """Closed outputs for type A by name, from the cosine rule; derivatives are those of the cosine rule."""
+    with mp.workdps(DIGITS):
+        b, d, f, e = map(mpf, (b, d, f, e))
+
+        def between(x, y, z):
+            return acos((x * x + y * y - z * z) / (2 * x * y))
+
+        def slopes(c):
+            angle = between(b, d, c)
+            by_c = c / (b * d * sin(angle))
+            return -by_c * cos(between(b, c, d)), -by_c * cos(between(d, c, b)), by_c
+
+        plus, minus = between(b, d, f + e), between(b, d, f - e)
+        far, near = slopes(f + e), slopes(f - e)
+        mean, half = ([(x + sign * y) / 2 for x, y in zip(far, near, strict=True)] for sign in (1, -1))
+        return {
+            "A0": (plus + minus) / 2, "A1": (plus - minus) / 2, "eta_plus": plus, "eta_minus": minus,
+            "theta_plus": pi - between(b, f + e, d), "theta_minus": -between(b, f - e, d),
+            "transmission_angle": min(between(d, f, b - e), pi - between(d, f, b + e)),
+            "A0_b": mean[0], "A0_d": mean[1], "A0_f": mean[2], "A0_e": half[2],
+            "A1_b": half[0], "A1_d": half[1], "A1_f": half[2], "A1_e": mean[2],
+        }  # fmt: skip
+
+
+def verdict(b, d, f, e):
+    """What the exact lengths are: the shortest link's sum with the longest against the other two (Grashof)."""
+    b, d, f, e = map(Fraction, (b, d, f, e))
+    short, middle, more, long = sorted((b, d, f, e))
+    if long > short + middle + more:
+        return "NO_ASSEMBLY"
+    if short + long > middle + more:
+        return "LOCK_UP"
+    if short + long == middle + more:
+        return "CHANGE_POINT" if short in (b, e) else "LOCK_UP"
+    return "OK" if e == short else "DOUBLE_CRANK" if b == short else "LOCK_UP"
+
+
+def locks(b, d, f, e):
+    """Crank angles at which the linkage lies stretched (towards 0) or folded (towards pi); None where it does not."""
+    with mp.workdps(DIGITS):
+        b, d, f, e = map(mpf, (b, d, f, e))
+        stretched, folded = (((d + s * f) ** 2 - b * b - e * e) / (2 * b * e) for s in (1, -1))
+        return acos(stretched) if stretched < 1 else None, acos(folded) if folded > -1 else None
