@@ -22,14 +22,16 @@ HALF_SWINGS = 2048
 """Half swings after which a motion that does not repeat is called so; means are over the second half of them."""
 EVENT_LIMIT = 1_000_000
 """Events of the second half, or of the first."""
+KAPPA_LIMIT = 1e12
+"""Largest ratio of the two masses, either way: beyond it the lighter one's impacts are lost in rounding."""
 BLOCK = 16
 """Half swings between two looks at whether the motion repeats, and the most after which it is seen to."""
 DISTURBANCE = 1e-6
 
 _CLOSE = 1e-3
 """Relative distance of two half swings' beginnings at which Newton is tried."""
-_NEAR = 0.05
-"""How far from there a cycle may be found."""
+_NEAR = 1.0
+"""How far from there a cycle may be found: a motion that settles slowly is close to repeating long before."""
 _SAME = 1e-9
 """The distance of two beginnings that are one."""
 _KICK, _KICKS = 0.01, 8
@@ -38,7 +40,7 @@ _ROUNDING = 2.3e-16
 _OK, _INACCURATE, _GRAZING = float(Status.OK), float(Status.INACCURATE), float(Status.GRAZING)
 _UNSTABLE, _PERIOD_2, _NOT_PERIODIC = float(Status.UNSTABLE), float(Status.PERIOD_2), float(Status.NOT_PERIODIC)
 _TOOTH_JUMPED, _STEP_LIMIT = float(Status.TOOTH_JUMPED), float(Status.STEP_LIMIT)
-_NO_METHOD = float(Status.NO_METHOD)
+_NO_METHOD, _NOT_CONVERGED = float(Status.NO_METHOD), float(Status.NOT_CONVERGED)
 
 
 @jit
@@ -147,14 +149,17 @@ def _none():
 
 
 @jit
-def _verdict(tally, teeth, cycles, worst, gap, rounding, rtol):
-    """The status of a stable motion."""
-    status = _OK if teeth == 1.0 else _PERIOD_2
-    if teeth > cycles:
-        status = _TOOTH_JUMPED
+def _verdict(tally, teeth, cycles, fading, worst, gap, rounding, rtol):
+    """The status of a motion that repeats, where `fading` is 1 - multiplier in units of its error."""
+    if fading < -1.0:
+        return _UNSTABLE
     if not (worst <= rtol):
-        status = _INACCURATE
-    return _GRAZING if tally[swing.MARGIN] <= 4.0 * gap + rounding else status
+        return _INACCURATE
+    if fading < 1.0 or tally[swing.MARGIN] <= 4.0 * gap + rounding:
+        return _GRAZING
+    if teeth > cycles:
+        return _TOOTH_JUMPED
+    return _OK if teeth == 1.0 else _PERIOD_2
 
 
 @jit_call
@@ -174,10 +179,8 @@ def _judged(scene, start, k, work, rtol):
     noise = blur * (rounding * k + gap)
     worst = max(max(late, gap / travel), max(V / magnitude(rim), w / magnitude(pallet)))
     worst = max(worst, noise / (k * modulus) if modulus > 0.0 else 0.0)
-    status = _verdict(tally, teeth, cycles, worst, gap, rounding, rtol)
-    if modulus > 1.0 - noise:
-        status = _UNSTABLE if modulus > 1.0 + noise else _GRAZING
-    return answer, status
+    fading = (1.0 - modulus) / max(noise, _ROUNDING)
+    return answer, _verdict(tally, teeth, cycles, fading, worst, gap, rounding, rtol)
 
 
 @jit_call
@@ -185,6 +188,7 @@ def attractor(scene, rtol, total, work, history):
     """The cycle, the middle of the swing, the share of time in contact, impacts in half a period, and the status."""
     start, kicks = beginning(scene, DISTURBANCE), 0
     swing.clear(total)
+    k = 0
     blocks = HALF_SWINGS // BLOCK
     for block in range(blocks):
         if 2 * block == blocks:
@@ -206,12 +210,17 @@ def attractor(scene, rtol, total, work, history):
             start, kicks = _left_behind(start, cycle), kicks + 1
     half_swings = HALF_SWINGS // 2
     cycles = max(min(total[swing.WAY], 0.5 * half_swings), 1.0)
-    return _answer(total, half_swings, 2.0 * cycles, math.nan, scene[3]), _NOT_PERIODIC
+    status = _NOT_CONVERGED if k > 0 else _NOT_PERIODIC
+    return _answer(total, half_swings, 2.0 * cycles, math.nan, scene[3]), status
 
 
 @jit
 def settled(scene, rtol):
     """`attractor` of a scene of `_impact_scene`, in one row."""
+    kappa = scene[2][0]
+    if not (1.0 / KAPPA_LIMIT <= kappa <= KAPPA_LIMIT):
+        answer = _none()
+        return answer[0], answer[1], answer[2], answer[3], _NO_METHOD
     work = np.empty(swing.TALLIES), np.empty((5, 3)), np.empty((4, 3)), np.empty((3, 3))
     answer, status = attractor(plain_scene(scene), rtol, np.empty(swing.TALLIES), work, np.empty((BLOCK + 1, 3)))
     return answer[0], answer[1], answer[2], answer[3], status
