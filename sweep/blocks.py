@@ -49,6 +49,10 @@ class Partition:
         start = index * self.cells
         return start, min(start + self.cells, self.size)
 
+    def holds(self, start: int, stop: int) -> bool:
+        """Whether there is a block of just these cells."""
+        return 0 <= start < stop and self.bounds(start // self.cells) == (start, stop)
+
 
 @dataclass(frozen=True)
 class Sample:

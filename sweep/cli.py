@@ -78,6 +78,9 @@ def parser() -> argparse.ArgumentParser:
     show = _command(commands, "show", _show, "what is in a result, how much is done, what became of its cells")
     _add_result(show)
 
+    verify = _command(commands, "verify", _verify, "whether a result, finished or not, is what was written")
+    _add_result(verify)
+
     fit = _command(commands, "fit", _fit, "exponent of a power law, and where two laws meet")
     _add_result(fit)
     fit.add_argument("--y", metavar="OUTPUT", required=True)
@@ -167,6 +170,15 @@ def _show(arguments: argparse.Namespace) -> None:
 
     with _result(arguments) as dataset:
         print(result_text(arguments.result, dataset))
+
+
+def _verify(arguments: argparse.Namespace) -> None:
+    from sweep.verifying import verify
+
+    verdict = verify(arguments.result)
+    if not verdict.whole:
+        raise SweepError(str(verdict))
+    print(verdict)
 
 
 def _fit(arguments: argparse.Namespace) -> None:

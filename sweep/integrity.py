@@ -2,7 +2,7 @@
 
 In the group `integrity` of the file:
 
-    digests (chunk, column, byte)   xxh3 (128 bits) of the numbers of each column, `cells` cells at a time
+    digests (chunk, column, byte)   xxh3 (128 bits) of the numbers of each column, `cells` of the `size` cells at a time
     frame (byte,)                   the same of all else: every byte outside the outputs' numbers and outside itself
 
 The outputs' numbers lie in the file as they are, so they are read without HDF5.
@@ -48,7 +48,8 @@ class Seals:
         group.dimensions = {"chunk": self.chunks.count, "column": len(self.columns), "byte": BYTES}
         digests = group.create_variable(DIGESTS, ("chunk", "column", "byte"), "u1", dcpl=unfilled())
         names = " ".join(c.name for c in self.columns)
-        digests.attrs.update({"long_name": "xxh3_128 of cells", "columns": names, "cells": self.chunks.cells})
+        digests.attrs.update({"long_name": "xxh3_128 of cells", "columns": names})
+        digests.attrs.update({"size": self.chunks.size, "cells": self.chunks.cells})
         frame = group.create_variable(FRAME, ("byte",), "u1", dcpl=unfilled())
         frame.attrs["long_name"] = "xxh3_128 of every byte outside the contiguous columns and outside this"
 

@@ -39,6 +39,8 @@ __all__ = [
 
 LARGEST_AT_ONCE = 1 << 28
 """Bytes of an unfinished result that are read at once; of larger ones, parts are read when they are used."""
+MOST_COMPRESSED = 1100
+"""Bytes that gzip makes of one, at most."""
 MEMORY_SHARE = 0.25
 """Results larger than this share of the memory are opened in pieces (dask)."""
 
@@ -100,9 +102,17 @@ def stored_fingerprint(output: Path) -> dict[str, str]:
         with h5py.File(output, "r") as file:
             text = file.attrs["fingerprint"]
             file.attrs["study_json"], file[STATUS if STATUS in file else BY_STATUS]
+            if any(not _can_be(file, name, output.stat().st_size) for name in file):
+                raise ValueError("more numbers than the file has room for")
         return dict(json.loads(text))
     except (OSError, KeyError, ValueError, TypeError, RuntimeError) as fault:
-        raise _unreadable(output, fault) from None
+        raise unreadable(output, fault) from None
+
+
+def _can_be(file: Any, name: str, size: int) -> bool:
+    """Whether the file has room for a dataset."""
+    numbers = getattr(file[name], "nbytes", 0)
+    return bool(numbers <= size * (MOST_COMPRESSED if file[name].chunks else 1)) if numbers else True
 
 
 def memory() -> int:
@@ -121,10 +131,11 @@ def _open_finished(output: Path) -> xr.Dataset:
         )
         return _with_plain_text(dataset)
     except (OSError, KeyError, ValueError, TypeError, RuntimeError) as fault:
-        raise _unreadable(output, fault) from None
+        raise unreadable(output, fault) from None
 
 
-def _unreadable(output: Path, fault: Exception) -> SweepError:
+def unreadable(output: Path, fault: Exception) -> SweepError:
+    """What a user is told of a file that is no result."""
     if output.is_dir():
         return SweepError(f"{output}: is a folder, not the result of a sweep")
     if isinstance(fault, PermissionError):

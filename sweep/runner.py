@@ -15,7 +15,7 @@ from sweep.errors import SweepError
 from sweep.fingerprint import difference, fingerprint
 from sweep.pool import Spares, cores, whole_number
 from sweep.progress import Progress, stream_of
-from sweep.result import in_memory, memory, open_result, stored_fingerprint
+from sweep.result import checked_study, in_memory, memory, open_result, stored_fingerprint
 from sweep.session import Session, Solve
 from sweep.store import Store, folder_of, opened, read_spec
 
@@ -136,7 +136,10 @@ def _run_to_file(task: _Task, output: Path) -> None:
 def _spec(store: Store, task: _Task) -> Spec | None:
     """What an earlier run left, if it can be read. Raises SweepError where it cannot, unless forced."""
     try:
-        return read_spec(store.folder)
+        spec = read_spec(store.folder)
+        if spec is not None:
+            checked_study(store.folder, spec)
+        return spec
     except SweepError:
         if task.force:
             return None

@@ -177,7 +177,7 @@ class Store:
     def _take_up(self, entry: os.DirEntry[str], start: int, stop: int) -> None:
         index = start // self.blocks.cells
         least = (stop - start) * sum(column.cell_bytes for column in self.columns)
-        if self.blocks.bounds(index) != (start, stop) or entry.stat().st_size < least:
+        if not self.blocks.holds(start, stop) or entry.stat().st_size < least:
             _set_aside(Path(entry.path))
         elif index in self.names:
             self._compare(index, entry.name)
