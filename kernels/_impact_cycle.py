@@ -10,7 +10,7 @@ u = e and 1 in place of the speeds after and before the impact, q = (1 + e)(pall
 and (1 - e) for the pitch. The pallet is in the way of teeth for the share a = (1 + eta/Y)/2 of T on both sides. So the
 cycle exists exactly if
     eta < Y,  q a < 2 e,  t - q t^2/2 < 1 - e for all t <= a;                                            (3)
-the tooth ahead after the impact and the tooth itself before it are then clear as well. (3) implies e < 7/8.
+the tooth ahead after the impact and the tooth itself before it are then clear as well. Since a >= 1/2, (3) implies e < 7/8.
 The half map (y, V, w), reflected, has multipliers with the product e^2; their polynomial p is given by
     p(1) = (1 - e^2) (4 pallet - nu wheel d),  d = wheel - pallet,                                       (4)
     p(-1) = -(wheel d/2) (4 (1 + e)^2 + nu (kappa (1 - e)^2 + 2 (1 + e^2))),                             (5)
@@ -41,6 +41,8 @@ GRAZE = 4e-15
 _OK, _INACCURATE, _GRAZING = float(Status.OK), float(Status.INACCURATE), float(Status.GRAZING)
 _UNSTABLE, _NO_CYCLE, _NO_METHOD = float(Status.UNSTABLE), float(Status.NO_CYCLE), float(Status.NO_METHOD)
 _OUT_OF_RANGE = float(Status.OUT_OF_RANGE)
+MOST_KEPT = 0.875
+"""Restitution from which on no cycle exists."""
 
 _MOST_BENT = 24.0
 """abs(nu kappa wheel) of (3): beyond it q is below -5 or above 5, and no cycle exists."""
@@ -171,7 +173,7 @@ def plastic_cycle(scene):
 def verdict(exists, stable, doubt, rtol):
     """The status by the margins of existence and stability and the error of the multiplier."""
     status = where(stable < -GRAZE, _UNSTABLE, where((exists <= GRAZE) | (stable <= GRAZE), _GRAZING, _OK))
-    status = where(doubt + ROUNDING <= rtol, status, _INACCURATE)
+    status = where((rtol >= ROUNDING) & (doubt <= 0.2 * rtol), status, _INACCURATE)
     return where(exists >= -GRAZE, status, _NO_CYCLE)
 
 

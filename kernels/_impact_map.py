@@ -15,7 +15,7 @@ of teeth know it. For e = 0 the map is that of the speed c of escape: fall, stop
     c'^2 = s^2 + 2 wheel pallet (2 eta + c t).                                                           (3)
 """
 
-from kernels._impact_cycle import behind, bent, within
+from kernels._impact_cycle import MOST_KEPT, ROUNDING, behind, bent, within
 from kernels._impact_cycle import verdict as judged
 from kernels._impact_multiplier import largest_modulus
 from kernels._jit import jit, jit_call
@@ -329,19 +329,20 @@ def plastic_cycle(scene, rtol):
     start = s[0] / root
     travel = fma(c[0], t[0], eta[0]) + back
     cycle = ((t[0] + contact) * root, travel, start, start, magnitude(slope), back)
-    fine = rtol * magnitude(slope) >= _PAIR_ERROR
+    fine = (rtol >= ROUNDING) & (rtol * magnitude(slope) >= _PAIR_ERROR)
     return cycle, contact / (contact + t[0]), where(lost, _NOT_CONVERGED, where(fine, _OK, _INACCURATE))
 
 
 @jit
 def half_cycle(scene, rtol):
     """The cycle, the share of time in contact, and the status."""
-    plastic = isnt(scene[5] > 0.0)
+    wheel, pallet, kappa, eta, slack, e, curvature = scene
+    plastic, lossy = isnt(e > 0.0), e < MOST_KEPT
     nu, tame = bent(scene)
-    cycle, status = impact_cycle(scene, nu, rtol)
+    cycle, status = impact_cycle((wheel, pallet, kappa, eta, slack, where(lossy, e, 0.5), nu), nu, rtol)
     pushed, held, verdict = plastic_cycle(scene, rtol)
-    status = where(tame, status, _NO_CYCLE)
-    straight = isnt(magnitude(scene[6]) > 0.0)
+    status = where(tame & lossy, status, _NO_CYCLE)
+    straight = isnt(magnitude(curvature) > 0.0)
     status = where(plastic, where(straight, verdict, _NO_METHOD), status)
-    status = where(_told_apart(scene), status, _NO_METHOD)
+    status = where(_told_apart(scene) | isnt(lossy), status, _NO_METHOD)
     return choose(plastic, pushed, cycle), where(plastic, held, 0.0), status

@@ -8,8 +8,11 @@ of its derivative by differences, and every passage of a tooth through a pallet 
 from mpmath import ceil, floor, lu_solve, matrix, mp, mpc, mpf, pi, sqrt
 
 DIGITS = 120
-TINY = mpf(10) ** -30
-"""Steps of differences, relative to the state: their error is its square."""
+
+
+def tiny():
+    """Steps of differences, relative to the state: their error is its square."""
+    return mpf(10) ** -(mp.dps // 4)
 
 
 class Clock:
@@ -56,7 +59,7 @@ def derivative(clock, state):
     """The derivative of the half map, by central differences."""
     columns = []
     for k in range(3):
-        step = TINY * max(abs(state[0]) if k == 0 else abs(state[1]) + abs(state[2]), TINY)
+        step = tiny() * (abs(state[0]) if k == 0 else abs(state[1]) + abs(state[2]))
         beside = [matrix(state), matrix(state)]
         beside[0][k] += step
         beside[1][k] -= step
@@ -75,7 +78,7 @@ def fixed_point(clock):
             jacobian[k, k] -= 1
         step = lu_solve(jacobian, matrix(state) - half_map(clock, state))
         state = state + step
-        if all(abs(step[k]) <= mpf(10) ** -60 * abs(state[2 if k else 0]) for k in range(3)):
+        if all(abs(step[k]) <= tiny() ** 2 * abs(state[2 if k else 0]) for k in range(3)):
             return state
     raise ArithmeticError("no fixed point")
 
@@ -107,7 +110,7 @@ def passages(a, b, c, end, p):
         big = -(b + (sqrt(inside) if b >= 0 else -sqrt(inside))) / 2
         found += [(c - j * p) / big] if big != 0 else []
         found += [big / a] if a != 0 else []
-    return [t for t in found if TINY * end < t < end * (1 - TINY)]
+    return [t for t in found if tiny() * end < t < end * (1 - tiny())]
 
 
 def exists(clock, state):
@@ -135,9 +138,9 @@ def bent(clock):
     return flat
 
 
-def impact_cycle(*cell):
-    """(period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset), and whether it exists."""
-    with mp.workdps(DIGITS):
+def impact_cycle(*cell, digits=DIGITS):
+    """(period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset); does it exist?"""
+    with mp.workdps(digits):
         clock = Clock(*cell)
         state = bent(clock)
         assert mp.norm(half_map(clock, state) - state, mp.inf) < mpf(10) ** -50 * mp.norm(state, mp.inf)
@@ -149,11 +152,16 @@ def impact_cycle(*cell):
         return values, exists(clock, state)
 
 
-def stays(*cell):
-    """Whether the impact cycle exists."""
-    with mp.workdps(DIGITS):
+def highest_escape(*cell, digits=DIGITS):
+    """The largest escape height, up to p/4, with which the cycle of this clock exists, by bisection."""
+    with mp.workdps(digits):
         clock = Clock(*cell)
-        return exists(clock, bent(clock))
+        state = bent(clock)
+        low, high = mpf(0), clock.p / 4
+        for _ in range(80):
+            clock.h = (low + high) / 2
+            low, high = (clock.h, high) if exists(clock, state) else (low, clock.h)
+        return low
 
 
 def escape(clock, speed):
@@ -167,18 +175,20 @@ def escape(clock, speed):
     return fall, (end - start) / push, y, start, end
 
 
-def plastic_cycle(*cell):
+def plastic_cycle(*cell, digits=DIGITS):
     """The same outputs for e = 0, where tooth and pallet stay together until the escape."""
-    with mp.workdps(DIGITS):
+    with mp.workdps(digits):
         clock = Clock(*cell)
-        speed = sqrt(clock.F / (clock.M + clock.m) * clock.p)
+        speed = sqrt(clock.F * (clock.p / clock.m + clock.h / clock.M))
         for _ in range(80):
-            step = TINY * speed
+            step = tiny() * speed
             slope = (escape(clock, speed + step)[4] - escape(clock, speed - step)[4]) / (2 * step)
             error = (escape(clock, speed)[4] - speed) / (1 - slope)
             speed += error
-            if abs(error) < mpf(10) ** -60 * speed:
+            if abs(error) < tiny() ** 2 * speed:
                 break
+        else:
+            raise ArithmeticError("no fixed point")
         fall, held, y, start, _ = escape(clock, speed)
         back = start * start * (clock.M + clock.m) / (2 * clock.F) if start < 0 else mpf(0)
         values = (2 * (fall + held), back - y, start / clock.r_c, start / clock.r_v, slope, back / clock.r_c)
