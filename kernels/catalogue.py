@@ -19,6 +19,8 @@ KERNELS = {
     "polisher_motion": "kernels.polisher_motion:POLISHER_MOTION",
     "polisher_wear": "kernels.polisher_wear:POLISHER_WEAR",
     "drivetrain_frf": "kernels.drivetrain_frf:DRIVETRAIN_FRF",
+    "polisher_wear_point": "kernels.polisher_wear_point:POLISHER_WEAR_POINT",
+    "drivetrain": "kernels.drivetrain:DRIVETRAIN",
 }
 
 
