@@ -1,0 +1,239 @@
+"""The expression graph of a right-hand side: what a plain Python function does to named scalars, recorded.
+
+A function called once with recording objects instead of numbers leaves a graph of its operations; equal operations
+are recorded once. An expression is a *series* where it varies along the motion, else a *constant*, computed once. A
+product keeps its constants apart, `scaled(constant, series)`: c v abs(v) is (2 c s)(v v/2) with the sign s of v, and
+half a square needs the fewest operations.
+
+abs(u) and sign(u) bend or jump where u = 0: each such u is a *kink*. Between kinks the sign of u is a constant, an
+input of the graph; an integrator stops at a kink and turns the sign round.
+"""
+
+import math
+from dataclasses import dataclass
+
+NUMBER, INPUT, ADD, MUL, HALF_SQUARE, SCALED, DIV = "number", "input", "add", "mul", "half_square", "scaled", "div"
+
+
+class SceneError(ValueError):
+    """A scene that cannot be compiled, and why."""
+
+
+@dataclass(frozen=True, eq=False)
+class Expression:
+    """One operation; `args` are expressions, a number, or a name."""
+
+    graph: "Graph"
+    kind: str
+    args: tuple
+    varies: bool
+    index: int
+
+    def __add__(self, other):
+        return self.graph.add(self, other)
+
+    def __sub__(self, other):
+        return self.graph.add(self, -self.graph.of(other))
+
+    def __rsub__(self, other):
+        return self.graph.add(other, -self)
+
+    def __mul__(self, other):
+        return self.graph.multiply(self, other)
+
+    def __truediv__(self, other):
+        return self.graph.divide(self, other)
+
+    def __rtruediv__(self, other):
+        return self.graph.divide(other, self)
+
+    def __pow__(self, exponent):
+        return self.graph.power(self, exponent)
+
+    def __neg__(self):
+        return self.graph.multiply(-1.0, self)
+
+    def __pos__(self):
+        return self
+
+    def __abs__(self):
+        return self.graph.magnitude(self)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __bool__(self):
+        raise SceneError("a scene's function cannot branch on a value; say it with abs, sign, side or a second scene")
+
+    def _no_comparison(self, other):
+        raise SceneError("a scene's function cannot compare values; say it with abs, sign, side or a second scene")
+
+    __lt__ = __le__ = __gt__ = __ge__ = _no_comparison
+
+    def __float__(self):
+        raise SceneError("use the functions of kernels.scene (sqrt, exp, log, sin, cos, power), not those of math")
+
+
+class Graph:
+    """Expressions over named inputs, each recorded once, in the order in which they can be computed.
+
+    `kinks` are the series whose signs are inputs "sign_0", "sign_1", ...
+    """
+
+    def __init__(self):
+        self.nodes = []
+        self.kinks = []
+        self._known = {}
+
+    def _node(self, kind, args, varies):
+        key = (kind, *(a.index if isinstance(a, Expression) else repr(a) for a in args))
+        if key not in self._known:
+            self._known[key] = Expression(self, kind, args, varies, len(self.nodes))
+            self.nodes.append(self._known[key])
+        return self._known[key]
+
+    def series(self, name):
+        """An input that varies along the motion: a state."""
+        return self._node(INPUT, (name,), True)
+
+    def constant(self, name):
+        """An input that does not vary between two events: a parameter, the side, a sign."""
+        return self._node(INPUT, (name,), False)
+
+    def of(self, value):
+        """The value as an expression. Raises SceneError for what is none."""
+        if isinstance(value, Expression):
+            return value
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            raise SceneError(f"expected a number or an expression, found {value!r}") from None
+        return self._node(NUMBER, (number,), False)
+
+    def parts(self, x):
+        """The constant and the series of a product: x = constant * series; the series is 1 where x is constant."""
+        if x.kind == SCALED:
+            return x.args
+        return (self.of(1.0), x) if x.varies else (x, self.of(1.0))
+
+    def add(self, x, y):
+        x, y = self.of(x), self.of(y)
+        if x.kind == y.kind == NUMBER:
+            return self.of(x.args[0] + y.args[0])
+        if _is(x, 0.0) or _is(y, 0.0):
+            return y if _is(x, 0.0) else x
+        return self._node(ADD, _ordered(x, y), x.varies or y.varies)
+
+    def multiply(self, x, y):
+        x, y = self.of(x), self.of(y)
+        if x.varies or y.varies:
+            (c, u), (d, w) = self.parts(x), self.parts(y)
+            if u is w and u.varies:
+                return self._scaled(self._plain(self._plain(c, d), self.of(2.0)), self._node(HALF_SQUARE, (u,), True))
+            return self._scaled(self._plain(c, d), self._plain(u, w))
+        return self._plain(x, y)
+
+    def _plain(self, x, y):
+        """A product of two constants, or of two series without constants."""
+        if x.kind == y.kind == NUMBER:
+            return self.of(x.args[0] * y.args[0])
+        if _is(x, 1.0) or _is(y, 1.0):
+            return y if _is(x, 1.0) else x
+        return self._node(MUL, _ordered(x, y), x.varies)
+
+    def _scaled(self, constant, series):
+        if not series.varies:
+            return self._plain(constant, series)
+        return series if _is(constant, 1.0) else self._node(SCALED, (constant, series), True)
+
+    def divide(self, x, y):
+        x, y = self.of(x), self.of(y)
+        if x.kind == y.kind == NUMBER and y.args[0]:
+            return self.of(x.args[0] / y.args[0])
+        (c, u), (d, w) = self.parts(x), self.parts(y)
+        constant = c if _is(d, 1.0) else self._node(DIV, (c, d), False)
+        return self._scaled(constant, u if _is(w, 1.0) else self._node(DIV, (u, w), True))
+
+    def function(self, name, x):
+        """sqrt, exp, log, sin or cos."""
+        x = self.of(x)
+        return self._node(name, (x,), x.varies)
+
+    def power(self, x, exponent):
+        """x^exponent, the exponent a constant; by products where it is a small integer. x > 0 otherwise."""
+        x = self.of(x)
+        if isinstance(exponent, int) and abs(exponent) <= 8:
+            product = self.of(1.0)
+            for _ in range(abs(exponent)):
+                product = product * x
+            return product if exponent >= 0 else 1.0 / product
+        exponent = self.of(exponent)
+        if exponent.varies:
+            raise SceneError("the exponent of a power must not vary along the motion")
+        return self._node("power", (x, exponent), x.varies)
+
+    def magnitude(self, x):
+        c, u = self.parts(self.of(x))
+        if not u.varies:
+            return self._node("abs", (c,), False)
+        return self._node("abs", (c,), False) * self._side_of(u) * u if not _is(c, 1.0) else self._side_of(u) * u
+
+    def sign(self, x):
+        c, u = self.parts(self.of(x))
+        if not u.varies:
+            return self._node("sign", (c,), False)
+        return self._side_of(u) if _is(c, 1.0) else self._node("sign", (c,), False) * self._side_of(u)
+
+    def _side_of(self, u):
+        """The sign of a series, constant between kinks."""
+        if u not in self.kinks:
+            self.kinks.append(u)
+        return self.constant(f"sign_{self.kinks.index(u)}")
+
+
+def _is(x, number):
+    return x.kind == NUMBER and x.args[0] == number
+
+
+def _ordered(x, y):
+    return (x, y) if x.index <= y.index else (y, x)
+
+
+def needed(*roots):
+    """The nodes that the roots hang on, themselves included, in the order of computation."""
+    found, waiting = {}, list(roots)
+    while waiting:
+        node = waiting.pop()
+        if node.index not in found:
+            found[node.index] = node
+            waiting += [a for a in node.args if isinstance(a, Expression)]
+    return [found[i] for i in sorted(found)]
+
+
+def _function(name, of_number):
+    def call(x):
+        return x.graph.function(name, x) if isinstance(x, Expression) else of_number(x)
+
+    call.__name__ = name
+    call.__doc__ = f"{name}(x) of a number or of what a scene's function is called with."
+    return call
+
+
+sqrt = _function("sqrt", math.sqrt)
+exp = _function("exp", math.exp)
+log = _function("log", math.log)
+sin = _function("sin", math.sin)
+cos = _function("cos", math.cos)
+
+
+def power(x, exponent):
+    """x^exponent for x > 0 and an exponent that does not vary along the motion."""
+    return (
+        x**exponent
+        if not isinstance(exponent, Expression) or isinstance(x, Expression)
+        else exponent.graph.power(x, exponent)
+    )
+
+
+def sign(x):
+    """-1 or 1: the side of 0 on which x is; where x passes 0 a kink. 0 only for a constant 0."""
+    return x.graph.sign(x) if isinstance(x, Expression) else math.copysign(1.0, x) if x else 0.0

@@ -1,0 +1,63 @@
+"""What a scene's functions do, recorded: the graphs of its rates, surface, switch and start."""
+
+import inspect
+from dataclasses import dataclass
+
+from kernels._expression import ADD, SCALED, Expression, Graph, SceneError
+
+RESERVED = ("side", "flips", "rtol", "status", "state", "signs", "parameters")
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """The expressions of a scene, in one graph.
+
+    `events` are (offset, factor, u): each fires where offset + factor u falls through 0; the first is the switch, the
+    others are the kinks.
+    """
+
+    graph: Graph
+    rates: tuple[Expression, ...]
+    surface: Expression
+    switched: tuple[Expression, ...]
+    started: tuple[Expression, ...]
+    events: tuple[tuple[Expression, Expression, Expression], ...]
+
+
+def record(scene):
+    """Calls each function of the scene once with recording objects. Raises SceneError."""
+    graph = Graph()
+    states = {name: graph.series(name) for name in scene.states}
+    known = {name: graph.constant(name) for name in (*scene.parameters, "side")}
+    rates = _called(graph, scene.rates, states | known, len(states))
+    surface = _called(graph, scene.surface, states | known, 1)[0]
+    if not surface.varies:
+        raise SceneError("the surface does not depend on a state, so the motion never meets it")
+    switched = tuple(states.values())
+    if scene.switch is not None:
+        switched = _called(graph, scene.switch, states | known, len(states))
+    started = _called(graph, scene.start, known, len(states))
+    kinks = [(graph.of(0.0), graph.constant(f"sign_{j}"), u) for j, u in enumerate(graph.kinks)]
+    return Recorded(graph, rates, surface, switched, started, (_affine(graph, surface), *kinks))
+
+
+def _called(graph, function, named, length):
+    """What a function of some of the named scalars returns, as expressions."""
+    wanted = inspect.signature(function).parameters
+    unknown = [name for name in wanted if name not in named]
+    if unknown:
+        raise SceneError(f"{function.__name__} asks for {unknown[0]!r}; there are {', '.join(named)}")
+    found = function(**{name: named[name] for name in wanted})
+    found = found if isinstance(found, tuple | list) else (found,)
+    if len(found) != length:
+        raise SceneError(f"{function.__name__} returns {len(found)} values instead of {length}")
+    return tuple(graph.of(value) for value in found)
+
+
+def _affine(graph, surface):
+    """offset, factor, u of a surface offset + factor u; a sum of series is its own u."""
+    offset, rest = graph.of(0.0), surface
+    if surface.kind == ADD and not all(term.varies for term in surface.args):
+        offset, rest = sorted(surface.args, key=lambda term: term.varies)
+    factor, u = rest.args if rest.kind == SCALED else (graph.of(1.0), rest)
+    return offset, factor, u

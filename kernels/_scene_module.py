@@ -1,0 +1,205 @@
+"""A scene as a module of compiled functions, written to a file that can be read, and whose machine code is kept.
+
+The file lies in the folder of the kernels' own machine code (`_cache`), named by the scene and a digest of its text.
+"""
+
+import hashlib
+import importlib.util
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+from kernels import _cache
+from kernels._expression import DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, needed
+from kernels._jit import COMPILED, jit_call
+from kernels._scene_graph import record
+from kernels._taylor_leg import leg
+from kernels._taylor_pool import advance, shared
+from kernels._taylor_source import Lines
+from kernels._taylor_text import filled, listed
+
+ORDERS = (14, 20)
+
+HEAD = '''
+"""{name}: {doc}
+
+Written by kernels.scene from the functions of the scene; do not change it here.
+"""
+
+import math
+
+from kernels._jit import jit, jit_call
+from kernels._lanes import choose, dot, exponent, fma, horner, isnt, magnitude, pow2, some, sqrt, where
+from kernels._refill import LANES, align_stack, each_refilled
+from kernels._scene_module import kept
+from kernels._taylor import (
+    GRAZING, HALVINGS, SLACK, STEP_LIMIT, clear, falls, keeps, last_term, natural_power, next_step, root, size, slope,
+    tail, worse,
+)
+from kernels._taylor_pool import KINK_LIMIT, time_unit
+from kernels._vecmath import exp, is_normal, log, power, sincos
+from kernels.interface import FIRST_REFUSAL, Status
+
+STATES = {states}
+PARAMETERS = {parameters}
+KINKS = {kinks}
+REMARK, REFUSAL, BAD_INPUT = float(Status.GRAZING), float(FIRST_REFUSAL), float(Status.BAD_INPUT)
+OUT_OF_RANGE, STICKS, STEP_LIMIT_MET = float(Status.OUT_OF_RANGE), float(Status.STICKS), float(Status.STEP_LIMIT)
+'''
+
+FUNCTION = '''
+@jit
+def {name}({arguments}):
+    """{doc}"""
+    {unpack}
+    {lines}
+    return {result}
+'''
+
+SERIES = '''
+@jit
+def series_{order}(state, side, signs, parameters, unit):
+    """Taylor coefficients of each state, and (offset, factor, series) of each event; time in units."""
+    {unpack}
+    {lines}
+    return {result}
+'''
+
+
+class Writer:
+    """Writes the functions of a recorded scene."""
+
+    def __init__(self, scene, recorded):
+        self.scene, self.recorded = scene, recorded
+        self.kinks = len(recorded.graph.kinks)
+        self.names = {n: n for n in (*scene.states, *scene.parameters, "side", "unit")}
+        self.names |= {f"sign_{j}": f"sign_{j}" for j in range(self.kinks)}
+        self.all_unpacked = self.unpacked("state", "signs", "parameters")
+
+    def unpacked(self, *which):
+        """Statements that give what the tuples hold its names."""
+        held = {
+            "state": self.scene.states,
+            "signs": [f"sign_{j}" for j in range(self.kinks)],
+            "parameters": self.scene.parameters,
+        }
+        return "\n".join(f"{listed(held[name])} = {name}" for name in which if held[name])
+
+    def function(self, name, doc, expressions, arguments, single=False):
+        """A function of the values of expressions."""
+        lines = Lines(self.names)
+        values = [lines.value(x) for x in expressions]
+        return filled(
+            FUNCTION, name=name, doc=doc, arguments=", ".join(arguments),
+            unpack=self.unpacked(*(a for a in arguments if a in ("state", "signs", "parameters"))),
+            lines="\n".join(lines.text), result=values[0] if single else f"({listed(values)})",
+        )  # fmt: skip
+
+    def natural_signs(self):
+        """The side of each kink on which a state lies, one after the other."""
+        lines = Lines(self.names)
+        for j, u in enumerate(self.recorded.graph.kinks):
+            lines.text.append(f"sign_{j} = where({lines.value(u)} < 0.0, -1.0, 1.0)")
+        return filled(
+            FUNCTION, name="natural_signs", doc="1 or -1 for each kink: the side on which the state is; 1 on it.",
+            arguments="state, side, parameters", unpack=self.unpacked("state", "parameters"),
+            lines="\n".join(lines.text), result=f"({listed(f'sign_{j}' for j in range(self.kinks))})",
+        )  # fmt: skip
+
+    def in_range(self):
+        """Whether no product of numbers that are not 0 underflows."""
+        lines, lost = Lines(self.names), []
+
+        def watch(product, *factors):
+            lost.append(" & ".join([f"(magnitude({product}) < 1e-290)", *(f"(magnitude({a}) > 0.0)" for a in factors)]))
+
+        for node in needed(*self.recorded.rates, self.recorded.surface):
+            if node.kind in (MUL, HALF_SQUARE, SCALED, DIV) and all(a.kind != NUMBER for a in node.args):
+                watch(lines.value(node), *(lines.value(x) for x in node.args))
+        for rate in self.recorded.rates:
+            watch(f"unit * {lines.value(rate)}", lines.value(rate))
+        return filled(
+            FUNCTION, name="underflows", doc="Whether a product of numbers other than 0 loses its digits.",
+            arguments="state, side, signs, parameters, unit", unpack=self.all_unpacked, lines="\n".join(lines.text),
+            result=" | ".join(f"({text})" for text in lost),
+        )  # fmt: skip
+
+    def offset(self):
+        """The surface's offset, as text of parameters; 0 where that would be long."""
+        offset = self.recorded.events[0][0]
+        return self.names[offset.args[0]] if offset.kind == INPUT else "0.0"
+
+    def series(self, order):
+        recorded = self.recorded
+        lines = Lines(self.names, dict(zip(self.scene.states, recorded.rates, strict=True)))
+        states = [lines.coefficients(recorded.graph.series(s), order) for s in self.scene.states]
+        events = [
+            f"({lines.value(offset)}, {lines.value(factor)}, {lines.coefficients(u, order)})"
+            for offset, factor, u in recorded.events
+        ]
+        return filled(
+            SERIES, order=order, unpack=self.all_unpacked, lines="\n".join(lines.text),
+            result=f"({listed([*states, *events])})",
+        )  # fmt: skip
+
+    def text(self):
+        """The whole module."""
+        scene, recorded = self.scene, self.recorded
+        moving = ("state", "side", "signs", "parameters")
+        parts = [
+            filled(HEAD, name=scene.name, doc=scene.doc, states=tuple(scene.states), parameters=tuple(scene.parameters),
+                   kinks=self.kinks).lstrip(),
+            self.function("rates", "Time derivative of each state.", recorded.rates, moving),
+            self.function("surface", "Falls through 0 at the switch.", (recorded.surface,), moving, True),
+            self.function("kinks", "What passes 0 at each kink.", tuple(recorded.graph.kinks), moving),
+            self.natural_signs(),
+            self.function("switched", "The state behind the switch; the side then turns.", recorded.switched, moving),
+            self.function("started", "The state at the start.", recorded.started, ("side", "parameters")),
+            self.in_range(),
+            self.series(2),
+            shared(scene, self.kinks),
+        ]  # fmt: skip
+        for order in ORDERS:
+            parts += [self.series(order), leg(scene.states, 1 + self.kinks, order)]
+            parts.append(advance(scene, self.kinks, order, self.offset()))
+        return "\n".join(parts)
+
+
+def kept(function):
+    """A function called from Python, whose machine code is kept: its file is named by all it was made from."""
+    if not COMPILED:
+        return function
+    compiled = jit_call(function)
+    if _cache.FOLDER is not None and Path(function.__code__.co_filename).parent == _cache.FOLDER:
+        compiled._cache = _cache._Cache(function)
+    return compiled
+
+
+def build(scene):
+    """The module of the scene."""
+    text = Writer(scene, record(scene)).text()
+    name = f"scene_{scene.name}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+    if name not in sys.modules:
+        path = _written(name, text)
+        spec = importlib.util.spec_from_file_location(name, path)
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module
+        try:
+            spec.loader.exec_module(module)
+        except BaseException:
+            del sys.modules[name]
+            raise
+    return sys.modules[name]
+
+
+def _written(name, text):
+    """The file of that text: among the kernels' machine code, or where that cannot be, a temporary one."""
+    folder = _cache.FOLDER or Path(tempfile.mkdtemp(prefix="foliot_scene_"))
+    path = folder / f"{name}.py"
+    if not path.is_file() or path.read_text() != text:
+        handle, draft = tempfile.mkstemp(dir=folder, suffix=".draft")
+        with os.fdopen(handle, "w") as file:
+            file.write(text)
+        Path(draft).replace(path)
+    return path

@@ -1,0 +1,196 @@
+"""Steps of a Taylor series, and the proof of what happens within one; generic in one cell or lanes.
+
+A *series* is the tuple (u_0 ... u_p) of u(t) = sum u_k t^k on a step [0, h]. An *event* is e(t) = offset + factor u(t),
+which fires where it falls through 0. With A = sum_{k>2} k abs(e_k) h^(k-2) and 0 < t <= h
+    e'(t) <= e_1 + t (2 e_2 + A),  e(t) >= e_0 + t e_1 + t^2 (e_2 - A/3),                                (1)
+so e_1 <= 0 and e_1 + h (2 e_2 + A) < 0 prove that e falls all along, and whether it fires is seen by its sign at the
+end; and where the parabola below it stays above 0, nothing fires. Where neither is proved the step is halved.
+The proof is of the series; what that leaves out is below the tolerance of the step, and an event that so little decides
+is called grazing.
+"""
+
+from kernels._jit import jit, jit_call
+from kernels._lanes import (
+    _called,
+    _constant,
+    _function,
+    _items,
+    _number,
+    exponent,
+    fma,
+    horner,
+    isnt,
+    magnitude,
+    nearest,
+    pow2,
+    some,
+    sqrt,
+    where,
+)
+
+STEP_LIMIT = 2000
+"""Steps between two events after which a cell is given up."""
+HALVINGS = 40
+ROOT_LIMIT = 60
+SLACK = 4.0
+"""By how much the estimated error of a step may exceed its tolerance."""
+LARGEST = 5.0
+"""log2 of the factor by which a step may change."""
+WIDER = 4.0 / 3.0
+GRAZING = 16.0
+
+
+def tail(h, series):
+    """A bound on A of (1) for u: sum over k > 2 of k abs(u_k) h^(k-2), with 3 (4/3)^(k-3) >= k for k."""
+    total, wide = abs(series[-1]), WIDER * h
+    for k in range(len(series) - 2, 2, -1):
+        total = fma(total, wide, abs(series[k]))
+    return 3.0 * (total * h)
+
+
+def _lower_tail(context, builder, signature, values):
+    target = signature.return_type
+    h = context.cast(builder, values[0], signature.args[0], target)
+    items = _items(context, builder, signature.args[1], values[1], target)
+    sizes = [_called("fabs")(builder, item) for item in items]
+    total, wide = sizes[-1], builder.fmul(_constant(h.type, WIDER), h)
+    for k in range(len(items) - 2, 2, -1):
+        total = _called("fma")(builder, total, wide, sizes[k])
+    return builder.fmul(_constant(h.type, 3.0), builder.fmul(total, h))
+
+
+_function(tail, 2, lambda h, series: _number(h, *series), _lower_tail)
+
+
+def slope(x, series):
+    """u'(x) = sum k u_k x^(k-1)."""
+    order = len(series) - 1
+    value = order * series[order]
+    for k in range(order - 1, 0, -1):
+        value = fma(value, x, float(k) * series[k])
+    return value
+
+
+def _lower_slope(context, builder, signature, values):
+    target = signature.return_type
+    x = context.cast(builder, values[0], signature.args[0], target)
+    items = _items(context, builder, signature.args[1], values[1], target)
+    value = None
+    for k in range(len(items) - 1, 0, -1):
+        term = builder.fmul(_constant(items[k].type, float(k)), items[k])
+        value = term if value is None else _called("fma")(builder, value, x, term)
+    return value
+
+
+_function(slope, 2, lambda x, series: _number(x, *series), _lower_slope)
+
+
+@jit
+def natural_power(x, n):
+    """x^n for a natural number n known when compiled."""
+    product, square = 0.0 * x + 1.0, x
+    for _ in range(6):
+        product = product * square if n % 2 else product
+        square, n = square * square, n // 2
+    return product
+
+
+@jit
+def last_term(h, series):
+    """The last term of a series on a step, over h^(p-1).
+
+    Of terms that fall by about 1/4 each the rest is a third of the last; the last but one counts in case the last
+    vanishes by chance.
+    """
+    last, before = magnitude(series[-1]) * h, 0.25 * magnitude(series[-2])
+    return where(last < before, before, last)
+
+
+@jit
+def size(h, series):
+    """Of a state on a step: its first terms."""
+    return fma(fma(magnitude(series[2]), h, magnitude(series[1])), h, magnitude(series[0]))
+
+
+@jit
+def worse(first, second):
+    """Of two pairs (what is left out, size) the one that is worse in its size."""
+    (x, of_x), (y, of_y) = first, second
+    smaller = y * of_x <= x * of_y
+    return where(smaller, x, y), where(smaller, of_x, of_y)
+
+
+@jit
+def next_step(h, ratio, order):
+    """The step on which 1 is left out instead of `ratio`, within 1 %."""
+    ratio = where(ratio < 1e250, ratio, 1e250)  # NaN too: a power of the step overflowed
+    ratio = where(ratio > 1e-250, ratio, 1e-250)
+    e = exponent(ratio)
+    m = ratio * pow2(-e) - 1.0
+    log2_factor = (e + m * fma(m, -1.0 / 3.0, 4.0 / 3.0)) * (-1.0 / order)  # within 0.01/order
+    log2_factor = where(log2_factor > -LARGEST, log2_factor, -LARGEST)
+    log2_factor = where(log2_factor < LARGEST, log2_factor, LARGEST)
+    whole = nearest(log2_factor)
+    part = log2_factor - whole  # [-0.5, 0.5]
+    return h * fma(part, fma(part, fma(part, 0.0555, 0.2402), 0.6931), 1.0) * pow2(whole)
+
+
+@jit
+def keeps(h, power_h, series, allowed):
+    """Whether a step leaves out no more than that, over the state's size; NaN fails. `power_h` is h^(p-1).
+
+    To be asked after `next_step`, for on a shorter step the size is smaller.
+    """
+    return last_term(h, series) * power_h <= allowed * size(h, series)
+
+
+@jit
+def falls(d, dd, rest, h):
+    """Whether an event falls all along a step, by (1): from e' = d and e''/2 = dd, `rest` is A."""
+    return (d <= 0.0) & (fma(h, fma(2.0, dd, rest), d) < 0.0)
+
+
+@jit
+def clear(e, d, dd, rest, h, margin):
+    """Whether an event does not fire in (0, h], by (1): from e(0) = e on.
+
+    What comes down to less than `margin` is not clear. What starts at 0, or below it by rounding, must rise.
+    """
+    curve = fma(-1.0 / 3.0, rest, dd)
+    down = where(curve < 0.0, curve, 0.0)
+    above = fma(h, fma(h, down, d), e) > where(d < 0.0, margin, 0.0)
+    turns = (curve > 0.0) & ((d >= 0.0) | (4.0 * curve * (e - margin) > d * d))
+    return above | turns | ((h <= 0.0) & (d > 0.0))
+
+
+@jit_call
+def root(offset, factor, series, h, tolerance, searching):
+    """Where offset + factor u(t) falls through 0 in (0, h], given that it falls all along: Newton within a bracket.
+
+    Newton's last step is as small, over h, as the root of what is left out: the error behind it is the square.
+    """
+    enough = (0.001 * tolerance + 1e-18) * h * h
+    low, high = 0.0 * h, h
+    e, d, dd = fma(factor, series[0], offset), factor * series[1], factor * series[2]
+    t = first_guess(e, d, dd, h)
+    for _ in range(ROOT_LIMIT):
+        if not some(searching):
+            break
+        value, rate = fma(factor, horner(t, series), offset), factor * slope(t, series)
+        low, high = where(value > 0.0, t, low), where(value > 0.0, high, t)
+        new = t - value / rate
+        new = where((new >= low) & (new <= high), new, 0.5 * (low + high))
+        change = magnitude(new - t)
+        t = where(searching, new, t)
+        searching = searching & isnt(change * change <= enough)
+    return t
+
+
+@jit
+def first_guess(e, d, dd, h):
+    """The root of e + d t + dd t^2 for e > 0 > d, within [0, h]."""
+    inside = fma(d, d, -4.0 * dd * e)
+    inside = where(inside > 0.0, inside, 0.0)
+    t = 2.0 * e / (sqrt(inside) - d)
+    t = where(t < h, t, h)
+    return where(t > 0.0, t, 0.0)

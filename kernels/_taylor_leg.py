@@ -1,0 +1,168 @@
+"""Source text of a scene's motion from event to event: what does not fit in one function for all scenes.
+
+The text is of named scalars, one statement per event; what can be said once for all scenes is in `_taylor`.
+"""
+
+from kernels._taylor_text import filled, folded, listed
+
+LEG = '''
+@jit_call
+def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, active):
+    """Follow the motion of the active lanes until an event falls through 0, and stop there.
+
+    Parameters
+    ----------
+    unit : of time, in seconds
+    h : first guess of a step, in units
+    on : for each event 1 where the motion starts on it, else 0
+    tolerance : of a step, relative to each state's own size
+
+    Returns
+    -------
+    state, t, h, on : at the event, after the time t; `on` is 1 for the event that fired
+    stuck, lost, broken : pressed on what it started on; not there within limits; coefficients that are no numbers
+    grazing, hangs : neither met nor missed for sure; met, but only just
+    tried : steps
+    """
+    {states} = state
+    {ons} = on
+    moving, t, span, tried = active, 0.0 * h, h, 0.0 * h
+    nothing = active & isnt(active)
+    {no_passed} = {nothings}
+    {no_now} = {nothings}
+    {no_margins}
+    stuck, lost, broken, grazing = nothing, nothing, nothing, nothing
+    for step in range(STEP_LIMIT):
+        {series_and_events} = series_{order}(({states}), side, signs, parameters, unit)
+        {facts}
+        left_out, over = {left_out}
+        new = next_step(h, left_out * natural_power(h, {order} - 1) / (tolerance * over), {order})
+        h = where(moving, new, h)
+        power_h, allowed = natural_power(h, {order} - 1), SLACK * tolerance
+        fine = {keeps}
+        trial = h
+        if step == 0:
+            {sum_last}
+            broken = active & isnt(last < math.inf)
+            {start}
+            stuck = active & ({any_stuck})
+            trial = where({any_now}, 0.0, h)
+            {margins}
+            moving = moving & isnt(broken | stuck)
+        tried = where(moving, tried + 1.0, tried)
+        unsure = moving
+        for _ in range(HALVINGS):
+            {judge}
+            unsure = moving & isnt({all_sure})
+            if not some(unsure):
+                break
+            trial = where(unsure, 0.5 * trial, trial)
+        grazing = grazing | unsure
+        moving = moving & isnt(unsure)
+        steps = moving & fine
+        {ends}
+        {passed}
+        meets = steps & ({any_passed})
+        span = where(meets, trial, span)
+        steps = steps & isnt(meets)
+        {advance}
+        t = where(steps, t + trial, t)
+        {off}
+        moving = moving & isnt(meets)
+        if not some(moving):
+            break
+    lost = moving
+    met = active & isnt(lost | stuck | broken | grazing)
+    {roots}
+    {at_root}
+    return ({final}), where(met, t + part, t), h, ({fired}), stuck, lost, broken, grazing, hangs, tried
+'''
+
+
+def leg(states, events, order):
+    """The text of `to_event_{order}`: `states` are names, `events` the number of events."""
+    e = range(events)
+    roots = [
+        """\
+offset, factor, series, part = offset_0, factor_0, event_0, span
+which = where(passed_0, 0.0, -1.0)""",
+        *(
+            f"""\
+first = passed_{j} & (which < 0.0)
+which, offset, factor = where(first, {j}.0, which), where(first, offset_{j}, offset), where(first, factor_{j}, factor)
+series = choose(first, event_{j}, series)"""
+            for j in e[1:]
+        ),
+        "part = root(offset, factor, series, span, tolerance, met)",
+        *(
+            f"""\
+first = passed_{j} & (which < {j}.0) & (fma(factor_{j}, horner(part, event_{j}), offset_{j}) <= 0.0)
+if some(first):
+    part = where(first, root(offset_{j}, factor_{j}, event_{j}, part, tolerance, first), part)
+    which = where(first, {j}.0, which)
+    offset, factor = where(first, offset_{j}, offset), where(first, factor_{j}, factor)
+    series = choose(first, event_{j}, series)"""
+            for j in e[1:]
+        ),
+        """\
+rate = factor * slope(part, series)
+bend = magnitude(factor) * (2.0 * magnitude(series[2]) + 2.0 * tail(part, series))
+hangs = met & isnt(rate * rate > GRAZING * tolerance * (magnitude(offset) + magnitude(factor * series[0])) * bend)""",
+    ]
+    facts = [
+        f"""\
+e_{j}, d_{j} = fma(factor_{j}, event_{j}[0], offset_{j}), factor_{j} * event_{j}[1]
+dd_{j}, a_{j} = factor_{j} * event_{j}[2], magnitude(factor_{j})"""
+        for j in e
+    ]
+    start = [
+        f"""\
+away_{j} = (d_{j} > 0.0) | ((d_{j} >= 0.0) & (dd_{j} > 0.0))
+now_{j} = (on_{j} < 0.5) & (e_{j} <= 0.0)"""
+        for j in e
+    ]
+    margins = [
+        f"margin_{j} = SLACK * tolerance * (magnitude(offset_{j}) + magnitude(factor_{j} * event_{j}[0]))" for j in e
+    ]
+    judge = [
+        f"""\
+rest_{j} = a_{j} * tail(trial, event_{j})
+clear_{j} = clear(e_{j}, d_{j}, dd_{j}, rest_{j}, trial, margin_{j})
+falls_{j} = falls(d_{j}, dd_{j}, rest_{j}, trial) | now_{j}"""
+        for j in e
+    ]
+    passed = [f"passed_{j} = passed_{j} | (steps & falls_{j} & (end_{j} <= 0.0))" for j in e]
+    parts = {
+        "series_and_events": ", ".join(
+            [f"s_{s}" for s in states] + [f"(offset_{j}, factor_{j}, event_{j})" for j in e]
+        ),
+        "sum_last": "last = " + " + ".join(f"magnitude(s_{s}[-1])" for s in states),
+        "facts": "\n".join(facts),
+        "start": "\n".join(start),
+        "margins": "\n".join(margins),
+        "any_stuck": " | ".join(f"((on_{j} > 0.5) & isnt(away_{j}))" for j in e),
+        "any_now": " | ".join(f"now_{j}" for j in e),
+        "nothings": listed(["nothing"] * events),
+        "no_passed": listed(f"passed_{j}" for j in e),
+        "no_now": listed(f"now_{j}" for j in e),
+        "no_margins": "\n".join(f"margin_{j} = 0.0 * h" for j in e),
+        "judge": "\n".join(judge),
+        "all_sure": " & ".join(f"(clear_{j} | falls_{j})" for j in e),
+        "ends": "\n".join(
+            [f"end_{s} = horner(trial, s_{s})" for s in states]
+            + [f"end_{j} = fma(factor_{j}, horner(trial, event_{j}), offset_{j})" for j in e]
+        ),
+        "passed": "\n".join(passed),
+        "any_passed": " | ".join(f"passed_{j}" for j in e),
+        "advance": "\n".join(f"{s} = where(steps, end_{s}, {s})" for s in states),
+        "off": "\n".join(f"now_{j} = now_{j} & meets" for j in e),
+        "roots": "\n".join(roots),
+        "at_root": "\n".join(f"end_{s} = where(met, horner(part, s_{s}), {s})" for s in states),
+        "final": listed(f"end_{s}" for s in states),
+        "fired": listed(f"where(met & (which > {j - 0.5}) & (which < {j + 0.5}), 1.0, 0.0)" for j in e),
+        "left_out": folded("worse({}, {})", [f"(last_term(h, s_{s}), size(h, s_{s}))" for s in states]),
+        "keeps": " & ".join(f"keeps(h, power_h, s_{s}, allowed)" for s in states),
+        "states": listed(states),
+        "ons": listed(f"on_{j}" for j in e),
+    }
+    return filled(LEG, order=order, **parts)

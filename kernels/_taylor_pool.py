@@ -1,0 +1,165 @@
+"""Source text of what a lane does from one event to the next: start, switch, turn signs round, count, end."""
+
+from kernels._jit import jit
+from kernels._lanes import exponent, magnitude, pow2, sqrt, where
+from kernels._taylor_text import filled, listed
+
+KINK_LIMIT = 1000
+"""Kinks between two switches after which a cell is given up."""
+
+SETTLED = '''
+@jit_call
+def settled(state, side, parameters, unit):
+    """The sign of each kink's u, and whether the state is on it: there the sign is that of u in the next moment."""
+    {signs} = natural_signs(state, side, parameters)
+    {unpack} = series_2(state, side, ({signs}), parameters, unit)
+    {turn}
+    return ({signs}), ({on})
+'''
+
+ADVANCE = '''
+@jit
+def begun(parameters):
+    """State, side, signs, unit, on, and whether the start is beyond the surface."""
+    side = 0.0 * parameters[0] + 1.0
+    state = started(side, parameters)
+    one = 0.0 * side + 1.0
+    signs, on = settled(state, side, parameters, one)
+    {unpack} = series_2(state, side, signs, parameters, one)
+    e, d, dd = fma(factor_0, event_0[0], offset_0), factor_0 * event_0[1], factor_0 * event_0[2]
+    away = (d > 0.0) | ((d >= 0.0) & (dd > 0.0))
+    at = where((e <= 0.0) & (e >= 0.0) & away, 1.0, 0.0)
+    return state, side, signs, time_unit(e, d, dd), (at, {also_on}), isnt(e >= 0.0)
+'''
+
+EVENT = '''
+@jit
+def advance_{order}(memory, i):
+    """Every lane on to its next event; whether one has finished."""
+    {load}
+    parameters = ({parameters})
+    fresh = (stage > 0.5) & (stage < 1.5)
+    active = fresh | ((stage > 1.5) & (stage < 2.5))
+    if some(fresh):
+        s, p, g, u, o, beyond = begun(parameters)
+        {begin}
+        side, unit, h = where(fresh, p, side), where(fresh, u, unit), where(fresh, 1.0, h)
+        time, interval, count, since = (
+            where(fresh, 0.0, time), where(fresh, 0.0, interval), where(fresh, 0.0, count), where(fresh, 0.0, since)
+        )
+        verdict = where(fresh, where(beyond, BAD_INPUT, 0.0), verdict)
+    moving = active & (verdict < REFUSAL)
+    new, t, h, on, stuck, lost, broken, grazing, hangs, tried = to_event_{order}(
+        ({states}), side, ({signs}), parameters, unit, h, ({ons}), tolerance, moving
+    )
+    verdict = where((hangs | grazing) & (verdict < REMARK), REMARK, verdict)
+    verdict = where(lost, STEP_LIMIT_MET, where(stuck, STICKS, where(broken, OUT_OF_RANGE, verdict)))
+    moving = moving & (verdict < REFUSAL) & isnt(grazing)
+    {nothing}
+    {land}
+    {ons} = on
+    time, since = where(moving, fma(t, unit, time), time), where(moving, fma(t, unit, since), since)
+    switches = moving & (on_0 > 0.5)
+    kinks_met = where(switches, 0.0, where(moving, kinks_met + 1.0, kinks_met))
+    {turn}
+    if some(switches):
+        {keep}
+        rate = rates(({states}), side, ({signs}), parameters)
+        {size}
+        interval, since = where(switches, since, interval), where(switches, 0.0, since)
+        count = where(switches, count + 1.0, count)
+        faint = underflows(({states}), side, ({signs}), parameters, unit)
+        verdict = where(switches & faint, OUT_OF_RANGE, verdict)
+        left = surface(({states}), side, ({signs}), parameters)
+        s = switched(({states}), side, ({signs}), parameters)
+        side = where(switches, -side, side)
+        g, o = settled(s, side, parameters, unit)
+        {jump}
+        after = surface(({states}), side, ({signs}), parameters)
+        size = magnitude({offset}) + magnitude(after - {offset})
+        still = magnitude(after) <= fma(1e-12, size, 2.0 * magnitude(left))
+        on_0 = where(switches, where(still, 1.0, 0.0), on_0)
+    steps, before = where(active, tried, steps), where(active, steps, before)
+    verdict = where(moving & (kinks_met > KINK_LIMIT), STEP_LIMIT_MET, verdict)
+    done = active & (grazing | (verdict >= REFUSAL) | (count >= flips))
+    stage = where(done, 3.0, where(active, 2.0, stage))
+    {store}
+    return some(done)
+
+
+@kept
+def run_{order}(inputs, results, together):
+    """Each cell, a column of `inputs`, until its last switch."""
+    align_stack(LANES)
+    each_refilled(advance_{order}, inputs, results, {rows}, together)
+'''
+
+
+@jit
+def time_unit(e, d, dd):
+    """A power of two near the time in which an event comes up: from e, e' and e''/2."""
+    e, d, dd = magnitude(e), magnitude(d), magnitude(dd)
+    by_rate, by_bend = e / d, sqrt(e / dd)
+    shorter = where(by_bend < by_rate, by_bend, by_rate)
+    t = where((shorter > 0.0) & (shorter < 1e300), shorter, where(by_rate < 1e300, by_rate, by_bend))
+    again = d / dd
+    t = where((t > 1e-300) & (t < 1e300), t, again)
+    t = where((t > 1e-300) & (t < 1e300), t, 1.0)
+    return pow2(exponent(t))
+
+
+def shared(scene, kinks):
+    """The text that does not depend on the order."""
+    signs, e = [f"sign_{j}" for j in range(kinks)], range(1, 1 + kinks)
+    unpack = ", ".join([f"s_{s}" for s in scene.states] + [f"(offset_{j}, factor_{j}, event_{j})" for j in (0, *e)])
+    turn = [
+        f"""\
+on_{j} = (event_{j}[0] <= 0.0) & (event_{j}[0] >= 0.0)
+back = (factor_{j} * event_{j}[1] < 0.0) | ((factor_{j} * event_{j}[1] <= 0.0) & (factor_{j} * event_{j}[2] < 0.0))
+sign_{j - 1} = where(on_{j} & back, -sign_{j - 1}, sign_{j - 1})"""
+        for j in e
+    ]
+    settled = SETTLED if kinks else SETTLED_EMPTY
+    return filled(
+        settled, signs=listed(signs), unpack=unpack, turn="\n".join(turn),
+        on=listed(f"where(on_{j}, 1.0, 0.0)" for j in e),
+    ) + filled(ADVANCE, unpack=unpack, also_on=", ".join(f"on[{j - 1}]" for j in e))  # fmt: skip
+
+
+SETTLED_EMPTY = '''
+@jit
+def settled(state, side, parameters, unit):
+    """No kinks, no signs."""
+    return (), ()
+'''
+
+
+def advance(scene, kinks, order, offset):
+    """The text of `advance_{order}` and `run_{order}`; `offset` is that of the surface, as text."""
+    states, signs, ons = scene.states, [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]
+    inputs = [*scene.parameters, "flips", "tolerance"]
+    results = ["time", "interval", *(f"at_{s}" for s in states), *(f"size_{s}" for s in states)]
+    results += ["steps", "before", "verdict"]
+    work = [*states, "side", *signs, "unit", "h", *ons, "count", "since", "kinks_met"]
+    rows = ["stage", *inputs, *results, *work]
+    begin = [f"{s} = where(fresh, s[{j}], {s})" for j, s in enumerate(states)]
+    begin += [f"{s} = where(fresh, g[{j}], {s})" for j, s in enumerate(signs)]
+    begin += [f"{o} = where(fresh, o[{j}], {o})" for j, o in enumerate(ons)]
+    begin += ["kinks_met = where(fresh, 0.0, kinks_met)"]
+    jump = [f"{s} = where(switches, s[{j}], {s})" for j, s in enumerate(states)]
+    jump += [f"{s} = where(switches, g[{j}], {s})" for j, s in enumerate(signs)]
+    jump += [f"{o} = where(switches, o[{j}], {o})" for j, o in enumerate(ons[1:])]
+    changed = ["stage", *results, *work]
+    return filled(
+        EVENT, order=order, rows=len(rows), load="\n".join(f"{r} = memory[{j}][i]" for j, r in enumerate(rows)),
+        parameters=listed(scene.parameters), begin="\n".join(begin), states=listed(states), signs=listed(signs),
+        ons=listed(ons), land="\n".join(f"{s} = where(moving, new[{j}], {s})" for j, s in enumerate(states)),
+        turn="\n".join(f"{s} = where(moving & ({o} > 0.5), -{s}, {s})" for s, o in zip(signs, ons[1:], strict=True)),
+        nothing="\n".join(f"{r} = where(grazing, math.nan, {r})" for r in results[:-3]),
+        keep="\n".join(f"at_{s} = where(switches, {s}, at_{s})" for s in states), jump="\n".join(jump), offset=offset,
+        size="\n".join(
+            f"size_{s} = where(switches, fma(magnitude(rate[{j}]), since, magnitude({s})), size_{s})"
+            for j, s in enumerate(states)
+        ),
+        store="\n".join(f"memory[{rows.index(r)}][i] = {r}" for r in changed),
+    )  # fmt: skip

@@ -1,0 +1,85 @@
+"""Columns of cells followed by the Taylor method of a scene's module, and how far the result can be believed.
+
+Each step is right to a tolerance; what many steps come to depends on the scene. So a cell is followed twice, the second
+time with a tolerance FINER times smaller: the first run's error is what they differ by, the second's is about FINER
+times less, and is what is given.
+"""
+
+import numpy as np
+
+from kernels._refill import LANES
+from kernels._vecmath import NORMAL_HIGH, NORMAL_LOW
+from kernels.interface import FIRST_REFUSAL, Status
+
+LOW_ORDER, HIGH_ORDER = 14, 20
+HIGH_BELOW = 1e-10
+"""Tolerance of a step from which on the higher order is the faster."""
+FINEST = 1e-17
+ROUGH, FINER = 2.0, 16.0
+APART = 8.0
+"""How many rtol the two runs may differ by: the finer one is then right to rtol/2."""
+
+
+def followed(module, columns, rtol, finer=1.0, together=False):
+    """The results of a cell a column: time, interval, states, their sizes, and as the last row the status.
+
+    Parameters
+    ----------
+    columns : the parameters and the number of switches
+    rtol : tolerance of each step, a column; it chooses the order
+    finer : by how much the steps are to be better than that
+    together : lanes in lockstep, in the order of the cells
+    """
+    inputs = np.array([*columns, np.maximum(rtol / finer, FINEST)])
+    results = np.full((5 + 2 * len(module.STATES), inputs.shape[1]), np.nan)
+    high = rtol < HIGH_BELOW
+    for run, cells in ((module.run_14, ~high), (module.run_20, high)):
+        if cells.any():
+            chosen = np.ascontiguousarray(inputs[:, cells])
+            found = np.full((len(results), chosen.shape[1]), np.nan)
+            run(chosen, found, True) if together else _dealt(run, chosen, found)
+            results[:, cells] = found
+    return np.delete(results, (-3, -2), axis=0)
+
+
+def _dealt(run, inputs, results):
+    """Cells that take as many steps side by side: lanes wait less for each other. Two switches tell how many."""
+    n = inputs.shape[1]
+    if n <= 4 * LANES or not inputs[-2].max() > 8:
+        run(inputs, results, False)
+        return
+    few = inputs.copy()
+    few[-2] = np.minimum(few[-2], 2)
+    run(few, results, False)
+    order = np.lexsort((results[-3], results[-2]))
+    found = np.empty_like(results)
+    run(np.ascontiguousarray(inputs[:, order]), found, False)
+    results[:, order] = found
+
+
+def once(module, columns, rtol, outputs, status):
+    """Fills outputs and status by one run, each step right to `rtol`."""
+    results = followed(module, columns, rtol)
+    _write(results, outputs, status)
+
+
+def twice(module, columns, rtol, outputs, status):
+    """Fills outputs and status by two runs; INACCURATE where they differ by more than the finer one could mend."""
+    rough, fine = (followed(module, columns, rtol, by) for by in (ROUGH, ROUGH * FINER))
+    _write(fine, outputs, status)
+    states = len(module.STATES)
+    scale = np.concatenate([abs(fine[:2]), np.maximum(abs(fine[2 : 2 + states]), fine[2 + states : -1])])
+    with np.errstate(all="ignore"):
+        apart = ~(abs(fine[: len(scale)] - rough[: len(scale)]) <= APART * rtol * scale).all(axis=0)
+    status[apart & (status == Status.OK)] = Status.INACCURATE
+    worse = (rough[-1] > 0) & (status <= Status.INACCURATE)
+    status[worse] = np.where(rough[-1][worse] < FIRST_REFUSAL, rough[-1][worse], Status.INACCURATE)
+
+
+def _write(results, outputs, status):
+    for column, row in zip(outputs, results, strict=False):
+        column[...] = row
+    status[...] = results[-1]
+    sizes = abs(results[: len(outputs)])
+    normal = (sizes == 0) | ((sizes >= NORMAL_LOW) & (sizes <= NORMAL_HIGH))
+    status[~normal.all(axis=0) & (results[-1] == Status.OK)] = Status.OUT_OF_RANGE

@@ -1,0 +1,177 @@
+"""A scene of one's own: a motion given by its rates, with a switch where a surface is passed.
+
+    u' = rates(u, side, parameters),  a switch where surface(u, side, parameters) falls through 0         (1)
+
+The functions are plain Python of named scalars; each asks by name for the states, parameters and `side` that it needs.
+They are called once, with objects that record what is done to them (`_expression`), and written out as compiled
+functions for one cell and for lanes (`_scene_module`), in a file that can be read. In them are allowed + - * / ** abs,
+and sqrt, exp, log, sin, cos, power and sign of this module.
+"""
+
+import inspect
+import keyword
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kernels import _taylor_solve
+from kernels._expression import SceneError, cos, exp, log, power, sign, sin, sqrt
+from kernels._scene_graph import RESERVED
+from kernels._scene_module import build
+from kernels.interface import Field, Kernel, Method, Status
+
+__all__ = ["Field", "Scene", "SceneError", "cos", "exp", "log", "power", "scene_kernel", "sign", "sin", "sqrt"]
+
+MOST_FLIPS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a scene is made of.
+
+    Parameters
+    ----------
+    name, doc : what it is called, and a line about it
+    states : names of the states
+    parameters : names of the parameters
+    rates : (states, side, parameters) -> the time derivative of each state
+    surface : (states, side, parameters) -> what falls through 0 at the switch
+    start : (parameters) -> the states at time 0, where side is 1
+    switch : (states, side, parameters) -> the states just behind the switch; None: they do not jump
+
+    At a switch `side` turns from 1 to -1 or back. Where abs(u) or sign(u) occurs, u = 0 is a *kink*: the motion is
+    followed up to it and begun anew behind it. A motion that cannot leave a kink sticks there.
+    """
+
+    name: str
+    doc: str
+    states: tuple[str, ...]
+    parameters: tuple[str, ...]
+    rates: Callable
+    surface: Callable
+    start: Callable
+    switch: Callable | None = None
+
+    def __post_init__(self):
+        names = [*self.states, *self.parameters]
+        for name in [self.name, *names]:
+            if not name.isidentifier() or keyword.iskeyword(name) or name in RESERVED:
+                raise SceneError(f"{name!r} cannot be a name in a scene")
+        if len(set(names)) < len(names):
+            raise SceneError("a scene's states and parameters need names of their own")
+        if not self.states:
+            raise SceneError("a scene needs a state")
+
+
+def scene_kernel(
+    *,
+    name: str,
+    doc: str,
+    states: Sequence[Field],
+    parameters: Sequence[Field],
+    rates: Callable,
+    surface: Callable,
+    start: Callable,
+    switch: Callable | None = None,
+    source: str = "a study's own",
+    example: Mapping[str, float] | None = None,
+) -> Kernel:
+    """A kernel that follows a scene from its start to its last switch.
+
+    Parameters
+    ----------
+    states, parameters : what they are called, their units; a state's Field is also that of the output
+    rates, surface, start, switch : as in `Scene`
+    example : parameters at which the scene runs well
+
+    Returns
+    -------
+    Kernel
+        With a further parameter `flips`, the number of switches to follow, and as outputs `time` of the last switch,
+        `interval` since the one before, and each state just before the last switch.
+
+    Raises
+    ------
+    SceneError
+        Where the functions ask for what is not there, or do what cannot be recorded.
+    """
+    scene = Scene(
+        name, doc, tuple(s.name for s in states), tuple(p.name for p in parameters), rates, surface, start, switch
+    )
+    fields = (
+        *parameters,
+        Field("flips", "1", "switches to follow", default=40.0, lower=1.0, upper=float(MOST_FLIPS), integer=True),
+    )
+    outputs = (
+        Field("time", "s", "time of the last switch"),
+        Field("interval", "s", "time between the last two switches, or from the start to the only one"),
+        *states,
+    )
+    module = build(scene)
+    names = [f.name for f in fields], [f.name for f in outputs]
+    return Kernel(
+        name=name,
+        doc=doc,
+        source=source,
+        parameters=fields,
+        outputs=outputs,
+        check=_check(fields),
+        methods=(
+            Method(
+                "taylor",
+                "Taylor series of order 14 or 20 in lanes, no switch passed over; followed twice",
+                _solve(_taylor_solve.twice, module, *names),
+            ),
+            Method(
+                "taylor_once",
+                "the same, each step right to rtol, followed once",
+                _solve(_taylor_solve.once, module, *names),
+                _no_bound(names[0]),
+            ),
+        ),
+        example=dict(example or {}),
+    )
+
+
+def _solve(how, module, parameters, outputs):
+    """A method's function of columns."""
+
+    def solve(*columns):
+        n = len(parameters)
+        if len(columns[0]):
+            how(module, columns[:n], columns[n], columns[n + 1 : -1], columns[-1])
+
+    return _signed(solve, [*parameters, "rtol", *outputs, "status"])
+
+
+def _no_bound(parameters):
+    """Says that nothing is promised."""
+
+    def bound(*columns):
+        columns[-1][:] = math.inf
+
+    return _signed(bound, [*parameters, "rtol", "asked", "out"])
+
+
+def _check(fields):
+    """BAD_INPUT for what is NaN, infinite or outside its limits, and for a number of switches that is not whole."""
+
+    def check(*columns):
+        *values, status = columns
+        good = np.ones(len(status), bool)
+        for value, f in zip(values, fields, strict=True):
+            good &= (value > f.lower if f.open_lower else value >= f.lower) & (value <= f.upper) & np.isfinite(value)
+            if f.integer:
+                good &= value == np.floor(value)
+        status[...] = np.where(good, Status.OK, Status.BAD_INPUT)
+
+    return _signed(check, [*(f.name for f in fields), "status"])
+
+
+def _signed(function, names):
+    """The function with the names of its columns, as the contract of a kernel asks."""
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    function.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])
+    return function
