@@ -32,6 +32,7 @@ SWEEP_LIMIT = 200
 PATIENCE = 8
 """Steps after which the smallest eigenvalue is looked for in another part."""
 _NEGLIGIBLE = 2.0**-106  # a squared entry, so 2^-53 of a frequency
+_TINY = 2.0**-60  # 63 of them are less than the last digit
 _SPENT = 2.0**-120
 _ROUNDING = 2.0**-53
 _OK, _NOT_CONVERGED, _OUT_OF_RANGE = float(Status.OK), float(Status.NOT_CONVERGED), float(Status.OUT_OF_RANGE)
@@ -100,8 +101,13 @@ def _joined(j, n, at, rows, limit):
 
 @jit
 def _unfinished(m, n, at, rows, found):
-    """Whether the last of m > 1 rows is not an eigenvalue yet."""
-    return _joined(m - 1, n, at, rows, found + rows[at(m - 1)])
+    """Whether the last of m > 1 rows is not an eigenvalue yet; `found` is how far all of them have been shifted.
+
+    Without e the others are off by no more than e + sqrt(q e).
+    """
+    q, e = rows[at(m - 1)], rows[at(n + m - 2)]
+    felt = (e > _TINY * found) | (e * q > _NEGLIGIBLE * _TINY * found * found)
+    return felt & _joined(m - 1, n, at, rows, found + q)
 
 
 @jit

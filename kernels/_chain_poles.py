@@ -28,6 +28,7 @@ REACH = 2.0**300
 """Largest h without units."""
 _SETTLED = 1e-12  # correction over root, after which (2) takes over
 _NEAR = 1e-6  # step over root, above which another joint may do better
+_TWIN = 2.0**-20  # below which rounding moves a double root
 _LIGHT = 0.03
 _OK, _NOT_CONVERGED, _OUT_OF_RANGE = float(Status.OK), float(Status.NOT_CONVERGED), float(Status.OUT_OF_RANGE)
 _TURNS = 0.15915494309189535  # 1/(2 pi)
@@ -125,7 +126,7 @@ def _joint(n, chain, ways):
 
 @jit_call
 def _look(n, chain, s, r, ways):
-    """Newton's step (2) of a pole from the joint r, the bound (3) on its relative error, and x* J x, x* h x."""
+    """Newton's step (2) of a pole from the joint r, the bound (3) on its relative error; x* J x, x* h x and x* k x."""
     J, k, h, e_J, e_k = chain
     right = ways[7 * n :]
     rigid, lost, solid, viscous, elastic = (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0
@@ -144,7 +145,7 @@ def _look(n, chain, s, r, ways):
     step = _complex.quotient(_complex.plus(missing, square), slope)
     size = sqrt(_complex.square(s))
     worth = (size * size * solid + elastic + size * viscous) / (size * sqrt(_complex.square(slope)))
-    return (-step[0], -step[1]), ROUNDING * worth, solid, viscous
+    return (-step[0], -step[1]), ROUNDING * worth, solid, viscous, elastic
 
 
 @jit_call
@@ -169,17 +170,44 @@ def _refined(n, chain, s, ways):
         _follow(n, chain, s, -1, ways)
         if r < 0:
             r = _best_joint(n, chain, s, ways)
-        step, error, solid, viscous = _look(n, chain, s, r, ways)
+        step, error, solid, viscous, _ = _look(n, chain, s, r, ways)
         s = _complex.plus(s, step)
         late = _complex.size(step) / _complex.size(s)
         error = error if late <= 4.0 * error else error + late
-        if attempt >= REFINEMENTS - 1 and (s[1] == 0.0 or magnitude(s[1]) > 16.0 * error * _complex.size(s)):
+        if attempt >= REFINEMENTS - 1 and (s[1] == 0.0 or magnitude(s[1]) > 4.0 * error * _complex.size(s)):
             break
         if attempt == REFINEMENTS - 1:
             s = s[0], 0.0
     if magnitude(s[0]) < _LIGHT * magnitude(s[1]):
         s = -0.5 * viscous / solid, s[1]
     return s, error
+
+
+@jit
+def _twin(i, count, fixed, pole_re, pole_im):
+    """A root next to root i that rounding may have parted from it; -1 for none."""
+    for j in range(fixed, count):
+        away = _complex.size((pole_re[i] - pole_re[j], pole_im[i] - pole_im[j]))
+        if j != i and away < _TWIN * magnitude(pole_re[i]):
+            return j
+    return -1
+
+
+@jit_call
+def _twins(n, chain, i, j, pole_re, pole_im, ways):
+    """Puts two roots near critical damping where the quadratic of the shape between them has its own; their error."""
+    middle = 0.5 * (pole_re[i] + pole_re[j]), 0.0
+    _follow(n, chain, middle, 1, ways)
+    _follow(n, chain, middle, -1, ways)
+    r = _best_joint(n, chain, middle, ways)
+    _, _, solid, viscous, elastic = _look(n, chain, middle, r, ways)
+    half, square = 0.5 * viscous / solid, elastic / solid
+    rest = fma(half, half, -square)
+    root = sqrt(magnitude(rest))
+    pole_re[i] = -half - (root if rest > 0.0 else 0.0)
+    pole_re[j] = square / pole_re[i] if rest > 0.0 else -half
+    pole_im[i], pole_im[j] = (root, -root) if rest < 0.0 else (0.0, 0.0)
+    return 2.0 * _TWIN + 2.0 * magnitude(half + middle[0]) / half
 
 
 @jit
@@ -243,27 +271,47 @@ def _sort(n, pole_re, pole_im):
 
 
 @jit
-def _gather(n, fixed, chain, pole_re, pole_im, errors, work):
-    """Every root refined, its conjugate beside it. The largest error, and whether 2 n different ones are there."""
-    worst, found = 0.0, fixed
+def _refine(n, fixed, chain, pole_re, pole_im, errors, work):
+    """Every root to its last digits; their errors, negative for twins; and the largest."""
+    worst = 0.0
+    for i in range(2 * n):
+        errors[i] = 0.0
     for i in range(fixed, 2 * n):
-        (re, im), error = _refined(n, chain, (pole_re[i], pole_im[i]), work)
-        pole_re[i], pole_im[i], errors[i] = re, im, error
-        worst = max(worst, error) if error >= 0.0 else float("inf")
+        j = _twin(i, 2 * n, fixed, pole_re, pole_im) if errors[i] == 0.0 else -1
+        if j >= 0 and errors[j] == 0.0:
+            error = _twins(n, chain, i, j, pole_re, pole_im, work)
+            errors[i] = errors[j] = -error
+            worst = max(worst, error)
+        elif errors[i] == 0.0:
+            (pole_re[i], pole_im[i]), error = _refined(n, chain, (pole_re[i], pole_im[i]), work)
+            errors[i] = error
+            worst = max(worst, error) if error >= 0.0 else float("inf")
+    return worst
+
+
+@jit
+def _apart(n, fixed, pole_re, pole_im, errors):
+    """Whether no two roots but twins may be the same."""
     apart = True
     for i in range(fixed, 2 * n):
-        for j in range(i):
-            away = _complex.size((pole_re[i] - pole_re[j], pole_im[i] - pole_im[j]))
-            reach = errors[i] * _complex.size((pole_re[i], pole_im[i]))
-            apart = apart and away > 4.0 * reach
+        for j in range(fixed, i):
+            size = _complex.size((pole_re[i], pole_im[i]))
+            away = _complex.size((pole_re[i] - pole_re[j], pole_im[i] - pole_im[j])) / size
+            twins = (errors[i] < 0.0) & (errors[i] == errors[j])
+            apart = apart and (twins or away > 4.0 * (magnitude(errors[i]) + magnitude(errors[j])))
+    return apart
+
+
+@jit
+def _paired(n, fixed, pole_re, pole_im, pairs):
+    """Real roots, and those with Im > 0 beside their conjugates, into `pairs`; whether these are 2 n."""
+    found = fixed
     for i in range(fixed, 2 * n):
-        if pole_im[i] >= 0.0:
-            copies = 2 if pole_im[i] > 0.0 else 1
-            for copy in range(copies):
-                if found < 2 * n:
-                    work[found], work[2 * n + found] = pole_re[i], pole_im[i] * (1.0 - 2.0 * copy)
-                found += 1
-    return worst, apart and found == 2 * n
+        for copy in range(2 if pole_im[i] > 0.0 else 1 if pole_im[i] == 0.0 else 0):
+            if found < 2 * n:
+                pairs[found], pairs[2 * n + found] = pole_re[i], pole_im[i] * (1.0 - 2.0 * copy)
+            found += 1
+    return found == 2 * n
 
 
 @jit_call
@@ -271,14 +319,17 @@ def damped_poles(n, J, k, h, frequency, pole_re, pole_im, work):
     """(error, status): all 2 n poles [rad/s] ascending in size, a pair as +Im, -Im; a bound on their relative errors.
 
     frequency [Hz] is that of `natural_frequencies`; work has room for 16 n. Without a spring to ground one pole is
-    exactly 0, without a damper to ground two are. NOT_CONVERGED where two poles cannot be told apart.
+    exactly 0, without a damper to ground two are. At critical damping two poles hang on half of the digits, as the
+    bound says; abs(s) and damping of both together do not. NOT_CONVERGED where others cannot be told apart.
     """
     e_J, e_k, sound = units(n, same, J, k)
     chain = J, k, h, e_J, e_k
     sound = sound & (scale(extremes(n, same, h)[1], -0.5 * (e_J + e_k)) < REACH)
     fixed = _start(n, chain, frequency, pole_re, pole_im, work)
     settled = _approach(n, chain, fixed, pole_re, pole_im, work)
-    error, told_apart = _gather(n, fixed, chain, pole_re, pole_im, work[14 * n :], work)
+    error = _refine(n, fixed, chain, pole_re, pole_im, work[14 * n :], work)
+    told_apart = _apart(n, fixed, pole_re, pole_im, work[14 * n :])
+    told_apart = _paired(n, fixed, pole_re, pole_im, work) and told_apart
     for i in range(2 * n):
         pole_re[i] = scale(work[i], 0.5 * (e_k - e_J)) if i >= fixed else 0.0
         pole_im[i] = scale(work[2 * n + i], 0.5 * (e_k - e_J)) if i >= fixed else 0.0
@@ -303,9 +354,9 @@ def modal_damping(n, pole_re, pole_im, frequency, damping):
             size = _complex.modulus(s, im)
             frequency[mode], damping[mode] = _TURNS * size, -s / size
         elif im == 0.0 and single:
-            size = sqrt(-waiting) * sqrt(-s)
+            size = sqrt(magnitude(waiting)) * sqrt(magnitude(s))
             frequency[mode] = _TURNS * size
-            damping[mode] = 0.5 * (sqrt(waiting / s) + sqrt(s / waiting)) if s < 0.0 else 0.0
+            damping[mode] = 0.5 * (magnitude(waiting) + magnitude(s)) / size if s < 0.0 else 0.0
         if im > 0.0 or (im == 0.0 and single):
             mode += 1
         if im == 0.0:
