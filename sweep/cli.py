@@ -28,7 +28,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 2 for a mistake of the user or a fault of the machine; 130 after Ctrl-C; 1 for a fault of ours.
+        0, also where `--until` ended a run; 2 for a mistake of the user or a fault of the machine; 130 after Ctrl-C,
+        143 after SIGTERM; 1 for a fault of ours.
     """
     arguments = parser().parse_args(argv)
     try:
@@ -38,6 +39,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(str(error), MISTAKE)
     except KeyboardInterrupt:
         return _fail("stopped", INTERRUPTED)
+    except SystemExit as end:
+        # after SIGTERM
+        return _fail("stopped", int(str(end.code)))
     except BrokenPipeError:
         # whoever read our output has had enough; Python would complain again when it closes stdout
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -74,6 +78,10 @@ def parser() -> argparse.ArgumentParser:
     _add_study(run)
     run.add_argument("-o", "--output", metavar="OUT.h5", type=Path, help="default: the study's name with .h5, here")
     run.add_argument("--force", action="store_true", help="overwrite the result of another study")
+    text = "of a result of the same study with fewer values on its axes, compute the new cells only"
+    run.add_argument("--extend", action="store_true", help=text)
+    text = "stop within a block's time of it, exit status 0; the same command continues"
+    run.add_argument("--until", metavar="07:00", help=text)
 
     show = _command(commands, "show", _show, "what is in a result, how much is done, what became of its cells")
     _add_result(show)
@@ -157,11 +165,14 @@ def _run(arguments: argparse.Namespace) -> None:
     study = _study(arguments)
     from sweep.report import summary_text
     from sweep.runner import run
+    from sweep.statuses import account
 
     output = arguments.output or Path(f"{arguments.study.stem}.h5")
     before = _mark(output)
-    with run(study, output, workers=arguments.workers, force=arguments.force) as dataset:
+    options = {name: getattr(arguments, name) for name in ("workers", "force", "extend", "until")}
+    with run(study, output, **options) as dataset:
         told = "done before; " if before is not None and _mark(output) == before else ""
+        told = told if account(dataset).pending == 0 else "unfinished; "
         print(f"{output}: {told}{summary_text(dataset)}")
 
 

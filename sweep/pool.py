@@ -9,7 +9,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from typing import Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
@@ -76,7 +76,7 @@ def each(
 ) -> None:
     """Calls `work` for every job on a pool of threads.
 
-    After a fault, or Ctrl-C, the jobs at work are ended, no other is begun, and the fault is raised.
+    After a fault, Ctrl-C or SIGTERM, the jobs at work are ended, no other is begun, and the fault is raised.
 
     Parameters
     ----------
@@ -109,37 +109,54 @@ def _settle(waiting: Jobs, finished: Callable[[int | None], None]) -> None:
     finished(None)
 
 
+class Terminated(SystemExit):
+    """The system, or somebody, asked this process to end (SIGTERM); it does, with the usual exit status 143."""
+
+    def __init__(self) -> None:
+        super().__init__(128 + signal.SIGTERM)
+
+
 class CtrlC:
-    """Holds Ctrl-C back until `check`, for Python's locks are left in disorder where it strikes inside them.
+    """Holds Ctrl-C and SIGTERM back until `check`, for Python's locks are left in disorder where they strike in them.
 
     The second one strikes at once. Other handlers than Python's own are left alone.
     """
 
+    OWN: ClassVar[dict[signal.Signals, Any]] = {
+        signal.SIGINT: signal.default_int_handler,
+        signal.SIGTERM: signal.SIG_DFL,
+    }
+
     def __init__(self) -> None:
-        self._pressed = False
-        self._ours = False
+        self._pressed: int | None = None
+        self._ours: list[signal.Signals] = []
 
     def __enter__(self) -> CtrlC:
-        main = threading.current_thread() is threading.main_thread()
-        self._ours = main and signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        if self._ours:
-            signal.signal(signal.SIGINT, self._press)
+        if threading.current_thread() is threading.main_thread():
+            self._ours = [number for number, own in self.OWN.items() if signal.getsignal(number) is own]
+        for number in self._ours:
+            signal.signal(number, self._press)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
-        if self._ours:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+        self._give_back()
         if kind is None:
             self.check()
 
     def check(self) -> None:
-        """Raises KeyboardInterrupt if Ctrl-C was pressed."""
-        if self._pressed:
+        """Raises KeyboardInterrupt if Ctrl-C was pressed, Terminated after SIGTERM."""
+        if self._pressed == signal.SIGTERM:
+            raise Terminated
+        if self._pressed is not None:
             raise KeyboardInterrupt
 
     def _press(self, number: int, frame: object) -> None:
-        self._pressed = True
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        self._pressed = number
+        self._give_back()
+
+    def _give_back(self) -> None:
+        for number in self._ours:
+            signal.signal(number, self.OWN[number])
 
 
 def whole_number(name: str, number: int) -> int:

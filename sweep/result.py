@@ -77,6 +77,15 @@ def open_result(path: str | os.PathLike[str], strict: bool = False) -> xr.Datase
     raise SweepError(f"{output}: its parts are vanishing while they are read; try again")
 
 
+def open_unfinished(path: str | os.PathLike[str]) -> xr.Dataset:
+    """What there is of an unfinished sweep, also where its output holds an earlier result. Raises SweepError."""
+    output = Path(path)
+    spec = read_spec(folder_of(output))
+    if spec is None:
+        raise SweepError(f"{output}: there is no sweep that writes it")
+    return _open_parts(output, spec, False)
+
+
 def in_memory(plan: Layout, arrays: Mapping[str, Any]) -> xr.Dataset:
     """A Dataset of columns of shape `(size, ...)`."""
     import xarray as xr

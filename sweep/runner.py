@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from sweep.assemble import assemble
 from sweep.contents import gathered, part_columns
 from sweep.errors import SweepError
+from sweep.extending import Known, obstacle
 from sweep.fingerprint import difference, fingerprint
-from sweep.pool import Spares, cores, whole_number
+from sweep.pool import Spares, Terminated, cores, whole_number
 from sweep.progress import Progress, stream_of
-from sweep.result import checked_study, in_memory, memory, open_result, stored_fingerprint
+from sweep.result import checked_study, in_memory, memory, open_result, open_unfinished, stored_fingerprint
 from sweep.session import Session, Solve
 from sweep.store import Store, folder_of, opened, read_spec
+from sweep.until import TimeUp, deadline
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from sweep.blocks import Partition
     from sweep.store import Spec
     from sweep.study import Study
 
@@ -37,6 +42,8 @@ def run(
     force: bool = False,
     progress: bool | TextIO | None = None,
     block_cells: int | None = None,
+    extend: bool = False,
+    until: str | datetime | None = None,
 ) -> xr.Dataset:
     """Computes every cell of a study. The same study gives the same bits, however it is cut and continued.
 
@@ -54,23 +61,30 @@ def run(
         Where to tell how far it is; None and True: stderr, False: nowhere. A run of less than a second is silent.
     block_cells : int, optional
         Cells a block, instead of a size taken from a timed sample. A run that is continued keeps its own.
+    extend : bool
+        Where the output is complete for a study of which this one has all values on every axis, and more, compute the
+        new cells only; the output is replaced when all are there.
+    until : str or datetime, optional
+        Stop within a block's time of "07:00" or "2027-01-31 07:00"; what there is by then is returned.
 
     Raises
     ------
     SweepError
         The output cannot be written, belongs to another study or another run, the disk is full, or a kernel failed.
         What is finished is kept.
-    KeyboardInterrupt
-        After Ctrl-C, when the blocks at work have been stored.
+    KeyboardInterrupt, SystemExit
+        After Ctrl-C or SIGTERM, when the blocks at work have been stored.
     """
     cells = None if block_cells is None else whole_number("block_cells", block_cells)
     crew = cores() if workers is None else whole_number("workers", workers)
-    task = _Task(study, fingerprint(study), crew, stream_of(progress), cells, force)
+    task = _Task(study, fingerprint(study), crew, stream_of(progress), cells, force, extend, deadline(until))
+    if path is None and until is not None:
+        raise SweepError("until: give a path as well, or what is computed by then would be lost")
     if path is None:
         return _run_in_memory(task)
     output = _checked_output(path)
-    if not _done(task, output) or folder_of(output).exists():
-        _run_to_file(task, output)
+    if (not _done(task, output) or folder_of(output).exists()) and not _run_to_file(task, output):
+        return open_unfinished(output)
     return open_result(output)
 
 
@@ -82,6 +96,8 @@ class _Task:
     stream: TextIO | None
     block_cells: int | None
     force: bool
+    extend: bool
+    until: datetime | None
 
 
 def _run_in_memory(task: _Task) -> xr.Dataset:
@@ -107,30 +123,59 @@ def _run_in_memory(task: _Task) -> xr.Dataset:
     return in_memory(session.dated(progress, session.began), found)
 
 
-def _run_to_file(task: _Task, output: Path) -> None:
+def _run_to_file(task: _Task, output: Path) -> bool:
+    """False where the time was up before the end."""
     with opened(output, part_columns(task.study)) as store:
         spec = _spec(store, task)
         # looked at again, for another run may have ended before this one had the lock
         if _done(task, output):
             _tidy(store, spec, task)
-            return
+            return True
         _take_up(store, spec, task)
         blocks = None if store.spec is None else store.blocks
         all_there = store.spec is not None and not store.missing()
-        session = Session(task.study, task.mark, task.workers, blocks, task.block_cells, sampled=not all_there)
-        if store.spec is None:
-            store.begin(task.study.to_json(), task.mark, session.blocks)
-        progress = session.progress(task.stream, output.name, store.missing())
-        _warn_of_space(session, output, progress)
-        try:
-            _finish(session, store, output, progress)
-        except KeyboardInterrupt:
-            kept = f"{len(store.names)} of {store.blocks.count} blocks are kept"
-            progress.note(f"stopped; {kept}, run the same command again to continue")
-            raise
-        finally:
-            progress.stop()
-        store.clear()
+        known = None if all_there else _known(task, output)
+        with known or contextlib.nullcontext():
+            return _run_session(task, store, output, blocks, known, all_there)
+
+
+def _run_session(
+    task: _Task, store: Store, output: Path, blocks: Partition | None, known: Known | None, all_there: bool
+) -> bool:
+    """Computes and puts together what is missing; False where the time was up before the end."""
+    session = Session(task.study, task.mark, task.workers, blocks, task.block_cells, not all_there, known, task.until)
+    jobs = range(session.blocks.count) if store.spec is None else store.missing()
+    progress = session.progress(task.stream, output.name, jobs)
+    _check_space(session, output, progress)
+    if store.spec is None:
+        store.begin(task.study.to_json(), task.mark, session.blocks)
+    try:
+        _finish(session, store, output, progress)
+    except (KeyboardInterrupt, Terminated):
+        progress.note(f"stopped; {_kept(store)}")
+        raise
+    except TimeUp:
+        progress.note(f"stopped, for it is {datetime.now():%H:%M}; {_kept(store)}")
+        return False
+    finally:
+        progress.stop()
+    store.clear()
+    return True
+
+
+def _kept(store: Store) -> str:
+    kept = f"{len(store.names)} of {store.blocks.count} blocks are kept"
+    return f"{kept}, run the same command again to continue"
+
+
+def _known(task: _Task, output: Path) -> Known | None:
+    """The cells of the result that is extended. Raises SweepError where that is not possible."""
+    if not task.extend or task.force or not output.exists():
+        return None
+    from sweep.verifying import check_whole
+
+    check_whole(output)
+    return Known(output, task.study)
 
 
 def _spec(store: Store, task: _Task) -> Spec | None:
@@ -176,7 +221,12 @@ def _finish(session: Session, store: Store, output: Path, progress: Progress) ->
         _store_blocks(session, store, progress)
         assert store.spec is not None
         layout = session.dated(progress, store.spec.begun)
-        damaged = assemble(store, session.study, layout, output, session.workers, progress.gather)
+
+        def tell(done: int, total: int) -> None:
+            progress.gather(done, total)
+            session.check_time()
+
+        damaged = assemble(store, session.study, layout, output, session.workers, tell)
         if not damaged:
             progress.end()
             return
@@ -207,13 +257,16 @@ def _store_blocks(session: Session, store: Store, progress: Progress) -> None:
     session.compute(jobs, threads, work, progress)
 
 
-def _warn_of_space(session: Session, output: Path, progress: Progress) -> None:
-    """Parts to come and the output have room on the disk, or somebody is told."""
+def _check_space(session: Session, output: Path, progress: Progress) -> None:
+    """Raises SweepError where the parts to come and the output have no room on the disk."""
     missing = session.row_bytes * (progress.total - progress.done) / session.granules.mean
     needed = missing + session.layout.cell_bytes * session.layout.grid.size
     free = shutil.disk_usage(output.parent).free
     if needed > free:
-        progress.note(f"needs {needed / 1e6:,.1f} MB, only {free / 1e6:,.1f} MB are free here")
+        raise SweepError(
+            f"{output}: needs {needed / 1e6:,.1f} MB more, only {free / 1e6:,.1f} MB are free here; free some space, "
+            "choose another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
+        )
 
 
 def _done(task: _Task, output: Path) -> bool:
@@ -225,9 +278,15 @@ def _done(task: _Task, output: Path) -> bool:
         return False
     if stored == dict(task.mark):
         return True
+    hindrance = obstacle(stored, task.mark)
+    if task.extend and not hindrance:
+        return False
+    cure = "choose another name, or overwrite it with --force"
+    if task.extend:
+        raise SweepError(f"{output}: cannot be extended, for {hindrance}; {cure}\n" + _listed(stored, task.mark))
+    more = "" if hindrance else "; where its axes have only got more values, --extend computes the new cells alone"
     raise SweepError(
-        f"{output}: holds the result of another study or version; choose another name, or overwrite it with --force\n"
-        + _listed(stored, task.mark)
+        f"{output}: holds the result of another study or version; {cure}{more}\n" + _listed(stored, task.mark)
     )
 
 

@@ -17,8 +17,10 @@ from sweep.layout import METHOD_USED, STATUS, Layout, columns
 from sweep.pool import Halt, Spares, each
 from sweep.progress import Progress
 from sweep.reducing import Reducer
+from sweep.until import TimeUp, passed
 
 if TYPE_CHECKING:
+    from sweep.extending import Known
     from sweep.study import Study
 
 Solve = Callable[[int, int, Mapping[str, Any]], bool]
@@ -36,6 +38,8 @@ class Session:
     blocks : how the grid is cut, where that is settled already
     block_cells : cells a block, instead of a size taken from the sample
     sampled : False where nothing is left to compute
+    known : cells that need not be computed
+    until : when to stop
     """
 
     def __init__(
@@ -46,8 +50,10 @@ class Session:
         blocks: Partition | None = None,
         block_cells: int | None = None,
         sampled: bool = True,
+        known: Known | None = None,
+        until: datetime | None = None,
     ) -> None:
-        self.study, self.workers = study, workers
+        self.study, self.workers, self.known, self.until = study, workers, known, until
         self.began = now()
         self.layout: Layout = contents(study, mark)
         self.columns = part_columns(study)
@@ -86,8 +92,9 @@ class Session:
     ) -> None:
         """Calls `work(job, solve)` for every block, dear ones first, on a pool of threads.
 
-        No more than `workers` threads are inside `solve` at a time. Raises SweepError where `work` fails.
+        No more than `workers` threads are inside `solve` at a time. Raises SweepError where `work` fails, TimeUp.
         """
+        self.check_time()
         halt = Halt(self.workers)
         solvers = Spares(lambda: self._solver(halt), threads)
 
@@ -102,24 +109,33 @@ class Session:
             else:
                 start, stop = self.cells(job)
                 progress.add(stop - start, float(self._weights[job]))
+            self.check_time()
 
         wanted = set(jobs)
         inorder = map(int, order(self.sample, self.blocks, self.granules.first))
         each((j for j in inorder if j in wanted), guarded, threads, finished, halt)
 
+    def check_time(self) -> None:
+        """Raises TimeUp when it is time to stop."""
+        if passed(self.until):
+            raise TimeUp
+
     def _solver(self, halt: Halt) -> Solve:
-        compute = _cells_solver(self.study) if self.study.summary is None else Reducer(self.study).solve
+        compute = _cells_solver(self.study, self.known) if self.study.summary is None else Reducer(self.study).solve
         return lambda start, stop, arrays: halt.compute(lambda: compute(start, stop, arrays))
 
 
-def _cells_solver(study: Study) -> Callable[[int, int, Any], None]:
+def _cells_solver(study: Study, known: Known | None) -> Callable[[int, int, Any], None]:
     from sweep.solve import Solver
 
     solver = Solver(study)
 
     def solve(start: int, stop: int, arrays: Mapping[str, Any]) -> None:
         outputs = {name: array for name, array in arrays.items() if name not in (STATUS, METHOD_USED)}
-        solver.solve(start, stop, outputs, arrays[STATUS], arrays[METHOD_USED])
+        wanted = None if known is None else known.missing(start, stop)
+        solver.solve(start, stop, outputs, arrays[STATUS], arrays[METHOD_USED], wanted)
+        if known is not None:
+            known.fill(start, stop, arrays)
 
     return solve
 

@@ -68,7 +68,15 @@ class Solver:
         self._asked = np.array([field.name in study.outputs for field in kernel.outputs], np.uint8)
         self._rtol, self._bound = np.empty(room), np.empty(room)
 
-    def solve(self, start: int, stop: int, outputs: Mapping[str, Floats], status: Codes, method_used: Codes) -> None:
+    def solve(
+        self,
+        start: int,
+        stop: int,
+        outputs: Mapping[str, Floats],
+        status: Codes,
+        method_used: Codes,
+        wanted: NDArray[np.bool_] | None = None,
+    ) -> None:
         """Fill the rows of every output asked for, and status and method number, of the cells `start` to `stop`.
 
         Parameters
@@ -78,15 +86,20 @@ class Solver:
         outputs : mapping of output name to ndarray, shape (stop - start, ...)
         status, method_used : ndarray of int8, shape (stop - start,)
             A `Status`; the position in `kernel.methods`, or -1 where the cell is refused.
+        wanted : ndarray of bool, optional
+            Cells to solve; what comes out for the others means nothing. Default: all.
         """
         for low in range(start, stop, self._strip):
             high = min(low + self._strip, stop)
             rows = slice(low - start, high - start)
+            if wanted is not None and not wanted[rows].any():
+                continue
             columns = [
                 outputs[f.name][rows] if f.name in outputs else self._unasked[f.name][: high - low]
                 for f in self.study.kernel.outputs
             ]
-            self._solve_strip(low, high, columns, status[rows], method_used[rows])
+            some = None if wanted is None or wanted[rows].all() else wanted[rows]
+            self._solve_strip(low, high, columns, status[rows], method_used[rows], some)
 
     def warm(self) -> None:
         """Solve a few cells spread over the grid: what they need is compiled before threads start."""
@@ -98,13 +111,22 @@ class Solver:
     def _shapes(self) -> dict[str, tuple[int, ...]]:
         return {f.name: tuple(self.study.lengths[d] for d in f.dims) for f in self.study.asked}
 
-    def _solve_strip(self, low: int, high: int, outputs: Sequence[Floats], status: Codes, used: Codes) -> None:
+    def _solve_strip(
+        self,
+        low: int,
+        high: int,
+        outputs: Sequence[Floats],
+        status: Codes,
+        used: Codes,
+        wanted: NDArray[np.bool_] | None,
+    ) -> None:
         strip = _Strip(self, high - low, outputs, status, used)
         self.grid.columns(low, high, strip.parameters)
         self.study.kernel.check(*strip.parameters, status)
         used.fill(NONE)
         method, strip.rtol[:] = self.grid.settings(low, high)
-        allowed = _pick(slice(0, high - low), status < FIRST_REFUSAL)
+        sound = status < FIRST_REFUSAL
+        allowed = _pick(slice(0, high - low), sound if wanted is None else sound & wanted)
         codes = [method] if isinstance(method, int) else np.unique(method)
         for code in codes:
             cells = allowed if isinstance(method, int) else _pick(allowed, method[allowed] == code)

@@ -519,14 +519,14 @@ def test_the_output_may_be_a_link_to_another_folder(tmp_path):
     assert (tmp_path / "far" / "real.h5").is_file()
 
 
-def test_a_disk_that_is_too_small_is_told_at_once(output, monkeypatch):
+def test_a_disk_that_is_too_small_is_refused_at_once(output, monkeypatch):
     import shutil
 
     usage = shutil.disk_usage(output.parent)
     monkeypatch.setattr(shutil, "disk_usage", lambda path: usage._replace(free=10))
-    log = io.StringIO()
-    quiet(stone(), output, progress=log)
-    assert "are free here" in log.getvalue()
+    with pytest.raises(SweepError, match="are free here"):
+        quiet(stone(), output)
+    assert list(output.parent.iterdir()) == []
 
 
 def test_blocks_without_a_spec_are_not_thrown_away(unfinished):
