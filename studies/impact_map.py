@@ -1,0 +1,274 @@
+"""When does a crown wheel that collides with a foliot keep a steady beat, and how far does it recoil?
+
+    sweep run studies/impact_map.toml
+    sweep run studies/impact_map_lever.toml
+    python studies/impact_map.py impact_map.h5 impact_map_lever.h5
+
+draws impact_map.png and prints theory beside what comes out. Two bodies of masses M and m at the pallet, kappa = M/m,
+under the force F = m g kappa, with one impact per half period T:
+    T^2 = p(1 + e)/(g(1 - e)(1 + kappa)),  swing Y = kappa g T^2/4,  recoil if kappa < 2e/(1 - e),
+where no tooth is met in between; stable for kappa > 1. The models of Lepschy, Roup and Denny are of this kind; only
+their abstracts were at hand, and no number here is theirs.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from _common import Groups, Statement, direct_label, hatch, read_result, report
+
+from kernels.interface import Status
+
+NOTES = """\
+theory: kappa = M/m, the mass of the wheel over that of the foliot, both at the pallet; deviation: relative, in the
+worst cell. A steady beat: the motion repeats after one tooth, the same on both sides"""
+
+EXISTS = (Status.OK, Status.UNSTABLE, Status.GRAZING)
+
+KINDS = ("one impact", "several impacts", "bounces end in contact", "off centre", "period 2", "never settles", "open")
+KIND_COLOURS = ("#0072B2", "#56B4E9", "#009E73", "#E69F00", "#CC79A7", "#D55E00", "0.85")
+
+LEVER_E = 0.6
+
+
+def prepared(ds: xr.Dataset) -> xr.Dataset:
+    """`ds` with kappa, the pitch p and the swing and recoil over it."""
+    pitch = 2 * math.pi * ds.r_c / ds.teeth
+    kappa = (ds.I_c / ds.r_c**2) / (ds.I_v / ds.r_v**2)
+    return ds.assign_coords(kappa=kappa).assign(pitch=pitch, Y=ds.swing / pitch)
+
+
+def half_period(ds: xr.Dataset) -> xr.DataArray:
+    """T of the symmetric cycle [s]."""
+    acceleration = ds.torque * ds.r_c / ds.I_c
+    return np.sqrt(ds.pitch * (1 + ds.e) / (acceleration * (1 - ds.e) * (1 + ds.kappa)))
+
+
+def worst(here: xr.DataArray, theory: xr.DataArray) -> float:
+    return float(abs(here / theory - 1).max())
+
+
+def count(condition: xr.DataArray) -> int:
+    return int(condition.sum())
+
+
+def cycle(closed: xr.Dataset) -> list[Statement]:
+    """The symmetric cycle where it exists; e = 0 is another one, with the tooth resting on the pallet."""
+    free = closed.where(closed.status.isin(EXISTS) & (closed.e > 0))
+    here = free.period.notnull() & (free.status != Status.GRAZING) & (abs(free.kappa - 1) > 1e-12)
+    loose = count(here & ((free.multiplier < 1) != (free.kappa > 1)))
+    thrown = count(here & ((free.recoil > 0) != (free.kappa < 2 * free.e / (1 - free.e))))
+    way = closed.kappa * (1 + closed.e) / (4 * (1 - closed.e) * (1 + closed.kappa))
+    cells = f"{count(free.period.notnull())} cells"
+    return [
+        Statement("period = 2T", "all that exist", cells, *_off(free.period, 2 * half_period(closed))),
+        Statement("swing = Y, whatever the torque", "all that exist", cells, *_off(free.Y, way)),
+        Statement("stable for kappa > 1 and no other", "no exception", f"{loose} exceptions", None, not loose),
+        Statement("recoil for kappa < 2e/(1 - e)", "no exception", f"{thrown} exceptions", None, not thrown),
+        *plastic(closed.sel(e=0.0)),
+    ]
+
+
+def plastic(stuck: xr.Dataset) -> list[Statement]:
+    """e = 0: the tooth stays on the pallet until it escapes."""
+    off = float(abs(stuck.multiplier - ((1 - stuck.kappa) / (1 + stuck.kappa)) ** 2).max())
+    steady = bool((stuck.status == Status.OK).all())
+    return [
+        Statement("e = 0: exists and is stable at every kappa", "yes", f"{stuck.kappa.size} cells", None, steady),
+        Statement("e = 0: multiplier ((1 - kappa)/(1 + kappa))^2", "yes", "largest difference", off, off < 1e-14),
+    ]
+
+
+def _off(here: xr.DataArray, theory: xr.DataArray) -> tuple[float, bool]:
+    off = worst(here, theory)
+    return off, off < 1e-13
+
+
+def kinds(motion: xr.Dataset) -> xr.DataArray:
+    """What the motion is, as position in `KINDS`."""
+    told = motion.status.isin((Status.OK, Status.GRAZING, Status.INACCURATE))
+    centred = abs(motion.offset) < 1e-6 * motion.pitch
+    kind = xr.full_like(motion.status, KINDS.index("open"), dtype=int)
+    rules = (
+        (told & centred & (motion.impacts == 1), "one impact"),
+        (told & centred & (motion.impacts > 1), "several impacts"),
+        (told & centred & np.isinf(motion.impacts), "bounces end in contact"),
+        (told & ~centred, "off centre"),
+        (motion.status == Status.PERIOD_2, "period 2"),
+        (motion.status == Status.NOT_PERIODIC, "never settles"),
+    )
+    for where, name in rules:
+        kind = kind.where(~where, KINDS.index(name))
+    return kind
+
+
+def motions(closed: xr.Dataset, motion: xr.Dataset) -> list[Statement]:
+    """What the clock does, followed contact by contact."""
+    both = (closed.status == Status.OK) & (motion.status == Status.OK) & (motion.impacts == 1)
+    same = motion.where(both & (closed.e > 0))
+    lost = (closed.status == Status.OK) & (motion.status != Status.OK)
+    kind = kinds(motion)
+    return [
+        Statement(
+            "where both find it, period by events = by formula", "yes", f"{count(both)} cells", *_near(same, closed)
+        ),
+        Statement("stable cycles that events does not settle on", "", f"{count(lost)} cells"),
+        *(Statement(f"the clock's motion: {name}", "", f"{count(kind == i)} cells") for i, name in enumerate(KINDS)),
+    ]
+
+
+def _near(here: xr.Dataset, closed: xr.Dataset) -> tuple[float, bool]:
+    off = worst(here.period, closed.period)
+    return off, off < 1e-9
+
+
+def lever_borders(kappa: Any, e: float) -> tuple[Any, Any]:
+    """nu between which the cycle is stable, for kappa < 1."""
+    return -4 * (1 + kappa) / (kappa * (1 - kappa)), -4 * (1 + e) ** 2 / ((1 - e) ** 2 * kappa + 2 * (1 + e * e))
+
+
+def lever(bent: xr.Dataset) -> list[Statement]:
+    """A curved lever can steady a heavy foliot."""
+    exists = bent.status.isin((Status.OK, Status.UNSTABLE))
+    low, high = lever_borders(bent.kappa, LEVER_E)
+    steady = xr.where(bent.kappa < 1, (bent.nu > low) & (bent.nu < high), _steady_light(bent))
+    wrong = count(exists & (steady != (bent.multiplier < 1)))
+    heavy = exists & (bent.kappa < 1)
+    held = count(heavy & (bent.multiplier < 1))
+    flat = count(heavy & (abs(bent.nu) < 1e-9) & (bent.multiplier < 1))
+    return [
+        Statement("stability between the two borders in nu", "no exception", f"{wrong} exceptions", None, not wrong),
+        Statement(
+            "heavy foliots steadied by a lever that yields", "some", f"{held} of {count(heavy)} cells", None, held > 0
+        ),
+        Statement("heavy foliots steady with a flat lever", "none", f"{flat} cells", None, not flat),
+    ]
+
+
+def _steady_light(bent: xr.Dataset) -> xr.DataArray:
+    """For kappa > 1: p(1) > 0 and p(-1) < 0, p the characteristic polynomial of the half map."""
+    k, e = bent.kappa, LEVER_E
+    low = -4 * (1 + e) ** 2 / ((1 - e) ** 2 * k + 2 * (1 + e * e))
+    return (bent.nu < 4 * (1 + k) / (k * (k - 1))) & (bent.nu > low)
+
+
+def figure(closed: xr.Dataset, motion: xr.Dataset, bent: xr.Dataset) -> Any:
+    """Cycle, recoil, motion and lever; for two columns of print."""
+    from sweep import charts
+
+    with charts.style():
+        page = charts.new_figure(charts.PAGE, 150.0)
+        axes = page.subplots(2, 2)
+        draw_swing(page, axes[0, 0], closed)
+        draw_recoil(page, axes[0, 1], closed)
+        draw_kinds(axes[1, 0], motion)
+        draw_lever(page, axes[1, 1], bent)
+        for panel, text in zip(axes.flat, "abcd", strict=True):
+            charts.letter(panel, text)
+    return page
+
+
+def _frame(axes: Any, ds: xr.Dataset) -> tuple[Any, Any]:
+    kappa, e = ds.kappa.values, ds.e.values
+    axes.set(xscale="log", xlim=(kappa[0], kappa[-1]), ylim=(e[0], e[-1]))
+    axes.set(xlabel=r"mass of the wheel over that of the foliot, $\kappa$", ylabel="restitution, $e$")
+    return kappa, e
+
+
+def _missing(axes: Any, ds: xr.Dataset, values: Any) -> None:
+    kappa, e = _frame(axes, ds)
+    hatch(axes, kappa, e, np.isnan(values), "////")
+
+
+def draw_swing(page: Any, axes: Any, ds: xr.Dataset) -> None:
+    """Swing of the symmetric cycle; left of the line it is unstable."""
+    values = ds.Y.transpose("e", "I_c").values
+    kappa, e = _frame(axes, ds)
+    mesh = axes.pcolormesh(kappa, e, values, vmin=0, vmax=0.8, cmap="cividis", shading="nearest", rasterized=True)
+    page.colorbar(mesh, ax=axes, label="swing over tooth pitch, $Y/p$", pad=0.02)
+    _missing(axes, ds, values)
+    axes.axvline(1.0, color="white", linewidth=1.4)
+    axes.axvline(1.0, color="black", linewidth=0.8, linestyle=(0, (4, 2)))
+    direct_label(axes, 0.1, 0.85, "no cycle with one impact")
+    direct_label(axes, 10.0, 0.3, "stable")
+    direct_label(axes, 0.36, 0.5, "unstable", fontsize=7)
+
+
+def draw_recoil(page: Any, axes: Any, ds: xr.Dataset) -> None:
+    """How far the wheel is thrown back, and the border of recoil."""
+    values = np.degrees(ds.recoil.transpose("e", "I_c").values)
+    pitch = math.degrees(float(2 * math.pi / ds.teeth))
+    kappa, e = _frame(axes, ds)
+    shown = np.ma.masked_invalid(values / pitch)
+    mesh = axes.pcolormesh(kappa, e, shown, cmap="cividis", vmin=0, vmax=0.3, shading="nearest", rasterized=True)
+    page.colorbar(mesh, ax=axes, label="recoil over tooth pitch", pad=0.02)
+    _missing(axes, ds, values)
+    border = kappa / (2 + kappa)
+    axes.plot(kappa, border, color="white", linewidth=1.4)
+    axes.plot(kappa, border, color="black", linewidth=0.8, linestyle=(0, (4, 2)))
+    direct_label(axes, 12, 0.3, "no recoil")
+
+
+def draw_kinds(axes: Any, motion: xr.Dataset) -> None:
+    """What the clock does, contact by contact."""
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
+    kappa, e = _frame(axes, motion)
+    kind = kinds(motion).transpose("e", "I_c").values
+    palette = ListedColormap(list(KIND_COLOURS))
+    axes.pcolormesh(kappa, e, kind, cmap=palette, vmin=-0.5, vmax=len(KINDS) - 0.5, shading="nearest", rasterized=True)
+    there = [i for i in range(len(KINDS)) if (kind == i).any()]
+    keys = [Patch(color=KIND_COLOURS[i], label=KINDS[i]) for i in there]
+    axes.legend(
+        handles=keys,
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.2),
+        ncols=3,
+        fontsize=7,
+        handlelength=1.2,
+        columnspacing=1,
+    )
+
+
+def draw_lever(page: Any, axes: Any, bent: xr.Dataset) -> None:
+    """Multiplier over kappa and the lever's curvature, and where theory has the borders of stability."""
+    kappa, nu = bent.kappa.values, bent.nu.values
+    values = bent.multiplier.transpose("nu", "I_c").values
+    mesh = axes.pcolormesh(kappa, nu, values, vmin=0.5, vmax=1.5, cmap="RdBu_r", shading="nearest", rasterized=True)
+    page.colorbar(mesh, ax=axes, label="multiplier", pad=0.02, extend="max")
+    hatch(axes, kappa, nu, np.isnan(values), "////")
+    heavy = np.linspace(kappa[0], 0.999, 400)
+    for border in lever_borders(heavy, LEVER_E):
+        axes.plot(heavy, border, color="black", linewidth=0.9)
+    axes.set(xscale="log", xlim=(kappa[0], kappa[-1]), ylim=(nu[0], nu[-1]))
+    axes.set(xlabel=r"$\kappa$", ylabel=r"curvature of the lever, $\nu$")
+    direct_label(axes, 0.3, -7, "stable")
+    direct_label(axes, 0.35, 2, "unstable")
+
+
+def conclude(path: str, lever_path: str) -> tuple[Groups, list[str], Any]:
+    """Statements and the figure."""
+    ds = prepared(read_result(path, "impact", ["method", "I_c", "e"], "impact_map.toml"))
+    bent = prepared(read_result(lever_path, "impact", ["I_c", "nu"], "impact_map_lever.toml"))
+    closed, motion = (ds.sel({"method": name}) for name in ("closed", "events"))
+    groups = {
+        "The symmetric cycle": cycle(closed),
+        "What the clock does": motions(closed, motion),
+        "A curved lever": lever(bent),
+    }
+    return groups, [NOTES], figure(closed, motion, bent)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Table and figure of the results that are named; 1 if a statement does not hold."""
+    return report(__file__, ["impact_map.h5", "impact_map_lever.h5"], arguments, conclude)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
