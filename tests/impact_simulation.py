@@ -60,7 +60,7 @@ class Clock:
             rate = self.V - side * self.slope(side * self.y) * self.w
             bend = 1 - self.c * self.w**2
             now = self.gap(side, self.x, self.y)
-            for tooth in range(floor(now) - 1, ceil(now) + 2):
+            for tooth in range(floor(now) - 3, ceil(now) + 4):
                 away = 0 * now if (side, tooth) == self.last else now - tooth
                 for t in roots(away, rate, bend):
                     if t > 0 and side * (self.y + self.w * t) < self.eta:

@@ -1,0 +1,326 @@
+"""Impact clocks followed contact by contact: against the closed cycle, a plain simulation, and the laws of impact."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import impact_simulation as simulation
+import numpy as np
+import pytest
+from columns import solve
+
+from kernels import _impact_contact, _impact_events, _impact_swing
+from kernels._jit import COMPILED
+from kernels.impact import IMPACT
+from kernels.interface import FIRST_REFUSAL, Status
+
+ROOT = Path(__file__).parents[2]
+TEETH, RADIUS, INERTIA = 31.0, 0.03, 1e-5
+PITCH = 2 * np.pi * RADIUS / TEETH
+
+
+def plain(function):
+    """A function without its compiled form."""
+    return getattr(function, "py_func", function)
+
+
+def clocks(kappa, eta, e, nu=0.0, torque=1e-3):
+    """Parameters by name, with g = torque r_c/I_c; `time_unit` is sqrt(p/g)."""
+    kappa, eta, e, nu, torque = np.broadcast_arrays(*(np.asarray(v, float) for v in (kappa, eta, e, nu, torque)))
+    masses = {"torque": torque, "I_c": kappa * INERTIA, "I_v": INERTIA, "r_c": RADIUS, "r_v": RADIUS, "teeth": TEETH}
+    return {name: np.atleast_1d(v) for name, v in (masses | {"h": eta * PITCH, "e": e, "nu": nu}).items()}
+
+
+def time_unit(kappa, torque=1e-3):
+    return np.sqrt(2 * np.pi / TEETH * np.asarray(kappa) * INERTIA / torque)
+
+
+def events(*scene, rtol=1e-9, **named):
+    return solve(IMPACT, "events", **clocks(*scene, **named), rtol=rtol)
+
+
+def random_clocks(n, seed=1, high=0.99):
+    random = np.random.default_rng(seed)
+    e = np.where(random.random(n) < 0.05, 0.0, random.uniform(0, high, n))
+    return 10 ** random.uniform(-2, 2, n), random.uniform(0, 0.25, n), e
+
+
+def orderly_clocks(n, seed=1):
+    """Clocks whose symmetric cycle exists and is stable, most of them."""
+    random = np.random.default_rng(seed)
+    return random.uniform(2, 8, n), random.uniform(0, 0.04, n), random.uniform(0.1, 0.3, n)
+
+
+def verdicts(scenes):
+    """For each clock: what the closed form says, what becomes of it, whether that is the closed cycle; both outputs."""
+    closed, says = solve(IMPACT, "closed", **clocks(*scenes))
+    found, becomes = events(*scenes)
+    same = becomes < FIRST_REFUSAL
+    for name in ("period", "swing"):
+        same &= np.abs(found[name] / closed[name] - 1) < 1e-9
+    return closed, says, found, becomes, same
+
+
+def test_clocks_come_to_the_symmetric_cycle_exactly_where_the_closed_form_has_it_stable():
+    scenes = random_clocks(1000) if COMPILED else orderly_clocks(10)
+    closed, says, found, becomes, same = verdicts(scenes)
+    sure = says != Status.GRAZING
+    assert ((says == Status.OK) == same)[sure].all()
+    assert (becomes[same] == Status.OK).mean() > 0.99
+    assert same.mean() > 0.15
+    assert (~same).sum() > 500 or not COMPILED
+    for name in ("period", "swing", "pallet_speed", "contact_share"):
+        np.testing.assert_allclose(found[name][same], closed[name][same], rtol=1e-13, atol=1e-15)
+    assert (found["impacts"][same] == 1).all()
+    assert (found["offset"][same] == 0).all()
+
+
+@pytest.mark.parametrize("rtol", [1e-12, 1e-13])
+def test_what_is_called_ok_is_right_to_rtol(rtol):
+    scenes = random_clocks(400, seed=7) if COMPILED else orderly_clocks(5, seed=7)
+    closed, says = solve(IMPACT, "closed", **clocks(*scenes))
+    found, becomes = events(*scenes, rtol=rtol)
+    both = (says == Status.OK) & (becomes == Status.OK)
+    assert both.sum() > (20 if COMPILED else 0)
+    for name in ("period", "swing", "pallet_speed", "wheel_speed", "multiplier"):
+        np.testing.assert_allclose(found[name][both], closed[name][both], rtol=rtol)
+    back = both & (closed["recoil"] > 0)
+    np.testing.assert_allclose(found["recoil"][back], closed["recoil"][back], rtol=2 * rtol)
+
+
+def test_near_the_borders_of_existence_the_verdict_still_is_that_of_the_closed_form():
+    """The tooth just clears a pallet's tip, or does not: kappa = 4, by bisection of e and of h."""
+    for eta in (0.0, 0.03, 0.1) if COMPILED else (0.0,):
+        low, high = 0.2, 0.8
+        for _ in range(20):
+            e = 0.5 * (low + high)
+            _, says = solve(IMPACT, "closed", **clocks(4.0, eta, e))
+            low, high = (e, high) if says[0] == Status.OK else (low, e)
+        beside = np.array([low - 1e-5, high + 1e-5])
+        _, says, _, _, same = verdicts((4.0, eta, beside))
+        assert says.tolist() == [Status.OK, Status.NO_CYCLE]
+        assert same.tolist() == [True, False]
+
+
+FOLLOWED = {
+    "one impact": (4.0, 0.05, 0.2),
+    "plastic": (2.0, 0.1, 0.0),
+    "plastic with a heavy foliot": (0.2, 0.05, 0.0),
+    "bounces that end in contact": (0.5, 0.1274, 0.05),
+    "bounces that end in contact, heavy foliot": (0.21, 0.048, 0.277),
+    "three impacts": (20.4555, 0.1277, 0.5778),
+    "five impacts": (70.2472, 0.2089, 0.5672),
+    "bounces that end in contact, off the middle": (2.831478082246554, 0.23931507825468049, 0.6098680333568618),
+    "off the middle, light foliot": (12.786, 0.126, 0.7672),
+    "two cycles": (12.7859, 0.1057, 0.5342),
+    "two cycles, more bounces": (2.8315, 0.1474, 0.4885),
+}
+KINDS = tuple(FOLLOWED) if COMPILED else ("one impact", "plastic", "bounces that end in contact")
+
+
+@pytest.fixture(scope="module")
+def found():
+    """What the kernel says of all in FOLLOWED, by their names."""
+    outputs, status = events(*np.array([FOLLOWED[kind] for kind in KINDS]).T)
+    rows = {kind: {name: column[i] for name, column in outputs.items()} for i, kind in enumerate(KINDS)}
+    return rows, dict(zip(KINDS, status, strict=True))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_plain_simulation_ends_up_in_the_same_cycle(kind, found):
+    clock = simulation.Clock(*FOLLOWED[kind])
+    clock.begin(w=1.0001)
+    period, travel, teeth = simulation.settled(clock, 3000 if COMPILED else 1000, 1e-8)
+    rows, status = found
+    row, unit = rows[kind], time_unit(FOLLOWED[kind][0])
+    assert status[kind] == (Status.PERIOD_2 if "two" in kind else Status.OK)
+    assert teeth == (2 if "two" in kind else 1)
+    assert row["period"] == pytest.approx(period * unit, rel=1e-11)
+    if teeth == 1:
+        assert row["swing"] == pytest.approx(travel * PITCH, rel=1e-11)
+        assert (row["offset"] > 0.01 * row["swing"]) == ("off" in kind)
+    assert np.isinf(row["impacts"]) == ("bounces that" in kind)
+
+
+@pytest.mark.skipif(not COMPILED, reason="many clocks")
+@pytest.mark.parametrize("seed", [11, 12])
+def test_random_clocks_go_where_a_plain_simulation_goes(seed):
+    scenes = random_clocks(8, seed, high=0.6)
+    outputs, status = events(*scenes)
+    compared = 0
+    for i, scene in enumerate(zip(*scenes, strict=True)):
+        clock = simulation.Clock(*map(float, scene))
+        clock.begin(w=1.0001)
+        end = simulation.settled(clock, 2500, 1e-8)
+        if status[i] in (Status.OK, Status.PERIOD_2) and end:
+            compared += 1
+            assert outputs["period"][i] == pytest.approx(end[0] * time_unit(scene[0]), rel=1e-8)
+    assert compared >= 4
+
+
+SCENE = 0.75, 0.25, 0.1, 0.3, 0.0, 0.0
+
+
+@pytest.mark.parametrize("lever", [1.0, -1.0, 0.6])
+def test_an_impact_keeps_momentum_and_turns_the_closing_speed_back_by_e(lever):
+    wheel, pallet, _, e, _, _ = SCENE
+    V, w = 0.7, -0.4
+    (_, after, turned), closing = plain(_impact_contact.impact)(SCENE, (0.0, V, w), lever)
+    assert after - lever * turned == pytest.approx(-e * (V - lever * w), rel=1e-15)
+    assert lever * (wheel / pallet) * (after - V) == pytest.approx(-(turned - w), rel=1e-15)
+    energy = [0.5 * V * V + 0.5 * pallet / wheel * w * w, 0.5 * after**2 + 0.5 * pallet / wheel * turned**2]
+    loss = plain(_impact_contact.impact_loss)(SCENE, closing, lever)
+    assert energy[0] - energy[1] == pytest.approx(loss, rel=1e-14)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("e", [0.0, 0.3, 0.9])
+def test_a_train_of_bounces_is_its_geometric_sum(side, e):
+    scene = 0.75, 0.25, 0.1, e, 0.0, 0.0
+    y, V, w, time, first = -0.2 * side, 0.5, 0.1 * side, 0.0, None
+    (y, V, w), _ = plain(_impact_contact.impact)(scene, (y, V, w), side)
+    first = y, V, w
+    for _ in range(600):
+        t = 2 * (side * w - V)
+        y, V, time = y + w * t, V + t, time + t
+        (y, V, w), _ = plain(_impact_contact.impact)(scene, (y, V, w), side)
+    total, after, widest = plain(_impact_contact.train)(scene, first, side)
+    assert total == pytest.approx(time, rel=1e-12, abs=1e-15)
+    assert after == pytest.approx((y, V, w), rel=1e-12)
+    assert widest == pytest.approx(0.5 * (side * first[2] - first[1]) ** 2, abs=1e-30)
+
+
+def followed(scene, half_swings):
+    """Tally, first and last start of a clock followed for so many half swings."""
+    wheel, _, _, e = scene[:4]
+    scene = *map(float, scene[:4]), 0.0, -0.25 * wheel * (1 + e) / (1 - e)
+    tally, slopes, history = np.zeros(_impact_swing.TALLIES), np.zeros((5, 3)), np.zeros((half_swings + 1, 3))
+    tally[_impact_swing.MARGIN] = np.inf
+    start = tuple(map(float, plain(_impact_events.beginning)(scene, 1e-3)))
+    end, verdict = _impact_events.follow(scene, start, half_swings, history, tally, slopes)
+    assert verdict == _impact_swing.DONE
+    return tally, start, end, history
+
+
+def test_the_work_of_the_torque_is_lost_in_impacts_whatever_the_motion():
+    n, half_swings = (40, 300) if COMPILED else (4, 20)
+    for kappa, eta, e in zip(*random_clocks(n, seed=3, high=0.9), strict=True):
+        wheel, pallet = kappa / (1 + kappa), 1 / (1 + kappa)
+        tally, start, end, _ = followed((wheel, pallet, eta, e), half_swings)
+        gained = 0.5 * (end[1] ** 2 - start[1] ** 2 + (end[2] ** 2 - start[2] ** 2) / kappa)
+        work, loss = tally[_impact_swing.WAY], tally[_impact_swing.LOSS]
+        assert work > 0.1 * half_swings / 2
+        assert abs(work - loss - gained) < 1e-12 * (work + start[2] ** 2 / kappa)
+
+
+def test_no_half_swing_lets_more_than_half_a_pitch_pass():
+    """So the wheel never runs free, and no clock of this kind loses a tooth: gaps are within (-1, 0] at both ends."""
+    n, half_swings = (40, 300) if COMPILED else (3, 20)
+    for kappa, eta, e in zip(*random_clocks(n, seed=4, high=0.95), strict=True):
+        tally, start, end, history = followed((kappa / (1 + kappa), 1 / (1 + kappa), eta, e), half_swings)
+        most = 0.5 * half_swings + end[0] - start[0]
+        assert tally[_impact_swing.WAY] <= most + 1e-9
+        assert ((history[:, 0] > -1) & (history[:, 0] <= 0) & (history[:, 2] < 0)).all()
+    if COMPILED:
+        assert not (events(*random_clocks(300, seed=5))[1] == Status.TOOTH_JUMPED).any()
+
+
+def test_with_little_restitution_a_clock_is_nearly_plastic():
+    plastic, _ = events(2.0, 0.1, 0.0)
+    for e in (1e-3, 1e-6):
+        bouncing, status = events(2.0, 0.1, e)
+        assert status[0] == Status.OK
+        assert np.isinf(bouncing["impacts"][0])
+        assert abs(bouncing["period"][0] / plastic["period"][0] - 1) < 3 * e
+        assert bouncing["multiplier"][0] == pytest.approx(plastic["multiplier"][0], rel=1e-12)
+
+
+@pytest.mark.skipif(not COMPILED, reason="two thousand half swings")
+def test_a_clock_that_never_settles_is_named_and_its_means_are_those_of_a_simulation():
+    kappa, eta, e = 0.6516, 0.0204, 0.2948
+    outputs, status = events(kappa, eta, e)
+    assert status[0] == Status.NOT_PERIODIC
+    assert np.isnan(outputs["multiplier"][0])
+    clock = simulation.Clock(kappa, eta, e)
+    clock.begin(w=1.0001)
+    assert simulation.settled(clock, 6000, 1e-8) is None
+    times, ways, *_ = zip(*clock.passages, strict=True)
+    mean = (times[-1] - times[100]) / (ways[-1] - ways[100])
+    assert outputs["period"][0] == pytest.approx(mean * time_unit(kappa), rel=0.03)
+
+
+def test_the_period_falls_as_the_root_of_the_torque_to_1e_14_over_20_decades():
+    torque = np.geomspace(1e-10, 1e10, 21 if COMPILED else 3)
+    for scene in ((4.0, 0.05, 0.2), (0.5, 0.1274, 0.05), (12.7859, 0.1057, 0.5342))[: 3 if COMPILED else 1]:
+        outputs, status = events(*scene, torque=torque)
+        assert (status < FIRST_REFUSAL).all()
+        assert (
+            np.abs(outputs["period"] * np.sqrt(torque) / (outputs["period"][0] * np.sqrt(torque[0])) - 1).max() < 1e-14
+        )
+        assert np.abs(outputs["swing"] / outputs["swing"][0] - 1).max() < 1e-14
+
+
+def test_a_bent_lever_makes_a_heavy_foliot_stable_as_the_closed_form_says():
+    kappa, eta, e = np.array([[0.5606, 0.01453, 0.3369], [0.9538, 0.0156, 0.29657], [0.9554, 0.02746, 0.43104]]).T
+    nu = np.array([-3.634, -2.6497, -2.965])
+    closed, says = solve(IMPACT, "closed", **clocks(kappa, eta, e, nu))
+    assert says.tolist() == [Status.OK, Status.OK, Status.UNSTABLE]
+    outputs, status = events(kappa, eta, e, nu)
+    assert (status[:2] == Status.OK).all()
+    for name in ("period", "swing", "wheel_speed", "multiplier"):
+        np.testing.assert_allclose(outputs[name][:2], closed[name][:2], rtol=1e-12)
+    assert status[2] != Status.OK or abs(outputs["period"][2] / closed["period"][2] - 1) > 1e-6
+
+
+def test_lasting_contact_under_a_bent_lever_is_not_followed():
+    _, status = events([2.0, 0.5], 0.1, [0.0, 0.05], 0.3)
+    assert (status == Status.NO_METHOD).all()
+
+
+@pytest.mark.parametrize(
+    ("scene", "rtol", "status"),
+    [
+        ((1.0, 0.02, 0.35), 1e-9, (Status.GRAZING,)),  # multiplier -1: the closed form cannot tell either
+        ((4.0, 0.05, 0.2), 1e-17, (Status.INACCURATE,)),
+        ((1e13, 0.05, 0.2), 1e-9, (Status.NO_METHOD,)),
+        ((2.0, 0.05, 1 - 1e-9), 1e-9, (Status.STEP_LIMIT,)),
+        ((1e-9, 0.1, 0.0), 1e-9, (Status.INACCURATE, Status.NOT_CONVERGED)),
+    ],
+)
+def test_what_cannot_be_right_says_so(scene, rtol, status):
+    if COMPILED or status[0] in (Status.INACCURATE, Status.NO_METHOD):
+        assert events(*scene, rtol=rtol)[1][0] in status
+
+
+def test_bits_do_not_depend_on_neighbours():
+    scenes = random_clocks(70, seed=9, high=0.7) if COMPILED else orderly_clocks(4, seed=9)
+    whole, status = events(*scenes)
+    order = np.random.default_rng(1).permutation(len(status))
+    shuffled, shuffled_status = events(*(c[order] for c in scenes))
+    alone, alone_status = events(*(c[3:4] for c in scenes))
+    assert (status[order] == shuffled_status).all()
+    assert status[3] == alone_status[0]
+    for name, column in whole.items():
+        assert column[order].tobytes() == shuffled[name].tobytes()
+        assert column[3:4].tobytes() == alone[name].tobytes()
+
+
+PLAIN = """
+import sys
+sys.path += ["tests", "tests/kernels"]
+from test_impact_events import events
+outputs, status = events([4.0, 2.0, 0.5], [0.05, 0.1, 0.1274], [0.2, 0.0, 0.05])
+print(status.tolist(), [[v.hex() for v in column.tolist()] for column in outputs.values()])
+"""
+
+
+def test_plain_python_gives_the_bits_of_compiled_code():
+    printed = [
+        subprocess.run(
+            [sys.executable, "-c", PLAIN],
+            env={**os.environ, "NUMBA_DISABLE_JIT": switch}, cwd=ROOT, capture_output=True, text=True, check=True,
+        ).stdout
+        for switch in ("0", "1")
+    ]  # fmt: skip
+    assert printed[0] == printed[1] != ""
