@@ -11,6 +11,7 @@ input of the graph; an integrator stops at a kink and turns the sign round.
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 
 NUMBER, INPUT, ADD, MUL, HALF_SQUARE, SCALED, DIV = "number", "input", "add", "mul", "half_square", "scaled", "div"
 
@@ -103,11 +104,9 @@ class Graph:
         """The value as an expression. Raises SceneError for what is none."""
         if isinstance(value, Expression):
             return value
-        try:
-            number = float(value)
-        except (TypeError, ValueError):
-            raise SceneError(f"expected a number or an expression, found {value!r}") from None
-        return self._node(NUMBER, (number,), False)
+        if not isinstance(value, Real):
+            raise SceneError(f"expected a number or an expression, found {value!r}")
+        return self._node(NUMBER, (float(value),), False)
 
     def parts(self, x):
         """The constant and the series of a product: x = constant * series; the series is 1 where x is constant."""
@@ -227,11 +226,8 @@ cos = _function("cos", math.cos)
 
 def power(x, exponent):
     """x^exponent for x > 0 and an exponent that does not vary along the motion."""
-    return (
-        x**exponent
-        if not isinstance(exponent, Expression) or isinstance(x, Expression)
-        else exponent.graph.power(x, exponent)
-    )
+    graph = next((part.graph for part in (x, exponent) if isinstance(part, Expression)), None)
+    return graph.power(x, exponent) if graph else x**exponent
 
 
 def sign(x):

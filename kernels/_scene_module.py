@@ -3,12 +3,15 @@
 The file lies in the folder of the kernels' own machine code (`_cache`), named by the scene and a digest of its text.
 """
 
+import functools
 import hashlib
 import importlib.util
 import os
 import sys
 import tempfile
 from pathlib import Path
+
+import numpy as np
 
 from kernels import _cache
 from kernels._expression import DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, needed
@@ -169,11 +172,22 @@ class Writer:
 def kept(function):
     """A function called from Python, whose machine code is kept: its file is named by all it was made from."""
     if not COMPILED:
-        return function
+        return _quiet(function)
     compiled = jit_call(function)
     if _cache.FOLDER is not None and Path(function.__code__.co_filename).parent == _cache.FOLDER:
         compiled._cache = _cache._Cache(function)
     return compiled
+
+
+def _quiet(function):
+    """Plain Python without numpy's warnings: 1/0 is inf here as in compiled code."""
+
+    @functools.wraps(function)
+    def call(*arguments):
+        with np.errstate(all="ignore"):
+            return function(*arguments)
+
+    return call
 
 
 def build(scene):

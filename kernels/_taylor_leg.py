@@ -107,7 +107,8 @@ if some(first):
         """\
 rate = factor * slope(part, series)
 bend = magnitude(factor) * (2.0 * magnitude(series[2]) + 2.0 * tail(part, series))
-hangs = met & isnt(rate * rate > GRAZING * tolerance * (magnitude(offset) + magnitude(factor * series[0])) * bend)""",
+blur = GRAZING * tolerance * (magnitude(offset) + magnitude(factor * series[0]))
+hangs = met & isnt(magnitude(rate) > blur / magnitude(rate) * bend)""",
     ]
     facts = [
         f"""\

@@ -43,10 +43,6 @@ def advance_{order}(memory, i):
     if some(fresh):
         s, p, g, u, o, beyond = begun(parameters)
         {begin}
-        side, unit, h = where(fresh, p, side), where(fresh, u, unit), where(fresh, 1.0, h)
-        time, interval, count, since = (
-            where(fresh, 0.0, time), where(fresh, 0.0, interval), where(fresh, 0.0, count), where(fresh, 0.0, since)
-        )
         verdict = where(fresh, where(beyond, BAD_INPUT, 0.0), verdict)
     moving = active & (verdict < REFUSAL)
     new, t, h, on, stuck, lost, broken, grazing, hangs, tried = to_event_{order}(
@@ -108,6 +104,12 @@ def time_unit(e, d, dd):
     return pow2(exponent(t))
 
 
+_STARTS = (
+    ("side", "p"), ("unit", "u"), ("h", "1.0"),
+    *((name, "0.0") for name in ("time", "interval", "count", "since", "kinks_met", "steps", "before")),
+)  # fmt: skip
+
+
 def shared(scene, kinks):
     """The text that does not depend on the order."""
     signs, e = [f"sign_{j}" for j in range(kinks)], range(1, 1 + kinks)
@@ -145,7 +147,7 @@ def advance(scene, kinks, order, offset):
     begin = [f"{s} = where(fresh, s[{j}], {s})" for j, s in enumerate(states)]
     begin += [f"{s} = where(fresh, g[{j}], {s})" for j, s in enumerate(signs)]
     begin += [f"{o} = where(fresh, o[{j}], {o})" for j, o in enumerate(ons)]
-    begin += ["kinks_met = where(fresh, 0.0, kinks_met)"]
+    begin += [f"{r} = where(fresh, {start}, {r})" for r, start in [*_STARTS, *((r, "math.nan") for r in results[2:-3])]]
     jump = [f"{s} = where(switches, s[{j}], {s})" for j, s in enumerate(states)]
     jump += [f"{s} = where(switches, g[{j}], {s})" for j, s in enumerate(signs)]
     jump += [f"{o} = where(switches, o[{j}], {o})" for j, o in enumerate(ons[1:])]

@@ -1,0 +1,173 @@
+"""The Taylor method against closed forms in 40 digits, and where it must refuse."""
+
+import mpmath
+import numpy as np
+import pytest
+import scene_oracles as oracles
+from columns import columns_of, relative_error
+from columns import solve as solve_columns
+from mpmath import mp, mpf
+from rich_scene import RICH
+
+from kernels import _taylor
+from kernels._jit import COMPILED
+from kernels.interface import FIRST_REFUSAL, Status
+
+SOME = 24 if COMPILED else 2
+FLIPS = 40.0 if COMPILED else 4.0
+
+
+def solve(kernel, method, *parameters, rtol=1e-9, **named):
+    """Of one cell, too."""
+    columns = [np.atleast_1d(c) for c in columns_of(kernel, parameters, named)]
+    return solve_columns(kernel, method, *columns, rtol=rtol)
+
+
+def drags(n=SOME, decades=1.0):
+    """mu, phi0, a, c of foliots with viscous and quadratic drag."""
+    random = np.random.default_rng(7)
+    return tuple(10.0 ** random.uniform(-decades, decades, n) for _ in range(4))
+
+
+def worst(outputs, columns, flips=FLIPS):
+    truths = [oracles.quadratic_foliot(*cell, int(flips)) for cell in zip(*columns, strict=True)]
+    return max(
+        relative_error(outputs["time"], [t for t, _ in truths]).max(),
+        relative_error(abs(outputs["speed"]), [v for _, v in truths]).max(),
+    )
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12] if COMPILED else [1e-9, 1e-12])
+def test_a_foliot_with_quadratic_drag_is_right_to_the_tolerance(rtol):
+    mu, phi0, a, c = columns = drags()
+    outputs, status = solve(RICH, "taylor", mu, phi0, a, c, flips=FLIPS, rtol=rtol)
+    assert (status == Status.OK).all()
+    assert worst(outputs, columns) < rtol
+    np.testing.assert_allclose(abs(outputs["angle"]), phi0, rtol=1e-14 + 1e-3 * rtol)
+
+
+def test_followed_once_it_is_right_to_some_tolerances_and_follows_the_tolerance():
+    mu, phi0, a, c = columns = drags()
+    errors = []
+    for rtol in (1e-5, 1e-7, 1e-9):
+        outputs, status = solve(RICH, "taylor_once", mu, phi0, a, c, flips=FLIPS, rtol=rtol)
+        assert (status == Status.OK).all()
+        errors.append(worst(outputs, columns))
+        assert errors[-1] < 20 * rtol
+    if COMPILED:
+        assert errors[2] < 1e-3 * errors[0]
+
+
+def test_free_of_drag_and_dry_friction_alone_are_exact_parabolas():
+    mu, R, flips = 3.0, 1.0, 5.0
+    outputs, status = solve(RICH, "taylor", mu, 2.0, R=R, flips=flips, rtol=1e-12)
+    v, time = mp.sqrt(2 * (mpf(mu) - R) * 2), mpf(0)
+    time += v / (mu - R)
+    for _ in range(4):  # up against mu + R, down with mu - R, to the switch 4 below
+        top = v * v / (2 * (mpf(mu) + R))
+        down = mp.sqrt(2 * (top + 4) / (mpf(mu) - R))
+        time, v = time + v / (mpf(mu) + R) + down, down * (mu - R)
+    assert status[0] == Status.OK
+    assert relative_error(outputs["time"], [time])[0] < 1e-14
+    assert relative_error(abs(outputs["speed"]), [v])[0] < 1e-14
+
+
+def test_an_oscillator_switched_within_its_swing():
+    k, mu, phi0 = 4.0, 1.0, 0.3
+    outputs, status = solve(RICH, "taylor", mu, phi0, k=k, flips=1, rtol=1e-12)
+    true = mp.acos(1 - mpf(phi0) * k / mu) / 2
+    assert status[0] == Status.OK
+    assert relative_error(outputs["time"], [true])[0] < 1e-13
+
+
+@pytest.mark.parametrize(
+    ("cell", "status"),
+    [
+        ({"mu": 1.0, "phi0": 1.0, "R": 1.5}, Status.STICKS),
+        ({"mu": 1.0, "phi0": 1.0, "R": 1.0}, Status.STICKS),
+        ({"mu": 1.0, "phi0": 1.0, "e": 0.0, "angle0": 0.5}, Status.OK),
+        ({"mu": 0.0, "phi0": 1.0}, Status.STICKS),
+        ({"mu": 1.0, "phi0": 1.0, "k": 4.0, "a": 0.1, "c": 0.1}, Status.STEP_LIMIT),  # swings below the switch for good
+        ({"mu": 1.0, "phi0": 1.0, "angle0": 2.0}, Status.BAD_INPUT),  # behind the switch
+        ({"mu": 1e140, "phi0": 1e140, "a": 1e-3}, Status.OK),
+        ({"mu": 1e-140, "phi0": 1e-140, "a": 0.5}, Status.OK),
+        ({"mu": 1.0, "phi0": 1e-80}, Status.OK),
+        ({"mu": 1e300, "phi0": 1e300, "a": 1e-3}, Status.OUT_OF_RANGE),  # the drag, though c = 0
+        ({"mu": 1e-300, "phi0": 1e-300, "a": 0.5}, Status.OUT_OF_RANGE),
+        ({"mu": 1e200, "phi0": 1e200, "c": 1e-200}, Status.OUT_OF_RANGE),
+        ({"mu": 1e-200, "phi0": 1e-200, "c": 1e200}, Status.OUT_OF_RANGE),
+        ({"mu": 1.0, "phi0": 1.0, "a": 1e9}, Status.STEP_LIMIT),
+    ],
+)
+def test_what_a_cell_comes_to_is_named(cell, status):
+    if not COMPILED and status in (Status.STEP_LIMIT, Status.GRAZING):
+        pytest.skip("thousands of steps")
+    outputs, verdict = solve(RICH, "taylor", flips=3.0, rtol=1e-9, **cell)
+    assert verdict[0] == status
+    if status >= FIRST_REFUSAL:
+        return
+    assert np.isfinite([outputs[name][0] for name in outputs]).all()
+
+
+def test_a_start_on_the_switch_moves_away_or_switches_at_once():
+    mu, phi0 = [1.0, 1.0], [1.0, 1.0]
+    outputs, status = solve(RICH, "taylor", mu, phi0, angle0=1.0, speed0=[-1.0, 1.0], flips=[1.0, 2.0])
+    assert (status == Status.OK).all()
+    assert outputs["time"][0] == pytest.approx(2.0, rel=1e-12)  # thrown back against the drive, and home again
+    # switched at 0, it then turns at 1 + 1/2 and falls 2.5
+    assert outputs["time"][1] == pytest.approx(1.0 + np.sqrt(5.0), rel=1e-12)
+
+
+def test_a_start_on_a_kink_takes_the_side_of_the_next_moment():
+    outputs, status = solve(RICH, "taylor", [-1.0, 1.0], [1.0], R=0.5, angle0=[1.5, 0.0], flips=1.0)
+    assert status.tolist() == [Status.BAD_INPUT, Status.OK]
+    assert outputs["time"][1] == pytest.approx(2.0, rel=1e-12)
+
+
+def grazing(excess, n=1):
+    """An oscillator about mu/k whose far turning point is 2 mu/k = phi0 (1 + excess)."""
+    k = 2.0 / (1.0 + np.asarray(excess, float))
+    return {"mu": np.ones(n), "phi0": 1.0, "k": k}
+
+
+@pytest.mark.parametrize("excess", [0.0, 1e-15, -1e-15, 1e-12, -1e-12])
+def test_a_turning_point_on_the_switch_is_no_quiet_number(excess):
+    if not COMPILED:
+        pytest.skip("many steps")
+    _, status = solve(RICH, "taylor", flips=1.0, rtol=1e-9, **grazing(-excess / (1 + excess)))
+    assert status[0] in (Status.GRAZING, Status.STEP_LIMIT, Status.INACCURATE)
+
+
+@pytest.mark.parametrize("excess", [1e-2, 1e-4])
+def test_two_roots_close_together_in_a_step_are_both_seen(excess):
+    k = 2.0 / (1.0 + excess)  # passes the switch by so little that it is back soon
+    outputs, status = solve(RICH, "taylor", 1.0, 1.0, k=k, flips=1.0, rtol=1e-9)
+    true = mp.acos(1 - mpf(k)) / mp.sqrt(mpf(k))
+    assert status[0] == Status.OK
+    assert relative_error(outputs["time"], [true])[0] < 1e-9
+
+
+def test_the_proof_holds_on_polynomials_with_two_roots_within_a_step():
+    for gap in (0.3, 0.03, 0.003):
+        series = ((0.25 + gap) * (0.25 - gap) + 0.25, -1.0, 1.0, 0.0, 0.0)  # (t - 1/2)^2 - gap^2 + 1/4 ...
+        series = (0.25 - gap * gap, *series[1:])
+        e, d, dd = series[:3]
+        for h in np.linspace(0.01, 1.0, 100):
+            rest = _plain(_taylor.tail, h, series)
+            if _plain(_taylor.clear, e, d, dd, rest, h, 0.0):
+                assert h < 0.5 - gap
+            if _plain(_taylor.falls, d, dd, rest, h):
+                assert h < 0.5
+
+
+def _plain(function, *numbers):
+    return getattr(function, "py_func", function)(*numbers)
+
+
+def test_the_bound_of_a_tail_is_one():
+    random = np.random.default_rng(3)
+    for _ in range(50):
+        series = tuple(random.normal(size=15) * 0.7 ** np.arange(15.0))
+        h = random.uniform(0.1, 1.5)
+        exact = mpmath.fsum(k * abs(series[k]) * h ** (k - 2) for k in range(3, 15))
+        assert _taylor.tail(h, series) >= exact
