@@ -9,18 +9,18 @@ The tooth falls behind its pallet by u t - G t^2/2 and comes to the next impact,
 u = e and 1 in place of the speeds after and before the impact, q = (1 + e)(pallet - nu kappa wheel/4) for G, time in T
 and (1 - e) for the pitch. The pallet is in the way of teeth for the share a = (1 + eta/Y)/2 of T on both sides. So the
 cycle exists exactly if
-    eta < Y,  q a < 2 e,  t - q t^2/2 < 1 - e for all t <= a;                                            (3)
-the tooth ahead after the impact and the tooth itself before it are then clear as well. Since a >= 1/2, (3) implies e < 7/8.
+    q a < 2 e,  t - q t^2/2 < 1 - e for all t <= a;                                                      (3)
+the tooth ahead after the impact and the tooth itself before it are then clear as well. (3) implies a < 1, which is
+eta < Y, and, since a >= 1/2, e < 7/8.
 The half map (y, V, w), reflected, has multipliers with the product e^2; their polynomial p is given by
     p(1) = (1 - e^2) (4 pallet - nu wheel d),  d = wheel - pallet,                                       (4)
     p(-1) = -(wheel d/2) (4 (1 + e)^2 + nu (kappa (1 - e)^2 + 2 (1 + e^2))),                             (5)
-and all are below 1 exactly if p(1) > 0, p(-1) < 0 and (Jury's third condition)
-    8 (1 + e^2) > d (4 (1 + e)^2 + nu kappa (1 - e)^2).                                                  (6)
-With nu = 0 only (5) decides: stable for kappa > 1, since (6) is then 2 (1 + e^2) > d (1 + e)^2.
+and all are below 1 exactly if p(1) > 0 and p(-1) < 0: Jury's third condition, 4 (1 + e)^2 d + nu kappa d (1 - e)^2 <
+8 (1 + e^2), follows from d < 1 and nu kappa d < 4, which is p(1) > 0. With nu = 0: stable for kappa > 1.
 
 Plastic, e = 0 and nu = 0. Tooth and pallet stay together until y = eta, where both have the speed c; then the wheel
 falls until the other pallet stops it with the speed R:
-    c^2 = (kappa + 4 eta)/4,  T = 2 c/kappa,  R^2 = 1 + kappa,  t_fall = slack/(R + 2 c),                (7)
+    c^2 = (kappa + 4 eta)/4,  T = 2 c/kappa,  R^2 = 1 + kappa,  t_fall = slack/(R + 2 c),                (6)
 and both start with V = w = wheel R - c, thrown back by V^2/(2 wheel) where V < 0. It exists for every eta <= 1/4; the
 map of c^2 is linear with the factor d^2. Derived here.
 """
@@ -37,20 +37,19 @@ ROUNDING = 2e-15
 """What the closed forms are right to."""
 GRAZE = 4e-15
 """A difference below this share of its terms hangs on the last digits of the input."""
+MOST_KEPT = 0.875
+"""Restitution from which on no cycle exists."""
 
 _OK, _INACCURATE, _GRAZING = float(Status.OK), float(Status.INACCURATE), float(Status.GRAZING)
 _UNSTABLE, _NO_CYCLE, _NO_METHOD = float(Status.UNSTABLE), float(Status.NO_CYCLE), float(Status.NO_METHOD)
-_OUT_OF_RANGE = float(Status.OUT_OF_RANGE)
-MOST_KEPT = 0.875
-"""Restitution from which on no cycle exists."""
 
 _MOST_BENT = 24.0
 """abs(nu kappa wheel) of (3): beyond it q is below -5 or above 5, and no cycle exists."""
 
 
 @jit
-def _lesser(x, y):
-    """The smaller of two; NaN if the second is."""
+def lesser(x, y):
+    """The smaller of two numbers."""
     return where(x < y, x, y)
 
 
@@ -84,8 +83,7 @@ def existence(scene, nu):
     a = 0.5 * (1.0 + reach)
     n = 0.25 * nu * kappa[0] * wheel[0]
     q, size = (1.0 + e) * (pallet[0] - n), (1.0 + e) * (pallet[0] + magnitude(n))
-    margin = _lesser(behind(e, q, size, a), within(1.0, q, size, a, 1.0 - e))
-    return _lesser(margin, 1.0 - reach)
+    return lesser(behind(e, q, size, a), within(1.0, q, size, a, 1.0 - e))
 
 
 @jit
@@ -96,7 +94,7 @@ def _excess(scene):
 
 @jit
 def stability(scene, nu):
-    """The least share by which (4), (5) and (6) hold; negative where disturbances grow."""
+    """The least share by which (4) and (5) have the right signs; negative where disturbances grow."""
     wheel, pallet, kappa, _, _, e, _ = scene
     d = _excess(scene)[0]
     steep, lost = 4.0 * (1.0 + e) * (1.0 + e), kappa[0] * ((1.0 - e) * (1.0 - e))
@@ -105,11 +103,9 @@ def stability(scene, nu):
     first = (flat - bend) / (flat + magnitude(bend))
     flat, bend = steep * wheel[0], curved * fma(2.0, fma(e, e, 1.0), lost)
     second = (flat + bend) / (flat + magnitude(bend))
-    flip = _lesser(magnitude(d), magnitude(second)) * where((d > 0.0) & (second > 0.0), 1.0, -1.0)
+    flip = lesser(magnitude(d), magnitude(second)) * where((d > 0.0) & (second > 0.0), 1.0, -1.0)
     flip = where((d < 0.0) & (second < 0.0), -flip, flip)
-    whole, bend = fma(8.0 * e, e, 8.0), d * fma(nu, lost, steep)
-    third = (whole - bend) / (whole + magnitude(d) * fma(magnitude(nu), lost, steep))
-    return _lesser(_lesser(first, flip), third)
+    return lesser(first, flip)
 
 
 @jit
@@ -155,7 +151,7 @@ def impact_cycle(scene, nu):
 
 @jit
 def plastic_cycle(scene):
-    """The cycle (7), and the share of time in contact."""
+    """The cycle (6), and the share of time in contact."""
     wheel, pallet, kappa, eta, slack, _, _ = scene
     twice = sqrt(fma(4.0, eta[0], kappa[0]))  # 2 c
     stop = sqrt(1.0 / pallet[0])

@@ -15,7 +15,7 @@ of teeth know it. For e = 0 the map is that of the speed c of escape: fall, stop
     c'^2 = s^2 + 2 wheel pallet (2 eta + c t).                                                           (3)
 """
 
-from kernels._impact_cycle import MOST_KEPT, ROUNDING, behind, bent, within
+from kernels._impact_cycle import MOST_KEPT, ROUNDING, behind, bent, lesser, within
 from kernels._impact_cycle import verdict as judged
 from kernels._impact_multiplier import largest_modulus
 from kernels._jit import jit, jit_call
@@ -206,17 +206,13 @@ def polynomial(scene, slopes, J):
 
 @jit
 def _stability(scene, coefficients):
-    """The least of p(1) > 0, -p(-1) > 0 and 1 - a0^2 > a1 - a0 a2, each over what it is small with."""
+    """The lesser of p(1) > 0 and -p(-1) > 0, each over what it is small with; all moduli are below 1 if both hold."""
     wheel, pallet, _, _, _, e, _ = scene
     a2, a1, a0 = coefficients
     even, odd = shifted(a1, 1.0), add(a2, a0)
-    lossy = (1.0 - e) * (1.0 + e)
-    fades = 0.25 * add(even, odd)[0] / (pallet[0] * lossy)
+    fades = 0.25 * add(even, odd)[0] / (pallet[0] * (1.0 - e) * (1.0 + e))
     flips = 0.25 * _less(even, odd)[0] / wheel[0]
-    swells = _less(shifted(negative(times(a0, a0)), 1.0), _less(a1, times(a0, a2)))[0]
-    swells = 0.25 * swells / (wheel[0] * lossy)
-    worst = where(flips < fades, flips, fades)
-    return where(swells < worst, swells, worst)
+    return where(flips < fades, flips, fades)
 
 
 @jit
@@ -241,13 +237,8 @@ def passages(scene, bend, state, t):
     bent_by = bend[0] * W[0] * speed
     G, size = pallet[0] - bent_by, pallet[0] + magnitude(bent_by)
     high = fma(-wheel[0], Y[0], eta[0]) / speed
-    share = 2.0 * (1.0 - high / t[0])
-    for u in (out, home):
-        clear = behind(u, G, size, high)
-        share = where(clear < share, clear, share)
-        clear = within(u, G, size, high, 1.0)
-        share = where(clear < share, clear, share)
-    return share
+    after = lesser(behind(out, G, size, high), within(out, G, size, high, 1.0))
+    return lesser(after, lesser(behind(home, G, size, high), within(home, G, size, high, 1.0)))
 
 
 @jit

@@ -160,6 +160,14 @@ def test_the_border_of_existence_is_exact_and_said_to_be_grazing(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
+def test_the_border_where_the_tooth_turns_before_it_meets_the_pallet_again_is_exact(method):
+    """There 1/(2 q) = 1 - e with q = (1 + e)/(1 + kappa), whatever the escape height: e^2 = (1 - kappa)/2."""
+    border = mp.sqrt((1 - mpf(0.375)) / 2)
+    columns = joined(*(cell_of(0.375, float(border * (1 + mpf(s))), 0.22) for s in (-1e-9, -1e-12, 1e-12, 1e-9)))
+    assert assert_cycle(method, columns).tolist() == [Status.UNSTABLE] * 2 + [Status.NO_CYCLE] * 2
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_a_flat_lever_is_stable_just_for_a_wheel_heavier_than_the_pallets(method):
     kappa = 1 + np.array([-1e-6, -1e-12, 0.0, 1e-12, 1e-6])
     columns = joined(*(cell_of(k, 0.4) for k in kappa))
