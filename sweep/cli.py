@@ -109,6 +109,13 @@ def parser() -> argparse.ArgumentParser:
     _add_at(plot)
     _add_units(plot)
 
+    report = _command(commands, "report", _report, "one self-contained page of HTML: figures, exponents, provenance")
+    _add_result(report)
+    report.add_argument(
+        "-o", "--output", metavar="FILE.html", type=Path, help="default: the result's name with .html, here"
+    )
+    _add_units(report)
+
     export = _command(commands, "export", _export, "write a result as csv, parquet, netCDF4 or zarr")
     _add_result(export)
     export.add_argument("-o", "--output", metavar="FILE.csv|.parquet|.nc|.zarr", type=Path, required=True)
@@ -212,6 +219,14 @@ def _plot(arguments: argparse.Namespace) -> None:
     with _result(arguments) as dataset:
         plot(_in_units(pick(dataset, arguments.at), arguments.unit), output, y=arguments.y, x=arguments.x)
     print(output)
+
+
+def _report(arguments: argparse.Namespace) -> None:
+    from sweep.webpage import write_page
+
+    output = arguments.output or Path(f"{arguments.result.stem}.html")
+    with _result(arguments) as dataset:
+        print(write_page(_in_units(dataset, arguments.unit), arguments.result, output))
 
 
 def _export(arguments: argparse.Namespace) -> None:

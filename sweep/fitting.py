@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 MOST_ROWS = 40
 
+WORST_MISFIT = 0.1
+"""Relative distance of a point beyond which a report does not speak of two laws."""
+
 EXPLANATION = (
     "The interval is of {confidence:g} % confidence where the values scatter; where they do not, it is the range of "
     "the local exponent in the window (of two laws: also of where that tends). Drift is how far the exponent changes "
@@ -110,7 +113,30 @@ def laws_text(found: Laws) -> str:
     if found.meeting is not None:
         heading = (*_dims(found.meeting), found.x, "", found.y)
         texts.append(_table("the two laws meet", heading, [found.meeting], _meeting_cells))
-    return page(*texts, columns([(EXPLANATION.format(confidence=100 * found.confidence),)], indent=""))
+    return page(*texts, columns([(explanation(found.confidence),)], indent=""))
+
+
+def law_rows(found: Laws) -> Iterator[tuple[str, ...]]:
+    """Output, where, exponent, interval and largest distance: a line for one law, two lines for two with a bend."""
+    bend = found.bend
+    for labels, fit in _points(found.fits[0]):
+        where = ", ".join(f"{dim} = {label}" for dim, label in zip(_dims(found.fits[0]), labels, strict=True))
+        name = f"{found.y} ({where})" if where else found.y
+        both = None if bend is None else bend.sel({d: fit[d] for d in _dims(bend, "law") if d in fit.coords})
+        if both is None or both.exponent.ndim != 1 or both.regimes.item() != 2 or both.residual.item() > WORST_MISFIT:
+            cells = _fit_cells(fit)
+            yield name, f"{found.x} {cells[0]}", cells[1], cells[2], cells[5]
+            continue
+        for law, sign in (("low", "<<"), ("high", ">>")):
+            one = both.sel(law=law)
+            interval = _interval(one.exponent_low.item(), one.exponent_high.item())
+            place, off = f"{found.x} {sign} {one.crossover.item():.3g}", f"{one.residual.item():.1e}"
+            yield name, place, f"{one.exponent.item():.6g}", interval, off
+
+
+def explanation(confidence: float) -> str:
+    """What intervals, drift and residual mean."""
+    return EXPLANATION.format(confidence=100 * confidence)
 
 
 def write_laws(found: Laws, path: Path) -> None:

@@ -26,25 +26,36 @@ LARGEST_SCAN = 1 << 28
 CELLS_AT_ONCE = 1 << 22
 
 
+Rows = list[tuple[str, ...]]
+
+
 def result_text(path: Path, dataset: xr.Dataset) -> str:
     """All about a result."""
-    if is_summary(dataset):
-        return _summary_page(path, dataset)
+    parts = sections(dataset).items()
+    return page(
+        "\n".join(head(path, dataset)), *(section(title, rows) if title else columns(rows) for title, rows in parts)
+    )
+
+
+def sections(dataset: xr.Dataset) -> dict[str, Rows]:
+    """What there is to tell of a result: titles, and rows of cells below them; the settings have no title."""
+    found = _of_summary(dataset) if is_summary(dataset) else _of_cells(dataset)
+    return {"": list(_settings(dataset))} | {title: rows for title, rows in found.items() if rows}
+
+
+def _of_cells(dataset: xr.Dataset) -> dict[str, Rows]:
     for name in (STATUS, METHOD_USED):
         if dataset[name].nbytes <= LARGEST_SCAN:
             dataset[name].load()  # once, for they are looked at several times
-    statuses = _status_rows(dataset)
     complete = dataset.nbytes <= LARGEST_SCAN or "end" in dataset.attrs
-    return page(
-        _head(path, dataset),
-        columns(_settings(dataset)),
-        section("axes", (_coordinate(dataset[name]) for name in _axes(dataset))),
-        section("fixed", map(_fixed, _given(dataset))),
-        section("along", (_coordinate(dataset[name]) for name in _along(dataset))),
-        section("outputs", (_output(dataset[name], complete) for name in _outputs(dataset))),
-        section("status", statuses),
-        section("methods used", _method_rows(dataset)),
-    )
+    return {
+        "axes": [_coordinate(dataset[name]) for name in _axes(dataset)],
+        "fixed": [_fixed(c) for c in _given(dataset)],
+        "along": [_coordinate(dataset[name]) for name in _along(dataset)],
+        "outputs": [_output(dataset[name], complete) for name in outputs_of(dataset)],
+        "status": _status_rows(dataset),
+        "methods used": _method_rows(dataset),
+    }
 
 
 def summary_text(dataset: xr.Dataset) -> str:
@@ -54,26 +65,22 @@ def summary_text(dataset: xr.Dataset) -> str:
     return "\n".join([*lines, *map(str, failures(dataset))])
 
 
-def _summary_page(path: Path, dataset: xr.Dataset) -> str:
-    """All about a summary."""
+def _of_summary(dataset: xr.Dataset) -> dict[str, Rows]:
     over = str(dataset.attrs["over"]).split()
     reduced = {name for name in over for dim in dataset[name].dims if dim in dataset.dims}
     kept = [str(d) for d in dataset[BY_STATUS].dims[:-1]]
     along = [n for n in _along_of(dataset, {*kept, *reduced, "cell"}) if n not in ("status_name", "method_name")]
     bins = {str(d) for name, c in dataset.coords.items() if str(name).endswith("_bin_lower") for d in c.dims}
     given = [c for c in dataset.coords.values() if not c.dims or set(map(str, c.dims)) & set(along) - {str(c.name)}]
-    counts = count_statuses(dataset)
-    return page(
-        _head(path, dataset),
-        columns(_settings(dataset)),
-        section("axes", (_coordinate(dataset[name]) for name in kept)),
-        section("reduced over", (_coordinate(dataset[name]) for name in over)),
-        section("fixed", map(_fixed, given)),
-        section("along", (_coordinate(dataset[name]) for name in along)),
-        section("reductions", (_reduction(dataset[name], bins) for name in _reductions(dataset))),
-        section("status", ((f"{c.cells:,}", c.name, _status_doc(c.name)) for c in counts)),
-        section("methods used", _method_rows(dataset)),
-    )
+    return {
+        "axes": [_coordinate(dataset[name]) for name in kept],
+        "reduced over": [_coordinate(dataset[name]) for name in over],
+        "fixed": [_fixed(c) for c in given],
+        "along": [_coordinate(dataset[name]) for name in along],
+        "reductions": [_reduction(dataset[name], bins) for name in _reductions(dataset)],
+        "status": [(f"{c.cells:,}", c.name, _status_doc(c.name)) for c in count_statuses(dataset)],
+        "methods used": _method_rows(dataset),
+    }
 
 
 def _reductions(dataset: xr.Dataset) -> list[str]:
@@ -97,16 +104,17 @@ def _status_doc(name: str) -> str:
     return Status[name].doc if name in Status.__members__ else ""
 
 
-def _head(path: Path, dataset: xr.Dataset) -> str:
+def head(path: Path, dataset: xr.Dataset) -> list[str]:
+    """Name and completeness, title, question, and what became of the cells."""
     found = account(dataset)
     total, waiting = found.total, found.pending
     share = f"{math.floor(1000 * (total - waiting) / total) / 10:g} %"
     done = f"unfinished: {total - waiting:,} of {total:,} cells ({share})" if waiting else f"complete, {total:,} cells"
     texts = [f"{path}: {done}", dataset.attrs.get("title", ""), dataset.attrs.get("question", ""), str(found)]
-    return "\n".join(dict.fromkeys(str(text) for text in texts if text))
+    return list(dict.fromkeys(str(text) for text in texts if text))
 
 
-def _settings(dataset: xr.Dataset) -> Iterator[tuple[str, str]]:
+def _settings(dataset: xr.Dataset) -> Iterator[tuple[str, ...]]:
     attrs = dataset.attrs
     for name in ("kernel", "design", "method", "rtol"):
         if name in attrs:
@@ -140,7 +148,7 @@ def _given(dataset: xr.Dataset) -> list[xr.DataArray]:
     return [c for name, c in dataset.coords.items() if not set(c.dims) & cells and c.dims != (name,)]
 
 
-def _outputs(dataset: xr.Dataset) -> list[str]:
+def outputs_of(dataset: xr.Dataset) -> list[str]:
     return [str(name) for name in dataset.data_vars if name not in (STATUS, METHOD_USED)]
 
 
