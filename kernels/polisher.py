@@ -23,8 +23,8 @@ from kernels import _linkage_extremes, _linkage_sampled, _linkage_textbook, _lin
 from kernels._columns import each_cell, entry, one_by_one
 from kernels._groups import GROUP, cells_at, each_group
 from kernels._jit import jit
-from kernels._lanes import isnt, magnitude, where
-from kernels._linkage import larger, side_of
+from kernels._lanes import isnt, where
+from kernels._linkage import in_units, larger, margins, side_of
 from kernels._polisher_cell import CHANGE_POINT, DOUBLE_CRANK, LOCK_UP, OK, judged, locks, no_rates, said, write
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
 
@@ -32,6 +32,7 @@ ROUNDING = 3e-15
 """What `stable` is right to."""
 
 _BAD_INPUT, _INACCURATE = float(Status.BAD_INPUT), float(Status.INACCURATE)
+_INACCURATE_CODE = int(Status.INACCURATE)
 _PRESSED, _FIRST_SLOPE = 8, 12  # positions of the transmission angle and of A0_b among the outputs
 
 
@@ -158,42 +159,67 @@ def waveform(
 
 
 @jit
-def _sampled(i, b, d, f, e, type, rtol, alphas, speeds, bends, *outputs):
-    cell = judged(b[i], d[i], f[i], e[i])
-    lengths, _, margin, code = cell
-    arm, none = (lengths, margin), math.nan
-    angles, crank_angles, rates = (none, none, none, none), (none, none), (none, none, none)
-    stops, pressed, doubt = (none, none), none, 0.0
+def _in_samples(
+    i, b, d, f, e, type, rtol, alphas, speeds, bends,
+    A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer, transmission_angle,
+    thd, rate_max, rate_min, status,
+):  # fmt: skip
+    """`status` comes with the verdict on the linkage."""
+    lengths, _, _ = in_units(b[i], d[i], f[i], e[i])
+    arm, code, none = (lengths, margins(*lengths)), float(status[i]), math.nan
+    angles, cranks, rates = (none, none, none, none), (none, none), (none, none, none)
+    stops, pressed, doubt = (none, none), none, math.inf
     if said(code, LOCK_UP):
         stops, doubt = _linkage_sampled.locks(arm)
+        pressed = 0.0
     elif said(code, OK) or said(code, DOUBLE_CRANK):
-        doubt = _linkage_sampled.sample(arm, alphas, speeds, bends)
+        blind = _linkage_sampled.sample(arm, alphas, speeds, bends)
         pressed = _linkage_sampled.pressed(arm)
-        rates, lost = _linkage_sampled.rates(arm, alphas, speeds)
-        doubt = larger(doubt, lost)
+        rates, doubt = _linkage_sampled.rates(arm, alphas, speeds)
         if said(code, OK):
-            angles, crank_angles, lost = _linkage_sampled.extremes(arm, alphas)
+            angles, cranks, lost = _linkage_sampled.extremes(arm, alphas)
             doubt = larger(doubt, lost)
-    elif said(code, CHANGE_POINT):
-        doubt = math.inf
-    slopes = (none, none, none, none, none, none)
-    verdict = where((doubt <= rtol[i]) | (code > float(FIRST_REFUSAL) - 0.5), code, _INACCURATE)
-    write(i, side_of(type[i]), cell, angles, crank_angles, stops, pressed, rates, slopes, verdict, *outputs)
+        doubt = larger(doubt, blind)
+    kind = side_of(type[i])
+    A0[i], A1[i], eta_plus[i], eta_minus[i] = kind * angles[0], angles[1], kind * angles[2], kind * angles[3]
+    theta_plus[i], theta_minus[i] = kind * cranks[0], kind * cranks[1]
+    theta_lock[i], theta_lock_outer[i] = stops
+    transmission_angle[i] = pressed
+    thd[i], rate_max[i], rate_min[i] = rates
+    if not doubt <= rtol[i] and code < FIRST_REFUSAL:
+        status[i] = _INACCURATE_CODE
 
 
 @entry()
-def sampled(
+def in_samples(
     b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
-    transmission_angle, thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
+    transmission_angle, thd, rate_max, rate_min, status,
 ):  # fmt: skip
     """Samples of a turn, followed up; one cell at a time, since every search goes its own way."""
     n = _linkage_sampled.SAMPLES
     columns = (
         b, d, f, e, type, rtol, np.empty(n), np.empty(n), np.empty(n),
         A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer, transmission_angle,
-        thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
+        thd, rate_max, rate_min, status,
     )  # fmt: skip
-    one_by_one(_sampled, columns)
+    one_by_one(_in_samples, columns)
+
+
+def sampled(
+    b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
+    transmission_angle, thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
+):  # fmt: skip
+    """The verdict of `stable`, and all its values anew from samples of a turn."""
+    stable(
+        b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
+        transmission_angle, thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
+    )  # fmt: skip
+    in_samples(
+        b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
+        transmission_angle, thd, rate_max, rate_min, status,
+    )  # fmt: skip
+    for slope in (A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e):
+        slope.fill(math.nan)
 
 
 @jit
@@ -201,7 +227,8 @@ def allowed(b, d, f, e, type):
     """Whether the parameters are numbers within their limits; NaN fails."""
     positive = (b > 0.0) & (d > 0.0) & (f > 0.0) & (e >= 0.0)
     finite = (b < math.inf) & (d < math.inf) & (f < math.inf) & (e < math.inf)
-    return positive & finite & (magnitude(magnitude(type - 0.5) - 0.5) <= 0.0)
+    a_or_b = ((type >= 0.0) & (type <= 0.0)) | ((type >= 1.0) & (type <= 1.0))
+    return positive & finite & a_or_b
 
 
 @jit

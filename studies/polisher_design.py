@@ -1,0 +1,211 @@
+"""Which polishing machine of a wanted amplitude swings most nearly harmonically, and how far is it from locking?
+
+    sweep run studies/polisher_design.toml
+    python studies/polisher_design.py polisher_design.h5
+
+draws polisher_design.png and prints what is concluded. For each b, d, f the crank e that makes the amplitude A1 is
+found between two cranks of the sweep. A machine of that amplitude exists where A1 passes it before the crank locks; at
+the border eta_minus = 0 or eta_plus = 180 degree, so that sin^2 A1 = e f/(b d) with e = d+f-b, b+f-d or b+d-f.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from _common import Groups, Statement, compared, direct_label, hatch, read_result, report
+
+import sweep
+
+WANTED = math.radians(15.0)
+ARM = 0.38
+"""The arm whose machines are mapped [m]."""
+PAPER = {"b": 0.6201, "f": 0.405}
+"""The paper's machine with that arm [m]."""
+
+NOTES = """\
+distortion: root of the sum of squares of the harmonics from the second on, over the first; best: least over f
+transmission angle: least angle of coupler and arm over the turn; below 40 degree a linkage is held to run badly
+"""
+
+
+def of_amplitude(ds: xr.Dataset, wanted: float = WANTED) -> xr.Dataset:
+    """Machines of one amplitude over d, b and f: every output, and the crank `e`, between two cranks of the sweep."""
+    swing = ds.A1
+    above = swing >= wanted
+    n = above.argmax("e")
+    there = above.any("e") & (n > 0)
+    n = n.where(there, 1)
+    share = (wanted - swing.isel(e=n - 1)) / (swing.isel(e=n) - swing.isel(e=n - 1))
+    names = ("thd", "transmission_angle", "rate_max", "rate_min")
+    full = ds[list(names)].assign(crank=ds.e.broadcast_like(swing))
+    made = full.isel(e=n - 1) * (1 - share) + full.isel(e=n) * share
+    return made.where(there).drop_vars("e").transpose("d", "b", "f")
+
+
+def crank_at_border(b: Any, d: Any, f: Any) -> Any:
+    """The longest crank that turns."""
+    return np.minimum(np.minimum(d + f - b, b + f - d), b + d - f)
+
+
+def reaches(b: Any, d: Any, f: Any, wanted: float = WANTED) -> Any:
+    """Whether the amplitude is passed before the crank locks."""
+    return crank_at_border(b, d, f) * f > b * d * math.sin(wanted) ** 2
+
+
+def best(machines: xr.Dataset) -> xr.Dataset:
+    """For each d and b the machine with the coupler of least distortion."""
+    known = machines.thd.notnull().any("f")
+    found = machines.isel(f=machines.thd.fillna(math.inf).argmin("f"))
+    return found.where(known)
+
+
+def existence(ds: xr.Dataset, machines: xr.Dataset) -> list[Statement]:
+    """Which machines of the amplitude there are."""
+    b, d, f = machines.b, machines.d, machines.f
+    within = reaches(b, d, f) & (crank_at_border(b, d, f) > 0)
+    within = within.transpose("d", "b", "f")
+    found = machines.thd.notnull()
+    strangers = int((found & ~within).sum())
+    share = float(found.sum() / within.sum())
+    spare = crank_at_border(b, d, f) / machines.crank - 1
+    return [
+        Statement("machines beyond the border", "none", f"{strangers} of {int(found.sum())}", None, strangers == 0),
+        Statement("of those within it, in the sweep's cranks", "most", f"{share:.1%}", None, share > 0.5),
+        Statement(
+            "crank to spare before it locks, least", "> 0", f"{float(spare.min()):.2%}", None, float(spare.min()) > 0
+        ),
+    ]
+
+
+def quality(machines: xr.Dataset) -> list[Statement]:
+    """How harmonic, and at what price."""
+    arm = machines.sel(d=ARM, method="nearest")
+    top = best(arm)
+    paper, same = arm.interp(b=PAPER["b"], f=PAPER["f"]), top.interp(b=PAPER["b"])
+    falls = bool((top.thd.dropna("b").diff("b").tail(b=20) < 0).all())
+    widest = top.isel(b=-1)
+    exact = sweep.run(
+        sweep.build_study(
+            kernel="polisher", axes={"e": [float(widest.crank)]}, outputs=["A1", "thd"],
+            fixed={"b": float(widest.b), "d": float(arm.d), "f": float(widest.f)}, rtol=1e-10,
+        )
+    ).isel(e=0)  # fmt: skip
+    shorter = [float(best(machines.isel(d=k)).thd.isel(b=-1)) for k in range(machines.d.size)]
+    return [
+        _described("the paper's machine", paper),
+        _described("best coupler for its motor's place", same),
+        Statement("a farther motor is better", "", "distortion falls with b", None, falls),
+        Statement("a shorter arm is better", "", _rising(shorter), None, bool(np.all(np.diff(shorter) > 0))),
+        _described(f"best of the sweep, b = {1e3 * float(widest.b):.0f}, f = {1e3 * float(widest.f):.0f} mm", widest),
+        compared("its amplitude, degree", "15", math.degrees(exact.A1), 15.0, 1e-4, 6),
+        compared("its distortion, once more", f"{float(widest.thd):.5f}", float(exact.thd), float(widest.thd), 1e-3, 5),
+    ]  # fmt: skip
+
+
+def _described(what: str, machine: xr.Dataset) -> Statement:
+    """Distortion, transmission angle and crank of a machine."""
+    angle = math.degrees(machine.transmission_angle)
+    return Statement(what, "", f"{float(machine.thd):.2%}, {angle:.0f} degree, e = {1e3 * float(machine.crank):.1f} mm")
+
+
+def _rising(values: Sequence[float]) -> str:
+    return " < ".join(f"{value:.2%}" for value in values)
+
+
+def statements(ds: xr.Dataset) -> Groups:
+    """Every line of the table, by heading."""
+    machines = of_amplitude(ds)
+    return {
+        "Machines of 15 degree": existence(ds, machines),
+        "Distortion, transmission angle, crank (arm 380 mm)": quality(machines),
+    }
+
+
+def figure(ds: xr.Dataset) -> Any:
+    """Distortion over motor and coupler, with the border of lock-up; the best coupler; a cut; for a page of print."""
+    from sweep import charts
+
+    machines = of_amplitude(ds)
+    with charts.style():
+        page = charts.new_figure(charts.PAGE, 88.0)
+        left, right = page.subfigures(1, 2, width_ratios=(1.2, 1))
+        whole = left.subplots()
+        upper, lower = right.subplots(2, 1)
+        draw_map(left, whole, machines.sel(d=ARM, method="nearest"))
+        draw_best(upper, machines)
+        draw_cut(lower, machines)
+        for axes, text in ((whole, "a"), (upper, "b"), (lower, "c")):
+            charts.letter(axes, text)
+    return page
+
+
+def draw_map(page: Any, axes: Any, arm: xr.Dataset) -> None:
+    """Distortion over b and f for one arm, the crank it takes, and where the motor locks instead."""
+    from matplotlib.colors import LogNorm
+
+    b, f, d = 1e3 * arm.b.values, 1e3 * arm.f.values, float(arm.d)
+    thd = 100 * arm.thd.transpose("f", "b").values
+    mesh = axes.pcolormesh(b, f, thd, norm=LogNorm(2, 40), cmap="cividis", shading="nearest", rasterized=True)
+    bar = page.colorbar(mesh, ax=axes, label="distortion, %", pad=0.02, extend="both")
+    bar.set_ticks([2, 5, 10, 20, 40], labels=["2", "5", "10", "20", "40"])
+    bar.minorticks_off()
+    lines = axes.contour(b, f, 1e3 * arm.crank.transpose("f", "b").values, [50, 70, 90], colors="white", linewidths=0.6)
+    axes.clabel(lines, fmt="%g", fontsize=7, manual=[(370, 765), (460, 765), (595, 765)])
+    fine_b, fine_f = np.meshgrid(np.linspace(b[0], b[-1], 400), np.linspace(f[0], f[-1], 400))
+    hatch(axes, fine_b, fine_f, ~reaches(1e-3 * fine_b, d, 1e-3 * fine_f), "////")
+    top = best(arm)
+    axes.plot(b, 1e3 * top.f.where(top.thd.notnull()), color="black", linestyle=(0, (4, 2)), linewidth=0.9)
+    axes.plot(1e3 * PAPER["b"], 1e3 * PAPER["f"], "o", color="white", markeredgecolor="black", markersize=5)
+    direct_label(axes, 700, 170, "motor locks")
+    axes.set(xlabel="motor from pivot $b$, mm", ylabel="coupler $f$, mm", xlim=(b[0], b[-1]), ylim=(f[0], f[-1]))
+
+
+def draw_best(axes: Any, machines: xr.Dataset) -> None:
+    """The least distortion over all couplers, for each arm."""
+    from sweep.charts import COLOURS
+
+    for k in range(machines.d.size):
+        top = best(machines.isel(d=k))
+        axes.plot(1e3 * top.b, 100 * top.thd, color=COLOURS[k], label=f"$d={1e3 * float(machines.d[k]):.0f}$ mm")
+    axes.set(xlabel="motor from pivot $b$, mm", ylabel="least distortion, %", yscale="log")
+    axes.set_yticks([2, 5, 10, 20, 40], labels=["2", "5", "10", "20", "40"])
+    axes.minorticks_off()
+    axes.legend(loc="upper right")
+
+
+def draw_cut(axes: Any, machines: xr.Dataset) -> None:
+    """Distortion and transmission angle over the coupler, with motor and arm of the paper's machine."""
+    from sweep.charts import COLOURS
+
+    cut = machines.sel(d=ARM, method="nearest").interp(b=PAPER["b"])
+    f = 1e3 * cut.f
+    axes.plot(f, 100 * cut.thd, color=COLOURS[0], label="distortion, %")
+    axes.plot(f, np.degrees(cut.transmission_angle), color=COLOURS[1], label="transmission angle, degree")
+    axes.axvline(1e3 * PAPER["f"], color="0.6", linewidth=0.8, linestyle=":")
+    axes.set(xlabel="coupler $f$, mm", ylabel="% or degree", ylim=(0, 75))
+    axes.legend(loc="center right", bbox_to_anchor=(1.0, 0.32))
+
+
+def read(path: str) -> xr.Dataset:
+    """The sweep of this study. Raises SweepError where it is none."""
+    return read_result(path, "polisher", ["d", "b", "f", "e"], "polisher_design.toml")
+
+
+def conclude(path: str) -> tuple[Groups, list[str], Any]:
+    """Statements and the figure."""
+    ds = read(path)
+    return statements(ds), [NOTES], figure(ds)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Table and figure of the result that is named; 1 if a statement does not hold."""
+    return report(__file__, ["polisher_design.h5"], arguments, conclude, "expected")
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
