@@ -118,7 +118,7 @@ class Clock:
 
 
 def settled(clock, steps, near):
-    """(period, half travel, share of an orbit's teeth that are thrown back on) of where a clock ends up, or None.
+    """(period, half travel, middle of the travel, teeth) of the motion that a clock comes to repeat, or None.
 
     It has come to a cycle when it passes y = 0 upwards as it did before, within `near`; a period is the time per tooth.
     """
@@ -134,7 +134,7 @@ def settled(clock, steps, near):
             low, high = (
                 f(extremes[marks[-back] : marks[-1]]) for f, extremes in ((min, clock.lows), (max, clock.highs))
             )
-            return (times[-1] - times[-back]) / round(teeth), (high - low) / 2, round(teeth)
+            return (times[-1] - times[-back]) / round(teeth), (high - low) / 2, abs(high + low) / 2, round(teeth)
     return None
 
 

@@ -131,7 +131,7 @@ def found():
 def test_a_plain_simulation_ends_up_in_the_same_cycle(kind, found):
     clock = simulation.Clock(*FOLLOWED[kind])
     clock.begin(w=1.0001)
-    period, travel, teeth = simulation.settled(clock, 3000 if COMPILED else 1000, 1e-8)
+    period, travel, middle, teeth = simulation.settled(clock, 3000 if COMPILED else 1000, 1e-8)
     rows, status = found
     row, unit = rows[kind], time_unit(FOLLOWED[kind][0])
     assert status[kind] == (Status.PERIOD_2 if "two" in kind else Status.OK)
@@ -139,6 +139,7 @@ def test_a_plain_simulation_ends_up_in_the_same_cycle(kind, found):
     assert row["period"] == pytest.approx(period * unit, rel=1e-11)
     if teeth == 1:
         assert row["swing"] == pytest.approx(travel * PITCH, rel=1e-11)
+        assert row["offset"] == pytest.approx(middle * PITCH, abs=1e-11 * PITCH)
         assert (row["offset"] > 0.01 * row["swing"]) == ("off" in kind)
     assert np.isinf(row["impacts"]) == ("bounces that" in kind)
 
@@ -189,6 +190,17 @@ def test_a_train_of_bounces_is_its_geometric_sum(side, e):
     assert total == pytest.approx(time, rel=1e-12, abs=1e-15)
     assert after == pytest.approx((y, V, w), rel=1e-12)
     assert widest == pytest.approx(0.5 * (side * first[2] - first[1]) ** 2, abs=1e-30)
+
+
+@pytest.mark.parametrize(("below", "ends"), [(0.01, False), (0.02, True)])
+def test_a_train_is_not_summed_where_a_bounce_may_pass_the_tip(below, ends):
+    """Its bounces reach 0.75 0.2^2/2 = 0.015 beyond the common centre, which ends so far below the tip."""
+    wheel, pallet, eta, e, *_ = SCENE
+    t, W = 2 * 0.2 / (1 - e), wheel * 0.1 + pallet * 0.3
+    first = eta - below - W * t - 0.5 * wheel * t * t, 0.1, 0.3
+    total, after, widest = plain(_impact_contact.train)(SCENE, first, 1.0)
+    assert (total, after[0]) == pytest.approx((t, eta - below))
+    assert plain(_impact_contact.train_ends)(SCENE, first, 1.0, total, after, widest) == ends
 
 
 def followed(scene, half_swings):
@@ -315,6 +327,7 @@ print(status.tolist(), [[v.hex() for v in column.tolist()] for column in outputs
 """
 
 
+@pytest.mark.skipif(not COMPILED, reason="compiles")
 def test_plain_python_gives_the_bits_of_compiled_code():
     printed = [
         subprocess.run(
