@@ -83,13 +83,20 @@ def _sweep(m, n, at, rows, shift, active):
 
 @jit
 def _fill(n, at, J, k, rows, e_J, e_k):
-    """The entries (1), without units."""
+    """The entries (1), without units, and the sums (3) of them."""
+    e, u, g = 0.0 * k[at(0)], 0.0 * k[at(0)], 0.0 * k[at(0)]
+    sums = u, g
     for j in range(n):
-        stiffness = scale(k[at(j)], -e_k)
-        rows[at(j)] = stiffness / scale(J[at(j)], -e_J)
+        stiffness, inertia = scale(k[at(j)], -e_k), scale(J[at(j)], -e_J)
+        inverse = inertia / stiffness
+        f = e * inverse
+        g = f * fma(u, u, g)
+        u = fma(f, u, inverse)
+        sums = _count(sums, u, g)
+        rows[at(j)], rows[at(2 * n + j)], rows[at(3 * n + j)] = stiffness / inertia, sums[0], sums[1]
         if j < n - 1:
-            rows[at(n + j)] = stiffness / scale(J[at(j + 1)], -e_J)
-        rows[at(2 * n + j)] = rows[at(3 * n + j)] = math.inf + 0.0 * stiffness
+            e = stiffness / scale(J[at(j + 1)], -e_J)
+            rows[at(n + j)] = e
 
 
 @jit

@@ -1,32 +1,27 @@
 """Poles of a damped chain: all 2 n roots s of det(s^2 J + s h + k) = 0, every one shown to be another.
 
-The determinant is D of the recurrence, with K_j = k_j + s h_j and common powers of two taken out,
-    X_(j+1) = K_j X_j + s^2 U_j,  U_(j+1) = K_j U_j + J_(j+1) X_(j+1),  X_1 = 1, U_1 = J_1,  D = X_(n+1).  (1)
-Its roots are approached all at once by Ehrlich's and Aberth's correction, from those of every undamped mode with its
-own damping: s^2 + s (x^T h x) + w^2 = 0 for x^T J x = 1. Each is then followed as a shape from both ends, as in
-`_chain_shapes` but complex; with the torque p that is missing at the joint, where x = 1, Newton's step is
-    -p/(x^T (2 s J + h) x),                                                                             (2)
+From the roots of `_chain_roots` each pole is followed as a shape from both ends, as in `_chain_shapes` but complex;
+with the torque p that is missing at the joint, where x = 1, Newton's step is
+    -p/(x^T (2 s J + h) x),                                                                             (1)
 and a root is off by no more than rounding in J, k and h is worth,
-    (sum of abs(s^2) J abs(x)^2 + sum of (k + abs(s) h) abs(x_j - x_(j+1))^2)/abs(x^T (2 s J + h) x).   (3)
-With light damping the real part is that of (x* J x) s^2 + (x* h x) s + x* k x = 0, which has all its digits.
-Source: Aberth, Math. Comp. 27:339 (1973); (2), (3) by first-order perturbation of the quadratic eigenvalue problem.
+    (sum of abs(s^2) J abs(x)^2 + sum of (k + abs(s) h) abs(x_j - x_(j+1))^2)/abs(x^T (2 s J + h) x).   (2)
+With light damping the real part is that of (x* J x) s^2 + (x* h x) s + x* k x = 0, which has all its digits; near
+critical damping both poles are those of this quadratic.
+Source: first-order perturbation of the quadratic eigenvalue problem, derived here.
 """
 
 from kernels import _complex
 from kernels._chain import extremes, same, units
-from kernels._chain_shapes import follow_mode
+from kernels._chain_roots import approach, start, stiffness
 from kernels._jit import jit, jit_call
 from kernels._lanes import exponent, fma, magnitude, sqrt
-from kernels._vecmath import scale
+from kernels._vecmath import is_normal, scale
 from kernels.interface import Status
 
-SWEEP_LIMIT = 300
-"""Rounds of corrections of all roots; 4 to 10 are usual."""
 REFINEMENTS = 3
 ROUNDING = 2.0**-50
 REACH = 2.0**300
 """Largest h without units."""
-_SETTLED = 1e-12  # correction over root, after which (2) takes over
 _NEAR = 1e-6  # step over root, above which another joint may do better
 _TWIN = 2.0**-20  # below which rounding moves a double root
 _LIGHT = 0.03
@@ -34,64 +29,18 @@ _OK, _NOT_CONVERGED, _OUT_OF_RANGE = float(Status.OK), float(Status.NOT_CONVERGE
 _TURNS = 0.15915494309189535  # 1/(2 pi)
 
 
-@jit
-def _stiffness(j, chain, s):
-    """K_j, without units."""
-    _, k, h, e_J, e_k = chain
-    damper = scale(h[j], -0.5 * (e_J + e_k))
-    return fma(damper, s[0], scale(k[j], -e_k)), damper * s[1]
-
-
-@jit_call
-def _newton(n, chain, s):
-    """D/D' of (1), by the same recurrence for the derivatives."""
-    J, _, h, e_J, e_k = chain
-    square, twice = _complex.product(s, s), _complex.times(s, 2.0)
-    x, u, dx, du = (1.0, 0.0), (scale(J[0], -e_J), 0.0), (0.0, 0.0), (0.0, 0.0)
-    for j in range(n):
-        spring, damper = _stiffness(j, chain, s), scale(h[j], -0.5 * (e_J + e_k))
-        moved = _complex.plus(_complex.product(spring, dx), _complex.times(x, damper))
-        bent = _complex.plus(_complex.product(square, du), _complex.product(twice, u))
-        dx_next = _complex.plus(moved, bent)
-        x_next = _complex.plus(_complex.product(spring, x), _complex.product(square, u))
-        inertia = scale(J[j + 1], -e_J) if j < n - 1 else 0.0
-        du = _complex.plus(_complex.product(spring, du), _complex.times(u, damper))
-        du = _complex.plus(du, _complex.times(dx_next, inertia))
-        u = _complex.plus(_complex.product(spring, u), _complex.times(x_next, inertia))
-        x, dx = x_next, dx_next
-        own = max(_complex.size(x), _complex.size(u))
-        if own > 0.0:
-            own = -exponent(own)
-            x, u, dx, du = (
-                _complex.scaled(x, own), _complex.scaled(u, own), _complex.scaled(dx, own), _complex.scaled(du, own)
-            )  # fmt: skip
-    return _complex.quotient(x, dx)
-
-
-@jit
-def _aberth(m, roots_re, roots_im, i, step):
-    """Newton's step for the root i of m, with the others taken out."""
-    pull = (0.0, 0.0)
-    for other in range(m):
-        away = roots_re[i] - roots_re[other], roots_im[i] - roots_im[other]
-        if other != i and _complex.size(away) > 0.0:
-            pull = _complex.plus(pull, _complex.quotient((1.0, 0.0), away))
-    held = _complex.product(step, pull)
-    return _complex.quotient(step, (1.0 - held[0], -held[1]))
-
-
 @jit_call
 def _follow(n, chain, s, step, ways):
     """Rows of x, g before the inertia, the winding of the spring on the right (re, im each) and their exponent."""
     J, k, _, e_J, e_k = chain
     square = _complex.product(s, s)
-    ground = _stiffness(n - 1, chain, s)
+    ground = stiffness(n - 1, chain, s)
     x, g, wound, e = (1.0, 0.0), ground if step < 0 else (0.0, 0.0), (1.0, 0.0), 0.0
     j, offset = (0, 0) if step > 0 else (n - 1, 7 * n)
     for left in range(n, 0, -1):
         turned = _complex.plus(g, _complex.product(square, _complex.times(x, scale(J[j], -e_J))))
         spring_at = j if step > 0 else max(j - 1, 0)
-        spring = _stiffness(spring_at, chain, s)
+        spring = stiffness(spring_at, chain, s)
         if not _complex.size(spring) > 0.0:
             spring = 2.0**-53 * scale(k[spring_at], -e_k), 0.0  # as good as 0
         next_wound = _complex.over(turned, spring) if left > 1 else wound
@@ -126,7 +75,7 @@ def _joint(n, chain, ways):
 
 @jit_call
 def _look(n, chain, s, r, ways):
-    """Newton's step (2) of a pole from the joint r, the bound (3) on its relative error; x* J x, x* h x and x* k x."""
+    """Newton's step (1) of a pole from the joint r, the bound (2) on its relative error; x* J x, x* h x and x* k x."""
     J, k, h, e_J, e_k = chain
     right = ways[7 * n :]
     rigid, lost, solid, viscous, elastic = (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0
@@ -211,54 +160,6 @@ def _twins(n, chain, i, j, pole_re, pole_im, ways):
 
 
 @jit
-def _start(n, chain, frequency, pole_re, pole_im, work):
-    """Roots of every mode with its own damping, turned a little so that none is real and no two are equal."""
-    J, _, h, e_J, e_k = chain
-    for j in range(n):
-        total = follow_mode(n, J, chain[1], e_J, e_k, frequency[j], work)
-        w = scale(frequency[j] / _TURNS, -0.5 * (e_k - e_J)) if frequency[j] > 0.0 else 0.0
-        half = 0.0
-        for i in range(n):
-            wound = work[i] - work[i + 1] if i < n - 1 else work[i]
-            half = fma(scale(h[i], -0.5 * (e_J + e_k)) * wound, wound, half)
-        half = 0.5 * half / total
-        rest = (w - half) * (w + half)
-        far = -half - sqrt(-rest) if rest < 0.0 else -half
-        near = w * w / far if rest < 0.0 else -half
-        up = sqrt(rest) if rest > 0.0 else 0.0
-        turn = 1e-3 * (1.0 + j / n)
-        pole_re[2 * j], pole_im[2 * j] = near - turn * up, up - turn * near
-        pole_re[2 * j + 1], pole_im[2 * j + 1] = far - 0.7 * turn * up, -up + 0.7 * turn * far
-    fixed = 0
-    if not chain[1][n - 1] > 0.0:
-        pole_re[0] = pole_im[0] = 0.0
-        fixed = 1
-        if not h[n - 1] > 0.0:
-            pole_re[1] = pole_im[1] = 0.0
-            fixed = 2
-    return fixed
-
-
-@jit
-def _approach(n, chain, fixed, pole_re, pole_im, moved):
-    """Ehrlich's and Aberth's rounds over all roots but the fixed ones; whether all settle."""
-    for i in range(2 * n):
-        moved[i] = 0.0 if i < fixed else 1.0
-    for _ in range(SWEEP_LIMIT):
-        busy = False
-        for i in range(fixed, 2 * n):
-            if moved[i] > _SETTLED:
-                step = _aberth(2 * n, pole_re, pole_im, i, _newton(n, chain, (pole_re[i], pole_im[i])))
-                pole_re[i], pole_im[i] = pole_re[i] - step[0], pole_im[i] - step[1]
-                size = _complex.size(step) / _complex.size((pole_re[i], pole_im[i]))
-                moved[i] = 0.0 if size >= 0.5 * moved[i] and size < 1e-6 else size
-                busy = busy or not moved[i] <= _SETTLED
-        if not busy:
-            return True
-    return False
-
-
-@jit
 def _sort(n, pole_re, pole_im):
     """Ascending size; of a pair, +Im first."""
     for i in range(1, n):
@@ -325,15 +226,18 @@ def damped_poles(n, J, k, h, frequency, pole_re, pole_im, work):
     e_J, e_k, sound = units(n, same, J, k)
     chain = J, k, h, e_J, e_k
     sound = sound & (scale(extremes(n, same, h)[1], -0.5 * (e_J + e_k)) < REACH)
-    fixed = _start(n, chain, frequency, pole_re, pole_im, work)
-    settled = _approach(n, chain, fixed, pole_re, pole_im, work)
+    fixed = start(n, chain, frequency, pole_re, pole_im, work)
+    settled = approach(n, chain, fixed, pole_re, pole_im, work)
     error = _refine(n, fixed, chain, pole_re, pole_im, work[14 * n :], work)
     told_apart = _apart(n, fixed, pole_re, pole_im, work[14 * n :])
     told_apart = _paired(n, fixed, pole_re, pole_im, work) and told_apart
     for i in range(2 * n):
-        pole_re[i] = scale(work[i], 0.5 * (e_k - e_J)) if i >= fixed else 0.0
-        pole_im[i] = scale(work[2 * n + i], 0.5 * (e_k - e_J)) if i >= fixed else 0.0
+        pole_re[i], pole_im[i] = (work[i], work[2 * n + i]) if i >= fixed else (0.0, 0.0)
     _sort(2 * n, pole_re, pole_im)
+    for i in range(2 * n):
+        pole_re[i] = scale(pole_re[i], 0.5 * (e_k - e_J))
+        pole_im[i] = scale(pole_im[i], 0.5 * (e_k - e_J))
+        sound = sound & ((i < fixed) | is_normal(_complex.size((pole_re[i], pole_im[i]))))
     if not sound:
         return error, _OUT_OF_RANGE
     return error, _OK if settled and told_apart else _NOT_CONVERGED

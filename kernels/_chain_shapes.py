@@ -3,8 +3,8 @@
 At a natural frequency the chain is followed from either end, x the angle and g what torque it takes on its inner side:
     g_j = g_(j-1) - w^2 J_j x_j,  x_(j+1) = x_j + g_j/k_j,  from x_1 = 1, g_0 = 0;                       (1)
 the same from the right, from x_n = 1 and the torque k_n of the last spring. Each step is exact for an inertia and a
-spring a few roundings off. Both are joined at the inertia r where J_r x_r(left) x_r(right) is largest: what torque p is
-missing there says how far w^2 is from the eigenvalue, p x_r/sum J x^2, and the shape is followed again from there.
+spring a few roundings off. Both are joined at the inertia r where J_r x_r(left) x_r(right) is largest: there the torque
+that is missing for a rounding in w^2 is least felt.
 Source: Holzer's method; the joint is that of Parlett & Dhillon, Linear Algebra Appl. 267:247 (1997), section 3.
 """
 
@@ -14,7 +14,6 @@ from kernels._lanes import exponent, fma, magnitude, sqrt
 from kernels._vecmath import is_normal, scale
 from kernels.interface import Status
 
-PASSES = 2
 _OK, _OUT_OF_RANGE = float(Status.OK), float(Status.OUT_OF_RANGE)
 _TWO_PI = 6.283185307179586
 
@@ -56,10 +55,9 @@ def _joint(n, J, e_J, ways):
 
 
 @jit_call
-def _join(n, J, e_J, square, ways):
-    """The shape into the first n of `ways`, 1 at the joint in size; its sum J x^2, and what is missing in w^2."""
+def _join(n, J, e_J, ways):
+    """The shape into the first n of `ways`, 1 at the joint in size; its sum J x^2."""
     r = _joint(n, J, e_J, ways)
-    missing = ways[n + r] / ways[r] + ways[4 * n + r] / ways[3 * n + r] - square * scale(J[r], -e_J)
     side = 1.0 if ways[r] > 0.0 else -1.0
     left, right, total = ways[r], ways[3 * n + r], 0.0
     for j in range(n):
@@ -68,20 +66,16 @@ def _join(n, J, e_J, square, ways):
         x = scale(x * side, ways[offset + j] - ways[offset + r])
         ways[j] = x
         total = fma(scale(J[j], -e_J) * x, x, total)
-    return total, missing / total
+    return total
 
 
 @jit
 def follow_mode(n, J, k, e_J, e_k, frequency, work):
     """Puts the shape at a natural frequency, 1 at some inertia in size, into `work`; its sum J x^2, without units."""
     root = scale(frequency * _TWO_PI, -0.5 * (e_k - e_J)) if frequency > 0.0 else 0.0
-    square, total = root * root, 0.0
-    for _ in range(PASSES):
-        _follow(n, J, k, e_J, e_k, square, 1, work)
-        _follow(n, J, k, e_J, e_k, square, -1, work)
-        total, less = _join(n, J, e_J, square, work)
-        square = square + less if frequency > 0.0 else 0.0
-    return total
+    _follow(n, J, k, e_J, e_k, root * root, 1, work)
+    _follow(n, J, k, e_J, e_k, root * root, -1, work)
+    return _join(n, J, e_J, work)
 
 
 @jit_call

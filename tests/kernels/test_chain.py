@@ -111,6 +111,15 @@ def test_every_frequency_of_64_inertias_is_right_to_1e_14(kind):
         assert not off(J[7], k[7], found[7], 1e-14)
 
 
+@pytest.mark.parametrize("seed", [73, 1279])
+def test_a_smallest_eigenvalue_that_is_shut_in_amid_the_chain_is_brought_to_its_end(seed):
+    """Chains whose parts fall apart above it: steps alone never find it there."""
+    J, k = (values[0] for values in chains("80 decades", 20, 1, seed))
+    found, status = one_chain(J, k)
+    assert status == Status.OK
+    assert not off(J, k, found, 4e-15)
+
+
 def test_the_count_that_tells_a_wrong_frequency_does_tell_it():
     J, k = (values[0] for values in chains("12 decades", 5, 1))
     found, _ = one_chain(J, k)
