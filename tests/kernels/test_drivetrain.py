@@ -144,7 +144,7 @@ def test_the_exact_reduction_has_no_error(n_keep, seed):
 
 
 def test_a_chain_of_its_full_size_is_itself():
-    for reduction in ("none", *REDUCING):
+    for reduction in ("none", *REDUCING) if COMPILED else ("none", "irs"):
         outputs, _ = reduced(reduction, n_keep=8, f_max=300.0)
         assert outputs["n_kept"][0] == 8
         assert abs(outputs["frequency_error"][0]).max() < 1e-13, reduction
@@ -292,7 +292,9 @@ def test_without_dampers_nothing_is_damped():
 
 
 @pytest.mark.parametrize("reduction", ["rivin", "irs", "exact"] if COMPILED else ["rivin"])
-@pytest.mark.parametrize(("mass", "spring"), [(200, 100), (-900, -960), (700, 740), (0, -400)])
+@pytest.mark.parametrize(
+    ("mass", "spring"), [(200, 100), (-900, -960), (700, 740), (0, -400)] if COMPILED else [(700, 740)]
+)
 def test_units_scale_out_exactly(reduction, mass, spring):
     here = reduced(reduction, n_keep=4, f_max=100.0)[0]
     time = 2.0 ** ((mass - spring) // 2)
