@@ -109,6 +109,15 @@ def parser() -> argparse.ArgumentParser:
     _add_at(plot)
     _add_units(plot)
 
+    refine = _command(commands, "refine", _refine, "add cells to a result where it bends, until it can be interpolated")
+    _add_result(refine)
+    refine.add_argument("--y", metavar="OUTPUT", nargs="+", required=True)
+    refine.add_argument("--tolerance", metavar="SHARE", type=float, required=True, help="relative, e.g. 1e-3")
+    refine.add_argument("-o", "--output", metavar="REFINED.h5", type=Path, required=True)
+    refine.add_argument("--most-cells", metavar="N", type=int, default=1_000_000, help="altogether; default: 1000000")
+    refine.add_argument("--workers", metavar="N", type=int, help="cores to use; default: all")
+    _add_allow_import(refine)
+
     report = _command(commands, "report", _report, "one self-contained page of HTML: figures, exponents, provenance")
     _add_result(report)
     report.add_argument(
@@ -219,6 +228,23 @@ def _plot(arguments: argparse.Namespace) -> None:
     with _result(arguments) as dataset:
         plot(_in_units(pick(dataset, arguments.at), arguments.unit), output, y=arguments.y, x=arguments.x)
     print(output)
+
+
+def _refine(arguments: argparse.Namespace) -> None:
+    from sweep.refining import refine, study_of
+
+    with _result(arguments) as dataset:
+        study = study_of(dataset, allow_import=arguments.allow_import)
+        found = refine(
+            dataset,
+            arguments.y,
+            arguments.tolerance,
+            path=arguments.output,
+            study=study,
+            most_cells=arguments.most_cells,
+            workers=arguments.workers,
+        )
+    print(f"{arguments.output}: {found}")
 
 
 def _report(arguments: argparse.Namespace) -> None:

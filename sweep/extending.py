@@ -11,7 +11,7 @@ import numpy as np
 
 from sweep.errors import SweepError
 from sweep.grid import Grid
-from sweep.layout import Column, columns
+from sweep.layout import STATUS, Column, columns
 from sweep.parts import DAMAGE
 from sweep.result import unreadable
 from sweep.study import Axis, Study
@@ -100,6 +100,35 @@ class Known:
             known = [positions[s] >= 0 for positions, s in zip(self._positions, slices, strict=True)]
             if all(k.any() for k in known):
                 yield slices, known, begin, end
+
+
+class Given:
+    """All cells of a study, solved before: what `Known` is, without a file to look them up in.
+
+    Parameters
+    ----------
+    arrays : mapping of output, "status" and "method_used" to ndarray, shape (cells, ...)
+    """
+
+    def __init__(self, arrays: Mapping[str, Any]) -> None:
+        self._arrays = arrays
+
+    def __enter__(self) -> Given:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, fault: BaseException | None, at: TracebackType | None) -> None:
+        pass
+
+    @property
+    def cells(self) -> int:
+        return len(self._arrays[STATUS])
+
+    def missing(self, start: int, stop: int) -> Any:
+        return np.zeros(stop - start, bool)
+
+    def fill(self, start: int, stop: int, arrays: Mapping[str, Any]) -> None:
+        for name, values in self._arrays.items():
+            arrays[name][...] = values[start:stop]
 
 
 def _positions(old: Axis, new: Axis) -> Any:

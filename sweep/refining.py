@@ -9,9 +9,13 @@ positive, as a scaling law wants it.
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import itertools
+import os
+import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -74,9 +78,10 @@ def refine(
     y: str | Sequence[str],
     tolerance: float,
     *,
+    path: str | os.PathLike[str] | None = None,
     study: Study | None = None,
-    run: Callable[[Study], xr.Dataset] | None = None,
     most_cells: int = MOST_CELLS,
+    workers: int | None = None,
 ) -> Refinement:
     """Add cells to a finished sweep until outputs can be interpolated to a tolerance.
 
@@ -88,12 +93,15 @@ def refine(
         Outputs, one value a cell.
     tolerance : float
         Relative error of the interpolation.
+    path : path, optional
+        Where all cells are written at the end, an HDF5 file as of `run`; the rounds on the way are kept beside it until
+        then, so that what was computed is not lost. None: in memory.
     study : Study, optional
         That of the dataset; default: the one in its attributes.
-    run : callable, optional
-        Solves a study of further cells, a zip; default: `sweep.run` in memory.
     most_cells : int
         Largest number of cells altogether.
+    workers : int, optional
+        As of `run`.
 
     Raises
     ------
@@ -103,13 +111,38 @@ def refine(
     study = study or study_of(dataset)
     names = [y] if isinstance(y, str) else list(y)
     _require(dataset, study, names, tolerance)
-    if run is None:
-        from sweep.runner import run as run_in_memory
+    rounds = None if path is None else Path(path).with_name(f"{Path(path).name}.rounds")
+    if rounds is not None:
+        _make(rounds)
+    found = _Refiner(dataset, study, names, tolerance, _Runs(rounds, workers), most_cells, path).refined()
+    if rounds is not None:
+        shutil.rmtree(rounds, ignore_errors=True)
+    return found
 
-        def run(further: Study) -> xr.Dataset:
-            return run_in_memory(further, progress=False)
 
-    return _Refiner(dataset, study, names, tolerance, run, most_cells).refined()
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise SweepError(f"{folder} cannot be made: {error.strerror}") from None
+
+
+@dataclass
+class _Runs:
+    """Solves studies of further cells, each into its file in a folder, or in memory."""
+
+    folder: Path | None
+    workers: int | None
+
+    def __call__(self, further: Study) -> xr.Dataset:
+        from sweep.fingerprint import fingerprint
+        from sweep.runner import run
+
+        if self.folder is None:
+            return run(further, workers=self.workers, progress=False)
+        mark = hashlib.sha256(repr(sorted(fingerprint(further).items())).encode()).hexdigest()[:16]
+        with run(further, self.folder / f"{mark}.h5", workers=self.workers) as found:
+            return found.load()
 
 
 def study_of(dataset: xr.Dataset, allow_import: bool = False) -> Study:
@@ -142,7 +175,9 @@ class _Refiner:
         tolerance: float,
         run: Callable[[Study], xr.Dataset],
         most_cells: int,
+        path: str | os.PathLike[str] | None,
     ) -> None:
+        self.path = path
         self.study, self.names, self.tolerance, self.run, self.most = study, names, tolerance, run, most_cells
         self.axes = [axis.values for axis in study.axes.values()]
         self.logarithmic = [is_logarithmic(values) for values in self.axes]
@@ -233,16 +268,15 @@ class _Refiner:
 
     def _joined(self) -> Refinement:
         from sweep.result import in_memory
+        from sweep.runner import store_cells
 
         parts = [_flat(self.first), *self.parts]
         names = list(self.study.axes)
         axes = {n: Axis(n, frozen(np.concatenate([p[n].values for p in parts])), "values") for n in names}
         whole = dataclasses.replace(self.study, design="zip", axes=axes, title=f"{self.study.title}, refined")
-        plan = layout(whole, {})
         columns = [*self.study.outputs, STATUS, METHOD_USED]
         arrays = {name: np.concatenate([part[name].values for part in parts]) for name in columns}
-        dataset: xr.Dataset = in_memory(plan, arrays)
-        dataset.attrs["fingerprint"] = self.first.attrs.get("fingerprint", "{}")
+        dataset = store_cells(whole, self.path, arrays) if self.path else in_memory(layout(whole, {}), arrays)
         finest = [(len(values) - 1) * 2**self.deepest + 1 for values in self.axes]
         uniform = int(np.prod([float(n) for n in finest]))
         return Refinement(dataset, sum(p.sizes["cell"] for p in self.parts), uniform, self.error, self.complete)

@@ -9,12 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from sweep.assemble import assemble
 from sweep.contents import gathered, part_columns
 from sweep.errors import SweepError
-from sweep.extending import Known, obstacle
+from sweep.extending import Given, Known, obstacle
 from sweep.fingerprint import difference, fingerprint
 from sweep.pool import Spares, Terminated, cores, whole_number
 from sweep.progress import Progress, stream_of
@@ -88,6 +88,25 @@ def run(
     return open_result(output)
 
 
+def store_cells(study: Study, path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> xr.Dataset:
+    """Writes the result of cells that are solved already, a file like that of `run`.
+
+    Parameters
+    ----------
+    arrays : mapping of output, "status" and "method_used" to ndarray, shape (cells, ...)
+
+    Raises
+    ------
+    SweepError
+        As `run`.
+    """
+    task = _Task(study, fingerprint(study), 1, None, None, False, False, None, Given(arrays))
+    output = _checked_output(path)
+    if not _done(task, output):
+        _run_to_file(task, output)
+    return open_result(output)
+
+
 @dataclass(frozen=True)
 class _Task:
     study: Study
@@ -98,6 +117,7 @@ class _Task:
     force: bool
     extend: bool
     until: datetime | None
+    given: Given | None = None
 
 
 def _run_in_memory(task: _Task) -> xr.Dataset:
@@ -140,7 +160,7 @@ def _run_to_file(task: _Task, output: Path) -> bool:
 
 
 def _run_session(
-    task: _Task, store: Store, output: Path, blocks: Partition | None, known: Known | None, all_there: bool
+    task: _Task, store: Store, output: Path, blocks: Partition | None, known: Known | Given | None, all_there: bool
 ) -> bool:
     """Computes and puts together what is missing; False where the time was up before the end."""
     session = Session(task.study, task.mark, task.workers, blocks, task.block_cells, not all_there, known, task.until)
@@ -168,8 +188,10 @@ def _kept(store: Store) -> str:
     return f"{kept}, run the same command again to continue"
 
 
-def _known(task: _Task, output: Path) -> Known | None:
+def _known(task: _Task, output: Path) -> Known | Given | None:
     """The cells of the result that is extended. Raises SweepError where that is not possible."""
+    if task.given is not None:
+        return task.given
     if not task.extend or task.force or not output.exists():
         return None
     from sweep.verifying import check_whole

@@ -20,7 +20,7 @@ from sweep.reducing import Reducer
 from sweep.until import TimeUp, passed
 
 if TYPE_CHECKING:
-    from sweep.extending import Known
+    from sweep.extending import Given, Known
     from sweep.study import Study
 
 Solve = Callable[[int, int, Mapping[str, Any]], bool]
@@ -50,7 +50,7 @@ class Session:
         blocks: Partition | None = None,
         block_cells: int | None = None,
         sampled: bool = True,
-        known: Known | None = None,
+        known: Known | Given | None = None,
         until: datetime | None = None,
     ) -> None:
         self.study, self.workers, self.known, self.until = study, workers, known, until
@@ -125,7 +125,7 @@ class Session:
         return lambda start, stop, arrays: halt.compute(lambda: compute(start, stop, arrays))
 
 
-def _cells_solver(study: Study, known: Known | None) -> Callable[[int, int, Any], None]:
+def _cells_solver(study: Study, known: Known | Given | None) -> Callable[[int, int, Any], None]:
     from sweep.solve import Solver
 
     solver = Solver(study)

@@ -5,6 +5,7 @@ import pytest
 from scipy.interpolate import LinearNDInterpolator
 
 import sweep
+from sweep.cli import main
 from sweep.errors import SweepError
 
 
@@ -99,3 +100,38 @@ def test_what_cannot_be_refined_is_told(change, message):
     ds = sweep.run(sweep.build_study(kernel="foliot", axes=axes, **keys))
     with pytest.raises(SweepError, match=message):
         sweep.refine(ds, change.get("y", "period"), change.get("tolerance", 0.1))
+
+
+def test_the_command_writes_a_result_like_any_other(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    sweep.run(foliot(mu=(1e-2, 1e3, 6)), "coarse.h5")
+    command = ["refine", "coarse.h5", "--y", "period", "--tolerance", "1e-2", "-o", "fine.h5"]
+    assert main(command) == 0
+    told = capsys.readouterr().out
+    assert "an even grid as fine has" in told
+    assert main(["verify", "fine.h5"]) == 0
+    ds = sweep.open_result("fine.h5", strict=True)
+    inside = sweep.refine(sweep.open_result("coarse.h5"), "period", 1e-2).dataset
+    np.testing.assert_array_equal(ds.period, inside.period)
+    np.testing.assert_array_equal(ds.mu, inside.mu)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["coarse.h5", "fine.h5"]
+    again = sweep.run(sweep.study_of(ds), "again.h5")
+    np.testing.assert_array_equal(again.period, ds.period)
+    assert main(command) == 0  # done before; nothing is lost by asking twice
+
+
+def test_a_refinement_that_was_stopped_takes_up_its_rounds(tmp_path, monkeypatch):
+    import sweep.runner
+
+    monkeypatch.chdir(tmp_path)
+    ds = sweep.run(foliot(mu=(1e-2, 1e3, 6)))
+    stored = sweep.runner.store_cells
+    monkeypatch.setattr("sweep.runner.store_cells", lambda *given: (_ for _ in ()).throw(KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        sweep.refine(ds, "period", 1e-2, path="fine.h5")
+    before = {p: p.stat().st_mtime_ns for p in (tmp_path / "fine.h5.rounds").iterdir()}
+    assert before
+    monkeypatch.setattr("sweep.runner.store_cells", stored)
+    monkeypatch.setattr("sweep.refining.shutil.rmtree", lambda *given, **keys: None)
+    sweep.refine(ds, "period", 1e-2, path="fine.h5")
+    assert {p: p.stat().st_mtime_ns for p in (tmp_path / "fine.h5.rounds").iterdir()} == before

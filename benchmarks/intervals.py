@@ -1,6 +1,6 @@
 """How often confidence intervals hold the truth: power laws with noise, one law and two, nominal 95 %.
 
-python benchmarks/coverage.py [SETS]      default 10000; a standard error of 0.2 % each
+python benchmarks/intervals.py [SETS]      default 10000; a standard error of 0.2 % each
 """
 
 from __future__ import annotations
