@@ -65,10 +65,16 @@ def _at_angle(scene, c, s, arc):
 
 @call
 def vertex_margins(piece, tool, reach, w, r):
-    """rho^2 - (w-r)^2 and rho^2 - (w+r)^2 of the tool's vertex on the X axis, without loss."""
+    """rho^2 - (w-r)^2 and rho^2 - (w+r)^2 of the tool's vertex on the X axis, without loss.
+
+    A vertex that is on the ring but for the rounding of its inputs is on it: the two terms of (2) differ by the square
+    root of what is left, and wear by that itself.
+    """
     a = _wear_tool.side_of(piece) * tool[0]
     near = sum4(reach, a, r, -w) * sum4(reach, a, -r, w)
-    return near, sum4(reach, a, -r, -w) * sum4(reach, a, r, w)
+    wide = sum4(reach, a, -r, -w) * sum4(reach, a, r, w)
+    least = 4.0 * _EPS * (reach + tool[0] + w + r) * (reach + tool[0] + w + r)
+    return near if magnitude(near) > least else 0.0, wide if magnitude(wide) > least else 0.0
 
 
 @call
@@ -305,12 +311,12 @@ def profile(scene, rtol, work):
     ----------
     scene : (arm of `_wear_arm`, tool of `_wear_tool`, (rate of the crank, of the work, L, w, cosine and sine of the
         direction of w from b + beta), r)
-    work : room for panels, splits, angles, the stack of intervals, and one panel's values
+    work : room for panels, splits, angles, and the stack of intervals
     """
     arm, tool, ride, r = scene
-    pool, found, angles, stack, values = work
+    pool, found, angles, stack = work
     x, y, radius, near, far = _circle(scene)
-    number = _wear_tool.arcs(tool, x, y, radius, near, far, angles, found, stack)
+    number, unsure = _wear_tool.arcs(tool, x, y, radius, near, far, angles, found, stack)
     if number < 0:
         return math.nan, math.inf, False
     if stands_still(arm):
@@ -328,7 +334,9 @@ def profile(scene, rtol, work):
     else:
         count = _open_far_side(pool, scene, angles, number)
         count = _open_outline(pool, count, scene, found, stack)
-    value, error = adapt(integrand, scene, pool, count, values, rtol)
+    value, error = adapt(integrand, scene, pool, count, rtol)
+    if unsure > 0.0:
+        error += 8.0 * unsure * _far_side(0.0, scene)[0] / (1.0 if arm[3] else arm[2][1] - arm[2][0])
     if on_pivot:
         length = _length_of(angles, number)
         value, error = value * length, error * length + 64.0 * _EPS * value

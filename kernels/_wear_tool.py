@@ -240,12 +240,10 @@ def _top(stack, k):
 
 
 @call
-def covers(tool, x, y):
-    """Whether the point (x, y) of the tool's frame is in contact."""
-    u, v = magnitude(x) / tool[0], magnitude(y) / tool[1]
-    if not (u < 1.0 and v < 1.0):
-        return False
-    return power(u, tool[2]) + power(v, tool[3]) < 1.0
+def excess(tool, x, y):
+    """abs(X/a)^n + abs(Y/b)^m - 1 of a point of the tool's frame, limited; negative where it is in contact."""
+    u, v = min(magnitude(x) / tool[0], 8.0), min(magnitude(y) / tool[1], 8.0)
+    return power(u, tool[2]) + power(v, tool[3]) - 1.0
 
 
 @call
@@ -275,6 +273,8 @@ def sort(values, count):
 def arcs(tool, cx, cy, radius, near, far, angles, found, stack):
     """Arcs of a circle within the tool: their ends in pairs in `angles`, in [-pi, pi]; how many numbers, -1: too many.
 
+    And how much of the circle lies on the outline but for rounding, so that it may be in or out.
+
     `near`, `far`: `vertex_excess` of the vertices at X = a and X = -a where it is known better than from cx, else NaN.
     """
     count, first = int(1.0), int(0.0)  # literals would have what they are passed to compiled anew
@@ -286,7 +286,7 @@ def arcs(tool, cx, cy, radius, near, far, angles, found, stack):
             start = vertex_excess(piece, tool, cx, mirror * cy, radius)
         number = crossings(piece, tool, cx, mirror * cy, radius, start, found, first, stack)
         if number < 0:
-            return -1
+            return -1, 0.0
         for j in range(number):
             x, y, _, _, _ = outline(piece, found[j], tool)
             angles[count] = arctan2(mirror * y - cy, x - cx)
@@ -298,16 +298,19 @@ def arcs(tool, cx, cy, radius, near, far, angles, found, stack):
 
 @jit
 def _kept(tool, cx, cy, radius, angles, count):
-    """Keeps those of `count` neighbouring arcs that are within the tool."""
-    kept = 0
+    """Keeps those of `count` neighbouring arcs that are within the tool; how many numbers, and how much is unsure."""
+    kept, unsure = 0, 0.0
     for j in range(count):
         low, high = angles[j], angles[j + 1]
         if high > low:
             s, c = sincos(0.5 * (low + high))
-            if covers(tool, cx + radius * c, cy + radius * s):
+            beyond = excess(tool, cx + radius * c, cy + radius * s)
+            if magnitude(beyond) < _ROUNDING * (tool[2] + tool[3]) * 16.0:
+                unsure += high - low
+            if beyond < 0.0:
                 if kept > 0 and not angles[kept - 1] < low:
                     angles[kept - 1] = high
                 else:
                     angles[kept], angles[kept + 1] = low, high  # kept <= j: what is read later is not overwritten
                     kept += 2
-    return kept
+    return kept, unsure

@@ -72,7 +72,7 @@ def contour(
     ))  # fmt: skip
     work = (
         np.empty(_wear_quadrature.POOL), np.empty(_wear_tool.ARC_LIMIT), np.empty(_wear_tool.ARC_LIMIT),
-        np.empty(_wear_tool.STACK), np.empty(21),
+        np.empty(_wear_tool.STACK),
     )  # fmt: skip
     for i in range(status.size):
         status[i] = _cell(cells[i], rtol[i], radius, wear[i], wear_error[i], work)

@@ -1,0 +1,227 @@
+"""Wear of one material point of a turning workpiece under the tool of a polishing machine (Preston's law).
+
+    h = preston p int_0^tau v [point in contact] dt                                                  (1)
+The point is at (r0, theta0), polar, about the workpiece's centre at t = 0, when the crank is along the x axis; model
+and names are those of `polisher_wear`; for large tau the points of a ring wear at its rate on average. Time is split at
+every entry and exit, none overlooked (`_wear_path`), and between them integrated adaptively.
+Source: Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (12) and (20), corrected; Preston (1927).
+
+LOCK_UP: the crank does not turn fully, so there is no wear (NaN). STEP_LIMIT: tau is too long.
+"""
+
+import math
+
+import numpy as np
+
+from kernels import _linkage, _wear_path, _wear_quadrature, _wear_scene
+from kernels._columns import entry, one_by_one
+from kernels._jit import jit, jit_inline
+from kernels._lanes import magnitude, sqrt
+from kernels._vecmath import in_unit, is_normal, mantissa_exponent, scale
+from kernels._wear_call import call, entry_of_cells
+from kernels._wear_path import INSIDE, ONCE, OUTSIDE, STEPS
+from kernels._wear_scene import ANGLE_LIMIT, BAD_INPUT, OK, OUT_OF_RANGE, allowed
+from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
+
+_INACCURATE, _STEP_LIMIT = float(Status.INACCURATE), float(Status.STEP_LIMIT)
+_EPS = 2.0**-52
+_TURN = 2.0 * math.pi
+_DEPTH = _wear_path.HALVINGS + 2
+
+
+@call
+def _speed(kind, s, scene):
+    """Speed at a time s of a step, and its rounding."""
+    path, cranked, turned = scene
+    _, _, vx, vy = _wear_path.position(path, cranked, turned, s)
+    v = sqrt(vx * vx + vy * vy)
+    return v, 4.0 * _EPS * v
+
+
+@call
+def _polished(scene, low, high, tolerance, pool):
+    """The way of polishing between two times within the tool, and its error; to `tolerance` times the way."""
+    if not high > low:
+        return 0.0, 0.0
+    count = int(0.0)
+    _wear_quadrature.open_panel(pool, count, 0.0, low, high - low)
+    return _wear_quadrature.adapt(_speed, scene, pool, count + 1, tolerance)
+
+
+@call
+def _step(scene, h, curve, rtol, stack, pool):
+    """The way of polishing in one step of time h, and its error."""
+    path, cranked, turned = scene
+    tool = path[3]
+    total, error, low, top = 0.0, 0.0, 0.0, int(1.0)
+    one = _wear_path.position(path, cranked, turned, 0.0)
+    stack[0] = h
+    least = h * 0.5**_wear_path.HALVINGS
+    entered, inside = 0.0, False
+    while top > 0:
+        high = stack[top - 1]
+        two = _wear_path.position(path, cranked, turned, high)
+        verdict = _wear_path.judged(tool, one, two, high - low, curve)
+        before = _wear_path.excess(tool, one[0], one[1]) < 0.0
+        after = _wear_path.excess(tool, two[0], two[1]) < 0.0
+        tiny = high - low <= least
+        if not (verdict in (INSIDE, OUTSIDE, ONCE) or tiny):
+            stack[top] = 0.5 * (low + high)
+            top += 1
+            continue
+        now = before if verdict == ONCE else verdict == INSIDE or (tiny and after)
+        if tiny:
+            error += (high - low) * sqrt(two[2] * two[2] + two[3] * two[3])
+        if now and not inside:
+            entered = low
+        if inside and not now:
+            way, doubt = _polished(scene, entered, low, rtol, pool)
+            total, error = total + way, error + doubt
+        inside = now
+        if verdict == ONCE and before != after:
+            s, blur = _wear_path.crossing(path, cranked, turned, low, high)
+            error += min(blur, high - low) * sqrt(two[2] * two[2] + two[3] * two[3])
+            if after:
+                entered = s
+            else:
+                way, doubt = _polished(scene, entered, s, rtol, pool)
+                total, error = total + way, error + doubt
+            inside = after
+        low, one = high, two
+        top -= 1
+    if inside:
+        way, doubt = _polished(scene, entered, h, rtol, pool)
+        total, error = total + way, error + doubt
+    return total, error
+
+
+@jit
+def _clock(speed, spin):
+    """Time of a step, and what the crank and the work turn by in it, in turns, the latter as a pair."""
+    if speed == 0.0:
+        return _TURN / (STEPS * magnitude(spin)), 0.0, 0.0, (1.0 if spin > 0.0 else -1.0) / STEPS, 0.0
+    ratio = spin / speed
+    steps = STEPS * math.ceil(max(1.0, min(magnitude(ratio), 1e9)))
+    low = _linkage.fma(-ratio, speed, spin) / speed
+    sign = 1.0 if speed > 0.0 else -1.0
+    share = sign * ratio / steps
+    rest = _linkage.fma(-share, steps, sign * ratio) / steps
+    turn = sign / steps
+    turn_rest = _linkage.fma(-turn, steps, sign) / steps
+    return _TURN / (steps * magnitude(speed)), turn, turn_rest, share, rest + sign * low / steps
+
+
+@call
+def way(path, theta0, tau, rtol, work):
+    """The way of polishing over the time tau, its error, and whether there were few enough steps."""
+    pool, stack = work
+    speed, spin = path[1][0], path[1][1]
+    if speed == 0.0 and spin == 0.0:
+        return 0.0, 0.0, True
+    h, cranked, cranked_low, turned, turned_low = _clock(speed, spin)
+    steps = tau / h
+    if not steps < _wear_path.STEP_LIMIT:
+        return 0.0, 0.0, False
+    curve = _wear_path.bend(path)
+    total, error = 0.0, 0.0
+    for j in range(int(steps) + 1):
+        rest = h * (steps - j)
+        scene = (
+            path, _wear_path.phase(j, cranked, cranked_low), theta0 + _wear_path.phase(j, turned, turned_low),
+        )  # fmt: skip
+        if rest > 0.0:
+            more, doubt = _step(scene, min(h, rest), curve, rtol, stack, pool)
+            total, error = total + more, error + doubt
+    return total, error + 4.0 * _EPS * (total + tau * 0.0), True
+
+
+@jit_inline
+def _cell(p, rtol, work):
+    """Wear, its error and the status of one cell; p: its parameters."""
+    _, lengths, margin, verdict = _wear_scene.arm_without_units(p[0], p[1], p[2], p[3])
+    tool, ride, unit, pace, fine = _wear_scene.work_without_units(p)
+    verdict = verdict if fine or verdict >= FIRST_REFUSAL else OUT_OF_RANGE
+    if not _wear_scene.turns_fully(verdict):
+        return math.nan, math.nan, verdict
+    x, y = _wear_scene.signed_in_unit(p[9], unit), _wear_scene.signed_in_unit(p[10], unit)
+    r = in_unit(p[18], unit)
+    motion = (ride[0], ride[1], ride[2], x, y, p[8])
+    path = (lengths, margin, _linkage.side_of(p[4]), p[6]), motion, r, tool
+    m, e = mantissa_exponent(p[20] if p[20] > 0.0 else 1.0)
+    tau = scale(m, e + pace) if p[20] > 0.0 else 0.0
+    if r > 4.0 * (ride[2] + ride[3] + tool[0] + tool[1]):
+        return 0.0, 0.0, verdict
+    value, error, short = way(path, p[19], tau, 0.25 * rtol, work)
+    if not short:
+        return math.nan, math.nan, _STEP_LIMIT
+    wear = _wear_scene.with_units(value, p[16], p[17], unit)
+    doubt = _wear_scene.with_units(error, p[16], p[17], unit)
+    if value > 0.0 and not is_normal(wear):
+        return wear, doubt, OUT_OF_RANGE
+    return wear, doubt, verdict if error <= rtol * value else _INACCURATE
+
+
+@entry_of_cells()
+def path(
+    b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
+    r0, theta0, tau, rtol, wear, wear_error, status,
+):  # fmt: skip
+    """(1), split at every entry and exit; one cell at a time, for no two split alike."""
+    cells = _wear_scene.side_by_side((
+        b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
+        r0, theta0, tau,
+    ))  # fmt: skip
+    work = np.empty(_wear_quadrature.POOL), np.empty(_DEPTH)
+    for i in range(status.size):
+        wear[i], wear_error[i], status[i] = _cell(cells[i], rtol[i], work)
+
+
+@jit
+def _check(
+    i, b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
+    r0, theta0, tau, status,
+):  # fmt: skip
+    fine = allowed(
+        b[i], d[i], f[i], e[i], type[i], omega[i], b_angle[i], L[i], beta[i], w_x[i], w_y[i], Omega[i],
+        tool_a[i], tool_b[i], tool_n[i], tool_m[i], preston[i],
+    )  # fmt: skip
+    pressed = pressure[i] > 0.0 and pressure[i] < math.inf
+    point = 0.0 <= r0[i] < math.inf and magnitude(theta0[i]) <= ANGLE_LIMIT and 0.0 <= tau[i] < math.inf
+    status[i] = OK if fine and pressed and point else BAD_INPUT
+
+
+@entry()
+def check(
+    b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
+    r0, theta0, tau, status,
+):  # fmt: skip
+    """BAD_INPUT: NaN, infinite or outside its limits."""
+    one_by_one(
+        _check,
+        (
+            b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston,
+            pressure, r0, theta0, tau, status,
+        ),
+    )  # fmt: skip
+
+
+POLISHER_WEAR_POINT = Kernel(
+    name="polisher_wear_point",
+    doc="Preston wear of one point of a turning workpiece under the tool of a polishing machine",
+    source="Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), corrected and completed",
+    parameters=(
+        *_wear_scene.PARAMETERS,
+        Field("pressure", "Pa", "pressure under the tool", lower=0.0, open_lower=True),
+        Field("r0", "m", "distance of the point from the workpiece's centre", lower=0.0),
+        Field("theta0", "rad", "its direction at the start, from the x axis", default=0.0,
+              lower=-ANGLE_LIMIT, upper=ANGLE_LIMIT),
+        Field("tau", "s", "time of polishing", lower=0.0),
+    ),
+    outputs=(
+        Field("wear", "m", "depth worn away"),
+        Field("wear_error", "m", "what it may be wrong by"),
+    ),
+    check=check,
+    methods=(Method("path", "time split at every entry and exit, adaptive to rtol between them", path),),
+    example=_wear_scene.EXAMPLE | {"r0": 0.05, "theta0": 0.0, "tau": 100.0},
+)  # fmt: skip
