@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from sweep.scaling import scaling as scaling
     from sweep.spec import build_study as build_study
     from sweep.spec import read_study as read_study
+    from sweep.verifying import verify as verify
 
 _HOMES = {
     "read_study": "spec",
@@ -38,6 +39,7 @@ _HOMES = {
     "plan": "planning",
     "run": "runner",
     "open_result": "result",
+    "verify": "verifying",
     "local_exponent": "analysis",
     "exponent": "analysis",
     "fit_exponent": "analysis",

@@ -56,13 +56,17 @@ class Partition:
 
 @dataclass(frozen=True)
 class Sample:
-    """Timed probes: cell each starts at (ascending), its seconds per cell, and what the probed cells gave."""
+    """Timed probes: cell each starts at (ascending), its seconds per cell, and what the probed cells gave.
+
+    `lanes`: whether one cell takes as long as 32; None where that was not asked.
+    """
 
     positions: Any
     costs: Any
     cells: int
     status: Any
     method_used: Any
+    lanes: bool | None = None
 
     @property
     def cost(self) -> float:
@@ -82,7 +86,7 @@ UNSAMPLED = Sample(np.zeros(1), np.ones(1), 1, np.empty(0, np.int8), np.empty(0,
 
 def take_sample(solver: Solver, columns: Sequence[Column], size: int) -> Sample:
     """Times a few cells at up to 64 places of the grid, in a few hundredths of a second or a hundredth of the run."""
-    cells = _probe_cells(solver, columns, size)
+    cells, lanes = _probe_cells(solver, columns, size)
     count = max(1, min(POSITIONS, size // (4 * cells)))
     arrays = {column.name: column.empty(cells) for column in columns}
     probes: dict[int, tuple[float, Any, Any]] = {}
@@ -97,7 +101,7 @@ def take_sample(solver: Solver, columns: Sequence[Column], size: int) -> Sample:
             break
     places = sorted(probes)
     costs, status, used = zip(*(probes[p] for p in places), strict=True)
-    return Sample(np.array(places), np.array(costs), cells, np.concatenate(status), np.concatenate(used))
+    return Sample(np.array(places), np.array(costs), cells, np.concatenate(status), np.concatenate(used), lanes)
 
 
 def partition(sample: Sample, size: int, cell_bytes: float, workers: int) -> Partition:
@@ -106,7 +110,9 @@ def partition(sample: Sample, size: int, cell_bytes: float, workers: int) -> Par
     shortest, longest = BLOCK_SECONDS
     seconds = min(max(cost * size / (200 * workers), shortest), longest)
     cells = min(seconds / cost, BLOCK_BYTES / cell_bytes, size)
-    if sample.cells < LANES:
+    if sample.lanes:
+        cells = max(cells, min(LANES, math.ceil(size / workers)))
+    elif sample.cells < LANES and sample.lanes is None:
         cells = max(cells, min(LANES, size / (4 * workers)))
     cells = max(1, math.floor(cells), -(-size // MOST_BLOCKS))
     whole_lanes = cells if cells < LANES else -(-cells // LANES) * LANES
@@ -128,19 +134,31 @@ def order(sample: Sample, blocks: Partition, first: Callable[[Any], Any] | None 
     return np.argsort(-np.round(2 * np.log2(weights)), kind="stable")
 
 
-def _probe_cells(solver: Solver, columns: Sequence[Column], size: int) -> int:
-    """Cells a probe: few enough for 64 probes in the budget, enough to see past the cost of a call."""
+def _probe_cells(solver: Solver, columns: Sequence[Column], size: int) -> tuple[int, bool | None]:
+    """Cells a probe: few enough for 64 probes in the budget, enough to see past the cost of a call.
+
+    Where single cells are dear and few, also whether two take as long as one: then 32 will.
+    """
     cells = 1
     while True:
-        arrays = {column.name: column.empty(cells) for column in columns}
-        start = _place(0, 1, cells, size)
-        seconds = min(_timed(solver, arrays, start, cells) for _ in range(2 if cells == 1 else 1))
+        seconds = _probe(solver, columns, size, cells)
         more = LANES if cells == 1 else 4 * cells
         dear = seconds > PROBE_SECONDS
         worth_a_look = cells == 1 and (seconds < BUDGET / 4 or more * 50 < size)
-        if size < (4 if cells == 1 else POSITIONS) * more or (dear and not worth_a_look):
-            return cells
+        few = size < (4 if cells == 1 else POSITIONS) * more
+        if cells == 1 and dear and (few or not worth_a_look) and size > 1:
+            lanes = _probe(solver, columns, size, 2) < 1.5 * seconds
+            return (max(1, min(LANES, size // 4)), True) if lanes else (1, False)
+        if few or (dear and not worth_a_look):
+            return cells, None
         cells = more
+
+
+def _probe(solver: Solver, columns: Sequence[Column], size: int, cells: int) -> float:
+    """Seconds that some cells in the middle of the grid take together."""
+    arrays = {column.name: column.empty(cells) for column in columns}
+    start = _place(0, 1, cells, size)
+    return min(_timed(solver, arrays, start, cells) for _ in range(2 if cells == 1 else 1))
 
 
 def _timed(solver: Solver, arrays: dict[str, Any], start: int, cells: int, usual: float = 0.0) -> float:

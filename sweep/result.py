@@ -185,7 +185,11 @@ def _open_parts(output: Path, spec: Spec, strict: bool) -> xr.Dataset:
 def checked_study(folder: Path, spec: Spec) -> Study:
     """The study of an unfinished sweep. Raises SweepError where its grid is not the one that was cut."""
     study = Study.from_json(spec.study, declared=True)
-    rows = granules(study).count
+    try:
+        rows = granules(study).count
+        contents(study, spec.fingerprint)
+    except (LookupError, ValueError, TypeError, AttributeError, ArithmeticError) as fault:
+        raise SweepError(f"{folder / SPEC}: damaged (its study cannot be: {fault})") from None
     if spec.blocks.size != rows or not 1 <= spec.blocks.cells <= rows:
         raise SweepError(f"{folder / SPEC}: damaged (its blocks do not fit its study)")
     return study

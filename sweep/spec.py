@@ -51,8 +51,8 @@ def build_study(*, allow_import: bool = False, **keys: Any) -> Study:
     allow_import : bool
         Allow a kernel named "module:NAME", whose module is imported.
     **keys
-        title, question, kernel, method, rtol, outputs, design, axes, fixed, along. Axes and coordinates may also be
-        arrays or lists of numbers in SI units.
+        title, question, kernel, method, rtol, outputs, design, axes, fixed, along, summary. Axes and coordinates may
+        also be arrays or lists of numbers in SI units.
 
     Raises
     ------

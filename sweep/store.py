@@ -69,7 +69,7 @@ def read_spec(folder: Path) -> Spec | None:
         return None
     except OSError as fault:
         raise SweepError(f"{path}: cannot be read ({fault.strerror})") from None
-    except (ValueError, KeyError, TypeError) as fault:
+    except (ValueError, KeyError, TypeError, RecursionError) as fault:
         raise SweepError(f"{path}: damaged ({fault}); remove the folder {folder} to start anew") from None
 
 

@@ -139,3 +139,32 @@ def test_lanes_are_told_from_single_cells(monkeypatch):
 
     solver.solve = solve
     assert take_sample(solver, COLUMNS, 10**5).cost == pytest.approx(1e-3 / 32, rel=0.01)
+
+
+def calls(seconds, lanes, monkeypatch):
+    """A solver that takes so long for up to 32 cells, or for each."""
+    made = Uneven(lambda k: 0.0, monkeypatch)
+    real = made.solve
+
+    def solve(start, stop, *rest):
+        real(start, stop, *rest)
+        made.now += seconds * (-(-(stop - start) // 32) if lanes else stop - start)
+
+    made.solve = solve
+    return made
+
+
+@pytest.mark.parametrize("size", [2, 5, 100, 1500])
+@pytest.mark.parametrize("lanes", [True, False])
+def test_few_dear_cells_are_told_from_lanes_by_two_of_them(monkeypatch, size, lanes):
+    solver = calls(0.05, lanes, monkeypatch)
+    found = take_sample(solver, COLUMNS, size)
+    assert found.lanes is lanes
+    assert max(stop for _, stop in solver.ranges) <= size
+    blocks = partition(found, size, 42, 2)
+    if lanes:
+        assert blocks.cells == min(32, -(-size // 2))
+    else:
+        assert blocks.cells == max(1, min(20, size // 400))
+        # every probe is taken twice, lest something was compiled meanwhile
+        assert solver.now <= 0.05 * 18
