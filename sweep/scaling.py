@@ -8,17 +8,16 @@ again in other units, and only a unit that changes nothing but the numbers count
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels.interface import FIRST_REFUSAL, Field, Status
-from sweep.study import Axis, Study, differs, frozen
+from sweep.sampling import sampled, solved
+from sweep.study import Study, differs
 from sweep.units import exponents
 
 if TYPE_CHECKING:
@@ -189,7 +188,8 @@ def _present(study: Study, field: Field) -> bool:
 
 def _is_a_matter_of_units(study: Study, units: Units, base: str) -> bool:
     """Whether solving some cells with another unit of `base` changes nothing but the numbers."""
-    old, new = _tried(study, {}), _tried(study, {name: FACTOR ** float(p.get(base, 0)) for name, p in units.items()})
+    factors = {name: FACTOR ** float(powers.get(base, 0)) for name, powers in units.items()}
+    old, new = solved(sampled(study, TRIED_CELLS)), solved(sampled(study, TRIED_CELLS, factors))
     fine = (old[1] < FIRST_REFUSAL) & (old[1] == new[1]) & (old[1] != Status.PENDING)
     if not fine.any() or (old[1] != new[1]).any():
         return False
@@ -200,42 +200,6 @@ def _is_a_matter_of_units(study: Study, units: Units, base: str) -> bool:
         ):
             return False
     return True
-
-
-def _tried(study: Study, factors: Mapping[str, float]) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int8]]:
-    """Outputs and statuses of a few cells, every parameter and coordinate times its factor."""
-    from sweep.grid import Grid
-    from sweep.solve import Solver
-
-    grid, lengths = Grid(study), study.lengths
-    cells = np.unique(np.linspace(0, grid.size - 1, TRIED_CELLS).astype(np.int64))
-    fields = study.kernel.parameters
-    columns = [np.empty((1, *(lengths[d] for d in f.dims))) for f in fields]
-    for k, value in grid.constants().items():
-        columns[k][:] = value
-    rows: list[list[NDArray[np.float64]]] = []
-    for cell in cells:
-        grid.columns(int(cell), int(cell) + 1, columns)
-        rows.append([column[0].copy() for column in columns])
-    axes = {
-        f.name: Axis(f.name, frozen(np.array([row[k] for row in rows]) * factors.get(f.name, 1.0)), "values")
-        for k, f in enumerate(fields)
-    }
-    along = {name: frozen(values * factors.get(name, 1.0)) for name, values in study.along.items()}
-    part = dataclasses.replace(
-        study,
-        design="zip",
-        axes=axes,
-        fixed={},
-        follows={},
-        along=along,
-        method="auto" if "method" in study.axes else study.method,
-    )
-    shapes = {f.name: tuple(lengths[d] for d in f.dims) for f in study.asked}
-    outputs = {name: np.empty((len(cells), *shape)) for name, shape in shapes.items()}
-    status, used = np.empty(len(cells), np.int8), np.empty(len(cells), np.int8)
-    Solver(part).solve(0, len(cells), outputs, status, used)
-    return outputs, status
 
 
 def _groups(names: Sequence[str], units: Units) -> tuple[list[str], list[Group]]:
