@@ -39,7 +39,8 @@ def test_the_units_of_the_source_are_those_of_the_file(ds):
     ("printed", "here", "word"),
     [
         (10.6, 10.591, "reproduced"), (10.6, 10.649, "reproduced"), (19.7, 19.756, "rounded"),
-        (227.2, 226.916, "rounded"), (387.6, 346.66, "misprinted"), (13, 12.6, "reproduced"), ("99.40", 99.44, "rounded"),
+        (227.2, 226.916, "rounded"), (387.6, 346.66, "misprinted"), (13, 12.6, "reproduced"),
+        ("99.40", 99.44, "rounded"),
     ],
 )  # fmt: skip
 def test_a_printed_number_is_judged_by_its_last_digit(printed, here, word):
