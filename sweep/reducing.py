@@ -251,7 +251,12 @@ def two_sum(a: Any, b: Any) -> tuple[Any, Any]:
     """The rounded sum and its error, exactly; where the sum is infinite the error means nothing."""
     total = a + b
     part = total - a
-    return total, (a - (total - part)) + (b - part)
+    rest = total - part
+    # in place: new arrays of this size cost more than the arithmetic
+    np.subtract(a, rest, out=rest)
+    np.subtract(b, part, out=part)
+    rest += part
+    return total, rest
 
 
 def tree_sum(values: Floats) -> tuple[Floats, Floats]:
