@@ -103,7 +103,8 @@ def test_the_papers_arccos_is_within_its_bound_and_loses_digits_next_to_a_dead_p
     for name, error in errors(outputs, columns).items():
         promised = bounds(POLISHER, "textbook", *columns, asked=[name])
         assert (error <= promised).all(), name
-        assert np.median(promised) < 300 * max(np.median(error), 1e-15), name
+        if COMPILED:  # of many machines
+            assert np.median(promised) < 300 * max(np.median(error), 1e-15), name
     if kind == "near dead":
         assert bounds(POLISHER, "textbook", *columns, asked=["A1"]).max() > 1e-9
 
@@ -134,8 +135,9 @@ def test_dense_sampling_finds_what_the_other_methods_say(kind):
         np.testing.assert_allclose(outputs[name][sure], expected[name][sure], rtol=1e-9, err_msg=name)
 
 
+@pytest.mark.skipif(not COMPILED, reason="2048 samples a machine in plain Python")
 def test_dense_sampling_says_where_it_sees_too_little():
-    columns = machines("near dead", 3 if COMPILED else 1)
+    columns = machines("near dead", 3)
     assert (solve(POLISHER, "sampled", *columns, rtol=1e-9)[1] == Status.INACCURATE).all()
 
 
@@ -281,6 +283,7 @@ def test_what_is_no_machine_is_bad_input(k, value):
         assert (status == (Status.OK if allowed else Status.BAD_INPUT)).all()
 
 
+@pytest.mark.skipif(not COMPILED, reason="cells go one by one in plain Python")
 def test_neighbours_do_not_change_a_cell():
     mixed = np.concatenate(
         [machines(kind, 20) for kind in KINDS] + [10 ** np.random.default_rng(6).uniform(-1, 0, (4, 30))], 1

@@ -77,13 +77,13 @@ def test_without_a_distance_the_tool_is_at_the_end_of_the_arm():
 
 @pytest.mark.parametrize("kind", [0.0, 1.0])
 def test_the_angle_is_continuous_over_many_turns(kind):
-    angles = np.linspace(-30, 30, 2001)
+    angles = np.linspace(-30, 30, 2001 if COMPILED else 401)
     swinging, _ = motion(*MACHINES["usual"], type=kind, angles=angles)
     turning, status = motion(*MACHINES["long crank"], type=kind, angles=angles)
     for traces in (swinging, turning):
         steps = np.diff(traces["alpha"])
         middle = (traces["alpha_rate"][1:] + traces["alpha_rate"][:-1]) / 2 * np.diff(angles)
-        np.testing.assert_allclose(steps, middle, atol=1e-3)
+        np.testing.assert_allclose(steps, middle, atol=1e-3 if COMPILED else 0.02)
     assert status == Status.DOUBLE_CRANK
     assert turning["alpha"][-1] - turning["alpha"][0] == pytest.approx(60, abs=3)
     assert (swinging["alpha"] * (1 - 2 * kind) > 0).all()
