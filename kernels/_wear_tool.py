@@ -29,6 +29,8 @@ _NEWTON_LIMIT = 60
 _DEPTH = 64
 _NARROW = 1e-13
 _ROUNDING = 1e-15
+_ASIDE = 0.38
+"""Where on an arc it is tried for contact: not amid it, where a circle about the pivot may touch a vertex."""
 STACK = (_DEPTH, 6)
 
 
@@ -303,7 +305,7 @@ def _kept(tool, cx, cy, radius, angles, count):
     for j in range(count):
         low, high = angles[j], angles[j + 1]
         if high > low:
-            s, c = sincos(0.5 * (low + high))
+            s, c = sincos(low + _ASIDE * (high - low))
             beyond = excess(tool, cx + radius * c, cy + radius * s)
             if magnitude(beyond) < _ROUNDING * (tool[2] + tool[3]) * 16.0:
                 unsure += high - low

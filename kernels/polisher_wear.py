@@ -11,7 +11,8 @@ that varies under the tool. Source: Preston, J. Soc. Glass Technol. 11:214 (1927
 Zhurnal 78(3):55 (2011), (12) and (20), corrected.
 
 LOCK_UP: the crank does not turn fully, so there is no wear (NaN). CHANGE_POINT: values if the arm keeps to its branch.
-DOUBLE_CRANK: the arm turns fully, too; values are given.
+DOUBLE_CRANK: the arm turns fully, too; values are given. INACCURATE: an error exceeds rtol of the largest wear asked
+for; each value has its own error beside it, and is sought to rtol of itself.
 """
 
 import math
@@ -33,32 +34,39 @@ _FOUR_PI2 = 4.0 * math.pi * math.pi
 
 @jit_inline
 def _wear_at(r, scene, unit, amount, rtol, work):
-    """Wear and its error at one radius [m], and the status of both."""
+    """Wear and its error at one radius [m], and whether it is a number that float64 can hold."""
     preston, pressure, units = amount
     near = in_unit(r, unit)
     near = near if near > _FAINT or scene[2][3] == 0.0 else 0.0
-    value, error, fine = _wear_profile.profile((scene[0], scene[1], scene[2], near), 0.5 * rtol, work)
+    value, error, _ = _wear_profile.profile((scene[0], scene[1], scene[2], near), 0.5 * rtol, work)
     wear = _wear_scene.with_units(value / _FOUR_PI2, preston, pressure, units)
     doubt = _wear_scene.with_units(error / _FOUR_PI2, preston, pressure, units)
-    if value > 0.0 and not is_normal(wear):
-        return wear, doubt, OUT_OF_RANGE
-    return wear, doubt, OK if fine and error <= rtol * value else _INACCURATE
+    return wear, doubt, not value > 0.0 or is_normal(wear)
 
 
 @jit_inline
 def _cell(p, rtol, radius, wear, wear_error, work):
-    """Fills the profile of one cell and returns its status; p: its parameters."""
+    """Fills the profile of one cell and returns its status; p: its parameters.
+
+    The status is about errors over the largest wear of the profile: that of every radius is stated beside it.
+    """
     arm, _, _, verdict = _wear_scene.arm_without_units(p[0], p[1], p[2], p[3])
     tool, ride, unit, pace, fine = _wear_scene.work_without_units(p)
     verdict = verdict if fine or verdict >= FIRST_REFUSAL else OUT_OF_RANGE
     turns = _wear_scene.turns_fully(verdict)
+    most, worst, normal = 0.0, 0.0, True
     for k in range(radius.size):
         wear[k], wear_error[k] = math.nan, math.nan
         if turns:
             amount = p[16], p[17], unit + pace
-            wear[k], wear_error[k], said = _wear_at(radius[k], (arm, tool, ride), unit, amount, rtol, work)
-            verdict = verdict if said == OK or verdict >= FIRST_REFUSAL else said
-    return verdict
+            wear[k], wear_error[k], held = _wear_at(radius[k], (arm, tool, ride), unit, amount, rtol, work)
+            normal, most = normal and held, max(most, wear[k])
+            worst = worst if wear_error[k] <= worst else wear_error[k]  # NaN stays
+    if not turns:
+        return verdict
+    if not normal:
+        return OUT_OF_RANGE
+    return verdict if worst <= rtol * most else _INACCURATE
 
 
 @entry_of_cells("radius")

@@ -260,3 +260,13 @@ def test_plain_python_gives_the_bits_of_compiled_code():
         for switch in ("0", "1")
     ]  # fmt: skip
     assert printed[0] == printed[1] != ""
+
+
+@pytest.mark.parametrize("shape", [0.5, 1.0, 2.0, 100.0])
+def test_a_ring_that_just_touches_the_tool_does_not_wear(shape):
+    """Vertex and ring meet at (54, 0) from the pivot, once a stroke: rounding is not to count as contact."""
+    changed = {"L": 0.5, "tool_a": 0.04, "tool_b": 0.04, "tool_n": shape, "tool_m": shape, "w_x": 0.59, "w_y": 0.0}
+    value, error, _ = wear([0.05, 0.06], 1e-6, **changed)
+    most = 1e-9 if shape < 3 else 0.01  # a square's edge comes as close as its vertex
+    assert abs(value[0]) <= most * value[1] + error[0]
+    assert error[0] <= 1e-6 * value[1]

@@ -84,7 +84,7 @@ def test_over_many_turns_a_point_wears_as_its_ring():
     from kernels.polisher_wear import POLISHER_WEAR
 
     ring, _ = solve(POLISHER_WEAR, "contour", along=[np.array([6.0])], **{k: [v] for k, v in PAPER.items()})
-    tau = 2000 * 2 * math.pi
+    tau = 500 * 2 * math.pi
     value, _, status = wear(Omega=0.4 * 1.0061803398, tau=tau, rtol=1e-6)
     assert status[0] == Status.OK
     assert value[0] / tau == pytest.approx(ring["wear"][0, 0], rel=5e-3)

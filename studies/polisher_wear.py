@@ -1,0 +1,183 @@
+"""How evenly does a polishing machine wear a turning workpiece, and what do eccentricity and offset do for it?
+
+    sweep run studies/polisher_wear.toml
+    python studies/polisher_wear.py polisher_wear.h5
+
+draws polisher_wear.png and prints conclusions. The unevenness of a profile is the standard deviation of the wear over
+the area of the workpiece, over its mean; 0 is even.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from _common import Groups, Statement, compared, read_result, report
+
+UM_PER_HOUR = 3.6e9
+"""1 m/s."""
+CM, MM = 100.0, 1000.0
+PROFILES = (0.50, 0.54, 0.56, 0.58)
+"""Workpiece centres [m] whose profiles are drawn."""
+USUAL = 0.10
+"""Eccentricity [m] of the profiles."""
+
+NOTES = """\
+unevenness: standard deviation of the wear over the workpiece's area, over its mean
+offset: how much farther from the pivot the workpiece's centre lies than the tool's; place of tool and workpiece, rates,
+pressure and Preston's coefficient are chosen here, for the paper gives none of them"""
+
+
+def scaled(ds: xr.Dataset) -> xr.Dataset:
+    """`ds` with the offset, the mean over the area and the unevenness."""
+    area = ds.radius.values.copy()
+    area[-1] *= 0.5  # trapezoids in r of 2 pi r
+    weight = xr.DataArray(area / area.sum(), dims="radius")
+    mean = (ds.wear * weight).sum("radius")
+    scatter = np.sqrt(((ds.wear - mean) ** 2 * weight).sum("radius"))
+    return ds.assign(average=mean, uneven=scatter / mean)
+
+
+def swing(ds: xr.Dataset) -> xr.DataArray:
+    """Half amplitude A1 of the arm, by the paper's (37) and (40), corrected."""
+    b, d, f = float(ds.b), float(ds.d), float(ds.f)
+    far, near = (np.arccos((b * b + d * d - c * c) / (2 * b * d)) for c in (f + ds.e, abs(f - ds.e)))
+    return 0.5 * (far - near)
+
+
+def centre(ds: xr.Dataset) -> Statement:
+    """What the middle of the workpiece loses under a tool that never leaves it: the way of the arm over it."""
+    small = ds.sel(tool_n=2, w_x=0.50).isel(tool_b=-1, radius=0)
+    small = small.where(swing(small) * float(ds.L) < 0.04, drop=True).isel(e=0)
+    way = 4 * float(swing(small)) * float(small.w_x) * float(ds.omega) / (2 * np.pi)
+    theory = float(ds.preston) * float(ds.pressure) * way * UM_PER_HOUR
+    return compared(
+        f"wear of the centre, e = {CM * float(small.e):g} cm [um/h]", f"{theory:.5g}",
+        float(small.wear) * UM_PER_HOUR, theory, 1e-2, 5,
+    )  # fmt: skip
+
+
+def worst_error(ds: xr.Dataset) -> Statement:
+    """How far the numbers may be off."""
+    worst = float((ds.wear_error / ds.wear.max("radius")).max())
+    return Statement("error of every profile, over its largest wear", "", "at most", worst, worst <= 1e-4)
+
+
+def offsets(ds: xr.Dataset) -> list[Statement]:
+    """What moving the workpiece does, tool by tool."""
+    lines = []
+    for name, n, b in SHAPES:
+        tool = ds.uneven.sel(tool_n=n).sel(tool_b=b, method="nearest")
+        usual = tool.sel(e=USUAL, method="nearest")
+        best = usual.isel(w_x=int(usual.argmin("w_x")))
+        aligned = float(usual.sel(w_x=0.50, method="nearest"))
+        text = f"{100 * aligned:.0f} % at no offset, {100 * float(best):.0f} % at {CM * float(best.w_x - ds.L):.0f} cm"
+        lines.append(
+            Statement(f"{name}: an offset evens the wear, e = 10 cm", "", text, None, float(best) < 0.6 * aligned)
+        )
+    return lines
+
+
+def eccentricities(ds: xr.Dataset) -> list[Statement]:
+    """What the eccentricity does."""
+    tool = ds.sel(tool_n=2).isel(tool_b=0)
+    aligned = tool.uneven.isel(w_x=0)
+    evenest = aligned.isel(e=int(aligned.argmin("e")))
+    text = (
+        f"{100 * float(aligned[0]):.0f} % at 2 cm, least {100 * float(evenest):.0f} % at {CM * float(evenest.e):g} cm"
+    )
+    best = tool.uneven.stack(place=("e", "w_x"))
+    best = best.isel(place=int(best.argmin("place")))
+    place = f"{100 * float(best):.1f} % at e = {CM * float(best.e):g} cm, offset {CM * float(best.w_x - ds.L):.0f} cm"
+    lost = tool.average.isel(w_x=0)
+    return [
+        Statement("disc, no offset: throw evens the wear", "", text, None, bool(evenest < 0.5 * aligned[0])),
+        Statement("disc: the most even of all", "", place),
+        Statement(
+            "disc, no offset: mean wear from 2 to 16 cm of throw [um/h]", "",
+            f"{UM_PER_HOUR * float(lost[0]):.3g} to {UM_PER_HOUR * float(lost[-1]):.3g}",
+        ),
+    ]  # fmt: skip
+
+
+SHAPES = (
+    ("disc", 2, 0.04),
+    ("ellipse", 2, 0.08),
+    ("rhombus 1:2", 1, 0.08),
+    ("rhombus 1:1", 1, 0.04),
+)
+
+
+def statements(ds: xr.Dataset) -> Groups:
+    """Every line of the table, by heading."""
+    return {
+        "Numbers": [centre(ds), worst_error(ds)],
+        "Offset": offsets(ds),
+        "Eccentricity": eccentricities(ds),
+    }
+
+
+def figure(ds: xr.Dataset) -> Any:
+    """Profiles of three tools, and how uneven they are over offset and eccentricity; for two columns of print."""
+    from sweep import charts
+
+    with charts.style():
+        page = charts.new_figure(charts.PAGE, 105.0)
+        upper, lower = page.subplots(2, 3)
+        for k, (name, n, b) in enumerate(SHAPES[:3]):
+            tool = ds.sel(tool_n=n).sel(tool_b=b, method="nearest")
+            draw_profiles(upper[k], tool, name, k)
+            mesh = draw_map(lower[k], tool, k)
+            charts.letter(upper[k], "abc"[k])
+            charts.letter(lower[k], "def"[k])
+        page.colorbar(mesh, ax=list(lower), label="unevenness of the wear", pad=0.01)
+    return page
+
+
+def draw_profiles(axes: Any, tool: xr.Dataset, name: str, k: int) -> None:
+    """Wear along the radius at some offsets."""
+    from sweep.charts import COLOURS
+
+    for j, place in enumerate(PROFILES):
+        line = tool.wear.sel(e=USUAL, method="nearest").sel(w_x=place, method="nearest")
+        offset = MM * float(line.w_x - tool.L)
+        axes.plot(MM * line.radius, UM_PER_HOUR * line, color=COLOURS[j], label=f"{offset:.0f} mm")
+    axes.set(xlabel="radius (mm)", title=f"{name}, $e=100$ mm", xlim=(0, 100), ylim=(0, None))
+    if k == 0:
+        axes.set_ylabel("wear (µm/h)")
+        axes.legend(title="offset", loc="upper right")
+
+
+def draw_map(axes: Any, tool: xr.Dataset, k: int) -> Any:
+    """Unevenness over offset and eccentricity."""
+    uneven = tool.uneven.transpose("e", "w_x")
+    x, y = MM * (tool.w_x - tool.L).values, MM * tool.e.values
+    mesh = axes.pcolormesh(x, y, uneven, vmin=0, vmax=1.2, cmap="cividis", shading="nearest", rasterized=True)
+    axes.contour(x, y, uneven, levels=[0.1, 0.2, 0.4], colors="white", linewidths=0.7)
+    axes.set(xlabel="offset (mm)")
+    if k == 0:
+        axes.set_ylabel("eccentricity $e$ (mm)")
+    return mesh
+
+
+def read(path: str) -> xr.Dataset:
+    """The sweep with its groups. Raises SweepError where it is none of this study."""
+    return scaled(read_result(path, "polisher_wear", ["tool_n", "tool_b", "e", "w_x"], "polisher_wear.toml"))
+
+
+def conclude(path: str) -> tuple[Groups, list[str], Any]:
+    """Statements and the figure."""
+    ds = read(path)
+    return statements(ds), [NOTES], figure(ds)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Table and figure of the result that is named; 1 if a statement does not hold."""
+    return report(__file__, ["polisher_wear.h5"], arguments, conclude)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
