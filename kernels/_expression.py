@@ -77,7 +77,7 @@ class Expression:
 class Graph:
     """Expressions over named inputs, each recorded once, in the order in which they can be computed.
 
-    `kinks` are the series whose signs are inputs "sign_0", "sign_1", ...
+    `kinks` are the series whose signs are inputs ".sign_0", ".sign_1", ...
     """
 
     def __init__(self):
@@ -186,7 +186,13 @@ class Graph:
         """The sign of a series, constant between kinks."""
         if u not in self.kinks:
             self.kinks.append(u)
-        return self.constant(f"sign_{self.kinks.index(u)}")
+        return self.constant(f".sign_{self.kinks.index(u)}")
+
+    def timed(self, x, unit):
+        """x times a constant, which in a sum of series goes into their constants and costs nothing there."""
+        if x.kind == ADD and x.varies:
+            return self.add(*(self.timed(term, unit) for term in x.args))
+        return self.multiply(unit, x)
 
 
 def _is(x, number):

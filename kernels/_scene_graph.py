@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from kernels._expression import ADD, SCALED, Expression, Graph, SceneError
 
-RESERVED = ("side", "flips", "rtol", "status", "state", "signs", "parameters")
+RESERVED = ("side", "flips", "time", "interval", "rtol", "status")
+"""Names that a scene's states and parameters cannot have."""
 
 
 @dataclass(frozen=True)
@@ -13,11 +14,12 @@ class Recorded:
     """The expressions of a scene, in one graph.
 
     `events` are (offset, factor, u): each fires where offset + factor u falls through 0; the first is the switch, the
-    others are the kinks.
+    others are the kinks. `timed` are the rates per unit of time, an input ".unit" in seconds.
     """
 
     graph: Graph
     rates: tuple[Expression, ...]
+    timed: tuple[Expression, ...]
     surface: Expression
     switched: tuple[Expression, ...]
     started: tuple[Expression, ...]
@@ -36,9 +38,11 @@ def record(scene):
     switched = tuple(states.values())
     if scene.switch is not None:
         switched = _called(graph, scene.switch, states | known, len(states))
+    unit = graph.constant(".unit")
+    timed = tuple(graph.timed(rate, unit) for rate in rates)
     started = _called(graph, scene.start, known, len(states))
-    kinks = [(graph.of(0.0), graph.constant(f"sign_{j}"), u) for j, u in enumerate(graph.kinks)]
-    return Recorded(graph, rates, surface, switched, started, (_affine(graph, surface), *kinks))
+    kinks = [(graph.of(0.0), graph.constant(f".sign_{j}"), u) for j, u in enumerate(graph.kinks)]
+    return Recorded(graph, rates, timed, surface, switched, started, (_affine(graph, surface), *kinks))
 
 
 def _called(graph, function, named, length):

@@ -3,10 +3,12 @@
 The file lies in the folder of the kernels' own machine code (`_cache`), named by the scene and a digest of its text.
 """
 
+import builtins
 import functools
 import hashlib
 import importlib.util
 import os
+import re
 import sys
 import tempfile
 from pathlib import Path
@@ -17,8 +19,8 @@ from kernels import _cache
 from kernels._expression import DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, needed
 from kernels._jit import COMPILED, jit_call
 from kernels._scene_graph import record
-from kernels._taylor_leg import leg
-from kernels._taylor_pool import advance, shared
+from kernels._taylor_leg import LEG, leg
+from kernels._taylor_pool import BEGUN, EVENT, SETTLED, advance, shared
 from kernels._taylor_source import Lines
 from kernels._taylor_text import filled, listed
 
@@ -70,22 +72,33 @@ def series_{order}(state, side, signs, parameters, unit):
 '''
 
 
+_TAKEN = set(re.findall(r"\w+", "".join((HEAD, FUNCTION, SERIES, LEG, EVENT, BEGUN, SETTLED)))) | {"n", "p", "s"}
+_NUMBERED = re.compile(r"\w*_\d+|n\d+|(at|s|end|size|half|over|and_one|half_over)_\w*")
+
+
+def _apart(name):
+    """A name of a scene's as it is written: apart from those of the text itself."""
+    return f"{name}_" if name in _TAKEN or _NUMBERED.fullmatch(name) or hasattr(builtins, name) else name
+
+
 class Writer:
     """Writes the functions of a recorded scene."""
 
     def __init__(self, scene, recorded):
         self.scene, self.recorded = scene, recorded
         self.kinks = len(recorded.graph.kinks)
-        self.names = {n: n for n in (*scene.states, *scene.parameters, "side", "unit")}
-        self.names |= {f"sign_{j}": f"sign_{j}" for j in range(self.kinks)}
+        self.states, self.parameters = ([_apart(n) for n in names] for names in (scene.states, scene.parameters))
+        self.names = dict(zip((*scene.states, *scene.parameters), (*self.states, *self.parameters), strict=True))
+        self.names |= {"side": "side", ".unit": "unit"}
+        self.names |= {f".sign_{j}": f"sign_{j}" for j in range(self.kinks)}
         self.all_unpacked = self.unpacked("state", "signs", "parameters")
 
     def unpacked(self, *which):
         """Statements that give what the tuples hold its names."""
         held = {
-            "state": self.scene.states,
+            "state": self.states,
             "signs": [f"sign_{j}" for j in range(self.kinks)],
-            "parameters": self.scene.parameters,
+            "parameters": self.parameters,
         }
         return "\n".join(f"{listed(held[name])} = {name}" for name in which if held[name])
 
@@ -117,15 +130,13 @@ class Writer:
         def watch(product, *factors):
             lost.append(" & ".join([f"(magnitude({product}) < 1e-290)", *(f"(magnitude({a}) > 0.0)" for a in factors)]))
 
-        for node in needed(*self.recorded.rates, self.recorded.surface):
+        for node in needed(*self.recorded.timed, self.recorded.surface):
             if node.kind in (MUL, HALF_SQUARE, SCALED, DIV) and all(a.kind != NUMBER for a in node.args):
                 watch(lines.value(node), *(lines.value(x) for x in node.args))
-        for rate in self.recorded.rates:
-            watch(f"unit * {lines.value(rate)}", lines.value(rate))
         return filled(
             FUNCTION, name="underflows", doc="Whether a product of numbers other than 0 loses its digits.",
             arguments="state, side, signs, parameters, unit", unpack=self.all_unpacked, lines="\n".join(lines.text),
-            result=" | ".join(f"({text})" for text in lost),
+            result=" | ".join(f"({text})" for text in lost) or "unit < 0.0",
         )  # fmt: skip
 
     def offset(self):
@@ -135,7 +146,7 @@ class Writer:
 
     def series(self, order):
         recorded = self.recorded
-        lines = Lines(self.names, dict(zip(self.scene.states, recorded.rates, strict=True)))
+        lines = Lines(self.names, dict(zip(self.scene.states, recorded.timed, strict=True)))
         states = [lines.coefficients(recorded.graph.series(s), order) for s in self.scene.states]
         events = [
             f"({lines.value(offset)}, {lines.value(factor)}, {lines.coefficients(u, order)})"
@@ -161,11 +172,11 @@ class Writer:
             self.function("started", "The state at the start.", recorded.started, ("side", "parameters")),
             self.in_range(),
             self.series(2),
-            shared(scene, self.kinks),
+            shared(self.states, self.kinks),
         ]  # fmt: skip
         for order in ORDERS:
-            parts += [self.series(order), leg(scene.states, 1 + self.kinks, order)]
-            parts.append(advance(scene, self.kinks, order, self.offset()))
+            parts += [self.series(order), leg(self.states, 1 + self.kinks, order)]
+            parts.append(advance(self.states, self.parameters, self.kinks, order, self.offset()))
         return "\n".join(parts)
 
 

@@ -87,11 +87,12 @@ _function(slope, 2, lambda x, series: _number(x, *series), _lower_slope)
 
 @jit
 def natural_power(x, n):
-    """x^n for a natural number n known when compiled."""
-    product, square = 0.0 * x + 1.0, x
-    for _ in range(6):
+    """x^n for a natural number n > 0 known when compiled."""
+    product, square = x if n % 2 else 0.0 * x + 1.0, x * x
+    for _ in range(5):
+        n //= 2
         product = product * square if n % 2 else product
-        square, n = square * square, n // 2
+        square = square * square
     return product
 
 

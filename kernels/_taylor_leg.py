@@ -32,13 +32,13 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
     {no_now} = {nothings}
     {no_margins}
     stuck, lost, broken, grazing = nothing, nothing, nothing, nothing
+    power_h, allowed = natural_power(h, {order} - 1), SLACK * tolerance
     for step in range(STEP_LIMIT):
         {series_and_events} = series_{order}(({states}), side, signs, parameters, unit)
         {facts}
         left_out, over = {left_out}
-        new = next_step(h, left_out * natural_power(h, {order} - 1) / (tolerance * over), {order})
-        h = where(moving, new, h)
-        power_h, allowed = natural_power(h, {order} - 1), SLACK * tolerance
+        h = where(moving, next_step(h, left_out * power_h / (tolerance * over), {order}), h)
+        power_h = natural_power(h, {order} - 1)
         fine = {keeps}
         trial = h
         if step == 0:
@@ -106,14 +106,14 @@ if some(first):
         ),
         """\
 rate = factor * slope(part, series)
-bend = magnitude(factor) * (2.0 * magnitude(series[2]) + 2.0 * tail(part, series))
+bend = magnitude(factor) * fma(6.0 * part, magnitude(series[3]), 2.0 * magnitude(series[2]))
 blur = GRAZING * tolerance * (magnitude(offset) + magnitude(factor * series[0]))
 hangs = met & isnt(magnitude(rate) > blur / magnitude(rate) * bend)""",
     ]
     facts = [
         f"""\
 e_{j}, d_{j} = fma(factor_{j}, event_{j}[0], offset_{j}), factor_{j} * event_{j}[1]
-dd_{j}, a_{j} = factor_{j} * event_{j}[2], magnitude(factor_{j})"""
+dd_{j} = factor_{j} * event_{j}[2]"""
         for j in e
     ]
     start = [
@@ -127,7 +127,7 @@ now_{j} = (on_{j} < 0.5) & (e_{j} <= 0.0)"""
     ]
     judge = [
         f"""\
-rest_{j} = a_{j} * tail(trial, event_{j})
+rest_{j} = {"tail" if j else "magnitude(factor_0) * tail"}(trial, event_{j})
 clear_{j} = clear(e_{j}, d_{j}, dd_{j}, rest_{j}, trial, margin_{j})
 falls_{j} = falls(d_{j}, dd_{j}, rest_{j}, trial) | now_{j}"""
         for j in e

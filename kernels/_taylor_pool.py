@@ -17,7 +17,7 @@ def settled(state, side, parameters, unit):
     return ({signs}), ({on})
 '''
 
-ADVANCE = '''
+BEGUN = '''
 @jit
 def begun(parameters):
     """State, side, signs, unit, on, and whether the start is beyond the surface."""
@@ -64,8 +64,10 @@ def advance_{order}(memory, i):
         {size}
         interval, since = where(switches, since, interval), where(switches, 0.0, since)
         count = where(switches, count + 1.0, count)
-        faint = underflows(({states}), side, ({signs}), parameters, unit)
-        verdict = where(switches & faint, OUT_OF_RANGE, verdict)
+        watched = switches & ((count < 1.5) | (count >= flips))
+        if some(watched):
+            faint = underflows(({states}), side, ({signs}), parameters, unit)
+            verdict = where(watched & faint, OUT_OF_RANGE, verdict)
         left = surface(({states}), side, ({signs}), parameters)
         s = switched(({states}), side, ({signs}), parameters)
         side = where(switches, -side, side)
@@ -80,6 +82,8 @@ def advance_{order}(memory, i):
     done = active & (grazing | (verdict >= REFUSAL) | (count >= flips))
     stage = where(done, 3.0, where(active, 2.0, stage))
     {store}
+    if some(switches | done):
+        {store_rare}
     return some(done)
 
 
@@ -110,10 +114,10 @@ _STARTS = (
 )  # fmt: skip
 
 
-def shared(scene, kinks):
+def shared(states, kinks):
     """The text that does not depend on the order."""
     signs, e = [f"sign_{j}" for j in range(kinks)], range(1, 1 + kinks)
-    unpack = ", ".join([f"s_{s}" for s in scene.states] + [f"(offset_{j}, factor_{j}, event_{j})" for j in (0, *e)])
+    unpack = ", ".join([f"s_{s}" for s in states] + [f"(offset_{j}, factor_{j}, event_{j})" for j in (0, *e)])
     turn = [
         f"""\
 on_{j} = (event_{j}[0] <= 0.0) & (event_{j}[0] >= 0.0)
@@ -125,7 +129,7 @@ sign_{j - 1} = where(on_{j} & back, -sign_{j - 1}, sign_{j - 1})"""
     return filled(
         settled, signs=listed(signs), unpack=unpack, turn="\n".join(turn),
         on=listed(f"where(on_{j}, 1.0, 0.0)" for j in e),
-    ) + filled(ADVANCE, unpack=unpack, also_on=", ".join(f"on[{j - 1}]" for j in e))  # fmt: skip
+    ) + filled(BEGUN, unpack=unpack, also_on=", ".join(f"on[{j - 1}]" for j in e))  # fmt: skip
 
 
 SETTLED_EMPTY = '''
@@ -136,10 +140,10 @@ def settled(state, side, parameters, unit):
 '''
 
 
-def advance(scene, kinks, order, offset):
+def advance(states, parameters, kinks, order, offset):
     """The text of `advance_{order}` and `run_{order}`; `offset` is that of the surface, as text."""
-    states, signs, ons = scene.states, [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]
-    inputs = [*scene.parameters, "flips", "tolerance"]
+    signs, ons = [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]
+    inputs = [*parameters, "flips", "tolerance"]
     results = ["time", "interval", *(f"at_{s}" for s in states), *(f"size_{s}" for s in states)]
     results += ["steps", "before", "verdict"]
     work = [*states, "side", *signs, "unit", "h", *ons, "count", "since", "kinks_met"]
@@ -151,10 +155,11 @@ def advance(scene, kinks, order, offset):
     jump = [f"{s} = where(switches, s[{j}], {s})" for j, s in enumerate(states)]
     jump += [f"{s} = where(switches, g[{j}], {s})" for j, s in enumerate(signs)]
     jump += [f"{o} = where(switches, o[{j}], {o})" for j, o in enumerate(ons[1:])]
-    changed = ["stage", *results, *work]
+    rare = results[1:-3]
+    changed = ["stage", *(name for name in (*results, *work) if name not in rare)]
     return filled(
         EVENT, order=order, rows=len(rows), load="\n".join(f"{r} = memory[{j}][i]" for j, r in enumerate(rows)),
-        parameters=listed(scene.parameters), begin="\n".join(begin), states=listed(states), signs=listed(signs),
+        parameters=listed(parameters), begin="\n".join(begin), states=listed(states), signs=listed(signs),
         ons=listed(ons), land="\n".join(f"{s} = where(moving, new[{j}], {s})" for j, s in enumerate(states)),
         turn="\n".join(f"{s} = where(moving & ({o} > 0.5), -{s}, {s})" for s, o in zip(signs, ons[1:], strict=True)),
         nothing="\n".join(f"{r} = where(grazing, math.nan, {r})" for r in results[:-3]),
@@ -163,5 +168,6 @@ def advance(scene, kinks, order, offset):
             f"size_{s} = where(switches, fma(magnitude(rate[{j}]), since, magnitude({s})), size_{s})"
             for j, s in enumerate(states)
         ),
+        store_rare="\n".join(f"memory[{rows.index(r)}][i] = {r}" for r in rare),
         store="\n".join(f"memory[{rows.index(r)}][i] = {r}" for r in changed),
     )  # fmt: skip

@@ -15,6 +15,8 @@ LOW_ORDER, HIGH_ORDER = 14, 20
 HIGH_BELOW = 1e-10
 """Tolerance of a step from which on the higher order is the faster."""
 FINEST = 1e-17
+FEW = 3
+"""Switches after which a cell's steps between two of them are known well enough."""
 ROUGH, FINER = 2.0, 16.0
 APART = 8.0
 """How many rtol the two runs may differ by: the finer one is then right to rtol/2."""
@@ -43,13 +45,13 @@ def followed(module, columns, rtol, finer=1.0, together=False):
 
 
 def _dealt(run, inputs, results):
-    """Cells that take as many steps side by side: lanes wait less for each other. Two switches tell how many."""
+    """Cells that take as many steps side by side: lanes wait less for each other. A few switches tell how many."""
     n = inputs.shape[1]
-    if n <= 4 * LANES or not inputs[-2].max() > 8:
+    if n <= 4 * LANES or not inputs[-2].max() > 8 * FEW:
         run(inputs, results, False)
         return
     few = inputs.copy()
-    few[-2] = np.minimum(few[-2], 2)
+    few[-2] = np.minimum(few[-2], FEW)
     run(few, results, False)
     order = np.lexsort((results[-3], results[-2]))
     found = np.empty_like(results)

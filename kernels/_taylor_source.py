@@ -8,7 +8,7 @@ With u = sum u_k t^k, and u' = (k + 1) u_{k+1}:
     l = ln(u):    u_0 l_k = u_k - (1/k) sum_{0<j<k} j l_j u_{k-j}
     k sin(u)_k = sum_{j>0} j u_j cos(u)_{k-j},  k cos(u)_k = -sum_{j>0} j u_j sin(u)_{k-j}
     b = u^n:      k u_0 b_k = sum_{j>0} ((n + 1) j - k) u_j b_{k-j}                                      (1)
-and of a state, whose rate is r, with time in units: u_{k+1} = r_k unit/(k + 1).
+and of a state, whose rate is r: u_{k+1} = r_k/(k + 1).
 Source: Jorba & Zou, Exp. Math. 14:99 (2005), proposition 2.1. Sums are chains of multiply-adds (`dot`).
 """
 
@@ -28,7 +28,7 @@ class Lines:
 
     def __init__(self, names, rates=None):
         self.text = []
-        self._names, self._rates, self._known, self._units = names, rates or {}, {}, {}
+        self._names, self._rates, self._known = names, rates or {}, {}
 
     def value(self, x):
         """The name of an expression's value."""
@@ -59,9 +59,7 @@ class Lines:
 
     def _state(self, x, k):
         rate = self.coefficient(self._rates[x.args[0]], k - 1)
-        if k not in self._units:
-            self._units[k] = "unit" if k == 1 else self._named(f"unit_{k}", f"unit * {1.0 / k!r}")
-        return rate and self._named(f"{self._names[x.args[0]]}_{k}", f"{rate} * {self._units[k]}")
+        return rate and self._named(f"{self._names[x.args[0]]}_{k}", rate if k == 1 else f"{rate} * {1.0 / k!r}")
 
     def _add(self, x, k):
         u, w = x.args
@@ -80,14 +78,15 @@ class Lines:
 
     def _mul(self, x, k):
         u, w = x.args
-        return self._sum((self.coefficient(u, j), self.coefficient(w, k - j)) for j in range(k + 1))
+        return self._sum((self.coefficient(u, j), self.coefficient(w, k - j)) for j in _oldest_first(0, k, k))
 
     def _half_square(self, x, k):
         u = x.args[0]
-        pairs = [(self.coefficient(u, j), self.coefficient(u, k - j)) for j in range((k + 1) // 2)]
+        pairs = []
         if k % 2 == 0 and self.coefficient(u, k // 2):
             middle = self.coefficient(u, k // 2)
             pairs.append((self._named(f"half_{middle}", f"0.5 * {middle}"), middle))
+        pairs += [(self.coefficient(u, j), self.coefficient(u, k - j)) for j in reversed(range((k + 1) // 2))]
         return self._sum(pairs)
 
     def _div(self, x, k):
@@ -97,14 +96,14 @@ class Lines:
         over = self._once(w, "over", "1.0 / {}")
         if k == 0:
             return f"{self.value(u)} * {over}"
-        rest = self._sum((self.coefficient(w, j), self.coefficient(x, k - j)) for j in range(1, k + 1))
+        rest = self._sum((self.coefficient(w, j), self.coefficient(x, k - j)) for j in _oldest_first(1, k, k))
         return self._times(self._difference(self.coefficient(u, k), rest), over)
 
     def _sqrt(self, x, k):
         u = x.args[0]
         if k == 0:
             return f"sqrt({self.value(u)})"
-        own = self._sum((self.coefficient(x, j), self.coefficient(x, k - j)) for j in range(1, k))
+        own = self._sum((self.coefficient(x, j), self.coefficient(x, k - j)) for j in _oldest_first(1, k - 1, k))
         return self._times(self._difference(self.coefficient(u, k), own), self._once(x, "half_over", "0.5 / {}"))
 
     def _exp(self, x, k):
@@ -116,7 +115,7 @@ class Lines:
         u = x.args[0]
         if k == 0:
             return f"log({self.value(u)})"
-        own = self._sum((self._rate(x, j), self.coefficient(u, k - j)) for j in range(1, k))
+        own = self._sum((self._rate(x, j), self.coefficient(u, k - j)) for j in _oldest_first(1, k - 1, k))
         own = own and f"{own} * {1.0 / k!r}"
         return self._times(self._difference(self.coefficient(u, k), own), self._once(u, "over", "1.0 / {}"))
 
@@ -139,7 +138,7 @@ class Lines:
         if k == 0:
             return f"power({self.value(u)}, {self.value(n)})"
         rates = self._rate_sum(u, x, k)
-        plain = self._sum((self.coefficient(u, j), self.coefficient(x, k - j)) for j in range(1, k + 1))
+        plain = self._sum((self.coefficient(u, j), self.coefficient(x, k - j)) for j in _oldest_first(1, k, k))
         more = self._once(n, "and_one", "{} + 1.0")
         total = rates and f"fma({more} * {1.0 / k!r}, {rates}, -({plain}))"
         return self._times(total, self._once(u, "over", "1.0 / {}"))
@@ -168,7 +167,7 @@ class Lines:
 
     def _rate_sum(self, u, x, k):
         """sum over j > 0 of j u_j x_{k-j}."""
-        return self._sum((self._rate(u, j), self.coefficient(x, k - j)) for j in range(1, k + 1))
+        return self._sum((self._rate(u, j), self.coefficient(x, k - j)) for j in _oldest_first(1, k, k))
 
     @staticmethod
     def _sum(pairs):
@@ -186,3 +185,8 @@ class Lines:
     @staticmethod
     def _times(x, factor):
         return x and f"({x}) * {factor}"
+
+
+def _oldest_first(first, last, k):
+    """Indices j of u_j w_{k-j}: of coefficients long known first, so that no sum waits for the newest."""
+    return sorted(range(first, last + 1), key=lambda j: max(j, k - j))

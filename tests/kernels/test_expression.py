@@ -26,9 +26,9 @@ def coefficients(function, order=ORDER, **constants):
     # u' = r, r' = s, s' = 6/5: a cubic
     rates = {"u": rate, "r": inner, "s": graph.of(1.2)}
     signs = {f"sign_{j}": 1.0 for j in range(len(graph.kinks))}
-    lines = Lines({name: name for name in ("u", "r", "s", "unit", *named, *signs)}, rates)
+    lines = Lines({name: name for name in ("u", "r", "s", *named)} | {f".{name}": name for name in signs}, rates)
     last = lines.coefficients(result, order)
-    scope = {**PLAIN, **constants, **signs, "u": 0.7, "r": 1.0, "s": -1.0, "unit": 1.0}
+    scope = {**PLAIN, **constants, **signs, "u": 0.7, "r": 1.0, "s": -1.0}
     exec("\n".join(lines.text) + f"\nresult = {last}", scope)
     return [float(x) for x in scope["result"]]
 
