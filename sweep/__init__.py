@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from sweep.analysis import where_exponent as where_exponent
     from sweep.analysis import where_value as where_value
     from sweep.charts import plot as plot
+    from sweep.charts import plot_precision as plot_precision
     from sweep.customary import in_units as in_units
     from sweep.errors import StudyError as StudyError
     from sweep.errors import SweepError as SweepError
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from sweep.mapping import contours as contours
     from sweep.mapping import exponent_map as exponent_map
     from sweep.planning import plan as plan
+    from sweep.precision import work_precision as work_precision
     from sweep.refining import refine as refine
     from sweep.refining import study_of as study_of
     from sweep.regimes import fit_two_laws as fit_two_laws
@@ -51,6 +53,8 @@ _HOMES = {
     "rescaled": "scaling",
     "collapse_quality": "scaling",
     "plot": "charts",
+    "plot_precision": "charts",
+    "work_precision": "precision",
     "in_units": "customary",
     "contours": "mapping",
     "exponent_map": "mapping",

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -131,6 +132,57 @@ def plot(
     if path is not None:
         save(figure, path)
     return figure
+
+
+def plot_precision(found: xr.Dataset, path: str | os.PathLike[str] | None = None) -> Figure:
+    """Error against time per cell, median and worst cell, a line for each method through its tolerances.
+
+    Parameters
+    ----------
+    found : Dataset
+        From `work_precision`.
+    path : path, optional
+        Where to save it; .png, .svg or .pdf.
+
+    Raises
+    ------
+    SweepError
+        The file cannot be written.
+    """
+    with style():
+        figure = new_figure(PAGE, 92.0)
+        panels = figure.subplots(1, 2, sharex=True, sharey=True)
+        for axes, key, text in zip(panels, ("error_median", "error_worst"), ("median cell", "worst cell"), strict=True):
+            _draw_precision(axes, found, key)
+            axes.set_title(text)
+        panels[0].set_ylabel("relative error")
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
+        if found.attrs.get("omissions"):
+            text = "\n".join(textwrap.wrap(f"Omissions: {found.attrs['omissions']}", 170)[:8])
+            figure.supxlabel(text, fontsize=6, ha="left", x=0.02)
+    if path is not None:
+        save(figure, path)
+    return figure
+
+
+FLOOR = 1e-17
+"""Where errors of 0 are drawn."""
+
+
+def _draw_precision(axes: Any, found: xr.Dataset, key: str) -> None:
+    """Filled marks where all cells are solved, open ones where some are refused or said to be inaccurate."""
+    for i, name in enumerate(found["method"].values):
+        row = found.sel({"method": name})
+        seconds, error = row.seconds.values, np.maximum(row[key].values, FLOOR)
+        whole = (row.failed + row.inaccurate).values == 0
+        look = {"color": COLOURS[i % len(COLOURS)], "marker": MARKS[i % len(MARKS)], "markersize": 4}
+        axes.plot(seconds, error, linewidth=0.8, linestyle=DASHES[i % len(DASHES)], markevery=whole, label=name, **look)
+        axes.plot(seconds[~whole], error[~whole], linestyle="", **{**look, "markerfacecolor": "white"})
+        silent = row.silent.values > 0
+        axes.plot(seconds[silent], error[silent], "x", color="black", markersize=7)
+    if np.isfinite(found.attrs.get("reference_error", np.nan)):
+        axes.axhspan(FLOOR, max(found.attrs["reference_error"], FLOOR), color="0.9", linewidth=0)
+    axes.set(xscale="log", yscale="log", xlabel="time per cell on one core [s]", ylim=(FLOOR / 2, 10))
 
 
 @contextlib.contextmanager

@@ -109,6 +109,21 @@ def parser() -> argparse.ArgumentParser:
     _add_at(plot)
     _add_units(plot)
 
+    chart = _command(
+        commands, "chart", _chart, "error against time of every method of a kernel, on the cells of a study"
+    )
+    chart.add_argument("study", metavar="STUDY.toml", type=Path)
+    chart.add_argument(
+        "-o", "--output", metavar="FILE.png", type=Path, help="default: the study's name with _chart.png, here"
+    )
+    chart.add_argument("--methods", metavar="METHOD", nargs="+", help="default: auto and all that can do the study")
+    chart.add_argument("--rtol", metavar="RTOL", nargs="+", type=float, help="default: 1e-3 to 1e-13")
+    chart.add_argument("--cells", metavar="N", type=int, default=1024, help="of the study at most; default: 1024")
+    chart.add_argument(
+        "--reference", metavar="METHOD", help="taken for the truth; default: the one with the best bound"
+    )
+    _add_allow_import(chart)
+
     refine = _command(commands, "refine", _refine, "add cells to a result where it bends, until it can be interpolated")
     _add_result(refine)
     refine.add_argument("--y", metavar="OUTPUT", nargs="+", required=True)
@@ -227,6 +242,23 @@ def _plot(arguments: argparse.Namespace) -> None:
     output = arguments.output or Path(f"{arguments.result.stem}.png")
     with _result(arguments) as dataset:
         plot(_in_units(pick(dataset, arguments.at), arguments.unit), output, y=arguments.y, x=arguments.x)
+    print(output)
+
+
+def _chart(arguments: argparse.Namespace) -> None:
+    from sweep.charts import plot_precision
+    from sweep.precision import TOLERANCES, precision_text, work_precision
+
+    found = work_precision(
+        _study(arguments),
+        methods=arguments.methods,
+        tolerances=arguments.rtol or TOLERANCES,
+        cells=arguments.cells,
+        reference=arguments.reference,
+    )
+    output = arguments.output or Path(f"{arguments.study.stem}_chart.png")
+    print(precision_text(found))
+    plot_precision(found, output)
     print(output)
 
 

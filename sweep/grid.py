@@ -91,6 +91,12 @@ class Grid(Box):
             else:
                 self._fill(axis, start, out[k][: stop - start])
 
+    def values(self, name: str, cells: NDArray[np.int64]) -> Floats:
+        """An axis' values of some flat cells."""
+        axis = self.study.axes[name]
+        found: Floats = axis.values[cells // self._runs[name] % len(axis)]
+        return found
+
     def settings(self, start: int, stop: int) -> tuple[int | NDArray[np.int8], float | Floats]:
         """Method number (-1: auto) and rtol of the cells: one for all where they agree, else one per cell."""
         method: int | NDArray[np.int8] = self._fixed_method()

@@ -15,31 +15,34 @@ ONE: Mapping[str, float] = {}
 
 
 def sampled(study: Study, cells: int, factors: Mapping[str, float] = ONE) -> Study:
-    """At most so many cells, spread evenly over the grid, as a zip over every parameter; methods and rtol are dropped.
+    """At most so many cells, spread evenly over the grid, as a zip of the study's axes; methods and rtol are dropped.
 
     Parameters
     ----------
     factors : mapping of parameter or coordinate to number
         What its values are multiplied by.
     """
-    grid, lengths, fields = Grid(study), study.lengths, study.kernel.parameters
-    columns = [np.empty((1, *(lengths[d] for d in f.dims))) for f in fields]
-    for k, value in grid.constants().items():
-        columns[k][:] = value
+    grid = Grid(study)
     chosen = np.unique(np.linspace(0, grid.size - 1, min(cells, grid.size)).astype(np.int64))
-    rows: list[list[Any]] = []
-    for cell in chosen:
-        grid.columns(int(cell), int(cell) + 1, columns)
-        rows.append([column[0].copy() for column in columns])
-    axes = {
-        f.name: Axis(f.name, frozen(np.array([row[k] for row in rows]) * factors.get(f.name, 1.0)), "values")
-        for k, f in enumerate(fields)
-    }
+    known = {p.name for p in study.kernel.parameters}
+    swept = [name for name in study.axes if name in known]
+    axes = {name: _axis(name, grid.values(name, chosen), factors) for name in swept}
+    fixed = {name: _times(value, factors.get(name, 1.0)) for name, value in study.fixed.items()}
+    if not axes:  # only methods or rtol were swept
+        name = next(p.name for p in study.kernel.parameters if p.default is None)
+        axes = {name: _axis(name, np.array([study.fixed[name]]), factors)}
+        del fixed[name]
     along = {name: frozen(values * factors.get(name, 1.0)) for name, values in study.along.items()}
     method = "auto" if "method" in study.axes else study.method
-    return dataclasses.replace(
-        study, design="zip", axes=axes, fixed={}, follows={}, along=along, method=method, summary=None
-    )
+    return dataclasses.replace(study, design="zip", axes=axes, fixed=fixed, along=along, method=method, summary=None)
+
+
+def _axis(name: str, values: Any, factors: Mapping[str, float]) -> Axis:
+    return Axis(name, frozen(values * factors.get(name, 1.0)), "values")
+
+
+def _times(value: Any, factor: float) -> Any:
+    return frozen(value * factor) if np.ndim(value) else value * factor
 
 
 def solved(study: Study) -> tuple[dict[str, Any], Any, Any]:
