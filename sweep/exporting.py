@@ -16,6 +16,7 @@ import xarray as xr
 
 from sweep.checks import listed
 from sweep.errors import SweepError
+from sweep.flat import flat
 
 ROWS = 65536
 """Rows of csv in memory at a time."""
@@ -71,6 +72,7 @@ def export(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
 
 
 def _write_csv(dataset: xr.Dataset, path: Path) -> None:
+    dataset = flat(dataset)
     names = [str(name) for name in (*dataset.coords, *dataset.data_vars)]
     with path.open("w", newline="", encoding="utf-8") as file:
         _write_units(dataset, names, file)
@@ -84,6 +86,7 @@ def _write_parquet(dataset: xr.Dataset, path: Path) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    dataset = flat(dataset)
     names = [str(name) for name in (*dataset.coords, *dataset.data_vars)]
     fields = [pa.field(name, _arrow_type(dataset[name], pa), metadata=_text(dataset[name].attrs)) for name in names]
     schema = pa.schema(fields, metadata=_text(dataset.attrs))

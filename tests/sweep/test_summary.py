@@ -82,7 +82,9 @@ def agree(found, cells, over):
 
 
 @pytest.mark.parametrize("over", [["height", "v0"], ["height"], ["v0"]])
-def test_reductions_are_those_of_the_cells(over, tmp_path):
+@pytest.mark.parametrize("at_once", [8 << 20, 2000])
+def test_reductions_are_those_of_the_cells(over, at_once, tmp_path, monkeypatch):
+    monkeypatch.setattr("sweep.assemble.CHUNK_BYTES", at_once)
     cells = quiet(stone())
     found = quiet(stone(whole(over=over)))
     agree(found, cells, over)
@@ -345,3 +347,25 @@ def test_the_summary_is_part_of_the_study():
     assert list(stone(whole(over=["height"])).axes) == ["v0", "height"]
     assert sweep.build_study(kernel="toy:KERNEL", allow_import=True, axes={"height": [1.0]},
                              summary={"outputs": {"fall_time": ["min"]}}).outputs == ("fall_time",)  # fmt: skip
+
+
+def test_of_equal_extremes_the_first_cell_is_told():
+    """`rough` does not heed the speed: all cells of a height are equal, over many granules."""
+    speeds = np.arange(3000.0, 0.0, -1.0)
+    found = quiet(stone({}, axes={"height": [2.0], "v0": speeds}, method="rough", rtol=0.9))
+    assert granules(stone({}, axes={"height": [2.0], "v0": speeds})).per_group > 1
+    assert (found.fall_time_argmin_v0, found.fall_time_argmax_v0) == (3000.0, 3000.0)
+
+
+def test_a_summary_exports_as_a_table_of_the_kept_axes(tmp_path):
+    found = quiet(stone(whole(over=["v0"])))
+    lines = sweep.export(found, tmp_path / "out.csv").read_text().splitlines()
+    about = {line[2:].partition(":")[0]: line for line in lines if line.startswith("#")}
+    assert "0.1 to 1: cells in each bin" in about["fall_time_histogram_2 [1]"]
+    heading, *rows = [line.split(",") for line in lines if not line.startswith("#")]
+    assert len(rows) == len(HEIGHTS)
+    table = {name: [row[i] for row in rows] for i, name in enumerate(heading)}
+    assert table["cells_OK"] == ["0", "6", "6", "6", "0", "6", "6", "6", "6", "6"]
+    assert [float(x) for x in table["fall_time_min"]] == pytest.approx(found.fall_time_min.values, nan_ok=True)
+    assert table["fall_time_argmin_status"][:2] == ["PENDING", "OK"]
+    assert "cells_NEVER_STARTS" not in table
