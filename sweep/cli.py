@@ -80,6 +80,8 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument("--force", action="store_true", help="overwrite the result of another study")
     text = "of a result of the same study with fewer values on its axes, compute the new cells only"
     run.add_argument("--extend", action="store_true", help=text)
+    text = "compute on the workers of a dask scheduler, e.g. tcp://10.0.0.1:8786, instead of here"
+    run.add_argument("--cluster", metavar="ADDRESS", help=text)
     text = "stop within a block's time of it, exit status 0; the same command continues"
     run.add_argument("--until", metavar="07:00", help=text)
 
@@ -200,7 +202,7 @@ def _run(arguments: argparse.Namespace) -> None:
 
     output = arguments.output or Path(f"{arguments.study.stem}.h5")
     before = _mark(output)
-    options = {name: getattr(arguments, name) for name in ("workers", "force", "extend", "until")}
+    options = {name: getattr(arguments, name) for name in ("workers", "cluster", "force", "extend", "until")}
     with run(study, output, **options) as dataset:
         told = "done before; " if before is not None and _mark(output) == before else ""
         told = told if account(dataset).pending == 0 else "unfinished; "

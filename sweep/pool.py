@@ -1,4 +1,4 @@
-"""One pool of threads over many jobs, a few of them submitted at a time."""
+"""Many jobs through a pool of threads, or through workers elsewhere, a few of them submitted at a time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ TICK = 0.2
 """Seconds after which progress is told even if nothing has finished."""
 
 T = TypeVar("T")
-Jobs = dict["Future[None]", int]
+J = TypeVar("J")
+R = TypeVar("R")
 
 
 def cores() -> int:
@@ -82,31 +83,56 @@ def each(
     ----------
     finished : called in this thread with each job that is done, and with None now and then
     """
-    waiting: Jobs = {}
     with CtrlC() as ctrl_c, ThreadPoolExecutor(threads) as pool:
-        try:
-            for job in jobs:
-                waiting[pool.submit(work, job)] = job
-                while len(waiting) >= 2 * threads:
-                    _settle(waiting, finished)
-                    ctrl_c.check()
-            while waiting:
-                _settle(waiting, finished)
-                ctrl_c.check()
-        except BaseException:
+
+        def stop() -> None:
             if halt is not None:
                 halt.set()
             pool.shutdown(wait=True, cancel_futures=True)
-            raise
+
+        def settled(job: int | None, future: Future[None] | None) -> None:
+            if future is not None:
+                future.result()
+            finished(job)
+
+        through(jobs, lambda job: pool.submit(work, job), lambda: 2 * threads, settled, stop, ctrl_c)
 
 
-def _settle(waiting: Jobs, finished: Callable[[int | None], None]) -> None:
+def through(
+    jobs: Iterable[J],
+    submit: Callable[[J], Future[R]],
+    room: Callable[[], int],
+    settled: Callable[[J | None, Future[R] | None], None],
+    stop: Callable[[], None],
+    ctrl_c: CtrlC,
+) -> None:
+    """Submits every job, no more than `room()` at a time; the same for threads and for workers elsewhere.
+
+    Parameters
+    ----------
+    settled : called in this thread with each job that has ended and its future, and with None now and then
+    stop : called where it raises, and after Ctrl-C or SIGTERM, before the fault goes on
+    """
+    waiting: dict[Future[R], J] = {}
+    try:
+        for job in jobs:
+            waiting[submit(job)] = job
+            while len(waiting) >= room():
+                _settle(waiting, settled)
+                ctrl_c.check()
+        while waiting:
+            _settle(waiting, settled)
+            ctrl_c.check()
+    except BaseException:
+        stop()
+        raise
+
+
+def _settle(waiting: dict[Future[R], J], settled: Callable[[J | None, Future[R] | None], None]) -> None:
     done, _ = wait(waiting, timeout=TICK, return_when=FIRST_COMPLETED)
     for future in done:
-        job = waiting.pop(future)
-        future.result()
-        finished(job)
-    finished(None)
+        settled(waiting.pop(future), future)
+    settled(None, None)
 
 
 class Terminated(SystemExit):

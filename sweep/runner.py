@@ -5,13 +5,14 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from sweep.assemble import assemble
+from sweep.cluster import Cluster, joined
 from sweep.contents import gathered, part_columns
 from sweep.errors import SweepError
 from sweep.extending import Given, Known, obstacle
@@ -26,7 +27,6 @@ from sweep.until import TimeUp, deadline
 if TYPE_CHECKING:
     import xarray as xr
 
-    from sweep.blocks import Partition
     from sweep.store import Spec
     from sweep.study import Study
 
@@ -44,6 +44,7 @@ def run(
     block_cells: int | None = None,
     extend: bool = False,
     until: str | datetime | None = None,
+    cluster: Any = None,
 ) -> xr.Dataset:
     """Computes every cell of a study. The same study gives the same bits, however it is cut and continued.
 
@@ -66,6 +67,9 @@ def run(
         new cells only; the output is replaced when all are there.
     until : str or datetime, optional
         Stop within a block's time of "07:00" or "2027-01-31 07:00"; what there is by then is returned.
+    cluster : str or distributed.Client, optional
+        Compute on the workers of this dask scheduler ("tcp://10.0.0.1:8786", or a scheduler file) instead of here.
+        Workers that see the folder of the output write there; others send their numbers.
 
     Raises
     ------
@@ -77,7 +81,10 @@ def run(
     """
     cells = None if block_cells is None else whole_number("block_cells", block_cells)
     crew = cores() if workers is None else whole_number("workers", workers)
-    task = _Task(study, fingerprint(study), crew, stream_of(progress), cells, force, extend, deadline(until))
+    if cluster is not None and workers is not None:
+        raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
+    stream = stream_of(progress)
+    task = _Task(study, fingerprint(study), crew, stream, cells, force, extend, deadline(until), cluster=cluster)
     if path is None and until is not None:
         raise SweepError("until: give a path as well, or what is computed by then would be lost")
     if path is None:
@@ -118,10 +125,23 @@ class _Task:
     extend: bool
     until: datetime | None
     given: Given | None = None
+    cluster: Any = None
 
 
 def _run_in_memory(task: _Task) -> xr.Dataset:
-    session = Session(task.study, task.mark, task.workers, block_cells=task.block_cells)
+    with joined(task.cluster) as cluster:
+        _wait(cluster, task, task.study.title or "sweep")
+        return _compute_in_memory(task, cluster)
+
+
+def _wait(cluster: Cluster | None, task: _Task, name: str) -> None:
+    """Until the cluster has a worker."""
+    if cluster is not None:
+        cluster.wait(Progress(1, task.stream, name).note, task.until)
+
+
+def _compute_in_memory(task: _Task, cluster: Cluster | None) -> xr.Dataset:
+    session = Session(task.study, task.mark, task.workers, block_cells=task.block_cells, cluster=cluster)
     rows = session.granules.count
     needed = rows * session.row_bytes
     if needed > memory():
@@ -132,10 +152,19 @@ def _run_in_memory(task: _Task) -> xr.Dataset:
         start, stop = session.blocks.bounds(job)
         solve(start, stop, {name: array[start:stop] for name, array in arrays.items()})
 
+    def receive(job: int, found: str | Mapping[str, Any]) -> None:
+        assert not isinstance(found, str)
+        start, stop = session.blocks.bounds(job)
+        for name, array in arrays.items():
+            array[start:stop] = found[name]
+
     jobs = range(session.blocks.count)
     progress = session.progress(task.stream, task.study.title or "sweep", jobs)
     try:
-        session.compute(jobs, min(task.workers, len(jobs)), work, progress)
+        if cluster is not None:
+            session.compute_elsewhere(jobs, receive, progress, None)
+        else:
+            session.compute(jobs, min(task.workers, len(jobs)), work, progress)
         progress.end()
     finally:
         progress.stop()
@@ -155,15 +184,24 @@ def _run_to_file(task: _Task, output: Path) -> bool:
         blocks = None if store.spec is None else store.blocks
         all_there = store.spec is not None and not store.missing()
         known = None if all_there else _known(task, output)
-        with known or contextlib.nullcontext():
-            return _run_session(task, store, output, blocks, known, all_there)
+        with known or contextlib.nullcontext(), joined(None if all_there else task.cluster) as cluster:
+            _wait(cluster, task, output.name)
+            session = Session(
+                task.study,
+                task.mark,
+                task.workers,
+                blocks,
+                task.block_cells,
+                not all_there,
+                known,
+                task.until,
+                cluster,
+            )
+            return _run_session(task, session, store, output)
 
 
-def _run_session(
-    task: _Task, store: Store, output: Path, blocks: Partition | None, known: Known | Given | None, all_there: bool
-) -> bool:
+def _run_session(task: _Task, session: Session, store: Store, output: Path) -> bool:
     """Computes and puts together what is missing; False where the time was up before the end."""
-    session = Session(task.study, task.mark, task.workers, blocks, task.block_cells, not all_there, known, task.until)
     jobs = range(session.blocks.count) if store.spec is None else store.missing()
     progress = session.progress(task.stream, output.name, jobs)
     _check_space(session, output, progress)
@@ -264,6 +302,9 @@ def _store_blocks(session: Session, store: Store, progress: Progress) -> None:
     jobs = store.missing()
     if not jobs:
         return
+    if session.cluster is not None:
+        _store_elsewhere(session, store, jobs, progress)
+        return
     # twice as many threads as cores: some wait for the disk while the others compute
     threads = min(2 * session.workers, len(jobs))
     cells = min(store.blocks.cells, store.blocks.size)
@@ -277,6 +318,19 @@ def _store_blocks(session: Session, store: Store, progress: Progress) -> None:
                 store.put(job, arrays)
 
     session.compute(jobs, threads, work, progress)
+
+
+def _store_elsewhere(session: Session, store: Store, jobs: Sequence[int], progress: Progress) -> None:
+    """Blocks that workers of a cluster compute, and write themselves where they can."""
+
+    def receive(job: int, found: str | Mapping[str, Any]) -> None:
+        if isinstance(found, str):
+            store.take(job, found)
+        else:
+            store.put(job, found)
+
+    session.compute_elsewhere(jobs, receive, progress, store.open_door())
+    store.close_doors()
 
 
 def _check_space(session: Session, output: Path, progress: Progress) -> None:

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from sweep.blocks import UNSAMPLED, Partition, Sample, order, row_partition, take_sample
@@ -20,11 +21,15 @@ from sweep.reducing import Reducer
 from sweep.until import TimeUp, passed
 
 if TYPE_CHECKING:
+    from sweep.cluster import Cluster
     from sweep.extending import Given, Known
     from sweep.study import Study
 
 Solve = Callable[[int, int, Mapping[str, Any]], bool]
 """Computes the rows start .. stop into columns of that length; False where the run is being stopped."""
+
+Receive = Callable[[int, "str | Mapping[str, Any]"], None]
+"""Takes a block that was computed elsewhere: the name of its part, or its numbers."""
 
 
 class Session:
@@ -40,6 +45,7 @@ class Session:
     sampled : False where nothing is left to compute
     known : cells that need not be computed
     until : when to stop
+    cluster : workers elsewhere, which compute instead of this process
     """
 
     def __init__(
@@ -52,8 +58,10 @@ class Session:
         sampled: bool = True,
         known: Known | Given | None = None,
         until: datetime | None = None,
+        cluster: Cluster | None = None,
     ) -> None:
-        self.study, self.workers, self.known, self.until = study, workers, known, until
+        self.study, self.mark, self.workers, self.known, self.until = study, mark, workers, known, until
+        self.cluster = cluster
         self.began = now()
         self.layout: Layout = contents(study, mark)
         self.columns = part_columns(study)
@@ -61,7 +69,8 @@ class Session:
         self.sample: Sample = sampled_study(study) if sampled else UNSAMPLED
         if blocks is None and block_cells is not None:
             blocks = Partition(grains.count, min(math.ceil(block_cells / grains.mean), grains.count))
-        self.blocks = blocks or row_partition(self.sample, grains, self.row_bytes, workers)
+        crew = cluster.threads if cluster is not None else 0
+        self.blocks = blocks or row_partition(self.sample, grains, self.row_bytes, crew or workers)
         self._weights = self.sample.weights(self.blocks, grains.first)
 
     @property
@@ -103,17 +112,42 @@ class Session:
             with faults_told(f"cells {start} to {stop}: the kernel failed"), solvers.lent() as solve:
                 work(job, solve)
 
-        def finished(job: int | None) -> None:
-            if job is None:
-                progress.tick()
-            else:
-                start, stop = self.cells(job)
-                progress.add(stop - start, float(self._weights[job]))
-            self.check_time()
+        each(self._inorder(jobs), guarded, threads, lambda job: self._tell(progress, job), halt)
 
+    def compute_elsewhere(
+        self,
+        jobs: Iterable[int],
+        receive: Receive,
+        progress: Progress,
+        door: Path | None,
+    ) -> None:
+        """The same on the workers of a cluster: calls `receive` with every block and its part's name, or its numbers.
+
+        Parameters
+        ----------
+        door : the way to the folder of the parts; None: all numbers are wanted here
+        """
+        self.check_time()
+
+        def finished(job: int | None) -> None:
+            self._tell(progress, job)
+
+        assert self.cluster is not None
+        self.cluster.compute(self, self._inorder(jobs), receive, finished, progress.note, door)
+
+    def _inorder(self, jobs: Iterable[int]) -> Iterator[int]:
         wanted = set(jobs)
         inorder = map(int, order(self.sample, self.blocks, self.granules.first))
-        each((j for j in inorder if j in wanted), guarded, threads, finished, halt)
+        return (job for job in inorder if job in wanted)
+
+    def _tell(self, progress: Progress, job: int | None) -> None:
+        """Counts a block that is done. Raises TimeUp."""
+        if job is None:
+            progress.tick()
+        else:
+            start, stop = self.cells(job)
+            progress.add(stop - start, float(self._weights[job]))
+        self.check_time()
 
     def check_time(self) -> None:
         """Raises TimeUp when it is time to stop."""
@@ -121,21 +155,28 @@ class Session:
             raise TimeUp
 
     def _solver(self, halt: Halt) -> Solve:
-        compute = _cells_solver(self.study, self.known) if self.study.summary is None else Reducer(self.study).solve
-        return lambda start, stop, arrays: halt.compute(lambda: compute(start, stop, arrays))
+        compute, known = block_solver(self.study), self.known
+
+        def solve(start: int, stop: int, arrays: Mapping[str, Any]) -> None:
+            compute(start, stop, arrays, None if known is None else known.missing(start, stop))
+            if known is not None:
+                known.fill(start, stop, arrays)
+
+        return lambda start, stop, arrays: halt.compute(lambda: solve(start, stop, arrays))
 
 
-def _cells_solver(study: Study, known: Known | Given | None) -> Callable[[int, int, Any], None]:
+def block_solver(study: Study) -> Callable[[int, int, Mapping[str, Any], Any], None]:
+    """Computes rows into the columns of a part; of cells, only those wanted (None: all). For one thread at a time."""
+    if study.summary is not None:
+        reducer = Reducer(study)
+        return lambda start, stop, arrays, wanted: reducer.solve(start, stop, arrays)
     from sweep.solve import Solver
 
     solver = Solver(study)
 
-    def solve(start: int, stop: int, arrays: Mapping[str, Any]) -> None:
+    def solve(start: int, stop: int, arrays: Mapping[str, Any], wanted: Any) -> None:
         outputs = {name: array for name, array in arrays.items() if name not in (STATUS, METHOD_USED)}
-        wanted = None if known is None else known.missing(start, stop)
         solver.solve(start, stop, outputs, arrays[STATUS], arrays[METHOD_USED], wanted)
-        if known is not None:
-            known.fill(start, stop, arrays)
 
     return solve
 

@@ -3,6 +3,7 @@
     spec.json                      the study, its fingerprint, and how the grid is cut into blocks
     lock                           held while a sweep runs; the system frees it when the process ends
     <start>-<stop>.<digest>.h5     one block: a small HDF5 file that is written once, or not at all
+    workers.<run>.tmp/             files that workers of a cluster are writing; without it they cannot
 
 A block counts as done when its file bears this name. The digest (xxh3, 128 bits) is of its numbers, in the order of
 the columns: a block computed twice has the same name, and a damaged file is known from its name.
@@ -14,6 +15,7 @@ import contextlib
 import json
 import os
 import secrets
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -30,6 +32,7 @@ from sweep.parts import PART_NAME, digest, part_name, read_part
 FORMAT = 1
 SPEC = "spec.json"
 LOCK = "lock"
+DOOR = "workers"
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,15 @@ class Store:
         self.names: dict[int, str] = {}
         self.run = secrets.token_hex(4)
         self._images = Images(columns)
+        self._scratch = folder
+
+    @classmethod
+    def through(cls, door: Path, columns: Sequence[Column], blocks: Partition) -> Store:
+        """The store of a process that writes parts for the one that has made the door, and has the lock."""
+        store = cls(door.parent, columns)
+        store._scratch = door
+        store.spec = Spec("", {}, blocks, "")
+        return store
 
     @property
     def blocks(self) -> Partition:
@@ -150,14 +162,43 @@ class Store:
 
     def temporary(self, name: str) -> Path:
         """A name for a file that is not whole yet."""
-        return self.folder / f"{name}.{self.run}.tmp"
+        return self._scratch / f"{name}.{self.run}.tmp"
+
+    def open_door(self) -> Path:
+        """A folder in which processes elsewhere make files that become parts. Raises SweepError."""
+        door = self.folder / f"{DOOR}.{self.run}.tmp"
+        self.close_doors()
+        try:
+            disk.make_folder(door)
+        except OSError as fault:
+            raise disk.refusal(fault, door) from fault
+        return door
+
+    def close_doors(self) -> None:
+        """From now on nobody else brings a part, however late: what was begun has lost its place. Raises SweepError."""
+        for door in self.folder.glob(f"{DOOR}.*.tmp"):
+            # renamed, it is gone for everybody in one step; what is in it goes then
+            try:
+                disk.rename(door, door.with_name(f"closed.{secrets.token_hex(4)}.tmp"))
+            except OSError as fault:
+                raise disk.refusal(fault, door) from fault
+        for closed in self.folder.glob("closed.*.tmp"):
+            shutil.rmtree(closed, ignore_errors=True)
+
+    def take(self, index: int, name: str) -> None:
+        """Counts a block as done whose part another process has written. Raises SweepError."""
+        match = PART_NAME.fullmatch(name)
+        if match is None or (int(match[1]), int(match[2])) != self.blocks.bounds(index):
+            raise SweepError(f"{self.folder}: a worker has written something else than it was asked for")
+        self.names[index] = name
 
     def clear(self) -> None:
         """Removes what a sweep writes, the spec last, so that a removal cut short leaves a store. Raises SweepError."""
         try:
+            self.close_doors()
             for path in list(self.folder.iterdir()):
                 if PART_NAME.fullmatch(path.name) or path.suffix in (".tmp", ".damaged"):
-                    disk.remove(path)
+                    _remove(path)
             disk.remove(self.folder / SPEC)
         except OSError as fault:
             raise disk.refusal(fault, self.folder) from fault
@@ -168,9 +209,10 @@ class Store:
         return 0 if self.spec else sum(bool(PART_NAME.fullmatch(path.name)) for path in self.folder.iterdir())
 
     def _sort_out(self) -> None:
+        self.close_doors()
         for entry in list(os.scandir(self.folder)):
             if entry.name.endswith(".tmp"):
-                disk.remove(Path(entry.path))
+                _remove(Path(entry.path))
             elif match := PART_NAME.fullmatch(entry.name):
                 self._take_up(entry, int(match[1]), int(match[2]))
 
@@ -242,6 +284,14 @@ def _remove_folder(folder: Path) -> None:
     with contextlib.suppress(OSError):
         disk.remove(folder / LOCK)
         folder.rmdir()
+
+
+def _remove(path: Path) -> None:
+    """Removes a file; a folder, of workers who are gone, as far as that goes."""
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        disk.remove(path)
 
 
 def _set_aside(path: Path) -> Path:
