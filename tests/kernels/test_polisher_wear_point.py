@@ -70,7 +70,7 @@ AWKWARD = {
 
 @pytest.mark.parametrize("name", list(AWKWARD) if COMPILED else ["round tool"])
 def test_wear_is_that_of_the_way_within_its_stated_error(name):
-    changed = AWKWARD[name] if COMPILED else AWKWARD[name] | {"tau": 1.5}
+    changed = AWKWARD[name] if COMPILED else AWKWARD[name] | {"tau": 1.5, "theta0": -1.0}
     value, error, status = wear(**changed)
     exact = truth(**changed)
     assert status[0] in (Status.OK, Status.DOUBLE_CRANK)
