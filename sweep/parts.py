@@ -22,6 +22,8 @@ from sweep.errors import SweepError
 from sweep.image import Images
 from sweep.layout import METHOD_USED, STATUS, Column
 
+AT_ONCE = 64
+"""Parts that one thread reads before it asks for more."""
 READERS = 8
 """Parts read at a time: small files wait for the disk most of the time."""
 MOST_FLAGS = 1 << 28
@@ -101,6 +103,22 @@ def _read(
     return arrays
 
 
+def _read_flags(path: Path, images: Images, start: int, stop: int) -> dict[str, Any] | None:
+    """Statuses and methods of a part as long as this program writes it, in as few calls as can be; None of others."""
+    cells = stop - start
+    frame = images.frame(cells)
+    places = {name: frame.places[name] for name in FLAGS}
+    first = min(places.values())
+    fd = disk.open_file(path, os.O_RDONLY)
+    try:
+        if os.fstat(fd).st_size != frame.size:
+            return None
+        found = os.pread(fd, max(places.values()) + cells - first, first)
+    finally:
+        os.close(fd)
+    return {name: np.frombuffer(found, np.int8, cells, place - first) for name, place in places.items()}
+
+
 def _places(fd: int, images: Images, start: int, stop: int) -> Mapping[str, int] | None:
     """Where each column begins, in a file that begins as this program writes it; None in any other."""
     frame, head = images.frame(stop - start), images.head(start, stop)
@@ -140,15 +158,15 @@ class Parts:
         cuts = [0, *(np.flatnonzero(np.diff(blocks)) + 1).tolist(), len(cells)]
         pieces = [(low, high) for low, high in itertools.pairwise(cuts) if int(blocks[low]) in self._paths]
 
-        def fill(piece: tuple[int, int]) -> None:
-            wanted = slice(*piece)
-            index = int(blocks[piece[0]])
-            found = self._column(index, column)
-            if found is not None:
-                out[wanted] = found[cells[wanted] - self.blocks.bounds(index)[0]]
+        def fill(some: list[tuple[int, int]]) -> None:
+            for low, high in some:
+                index = int(blocks[low])
+                found = self._column(index, column)
+                if found is not None:
+                    out[low:high] = found[cells[low:high] - self.blocks.bounds(index)[0]]
 
         with ThreadPoolExecutor(READERS) as pool:
-            list(pool.map(fill, pieces))
+            list(pool.map(fill, (pieces[i : i + AT_ONCE] for i in range(0, len(pieces), AT_ONCE))))
         return out
 
     def _column(self, index: int, column: Column) -> Any:
@@ -174,8 +192,11 @@ class Parts:
         kept = self._flags.pop((index, name), None)
         if kept is not None:
             return kept
-        flags = [c for c in self.images.columns if c.name in FLAGS]
-        found = _read(self._paths[index], self.images, *self.blocks.bounds(index), flags, keep=True)
+        start, stop = self.blocks.bounds(index)
+        found = _read_flags(self._paths[index], self.images, start, stop)
+        if found is None:
+            flags = [c for c in self.images.columns if c.name in FLAGS]
+            found = _read(self._paths[index], self.images, start, stop, flags, keep=True)
         if found is None:
             return None
         if self.blocks.size <= MOST_FLAGS:
