@@ -39,8 +39,8 @@ from kernels._lanes import choose, dot, exponent, fma, horner, isnt, magnitude, 
 from kernels._refill import LANES, align_stack, each_refilled
 from kernels._scene_module import kept
 from kernels._taylor import (
-    GRAZING, HALVINGS, SLACK, STEP_LIMIT, clear, falls, keeps, last_term, natural_power, next_step, root, size, slope,
-    tail, worse,
+    GRAZING, HALVINGS, LONGEST, SLACK, STEP_LIMIT, clear, falls, keeps, last_term, natural_power, next_step, root, size,
+    slope, tail, worse,
 )
 from kernels._taylor_pool import KINK_LIMIT, time_unit
 from kernels._vecmath import exp, is_normal, log, power, sincos

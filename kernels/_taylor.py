@@ -36,6 +36,8 @@ SLACK = 4.0
 """By how much the estimated error of a step may exceed its tolerance."""
 LARGEST = 5.0
 """log2 of the factor by which a step may change."""
+LONGEST = 8.0
+"""First guess of a step, at most, over the time of the last motion between events."""
 WIDER = 4.0 / 3.0
 GRAZING = 16.0
 
@@ -168,9 +170,9 @@ def clear(e, d, dd, rest, h, margin):
 def root(offset, factor, series, h, tolerance, searching):
     """Where offset + factor u(t) falls through 0 in (0, h], given that it falls all along: Newton within a bracket.
 
-    Newton's last step is as small, over h, as the root of what is left out: the error behind it is the square.
+    Newton's next step is about change^3/before^2; it ends where that is far below what the series leave out.
     """
-    enough = (0.001 * tolerance + 1e-18) * h * h
+    before, enough = 0.0 * h, 0.001 * tolerance + 1e-17
     low, high = 0.0 * h, h
     e, d, dd = fma(factor, series[0], offset), factor * series[1], factor * series[2]
     t = first_guess(e, d, dd, h)
@@ -183,7 +185,8 @@ def root(offset, factor, series, h, tolerance, searching):
         new = where((new >= low) & (new <= high), new, 0.5 * (low + high))
         change = magnitude(new - t)
         t = where(searching, new, t)
-        searching = searching & isnt(change * change <= enough)
+        searching = searching & isnt((change * change) * change <= enough * t * (before * before))
+        before = change
     return t
 
 

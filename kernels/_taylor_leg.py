@@ -75,7 +75,9 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
     met = active & isnt(lost | stuck | broken | grazing)
     {roots}
     {at_root}
-    return ({final}), where(met, t + part, t), h, ({fired}), stuck, lost, broken, grazing, hangs, tried
+    t = where(met, t + part, t)
+    h = where(met & (t > 0.0) & (h > LONGEST * t), LONGEST * t, h)
+    return ({final}), t, h, ({fired}), stuck, lost, broken, grazing, hangs, tried
 '''
 
 

@@ -22,7 +22,8 @@ BEGUN = '''
 def begun(parameters):
     """State, side, signs, unit, on, and whether the start is beyond the surface."""
     side = 0.0 * parameters[0] + 1.0
-    state = started(side, parameters)
+    {states} = started(side, parameters)
+    state = ({lasting})
     one = 0.0 * side + 1.0
     signs, on = settled(state, side, parameters, one)
     {unpack} = series_2(state, side, signs, parameters, one)
@@ -129,7 +130,10 @@ sign_{j - 1} = where(on_{j} & back, -sign_{j - 1}, sign_{j - 1})"""
     return filled(
         settled, signs=listed(signs), unpack=unpack, turn="\n".join(turn),
         on=listed(f"where(on_{j}, 1.0, 0.0)" for j in e),
-    ) + filled(BEGUN, unpack=unpack, also_on=", ".join(f"on[{j - 1}]" for j in e))  # fmt: skip
+    ) + filled(
+        BEGUN, states=listed(states), lasting=listed(f"{s} + 0.0 * side" for s in states), unpack=unpack,
+        also_on=", ".join(f"on[{j - 1}]" for j in e),
+    )  # fmt: skip
 
 
 SETTLED_EMPTY = '''

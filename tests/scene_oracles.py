@@ -1,6 +1,6 @@
 """Motions from switch to switch in 50 digits, by closed forms; imports nothing of ours."""
 
-from mpmath import atanh, cosh, findroot, log, mp, mpf, re, sqrt, tanh
+from mpmath import atanh, cosh, log, mp, mpf, re, sqrt, tanh
 
 
 def _leg(v0, force, a, c):
@@ -17,6 +17,18 @@ def _leg(v0, force, a, c):
     return speed, way, k, phase, shift
 
 
+def _reached(way, speed, to_go, t):
+    """When the way, convex as the motion speeds up, comes to `to_go`: Newton from behind it."""
+    while way(t) < to_go:
+        t *= 2
+    for _ in range(500):
+        step = (way(t) - to_go) / speed(t)
+        t -= step
+        if abs(step) < t * mpf(10) ** (10 - mp.dps):
+            return t
+    raise AssertionError("no root")
+
+
 def quadratic_foliot(mu, phi0, a, c, flips, digits=40):
     """Time of the last of `flips` switches from rest at 0, and the speed before it: v' = +-mu - a v - c v abs(v)."""
     with mp.workdps(digits):
@@ -31,8 +43,6 @@ def quadratic_foliot(mu, phi0, a, c, flips, digits=40):
                 time, x = time + turn, phi0 + way(turn)
             to_go = x + phi0 if flip else phi0
             v, way, k, *_ = _leg(mpf(0), mu, a, c)
-            guess = sqrt(2 * to_go / mu) * (1 + a * sqrt(to_go / mu) / 3) + c * to_go / abs(k) / 2
-            t = findroot(lambda t, way=way, to_go=to_go: way(t) - to_go, guess)
-            assert abs(way(t) - to_go) < mpf(10) ** (6 - digits) * to_go
+            t = _reached(way, v, to_go, sqrt(2 * to_go / mu))
             time, speed = time + t, v(t)
         return time, speed

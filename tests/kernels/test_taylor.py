@@ -171,3 +171,23 @@ def test_the_bound_of_a_tail_is_one():
         h = random.uniform(0.1, 1.5)
         exact = mpmath.fsum(k * abs(series[k]) * h ** (k - 2) for k in range(3, 15))
         assert _taylor.tail(h, series) >= exact
+
+
+@pytest.mark.parametrize("flips", [1.0, 2.0, 12.0])
+def test_a_switch_is_found_to_the_last_digits_however_long_the_steps(flips):
+    if not COMPILED:
+        flips = min(flips, 2.0)
+    outputs, status = solve(RICH, "taylor_once", [7.5e-4, 1.0, 3.0], [1e30, 1.0, 1e-6], flips=flips, rtol=1e-8)
+    assert (status == Status.OK).all()
+    np.testing.assert_allclose(abs(outputs["angle"]), [1e30, 1.0, 1e-6], rtol=1e-11)
+
+
+def test_over_decades_of_cells_what_is_not_remarked_is_right():
+    mu, phi0, a, c = drags(400 if COMPILED else 4, decades=5.0)
+    outputs, status = solve(RICH, "taylor", mu, phi0, a, c, flips=5.0, rtol=1e-8)
+    fine = np.flatnonzero(status == Status.OK)
+    assert len(fine) > 0.3 * len(status)
+    for i in fine[:: 10 if COMPILED else 1]:
+        time, speed = oracles.quadratic_foliot(mu[i], phi0[i], a[i], c[i], 5, digits=70)
+        assert relative_error(outputs["time"][[i]], [time])[0] < 1e-8
+        assert relative_error(abs(outputs["speed"][[i]]), [speed])[0] < 1e-8
