@@ -108,7 +108,10 @@ def test_an_unfinished_extension_returns_what_there_is_of_the_new_one(tmp_path):
 
 
 @settings(max_examples=20, deadline=None)
-@given(codes=st.lists(st.sampled_from([*map(int, Status), 33, 100, -5, -1, -128]), min_size=1, max_size=60), summed=st.booleans())
+@given(
+    codes=st.lists(st.sampled_from([*map(int, Status), 33, 100, -5, -1, -128]), min_size=1, max_size=60),
+    summed=st.booleans(),
+)
 def test_every_cell_is_in_the_account_once(codes, summed):
     keys = {"outputs": {"fall_time": ["min"]}} if summed else None
 
