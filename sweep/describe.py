@@ -86,7 +86,9 @@ def _limits(field: Field) -> str:
     if field.choices:
         return listed(field.choices, quote=True)
     low = f"{'>' if field.open_lower else '>='} {field.lower:g}" if field.lower > -math.inf else ""
-    high = f"<= {field.upper:g}" if field.upper < math.inf else ""
+    # the last float64 below a round number is how a kernel leaves that number out
+    below = float(f"{field.upper:g}") > field.upper
+    high = f"{'<' if below else '<='} {field.upper:g}" if field.upper < math.inf else ""
     return ", ".join(filter(None, [low, high]))
 
 

@@ -1,6 +1,7 @@
 """The command line: what it prints, and that no fault of a user or a machine ends in a traceback."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -419,3 +420,9 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(here):
     assert "Traceback" not in err
     assert len(list(folder.glob("*-*.h5"))) >= 2
     assert not Path("slow.h5").exists()
+
+
+def test_a_limit_that_leaves_a_round_number_out_is_told_so(call):
+    code, out, _ = call("kernels", "impact")
+    assert code == 0
+    assert re.search(r"^  e +\[1\] +>= 0, < 1 ", out, re.MULTILINE)
