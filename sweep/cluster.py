@@ -68,7 +68,7 @@ class Cluster:
         if self._client.asynchronous:
             raise SweepError("cluster: the client is asynchronous; pass one that is not")
         self.killed: type[Exception] = distributed.KilledWorker
-        self._asked, self._threads = -math.inf, 0
+        self._asked, self._threads, self._gone = -math.inf, 0, False
 
     def __enter__(self) -> Cluster:
         return self
@@ -76,7 +76,7 @@ class Cluster:
     def __exit__(self, *fault: object) -> None:
         if self._own:
             with contextlib.suppress(Exception):
-                self._client.close()
+                self._client.close(timeout=0.1 if self._gone else CONNECT_SECONDS)
 
     @property
     def threads(self) -> int:
@@ -85,7 +85,7 @@ class Cluster:
             try:
                 self._threads = sum(self._client.nthreads().values())
             except Exception as fault:
-                raise _lost(fault) from fault
+                raise self.lost(fault) from fault
             self._asked = time.monotonic()
         return self._threads
 
@@ -111,20 +111,39 @@ class Cluster:
         """Computes every block; see `Session.compute_elsewhere`. Raises SweepError."""
         assignment = _assignment(session, door)
         try:
-            self._client.register_plugin(_plugin(assignment), name=f"foliot-{assignment.run}")
+            self._client.register_plugin(_plugin(assignment), name=assignment.run)
             errand = _Errand(self, session, assignment, receive, finished, note)
             errand.run(jobs)
         except SweepError:
             raise
         except Exception as fault:
-            raise _lost(fault) from fault
+            raise self.lost(fault) from fault
         finally:
-            with contextlib.suppress(Exception):
-                self._client.unregister_worker_plugin(f"foliot-{assignment.run}")
+            self._forget(assignment.run)
 
     def executor(self) -> Any:
         """As of concurrent.futures."""
         return self._client.get_executor(pure=False)
+
+    def cancel(self, executor: Any) -> None:
+        """Takes back what no worker has begun."""
+        if not self._gone:
+            with contextlib.suppress(Exception):
+                executor.shutdown(wait=False)
+
+    def lost(self, fault: BaseException) -> SweepError:
+        """What is told where the scheduler does not answer any more; it is not asked again."""
+        self._gone = True
+        reason = (str(fault).splitlines() or [""])[0] or type(fault).__name__
+        return SweepError(
+            f"cluster: the scheduler is lost ({reason}); what is finished is kept, run the same command again to "
+            "continue"
+        )
+
+    def _forget(self, run: str) -> None:
+        if not self._gone:
+            with contextlib.suppress(Exception):
+                self._client.unregister_worker_plugin(run)
 
 
 def joined(given: Any) -> contextlib.AbstractContextManager[Cluster | None]:
@@ -172,10 +191,6 @@ class _Errand:
             future: Future[Answer] = executor.submit(remote.compute, self._assignment.run, batch, masks)
             return future
 
-        def stop() -> None:
-            with contextlib.suppress(Exception):
-                executor.shutdown(wait=False)
-
         def settled(batch: Batch | None, future: Future[Answer] | None) -> None:
             if batch is not None and future is not None:
                 self._take(batch, future, killed)
@@ -183,7 +198,7 @@ class _Errand:
                 self._look_for_workers()
                 self._finished(None)
 
-        through(batches, submit, room, settled, stop, ctrl_c)
+        through(batches, submit, room, settled, lambda: self._cluster.cancel(executor), ctrl_c)
 
     def _batches(self, jobs: Iterator[int]) -> Iterator[Batch]:
         """As many blocks together as take about half a second; fewer towards the end."""
@@ -204,7 +219,7 @@ class _Errand:
         try:
             answer = future.result()
         except CancelledError as fault:
-            raise _lost(fault) from fault
+            raise self._cluster.lost(fault) from fault
         except Exception as fault:
             if isinstance(fault, self._cluster.killed):
                 killed(batch)
@@ -282,7 +297,7 @@ def _assignment(session: Session, door: Path | None) -> Assignment:
         show_key(door, key)
     mark, study = session.mark, session.study
     place = str(door) if through_door else ""
-    return Assignment(key[:8], study.to_json(), mark, session.blocks, place, key, _paths(study))
+    return Assignment(f"foliot-{key[:8]}", study.to_json(), mark, session.blocks, place, key, _paths(study))
 
 
 def _paths(study: Study) -> tuple[str, ...]:
@@ -336,13 +351,6 @@ def _told(fault: Exception) -> SweepError:
     if isinstance(fault, SweepError):
         return fault
     return SweepError(f"cluster: a worker failed ({type(fault).__name__}: {fault}); what is finished is kept")
-
-
-def _lost(fault: BaseException) -> SweepError:
-    reason = (str(fault).splitlines() or [""])[0] or type(fault).__name__
-    return SweepError(
-        f"cluster: the scheduler is lost ({reason}); what is finished is kept, run the same command again to continue"
-    )
 
 
 def _range(cells: tuple[int, int]) -> str:
