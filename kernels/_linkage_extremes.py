@@ -23,7 +23,7 @@ import math
 from kernels._jit import jit, jit_call
 from kernels._lanes import fma, horner, magnitude, sqrt, where
 from kernels._linkage import larger, sum4
-from kernels._pairs import two_product
+from kernels._pairs import two_product, two_sum
 from kernels.interface import Status
 
 ROUNDING = 2.0**-53
@@ -155,15 +155,32 @@ def locks(lengths, margin):
 
 
 @jit
+def _difference_of_squares(x, y):
+    """x^2 - y^2 as a sum of three numbers, the second of what the first has no room for, the third of the second."""
+    x2, x_lost = two_product(x, x)
+    y2, y_lost = two_product(y, y)
+    high, low = two_sum(x2, -y2)
+    lost, least = two_sum(x_lost, -y_lost)
+    low, rest = two_sum(low, lost)
+    return high, low, rest + least
+
+
+@jit
+def _together(x, y):
+    """The sum of two such sums, with the digits that are left when the two higher numbers of both cancel."""
+    high, low = two_sum(x[0], y[0])
+    middle, least = two_sum(x[1], y[1])
+    low, rest = two_sum(low, middle)
+    high, low = two_sum(high, low)
+    return high + (low + (rest + (least + (x[2] + y[2]))))
+
+
+@jit
 def square_sums(lengths):
-    """Z1 = d^2+f^2-b^2-e^2 and Z2 = b^2+f^2-d^2-e^2, with their digits where squares cancel."""
+    """Z1 = d^2+f^2-b^2-e^2 and Z2 = b^2+f^2-d^2-e^2, with their digits wherever squares cancel."""
     b, d, f, e = lengths
-    b2, b_lost = two_product(b, b)
-    d2, d_lost = two_product(d, d)
-    f2, f_lost = two_product(f, f)
-    e2, e_lost = two_product(e, e)
-    rest, turned = f_lost - e_lost, d_lost - b_lost
-    return sum4(d2, f2, -b2, -e2) + (rest + turned), sum4(b2, f2, -d2, -e2) + (rest - turned)
+    arm, (high, low, least) = _difference_of_squares(f, e), _difference_of_squares(d, b)
+    return _together(arm, (high, low, least)), _together(arm, (-high, -low, -least))
 
 
 @jit

@@ -74,6 +74,20 @@ def test_every_closed_output_has_its_digits(kind, kind_of_arm):
     assert np.isnan([outputs[name] for name in (*RATES, "theta_lock", "theta_lock_outer")]).all()
 
 
+VANISHING = [
+    (0.7646033079641995, 0.24600515147746116, 0.7241413559202836, 0.016763631996645822),
+    (0.22432158267627217, 0.4357277682414095, 0.37378230652899247, 0.013217303502674473),
+]
+"""d^2 + f^2 - b^2 - e^2, or the same with b and d exchanged, is 0 but for 1e-19."""
+
+
+def test_a_derivative_that_nearly_vanishes_has_its_digits():
+    outputs, status = solve(POLISHER, "stable", *np.transpose(VANISHING), rtol=1e-14)
+    assert (status == Status.OK).all()
+    for name, error in errors(outputs, np.transpose(VANISHING)).items():
+        assert error.max() < 2e-15, name
+
+
 def test_the_papers_machine_swings_as_its_figures_say():
     e = [0.0, 5.0, 10.0, 15.0]
     outputs, status = solve(POLISHER, "stable", *FIGURE, e)
