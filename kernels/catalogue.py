@@ -11,6 +11,7 @@ KERNELS = {
     "foliot_start": "kernels.foliot_start:FOLIOT_START",
     "foliot_noise": "kernels.foliot_noise:FOLIOT_NOISE",
     "foliot_design": "kernels.foliot_design:FOLIOT_DESIGN",
+    "foliot_steps": "kernels.foliot_steps:FOLIOT_STEPS",
     "balance": "kernels.balance:BALANCE",
     "balance_trace": "kernels.balance_trace:BALANCE_TRACE",
     "balance_driven": "kernels.balance_driven:BALANCE_DRIVEN",

@@ -1,0 +1,155 @@
+"""Integrators at a fixed step: their order with each way to find a switch, closed forms, and what is refused."""
+
+import numpy as np
+import pytest
+import scene_oracles as oracles
+from columns import bounds, checked, solve
+from mpmath import mp, mpf
+
+from kernels._jit import COMPILED
+from kernels._locate import LOCATIONS, METHODS, ORDER
+from kernels.catalogue import get
+from kernels.interface import FIRST_REFUSAL, Status
+
+KERNEL = get("foliot_steps")
+CELL = {"mu": 1.0, "phi0": 1.0, "a": 0.5, "c": 0.3}
+MILD = {"mu": 1.0, "phi0": 1.0, "a": 1.0, "c": 1e-9}
+"""Here order 8 shows before rounding does."""
+FLIPS = 3
+FIRST_STEP = {
+    "euler": 0.02,
+    "semi_implicit": 0.02,
+    "verlet": 0.02,
+    "rk4": 0.16,
+    "dopri5": 0.32,
+    "dop853": 0.9,
+    "moreau": 0.02,
+}
+SAMPLES = 24
+
+
+def errors(method, location, halvings):
+    """Mean relative error of the last switch's time, of steps about h, h/2 ..., with grids that lie differently."""
+    shift = np.linspace(0.8, 1.2, SAMPLES)
+    steps = (FIRST_STEP[method] * 0.5 ** np.arange(halvings)[:, None] * shift).ravel()
+    cell = MILD if method == "dop853" else CELL
+    cells = {**cell, "mu": np.full(len(steps), cell["mu"])}
+    outputs, status = solve(KERNEL, method, flips=FLIPS, step=steps, location=float(LOCATIONS[location]), **cells)
+    assert (status < FIRST_REFUSAL).all()
+    truth, _ = oracles.quadratic_foliot(*cell.values(), FLIPS)
+    error = abs(outputs["time"] / float(truth) - 1).reshape(halvings, SAMPLES)
+    return np.exp(np.log(error).mean(axis=1)), outputs, error
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("location", ["root", "henon"])
+def test_a_located_switch_keeps_the_order_of_each_method(method, location):
+    mean, *_ = errors(method, location, 3)
+    order = np.log2(mean[:-1] / mean[1:])
+    wanted = ORDER[METHODS.index(method)]
+    assert (order > wanted - 0.35).all()
+    assert order[-1] < wanted + 0.9
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+@pytest.mark.parametrize("method", METHODS)
+def test_a_switch_at_the_end_of_its_step_takes_every_method_to_the_first_order(method):
+    mean, *_ = errors(method, "none", 5)
+    order = np.log2(mean[0] / mean[-1]) / 4
+    assert 0.6 < order < 1.5
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+@pytest.mark.parametrize(("location", "order"), [("linear", 2), ("hermite", 4)])
+@pytest.mark.parametrize("method", ["rk4", "dop853"])
+def test_a_switch_found_by_a_polynomial_has_the_polynomials_order(method, location, order):
+    mean, *_ = errors(method, location, 4)
+    measured = np.log2(mean[0] / mean[-1]) / 3
+    assert order - 0.5 < measured < order + 0.8
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+@pytest.mark.parametrize("location", LOCATIONS)
+@pytest.mark.parametrize("method", METHODS)
+def test_the_estimated_error_is_no_smaller_than_the_true_one(method, location):
+    _, outputs, error = errors(method, location, 3)
+    assert (error.ravel() <= 1.3 * outputs["error"] + 1e-15).all()
+
+
+def test_the_stated_bound_is_the_estimated_error():
+    outputs, _ = solve(KERNEL, "rk4", [1.0], flips=1.0, step=0.1, phi0=1.0, a=0.5)
+    assert bounds(KERNEL, "rk4", [1.0], flips=1.0, step=0.1, phi0=1.0, a=0.5)[0] == outputs["error"][0] > 0
+
+
+@pytest.mark.parametrize("method", ["verlet", "rk4"])
+def test_free_flight_with_dry_friction_is_exact_for_methods_of_order_two(method):
+    mu, R, phi0 = 3.0, 1.0, 2.0
+    outputs, status = solve(KERNEL, method, [mu], phi0=phi0, R=R, flips=3.0, step=0.7)
+    v, times = mp.sqrt(2 * (mpf(mu) - R) * phi0), []
+    times.append(v / (mu - R))
+    for _ in range(2):
+        top = v * v / (2 * (mpf(mu) + R))
+        down = mp.sqrt(2 * (top + 2 * phi0) / (mpf(mu) - R))
+        times.append(v / (mpf(mu) + R) + down)
+        v = down * (mu - R)
+    assert status[0] == Status.OK
+    assert outputs["time"][0] == pytest.approx(float(sum(times)), rel=1e-13)
+    assert outputs["period"][0] == pytest.approx(float(2 * times[-1]), rel=1e-13)
+    assert outputs["crossing_speed"][0] == pytest.approx(float(v), rel=1e-13)
+    assert outputs["amplitude"][0] == pytest.approx(float(phi0 + top), rel=1e-13)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_work_is_counted(method):
+    outputs, status = solve(KERNEL, method, [1.0], phi0=1.0, flips=1.0, step=0.1, location=0.0)
+    calls = {"euler": 1, "semi_implicit": 1, "verlet": 2, "rk4": 4, "dopri5": 6, "dop853": 12, "moreau": 2}
+    assert status[0] == Status.OK
+    assert outputs["time"][0] == pytest.approx(0.1 * outputs["steps"][0], rel=1e-12)
+    assert outputs["rate_calls"][0] == calls[method] * outputs["steps"][0]
+
+
+@pytest.mark.parametrize(
+    ("cell", "method", "location", "statuses"),
+    [
+        ({"k": 4.0}, "rk4", "root", {Status.STEP_LIMIT, Status.STICKS}),  # swings below the switch for good
+        ({"R": 0.999}, "rk4", "root", {Status.OK}),
+        ({"a": 1.0, "step": 1e3}, "euler", "none", {Status.OK, Status.STEP_LIMIT, Status.OUT_OF_RANGE}),
+        ({"mu": 1e300, "phi0": 1e300, "step": 1e-3}, "rk4", "root", {Status.OUT_OF_RANGE}),
+        ({"mu": 1e-300, "phi0": 1e-300, "a": 0.5}, "rk4", "root", {Status.OUT_OF_RANGE}),
+        ({"step": 1e-7}, "rk4", "root", {Status.STEP_LIMIT}),
+    ],
+)
+def test_what_a_cell_comes_to_is_named(cell, method, location, statuses):
+    if not COMPILED and (Status.STEP_LIMIT in statuses or "R" in cell):
+        pytest.skip("thousands of steps")
+    values = {"mu": 1.0, "phi0": 1.0, "step": 0.1, "flips": 4.0, **cell, "location": float(LOCATIONS[location])}
+    outputs, status = solve(KERNEL, method, **{k: [v] for k, v in values.items()})
+    assert status[0] in statuses, Status(status[0])
+    if status[0] < FIRST_REFUSAL:
+        assert np.isfinite([outputs[name][0] for name in ("time", "period", "amplitude")]).all()
+
+
+@pytest.mark.skipif(not COMPILED, reason="lanes")
+def test_the_bits_hang_neither_on_neighbours_nor_on_how_many_there_are():
+    random = np.random.default_rng(5)
+    n = 75
+    cells = {name: 10.0 ** random.uniform(-1, 1, n) for name in ("mu", "phi0", "a", "c")}
+    cells |= {
+        "R": random.choice([0.0, 0.05], n),
+        "step": random.choice([0.3, 0.01], n),
+        "flips": random.choice([1.0, 9.0], n),
+    }
+    cells["location"] = random.choice([0.0, 1.0, 2.0, 3.0, 4.0], n)
+    for method in ("verlet", "dop853"):
+        outputs, status = solve(KERNEL, method, **cells)
+        for some in (slice(0, 1), slice(30, 34), slice(None, None, -1)):
+            again, state = solve(KERNEL, method, **{k: np.ascontiguousarray(v[some]) for k, v in cells.items()})
+            np.testing.assert_array_equal(state, status[some])
+            for name in outputs:
+                np.testing.assert_array_equal(again[name], outputs[name][some])
+
+
+def test_a_drive_below_the_friction_never_starts():
+    assert checked(KERNEL, [1.0], phi0=1.0, R=1.0, step=0.1)[0] == Status.NEVER_STARTS
+    assert checked(KERNEL, [1.0], phi0=1.0, step=0.1, flips=1.5)[0] == Status.BAD_INPUT
