@@ -191,3 +191,30 @@ def test_over_decades_of_cells_what_is_not_remarked_is_right():
         time, speed = oracles.quadratic_foliot(mu[i], phi0[i], a[i], c[i], 5, digits=70)
         assert relative_error(outputs["time"][[i]], [time])[0] < 1e-8
         assert relative_error(abs(outputs["speed"][[i]]), [speed])[0] < 1e-8
+
+
+def test_the_proof_holds_on_any_polynomial():
+    random = np.random.default_rng(9)
+    t = np.linspace(0.0, 1.0, 400)[1:]
+    clear, falls = 0, 0
+    for _ in range(400 if COMPILED else 300):
+        series = tuple(random.normal(size=8) * 0.6 ** np.arange(8.0) * (0.5, 1, 1, 1, 1, 1, 1, 1))
+        h = random.uniform(0.05, 1.2)
+        values, slopes = (np.polynomial.Polynomial(p)(h * t) for p in (series, series[1:] * np.arange(1.0, 8.0)))
+        rest = _plain(_taylor.tail, h, series)
+        if series[0] >= 0.0 and _plain(_taylor.clear, *series[:3], rest, h, 0.0):
+            clear += 1
+            assert values.min() > 0.0
+        if _plain(_taylor.falls, *series[1:3], rest, h):
+            falls += 1
+            assert slopes.max() < 0.0
+    assert min(clear, falls) > 20
+
+
+def test_what_rounding_leaves_less_than_wanted_is_said_to_be_inaccurate():
+    if not COMPILED:
+        pytest.skip("too few switches to lose digits in")
+    mu, phi0, a, c = drags()
+    _, status = solve(RICH, "taylor", mu, phi0, a, c, flips=FLIPS, rtol=1e-17)
+    assert (status == Status.INACCURATE).any()
+    assert ((status == Status.INACCURATE) | (status == Status.OK)).all()
