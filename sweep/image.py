@@ -7,7 +7,7 @@ its range patched in. So a part costs no HDF5 call (those run one at a time) and
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,11 +61,14 @@ class Images:
         frame = self.frame(stop - start)
         return [arrays[p] if isinstance(p, str) else _patched(p, start, stop) for p in frame.pieces]
 
-    def head(self, start: int, stop: int) -> bytes:
-        """The bytes of a part before its first column."""
-        first = self.frame(stop - start).pieces[0]
-        assert isinstance(first, bytes)
-        return _patched(first, start, stop)
+    def between(self, start: int, stop: int) -> Iterator[tuple[int, bytes]]:
+        """All bytes of a part that are no column's: where they begin, and what they are."""
+        frame, at = self.frame(stop - start), 0
+        widths = {column.name: column.cell_bytes for column in self.columns}
+        for piece in frame.pieces:
+            if isinstance(piece, bytes):
+                yield at, _patched(piece, start, stop)
+            at += (stop - start) * widths[piece] if isinstance(piece, str) else len(piece)
 
 
 def _frame(columns: Sequence[Column], cells: int) -> Frame:

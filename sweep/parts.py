@@ -120,10 +120,16 @@ def _read_flags(path: Path, images: Images, start: int, stop: int) -> dict[str, 
 
 
 def _places(fd: int, images: Images, start: int, stop: int) -> Mapping[str, int] | None:
-    """Where each column begins, in a file that begins as this program writes it; None in any other."""
-    frame, head = images.frame(stop - start), images.head(start, stop)
-    same = os.fstat(fd).st_size == frame.size and os.pread(fd, len(head), 0) == head
-    return frame.places if same else None
+    """Where each column begins, in a file as long as this program writes it; None in any other.
+
+    Raises ValueError where a byte beside the columns differs.
+    """
+    frame = images.frame(stop - start)
+    if os.fstat(fd).st_size != frame.size:
+        return None
+    if any(os.pread(fd, len(piece), at) != piece for at, piece in images.between(start, stop)):
+        raise ValueError("differs from what is written there")
+    return frame.places
 
 
 def _places_by_hdf5(path: Path, columns: Sequence[Column], start: int, stop: int) -> dict[str, int]:
