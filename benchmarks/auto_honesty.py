@@ -5,7 +5,7 @@ python benchmarks/auto_honesty.py [--cells 10000] [--seed 1] [--workers 2] [KERN
 
 Each cell is asked for all outputs at once, and for each output alone, since `auto` takes another method then. Wrong is
 a cell with status OK of which an output is off by more than rtol (of traces: relative to the largest value), or that
-has none by the oracle. Dear oracles get fewer cells; "up to" is what the share may be with 95 % confidence. Needs mpmath.
+has none by the oracle. Dear oracles get fewer cells; "up to" is what the share may be, 95 % sure. Needs mpmath.
 """
 
 from __future__ import annotations

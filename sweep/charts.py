@@ -170,18 +170,22 @@ FLOOR = 1e-17
 
 
 def _draw_precision(axes: Any, found: xr.Dataset, key: str) -> None:
-    """Filled marks where all cells are solved, open ones where some are refused or said to be inaccurate."""
+    """Filled marks where all cells are solved, open ones where some are refused or said to be inaccurate, crosses where
+    some are silently wrong. The reference is drawn at what it is right to, since against itself it has no error.
+    """
+    floor = found.attrs.get("reference_error", np.nan)
     for i, name in enumerate(found["method"].values):
         row = found.sel({"method": name})
-        seconds, error = row.seconds.values, np.maximum(row[key].values, FLOOR)
+        least = max(floor, FLOOR) if name == found.attrs.get("reference") else FLOOR
+        seconds, error = row.seconds.values, np.maximum(row[key].values, least)
         whole = (row.failed + row.inaccurate).values == 0
         look = {"color": COLOURS[i % len(COLOURS)], "marker": MARKS[i % len(MARKS)], "markersize": 4}
         axes.plot(seconds, error, linewidth=0.8, linestyle=DASHES[i % len(DASHES)], markevery=whole, label=name, **look)
         axes.plot(seconds[~whole], error[~whole], linestyle="", **{**look, "markerfacecolor": "white"})
         silent = row.silent.values > 0
         axes.plot(seconds[silent], error[silent], "x", color="black", markersize=7)
-    if np.isfinite(found.attrs.get("reference_error", np.nan)):
-        axes.axhspan(FLOOR, max(found.attrs["reference_error"], FLOOR), color="0.9", linewidth=0)
+    if np.isfinite(floor):
+        axes.axhspan(FLOOR / 2, max(floor, FLOOR), color="0.9", linewidth=0)
     axes.set(xscale="log", yscale="log", xlabel="time per cell on one core [s]", ylim=(FLOOR / 2, 10))
 
 
