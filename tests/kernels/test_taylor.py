@@ -183,7 +183,7 @@ def test_a_switch_is_found_to_the_last_digits_however_long_the_steps(flips):
 
 
 def test_over_decades_of_cells_what_is_not_remarked_is_right():
-    mu, phi0, a, c = drags(400 if COMPILED else 4, decades=5.0)
+    mu, phi0, a, c = drags(400, decades=5.0) if COMPILED else drags(2)
     outputs, status = solve(RICH, "taylor", mu, phi0, a, c, flips=5.0, rtol=1e-8)
     fine = np.flatnonzero(status == Status.OK)
     assert len(fine) > 0.3 * len(status)
@@ -197,7 +197,7 @@ def test_the_proof_holds_on_any_polynomial():
     random = np.random.default_rng(9)
     t = np.linspace(0.0, 1.0, 400)[1:]
     clear, falls = 0, 0
-    for _ in range(400 if COMPILED else 300):
+    for _ in range(150):
         series = tuple(random.normal(size=8) * 0.6 ** np.arange(8.0) * (0.5, 1, 1, 1, 1, 1, 1, 1))
         h = random.uniform(0.05, 1.2)
         values, slopes = (np.polynomial.Polynomial(p)(h * t) for p in (series, series[1:] * np.arange(1.0, 8.0)))
@@ -208,13 +208,10 @@ def test_the_proof_holds_on_any_polynomial():
         if _plain(_taylor.falls, *series[1:3], rest, h):
             falls += 1
             assert slopes.max() < 0.0
-    assert min(clear, falls) > 20
+    assert min(clear, falls) > 8
 
 
 def test_what_rounding_leaves_less_than_wanted_is_said_to_be_inaccurate():
-    if not COMPILED:
-        pytest.skip("too few switches to lose digits in")
     mu, phi0, a, c = drags()
     _, status = solve(RICH, "taylor", mu, phi0, a, c, flips=FLIPS, rtol=1e-17)
-    assert (status == Status.INACCURATE).any()
-    assert ((status == Status.INACCURATE) | (status == Status.OK)).all()
+    assert (status == Status.INACCURATE).all()
