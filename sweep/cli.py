@@ -69,6 +69,7 @@ def parser() -> argparse.ArgumentParser:
 
     kernels = _command(commands, "kernels", _kernels, "what can be swept: parameters, units, outputs, methods")
     kernels.add_argument("name", metavar="NAME", nargs="?", help="tell all about this one")
+    kernels.add_argument("--study", metavar="FILE.toml", type=Path, help="write a study of it to begin with")
     _add_allow_import(kernels)
 
     plan = _command(commands, "plan", _plan, "cells, bytes, memory and a timed forecast, before anything runs")
@@ -183,8 +184,14 @@ def _add_units(command: Any) -> None:
 
 
 def _kernels(arguments: argparse.Namespace) -> None:
-    from sweep.describe import catalogue_text, kernel_text
+    from sweep.describe import catalogue_text, kernel_text, write_starter
 
+    if arguments.study and not arguments.name:
+        raise SweepError("--study: name a kernel as well, e.g. sweep kernels foliot --study foliot.toml")
+    if arguments.study:
+        write_starter(arguments.name, arguments.study, arguments.allow_import)
+        print(arguments.study)
+        return
     print(kernel_text(arguments.name, arguments.allow_import) if arguments.name else catalogue_text())
 
 

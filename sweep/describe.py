@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 from kernels import catalogue
@@ -31,8 +32,21 @@ def kernel_text(name: str, allow_import: bool = False) -> str:
         section(
             'methods, cheapest first; "auto" takes the first whose error bound meets rtol', map(_method, kernel.methods)
         ),
-        "a study to begin with\n" + _example(name, kernel),
+        "a study to begin with\n" + "\n".join(f"  {line}".rstrip() for line in _example(name, kernel).splitlines()),
     )
+
+
+def write_starter(name: str, path: Path, allow_import: bool = False) -> None:
+    """Write a study of a kernel to begin with. Raises SweepError; a file that is there is left alone."""
+    kernel = load_kernel(name, allow_import)
+    text = f"# {kernel.doc[0].upper()}{kernel.doc.splitlines()[0][1:]}: how does it change with its parameters?\n"
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(f"{text}{_example(name, kernel)}\n")
+    except FileExistsError:
+        raise SweepError(f"{path} is there already; name another file") from None
+    except OSError as error:
+        raise SweepError(f"{path} cannot be written: {error.strerror}") from None
 
 
 def _short(name: str) -> str:
@@ -109,13 +123,23 @@ def _example(name: str, kernel: Kernel) -> str:
         lines += ["", "[fixed]", *(_entry(p, values[p.name]) for p in fixed)]
     for field in kernel.along:
         lines += ["", f"[along.{field.name}]", *_range(field)]
-    return "\n".join(f"  {line}".rstrip() for line in lines)
+    return "\n".join(lines)
 
 
 def _axis(field: Field, middle: Any) -> Iterable[str]:
     yield f"[axes.{field.name}]"
     if field.choices:
         yield f"values = [{quoted(field.choices)}]"
+    elif field.integer:
+        yield f"values = [{', '.join(f'{max(field.lower, 1) + i:g}' for i in range(3))}]"
+    elif field.unit == "m":  # machines keep their kind when a length is changed by a fifth, not by ten
+        yield from (
+            'spacing = "linear"',
+            f"start = {0.8 * middle:g}",
+            f"stop = {1.2 * middle:g}",
+            "num = 41",
+            'unit = "m"',
+        )
     else:
         yield from ('spacing = "log"', f"start = {middle / 10:g}", f"stop = {middle * 10:g}", "num = 41")
         yield f'unit = "{field.unit}"'
@@ -133,4 +157,6 @@ def _range(field: Field) -> Iterable[str]:
         return ["num = 10"]
     if math.isfinite(field.upper - field.lower):
         return ["num = 200"]
-    return ['spacing = "log"', "start = 0.1", "stop = 10", "num = 200"]
+    if field.unit == "m":
+        return ['spacing = "linear"', "start = 0", "stop = 0.1", "num = 51", 'unit = "m"']
+    return ['spacing = "log"', "start = 0.1", "stop = 100", "num = 200", f'unit = "{field.unit}"']

@@ -426,3 +426,11 @@ def test_a_limit_that_leaves_a_round_number_out_is_told_so(call):
     code, out, _ = call("kernels", "impact")
     assert code == 0
     assert re.search(r"^  e +\[1\] +>= 0, < 1 ", out, re.MULTILINE)
+
+
+def test_a_study_to_begin_with_is_written_and_runs(call):
+    assert call("kernels", "foliot_motion", "--study", "motion.toml")[:2] == (0, "motion.toml\n")
+    assert call("run", "motion.toml")[0] == 0
+    code, _, err = call("kernels", "foliot_motion", "--study", "motion.toml")
+    assert (code, "is there already" in err) == (2, True)
+    assert call("kernels", "--study", "x.toml")[0] == 2
