@@ -71,11 +71,11 @@ def dip(start, end, start_rate, end_rate, h):
 
 
 @jit
-def near_an_event(values, margin):
-    """Whether an event is within a margin of 0."""
+def near_an_event(values, on, margins):
+    """Whether an event that the motion did not start on is within its margin of 0."""
     close = values[0] < -math.inf
     for j in range(len(values)):
-        close = close | (magnitude(values[j]) < margin)
+        close = close | ((magnitude(values[j]) < margins[j]) & (on[j] < 0.5))
     return close
 
 
@@ -161,7 +161,9 @@ def attempt(m, how, parameters, step, graze, motion, active):
         low = where(active & isnt(met | broken | (cuts > 0.5)), dip(start, end, start_rate, end_rate, h), 0.0)
         again = (pressed & away) | (low > 0.0)
         shorter = where(low > 0.0, low * h, 0.5 * h)
-        turning = active & (cuts > 0.5) & isnt(met) & near_an_event(end, graze)
+        turning = (
+            active & (cuts > 0.5) & isnt(met) & near_an_event(end, on, times(graze, reached(times(0.0, on), start)))
+        )
         verdict = where(turning & (verdict < _GRAZING), _GRAZING, verdict)
         seeking = met & isnt(pressed)
         if some(seeking):
@@ -203,8 +205,8 @@ def follow(m, how, parameters, limits, motion, tally, active):
 
     Parameters
     ----------
-    limits : flips, step, margin of grazing over the largest value of the surface
-    tally : time, since, interval, count, steps, calls, trials since the last switch, widest value of the surface,
+    limits : flips, step, margin of grazing over an event's value at the start of the step
+    tally : time, since, interval, count, steps, calls, trials since the last switch,
         reach (largest of each state since the last switch), states at the last switch, their reach before it, verdict
 
     Returns
@@ -214,11 +216,9 @@ def follow(m, how, parameters, limits, motion, tally, active):
     flips, step, graze = limits
     done = active & isnt(active)
     for _ in range(TOGETHER):
-        time, since, interval, count, steps, calls, trials, wide, reach, at, reach_at, verdict = tally
+        time, since, interval, count, steps, calls, trials, reach, at, reach_at, verdict = tally
         state, side, signs, _on, _cut, _cuts = motion
-        value = magnitude(m.events(state, side, signs, parameters)[0][0])
-        wide = where(value > wide, value, wide)
-        motion, which, taken, more, found = attempt(m, how, parameters, step, graze * wide, motion, active)
+        motion, which, taken, more, found = attempt(m, how, parameters, step, graze, motion, active)
         verdict = where(active & (found > verdict), found, verdict)
         trials, calls = where(active, trials + 1.0, trials), where(active, calls + more, calls)
         steps = where(active & (which > -1.5), steps + 1.0, steps)
@@ -233,11 +233,11 @@ def follow(m, how, parameters, limits, motion, tally, active):
             motion = switch(m, parameters, motion, left, switches)
             reach = choose(switches, reached(times(0.0, reach), motion[0]), reach)
             interval, since = where(switches, since, interval), where(switches, 0.0, since)
-            count, wide = where(switches, count + 1.0, count), where(switches, 0.0, wide)
+            count = where(switches, count + 1.0, count)
             trials = where(switches, 0.0, trials)
         verdict = where(active & (trials > STEP_LIMIT) & (verdict < _REFUSAL), _STEP_LIMIT, verdict)
         ended = active & ((verdict >= _REFUSAL) | (count >= flips))
-        tally = time, since, interval, count, steps, calls, trials, wide, reach, at, reach_at, verdict
+        tally = time, since, interval, count, steps, calls, trials, reach, at, reach_at, verdict
         done, active = done | ended, active & isnt(ended)
         if some(done):
             break

@@ -76,7 +76,7 @@ def rk4(m, state, scene, h):
 
 
 @jit
-def _dopri5(m, state, scene, h):
+def dopri5_stages(m, state, scene, h):
     k0 = rate(m, state, scene)
     k1 = rate(m, after(state, h, DOPRI5[0], (k0,)), scene)
     k2 = rate(m, after(state, h, DOPRI5[1], (k0, k1)), scene)
@@ -89,11 +89,11 @@ def _dopri5(m, state, scene, h):
 @jit_call
 def dopri5(m, state, scene, h):
     """Dormand-Prince 5(4), the fifth order."""
-    return _dopri5(m, state, scene, h)[0]
+    return dopri5_stages(m, state, scene, h)[0]
 
 
 @jit
-def _dop853(m, state, scene, h):
+def dop853_stages(m, state, scene, h):
     k0 = rate(m, state, scene)
     k1 = rate(m, after(state, h, DOP853[0], (k0,)), scene)
     k2 = rate(m, after(state, h, DOP853[1], (k0, k1)), scene)
@@ -113,4 +113,4 @@ def _dop853(m, state, scene, h):
 @jit_call
 def dop853(m, state, scene, h):
     """Order 8 of Dormand and Prince."""
-    return _dop853(m, state, scene, h)[0]
+    return dop853_stages(m, state, scene, h)[0]

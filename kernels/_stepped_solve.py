@@ -14,7 +14,7 @@ from kernels.interface import FIRST_REFUSAL, Status
 SAFETY = 1.5
 ROUNDING = 2.3e-16
 GRAZING = 1e-9
-"""Of the surface's largest value: how close a turning point may come to it unremarked."""
+"""Of an event's value at the start of a step: how close to 0 it may turn round in it unremarked."""
 
 
 def followed(module, method, columns, step, location, parts=1.0):

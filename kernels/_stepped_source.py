@@ -10,7 +10,8 @@ import sys
 from kernels._expression import INPUT
 from kernels._locate import METHODS
 from kernels._scene_graph import record
-from kernels._scene_module import _written, build
+from kernels._scene_module import Writer, _written, build
+from kernels._taylor_pool import advance
 from kernels._taylor_text import filled, listed
 
 TEXT = '''
@@ -41,8 +42,8 @@ def events(state, side, signs, parameters):
 def swapped_rates(wide, side, signs, parameters):
     """Rates of the states and of time per unit of an event's value; the last entry says of which event."""
     {states}, time, which = wide
-    {rates} = rates(({states}), side, signs, parameters)
-    slopes = events(({states}), side, signs, parameters)[1]
+    {rates} = rates(({states},), side, signs, parameters)
+    slopes = events(({states},), side, signs, parameters)[1]
     slope = slopes[0]
     {choose_slope}
     return {over}, 1.0 / slope, 0.0 * slope
@@ -52,7 +53,7 @@ def swapped_rates(wide, side, signs, parameters):
 def natural_signs_of(wide, side, parameters):
     """As the scene's, of the states among them."""
     {states}, time, which = wide
-    return scene_signs(({states}), side, parameters)
+    return scene_signs(({states},), side, parameters)
 
 
 scene_signs = scene.natural_signs
@@ -77,12 +78,12 @@ def advance(memory, i):
         {begin}
         verdict = where(fresh, where(beyond, {bad_input}, 0.0), verdict)
     how = int(memory[{method}][0]), int(memory[{method} + 1][0]), int(memory[{method} + 2][0])
-    motion = ({states}), side, ({signs}), ({ons}), cut, cuts
-    tally = time, since, interval, count, steps, calls, trials, wide, ({reach}), ({at}), ({before}), verdict
+    motion = ({states},), side, ({signs}), ({ons}), cut, cuts
+    tally = time, since, interval, count, steps, calls, trials, ({reach}), ({at}), ({before}), verdict
     moving = active & (verdict < 64.0)
     motion, tally, ended = follow(M, how, parameters, (flips, step, graze), motion, tally, moving)
-    ({states}), side, ({signs}), ({ons}), cut, cuts = motion
-    time, since, interval, count, steps, calls, trials, wide, ({reach}), ({at}), ({before}), verdict = tally
+    ({states},), side, ({signs}), ({ons}), cut, cuts = motion
+    time, since, interval, count, steps, calls, trials, ({reach}), ({at}), ({before}), verdict = tally
     done = active & (ended | (verdict >= 64.0))
     stage = where(done, 3.0, where(active, 2.0, stage))
     {store}
@@ -113,26 +114,27 @@ def methods_of(scene):
 
 def _text(scene, module):
     kinks = module.KINKS
-    states, signs = scene.states, [f"sign_{j}" for j in range(kinks)]
+    states, parameters = ([f"q_{name}" for name in names] for names in (scene.states, scene.parameters))
+    signs = [f"sign_{j}" for j in range(kinks)]
     ons = [f"on_{j}" for j in range(1 + kinks)]
     reach, at, before = ([f"{kind}_{s}" for s in states] for kind in ("reach", "at", "before"))
-    inputs = [*scene.parameters, "flips", "step", "graze", "method", "location", "parts"]
+    inputs = [*parameters, "flips", "step", "graze", "method", "location", "parts"]
     results = ["time", "interval", *at, *before, "steps", "calls", "verdict"]
-    work = [*states, "side", *signs, *ons, "cut", "cuts", "since", "count", "trials", "wide", *reach]
+    work = [*states, "side", *signs, *ons, "cut", "cuts", "since", "count", "trials", *reach]
     rows = ["stage", *inputs, *results, *work]
     begin = [f"{s} = where(fresh, s[{j}], {s})" for j, s in enumerate(states)]
     begin += [f"{s} = where(fresh, g[{j}], {s})" for j, s in enumerate(signs)]
     begin += [f"{o} = where(fresh, o[{j}], {o})" for j, o in enumerate(ons)]
     begin += ["side = where(fresh, p, side)"]
     begin += [f"{r} = where(fresh, magnitude({s}), {r})" for r, s in zip(reach, states, strict=True)]
-    zeros = ("time", "interval", "steps", "calls", "cut", "cuts", "since", "count", "trials", "wide", *at, *before)
+    zeros = ("time", "interval", "steps", "calls", "cut", "cuts", "since", "count", "trials", *at, *before)
     begin += [f"{r} = where(fresh, 0.0, {r})" for r in zeros]
     changed = ["stage", *results, *work]
     events = range(1 + kinks)
     return filled(
         TEXT, name=scene.name, module=module.__name__, kinks=kinks, signs=listed(signs),
-        states=listed(states).rstrip(","),
-        ons=listed(ons), reach=listed(reach), at=listed(at), before=listed(before), parameters=listed(scene.parameters),
+        states=", ".join(states),
+        ons=listed(ons), reach=listed(reach), at=listed(at), before=listed(before), parameters=listed(parameters),
         unpack=", ".join([f"s_{s}" for s in states] + [f"(offset_{j}, factor_{j}, event_{j})" for j in events]),
         values=listed(f"fma(factor_{j}, event_{j}[0], offset_{j})" for j in events),
         slopes=listed(f"factor_{j} * event_{j}[1]" for j in events),
@@ -146,10 +148,52 @@ def _text(scene, module):
     )  # fmt: skip
 
 
+LEGS = '''
+"""Legs of {name} to a tolerance: written by kernels; do not change it here."""
+
+from kernels import _adaptive_step
+from {module} import *
+from {steps} import M
+
+
+@jit_call
+def to_event_dopri5(state, side, signs, parameters, unit, h, on, tolerance, active):
+    """The leg of Dormand-Prince 5(4)."""
+    return _adaptive_step.to_event(
+        M, _adaptive_step.dopri5_tried, _adaptive_step.dopri5_series, _adaptive_step.dopri5_dense, 5.0,
+        state, side, signs, parameters, unit, h, on, tolerance, active,
+    )
+
+
+@jit_call
+def to_event_dop853(state, side, signs, parameters, unit, h, on, tolerance, active):
+    """The leg of DOP853."""
+    return _adaptive_step.to_event(
+        M, _adaptive_step.dop853_tried, _adaptive_step.dop853_series, _adaptive_step.dop853_dense, 8.0,
+        state, side, signs, parameters, unit, h, on, tolerance, active,
+    )
+'''
+
+
+def adaptive(scene):
+    """The module of the scene's legs to a tolerance, with `run_dopri5` and `run_dop853`."""
+    module, steps = build(scene), stepped(scene)
+    text = filled(LEGS, name=scene.name, module=module.__name__, steps=steps.__name__).lstrip()
+    writer = Writer(scene, record(scene))
+    for method in ("dopri5", "dop853"):
+        text += advance(writer.states, writer.parameters, module.KINKS, method, writer.offset())
+    return _loaded("legs", scene, text)
+
+
 def stepped(scene):
     """The module of the scene's fixed-step methods, with `run` and `STATES`."""
     text = _text(scene, build(scene)).lstrip()
-    name = f"steps_{scene.name}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+    return _loaded("steps", scene, text)
+
+
+def _loaded(kind, scene, text):
+    """The module of that text."""
+    name = f"{kind}_{scene.name}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
     if name not in sys.modules:
         spec = importlib.util.spec_from_file_location(name, _written(name, text))
         module = importlib.util.module_from_spec(spec)

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kernels import _taylor_solve
+from kernels._adaptive_solve import twice_by
 from kernels._expression import SceneError, cos, exp, log, power, sign, sin, sqrt
 from kernels._scene_graph import RESERVED
 from kernels._scene_module import build
@@ -129,6 +130,16 @@ def scene_kernel(
                 "the same, each step right to rtol, followed once",
                 _solve(_taylor_solve.once, module, *names),
                 _no_bound(names[0]),
+            ),
+            Method(
+                "dop853",
+                "Dormand-Prince 8(5,3) in lanes, switches on its dense output; followed twice",
+                _solve(twice_by("dop853", scene), module, *names),
+            ),
+            Method(
+                "dopri5",
+                "Dormand-Prince 5(4) in lanes, switches on its dense output; followed twice",
+                _solve(twice_by("dopri5", scene), module, *names),
             ),
         ),
         example=dict(example or {}),

@@ -1,0 +1,18 @@
+"""Columns of cells of a scene followed by Dormand-Prince 5(4) or DOP853, each twice, as by the Taylor method."""
+
+from types import SimpleNamespace
+
+from kernels import _taylor_solve
+from kernels._stepped_source import adaptive
+
+
+def twice_by(method, scene):
+    """The function of columns (`_taylor_solve.twice`) that follows the scene by "dopri5" or "dop853"."""
+
+    def twice(module, columns, rtol, outputs, status):
+        run = getattr(adaptive(scene), f"run_{method}")
+        _taylor_solve.twice(
+            SimpleNamespace(STATES=module.STATES, run_14=run, run_20=run), columns, rtol, outputs, status
+        )
+
+    return twice
