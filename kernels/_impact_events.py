@@ -129,16 +129,24 @@ def _left_behind(start, cycle):
 
 
 @jit
-def _answer(tally, n, halves, pace, e):
+def _ends(tally, k):
+    """Half of the way of y from end to end, and its middle, of a motion that repeats after k half swings."""
+    low, high = -tally[swing.LOWEST], -tally[swing.ACROSS]
+    if k % 2 == 1:
+        return max(low, high), 0.0
+    return 0.5 * (low + high), 0.5 * magnitude(low - high)
+
+
+@jit
+def _answer(tally, ends, halves, pace, e):
     """The cycle as in `_impact_scene`, the middle of the swing, the share of time in contact, and impacts, from the
-    tally of n half swings that are so many half periods."""
+    tally of half swings that are so many half periods; `ends` as `_ends` has them, or means."""
     beats = tally[swing.BEATS]
     rim, pallet = (tally[swing.RIM] / beats, tally[swing.PALLET] / beats) if beats > 0.0 else (math.nan, math.nan)
     endless = e > 0.0 and tally[swing.TRAINS] > 0.0
     impacts = math.inf if endless else tally[swing.IMPACTS] / halves
-    offset = magnitude(tally[swing.LEAN]) / n if n % 2 == 0 else 0.0
-    cycle = tally[swing.TIME] / halves, tally[swing.DIPS] / n, rim, pallet, pace, tally[swing.RECOIL]
-    return cycle, offset, tally[swing.HELD] / tally[swing.TIME], impacts
+    cycle = tally[swing.TIME] / halves, ends[0], rim, pallet, pace, tally[swing.RECOIL]
+    return cycle, ends[1], tally[swing.HELD] / tally[swing.TIME], impacts
 
 
 @jit
@@ -172,7 +180,7 @@ def _judged(scene, start, k, work, rtol):
     rest = image[0] - start[0], image[1] - start[1], image[2] - start[2]
     half_swings, teeth, cycles = _cycles(k, tally[swing.WAY])
     modulus, blur = multiplier(chained)
-    answer = _answer(tally, k, 2.0 * cycles * k / half_swings, modulus ** (1.0 / k), scene[3])
+    answer = _answer(tally, _ends(tally, k), 2.0 * cycles * k / half_swings, modulus ** (1.0 / k), scene[3])
     _, travel, rim, pallet, _, _ = answer[0]
     rounding = _ROUNDING * (2.0 + tally[swing.EVENTS] / k) * (1.0 + travel)
     gap, V, w, late = errors(start, rest, inverse, chained, rounding, tally[swing.TIME])
@@ -211,7 +219,8 @@ def attractor(scene, rtol, total, work, history):
     half_swings = HALF_SWINGS // 2
     cycles = max(min(total[swing.WAY], 0.5 * half_swings), 1.0)
     status = _NOT_CONVERGED if k > 0 else _NOT_PERIODIC
-    return _answer(total, half_swings, 2.0 * cycles, math.nan, scene[3]), status
+    means = total[swing.DIPS] / half_swings, magnitude(total[swing.LEAN]) / half_swings
+    return _answer(total, means, 2.0 * cycles, math.nan, scene[3]), status
 
 
 @jit

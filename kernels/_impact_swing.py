@@ -35,15 +35,16 @@ FAINT_BOUNCE = 1e-10
 
 DONE, TOO_MANY, BENT_CONTACT = 0, 1, 2
 """What became of a half swing."""
-TIME, WAY, DIP, DIPS, LEAN, IMPACTS, LOSS, RIM, PALLET, DEPTH, RECOIL, MARGIN, EVENTS, BEATS, HELD, TRAINS, STRUCK = (
-    range(17)
-)
+(
+    TIME, WAY, DIP, DIPS, LEAN, LOWEST, ACROSS, IMPACTS, LOSS, RIM, PALLET, DEPTH, RECOIL, MARGIN, EVENTS, BEATS, HELD,
+    TRAINS, STRUCK,
+) = range(19)  # fmt: skip
 """Entries of a tally: time, way of the rim, lowest y of this half swing, sum of -y over their lowest, the same with
-signs in turn, impacts (of a train only the first), energy lost, speeds just after the holding pallet's first impact
-(sums over half swings), way that the rim is behind its foremost and the most of that, least distance of a tooth from a
-tip that passes it, events, half swings that have an impact, time in contact, trains of bounces that end in it, whether
-this half swing has had an impact."""
-TALLIES = 17
+signs in turn, lowest y of all half swings on this pallet and lowest -y of those on the other, impacts (of a train only
+the first), energy lost, speeds just after the holding pallet's first impact (sums over half swings), way that the rim
+is behind its foremost and the most of that, least distance of a tooth from a tip that passes it, events, half swings
+that have an impact, time in contact, trains of bounces that end in it, whether this half swing has had an impact."""
+TALLIES = 19
 
 
 @jit
@@ -277,4 +278,5 @@ def _reflected(tally, far, V, w):
     """The start of the next half swing; this one is counted."""
     tally[DIPS] -= tally[DIP]
     tally[LEAN] = -(tally[LEAN] + tally[DIP])
+    tally[LOWEST], tally[ACROSS] = tally[ACROSS], min(tally[LOWEST], tally[DIP])
     return far, V, -w

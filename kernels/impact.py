@@ -127,12 +127,16 @@ PARAMETERS = (
 )
 
 OUTPUTS = (
-    Field("period", "s", "period of the cycle: two impacts or pushes"),
-    Field("swing", "m", "half of the pallet's way from end to end"),
-    Field("wheel_speed", "rad/s", "speed of the crown wheel just after impact"),
-    Field("pallet_speed", "rad/s", "speed of the verge just after impact, in the direction of the tooth"),
-    Field("multiplier", "1", "largest modulus of the multipliers of the half-cycle map"),
-    Field("recoil", "rad", "angle that the crown wheel is thrown back at each impact (0 where it is not)"),
+    Field("period", "s", "period of the cycle, in which one tooth passes; the mean of cycles that differ"),
+    Field("swing", "m", "half of the pallet's way between the farthest ends of its swings"),
+    Field(
+        "wheel_speed",
+        "rad/s",
+        "speed of the crown wheel just after a swing's first impact; the mean of swings that differ",
+    ),
+    Field("pallet_speed", "rad/s", "speed of the verge just after that impact, in the direction of the tooth"),
+    Field("multiplier", "1", "largest factor by which disturbances grow in a half swing, from release to release"),
+    Field("recoil", "rad", "largest angle by which the crown wheel is thrown back (0 where it is not)"),
     Field("contact_share", "1", "share of the time that a tooth and a pallet are in contact"),
     Field("impacts", "1", "impacts in half a period (inf where bounces die out in contact)"),
     Field("offset", "m", "how far the middle of the pallet's swing is from the middle of its teeth"),

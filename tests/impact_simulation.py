@@ -6,7 +6,9 @@ told from contact. Numbers are float or mpf, whichever the arguments are.
 """
 
 from math import ceil, floor
+from typing import Any, NamedTuple
 
+import numpy as np
 from mpmath import mpf
 
 
@@ -18,6 +20,36 @@ def root(x):
 FAINT = {float: 1e-13, mpf: mpf(10) ** -22}
 
 
+class Passage(NamedTuple):
+    """Time and motion where y passes 0 upwards; how many ends and retreats were noted, contact time,
+    impacts, and how often a pallet has released the wheel."""
+
+    time: Any
+    x: Any
+    V: Any
+    w: Any
+    ends: int
+    backs: int
+    touched: Any
+    impacts: int
+    releases: int
+
+
+class Settled(NamedTuple):
+    """What a clock comes to repeat; a period is the time per tooth, passages of y = 0 and half swings, from release
+    to release, are those until it repeats."""
+
+    period: Any
+    travel: Any
+    middle: Any
+    teeth: int
+    passages: int
+    half_swings: int
+    recoil: Any
+    contact_share: Any
+    impacts: Any
+
+
 class Clock:
     """One clock in motion; `upper` 1 and -1 are the two pallets."""
 
@@ -26,7 +58,9 @@ class Clock:
         self.time = self.x = self.y = self.V = self.w = 0 * kappa
         self.held = self.last = None
         self.lost, self.lows, self.highs, self.impacts = 0 * kappa, [], [], 0
-        self.passages = []
+        self.passages, self.backs = [], []
+        self.foremost, self.touched = 0 * kappa, 0 * kappa
+        self.holder, self.releases = 1, 0
 
     def push(self, y):
         """U(y)."""
@@ -52,6 +86,7 @@ class Clock:
         self.x = self.push(self.y)
         for name, factor in disturbed.items():
             setattr(self, name, getattr(self, name) * factor)
+        self.foremost = self.x
         self.held, self.last = (1 if e == 0 else None), (1, 0)
 
     def contacts(self):
@@ -66,14 +101,32 @@ class Clock:
                     if t > 0 and side * (self.y + self.w * t) < self.eta:
                         yield t, side, tooth
 
+    def mark(self, time, x, V, w):
+        """Remembers that y passes 0 upwards, and how much was counted until then."""
+        counts = len(self.lows), len(self.backs), self.touched, self.impacts, self.releases
+        self.passages.append(Passage(time, x, V, w, *counts))
+
+    def release(self):
+        """Counts that y passes the tip of the pallet that holds the wheel: the other one holds it from there."""
+        if self.holder * self.y >= self.eta:
+            self.holder, self.releases = -self.holder, self.releases + 1
+
+    def go_back(self, speed, pull, t):
+        """Remembers how far the wheel is behind its foremost within t, which begins at that speed."""
+        turn = min(max(-speed / pull, 0), t)
+        self.backs.append(self.foremost - self.x - (speed + pull * turn / 2) * turn)
+        self.foremost = max(self.foremost, self.x + (speed + pull * t / 2) * t)
+
     def fly(self, t):
         if self.y < 0 <= self.y + self.w * t:
             to = -self.y / self.w
-            self.passages.append((self.time + to, self.x + (self.V + to / 2) * to, self.V + to, self.w, len(self.lows)))
+            self.mark(self.time + to, self.x + (self.V + to / 2) * to, self.V + to, self.w)
+        self.go_back(self.V, 1, t)
         self.x += self.V * t + t * t / 2
         self.y += self.w * t
         self.V += t
         self.time += t
+        self.release()
 
     def strike(self, side, tooth):
         lever = side * self.slope(side * self.y)
@@ -101,11 +154,14 @@ class Clock:
             (self.lows if side > 0 else self.highs).append(turn)
         if side > 0 and self.y < 0:
             fast = root(W * W - 2 * pull * self.y)
-            self.passages.append((self.time + (fast - W) / pull, self.x - self.y, fast, fast, len(self.lows)))
+            self.mark(self.time + (fast - W) / pull, self.x - self.y, fast, fast)
+        self.go_back(W, pull, t)
+        self.touched += t
         self.x += way
         self.y, self.V, self.w = side * self.eta, speed, side * speed
         self.time += t
         self.held = None
+        self.release()
 
     def step(self):
         """To just after the next contact, or to the end of one that lasts."""
@@ -118,24 +174,42 @@ class Clock:
 
 
 def settled(clock, steps, near):
-    """(period, half travel, middle of the travel, teeth) of the motion that a clock comes to repeat, or None.
+    """`Settled` of a clock, or None; half travel and its middle are those of the farthest ends.
 
-    It has come to a cycle when it passes y = 0 upwards as it did before, within `near`; a period is the time per tooth.
+    It has come to a cycle when it passes y = 0 upwards as it did before, within `near`; impacts are per half period.
     """
     for _ in range(steps):
         clock.step()
-    times, ways, rims, pallets, marks = zip(*clock.passages, strict=True)
-    for back in range(2, 40):
-        if back > len(times):
-            return None
-        teeth = ways[-1] - ways[-back]
-        apart = max(abs(rims[-1] - rims[-back]), abs(pallets[-1] - pallets[-back]), abs(teeth - round(teeth)))
-        if apart < near and round(teeth) > 0:
-            low, high = (
-                f(extremes[marks[-back] : marks[-1]]) for f, extremes in ((min, clock.lows), (max, clock.highs))
-            )
-            return (times[-1] - times[-back]) / round(teeth), (high - low) / 2, abs(high + low) / 2, round(teeth)
+    last = clock.passages[-1]
+    for back in range(1, min(40, len(clock.passages))):
+        first = clock.passages[-1 - back]
+        ways = last.x - first.x
+        teeth = round(ways)
+        if max(abs(last.V - first.V), abs(last.w - first.w), abs(ways - teeth)) < near and teeth > 0:
+            low, high = min(clock.lows[first.ends : last.ends]), max(clock.highs[first.ends : last.ends])
+            time = last.time - first.time
+            return Settled(
+                time / teeth, (high - low) / 2, abs(high + low) / 2, teeth, back, last.releases - first.releases,
+                max(clock.backs[first.backs : last.backs]), (last.touched - first.touched) / time,
+                (last.impacts - first.impacts) / (2 * teeth),
+            )  # fmt: skip
     return None
+
+
+def multiplier(clock, end, step=1e-5):
+    """Largest modulus by which disturbances of a settled clock without contact grow in a half swing, by differences."""
+    last = clock.passages[-1]
+
+    def image(disturbance):
+        other = Clock(clock.kappa, clock.eta, clock.e, clock.c, clock.y_i)
+        other.x, other.V, other.w = (v + d for v, d in zip((last.x, last.V, last.w), disturbance, strict=True))
+        while len(other.passages) < end.passages:
+            other.step()
+        there = other.passages[-1]
+        return np.array([there.x, there.V, there.w])
+
+    slopes = [(image(step * unit) - image(-step * unit)) / (2 * step) for unit in np.eye(3)]
+    return max(abs(np.linalg.eigvals(np.array(slopes)))) ** (1 / end.half_swings)
 
 
 def roots(gap, rate, bend):

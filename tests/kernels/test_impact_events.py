@@ -113,8 +113,9 @@ FOLLOWED = {
     "five impacts": (70.2472, 0.2089, 0.5672),
     "bounces that end in contact, off the middle": (2.831478082246554, 0.23931507825468049, 0.6098680333568618),
     "off the middle, light foliot": (12.786, 0.126, 0.7672),
-    "two cycles": (12.7859, 0.1057, 0.5342),
-    "two cycles, more bounces": (2.8315, 0.1474, 0.4885),
+    "three swings to a tooth": (17.13985716032627, 0.004964693289814581, 0.6716857730988353),
+    "two cycles, off the middle": (12.7859, 0.1057, 0.5342),
+    "two cycles, off the middle, more impacts": (2.8315, 0.1474, 0.4885),
 }
 KINDS = tuple(FOLLOWED) if COMPILED else ("one impact", "plastic", "bounces that end in contact")
 
@@ -131,17 +132,21 @@ def found():
 def test_a_plain_simulation_ends_up_in_the_same_cycle(kind, found):
     clock = simulation.Clock(*FOLLOWED[kind])
     clock.begin(w=1.0001)
-    period, travel, middle, teeth = simulation.settled(clock, 3000 if COMPILED else 1000, 1e-8)
+    end = simulation.settled(clock, 3000 if COMPILED else 1000, 1e-8)
     rows, status = found
     row, unit = rows[kind], time_unit(FOLLOWED[kind][0])
     assert status[kind] == (Status.PERIOD_2 if "two" in kind else Status.OK)
-    assert teeth == (2 if "two" in kind else 1)
-    assert row["period"] == pytest.approx(period * unit, rel=1e-11)
-    if teeth == 1:
-        assert row["swing"] == pytest.approx(travel * PITCH, rel=1e-11)
-        assert row["offset"] == pytest.approx(middle * PITCH, abs=1e-11 * PITCH)
-        assert (row["offset"] > 0.01 * row["swing"]) == ("off" in kind)
-    assert np.isinf(row["impacts"]) == ("bounces that" in kind)
+    assert end.teeth == (2 if "two" in kind else 1)
+    assert row["period"] == pytest.approx(end.period * unit, rel=1e-11)
+    assert row["swing"] == pytest.approx(end.travel * PITCH, rel=1e-11)
+    assert row["offset"] == pytest.approx(end.middle * PITCH, abs=1e-11 * PITCH)
+    assert row["contact_share"] == pytest.approx(end.contact_share, rel=1e-9, abs=1e-9)
+    assert row["recoil"] == pytest.approx(end.recoil * 2 * np.pi / TEETH, rel=1e-10, abs=1e-12)
+    assert (row["offset"] > 0.01 * row["swing"]) == ("off" in kind)
+    assert np.isinf(row["impacts"]) == ("bounces" in kind)
+    if end.contact_share == 0:
+        assert row["impacts"] == end.impacts
+        assert row["multiplier"] == pytest.approx(simulation.multiplier(clock, end), rel=1e-5)
 
 
 @pytest.mark.skipif(not COMPILED, reason="many clocks")
@@ -156,7 +161,7 @@ def test_random_clocks_go_where_a_plain_simulation_goes(seed):
         end = simulation.settled(clock, 2500, 1e-8)
         if status[i] in (Status.OK, Status.PERIOD_2) and end:
             compared += 1
-            assert outputs["period"][i] == pytest.approx(end[0] * time_unit(scene[0]), rel=1e-8)
+            assert outputs["period"][i] == pytest.approx(end.period * time_unit(scene[0]), rel=1e-8)
     assert compared >= 4
 
 
