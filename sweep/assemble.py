@@ -27,6 +27,7 @@ from sweep.integrity import BYTES, Seals, column_digests, frame_digest, frame_pl
 from sweep.layout import Column, Coordinate, Layout
 from sweep.parts import DAMAGE, FLAGS
 from sweep.pool import CtrlC, Spares, each
+from sweep.sealing import seal
 from sweep.store import Store
 from sweep.study import Study
 
@@ -119,10 +120,11 @@ def _fill(
 
 
 def _seal(fd: int, writer: _Writer) -> None:
-    """Writes the digest of everything else, which must be in its place by now."""
+    """Writes the digests of everything else, which must be in its place by now."""
     place = writer.frame_place
     found = frame_digest(fd, [*writer.regions, (place, place + BYTES)])
     disk.pwrite_all(fd, found, place)
+    disk.pwrite_all(fd, seal(writer.regions, fd), os.fstat(fd).st_size)
 
 
 def write_frame(path: Any, layout: Layout, seals: Seals) -> None:

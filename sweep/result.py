@@ -19,6 +19,7 @@ from sweep.image import Images
 from sweep.layout import STATUS, Layout
 from sweep.parts import PART_NAME, READERS, Parts, read_part
 from sweep.reducing import BY_STATUS, pending
+from sweep.sealing import readable
 from sweep.statuses import StatusCount, count_methods, count_statuses, failures
 from sweep.store import SPEC, Spec, folder_of, read_spec
 from sweep.study import Study
@@ -108,6 +109,9 @@ def stored_fingerprint(output: Path) -> dict[str, str]:
     import h5py
 
     try:
+        with output.open("rb") as raw:
+            if not readable(output, raw.fileno()):
+                raise ValueError("HDF5 cannot read it")
         with h5py.File(output, "r") as file:
             text = file.attrs["fingerprint"]
             file.attrs["study_json"], file[STATUS if STATUS in file else BY_STATUS]

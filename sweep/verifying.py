@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -21,8 +22,12 @@ from sweep.image import Images
 from sweep.integrity import BYTES, DIGESTS, FRAME, GROUP, frame_digest, frame_place, pieces
 from sweep.parts import DAMAGE, PART_NAME, READERS, read_part
 from sweep.result import checked_study, unreadable
+from sweep.sealing import length, readable, unbroken
 from sweep.store import LOCK, SPEC, Spec, folder_of, read_spec
 
+BESIDE = "damaged beside the outputs' numbers: in attributes, coordinates, statuses or its structure"
+OF_DAMAGE = (errno.EINVAL, errno.EOVERFLOW)
+"""What the system says where a damaged file sends one to a place that cannot be."""
 MOST_TOLD = 8
 """Findings of one kind that are told one by one."""
 
@@ -90,6 +95,8 @@ def _finished(output: Path) -> Verdict:
 
     try:
         size = output.stat().st_size
+        if not _may_be_read(output):
+            return Verdict(output, False, f"{size:,} bytes checked", (BESIDE,))
         with h5py.File(output, "r") as file:
             if GROUP not in file and "study_json" in file.attrs:
                 raise SweepError(f"{output}: has no digests; it was written by an earlier version")
@@ -97,9 +104,21 @@ def _finished(output: Path) -> Verdict:
     except DAMAGE as fault:
         if output.is_dir() or isinstance(fault, PermissionError):
             raise unreadable(output, fault) from None
+        if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
+            raise SweepError(f"{output}: cannot be read ({os.strerror(fault.errno)})") from None
         text = (str(fault).splitlines() or [type(fault).__name__])[0]
         findings = [f"its structure is damaged, or it is not the result of a sweep ({text})"]
     return Verdict(output, not findings, f"{size:,} bytes checked", tuple(findings))
+
+
+def _may_be_read(output: Path) -> bool:
+    """False where the structure is damaged. Raises OSError."""
+    fd = disk.open_file(output, os.O_RDONLY)
+    try:
+        found = unbroken(fd)
+        return readable(output, fd) if found is None else found
+    finally:
+        os.close(fd)
 
 
 def _description(file: Any, size: int) -> tuple[list[_Column], Partition]:
@@ -132,9 +151,11 @@ def _compare(output: Path, file: Any, columns: list[_Column], blocks: Partition)
             findings += _told(column.name, blocks, bad)
         place = frame_place(file)
         apart = [(c.place, c.place + c.cell_bytes * blocks.size) for c in columns]
-        if frame_digest(fd, [*apart, (place, place + BYTES)]) != bytes(file[GROUP][FRAME][...]):
-            what = "in attributes, coordinates, statuses or its structure"
-            findings.append(f"damaged beside the outputs' numbers: {what}")
+        size = os.fstat(fd).st_size
+        if frame_digest(fd, [*apart, (place, place + BYTES), (size - length(fd), size)]) != bytes(
+            file[GROUP][FRAME][...]
+        ):
+            findings.append(BESIDE)
         return findings
     finally:
         os.close(fd)
