@@ -428,7 +428,8 @@ def test_a_limit_that_leaves_a_round_number_out_is_told_so(call):
     assert re.search(r"^  e +\[1\] +>= 0, < 1 ", out, re.MULTILINE)
 
 
-def test_a_study_to_begin_with_is_written_and_runs(call):
+def test_a_study_to_begin_with_is_written_and_runs(call, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     assert call("kernels", "foliot_motion", "--study", "motion.toml")[:2] == (0, "motion.toml\n")
     assert call("run", "motion.toml")[0] == 0
     code, _, err = call("kernels", "foliot_motion", "--study", "motion.toml")
