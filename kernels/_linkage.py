@@ -133,17 +133,22 @@ def rate(lengths, squared, rz, side, s, c):
 
 
 @jit
-def acceleration(lengths, squared, rz, side, s, c):
+def acceleration(lengths, margin, squared, rz, side, s, c):
     """alpha'' at a constant rate of the crank, (3) once more by theta.
 
-    alpha'' = (b e/P^2) [sin theta (e^2 - b^2)/P^2
-                         + (side/rz) (Q cos theta - 2 b e sin^2 theta ((d^2 - f^2)/P^2 - Q K/rz^2))]
+    With i = P^2 - (d-f)^2 and o = (d+f)^2 - P^2, at theta = 0 and pi where c and s are 0: i0 and o0 of the margins,
+    (sin theta/rz)' = (c^2 i o0 - s^2 o i0)/rz^3
+    alpha'' = (b e/P^2) [sin theta (e^2 - b^2)/P^2 + side (Q (sin theta/rz)' - 2 b e sin^2 theta (d^2 - f^2)/(P^2 rz))]
     """
     b, d, f, e = lengths
-    p2, q, _, k = squared
-    sine, cosine = 2.0 * s * c, (c - s) * (c + s)
-    drift = (d - f) * (d + f) / p2 - (q / rz) * (k / rz)
-    bent = fma(q, cosine, -2.0 * b * e * (sine * sine) * drift) * (side / rz)
+    p2, q, _, _ = squared
+    stretched, back, front = margin
+    outer, inner = dead_gaps(lengths, margin, s, c)
+    sine = 2.0 * s * c
+    past = (c * c) * inner * (stretched * ((d + f) + (b + e)))
+    steeper = fma(-(s * s) * outer, back * front, past) / (outer * inner)
+    drift = 2.0 * b * e * (sine * sine) * ((d - f) * (d + f) / p2)
+    bent = fma(q, steeper, -drift) * (side / rz)
     return b * e / p2 * fma(sine, (e - b) * (e + b) / p2, bent)
 
 
@@ -166,7 +171,7 @@ def motion(lengths, margin, side, theta, s, c):
     return (
         alpha,
         rate(lengths, squared, rz, side, s, c),
-        acceleration(lengths, squared, rz, side, s, c),
+        acceleration(lengths, margin, squared, rz, side, s, c),
     )
 
 

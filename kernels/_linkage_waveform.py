@@ -192,7 +192,7 @@ def _slope(lengths, margin, sign, place, half):
     """Whether sign alpha' rises with `place`: alpha'' there."""
     s, c = at_node(place, half)
     outer, inner = dead_gaps(lengths, margin, s, c)
-    return sign * half * acceleration(lengths, squares(lengths, c), sqrt(outer * inner), 1.0, s, c)
+    return sign * half * acceleration(lengths, margin, squares(lengths, c), sqrt(outer * inner), 1.0, s, c)
 
 
 @jit_call

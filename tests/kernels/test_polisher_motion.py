@@ -51,6 +51,15 @@ def test_angle_rate_and_acceleration_have_their_digits_next_to_dead_points_too(n
         assert max(float(abs(x) / largest) for x in off) < 2e-15, output
 
 
+@pytest.mark.parametrize("distance", [1e-7, 1e-5, 1e-3])
+@pytest.mark.parametrize(("name", "dead"), [("nearly stretched", 0.0), ("nearly folded", np.pi)])
+def test_the_acceleration_beside_a_dead_point_has_its_digits_for_itself(name, dead, distance):
+    """Not only beside its largest value, which is at the dead point and far larger."""
+    traces, _ = motion(*MACHINES[name], angles=[dead - distance])
+    truth = oracles.motion(*MACHINES[name], 1, dead - distance)
+    assert float(abs(mpf(float(traces["alpha_acceleration"][0])) / truth[2] - 1)) < 1e-14
+
+
 def test_the_tool_goes_with_the_arm_at_its_distance_and_angle():
     terms = {"omega": -3.0, "b_angle": -0.66, "L": 0.9, "beta": 1.5}
     traces, status = motion(*MACHINES["usual"], type=1.0, **terms)
