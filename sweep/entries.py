@@ -200,7 +200,7 @@ class Entries:
         if not isinstance(found, str | Path):
             return self._file(found, name, field, where)
         try:
-            count = axes.numbered_columns(self.folder / found, name)
+            count = axes.numbered_columns(self._path(found), name)
         except ValueError as error:
             self.mistakes.add(where, str(error))
             return NONE
@@ -211,8 +211,8 @@ class Entries:
         if not isinstance(found, str | Path):
             self.mistakes.add(where, f'expected the name of a csv file, found {show(found)}; write e.g. "points.csv"')
             return NONE
-        path = self.folder / found
         try:
+            path = self._path(found)
             cells = axes.read_column(path, name)
         except ValueError as error:
             self.mistakes.add(where, str(error))
@@ -224,6 +224,19 @@ class Entries:
         return self._numbers(
             texts, lambda text: _csv_number(text, field), lambda i: (where, f"{path}, line {cells[i][0]}: ")
         )
+
+    def _path(self, found: str | Path) -> Path:
+        """A text names a file in the study's folder or below; a `Path`, which a file cannot hold, any. ValueError."""
+        path = self.folder / found
+        try:
+            path.exists()
+            inside = path.resolve().is_relative_to(self.folder.resolve())
+        except (OSError, RuntimeError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise ValueError(f"{show(found)} cannot be read: {reason}") from None
+        if isinstance(found, str) and not inside:
+            raise ValueError(f"{show(found)} cannot be read: it is outside of the study's folder; put a copy beside it")
+        return path
 
     def _allowed_length(self, length: int, where: str) -> bool:
         if length == 0:
