@@ -114,7 +114,7 @@ def located(m, how, state, new, scene, h, which, ends, seeking):
         calls = calls + where(method > 3.5, 12.0, 4.0) * parts
         part, new = where(curved, part, 0.0), choose(curved, new, state)
     elif location == ROOT:
-        part, new, trials, lost = shortened(m, method, parts, state, scene, h, which, part, curved)
+        part, new, trials, lost = shortened(m, method, parts, state, scene, h, which, part, (e0, e1), curved)
         part, new = where(curved, part, 0.0), choose(curved, new, state)
         calls = trials * (CALLS[method] * parts)
     else:
@@ -217,7 +217,7 @@ def follow(m, how, parameters, limits, motion, tally, active):
     done = active & isnt(active)
     for _ in range(TOGETHER):
         time, since, interval, count, steps, calls, trials, reach, at, reach_at, verdict = tally
-        state, side, signs, _on, _cut, _cuts = motion
+        side = motion[1]
         motion, which, taken, more, found = attempt(m, how, parameters, step, graze, motion, active)
         verdict = where(active & (found > verdict), found, verdict)
         trials, calls = where(active, trials + 1.0, trials), where(active, calls + more, calls)

@@ -22,8 +22,8 @@ NONE, LINEAR, HERMITE, ROOT, HENON = range(5)
 LOCATIONS = {"none": NONE, "linear": LINEAR, "hermite": HERMITE, "root": ROOT, "henon": HENON}
 
 ROOT_LIMIT = 60
-SETTLED = 1e-9
-"""Newton's step, over the whole one, after which the event is where the next trial ends: its error is the square."""
+SETTLED = 1e-11
+"""Change of the part of a step after which the event is where the next trial ends."""
 CLOSE = 0.1
 """How much of an event's value may be left behind Henon's step."""
 
@@ -96,23 +96,29 @@ def of_event(values, which):
 
 
 @jit_call
-def shortened(m, method, parts, state, scene, h, which, first, seeking):
-    """The step that ends on the event: part of h, state, trials. Newton, bisection where that leaves the bracket."""
+def shortened(m, method, parts, state, scene, h, which, first, ends, seeking):
+    """The step that ends on the event: part of h, state, trials, and whether it is not found.
+
+    Regula falsi with halving (Illinois): the event's rate is not the slope of its value over the step's length.
+    """
     side, signs, parameters, _ = scene
     low, high, part, trials = 0.0 * h, 0.0 * h + 1.0, first, 0.0 * h
+    above, below = ends
     new = leap(m, method, parts, state, scene, part * h)
-    settled = seeking & isnt(seeking)
+    settled, last = seeking & isnt(seeking), 0.0 * h
     for _ in range(ROOT_LIMIT):
         trials = where(seeking, trials + 1.0, trials)
         seeking = seeking & isnt(settled)
         if not some(seeking):
             break
-        values, slopes = m.events(new, side, signs, parameters)
-        value, slope = of_event(values, which), of_event(slopes, which)
-        low, high = where(value > 0.0, part, low), where(value > 0.0, high, part)
-        guess = part - value / (slope * h)
-        settled = magnitude(guess - part) <= SETTLED
-        guess = where((guess >= low) & (guess <= high), guess, 0.5 * (low + high))
+        value = of_event(m.events(new, side, signs, parameters)[0], which)
+        before = value > 0.0
+        above = where(before, value, where(last < 0.0, 0.5 * above, above))
+        below = where(before, where(last > 0.0, 0.5 * below, below), value)
+        low, high = where(before, part, low), where(before, high, part)
+        last = where(before, 1.0, -1.0)
+        guess = fma(high - low, above / (above - below), low)
+        settled = (magnitude(guess - part) <= SETTLED) | (magnitude(value) <= 0.0)
         part = where(seeking, guess, part)
         new = choose(seeking, leap(m, method, parts, state, scene, part * h), new)
     return part, new, trials, seeking

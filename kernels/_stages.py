@@ -6,13 +6,13 @@ held, and the motion is followed as if the kink were not there, until it is loca
 """
 
 from kernels._jit import jit, jit_call
-from kernels._lanes import where
+from kernels._lanes import choose
 from kernels._tableaux import (
     DOP853,
     DOPRI5,
     RK4,
 )
-from kernels._tuples import after, paired
+from kernels._tuples import after, paired, times
 
 ONE = (1.0,)
 
@@ -60,8 +60,8 @@ def moreau(m, state, scene, h):
     middle = paired(after(state, 0.5 * h, ONE, (rate(m, state, scene),)), state)
     forward = after(state, h, ONE, (m.rates(middle, side, m.ahead, parameters),))
     backward = after(state, h, ONE, (m.rates(middle, side, m.behind, parameters),))
-    speed = where(forward[1] > 0.0, forward[1], where(backward[1] < 0.0, backward[1], 0.0))
-    kicked = paired(state, (speed, speed))
+    slid = choose(forward[-1] > 0.0, forward, choose(backward[-1] < 0.0, backward, times(0.0, state)))
+    kicked = paired(state, slid)
     return paired(after(middle, 0.5 * h, ONE, (rate(m, kicked, scene),)), kicked)
 
 

@@ -9,26 +9,9 @@ is also what a method states as its bound. STEP_LIMIT: no switch in 20 000 steps
 energy, or chatters about a place of rest. OUT_OF_RANGE: the method blew up.
 """
 
-import math
-
-import numpy as np
-
-from kernels import _stepped_solve
-from kernels._locate import LOCATIONS, METHODS
-from kernels._stepped_source import stepped
-from kernels.interface import Field, Kernel, Method, Status
+from kernels.interface import Field, Kernel, Status
 from kernels.scene import Scene, _check, _signed, sign
-
-MOST_FLIPS = 10_000
-DOCS = {
-    "euler": "explicit Euler, order 1",
-    "semi_implicit": "semi-implicit Euler, order 1",
-    "verlet": "velocity Verlet, order 2",
-    "rk4": "classical Runge-Kutta, order 4",
-    "dopri5": "Dormand-Prince at a fixed step, order 5",
-    "dop853": "Dormand-Prince at a fixed step, order 8",
-    "moreau": "Moreau's time-stepping, order 1: dry friction without location",
-}
+from kernels.stepping import WORK, stepping_fields, stepping_methods
 
 
 def rates(angle, speed, side, mu, a, R, c, k):
@@ -59,51 +42,22 @@ PARAMETERS = (
     Field("c", "1", "quadratic drag per moment of inertia", default=0.0, lower=0.0),
     Field("k", "1/s^2", "hairspring stiffness per moment of inertia", default=0.0, lower=0.0),
     Field("e", "1", "restitution of the speed at the switch", default=1.0, lower=-1.0, upper=1.0, open_lower=True),
-    Field("flips", "1", "switches to follow", default=20.0, lower=1.0, upper=float(MOST_FLIPS), integer=True),
-    Field("step", "s", "time step", lower=0.0, open_lower=True),
-    Field("location", "1", "how a switch is found in its step", default=3.0, lower=0.0, upper=4.0, choices=LOCATIONS,
-          integer=True),
-)  # fmt: skip
+    *stepping_fields(),
+)
 
 OUTPUTS = (
     Field("period", "s", "twice the time between the last two switches"),
     Field("time", "s", "time of the last switch"),
     Field("amplitude", "rad", "largest angle since the switch before the last"),
     Field("crossing_speed", "rad/s", "speed just before the last switch"),
-    Field("error", "1", "estimated largest relative error of these four"),
-    Field("steps", "1", "steps taken", integer=True),
-    Field("rate_calls", "1", "evaluations of the right-hand side", integer=True),
+    *WORK,
 )
 
 
-def _solved(name, mu, phi0, a, R, c, k, e, flips, step, location):
-    """The rows of `_stepped_solve.solved`."""
-    return _stepped_solve.solved(stepped(SCENE), name, (mu, phi0, a, R, c, k, e, flips), step, location)
-
-
-def _method(name):
-    """A method with its functions of columns."""
-
-    def solve(*columns):
-        *inputs, _ = columns[: len(PARAMETERS) + 1]
-        period, time, amplitude, crossing_speed, error, steps, rate_calls, status = columns[len(PARAMETERS) + 1 :]
-        if len(status):
-            found, error[:], status[:] = _solved(name, *inputs)
-            time[:], period[:], amplitude[:], crossing_speed[:] = found[0], 2.0 * found[1], found[4], abs(found[3])
-            steps[:], rate_calls[:] = found[6], found[7]
-
-    def bound(*columns):
-        if len(columns[0]):
-            error = _solved(name, *columns[: len(PARAMETERS)])[1]
-            columns[-1][:] = np.where(np.isnan(error), math.inf, error)
-
-    parameters, outputs = [f.name for f in PARAMETERS], [f.name for f in OUTPUTS]
-    return Method(
-        name,
-        DOCS[name],
-        _signed(solve, [*parameters, "rtol", *outputs, "status"]),
-        _signed(bound, [*parameters, "rtol", "asked", "out"]),
-    )
+def _fill(time, interval, states, reach, columns):
+    """The outputs but those of the work."""
+    period, last, amplitude, crossing_speed = columns
+    period[:], last[:], amplitude[:], crossing_speed[:] = 2.0 * interval, time, reach[0], abs(states[1])
 
 
 def _check_columns(*columns):
@@ -123,6 +77,6 @@ FOLIOT_STEPS = Kernel(
     parameters=PARAMETERS,
     outputs=OUTPUTS,
     check=check,
-    methods=tuple(_method(name) for name in METHODS),
+    methods=stepping_methods(SCENE, PARAMETERS, OUTPUTS, _fill),
     example={"mu": 1.0, "phi0": 1.0, "a": 0.5, "flips": 2.0, "step": 0.05},
 )

@@ -1,0 +1,114 @@
+"""Scenes of one's own followed by textbook integrators at a fixed step.
+
+The parameters `step` and `location` (`_locate`) may be axes of a study. Everything is done twice (`_stepped_solve`):
+what the runs differ by tells `error`, which is also what a method states as its bound.
+Semi-implicit Euler and Verlet
+are to be had where the states are pairs (place, speed), Moreau's method for one pair with dry friction at speed 0.
+"""
+
+import math
+
+import numpy as np
+
+from kernels import _stepped_solve
+from kernels._locate import LOCATIONS, METHODS
+from kernels._stepped_source import methods_of, stepped
+from kernels.interface import Field, Kernel, Method
+from kernels.scene import Scene, _check, _signed
+
+__all__ = ["METHODS", "stepped_kernel", "stepping_fields", "stepping_methods"]
+
+MOST_FLIPS = 10_000
+DOCS = {
+    "euler": "explicit Euler, order 1",
+    "semi_implicit": "semi-implicit Euler, order 1",
+    "verlet": "velocity Verlet, order 2",
+    "rk4": "classical Runge-Kutta, order 4",
+    "dopri5": "Dormand-Prince at a fixed step, order 5",
+    "dop853": "Dormand-Prince at a fixed step, order 8",
+    "moreau": "Moreau's time-stepping, order 1: dry friction without location",
+}
+WORK = (
+    Field("error", "1", "estimated largest relative error"),
+    Field("steps", "1", "steps taken", integer=True),
+    Field("rate_calls", "1", "evaluations of the right-hand side", integer=True),
+)
+
+
+def stepping_fields(flips=20.0):
+    """The parameters that every scene has: switches to follow, step, location."""
+    words = {"lower": 0.0, "upper": 4.0, "choices": LOCATIONS, "integer": True}
+    return (
+        Field("flips", "1", "switches to follow", default=flips, lower=1.0, upper=float(MOST_FLIPS), integer=True),
+        Field("step", "s", "time step", lower=0.0, open_lower=True),
+        Field("location", "1", "how a switch is found in its step", default=3.0, **words),
+    )
+
+
+def stepping_methods(scene, parameters, outputs, fill):
+    """The methods that can do the scene.
+
+    Parameters
+    ----------
+    parameters, outputs : fields; the last parameters are those of `stepping_fields`, the last outputs `WORK`
+    fill : (time, interval, states, their reach, outputs but the last three) writes these
+    """
+    count, names = len(parameters), [f.name for f in parameters]
+    n = len(scene.states)
+
+    def solved(name, columns):
+        return _stepped_solve.solved(stepped(scene), name, columns[: count - 2], *columns[count - 2 : count])
+
+    def method(name):
+        def solve(*columns):
+            *given, error, steps, rate_calls, status = columns[count + 1 :]
+            if len(status):
+                found, error[:], status[:] = solved(name, columns)
+                fill(found[0], found[1], found[2 : 2 + n], found[2 + n : 2 + 2 * n], given)
+                steps[:], rate_calls[:] = found[-2:]
+
+        def bound(*columns):
+            if len(columns[0]):
+                error = solved(name, columns)[1]
+                columns[-1][:] = np.where(np.isnan(error), math.inf, error)
+
+        solve = _signed(solve, [*names, "rtol", *(f.name for f in outputs), "status"])
+        return Method(name, DOCS[name], solve, _signed(bound, [*names, "rtol", "asked", "out"]))
+
+    return tuple(method(name) for name in methods_of(scene))
+
+
+def _fill_plainly(time, interval, states, reach, columns):
+    for column, row in zip(columns, (time, interval, *states), strict=True):
+        column[:] = row
+
+
+def stepped_kernel(*, name, doc, states, parameters, rates, surface, start, switch=None, source="", example=None):
+    """A kernel that follows a scene at a fixed step; the arguments are those of `kernels.scene.scene_kernel`.
+
+    Returns
+    -------
+    Kernel
+        Of the scene's parameters, `flips`, `step` and `location`; its outputs are `time` of the last switch, `interval`
+        since the one before, each state just before it, and `error`, `steps`, `rate_calls`.
+    """
+    scene = Scene(
+        name, doc, tuple(s.name for s in states), tuple(p.name for p in parameters), rates, surface, start, switch
+    )
+    fields = (*parameters, *stepping_fields())
+    outputs = (
+        Field("time", "s", "time of the last switch"),
+        Field("interval", "s", "time between the last two switches, or from the start to the only one"),
+        *states,
+        *WORK,
+    )
+    return Kernel(
+        name=name,
+        doc=doc,
+        source=source or "a study's own",
+        parameters=fields,
+        outputs=outputs,
+        check=_check(fields),
+        methods=stepping_methods(scene, fields, outputs, _fill_plainly),
+        example=dict(example or {}),
+    )
