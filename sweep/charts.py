@@ -9,7 +9,7 @@ import contextlib
 import itertools
 import os
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -153,7 +153,7 @@ def plot_precision(found: xr.Dataset, path: str | os.PathLike[str] | None = None
         figure = new_figure(PAGE, 92.0)
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         for axes, key, text in zip(panels, ("error_median", "error_worst"), ("median cell", "worst cell"), strict=True):
-            _draw_precision(axes, found, key)
+            draw_precision(axes, found, key)
             axes.set_title(text)
         panels[0].set_ylabel("relative error")
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
@@ -169,12 +169,15 @@ FLOOR = 1e-17
 """Where errors of 0 are drawn."""
 
 
-def _draw_precision(axes: Any, found: xr.Dataset, key: str) -> None:
-    """Filled marks where all cells are solved, open ones where some are refused or said to be inaccurate, crosses where
+def draw_precision(axes: Any, found: xr.Dataset, key: str, names: Sequence[str] = ()) -> None:
+    """A line for each method; those in `names` look the same in every picture that gives the same names.
+
+    Filled marks where all cells are solved, open ones where some are refused or said to be inaccurate, crosses where
     some are silently wrong. The reference is drawn at what it is right to, since against itself it has no error.
     """
     floor = found.attrs.get("reference_error", np.nan)
-    for i, name in enumerate(found["method"].values):
+    order = list(dict.fromkeys([*names, *found["method"].values.tolist()]))
+    for i, name in ((order.index(name), name) for name in found["method"].values):
         row = found.sel({"method": name})
         least = max(floor, FLOOR) if name == found.attrs.get("reference") else FLOOR
         seconds, error = row.seconds.values, np.maximum(row[key].values, least)

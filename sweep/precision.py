@@ -34,6 +34,7 @@ REPETITIONS = 3
 LEAST_SECONDS = 0.02
 UNSURE = (Status.INACCURATE, Status.GRAZING)
 """What says of itself that digits, or a count, may be wrong."""
+NAMES = {int(status): status.name for status in Status}
 WORK = ("rate_calls", "steps", "events")
 """Outputs that count a method's work; where a study asks for them, their means are shown beside the time."""
 
@@ -244,7 +245,7 @@ def _first(study: Study, where: Any, status: Any = None) -> str:
     if not where.any():
         return ""
     index = int(where.argmax())
-    return _cell(study, index) if status is None else f"{Status(status[index]).name} at {_cell(study, index)}"
+    return _cell(study, index) if status is None else f"{NAMES[int(status[index])]} at {_cell(study, index)}"
 
 
 def _seconds(study: Study) -> float:

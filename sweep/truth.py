@@ -77,7 +77,12 @@ def best_reference(study: Study, able: Sequence[str], asked: str | None) -> Trut
     """
     if asked is not None and asked not in able:
         raise SweepError(f"no method {asked} that can do this study; there are {', '.join(able)}")
-    found = [reference(study, name) for name in ([asked] if asked else able)]
+    names = [asked] if asked else sorted(able, key=lambda name: study.kernel.method(name).bound is None)
+    found: list[Truth] = []
+    for name in names:
+        if study.kernel.method(name).bound is None and any(t.judged == len(t.floor) for t in found):
+            break  # those that state a bound suffice
+        found.append(reference(study, name))
     best = min(found, key=lambda t: (-t.judged, study.kernel.method(t.source).bound is None, _digits_lost(t)))
     if not best.sound.any():
         raise SweepError(f"{best.source} solves none of the cells, so there is nothing to measure against")

@@ -9,7 +9,7 @@ from toy_studies import build
 
 from kernels.interface import Field, Method, Status
 from sweep import SweepError, cli
-from sweep.charts import plot_precision
+from sweep.charts import draw_precision, new_figure, plot_precision, style
 from sweep.precision import precision_cells, precision_text, work_precision
 from sweep.sampling import sampled, with_method
 
@@ -166,6 +166,20 @@ def test_of_methods_that_solve_all_cells_one_that_states_a_bound_is_the_referenc
     assert measured(still).attrs["reference"] == "rough"
 
 
+def test_methods_that_state_no_bound_are_not_tried_where_another_leaves_no_cell_open():
+    calls = []
+
+    def dear(*columns):
+        calls.append(columns[3][0])
+        exact(*columns)
+
+    still = stones(axes={"height": HEIGHTS, "v0": np.zeros(4)})
+    study = with_methods(still, Method("dear", "", dear), KERNEL.methods[0])
+    found = work_precision(study, methods=["rough"], tolerances=[1e-3])
+    assert found.attrs["reference"] == "rough"
+    assert calls == []
+
+
 def test_the_floor_is_the_least_rtol_at_which_the_reference_says_ok():
     def coarse(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
         exact(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status)
@@ -292,6 +306,16 @@ def test_the_picture_has_a_line_for_each_method_open_marks_where_cells_fail_and_
     assert len(open_marks) == 1
     assert (lines["exact"].get_ydata() == found.attrs["reference_error"]).all()
     assert (tmp_path / "chart.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_method_looks_the_same_in_pictures_that_name_the_same_methods():
+    found = measured(stones())
+    with style():
+        left, right = new_figure(100, 60).subplots(1, 2)
+        draw_precision(left, found, "error_worst", ["exact", "rough"])
+        draw_precision(right, found.sel({"method": ["exact"]}), "error_worst", ["exact", "rough"])
+    looks = [{line.get_label(): (line.get_color(), line.get_marker()) for line in axes.lines} for axes in (left, right)]
+    assert looks[0]["exact"] == looks[1]["exact"] != looks[0]["rough"]
 
 
 TOML = """# How right is a stone?

@@ -1,0 +1,112 @@
+"""What the study of work and precision concludes is so, on few cells and tolerances."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import work_precision as study
+import xarray as xr
+from mpmath import mp, mpf
+
+import sweep
+from kernels._jit import COMPILED
+from sweep.precision import precision_cells, work_precision
+
+STUDIES = Path(study.__file__).parent
+FILE = STUDIES / "work_precision.toml"
+CELLS = 6 if COMPILED else 3
+TOLERANCES = (1e-4, 1e-10)
+METHODS = ("auto", "coulomb", "quadrature")
+
+
+@pytest.fixture(scope="module")
+def coulomb():
+    few = sweep.read_study(FILE)
+    return work_precision(few, methods=METHODS, cells=CELLS, tolerances=TOLERANCES, truth=study.cycles(few, CELLS))
+
+
+@pytest.fixture(scope="module")
+def steps():
+    """An integrator of order p whose error is h^p/10, three calls a step."""
+    h = np.geomspace(1e-3, 0.25, 17)
+    order = {"euler": 1, "semi_implicit": 1, "verlet": 2, "rk4": 4, "dopri5": 5, "dop853": 8}
+    error = (("method", "step"), [h**p / 10 for p in order.values()])
+    calls = (("method", "step"), [3 / h for _ in order])
+    coords = {"method": list(order), "step": h}
+    return xr.Dataset({"error_median": error, "error_worst": error, "rate_calls": calls}, coords)
+
+
+def test_truth_is_that_of_the_cells_in_their_order():
+    few = sweep.read_study(FILE)
+    true, cells = study.cycles(few, 3), precision_cells(few, 3)
+    assert list(true) == ["period", "amplitude", "crossing_speed"]
+    with mp.workdps(30):  # the energy that one half swing loses: mu 2 phi0 = (a v + R) integrated, at R alone a = 0.01
+        rho = mpf(float(cells["R"][0]))
+        alone = 4 * mp.sqrt(2 / rho) / mp.sqrt(1 - rho**2)
+    assert cells["a"][0] == 0.01
+    assert true["period"][0] < float(alone)  # viscous friction makes the swing smaller, and shorter
+    assert true["period"][0] > 0.8 * float(alone)
+    assert true["amplitude"][0] > true["amplitude"][-1] > 1
+
+
+def test_no_method_is_silently_wrong_and_auto_is_right(coulomb):
+    assert [s.what for s in study.honesty("x", coulomb) if not s.holds] == []
+    assert coulomb.attrs["reference"] == "the truth given"
+    assert float(coulomb.error_worst.max()) < 1e-12
+
+
+def test_a_method_that_lies_is_seen(coulomb):
+    lying = coulomb.assign(silent=coulomb.silent + 0.1, failed=coulomb.failed + 0.1)
+    lying = lying.assign(error_worst=coulomb.error_worst + 2e-4)
+    lying.attrs = coulomb.attrs
+    assert [s.holds for s in study.honesty("x", lying)] == [False, False, False]
+
+
+def test_costs_are_those_of_the_first_tolerance_that_suffices(coulomb):
+    auto = next(s for s in study.costs(coulomb) if s.what.startswith("auto"))
+    least = 1e6 * float(coulomb.seconds.sel({"method": "auto"}).min())
+    assert auto.here.split(", ")[0] == f"{least:.3g}"
+    none = coulomb.assign(error_worst=coulomb.error_worst + 1)
+    assert all(s.here == "-, -, -" for s in study.costs(none))
+
+
+def test_orders_are_the_exponents_of_the_error(steps):
+    lines = {s.what.split(":")[0]: s for s in study.orders(steps)[:4]}
+    assert [float(lines[name].here) for name in study.ORDERS] == pytest.approx([1, 1, 2, 4])
+    assert all(s.holds for s in lines.values())
+    flat = steps.assign(error_median=steps.error_median**1.1)
+    assert not any(s.holds for s in study.orders(flat)[:4])
+
+
+def test_calls_are_counted_to_seven_digits(steps):
+    rk4 = next(s for s in study.orders(steps) if s.what.startswith("rk4: calls"))
+    h = float(steps.step.where(steps.step**4 / 10 <= 1e-7).max())
+    assert float(rk4.here) == pytest.approx(3 / h, rel=1e-3)
+
+
+def test_the_figure_has_two_rows_of_three_panels(coulomb, steps):
+    other = xr.Dataset({k: ("rtol", [1e-4, 1e-9]) for k in ("error_median", "error_worst", "seconds")})
+    page = study.figure(coulomb, coulomb, steps, other)
+    assert len(page.axes) == 6
+    assert [axes.get_title(loc="left") for axes in page.axes[:3]] == ["(a)", "(b)", "(c)"]
+    assert "heyoka.py" in [text.get_text() for text in page.legends[0].get_texts()]
+    assert len(study.figure(coulomb, coulomb, None, None).axes) == 6
+
+
+def test_heyoka_finds_the_same_cycle(monkeypatch):
+    pytest.importorskip("heyoka")
+    monkeypatch.setattr(study, "PEER_CELLS", 2)
+    found = study.peer(FILE, (1e-9,))
+    assert float(found.error_worst.max()) < 1e-8
+    assert float(found.seconds.min()) > 0
+
+
+def test_the_study_prints_its_table_and_draws_its_figure(coulomb, steps, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(study, "charted", lambda *_: coulomb)
+    monkeypatch.setattr(study, "stepped", lambda *_: steps)
+    monkeypatch.setattr(study, "peer", lambda *_: None)
+    assert study.main([str(tmp_path / "work_precision.toml")]) == 0
+    text = capsys.readouterr().out
+    assert " NO" not in text
+    assert "not installed" in text
+    assert (tmp_path / "work_precision.png").read_bytes().startswith(b"\x89PNG")
