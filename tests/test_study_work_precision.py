@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import numpy as np
+import oracles
 import pytest
 import work_precision as study
 import xarray as xr
-from mpmath import mp, mpf
 
 import sweep
 from kernels._jit import COMPILED
@@ -40,12 +40,12 @@ def test_truth_is_that_of_the_cells_in_their_order():
     few = sweep.read_study(FILE)
     true, cells = study.cycles(few, 3), precision_cells(few, 3)
     assert list(true) == ["period", "amplitude", "crossing_speed"]
-    with mp.workdps(30):  # the energy that one half swing loses: mu 2 phi0 = (a v + R) integrated, at R alone a = 0.01
-        rho = mpf(float(cells["R"][0]))
-        alone = 4 * mp.sqrt(2 / rho) / mp.sqrt(1 - rho**2)
-    assert cells["a"][0] == 0.01
-    assert true["period"][0] < float(alone)  # viscous friction makes the swing smaller, and shorter
-    assert true["period"][0] > 0.8 * float(alone)
+    for i, (a, R) in enumerate(zip(cells["a"], cells["R"], strict=True)):
+        # with either friction alone it swings wider
+        assert 1 < true["amplitude"][i] < min(float(oracles.foliot(1.0, 1.0, a)[1]), 1 / R)
+    a, R = cells["a"][-1], cells["R"][-1]
+    assert a == 10
+    assert true["period"][-1] == pytest.approx(4 * a / (1 - R), rel=1e-3)  # it drifts: (1 - R)/a is its speed
     assert true["amplitude"][0] > true["amplitude"][-1] > 1
 
 
