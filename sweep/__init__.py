@@ -6,6 +6,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sweep._scaling import collapse_quality as collapse_quality
+    from sweep._scaling import rescaled as rescaled
+    from sweep._scaling import scaling as scaling
     from sweep.analysis import crossover as crossover
     from sweep.analysis import exponent as exponent
     from sweep.analysis import fit_exponent as fit_exponent
@@ -28,9 +31,6 @@ if TYPE_CHECKING:
     from sweep.regimes import fit_two_laws as fit_two_laws
     from sweep.result import open_result as open_result
     from sweep.runner import run as run
-    from sweep.scaling import collapse_quality as collapse_quality
-    from sweep.scaling import rescaled as rescaled
-    from sweep.scaling import scaling as scaling
     from sweep.spec import build_study as build_study
     from sweep.spec import read_study as read_study
     from sweep.verifying import verify as verify
@@ -49,9 +49,9 @@ _HOMES = {
     "fit_two_laws": "regimes",
     "where_exponent": "analysis",
     "where_value": "analysis",
-    "scaling": "scaling",
-    "rescaled": "scaling",
-    "collapse_quality": "scaling",
+    "scaling": "_scaling",
+    "rescaled": "_scaling",
+    "collapse_quality": "_scaling",
     "plot": "charts",
     "plot_precision": "charts",
     "work_precision": "precision",

@@ -71,7 +71,7 @@ class _Reader:
         try:
             tree = ast.parse(self.condition.strip(), mode="eval")
             found = self.value(tree.body)
-        except (SyntaxError, ValueError, RecursionError, MemoryError):
+        except (SyntaxError, ValueError, RecursionError, MemoryError, ArithmeticError, TypeError):
             raise _refusal(self.condition, f"cannot be read; it may hold {GRAMMAR}") from None
         if not isinstance(found, xr.DataArray) or found.dtype != bool:
             raise _refusal(self.condition, "is no condition on the cells; write e.g. \"status == 'OK' and R < 0.1\"")

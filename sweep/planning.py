@@ -133,7 +133,7 @@ def plan(study: Study, workers: int | None = None, path: str | os.PathLike[str] 
     SweepError
         The folder of the output is not there.
     """
-    from sweep.scaling import scaling
+    from sweep._scaling import scaling
 
     crew = cores() if workers is None else whole_number("workers", workers)
     folder = Path(path).absolute().parent if path is not None else Path.cwd()

@@ -100,7 +100,7 @@ def test_csv_is_a_file_axis_of_a_study(tmp_path):
     path = sweep.export(result().drop_vars("angle").drop_vars("phase").isel(a=0), tmp_path / "points.csv")
     study = sweep.build_study(
         kernel="foliot", design="zip", fixed={"phi0": 1.0},
-        axes={"mu": {"file": str(path), "unit": "rad/s^2"}, "a": {"file": str(path), "unit": "1/s"}},
+        axes={"mu": {"file": path, "unit": "rad/s^2"}, "a": {"file": path, "unit": "1/s"}},
     )  # fmt: skip
     np.testing.assert_array_equal(study.axes["mu"].values, result().mu)
     np.testing.assert_array_equal(study.axes["a"].values, [1.0, 1.0, 1.0])

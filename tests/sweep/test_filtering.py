@@ -75,6 +75,7 @@ def test_a_result_of_a_zip_can_be_chosen_from_again():
         ("1 < 2", "two constants"),
         ("drop > 0", "runs along phase"),
         ("height >", "cannot be read"),
+        ("height > 1/0", "cannot be read"),
         ("__import__('os').system('true')", "is not allowed"),
         ("height.real > 0", "is not allowed"),
         ("[h for h in height]", "is not allowed"),

@@ -10,7 +10,7 @@ from toy import KERNEL as TOY
 
 import sweep
 from kernels.interface import Field
-from sweep.scaling import Group, scaling
+from sweep._scaling import Group, scaling
 
 DECADES = {"spacing": "log", "start": 0.1, "stop": 10, "num": 5}
 
