@@ -221,7 +221,8 @@ class _Errand:
         except CancelledError as fault:
             raise self._cluster.lost(fault) from fault
         except Exception as fault:
-            if isinstance(fault, self._cluster.killed):
+            # distributed's executor trips over a task that fails with its worker and is answered at that moment
+            if isinstance(fault, self._cluster.killed) or (isinstance(fault, TypeError) and "Answer" in str(fault)):
                 killed(batch)
                 return
             raise _told(fault) from fault
