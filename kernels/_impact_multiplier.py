@@ -103,7 +103,7 @@ def _of_two(b, c, error):
     width = sqrt(where(real, inside[0] + inside[1], 0.0))
     modulus = where(real, magnitude(half[0]) + width, sqrt(where(c[0] > 0.0, c[0], 0.0)))
     spread = fma(error, 2.0 * magnitude(half[0]) + modulus, _PAIR_ERROR * fma(half[0], half[0], magnitude(c[0])))
-    open_ = where(real, width, modulus)
+    open_ = where(inside[0] > -spread, width, modulus)
     closest = sqrt(spread)
     return modulus, error + spread / where(open_ > closest, open_, where(closest > 0.0, closest, 1.0))
 

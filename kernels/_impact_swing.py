@@ -2,7 +2,9 @@
 
 It begins where y falls through -eta, so that the upper pallet alone holds the wheel, and ends where y rises through
 eta; the next one is the same in the reflected frame, y -> -y, x -> x - 1/2. In between no tooth can pass the pallet
-that holds: so the wheel goes on by at most one tooth a swing to and fro, whatever the clock, and never runs free.
+that holds. The tooth that a pallet releases is at most at U(eta), and the other pallet holds it, or one before it, as
+long as U(eta) - U(-eta) <= 1/2, which every flat lever keeps: so the wheel goes on by at most one tooth a swing to and
+fro and never runs free. Where a bent lever does not keep it, both pallets can wedge the wheel: bounces without end.
 The pallet across meets teeth while y > -eta. Bounces that are bound to end in lasting contact are summed as soon as
 nothing can come between them. Contact lasts until the pallet's tip: it holds with the force wheel pallet > 0, and both
 pallets are in contact only at y = 1/4, beyond the tips.

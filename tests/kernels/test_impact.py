@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 
+from kernels._impact_multiplier import largest_modulus
 from kernels._jit import COMPILED
 from kernels.impact import IMPACT
 from kernels.interface import FIRST_REFUSAL, Status
@@ -132,6 +133,42 @@ def test_a_multiplier_that_two_roots_share_keeps_its_digits(method):
     columns = joined(*(cell_of(k, float(e * (1 + mpf(s)))) for k, e in MEETING for s in shifts))
     status = assert_cycle(method, columns, rtol=1e-13)
     assert (status != Status.NO_CYCLE).mean() > 0.6
+
+
+ROOTS = [
+    (1e-24, 0.5, 0.6),
+    (1e-24, 0.5, -0.4),
+    (-1e-22, 0.3 + 0.4j, 0.3 - 0.4j),
+    (1.0, 1e-20, -1e-21),
+    (0.9, 0.8, -0.7),
+    (3e5, 2e5, 1e-9),
+]
+
+
+def cubic(roots):
+    """The coefficients, as pairs of float64, and the largest modulus of (x - r)(x - s)(x - t) with those."""
+    with mp.workdps(80):
+        r, s, t = (mp.mpmathify(x) for x in roots)
+        pairs = []
+        for a in (-(r + s + t), r * s + s * t + t * r, -r * s * t):
+            high = float(mp.re(a))
+            pairs.append((high, float(mp.re(a) - high)))
+        return pairs, float(max(abs(r), abs(s), abs(t)))
+
+
+@pytest.mark.parametrize("roots", ROOTS)
+def test_the_largest_modulus_of_three_roots_is_right_however_far_they_lie_apart(roots):
+    pairs, true = cubic(roots)
+    modulus, doubt = largest_modulus(*pairs)
+    assert abs(modulus / true - 1) < 4e-16
+    assert doubt < 1e-22
+
+
+def test_where_two_roots_meet_the_largest_modulus_is_in_doubt_by_half_the_digits():
+    pairs, true = cubic((0.75, 0.75, 0.1))
+    modulus, doubt = largest_modulus(*pairs)
+    assert abs(modulus / true - 1) <= doubt
+    assert 1e-16 < doubt < 1e-13
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -345,6 +382,7 @@ for method in ("closed", "map"):
 """
 
 
+@pytest.mark.skipif(not COMPILED, reason="compiles")
 def test_plain_python_gives_the_bits_of_compiled_code():
     printed = [
         subprocess.run(
