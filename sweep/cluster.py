@@ -111,19 +111,22 @@ class Cluster:
         """Computes every block; see `Session.compute_elsewhere`. Raises SweepError."""
         assignment = _assignment(session, door)
         try:
-            self._client.register_plugin(_plugin(assignment), name=assignment.run)
-            errand = _Errand(self, session, assignment, receive, finished, note)
-            errand.run(jobs)
-        except SweepError:
-            raise
-        except Exception as fault:
-            raise self.lost(fault) from fault
+            self._introduce(assignment)
+            _Errand(self, session, assignment, receive, finished, note).run(jobs)
         finally:
             self._forget(assignment.run)
 
     def executor(self) -> Any:
         """As of concurrent.futures."""
         return self._client.get_executor(pure=False)
+
+    def submit(self, executor: Any, *words: Any) -> Future[Answer]:
+        """Has `remote.compute` called with the words by a worker. Raises SweepError."""
+        try:
+            future: Future[Answer] = executor.submit(remote.compute, *words)
+            return future
+        except Exception as fault:
+            raise self.lost(fault) from fault
 
     def cancel(self, executor: Any) -> None:
         """Takes back what no worker has begun."""
@@ -139,6 +142,18 @@ class Cluster:
             f"cluster: the scheduler is lost ({reason}); what is finished is kept, run the same command again to "
             "continue"
         )
+
+    def _introduce(self, assignment: Assignment) -> None:
+        """Tells the workers, also those that come later, of a run. Raises SweepError."""
+        try:
+            self._client.register_plugin(_plugin(assignment), name=assignment.run)
+        except OSError as fault:
+            raise self.lost(fault) from fault
+        except Exception as fault:
+            raise SweepError(
+                f"cluster: a worker cannot take part ({type(fault).__name__}: {fault}); every machine of the cluster "
+                "needs the same version of foliot"
+            ) from fault
 
     def _forget(self, run: str) -> None:
         if not self._gone:
@@ -188,8 +203,7 @@ class _Errand:
 
         def submit(batch: Batch) -> Future[Answer]:
             masks = {job: mask for job in batch if (mask := self._mask(job)) is not None}
-            future: Future[Answer] = executor.submit(remote.compute, self._assignment.run, batch, masks)
-            return future
+            return self._cluster.submit(executor, self._assignment.run, batch, masks)
 
         def settled(batch: Batch | None, future: Future[Answer] | None) -> None:
             if batch is not None and future is not None:

@@ -19,6 +19,7 @@ from sweep import cluster as clusters
 from sweep import remote
 from sweep.cli import main
 from sweep.errors import SweepError
+from sweep.statuses import account
 from sweep.store import folder_of, opened
 from sweep.verifying import verify
 
@@ -249,6 +250,19 @@ def test_numbers_that_were_damaged_on_their_way_are_refused(client, output, monk
     monkeypatch.setattr(clusters._Errand, "_checked", harmed)
     with pytest.raises(SweepError, match="damaged on their way"):
         elsewhere(tall(3), cluster=client)
+
+
+def test_a_run_on_a_cluster_ends_at_its_time_and_continues(client, output):
+    study = tall(1000, "slow:SLOW")
+    begun = datetime.now()
+    with elsewhere(study, output, cluster=client, block_cells=4, until=begun + timedelta(seconds=2)) as found:
+        told = account(found)
+    assert 0 < told.ok < 1000
+    assert told.ok + told.pending == 1000
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("slow.CELL_SECONDS", 0.0)
+        same(quiet(study, output), quiet(study))
+    assert list(output.parent.iterdir()) == [output]
 
 
 def test_ctrl_c_ends_a_run_on_a_cluster(client, output):
