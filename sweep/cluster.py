@@ -39,6 +39,8 @@ TASK_SECONDS = 0.5
 """Blocks shorter than this go to a worker several at a time;"""
 TASK_BYTES = 32 << 20
 """but no more than this, where their numbers are sent back."""
+MOST_ROUNDS = 3
+"""Times that a block is tried alone where nothing could be made of its answer."""
 CONNECT_SECONDS = 10
 ASK_SECONDS = 2.0
 """How often the scheduler is asked for its workers."""
@@ -190,9 +192,11 @@ class _Errand:
         """Raises SweepError."""
         with CtrlC() as ctrl_c:
             self._submit(self._batches(jobs), self._room, self._suspect, ctrl_c)
-            # nothing else is under way then, so what kills its worker is found out for certain
-            suspects = [(job,) for job in self._suspects]
-            self._submit(iter(suspects), lambda: 1, self._lethal.extend, ctrl_c)
+            for _ in range(MOST_ROUNDS):
+                # nothing else is under way now, so what kills its worker is found out for certain
+                suspects, self._suspects = [(job,) for job in self._suspects], []
+                self._submit(iter(suspects), lambda: 1, self._lethal.extend, ctrl_c)
+            self._lethal += self._suspects
         if self._lethal:
             raise SweepError(self._obituary())
 
@@ -235,9 +239,12 @@ class _Errand:
         except CancelledError as fault:
             raise self._cluster.lost(fault) from fault
         except Exception as fault:
-            # distributed's executor trips over a task that fails with its worker and is answered at that moment
-            if isinstance(fault, self._cluster.killed) or (isinstance(fault, TypeError) and "Answer" in str(fault)):
+            if isinstance(fault, self._cluster.killed):
                 killed(batch)
+                return
+            # distributed's executor trips over a task that fails with its worker and is answered at that moment
+            if isinstance(fault, TypeError) and "Answer" in str(fault):
+                self._suspect(batch)
                 return
             raise _told(fault) from fault
         mean = answer.seconds / len(batch)

@@ -6,6 +6,7 @@ import signal
 import sys
 import threading
 import time
+from concurrent.futures import Future
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -253,16 +254,37 @@ def test_numbers_that_were_damaged_on_their_way_are_refused(client, output, monk
 
 
 def test_a_run_on_a_cluster_ends_at_its_time_and_continues(client, output):
-    study = tall(1000, "slow:SLOW")
+    study = tall(10_000, "slow:SLOW")  # ten seconds of two workers at the least
     begun = datetime.now()
-    with elsewhere(study, output, cluster=client, block_cells=4, until=begun + timedelta(seconds=2)) as found:
+    with elsewhere(study, output, cluster=client, block_cells=40, until=begun + timedelta(seconds=2)) as found:
         told = account(found)
-    assert 0 < told.ok < 1000
-    assert told.ok + told.pending == 1000
+    assert 0 < told.ok < 10_000
+    assert told.ok + told.pending == 10_000
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("slow.CELL_SECONDS", 0.0)
         same(quiet(study, output), quiet(study))
     assert list(output.parent.iterdir()) == [output]
+
+
+@pytest.mark.parametrize(("times", "lethal"), [(1, False), (3, False), (99, True)])
+def test_an_answer_that_gets_lost_in_the_executor_is_asked_for_again(client, monkeypatch, times, lethal):
+    lost, real = [], clusters.Cluster.submit
+
+    def submit(self, executor, run, batch, masks):
+        future = real(self, executor, run, batch, masks)
+        if 7 in batch and len(lost) < times:
+            lost.append(batch)
+            future = Future()
+            future.set_exception(TypeError("cannot unpack non-iterable Answer object"))
+        return future
+
+    monkeypatch.setattr(clusters.Cluster, "submit", submit)
+    if lethal:
+        with pytest.raises(SweepError, match="cells 7 to 8: every worker"):
+            elsewhere(tall(20), cluster=client, block_cells=1)
+    else:
+        same(elsewhere(tall(20), cluster=client, block_cells=1), quiet(tall(20)))
+    assert len(lost) == min(times, 1 + clusters.MOST_ROUNDS)
 
 
 def test_ctrl_c_ends_a_run_on_a_cluster(client, output):
