@@ -22,7 +22,7 @@ import numpy as np
 from kernels._chain import same, units
 from kernels._columns import entry
 from kernels._groups import GROUP, cells_at, each_group, write_row
-from kernels._jit import jit, jit_call, jit_inline
+from kernels._jit import jit, jit_call
 from kernels._lanes import fma, isnt, magnitude, some, sqrt, where
 from kernels._vecmath import is_normal, scale
 from kernels.interface import Status
@@ -136,7 +136,7 @@ def _split(m, n, at, rows, found):
     return end
 
 
-@jit_inline
+@jit_call
 def _rotate(m, n, at, rows, found, active):
     """Brings the part with the smallest eigenvalue to the end, where steps can find it; parts have no order."""
     end = _split(m, n, at, rows, found)

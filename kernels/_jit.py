@@ -7,6 +7,8 @@ on every CPU. `error_model="numpy"`: 1/0 is inf, nothing raises.
 import numba
 from numba import njit
 
+from kernels._parts import part
+
 COMPILED = not numba.config.DISABLE_JIT
 """False under NUMBA_DISABLE_JIT=1, where every function here is plain Python of one cell."""
 
@@ -15,7 +17,7 @@ _OPTIONS = {"error_model": "numpy", "nogil": True, "fastmath": False}
 
 def jit(function):
     """Physics: compiled where it is called, for one cell or for lanes, and always inlined."""
-    return njit(forceinline=True, **_OPTIONS)(function)
+    return part(function, forceinline=True, **_OPTIONS)
 
 
 def jit_inline(function):
@@ -25,11 +27,11 @@ def jit_inline(function):
 
 def jit_call(function):
     """As `jit`, but left a call: for what is long and used in several places."""
-    return njit(**_OPTIONS)(function)
+    return part(function, **_OPTIONS)
 
 
 def cached(function):
     """As `jit_call`, called from Python; machine code of this package is kept on the disk."""
     from kernels._cache import enable
 
-    return enable(jit_call(function))
+    return enable(njit(**_OPTIONS)(function))

@@ -4,12 +4,16 @@ numba makes machine code of every function by itself: it links in all that the f
 translates it, level above level, although only what Python calls is ever run. A *part* stops before that. Its code is
 handed on as it is written, and optimised in the function called by Python (an `entry`) that it ends up in: the same
 digits in less than half of the seconds. Called from Python after all, a part is compiled by itself, as numba does.
+This rests on the inside of numba's compiler, so other versions of numba than those tried get plain `njit`.
 """
 
 import numba
 from numba import njit
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+
+TRIED = ("0.68",)
+"""Versions of numba whose compiler is known to work so."""
 
 
 class _NoMachineCode:
@@ -50,7 +54,7 @@ class _PartCompiler(Compiler):
 def part(function, **options):
     """As numba's `njit` with these options, for what is called by compiled code."""
     whole = njit(**options)(function)
-    if numba.config.DISABLE_JIT:
+    if numba.config.DISABLE_JIT or not numba.__version__.startswith(TRIED):
         return whole
     inner = njit(pipeline_class=_PartCompiler, **options)(function)
     inner._insert = lambda *overload: None  # there is nothing that Python could call

@@ -1,7 +1,7 @@
 """A reduced model against its chain: damping of the modes, and the largest error of the spindle's receptance."""
 
 from kernels._chain_poles import damped_poles
-from kernels._jit import jit, jit_call, jit_inline
+from kernels._jit import jit, jit_call
 from kernels._lanes import fma, sqrt
 from kernels._reduction_exact import receptance as exact_receptance
 from kernels._reduction_frf import (
@@ -34,7 +34,7 @@ def damped(chain, m):
     return most > 0.0
 
 
-@jit_inline
+@jit_call
 def all_poles(code, p, full, kept, modes, rooms):
     """Poles of both, and the damping of a modal model; a bound on the error, inf where they did not come."""
     n, error = full.J.size, 0.0
@@ -62,7 +62,7 @@ def least_gap(f, p):
     return gap
 
 
-@jit_inline
+@jit_call
 def reduced_receptance(w, code, p, residual, full, kept, modes, rooms):
     """Receptance of the spindle by the reduced model."""
     if code == RIVIN:
@@ -82,7 +82,7 @@ def value_at(w, of_error, code, p, residual, full, kept, modes, rooms):
     return size if size >= 0.0 else 0.0
 
 
-@jit_inline
+@jit_call
 def _top(low, high, of_error, code, p, residual, full, kept, modes, rooms):
     """Largest value between two frequencies, by the golden section."""
     a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
@@ -100,7 +100,7 @@ def _top(low, high, of_error, code, p, residual, full, kept, modes, rooms):
     return max(at_a, at_b)
 
 
-@jit_inline
+@jit_call
 def _largest(count, of_error, code, p, residual, full, kept, modes, rooms):
     """Largest value in the band: of those at the samples, and of the tops between them."""
     at, value = rooms.at, rooms.off
@@ -116,7 +116,7 @@ def _largest(count, of_error, code, p, residual, full, kept, modes, rooms):
     return most
 
 
-@jit_inline
+@jit_call
 def receptance_error(f_max, code, p, residual, full, kept, modes, rooms):
     """Largest abs(dH) up to f_max over the largest abs(H), and a bound on its rounding.
 
@@ -142,7 +142,7 @@ def receptance_error(f_max, code, p, residual, full, kept, modes, rooms):
     return off / size, _ROUNDING * n / zeta
 
 
-@jit_inline
+@jit_call
 def undamped_poles(chain):
     """Poles on the imaginary axis."""
     for i in range(chain.f.size):
@@ -150,7 +150,7 @@ def undamped_poles(chain):
         chain.im[2 * i], chain.im[2 * i + 1] = TURN * chain.f[i], -TURN * chain.f[i]
 
 
-@jit_inline
+@jit_call
 def compare(f_max, code, p, residual, full, kept, modes, rooms):
     """Poles of both, and `receptance_error`: that, its rounding, and the bound on the error of the poles."""
     n = full.J.size

@@ -5,7 +5,7 @@ strains d. It moves as x = sum phi_i q_i,
     q_i'' + sum_j c_ij q_j' + w_i^2 q_i = phi_i M.                                                   (1)
 """
 
-from kernels._jit import jit, jit_call, jit_inline
+from kernels._jit import jit, jit_call
 from kernels._lanes import fma, magnitude, sqrt
 from kernels._reduction_exact import over, spindle_receptance
 from kernels._vecmath import exp, log
@@ -16,7 +16,7 @@ GRID = 96
 """Further frequencies, evenly over the logarithm of the band."""
 
 
-@jit_inline
+@jit_call
 def damping_matrix(C, W, G, J, k, h, p, n):
     """c_ij of (1) from rows W, G; a damper without a spring, at a free end, is strained by its mass's angle."""
     for i in range(p):
@@ -59,7 +59,7 @@ def solve_in_place(A, b, p):
         b[i] = over(b[i], A[i, i])
 
 
-@jit_inline
+@jit_call
 def modal_receptance(w, frequencies, shape, C, p, A, b):
     """Receptance of the spindle by (1); `A` and `b` are complex buffers."""
     for i in range(p):
@@ -82,7 +82,7 @@ def chain_receptance(w, J, k, h, m, J_w, K_w):
     return spindle_receptance(J_w, K_w, w * w, m)
 
 
-@jit_inline
+@jit_call
 def sample_grid(at, w_max, lowest):
     """Fills `at` with 0, w_max and frequencies between, even on a log scale; how many there are."""
     at[0], at[1] = 0.0, w_max
@@ -107,7 +107,7 @@ def sample_poles(at, filled, w_max, pole_re, pole_im, count):
     return filled
 
 
-@jit_inline
+@jit_call
 def sort(values, count):
     """Rising order of `count` values; Shell's gaps, so that a thousand take some ten thousand steps."""
     gap = count // 2

@@ -10,12 +10,12 @@ spindle always, then those of small (k_left + k_right)/J. Rows are as in `_reduc
 Source: Guyan, AIAA J. 3:380 (1965); O'Callahan, Proc. 7th IMAC (1989) 17.
 """
 
-from kernels._jit import jit, jit_inline
+from kernels._jit import jit, jit_call
 from kernels._lanes import sqrt
 from kernels._reduction_rivin import fastest, remove_mass
 
 
-@jit_inline
+@jit_call
 def choose_masters(J, k, h, masters, n, p, order):
     """Fills `masters` with the numbers of the p masses to be kept, rising; uses up J, k and h.
 
@@ -47,7 +47,7 @@ def _share(part, whole):
     return part / whole if whole < float("inf") else 0.0
 
 
-@jit_inline
+@jit_call
 def static_shapes(W, G, J, k, masters, n, p):
     """The basis (1): each master turned by 1 while the others stand; with free ends, row 0 is all turned by 1."""
     for i in range(p):
@@ -72,7 +72,7 @@ def static_shapes(W, G, J, k, masters, n, p):
             W[0, j], G[0, j] = sqrt(J[j]), 0.0
 
 
-@jit_inline
+@jit_call
 def add_inertia(W, G, J, k, masters, w, p, n, angle):
     """Adds (2) to the modes W, G of frequencies w; `angle` is a buffer."""
     for mode in range(p):

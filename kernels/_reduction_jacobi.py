@@ -7,7 +7,7 @@ ever formed, so graded masses and springs lose no digits but those that the basi
 Source: Demmel & Veselic, SIAM J. Matrix Anal. Appl. 13:1204 (1992).
 """
 
-from kernels._jit import jit, jit_call, jit_inline
+from kernels._jit import jit, jit_call
 from kernels._lanes import fma, magnitude, sqrt
 
 SWEEP_LIMIT = 40
@@ -75,7 +75,7 @@ def orthogonalise(rows, others, first, p, n):
     return False
 
 
-@jit_inline
+@jit_call
 def _make_orthonormal(W, G, first, p, n):
     """W to orthonormal rows, G alike; the condition of W's rows as they were, inf if it failed."""
     for i in range(p):
@@ -103,7 +103,7 @@ def _swap(rows, i, j, n):
         rows[i, c], rows[j, c] = rows[j, c], rows[i, c]
 
 
-@jit_inline
+@jit_call
 def _sort(w, W, G, first, p, n):
     """By rising frequency."""
     for i in range(first, p - 1):
@@ -117,7 +117,7 @@ def _sort(w, W, G, first, p, n):
             _swap(G, i, least, n)
 
 
-@jit_inline
+@jit_call
 def _worst(condition, w, before, sizes, W, first, p, n):
     """Largest relative error of a frequency: rounding of each row G_j, of size |G_j|, by its share in mode i."""
     worst = 0.0

@@ -11,7 +11,7 @@ import numpy as np
 from kernels import _reduction_guyan, _reduction_modes, _reduction_rivin
 from kernels._chain import extremes, same
 from kernels._chain_eigen import natural_frequencies
-from kernels._jit import jit, jit_call, jit_inline
+from kernels._jit import jit, jit_call
 from kernels._lanes import exponent, magnitude, nearest
 from kernels._reduction_frf import AROUND, GRID
 from kernels._reduction_jacobi import ritz
@@ -105,7 +105,7 @@ def _copy(full, kept):
         kept.J[j], kept.k[j], kept.h[j] = full.J[j], full.k[j], full.h[j]
 
 
-@jit_inline
+@jit_call
 def _rivin(p, order, full, kept, rooms):
     """The chain of p masses; the largest h e of merged springs."""
     n, slower = full.J.size, 0.0
@@ -116,7 +116,7 @@ def _rivin(p, order, full, kept, rooms):
     return slower
 
 
-@jit_inline
+@jit_call
 def _modal(p, full, kept, modes, rooms):
     """The lowest p modes; what the others give way at rest, and a status."""
     for i in range(full.J.size):
@@ -126,7 +126,7 @@ def _modal(p, full, kept, modes, rooms):
     )
 
 
-@jit_inline
+@jit_call
 def _basis(code, p, order, full, kept, modes, rooms):
     """Shapes of `guyan` and `irs`, or of `craig_bampton`; the largest h e of springs that come in series, a status."""
     n, slower, status = full.J.size, 0.0, 0.0
@@ -141,7 +141,7 @@ def _basis(code, p, order, full, kept, modes, rooms):
     return slower, status
 
 
-@jit_inline
+@jit_call
 def _ritz(code, p, full, kept, modes, rooms):
     """Modes of a basis, for `irs` once more with the inertia of what follows; a bound on the error."""
     n, error = full.J.size, 0.0
@@ -161,7 +161,7 @@ def is_chain(code):
     return code in (NONE, RIVIN, EXACT)
 
 
-@jit_inline
+@jit_call
 def reduce(code, p, order, full, kept, modes, rooms):
     """The reduced model of p masses.
 
@@ -206,7 +206,7 @@ def off_by(value, true):
     return (value - true) / true if true > 0.0 else 0.0 * value
 
 
-@jit_inline
+@jit_call
 def reduce_enough(code, n_keep, tol, f_max, order, full, kept, modes, rooms):
     """The model of n_keep masses or, where that is 0, of as many as `tol` needs.
 

@@ -9,7 +9,7 @@ Rows are as in `_reduction_jacobi`. Source: Craig & Bampton, AIAA J. 6:1313 (196
 
 from kernels._chain_eigen import natural_frequencies
 from kernels._chain_shapes import mode_shapes
-from kernels._jit import jit, jit_call, jit_inline
+from kernels._jit import jit, jit_call
 from kernels._lanes import fma, magnitude, sqrt
 
 HOLD = 2.0**80
@@ -32,7 +32,7 @@ def fill_rows(W, G, J, k, angle, square, n):
         G[j] = torque / sqrt(k[j]) if by_torque and j + 1 < n else sqrt(k[j]) * (angle[j] - beyond)
 
 
-@jit_inline
+@jit_call
 def modal(W, G, w, J, k, frequency, shapes, angle, p, n, work):
     """The lowest p modes as rows; what the others give way at rest [rad/(N m)] and a status. `angle` is a buffer."""
     status = mode_shapes(n, J, k, frequency, shapes, work)
@@ -48,7 +48,7 @@ def modal(W, G, w, J, k, frequency, shapes, angle, p, n, work):
     return residual, status
 
 
-@jit_inline
+@jit_call
 def craig_bampton(W, G, J, k, frequency, shapes, angle, p, n, work):
     """Basis of the spindle at rest and p - 1 modes with the spindle held, and a status."""
     at_rest(W[0], G[0], J, k, n)

@@ -55,6 +55,7 @@ def solved(module, method, columns, step, location):
     with np.errstate(all="ignore"):
         error = _apart(results, finer, len(module.STATES)) + ROUNDING * np.sqrt(results[-3])
         error = np.where(blind, np.maximum(error, step / results[1]), error)
+        error = np.where(finer[-1] < FIRST_REFUSAL, error, np.inf)
     status = _status(results, finer)
     return results[:-1], np.where(status < FIRST_REFUSAL, np.where(error < np.inf, error, np.inf), np.nan), status
 

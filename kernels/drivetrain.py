@@ -29,7 +29,7 @@ from kernels._chain import MASS_LIMIT, refusal
 from kernels._chain_eigen import natural_frequencies
 from kernels._chain_poles import modal_damping
 from kernels._columns import entry
-from kernels._jit import COMPILED, jit, jit_inline
+from kernels._jit import COMPILED, jit, jit_call
 from kernels._lanes import magnitude, nearest
 from kernels._reduction_compare import compare
 from kernels._reduction_model import (
@@ -71,7 +71,7 @@ def entry_of_cells(function):
     return call
 
 
-@jit_inline
+@jit_call
 def _write_modes(i, count, e, full, kept, of_poles, frequency, frequency_error, damping):
     """Frequencies, their errors and the damping, in Hz. Whether all are in range."""
     fine = True
@@ -83,7 +83,7 @@ def _write_modes(i, count, e, full, kept, of_poles, frequency, frequency_error, 
     return fine
 
 
-@jit_inline
+@jit_call
 def _write_chain(i, p, e_J, e_k, kept, J_kept, k_kept, h_kept):
     """The reduced chain in SI units. Whether all is in range."""
     fine = True
@@ -95,7 +95,7 @@ def _write_chain(i, p, e_J, e_k, kept, J_kept, k_kept, h_kept):
     return fine
 
 
-@jit_inline
+@jit_call
 def _solve_cell(
     i, J, k, h, reduction, n_keep, tol, f_max, order, rtol,
     frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status,
@@ -155,7 +155,7 @@ def _is_whole(x, low, high):
     return x >= low and x <= high and not magnitude(x - nearest(x)) > 0.0
 
 
-@jit_inline
+@jit_call
 def _choices(n, reduction, n_keep, tol, f_max, order):
     """Whether reduction, size and band are such that one reduced model is meant."""
     named = _is_whole(reduction, 0.0, _REDUCTIONS - 1.0) and _is_whole(order, 0.0, _ORDERS - 1.0)

@@ -11,9 +11,9 @@ from rich_scene import RICH
 from kernels._jit import COMPILED
 from kernels.interface import FIRST_REFUSAL, Status
 
-METHODS = ["dop853", "dopri5"]
-SOME = 24 if COMPILED else 2
-FLIPS = 10.0 if COMPILED else 3.0
+METHODS = ["dop853", "dopri5"] if COMPILED else ["dop853"]
+SOME = 24 if COMPILED else 1
+FLIPS = 10.0 if COMPILED else 2.0
 
 
 def solve(method, *parameters, rtol=1e-9, **named):

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp, mpc, mpf
 
-from kernels._chain import refusal
-from kernels._chain_eigen import natural_frequencies, natural_frequencies_of_all
-from kernels._chain_poles import damped_poles, modal_damping
+from kernels._chain import refusal, same
+from kernels._chain_eigen import _rotate, _shift, _split, natural_frequencies, natural_frequencies_of_all
+from kernels._chain_poles import _apart, _refined, damped_poles, modal_damping
 from kernels._chain_shapes import mode_shapes
 from kernels._jit import COMPILED
 from kernels.drivetrain_frf import MILLING_MACHINE
@@ -341,3 +341,52 @@ def test_near_critical_damping_poles_are_within_their_bound_and_the_mode_keeps_i
     if n == 1:
         assert modes[0] == pytest.approx(frequency, rel=1e-14)
         assert damping[0] == pytest.approx(1 + share, rel=1e-14)
+
+
+def unit_chain(n, seed=6):
+    """A chain in its own units, as the solvers of poles have it: J, k, h and two exponents."""
+    random = np.random.default_rng(seed)
+    J, k, h = (random.uniform(0.5, 1.0, n) for _ in range(3))
+    return J, k, 0.2 * h, 0.0, 0.0
+
+
+def test_a_root_of_five_digits_is_refined_to_its_last():
+    J, k, h, *_ = chain = unit_chain(4)
+    for true in oracles.poles(J, k, h):
+        rough = complex(true) * (1 + 1e-5)
+        found, error = _refined(4, chain, (rough.real, rough.imag), np.empty(64))
+        assert abs(mpc(*map(float, found)) / true - 1) <= error < 1e-13
+
+
+def test_two_roots_that_may_be_one_are_not_told_apart_unless_they_are_twins():
+    re, im = np.array([-1.0, -1.0, -2.0, -2.0]), np.array([1.0, -1.0, 1e-9, -1e-9])
+
+    def apart(*errors):
+        return _apart(2, 0, re, im, np.array(errors))
+
+    assert apart(1e-12, 1e-12, 1e-12, 1e-12)
+    assert not apart(1e-12, 1e-12, 1e-9, 1e-12)
+    assert not apart(1e-12, 1e-12, 1e-12, 1e-9)
+    assert apart(1e-12, 1e-12, -1e-9, -1e-9)
+    assert not apart(1e-12, 1e-12, -1e-9, -2e-9)
+
+
+def entries(q, e, sums):
+    """Rows of `_chain_eigen` for two rows of a chain: q, e, and the sums of the inverse and of its square."""
+    return np.array([*q, *e, 0.0, *sums, *sums])
+
+
+def test_a_chain_is_not_split_where_what_is_dropped_would_be_felt_beyond_the_last_digit():
+    """Without e, next to q, others move by sqrt(q e), which may be no more than 2^-53 of what is found."""
+    far = 2.0**20
+    for e, end in ((2.0**-110, 2.0), (2.0**-127, 1.0)):
+        assert _split(2, 2, same, entries([2.0**-40, far], [e], [2.0**40, 2.0**40]), 1.0) == end
+    assert _split(2, 2, same, entries([far, 2.0**-40], [2.0**-127], [1 / far, 2.0**40]), 1.0) == 2.0
+
+
+def test_after_a_rotation_no_shift_is_taken_from_sums_of_the_old_order():
+    rows = entries([2.0**-40, 2.0**20], [2.0**-190], [2.0**40, 2.0**40])
+    _rotate(2, 2, same, rows, 1.0, True)
+    assert list(rows[:2]) == [2.0**20, 2.0**-40]
+    assert not rows[2]
+    assert _shift(2, rows[5], rows[7], 1.0) == 0.0

@@ -203,3 +203,38 @@ def test_the_decibel_of_one_radian_per_newton_metre_is_0():
     outputs, _ = receptances(np.ones((1, 1)), np.ones((1, 1)), np.ones((1, 1)), 1, 1, [0.0])
     assert outputs["amplitude_dB"][0, 0] == 0.0
     assert mpf(float(outputs["amplitude"][0, 0])) == 1
+
+
+@pytest.mark.parametrize("damper", [0.0, 0.3])
+def test_a_chain_without_its_last_spring_is_that_of_the_dense_equations_with_or_without_a_damper_there(damper):
+    J, k, h = chains(3, 2, 0.1, cells=1)
+    k[:, -1], h[:, -1] = 0.0, damper
+    frequency = [0.03, 0.5]
+    for drive, read in ((1, 1), (1, 3), (3, 2), (3, 3)):
+        outputs, status = receptances(J, k, h, drive, read, frequency)
+        assert status[0] == Status.OK
+        assert errors(outputs, 0, J[0], k[0], h[0], drive, read, frequency).max() < 1e-13
+
+
+def test_without_damping_the_response_is_in_phase_below_a_resonance_and_at_minus_pi_above():
+    one = np.ones((1, 1))
+    outputs, _ = receptances(one, one, 0.0 * one, 1, 1, [0.1, 0.2])  # the resonance is at 1/2 pi = 0.159 Hz
+    assert outputs["phase"].tolist() == [[0.0, -np.pi]]
+
+
+def test_nothing_is_written_beyond_the_last_frequency_and_cell():
+    J, k, h = chains(3, 2, 0.1, cells=35)
+    frequency = np.geomspace(0.01, 1.0, 5)
+    outputs, status = [np.full((36, 5), 99.0) for _ in DRIVETRAIN_FRF.outputs], np.full(36, 99, np.int8)
+    columns = J, k, h, np.ones(35), np.ones(35), np.full(35, 1e-9), frequency
+    DRIVETRAIN_FRF.method("continued").solve(*columns, *(o[:35] for o in outputs), status[:35])
+    assert all((o[35] == 99.0).all() and (o[:35] != 99.0).all() for o in outputs)
+    assert status[35] == 99
+
+
+def test_the_decibel_is_right_to_the_last_digits_of_the_amplitude():
+    J, k, h = (np.array([MILLING_MACHINE[name]]) for name in "Jkh")
+    outputs, _ = receptances(J, k, h, 1, 5, [0.0, 5.0, 40.0, 400.0])
+    with mp.workdps(30):
+        for amplitude, decibel in zip(outputs["amplitude"][0], outputs["amplitude_dB"][0], strict=True):
+            assert abs(mpf(float(decibel)) - 20 * mp.log10(mpf(float(amplitude)))) < 1e-15 * abs(decibel)

@@ -153,3 +153,49 @@ def test_the_bits_hang_neither_on_neighbours_nor_on_how_many_there_are():
 def test_a_drive_below_the_friction_never_starts():
     assert checked(KERNEL, [1.0], phi0=1.0, R=1.0, step=0.1)[0] == Status.NEVER_STARTS
     assert checked(KERNEL, [1.0], phi0=1.0, step=0.1, flips=1.5)[0] == Status.BAD_INPUT
+
+
+@pytest.mark.parametrize("method", ["rk4", "dop853"])
+@pytest.mark.parametrize("excess", [1e-2, 1e-3])
+def test_two_roots_within_a_step_are_both_seen(method, excess):
+    k = 2.0 / (1.0 + excess)  # passes the switch by so little that it is back within the step
+    cell = {"phi0": 1.0, "k": k, "flips": 1.0, "step": 0.21, "location": float(LOCATIONS["root"])}
+    outputs, status = solve(KERNEL, method, [1.0], **cell)
+    true = mp.acos(1 - mpf(k)) / mp.sqrt(mpf(k))
+    assert status[0] == Status.OK
+    assert abs(outputs["time"][0] / float(true) - 1) < 2 * outputs["error"][0] + 1e-14
+    assert outputs["error"][0] < 0.01
+
+
+@pytest.mark.skipif(not COMPILED, reason="many steps")
+def test_without_location_a_switch_is_passed_over_and_the_error_tells():
+    k = 2.0 / 1.001
+    outputs, status = solve(KERNEL, "rk4", [1.0], phi0=1.0, k=k, flips=1.0, step=0.21, location=0.0)
+    true = mp.acos(1 - mpf(k)) / mp.sqrt(mpf(k))
+    assert status[0] >= FIRST_REFUSAL or abs(outputs["time"][0] / float(true) - 1) < 2 * outputs["error"][0]
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+def test_moreau_and_a_located_method_agree_under_dry_friction():
+    cell = {"phi0": 1.0, "R": np.array([0.3, 0.9]), "a": 0.2, "flips": 2.0}
+    moreau, rough = solve(KERNEL, "moreau", [1.0, 1.0], **cell, step=2e-3, location=0.0)
+    located, status = solve(KERNEL, "dop853", [1.0, 1.0], **cell, step=0.05)
+    assert (rough == Status.OK).all() and (status == Status.OK).all()
+    assert (moreau["error"] < 0.01).all()
+    for name in ("time", "period", "amplitude", "crossing_speed"):
+        np.testing.assert_allclose(moreau[name], located[name], rtol=3e-3)
+        assert (abs(moreau[name] / located[name] - 1) < 2 * moreau["error"]).all()
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+def test_where_the_run_at_a_finer_step_does_not_end_the_error_is_unknown():
+    outputs, status = solve(KERNEL, "moreau", [1.0], phi0=1.0, R=0.9, a=0.2, flips=2.0, step=6e-4)
+    assert status[0] == Status.OK
+    assert outputs["error"][0] == np.inf
+
+
+def test_a_motion_that_comes_to_rest_in_the_switch_sticks_for_every_method_that_can_tell():
+    cell = {"phi0": 1.0, "R": 0.9, "k": 0.5, "flips": 1.0, "step": 0.02}  # the spring stops it before the switch
+    for method, location in (("moreau", "none"), ("rk4", "root"), ("dop853", "henon")):
+        _, status = solve(KERNEL, method, [1.0], **cell, location=float(LOCATIONS[location]))
+        assert status[0] == Status.STICKS
