@@ -2,8 +2,8 @@
 
 Errors are against values that are given, or against a reference: the method that leaves the fewest cells open, of those
 that state a bound before those that do not. What the reference is right to itself is the floor below which no error
-here means anything, its own least of all. Times are of one core, the least of a few repetitions; they are noisy,
-errors, shares of cells and counts of work are not.
+here means anything, its own least of all. Times are what one core spends on it, not what it spends on others, the least
+of a few rounds over all methods; they are noisy, errors, shares of cells and counts of work are not.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.checks import did_you_mean
@@ -30,8 +31,8 @@ if TYPE_CHECKING:
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 CELLS = 1024
-REPETITIONS = 3
-LEAST_SECONDS = 0.02
+ROUNDS = 5
+LEAST_SECONDS = 0.01
 UNSURE = (Status.INACCURATE, Status.GRAZING)
 """What says of itself that digits, or a count, may be wrong."""
 NAMES = {int(status): status.name for status in Status}
@@ -117,6 +118,7 @@ def work_precision(
         {key: (("method", "rtol"), np.array([[cell[key] for cell in row] for row in rows])) for key in rows[0][0]},
         {"method": names, "rtol": list(tolerances)},
     )
+    found["seconds"] = (("method", "rtol"), _seconds(part, names, tolerances))
     for key in found.data_vars:
         found[key].attrs = {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[str(key)]}
     floor = float(known.floor[known.sound].max()) if known.sound.any() else math.nan
@@ -219,7 +221,6 @@ def _measured(study: Study, name: str, rtol: float, truth: Truth) -> dict[str, A
     return {
         "error_median": float(np.median(error[valued])) if valued.any() else math.nan,
         "error_worst": float(error[worst]) if sure.any() else math.nan,
-        "seconds": _seconds(part),
         "ok": float((truth.sound & (status == Status.OK)).sum() / total),
         "remarked": float((valued & (status != Status.OK) & (status != Status.INACCURATE)).sum() / total),
         "inaccurate": float((valued & (status == Status.INACCURATE)).sum() / total),
@@ -248,21 +249,28 @@ def _first(study: Study, where: Any, status: Any = None) -> str:
     return _cell(study, index) if status is None else f"{NAMES[int(status[index])]} at {_cell(study, index)}"
 
 
-def _seconds(study: Study) -> float:
-    """Least time per cell of a few repetitions."""
+def _seconds(study: Study, names: Sequence[str], tolerances: Sequence[float]) -> NDArray[np.float64]:
+    """Least time per cell of a few rounds over all methods: what slows the machine for a while slows them alike."""
+    best = np.full((len(names), len(tolerances)), math.inf)
+    for _ in range(ROUNDS):
+        for i, name in enumerate(names):
+            for j, rtol in enumerate(tolerances):
+                best[i, j] = min(best[i, j], _timed(with_method(study, name, rtol)))
+    return best
+
+
+def _timed(study: Study) -> float:
+    """Time per cell that this thread spends: what else runs on the machine matters less."""
     from sweep.solve import Solver
 
     size, lengths, solver = Grid(study).size, study.lengths, Solver(study)
     outputs = {f.name: np.empty((size, *(lengths[d] for d in f.dims))) for f in study.asked}
     status, used = np.empty(size, np.int8), np.empty(size, np.int8)
-    best = math.inf
-    for _ in range(REPETITIONS):
-        count, begin = 0, time.perf_counter()
-        while (spent := time.perf_counter() - begin) < LEAST_SECONDS or not count:
-            solver.solve(0, size, outputs, status, used)
-            count += 1
-        best = min(best, spent / count / size)
-    return best
+    count, begin = 0, time.thread_time()
+    while (spent := time.thread_time() - begin) < LEAST_SECONDS or not count:
+        solver.solve(0, size, outputs, status, used)
+        count += 1
+    return spent / count / size
 
 
 def _cell(study: Study, index: int) -> str:
