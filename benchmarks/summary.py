@@ -22,12 +22,13 @@ import numpy as np
 from engine import kernel_seconds
 
 import sweep
+from sweep.begun import read_spec
 from sweep.blocks import Partition
 from sweep.contents import part_columns
 from sweep.fingerprint import fingerprint
 from sweep.solve import Solver
 from sweep.statuses import account
-from sweep.store import folder_of, opened, read_spec
+from sweep.store import folder_of, opened
 from sweep.study import Study
 
 REDUCTIONS = {"plain": ["min", "max", "mean", "argmin"], "histogram": ["min", "max", "mean", "argmin", "histogram"]}

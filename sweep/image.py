@@ -42,10 +42,11 @@ class Images:
     Parameters
     ----------
     columns : the columns of a part, in the order of its datasets
+    mark : what the digests of the parts begin with
     """
 
-    def __init__(self, columns: Sequence[Column]) -> None:
-        self.columns = tuple(columns)
+    def __init__(self, columns: Sequence[Column], mark: bytes = b"") -> None:
+        self.columns, self.mark = tuple(columns), mark
         self._frames: dict[int, Frame] = {}
         self._lock = threading.Lock()
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import os
 import re
+import stat
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -41,9 +42,9 @@ def part_name(start: int, stop: int, digest: str) -> str:
     return f"{start:012d}-{stop:012d}.{digest}.h5"
 
 
-def digest(columns: Sequence[Column], arrays: Mapping[str, Any]) -> str:
-    """32 hex digits of the numbers of a block."""
-    state = xxhash.xxh3_128()
+def digest(columns: Sequence[Column], arrays: Mapping[str, Any], mark: bytes = b"") -> str:
+    """32 hex digits of the numbers of a block, and of the mark of the sweep they belong to."""
+    state = xxhash.xxh3_128(mark)
     for column in columns:
         state.update(memoryview(arrays[column.name]).cast("B"))
     return state.hexdigest()
@@ -57,7 +58,8 @@ def read_part(
     buffers: Mapping[str, Any] | None = None,
     keep: bool = False,
 ) -> dict[str, Any] | None:
-    """The numbers of one block, each of shape `(stop - start, ...)`; None where the file is damaged.
+    """The numbers of one block, each of shape `(stop - start, ...)`; None where the file is damaged,
+    or of another study.
 
     Parameters
     ----------
@@ -71,7 +73,7 @@ def read_part(
     match = PART_NAME.fullmatch(path.name)
     assert match is not None
     arrays = _read(path, images, start, stop, images.columns, buffers, keep)
-    return arrays if arrays is not None and digest(images.columns, arrays) == match[3] else None
+    return arrays if arrays is not None and digest(images.columns, arrays, images.mark) == match[3] else None
 
 
 def _read(
@@ -122,10 +124,12 @@ def _read_flags(path: Path, images: Images, start: int, stop: int) -> dict[str, 
 def _places(fd: int, images: Images, start: int, stop: int) -> Mapping[str, int] | None:
     """Where each column begins, in a file as long as this program writes it; None in any other.
 
-    Raises ValueError where a byte beside the columns differs.
+    Raises ValueError where a byte beside the columns differs, or it is no file.
     """
-    frame = images.frame(stop - start)
-    if os.fstat(fd).st_size != frame.size:
+    frame, found = images.frame(stop - start), os.fstat(fd)
+    if not stat.S_ISREG(found.st_mode):
+        raise ValueError("is no regular file")
+    if found.st_size != frame.size:
         return None
     if any(os.pread(fd, len(piece), at) != piece for at, piece in images.between(start, stop)):
         raise ValueError("differs from what is written there")

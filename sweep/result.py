@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sweep.begun import SPEC, Spec, read_spec
 from sweep.contents import contents, gathered, part_columns
 from sweep.errors import SweepError
 from sweep.granules import granules
@@ -21,7 +22,7 @@ from sweep.parts import PART_NAME, READERS, Parts, read_part
 from sweep.reducing import BY_STATUS, pending
 from sweep.sealing import readable
 from sweep.statuses import StatusCount, count_methods, count_statuses, failures
-from sweep.store import SPEC, Spec, folder_of, read_spec
+from sweep.store import folder_of
 from sweep.study import Study
 
 if TYPE_CHECKING:
@@ -109,6 +110,8 @@ def stored_fingerprint(output: Path) -> dict[str, str]:
     import h5py
 
     try:
+        if not output.is_file():
+            raise ValueError("it is no regular file")
         with output.open("rb") as raw:
             if not readable(output, raw.fileno()):
                 raise ValueError("HDF5 cannot read it")
@@ -181,7 +184,7 @@ def _open_parts(output: Path, spec: Spec, strict: bool) -> xr.Dataset:
     if study.summary is not None:
         return in_memory(plan, gathered(study, _read_all(study, spec, parts, pending(study, 0, spec.blocks.size))))
     if plan.grid.size * plan.cell_bytes > min(LARGEST_AT_ONCE, MEMORY_SHARE * memory()):
-        return _lazily(plan, Parts(Images(plan.columns), spec.blocks, parts))
+        return _lazily(plan, Parts(Images(plan.columns, spec.mark), spec.blocks, parts))
     empty = {c.name: np.full((plan.grid.size, *c.shape), c.missing, c.dtype) for c in plan.columns}
     return in_memory(plan, _read_all(study, spec, parts, empty))
 
@@ -201,7 +204,7 @@ def checked_study(folder: Path, spec: Spec) -> Study:
 
 def _read_all(study: Study, spec: Spec, parts: Mapping[int, Path], rows: dict[str, Any]) -> dict[str, Any]:
     """The rows, with those of all sound parts filled in."""
-    images = Images(part_columns(study))
+    images = Images(part_columns(study), spec.mark)
 
     def fill(index: int) -> None:
         start, stop = spec.blocks.bounds(index)

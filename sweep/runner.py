@@ -12,22 +12,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from sweep.assemble import assemble
+from sweep.begun import Spec, read_spec, restored
 from sweep.cluster import Cluster, joined
 from sweep.contents import gathered, part_columns
 from sweep.errors import SweepError
 from sweep.extending import Given, Known, obstacle
 from sweep.fingerprint import difference, fingerprint
+from sweep.granules import granules
 from sweep.pool import Spares, Terminated, cores, whole_number
 from sweep.progress import Progress, stream_of
 from sweep.result import checked_study, in_memory, memory, open_result, open_unfinished, stored_fingerprint
 from sweep.session import Session, Solve
-from sweep.store import Store, folder_of, opened, read_spec
+from sweep.store import Store, folder_of, opened
 from sweep.until import TimeUp, deadline
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from sweep.store import Spec
     from sweep.study import Study
 
 MOST_ATTEMPTS = 3
@@ -244,11 +245,25 @@ def _spec(store: Store, task: _Task) -> Spec | None:
         spec = read_spec(store.folder)
         if spec is not None:
             checked_study(store.folder, spec)
-        return spec
+            return spec
     except SweepError:
         if task.force:
             return None
-        raise
+        spec = _restored(store, task)
+        if spec is None:
+            raise
+        return spec
+    return None if task.force else _restored(store, task)
+
+
+def _restored(store: Store, task: _Task) -> Spec | None:
+    """The spec that is lost or damaged, written anew where the parts are of this study. Raises SweepError."""
+    study = task.study
+    spec = restored(store.folder, store.columns, study.to_json(), task.mark, granules(study).count)
+    if spec is not None:
+        store.write(spec)
+        Progress(1, task.stream, store.folder.name).note("its spec.json was lost or damaged; it is written anew")
+    return spec
 
 
 def _take_up(store: Store, spec: Spec | None, task: _Task) -> None:

@@ -5,75 +5,31 @@
     <start>-<stop>.<digest>.h5     one block: a small HDF5 file that is written once, or not at all
     workers.<run>.tmp/             files that workers of a cluster are writing; without it they cannot
 
-A block counts as done when its file bears this name. The digest (xxh3, 128 bits) is of its numbers, in the order of
-the columns: a block computed twice has the same name, and a damaged file is known from its name.
+A block counts as done when its file bears this name. The digest (xxh3, 128 bits) is of the fingerprint and of its
+numbers, in the order of the columns: a block computed twice has the same name, and a damaged file, or one of another
+study, is known from its name.
 """
 
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import secrets
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from sweep import disk
+from sweep.begun import SPEC, Spec, new_spec
 from sweep.blocks import Partition
 from sweep.errors import SweepError
 from sweep.image import Images
 from sweep.layout import Column
 from sweep.parts import PART_NAME, digest, part_name, read_part
 
-FORMAT = 1
-SPEC = "spec.json"
 LOCK = "lock"
 DOOR = "workers"
-
-
-@dataclass(frozen=True)
-class Spec:
-    """What spec.json says: all that a sweep needs to be continued or read."""
-
-    study: str
-    fingerprint: Mapping[str, str]
-    blocks: Partition
-    begun: str
-
-    def to_json(self) -> str:
-        """The text of spec.json."""
-        return json.dumps(
-            {
-                "format": FORMAT,
-                "cells": self.blocks.size,
-                "cells_per_block": self.blocks.cells,
-                "begun": self.begun,
-                "fingerprint": dict(self.fingerprint),
-                "study": self.study,
-            },
-            indent=1,
-        )
-
-
-def read_spec(folder: Path) -> Spec | None:
-    """The spec of a sweep that has not ended, or None where there is none. Raises SweepError."""
-    path = folder / SPEC
-    try:
-        keys = json.loads(path.read_text("utf-8"))
-        if keys["format"] != FORMAT:
-            raise SweepError(f"{path}: format {keys['format']}; this version of foliot reads format {FORMAT}")
-        blocks = Partition(int(keys["cells"]), int(keys["cells_per_block"]))
-        return Spec(keys["study"], keys["fingerprint"], blocks, keys["begun"])
-    except FileNotFoundError:
-        return None
-    except OSError as fault:
-        raise SweepError(f"{path}: cannot be read ({fault.strerror})") from None
-    except (ValueError, KeyError, TypeError, RecursionError) as fault:
-        raise SweepError(f"{path}: damaged ({fault}); remove the folder {folder} to start anew") from None
 
 
 def folder_of(output: Path) -> Path:
@@ -103,12 +59,16 @@ class Store:
         self._images = Images(columns)
         self._scratch = folder
 
+    def _of(self, spec: Spec) -> None:
+        """The parts are those of this sweep from now on."""
+        self.spec, self._images = spec, Images(self.columns, spec.mark)
+
     @classmethod
-    def through(cls, door: Path, columns: Sequence[Column], blocks: Partition) -> Store:
+    def through(cls, door: Path, columns: Sequence[Column], fingerprint: Mapping[str, str], blocks: Partition) -> Store:
         """The store of a process that writes parts for the one that has made the door, and has the lock."""
         store = cls(door.parent, columns)
         store._scratch = door
-        store.spec = Spec("", {}, blocks, "")
+        store._of(Spec("", fingerprint, blocks, ""))
         return store
 
     @property
@@ -123,18 +83,20 @@ class Store:
 
     def begin(self, study: str, fingerprint: Mapping[str, str], blocks: Partition) -> None:
         """Fixes study and partition for good. Raises SweepError."""
-        begun = datetime.now(UTC).isoformat(timespec="seconds")
-        spec = Spec(study, fingerprint, blocks, begun)
+        self.write(new_spec(study, fingerprint, blocks))
+
+    def write(self, spec: Spec) -> None:
+        """Puts a spec in place; the parts that are there are not taken up. Raises SweepError."""
         path = self.folder / SPEC
         try:
             disk.publish([spec.to_json().encode()], self.temporary(SPEC), path)
         except OSError as fault:
             raise disk.refusal(fault, path) from fault
-        self.spec = spec
+        self._of(spec)
 
     def resume(self, spec: Spec) -> None:
         """Takes up the parts that are there. Raises SweepError."""
-        self.spec = spec
+        self._of(spec)
         try:
             self._sort_out()
         except OSError as fault:
@@ -143,7 +105,7 @@ class Store:
     def put(self, index: int, arrays: Mapping[str, Any]) -> None:
         """Stores a block: on return it is on the disk. Raises SweepError."""
         start, stop = self.blocks.bounds(index)
-        name = part_name(start, stop, digest(self.columns, arrays))
+        name = part_name(start, stop, digest(self.columns, arrays, self._images.mark))
         pieces = self._images.pieces(start, stop, arrays)
         try:
             disk.publish(pieces, self.temporary(f"{start:012d}"), self.folder / name)

@@ -14,6 +14,7 @@ import numpy as np
 import xxhash
 
 from sweep import disk
+from sweep.begun import SPEC, Spec, read_spec
 from sweep.blocks import Partition
 from sweep.contents import part_columns
 from sweep.errors import SweepError
@@ -23,7 +24,7 @@ from sweep.integrity import BYTES, DIGESTS, FRAME, GROUP, frame_digest, frame_pl
 from sweep.parts import DAMAGE, PART_NAME, READERS, read_part
 from sweep.result import checked_study, unreadable
 from sweep.sealing import length, readable, unbroken
-from sweep.store import LOCK, SPEC, Spec, folder_of, read_spec
+from sweep.store import LOCK, folder_of
 
 BESIDE = "damaged beside the outputs' numbers: in attributes, coordinates, statuses or its structure"
 OF_DAMAGE = (errno.EINVAL, errno.EOVERFLOW)
@@ -94,6 +95,8 @@ def _finished(output: Path) -> Verdict:
     import h5py
 
     try:
+        if not output.is_file():
+            raise unreadable(output, ValueError("it is no regular file"))
         size = output.stat().st_size
         if not _may_be_read(output):
             return Verdict(output, False, f"{size:,} bytes checked", (BESIDE,))
@@ -177,7 +180,7 @@ def _told(name: str, blocks: Partition, bad: list[int]) -> Iterator[str]:
 
 def _parts(output: Path, folder: Path, spec: Spec) -> Verdict:
     study = checked_study(folder, spec)
-    images = Images(part_columns(study))
+    images = Images(part_columns(study), spec.mark)
     names, strange = _sorted_out(folder, spec.blocks)
 
     def sound(name: str) -> bool:

@@ -217,7 +217,7 @@ def test_a_worker_that_comes_too_late_has_no_place_to_write(output):
         store.begin(study.to_json(), {}, sweep.blocks.Partition(30, 10))
         door = store.open_door()
         clusters.show_key(door, "key")
-        late = store.through(door, store.columns, store.blocks)
+        late = store.through(door, store.columns, {}, store.blocks)
         arrays = {c.name: c.empty(10) for c in store.columns}
         late.put(0, arrays)
         store.take(0, late.names[0])

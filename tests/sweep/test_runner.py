@@ -2,6 +2,7 @@ import errno
 import io
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -19,12 +20,14 @@ from hypothesis import strategies as st
 
 from kernels.interface import Status
 from sweep import disk
+from sweep.begun import SPEC
 from sweep.errors import SweepError
 from sweep.result import open_result
 from sweep.runner import run
 from sweep.solve import Solver
 from sweep.spec import build_study
-from sweep.store import SPEC, folder_of
+from sweep.store import Store, folder_of
+from sweep.verifying import verify
 
 HEIGHTS = [-1.0, 1.0, 2.0, 5.0, float("nan"), 13.5, 100.0]
 SPEEDS = [0.0, 0.5, 3.0, 1e-9, 1e4]
@@ -208,11 +211,37 @@ def test_parts_of_another_study_beside_a_complete_output_are_left_alone(output):
     same(quiet(tall(4), output, force=True), quiet(tall(4)))
 
 
-def test_a_damaged_spec_is_refused_unless_forced(unfinished):
+@pytest.mark.parametrize("text", ["?", None])
+def test_a_damaged_or_lost_spec_is_written_anew_for_its_own_study_alone(unfinished, text, monkeypatch):
+    spec, before = folder_of(unfinished) / SPEC, names(unfinished)
+    spec.unlink() if text is None else spec.write_text(text)
+    with pytest.raises(SweepError, match="damaged" if text else "finished blocks, but no spec"):
+        quiet(tall(24), unfinished)
+    assert names(unfinished) == before != []
+    put, log = [], io.StringIO()
+    real = Store.put
+    monkeypatch.setattr(Store, "put", lambda self, index, arrays: put.append(index) or real(self, index, arrays))
+    same(quiet(tall(23), unfinished, progress=log), quiet(tall(23)))
+    assert len(put) == 5 - len(before)
+    assert "spec.json was lost or damaged; it is written anew" in log.getvalue()
+
+
+def test_a_damaged_spec_without_parts_of_this_study_is_given_up_when_forced(unfinished):
     (folder_of(unfinished) / SPEC).write_text("?")
-    with pytest.raises(SweepError, match="damaged"):
-        quiet(tall(23), unfinished)
-    same(quiet(tall(23), unfinished, force=True), quiet(tall(23)))
+    same(quiet(tall(24), unfinished, force=True), quiet(tall(24)))
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_a_part_of_another_study_is_found_and_computed_again(unfinished, own):
+    """The same cells, the same columns, a sound digest: but of a stone thrown from elsewhere."""
+    other = unfinished.with_name("other.h5")
+    interrupted(stone(axes={"height": np.arange(101.0, 124)}, outputs=["fall_time"], along={}), other)
+    first, strange = names(unfinished)[0], folder_of(other) / names(other)[0]
+    shutil.copy(strange, folder_of(unfinished))
+    if not own:
+        (folder_of(unfinished) / first).unlink()
+    assert f"damaged: {strange.name}" in verify(unfinished).findings
+    same(quiet(tall(23), unfinished), quiet(tall(23)))
 
 
 @pytest.mark.parametrize("harm", ["flip", "cut", "empty", "text"])
@@ -529,13 +558,22 @@ def test_a_disk_that_is_too_small_is_refused_at_once(output, monkeypatch):
     assert list(output.parent.iterdir()) == []
 
 
-def test_blocks_without_a_spec_are_not_thrown_away(unfinished):
-    study, output = tall(23), unfinished
-    (folder_of(output) / "spec.json").unlink()
-    before = names(output)
-    with pytest.raises(SweepError, match="finished blocks, but no spec"):
-        quiet(study, output)
-    assert names(output) == before != []
+@pytest.mark.parametrize("place", ["out.h5", "out.h5.parts"])
+def test_a_pipe_where_a_result_or_its_parts_should_be_is_told_at_once(output, place):
+    os.mkfifo(output.with_name(place))
+    for action in (lambda path: quiet(tall(3), path), verify, open_result):
+        with pytest.raises(SweepError, match=r"^[^\n]*$"):
+            action(output)
+
+
+def test_pipes_among_the_parts_are_told_and_set_aside(unfinished):
+    first = folder_of(unfinished) / names(unfinished)[0]
+    first.unlink()
+    os.mkfifo(first)
+    assert f"damaged: {first.name}" in verify(unfinished).findings
+    with open_result(unfinished) as found:
+        assert found.status[0] == Status.PENDING
+    same(quiet(tall(23), unfinished), quiet(tall(23)))
 
 
 def test_a_file_of_somebody_elses_in_the_folder_of_the_parts_is_left_there(tmp_path):

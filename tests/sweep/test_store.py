@@ -1,3 +1,4 @@
+import contextlib
 import errno
 import os
 import signal
@@ -13,12 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sweep import disk
+from sweep.begun import SPEC, Spec, read_spec
 from sweep.blocks import Partition
 from sweep.errors import SweepError
 from sweep.image import Images
 from sweep.layout import Column
 from sweep.parts import digest, read_part
-from sweep.store import LOCK, SPEC, folder_of, opened, read_spec
+from sweep.store import LOCK, folder_of, opened
 
 COLUMNS = (
     Column("period", "f8", (), (), {"units": "s", "long_name": "time of a swing"}),
@@ -26,8 +28,8 @@ COLUMNS = (
     Column("status", "i1", (), (), {}),
     Column("method_used", "i1", (), (), {}),
 )
-IMAGES = Images(COLUMNS)
 MARK = {"study": "abc"}
+IMAGES = Images(COLUMNS, Spec("{}", MARK, Partition(25, 10), "").mark)
 
 
 def numbers(start, stop):
@@ -157,7 +159,7 @@ def test_a_part_cut_off_anywhere_is_found(filled):
     for length in [0, 1, 100, *range(2000, len(whole), 13)]:
         path.write_bytes(whole[:length])
         found = read_part(path, IMAGES, 0, 10)
-        assert found is None or digest(COLUMNS, found) in path.name
+        assert found is None or digest(COLUMNS, found, IMAGES.mark) in path.name
 
 
 def test_a_part_that_another_version_of_hdf5_laid_out_is_read_as_well(filled):
@@ -346,11 +348,20 @@ def test_the_spec_comes_back_as_it_was(output):
         assert (found.blocks, found.fingerprint, found.study) == (Partition(10**12, 12345), MARK, "{}")
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", '{"format": 1}', "\x00"])
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"format": 2}', "\x00"])
 def test_a_damaged_spec_is_one_clear_line(filled, text):
     (filled / SPEC).write_text(text)
-    with pytest.raises(SweepError, match=r"damaged.*remove the folder"):
+    with pytest.raises(SweepError, match=r"damaged.*run its study again"):
         read_spec(filled)
+
+
+def test_a_flipped_bit_anywhere_in_a_spec_is_found(filled):
+    whole, before = (filled / SPEC).read_bytes(), read_spec(filled)
+    for place in range(len(whole)):
+        (filled / SPEC).write_bytes(whole[:place] + bytes([whole[place] ^ 1 << place % 8]) + whole[place + 1 :])
+        # white space may be flipped
+        with contextlib.suppress(SweepError):
+            assert read_spec(filled) == before
 
 
 def test_a_spec_of_a_later_version_is_named_as_such(filled):
