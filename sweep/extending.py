@@ -133,9 +133,8 @@ class Given:
 
 def _positions(old: Axis, new: Axis) -> Any:
     """For every value of an axis its position among the old ones, -1 where it is new."""
-    places = {value: place for place, value in enumerate(new.values.tolist())}
-    nan = next((place for value, place in places.items() if value != value), -1)
-    found = np.array([nan if value != value else places.get(value, -1) for value in old.values.tolist()])
+    places = {_exactly(value): place for place, value in enumerate(new.values.tolist())}
+    found = np.array([places.get(_exactly(value), -1) for value in old.values.tolist()])
     lost = np.flatnonzero(found < 0)
     if len(lost):
         raise SweepError(
@@ -147,3 +146,8 @@ def _positions(old: Axis, new: Axis) -> Any:
     positions = np.full(len(new), -1)
     positions[found] = np.arange(len(old))
     return positions
+
+
+def _exactly(value: float) -> str:
+    """A value to the last digit and the sign of its zero, which numbers that are equal may differ in."""
+    return float(value).hex()

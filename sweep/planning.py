@@ -27,7 +27,7 @@ from sweep.integrity import Seals
 from sweep.layout import Column
 from sweep.parts import FLAGS
 from sweep.pool import cores, whole_number
-from sweep.progress import duration
+from sweep.progress import duration, quantity
 from sweep.reducing import strip_bytes
 from sweep.result import memory
 from sweep.session import faults_told, sampled_study
@@ -214,14 +214,6 @@ def _counted(numbers: np.ndarray, names: dict[int, str]) -> dict[str, float]:
 
 def _shares(shares: dict[str, float]) -> str:
     return ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares.items()) + " of a sample" * bool(shares)
-
-
-def quantity(count: float) -> str:
-    """Bytes as people say them: `812 B`, `1.3 kB`, `42 MB`."""
-    units = ["B", "kB", "MB", "GB", "TB", "PB"]
-    while count >= 999.5 and len(units) > 1:
-        count, units = count / 1000, units[1:]
-    return f"{count:.3g} {units[0]}"
 
 
 def small_duration(seconds: float) -> str:

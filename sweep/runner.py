@@ -11,6 +11,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
+import numpy as np
+
 from sweep.assemble import assemble
 from sweep.begun import Spec, read_spec, restored
 from sweep.cluster import Cluster, joined
@@ -20,7 +22,7 @@ from sweep.extending import Given, Known, obstacle
 from sweep.fingerprint import difference, fingerprint
 from sweep.granules import granules
 from sweep.pool import Spares, Terminated, cores, whole_number
-from sweep.progress import Progress, stream_of
+from sweep.progress import Progress, quantity, stream_of
 from sweep.result import checked_study, in_memory, memory, open_result, open_unfinished, stored_fingerprint
 from sweep.session import Session, Solve
 from sweep.store import Store, folder_of, opened
@@ -351,12 +353,14 @@ def _store_elsewhere(session: Session, store: Store, jobs: Sequence[int], progre
 def _check_space(session: Session, output: Path, progress: Progress) -> None:
     """Raises SweepError where the parts to come and the output have no room on the disk."""
     missing = session.row_bytes * (progress.total - progress.done) / session.granules.mean
-    needed = missing + session.layout.cell_bytes * session.layout.grid.size
+    layout = session.layout
+    coordinates = sum(np.asarray(coordinate.values).nbytes for coordinate in layout.coordinates)
+    needed = missing + layout.cell_bytes * layout.grid.size + coordinates
     free = shutil.disk_usage(output.parent).free
     if needed > free:
         raise SweepError(
-            f"{output}: needs {needed / 1e6:,.1f} MB more, only {free / 1e6:,.1f} MB are free here; free some space, "
-            "choose another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
+            f"{output}: needs {quantity(needed)} more, only {quantity(free)} are free here; free some space, choose "
+            "another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
         )
 
 

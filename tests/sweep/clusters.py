@@ -46,8 +46,12 @@ def served(workers=2, threads=1, failures=1):
     try:
         yield process.stdout.readline().strip(), process
     finally:
+        # left to itself it tidies up after its workers
+        with contextlib.suppress(OSError):
+            process.stdin.close()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(20)
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-        process.stdin.close()
         process.stdout.close()

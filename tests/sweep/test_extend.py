@@ -125,6 +125,8 @@ def test_a_killed_extension_continues(output, monkeypatch):
         ({"heights": HEIGHTS[1:]}, r"axes\.height: 1 of its 21 values so far are not among the new ones, e\.g\. -1"),
         ({"heights": HEIGHTS[::-1]}, r"axes\.height: its values so far stand in another order"),
         ({"heights": np.append(HEIGHTS[:-1], np.nextafter(9.0, 10))}, "to the last digit"),
+        ({"speeds": np.append(np.where(SPEEDS == 0, -0.0, SPEEDS), 2e4)}, "0 is not; extended, an axis keeps"),
+        ({"heights": np.append(HEIGHTS, 20.0), "fixed": {"g": 1.6}}, "cannot be extended, for fixed"),
         ({"heights": np.append(HEIGHTS, 20.0), "rtol": 1e-3}, "cannot be extended, for rtol differs, too"),
         ({"heights": np.append(HEIGHTS, 20.0), "outputs": ["fall_time"], "along": {}}, "cannot be extended, for"),
         ({"heights": np.append(HEIGHTS, 20.0), "summary": {}}, "cannot be extended, for summary"),

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from sweep.errors import SweepError
-from sweep.planning import plan, quantity, small_duration
+from sweep.planning import plan, small_duration
+from sweep.progress import quantity
 from sweep.runner import run
 from sweep.spec import build_study
 
