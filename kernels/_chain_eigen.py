@@ -17,11 +17,9 @@ Source: Fernando & Parlett, Numer. Math. 67:191 (1994), sections 4 and 6; traces
 
 import math
 
-import numpy as np
-
 from kernels._chain import same, units
 from kernels._columns import entry
-from kernels._groups import GROUP, cells_at, each_group, write_row
+from kernels._groups import GROUP, cells_at, each_group, room, write_row
 from kernels._jit import jit, jit_call
 from kernels._lanes import fma, isnt, magnitude, some, sqrt, where
 from kernels._vecmath import is_normal, scale
@@ -238,4 +236,4 @@ def _group(first, J, k, frequency, status, rows):
 @entry()
 def natural_frequencies_of_all(J, k, frequency, status):
     """`natural_frequencies` of every row of J, k and frequency, of shape (n_cells, n); and every status."""
-    each_group(_group, (J, k, frequency, status, np.empty(7 * J.shape[1] * GROUP)))
+    each_group(_group, (J, k, frequency, status, room(7 * J.shape[1])))

@@ -10,11 +10,21 @@ import numpy as np
 
 from kernels._jit import COMPILED, jit
 from kernels._lanes import WIDTH, lanes_at
+from kernels._parts import LINE
 
 GROUP = WIDTH if COMPILED else 1
 """Cells of a group."""
 
 cells_at = lanes_at if COMPILED else operator.index
+
+
+@jit
+def room(rows):
+    """Space for that many rows of a group, from the border of a cache line on: no register straddles two of them."""
+    spare = LINE // 8
+    space = np.empty(rows * GROUP + spare)
+    first = (spare - np.int64(space.ctypes.data) // 8 % spare) % spare
+    return space[first : first + rows * GROUP]
 
 
 @jit

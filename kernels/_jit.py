@@ -7,7 +7,7 @@ on every CPU. `error_model="numpy"`: 1/0 is inf, nothing raises.
 import numba
 from numba import njit
 
-from kernels._parts import part
+from kernels._parts import aligned, part
 
 COMPILED = not numba.config.DISABLE_JIT
 """False under NUMBA_DISABLE_JIT=1, where every function here is plain Python of one cell."""
@@ -34,4 +34,4 @@ def cached(function):
     """As `jit_call`, called from Python; machine code of this package is kept on the disk."""
     from kernels._cache import enable
 
-    return enable(njit(**_OPTIONS)(function))
+    return enable(aligned(function, **_OPTIONS))

@@ -21,7 +21,7 @@ import numpy as np
 
 from kernels import _linkage_extremes, _linkage_sampled, _linkage_textbook, _linkage_waveform
 from kernels._columns import each_cell, entry, one_by_one
-from kernels._groups import GROUP, cells_at, each_group
+from kernels._groups import GROUP, cells_at, each_group, room
 from kernels._jit import jit
 from kernels._lanes import isnt, where
 from kernels._linkage import in_units, larger, margins, side_of
@@ -142,7 +142,7 @@ def _over_a_turn(first, b, d, f, e, rtol, buffers, thd, rate_max, rate_min, stat
 @entry()
 def over_a_turn(b, d, f, e, rtol, thd, rate_max, rate_min, status):
     """The outputs that `stable` lacks; `_linkage_waveform` estimates their rounding."""
-    buffers = np.empty((4, _linkage_waveform.NODES * GROUP))
+    buffers = room(4 * _linkage_waveform.NODES).reshape((4, _linkage_waveform.NODES * GROUP))
     each_group(_over_a_turn, (b, d, f, e, rtol, buffers, thd, rate_max, rate_min, status))
 
 
