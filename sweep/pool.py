@@ -145,35 +145,45 @@ class Terminated(SystemExit):
 class CtrlC:
     """Holds Ctrl-C and SIGTERM back until `check`, for Python's locks are left in disorder where they strike in them.
 
-    The second one strikes at once. Other handlers than Python's own are left alone.
+    The second one strikes at once. One within another asks that one. Other handlers than Python's own are left alone.
     """
 
     OWN: ClassVar[dict[signal.Signals, Any]] = {
         signal.SIGINT: signal.default_int_handler,
         signal.SIGTERM: signal.SIG_DFL,
     }
+    _outermost: ClassVar[CtrlC | None] = None
 
     def __init__(self) -> None:
         self._pressed: int | None = None
         self._ours: list[signal.Signals] = []
+        self._holder = self
 
     def __enter__(self) -> CtrlC:
-        if threading.current_thread() is threading.main_thread():
-            self._ours = [number for number, own in self.OWN.items() if signal.getsignal(number) is own]
+        if threading.current_thread() is not threading.main_thread():
+            return self
+        if CtrlC._outermost is not None:
+            self._holder = CtrlC._outermost
+            return self
+        CtrlC._outermost = self
+        self._ours = [number for number, own in self.OWN.items() if signal.getsignal(number) is own]
         for number in self._ours:
             signal.signal(number, self._press)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
-        self._give_back()
+        if CtrlC._outermost is self:
+            CtrlC._outermost = None
+            self._give_back()
         if kind is None:
             self.check()
 
     def check(self) -> None:
         """Raises KeyboardInterrupt if Ctrl-C was pressed, Terminated after SIGTERM."""
-        if self._pressed == signal.SIGTERM:
+        pressed = self._holder._pressed
+        if pressed == signal.SIGTERM:
             raise Terminated
-        if self._pressed is not None:
+        if pressed is not None:
             raise KeyboardInterrupt
 
     def _press(self, number: int, frame: object) -> None:

@@ -21,7 +21,7 @@ from sweep.errors import SweepError
 from sweep.extending import Given, Known, obstacle
 from sweep.fingerprint import difference, fingerprint
 from sweep.granules import granules
-from sweep.pool import Spares, Terminated, cores, whole_number
+from sweep.pool import CtrlC, Spares, Terminated, cores, whole_number
 from sweep.progress import Progress, quantity, stream_of
 from sweep.result import checked_study, in_memory, memory, open_result, open_unfinished, stored_fingerprint
 from sweep.session import Session, Solve
@@ -208,19 +208,21 @@ def _run_session(task: _Task, session: Session, store: Store, output: Path) -> b
     jobs = range(session.blocks.count) if store.spec is None else store.missing()
     progress = session.progress(task.stream, output.name, jobs)
     _check_space(session, output, progress)
-    if store.spec is None:
-        store.begin(task.study.to_json(), task.mark, session.blocks)
-    try:
-        _finish(session, store, output, progress)
-    except (KeyboardInterrupt, Terminated):
-        progress.note(f"stopped; {_kept(store)}")
-        raise
-    except TimeUp:
-        progress.note(f"stopped, for it is {datetime.now():%H:%M}; {_kept(store)}")
-        return False
-    finally:
-        progress.stop()
-    store.clear()
+    # held back wherever they would leave half a file behind
+    with CtrlC():
+        if store.spec is None:
+            store.begin(task.study.to_json(), task.mark, session.blocks)
+        try:
+            _finish(session, store, output, progress)
+        except (KeyboardInterrupt, Terminated):
+            progress.note(f"stopped; {_kept(store)}")
+            raise
+        except TimeUp:
+            progress.note(f"stopped, for it is {datetime.now():%H:%M}; {_kept(store)}")
+            return False
+        finally:
+            progress.stop()
+        store.clear()
     return True
 
 

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from sweep.pool import CtrlC, Halt, each
+from sweep.pool import CtrlC, Halt, Terminated, each
 
 
 def test_every_job_is_done_once_and_told():
@@ -90,6 +90,29 @@ def test_ctrl_c_waits_until_it_may_strike():
 def test_ctrl_c_is_not_lost_where_nobody_checks():
     with pytest.raises(KeyboardInterrupt), CtrlC():
         press()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_what_strikes_within_is_held_back_to_the_next_check_of_any(number):
+    reached = []
+
+    def pressed():
+        with CtrlC() as outer:
+            with CtrlC():
+                pass
+            os.kill(os.getpid(), number)
+            time.sleep(0.01)
+            reached.append(signal.getsignal(number))
+            with CtrlC() as inner:
+                reached.append("within")
+                inner.check()
+            outer.check()
+
+    with pytest.raises((KeyboardInterrupt, Terminated)):
+        pressed()
+    assert reached == [CtrlC.OWN[number], "within"]
+    with CtrlC() as ctrl_c:
+        ctrl_c.check()
 
 
 def test_a_second_ctrl_c_strikes_at_once():

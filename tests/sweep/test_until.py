@@ -1,6 +1,7 @@
 """Runs that end early: at a time of day, on SIGTERM; and that every cell is accounted for at any moment."""
 
 import io
+import os
 import signal
 from datetime import datetime, timedelta
 
@@ -12,8 +13,10 @@ from test_runner import names, quiet, same, slow_run, tall, wait_for
 
 import sweep
 from kernels.interface import Status
+from sweep import assemble
 from sweep.cli import main
 from sweep.errors import SweepError
+from sweep.pool import Terminated
 from sweep.statuses import FAILED, account
 from sweep.store import folder_of
 from sweep.until import deadline
@@ -95,6 +98,25 @@ def test_sigterm_ends_within_a_block_with_143_and_the_next_start_tidies_up(tmp_p
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("slow.CELL_SECONDS", 0.0)
         same(quiet(tall(400, "slow:SLOW"), output), quiet(tall(400, "slow:SLOW")))
+    assert list(tmp_path.iterdir()) == [output]
+
+
+@pytest.mark.parametrize("name", ["write_frame", "seal", "frame_digest", "_check"])
+def test_sigterm_while_the_output_is_put_together_leaves_no_file_half_written(tmp_path, name):
+    output, log = tmp_path / "out.h5", io.StringIO()
+    real = getattr(assemble, name)
+
+    def struck(*rest):
+        os.kill(os.getpid(), signal.SIGTERM)
+        return real(*rest)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(assemble, name, struck)
+        with pytest.raises(Terminated):
+            quiet(tall(50), output, block_cells=10, progress=log)
+    assert not list(tmp_path.rglob("*.tmp"))
+    assert output.exists() != ("run the same command again" in log.getvalue())
+    same(quiet(tall(50), output), quiet(tall(50)))
     assert list(tmp_path.iterdir()) == [output]
 
 
