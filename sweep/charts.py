@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from sweep import disk
 from sweep._view import View, coordinate, is_logarithmic, label, setting, spans_decades, view
 from sweep.errors import SweepError
 
@@ -223,15 +224,8 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
         raise SweepError(f"{target}: found {found}; a picture is one of {', '.join(METADATA)}")
     if target.is_dir():
         raise SweepError(f"{target} is a folder; name a file in it")
-    part = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    try:
-        with style():
-            figure.savefig(part, format=kind[1:], metadata=METADATA[kind])
-        part.replace(target)
-    except OSError as error:
-        raise SweepError(f"{target} cannot be written: {error.strerror or error}") from None
-    finally:
-        part.unlink(missing_ok=True)
+    with disk.replacing(target) as part, style():
+        figure.savefig(part, format=kind[1:], metadata=METADATA[kind])
     return target
 
 

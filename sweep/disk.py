@@ -10,7 +10,8 @@ import contextlib
 import errno
 import fcntl
 import os
-from collections.abc import Iterable
+import shutil
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -111,6 +112,27 @@ def publish(pieces: Iterable[Any], temporary: Path, final: Path) -> None:
             temporary.unlink(missing_ok=True)
         raise
     sync_folder(final.parent)
+
+
+@contextlib.contextmanager
+def replacing(target: Path) -> Iterator[Path]:
+    """A file beside `target` to write to, or to put a folder at; it takes the place of `target` at the end.
+
+    Raises SweepError where the system refuses; what was there before then stays.
+    """
+    part = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    try:
+        part.touch()  # says in plain words that there is no such folder, or no permission
+        yield part
+        if target.is_dir():
+            shutil.rmtree(target)
+        rename(part, target)
+    except OSError as fault:
+        raise SweepError(f"{target} cannot be written: {fault.strerror or fault}") from None
+    finally:
+        if part.is_dir():
+            shutil.rmtree(part, ignore_errors=True)
+        part.unlink(missing_ok=True)
 
 
 def try_lock(fd: int) -> bool:

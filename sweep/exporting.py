@@ -6,7 +6,6 @@ import csv
 import itertools
 import math
 import os
-import shutil
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TextIO
@@ -14,6 +13,7 @@ from typing import Any, TextIO
 import numpy as np
 import xarray as xr
 
+from sweep import disk
 from sweep.checks import listed
 from sweep.errors import SweepError
 from sweep.flat import flat
@@ -52,22 +52,13 @@ def export(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         raise SweepError(f"{target}: found {found}; export writes {listed(WRITERS, word='and')}, as the suffix says")
     if target.is_dir() and kind != ".zarr":
         raise SweepError(f"{target} is a folder; name a file in it")
-    part = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
-        part.touch()  # says in plain words that there is no such folder, or no permission
-        WRITERS[kind](dataset, part)
-        if target.is_dir():
-            shutil.rmtree(target)
-        part.replace(target)
+        with disk.replacing(target) as part:
+            WRITERS[kind](dataset, part)
     except ImportError as error:
         raise SweepError(f'{target}: needs {error.name}; install it with: pip install "foliot[export]"') from None
-    except (OSError, RuntimeError) as error:  # the latter from HDF5
-        reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else error
-        raise SweepError(f"{target} cannot be written: {reason}") from None
-    finally:
-        if part.is_dir():
-            shutil.rmtree(part, ignore_errors=True)
-        part.unlink(missing_ok=True)
+    except RuntimeError as error:  # from HDF5
+        raise SweepError(f"{target} cannot be written: {error}") from None
     return target
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sweep import disk
 from sweep.checks import did_you_mean, listed
 from sweep.errors import SweepError
 from sweep.layout import METHOD_USED, STATUS
@@ -147,13 +148,10 @@ def write_laws(found: Laws, path: Path) -> None:
     if found.meeting is not None:
         rows += list(_table_rows(found.meeting, "meeting"))
     names = list(dict.fromkeys(name for row in rows for name in row))
-    try:
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, names, lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
-    except OSError as error:
-        raise SweepError(f"{path} cannot be written: {error.strerror}") from None
+    with disk.replacing(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, names, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 def _table_rows(fit: xr.Dataset, law: str) -> Iterator[dict[str, Any]]:

@@ -14,6 +14,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sweep import disk
 from sweep.errors import SweepError
 from sweep.fitting import explanation, law_rows
 from sweep.report import Rows, head, outputs_of, sections
@@ -82,14 +83,8 @@ def write_page(dataset: xr.Dataset, result: Path, path: str | os.PathLike[str]) 
         The file cannot be written.
     """
     target = Path(path)
-    part = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    try:
+    with disk.replacing(target) as part:
         part.write_text(page(dataset, result), encoding="utf-8")
-        part.replace(target)
-    except OSError as error:
-        raise SweepError(f"{target} cannot be written: {error.strerror or error}") from None
-    finally:
-        part.unlink(missing_ok=True)
     return target
 
 
