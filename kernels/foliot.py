@@ -227,17 +227,17 @@ FOLIOT = Kernel(
     check=check,
     methods=(
         Method(
-            "asymptotic",
-            "weak and strong series with a bound each",
-            _foliot_viscous.asymptotic,
-            _foliot_viscous.asymptotic_bound,
-            _VISCOUS_ONLY,
-        ),
-        Method(
             "closed",
             "root of q - tanh q = 1/alpha by fitted polynomials",
             _foliot_viscous.closed,
             _foliot_viscous.closed_bound,
+            _VISCOUS_ONLY,
+        ),
+        Method(
+            "asymptotic",
+            "weak and strong series with a bound each",
+            _foliot_viscous.asymptotic,
+            _foliot_viscous.asymptotic_bound,
             _VISCOUS_ONLY,
         ),
         Method("pure", "closed forms where one loss acts alone", pure, pure_bound, ("a", "k")),

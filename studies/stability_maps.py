@@ -2,13 +2,16 @@
 
     sweep run studies/stability_maps.toml
     sweep run studies/stability_maps_oscillator.toml --allow-import
-    python studies/stability_maps.py stability_maps.h5 stability_maps_oscillator.h5
+    sweep run studies/stability_maps_sticking.toml
+    sweep run studies/stability_maps_spring.toml
+    python studies/stability_maps.py stability_maps_oscillator.h5 stability_maps.h5 stability_maps_sticking.h5 \\
+        stability_maps_spring.h5
 
-draws stability_maps.png. The first sweep is of a foliot's first flips from rest, a step h against its drive; truth is
-the kernel foliot_start. The second is of a damped oscillator x'' = -a x' - w^2 x, which a method makes grow where the
-largest eigenvalue of its step exceeds 1: for Runge-Kutta methods that is abs(R(z)), z the scene's eigenvalues times h,
-R the series of exp to the order, with one term more for Dormand-Prince. Of semi-implicit Euler and Verlet it is that of
-a 2 by 2 matrix.
+draws stability_maps.png. The second sweep is of a damped oscillator x'' = -a x' - w^2 x, which a method makes grow
+where the largest eigenvalue of its step exceeds 1: for Runge-Kutta methods that is abs(R(z)), z the scene's
+eigenvalues times h, R(z) the result of one step of x' = z x. Of semi-implicit Euler and Verlet it is that of a 2 by 2
+matrix. The others are of a foliot's first flips from rest: a step h against its drive, against dry friction close to
+sticking, and against a hairspring that it hardly overcomes; truth is the kernel foliot_start.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Groups, Statement, direct_label, read_result, report
+from scipy.integrate import DOP853, RK45
 
 import sweep
 from kernels.interface import FIRST_REFUSAL, Field, Status
@@ -80,33 +84,38 @@ and what is stated\
 """
 
 
-def taylor(z: Any, order: int) -> Any:
-    """exp(z) to that order."""
-    total, term = np.ones_like(z), np.ones_like(z)
-    for n in range(1, order + 1):
-        term = term * z / n
-        total = total + term
-    return total
+RUNGE_KUTTA = {
+    "euler": (np.zeros((1, 1)), np.ones(1)),
+    "rk4": (np.diag([0.5, 0.5, 1.0], -1), np.array([1, 2, 2, 1]) / 6),
+    "dopri5": (RK45.A, RK45.B),
+    "dop853": (DOP853.A, DOP853.B),
+}
+"""Weights of stages and result, the longer ones by scipy."""
+
+
+def stability_function(z: Any, method: str) -> Any:
+    """What a step of x' = z x, of size 1 from x = 1, comes to."""
+    weights, result = RUNGE_KUTTA[method]
+    stages: list[Any] = []
+    for row in weights:
+        stages.append(z * (1 + sum(w * k for w, k in zip(row, stages, strict=False))))
+    return 1 + sum(w * k for w, k in zip(result, stages, strict=True))
 
 
 def eigenvalue(method: str, ah: Any, wh: Any) -> Any:
-    """Modulus of the largest eigenvalue of a step, by theory; NaN for methods whose theory is not told here."""
+    """Modulus of the largest eigenvalue of a step, by theory."""
     ah, wh = np.broadcast_arrays(ah, wh)
     root = np.sqrt((ah**2 / 4 - wh**2).astype(complex))
     z = np.stack([-ah / 2 + root, -ah / 2 - root])
-    if method in ("euler", "rk4"):
-        return abs(taylor(z, {"euler": 1, "rk4": 4}[method])).max(axis=0)
-    if method == "dopri5":
-        return abs(taylor(z, 5) + z**6 / 600).max(axis=0)
+    if method in RUNGE_KUTTA:
+        return abs(stability_function(z, method)).max(axis=0)
     if method == "semi_implicit":
         trace, product = 2 - ah - wh**2, 1 - ah
-    elif method == "verlet":  # (x, v h) -> x1 = x + v - (w^2 x + a v)/2, v1 = v - (f0 + w^2 x1 + a (v - f0))/2
+    else:  # Verlet: (x, v h) -> x1 = x + v - (w^2 x + a v)/2, v1 = v - (f0 + w^2 x1 + a (v - f0))/2
         m11, m12 = 1 - wh**2 / 2, 1 - ah / 2
         m21 = -(wh**2 + wh**2 * m11 - ah * wh**2) / 2
         m22 = 1 - (ah + wh**2 * m12 + ah * (1 - ah)) / 2
         trace, product = m11 + m22, m11 * m22 - m12 * m21
-    else:
-        return np.full(ah.shape, np.nan)
     part = np.sqrt((trace**2 / 4 - product).astype(complex))
     return abs(np.stack([trace / 2 + part, trace / 2 - part])).max(axis=0)
 
@@ -119,21 +128,31 @@ def grown(ds: xr.Dataset) -> xr.DataArray:
 
 
 def with_truth(ds: xr.Dataset) -> xr.Dataset:
-    """`ds` with the true relative error `off` of the period, twice the time between its last two flips."""
+    """`ds` with the true relative error `off` of the period; inf where the foliot does not flip at all.
+
+    A period here is twice the time between the last two flips.
+    """
+    axis = swept(ds)
     study = sweep.build_study(
         kernel="foliot_start",
         rtol=1e-11,
         outputs=["flip_time"],
-        axes={"mu": ds.mu.values},
-        fixed={"a": float(ds.a), "phi0": float(ds.phi0)},
+        axes={axis: ds[axis].values},
+        fixed={name: float(ds[name]) for name in ("mu", "a", "phi0", "R", "k") if name != axis and name in ds},
         along={"flip": [float(ds.flips) - 1, float(ds.flips)]},
     )
-    truth = 2 * sweep.run(study, progress=False).flip_time.diff("flip").isel(flip=0, drop=True)
-    return ds.assign(off=abs(ds.period / truth - 1))
+    truth = sweep.run(study, progress=False)
+    period = 2 * truth.flip_time.diff("flip").isel(flip=0, drop=True)
+    return ds.assign(off=abs(ds.period / period - 1).where(truth.status < FIRST_REFUSAL, np.inf))
+
+
+def swept(ds: xr.Dataset) -> str:
+    """The foliot's parameter that a sweep is over."""
+    return next(str(name) for name in ds.status.dims if name not in ("method", "step"))
 
 
 def foliots(ds: xr.Dataset) -> list[Statement]:
-    """What becomes of the foliot's cells."""
+    """What becomes of a foliot's cells."""
     given = ds.status < FIRST_REFUSAL
     silent = given & (ds.off > 10 * np.maximum(1e-9, ds.error))
     lines = [
@@ -162,8 +181,6 @@ def oscillators(ds: xr.Dataset) -> list[Statement]:
     for method in map(str, ds.method.values):
         theory = xr.DataArray(eigenvalue(method, ds.a.values[:, None], ds.w.values[None, :]), dims=("a", "w"))
         clear = abs(theory.values - 1) > 0.1
-        if np.isnan(theory).all():
-            continue
         here = growth.sel({"method": method}).transpose("a", "w").values
         agrees = ((here > 1) == (theory.values > 1))[clear].mean()
         lines.append(
@@ -187,63 +204,86 @@ def hard(method: str, step: float = 0.02) -> list[str]:
     ]
 
 
-def figure(ds: xr.Dataset, linear: xr.Dataset) -> Any:
-    """Growth of the oscillator above, error of the foliot's period below."""
+def figure(linear: xr.Dataset, foliot: Sequence[xr.Dataset]) -> Any:
+    """Growth of the oscillator above, errors of the foliot's period below."""
     from matplotlib.colors import LogNorm
 
     from sweep import charts
 
     with charts.style():
-        page = charts.new_figure(charts.PAGE, 110.0)
+        page = charts.new_figure(charts.PAGE, 200.0)
         names = [str(m) for m in linear.method.values]
-        axes = page.subplots(2, len(names), squeeze=False)
+        axes = page.subplots(1 + len(foliot), len(names), squeeze=False)
         for k, method in enumerate(names):
-            draw_growth(axes[0, k], linear, method, k)
-            mesh = draw_error(axes[1, k], ds, method, k, LogNorm(1e-8, 1))
-        page.colorbar(mesh, ax=axes[1, :].tolist(), label="relative error of the period", pad=0.01)
+            draw_growth(axes[0, k], linear, method)
+            for row, ds in zip(axes[1:], foliot, strict=True):
+                mesh = draw_error(row[k], ds, method, LogNorm(1e-8, 1))
+        for one in axes[:, 1:].flat:
+            one.set(ylabel="", yticklabels=[])
+        page.colorbar(mesh, ax=axes[1:].ravel().tolist(), label="relative error of the period", pad=0.01, aspect=40)
     return page
 
 
-def draw_growth(axes: Any, ds: xr.Dataset, method: str, k: int) -> None:
+def draw_growth(axes: Any, ds: xr.Dataset, method: str) -> None:
     """Where the oscillator grows (dark), and theory's border."""
     growth = grown(ds.sel({"method": method})).transpose("w", "a")
     axes.contourf(ds.a, ds.w, np.minimum(growth, 1e3), levels=[0, 1, 2e3], colors=["#e8eef5", "#b04a3a"])
     theory = eigenvalue(method, ds.a.values[None, :], ds.w.values[:, None])
-    if not np.isnan(theory).all():
-        axes.contour(ds.a, ds.w, theory, levels=[1], colors="black", linewidths=0.9, linestyles="--")
-    axes.set(title=method, xlabel="$ah$", ylabel=r"$\omega h$" if k == 0 else "")
+    axes.contour(ds.a, ds.w, theory, levels=[1], colors="black", linewidths=0.9, linestyles="--")
+    axes.set(title=method, xlabel="$ah$", ylabel=r"$\omega h$")
     axes.title.set_size(8)
-    if k:
-        axes.set_yticklabels([])
+    if method == "euler":
+        direct_label(axes, 4.4, 6.0, "grows", fontsize=7)
 
 
-def draw_error(axes: Any, ds: xr.Dataset, method: str, k: int, norm: Any) -> Any:
-    """The true error over step and drive; grey where the method refuses."""
-    here = ds.sel({"method": method}).transpose("step", "mu")
+MARGIN = {
+    "mu": (r"$\mu$", lambda mu: mu),
+    "R": (r"$1 - R/\mu$", lambda R: 1 - R),
+    "k": (r"$1 - k\varphi_0/2\mu$", lambda k: 1 - k / 2),
+}
+"""How far a foliot is from not flipping, where mu = phi0 = 1 in the last two."""
+
+
+def draw_error(axes: Any, ds: xr.Dataset, method: str, norm: Any) -> Any:
+    """The true error over step and margin; grey where the method refuses."""
+    label, margin = MARGIN[swept(ds)]
+    across = margin(ds[swept(ds)].values)
+    here = ds.sel({"method": method}).transpose("step", swept(ds))
     axes.set_facecolor("0.8")
     off = np.clip(here.off.where(here.status < FIRST_REFUSAL), 1e-8, 1)
-    mesh = axes.pcolormesh(ds.mu, ds.step, off, norm=norm, cmap="cividis_r", shading="nearest", rasterized=True)
-    axes.contour(ds.mu, ds.step, off.fillna(1.0), levels=[WRONG], colors="#b04a3a", linewidths=0.9)
-    axes.set(xscale="log", yscale="log", xlabel=r"$\mu$", ylabel="step $h$ [s]" if k == 0 else "")
-    if k:
-        axes.set_yticklabels([])
-    if k == 0:
-        direct_label(axes, 10.0, 5.0, "refused", fontsize=7)
+    mesh = axes.pcolormesh(across, ds.step, off, norm=norm, cmap="cividis_r", shading="nearest", rasterized=True)
+    axes.contour(across, ds.step, off.fillna(1.0), levels=[WRONG], colors="#b04a3a", linewidths=0.9)
+    axes.set(xscale="log", yscale="log", xlabel=label, ylabel="step $h$ [s]")
+    if (swept(ds), method) == ("k", "rk4"):
+        direct_label(axes, 2e-5, 0.9, "refused", fontsize=7)
     return mesh
 
 
-def conclude(path: str, oscillator: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, oscillator: str, *paths: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
-    ds = with_truth(read_result(path, "foliot_steps", ["method", "mu", "step"], "stability_maps.toml"))
     linear = read_result(oscillator, "stability_maps:KERNEL", ["method", "a", "w"], "stability_maps_oscillator.toml")
-    groups = {"Oscillator": oscillators(linear), "Foliot": foliots(ds)}
+    grids = [
+        with_truth(read_result(one, "foliot_steps", ["method", axis, "step"], f"{name}.toml"))
+        for one, (name, axis) in zip((path, *paths), GRIDS.items(), strict=True)
+    ]
+    groups = {"Oscillator": oscillators(linear)}
+    groups |= {name: foliots(ds) for name, ds in zip(("Drive", "Near sticking", "Spring"), grids, strict=True)}
     notes = [NOTES, "", *(line for m in ("euler", "verlet", "rk4", "dop853", "moreau") for line in hard(m))]
-    return groups, notes, figure(ds, linear)
+    return groups, notes, figure(linear, grids)
+
+
+GRIDS = {"stability_maps": "mu", "stability_maps_sticking": "R", "stability_maps_spring": "k"}
+"""Studies of a foliot, and what each is over."""
 
 
 def main(arguments: Sequence[str]) -> int:
     """Table and figure of the results that are named; 1 if a statement does not hold."""
-    return report(__file__, ["stability_maps.h5", "stability_maps_oscillator.h5"], arguments, conclude)
+    return report(
+        __file__,
+        ["stability_maps.h5", "stability_maps_oscillator.h5", "stability_maps_sticking.h5", "stability_maps_spring.h5"],
+        arguments,
+        conclude,
+    )
 
 
 if __name__ == "__main__":

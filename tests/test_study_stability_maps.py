@@ -1,5 +1,7 @@
 """What the study of integrators concludes is so, on a coarse grid."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import stability_maps as maps
@@ -7,6 +9,7 @@ import xarray as xr
 
 import sweep
 from kernels._jit import COMPILED
+from kernels.interface import FIRST_REFUSAL
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="thousands of steps; the kernels' own tests run as plain Python")
 
@@ -26,6 +29,24 @@ def test_the_study_files_have_the_grid_the_conclusions_need():
     study = sweep.read_study(maps.__file__.replace(".py", ".toml"))
     assert list(study.axes) == ["method", "mu", "step"]
     assert (study.fixed["a"], study.fixed["phi0"], study.fixed["location"]) == (1.0, 1.0, 3.0)
+    for name, axis in maps.GRIDS.items():
+        study = sweep.read_study(Path(maps.__file__).with_name(f"{name}.toml"))
+        assert list(study.axes) == ["method", axis, "step"]
+        assert (study.fixed["phi0"], study.fixed["location"]) == (1.0, 3.0)
+
+
+@pytest.mark.parametrize(("fixed", "axes"), [({"a": 0.1}, {"R": [0.9, 0.999]}), ({"flips": 2}, {"k": [1.5, 1.999]})])
+def test_neither_friction_nor_a_spring_makes_a_value_wrong_in_silence(fixed, axes):
+    axes = {"method": METHODS, **axes, "step": [0.1, 1.0, 10.0]}
+    fixed = {"mu": 1.0, "phi0": 1.0, "flips": 6, "location": "root", **fixed}
+    study = sweep.build_study(kernel="foliot_steps", rtol=1e-6, axes=axes, fixed=fixed)
+    ds = maps.with_truth(sweep.run(study, progress=False))
+    assert maps.foliots(ds)[0].holds
+    assert np.isfinite(ds.off.where(ds.status < FIRST_REFUSAL, 0.0)).all()
+
+
+def test_a_value_where_nothing_flips_is_wrong_in_silence(ds):
+    assert not maps.foliots(ds.assign(off=np.inf + 0 * ds.off, error=0 * ds.error))[0].holds
 
 
 def test_no_value_is_wrong_by_more_than_ten_times_what_is_stated(ds):
@@ -39,6 +60,10 @@ def test_the_borders_of_theory_are_the_textbooks():
         assert maps.eigenvalue(method, np.array([end]), zero)[0] == pytest.approx(1.0, abs=1e-8)
         assert maps.eigenvalue(method, np.array([end + 0.01]), zero)[0] > 1
     assert maps.eigenvalue("rk4", zero, np.array([np.sqrt(8)]))[0] == pytest.approx(1.0)
+    z = np.array([-0.1, 0.3j])
+    for method, order in (("euler", 1), ("rk4", 4), ("dopri5", 5), ("dop853", 8)):
+        off = abs(maps.stability_function(z, method) - np.exp(z))
+        assert (off < abs(z) ** (order + 1)).all()
     assert maps.eigenvalue("semi_implicit", zero, np.array([2.01]))[0] > 1
 
 
