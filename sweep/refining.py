@@ -3,7 +3,7 @@
 A box of the grid, with a cell in each corner, is tried by solving the middles of its edges, faces and itself. Where one
 of them is off the multilinear interpolation from the corners, or has another status, the box is cut in two along every
 axis, and its parts are tried in turn. What is tried is logarithmic where the grid is, and in the output where that is
-positive, as a scaling law wants it.
+positive in all of the box, as a scaling law wants it; elsewhere distances are relative to the largest value.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import itertools
+import math
 import os
 import shutil
 from collections.abc import Callable, Sequence
@@ -31,9 +32,10 @@ from sweep.study import Axis, Study, frozen
 if TYPE_CHECKING:
     import xarray as xr
 
-LEVELS = 12
-"""How often a box may be cut; a border between statuses is followed `BORDER_LEVELS` deep."""
+LEVELS = 16
+"""How often a box may be cut."""
 BORDER_LEVELS = 5
+"""How often a box may be cut because a border between statuses passes through it; no value is right inside the last."""
 MOST_CELLS = 1_000_000
 
 Index = tuple[int, ...]
@@ -53,7 +55,8 @@ class Refinement:
     uniform : int
         Cells of an even grid as fine as the finest box.
     error : float
-        Largest distance left between an output and its interpolation, relative; at the middles that were tried.
+        Largest distance left between an output and its interpolation, relative; at the middles that were tried, of
+        boxes that were cut and not tried since also before the cut.
     complete : bool
         Whether all boxes meet the tolerance; not so where `most_cells` or the levels ran out.
     """
@@ -66,7 +69,11 @@ class Refinement:
 
     def __str__(self) -> str:
         cells = self.dataset.sizes["cell"]
-        told = "" if self.complete else "; not all boxes meet the tolerance, allow more cells"
+        told = (
+            ""
+            if self.complete
+            else "; not all boxes meet the tolerance, allow more cells, or leave out where it diverges"
+        )
         return (
             f"{cells:,} cells, {self.added:,} of them added; an even grid as fine has {self.uniform:,}\n"
             f"largest interpolation error left: {self.error:.2g}{told}"
@@ -185,8 +192,7 @@ class _Refiner:
         self.parts: list[xr.Dataset] = []
         self.known: dict[Index, int] = {}
         self.values: list[Array] = []
-        self.positive = [bool((self.first[name] > 0).where(self.first[name].notnull(), True).all()) for name in names]
-        self.size = [float(abs(self.first[name]).max()) or 1.0 for name in names]
+        self.size = np.array([float(abs(self.first[name]).max()) or 1.0 for name in names])
         self.error, self.deepest = 0.0, 0
         self.complete = True
 
@@ -196,6 +202,7 @@ class _Refiner:
         unit = 2**LEVELS
         self._learn([tuple(i * unit for i in index) for index in itertools.product(*steps)], _flat(self.first))
         boxes = [tuple(i * unit for i in index) for index in itertools.product(*(range(len(s) - 1) for s in steps))]
+        left = 0.0
         for level in range(LEVELS):
             half = 2 ** (LEVELS - level - 1)
             wanted = {p for box in boxes for p in self._points(box, half)} - self.known.keys()
@@ -203,32 +210,41 @@ class _Refiner:
                 self.complete = False
                 break
             self._solve(sorted(wanted))
-            boxes = [part for box in boxes if self._must_be_cut(box, half, level) for part in _parts(box, half)]
+            off = {box: self._off(box, half) for box in boxes}
+            self.error = max([self.error, *(e for e in off.values() if e <= self.tolerance)])
+            left = max((e for e in off.values() if math.inf > e > self.tolerance), default=0.0)
+            boxes = [part for box in boxes if off[box] > self.tolerance for part in _parts(box, half)]
+            if level >= BORDER_LEVELS:
+                boxes = [box for box in boxes if self._of_one_status(box, half)]
             if not boxes:
                 break
             self.deepest = level + 1
         else:
             self.complete = not boxes
+        self.error = max(self.error, 0.0 if self.complete else left)
         return self._joined()
 
     def _points(self, corner: Index, half: int) -> list[Index]:
         """Corners and middles of a box, 3^D of them in C order."""
         return list(itertools.product(*((i, i + half, i + 2 * half) for i in corner)))
 
-    def _must_be_cut(self, corner: Index, half: int, level: int) -> bool:
-        """Whether a middle of the box is off the interpolation from its corners, or has another status."""
+    def _of_one_status(self, corner: Index, side: int) -> bool:
+        """Whether a box has the same status in all its corners; no border is known to pass through it."""
+        corners = itertools.product(*((i, i + side) for i in corner))
+        return len({self.values[self.known[p]][0] for p in corners}) == 1
+
+    def _off(self, corner: Index, half: int) -> float:
+        """How far a middle of the box is off the interpolation from its corners, infinite if it has another status."""
         rows = np.array([self.values[self.known[p]] for p in self._points(corner, half)])
         rows = rows.reshape(*[3] * len(corner), -1)
-        fine = rows[..., 0] < FIRST_REFUSAL
         if (rows[..., 0] != rows[..., 0].flat[0]).any():
-            return level < BORDER_LEVELS
-        if not fine.any():
-            return False
-        off = float(np.nanmax(abs(rows - _multilinear(rows))[..., 1:], initial=0.0))
-        if off > self.tolerance:
-            return True
-        self.error = max(self.error, off)
-        return False
+            return math.inf
+        if rows[..., 0].flat[0] >= FIRST_REFUSAL:
+            return 0.0
+        values = rows[..., 1:] / self.size
+        positive = (values > 0).all(axis=tuple(range(len(corner))))
+        values[..., positive] = np.log(rows[..., 1:][..., positive])
+        return float(np.nanmax(abs(values - _multilinear(values)), initial=0.0))
 
     def _solve(self, points: list[Index]) -> None:
         if not points:
@@ -256,11 +272,7 @@ class _Refiner:
         return found
 
     def _learn(self, points: Sequence[Index], solved: xr.Dataset) -> None:
-        columns = [solved[STATUS].values.ravel().astype(float)]
-        for name, positive, size in zip(self.names, self.positive, self.size, strict=True):
-            values = solved[name].values.ravel()
-            with np.errstate(invalid="ignore", divide="ignore"):
-                columns.append(np.log(values) if positive else values / size)
+        columns = [solved[STATUS].values.ravel().astype(float), *(solved[name].values.ravel() for name in self.names)]
         rows = np.stack(columns, axis=1)
         for point, row in zip(points, rows, strict=True):
             self.known[point] = len(self.values)

@@ -7,6 +7,7 @@ from scipy.interpolate import LinearNDInterpolator
 import sweep
 from sweep.cli import main
 from sweep.errors import SweepError
+from sweep.refining import _Refiner
 
 
 def foliot(**axes):
@@ -45,7 +46,7 @@ def test_a_surface_with_a_border_of_statuses():
     """period over mu and R: no start where R >= mu."""
     study = foliot(mu=(0.1, 100.0, 7), R=(0.01, 10.0, 7))
     ds = sweep.run(study)
-    found = sweep.refine(ds, ["period", "multiplier"], 1e-2)
+    found = sweep.refine(ds, ["period", "multiplier"], 1e-2, most_cells=8000)  # the period diverges at the border
     whole = found.dataset
     assert {0, 65} <= set(whole.status.values.tolist())
     near = abs(np.log(whole.R / whole.mu)) < 0.1
@@ -59,6 +60,33 @@ def test_a_surface_with_a_border_of_statuses():
     truth = sweep.run(sweep.build_study(kernel="foliot", axes={"mu": mu, "R": R}, **keys)).period.values
     off = abs(np.exp(guess(np.log(mu), np.log(R))) / truth - 1)
     assert np.nanmax(off) < 3e-2
+
+
+def test_beside_a_border_of_statuses_a_curve_is_interpolated_as_right_as_elsewhere():
+    """No start where mu <= R = 0.1; above, the period diverges."""
+    keys = {"fixed": {"phi0": 1.0, "a": 1.0, "R": 0.1}, "outputs": ["period"]}
+    axis = {"spacing": "log", "start": 1e-2, "stop": 1e4, "num": 5}
+    found = sweep.refine(sweep.run(sweep.build_study(kernel="foliot", axes={"mu": axis}, **keys)), "period", 1e-3)
+    assert found.complete
+    ds = found.dataset.isel(cell=np.flatnonzero(found.dataset.status == 0)).sortby("mu")
+    assert 0.1 < float(ds.mu[0]) < 0.1 * 1.1  # the border is followed
+    mu = np.exp(np.random.default_rng(1).uniform(np.log(ds.mu.values[0]), np.log(1e4), 500))
+    truth = sweep.run(sweep.build_study(kernel="foliot", axes={"mu": mu}, **keys)).period
+    guess = np.exp(np.interp(np.log(mu), np.log(ds.mu.values), np.log(ds.period.values)))
+    assert float(abs(guess / truth - 1).max()) < 1.2e-3
+
+
+def test_an_output_that_changes_its_sign_between_two_cells_is_followed():
+    boxes = _Refiner.__new__(_Refiner)
+    boxes.size, boxes.known = np.array([2.0]), {(0,): 0, (1,): 1, (2,): 2}
+    boxes.values = [np.array([0.0, value]) for value in (2.0, -1.0, 1.0)]
+    assert boxes._off((0,), 1) == pytest.approx(2.5 / 2)  # not a NaN that is passed over
+    boxes.values = [np.array([0.0, value]) for value in (1.0, 2.0, 4.0)]
+    assert boxes._off((0,), 1) < 1e-15
+    boxes.values = [np.array([0.0, value]) for value in (1e-320, 0.0, 1e-320)]
+    assert boxes._off((0,), 1) < 1e-300
+    boxes.values = [np.array([status, 1.0]) for status in (0.0, 65.0, 0.0)]
+    assert boxes._off((0,), 1) == np.inf
 
 
 def test_what_is_straight_needs_no_cells_but_the_middles():
@@ -82,6 +110,7 @@ def test_too_few_cells_allowed_is_told():
     assert not found.complete
     assert found.dataset.sizes["cell"] <= 40
     assert "allow more cells" in str(found)
+    assert found.error > 1e-6  # what is left is told
 
 
 @pytest.mark.parametrize(
