@@ -21,13 +21,15 @@ f = 5, e = 10 has two angles by the arccos, and locks).
 import math
 
 from kernels._jit import jit, jit_call
-from kernels._lanes import fma, horner, magnitude, sqrt, where
+from kernels._lanes import choose, fma, horner, isnt, magnitude, some, sqrt, where
 from kernels._linkage import larger, sum4
 from kernels._pairs import two_product, two_sum
 from kernels.interface import Status
 
 ROUNDING = 2.0**-53
 """Share of b+d+f+e that rounding the four lengths may add to a margin: closer to 0 it is a change point."""
+NARROW = 2.0**-40
+"""Share of b^2+d^2+f^2+e^2 down to which 32 digits of a sum of squares suffice."""
 
 _OK, _LOCK_UP, _CHANGE_POINT = float(Status.OK), float(Status.LOCK_UP), float(Status.CHANGE_POINT)
 _DOUBLE_CRANK, _NO_ASSEMBLY = float(Status.DOUBLE_CRANK), float(Status.NO_ASSEMBLY)
@@ -47,7 +49,7 @@ def smaller(x, y):
     return where(x < y, x, y)
 
 
-@jit
+@jit_call
 def _spare(b, d, f, e):
     """By how much the other three links together exceed the longest one: below 0 they cannot be joined."""
     crank_or_frame = smaller(sum4(d, f, e, -b), sum4(b, d, f, -e))
@@ -63,7 +65,10 @@ def verdict(lengths, margin):
     sense = where(e > b, -1.0, 1.0)  # a crank longer than the frame: abs(b-e) = e-b
     least = smaller(m1, smaller(sense * m2, sense * m3))
     turning = where(least > hair, where(e < b, _OK, _DOUBLE_CRANK), _CHANGE_POINT)
-    return where(least < -hair, where(_spare(b, d, f, e) < 0.0, _NO_ASSEMBLY, _LOCK_UP), turning)
+    locked = least < -hair
+    if some(locked):
+        return where(locked, where(_spare(b, d, f, e) < 0.0, _NO_ASSEMBLY, _LOCK_UP), turning)
+    return turning
 
 
 @jit
@@ -175,12 +180,33 @@ def _together(x, y):
     return high + (low + (rest + (least + (x[2] + y[2]))))
 
 
-@jit
-def square_sums(lengths):
-    """Z1 = d^2+f^2-b^2-e^2 and Z2 = b^2+f^2-d^2-e^2, with their digits wherever squares cancel."""
-    b, d, f, e = lengths
+@jit_call
+def _narrow_square_sums(b, d, f, e):
+    """`square_sums`, however little is left of the squares."""
     arm, (high, low, least) = _difference_of_squares(f, e), _difference_of_squares(d, b)
     return _together(arm, (high, low, least)), _together(arm, (-high, -low, -least))
+
+
+@jit
+def square_sums(lengths):
+    """Z1 = d^2+f^2-b^2-e^2 and Z2 = b^2+f^2-d^2-e^2, with their digits wherever squares cancel.
+
+    In 32 digits, unless less than NARROW of the squares is left.
+    """
+    b, d, f, e = lengths
+    (b2, b_lost), (d2, d_lost) = two_product(b, b), two_product(d, d)
+    (f2, f_lost), (e2, e_lost) = two_product(f, f), two_product(e, e)
+    arm, arm_lost = two_sum(d2, -b2)
+    coupler, coupler_lost = two_sum(f2, -e2)
+    arm_lost, coupler_lost = arm_lost + (d_lost - b_lost), coupler_lost + (f_lost - e_lost)
+    z1, z1_lost = two_sum(coupler, arm)
+    z2, z2_lost = two_sum(coupler, -arm)
+    z1, z2 = z1 + (z1_lost + (coupler_lost + arm_lost)), z2 + (z2_lost + (coupler_lost - arm_lost))
+    hair = NARROW * ((b2 + d2) + (f2 + e2))
+    narrow = isnt((magnitude(z1) > hair) & (magnitude(z2) > hair))
+    if some(narrow):
+        return choose(narrow, _narrow_square_sums(b, d, f, e), (z1, z2))
+    return z1, z2
 
 
 @jit
