@@ -13,6 +13,7 @@ from kernels._chain import extremes, same
 from kernels._chain_eigen import natural_frequencies
 from kernels._jit import jit, jit_call
 from kernels._lanes import exponent, magnitude, nearest
+from kernels._reduction_exact_modes import exact_frequencies
 from kernels._reduction_frf import AROUND, GRID
 from kernels._reduction_jacobi import ritz
 from kernels._reduction_modes import TURN
@@ -155,6 +156,19 @@ def _ritz(code, p, full, kept, modes, rooms):
     return error
 
 
+@jit_call
+def _all_frequencies(code, p, full, kept, rooms):
+    """Those of `none` are the chain's own, those of `exact` are found from its p masses; how far both are apart."""
+    n, apart = full.J.size, 0.0
+    if code == EXACT:
+        exact_frequencies(full.J, full.k, rooms.kinds, rooms.places, p, kept.f, rooms.work, rooms.work[2 * n :])
+    for i in range(n):
+        kept.f[i] = kept.f[i] if code == EXACT else full.f[i]
+        off = magnitude(off_by(kept.f[i], full.f[i]))
+        apart = max(apart, off if off >= 0.0 else float("inf"))
+    return apart
+
+
 @jit
 def is_chain(code):
     """Whether a reduction's poles are those of a chain."""
@@ -178,8 +192,7 @@ def reduce(code, p, order, full, kept, modes, rooms):
         if code == RIVIN:
             slower, status = late, natural_frequencies(p, kept.J, kept.k, kept.f, rooms.work)
         else:
-            for i in range(full.J.size):
-                kept.f[i] = full.f[i]
+            error += _all_frequencies(code, p, full, kept, rooms)
     elif code == MODAL:
         residual, status = _modal(p, full, kept, modes, rooms)
     else:

@@ -8,10 +8,11 @@ The spindle J_1 is free, the motor's end is held by k_n; with k_n = 0 it is free
     irs             guyan, and the inertia of what follows
     craig_bampton   the spindle at rest, and modes of the chain with the spindle held (n_keep counts both)
     modal           the lowest modes, and what the others give way at rest
-    exact           rivin's, with masses and springs that depend on the frequency: no error at all
+    exact           rivin's, with masses and springs that depend on the frequency: no error but rounding
 to `n_keep` masses (or modes), or to the fewest that hold every frequency up to `f_max` to `tol`: from n downwards
 until one less would break it; a frequency that is missing breaks it. Errors are those against the full chain. Exact
-reductions keep all its frequencies; their J_kept, k_kept, h_kept are those at rest.
+reductions have all its frequencies, found from the masses that are left; their damping is that of the full chain, their
+J_kept, k_kept, h_kept are those at rest.
 Leaves out: backlash, clearances, gyroscopic and lateral motion, stiffness that varies with the angle.
 Source: Baran & Marchelek, Mechanika Teoretyczna i Stosowana 9 (1971) 201; see the modules `_reduction_...`.
 
