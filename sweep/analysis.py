@@ -264,14 +264,27 @@ def _interval(t: Array, z: Array, confidence: float, noise: bool | None) -> Arra
     slope, error, count = (numbers[..., LINE.index(name)] for name in ("exponent", "exponent_error", "points"))
     level, centre = (np.log(numbers[..., LINE.index(name)])[..., None] for name in ("level", "centre"))
     noisy = scatter_is_noise(z - level - slope[..., None] * (t - centre), z) if noise is None else np.array(noise)
-    reach = stdtrit(np.maximum(count - 2, 1), (1 + confidence) / 2) * error
-    local, rough = slopes(t, z, 5), slopes(t, z, 7)
-    least = EPSILON * np.nanmax(abs(z), axis=-1, initial=1.0) / abs(np.diff(t)).min()  # rounding of the differences
-    doubt = np.nanmax(abs(local - rough), axis=-1, initial=0.0) + least
-    low = np.fmin(np.nanmin(local, axis=-1, initial=np.inf) - doubt, slope)
-    high = np.fmax(np.nanmax(local, axis=-1, initial=-np.inf) + doubt, slope)
+    rounding = EPSILON * (1.0 + np.nanmax(abs(z), axis=-1, initial=0.0)) / abs(t[-1] - t[0])
+    reach = stdtrit(np.maximum(count - 2, 1), (1 + confidence) / 2) * error + rounding
+    local, doubt = _range_of_slopes(t, z)
+    low, high = np.fmin(local[..., 0] - doubt, slope), np.fmax(local[..., 1] + doubt, slope)
     ends = np.where(noisy, slope - reach, low), np.where(noisy, slope + reach, high)
     return np.stack([*ends, np.broadcast_to(noisy, slope.shape).astype(float)], axis=-1)
+
+
+def _range_of_slopes(t: Array, z: Array) -> tuple[Array, Array]:
+    """Least and largest local exponent of each line, missing points passed over, and the doubt about both."""
+    rows = z.reshape(-1, t.size)
+    found = np.full((len(rows), 3), np.nan)
+    for row, into in zip(rows, found, strict=True):
+        present = np.isfinite(row)
+        if present.sum() >= FEWEST:
+            s, y = t[present], row[present]
+            local, rough = slopes(s, y, 5), slopes(s, y, 7)
+            rounding = EPSILON * max(1.0, abs(y).max()) / abs(np.diff(s)).min()
+            into[:] = local.min(), local.max(), abs(local - rough).max() + rounding
+    found = found.reshape(*z.shape[:-1], 3)
+    return found[..., :2], found[..., 2]
 
 
 def _describe_fit(fit: xr.Dataset, y: xr.DataArray, dim: str) -> xr.Dataset:

@@ -8,13 +8,14 @@ rest: a grid over these two gives the start, scipy's Levenberg-Marquardt the end
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from sweep._curves import Window, inside_window, logarithm, positive_axis, scatter_is_noise, title
+from sweep._curves import Window, inside_window, logarithm, noise_of, positive_axis, scatter_is_noise, title
 from sweep._loglog import EPSILON, Array, line, slopes
 from sweep.errors import SweepError
 
@@ -53,9 +54,13 @@ def fit_two_laws(
 
     Intervals: where the points scatter about the curve (`noise`), those of least squares, by Student's t. Where they
     do not, as in a simulation, there is no noise to speak of and the uncertainty is how far the truth is from (1):
-    the interval of an exponent then also reaches to the local exponent at its end of the window and, twice over, to
-    the limit to which that tends; that of the crossover to where the local exponent is half-way between the
-    two, and to where the tangents at the ends meet.
+    the interval of an exponent then also reaches to the local exponent at its end of the window and, three times over,
+    to the limit to which that tends; that of the crossover to where the local exponent is half-way between the
+    two, and to where the tangents at the ends meet. What noise there is beneath is added.
+
+    Where noise hides how far the truth is from (1), the intervals are those of (1) and too narrow for a bend of another
+    shape. Fitted to the period of the viscous foliot with 1 % of noise, 81 points over 8 decades, (1) gives the strong
+    law -0.3387 for -1/3, and its interval never reaches there; straight lines over windows far from the bend do.
 
     Parameters
     ----------
@@ -121,12 +126,15 @@ def _one(t: Array, z: Array, confidence: float, noise: bool | None) -> Array:
     reach = _reach(off, jacobian, confidence)
     low, high = best - reach, best + reach
     if not noisy:
-        low, high = _widened(t, z, best, low, high)
+        low, high = _widened(t, z, off, best, low, high)
     evidence = _evidence(t, z, off)
     ends = [best[1], low[1], high[1], best[2], low[2], high[2]]
     with np.errstate(over="ignore"):  # a crossover that is not determined reaches to infinity
         place = np.exp([best[3], low[3], high[3]])
-    rest = [math.exp(best[4]) / math.log(10), math.exp(best[0]), math.expm1(abs(off).max()), t.size]
+    bend = [math.exp(best[4]) / math.log(10), math.exp(best[0])]
+    if evidence <= 0 and not noisy:  # straight to rounding: nothing meets anywhere
+        place, bend = np.array([np.nan, 0.0, np.inf]), [np.nan, np.nan]
+    rest = [*bend, math.expm1(abs(off).max()), t.size]
     return np.array([*ends, *place, *rest, 2 if evidence > 0 else 1, evidence, noisy])
 
 
@@ -199,36 +207,46 @@ def _reach(off: Array, jacobian: Array, confidence: float) -> Array:
     return found
 
 
-def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[Array, Array]:
+def _widened(t: Array, z: Array, off: Array, best: Array, low: Array, high: Array) -> tuple[Array, Array]:
     """Intervals that reach to where the local exponents tend; of the crossover, to where they are half-way between the
     laws and to where the tangents at the ends of the window meet."""
-    local = slopes(t, z, 5)
+    local, mirrored = slopes(t, z, 5), -t[::-1]
     half = np.flatnonzero(np.diff(np.sign(local - (best[1] + best[2]) / 2)))
     place = t[half[np.argmin(abs(t[half] - best[3]))]] if half.size else best[3]
-    ends = np.array([_tends(t, local), _tends(-t[::-1], local[::-1])])
+    doubt = 2.5 * noise_of(off) * np.array([_amplified(t), _amplified(mirrored)])
+    ends = np.array([_tends(t, local, doubt[0]), _tends(mirrored, local[::-1], doubt[1])])
     low, high = low.copy(), high.copy()
-    low[1:3], high[1:3] = np.minimum(low[1:3], ends.min(axis=1)), np.maximum(high[1:3], ends.max(axis=1))
-    meetings = [_meeting(t, z, pair) for pair in ends.T]
+    low[1:3] = np.minimum(low[1:3], ends.min(axis=1) - doubt)
+    high[1:3] = np.maximum(high[1:3], ends.max(axis=1) + doubt)
+    corners = itertools.product(*np.stack([ends[:, 0] - doubt, ends[:, 0] + doubt], axis=1))
+    meetings = [_meeting(t, z, pair) for pair in (*ends.T, *corners) if pair[0] != pair[1]]
     low[3], high[3] = min(low[3], place, *meetings), max(high[3], place, *meetings)
     return low, high
 
 
-def _meeting(t: Array, z: Array, pair: Array) -> float:
+def _amplified(t: Array) -> float:
+    """Standard error of the local exponent at the start of a window, for values with errors of size 1."""
+    near = t[:5]
+    return float(np.sqrt((slopes(near, np.eye(near.size), 5)[:, 0] ** 2).sum()))
+
+
+def _meeting(t: Array, z: Array, pair: tuple[float, ...]) -> float:
     """Where lines of these slopes through the first and the last point meet."""
     return float((z[-1] - z[0] + pair[0] * t[0] - pair[1] * t[-1]) / (pair[0] - pair[1]))
 
 
-def _tends(t: Array, local: Array) -> tuple[float, float]:
-    """The exponent at the start of a window, and the limit beyond it, twice over.
+def _tends(t: Array, local: Array, doubt: float) -> tuple[float, float]:
+    """The exponent at the start of a window, and the limit beyond it, three times over.
 
-    Its change from third to second to first of three points a step apart goes on geometrically; where it does not
-    slow down towards the end, ten times the last change stands for an unknown limit.
+    Its change from third to second to first of three points a step apart goes on geometrically, which is a third of the
+    way for a bend that fades as 1/ln^2; where it does not slow down towards the end, ten times the last change stands
+    for an unknown limit. What is within `doubt` is no change.
     """
     step = min(math.log(10), (t[-1] - t[0]) / 8)
     first, second, third = np.interp(t[0] + step * np.arange(3), t, local)
     last, before = first - second, second - third
     left = last * last / (before - last) if abs(last) < abs(before) and last * before > 0 else 10 * last
-    return float(first), float(first + 2 * left)
+    return float(first), float(first + 3 * left) if abs(last) > doubt else float(first)
 
 
 def _evidence(t: Array, z: Array, off: Array) -> float:

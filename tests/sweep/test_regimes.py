@@ -118,6 +118,47 @@ def test_the_laws_of_a_foliot_lie_in_the_intervals_of_its_noise_free_periods():
     assert float(found.crossover_low) <= 3**-0.5 <= float(found.crossover_high)
 
 
+@pytest.mark.parametrize("gaps", [slice(None, None, 2), slice(2, None, 3), slice(20, 40)])
+def test_gaps_do_not_shrink_the_interval_of_a_line_without_noise(gaps):
+    x = np.geomspace(1e-2, 1e2, 81)
+    y = 1 / x + x ** (-1 / 3)
+    whole = sweep.fit_exponent(curve(y, x), "mu")
+    y[gaps] = np.nan
+    gappy = sweep.fit_exponent(curve(y, x), "mu")
+    for end in ("exponent_low", "exponent_high"):
+        assert float(gappy[end]) == pytest.approx(float(whole[end]), abs=0.02)
+
+
+@pytest.mark.parametrize("noise", [None, True, False])
+@pytest.mark.parametrize(("power", "prefactor"), [(0.0, 7.3), (-0.5, 3.0), (2.0, 1.0)])
+def test_the_interval_of_an_exact_law_holds_it_whatever_is_said_of_noise(power, prefactor, noise):
+    fit = sweep.fit_exponent(curve(prefactor * MU**power), "mu", noise=noise)
+    assert float(fit.exponent_low) <= power <= float(fit.exponent_high)
+    assert float(fit.exponent_high - fit.exponent_low) < 1e-11
+
+
+@pytest.mark.parametrize("power", [0.0, -0.5])
+def test_where_one_law_holds_to_rounding_nothing_meets_anywhere(power):
+    found = sweep.fit_two_laws(curve(7.3 * MU**power), "mu")
+    assert int(found.regimes) == 1
+    assert all(np.isnan(float(found[name])) for name in ("crossover", "width", "level"))
+    assert (float(found.crossover_low), float(found.crossover_high)) == (0.0, np.inf)
+    assert (found.exponent_low <= power + 1e-12).all()
+    assert (found.exponent_high >= power - 1e-12).all()
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e-4, 1e-6])
+def test_where_the_bend_is_plainly_of_another_shape_its_doubt_and_the_noise_are_both_in_the_intervals(size):
+    """Slope by a hyperbola, which reaches its limits by powers of ln mu and not of mu."""
+    u, w = np.log(MU / 1.6), 0.3 * np.log(10)
+    y = np.exp(-2 / 3 * u + 1 / 3 * np.sqrt(u * u + w * w))
+    found = sweep.fit_two_laws(curve(noisy(y, size, 100), dims=("set", "mu")), "mu")
+    assert (found.noisy == 0).all()
+    for law, truth in (("low", -1.0), ("high", -1 / 3)):
+        assert covered(found.sel(law=law), "exponent", truth) > 0.9
+    assert covered(found, "crossover", 1.6) > 0.9
+
+
 def test_missing_points_and_falling_axes_change_nothing():
     y = curve(noisy(broken(), 0.01, 1)[0])
     whole = sweep.fit_two_laws(y, "mu")
