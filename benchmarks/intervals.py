@@ -6,6 +6,7 @@ python benchmarks/intervals.py [SETS]      default 10000; a standard error of 0.
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -23,6 +24,8 @@ CASES = {
     "sharp bend": (-1.0, -1 / 3, 0.05, 10, 0.02),
     "wide bend": (0.0, -0.5, 0.6, 10, 0.01),
     "few points": (2.0, 0.5, 0.2, 4, 0.02),
+    "a slight change": (0.5, 0.6, 0.3, 10, 0.01),
+    "a kink": (0.5, 2.0, 0.001, 10, 0.02),
 }
 """Six decades, the crossover at 1.6."""
 
@@ -39,7 +42,7 @@ def curve(case: tuple[float, ...], sets: int, rng: np.random.Generator) -> xr.Da
     return xr.DataArray(values, {"mu": mu}, ("set", "mu"), name="y")
 
 
-def holds(found: xr.Dataset, name: str, truth: float) -> float:
+def holds(found: xr.Dataset, name: str, truth: Any) -> float:
     """Share of the intervals that hold the truth."""
     return float(((found[f"{name}_low"] <= truth) & (truth <= found[f"{name}_high"])).mean())
 
@@ -50,6 +53,23 @@ def two_laws(case: tuple[float, ...], sets: int, rng: np.random.Generator) -> tu
     found = sweep.fit_two_laws(y, "mu")
     laws = [holds(found.sel(law=law), "exponent", p) for law, p in zip(("low", "high"), case[:2], strict=True)]
     return *laws, holds(found, "crossover", CROSSOVER), float((found.regimes == 2).mean()), float(found.noisy.mean())
+
+
+def any_laws(sets: int, rng: np.random.Generator) -> tuple[float, ...]:
+    """As `two_laws`, for sets of which each has exponents, crossover, width and noise of its own, at random places."""
+    points = rng.integers(20, 80)
+    mu = np.sort(np.exp(rng.uniform(-7, 7, points)))
+    low, change, place, width = (
+        rng.uniform(a, b, (sets, 1)) for a, b in ((-2.0, 2.0), (0.5, 2.0), (-2.0, 2.0), (0.1, 1.2))
+    )
+    high = low + change * rng.choice([-1.0, 1.0], (sets, 1))
+    u = np.log(mu) - place
+    noise = np.exp(rng.uniform(np.log(1e-3), np.log(0.03), (sets, 1))) * rng.standard_normal((sets, points))
+    z = low * u + (high - low) * width * np.logaddexp(0, u / width) + noise
+    found = sweep.fit_two_laws(xr.DataArray(np.exp(z), {"mu": mu}, ("set", "mu"), name="y"), "mu")
+    laws = [holds(found.sel(law=law), "exponent", p[:, 0]) for law, p in (("low", low), ("high", high))]
+    x0 = holds(found, "crossover", np.exp(place[:, 0]))
+    return *laws, x0, float((found.regimes == 2).mean()), float(found.noisy.mean())
 
 
 def one_law(sets: int, rng: np.random.Generator) -> tuple[float, ...]:
@@ -66,6 +86,8 @@ def main(sets: int) -> None:
     for name, case in CASES.items():
         parts = [two_laws(case, AT_ONCE, rng) for _ in range(max(1, sets // AT_ONCE))]
         print(f"{name:24}" + "".join(f"{share:8.4f}" for share in np.mean(parts, axis=0)), flush=True)
+    parts = [any_laws(AT_ONCE, rng) for _ in range(max(1, sets // AT_ONCE))]
+    print(f"{'all at random':24}" + "".join(f"{share:8.4f}" for share in np.mean(parts, axis=0)), flush=True)
     parts = [one_law(AT_ONCE, rng) for _ in range(max(1, sets // AT_ONCE))]
     share, two, noisy = np.mean(parts, axis=0)
     print(f"{'one law':24}{share:8.4f}{'':16}{two:8.4f}{noisy:8.4f}")
