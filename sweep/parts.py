@@ -9,7 +9,7 @@ import itertools
 import os
 import re
 import stat
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -152,6 +152,12 @@ def _places_by_hdf5(path: Path, columns: Sequence[Column], start: int, stop: int
     return places
 
 
+def at_once(read: Callable[[list[Any]], None], items: Sequence[Any]) -> None:
+    """Has several threads read, each some of the items at a time."""
+    with ThreadPoolExecutor(READERS) as pool:
+        list(pool.map(read, (list(items[i : i + AT_ONCE]) for i in range(0, len(items), AT_ONCE))))
+
+
 class Parts:
     """The parts that are there. Before numbers of a part are used its digest is checked; for its statuses it is not."""
 
@@ -166,7 +172,8 @@ class Parts:
         out = np.full((len(cells), *column.shape), column.missing, column.dtype)
         blocks = cells // self.blocks.cells
         cuts = [0, *(np.flatnonzero(np.diff(blocks)) + 1).tolist(), len(cells)]
-        pieces = [(low, high) for low, high in itertools.pairwise(cuts) if int(blocks[low]) in self._paths]
+        some = ((low, high) for low, high in itertools.pairwise(cuts) if low < high)
+        pieces = [(low, high) for low, high in some if int(blocks[low]) in self._paths]
 
         def fill(some: list[tuple[int, int]]) -> None:
             for low, high in some:
@@ -175,8 +182,22 @@ class Parts:
                 if found is not None:
                     out[low:high] = found[cells[low:high] - self.blocks.bounds(index)[0]]
 
-        with ThreadPoolExecutor(READERS) as pool:
-            list(pool.map(fill, (pieces[i : i + AT_ONCE] for i in range(0, len(pieces), AT_ONCE))))
+        at_once(fill, pieces)
+        return out
+
+    def run(self, column: Column, start: int, stop: int) -> Any:
+        """The same of all cells from one number to another, with nothing noted for each of them."""
+        out = np.full((stop - start, *column.shape), column.missing, column.dtype)
+        blocks = [i for i in range(start // self.blocks.cells, -(-stop // self.blocks.cells)) if i in self._paths]
+
+        def fill(some: list[int]) -> None:
+            for index in some:
+                found, (first, last) = self._column(index, column), self.blocks.bounds(index)
+                if found is not None:
+                    low, high = max(first, start), min(last, stop)
+                    out[low - start : high - start] = found[low - first : high - first]
+
+        at_once(fill, blocks)
         return out
 
     def _column(self, index: int, column: Column) -> Any:

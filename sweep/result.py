@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +17,7 @@ from sweep.errors import SweepError
 from sweep.granules import granules
 from sweep.image import Images
 from sweep.layout import STATUS, Layout
-from sweep.parts import PART_NAME, READERS, Parts, read_part
+from sweep.parts import PART_NAME, Parts, at_once, read_part
 from sweep.reducing import BY_STATUS, pending
 from sweep.sealing import readable
 from sweep.statuses import StatusCount, count_methods, count_statuses, failures
@@ -206,13 +205,13 @@ def _read_all(study: Study, spec: Spec, parts: Mapping[int, Path], rows: dict[st
     """The rows, with those of all sound parts filled in."""
     images = Images(part_columns(study), spec.mark)
 
-    def fill(index: int) -> None:
-        start, stop = spec.blocks.bounds(index)
-        for name, values in (read_part(parts[index], images, start, stop, keep=True) or {}).items():
-            rows[name][start:stop] = values
+    def fill(indices: list[int]) -> None:
+        for index in indices:
+            start, stop = spec.blocks.bounds(index)
+            for name, values in (read_part(parts[index], images, start, stop, keep=True) or {}).items():
+                rows[name][start:stop] = values
 
-    with ThreadPoolExecutor(READERS) as pool:
-        list(pool.map(fill, sorted(parts)))
+    at_once(fill, sorted(parts))
     return rows
 
 

@@ -29,7 +29,7 @@ from sweep.layout import Column
 from sweep.parts import PART_NAME, digest, part_name, read_part
 
 LOCK = "lock"
-DOOR = "workers"
+DOOR, CLOSED = "workers", "closed"
 
 
 def folder_of(output: Path) -> Path:
@@ -138,14 +138,17 @@ class Store:
 
     def close_doors(self) -> None:
         """From now on nobody else brings a part, however late: what was begun has lost its place. Raises SweepError."""
-        for door in self.folder.glob(f"{DOOR}.*.tmp"):
-            # renamed, it is gone for everybody in one step; what is in it goes then
-            try:
-                disk.rename(door, door.with_name(f"closed.{secrets.token_hex(4)}.tmp"))
-            except OSError as fault:
-                raise disk.refusal(fault, door) from fault
-        for closed in self.folder.glob("closed.*.tmp"):
-            shutil.rmtree(closed, ignore_errors=True)
+        for name in [entry.name for entry in os.scandir(self.folder) if entry.name.endswith(".tmp")]:
+            path = self.folder / name
+            if name.startswith(f"{DOOR}."):
+                # renamed, it is gone for everybody in one step; what is in it goes then
+                path = path.with_name(f"{CLOSED}.{secrets.token_hex(4)}.tmp")
+                try:
+                    disk.rename(self.folder / name, path)
+                except OSError as fault:
+                    raise disk.refusal(fault, self.folder / name) from fault
+            if path.name.startswith(f"{CLOSED}."):
+                shutil.rmtree(path, ignore_errors=True)
 
     def take(self, index: int, name: str) -> None:
         """Counts a block as done whose part another process has written. Raises SweepError."""
@@ -172,16 +175,16 @@ class Store:
 
     def _sort_out(self) -> None:
         self.close_doors()
+        row_bytes = sum(column.cell_bytes for column in self.columns)
         for entry in list(os.scandir(self.folder)):
             if entry.name.endswith(".tmp"):
                 _remove(Path(entry.path))
             elif match := PART_NAME.fullmatch(entry.name):
-                self._take_up(entry, int(match[1]), int(match[2]))
+                self._take_up(entry, int(match[1]), int(match[2]), row_bytes)
 
-    def _take_up(self, entry: os.DirEntry[str], start: int, stop: int) -> None:
+    def _take_up(self, entry: os.DirEntry[str], start: int, stop: int, row_bytes: int) -> None:
         index = start // self.blocks.cells
-        least = (stop - start) * sum(column.cell_bytes for column in self.columns)
-        if not self.blocks.holds(start, stop) or entry.stat().st_size < least:
+        if not self.blocks.holds(start, stop) or entry.stat().st_size < (stop - start) * row_bytes:
             _set_aside(Path(entry.path))
         elif index in self.names:
             self._compare(index, entry.name)
