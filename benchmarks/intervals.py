@@ -79,6 +79,15 @@ def one_law(sets: int, rng: np.random.Generator) -> tuple[float, ...]:
     return holds(found, "exponent", -0.5), float((two.regimes == 2).mean()), float(found.noisy.mean())
 
 
+def local(mu: np.ndarray, sets: int, rng: np.random.Generator) -> float:
+    """Coverage of the error bar of the local exponent, at all points of a bend with 1 % of noise."""
+    u, w = np.log(mu / CROSSOVER), 0.3 * np.log(10)
+    z = -u + 2 / 3 * w * np.logaddexp(0, u / w) + 0.01 * rng.standard_normal((sets, mu.size))
+    y = xr.DataArray(np.exp(z), {"mu": mu}, ("set", "mu"), name="y")
+    off = abs(sweep.local_exponent(y, "mu") - (-1 + 2 / 3 / (1 + np.exp(-u / w))))
+    return float((off <= sweep.local_exponent_error(y, "mu")).mean())
+
+
 def main(sets: int) -> None:
     rng = np.random.default_rng(20)
     print(f"{sets} sets each; share of 95 % intervals that hold the truth")
@@ -91,6 +100,11 @@ def main(sets: int) -> None:
     parts = [one_law(AT_ONCE, rng) for _ in range(max(1, sets // AT_ONCE))]
     share, two, noisy = np.mean(parts, axis=0)
     print(f"{'one law':24}{share:8.4f}{'':16}{two:8.4f}{noisy:8.4f}")
+
+    for points in (25, 61, 241):
+        print(f"{f'local, {points} points':24}{local(np.geomspace(1e-3, 1e3, points), sets, rng):8.4f}")
+    places = (np.sort(np.exp(rng.uniform(-7, 7, 60))) for _ in range(20))
+    print(f"{'local, 60 at random':24}{np.mean([local(mu, sets // 20, rng) for mu in places]):8.4f}")
 
 
 if __name__ == "__main__":

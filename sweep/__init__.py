@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from sweep.analysis import exponent as exponent
     from sweep.analysis import fit_exponent as fit_exponent
     from sweep.analysis import local_exponent as local_exponent
+    from sweep.analysis import local_exponent_error as local_exponent_error
     from sweep.analysis import where_exponent as where_exponent
     from sweep.analysis import where_value as where_value
     from sweep.charts import plot as plot
@@ -43,6 +44,7 @@ _HOMES = {
     "open_result": "result",
     "verify": "verifying",
     "local_exponent": "analysis",
+    "local_exponent_error": "analysis",
     "exponent": "analysis",
     "fit_exponent": "analysis",
     "crossover": "analysis",

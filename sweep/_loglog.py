@@ -5,7 +5,7 @@ A missing point is NaN, and no stencil reaches across one: each run of neighbour
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,12 @@ Array = NDArray[np.float64]
 
 FEWEST = 3
 """Points that a slope needs: through two it says nothing about its own error."""
+
+BEYOND_NOISE = 4.0
+"""Standard errors that noise does not reach."""
+
+FEW = 20
+"""Points below which noise is not told from a bend."""
 
 EPSILON = float(np.finfo(np.float64).eps)
 
@@ -29,8 +35,23 @@ def slopes(t: Array, z: Array, points: int) -> Array:
         NaN where missing; the result is NaN there, and in runs shorter than three. A run shorter than `points`
         is differentiated with what it has.
     """
+    return _by_runs(t, z, lambda s, y: _derivative(s, y, points))
+
+
+def slope_errors(t: Array, z: Array) -> Array:
+    """Half the 95 % interval of the slope by five points, with noise; without, more than its error.
+
+    What the polynomial through seven points says otherwise tells the error. Noise makes it alike everywhere, over the
+    weights of both: the median gives its size. Where it is far larger, the curve bends: it counts itself there, and
+    where a bend is within a step, so that more points do not tell more, the slopes of the steps beside the point.
+    """
+    return _by_runs(t, z, _derivative_errors)
+
+
+def _by_runs(t: Array, z: Array, function: Callable[[Array, Array], Array]) -> Array:
+    """`function` of each unbroken run of at least three neighbours; lines with the same gaps at once."""
     if np.isfinite(z).all():
-        return _derivative(t, z, points)
+        return function(t, z)
     rows = z.reshape(-1, t.size)
     found = np.full(rows.shape, np.nan)
     patterns, which = np.unique(np.isfinite(rows), axis=0, return_inverse=True)
@@ -38,7 +59,7 @@ def slopes(t: Array, z: Array, points: int) -> Array:
         alike = np.flatnonzero(which.reshape(-1) == number)
         for start, stop in runs(pattern):
             if stop - start >= FEWEST:
-                found[alike, start:stop] = _derivative(t[start:stop], rows[alike, start:stop], points)
+                found[alike, start:stop] = function(t[start:stop], rows[alike, start:stop])
     return found.reshape(z.shape)
 
 
@@ -49,15 +70,58 @@ def runs(present: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
 
 
 def _derivative(t: Array, z: Array, points: int) -> Array:
+    nodes, weights = _stencils(t, points)
+    slope = np.zeros(z.shape)
+    for k in range(nodes.shape[1]):  # differences from the home point: a constant has slope zero exactly
+        slope += weights[:, k] * (z[..., nodes[:, k]] - z)
+    return slope
+
+
+def _derivative_errors(t: Array, z: Array) -> Array:
+    fine, middle, rough = (7, 5, 3) if t.size > 5 else (t.size, max(2, t.size - 2), 2)  # beside few points lower orders
+    slope = _derivative(t, z, middle)
+    apart, coarse = abs(_derivative(t, z, fine) - slope), abs(_derivative(t, z, rough) - slope)
+    sharp = 4.0 * apart > coarse  # orders that do not tell: a bend within a step, about which the steps beside it do
+    steps = np.diff(z, axis=-1) / np.diff(t)
+    beside = np.maximum(
+        abs(steps[..., np.r_[0, : t.size - 1]] - slope), abs(steps[..., np.r_[: t.size - 1, -1]] - slope)
+    )
+    nodes, weights = _stencils(t, middle)
+    other, those = _stencils(t, fine)
+    between = -those
+    np.put_along_axis(between, nodes - other[:, :1], weights - np.take_along_axis(those, nodes - other[:, :1], 1), 1)
+    apart_by_noise = apart / _norm(between)
+    noise = 1.4826 * np.median(apart_by_noise, axis=-1, keepdims=True)
+    by_noise = noise * _norm(weights)
+    few = t.size < FEW
+    by_bend = _largest_near(np.where(sharp, np.maximum(apart, beside), np.maximum(apart, coarse) if few else apart))
+    bends = few | (_largest_near(apart_by_noise) > BEYOND_NOISE * noise)
+    error = np.where(bends, np.maximum(by_noise, by_bend), by_noise)
+    rounding = EPSILON * (1.0 + abs(z).max(axis=-1, keepdims=True)) * _norm(weights)
+    found: Array = 2.05 * error + rounding  # 1.96 and what the median, of few points, is too small
+    return found
+
+
+def _largest_near(values: Array) -> Array:
+    """The largest of each value and its two neighbours on both sides."""
+    padded = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(2, 2)], mode="edge")
+    found: Array = np.lib.stride_tricks.sliding_window_view(padded, 5, axis=-1).max(axis=-1)
+    return found
+
+
+def _norm(weights: Array) -> Array:
+    """Standard error of each slope for values with errors of size 1; the home point has minus the sum of the others."""
+    size: Array = np.sqrt((weights**2).sum(axis=1) + weights.sum(axis=1) ** 2)
+    return size
+
+
+def _stencils(t: Array, points: int) -> tuple[NDArray[np.intp], Array]:
+    """Neighbours (n, points) of each point, and their weights in its slope; that of the point itself is left zero."""
     points = min(points, t.size)
     home = np.arange(t.size)
     first = np.clip(home - points // 2, 0, t.size - points)
     nodes = first[:, None] + np.arange(points)
-    weights = _weights(t[nodes], home - first)
-    slope = np.zeros(z.shape)
-    for k in range(points):  # differences from the home point: a constant has slope zero exactly
-        slope += weights[:, k] * (z[..., nodes[:, k]] - z)
-    return slope
+    return nodes, _weights(t[nodes], home - first)
 
 
 def _weights(nodes: Array, home: NDArray[np.intp]) -> Array:

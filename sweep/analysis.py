@@ -23,7 +23,7 @@ from sweep._curves import (
     scatter_is_noise,
     title,
 )
-from sweep._loglog import EPSILON, FEWEST, LINE, Array, brackets, line, root, slopes
+from sweep._loglog import EPSILON, FEWEST, LINE, Array, brackets, line, root, slope_errors, slopes
 from sweep.errors import SweepError
 
 Finder = Callable[[Array, Array, int], tuple[float, float]]
@@ -82,6 +82,31 @@ def local_exponent(y: xr.DataArray, dim: str) -> xr.DataArray:
     found = along(lambda z: slopes(np.log(x), z, 5), log_of(y), dimension)
     found.name = f"{y.name}_exponent" if y.name is not None else "exponent"
     found.attrs = {"units": "1", "long_name": f"local exponent of {title(y)} in {dim}"}
+    return found
+
+
+def local_exponent_error(y: xr.DataArray, dim: str) -> xr.DataArray:
+    """Error bar of `local_exponent` [1], which knows the sampling and finds noise by itself.
+
+    Where the values carry independent noise, it is half the interval of 95 % confidence, wider for runs of fewer than
+    20 points (`benchmarks/intervals.py` measures it). Where they do not, it is more than the error that the spacing
+    leaves, typically 20 times as much: the local exponent by five points is tried by that through seven, and where a
+    bend is within a step, by the slopes of the steps beside it.
+
+    Parameters
+    ----------
+    y, dim
+        As of `local_exponent`.
+
+    Raises
+    ------
+    SweepError
+        As `local_exponent`.
+    """
+    dimension, x = positive_axis(y, dim)
+    found = along(lambda z: slope_errors(np.log(x), z), log_of(y), dimension)
+    found.name = f"{y.name}_exponent_error" if y.name is not None else "exponent_error"
+    found.attrs = {"units": "1", "long_name": f"error of the local exponent of {title(y)} in {dim}"}
     return found
 
 

@@ -10,7 +10,7 @@ import xarray as xr
 
 from sweep._curves import title
 from sweep._view import is_logarithmic
-from sweep.analysis import local_exponent
+from sweep.analysis import local_exponent, local_exponent_error
 from sweep.errors import SweepError
 
 BORDERS = (-1.0, -0.5, -1 / 3)
@@ -32,7 +32,7 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     Returns
     -------
     Dataset
-        `exponent`, of the shape of y, and what `contours` gives of it along `point`.
+        `exponent` and its `exponent_error`, of the shape of y, and what `contours` gives of it along `point`.
 
     Raises
     ------
@@ -42,7 +42,8 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     field = local_exponent(y, dim)
     lines = contours(field, levels)
     names = {str(d): f"{d}_on_border" for d in field.dims}
-    return xr.Dataset({"exponent": field, **lines.rename(names).data_vars}, attrs={"y": title(y), "x": dim})
+    fields = {"exponent": field, "exponent_error": local_exponent_error(y, dim)}
+    return xr.Dataset({**fields, **lines.rename(names).data_vars}, attrs={"y": title(y), "x": dim})
 
 
 def contours(field: xr.DataArray, levels: Sequence[float]) -> xr.Dataset:

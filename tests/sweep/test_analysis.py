@@ -7,7 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import sweep
-from sweep.analysis import crossover, exponent, fit_exponent, local_exponent, where_exponent, where_value
+from sweep.analysis import (
+    crossover,
+    exponent,
+    fit_exponent,
+    local_exponent,
+    local_exponent_error,
+    where_exponent,
+    where_value,
+)
 from sweep.errors import SweepError
 
 PER_DECADE = 40
@@ -197,6 +205,52 @@ def test_further_axes_keep_their_units():
     met = crossover(fit, fit_exponent(y, "mu", (2, None)))
     for found in (local_exponent(y, "mu"), fit, met, where_exponent(y, "mu", -0.5)):
         assert found.R.attrs == {"units": "rad/s^2"}
+
+
+# its error bar
+
+
+def slopes_off_and_told(x, y, truth):
+    y = xr.DataArray(y, dims=("mu",) if y.ndim == 1 else ("set", "mu"), coords={"mu": x}, name="period")
+    return abs(local_exponent(y, "mu") - truth).values, local_exponent_error(y, "mu").values
+
+
+@pytest.mark.parametrize("points", [4, 5, 6, 7, 13, 25, 61, 241])
+def test_the_error_bar_is_above_what_the_sampling_leaves_and_falls_with_it(points):
+    x = np.geomspace(1e-3, 1e3, points)
+    off, told = slopes_off_and_told(x, bend(x), bend_exponent(x))
+    assert (off <= told).all()
+    assert told.max() < 2.0 * (12 / points) ** 3
+
+
+@pytest.mark.parametrize("place", [0.15, 0.4, 0.9, 2.3])
+@pytest.mark.parametrize("points", [13, 25, 41])
+def test_a_kink_between_two_points_is_in_the_error_bar(points, place):
+    x = np.geomspace(1e-3, 1e3, points)
+    off, told = slopes_off_and_told(
+        x, np.where(x < place, place / x, (place / x) ** (1 / 3)), np.where(x < place, -1, -1 / 3)
+    )
+    assert (off <= told + 1e-13).all()
+
+
+@pytest.mark.parametrize(("x", "least", "most"), [(grid(-3, 3, 10), 0.94, 0.96), (grid(-3, 3, 4), 0.92, 0.96)])
+@pytest.mark.parametrize("size", [1e-2, 1e-4])
+def test_the_error_bar_holds_the_truth_as_often_as_it_says_where_there_is_noise(x, least, most, size):
+    """61 and 25 points a set, 1000 sets; neighbours share points, so a share is good to about 0.3 %."""
+    noise = np.exp(size * np.random.default_rng(2).standard_normal((1000, x.size)))
+    off, told = slopes_off_and_told(x, 3 * x**-0.5 * noise, -0.5)
+    assert least < (off <= told).mean() < most
+
+
+def test_the_error_bar_of_a_constant_is_of_rounding_and_gaps_stay_gaps():
+    x = grid(-1, 1, 10)
+    assert local_exponent_error(curve(x, np.full(x.size, 7.3)), "mu").max() < 1e-13
+    y = bend(x)
+    y[[4, 9, 11]] = np.nan
+    found = local_exponent_error(curve(x, y), "mu")
+    assert np.flatnonzero(np.isnan(found)).tolist() == [4, 9, 10, 11]
+    assert found.attrs["units"] == "1"
+    assert sweep.local_exponent_error is local_exponent_error
 
 
 # straight lines
