@@ -2,9 +2,10 @@
 
     python studies/work_precision.py studies/work_precision.toml
 
-measures every method on the same cells, in one run on one core, and draws work_precision.png: errors against 40 digits
-where mpmath is installed, else against the best method; heyoka.py (the extra `peers`) where it is, integrating from one
-switch to the next until nothing is left of its start. Times are noisy and only told; errors and counts are checked.
+measures every method on the same cells, in one run on one core, and draws work_precision.png: errors against 40
+digits where mpmath is installed, else against the best method; heyoka.py, diffrax and scipy (the extra `peers`) where
+they are, integrating from one switch to the next until nothing is left of the start. Times are noisy and only told;
+errors and counts are checked.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ ORDERS = {"euler": (1, 1e-2), "semi_implicit": (1, 1e-2), "verlet": (2, 1e-2), "
 NOTES = """\
 error: the largest of period, amplitude and speed at the switch, relative; of fixed steps: of the third switch's time
 open marks: some cells are refused, or said not to be right to rtol; black crosses: silently wrong; grey: below what the
-truth is right to. heyoka.py is told how many half swings it takes and starts 10 % from the cycle"""
+truth is right to. Others (heyoka.py, diffrax, scipy) are told how many half swings it takes and start 10 % from the
+cycle; diffrax does all clocks side by side, each as often as the slowest"""
 
 
 def cycles(study: sweep.spec.Study, cells: int) -> dict[str, Any] | None:
@@ -67,30 +69,30 @@ def charted(path: Path, cells: int, tolerances: Sequence[float]) -> xr.Dataset:
     return work_precision(study, cells=cells, tolerances=tolerances, truth=cycles(study, cells))
 
 
-def peer(path: Path, tolerances: Sequence[float]) -> xr.Dataset | None:
-    """heyoka.py on some cells of the study with Coulomb friction; None where it is not installed."""
-    try:
-        import heyoka  # noqa: F401
-    except ImportError:
-        return None
-    from _heyoka import Foliots
+def peers(path: Path, tolerances: Sequence[float]) -> dict[str, xr.Dataset]:
+    """Others on some cells of the study with Coulomb friction, by name; none where truth is not at hand."""
+    from _peers import FOLLOWERS
 
     study = sweep.read_study(path)
     cells, true = precision_cells(study, PEER_CELLS), cycles(study, PEER_CELLS)
     if true is None:
-        return None
+        return {}
     multiplier = _multiplier(study, PEER_CELLS)
+    return {name: _measured(follower, cells, true, multiplier, tolerances) for name, follower in FOLLOWERS.items()}
+
+
+def _measured(follower: Any, cells: Any, true: Any, multiplier: Any, tolerances: Sequence[float]) -> xr.Dataset:
+    from _peers import swings
+
     rows = []
     for rtol in tolerances:
-        foliots = Foliots(rtol)
-        foliots.settle(cells["a"][0], cells["R"][0], true["crossing_speed"][0], 2)  # compiled before it is timed
+        columns = (cells["a"], cells["R"], true["crossing_speed"], [swings(rtol, m) for m in multiplier])
+        one = follower(rtol)
+        one.settle(*columns[:3], [2] * len(multiplier))  # compiled before it is timed
         begin = time.perf_counter()
-        found = [
-            foliots.settle(a, R, v, foliots.swings(m))
-            for a, R, v, m in zip(cells["a"], cells["R"], true["crossing_speed"], multiplier, strict=True)
-        ]
+        found = one.settle(*columns)
         seconds = (time.perf_counter() - begin) / len(found)
-        off = np.max(abs(np.array(found) / np.transpose(list(true.values())) - 1), axis=1)
+        off = np.max(abs(found / np.transpose(list(true.values())) - 1), axis=1)
         rows.append((np.median(off), off.max(), seconds))
     keys = ("error_median", "error_worst", "seconds")
     return xr.Dataset({k: ("rtol", list(v)) for k, v in zip(keys, zip(*rows, strict=True), strict=True)})
@@ -161,7 +163,7 @@ def orders(found: xr.Dataset) -> list[Statement]:
     return lines
 
 
-def figure(coulomb: xr.Dataset, drag: xr.Dataset, steps: xr.Dataset | None, other: xr.Dataset | None) -> Any:
+def figure(coulomb: xr.Dataset, drag: xr.Dataset, steps: xr.Dataset | None, others: dict[str, xr.Dataset]) -> Any:
     """Median cell above, worst cell below: two friction laws over time, and fixed steps over calls of the rates."""
     from sweep import charts
 
@@ -174,8 +176,8 @@ def figure(coulomb: xr.Dataset, drag: xr.Dataset, steps: xr.Dataset | None, othe
                 charts.draw_precision(axes, found, key, names)
                 axes.set_xlabel("")
             row[0].set_ylabel(f"relative error, {what} cell")
-            if other is not None:
-                row[0].plot(other.seconds, other[key], "k--", marker="*", linewidth=0.8, label="heyoka.py")
+            for (name, other), mark in zip(others.items(), "*xP", strict=False):
+                row[0].plot(other.seconds, other[key], "k--", marker=mark, linewidth=0.8, label=name)
             draw_steps(row[2], steps, key)
         for axes, text in zip(panels[0], "abc", strict=True):
             charts.letter(axes, text)
@@ -207,26 +209,28 @@ def conclude(path: str, cells: int = 1000, tolerances: Sequence[float] = TOLERAN
     coulomb = charted(first, cells, tolerances)
     drag = charted(first.with_name("work_precision_drag.toml"), cells, tolerances)
     steps = stepped(first.with_name("work_precision_steps.toml"))
-    other = peer(first, tolerances)
+    others = peers(first, tolerances)
     groups = {
         "Honesty": [*honesty("viscous and Coulomb", coulomb), *honesty("drag", drag)],
-        "Cost, viscous and Coulomb": [*costs(coulomb), *beside(other)],
+        "Cost, viscous and Coulomb": [*costs(coulomb), *beside(others)],
         "Cost, drag": costs(drag),
     }
     groups |= {} if steps is None else {"Fixed steps": orders(steps)}
     tables = [f"{found.attrs['title']}\n{precision_text(found)}\n" for found in (coulomb, drag)]
-    return groups, [NOTES, "", *tables], figure(coulomb, drag, steps, other)
+    return groups, [NOTES, "", *tables], figure(coulomb, drag, steps, others)
 
 
-def beside(other: xr.Dataset | None) -> list[Statement]:
-    """The peer's line, as those of our methods."""
-    if other is None:
-        return [Statement("heyoka.py", "", "not installed")]
-    texts = []
-    for wanted in (1e-3, 1e-7, 1e-11):
-        enough = other.seconds.where(other.error_worst <= wanted)
-        texts.append("-" if bool(enough.isnull().all()) else f"{1e6 * float(enough.min()):.3g}")
-    return [Statement("heyoka.py: us a cell, worst right to 1e-3, 1e-7, 1e-11", "", ", ".join(texts))]
+def beside(others: dict[str, xr.Dataset]) -> list[Statement]:
+    """A line for each of the others, as those of our methods."""
+    lines = []
+    for name, other in others.items():
+        texts = []
+        for wanted in (1e-3, 1e-7, 1e-11):
+            enough = other.seconds.where(other.error_worst <= wanted)
+            texts.append("-" if bool(enough.isnull().all()) else f"{1e6 * float(enough.min()):.3g}")
+        lines.append(Statement(f"{name}: us a cell, worst right to 1e-3, 1e-7, 1e-11", "", ", ".join(texts)))
+    missing = {"heyoka.py", "diffrax"} - set(others)
+    return [*lines, *(Statement(name, "", "not installed") for name in sorted(missing))]
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -86,25 +86,32 @@ def test_calls_are_counted_to_seven_digits(steps):
 
 def test_the_figure_has_two_rows_of_three_panels(coulomb, steps):
     other = xr.Dataset({k: ("rtol", [1e-4, 1e-9]) for k in ("error_median", "error_worst", "seconds")})
-    page = study.figure(coulomb, coulomb, steps, other)
+    page = study.figure(coulomb, coulomb, steps, {"heyoka.py": other, "diffrax": other})
     assert len(page.axes) == 6
     assert [axes.get_title(loc="left") for axes in page.axes[:3]] == ["(a)", "(b)", "(c)"]
     assert "heyoka.py" in [text.get_text() for text in page.legends[0].get_texts()]
-    assert len(study.figure(coulomb, coulomb, None, None).axes) == 6
+    assert len(study.figure(coulomb, coulomb, None, {}).axes) == 6
 
 
-def test_heyoka_finds_the_same_cycle(monkeypatch):
-    pytest.importorskip("heyoka")
+@pytest.mark.parametrize(
+    ("name", "rtol", "right_to"), [("heyoka.py", 1e-9, 1e-8), ("diffrax", 1e-9, 1e-6), ("scipy", 1e-7, 1e-6)]
+)
+def test_others_find_the_same_cycle(monkeypatch, name, rtol, right_to):
+    import _peers
+
+    if name not in _peers.FOLLOWERS:
+        pytest.skip(f"{name} is not installed")
     monkeypatch.setattr(study, "PEER_CELLS", 2)
-    found = study.peer(FILE, (1e-9,))
-    assert float(found.error_worst.max()) < 1e-8
+    monkeypatch.setattr(_peers, "FOLLOWERS", {name: _peers.FOLLOWERS[name]})
+    found = study.peers(FILE, (rtol,))[name]
+    assert float(found.error_worst.max()) < right_to
     assert float(found.seconds.min()) > 0
 
 
 def test_the_study_prints_its_table_and_draws_its_figure(coulomb, steps, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(study, "charted", lambda *_: coulomb)
     monkeypatch.setattr(study, "stepped", lambda *_: steps)
-    monkeypatch.setattr(study, "peer", lambda *_: None)
+    monkeypatch.setattr(study, "peers", lambda *_: {})
     assert study.main([str(tmp_path / "work_precision.toml")]) == 0
     text = capsys.readouterr().out
     assert " NO" not in text
