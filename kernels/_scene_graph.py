@@ -24,6 +24,7 @@ class Recorded:
     switched: tuple[Expression, ...]
     started: tuple[Expression, ...]
     events: tuple[tuple[Expression, Expression, Expression], ...]
+    nested: int
 
 
 def record(scene):
@@ -42,7 +43,17 @@ def record(scene):
     timed = tuple(graph.timed(rate, unit) for rate in rates)
     started = _called(graph, scene.start, known, len(states))
     kinks = [(graph.of(0.0), graph.constant(f".sign_{j}"), u) for j, u in enumerate(graph.kinks)]
-    return Recorded(graph, rates, timed, surface, switched, started, (_affine(graph, surface), *kinks))
+    events = (_affine(graph, surface), *kinks)
+    return Recorded(
+        graph,
+        rates,
+        timed,
+        surface,
+        switched,
+        started,
+        events,
+        _nested(events, dict(zip(states.values(), rates, strict=True))),
+    )
 
 
 def _called(graph, function, named, length):
@@ -65,3 +76,12 @@ def _affine(graph, surface):
         offset, rest = sorted(surface.args, key=lambda term: term.varies)
     factor, u = rest.args if rest.kind == SCALED else (graph.of(1.0), rest)
     return offset, factor, u
+
+
+def _nested(events, rates):
+    """The number of the kink whose u is, but for a constant factor, the rate of the surface; 0 where there is none."""
+    surface, *kinks = (u for _, _, u in events)
+    if surface not in rates:
+        return 0
+    _, rate = surface.graph.parts(rates[surface])
+    return 1 + kinks.index(rate) if rate in kinks else 0

@@ -11,6 +11,7 @@ import os
 import re
 import sys
 import tempfile
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,8 @@ from kernels._taylor_source import Lines
 from kernels._taylor_text import filled, listed
 
 ORDERS = (14, 20)
+_BUILDING = threading.RLock()
+"""No thread may be given a module that another one is still making."""
 
 HEAD = '''
 """{name}: {doc}
@@ -39,8 +42,8 @@ from kernels._lanes import choose, dot, exponent, fma, horner, isnt, magnitude, 
 from kernels._refill import LANES, align_stack, each_refilled
 from kernels._scene_module import kept
 from kernels._taylor import (
-    GRAZING, HALVINGS, LONGEST, SLACK, STEP_LIMIT, clear, falls, keeps, last_term, natural_power, next_step, root, size,
-    slope, tail, worse,
+    GRAZING, HALVINGS, LONGEST, SLACK, STEP_LIMIT, clear, falls, integral, keeps, last_term, mean, natural_power,
+    next_step, rises, root, size, slope, stays_apart, tail, worse,
 )
 from kernels._taylor_pool import KINK_LIMIT, time_unit
 from kernels._vecmath import exp, is_normal, log, power, sincos
@@ -144,6 +147,15 @@ class Writer:
         offset = self.recorded.events[0][0]
         return self.names[offset.args[0]] if offset.kind == INPUT else "0.0"
 
+    def summed(self):
+        """The states whose rate is another state, and which."""
+        rates = zip(self.states, self.recorded.rates, strict=True)
+        return {s: self.names[r.args[0]] for s, r in rates if r.kind == INPUT and r.varies}
+
+    def seen(self):
+        """For each event the state that it watches; None where it is more than one."""
+        return [self.names[u.args[0]] if u.kind == INPUT else None for _, _, u in self.recorded.events]
+
     def series(self, order):
         recorded = self.recorded
         lines = Lines(self.names, dict(zip(self.scene.states, recorded.timed, strict=True)))
@@ -175,7 +187,10 @@ class Writer:
             shared(self.states, self.kinks),
         ]  # fmt: skip
         for order in ORDERS:
-            parts += [self.series(order), leg(self.states, 1 + self.kinks, order)]
+            parts += [
+                self.series(order),
+                leg(self.states, 1 + self.kinks, order, recorded.nested, self.summed(), self.seen()),
+            ]
             parts.append(advance(self.states, self.parameters, self.kinks, order, self.offset()))
         return "\n".join(parts)
 
@@ -205,17 +220,18 @@ def build(scene):
     """The module of the scene."""
     text = Writer(scene, record(scene)).text()
     name = f"scene_{scene.name}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
-    if name not in sys.modules:
-        path = _written(name, text)
-        spec = importlib.util.spec_from_file_location(name, path)
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[name] = module
-        try:
-            spec.loader.exec_module(module)
-        except BaseException:
-            del sys.modules[name]
-            raise
-    return sys.modules[name]
+    with _BUILDING:
+        if name not in sys.modules:
+            path = _written(name, text)
+            spec = importlib.util.spec_from_file_location(name, path)
+            module = importlib.util.module_from_spec(spec)
+            sys.modules[name] = module
+            try:
+                spec.loader.exec_module(module)
+            except BaseException:
+                del sys.modules[name]
+                raise
+        return sys.modules[name]
 
 
 def _written(name, text):

@@ -1,13 +1,15 @@
 """Steps of a Taylor series, and the proof of what happens within one; generic in one cell or lanes.
 
 A *series* is the tuple (u_0 ... u_p) of u(t) = sum u_k t^k on a step [0, h]. An *event* is e(t) = offset + factor u(t),
-which fires where it falls through 0. With A = sum_{k>2} k abs(e_k) h^(k-2) and 0 < t <= h
-    e'(t) <= e_1 + t (2 e_2 + A),  e(t) >= e_0 + t e_1 + t^2 (e_2 - A/3),                                (1)
-so e_1 <= 0 and e_1 + h (2 e_2 + A) < 0 prove that e falls all along, and whether it fires is seen by its sign at the
-end; and where the parabola below it stays above 0, nothing fires. Where neither is proved the step is halved.
+which fires where it falls through 0. With A = sum_{k>3} k abs(e_k) h^(k-2) and 0 < t <= h
+    e'(t) <= e_1 + t (2 e_2 + A) + 3 t^2 e_3,  e(t) >= e_0 + t e_1 + t^2 (e_2 + h min(e_3, 0) - A/4),     (1)
+so where the first parabola stays below 0, e falls all along, and whether it fires is seen by its sign at the end;
+where the second one stays above 0, nothing fires. Where neither is proved the step is halved.
 The proof is of the series; what that leaves out is below the tolerance of the step, and an event that so little decides
 is called grazing.
 """
+
+from numba import types
 
 from kernels._jit import jit, jit_call
 from kernels._lanes import (
@@ -38,16 +40,16 @@ LARGEST = 5.0
 """log2 of the factor by which a step may change."""
 LONGEST = 8.0
 """First guess of a step, at most, over the time of the last motion between events."""
-WIDER = 4.0 / 3.0
+WIDER = 5.0 / 4.0
 GRAZING = 16.0
 
 
 def tail(h, series):
-    """A bound on A of (1) for u: sum over k > 2 of k abs(u_k) h^(k-2), with 3 (4/3)^(k-3) >= k for k."""
+    """A bound on A of (1) for u: sum over k > 3 of k abs(u_k) h^(k-2), with 4 (5/4)^(k-4) >= k for k."""
     total, wide = abs(series[-1]), WIDER * h
-    for k in range(len(series) - 2, 2, -1):
+    for k in range(len(series) - 2, 3, -1):
         total = fma(total, wide, abs(series[k]))
-    return 3.0 * (total * h)
+    return 4.0 * (total * (h * h))
 
 
 def _lower_tail(context, builder, signature, values):
@@ -56,9 +58,9 @@ def _lower_tail(context, builder, signature, values):
     items = _items(context, builder, signature.args[1], values[1], target)
     sizes = [_called("fabs")(builder, item) for item in items]
     total, wide = sizes[-1], builder.fmul(_constant(h.type, WIDER), h)
-    for k in range(len(items) - 2, 2, -1):
+    for k in range(len(items) - 2, 3, -1):
         total = _called("fma")(builder, total, wide, sizes[k])
-    return builder.fmul(_constant(h.type, 3.0), builder.fmul(total, h))
+    return builder.fmul(_constant(h.type, 4.0), builder.fmul(total, builder.fmul(h, h)))
 
 
 _function(tail, 2, lambda h, series: _number(h, *series), _lower_tail)
@@ -85,6 +87,47 @@ def _lower_slope(context, builder, signature, values):
 
 
 _function(slope, 2, lambda x, series: _number(x, *series), _lower_slope)
+
+
+def mean(x, series):
+    """The mean of u between 0 and x, but for its last term: sum of u_k x^k/(k + 1)."""
+    value = series[-2] * (1.0 / (len(series) - 1))
+    for k in range(len(series) - 3, -1, -1):
+        value = fma(value, x, series[k] * (1.0 / (k + 1)))
+    return value
+
+
+def _lower_mean(context, builder, signature, values):
+    target = signature.return_type
+    x = context.cast(builder, values[0], signature.args[0], target)
+    items = _items(context, builder, signature.args[1], values[1], target)
+    value = None
+    for k in range(len(items) - 2, -1, -1):
+        term = builder.fmul(_constant(items[k].type, 1.0 / (k + 1)), items[k])
+        value = term if value is None else _called("fma")(builder, value, x, term)
+    return value
+
+
+_function(mean, 2, lambda x, series: _number(x, *series), _lower_mean)
+
+
+def integral(unit, start, series):
+    """Coefficients of the state that starts there and whose rate is unit u."""
+    return start, *(u * (unit * (1.0 / (k + 1))) for k, u in enumerate(series[:-1]))
+
+
+def _lower_integral(context, builder, signature, values):
+    lanes = signature.return_type[0]
+    unit, start = (context.cast(builder, v, t, lanes) for v, t in zip(values[:2], signature.args[:2], strict=True))
+    items = _items(context, builder, signature.args[2], values[2], lanes)
+    parts = [builder.fmul(unit, _constant(unit.type, 1.0 / (k + 1))) for k in range(len(items) - 1)]
+    found = [start] + [builder.fmul(u, part) for u, part in zip(items[:-1], parts, strict=True)]
+    return context.make_tuple(builder, signature.return_type, found)
+
+
+_function(
+    integral, 3, lambda unit, start, series: types.UniTuple(_number(unit, start, *series), len(series)), _lower_integral
+)
 
 
 @jit
@@ -148,18 +191,39 @@ def keeps(h, power_h, series, allowed):
 
 
 @jit
-def falls(d, dd, rest, h):
-    """Whether an event falls all along a step, by (1): from e' = d and e''/2 = dd, `rest` is A."""
-    return (d <= 0.0) & (fma(h, fma(2.0, dd, rest), d) < 0.0)
+def rises(d, dd):
+    """Whether what has these first derivatives rises in the next moment."""
+    return (d > 0.0) | ((d >= 0.0) & (dd > 0.0))
+
+
+def stays_apart(x):
+    """Keeps the function that calls it out of line: what is rarely needed must not cost what is needed often."""
+
+
+def _lower_stays_apart(context, builder, signature, values):
+    builder.function.attributes.discard("alwaysinline")
+    builder.function.attributes.add("noinline")
+    return context.get_dummy_value()
+
+
+_function(stays_apart, 1, lambda x: types.void, _lower_stays_apart)
 
 
 @jit
-def clear(e, d, dd, rest, h, margin):
-    """Whether an event does not fire in (0, h], by (1): from e(0) = e on.
+def falls(d, dd, ddd, rest, h):
+    """Whether an event falls all along a step, by (1): from its coefficients 1 to 3, `rest` is A."""
+    b, q = fma(2.0, dd, rest), 3.0 * ddd
+    turns = (q < 0.0) & (b > 0.0) & (fma(2.0 * h, q, b) < 0.0) & isnt(4.0 * (q * d) > b * b)
+    return (d <= 0.0) & (fma(h, fma(h, q, b), d) < 0.0) & isnt(turns)
+
+
+@jit
+def clear(e, d, dd, ddd, rest, h, margin):
+    """Whether an event does not fire in (0, h], by (1): from its coefficients 0 to 3.
 
     What comes down to less than `margin` is not clear. What starts at 0, or below it by rounding, must rise.
     """
-    curve = fma(-1.0 / 3.0, rest, dd)
+    curve = fma(h, where(ddd < 0.0, ddd, 0.0), fma(-0.25, rest, dd))
     down = where(curve < 0.0, curve, 0.0)
     above = fma(h, fma(h, down, d), e) > where(d < 0.0, margin, 0.0)
     turns = (curve > 0.0) & ((d >= 0.0) | (4.0 * curve * (e - margin) > d * d))
@@ -168,11 +232,12 @@ def clear(e, d, dd, rest, h, margin):
 
 @jit_call
 def root(offset, factor, series, h, tolerance, searching):
-    """Where offset + factor u(t) falls through 0 in (0, h], given that it falls all along: Newton within a bracket.
+    """Where offset + factor u(t) falls through 0 in (0, h], given that it falls all along.
 
-    Newton's next step is about change^3/before^2; it ends where that is far below what the series leave out.
+    Halley's steps within a bracket, with the bend by the first terms. What is left after a step is taken for that of
+    Newton's, change^3/before^2, which is more; the search ends where that is far below what the series leave out.
     """
-    before, enough = 0.0 * h, 0.001 * tolerance + 1e-17
+    before, enough = 0.0 * h, 0.01 * tolerance + 1e-17
     low, high = 0.0 * h, h
     e, d, dd = fma(factor, series[0], offset), factor * series[1], factor * series[2]
     t = first_guess(e, d, dd, h)
@@ -181,13 +246,19 @@ def root(offset, factor, series, h, tolerance, searching):
             break
         value, rate = fma(factor, horner(t, series), offset), factor * slope(t, series)
         low, high = where(value > 0.0, t, low), where(value > 0.0, high, t)
-        new = t - value / rate
+        new = t - value * rate / fma(rate, rate, -value * (factor * half_bend(t, series)))
         new = where((new >= low) & (new <= high), new, 0.5 * (low + high))
         change = magnitude(new - t)
         t = where(searching, new, t)
         searching = searching & isnt((change * change) * change <= enough * t * (before * before))
         before = change
     return t
+
+
+@jit
+def half_bend(t, series):
+    """About u''(t)/2, by its first terms."""
+    return fma(t, fma(t, 6.0 * series[4], 3.0 * series[3]), series[2])
 
 
 @jit

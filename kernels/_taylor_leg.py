@@ -7,6 +7,23 @@ from kernels._taylor_text import filled, folded, listed
 
 LEG = '''
 @jit_call
+def doubted_{order}(trial, unsure, facts, series):
+    """Steps of the unsure lanes halved until each event is proved to fall or to stay clear; which fall."""
+    stays_apart(trial)
+    {unpack_facts}
+    {unpack_series}
+    for _ in range(HALVINGS):
+        {judge_all}
+        known = {all_known}
+        {falls_of_unsure}
+        unsure = unsure & isnt(known)
+        if not some(unsure):
+            break
+        trial = where(unsure, 0.5 * trial, trial)
+    return trial, unsure, {no_falls}
+
+
+@jit_call
 def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, active):
     """Follow the motion of the active lanes until an event falls through 0, and stop there.
 
@@ -50,13 +67,12 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
             {margins}
             moving = moving & isnt(broken | stuck)
         tried = where(moving, tried + 1.0, tried)
-        unsure = moving
-        for _ in range(HALVINGS):
-            {judge}
-            unsure = moving & isnt({all_sure})
-            if not some(unsure):
-                break
-            trial = where(unsure, 0.5 * trial, trial)
+        {judge}
+        unsure = moving & isnt({all_sure})
+        if some(unsure):
+            trial, unsure, {no_falls} = doubted_{order}(
+                trial, unsure, ({facts_of_all}), ({series_of_all})
+            )
         grazing = grazing | unsure
         moving = moving & isnt(unsure)
         steps = moving & fine
@@ -72,6 +88,7 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
         if not some(moving):
             break
     lost = moving
+    {again}
     met = active & isnt(lost | stuck | broken | grazing)
     {roots}
     {at_root}
@@ -81,7 +98,7 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
 '''
 
 
-def leg(states, events, order):
+def leg(states, events, order, nested=0, summed=(), seen=()):
     """The text of `to_event_{order}`: `states` are names, `events` the number of events."""
     e = range(events)
     roots = [
@@ -115,7 +132,7 @@ hangs = met & isnt(magnitude(rate) > blur / magnitude(rate) * bend)""",
     facts = [
         f"""\
 e_{j}, d_{j} = fma(factor_{j}, event_{j}[0], offset_{j}), factor_{j} * event_{j}[1]
-dd_{j} = factor_{j} * event_{j}[2]"""
+dd_{j}, ddd_{j} = factor_{j} * event_{j}[2], factor_{j} * event_{j}[3]"""
         for j in e
     ]
     start = [
@@ -127,13 +144,36 @@ now_{j} = (on_{j} < 0.5) & (e_{j} <= 0.0)"""
     margins = [
         f"margin_{j} = SLACK * tolerance * (magnitude(offset_{j}) + magnitude(factor_{j} * event_{j}[0]))" for j in e
     ]
-    judge = [
+    by_tails = [
         f"""\
 rest_{j} = {"tail" if j else "magnitude(factor_0) * tail"}(trial, event_{j})
-clear_{j} = clear(e_{j}, d_{j}, dd_{j}, rest_{j}, trial, margin_{j})
-falls_{j} = falls(d_{j}, dd_{j}, rest_{j}, trial) | now_{j}"""
+clear_{j} = clear(e_{j}, d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial, margin_{j})
+falls_{j} = falls(d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial) | now_{j}"""
         for j in e
     ]
+    by_kink = f"""\
+lead = where(e_{nested} > 0.0, d_0, 0.0)
+clear_0 = rises(lead, dd_0) & (clear_{nested} | falls_{nested})
+falls_0 = (rises(-lead, -dd_0) & clear_{nested}) | now_0"""
+    judge = [*by_tails[1:], by_kink] if nested else by_tails
+    doubt = [
+        f"""\
+rest_{j} = {"tail" if j else "magnitude(factor_0) * tail"}(trial, event_{j})
+clear_{j} = clear(e_{j}, d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial, margin_{j})
+down_{j} = falls(d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial) | now_{j}"""
+        for j in e
+    ]
+
+    def end_of(s, h):
+        if s in summed:
+            return f"end_{s} = fma(unit * {h}, mean({h}, s_{summed[s]}), {s})"
+        return f"end_{s} = horner({h}, s_{s})"
+
+    def seen_at(j):
+        return f"end_{seen[j]}" if seen[j] else f"horner(trial, event_{j})"
+
+    each = ("e", "d", "dd", "ddd", "margin", "now", "falls")
+    facts_of = [f"{name}_{j}" for j in e for name in each]
     passed = [f"passed_{j} = passed_{j} | (steps & falls_{j} & (end_{j} <= 0.0))" for j in e]
     parts = {
         "series_and_events": ", ".join(
@@ -150,15 +190,26 @@ falls_{j} = falls(d_{j}, dd_{j}, rest_{j}, trial) | now_{j}"""
         "no_now": listed(f"now_{j}" for j in e),
         "no_margins": "\n".join(f"margin_{j} = 0.0 * h" for j in e),
         "judge": "\n".join(judge),
+        "judge_all": "\n".join(doubt),
+        "all_known": " & ".join(f"(clear_{j} | down_{j})" for j in e),
+        "falls_of_unsure": "\n".join(f"falls_{j} = (unsure & down_{j}) | (falls_{j} & isnt(unsure))" for j in e),
+        "no_falls": ", ".join(f"falls_{j}" for j in e),
+        "facts_of_all": ", ".join(["factor_0", *facts_of]),
+        "series_of_all": listed(f"event_{j}" for j in e),
+        "unpack_facts": ", ".join(["factor_0", *facts_of]) + " = facts",
+        "unpack_series": listed(f"event_{j}" for j in e) + " = series",
         "all_sure": " & ".join(f"(clear_{j} | falls_{j})" for j in e),
         "ends": "\n".join(
-            [f"end_{s} = horner(trial, s_{s})" for s in states]
-            + [f"end_{j} = fma(factor_{j}, horner(trial, event_{j}), offset_{j})" for j in e]
+            [end_of(s, "trial") for s in states] + [f"end_{j} = fma(factor_{j}, {seen_at(j)}, offset_{j})" for j in e]
         ),
         "passed": "\n".join(passed),
         "any_passed": " | ".join(f"passed_{j}" for j in e),
         "advance": "\n".join(f"{s} = where(steps, end_{s}, {s})" for s in states),
         "off": "\n".join(f"now_{j} = now_{j} & meets" for j in e),
+        "again": "\n".join(
+            [f"s_{s} = integral(unit, {s}, s_{w})" for s, w in summed.items()]
+            + [f"event_{j} = s_{seen[j]}" for j in e if seen[j] in summed]
+        ),
         "roots": "\n".join(roots),
         "at_root": "\n".join(f"end_{s} = where(met, horner(part, s_{s}), {s})" for s in states),
         "final": listed(f"end_{s}" for s in states),

@@ -151,12 +151,11 @@ def test_the_proof_holds_on_polynomials_with_two_roots_within_a_step():
     for gap in (0.3, 0.03, 0.003):
         series = ((0.25 + gap) * (0.25 - gap) + 0.25, -1.0, 1.0, 0.0, 0.0)  # (t - 1/2)^2 - gap^2 + 1/4 ...
         series = (0.25 - gap * gap, *series[1:])
-        e, d, dd = series[:3]
         for h in np.linspace(0.01, 1.0, 100):
             rest = _plain(_taylor.tail, h, series)
-            if _plain(_taylor.clear, e, d, dd, rest, h, 0.0):
+            if _plain(_taylor.clear, *series[:4], rest, h, 0.0):
                 assert h < 0.5 - gap
-            if _plain(_taylor.falls, d, dd, rest, h):
+            if _plain(_taylor.falls, *series[1:4], rest, h):
                 assert h < 0.5
 
 
@@ -169,8 +168,17 @@ def test_the_bound_of_a_tail_is_one():
     for _ in range(50):
         series = tuple(random.normal(size=15) * 0.7 ** np.arange(15.0))
         h = random.uniform(0.1, 1.5)
-        exact = mpmath.fsum(k * abs(series[k]) * h ** (k - 2) for k in range(3, 15))
+        exact = mpmath.fsum(k * abs(series[k]) * h ** (k - 2) for k in range(4, 15))
         assert _taylor.tail(h, series) >= exact
+
+
+def test_a_state_that_sums_another_up_is_its_integral():
+    random = np.random.default_rng(4)
+    series, start, unit, x = tuple(random.normal(size=9)), 0.4, 0.5, 0.7
+    summed = np.polynomial.Polynomial(series[:-1]).integ()
+    np.testing.assert_allclose(_taylor.integral(unit, start, series)[1:], unit * summed.coef[1:], rtol=1e-14)
+    assert _taylor.integral(unit, start, series)[0] == start
+    assert x * _taylor.mean(x, series) == pytest.approx(summed(x), rel=1e-14)
 
 
 @pytest.mark.parametrize("flips", [1.0, 2.0, 12.0])
@@ -202,10 +210,10 @@ def test_the_proof_holds_on_any_polynomial():
         h = random.uniform(0.05, 1.2)
         values, slopes = (np.polynomial.Polynomial(p)(h * t) for p in (series, series[1:] * np.arange(1.0, 8.0)))
         rest = _plain(_taylor.tail, h, series)
-        if series[0] >= 0.0 and _plain(_taylor.clear, *series[:3], rest, h, 0.0):
+        if series[0] >= 0.0 and _plain(_taylor.clear, *series[:4], rest, h, 0.0):
             clear += 1
             assert values.min() > 0.0
-        if _plain(_taylor.falls, *series[1:3], rest, h):
+        if _plain(_taylor.falls, *series[1:4], rest, h):
             falls += 1
             assert slopes.max() < 0.0
     assert min(clear, falls) > 8
