@@ -17,7 +17,7 @@ from kernels._lanes import magnitude, sqrt
 from kernels._wear_call import call
 from kernels._wear_tool import arctan2, sincos
 
-_DOUBT = 8.0 * 2.0**-52
+_DOUBT = 4.0 * 2.0**-52
 """What rounding comes to in the angle of the arm: where it all but turns, its dwell knows it a million times worse."""
 
 
@@ -43,7 +43,7 @@ def gaps(arm, c, s):
     sine2 = 0.5 * s * s / (1.0 + c) if c > 0.0 else 0.5 * (1.0 - c)
     cosine2 = 0.5 * (1.0 + c) if c > 0.0 else 0.5 * s * s / (1.0 - c)
     top, bottom = unit * cosine2 - high, unit * sine2 - low
-    return top, bottom, _DOUBT * (unit * cosine2 / top + unit * sine2 / bottom)
+    return top, bottom, _DOUBT * unit * ((magnitude(s) + cosine2) / top + (magnitude(s) + sine2) / bottom)
 
 
 @call

@@ -3,15 +3,13 @@
 import functools
 
 import numpy as np
-from numba import njit
 
 from kernels._columns import entry
-from kernels._jit import _OPTIONS, COMPILED
+from kernels._jit import COMPILED, jit_call
 
 
-def call(function):
-    """As `jit_call`, for what is never called from Python: without the code for that, a third less to compile."""
-    return njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)
+call = jit_call
+"""For every function that is not a line or two: pasted in, they would be compiled over and over."""
 
 
 def entry_of_cells(*shared):

@@ -16,19 +16,22 @@ panels are split. dtheta = dphi/abs(alpha') of both strokes is closed, too (`_we
 
 import math
 
-from kernels import _wear_arm, _wear_tool
+import numpy as np
+
+from kernels import _wear_arm, _wear_quadrature, _wear_still, _wear_tool
 from kernels._jit import jit
 from kernels._lanes import magnitude, sqrt
 from kernels._linkage import sum4
 from kernels._wear_call import call
 from kernels._wear_quadrature import adapt, open_panel
 from kernels._wear_speed import along_arc, extremes, half_circle
-from kernels._wear_tool import PIECES, arctan2, outline, sincos
+from kernels._wear_tool import CROSSING_LIMIT, PIECES, arctan2, outline, sincos
 
 FAR_SIDE, SPIN = 4.0, 5.0
 """Kinds of panels beside the outline's pieces: the second integral of (2); all of a work on the pivot itself."""
 
 _EPS = 2.0**-52
+_AT_TURN = 1e-11  # a gap over its largest, or a step: beyond that a split is none where the arm turns
 _TURN = 2.0 * math.pi
 
 
@@ -65,28 +68,34 @@ def _at_angle(scene, c, s, arc):
 
 @call
 def vertex_margins(piece, tool, reach, w, r):
-    """rho^2 - (w-r)^2 and rho^2 - (w+r)^2 of the tool's vertex on the X axis, without loss.
+    """rho^2 - (w-r)^2 and rho^2 - (w+r)^2 of the vertex where a piece begins, without loss.
 
     A vertex that is on the ring but for the rounding of its inputs is on it: the two terms of (2) differ by the square
     root of what is left, and wear by that itself.
     """
-    a = _wear_tool.side_of(piece) * tool[0]
-    near = sum4(reach, a, r, -w) * sum4(reach, a, -r, w)
-    wide = sum4(reach, a, -r, -w) * sum4(reach, a, r, w)
-    least = 4.0 * _EPS * (reach + tool[0] + w + r) * (reach + tool[0] + w + r)
+    a, b = (_wear_tool.side_of(piece) * tool[0], 0.0) if _wear_tool.on_x_axis(piece) else (0.0, tool[1])
+    near = sum4(reach, a, r, -w) * sum4(reach, a, -r, w) + b * b
+    wide = sum4(reach, a, -r, -w) * sum4(reach, a, r, w) + b * b
+    far = reach + magnitude(a) + b + w + r
+    least = 4.0 * _EPS * far * far
     return near if magnitude(near) > least else 0.0, wide if magnitude(wide) > least else 0.0
 
 
 @call
 def _margins(piece, point, tool, reach, w, r):
-    """rho^2, rho^2 - (w-r)^2, (w+r)^2 - rho^2 of an outline's point, and their rounding, absolute."""
+    """rho^2, rho^2 - (w-r)^2, (w+r)^2 - rho^2 of an outline's point, and their rounding, absolute.
+
+    From the vertex on, as `crossings` has it: what rounds at the vertex rounds alike where panels are split.
+    """
     x, y, _, _, missing = point
     far = reach + x
     rho2 = far * far + y * y
-    if not _wear_tool.on_x_axis(piece):
-        return rho2, rho2 - (w - r) * (w - r), (w + r) * (w + r) - rho2, 2.0 * _EPS * (rho2 + (w + r) * (w + r))
-    side = _wear_tool.side_of(piece)
     near, wide = vertex_margins(piece, tool, reach, w, r)
+    if not _wear_tool.on_x_axis(piece):
+        inward, aside = missing * (missing - 2.0 * tool[1]), x * (x + 2.0 * reach)
+        noise = 4.0 * _EPS * (magnitude(inward) + magnitude(aside))
+        return rho2, near + (inward + aside), -(wide + (inward + aside)), noise
+    side = _wear_tool.side_of(piece)
     inward = missing * (missing - 2.0 * side * (reach + side * tool[0]))
     noise = 2.0 * _EPS * (magnitude(inward) + y * y)
     return rho2, near + (inward + y * y), -(wide + (inward + y * y)), noise
@@ -172,32 +181,58 @@ def integrand(kind, x, scene):
 
 
 @jit
-def _split_circle(k, scene, piece):
-    """Centre, radius and vertex excess of the circles at which contact ends: two about the pivot, four of radius r."""
-    arm, tool, (_, _, reach, w, turn_c, turn_s), r = scene
+def _split_circle(k, scene, piece, still):
+    """Centre, radius and vertex excess of the circles at which panels are split: two about the pivot, then of radius r.
+
+    These are at the angles in `still`, each on either side of the arm.
+    """
+    _, tool, (_, _, reach, w, turn_c, turn_s), r = scene
     if k < 2:
         radius = w + r if k else magnitude(w - r)
         margins = vertex_margins(piece, tool, reach, w, r)
-        start = margins[1] if k else margins[0]
-        if not _wear_tool.on_x_axis(piece):
-            start = _wear_tool.vertex_excess(piece, tool, -reach, 0.0, radius)
-        return -reach, 0.0, radius, start
-    s, c = sincos(arm[2][0] if k < 4 else arm[2][1])
+        return -reach, 0.0, radius, margins[1] if k else margins[0]
+    s, c = sincos(still[k // 2 - 1])
     x, y = w * (c * turn_c + s * turn_s) - reach, w * (c * turn_s - s * turn_c)
     y = -y if k % 2 else y
     return x, y, r, _wear_tool.vertex_excess(piece, tool, x, y, r)
 
 
 @call
-def _open_outline(pool, count, scene, found, stack):
-    """Opens the panels of the contour, split where contact ends; how many panels there are then."""
+def _settled(x, scene, piece):
+    """The same split, if it is where the arm turns, of all of its ways to get there that which is nearest its end.
+
+    By Newton's rule on the arm's gap as the integrand has it, which goes there like a square root: where the point is
+    near the line of centres, a split that was found otherwise is off by much more than rounding of the gap.
+    """
+    arm, tool, (_, _, _, _, turn_c, turn_s), _ = scene
+    chi, gamma, slopes, _, blur = _about_pivot(scene, piece, outline(piece, x, tool))
+    least, step = _AT_TURN * arm[1][0], 0.0
+    if blur < math.inf:
+        for k in range(4):
+            side, half = 1.0 if k < 2 else -1.0, 1.0 if k % 2 else -1.0
+            c, s = chi[0] * gamma[0] + side * chi[1] * gamma[1], half * (chi[1] * gamma[0] - side * chi[0] * gamma[1])
+            cosine, sine = turn_c * c - turn_s * s, turn_s * c + turn_c * s
+            top, bottom, _ = _wear_arm.gaps(arm, cosine, sine)
+            gap, growth = (top, -1.0) if magnitude(top) < magnitude(bottom) else (bottom, 1.0)
+            slope = growth * 0.5 * arm[1][0] * sine * half * (slopes[0] - side * slopes[1])
+            if sine > 0.0 and magnitude(gap) < least and magnitude(gap) < _AT_TURN * magnitude(slope):
+                least, step = magnitude(gap), gap / slope
+    return x - step if 0.0 < x - step < 1.0 else x
+
+
+@call
+def _open_outline(pool, count, scene, found, stack, stops):
+    """Opens the panels of the contour, split where contact ends or v is 0; how many panels there are then."""
     for k in range(PIECES):
         piece, splits = float(k), int(1.0)
         found[0] = 0.0
-        for j in range(2 if scene[0][3] else 6):
-            x, y, radius, start = _split_circle(j, scene, piece)
-            number = _wear_tool.crossings(piece, scene[1], x, y, radius, start, found, splits, stack)
-            splits = number if number >= 0 else splits  # where circle and outline coincide there is nothing to split
+        for j in range(2 + 2 * stops[1]):
+            x, y, radius, start = _split_circle(j, scene, piece, stops[0])
+            if splits + CROSSING_LIMIT < found.size:
+                number = _wear_tool.crossings(piece, scene[1], x, y, radius, start, found, splits, stack)
+                for i in range(splits, number if 1 < j < 6 and not scene[0][3] else splits):
+                    found[i] = _settled(found[i], scene, piece)
+                splits = number if number >= 0 else splits  # where circle and outline coincide there is none to split
         found[splits] = 1.0
         _wear_tool.sort(found, splits + 1)
         for j in range(splits):
@@ -217,30 +252,42 @@ def _phase(arm, eta):
 
 
 @call
-def _open_far_side(pool, scene, angles, number):
-    """Opens the panels of the second integral of (2), from the arcs about the pivot; how many there are."""
-    arm, _, (_, _, _, w, turn_c, turn_s), r = scene
-    turn = arctan2(turn_s, turn_c) + (math.pi if r > w else 0.0)
-    count = 0
-    for j in range(0, number, 2):
-        low, high = turn - angles[j + 1], turn - angles[j]
-        if arm[3]:
-            open_panel(pool, count, FAR_SIDE, low, high - low)
-            count += 1
-        else:
-            for k in range(-2, 3):
-                first, last = max(low + k * _TURN, arm[2][0]), min(high + k * _TURN, arm[2][1])
-                if last > first:
-                    u = _phase(arm, first)
-                    open_panel(pool, count, FAR_SIDE, u, _phase(arm, last) - u)
-                    count += 1
+def _open_split(pool, count, kind, low, high, scene, stops):
+    """Opens panels of that kind from arm's angle low to high, split at the stops; how many panels there are then.
+
+    None is longer than a quarter of a turn, or half of what the arm rocks: 21 nodes may miss a dwell in all of it.
+    """
+    arm, still = scene[0], stops[0]
+    longest = 0.25 * _TURN if arm[3] else 0.5 * (arm[2][1] - arm[2][0])
+    start = low
+    while start < high:
+        end = min(high, start + longest)
+        for k in range(stops[1]):
+            turns = math.floor((still[k] - start) / _TURN) if arm[3] else 0.0
+            stop = still[k] - turns * _TURN
+            end = stop if start < stop < end else end
+        first, last = (start, end) if arm[3] else (_phase(arm, start), _phase(arm, end))
+        open_panel(pool, count, kind, first, last - first)
+        count += 1
+        start = end
     return count
 
 
-@jit
-def _arm_time(arm):
-    """Ends of u over all the arm's motion, and how often each angle is passed."""
-    return (-math.pi, math.pi, 1.0) if arm[3] else (-0.5 * math.pi, 0.5 * math.pi, 2.0)
+@call
+def _open_far_side(pool, scene, angles, number, stops):
+    """Opens the panels of the second integral of (2), from the arcs about the pivot; how many there are."""
+    arm, _, (_, _, _, w, turn_c, turn_s), r = scene
+    turn = arctan2(turn_s, turn_c) + (math.pi if r > w else 0.0)
+    count = int(0.0)
+    for j in range(0, number, 2):
+        low, high = turn - angles[j + 1], turn - angles[j]
+        if arm[3]:
+            count = _open_split(pool, count, FAR_SIDE, low, high, scene, stops)
+        else:
+            for k in range(-2, 3):
+                first, last = max(low + k * _TURN, arm[2][0]), min(high + k * _TURN, arm[2][1])
+                count = _open_split(pool, count, FAR_SIDE, first, last, scene, stops)
+    return count
 
 
 @call
@@ -254,7 +301,7 @@ def _angle_in_arcs(arm, turn, angles, number):
         else:
             for shift in (-_TURN, 0.0, _TURN):
                 total += max(min(high + shift, arm[2][1]) - max(low + shift, arm[2][0]), 0.0)
-    return total * _arm_time(arm)[2]
+    return total if arm[3] else 2.0 * total
 
 
 @jit
@@ -304,6 +351,15 @@ def _centre(scene, angles, number):
 
 
 @call
+def room():
+    """Memory for panels, splits, angles, the stack of intervals, and the stops of the arm."""
+    return (
+        np.empty(_wear_quadrature.POOL), np.empty(_wear_tool.ARC_LIMIT), np.empty(_wear_tool.ARC_LIMIT),
+        np.empty(_wear_tool.STACK), np.empty(_wear_still.STOP_LIMIT),
+    )  # fmt: skip
+
+
+@call
 def profile(scene, rtol, work):
     """I(r) of (1), its error, and whether it could be had.
 
@@ -311,10 +367,10 @@ def profile(scene, rtol, work):
     ----------
     scene : (arm of `_wear_arm`, tool of `_wear_tool`, (rate of the crank, of the work, L, w, cosine and sine of the
         direction of w from b + beta), r)
-    work : room for panels, splits, angles, and the stack of intervals
+    work : `room`
     """
     arm, tool, ride, r = scene
-    pool, found, angles, stack = work
+    pool, found, angles, stack, still = work
     x, y, radius, near, far = _circle(scene)
     number, unsure = _wear_tool.arcs(tool, x, y, radius, near, far, angles, found, stack)
     if number < 0:
@@ -326,14 +382,13 @@ def profile(scene, rtol, work):
     if r == 0.0 and not on_pivot:
         value, error = _centre(scene, angles, number)
         return value, error, True
-    count = int(0.0)
+    stops = still, _wear_still.stops_of(scene, still)
     if on_pivot:
-        first, last, _ = _arm_time(arm)
-        open_panel(pool, count, SPIN, first, last - first)
-        count += 1
+        first, last = _wear_still.span(arm) if arm[3] else arm[2]
+        count = _open_split(pool, int(0.0), SPIN, first, last, scene, stops)
     else:
-        count = _open_far_side(pool, scene, angles, number)
-        count = _open_outline(pool, count, scene, found, stack)
+        count = _open_far_side(pool, scene, angles, number, stops)
+        count = _open_outline(pool, count, scene, found, stack, stops)
     value, error = adapt(integrand, scene, pool, count, rtol)
     if unsure > 0.0:
         error += 8.0 * unsure * _far_side(0.0, scene)[0] / (1.0 if arm[3] else arm[2][1] - arm[2][0])

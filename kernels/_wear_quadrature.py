@@ -2,8 +2,9 @@
 
 A panel is a stretch x0 .. x0 + h of an integrand, taken by y in 0..1: x = x0 + h y^2 (3 - 2 y), which smooths what ends
 or sets in like a square root at either end. It is halved in y; worst panels first, until their errors add up to no more
-than wanted. The error of a panel is the whole difference of the 21- and the 10-point rule, which is far more than the
-21-point rule is off by if the integrand is smooth, and not less if it all but has a kink.
+than wanted, but none whose error is within its rounding, which only grows as nodes come closer to its ends. The error
+of a panel is thrice the difference of the 21- and the 10-point rule, which is far more than the 21-point rule is off by
+if the integrand is smooth; if it all but has a kink, the difference alone was seen to be half of that (in 1 of 5000).
 Nodes: Piessens et al., QUADPACK (1983).
 """
 
@@ -15,7 +16,10 @@ from kernels._wear_call import call
 
 PANEL_LIMIT = 1000
 KIND, START, LENGTH, LOW, HIGH, VALUE, ERROR, NOISE = range(8)
-POOL = (PANEL_LIMIT, 8)
+POOL = (2 * PANEL_LIMIT, 8)
+_CAUTION = 3.0
+_JUMP = 0.125  # of a panel's change when it is halved: the least error of its halves, where theirs is small by chance
+_LEAST = 1.25  # of rtol
 
 _NODES = np.array([
     0.995657163025808080735527280689003, 0.973906528517171720077964012084452, 0.930157491355708226001207180059508,
@@ -56,7 +60,7 @@ def integrate(integrand, scene, pool, k):
         gauss += _GAUSS[i] * value * growth
         noise += _KRONROD[i] * doubt * growth
         size += _KRONROD[i] * magnitude(value * growth)
-    error = magnitude(kronrod - gauss)
+    error = _CAUTION * magnitude(kronrod - gauss)
     pool[k, VALUE], pool[k, ERROR] = half * kronrod, half * error
     pool[k, NOISE] = half * noise + 4e-16 * half * size
 
@@ -78,28 +82,35 @@ def halve(pool, k, new):
 
 @call
 def totals(pool, count):
-    """Sums of values, errors and noises, and the panel with the largest error."""
-    value, error, noise, worst = 0.0, 0.0, 0.0, 0
+    """Sums of values, errors and noises, and the panel whose error is farthest above its noise, and by how much."""
+    value, error, noise, worst, excess = 0.0, 0.0, 0.0, 0, 0.0
     for k in range(count):
         value += pool[k, VALUE]
         error += pool[k, ERROR]
         noise += pool[k, NOISE]
-        if pool[k, ERROR] > pool[worst, ERROR]:
-            worst = k
-    return value, error, noise, worst
+        if pool[k, ERROR] - pool[k, NOISE] > excess:
+            worst, excess = k, pool[k, ERROR] - pool[k, NOISE]
+    return value, error, noise, worst, excess
 
 
 @call
 def adapt(integrand, scene, pool, count, rtol):
-    """Value and error of the pool's `count` opened panels, to `rtol` or as near as rounding or PANEL_LIMIT let it."""
+    """Value and error of the pool's `count` opened panels, to `rtol` or as near as rounding or PANEL_LIMIT let it.
+
+    The error is stated to be no less than rtol: on one panel in some 1e5 two rules agree by chance a hundred times
+    better than they are right.
+    """
     for k in range(count):
         integrate(integrand, scene, pool, k)
-    value, error, noise, worst = totals(pool, count)
+    value, error, noise, worst, excess = totals(pool, count)
     for new in range(count, PANEL_LIMIT):
-        if not error > max(rtol * magnitude(value), noise):
+        if not (error > max(rtol * magnitude(value), noise) and excess > 0.0):
             break
+        whole = pool[worst, VALUE]
         halve(pool, worst, new)
         integrate(integrand, scene, pool, worst)
         integrate(integrand, scene, pool, new)
-        value, error, noise, worst = totals(pool, new + 1)
-    return value, error + noise
+        jump = _JUMP * magnitude(whole - (pool[worst, VALUE] + pool[new, VALUE]))
+        pool[worst, ERROR], pool[new, ERROR] = max(pool[worst, ERROR], jump), max(pool[new, ERROR], jump)
+        value, error, noise, worst, excess = totals(pool, new + 1)
+    return value, max(error + noise, _LEAST * rtol * magnitude(value))

@@ -17,9 +17,7 @@ for; each value has its own error beside it, and is sought to rtol of itself.
 
 import math
 
-import numpy as np
-
-from kernels import _wear_profile, _wear_quadrature, _wear_scene, _wear_tool
+from kernels import _wear_profile, _wear_scene
 from kernels._columns import entry, one_by_one
 from kernels._jit import jit, jit_inline
 from kernels._vecmath import in_unit, is_normal
@@ -38,7 +36,7 @@ def _wear_at(r, scene, unit, amount, rtol, work):
     preston, pressure, units = amount
     near = in_unit(r, unit)
     near = near if near > _FAINT or scene[2][3] == 0.0 else 0.0
-    value, error, _ = _wear_profile.profile((scene[0], scene[1], scene[2], near), 0.5 * rtol, work)
+    value, error, _ = _wear_profile.profile((scene[0], scene[1], scene[2], near), 0.7 * rtol, work)
     wear = _wear_scene.with_units(value / _FOUR_PI2, preston, pressure, units)
     doubt = _wear_scene.with_units(error / _FOUR_PI2, preston, pressure, units)
     return wear, doubt, not value > 0.0 or is_normal(wear)
@@ -78,10 +76,7 @@ def contour(
     cells = _wear_scene.side_by_side((
         b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
     ))  # fmt: skip
-    work = (
-        np.empty(_wear_quadrature.POOL), np.empty(_wear_tool.ARC_LIMIT), np.empty(_wear_tool.ARC_LIMIT),
-        np.empty(_wear_tool.STACK),
-    )  # fmt: skip
+    work = _wear_profile.room()
     for i in range(status.size):
         status[i] = _cell(cells[i], rtol[i], radius, wear[i], wear_error[i], work)
 

@@ -91,6 +91,8 @@ def samples(machine, r, theta):
 
 def ends(machine, r, theta):
     """Ends of the arcs in contact at each instant, as rows (instant, psi) sorted, from -pi to pi."""
+    if machine.tool[2:] == (1.0, 1.0):
+        return ends_on_edges(machine, r, theta)
     psi = samples(machine, r, theta)
     value = machine.excess(theta[:, None], machine.ring(r, psi))
     i, j = np.nonzero((value[:, 1:-1] > 0) & (value[:, 1:-1] <= value[:, :-2]) & (value[:, 1:-1] <= value[:, 2:]))
@@ -110,6 +112,24 @@ def ends(machine, r, theta):
     i, j = np.nonzero((value[:, 1:] > 0) != (value[:, :-1] > 0))
     at = bisected(lambda s: machine.excess(theta[i], machine.ring(r, s)), psi[i, j], psi[i, j + 1])
     return i, at, value[:, 0] < 0
+
+
+def ends_on_edges(machine, r, theta):
+    """As `ends`, of a rhombus, by the quadratic equation of each edge: samples may miss a sliver beside a corner."""
+    turn = np.exp(1j * (machine.arm(theta)[0] + machine.beta))
+    w = machine.centre / turn - machine.reach
+    corners = np.array([machine.tool[0], 1j * machine.tool[1], -machine.tool[0], -1j * machine.tool[1]])
+    found = []
+    for one, two in zip(corners, np.roll(corners, -1), strict=True):
+        edge, middle = two - one, (np.conj(two - one) * (w - one)).real / abs(two - one) ** 2
+        square = (r**2 - abs(one + middle * edge - w) ** 2) / abs(edge) ** 2
+        for sign in (-1, 1):
+            share = middle + sign * np.sqrt(np.maximum(square, 0))
+            there = (square > 0) & (share >= 0) & (share <= 1)
+            found.append(np.where(there, np.angle((one + share * edge - w) * turn), np.inf))
+    psi = np.sort(np.array(found).T, axis=1)
+    i, j = np.nonzero(np.isfinite(psi))
+    return i, psi[i, j], machine.excess(theta, machine.ring(r, -np.pi)) < 0
 
 
 def shape(machine, r, theta):
@@ -190,7 +210,7 @@ def ring_wear(machine, r, rtol=1e-12):
         low, high, first, last, value = todo.pop()
         middle = 0.5 * (first + last)
         one, two = panel(low, high, first, middle), panel(low, high, middle, last)
-        if abs(one + two - value) <= rtol * whole or last - first < 1e-4:
+        if abs(one + two - value) <= rtol * whole or last - first < 1e-10:
             total += one + two
         else:
             todo += [(low, high, first, middle, one), (low, high, middle, last, two)]
