@@ -180,8 +180,13 @@ def label(variable: xr.DataArray, width: int = 44) -> str:
     sign, unit = symbol(name), unit_text(str(variable.attrs.get("units", "")))
     words = str(variable.attrs.get("long_name", "")) or ("" if sign else name.replace("_", " "))
     text = ", ".join(part for part in (words, sign) if part) + (f" [{unit}]" if unit else "")
-    width += sum(map(len, re.findall(r"\$.*?\$", text)))  # symbols are longer in writing than in print
-    return "\n".join(textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False))
+    signs = re.findall(r"\$.*?\$", text)
+    for sign in signs:  # a few letters in print, whatever they are in writing
+        text = text.replace(sign, "\0\0", 1)
+    wrapped = "\n".join(textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False))
+    for sign in signs:
+        wrapped = wrapped.replace("\0\0", sign, 1)
+    return wrapped
 
 
 def setting(value: xr.DataArray) -> str:

@@ -287,8 +287,9 @@ def _cover(axes: Any, corners: list[Any], shown: View, code: int, hatch: str, co
     here, name = shown.status == code, shown.meanings.get(code, str(code))
     empty = here & ~np.isfinite(shown.y.values)
     _name(axes, corners, here, name)
-    if not empty.any():
+    if (here & ~empty).any():
         axes.contour(shown.values(shown.x), shown.values(str(shown.across)), here, levels=[0.5], colors=[colour])
+    if not empty.any():
         return Line2D([], [], color=colour, label=name)
     look: dict[str, Any] = {"facecolor": "0.94", "edgecolor": "0.45", "linewidth": 0.0, "hatch": hatch}
     axes.add_collection(PolyCollection(list(_runs(corners, empty)), **look))

@@ -301,7 +301,7 @@ def _export(arguments: argparse.Namespace) -> None:
     from sweep.filtering import where
 
     with _result(arguments) as dataset:
-        chosen = where(dataset, arguments.where) if arguments.where else dataset
+        chosen = dataset if arguments.where is None else where(dataset, arguments.where)
         print(export(_in_units(chosen, arguments.unit), arguments.output))
 
 

@@ -155,6 +155,8 @@ def _entry(field: Field, value: Any) -> str:
 def _range(field: Field) -> Iterable[str]:
     if field.integer:
         return ["num = 10"]
+    if field.unit == "rad" and field.upper - field.lower > 2 * math.pi:
+        return ['spacing = "linear"', "start = 0", "stop = 360", "num = 181", 'unit = "degree"']
     if math.isfinite(field.upper - field.lower):
         return ["num = 200"]
     if field.unit == "m":

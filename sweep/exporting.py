@@ -101,7 +101,8 @@ def _write_zarr(dataset: xr.Dataset, path: Path) -> None:
 
     path.unlink()
     whole = dataset.chunk("auto") if dataset.nbytes > LARGE and not dataset.chunks else dataset
-    whole.drop_encoding().to_zarr(path, mode="w", consolidated=False)
+    words = {str(name): whole[name].astype(object) for name in whole.variables if whole[name].dtype.kind == "U"}
+    whole.assign(words).drop_encoding().to_zarr(path, mode="w", consolidated=False)
 
 
 def _write_units(dataset: xr.Dataset, names: list[str], file: TextIO) -> None:

@@ -13,6 +13,7 @@ import xarray as xr
 from sweep.checks import did_you_mean, listed
 from sweep.errors import SweepError
 from sweep.exporting import flag_words
+from sweep.layout import STATUS
 
 COMPARE: dict[type, Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,
@@ -51,13 +52,15 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
     SweepError
         The condition cannot be read, or names what is not there.
     """
+    if STATUS not in dataset:
+        raise _refusal(condition, "a summary keeps no cells to choose from")
     truth = _Reader(dataset, condition).truth()
-    dims = [str(dim) for dim in (dataset["status"].dims if "status" in dataset else dataset.sizes)]
+    dims = [str(dim) for dim in dataset[STATUS].dims]
     if set(truth.dims) - set(dims):
         raise _refusal(condition, f"runs along {listed(sorted(map(str, set(truth.dims) - set(dims))))}, not the cells")
     flat = dataset if dims == ["cell"] else dataset.stack(cell=dims, create_index=False)
     flat = flat.transpose("cell", ...)
-    mask = truth.broadcast_like(dataset["status"]).transpose(*dims).values.ravel()
+    mask = truth.broadcast_like(dataset[STATUS]).transpose(*dims).values.ravel()
     return flat.isel(cell=np.flatnonzero(mask))
 
 
@@ -70,7 +73,8 @@ class _Reader:
             raise _refusal(self.condition[:40] + "...", f"is longer than {LONGEST} letters")
         try:
             tree = ast.parse(self.condition.strip(), mode="eval")
-            found = self.value(tree.body)
+            with np.errstate(all="ignore"):
+                found = self.value(tree.body)
         except (SyntaxError, ValueError, RecursionError, MemoryError, ArithmeticError, TypeError):
             raise _refusal(self.condition, f"cannot be read; it may hold {GRAMMAR}") from None
         if not isinstance(found, xr.DataArray) or found.dtype != bool:

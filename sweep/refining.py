@@ -162,6 +162,8 @@ def study_of(dataset: xr.Dataset, allow_import: bool = False) -> Study:
 def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance: float) -> None:
     if not 0 < tolerance < 1:
         raise SweepError(f"tolerance: expected a number between 0 and 1, found {tolerance}")
+    if STATUS not in dataset:
+        raise SweepError("a summary keeps no cells; refine a result that has them")
     if study.design != "product" or any(axis.words is not None for axis in study.axes.values()):
         raise SweepError("only a product of number axes can be refined")
     if any(len(axis) < 2 or (np.diff(axis.values) <= 0).any() for axis in study.axes.values()):

@@ -60,6 +60,8 @@ td:first-child { white-space: nowrap; }
 td:last-child { min-width: 11rem; }
 code, pre { font-family: ui-monospace, Menlo, Consolas, monospace; font-size: .82rem; }
 pre { background: #f6f6f4; padding: .8rem; overflow-x: auto; white-space: pre-wrap; overflow-wrap: anywhere; }
+@media (max-width: 34rem) { table { font-size: .78rem; } th, td { padding-right: .5rem; overflow-wrap: break-word; }
+  td:last-child { min-width: 6.5rem; } }
 @media print { body { font-size: 10.5pt; max-width: none; padding: 0; } h2 { break-after: avoid; }
   table { font-size: 8.5pt; } tr { break-inside: avoid; } .figures { grid-template-columns: 1fr 1fr; } }
 """
@@ -119,7 +121,8 @@ def _figures(dataset: xr.Dataset) -> Iterator[str]:
     """A picture of each of the first outputs that can be drawn."""
     if is_summary(dataset):
         return
-    found = [picture for name in outputs_of(dataset)[:MOST_FIGURES] if (picture := _picture(dataset, name))]
+    names = [name for name in outputs_of(dataset) if bool(dataset[name].notnull().any())]
+    found = [picture for name in names[:MOST_FIGURES] if (picture := _picture(dataset, name))]
     if found:
         yield '<h2>figures</h2>\n<div class="figures">' + "\n".join(found) + "</div>"
 

@@ -352,3 +352,9 @@ def test_a_long_name_is_broken_into_lines_that_fit_the_picture():
     assert " ".join(lines) == text
     assert len(lines) == 2
     assert max(map(len, lines)) <= 44
+
+
+def test_a_symbol_takes_the_room_it_has_in_print():
+    text = "middle between the arm's extremes, from b; negative for type B"
+    lines = label(xr.DataArray(1.0, name="A0", attrs={"units": "rad", "long_name": text})).split("\n")
+    assert lines == ["middle between the arm's extremes, from b;", r"negative for type B, $A_{\mathrm{0}}$ [rad]"]

@@ -281,3 +281,11 @@ def test_a_kind_of_file_whose_library_is_missing_is_told(tmp_path, monkeypatch):
     with pytest.raises(SweepError, match=r"needs pyarrow; install it with: pip install \"foliot\[export\]\""):
         sweep.export(result(), tmp_path / "out.parquet")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.filterwarnings("error")
+def test_zarr_keeps_words_without_a_warning(tmp_path):
+    ds = result().expand_dims({"word": ["plain", "longer"]})
+    sweep.export(ds, tmp_path / "out.zarr")
+    with xr.open_zarr(tmp_path / "out.zarr", consolidated=False) as read:
+        assert read["word"].values.tolist() == ["plain", "longer"]

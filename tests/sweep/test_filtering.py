@@ -104,5 +104,19 @@ def test_export_takes_a_condition(tmp_path, monkeypatch, capsys):
     assert main(["export", "f.h5", "-o", "f.csv", "--where", "status == 'OK' and mu < 2"]) == 0
     table = pd.read_csv("f.csv", comment="#")
     assert table.mu.tolist() == [1.0]
-    assert main(["export", "f.h5", "-o", "g.csv", "--where", "mu < "]) == 2
-    assert "cannot be read" in capsys.readouterr().err
+    for mistake in ("mu < ", ""):
+        assert main(["export", "f.h5", "-o", "g.csv", "--where", mistake]) == 2
+        assert "cannot be read" in capsys.readouterr().err
+
+
+def test_a_number_beyond_all_is_infinite_and_nothing_is_above_it():
+    assert sweep.where(RESULT, "height > 9**9**9**9").sizes["cell"] == 0
+    assert sweep.where(RESULT, "height < 1e400").sizes["cell"] == 8
+
+
+def test_a_summary_has_no_cells_to_choose_from_or_to_refine():
+    summary = RESULT.drop_vars(["status", "method_used"])
+    with pytest.raises(SweepError, match="a summary keeps no cells"):
+        sweep.where(summary, "height > 1")
+    with pytest.raises(SweepError, match="a summary keeps no cells"):
+        sweep.refine(summary, "fall_time", 0.1, study=sweep.study_of(RESULT, allow_import=True))

@@ -105,3 +105,10 @@ def test_the_command_writes_it_in_the_units_asked_for(tmp_path, monkeypatch, cap
     with pytest.raises(sweep.SweepError, match="cannot be written"):
         write_page(sweep.open_result("foliot.h5"), tmp_path / "foliot.h5", tmp_path / "no" / "page.html")
     assert [p.name for p in tmp_path.iterdir() if "tmp" in p.name] == []
+
+
+def test_outputs_without_a_value_have_no_picture(tmp_path):
+    refused = sweep.run(foliot(axes={"mu": [0.01, 0.02, 0.03]}, fixed={"a": 1.0, "phi0": 1.0, "R": 1.0}))
+    tree = Tree(page(refused, tmp_path / "foliot.h5"))
+    assert "img" not in tree.tags
+    assert "NEVER_STARTS" in tree.text
