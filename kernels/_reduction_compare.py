@@ -13,7 +13,7 @@ from kernels._reduction_frf import (
     sample_poles,
     sort,
 )
-from kernels._reduction_model import EXACT, NONE, RIVIN, is_chain
+from kernels._reduction_model import CHAIN_ROUNDING, EXACT, RIVIN, is_chain, reduce_enough
 from kernels._reduction_modes import TURN
 from kernels._reduction_poles import modal_poles
 
@@ -42,15 +42,20 @@ def all_poles(code, p, full, kept, modes, rooms):
         m, chain = (p, kept) if reduced > 0 else (n, full)
         blur, status = damped_poles(m, chain.J, chain.k, chain.h, chain.f, chain.re, chain.im, rooms.work)
         error = max(error, blur if status == 0.0 else float("inf"))
-    if code in (NONE, EXACT):
-        for i in range(2 * n):
-            kept.re[i], kept.im[i] = full.re[i], full.im[i]
+    if code == EXACT:
+        _same_poles(full, kept)
     elif code != RIVIN:
         damping_matrix(modes.C, modes.W, modes.G, full.J, full.k, full.h, p, n)
         free = not full.k[n - 1] > 0.0
         blur = modal_poles(modes.w, modes.C, p, free, kept.re, kept.im, rooms.s, rooms.A, rooms.B, rooms.b)
         error = max(error, blur, _ROUNDING * n / least_gap(kept.f, p))
     return error
+
+
+@jit
+def _same_poles(full, kept):
+    for i in range(2 * full.f.size):
+        kept.re[i], kept.im[i] = full.re[i], full.im[i]
 
 
 @jit
@@ -123,8 +128,6 @@ def receptance_error(f_max, code, p, residual, full, kept, modes, rooms):
     NaN where H is infinite in the band: with a free end, or with a resonance that nothing damps.
     """
     n = full.J.size
-    if code == NONE:
-        return 0.0, 0.0
     w_max = TURN * min(f_max, _BEYOND * max(full.f[n - 1], kept.f[p - 1]))
     zeta = min(least_damping(full.re, full.im, w_max, 2 * n), least_damping(kept.re, kept.im, w_max, 2 * p))
     if not (zeta > 0.0 and full.k[n - 1] > 0.0 and w_max > 0.0):
@@ -167,3 +170,38 @@ def compare(f_max, code, p, residual, full, kept, modes, rooms):
         return float("nan"), float("inf"), blur
     off, rounding = receptance_error(f_max, code, p, residual, full, kept, modes, rooms)
     return off, rounding, blur
+
+
+@jit_call
+def reduced(code, n_keep, tol, f_max, order, full, kept, modes, rooms):
+    """The reduced model of a chain, and how far it is off.
+
+    Returns
+    -------
+    p : number of its masses
+    slower : largest h e of merged springs
+    off : error of the receptance
+    error : bound on the relative error of all that is told
+    status : of what it hangs on
+    """
+    p, error, slower, residual, status = reduce_enough(code, n_keep, tol, f_max, order, full, kept, modes, rooms)
+    if status > 0.0:
+        return p, slower, 0.0, error, status
+    off, rounding, blur = compare(f_max, code, p, residual, full, kept, modes, rooms)
+    known = error >= 0.0 and rounding >= 0.0 and blur >= 0.0
+    return p, slower, off, max(error, rounding, blur) if known else float("inf"), status
+
+
+@jit_call
+def whole(code, n_keep, tol, f_max, order, full, kept, modes, rooms):
+    """As `reduced`, of a chain that stays as it is."""
+    n, blur, status = full.J.size, 0.0, 0.0
+    if damped(full, n):
+        blur, status = damped_poles(n, full.J, full.k, full.h, full.f, full.re, full.im, rooms.work)
+    else:
+        undamped_poles(full)
+    for i in range(n):
+        kept.J[i], kept.k[i], kept.h[i], kept.f[i] = full.J[i], full.k[i], full.h[i], full.f[i]
+    _same_poles(full, kept)
+    known = status == 0.0 and blur >= 0.0
+    return n, 0.0, 0.0 if known else float("nan"), max(CHAIN_ROUNDING, blur) if known else float("inf"), 0.0

@@ -19,7 +19,7 @@ from kernels._reduction_jacobi import ritz
 from kernels._reduction_modes import TURN
 from kernels._vecmath import in_unit
 
-NONE, RIVIN, GUYAN, IRS, CRAIG_BAMPTON, MODAL, EXACT = range(7)
+RIVIN, GUYAN, IRS, CRAIG_BAMPTON, MODAL, EXACT = range(1, 7)
 CHAIN_ROUNDING = 5e-14
 """Relative error of a frequency of a chain."""
 
@@ -157,13 +157,11 @@ def _ritz(code, p, full, kept, modes, rooms):
 
 
 @jit_call
-def _all_frequencies(code, p, full, kept, rooms):
-    """Those of `none` are the chain's own, those of `exact` are found from its p masses; how far both are apart."""
+def _exact(p, full, kept, rooms):
+    """All frequencies from p masses that depend on the frequency; how far they are from those of the full chain."""
     n, apart = full.J.size, 0.0
-    if code == EXACT:
-        exact_frequencies(full.J, full.k, rooms.kinds, rooms.places, p, kept.f, rooms.work, rooms.work[2 * n :])
+    exact_frequencies(full.J, full.k, rooms.kinds, rooms.places, p, kept.f, rooms.work, rooms.work[2 * n :])
     for i in range(n):
-        kept.f[i] = kept.f[i] if code == EXACT else full.f[i]
         off = magnitude(off_by(kept.f[i], full.f[i]))
         apart = max(apart, off if off >= 0.0 else float("inf"))
     return apart
@@ -172,7 +170,7 @@ def _all_frequencies(code, p, full, kept, rooms):
 @jit
 def is_chain(code):
     """Whether a reduction's poles are those of a chain."""
-    return code in (NONE, RIVIN, EXACT)
+    return code in (RIVIN, EXACT)
 
 
 @jit_call
@@ -192,7 +190,7 @@ def reduce(code, p, order, full, kept, modes, rooms):
         if code == RIVIN:
             slower, status = late, natural_frequencies(p, kept.J, kept.k, kept.f, rooms.work)
         else:
-            error += _all_frequencies(code, p, full, kept, rooms)
+            error += _exact(p, full, kept, rooms)
     elif code == MODAL:
         residual, status = _modal(p, full, kept, modes, rooms)
     else:
@@ -224,11 +222,11 @@ def reduce_enough(code, n_keep, tol, f_max, order, full, kept, modes, rooms):
     """The model of n_keep masses or, where that is 0, of as many as `tol` needs.
 
     That is the number before the first, from all of them downwards, with which `largest_error` exceeds tol.
-    Returns the number, and as `reduce`.
+    Exact reductions need one. Returns the number, and as `reduce`.
     """
     n = full.J.size
-    given = code in (NONE, EXACT) or n_keep > 0.0
-    p = n if code == NONE else int(n_keep) if n_keep > 0.0 else 1 if code == EXACT else n
+    given = code == EXACT or n_keep > 0.0
+    p = int(n_keep) if n_keep > 0.0 else 1 if code == EXACT else n
     model = (0.0, 0.0, 0.0, 0.0)
     for _ in range(2 * n + 1):
         model = reduce(code, p, order, full, kept, modes, rooms)
