@@ -20,6 +20,7 @@ from sweep.blocks import Partition, Sample, row_partition
 from sweep.canvas import Canvas
 from sweep.contents import contents, part_columns
 from sweep.errors import SweepError
+from sweep.fingerprint import fingerprint
 from sweep.granules import granules
 from sweep.grid import Grid
 from sweep.image import Images
@@ -29,6 +30,7 @@ from sweep.parts import FLAGS
 from sweep.pool import cores, whole_number
 from sweep.progress import duration, quantity
 from sweep.reducing import strip_bytes
+from sweep.rehearsing import rehearsed
 from sweep.result import memory
 from sweep.session import faults_told, sampled_study
 
@@ -59,7 +61,7 @@ class Plan:
     free_bytes : int
         On the disk of the output.
     cell_seconds, seconds : float
-        On one core; and altogether, with the time of the disk where that matters.
+        On one core; and altogether, from the call of `run` in a program that has called it before.
     methods, statuses : dict of str to float
         Shares of the sampled cells.
     scaling : str
@@ -119,7 +121,7 @@ class Plan:
 
 
 def plan(study: Study, workers: int | None = None, path: str | os.PathLike[str] | None = None) -> Plan:
-    """Forecast of a run, from the times of a few cells spread over the grid.
+    """Forecast of a run, from runs of some of its cells, spread over the grid, in a folder beside the output.
 
     Parameters
     ----------
@@ -152,8 +154,6 @@ def _forecast(study: Study, sample: Sample, workers: int, folder: Path) -> Plan:
     parts = _part_bytes(columns, blocks)
     output, frame = _output_bytes(study, sample, blocks)
     names = [m.name for m in study.kernel.methods]
-    computing = sample.cost * grains.size / min(workers, blocks.count)
-    speed = _disk_speed(folder) if parts + output > WORTH_A_TRIAL else math.inf
     return Plan(
         title=study.title,
         kernel=study.kernel_name,
@@ -169,11 +169,24 @@ def _forecast(study: Study, sample: Sample, workers: int, folder: Path) -> Plan:
         free_bytes=shutil.disk_usage(folder).free,
         folder=str(folder),
         cell_seconds=sample.cost,
-        # parts are written while others are computed
-        seconds=max(computing, parts / speed) + output / speed,
+        seconds=_seconds(study, sample, blocks, parts, output, workers, folder),
         methods=_counted(sample.method_used, dict(enumerate(names)) | {-1: "none"}),
         statuses=_counted(sample.status, {int(s): s.name for s in Status}),
     )
+
+
+def _seconds(
+    study: Study, sample: Sample, blocks: Partition, parts: int, output: int, workers: int, folder: Path
+) -> float:
+    """What a run takes, of some of the cells in earnest; or, where that cannot be, from the probes alone."""
+    grains = granules(study)
+    cells, block = grains.size, grains.cells(0, blocks.cells)[1]
+    found = rehearsed(study, cells, block, sample.cost, (parts + output) / cells, folder, workers)
+    if not math.isnan(found):
+        return found
+    speed = _disk_speed(folder) if parts + output > WORTH_A_TRIAL else math.inf
+    # parts are written while others are computed
+    return max(sample.cost * cells / min(workers, blocks.count), parts / speed) + output / speed
 
 
 def _part_bytes(columns: tuple[Column, ...], blocks: Partition) -> int:
@@ -185,7 +198,7 @@ def _part_bytes(columns: tuple[Column, ...], blocks: Partition) -> int:
 
 def _output_bytes(study: Study, sample: Sample, blocks: Partition) -> tuple[int, int]:
     """The output, and all of it but the outputs' numbers; its frame is made for this, in memory."""
-    content, canvas = contents(study, {}), Canvas()
+    content, canvas = contents(study, fingerprint(study)), Canvas()
     write_frame(canvas, content, Seals(content.columns, chunks(study, blocks)))
     numbers = sum(c.cell_bytes for c in content.columns if c.name not in FLAGS) * content.grid.size
     flags = sum(c.name in FLAGS for c in content.columns) * content.grid.size

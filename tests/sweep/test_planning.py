@@ -1,14 +1,22 @@
+import errno
 import re
 import shutil
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_runner import fail_on
 
+from sweep import rehearsing
 from sweep.errors import SweepError
+from sweep.grid import Grid
 from sweep.planning import plan, small_duration
 from sweep.progress import quantity
+from sweep.rehearsing import thinned
 from sweep.runner import run
 from sweep.spec import build_study
 
@@ -33,14 +41,50 @@ def test_traces_count_with_their_length():
     assert plan(traces).output_bytes > 1000 * (200 * 8 + 2)
 
 
-def test_a_plan_forecasts_the_time_of_a_run():
-    keys = {"axes": {"height": np.arange(1.0, 201)}, "outputs": ["fall_time"]}
-    study = build_study(allow_import=True, kernel="slow:SLOW", **keys)
-    found = plan(study, workers=2)
-    # 2 ms a cell by sleeping
-    assert found.cell_seconds == pytest.approx(2e-3, rel=0.3)
-    assert found.seconds == pytest.approx(0.2, rel=0.4)
-    assert found.blocks >= 2
+def slow(count):
+    keys = {"axes": {"height": np.arange(1.0, count + 1)}, "outputs": ["fall_time"]}
+    return build_study(allow_import=True, kernel="slow:SLOW", **keys)
+
+
+@pytest.mark.parametrize("count", [60, 1000])
+def test_a_plan_forecasts_the_time_of_a_run(tmp_path, count):
+    """Two milliseconds a cell by sleeping, and what any run costs."""
+    found = plan(slow(count), workers=2, path=tmp_path / "out.h5")
+    begun = time.perf_counter()
+    run(slow(count), tmp_path / "out.h5", workers=2, progress=False).close()
+    assert 2e-3 <= found.cell_seconds < 2e-2
+    assert found.seconds == pytest.approx(time.perf_counter() - begun, rel=0.6)
+    assert found.blocks >= 1
+
+
+@pytest.mark.parametrize("why", ["no room", "dear"])
+def test_where_nothing_can_be_rehearsed_the_probes_alone_tell_the_time(tmp_path, monkeypatch, why):
+    if why == "no room":
+        fail_on(monkeypatch, "make_folder", 1, errno.ENOSPC)
+    else:
+        monkeypatch.setattr(rehearsing, "REHEARSAL_SECONDS", 1e-3)
+    found = plan(slow(100), workers=2, path=tmp_path / "out.h5")
+    assert found.seconds == pytest.approx(100 * found.cell_seconds / 2)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("design", ["product", "zip"])
+@settings(max_examples=60, deadline=None)
+@given(lengths=st.lists(st.integers(1, 40), min_size=2, max_size=2), cells=st.integers(1, 2000))
+def test_a_thinned_study_has_about_so_many_cells_from_all_over_its_axes(design, lengths, cells):
+    if design == "zip":
+        lengths = lengths[:1] * 2
+    axes = {"height": np.arange(1.0, lengths[0] + 1), "v0": np.arange(1.0, lengths[1] + 1)}
+    study = stone(axes=axes, design=design)
+    few = thinned(study, cells)
+    size, wanted = Grid(few).size, min(cells, Grid(study).size)
+    assert wanted / 2 - 1 <= size <= max(wanted, 64)
+    for name, axis in few.axes.items():
+        assert set(axis.values) <= set(study.axes[name].values)
+        assert (np.diff(axis.values) > 0).all()
+        if len(axis) > 1:
+            gaps = np.diff(np.r_[0, axis.values, len(study.axes[name])])
+            assert gaps.max() <= 2 * len(study.axes[name]) / len(axis) + 1
 
 
 def test_a_plan_tells_what_auto_would_choose_and_what_becomes_of_cells():
