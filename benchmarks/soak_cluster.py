@@ -65,6 +65,26 @@ def killing(client: Client, kills: int, rng: random.Random, ended: threading.Eve
                 done.append(1)
 
 
+def tormented(client: Client, path: Path, kills: int, rng: random.Random) -> tuple[int, bool]:
+    """A run of slow blocks whose workers are killed: how many were, and whether it ended with the same bits."""
+    ended, done = threading.Event(), []
+    killer = threading.Thread(target=killing, args=(client, kills, rng, ended, done))
+    killer.start()
+    study, seconds = falls(10_000, "slow:SLOW"), slow.CELL_SECONDS
+    try:
+        found = run(study, path, cluster=client, block_cells=20, progress=False)
+    finally:
+        ended.set()
+        killer.join()
+    slow.CELL_SECONDS = 0.0
+    whole = run(study, progress=False)
+    slow.CELL_SECONDS = seconds
+    same = all(found[n].values.tobytes() == whole[n].values.tobytes() for n in whole.data_vars)
+    found.close()
+    path.unlink()
+    return len(done), same
+
+
 def main() -> int:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--blocks", type=int, default=100_000)
@@ -90,19 +110,13 @@ def main() -> int:
             here = timed(falls(given.stored), folder / "here.h5", workers=2)
             print(f"{given.stored} blocks stored by two threads here: {here:.1f} s; ratio {elsewhere / here:.2f}")
         with tempfile.TemporaryDirectory() as name:
-            ended, done = threading.Event(), []
-            words = (client, given.kills, random.Random(given.seed), ended, done)
-            killer = threading.Thread(target=killing, args=words)
-            killer.start()
-            study, begun = falls(2000 * max(1, given.kills), "slow:SLOW"), time.monotonic()
-            found = run(study, Path(name) / "out.h5", cluster=client, block_cells=20, progress=False)
-            ended.set()
-            killer.join()
-            slow.CELL_SECONDS = 0.0
-            whole = run(study, progress=False)
-            same = all(found[n].values.tobytes() == whole[n].values.tobytes() for n in whole.data_vars)
-            print(f"{len(done)} workers killed in {time.monotonic() - begun:.0f} s; the same bits: {same}")
-    return int(not same)
+            runs, killed, different, begun = 0, 0, 0, time.monotonic()
+            rng = random.Random(given.seed)
+            while killed < given.kills:
+                more, same = tormented(client, Path(name) / "out.h5", given.kills - killed, rng)
+                runs, killed, different = runs + 1, killed + more, different + (not same)
+    print(f"{killed} workers killed in {runs} runs, {time.monotonic() - begun:.0f} s; with other bits: {different}")
+    return int(different > 0)
 
 
 if __name__ == "__main__":
