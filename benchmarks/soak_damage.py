@@ -2,10 +2,10 @@
 
     python benchmarks/soak_damage.py [--tries 10000] [--seed 1]
 
-One try in ten damages the parts of a sweep (a flipped bit, a file cut, emptied, missing, doubled, swapped, foreign):
-`sweep verify` must name it, and the continued run must end with the same bits. The others damage a finished result (a
-flipped bit, 512 bytes zeroed, cut, lengthened): `sweep verify` must find it. Prints the figures; exit status 1 where
-anything is missed.
+One try in ten damages the parts of a sweep (a flipped bit, a file cut, emptied, missing, doubled, swapped, foreign, of
+another study; a flipped bit of spec.json): `sweep verify` must name it, and the continued run must end with the same
+bits. The others damage a finished result (a flipped bit, 512 bytes zeroed, cut, lengthened): `sweep verify` must find
+it. Prints the figures, those that count at the end; exit status 1 where anything is missed.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ def main() -> int:
             slowest = max(slowest, time.monotonic() - begun)
             if what:
                 wrong.append(f"try {number}, {kind}: {what}")
-    print(f"{given.tries} tries, the slowest {slowest:.1f} s; missed or wrong: {len(wrong)}")
     print("\n".join(f"  {kind}: {count}" for kind, count in sorted(kinds.items())))
     print("\n".join(wrong[:20]))
+    print(f"{given.tries} tries, the slowest {slowest:.1f} s; missed or wrong: {len(wrong)}")
     return int(bool(wrong))
 
 

@@ -43,10 +43,10 @@ def main() -> int:
                 wrong.append(f"{kind} {number}: {type(fault).__name__}: {str(fault)[:100]}")
             found[f"{kind}: {came}"] += 1
             slowest[kind] = max(slowest[kind], time.monotonic() - begun)
-    print(f"{given.studies} studies, {given.results} results; tracebacks and faults: {len(wrong)}")
     print("\n".join(f"  {came}: {count}" for came, count in found.most_common()))
     print(f"  slowest study {slowest['study']:.1f} s, slowest result (three commands) {slowest['result']:.1f} s")
     print("\n".join(wrong[:20]))
+    print(f"{given.studies} studies, {given.results} results; tracebacks and faults: {len(wrong)}")
     return int(bool(wrong))
 
 

@@ -36,10 +36,12 @@ def main() -> int:
         found = torture(
             random.Random(given.seed), victims, folder, given.kills, numbers(folder / "first.h5"), usual, SHAPES
         )
-    print(f"{found['kills']} kills of {found['runs']} runs that were continued to their end")
     print(f"  killed: {', '.join(f'{stage} {count}' for stage, count in found['stages'].most_common())}")
-    print(f"  blocks acknowledged by killed runs: {found['acknowledged']}; of these lost: {found['lost']}")
-    print(f"  runs that ended with other bits, or left something behind: {found['different']}")
+    print(
+        f"{found['kills']} kills of {found['runs']} runs that were continued to their end; of {found['acknowledged']} "
+        f"blocks acknowledged by killed runs lost: {found['lost']}; runs that ended with other bits, or left something "
+        f"behind: {found['different']}"
+    )
     return int(found["lost"] > 0 or found["different"] > 0)
 
 
