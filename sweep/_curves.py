@@ -118,7 +118,7 @@ def noise_of(off: Array) -> float:
 
     Noise leaves the same in all orders; a bend ever less, the higher the order.
     """
-    orders = range(2, min(10, off.size - 2) + 1)
+    orders = range(2, min(10, off.size - 4) + 1)
     sizes = [float(np.sqrt(np.mean(np.diff(off, k) ** 2) / math.comb(2 * k, k))) for k in orders]
     return min(sizes, default=math.inf)
 

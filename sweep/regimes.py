@@ -22,6 +22,9 @@ from sweep.errors import SweepError
 FEWEST_POINTS = 8
 """Points for the five numbers of (1) and an error bar."""
 
+TELLING = 16
+"""Points from which noise is told from the misfit of a smooth truth."""
+
 NUMBERS = (
     "exponent", "exponent_low", "exponent_high", "crossover", "crossover_low", "crossover_high",
     "width", "level", "residual", "points", "regimes", "evidence", "noisy",
@@ -73,7 +76,8 @@ def fit_two_laws(
     confidence : float
         Of the intervals.
     noise : bool, optional
-        Whether the values carry independent noise. Default: as the scatter of neighbours about the curve shows.
+        Whether the values carry independent noise. Default: as the scatter of neighbours about the curve shows; with
+        fewer than 16 points, where it shows nothing, intervals are wide enough for both. Say which, if you know.
 
     Returns
     -------
@@ -122,7 +126,7 @@ def _one(t: Array, z: Array, confidence: float, noise: bool | None) -> Array:
     order = np.argsort(t)
     t, z = t[order], z[order]
     best, off, jacobian = _fit(t, z)
-    noisy = scatter_is_noise(off, z) if noise is None else noise
+    noisy = _is_noise(z, off) if noise is None else noise
     reach = _reach(off, jacobian, confidence)
     low, high = best - reach, best + reach
     if not noisy:
@@ -136,6 +140,16 @@ def _one(t: Array, z: Array, confidence: float, noise: bool | None) -> Array:
         place, bend = np.array([np.nan, 0.0, np.inf]), [np.nan, np.nan]
     rest = [*bend, math.expm1(abs(off).max()), t.size]
     return np.array([*ends, *place, *rest, 2 if evidence > 0 else 1, evidence, noisy])
+
+
+def _is_noise(z: Array, off: Array) -> bool:
+    """Whether the distances are noise: they scatter, and the points themselves are as rough.
+
+    A curve of five numbers swings about few points of a smooth truth in a way that looks like scatter; then nothing is
+    told, and the intervals are those of both.
+    """
+    size = math.sqrt(float(off @ off) / (off.size - 5))
+    return off.size >= TELLING and bool(scatter_is_noise(off, z)) and size < 3 * noise_of(z)
 
 
 def _curve(q: Array, t: Array) -> Array:
@@ -218,8 +232,8 @@ def _widened(t: Array, z: Array, off: Array, best: Array, low: Array, high: Arra
     low, high = low.copy(), high.copy()
     low[1:3] = np.minimum(low[1:3], ends.min(axis=1) - doubt)
     high[1:3] = np.maximum(high[1:3], ends.max(axis=1) + doubt)
-    corners = itertools.product(*np.stack([ends[:, 0] - doubt, ends[:, 0] + doubt], axis=1))
-    meetings = [_meeting(t, z, pair) for pair in (*ends.T, *corners) if pair[0] != pair[1]]
+    slopes_told = np.concatenate([ends, (ends[:, 0] - doubt)[:, None], (ends[:, 0] + doubt)[:, None]], axis=1)
+    meetings = [_meeting(t, z, pair) for pair in itertools.product(*slopes_told) if pair[0] != pair[1]]
     low[3], high[3] = min(low[3], place, *meetings), max(high[3], place, *meetings)
     return low, high
 

@@ -159,6 +159,32 @@ def test_where_the_bend_is_plainly_of_another_shape_its_doubt_and_the_noise_are_
     assert covered(found, "crossover", 1.6) > 0.9
 
 
+@pytest.fixture(scope="module")
+def periods():
+    axis = {"spacing": "log", "start": 1e-4, "stop": 1e4, "num": 81}
+    return sweep.run(sweep.build_study(kernel="foliot", axes={"mu": axis}, fixed={"a": 1.0, "phi0": 1.0})).period
+
+
+@pytest.mark.parametrize("step", [1, 2, 3])
+@pytest.mark.parametrize("window", [(1e-4, 0.3), (1e-3, 0.58), (1e-3, 1), (0.01, 100), (0.3, 1e3), (0.5, 1e4)])
+def test_a_bend_at_the_edge_of_a_window_or_beyond_it_is_in_the_intervals(periods, window, step):
+    """8 to 44 points on one side of the bend at 3^(-1/2), or a little across; no noise."""
+    found = sweep.fit_two_laws(periods[::step], "mu", window)
+    for law, truth in (("low", -1.0), ("high", -1 / 3)):
+        one = found.sel(law=law)
+        assert float(one.exponent_low) <= truth <= float(one.exponent_high)
+    assert float(found.crossover_low) <= 3**-0.5 <= float(found.crossover_high)
+
+
+def test_few_points_tell_nothing_of_noise_unless_it_is_said():
+    x = np.geomspace(1e-2, 1e2, 12)
+    y = curve(noisy(broken(x=x), 0.02, 200), x, dims=("set", "mu"))
+    silent, told = sweep.fit_two_laws(y, "mu"), sweep.fit_two_laws(y, "mu", noise=True)
+    assert (silent.noisy == 0).all()
+    assert covered(silent.sel(law="low"), "exponent", -1.0) > 0.98
+    assert 0.9 < covered(told.sel(law="low"), "exponent", -1.0) < 0.99
+
+
 def test_missing_points_and_falling_axes_change_nothing():
     y = curve(noisy(broken(), 0.01, 1)[0])
     whole = sweep.fit_two_laws(y, "mu")
