@@ -77,12 +77,14 @@ class Expression:
 class Graph:
     """Expressions over named inputs, each recorded once, in the order in which they can be computed.
 
-    `kinks` are the series whose signs are inputs ".sign_0", ".sign_1", ...
+    `kinks` are the series whose signs are inputs ".sign_0", ".sign_1", ...; `powers` are those of abs(u), u a state,
+    which have no series at u = 0.
     """
 
     def __init__(self):
         self.nodes = []
         self.kinks = []
+        self.powers = []
         self._known = {}
 
     def _node(self, kind, args, varies):
@@ -155,6 +157,8 @@ class Graph:
     def function(self, name, x):
         """sqrt, exp, log, sin or cos."""
         x = self.of(x)
+        if name == "sqrt" and self._is_side(x):
+            return self.power(x, 0.5)
         return self._node(name, (x,), x.varies)
 
     def power(self, x, exponent):
@@ -168,7 +172,24 @@ class Graph:
         exponent = self.of(exponent)
         if exponent.varies:
             raise SceneError("the exponent of a power must not vary along the motion")
+        if self._is_side(x):
+            return self._power_of_side(x, exponent)
         return self._node("power", (x, exponent), x.varies)
+
+    def _is_side(self, x):
+        """Whether it is a constant times a state that has a kink, as abs(state) is."""
+        return x.kind == SCALED and x.args[1].kind == INPUT and x.args[1] in self.kinks
+
+    def _power_of_side(self, x, exponent):
+        """(c s u)^n = c^n (s u)^n, s the sign of u."""
+        constant, u = x.args
+        side = self._side_of(u)
+        node = self._node("power_of_side", (self._scaled(side, u), exponent), True)
+        if node not in self.powers:
+            self.powers.append(node)
+        if constant is side:
+            return node
+        return self.multiply(self._node("power", (self._plain(constant, side), exponent), False), node)
 
     def magnitude(self, x):
         c, u = self.parts(self.of(x))
@@ -231,7 +252,7 @@ cos = _function("cos", math.cos)
 
 
 def power(x, exponent):
-    """x^exponent for x > 0 and an exponent that does not vary along the motion."""
+    """x^exponent for x > 0 and an exponent that does not vary along the motion; also abs(u)^exponent of a state u."""
     graph = next((part.graph for part in (x, exponent) if isinstance(part, Expression)), None)
     return graph.power(x, exponent) if graph else x**exponent
 

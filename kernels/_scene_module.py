@@ -20,6 +20,7 @@ from kernels import _cache
 from kernels._expression import DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, needed
 from kernels._jit import COMPILED, jit_call
 from kernels._scene_graph import record
+from kernels._taylor_core import CORE, core
 from kernels._taylor_leg import LEG, leg
 from kernels._taylor_pool import BEGUN, EVENT, SETTLED, advance, shared
 from kernels._taylor_source import Lines
@@ -45,6 +46,7 @@ from kernels._taylor import (
     GRAZING, HALVINGS, LONGEST, SLACK, STEP_LIMIT, clear, falls, integral, keeps, last_term, mean, natural_power,
     next_step, rises, root, size, slope, stays_apart, tail, worse,
 )
+from kernels._taylor_core import FAR, UNEVEN, core_time, mean_power, size_in_unit
 from kernels._taylor_pool import KINK_LIMIT, time_unit
 from kernels._vecmath import exp, is_normal, log, power, sincos
 from kernels.interface import FIRST_REFUSAL, Status
@@ -67,16 +69,17 @@ def {name}({arguments}):
 
 SERIES = '''
 @jit
-def series_{order}(state, side, signs, parameters, unit):
+def series_{order}(state, side, signs, parameters, unit{also}):
     """Taylor coefficients of each state, and (offset, factor, series) of each event; time in units."""
     {unpack}
+    {cores}
     {lines}
     return {result}
 '''
 
 
-_TAKEN = set(re.findall(r"\w+", "".join((HEAD, FUNCTION, SERIES, LEG, EVENT, BEGUN, SETTLED)))) | {"n", "p", "s"}
-_NUMBERED = re.compile(r"\w*_\d+|n\d+|(at|s|end|size|half|over|and_one|half_over)_\w*")
+_TAKEN = set(re.findall(r"\w+", "".join((HEAD, FUNCTION, SERIES, LEG, CORE, EVENT, BEGUN, SETTLED)))) | {"n", "p", "s"}
+_NUMBERED = re.compile(r"\w*_\d+|n\d+|(at|s|end|size|bare|full|most|half|over|and_one|half_over)_\w*")
 
 
 def _apart(name):
@@ -156,9 +159,18 @@ class Writer:
         """For each event the state that it watches; None where it is more than one."""
         return [self.names[u.args[0]] if u.kind == INPUT else None for _, _, u in self.recorded.events]
 
-    def series(self, order):
+    def lines_given(self, given):
+        """Lines of values, of which some are known."""
+        return Lines(self.names, given=given)
+
+    def kinks_of_powers(self):
+        """For each power its kink."""
+        return [self.recorded.graph.kinks.index(x.args[0].args[1]) for x in self.recorded.graph.powers]
+
+    def series(self, order, powers=0):
+        """The text of `series_{order}`, with a core for each of so many powers."""
         recorded = self.recorded
-        lines = Lines(self.names, dict(zip(self.scene.states, recorded.timed, strict=True)))
+        lines = Lines(self.names, dict(zip(self.scene.states, recorded.timed, strict=True)), cores=powers > 0)
         states = [lines.coefficients(recorded.graph.series(s), order) for s in self.scene.states]
         events = [
             f"({lines.value(offset)}, {lines.value(factor)}, {lines.coefficients(u, order)})"
@@ -166,7 +178,8 @@ class Writer:
         ]
         return filled(
             SERIES, order=order, unpack=self.all_unpacked, lines="\n".join(lines.text),
-            result=f"({listed([*states, *events])})",
+            result=f"({listed([*states, *events])})", also=", cores" if powers else "",
+            cores=listed(f"core_{i}" for i in range(powers)) + " = cores" if powers else "",
         )  # fmt: skip
 
     def text(self):
@@ -186,11 +199,20 @@ class Writer:
             self.series(2),
             shared(self.states, self.kinks),
         ]  # fmt: skip
+        parts += [core(self, i) for i in range(len(recorded.graph.powers))]
         for order in ORDERS:
-            parts += [
-                self.series(order),
-                leg(self.states, 1 + self.kinks, order, recorded.nested, self.summed(), self.seen()),
-            ]
+            parts.append(self.series(order, len(recorded.graph.powers)))
+            parts.append(
+                leg(
+                    self.states,
+                    1 + self.kinks,
+                    order,
+                    recorded.nested,
+                    self.summed(),
+                    self.seen(),
+                    self.kinks_of_powers(),
+                )
+            )
             parts.append(advance(self.states, self.parameters, self.kinks, order, self.offset()))
         return "\n".join(parts)
 

@@ -51,10 +51,12 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
     stuck, lost, broken, grazing = nothing, nothing, nothing, nothing
     power_h, allowed = natural_power(h, {order} - 1), SLACK * tolerance
     for step in range(STEP_LIMIT):
-        {series_and_events} = series_{order}(({states}), side, signs, parameters, unit)
+        {cores}
+        {series_and_events} = series_{order}(({states}), side, signs, parameters, unit{all_cores})
         {facts}
         left_out, over = {left_out}
         h = where(moving, next_step(h, left_out * power_h / (tolerance * over), {order}), h)
+        {no_longer}
         power_h = natural_power(h, {order} - 1)
         fine = {keeps}
         trial = h
@@ -98,7 +100,7 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
 '''
 
 
-def leg(states, events, order, nested=0, summed=(), seen=()):
+def leg(states, events, order, nested=0, summed=(), seen=(), kinks_of_powers=()):
     """The text of `to_event_{order}`: `states` are names, `events` the number of events."""
     e = range(events)
     roots = [
@@ -172,6 +174,11 @@ down_{j} = falls(d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial) | now_{j}"""
     def seen_at(j):
         return f"end_{seen[j]}" if seen[j] else f"horner(trial, event_{j})"
 
+    cores = [
+        f"at_core_{i}, longest_{i} = "
+        f"core_{i}(({listed(states)}), side, signs, parameters, unit, tolerance, on_{1 + j} > 0.5, step == 0)"
+        for i, j in enumerate(kinks_of_powers)
+    ]
     each = ("e", "d", "dd", "ddd", "margin", "now", "falls")
     facts_of = [f"{name}_{j}" for j in e for name in each]
     passed = [f"passed_{j} = passed_{j} | (steps & falls_{j} & (end_{j} <= 0.0))" for j in e]
@@ -206,6 +213,9 @@ down_{j} = falls(d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial) | now_{j}"""
         "any_passed": " | ".join(f"passed_{j}" for j in e),
         "advance": "\n".join(f"{s} = where(steps, end_{s}, {s})" for s in states),
         "off": "\n".join(f"now_{j} = now_{j} & meets" for j in e),
+        "cores": "\n".join(cores),
+        "all_cores": f", ({listed(f'at_core_{i}' for i in range(len(cores)))})" if cores else "",
+        "no_longer": "\n".join(f"h = where(h < longest_{i}, h, longest_{i})" for i in range(len(cores))),
         "again": "\n".join(
             [f"s_{s} = integral(unit, {s}, s_{w})" for s, w in summed.items()]
             + [f"event_{j} = s_{seen[j]}" for j in e if seen[j] in summed]

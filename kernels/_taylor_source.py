@@ -24,11 +24,14 @@ class Lines:
     ----------
     names : dict from the name of an input to its name in the text
     rates : dict from the name of a state to the expression of its rate, for coefficients above the 0th
+    cores : whether constants core_0, core_1, ... stand for the powers of a state's abs, where they are not below 0
+    given : dict from an expression to the name of its value, where that is known
     """
 
-    def __init__(self, names, rates=None):
+    def __init__(self, names, rates=None, cores=False, given=None):
         self.text = []
-        self._names, self._rates, self._known = names, rates or {}, {}
+        self._names, self._rates, self._cores = names, rates or {}, cores
+        self._known = {(x.index, 0): name for x, name in (given or {}).items()}
 
     def value(self, x):
         """The name of an expression's value."""
@@ -137,11 +140,25 @@ class Lines:
         u, n = x.args
         if k == 0:
             return f"power({self.value(u)}, {self.value(n)})"
+        return self._times(self._power_times_base(x, u, k), self._once(u, "over", "1.0 / {}"))
+
+    def _power_of_side(self, x, k):
+        """abs(u)^n, of which the sign of u leaves the recurrence as it is; constant in its core, and at u = 0."""
+        (_, u), i = x.args[0].args, x.graph.powers.index(x)
+        if k == 0:
+            plain = f"power({self.value(x.args[0])}, {self.value(x.args[1])})"
+            return f"where(core_{i} < 0.0, {plain}, core_{i})" if self._cores else plain
+        moves = f"core_{i} < 0.0" if self._cores else f"{self.value(x.args[0])} > 0.0"
+        return self._times(
+            self._power_times_base(x, u, k), self._once(u, f"over_{i}", f"where({moves}, 1.0 / {{}}, 0.0)")
+        )
+
+    def _power_times_base(self, x, u, k):
+        """u_0 b_k of (1)."""
         rates = self._rate_sum(u, x, k)
         plain = self._sum((self.coefficient(u, j), self.coefficient(x, k - j)) for j in _oldest_first(1, k, k))
-        more = self._once(n, "and_one", "{} + 1.0")
-        total = rates and f"fma({more} * {1.0 / k!r}, {rates}, -({plain}))"
-        return self._times(total, self._once(u, "over", "1.0 / {}"))
+        more = self._once(x.args[1], "and_one", "{} + 1.0")
+        return rates and f"fma({more} * {1.0 / k!r}, {rates}, -({plain}))"
 
     def _abs(self, x, k):
         return f"magnitude({self.value(x.args[0])})"

@@ -5,7 +5,9 @@
 The functions are plain Python of named scalars; each asks by name for the states, parameters and `side` that it needs.
 They are called once, with objects that record what is done to them (`_expression`), and written out as compiled
 functions for one cell and for lanes (`_scene_module`), in a file that can be read. In them are allowed + - * / ** abs,
-and sqrt, exp, log, sin, cos, power and sign of this module.
+and sqrt, exp, log, sin, cos, power and sign of this module. power(abs(u), n), u a state and n > -1 any number, has no
+Taylor series at u = 0; there it is followed as `_taylor_core` says, right to the same tolerance. Of what is not a
+state, power and sqrt want something above 0 (else OUT_OF_RANGE).
 """
 
 import inspect

@@ -108,3 +108,23 @@ def test_functions_of_plain_numbers_are_plain():
     assert E.sqrt(4.0) == 2.0
     assert E.power(2.0, 3) == 8.0
     assert [E.sign(x) for x in (-2.0, 0.0, 3.0)] == [-1.0, 0.0, 1.0]
+
+
+def test_a_power_of_abs_keeps_its_constant_apart_and_its_series_is_that_of_both_signs():
+    graph = E.Graph()
+    u, n = graph.series("u"), graph.constant("n")
+    assert E.power(abs(-3.0 * u), n).args[1] is E.power(abs(u), n)
+    assert E.sqrt(abs(u)) is E.power(abs(u), 0.5)
+    assert len(graph.powers) == 2
+    true = true_coefficients(lambda u: u ** mp.mpf(1.7))
+    for side in (1.0, -1.0):  # u and its rates with the other sign
+        graph = E.Graph()
+        u, rate, inner = graph.series("u"), graph.series("r"), graph.series("s")
+        result = E.power(abs(u), 1.7)
+        lines = Lines(
+            {"u": "u", "r": "r", "s": "s", ".sign_0": "side"}, {"u": rate, "r": inner, "s": graph.of(side * 1.2)}
+        )
+        last = lines.coefficients(result, ORDER)
+        scope = {**PLAIN, "u": side * 0.7, "r": side, "s": -side, "side": side}
+        exec("\n".join(lines.text) + f"\nresult = {last}", scope)
+        assert max(abs(float(f) - t) for f, t in zip(scope["result"], true, strict=True)) < 3e-14
