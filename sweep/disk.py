@@ -20,7 +20,7 @@ from sweep.errors import SweepError
 NEW = os.O_CREAT | os.O_EXCL | os.O_WRONLY
 
 
-def open_file(path: Path, flags: int) -> int:
+def open_file(path: Path | str, flags: int) -> int:
     """A file descriptor; a pipe that is to be read is not waited for. Raises OSError."""
     waiting = os.O_NONBLOCK if flags == os.O_RDONLY else 0
     return os.open(path, flags | waiting | getattr(os, "O_CLOEXEC", 0), 0o666)

@@ -105,7 +105,7 @@ def _read(
     return arrays
 
 
-def _read_flags(path: Path, images: Images, start: int, stop: int) -> dict[str, Any] | None:
+def _read_flags(path: str, images: Images, start: int, stop: int) -> dict[str, Any] | None:
     """Statuses and methods of a part as long as this program writes it, in as few calls as can be; None of others."""
     cells = stop - start
     frame = images.frame(cells)
@@ -161,9 +161,8 @@ def at_once(read: Callable[[list[Any]], None], items: Sequence[Any]) -> None:
 class Parts:
     """The parts that are there. Before numbers of a part are used its digest is checked; for its statuses it is not."""
 
-    def __init__(self, images: Images, blocks: Partition, paths: Mapping[int, Path]) -> None:
-        self.images, self.blocks = images, blocks
-        self._paths = dict(paths)
+    def __init__(self, images: Images, blocks: Partition, folder: Path, names: Mapping[int, str]) -> None:
+        self.images, self.blocks, self.folder, self.names = images, blocks, folder, dict(names)
         self._sound: set[int] = set()
         self._flags: dict[tuple[int, str], Any] = {}
 
@@ -173,7 +172,7 @@ class Parts:
         blocks = cells // self.blocks.cells
         cuts = [0, *(np.flatnonzero(np.diff(blocks)) + 1).tolist(), len(cells)]
         some = ((low, high) for low, high in itertools.pairwise(cuts) if low < high)
-        pieces = [(low, high) for low, high in some if int(blocks[low]) in self._paths]
+        pieces = [(low, high) for low, high in some if int(blocks[low]) in self.names]
 
         def fill(some: list[tuple[int, int]]) -> None:
             for low, high in some:
@@ -188,7 +187,7 @@ class Parts:
     def run(self, column: Column, start: int, stop: int) -> Any:
         """The same of all cells from one number to another, with nothing noted for each of them."""
         out = np.full((stop - start, *column.shape), column.missing, column.dtype)
-        blocks = [i for i in range(start // self.blocks.cells, -(-stop // self.blocks.cells)) if i in self._paths]
+        blocks = [i for i in range(start // self.blocks.cells, -(-stop // self.blocks.cells)) if i in self.names]
 
         def fill(some: list[int]) -> None:
             for index in some:
@@ -201,19 +200,19 @@ class Parts:
         return out
 
     def _column(self, index: int, column: Column) -> Any:
-        path = self._paths[index]
         start, stop = self.blocks.bounds(index)
         try:
             if column.name in FLAGS:
                 return self._flag(index, column.name)
+            path = self.folder / self.names[index]
             if index in self._sound:
                 found = _read(path, self.images, start, stop, [column], keep=True)
             else:
                 found = read_part(path, self.images, start, stop, keep=True)
         except FileNotFoundError:
-            raise SweepError(f"{path.parent}: the sweep has ended meanwhile; open its result again") from None
+            raise SweepError(f"{self.folder}: the sweep has ended meanwhile; open its result again") from None
         if found is None:
-            self._paths.pop(index, None)
+            self.names.pop(index, None)
             return None
         self._sound.add(index)
         return found[column.name]
@@ -224,10 +223,10 @@ class Parts:
         if kept is not None:
             return kept
         start, stop = self.blocks.bounds(index)
-        found = _read_flags(self._paths[index], self.images, start, stop)
+        found = _read_flags(f"{self.folder}/{self.names[index]}", self.images, start, stop)
         if found is None:
             flags = [c for c in self.images.columns if c.name in FLAGS]
-            found = _read(self._paths[index], self.images, start, stop, flags, keep=True)
+            found = _read(self.folder / self.names[index], self.images, start, stop, flags, keep=True)
         if found is None:
             return None
         if self.blocks.size <= MOST_FLAGS:

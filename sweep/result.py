@@ -169,23 +169,23 @@ def _with_plain_text(dataset: xr.Dataset) -> xr.Dataset:
 def _open_parts(output: Path, spec: Spec, strict: bool) -> xr.Dataset:
     folder = folder_of(output)
     study = checked_study(folder, spec)
-    matches = (PART_NAME.fullmatch(entry.name) for entry in os.scandir(folder))
-    parts = {int(m[1]) // spec.blocks.cells: folder / m[0] for m in matches if m}
-    if strict and len(parts) == spec.blocks.count:
+    images = Images(part_columns(study), spec.mark)
+    parts = Parts(images, spec.blocks, folder, _part_names(folder, spec, images))
+    if strict and len(parts.names) == spec.blocks.count:
         raise SweepError(f"{output}: all is computed but not put together yet; run its sweep again to finish")
     if strict:
-        left = spec.blocks.count - len(parts)
+        left = spec.blocks.count - len(parts.names)
         raise SweepError(
             f"{output}: unfinished, {left} of {spec.blocks.count} blocks are missing; run its sweep again to continue"
         )
     plan = contents(study, spec.fingerprint)
     plan = replace(plan, attrs={**plan.attrs, "start": spec.begun})
     if study.summary is not None:
-        return in_memory(plan, gathered(study, _read_all(study, spec, parts, pending(study, 0, spec.blocks.size))))
+        return in_memory(plan, gathered(study, _read_all(parts, pending(study, 0, spec.blocks.size))))
     if plan.grid.size * plan.cell_bytes > min(LARGEST_AT_ONCE, MEMORY_SHARE * memory()):
-        return _lazily(plan, Parts(Images(plan.columns, spec.mark), spec.blocks, parts))
+        return _lazily(plan, parts)
     empty = {c.name: np.full((plan.grid.size, *c.shape), c.missing, c.dtype) for c in plan.columns}
-    return in_memory(plan, _read_all(study, spec, parts, empty))
+    return in_memory(plan, _read_all(parts, empty))
 
 
 def checked_study(folder: Path, spec: Spec) -> Study:
@@ -201,17 +201,30 @@ def checked_study(folder: Path, spec: Spec) -> Study:
     return study
 
 
-def _read_all(study: Study, spec: Spec, parts: Mapping[int, Path], rows: dict[str, Any]) -> dict[str, Any]:
+def _part_names(folder: Path, spec: Spec, images: Images) -> dict[int, str]:
+    """The part of every block that is there; of two of one block, a sound one."""
+    names: dict[int, str] = {}
+    for entry in os.scandir(folder):
+        match = PART_NAME.fullmatch(entry.name)
+        if match is None or not spec.blocks.holds(int(match[1]), int(match[2])):
+            continue
+        index = int(match[1]) // spec.blocks.cells
+        if index not in names or read_part(folder / names[index], images, *spec.blocks.bounds(index)) is None:
+            names[index] = entry.name
+    return names
+
+
+def _read_all(parts: Parts, rows: dict[str, Any]) -> dict[str, Any]:
     """The rows, with those of all sound parts filled in."""
-    images = Images(part_columns(study), spec.mark)
 
     def fill(indices: list[int]) -> None:
         for index in indices:
-            start, stop = spec.blocks.bounds(index)
-            for name, values in (read_part(parts[index], images, start, stop, keep=True) or {}).items():
+            start, stop = parts.blocks.bounds(index)
+            path = parts.folder / parts.names[index]
+            for name, values in (read_part(path, parts.images, start, stop, keep=True) or {}).items():
                 rows[name][start:stop] = values
 
-    at_once(fill, sorted(parts))
+    at_once(fill, sorted(parts.names))
     return rows
 
 

@@ -160,6 +160,23 @@ def test_missing_cells_of_an_unfinished_sweep_are_nan_and_pending(unfinished, st
     xr.testing.assert_identical(found.height, whole.height.load().drop_vars("g").assign_coords(g=found.g))
 
 
+@pytest.mark.parametrize(
+    "name", [f"000000000001-000000000002.{'0' * 32}.h5", f"000000990000-000000990005.{'0' * 32}.h5", "{}{}.h5"]
+)
+def test_strange_and_doubled_parts_hide_no_sound_one(unfinished, name):
+    with open_result(unfinished) as before:
+        before.load()
+    for part in sorted(folder_of(unfinished).glob("*-*.h5")):
+        for letter in "0f":
+            path = part.with_name(name.format(part.name[:26], letter * 32))
+            path.write_bytes(part.read_bytes())
+    for most in (result.LARGEST_AT_ONCE, 0):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(result, "LARGEST_AT_ONCE", most)
+            with open_result(unfinished) as found:
+                xr.testing.assert_identical(found.load(), before)
+
+
 def test_an_unfinished_sweep_is_refused_when_strict(unfinished):
     with pytest.raises(SweepError, match="1 of 5 blocks are missing"):
         open_result(unfinished, strict=True)
