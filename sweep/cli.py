@@ -99,6 +99,8 @@ def parser() -> argparse.ArgumentParser:
     window = "part of the axis to fit over; given twice, also tells where the two laws meet"
     fit.add_argument("--window", nargs=2, type=float, metavar=("LO", "HI"), action="append", help=window)
     fit.add_argument("--confidence", type=float, default=0.95, metavar="SHARE", help="of the intervals; default: 0.95")
+    text = "whether the values carry independent noise; default: as their scatter shows"
+    fit.add_argument("--noise", choices=("yes", "no"), help=text)
     fit.add_argument("-o", "--output", metavar="FILE.csv", type=Path, help="also write the table")
     _add_at(fit)
 
@@ -237,7 +239,8 @@ def _fit(arguments: argparse.Namespace) -> None:
 
     with _result(arguments) as dataset:
         part = pick(dataset, arguments.at)
-        found = laws(part, arguments.y, arguments.x, arguments.window or [], arguments.confidence)
+        noise = {None: None, "yes": True, "no": False}[arguments.noise]
+        found = laws(part, arguments.y, arguments.x, arguments.window or [], arguments.confidence, noise)
     print(laws_text(found))
     if arguments.output:
         write_laws(found, arguments.output)

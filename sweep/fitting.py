@@ -28,8 +28,9 @@ WORST_MISFIT = 0.1
 
 EXPLANATION = (
     "The interval is of {confidence:g} % confidence where the values scatter; where they do not, it is the range of "
-    "the local exponent in the window (of two laws: also of where that tends). Drift is how far the exponent changes "
-    "across the window; residual is the largest relative distance of a point from the curve."
+    "the local exponent in the window (of two laws: also of where that tends). With scatter, two laws are taken to "
+    "meet in a bend of the fitted shape. Drift is how far the exponent changes across the window; residual is the "
+    "largest relative distance of a point from the curve."
 )
 
 
@@ -71,12 +72,19 @@ class Laws:
     bend: xr.Dataset | None
     meeting: xr.Dataset | None
     confidence: float
+    remark: str = ""
+    """What became of cells that are not OK."""
 
 
 def laws(
-    dataset: xr.Dataset, y: str, x: str, windows: Sequence[Sequence[float]] = (), confidence: float = 0.95
+    dataset: xr.Dataset,
+    y: str,
+    x: str,
+    windows: Sequence[Sequence[float]] = (),
+    confidence: float = 0.95,
+    noise: bool | None = None,
 ) -> Laws:
-    """What `sweep fit` finds. Raises SweepError."""
+    """What `sweep fit` finds; `noise` as of `fit_exponent`. Raises SweepError."""
     from sweep.analysis import crossover, fit_exponent
 
     outputs = [str(name) for name in dataset.data_vars if name not in (STATUS, METHOD_USED)]
@@ -86,20 +94,38 @@ def laws(
     if len(windows) > 2:
         raise SweepError(f"--window: expected one or two, found {len(windows)}")
     limits: list[tuple[float, float] | None] = [*sorted((low, high) for low, high in windows)] or [None]
-    fits = tuple(fit_exponent(dataset[y], x, window, confidence=confidence) for window in limits)
+    fits = tuple(fit_exponent(dataset[y], x, window, confidence=confidence, noise=noise) for window in limits)
+    remark = _remark(dataset, y)
     if len(fits) == 2:
-        return Laws(y, x, fits, None, crossover(fits[0], fits[1]), confidence)
-    return Laws(y, x, fits, _bend(dataset[y], x, limits[0], confidence), None, confidence)
+        return Laws(y, x, fits, None, crossover(fits[0], fits[1]), confidence, remark)
+    return Laws(y, x, fits, _bend(dataset[y], x, limits[0], confidence, noise), None, confidence, remark)
 
 
-def _bend(y: xr.DataArray, x: str, window: tuple[float, float] | None, confidence: float) -> xr.Dataset | None:
+def _remark(dataset: xr.Dataset, y: str) -> str:
+    """Cells that are not OK, by status; those with a value are in the fit."""
+    from sweep.exporting import flag_words
+
+    if STATUS not in dataset or dataset[y].dims != dataset[STATUS].dims:
+        return ""
+    status, valued, words = dataset[STATUS].values, dataset[y].notnull().values, flag_words(dataset[STATUS])
+    told = []
+    for code in np.unique(status[status != 0]).tolist():
+        here = status == code
+        counts = {"in the fit": int((here & valued).sum()), "left out": int((here & ~valued).sum())}
+        told += [f"{count} {words.get(code, code)} ({fate})" for fate, count in counts.items() if count]
+    return f"Of {status.size} cells: {', '.join(told)}." if told else ""
+
+
+def _bend(
+    y: xr.DataArray, x: str, window: tuple[float, float] | None, confidence: float, noise: bool | None
+) -> xr.Dataset | None:
     """Two laws, where any line has points enough for them and is not straight."""
     from sweep.regimes import FEWEST_POINTS, fit_two_laws
 
     if y.sizes[str(y[x].dims[0])] < FEWEST_POINTS:
         return None
     try:
-        found = fit_two_laws(y, x, window, confidence=confidence)
+        found = fit_two_laws(y, x, window, confidence=confidence, noise=noise)
     except SweepError:  # the window leaves too few points
         return None
     return found if bool((found.regimes == 2).any()) else None
@@ -114,7 +140,8 @@ def laws_text(found: Laws) -> str:
     if found.meeting is not None:
         heading = (*_dims(found.meeting), found.x, "", found.y)
         texts.append(_table("the two laws meet", heading, [found.meeting], _meeting_cells))
-    return page(*texts, columns([(explanation(found.confidence),)], indent=""))
+    notes = [text for text in (found.remark, explanation(found.confidence)) if text]
+    return page(*texts, *(columns([(text,)], indent="") for text in notes))
 
 
 def law_rows(found: Laws) -> Iterator[tuple[str, ...]]:

@@ -216,8 +216,11 @@ def _reach(off: Array, jacobian: Array, confidence: float) -> Array:
     from scipy.special import stdtrit
 
     left = off.size - jacobian.shape[1]
-    covariance = np.linalg.pinv(jacobian.T @ jacobian) * (off @ off) / left
-    found: Array = stdtrit(left, (1 + confidence) / 2) * np.sqrt(np.diag(covariance))
+    size = np.sqrt((jacobian**2).sum(axis=0))
+    size[size == 0] = 1.0
+    inverse = np.linalg.pinv(jacobian / size) / size[:, None]  # of columns alike in size, and never squared
+    error = np.sqrt((inverse**2).sum(axis=1) * (off @ off) / left)
+    found: Array = stdtrit(left, (1 + confidence) / 2) * error
     return found
 
 

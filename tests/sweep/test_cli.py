@@ -243,6 +243,20 @@ def test_fit_writes_its_table(done, call):
     assert call("fit", "stones.h5", "--y", "fall_time", "--x", "height", "--confidence", "95")[0] == 2
 
 
+def test_fit_tells_of_cells_that_are_not_ok(done, call):
+    code, out, _ = call("fit", "stones.h5", "--y", "fall_time", "--x", "height")
+    assert code == 0
+    assert "Of 124 cells: 62 BAD_INPUT (left out)." in out
+    assert "Of " not in call("fit", "stones.h5", "--y", "fall_time", "--x", "height", "--at", "v0=0")[1]
+
+
+def test_fit_takes_the_readers_word_on_noise(done, call):
+    for word, noisy in (("yes", 1.0), ("no", 0.0)):
+        options = ("--y", "fall_time", "--x", "height", "--at", "v0=0", "--noise", word, "-o", "laws.csv")
+        assert call("fit", "stones.h5", *options)[0] == 0
+        assert pd.read_csv("laws.csv").noisy[0] == noisy
+
+
 def test_fit_tells_the_exponent(done, call):
     code, out, err = call("fit", "stones.h5", "--y", "fall_time", "--x", "height", "--at", "v0=0")
     assert (code, err) == (0, "")

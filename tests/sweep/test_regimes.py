@@ -6,6 +6,7 @@ import xarray as xr
 
 import sweep
 from sweep.errors import SweepError
+from sweep.regimes import _reach
 
 MU = np.geomspace(1e-3, 1e3, 61)
 SETS = 300
@@ -174,6 +175,16 @@ def test_a_bend_at_the_edge_of_a_window_or_beyond_it_is_in_the_intervals(periods
         one = found.sel(law=law)
         assert float(one.exponent_low) <= truth <= float(one.exponent_high)
     assert float(found.crossover_low) <= 3**-0.5 <= float(found.crossover_high)
+
+
+def test_numbers_that_can_hardly_be_told_apart_have_wide_intervals_and_finite_ones():
+    """Columns 3 and 4 differ by 1e-9; errors by hand from the triangular factor."""
+    columns = np.linalg.qr(np.random.default_rng(0).standard_normal((30, 5)))[0]
+    factor = np.eye(5)
+    factor[3, 4], factor[4, 4] = 1.0, 1e-9
+    found = _reach(np.full(30, 0.1), columns @ factor, 0.95)
+    single = 2.0595385527533 * 0.1 * (30 / 25) ** 0.5  # Student's t of 25 degrees
+    np.testing.assert_allclose(found, single * np.array([1, 1, 1, 1e9, 1e9]), rtol=1e-5)
 
 
 def test_few_points_tell_nothing_of_noise_unless_it_is_said():
