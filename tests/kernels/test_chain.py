@@ -260,7 +260,7 @@ def test_all_poles_are_found_within_their_bound(damping, kind, n):
         if status == Status.OK:
             assert error < 1e-12
             assert pole_errors(re, im, oracles.poles(*cell)).max() <= error
-    assert sure >= len(J) * (0.7 if damping * len(kind) >= 100 else 1.0)  # creep beyond what digits can tell
+    assert sure >= len(J) * (0.9 if damping * len(kind) >= 100 else 1.0)  # held nowhere: poles over 19 decades
 
 
 def test_light_damping_keeps_its_digits():
@@ -386,7 +386,7 @@ def test_a_chain_is_not_split_where_what_is_dropped_would_be_felt_beyond_the_las
 
 def test_after_a_rotation_no_shift_is_taken_from_sums_of_the_old_order():
     rows = entries([2.0**-40, 2.0**20], [2.0**-190], [2.0**40, 2.0**40])
-    _rotate(2, 2, same, rows, 1.0, True)
+    sums = _rotate(2, 2, same, rows, 1.0, True, (2.0**40, 2.0**80, 2.0**40, 2.0**80, 0.0, 0.0))
     assert list(rows[:2]) == [2.0**20, 2.0**-40]
     assert not rows[2]
-    assert _shift(2, rows[5], rows[7], 1.0) == 0.0
+    assert _shift(2, sums[0], sums[1], 1.0) == 0.0
