@@ -68,6 +68,20 @@ def test_where_nothing_can_be_rehearsed_the_probes_alone_tell_the_time(tmp_path,
     assert list(tmp_path.iterdir()) == []
 
 
+@given(fixed=st.floats(0.0, 10.0), each=st.floats(1e-6, 1.0), some=st.integers(1, 1500))
+@settings(max_examples=30, deadline=None)
+def test_two_rehearsals_tell_what_any_run_costs_from_what_cells_cost(fixed, each, some):
+    class Stage:
+        cells = 1000
+
+        def timed(self, study):
+            size = Grid(study).size
+            return rehearsing.Timed(size, fixed + each * size)
+
+    found = rehearsing._forecast(slow(1000), Stage(), some, 0.0)
+    assert found == pytest.approx(fixed + 1000 * each if some > 1 else 1000 * (fixed + each))
+
+
 @pytest.mark.parametrize("design", ["product", "zip"])
 @settings(max_examples=60, deadline=None)
 @given(lengths=st.lists(st.integers(1, 40), min_size=2, max_size=2), cells=st.integers(1, 2000))

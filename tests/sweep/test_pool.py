@@ -106,6 +106,7 @@ def test_what_strikes_within_is_held_back_to_the_next_check_of_any(number):
             with CtrlC() as inner:
                 reached.append("within")
                 inner.check()
+                reached.append("behind the check")
             outer.check()
 
     with pytest.raises((KeyboardInterrupt, Terminated)):
