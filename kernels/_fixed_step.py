@@ -123,13 +123,27 @@ def located(m, how, state, new, scene, h, which, ends, seeking):
     return part, new, where(curved, calls, 0.0), lost
 
 
+@jit
+def margin_behind(which, start, slopes, part, h, wide):
+    """How far behind the switch the motion would turn round, over the surface's largest value so far; infinite if not.
+
+    From the rates at the ends of the step: what bends the surface's value back is their difference.
+    """
+    first, last = slopes
+    rate = (last[0] - first[0]) * part + first[0]
+    back = (which > -0.5) & (which < 0.5) & (last[0] > first[0]) & (start[0] > 0.0)
+    bend = where(back, (last[0] - first[0]) / h, 1.0)
+    return where(back, rate * rate / (2.0 * bend * where(wide > 0.0, wide, 1.0)), math.inf)
+
+
 @jit_call
-def attempt(m, how, parameters, step, graze, motion, active):
+def attempt(m, how, parameters, step, graze, wide, motion, active):
     """Try one step.
 
     Parameters
     ----------
     how : method, location, parts of a step
+    wide : largest value of the surface since the last switch
     motion : state, side, signs, on (1 for the event that the motion starts on), cut (the step's length; 0: whole), cuts
     active : lanes that move
 
@@ -137,6 +151,7 @@ def attempt(m, how, parameters, step, graze, motion, active):
     -------
     motion, which : after the step; the event that it ends on, -1 for none, -2 where it must be tried again
     taken, calls, verdict : length of the step, calls of the rates, what went wrong (0: nothing)
+    wide, behind : with this step's start; see `margin_behind`
     """
     method, location, parts = how
     state, side, signs, on, cut, cuts = motion
@@ -148,6 +163,9 @@ def attempt(m, how, parameters, step, graze, motion, active):
     end, end_rate = m.events(new, side, signs, parameters)
     calls = 0.0 * h + CALLS[method] * parts
     which, _ = first_event(start, end, end_rate, on, natural)
+    wide = where(active & (start[0] > wide), start[0], wide)
+    part = where(start[0] > end[0], start[0] / (start[0] - end[0]), 0.0)
+    behind = margin_behind(which, start, (start_rate, end_rate), part, h, wide)
     broken = active & isnt(finite(new) & finite(end))
     met = active & (which > -0.5) & isnt(broken)
     verdict, taken, again = where(broken, _OUT_OF_RANGE, 0.0), h, active & isnt(active)
@@ -182,7 +200,8 @@ def attempt(m, how, parameters, step, graze, motion, active):
     below = moved & natural & (which < -0.5) & (end[0] <= 0.0)  # not yet above where it began
     on = choose(moved & isnt(below), marks(which, on), on)
     signs = choose(moved, turned(signs, on), signs)
-    return (choose(moved, new, state), side, signs, on, cut, cuts), which, where(moved, taken, 0.0), calls, verdict
+    motion = choose(moved, new, state), side, signs, on, cut, cuts
+    return motion, which, where(moved, taken, 0.0), calls, verdict, wide, behind
 
 
 @jit_call
@@ -207,7 +226,8 @@ def follow(m, how, parameters, limits, motion, tally, active):
     ----------
     limits : flips, step, margin of grazing over an event's value at the start of the step
     tally : time, since, interval, count, steps, calls, trials since the last switch,
-        reach (largest of each state since the last switch), states at the last switch, their reach before it, verdict
+        reach (largest of each state since the last switch), states at the last switch, their reach before it,
+        largest value of the surface since the last switch, least margin behind a switch, verdict
 
     Returns
     -------
@@ -216,9 +236,9 @@ def follow(m, how, parameters, limits, motion, tally, active):
     flips, step, graze = limits
     done = active & isnt(active)
     for _ in range(TOGETHER):
-        time, since, interval, count, steps, calls, trials, reach, at, reach_at, verdict = tally
+        time, since, interval, count, steps, calls, trials, reach, at, reach_at, wide, slim, verdict = tally
         side = motion[1]
-        motion, which, taken, more, found = attempt(m, how, parameters, step, graze, motion, active)
+        motion, which, taken, more, found, wide, behind = attempt(m, how, parameters, step, graze, wide, motion, active)
         verdict = where(active & (found > verdict), found, verdict)
         trials, calls = where(active, trials + 1.0, trials), where(active, calls + more, calls)
         steps = where(active & (which > -1.5), steps + 1.0, steps)
@@ -235,9 +255,11 @@ def follow(m, how, parameters, limits, motion, tally, active):
             interval, since = where(switches, since, interval), where(switches, 0.0, since)
             count = where(switches, count + 1.0, count)
             trials = where(switches, 0.0, trials)
+            slim = where(switches & (behind < slim), behind, slim)
+            wide = where(switches, 0.0, wide)
         verdict = where(active & (trials > STEP_LIMIT) & (verdict < _REFUSAL), _STEP_LIMIT, verdict)
         ended = active & ((verdict >= _REFUSAL) | (count >= flips))
-        tally = time, since, interval, count, steps, calls, trials, reach, at, reach_at, verdict
+        tally = time, since, interval, count, steps, calls, trials, reach, at, reach_at, wide, slim, verdict
         done, active = done | ended, active & isnt(ended)
         if some(done):
             break

@@ -79,11 +79,11 @@ def advance(memory, i):
         verdict = where(fresh, where(beyond, {bad_input}, 0.0), verdict)
     how = int(memory[{method}][0]), int(memory[{method} + 1][0]), int(memory[{method} + 2][0])
     motion = ({states},), side, ({signs}), ({ons}), cut, cuts
-    tally = time, since, interval, count, steps, calls, trials, ({reach}), ({at}), ({before}), verdict
+    tally = time, since, interval, count, steps, calls, trials, ({reach}), ({at}), ({before}), wide, slim, verdict
     moving = active & (verdict < 64.0)
     motion, tally, ended = follow(M, how, parameters, (flips, step, graze), motion, tally, moving)
     ({states},), side, ({signs}), ({ons}), cut, cuts = motion
-    time, since, interval, count, steps, calls, trials, ({reach}), ({at}), ({before}), verdict = tally
+    time, since, interval, count, steps, calls, trials, ({reach}), ({at}), ({before}), wide, slim, verdict = tally
     done = active & (ended | (verdict >= 64.0))
     stage = where(done, 3.0, where(active, 2.0, stage))
     {store}
@@ -119,16 +119,16 @@ def _text(scene, module):
     ons = [f"on_{j}" for j in range(1 + kinks)]
     reach, at, before = ([f"{kind}_{s}" for s in states] for kind in ("reach", "at", "before"))
     inputs = [*parameters, "flips", "step", "graze", "method", "location", "parts"]
-    results = ["time", "interval", *at, *before, "steps", "calls", "verdict"]
-    work = [*states, "side", *signs, *ons, "cut", "cuts", "since", "count", "trials", *reach]
+    results = ["time", "interval", *at, *before, "slim", "steps", "calls", "verdict"]
+    work = [*states, "side", *signs, *ons, "cut", "cuts", "since", "count", "trials", "wide", *reach]
     rows = ["stage", *inputs, *results, *work]
     begin = [f"{s} = where(fresh, s[{j}], {s})" for j, s in enumerate(states)]
     begin += [f"{s} = where(fresh, g[{j}], {s})" for j, s in enumerate(signs)]
     begin += [f"{o} = where(fresh, o[{j}], {o})" for j, o in enumerate(ons)]
     begin += ["side = where(fresh, p, side)"]
     begin += [f"{r} = where(fresh, magnitude({s}), {r})" for r, s in zip(reach, states, strict=True)]
-    zeros = ("time", "interval", "steps", "calls", "cut", "cuts", "since", "count", "trials", *at, *before)
-    begin += [f"{r} = where(fresh, 0.0, {r})" for r in zeros]
+    zeros = ("time", "interval", "steps", "calls", "cut", "cuts", "since", "count", "trials", "wide", *at, *before)
+    begin += [f"{r} = where(fresh, 0.0, {r})" for r in zeros] + ["slim = where(fresh, math.inf, slim)"]
     changed = ["stage", *results, *work]
     events = range(1 + kinks)
     return filled(

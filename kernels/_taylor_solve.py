@@ -2,7 +2,8 @@
 
 Each step is right to a tolerance; what many steps come to depends on the scene. So a cell is followed twice, the second
 time with a tolerance FINER times smaller: the first run's error is what they differ by, the second's is about FINER
-times less, and is what is given.
+times less, and is what is given. The first run's parameters are some roundings off (`off_by_roundings`): so what a
+scene makes of rounding, which both runs would share, is seen too.
 """
 
 import numpy as np
@@ -20,6 +21,8 @@ ROUNDING = 1e-14
 FEW = 3
 """Switches after which a cell's steps between two of them are known well enough."""
 ROUGH, FINER = 2.0, 16.0
+ROUNDINGS, GOLDEN = 8.0, 0.6180339887498949
+"""By how many roundings a parameter is changed at most, and what makes that differ from one to the next."""
 APART = 8.0
 """How many rtol the two runs may differ by: the finer one is then right to rtol/2."""
 
@@ -69,7 +72,8 @@ def once(module, columns, rtol, outputs, status):
 
 def twice(module, columns, rtol, outputs, status):
     """Fills outputs and status by two runs; INACCURATE where they differ by more than the finer one could mend."""
-    rough, fine = (followed(module, columns, rtol, by) for by in (ROUGH, ROUGH * FINER))
+    rough = followed(module, off_by_roundings(columns), rtol, ROUGH)
+    fine = followed(module, columns, rtol, ROUGH * FINER)
     _write(fine, outputs, status)
     states = len(module.STATES)
     scale = np.concatenate([abs(fine[:2]), np.maximum(abs(fine[2 : 2 + states]), fine[2 + states : -1])])
@@ -78,6 +82,22 @@ def twice(module, columns, rtol, outputs, status):
     status[apart & (status == Status.OK)] = Status.INACCURATE
     worse = (rough[-1] > 0) & (status <= Status.INACCURATE)
     status[worse] = np.where(rough[-1][worse] < FIRST_REFUSAL, rough[-1][worse], Status.INACCURATE)
+
+
+def off_by_roundings(columns):
+    """The parameters, each changed by a few roundings of its own; the number of switches, the last, as it is.
+
+    Numbers of eight bits, which cannot cancel so far that it matters, and those that another one repeats are kept: a
+    start on the surface stays there.
+    """
+    *values, flips = columns
+    changed = []
+    for j, value in enumerate(values):
+        ulps = ROUNDINGS * (2.0 * ((j + 1) * GOLDEN % 1.0) - 1.0)
+        short = np.ascontiguousarray(value).view(np.int64) & (2**44 - 1) == 0
+        kept = short | np.any([abs(value) == abs(other) for k, other in enumerate(values) if k != j], axis=0)
+        changed.append(np.where(kept, value, value * (1.0 + ulps * 2.0**-52)))
+    return [*changed, flips]
 
 
 def _write(results, outputs, status):

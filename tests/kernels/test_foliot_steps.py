@@ -114,7 +114,7 @@ def test_the_work_is_counted(method):
     [
         ({"k": 4.0}, "rk4", "root", {Status.STEP_LIMIT, Status.STICKS}),  # swings below the switch for good
         ({"R": 0.999}, "rk4", "root", {Status.OK}),
-        ({"a": 1.0, "step": 1e3}, "euler", "none", {Status.OK, Status.STEP_LIMIT, Status.OUT_OF_RANGE}),
+        ({"a": 1.0, "step": 1e3}, "euler", "none", {Status.GRAZING, Status.STEP_LIMIT, Status.OUT_OF_RANGE}),
         ({"mu": 1e300, "phi0": 1e300, "step": 1e-3}, "rk4", "root", {Status.OUT_OF_RANGE}),
         ({"mu": 1e-300, "phi0": 1e-300, "a": 0.5}, "rk4", "root", {Status.OUT_OF_RANGE}),
         ({"step": 1e-7}, "rk4", "root", {Status.STEP_LIMIT}),
@@ -200,3 +200,15 @@ def test_a_motion_that_comes_to_rest_in_the_switch_sticks_for_every_method_that_
     for method, location in (("moreau", "none"), ("rk4", "root"), ("dop853", "henon")):
         _, status = solve(KERNEL, method, [1.0], **cell, location=float(LOCATIONS[location]))
         assert status[0] == Status.STICKS
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+@pytest.mark.parametrize("location", LOCATIONS)
+@pytest.mark.parametrize("method", ["euler", "verlet", "rk4", "moreau"])
+def test_a_switch_that_only_the_steps_error_reaches_is_no_quiet_number(method, location):
+    missed = 10.0 ** -np.arange(1.0, 8.0)[:, None]
+    step = np.array([0.003, 0.03, 0.3])
+    k, step = (np.broadcast_to(v, (7, 3)).ravel() for v in (2.0 * (1.0 + missed), step))  # turns at 1 - missed
+    cells = {"mu": [1.0] * 21, "k": k, "step": step, "location": float(LOCATIONS[location])}
+    outputs, status = solve(KERNEL, method, phi0=1.0, flips=1.0, **cells)
+    assert ((status != Status.OK) | np.isinf(outputs["error"])).all()
