@@ -49,14 +49,17 @@ def counted(J, k, steps, frequency):
 def test_the_masses_that_are_left_know_how_many_frequencies_are_below_any(seed, free):
     n = 6 if COMPILED else 4
     J, k = chain(seed, n, 2.0, free)
-    f = [float(x) for x in oracles.chain_frequencies(J, k)]
-    between = [0.5 * (low + high) for low, high in zip(f, [*f[1:], 2 * f[-1]], strict=True)]
+    around, counts = [], []
+    for j, f in enumerate(oracles.chain_frequencies(J, k)):
+        if j > 0 or not free:
+            around += [float(f) * (1 - 1e-9), float(f) * (1 + 1e-9)]
+            counts += [j, j + 1]
     for way in ("ab", "ba", "aaa", "bbb"):
         at = {"a": [1, 2, 1], "b": [0, 1, 0]}
         steps = [(kind, at[kind][i]) for i, kind in enumerate(way)]
-        assert [counted(J, k, steps, x) for x in between] == list(range(1, n + 1))
+        assert [counted(J, k, steps, f) for f in around] == counts
     steps = [("a", n - 1), ("b", n - 3)]  # at the ground
-    assert [counted(J, k, steps, x) for x in between] == list(range(1, n + 1))
+    assert [counted(J, k, steps, f) for f in around] == counts
 
 
 @pytest.mark.parametrize(
@@ -85,15 +88,15 @@ def test_sixty_four_masses_have_their_frequencies_from_one():
 
 def test_where_a_partial_system_stands_still_in_a_mode_twelve_digits_are_left_or_the_cell_says_so():
     """Equal masses and springs, free: mass 4 rests in a mode of its own partial frequency."""
-    n = 8 if COMPILED else 4
+    n = 8
     J, k = np.ones(n), np.ones(n)
     k[-1] = 0.0
     truth = oracles.chain_frequencies(J, k)
-    for n_keep in range(1, n):
+    for n_keep in range(1, n) if COMPILED else (1,):
         outputs, status = exact(J, k, n_keep)
         assert status == Status.OK
         error = relative_error(outputs["frequency"][0, 1:], truth[1:]).max()
         assert error < 1e-11
-        for rtol in (1e-11, 1e-12, 1e-13):
+        for rtol in (1e-11, 1e-12, 1e-13) if COMPILED else (1e-12,):
             assert error <= rtol or exact(J, k, n_keep, rtol)[1] == Status.INACCURATE
     assert exact(J, k, 1, 1e-16)[1] == Status.INACCURATE
