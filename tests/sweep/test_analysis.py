@@ -242,6 +242,16 @@ def test_the_error_bar_holds_the_truth_as_often_as_it_says_where_there_is_noise(
     assert least < (off <= told).mean() < most
 
 
+def test_a_kink_among_noise_is_in_the_error_bars_beside_it():
+    x, place = grid(-3, 3, 10), 1.17
+    y = np.where(x < place, place / x, (place / x) ** (1 / 3))
+    y = y * np.exp(1e-4 * np.random.default_rng(3).standard_normal((200, x.size)))
+    off, told = slopes_off_and_told(x, y, np.where(x < place, -1, -1 / 3))
+    near = abs(np.log10(x / place)) < 0.15
+    assert (off <= told)[:, near].all()
+    assert told[:, ~near].min() < 1e-3  # and not elsewhere
+
+
 def test_the_error_bar_of_a_constant_is_of_rounding_and_gaps_stay_gaps():
     x = grid(-1, 1, 10)
     assert local_exponent_error(curve(x, np.full(x.size, 7.3)), "mu").max() < 1e-13
