@@ -172,6 +172,18 @@ def test_the_bound_of_a_tail_is_one():
         assert _taylor.tail(h, series) >= exact
 
 
+def test_a_cubic_is_proved_to_fall_where_it_does_and_nowhere_else():
+    random, t = np.random.default_rng(8), np.linspace(0.0, 1.0, 500)
+    verdicts = []
+    for _ in range(300):
+        (d, dd, ddd), h = random.normal(size=3), random.uniform(0.2, 2.0)
+        steepest = np.max(d + h * t * (2.0 * dd + 3.0 * h * t * ddd))
+        if abs(steepest) > 1e-3:
+            verdicts.append(steepest < 0.0)
+            assert _plain(_taylor.falls, d, dd, ddd, 0.0, h) == verdicts[-1]
+    assert 50 < sum(verdicts) < 250
+
+
 def test_a_state_that_sums_another_up_is_its_integral():
     random = np.random.default_rng(4)
     series, start, unit, x = tuple(random.normal(size=9)), 0.4, 0.5, 0.7
