@@ -7,7 +7,6 @@ import numpy as np
 from kernels._columns import entry
 from kernels._jit import COMPILED, jit_call
 
-
 call = jit_call
 """For every function that is not a line or two: pasted in, they would be compiled over and over."""
 

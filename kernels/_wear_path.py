@@ -51,6 +51,19 @@ def position(scene, cranked, turned, s):
 
 
 @call
+def facing(scene, cranked, s):
+    """Cosine and sine of the arm's angle from the direction of w at a time s."""
+    (lengths, margin, side, b_angle), (speed, _, _, x, y, beta), _, _ = scene
+    theta, half_s, half_c = _linkage.crank(cranked + speed * s, b_angle)
+    alpha, _, _ = _linkage.motion(lengths, margin, side, theta, half_s, half_c)
+    sine_arm, cosine_arm = sincos(alpha + (b_angle + beta))
+    w = sqrt(x * x + y * y)
+    if not w > 0.0:
+        return 1.0, 0.0
+    return (x * cosine_arm + y * sine_arm) / w, (x * sine_arm - y * cosine_arm) / w
+
+
+@call
 def bend(scene):
     """(1), from samples of the arm's motion that are dense about the dead points, half as much again."""
     (lengths, margin, side, _), (speed, spin, _, x, y, _), r, _ = scene

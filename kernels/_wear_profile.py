@@ -1,9 +1,10 @@
 """Wear of a turning work by a tool on a rocking arm, at one radius, averaged over the phase of the work.
 
 With theta the crank's angle, psi that about the work's centre from the direction of w, and v of `_wear_speed`,
-    I(r) = int_0^2pi dtheta int_contact v dpsi                                                       (1)
+    I(r) = int_0^2pi dtheta W int_contact v dpsi                                                     (1)
+with W = 1 for a constant pressure, and W = 1/A(phi) for a constant load on an area A of contact (`_wear_load`).
 By parts in psi this is an integral along the outline of the tool, for each half psi > 0 and psi < 0
-    I = sum_halves [ contour E(theta, abs(psi)) dtheta + int E(theta, pi) [psi = pi in contact] dtheta ],
+    I = sum_halves [ contour W E(theta, abs(psi)) dtheta + int W E(theta, pi) [psi = pi in contact] dtheta ],
     E(theta, psi) = int_0^psi v dpsi,                                                                (2)
 where the outline's point at a distance rho from the pivot is at radius r just when the arm is at phi = +-chi -+ gamma
 from the direction of w (chi, gamma: angles at the pivot from w, and from the arm, to the point):
@@ -18,7 +19,7 @@ import math
 
 import numpy as np
 
-from kernels import _wear_arm, _wear_quadrature, _wear_still, _wear_tool
+from kernels import _wear_arm, _wear_load, _wear_quadrature, _wear_still, _wear_tool
 from kernels._jit import jit
 from kernels._lanes import magnitude, sqrt
 from kernels._linkage import sum4
@@ -38,7 +39,7 @@ _TURN = 2.0 * math.pi
 @call
 def _passage(scene, c, s, top, bottom, arc):
     """Sum over the strokes of E dtheta/dphi at one angle of the arm; `arc`: of what arc, sine and cosine of psi/2."""
-    arm, _, (speed, spin, _, w, _, _), r = scene
+    arm, _, (speed, spin, _, w, _, _), r, _ = scene
     rate_back, dwell_back, rate_forth, dwell_forth = _wear_arm.strokes(arm, c, s, top, bottom)
     total = 0.0
     if dwell_back > 0.0:
@@ -55,15 +56,19 @@ def _polish(rate, spin, r, w, arc):
 
 
 @call
-def _at_angle(scene, c, s, arc):
-    """`_passage` with the arm at phi = (c, s) from the direction of w, and its rounding; 0 where it does not come."""
-    arm, _, (_, _, _, _, turn_c, turn_s), _ = scene
+def _at_angle(scene, c, s, arc, blur):
+    """`_passage` with the arm at phi = (c, s) from the direction of w, and its rounding; 0 where it does not come.
+
+    blur: rounding of phi, over that of a number
+    """
+    arm, _, (_, _, _, _, turn_c, turn_s), _, loaded = scene
     cosine, sine = turn_c * c - turn_s * s, turn_s * c + turn_c * s
     top, bottom, noise = _wear_arm.gaps(arm, cosine, sine)
     if not (top > 0.0 and bottom > 0.0 and (sine > 0.0 or arm[3])):
         return 0.0, 0.0
-    total = _passage(scene, cosine, sine, top, bottom, arc)
-    return total, total * noise
+    weight, doubt, slope = _wear_load.weight(loaded, c, s)
+    total = weight * _passage(scene, cosine, sine, top, bottom, arc)
+    return total, total * (noise * blur + (doubt + 4.0 * _EPS * slope * blur))
 
 
 @call
@@ -107,7 +112,7 @@ def _about_pivot(scene, piece, point):
 
     The rounding is relative, of sin chi and the slopes.
     """
-    _, tool, (_, _, reach, w, _, _), r = scene
+    _, tool, (_, _, reach, w, _, _), r, _ = scene
     x, y, dx, dy, _ = point
     rho2, near, wide, noise = _margins(piece, point, tool, reach, w, r)
     if not (near > 0.0 and wide > 0.0 and rho2 > 0.0):
@@ -126,15 +131,23 @@ def _outline(piece, x, scene):
     chi, gamma, slopes, arc, blur = _about_pivot(scene, piece, outline(piece, x, scene[1]))
     if not blur < math.inf:
         return 0.0, 0.0
-    total, noise = 0.0, 0.0
+    total, noise, turned = 0.0, 0.0, 1.0 + blur * chi[1] / _EPS
     for side in (1.0, -1.0):
         c, s = chi[0] * gamma[0] + side * chi[1] * gamma[1], chi[1] * gamma[0] - side * chi[0] * gamma[1]
         slope = _wear_tool.sense(piece) * (side * slopes[0] - slopes[1])
         for half in (1.0, -1.0):
-            value, doubt = _at_angle(scene, c, half * s, arc)
+            value, doubt = _at_angle(scene, c, half * s, arc, turned)
             total += slope * value
-            noise += magnitude(slope) * (blur * value + (1.0 + blur * chi[1] / _EPS) * doubt)
+            noise += magnitude(slope) * (blur * value + doubt)
     return total, noise
+
+
+@jit
+def _pressed(scene, c, s):
+    """Weight of the pressure with the arm at (c, s) from the frame, and what it may be wrong by, relative."""
+    turn_c, turn_s = scene[2][4], scene[2][5]
+    weight, doubt, slope = _wear_load.weight(scene[4], c * turn_c + s * turn_s, s * turn_c - c * turn_s)
+    return weight, doubt + 4.0 * _EPS * slope
 
 
 @call
@@ -144,20 +157,22 @@ def _far_side(u, scene):
     if arm[3]:
         s, c = sincos(u)
         top, bottom, noise = _wear_arm.gaps(arm, c, s)
-        total = 2.0 * _passage(scene, c, s, top, bottom, (1.0, 0.0))
-        return total, total * noise
+        weight, doubt = _pressed(scene, c, s)
+        total = 2.0 * weight * _passage(scene, c, s, top, bottom, (1.0, 0.0))
+        return total, total * (noise + doubt)
     eta, top, bottom, growth = _wear_arm.gaps_at(arm, u)
     s, c = sincos(eta)
     if not (top > 0.0 and bottom > 0.0):
         return 0.0, 0.0
-    total = 2.0 * growth * _passage(scene, c, s, top, bottom, (1.0, 0.0))
-    return total, 4.0 * _EPS * total
+    weight, doubt = _pressed(scene, c, s)
+    total = 2.0 * weight * growth * _passage(scene, c, s, top, bottom, (1.0, 0.0))
+    return total, (4.0 * _EPS + doubt) * total
 
 
 @call
 def _on_pivot(u, scene):
     """Integrand of int v dtheta over the strokes for a work on the pivot, where v does not hang on psi."""
-    arm, _, (speed, spin, _, _, _, _), r = scene
+    arm, _, (speed, spin, _, _, _, _), r, _ = scene
     if arm[3]:
         s, c = sincos(u)
         top, bottom, _ = _wear_arm.gaps(arm, c, s)
@@ -186,7 +201,7 @@ def _split_circle(k, scene, piece, still):
 
     These are at the angles in `still`, each on either side of the arm.
     """
-    _, tool, (_, _, reach, w, turn_c, turn_s), r = scene
+    _, tool, (_, _, reach, w, turn_c, turn_s), r, _ = scene
     if k < 2:
         radius = w + r if k else magnitude(w - r)
         margins = vertex_margins(piece, tool, reach, w, r)
@@ -204,7 +219,7 @@ def _settled(x, scene, piece):
     By Newton's rule on the arm's gap as the integrand has it, which goes there like a square root: where the point is
     near the line of centres, a split that was found otherwise is off by much more than rounding of the gap.
     """
-    arm, tool, (_, _, _, _, turn_c, turn_s), _ = scene
+    arm, tool, (_, _, _, _, turn_c, turn_s), _, _ = scene
     chi, gamma, slopes, _, blur = _about_pivot(scene, piece, outline(piece, x, tool))
     least, step = _AT_TURN * arm[1][0], 0.0
     if blur < math.inf:
@@ -276,7 +291,7 @@ def _open_split(pool, count, kind, low, high, scene, stops):
 @call
 def _open_far_side(pool, scene, angles, number, stops):
     """Opens the panels of the second integral of (2), from the arcs about the pivot; how many there are."""
-    arm, _, (_, _, _, w, turn_c, turn_s), r = scene
+    arm, _, (_, _, _, w, turn_c, turn_s), r, _ = scene
     turn = arctan2(turn_s, turn_c) + (math.pi if r > w else 0.0)
     count = int(0.0)
     for j in range(0, number, 2):
@@ -318,7 +333,7 @@ def _circle(scene):
 
     Its centre in the tool's frame, its radius, and `starts` of `arcs`.
     """
-    arm, tool, (_, _, reach, w, turn_c, turn_s), r = scene
+    arm, tool, (_, _, reach, w, turn_c, turn_s), r, _ = scene
     if stands_still(arm):
         s, c = sincos(arm[2][0])
         x, y = w * (c * turn_c + s * turn_s) - reach, w * (c * turn_s - s * turn_c)
@@ -336,18 +351,33 @@ def stands_still(arm):
 @jit
 def _standing(scene, angles, number):
     """I(r) under an arm that stands still."""
-    _, _, (_, spin, _, _, _, _), r = scene
-    total = _TURN * magnitude(spin) * r * _length_of(angles, number)
-    return total, 64.0 * _EPS * total
+    _, _, (_, spin, _, _, _, _), r, _ = scene
+    weight, doubt = _at_rest(scene)
+    total = weight * _TURN * magnitude(spin) * r * _length_of(angles, number)
+    return total, (64.0 * _EPS + doubt) * total
+
+
+@jit
+def _at_rest(scene):
+    """Weight of the pressure where it is the same at all of the arm's angles, and what it may be wrong by, relative."""
+    s, c = sincos(scene[0][2][0])
+    return _pressed(scene, c, s)
 
 
 @jit
 def _centre(scene, angles, number):
     """I(0): the way of the centre through the tool, whatever the arm's rate."""
-    arm, _, (speed, _, _, w, turn_c, turn_s), _ = scene
+    arm, _, (speed, _, _, w, turn_c, turn_s), _, _ = scene
     passed = _angle_in_arcs(arm, arctan2(turn_s, turn_c), angles, number)
     unit = _TURN * magnitude(speed) * w
     return unit * passed, 64.0 * _EPS * unit * (passed + (1.0 if passed > 0.0 else 0.0))
+
+
+@jit
+def _uncertain(loaded):
+    """How much more the pressure may be than amid the arm's way."""
+    _, count, lowest, largest = loaded
+    return largest / max(lowest, _wear_load.FAINT * largest) if count > 0 else 1.0
 
 
 @call
@@ -366,10 +396,10 @@ def profile(scene, rtol, work):
     Parameters
     ----------
     scene : (arm of `_wear_arm`, tool of `_wear_tool`, (rate of the crank, of the work, L, w, cosine and sine of the
-        direction of w from b + beta), r)
+        direction of w from b + beta), r, areas of contact of `_wear_load`)
     work : `room`
     """
-    arm, tool, ride, r = scene
+    arm, tool, ride, r, loaded = scene
     pool, found, angles, stack, still = work
     x, y, radius, near, far = _circle(scene)
     number, unsure = _wear_tool.arcs(tool, x, y, radius, near, far, angles, found, stack)
@@ -379,7 +409,7 @@ def profile(scene, rtol, work):
         value, error = _standing(scene, angles, number)
         return value, error, True
     on_pivot = ride[3] == 0.0
-    if r == 0.0 and not on_pivot:
+    if r == 0.0 and not on_pivot and loaded[1] == 0:
         value, error = _centre(scene, angles, number)
         return value, error, True
     stops = still, _wear_still.stops_of(scene, still)
@@ -388,11 +418,16 @@ def profile(scene, rtol, work):
         count = _open_split(pool, int(0.0), SPIN, first, last, scene, stops)
     else:
         count = _open_far_side(pool, scene, angles, number, stops)
-        count = _open_outline(pool, count, scene, found, stack, stops)
+        if r > 0.0:
+            count = _open_outline(pool, count, scene, found, stack, stops)
     value, error = adapt(integrand, scene, pool, count, rtol)
     if unsure > 0.0:
-        error += 8.0 * unsure * _far_side(0.0, scene)[0] / (1.0 if arm[3] else arm[2][1] - arm[2][0])
+        way = 1.0 if arm[3] else arm[2][1] - arm[2][0]
+        error += 8.0 * unsure * _far_side(0.0, scene)[0] / way * _uncertain(loaded)
+    if r == 0.0 and not on_pivot:
+        error += 64.0 * _EPS * (value + _TURN * magnitude(ride[0]) * ride[3] * _uncertain(loaded) / loaded[3])
     if on_pivot:
         length = _length_of(angles, number)
-        value, error = value * length, error * length + 64.0 * _EPS * value
+        weight, doubt = _at_rest(scene)
+        value, error = weight * value * length, weight * (error * length + (64.0 * _EPS + doubt * length) * value)
     return value, error, True

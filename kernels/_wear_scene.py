@@ -91,6 +91,7 @@ def work_without_units(p):
     if w > 0.0 and min(magnitude(x), magnitude(y)) > 0.0:
         w = sqrt(x * x + y * y)
     fine = a >= _SPAN and b >= _SPAN and (w == 0.0 or w >= _SPAN) and (reach == 0.0 or reach >= _SPAN)
+    fine = fine and (p[19] == 0.0 or in_unit(p[19], unit) >= _SPAN)
     s_b, c_b = sincos(b_angle)
     s, c = sincos(beta)
     c, s = c * c_b - s * s_b, s * c_b + c * s_b
@@ -101,6 +102,13 @@ def work_without_units(p):
         cosine, -sine if p[4] == 1.0 else sine,
     )  # fmt: skip
     return _wear_tool.tool_of(a, b, p[14], p[15]), ride, unit, pace, fine
+
+
+@jit
+def pressed(pressure, load, workpiece_radius):
+    """Whether just one of pressure and load is given, and with a load the workpiece's radius; NaN fails."""
+    numbers = 0.0 <= pressure < math.inf and 0.0 <= load < math.inf and 0.0 <= workpiece_radius < math.inf
+    return numbers and (pressure > 0.0) != (load > 0.0) and (load == 0.0 or workpiece_radius > 0.0)
 
 
 @call
@@ -132,7 +140,17 @@ PARAMETERS = (
     Field("preston", "1/Pa", "wear per way and pressure", lower=0.0, open_lower=True),
 )  # fmt: skip
 
+PRESS = (
+    Field("pressure", "Pa", "pressure under the tool, if constant; or else load and workpiece_radius", default=0.0,
+          lower=0.0, open_lower=True),
+    Field("load", "N", "force on the tool, if constant: pressure is load over the area of contact", default=0.0,
+          lower=0.0),
+    Field("workpiece_radius", "m", "radius of the workpiece, beyond which nothing wears; needed with load; 0: no rim",
+          default=0.0, lower=0.0),
+)  # fmt: skip
+
 EXAMPLE = LINKS | {
     "omega": 2.0, "b_angle": -0.66, "L": 0.5, "beta": 0.0, "w_x": 0.5, "w_y": 0.0, "Omega": 0.8,
-    "tool_a": 0.06, "tool_b": 0.06, "tool_n": 2.0, "tool_m": 2.0, "preston": 1e-13, "pressure": 7000.0,
+    "tool_a": 0.06, "tool_b": 0.06, "tool_n": 2.0, "tool_m": 2.0,
+    "preston": 1e-13, "pressure": 7000.0, "load": 0.0, "workpiece_radius": 0.0,
 }  # fmt: skip

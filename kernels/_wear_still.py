@@ -43,7 +43,7 @@ def rates_at(arm, u):
 @jit
 def _lead(scene, rate, side):
     """Left less right side of (1)."""
-    _, _, (speed, spin, _, w, _, _), r = scene
+    _, _, (speed, spin, _, w, _, _), r, _ = scene
     return speed * rate * (r + side * w) - spin * r
 
 

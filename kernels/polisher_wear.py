@@ -6,45 +6,55 @@ the arm: its centre at L (cos, sin)(alpha + beta), its X axis along the arm, its
 Over many turns every point of a ring of the workpiece wears alike (unless the rates of crank and workpiece are in the
 ratio of small whole numbers: then this is the mean of the ring), and that is what is given:
     wear(r) = preston p/(4 pi^2) int_0^2pi dtheta int_contact v dpsi                                 (2)
-by the exact integral along the tool's outline of `_wear_profile`. Leaves out: a tool that turns in its socket, pressure
-that varies under the tool. Source: Preston, J. Soc. Glass Technol. 11:214 (1927); Cordero-Davila et al., Opticheskii
-Zhurnal 78(3):55 (2011), (12) and (20), corrected.
+by the exact integral along the tool's outline of `_wear_profile`. p is the pressure given, or
+    p = load/A                                                                                       (3)
+with A the area of contact at that moment, that of the tool within the workpiece's disc (`_wear_load`); without contact
+nothing wears, nor does anything beyond workpiece_radius, if that is given. Leaves out: a tool that turns in its socket,
+or tilts where it hangs over; pressure that varies under the tool. Source: Preston, J. Soc. Glass Technol. 11:214
+(1927); Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (12) and (20), corrected.
 
 LOCK_UP: the crank does not turn fully, so there is no wear (NaN). CHANGE_POINT: values if the arm keeps to its branch.
 DOUBLE_CRANK: the arm turns fully, too; values are given. INACCURATE: an error exceeds rtol of the largest wear asked
-for; each value has its own error beside it, and is sought to rtol of itself.
+for; each value has its own error beside it, and is sought to rtol of itself. The very rim of a workpiece that the tool
+under a load leaves wholly wears without bound: NaN with an infinite error, hence INACCURATE.
 """
 
 import math
 
-from kernels import _wear_profile, _wear_scene
+from kernels import _wear_load, _wear_profile, _wear_scene
 from kernels._columns import entry, one_by_one
 from kernels._jit import jit, jit_inline
 from kernels._vecmath import in_unit, is_normal
 from kernels._wear_call import entry_of_cells
-from kernels._wear_scene import BAD_INPUT, OK, OUT_OF_RANGE, allowed
+from kernels._wear_scene import BAD_INPUT, OK, OUT_OF_RANGE, allowed, pressed
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
 
 _INACCURATE = float(Status.INACCURATE)
 _FAINT = 2.0**-100
+_AT_RIM = 1e-8
+"""Distance from the rim, over the radius, within which wear may have no bound."""
 _FOUR_PI2 = 4.0 * math.pi * math.pi
 
 
 @jit_inline
 def _wear_at(r, scene, unit, amount, rtol, work):
     """Wear and its error at one radius [m], and whether it is a number that float64 can hold."""
-    preston, pressure, units = amount
+    preston, pressure, units, rim = amount
+    if r > rim > 0.0:
+        return 0.0, 0.0, True
+    if _wear_load.leaves(scene[3]) and not r < rim * (1.0 - _AT_RIM):
+        return math.nan, math.inf, True
     near = in_unit(r, unit)
     near = near if near > _FAINT or scene[2][3] == 0.0 else 0.0
-    value, error, _ = _wear_profile.profile((scene[0], scene[1], scene[2], near), 0.7 * rtol, work)
+    value, error, _ = _wear_profile.profile((scene[0], scene[1], scene[2], near, scene[3]), 0.7 * rtol, work)
     wear = _wear_scene.with_units(value / _FOUR_PI2, preston, pressure, units)
     doubt = _wear_scene.with_units(error / _FOUR_PI2, preston, pressure, units)
     return wear, doubt, not value > 0.0 or is_normal(wear)
 
 
 @jit_inline
-def _cell(p, rtol, radius, wear, wear_error, work):
-    """Fills the profile of one cell and returns its status; p: its parameters.
+def _cell(p, rtol, loaded, radius, wear, wear_error, work):
+    """Fills the profile of one cell and returns its status; p: its parameters, loaded: its areas of contact.
 
     The status is about errors over the largest wear of the profile: that of every radius is stated beside it.
     """
@@ -56,9 +66,9 @@ def _cell(p, rtol, radius, wear, wear_error, work):
     for k in range(radius.size):
         wear[k], wear_error[k] = math.nan, math.nan
         if turns:
-            amount = p[16], p[17], unit + pace
-            wear[k], wear_error[k], held = _wear_at(radius[k], (arm, tool, ride), unit, amount, rtol, work)
-            normal, most = normal and held, max(most, wear[k])
+            amount = p[16], max(p[17], p[18]), pace + (unit if loaded[1] == 0 else -unit), p[19]
+            wear[k], wear_error[k], held = _wear_at(radius[k], (arm, tool, ride, loaded), unit, amount, rtol, work)
+            normal, most = normal and held, wear[k] if wear[k] > most else most
             worst = worst if wear_error[k] <= worst else wear_error[k]  # NaN stays
     if not turns:
         return verdict
@@ -70,40 +80,45 @@ def _cell(p, rtol, radius, wear, wear_error, work):
 @entry_of_cells("radius")
 def contour(
     b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
-    rtol, radius, wear, wear_error, status,
+    load, workpiece_radius, rtol, radius, wear, wear_error, status,
 ):  # fmt: skip
     """(2) as integrals along the outline, split where contact ends; one cell at a time, for no two split alike."""
     cells = _wear_scene.side_by_side((
         b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
+        load, workpiece_radius,
     ))  # fmt: skip
     work = _wear_profile.room()
+    memory = _wear_load.room()
+    loaded = _wear_load.unloaded(memory[0])
     for i in range(status.size):
-        status[i] = _cell(cells[i], rtol[i], radius, wear[i], wear_error[i], work)
+        if i == 0 or not _wear_load.shared(cells[i], rtol[i], cells[i - 1], rtol[i - 1]):
+            loaded = _wear_load.areas(cells[i], rtol[i], memory)
+        status[i] = _cell(cells[i], rtol[i], loaded, radius, wear[i], wear_error[i], work)
 
 
 @jit
 def _check(
     i, b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
-    status,
+    load, workpiece_radius, status,
 ):  # fmt: skip
     fine = allowed(
         b[i], d[i], f[i], e[i], type[i], omega[i], b_angle[i], L[i], beta[i], w_x[i], w_y[i], Omega[i],
         tool_a[i], tool_b[i], tool_n[i], tool_m[i], preston[i],
     )  # fmt: skip
-    status[i] = OK if fine and pressure[i] > 0.0 and pressure[i] < math.inf else BAD_INPUT
+    status[i] = OK if fine and pressed(pressure[i], load[i], workpiece_radius[i]) else BAD_INPUT
 
 
 @entry()
 def check(
     b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
-    status,
+    load, workpiece_radius, status,
 ):  # fmt: skip
     """BAD_INPUT: NaN, infinite or outside its limits."""
     one_by_one(
         _check,
         (
             b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston,
-            pressure, status,
+            pressure, load, workpiece_radius, status,
         ),
     )  # fmt: skip
 
@@ -114,7 +129,7 @@ POLISHER_WEAR = Kernel(
     source="Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), corrected and completed; the integral is ours",
     parameters=(
         *_wear_scene.PARAMETERS,
-        Field("pressure", "Pa", "pressure under the tool", lower=0.0, open_lower=True),
+        *_wear_scene.PRESS,
     ),
     outputs=(
         Field("wear", "m/s", "depth worn away per time, mean of the ring", dims=("radius",)),

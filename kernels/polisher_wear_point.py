@@ -1,6 +1,6 @@
 """Wear of one material point of a turning workpiece under the tool of a polishing machine (Preston's law).
 
-    h = preston p int_0^tau v [point in contact] dt                                                  (1)
+    h = preston int_0^tau p v [point in contact] dt                                                  (1)
 The point is at (r0, theta0), polar, about the workpiece's centre at t = 0, when the crank is along the x axis; model
 and names are those of `polisher_wear`; for large tau the points of a ring wear at its rate on average. Time is split at
 every entry and exit, none overlooked (`_wear_path`), and between them integrated adaptively.
@@ -13,14 +13,14 @@ import math
 
 import numpy as np
 
-from kernels import _linkage, _wear_path, _wear_quadrature, _wear_scene
+from kernels import _linkage, _wear_load, _wear_path, _wear_quadrature, _wear_scene
 from kernels._columns import entry, one_by_one
 from kernels._jit import jit, jit_inline
 from kernels._lanes import magnitude, sqrt
 from kernels._vecmath import in_unit, is_normal, mantissa_exponent, scale
 from kernels._wear_call import call, entry_of_cells
 from kernels._wear_path import INSIDE, ONCE, OUTSIDE, STEPS
-from kernels._wear_scene import ANGLE_LIMIT, BAD_INPUT, OK, OUT_OF_RANGE, allowed
+from kernels._wear_scene import ANGLE_LIMIT, BAD_INPUT, OK, OUT_OF_RANGE, allowed, pressed
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
 
 _INACCURATE, _STEP_LIMIT = float(Status.INACCURATE), float(Status.STEP_LIMIT)
@@ -31,11 +31,15 @@ _DEPTH = _wear_path.HALVINGS + 2
 
 @call
 def _speed(kind, s, scene):
-    """Speed at a time s of a step, and its rounding."""
-    path, cranked, turned = scene
+    """Speed at a time s of a step, over the area of contact where the load is constant, and its rounding."""
+    path, cranked, turned, loaded = scene
     _, _, vx, vy = _wear_path.position(path, cranked, turned, s)
     v = sqrt(vx * vx + vy * vy)
-    return v, 4.0 * _EPS * v
+    if loaded[1] == 0:
+        return v, 4.0 * _EPS * v
+    cosine, sine = _wear_path.facing(path, cranked, s)
+    weight, doubt, slope = _wear_load.weight(loaded, cosine, sine)
+    return weight * v, weight * v * (4.0 * _EPS + doubt + 8.0 * _EPS * slope)
 
 
 @call
@@ -51,7 +55,7 @@ def _polished(scene, low, high, tolerance, pool):
 @call
 def _step(scene, h, curve, rtol, stack, pool):
     """The way of polishing in one step of time h, and its error."""
-    path, cranked, turned = scene
+    path, cranked, turned, _ = scene
     tool = path[3]
     total, error, low, top = 0.0, 0.0, 0.0, int(1.0)
     one = _wear_path.position(path, cranked, turned, 0.0)
@@ -71,7 +75,7 @@ def _step(scene, h, curve, rtol, stack, pool):
             continue
         now = before if verdict == ONCE else verdict == INSIDE or (tiny and after)
         if tiny:
-            error += (high - low) * sqrt(two[2] * two[2] + two[3] * two[3])
+            error += (high - low) * _speed(0.0, high, scene)[0]
         if now and not inside:
             entered = low
         if inside and not now:
@@ -80,7 +84,7 @@ def _step(scene, h, curve, rtol, stack, pool):
         inside = now
         if verdict == ONCE and before != after:
             s, blur = _wear_path.crossing(path, cranked, turned, low, high)
-            error += min(blur, high - low) * sqrt(two[2] * two[2] + two[3] * two[3])
+            error += min(blur, high - low) * _speed(0.0, high, scene)[0]
             if after:
                 entered = s
             else:
@@ -112,7 +116,7 @@ def _clock(speed, spin):
 
 
 @call
-def way(path, theta0, tau, rtol, work):
+def way(path, loaded, theta0, tau, rtol, work):
     """The way of polishing over the time tau, its error, and whether there were few enough steps."""
     pool, stack = work
     speed, spin = path[1][0], path[1][1]
@@ -127,7 +131,7 @@ def way(path, theta0, tau, rtol, work):
     for j in range(int(steps) + 1):
         rest = h * (steps - j)
         scene = (
-            path, _wear_path.phase(j, cranked, cranked_low), theta0 + _wear_path.phase(j, turned, turned_low),
+            path, _wear_path.phase(j, cranked, cranked_low), theta0 + _wear_path.phase(j, turned, turned_low), loaded,
         )  # fmt: skip
         if rest > 0.0:
             more, doubt = _step(scene, min(h, rest), curve, rtol, stack, pool)
@@ -136,26 +140,27 @@ def way(path, theta0, tau, rtol, work):
 
 
 @jit_inline
-def _cell(p, rtol, work):
-    """Wear, its error and the status of one cell; p: its parameters."""
+def _cell(p, rtol, loaded, work):
+    """Wear, its error and the status of one cell; p: its parameters, loaded: its areas of contact."""
     _, lengths, margin, verdict = _wear_scene.arm_without_units(p[0], p[1], p[2], p[3])
     tool, ride, unit, pace, fine = _wear_scene.work_without_units(p)
     verdict = verdict if fine or verdict >= FIRST_REFUSAL else OUT_OF_RANGE
     if not _wear_scene.turns_fully(verdict):
         return math.nan, math.nan, verdict
     x, y = _wear_scene.signed_in_unit(p[9], unit), _wear_scene.signed_in_unit(p[10], unit)
-    r = in_unit(p[18], unit)
+    r = in_unit(p[20], unit)
     motion = (ride[0], ride[1], ride[2], x, y, p[8])
     path = (lengths, margin, _linkage.side_of(p[4]), p[6]), motion, r, tool
-    m, e = mantissa_exponent(p[20] if p[20] > 0.0 else 1.0)
-    tau = scale(m, e + pace) if p[20] > 0.0 else 0.0
-    if r > 4.0 * (ride[2] + ride[3] + tool[0] + tool[1]):
+    m, e = mantissa_exponent(p[22] if p[22] > 0.0 else 1.0)
+    tau = scale(m, e + pace) if p[22] > 0.0 else 0.0
+    if p[20] > p[19] > 0.0 or r > 4.0 * (ride[2] + ride[3] + tool[0] + tool[1]):
         return 0.0, 0.0, verdict
-    value, error, short = way(path, p[19], tau, 0.25 * rtol, work)
+    value, error, short = way(path, loaded, p[21], tau, 0.25 * rtol, work)
     if not short:
         return math.nan, math.nan, _STEP_LIMIT
-    wear = _wear_scene.with_units(value, p[16], p[17], unit)
-    doubt = _wear_scene.with_units(error, p[16], p[17], unit)
+    hard, units = (p[17], unit) if loaded[1] == 0 else (p[18], -unit)
+    wear = _wear_scene.with_units(value, p[16], hard, units)
+    doubt = _wear_scene.with_units(error, p[16], hard, units)
     if value > 0.0 and not is_normal(wear):
         return wear, doubt, OUT_OF_RANGE
     return wear, doubt, verdict if error <= rtol * value else _INACCURATE
@@ -164,43 +169,47 @@ def _cell(p, rtol, work):
 @entry_of_cells()
 def path(
     b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
-    r0, theta0, tau, rtol, wear, wear_error, status,
+    load, workpiece_radius, r0, theta0, tau, rtol, wear, wear_error, status,
 ):  # fmt: skip
     """(1), split at every entry and exit; one cell at a time, for no two split alike."""
     cells = _wear_scene.side_by_side((
         b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
-        r0, theta0, tau,
+        load, workpiece_radius, r0, theta0, tau,
     ))  # fmt: skip
     work = np.empty(_wear_quadrature.POOL), np.empty(_DEPTH)
+    memory = _wear_load.room()
+    loaded = _wear_load.unloaded(memory[0])
     for i in range(status.size):
-        wear[i], wear_error[i], status[i] = _cell(cells[i], rtol[i], work)
+        if i == 0 or not _wear_load.shared(cells[i], rtol[i], cells[i - 1], rtol[i - 1]):
+            loaded = _wear_load.areas(cells[i], rtol[i], memory)
+        wear[i], wear_error[i], status[i] = _cell(cells[i], rtol[i], loaded, work)
 
 
 @jit
 def _check(
     i, b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
-    r0, theta0, tau, status,
+    load, workpiece_radius, r0, theta0, tau, status,
 ):  # fmt: skip
     fine = allowed(
         b[i], d[i], f[i], e[i], type[i], omega[i], b_angle[i], L[i], beta[i], w_x[i], w_y[i], Omega[i],
         tool_a[i], tool_b[i], tool_n[i], tool_m[i], preston[i],
     )  # fmt: skip
-    pressed = pressure[i] > 0.0 and pressure[i] < math.inf
+    push = pressed(pressure[i], load[i], workpiece_radius[i])
     point = 0.0 <= r0[i] < math.inf and magnitude(theta0[i]) <= ANGLE_LIMIT and 0.0 <= tau[i] < math.inf
-    status[i] = OK if fine and pressed and point else BAD_INPUT
+    status[i] = OK if fine and push and point else BAD_INPUT
 
 
 @entry()
 def check(
     b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
-    r0, theta0, tau, status,
+    load, workpiece_radius, r0, theta0, tau, status,
 ):  # fmt: skip
     """BAD_INPUT: NaN, infinite or outside its limits."""
     one_by_one(
         _check,
         (
             b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston,
-            pressure, r0, theta0, tau, status,
+            pressure, load, workpiece_radius, r0, theta0, tau, status,
         ),
     )  # fmt: skip
 
@@ -211,7 +220,7 @@ POLISHER_WEAR_POINT = Kernel(
     source="Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), corrected and completed",
     parameters=(
         *_wear_scene.PARAMETERS,
-        Field("pressure", "Pa", "pressure under the tool", lower=0.0, open_lower=True),
+        *_wear_scene.PRESS,
         Field("r0", "m", "distance of the point from the workpiece's centre", lower=0.0),
         Field("theta0", "rad", "its direction at the start, from the x axis", default=0.0,
               lower=-ANGLE_LIMIT, upper=ANGLE_LIMIT),

@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 PAPER = {
     "b": 62.01, "d": 38.0, "f": 40.5, "e": 10.0, "type": 0.0, "omega": 1.0, "b_angle": -0.66, "L": 50.0, "beta": 0.0,
     "w_x": 50.0, "w_y": 1.0, "Omega": 0.4, "tool_a": 5.0, "tool_b": 5.0, "tool_n": 2.0, "tool_m": 2.0, "preston": 1.0,
-    "pressure": 1.0,
+    "pressure": 1.0, "load": 0.0, "workpiece_radius": 0.0,
 }  # fmt: skip
 INF, NAN = np.inf, np.nan
 
@@ -33,7 +33,7 @@ def wear(radius, rtol=1e-9, **changed):
     return outputs["wear"][0], outputs["wear_error"][0], status[0]
 
 
-def truth(radius, **changed):
+def truth(radius, oracle_rtol=1e-12, **changed):
     """The same by the oracle."""
     cell = PAPER | changed
     names = ("b", "d", "f", "e", "omega", "b_angle", "L", "beta", "w_x", "w_y", "Omega")
@@ -41,7 +41,8 @@ def truth(radius, **changed):
     shape = cell["tool_a"], cell["tool_b"], cell["tool_n"], cell["tool_m"]
     side = -1 if cell["type"] else 1
     machine = oracles.Machine(**values, type=side, a=shape[0], width=shape[1], n=shape[2], m=shape[3])
-    return oracles.ring_wear(machine, radius, 1e-12) / (4 * math.pi**2)
+    rim = cell["workpiece_radius"] if cell["load"] else None
+    return (cell["load"] or 1.0) * oracles.ring_wear(machine, radius, oracle_rtol, rim) / (4 * math.pi**2)
 
 
 def half_amplitude(b, d, f, e):
@@ -75,6 +76,65 @@ def test_wear_is_that_of_time_and_arcs_within_its_stated_error(name):
     exact = truth(radius, **changed)
     assert abs(value[0] - exact) <= error[0] + 2e-11 * exact
     assert error[0] <= rtol * exact
+
+
+LOAD = {"pressure": 0.0, "load": 3.0}
+
+
+def under_a_load(radius, rim, w_x):
+    """Wear by that load on the paper's round tool, by 20 000 instants: arcs and areas in closed form."""
+    machine = oracles.Machine(62.01, 38.0, 40.5, 10.0, 1, 1.0, -0.66, 50.0, 0.0, w_x, 1.0, 0.4, 5.0, 5.0, 2.0, 2.0)
+    theta = (np.arange(20_000) + 0.5) / 20_000 * 2 * math.pi
+    far = 50.0 * np.exp(1j * machine.arm(theta)[0]) - machine.centre
+    half = np.arccos(np.clip((radius**2 + abs(far) ** 2 - 25.0) / (2 * radius * abs(far)), -1, 1))
+    theta, far, half = theta[half > 0], far[half > 0], half[half > 0]
+    y, weight = np.polynomial.legendre.leggauss(40)
+    speed = machine.speed(theta[:, None], radius, np.angle(far)[:, None] + half[:, None] * y)
+    polish = half * (speed * weight).sum(axis=1) / oracles.lens(5.0, rim, abs(far))
+    return LOAD["load"] * polish.sum() / 20_000 / (2 * math.pi)
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of areas")
+@pytest.mark.parametrize(("radius", "rim", "w_x"), [(6.0, 8.0, 52.0), (2.0, 8.0, 52.0), (3.0, 6.0, 50.0)])
+def test_under_a_load_wear_is_that_of_time_and_arcs_over_the_area_of_contact(radius, rim, w_x):
+    """Over the rim, and leaving the workpiece for part of the turn."""
+    for rtol in (1e-3, 1e-9):
+        value, error, status = wear([radius, 9.0], rtol, **LOAD, w_x=w_x, workpiece_radius=rim)
+        assert status == Status.OK
+        assert value[0] == pytest.approx(under_a_load(radius, rim, w_x), rel=2e-5 + rtol)
+        assert error[0] <= rtol * value[0]
+        assert value[1] == 0.0
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of areas")
+def test_of_a_tool_within_the_rim_load_over_its_area_is_the_pressure():
+    for changed, area in (({}, 25 * math.pi), ({"tool_n": 1.0, "tool_m": 1.0, "tool_b": 8.0}, 80.0)):
+        pressed, _, _ = wear([2.0, 6.0], pressure=3.0 / area, **changed)
+        value, error, status = wear([2.0, 6.0], workpiece_radius=40.0, **LOAD, **changed)
+        assert status == Status.OK
+        assert value == pytest.approx(pressed, rel=2e-12)
+        assert (error <= 1e-9 * value).all()
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of areas")
+def test_the_very_rim_of_a_workpiece_that_the_tool_leaves_has_no_finite_wear():
+    value, error, status = wear([3.0, 6.0], 1e-6, workpiece_radius=6.0, **LOAD)
+    assert status == Status.INACCURATE
+    assert value[0] > 0.0
+    assert np.isnan(value[1])
+    assert error[1] == INF
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"load": 1.0, "workpiece_radius": 5.0}, {"pressure": 0.0}, {"pressure": 0.0, "load": 1.0},
+        {"pressure": 0.0, "load": -1.0, "workpiece_radius": 5.0}, {"workpiece_radius": -1.0},
+    ],
+)  # fmt: skip
+def test_just_one_of_pressure_and_load_is_given_and_with_it_the_rim(changed):
+    cells = {name: [float(value)] for name, value in (PAPER | changed).items()}
+    assert checked(POLISHER_WEAR, **cells)[0] == Status.BAD_INPUT
 
 
 def test_under_a_resting_arm_wear_is_the_share_of_the_ring_under_the_tool():

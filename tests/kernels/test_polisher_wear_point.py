@@ -100,6 +100,29 @@ def test_wear_adds_up_over_time():
     assert whole[0] == pytest.approx(first[0] + second[0], rel=1e-10)
 
 
+@pytest.mark.skipif(not COMPILED, reason="thousands of areas")
+def test_under_a_load_a_point_wears_by_the_speed_over_the_area_of_contact():
+    """In time steps of 1e-5 of it, as far as they tell; within the rim as under a pressure."""
+    changed = {"w_x": 52.0, "w_y": 0.0, "pressure": 0.0, "load": 3.0, "r0": 4.0, "tau": 3.0}
+    machine = oracles.Machine(62.01, 38.0, 40.5, 10.0, 1, 1.0, -0.66, 50.0, 0.0, 52.0, 0.0, 0.4, 5.0, 5.0, 2.0, 2.0)
+    h = changed["tau"] / 100_000
+    t = (np.arange(100_000) + 0.5) * h
+    place, theta = machine.ring(4.0, 0.3 + 0.4 * t), t + 0.66
+    alpha, rate = machine.arm(theta)
+    speed = abs(1j * rate * place - 0.4j * (place - machine.centre))
+    area = oracles.lens(5.0, 7.0, abs(50.0 * np.exp(1j * alpha) - machine.centre))
+    inside = machine.excess(theta, place) < 0
+    expected = 3.0 * np.sum(speed[inside] / area[inside]) * h
+    value, error, status = wear(workpiece_radius=7.0, **changed)
+    assert status[0] == Status.OK
+    assert value[0] == pytest.approx(expected, rel=1e-4)
+    assert error[0] <= 1e-9 * value[0]
+    inside, _, _ = wear(workpiece_radius=40.0, **changed)
+    pressed, _, _ = wear(**(changed | {"load": 0.0, "pressure": 3.0 / (25 * math.pi)}))
+    assert inside[0] == pytest.approx(pressed[0], rel=1e-11)
+    assert wear(workpiece_radius=3.9, **changed)[0][0] == 0.0
+
+
 def test_no_time_and_no_touch_wear_nothing():
     value, error, status = wear(tau=[0.0, 20.0, 20.0], r0=[6.0, 40.0, 1e300])
     assert (status == Status.OK).all()
