@@ -241,11 +241,15 @@ def _quiet(function):
 def build(scene):
     """The module of the scene."""
     text = Writer(scene, record(scene)).text()
-    name = f"scene_{scene.name}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+    return loaded("scene", scene, text)
+
+
+def loaded(kind, scene, text):
+    """The module of a text that is written for a scene."""
+    name = f"{kind}_{scene.name}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
     with _BUILDING:
         if name not in sys.modules:
-            path = _written(name, text)
-            spec = importlib.util.spec_from_file_location(name, path)
+            spec = importlib.util.spec_from_file_location(name, _written(name, text))
             module = importlib.util.module_from_spec(spec)
             sys.modules[name] = module
             try:

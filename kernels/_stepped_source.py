@@ -3,14 +3,10 @@
 It lies beside the scene's own module (`_scene_module`), whose functions it takes.
 """
 
-import hashlib
-import importlib.util
-import sys
-
 from kernels._expression import INPUT
 from kernels._locate import METHODS
 from kernels._scene_graph import record
-from kernels._scene_module import Writer, _written, build
+from kernels._scene_module import Writer, build, loaded
 from kernels._taylor_pool import advance
 from kernels._taylor_text import filled, listed
 
@@ -182,25 +178,10 @@ def adaptive(scene):
     writer = Writer(scene, record(scene))
     for method in ("dopri5", "dop853"):
         text += advance(writer.states, writer.parameters, module.KINKS, method, writer.offset())
-    return _loaded("legs", scene, text)
+    return loaded("legs", scene, text)
 
 
 def stepped(scene):
     """The module of the scene's fixed-step methods, with `run` and `STATES`."""
     text = _text(scene, build(scene)).lstrip()
-    return _loaded("steps", scene, text)
-
-
-def _loaded(kind, scene, text):
-    """The module of that text."""
-    name = f"{kind}_{scene.name}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
-    if name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(name, _written(name, text))
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[name] = module
-        try:
-            spec.loader.exec_module(module)
-        except BaseException:
-            del sys.modules[name]
-            raise
-    return sys.modules[name]
+    return loaded("steps", scene, text)
