@@ -50,6 +50,10 @@ _NOISE = 100.0
 """Tolerances within which the sign of F - v may be wrong."""
 _FINEST = 3e-15
 """Tolerance of a step that rounding leaves possible."""
+_V_ROUNDING = 1e-14
+"""Of the speed after a half swing."""
+_STEEP_FROM = 1e-8
+"""Change of v1 between two swings whose effect on s is the change's own, not that of their tolerances."""
 _CAREFUL = 1e-5
 """Of a step, the first after a turning point where f' is not smooth: there the estimate of the error is too low."""
 _FORGOTTEN = 40.0
@@ -360,7 +364,8 @@ def dopri5(scene, ripple, rtol):
 
     Newton's method on v1 within a bracket, first with a coarse tolerance, then with one that follows the square of
     its step, and at last with the wanted one. The last swing but one has `_CHECK` times that; what the last two give
-    must agree to 0.3 rtol, or the tolerance is lowered further.
+    must agree to 0.3 rtol, or the tolerance is lowered further. A ripple makes s hang on v1 steeply, a thousandfold at
+    times: how steeply is told by the steps themselves, and what is left of v1's error is counted so.
 
     Parameters
     ----------
@@ -376,15 +381,16 @@ def dopri5(scene, ripple, rtol):
     dry, terms, pace, stiffness = _legs(scene, ripple, rtol)
     zero, turns = 0.0 * e, e > 0.0
     possible = dry[1] - dry[2] > 0.0
-    varied = (terms[2] > 0.0) | (ripple[0] > 0.0)
+    rippled = ripple[0] > 0.0
+    varied = (terms[2] > 0.0) | rippled
     stiff = isnt(stiffness * pace < where(varied, _STIFFEST, _STIFFEST_UNIFORM))
-    share = where((ripple[0] > 0.0) | ((terms[1][0] > 0.0) & (terms[1][1] < 2.0)), _ROUGH_SHARE, _SHARE)
+    share = where(rippled | ((terms[1][0] > 0.0) & (terms[1][1] < 2.0)), _ROUGH_SHARE, _SHARE)
     first = 0.1 / (1.0 + stiffness + sqrt(scene[5]))
 
     slow = pace > 3.0  # friction soon balances the drive: v1 = V, and steps are short whatever the tolerance
     v = where(slow, 1.0 / pace, 2.0 / sqrt(1.0 + 4.0 * pace * pace))
     tolerance = where(slow, _CHECK * _enough(share, rtol, zero, 2.0 * stiffness * pace), _COARSE)
-    low, high, tighter, before = zero - 1.0, zero + math.inf, zero + 1.0, zero + 1.0
+    low, high, tighter, before, steep = zero - 1.0, zero + math.inf, zero + 1.0, zero + 1.0, zero
     cycle = (zero, zero, zero, zero, zero)
     verdict = where(possible, where(stiff, _STEP_LIMIT, _NOT_CONVERGED), _STICKS)
     active = possible & isnt(stiff)
@@ -409,10 +415,12 @@ def dopri5(scene, ripple, rtol):
         at_rest = (end <= 0.0) & (v <= 0.0)
         held = (e >= 0.0) & isnt(1.0 + _pull(top, terms) > rho_s)
         stuck = last_but_one & ((helped & (relative <= 0.2 * rtol)) | at_rest)
+        steep = where(rippled & (before > _STEEP_FROM), apart / before, steep)
         settled = last & isnt(helped) & (relative <= 0.2 * rtol) & (apart <= 0.3 * rtol)
+        settled = settled & (steep * relative <= 0.3 * rtol)
         at_floor = (wanted < _FINEST) & (tolerance < _FINEST) & isnt(helped) & (relative <= rtol)
         done = active & (settled | stuck | at_floor | lost)
-        right = settled & (wanted >= _FINEST)
+        right = settled & (wanted >= _FINEST) & (steep * _V_ROUNDING <= 0.3 * rtol * (1.0 - slope))
         verdict = where(
             done, where(lost, _STEP_LIMIT, where(stuck | held, _STICKS, where(right, _OK, _INACCURATE))), verdict
         )
