@@ -151,22 +151,27 @@ def _pressed(scene, c, s):
 
 
 @call
-def _far_side(u, scene):
-    """Integrand of the second integral of (2), both halves: 2 E(theta, pi) dtheta/du."""
+def _far_side_alone(u, scene):
+    """2 E(theta, pi) dtheta/du, its rounding, and the arm's cosine and sine."""
     arm = scene[0]
     if arm[3]:
         s, c = sincos(u)
         top, bottom, noise = _wear_arm.gaps(arm, c, s)
-        weight, doubt = _pressed(scene, c, s)
-        total = 2.0 * weight * _passage(scene, c, s, top, bottom, (1.0, 0.0))
-        return total, total * (noise + doubt)
+        return 2.0 * _passage(scene, c, s, top, bottom, (1.0, 0.0)), noise, c, s
     eta, top, bottom, growth = _wear_arm.gaps_at(arm, u)
     s, c = sincos(eta)
     if not (top > 0.0 and bottom > 0.0):
-        return 0.0, 0.0
+        return 0.0, 0.0, c, s
+    return 2.0 * growth * _passage(scene, c, s, top, bottom, (1.0, 0.0)), 4.0 * _EPS, c, s
+
+
+@call
+def _far_side(u, scene):
+    """Integrand of the second integral of (2), both halves."""
+    total, noise, c, s = _far_side_alone(u, scene)
     weight, doubt = _pressed(scene, c, s)
-    total = 2.0 * weight * growth * _passage(scene, c, s, top, bottom, (1.0, 0.0))
-    return total, (4.0 * _EPS + doubt) * total
+    total *= weight
+    return total, total * (noise + doubt)
 
 
 @call
@@ -374,10 +379,23 @@ def _centre(scene, angles, number):
 
 
 @jit
-def _uncertain(loaded):
-    """How much more the pressure may be than amid the arm's way."""
+def _weight_about(scene, angle):
+    """Weight of the pressure where the point at psi = pi is at this angle from the arm; its largest for NaN."""
+    _, _, (_, _, _, w, _, _), r, loaded = scene
+    s, c = sincos(angle)
+    if angle == angle:
+        return _wear_load.weight(loaded, -c if r > w else c, s)[0]
     _, count, lowest, largest = loaded
-    return largest / max(lowest, _wear_load.FAINT * largest) if count > 0 else 1.0
+    return 1.0 / max(lowest, _wear_load.FAINT * largest) if count > 0 else 1.0
+
+
+@jit
+def _weight_at_ends(scene, angles, number):
+    """The largest weight of the pressure at the ends of arcs."""
+    most = 0.0
+    for j in range(number):
+        most = max(most, _weight_about(scene, angles[j]))
+    return most
 
 
 @call
@@ -402,7 +420,7 @@ def profile(scene, rtol, work):
     arm, tool, ride, r, loaded = scene
     pool, found, angles, stack, still = work
     x, y, radius, near, far = _circle(scene)
-    number, unsure = _wear_tool.arcs(tool, x, y, radius, near, far, angles, found, stack)
+    number, unsure, about = _wear_tool.arcs(tool, x, y, radius, near, far, angles, found, stack)
     if number < 0:
         return math.nan, math.inf, False
     if stands_still(arm):
@@ -423,9 +441,10 @@ def profile(scene, rtol, work):
     value, error = adapt(integrand, scene, pool, count, rtol)
     if unsure > 0.0:
         way = 1.0 if arm[3] else arm[2][1] - arm[2][0]
-        error += 8.0 * unsure * _far_side(0.0, scene)[0] / way * _uncertain(loaded)
+        error += 8.0 * unsure * _far_side_alone(0.0, scene)[0] / way * _weight_about(scene, about)
     if r == 0.0 and not on_pivot:
-        error += 64.0 * _EPS * (value + _TURN * magnitude(ride[0]) * ride[3] * _uncertain(loaded) / loaded[3])
+        ends = _TURN * magnitude(ride[0]) * ride[3] * _weight_at_ends(scene, angles, number)
+        error += 64.0 * _EPS * (value + ends)
     if on_pivot:
         length = _length_of(angles, number)
         weight, doubt = _at_rest(scene)

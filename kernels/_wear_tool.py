@@ -29,6 +29,8 @@ _NEWTON_LIMIT = 60
 _DEPTH = 64
 _NARROW = 1e-13
 _ROUNDING = 1e-15
+_NEAR = 1e-3
+"""Between angles at which the rest of the scene is much the same."""
 _ASIDE = 0.38
 """Where on an arc it is tried for contact: not amid it, where a circle about the pivot may touch a vertex."""
 STACK = (_DEPTH, 6)
@@ -275,7 +277,8 @@ def sort(values, count):
 def arcs(tool, cx, cy, radius, near, far, angles, found, stack):
     """Arcs of a circle within the tool: their ends in pairs in `angles`, in [-pi, pi]; how many numbers, -1: too many.
 
-    And how much of the circle lies on the outline but for rounding, so that it may be in or out.
+    And how much of the circle lies on the outline but for rounding, so that it may be in or out; and the angle, on
+    either side, that this is about, NaN if it is about several.
 
     `near`, `far`: `vertex_excess` of the vertices at X = a and X = -a where it is known better than from cx, else NaN.
     """
@@ -288,7 +291,7 @@ def arcs(tool, cx, cy, radius, near, far, angles, found, stack):
             start = vertex_excess(piece, tool, cx, mirror * cy, radius)
         number = crossings(piece, tool, cx, mirror * cy, radius, start, found, first, stack)
         if number < 0:
-            return -1, 0.0
+            return -1, 0.0, math.nan
         for j in range(number):
             x, y, _, _, _ = outline(piece, found[j], tool)
             angles[count] = arctan2(mirror * y - cy, x - cx)
@@ -300,8 +303,8 @@ def arcs(tool, cx, cy, radius, near, far, angles, found, stack):
 
 @jit
 def _kept(tool, cx, cy, radius, angles, count):
-    """Keeps those of `count` neighbouring arcs that are within the tool; how many numbers, and how much is unsure."""
-    kept, unsure = 0, 0.0
+    """Keeps those of `count` neighbouring arcs that are within the tool; how many numbers, what is unsure, where."""
+    kept, unsure, about = 0, 0.0, -1.0
     for j in range(count):
         low, high = angles[j], angles[j + 1]
         if high > low:
@@ -309,10 +312,13 @@ def _kept(tool, cx, cy, radius, angles, count):
             beyond = excess(tool, cx + radius * c, cy + radius * s)
             if magnitude(beyond) < _ROUNDING * (tool[2] + tool[3]) * 16.0:
                 unsure += high - low
+                angle = magnitude(0.5 * (low + high))
+                alone = about < 0.0 or magnitude(about - angle) < _NEAR
+                about = angle if alone and high - low < _NEAR else math.nan
             if beyond < 0.0:
                 if kept > 0 and not angles[kept - 1] < low:
                     angles[kept - 1] = high
                 else:
                     angles[kept], angles[kept + 1] = low, high  # kept <= j: what is read later is not overwritten
                     kept += 2
-    return kept, unsure
+    return kept, unsure, about

@@ -107,6 +107,25 @@ def test_under_a_load_wear_is_that_of_time_and_arcs_over_the_area_of_contact(rad
 
 
 @pytest.mark.skipif(not COMPILED, reason="thousands of areas")
+def test_a_ring_that_the_loaded_tool_just_touches_is_as_sure_as_under_a_pressure():
+    changed = {"w_x": 56.0, "w_y": 0.0, "tool_a": 4.0, "tool_b": 4.0, "e": 10.0}
+    loaded, error, status = wear([2.0, 4.0], rtol=1e-6, **changed, **LOAD, workpiece_radius=10.0)
+    pressed, _, _ = wear([2.0, 4.0], **changed)
+    assert status == Status.OK
+    assert error[0] < 1e-9 * loaded[1]
+    assert loaded[0] == pressed[0] == 0.0
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of areas")
+def test_under_a_load_the_centre_is_right_though_the_tool_may_leave_the_work():
+    changed = {"w_x": 54.0, "w_y": 0.0, "tool_a": 5.0, "tool_b": 5.0}
+    value, error, status = wear([0.0, 1e-6], **changed, **LOAD, workpiece_radius=3.0)
+    assert status == Status.OK
+    assert error[0] < 1e-8 * value[0]
+    assert value[1] == pytest.approx(value[0], rel=1e-5)
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of areas")
 def test_of_a_tool_within_the_rim_load_over_its_area_is_the_pressure():
     for changed, area in (({}, 25 * math.pi), ({"tool_n": 1.0, "tool_m": 1.0, "tool_b": 8.0}, 80.0)):
         pressed, _, _ = wear([2.0, 6.0], pressure=3.0 / area, **changed)
