@@ -1,7 +1,8 @@
 """How evenly does a polishing machine wear a turning workpiece, and what do eccentricity and offset do for it?
 
     sweep run studies/polisher_wear.toml
-    python studies/polisher_wear.py polisher_wear.h5
+    sweep run studies/polisher_wear_load.toml
+    python studies/polisher_wear.py polisher_wear.h5 polisher_wear_load.h5
 
 draws polisher_wear.png and prints conclusions. The unevenness of a profile is the standard deviation of the wear over
 the area of the workpiece, over its mean; 0 is even.
@@ -60,6 +61,24 @@ def centre(ds: xr.Dataset) -> Statement:
     )  # fmt: skip
 
 
+def edge(ds: xr.Dataset, load: xr.Dataset) -> list[Statement]:
+    """What a constant load does where the tool hangs over the edge."""
+    pressed = ds.wear.sel(tool_n=2).isel(tool_b=0).sel(e=USUAL, method="nearest")
+    ratio = load.wear.isel(radius=-1) / pressed.interp(radius=load.radius[-1]).sel(w_x=load.w_x, method="nearest")
+    texts = [f"{float(r):.3g} at {MM * float(r.w_x - ds.L):.0f} mm" for r in ratio]
+    least = float((load.wear / load.wear.isel(radius=0)).isel(w_x=0).min())
+    return [
+        Statement(
+            "disc: load over pressure, 2 mm from the edge, by offset",
+            "> 1",
+            ", ".join(texts),
+            None,
+            bool((ratio > 1).all()),
+        ),
+        Statement("disc, no offset: least wear over that of the centre", "", f"{least:.3g}"),
+    ]
+
+
 def worst_error(ds: xr.Dataset) -> Statement:
     """How far the numbers may be off."""
     worst = float((ds.wear_error / ds.wear.max("radius")).max())
@@ -111,16 +130,17 @@ SHAPES = (
 )
 
 
-def statements(ds: xr.Dataset) -> Groups:
+def statements(ds: xr.Dataset, load: xr.Dataset) -> Groups:
     """Every line of the table, by heading."""
     return {
         "Numbers": [centre(ds), worst_error(ds)],
         "Offset": offsets(ds),
         "Eccentricity": eccentricities(ds),
+        "Constant load": edge(ds, load),
     }
 
 
-def figure(ds: xr.Dataset) -> Any:
+def figure(ds: xr.Dataset, load: xr.Dataset) -> Any:
     """Profiles of three tools, and how uneven they are over offset and eccentricity; for two columns of print."""
     from sweep import charts
 
@@ -129,7 +149,7 @@ def figure(ds: xr.Dataset) -> Any:
         upper, lower = page.subplots(2, 3)
         for k, (name, n, b) in enumerate(SHAPES[:3]):
             tool = ds.sel(tool_n=n).sel(tool_b=b, method="nearest")
-            draw_profiles(upper[k], tool, name, k)
+            draw_profiles(upper[k], tool, name, k, load if k == 0 else None)
             mesh = draw_map(lower[k], tool, k)
             charts.letter(upper[k], "abc"[k])
             charts.letter(lower[k], "def"[k])
@@ -137,17 +157,23 @@ def figure(ds: xr.Dataset) -> Any:
     return page
 
 
-def draw_profiles(axes: Any, tool: xr.Dataset, name: str, k: int) -> None:
-    """Wear along the radius at some offsets."""
+def draw_profiles(axes: Any, tool: xr.Dataset, name: str, k: int, load: xr.Dataset | None) -> None:
+    """Wear along the radius at some offsets; dashed under a constant load."""
     from sweep.charts import COLOURS
 
     for j, place in enumerate(PROFILES):
         line = tool.wear.sel(e=USUAL, method="nearest").sel(w_x=place, method="nearest")
         offset = MM * float(line.w_x - tool.L)
         axes.plot(MM * line.radius, UM_PER_HOUR * line, color=COLOURS[j], label=f"{offset:.0f} mm")
+        if load is not None:
+            dashed = load.wear.sel(w_x=place, method="nearest")
+            axes.plot(MM * dashed.radius, UM_PER_HOUR * dashed, "--", color=COLOURS[j], linewidth=0.9)
     axes.set(xlabel="radius (mm)", title=f"{name}, $e=100$ mm", xlim=(0, 100), ylim=(0, None))
-    if k == 0:
+    if load is not None:
         axes.set_ylabel("wear (µm/h)")
+        axes.plot([], [], "k--", linewidth=0.9, label="constant load")
+        axes.legend(handles=axes.lines[-1:], loc="upper center")
+    if k == 2:
         axes.legend(title="offset", loc="upper right")
 
 
@@ -168,15 +194,16 @@ def read(path: str) -> xr.Dataset:
     return scaled(read_result(path, "polisher_wear", ["tool_n", "tool_b", "e", "w_x"], "polisher_wear.toml"))
 
 
-def conclude(path: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, loaded: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
     ds = read(path)
-    return statements(ds), [NOTES], figure(ds)
+    load = read_result(loaded, "polisher_wear", ["w_x"], "polisher_wear_load.toml")
+    return statements(ds, load), [NOTES], figure(ds, load)
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["polisher_wear.h5"], arguments, conclude)
+    """Table and figure of the results that are named; 1 if a statement does not hold."""
+    return report(__file__, ["polisher_wear.h5", "polisher_wear_load.h5"], arguments, conclude)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,7 @@
 """What the study of the polisher's wear concludes is so, on a coarse grid."""
 
+from dataclasses import replace
+
 import numpy as np
 import polisher_wear as study
 import pytest
@@ -31,6 +33,16 @@ def result(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def loaded(result):
+    """The study of a constant load, at three radii."""
+    path = result.with_name("polisher_wear_load.h5")
+    made = sweep.read_study(study.__file__.replace(".py", "_load.toml"))
+    made = replace(made, along={"radius": np.array([0.0, 0.05, 0.098])}, rtol=1e-4)
+    sweep.run(made, path, workers=1).close()
+    return path
+
+
+@pytest.fixture(scope="module")
 def ds(result):
     return study.read(str(result))
 
@@ -42,8 +54,8 @@ def test_the_study_file_has_the_grid_the_conclusions_need():
     assert {round(100 * x) for x in read.axes["w_x"].values} >= {50, 54, 56, 58}
 
 
-def test_the_study_draws_its_figure_and_every_statement_holds(result, capsys):
-    assert study.main([str(result)]) == 0
+def test_the_study_draws_its_figure_and_every_statement_holds(result, loaded, capsys):
+    assert study.main([str(result), str(loaded)]) == 0
     text = capsys.readouterr().out
     assert " NO" not in text
     assert "ECCENTRICITY" in text
@@ -63,3 +75,9 @@ def test_a_false_wear_makes_the_statements_fail(ds):
     even = ds.assign(uneven=ds.uneven * 0 + 0.3)
     assert not any(s.holds for s in study.offsets(even))
     assert not study.eccentricities(even)[0].holds
+
+
+def test_a_load_that_spares_the_edge_makes_the_statement_fail(ds, loaded):
+    with sweep.open_result(loaded) as load:
+        assert study.edge(ds, load)[0].holds
+        assert not study.edge(ds, load.assign(wear=0.1 * load.wear))[0].holds
