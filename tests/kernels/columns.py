@@ -1,5 +1,10 @@
 """Columns for tests of kernels."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 from mpmath import mp, mpf
 
@@ -55,3 +60,18 @@ def relative_error(values, truths):
     """abs(value/truth - 1), each taken in high precision."""
     with mp.workdps(60):
         return np.array([float(abs(mpf(float(v)) / t - 1)) for v, t in zip(values, truths, strict=True)])
+
+
+def printed_both_ways(program):
+    """What a program prints compiled, and as plain Python; it runs in the project's folder."""
+    return tuple(
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env={**os.environ, "NUMBA_DISABLE_JIT": switch},
+            cwd=Path(__file__).parents[2],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for switch in ("0", "1")
+    )

@@ -1,14 +1,9 @@
 """The balance's ring-down against 100 digits, where the last digit decides, and against its own laws."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import balance_oracles as oracles
 import numpy as np
 import pytest
-from columns import bounds, checked, relative_error, solve
+from columns import bounds, checked, printed_both_ways, relative_error, solve
 from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
@@ -18,7 +13,6 @@ from kernels.balance import BALANCE
 from kernels.balance_trace import BALANCE_TRACE
 from kernels.interface import Status
 
-ROOT = Path(__file__).parents[2]
 NAMES = ("half_swings", "stop_angle", "stop_time", "margin", "period")
 METHODS = tuple(m.name for m in BALANCE.methods)
 SOME = 200 if COMPILED else 12
@@ -407,15 +401,10 @@ print(*(float(v).hex() for v in outputs["turning_point"].ravel()), *status)
 """
 
 
+@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
 def test_plain_python_gives_the_bits_of_compiled_code():
-    printed = [
-        subprocess.run(
-            [sys.executable, "-c", PLAIN],
-            env={**os.environ, "NUMBA_DISABLE_JIT": switch}, cwd=ROOT, capture_output=True, text=True, check=True,
-        ).stdout
-        for switch in ("0", "1")
-    ]  # fmt: skip
-    assert printed[0] == printed[1] != ""
+    compiled, plain = printed_both_ways(PLAIN)
+    assert compiled == plain != ""
 
 
 @pytest.mark.parametrize(

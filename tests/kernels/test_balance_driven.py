@@ -1,14 +1,9 @@
 """The driven balance against 40 digits of two motions that meet, against its formulas, and where it sticks."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import balance_oracles as oracles
 import numpy as np
 import pytest
-from columns import bounds, checked, relative_error, solve
+from columns import bounds, checked, printed_both_ways, relative_error, solve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp, mpf
@@ -17,7 +12,6 @@ from kernels._jit import COMPILED
 from kernels.balance_driven import BALANCE_DRIVEN
 from kernels.interface import FIRST_REFUSAL, Status
 
-ROOT = Path(__file__).parents[2]
 NAMES = ("amplitude", "period", "multiplier")
 METHODS = tuple(m.name for m in BALANCE_DRIVEN.methods)
 SOME = 14 if COMPILED else 3
@@ -236,15 +230,10 @@ for method in ("closed", "newton"):
 """
 
 
+@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
 def test_plain_python_gives_the_bits_of_compiled_code():
-    printed = [
-        subprocess.run(
-            [sys.executable, "-c", PLAIN],
-            env={**os.environ, "NUMBA_DISABLE_JIT": switch}, cwd=ROOT, capture_output=True, text=True, check=True,
-        ).stdout
-        for switch in ("0", "1")
-    ]  # fmt: skip
-    assert printed[0] == printed[1] != ""
+    compiled, plain = printed_both_ways(PLAIN)
+    assert compiled == plain != ""
 
 
 @pytest.mark.parametrize(

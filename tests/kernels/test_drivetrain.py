@@ -1,14 +1,9 @@
 """Reduced drivetrains against 50 digits, against the source's tables, and against their own laws."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 import reduction_oracles as oracles
-from columns import checked, relative_error, solve
+from columns import checked, printed_both_ways, relative_error, solve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,7 +11,6 @@ from kernels._jit import COMPILED
 from kernels.drivetrain import DRIVETRAIN, ORDERS, REDUCTIONS
 from kernels.interface import Status
 
-ROOT = Path(__file__).parents[2]
 BASES = ("guyan", "irs", "craig_bampton", "modal")
 REDUCING = ("rivin", *BASES, "exact")
 FULA = {
@@ -374,12 +368,7 @@ for code in range(7):
 """
 
 
+@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
 def test_plain_python_gives_the_bits_of_compiled_code():
-    printed = [
-        subprocess.run(
-            [sys.executable, "-c", PLAIN],
-            env={**os.environ, "NUMBA_DISABLE_JIT": switch}, cwd=ROOT, capture_output=True, text=True, check=True,
-        ).stdout
-        for switch in ("0", "1")
-    ]  # fmt: skip
-    assert printed[0] == printed[1] != ""
+    compiled, plain = printed_both_ways(PLAIN)
+    assert compiled == plain != ""

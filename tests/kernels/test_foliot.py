@@ -1,14 +1,9 @@
 """The viscous foliot against 50 digits, against waiting for the cycle, and against its own laws."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import oracles
 import pytest
-from columns import bounds, checked, relative_error, solve
+from columns import bounds, checked, printed_both_ways, relative_error, solve
 from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mpf
@@ -17,7 +12,6 @@ from kernels._jit import COMPILED
 from kernels.foliot import FOLIOT
 from kernels.interface import Status
 
-ROOT = Path(__file__).parents[2]
 NAMES = ("period", "amplitude", "crossing_speed", "sensitivity", "multiplier")
 SOME = 400 if COMPILED else 12
 
@@ -127,15 +121,10 @@ print(*(float(v).hex() for column in outputs.values() for v in column))
 """
 
 
+@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
 def test_plain_python_gives_the_bits_of_compiled_code():
-    printed = [
-        subprocess.run(
-            [sys.executable, "-c", PLAIN],
-            env={**os.environ, "NUMBA_DISABLE_JIT": switch}, cwd=ROOT, capture_output=True, text=True, check=True,
-        ).stdout
-        for switch in ("0", "1")
-    ]  # fmt: skip
-    assert printed[0] == printed[1] != ""
+    compiled, plain = printed_both_ways(PLAIN)
+    assert compiled == plain != ""
 
 
 @pytest.mark.parametrize("alpha", [0.02, 1.0, 1.46299058758010465706, 30.0])

@@ -2,15 +2,11 @@
 
 import functools
 import itertools
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import impact_oracles as oracles
 import numpy as np
 import pytest
-from columns import bounds, checked, solve
+from columns import bounds, checked, printed_both_ways, solve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp, mpf
@@ -20,7 +16,6 @@ from kernels._jit import COMPILED
 from kernels.impact import IMPACT
 from kernels.interface import FIRST_REFUSAL, Status
 
-ROOT = Path(__file__).parents[2]
 NAMES = tuple(f.name for f in IMPACT.outputs)
 METHODS = ("closed", "map")
 WORST = 1.2e-15
@@ -382,16 +377,10 @@ for method in ("closed", "map"):
 """
 
 
-@pytest.mark.skipif(not COMPILED, reason="compiles")
+@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
 def test_plain_python_gives_the_bits_of_compiled_code():
-    printed = [
-        subprocess.run(
-            [sys.executable, "-c", PLAIN],
-            env={**os.environ, "NUMBA_DISABLE_JIT": switch}, cwd=ROOT, capture_output=True, text=True, check=True,
-        ).stdout
-        for switch in ("0", "1")
-    ]  # fmt: skip
-    assert printed[0] == printed[1] != ""
+    compiled, plain = printed_both_ways(PLAIN)
+    assert compiled == plain != ""
 
 
 GOOD = (1.0, 1.0, 1.0, 1.0, 1.0, 3.0, 0.1, 0.2, 0.0)

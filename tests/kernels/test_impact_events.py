@@ -1,21 +1,15 @@
 """Impact clocks followed contact by contact: against the closed cycle, a plain simulation, and the laws of impact."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import impact_simulation as simulation
 import numpy as np
 import pytest
-from columns import solve
+from columns import printed_both_ways, solve
 
 from kernels import _impact_contact, _impact_events, _impact_swing
 from kernels._jit import COMPILED
 from kernels.impact import IMPACT
 from kernels.interface import FIRST_REFUSAL, Status
 
-ROOT = Path(__file__).parents[2]
 TEETH, RADIUS, INERTIA = 31.0, 0.03, 1e-5
 PITCH = 2 * np.pi * RADIUS / TEETH
 
@@ -349,13 +343,7 @@ print(status.tolist(), [[v.hex() for v in column.tolist()] for column in outputs
 """
 
 
-@pytest.mark.skipif(not COMPILED, reason="compiles")
+@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
 def test_plain_python_gives_the_bits_of_compiled_code():
-    printed = [
-        subprocess.run(
-            [sys.executable, "-c", PLAIN],
-            env={**os.environ, "NUMBA_DISABLE_JIT": switch}, cwd=ROOT, capture_output=True, text=True, check=True,
-        ).stdout
-        for switch in ("0", "1")
-    ]  # fmt: skip
-    assert printed[0] == printed[1] != ""
+    compiled, plain = printed_both_ways(PLAIN)
+    assert compiled == plain != ""

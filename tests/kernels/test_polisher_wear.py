@@ -1,21 +1,16 @@
 """Wear along the radius against integration over time and arcs, closed forms, its own laws, and at its limits."""
 
 import math
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import wear_oracles as oracles
-from columns import checked, solve
+from columns import checked, printed_both_ways, solve
 
 from kernels._jit import COMPILED
 from kernels.interface import Status
 from kernels.polisher_wear import POLISHER_WEAR
 
-ROOT = Path(__file__).parents[2]
 PAPER = {
     "b": 62.01, "d": 38.0, "f": 40.5, "e": 10.0, "type": 0.0, "omega": 1.0, "b_angle": -0.66, "L": 50.0, "beta": 0.0,
     "w_x": 50.0, "w_y": 1.0, "Omega": 0.4, "tool_a": 5.0, "tool_b": 5.0, "tool_n": 2.0, "tool_m": 2.0, "preston": 1.0,
@@ -330,15 +325,10 @@ print(*(float(v).hex() for column in outputs.values() for v in column.ravel()), 
 """
 
 
+@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
 def test_plain_python_gives_the_bits_of_compiled_code():
-    printed = [
-        subprocess.run(
-            [sys.executable, "-c", PLAIN],
-            env={**os.environ, "NUMBA_DISABLE_JIT": switch}, cwd=ROOT, capture_output=True, text=True, check=True,
-        ).stdout
-        for switch in ("0", "1")
-    ]  # fmt: skip
-    assert printed[0] == printed[1] != ""
+    compiled, plain = printed_both_ways(PLAIN)
+    assert compiled == plain != ""
 
 
 @pytest.mark.parametrize("shape", [0.5, 1.0, 2.0])
