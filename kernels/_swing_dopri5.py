@@ -52,8 +52,8 @@ _FINEST = 3e-15
 """Tolerance of a step that rounding leaves possible."""
 _V_ROUNDING = 1e-14
 """Of the speed after a half swing."""
-_STEEP_FROM = 1e-8
-"""Change of v1 between two swings whose effect on s is the change's own, not that of their tolerances."""
+_STEEP_FROM, _STEEP_TO = 1e-8, 0.03
+"""Changes of v1 between two swings, near the cycle, whose effect on s is their own, not that of the tolerances."""
 _CAREFUL = 1e-5
 """Of a step, the first after a turning point where f' is not smooth: there the estimate of the error is too low."""
 _FORGOTTEN = 40.0
@@ -415,7 +415,8 @@ def dopri5(scene, ripple, rtol):
         at_rest = (end <= 0.0) & (v <= 0.0)
         held = (e >= 0.0) & isnt(1.0 + _pull(top, terms) > rho_s)
         stuck = last_but_one & ((helped & (relative <= 0.2 * rtol)) | at_rest)
-        steep = where(rippled & (before > _STEEP_FROM), apart / before, steep)
+        telling = rippled & (before > _STEEP_FROM) & (before < _STEEP_TO)
+        steep = where(telling, _larger(steep, apart / before), steep)
         settled = last & isnt(helped) & (relative <= 0.2 * rtol) & (apart <= 0.3 * rtol)
         settled = settled & (steep * relative <= 0.3 * rtol)
         at_floor = (wanted < _FINEST) & (tolerance < _FINEST) & isnt(helped) & (relative <= rtol)
