@@ -146,6 +146,7 @@ STEEP = (
 """mu, phi0, R, k, depth, harmonic and rtol where s hangs on the speed at the switch a hundredfold and more."""
 
 
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
 @pytest.mark.parametrize("cell", STEEP)
 def test_a_sensitivity_that_hangs_steeply_on_the_speed_is_right_or_said_not_to_be(cell):
     *values, rtol = cell
