@@ -43,13 +43,7 @@ def dop853_tried(m, state, scene, h):
     new, stages = dop853_stages(m, state, scene, h)
     nothing = times(0.0, state)
     fifth, third = after(nothing, h, DOP853_ERROR_5, stages), after(nothing, h, DOP853_ERROR_3, stages)
-    worst_5, worst_3 = 0.0 * h, 0.0 * h
-    for i in range(len(state)):
-        start, end = magnitude(state[i]), magnitude(new[i])
-        size = fma(magnitude(h), magnitude(stages[0][i]), where(start > end, start, end))
-        size = where(size > 0.0, size, 1.0)
-        e5, e3 = magnitude(fifth[i]) / size, magnitude(third[i]) / size
-        worst_5, worst_3 = where(e5 <= worst_5, worst_5, e5), where(e3 <= worst_3, worst_3, e3)
+    worst_5, worst_3 = of_size(state, new, stages[0], h, fifth), of_size(state, new, stages[0], h, third)
     total = fma(0.01 * worst_3, worst_3, worst_5 * worst_5)
     return new, stages, rate(m, new, scene), where(total <= 0.0, 0.0, worst_5 * worst_5 / sqrt(total))
 

@@ -100,8 +100,8 @@ class _Cache(FunctionCache):
 
 
 def enable(dispatcher):
-    """Keeps the compiled versions of a function of this package on the disk."""
-    own = Path(dispatcher.py_func.__code__.co_filename).parent == PACKAGE
+    """Keeps the compiled versions of a function of this package, or of what it wrote into FOLDER, on the disk."""
+    own = Path(dispatcher.py_func.__code__.co_filename).parent in (PACKAGE, FOLDER)
     if own and FOLDER is not None:
         dispatcher._cache = _Cache(dispatcher.py_func)
     return dispatcher

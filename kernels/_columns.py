@@ -62,6 +62,19 @@ def entry(*shared):
     return decorate
 
 
+def entry_of_cells(function):
+    """As `entry`, for what takes one cell at a time: few cells are not filled up, and columns may be read-only."""
+    ready = entry(*inspect.signature(function).parameters)(
+        function if COMPILED else np.errstate(all="ignore")(function)
+    )
+
+    @functools.wraps(ready)
+    def call(*columns):
+        ready(*(c if c.flags.writeable else c.copy() for c in columns))
+
+    return call
+
+
 def _filled_up(compiled, columns, per_cell):
     n = len(columns[0])
     rows = np.minimum(np.arange(WIDTH), n - 1)

@@ -6,33 +6,15 @@ and returns whether one has finished; i is the index of all lanes, or 0 in plain
 """
 
 import numpy as np
-from numba import types
 
 from kernels._jit import COMPILED, jit
-from kernels._lanes import WIDTH, _function, lanes_at
+from kernels._lanes import WIDTH, lanes_at
 
 LANES = WIDTH if COMPILED else 1
 IDLE, FRESH, MOVING, DONE = 0.0, 1.0, 2.0, 3.0
 """Stages of a lane; `advance` begins a fresh one and says when it is done."""
 
 _index_of_all = lanes_at if COMPILED else int
-
-
-def align_stack(lanes):
-    """Makes the function that calls it keep its registers of lanes on whole cache lines: half the time of its loops.
-
-    LLVM aligns the stack for what it lays there itself, but not for registers that it runs out of.
-    """
-
-
-def _lower_align_stack(context, builder, signature, values):
-    attributes = builder.function.attributes
-    attributes.add("nounwind")  # llvmlite writes no alignment where it stands alone
-    attributes.alignstack = 64
-    return context.get_dummy_value()
-
-
-_function(align_stack, 1, lambda lanes: types.void, _lower_align_stack)
 
 
 @jit

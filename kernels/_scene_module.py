@@ -18,7 +18,7 @@ import numpy as np
 
 from kernels import _cache
 from kernels._expression import DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, needed
-from kernels._jit import COMPILED, jit_call
+from kernels._jit import COMPILED, cached
 from kernels._scene_graph import record
 from kernels._taylor_core import CORE, core
 from kernels._taylor_leg import LEG, leg
@@ -40,7 +40,7 @@ import math
 
 from kernels._jit import jit, jit_call
 from kernels._lanes import choose, dot, exponent, fma, horner, isnt, magnitude, pow2, some, sqrt, where
-from kernels._refill import LANES, align_stack, each_refilled
+from kernels._refill import each_refilled
 from kernels._scene_module import kept
 from kernels._taylor import (
     GRAZING, HALVINGS, LONGEST, SLACK, STEP_LIMIT, clear, falls, integral, keeps, last_term, mean, natural_power,
@@ -219,12 +219,7 @@ class Writer:
 
 def kept(function):
     """A function called from Python, whose machine code is kept: its file is named by all it was made from."""
-    if not COMPILED:
-        return _quiet(function)
-    compiled = jit_call(function)
-    if _cache.FOLDER is not None and Path(function.__code__.co_filename).parent == _cache.FOLDER:
-        compiled._cache = _cache._Cache(function)
-    return compiled
+    return cached(function) if COMPILED else _quiet(function)
 
 
 def _quiet(function):

@@ -20,7 +20,7 @@ from collections import namedtuple
 from kernels._fixed_step import follow
 from kernels._jit import jit, jit_call
 from kernels._lanes import fma, magnitude, some, where
-from kernels._refill import LANES, align_stack, each_refilled
+from kernels._refill import each_refilled
 from kernels._scene_module import kept
 
 scene = sys.modules["{module}"]
@@ -89,7 +89,6 @@ def advance(memory, i):
 @kept
 def run(inputs, results, together):
     """Each cell, a column of `inputs`, until its last switch."""
-    align_stack(LANES)
     each_refilled(advance, inputs, results, {rows}, together)
 '''
 

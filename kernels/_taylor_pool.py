@@ -91,7 +91,6 @@ def advance_{order}(memory, i):
 @kept
 def run_{order}(inputs, results, together):
     """Each cell, a column of `inputs`, until its last switch."""
-    align_stack(LANES)
     each_refilled(advance_{order}, inputs, results, {rows}, together)
 '''
 

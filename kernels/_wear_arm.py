@@ -13,15 +13,15 @@ offset beta are mirrored at the frame. Source: derived here from Cordero-Davila 
 
 import math
 
+from kernels._jit import jit_call
 from kernels._lanes import magnitude, sqrt
-from kernels._wear_call import call
 from kernels._wear_tool import arctan2, sincos
 
 _DOUBT = 4.0 * 2.0**-52
 """What rounding comes to in the angle of the arm: where it all but turns, its dwell knows it a million times worse."""
 
 
-@call
+@jit_call
 def arm_of(lengths, margin):
     """The arm: its lengths, the two constants of (3), its least and largest angle, and whether it turns fully.
 
@@ -36,7 +36,7 @@ def arm_of(lengths, margin):
     return lengths, (unit, low, high), (least, most), e > b
 
 
-@call
+@jit_call
 def gaps(arm, c, s):
     """(3): (f+e)^2 - q^2 and q^2 - (f-e)^2 of the arm at (cos eta, sin eta) = (c, s), and their rounding, relative."""
     unit, low, high = arm[1]
@@ -46,7 +46,7 @@ def gaps(arm, c, s):
     return top, bottom, _DOUBT * unit * ((magnitude(s) + cosine2) / top + (magnitude(s) + sine2) / bottom)
 
 
-@call
+@jit_call
 def gaps_at(arm, u):
     """As `gaps` where eta lies a share (1 + sin u)/2 of the way from least to most, without rounding; d eta/du."""
     least, most = arm[2]
@@ -60,7 +60,7 @@ def gaps_at(arm, u):
     return eta, top, bottom, 2.0 * half * up * far
 
 
-@call
+@jit_call
 def strokes(arm, c, s, top, bottom):
     """alpha' of the stroke back, abs(dtheta/d alpha) there, both of the stroke forth; (2). 0: no such stroke."""
     b, d, f, e = arm[0]

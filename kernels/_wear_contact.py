@@ -11,9 +11,8 @@ misjudge counts as noise. Source: derived here; (2) is DLMF 8.17.7.
 import math
 
 from kernels import _wear_tool
-from kernels._jit import jit
+from kernels._jit import jit, jit_call
 from kernels._lanes import magnitude, sqrt
-from kernels._wear_call import call
 from kernels._wear_tool import PIECES, arctan2, outline, power, sincos
 
 POINTS = (2 * (_wear_tool.ARC_LIMIT + 2 * PIECES), 3)
@@ -25,7 +24,7 @@ _SLACK = 1e-9
 _TURN = 2.0 * math.pi
 
 
-@call
+@jit_call
 def _beta(x, k, j):
     """(2) over `small`."""
     z = 0.5 * power(x, max(1.0, k))
@@ -38,7 +37,7 @@ def _beta(x, k, j):
     return total
 
 
-@call
+@jit_call
 def sector(piece, x, tool):
     """Area between the tool's centre and its outline from 0 to x of a piece, and X and Y there."""
     a, b, n, m, _, _ = tool
@@ -48,13 +47,13 @@ def sector(piece, x, tool):
     return a * b * (magnitude(px) / a * (_beta(x, n, m) - 0.5 * (1.0 - missing / b))), px, py
 
 
-@call
+@jit_call
 def whole_area(tool):
     """Area of the tool."""
     return 4.0 * (sector(0.0, 1.0, tool)[0] + sector(1.0, 1.0, tool)[0])
 
 
-@call
+@jit_call
 def _outline_within(piece, mirror, tool, disc, count, room):
     """Adds the points of half a piece on the disc's edge; its share of (1), what it may be wrong by, and the count."""
     cx, cy, radius = disc
@@ -107,7 +106,7 @@ def _bulge(t):
     return t * y / 6.0 * (1.0 - y / 20.0 * (1.0 - y / 42.0 * (1.0 - y / 72.0 * (1.0 - y / 110.0 * (1.0 - y / 156.0)))))
 
 
-@call
+@jit_call
 def _arc_within(tool, disc, one, two, turn):
     """Share of (1) of the arc of the disc's edge between two points, by about `turn`, and what it may be wrong by."""
     cx, cy, radius = disc
@@ -137,7 +136,7 @@ def _sort_points(points, count):
         points[j, 0], points[j, 1], points[j, 2] = angle, x, y
 
 
-@call
+@jit_call
 def _edge_within(tool, disc, points, count):
     """Share of (1) of all arcs of the disc's edge within the tool, and what it may be wrong by."""
     if count == 0:
@@ -155,7 +154,7 @@ def _edge_within(tool, disc, points, count):
     return total, noise
 
 
-@call
+@jit_call
 def contact_area(tool, whole, disc, room):
     """Area of the tool within the disc (centre in the tool's frame, radius), and what it may be wrong by.
 

@@ -13,10 +13,9 @@ import math
 import numpy as np
 
 from kernels import _wear_contact, _wear_scene, _wear_tool
-from kernels._jit import jit
+from kernels._jit import jit, jit_call
 from kernels._lanes import magnitude, sqrt
 from kernels._vecmath import in_unit
-from kernels._wear_call import call
 from kernels._wear_tool import arctan2, sincos
 
 PANEL_LIMIT = 1024
@@ -40,7 +39,7 @@ _COSINES = np.cos(np.pi * np.outer(np.arange(NODES + _TESTS), np.arange(NODES) +
 _TRIED = 0.83, -0.41
 
 
-@call
+@jit_call
 def room():
     """Memory for a table, and for building it."""
     return (
@@ -55,7 +54,7 @@ def unloaded(table):
     return table, int(0.0), 1.0, 1.0
 
 
-@call
+@jit_call
 def _area_at(phi, scene, spots):
     """Area of contact with the arm at phi from the direction of w, and what it may be wrong by."""
     tool, whole, reach, w, radius = scene
@@ -70,7 +69,7 @@ def _folded(phi):
     return _TURN - phi if phi > math.pi else phi
 
 
-@call
+@jit_call
 def _stops(scene, stops):
     """Angles between which the table's panels are opened: an even grid, and where the rim passes vertices; how many."""
     (a, b, _, _, half_x, half_y), _, reach, w, radius = scene
@@ -91,7 +90,7 @@ def _stops(scene, stops):
     return count
 
 
-@call
+@jit_call
 def _passes(arm, turn, low, high):
     """Whether the arm comes to an angle phi between low and high, on either side."""
     if arm[3]:
@@ -105,7 +104,7 @@ def _passes(arm, turn, low, high):
     return False
 
 
-@call
+@jit_call
 def _polynomial(row, t):
     """Value of a panel at t in [-1, 1], by Clenshaw's recurrence."""
     one, two = 0.0, 0.0
@@ -114,7 +113,7 @@ def _polynomial(row, t):
     return t * one - two + row[FIRST]
 
 
-@call
+@jit_call
 def _fit(row, low, high, scene, values, spots):
     """Fills a panel; its least and largest area, and the least noise of its values.
 
@@ -142,7 +141,7 @@ def _fit(row, low, high, scene, values, spots):
     return least, most, calm
 
 
-@call
+@jit_call
 def table_of(arm, tool, ride, radius, tolerance, memory):
     """The areas of contact of a machine: table, its panels, and the least and largest area that its tool may have.
 
@@ -173,7 +172,7 @@ def table_of(arm, tool, ride, radius, tolerance, memory):
     return table, count, lowest, largest
 
 
-@call
+@jit_call
 def areas(p, rtol, memory):
     """The areas of contact of a cell with these parameters, in its unit of length; `unloaded` where none are needed."""
     arm, _, _, verdict = _wear_scene.arm_without_units(p[0], p[1], p[2], p[3])
@@ -183,7 +182,7 @@ def areas(p, rtol, memory):
     return table_of(arm, tool, ride, in_unit(p[19], unit), max(_SHARE * rtol, 4.0 * _EPS), memory)
 
 
-@call
+@jit_call
 def shared(p, rtol, q, rtol_q):
     """Whether two cells have the same areas of contact, to the same tolerance."""
     for k in range(20):
@@ -192,7 +191,7 @@ def shared(p, rtol, q, rtol_q):
     return rtol == rtol_q and (p[18] > 0.0) == (q[18] > 0.0)
 
 
-@call
+@jit_call
 def weight(loaded, c, s):
     """1/A at the angle (cos phi, sin phi) = (c, s), what it may be wrong by, and a bound on its slope, both relative.
 

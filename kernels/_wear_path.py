@@ -12,10 +12,9 @@ Time goes in steps of a share of the crank's turn; whole turns are taken off wit
 import math
 
 from kernels import _linkage
-from kernels._jit import jit
+from kernels._jit import jit, jit_call
 from kernels._lanes import fma, magnitude, nearest, sqrt
 from kernels._pairs import two_product
-from kernels._wear_call import call
 from kernels._wear_tool import excess, power, sincos
 
 STEPS = 24
@@ -30,7 +29,7 @@ _MARGIN = 1.5
 _BISECTIONS = 80
 
 
-@call
+@jit_call
 def position(scene, cranked, turned, s):
     """X, Y and their rates at a time s after the crank had turned by `cranked` and the point was at `turned`."""
     (lengths, margin, side, b_angle), (speed, spin, reach, x, y, beta), r, _ = scene
@@ -50,7 +49,7 @@ def position(scene, cranked, turned, s):
     )
 
 
-@call
+@jit_call
 def facing(scene, cranked, s):
     """Cosine and sine of the arm's angle from the direction of w at a time s."""
     (lengths, margin, side, b_angle), (speed, _, _, x, y, beta), _, _ = scene
@@ -63,7 +62,7 @@ def facing(scene, cranked, s):
     return (x * cosine_arm + y * sine_arm) / w, (x * sine_arm - y * cosine_arm) / w
 
 
-@call
+@jit_call
 def bend(scene):
     """(1), from samples of the arm's motion that are dense about the dead points, half as much again."""
     (lengths, margin, side, _), (speed, spin, _, x, y, _), r, _ = scene
@@ -88,7 +87,7 @@ def _range(x, y, spread):
     return (0.0 if low * high <= 0.0 else min(magnitude(low), magnitude(high))), max(magnitude(low), magnitude(high))
 
 
-@call
+@jit_call
 def _rate_bounds(size, k, x1, x2, spread, v, turn):
     """Bounds on the rate of abs(x/size)^k over a box of x and rates within `turn` of v."""
     least, most = _range(x1, x2, spread)
@@ -107,7 +106,7 @@ def _rate_bounds(size, k, x1, x2, spread, v, turn):
 INSIDE, OUTSIDE, ONCE, UNKNOWN = range(4)
 
 
-@call
+@jit_call
 def judged(tool, one, two, h, curve):
     """Whether a stretch of time h between two positions is INSIDE, OUTSIDE, crossed ONCE at most, or UNKNOWN."""
     spread = 0.125 * curve * h * h
@@ -122,7 +121,7 @@ def judged(tool, one, two, h, curve):
     return ONCE if x_least + y_least > 0.0 or x_most + y_most < 0.0 else UNKNOWN
 
 
-@call
+@jit_call
 def crossing(scene, cranked, turned, low, high):
     """The time between low and high at which the outline is crossed, and what rounding may come to in it."""
     tool = scene[3]

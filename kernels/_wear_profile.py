@@ -20,10 +20,9 @@ import math
 import numpy as np
 
 from kernels import _wear_arm, _wear_load, _wear_quadrature, _wear_still, _wear_tool
-from kernels._jit import jit
+from kernels._jit import jit, jit_call
 from kernels._lanes import magnitude, sqrt
 from kernels._linkage import sum4
-from kernels._wear_call import call
 from kernels._wear_quadrature import adapt, open_panel
 from kernels._wear_speed import along_arc, extremes, half_circle
 from kernels._wear_tool import CROSSING_LIMIT, PIECES, arctan2, outline, sincos
@@ -36,7 +35,7 @@ _AT_TURN = 1e-11  # a gap over its largest, or a step: beyond that a split is no
 _TURN = 2.0 * math.pi
 
 
-@call
+@jit_call
 def _passage(scene, c, s, top, bottom, arc):
     """Sum over the strokes of E dtheta/dphi at one angle of the arm; `arc`: of what arc, sine and cosine of psi/2."""
     arm, _, (speed, spin, _, w, _, _), r, _ = scene
@@ -55,7 +54,7 @@ def _polish(rate, spin, r, w, arc):
     return half_circle(p, q)
 
 
-@call
+@jit_call
 def _at_angle(scene, c, s, arc, blur):
     """`_passage` with the arm at phi = (c, s) from the direction of w, and its rounding; 0 where it does not come.
 
@@ -71,7 +70,7 @@ def _at_angle(scene, c, s, arc, blur):
     return total, total * (noise * blur + (doubt + 4.0 * _EPS * slope * blur))
 
 
-@call
+@jit_call
 def vertex_margins(piece, tool, reach, w, r):
     """rho^2 - (w-r)^2 and rho^2 - (w+r)^2 of the vertex where a piece begins, without loss.
 
@@ -86,7 +85,7 @@ def vertex_margins(piece, tool, reach, w, r):
     return near if magnitude(near) > least else 0.0, wide if magnitude(wide) > least else 0.0
 
 
-@call
+@jit_call
 def _margins(piece, point, tool, reach, w, r):
     """rho^2, rho^2 - (w-r)^2, (w+r)^2 - rho^2 of an outline's point, and their rounding, absolute.
 
@@ -125,7 +124,7 @@ def _about_pivot(scene, piece, point):
     return chi, (far / rho, y / rho), slopes, arc, 4.0 * _EPS + noise / near + noise / wide
 
 
-@call
+@jit_call
 def _outline(piece, x, scene):
     """Integrand of the contour: both sides Y of the outline and both halves of psi; and its rounding."""
     chi, gamma, slopes, arc, blur = _about_pivot(scene, piece, outline(piece, x, scene[1]))
@@ -150,7 +149,7 @@ def _pressed(scene, c, s):
     return weight, doubt + 4.0 * _EPS * slope
 
 
-@call
+@jit_call
 def _far_side_alone(u, scene):
     """2 E(theta, pi) dtheta/du, its rounding, and the arm's cosine and sine."""
     arm = scene[0]
@@ -165,7 +164,7 @@ def _far_side_alone(u, scene):
     return 2.0 * growth * _passage(scene, c, s, top, bottom, (1.0, 0.0)), 4.0 * _EPS, c, s
 
 
-@call
+@jit_call
 def _far_side(u, scene):
     """Integrand of the second integral of (2), both halves."""
     total, noise, c, s = _far_side_alone(u, scene)
@@ -174,7 +173,7 @@ def _far_side(u, scene):
     return total, total * (noise + doubt)
 
 
-@call
+@jit_call
 def _on_pivot(u, scene):
     """Integrand of int v dtheta over the strokes for a work on the pivot, where v does not hang on psi."""
     arm, _, (speed, spin, _, _, _, _), r, _ = scene
@@ -217,7 +216,7 @@ def _split_circle(k, scene, piece, still):
     return x, y, r, _wear_tool.vertex_excess(piece, tool, x, y, r)
 
 
-@call
+@jit_call
 def _settled(x, scene, piece):
     """The same split, if it is where the arm turns, of all of its ways to get there that which is nearest its end.
 
@@ -240,7 +239,7 @@ def _settled(x, scene, piece):
     return x - step if 0.0 < x - step < 1.0 else x
 
 
-@call
+@jit_call
 def _open_outline(pool, count, scene, found, stack, stops):
     """Opens the panels of the contour, split where contact ends or v is 0; how many panels there are then."""
     for k in range(PIECES):
@@ -263,7 +262,7 @@ def _open_outline(pool, count, scene, found, stack, stops):
     return count
 
 
-@call
+@jit_call
 def _phase(arm, eta):
     """u of `gaps_at`."""
     least, most = arm[2]
@@ -271,7 +270,7 @@ def _phase(arm, eta):
     return 2.0 * arctan2(sqrt(max(behind, 0.0)), sqrt(max(ahead, 0.0))) - 0.5 * math.pi
 
 
-@call
+@jit_call
 def _open_split(pool, count, kind, low, high, scene, stops):
     """Opens panels of that kind from arm's angle low to high, split at the stops; how many panels there are then.
 
@@ -293,7 +292,7 @@ def _open_split(pool, count, kind, low, high, scene, stops):
     return count
 
 
-@call
+@jit_call
 def _open_far_side(pool, scene, angles, number, stops):
     """Opens the panels of the second integral of (2), from the arcs about the pivot; how many there are."""
     arm, _, (_, _, _, w, turn_c, turn_s), r, _ = scene
@@ -310,7 +309,7 @@ def _open_far_side(pool, scene, angles, number, stops):
     return count
 
 
-@call
+@jit_call
 def _angle_in_arcs(arm, turn, angles, number):
     """How much of the arm's angle, all strokes, lies within arcs about the pivot."""
     total = 0.0
@@ -398,7 +397,7 @@ def _weight_at_ends(scene, angles, number):
     return most
 
 
-@call
+@jit_call
 def room():
     """Memory for panels, splits, angles, the stack of intervals, and the stops of the arm."""
     return (
@@ -407,7 +406,7 @@ def room():
     )  # fmt: skip
 
 
-@call
+@jit_call
 def profile(scene, rtol, work):
     """I(r) of (1), its error, and whether it could be had.
 

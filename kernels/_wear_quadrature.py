@@ -10,9 +10,8 @@ Nodes: Piessens et al., QUADPACK (1983).
 
 import numpy as np
 
-from kernels._jit import jit
+from kernels._jit import jit, jit_call
 from kernels._lanes import magnitude
-from kernels._wear_call import call
 
 PANEL_LIMIT = 1000
 KIND, START, LENGTH, LOW, HIGH, VALUE, ERROR, NOISE = range(8)
@@ -46,7 +45,7 @@ def place(pool, k, y):
     return pool[k, START] + pool[k, LENGTH] * (y * y * (3.0 - 2.0 * y)), pool[k, LENGTH] * 6.0 * y * (1.0 - y)
 
 
-@call
+@jit_call
 def integrate(integrand, scene, pool, k):
     """Value, error and noise of panel k by 21 nodes."""
     middle, half = 0.5 * (pool[k, LOW] + pool[k, HIGH]), 0.5 * (pool[k, HIGH] - pool[k, LOW])
@@ -80,7 +79,7 @@ def halve(pool, k, new):
     pool[k, HIGH], pool[new, LOW] = middle, middle
 
 
-@call
+@jit_call
 def totals(pool, count):
     """Sums of values, errors and noises, and the panel whose error is farthest above its noise, and by how much."""
     value, error, noise, worst, excess = 0.0, 0.0, 0.0, 0, 0.0
@@ -93,7 +92,7 @@ def totals(pool, count):
     return value, error, noise, worst, excess
 
 
-@call
+@jit_call
 def adapt(integrand, scene, pool, count, rtol):
     """Value and error of the pool's `count` opened panels, to `rtol` or as near as rounding or PANEL_LIMIT let it.
 

@@ -5,10 +5,9 @@ import math
 import numpy as np
 
 from kernels import _linkage, _linkage_extremes, _wear_arm, _wear_tool
-from kernels._jit import jit
+from kernels._jit import jit, jit_call
 from kernels._lanes import magnitude, sqrt
 from kernels._vecmath import in_unit, mantissa_exponent, scale
-from kernels._wear_call import call
 from kernels._wear_tool import sincos
 from kernels.interface import Field, Status
 from kernels.polisher import EXAMPLE as LINKS
@@ -37,7 +36,7 @@ def allowed(b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, 
     return links and kind and turns and angles and work and size and shape
 
 
-@call
+@jit_call
 def arm_without_units(b, d, f, e):
     """The arm of `_wear_arm`, its lengths and margins, and the verdict on the linkage: OK, a remark or a refusal."""
     lengths, _, fine = _linkage.in_units(b, d, f, e)
@@ -46,7 +45,7 @@ def arm_without_units(b, d, f, e):
     return _wear_arm.arm_of(lengths, margin), lengths, margin, verdict if fine else OUT_OF_RANGE
 
 
-@call
+@jit_call
 def side_by_side(columns):
     """The parameters of each cell in a row."""
     rows = np.empty((columns[0].size, len(columns)))
@@ -62,20 +61,20 @@ def turns_fully(verdict):
     return verdict in (OK, CHANGE_POINT, DOUBLE_CRANK)
 
 
-@call
+@jit_call
 def signed_in_unit(x, unit):
     """x over 2^unit."""
     value = in_unit(magnitude(x), unit)
     return -value if x < 0.0 else value
 
 
-@call
+@jit_call
 def _unit_of(x):
     """Power of two next below x; of 0: of 1."""
     return mantissa_exponent(x if x > 0.0 else 1.0)[1]
 
 
-@call
+@jit_call
 def work_without_units(p):
     """The tool, the ride (rates of crank and work, L, w, direction of w), both units, and whether all is in range.
 
@@ -111,7 +110,7 @@ def pressed(pressure, load, workpiece_radius):
     return numbers and (pressure > 0.0) != (load > 0.0) and (load == 0.0 or workpiece_radius > 0.0)
 
 
-@call
+@jit_call
 def with_units(value, preston, pressure, units):
     """`value` times preston, pressure and 2^units, without overflow on the way."""
     m, e = mantissa_exponent(preston)

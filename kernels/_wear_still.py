@@ -9,9 +9,8 @@ and near by the integral of v along an arc goes like x^2 log x of the distance x
 import math
 
 from kernels import _wear_arm
-from kernels._jit import jit
+from kernels._jit import jit, jit_call
 from kernels._lanes import magnitude
-from kernels._wear_call import call
 from kernels._wear_tool import sincos
 
 STOP_LIMIT = 14
@@ -27,7 +26,7 @@ def span(arm):
     return (-math.pi, math.pi) if arm[3] else (-0.5 * math.pi, 0.5 * math.pi)
 
 
-@call
+@jit_call
 def rates_at(arm, u):
     """The arm's angle at u, and alpha' of the stroke back and forth over the crank's rate."""
     if arm[3]:
@@ -47,7 +46,7 @@ def _lead(scene, rate, side):
     return speed * rate * (r + side * w) - spin * r
 
 
-@call
+@jit_call
 def _root(scene, forth, side, one, two, f_one, f_two):
     """The arm's angle where (1) holds, between one and two, by the Illinois rule."""
     last, eta = math.inf, 0.0
@@ -65,7 +64,7 @@ def _root(scene, forth, side, one, two, f_one, f_two):
     return eta
 
 
-@call
+@jit_call
 def stops_of(scene, still):
     """Puts the angles into `still`, from b on; how many. First those where the arm turns, if it does."""
     arm = scene[0]

@@ -12,12 +12,11 @@ slope are monotone, hence so are bounds on the distance from a point and on its 
 
 import math
 
-from kernels._jit import jit
+from kernels._jit import jit, jit_call
 from kernels._lanes import magnitude
 from kernels._vecmath import arctan, expm1, log1p
 from kernels._vecmath import power as inlined_power
 from kernels._vecmath import sincos as inlined_sincos
-from kernels._wear_call import call
 
 PIECES = 4
 CROSSING_LIMIT = 32
@@ -36,25 +35,25 @@ _ASIDE = 0.38
 STACK = (_DEPTH, 6)
 
 
-@call
+@jit_call
 def power(x, y):
     """x^y."""
     return inlined_power(x, y)
 
 
-@call
+@jit_call
 def sincos(x):
     """Sine and cosine."""
     return inlined_sincos(x)
 
 
-@call
+@jit_call
 def tool_of(a, b, n, m):
     """The tool: half widths, exponents, and 2^(-1/n), 2^(-1/m)."""
     return a, b, n, m, power(0.5, 1.0 / n), power(0.5, 1.0 / m)
 
 
-@call
+@jit_call
 def _along(x, k, j, middle):
     """(1) and what makes its slope: small, 1 - large, d small/dx, and two monotone factors of -d large/d small."""
     if k >= 1.0:
@@ -70,7 +69,7 @@ def _along(x, k, j, middle):
     return small, missing, growth, steep, (1.0 - missing) / (j * (1.0 - share))
 
 
-@call
+@jit_call
 def outline(piece, x, tool):
     """X, Y, dX/dx and dY/dx of a piece, and how far the larger of X and Y is below its vertex."""
     a, b, n, m, half_x, half_y = tool
@@ -100,7 +99,7 @@ def sense(piece):
     return 1.0 if piece == 0.0 or piece == 3.0 else -1.0
 
 
-@call
+@jit_call
 def vertex_excess(piece, tool, cx, cy, radius):
     """Squared distance from (cx, cy) of the vertex where a piece begins, less radius^2."""
     u, v = -cx, -cy
@@ -111,7 +110,7 @@ def vertex_excess(piece, tool, cx, cy, radius):
     return (magnitude(u) - radius) * (magnitude(u) + radius) + v * v
 
 
-@call
+@jit_call
 def _end(piece, x, tool, cx, cy, start):
     """x, X - cx, Y - cy, two factors of the slope, and the squared distance less that of the circle."""
     a, b, n, m, half_x, half_y = tool
@@ -135,7 +134,7 @@ def _least_square(x, y):
     return min(x * x, y * y)
 
 
-@call
+@jit_call
 def _slope_bounds(piece, tool, one, two):
     """Bounds on half the derivative of the squared distance by `small`, over the unit of `small`.
 
@@ -157,7 +156,7 @@ def _slope_bounds(piece, tool, one, two):
     return min(p1, p2) - most, max(p1, p2) - least
 
 
-@call
+@jit_call
 def _excess(piece, x, tool, cx, cy, start):
     """Squared distance from the centre, less that of the circle, and its derivative."""
     _, u, v, _, _, excess = _end(piece, x, tool, cx, cy, start)
@@ -165,7 +164,7 @@ def _excess(piece, x, tool, cx, cy, start):
     return excess, 2.0 * (u * dx + v * dy)
 
 
-@call
+@jit_call
 def _root(piece, low, high, tool, cx, cy, start):
     """The crossing between low and high, where there is just one: Newton within the bracket."""
     rising = _excess(piece, high, tool, cx, cy, start)[0] > 0.0
@@ -187,7 +186,7 @@ def _root(piece, low, high, tool, cx, cy, start):
     return x
 
 
-@call
+@jit_call
 def crossings(piece, tool, cx, cy, radius, start, found, count, stack):
     """Puts into `found`, from `count` on, all x of a piece at a distance `radius` of (cx, cy); the new count.
 
@@ -243,14 +242,14 @@ def _top(stack, k):
     return stack[k, 0], stack[k, 1], stack[k, 2], stack[k, 3], stack[k, 4], stack[k, 5]
 
 
-@call
+@jit_call
 def excess(tool, x, y):
     """abs(X/a)^n + abs(Y/b)^m - 1 of a point of the tool's frame, limited; negative where it is in contact."""
     u, v = min(magnitude(x) / tool[0], 8.0), min(magnitude(y) / tool[1], 8.0)
     return power(u, tool[2]) + power(v, tool[3]) - 1.0
 
 
-@call
+@jit_call
 def arctan2(y, x):
     """The angle of the point (x, y), in [-pi, pi]."""
     if magnitude(y) <= magnitude(x):
@@ -262,7 +261,7 @@ def arctan2(y, x):
     return (0.5 * math.pi if y > 0.0 else -0.5 * math.pi) - arctan(x / y)
 
 
-@call
+@jit_call
 def sort(values, count):
     """Sorts the first `count` values, by insertion."""
     for i in range(1, count):
@@ -273,7 +272,7 @@ def sort(values, count):
         values[j] = value
 
 
-@call
+@jit_call
 def arcs(tool, cx, cy, radius, near, far, angles, found, stack):
     """Arcs of a circle within the tool: their ends in pairs in `angles`, in [-pi, pi]; how many numbers, -1: too many.
 

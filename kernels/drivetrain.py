@@ -20,17 +20,13 @@ Right to rtol are frequencies, damping (where not, INACCURATE), and errors as di
 frequency_error of 1e-6 is one to 1e-6 +- rtol.
 """
 
-import functools
-import inspect
 import math
-
-import numpy as np
 
 from kernels._chain import MASS_LIMIT, refusal
 from kernels._chain_eigen import natural_frequencies
 from kernels._chain_poles import modal_damping
-from kernels._columns import entry
-from kernels._jit import COMPILED, jit, jit_call
+from kernels._columns import entry_of_cells
+from kernels._jit import jit, jit_call
 from kernels._lanes import magnitude, nearest
 from kernels._reduction_compare import reduced, whole
 from kernels._reduction_model import EXACT, RIVIN, new_chain, new_modes, new_rooms, off_by, take_units
@@ -50,19 +46,6 @@ SMALL_PHASE = 0.1
 
 _OK, _INACCURATE, _BAD_INPUT = float(Status.OK), float(Status.INACCURATE), float(Status.BAD_INPUT)
 _DAMPERS, _OUT_OF_RANGE = float(Status.DAMPERS_OUT_OF_RANGE), float(Status.OUT_OF_RANGE)
-
-
-def entry_of_cells(function):
-    """As `entry`, for one cell at a time: no group of lanes need be full, and read-only columns are none of its own."""
-    ready = entry(*inspect.signature(function).parameters)(
-        function if COMPILED else np.errstate(all="ignore")(function)
-    )
-
-    @functools.wraps(function)
-    def call(*columns):
-        ready(*(c if c.flags.writeable else c.copy() for c in columns))
-
-    return call
 
 
 @jit_call
@@ -123,20 +106,32 @@ def _solve_cell(
     status[i] = int(verdict if fine else _OUT_OF_RANGE)
 
 
-@entry_of_cells
-def _solve_whole(
+@jit_call
+def _solve_cells(
     J, k, h, reduction, n_keep, tol, f_max, order, rtol,
     frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status,
+    model,
 ):  # fmt: skip
-    """Chains that stay as they are: compiled in a third of the time of `_solve_reduced`."""
     n = J.shape[1]
     full, kept, modes, rooms = new_chain(n), new_chain(n), new_modes(n), new_rooms(n)
     for i in range(J.shape[0]):
         _solve_cell(
             i, J, k, h, reduction, n_keep, tol, f_max, order, rtol,
             frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status,
-            whole, full, kept, modes, rooms,
+            model, full, kept, modes, rooms,
         )  # fmt: skip
+
+
+@entry_of_cells
+def _solve_whole(
+    J, k, h, reduction, n_keep, tol, f_max, order, rtol,
+    frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status,
+):  # fmt: skip
+    """Chains that stay as they are: compiled in a third of the time of `_solve_reduced`."""
+    _solve_cells(
+        J, k, h, reduction, n_keep, tol, f_max, order, rtol,
+        frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status, whole,
+    )  # fmt: skip
 
 
 @entry_of_cells
@@ -145,14 +140,10 @@ def _solve_reduced(
     frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status,
 ):  # fmt: skip
     """Each chain and its reduced model, solved and compared."""
-    n = J.shape[1]
-    full, kept, modes, rooms = new_chain(n), new_chain(n), new_modes(n), new_rooms(n)
-    for i in range(J.shape[0]):
-        _solve_cell(
-            i, J, k, h, reduction, n_keep, tol, f_max, order, rtol,
-            frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status,
-            reduced, full, kept, modes, rooms,
-        )  # fmt: skip
+    _solve_cells(
+        J, k, h, reduction, n_keep, tol, f_max, order, rtol,
+        frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status, reduced,
+    )  # fmt: skip
 
 
 def direct(

@@ -18,7 +18,7 @@ import numpy as np
 from kernels import _chain_frf, _complex
 from kernels._chain import refusal as chain_refusal
 from kernels._chain_eigen import row_at
-from kernels._columns import entry, one_by_one
+from kernels._columns import entry_of_cells, one_by_one
 from kernels._groups import GROUP
 from kernels._jit import jit, jit_call
 from kernels._lanes import nearest, where
@@ -68,7 +68,7 @@ def _cell(i, J, k, h, drive, read, rtol, frequency, re, im, amplitude, phase, de
     status[i] = where(error <= rtol[i], _OK, where(error < math.inf, _INACCURATE, _OUT_OF_RANGE))
 
 
-@entry("frequency")
+@entry_of_cells
 def continued(
     J, k, h, drive_mass, read_mass, rtol, frequency,
     receptance_re, receptance_im, amplitude, phase, amplitude_dB, status,
@@ -91,7 +91,7 @@ def _check(i, J, k, h, drive, read, status):
     status[i] = where(sound, chain_refusal(n, J[i], k[i], h[i]), _BAD_INPUT)
 
 
-@entry()
+@entry_of_cells
 def check(J, k, h, drive_mass, read_mass, status):
     """BAD_INPUT where an inertia or spring is not positive (the last spring may be 0), a damper negative, no such mass.
 

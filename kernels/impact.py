@@ -22,7 +22,7 @@ bent one was found to.
 """
 
 from kernels import _impact_cycle, _impact_events, _impact_map, _impact_scene
-from kernels._columns import each_cell, entry, one_by_one
+from kernels._columns import each_cell, entry, entry_of_cells, one_by_one
 from kernels._jit import jit
 from kernels._lanes import where
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
@@ -76,7 +76,7 @@ def _events(i, torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs):
     outputs[-2][i] = _impact_scene.length(units, offset)
 
 
-@entry()
+@entry_of_cells
 def events(
     torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol,
     period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status,

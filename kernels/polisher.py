@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from kernels import _linkage_extremes, _linkage_sampled, _linkage_textbook, _linkage_waveform
-from kernels._columns import each_cell, entry, one_by_one
+from kernels._columns import each_cell, entry, entry_of_cells, one_by_one
 from kernels._groups import GROUP, cells_at, each_group, room
 from kernels._jit import jit
 from kernels._lanes import isnt, where
@@ -190,7 +190,7 @@ def _in_samples(
         status[i] = _INACCURATE_CODE
 
 
-@entry()
+@entry_of_cells
 def in_samples(
     b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
     transmission_angle, thd, rate_max, rate_min, status,

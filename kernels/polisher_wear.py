@@ -22,10 +22,9 @@ under a load leaves wholly wears without bound: NaN with an infinite error, henc
 import math
 
 from kernels import _wear_load, _wear_profile, _wear_scene
-from kernels._columns import entry, one_by_one
+from kernels._columns import entry_of_cells, one_by_one
 from kernels._jit import jit, jit_inline
 from kernels._vecmath import in_unit, is_normal
-from kernels._wear_call import entry_of_cells
 from kernels._wear_scene import BAD_INPUT, OK, OUT_OF_RANGE, allowed, pressed
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
 
@@ -77,7 +76,7 @@ def _cell(p, rtol, loaded, radius, wear, wear_error, work):
     return verdict if worst <= rtol * most else _INACCURATE
 
 
-@entry_of_cells("radius")
+@entry_of_cells
 def contour(
     b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
     load, workpiece_radius, rtol, radius, wear, wear_error, status,
@@ -108,7 +107,7 @@ def _check(
     status[i] = OK if fine and pressed(pressure[i], load[i], workpiece_radius[i]) else BAD_INPUT
 
 
-@entry()
+@entry_of_cells
 def check(
     b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
     load, workpiece_radius, status,

@@ -14,11 +14,10 @@ import math
 import numpy as np
 
 from kernels import _linkage, _wear_load, _wear_path, _wear_quadrature, _wear_scene
-from kernels._columns import entry, one_by_one
-from kernels._jit import jit, jit_inline
+from kernels._columns import entry_of_cells, one_by_one
+from kernels._jit import jit, jit_call, jit_inline
 from kernels._lanes import magnitude, sqrt
 from kernels._vecmath import in_unit, is_normal, mantissa_exponent, scale
-from kernels._wear_call import call, entry_of_cells
 from kernels._wear_path import INSIDE, ONCE, OUTSIDE, STEPS
 from kernels._wear_scene import ANGLE_LIMIT, BAD_INPUT, OK, OUT_OF_RANGE, allowed, pressed
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
@@ -29,7 +28,7 @@ _TURN = 2.0 * math.pi
 _DEPTH = _wear_path.HALVINGS + 2
 
 
-@call
+@jit_call
 def _speed(kind, s, scene):
     """Speed at a time s of a step, over the area of contact where the load is constant, and its rounding."""
     path, cranked, turned, loaded = scene
@@ -42,7 +41,7 @@ def _speed(kind, s, scene):
     return weight * v, weight * v * (4.0 * _EPS + doubt + 8.0 * _EPS * slope)
 
 
-@call
+@jit_call
 def _polished(scene, low, high, tolerance, pool):
     """The way of polishing between two times within the tool, and its error; to `tolerance` times the way."""
     if not high > low:
@@ -52,7 +51,7 @@ def _polished(scene, low, high, tolerance, pool):
     return _wear_quadrature.adapt(_speed, scene, pool, count + 1, tolerance)
 
 
-@call
+@jit_call
 def _step(scene, h, curve, rtol, stack, pool):
     """The way of polishing in one step of time h, and its error."""
     path, cranked, turned, _ = scene
@@ -115,7 +114,7 @@ def _clock(speed, spin):
     return _TURN / (steps * magnitude(speed)), turn, turn_rest, share, rest + sign * low / steps
 
 
-@call
+@jit_call
 def way(path, loaded, theta0, tau, rtol, work):
     """The way of polishing over the time tau, its error, and whether there were few enough steps."""
     pool, stack = work
@@ -166,7 +165,7 @@ def _cell(p, rtol, loaded, work):
     return wear, doubt, verdict if error <= rtol * value else _INACCURATE
 
 
-@entry_of_cells()
+@entry_of_cells
 def path(
     b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
     load, workpiece_radius, r0, theta0, tau, rtol, wear, wear_error, status,
@@ -199,7 +198,7 @@ def _check(
     status[i] = OK if fine and push and point else BAD_INPUT
 
 
-@entry()
+@entry_of_cells
 def check(
     b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
     load, workpiece_radius, r0, theta0, tau, status,

@@ -95,3 +95,21 @@ def test_a_kernel_of_the_users_own_is_not_cached():
         with pytest.raises(TypingError):
             double(wrong, y)
     assert double.compiled.signatures[0][0].dtype == float64
+
+
+OWN_SCENE = """
+import sys
+sys.path += ["tests/kernels", "studies"]
+from columns import solve
+from own_scene import KERNEL
+_, status = solve(KERNEL, "taylor", **{name: [value] for name, value in KERNEL.example.items()})
+written = next(module for name, module in sys.modules.items() if name.startswith("scene_"))
+print(status[0], sum(sum(getattr(written, f"run_{order}").stats.cache_hits.values()) for order in (14, 20)))
+"""
+
+
+def test_what_is_written_for_a_scene_of_ones_own_is_compiled_once(tmp_path):
+    assert run(OWN_SCENE, tmp_path) == ["0", "0"]
+    status, hits = run(OWN_SCENE, tmp_path)
+    assert status == "0"
+    assert int(hits) > 0

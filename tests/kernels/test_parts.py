@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from kernels._columns import each_cell, entry
+from kernels._columns import each_cell, entry, entry_of_cells
 from kernels._groups import GROUP, room
 from kernels._jit import COMPILED, jit, jit_call
 from kernels._lanes import fma, sqrt
@@ -58,3 +58,18 @@ def test_the_stack_of_machine_code_begins_on_such_a_border():
     wide = re.findall(r"^attributes (#\d+) = \{.* alignstack=64 ", text, re.M)
     defined = [line.split()[-2] for line in text.splitlines() if line.startswith("define") and "NRT" not in line]
     assert set(defined) <= set(wide) != set()
+
+
+@entry_of_cells
+def seen(count, total):
+    """total = how many cells one call is given."""
+    for i in range(count.size):
+        total[i] = count.size
+
+
+@pytest.mark.parametrize("n", [1, 3, 40])
+def test_what_takes_one_cell_at_a_time_is_not_given_more(n):
+    count, total = np.ones(n), np.zeros(n)
+    count.flags.writeable = False
+    seen(count, total)
+    assert (total == n).all()
