@@ -1,10 +1,13 @@
 """Columns of cells followed at a fixed step, and how far the result can be believed.
 
-A cell is followed twice. The second run takes half the step and makes each of its steps, those that end on an event
-too, of two halves; without location a quarter of the step. What the runs differ by is 3/4 of the first one's error at
-least, whatever the order. A switch that is not located is known to one step at best. The second run's parameters are
-some roundings off (`off_by_roundings`), so that rounding that a scene makes worse shows too. Where the motion would
-turn round behind a switch within the error, the switch may not be there at all: GRAZING.
+A cell is followed three times: at its step, at less than half of it with each step made of two halves, those that end
+on an event too, and at a step between. What any two of them differ by tells the first one's error; two alone may agree
+by chance. Whole fractions of the step would see the same points of the motion again, and agree where each is as wrong,
+so the fractions are not whole. Where the run between, which is nearer to the first, differs from it by next to nothing
+of what the finest does, the differences grow as the step shrinks, and do not tell what is left: INACCURATE. Without
+location steps are not made of halves, and a switch is known to one step at best. The other runs' parameters are some
+roundings off (`off_by_roundings`), so that rounding that a scene makes worse shows too. Where the motion would turn
+round behind a switch within the error, the switch may not be there at all: GRAZING.
 """
 
 import numpy as np
@@ -14,11 +17,18 @@ from kernels._taylor_solve import off_by_roundings
 from kernels._vecmath import NORMAL_HIGH, NORMAL_LOW
 from kernels.interface import FIRST_REFUSAL, Status
 
-SAFETY = 1.5
+LOCATED, BLIND = ((0.37, 2.0), (0.77, 1.0)), ((0.23, 1.0), (0.61, 1.0))
+"""Length of the finest run's steps and of those of the run between, and how many parts a step has."""
+SAFETY = 2.0
+"""A switch found by a line or a polynomial is off by 1/(1 - 0.37) of what two runs differ by if only the order is 1."""
+GROWS = 0.1
+"""Least share of a difference in the nearer run: order 0, an error like log(step), would leave 0.15."""
 ROUNDING = 2.3e-16
-UNSURE, MOVED = 4.0, 1.3
-"""Errors of its speed there that a motion must have left behind a switch, and how often the margin, which goes with
-the speed's square, must be what the two runs differ by in it."""
+ROUNDINGS = 8.0
+"""Of the result, up to which differences are in no order."""
+UNSURE, FALLEN = 6.0, 1.3
+"""Differences in its speed there that a motion must have left behind a switch, and how often the margin, which goes
+with the speed's square, must be what it has fallen by to the finest run."""
 GRAZING = 1e-9
 """Of an event's value at the start of a step: how close to 0 it may turn round in it unremarked."""
 
@@ -52,37 +62,59 @@ def solved(module, method, columns, step, location):
     error, status
     """
     blind = (location == NONE) | (METHODS.index(method) == MOREAU)
-    results = followed(module, method, columns, step, location)
-    finer = np.empty_like(results)
-    columns = off_by_roundings(columns)
-    for cells, shorter, parts in ((~blind, 0.5, 2.0), (blind, 0.25, 1.0)):
-        if cells.any():
-            some = [np.broadcast_to(c, step.shape)[cells] for c in columns]
-            finer[:, cells] = followed(module, method, some, shorter * step[cells], location[cells], parts)
+    first = followed(module, method, columns, step, location)
+    finest, between = _again(module, method, off_by_roundings(columns), step, location, blind)
+    error, unsure, grows = _compared(first, finest, between, len(module.STATES))
     with np.errstate(all="ignore"):
-        of_switch, of_reach = _apart(results, finer, len(module.STATES))
-        unsure = finer[-4] <= np.maximum((UNSURE * of_switch) ** 2, MOVED * abs(results[-4] - finer[-4]))
-        error = np.maximum(of_switch, of_reach) + ROUNDING * np.sqrt(results[-3])
-        error = np.where(blind, np.maximum(error, step / results[1]), error)
-        error = np.where(finer[-1] < FIRST_REFUSAL, error, np.inf)
-    status = _status(results, finer)
-    status = np.where((status < Status.GRAZING) & unsure & (finer[-1] < FIRST_REFUSAL), Status.GRAZING, status)
-    error = np.where(status < FIRST_REFUSAL, np.where(error < np.inf, error, np.inf), np.nan)
-    return np.delete(results, (-4, -1), axis=0), error, status
+        error = np.where(blind, np.maximum(error, step / first[1]), error)
+    status = _status(first, finest, between)
+    known = (finest[-1] < FIRST_REFUSAL) & (between[-1] < FIRST_REFUSAL)
+    status = np.where((status < Status.GRAZING) & unsure & known, Status.GRAZING, status)
+    status = np.where((status == Status.OK) & grows & known, Status.INACCURATE, status)
+    error = np.where(status < FIRST_REFUSAL, np.where(known & (error < np.inf), error, np.inf), np.nan)
+    return np.delete(first, (-4, -1), axis=0), error, status
 
 
-def _apart(results, finer, states):
-    """The largest relative difference of time, interval and states at the switch, and of the states' reach."""
-    scale = np.concatenate([abs(finer[:2]), finer[2 + states : 2 + 2 * states]])
-    apart = abs(results[: len(scale)] - finer[: len(scale)])
-    reach = abs(results - finer)[2 + states : 2 + 2 * states]
-    return SAFETY * (apart / scale).max(axis=0), SAFETY * (reach / scale[2:]).max(axis=0)
+def _again(module, method, columns, step, location, blind):
+    """The finest run and the one between."""
+    runs = []
+    for ways in zip(LOCATED, BLIND, strict=True):
+        run = np.full((6 + 2 * len(module.STATES), len(step)), np.nan)
+        for cells, (length, parts) in zip((~blind, blind), ways, strict=True):
+            if cells.any():
+                some = [np.broadcast_to(c, step.shape)[cells] for c in columns]
+                run[:, cells] = followed(module, method, some, length * step[cells], location[cells], parts)
+        runs.append(run)
+    return runs
 
 
-def _status(results, finer):
-    status = results[-1].astype(np.int8)
-    remark = finer[-1] * (finer[-1] < FIRST_REFUSAL)
-    status = np.where(status == Status.OK, remark, status)
-    sizes = abs(results[:-4])
+def _compared(first, finest, between, states):
+    """The error, whether the last switch may not be there, and whether differences grow as the step shrinks."""
+    with np.errstate(all="ignore"):
+        ends, near, far = (
+            _apart(one, other, finest, states) for one, other in ((first, finest), (first, between), (between, finest))
+        )
+        of_switch, of_all = np.max((ends, near, far), axis=0)
+        fallen = np.maximum(first[-4], between[-4]) - finest[-4]
+        unsure = finest[-4] <= np.maximum((UNSURE * of_switch) ** 2, FALLEN * fallen)
+        rounding = ROUNDING * np.sqrt(first[-3])
+        grows = (near[1] < GROWS * ends[1]) & (of_all > ROUNDINGS * rounding)
+        return SAFETY * of_all + rounding, unsure, grows
+
+
+def _apart(one, other, finest, states):
+    """The largest relative difference of time, interval and states at the switch; the same with the states' reach."""
+    scale = np.concatenate([abs(finest[:2]), finest[2 + states : 2 + 2 * states]])
+    switch = (abs(one - other)[: len(scale)] / scale).max(axis=0)
+    reach = (abs(one - other)[2 + states : 2 + 2 * states] / scale[2:]).max(axis=0)
+    return switch, np.maximum(switch, reach)
+
+
+def _status(first, finest, between):
+    status = first[-1].astype(np.int8)
+    for other in (finest, between):
+        remark = other[-1] * (other[-1] < FIRST_REFUSAL)
+        status = np.where(status == Status.OK, remark, status)
+    sizes = abs(first[:-4])
     normal = ((sizes == 0) | ((sizes >= NORMAL_LOW) & (sizes <= NORMAL_HIGH))).all(axis=0)
     return np.where((status < FIRST_REFUSAL) & ~normal, Status.OUT_OF_RANGE, status)

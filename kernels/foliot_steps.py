@@ -3,10 +3,11 @@
     phi'' = +-mu - a phi' - R sign phi' - c phi' abs(phi') - k phi,  speed times e where +-phi passes phi0    (1)
 
 From rest at the centre, through `flips` switches. The methods are euler, semi_implicit, verlet, rk4, dopri5, dop853 and
-moreau, `location` says where in a step a switch, or a place of rest, is taken to be (`_locate`). Everything is done a
-second time with finer steps: the first run's values are given, and what the two differ by tells their `error`, which
-is also what a method states as its bound. STEP_LIMIT: no switch in 20 000 steps, as where a method takes too much
-energy, or chatters about a place of rest. OUT_OF_RANGE: the method blew up.
+moreau, `location` says where in a step a switch, or a place of rest, is taken to be (`_locate`). Everything is done
+twice more with finer steps: the first run's values are given, and what the three differ by tells their `error`, which
+is also what a method states as its bound. INACCURATE: the step is too coarse for that.
+STEP_LIMIT: no switch in 20 000 steps, as where a method takes too much energy, or chatters about a place of rest.
+OUT_OF_RANGE: the method blew up.
 """
 
 from kernels.interface import Field, Kernel, Status

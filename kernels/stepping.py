@@ -1,9 +1,9 @@
 """Scenes of one's own followed by textbook integrators at a fixed step.
 
-The parameters `step` and `location` (`_locate`) may be axes of a study. Everything is done twice (`_stepped_solve`):
-what the runs differ by tells `error`, which is also what a method states as its bound.
-Semi-implicit Euler and Verlet
-are to be had where the states are pairs (place, speed), Moreau's method for one pair with dry friction at speed 0.
+The parameters `step` and `location` (`_locate`) may be axes of a study. Everything is done three times
+(`_stepped_solve`): what the runs differ by tells `error`, which is also what a method states as its bound, unless the
+differences grow as the step shrinks: INACCURATE. Semi-implicit Euler and Verlet are to be had where the states are
+pairs (place, speed), Moreau's method for one pair with dry friction at speed 0.
 """
 
 import math
@@ -13,7 +13,7 @@ import numpy as np
 from kernels import _stepped_solve
 from kernels._locate import LOCATIONS, METHODS
 from kernels._stepped_source import methods_of, stepped
-from kernels.interface import Field, Kernel, Method
+from kernels.interface import Field, Kernel, Method, Status
 from kernels.scene import Scene, _check, _signed
 
 __all__ = ["METHODS", "stepped_kernel", "stepping_fields", "stepping_methods"]
@@ -69,8 +69,8 @@ def stepping_methods(scene, parameters, outputs, fill):
 
         def bound(*columns):
             if len(columns[0]):
-                error = solved(name, columns)[1]
-                columns[-1][:] = np.where(np.isnan(error), math.inf, error)
+                _, error, status = solved(name, columns)
+                columns[-1][:] = np.where(np.isnan(error) | (status == Status.INACCURATE), math.inf, error)
 
         solve = _signed(solve, [*names, "rtol", *(f.name for f in outputs), "status"])
         return Method(name, DOCS[name], solve, _signed(bound, [*names, "rtol", "asked", "out"]))

@@ -82,17 +82,61 @@ def test_the_stated_bound_is_the_estimated_error():
     assert bounds(KERNEL, "rk4", [1.0], flips=1.0, step=0.1, phi0=1.0, a=0.5)[0] == outputs["error"][0] > 0
 
 
+def test_a_grid_that_meets_the_same_points_again_does_not_make_two_runs_believed():
+    cell = {"phi0": 0.09737491865214114, "k": 640.955635182617, "flips": 1.0}  # grazes; halves of the step agree
+    how = {"step": 0.012529584097168095, "location": float(LOCATIONS["linear"])}
+    mu = 31.253343950955195
+    outputs, status = solve(KERNEL, "dopri5", [mu], **cell, **how)
+    k = mpf(cell["k"])
+    off = abs(outputs["time"][0] / float(mp.acos(1 - k * mpf(cell["phi0"]) / mpf(mu)) / mp.sqrt(k)) - 1)
+    assert off > 0.01
+    assert off < outputs["error"][0]
+    assert status[0] == Status.GRAZING
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+def test_steps_of_a_half_and_a_quarter_that_are_as_wrong_are_not_believed():
+    mu, R, phi0 = 0.3728952659438824, 0.36853454347820896, 167.44256859441495
+    outputs, status = solve(
+        KERNEL, "semi_implicit", [mu], R=R, phi0=phi0, flips=8.0, step=3.238507460064415, location=0.0
+    )
+    off = abs(outputs["period"][0] / float(2 * parabolas(mu, R, phi0, 8)[0][-1]) - 1)
+    assert off > 0.2
+    assert status[0] != Status.OK or off < outputs["error"][0]
+
+
+def test_where_differences_grow_as_the_step_shrinks_nothing_is_promised():
+    mu, phi0, a = cell = 55.9382192261618, 0.16322424255323054, 59.090741848524814  # each step takes 0.95 of the way
+    how = {"phi0": phi0, "a": a, "flips": 1.0, "location": float(LOCATIONS["henon"])}
+    outputs, status = solve(KERNEL, "euler", [mu, mu], **how, step=np.array([0.016034811141985534, 0.001]))
+    drive, way, drag = map(mpf, cell)
+    time = mp.findroot(lambda t: drive / drag * (t + mp.expm1(-drag * t) / drag) - way, way * drag / drive)
+    true = float(-drive / drag * mp.expm1(-drag * time))
+    off = abs(outputs["crossing_speed"] / true - 1)
+    assert status.tolist() == [Status.INACCURATE, Status.OK]
+    assert off[0] > outputs["error"][0]
+    assert off[1] < outputs["error"][1]
+    assert bounds(KERNEL, "euler", [mu], **how, step=0.016034811141985534)[0] == np.inf
+
+
+def parabolas(mu, R, phi0, flips):
+    """Times between switches under dry friction alone, the speed at the last, the largest angle before it."""
+    mu, R, phi0 = mpf(mu), mpf(R), mpf(phi0)
+    v, top = mp.sqrt(2 * (mu - R) * phi0), None
+    times = [v / (mu - R)]
+    for _ in range(flips - 1):
+        top = v * v / (2 * (mu + R))
+        down = mp.sqrt(2 * (top + 2 * phi0) / (mu - R))
+        times.append(v / (mu + R) + down)
+        v = down * (mu - R)
+    return times, v, top
+
+
 @pytest.mark.parametrize("method", ["verlet", "rk4"])
 def test_free_flight_with_dry_friction_is_exact_for_methods_of_order_two(method):
     mu, R, phi0 = 3.0, 1.0, 2.0
     outputs, status = solve(KERNEL, method, [mu], phi0=phi0, R=R, flips=3.0, step=0.7)
-    v, times = mp.sqrt(2 * (mpf(mu) - R) * phi0), []
-    times.append(v / (mu - R))
-    for _ in range(2):
-        top = v * v / (2 * (mpf(mu) + R))
-        down = mp.sqrt(2 * (top + 2 * phi0) / (mpf(mu) - R))
-        times.append(v / (mpf(mu) + R) + down)
-        v = down * (mu - R)
+    times, v, top = parabolas(mu, R, phi0, 3)
     assert status[0] == Status.OK
     assert outputs["time"][0] == pytest.approx(float(sum(times)), rel=1e-13)
     assert outputs["period"][0] == pytest.approx(float(2 * times[-1]), rel=1e-13)
