@@ -37,6 +37,8 @@ _SAME = 1e-9
 _KICK, _KICKS = 0.01, 8
 """How far an unstable cycle is left behind, and how often that is tried."""
 _ROUNDING = 2.3e-16
+_CHAINED = 4.0
+"""Errors of the changes after many contacts over those of one: 2.7 were found in 1300 clocks."""
 _OK, _INACCURATE, _GRAZING = float(Status.OK), float(Status.INACCURATE), float(Status.GRAZING)
 _UNSTABLE, _PERIOD_2, _NOT_PERIODIC = float(Status.UNSTABLE), float(Status.PERIOD_2), float(Status.NOT_PERIODIC)
 _TOOTH_JUMPED, _STEP_LIMIT = float(Status.TOOTH_JUMPED), float(Status.STEP_LIMIT)
@@ -170,23 +172,36 @@ def _verdict(tally, teeth, cycles, fading, worst, gap, rounding, rtol):
     return _OK if teeth == 1.0 else _PERIOD_2
 
 
+@jit
+def _worst(answer, gap, V, w, late):
+    """Largest relative error of the outputs but the multiplier, by the errors of gap, V and w and the relative one of
+    the time."""
+    (_, travel, rim, pallet, _, back), _, share, _ = answer
+    worst = max(max(late, gap / travel), max(V / magnitude(rim), w / magnitude(pallet)))
+    worst = max(worst, late + late / share if share > 0.0 else 0.0)
+    return max(worst, 2.0 * V / sqrt(2.0 * back) if back > 0.0 else 0.0)  # `back` is V^2/2 of a throw
+
+
 @jit_call
 def _judged(scene, start, k, work, rtol):
     """The answer for a motion that repeats after k half swings, and its status; UNSTABLE where it leaves that."""
     tally, slopes, chained, inverse = work
     swing.clear(tally)
     image, _ = chain(scene, start, k, tally, slopes, chained)
+    deep = tally[swing.DEPTH]
+    if deep > 0.0:  # the rim is still behind its foremost where the motion begins anew
+        swing.clear(tally)
+        tally[swing.DEPTH] = deep
+        image, _ = chain(scene, start, k, tally, slopes, chained)
     invert(chained, inverse)
     rest = image[0] - start[0], image[1] - start[1], image[2] - start[2]
     half_swings, teeth, cycles = _cycles(k, tally[swing.WAY])
     modulus, blur = multiplier(chained)
     answer = _answer(tally, _ends(tally, k), 2.0 * cycles * k / half_swings, modulus ** (1.0 / k), scene[3])
-    _, travel, rim, pallet, _, _ = answer[0]
-    rounding = _ROUNDING * (2.0 + tally[swing.EVENTS] / k) * (1.0 + travel)
+    rounding = _ROUNDING * (2.0 + tally[swing.EVENTS] / k) * (1.0 + answer[0][1])
     gap, V, w, late = errors(start, rest, inverse, chained, rounding, tally[swing.TIME])
-    noise = blur * (rounding * k + gap)
-    worst = max(max(late, gap / travel), max(V / magnitude(rim), w / magnitude(pallet)))
-    worst = max(worst, noise / (k * modulus) if modulus > 0.0 else 0.0)
+    noise = _CHAINED * blur * (rounding * k + gap)
+    worst = max(_worst(answer, gap, V, w, late), noise / (k * modulus) if modulus > 0.0 else 0.0)
     fading = (1.0 - modulus) / max(noise, _ROUNDING)
     return answer, _verdict(tally, teeth, cycles, fading, worst, gap, rounding, rtol)
 

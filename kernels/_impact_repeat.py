@@ -16,6 +16,8 @@ from kernels._lanes import magnitude, sqrt
 NEWTON_LIMIT = 12
 
 _CONVERGED = 3e-15
+_LEAST_TRACE = 0.25
+"""Terms of about 1 cancel in the changes of a motion whose disturbances fade at once."""
 
 
 @jit
@@ -101,7 +103,10 @@ def multiplier(chained):
     minors = a * e - b * d + (a * i - c * g) + (e * i - f * h)
     third = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
     modulus, _ = largest_modulus((-(a + e + i), 0.0), (minors, 0.0), (-third, 0.0))
-    sizes = magnitude(a) + magnitude(e) + magnitude(i), magnitude(a * e) + magnitude(b * d) + magnitude(a * i)
+    sizes = (
+        max(magnitude(a) + magnitude(e) + magnitude(i), _LEAST_TRACE),
+        magnitude(a * e) + magnitude(b * d) + magnitude(a * i),
+    )
     second = sizes[1] + magnitude(c * g) + magnitude(e * i) + magnitude(f * h)
     last = magnitude(a) * (magnitude(e * i) + magnitude(f * h)) + magnitude(b) * (magnitude(d * i) + magnitude(f * g))
     last += magnitude(c) * (magnitude(d * h) + magnitude(e * g))

@@ -108,6 +108,11 @@ FOLLOWED = {
     "bounces that end in contact, off the middle": (2.831478082246554, 0.23931507825468049, 0.6098680333568618),
     "off the middle, light foliot": (12.786, 0.126, 0.7672),
     "three swings to a tooth": (17.13985716032627, 0.004964693289814581, 0.6716857730988353),
+    "off the middle, thrown back from one half swing into the next": (
+        2.2403204501117404,
+        0.0010984720445904245,
+        0.6592247725331054,
+    ),
     "two cycles, off the middle": (12.7859, 0.1057, 0.5342),
     "two cycles, off the middle, more impacts": (2.8315, 0.1474, 0.4885),
 }
