@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 import sys
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -26,7 +27,7 @@ from kernels.interface import Status
 
 NOTES = """\
 theory: kappa = M/m, the mass of the wheel over that of the foliot, both at the pallet; deviation: relative, in the
-worst cell. A steady beat: the motion repeats after one tooth, the same on both sides"""
+worst cell"""
 
 EXISTS = (Status.OK, Status.UNSTABLE, Status.GRAZING)
 
@@ -84,6 +85,30 @@ def plastic(stuck: xr.Dataset) -> list[Statement]:
     ]
 
 
+def words(closed: xr.Dataset) -> str:
+    """The conclusion, with the numbers of this grid."""
+    loose = closed.where(closed.status.isin(EXISTS) & (closed.e > 0))
+    steady = loose.where(loose.status == Status.OK)
+    kept = steady.e.where(steady.period.notnull())
+    first = kept.isel(I_c=kept.notnull().any("e").values.nonzero()[0][[0, -1]])
+    low, high = first.min("e").values, first.max("e").values
+    near, far = first.kappa.values
+    windows = f"{low[0]:.2f} to {high[0]:.2f} at kappa = {near:.3g}, from {low[1]:.2f} to {high[1]:.2f} at {far:.3g}"
+    text = f"""In words: with a flat lever only a wheel heavier than the foliot keeps the beat of one impact, and only
+        if the impacts are neither too soft (the tooth catches up with the pallet) nor too hard (the pallet comes to
+        another tooth): e from {windows}.
+        Its swing is {float(steady.Y.min()):.2f} to {float(steady.Y.max()):.2f} of the tooth pitch, whatever the torque;
+        its wheel is thrown back by {_thrown(steady):.3f} of the pitch at most. Heavier foliots throw the wheel back by
+        up to {_thrown(loose):.2f} of it and lose that beat: they bounce until they rest against the tooth, or wander,
+        unless their lever yields as it is pushed."""
+    return textwrap.fill(" ".join(text.split()), 120)
+
+
+def _thrown(ds: xr.Dataset) -> float:
+    """Largest recoil over the tooth pitch."""
+    return float(ds.recoil.max() * ds.teeth / (2 * math.pi))
+
+
 def _off(here: xr.DataArray, theory: xr.DataArray) -> tuple[float, bool]:
     off = worst(here, theory)
     return off, off < 1e-13
@@ -129,7 +154,12 @@ def _near(here: xr.Dataset, closed: xr.Dataset) -> tuple[float, bool]:
 
 def lever_borders(kappa: Any, e: float) -> tuple[Any, Any]:
     """nu between which the cycle is stable, for kappa < 1."""
-    return -4 * (1 + kappa) / (kappa * (1 - kappa)), -4 * (1 + e) ** 2 / ((1 - e) ** 2 * kappa + 2 * (1 + e * e))
+    return -4 * (1 + kappa) / (kappa * (1 - kappa)), flip_border(kappa, e)
+
+
+def flip_border(kappa: Any, e: float) -> Any:
+    """nu at which a multiplier is -1, for any kappa; so it is at kappa = 1 for any nu."""
+    return -4 * (1 + e) ** 2 / ((1 - e) ** 2 * kappa + 2 * (1 + e * e))
 
 
 def lever(bent: xr.Dataset) -> list[Statement]:
@@ -152,9 +182,8 @@ def lever(bent: xr.Dataset) -> list[Statement]:
 
 def _steady_light(bent: xr.Dataset) -> xr.DataArray:
     """For kappa > 1: p(1) > 0 and p(-1) < 0, p the characteristic polynomial of the half map."""
-    k, e = bent.kappa, LEVER_E
-    low = -4 * (1 + e) ** 2 / ((1 - e) ** 2 * k + 2 * (1 + e * e))
-    return (bent.nu < 4 * (1 + k) / (k * (k - 1))) & (bent.nu > low)
+    k = bent.kappa
+    return (bent.nu < 4 * (1 + k) / (k * (k - 1))) & (bent.nu > flip_border(k, LEVER_E))
 
 
 def figure(closed: xr.Dataset, motion: xr.Dataset, bent: xr.Dataset) -> Any:
@@ -205,13 +234,14 @@ def draw_recoil(page: Any, axes: Any, ds: xr.Dataset) -> None:
     pitch = math.degrees(float(2 * math.pi / ds.teeth))
     kappa, e = _frame(axes, ds)
     shown = np.ma.masked_invalid(values / pitch)
-    mesh = axes.pcolormesh(kappa, e, shown, cmap="cividis", vmin=0, vmax=0.3, shading="nearest", rasterized=True)
+    mesh = axes.pcolormesh(kappa, e, shown, cmap="cividis", vmin=0, vmax=0.4, shading="nearest", rasterized=True)
     page.colorbar(mesh, ax=axes, label="recoil over tooth pitch", pad=0.02)
     _missing(axes, ds, values)
     border = kappa / (2 + kappa)
     axes.plot(kappa, border, color="white", linewidth=1.4)
     axes.plot(kappa, border, color="black", linewidth=0.8, linestyle=(0, (4, 2)))
     direct_label(axes, 12, 0.3, "no recoil")
+    direct_label(axes, 24, 0.72, r"$\kappa = 2e/(1 - e)$", fontsize=7)
 
 
 def draw_kinds(axes: Any, motion: xr.Dataset) -> None:
@@ -243,13 +273,13 @@ def draw_lever(page: Any, axes: Any, bent: xr.Dataset) -> None:
     mesh = axes.pcolormesh(kappa, nu, values, vmin=0.5, vmax=1.5, cmap="RdBu_r", shading="nearest", rasterized=True)
     page.colorbar(mesh, ax=axes, label="multiplier", pad=0.02, extend="max")
     hatch(axes, kappa, nu, np.isnan(values), "////")
-    heavy = np.linspace(kappa[0], 0.999, 400)
-    for border in lever_borders(heavy, LEVER_E):
-        axes.plot(heavy, border, color="black", linewidth=0.9)
+    inside = kappa[~np.isnan(values).all(axis=0)]
+    axes.plot(inside, flip_border(inside, LEVER_E), color="black", linewidth=0.9)
+    axes.axvline(1.0, color="black", linewidth=0.9)
     axes.set(xscale="log", xlim=(kappa[0], kappa[-1]), ylim=(nu[0], nu[-1]))
-    axes.set(xlabel=r"$\kappa$", ylabel=r"curvature of the lever, $\nu$")
+    axes.set(xlabel=r"mass of the wheel over that of the foliot, $\kappa$", ylabel=r"curvature of the lever, $\nu$")
     direct_label(axes, 0.3, -7, "stable")
-    direct_label(axes, 0.35, 2, "unstable")
+    direct_label(axes, 0.22, 3, "unstable")
 
 
 def conclude(path: str, lever_path: str) -> tuple[Groups, list[str], Any]:
@@ -262,7 +292,7 @@ def conclude(path: str, lever_path: str) -> tuple[Groups, list[str], Any]:
         "What the clock does": motions(closed, motion),
         "A curved lever": lever(bent),
     }
-    return groups, [NOTES], figure(closed, motion, bent)
+    return groups, [NOTES, "", words(closed)], figure(closed, motion, bent)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -33,7 +33,9 @@ NOTES = """\
 theory: P ~ torque^(-s); deviation: relative, of exponents the difference. In words: impacts alone cannot give any other
 exponent than 1/2, whatever the inertias, the restitution or the pallets are, and they leave the swing alone; a period
 that falls as 1/torque or as torque^(-1/3), or a swing that grows with the torque, shows friction. At 1/2 a torque that
-is 1 % low makes the clock 0.5 % slow, 7.2 minutes a day"""
+is 1 % low makes the clock 0.5 % slow, 7.2 minutes a day. Without drop two plastic bodies are one that keeps the share
+(m - M)/(m + M); a wheel heavier than the foliot makes it negative: the same period formula, but the foliot turns round
+at the switch, and its swing is the way to the switch alone"""
 
 
 def together(impact: xr.Dataset, denny: xr.Dataset, viscous: xr.Dataset) -> xr.Dataset:

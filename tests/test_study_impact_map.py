@@ -64,6 +64,16 @@ def test_a_light_foliot_with_little_restitution_beats_with_one_impact(closed_and
     assert (kind.where((kind.kappa > 3) & (kind.e > 0.15) & (kind.e < 0.4), 0) == 0).all()
 
 
+def test_the_conclusion_in_words_has_the_numbers_of_the_grid(closed_and_motion):
+    closed = closed_and_motion[0]
+    kappa, e, swing = (closed[name].broadcast_like(closed.Y).values for name in ("kappa", "e", "Y"))
+    steady = (closed.status.values == Status.OK) & (e > 0)
+    ends = [e[steady & (kappa == kappa[steady].max())].min(), e[steady & (kappa == kappa[steady].max())].max()]
+    text = " ".join(impact_map.words(closed).split())
+    assert f"from {ends[0]:.2f} to {ends[1]:.2f} at {kappa[steady].max():.3g}." in text
+    assert f"swing is {swing[steady].min():.2f} to {swing[steady].max():.2f} of" in text
+
+
 def test_heavy_foliots_have_no_stable_cycle_of_one_impact(closed_and_motion):
     closed = closed_and_motion[0]
     heavy = closed.where((closed.kappa < 0.99) & (closed.e > 0), drop=True)
