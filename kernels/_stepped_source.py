@@ -155,8 +155,8 @@ from {steps} import M
 def to_event_dopri5(state, side, signs, parameters, unit, h, on, tolerance, active):
     """The leg of Dormand-Prince 5(4)."""
     return _adaptive_step.to_event(
-        M, _adaptive_step.dopri5_tried, _adaptive_step.dopri5_series, _adaptive_step.dopri5_dense, 5.0,
-        state, side, signs, parameters, unit, h, on, tolerance, active,
+        M, _adaptive_step.dopri5_tried, _adaptive_step.dopri5_series, _adaptive_step.dopri5_dense,
+        _adaptive_step.dopri5_vague, 5.0, state, side, signs, parameters, unit, h, on, tolerance, active,
     )
 
 
@@ -164,8 +164,8 @@ def to_event_dopri5(state, side, signs, parameters, unit, h, on, tolerance, acti
 def to_event_dop853(state, side, signs, parameters, unit, h, on, tolerance, active):
     """The leg of DOP853."""
     return _adaptive_step.to_event(
-        M, _adaptive_step.dop853_tried, _adaptive_step.dop853_series, _adaptive_step.dop853_dense, 8.0,
-        state, side, signs, parameters, unit, h, on, tolerance, active,
+        M, _adaptive_step.dop853_tried, _adaptive_step.dop853_series, _adaptive_step.dop853_dense,
+        _adaptive_step.dop853_vague, 8.0, state, side, signs, parameters, unit, h, on, tolerance, active,
     )
 '''
 

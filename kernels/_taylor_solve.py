@@ -70,7 +70,7 @@ def once(module, columns, rtol, outputs, status):
     _write(results, outputs, status)
 
 
-def twice(module, columns, rtol, outputs, status):
+def twice(module, columns, rtol, outputs, status, most=APART):
     """Fills outputs and status by two runs; INACCURATE where they differ by more than the finer one could mend."""
     rough = followed(module, off_by_roundings(columns), rtol, ROUGH)
     fine = followed(module, columns, rtol, ROUGH * FINER)
@@ -78,7 +78,7 @@ def twice(module, columns, rtol, outputs, status):
     states = len(module.STATES)
     scale = np.concatenate([abs(fine[:2]), np.maximum(abs(fine[2 : 2 + states]), fine[2 + states : -1])])
     with np.errstate(all="ignore"):
-        apart = (rtol < ROUNDING) | ~(abs(fine[: len(scale)] - rough[: len(scale)]) <= APART * rtol * scale).all(axis=0)
+        apart = (rtol < ROUNDING) | ~(abs(fine[: len(scale)] - rough[: len(scale)]) <= most * rtol * scale).all(axis=0)
     status[apart & (status == Status.OK)] = Status.INACCURATE
     worse = (rough[-1] > 0) & (status <= Status.INACCURATE)
     status[worse] = np.where(rough[-1][worse] < FIRST_REFUSAL, rough[-1][worse], Status.INACCURATE)
