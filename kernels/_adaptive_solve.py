@@ -14,8 +14,7 @@ def twice_by(method, scene):
 
     def twice(module, columns, rtol, outputs, status):
         run = getattr(adaptive(scene), f"run_{method}")
-        _taylor_solve.twice(
-            SimpleNamespace(STATES=module.STATES, run_14=run, run_20=run), columns, rtol, outputs, status, APART[method]
-        )
+        runs = SimpleNamespace(STATES=module.STATES, ROWS=module.ROWS, run_14=run, run_20=run)
+        _taylor_solve.twice(runs, columns, rtol, outputs, status, APART[method])
 
     return twice

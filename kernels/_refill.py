@@ -1,7 +1,7 @@
 """Cells of very different length in lanes: a lane that has finished its cell is given the next one.
 
 A *memory* has a row for each number that a lane knows between two events, and a column for each lane. The first row is
-the lane's stage; then come its cell's inputs, then its results. `advance(memory, i)` takes every lane one event further
+the lane's stage; then come its cell's inputs. `advance(memory, i)` takes every lane one event further
 and returns whether one has finished; i is the index of all lanes, or 0 in plain Python, where there is one.
 """
 
@@ -17,21 +17,28 @@ IDLE, FRESH, MOVING, DONE = 0.0, 1.0, 2.0, 3.0
 _index_of_all = lanes_at if COMPILED else int
 
 
+def fresh(numbers, inputs):
+    """Cells before anything runs: of so many numbers each, of which the first behind the stage are the inputs."""
+    cells = np.zeros((len(inputs[0]), numbers))
+    cells[:, 0] = FRESH
+    cells[:, 1 : 1 + len(inputs)] = np.transpose(inputs)
+    return cells
+
+
 @jit
-def _give(memory, lane, inputs, cell):
+def _give(memory, lane, cells, cell):
     """Puts a cell into a lane; with none left the lane keeps its last one, idle."""
-    if cell < inputs.shape[1]:
-        for row in range(inputs.shape[0]):
-            memory[1 + row, lane] = inputs[row, cell]
-        memory[0, lane] = FRESH
+    if cell < cells.shape[0]:
+        for row in range(cells.shape[1]):
+            memory[row, lane] = cells[cell, row]
     else:
         memory[0, lane] = IDLE
 
 
 @jit
-def _take(memory, lane, results, cell, first):
-    for row in range(results.shape[0]):
-        results[row, cell] = memory[first + row, lane]
+def _take(memory, lane, cells, cell):
+    for row in range(cells.shape[1]):
+        cells[cell, row] = memory[row, lane]
 
 
 @jit
@@ -43,23 +50,21 @@ def _busy(memory):
 
 
 @jit
-def each_refilled(advance, inputs, results, rows, together):
+def each_refilled(advance, cells, together):
     """Every cell to its end.
 
     Parameters
     ----------
-    inputs, results : arrays of a row per number and a column per cell
-    rows : of the memory
+    cells : (n_cells, numbers that a lane knows), fresh or moving; in the end all are done
     together : refill no lane before all have finished, as lanes in lockstep do; the rival that this is measured against
     """
-    memory = np.zeros((rows, LANES))
-    cells = np.zeros(LANES, np.int64)
-    first = 1 + inputs.shape[0]
-    n = inputs.shape[1]
+    memory = np.zeros((cells.shape[1], LANES))
+    held = np.zeros(LANES, np.int64)
+    n = cells.shape[0]
     for lane in range(LANES):
-        cells[lane] = min(lane, n - 1)
-        _give(memory, lane, inputs, cells[lane])
-        memory[0, lane] = FRESH if lane < n else IDLE
+        held[lane] = min(lane, n - 1)
+        _give(memory, lane, cells, held[lane])
+        memory[0, lane] = memory[0, lane] if lane < n else IDLE
     handed, left = LANES, n
     while left > 0:  # every lane ends: `advance` limits its events
         finished = advance(memory, _index_of_all(0))
@@ -67,8 +72,8 @@ def each_refilled(advance, inputs, results, rows, together):
             continue
         for lane in range(LANES):
             if memory[0, lane] == DONE:
-                _take(memory, lane, results, cells[lane], first)
+                _take(memory, lane, cells, held[lane])
                 left -= 1
-                cells[lane] = handed
-                _give(memory, lane, inputs, handed)
+                held[lane] = handed
+                _give(memory, lane, cells, handed)
                 handed += 1

@@ -43,11 +43,11 @@ from kernels._lanes import choose, dot, exponent, fma, horner, isnt, magnitude, 
 from kernels._refill import each_refilled
 from kernels._scene_module import kept
 from kernels._taylor import (
-    GRAZING, HALVINGS, LONGEST, SLACK, STEP_LIMIT, clear, falls, integral, keeps, last_term, mean, natural_power,
-    next_step, rises, root, size, slope, stays_apart, tail, worse,
+    HALVINGS, LONGEST, SLACK, STEP_LIMIT, clear, crossing, falls, keeps, last_term, mean, natural_power, next_step,
+    of_series, of_sum, rises, size, stays_apart, tail, worse,
 )
 from kernels._taylor_core import FAR, UNEVEN, core_time, mean_power, size_in_unit
-from kernels._taylor_pool import KINK_LIMIT, time_unit
+from kernels._taylor_pool import EVENTS, KINK_LIMIT, time_unit
 from kernels._vecmath import exp, is_normal, log, power, sincos
 from kernels.interface import FIRST_REFUSAL, Status
 
@@ -197,7 +197,7 @@ class Writer:
             self.function("started", "The state at the start.", recorded.started, ("side", "parameters")),
             self.in_range(),
             self.series(2),
-            shared(self.states, self.kinks),
+            shared(self.states, self.parameters, self.kinks),
         ]  # fmt: skip
         parts += [core(self, i) for i in range(len(recorded.graph.powers))]
         for order in ORDERS:

@@ -17,10 +17,12 @@ import math
 import sys
 from collections import namedtuple
 
+import numpy as np
+
 from kernels._fixed_step import follow
 from kernels._jit import jit, jit_call
 from kernels._lanes import fma, magnitude, some, where
-from kernels._refill import each_refilled
+from kernels._refill import FRESH, each_refilled
 from kernels._scene_module import kept
 
 scene = sys.modules["{module}"]
@@ -89,7 +91,11 @@ def advance(memory, i):
 @kept
 def run(inputs, results, together):
     """Each cell, a column of `inputs`, until its last switch."""
-    each_refilled(advance, inputs, results, {rows}, together)
+    first, last = 1 + inputs.shape[0], 1 + inputs.shape[0] + results.shape[0]
+    cells = np.zeros((inputs.shape[1], {rows}))
+    cells[:, 0], cells[:, 1:first] = FRESH, inputs.T
+    each_refilled(advance, cells, together)
+    results[...] = cells[:, first:last].T
 '''
 
 

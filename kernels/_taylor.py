@@ -26,7 +26,6 @@ from kernels._lanes import (
     nearest,
     pow2,
     some,
-    sqrt,
     where,
 )
 
@@ -66,68 +65,48 @@ def _lower_tail(context, builder, signature, values):
 _function(tail, 2, lambda h, series: _number(h, *series), _lower_tail)
 
 
+def _nested(x, terms, ratios):
+    """terms[0] + x ratios[0] (terms[1] + x ratios[1] (terms[2] + ...)).
+
+    The ratios go to x and not into the terms, or those would be kept from one evaluation for the next, and stored.
+    """
+    value = terms[-1]
+    for term, ratio in zip(terms[-2::-1], ratios[::-1], strict=True):
+        value = fma(value, x * ratio, term)
+    return value
+
+
+def _lower_nested(first, last, ratio):
+    """The compiled form, of the terms from `first` to `last`."""
+
+    def lower(context, builder, signature, values):
+        target = signature.return_type
+        x = context.cast(builder, values[0], signature.args[0], target)
+        terms = _items(context, builder, signature.args[1], values[1], target)
+        value, k = None, len(terms) + last
+        for term in terms[first : len(terms) + last + 1][::-1]:
+            by = None if value is None else builder.fmul(x, _constant(x.type, ratio(k + 1)))
+            value, k = term if value is None else _called("fma")(builder, value, by, term), k - 1
+        return value
+
+    return lower
+
+
 def slope(x, series):
     """u'(x) = sum k u_k x^(k-1)."""
-    order = len(series) - 1
-    value = order * series[order]
-    for k in range(order - 1, 0, -1):
-        value = fma(value, x, float(k) * series[k])
-    return value
-
-
-def _lower_slope(context, builder, signature, values):
-    target = signature.return_type
-    x = context.cast(builder, values[0], signature.args[0], target)
-    items = _items(context, builder, signature.args[1], values[1], target)
-    value = None
-    for k in range(len(items) - 1, 0, -1):
-        term = builder.fmul(_constant(items[k].type, float(k)), items[k])
-        value = term if value is None else _called("fma")(builder, value, x, term)
-    return value
-
-
-_function(slope, 2, lambda x, series: _number(x, *series), _lower_slope)
+    return _nested(x, series[1:], [k / (k - 1) for k in range(2, len(series))])
 
 
 def mean(x, series):
     """The mean of u between 0 and x, but for its last term: sum of u_k x^k/(k + 1)."""
-    value = series[-2] * (1.0 / (len(series) - 1))
-    for k in range(len(series) - 3, -1, -1):
-        value = fma(value, x, series[k] * (1.0 / (k + 1)))
-    return value
+    return _nested(x, series[:-1], [k / (k + 1) for k in range(1, len(series) - 1)])
 
 
-def _lower_mean(context, builder, signature, values):
-    target = signature.return_type
-    x = context.cast(builder, values[0], signature.args[0], target)
-    items = _items(context, builder, signature.args[1], values[1], target)
-    value = None
-    for k in range(len(items) - 2, -1, -1):
-        term = builder.fmul(_constant(items[k].type, 1.0 / (k + 1)), items[k])
-        value = term if value is None else _called("fma")(builder, value, x, term)
-    return value
-
-
-_function(mean, 2, lambda x, series: _number(x, *series), _lower_mean)
-
-
-def integral(unit, start, series):
-    """Coefficients of the state that starts there and whose rate is unit u."""
-    return start, *(u * (unit * (1.0 / (k + 1))) for k, u in enumerate(series[:-1]))
-
-
-def _lower_integral(context, builder, signature, values):
-    lanes = signature.return_type[0]
-    unit, start = (context.cast(builder, v, t, lanes) for v, t in zip(values[:2], signature.args[:2], strict=True))
-    items = _items(context, builder, signature.args[2], values[2], lanes)
-    parts = [builder.fmul(unit, _constant(unit.type, 1.0 / (k + 1))) for k in range(len(items) - 1)]
-    found = [start] + [builder.fmul(u, part) for u, part in zip(items[:-1], parts, strict=True)]
-    return context.make_tuple(builder, signature.return_type, found)
-
-
-_function(
-    integral, 3, lambda unit, start, series: types.UniTuple(_number(unit, start, *series), len(series)), _lower_integral
-)
+for _of_series, _lower in (
+    (slope, _lower_nested(1, -1, lambda k: k / (k - 1))),
+    (mean, _lower_nested(0, -2, lambda k: k / (k + 1))),
+):
+    _function(_of_series, 2, lambda x, series: _number(x, *series), _lower)
 
 
 @jit
@@ -230,42 +209,48 @@ def clear(e, d, dd, ddd, rest, h, margin):
     return above | turns | ((h <= 0.0) & (d > 0.0))
 
 
+@jit
+def of_series(t, curve):
+    """u, u' and about u''/2 at t, of u = sum u_k t^k; curve is (series,)."""
+    (u,) = curve
+    return horner(t, u), slope(t, u), fma(t, fma(t, 6.0 * u[4], 3.0 * u[3]), u[2])
+
+
+@jit
+def of_sum(t, curve):
+    """u, u' and about u''/2 at t, of u = start + unit int w; curve is (start, unit, series of w)."""
+    start, unit, w = curve
+    bend = fma(t, fma(t, 1.5 * w[3], w[2]), 0.5 * w[1])
+    return fma(unit * t, mean(t, w), start), unit * horner(t, w), unit * bend
+
+
 @jit_call
-def root(offset, factor, series, h, tolerance, searching):
-    """Where offset + factor u(t) falls through 0 in (0, h], given that it falls all along.
+def crossing(at, curve, event, h, tolerance, searching):
+    """Where an event falls through 0 in (0, h], given that it falls all along, and whether it only just does.
 
     Halley's steps within a bracket, with the bend by the first terms. What is left after a step is taken for that of
     Newton's, change^3/before^2, which is more; the search ends where that is far below what the series leave out.
+
+    Parameters
+    ----------
+    at, curve : u, u' and u''/2 at t are `at(t, curve)`
+    event : offset, factor and u(0) of the event offset + factor u
     """
+    offset, factor, start = event
     before, enough = 0.0 * h, 0.01 * tolerance + 1e-17
-    low, high = 0.0 * h, h
-    e, d, dd = fma(factor, series[0], offset), factor * series[1], factor * series[2]
-    t = first_guess(e, d, dd, h)
+    low, high, t, left = 0.0 * h, h, 0.5 * h, searching
+    rate, bend = 0.0 * h, 0.0 * h
     for _ in range(ROOT_LIMIT):
-        if not some(searching):
-            break
-        value, rate = fma(factor, horner(t, series), offset), factor * slope(t, series)
+        u, du, ddu = at(t, curve)
+        value, rate, bend = fma(factor, u, offset), where(left, factor * du, rate), where(left, factor * ddu, bend)
         low, high = where(value > 0.0, t, low), where(value > 0.0, high, t)
-        new = t - value * rate / fma(rate, rate, -value * (factor * half_bend(t, series)))
+        new = t - value * rate / fma(rate, rate, -value * bend)
         new = where((new >= low) & (new <= high), new, 0.5 * (low + high))
         change = magnitude(new - t)
-        t = where(searching, new, t)
-        searching = searching & isnt((change * change) * change <= enough * t * (before * before))
+        t = where(left, new, t)
+        left = left & isnt((change * change) * change <= enough * t * (before * before))
+        if not some(left):
+            break
         before = change
-    return t
-
-
-@jit
-def half_bend(t, series):
-    """About u''(t)/2, by its first terms."""
-    return fma(t, fma(t, 6.0 * series[4], 3.0 * series[3]), series[2])
-
-
-@jit
-def first_guess(e, d, dd, h):
-    """The root of e + d t + dd t^2 for e > 0 > d, within [0, h]."""
-    inside = fma(d, d, -4.0 * dd * e)
-    inside = where(inside > 0.0, inside, 0.0)
-    t = 2.0 * e / (sqrt(inside) - d)
-    t = where(t < h, t, h)
-    return where(t > 0.0, t, 0.0)
+    blur = GRAZING * tolerance * (magnitude(offset) + magnitude(factor * start))
+    return t, searching & isnt(magnitude(rate) > blur / magnitude(rate) * (2.0 * magnitude(bend)))

@@ -27,7 +27,7 @@ def given_{i}(state, side, signs, parameters, unit, power_{i}):
 
 
 @jit_call
-def core_{i}(state, side, signs, parameters, unit, tolerance, leaves, starting):
+def core_{i}(state, side, signs, parameters, unit, tolerance, leaves):
     """The mean of power {i} in its core, -1 where the motion is not in it; and the longest step from the kink on."""
     {unpack}
     {value_of_n}
@@ -40,7 +40,7 @@ def core_{i}(state, side, signs, parameters, unit, tolerance, leaves, starting):
     inside = (sign_{kink} * full_{u} < 0.0) & (d <= UNEVEN)
     {inside}
     core, longest = where(inside, mean_power(value, {n}), -1.0), 0.0 * t + FAR
-    if starting and some(leaves):
+    if some(leaves):
         {most} = given_{i}(state, side, signs, parameters, unit, 0.0 * side + 1.0)
         room = 0.0 * t + FAR
         {room}

@@ -90,8 +90,8 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
         if not some(moving):
             break
     lost = moving
-    {again}
     met = active & isnt(lost | stuck | broken | grazing)
+    part, which, hangs = span, -1.0 - 0.0 * h, nothing
     {roots}
     {at_root}
     t = where(met, t + part, t)
@@ -103,34 +103,30 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
 def leg(states, events, order, nested=0, summed=(), seen=(), kinks_of_powers=()):
     """The text of `to_event_{order}`: `states` are names, `events` the number of events."""
     e = range(events)
-    roots = [
-        """\
-offset, factor, series, part = offset_0, factor_0, event_0, span
-which = where(passed_0, 0.0, -1.0)""",
-        *(
-            f"""\
-first = passed_{j} & (which < 0.0)
-which, offset, factor = where(first, {j}.0, which), where(first, offset_{j}, offset), where(first, factor_{j}, factor)
-series = choose(first, event_{j}, series)"""
-            for j in e[1:]
-        ),
-        "part = root(offset, factor, series, span, tolerance, met)",
-        *(
-            f"""\
-first = passed_{j} & (which < {j}.0) & (fma(factor_{j}, horner(part, event_{j}), offset_{j}) <= 0.0)
+
+    def state_at(s, x):
+        return f"fma(unit * {x}, mean({x}, s_{summed[s]}), {s})" if s in summed else f"horner({x}, s_{s})"
+
+    def seen_at(j, x):
+        return state_at(seen[j], x) if seen[j] else f"horner({x}, event_{j})"
+
+    def curve(j):
+        """Of what the event watches: how it is evaluated, its value at the start of the step."""
+        s = seen[j]
+        if s in summed:
+            return f"of_sum, ({s}, unit, s_{summed[s]})", s
+        return f"of_series, (event_{j},)", f"event_{j}[0]"
+
+    def root(j):
+        among = f"first = first & ((which < 0.0) | (fma(factor_{j}, {seen_at(j, 'part')}, offset_{j}) <= 0.0))"
+        watched, value = curve(j)
+        return f"""\
+first = met & passed_{j}
 if some(first):
-    part = where(first, root(offset_{j}, factor_{j}, event_{j}, part, tolerance, first), part)
-    which = where(first, {j}.0, which)
-    offset, factor = where(first, offset_{j}, offset), where(first, factor_{j}, factor)
-    series = choose(first, event_{j}, series)"""
-            for j in e[1:]
-        ),
-        """\
-rate = factor * slope(part, series)
-bend = magnitude(factor) * fma(6.0 * part, magnitude(series[3]), 2.0 * magnitude(series[2]))
-blur = GRAZING * tolerance * (magnitude(offset) + magnitude(factor * series[0]))
-hangs = met & isnt(magnitude(rate) > blur / magnitude(rate) * bend)""",
-    ]
+    {among if j else "# whatever else passed in this step"}
+    at, only_just = crossing({watched}, (offset_{j}, factor_{j}, {value}), span, tolerance, first)
+    part, which, hangs = where(first, at, part), where(first, {j}.0, which), (hangs & isnt(first)) | only_just"""
+
     facts = [
         f"""\
 e_{j}, d_{j} = fma(factor_{j}, event_{j}[0], offset_{j}), factor_{j} * event_{j}[1]
@@ -166,17 +162,9 @@ down_{j} = falls(d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial) | now_{j}"""
         for j in e
     ]
 
-    def end_of(s, h):
-        if s in summed:
-            return f"end_{s} = fma(unit * {h}, mean({h}, s_{summed[s]}), {s})"
-        return f"end_{s} = horner({h}, s_{s})"
-
-    def seen_at(j):
-        return f"end_{seen[j]}" if seen[j] else f"horner(trial, event_{j})"
-
     cores = [
         f"at_core_{i}, longest_{i} = "
-        f"core_{i}(({listed(states)}), side, signs, parameters, unit, tolerance, on_{1 + j} > 0.5, step == 0)"
+        f"core_{i}(({listed(states)}), side, signs, parameters, unit, tolerance, (on_{1 + j} > 0.5) & (t <= 0.0))"
         for i, j in enumerate(kinks_of_powers)
     ]
     each = ("e", "d", "dd", "ddd", "margin", "now", "falls")
@@ -207,7 +195,11 @@ down_{j} = falls(d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial) | now_{j}"""
         "unpack_series": listed(f"event_{j}" for j in e) + " = series",
         "all_sure": " & ".join(f"(clear_{j} | falls_{j})" for j in e),
         "ends": "\n".join(
-            [end_of(s, "trial") for s in states] + [f"end_{j} = fma(factor_{j}, {seen_at(j)}, offset_{j})" for j in e]
+            [f"end_{s} = {state_at(s, 'trial')}" for s in states]
+            + [
+                f"end_{j} = fma(factor_{j}, {f'end_{seen[j]}' if seen[j] else seen_at(j, 'trial')}, offset_{j})"
+                for j in e
+            ]
         ),
         "passed": "\n".join(passed),
         "any_passed": " | ".join(f"passed_{j}" for j in e),
@@ -216,12 +208,8 @@ down_{j} = falls(d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial) | now_{j}"""
         "cores": "\n".join(cores),
         "all_cores": f", ({listed(f'at_core_{i}' for i in range(len(cores)))})" if cores else "",
         "no_longer": "\n".join(f"h = where(h < longest_{i}, h, longest_{i})" for i in range(len(cores))),
-        "again": "\n".join(
-            [f"s_{s} = integral(unit, {s}, s_{w})" for s, w in summed.items()]
-            + [f"event_{j} = s_{seen[j]}" for j in e if seen[j] in summed]
-        ),
-        "roots": "\n".join(roots),
-        "at_root": "\n".join(f"end_{s} = where(met, horner(part, s_{s}), {s})" for s in states),
+        "roots": "\n".join(root(j) for j in e),
+        "at_root": "\n".join(f"end_{s} = where(met, {state_at(s, 'part')}, {s})" for s in states),
         "final": listed(f"end_{s}" for s in states),
         "fired": listed(f"where(met & (which > {j - 0.5}) & (which < {j + 0.5}), 1.0, 0.0)" for j in e),
         "left_out": folded("worse({}, {})", [f"(last_term(h, s_{s}), size(h, s_{s}))" for s in states]),

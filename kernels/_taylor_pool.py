@@ -6,6 +6,8 @@ from kernels._taylor_text import filled, listed
 
 KINK_LIMIT = 1000
 """Kinks between two switches after which a cell is given up."""
+EVENTS = 1_000_000
+"""Of lanes none of which finishes, before what they know is put down."""
 
 SETTLED = '''
 @jit_call
@@ -34,9 +36,9 @@ def begun(parameters):
 '''
 
 EVENT = '''
-@jit
+@jit_call
 def advance_{order}(memory, i):
-    """Every lane on to its next event; whether one has finished."""
+    """Every lane on from event to event, until one has finished; whether one has."""
     {load}
     parameters = ({parameters})
     fresh = (stage > 0.5) & (stage < 1.5)
@@ -45,53 +47,55 @@ def advance_{order}(memory, i):
         s, p, g, u, o, beyond = begun(parameters)
         {begin}
         verdict = where(fresh, where(beyond, BAD_INPUT, 0.0), verdict)
-    moving = active & (verdict < REFUSAL)
-    new, t, h, on, stuck, lost, broken, grazing, hangs, tried = to_event_{order}(
-        ({states}), side, ({signs}), parameters, unit, h, ({ons}), tolerance, moving
-    )
-    verdict = where((hangs | grazing) & (verdict < REMARK), REMARK, verdict)
-    verdict = where(lost, STEP_LIMIT_MET, where(stuck, STICKS, where(broken, OUT_OF_RANGE, verdict)))
-    moving = moving & (verdict < REFUSAL) & isnt(grazing)
-    {nothing}
-    {land}
-    {ons} = on
-    time, since = where(moving, fma(t, unit, time), time), where(moving, fma(t, unit, since), since)
-    switches = moving & (on_0 > 0.5)
-    kinks_met = where(switches, 0.0, where(moving, kinks_met + 1.0, kinks_met))
-    {turn}
-    if some(switches):
-        {keep}
-        rate = rates(({states}), side, ({signs}), parameters)
-        {size}
-        interval, since = where(switches, since, interval), where(switches, 0.0, since)
-        count = where(switches, count + 1.0, count)
-        watched = switches & ((count < 1.5) | (count >= flips))
-        if some(watched):
-            faint = underflows(({states}), side, ({signs}), parameters, unit)
-            verdict = where(watched & faint, OUT_OF_RANGE, verdict)
-        left = surface(({states}), side, ({signs}), parameters)
-        s = switched(({states}), side, ({signs}), parameters)
-        side = where(switches, -side, side)
-        g, o = settled(s, side, parameters, unit)
-        {jump}
-        after = surface(({states}), side, ({signs}), parameters)
-        size = magnitude({offset}) + magnitude(after - {offset})
-        still = magnitude(after) <= fma(1e-12, size, 2.0 * magnitude(left))
-        on_0 = where(switches, where(still, 1.0, 0.0), on_0)
-    steps, before = where(active, tried, steps), where(active, steps, before)
-    verdict = where(moving & (kinks_met > KINK_LIMIT), STEP_LIMIT_MET, verdict)
-    done = active & (grazing | (verdict >= REFUSAL) | (count >= flips))
+    done = active & isnt(active)
+    for _ in range(EVENTS):
+        moving = active & (verdict < REFUSAL)
+        new, t, h, on, stuck, lost, broken, grazing, hangs, tried = to_event_{order}(
+            ({states}), side, ({signs}), parameters, unit, h, ({ons}), tolerance, moving
+        )
+        verdict = where((hangs | grazing) & (verdict < REMARK), REMARK, verdict)
+        verdict = where(lost, STEP_LIMIT_MET, where(stuck, STICKS, where(broken, OUT_OF_RANGE, verdict)))
+        moving = moving & (verdict < REFUSAL) & isnt(grazing)
+        {land}
+        {ons} = on
+        time, since = where(moving, fma(t, unit, time), time), where(moving, fma(t, unit, since), since)
+        switches = moving & (on_0 > 0.5)
+        kinks_met = where(switches, 0.0, where(moving, kinks_met + 1.0, kinks_met))
+        {turn}
+        if some(switches):
+            count = where(switches, count + 1.0, count)
+            watched = switches & ((count < 1.5) | (count >= flips))
+            if some(watched):
+                faint = underflows(({states}), side, ({signs}), parameters, unit)
+                verdict = where(watched & faint, OUT_OF_RANGE, verdict)
+                rate = rates(({states}), side, ({signs}), parameters)
+                {keep}
+            since = where(switches, 0.0, since)
+            left = surface(({states}), side, ({signs}), parameters)
+            s = switched(({states}), side, ({signs}), parameters)
+            side = where(switches, -side, side)
+            g, o = settled(s, side, parameters, unit)
+            {jump}
+            after = surface(({states}), side, ({signs}), parameters)
+            size = magnitude({offset}) + magnitude(after - {offset})
+            still = magnitude(after) <= fma(1e-12, size, 2.0 * magnitude(left))
+            on_0 = where(switches, where(still, 1.0, 0.0), on_0)
+        steps, before = where(active, tried, steps), where(active, steps, before)
+        verdict = where(moving & (kinks_met > KINK_LIMIT), STEP_LIMIT_MET, verdict)
+        done = active & (grazing | (verdict >= REFUSAL) | (count >= flips))
+        if some(grazing):
+            {nothing}
+        if some(done):
+            break
     stage = where(done, 3.0, where(active, 2.0, stage))
     {store}
-    if some(switches | done):
-        {store_rare}
     return some(done)
 
 
 @kept
-def run_{order}(inputs, results, together):
-    """Each cell, a column of `inputs`, until its last switch."""
-    each_refilled(advance_{order}, inputs, results, {rows}, together)
+def run_{order}(cells, together):
+    """Each cell, a row of what ROWS names, until its last switch."""
+    each_refilled(advance_{order}, cells, together)
 '''
 
 
@@ -110,11 +114,27 @@ def time_unit(e, d, dd):
 
 _STARTS = (
     ("side", "p"), ("unit", "u"), ("h", "1.0"),
-    *((name, "0.0") for name in ("time", "interval", "count", "since", "kinks_met", "steps", "before")),
+    *((name, "0.0") for name in ("time", "count", "since", "kinks_met", "steps", "before")),
 )  # fmt: skip
 
 
-def shared(states, kinks):
+def results_of(states):
+    """Names of what is known of a cell in the end."""
+    return ["time", "interval", *(f"at_{s}" for s in states), *(f"size_{s}" for s in states), "verdict"]
+
+
+def _work_of(states, kinks):
+    """Names of what a lane knows of its cell between two events, beside results."""
+    signs, ons = [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]
+    return [*states, "side", *signs, "unit", "h", *ons, "count", "since", "kinks_met", "steps", "before"]
+
+
+def _rows(states, parameters, kinks):
+    """Names of all that a lane knows."""
+    return ["stage", *parameters, "flips", "tolerance", *results_of(states), *_work_of(states, kinks)]
+
+
+def shared(states, parameters, kinks):
     """The text that does not depend on the order."""
     signs, e = [f"sign_{j}" for j in range(kinks)], range(1, 1 + kinks)
     unpack = ", ".join([f"s_{s}" for s in states] + [f"(offset_{j}, factor_{j}, event_{j})" for j in (0, *e)])
@@ -132,7 +152,7 @@ sign_{j - 1} = where(on_{j} & back, -sign_{j - 1}, sign_{j - 1})"""
     ) + filled(
         BEGUN, states=listed(states), lasting=listed(f"{s} + 0.0 * side" for s in states), unpack=unpack,
         also_on=", ".join(f"on[{j - 1}]" for j in e),
-    )  # fmt: skip
+    ) + f"\n\nROWS = {tuple(_rows(states, parameters, kinks))}\n"  # fmt: skip
 
 
 SETTLED_EMPTY = '''
@@ -146,31 +166,26 @@ def settled(state, side, parameters, unit):
 def advance(states, parameters, kinks, order, offset):
     """The text of `advance_{order}` and `run_{order}`; `offset` is that of the surface, as text."""
     signs, ons = [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]
-    inputs = [*parameters, "flips", "tolerance"]
-    results = ["time", "interval", *(f"at_{s}" for s in states), *(f"size_{s}" for s in states)]
-    results += ["steps", "before", "verdict"]
-    work = [*states, "side", *signs, "unit", "h", *ons, "count", "since", "kinks_met"]
-    rows = ["stage", *inputs, *results, *work]
+    rows, changed = _rows(states, parameters, kinks), ["stage", "time", "verdict", *_work_of(states, kinks)]
+    results = {name: f"memory[{rows.index(name)}][i]" for name in results_of(states)[1:-1]}
+    held = [name for name in rows if name not in results]
     begin = [f"{s} = where(fresh, s[{j}], {s})" for j, s in enumerate(states)]
     begin += [f"{s} = where(fresh, g[{j}], {s})" for j, s in enumerate(signs)]
     begin += [f"{o} = where(fresh, o[{j}], {o})" for j, o in enumerate(ons)]
-    begin += [f"{r} = where(fresh, {start}, {r})" for r, start in [*_STARTS, *((r, "math.nan") for r in results[2:-3])]]
+    begin += [f"{r} = where(fresh, {start}, {r})" for r, start in _STARTS]
     jump = [f"{s} = where(switches, s[{j}], {s})" for j, s in enumerate(states)]
     jump += [f"{s} = where(switches, g[{j}], {s})" for j, s in enumerate(signs)]
     jump += [f"{o} = where(switches, o[{j}], {o})" for j, o in enumerate(ons[1:])]
-    rare = results[1:-3]
-    changed = ["stage", *(name for name in (*results, *work) if name not in rare)]
+    keep = {"interval": "since"} | {f"at_{s}": s for s in states}
+    keep |= {f"size_{s}": f"fma(magnitude(rate[{j}]), since, magnitude({s}))" for j, s in enumerate(states)}
     return filled(
-        EVENT, order=order, rows=len(rows), load="\n".join(f"{r} = memory[{j}][i]" for j, r in enumerate(rows)),
+        EVENT, order=order, load="\n".join(f"{r} = memory[{rows.index(r)}][i]" for r in held),
         parameters=listed(parameters), begin="\n".join(begin), states=listed(states), signs=listed(signs),
         ons=listed(ons), land="\n".join(f"{s} = where(moving, new[{j}], {s})" for j, s in enumerate(states)),
         turn="\n".join(f"{s} = where(moving & ({o} > 0.5), -{s}, {s})" for s, o in zip(signs, ons[1:], strict=True)),
-        nothing="\n".join(f"{r} = where(grazing, math.nan, {r})" for r in results[:-3]),
-        keep="\n".join(f"at_{s} = where(switches, {s}, at_{s})" for s in states), jump="\n".join(jump), offset=offset,
-        size="\n".join(
-            f"size_{s} = where(switches, fma(magnitude(rate[{j}]), since, magnitude({s})), size_{s})"
-            for j, s in enumerate(states)
-        ),
-        store_rare="\n".join(f"memory[{rows.index(r)}][i] = {r}" for r in rare),
+        nothing="\n".join(["time = where(grazing, math.nan, time)",
+                           *(f"{place} = where(grazing, math.nan, {place})" for place in results.values())]),
+        keep="\n".join(f"{results[r]} = where(watched, {x}, {results[r]})" for r, x in keep.items()),
+        jump="\n".join(jump), offset=offset,
         store="\n".join(f"memory[{rows.index(r)}][i] = {r}" for r in changed),
     )  # fmt: skip

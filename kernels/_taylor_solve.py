@@ -8,7 +8,7 @@ scene makes of rounding, which both runs would share, is seen too.
 
 import numpy as np
 
-from kernels._refill import LANES
+from kernels._refill import MOVING, fresh
 from kernels._vecmath import NORMAL_HIGH, NORMAL_LOW
 from kernels.interface import FIRST_REFUSAL, Status
 
@@ -18,7 +18,9 @@ HIGH_BELOW = 1e-10
 FINEST = 1e-25
 ROUNDING = 1e-14
 """The least rtol that is promised, whatever the two runs agree to."""
-FEW = 3
+AT_ONCE = 8192
+"""Cells whose lanes' memory stays in a core's cache."""
+FEW = 2
 """Switches after which a cell's steps between two of them are known well enough."""
 ROUGH, FINER = 2.0, 16.0
 ROUNDINGS, GOLDEN = 8.0, 0.6180339887498949
@@ -37,31 +39,44 @@ def followed(module, columns, rtol, finer=1.0, together=False):
     finer : by how much the steps are to be better than that
     together : lanes in lockstep, in the order of the cells
     """
-    inputs = np.array([*columns, np.maximum(rtol / finer, FINEST)])
-    results = np.full((5 + 2 * len(module.STATES), inputs.shape[1]), np.nan)
+    inputs = [*columns, np.maximum(rtol / finer, FINEST)]
+    results = np.empty((3 + 2 * len(module.STATES), len(rtol)))
     high = rtol < HIGH_BELOW
-    for run, cells in ((module.run_14, ~high), (module.run_20, high)):
-        if cells.any():
-            chosen = np.ascontiguousarray(inputs[:, cells])
-            found = np.full((len(results), chosen.shape[1]), np.nan)
-            run(chosen, found, True) if together else _dealt(run, chosen, found)
-            results[:, cells] = found
-    return np.delete(results, (-3, -2), axis=0)
+    for run, of_order in ((module.run_14, ~high), (module.run_20, high)):
+        cells = np.flatnonzero(of_order)
+        for begin in range(0, len(cells), AT_ONCE):
+            those = cells[begin : begin + AT_ONCE]
+            results[:, those] = _run(module, run, [column[those] for column in inputs], together)
+    return results
 
 
-def _dealt(run, inputs, results):
-    """Cells that take as many steps side by side: lanes wait less for each other. A few switches tell how many."""
-    n = inputs.shape[1]
-    if n <= 4 * LANES or not inputs[-2].max() > 8 * FEW:
-        run(inputs, results, False)
-        return
-    few = inputs.copy()
-    few[-2] = np.minimum(few[-2], FEW)
-    run(few, results, False)
-    order = np.lexsort((results[-3], results[-2]))
-    found = np.empty_like(results)
-    run(np.ascontiguousarray(inputs[:, order]), found, False)
-    results[:, order] = found
+def _run(module, run, inputs, together):
+    """The results of cells; those that take as many steps side by side, for so lanes wait less for each other.
+
+    How many they take a few switches tell, behind which the cells are stopped and put in order.
+    """
+    cells = fresh(len(module.ROWS), inputs)
+    results = cells[:, module.ROWS.index("time") : module.ROWS.index("verdict") + 1]
+    results[:, :-1] = np.nan
+    if together:
+        run(cells, True)
+        return results.T
+    flips, count, verdict, steps, before = (cells[:, module.ROWS.index(name)] for name in _WATCHED)
+    whole = flips.copy()
+    flips[:] = np.minimum(whole, FEW)
+    run(cells, False)
+    stopped = np.flatnonzero((count >= FEW) & (count < whole) & (verdict < FIRST_REFUSAL))
+    if len(stopped):
+        order = stopped[np.lexsort([key[stopped].astype(np.int16) for key in (steps, before)])]
+        flips[:] = whole
+        rest = cells[order]
+        rest[:, 0] = MOVING
+        run(rest, False)
+        cells[order] = rest
+    return results.T
+
+
+_WATCHED = "flips", "count", "verdict", "steps", "before"
 
 
 def once(module, columns, rtol, outputs, status):

@@ -184,13 +184,38 @@ def test_a_cubic_is_proved_to_fall_where_it_does_and_nowhere_else():
     assert 50 < sum(verdicts) < 250
 
 
-def test_a_state_that_sums_another_up_is_its_integral():
+def test_a_series_and_its_sum_give_value_rate_and_bend():
     random = np.random.default_rng(4)
-    series, start, unit, x = tuple(random.normal(size=9)), 0.4, 0.5, 0.7
+    series, start, unit, x = tuple(random.normal(size=9)), 0.4, 0.5, 0.07
+    u = np.polynomial.Polynomial(series)
     summed = np.polynomial.Polynomial(series[:-1]).integ()
-    np.testing.assert_allclose(_taylor.integral(unit, start, series)[1:], unit * summed.coef[1:], rtol=1e-14)
-    assert _taylor.integral(unit, start, series)[0] == start
     assert x * _taylor.mean(x, series) == pytest.approx(summed(x), rel=1e-14)
+    value, rate, bend = _plain(_taylor.of_series, x, (series,))
+    assert (value, rate) == pytest.approx((u(x), u.deriv()(x)), rel=1e-14)
+    assert bend == pytest.approx(series[2] + 3 * x * series[3] + 6 * x * x * series[4], rel=1e-14)
+    value, rate, bend = _plain(_taylor.of_sum, x, (start, unit, series))
+    assert (value, rate) == pytest.approx((start + unit * summed(x), unit * u(x)), rel=1e-14)
+    assert bend == pytest.approx(unit * (series[1] / 2 + x * series[2] + 1.5 * x * x * series[3]), rel=1e-14)
+
+
+@pytest.mark.parametrize("root", [1e-12, 0.01, 0.5, 0.97, 1.0])
+def test_a_crossing_is_found_wherever_it_lies_in_the_step(root):
+    series = np.polynomial.Polynomial([root, -1.0]) * np.polynomial.Polynomial([1.0, 0.3, 0.2, 0.1])
+    for factor, offset in ((1.0, 0.0), (-2.0, 3.0)):
+        u = (series - offset) / factor
+        curve = (tuple(np.append(u.coef, [0.0, 0.0])),)
+        event = offset, factor, u(0.0)
+        t, only_just = _plain(_taylor.crossing, _taylor.of_series, curve, event, 1.0, 1e-13, True)
+        assert t == pytest.approx(root, rel=1e-12, abs=4e-16)
+        assert not only_just
+
+
+@pytest.mark.parametrize(("left", "hangs"), [(1e-9, True), (1e-3, False)])
+def test_what_falls_through_0_just_before_it_turns_hangs(left, hangs):
+    """(t - 1/2)^2 - left turns at 1/2, by so much below 0."""
+    series = (0.25 - left, -1.0, 1.0, 0.0, 0.0)
+    event = 0.0, 1.0, series[0]
+    assert _plain(_taylor.crossing, _taylor.of_series, (series,), event, 0.5, 1e-9, True)[1] == hangs
 
 
 @pytest.mark.parametrize("flips", [1.0, 2.0, 12.0])
