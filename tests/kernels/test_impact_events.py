@@ -1,9 +1,11 @@
 """Impact clocks followed contact by contact: against the closed cycle, a plain simulation, and the laws of impact."""
 
+import impact_event_oracles as oracles
 import impact_simulation as simulation
 import numpy as np
 import pytest
 from columns import printed_both_ways, solve
+from mpmath import mpf
 
 from kernels import _impact_contact, _impact_events, _impact_swing
 from kernels._jit import COMPILED
@@ -83,6 +85,36 @@ def test_what_is_called_ok_is_right_to_rtol(rtol):
     np.testing.assert_allclose(found["recoil"][back], closed["recoil"][back], rtol=2 * rtol)
 
 
+HARD = {
+    "multiplier 2e-5": (0.05444391624587448, 0.24840732823459197, 0.5953083758877441),
+    "multiplier 8e-5": (0.05173626955230469, 0.2431802200137579, 0.4129134125213098),
+    "contact 0.3 % of the time": (0.020452624631909878, 0.16924539535291136, 0.45005829237895606),
+    "plastic": (0.17, 0.12, 0.0),
+    "two cycles": (0.0024778203622565003, 0.22368016246548128, 0.2311198975012022),
+    "the tooth behind is met": (0.0065396, 0.204683, 0.761343),
+    "the tooth behind is met, three impacts": (0.040169, 0.0158237, 0.84485),
+    "thrown back into the next half swing": (0.0495416, 0.0450295, 0.73143),
+}
+
+
+@pytest.mark.parametrize("kind", HARD if COMPILED else ("plastic",))
+def test_a_followed_clock_that_is_called_ok_is_right_to_rtol_against_50_digits(kind):
+    """Cells of which a part is a small difference: what is lost in it is known, and INACCURATE where it is too much."""
+    I_v, h, e = HARD[kind]
+    r_c = 3 / (2 * np.pi)
+    cell = (r_c**3, r_c**4, I_v, r_c, r_c, 3.0, h, e)
+    truth = oracles.outputs(*cell)
+    for rtol in (1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-6):
+        outputs, status = solve(IMPACT, "events", *([v] for v in cell), rtol=rtol)
+        assert status[0] in (
+            (Status.OK, Status.PERIOD_2) if rtol == 1e-6 else (Status.INACCURATE, Status.OK, Status.PERIOD_2)
+        )
+        for name, true in truth.items():
+            error = abs(mpf(float(outputs[name][0])) - true) / (abs(true) or 1)
+            assert error < 1e-8
+            assert error <= rtol or status[0] == Status.INACCURATE, (name, rtol, float(error))
+
+
 def test_near_the_borders_of_existence_the_verdict_still_is_that_of_the_closed_form():
     """The tooth just clears a pallet's tip, or does not: kappa = 4, by bisection of e and of h."""
     for eta in (0.0, 0.03, 0.1) if COMPILED else (0.0,):
@@ -95,6 +127,12 @@ def test_near_the_borders_of_existence_the_verdict_still_is_that_of_the_closed_f
         _, says, _, _, same = verdicts((4.0, eta, beside))
         assert says.tolist() == [Status.OK, Status.NO_CYCLE]
         assert same.tolist() == [True, False]
+
+
+def test_a_tooth_that_passes_the_tip_within_rounding_is_said_to_graze_it():
+    """kappa = 4, h = 0: the tooth is at the pallet again as it escapes for (1 + e)/10 = 2 e."""
+    for beyond, status in ((1e-15, Status.GRAZING), (1e-9, Status.OK)):
+        assert events(4.0, 0.0, (1 + beyond) / 19)[1][0] == status
 
 
 FOLLOWED = {
@@ -166,6 +204,24 @@ def test_random_clocks_go_where_a_plain_simulation_goes(seed):
             compared += 1
             assert outputs["period"][i] == pytest.approx(end.period * time_unit(scene[0]), rel=1e-8)
     assert compared >= 4
+
+
+@pytest.mark.parametrize(("speed", "way"), [(0.3, 0.0), (-0.3, 0.045), (-0.8, 0.275)])
+def test_a_wheel_is_thrown_back_as_far_as_it_comes_before_the_next_contact(speed, way):
+    tally = np.zeros(_impact_swing.TALLIES)
+    plain(_impact_swing._count_flight)(tally, speed, 0.5)
+    assert tally[_impact_swing.RECOIL] == pytest.approx(way, abs=1e-16)
+    assert tally[_impact_swing.WAY] == pytest.approx(0.5 * speed + 0.125)
+
+
+def test_ends_and_middles_of_swings_are_told_pallet_by_pallet():
+    """The upper pallet swings to 0.3 and the lower one to 0.1, then to 0.2."""
+    tally = np.zeros(_impact_swing.TALLIES)
+    for dip in (-0.3, -0.1, -0.3, -0.2):
+        tally[_impact_swing.DIP] = dip
+        plain(_impact_swing._reflected)(tally, 0.0, 1.0, 1.0)
+    names = _impact_swing.DIPS, _impact_swing.LEAN, _impact_swing.LOWEST, _impact_swing.ACROSS
+    assert [tally[name] for name in names] == pytest.approx([0.9, -0.3, -0.3, -0.2])
 
 
 SCENE = 0.75, 0.25, 0.1, 0.3, 0.0, 0.0
