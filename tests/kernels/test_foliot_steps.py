@@ -94,6 +94,17 @@ def test_a_grid_that_meets_the_same_points_again_does_not_make_two_runs_believed
     assert status[0] == Status.GRAZING
 
 
+def test_a_switch_that_goes_as_the_step_shrinks_is_no_switch():
+    mu, phi0, a, k = 0.001266349113732273, 1.402429638167423, 0.000266272676099387, 0.0017970706542706216
+    cell = {"phi0": phi0, "a": a, "k": k, "flips": 1.0}
+    how = {"step": 53.94530913252986, "location": float(LOCATIONS["hermite"])}  # more energy than there is
+    _, status = solve(KERNEL, "semi_implicit", [mu], **cell, **how)
+    drag, stiffness = mpf(a) / 2, mpf(k)
+    turn = mpf(mu) / stiffness * (1 + mp.exp(-mp.pi * drag / mp.sqrt(stiffness - drag**2)))
+    assert turn < phi0
+    assert status[0] == Status.GRAZING
+
+
 @pytest.mark.skipif(not COMPILED, reason="thousands of steps")
 def test_steps_of_a_half_and_a_quarter_that_are_as_wrong_are_not_believed():
     mu, R, phi0 = 0.3728952659438824, 0.36853454347820896, 167.44256859441495
