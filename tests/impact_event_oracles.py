@@ -211,6 +211,6 @@ def outputs(torque, I_c, I_v, r_c, r_v, teeth, h, e):
             "wheel_speed": sum(V for V, _ in clock.firsts) / beats * pitch / (unit * r_c),
             "pallet_speed": sum(w for _, w in clock.firsts) / beats * pitch / (unit * r_v),
             "multiplier": multiplier,
-            "recoil": clock.recoil * pitch / r_c,
+            "recoil": clock.recoil * pitch / r_c if clock.recoil > TOUCHING[mpf] else mpf(0),
             "contact_share": clock.held / clock.time,
         }

@@ -7,7 +7,7 @@ import pytest
 from columns import printed_both_ways, solve
 from mpmath import mpf
 
-from kernels import _impact_contact, _impact_events, _impact_swing
+from kernels import _impact_contact, _impact_events, _impact_repeat, _impact_swing
 from kernels._jit import COMPILED
 from kernels.impact import IMPACT
 from kernels.interface import FIRST_REFUSAL, Status
@@ -94,6 +94,8 @@ HARD = {
     "the tooth behind is met": (0.0065396, 0.204683, 0.761343),
     "the tooth behind is met, three impacts": (0.040169, 0.0158237, 0.84485),
     "thrown back into the next half swing": (0.0495416, 0.0450295, 0.73143),
+    "bounces that the other pallet cuts short": (0.0107793, 0.249893, 0.440659),
+    "bounces that the other pallet cuts short, light foliot": (0.00483672, 0.2498316, 0.30645),
 }
 
 
@@ -265,6 +267,55 @@ def test_a_train_is_not_summed_where_a_bounce_may_pass_the_tip(below, ends):
     total, after, widest = plain(_impact_contact.train)(SCENE, first, 1.0)
     assert (total, after[0]) == pytest.approx((t, eta - below))
     assert plain(_impact_contact.train_ends)(SCENE, first, 1.0, total, after, widest) == ends
+
+
+def test_contact_with_the_pallet_across_ends_at_its_tip_or_where_y_reaches_eta():
+    """From y = 0.05 with the wheel's way W = -0.5 it would turn 1/6 further back, beyond y = eta = 0.1."""
+    t, goal, speed, ends = plain(_impact_contact.slide)(SCENE, (0.05, -0.5, 0.5), -1.0)
+    assert (goal, ends) == (-0.1, True)
+    assert speed == pytest.approx(-np.sqrt(0.25 - 2 * 0.75 * 0.05))
+    assert t == pytest.approx((speed + 0.5) / 0.75)
+    t, goal, speed, ends = plain(_impact_contact.slide)(SCENE, (0.05, -0.1, 0.1), -1.0)
+    assert (goal, ends) == (0.1, False)
+    assert speed == pytest.approx(np.sqrt(0.01 + 2 * 0.75 * 0.15))
+
+
+@pytest.mark.parametrize("roots", [(0.9, 0.5, -0.3), (-0.9, 0.5, 0.3), (0.6 + 0.5j, 0.6 - 0.5j, 0.1)])
+def test_how_steep_the_polynomial_is_at_its_largest_root_is_the_product_of_distances(roots):
+    r, s, t = roots
+    sums = (r + s + t).real, (r * s + s * t + t * r).real, (r * s * t).real
+    assert plain(_impact_repeat._steepness)(*sums, abs(r)) == pytest.approx(abs((r - s) * (r - t)), rel=1e-12)
+
+
+CARRIED = {
+    "one impact": (0.8, 0.05, 0.2, 0.0),
+    "a bent lever": (0.6, 0.05, 0.3, 0.5),
+    "bounces that end in contact": (1 / 3, 0.1274, 0.05, 0.0),
+    "plastic": (2 / 3, 0.1, 0.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("kind", CARRIED)
+def test_changes_carried_along_contacts_are_the_differences_of_neighbouring_motions(kind):
+    wheel, eta, e, c = CARRIED[kind]
+    scene = wheel, 1 - wheel, eta, e, c, -0.25 * wheel * (1 + e) / (1 - e)
+    tally, slopes, changes = np.zeros(_impact_swing.TALLIES), np.zeros((5, 3)), np.zeros((4, 3))
+
+    def after(start):
+        _impact_swing.clear(tally)
+        end, verdict = _impact_repeat.chain(scene, start, 3, tally, slopes, changes)
+        assert verdict == _impact_swing.DONE
+        return np.array([*end, tally[_impact_swing.TIME]])
+
+    start = np.array(plain(_impact_events.beginning)(scene, 1e-3))
+    start[0] -= 1e-3
+    found = []
+    for j in range(3):
+        by = 1e-6 * np.eye(3)[j]
+        found.append((after(tuple((start + by).tolist())) - after(tuple((start - by).tolist()))) / 2e-6)
+    after(tuple(start.tolist()))
+    np.testing.assert_allclose(changes, np.transpose(found), rtol=1e-6, atol=1e-7)
+    assert abs(changes[3]).max() > 0.1
 
 
 def followed(scene, half_swings):
