@@ -6,6 +6,8 @@ times less, and is what is given. The first run's parameters are some roundings 
 scene makes of rounding, which both runs would share, is seen too.
 """
 
+import math
+
 import numpy as np
 
 from kernels._refill import MOVING, fresh
@@ -20,8 +22,8 @@ ROUNDING = 1e-14
 """The least rtol that is promised, whatever the two runs agree to."""
 AT_ONCE = 8192
 """Cells whose lanes' memory stays in a core's cache."""
-FEW = 2
-"""Switches after which a cell's steps between two of them are known well enough."""
+STOPS = 2.0, 4.0, math.inf
+"""Switches behind which cells are put in the order of the steps that they have lately taken between two of them."""
 ROUGH, FINER = 2.0, 16.0
 ROUNDINGS, GOLDEN = 8.0, 0.6180339887498949
 """By how many roundings a parameter is changed at most, and what makes that differ from one to the next."""
@@ -51,32 +53,24 @@ def followed(module, columns, rtol, finer=1.0, together=False):
 
 
 def _run(module, run, inputs, together):
-    """The results of cells; those that take as many steps side by side, for so lanes wait less for each other.
-
-    How many they take a few switches tell, behind which the cells are stopped and put in order.
-    """
-    cells = fresh(len(module.ROWS), inputs)
-    results = cells[:, module.ROWS.index("time") : module.ROWS.index("verdict") + 1]
-    results[:, :-1] = np.nan
-    if together:
-        run(cells, True)
-        return results.T
-    flips, count, verdict, steps, before = (cells[:, module.ROWS.index(name)] for name in _WATCHED)
-    whole = flips.copy()
-    flips[:] = np.minimum(whole, FEW)
-    run(cells, False)
-    stopped = np.flatnonzero((count >= FEW) & (count < whole) & (verdict < FIRST_REFUSAL))
-    if len(stopped):
-        order = stopped[np.lexsort([key[stopped].astype(np.int16) for key in (steps, before)])]
-        flips[:] = whole
-        rest = cells[order]
-        rest[:, 0] = MOVING
-        run(rest, False)
-        cells[order] = rest
-    return results.T
-
-
-_WATCHED = "flips", "count", "verdict", "steps", "before"
+    """The results of cells; those that take as many steps side by side, for so lanes wait less for each other."""
+    row = {name: j for j, name in enumerate(module.ROWS)}
+    known = slice(row["time"], row["verdict"] + 1)
+    cells, places, whole = fresh(len(row), inputs), np.arange(len(inputs[0])), inputs[-2]
+    cells[:, known] = np.nan
+    results = np.empty((known.stop - known.start, len(cells)))
+    for stop in (math.inf,) if together else STOPS:
+        cells[:, row["flips"]] = np.minimum(whole, stop)
+        run(cells, together)
+        results[:, places] = cells[:, known].T
+        count, verdict, steps, before = (cells[:, row[name]] for name in ("count", "verdict", "steps", "before"))
+        going = np.flatnonzero((count >= stop) & (count < whole) & (verdict < FIRST_REFUSAL))
+        going = going[np.lexsort([key[going].astype(np.int16) for key in (steps, before)])]
+        if not len(going):
+            break
+        cells, places, whole = cells[going], places[going], whole[going]
+        cells[:, 0] = MOVING
+    return results
 
 
 def once(module, columns, rtol, outputs, status):

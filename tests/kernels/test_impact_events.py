@@ -94,6 +94,7 @@ HARD = {
     "the tooth behind is met": (0.0065396, 0.204683, 0.761343),
     "the tooth behind is met, three impacts": (0.040169, 0.0158237, 0.84485),
     "thrown back into the next half swing": (0.0495416, 0.0450295, 0.73143),
+    "thrown back while it bounces": (0.0740083, 0.0967041, 0.155516),
     "bounces that the other pallet cuts short": (0.0107793, 0.249893, 0.440659),
     "bounces that the other pallet cuts short, light foliot": (0.00483672, 0.2498316, 0.30645),
 }
