@@ -78,6 +78,8 @@ def test_a_turning_point_on_the_switch_is_no_quiet_number(method, excess):
     ],
 )
 def test_what_a_cell_comes_to_is_named(method, cell, status):
+    if not COMPILED and cell.get("mu", 1.0) == 1e300:
+        pytest.skip("many steps")
     outputs, found = solve(method, **{"mu": 1.0, "phi0": 1.0, "flips": 1.0, **cell})
     assert found[0] == status, Status(found[0])
     if status < FIRST_REFUSAL:

@@ -167,7 +167,7 @@ def test_the_bounds_of_the_series_are_not_idle():
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-9, 1e-12])
 def test_the_iterated_map_is_right_to_rtol_or_says_that_it_has_not_settled(rtol):
-    columns = scenes(-6, 9, n=SOME // 2)
+    columns = scenes(-6, 9 if COMPILED else 2, n=SOME // 2)
     outputs, status = solve(FOLIOT, "map", *columns, rtol=rtol)
     good = (status == Status.OK) & (bounds(FOLIOT, "map", *columns) <= rtol)
     assert set(status) <= {Status.OK, Status.NOT_CONVERGED}

@@ -6,6 +6,7 @@ import pytest
 from columns import bounds, checked, solve
 from mpmath import mpf
 
+from kernels._jit import COMPILED
 from kernels.foliot import FOLIOT
 from kernels.foliot_motion import FOLIOT_MOTION
 from kernels.interface import Status
@@ -39,16 +40,17 @@ def test_friction_takes_2_mu_phi0_in_every_half_swing(alpha):
 
 
 def test_it_starts_at_the_switch_rises_to_the_amplitude_and_turns_over_at_half_time():
-    phase = np.linspace(0, 1, 20001)
+    half = 10000 if COMPILED else 1000
+    phase = np.linspace(0, 1, 2 * half + 1)
     motion, _ = solve(FOLIOT_MOTION, "closed", [3.0], [0.5], [1.1], along=[phase])
     cycle, _ = solve(FOLIOT, "closed", [3.0], [0.5], [1.1])
     angle, speed = motion["angle"][0], motion["speed"][0]
-    assert angle[0] == 0.5 == -angle[10000]
-    assert speed[0] == -speed[10000]
+    assert angle[0] == 0.5 == -angle[half]
+    assert speed[0] == -speed[half]
     assert speed[0] == pytest.approx(cycle["crossing_speed"][0], rel=1e-15)
-    assert angle.max() == pytest.approx(cycle["amplitude"][0], rel=1e-7)
-    assert np.allclose(angle[:10000], -angle[10000:20000], atol=1e-14)
-    assert np.allclose(np.gradient(angle, phase * cycle["period"][0])[1:-1], speed[1:-1], atol=1e-3)
+    assert angle.max() == pytest.approx(cycle["amplitude"][0], rel=10 / half**2)
+    assert np.allclose(angle[:half], -angle[half:-1], atol=1e-14)
+    assert np.allclose(np.gradient(angle, phase * cycle["period"][0])[1:-1], speed[1:-1], atol=10 / half)
 
 
 @pytest.mark.parametrize(
