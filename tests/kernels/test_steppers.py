@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from kernels._jit import jit, jit_call
+from kernels._jit import COMPILED, jit, jit_call
 from kernels._steppers import dopri5_step, integrate_until
 
 
@@ -115,6 +115,7 @@ def test_the_event_is_located_to_the_tolerance(tolerance):
     assert state[4] == pytest.approx(-math.pi / 2.6, rel=50 * tolerance)
 
 
+@pytest.mark.skipif(not COMPILED, reason="ten thousand steps in plain Python")
 def test_a_motion_that_never_meets_the_event_is_given_up():
     @jit
     def never(state, acceleration):
