@@ -32,17 +32,20 @@ def core_{i}(state, side, signs, parameters, unit, tolerance, leaves):
     {unpack}
     {value_of_n}
     base = sign_{kink} * {u}
-    value = power(base, {n})
-    {bare} = given_{i}(state, side, signs, parameters, unit, 0.0 * side)
+    value, nothing = power(base, {n}), 0.0 * side
     {full} = given_{i}(state, side, signs, parameters, unit, value)
-    t = base / magnitude(full_{u})
-    d = magnitude(full_{u} - bare_{u}) / magnitude(full_{u})
-    inside = (sign_{kink} * full_{u} < 0.0) & (d <= UNEVEN)
-    {inside}
-    core, longest = where(inside, mean_power(value, {n}), -1.0), 0.0 * t + FAR
+    core, longest, nears = nothing - 1.0, nothing + FAR, sign_{kink} * full_{u} < 0.0
+    if some(nears):
+        {bare} = given_{i}(state, side, signs, parameters, unit, nothing)
+        over = 1.0 / magnitude(full_{u})
+        t, d = base * over, magnitude(full_{u} - bare_{u}) * over
+        inside = nears & (d <= UNEVEN)
+        {inside}
+        core = where(inside, mean_power(value, {n}), -1.0)
     if some(leaves):
-        {most} = given_{i}(state, side, signs, parameters, unit, 0.0 * side + 1.0)
-        room = 0.0 * t + FAR
+        {bare} = given_{i}(state, side, signs, parameters, unit, nothing)
+        {most} = given_{i}(state, side, signs, parameters, unit, nothing + 1.0)
+        room = nothing + FAR
         {room}
         reach = core_time(room, magnitude(bare_{u}), magnitude(most_{u} - bare_{u}), {n}, tolerance)
         mean = mean_power(power(magnitude(bare_{u}) * reach, {n}), {n})
