@@ -13,12 +13,13 @@ their abstracts only; no number here is theirs.
 where it does not exist, UNSTABLE where it exists and disturbances grow, GRAZING where the last digits of the input
 decide on either (kappa = 1 with a flat lever: they neither grow nor fade).
 
-`events` tells what the clock comes to. OK: one tooth a cycle, be it off the middle (`offset`), with several impacts or
-with several swings to and fro. PERIOD_2: two or more teeth until it repeats; of those the period and the speeds are
-means. NOT_PERIODIC: means over 1024 half swings, no multiplier. STEP_LIMIT: bounces without end, as e towards 1 makes
-them, or a lever so bent that both pallets wedge the wheel. NO_METHOD: lasting contact under a bent lever, and masses
-more unequal than 1e12. TOOTH_JUMPED is watched for; a flat lever lets no tooth pass alone (`_impact_swing`), and no
-bent one was found to.
+`events` tells what the clock comes to from a start a millionth off the symmetric cycle; other motions may be stable
+too, and so near a border of existence the clock may leave the cycle for one of them. OK: one tooth a cycle, be it off
+the middle (`offset`), with several impacts or with several swings to and fro. PERIOD_2: two or more teeth until it
+repeats; of those the period and the speeds are means. NOT_PERIODIC: means over 1024 half swings, no multiplier.
+STEP_LIMIT: bounces without end, as e towards 1 makes them, or a lever so bent that both pallets wedge the wheel.
+NO_METHOD: lasting contact under a bent lever, and masses more unequal than 1e12 (1e24 for `map`). TOOTH_JUMPED is
+watched for; a flat lever lets no tooth pass alone (`_impact_swing`), and no bent one was found to.
 """
 
 from kernels import _impact_cycle, _impact_events, _impact_map, _impact_scene

@@ -90,7 +90,7 @@ HARD = {
     "multiplier 8e-5": (0.05173626955230469, 0.2431802200137579, 0.4129134125213098),
     "contact 0.3 % of the time": (0.020452624631909878, 0.16924539535291136, 0.45005829237895606),
     "plastic": (0.17, 0.12, 0.0),
-    "changes whose rounding adds up": (0.043088494795278105, 0.2335219255402223, 0.3376696738356851),
+    "changes whose rounding adds up": (0.038606962381997394, 0.21457830703209668, 0.8104850512676235),
     "two cycles": (0.0024778203622565003, 0.22368016246548128, 0.2311198975012022),
     "the tooth behind is met": (0.0065396, 0.204683, 0.761343),
     "the tooth behind is met, three impacts": (0.040169, 0.0158237, 0.84485),
@@ -108,10 +108,10 @@ def test_a_followed_clock_that_is_called_ok_is_right_to_rtol_against_50_digits(k
     r_c = 3 / (2 * np.pi)
     cell = (r_c**3, r_c**4, I_v, r_c, r_c, 3.0, h, e)
     truth = oracles.outputs(*cell)
-    for rtol in (2e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-6):
+    for rtol in (2e-14, 5e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-5):
         outputs, status = solve(IMPACT, "events", *([v] for v in cell), rtol=rtol)
         assert status[0] in (
-            (Status.OK, Status.PERIOD_2) if rtol == 1e-6 else (Status.INACCURATE, Status.OK, Status.PERIOD_2)
+            (Status.OK, Status.PERIOD_2) if rtol == 1e-5 else (Status.INACCURATE, Status.OK, Status.PERIOD_2)
         )
         for name, true in truth.items():
             error = abs(mpf(float(outputs[name][0])) - true) / (abs(true) or 1)
