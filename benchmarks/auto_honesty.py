@@ -6,8 +6,8 @@ nice python benchmarks/auto_honesty.py [--cells 100000] [--seed 1] [--workers 2]
 Each cell is asked for all outputs at once, and for each output alone, since `auto` takes another method then. Wrong is
 a cell with status OK of which an output is off by more than rtol (of traces: relative to the largest value, or to what
 their kernel says), or that has none by the oracle. Dear oracles get about 12000 of the 100000 cells, and the dearest
-are stood in for by a second path in 80 bits (`honest_paths`), which they are held against in some cells first. "up to"
-is what the share may be, 95 % sure. Needs mpmath.
+are stood in for by a second path in 80 bits (`honest_paths`), which they are held against in some cells first, and
+which calls no cell wrong before they are asked, too. "up to" is what the share may be, 95 % sure. Needs mpmath.
 """
 
 from __future__ import annotations
@@ -96,11 +96,11 @@ class Tally:
         self.remarked, self.wrongly_remarked = 0, []
 
     def add(self, cell, rtol, values, status, method, truth, over):
-        """Judge one cell; `values` by the names of the outputs asked for, `over` as in a case."""
+        """Judge one cell, and say whether it is wrong; `values` by the names of the outputs, `over` as in a case."""
         self.statuses[Status(status).name] += 1
         self.unknown += truth == UNKNOWN
         if truth == UNKNOWN or status >= FIRST_REFUSAL or status in UNSURE:
-            return
+            return False
         if truth == NO_CYCLE:
             errors = dict.fromkeys(values, math.inf)
         else:
@@ -110,10 +110,11 @@ class Tally:
         if status != Status.OK:
             self.remarked += 1
             self.wrongly_remarked += [found] if found[0] > 1 else []
-            return
+            return found[0] > 1
         self.judged += 1
         self.worst = max(self.worst, found, key=lambda f: f[0])
         self.wrong += [found] if found[0] > 1 else []
+        return found[0] > 1
 
     def text(self):
         """One line on shares, one on statuses, and the worst cells."""
@@ -143,8 +144,10 @@ def judge(case, n, seed, pool):
         values, status, used = solve(case, columns, rtol, outputs)
         tally = tallies["all outputs" if outputs == asked[0] else "one output alone"]
         for i, cell in enumerate(cells):
-            found = {name: values[name][i] for name in outputs}
-            tally.add(cell, rtol[i], found, status[i], used[i], truths[i], case.over)
+            given = cell, rtol[i], {name: values[name][i] for name in outputs}, status[i], used[i]
+            if case.path and Tally().add(*given, truths[i], case.over):
+                truths[i] = truth_of((case, cell))
+            tally.add(*given, truths[i], case.over)
     return {title: tally for title, tally in tallies.items() if tally.statuses}, apart
 
 

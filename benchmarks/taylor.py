@@ -213,11 +213,11 @@ def main():
     own = cells(CELLS)
     truth = [quadratic_foliot(*cell, FLIPS) for cell in zip(*(c[:JUDGED] for c in own), strict=True)]
     columns = (*own, np.full(CELLS, float(FLIPS)))
-    for near, their, our in (("1e-8", 1e-6, 4e-8), ("1e-12", 1e-10, 2e-12)):
+    for near, their, our in (("1e-8", 1e-6, 6e-8), ("1e-12", 1e-10, 3e-12)):
         compare(f"v abs(v), near {near}", peer(their), module, columns, our, truth)
     truth = [power_foliot(*cell, POWER, POWER_FLIPS) for cell in zip(*(c[:POWER_JUDGED] for c in own), strict=True)]
     columns = (*own, np.full(CELLS, POWER), np.full(CELLS, float(POWER_FLIPS)))
-    for near, their, w, our in (("1e-8", 1e-7, 8e-5, 2e-9), ("1e-12", 5e-12, 1e-6, 1e-12)):
+    for near, their, w, our in (("1e-8", 1e-7, 8e-5, 2.5e-9), ("1e-12", 5e-12, 1e-6, 8e-13)):
         compare(f"abs(v)^{POWER}, near {near}", power_peer(their, w), general, columns, our, truth)
     dealt, lockstep = (max(uneven(module, together) for _ in range(3)) for together in (False, True))
     print(f"cells of 4 to 400 switches: {dealt:,.0f} cells/s refilled, {lockstep:,.0f} in lockstep;", end=" ")

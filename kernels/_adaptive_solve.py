@@ -14,7 +14,7 @@ def twice_by(method, scene):
 
     def twice(module, columns, rtol, outputs, status):
         run = getattr(adaptive(scene), f"run_{method}")
-        runs = SimpleNamespace(STATES=module.STATES, ROWS=module.ROWS, run_14=run, run_20=run)
+        runs = SimpleNamespace(STATES=module.STATES, ROWS=module.ROWS, run_12=run, run_18=run)
         _taylor_solve.twice(runs, columns, rtol, outputs, status, APART[method])
 
     return twice

@@ -26,7 +26,7 @@ from kernels._taylor_pool import BEGUN, EVENT, SETTLED, advance, shared
 from kernels._taylor_source import Lines
 from kernels._taylor_text import filled, listed
 
-ORDERS = (14, 20)
+ORDERS = (12, 18)
 _BUILDING = threading.RLock()
 """No thread may be given a module that another one is still making."""
 

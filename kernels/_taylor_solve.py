@@ -14,8 +14,7 @@ from kernels._refill import MOVING, fresh
 from kernels._vecmath import NORMAL_HIGH, NORMAL_LOW
 from kernels.interface import FIRST_REFUSAL, Status
 
-LOW_ORDER, HIGH_ORDER = 14, 20
-HIGH_BELOW = 1e-10
+HIGH_BELOW = 5e-10
 """Tolerance of a step from which on the higher order is the faster."""
 FINEST = 1e-25
 ROUNDING = 1e-14
@@ -44,7 +43,7 @@ def followed(module, columns, rtol, finer=1.0, together=False):
     inputs = [*columns, np.maximum(rtol / finer, FINEST)]
     results = np.empty((3 + 2 * len(module.STATES), len(rtol)))
     high = rtol < HIGH_BELOW
-    for run, of_order in ((module.run_14, ~high), (module.run_20, high)):
+    for run, of_order in ((module.run_12, ~high), (module.run_18, high)):
         cells = np.flatnonzero(of_order)
         for begin in range(0, len(cells), AT_ONCE):
             those = cells[begin : begin + AT_ONCE]

@@ -124,7 +124,7 @@ def scene_kernel(
         methods=(
             Method(
                 "taylor",
-                "Taylor series of order 14 or 20 in lanes, no switch passed over; followed twice",
+                "Taylor series of order 12 or 18 in lanes, no switch passed over; followed twice",
                 _solve(_taylor_solve.twice, module, *names),
             ),
             Method(
