@@ -179,7 +179,7 @@ def _worst(answer, gap, V, w, late):
     (_, travel, rim, pallet, _, back), _, share, _ = answer
     worst = max(max(late, gap / travel), max(V / magnitude(rim), w / magnitude(pallet)))
     worst = max(worst, late + late / share if share > 0.0 else 0.0)
-    return max(worst, 2.0 * V / sqrt(2.0 * back) if back > 0.0 else 0.0)  # `back` is V^2/2 of a throw
+    return max(worst, 6.0 * (V + w) / sqrt(2.0 * back) if back > 0.0 else 0.0)  # V^2/2, V perhaps that of both bodies
 
 
 @jit_call
