@@ -1,8 +1,9 @@
 """Cells of very different length in lanes: a lane that has finished its cell is given the next one.
 
 A *memory* has a row for each number that a lane knows between two events, and a column for each lane. The first row is
-the lane's stage; then come its cell's inputs. `advance(memory, i)` takes every lane one event further
-and returns whether one has finished; i is the index of all lanes, or 0 in plain Python, where there is one.
+the lane's stage; then come its cell's inputs. `advance(memory, i)` takes every lane on until one has finished, or for a
+limited number of events or steps, and returns whether one has; i is the index of all lanes, or 0 in plain Python,
+where there is one.
 """
 
 import numpy as np
@@ -66,7 +67,7 @@ def each_refilled(advance, cells, together):
         _give(memory, lane, cells, held[lane])
         memory[0, lane] = memory[0, lane] if lane < n else IDLE
     handed, left = LANES, n
-    while left > 0:  # every lane ends: `advance` limits its events
+    while left > 0:  # every lane ends: cells have a limit of events and each event one of steps
         finished = advance(memory, _index_of_all(0))
         if not finished or (together and _busy(memory)):
             continue

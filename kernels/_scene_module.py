@@ -39,7 +39,7 @@ Written by kernels.scene from the functions of the scene; do not change it here.
 import math
 
 from kernels._jit import jit, jit_call
-from kernels._lanes import choose, dot, exponent, fma, horner, isnt, magnitude, pow2, some, sqrt, where
+from kernels._lanes import dot, fma, horner, isnt, magnitude, some, sqrt, where
 from kernels._refill import each_refilled
 from kernels._scene_module import kept
 from kernels._taylor import (
@@ -48,7 +48,7 @@ from kernels._taylor import (
 )
 from kernels._taylor_core import FAR, UNEVEN, core_time, mean_power, size_in_unit
 from kernels._taylor_pool import EVENTS, KINK_LIMIT, time_unit
-from kernels._vecmath import exp, is_normal, log, power, sincos
+from kernels._vecmath import exp, log, power, sincos
 from kernels.interface import FIRST_REFUSAL, Status
 
 STATES = {states}
@@ -129,8 +129,8 @@ class Writer:
             lines="\n".join(lines.text), result=f"({listed(f'sign_{j}' for j in range(self.kinks))})",
         )  # fmt: skip
 
-    def in_range(self):
-        """Whether no product of numbers that are not 0 underflows."""
+    def underflows(self):
+        """Whether a product of numbers that are not 0 underflows."""
         lines, lost = Lines(self.names), []
 
         def watch(product, *factors):
@@ -191,11 +191,10 @@ class Writer:
                    kinks=self.kinks).lstrip(),
             self.function("rates", "Time derivative of each state.", recorded.rates, moving),
             self.function("surface", "Falls through 0 at the switch.", (recorded.surface,), moving, True),
-            self.function("kinks", "What passes 0 at each kink.", tuple(recorded.graph.kinks), moving),
             self.natural_signs(),
             self.function("switched", "The state behind the switch; the side then turns.", recorded.switched, moving),
             self.function("started", "The state at the start.", recorded.started, ("side", "parameters")),
-            self.in_range(),
+            self.underflows(),
             self.series(2),
             shared(self.states, self.parameters, self.kinks),
         ]  # fmt: skip

@@ -21,7 +21,7 @@ import numpy as np
 
 from kernels._fixed_step import follow
 from kernels._jit import jit, jit_call
-from kernels._lanes import fma, magnitude, some, where
+from kernels._lanes import fma, isnt, magnitude, some, where
 from kernels._refill import FRESH, each_refilled
 from kernels._scene_module import kept
 
@@ -74,7 +74,8 @@ def advance(memory, i):
     if some(fresh):
         s, p, g, u, o, beyond = begun(parameters)
         {begin}
-        verdict = where(fresh, where(beyond, {bad_input}, 0.0), verdict)
+        endless = isnt((flips >= 1.0) & (flips < math.inf))
+        verdict = where(fresh, where(beyond | endless, {bad_input}, 0.0), verdict)
     how = int(memory[{method}][0]), int(memory[{method} + 1][0]), int(memory[{method} + 2][0])
     motion = ({states},), side, ({signs}), ({ons}), cut, cuts
     tally = time, since, interval, count, steps, calls, trials, ({reach}), ({at}), ({before}), wide, slim, verdict

@@ -46,7 +46,7 @@ def advance_{order}(memory, i):
     if some(fresh):
         s, p, g, u, o, beyond = begun(parameters)
         {begin}
-        verdict = where(fresh, where(beyond, BAD_INPUT, 0.0), verdict)
+        verdict = where(fresh, where(beyond | isnt(flips >= 1.0), BAD_INPUT, 0.0), verdict)
     done = active & isnt(active)
     for _ in range(EVENTS):
         moving = active & (verdict < REFUSAL)

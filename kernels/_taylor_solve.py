@@ -15,14 +15,14 @@ from kernels._vecmath import NORMAL_HIGH, NORMAL_LOW
 from kernels.interface import FIRST_REFUSAL, Status
 
 HIGH_BELOW = 5e-10
-"""Tolerance of a step from which on the higher order is the faster."""
+"""Tolerance of a step below which the higher order is the faster."""
 FINEST = 1e-25
 ROUNDING = 1e-14
 """The least rtol that is promised, whatever the two runs agree to."""
 AT_ONCE = 8192
 """Cells whose lanes' memory stays in a core's cache."""
 STOPS = 2.0, 4.0, math.inf
-"""Switches behind which cells are put in the order of the steps that they have lately taken between two of them."""
+"""Switches behind which cells are put in the order of the steps of their last two legs, from event to event."""
 ROUGH, FINER = 2.0, 16.0
 ROUNDINGS, GOLDEN = 8.0, 0.6180339887498949
 """By how many roundings a parameter is changed at most, and what makes that differ from one to the next."""
@@ -55,7 +55,8 @@ def _run(module, run, inputs, together):
     """The results of cells; those that take as many steps side by side, for so lanes wait less for each other."""
     row = {name: j for j, name in enumerate(module.ROWS)}
     known = slice(row["time"], row["verdict"] + 1)
-    cells, places, whole = fresh(len(row), inputs), np.arange(len(inputs[0])), inputs[-2]
+    cells, places = fresh(len(row), inputs), np.arange(len(inputs[0]))
+    whole = np.where(inputs[-2] < math.inf, inputs[-2], math.nan)  # NaN is refused, without end not followed
     cells[:, known] = np.nan
     results = np.empty((known.stop - known.start, len(cells)))
     for stop in (math.inf,) if together else STOPS:

@@ -1,10 +1,14 @@
 """Lanes that are refilled give each cell the bits that it has alone."""
 
 import numpy as np
+import pytest
 from columns import solve
 from rich_scene import RICH
 
 from kernels._jit import COMPILED
+from kernels._refill import DONE, FRESH, MOVING
+from kernels._taylor_solve import followed
+from kernels.interface import Status
 
 NAMES = ("time", "interval", "angle", "speed")
 CELLS = 131 if COMPILED else 3
@@ -44,3 +48,46 @@ def test_every_cell_is_solved_and_the_tolerance_of_one_does_not_touch_another():
         alone, _ = solve(RICH, "taylor_once", rtol=each, **columns)
         for name in NAMES:
             assert np.array_equal(alone[name][rtol == each], mixed[name][rtol == each], equal_nan=True)
+
+
+@pytest.mark.parametrize("method", ["taylor_once", "dop853"])
+def test_a_number_of_switches_that_is_none_is_refused_and_ends(method):
+    flips = np.array([np.nan, np.inf, 0.0, -3.0, 2.0])
+    _, status = solve(RICH, method, 1.0, 1.0, 0.3, 0.2, R=0.1, flips=flips)
+    assert status.tolist() == [Status.BAD_INPUT] * 4 + [Status.OK]
+
+
+class _Counted:
+    """A module that only counts switches, one at a time, and remembers in what state cells come to it."""
+
+    STATES = ("x",)
+    ROWS = ("stage", "flips", "tolerance", "time", "interval", "at_x", "size_x", "verdict", "count", "steps", "before")
+
+    def __init__(self):
+        self.runs = []
+
+    def run(self, cells, together):
+        stage, flips, tolerance, time, *_, verdict, count, steps, before = cells.T
+        self.runs.append((len(cells), set(stage), together, steps.tolist()))
+        fresh = stage == FRESH
+        count[fresh] = time[fresh] = verdict[fresh] = 0.0
+        refused = (tolerance == 3e-7) & (flips > 1)  # behind the second switch
+        end = np.where(refused, 2.0, flips)
+        time += (end - count) * tolerance * 2.0**20
+        verdict[refused], count[:], before[:], stage[:] = Status.OUT_OF_RANGE, end, steps, DONE
+        steps[:] = tolerance * 1e7
+
+    run_12 = run_18 = run
+
+
+def test_cells_are_stopped_behind_two_switches_and_four_put_in_order_and_go_on_where_they_were():
+    module, flips = _Counted(), np.array([1.0, 9.0, 2.0, 7.0, 4.0, 3.0, 5.0, 6.0])
+    rtol = np.array([1e-7, 9e-7, 2e-7, 7e-7, 4e-7, 3e-7, 5e-7, 1e-7])
+    results = followed(module, [flips], rtol)
+    assert [(n, stages) for n, stages, _, _ in module.runs] == [(8, {FRESH}), (5, {MOVING}), (4, {MOVING})]
+    assert module.runs[1][3] == sorted(module.runs[1][3])
+    refused = rtol == 3e-7
+    np.testing.assert_allclose(results[0][~refused], (flips * rtol * 2.0**20)[~refused], rtol=1e-14)
+    assert np.array_equal(results[-1], np.where(refused, Status.OUT_OF_RANGE, Status.OK))
+    followed(module, [flips], rtol, together=True)
+    assert [(n, together) for n, _, together, _ in module.runs[3:]] == [(8, True)]

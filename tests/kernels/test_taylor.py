@@ -109,6 +109,11 @@ def test_what_a_cell_comes_to_is_named(cell, status):
     assert np.isfinite([outputs[name][0] for name in outputs]).all()
 
 
+def test_what_underflows_before_the_first_switch_is_out_of_range_though_it_grows_behind_it():
+    _, status = solve(RICH, "taylor", 1e-160, 1e-160, e=1e160, flips=2.0)
+    assert status[0] == Status.OUT_OF_RANGE
+
+
 def test_a_start_on_the_switch_moves_away_or_switches_at_once():
     mu, phi0 = [1.0, 1.0], [1.0, 1.0]
     outputs, status = solve(RICH, "taylor", mu, phi0, angle0=1.0, speed0=[-1.0, 1.0], flips=[1.0, 2.0])
