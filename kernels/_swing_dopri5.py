@@ -342,13 +342,18 @@ def _newton(v, end, slope, low, high):
 
 @jit
 def _cycle(state, end, top, top_by_start, time, shrink, turns, e, slope, new, step, terms):
-    """The cycle by (4) from a half swing close to it: time and amplitude follow v1 by its last `step`."""
+    """The cycle by (4) from a half swing close to it: time and amplitude follow v1 by its last `step`.
+
+    Also how many times larger than s the terms are that it is the sum of.
+    """
     force = accelerations(state, terms)[0]
     time_by_mu, time_by_start = state[2] / end, e * state[4] / end
     end_by_mu = -fma(force, time_by_mu, state[3])
-    s = -fma(time_by_start, end_by_mu / (1.0 - slope), time_by_mu) / time
+    by_start = time_by_start * (end_by_mu / (1.0 - slope))
+    s = -(by_start + time_by_mu) / time
+    cancels = (magnitude(by_start) + magnitude(time_by_mu)) / magnitude(s * time)
     amplitude = where(turns, fma(top_by_start, e * step, top), 1.0)
-    return fma(time_by_start, step, time), amplitude, new, s, e * e * shrink
+    return (fma(time_by_start, step, time), amplitude, new, s, e * e * shrink), cancels
 
 
 @jit
@@ -406,7 +411,7 @@ def dopri5(scene, ripple, rtol):
         low, high = where(active & (end - v > noise), v, low), where(active & (v - end > noise), v, high)
         new, newton = _newton(v, end, slope, low, high)
         relative = _relative(new, v)
-        found = _cycle(state, end, top, top_by_start, time, shrink, turns, e, slope, new, new - v, terms)
+        found, cancels = _cycle(state, end, top, top_by_start, time, shrink, turns, e, slope, new, new - v, terms)
         apart = _larger(_difference(found, cycle), relative)
         cycle = choose(active, found, cycle)
 
@@ -421,7 +426,7 @@ def dopri5(scene, ripple, rtol):
         settled = settled & (steep * relative <= 0.3 * rtol)
         at_floor = (wanted < _FINEST) & (tolerance < _FINEST) & isnt(helped) & (relative <= rtol)
         done = active & (settled | stuck | at_floor | lost)
-        right = settled & (wanted >= _FINEST) & (steep * _V_ROUNDING <= 0.3 * rtol * (1.0 - slope))
+        right = settled & (wanted >= _FINEST) & (_larger(steep, cancels) * _V_ROUNDING <= 0.3 * rtol * (1.0 - slope))
         verdict = where(
             done, where(lost, _STEP_LIMIT, where(stuck | held, _STICKS, where(right, _OK, _INACCURATE))), verdict
         )

@@ -74,6 +74,27 @@ def test_every_linear_term_in_every_combination_is_right_to_1e_13(terms):
     assert share > (0.2 if terms in ("R", "aRk") else 0.5) or not COMPILED  # small s are remarked
 
 
+WIDE_SWINGS = (
+    {"mu": 0.8325162231299857, "phi0": 3.4541739652892662, "R": 1.9419516558116308e-09, "k": 0.24326608631850752},
+    {"mu": 23.45755854915434, "phi0": 39.6822014183762, "R": 1.4281577786622918e-06, "k": 3.5446926172047624},
+    {"mu": 0.5509590625740179, "phi0": 3.82539277366175, "R": 6.98390917575075e-05, "k": 1.3309086167759927},
+    {"mu": 31.030687325891886, "phi0": 1.1298248019711736, "R": 0.0012675897912571012, "k": 0.0},
+    {"mu": 0.17484109976698284, "phi0": 0.0010605806583133613, "R": 4.989492920121259e-05, "k": 0.0},
+)
+"""With next to no loss: the sensitivity, down to 8e-27, is a difference of terms near 1."""
+
+
+@pytest.mark.parametrize("method", ["segments", "dopri5"] if COMPILED else ["segments"])
+@pytest.mark.parametrize("rtol", [5e-5, 1e-6, 1e-9] if COMPILED else [5e-5])
+def test_a_sensitivity_that_all_but_cancels_is_right_or_said_not_to_be(method, rtol):
+    cells = {name: np.array([cell[name] for cell in WIDE_SWINGS]) for name in WIDE_SWINGS[0]}
+    outputs, status = solve(FOLIOT, method, **cells, rtol=rtol)
+    assert (status < FIRST_REFUSAL).any()
+    for i, truth in enumerate(truths(cells)):
+        if status[i] in (Status.OK, Status.NOT_SELF_STARTING):
+            assert abs(outputs["sensitivity"][i] / float(truth[3]) - 1) <= rtol, (i, status[i])
+
+
 def test_both_exact_methods_agree_with_the_fitted_closed_form():
     mu = np.geomspace(1e-12, 1e12, 97)
     closed = solve(FOLIOT, "closed", mu, 1.0, 1.0)[0]
