@@ -5,6 +5,7 @@ import pytest
 from columns import solve
 from rich_scene import RICH
 
+from kernels import _taylor_solve
 from kernels._jit import COMPILED
 from kernels._refill import DONE, FRESH, MOVING
 from kernels._taylor_solve import followed
@@ -91,3 +92,13 @@ def test_cells_are_stopped_behind_two_switches_and_four_put_in_order_and_go_on_w
     assert np.array_equal(results[-1], np.where(refused, Status.OUT_OF_RANGE, Status.OK))
     followed(module, [flips], rtol, together=True)
     assert [(n, together) for n, _, together, _ in module.runs[3:]] == [(8, True)]
+
+
+def test_what_is_followed_piece_by_piece_comes_back_in_its_place(monkeypatch):
+    flips, rtol = np.arange(1.0, 12.0), np.geomspace(1e-8, 1e-11, 11)
+    together = followed(_Counted(), [flips], rtol)
+    monkeypatch.setattr(_taylor_solve, "AT_ONCE", 3)
+    module = _Counted()
+    assert np.array_equal(followed(module, [flips], rtol), together, equal_nan=True)
+    assert max(n for n, *_ in module.runs) == 3
+    np.testing.assert_allclose(together[0], flips * rtol * 2.0**20, rtol=1e-14)

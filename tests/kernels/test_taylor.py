@@ -66,9 +66,11 @@ def test_free_of_drag_and_dry_friction_alone_are_exact_parabolas():
     for _ in range(4):  # up against mu + R, down with mu - R, to the switch 4 below
         top = v * v / (2 * (mpf(mu) + R))
         down = mp.sqrt(2 * (top + 4) / (mpf(mu) - R))
-        time, v = time + v / (mpf(mu) + R) + down, down * (mu - R)
+        interval, v = v / (mpf(mu) + R) + down, down * (mu - R)
+        time += interval
     assert status[0] == Status.OK
     assert relative_error(outputs["time"], [time])[0] < 1e-14
+    assert relative_error(outputs["interval"], [interval])[0] < 1e-14
     assert relative_error(abs(outputs["speed"]), [v])[0] < 1e-14
 
 
@@ -213,6 +215,44 @@ def test_a_crossing_is_found_wherever_it_lies_in_the_step(root):
         t, only_just = _plain(_taylor.crossing, _taylor.of_series, curve, event, 1.0, 1e-13, True)
         assert t == pytest.approx(root, rel=1e-12, abs=4e-16)
         assert not only_just
+
+
+def falling(random):
+    """A series that is proved to fall from above 0 to below it in (0, 1]: of any terms, or all but flat in places."""
+    while True:
+        series = random.normal(size=9) * random.uniform(0.1, 0.9) ** np.arange(9.0)
+        if random.uniform() < 0.6:
+            flat = random.uniform(1, 3) * np.polynomial.Polynomial.fromroots(
+                random.uniform(-0.3, 1.3, random.integers(1, 4))
+            )
+            series = -(flat * flat + 10.0 ** random.uniform(-6, -1)).integ().coef
+        start = -sum(series[1:]) * random.beta(0.2, 0.2)
+        series = (start, *series[1:])
+        falls = _plain(_taylor.falls, *series[1:4], _taylor.tail(1.0, series), 1.0)
+        if falls and start > 0.0 > sum(series):
+            return series
+
+
+def test_a_crossing_is_found_in_a_few_looks_at_the_series():
+    """3.9 on average as measured; 5.9 with the sign of the bend turned."""
+    random, looks, curve = np.random.default_rng(11), [], _plain_of_series()
+
+    def counted(t, of):
+        looks[-1] += 1
+        return curve(t, of)
+
+    for _ in range(400 if COMPILED else 100):
+        series = falling(random)
+        looks.append(0)
+        t, _ = _plain(_taylor.crossing, counted, (series,), (0.0, 1.0, series[0]), 1.0, 1e-13, True)
+        low, high = (np.polynomial.Polynomial(series)(t * (1.0 + by)) for by in (-1e-10, 1e-10))
+        assert low > 0.0 > high
+    assert np.mean(looks) < 4.8
+    assert max(looks) < 40
+
+
+def _plain_of_series():
+    return getattr(_taylor.of_series, "py_func", _taylor.of_series)
 
 
 @pytest.mark.parametrize(("left", "hangs"), [(1e-9, True), (1e-3, False)])

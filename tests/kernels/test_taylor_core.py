@@ -119,3 +119,15 @@ def test_within_the_core_the_mean_does_for_the_power(n, c):
     assert abs(way - speed * t / 2) < tolerance * rate
     assert c * (rate * t) ** n <= 0.2501 * rate
     assert t == 1.0 or 100 * abs(true - t) + 100 * abs(way - speed * t / 2) / rate > 1e-3 * tolerance
+
+
+@pytest.mark.skipif(not COMPILED, reason="a thousand steps")
+def test_a_first_step_from_the_kink_that_was_too_long_is_tried_again_in_the_core():
+    """Of what friction brings to an end in a hundredth of the first guess: two steps are refused."""
+    mu, phi0, a, c, n = cell = 1.0, 1.0, 100.0, 1e-7, 0.5
+    outputs, status = solve(*cell, flips=1.0, rtol=1e-9)
+    speed = mu / a
+    for _ in range(5):
+        speed = (mu - c * speed**n) / a
+    assert status[0] == Status.OK
+    assert outputs["time"][0] == pytest.approx(phi0 / speed + 1.0 / a, rel=1e-9)  # c leaves 1e-12 of the last
