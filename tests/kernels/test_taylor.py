@@ -131,6 +131,13 @@ def test_a_start_on_a_kink_takes_the_side_of_the_next_moment():
     assert outputs["time"][1] == pytest.approx(2.0, rel=1e-12)
 
 
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+def test_kinks_are_limited_between_two_switches_and_not_in_all():
+    outputs, status = solve(RICH, "taylor_once", 1.0, 1.0, a=0.3, flips=1200.0)
+    assert status[0] == Status.OK
+    assert outputs["time"][0] == pytest.approx(1200.0 * outputs["interval"][0], rel=3e-3)
+
+
 def grazing(excess, n=1):
     """An oscillator about mu/k whose far turning point is 2 mu/k = phi0 (1 + excess)."""
     k = 2.0 / (1.0 + np.asarray(excess, float))
