@@ -61,8 +61,9 @@ class Lines:
         return name
 
     def _state(self, x, k):
-        rate = self.coefficient(self._rates[x.args[0]], k - 1)
-        return rate and self._named(f"{self._names[x.args[0]]}_{k}", rate if k == 1 else f"{rate} * {1.0 / k!r}")
+        """1/k goes into the constants of the rate, which are multiplied once for many steps."""
+        rate = self.coefficient(x.graph.timed(self._rates[x.args[0]], x.graph.of(1.0 / k)), k - 1)
+        return rate and self._named(f"{self._names[x.args[0]]}_{k}", rate)
 
     def _add(self, x, k):
         u, w = x.args
