@@ -13,6 +13,7 @@ round behind a switch within the error, the switch may not be there at all: GRAZ
 import numpy as np
 
 from kernels._locate import METHODS, MOREAU, NONE
+from kernels._refill import fresh
 from kernels._taylor_solve import off_by_roundings
 from kernels._vecmath import NORMAL_HIGH, NORMAL_LOW
 from kernels.interface import FIRST_REFUSAL, Status
@@ -47,9 +48,9 @@ def followed(module, method, columns, step, location, parts=1.0):
         cells = location == way
         extra = (step, GRAZING, METHODS.index(method), way, parts)
         rows = [np.broadcast_to(c, step.shape)[cells] for c in (*columns, *extra)]
-        found = np.full((len(results), len(rows[0])), np.nan)
-        module.run(np.ascontiguousarray(rows), found, False)
-        results[:, cells] = found
+        table = fresh(len(module.ROWS), rows)
+        module.run(table, False)
+        results[:, cells] = table[:, 1 + len(rows) : 1 + len(rows) + len(results)].T
     return results
 
 

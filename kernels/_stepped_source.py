@@ -17,12 +17,10 @@ import math
 import sys
 from collections import namedtuple
 
-import numpy as np
-
 from kernels._fixed_step import follow
 from kernels._jit import jit, jit_call
 from kernels._lanes import fma, isnt, magnitude, some, where
-from kernels._refill import FRESH, each_refilled
+from kernels._refill import each_refilled
 from kernels._scene_module import kept
 
 scene = sys.modules["{module}"]
@@ -90,13 +88,12 @@ def advance(memory, i):
 
 
 @kept
-def run(inputs, results, together):
-    """Each cell, a column of `inputs`, until its last switch."""
-    first, last = 1 + inputs.shape[0], 1 + inputs.shape[0] + results.shape[0]
-    cells = np.zeros((inputs.shape[1], {rows}))
-    cells[:, 0], cells[:, 1:first] = FRESH, inputs.T
+def run(cells, together):
+    """Each cell, a row of what ROWS names, until its last switch."""
     each_refilled(advance, cells, together)
-    results[...] = cells[:, first:last].T
+
+
+ROWS = {rows}
 '''
 
 
@@ -145,7 +142,7 @@ def _text(scene, module):
             f"slope = where((which > {j}.0 - 0.5) & (which < {j}.0 + 0.5), slopes[{j}], slope)" for j in events[1:]
         ),
         load="\n".join(f"{r} = memory[{j}][i]" for j, r in enumerate(rows) if r not in ("method", "location", "parts")),
-        begin="\n".join(begin), bad_input=64.0, method=rows.index("method"), rows=len(rows),
+        begin="\n".join(begin), bad_input=64.0, method=rows.index("method"), rows=tuple(rows),
         store="\n".join(f"memory[{rows.index(r)}][i] = {r}" for r in changed),
     )  # fmt: skip
 
