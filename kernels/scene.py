@@ -3,10 +3,10 @@
     u' = rates(u, side, parameters),  a switch where surface(u, side, parameters) falls through 0         (1)
 
 The functions are plain Python of named scalars; each asks by name for the states, parameters and `side` that it needs.
-They are called once, with objects that record what is done to them (`_expression`), and written out as compiled
-functions for one cell and for lanes (`_scene_module`), in a file that can be read. In them are allowed + - * / ** abs,
+They are called once, with objects that record what is done to them (`expression`), and written out as compiled
+functions for one cell and for lanes (`module`), in a file that can be read. In them are allowed + - * / ** abs,
 and sqrt, exp, log, sin, cos, power and sign of this module. power(abs(u), n), u a state and n > -1 any number, has no
-Taylor series at u = 0; there it is followed as `_taylor_core` says, right to the same tolerance. Of what is not a
+Taylor series at u = 0; there it is followed as `power_core` says, right to the same tolerance. Of what is not a
 state, power and sqrt want something above 0 (else OUT_OF_RANGE).
 """
 
@@ -18,11 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kernels import _taylor_solve
-from kernels._adaptive_solve import twice_by
-from kernels._expression import SceneError, cos, exp, log, power, sign, sin, sqrt
-from kernels._scene_graph import RESERVED
-from kernels._scene_module import build
+from kernels.codegen import followed_twice
+from kernels.codegen.adaptive_solve import twice_by
+from kernels.codegen.expression import SceneError, cos, exp, log, power, sign, sin, sqrt
+from kernels.codegen.module import build
+from kernels.codegen.record import RESERVED
 from kernels.interface import Field, Kernel, Method, Status
 
 __all__ = ["Field", "Scene", "SceneError", "cos", "exp", "log", "power", "scene_kernel", "sign", "sin", "sqrt"]
@@ -125,12 +125,12 @@ def scene_kernel(
             Method(
                 "taylor",
                 "Taylor series of order 12 or 18 in lanes, no switch passed over; followed twice",
-                _solve(_taylor_solve.twice, module, *names),
+                _solve(followed_twice.twice, module, *names),
             ),
             Method(
                 "taylor_once",
                 "the same, each step right to rtol, followed once",
-                _solve(_taylor_solve.once, module, *names),
+                _solve(followed_twice.once, module, *names),
                 _no_bound(names[0]),
             ),
             Method(

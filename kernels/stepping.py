@@ -1,7 +1,7 @@
 """Scenes of one's own followed by textbook integrators at a fixed step.
 
-The parameters `step` and `location` (`_locate`) may be axes of a study. Everything is done three times
-(`_stepped_solve`): what the runs differ by tells `error`, which is also what a method states as its bound, unless the
+The parameters `step` and `location` (`events`) may be axes of a study. Everything is done three times
+(`three_steps`): what the runs differ by tells `error`, which is also what a method states as its bound, unless the
 differences grow as the step shrinks: INACCURATE. Semi-implicit Euler and Verlet are to be had where the states are
 pairs (place, speed), Moreau's method for one pair with dry friction at speed 0.
 """
@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
-from kernels import _stepped_solve
-from kernels._locate import LOCATIONS, METHODS
-from kernels._stepped_source import methods_of, stepped
+from kernels.codegen import three_steps
+from kernels.codegen.stepped_source import methods_of, stepped
+from kernels.integrate.events import LOCATIONS, METHODS
 from kernels.interface import Field, Kernel, Method, Status
 from kernels.scene import Scene, _check, _signed
 
@@ -57,7 +57,7 @@ def stepping_methods(scene, parameters, outputs, fill):
     n = len(scene.states)
 
     def solved(name, columns):
-        return _stepped_solve.solved(stepped(scene), name, columns[: count - 2], *columns[count - 2 : count])
+        return three_steps.solved(stepped(scene), name, columns[: count - 2], *columns[count - 2 : count])
 
     def method(name):
         def solve(*columns):

@@ -101,7 +101,7 @@ def report(
         print(f"use: python {Path(script).name} {' '.join(inputs)}", file=sys.stderr)
         return 2
     try:
-        from sweep import charts
+        from sweep.show import charts
 
         groups, notes, page = conclude(*arguments)
         print("\n".join([*table(groups, source), "", *notes, ""]))

@@ -20,7 +20,7 @@ import xarray as xr
 from _common import Groups, Statement, compared, differing, direct_label, hatch, read_result, report
 
 from kernels.interface import Status
-from sweep.analysis import fit_exponent
+from sweep.analysis.exponents import fit_exponent
 
 LIGHT = 0.01
 """Damping up to which delta = pi zeta to 5e-5."""
@@ -102,7 +102,7 @@ def statements(ds: xr.Dataset) -> Groups:
 
 def figure(ds: xr.Dataset) -> Any:
     """The count over both frictions, its collapse on one law, and the period; for two columns of print."""
-    from sweep import charts
+    from sweep.show import charts
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 84.0)
@@ -138,7 +138,7 @@ def draw_map(page: Any, axes: Any, ds: xr.Dataset) -> None:
 
 def draw_law(axes: Any, ds: xr.Dataset) -> None:
     """pi zeta N against x: one curve for all light damping."""
-    from sweep.charts import COLOURS, MARKS
+    from sweep.show.charts import COLOURS, MARKS
 
     x = np.geomspace(1e-4, 1e4, 200)
     axes.loglog(x, np.log1p(x), color="black", label=r"$\ln(1+x)$")
@@ -160,7 +160,7 @@ def _power(x: float) -> str:
 
 def draw_period(axes: Any, ds: xr.Dataset) -> None:
     """How much viscous damping slows the balance, at three solid frictions: the marks lie on each other."""
-    from sweep.charts import COLOURS, MARKS
+    from sweep.show.charts import COLOURS, MARKS
 
     zeta = np.geomspace(1e-4, 0.9999, 300)
     axes.loglog(zeta, 1 / np.sqrt(1 - zeta**2) - 1, color="black", label=r"$(1-\zeta^2)^{-1/2}-1$")

@@ -164,8 +164,8 @@ def figure(ds: xr.Dataset, times: xr.Dataset) -> Any:
 
     The line in (c) is the full chain's.
     """
-    from sweep import charts
-    from sweep.charts import COLOURS, MARKS
+    from sweep.show import charts
+    from sweep.show.charts import COLOURS, MARKS
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 70.0)
@@ -203,7 +203,7 @@ def figure(ds: xr.Dataset, times: xr.Dataset) -> Any:
 
 def main(arguments: Sequence[str]) -> int:
     """Table and figure; 1 if a statement does not hold."""
-    from sweep import charts
+    from sweep.show import charts
 
     if list(arguments) == ["points"]:
         write_points(Path(__file__).with_suffix(".csv"))

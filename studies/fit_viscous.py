@@ -1,13 +1,17 @@
 # How few coefficients hold the viscous foliot's limit cycle to a few 1e-16?
-"""Fits the polynomials of `kernels/_viscous_fit.py` in 50-digit arithmetic and prints that module.
+"""Fits the polynomials of `kernels/foliot/_viscous_fit.py` in 50-digit arithmetic and prints that module.
 
-    python studies/fit_viscous.py > kernels/_viscous_fit.py
+    python studies/fit_viscous.py > kernels/foliot/_viscous_fit.py
+
+LOG_TAIL of `kernels/maths/elementary.py` is fitted with it and printed on stderr.
 
 With k = 1/alpha = a^2 phi0/mu, the cycle is q - tanh q = k, and everything is smooth in
     w = y^2, y = cbrt(3 k)            for k <  SPLIT (strong drive)
     x = exp(-2 (k + 1))               for k >= SPLIT (weak drive).
 Chebyshev interpolation, then monomials; the leading coefficients are known and kept out of the fit.
 """
+
+import sys
 
 from mpmath import chebyt, cos, exp, findroot, log, log1p, mp, mpf, pi, tanh, taylor
 
@@ -82,7 +86,7 @@ def main():
     print(show("SENSITIVITY_STRONG", "(s - 1/3)/w.", s), end="")
     print(show("GAP_WEAK", "(1 - lambda)/x, x = exp(-2(k + 1)).", gap), end="")
     print(show("OVERSHOOT_WEAK", "(k (A - 1) - (1 - ln 2))/x.", overshoot), end="")
-    print(show("LOG_TAIL", "(atanh(s)/s - 1)/s^2 in s^2, 0 <= s <= 1/3.", log_coefficients), end="")
+    print(show("LOG_TAIL", "(atanh(s)/s - 1)/s^2 in s^2, 0 <= s <= 1/3.", log_coefficients), end="", file=sys.stderr)
 
 
 if __name__ == "__main__":

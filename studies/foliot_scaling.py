@@ -20,7 +20,7 @@ import xarray as xr
 from _common import Groups, Statement, columns, compared, read_result, report
 
 import sweep
-from sweep.analysis import crossover, fit_exponent, local_exponent, where_exponent, where_value
+from sweep.analysis.exponents import crossover, fit_exponent, local_exponent, where_exponent, where_value
 
 WEAK: tuple[float | None, float | None] = (None, 1e-5)
 STRONG: tuple[float | None, float | None] = (1e5, None)
@@ -252,7 +252,7 @@ def trajectories(ds: xr.Dataset) -> xr.Dataset:
 
 def figure(ds: xr.Dataset) -> Any:
     """Period and amplitude, the sliding exponent, and trajectories, in one figure for two columns of print."""
-    from sweep import charts
+    from sweep.show import charts
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 118.0)
@@ -269,7 +269,7 @@ def figure(ds: xr.Dataset) -> Any:
 
 def draw_scaling(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
     """a P and A against alpha, with the asymptotes of both."""
-    from sweep.charts import COLOURS
+    from sweep.show.charts import COLOURS
 
     alpha = ds.alpha.values
     axes.loglog(alpha, ds.aP, color=COLOURS[0], label=r"period, $aP$")
@@ -291,7 +291,7 @@ def draw_scaling(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
 
 def draw_exponent(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
     """Local exponent by differences of ln P, the exact -s, and the drive at which it is -1/2."""
-    from sweep.charts import COLOURS
+    from sweep.show.charts import COLOURS
 
     slope = local_exponent(ds.aP, "alpha")
     few = slice(None, None, max(1, slope.size // 56))
@@ -321,7 +321,7 @@ def draw_exponent(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
 
 def draw_trajectories(panels: Sequence[Any], motion: xr.Dataset, phi0: float) -> None:
     """Two periods of phi(t)/phi0 at each drive; shaded while the torque is positive."""
-    from sweep.charts import COLOURS
+    from sweep.show.charts import COLOURS
 
     phase = np.concatenate([motion.phase.values, 1 + motion.phase.values[1:]])
     for i, (axes, (name, alpha)) in enumerate(zip(panels, SHOWN.items(), strict=True)):

@@ -25,7 +25,7 @@ from _common import Groups, Statement, compared, differing, direct_label, hatch,
 
 import sweep
 from kernels.interface import Status
-from sweep.analysis import fit_exponent, local_exponent, where_exponent, where_value
+from sweep.analysis.exponents import fit_exponent, local_exponent, where_exponent, where_value
 
 KNOWN = {10.0: (8.719, 0.27318), 100.0: (6.098, 0.17768)}
 """mu/R and s in the valley at R/(a^2 phi0), in 50-digit arithmetic."""
@@ -176,7 +176,7 @@ def far(line: xr.Dataset) -> list[Statement]:
 
 def figure(laws: xr.Dataset, grid: xr.Dataset, line: xr.Dataset) -> Any:
     """Exponents against torque, their limits against n, and the map with its valley."""
-    from sweep import charts
+    from sweep.show import charts
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 70.0)
@@ -191,7 +191,7 @@ def figure(laws: xr.Dataset, grid: xr.Dataset, line: xr.Dataset) -> Any:
 
 def draw_exponents(axes: Any, laws: xr.Dataset) -> None:
     """-s against mu for every n."""
-    from sweep.charts import COLOURS, DASHES
+    from sweep.show.charts import COLOURS, DASHES
 
     for i, n in enumerate((0.0, 1.0, 2.0, 3.0, 4.0)):
         law = laws.sel(n=n)
@@ -204,7 +204,7 @@ def draw_exponents(axes: Any, laws: xr.Dataset) -> None:
 
 def draw_limits(axes: Any, laws: xr.Dataset) -> None:
     """The exponents at both ends of the torque against n."""
-    from sweep.charts import COLOURS
+    from sweep.show.charts import COLOURS
 
     n = np.linspace(0.2, 4.3, 200)
     axes.plot(n, -1 / n, color="black", linewidth=0.8)

@@ -165,8 +165,8 @@ def others(ds: xr.Dataset) -> list[Statement]:
 
 def figure(ds: xr.Dataset) -> Any:
     """Receptance of the spindle by eight and by five, its error, and errors of frequencies by size."""
-    from sweep import charts
-    from sweep.charts import COLOURS, MARKS
+    from sweep.show import charts
+    from sweep.show.charts import COLOURS, MARKS
 
     full = source_chain(ds)
     small = {name: ds[f"{name}_kept"].sel(n_keep=5).isel(reduction=0).values[:5] for name in "Jkh"}
@@ -207,7 +207,7 @@ def figure(ds: xr.Dataset) -> Any:
 
 def draw_errors(axes: Any, ds: xr.Dataset, f: np.ndarray) -> None:
     """abs(H5/H8 - 1): with the source's formulas, and with exact dampers."""
-    from sweep.charts import COLOURS
+    from sweep.show.charts import COLOURS
 
     for how, name, colour, line in (("real", "source", COLOURS[1], "-"), ("complex", "dampers exact", "black", ":")):
         axes.semilogy(f, [error_at(ds, x, how) for x in f], line, color=colour, label=name)

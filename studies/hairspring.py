@@ -26,7 +26,7 @@ from _common import Groups, Statement, columns, compared, differing, direct_labe
 
 import sweep
 from kernels.interface import Status
-from sweep.analysis import fit_exponent, local_exponent, where_exponent, where_value
+from sweep.analysis.exponents import fit_exponent, local_exponent, where_exponent, where_value
 
 SHOWN = (1e6, 1e4, 1e2, 1.0)
 """alpha of the lines in the figure."""
@@ -209,7 +209,7 @@ def clock(ds: xr.Dataset, springs: xr.Dataset) -> list[str]:
 
 def figure(ds: xr.Dataset, springs: xr.Dataset) -> Any:
     """Sensitivity against the spring, and a map of it over spring and drive."""
-    from sweep import charts
+    from sweep.show import charts
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 84.0)
@@ -223,7 +223,7 @@ def figure(ds: xr.Dataset, springs: xr.Dataset) -> Any:
 
 def draw_lines(axes: Any, ds: xr.Dataset, springs: xr.Dataset) -> None:
     """s against kappa at several drives: exact, by (1), and the best springs."""
-    from sweep.charts import COLOURS
+    from sweep.show.charts import COLOURS
 
     for alpha, colour in zip(SHOWN, COLOURS, strict=False):
         line = lines(ds, alpha)

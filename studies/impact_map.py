@@ -188,7 +188,7 @@ def _steady_light(bent: xr.Dataset) -> xr.DataArray:
 
 def figure(closed: xr.Dataset, motion: xr.Dataset, bent: xr.Dataset) -> Any:
     """Cycle, recoil, motion and lever; for two columns of print."""
-    from sweep import charts
+    from sweep.show import charts
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 150.0)

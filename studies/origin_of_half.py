@@ -27,7 +27,7 @@ import xarray as xr
 from _common import Groups, Statement, compared, differing, direct_label, read_result, report
 
 import sweep
-from sweep.analysis import fit_exponent, local_exponent, where_value
+from sweep.analysis.exponents import fit_exponent, local_exponent, where_value
 
 E = 0.8
 """Restitution of impacts."""
@@ -164,7 +164,7 @@ def slight_impacts() -> Statement:
 
 def figure(ds: xr.Dataset) -> Any:
     """Periods in units of (phi0/mu)^(1/2), and exponents."""
-    from sweep import charts
+    from sweep.show import charts
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 80.0)
@@ -189,7 +189,7 @@ SHOWN = {
 
 def draw(axes: Any, ds: xr.Dataset, value: Any) -> None:
     """`value` of the shown mixtures against mu: lines, and points for proportional friction."""
-    from sweep.charts import COLOURS, DASHES
+    from sweep.show.charts import COLOURS, DASHES
 
     for i, (name, mixture) in enumerate(SHOWN.items()):
         line = part(ds, mixture)

@@ -128,7 +128,7 @@ def statements(ds: xr.Dataset) -> Groups:
 
 def figure(ds: xr.Dataset) -> Any:
     """Distortion over motor and coupler, with the border of lock-up; the best coupler; a cut; for a page of print."""
-    from sweep import charts
+    from sweep.show import charts
 
     machines = of_amplitude(ds)
     with charts.style():
@@ -167,7 +167,7 @@ def draw_map(page: Any, axes: Any, arm: xr.Dataset) -> None:
 
 def draw_best(axes: Any, machines: xr.Dataset) -> None:
     """The least distortion over all couplers, for each arm."""
-    from sweep.charts import COLOURS
+    from sweep.show.charts import COLOURS
 
     for k in range(machines.d.size):
         top = best(machines.isel(d=k))
@@ -180,7 +180,7 @@ def draw_best(axes: Any, machines: xr.Dataset) -> None:
 
 def draw_cut(axes: Any, machines: xr.Dataset) -> None:
     """Distortion and transmission angle over the coupler, with motor and arm of the paper's machine."""
-    from sweep.charts import COLOURS
+    from sweep.show.charts import COLOURS
 
     cut = machines.sel(d=ARM, method="nearest").interp(b=PAPER["b"])
     f = 1e3 * cut.f

@@ -129,7 +129,7 @@ def motions(ds: xr.Dataset) -> xr.Dataset:
 
 def figure(ds: xr.Dataset) -> Any:
     """alpha over a turn, A0 and A1 against e, with the border; for two columns of print."""
-    from sweep import charts
+    from sweep.show import charts
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 84.0)
@@ -146,7 +146,7 @@ def figure(ds: xr.Dataset) -> Any:
 
 def draw_motion(axes: Any, ds: xr.Dataset) -> None:
     """The paper's figure 4 over the crank's angle from b, with the path of the extremes."""
-    from sweep.charts import COLOURS
+    from sweep.show.charts import COLOURS
 
     motion = motions(ds)
     turn = np.degrees(motion.crank_angle.values - B_ANGLE)

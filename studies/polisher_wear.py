@@ -142,7 +142,7 @@ def statements(ds: xr.Dataset, load: xr.Dataset) -> Groups:
 
 def figure(ds: xr.Dataset, load: xr.Dataset) -> Any:
     """Profiles of three tools, and how uneven they are over offset and eccentricity; for two columns of print."""
-    from sweep import charts
+    from sweep.show import charts
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 105.0)
@@ -159,7 +159,7 @@ def figure(ds: xr.Dataset, load: xr.Dataset) -> Any:
 
 def draw_profiles(axes: Any, tool: xr.Dataset, name: str, k: int, load: xr.Dataset | None) -> None:
     """Wear along the radius at some offsets; dashed under a constant load."""
-    from sweep.charts import COLOURS
+    from sweep.show.charts import COLOURS
 
     for j, place in enumerate(PROFILES):
         line = tool.wear.sel(e=USUAL, method="nearest").sel(w_x=place, method="nearest")

@@ -208,7 +208,7 @@ def figure(linear: xr.Dataset, foliot: Sequence[xr.Dataset]) -> Any:
     """Growth of the oscillator above, errors of the foliot's period below."""
     from matplotlib.colors import LogNorm
 
-    from sweep import charts
+    from sweep.show import charts
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 200.0)

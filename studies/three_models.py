@@ -25,7 +25,7 @@ import xarray as xr
 from _common import Groups, Statement, compared, differing, direct_label, read_result, report
 
 import sweep
-from sweep.analysis import fit_exponent, local_exponent
+from sweep.analysis.exponents import fit_exponent, local_exponent
 
 MODELS = ("two bodies", "kept share", "viscous")
 
@@ -110,7 +110,7 @@ def identity(ds: xr.Dataset, impact: xr.Dataset) -> list[Statement]:
 
 def figure(ds: xr.Dataset) -> Any:
     """Period, exponent and swing over torque; for two columns of print."""
-    from sweep import charts
+    from sweep.show import charts
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 66.0)

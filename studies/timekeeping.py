@@ -190,7 +190,7 @@ regulated away, and so is the loss by white noise, a share of sigma^2; what diff
 
 def figure(clocks: dict[str, xr.Dataset]) -> Any:
     """Scatter against noise, against correlation, and loss against noise."""
-    from sweep import charts
+    from sweep.show import charts
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 70.0)

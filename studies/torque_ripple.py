@@ -219,7 +219,7 @@ def in_words(ds: xr.Dataset) -> list[str]:
 
 def figure(ds: xr.Dataset) -> Any:
     """Change of the period against depth; first-order coefficients of period and sensitivity against the harmonic."""
-    from sweep import charts
+    from sweep.show import charts
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 70.0)
@@ -239,7 +239,7 @@ def figure(ds: xr.Dataset) -> Any:
 
 def draw_depths(axes: Any, ds: xr.Dataset) -> None:
     """|P/P0 - 1| of some harmonics, and the two limits."""
-    from sweep.charts import COLOURS, DASHES
+    from sweep.show.charts import COLOURS, DASHES
 
     for h, dashes in zip((1, 2, 16), DASHES, strict=False):
         for i in range(3):
@@ -255,7 +255,7 @@ def draw_depths(axes: Any, ds: xr.Dataset) -> None:
 
 def draw_harmonics(axes: Any, ds: xr.Dataset, found: xr.DataArray, theory: Any, which: int) -> None:
     """A coefficient at some harmonics, theory as a dot, and the envelopes of (2)."""
-    from sweep.charts import COLOURS
+    from sweep.show.charts import COLOURS
 
     h = np.intersect1d(ds.harmonic, np.geomspace(1, 64, 30).round())
     for i, mark in enumerate("os^"):

@@ -19,7 +19,7 @@ import xarray as xr
 from _common import Groups, Statement, report
 
 import sweep
-from sweep.precision import TOLERANCES, precision_text, work_precision
+from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
 
 PARTS = ("", "_viscous", "_drag", "_balance", "_impact", "_polisher")
 """Ends of the names of the study files."""
@@ -32,7 +32,7 @@ NOTES = """\
 saved: time of the best single method over that of auto, on the same cells; "gives" is the share of cells that come out
 and are not said to be inaccurate. Below 1 auto is the slower one: it asks the bounds of every cell, and pays for cells
 that the single method leaves unsolved. Where auto takes the reference itself its error is 0 by that alone: what auto
-calls right is judged against 50 digits by benchmarks/auto_honesty.py"""
+calls right is judged against 50 digits by benchmarks/honesty/auto_honesty.py"""
 
 
 def given(found: xr.Dataset) -> Any:
@@ -85,7 +85,7 @@ def statements(found: xr.Dataset) -> list[Statement]:
 
 def figure(parts: Sequence[xr.Dataset]) -> Any:
     """Time of every method over that of auto, a panel for each kernel; the best single method is ringed."""
-    from sweep import charts
+    from sweep.show import charts
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 128.0)
@@ -104,7 +104,7 @@ def figure(parts: Sequence[xr.Dataset]) -> Any:
 
 def draw(axes: Any, found: xr.Dataset) -> None:
     """Filled marks where a method gives every cell that auto gives, open ones where it gives fewer."""
-    from sweep.charts import COLOURS, MARKS
+    from sweep.show.charts import COLOURS, MARKS
 
     auto = found.sel({"method": "auto"})
     axes.axhline(1.0, color="black", linewidth=0.8)

@@ -21,7 +21,7 @@ import xarray as xr
 from _common import Groups, Statement, differing, report
 
 import sweep
-from sweep.precision import TOLERANCES, precision_cells, precision_text, work_precision
+from sweep.explore.work_precision import TOLERANCES, precision_cells, precision_text, work_precision
 
 DIGITS = 20
 """Of the truth."""
@@ -36,7 +36,7 @@ truth is right to. Others (heyoka.py, diffrax, scipy) are told how many half swi
 cycle; diffrax does all clocks side by side, each as often as the slowest"""
 
 
-def cycles(study: sweep.spec.Study, cells: int) -> dict[str, Any] | None:
+def cycles(study: sweep.study.read.Study, cells: int) -> dict[str, Any] | None:
     """True values of the outputs, by mpmath; None where it is not installed or the oracle is not at hand."""
     oracle = _oracle("foliot_oracles")
     if oracle is None:
@@ -55,7 +55,7 @@ def cycles(study: sweep.spec.Study, cells: int) -> dict[str, Any] | None:
 def _oracle(name: str) -> Any:
     from importlib import import_module
 
-    folder = str(Path(__file__).parents[1] / "tests")
+    folder = str(Path(__file__).parents[1] / "tests" / "oracles")
     sys.path += [] if folder in sys.path else [folder]
     try:
         return import_module(name)
@@ -98,11 +98,11 @@ def _measured(follower: Any, cells: Any, true: Any, multiplier: Any, tolerances:
     return xr.Dataset({k: ("rtol", list(v)) for k, v in zip(keys, zip(*rows, strict=True), strict=True)})
 
 
-def _multiplier(study: sweep.spec.Study, cells: int) -> Any:
+def _multiplier(study: sweep.study.read.Study, cells: int) -> Any:
     """Of the cycles' half swings: what is left of a start after each."""
     from dataclasses import replace
 
-    from sweep.sampling import sampled, solved
+    from sweep.cells.sample import sampled, solved
 
     return solved(replace(sampled(study, cells), outputs=("multiplier",), method="auto", rtol=1e-6))[0]["multiplier"]
 
@@ -165,7 +165,7 @@ def orders(found: xr.Dataset) -> list[Statement]:
 
 def figure(coulomb: xr.Dataset, drag: xr.Dataset, steps: xr.Dataset | None, others: dict[str, xr.Dataset]) -> Any:
     """Median cell above, worst cell below: two friction laws over time, and fixed steps over calls of the rates."""
-    from sweep import charts
+    from sweep.show import charts
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 138.0)
@@ -194,7 +194,7 @@ def figure(coulomb: xr.Dataset, drag: xr.Dataset, steps: xr.Dataset | None, othe
 
 def draw_steps(axes: Any, found: xr.Dataset | None, key: str) -> None:
     """Error over calls of the rates, a line for each integrator."""
-    from sweep.charts import COLOURS, FLOOR, MARKS
+    from sweep.show.charts import COLOURS, FLOOR, MARKS
 
     axes.set(xscale="log", yscale="log")
     for i, name in enumerate([] if found is None else found["method"].values):

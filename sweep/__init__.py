@@ -6,66 +6,66 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sweep._scaling import collapse_quality as collapse_quality
-    from sweep._scaling import rescaled as rescaled
-    from sweep._scaling import scaling as scaling
-    from sweep.analysis import crossover as crossover
-    from sweep.analysis import exponent as exponent
-    from sweep.analysis import fit_exponent as fit_exponent
-    from sweep.analysis import local_exponent as local_exponent
-    from sweep.analysis import local_exponent_error as local_exponent_error
-    from sweep.analysis import where_exponent as where_exponent
-    from sweep.analysis import where_value as where_value
-    from sweep.charts import plot as plot
-    from sweep.charts import plot_precision as plot_precision
-    from sweep.customary import in_units as in_units
-    from sweep.errors import StudyError as StudyError
-    from sweep.errors import SweepError as SweepError
-    from sweep.exporting import export as export
-    from sweep.filtering import where as where
-    from sweep.mapping import contours as contours
-    from sweep.mapping import exponent_map as exponent_map
-    from sweep.planning import plan as plan
-    from sweep.precision import work_precision as work_precision
-    from sweep.refining import refine as refine
-    from sweep.refining import study_of as study_of
-    from sweep.regimes import fit_two_laws as fit_two_laws
-    from sweep.result import open_result as open_result
-    from sweep.runner import run as run
-    from sweep.spec import build_study as build_study
-    from sweep.spec import read_study as read_study
-    from sweep.verifying import verify as verify
+    from sweep.analysis.exponents import crossover as crossover
+    from sweep.analysis.exponents import exponent as exponent
+    from sweep.analysis.exponents import fit_exponent as fit_exponent
+    from sweep.analysis.exponents import local_exponent as local_exponent
+    from sweep.analysis.exponents import local_exponent_error as local_exponent_error
+    from sweep.analysis.exponents import where_exponent as where_exponent
+    from sweep.analysis.exponents import where_value as where_value
+    from sweep.analysis.maps import contours as contours
+    from sweep.analysis.maps import exponent_map as exponent_map
+    from sweep.analysis.two_laws import fit_two_laws as fit_two_laws
+    from sweep.explore.groups import collapse_quality as collapse_quality
+    from sweep.explore.groups import rescaled as rescaled
+    from sweep.explore.groups import scaling as scaling
+    from sweep.explore.plan import plan as plan
+    from sweep.explore.refine import refine as refine
+    from sweep.explore.refine import study_of as study_of
+    from sweep.explore.work_precision import work_precision as work_precision
+    from sweep.results.export import export as export
+    from sweep.results.filter import where as where
+    from sweep.results.open import open_result as open_result
+    from sweep.results.units import in_units as in_units
+    from sweep.results.verify import verify as verify
+    from sweep.runs.run import run as run
+    from sweep.show.charts import plot as plot
+    from sweep.show.charts import plot_precision as plot_precision
+    from sweep.study.read import build_study as build_study
+    from sweep.study.read import read_study as read_study
+    from sweep.system.errors import StudyError as StudyError
+    from sweep.system.errors import SweepError as SweepError
 
 _HOMES = {
-    "read_study": "spec",
-    "build_study": "spec",
-    "plan": "planning",
-    "run": "runner",
-    "open_result": "result",
-    "verify": "verifying",
-    "local_exponent": "analysis",
-    "local_exponent_error": "analysis",
-    "exponent": "analysis",
-    "fit_exponent": "analysis",
-    "crossover": "analysis",
-    "fit_two_laws": "regimes",
-    "where_exponent": "analysis",
-    "where_value": "analysis",
-    "scaling": "_scaling",
-    "rescaled": "_scaling",
-    "collapse_quality": "_scaling",
-    "plot": "charts",
-    "plot_precision": "charts",
-    "work_precision": "precision",
-    "in_units": "customary",
-    "contours": "mapping",
-    "exponent_map": "mapping",
-    "refine": "refining",
-    "study_of": "refining",
-    "where": "filtering",
-    "export": "exporting",
-    "SweepError": "errors",
-    "StudyError": "errors",
+    "read_study": "study.read",
+    "build_study": "study.read",
+    "plan": "explore.plan",
+    "run": "runs.run",
+    "open_result": "results.open",
+    "verify": "results.verify",
+    "local_exponent": "analysis.exponents",
+    "local_exponent_error": "analysis.exponents",
+    "exponent": "analysis.exponents",
+    "fit_exponent": "analysis.exponents",
+    "crossover": "analysis.exponents",
+    "fit_two_laws": "analysis.two_laws",
+    "where_exponent": "analysis.exponents",
+    "where_value": "analysis.exponents",
+    "scaling": "explore.groups",
+    "rescaled": "explore.groups",
+    "collapse_quality": "explore.groups",
+    "plot": "show.charts",
+    "plot_precision": "show.charts",
+    "work_precision": "explore.work_precision",
+    "in_units": "results.units",
+    "contours": "analysis.maps",
+    "exponent_map": "analysis.maps",
+    "refine": "explore.refine",
+    "study_of": "explore.refine",
+    "where": "results.filter",
+    "export": "results.export",
+    "SweepError": "system.errors",
+    "StudyError": "system.errors",
 }
 """Public names and the modules they live in; a module is imported when one of its names is first used."""
 

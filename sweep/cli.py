@@ -12,12 +12,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sweep.errors import SweepError
+from sweep.system.errors import SweepError
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from sweep.study import Study
+    from sweep.study.model import Study
 
 OK, FAULT, MISTAKE, INTERRUPTED = 0, 1, 2, 130
 
@@ -186,7 +186,7 @@ def _add_units(command: Any) -> None:
 
 
 def _kernels(arguments: argparse.Namespace) -> None:
-    from sweep.describe import catalogue_text, kernel_text, write_starter
+    from sweep.show.kernels import catalogue_text, kernel_text, write_starter
 
     if arguments.study and not arguments.name:
         raise SweepError("--study: name a kernel as well, e.g. sweep kernels foliot --study foliot.toml")
@@ -198,16 +198,16 @@ def _kernels(arguments: argparse.Namespace) -> None:
 
 
 def _plan(arguments: argparse.Namespace) -> None:
-    from sweep.planning import plan
+    from sweep.explore.plan import plan
 
     print(plan(_study(arguments), workers=arguments.workers))
 
 
 def _run(arguments: argparse.Namespace) -> None:
     study = _study(arguments)
-    from sweep.report import summary_text
-    from sweep.runner import run
-    from sweep.statuses import account
+    from sweep.results.statuses import account
+    from sweep.runs.run import run
+    from sweep.show.text import summary_text
 
     output = arguments.output or Path(f"{arguments.study.stem}.h5")
     before = _mark(output)
@@ -219,14 +219,14 @@ def _run(arguments: argparse.Namespace) -> None:
 
 
 def _show(arguments: argparse.Namespace) -> None:
-    from sweep.report import result_text
+    from sweep.show.text import result_text
 
     with _result(arguments) as dataset:
         print(result_text(arguments.result, dataset))
 
 
 def _verify(arguments: argparse.Namespace) -> None:
-    from sweep.verifying import verify
+    from sweep.results.verify import verify
 
     verdict = verify(arguments.result)
     if not verdict.whole:
@@ -235,7 +235,7 @@ def _verify(arguments: argparse.Namespace) -> None:
 
 
 def _fit(arguments: argparse.Namespace) -> None:
-    from sweep.fitting import laws, laws_text, pick, write_laws
+    from sweep.show.laws import laws, laws_text, pick, write_laws
 
     with _result(arguments) as dataset:
         part = pick(dataset, arguments.at)
@@ -248,8 +248,8 @@ def _fit(arguments: argparse.Namespace) -> None:
 
 
 def _plot(arguments: argparse.Namespace) -> None:
-    from sweep.charts import plot
-    from sweep.fitting import pick
+    from sweep.show.charts import plot
+    from sweep.show.laws import pick
 
     output = arguments.output or Path(f"{arguments.result.stem}.png")
     with _result(arguments) as dataset:
@@ -258,8 +258,8 @@ def _plot(arguments: argparse.Namespace) -> None:
 
 
 def _chart(arguments: argparse.Namespace) -> None:
-    from sweep.charts import plot_precision
-    from sweep.precision import TOLERANCES, precision_text, work_precision
+    from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
+    from sweep.show.charts import plot_precision
 
     found = work_precision(
         _study(arguments),
@@ -275,7 +275,7 @@ def _chart(arguments: argparse.Namespace) -> None:
 
 
 def _refine(arguments: argparse.Namespace) -> None:
-    from sweep.refining import refine, study_of
+    from sweep.explore.refine import refine, study_of
 
     with _result(arguments) as dataset:
         study = study_of(dataset, allow_import=arguments.allow_import)
@@ -292,7 +292,7 @@ def _refine(arguments: argparse.Namespace) -> None:
 
 
 def _report(arguments: argparse.Namespace) -> None:
-    from sweep.webpage import write_page
+    from sweep.show.page import write_page
 
     output = arguments.output or Path(f"{arguments.result.stem}.html")
     with _result(arguments) as dataset:
@@ -300,8 +300,8 @@ def _report(arguments: argparse.Namespace) -> None:
 
 
 def _export(arguments: argparse.Namespace) -> None:
-    from sweep.exporting import export
-    from sweep.filtering import where
+    from sweep.results.export import export
+    from sweep.results.filter import where
 
     with _result(arguments) as dataset:
         chosen = dataset if arguments.where is None else where(dataset, arguments.where)
@@ -309,7 +309,7 @@ def _export(arguments: argparse.Namespace) -> None:
 
 
 def _in_units(dataset: xr.Dataset, given: Sequence[str]) -> xr.Dataset:
-    from sweep.customary import in_units
+    from sweep.results.units import in_units
 
     for text in given:
         if not all(text.partition("=")):
@@ -318,7 +318,7 @@ def _in_units(dataset: xr.Dataset, given: Sequence[str]) -> xr.Dataset:
 
 
 def _study(arguments: argparse.Namespace) -> Study:
-    from sweep.spec import read_study
+    from sweep.study.read import read_study
 
     path = arguments.study
     if path.suffix == ".py":
@@ -329,7 +329,7 @@ def _study(arguments: argparse.Namespace) -> Study:
 
 
 def _result(arguments: argparse.Namespace) -> xr.Dataset:
-    from sweep.result import open_result
+    from sweep.results.open import open_result
 
     path = arguments.result
     if path.suffix == ".toml":

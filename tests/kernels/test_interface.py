@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from columns import checked, solve
 
-from kernels._jit import COMPILED
 from kernels.catalogue import KERNELS, get
 from kernels.interface import FIRST_REFUSAL, Status
+from kernels.lanes.jit import COMPILED
 
 NAMES = sorted(KERNELS)
 REMARKED_ONLY = {"polisher": {"theta_lock", "theta_lock_outer"}}

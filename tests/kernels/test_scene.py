@@ -13,11 +13,11 @@ from columns import bounds, checked, solve
 from mpmath import mp, mpf
 from rich_scene import RICH
 
-from kernels._expression import SceneError
-from kernels._jit import COMPILED
-from kernels._scene_graph import record
-from kernels._scene_module import Writer, build
+from kernels.codegen.expression import SceneError
+from kernels.codegen.module import Writer, build
+from kernels.codegen.record import record
 from kernels.interface import Kernel, Status
+from kernels.lanes.jit import COMPILED
 from kernels.scene import Field, Scene, exp, scene_kernel
 
 ROOT = Path(__file__).parents[2]

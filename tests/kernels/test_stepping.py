@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from columns import solve
 
-from kernels._jit import COMPILED
 from kernels.interface import Field, Status
+from kernels.lanes.jit import COMPILED
 from kernels.scene import sign
 from kernels.stepping import METHODS, stepped_kernel
 

@@ -60,7 +60,7 @@ def done(here, call):
 
 
 def in_a_process(*argv, **options):
-    path = os.pathsep.join([str(Path(sweep.__file__).parents[1]), str(Path(__file__).parent)])
+    path = os.pathsep.join([str(Path(sweep.__file__).parents[1]), str(Path(__file__).parents[1] / "helpers")])
     command = [sys.executable, "-m", "sweep", *argv]
     return subprocess.Popen(
         command,
@@ -84,7 +84,7 @@ def test_nothing_heavy_is_imported_before_it_is_needed(statement):
 
 def test_a_study_without_foreign_units_is_read_without_pint(here):
     code = "import sys, sweep; sweep.read_study('stones.toml', True); assert not {'pint', 'xarray'} & set(sys.modules)"
-    path = os.pathsep.join([str(Path(sweep.__file__).parents[1]), str(Path(__file__).parent)])
+    path = os.pathsep.join([str(Path(sweep.__file__).parents[1]), str(Path(__file__).parents[1] / "helpers")])
     subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "PYTHONPATH": path})
 
 

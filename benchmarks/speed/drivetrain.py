@@ -1,0 +1,140 @@
+# How fast are the natural frequencies and receptances of drivetrains against numpy, and how right?
+"""Prints ratios measured in this run, on one core, and errors against 50 digits (needs mpmath):
+
+OPENBLAS_NUM_THREADS=1 python benchmarks/speed/drivetrain.py
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from kernels.drivetrain._chain_frequencies import natural_frequencies_of_all
+from kernels.drivetrain.receptance import DRIVETRAIN_FRF
+
+sys.path.append(str(Path(__file__).parents[2] / "tests" / "oracles"))
+import chain_oracles as oracles
+from mpmath import mp, mpc, mpf
+
+CELLS = {2: 65536, 4: 32768, 8: 16384, 16: 8192, 64: 512}
+"""Chains by the number of their inertias."""
+REPEATS = 7
+CHECKED = 6
+"""Chains whose error is measured."""
+
+
+def chains(n, decades, cells, seed=1):
+    """J and k over so many decades."""
+    random = np.random.default_rng(seed)
+    return tuple(10 ** random.uniform(-decades / 2, decades / 2, (cells, n)) for _ in range(2))
+
+
+def dense(J, k):
+    """The symmetric matrices J^-1/2 K J^-1/2, as numpy's eigenvalue routine wants them."""
+    n = J.shape[1]
+    matrices, i = np.zeros((*J.shape, n)), np.arange(n)
+    matrices[:, i, i] = k / J
+    matrices[:, i[1:], i[1:]] += k[:, :-1] / J[:, 1:]
+    beside = -k[:, :-1] / np.sqrt(J[:, :-1] * J[:, 1:])
+    matrices[:, i[1:], i[:-1]] = matrices[:, i[:-1], i[1:]] = beside
+    return matrices
+
+
+def seconds(function, *arguments):
+    """Time of one pass, and what it gave."""
+    start = time.perf_counter()
+    result = function(*arguments)
+    return time.perf_counter() - start, result
+
+
+def worst(found, J, k):
+    """The largest relative error of a frequency over the first chains; below 0 in the square counts as 0 Hz."""
+    largest = 0.0
+    for i in range(CHECKED if J.shape[1] < 64 else 1):
+        true, _ = oracles.modes(J[i], k[i], 100)
+        with mp.workdps(50):
+            largest = max(largest, *(float(abs(mpf(float(f)) / t - 1)) for f, t in zip(found[i], true, strict=True)))
+    return largest
+
+
+def frequencies():
+    """Ours and numpy's in turn, in this run: medians of the ratios; building the matrices is not counted."""
+    print(f"{'natural frequencies':34} {'ns/chain':>9} {'eigvalsh':>9} {'ratio':>6} {'error':>8} {'its error':>9}")
+    for decades in (1, 12):
+        for n, cells in CELLS.items():
+            J, k = chains(n, decades, cells)
+            matrices, found, status = dense(J, k), np.empty_like(J), np.empty(cells, np.int8)
+            natural_frequencies_of_all(J, k, found, status)
+            times = []
+            squares = np.linalg.eigvalsh(matrices)
+            for _ in range(REPEATS):
+                ours = seconds(natural_frequencies_of_all, J, k, found, status)[0]
+                theirs, squares = seconds(np.linalg.eigvalsh, matrices)
+                times.append((ours, theirs))
+            assert not status.any()
+            ratio = np.median([b / a for a, b in times])
+            ours, theirs = (np.median(t) / cells * 1e9 for t in zip(*times, strict=True))
+            rival = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+            errors = worst(found, J, k), worst(rival, J, k)
+            title = f"{n} inertias, J and k over {decades} decades"
+            print(f"{title:34} {ours:9.0f} {theirs:9.0f} {ratio:6.1f} {errors[0]:8.1e} {errors[1]:9.1e}")
+
+
+def numpy_receptances(J, k, h, frequency):
+    """The receptance at mass 1 by numpy's dense solver, all frequencies of a chain at a time."""
+    n, i = J.shape[1], np.arange(J.shape[1])
+    found = np.empty((len(J), len(frequency)), complex)
+    torque = np.zeros((len(frequency), n, 1))
+    torque[:, 0] = 1.0
+    w = 2 * np.pi * frequency[:, None]
+    for cell in range(len(J)):
+        matrices = np.zeros((len(frequency), n, n), complex)
+        K = k[cell] + 1j * w * h[cell]
+        matrices[:, i, i] = K - w * w * J[cell]
+        matrices[:, i[1:], i[1:]] += K[:, :-1]
+        matrices[:, i[1:], i[:-1]] = matrices[:, i[:-1], i[1:]] = -K[:, :-1]
+        found[cell] = np.linalg.solve(matrices, torque)[:, 0, 0]
+    return found
+
+
+def receptances():
+    """The kernel with its error bound, amplitude, phase and decibel against numpy's solver alone."""
+    print(
+        f"{'receptance at 256 frequencies':34} {'ns each':>9} {'solve':>9} {'ratio':>6} {'error':>8} {'its error':>9}"
+    )
+    frequency = np.geomspace(1e-3, 1.0, 256)
+    for n, cells in ((8, 256), (64, 16)):
+        J, k = chains(n, 1, cells)
+        h = 0.02 * np.sqrt(J * k)
+        outputs, status = [np.empty((cells, 256)) for _ in range(5)], np.empty(cells, np.int8)
+        columns = J, k, h, np.ones(cells), np.ones(cells), np.full(cells, 1e-9), frequency, *outputs, status
+        solve = DRIVETRAIN_FRF.method("continued").solve
+        solve(*columns)
+        times = []
+        for _ in range(REPEATS):
+            ours = seconds(solve, *columns)[0]
+            theirs, rival = seconds(numpy_receptances, J, k, h, frequency)
+            times.append((ours, theirs))
+        ratio = np.median([b / a for a, b in times])
+        ours, theirs = (np.median(t) / cells / 256 * 1e9 for t in zip(*times, strict=True))
+        errors = []
+        for values in (outputs[0] + 1j * outputs[1], rival):
+            found = []
+            for j in range(0, 256, 32):
+                true = oracles.receptance(J[0], k[0], h[0], frequency[j], 1, 1)
+                with mp.workdps(50):
+                    found.append(float(abs(mpc(complex(values[0, j])) - true) / abs(true)))
+            errors.append(max(found))
+        print(f"{f'{n} inertias':34} {ours:9.0f} {theirs:9.0f} {ratio:6.1f} {errors[0]:8.1e} {errors[1]:9.1e}")
+
+
+if __name__ == "__main__":
+    frequencies()
+    receptances()

@@ -1,0 +1,231 @@
+"""The half swing of a balance that is driven once in it, and its limit cycle: exact pieces of `linear_flow`.
+
+    th'' + 2 zeta th' + th +- r = drive,  in units of 1/w_n                                          (1)
+From rest at a = beta + p the balance falls to th = beta (leg 1, where its speed is v1). The lift torque m pushes it to
+-beta (leg 2, v2), or the energy w kicks it at 0 (beta = 0, v3^2 = v2^2 + 2 w), and it comes to rest at -a' =
+-(beta + p') (leg 3). The balance of energy and the phase area give its gain and its slope,
+    a'^2 - a^2 = 2 (2 m beta + w - r (a + a') - 2 zeta J),  J = integral of v^2 over the legs,       (2)
+    da'/da = exp(-2 zeta T) (a - r)/(a' + r),  T the time of the half swing.                         (3)
+At the cycle (3) is the multiplier, of the amplitude as of the energy. The energy that leg 3 needs to rise to a grows
+with a by exp(2 zeta t3) (a + r), what legs 1 and 2 provide by exp(-2 zeta (t1 + t2)) (a - r), which is less: there is
+one cycle, stable, if the least swing that comes through the lift gains, and none otherwise.
+Angles are in units of a power of two near beta, or near the square root of w. A *scene* is (zeta, r, m, beta, w).
+Derived here.
+"""
+
+import math
+
+from kernels.balance import _ringdown
+from kernels.integrate import linear_flow
+from kernels.interface import Status
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.vectors import fma, isnt, magnitude, nearest, some, sqrt, where
+from kernels.maths import pairs
+from kernels.maths.elementary import arctan, exp, expm1, in_unit, mantissa_exponent
+
+NEWTON_LIMIT = 100
+"""Newton steps or bisections on (3); about six are usual."""
+ROUNDING = 4e-15
+"""Relative error of one half swing: of times, speeds, rises, and of the terms of (2)."""
+_LARGEST = 1e140
+"""Swing, in units, whose square still is well inside float64."""
+
+_OK, _NOT_CONVERGED, _INACCURATE = float(Status.OK), float(Status.NOT_CONVERGED), float(Status.INACCURATE)
+_STICKS, _OUT_OF_RANGE, _NO_METHOD = float(Status.STICKS), float(Status.OUT_OF_RANGE), float(Status.NO_METHOD)
+
+
+@jit
+def without_units(zeta, r, w, m, beta):
+    """The scene, the exponent of its unit, and whether friction and torque are normal numbers in it."""
+    lifts = beta > 0.0
+    m_w, e_w = mantissa_exponent(where(lifts, 1.0, w))
+    _, e_beta = mantissa_exponent(where(lifts, beta, 1.0))
+    half = nearest(0.5 * e_w - 0.25)
+    e = where(lifts, e_beta, half)
+    energy = where(lifts, 0.0, m_w * where(e_w - 2.0 * half > 0.5, 2.0, 1.0))
+    friction, torque = in_unit(r, e), in_unit(m, e)
+    fine = (isnt(r > 0.0) | (friction > 1e-300)) & (friction < 1e300) & (isnt(lifts) | (torque > 1e-300))
+    return (zeta, friction, torque, in_unit(beta, e), energy), e, fine & (torque < 1e300)
+
+
+@jit_call
+def _from_lift(scene, v1):
+    """Legs 2 and 3 from th = beta with speed v1: rise p', speeds, times, whether the lift is passed; and the losses."""
+    zeta, r, m, beta, w = scene
+    lifts = beta > 0.0
+    f2 = (beta - r) + m
+    t2, comes = 0.0 * v1, v1 >= 0.0
+    if some(lifts):
+        way = where(lifts, 2.0 * beta, 1.0)
+        t2 = linear_flow.first_crossing(zeta, 1.0, where(lifts, v1, 1.0), where(lifts, f2, 1.0), way)
+        comes = isnt(lifts) | (t2 < math.inf)
+        t2 = where(lifts & comes, t2, 0.0)
+    s2, _, slope2 = linear_flow.response(zeta, 1.0, t2)
+    k2 = linear_flow.loss(zeta, 1.0, t2)
+    v2 = fma(v1, slope2, f2 * s2)
+    v3 = sqrt(fma(v2, v2, 2.0 * w))
+    f3 = beta + r
+    t3 = linear_flow.first_reversal(zeta, 1.0, where(comes, v3, 1.0), -f3)
+    s3, c3, slope3 = linear_flow.response(zeta, 1.0, t3)
+    rise = fma(v3, s3, -f3 * c3)
+    top = beta + rise
+    j2 = v1 * v1 * (s2 * fma(zeta, s2, slope2) + k2) + f2 * s2 * s2 * v1 + f2 * f2 * k2
+    j3 = (top + r) * (top + r) * linear_flow.loss(-zeta, 1.0, t3)
+    return rise, v2, v3, t2, t3, comes, j2 + j3, s2, slope3
+
+
+@jit_call
+def half_swing(scene, p):
+    """From rest at beta + p, p > 0.
+
+    Returns
+    -------
+    gain : p' - p, a difference where the swing forgets its start and by (2) where it hardly changes
+    noise : what rounding may be worth in it
+    kept, lost : da'/da by (3), and 1 minus it
+    time : of the half swing
+    comes : whether it passes the lift, or the zero
+    late : bound on dT/dp
+    blunt : error of the time, by the speeds at which its pieces end
+    """
+    zeta, r, m, beta, w = scene
+    a = beta + p
+    f1 = (beta - r) + p
+    t1 = linear_flow.first_crossing(zeta, 1.0, 0.0 * p, f1, p)
+    comes = t1 < math.inf
+    t1 = where(comes, t1, 0.0)
+    s1, c1, _ = linear_flow.response(zeta, 1.0, t1)
+    v1 = f1 * s1
+    rise, v2, v3, t2, t3, passes, j, s2, slope3 = _from_lift(scene, v1)
+    top, time = beta + rise, t1 + t2 + t3
+    j = j + f1 * f1 * linear_flow.loss(zeta, 1.0, t1)
+    fade = -expm1(-2.0 * zeta * time)
+    kept = exp(-2.0 * zeta * time) * f1 / (top + r)
+    balanced = kept > 0.5
+    work = fma(2.0 * m, beta, w)
+    by_energy = 2.0 * (work - r * (a + top) - 2.0 * zeta * j) / (a + top)
+    gain = where(balanced, by_energy, rise - p)
+    lost = (fade * f1 + gain + 2.0 * r) / (top + r)
+    noise = ROUNDING * where(balanced, 4.0 * work / (a + top), rise)
+    early, later = exp(-2.0 * zeta * t1), exp(-2.0 * zeta * (t1 + t2))
+    late = magnitude(1.0 - c1) / v1 + s2 / v2 * early * f1 / v1 + magnitude(slope3) / (top + r) * later * f1 / v3
+    blunt = ROUNDING * (time + 2.0 * p / v1 + 4.0 * beta / v2)
+    return gain, noise, kept, lost, time, comes & passes, late, blunt
+
+
+@jit
+def _least(scene):
+    """The least p from which the balance comes to the lift, or to the zero: 0, or (r - beta)(1 + 1/E) beyond r."""
+    zeta, r, _, beta, _ = scene
+    creeps = zeta >= 1.0
+    delta, _ = _ringdown.decrement(where(creeps, 0.5, zeta))
+    share = where(creeps, 0.0, exp(-delta[0]))
+    short = r > beta
+    return where(short, (r - beta) * (1.0 + 1.0 / where(share > 1e-300, share, 1e-300)), 0.0), short & isnt(
+        share > 1e-300
+    )
+
+
+@jit
+def _light_losses(scene):
+    """a of 2 r a + pi zeta a^2 = work, what light losses tend to."""
+    zeta, r, m, beta, w = scene
+    work = fma(2.0 * m, beta, w)
+    return 2.0 * work / (2.0 * r + sqrt(4.0 * r * r + 4.0 * math.pi * zeta * work))
+
+
+@jit_call
+def newton(scene, rtol):
+    """Amplitude, half period and multiplier of the cycle in units, and its verdict."""
+    zeta, r, _, beta, _ = scene
+    least, never = _least(scene)
+    first, _, _, _, _, passes, _, _, _ = _from_lift(scene, 0.0 * least)
+    impulse_creeps = isnt(beta > 0.0) & (zeta >= 1.0)
+    swings = passes & (first > least) & isnt(never | impulse_creeps)
+    guess = _light_losses(scene)
+    tame = guess < _LARGEST
+    guess = guess - beta
+    p = where(guess > first, guess, first)
+    p = where(swings & tame, p, 1.0)
+    low, high = where(swings, least, 0.0), 0.0 * p + 1e300
+    active = swings & tame
+    for _ in range(NEWTON_LIMIT):
+        if not some(active):
+            break
+        gain, noise, _, lost, _, comes, _, _ = half_swing(scene, p)
+        up = isnt(comes) | (gain > 0.0)
+        low, high = where(up, p, low), where(up, high, p)
+        new = p + gain / lost
+        fallback = where(high < 1e300, 0.5 * (low + high), 2.0 * p)
+        change = magnitude(new - p)
+        inside = comes & (new >= low) & (new <= high)
+        new = where(inside, new, fallback)
+        settled = inside & ((change <= 1e-9 * p) | (change * lost <= noise))
+        p = where(active, new, p)
+        active = active & isnt(settled)
+    _, noise, kept, lost, time, comes, late, blunt = half_swing(scene, p)
+    a = beta + p
+    error = noise / lost + 2.3e-16 * a
+    of_time = (error * late + blunt) / time
+    of_multiplier = 2.0 * zeta * of_time * time + 2.0 * error / ((beta - r) + p)
+    of_multiplier = where(kept > 1e-300, of_multiplier, 0.0)
+    right = (error <= rtol * a) & (of_time <= rtol) & (of_multiplier <= rtol)
+    verdict = where(active | isnt(comes), _NOT_CONVERGED, where(right, _OK, _INACCURATE))
+    verdict = where(swings, verdict, _STICKS)
+    return a, time, kept, where(tame, verdict, _OUT_OF_RANGE)
+
+
+@jit_call
+def closed(scene):
+    """As `newton`, from formulas, where there is an impulse and r = 0, or zeta = 0; NO_METHOD elsewhere."""
+    zeta, r, m, beta, w = scene
+    lifts, free, smooth = beta > 0.0, isnt(zeta > 0.0), isnt(r > 0.0)
+    some_r = where(smooth, 1.0, r)
+    a_kick, t_kick, runs_kick = _kicked(some_r, where(lifts, 1.0, w))
+    a_lift, t_lift, runs_lift = _lifted(some_r, where(lifts, m, 1.0), where(lifts, beta, 1.0))
+    a, time = where(lifts, a_lift, a_kick), where(lifts, t_lift, t_kick)
+    kept, runs = (a - r) / (a + r), where(lifts, where(runs_lift, 1.0, 0.0), where(runs_kick, 1.0, 0.0)) > 0.5
+    a_smooth, t_smooth, kept_smooth = _kicked_smoothly(where(zeta < 1.0, zeta, 0.5), w)
+    a, time = where(free, a, a_smooth), where(free, time, t_smooth)
+    kept = where(free, kept, kept_smooth)
+    known = free | (smooth & isnt(lifts))
+    runs = (free & runs) | (isnt(free) & (zeta < 1.0))
+    return a, time, kept, where(known, where(runs, _OK, _STICKS), _NO_METHOD)
+
+
+@jit
+def _kicked_smoothly(zeta, w):
+    """a^2 = 2 w exp(-2 zeta acos(zeta)/S)/(1 - E^2), T = pi/S, multiplier E^2, S = sqrt(1 - zeta^2): no friction."""
+    delta, root = _ringdown.decrement(zeta)
+    s = root[0]
+    arccos = 2.0 * arctan(s / (1.0 + zeta))
+    square = 2.0 * w * exp(-2.0 * zeta * arccos / s) / -expm1(-2.0 * where(zeta > 0.0, delta[0], 1.0))
+    return sqrt(square), math.pi / s, exp(-2.0 * delta[0]) * (1.0 - 2.0 * delta[1])
+
+
+@jit
+def _kicked(r, w):
+    """a = w/(2 r), T = pi + asin(r/(a - r)) - asin(r/(a + r)), and whether w > 4 r^2: no viscous damping."""
+    a = w / (2.0 * r)
+    spare = fma(-4.0 * r, r, w) / (2.0 * r)  # a - 2 r
+    runs = spare > 0.0
+    before = arctan(r / (sqrt(a) * sqrt(where(runs, spare, 1.0))))
+    after = arctan(r / (sqrt(a) * sqrt(a + 2.0 * r)))
+    return a, math.pi + (before - after), runs
+
+
+@jit
+def _lifted(r, m, beta):
+    """a = m beta/r, T by the half angles of three arcs, and whether m > r and a + beta > 2 r: no viscous damping.
+
+    About r: tan^2 = (a - beta)/(a + beta -+ 2 r); about r - m: tan = 2 beta/(v1 + v2).
+    """
+    a, p = m * beta / r, beta * ((m - r) / r)
+    room = pairs.scaled(pairs.two_sum(m, r), beta)
+    room = pairs.add(room, pairs.negative(pairs.scaled(pairs.two_product(r, r), 2.0)))[0] / r  # a + beta - 2 r
+    runs = (p > 0.0) & (room > 0.0)
+    p, room = where(runs, p, 1.0), where(runs, room, 1.0)
+    wide = a + beta + 2.0 * r
+    v1, v2 = sqrt(p) * sqrt(room), sqrt(p) * sqrt(wide)
+    arcs = arctan(sqrt(p / room)) + arctan(2.0 * beta / (v1 + v2)) + arctan(sqrt(p / wide))
+    return a, 2.0 * arcs, runs

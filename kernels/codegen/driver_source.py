@@ -1,0 +1,191 @@
+"""Source text of what a lane does from one event to the next: start, switch, turn signs round, count, end."""
+
+from kernels.codegen.template import filled, listed
+from kernels.lanes.jit import jit
+from kernels.lanes.vectors import exponent, magnitude, pow2, sqrt, where
+
+KINK_LIMIT = 1000
+"""Kinks between two switches after which a cell is given up."""
+EVENTS = 1_000_000
+"""Of lanes none of which finishes, before what they know is put down."""
+
+SETTLED = '''
+@jit_call
+def settled(state, side, parameters, unit):
+    """The sign of each kink's u, and whether the state is on it: there the sign is that of u in the next moment."""
+    {signs} = natural_signs(state, side, parameters)
+    {unpack} = series_2(state, side, ({signs}), parameters, unit)
+    {turn}
+    return ({signs}), ({on})
+'''
+
+BEGUN = '''
+@jit
+def begun(parameters):
+    """State, side, signs, unit, on, and whether the start is beyond the surface."""
+    side = 0.0 * parameters[0] + 1.0
+    {states} = started(side, parameters)
+    state = ({lasting})
+    one = 0.0 * side + 1.0
+    signs, on = settled(state, side, parameters, one)
+    {unpack} = series_2(state, side, signs, parameters, one)
+    e, d, dd = fma(factor_0, event_0[0], offset_0), factor_0 * event_0[1], factor_0 * event_0[2]
+    away = (d > 0.0) | ((d >= 0.0) & (dd > 0.0))
+    at = where((e <= 0.0) & (e >= 0.0) & away, 1.0, 0.0)
+    return state, side, signs, time_unit(e, d, dd), (at, {also_on}), isnt(e >= 0.0)
+'''
+
+EVENT = '''
+@jit_call
+def advance_{order}(memory, i):
+    """Every lane on from event to event, until one has finished; whether one has."""
+    {load}
+    parameters = ({parameters})
+    fresh = (stage > 0.5) & (stage < 1.5)
+    active = fresh | ((stage > 1.5) & (stage < 2.5))
+    if some(fresh):
+        s, p, g, u, o, beyond = begun(parameters)
+        {begin}
+        verdict = where(fresh, where(beyond | isnt(flips >= 1.0), BAD_INPUT, 0.0), verdict)
+    done = active & isnt(active)
+    for _ in range(EVENTS):
+        moving = active & (verdict < REFUSAL)
+        new, t, h, on, stuck, lost, broken, grazing, hangs, tried = to_event_{order}(
+            ({states}), side, ({signs}), parameters, unit, h, ({ons}), tolerance, moving
+        )
+        verdict = where((hangs | grazing) & (verdict < REMARK), REMARK, verdict)
+        verdict = where(lost, STEP_LIMIT_MET, where(stuck, STICKS, where(broken, OUT_OF_RANGE, verdict)))
+        moving = moving & (verdict < REFUSAL) & isnt(grazing)
+        {land}
+        {ons} = on
+        time, since = where(moving, fma(t, unit, time), time), where(moving, fma(t, unit, since), since)
+        switches = moving & (on_0 > 0.5)
+        kinks_met = where(switches, 0.0, where(moving, kinks_met + 1.0, kinks_met))
+        {turn}
+        if some(switches):
+            count = where(switches, count + 1.0, count)
+            watched = switches & ((count < 1.5) | (count >= flips))
+            if some(watched):
+                faint = underflows(({states}), side, ({signs}), parameters, unit)
+                verdict = where(watched & faint, OUT_OF_RANGE, verdict)
+                rate = rates(({states}), side, ({signs}), parameters)
+                {keep}
+            since = where(switches, 0.0, since)
+            left = surface(({states}), side, ({signs}), parameters)
+            s = switched(({states}), side, ({signs}), parameters)
+            side = where(switches, -side, side)
+            g, o = settled(s, side, parameters, unit)
+            {jump}
+            after = surface(({states}), side, ({signs}), parameters)
+            size = magnitude({offset}) + magnitude(after - {offset})
+            still = magnitude(after) <= fma(1e-12, size, 2.0 * magnitude(left))
+            on_0 = where(switches, where(still, 1.0, 0.0), on_0)
+        steps, before = where(active, tried, steps), where(active, steps, before)
+        verdict = where(moving & (kinks_met > KINK_LIMIT), STEP_LIMIT_MET, verdict)
+        done = active & (grazing | (verdict >= REFUSAL) | (count >= flips))
+        if some(grazing):
+            {nothing}
+        if some(done):
+            break
+    stage = where(done, 3.0, where(active, 2.0, stage))
+    {store}
+    return some(done)
+
+
+@kept
+def run_{order}(cells, together):
+    """Each cell, a row of what ROWS names, until its last switch."""
+    each_refilled(advance_{order}, cells, together)
+'''
+
+
+@jit
+def time_unit(e, d, dd):
+    """A power of two near the time in which an event comes up: from e, e' and e''/2."""
+    e, d, dd = magnitude(e), magnitude(d), magnitude(dd)
+    by_rate, by_bend = e / d, sqrt(e / dd)
+    shorter = where(by_bend < by_rate, by_bend, by_rate)
+    t = where((shorter > 0.0) & (shorter < 1e300), shorter, where(by_rate < 1e300, by_rate, by_bend))
+    again = d / dd
+    t = where((t > 1e-300) & (t < 1e300), t, again)
+    t = where((t > 1e-300) & (t < 1e300), t, 1.0)
+    return pow2(exponent(t))
+
+
+_STARTS = (
+    ("side", "p"), ("unit", "u"), ("h", "1.0"),
+    *((name, "0.0") for name in ("time", "count", "since", "kinks_met", "steps", "before")),
+)  # fmt: skip
+
+
+def results_of(states):
+    """Names of what is known of a cell in the end."""
+    return ["time", "interval", *(f"at_{s}" for s in states), *(f"size_{s}" for s in states), "verdict"]
+
+
+def _work_of(states, kinks):
+    """Names of what a lane knows of its cell between two events, beside results."""
+    signs, ons = [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]
+    return [*states, "side", *signs, "unit", "h", *ons, "count", "since", "kinks_met", "steps", "before"]
+
+
+def _rows(states, parameters, kinks):
+    """Names of all that a lane knows."""
+    return ["stage", *parameters, "flips", "tolerance", *results_of(states), *_work_of(states, kinks)]
+
+
+def shared(states, parameters, kinks):
+    """The text that does not depend on the order."""
+    signs, e = [f"sign_{j}" for j in range(kinks)], range(1, 1 + kinks)
+    unpack = ", ".join([f"s_{s}" for s in states] + [f"(offset_{j}, factor_{j}, event_{j})" for j in (0, *e)])
+    turn = [
+        f"""\
+on_{j} = (event_{j}[0] <= 0.0) & (event_{j}[0] >= 0.0)
+back = (factor_{j} * event_{j}[1] < 0.0) | ((factor_{j} * event_{j}[1] <= 0.0) & (factor_{j} * event_{j}[2] < 0.0))
+sign_{j - 1} = where(on_{j} & back, -sign_{j - 1}, sign_{j - 1})"""
+        for j in e
+    ]
+    settled = SETTLED if kinks else SETTLED_EMPTY
+    return filled(
+        settled, signs=listed(signs), unpack=unpack, turn="\n".join(turn),
+        on=listed(f"where(on_{j}, 1.0, 0.0)" for j in e),
+    ) + filled(
+        BEGUN, states=listed(states), lasting=listed(f"{s} + 0.0 * side" for s in states), unpack=unpack,
+        also_on=", ".join(f"on[{j - 1}]" for j in e),
+    ) + f"\n\nROWS = {tuple(_rows(states, parameters, kinks))}\n"  # fmt: skip
+
+
+SETTLED_EMPTY = '''
+@jit
+def settled(state, side, parameters, unit):
+    """No kinks, no signs."""
+    return (), ()
+'''
+
+
+def advance(states, parameters, kinks, order, offset):
+    """The text of `advance_{order}` and `run_{order}`; `offset` is that of the surface, as text."""
+    signs, ons = [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]
+    rows, changed = _rows(states, parameters, kinks), ["stage", "time", "verdict", *_work_of(states, kinks)]
+    results = {name: f"memory[{rows.index(name)}][i]" for name in results_of(states)[1:-1]}
+    held = [name for name in rows if name not in results]
+    begin = [f"{s} = where(fresh, s[{j}], {s})" for j, s in enumerate(states)]
+    begin += [f"{s} = where(fresh, g[{j}], {s})" for j, s in enumerate(signs)]
+    begin += [f"{o} = where(fresh, o[{j}], {o})" for j, o in enumerate(ons)]
+    begin += [f"{r} = where(fresh, {start}, {r})" for r, start in _STARTS]
+    jump = [f"{s} = where(switches, s[{j}], {s})" for j, s in enumerate(states)]
+    jump += [f"{s} = where(switches, g[{j}], {s})" for j, s in enumerate(signs)]
+    jump += [f"{o} = where(switches, o[{j}], {o})" for j, o in enumerate(ons[1:])]
+    keep = {"interval": "since"} | {f"at_{s}": s for s in states}
+    keep |= {f"size_{s}": f"fma(magnitude(rate[{j}]), since, magnitude({s}))" for j, s in enumerate(states)}
+    return filled(
+        EVENT, order=order, load="\n".join(f"{r} = memory[{rows.index(r)}][i]" for r in held),
+        parameters=listed(parameters), begin="\n".join(begin), states=listed(states), signs=listed(signs),
+        ons=listed(ons), land="\n".join(f"{s} = where(moving, new[{j}], {s})" for j, s in enumerate(states)),
+        turn="\n".join(f"{s} = where(moving & ({o} > 0.5), -{s}, {s})" for s, o in zip(signs, ons[1:], strict=True)),
+        nothing="\n".join(["time = where(grazing, math.nan, time)",
+                           *(f"{place} = where(grazing, math.nan, {place})" for place in results.values())]),
+        keep="\n".join(f"{results[r]} = where(watched, {x}, {results[r]})" for r, x in keep.items()),
+        jump="\n".join(jump), offset=offset,
+        store="\n".join(f"memory[{rows.index(r)}][i] = {r}" for r in changed),
+    )  # fmt: skip

@@ -1,0 +1,118 @@
+"""Columns of cells followed by the Taylor method of a scene's module, and how far the result can be believed.
+
+Each step is right to a tolerance; what many steps come to depends on the scene. So a cell is followed twice, the second
+time with a tolerance FINER times smaller: the first run's error is what they differ by, the second's is about FINER
+times less, and is what is given. The first run's parameters are some roundings off (`off_by_roundings`): so what a
+scene makes of rounding, which both runs would share, is seen too.
+"""
+
+import math
+
+import numpy as np
+
+from kernels.interface import FIRST_REFUSAL, Status
+from kernels.lanes.refill import MOVING, fresh
+from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW
+
+HIGH_BELOW = 5e-10
+"""Tolerance of a step below which the higher order is the faster."""
+FINEST = 1e-25
+ROUNDING = 1e-14
+"""The least rtol that is promised, whatever the two runs agree to."""
+AT_ONCE = 8192
+"""Cells whose lanes' memory stays in a core's cache."""
+STOPS = 2.0, 4.0, math.inf
+"""Switches behind which cells are put in the order of the steps of their last two legs, from event to event."""
+ROUGH, FINER = 2.0, 16.0
+ROUNDINGS, GOLDEN = 8.0, 0.6180339887498949
+"""By how many roundings a parameter is changed at most, and what makes that differ from one to the next."""
+APART = 8.0
+"""How many rtol the two runs may differ by: the finer one is then right to rtol/2."""
+
+
+def followed(module, columns, rtol, finer=1.0, together=False):
+    """The results of a cell a column: time, interval, states, their sizes, and as the last row the status.
+
+    Parameters
+    ----------
+    columns : the parameters and the number of switches
+    rtol : tolerance of each step, a column; it chooses the order
+    finer : by how much the steps are to be better than that
+    together : lanes in lockstep, in the order of the cells
+    """
+    inputs = [*columns, np.maximum(rtol / finer, FINEST)]
+    results = np.empty((3 + 2 * len(module.STATES), len(rtol)))
+    high = rtol < HIGH_BELOW
+    for run, of_order in ((module.run_12, ~high), (module.run_18, high)):
+        cells = np.flatnonzero(of_order)
+        for begin in range(0, len(cells), AT_ONCE):
+            those = cells[begin : begin + AT_ONCE]
+            results[:, those] = _run(module, run, [column[those] for column in inputs], together)
+    return results
+
+
+def _run(module, run, inputs, together):
+    """The results of cells; those that take as many steps side by side, for so lanes wait less for each other."""
+    row = {name: j for j, name in enumerate(module.ROWS)}
+    known = slice(row["time"], row["verdict"] + 1)
+    cells, places = fresh(len(row), inputs), np.arange(len(inputs[0]))
+    whole = np.where(inputs[-2] < math.inf, inputs[-2], math.nan)  # NaN is refused, without end not followed
+    cells[:, known] = np.nan
+    results = np.empty((known.stop - known.start, len(cells)))
+    for stop in (math.inf,) if together else STOPS:
+        cells[:, row["flips"]] = np.minimum(whole, stop)
+        run(cells, together)
+        results[:, places] = cells[:, known].T
+        count, verdict, steps, before = (cells[:, row[name]] for name in ("count", "verdict", "steps", "before"))
+        going = np.flatnonzero((count >= stop) & (count < whole) & (verdict < FIRST_REFUSAL))
+        going = going[np.lexsort([key[going].astype(np.int16) for key in (steps, before)])]
+        if not len(going):
+            break
+        cells, places, whole = cells[going], places[going], whole[going]
+        cells[:, 0] = MOVING
+    return results
+
+
+def once(module, columns, rtol, outputs, status):
+    """Fills outputs and status by one run, each step right to `rtol`."""
+    results = followed(module, columns, rtol)
+    _write(results, outputs, status)
+
+
+def twice(module, columns, rtol, outputs, status, most=APART):
+    """Fills outputs and status by two runs; INACCURATE where they differ by more than the finer one could mend."""
+    rough = followed(module, off_by_roundings(columns), rtol, ROUGH)
+    fine = followed(module, columns, rtol, ROUGH * FINER)
+    _write(fine, outputs, status)
+    states = len(module.STATES)
+    scale = np.concatenate([abs(fine[:2]), np.maximum(abs(fine[2 : 2 + states]), fine[2 + states : -1])])
+    with np.errstate(all="ignore"):
+        apart = (rtol < ROUNDING) | ~(abs(fine[: len(scale)] - rough[: len(scale)]) <= most * rtol * scale).all(axis=0)
+    status[apart & (status == Status.OK)] = Status.INACCURATE
+    worse = (rough[-1] > 0) & (status <= Status.INACCURATE)
+    status[worse] = np.where(rough[-1][worse] < FIRST_REFUSAL, rough[-1][worse], Status.INACCURATE)
+
+
+def off_by_roundings(columns):
+    """The parameters, each changed by a few roundings of its own; the number of switches, the last, as it is.
+
+    Numbers of eight bits, which cannot cancel so far that it matters, and those that another one repeats are kept: a
+    start on the surface stays there.
+    """
+    *values, flips = columns
+    changed = []
+    for j, value in enumerate(values):
+        ulps = ROUNDINGS * (2.0 * ((j + 1) * GOLDEN % 1.0) - 1.0)
+        short = np.ascontiguousarray(value).view(np.int64) & (2**44 - 1) == 0
+        kept = short | np.any([abs(value) == abs(other) for k, other in enumerate(values) if k != j], axis=0)
+        changed.append(np.where(kept, value, value * (1.0 + ulps * 2.0**-52)))
+    return [*changed, flips]
+
+
+def _write(results, outputs, status):
+    for column, row in zip(outputs, results, strict=False):
+        column[...] = row
+    status[...] = results[-1]
+    sizes = abs(results[: len(outputs)])
+    normal = (sizes == 0) | ((sizes >= NORMAL_LOW) & (sizes <= NORMAL_HIGH))
+    status[~normal.all(axis=0) & (results[-1] == Status.OK)] = Status.OUT_OF_RANGE

@@ -1,0 +1,266 @@
+"""A scene as a module of compiled functions, written to a file that can be read, and whose machine code is kept.
+
+The file lies in the folder of the kernels' own machine code (`cache`), named by the scene and a digest of its text.
+"""
+
+import builtins
+import functools
+import hashlib
+import importlib.util
+import os
+import re
+import sys
+import tempfile
+import threading
+from pathlib import Path
+
+import numpy as np
+
+from kernels.codegen.driver_source import BEGUN, EVENT, SETTLED, advance, shared
+from kernels.codegen.expression import DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, needed
+from kernels.codegen.leg_source import LEG, leg
+from kernels.codegen.power_core import CORE, core
+from kernels.codegen.record import record
+from kernels.codegen.series_source import Lines
+from kernels.codegen.template import filled, listed
+from kernels.lanes import cache
+from kernels.lanes.jit import COMPILED, cached
+
+ORDERS = (12, 18)
+_BUILDING = threading.RLock()
+"""No thread may be given a module that another one is still making."""
+
+HEAD = '''
+"""{name}: {doc}
+
+Written by kernels.scene from the functions of the scene; do not change it here.
+"""
+
+import math
+
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.vectors import dot, fma, horner, isnt, magnitude, some, sqrt, where
+from kernels.lanes.refill import each_refilled
+from kernels.codegen.module import kept
+from kernels.integrate.taylor import (
+    HALVINGS, LONGEST, SLACK, STEP_LIMIT, clear, crossing, falls, keeps, last_term, mean, natural_power, next_step,
+    of_series, of_sum, rises, size, stays_apart, tail, worse,
+)
+from kernels.codegen.power_core import FAR, UNEVEN, core_time, mean_power, size_in_unit
+from kernels.codegen.driver_source import EVENTS, KINK_LIMIT, time_unit
+from kernels.maths.elementary import exp, log, power, sincos
+from kernels.interface import FIRST_REFUSAL, Status
+
+STATES = {states}
+PARAMETERS = {parameters}
+KINKS = {kinks}
+REMARK, REFUSAL, BAD_INPUT = float(Status.GRAZING), float(FIRST_REFUSAL), float(Status.BAD_INPUT)
+OUT_OF_RANGE, STICKS, STEP_LIMIT_MET = float(Status.OUT_OF_RANGE), float(Status.STICKS), float(Status.STEP_LIMIT)
+'''
+
+FUNCTION = '''
+@jit
+def {name}({arguments}):
+    """{doc}"""
+    {unpack}
+    {lines}
+    return {result}
+'''
+
+SERIES = '''
+@jit
+def series_{order}(state, side, signs, parameters, unit{also}):
+    """Taylor coefficients of each state, and (offset, factor, series) of each event; time in units."""
+    {unpack}
+    {cores}
+    {lines}
+    return {result}
+'''
+
+
+_TAKEN = set(re.findall(r"\w+", "".join((HEAD, FUNCTION, SERIES, LEG, CORE, EVENT, BEGUN, SETTLED)))) | {"n", "p", "s"}
+_NUMBERED = re.compile(r"\w*_\d+|n\d+|(at|s|end|size|bare|full|most|half|over|and_one|half_over)_\w*")
+
+
+def _apart(name):
+    """A name of a scene's as it is written: apart from those of the text itself."""
+    return f"{name}_" if name in _TAKEN or _NUMBERED.fullmatch(name) or hasattr(builtins, name) else name
+
+
+class Writer:
+    """Writes the functions of a recorded scene."""
+
+    def __init__(self, scene, recorded):
+        self.scene, self.recorded = scene, recorded
+        self.kinks = len(recorded.graph.kinks)
+        self.states, self.parameters = ([_apart(n) for n in names] for names in (scene.states, scene.parameters))
+        self.names = dict(zip((*scene.states, *scene.parameters), (*self.states, *self.parameters), strict=True))
+        self.names |= {"side": "side", ".unit": "unit"}
+        self.names |= {f".sign_{j}": f"sign_{j}" for j in range(self.kinks)}
+        self.all_unpacked = self.unpacked("state", "signs", "parameters")
+
+    def unpacked(self, *which):
+        """Statements that give what the tuples hold its names."""
+        held = {
+            "state": self.states,
+            "signs": [f"sign_{j}" for j in range(self.kinks)],
+            "parameters": self.parameters,
+        }
+        return "\n".join(f"{listed(held[name])} = {name}" for name in which if held[name])
+
+    def function(self, name, doc, expressions, arguments, single=False):
+        """A function of the values of expressions."""
+        lines = Lines(self.names)
+        values = [lines.value(x) for x in expressions]
+        return filled(
+            FUNCTION, name=name, doc=doc, arguments=", ".join(arguments),
+            unpack=self.unpacked(*(a for a in arguments if a in ("state", "signs", "parameters"))),
+            lines="\n".join(lines.text), result=values[0] if single else f"({listed(values)})",
+        )  # fmt: skip
+
+    def natural_signs(self):
+        """The side of each kink on which a state lies, one after the other."""
+        lines = Lines(self.names)
+        for j, u in enumerate(self.recorded.graph.kinks):
+            lines.text.append(f"sign_{j} = where({lines.value(u)} < 0.0, -1.0, 1.0)")
+        return filled(
+            FUNCTION, name="natural_signs", doc="1 or -1 for each kink: the side on which the state is; 1 on it.",
+            arguments="state, side, parameters", unpack=self.unpacked("state", "parameters"),
+            lines="\n".join(lines.text), result=f"({listed(f'sign_{j}' for j in range(self.kinks))})",
+        )  # fmt: skip
+
+    def underflows(self):
+        """Whether a product of numbers that are not 0 underflows."""
+        lines, lost = Lines(self.names), []
+
+        def watch(product, *factors):
+            lost.append(" & ".join([f"(magnitude({product}) < 1e-290)", *(f"(magnitude({a}) > 0.0)" for a in factors)]))
+
+        for node in needed(*self.recorded.timed, self.recorded.surface):
+            if node.kind in (MUL, HALF_SQUARE, SCALED, DIV) and all(a.kind != NUMBER for a in node.args):
+                watch(lines.value(node), *(lines.value(x) for x in node.args))
+        return filled(
+            FUNCTION, name="underflows", doc="Whether a product of numbers other than 0 loses its digits.",
+            arguments="state, side, signs, parameters, unit", unpack=self.all_unpacked, lines="\n".join(lines.text),
+            result=" | ".join(f"({text})" for text in lost) or "unit < 0.0",
+        )  # fmt: skip
+
+    def offset(self):
+        """The surface's offset, as text of parameters; 0 where that would be long."""
+        offset = self.recorded.events[0][0]
+        return self.names[offset.args[0]] if offset.kind == INPUT else "0.0"
+
+    def summed(self):
+        """The states whose rate is another state, and which."""
+        rates = zip(self.states, self.recorded.rates, strict=True)
+        return {s: self.names[r.args[0]] for s, r in rates if r.kind == INPUT and r.varies}
+
+    def seen(self):
+        """For each event the state that it watches; None where it is more than one."""
+        return [self.names[u.args[0]] if u.kind == INPUT else None for _, _, u in self.recorded.events]
+
+    def lines_given(self, given):
+        """Lines of values, of which some are known."""
+        return Lines(self.names, given=given)
+
+    def kinks_of_powers(self):
+        """For each power its kink."""
+        return [self.recorded.graph.kinks.index(x.args[0].args[1]) for x in self.recorded.graph.powers]
+
+    def series(self, order, powers=0):
+        """The text of `series_{order}`, with a core for each of so many powers."""
+        recorded = self.recorded
+        lines = Lines(self.names, dict(zip(self.scene.states, recorded.timed, strict=True)), cores=powers > 0)
+        states = [lines.coefficients(recorded.graph.series(s), order) for s in self.scene.states]
+        events = [
+            f"({lines.value(offset)}, {lines.value(factor)}, {lines.coefficients(u, order)})"
+            for offset, factor, u in recorded.events
+        ]
+        return filled(
+            SERIES, order=order, unpack=self.all_unpacked, lines="\n".join(lines.text),
+            result=f"({listed([*states, *events])})", also=", cores" if powers else "",
+            cores=listed(f"core_{i}" for i in range(powers)) + " = cores" if powers else "",
+        )  # fmt: skip
+
+    def text(self):
+        """The whole module."""
+        scene, recorded = self.scene, self.recorded
+        moving = ("state", "side", "signs", "parameters")
+        parts = [
+            filled(HEAD, name=scene.name, doc=scene.doc, states=tuple(scene.states), parameters=tuple(scene.parameters),
+                   kinks=self.kinks).lstrip(),
+            self.function("rates", "Time derivative of each state.", recorded.rates, moving),
+            self.function("surface", "Falls through 0 at the switch.", (recorded.surface,), moving, True),
+            self.natural_signs(),
+            self.function("switched", "The state behind the switch; the side then turns.", recorded.switched, moving),
+            self.function("started", "The state at the start.", recorded.started, ("side", "parameters")),
+            self.underflows(),
+            self.series(2),
+            shared(self.states, self.parameters, self.kinks),
+        ]  # fmt: skip
+        parts += [core(self, i) for i in range(len(recorded.graph.powers))]
+        for order in ORDERS:
+            parts.append(self.series(order, len(recorded.graph.powers)))
+            parts.append(
+                leg(
+                    self.states,
+                    1 + self.kinks,
+                    order,
+                    recorded.nested,
+                    self.summed(),
+                    self.seen(),
+                    self.kinks_of_powers(),
+                )
+            )
+            parts.append(advance(self.states, self.parameters, self.kinks, order, self.offset()))
+        return "\n".join(parts)
+
+
+def kept(function):
+    """A function called from Python, whose machine code is kept: its file is named by all it was made from."""
+    return cached(function) if COMPILED else _quiet(function)
+
+
+def _quiet(function):
+    """Plain Python without numpy's warnings: 1/0 is inf here as in compiled code."""
+
+    @functools.wraps(function)
+    def call(*arguments):
+        with np.errstate(all="ignore"):
+            return function(*arguments)
+
+    return call
+
+
+def build(scene):
+    """The module of the scene."""
+    text = Writer(scene, record(scene)).text()
+    return loaded("scene", scene, text)
+
+
+def loaded(kind, scene, text):
+    """The module of a text that is written for a scene."""
+    name = f"{kind}_{scene.name}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+    with _BUILDING:
+        if name not in sys.modules:
+            spec = importlib.util.spec_from_file_location(name, _written(name, text))
+            module = importlib.util.module_from_spec(spec)
+            sys.modules[name] = module
+            try:
+                spec.loader.exec_module(module)
+            except BaseException:
+                del sys.modules[name]
+                raise
+        return sys.modules[name]
+
+
+def _written(name, text):
+    """The file of that text: among the kernels' machine code, or where that cannot be, a temporary one."""
+    folder = cache.FOLDER or Path(tempfile.mkdtemp(prefix="foliot_scene_"))
+    path = folder / f"{name}.py"
+    if not path.is_file() or path.read_text() != text:
+        handle, draft = tempfile.mkstemp(dir=folder, suffix=".draft")
+        with os.fdopen(handle, "w") as file:
+            file.write(text)
+        Path(draft).replace(path)
+    return path

@@ -1,0 +1,115 @@
+"""The *core* of a power: where abs(u)^n, u a state, is a constant for a Taylor series, for it has none at u = 0.
+
+From a kink u = 0 on, u is r t, and abs(u)^n has the mean (r t)^n/(n + 1). With the mean in its place the rates' impulse
+is right for whatever n, and what is left of a state whose rate the power changes by D is, in units of time,
+    D t (t + d),  d = (D of u)/r                                                                         (1)
+for the speed between differs from the true one by less than D t, and the motion is not quite even: d, at most 1/4.
+The core ends where that is the tolerance times the state's own size; outside the series steps towards it or away from
+it by parts of the way that is left, as the radius of convergence allows.
+"""
+
+from kernels.codegen.template import filled, listed
+from kernels.lanes.jit import jit
+from kernels.lanes.vectors import magnitude, where
+from kernels.maths.elementary import power
+
+UNEVEN = 0.25
+"""d of (1), at most."""
+FAR = 1e300
+
+CORE = '''
+@jit
+def given_{i}(state, side, signs, parameters, unit, power_{i}):
+    """The rates per unit of time, with a value of power {i}."""
+    {unpack}
+    {lines}
+    return {rates}
+
+
+@jit_call
+def core_{i}(state, side, signs, parameters, unit, tolerance, leaves):
+    """The mean of power {i} in its core, -1 where the motion is not in it; and the longest step from the kink on."""
+    {unpack}
+    {value_of_n}
+    base = sign_{kink} * {u}
+    value, nothing = power(base, {n}), 0.0 * side
+    {full} = given_{i}(state, side, signs, parameters, unit, value)
+    core, longest, nears = nothing - 1.0, nothing + FAR, sign_{kink} * full_{u} < 0.0
+    if some(nears):
+        {bare} = given_{i}(state, side, signs, parameters, unit, nothing)
+        over = 1.0 / magnitude(full_{u})
+        t, d = base * over, magnitude(full_{u} - bare_{u}) * over
+        inside = nears & (d <= UNEVEN)
+        {inside}
+        core = where(inside, mean_power(value, {n}), -1.0)
+    if some(leaves):
+        {bare} = given_{i}(state, side, signs, parameters, unit, nothing)
+        {most} = given_{i}(state, side, signs, parameters, unit, nothing + 1.0)
+        room = nothing + FAR
+        {room}
+        reach = core_time(room, magnitude(bare_{u}), magnitude(most_{u} - bare_{u}), {n}, tolerance)
+        mean = mean_power(power(magnitude(bare_{u}) * reach, {n}), {n})
+        core, longest = where(leaves, mean, core), where(leaves, reach, longest)
+    return core, longest
+'''
+
+
+@jit
+def size_in_unit(u, rate):
+    """Of a state, with what it gains in a unit of time."""
+    return magnitude(u) + magnitude(rate)
+
+
+@jit
+def mean_power(last, n):
+    """The mean of what grows as t^n up to `last`."""
+    return last / (n + 1.0)
+
+
+@jit
+def core_time(room, rate, most, n, tolerance):
+    """How long u = rate t may be taken for small, by (1); at most 1 unit.
+
+    `room` is the least size of a state over what the power, were it 1, would add to its rate; `most` is that of u.
+    """
+    drag = power(rate, n)
+    whole = 0.5 * tolerance * room / drag  # D t^2 <= half the tolerance times the size
+    slow = power(_no_more_than_one(whole), 1.0 / (n + 2.0))
+    even = power(_no_more_than_one(whole * (rate / (most * drag))), 1.0 / (2.0 * n + 1.0))
+    mild = where(n > 0.0, power(_no_more_than_one(UNEVEN * (rate / (most * drag))), 1.0 / where(n > 0.0, n, 1.0)), 1.0)
+    shorter = where(slow < even, slow, even)
+    return where(shorter < mild, shorter, mild)
+
+
+@jit
+def _no_more_than_one(x):
+    return where(x < 1.0, x, 1.0)
+
+
+def core(writer, i):
+    """The text of `core_{i}` and what it calls."""
+    node = writer.recorded.graph.powers[i]
+    base, exponent = node.args
+    kink = writer.kinks_of_powers()[i]
+    states, u = writer.states, writer.names[base.args[1].args[0]]
+    lines = writer.lines_given({node: f"power_{i}"})
+    rates = [lines.value(rate) for rate in writer.recorded.timed]
+    of_n = writer.lines_given({})
+    n = of_n.value(exponent)
+    inside = [
+        f"inside = inside & (magnitude(full_{s} - bare_{s}) * (t * (t + d)) <= tolerance * size_in_unit({s}, full_{s}))"
+        for s in states
+    ]
+    room = [
+        f"""\
+share = size_in_unit({s}, bare_{s}) / magnitude(most_{s} - bare_{s})
+room = where(share < room, share, room)"""
+        for s in states
+    ]
+    return filled(
+        CORE, i=i, kink=kink, u=u, n=n, unpack=writer.all_unpacked, lines="\n".join(lines.text),
+        rates=f"({listed(rates)})",
+        value_of_n="\n".join(of_n.text), inside="\n".join(inside), room="\n".join(room),
+        bare=listed(f"bare_{s}" for s in states), full=listed(f"full_{s}" for s in states),
+        most=listed(f"most_{s}" for s in states),
+    )  # fmt: skip

@@ -1,0 +1,87 @@
+"""What a scene's functions do, recorded: the graphs of its rates, surface, switch and start."""
+
+import inspect
+from dataclasses import dataclass
+
+from kernels.codegen.expression import ADD, SCALED, Expression, Graph, SceneError
+
+RESERVED = ("side", "flips", "time", "interval", "rtol", "status")
+"""Names that a scene's states and parameters cannot have."""
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """The expressions of a scene, in one graph.
+
+    `events` are (offset, factor, u): each fires where offset + factor u falls through 0; the first is the switch, the
+    others are the kinks. `timed` are the rates per unit of time, an input ".unit" in seconds.
+    """
+
+    graph: Graph
+    rates: tuple[Expression, ...]
+    timed: tuple[Expression, ...]
+    surface: Expression
+    switched: tuple[Expression, ...]
+    started: tuple[Expression, ...]
+    events: tuple[tuple[Expression, Expression, Expression], ...]
+    nested: int
+
+
+def record(scene):
+    """Calls each function of the scene once with recording objects. Raises SceneError."""
+    graph = Graph()
+    states = {name: graph.series(name) for name in scene.states}
+    known = {name: graph.constant(name) for name in (*scene.parameters, "side")}
+    rates = _called(graph, scene.rates, states | known, len(states))
+    surface = _called(graph, scene.surface, states | known, 1)[0]
+    if not surface.varies:
+        raise SceneError("the surface does not depend on a state, so the motion never meets it")
+    switched = tuple(states.values())
+    if scene.switch is not None:
+        switched = _called(graph, scene.switch, states | known, len(states))
+    unit = graph.constant(".unit")
+    timed = tuple(graph.timed(rate, unit) for rate in rates)
+    started = _called(graph, scene.start, known, len(states))
+    kinks = [(graph.of(0.0), graph.constant(f".sign_{j}"), u) for j, u in enumerate(graph.kinks)]
+    events = (_affine(graph, surface), *kinks)
+    return Recorded(
+        graph,
+        rates,
+        timed,
+        surface,
+        switched,
+        started,
+        events,
+        _nested(events, dict(zip(states.values(), rates, strict=True))),
+    )
+
+
+def _called(graph, function, named, length):
+    """What a function of some of the named scalars returns, as expressions."""
+    wanted = inspect.signature(function).parameters
+    unknown = [name for name in wanted if name not in named]
+    if unknown:
+        raise SceneError(f"{function.__name__} asks for {unknown[0]!r}; there are {', '.join(named)}")
+    found = function(**{name: named[name] for name in wanted})
+    found = found if isinstance(found, tuple | list) else (found,)
+    if len(found) != length:
+        raise SceneError(f"{function.__name__} returns {len(found)} values instead of {length}")
+    return tuple(graph.of(value) for value in found)
+
+
+def _affine(graph, surface):
+    """offset, factor, u of a surface offset + factor u; a sum of series is its own u."""
+    offset, rest = graph.of(0.0), surface
+    if surface.kind == ADD and not all(term.varies for term in surface.args):
+        offset, rest = sorted(surface.args, key=lambda term: term.varies)
+    factor, u = rest.args if rest.kind == SCALED else (graph.of(1.0), rest)
+    return offset, factor, u
+
+
+def _nested(events, rates):
+    """The number of the kink whose u is, but for a constant factor, the rate of the surface; 0 where there is none."""
+    surface, *kinks = (u for _, _, u in events)
+    if surface not in rates:
+        return 0
+    _, rate = surface.graph.parts(rates[surface])
+    return 1 + kinks.index(rate) if rate in kinks else 0

@@ -1,0 +1,121 @@
+"""Columns of cells followed at a fixed step, and how far the result can be believed.
+
+A cell is followed three times: at its step, at less than half of it with each step made of two halves, those that end
+on an event too, and at a step between. What any two of them differ by tells the first one's error; two alone may agree
+by chance. Whole fractions of the step would see the same points of the motion again, and agree where each is as wrong,
+so the fractions are not whole. Where the run between, which is nearer to the first, differs from it by next to nothing
+of what the finest does, the differences grow as the step shrinks, and do not tell what is left: INACCURATE. Without
+location steps are not made of halves, and a switch is known to one step at best. The other runs' parameters are some
+roundings off (`off_by_roundings`), so that rounding that a scene makes worse shows too. Where the motion would turn
+round behind a switch within the error, the switch may not be there at all: GRAZING.
+"""
+
+import numpy as np
+
+from kernels.codegen.followed_twice import off_by_roundings
+from kernels.integrate.events import METHODS, MOREAU, NONE
+from kernels.interface import FIRST_REFUSAL, Status
+from kernels.lanes.refill import fresh
+from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW
+
+LOCATED, BLIND = ((0.37, 2.0), (0.77, 1.0)), ((0.23, 1.0), (0.61, 1.0))
+"""Length of the finest run's steps and of those of the run between, and how many parts a step has."""
+SAFETY = 2.0
+"""A switch found by a line or a polynomial is off by 1/(1 - 0.37) of what two runs differ by if only the order is 1."""
+GROWS = 0.1
+"""Least share of a difference in the nearer run: order 0, an error like log(step), would leave 0.15."""
+ROUNDING = 2.3e-16
+ROUNDINGS = 8.0
+"""Of the result, up to which differences are in no order."""
+UNSURE, FALLEN = 6.0, 1.3
+"""Differences in its speed there that a motion must have left behind a switch, and how often the margin, which goes
+with the speed's square, must be what it has fallen by to the finest run."""
+GRAZING = 1e-9
+"""Of an event's value at the start of a step: how close to 0 it may turn round in it unremarked."""
+
+
+def followed(module, method, columns, step, location, parts=1.0):
+    """A column per cell of: time, interval, states, their reach, margin behind a switch, steps, calls, status.
+
+    Parameters
+    ----------
+    columns : the parameters and the number of switches
+    step, location : columns
+    parts : of a step
+    """
+    results = np.full((6 + 2 * len(module.STATES), len(step)), np.nan)
+    for way in np.unique(location):
+        cells = location == way
+        extra = (step, GRAZING, METHODS.index(method), way, parts)
+        rows = [np.broadcast_to(c, step.shape)[cells] for c in (*columns, *extra)]
+        table = fresh(len(module.ROWS), rows)
+        module.run(table, False)
+        results[:, cells] = table[:, 1 + len(rows) : 1 + len(rows) + len(results)].T
+    return results
+
+
+def solved(module, method, columns, step, location):
+    """The first run, a row for its estimated relative error, and the status.
+
+    Returns
+    -------
+    results : as `followed` gives, but margin and status
+    error, status
+    """
+    blind = (location == NONE) | (METHODS.index(method) == MOREAU)
+    first = followed(module, method, columns, step, location)
+    finest, between = _again(module, method, off_by_roundings(columns), step, location, blind)
+    error, unsure, grows = _compared(first, finest, between, len(module.STATES))
+    with np.errstate(all="ignore"):
+        error = np.where(blind, np.maximum(error, step / first[1]), error)
+    status = _status(first, finest, between)
+    known = (finest[-1] < FIRST_REFUSAL) & (between[-1] < FIRST_REFUSAL)
+    status = np.where((status < Status.GRAZING) & unsure & known, Status.GRAZING, status)
+    status = np.where((status == Status.OK) & grows & known, Status.INACCURATE, status)
+    error = np.where(status < FIRST_REFUSAL, np.where(known & (error < np.inf), error, np.inf), np.nan)
+    return np.delete(first, (-4, -1), axis=0), error, status
+
+
+def _again(module, method, columns, step, location, blind):
+    """The finest run and the one between."""
+    runs = []
+    for ways in zip(LOCATED, BLIND, strict=True):
+        run = np.full((6 + 2 * len(module.STATES), len(step)), np.nan)
+        for cells, (length, parts) in zip((~blind, blind), ways, strict=True):
+            if cells.any():
+                some = [np.broadcast_to(c, step.shape)[cells] for c in columns]
+                run[:, cells] = followed(module, method, some, length * step[cells], location[cells], parts)
+        runs.append(run)
+    return runs
+
+
+def _compared(first, finest, between, states):
+    """The error, whether the last switch may not be there, and whether differences grow as the step shrinks."""
+    with np.errstate(all="ignore"):
+        ends, near, far = (
+            _apart(one, other, finest, states) for one, other in ((first, finest), (first, between), (between, finest))
+        )
+        of_switch, of_all = np.max((ends, near, far), axis=0)
+        fallen = np.maximum(first[-4], between[-4]) - finest[-4]
+        unsure = finest[-4] <= np.maximum((UNSURE * of_switch) ** 2, FALLEN * fallen)
+        rounding = ROUNDING * np.sqrt(first[-3])
+        grows = (near[1] < GROWS * ends[1]) & (of_all > ROUNDINGS * rounding)
+        return SAFETY * of_all + rounding, unsure, grows
+
+
+def _apart(one, other, finest, states):
+    """The largest relative difference of time, interval and states at the switch; the same with the states' reach."""
+    scale = np.concatenate([abs(finest[:2]), finest[2 + states : 2 + 2 * states]])
+    switch = (abs(one - other)[: len(scale)] / scale).max(axis=0)
+    reach = (abs(one - other)[2 + states : 2 + 2 * states] / scale[2:]).max(axis=0)
+    return switch, np.maximum(switch, reach)
+
+
+def _status(first, finest, between):
+    status = first[-1].astype(np.int8)
+    for other in (finest, between):
+        remark = other[-1] * (other[-1] < FIRST_REFUSAL)
+        status = np.where(status == Status.OK, remark, status)
+    sizes = abs(first[:-4])
+    normal = ((sizes == 0) | ((sizes >= NORMAL_LOW) & (sizes <= NORMAL_HIGH))).all(axis=0)
+    return np.where((status < FIRST_REFUSAL) & ~normal, Status.OUT_OF_RANGE, status)

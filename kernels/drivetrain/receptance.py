@@ -1,0 +1,140 @@
+"""Drivetrain: how far one inertia turns for a torque at another, against frequency.
+
+A chain of n inertias, J_1 -k_1- J_2 - ... - J_n -k_n- ground, each spring with a damper h_j beside it. For a torque
+exp(i w t) at `drive_mass` the angle at `read_mass` is H exp(i w t), with
+    (-w^2 J + i w h + k) H = unit torque,  w = 2 pi frequency,                                          (1)
+J diagonal, k and h tridiagonal. The answer to a torque of any size is that times H. k_n = 0 leaves the end free.
+Leaves out: backlash, solid friction, damping that is not viscous. Source: the drivetrain of a milling machine after
+Rivin; how (1) is solved, and the bound by which a cell is called INACCURATE, is told in `_chain_receptance`.
+
+rtol is of abs(dH)/abs(H) at every frequency: the phase is right to it in radian, the decibel to 8.7 times it.
+An undamped resonance, or 0 Hz without a spring to ground, is OUT_OF_RANGE: there H is infinite.
+"""
+
+import math
+
+import numpy as np
+
+from kernels.drivetrain import _chain_receptance
+from kernels.drivetrain._chain import refusal as chain_refusal
+from kernels.drivetrain._chain_frequencies import row_at
+from kernels.interface import Field, Kernel, Method, Status
+from kernels.lanes.columns import entry_of_cells, one_by_one
+from kernels.lanes.groups import GROUP
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.vectors import nearest, where
+from kernels.maths import complex
+from kernels.maths.elementary import is_normal, log
+
+_OK, _INACCURATE = float(Status.OK), float(Status.INACCURATE)
+_BAD_INPUT, _OUT_OF_RANGE = float(Status.BAD_INPUT), float(Status.OUT_OF_RANGE)
+_TWO_PI, _DB = 2.0 * math.pi, 20.0 / math.log(10.0)
+
+
+@jit_call
+def _write(i, j, lanes, values, output, rows):
+    """output[i, j ...] = values of the lanes that are frequencies."""
+    rows[row_at(0)] = values
+    for lane in range(lanes):
+        output[i, j + lane] = rows[lane]
+
+
+@jit_call
+def _group(i, j, J, k, h, drive, read, frequency, outputs, rows):
+    """Outputs at frequencies j ... j + GROUP - 1 of a cell; the largest error of them, inf where there is none."""
+    n, lanes = J.shape[1], min(GROUP, frequency.size - j)
+    for lane in range(GROUP):
+        rows[lane] = frequency[min(j + lane, frequency.size - 1)]
+    omega = rows[row_at(0)] * _TWO_PI
+    re, im, error = _chain_receptance.receptance(n, J[i], k[i], h[i], omega, drive, read, row_at, rows)
+    amplitude = complex.modulus(re, im)
+    sound = is_normal(amplitude)
+    _write(i, j, lanes, re, outputs[0], rows)
+    _write(i, j, lanes, im, outputs[1], rows)
+    _write(i, j, lanes, amplitude, outputs[2], rows)
+    _write(i, j, lanes, complex.argument(re, im), outputs[3], rows)
+    _write(i, j, lanes, _DB * log(where(sound, amplitude, 1.0)), outputs[4], rows)
+    rows[row_at(0)] = where(sound, error, math.inf)
+    largest = 0.0
+    for lane in range(lanes):
+        largest = max(largest, rows[lane])
+    return largest
+
+
+@jit
+def _cell(i, J, k, h, drive, read, rtol, frequency, re, im, amplitude, phase, decibel, status, rows):
+    outputs, error = (re, im, amplitude, phase, decibel), 0.0
+    for j in range(0, frequency.size, GROUP):
+        error = max(error, _group(i, j, J, k, h, int(drive[i]), int(read[i]), frequency, outputs, rows))
+    status[i] = where(error <= rtol[i], _OK, where(error < math.inf, _INACCURATE, _OUT_OF_RANGE))
+
+
+@entry_of_cells
+def continued(
+    J, k, h, drive_mass, read_mass, rtol, frequency,
+    receptance_re, receptance_im, amplitude, phase, amplitude_dB, status,
+):  # fmt: skip
+    """Both ends followed to the inertia that is turned, GROUP frequencies at a time: they share their chain."""
+    rows = np.empty(3 * J.shape[1] * GROUP)
+    outputs = receptance_re, receptance_im, amplitude, phase, amplitude_dB
+    one_by_one(_cell, (J, k, h, drive_mass, read_mass, rtol, frequency, *outputs, status, rows))
+
+
+@jit
+def _names_a_mass(number, n):
+    return (number >= 1.0) & (number <= n) & (number == nearest(number))
+
+
+@jit
+def _check(i, J, k, h, drive, read, status):
+    n = J.shape[1]
+    sound = _names_a_mass(drive[i], n) & _names_a_mass(read[i], n)
+    status[i] = where(sound, chain_refusal(n, J[i], k[i], h[i]), _BAD_INPUT)
+
+
+@entry_of_cells
+def check(J, k, h, drive_mass, read_mass, status):
+    """BAD_INPUT where an inertia or spring is not positive (the last spring may be 0), a damper negative, no such mass.
+
+    OUT_OF_RANGE where inertias, or springs, are more than 2^300 apart.
+    """
+    one_by_one(_check, (J, k, h, drive_mass, read_mass, status))
+
+
+PARAMETERS = (
+    Field("J", "kg m^2", "inertias, from the free end on", lower=0.0, open_lower=True, dims=("mass",)),
+    Field(
+        "k", "N m/rad", "springs behind each inertia; only the last one, to ground, may also be 0",
+        lower=0.0, open_lower=True, dims=("mass",),
+    ),
+    Field("h", "N m s/rad", "dampers beside the springs", lower=0.0, dims=("mass",)),
+)  # fmt: skip
+
+MILLING_MACHINE = {
+    "J": (0.2520, 0.01226, 0.002785, 0.007541, 0.01422, 0.06374, 0.9414, 0.9752),
+    "k": (73844.0, 37167.0, 8228.0, 13455.0, 39325.0, 27459.0, 51485.0, 11690.0),
+    "h": (1.765, 0.4119, 0.1863, 0.3628, 0.9561, 1.834, 7.061, 127.5),
+}
+"""Drive of a milling machine, spindle first (Baran & Marchelek, Mech. Teor. Stos. 9:201 (1971), table 1, in SI)."""
+
+DRIVETRAIN_FRF = Kernel(
+    name="drivetrain_frf",
+    doc="angle of one inertia of a drivetrain per torque at another, against frequency",
+    source="drivetrain of a milling machine after Rivin; solution and error bound derived in `_chain_receptance`",
+    parameters=(
+        *PARAMETERS,
+        Field("drive_mass", "1", "number of the inertia with the torque", 1.0, lower=1.0, upper=64.0, integer=True),
+        Field("read_mass", "1", "number of the inertia whose angle is told", "drive_mass", 1.0, 64.0, integer=True),
+    ),
+    outputs=(
+        Field("receptance_re", "rad/(N m)", "receptance, real part", dims=("frequency",)),
+        Field("receptance_im", "rad/(N m)", "receptance, imaginary part", dims=("frequency",)),
+        Field("amplitude", "rad/(N m)", "modulus of the receptance", dims=("frequency",)),
+        Field("phase", "rad", "angle of the receptance, in [-pi, pi): negative where it lags", dims=("frequency",)),
+        Field("amplitude_dB", "1", "amplitude over 1 rad/(N m), in decibel", dims=("frequency",)),
+    ),
+    check=check,
+    methods=(Method("continued", "the chain followed from both ends at each frequency", continued),),
+    along=(Field("frequency", "Hz", "frequency of the torque", lower=0.0),),
+    example=MILLING_MACHINE,
+)

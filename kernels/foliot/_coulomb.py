@@ -1,0 +1,94 @@
+"""Limit cycle of the foliot with viscous and Coulomb friction: one transcendental equation.
+
+With u = a v/mu just before the switch, rho = R/mu, k = a^2 phi0/mu = d^2 and z = -ln(1 - u/(1 - rho)), x = u/(1 + rho),
+    2 k = (1 - rho)(z - 1 + e^-z) - (1 + rho)(x - ln(1 + x))                                         (1)
+    a P/2 = tau = z + ln(1 + x),  A = 1 + (1 + rho)(x - ln(1 + x))/k                                 (2)
+    multiplier = e^-tau (1 - rho)/(1 + rho)                                                          (3)
+(1) cancels at strong drive. With M3 = z - y - y^2/2, y = 1 - e^-z, and L3 = ln(1 + x) - x + x^2/2 it is a sum,
+    2 k = rho u^2/(1 - rho^2) + (1 - rho) M3 + (1 + rho) L3,                                         (4)
+and so is the sensitivity, from the derivatives of (1) and (2) by mu at fixed a, R, phi0:
+    s = (2 rho^3 u^2/(1 - rho^2)^2 + M3 + L3)/((rho + u) u tau).                                     (5)
+Derived here from the general law of friction; scene and cycle as in `_units`.
+"""
+
+from kernels.foliot._single_loss import dry as dry_cycle
+from kernels.interface import Status
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.vectors import choose, fma, magnitude, some, sqrt, where
+from kernels.maths.elementary import cbrt, exp, expm1, log1p, log_remainder, log_remainder3
+
+HALLEY_LIMIT = 40
+ROUNDING = 4e-15
+"""What period, amplitude, speed and sensitivity are right to."""
+_FAINT = 1e-100
+"""Viscous friction d below which it changes no digit, provided Coulomb friction is not faint too."""
+_FAINT_COULOMB = 1e-55
+
+_OK, _OUT_OF_RANGE, _NOT_CONVERGED = float(Status.OK), float(Status.OUT_OF_RANGE), float(Status.NOT_CONVERGED)
+
+
+@jit
+def _parts(z, rho, slack):
+    """u, x, M3 and L3 of (4)."""
+    y = -expm1(-z)
+    u = slack * y
+    x = u / (1.0 + rho)
+    small = y < 0.5
+    m3 = where(small, -log_remainder3(where(small, -y, 0.0)), z - fma(0.5 * y, y, y))
+    return u, x, m3, log_remainder3(x)
+
+
+@jit
+def _start(double_k, rho, slack):
+    """z within a factor of 2: (4) is A z^2 + B z^3 for small z, slack (z - 3/2) + ... for large z."""
+    square = slack * rho / (1.0 + rho)
+    share = slack / (1.0 + rho)
+    cube = slack * fma(share, share, 1.0) * (1.0 / 3.0)
+    by_cube = cbrt(double_k / cube)
+    by_square = sqrt(double_k / where(square > 1e-200, square, 1e-200))
+    strong = where(by_square < by_cube, by_square, by_cube)
+    return where(strong < 1.5, strong, double_k / slack + 1.0)
+
+
+@jit
+def _root(double_k, rho, slack):
+    """z of (4) by Halley's steps, and where they have not settled."""
+    z = _start(double_k, rho, slack)
+    active = z > 0.0
+    for _ in range(HALLEY_LIMIT):
+        if not some(active):
+            break
+        u, _, m3, l3 = _parts(z, rho, slack)
+        miss = rho * u * u / (slack * (1.0 + rho)) + slack * m3 + (1.0 + rho) * l3 - double_k
+        below = 1.0 / (1.0 + rho + u)
+        slope = 2.0 * (rho + u) * u * below
+        bend = (2.0 * (rho + 2.0 * u) - slope) * below * (slack - u)
+        step = 2.0 * miss * slope / (2.0 * slope * slope - miss * bend)
+        step = where(step < 0.9 * z, step, 0.9 * z)
+        z = where(active, z - step, z)
+        active = active & (magnitude(step) > 1e-8 * z)  # cubic: the step just made was the last
+    return z, active
+
+
+@jit
+def _viscous_and_coulomb(d, rho, slack):
+    double_k = 2.0 * d * d
+    z, unsettled = _root(double_k, rho, slack)
+    u, x, m3, l3 = _parts(z, rho, slack)
+    tau = z + log1p(x)
+    top = 1.0 + 2.0 * (1.0 + rho) * log_remainder(x) / double_k
+    share = rho / (slack * (1.0 + rho))
+    s = (2.0 * rho * (share * u) * (share * u) + m3 + l3) / ((rho + u) * u * tau)
+    return (tau / d, top, u / d, s, exp(-tau) * slack / (1.0 + rho)), unsettled
+
+
+@jit_call
+def limit_cycle(scene):
+    """The cycle, and its verdict."""
+    d, rho, _, _, _, _, _, slack = scene
+    dry = d < _FAINT
+    cycle, unsettled = _viscous_and_coulomb(where(dry, 1.0, d), rho, slack)
+    alone = dry_cycle(where(rho > _FAINT_COULOMB, rho, 0.5), slack)
+    verdict = where(unsettled, _NOT_CONVERGED, _OK)
+    verdict = where(dry, where(rho > _FAINT_COULOMB, _OK, _OUT_OF_RANGE), verdict)
+    return choose(dry, alone, cycle), verdict

@@ -1,0 +1,206 @@
+"""The half swing of a foliot with linear terms only, and its limit cycle: exact pieces of `linear_flow`.
+
+    x'' = -torque - d x' - rho sgn x' - kappa x,  beta = d/2                                         (1)
+From the switch at x = +1 with speed u the mass first rises (leg 1, only for u > 0) to the turning point A, then falls
+(leg 2) to x = -1, where it arrives with speed v:
+    A = 1 + u S1 - g1 C1,  g1 = torque + rho + kappa;  A + 1 = g2 C2,  v = g2 S2,  g2 = torque - rho + kappa A.   (2)
+With E = v^2/2 the half swing maps E_0 to E_1. The phase area gives its slope, the work its increase,
+    dE_1/dE_0 = exp(-d T) g2/(torque + rho + kappa A),                                               (3)
+    E_1 - E_0 = 2 torque - 2 rho A - d (J1 + J2),  J = integral of v^2 over a leg.                    (4)
+The loss on the right of (4) grows strictly with the swing, so there is one limit cycle where a start from rest at the
+switch comes through, and none elsewhere. Units: see `_units`. Derived here.
+"""
+
+from kernels.integrate import linear_flow
+from kernels.interface import Status
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.vectors import fma, isnt, magnitude, some, sqrt, where
+from kernels.maths.elementary import exp, expm1
+
+NEWTON_LIMIT = 100
+"""Newton steps or bisections on the map of E; about eight are usual."""
+_ULPS = 4.5e-16
+"""Relative error of the terms that s is summed of in the end: found up to 2.4e-16 of their own terms."""
+_STIFFEST = 1e60
+"""Viscous friction d beyond which its powers leave float64."""
+ROUNDING = 2e-15
+"""Relative error of one half swing: of time, amplitude, speed and of the terms of (4)."""
+
+_OK, _NOT_CONVERGED, _INACCURATE = float(Status.OK), float(Status.NOT_CONVERGED), float(Status.INACCURATE)
+_NO_METHOD = float(Status.NO_METHOD)
+_STICKS, _NOT_SELF_STARTING = float(Status.STICKS), float(Status.NOT_SELF_STARTING)
+
+
+@jit_call
+def half_swing(torque, scene, start):
+    """From x = 1 with speed `start`, outward if positive, else inward, to x = -1.
+
+    Returns
+    -------
+    time, top, speed : until the switch, largest x, speed at the switch
+    comes : whether the switch is reached
+    legs : what the derivatives need of each leg
+    """
+    d, rho, _, _, _, kappa, _, slack = scene
+    beta = 0.5 * d
+    up = where(start > 0.0, start, 0.0)
+    g1 = torque + rho + kappa
+    t1 = linear_flow.first_reversal(beta, kappa, where(up > 0.0, up, 1.0), -g1)
+    t1 = where(up > 0.0, t1, 0.0)
+    s1, c1, slope1 = linear_flow.response(beta, kappa, t1)
+    rise = fma(up, s1, -g1 * c1)
+    top = 1.0 + rise
+    down = where(start < 0.0, -start, 0.0)
+    g2 = (torque - 1.0) + slack + kappa * top
+    t2 = linear_flow.first_crossing(beta, kappa, down, g2, 2.0 + rise)
+    comes = t2 < 1e300
+    t2 = where(comes, t2, 0.0)
+    s2, c2, slope2 = linear_flow.response(beta, kappa, t2)
+    speed = fma(down, slope2, g2 * s2)
+    return t1 + t2, top, speed, comes, (t1, s1, c1, slope1, g1, t2, s2, c2, slope2, g2, down)
+
+
+@jit
+def _losses(scene, legs, top):
+    """d (J1 + J2) of (4) after a rise from x = 1; leg 1 is taken backwards from its turning point."""
+    d, rho, _, _, _, kappa, _, _ = scene
+    t1, t2, g2 = legs[0], legs[5], legs[9]
+    back = 1.0 + rho + kappa * top
+    return d * (back * back * linear_flow.loss(-0.5 * d, kappa, t1) + g2 * g2 * linear_flow.loss(0.5 * d, kappa, t2))
+
+
+@jit
+def _area(scene, time, top, legs):
+    """dE_1/dE_0 by (3), and 1 minus e^2 times it, with its digits where that is small."""
+    d, rho, _, _, _, kappa, e, _ = scene
+    back = 1.0 + rho + kappa * top
+    rises = e > 0.0
+    ratio = where(rises, legs[9] / back, 1.0)
+    shrink = where(rises, 2.0 * rho / back, 0.0)  # 1 - ratio
+    lost = (1.0 - e) * (1.0 + e)
+    kept = -expm1(-d * time)
+    rest = lost + e * e * (kept + (1.0 - kept) * shrink)
+    return exp(-d * time) * ratio, rest
+
+
+@jit
+def _end(scene, legs):
+    """Acceleration along the drive on arrival at the switch."""
+    _, _, _, _, _, _, s2, _, slope2, g2, down = legs
+    return fma(g2, slope2, -down * fma(scene[0], slope2, scene[5] * s2))
+
+
+@jit_call
+def _turn(scene, energy):
+    """One half swing from the energy E before the switch: E_1 - E, and what belongs to it.
+
+    E_1 - E is a difference of speeds where the swing forgets its start (weak drive), and the balance (4) where it
+    hardly changes (strong drive).
+    """
+    _, rho, _, _, _, _, e, _ = scene
+    time, top, speed, comes, legs = half_swing(1.0, scene, e * sqrt(2.0 * energy))
+    after = 0.5 * speed * speed
+    balanced = (after > 2.0) & (e > 0.0)
+    work = 2.0 - 2.0 * rho * top - _losses(scene, legs, top) - (1.0 - e) * (1.0 + e) * energy
+    noise = ROUNDING * where(balanced, 4.0, after + energy + (1.0 + top) * magnitude(_end(scene, legs)))
+    return where(balanced, work, after - energy), noise, balanced, time, top, speed, comes, legs
+
+
+@jit_call
+def _variation(scene, swing, start, dstart, dmu):
+    """Changes of E_1 and of the time of one half swing with the speed after the switch and with the torque.
+
+    Returns
+    -------
+    gain, time : the changes
+    sizes : of gain and time, the sum of the sizes of their terms, whose rounding they inherit
+    """
+    d, rho, _, _, _, kappa, e, _ = scene
+    balanced, top, speed, legs = swing
+    t1, s1, c1, slope1, _, t2, s2, c2, slope2, g2, _ = legs
+    rises = e > 0.0
+    back, by_mu = 1.0 + rho + kappa * top, magnitude(dmu)
+    dtop = where(rises, fma(s1, dstart, -c1 * dmu), 0.0)
+    dt1 = where(rises, fma(slope1, dstart, -s1 * dmu) / back, 0.0)
+    of_top = where(rises, magnitude(s1 * dstart) + magnitude(c1 * dmu), 0.0)
+    of_t1 = where(rises, (magnitude(slope1 * dstart) + magnitude(s1 * dmu)) / back, 0.0)
+    ddown = where(rises, 0.0, dstart)
+    dg = fma(kappa, dtop, dmu)  # of the push at both sides of the turning point
+    of_g = fma(kappa, of_top, by_mu)
+    dt2 = (dtop - c2 * dg - s2 * ddown) / speed
+    of_t2 = (of_top + magnitude(c2) * of_g + magnitude(s2 * ddown)) / speed
+    dspeed = fma(slope2, ddown, fma(s2, dg, _end(scene, legs) * dt2))
+    of_speed = magnitude(slope2 * ddown) + magnitude(s2) * of_g + magnitude(_end(scene, legs)) * of_t2
+    of_g1, of_g2 = 2.0 * back * linear_flow.loss(-0.5 * d, kappa, t1), 2.0 * g2 * linear_flow.loss(0.5 * d, kappa, t2)
+    dloss1, dloss2 = of_g1 * dg + start * start * dt1, of_g2 * dg + speed * speed * dt2
+    work = start * dstart + 2.0 * dmu - 2.0 * rho * dtop - d * (dloss1 + dloss2)
+    of_loss = magnitude(of_g1 + of_g2) * of_g + start * start * of_t1 + speed * speed * of_t2
+    of_work = start * magnitude(dstart) + 2.0 * by_mu + 2.0 * rho * of_top + d * of_loss
+    gain, of_gain = where(balanced, work, speed * dspeed), where(balanced, of_work, speed * of_speed)
+    return gain, dt1 + dt2, (of_gain, of_t1 + of_t2)
+
+
+@jit
+def _sensitivity(scene, energy, swing, time, rest):
+    """-dlnP/dlnmu of the fixed point E_1(E, mu) = E; the sizes of its terms, and of the terms of those."""
+    start = magnitude(scene[6]) * sqrt(2.0 * energy)
+    gain_by_mu, time_by_mu, (of_gain, of_time) = _variation(scene, swing, start, 0.0 * start, 0.0 * start + 1.0)
+    _, time_by_start, (_, of_slope) = _variation(scene, swing, start, 0.0 * start + 1.0, 0.0 * start)
+    by_gain = magnitude(scene[6]) / sqrt(2.0 * energy) / rest
+    chain = time_by_start * (by_gain * gain_by_mu)
+    of_chain = magnitude(time_by_start) * (by_gain * of_gain) + of_slope * (by_gain * magnitude(gain_by_mu))
+    return -(time_by_mu + chain) / time, (magnitude(time_by_mu) + magnitude(chain)) / time, (of_time + of_chain) / time
+
+
+@jit
+def _search(scene):
+    """The energy before the switch on the cycle, by Newton from rest there, and the cells that have not settled.
+
+    A half swing's gain falls with E: where it is positive is a lower end of the bracket, where negative an upper one.
+    """
+    energy = 0.0 * scene[0]
+    low, high = energy, energy + 1e308
+    active = energy < 1.0
+    comes = active
+    for _ in range(NEWTON_LIMIT):
+        if not some(active):
+            break
+        gain, noise, _, time, top, _, through, legs = _turn(scene, energy)
+        comes = comes & (through | isnt(active))
+        active = active & through
+        _, rest = _area(scene, time, top, legs)
+        low, high = where(gain > 0.0, energy, low), where(gain > 0.0, high, energy)
+        guess = energy + gain / rest
+        guess = where((guess >= low) & (guess <= high), guess, 0.5 * (low + high))
+        change = magnitude(guess - energy)
+        settled = (change <= 1e-10 * energy) | (change * rest <= noise)
+        energy = where(active, guess, energy)
+        active = active & isnt(settled)
+    return energy, comes, active
+
+
+@jit_call
+def limit_cycle(scene, rtol):
+    """The cycle, and its verdict."""
+    d, _, rho_s, _, _, kappa, e, slack = scene
+    energy, comes, unsettled = _search(scene)
+    _, noise, balanced, time, top, speed, _, legs = _turn(scene, energy)
+    area, rest = _area(scene, time, top, legs)
+    s, terms, of_terms = _sensitivity(scene, energy, (balanced, top, speed, legs), time, rest)
+    loose = noise / (rest * energy) + ROUNDING * (1.0 + (1.0 + top) / (speed * time))
+    loose_s = fma(2.0 * loose, terms, _ULPS * of_terms) / magnitude(s)
+    loose_m = loose + where(area > 1e-300, 0.3 * ROUNDING * d * time, 0.0)
+    verdict = where(_self_starting(d, kappa, slack, rho_s), _OK, _NOT_SELF_STARTING)
+    verdict = where((loose_s <= rtol) & (loose_m <= rtol), verdict, _INACCURATE)
+    verdict = where(unsettled, _NOT_CONVERGED, verdict)
+    passes = (e < 0.0) | (1.0 + kappa * top > rho_s)  # for e < 0 nothing comes to rest at the switch
+    verdict = where(comes & (energy > 0.0) & passes, verdict, _STICKS)
+    verdict = where(d < _STIFFEST, verdict, _NO_METHOD)
+    return (time, top, sqrt(2.0 * energy), s, e * e * area), verdict
+
+
+@jit
+def _self_starting(d, kappa, slack, rho_s):
+    """Whether the motion from rest at x = 0 reaches the switch at x = 1."""
+    none = 0.0 * d
+    return (rho_s < 1.0) & (linear_flow.reach(0.5 * d, kappa, none, slack) > 1.0)

@@ -1,0 +1,83 @@
+"""The foliot followed by textbook integrators at a fixed step: what the step and a switch found late do to the period.
+
+    phi'' = +-mu - a phi' - R sign phi' - c phi' abs(phi') - k phi,  speed times e where +-phi passes phi0    (1)
+
+From rest at the centre, through `flips` switches. The methods are euler, semi_implicit, verlet, rk4, dopri5, dop853 and
+moreau, `location` says where in a step a switch, or a place of rest, is taken to be (`events`). Everything is done
+twice more with finer steps: the first run's values are given, and what the three differ by tells their `error`, which
+is also what a method states as its bound. INACCURATE: the step is too coarse for that.
+STEP_LIMIT: no switch in 20 000 steps, as where a method takes too much energy, or chatters about a place of rest.
+OUT_OF_RANGE: the method blew up.
+"""
+
+from kernels.interface import Field, Kernel, Status
+from kernels.scene import Scene, _check, _signed, sign
+from kernels.stepping import WORK, stepping_fields, stepping_methods
+
+
+def rates(angle, speed, side, mu, a, R, c, k):
+    return speed, side * mu - a * speed - R * sign(speed) - c * speed * abs(speed) - k * angle
+
+
+def surface(angle, side, phi0):
+    return phi0 - side * angle
+
+
+def switch(angle, speed, e):
+    return angle, e * speed
+
+
+def start():
+    return 0.0, 0.0
+
+
+SCENE = Scene(
+    "foliot_steps", "foliot", ("angle", "speed"), ("mu", "phi0", "a", "R", "c", "k", "e"), rates, surface, start, switch
+)
+
+PARAMETERS = (
+    Field("mu", "rad/s^2", "drive torque per moment of inertia", lower=0.0, open_lower=True),
+    Field("phi0", "rad", "angle at which the drive switches", lower=0.0, open_lower=True),
+    Field("a", "1/s", "viscous friction per moment of inertia", default=0.0, lower=0.0),
+    Field("R", "rad/s^2", "Coulomb friction per moment of inertia", default=0.0, lower=0.0),
+    Field("c", "1", "quadratic drag per moment of inertia", default=0.0, lower=0.0),
+    Field("k", "1/s^2", "hairspring stiffness per moment of inertia", default=0.0, lower=0.0),
+    Field("e", "1", "restitution of the speed at the switch", default=1.0, lower=-1.0, upper=1.0, open_lower=True),
+    *stepping_fields(),
+)
+
+OUTPUTS = (
+    Field("period", "s", "twice the time between the last two switches"),
+    Field("time", "s", "time of the last switch"),
+    Field("amplitude", "rad", "largest angle since the switch before the last"),
+    Field("crossing_speed", "rad/s", "speed just before the last switch"),
+    *WORK,
+)
+
+
+def _fill(time, interval, states, reach, columns):
+    """The outputs but those of the work."""
+    period, last, amplitude, crossing_speed = columns
+    period[:], last[:], amplitude[:], crossing_speed[:] = 2.0 * interval, time, reach[0], abs(states[1])
+
+
+def _check_columns(*columns):
+    """As of every scene; and NEVER_STARTS where the drive cannot overcome dry friction."""
+    _limits(*columns)
+    mu, _, _, R, *_, status = columns
+    status[(status == Status.OK) & (mu <= R)] = Status.NEVER_STARTS
+
+
+_limits = _check(PARAMETERS)
+check = _signed(_check_columns, [*(f.name for f in PARAMETERS), "status"])
+
+FOLIOT_STEPS = Kernel(
+    name="foliot_steps",
+    doc="foliot followed at a fixed step by textbook integrators",
+    source="as of the kernel foliot; the methods of Hairer, Norsett & Wanner, Moreau and Henon",
+    parameters=PARAMETERS,
+    outputs=OUTPUTS,
+    check=check,
+    methods=stepping_methods(SCENE, PARAMETERS, OUTPUTS, _fill),
+    example={"mu": 1.0, "phi0": 1.0, "a": 0.5, "flips": 2.0, "step": 0.05},
+)

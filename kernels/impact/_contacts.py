@@ -1,0 +1,199 @@
+"""Contacts of the impact clock: when the next one comes, what it does, and how it carries small changes along.
+
+All in the units of `_units`, in the frame of the pallet that holds the wheel (the upper one; for the lower one
+y -> -y, x -> x - 1/2). With the lever's slope l (1 where it is flat, -1 at the pallet across) a gap x - l y - ... obeys
+    gap'' = 1 - c w^2                                                                                  (1)
+in flight, so every time of meeting is a root of a parabola. An impact with the speed of closing s = V - l w gives
+    V -> V - (1 + e) s pallet/(pallet + wheel l^2),  w -> w + l (1 + e) s wheel/(pallet + wheel l^2)    (2)
+(momentum V + w/(kappa l) is kept, the speed of closing becomes -e s) and takes (1 - e^2) s^2 pallet/2 from the energy
+of bodies of mass 1 and 1/kappa, at l^2 = 1. Under a flat lever bounces with closing speeds s1, e s1, ... end after
+    t = 2 s1/(1 - e)                                                                                   (3)
+in lasting contact: in that time the common centre, of speed W = wheel V + pallet w, falls freely with `wheel`, the
+share of the torque in both bodies, and the gap is never wider than s1^2/2. In contact both go on with that.
+A *motion* is the tuple (y, V, w). *Slopes* are an array of 5 rows, the changes of x, y, V, w and of the time, and 3
+columns, by gap, V and w at the beginning of the half swing.
+"""
+
+import math
+
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.vectors import magnitude, sqrt
+
+
+@jit
+def meets(gap, closing, pull):
+    """First t >= 0 with gap = closing t + pull t^2/2, for gap >= 0; inf if there is none."""
+    square = closing * closing + 2.0 * pull * gap
+    if not (square >= 0.0):
+        return math.inf
+    if closing > 0.0:
+        return 2.0 * gap / (closing + sqrt(square))
+    return (sqrt(square) - closing) / pull if pull > 0.0 else math.inf
+
+
+@jit
+def meets_either(gap, rate, bend):
+    """First meeting of a gap in [-1, 0]: the tooth reaches the pallet, or falls back on it by a pitch; and which."""
+    gap = max(min(gap, 0.0), -1.0)
+    ahead = meets(-gap, rate, bend)
+    if rate < 0.0 or bend < 0.0:
+        behind = meets(1.0 + gap, -rate, -bend)
+        if behind < ahead:
+            return behind, True
+    return ahead, False
+
+
+@jit
+def impact(scene, motion, lever):
+    """The motion after an impact, by (2), and the speed of closing before it."""
+    wheel, pallet, _, e, _, _ = scene
+    y, V, w = motion
+    closing = V - lever * w
+    push = (1.0 + e) * closing / (pallet + wheel * lever * lever)
+    return (y, V - pallet * push, w + lever * wheel * push), closing
+
+
+@jit
+def impact_loss(scene, closing, lever):
+    """Energy lost in an impact, for a wheel of mass 1."""
+    wheel, pallet, _, e, _, _ = scene
+    return 0.5 * (1.0 - e) * (1.0 + e) * closing * closing * pallet / (pallet + wheel * lever * lever)
+
+
+@jit
+def centre(scene, motion, side):
+    """Way and speed of the common centre along `side` (1: the holding pallet pushes y up, -1: the other one, down)."""
+    y, V, w = motion
+    return side * y, scene[0] * V + scene[1] * side * w
+
+
+@jit
+def train(scene, motion, side):
+    """Duration (3) of the bounces that follow an impact, the motion after them, and the widest gap on the way."""
+    wheel, _, _, e, _, _ = scene
+    away, W = centre(scene, motion, side)
+    bounce = side * motion[2] - motion[1]
+    bounce = bounce if bounce > 0.0 else 0.0
+    t = 2.0 * bounce / (1.0 - e)
+    speed = W + wheel * t
+    return t, (side * (away + 0.5 * (W + speed) * t), speed, side * speed), 0.5 * bounce * bounce
+
+
+@jit
+def lowest(wheel, away, W, t):
+    """Lowest way of the common centre within t."""
+    turn = -W / wheel
+    if not (turn > 0.0):
+        return away
+    turn = turn if turn < t else t
+    return away + (W + 0.5 * wheel * turn) * turn
+
+
+@jit
+def train_ends(scene, motion, side, t, after, gap):
+    """Whether nothing comes between the bounces: no tip of a pallet is reached, and no tooth meets the other pallet.
+
+    On the holding side that tooth is met where y is in [-1/4, -1/4 + gap/2] and above -eta, on the other mirrored.
+    """
+    wheel, _, eta, _, _, _ = scene
+    away, W = centre(scene, motion, side)
+    low, high = lowest(wheel, away, W, t), side * after[0]
+    high = (high if high > away else away) + wheel * gap
+    clear = gap <= 0.5 - 2.0 * eta or low > -0.25 + 0.5 * gap or high < -eta
+    return high < eta and clear and (side > 0.0 or low > -eta) and _plain(scene, motion, W, after[1], gap)
+
+
+@jit
+def _plain(scene, motion, W, speed, gap):
+    """Whether the bounces have no extreme of y or of the rim's way between them: that of the centre is another."""
+    if W >= 0.0:
+        return motion[1] >= 0.0
+    return speed <= 0.0 and speed * speed >= 2.0 * scene[0] * scene[1] * gap
+
+
+@jit
+def slide(scene, motion, side):
+    """Time in contact until the tooth leaves the pallet at its tip, or, across, until y reaches eta before that.
+
+    Returns
+    -------
+    t, goal, speed : time, and the way and the speed along `side` at its end
+    ends : whether the half swing ends with it
+    """
+    wheel, _, eta, _, _, _ = scene
+    away, W = side * motion[0], side * motion[2]
+    if side < 0.0 and lowest(wheel, away, W, math.inf) <= -eta:
+        speed = -sqrt(max(W * W - 2.0 * wheel * (away + eta), 0.0))
+        return (speed - W) / wheel, -eta, speed, True
+    return meets(eta - away, W, wheel), eta, sqrt(W * W + 2.0 * wheel * (eta - away)), side > 0.0
+
+
+@jit_call
+def carry_flight(slopes, t):
+    """Changes after a flight of fixed duration."""
+    for j in range(3):
+        slopes[0, j] += t * slopes[2, j]
+        slopes[1, j] += t * slopes[3, j]
+
+
+@jit
+def _later(slopes, j, motion, by):
+    """Column j of the changes, `by` later in free flight."""
+    slopes[0, j] += motion[1] * by
+    slopes[1, j] += motion[2] * by
+    slopes[2, j] += by
+    slopes[4, j] += by
+
+
+@jit_call
+def carry_line(slopes, motion):
+    """Changes where y crosses a line."""
+    for j in range(3):
+        _later(slopes, j, motion, -slopes[1, j] / motion[2])
+        slopes[1, j] = 0.0
+
+
+@jit_call
+def carry_impact(scene, slopes, motion, lever):
+    """Changes through an impact, (2) by its derivative; `motion` is before it. A pallet at rest on the tooth is met
+    by none of them."""
+    wheel, pallet, _, e, c, _ = scene
+    closing = motion[1] - lever * motion[2]
+    inertia = pallet + wheel * lever * lever
+    r = (1.0 + e) / inertia
+    for j in range(3):
+        by = -(slopes[0, j] - lever * slopes[1, j]) / closing if magnitude(closing) > 0.0 else 0.0
+        _later(slopes, j, motion, by)
+        turned = c * slopes[1, j]
+        faster = slopes[2, j] - lever * slopes[3, j] - motion[2] * turned
+        softer = -2.0 * r * wheel * lever * turned / inertia
+        push = r * faster + closing * softer
+        slopes[2, j] -= pallet * push
+        slopes[3, j] += wheel * (lever * push + closing * r * turned)
+
+
+@jit_call
+def carry_train(scene, slopes, motion, side, t):
+    """Changes through the bounces (3) into contact; `motion` is after the first impact, of which t comes."""
+    wheel, pallet, _, e, _, _ = scene
+    _, W = centre(scene, motion, side)
+    for j in range(3):
+        longer = 2.0 * (side * slopes[3, j] - slopes[2, j]) / (1.0 - e)
+        faster = wheel * slopes[2, j] + pallet * side * slopes[3, j]
+        slopes[1, j] += side * (faster * t + (W + wheel * t) * longer)
+        slopes[0, j] = side * slopes[1, j]
+        slopes[2, j] = faster + wheel * longer
+        slopes[3, j] = side * slopes[2, j]
+        slopes[4, j] += longer
+
+
+@jit_call
+def carry_slide(scene, slopes, motion, side, speed):
+    """Changes through contact until a line, where both have the signed `speed` along `side`."""
+    wheel = scene[0]
+    for j in range(3):
+        away, fast = side * slopes[1, j], side * slopes[3, j]
+        there = (side * motion[2] * fast - wheel * away) / speed
+        slopes[4, j] += (there - fast) / wheel
+        slopes[0, j], slopes[1, j] = 0.0, 0.0
+        slopes[2, j], slopes[3, j] = there, side * there

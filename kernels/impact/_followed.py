@@ -1,0 +1,250 @@
+"""Where the impact clock ends up, whatever it does on the way: contact by contact, then Newton on what repeats.
+
+From the symmetric cycle of one impact, a little disturbed (or from what its formula gives where there is none), half
+swings are followed in blocks. When the motion all but repeats after k of them, Newton finds where it does (k = 1: a
+symmetric cycle; even k: k/2 swings to and fro; other k: k of them). It is taken if it is stable, else left behind.
+A cycle lasts until the next tooth, or, should more than one pass in it, one swing to and fro.
+"""
+
+import math
+
+import numpy as np
+
+from kernels.impact import _half_swing as swing
+from kernels.impact._half_swing import half_swing
+from kernels.impact._periodic import chain, distance, errors, invert, multiplier, newton
+from kernels.impact._units import bend
+from kernels.interface import Status
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.vectors import magnitude, nearest, sqrt
+
+HALF_SWINGS = 2048
+"""Half swings after which a motion that does not repeat is called so; means are over the second half of them."""
+EVENT_LIMIT = 1_000_000
+"""Events of the second half, or of the first."""
+KAPPA_LIMIT = 1e12
+"""Largest ratio of the two masses, either way: beyond it the lighter one's impacts are lost in rounding."""
+BLOCK = 16
+"""Half swings between two looks at whether the motion repeats, and the most after which it is seen to."""
+DISTURBANCE = 1e-6
+
+_CLOSE = 1e-3
+"""Relative distance of two half swings' beginnings at which Newton is tried."""
+_NEAR = 1.0
+"""How far from there a cycle may be found: a motion that settles slowly is close to repeating long before."""
+_SAME = 1e-9
+"""The distance of two beginnings that are one."""
+_KICK, _KICKS = 0.01, 8
+"""How far an unstable cycle is left behind, and how often that is tried."""
+_ROUNDING = 2.3e-16
+_CHAINED = 5.0
+"""Errors of the changes after many contacts over those of one: 3.5 at most in 1055 clocks."""
+_OK, _INACCURATE, _GRAZING = float(Status.OK), float(Status.INACCURATE), float(Status.GRAZING)
+_UNSTABLE, _PERIOD_2, _NOT_PERIODIC = float(Status.UNSTABLE), float(Status.PERIOD_2), float(Status.NOT_PERIODIC)
+_TOOTH_JUMPED, _STEP_LIMIT = float(Status.TOOTH_JUMPED), float(Status.STEP_LIMIT)
+_NO_METHOD, _NOT_CONVERGED = float(Status.NO_METHOD), float(Status.NOT_CONVERGED)
+
+
+@jit
+def plain_scene(scene):
+    """The scene of `_half_swing`."""
+    wheel, pallet, _, eta, _, e, _ = scene
+    c, y_i = bend(scene)
+    return wheel[0], pallet[0], min(eta[0], 0.25), e, c, y_i
+
+
+@jit
+def beginning(scene, disturbance):
+    """Start of a half swing on the symmetric cycle of one impact, by its formula, with its speeds so much changed.
+
+    w = kappa T/2 and V = T (kappa (1 - e) - 2 e)/(2 (1 + e)) after the impact at y = -Y; it is followed back to the
+    release at y = -eta. Where it is not one, y = -eta is where it begins all the same.
+    """
+    wheel, pallet, eta, e, c, y_i = scene
+    kappa = wheel / pallet
+    if not (e > 0.0):
+        c_0 = 0.5 * sqrt(kappa + 4.0 * eta)
+        return swing.reduced(2.0 * eta - 0.5), c_0 * (1.0 + 0.5 * disturbance), -c_0 * (1.0 + disturbance)
+    half = sqrt((1.0 + e) / (1.0 - e) * pallet)
+    w = 0.5 * kappa * half
+    V = half * (kappa * (1.0 - e) - 2.0 * e) / (2.0 * (1.0 + e)) + half
+    away = max(-eta - y_i, 0.0)
+    t = away / w
+    V, w = (V - t) * (1.0 + 0.5 * disturbance), w * (1.0 + disturbance)
+    gap = -(V + 0.5 * t) * t - away * (1.0 + 0.5 * c * away)
+    return swing.reduced(gap), V, -w
+
+
+@jit_call
+def follow(scene, start, n, history, tally, slopes):
+    """The start after n half swings, and what became of them; `history` gets n + 1 starts."""
+    history[0, 0], history[0, 1], history[0, 2] = start
+    for i in range(n):
+        start, verdict = half_swing(scene, start, tally, slopes, False)
+        if verdict != swing.DONE:
+            return start, verdict
+        history[i + 1, 0], history[i + 1, 1], history[i + 1, 2] = start
+    return start, swing.DONE
+
+
+@jit
+def _past(history, i):
+    return history[i, 0], history[i, 1], history[i, 2]
+
+
+@jit_call
+def _repeats_after(history, n):
+    """The least number of half swings after which the motion all but repeats; 0 if it does not."""
+    for k in range(1, n + 1):
+        if distance(_past(history, n - k), _past(history, n)) < _CLOSE:
+            return k
+    return 0
+
+
+@jit_call
+def _shortest(scene, start, k, history, work):
+    """The shortest repetition of a motion that repeats after k half swings."""
+    follow(scene, start, k, history, work[0], work[1])
+    for shorter in range(1, k):
+        if k % shorter == 0 and distance(_past(history, shorter), start) < _SAME:
+            return shorter
+    return k
+
+
+@jit
+def _cycles(k, way):
+    """Half swings of the whole motion, teeth that pass in it, and the cycles that this is."""
+    teeth = nearest(2.0 * way)
+    if k % 2 == 0:
+        return 1.0 * k, 0.5 * teeth, min(0.5 * teeth, 0.5 * k)
+    return 2.0 * k, teeth, min(teeth, 1.0 * k)
+
+
+@jit_call
+def _left_behind(start, cycle):
+    """A start further from an unstable cycle, the way the motion leaves it."""
+    away = distance(start, cycle)
+    more = _KICK / max(away, 1e-12) if away < _KICK else 1.0
+    gap, V = cycle[0] + more * (start[0] - cycle[0]), cycle[1] + more * (start[1] - cycle[1])
+    w = cycle[2] + more * (start[2] - cycle[2])
+    return (swing.reduced(gap), V, w) if w < 0.0 else start
+
+
+@jit
+def _ends(tally, k):
+    """Half of the way of y from end to end, and its middle, of a motion that repeats after k half swings."""
+    low, high = -tally[swing.LOWEST], -tally[swing.ACROSS]
+    if k % 2 == 1:
+        return max(low, high), 0.0
+    return 0.5 * (low + high), 0.5 * magnitude(low - high)
+
+
+@jit
+def _answer(tally, ends, halves, pace, e):
+    """The cycle as in `_units`, the middle of the swing, the share of time in contact, and impacts, from the
+    tally of half swings that are so many half periods; `ends` as `_ends` has them, or means."""
+    beats = tally[swing.BEATS]
+    rim, pallet = (tally[swing.RIM] / beats, tally[swing.PALLET] / beats) if beats > 0.0 else (math.nan, math.nan)
+    endless = e > 0.0 and tally[swing.TRAINS] > 0.0
+    impacts = math.inf if endless else tally[swing.IMPACTS] / halves
+    cycle = tally[swing.TIME] / halves, ends[0], rim, pallet, pace, tally[swing.RECOIL]
+    return cycle, ends[1], tally[swing.HELD] / tally[swing.TIME], impacts
+
+
+@jit
+def _none():
+    """No answer."""
+    nan = math.nan
+    return (nan, nan, nan, nan, nan, nan), nan, nan, nan
+
+
+@jit
+def _verdict(tally, teeth, cycles, fading, worst, gap, rounding, rtol):
+    """The status of a motion that repeats, where `fading` is 1 - multiplier in units of its error."""
+    if fading < -1.0:
+        return _UNSTABLE
+    if not (worst <= rtol):
+        return _INACCURATE
+    if fading < 1.0 or tally[swing.MARGIN] <= 4.0 * gap + rounding:
+        return _GRAZING
+    if teeth > cycles:
+        return _TOOTH_JUMPED
+    return _OK if teeth == 1.0 else _PERIOD_2
+
+
+@jit
+def _worst(answer, gap, V, w, late):
+    """Largest relative error of the outputs but the multiplier, by the errors of gap, V and w and the relative one of
+    the time."""
+    (_, travel, rim, pallet, _, back), _, share, _ = answer
+    worst = max(max(late, gap / travel), max(V / magnitude(rim), w / magnitude(pallet)))
+    worst = max(worst, late + late / share if share > 0.0 else 0.0)
+    return max(worst, 6.0 * (V + w) / sqrt(2.0 * back) if back > 0.0 else 0.0)  # V^2/2, V perhaps that of both bodies
+
+
+@jit_call
+def _judged(scene, start, k, work, rtol):
+    """The answer for a motion that repeats after k half swings, and its status; UNSTABLE where it leaves that."""
+    tally, slopes, chained, inverse = work
+    swing.clear(tally)
+    image, _ = chain(scene, start, k, tally, slopes, chained)
+    deep = tally[swing.DEPTH]
+    if deep > 0.0:  # the rim is still behind its foremost where the motion begins anew
+        swing.clear(tally)
+        tally[swing.DEPTH] = deep
+        image, _ = chain(scene, start, k, tally, slopes, chained)
+    invert(chained, inverse)
+    rest = image[0] - start[0], image[1] - start[1], image[2] - start[2]
+    half_swings, teeth, cycles = _cycles(k, tally[swing.WAY])
+    modulus, blur = multiplier(chained)
+    answer = _answer(tally, _ends(tally, k), 2.0 * cycles * k / half_swings, modulus ** (1.0 / k), scene[3])
+    rounding = _ROUNDING * (2.0 + tally[swing.EVENTS] / k) * (1.0 + answer[0][1])
+    gap, V, w, late = errors(start, rest, inverse, chained, rounding, tally[swing.TIME])
+    noise = _CHAINED * blur * (rounding * k + gap)
+    worst = max(_worst(answer, gap, V, w, late), noise / (k * modulus) if modulus > 0.0 else 0.0)
+    fading = (1.0 - modulus) / max(noise, _ROUNDING)
+    return answer, _verdict(tally, teeth, cycles, fading, worst, gap, rounding, rtol)
+
+
+@jit_call
+def attractor(scene, rtol, total, work, history):
+    """The cycle, the middle of the swing, the share of time in contact, impacts in half a period, and the status."""
+    start, kicks = beginning(scene, DISTURBANCE), 0
+    swing.clear(total)
+    k = 0
+    blocks = HALF_SWINGS // BLOCK
+    for block in range(blocks):
+        if 2 * block == blocks:
+            swing.clear(total)
+        start, verdict = follow(scene, start, BLOCK, history, total, work[1])
+        if verdict != swing.DONE or total[swing.EVENTS] > EVENT_LIMIT:
+            return _none(), _NO_METHOD if verdict == swing.BENT_CONTACT else _STEP_LIMIT
+        k = _repeats_after(history, BLOCK)
+        if k == 0:
+            continue
+        cycle, found = newton(scene, start, k, work)
+        if not (found and distance(start, cycle) < _NEAR):
+            continue
+        k = _shortest(scene, cycle, k, history, work)
+        answer, status = _judged(scene, cycle, k, work, rtol)
+        if status != _UNSTABLE:
+            return answer, status
+        if 2 * block < blocks and kicks < _KICKS:
+            start, kicks = _left_behind(start, cycle), kicks + 1
+    half_swings = HALF_SWINGS // 2
+    cycles = max(min(total[swing.WAY], 0.5 * half_swings), 1.0)
+    status = _NOT_CONVERGED if k > 0 else _NOT_PERIODIC
+    means = total[swing.DIPS] / half_swings, magnitude(total[swing.LEAN]) / half_swings
+    return _answer(total, means, 2.0 * cycles, math.nan, scene[3]), status
+
+
+@jit
+def settled(scene, rtol):
+    """`attractor` of a scene of `_units`, in one row."""
+    kappa = scene[2][0]
+    if not (1.0 / KAPPA_LIMIT <= kappa <= KAPPA_LIMIT):
+        answer = _none()
+        return answer[0], answer[1], answer[2], answer[3], _NO_METHOD
+    work = np.empty(swing.TALLIES), np.empty((5, 3)), np.empty((4, 3)), np.empty((3, 3))
+    answer, status = attractor(plain_scene(scene), rtol, np.empty(swing.TALLIES), work, np.empty((BLOCK + 1, 3)))
+    return answer[0], answer[1], answer[2], answer[3], status

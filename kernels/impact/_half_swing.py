@@ -1,0 +1,284 @@
+"""One half swing of the impact clock, contact by contact: from one pallet's release of the wheel to the other's.
+
+It begins where y falls through -eta, so that the upper pallet alone holds the wheel, and ends where y rises through
+eta; the next one is the same in the reflected frame, y -> -y, x -> x - 1/2. In between no tooth can pass the pallet
+that holds. The tooth that a pallet releases is at most at U(eta), and the other pallet holds it, or one before it, as
+long as U(eta) - U(-eta) <= 1/2, which every flat lever keeps: so the wheel goes on by at most one tooth a swing to and
+fro and never runs free. Where a bent lever does not keep it, both pallets can wedge the wheel: bounces without end.
+The pallet across meets teeth while y > -eta. Bounces that are bound to end in lasting contact are summed as soon as
+nothing can come between them. Contact lasts until the pallet's tip: it holds with the force wheel pallet > 0, and both
+pallets are in contact only at y = 1/4, beyond the tips.
+Under a bent lever bounces have no such sum; what comes to that is not followed.
+A *scene* is the tuple (wheel, pallet, eta, e, c, y_i) of float64; a *start* is (gap, V, w), the gap in (-1, 0].
+"""
+
+import math
+
+from kernels.impact._contacts import (
+    carry_flight,
+    carry_impact,
+    carry_line,
+    carry_slide,
+    carry_train,
+    impact,
+    impact_loss,
+    meets_either,
+    slide,
+    train,
+    train_ends,
+)
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.vectors import magnitude
+
+CONTACT_LIMIT = 20_000
+"""Events of one half swing."""
+FAINT_BOUNCE = 1e-10
+"""Speed of closing under a bent lever below which bounces are taken to end in lasting contact."""
+
+DONE, TOO_MANY, BENT_CONTACT = 0, 1, 2
+"""What became of a half swing."""
+(
+    TIME, WAY, DIP, DIPS, LEAN, LOWEST, ACROSS, IMPACTS, LOSS, RIM, PALLET, DEPTH, RECOIL, MARGIN, EVENTS, BEATS, HELD,
+    TRAINS, STRUCK,
+) = range(19)  # fmt: skip
+"""Entries of a tally: time, way of the rim, lowest y of this half swing, sum of -y over their lowest, the same with
+signs in turn, lowest y of all half swings on this pallet and lowest -y of those on the other, impacts (of a train only
+the first), energy lost, speeds just after the holding pallet's first impact (sums over half swings), way that the rim
+is behind its foremost and the most of that, least distance of a tooth from a tip that passes it, events, half swings
+that have an impact, time in contact, trains of bounces that end in it, whether this half swing has had an impact."""
+TALLIES = 19
+
+
+@jit
+def clear(tally):
+    """A tally of nothing."""
+    for i in range(TALLIES):
+        tally[i] = 0.0
+    tally[MARGIN] = math.inf
+
+
+@jit
+def reduced(gap):
+    """The same gap to the tooth before the pallet, in (-1, 0]; what rounding leaves beyond 0 is 0."""
+    gap = gap - math.ceil(gap - 4e-16)
+    return gap if gap < 0.0 else 0.0
+
+
+@jit
+def _lever(scene, y):
+    """Slope of the holding pallet's lever at y; that of the pallet across is -lever(-y)."""
+    return 1.0 + scene[4] * (y - scene[5])
+
+
+@jit
+def _across(scene, gap, y):
+    """Gap of the pallet across, from that of the holding one, or the other way round with -y."""
+    return gap + 2.0 * y * (1.0 - scene[4] * scene[5]) - 0.5
+
+
+@jit
+def _count_flight(tally, V, t):
+    """Time, and the rim's way: it may be thrown back first."""
+    way = (V + 0.5 * t) * t
+    if V < 0.0:
+        back = 0.5 * V * V if t + V > 0.0 else -way
+        tally[RECOIL] = max(tally[RECOIL], tally[DEPTH] + back)
+    tally[DEPTH] = max(tally[DEPTH] - way, 0.0)
+    tally[WAY] += way
+    tally[TIME] += t
+    tally[EVENTS] += 1.0
+
+
+@jit
+def _count_joint(tally, scene, away, W, side, t, after):
+    """The same in contact, where the rim goes with `away` and the torque's share `wheel`."""
+    wheel = scene[0]
+    if W < 0.0:
+        turn = min(-W, wheel * t)
+        tally[RECOIL] = max(tally[RECOIL], tally[DEPTH] - (W + 0.5 * turn) * turn / wheel)
+        _count_low(tally, side * (away + (W + 0.5 * turn) * turn / wheel))
+    way = after - away
+    tally[DEPTH] = max(tally[DEPTH] - way, 0.0)
+    tally[WAY] += way
+    tally[TIME] += t
+    tally[EVENTS] += 1.0
+
+
+@jit
+def _count_low(tally, y):
+    tally[DIP] = min(tally[DIP], y)
+
+
+@jit
+def _count_margin(tally, gap):
+    tally[MARGIN] = min(tally[MARGIN], min(magnitude(gap), magnitude(1.0 + gap)))
+
+
+@jit
+def _count_impact(tally, scene, motion, closing, lever):
+    """An impact; `motion` is after it."""
+    tally[LOSS] += impact_loss(scene, closing, lever)
+    tally[IMPACTS] += 1.0
+    _count_low(tally, motion[0])
+
+
+@jit
+def _count_beat(tally, V, w):
+    """The speeds just after the holding pallet's first impact of the half swing."""
+    if tally[STRUCK] == 0.0:
+        tally[STRUCK] = 1.0
+        tally[RIM] += V
+        tally[PALLET] += w
+        tally[BEATS] += 1.0
+
+
+@jit_call
+def _bounces_out(scene, motion, side, tally, slopes, follows):
+    """The motion after bounces that end in contact, and whether they do."""
+    t, after, gap = train(scene, motion, side)
+    if not train_ends(scene, motion, side, t, after, gap):
+        return motion, False
+    if follows:
+        carry_train(scene, slopes, motion, side, t)
+    away, W = side * motion[0], scene[0] * motion[1] + scene[1] * side * motion[2]
+    _count_joint(tally, scene, away, W, side, t, side * after[0])
+    tally[LOSS] += scene[1] * gap
+    tally[TRAINS] += 1.0
+    return after, True
+
+
+@jit_call
+def _slides_off(scene, motion, side, tally, slopes, follows):
+    """The motion where contact ends, and whether the half swing does."""
+    t, goal, speed, ends = slide(scene, motion, side)
+    if follows:
+        carry_slide(scene, slopes, motion, side, speed)
+    _count_joint(tally, scene, side * motion[0], side * motion[2], side, t, goal)
+    tally[HELD] += t
+    return (side * goal, speed, side * speed), ends
+
+
+@jit
+def _line(eta, y, w, near):
+    """Time to the next tip that y passes; inf if it passes none."""
+    if w > 0.0:
+        return max(((eta if near else -eta) - y) / w, 0.0)
+    return max((-eta - y) / w, 0.0) if near and w < 0.0 else math.inf
+
+
+@jit
+def _next(scene, state):
+    """Time of the next event, whether it is a contact, with the pallet across, and with the tooth behind."""
+    gap, far, y, V, w, near = state
+    bend = 1.0 - scene[4] * w * w
+    t, behind = meets_either(gap, V - _lever(scene, y) * w, bend)
+    across = False
+    if near:
+        other, other_behind = meets_either(far, V + _lever(scene, -y) * w, bend)
+        if other < t:
+            t, behind, across = other, other_behind, True
+    line = _line(scene[2], y, w, near)
+    return min(t, line), t < line, across, behind
+
+
+@jit
+def _flown(scene, state, t, tally, slopes, follows):
+    """The state after a free flight."""
+    gap, far, y, V, w, near = state
+    _count_flight(tally, V, t)
+    if follows:
+        carry_flight(slopes, t)
+    bend = 1.0 - scene[4] * w * w
+    gap += ((V - _lever(scene, y) * w) + 0.5 * bend * t) * t
+    far += ((V + _lever(scene, -y) * w) + 0.5 * bend * t) * t
+    return gap, far, y + w * t, V + t, w, near
+
+
+@jit
+def _across_line(scene, state, tally, slopes, follows):
+    """The state where y passes -eta: the pallet across begins, or ceases, to be in the way of teeth."""
+    gap, _, y, V, w, _ = state
+    if follows:
+        carry_line(slopes, (y, V, w))
+    y = -scene[2]
+    far = reduced(_across(scene, gap, y))
+    _count_margin(tally, far)
+    return gap, far, y, V, w, w > 0.0
+
+
+@jit
+def _struck(scene, state, across, behind, tally, slopes, follows):
+    """The state after an impact, and its speed of closing."""
+    gap, far, y, V, w, near = state
+    lever = -_lever(scene, -y) if across else _lever(scene, y)
+    if follows:
+        carry_impact(scene, slopes, (y, V, w), lever)
+    (y, V, w), closing = impact(scene, (y, V, w), lever)
+    _count_impact(tally, scene, (y, V, w), closing, lever)
+    touching = -1.0 if behind else 0.0
+    return (gap if across else touching, touching if across else far, y, V, w, near), closing
+
+
+@jit
+def _begun(scene, start, tally, slopes, follows):
+    """The state at a start: (gap, gap of the pallet across, y, V, w, whether that is in the way of teeth)."""
+    gap, V, w = start
+    tally[DIP] = -scene[2]
+    tally[STRUCK] = 0.0
+    if follows:
+        for j in range(3):
+            slopes[0, j], slopes[1, j], slopes[2, j], slopes[3, j], slopes[4, j] = 0.0, 0.0, 0.0, 0.0, 0.0
+        slopes[0, 0], slopes[2, 1], slopes[3, 2] = 1.0, 1.0, 1.0
+    return gap, 0.0, -scene[2], V, w, False
+
+
+@jit_call
+def half_swing(scene, start, tally, slopes, follows):
+    """The start of the next half swing, in its frame, and what became of this one.
+
+    Adds to `tally`; where `follows`, `slopes` become the changes at the end by those at the start, without reflection.
+    """
+    eta, e, c = scene[2], scene[3], scene[4]
+    state = _begun(scene, start, tally, slopes, follows)
+    for _ in range(CONTACT_LIMIT):
+        t, contact, across, behind = _next(scene, state)
+        if not (t < math.inf):
+            return start, TOO_MANY
+        state = _flown(scene, state, t, tally, slopes, follows)
+        if not contact:
+            arrives = state[5] and state[4] > 0.0
+            state = _across_line(scene, state, tally, slopes, follows) if not arrives else state
+            if arrives:
+                if follows:
+                    carry_line(slopes, state[2:5])
+                _count_margin(tally, state[0])
+                return _reflected(tally, reduced(state[1]), state[3], state[4]), DONE
+            continue
+        state, closing = _struck(scene, state, across, behind, tally, slopes, follows)
+        if behind:
+            continue
+        if not across:
+            _count_beat(tally, state[3], state[4])
+        if c != 0.0:
+            if magnitude(closing) * e <= FAINT_BOUNCE:
+                return start, BENT_CONTACT
+            continue
+        side = -1.0 if across else 1.0
+        motion, stays = _bounces_out(scene, state[2:5], side, tally, slopes, follows)
+        if not stays:
+            continue
+        (y, V, w), ends = _slides_off(scene, motion, side, tally, slopes, follows)
+        other = reduced(2.0 * eta - 0.5)
+        if ends:
+            return _reflected(tally, 0.0 if across else other, V, w), DONE
+        state = other, 0.0, y, V, w, False
+    return start, TOO_MANY
+
+
+@jit
+def _reflected(tally, far, V, w):
+    """The start of the next half swing; this one is counted."""
+    tally[DIPS] -= tally[DIP]
+    tally[LEAN] = -(tally[LEAN] + tally[DIP])
+    tally[LOWEST], tally[ACROSS] = tally[ACROSS], min(tally[LOWEST], tally[DIP])
+    return far, V, -w

@@ -1,0 +1,148 @@
+"""Where a motion of the impact clock repeats: Newton on k half swings, its multipliers, and what rounding leaves of it.
+
+With z = (gap, V, w) at the start and P(z) after k half swings, the derivative D of P is the product of those of half
+swings, each carried along its contacts. Newton's step is (1 - D)^-1 (P - z), and so is the error of z that rounding of
+P leaves. The multipliers are the roots of x^3 - trace x^2 + minors x - determinant.
+*Work* is the tuple of arrays (tally, slopes, chained, inverse): rows of `chained` are changes of gap, V, w and time.
+"""
+
+import math
+
+from kernels.impact._half_swing import DONE, half_swing, reduced
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.vectors import magnitude, sqrt
+from kernels.maths.cubic import largest_modulus
+
+NEWTON_LIMIT = 12
+
+_CONVERGED = 3e-15
+_LEAST_TRACE = 0.25
+"""Terms of about 1 cancel in the changes of a motion whose disturbances fade at once."""
+
+
+@jit
+def distance(start, other):
+    """How far two beginnings are from each other, relative to what they are."""
+    speed = magnitude(other[1]) + magnitude(other[2])
+    parts = max(magnitude(start[1] - other[1]) / speed, magnitude(start[2] - other[2]) / magnitude(other[2]))
+    return max(magnitude(start[0] - other[0]), parts)
+
+
+@jit_call
+def chain(scene, start, k, tally, slopes, chained):
+    """The start after k half swings; `chained` becomes its changes (gap, V, w) and that of the time by `start`."""
+    for j in range(3):
+        chained[0, j], chained[1, j], chained[2, j], chained[3, j] = 0.0, 0.0, 0.0, 0.0
+        chained[j, j] = 1.0
+    for _ in range(k):
+        start, verdict = half_swing(scene, start, tally, slopes, True)
+        if verdict != DONE:
+            return start, verdict
+        for j in range(3):
+            gap, V, w = chained[0, j], chained[1, j], chained[2, j]
+            chained[0, j] = slopes[0, 0] * gap + slopes[0, 1] * V + slopes[0, 2] * w
+            chained[1, j] = slopes[2, 0] * gap + slopes[2, 1] * V + slopes[2, 2] * w
+            chained[2, j] = -(slopes[3, 0] * gap + slopes[3, 1] * V + slopes[3, 2] * w)
+            chained[3, j] += slopes[4, 0] * gap + slopes[4, 1] * V + slopes[4, 2] * w
+    return start, DONE
+
+
+@jit_call
+def invert(chained, inverse):
+    """(1 - D)^-1 by cofactors, into `inverse`."""
+    a, b, c = 1.0 - chained[0, 0], -chained[0, 1], -chained[0, 2]
+    d, e, f = -chained[1, 0], 1.0 - chained[1, 1], -chained[1, 2]
+    g, h, i = -chained[2, 0], -chained[2, 1], 1.0 - chained[2, 2]
+    inverse[0, 0], inverse[0, 1], inverse[0, 2] = e * i - f * h, c * h - b * i, b * f - c * e
+    inverse[1, 0], inverse[1, 1], inverse[1, 2] = f * g - d * i, a * i - c * g, c * d - a * f
+    inverse[2, 0], inverse[2, 1], inverse[2, 2] = d * h - e * g, b * g - a * h, a * e - b * d
+    determinant = a * inverse[0, 0] + b * inverse[1, 0] + c * inverse[2, 0]
+    for row in range(3):
+        for column in range(3):
+            inverse[row, column] /= determinant
+
+
+@jit
+def _row(inverse, row, x):
+    return inverse[row, 0] * x[0] + inverse[row, 1] * x[1] + inverse[row, 2] * x[2]
+
+
+@jit_call
+def newton(scene, start, k, work):
+    """The start that repeats after k half swings, near the one given, and whether it is found."""
+    tally, slopes, chained, inverse = work
+    last = math.inf
+    for _ in range(NEWTON_LIMIT):
+        image, verdict = chain(scene, start, k, tally, slopes, chained)
+        if verdict != DONE:
+            return start, False
+        invert(chained, inverse)
+        rest = image[0] - start[0], image[1] - start[1], image[2] - start[2]
+        gap, V, w = (
+            start[0] + _row(inverse, 0, rest),
+            start[1] + _row(inverse, 1, rest),
+            start[2] + _row(inverse, 2, rest),
+        )
+        new = reduced(gap), V, w
+        step = distance(start, new)
+        if not (w < 0.0 and step < 0.5):
+            return start, False
+        start = new
+        if step < _CONVERGED or (last < 1e-10 and step > 0.25 * last):
+            return start, True
+        last = step
+    return start, last < 1e-10
+
+
+@jit
+def multiplier(chained):
+    """Largest modulus of the multipliers, and what rounding of one part in 1 of the changes would be worth in it."""
+    a, b, c = chained[0, 0], chained[0, 1], chained[0, 2]
+    d, e, f = chained[1, 0], chained[1, 1], chained[1, 2]
+    g, h, i = chained[2, 0], chained[2, 1], chained[2, 2]
+    minors = a * e - b * d + (a * i - c * g) + (e * i - f * h)
+    third = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    modulus, _ = largest_modulus((-(a + e + i), 0.0), (minors, 0.0), (-third, 0.0))
+    sizes = (
+        max(magnitude(a) + magnitude(e) + magnitude(i), _LEAST_TRACE),
+        magnitude(a * e) + magnitude(b * d) + magnitude(a * i),
+    )
+    second = sizes[1] + magnitude(c * g) + magnitude(e * i) + magnitude(f * h)
+    last = magnitude(a) * (magnitude(e * i) + magnitude(f * h)) + magnitude(b) * (magnitude(d * i) + magnitude(f * g))
+    last += magnitude(c) * (magnitude(d * h) + magnitude(e * g))
+    blur = (sizes[0] * modulus + second) * modulus + last
+    return modulus, blur / max(_steepness(a + e + i, minors, third, modulus), 1e-300)
+
+
+@jit
+def _steepness(trace, minors, third, modulus):
+    """abs(p') at the root of that modulus: the product of its distances from the other two."""
+    size = (modulus + magnitude(trace)) * modulus * modulus + magnitude(minors) * modulus + magnitude(third)
+    steepest = 0.0
+    for sign in (1.0, -1.0):
+        x = sign * modulus
+        if magnitude(((x - trace) * x + minors) * x - third) <= 1e-8 * size:
+            steepest = max(steepest, magnitude((3.0 * x - 2.0 * trace) * x + minors))
+    if steepest > 0.0:
+        return steepest
+    alone = third / (modulus * modulus)
+    half = 0.5 * (trace - alone)
+    upright = sqrt(max(modulus * modulus - half * half, 0.0))
+    return 2.0 * upright * sqrt((half - alone) * (half - alone) + upright * upright)
+
+
+@jit
+def errors(start, rest, inverse, chained, rounding, time):
+    """Relative errors of gap, V and w where the motion repeats, and of the time."""
+    blur = (
+        magnitude(rest[0]) + rounding,
+        magnitude(rest[1]) + rounding * magnitude(start[1]),
+        magnitude(rest[2]) + rounding * magnitude(start[2]),
+    )
+    gap, V, w = 0.0, 0.0, 0.0
+    for j in range(3):
+        gap += magnitude(inverse[0, j]) * blur[j]
+        V += magnitude(inverse[1, j]) * blur[j]
+        w += magnitude(inverse[2, j]) * blur[j]
+    longer = magnitude(chained[3, 0]) * gap + magnitude(chained[3, 1]) * V + magnitude(chained[3, 2]) * w
+    return gap, V, w, longer / time + rounding

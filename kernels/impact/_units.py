@@ -1,0 +1,148 @@
+"""The impact clock without dimensions, and back: crown wheel and foliot, free between inelastic impacts.
+
+x = r_c th_c is the way of the wheel's rim, y = r_v th_v that of the pallets, M = I_c/r_c^2 and m = I_v/r_v^2 their
+masses there, kappa = M/m. The torque pushes the rim with F = torque/r_c, g = F/M. In units of the tooth pitch
+p = 2 pi r_c/teeth and of T0 = sqrt(p/g)
+    free flight         x'' = 1,  y'' = 0                                                              (1)
+    upper pallet meets  x - U(y) = j          while y < eta,  eta = h/p                                 (2)
+    lower pallet meets  x - U(-y) = j + 1/2   while y > -eta,  for every integer j                      (3)
+    impact              speed of closing times -e, with M x' + m y'/U' kept                             (4)
+The reflection y -> -y, x -> x - 1/2 turns (3) into (2); (4) is for the upper pallet, the lower one is its reflection.
+The lever is flat, U(y) = y, or bent about the place y_i = -Y of impact of the symmetric cycle:
+    U(y) = y + (c/2) (y - y_i)^2,  c = nu/T^2,                                                         (5)
+    T^2 = (1 + e)/((1 - e)(1 + kappa)),  Y = kappa T^2/4.                                              (6)
+So nu = (U''/U'^2) g T^2 leaves that cycle as it is and bends what is beside it, and flights stay parabolas.
+
+A *scene* is the tuple (wheel, pallet, kappa, eta, slack, e, nu): wheel = M/(M + m), pallet = m/(M + m), kappa, eta and
+slack = 1 - 4 eta are pairs of `pairs`. At h = p/4 (within HALF_PITCH) slack is exactly 0: no drop.
+A *cycle* is the tuple (half period, half travel, speed of the rim and of the pallet just after impact, multiplier, way
+that the rim is thrown back), without dimensions.
+Leaves out friction, play of the pivots, and the width of teeth and pallets. Derived here.
+"""
+
+import math
+
+from kernels.interface import Status
+from kernels.lanes.jit import jit
+from kernels.lanes.vectors import choose, isnt, magnitude, nearest, sqrt, where
+from kernels.maths import pairs as _pairs
+from kernels.maths.elementary import in_unit, is_normal, mantissa_exponent, scale
+
+HALF_PITCH = 2e-15
+"""Share of p/4 within which h is p/4."""
+MOST_TEETH = 2.0**31 - 1.0
+MOST_E = math.nextafter(1.0, 0.0)
+
+_TWO_PI = (2.0 * math.pi, 2.0 * 1.2246467991473532e-16)
+_KAPPA_LIMIT = 900.0
+"""log2 of kappa beyond which products would leave float64."""
+
+_OK, _BAD_INPUT = float(Status.OK), float(Status.BAD_INPUT)
+_NEVER_STARTS, _NEVER_MEETS = float(Status.NEVER_STARTS), float(Status.NEVER_MEETS)
+
+
+@jit
+def _masses(I_c, I_v, r_c, r_v):
+    """M and m in a common unit, as pairs, the larger in [1/2, 8), and whether neither is too small beside it."""
+    (m_c, e_c), (m_v, e_v) = mantissa_exponent(I_c), mantissa_exponent(I_v)
+    (s_c, f_c), (s_v, f_v) = mantissa_exponent(r_c), mantissa_exponent(r_v)
+    wheel = _pairs.times((m_c, 0.0 * m_c), _pairs.two_product(s_v, s_v))  # M/m = I_c r_v^2/(I_v r_c^2)
+    pallet = _pairs.times((m_v, 0.0 * m_v), _pairs.two_product(s_c, s_c))
+    e = (e_c + 2.0 * f_v) - (e_v + 2.0 * f_c)
+    fine = magnitude(e) < _KAPPA_LIMIT
+    e = where(fine, e, 0.0)
+    light, heavy = where(e < 0.0, e, 0.0), where(e > 0.0, -e, 0.0)
+    return _times_power(wheel, light), _times_power(pallet, heavy), fine
+
+
+@jit
+def _times_power(x, n):
+    """A pair times 2^n."""
+    return scale(x[0], n), scale(x[1], n)
+
+
+@jit
+def _escape(r_c, teeth, h):
+    """eta = h teeth/(2 pi r_c) and slack = 1 - 4 eta, as pairs."""
+    m, e = mantissa_exponent(r_c)
+    high = where(h < 4.0 * r_c, h, 4.0 * r_c)  # beyond p/4 for any number of teeth
+    eta = _pairs.over(_pairs.two_product(in_unit(high, e), teeth), _pairs.scaled(_TWO_PI, m))
+    slack = _pairs.shifted((-4.0 * eta[0], -4.0 * eta[1]), 1.0)
+    there = magnitude(slack[0]) <= HALF_PITCH
+    return eta, choose(there, (0.0, 0.0), slack)
+
+
+@jit
+def without_dimensions(torque, I_c, I_v, r_c, r_v, teeth, h, e, nu):
+    """The scene, and the units for `dimensional`, with whether kappa is in range."""
+    wheel, pallet, fine = _masses(I_c, I_v, r_c, r_v)
+    both = _pairs.add(wheel, pallet)
+    kappa = _pairs.over(wheel, pallet)
+    eta, slack = _escape(r_c, teeth, h)
+    scene = (_pairs.over(wheel, both), _pairs.over(pallet, both), kappa, eta, slack, e, nu)
+    return scene, (*_units(torque, I_c, r_c, r_v, teeth), fine)
+
+
+@jit
+def _units(torque, I_c, r_c, r_v, teeth):
+    """T0, p, and the share r_c/r_v: each a mantissa and an exponent; and 2 pi/teeth.
+
+    T0^2 = p M/F = 2 pi I_c/(teeth torque) has no r_c in it.
+    """
+    (m_tau, e_tau), (m_c, e_c) = mantissa_exponent(torque), mantissa_exponent(I_c)
+    (s_c, f_c), (s_v, f_v) = mantissa_exponent(r_c), mantissa_exponent(r_v)
+    step = _TWO_PI[0] / teeth
+    half = nearest(0.5 * (e_c - e_tau) - 0.25)
+    odd = (e_c - e_tau) - 2.0 * half > 0.5
+    time = sqrt(step * (m_c / m_tau) * where(odd, 2.0, 1.0))
+    return time, half, step * s_c, f_c, s_c / s_v, f_c - f_v, step
+
+
+@jit
+def dimensional(units, cycle):
+    """Period [s], swing [m], wheel and pallet speed [rad/s], recoil [rad], and whether all are normal numbers or 0."""
+    time, e_time, pitch, e_pitch, arm, e_arm, step, fine = units
+    half_period, travel, rim, pallet, _, back = cycle
+    period = scale(2.0 * time * half_period, e_time)
+    swing = scale(pitch * travel, e_pitch)
+    wheel_speed = scale(step / time * rim, -e_time)
+    pallet_speed = scale(step / time * arm * pallet, e_arm - e_time)
+    recoil = step * back
+    fine = fine & is_normal(period) & is_normal(swing)
+    fine = fine & _normal_or_none(rim, wheel_speed) & _normal_or_none(pallet, pallet_speed)
+    return period, swing, wheel_speed, pallet_speed, recoil, fine
+
+
+@jit
+def length(units, x):
+    """A length without dimensions in metres."""
+    return scale(units[2] * x, units[3])
+
+
+@jit
+def _normal_or_none(x, result):
+    """Whether a result is a normal number where what it comes from is not 0."""
+    return isnt(magnitude(x) > 0.0) | is_normal(magnitude(result))
+
+
+@jit
+def bend(scene):
+    """c of (5) and y_i, for one float64 each; c is 0 where nu is."""
+    wheel, pallet, _, _, _, e, nu = scene
+    loss = (1.0 - e) / (1.0 + e)
+    return nu * loss / pallet[0], -0.25 * wheel[0] / loss
+
+
+@jit
+def refusal(torque, I_c, I_v, r_c, r_v, teeth, h, e, nu):
+    """The status of `check` for one cell, or for lanes; OK where a method is to decide. NaN fails."""
+    known = (torque >= 0.0) & (I_c > 0.0) & (I_v > 0.0) & (r_c > 0.0) & (r_v > 0.0) & (h >= 0.0)
+    small = (torque < math.inf) & (I_c < math.inf) & (I_v < math.inf) & (r_c < math.inf) & (r_v < math.inf)
+    odd = (teeth >= 3.0) & (teeth <= MOST_TEETH)
+    pairs = 0.5 * (where(odd, teeth, 3.0) - 1.0)
+    odd = odd & isnt(magnitude(nearest(pairs) - pairs) > 0.0)
+    allowed = known & small & odd & (h < math.inf) & (e >= 0.0) & (e < 1.0) & (magnitude(nu) < math.inf)
+    _, slack = _escape(where(allowed, r_c, 1.0), where(allowed, teeth, 3.0), where(allowed, h, 0.0))
+    meets = (slack[0] > 0.0) | (isnt(slack[0] < 0.0) & isnt(e > 0.0))
+    verdict = where(torque > 0.0, where(meets, _OK, _NEVER_MEETS), _NEVER_STARTS)
+    return where(allowed, verdict, _BAD_INPUT)

@@ -1,0 +1,172 @@
+"""Impact clock: crown wheel and foliot as two bodies, free between inelastic impacts, driven by a constant torque.
+
+    I_c th_c'' = torque,  I_v th_v'' = 0  between impacts; at an impact closing speeds are multiplied by -e        (1)
+
+Teeth meet the upper and the lower pallet in turn and slip off where the pallet has moved by h past the middle; `nu`
+bends the lever (`_units` has the geometry). With e = 0 tooth and pallet stay together until the tooth escapes.
+Every torque in it is proportional to the drive, so the period is proportional to torque^(-1/2) and the swing does not
+depend on the torque at all. Leaves out friction, the width of teeth and pallets.
+Source: derived here. Works on such clocks by Roup et al. (2003), Lepschy et al. and Denny (2002) are known to us by
+their abstracts only; no number here is theirs.
+
+`closed` and `map` know the symmetric cycle with one impact a half period (one push in contact for e = 0): NO_CYCLE
+where it does not exist, UNSTABLE where it exists and disturbances grow, GRAZING where the last digits of the input
+decide on either (kappa = 1 with a flat lever: they neither grow nor fade).
+
+`events` tells what the clock comes to from a start a millionth off the symmetric cycle; other motions may be stable
+too, and so near a border of existence the clock may leave the cycle for one of them. OK: one tooth a cycle, be it off
+the middle (`offset`), with several impacts or with several swings to and fro. PERIOD_2: two or more teeth until it
+repeats; of those the period and the speeds are means. NOT_PERIODIC: means over 1024 half swings, no multiplier.
+STEP_LIMIT: bounces without end, as e towards 1 makes them, or a lever so bent that both pallets wedge the wheel.
+NO_METHOD: lasting contact under a bent lever, and masses more unequal than 1e12 (1e24 for `map`). TOOTH_JUMPED is
+watched for; a flat lever lets no tooth pass alone (`_half_swing`), and no bent one was found to.
+"""
+
+from kernels.impact import _closed_cycle, _followed, _return_map, _units
+from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
+from kernels.lanes.columns import each_cell, entry, entry_of_cells, one_by_one
+from kernels.lanes.jit import jit
+from kernels.lanes.vectors import where
+
+_OUT_OF_RANGE = float(Status.OUT_OF_RANGE)
+
+
+@jit
+def write(
+    i, units, cycle, held, count, verdict,
+    period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status,
+):  # fmt: skip
+    """One cell's symmetric cycle, or the lanes', in SI units."""
+    period[i], swing[i], wheel_speed[i], pallet_speed[i], recoil[i], fine = _units.dimensional(units, cycle)
+    multiplier[i], contact_share[i], impacts[i], offset[i] = cycle[4], held, count, 0.0 * count
+    status[i] = where(fine | (verdict >= FIRST_REFUSAL), verdict, _OUT_OF_RANGE)
+
+
+@jit
+def _closed(i, torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs):
+    scene, units = _units.without_dimensions(torque[i], I_c[i], I_v[i], r_c[i], r_v[i], teeth[i], h[i], e[i], nu[i])
+    cycle, held, verdict = _closed_cycle.closed(scene, rtol[i])
+    write(i, units, cycle, held, 0.0 * held + 1.0, verdict, *outputs)
+
+
+@entry()
+def closed(
+    torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol,
+    period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status,
+):  # fmt: skip
+    """The symmetric cycle by formula, with its existence and its multipliers."""
+    outputs = (period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status)
+    each_cell(_closed, (torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs))
+
+
+@entry("asked")
+def closed_bound(torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, asked, out):
+    """Rounding; where two multipliers nearly meet and lose more, the status says so."""
+    out[:] = _closed_cycle.ROUNDING
+
+
+@jit
+def _events(i, torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs):
+    scene, units = _units.without_dimensions(torque[i], I_c[i], I_v[i], r_c[i], r_v[i], teeth[i], h[i], e[i], nu[i])
+    cycle, offset, held, count, verdict = _followed.settled(scene, rtol[i])
+    write(i, units, cycle, held, count, verdict, *outputs)
+    outputs[-2][i] = _units.length(units, offset)
+
+
+@entry_of_cells
+def events(
+    torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol,
+    period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status,
+):  # fmt: skip
+    """Followed contact by contact, cell by cell: no two clocks have the same contacts to be followed in lanes."""
+    outputs = (period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status)
+    one_by_one(_events, (torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs))
+
+
+@jit
+def _map(i, torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs):
+    scene, units = _units.without_dimensions(torque[i], I_c[i], I_v[i], r_c[i], r_v[i], teeth[i], h[i], e[i], nu[i])
+    cycle, held, verdict = _return_map.half_cycle(scene, rtol[i])
+    write(i, units, cycle, held, 0.0 * held + 1.0, verdict, *outputs)
+
+
+@entry()
+def half_cycle_map(
+    torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol,
+    period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status,
+):  # fmt: skip
+    """The symmetric cycle as the fixed point of the half-cycle map, by Newton, and its multipliers."""
+    outputs = (period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status)
+    each_cell(_map, (torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs))
+
+
+@jit
+def _check(i, torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, status):
+    status[i] = _units.refusal(torque[i], I_c[i], I_v[i], r_c[i], r_v[i], teeth[i], h[i], e[i], nu[i])
+
+
+@entry()
+def check(torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, status):
+    """What no method is asked.
+
+    BAD_INPUT: NaN, infinite, outside its limits, or an even number of teeth. NEVER_STARTS: no torque. NEVER_MEETS: a
+    tooth held until h >= p/4 is met by the other pallet before it escapes; with e = 0 h = p/4 itself is the clock
+    without drop.
+    """
+    each_cell(_check, (torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, status))
+
+
+PARAMETERS = (
+    Field("torque", "N m", "drive torque on the crown wheel", lower=0.0),
+    Field("I_c", "kg m^2", "moment of inertia of the crown wheel", lower=0.0, open_lower=True),
+    Field("I_v", "kg m^2", "moment of inertia of verge and foliot", lower=0.0, open_lower=True),
+    Field("r_c", "m", "radius of the crown wheel", lower=0.0, open_lower=True),
+    Field("r_v", "m", "lever of the pallets", lower=0.0, open_lower=True),
+    Field("teeth", "1", "teeth of the crown wheel, odd", lower=3.0, upper=_units.MOST_TEETH, integer=True),
+    Field("h", "m", "way of a pallet past the middle at which its tooth escapes", lower=0.0),
+    Field("e", "1", "restitution: share of the closing speed kept by an impact", lower=0.0, upper=_units.MOST_E),
+    Field("nu", "1", "curvature of the lever, (U''/U'^2) g T^2 of the symmetric cycle", default=0.0),
+)
+
+OUTPUTS = (
+    Field("period", "s", "period of the cycle, in which one tooth passes; the mean of cycles that differ"),
+    Field("swing", "m", "half of the pallet's way between the farthest ends of its swings"),
+    Field(
+        "wheel_speed",
+        "rad/s",
+        "speed of the crown wheel just after a swing's first impact; the mean of swings that differ",
+    ),
+    Field("pallet_speed", "rad/s", "speed of the verge just after that impact, in the direction of the tooth"),
+    Field("multiplier", "1", "largest factor by which disturbances grow in a half swing, from release to release"),
+    Field("recoil", "rad", "largest angle by which the crown wheel is thrown back (0 where it is not)"),
+    Field("contact_share", "1", "share of the time that a tooth and a pallet are in contact"),
+    Field("impacts", "1", "impacts in half a period (inf where bounces die out in contact)"),
+    Field("offset", "m", "how far the middle of the pallet's swing is from the middle of its teeth"),
+)
+
+IMPACT = Kernel(
+    name="impact",
+    doc="limit cycle of a crown wheel and a foliot with inelastic impacts",
+    source="two bodies, free flight and restitution; derived here",
+    parameters=PARAMETERS,
+    outputs=OUTPUTS,
+    check=check,
+    methods=(
+        # "map" is last: it knows no cycle that "closed" does not
+        Method("closed", "formula of the symmetric cycle, where it exists and is stable", closed, closed_bound),
+        Method("events", "whatever the clock does, contact by contact, and Newton on what repeats", events),
+        Method(
+            "map", "the cycle of `closed` as fixed point of the half-cycle map, by Newton in 32 digits", half_cycle_map
+        ),
+    ),
+    example={
+        "torque": 1e-3,
+        "I_c": 4e-5,
+        "I_v": 1e-5,
+        "r_c": 0.03,
+        "r_v": 0.03,
+        "teeth": 31,
+        "h": 0.0,
+        "e": 0.2,
+    },
+)

@@ -1,0 +1,142 @@
+"""Where in a step an event fires, and the state there: five ways, generic in one cell or lanes.
+
+An event is known at both ends of the step [0, h] by its value (e0 > 0 >= e1) and its rate (d0, d1). `linear` and
+`hermite` find the part of the step by a line or by the cubic through all four, and take a step of just that length.
+`root` is exact to the method: each trial is a step of its own from the same start, which is the method's continuous
+extension. `henon` goes from behind the event back onto it in one step, with the event's value as the variable:
+    du/de = u'/e',  dt/de = 1/e'                                                                     (1)
+Source: Henon, Physica D 5:412 (1982). `none` takes the event to fire at the end of the step: the fault to be shown.
+"""
+
+from kernels.integrate.steps import dop853, dopri5, euler, moreau, rk4, semi_implicit, verlet
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.tuples import but_last, with_last
+from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
+
+METHODS = ("euler", "semi_implicit", "verlet", "rk4", "dopri5", "dop853", "moreau")
+EULER, SEMI_IMPLICIT, VERLET, RK4, DOPRI5, DOP853, MOREAU = range(7)
+ORDER = (1, 1, 2, 4, 5, 8, 1)
+CALLS = (1.0, 1.0, 2.0, 4.0, 6.0, 12.0, 2.0)
+"""Calls of the rates in a step."""
+NONE, LINEAR, HERMITE, ROOT, HENON = range(5)
+LOCATIONS = {"none": NONE, "linear": LINEAR, "hermite": HERMITE, "root": ROOT, "henon": HENON}
+
+ROOT_LIMIT = 60
+SETTLED = 1e-11
+"""Change of the part of a step after which the event is where the next trial ends."""
+CLOSE = 0.1
+"""How much of an event's value may be left behind Henon's step."""
+
+
+@jit_call
+def leap(m, method, parts, state, scene, h):
+    """`parts` equal steps that make up h."""
+    part = h / parts
+    for _ in range(parts):
+        if method == EULER:
+            state = euler(m, state, scene, part)
+        elif method == SEMI_IMPLICIT:
+            state = semi_implicit(m, state, scene, part)
+        elif method == VERLET:
+            state = verlet(m, state, scene, part)
+        elif method == RK4:
+            state = rk4(m, state, scene, part)
+        elif method == DOPRI5:
+            state = dopri5(m, state, scene, part)
+        elif method == DOP853:
+            state = dop853(m, state, scene, part)
+        else:
+            state = moreau(m, state, scene, part)
+    return state
+
+
+@jit
+def cubic(s, e0, e1, m0, m1):
+    """Value and slope at s in [0, 1] of the cubic with these values and slopes at the ends."""
+    d = e1 - e0
+    b, a = 3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d
+    return fma(s, fma(s, fma(s, a, b), m0), e0), fma(s, fma(3.0 * a, s, 2.0 * b), m0)
+
+
+@jit_call
+def cubic_root(e0, e1, m0, m1, seeking):
+    """Where in [0, 1] that cubic falls through 0, for e0 > 0 >= e1: Newton within a bracket."""
+    low, high = 0.0 * e0, 0.0 * e0 + 1.0
+    s = e0 / (e0 - e1)
+    for _ in range(ROOT_LIMIT):
+        if not some(seeking):
+            break
+        value, slope = cubic(s, e0, e1, m0, m1)
+        low, high = where(value > 0.0, s, low), where(value > 0.0, high, s)
+        new = s - value / slope
+        new = where((new >= low) & (new <= high), new, 0.5 * (low + high))
+        change = magnitude(new - s)
+        s = where(seeking, new, s)
+        seeking = seeking & (change > 1e-15)
+    return s
+
+
+@jit
+def lowest(e0, e1, m0, m1):
+    """Where the cubic with m0 < 0 < m1 is lowest in (0, 1), and how low."""
+    d = e1 - e0
+    b, a = 3.0 * d - 2.0 * m0 - m1, 3.0 * (m0 + m1 - 2.0 * d)
+    inside = b * b - a * m0
+    s = -m0 / (b + sqrt(where(inside > 0.0, inside, 0.0)))
+    return s, cubic(s, e0, e1, m0, m1)[0]
+
+
+@jit
+def of_event(values, which):
+    """The entry of a tuple at the index `which` of each lane."""
+    chosen = values[0]
+    for j in range(1, len(values)):
+        chosen = where((which > j - 0.5) & (which < j + 0.5), values[j], chosen)
+    return chosen
+
+
+@jit_call
+def shortened(m, method, parts, state, scene, h, which, first, ends, seeking):
+    """The step that ends on the event: part of h, state, trials, and whether it is not found.
+
+    Regula falsi with halving (Illinois): the event's rate is not the slope of its value over the step's length.
+    """
+    side, signs, parameters, _ = scene
+    low, high, part, trials = 0.0 * h, 0.0 * h + 1.0, first, 0.0 * h
+    above, below = ends
+    new = leap(m, method, parts, state, scene, part * h)
+    settled, last = seeking & isnt(seeking), 0.0 * h
+    for _ in range(ROOT_LIMIT):
+        trials = where(seeking, trials + 1.0, trials)
+        seeking = seeking & isnt(settled)
+        if not some(seeking):
+            break
+        value = of_event(m.events(new, side, signs, parameters)[0], which)
+        before = value > 0.0
+        above = where(before, value, where(last < 0.0, 0.5 * above, above))
+        below = where(before, where(last > 0.0, 0.5 * below, below), value)
+        low, high = where(before, part, low), where(before, high, part)
+        last = where(before, 1.0, -1.0)
+        guess = fma(high - low, above / (above - below), low)
+        settled = (magnitude(guess - part) <= SETTLED) | (magnitude(value) <= 0.0)
+        part = where(seeking, guess, part)
+        new = choose(seeking, leap(m, method, parts, state, scene, part * h), new)
+    return part, new, trials, seeking
+
+
+@jit_call
+def swapped(m, method, parts, state, scene, h, which, value):
+    """From behind the event, where it has that value, back onto it by (1): part of h, state, whether it is there."""
+    side, signs, parameters, _ = scene
+    wide = with_last(with_last(state, h), which)
+    held = side, signs, parameters, False
+    if method in (DOP853, DOPRI5):
+        for _ in range(parts):
+            wide = dop853(m.swap, wide, held, -value / parts)
+    else:
+        for _ in range(parts):
+            wide = rk4(m.swap, wide, held, -value / parts)
+    time, found = but_last(wide)[-1], but_last(but_last(wide))
+    left = of_event(m.events(found, side, signs, parameters)[0], which)
+    there = (magnitude(left) <= -CLOSE * value) & (time > -CLOSE * h) & (time <= h)
+    return time / h, found, there

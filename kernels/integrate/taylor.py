@@ -1,0 +1,256 @@
+"""Steps of a Taylor series, and the proof of what happens within one; generic in one cell or lanes.
+
+A *series* is the tuple (u_0 ... u_p) of u(t) = sum u_k t^k on a step [0, h]. An *event* is e(t) = offset + factor u(t),
+which fires where it falls through 0. With A = sum_{k>3} k abs(e_k) h^(k-2) and 0 < t <= h
+    e'(t) <= e_1 + t (2 e_2 + A) + 3 t^2 e_3,  e(t) >= e_0 + t e_1 + t^2 (e_2 + h min(e_3, 0) - A/4),     (1)
+so where the first parabola stays below 0, e falls all along, and whether it fires is seen by its sign at the end;
+where the second one stays above 0, nothing fires. Where neither is proved the step is halved.
+The proof is of the series; what that leaves out is below the tolerance of the step, and an event that so little decides
+is called grazing.
+"""
+
+from numba import types
+
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.vectors import (
+    _called,
+    _constant,
+    _function,
+    _items,
+    _number,
+    exponent,
+    fma,
+    horner,
+    isnt,
+    magnitude,
+    nearest,
+    pow2,
+    some,
+    where,
+)
+
+STEP_LIMIT = 2000
+"""Steps between two events after which a cell is given up."""
+HALVINGS = 40
+ROOT_LIMIT = 60
+SLACK = 4.0
+"""By how much the estimated error of a step may exceed its tolerance."""
+LARGEST = 5.0
+"""log2 of the factor by which a step may change."""
+LONGEST = 8.0
+"""First guess of a step, at most, over the time of the last motion between events."""
+WIDER = 5.0 / 4.0
+GRAZING = 16.0
+
+
+def tail(h, series):
+    """A bound on A of (1) for u: sum over k > 3 of k abs(u_k) h^(k-2), with 4 (5/4)^(k-4) >= k for k."""
+    total, wide = abs(series[-1]), WIDER * h
+    for k in range(len(series) - 2, 3, -1):
+        total = fma(total, wide, abs(series[k]))
+    return 4.0 * (total * (h * h))
+
+
+def _lower_tail(context, builder, signature, values):
+    target = signature.return_type
+    h = context.cast(builder, values[0], signature.args[0], target)
+    items = _items(context, builder, signature.args[1], values[1], target)
+    sizes = [_called("fabs")(builder, item) for item in items]
+    total, wide = sizes[-1], builder.fmul(_constant(h.type, WIDER), h)
+    for k in range(len(items) - 2, 3, -1):
+        total = _called("fma")(builder, total, wide, sizes[k])
+    return builder.fmul(_constant(h.type, 4.0), builder.fmul(total, builder.fmul(h, h)))
+
+
+_function(tail, 2, lambda h, series: _number(h, *series), _lower_tail)
+
+
+def _nested(x, terms, ratios):
+    """terms[0] + x ratios[0] (terms[1] + x ratios[1] (terms[2] + ...)).
+
+    The ratios go to x and not into the terms, or those would be kept from one evaluation for the next, and stored.
+    """
+    value = terms[-1]
+    for term, ratio in zip(terms[-2::-1], ratios[::-1], strict=True):
+        value = fma(value, x * ratio, term)
+    return value
+
+
+def _lower_nested(first, last, ratio):
+    """The compiled form, of the terms from `first` to `last`."""
+
+    def lower(context, builder, signature, values):
+        target = signature.return_type
+        x = context.cast(builder, values[0], signature.args[0], target)
+        terms = _items(context, builder, signature.args[1], values[1], target)
+        value, k = None, len(terms) + last
+        for term in terms[first : len(terms) + last + 1][::-1]:
+            by = None if value is None else builder.fmul(x, _constant(x.type, ratio(k + 1)))
+            value, k = term if value is None else _called("fma")(builder, value, by, term), k - 1
+        return value
+
+    return lower
+
+
+def slope(x, series):
+    """u'(x) = sum k u_k x^(k-1)."""
+    return _nested(x, series[1:], [k / (k - 1) for k in range(2, len(series))])
+
+
+def mean(x, series):
+    """The mean of u between 0 and x, but for its last term: sum of u_k x^k/(k + 1)."""
+    return _nested(x, series[:-1], [k / (k + 1) for k in range(1, len(series) - 1)])
+
+
+for _of_series, _lower in (
+    (slope, _lower_nested(1, -1, lambda k: k / (k - 1))),
+    (mean, _lower_nested(0, -2, lambda k: k / (k + 1))),
+):
+    _function(_of_series, 2, lambda x, series: _number(x, *series), _lower)
+
+
+@jit
+def natural_power(x, n):
+    """x^n for a natural number n > 0 known when compiled."""
+    product, square = x if n % 2 else 0.0 * x + 1.0, x * x
+    for _ in range(5):
+        n //= 2
+        product = product * square if n % 2 else product
+        square = square * square
+    return product
+
+
+@jit
+def last_term(h, series):
+    """The last term of a series on a step, over h^(p-1).
+
+    Of terms that fall by about 1/4 each the rest is a third of the last; the last but one counts in case the last
+    vanishes by chance.
+    """
+    last, before = magnitude(series[-1]) * h, 0.25 * magnitude(series[-2])
+    return where(last < before, before, last)
+
+
+@jit
+def size(h, series):
+    """Of a state on a step: its first terms."""
+    return fma(fma(magnitude(series[2]), h, magnitude(series[1])), h, magnitude(series[0]))
+
+
+@jit
+def worse(first, second):
+    """Of two pairs (what is left out, size) the one that is worse in its size."""
+    (x, of_x), (y, of_y) = first, second
+    smaller = y * of_x <= x * of_y
+    return where(smaller, x, y), where(smaller, of_x, of_y)
+
+
+@jit
+def next_step(h, ratio, order):
+    """The step on which 1 is left out instead of `ratio`, within 1 %."""
+    ratio = where(ratio < 1e250, ratio, 1e250)  # NaN too: a power of the step overflowed
+    ratio = where(ratio > 1e-250, ratio, 1e-250)
+    e = exponent(ratio)
+    m = ratio * pow2(-e) - 1.0
+    log2_factor = (e + m * fma(m, -1.0 / 3.0, 4.0 / 3.0)) * (-1.0 / order)  # within 0.01/order
+    log2_factor = where(log2_factor > -LARGEST, log2_factor, -LARGEST)
+    log2_factor = where(log2_factor < LARGEST, log2_factor, LARGEST)
+    whole = nearest(log2_factor)
+    part = log2_factor - whole  # [-0.5, 0.5]
+    return h * fma(part, fma(part, fma(part, 0.0555, 0.2402), 0.6931), 1.0) * pow2(whole)
+
+
+@jit
+def keeps(h, power_h, series, allowed):
+    """Whether a step leaves out no more than that, over the state's size; NaN fails. `power_h` is h^(p-1).
+
+    To be asked after `next_step`, for on a shorter step the size is smaller.
+    """
+    return last_term(h, series) * power_h <= allowed * size(h, series)
+
+
+@jit
+def rises(d, dd):
+    """Whether what has these first derivatives rises in the next moment."""
+    return (d > 0.0) | ((d >= 0.0) & (dd > 0.0))
+
+
+def stays_apart(x):
+    """Keeps the function that calls it out of line: what is rarely needed must not cost what is needed often."""
+
+
+def _lower_stays_apart(context, builder, signature, values):
+    builder.function.attributes.discard("alwaysinline")
+    builder.function.attributes.add("noinline")
+    return context.get_dummy_value()
+
+
+_function(stays_apart, 1, lambda x: types.void, _lower_stays_apart)
+
+
+@jit
+def falls(d, dd, ddd, rest, h):
+    """Whether an event falls all along a step, by (1): from its coefficients 1 to 3, `rest` is A."""
+    b, q = fma(2.0, dd, rest), 3.0 * ddd
+    turns = (q < 0.0) & (b > 0.0) & (fma(2.0 * h, q, b) < 0.0) & isnt(4.0 * (q * d) > b * b)
+    return (d <= 0.0) & (fma(h, fma(h, q, b), d) < 0.0) & isnt(turns)
+
+
+@jit
+def clear(e, d, dd, ddd, rest, h, margin):
+    """Whether an event does not fire in (0, h], by (1): from its coefficients 0 to 3.
+
+    What comes down to less than `margin` is not clear. What starts at 0, or below it by rounding, must rise.
+    """
+    curve = fma(h, where(ddd < 0.0, ddd, 0.0), fma(-0.25, rest, dd))
+    down = where(curve < 0.0, curve, 0.0)
+    above = fma(h, fma(h, down, d), e) > where(d < 0.0, margin, 0.0)
+    turns = (curve > 0.0) & ((d >= 0.0) | (4.0 * curve * (e - margin) > d * d))
+    return above | turns | ((h <= 0.0) & (d > 0.0))
+
+
+@jit
+def of_series(t, curve):
+    """u, u' and about u''/2 at t, of u = sum u_k t^k; curve is (series,)."""
+    (u,) = curve
+    return horner(t, u), slope(t, u), fma(t, fma(t, 6.0 * u[4], 3.0 * u[3]), u[2])
+
+
+@jit
+def of_sum(t, curve):
+    """u, u' and about u''/2 at t, of u = start + unit int w; curve is (start, unit, series of w)."""
+    start, unit, w = curve
+    bend = fma(t, fma(t, 1.5 * w[3], w[2]), 0.5 * w[1])
+    return fma(unit * t, mean(t, w), start), unit * horner(t, w), unit * bend
+
+
+@jit_call
+def crossing(at, curve, event, h, tolerance, searching):
+    """Where an event falls through 0 in (0, h], given that it falls all along, and whether it only just does.
+
+    Halley's steps within a bracket, with the bend by the first terms. What is left after a step is taken for that of
+    Newton's, change^3/before^2, which is more; the search ends where that is far below what the series leave out.
+
+    Parameters
+    ----------
+    at, curve : u, u' and u''/2 at t are `at(t, curve)`
+    event : offset, factor and u(0) of the event offset + factor u
+    """
+    offset, factor, start = event
+    before, enough = 0.0 * h, 0.01 * tolerance + 1e-17
+    low, high, t, left = 0.0 * h, h, 0.5 * h, searching
+    rate, bend = 0.0 * h, 0.0 * h
+    for _ in range(ROOT_LIMIT):
+        u, du, ddu = at(t, curve)
+        value, rate, bend = fma(factor, u, offset), where(left, factor * du, rate), where(left, factor * ddu, bend)
+        low, high = where(value > 0.0, t, low), where(value > 0.0, high, t)
+        new = t - value * rate / fma(rate, rate, -value * bend)
+        new = where((new >= low) & (new <= high), new, 0.5 * (low + high))
+        change = magnitude(new - t)
+        t = where(left, new, t)
+        left = left & isnt((change * change) * change <= enough * t * (before * before))
+        if not some(left):
+            break
+        before = change
+    blur = GRAZING * tolerance * (magnitude(offset) + magnitude(factor * start))
+    return t, searching & isnt(magnitude(rate) > blur / magnitude(rate) * (2.0 * magnitude(bend)))

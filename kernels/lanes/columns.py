@@ -1,0 +1,85 @@
+"""Loops over columns of cells, and the entry functions that the engine calls."""
+
+import functools
+import inspect
+
+import numpy as np
+
+from kernels.lanes.jit import COMPILED, cached, jit
+from kernels.lanes.vectors import WIDTH, lanes_at
+
+
+@jit
+def _one_by_one(body, columns):
+    for i in range(columns[0].shape[0]):
+        body(i, *columns)
+
+
+def _plain(body, columns):
+    with np.errstate(all="ignore"):
+        for i in range(columns[0].shape[0]):
+            body(i, *columns)
+
+
+@jit
+def _in_lanes(body, columns):
+    """The last group overlaps the one before it: its cells are solved twice, to the same bits."""
+    n = columns[0].shape[0]
+    for i in range(0, n, WIDTH):
+        body(lanes_at(min(i, n - WIDTH)), *columns)
+
+
+each_cell = _in_lanes if COMPILED else _plain
+"""each_cell(body, columns): body(i, *columns) for all cells, WIDTH at a time; called by an `entry`."""
+
+one_by_one = _one_by_one if COMPILED else _plain
+"""The same one cell at a time: the rival that lanes are measured against."""
+
+
+def entry(*shared):
+    """Makes a function of columns one that the engine can call; its machine code is kept on the disk.
+
+    Columns hold one cell a row; those named in `shared` belong to all cells. Fewer cells than lanes are filled up with
+    copies of the last one, so that no second version for one cell is compiled.
+    """
+
+    def decorate(function):
+        if not COMPILED:
+            return function
+        compiled = cached(function)
+        per_cell = [name not in shared for name in inspect.signature(function).parameters]
+
+        @functools.wraps(function)
+        def call(*columns):
+            if 0 < len(columns[0]) < WIDTH:
+                _filled_up(compiled, columns, per_cell)
+            elif len(columns[0]):
+                compiled(*columns)
+
+        call.compiled = compiled
+        return call
+
+    return decorate
+
+
+def entry_of_cells(function):
+    """As `entry`, for what takes one cell at a time: few cells are not filled up, and columns may be read-only."""
+    ready = entry(*inspect.signature(function).parameters)(
+        function if COMPILED else np.errstate(all="ignore")(function)
+    )
+
+    @functools.wraps(ready)
+    def call(*columns):
+        ready(*(c if c.flags.writeable else c.copy() for c in columns))
+
+    return call
+
+
+def _filled_up(compiled, columns, per_cell):
+    n = len(columns[0])
+    rows = np.minimum(np.arange(WIDTH), n - 1)
+    full = [c[rows] if cells else c for c, cells in zip(columns, per_cell, strict=True)]
+    compiled(*full)
+    for column, result in zip(columns, full, strict=True):
+        if column is not result and column.flags.writeable:
+            column[...] = result[:n]

@@ -1,0 +1,37 @@
+"""Compiler options, once.
+
+No fast-math: with explicit `fma` and no contraction the same source gives the same bits for one cell, for lanes and
+on every CPU. `error_model="numpy"`: 1/0 is inf, nothing raises.
+"""
+
+import numba
+from numba import njit
+
+from kernels.lanes.inlining import aligned, part
+
+COMPILED = not numba.config.DISABLE_JIT
+"""False under NUMBA_DISABLE_JIT=1, where every function here is plain Python of one cell."""
+
+_OPTIONS = {"error_model": "numpy", "nogil": True, "fastmath": False}
+
+
+def jit(function):
+    """Physics: compiled where it is called, for one cell or for lanes, and always inlined."""
+    return part(function, forceinline=True, **_OPTIONS)
+
+
+def jit_inline(function):
+    """As `jit`, but pasted in before anything is compiled: for what is long and used once; saves compile seconds."""
+    return njit(inline="always", **_OPTIONS)(function)
+
+
+def jit_call(function):
+    """As `jit`, but left a call: for what is long and used in several places."""
+    return part(function, **_OPTIONS)
+
+
+def cached(function):
+    """As `jit_call`, called from Python; machine code of this package is kept on the disk."""
+    from kernels.lanes.cache import enable
+
+    return enable(aligned(function, **_OPTIONS))

@@ -1,0 +1,419 @@
+"""A numba type of WIDTH cells in vector registers, so that physics is written once for one cell and for many.
+
+A function of plain arithmetic compiles for float64 and for `Lanes` alike and gives the same bits in both, because
+multiply-adds are explicit (`fma`) and nothing else may be contracted. A column loop is written for one index `i`:
+an integer means one cell, `lanes_at(i)` means cells i .. i + WIDTH - 1:
+
+    def body(i, x, y):          # y[i] = x[i]^2 for one cell or WIDTH of them
+        y[i] = x[i] * x[i]
+
+Branches become `where(condition, x, y)`; `some(condition)` ends a masked loop. In such a loop a finished lane is frozen
+by `where(active, new, old)`, or its bits would depend on its neighbours.
+Under NUMBA_DISABLE_JIT=1 only the one-cell form exists. `columns` has the loops.
+"""
+
+import math
+import operator
+from fractions import Fraction
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.typeconv import Conversion
+from numba.extending import lower_builtin, lower_cast, models, register_model, type_callable
+
+from kernels.lanes.jit import jit
+
+WIDTH = 32
+"""8 lanes reach half the speed, 16 85 %, 64 no more than 32: several registers hide the latency of a recurrence."""
+
+_I64, _F64 = ir.IntType(64), ir.DoubleType()
+_MAGIC = 6755399441055744.0  # 1.5 * 2^52: adding it leaves the nearest integer in the low bits
+
+
+class LanesType(types.Type):
+    """WIDTH float64 cells; a float64 beside them is repeated in every lane."""
+
+    def __init__(self):
+        super().__init__("Lanes")
+
+    def can_convert_from(self, typing_context, other):
+        return Conversion.promote if isinstance(other, types.Number) else None
+
+    def unify(self, typing_context, other):
+        return self if isinstance(other, types.Number) else None
+
+
+class MaskType(types.Type):
+    """One bit a lane; a boolean beside it is repeated."""
+
+    def __init__(self):
+        super().__init__("Mask")
+
+    def can_convert_from(self, typing_context, other):
+        return Conversion.promote if isinstance(other, types.Boolean) else None
+
+    def unify(self, typing_context, other):
+        return self if isinstance(other, types.Boolean) else None
+
+
+class LaneIndexType(types.Type):
+    """Cells i .. i + WIDTH - 1 of a column."""
+
+    def __init__(self):
+        super().__init__("LaneIndex")
+
+
+_lanes, _mask, _lane_index = LanesType(), MaskType(), LaneIndexType()
+
+
+def _primitive(numba_type, llvm_type):
+    @register_model(numba_type)
+    class Model(models.PrimitiveModel):
+        def __init__(self, manager, fe_type):
+            super().__init__(manager, fe_type, llvm_type)
+
+
+_primitive(LanesType, ir.VectorType(_F64, WIDTH))
+_primitive(MaskType, ir.VectorType(ir.IntType(1), WIDTH))
+_primitive(LaneIndexType, _I64)
+
+
+def _repeat(builder, value, like):
+    """A scalar LLVM value in every lane of a vector type."""
+    undefined = ir.Constant(like, ir.Undefined)
+    one = builder.insert_element(undefined, value, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(one, undefined, ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH))
+
+
+@lower_cast(types.Number, LanesType)
+def _number_to_lanes(context, builder, source, target, value):
+    value = context.cast(builder, value, source, types.float64)
+    return _repeat(builder, value, ir.VectorType(_F64, WIDTH))
+
+
+@lower_cast(types.Boolean, MaskType)
+def _boolean_to_mask(context, builder, source, target, value):
+    bit = context.cast(builder, value, source, types.boolean)
+    bit = builder.icmp_unsigned("!=", bit, ir.Constant(bit.type, 0))
+    return _repeat(builder, bit, ir.VectorType(ir.IntType(1), WIDTH))
+
+
+def _is_wide(*numba_types):
+    return any(isinstance(t, LanesType | MaskType) for t in numba_types)
+
+
+_BINARY_OPERANDS = (
+    (LanesType, LanesType),
+    (LanesType, types.Number),
+    (types.Number, LanesType),
+    (MaskType, MaskType),
+    (MaskType, types.Boolean),
+    (types.Boolean, MaskType),
+)
+
+
+def _emit(build, operand=None):
+    """Lowers a call: casts its arguments to `operand` (None: Lanes if one is wide, else float64), then builds."""
+
+    def lower(context, builder, signature, values):
+        target = operand or (_lanes if _is_wide(*signature.args) else types.float64)
+        return build(
+            builder, *(context.cast(builder, v, t, target) for v, t in zip(values, signature.args, strict=True))
+        )
+
+    return lower
+
+
+def _operator(python_operator, build, operand=_lanes, result=_lanes):
+    """Gives a Python operator a meaning for Lanes or Mask; plain numbers keep numba's own."""
+
+    @type_callable(python_operator)
+    def _(context):
+        return lambda x, y: result if isinstance(x, type(operand)) or isinstance(y, type(operand)) else None
+
+    for operands in _BINARY_OPERANDS:
+        if type(operand) in operands:
+            lower_builtin(python_operator, *operands)(_emit(build, operand))
+
+
+def _function(python_function, arity, result, lower):
+    """Gives a Python function a compiled meaning, emitted where it is called; `result(*types)` is what it returns."""
+    typers = (
+        lambda x: result(x),
+        lambda x, y: result(x, y),
+        lambda x, y, z: result(x, y, z),
+    )
+    type_callable(python_function)(lambda context: typers[arity - 1])
+    lower_builtin(python_function, *[types.Any] * arity)(lower)
+
+
+def _number(*numba_types):
+    return _lanes if _is_wide(*numba_types) else types.float64
+
+
+def _called(name):
+    """An LLVM floating-point intrinsic of the operands' own type."""
+
+    def build(builder, *values):
+        ty = values[0].type
+        suffix = f"v{WIDTH}f64" if isinstance(ty, ir.VectorType) else "f64"
+        function = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(ty, [ty] * len(values)), f"llvm.{name}.{suffix}"
+        )
+        return builder.call(function, values)
+
+    return build
+
+
+_operator(operator.add, lambda b, x, y: b.fadd(x, y))
+_operator(operator.sub, lambda b, x, y: b.fsub(x, y))
+_operator(operator.mul, lambda b, x, y: b.fmul(x, y))
+_operator(operator.truediv, lambda b, x, y: b.fdiv(x, y))
+_operator(operator.lt, lambda b, x, y: b.fcmp_ordered("<", x, y), result=_mask)
+_operator(operator.le, lambda b, x, y: b.fcmp_ordered("<=", x, y), result=_mask)
+_operator(operator.gt, lambda b, x, y: b.fcmp_ordered(">", x, y), result=_mask)
+_operator(operator.ge, lambda b, x, y: b.fcmp_ordered(">=", x, y), result=_mask)
+_operator(operator.and_, lambda b, x, y: b.and_(x, y), operand=_mask, result=_mask)
+_operator(operator.or_, lambda b, x, y: b.or_(x, y), operand=_mask, result=_mask)
+type_callable(operator.neg)(lambda context: lambda x: _lanes if _is_wide(x) else None)
+lower_builtin(operator.neg, LanesType)(_emit(lambda b, x: b.fneg(x)))
+
+
+def fma(x, y, z):
+    """x*y + z, rounded once, also in plain Python."""
+    x, y, z = np.float64(x), np.float64(y), np.float64(z)
+    if not (np.isfinite(x) and np.isfinite(y) and np.isfinite(z)):
+        return x * y + z
+    exact = Fraction(float(x)) * Fraction(float(y)) + Fraction(float(z))
+    try:
+        return np.float64(float(exact)) if exact else x * y + z
+    except OverflowError:
+        return np.float64(math.inf if exact > 0 else -math.inf)
+
+
+def sqrt(x):
+    """Square root; NaN below 0."""
+    return np.sqrt(np.float64(x))
+
+
+def magnitude(x):
+    """Absolute value."""
+    return abs(x)
+
+
+_function(fma, 3, _number, _emit(_called("fma")))
+_function(sqrt, 1, _number, _emit(_called("sqrt")))
+_function(magnitude, 1, _number, _emit(_called("fabs")))
+
+
+def dot(weights, terms):
+    """Sum of weights[j] terms[j] by a chain of multiply-adds from the first term on; both are tuples."""
+    total = weights[0] * terms[0]
+    for weight, term in zip(weights[1:], terms[1:], strict=True):
+        total = fma(weight, term, total)
+    return total
+
+
+def horner(x, coefficients):
+    """Polynomial in x, lowest power first; the coefficients are a tuple."""
+    value = coefficients[-1]
+    for coefficient in coefficients[-2::-1]:
+        value = fma(value, x, coefficient)
+    return value
+
+
+def _items(context, builder, numba_type, value, target):
+    """The elements of a tuple, each as `target`."""
+    items = cgutils.unpack_tuple(builder, value)
+    return [context.cast(builder, v, t, target) for v, t in zip(items, numba_type, strict=True)]
+
+
+def _lower_dot(context, builder, signature, values):
+    target = signature.return_type
+    weights, terms = (_items(context, builder, t, v, target) for v, t in zip(values, signature.args, strict=True))
+    total = builder.fmul(weights[0], terms[0])
+    for weight, term in zip(weights[1:], terms[1:], strict=True):
+        total = _called("fma")(builder, weight, term, total)
+    return total
+
+
+def _lower_horner(context, builder, signature, values):
+    target = signature.return_type
+    x = context.cast(builder, values[0], signature.args[0], target)
+    coefficients = _items(context, builder, signature.args[1], values[1], target)
+    value = coefficients[-1]
+    for coefficient in coefficients[-2::-1]:
+        value = _called("fma")(builder, value, x, coefficient)
+    return value
+
+
+_function(dot, 2, lambda weights, terms: _number(*terms), _lower_dot)
+_function(horner, 2, lambda x, coefficients: _number(x), _lower_horner)
+
+
+def pow2(n):
+    """2^n for an integer-valued n from -1022 to 1023."""
+    return np.float64(math.ldexp(1.0, int(n)) if -1023.0 < n < 1024.0 else math.nan)
+
+
+def exponent(x):
+    """floor(log2(abs(x))) as a float64, for normal x."""
+    return np.float64(math.frexp(x)[1] - 1)
+
+
+def _constant(ty, value):
+    """A constant of the type `ty`: in every lane of a vector."""
+    return ir.Constant(ty, [value] * WIDTH if isinstance(ty, ir.VectorType) else value)
+
+
+def _as_integers(ty):
+    return ir.VectorType(_I64, WIDTH) if isinstance(ty, ir.VectorType) else _I64
+
+
+def _build_pow2(builder, n):
+    integers = _as_integers(n.type)
+    biased = builder.bitcast(builder.fadd(n, _constant(n.type, _MAGIC + 1023.0)), integers)
+    return builder.bitcast(builder.shl(biased, _constant(integers, 52)), n.type)
+
+
+def _build_exponent(builder, x):
+    integers = _as_integers(x.type)
+    biased = builder.lshr(builder.bitcast(x, integers), _constant(integers, 52))
+    biased = builder.and_(biased, _constant(integers, 0x7FF))
+    shifted = builder.bitcast(builder.or_(biased, _constant(integers, 0x4330000000000000)), x.type)  # 2^52 + biased
+    return builder.fsub(shifted, _constant(x.type, 2.0**52 + 1023.0))
+
+
+_function(pow2, 1, _number, _emit(_build_pow2))
+_function(exponent, 1, _number, _emit(_build_exponent))
+
+
+@jit
+def nearest(x):
+    """The nearest integer, as a float64, for abs(x) < 2^51."""
+    return (x + _MAGIC) - _MAGIC
+
+
+def where(condition, x, y):
+    """x where the condition holds, else y; both are computed."""
+    return x if condition else y
+
+
+def choose(condition, xs, ys):
+    """`where` for each pair of two tuples."""
+    return tuple(where(condition, x, y) for x, y in zip(xs, ys, strict=True))
+
+
+def _type_choose(condition, xs, ys):
+    return types.Tuple([_number(condition, x, y) for x, y in zip(xs, ys, strict=True)])
+
+
+def _lower_choose(context, builder, signature, values):
+    condition, xs, ys = signature.args
+    items = (cgutils.unpack_tuple(builder, v) for v in values[1:])
+    chosen = [
+        _lower_where(context, builder, result(condition, x, y), (values[0], a, b))
+        for result, x, y, a, b in zip(signature.return_type, xs, ys, *items, strict=True)
+    ]
+    return context.make_tuple(builder, signature.return_type, chosen)
+
+
+def _lower_where(context, builder, signature, values):
+    wide = isinstance(signature.return_type, LanesType)
+    mask = _mask if wide and isinstance(signature.args[0], MaskType) else types.boolean
+    condition = context.cast(builder, values[0], signature.args[0], mask)
+    if mask is types.boolean:
+        condition = builder.icmp_unsigned("!=", condition, ir.Constant(condition.type, 0))
+    operands = (
+        context.cast(builder, v, t, signature.return_type) for v, t in zip(values[1:], signature.args[1:], strict=True)
+    )
+    return builder.select(condition, *operands)
+
+
+def some(condition):
+    """Whether the condition holds in at least one cell."""
+    return bool(condition)
+
+
+def _lower_some(context, builder, signature, values):
+    if not isinstance(signature.args[0], MaskType):
+        return context.cast(builder, values[0], signature.args[0], types.boolean)
+    bits = builder.bitcast(values[0], ir.IntType(WIDTH))
+    return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+
+
+def isnt(condition):
+    """The opposite of a condition."""
+    return not condition
+
+
+def _lower_isnt(context, builder, signature, values):
+    return builder.not_(values[0])
+
+
+_function(where, 3, lambda condition, x, y: _number(condition, x, y), _lower_where)
+_function(choose, 3, _type_choose, _lower_choose)
+_function(some, 1, lambda condition: types.boolean, _lower_some)
+_function(isnt, 1, lambda condition: condition, _lower_isnt)
+
+
+def lanes_at(i):
+    """The index of cells i .. i + WIDTH - 1; compiled code only."""
+    raise NotImplementedError
+
+
+_function(lanes_at, 1, lambda i: _lane_index, lambda context, builder, signature, values: values[0])
+
+
+def _cells_pointer(context, builder, array_type, array, i):
+    element = context.get_data_type(array_type.dtype)
+    first = builder.gep(context.make_array(array_type)(context, builder, array).data, [i])
+    return builder.bitcast(first, ir.VectorType(element, WIDTH).as_pointer()), element
+
+
+def _align(element):
+    """Bytes of one cell: a column's cells need not lie on a register's border."""
+    return element.width // 8 if isinstance(element, ir.IntType) else 8
+
+
+def _is_column(numba_type):
+    """Whether lanes can be loaded from it: cells side by side, in one dimension. Anything else is a TypingError."""
+    return (
+        isinstance(numba_type, types.Array)
+        and numba_type.ndim == 1
+        and numba_type.layout == "C"
+        and numba_type.dtype in (types.float64, types.int8)
+    )
+
+
+@type_callable(operator.getitem)
+def _type_load(context):
+    return lambda column, i: _lanes if _is_column(column) and isinstance(i, LaneIndexType) else None
+
+
+@lower_builtin(operator.getitem, types.Array, LaneIndexType)
+def _lower_load(context, builder, signature, values):
+    pointer, element = _cells_pointer(context, builder, signature.args[0], *values)
+    cells = builder.load(pointer, align=_align(element))
+    return builder.sitofp(cells, ir.VectorType(_F64, WIDTH)) if isinstance(element, ir.IntType) else cells
+
+
+@type_callable(operator.setitem)
+def _type_store(context):
+    def typer(column, i, value):
+        wide = _is_column(column) and isinstance(i, LaneIndexType)
+        return types.void(column, i, _lanes) if wide else None
+
+    return typer
+
+
+@lower_builtin(operator.setitem, types.Array, LaneIndexType, LanesType)
+def _lower_store(context, builder, signature, values):
+    pointer, element = _cells_pointer(context, builder, signature.args[0], *values[:2])
+    cells = values[2]
+    if isinstance(element, ir.IntType):
+        cells = builder.fptosi(cells, ir.VectorType(element, WIDTH))
+    builder.store(cells, pointer, align=_align(element))
+    return context.get_dummy_value()

@@ -1,0 +1,80 @@
+"""Complex numbers as tuples (re, im), of one cell or lanes: numba's own have no lanes and no explicit multiply-adds.
+
+Products and quotients are right to 4 roundings of the modulus.
+"""
+
+import math
+
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.vectors import exponent, fma, magnitude, sqrt, where
+from kernels.maths.elementary import arctan, is_normal, scale
+
+
+@jit
+def square(z):
+    """Squared modulus."""
+    return fma(z[0], z[0], z[1] * z[1])
+
+
+@jit
+def product(y, z):
+    """Product of two complex numbers."""
+    return fma(y[0], z[0], -(y[1] * z[1])), fma(y[0], z[1], y[1] * z[0])
+
+
+@jit
+def over(y, z):
+    """Quotient of two complex numbers, z between 1e-150 and 1e150."""
+    inverse = 1.0 / square(z)
+    return product(y, (z[0] * inverse, -z[1] * inverse))
+
+
+@jit_call
+def scaled(z, n):
+    """z 2^n."""
+    return scale(z[0], n), scale(z[1], n)
+
+
+@jit
+def size(z):
+    """Modulus, or up to sqrt 2 more."""
+    return magnitude(z[0]) + magnitude(z[1])
+
+
+@jit
+def plus(y, z):
+    """Sum of two complex numbers."""
+    return y[0] + z[0], y[1] + z[1]
+
+
+@jit
+def times(z, number):
+    """z times a real number."""
+    return z[0] * number, z[1] * number
+
+
+@jit
+def quotient(y, z):
+    """Quotient of two complex numbers of any size; NaN or infinite for z = 0."""
+    own = -exponent(where(size(z) > 0.0, size(z), 1.0))
+    return scaled(over(y, scaled(z, own)), own)
+
+
+@jit_call
+def modulus(re, im):
+    """abs(re + i im), also where a square would leave the range."""
+    size = magnitude(re) + magnitude(im)
+    e = exponent(where(is_normal(size), size, 1.0))
+    x, y = scale(re, -e), scale(im, -e)
+    return scale(sqrt(fma(x, x, y * y)), e)
+
+
+@jit_call
+def argument(re, im):
+    """The angle of re + i im in [-pi, pi), for re + i im not 0."""
+    steep = magnitude(im) > magnitude(re)
+    low, high = where(steep, re, im), where(steep, im, re)
+    angle = arctan(low / where(magnitude(high) > 0.0, high, 1.0))
+    turned = where(im < 0.0, -0.5 * math.pi, 0.5 * math.pi) - angle
+    flat = where(re < 0.0, where(im > 0.0, angle + math.pi, angle - math.pi), angle)
+    return where(steep, turned, flat)

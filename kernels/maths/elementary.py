@@ -1,0 +1,232 @@
+"""Elementary functions as branch-free polynomials, generic in one cell or lanes: the same bits in both.
+
+numba's wheels give lanes no vector math library, and a library's last digits differ from CPU to CPU.
+"""
+
+import math
+
+from kernels.lanes.jit import jit
+from kernels.lanes.vectors import exponent, fma, horner, magnitude, nearest, pow2, where
+
+LN2 = math.log(2.0)
+NORMAL_LOW, NORMAL_HIGH = 2.3e-308, 1.79e308
+_LOG2_E = 1.4426950408889634
+_LN2_HIGH, _LN2_LOW = 0.6931471805599453, 2.3190468138462996e-17
+_INVERSE_FACTORIALS = tuple(1.0 / math.factorial(n) for n in range(2, 14))
+_TAIL_FACTORIALS = tuple((-1.0) ** n / math.factorial(n + 2) for n in range(17))
+# r with r^-3 within 2.6e-4 of m on [1, 2), and the cube roots of 1, 1/2, 1/4
+_CBRT_START = (1.541886, -0.80995816, 0.31775564, -0.04993657)
+_CBRT_HALF, _CBRT_QUARTER = 0.7937005259840998, 0.6299605249474366
+_SQRT_HALF, _SQRT_2 = 0.7071067811865476, 1.4142135623730951
+_LOG_SERIES = tuple(2.0 / (2 * j + 3) for j in range(11))  # of ln((1 + s)/(1 - s)) - 2s, for abs(s) < 0.172
+_TWO_OVER_PI = 0.6366197723675814
+_HALF_PI = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33)
+_SINE = tuple((-1.0) ** j / math.factorial(2 * j + 3) for j in range(8))
+_COSINE = tuple((-1.0) ** j / math.factorial(2 * j + 4) for j in range(8))
+LOG_TAIL = (
+    0.3333333333333333,
+    0.2000000000000001,
+    0.14285714285710677,
+    0.11111111111710455,
+    0.09090909039577066,
+    0.076923102801411,
+    0.06666584219469844,
+    0.05884074478545722,
+    0.05239339771041137,
+    0.049770672966691326,
+    0.03143025125292994,
+    0.07656715655214262,
+)
+"""(atanh(s)/s - 1)/s^2 in s^2, 0 <= s <= 1/3."""
+_TAN_PI_8 = 0.41421356237309503
+_ARCTAN = tuple((-1.0) ** (j + 1) / (2 * j + 3) for j in range(20))
+
+
+@jit
+def is_normal(x):
+    """Whether a positive result is a normal float64."""
+    return (x >= NORMAL_LOW) & (x <= NORMAL_HIGH)
+
+
+@jit
+def scale(x, n):
+    """x 2^n for an integer-valued n and x between 1e-300 and 1e300; overflows to inf and underflows to 0."""
+    n = where(n > -2040.0, n, -2040.0)
+    n = where(n < 2040.0, n, 2040.0)
+    half = nearest(0.5 * n)
+    return x * pow2(half) * pow2(n - half)
+
+
+@jit
+def mantissa_exponent(x):
+    """m in [1, 2) and e with x = m 2^e, exact for every positive finite x, subnormal ones included."""
+    small = x < 1e-290
+    normal = where(small, x * 2.0**128, x)
+    e = exponent(normal)
+    return scale(normal, -e), where(small, e - 128.0, e)
+
+
+@jit
+def in_unit(x, e):
+    """x over 2^e for x >= 0, without overflow on the way."""
+    m, own = mantissa_exponent(where(x > 0.0, x, 1.0))
+    return where(x > 0.0, scale(m, own - e), 0.0)
+
+
+@jit
+def exp(x):
+    """e^x within 1 ulp; 0 below -745, inf above 710."""
+    x = where(x > -760.0, x, -760.0)
+    x = where(x < 720.0, x, 720.0)
+    n = nearest(x * _LOG2_E)
+    r = fma(-n, _LN2_LOW, fma(-n, _LN2_HIGH, x))  # abs(r) <= 0.347
+    return scale(1.0 + fma(r * r, horner(r, _INVERSE_FACTORIALS), r), n)
+
+
+@jit
+def cbrt(x):
+    """Cube root of a positive normal x, within 0.6 ulp."""
+    e = exponent(x)
+    third = nearest((e - 1.0) * (1.0 / 3.0))
+    j = e - 3.0 * third  # 0, 1, 2
+    r = horner(x * pow2(-e), _CBRT_START) * where(j > 0.5, where(j > 1.5, _CBRT_QUARTER, _CBRT_HALF), 1.0)
+    f = x * pow2(-3.0 * third)  # [1, 8)
+    error = fma(-(f * r), r * r, 1.0)
+    r = fma(r * error, fma(error, fma(error, 14.0 / 81.0, 2.0 / 9.0), 1.0 / 3.0), r)
+    y = f * (r * r)
+    y = fma(fma(-(y * y), y, f) * (1.0 / 3.0), r * r, y)
+    return y * pow2(third)
+
+
+@jit
+def exp_remainder(z):
+    """z - 1 + exp(-z) for z >= 0, to a few ulp: z^2/2 - z^3/6 + ... where the plain form would cancel."""
+    near = where(z < 1.0, z, 1.0)
+    return where(z < 1.0, (near * near) * horner(near, _TAIL_FACTORIALS), (z - 1.0) + exp(-z))
+
+
+@jit
+def log_remainder(u):
+    """u - ln(1 + u) for 0 <= u <= 1, to a few ulp: with s = u/(2 + u) it is s (u - 2 s^2 (1/3 + s^2/5 + ...))."""
+    s = u / (2.0 + u)
+    v = s * s
+    return s * fma(-2.0 * v, horner(v, LOG_TAIL), u)
+
+
+@jit
+def log_remainder3(x):
+    """ln(1 + x) - x + x^2/2 for -1/2 <= x <= 1, to a few ulp: x^2 s/2 + 2 s^3 (1/3 + s^2/5 + ...), s = x/(2 + x)."""
+    s = x / (2.0 + x)
+    v = s * s
+    return s * fma(2.0 * v, horner(v, LOG_TAIL), 0.5 * (x * x))
+
+
+@jit
+def _reduced(x):
+    """f in [sqrt(1/2) - 1, sqrt(2) - 1] and e with x = (1 + f) 2^e, for x normal and positive."""
+    e = exponent(x)
+    m = x * pow2(-e)
+    high = m > _SQRT_2
+    return where(high, 0.5 * m, m) - 1.0, where(high, e + 1.0, e)
+
+
+@jit
+def _log_sum(f, e, rest):
+    """ln(1 + f) + e ln 2 + rest, for f as in `_reduced`."""
+    s = f / (2.0 + f)
+    v = s * s
+    half = 0.5 * f * f
+    tail = s * fma(v, horner(v, _LOG_SERIES), half) + fma(e, _LN2_LOW, rest)
+    return fma(e, _LN2_HIGH, f - (half - tail))
+
+
+@jit
+def log(x):
+    """Natural logarithm within 1 ulp; -inf at 0, inf at inf, NaN below 0."""
+    small = x < 1e-290
+    normal = where(small, x * 2.0**128, x)
+    f, e = _reduced(where((normal > 0.0) & (normal < math.inf), normal, 1.0))
+    value = _log_sum(f, where(small, e - 128.0, e), 0.0)
+    value = where(x > 0.0, value, where(x < 0.0, math.nan, x - math.inf))  # NaN stays
+    return where(x < math.inf, value, x)
+
+
+@jit
+def log1p(u):
+    """ln(1 + u) within 1 ulp, u > -1; -inf at -1, inf at inf, NaN below -1."""
+    near = (u > _SQRT_HALF - 1.0) & (u < _SQRT_2 - 1.0)
+    y = 1.0 + u
+    back = y - 1.0
+    lost = (1.0 - (y - back)) + (u - back)  # y + lost = 1 + u exactly
+    inside = (y > 0.0) & (y < math.inf)
+    f, e = _reduced(where(inside, y, 1.0))
+    far = _log_sum(f, e, where(inside, lost / y, 0.0))
+    value = where(near, _log_sum(where(near, u, 0.0), 0.0, 0.0), far)
+    value = where(y > 0.0, value, where(y < 0.0, math.nan, y - math.inf))
+    return where(y < math.inf, value, y)
+
+
+@jit
+def expm1(x):
+    """e^x - 1 within 1.5 ulp; -1 below -745, inf above 710."""
+    x = where(x > -760.0, x, -760.0)
+    x = where(x < 720.0, x, 720.0)
+    n = nearest(x * _LOG2_E)
+    r = fma(-n, _LN2_LOW, fma(-n, _LN2_HIGH, x))
+    part = fma(r * r, horner(r, _INVERSE_FACTORIALS), r)
+    middle = where((n > -60.0) & (n < 60.0), n, 0.0)
+    two = pow2(middle)
+    return where(n < 60.0, where(n > -60.0, fma(two, part, two - 1.0), -1.0), scale(1.0 + part, n))
+
+
+@jit
+def artanh(x):
+    """Inverse hyperbolic tangent within 3 ulp, for -1 < x < 1."""
+    a = magnitude(x)
+    value = 0.5 * log1p(2.0 * a / (1.0 - a))
+    return where(x < 0.0, -value, value)
+
+
+@jit
+def sincos(x):
+    """Sine and cosine, within 1 ulp of the larger for abs(x) < 1e7."""
+    n = nearest(x * _TWO_OVER_PI)
+    first = fma(-n, _HALF_PI[0], x)
+    r = fma(-n, _HALF_PI[1], first)  # abs(r) <= pi/4
+    v = r * r
+    s = fma(r * v, -horner(v, _SINE), r)
+    c = 1.0 - v * (0.5 - v * horner(v, _COSINE))
+    q = n - 4.0 * nearest(0.25 * n)  # -2, -1, 0, 1, 2
+    odd = (magnitude(q) > 0.5) & (magnitude(q) < 1.5)
+    sine, cosine = where(odd, c, s), where(odd, s, c)
+    return where((q < -0.5) | (q > 1.5), -sine, sine), where((q > 0.5) | (q < -1.5), -cosine, cosine)
+
+
+@jit
+def arctan(x):
+    """Inverse tangent within 1.5 ulp, in (-pi/2, pi/2)."""
+    a = magnitude(x)
+    steep = a > 1.0
+    b = where(steep, 1.0 / a, a)
+    middle = b > _TAN_PI_8
+    c = where(middle, (b - 1.0) / (b + 1.0), b)
+    v = c * c
+    value = fma(c * v, horner(v, _ARCTAN), c)
+    value = where(middle, 0.5 * _HALF_PI[0] + value, value)
+    value = where(steep, _HALF_PI[0] - (value - _HALF_PI[1]), value)
+    return where(x < 0.0, -value, value)
+
+
+@jit
+def power(x, y):
+    """x^y for finite x >= 0 and finite y >= 0 or x > 0, within 2 + y ulp: 2^(y e) m^y for x = m 2^e; 0^0 = 1."""
+    positive = x > 0.0
+    m, e = mantissa_exponent(where(positive, x, 1.0))
+    high = m > _SQRT_2
+    f, e = where(high, 0.5 * m, m) - 1.0, where(high, e + 1.0, e)
+    whole = y * e
+    rest = fma(y, e, -whole)
+    n = nearest(whole)
+    t = y * _log_sum(f, 0.0, 0.0) + ((whole - n) + rest) * LN2
+    value = scale(exp(t), n)
+    return where(positive, value, where(y > 0.0, 0.0, 1.0))

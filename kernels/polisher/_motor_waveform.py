@@ -1,0 +1,251 @@
+"""How a linkage's arm swings over a turn: its distance from simple harmonic motion, and its fastest rates.
+
+    alpha = arg p + side psi;  arg p = sum a_k sin(k theta), a_k = -(-e/b)^k/k;  psi = sum psi_k cos(k theta)   (1)
+    thd^2 = sum_{k>1} (a_k^2 + psi_k^2)/(a_1^2 + psi_1^2)                                            (2)
+psi is a function of x = cos theta, singular only next to theta = 0 and pi, however close to dead points. So integrals
+over theta are taken by the trapezoid in u, theta = pi/(1 + e^-u): it converges geometrically (like 2^(-50) at this
+step) whatever the distances of the singularities from 0 and pi. Partial integration gives each harmonic its digits:
+    psi_1 = -(2/pi) int psi' sin theta,  psi_k = (2/pi) int psi_xx kernel_k(theta),  kernel_2 = sin^4(theta)/3   (3)
+Where more harmonics count than (3) is taken for, (2) is the mean square of what is left of (1) without the first.
+
+Rates of both types are the same in reverse order of theta. Each extreme is the best of a scan over the nodes, and the
+root of alpha'' between its neighbours.
+"""
+
+import math
+
+import numpy as np
+
+from kernels.lanes.groups import GROUP, cells_at
+from kernels.lanes.jit import jit, jit_call, jit_inline
+from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
+from kernels.maths.elementary import exp, sincos
+from kernels.polisher.extremes import smaller
+from kernels.polisher.linkage import acceleration, dead_gaps, direction, larger, opening, squares
+
+STEP = 0.28
+REACH = 133
+"""Nodes to either side of theta = pi/2; beyond lies e^-37 of the turn."""
+NODES = 2 * REACH + 1
+HARMONICS = 12
+"""Of (3), which leave 1e-16 of (2) where singularities are farther off than FAR."""
+FAR = 1.744
+"""A singularity at cos theta = 1 + FAR or -1 - FAR adds harmonics that fall like 5.3^-k."""
+TRIES = 40
+ROUNDING = 5e-15
+
+
+def _table():
+    """Sine and cosine of theta/2 and dtheta of each node."""
+    u = STEP * np.arange(-REACH, REACH + 1)
+    short = 0.5 * math.pi / (1.0 + np.exp(np.abs(u)))
+    sine, cosine = np.where(u > 0.0, np.cos(short), np.sin(short)), np.where(u > 0.0, np.sin(short), np.cos(short))
+    return sine, cosine, STEP * math.pi / ((1.0 + np.exp(-u)) * (1.0 + np.exp(u)))
+
+
+def _kernels(sine, cosine, weight):
+    """(2/pi) kernel_k dtheta of each node, k from 2 on: what twice integrating cos(k theta) by x comes to."""
+    theta = 2.0 * np.arctan2(sine, cosine)
+    rows = [
+        (
+            (np.cos((k - 2) * theta) - np.cos(k * theta)) / (k - 1)
+            - (np.cos(k * theta) - np.cos((k + 2) * theta)) / (k + 1)
+        )
+        / (4 * k)
+        for k in range(2, HARMONICS + 1)
+    ]
+    rows[0] = (2.0 * sine * cosine) ** 4 / 3.0
+    return np.array(rows) * (2.0 / math.pi * weight)
+
+
+SINE, COSINE, WEIGHT = _table()
+KERNELS = _kernels(SINE, COSINE, WEIGHT)
+
+
+@jit_call
+def pace(lengths, margin, s, c):
+    """(arg p)' and psi', of which alpha' is the sum (type A) or difference (B), then psi_xx, and psi."""
+    b, d, f, e = lengths
+    outer, inner = dead_gaps(lengths, margin, s, c)
+    rz = sqrt(outer * inner)
+    p2, q, g, k = squares(lengths, c)
+    spread = b * e / p2
+    turn = e * fma(2.0 * b * c, c, e - b) / p2
+    opened = 2.0 * (s * c) * spread * (q / rz)
+    drift = (d - f) * (d + f) / p2 - (q / rz) * (k / rz)
+    bend = -2.0 * (b * e) * spread * (drift / rz)
+    return turn, opened, bend, opening(d, p2, g, rz)
+
+
+@jit
+def smooth(lengths, margin):
+    """Whether all that counts of (2) is in the harmonics of (3)."""
+    b, d, f, e = lengths
+    m1, m2, m3 = margin
+    far = 2.0 * FAR * b * e
+    return (m1 * ((b + d) + (f + e)) > far) & (m2 * m3 > far) & (b > 5.3 * e)
+
+
+@jit_inline
+def scan(lengths, margin, forward, backward, bends, angles):
+    """Fills buffers of a group: alpha' on either half of the turn (type A), psi_xx and psi.
+
+    Returns psi_1, the mean of psi, and the sum of the sizes of what makes psi_1.
+    """
+    zero = 0.0 * lengths[0]
+    first, mean, gross = zero, zero, zero
+    for j in range(NODES):
+        s, c = SINE[j] + zero, COSINE[j] + zero
+        turn, opened, bend, psi = pace(lengths, margin, s, c)
+        forward[cells_at(j * GROUP)], backward[cells_at(j * GROUP)] = turn + opened, turn - opened
+        bends[cells_at(j * GROUP)], angles[cells_at(j * GROUP)] = bend, psi
+        share = (2.0 / math.pi) * WEIGHT[j]
+        part = 2.0 * share * (s * c) * opened
+        first, mean = first - part, fma(0.5 * share, psi, mean)
+        gross = gross + magnitude(part)
+    return first, mean, gross
+
+
+@jit_inline
+def few_harmonics(ratio, bends):
+    """sum (a_k^2 + psi_k^2) over k from 2 to HARMONICS, and the sum of terms that make psi_2."""
+    zero = 0.0 * ratio
+    total, gross, power = zero, zero, ratio
+    for k in range(2, HARMONICS + 1):
+        power = power * ratio
+        psi = zero
+        for j in range(NODES):
+            part = KERNELS[k - 2, j] * bends[cells_at(j * GROUP)]
+            psi = psi + part
+            gross = where(k < 3, gross + magnitude(part), gross)
+        sine = power * (1.0 / k)
+        total = fma(psi, psi, fma(sine, sine, total))
+    return total, gross
+
+
+@jit_inline
+def all_harmonics(lengths, ratio, first, mean, angles):
+    """The same sum over all k, as twice the mean square of what the first harmonic leaves."""
+    zero = 0.0 * ratio
+    total = zero
+    for j in range(NODES):
+        s, c = SINE[j] + zero, COSINE[j] + zero
+        even = angles[cells_at(j * GROUP)] - mean - first * ((c - s) * (c + s))
+        odd = direction(lengths, 2.0 * zero, s, c) - ratio * (2.0 * s * c)
+        total = fma((2.0 / math.pi) * WEIGHT[j], fma(even, even, odd * odd), total)
+    return total
+
+
+@jit_inline
+def distortion(lengths, margin, scanned, bends, angles):
+    """thd of (2), and its relative error; `scanned` is what `scan` returns."""
+    b, _, _, e = lengths
+    first, mean, gross = scanned
+    moves = e > 0.0
+    ratio = e / b
+    few = smooth(lengths, margin)
+    rest, lost = 0.0 * b, 0.0 * b
+    if some(few):
+        of_few, terms = few_harmonics(ratio, bends)
+        root = sqrt(of_few)
+        rest, lost = where(few, root, rest), where(few, terms, lost)
+    if some(isnt(few)):
+        root = sqrt(all_harmonics(lengths, ratio, first, mean, angles))
+        rest, lost = where(few, rest, root), where(few, lost, 2.0 + mean)
+    fundamental = sqrt(fma(first, first, ratio * ratio))
+    doubt = ROUNDING * 0.1 * (lost / rest + gross / fundamental) + ROUNDING
+    return where(moves, rest / fundamental, 0.0), where(moves, doubt, ROUNDING)
+
+
+@jit_inline
+def _two_peaks(sign, buffer, half, found):
+    """The two highest local maxima of sign alpha' among `found` and the nodes of one half of the turn.
+
+    `found` has height, node, half of the turn and height of the lower neighbour, of the best and the second.
+    """
+    best, second = found
+    zero = 0.0 * best[1]
+    before, here = zero - math.inf, sign * buffer[cells_at(0)]
+    for j in range(NODES):
+        after = zero - math.inf
+        if j + 1 < NODES:
+            after = sign * buffer[cells_at((j + 1) * GROUP)]
+        new = here, zero + j, zero + half, smaller(before, after)
+        peak = (here >= before) & (here > after)
+        first, other = peak & (here > best[0]), peak & (here > second[0])
+        second = choose(first, best, choose(other, new, second))
+        best = choose(first, new, best)
+        before, here = here, after
+    return best, second
+
+
+@jit
+def at_node(place, half):
+    """Sine and cosine of theta/2 at a place between nodes, on either half of the turn."""
+    u = STEP * (place - REACH)
+    s, c = sincos(0.5 * math.pi / (1.0 + exp(magnitude(u))))
+    return half * where(u > 0.0, c, s), where(u > 0.0, s, c)
+
+
+@jit_call
+def _slope(lengths, margin, sign, place, half):
+    """Whether sign alpha' rises with `place`: alpha'' there."""
+    s, c = at_node(place, half)
+    outer, inner = dead_gaps(lengths, margin, s, c)
+    return sign * half * acceleration(lengths, margin, squares(lengths, c), sqrt(outer * inner), 1.0, s, c)
+
+
+@jit_call
+def _top(lengths, margin, sign, peak):
+    """The height of one peak at the root of alpha'' beside its node, and what may be missing from it.
+
+    Regula falsi with halved ends (Illinois) until the step is 1e-9 of a node: an extreme's height then has its digits.
+    """
+    height, node, half, beside = peak
+    low, high = node - 1.0, node + 1.0
+    at_low, at_high = _slope(lengths, margin, sign, low, half), _slope(lengths, margin, sign, high, half)
+    settled = (at_low > 0.0) & (at_high < 0.0)
+    active, place, side = settled, node, 0.0 * node
+    for _ in range(TRIES):
+        if not some(active):
+            break
+        new = (low * at_high - high * at_low) / (at_high - at_low)
+        here = _slope(lengths, margin, sign, new, half)
+        up, down = active & (here > 0.0), active & isnt(here > 0.0)
+        at_low = where(up, here, where(down & (side < 0.0), 0.5 * at_low, at_low))
+        at_high = where(down, here, where(up & (side > 0.0), 0.5 * at_high, at_high))
+        low, high = where(up, new, low), where(down, new, high)
+        side = where(up, 1.0, where(down, -1.0, side))
+        place, done = where(active, new, place), magnitude(new - place) <= 1e-9
+        active = active & isnt(done)
+    s, c = at_node(place, half)
+    turn, opened, _, _ = pace(lengths, margin, magnitude(s), c)
+    top = sign * fma(half, opened, turn)
+    better = settled & (top > height)
+    missing = where(settled, 0.0, where(beside > -math.inf, height - beside, 0.0))
+    return where(better, top, height), missing
+
+
+@jit_call
+def fastest(lengths, margin, sign, forward, backward):
+    """The largest sign alpha' over the turn, and what may be missing from it."""
+    zero = 0.0 * lengths[0]
+    nowhere = zero - math.inf, zero, zero + 1.0, zero
+    found = _two_peaks(sign, forward, 1.0, (nowhere, nowhere))
+    best, second = _two_peaks(sign, backward, -1.0, found)
+    highest, missing = _top(lengths, margin, sign, best)
+    other, more = _top(lengths, margin, sign, second)
+    over = other > highest
+    return where(over, other, highest), where(over, more, missing)
+
+
+@jit_inline
+def rates(lengths, margin, forward, backward):
+    """Largest and least alpha' of a crank that turns, and the larger of their relative errors."""
+    moves = lengths[3] > 0.0
+    most, missing = fastest(lengths, margin, 1.0, forward, backward)
+    least, more = fastest(lengths, margin, -1.0, forward, backward)
+    span = larger(magnitude(most), magnitude(least))
+    doubt = (missing + 0.2 * ROUNDING * span) / magnitude(most)
+    doubt = larger(doubt, (more + 0.2 * ROUNDING * span) / magnitude(least))
+    return where(moves, most, 0.0), where(moves, -least, 0.0), where(moves, doubt, 0.0)

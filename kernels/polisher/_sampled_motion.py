@@ -1,0 +1,174 @@
+"""A linkage's arm by dense sampling of a turn: the slow way, which knows no formula but that of the motion.
+
+The turn is sampled at SAMPLES equal steps of the crank; extremes of alpha are where alpha' changes its sign, those of
+alpha' where alpha'' does, each by bisection between the samples; harmonics are sums over the samples. One cell at a
+time: every search goes its own way.
+"""
+
+import math
+
+from kernels.lanes.jit import jit, jit_call, jit_inline
+from kernels.lanes.vectors import magnitude, sqrt
+from kernels.polisher.extremes import angle, smaller
+from kernels.polisher.linkage import crank, dead_gaps, larger, motion, squares
+
+SAMPLES = 2048
+HALVINGS = 60
+WIDEST = 32.0
+"""Steps of the crank on which a dead point must have its effect to be seen."""
+ROUNDING = 1e-15
+"""Error of alpha, of rates over the fastest, and of crank angles where alpha'' is as large as alpha'."""
+
+
+@jit_call
+def at(cell, theta):
+    """alpha, alpha', alpha'' of type A; NaN where it is locked. `cell` is lengths and margins."""
+    whole, s, c = crank(theta, 0.0)
+    return motion(cell[0], cell[1], 1.0, whole, s, c)
+
+
+@jit
+def step(j):
+    """The crank angle of a sample, from -pi on."""
+    return math.pi * (2 * j - SAMPLES) / SAMPLES
+
+
+@jit_inline
+def sample(cell, alphas, rates, bends):
+    """Fills the three columns of a turn; returns inf where a dead point is passed between two samples, else 0."""
+    for j in range(SAMPLES):
+        alphas[j], rates[j], bends[j] = at(cell, step(j))
+    b, d, f, e = cell[0]
+    m1, m2, m3 = cell[1]
+    narrow = 4.0 * b * e * (WIDEST * math.pi / SAMPLES) ** 2
+    wide = m1 * (b + d + f + e) > narrow and m2 * m3 > narrow and (b - e) ** 2 > narrow
+    return 0.0 if wide else math.inf
+
+
+@jit
+def largest(column, sign):
+    """The sample at which sign times a column is largest."""
+    best = 0
+    for j in range(SAMPLES):
+        if sign * column[j] > sign * column[best]:
+            best = j
+    return best
+
+
+@jit_call
+def turning(cell, order, sign, j):
+    """Where sign times the derivative of that order falls through 0, next to sample j; NaN where it does not."""
+    low, high = step(j - 1), step(j + 1)
+    if not (sign * at(cell, low)[order] > 0.0 and sign * at(cell, high)[order] < 0.0):
+        return math.nan
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if sign * at(cell, middle)[order] > 0.0:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+@jit_inline
+def extremes(cell, alphas):
+    """A0, A1, eta_plus, eta_minus; theta_plus, theta_minus; and their largest relative error."""
+    at_plus, at_minus = turning(cell, 1, 1.0, largest(alphas, 1.0)), turning(cell, 1, -1.0, largest(alphas, -1.0))
+    at_plus = at_plus if at_plus > 0.0 else at_plus + math.tau
+    at_minus = at_minus if at_minus < 0.0 else at_minus - math.tau
+    plus, _, plus_bend = at(cell, at_plus)
+    minus, _, minus_bend = at(cell, at_minus)
+    swing = 0.5 * (plus - minus)
+    lost = ROUNDING * (1.0 + plus) / larger(0.0, smaller(minus, swing))
+    misplaced = (1.0 + swing / magnitude(plus_bend)) / at_plus, (1.0 + swing / magnitude(minus_bend)) / -at_minus
+    lost = larger(lost, ROUNDING * larger(misplaced[0], misplaced[1]))
+    return (0.5 * (plus + minus), swing, plus, minus), (at_plus, at_minus), lost
+
+
+@jit_call
+def fastest(cell, sign, rates):
+    """The largest alpha' (sign +1) or the least; every sample that may be next to it is followed up."""
+    top, best = sign * rates[largest(rates, sign)], -math.inf
+    for j in range(SAMPLES):
+        here = sign * rates[j]
+        close = here >= top - 0.1 * magnitude(top)
+        if close and here >= sign * rates[j - 1] and here >= sign * rates[(j + 1) % SAMPLES]:
+            theta = turning(cell, 2, sign, j)
+            here = larger(here, sign * at(cell, theta)[1]) if theta == theta else here
+            best = larger(best, here)
+    return sign * best
+
+
+@jit_call
+def distortion(alphas, stride):
+    """thd of every `stride`-th sample, and the amplitude of the first harmonic."""
+    n = SAMPLES // stride
+    mean, even, odd, rest = 0.0, 0.0, 0.0, 0.0
+    for j in range(0, SAMPLES, stride):
+        mean += alphas[j] / n
+        even += 2.0 * alphas[j] * math.cos(step(j)) / n
+        odd += 2.0 * alphas[j] * math.sin(step(j)) / n
+    for j in range(0, SAMPLES, stride):
+        left = alphas[j] - mean - even * math.cos(step(j)) - odd * math.sin(step(j))
+        rest += 2.0 * left * left / n
+    first = math.sqrt(even * even + odd * odd)
+    return math.sqrt(rest) / first, first
+
+
+@jit_inline
+def rates(cell, alphas, speeds):
+    """thd, the largest and the least rate, and the largest of their relative errors."""
+    most, least = fastest(cell, 1.0, speeds), fastest(cell, -1.0, speeds)
+    span = larger(magnitude(most), magnitude(least))
+    lost = 4.0 * ROUNDING * span / smaller(magnitude(most), magnitude(least))
+    if cell[0][3] > cell[0][0]:
+        return (math.nan, most, least), lost
+    thd, first = distortion(alphas, 1)
+    coarse, _ = distortion(alphas, 2)
+    return (thd, most, least), larger(lost, (magnitude(thd - coarse) + 4.0 * ROUNDING / first) / thd)
+
+
+@jit_inline
+def pressed(cell):
+    """The least angle between coupler and arm, or their extensions, of all samples."""
+    least = math.pi
+    for j in range(SAMPLES):
+        _, s, c = crank(step(j), 0.0)
+        outer, inner = dead_gaps(cell[0], cell[1], s, c)
+        least = smaller(least, angle(sqrt(outer * inner), magnitude(squares(cell[0], c)[3])))
+    return least
+
+
+@jit_call
+def is_free(cell, theta):
+    """Whether the crank can stand there."""
+    alpha = at(cell, theta)[0]
+    return alpha == alpha
+
+
+@jit_call
+def lock(cell, goal):
+    """Where the crank locks on its way to the goal, 0 or pi; NaN where it does not; and its relative error."""
+    free, start = is_free(cell, goal), math.nan
+    for j in range(SAMPLES // 2 + 1):
+        theta = goal + (1.0 if goal < 1.0 else -1.0) * math.pi * j / (SAMPLES // 2)
+        if start != start and is_free(cell, theta):
+            start = theta
+    stuck = goal
+    for _ in range(HALVINGS):
+        middle = 0.5 * (start + stuck)
+        if is_free(cell, middle):
+            start = middle
+        else:
+            stuck = middle
+    lost = 4.0 * ROUNDING * (1.0 + 1.0 / (start * start)) if start == start else math.inf
+    return math.nan if free else start, 0.0 if free else lost
+
+
+@jit_inline
+def locks(cell):
+    """The locks nearest to 0 and to pi, as `extremes.locks`; and their largest relative error."""
+    inner, inner_lost = lock(cell, 0.0)
+    outer, outer_lost = lock(cell, math.pi)
+    lost = larger(inner_lost, outer_lost)
+    return ((inner, outer) if inner == inner else (outer, inner)), lost

@@ -1,0 +1,169 @@
+"""Polishing machine: angle, rate and acceleration of its arm, and the way of the tool, along the crank's angle.
+
+    b + e - d = f,  alpha = b_angle + arg p + side psi                                               (1)
+    x = L cos(alpha + beta), y = L sin(alpha + beta)                                                 (2)
+with (1) as in `linkage`, at a constant rate omega of the crank. alpha is continuous in the crank's angle: for e < b
+it stays within half a turn of b, above it for type A and below for type B; for e > b it turns with the crank, from
+its value at crank_angle = b_angle within half a turn of b. The tool is fixed to the arm, at a distance L from the pivot
+and an angle beta ahead of the arm; without L it is where the arm meets the coupler.
+Source: Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (2)-(19), corrected as `linkage` says; the printed
+"tool centre" of (12) and (15) is the arm's end.
+
+LOCK_UP: NaN where the crank cannot come to; CHANGE_POINT: the branch goes on smoothly beside p, and where the linkage
+lies flat rate and acceleration are NaN; DOUBLE_CRANK: the arm turns. Close to a lock the digits of the crank's angle
+count more than once: INACCURATE.
+"""
+
+import math
+
+import numpy as np
+
+from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
+from kernels.lanes.columns import each_cell, entry
+from kernels.lanes.groups import GROUP, cells_at, each_group, write_row
+from kernels.lanes.jit import jit
+from kernels.lanes.vectors import isnt, magnitude, where
+from kernels.maths.elementary import arctan, sincos
+from kernels.polisher._cell import CHANGE_POINT, LOCK_UP, OK, OUT_OF_RANGE, judged, said
+from kernels.polisher.arm import EXAMPLE as MACHINE
+from kernels.polisher.arm import PARAMETERS as LENGTHS
+from kernels.polisher.arm import allowed
+from kernels.polisher.extremes import smaller
+from kernels.polisher.linkage import crank, larger, lock_doubt, motion, side_of
+
+ROUNDING = 3e-15
+"""Error over the largest value of the trace; of x and y over L."""
+FARTHEST = 1e6
+"""Crank angle, beyond which a radian has lost its digits."""
+RATE_LIMIT = 1e140
+"""omega, beyond which, or below the inverse of which, its square leaves float64."""
+
+_BAD_INPUT, _INACCURATE = float(Status.BAD_INPUT), float(Status.INACCURATE)
+_REFUSED = int(Status.BAD_INPUT)
+
+
+@jit
+def _within(crank_angle):
+    """Whether every angle asked for is a number that has its digits."""
+    fine = True
+    for angle in crank_angle:
+        fine = fine and abs(angle) <= FARTHEST
+    return fine
+
+
+@jit
+def _branch(lengths, margin, code):
+    """The margins; those of a change point without what rounding has taken them past 0 by."""
+    m1, m2, m3 = margin
+    flat, long_crank = said(code, CHANGE_POINT), lengths[3] > lengths[0]
+    back = where(long_crank, smaller(m2, 0.0), larger(m2, 0.0))
+    front = where(long_crank, smaller(m3, 0.0), larger(m3, 0.0))
+    return where(flat, larger(m1, 0.0), m1), where(flat, back, m2), where(flat, front, m3)
+
+
+@jit
+def _angles(lengths, margin, side, crank_angle, b_angle):
+    """alpha from b within a turn, what turns add to it, alpha', alpha'', and the doubt close to a lock."""
+    theta, s, c = crank(crank_angle, b_angle)
+    within = 2.0 * arctan(s / c)  # theta in [-pi, pi]
+    alpha, rate, acceleration = motion(lengths, margin, side, within, s, c)
+    turns = where(lengths[3] > lengths[0], theta - within, 0.0)
+    doubt = where(rate - rate >= 0.0, 2.0 * lock_doubt(lengths, margin, s, c), 0.0)
+    return (alpha, turns, rate, acceleration), doubt
+
+
+@jit
+def _follow(
+    first, b, d, f, e, type, omega, b_angle, L, beta, rtol, crank_angle, row,
+    alpha, alpha_rate, alpha_acceleration, x, y, status,
+):  # fmt: skip
+    i = cells_at(first)
+    lengths, _, margin, code = judged(b[i], d[i], f[i], e[i])
+    margin, side, w = _branch(lengths, margin, code), side_of(type[i]), omega[i]
+    worst = 0.0 * code
+    for j in range(crank_angle.size):
+        angles, doubt = _angles(lengths, margin, side, 0.0 * code + crank_angle[j], b_angle[i])
+        worst = larger(worst, doubt)
+        write_row(first, j, b_angle[i] + (angles[0] + angles[1]), row, alpha)
+        write_row(first, j, w * angles[2], row, alpha_rate)
+        write_row(first, j, w * w * angles[3], row, alpha_acceleration)
+        sine, cosine = sincos(b_angle[i] + (angles[0] + beta[i]))
+        write_row(first, j, L[i] * cosine, row, x)
+        write_row(first, j, L[i] * sine, row, y)
+    fast = magnitude(w)
+    fine = ((fast <= RATE_LIMIT) & (fast >= 1.0 / RATE_LIMIT)) | isnt(fast > 0.0)
+    code = where(said(code, LOCK_UP) & isnt(worst <= rtol[i]), _INACCURATE, code)
+    status[i] = where(fine | (code >= FIRST_REFUSAL), code, OUT_OF_RANGE)
+
+
+@entry("crank_angle")
+def closed(
+    b, d, f, e, type, omega, b_angle, L, beta, rtol, crank_angle, alpha, alpha_rate, alpha_acceleration, x, y, status
+):
+    """Closed forms of sums without error."""
+    row = np.empty(GROUP)
+    if _within(crank_angle):
+        columns = (
+            b, d, f, e, type, omega, b_angle, L, beta, rtol, crank_angle, row,
+            alpha, alpha_rate, alpha_acceleration, x, y, status,
+        )  # fmt: skip
+        each_group(_follow, columns)
+    else:
+        status[:] = _REFUSED
+
+
+@entry("crank_angle", "asked")
+def closed_bound(b, d, f, e, type, omega, b_angle, L, beta, rtol, crank_angle, asked, out):
+    """Rounding; close to a lock the status says more."""
+    out[:] = ROUNDING
+
+
+@jit
+def _check(i, b, d, f, e, type, omega, b_angle, L, beta, status):
+    fine = allowed(b[i], d[i], f[i], e[i], type[i]) & (magnitude(omega[i]) < math.inf)
+    fine = fine & (magnitude(b_angle[i]) <= math.tau) & (magnitude(beta[i]) <= math.tau)
+    status[i] = where(fine & (L[i] >= 0.0) & (L[i] < math.inf), OK, _BAD_INPUT)
+
+
+@entry()
+def check(b, d, f, e, type, omega, b_angle, L, beta, status):
+    """BAD_INPUT as for `polisher`, and angles beyond a turn."""
+    each_cell(_check, (b, d, f, e, type, omega, b_angle, L, beta, status))
+
+
+POLISHER_MOTION = Kernel(
+    name="polisher_motion",
+    doc="motion of a polishing machine's arm and tool along the crank's angle",
+    source="Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (2)-(19), corrected",
+    parameters=(
+        *LENGTHS,
+        Field("omega", "rad/s", "angular rate of the crank, either way"),
+        Field(
+            "b_angle",
+            "rad",
+            "direction of b, from the pivot to the motor",
+            default=0.0,
+            lower=-math.tau,
+            upper=math.tau,
+        ),
+        Field("L", "m", "distance of the tool's centre from the pivot", default="d", lower=0.0),
+        Field(
+            "beta", "rad", "angle of the tool's centre ahead of the arm", default=0.0, lower=-math.tau, upper=math.tau
+        ),
+    ),
+    outputs=(
+        Field("alpha", "rad", "angle of the arm", dims=("crank_angle",)),
+        Field("alpha_rate", "rad/s", "angular rate of the arm", dims=("crank_angle",)),
+        Field("alpha_acceleration", "rad/s^2", "angular acceleration of the arm", dims=("crank_angle",)),
+        Field(
+            "x", "m", "tool's centre from the pivot, in the direction from which angles count", dims=("crank_angle",)
+        ),
+        Field("y", "m", "tool's centre from the pivot, across that", dims=("crank_angle",)),
+    ),
+    along=(
+        Field("crank_angle", "rad", "angle of the crank, from where b_angle counts", lower=-FARTHEST, upper=FARTHEST),
+    ),
+    check=check,
+    methods=(Method("closed", "closed forms of sums without error", closed, closed_bound),),
+    example=dict(MACHINE) | {"omega": 6.0},
+)

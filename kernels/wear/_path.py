@@ -1,0 +1,160 @@
+"""The way of one point of a turning workpiece under the tool of a polishing machine, and the polishing on it.
+
+In the frame of the tool it is at Q(t) = R(-phi) x(t) - (L, 0), x = w + r0 (cos, sin)(theta0 + Omega t), and moves there
+with the speed v of polishing: abs(dQ/dt) = v. The second derivative is bounded,
+    abs(Q'') <= (abs(Omega) r0)^2/r0 + 2 abs(phi' Omega) r0 + (abs(phi'') + phi'^2) (w + r0) = bend       (1)
+so that over a time h the way lies within bend h^2/8 of its chord. By bounds on abs(X/a)^n + abs(Y/b)^m and on its rate
+over such a box, each stretch of time is inside, outside, or crossed once; else it is halved. So no touch is overlooked.
+
+Time goes in steps of a share of the crank's turn; whole turns are taken off without rounding. Derived here.
+"""
+
+import math
+
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.vectors import fma, magnitude, nearest, sqrt
+from kernels.maths.pairs import two_product
+from kernels.polisher import linkage
+from kernels.wear._tool import excess, power, sincos
+
+STEPS = 24
+"""Steps of a turn of the crank or the work, whichever is faster."""
+STEP_LIMIT = 20_000_000
+HALVINGS = 44
+
+_EPS = 2.0**-52
+_TURN = 2.0 * math.pi
+_SAMPLES = 256
+_MARGIN = 1.5
+_BISECTIONS = 80
+
+
+@jit_call
+def position(scene, cranked, turned, s):
+    """X, Y and their rates at a time s after the crank had turned by `cranked` and the point was at `turned`."""
+    (lengths, margin, side, b_angle), (speed, spin, reach, x, y, beta), r, _ = scene
+    theta, half_s, half_c = linkage.crank(cranked + speed * s, b_angle)
+    alpha, rate, _ = linkage.motion(lengths, margin, side, theta, half_s, half_c)
+    rate = speed * rate
+    sine, cosine = sincos(turned + spin * s)
+    sine, cosine = r * sine, r * cosine
+    sine_arm, cosine_arm = sincos(alpha + (b_angle + beta))
+    px, py = x + cosine, y + sine
+    vx, vy = rate * py - spin * sine, spin * cosine - rate * px
+    return (
+        px * cosine_arm + py * sine_arm - reach,
+        py * cosine_arm - px * sine_arm,
+        vx * cosine_arm + vy * sine_arm,
+        vy * cosine_arm - vx * sine_arm,
+    )
+
+
+@jit_call
+def facing(scene, cranked, s):
+    """Cosine and sine of the arm's angle from the direction of w at a time s."""
+    (lengths, margin, side, b_angle), (speed, _, _, x, y, beta), _, _ = scene
+    theta, half_s, half_c = linkage.crank(cranked + speed * s, b_angle)
+    alpha, _, _ = linkage.motion(lengths, margin, side, theta, half_s, half_c)
+    sine_arm, cosine_arm = sincos(alpha + (b_angle + beta))
+    w = sqrt(x * x + y * y)
+    if not w > 0.0:
+        return 1.0, 0.0
+    return (x * cosine_arm + y * sine_arm) / w, (x * sine_arm - y * cosine_arm) / w
+
+
+@jit_call
+def bend(scene):
+    """(1), from samples of the arm's motion that are dense about the dead points, half as much again."""
+    (lengths, margin, side, _), (speed, spin, _, x, y, _), r, _ = scene
+    rate, acceleration = 0.0, 0.0
+    for k in range(_SAMPLES + 160):
+        theta = _TURN * k / _SAMPLES
+        if k >= _SAMPLES:
+            j = k - _SAMPLES
+            theta = (math.pi if j % 2 else 0.0) + (1.0 if j % 4 < 2 else -1.0) * 2.0 ** (-(j // 4))
+        theta, s, c = linkage.crank(theta, 0.0)
+        _, first, second = linkage.motion(lengths, margin, side, theta, s, c)
+        rate, acceleration = max(rate, magnitude(first)), max(acceleration, magnitude(second))
+    rate, acceleration = magnitude(speed) * rate, speed * speed * acceleration
+    far = sqrt(x * x + y * y) + r
+    return _MARGIN * (spin * spin * r + 2.0 * rate * magnitude(spin) * r + (acceleration + rate * rate) * far)
+
+
+@jit
+def _range(x, y, spread):
+    """Least and largest abs of what lies between x and y, or within `spread` of that."""
+    low, high = min(x, y) - spread, max(x, y) + spread
+    return (0.0 if low * high <= 0.0 else min(magnitude(low), magnitude(high))), max(magnitude(low), magnitude(high))
+
+
+@jit_call
+def _rate_bounds(size, k, x1, x2, spread, v, turn):
+    """Bounds on the rate of abs(x/size)^k over a box of x and rates within `turn` of v."""
+    least, most = _range(x1, x2, spread)
+    if least == 0.0 and k < 1.0:
+        return -math.inf, math.inf
+    g1, g2 = k / size * power(min(least / size, 8.0), k - 1.0), k / size * power(min(most / size, 8.0), k - 1.0)
+    low, high = min(g1, g2), max(g1, g2)
+    if least == 0.0:  # the coordinate's sign changes
+        reach = high * (magnitude(v) + turn)
+        return -reach, reach
+    v = v if x1 > 0.0 else -v
+    slow, fast = v - turn, v + turn
+    return slow * (low if slow > 0.0 else high), fast * (high if fast > 0.0 else low)
+
+
+INSIDE, OUTSIDE, ONCE, UNKNOWN = range(4)
+
+
+@jit_call
+def judged(tool, one, two, h, curve):
+    """Whether a stretch of time h between two positions is INSIDE, OUTSIDE, crossed ONCE at most, or UNKNOWN."""
+    spread = 0.125 * curve * h * h
+    x_low, x_high = _range(one[0], two[0], spread)
+    y_low, y_high = _range(one[1], two[1], spread)
+    if excess(tool, x_high, y_high) < 0.0:
+        return INSIDE
+    if excess(tool, x_low, y_low) > 0.0:
+        return OUTSIDE
+    x_least, x_most = _rate_bounds(tool[0], tool[2], one[0], two[0], spread, one[2], curve * h)
+    y_least, y_most = _rate_bounds(tool[1], tool[3], one[1], two[1], spread, one[3], curve * h)
+    return ONCE if x_least + y_least > 0.0 or x_most + y_most < 0.0 else UNKNOWN
+
+
+@jit_call
+def crossing(scene, cranked, turned, low, high):
+    """The time between low and high at which the outline is crossed, and what rounding may come to in it."""
+    tool = scene[3]
+    x, y, _, _ = position(scene, cranked, turned, high)
+    rising = excess(tool, x, y) > 0.0
+    first = low
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        x, y, _, _ = position(scene, cranked, turned, middle)
+        if (excess(tool, x, y) > 0.0) == rising:
+            high = middle
+        else:
+            low = middle
+        if high - low <= _EPS * (high - first):
+            break
+    s = 0.5 * (low + high)
+    x, y, vx, vy = position(scene, cranked, turned, s)
+    gx = _slope(tool[0], tool[2], x)
+    gy = _slope(tool[1], tool[3], y)
+    far = scene[1][2] + magnitude(x) + magnitude(y)
+    pace = magnitude(gx * vx + gy * vy)
+    return s, 8.0 * _EPS * far * (magnitude(gx) + magnitude(gy)) / pace if pace > 0.0 else math.inf
+
+
+@jit
+def _slope(size, k, x):
+    u = min(magnitude(x) / size, 8.0)
+    slope = k / size * power(u, k - 1.0) if u > 0.0 else 0.0
+    return slope if x > 0.0 else -slope
+
+
+@jit
+def phase(j, ratio, ratio_low):
+    """j (ratio + ratio_low) turns, without the whole ones, as an angle."""
+    product, lost = two_product(float(j), ratio)
+    return _TURN * ((product - nearest(product)) + fma(float(j), ratio_low, lost))

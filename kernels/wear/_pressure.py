@@ -1,0 +1,222 @@
+"""Pressure of a constant load on a tool that may hang over the workpiece's rim, by the angle of the arm.
+
+    p(phi) = load/A(phi),  A: area of the tool within the disc of the workpiece                      (1)
+A depends on the arm's angle phi from the direction of w alone, and not on its sign, for the tool is alike on both sides
+of the arm: the disc's centre is at (w cos phi - L, -w sin phi) in the tool's frame. Hence a table of it for each
+machine, once for all radii: polynomials on panels of phi, parted where the rim passes the tool's vertices and halved
+until they hold, each with what it may be wrong by. Where A -> 0 the pressure has no bound, nor has wear at the very rim
+of a workpiece that the tool leaves: this is said by the error. Derived here.
+"""
+
+import math
+
+import numpy as np
+
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.vectors import magnitude, sqrt
+from kernels.maths.elementary import in_unit
+from kernels.wear import _contact, _scene, _tool
+from kernels.wear._tool import arctan2, sincos
+
+PANEL_LIMIT = 1024
+LOW, HIGH, DOUBT, SLOPE, FIRST = range(5)
+NODES = 16
+TABLE = (PANEL_LIMIT, FIRST + NODES)
+FAINT = 1e-13
+"""Share of the largest area that contact may have, below which its area is not told from none."""
+
+_EPS = 2.0**-52
+_STARTS = 16
+_NARROW = 2.0**-46
+_SLACK = 1e-6
+_HOPELESS = 1e100
+_TESTS = 2
+_SHARE = 0.02  # of rtol, for the areas
+_NO_MATTER = 5, 11, 16, 17, 18
+"""Parameters on which no area hangs: rates, preston and how hard the tool is pressed; and all from 20 on."""
+_TURN = 2.0 * math.pi
+_COSINES = np.cos(np.pi * np.outer(np.arange(NODES + _TESTS), np.arange(NODES) + 0.5) / NODES)
+_TRIED = 0.83, -0.41
+
+
+@jit_call
+def room():
+    """Memory for a table, and for building it."""
+    return (
+        np.empty(TABLE), np.empty(_tool.ARC_LIMIT), np.empty(NODES + _TESTS), np.empty(_tool.ARC_LIMIT),
+        np.empty(_contact.POINTS), np.empty(_tool.STACK),
+    )  # fmt: skip
+
+
+@jit
+def unloaded(table):
+    """What stands for a load where the pressure is given: no panels, and the least and largest area."""
+    return table, int(0.0), 1.0, 1.0
+
+
+@jit_call
+def _area_at(phi, scene, spots):
+    """Area of contact with the arm at phi from the direction of w, and what it may be wrong by."""
+    tool, whole, reach, w, radius = scene
+    s, c = sincos(phi)
+    return _contact.contact_area(tool, whole, (w * c - reach, -w * s, radius), spots)
+
+
+@jit
+def _folded(phi):
+    """The angle in [0, pi] of the same cosine, of one in [-2 pi, 2 pi]."""
+    phi = magnitude(phi)
+    return _TURN - phi if phi > math.pi else phi
+
+
+@jit_call
+def _stops(scene, stops):
+    """Angles between which the table's panels are opened: an even grid, and where the rim passes vertices; how many."""
+    (a, b, _, _, half_x, half_y), _, reach, w, radius = scene
+    count = int(0.0)
+    for k in range(_STARTS + 1):
+        stops[count] = math.pi * k / _STARTS
+        count += 1
+    for k in range(5):
+        x = (a, -a, 0.0, a * half_x, -a * half_x)[k] + reach
+        y = (0.0, 0.0, b, b * half_y, b * half_y)[k]
+        rho = sqrt(x * x + y * y)
+        cosine, unit = w * w + rho * rho - radius * radius, 2.0 * w * rho
+        if magnitude(cosine) < unit:
+            chi, gamma = arctan2(sqrt((unit - cosine) * (unit + cosine)), cosine), arctan2(y, x)
+            stops[count], stops[count + 1] = _folded(chi + gamma), _folded(chi - gamma)
+            count += 2
+    _tool.sort(stops, count)
+    return count
+
+
+@jit_call
+def _passes(arm, turn, low, high):
+    """Whether the arm comes to an angle phi between low and high, on either side."""
+    if arm[3]:
+        return True
+    least, most = arm[2]
+    for k in range(-2, 3):
+        shift = turn + k * _TURN
+        ahead = shift + low - _SLACK <= most and shift + high + _SLACK >= least
+        if ahead or (shift - high - _SLACK <= most and shift - low + _SLACK >= least):
+            return True
+    return False
+
+
+@jit_call
+def _polynomial(row, t):
+    """Value of a panel at t in [-1, 1], by Clenshaw's recurrence."""
+    one, two = 0.0, 0.0
+    for k in range(NODES - 1, 0, -1):
+        one, two = 2.0 * t * one - two + row[FIRST + k], one
+    return t * one - two + row[FIRST]
+
+
+@jit_call
+def _fit(row, low, high, scene, values, spots):
+    """Fills a panel; its least and largest area, and the least noise of its values.
+
+    The error is four times the last three coefficients, and not less than what is seen at two angles more.
+    """
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    least, most, noise, calm = math.inf, 0.0, 0.0, math.inf
+    for j in range(NODES + _TESTS):
+        t = _COSINES[1, j] if j < NODES else _TRIED[j - NODES]
+        values[j], doubt = _area_at(middle + half * t, scene, spots)
+        least, most = min(least, values[j]), max(most, values[j])
+        noise, calm = max(noise, doubt), min(calm, doubt)
+    slope, last = 0.0, 0.0
+    for k in range(NODES):
+        total = 0.0
+        for j in range(NODES):
+            total += _COSINES[k, j] * values[j]
+        total *= (1.0 if k == 0 else 2.0) / NODES
+        row[FIRST + k] = total
+        slope += k * k * magnitude(total) / half
+        last += magnitude(total) if k >= NODES - 3 else 0.0
+    for j in range(_TESTS):
+        last = max(last, magnitude(_polynomial(row, _TRIED[j]) - values[NODES + j]))
+    row[LOW], row[HIGH], row[SLOPE], row[DOUBT] = low, high, slope, 4.0 * last + noise
+    return least, most, calm
+
+
+@jit_call
+def table_of(arm, tool, ride, radius, tolerance, memory):
+    """The areas of contact of a machine: table, its panels, and the least and largest area that its tool may have.
+
+    radius : of the workpiece; tolerance : of the area, relative, wanted
+    """
+    table, stops, values, found, points, stack = memory
+    _, _, reach, w, c, s = ride
+    whole = _contact.whole_area(tool)
+    radius = min(radius, 4.0 * (reach + w + tool[0] + tool[1]))
+    scene, turn = (tool, whole, reach, w, radius), arctan2(s, c)
+    largest, lowest = min(whole, math.pi * radius * radius), math.inf
+    todo, count, low = _stops(scene, stops), int(0.0), 0.0
+    for k in range(todo // 2):
+        stops[k], stops[todo - 1 - k] = stops[todo - 1 - k], stops[k]
+    while todo > 0:
+        high = stops[todo - 1]
+        if high - low > _EPS and _passes(arm, turn, low, high):
+            least, most, calm = _fit(table[count], low, high, scene, values, (found, points, stack))
+            fine = table[count, DOUBT] <= max(tolerance * least, 32.0 * calm) or most <= FAINT * largest
+            if not (fine or high - low <= _NARROW) and count + todo + 1 < PANEL_LIMIT and todo < stops.size:
+                stops[todo] = 0.5 * (low + high)
+                todo += 1
+                continue
+            lowest = min(lowest, least)
+            count += 1
+        low = high
+        todo -= 1
+    return table, count, lowest, largest
+
+
+@jit_call
+def areas(p, rtol, memory):
+    """The areas of contact of a cell with these parameters, in its unit of length; `unloaded` where none are needed."""
+    arm, _, _, verdict = _scene.arm_without_units(p[0], p[1], p[2], p[3])
+    tool, ride, unit, _, fine = _scene.work_without_units(p)
+    if not (p[18] > 0.0 and fine and _scene.turns_fully(verdict)):
+        return unloaded(memory[0])
+    return table_of(arm, tool, ride, in_unit(p[19], unit), max(_SHARE * rtol, 4.0 * _EPS), memory)
+
+
+@jit_call
+def shared(p, rtol, q, rtol_q):
+    """Whether two cells have the same areas of contact, to the same tolerance."""
+    for k in range(20):
+        if p[k] != q[k] and k not in _NO_MATTER:
+            return False
+    return rtol == rtol_q and (p[18] > 0.0) == (q[18] > 0.0)
+
+
+@jit_call
+def weight(loaded, c, s):
+    """1/A at the angle (cos phi, sin phi) = (c, s), what it may be wrong by, and a bound on its slope, both relative.
+
+    1 where the pressure is given.
+    """
+    table, count, _, largest = loaded
+    if count == 0:
+        return 1.0, 0.0, 0.0
+    phi, low, high = arctan2(magnitude(s), c), 0, count
+    while high - low > 1:
+        k = (low + high) // 2
+        if table[k, LOW] <= phi:
+            low = k
+        else:
+            high = k
+    row = table[low]
+    start, end = row[LOW], row[HIGH]
+    area = _polynomial(row, ((phi - start) - (end - phi)) / (end - start))
+    if not (area > 2.0 * row[DOUBT] and area > FAINT * largest):
+        return 1.0 / (FAINT * largest), _HOPELESS, 0.0
+    return 1.0 / area, row[DOUBT] / area * 2.0, 2.0 * row[SLOPE] / area
+
+
+@jit
+def leaves(loaded):
+    """Whether the tool may leave the workpiece wholly."""
+    _, count, lowest, largest = loaded
+    return count > 0 and not lowest > FAINT * largest

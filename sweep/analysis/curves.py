@@ -1,0 +1,134 @@
+"""What all analysis of curves shares: the axis they run along, windows of it, logarithms, and lines of an array."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from sweep.analysis.loglog import EPSILON, FEWEST, Array
+from sweep.system.errors import SweepError
+
+Window = tuple[float | None, float | None]
+
+
+def positive_axis(y: xr.DataArray, dim: str) -> tuple[str, Array]:
+    """Dimension that `dim` runs along, and its values, fit to take logarithms of."""
+    dimension, values = _coordinate(y, dim)
+    if values.dtype.kind not in "fiu":
+        raise SweepError(f"{dim} holds words, not numbers; a power law needs a number axis")
+    x = values.astype(np.float64)
+    fit = np.isfinite(x) & (x > 0)
+    if not fit.all():
+        raise SweepError(f"{dim} must be positive and finite to take logarithms; found {x[~fit][0]:g}, select a part")
+    if x.size < FEWEST:
+        raise SweepError(f"{dim} has {x.size} of the at least {FEWEST} points that an exponent needs")
+    rises = np.diff(x) > 0
+    if not ((rises.all() or not rises.any()) and np.diff(x).all()):
+        raise SweepError(f"{dim} neither rises nor falls throughout; sort first, e.g. ds.sortby({dim!r})")
+    return dimension, x
+
+
+def _coordinate(y: xr.DataArray, dim: str) -> tuple[str, NDArray[Any]]:
+    if not isinstance(y, xr.DataArray):
+        raise SweepError(f"expected one output, e.g. ds.period; found a {type(y).__name__}")
+    known = [str(name) for name, coordinate in y.coords.items() if coordinate.ndim == 1]
+    if dim in known:
+        return str(y.coords[dim].dims[0]), y.coords[dim].values
+    there = f"{title(y)} runs along {', '.join(known)}" if known else f"{title(y)} runs along no axis with values"
+    if dim in y.coords:
+        raise SweepError(f"{dim} has one value here, so nothing can be fitted along it; {there}")
+    close = difflib.get_close_matches(str(dim), known, 1)
+    raise SweepError(f"{title(y)} has no axis {dim!r}; " + (f"did you mean {close[0]}?" if close else there))
+
+
+def inside_window(x: Array, window: Window | None, dim: str) -> NDArray[np.bool_]:
+    low, high = ends(window, dim)
+    # an end that is a grid point up to rounding is meant to be in
+    return (x >= low * (1 - 8 * EPSILON)) & (x <= high * (1 + 8 * EPSILON))
+
+
+def ends(window: Window | None, dim: str) -> tuple[float, float]:
+    try:
+        low, high = (None, None) if window is None else window
+        ends = 0.0 if low is None else float(low), math.inf if high is None else float(high)
+    except (TypeError, ValueError):
+        raise SweepError(f"a window of {dim} is a pair (low, high) of numbers or None; found {window!r}") from None
+    if not ends[0] < ends[1]:
+        raise SweepError(f"the window {ends[0]:g} to {ends[1]:g} of {dim} is empty; give (low, high) with low < high")
+    return ends
+
+
+def title(y: xr.DataArray) -> str:
+    return str(y.name) if y.name is not None else "the array"
+
+
+def missing_is_nan(y: xr.DataArray) -> xr.DataArray:
+    numbers = y.astype(np.float64)
+    return numbers.where(np.isfinite(numbers))
+
+
+def logarithm(part: xr.DataArray, dim: str) -> xr.DataArray:
+    """Natural logarithm, NaN where a point is missing. Raises SweepError where a point is not positive."""
+    _require_fit_for_logarithms(part, dim)
+    return log_of(part)
+
+
+def log_of(y: xr.DataArray) -> xr.DataArray:
+    """Natural logarithm, NaN where there is none."""
+    numbers = missing_is_nan(y)
+    logs: xr.DataArray = xr.apply_ufunc(np.log, numbers.where(numbers > 0), dask="allowed", keep_attrs=True)
+    return logs.rename(y.name)
+
+
+def along(function: Callable[[Array], Array], y: xr.DataArray, dimension: str, to: str | None = None) -> xr.DataArray:
+    """`function` of the last axis, put along `dimension`: in its place, or as a new last dimension `to`."""
+    found: xr.DataArray = xr.apply_ufunc(
+        function,
+        y.compute(),
+        input_core_dims=[[dimension]],
+        output_core_dims=[[to or dimension]],
+        exclude_dims={dimension} if to else set(),
+        keep_attrs=True,  # those of the coordinates; the caller writes those of the result
+    )
+    return found if to else found.transpose(*y.dims)
+
+
+def scatter_is_noise(off: Array, z: Array) -> Any:
+    """Whether distances from a curve look like independent noise rather than a bend, lines along the last axis.
+
+    Neighbours of independent noise differ by sqrt(2) times its size: von Neumann's ratio is 2 +- 2/sqrt(n). Those of a
+    smooth bend differ by far less; and what rounding leaves is no noise. Missing points are passed over.
+    """
+    rows = [row[np.isfinite(row)] for row in off.reshape(-1, off.shape[-1])]
+    least = np.array([max(1.0, 2.0 - 6.0 / math.sqrt(row.size or 1)) for row in rows])  # one set of noise in 1000
+    ratio = np.array([(np.diff(row) ** 2).sum() for row in rows]) > least * np.array([(row**2).sum() for row in rows])
+    size = np.array([math.sqrt((row**2).mean()) if row.size else 0.0 for row in rows])
+    rounding = 8 * EPSILON * (1.0 + np.nanmax(abs(z), axis=-1, initial=0.0))
+    return (ratio & (size > rounding.reshape(-1))).reshape(off.shape[:-1])
+
+
+def noise_of(off: Array) -> float:
+    """Size of the noise on one smooth line without gaps: the least of what its differences of order 2 to 10 leave.
+
+    Noise leaves the same in all orders; a bend ever less, the higher the order.
+    """
+    orders = range(2, min(10, off.size - 4) + 1)
+    sizes = [float(np.sqrt(np.mean(np.diff(off, k) ** 2) / math.comb(2 * k, k))) for k in orders]
+    return min(sizes, default=math.inf)
+
+
+def _require_fit_for_logarithms(part: xr.DataArray, dim: str) -> None:
+    cells = np.argwhere(np.asarray(part.values <= 0))
+    count = len(cells)
+    if count:
+        first = part[tuple(cells[0])]
+        raise SweepError(
+            f"a power law needs positive values; {count} of {part.size} of {title(part)} in the window are not, "
+            f"e.g. {float(first):g} at {dim} = {float(first.coords[dim]):g}; choose a window without them"
+        )

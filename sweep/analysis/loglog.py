@@ -1,0 +1,247 @@
+"""Slopes, lines and roots of curves given at the points of an uneven grid; plain arrays, the curve along the last axis.
+
+A missing point is NaN, and no stencil reaches across one: each run of neighbours stands for itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+FEWEST = 3
+"""Points that a slope needs: through two it says nothing about its own error."""
+
+BEYOND_NOISE = 4.0
+"""Standard errors that noise does not reach."""
+
+FEW = 20
+"""Points below which noise is not told from a bend."""
+
+EPSILON = float(np.finfo(np.float64).eps)
+
+
+def slopes(t: Array, z: Array, points: int) -> Array:
+    """dz/dt at every point, by the polynomial through `points` neighbours: order points - 1.
+
+    Parameters
+    ----------
+    t : (n,) array
+        Strictly monotone.
+    z : (..., n) array
+        NaN where missing; the result is NaN there, and in runs shorter than three. A run shorter than `points`
+        is differentiated with what it has.
+    """
+    return _by_runs(t, z, lambda s, y: _derivative(s, y, points))
+
+
+def slope_errors(t: Array, z: Array) -> Array:
+    """Half the 95 % interval of the slope by five points, with noise; without, more than its error.
+
+    What the polynomial through seven points says otherwise tells the error. Noise makes it alike everywhere, over the
+    weights of both: the median gives its size. Where it is far larger, the curve bends: it counts itself there, and
+    where a bend is within a step, so that more points do not tell more, the slopes of the steps beside the point.
+    """
+    return _by_runs(t, z, _derivative_errors)
+
+
+def _by_runs(t: Array, z: Array, function: Callable[[Array, Array], Array]) -> Array:
+    """`function` of each unbroken run of at least three neighbours; lines with the same gaps at once."""
+    if np.isfinite(z).all():
+        return function(t, z)
+    rows = z.reshape(-1, t.size)
+    found = np.full(rows.shape, np.nan)
+    patterns, which = np.unique(np.isfinite(rows), axis=0, return_inverse=True)
+    for number, pattern in enumerate(patterns):
+        alike = np.flatnonzero(which.reshape(-1) == number)
+        for start, stop in runs(pattern):
+            if stop - start >= FEWEST:
+                found[alike, start:stop] = function(t[start:stop], rows[alike, start:stop])
+    return found.reshape(z.shape)
+
+
+def runs(present: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """First and past-the-last index of each unbroken run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], present, [False]])))
+    yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+
+
+def _derivative(t: Array, z: Array, points: int) -> Array:
+    nodes, weights = _stencils(t, points)
+    slope = np.zeros(z.shape)
+    for k in range(nodes.shape[1]):  # differences from the home point: a constant has slope zero exactly
+        slope += weights[:, k] * (z[..., nodes[:, k]] - z)
+    return slope
+
+
+def _derivative_errors(t: Array, z: Array) -> Array:
+    fine, middle, rough = (7, 5, 3) if t.size > 5 else (t.size, max(2, t.size - 2), 2)  # beside few points lower orders
+    slope = _derivative(t, z, middle)
+    apart, coarse = abs(_derivative(t, z, fine) - slope), abs(_derivative(t, z, rough) - slope)
+    sharp = 4.0 * apart > coarse  # orders that do not tell: a bend within a step, about which the steps beside it do
+    steps = np.diff(z, axis=-1) / np.diff(t)
+    beside = np.maximum(
+        abs(steps[..., np.r_[0, : t.size - 1]] - slope), abs(steps[..., np.r_[: t.size - 1, -1]] - slope)
+    )
+    nodes, weights = _stencils(t, middle)
+    other, those = _stencils(t, fine)
+    between = -those
+    np.put_along_axis(between, nodes - other[:, :1], weights - np.take_along_axis(those, nodes - other[:, :1], 1), 1)
+    apart_by_noise = apart / _norm(between)
+    noise = 1.4826 * np.median(apart_by_noise, axis=-1, keepdims=True)
+    by_noise = noise * _norm(weights)
+    few = t.size < FEW
+    by_bend = _largest_near(np.where(sharp, np.maximum(apart, beside), np.maximum(apart, coarse) if few else apart))
+    bends = few | (_largest_near(apart_by_noise) > BEYOND_NOISE * noise)
+    error = np.where(bends, np.maximum(by_noise, by_bend), by_noise)
+    rounding = EPSILON * (1.0 + abs(z).max(axis=-1, keepdims=True)) * _norm(weights)
+    found: Array = 2.05 * error + rounding  # 1.96 and what the median, of few points, is too small
+    return found
+
+
+def _largest_near(values: Array) -> Array:
+    """The largest of each value and its two neighbours on both sides."""
+    padded = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(2, 2)], mode="edge")
+    found: Array = np.lib.stride_tricks.sliding_window_view(padded, 5, axis=-1).max(axis=-1)
+    return found
+
+
+def _norm(weights: Array) -> Array:
+    """Standard error of each slope for values with errors of size 1; the home point has minus the sum of the others."""
+    size: Array = np.sqrt((weights**2).sum(axis=1) + weights.sum(axis=1) ** 2)
+    return size
+
+
+def _stencils(t: Array, points: int) -> tuple[NDArray[np.intp], Array]:
+    """Neighbours (n, points) of each point, and their weights in its slope; that of the point itself is left zero."""
+    points = min(points, t.size)
+    home = np.arange(t.size)
+    first = np.clip(home - points // 2, 0, t.size - points)
+    nodes = first[:, None] + np.arange(points)
+    return nodes, _weights(t[nodes], home - first)
+
+
+def _weights(nodes: Array, home: NDArray[np.intp]) -> Array:
+    """Weights (n, points) of the derivative at nodes[i, home[i]]; that of the home point itself is left zero."""
+    row = np.arange(len(nodes))
+    apart = nodes[:, :, None] - nodes[:, None, :]
+    apart[:, np.arange(nodes.shape[1]), np.arange(nodes.shape[1])] = 1.0
+    barycentric = 1.0 / apart.prod(axis=2)
+    weights: Array = barycentric / barycentric[row, home][:, None] / apart[row, home]
+    weights[row, home] = 0.0
+    return weights
+
+
+LINE = (
+    "exponent", "exponent_error", "prefactor", "prefactor_error", "drift", "residual",
+    "points", "low", "high", "centre", "level", "level_error",
+)  # fmt: skip
+"""What `line` puts along its last axis."""
+
+
+def line(t: Array, z: Array) -> Array:
+    """Least-squares line z = level + exponent (t - centre), (..., n) to (..., 12) in the order of `LINE`.
+
+    Sums run over deviations from the means, so a narrow window far from t = 0 costs no digits. `prefactor`,
+    `low`, `high`, `centre` and `level` are turned back from logarithms. NaN where fewer than three points are left.
+    """
+    present = np.isfinite(z)
+    n = present.sum(axis=-1)
+    enough = n >= FEWEST
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
+        count = np.where(enough, n, np.nan)
+        centre = _sum(present, t) / count
+        u = np.where(present, t - centre[..., None], 0.0)
+        level = _sum(present, z) / count
+        rise = np.where(present, z - level[..., None], 0.0)
+        spread = (u * u).sum(axis=-1)
+        slope = (u * rise).sum(axis=-1) / spread
+        off = rise - slope[..., None] * u
+        variance = (off * off).sum(axis=-1) / (count - 2)
+        at_one = np.sqrt(variance * (1 / count + centre**2 / spread))
+        prefactor = np.exp(level - slope * centre)
+        low = np.where(present, t, np.inf).min(axis=-1, initial=np.inf)
+        high = np.where(present, t, -np.inf).max(axis=-1, initial=-np.inf)
+        columns = (
+            slope, np.sqrt(variance / spread), prefactor, prefactor * at_one,
+            _drift(u, off, present, high - low), np.expm1(abs(off).max(axis=-1, initial=0.0)),
+            n, np.exp(low), np.exp(high), np.exp(centre), np.exp(level), np.sqrt(variance / count),
+        )  # fmt: skip
+    found = np.stack([np.where(enough, column, np.nan) for column in columns], axis=-1)
+    found[..., LINE.index("points")] = n
+    return found
+
+
+def _sum(present: NDArray[np.bool_], values: Array) -> Array:
+    total: Array = np.where(present, values, 0.0).sum(axis=-1)
+    return total
+
+
+def _drift(u: Array, off: Array, present: NDArray[np.bool_], width: Array) -> Array:
+    """Change of slope over `width` by the parabola that fits best; `u` is centred, `off` the distance to the line."""
+    n = present.sum(axis=-1)[..., None]
+    square = u * u
+    spread = square.sum(axis=-1)[..., None]
+    bow = np.where(present, square - spread / n - (square * u).sum(axis=-1)[..., None] / spread * u, 0.0)
+    change: Array = 2.0 * (bow * off).sum(axis=-1) / (bow * bow).sum(axis=-1) * width
+    return change
+
+
+def brackets(c: Array, value: float) -> list[int]:
+    """Indices i such that a curve passes `value` in [c[i], c[i + 1]), or meets it at either end of a run."""
+    present, above, on = np.isfinite(c), c >= value, c == value
+    alone = np.concatenate([[True], ~present, [True]])  # whether the point before is missing; shifted by 2: after
+    starts, ends = alone[:-2][:-1] & on[:-1] & above[1:], alone[2:][1:] & on[1:] & above[:-1]
+    passes = (above[:-1] != above[1:]) | starts | ends
+    found: list[int] = np.flatnonzero(present[:-1] & present[1:] & passes).tolist()
+    return found
+
+
+def root(t: Array, c: Array, bracket: int, value: float, points: int) -> float:
+    """Where the polynomial through `points` neighbours of t[bracket], t[bracket + 1] passes `value` between these."""
+    start, stop = next((a, b) for a, b in runs(np.isfinite(c)) if a <= bracket < b)
+    first = min(max(bracket - points // 2 + 1, start), max(stop - points, start))
+    near = slice(first, min(first + points, stop))
+    nodes, heights = t[near], c[near] - value
+    apart = nodes[:, None] - nodes[None, :]
+    np.fill_diagonal(apart, 1.0)
+    weights = 1.0 / apart.prod(axis=1)
+    left, right = float(t[bracket]), float(t[bracket + 1])
+    rising = bool(c[bracket + 1] > c[bracket])
+    for _ in range(64):  # halves down to the last bit
+        middle = left + (right - left) / 2
+        if middle in (left, right):
+            break
+        if (_polynomial(nodes, weights, heights, middle) >= 0) == rising:
+            right = middle
+        else:
+            left = middle
+    return left + (right - left) / 2
+
+
+def _polynomial(nodes: Array, weights: Array, heights: Array, at: float) -> float:
+    away = at - nodes
+    if not away.all():
+        return float(heights[away == 0][0])
+    share = weights / away
+    return float((share * heights).sum() / share.sum())
+
+
+def is_logarithmic(grid: Any) -> bool:
+    """Whether an axis of these values is drawn in logarithms: steps of equal ratio, or two decades and more."""
+    numbers = np.asarray(grid, dtype=np.float64)
+    if numbers.size < 3 or not (np.isfinite(numbers).all() and numbers.min() > 0):
+        return spans_decades(numbers)
+    steps = np.diff(np.log(numbers))
+    return bool(np.ptp(steps) < 1e-6 * abs(steps).max()) or spans_decades(numbers)
+
+
+def spans_decades(values: Any) -> bool:
+    """Whether the finite values are positive and reach over two decades and more."""
+    numbers = np.asarray(values, dtype=np.float64)
+    numbers = numbers[np.isfinite(numbers)]
+    return bool(numbers.size and numbers.min() > 0 and numbers.max() / numbers.min() >= 99.9)

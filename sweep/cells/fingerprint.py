@@ -1,0 +1,170 @@
+"""What decides the numbers of a result: the study, the sources of its kernel, and the compiler."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.util
+import json
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kernels import catalogue
+from sweep.study.model import Study, Summary, short
+
+COMPILERS = ("numba", "llvmlite", "numpy")
+OURS = ("kernels",)
+"""Packages whose modules count even where a kernel of another package imports them."""
+
+ENGINE = ("sweep.cells.solve", "sweep.cells.grid")
+"""Modules of the engine that decide values: the method of each cell, and its parameters."""
+
+REDUCING = ("sweep.cells.row_blocks", "sweep.cells.reduce", "sweep.cells.contents")
+"""Those that decide the values of a summary."""
+
+SOURCE = "source "
+
+
+def fingerprint(study: Study) -> dict[str, str]:
+    """Everything that decides the numbers of a result, as texts: equal fingerprints, equal bits.
+
+    Returns
+    -------
+    dict of str to str
+        "study" is one digest of all that the study says but for its words; what it says follows in short, under its
+        names in a study file. Then a digest per source file of the kernel ("source kernels.foliot.cycle"), and the
+        versions of compiler and arrays. The processor is not in it: kernels give the same bits on each.
+    """
+    said = _said(study)
+    whole = hashlib.sha256(json.dumps(said).encode()).hexdigest()
+    engine = ENGINE if study.summary is None else (*ENGINE, *REDUCING)
+    return {
+        "study": whole,
+        **said,
+        **_sources(study.kernel_name, engine),
+        **{name: _version(name) for name in COMPILERS},
+    }
+
+
+def difference(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
+    """What two fingerprints differ in, a line each: 'axes.mu: was 401 values ..., now 101 values ...'."""
+    names = [*new, *(name for name in old if name not in new)]
+    changed = [name for name in names if old.get(name) != new.get(name)]
+    # the digest of the whole study tells nothing where its parts do
+    told = [name for name in changed if name != "study"] or changed
+    return [_change(name, old.get(name), new.get(name)) for name in told]
+
+
+def _change(name: str, old: str | None, new: str | None) -> str:
+    if old is None:
+        return f"{name}: new" if name.startswith(SOURCE) else f"{name}: new, {new}"
+    if new is None:
+        return f"{name}: gone" if name.startswith(SOURCE) else f"{name}: gone, was {old}"
+    return f"{name}: changed" if name.startswith(SOURCE) or name == "study" else f"{name}: was {old}, now {new}"
+
+
+def _said(study: Study) -> dict[str, str]:
+    """What the study says, exactly."""
+    said = {
+        "kernel": study.kernel_name,
+        "method": study.method,
+        "rtol": repr(study.rtol),
+        "outputs": ", ".join(study.outputs),
+        "design": study.design,
+        "axes": ", ".join(study.axes),
+    }
+    said |= {f"axes.{name}": _values(axis.values) for name, axis in study.axes.items()}
+    said |= {f"fixed.{n}": _values(value) if np.ndim(value) else repr(value) for n, value in study.fixed.items()}
+    said |= {f"fixed.{name}": f"as {axis}" for name, axis in study.follows.items()}
+    said |= {f"along.{name}": _values(values) for name, values in study.along.items() if len(values)}
+    return said if study.summary is None else said | _kept(study.summary)
+
+
+def _kept(summary: Summary) -> dict[str, str]:
+    """What the study says of its summary."""
+    said = {"summary.over": ", ".join(summary.over)}
+    said |= {f"summary.outputs.{name}": ", ".join(words) for name, words in summary.outputs.items()}
+    return said | {f"summary.edges.{name}": _values(edges) for name, edges in summary.edges.items()}
+
+
+def _values(values: Any) -> str:
+    """'401 values, 0.0001 to 1e+06 (digest 0123456789abcdef)'."""
+    digest = hashlib.sha256(values.astype("<f8").tobytes()).hexdigest()[:16]
+    ends = short(values[0]) if len(values) == 1 else f"{short(values[0])} to {short(values[-1])}"
+    return f"{len(values)} value{'s' * (len(values) > 1)}, {ends} (digest {digest})"
+
+
+def _sources(kernel_name: str, engine: Sequence[str]) -> dict[str, str]:
+    """A digest of every source file that takes part in solving a cell."""
+    entry = catalogue.KERNELS.get(kernel_name, kernel_name).partition(":")[0]
+    packages = {entry.partition(".")[0], *OURS}
+    found: dict[str, str] = {}
+    waiting = [entry]
+    while waiting:
+        name = waiting.pop()
+        path = _path(name)
+        if name in found or path is None:
+            continue
+        found[name], imported = _read(path, name, path.stat().st_mtime_ns)
+        names = [name, *imported]
+        # with a.b.c Python also runs a and a.b
+        parents = (n.rsplit(".", k)[0] for n in names for k in range(n.count(".") + 1))
+        waiting += [n for n in parents if n.partition(".")[0] in packages or _is_own(n.partition(".")[0])]
+    for name in engine:
+        path = _path(name)
+        if path is not None:
+            found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
+    return {SOURCE + name: found[name] for name in sorted(found)}
+
+
+@lru_cache(maxsize=1000)
+def _is_own(package: str) -> bool:
+    """Whether a package is source of somebody's own: neither Python's nor installed from a distribution."""
+    if package in sys.stdlib_module_names or package == "sweep":
+        return False
+    path = _path(package)
+    return path is not None and not {"site-packages", "dist-packages"}.intersection(path.parts)
+
+
+@lru_cache(maxsize=1000)
+def _read(path: Path, name: str, modified: int) -> tuple[str, tuple[str, ...]]:
+    """Digest of a source file, and what it imports; kept while the file's time of modification stays."""
+    text = path.read_bytes()
+    return hashlib.sha256(text).hexdigest(), tuple(_imported(text, name, path)) if path.suffix == ".py" else ()
+
+
+def _path(name: str) -> Path | None:
+    """File of a module, which is not imported; None of what has no file, or is no module."""
+    try:
+        spec = importlib.util.find_spec(name)
+    except (ImportError, ValueError, AttributeError):
+        file = getattr(sys.modules.get(name), "__file__", None)
+        return Path(file) if file else None
+    path = Path(spec.origin) if spec is not None and spec.origin else None
+    return path if path is not None and path.is_file() else None
+
+
+def _imported(text: bytes, name: str, path: Path) -> Iterator[str]:
+    """Names of modules that a source may import; of `from a import b` both a and a.b, as b may be a module."""
+    package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else []
+            base = ".".join([*above, *filter(None, [node.module])])
+            yield base
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "not installed"

@@ -1,0 +1,181 @@
+"""From axes to cells: flat cell numbers, the columns a kernel takes, and the hyperslabs a block of cells fills.
+
+Cells are numbered in C order: the last axis runs fastest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.study.model import AUTO, Axis, Study
+
+Floats = NDArray[np.float64]
+Piece = tuple[tuple[slice, ...], int, int]
+
+SHORT_RUN = 16
+"""Below this many equal cells in a row, filling every n-th cell is faster than filling runs."""
+
+
+class Box:
+    """Places in C order.
+
+    Attributes
+    ----------
+    dims : tuple of str
+    shape : tuple of int
+    size : int
+        Number of places.
+    """
+
+    def __init__(self, dims: tuple[str, ...], shape: tuple[int, ...]) -> None:
+        self.dims, self.shape, self.size = dims, shape, math.prod(shape)
+
+    def pieces(self, start: int, stop: int) -> list[Piece]:
+        """Cut the places `start` to `stop` into hyperslabs of `shape`, at most 2 ndim - 1 of them.
+
+        Returns
+        -------
+        list of (slices, sub_start, sub_stop)
+            A slice per dimension; and the hyperslab's places, counted from `start`: the places
+            `block[sub_start:sub_stop]` in C order fill `dataset[slices]`.
+        """
+        found: list[Piece] = []
+        done = 0
+        for slices in _hyperslabs(self.shape, start, stop):
+            size = math.prod(s.stop - s.start for s in slices)
+            found.append((slices, done, done + size))
+            done += size
+        return found
+
+
+class Grid(Box):
+    """The cells of a study; its dims are the axes of a product, ("cell",) of a zip."""
+
+    def __init__(self, study: Study) -> None:
+        lengths = tuple(len(axis) for axis in study.axes.values())
+        product = study.design == "product"
+        super().__init__(tuple(study.axes) if product else ("cell",), lengths if product else lengths[:1])
+        self.study = study
+        # cells in a row that share one value of the axis
+        self._runs = {
+            name: math.prod(lengths[position + 1 :]) if product else 1 for position, name in enumerate(study.axes)
+        }
+        self._varying = [
+            (k, study.axes[source])
+            for k, field in enumerate(study.kernel.parameters)
+            if (source := study.follows.get(field.name, field.name)) in study.axes
+        ]
+
+    def constants(self) -> dict[int, float | Floats]:
+        """Column number and value of every parameter that is the same in all cells."""
+        fixed = self.study.fixed
+        return {k: fixed[field.name] for k, field in enumerate(self.study.kernel.parameters) if field.name in fixed}
+
+    def columns(self, start: int, stop: int, out: Sequence[Floats]) -> None:
+        """Write the varying parameters of the cells `start` to `stop`.
+
+        Parameters
+        ----------
+        start, stop : int
+            0 <= start <= stop <= size.
+        out : sequence of ndarray, each of shape (>= stop - start, ...)
+            One column per parameter of the kernel, in its order; constant ones are left alone.
+        """
+        for k, axis in self._varying:
+            if axis.values.ndim > 1:  # of a zip
+                out[k][: stop - start] = axis.values[start:stop]
+            else:
+                self._fill(axis, start, out[k][: stop - start])
+
+    def values(self, name: str, cells: NDArray[np.int64]) -> Floats:
+        """An axis' values of some flat cells."""
+        axis = self.study.axes[name]
+        found: Floats = axis.values[cells // self._runs[name] % len(axis)]
+        return found
+
+    def settings(self, start: int, stop: int) -> tuple[int | NDArray[np.int8], float | Floats]:
+        """Method number (-1: auto) and rtol of the cells: one for all where they agree, else one per cell."""
+        method: int | NDArray[np.int8] = self._fixed_method()
+        rtol: float | Floats = self.study.rtol
+        if "method" in self.study.axes:
+            codes = self._column("method", start, stop)
+            method = int(codes[0]) if _all_equal(codes) else codes.astype(np.int8)
+        if "rtol" in self.study.axes:
+            column = self._column("rtol", start, stop)
+            rtol = float(column[0]) if _all_equal(column) else column
+        return method, rtol
+
+    def cell(self, index: int) -> dict[str, str]:
+        """The axes' values of one cell, as people write them: {"mu": "0.9", "method": "closed"}."""
+        return {name: axis.label(index // self._runs[name] % len(axis)) for name, axis in self.study.axes.items()}
+
+    def _fixed_method(self) -> int:
+        names = [m.name for m in self.study.kernel.methods]
+        return AUTO if self.study.method == "auto" else names.index(self.study.method)
+
+    def _column(self, name: str, start: int, stop: int) -> Floats:
+        column = np.empty(stop - start)
+        self._fill(self.study.axes[name], start, column)
+        return column
+
+    def _fill(self, axis: Axis, start: int, out: Floats) -> None:
+        """Write the axis' values of the cells from `start` on, one period of them; then copy that period on."""
+        run = self._runs[axis.name]
+        filled = min(len(out), run * len(axis))
+        if filled == 0:
+            return
+        first, last = start // run, (start + filled - 1) // run
+        _repeat(_cyclic(axis.values, first % len(axis), last - first + 1), run, start % run, out[:filled])
+        while filled < len(out):
+            more = min(filled, len(out) - filled)
+            out[filled : filled + more] = out[:more]
+            filled += more
+
+
+def _cyclic(values: Floats, first: int, count: int) -> Floats:
+    """`count` values from number `first` on, starting over at the end; at most one turn and one value."""
+    if first + count <= len(values):
+        return values[first : first + count]
+    return np.concatenate([values[first:], values[: first + count - len(values)]])
+
+
+def _repeat(values: Floats, run: int, skip: int, out: Floats) -> None:
+    """Each of `values` `run` times, without the first `skip` cells, until `out` is full."""
+    head = min(run - skip, len(out))
+    whole = (len(out) - head) // run
+    out[:head] = values[0]
+    body = out[head : head + whole * run].reshape(whole, run)
+    if run < SHORT_RUN:
+        for offset in range(run):
+            body[:, offset] = values[1 : 1 + whole]
+    else:
+        body[...] = values[1 : 1 + whole, None]
+    out[head + whole * run :] = values[-1]
+
+
+def _hyperslabs(shape: tuple[int, ...], start: int, stop: int) -> list[tuple[slice, ...]]:
+    """Hyperslabs that hold the flat cells `start` to `stop` of `shape`, in order."""
+    if start == stop:
+        return []
+    if len(shape) < 2:
+        return [(slice(start, stop),)[: len(shape)]]
+    row = math.prod(shape[1:])
+    (first, head), (last, tail) = divmod(start, row), divmod(stop, row)
+
+    def within(index: int, begin: int, end: int) -> list[tuple[slice, ...]]:
+        return [(slice(index, index + 1), *rest) for rest in _hyperslabs(shape[1:], begin, end)]
+
+    if first == last:
+        return within(first, head, tail)
+    before = within(first, head, row) if head else []
+    begin = first + 1 if head else first
+    middle = [(slice(begin, last), *(slice(0, n) for n in shape[1:]))] if begin < last else []
+    return [*before, *middle, *within(last, 0, tail)]
+
+
+def _all_equal(column: NDArray[np.float64]) -> bool:
+    return len(column) > 0 and bool((column == column[0]).all())

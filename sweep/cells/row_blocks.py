@@ -1,0 +1,102 @@
+"""Rows: what a part holds a line of. A cell; or, of a study with a summary, a granule of cells reduced to one.
+
+Granules depend on the study alone, so that a summary has the same bits for any blocks, workers and interruptions.
+The axes that are kept come first, so a group (the cells that are reduced to one number in the end) is one run of flat
+cell numbers; it is cut into granules of equal length, the last one shorter.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sweep.study.model import Study
+
+FINENESS = 1024
+"""Granules a study is cut into, about: enough for many workers, and few to merge in the end."""
+LARGEST = 1 << 22
+"""Cells of a granule, so that a block of dear cells stays short."""
+
+
+@dataclass(frozen=True)
+class Granules:
+    """`groups` groups of `group` cells, in granules of `length` cells."""
+
+    groups: int
+    group: int
+    length: int
+
+    @property
+    def per_group(self) -> int:
+        """Granules of a group."""
+        return -(-self.group // self.length)
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return self.groups * self.per_group
+
+    @property
+    def size(self) -> int:
+        """Number of cells."""
+        return self.groups * self.group
+
+    @property
+    def mean(self) -> float:
+        """Cells of a row, on average."""
+        return self.size / self.count
+
+    def first(self, row: Any) -> Any:
+        """Number of the first cell of a row, or of an array of rows; of the row behind the last one: all cells."""
+        group, place = row // self.per_group, row % self.per_group
+        return group * self.group + place * self.length
+
+    def cells(self, start: int, stop: int) -> tuple[int, int]:
+        """The cells of the rows `start` to `stop`."""
+        return int(self.first(start)), int(self.first(stop))
+
+    def strips(self, start: int, stop: int, room: int) -> Iterator[tuple[int, int, int, int]]:
+        """Cut the rows `start` to `stop` into strips of at most `room` cells, or one row.
+
+        Yields
+        ------
+        row, rows, cell, cells : int
+            The strip has `rows` rows from `row` on, of `cells` cells each, from cell number `cell` on. A granule
+            longer than `room` comes in several strips, cut at the same places always.
+        """
+        row = start
+        while row < stop:
+            cell, end = self.cells(row, row + 1)
+            cells = end - cell
+            if cells > room:
+                for first in range(cell, end, room):
+                    yield row, 1, first, min(room, end - first)
+                row += 1
+                continue
+            rows = min(stop - row, max(1, room // cells), self._alike(row))
+            yield row, rows, cell, cells
+            row += rows
+
+    def _alike(self, row: int) -> int:
+        """Rows from this one on that are of equal length and follow each other."""
+        if self.per_group == 1:
+            return self.groups
+        place = row % self.per_group
+        whole = self.group // self.length
+        return whole - place if place < whole else 1
+
+
+def granules(study: Study) -> Granules:
+    """How the cells of a study make rows."""
+    lengths = {name: len(axis) for name, axis in study.axes.items()}
+    size = math.prod(lengths.values()) if study.design == "product" else next(iter(lengths.values()))
+    if study.summary is None:
+        return Granules(size, 1, 1)
+    over = study.summary.over
+    groups = math.prod(n for name, n in lengths.items() if name not in over) if study.design == "product" else 1
+    group = size // groups
+    wanted = min(1 << max(0, (size // FINENESS).bit_length() - 1), LARGEST)
+    return Granules(groups, group, group if group <= 4 * wanted else wanted)

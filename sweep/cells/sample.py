@@ -1,0 +1,61 @@
+"""Some cells of a study as a study of their own, to try things on."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from sweep.cells.grid import Grid
+from sweep.study.model import Axis, Study, frozen
+
+ONE: Mapping[str, float] = {}
+
+
+def sampled(study: Study, cells: int, factors: Mapping[str, float] = ONE) -> Study:
+    """At most so many cells, spread evenly over the grid, as a zip of the study's axes; methods and rtol are dropped.
+
+    Parameters
+    ----------
+    factors : mapping of parameter or coordinate to number
+        What its values are multiplied by.
+    """
+    grid = Grid(study)
+    chosen = np.unique(np.linspace(0, grid.size - 1, min(cells, grid.size)).astype(np.int64))
+    known = {p.name for p in study.kernel.parameters}
+    swept = [name for name in study.axes if name in known]
+    axes = {name: _axis(name, grid.values(name, chosen), factors) for name in swept}
+    fixed = {name: _times(value, factors.get(name, 1.0)) for name, value in study.fixed.items()}
+    if not axes:  # only methods or rtol were swept
+        name = next(p.name for p in study.kernel.parameters if p.default is None)
+        axes = {name: _axis(name, np.array([study.fixed[name]]), factors)}
+        del fixed[name]
+    along = {name: frozen(values * factors.get(name, 1.0)) for name, values in study.along.items()}
+    method = "auto" if "method" in study.axes else study.method
+    return dataclasses.replace(study, design="zip", axes=axes, fixed=fixed, along=along, method=method, summary=None)
+
+
+def _axis(name: str, values: Any, factors: Mapping[str, float]) -> Axis:
+    return Axis(name, frozen(values * factors.get(name, 1.0)), "values")
+
+
+def _times(value: Any, factor: float) -> Any:
+    return frozen(value * factor) if np.ndim(value) else value * factor
+
+
+def solved(study: Study) -> tuple[dict[str, Any], Any, Any]:
+    """Outputs by name, statuses, and numbers of the methods used, of all cells of a study, in memory."""
+    from sweep.cells.solve import Solver
+
+    size, lengths = Grid(study).size, study.lengths
+    outputs = {f.name: np.empty((size, *(lengths[d] for d in f.dims))) for f in study.asked}
+    status, used = np.empty(size, np.int8), np.empty(size, np.int8)
+    Solver(study).solve(0, size, outputs, status, used)
+    return outputs, status, used
+
+
+def with_method(study: Study, method: str, rtol: float) -> Study:
+    """The study by one method, at one rtol."""
+    return dataclasses.replace(study, method=method, rtol=rtol)

@@ -1,0 +1,187 @@
+"""What a result holds, before there is any: its columns, coordinates and attributes, named as CF wants them."""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kernels.interface import Field, Kernel, Status
+from sweep.cells.grid import Box, Grid
+
+if TYPE_CHECKING:
+    from sweep.study.model import Axis, Study
+
+CONVENTIONS = "CF-1.11"
+STATUS, METHOD_USED = "status", "method_used"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One variable of the result: an output, the status, or the method used.
+
+    `dims` and `shape` are its own, behind those of the grid ("phase",), (200,).
+    """
+
+    name: str
+    dtype: str
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
+    attrs: Mapping[str, Any]
+
+    @property
+    def cell_bytes(self) -> int:
+        """Bytes of one cell."""
+        return np.dtype(self.dtype).itemsize * math.prod(self.shape)
+
+    @property
+    def missing(self) -> float | int:
+        """What stands for a cell that is not computed yet."""
+        return {STATUS: int(Status.PENDING), METHOD_USED: -1}.get(self.name, math.nan)
+
+    def empty(self, cells: int) -> Any:
+        """An uninitialised array of shape `(cells, *shape)`."""
+        return np.empty((cells, *self.shape), self.dtype)
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A coordinate of the result: an axis, a fixed parameter, or one that all cells share (phase, number of a mass)."""
+
+    name: str
+    dims: tuple[str, ...]
+    values: Any
+    attrs: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Everything of a result except its numbers."""
+
+    grid: Box
+    columns: tuple[Column, ...]
+    coordinates: tuple[Coordinate, ...]
+    attrs: Mapping[str, Any]
+
+    @property
+    def cell_bytes(self) -> int:
+        """Bytes of one cell over all columns."""
+        return sum(column.cell_bytes for column in self.columns)
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Length of every dimension, those of the grid first."""
+        own = {d: n for column in self.columns for d, n in zip(column.dims, column.shape, strict=True)}
+        own |= {d: n for c in self.coordinates for d, n in zip(c.dims, np.shape(c.values), strict=True)}
+        return {**dict(zip(self.grid.dims, self.grid.shape, strict=True)), **own}
+
+    def shape(self, column: Column) -> tuple[int, ...]:
+        """Shape of a column over the whole grid."""
+        return (*self.grid.shape, *column.shape)
+
+
+def layout(study: Study, fingerprint: Mapping[str, str]) -> Layout:
+    """The layout of a study's result."""
+    return Layout(Grid(study), columns(study), coordinates(study), attributes(study, fingerprint))
+
+
+def columns(study: Study) -> tuple[Column, ...]:
+    """The asked outputs in kernel order, then status and method_used."""
+    return (*(_output(f, study) for f in study.asked), _status(), _method_used(study.kernel))
+
+
+def coordinates(study: Study) -> tuple[Coordinate, ...]:
+    """Axes, fixed parameters and shared coordinates."""
+    product = study.design == "product"
+    fields = {f.name: f for f in (*study.kernel.parameters, *study.kernel.along)}
+    axes = [_axis(axis, (axis.name,) if product else ("cell",), fields) for axis in study.axes.values()]
+    fixed = [Coordinate(k, fields[k].dims, np.float64(v), _field_attrs(fields[k])) for k, v in study.fixed.items()]
+    used = {d for f in (*study.kernel.parameters, *study.asked) for d in f.dims}
+    along = [Coordinate(k, (k,), v, _field_attrs(fields[k])) for k, v in study.along.items() if k in used]
+    lengths = study.lengths
+    counted = [_counting(d, lengths[d]) for d in lengths if d in used and d not in study.along]
+    return (*axes, *fixed, *along, *counted)
+
+
+def _counting(dim: str, length: int) -> Coordinate:
+    """1, 2, ... along a dim of arrays."""
+    return Coordinate(dim, (dim,), np.arange(1, length + 1), {"units": "1", "long_name": f"number of the {dim}"})
+
+
+def attributes(study: Study, fingerprint: Mapping[str, str]) -> dict[str, Any]:
+    """Global attributes; with them the file alone suffices to run the study again."""
+    attrs: dict[str, Any] = {
+        "Conventions": CONVENTIONS,
+        "title": study.title,
+        "question": study.question,
+        "kernel": study.kernel_name,
+        "source": study.kernel.source,
+        "design": study.design,
+    }
+    attrs |= {k: v for k, v in (("method", study.method), ("rtol", study.rtol)) if k not in study.axes}
+    return attrs | {
+        "study": study.text,
+        "study_json": study.to_json(),
+        "fingerprint": json.dumps(dict(fingerprint), sort_keys=True),
+        "versions": _versions(),
+    }
+
+
+def _output(field: Field, study: Study) -> Column:
+    shape = tuple(study.lengths[d] for d in field.dims)
+    attrs = {**_field_attrs(field), "ancillary_variables": f"{STATUS} {METHOD_USED}"}
+    return Column(field.name, "f8", field.dims, shape, attrs)
+
+
+def _status() -> Column:
+    attrs = {
+        "long_name": "what became of the cell",
+        "flag_values": np.array([int(s) for s in Status], "i1"),
+        "flag_meanings": " ".join(s.name for s in Status),
+    }
+    return Column(STATUS, "i1", (), (), attrs)
+
+
+def _method_used(kernel: Kernel) -> Column:
+    attrs = {
+        "long_name": "method that solved the cell",
+        "flag_values": np.arange(-1, len(kernel.methods), dtype="i1"),
+        "flag_meanings": " ".join(["none", *(m.name for m in kernel.methods)]),
+    }
+    return Column(METHOD_USED, "i1", (), (), attrs)
+
+
+def _axis(axis: Axis, dims: tuple[str, ...], fields: Mapping[str, Field]) -> Coordinate:
+    field = fields.get(axis.name)
+    if field is not None:
+        attrs = _field_attrs(field)
+    else:
+        attrs = {
+            "method": {"long_name": "method asked for"},
+            "rtol": {"units": "1", "long_name": "relative error asked for"},
+        }[axis.name]
+    dims = dims if field is None else (*dims, *field.dims)
+    return Coordinate(axis.name, dims, axis.values if axis.words is None else np.array(axis.words), attrs)
+
+
+def _field_attrs(field: Field) -> dict[str, Any]:
+    return {"units": field.unit, "long_name": field.doc}
+
+
+def _versions() -> str:
+    names = ("foliot", "numba", "llvmlite", "numpy", "xarray", "h5py", "h5netcdf")
+    found = [f"{name} {_version(name)}" for name in names]
+    return ", ".join([*found, f"python {platform.python_version()}", platform.machine()])
+
+
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "(not installed)"

@@ -1,0 +1,1 @@
+"""What runs sweeps to learn something: `plan`, `work_precision`, `refine`, `groups` (superfluous axes), `reference`."""

@@ -1,0 +1,237 @@
+"""What a study will take, before it runs: cells, bytes, memory, time."""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+import tempfile
+import time
+import zlib
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kernels.interface import Status
+from sweep.cells.contents import contents, part_columns
+from sweep.cells.fingerprint import fingerprint
+from sweep.cells.grid import Grid
+from sweep.cells.partition import Partition, Sample, row_partition
+from sweep.cells.reduce import strip_bytes
+from sweep.cells.row_blocks import granules
+from sweep.cells.schema import Column
+from sweep.explore.calibration import rehearsed
+from sweep.results.open import memory
+from sweep.runs.session import faults_told, sampled_study
+from sweep.store.assemble import chunks, write_frame
+from sweep.store.canvas import Canvas
+from sweep.store.digests import Seals
+from sweep.store.hdf5_bytes import Images
+from sweep.store.parts import FLAGS
+from sweep.system.errors import SweepError
+from sweep.system.pool import cores, whole_number
+from sweep.system.progress import duration, quantity
+
+if TYPE_CHECKING:
+    from sweep.study.model import Study
+
+TRIAL = 32 << 20
+"""Bytes written to see how fast the disk is,"""
+WORTH_A_TRIAL = 1 << 28
+"""where so many are to be written."""
+UNIFORM = 0.0012
+"""Share of their size that statuses take compressed where all are the same."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A forecast; `str` of it is what `sweep plan` prints.
+
+    Attributes
+    ----------
+    cells, blocks, cells_per_block, workers : int
+    shape : dict of str to int
+        Length of every axis ("cell" of a zip).
+    part_bytes, output_bytes : int
+        Parts are removed when the output is complete; for a moment both are there.
+    memory_bytes : int
+        While it runs with an output; without one, `output_bytes` come on top.
+    free_bytes : int
+        On the disk of the output.
+    cell_seconds, seconds : float
+        On one core; and altogether, from the call of `run` in a program that has called it before.
+    methods, statuses : dict of str to float
+        Shares of the sampled cells.
+    scaling : str
+        Which axes are superfluous, since they change nothing but the units; "" where none is.
+    """
+
+    title: str
+    kernel: str
+    cells: int
+    shape: dict[str, int]
+    outputs: tuple[str, ...]
+    blocks: int
+    cells_per_block: int
+    workers: int
+    part_bytes: int
+    output_bytes: int
+    memory_bytes: int
+    free_bytes: int
+    folder: str
+    cell_seconds: float
+    seconds: float
+    methods: dict[str, float] = field(default_factory=dict)
+    statuses: dict[str, float] = field(default_factory=dict)
+    scaling: str = ""
+
+    @property
+    def warnings(self) -> list[str]:
+        """What should be seen to before the run."""
+        found = []
+        if self.part_bytes + self.output_bytes > self.free_bytes:
+            needed = quantity(self.part_bytes + self.output_bytes)
+            found.append(f"the disk is too small: {needed} needed, {quantity(self.free_bytes)} free in {self.folder}")
+        if self.memory_bytes > memory():
+            found.append(f"the memory is too small: {quantity(self.memory_bytes)} needed, {quantity(memory())} there")
+        return found
+
+    def __str__(self) -> str:
+        shape = " x ".join(f"{name} {n:,}" for name, n in self.shape.items())
+        rows = {
+            "kernel": self.kernel,
+            "outputs": ", ".join(self.outputs),
+            "cells": f"{self.cells:,} = {shape}" if len(self.shape) > 1 else f"{self.cells:,}",
+            "blocks": f"{self.blocks:,} of {self.cells_per_block:,} cells",
+            "parts": f"{quantity(self.part_bytes)}, while it runs",
+            "output": quantity(self.output_bytes),
+            "disk": f"{quantity(self.free_bytes)} free in {self.folder}",
+            "memory": quantity(self.memory_bytes),
+            "time": f"{duration(self.seconds)} on {self.workers} core{'s' * (self.workers > 1)}, "
+            f"{small_duration(self.cell_seconds)} a cell",
+            "methods": _shares(self.methods),
+            "statuses": _shares(self.statuses),
+            "scaling": self.scaling,
+        }
+        lines = [self.title] if self.title else []
+        lines += [f"  {name:9} {text}" for name, text in rows.items() if text]
+        return "\n".join([*lines, *(f"  warning   {text}" for text in self.warnings)])
+
+
+def plan(study: Study, workers: int | None = None, path: str | os.PathLike[str] | None = None) -> Plan:
+    """Forecast of a run, from runs of some of its cells, spread over the grid, in a folder beside the output.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Cores; default: all this process may use.
+    path : path, optional
+        Where the output would be; default: the current folder.
+
+    Raises
+    ------
+    SweepError
+        The folder of the output is not there.
+    """
+    from sweep.explore.groups import scaling
+
+    crew = cores() if workers is None else whole_number("workers", workers)
+    folder = Path(path).absolute().parent if path is not None else Path.cwd()
+    if not folder.is_dir():
+        raise SweepError(f"{path}: there is no folder {folder}")
+    sample = sampled_study(study)
+    with faults_told(f"{study.kernel_name}: the kernel failed"):
+        advice = scaling(study).advice
+    return replace(_forecast(study, sample, crew, folder), scaling=advice)
+
+
+def _forecast(study: Study, sample: Sample, workers: int, folder: Path) -> Plan:
+    grains, columns = granules(study), part_columns(study)
+    row_bytes = sum(c.cell_bytes for c in columns)
+    blocks = row_partition(sample, grains, row_bytes, workers)
+    parts = _part_bytes(columns, blocks)
+    output, frame = _output_bytes(study, sample, blocks)
+    names = [m.name for m in study.kernel.methods]
+    return Plan(
+        title=study.title,
+        kernel=study.kernel_name,
+        cells=grains.size,
+        shape=dict(zip((grid := Grid(study)).dims, grid.shape, strict=True)),
+        outputs=study.outputs,
+        blocks=blocks.count,
+        cells_per_block=grains.cells(0, blocks.cells)[1],
+        workers=workers,
+        part_bytes=parts,
+        output_bytes=output,
+        memory_bytes=2 * workers * (blocks.cells * row_bytes + strip_bytes(study)) + frame,
+        free_bytes=shutil.disk_usage(folder).free,
+        folder=str(folder),
+        cell_seconds=sample.cost,
+        seconds=_seconds(study, sample, blocks, parts, output, workers, folder),
+        methods=_counted(sample.method_used, dict(enumerate(names)) | {-1: "none"}),
+        statuses=_counted(sample.status, {int(s): s.name for s in Status}),
+    )
+
+
+def _seconds(
+    study: Study, sample: Sample, blocks: Partition, parts: int, output: int, workers: int, folder: Path
+) -> float:
+    """What a run takes, of some of the cells in earnest; or, where that cannot be, from the probes alone."""
+    grains = granules(study)
+    cells, block = grains.size, grains.cells(0, blocks.cells)[1]
+    found = rehearsed(study, cells, block, sample.cost, (parts + output) / cells, folder, workers)
+    if not math.isnan(found):
+        return found
+    speed = _disk_speed(folder) if parts + output > WORTH_A_TRIAL else math.inf
+    # parts are written while others are computed
+    return max(sample.cost * cells / min(workers, blocks.count), parts / speed) + output / speed
+
+
+def _part_bytes(columns: tuple[Column, ...], blocks: Partition) -> int:
+    """All parts, as files."""
+    images = Images(columns)
+    last = blocks.bounds(blocks.count - 1)
+    return (blocks.count - 1) * images.frame(blocks.cells).size + images.frame(last[1] - last[0]).size
+
+
+def _output_bytes(study: Study, sample: Sample, blocks: Partition) -> tuple[int, int]:
+    """The output, and all of it but the outputs' numbers; its frame is made for this, in memory."""
+    content, canvas = contents(study, fingerprint(study)), Canvas()
+    write_frame(canvas, content, Seals(content.columns, chunks(study, blocks)))
+    numbers = sum(c.cell_bytes for c in content.columns if c.name not in FLAGS) * content.grid.size
+    flags = sum(c.name in FLAGS for c in content.columns) * content.grid.size
+    told = len(zlib.compress(sample.status.tobytes(), 1)) / max(len(sample.status), 1)
+    uniform = len(set(sample.status.tolist())) < 2
+    return canvas.size + int(flags * (UNIFORM if uniform else told)), canvas.size - numbers
+
+
+def _disk_speed(folder: Path) -> float:
+    """Bytes a second that are written and synced here, from a short trial; infinite where nothing can be written."""
+    piece = np.random.default_rng(0).bytes(TRIAL)
+    try:
+        with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
+            begun = time.perf_counter()
+            file.write(piece)
+            os.fsync(file.fileno())
+            return TRIAL / (time.perf_counter() - begun)
+    except OSError:
+        return math.inf
+
+
+def _counted(numbers: np.ndarray, names: dict[int, str]) -> dict[str, float]:
+    found, counts = np.unique(numbers, return_counts=True)
+    return {names[int(n)]: float(c / len(numbers)) for n, c in zip(found, counts, strict=True)}
+
+
+def _shares(shares: dict[str, float]) -> str:
+    return ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares.items()) + " of a sample" * bool(shares)
+
+
+def small_duration(seconds: float) -> str:
+    """Seconds as people say them where there may be few: `5.1 ns`, `20 us`, `3.4 ms`, `2.0 s`."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        if seconds >= 0.9995 * size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns"

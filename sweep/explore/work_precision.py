@@ -1,0 +1,277 @@
+"""Speed against accuracy: every method of a kernel on the same cells, in one run.
+
+Errors are against values that are given, or against a reference: the method that leaves the fewest cells open, of those
+that state a bound before those that do not. What the reference is right to itself is the floor below which no error
+here means anything, its own least of all. Times are what one core spends on it, not what it spends on others, the least
+of a few rounds over all methods; they are noisy, errors, shares of cells and counts of work are not.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.interface import FIRST_REFUSAL, Status
+from sweep.cells.grid import Grid
+from sweep.cells.sample import sampled, solved, with_method
+from sweep.explore.plan import small_duration
+from sweep.explore.reference import Truth, best_reference, errors, given_truth
+from sweep.study.mistakes import did_you_mean
+from sweep.study.model import Study
+from sweep.system.errors import SweepError
+from sweep.system.table import columns, page
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
+CELLS = 1024
+ROUNDS = 5
+LEAST_SECONDS = 0.01
+UNSURE = (Status.INACCURATE, Status.GRAZING)
+"""What says of itself that digits, or a count, may be wrong."""
+NAMES = {int(status): status.name for status in Status}
+WORK = ("rate_calls", "steps", "events")
+"""Outputs that count a method's work; where a study asks for them, their means are shown beside the time."""
+
+LONG_NAMES = {
+    "error_median": "median relative error of a cell, over its outputs",
+    "error_worst": "largest relative error of a cell that the method calls right",
+    "seconds": "time per cell on one core",
+    "ok": "share of cells that the method calls right",
+    "remarked": "share of cells with another remark",
+    "inaccurate": "share of cells that it says are not right to rtol",
+    "failed": "share of cells that it refuses though there are values",
+    "silent": "share of cells wrong by more than rtol, and what the truth is right to, without a status that says so",
+    "worst_cell": "where the largest error is",
+    "failed_as": "the status of the first cell refused, and where it is",
+    "silent_at": "the first cell that is silently wrong",
+    "methods_used": "which methods solved how many cells",
+    **{name: f"{name.replace('_', ' ')} per cell, mean" for name in WORK},
+}
+
+
+def precision_cells(study: Study, cells: int = CELLS) -> dict[str, Any]:
+    """Values of the study's axes in the cells that `work_precision` takes, in their order: what truth is given for."""
+    return {name: axis.values for name, axis in sampled(study, cells).axes.items()}
+
+
+def work_precision(
+    study: Study,
+    *,
+    methods: Sequence[str] | None = None,
+    tolerances: Sequence[float] = TOLERANCES,
+    cells: int = CELLS,
+    reference: str | None = None,
+    truth: Mapping[str, Any] | None = None,
+) -> xr.Dataset:
+    """Error and time per cell of methods at several tolerances, on cells spread over a study's grid.
+
+    Parameters
+    ----------
+    study : Study
+        Its method and rtol, and axes of these, are left aside.
+    methods : sequence of str, optional
+        Default: "auto" and all that can do the study's terms and outputs.
+    tolerances : sequence of float
+        Values of rtol.
+    cells : int
+        At most so many.
+    reference : str, optional
+        The method whose results are taken for the truth: in each cell at the least rtol at which it says OK.
+    truth : mapping of output to ndarray, optional
+        True values in the cells that `precision_cells` names; NaN in all outputs where there is nothing to give. Errors
+        are then over these outputs alone.
+
+    Returns
+    -------
+    Dataset
+        Over `method` and `rtol`: `error_median`, `error_worst`, `seconds`; shares of cells `ok`, `remarked`,
+        `inaccurate`, `failed`, `silent`; texts `worst_cell`, `failed_as`, `silent_at`, `methods_used`; and means of the
+        outputs asked for that count work. Attributes `reference`, `reference_error` (the largest error of the truth
+        itself), `cells` (in which methods can be told right or wrong), `open_cells` (in which they cannot) and
+        `omissions`.
+
+    Raises
+    ------
+    SweepError
+        There is no such method, or none that can do the study; the reference solves no cell; truth has another shape;
+        a tolerance is not above 0.
+    """
+    import xarray as xr
+
+    part = sampled(study, cells)
+    able = _able(part)
+    names = _chosen(methods, able)
+    if not len(tolerances) or not all(0 < rtol < math.inf for rtol in tolerances):
+        raise SweepError(f"rtol: expected numbers above 0, found {list(tolerances)}")
+    if cells < 1:
+        raise SweepError(f"cells: expected at least 1, found {cells}")
+    known = best_reference(_without_work(part), able, reference) if truth is None else given_truth(part, truth)
+    rows = [[_measured(part, name, rtol, known) for rtol in tolerances] for name in names]
+    found = xr.Dataset(
+        {key: (("method", "rtol"), np.array([[cell[key] for cell in row] for row in rows])) for key in rows[0][0]},
+        {"method": names, "rtol": list(tolerances)},
+    )
+    found["seconds"] = (("method", "rtol"), _seconds(part, names, tolerances))
+    for key in found.data_vars:
+        found[key].attrs = {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[str(key)]}
+    floor = float(known.floor[known.sound].max()) if known.sound.any() else math.nan
+    found.attrs = {"title": study.title, "kernel": study.kernel_name, "cells": known.judged}
+    found.attrs |= {"open_cells": Grid(part).size - known.judged, "reference": known.source, "reference_error": floor}
+    found.attrs["omissions"] = "; ".join(
+        [*_missing(part, able), *omissions(found)] if methods is None else omissions(found)
+    )
+    return found
+
+
+def precision_text(found: xr.Dataset) -> str:
+    """The table that `sweep chart` prints."""
+    work = [name for name in WORK if name in found]
+    head = ("method", "rtol", "median", "worst", "time", *(name.replace("_", " ") for name in work))
+    rows = [(*head, "ok", "inaccurate", "refused", "silent", "worst cell")]
+    for name in found["method"].values:
+        for rtol in found["rtol"].values:
+            cell = found.sel({"method": name, "rtol": rtol})
+            off = (_error(float(cell[key]), found.attrs, name) for key in ("error_median", "error_worst"))
+            counts = (f"{float(cell[key]):.4g}" for key in work)
+            shares = (f"{100 * float(cell[key]):.3g} %" for key in ("ok", "inaccurate", "failed", "silent"))
+            taken = small_duration(float(cell.seconds))
+            rows.append((str(name), f"{rtol:.0e}", *off, taken, *counts, *shares, str(cell.worst_cell.item())))
+    truth = f"errors against {found.attrs['reference']}, in {found.attrs['cells']} cells"
+    truth += f", itself right to {found.attrs['reference_error']:.1e}"
+    truth += f"; {found.attrs['open_cells']} cells left aside, of which it is not sure" * (
+        found.attrs["open_cells"] > 0
+    )
+    left_out = found.attrs["omissions"]
+    return page(columns(rows), truth, f"Omissions: {left_out}" if left_out else "")
+
+
+def _error(value: float, attributes: Mapping[str, Any], name: str) -> str:
+    """An error as text; of the reference itself nothing can be said but that it is below its floor."""
+    if name == attributes["reference"] and value < attributes["reference_error"]:
+        return "reference"
+    return f"{value:.1e}"
+
+
+def omissions(found: xr.Dataset) -> list[str]:
+    """What fails where, in words."""
+    lines = []
+    for name in found["method"].values:
+        row = found.sel({"method": name})
+        for key, verb, where in (("failed", "refuses", "failed_as"), ("silent", "is silently wrong in", "silent_at")):
+            shares, places = row[key].values, row[where].values
+            if shares.any():
+                at = ", ".join(f"{100 * s:.3g} % at {r:.0e}" for s, r in zip(shares, row.rtol.values, strict=True) if s)
+                lines.append(f"{name} {verb} {at}, first {next(place for place in places if place)}")
+    return lines
+
+
+def _missing(study: Study, able: Sequence[str]) -> list[str]:
+    """Methods that cannot do the study, and why."""
+    lines = []
+    for method in study.kernel.methods:
+        if method.name not in able:
+            terms = [name for name in method.excludes if name in study.terms]
+            lacks = [name for name in method.lacks if name in study.outputs]
+            lines.append(f"{method.name} cannot do {', '.join(terms)}" if terms else "")
+            lines[-1] = lines[-1] or f"{method.name} does not give {', '.join(lacks)}"
+    return lines
+
+
+def _able(study: Study) -> list[str]:
+    from sweep.cells.solve import usable_methods
+
+    return [study.kernel.methods[i].name for i in usable_methods(study)]
+
+
+def _chosen(methods: Sequence[str] | None, able: Sequence[str]) -> list[str]:
+    if not able:
+        raise SweepError("no method of the kernel can do this study")
+    names = ["auto", *able] if methods is None else list(dict.fromkeys(methods))
+    for name in names:
+        if name not in ("auto", *able):
+            hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
+            raise SweepError(f"no method {name} that can do this study{hint}")
+    return names
+
+
+def _without_work(study: Study) -> Study:
+    """The study without its counts of work, of which no method is right or wrong."""
+    import dataclasses
+
+    left = tuple(name for name in study.outputs if name not in WORK)
+    return dataclasses.replace(study, outputs=left) if left else study
+
+
+def _measured(study: Study, name: str, rtol: float, truth: Truth) -> dict[str, Any]:
+    part = with_method(study, name, rtol)
+    outputs, status, used = solved(part)
+    error = errors(outputs, truth.values)
+    valued, total = truth.sound & (status < FIRST_REFUSAL), truth.judged
+    sure = valued & ~np.isin(status, UNSURE)
+    refused = truth.sound & ~valued
+    wrong = sure & ~(error <= rtol + truth.floor) | truth.void & (status == Status.OK)
+    worst = int(np.where(sure, error, -1.0).argmax())
+    return {
+        "error_median": float(np.median(error[valued])) if valued.any() else math.nan,
+        "error_worst": float(error[worst]) if sure.any() else math.nan,
+        "ok": float((truth.sound & (status == Status.OK)).sum() / total),
+        "remarked": float((valued & (status != Status.OK) & (status != Status.INACCURATE)).sum() / total),
+        "inaccurate": float((valued & (status == Status.INACCURATE)).sum() / total),
+        "failed": float(refused.sum() / total),
+        "silent": float(wrong.sum() / total),
+        "worst_cell": _cell(study, worst) if sure.any() else "",
+        "failed_as": _first(study, refused, status),
+        "silent_at": _first(study, wrong),
+        "methods_used": _shares(study, used),
+        **{key: float(outputs[key][valued].mean()) if valued.any() else math.nan for key in WORK if key in outputs},
+    }
+
+
+def _shares(study: Study, used: Any) -> str:
+    """`closed 80 %, segments 20 %` of the cells that were solved."""
+    counts = {m.name: int((used == i).sum()) for i, m in enumerate(study.kernel.methods)}
+    solved_cells = max(sum(counts.values()), 1)
+    return ", ".join(f"{name} {100 * n / solved_cells:.3g} %" for name, n in counts.items() if n)
+
+
+def _first(study: Study, where: Any, status: Any = None) -> str:
+    """The first of the cells, with its status where that is wanted; "" where there is none."""
+    if not where.any():
+        return ""
+    index = int(where.argmax())
+    return _cell(study, index) if status is None else f"{NAMES[int(status[index])]} at {_cell(study, index)}"
+
+
+def _seconds(study: Study, names: Sequence[str], tolerances: Sequence[float]) -> NDArray[np.float64]:
+    """Least time per cell of a few rounds over all methods: what slows the machine for a while slows them alike."""
+    best = np.full((len(names), len(tolerances)), math.inf)
+    for _ in range(ROUNDS):
+        for i, name in enumerate(names):
+            for j, rtol in enumerate(tolerances):
+                best[i, j] = min(best[i, j], _timed(with_method(study, name, rtol)))
+    return best
+
+
+def _timed(study: Study) -> float:
+    """Time per cell that this thread spends: what else runs on the machine matters less."""
+    from sweep.cells.solve import Solver
+
+    size, lengths, solver = Grid(study).size, study.lengths, Solver(study)
+    outputs = {f.name: np.empty((size, *(lengths[d] for d in f.dims))) for f in study.asked}
+    status, used = np.empty(size, np.int8), np.empty(size, np.int8)
+    count, begin = 0, time.thread_time()
+    while (spent := time.thread_time() - begin) < LEAST_SECONDS or not count:
+        solver.solve(0, size, outputs, status, used)
+        count += 1
+    return spent / count / size
+
+
+def _cell(study: Study, index: int) -> str:
+    return " ".join(f"{name}={axis.label(index)}" for name, axis in study.axes.items())

@@ -1,0 +1,169 @@
+"""Results for other programs: csv and parquet for tables, nc (netCDF4) and zarr for whatever reads CF."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+import os
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+import xarray as xr
+
+from sweep.results.flat import flat
+from sweep.study.mistakes import listed
+from sweep.system import disk
+from sweep.system.errors import SweepError
+
+ROWS = 65536
+"""Rows of csv in memory at a time."""
+
+LARGE = 256 * 2**20
+"""Bytes from which a Dataset is written to netCDF4 piece by piece."""
+
+
+def export(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+    """Write a Dataset to `path`, as its suffix says: .csv, .parquet, .nc or .zarr.
+
+    What is there is replaced once all is written.
+
+    csv: one row per cell (per cell and phase, for outputs along a phase), one column per coordinate and output,
+    `status` and `method_used` as words, numbers with all their digits. Lines that start with "#" name the unit of
+    each column; `pandas.read_csv(path, comment="#")` reads it, and so does the `file` of an axis of a study.
+    Memory does not grow with the number of cells.
+
+    parquet: the same table with types; units and meanings are in the metadata of each field, the Dataset's attributes
+    in that of the schema.
+
+    nc, zarr: netCDF4, or a folder of zarr, with units, flags and all attributes.
+
+    Raises
+    ------
+    SweepError
+        If the suffix is another, what writes it is not installed, or the file cannot be written.
+    """
+    target = Path(path)
+    kind = target.suffix.lower()
+    if kind not in WRITERS:
+        found = f'"{target.suffix}"' if target.suffix else "no suffix"
+        raise SweepError(f"{target}: found {found}; export writes {listed(WRITERS, word='and')}, as the suffix says")
+    if target.is_dir() and kind != ".zarr":
+        raise SweepError(f"{target} is a folder; name a file in it")
+    try:
+        with disk.replacing(target) as part:
+            WRITERS[kind](dataset, part)
+    except ImportError as error:
+        raise SweepError(f'{target}: needs {error.name}; install it with: pip install "foliot[export]"') from None
+    except RuntimeError as error:  # from HDF5
+        raise SweepError(f"{target} cannot be written: {error}") from None
+    return target
+
+
+def _write_csv(dataset: xr.Dataset, path: Path) -> None:
+    dataset = flat(dataset)
+    names = [str(name) for name in (*dataset.coords, *dataset.data_vars)]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        _write_units(dataset, names, file)
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(names)
+        for block in _blocks(dataset):
+            writer.writerows(zip(*(_column(block, name) for name in names), strict=True))
+
+
+def _write_parquet(dataset: xr.Dataset, path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    dataset = flat(dataset)
+    names = [str(name) for name in (*dataset.coords, *dataset.data_vars)]
+    fields = [pa.field(name, _arrow_type(dataset[name], pa), metadata=_text(dataset[name].attrs)) for name in names]
+    schema = pa.schema(fields, metadata=_text(dataset.attrs))
+    with pq.ParquetWriter(path, schema) as writer:
+        for block in _blocks(dataset):
+            writer.write_table(pa.table([_column(block, name) for name in names], schema=schema))
+
+
+def _arrow_type(variable: xr.DataArray, pa: Any) -> Any:
+    words = flag_words(variable) or variable.dtype.kind not in "fiu"
+    return pa.string() if words else pa.from_numpy_dtype(variable.dtype)
+
+
+def _text(attrs: Mapping[Any, Any]) -> dict[str, str]:
+    """Attributes as text, as parquet wants them; flags are words in a table."""
+    return {str(name): str(value) for name, value in attrs.items() if name not in ("flag_values", "flag_meanings")}
+
+
+def _write_zarr(dataset: xr.Dataset, path: Path) -> None:
+    import zarr  # noqa: F401  xarray would say in other words that it is missing
+
+    path.unlink()
+    whole = dataset.chunk("auto") if dataset.nbytes > LARGE and not dataset.chunks else dataset
+    words = {str(name): whole[name].astype(object) for name in whole.variables if whole[name].dtype.kind == "U"}
+    whole.assign(words).drop_encoding().to_zarr(path, mode="w", consolidated=False)
+
+
+def _write_units(dataset: xr.Dataset, names: list[str], file: TextIO) -> None:
+    for name in names:
+        attrs = dataset[name].attrs
+        unit = f" [{attrs['units']}]" if "units" in attrs else ""
+        # a quotation mark could open a quoted field that swallows the lines below
+        about = " ".join(str(attrs.get("long_name", "")).replace('"', "'").split())
+        file.write(f"# {name}{unit}{': ' + about if about else ''}\n")
+
+
+def _blocks(dataset: xr.Dataset) -> Iterator[xr.Dataset]:
+    """Parts of at most about `ROWS` rows, in C order of the dimensions."""
+    dims = _dimensions(dataset)
+    inner = 1
+    chunks: dict[str, int] = {}
+    for dim in reversed(dims):
+        chunks[dim] = max(1, min(dataset.sizes[dim], ROWS // inner))
+        inner *= dataset.sizes[dim]
+    starts = (range(0, dataset.sizes[dim], chunks[dim]) for dim in dims)
+    for corner in itertools.product(*starts):
+        pieces = {dim: slice(start, start + chunks[dim]) for dim, start in zip(dims, corner, strict=True)}
+        yield dataset.isel(pieces).load() if dims else dataset.load()
+
+
+def _dimensions(dataset: xr.Dataset) -> list[str]:
+    """Dimensions of the cells as the status has them, then those of traces."""
+    cells = dataset["status"].dims if "status" in dataset else ()
+    return list(dict.fromkeys(str(dim) for dim in (*cells, *dataset.sizes)))
+
+
+def _column(block: xr.Dataset, name: str) -> list[Any]:
+    """Values of one column, one for each row of the block."""
+    dims, variable = _dimensions(block), block[name]
+    values = variable.transpose(*(dim for dim in dims if dim in variable.dims)).values
+    values = values.reshape([block.sizes[dim] if dim in variable.dims else 1 for dim in dims])
+    column = np.broadcast_to(values, [block.sizes[dim] for dim in dims]).reshape(-1).tolist()
+    words = flag_words(variable)
+    return [words.get(code, code) for code in column] if words else column
+
+
+def flag_words(variable: xr.DataArray) -> dict[int, str]:
+    """What the codes of a flag variable mean, {} for others; -1 is "none" where the flags do not say."""
+    values = np.atleast_1d(variable.attrs.get("flag_values", ())).tolist()
+    words = dict(zip(values, str(variable.attrs.get("flag_meanings", "")).split(), strict=False))
+    return {-1: "none", **words} if words else {}
+
+
+def _write_netcdf(dataset: xr.Dataset, path: Path) -> None:
+    whole = dataset.chunk("auto") if dataset.nbytes > LARGE and not dataset.chunks else dataset
+    encoding: dict[str, dict[str, Any]] = {str(name): {"_FillValue": None} for name in whole.variables}
+    for name, variable in whole.data_vars.items():
+        if variable.dtype.kind in "iu" and math.prod(variable.shape) > 1:
+            encoding[str(name)] |= {"zlib": True, "complevel": 1}
+    whole.to_netcdf(path, engine="h5netcdf", encoding=encoding)
+
+
+WRITERS: dict[str, Callable[[xr.Dataset, Path], None]] = {
+    ".csv": _write_csv,
+    ".parquet": _write_parquet,
+    ".nc": _write_netcdf,
+    ".zarr": _write_zarr,
+}
+"""Kinds of file, by suffix."""

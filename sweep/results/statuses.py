@@ -1,0 +1,174 @@
+"""Which statuses a result holds, with a cell of each to look at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kernels.interface import Status
+from sweep.cells.reduce import BY_METHOD, BY_STATUS
+from sweep.cells.schema import METHOD_USED, STATUS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+CELLS_AT_ONCE = 1 << 22
+FAILED = (Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.NO_METHOD)
+"""Refusals for which the method is to blame, not the scene."""
+
+
+@dataclass(frozen=True)
+class Account:
+    """What became of all cells: each is in one of these, and together they are `total`.
+
+    `failed` are those for which no method found an answer, and those of a status that this version does not know.
+    """
+
+    ok: int
+    remarks: int
+    refused: int
+    failed: int
+    pending: int
+
+    @property
+    def total(self) -> int:
+        """All cells."""
+        return self.ok + self.remarks + self.refused + self.failed + self.pending
+
+    def __str__(self) -> str:
+        parts = ("ok", "remarks", "refused", "failed", "pending")
+        return f"{self.total:,} cells: " + ", ".join(f"{getattr(self, name):,} {name}" for name in parts)
+
+
+def account(dataset: xr.Dataset) -> Account:
+    """What became of the cells of a result, of a summary too."""
+    counts = dict.fromkeys(("ok", "remarks", "refused", "failed", "pending"), 0)
+    for name, cells in _counts(dataset).items():
+        counts[_kind(name)] += cells
+    return Account(**counts)
+
+
+def _kind(name: str) -> str:
+    status = Status.__members__.get(name)
+    if status is None or status in FAILED:
+        return "failed"
+    if status in (Status.OK, Status.PENDING):
+        return "ok" if status == Status.OK else "pending"
+    return "refused" if status.refused else "remarks"
+
+
+def _counts(dataset: xr.Dataset) -> dict[str, int]:
+    if is_summary(dataset):
+        return summed(dataset, BY_STATUS)
+    return {count.name: count.cells for count in count_statuses(dataset)}
+
+
+def is_summary(dataset: xr.Dataset) -> bool:
+    """Whether a result holds reductions, not cells."""
+    return BY_STATUS in dataset and STATUS not in dataset
+
+
+def summed(dataset: xr.Dataset, name: str) -> dict[str, int]:
+    """Cells of each status or method of a summary, over all it keeps; those that do not occur are left out."""
+    counts = dataset[name]
+    total = counts.sum([d for d in counts.dims if d != counts.dims[-1]])
+    return {str(word): int(n) for word, n in zip(total[counts.dims[-1]].values, total.values, strict=True) if n}
+
+
+@dataclass(frozen=True)
+class StatusCount:
+    """How many cells have a status, and the coordinates of the first of them."""
+
+    name: str
+    cells: int
+    total: int
+    example: dict[str, str] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        text = f"{self.cells} of {self.total} cells: {self.name}"
+        cell = " ".join(f"{k}={v}" for k, v in self.example.items())
+        return f"{text}, e.g. {cell}" if cell else text
+
+
+def count_statuses(dataset: xr.Dataset) -> list[StatusCount]:
+    """Every status that occurs, in the order of its number, with its first cell; OK without one, a summary without any.
+
+    Reads a few million cells at a time.
+    """
+    if is_summary(dataset):
+        found = summed(dataset, BY_STATUS)
+        return [StatusCount(name, cells, sum(found.values())) for name, cells in found.items()]
+    counts, first = _tally(dataset[STATUS])
+    total = int(counts.sum())
+    return [
+        StatusCount(
+            _name(number), int(counts[number]), total, {} if number == Status.OK else _cell(dataset, first[number])
+        )
+        for number in range(len(counts))
+        if counts[number]
+    ]
+
+
+def failures(dataset: xr.Dataset) -> list[StatusCount]:
+    """The statuses that are not OK."""
+    return [count for count in count_statuses(dataset) if count.name != Status.OK.name]
+
+
+def count_methods(dataset: xr.Dataset) -> dict[str, int]:
+    """How many cells each method solved; those that none did are left out."""
+    if is_summary(dataset):
+        return {name: n for name, n in summed(dataset, BY_METHOD).items() if name != "none"}
+    counts, _ = _tally(dataset[METHOD_USED], lowest=-1)
+    names = str(dataset[METHOD_USED].attrs["flag_meanings"]).split()
+    return {name: int(n) for name, n in zip(names[1:], counts[1:], strict=False) if n}
+
+
+def _tally(column: xr.DataArray, lowest: int = 0) -> tuple[Any, dict[int, int]]:
+    """Cells of each number from `lowest` on, and the flat index of the first of each (both counted from `lowest`)."""
+    counts = np.zeros(256, np.int64)
+    first: dict[int, int] = {}
+    done = 0
+    for piece in _flat_pieces(column):
+        values = (piece.astype(np.int16) - lowest) & 255
+        found = np.bincount(values, minlength=256)
+        for number in np.flatnonzero(found):
+            if int(number) not in first:
+                first[int(number)] = done + int(np.argmax(values == number))
+        counts += found
+        done += len(values)
+    return counts, first
+
+
+def _flat_pieces(column: xr.DataArray) -> Iterator[Any]:
+    """The cells in C order, some at a time."""
+    if not column.dims:
+        yield np.atleast_1d(np.asarray(column.values))
+        return
+    row = max(1, math.prod(column.shape[1:]))
+    if row > CELLS_AT_ONCE:
+        for index in range(column.shape[0]):
+            yield from _flat_pieces(column[index])
+        return
+    rows = max(1, CELLS_AT_ONCE // row)
+    for start in range(0, column.shape[0], rows):
+        yield np.asarray(column[start : start + rows].values).reshape(-1)
+
+
+def _name(number: int) -> str:
+    return next((status.name for status in Status if status == number), f"status {number}")
+
+
+def _cell(dataset: xr.Dataset, index: int) -> dict[str, str]:
+    """Coordinates of a cell, as people write them."""
+    column = dataset[STATUS]
+    at = dict(zip(column.dims, np.unravel_index(index, column.shape), strict=True))
+    cell = {}
+    for name, coordinate in dataset.coords.items():
+        if coordinate.dims and set(coordinate.dims) <= set(column.dims):
+            value = coordinate.isel({d: at[d] for d in coordinate.dims}).item()
+            cell[str(name)] = value if isinstance(value, str) else repr(float(f"{value:.6g}"))
+    return cell

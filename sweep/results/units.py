@@ -1,0 +1,57 @@
+"""Results in the units people use: degree for rad, mm for m, mm/hour for m/s."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from decimal import Decimal
+from typing import TYPE_CHECKING
+
+from sweep.study.mistakes import Mistakes, did_you_mean
+from sweep.study.units import UnitMistake, scale
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def in_units(dataset: xr.Dataset, units: Mapping[str, str]) -> xr.Dataset:
+    """The Dataset with some outputs, parameters or coordinates in other units, which their `units` attribute names.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        From `run` or `open_result`.
+    units : mapping of name to unit
+        {"A0": "degree", "e": "mm", "wear": "mm/hour"}
+
+    Raises
+    ------
+    StudyError
+        Names that are not there, or units that measure something else; all of them are listed.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> study = sweep.build_study(kernel="foliot", axes={"mu": [0.1]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> sweep.in_units(sweep.run(study), {"amplitude": "degree"}).amplitude.attrs["units"]
+    'degree'
+    """
+    mistakes = Mistakes()
+    factors = {name: _factor(dataset, name, unit, mistakes) for name, unit in units.items()}
+    mistakes.raise_if_any("units")
+    for name, unit in units.items():
+        old = dataset[name]
+        dataset = dataset.assign({name: (old.dims, (old * float(factors[name])).data, {**old.attrs, "units": unit})})
+    return dataset
+
+
+def _factor(dataset: xr.Dataset, name: str, unit: str, mistakes: Mistakes) -> Decimal:
+    if name not in dataset.variables:
+        mistakes.add(name, f"the result has no such variable{did_you_mean(name, map(str, dataset.variables))}")
+    elif "units" not in dataset[name].attrs or dataset[name].dtype.kind != "f":
+        mistakes.add(name, "has words or counts, which have no unit")
+    else:
+        try:
+            return 1 / (scale(unit, dataset[name].attrs["units"], name) or Decimal(1))
+        except UnitMistake as error:
+            mistakes.add(name, str(error))
+    return Decimal(1)

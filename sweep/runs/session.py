@@ -1,0 +1,212 @@
+"""One run of a study: its layout, how it is cut into blocks, and the threads that compute them."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+from sweep.cells.contents import contents, part_columns
+from sweep.cells.partition import UNSAMPLED, Partition, Sample, order, row_partition, take_sample
+from sweep.cells.reduce import Reducer
+from sweep.cells.row_blocks import granules
+from sweep.cells.schema import METHOD_USED, STATUS, Layout, columns
+from sweep.system.errors import SweepError
+from sweep.system.pool import Halt, Spares, each
+from sweep.system.progress import Progress
+from sweep.system.until import TimeUp, passed
+
+if TYPE_CHECKING:
+    from sweep.runs.cluster import Cluster
+    from sweep.runs.extend import Given, Known
+    from sweep.study.model import Study
+
+Solve = Callable[[int, int, Mapping[str, Any]], bool]
+"""Computes the rows start .. stop into columns of that length; False where the run is being stopped."""
+
+Receive = Callable[[int, "str | Mapping[str, Any]"], None]
+"""Takes a block that was computed elsewhere: the name of its part, or its numbers."""
+
+
+class Session:
+    """Compiles the kernel, times a sample of the grid, and cuts it.
+
+    Parameters
+    ----------
+    study : Study
+    mark : fingerprint of the study
+    workers : cores to compute on
+    blocks : how the grid is cut, where that is settled already
+    block_cells : cells a block, instead of a size taken from the sample
+    sampled : False where nothing is left to compute
+    known : cells that need not be computed
+    until : when to stop
+    cluster : workers elsewhere, which compute instead of this process
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        mark: Mapping[str, str],
+        workers: int,
+        blocks: Partition | None = None,
+        block_cells: int | None = None,
+        sampled: bool = True,
+        known: Known | Given | None = None,
+        until: datetime | None = None,
+        cluster: Cluster | None = None,
+    ) -> None:
+        self.study, self.mark, self.workers, self.known, self.until = study, mark, workers, known, until
+        self.cluster = cluster
+        self.began = now()
+        self.layout: Layout = contents(study, mark)
+        self.columns = part_columns(study)
+        self.granules = grains = granules(study)
+        self.sample: Sample = sampled_study(study) if sampled else UNSAMPLED
+        if blocks is None and block_cells is not None:
+            blocks = Partition(grains.count, min(math.ceil(block_cells / grains.mean), grains.count))
+        crew = cluster.threads if cluster is not None else 0
+        self.blocks = blocks or row_partition(self.sample, grains, self.row_bytes, crew or workers)
+        self._weights = self.sample.weights(self.blocks, grains.first)
+
+    @property
+    def row_bytes(self) -> int:
+        """Bytes of one row over all columns of a part."""
+        return sum(column.cell_bytes for column in self.columns)
+
+    def cells(self, job: int) -> tuple[int, int]:
+        """The cells of a block."""
+        return self.granules.cells(*self.blocks.bounds(job))
+
+    def progress(self, stream: TextIO | None, name: str, jobs: Iterable[int]) -> Progress:
+        """Where the run stands when `jobs` are still to do."""
+        left, work = 0, 0.0
+        for job in jobs:
+            start, stop = self.cells(job)
+            left, work = left + stop - start, work + float(self._weights[job])
+        return Progress(self.granules.size, stream, name, self.granules.size - left, work)
+
+    def dated(self, progress: Progress, began: str) -> Layout:
+        """The layout with the times of the run, which now is at its end."""
+        end = now()
+        times = {"created": end, "start": began, "end": end, "cells_per_second": progress.rate}
+        return replace(self.layout, attrs={**self.layout.attrs, **times})
+
+    def compute(
+        self, jobs: Iterable[int], threads: int, work: Callable[[int, Solve], None], progress: Progress
+    ) -> None:
+        """Calls `work(job, solve)` for every block, dear ones first, on a pool of threads.
+
+        No more than `workers` threads are inside `solve` at a time. Raises SweepError where `work` fails, TimeUp.
+        """
+        self.check_time()
+        halt = Halt(self.workers)
+        solvers = Spares(lambda: self._solver(halt), threads)
+
+        def guarded(job: int) -> None:
+            start, stop = self.cells(job)
+            with faults_told(f"cells {start} to {stop}: the kernel failed"), solvers.lent() as solve:
+                work(job, solve)
+
+        each(self._inorder(jobs), guarded, threads, lambda job: self._tell(progress, job), halt)
+
+    def compute_elsewhere(
+        self,
+        jobs: Iterable[int],
+        receive: Receive,
+        progress: Progress,
+        door: Path | None,
+    ) -> None:
+        """The same on the workers of a cluster: calls `receive` with every block and its part's name, or its numbers.
+
+        Parameters
+        ----------
+        door : the way to the folder of the parts; None: all numbers are wanted here
+        """
+        self.check_time()
+
+        def finished(job: int | None) -> None:
+            self._tell(progress, job)
+
+        assert self.cluster is not None
+        self.cluster.compute(self, self._inorder(jobs), receive, finished, progress.note, door)
+
+    def _inorder(self, jobs: Iterable[int]) -> Iterator[int]:
+        wanted = set(jobs)
+        inorder = map(int, order(self.sample, self.blocks, self.granules.first))
+        return (job for job in inorder if job in wanted)
+
+    def _tell(self, progress: Progress, job: int | None) -> None:
+        """Counts a block that is done. Raises TimeUp."""
+        if job is None:
+            progress.tick()
+        else:
+            start, stop = self.cells(job)
+            progress.add(stop - start, float(self._weights[job]))
+        self.check_time()
+
+    def check_time(self) -> None:
+        """Raises TimeUp when it is time to stop."""
+        if passed(self.until):
+            raise TimeUp
+
+    def _solver(self, halt: Halt) -> Solve:
+        compute, known = block_solver(self.study), self.known
+
+        def solve(start: int, stop: int, arrays: Mapping[str, Any]) -> None:
+            compute(start, stop, arrays, None if known is None else known.missing(start, stop))
+            if known is not None:
+                known.fill(start, stop, arrays)
+
+        return lambda start, stop, arrays: halt.compute(lambda: solve(start, stop, arrays))
+
+
+def block_solver(study: Study) -> Callable[[int, int, Mapping[str, Any], Any], None]:
+    """Computes rows into the columns of a part; of cells, only those wanted (None: all). For one thread at a time."""
+    if study.summary is not None:
+        reducer = Reducer(study)
+        return lambda start, stop, arrays, wanted: reducer.solve(start, stop, arrays)
+    from sweep.cells.solve import Solver
+
+    solver = Solver(study)
+
+    def solve(start: int, stop: int, arrays: Mapping[str, Any], wanted: Any) -> None:
+        outputs = {name: array for name, array in arrays.items() if name not in (STATUS, METHOD_USED)}
+        solver.solve(start, stop, outputs, arrays[STATUS], arrays[METHOD_USED], wanted)
+
+    return solve
+
+
+def sampled_study(study: Study) -> Sample:
+    """Compiles the kernel and times a sample of the grid. Raises SweepError where the kernel fails."""
+    from sweep.cells.solve import Solver
+
+    with faults_told(f"{study.kernel_name}: the kernel failed"):
+        solver = Solver(study)
+        solver.warm()
+        sample = take_sample(solver, columns(study), granules(study).size)
+        if study.summary is not None:
+            sample = replace(sample, costs=sample.costs + Reducer(study).seconds())
+        return sample
+
+
+@contextlib.contextmanager
+def faults_told(what: str) -> Iterator[None]:
+    """Every fault as a SweepError of one line."""
+    try:
+        yield
+    except SweepError:
+        raise
+    except MemoryError as fault:
+        raise SweepError("out of memory; fewer workers need less; what is finished is kept") from fault
+    except Exception as fault:
+        raise SweepError(f"{what} ({type(fault).__name__}: {fault}); what is finished is kept") from fault
+
+
+def now() -> str:
+    """The time as ISO 8601 in UTC."""
+    return datetime.now(UTC).isoformat(timespec="seconds")

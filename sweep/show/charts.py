@@ -1,0 +1,333 @@
+"""Pictures of results, fit for print; the only module that imports matplotlib.
+
+Nothing here touches pyplot or its global state, and the same Dataset gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import os
+import textwrap
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from sweep.analysis.loglog import is_logarithmic, spans_decades
+from sweep.show.view import View, coordinate, label, setting, view
+from sweep.system import disk
+from sweep.system.errors import SweepError
+
+try:
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import LogNorm, Normalize
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+except ImportError:
+    raise SweepError('pictures need matplotlib; install it with: pip install "foliot[plot]"') from None
+
+MILLIMETRE = 1 / 25.4
+"""One millimetre in the inches of matplotlib."""
+
+COLUMN, PAGE = 86.0, 178.0
+"""Widths in mm of one and of two columns of a physics journal."""
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+"""Okabe and Ito's colours, told apart by colour-blind readers; their yellow is lost on white paper."""
+
+DASHES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
+"""Line styles, so that a line is known in black and white too."""
+
+STYLE = {
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
+    "font.size": 9,
+    "axes.labelsize": 9,
+    "axes.titlesize": 9,
+    "axes.linewidth": 0.6,
+    "axes.formatter.use_mathtext": True,
+    "legend.fontsize": 8,
+    "legend.frameon": False,
+    "legend.handlelength": 2.4,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 4,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.top": True,
+    "ytick.right": True,
+    "xtick.minor.visible": True,
+    "ytick.minor.visible": True,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.minor.width": 0.4,
+    "ytick.minor.width": 0.4,
+    "figure.dpi": 150,
+    "savefig.dpi": 300,
+    "svg.hashsalt": "foliot",
+    "pdf.fonttype": 42,
+    "hatch.linewidth": 0.4,
+}
+
+MARKS = "osD^vPX*"
+"""Marks of points that no line joins."""
+
+FLAGGED = ("#D55E00", "#000000", "#CC79A7", "#666666")
+"""Colours of cells that are not OK."""
+
+HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "----")
+"""Patterns of cells without a value, told apart without colour."""
+
+NAME_ROOM = 0.11
+"""Part of a map's height that a region must reach from the place of its name in all directions."""
+
+METADATA: dict[str, dict[str, Any]] = {
+    ".png": {"Software": None},
+    ".svg": {"Date": None},
+    ".pdf": {"CreationDate": None},
+}
+"""Kinds of file, and what is left out of them so that the same picture has the same bytes."""
+
+
+def plot(
+    dataset: xr.Dataset, path: str | os.PathLike[str] | None = None, *, y: str | None = None, x: str | None = None
+) -> Figure:
+    """Picture of one output: a line, a family of lines, or a map where there are two long axes.
+
+    An axis is logarithmic where its grid is, or where the values span decades. Cells whose status is not OK are
+    marked: on the line where they have a value, at the foot of the picture where they have none. Further axes are
+    held at their middle value, which the title says.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        From `run` or `open_result`.
+    path : path, optional
+        Where to save it; .png, .svg or .pdf.
+    y : str, optional
+        Output; the first by default.
+    x : str, optional
+        Axis, or coordinate along the cells of a zip design. Default: what a trace runs along, else the longest.
+
+    Raises
+    ------
+    SweepError
+        If there is no such output or axis, or the file cannot be written.
+    """
+    shown = view(dataset, y, x)
+    with style():
+        figure = new_figure(120.0, 82.0)
+        axes = figure.subplots()
+        if shown.mapped:
+            _draw_map(axes, shown)
+        else:
+            _draw_lines(axes, shown)
+        title = "\n".join(part for part in (str(dataset.attrs.get("title", "")), shown.held) if part)
+        axes.set_title(title, wrap=True)
+    if path is not None:
+        save(figure, path)
+    return figure
+
+
+def plot_precision(found: xr.Dataset, path: str | os.PathLike[str] | None = None) -> Figure:
+    """Error against time per cell, median and worst cell, a line for each method through its tolerances.
+
+    Parameters
+    ----------
+    found : Dataset
+        From `work_precision`.
+    path : path, optional
+        Where to save it; .png, .svg or .pdf.
+
+    Raises
+    ------
+    SweepError
+        The file cannot be written.
+    """
+    with style():
+        figure = new_figure(PAGE, 92.0)
+        panels = figure.subplots(1, 2, sharex=True, sharey=True)
+        for axes, key, text in zip(panels, ("error_median", "error_worst"), ("median cell", "worst cell"), strict=True):
+            draw_precision(axes, found, key)
+            axes.set_title(text)
+        panels[0].set_ylabel("relative error")
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
+        if found.attrs.get("omissions"):
+            text = "\n".join(textwrap.wrap(f"Omissions: {found.attrs['omissions']}", 170)[:8])
+            figure.supxlabel(text, fontsize=6, ha="left", x=0.02)
+    if path is not None:
+        save(figure, path)
+    return figure
+
+
+FLOOR = 1e-17
+"""Where errors of 0 are drawn."""
+
+
+def draw_precision(axes: Any, found: xr.Dataset, key: str, names: Sequence[str] = ()) -> None:
+    """A line for each method; those in `names` look the same in every picture that gives the same names.
+
+    Filled marks where all cells are solved, open ones where some are refused or said to be inaccurate, crosses where
+    some are silently wrong. The reference is drawn at what it is right to, since against itself it has no error.
+    """
+    floor = found.attrs.get("reference_error", np.nan)
+    order = list(dict.fromkeys([*names, *found["method"].values.tolist()]))
+    for i, name in ((order.index(name), name) for name in found["method"].values):
+        row = found.sel({"method": name})
+        least = max(floor, FLOOR) if name == found.attrs.get("reference") else FLOOR
+        seconds, error = row.seconds.values, np.maximum(row[key].values, least)
+        whole = (row.failed + row.inaccurate).values == 0
+        look = {"color": COLOURS[i % len(COLOURS)], "marker": MARKS[i % len(MARKS)], "markersize": 4}
+        axes.plot(seconds, error, linewidth=0.8, linestyle=DASHES[i % len(DASHES)], markevery=whole, label=name, **look)
+        axes.plot(seconds[~whole], error[~whole], linestyle="", **{**look, "markerfacecolor": "white"})
+        silent = row.silent.values > 0
+        axes.plot(seconds[silent], error[silent], "x", color="black", markersize=7)
+    if np.isfinite(floor):
+        axes.axhspan(FLOOR / 2, max(floor, FLOOR), color="0.9", linewidth=0)
+    axes.set(xscale="log", yscale="log", xlabel="time per cell on one core [s]", ylim=(FLOOR / 2, 10))
+
+
+@contextlib.contextmanager
+def style() -> Iterator[None]:
+    """The look of all pictures, whatever the reader's own matplotlib settings are."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(STYLE)
+        yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Empty figure of so many millimetres; draw in it inside `style()`."""
+    figure = Figure(figsize=(width * MILLIMETRE, height * MILLIMETRE), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
+    """Save as .png, .svg or .pdf; a file that is there is replaced once all is written.
+
+    Raises
+    ------
+    SweepError
+        If the suffix is another, or the file cannot be written.
+    """
+    target = Path(path)
+    kind = target.suffix.lower()
+    if kind not in METADATA:
+        found = f'"{target.suffix}"' if target.suffix else "no suffix"
+        raise SweepError(f"{target}: found {found}; a picture is one of {', '.join(METADATA)}")
+    if target.is_dir():
+        raise SweepError(f"{target} is a folder; name a file in it")
+    with disk.replacing(target) as part, style():
+        figure.savefig(part, format=kind[1:], metadata=METADATA[kind])
+    return target
+
+
+def letter(axes: Any, text: str) -> None:
+    """Letter of a panel, in its upper left corner outside the frame."""
+    axes.set_title(f"({text})", loc="left")
+
+
+def _draw_lines(axes: Any, shown: View) -> None:
+    axes.set(xlabel=shown.label(shown.x, 80), ylabel=label(shown.y))
+    axes.set_xscale("log" if is_logarithmic(shown.values(shown.x)) else "linear")
+    axes.set_yscale("log" if spans_decades(shown.y) else "linear")
+    x, lines = shown.values(shown.x), np.atleast_2d(shown.y.values)
+    for i, y in enumerate(lines):
+        name = setting(coordinate(shown.y, shown.across)[i]) if shown.across else None
+        axes.plot(x, y, color=COLOURS[i % len(COLOURS)], label=name, **_look(i, shown.joined))
+    for code, mark, colour in zip(shown.codes(), itertools.cycle(MARKS), itertools.cycle(FLAGGED), strict=False):
+        _mark(axes, x, lines, np.atleast_2d(shown.status) == code, mark, colour)
+        axes.plot([], [], mark, color=colour, markerfacecolor="none", label=shown.meanings.get(code, str(code)))
+    if (shown.across or shown.codes()) and shown.joined:
+        axes.legend()
+    elif shown.across or shown.codes():  # points lie everywhere
+        axes.figure.legend(loc="outside lower center", ncols=3)
+
+
+def _look(i: int, joined: bool) -> dict[str, Any]:
+    if joined:
+        return {"linestyle": DASHES[i % len(DASHES)]}
+    return {"linestyle": "", "marker": MARKS[i % len(MARKS)], "markersize": 2.5}
+
+
+def _mark(axes: Any, x: Any, lines: Any, flagged: Any, mark: str, colour: str) -> None:
+    """Cells of one status: on the line where they have a value, at the foot where they have none."""
+    open_mark = {"linestyle": "", "marker": mark, "color": colour, "markerfacecolor": "none", "clip_on": False}
+    for y, here in zip(lines, flagged, strict=True):
+        valued, empty = here & np.isfinite(y), here & ~np.isfinite(y)
+        axes.plot(x[valued], y[valued], **open_mark)
+        axes.plot(x[empty], np.zeros(empty.sum()), transform=axes.get_xaxis_transform(), **open_mark)
+
+
+def _draw_map(axes: Any, shown: View) -> None:
+    across = str(shown.across)
+    axes.set(xlabel=shown.label(shown.x, 80), ylabel=shown.label(across))
+    corners = []
+    for scale, grid in ((axes.set_xscale, shown.values(shown.x)), (axes.set_yscale, shown.values(across))):
+        scale("log" if is_logarithmic(grid) else "linear")
+        corners.append(_edges(grid.astype(np.float64), is_logarithmic(grid)))
+    norm = LogNorm() if spans_decades(shown.y) else Normalize()
+    mesh = axes.pcolormesh(*corners, np.ma.masked_invalid(shown.y.values), norm=norm, cmap="viridis", rasterized=True)
+    axes.figure.colorbar(mesh, ax=axes, label=label(shown.y))
+    marks = zip(shown.codes(), itertools.cycle(HATCHES), itertools.cycle(FLAGGED), strict=False)
+    keys = [_cover(axes, corners, shown, code, hatch, colour) for code, hatch, colour in marks]
+    if keys:
+        axes.figure.legend(handles=keys, loc="outside lower center", ncols=3)
+
+
+def _cover(axes: Any, corners: list[Any], shown: View, code: int, hatch: str, colour: str) -> Any:
+    """Cells of one status: hatched where they have no value, outlined where they have one; named if there is room."""
+    here, name = shown.status == code, shown.meanings.get(code, str(code))
+    empty = here & ~np.isfinite(shown.y.values)
+    _name(axes, corners, here, name)
+    if (here & ~empty).any():
+        axes.contour(shown.values(shown.x), shown.values(str(shown.across)), here, levels=[0.5], colors=[colour])
+    if not empty.any():
+        return Line2D([], [], color=colour, label=name)
+    look: dict[str, Any] = {"facecolor": "0.94", "edgecolor": "0.45", "linewidth": 0.0, "hatch": hatch}
+    axes.add_collection(PolyCollection(list(_runs(corners, empty)), **look))
+    return Patch(label=name, **look)
+
+
+def _runs(corners: list[Any], here: Any) -> Iterator[Any]:
+    """A rectangle for each run of cells side by side."""
+    x, y = corners
+    for row, cells in enumerate(here):
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], cells, [False]]).astype(int)))
+        for left, right in zip(x[ends[::2]], x[ends[1::2]], strict=True):
+            yield [(left, y[row]), (right, y[row]), (right, y[row + 1]), (left, y[row + 1])]
+
+
+def _name(axes: Any, corners: list[Any], here: Any, name: str) -> None:
+    """The name of a region where it is widest, if it has room there."""
+    from scipy.ndimage import distance_transform_edt
+
+    inside = np.pad(here, 1)
+    aspect = here.shape[0] / here.shape[1]
+    depth = distance_transform_edt(inside, sampling=(1.0, aspect))[1:-1, 1:-1]
+    widest = np.argwhere(depth > 0.999 * depth.max())
+    row, column = widest[abs(widest - widest.mean(axis=0)).sum(axis=1).argmin()]
+    if depth[row, column] < NAME_ROOM * here.shape[0]:
+        return
+    at = [
+        np.sqrt(c[i] * c[i + 1]) if c[0] > 0 else (c[i] + c[i + 1]) / 2
+        for c, i in zip(corners, (column, row), strict=True)
+    ]
+    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}
+    axes.text(*at, name.replace("_", " "), ha="center", va="center", fontsize=7, bbox=box, zorder=5)
+
+
+def _edges(grid: Any, logarithmic: bool) -> Any:
+    """Edges of the cells around the points of a grid."""
+    at = np.log(grid) if logarithmic else grid
+    middle = (at[1:] + at[:-1]) / 2
+    edges = np.concatenate([[2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]])
+    return np.exp(edges) if logarithmic else edges

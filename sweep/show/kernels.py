@@ -1,0 +1,164 @@
+"""What `sweep kernels` prints: what can be swept."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from kernels import catalogue
+from kernels.interface import Field, Kernel, Method
+from sweep.study.kernels import load_kernel
+from sweep.study.mistakes import listed, quoted
+from sweep.system.errors import SweepError
+from sweep.system.table import columns, page, section
+
+
+def catalogue_text() -> str:
+    """Every kernel of the catalogue in a few lines."""
+    return page(*(_short(name) for name in catalogue.KERNELS), "`sweep kernels NAME` tells more of one of them.")
+
+
+def kernel_text(name: str, allow_import: bool = False) -> str:
+    """All about one kernel, and a study to begin with. Raises SweepError."""
+    kernel = load_kernel(name, allow_import)
+    return page(
+        f"{name}: {kernel.doc}",
+        f"Source: {kernel.source}" if kernel.source else "",
+        section("parameters", map(_parameter, kernel.parameters)),
+        section("outputs", map(_output, kernel.outputs)),
+        section("coordinates that all cells share", map(_coordinate, kernel.along)),
+        section(
+            'methods, cheapest first; "auto" takes the first whose error bound meets rtol', map(_method, kernel.methods)
+        ),
+        "a study to begin with\n" + "\n".join(f"  {line}".rstrip() for line in _example(name, kernel).splitlines()),
+    )
+
+
+def write_starter(name: str, path: Path, allow_import: bool = False) -> None:
+    """Write a study of a kernel to begin with. Raises SweepError; a file that is there is left alone."""
+    kernel = load_kernel(name, allow_import)
+    text = f"# {kernel.doc[0].upper()}{kernel.doc.splitlines()[0][1:]}: how does it change with its parameters?\n"
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(f"{text}{_example(name, kernel)}\n")
+    except FileExistsError:
+        raise SweepError(f"{path} is there already; name another file") from None
+    except OSError as error:
+        raise SweepError(f"{path} cannot be written: {error.strerror}") from None
+
+
+def _short(name: str) -> str:
+    try:
+        kernel = load_kernel(name)
+    except SweepError as error:
+        return f"{name}\n  {error}"
+    rows = [
+        ("parameters", ", ".join(map(_name_and_default, kernel.parameters))),
+        ("outputs", ", ".join(f"{o.name} [{o.unit}]{_along(o)}" for o in kernel.outputs)),
+        ("methods", ", ".join(m.name for m in kernel.methods)),
+    ]
+    return f"{name}: {kernel.doc.splitlines()[0]}\n{columns(rows)}"
+
+
+def _name_and_default(field: Field) -> str:
+    return f"{field.name} [{field.unit}]" + ("" if field.default is None else f" = {_default(field)}")
+
+
+def _parameter(field: Field) -> tuple[str, ...]:
+    default = "required" if field.default is None else f"default {_default(field)}"
+    return (
+        field.name,
+        f"[{field.unit}]",
+        _limits(field),
+        default,
+        field.doc + _along(field).replace(" along", ", one for each"),
+    )
+
+
+def _output(field: Field) -> tuple[str, ...]:
+    return field.name, f"[{field.unit}]", _along(field).strip(), field.doc
+
+
+def _coordinate(field: Field) -> tuple[str, ...]:
+    return field.name, f"[{field.unit}]", _limits(field), field.doc
+
+
+def _method(method: Method) -> tuple[str, ...]:
+    cannot = f"; cannot do {listed(method.excludes)}" if method.excludes else ""
+    lacks = f"; does not give {listed(method.lacks)}" if method.lacks else ""
+    return method.name, "states its error" if method.bound else "keeps rtol", method.doc + cannot + lacks
+
+
+def _along(field: Field) -> str:
+    return f" along {listed(field.dims, word='and')}" if field.dims else ""
+
+
+def _limits(field: Field) -> str:
+    """'> 0', '0 to 1', or the words it takes."""
+    if field.choices:
+        return listed(field.choices, quote=True)
+    low = f"{'>' if field.open_lower else '>='} {field.lower:g}" if field.lower > -math.inf else ""
+    # the last float64 below a round number is how a kernel leaves that number out
+    below = float(f"{field.upper:g}") > field.upper
+    high = f"{'<' if below else '<='} {field.upper:g}" if field.upper < math.inf else ""
+    return ", ".join(filter(None, [low, high]))
+
+
+def _default(field: Field) -> str:
+    if field.default is None or isinstance(field.default, str):
+        return field.default or "required"
+    words = {float(number): word for word, number in field.choices.items()}
+    return words.get(field.default, f"{field.default:g}")
+
+
+def _example(name: str, kernel: Kernel) -> str:
+    """A study that sweeps the first parameter that is a number."""
+    first = next(p for p in kernel.parameters if not p.dims)
+    values = {p.name: kernel.example.get(p.name, 1.0) for p in kernel.parameters}
+    fixed = [p for p in kernel.parameters if p is not first and (p.default is None or p.name in kernel.example)]
+    lines = [f'kernel = "{name}"', "", *_axis(first, values[first.name])]
+    if fixed:
+        lines += ["", "[fixed]", *(_entry(p, values[p.name]) for p in fixed)]
+    for field in kernel.along:
+        lines += ["", f"[along.{field.name}]", *_range(field)]
+    return "\n".join(lines)
+
+
+def _axis(field: Field, middle: Any) -> Iterable[str]:
+    yield f"[axes.{field.name}]"
+    if field.choices:
+        yield f"values = [{quoted(field.choices)}]"
+    elif field.integer:
+        yield f"values = [{', '.join(f'{max(field.lower, 1) + i:g}' for i in range(3))}]"
+    elif field.unit == "m":  # machines keep their kind when a length is changed by a fifth, not by ten
+        yield from (
+            'spacing = "linear"',
+            f"start = {0.8 * middle:g}",
+            f"stop = {1.2 * middle:g}",
+            "num = 41",
+            'unit = "m"',
+        )
+    else:
+        yield from ('spacing = "log"', f"start = {middle / 10:g}", f"stop = {middle * 10:g}", "num = 41")
+        yield f'unit = "{field.unit}"'
+
+
+def _entry(field: Field, value: Any) -> str:
+    if field.choices:
+        return f'{field.name} = "{next(iter(field.choices))}"'
+    text = f"[{', '.join(f'{v:g}' for v in value)}]" if field.dims else f"{value:g}"
+    return f'{field.name} = {{ value = {text}, unit = "{field.unit}" }}'
+
+
+def _range(field: Field) -> Iterable[str]:
+    if field.integer:
+        return ["num = 10"]
+    if field.unit == "rad" and field.upper - field.lower > 2 * math.pi:
+        return ['spacing = "linear"', "start = 0", "stop = 360", "num = 181", 'unit = "degree"']
+    if math.isfinite(field.upper - field.lower):
+        return ["num = 200"]
+    if field.unit == "m":
+        return ['spacing = "linear"', "start = 0", "stop = 0.1", "num = 51", 'unit = "m"']
+    return ['spacing = "log"', "start = 0.1", "stop = 100", "num = 200", f'unit = "{field.unit}"']

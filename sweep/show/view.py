@@ -1,0 +1,180 @@
+"""What a picture of a result shows, and how it is lettered; knows nothing of how it is drawn."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import textwrap
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from sweep.results.export import flag_words
+from sweep.system.errors import SweepError
+
+GREEK = frozenset(
+    (
+        *("alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi"),
+        *("rho", "sigma", "tau", "phi", "chi", "psi", "omega", "Gamma", "Delta", "Theta", "Phi", "Psi", "Omega"),
+    )
+)
+
+FAMILY = 8
+"""Most lines in one picture; more values of a number axis make a map."""
+
+POINTS, PIXELS = 20_000, 2_000
+"""Points along a line and cells along the side of a map that are drawn; beyond, every second, third ... one."""
+
+FLAGS = ("status", "method_used")
+
+
+@dataclass(frozen=True)
+class View:
+    """An output `y` along coordinate `x` of dimension `along`, once for each value of dimension `across`.
+
+    `y` and `status` have the dimensions (across, along), or (along,) where `across` is None; `held` says where
+    the other axes stand.
+    """
+
+    y: xr.DataArray
+    status: NDArray[np.int_]
+    meanings: dict[int, str]
+    x: str
+    along: str
+    across: str | None
+    held: str
+
+    @property
+    def mapped(self) -> bool:
+        return self.across is not None and self.y.sizes[self.across] > FAMILY and is_number_axis(self.y, self.across)
+
+    @property
+    def joined(self) -> bool:
+        """Whether neighbours along x are neighbours in the study, so that a line may join them."""
+        return self.x == self.along
+
+    def values(self, name: str) -> NDArray[Any]:
+        return coordinate(self.y, name).values
+
+    def label(self, name: str, width: int = 44) -> str:
+        return label(coordinate(self.y, name), width)
+
+    def codes(self) -> list[int]:
+        """Statuses other than OK that occur."""
+        return [int(code) for code in np.unique(self.status) if code != 0]
+
+
+def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> View:
+    """Choose what is drawn: `y` (the first output) along `x` (what a trace runs along, else the longest axis).
+
+    Raises
+    ------
+    SweepError
+        If there is no such output or axis.
+    """
+    name = _output(dataset, y)
+    x = _x(dataset[name], x, dataset["status"].dims if "status" in dataset else ())
+    along = str(coordinate(dataset[name], x).dims[0])
+    others = sorted((str(d) for d in dataset[name].dims if d != along), key=lambda d: -dataset.sizes[d])
+    across = others[0] if others else None
+    held = {dim: dataset.sizes[dim] // 2 for dim in others[1:]}
+    shown = dataset[[name] + (["status"] if "status" in dataset else [])].isel(held)
+    shown = _thinned(shown, along, across).compute()
+    for dim in (along, across):
+        if dim is not None and is_number_axis(shown[name], dim) and dim in shown.coords:
+            shown = shown.sortby(dim)
+    values = shown[name].transpose(*([across] if across else []), along)
+    status = shown["status"].broadcast_like(values).transpose(*values.dims).values if "status" in shown else None
+    return View(
+        values,
+        np.zeros(values.shape, int) if status is None else status.astype(int),
+        {} if status is None else flag_words(shown["status"]),
+        x, along, across,
+        ", ".join(setting(coordinate(dataset[name], dim)[index]) for dim, index in held.items()),
+    )  # fmt: skip
+
+
+def _output(dataset: xr.Dataset, y: str | None) -> str:
+    known = [str(n) for n, v in dataset.data_vars.items() if v.ndim and n not in FLAGS and v.dtype.kind in "fiu"]
+    if not known:
+        raise SweepError("there is nothing to draw: no output runs along an axis")
+    if y is not None and y not in known:
+        raise SweepError(f"there is no output {y!r} to draw; {_hint(y, known)}")
+    return known[0] if y is None else y
+
+
+def _x(output: xr.DataArray, x: str | None, cell_dims: tuple[Any, ...]) -> str:
+    known = [str(name) for name, c in output.coords.items() if c.ndim == 1 and c.dtype.kind in "fiu"]
+    if x is not None:
+        if x not in known:
+            raise SweepError(f"there is no number axis {x!r} to draw {output.name} along; {_hint(x, known)}")
+        return x
+    traces = [str(dim) for dim in output.dims if cell_dims and dim not in cell_dims and dim in known]
+    axes = traces or [str(dim) for dim in output.dims if dim in known] or known
+    if not axes:
+        raise SweepError(f"{output.name} has no number axis to draw it along")
+    return max(axes, key=lambda name: output[name].size)
+
+
+def _hint(name: str, known: Iterable[str]) -> str:
+    close = difflib.get_close_matches(name, known, 1)
+    return f"did you mean {close[0]}?" if close else f"there are {', '.join(known) or 'none'}"
+
+
+def _thinned(shown: xr.Dataset, along: str, across: str | None) -> xr.Dataset:
+    """No more cells than a picture can show."""
+    mapped = across is not None and shown.sizes[across] > FAMILY
+    most = dict.fromkeys((across, along), PIXELS) if mapped else {along: POINTS}
+    return shown.isel({d: slice(None, None, -(-shown.sizes[d] // n)) for d, n in most.items() if d is not None})
+
+
+def coordinate(y: xr.DataArray, name: str) -> xr.DataArray:
+    """Coordinate of that name; a dimension that has none is counted from 0."""
+    return y[name] if name in y.coords else xr.DataArray(np.arange(y.sizes[name]), dims=name, name=name)
+
+
+def is_number_axis(y: xr.DataArray, name: str) -> bool:
+    return coordinate(y, name).dtype.kind in "fiu"
+
+
+def symbol(name: str) -> str:
+    """Mathematical form of a parameter's name, "" if it is a word: mu, phi0 and R_s, but not period."""
+    letter, _, index = name.partition("_")
+    digits = re.fullmatch(r"([A-Za-z]+?)(\d+)", letter)
+    if digits and not index:
+        letter, index = digits.groups()
+    if letter not in GREEK and len(letter) > 1:
+        return ""
+    sign = "\\varphi" if letter == "phi" else f"\\{letter}" if letter in GREEK else letter
+    return f"${sign}_{{\\mathrm{{{index}}}}}$" if index else f"${sign}$"
+
+
+def unit_text(unit: str) -> str:
+    """Unit with its powers raised, "" for a pure number."""
+    return "" if unit in ("", "1") else re.sub(r"\^(-?\d+)", r"$^{\1}$", unit)
+
+
+def label(variable: xr.DataArray, width: int = 44) -> str:
+    """Text for an axis: long name, symbol, unit; in lines of so many letters."""
+    name = str(variable.name)
+    sign, unit = symbol(name), unit_text(str(variable.attrs.get("units", "")))
+    words = str(variable.attrs.get("long_name", "")) or ("" if sign else name.replace("_", " "))
+    text = ", ".join(part for part in (words, sign) if part) + (f" [{unit}]" if unit else "")
+    signs = re.findall(r"\$.*?\$", text)
+    for sign in signs:  # a few letters in print, whatever they are in writing
+        text = text.replace(sign, "\0\0", 1)
+    wrapped = "\n".join(textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False))
+    for sign in signs:
+        wrapped = wrapped.replace("\0\0", sign, 1)
+    return wrapped
+
+
+def setting(value: xr.DataArray) -> str:
+    """One value of an axis, e.g. "a = 0.5 1/s"."""
+    name, unit = str(value.name), unit_text(str(value.attrs.get("units", "")))
+    number = f"{value.item():.4g}" if value.dtype.kind in "fiu" else str(value.item())
+    return f"{symbol(name) or name.replace('_', ' ')} = {number}" + (f" {unit}" if unit else "")

@@ -1,0 +1,322 @@
+"""From parts to one file that netCDF4 and HDF5 readers open.
+
+HDF5 writes the frame: dimensions, coordinates, attributes, statuses, and the places of the outputs. These are
+contiguous, so a block's cells are consecutive bytes there, and threads copy them in by plain writes at disk speed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sweep.cells.contents import gathered, part_columns
+from sweep.cells.grid import Box
+from sweep.cells.partition import Partition
+from sweep.cells.row_blocks import granules
+from sweep.cells.schema import Column, Coordinate, Layout
+from sweep.store.canvas import Canvas
+from sweep.store.digests import BYTES, Seals, column_digests, frame_digest, frame_place
+from sweep.store.hdf5_bytes import unfilled
+from sweep.store.parts import DAMAGE, FLAGS
+from sweep.store.seal import seal
+from sweep.store.store import Store
+from sweep.study.model import Study
+from sweep.system import disk
+from sweep.system.errors import SweepError
+from sweep.system.pool import CtrlC, Spares, each
+
+CHUNK_CELLS = 1 << 18
+"""Cells of one compressed piece of status and method_used; HDF5 keeps at least four of them in memory."""
+SYNC_BYTES = 128 << 20
+"""Bytes after which the disk is set to work, long before the end."""
+CHUNK_BYTES = 8 << 20
+"""Bytes of the rows that are reduced to groups at a time."""
+
+Tell = Callable[[int, int], None]
+
+
+def assemble(store: Store, study: Study, layout: Layout, output: Path, threads: int, tell: Tell) -> list[int]:
+    """Puts the parts together under the output's name; then the parts are not needed any more.
+
+    Parameters
+    ----------
+    tell : called with the number of parts written, and of all parts
+
+    Returns
+    -------
+    list of int
+        Blocks whose part turned out to be damaged. Then there is no output; compute them again.
+
+    Raises
+    ------
+    SweepError
+        The disk is full or fails. All parts are kept.
+    """
+    temporary = store.temporary("result.h5")
+    try:
+        seals = Seals(layout.columns, chunks(study, store.blocks))
+        damaged = _build(store, study, layout, seals, temporary, threads, tell)
+        if not damaged:
+            _check(layout, seals, temporary, output)
+            disk.rename(temporary, output)
+            disk.sync_folder(output.parent)
+        return damaged
+    except (OSError, RuntimeError) as fault:
+        raise disk.refusal(fault, output) from fault
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def chunks(study: Study, blocks: Partition) -> Partition:
+    """The output's cells that are written, and have a digest, together: those of a part, or some groups."""
+    if study.summary is None:
+        return blocks
+    grains = granules(study)
+    row_bytes = sum(column.cell_bytes for column in part_columns(study))
+    return Partition(grains.groups, min(grains.groups, max(1, CHUNK_BYTES // (row_bytes * grains.per_group))))
+
+
+def _build(store: Store, study: Study, layout: Layout, seals: Seals, path: Path, threads: int, tell: Tell) -> list[int]:
+    fd = disk.open_file(path, os.O_CREAT | os.O_EXCL | os.O_RDWR)
+    try:
+        canvas = Canvas(fd)
+        with CtrlC():
+            write_frame(canvas, layout, seals)
+        canvas.check()
+        writer = _fill(store, study, layout, seals, canvas, fd, threads, tell)
+        canvas.finish()
+        if not writer.damaged:
+            _seal(fd, writer)
+            disk.fsync(fd)
+        return sorted(writer.damaged)
+    finally:
+        os.close(fd)
+
+
+def _fill(
+    store: Store, study: Study, layout: Layout, seals: Seals, canvas: Canvas, fd: int, threads: int, tell: Tell
+) -> _Writer:
+    """Writes all columns on a pool of threads."""
+    import h5py
+
+    with h5py.File(canvas, "r+") as file:
+        writer = _Writer(layout, seals, file, canvas, fd)
+        work: Callable[[int], None]
+        if study.summary is None:
+            work = _Copier(store, writer, threads).copy
+        else:
+            work, threads = _Gatherer(store, study, writer).gather, 1
+        each(range(seals.chunks.count), work, threads, lambda job: tell(writer.written, seals.chunks.count))
+        if not writer.damaged:
+            seals.write(file)
+    return writer
+
+
+def _seal(fd: int, writer: _Writer) -> None:
+    """Writes the digests of everything else, which must be in its place by now."""
+    place = writer.frame_place
+    found = frame_digest(fd, [*writer.regions, (place, place + BYTES)])
+    disk.pwrite_all(fd, found, place)
+    disk.pwrite_all(fd, seal(writer.regions, fd), os.fstat(fd).st_size)
+
+
+def write_frame(path: Any, layout: Layout, seals: Seals) -> None:
+    """Writes everything but the columns' numbers and digests to a file, or what HDF5 takes for one."""
+    import h5netcdf
+
+    with h5netcdf.File(path, "w") as file:
+        shared = [c.name for c in layout.coordinates if c.dims and not set(c.dims) & {c.name, *layout.grid.dims}]
+        # xarray's way to mark what belongs to the coordinates of all variables
+        file.attrs.update({**layout.attrs, **({"coordinates": " ".join(shared)} if shared else {})})
+        file.dimensions = layout.sizes
+        for coordinate in layout.coordinates:
+            _write_coordinate(file, coordinate)
+        for column in layout.columns:
+            away = " ".join(_auxiliary(layout, column))
+            variable = _declare(file, layout, column)
+            variable.attrs.update({**column.attrs, **({"coordinates": away} if away else {})})
+        seals.declare(file)
+
+
+def _auxiliary(layout: Layout, column: Column) -> Iterator[str]:
+    """Coordinates of a variable that are not among its dimensions."""
+    dims = {*layout.grid.dims, *column.dims}
+    return (c.name for c in layout.coordinates if c.dims != (c.name,) and set(c.dims) <= dims)
+
+
+def _write_coordinate(file: Any, coordinate: Coordinate) -> None:
+    import h5py
+
+    values = np.asarray(coordinate.values)
+    text = values.dtype.kind == "U"
+    dtype = h5py.string_dtype() if text else values.dtype
+    data = values.astype(object) if text else values
+    file.create_variable(coordinate.name, coordinate.dims, dtype, data=data).attrs.update(coordinate.attrs)
+
+
+def _declare(file: Any, layout: Layout, column: Column) -> Any:
+    dims = (*layout.grid.dims, *column.dims)
+    if not layout.shape(column):
+        # h5py does not heed the properties of a single number; written, it has its place
+        return file.create_variable(column.name, (), column.dtype, data=np.zeros((), column.dtype))
+    if column.name not in FLAGS:
+        return file.create_variable(column.name, dims, column.dtype, dcpl=unfilled())
+    chunks = chunk_shape(layout.grid.shape)
+    return file.create_variable(column.name, dims, column.dtype, chunks=chunks, compression="gzip", compression_opts=1)
+
+
+def chunk_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Chunks that follow the cells' order: whole trailing dimensions, part of one, single ones before."""
+    chunks: list[int] = []
+    room = CHUNK_CELLS
+    for length in reversed(shape):
+        chunks.append(max(1, min(length, room)))
+        room //= chunks[-1] if chunks[-1] == length else room
+    return tuple(reversed(chunks))
+
+
+class _Writer:
+    """Writes chunks of cells to their places, in any order."""
+
+    def __init__(self, layout: Layout, seals: Seals, file: Any, canvas: Canvas, fd: int) -> None:
+        self.damaged: set[int] = set()
+        self.written = 0
+        self._columns, self._seals, self._fd = layout.columns, seals, fd
+        # contiguous ones; those in chunks are left to HDF5
+        datasets = {c.name: file[c.name] for c in layout.columns if c.name not in FLAGS}
+        self._places = {name: dataset.id.get_offset() for name, dataset in datasets.items()}
+        self.regions = [(at, at + datasets[name].nbytes) for name, at in self._places.items()]
+        self.frame_place = frame_place(file)
+        flags = [c.name for c in layout.columns if c.name in FLAGS]
+        self._flags = _Flags({name: file[name] for name in flags}, layout, seals.chunks, canvas)
+        self._unsynced = 0
+        self._lock = threading.Lock()
+
+    def put(self, chunk: int, arrays: Mapping[str, Any]) -> None:
+        """Raises OSError where the disk fails."""
+        self._seals.take(chunk, arrays)
+        self._flags.put(chunk, arrays)
+        start = self._seals.chunks.bounds(chunk)[0]
+        # the system lets one thread at a time write to a file; those that wait for it there burn time
+        with self._lock:
+            for column in self._columns:
+                if column.name in self._places:
+                    at = self._places[column.name] + start * column.cell_bytes
+                    disk.pwrite_all(self._fd, arrays[column.name], at)
+                    self._unsynced += arrays[column.name].nbytes
+            self.written += 1
+            due = self._unsynced > SYNC_BYTES
+            self._unsynced = 0 if due else self._unsynced
+        if due:
+            disk.fsync(self._fd)
+
+
+class _Copier:
+    """Copies verified parts; after the first damaged one it only looks for others."""
+
+    def __init__(self, store: Store, writer: _Writer, threads: int) -> None:
+        self._store, self._writer = store, writer
+        cells = min(store.blocks.cells, store.blocks.size)
+        self._buffers = Spares(lambda: {column.name: column.empty(cells) for column in store.columns}, threads)
+
+    def copy(self, index: int) -> None:
+        with self._buffers.lent() as buffers:
+            arrays = self._store.get(index, buffers)
+            if arrays is None:
+                self._writer.damaged.add(index)
+            elif not self._writer.damaged:
+                self._writer.put(index, arrays)
+
+
+class _Gatherer:
+    """Reduces the rows of verified parts to groups, in their order."""
+
+    def __init__(self, store: Store, study: Study, writer: _Writer) -> None:
+        self._study, self._writer, self._chunks = study, writer, chunks(study, store.blocks)
+        self._rows = granules(study).per_group
+        self._store = store
+        self._last: tuple[int, dict[str, Any]] | None = None
+
+    def gather(self, chunk: int) -> None:
+        first, last = (self._rows * groups for groups in self._chunks.bounds(chunk))
+        blocks = range(first // self._store.blocks.cells, -(-last // self._store.blocks.cells))
+        found = [self._part(index) for index in blocks]
+        if not self._writer.damaged:
+            skip = first - self._store.blocks.bounds(blocks[0])[0]
+            rows = {
+                c.name: np.concatenate([part[c.name] for part in found])[skip : skip + last - first]
+                for c in self._store.columns
+            }
+            self._writer.put(chunk, gathered(self._study, rows))
+
+    def _part(self, index: int) -> dict[str, Any]:
+        if self._last is None or self._last[0] != index:
+            found = self._store.get(index)
+            if found is None:
+                self._writer.damaged.add(index)
+                return {}
+            self._last = index, found
+        return self._last[1]
+
+
+class _Flags:
+    """Writes statuses and methods in the order of cells, so that HDF5 compresses each chunk once.
+
+    Blocks that come early wait in memory, two bytes a cell.
+    """
+
+    def __init__(self, datasets: Mapping[str, Any], layout: Layout, blocks: Partition, canvas: Canvas) -> None:
+        self._layout, self._blocks, self._canvas, self._datasets = layout, blocks, canvas, datasets
+        self._early: dict[int, dict[str, Any]] = {}
+        self._next = 0
+        self._lock = threading.Lock()
+
+    def put(self, index: int, arrays: Mapping[str, Any]) -> None:
+        """Raises OSError where the disk fails."""
+        with self._lock:
+            self._early[index] = {name: arrays[name].copy() for name in self._datasets}
+            while self._next in self._early:
+                for name, column in self._early.pop(self._next).items():
+                    _write_cells(self._datasets[name], self._layout, self._blocks.bounds(self._next), column)
+                self._next += 1
+        self._canvas.check()
+
+
+def _write_cells(dataset: Any, layout: Layout, bounds: tuple[int, int], column: Any) -> None:
+    for slices, begin, end in layout.grid.pieces(*bounds):
+        dataset[slices] = column[begin:end].reshape([s.stop - s.start for s in slices])
+
+
+def _check(layout: Layout, seals: Seals, path: Path, output: Path) -> None:
+    """Reads some chunks back as any reader would. Raises SweepError where they differ."""
+    import h5py
+
+    last = seals.chunks.count - 1
+    try:
+        with h5py.File(path, "r") as file:
+            same = all(_reads_back(layout, seals, file, chunk) for chunk in {0, last // 2, last})
+    except DAMAGE:
+        same = False
+    if not same:
+        raise SweepError(f"{output}: differs when read back from what was written; the disk may be failing")
+
+
+def _reads_back(layout: Layout, seals: Seals, file: Any, chunk: int) -> bool:
+    bounds = seals.chunks.bounds(chunk)
+    arrays = {c.name: read_cells(file[c.name], layout.grid, bounds, c) for c in layout.columns}
+    return bool((column_digests(layout.columns, arrays) == seals.digests[chunk]).all())
+
+
+def read_cells(dataset: Any, box: Box, bounds: tuple[int, int], column: Column) -> Any:
+    """The flat cells from one number to another."""
+    arrays = column.empty(bounds[1] - bounds[0])
+    for slices, begin, end in box.pieces(*bounds):
+        arrays[begin:end] = dataset[slices].reshape(end - begin, *column.shape)
+    return arrays

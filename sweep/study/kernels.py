@@ -1,0 +1,66 @@
+"""A kernel by the name that a study gives it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from kernels import catalogue
+from kernels.interface import Kernel, load
+from sweep.study.mistakes import did_you_mean, listed, show
+from sweep.system.errors import SweepError
+
+RESERVED = ("status", "method_used", "method", "rtol", "cell")
+"""Names that a result has in any case."""
+
+
+def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path] = ()) -> Kernel:
+    """The kernel called `name` in the catalogue, or, where allowed, found at "module:NAME".
+
+    Parameters
+    ----------
+    folders : iterable of Path
+        Where to look for the module after Python's own path.
+
+    Raises
+    ------
+    SweepError
+        There is no such kernel, it may not be imported, or importing it fails.
+    """
+    known = list(catalogue.KERNELS)
+    if not isinstance(name, str) or not name:
+        raise SweepError(f"expected the name of a kernel, found {show(name)}; there are {listed(known)}")
+    if ":" not in name and name not in known:
+        raise SweepError(f"no kernel {show(name)}{did_you_mean(name, known) or ';'} there are {listed(known)}")
+    if ":" in name and not allow_import:
+        raise SweepError(
+            f"{show(name)} runs code of your own; allow it with --allow-import (Python: allow_import=True)"
+        )
+    try:
+        if ":" in name:
+            # for good: a kernel may import modules beside it later
+            sys.path.extend(folder for f in folders if (folder := str(f.resolve())) not in sys.path)
+        kernel = load(name) if ":" in name else catalogue.get(name)
+    except Exception as error:
+        raise SweepError(f"{show(name)} cannot be loaded: {type(error).__name__}: {error}") from error
+    if not isinstance(kernel, Kernel):
+        raise SweepError(f"{show(name)} is a {type(kernel).__name__}, not a kernels.interface.Kernel")
+    _check_declaration(str(name), kernel)
+    return kernel
+
+
+def _check_declaration(name: str, kernel: Kernel) -> None:
+    """Raises SweepError where no result could hold what the kernel declares."""
+    fields = [*kernel.parameters, *kernel.outputs, *kernel.along]
+    names = [*RESERVED, *(field.name for field in fields)]
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise SweepError(f"kernel {name} declares {listed(twice)} more than once, or takes a name of the result's own")
+    known = {field.name for field in kernel.along} | set(kernel.same_length)
+    known |= {dim for field in kernel.parameters for dim in field.dims}
+    lost = sorted({d for field in kernel.outputs for d in field.dims} - known)
+    if lost:
+        raise SweepError(
+            f"kernel {name} has outputs along {listed(lost)}, neither in `along` nor a dim of array parameters"
+        )

@@ -1,0 +1,309 @@
+"""From the keys of a study to a checked `Study`: what each key may be, and what must fit together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import catalogue
+from kernels.interface import Field, Kernel
+from sweep.study.kernels import load_kernel
+from sweep.study.mistakes import Mistakes, did_you_mean, listed, show
+from sweep.study.model import AUTO, Axis, Study, differs, frozen
+from sweep.study.summary import SummaryEntry
+from sweep.study.values import EXAMPLE, Entries
+from sweep.system.errors import SweepError
+
+KEYS = ("title", "question", "kernel", "method", "rtol", "outputs", "design", "axes", "fixed", "along", "summary")
+DESIGNS = ("product", "zip")
+SETTINGS = ("method", "rtol")
+"""What may be an axis although it is no parameter of the kernel."""
+
+DEFAULT_RTOL = 1e-9
+SMALLEST_RTOL = 1e-15
+LARGEST_GRID = 10**12
+UNKNOWN = Kernel("?", "", "", (), (), lambda *columns: None, ())
+"""Stands for a kernel that could not be found, so that the rest of a study is checked all the same."""
+
+
+class Reader:
+    """Turns the keys of one study into a `Study`; mistakes gather on the way and are raised together."""
+
+    def __init__(self, source: str, folder: Path, allow_import: bool) -> None:
+        self.source, self.folder, self.allow_import = source, folder, allow_import
+        self.mistakes = Mistakes()
+        self.entries = Entries(self.mistakes, folder)
+        self.kernel = UNKNOWN
+
+    def study(self, keys: Mapping[str, Any], text: str) -> Study:
+        self.mistakes.keys(keys, KEYS)
+        self.kernel = self._kernel(keys)
+        title, question = (self.mistakes.text(keys.get(key, ""), key) for key in ("title", "question"))
+        method = self._method(keys)
+        rtol = self._rtol(keys)
+        outputs = self._outputs(keys.get("outputs", self._named(keys.get("summary"))))
+        design = self.mistakes.word(keys.get("design", "product"), "design", DESIGNS) or ""
+        axes = self._axes(keys.get("axes", {}), design)
+        given = self._fixed(keys.get("fixed", {}), axes)
+        along = self._along(keys.get("along", {}), outputs)
+        fixed, follows = self._complete(axes, given)
+        self._excluded(method, axes, fixed)
+        self._lacked(method, axes, outputs)
+        summary = None
+        if "summary" in keys:
+            asked = [o for o in self.kernel.outputs if o.name in outputs]
+            summary = SummaryEntry(self.entries).read(keys["summary"], axes, design, asked)
+            axes = dict(sorted(axes.items(), key=lambda item: item[0] in summary.over))
+        self.mistakes.raise_if_any(self.source)
+        return Study(
+            title=title or f"{self.kernel.name} over {listed(axes, word='and')}",
+            question=question,
+            kernel_name=str(keys["kernel"]),
+            kernel=self.kernel,
+            method=method,
+            rtol=rtol,
+            outputs=outputs,
+            design=design,
+            axes=axes,
+            fixed=fixed,
+            follows=follows,
+            along=along,
+            text=text,
+            summary=summary,
+        )
+
+    def _kernel(self, keys: Mapping[str, Any]) -> Kernel:
+        if "kernel" not in keys:
+            self.mistakes.add("kernel", f'missing; write e.g. kernel = "{next(iter(catalogue.KERNELS))}"')
+            return UNKNOWN
+        try:
+            return load_kernel(keys["kernel"], self.allow_import, [self.folder])
+        except SweepError as error:
+            self.mistakes.add("kernel", str(error))
+            return UNKNOWN
+
+    def _field(self, name: str, where: str) -> Field | None:
+        """The kernel's parameter `name`, or a mistake."""
+        found = next((p for p in self.kernel.parameters if p.name == name), None)
+        if found is None and self.kernel is not UNKNOWN:
+            names = [p.name for p in self.kernel.parameters]
+            hint = did_you_mean(name, names) or f"; it has {listed(names, word='and')}"
+            self.mistakes.add(where, f"kernel {self.kernel.name} has no such parameter{hint}")
+        return found
+
+    def _setting(self, name: str) -> Field | None:
+        """Method or rtol as a field: what may be an axis although it is no parameter."""
+        if name == "rtol":
+            return Field("rtol", "1", "wanted relative error", lower=SMALLEST_RTOL, upper=1.0)
+        if self.kernel is UNKNOWN:
+            return None
+        choices = {"auto": AUTO} | {m.name: i for i, m in enumerate(self.kernel.methods)}
+        return Field("method", "1", "how a cell is solved", choices=choices)
+
+    def _method(self, keys: Mapping[str, Any]) -> str:
+        field = self._setting("method")
+        if "method" not in keys or field is None:
+            return "auto"
+        self._only_once("method", keys)
+        return self.mistakes.word(keys["method"], "method", field.choices) or "auto"
+
+    def _rtol(self, keys: Mapping[str, Any]) -> float:
+        self._only_once("rtol", keys)
+        before = len(self.mistakes)
+        rtol = self.mistakes.number(keys.get("rtol", DEFAULT_RTOL), "rtol")
+        if not SMALLEST_RTOL <= rtol < 1 and len(self.mistakes) == before:
+            self.mistakes.add("rtol", f"expected {SMALLEST_RTOL:g} <= rtol < 1, found {rtol:g}")
+        return rtol
+
+    def _only_once(self, name: str, keys: Mapping[str, Any]) -> None:
+        axes = keys.get("axes")
+        if name in keys and isinstance(axes, Mapping) and name in axes:
+            self.mistakes.add(name, f"{name} is an axis as well; keep one of the two")
+
+    def _named(self, summary: Any) -> list[str] | None:
+        """Outputs that the summary names, which are those asked for where the study does not say."""
+        found = summary.get("outputs") if isinstance(summary, Mapping) else None
+        known = [o.name for o in self.kernel.outputs]
+        if not isinstance(found, Mapping) or not set(found) <= set(known):
+            return None
+        return [name for name in known if name in found] or None
+
+    def _outputs(self, found: Any) -> tuple[str, ...]:
+        """Outputs asked for, in the kernel's order; all of them where the study names none."""
+        names = [o.name for o in self.kernel.outputs]
+        if found is None:
+            return tuple(names)
+        if isinstance(found, str) or not isinstance(found, Sequence) or not found:
+            what = "an empty list" if isinstance(found, Sequence) and not found else show(found)
+            self.mistakes.add("outputs", f"expected a list of outputs, found {what}; leave it out to get all of them")
+            return ()
+        for i, item in enumerate(found):
+            if self.kernel is not UNKNOWN:
+                self.mistakes.word(item, f"outputs[{i}]", names)
+            if item in list(found)[:i]:
+                self.mistakes.add(f"outputs[{i}]", f"{show(item)} stands twice")
+        return tuple(name for name in names if name in found)
+
+    def _axes(self, found: Any, design: str) -> dict[str, Axis]:
+        axes: dict[str, Axis] = {}
+        for name, entry in self.mistakes.table(found, "axes", f"[axes.mu] with {EXAMPLE}").items():
+            where = f"axes.{name}"
+            field = self._setting(name) if name in SETTINGS else self._field(name, where)
+            axes[name] = self.entries.axis(name, entry, field, where)
+        if not found:
+            self.mistakes.add("axes", f"missing; give at least one, e.g. axes.mu = {EXAMPLE}")
+        self._check_axes(axes, design)
+        return axes
+
+    def _check_axes(self, axes: Mapping[str, Axis], design: str) -> None:
+        """What concerns several values or several axes; axes without values have been complained about."""
+        if "rtol" in axes and not all(SMALLEST_RTOL <= value < 1 for value in axes["rtol"].values):
+            self.mistakes.add("axes.rtol", f"expected {SMALLEST_RTOL:g} <= rtol < 1 everywhere")
+        lengths = {name: len(axis) for name, axis in axes.items()}
+        if not all(lengths.values()):
+            return
+        if design == "zip" and len(set(lengths.values())) > 1:
+            found = listed((f"{name} has {n}" for name, n in lengths.items()), word="and")
+            self.mistakes.add("axes", f'design "zip" needs axes of equal length; {found} values')
+        for name, axis in axes.items() if design == "product" else ():
+            if axis.values.ndim > 1:
+                self.mistakes.add(f"axes.{name}", f'{name} is an array; as an axis it needs design = "zip"')
+        if design == "product" and math.prod(lengths.values()) > LARGEST_GRID:
+            product = " x ".join(str(n) for n in lengths.values())
+            self.mistakes.add("axes", f"{product} cells; a study may have at most {LARGEST_GRID:.0e}")
+        for name, axis in axes.items() if design == "product" else ():
+            values, counts = np.unique(axis.values, return_counts=True)
+            if axis.values.ndim == 1 and counts.max() > 1:
+                twice = axis.label(int(np.flatnonzero(axis.values == values[counts.argmax()])[0]))
+                self.mistakes.add(f"axes.{name}", f"{twice} stands more than once; give every value once")
+
+    def _fixed(self, found: Any, axes: Mapping[str, Axis]) -> dict[str, float | NDArray[np.float64]]:
+        given = {}
+        for name, entry in self.mistakes.table(found, "fixed", "[fixed] with mu = 1.0").items():
+            where = f"fixed.{name}"
+            if name in SETTINGS:
+                self.mistakes.add(where, f"stands at the top of a study: {name} = ..., or under [axes.{name}]")
+                continue
+            given[name] = self.entries.quantity(entry, self._field(name, where), where)
+            if name in axes:
+                self.mistakes.add(where, f"{name} is an axis as well; keep one of the two")
+        return given
+
+    def _complete(
+        self, axes: Mapping[str, Axis], given: Mapping[str, float | NDArray[np.float64]]
+    ) -> tuple[dict[str, float | NDArray[np.float64]], dict[str, str]]:
+        """Every parameter that is no axis: its fixed value, or the axis it follows."""
+        fixed: dict[str, float | NDArray[np.float64]] = {}
+        follows: dict[str, str] = {}
+        for field in self.kernel.parameters:
+            source = self._source(field, axes, given)
+            if source.name in axes:
+                if source is not field:
+                    follows[field.name] = source.name
+            elif source.name in given:
+                fixed[field.name] = given[source.name]
+            elif isinstance(source.default, float | int):
+                fixed[field.name] = float(source.default)
+            elif source is field:
+                what = f"{field.name} ({field.doc}, {field.unit}) has no default"
+                self.mistakes.add(f"fixed.{field.name}", f"missing; {what}: give it here or as an axis")
+        return self._filled(axes, fixed), follows
+
+    def _filled(
+        self, axes: Mapping[str, Axis], fixed: dict[str, float | NDArray[np.float64]]
+    ) -> dict[str, float | NDArray[np.float64]]:
+        """Array parameters of one length, single numbers repeated; mistakes where their lengths differ."""
+        arrays = {p.name: p.dims[0] for p in self.kernel.parameters if p.dims}
+        lengths = {name: axes[name].values.shape[-1] for name in arrays if name in axes and len(axes[name])}
+        lengths |= {
+            name: np.size(fixed[name]) for name in arrays if np.ndim(fixed.get(name, 0.0)) and np.size(fixed[name])
+        }
+        for dim in dict.fromkeys(arrays.values()):
+            found = {name: n for name, n in lengths.items() if arrays[name] == dim}
+            if len(set(found.values())) > 1:
+                counts = listed((f"{name} has {n}" for name, n in found.items()), word="and")
+                self.mistakes.add("fixed", f"arrays along {dim} need equal length; {counts} values")
+            elif not found and not any(name in axes for name in arrays):
+                self.mistakes.add("fixed", f"how many of {dim}? Give at least one of {listed(arrays)} as a list")
+            for name in arrays:
+                if arrays[name] == dim and name in fixed and not np.ndim(fixed[name]):
+                    fixed[name] = frozen(np.full(max(found.values(), default=1), fixed[name]))
+        return fixed
+
+    def _source(self, field: Field, axes: Mapping[str, Axis], given: Mapping[str, Any]) -> Field:
+        """The parameter whose value `field` takes: itself, or the one its default names, and so on."""
+        while field.name not in axes and field.name not in given and isinstance(field.default, str):
+            field = self.kernel.parameter(field.default)
+        return field
+
+    def _along(self, found: Any, outputs: tuple[str, ...]) -> dict[str, NDArray[np.float64]]:
+        """Values of every coordinate of the kernel; none of those that no output asked for has."""
+        given = self.mistakes.table(found, "along", "[along.phase] with num = 200")
+        names = [c.name for c in self.kernel.along]
+        for name in given:
+            if name not in names and self.kernel is not UNKNOWN:
+                hint = did_you_mean(name, names) or (
+                    f"; it has {listed(names, word='and')}" if names else "; leave it out"
+                )
+                self.mistakes.add(f"along.{name}", f"kernel {self.kernel.name} has no such coordinate{hint}")
+        needed = {dim: o.name for o in self.kernel.outputs if o.name in outputs for dim in o.dims}
+        along = {}
+        for field in self.kernel.along:
+            where = f"along.{field.name}"
+            along[field.name] = frozen([])
+            if field.name in given:
+                values = self._coordinate(field, given[field.name], where)
+                along[field.name] = values if field.name in needed else frozen([])
+            elif field.name in needed:
+                self.mistakes.add(where, f"missing; output {needed[field.name]} needs it, e.g. num = 200")
+        return along
+
+    def _coordinate(self, field: Field, entry: Any, where: str) -> NDArray[np.float64]:
+        """Where the study gives nothing but `num`: from one limit to the other, or the first whole numbers."""
+        if isinstance(entry, Mapping) and set(entry) == {"num"} and math.isfinite(field.upper - field.lower):
+            counted = field.integer and isinstance(entry["num"], int)
+            last = min(field.upper, field.lower + entry["num"] - 1) if counted else field.upper
+            entry = {"spacing": "linear", "start": field.lower, "stop": last, **entry}
+        values = self.entries.axis(field.name, entry, field, where).values
+        inside = (values >= field.lower) & (values <= field.upper) & np.isfinite(values)
+        bad = values[~(inside & (values == np.round(values)) if field.integer else inside)]
+        if len(bad):
+            kind = "whole numbers" if field.integer else "values"
+            self.mistakes.add(where, f"expected {kind} from {field.lower:g} to {field.upper:g}, found {bad[0]:g}")
+        return values
+
+    def _lacked(self, method: str, axes: Mapping[str, Axis], outputs: tuple[str, ...]) -> None:
+        """Methods that do not give an output asked for."""
+        lacking = {m.name: [name for name in m.lacks if name in outputs] for m in self.kernel.methods}
+        able = [name for name, found in lacking.items() if not found]
+        where, words = _methods_named(method, axes)
+        for word in words:
+            if lacking.get(word):
+                cure = f"use {listed(['auto', *able])}, or name the outputs you want" if able else "name other outputs"
+                self.mistakes.add(where, f"{word} does not give {listed(lacking[word], word='and')}; {cure}")
+
+    def _excluded(self, method: str, axes: Mapping[str, Axis], fixed: Mapping[str, Any]) -> None:
+        """Methods that cannot do a term which the study has."""
+        terms = [p.name for p in self.kernel.parameters if p.name in axes or differs(p, fixed)]
+        lacking = {m.name: [t for t in m.excludes if t in terms] for m in self.kernel.methods}
+        able = [name for name, found in lacking.items() if not found]
+        where, words = _methods_named(method, axes)
+        for word in words:
+            if lacking.get(word):
+                cure = f"use {listed(['auto', *able])}" if able else "leave it out"
+                self.mistakes.add(where, f"{word} cannot do {listed(lacking[word], word='and')}; {cure}")
+            if word == "auto" and self.kernel.methods and not able:
+                hard = [term for term in terms if any(term in found for found in lacking.values())]
+                self.mistakes.add(where, f"no method of {self.kernel.name} can do {listed(hard, word='and')} together")
+
+
+def _methods_named(method: str, axes: Mapping[str, Axis]) -> tuple[str, list[str]]:
+    """Where a study names its methods, and which."""
+    if "method" in axes:
+        return "axes.method", sorted(set(axes["method"].words or ()))
+    return "method", [method]

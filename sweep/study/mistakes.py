@@ -1,0 +1,153 @@
+"""What a study may hold: mistakes are collected, not raised, and each says what was found and what to do."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import numbers
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from sweep.system.errors import Mistake, StudyError
+
+
+class Mistakes:
+    """All that is wrong with one study."""
+
+    def __init__(self) -> None:
+        self.found: list[Mistake] = []
+
+    def __len__(self) -> int:
+        return len(self.found)
+
+    def add(self, where: str, message: str) -> None:
+        self.found.append(Mistake(where, message))
+
+    def raise_if_any(self, source: str) -> None:
+        if self.found:
+            raise StudyError(source, self.found)
+
+    def number(self, value: Any, where: str) -> float:
+        """`value` as a float64 without loss; else a mistake, and NaN."""
+        try:
+            return exact_float(value)
+        except ValueError as error:
+            self.add(where, str(error))
+            return math.nan
+
+    def finite(self, value: Any, where: str) -> float:
+        """As `number`, and neither NaN nor infinite."""
+        before = len(self)
+        result = self.number(value, where)
+        if not math.isfinite(result) and len(self) == before:
+            self.add(where, f"expected a finite number, found {result}")
+        return result
+
+    def count(self, value: Any, where: str, largest: int) -> int | None:
+        """A whole number of values, from 2 to `largest`."""
+        if isinstance(value, bool) or not isinstance(value, numbers.Integral):
+            self.add(where, f"expected a whole number, found {show(value)}")
+        elif int(value) < 2:
+            self.add(where, f"expected at least 2, found {show(value)}; for a single value write values = [...]")
+        elif int(value) > largest:
+            self.add(where, f"expected at most {largest}, found {show(value)}")
+        else:
+            return int(value)
+        return None
+
+    def word(self, value: Any, where: str, allowed: Iterable[str]) -> str | None:
+        """One of the words `allowed`."""
+        words = list(allowed)
+        if isinstance(value, str) and value in words:
+            return value
+        self.add(where, f"expected {listed(words, quote=True)}, found {show(value)}{did_you_mean(value, words)}")
+        return None
+
+    def text(self, value: Any, where: str) -> str:
+        if isinstance(value, str):
+            return value
+        self.add(where, f"expected text in quotes, found {show(value)}")
+        return ""
+
+    def table(self, value: Any, where: str, example: str) -> Mapping[str, Any]:
+        if isinstance(value, Mapping):
+            return value
+        self.add(where, f"expected a table, found {show(value)}; write e.g. {example}")
+        return {}
+
+    def keys(self, table: Mapping[str, Any], allowed: Iterable[str], where: str = "") -> None:
+        """A mistake for every key that is not `allowed`."""
+        words = list(allowed)
+        for key in table:
+            if key not in words:
+                hint = did_you_mean(key, words) or f"; allowed are {listed(words)}"
+                self.add(f"{where}.{key}" if where else str(key), f"no such key{hint}")
+
+
+def exact_float(value: Any) -> float:
+    """A number as float64. Raises ValueError with the text for the user."""
+    if getattr(value, "ndim", None) == 0:
+        value = value.item()  # of numpy
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise ValueError(f"expected a number, found {show(value)}{_cure(value)}")
+    try:
+        result = float(value)
+    except OverflowError:
+        raise ValueError(f"{show(value)} is larger than any float64") from None
+    if isinstance(value, numbers.Integral) and int(result) != int(value):
+        raise ValueError(f"{show(value)} is not exact as a float64; write {result!r} if that is meant")
+    return result
+
+
+def _cure(value: Any) -> str:
+    """What to do about a text that looks like a number."""
+    if not isinstance(value, str):
+        return ""
+    match = re.fullmatch(r"\s*([-+]?[\d.][\d._]*(?:[eE][-+]?\d+)?)\s*(\D.*)?", value)
+    if not match:
+        return ""
+    number, unit = match.groups()
+    return f'; write {{ value = {number}, unit = "{unit.strip()}" }}' if unit else "; drop the quotes"
+
+
+def show(value: Any) -> str:
+    """A found value, as short text."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return f'"{value}"' if len(value) <= 60 else f'"{value[:57]}..."'
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, list | tuple):
+        return "a list"
+    if value is None:
+        return "nothing"
+    if isinstance(value, numbers.Integral):
+        # str() of more than 4300 digits raises
+        return str(value) if abs(int(value)) < 10**40 else "an integer of more than 40 digits"
+    if isinstance(value, numbers.Real):
+        return repr(float(value))
+    return f"a {type(value).__name__}"
+
+
+def listed(words: Iterable[str], quote: bool = False, word: str = "or") -> str:
+    """'a, b or c', at most a dozen of them."""
+    texts = [f'"{w}"' if quote else w for w in words]
+    if len(texts) > 12:
+        texts = [*texts[:11], f"{len(texts) - 11} more"]
+    return f" {word} ".join([", ".join(texts[:-1]), texts[-1]]) if len(texts) > 1 else "".join(texts)
+
+
+def quoted(words: Iterable[str]) -> str:
+    """'"a", "b"'."""
+    return ", ".join(f'"{word}"' for word in words)
+
+
+def did_you_mean(found: Any, words: Iterable[str]) -> str:
+    """'; did you mean x?', or nothing where no word is near."""
+    if not isinstance(found, str):
+        return ""
+    by_lower = {w.lower(): w for w in words}
+    near = difflib.get_close_matches(found.lower(), by_lower, n=1, cutoff=0.5)
+    return f"; did you mean {by_lower[near[0]]}?" if near else ""

@@ -1,0 +1,1 @@
+"""Ground floor of the engine: errors, words, disk, threads, progress, tables. Knows no study and no result."""

@@ -1,0 +1,119 @@
+"""Studies of the toy kernel, run, interrupted, broken and compared."""
+
+import os
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from sweep.cells.solve import Solver
+from sweep.runs.run import run
+from sweep.store.store import folder_of
+from sweep.study.read import build_study
+from sweep.system import disk
+from sweep.system.errors import SweepError
+
+HEIGHTS = [-1.0, 1.0, 2.0, 5.0, float("nan"), 13.5, 100.0]
+
+
+SPEEDS = [0.0, 0.5, 3.0, 1e-9, 1e4]
+
+
+def stone(kernel="toy:KERNEL", **keys):
+    keys = {"axes": {"height": HEIGHTS, "v0": SPEEDS}, "along": {"phase": [0.0, 0.25, 1.0]}, **keys}
+    return build_study(allow_import=True, kernel=kernel, title="A stone", **keys)
+
+
+def tall(count, kernel="toy:KERNEL"):
+    """As many cells, of height 1, 2, 3 ... m."""
+    return stone(kernel, axes={"height": np.arange(1.0, count + 1)}, outputs=["fall_time"], along={})
+
+
+def same(left, right):
+    """Bit for bit, NaN included."""
+    assert list(left.data_vars) == list(right.data_vars)
+    for name in left.data_vars:
+        assert left[name].dims == right[name].dims
+        assert left[name].values.tobytes() == right[name].values.tobytes(), name
+    for name in left.coords:
+        xr.testing.assert_identical(left[name].drop_attrs(), right[name].drop_attrs())
+
+
+def quiet(study, path=None, **keys):
+    return run(study, path, **{"progress": False, "workers": 2, **keys})
+
+
+def interrupted(study, output):
+    """Computes the first cells of a study and fails at the eleventh."""
+    real = Solver.solve
+
+    def failing(self, start, stop, *rest):
+        if (start, stop) == (10, 15):
+            raise RuntimeError("stop here")
+        real(self, start, stop, *rest)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Solver, "solve", failing)
+        patch.setattr("sweep.runs.session.order", lambda sample, blocks, first: np.arange(blocks.count))
+        with pytest.raises(SweepError, match="stop here"):
+            quiet(study, output, block_cells=5, workers=1)
+
+
+def names(output):
+    return sorted(path.name for path in folder_of(output).glob("*.h5"))
+
+
+def fail_on(monkeypatch, name, turn, number):
+    """Lets the call number `turn` of a function of `disk` fail; returns the calls."""
+    real, calls = getattr(disk, name), []
+
+    def failing(*args):
+        calls.append(args)
+        if len(calls) == turn:
+            raise OSError(number, os.strerror(number))
+        return real(*args)
+
+    monkeypatch.setattr(disk, name, failing)
+    return calls
+
+
+def told_by(action):
+    """What the user is told where the action fails."""
+    try:
+        action()
+    except SweepError as fault:
+        return str(fault)
+    return ""
+
+
+def environment():
+    root = Path(__file__).parents[3]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(root), str(root / "tests" / "helpers")])}
+
+
+RUN_SLOWLY = """
+    import sys
+    from sweep.runs.run import run
+    from sweep.study.read import build_study
+    study = build_study(allow_import=True, kernel="slow:SLOW", title="A stone", outputs=["fall_time"],
+                        axes=dict(height=[float(h) for h in range(1, 401)]))
+    run(study, sys.argv[1], workers=int(sys.argv[2]), block_cells=int(sys.argv[3]))
+"""
+
+
+def slow_run(output, workers, cells):
+    words = [sys.executable, "-c", textwrap.dedent(RUN_SLOWLY), str(output), str(workers), str(cells)]
+    return subprocess.Popen(words, env=environment(), stderr=subprocess.PIPE, text=True)
+
+
+def wait_for(condition, process):
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < deadline
+        time.sleep(0.002)

@@ -1,0 +1,287 @@
+"""The driven balance against 40 digits of two motions that meet, against its formulas, and where it sticks."""
+
+import balance_oracles as oracles
+import numpy as np
+import pytest
+from columns import bounds, checked, printed_both_ways, relative_error, solve
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpmath import mp, mpf
+
+from kernels.balance.driven import BALANCE_DRIVEN
+from kernels.interface import FIRST_REFUSAL, Status
+from kernels.lanes.jit import COMPILED
+
+NAMES = ("amplitude", "period", "multiplier")
+METHODS = tuple(m.name for m in BALANCE_DRIVEN.methods)
+SOME = 14 if COMPILED else 3
+MANY = 600 if COMPILED else 6
+POINTS = 29 if COMPILED else 8
+INF, NAN = np.inf, np.nan
+
+
+def scenes(drive, zeta, friction, n=SOME, seed=1, torque=(-1.0, 1.0)):
+    """Columns of random balances: log10 of zeta, and of r over beta or the root of w, between the limits given."""
+    random = np.random.default_rng(seed)
+    none = np.zeros(n)
+    zeta = 10 ** random.uniform(*zeta, n) if zeta else none
+    unit = 10 ** random.uniform(-30, 30, n)
+    r = unit * 10 ** random.uniform(*friction, n) if friction else none
+    omega_n = 10 ** random.uniform(-30, 30, n)
+    if drive == "impulse":
+        return zeta, omega_n, r, unit * unit * random.uniform(0.5, 2.0, n), none, none
+    return zeta, omega_n, r, none, unit * 10 ** random.uniform(*torque, n), unit * random.uniform(0.5, 2.0, n)
+
+
+def compare(outputs, status, columns, limit):
+    """Every cell that came out has the amplitude, period and multiplier of the oracle, and no other has a cycle."""
+    for i, cell in enumerate(zip(*columns, strict=True)):
+        true = oracles.driven(*cell)
+        assert (status[i] >= FIRST_REFUSAL) == (true is None), cell
+        if true is None:
+            assert status[i] == Status.STICKS, cell
+        elif status[i] == Status.OK:
+            for name, t in zip(NAMES, true, strict=True):
+                if t > mpf(10) ** -12:  # what differences of the oracle can tell
+                    assert relative_error([outputs[name][i]], [t])[0] < limit, (name, cell)
+
+
+@pytest.mark.parametrize(
+    ("drive", "zeta", "friction"),
+    [
+        ("impulse", (-6, -0.05), None), ("impulse", None, (-6, 0)), ("lift", None, (-6, 0.3)),
+    ],
+)  # fmt: skip
+def test_formulas_are_right_to_4e_15(drive, zeta, friction):
+    columns = scenes(drive, zeta, friction)
+    outputs, status = solve(BALANCE_DRIVEN, "closed", *columns)
+    assert np.isin(status, (Status.OK, Status.STICKS)).all()
+    assert (bounds(BALANCE_DRIVEN, "closed", *columns) == 4e-15).all()
+    compare(outputs, status, columns, 4e-15)
+
+
+@pytest.mark.parametrize(
+    ("drive", "zeta", "friction", "torque"),
+    [
+        ("impulse", (-6, -0.05), (-6, 0), None), ("lift", (-6, -0.05), (-6, 0.3), (-2.0, 1.0)),
+        ("lift", (-0.3, 1), (-6, 0.3), (-0.5, 2.0)), ("lift", (-1, 0.0), (-0.5, 0.5), (0.0, 1.5)),
+    ],
+)  # fmt: skip
+def test_newton_finds_the_cycle_to_1e_13_in_all_regimes_and_none_where_there_is_none(drive, zeta, friction, torque):
+    columns = scenes(drive, zeta, friction, torque=torque)
+    outputs, status = solve(BALANCE_DRIVEN, "newton", *columns, rtol=1e-13)
+    assert set(status) <= {Status.OK, Status.INACCURATE, Status.STICKS}
+    assert (status == Status.OK).any()
+    compare(outputs, status, columns, 1e-13)
+
+
+@pytest.mark.parametrize("rtol", [1e-13, 1e-11])
+@pytest.mark.parametrize(
+    ("drive", "zeta", "friction"),
+    [("impulse", (-12, -0.002), None), ("impulse", None, (-12, 0)), ("lift", None, (-12, 0.3))],
+)
+def test_newton_agrees_with_the_formulas_to_rtol_or_says_that_it_does_not(drive, zeta, friction, rtol):
+    columns = scenes(drive, zeta, friction, MANY)
+    outputs, status = solve(BALANCE_DRIVEN, "newton", *columns, rtol=rtol)
+    formulas, verdict = solve(BALANCE_DRIVEN, "closed", *columns)
+    assert np.array_equal(status >= FIRST_REFUSAL, verdict >= FIRST_REFUSAL)
+    good = status == Status.OK
+    assert good.sum() > 0.8 * (verdict == Status.OK).sum()
+    for name in NAMES:
+        np.testing.assert_allclose(outputs[name][good], formulas[name][good], rtol=rtol, atol=1e-300, err_msg=name)
+
+
+def test_newton_promises_no_more_than_rounding_leaves():
+    _, status = solve(BALANCE_DRIVEN, "newton", *scenes("impulse", (-6, -1), None, MANY), rtol=1e-15)
+    assert (status == Status.INACCURATE).all()
+
+
+def close_to_sticking():
+    """Impulses just above w = 4 r^2, and lifts just above m = r and just above a + beta = 2 r."""
+    near = 10.0 ** np.linspace(-14, -1, POINTS)
+    none, one = np.zeros(POINTS), np.ones(POINTS)
+    return [
+        (none, one, 0.3 * one, 4 * 0.3 * 0.3 * (1 + near), none, none),
+        (none, one, 0.1 * one, none, 0.1 * (1 + near), 0.5 * one),
+        (none, one, one, none, 2 * one, 2 / 3 * (1 + near)),
+    ]
+
+
+@pytest.mark.parametrize("which", range(3))
+def test_close_to_sticking_the_formulas_keep_their_digits_and_newton_says_what_it_lost(which):
+    columns = close_to_sticking()[which]
+    outputs, status = solve(BALANCE_DRIVEN, "closed", *columns)
+    assert (status == Status.OK).all()
+    for i in range(0, POINTS, 7):
+        compare(
+            {k: v[i : i + 1] for k, v in outputs.items()}, status[i : i + 1], [c[i : i + 1] for c in columns], 4e-15
+        )
+    found, verdict = solve(BALANCE_DRIVEN, "newton", *columns, rtol=1e-10)
+    assert np.isin(verdict, (Status.OK, Status.INACCURATE)).all()
+    good = verdict == Status.OK
+    assert 0 < good.sum() < POINTS
+    for name in NAMES:
+        np.testing.assert_allclose(found[name][good], outputs[name][good], rtol=1e-10)
+
+
+def test_the_formulas_of_the_source_with_one_kind_of_friction():
+    zeta, r, w = 0.1, 0.05, 0.3
+    s = np.sqrt(1 - zeta**2)
+    outputs, _ = solve(BALANCE_DRIVEN, "newton", [zeta, 0.0], [2.0], [0.0, r], [w], rtol=1e-12)
+    square = w * np.exp(2 * zeta * np.arcsin(zeta) / s) / np.sinh(np.pi * zeta / s)
+    np.testing.assert_allclose(outputs["amplitude"], [np.sqrt(square), w / (2 * r)], rtol=1e-13)
+    np.testing.assert_allclose(outputs["period"][0], 2 * np.pi / (2.0 * s), rtol=1e-13)
+    a = w / (2 * r)
+    expected = [np.exp(-2 * np.pi * zeta / s), (a - r) / (a + r)]
+    np.testing.assert_allclose(outputs["multiplier"], expected, rtol=1e-13)
+
+
+def test_just_below_the_least_drive_the_balance_sticks():
+    below = 1 - 1e-12
+    columns = [0.0, 0.0, 0.0], [1.0], [1.0, 0.1, 1.0], [4 * below, 0, 0], [0, 0.1 * below, 2], [0, 0.5, 2 / 3 * below]
+    for method in METHODS:
+        _, status = solve(BALANCE_DRIVEN, method, *columns)
+        assert (status == Status.STICKS).all(), method
+    _, status = solve(BALANCE_DRIVEN, "closed", [0.0, 0.0], [1.0], [1.0, 0.1], [4.0, 0.0], [0.0, 0.1], [0.0, 0.5])
+    assert (status == Status.STICKS).all()
+
+
+@pytest.mark.parametrize("zeta", [1.0, 1 + 1e-12, 10.0])
+def test_an_overdamped_balance_needs_a_lift(zeta):
+    for method, r in (("closed", 0.0), ("newton", 0.0), ("newton", 0.1)):
+        _, status = solve(BALANCE_DRIVEN, method, [zeta], [1.0], [r], [100.0])
+        assert status[0] == Status.STICKS
+    outputs, status = solve(BALANCE_DRIVEN, "newton", [zeta], [1.0], [0.1], [0.0], [3.0], [1.0], rtol=1e-11)
+    assert status[0] == Status.OK
+    compare(outputs, status, ([zeta], [1.0], [0.1], [0.0], [3.0], [1.0]), 1e-12)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_nothing_happens_at_critical_damping(side):
+    zeta = 1 + side * np.array([1e-12, 1e-9, 1e-6])
+    cell = [1.0], [0.1], [0.0], [3.0], [1.0]
+    near, status = solve(BALANCE_DRIVEN, "newton", zeta, *cell, rtol=1e-11)
+    at, _ = solve(BALANCE_DRIVEN, "newton", [1.0], *cell)
+    assert (status == Status.OK).all()
+    for name in NAMES:
+        assert (abs(near[name] / at[name] - 1) < 50 * abs(zeta - 1) + 1e-13).all()
+
+
+def test_the_map_has_the_slope_that_the_multiplier_says():
+    """Two half swings from a little more than the cycle's amplitude, followed in 40 digits."""
+    zeta, r, m, beta = 0.05, 0.02, 0.3, 0.4
+    outputs, _ = solve(BALANCE_DRIVEN, "newton", [zeta], [1.0], [r], [0.0], [m], [beta], rtol=1e-13)
+    with mp.workdps(40):
+        scene = tuple(map(mpf, (zeta, r, 0.0, m, beta)))
+        a, step = mpf(float(outputs["amplitude"][0])), mpf(10) ** -8
+        energy = [oracles._given(*scene, a + k * step)[0] for k in (-1, 1)]
+        risen = [oracles._needed(*scene, a + k * step)[0] for k in (-1, 1)]
+        slope = (energy[1] - energy[0]) / (risen[1] - risen[0])
+    assert relative_error(outputs["multiplier"], [slope])[0] < 1e-12
+
+
+@settings(max_examples=40 if COMPILED else 5)
+@given(st.floats(0, 1.5), st.floats(-3, -0.5), st.integers(-200, 200), st.integers(-200, 200))
+def test_units_of_angle_and_time_scale_out_exactly(zeta, log_r, angle, time):
+    r, x, t = 10.0**log_r, 2.0**angle, 2.0**time
+    drives = ([0.3, 0.3 * x * x], [0.0], [0.0]), ([0.0], [0.5, 0.5 * x], [0.7, 0.7 * x])
+    for drive in drives:
+        outputs, status = solve(BALANCE_DRIVEN, "newton", [zeta] * 2, [1.3, 1.3 * t], [r, r * x], *drive)
+        assert status[0] == status[1]
+        if status[0] < FIRST_REFUSAL:
+            for name, factor in zip(NAMES, (x, 1 / t, 1.0), strict=True):
+                assert outputs[name][1] == outputs[name][0] * factor, name
+
+
+@settings(max_examples=40 if COMPILED else 5)
+@given(st.floats(0.001, 0.5), st.floats(-3, -1.5), st.floats(0.01, 1.0))
+def test_a_stronger_drive_swings_wider_and_is_less_stable(zeta, log_r, more):
+    w = np.array([1.0, 1.0 + more])
+    outputs, status = solve(BALANCE_DRIVEN, "newton", [zeta] * 2, [1.0], [10.0**log_r], w)
+    if (status < FIRST_REFUSAL).all():
+        assert outputs["amplitude"][1] > outputs["amplitude"][0] > 2 * 10.0**log_r
+        assert outputs["multiplier"][1] > outputs["multiplier"][0]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_same_bits_alone_in_lanes_and_in_tails(method):
+    columns = [c.copy() for c in scenes("lift", (-3, 0.5), (-4, 0.1), 45 if COMPILED else 3)]
+    columns[0][::3], columns[2][::4] = 0.0, 0.0
+    for k, value in ((3, 1.0), (4, 0.0), (5, 0.0)):
+        columns[k][1::2] = value
+    together, status = solve(BALANCE_DRIVEN, method, *columns)
+    for i in range(len(status)):
+        alone, verdict = solve(BALANCE_DRIVEN, method, *(c[i : i + 1] for c in columns))
+        assert verdict[0] == status[i]
+        for name in NAMES:
+            assert np.array_equal(alone[name], together[name][i : i + 1], equal_nan=True), (name, i)
+
+
+PLAIN = """
+import sys
+sys.path += ["tests/oracles", "tests/helpers"]
+from columns import solve
+from kernels.balance.driven import BALANCE_DRIVEN
+cells = [0.0, 0.1, 0.1, 2.0], [1.3], [0.05, 0.0, 0.05, 0.05], [0.3, 0.3, 0, 0], [0, 0, 0.5, 3], [0, 0, 0.7, 1]
+for method in ("closed", "newton"):
+    outputs, status = solve(BALANCE_DRIVEN, method, *cells)
+    good = status < 64
+    print(*(float(v).hex() for column in outputs.values() for v in column[good]), *status)
+"""
+
+
+@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
+def test_plain_python_gives_the_bits_of_compiled_code():
+    compiled, plain = printed_both_ways(PLAIN)
+    assert compiled == plain != ""
+
+
+@pytest.mark.parametrize(
+    ("cell", "status"),
+    [
+        ((0.1, 1, 0.1, 0.1, 0, 0), Status.OK), ((0.1, 1, 0.1, 0, 0.1, 0.1), Status.OK),
+        ((0.1, 1, 0.1, 0, 0, 0), Status.BAD_INPUT), ((0.1, 1, 0.1, 0.1, 0.1, 0.1), Status.BAD_INPUT),
+        ((0.1, 1, 0.1, 0, 0.1, 0), Status.BAD_INPUT), ((0.1, 1, 0.1, 0, 0, 0.1), Status.BAD_INPUT),
+        ((0.1, 1, 0.1, 0.1, 0.1, 0), Status.BAD_INPUT), ((0.1, 1, 0.1, 0.1, 0, 0.1), Status.BAD_INPUT),
+        ((0.0, 1, 0.0, 0.1, 0, 0), Status.NO_LIMIT_CYCLE), ((0.0, 1, 0.0, 0, 0.1, 0.1), Status.NO_LIMIT_CYCLE),
+        ((-0.1, 1, 0.1, 0.1, 0, 0), Status.BAD_INPUT), ((0.1, 0, 0.1, 0.1, 0, 0), Status.BAD_INPUT),
+        *(
+            ((*(x if k == bad else 0.1 if k < 4 else 0.0 for k in range(6)),), Status.BAD_INPUT)
+            for bad in range(6) for x in (NAN, INF, -INF)
+        ),
+    ],
+)  # fmt: skip
+def test_what_cannot_run_is_refused_by_name(cell, status):
+    assert (checked(BALANCE_DRIVEN, *(np.full(2, float(c)) for c in cell)) == status).all()
+
+
+def test_where_there_is_no_formula_none_is_taken():
+    columns = [0.1, 0.1], [1.0], [0.1, 0.0], [0.1, 0.0], [0.0, 0.1], [0.0, 0.1]
+    _, status = solve(BALANCE_DRIVEN, "closed", *columns)
+    assert (status == Status.NO_METHOD).all()
+    assert (bounds(BALANCE_DRIVEN, "closed", *columns) == INF).all()
+
+
+@pytest.mark.parametrize(
+    ("cell", "status"),
+    [
+        ((0.0, 1.0, 1e-200, 1.0, 0, 0), (Status.OK, Status.OUT_OF_RANGE)),  # a = 5e199: its square is too large
+        ((0.0, 1.0, 1e-305, 1.0, 0, 0), (Status.OUT_OF_RANGE,) * 2),
+        ((0.0, 1.0, 1e-100, 1e-60, 0, 0), (Status.OK, Status.OK)),
+        ((0.1, 1e-308, 0.0, 1.0, 0, 0), (Status.OUT_OF_RANGE,) * 2),  # period
+        ((1e-30, 1.0, 0.0, 1e-60, 0, 0), (Status.OK, Status.OK)),
+        ((1e-300, 1.0, 0.0, 1.0, 0, 0), (Status.OK, Status.OUT_OF_RANGE)),
+        ((0.3, 1.0, 0.0, 5e-324, 0, 0), (Status.OK, Status.OK)),
+        ((0.3, 1.0, 0.0, 1.7e308, 0, 0), (Status.OK, Status.OK)),
+    ],
+)  # fmt: skip
+def test_over_the_range_of_float64_a_cell_is_right_or_refused(cell, status):
+    columns = [np.array([float(c)]) for c in cell]
+    for method, expected in zip(METHODS, status, strict=True):
+        outputs, verdict = solve(BALANCE_DRIVEN, method, *columns)
+        assert verdict[0] == expected, method
+        if expected == Status.OK:
+            zeta, _, r, w, _, _ = map(mpf, cell)
+            s = mp.sqrt(1 - zeta**2)
+            by_damping = mp.sqrt(w * mp.exp(2 * zeta * mp.asin(zeta) / s) / mp.sinh(mp.pi * zeta / s)) if zeta else 0
+            assert relative_error(outputs["amplitude"], [by_damping or w / (2 * r)])[0] < 1e-13

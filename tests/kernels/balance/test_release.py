@@ -1,0 +1,454 @@
+"""The balance's ring-down against 100 digits, where the last digit decides, and against its own laws."""
+
+import balance_oracles as oracles
+import numpy as np
+import pytest
+from columns import bounds, checked, printed_both_ways, relative_error, solve
+from hypothesis import given
+from hypothesis import strategies as st
+from mpmath import mp, mpf
+
+from kernels.balance.release import BALANCE
+from kernels.balance.trace import BALANCE_TRACE
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+
+NAMES = ("half_swings", "stop_angle", "stop_time", "margin", "period")
+METHODS = tuple(m.name for m in BALANCE.methods)
+SOME = 200 if COMPILED else 12
+INF, NAN = np.inf, np.nan
+
+
+def dampings(kind, random, n):
+    """zeta of a regime."""
+    return {
+        "light": lambda: 10 ** random.uniform(-16, -2, n),
+        "moderate": lambda: random.uniform(0.01, 0.99, n),
+        "nearly critical": lambda: 1 - 10 ** random.uniform(-15.9, -2, n),
+        "none": lambda: np.zeros(n),
+        "any": lambda: np.minimum(10 ** random.uniform(-120, 0, n), 0.999),
+    }[kind]()
+
+
+def scenes(kind, low=-12.0, high=0.0, n=SOME, seed=1, units=30):
+    """Columns of random balances: log10 of r/theta0 between `low` and `high`, lengths over `units` decades and back."""
+    random = np.random.default_rng(seed)
+    unit = 10 ** random.uniform(-units, units, n)
+    r = unit * 10 ** random.uniform(low, high, n)
+    r_s = r * np.where(random.random(n) < 0.5, 1.0, 1 + 10 ** random.uniform(-3, 1, n))
+    theta0 = unit * random.choice([-1.0, 1.0], n) * random.uniform(1, 2, n)
+    return dampings(kind, random, n), 10 ** random.uniform(-30, 30, n), r, r_s, theta0
+
+
+def truths(columns):
+    return [oracles.balance(*cell) for cell in zip(*columns, strict=True)]
+
+
+def errors(outputs, expected, names=NAMES):
+    """Relative errors by name; 0 for an exact 0."""
+    found = {}
+    for name in names:
+        true = [t[NAMES.index(name)] for t in expected]
+        found[name] = np.array(
+            [float(abs(mpf(float(v)) - t) / (abs(t) or 1)) for v, t in zip(outputs[name], true, strict=True)]
+        )
+    return found
+
+
+@pytest.mark.parametrize("kind", ["light", "moderate", "nearly critical", "none", "any"])
+def test_closed_form_is_right_to_1e_15_and_the_count_exact_up_to_1e12_half_swings(kind):
+    columns = scenes(kind)
+    outputs, status = solve(BALANCE, "closed", *columns, rtol=1e-14)
+    assert np.isin(status, (Status.OK, Status.GRAZING)).all()
+    assert (status == Status.OK).mean() > 0.95
+    good = status == Status.OK
+    kept = {name: column[good] for name, column in outputs.items()}
+    for name, error in errors(kept, truths([c[good] for c in columns])).items():
+        assert error.max() < (1e-300 if name == "half_swings" else 1e-15), name
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_one_half_swing_is_the_solution_of_the_equation_of_motion(method):
+    zeta, r, theta0 = 0.2, 0.3, 1.0
+    with mp.workdps(60):
+        angle, speed = oracles.swing_followed(zeta, r, theta0, 1)
+        assert abs(speed) < mpf(10) ** -50
+        time = mp.pi / mp.sqrt(1 - mpf(zeta) ** 2)
+        for share in (0.1, 0.7):
+            x, v = oracles.swing_followed(zeta, r, theta0, share)
+            slope = mp.diff(lambda s: oracles.swing_followed(zeta, r, theta0, s)[0], share) / time
+            bend = mp.diff(lambda s: oracles.swing_followed(zeta, r, theta0, s)[1], share) / time
+            assert abs(slope - v) < mpf(10) ** -20
+            assert abs(bend + 2 * mpf(zeta) * v + x - mpf(r)) < mpf(10) ** -20
+    outputs, _ = solve(BALANCE, method, [zeta], [2.0], [r], [r], [theta0])
+    assert outputs["half_swings"][0] == 1
+    assert relative_error(outputs["stop_angle"], [angle])[0] < 1e-15
+    assert relative_error(outputs["stop_time"], [time / 2])[0] < 1e-15
+
+
+def grazing(shift, kind="moderate", seed=5):
+    """Balances whose stiction lies a share `shift` of itself off the third turning point."""
+    zeta, omega_n, r, _, theta0 = scenes(kind, -2, -1.7, SOME, seed, 0)
+    zeta = 0.2 * zeta
+    third = [oracles.turning_point(*cell, 3) for cell in zip(zeta, r, theta0, strict=True)]
+    r_s = np.array([float(t * (1 + mpf(s))) for t, s in zip(third, np.broadcast_to(shift, (SOME,)), strict=True)])
+    reached = r_s > r
+    return [c[reached] for c in (zeta, omega_n, r, r_s, theta0)]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_a_count_that_hangs_on_the_last_digits_is_grazing(method, sign):
+    columns = grazing(sign * 10 ** np.linspace(-16, -9.3, SOME))
+    outputs, status = solve(BALANCE, method, *columns)
+    assert len(status) > SOME // 2
+    assert (status == Status.GRAZING).all()
+    assert (outputs["margin"] < 1e-9).all()
+    assert np.isin(outputs["half_swings"], (3, 4)).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_a_count_beyond_the_last_digits_is_exact_and_not_grazing(method, sign):
+    columns = grazing(sign * 10 ** np.linspace(-8.9, -6, SOME))
+    outputs, status = solve(BALANCE, method, *columns, rtol=1e-5)
+    assert (status == Status.OK).all()
+    assert (outputs["half_swings"] == (3 if sign > 0 else 4)).all()
+    for name, error in errors(outputs, truths(columns)).items():
+        assert error.max() < (1e-14 if method == "closed" else 1e-6), name
+
+
+def test_even_a_grazing_count_is_that_of_the_inputs_as_they_are():
+    for sign in (-1, 1):
+        columns = grazing(sign * 10 ** np.linspace(-16, -9.3, SOME), "light")
+        outputs, _ = solve(BALANCE, "closed", *columns)
+        assert errors(outputs, truths(columns), ["half_swings"])["half_swings"].max() == 0
+
+
+def test_huge_counts_are_exact_unless_an_ulp_of_the_input_decides():
+    """5e11 half swings: an ulp of r is worth 1e-4 of one, so more is grazing than a margin below 1e-9."""
+    random = np.random.default_rng(3)
+    n = 10 * SOME
+    r, theta0 = 1e-12 * random.uniform(1, 2, n), random.uniform(1, 2, n)
+    shift = np.concatenate([10 ** random.uniform(-12, 0, n // 2), random.uniform(0, 1, n - n // 2)])
+    swings = np.round(theta0 / (2 * r))
+    theta0 = 2 * swings * r + r * (1 - 2 * shift)
+    columns = np.zeros(n), np.ones(n), r, r, theta0
+    outputs, status = solve(BALANCE, "closed", *columns)
+    exact = [oracles.half_swings(0.0, *cell) for cell in zip(r, r, theta0, strict=True)]
+    assert (outputs["half_swings"] == np.array(exact, float)).all()
+    for ulp in (-1, 1):
+        beside = [oracles.half_swings(0.0, q, q, a) for q, a in zip(r, np.nextafter(theta0, ulp * INF), strict=True)]
+        changed = np.array(exact, float) != np.array(beside, float)
+        assert (status[changed] == Status.GRAZING).all()
+    assert 0.0 < (status == Status.GRAZING).mean() < 0.9
+
+
+@pytest.mark.parametrize("zeta", [0.0, 1e-30, 1e-16])
+def test_a_count_that_no_digits_can_tell_is_grazing_and_has_no_stop_angle(zeta):
+    outputs, status = solve(BALANCE, "closed", [zeta], [2.0], [1e-30], [1e-30], [1.0])
+    assert status[0] == Status.GRAZING
+    expected = oracles.half_swings(zeta, 1e-30, 1e-30, 1.0)
+    assert relative_error(outputs["half_swings"], [mpf(expected)])[0] < 4e-15
+    assert np.isnan(outputs["stop_angle"][0])
+    assert outputs["margin"][0] == 0
+
+
+@pytest.mark.parametrize("kind", ["light", "moderate", "nearly critical", "none"])
+@pytest.mark.parametrize("rtol", [1e-13, 1e-9])
+def test_the_recursion_is_right_to_rtol_or_says_that_it_is_not(kind, rtol):
+    columns = scenes(kind, -4 if COMPILED else -2)
+    outputs, status = solve(BALANCE, "recursion", *columns, rtol=rtol)
+    assert set(status) <= {Status.OK, Status.INACCURATE, Status.GRAZING}
+    assert (status == Status.OK).mean() > 0.1
+    expected = truths(columns)
+    found = errors(outputs, expected)
+    assert (found["half_swings"][status != Status.GRAZING] == 0).all()
+    for name in NAMES:
+        assert found[name][status == Status.OK].max() <= max(rtol, 1e-15), name
+
+
+def test_the_recursion_counts_the_rounding_of_its_factor():
+    """Without solid friction nothing else is there to be rounded but the product: half of the error."""
+    n = 1000 if COMPILED else 40
+    zeta = np.random.default_rng(8).uniform(0.05, 0.9, n)
+    columns = zeta, np.ones(n), np.zeros(n), np.full(n, 1e-60), np.ones(n)
+    exact = truths(columns)
+    seen = 0.0
+    for rtol in np.geomspace(1e-15, 1e-12, 31 if COMPILED else 7):
+        outputs, status = solve(BALANCE, "recursion", *columns, rtol=rtol)
+        error = errors(outputs, exact, ["stop_angle"])["stop_angle"][status == Status.OK]
+        assert (error <= rtol).all()
+        seen = max(seen, error.max(initial=0.0) / rtol)
+    assert seen > 0.1
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_turning_point_exactly_at_the_stiction_is_rest(method):
+    outputs, status = solve(BALANCE, method, [0.0], [2.0], [0.125], [0.25], [1.0])
+    assert status[0] == Status.GRAZING
+    assert outputs["half_swings"][0] == 3
+    assert outputs["stop_angle"][0] == -0.25
+    assert outputs["margin"][0] == 0
+
+
+@pytest.mark.skipif(not COMPILED, reason="a hundred thousand half swings in plain Python")
+def test_the_recursion_gives_up_beyond_its_limit():
+    r = np.array([4.9e-6, 5.1e-6])
+    _, status = solve(BALANCE, "recursion", [0.0, 0.0], [1.0], r, r, [1.0], rtol=1.0)
+    assert status.tolist() == [Status.STEP_LIMIT, Status.OK]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("zeta", [1.0, 1 + 1e-12, 10.0])
+def test_an_overdamped_balance_never_turns_and_creeps_to_where_friction_holds_the_spring(method, zeta):
+    outputs, status = solve(BALANCE, method, [zeta] * 3, [3.0], [0.1] * 3, [0.2] * 3, [2.0, -2.0, 0.1])
+    assert (status == Status.OVERDAMPED).all()
+    assert outputs["stop_angle"].tolist() == [0.1, -0.1, 0.1]
+    assert outputs["half_swings"].tolist() == [0, 0, 0]
+    assert np.isnan(outputs["stop_time"][:2]).all()
+    assert outputs["stop_time"][2] == 0
+    assert np.isnan(outputs["period"]).all()
+    np.testing.assert_allclose(outputs["margin"], [9, 9, 0.5], rtol=1e-15)
+
+
+def test_the_creep_ends_on_the_side_of_release_at_any_friction():
+    r = np.geomspace(1e-4, 0.9, 40)
+    for side in (-1.0, 1.0):
+        outputs, _ = solve(BALANCE, "closed", [1.5] * 40, [1.0], r, r, [side])
+        assert (outputs["stop_angle"] == side * r).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_just_below_critical_damping_one_half_swing_ends_where_above_it_the_creep_does(method):
+    outputs, status = solve(BALANCE, method, [1 - 1e-12], [3.0], [0.1], [0.1], [-2.0])
+    assert status[0] == Status.OK
+    assert outputs["half_swings"][0] == 1
+    assert outputs["stop_angle"][0] == -0.1
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_without_solid_friction_the_swing_fades_and_never_ends(method):
+    outputs, status = solve(BALANCE, method, [0.1], [3.0], [0.0], [0.0], [-2.0])
+    assert status[0] == Status.NEVER_ENDS
+    assert outputs["stop_angle"][0] == 0
+    assert np.isnan([outputs[name][0] for name in ("half_swings", "stop_time", "margin")]).all()
+    assert outputs["period"][0] == pytest.approx(2 * np.pi / (3 * np.sqrt(0.99)), rel=1e-15)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_stiction_alone_ends_a_viscous_ring_down(method):
+    columns = [np.array([c]) for c in (0.02, 3.0, 0.0, 0.01, 2.0)]
+    outputs, status = solve(BALANCE, method, *columns, rtol=1e-10)
+    assert status[0] == Status.OK
+    for name, error in errors(outputs, truths(columns)).items():
+        assert error[0] < (1e-15 if method == "closed" else 1e-12), name
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_angle_of_rest_that_no_float64_can_hold_is_refused(method):
+    zeta = [0.9999, 0.999999999, 0.99]
+    outputs, status = solve(BALANCE, method, zeta, [1.0], [0.0], [1e-3], [1.0], rtol=1e-10)
+    assert status.tolist() == [Status.OK, Status.OUT_OF_RANGE, Status.OK]
+    for i in (0, 2):
+        true = oracles.balance(zeta[i], 1.0, 0.0, 1e-3, 1.0)[1]
+        assert relative_error(outputs["stop_angle"][i : i + 1], [true])[0] < (1e-15 if method == "closed" else 1e-12)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_released_within_stiction_it_stays_where_it_is(method):
+    theta0 = [0.05, -0.05, 0.0, -0.1, 0.1]
+    outputs, status = solve(BALANCE, method, [0.3] * 5, [2.0], [0.1], [0.1], theta0)
+    assert status.tolist() == [Status.OK, Status.OK, Status.OK, Status.GRAZING, Status.GRAZING]
+    assert outputs["stop_angle"].tolist() == theta0
+    assert not outputs["half_swings"].any()
+    assert not outputs["stop_time"].any()
+    np.testing.assert_allclose(outputs["margin"], [0.5, 0.5, 1.0, 0.0, 0.0], rtol=1e-15)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_at_rest_at_the_zero_without_friction_it_stays_there(method):
+    outputs, status = solve(BALANCE, method, [0.3], [2.0], [0.0], [0.0], [0.0])
+    assert status[0] == Status.OK
+    assert [outputs[name][0] for name in NAMES[:4]] == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_rest_exactly_at_the_zero_of_the_spring_is_no_loss_of_digits(method):
+    outputs, status = solve(BALANCE, method, [0.0], [2.0], [0.125], [0.125], [1.0])
+    assert outputs["half_swings"][0] == 4
+    assert outputs["stop_angle"][0] == 0
+    assert status[0] == (Status.OK if method == "closed" else Status.INACCURATE)
+
+
+@given(st.floats(0, 0.9), st.floats(-4, -0.5), st.integers(-200, 200), st.integers(-200, 200))
+def test_units_of_angle_and_time_scale_out_exactly(zeta, log_r, angle, time):
+    r, x, t = 10.0**log_r, 2.0**angle, 2.0**time
+    outputs, _ = solve(BALANCE, "closed", [zeta] * 2, [1.3, 1.3 * t], [r, r * x], [r, r * x], [0.9, 0.9 * x])
+    for name, factor in zip(NAMES, (1.0, x, 1 / t, 1.0, 1 / t), strict=True):
+        assert outputs[name][1] == outputs[name][0] * factor, name
+
+
+@given(st.floats(0, 0.99), st.floats(-6, 0), st.floats(1.0, 3.0))
+def test_it_rests_within_stiction_and_more_friction_never_makes_more_swings(zeta, log_r, more):
+    r = 10.0**log_r * np.array([1.0, more])
+    outputs, status = solve(BALANCE, "closed", [zeta] * 2, [1.3], r, r, [1.0])
+    assert (abs(outputs["stop_angle"]) <= r).all()
+    if not (status == Status.GRAZING).any():
+        assert outputs["half_swings"][1] <= outputs["half_swings"][0]
+    assert outputs["period"][0] == outputs["period"][1]  # isochronous
+    halves = outputs["half_swings"] * outputs["period"] / 2
+    np.testing.assert_allclose(outputs["stop_time"], halves, rtol=1e-15)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_same_bits_alone_in_lanes_and_in_tails(method):
+    columns = [c.copy() for c in scenes("light", -2, 0, 75 if COMPILED else 4, units=3)]
+    columns[0][::5], columns[0][1::7], columns[2][::6], columns[4][::9] = 0.0, 1.5, 0.0, 0.0
+    together, status = solve(BALANCE, method, *columns)
+    for i in range(len(status)):
+        alone, verdict = solve(BALANCE, method, *(c[i : i + 1] for c in columns))
+        assert verdict[0] == status[i]
+        for name in NAMES:
+            assert np.array_equal(alone[name][:1], together[name][i : i + 1], equal_nan=True), (name, i)
+
+
+def trace(*columns, half_swing):
+    outputs, status = solve(BALANCE_TRACE, "closed", *columns, along=[np.asarray(half_swing, float)])
+    return outputs["turning_point"], status
+
+
+@pytest.mark.parametrize("kind", ["light", "moderate", "nearly critical", "none"])
+def test_turning_points_are_right_to_1e_15_of_the_release(kind):
+    columns = scenes(kind, -4, 0, SOME // 4)
+    counts = [oracles.half_swings(*cell) for cell in zip(*(columns[k] for k in (0, 2, 3, 4)), strict=True)]
+    asked = [0, 1, 2, 3, 7, 20, 1000]
+    found, status = trace(*columns, half_swing=asked)
+    assert (status == Status.OK).all()
+    for i, (zeta, _, r, _, theta0) in enumerate(zip(*columns, strict=True)):
+        for k, value in zip(asked, found[i], strict=True):
+            if k > counts[i]:
+                assert np.isnan(value)
+            else:
+                true = np.sign(theta0) * (-1) ** k * oracles.turning_point(zeta, r, theta0, k)
+                assert abs(mpf(float(value)) - true) <= 1e-15 * abs(theta0)
+
+
+def test_the_trace_ends_where_the_ring_down_does():
+    columns = scenes("moderate", -2.5, 0)
+    found, _ = trace(*columns, half_swing=np.arange(400))
+    outputs, _ = solve(BALANCE, "closed", *columns)
+    assert (np.isfinite(found).sum(axis=1) == outputs["half_swings"] + 1).all()
+    last = found[np.arange(len(found)), outputs["half_swings"].astype(int)]
+    assert (abs(last - outputs["stop_angle"]) <= 1e-15 * abs(columns[4])).all()
+
+
+def test_turning_points_do_not_depend_on_the_order_or_the_company_in_which_they_are_asked_for():
+    columns = scenes("light", -2, 0, 41 if COMPILED else 3, units=3)
+    forward, status = trace(*columns, half_swing=np.arange(9))
+    backward, _ = trace(*columns, half_swing=np.arange(9)[::-1])
+    assert np.array_equal(forward, backward[:, ::-1], equal_nan=True)
+    for i in range(len(status)):
+        alone, verdict = trace(*(c[i : i + 1] for c in columns), half_swing=[4])
+        assert np.array_equal(alone[0], forward[i, 4:5], equal_nan=True)
+        assert verdict[0] == status[i]
+
+
+def test_a_trace_shows_what_there_is_of_an_overdamped_and_of_an_endless_motion():
+    found, status = trace(
+        [1.0, 0.0, 0.1], [1.0], [0.1, 0.0, 0.0], [0.1, 0.0, 0.0], [-2.0, 2.0, -2.0], half_swing=[0, 1, 6]
+    )
+    assert status.tolist() == [Status.OVERDAMPED, Status.OK, Status.OK]
+    assert np.array_equal(found[0], [-2.0, NAN, NAN], equal_nan=True)
+    assert found[1].tolist() == [2.0, -2.0, 2.0]
+    share = np.exp(-np.pi * 0.1 / np.sqrt(0.99))
+    np.testing.assert_allclose(found[2], [-2.0, 2.0 * share, -2.0 * share**6], rtol=1e-14)
+
+
+def test_a_trace_is_grazing_only_if_it_reaches_the_turning_point_in_doubt():
+    columns = grazing(1e-12)
+    assert (trace(*columns, half_swing=[0, 1, 2])[1] == Status.OK).all()
+    assert (trace(*columns, half_swing=[0, 1, 2, 3])[1] == Status.GRAZING).all()
+
+
+@pytest.mark.parametrize("coordinate", [[0.5], [-1.0], [0.0, NAN], [1e30], [1.0, INF, 2.0]])
+def test_a_coordinate_that_does_not_count_half_swings_is_bad_input(coordinate):
+    _, status = trace([0.1], [1.0], [0.1], [0.1], [1.0], half_swing=coordinate)
+    assert status[0] == Status.BAD_INPUT
+
+
+def test_a_trace_is_refused_as_the_ring_down_is_but_for_what_never_ends():
+    columns = [0.0, -0.1, 0.1, NAN], [1.0], [0.0, 0.1, 0.1, 0.1], [0.0, 0.1, 0.01, 0.1], [1.0]
+    expected = [Status.OK, Status.BAD_INPUT, Status.BAD_INPUT, Status.BAD_INPUT]
+    assert checked(BALANCE_TRACE, *columns).tolist() == expected
+
+
+PLAIN = """
+import sys
+sys.path += ["tests/oracles", "tests/helpers"]
+import numpy as np
+from columns import solve
+from kernels.balance.release import BALANCE
+from kernels.balance.trace import BALANCE_TRACE
+for method in ("closed", "recursion"):
+    outputs, status = solve(
+        BALANCE, method, [0.0, 1e-9, 0.01, 0.5, 0.999, 2.0], [3.0], [0.01] * 6, [0.011] * 6, [1.0, -1, 2, 1, 1, 1]
+    )
+    print(*(float(v).hex() for column in outputs.values() for v in column), *status)
+along = [np.array([0.0, 1, 2, 5])]
+outputs, status = solve(BALANCE_TRACE, "closed", [0.0, 0.1, 0.9], [3.0], [0.05], [0.06], [1.0], along=along)
+print(*(float(v).hex() for v in outputs["turning_point"].ravel()), *status)
+"""
+
+
+@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
+def test_plain_python_gives_the_bits_of_compiled_code():
+    compiled, plain = printed_both_ways(PLAIN)
+    assert compiled == plain != ""
+
+
+@pytest.mark.parametrize(
+    ("cell", "status"),
+    [
+        ((0.1, 1, 0.1, 0.1, 1), Status.OK), ((0.0, 1, 0.0, 0.0, 1), Status.NO_LIMIT_CYCLE),
+        ((0.0, 1, 0.0, 0.5, 1), Status.NO_LIMIT_CYCLE), ((0.0, 1, 0.0, 0.5, 0.4), Status.OK),
+        ((-0.1, 1, 0.1, 0.1, 1), Status.BAD_INPUT), ((0.1, 0, 0.1, 0.1, 1), Status.BAD_INPUT),
+        ((0.1, -1, 0.1, 0.1, 1), Status.BAD_INPUT), ((0.1, 1, -0.1, 0.1, 1), Status.BAD_INPUT),
+        ((0.1, 1, 0.1, 0.09, 1), Status.BAD_INPUT), ((0.1, 1, 0.1, 0.1, 0), Status.OK),
+        *(
+            ((*(x if k == bad else 0.1 for k in range(5)),), Status.BAD_INPUT)
+            for bad in range(5) for x in (NAN, INF, -INF)
+        ),
+    ],
+)  # fmt: skip
+def test_what_cannot_run_is_refused_by_name(cell, status):
+    for n in (1, 40):
+        assert (checked(BALANCE, *(np.full(n, float(c)) for c in cell)) == status).all()
+
+
+@pytest.mark.parametrize(
+    ("cell", "status"),
+    [
+        ((0.1, 1e-308, 0.1, 0.1, 1), Status.OUT_OF_RANGE),  # period
+        ((0.0, 1.0, 1e-300, 1e-300, 1e10), Status.OUT_OF_RANGE),  # theta0/r
+        ((0.1, 1e-300, 1e-10, 1e-10, 1), Status.OK),
+        ((0.2, 1.0, 1e-255, 1e-255, 1e10), Status.OK),  # exp(-k delta) is about 1e-265
+        ((0.9, 1.0, 1e-255, 1e-255, 1e10), Status.OK),
+        ((0.2, 1.0, 1e290, 1e290, 1e300), Status.OK),
+        ((0.2, 1.0, 1e-307, 1e-307, 1e-300), Status.OK),
+        ((0.2, 1.0, 3e-310, 3e-310, 1e-300), Status.OUT_OF_RANGE),  # stop_angle
+        ((5e-324, 1.0, 0.0, 0.1, 1.0), Status.OUT_OF_RANGE),  # half swings
+        ((0.9999999999999999, 1.0, 0.1, 0.1, 1e269), Status.OK),
+    ],
+)
+def test_over_the_range_of_float64_a_cell_is_right_or_refused(cell, status):
+    columns = [np.array([float(c)]) for c in cell]
+    outputs, verdict = solve(BALANCE, "closed", *columns)
+    assert verdict[0] == status
+    if status == Status.OK:
+        for name, error in errors(outputs, truths(columns)).items():
+            assert error[0] < 1e-15, name
+
+
+def test_the_closed_form_promises_what_it_keeps():
+    assert (bounds(BALANCE, "closed", *scenes("any")) == 2e-15).all()

@@ -1,0 +1,130 @@
+"""Recurrences written from an expression graph, against mpmath's Taylor coefficients of the same function."""
+
+import math
+
+import mpmath
+import pytest
+from mpmath import mp
+
+from kernels.codegen import expression as E
+from kernels.codegen.series_source import Lines
+from kernels.lanes.vectors import dot, fma, magnitude, where
+
+ORDER = 9
+PLAIN = {
+    "dot": dot, "fma": fma, "where": where, "magnitude": magnitude, "sqrt": math.sqrt, "exp": math.exp,
+    "log": math.log, "power": math.pow, "sincos": lambda x: (math.sin(x), math.cos(x)),
+}  # fmt: skip
+
+
+def coefficients(function, order=ORDER, **constants):
+    """Taylor coefficients of function(u) for u = 0.7 + t - t^2/2 + t^3/5, as the written text gives them."""
+    graph = E.Graph()
+    u, rate, inner = graph.series("u"), graph.series("r"), graph.series("s")
+    named = {name: graph.constant(name) for name in constants}
+    result = function(u, **named)
+    # u' = r, r' = s, s' = 6/5: a cubic
+    rates = {"u": rate, "r": inner, "s": graph.of(1.2)}
+    signs = {f"sign_{j}": 1.0 for j in range(len(graph.kinks))}
+    lines = Lines({name: name for name in ("u", "r", "s", *named)} | {f".{name}": name for name in signs}, rates)
+    last = lines.coefficients(result, order)
+    scope = {**PLAIN, **constants, **signs, "u": 0.7, "r": 1.0, "s": -1.0}
+    exec("\n".join(lines.text) + f"\nresult = {last}", scope)
+    return [float(x) for x in scope["result"]]
+
+
+def true_coefficients(function, order=ORDER):
+    with mp.workdps(40):
+        return mpmath.taylor(lambda t: function(mp.mpf(0.7) + t - t * t / 2 + t**3 * mp.mpf(1.2) / 6), 0, order)
+
+
+CASES = {
+    "product": (lambda u: u * (3.0 - u) * 0.5, lambda u: u * (3 - u) / 2),
+    "square": (lambda u: u * u - 2.0 * u, lambda u: u**2 - 2 * u),
+    "cube": (lambda u: u**3 / 7.0, lambda u: u**3 / 7),
+    "inverse": (lambda u: 1.0 / u, lambda u: 1 / u),
+    "quotient": (lambda u: (u + 1.0) / (u * u + 2.0), lambda u: (u + 1) / (u * u + 2)),
+    "negative power": (lambda u: u**-2, lambda u: u**-2),
+    "sqrt": (lambda u: E.sqrt(u * u + 0.25), lambda u: mp.sqrt(u * u + 0.25)),
+    "exp": (lambda u: E.exp(-0.5 * u), lambda u: mp.exp(-u / 2)),
+    "log": (lambda u: E.log(u + u * u), lambda u: mp.log(u + u * u)),
+    "sin": (lambda u: E.sin(3.0 * u), lambda u: mp.sin(3 * u)),
+    "cos": (lambda u: E.cos(u * u) * E.sin(u * u), lambda u: mp.cos(u * u) * mp.sin(u * u)),
+    "power": (lambda u: E.power(u, 1.7), lambda u: u ** mp.mpf(1.7)),
+    "abs": (lambda u: u * abs(u) - 2.0 * abs(-3.0 * u), lambda u: u * u - 6 * u),
+    "sign": (lambda u: E.sign(-2.0 * u) * u, lambda u: -u),
+    "all": (
+        lambda u: E.exp(E.sin(u)) / E.sqrt(1.0 + E.power(u, 0.5)) - u / (2.0 - E.log(u)),
+        lambda u: mp.exp(mp.sin(u)) / mp.sqrt(1 + mp.sqrt(u)) - u / (2 - mp.log(u)),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_recurrences_give_the_taylor_coefficients_of_every_operation(name):
+    ours, truth = CASES[name]
+    for k, (found, true) in enumerate(zip(coefficients(ours), true_coefficients(truth), strict=True)):
+        assert abs(found - true) < 3e-14 * max(1, abs(true)), k
+
+
+def test_constants_enter_a_recurrence_by_name():
+    found = coefficients(lambda u, n, c: c * E.power(u, n), n=2.4, c=3.0)
+    true = true_coefficients(lambda u: 3 * u ** mp.mpf(2.4))
+    assert max(abs(f - t) for f, t in zip(found, true, strict=True)) < 3e-14
+
+
+def test_what_is_written_twice_is_computed_once():
+    graph = E.Graph()
+    u, c = graph.series("u"), graph.constant("c")
+    assert E.sqrt(u * c + 1.0) is E.sqrt(1.0 + c * u)
+    assert c * u * abs(u) is (u * c) * abs(u)
+    assert abs(2.0 * u) is not abs(u)
+    assert len(graph.kinks) == 1
+
+
+def test_a_kink_at_every_series_within_abs_or_sign():
+    graph = E.Graph()
+    u, w = graph.series("u"), graph.series("w")
+    _ = abs(u) + E.sign(u) * abs(w - 1.0) - abs(graph.constant("c"))
+    assert [k.kind for k in graph.kinks] == ["input", "add"]
+
+
+@pytest.mark.parametrize(
+    ("function", "says"),
+    [
+        (lambda u: u if u > 0.0 else -u, "compare"),
+        (lambda u: u or 1.0, "branch"),
+        (lambda u: math.sin(u), "kernels.scene"),
+        (lambda u: u**u, "exponent"),
+        (lambda u: u + "1", "expected a number"),
+    ],
+)
+def test_what_cannot_be_recorded_is_refused_with_a_reason(function, says):
+    with pytest.raises(E.SceneError, match=says):
+        function(E.Graph().series("u"))
+
+
+def test_functions_of_plain_numbers_are_plain():
+    assert E.sqrt(4.0) == 2.0
+    assert E.power(2.0, 3) == 8.0
+    assert [E.sign(x) for x in (-2.0, 0.0, 3.0)] == [-1.0, 0.0, 1.0]
+
+
+def test_a_power_of_abs_keeps_its_constant_apart_and_its_series_is_that_of_both_signs():
+    graph = E.Graph()
+    u, n = graph.series("u"), graph.constant("n")
+    assert E.power(abs(-3.0 * u), n).args[1] is E.power(abs(u), n)
+    assert E.sqrt(abs(u)) is E.power(abs(u), 0.5)
+    assert len(graph.powers) == 2
+    true = true_coefficients(lambda u: u ** mp.mpf(1.7))
+    for side in (1.0, -1.0):  # u and its rates with the other sign
+        graph = E.Graph()
+        u, rate, inner = graph.series("u"), graph.series("r"), graph.series("s")
+        result = E.power(abs(u), 1.7)
+        lines = Lines(
+            {"u": "u", "r": "r", "s": "s", ".sign_0": "side"}, {"u": rate, "r": inner, "s": graph.of(side * 1.2)}
+        )
+        last = lines.coefficients(result, ORDER)
+        scope = {**PLAIN, "u": side * 0.7, "r": side, "s": -side, "side": side}
+        exec("\n".join(lines.text) + f"\nresult = {last}", scope)
+        assert max(abs(float(f) - t) for f, t in zip(scope["result"], true, strict=True)) < 3e-14

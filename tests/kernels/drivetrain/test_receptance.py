@@ -1,0 +1,240 @@
+"""The receptance of drivetrains against the dense equations in 60 digits, and against its own laws."""
+
+import chain_oracles as oracles
+import numpy as np
+import pytest
+from columns import checked, solve
+from mpmath import mp, mpc, mpf
+
+from kernels.drivetrain._chain_frequencies import natural_frequencies
+from kernels.drivetrain.receptance import DRIVETRAIN_FRF, MILLING_MACHINE
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+
+CELLS = 24 if COMPILED else 4
+NAN, INF = np.nan, np.inf
+KGF_M = 9.80665  # N m
+
+
+def chains(n, decades, damping, seed=1, cells=CELLS):
+    """J, k, h of random chains; h about `damping` times what the smallest of them has as critical."""
+    random = np.random.default_rng(seed)
+    J, k, share = (10 ** random.uniform(-decades / 2, decades / 2, (cells, n)) for _ in range(3))
+    return J, k, damping * share * np.sqrt(J * k)
+
+
+def receptances(J, k, h, drive, read, frequency, rtol=1e-9):
+    outputs, status = solve(DRIVETRAIN_FRF, "continued", J, k, h, drive, read, rtol=rtol, along=[np.array(frequency)])
+    return outputs, status
+
+
+def errors(outputs, i, J, k, h, drive, read, frequency):
+    """abs(dH)/abs(H) of cell i at every frequency."""
+    found = []
+    with mp.workdps(50):
+        for j, f in enumerate(frequency):
+            true = oracles.receptance(J, k, h, f, int(drive), int(read))
+            value = mpc(float(outputs["receptance_re"][i, j]), float(outputs["receptance_im"][i, j]))
+            found.append(float(abs(value - true) / abs(true)))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("rtol", [1e-14, 1e-13, 1e-12, 1e-9])
+@pytest.mark.parametrize(("n", "decades", "damping"), [(1, 2, 0.1), (4, 2, 1e-3), (4, 12, 0.1), (9, 2, 1e-12)])
+def test_a_receptance_is_right_to_rtol_or_the_cell_says_that_it_is_not(n, decades, damping, rtol):
+    J, k, h = chains(n, decades, damping)
+    random = np.random.default_rng(3)
+    drive, read = random.integers(1, n + 1, CELLS), random.integers(1, n + 1, CELLS)
+    frequency = 10 ** random.uniform(-2 - decades / 2, 1 + decades / 2, 5)
+    outputs, status = receptances(J, k, h, drive, read, frequency, rtol)
+    assert set(status) <= {Status.OK, Status.INACCURATE}
+    for i in range(0, CELLS, 3):
+        worst = errors(outputs, i, J[i], k[i], h[i], drive[i], read[i], frequency).max()
+        assert worst <= rtol if status[i] == Status.OK else worst >= rtol / 1000
+    if rtol >= 1e-9:
+        assert (status == Status.OK).all()
+
+
+def test_on_a_resonance_without_damping_the_loss_of_digits_is_told():
+    """At a share d of the frequency above it, no more than 1e-16/d of the receptance is known."""
+    J, k, h = chains(5, 2, 0.0, cells=1)
+    found = np.empty(5)
+    with np.errstate(all="ignore"):
+        natural_frequencies(5, J[0], k[0], found, np.empty(20))
+    for share in (1e-3, 1e-6, 1e-9, 1e-12):
+        frequency = found[2] * (1 + share)
+        outputs, _ = receptances(J, k, h, 1, 5, [frequency])
+        actual = errors(outputs, 0, J[0], k[0], h[0], 1, 5, [frequency])[0]
+        assert actual < 1e-14 / share
+        for rtol in np.geomspace(1e-16, 1.0, 17):
+            status = receptances(J, k, h, 1, 5, [frequency], rtol)[1][0]
+            if actual > rtol:
+                assert status == Status.INACCURATE
+            if rtol > 1e-13 / share:
+                assert status == Status.OK
+
+
+def test_where_the_receptance_is_infinite_the_cell_is_out_of_range():
+    one = [np.array([[1.0]])] * 2
+    assert receptances(*one, 0.0 * one[0], 1, 1, [0.1, 1 / (2 * np.pi)])[1][0] in (
+        Status.INACCURATE,
+        Status.OUT_OF_RANGE,
+    )
+    J, k, h = chains(3, 2, 0.1)
+    k[:, -1] = h[:, -1] = 0.0
+    _, status = receptances(J, k, h, 1, 3, [0.0, 1.0])
+    assert (status == Status.OUT_OF_RANGE).all()
+    _, status = receptances(J, k, h, 1, 3, [1e-9, 1.0])
+    assert (status == Status.OK).all()
+
+
+def test_at_rest_the_receptance_is_the_flexibility_to_ground():
+    J, k, h = chains(6, 12, 0.1)
+    for drive, read in ((1, 1), (2, 5), (6, 3)):
+        outputs, _ = receptances(J, k, h, drive, read, [0.0])
+        flexibility = (1 / k[:, max(drive, read) - 1 :]).sum(axis=1)
+        np.testing.assert_allclose(outputs["amplitude"][:, 0], flexibility, rtol=3e-15)
+        assert not outputs["receptance_im"].any()
+        assert not outputs["phase"].any()
+
+
+def test_drive_and_response_change_places():
+    J, k, h = chains(7, 3, 0.05)
+    frequency = np.geomspace(1e-3, 10, 40)
+    there, back = (receptances(J, k, h, *ends, frequency)[0] for ends in ((2, 6), (6, 2)))
+    for name in there:
+        assert (there[name] == back[name]).all()
+
+
+def test_a_torque_does_work_on_its_own_inertia():
+    """Where damping alone takes energy the drive point lags: its phase is between -pi and 0."""
+    J, k, h = chains(7, 3, 0.05)
+    for mass in (1, 4, 7):
+        outputs, _ = receptances(J, k, h, mass, mass, np.geomspace(1e-3, 10, 40))
+        assert (outputs["receptance_im"] < 0).all()
+        assert ((outputs["phase"] >= -np.pi) & (outputs["phase"] < 0)).all()
+
+
+def test_amplitude_phase_and_decibel_are_those_of_the_receptance():
+    J, k, h = chains(5, 4, 0.1)
+    outputs, _ = receptances(J, k, h, 1, 4, np.geomspace(1e-2, 100, 50))
+    H = outputs["receptance_re"] + 1j * outputs["receptance_im"]
+    np.testing.assert_allclose(outputs["amplitude"], abs(H), rtol=4e-16)
+    np.testing.assert_allclose(outputs["phase"], np.angle(H), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(outputs["amplitude_dB"], 20 * np.log10(abs(H)), rtol=1e-15, atol=1e-14)
+
+
+def test_no_frequency_has_bits_that_depend_on_the_others():
+    J, k, h = chains(5, 4, 0.01)
+    frequency = np.geomspace(1e-2, 1e2, 71)
+    together = receptances(J, k, h, 1, 4, frequency)[0]["receptance_im"]
+    for some in (slice(0, 1), slice(3, 40), slice(60, 71)):
+        assert (receptances(J, k, h, 1, 4, frequency[some].copy())[0]["receptance_im"] == together[:, some]).all()
+    assert (receptances(J[2:3], k[2:3], h[2:3], 1, 4, frequency)[0]["receptance_im"] == together[2:3]).all()
+
+
+def test_other_units_by_powers_of_four_change_no_digit():
+    J, k, h = chains(4, 4, 0.01)
+    frequency = np.geomspace(1e-2, 1e2, 9)
+    here = receptances(J, k, h, 1, 3, frequency)[0]
+    for inertia, stiffness in ((120, -130), (-100, 140)):
+        there, status = receptances(
+            J * 4.0**inertia, k * 4.0**stiffness, h * 2.0 ** (inertia + stiffness), 1, 3,
+            frequency * 2.0 ** (stiffness - inertia),
+        )  # fmt: skip
+        assert (status == Status.OK).all()
+        assert (there["receptance_re"] == here["receptance_re"] * 4.0**-stiffness).all()
+        assert (there["phase"] == here["phase"]).all()
+
+
+def test_the_milling_machine_answers_at_its_spindle_as_was_found_for_it():
+    """Static 3.9534e-3 rad/(kgf m), peak 15.15e-3 at 19.1 Hz, shoulder 6.28e-3 at 10 Hz; at the motor 1.22e-3."""
+    J, k, h = (np.array([MILLING_MACHINE[name]]) for name in "Jkh")
+    frequency = np.concatenate([[0.0, 10.0], np.arange(18.0, 20.5, 0.05)])
+    amplitude = KGF_M * receptances(J, k, h, 1, 1, frequency)[0]["amplitude"][0]
+    assert amplitude[0] == pytest.approx(3.9534e-3, rel=5e-4)
+    assert amplitude[1] == pytest.approx(6.28e-3, rel=1e-3)
+    assert amplitude.max() == pytest.approx(15.15e-3, rel=1e-3)
+    assert frequency[amplitude.argmax()] == pytest.approx(19.1, abs=0.06)
+    motor = KGF_M * receptances(J, k, h, 8, 8, np.arange(1.0, 60.0, 0.5))[0]["amplitude"][0]
+    assert motor.max() == pytest.approx(1.22e-3, rel=5e-3)
+
+
+@pytest.mark.parametrize("wild", [1e-300, 1e300])
+def test_wild_values_are_right_or_refused(wild):
+    J, k, h = (np.full((1, 2), 1.0) for _ in range(3))
+    for which in range(3):
+        for column in range(2):
+            cell = [J.copy(), k.copy(), h.copy()]
+            cell[which][0, column] = wild
+            refused = checked(DRIVETRAIN_FRF, *cell)[0]
+            outputs, status = receptances(*cell, 1, 2, [0.1, 3.0])
+            assert refused == (Status.OK if which == 2 else Status.OUT_OF_RANGE)
+            if status[0] == Status.OK:
+                assert errors(outputs, 0, *(c[0] for c in cell), 1, 2, [0.1, 3.0]).max() < 1e-9
+            else:
+                assert status[0] in (Status.OUT_OF_RANGE, Status.INACCURATE)
+    outputs, status = receptances(J, k, h, 1, 2, [wild])
+    assert status[0] == (Status.OK if wild < 1 else Status.OUT_OF_RANGE)
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, NAN, INF])
+def test_what_is_no_chain_is_refused_at_any_place(bad):
+    ones = np.ones((1, 3))
+    for place in range(3):
+        wrong = ones.copy()
+        wrong[0, place] = bad
+        assert checked(DRIVETRAIN_FRF, wrong, ones, ones)[0] == Status.BAD_INPUT
+        assert checked(DRIVETRAIN_FRF, ones, wrong, ones)[0] == (
+            Status.OK if bad == 0.0 and place == 2 else Status.BAD_INPUT
+        )
+        assert checked(DRIVETRAIN_FRF, ones, ones, wrong)[0] == (Status.OK if bad == 0.0 else Status.BAD_INPUT)
+
+
+@pytest.mark.parametrize("mass", [0.0, 4.0, 1.5, -1.0, NAN, INF])
+def test_a_mass_that_is_not_in_the_chain_is_bad_input(mass):
+    ones = np.ones((1, 3))
+    assert checked(DRIVETRAIN_FRF, ones, ones, ones, drive_mass=mass, read_mass=1.0)[0] == Status.BAD_INPUT
+    assert checked(DRIVETRAIN_FRF, ones, ones, ones, drive_mass=1.0, read_mass=mass)[0] == Status.BAD_INPUT
+    assert checked(DRIVETRAIN_FRF, ones, ones, ones, drive_mass=3.0)[0] == Status.OK
+
+
+def test_the_decibel_of_one_radian_per_newton_metre_is_0():
+    outputs, _ = receptances(np.ones((1, 1)), np.ones((1, 1)), np.ones((1, 1)), 1, 1, [0.0])
+    assert outputs["amplitude_dB"][0, 0] == 0.0
+    assert mpf(float(outputs["amplitude"][0, 0])) == 1
+
+
+@pytest.mark.parametrize("damper", [0.0, 0.3])
+def test_a_chain_without_its_last_spring_is_that_of_the_dense_equations_with_or_without_a_damper_there(damper):
+    J, k, h = chains(3, 2, 0.1, cells=1)
+    k[:, -1], h[:, -1] = 0.0, damper
+    frequency = [0.03, 0.5]
+    for drive, read in ((1, 1), (1, 3), (3, 2), (3, 3)):
+        outputs, status = receptances(J, k, h, drive, read, frequency)
+        assert status[0] == Status.OK
+        assert errors(outputs, 0, J[0], k[0], h[0], drive, read, frequency).max() < 1e-13
+
+
+def test_without_damping_the_response_is_in_phase_below_a_resonance_and_at_minus_pi_above():
+    one = np.ones((1, 1))
+    outputs, _ = receptances(one, one, 0.0 * one, 1, 1, [0.1, 0.2])  # the resonance is at 1/2 pi = 0.159 Hz
+    assert outputs["phase"].tolist() == [[0.0, -np.pi]]
+
+
+def test_nothing_is_written_beyond_the_last_frequency_and_cell():
+    J, k, h = chains(3, 2, 0.1, cells=35)
+    frequency = np.geomspace(0.01, 1.0, 5)
+    outputs, status = [np.full((36, 5), 99.0) for _ in DRIVETRAIN_FRF.outputs], np.full(36, 99, np.int8)
+    columns = J, k, h, np.ones(35), np.ones(35), np.full(35, 1e-9), frequency
+    DRIVETRAIN_FRF.method("continued").solve(*columns, *(o[:35] for o in outputs), status[:35])
+    assert all((o[35] == 99.0).all() and (o[:35] != 99.0).all() for o in outputs)
+    assert status[35] == 99
+
+
+def test_the_decibel_is_right_to_the_last_digits_of_the_amplitude():
+    J, k, h = (np.array([MILLING_MACHINE[name]]) for name in "Jkh")
+    outputs, _ = receptances(J, k, h, 1, 5, [0.0, 5.0, 40.0, 400.0])
+    with mp.workdps(30):
+        for amplitude, decibel in zip(outputs["amplitude"][0], outputs["amplitude_dB"][0], strict=True):
+            assert abs(mpf(float(decibel)) - 20 * mp.log10(mpf(float(amplitude)))) < 1e-15 * abs(decibel)

@@ -1,0 +1,374 @@
+"""Reduced drivetrains against 50 digits, against the source's tables, and against their own laws."""
+
+import numpy as np
+import pytest
+import reduction_oracles as oracles
+from columns import checked, printed_both_ways, relative_error, solve
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kernels.drivetrain.reduced import DRIVETRAIN, ORDERS, REDUCTIONS
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+
+BASES = ("guyan", "irs", "craig_bampton", "modal")
+REDUCING = ("rivin", *BASES, "exact")
+FULA = {
+    "J": np.array([25.7, 1.25, 0.284, 0.769, 1.45, 6.5, 96.0, 99.44]) * 1e-3,
+    "k": np.array([7.53, 3.79, 0.839, 1.372, 4.01, 2.80, 5.25, 1.192]) * 1e3,
+    "h": np.array([0.18, 0.042, 0.019, 0.037, 0.0975, 0.187, 0.72, 13.0]),
+}
+"""Main drive of the Fu-la milling machine, Table 1, in units of kgf, m and s."""
+INF, NAN = np.inf, np.nan
+
+
+def reduced(reduction, chain=FULA, rtol=1e-9, order="strict", **named):
+    """Outputs by name, and status, of cells; scalars of one cell."""
+    codes = {"reduction": float(REDUCTIONS[reduction]), "order": float(ORDERS[order])}
+    columns = {name: np.atleast_1d(np.asarray(v, float)) for name, v in (codes | named).items()}
+    chain = {name: np.atleast_2d(v) for name, v in chain.items()}
+    outputs, status = solve(DRIVETRAIN, "direct", rtol=rtol, **chain, **columns)
+    return outputs, [Status(s) for s in status]
+
+
+def random_chain(seed, n, decades=2.0, damping=-2.0):
+    """A chain with inertias and stiffnesses over so many decades, and dampers of that power of ten."""
+    random = np.random.default_rng(seed)
+    J, k = 10 ** random.uniform(0, decades, n), 10 ** random.uniform(0, decades, n)
+    return {"J": J, "k": k, "h": np.sqrt(J * k) * 10 ** (damping + random.uniform(-1, 0, n))}
+
+
+SIZES = [(1, 6, 2.0), (2, 7, 6.0), (3, 8, 12.0), (4, 2, 3.0), (5, 12, 4.0)] if COMPILED else [(1, 4, 3.0)]
+
+
+@pytest.mark.parametrize(("seed", "n", "decades"), SIZES)
+def test_the_reduced_chain_is_that_of_the_levers_to_a_few_ulp(seed, n, decades):
+    chain = random_chain(seed, n, decades)
+    for n_keep in {1, n // 2, n - 1}:
+        outputs, _ = reduced("rivin", chain, n_keep=n_keep)
+        truth = oracles.rivin(*chain.values(), oracles.strict_steps(*chain.values(), n_keep))
+        for name, values in zip(("J_kept", "k_kept", "h_kept"), truth, strict=True):
+            assert relative_error(outputs[name][0, :n_keep], values).max() < 2e-14, name
+            assert np.isnan(outputs[name][0, n_keep:]).all()
+        frequencies = oracles.chain_frequencies(*truth[:2])
+        assert relative_error(outputs["frequency"][0, :n_keep], frequencies).max() < 1e-13
+
+
+@pytest.mark.parametrize("reduction", BASES)
+@pytest.mark.parametrize(("seed", "n", "decades"), SIZES)
+def test_frequencies_in_a_basis_are_right_or_said_not_to_be(reduction, seed, n, decades):
+    chain = random_chain(seed, n, decades)
+    for n_keep in {1, (n + 1) // 2, n - 1}:
+        masters = oracles.masters(*chain.values(), n_keep)
+        truth = oracles.Reduced(reduction, *chain.values(), n_keep, masters).frequencies()
+        outputs, status = reduced(reduction, chain, n_keep=n_keep, rtol=1e-10)
+        error = relative_error(outputs["frequency"][0, :n_keep], truth).max()
+        assert status[0] in (Status.OK, Status.INACCURATE, Status.DAMPERS_OUT_OF_RANGE)
+        assert error < 1e-10 or status[0] == Status.INACCURATE
+        if decades < 5:
+            assert error < 1e-12
+
+
+@pytest.mark.parametrize("reduction", ["rivin", *BASES])
+def test_damping_is_that_of_the_poles_in_30_digits(reduction):
+    chain = random_chain(11, 5, 2.0, -0.7)
+    n_keep = 3
+    outputs, status = reduced(reduction, chain, n_keep=n_keep)
+    if reduction == "rivin":
+        truth = oracles.full(*oracles.rivin(*chain.values(), oracles.strict_steps(*chain.values(), n_keep)))
+    else:
+        truth = oracles.Reduced(reduction, *chain.values(), n_keep, oracles.masters(*chain.values(), n_keep))
+    assert status[0] in (Status.OK, Status.DAMPERS_OUT_OF_RANGE)
+    expected = oracles.dampings(truth.poles())
+    assert relative_error(outputs["damping"][0, :n_keep], expected).max() < 1e-11
+
+
+@pytest.mark.parametrize("reduction", BASES)
+def test_overdamped_modes_have_a_damping_above_one(reduction):
+    chain = random_chain(12, 4, 1.0, 0.8)
+    outputs, _ = reduced(reduction, chain, n_keep=2)
+    truth = oracles.Reduced(reduction, *chain.values(), 2, oracles.masters(*chain.values(), 2))
+    expected = oracles.dampings(truth.poles())
+    assert max(expected) > 1
+    assert relative_error(np.sort(outputs["damping"][0, :2]), sorted(expected)).max() < 1e-11
+
+
+def spindle(model):
+    """Receptance of the spindle at frequencies [Hz], in numpy."""
+    K, C, M, here = (np.array(m.tolist(), float) for m in (model.K, model.C, model.M, model.here))
+    rest = float(model.rest)
+
+    def receptance(f):
+        w = 2 * np.pi * f[:, None, None]
+        return rest + np.einsum("ai,nij,bj->n", here, np.linalg.inv(K + 1j * w * C - w * w * M), here)
+
+    return receptance
+
+
+def scanned(function, f_max):
+    """The largest absolute value up to f_max: of 20001, and of 2001 beside the largest of them, to 1e-9."""
+    f = np.linspace(0.0, f_max, 20001)
+    best, step = f[abs(function(f)).argmax()], f[1]
+    return abs(function(np.linspace(max(best - step, 0.0), min(best + step, f_max), 2001))).max()
+
+
+@pytest.mark.parametrize("f_max", [15.0, 100.0, 400.0] if COMPILED else [100.0])
+@pytest.mark.parametrize("reduction", ["rivin", *BASES])
+def test_the_error_of_the_receptance_is_the_largest_that_a_fine_scan_finds(reduction, f_max):
+    outputs, _ = reduced(reduction, n_keep=5, f_max=f_max)
+    if reduction == "rivin":
+        model = oracles.full(*oracles.rivin(*FULA.values(), oracles.strict_steps(*FULA.values(), 5)))
+    else:
+        model = oracles.Reduced(reduction, *FULA.values(), 5, [0, 3, 5, 6, 7])
+    here, true = spindle(model), spindle(oracles.full(*FULA.values()))
+    found = scanned(lambda f: here(f) - true(f), f_max) / scanned(true, f_max)
+    assert outputs["frf_error"][0] == pytest.approx(found, rel=1e-8)
+
+
+@pytest.mark.parametrize("n_keep", [1, 3, 7] if COMPILED else [2])
+@pytest.mark.parametrize("seed", [1, 2, 3] if COMPILED else [1])
+def test_the_exact_reduction_has_no_error(n_keep, seed):
+    chain = random_chain(seed, 8, 3.0)
+    outputs, status = reduced("exact", chain, n_keep=n_keep, f_max=1.0)
+    assert status[0] == Status.OK
+    assert outputs["frf_error"][0] < 1e-11
+    truth = oracles.chain_frequencies(chain["J"], chain["k"])
+    assert relative_error(outputs["frequency"][0], truth).max() < 1e-13
+    assert outputs["n_kept"][0] == n_keep
+
+
+def test_a_chain_of_its_full_size_is_itself():
+    for reduction in ("none", *REDUCING) if COMPILED else ("none", "irs"):
+        outputs, _ = reduced(reduction, n_keep=8, f_max=300.0)
+        assert outputs["n_kept"][0] == 8
+        assert abs(outputs["frequency_error"][0]).max() < 1e-13, reduction
+        assert outputs["frf_error"][0] < 1e-12, reduction
+    assert outputs["valid_to"][0] == 300.0
+
+
+def test_the_sources_order_takes_out_the_masses_3_2_and_5():
+    seven, six, five = (reduced("rivin", order="paper", n_keep=n)[0] for n in (7, 6, 5))
+    np.testing.assert_allclose(seven["J_kept"][0, 1:3], [1.483e-3, 0.820e-3], rtol=1e-3)
+    np.testing.assert_allclose(1 / seven["k_kept"][0, 1], 1.4558e-3, rtol=1e-4)
+    np.testing.assert_allclose(seven["h_kept"][0, 1], 0.0141, rtol=2e-3)
+    np.testing.assert_allclose(six["J_kept"][0, :2], [27.06e-3, 0.944e-3], rtol=1e-3)
+    np.testing.assert_allclose(five["J_kept"][0, :5], [27.06e-3, 1.314e-3, 7.58e-3, 96e-3, 99.44e-3], rtol=1e-3)
+    np.testing.assert_allclose(five["k_kept"][0, :5], [629.5, 1022.2, 2800, 5250, 1192], rtol=1e-4)
+    np.testing.assert_allclose(five["h_kept"][0, :5], [0.01311, 0.02688, 0.187, 0.72, 13.0], rtol=1e-3)
+
+
+def test_the_strict_order_begins_with_spring_2_and_ends_at_the_same_five_masses():
+    strict, paper = (reduced("rivin", order=order, n_keep=5)[0] for order in ("strict", "paper"))
+    np.testing.assert_allclose(strict["J_kept"], paper["J_kept"], rtol=1e-14)
+    np.testing.assert_allclose(strict["h_kept"], paper["h_kept"], rtol=1e-14)
+    seven = reduced("rivin", n_keep=7)[0]["J_kept"][0]
+    assert seven[1] == pytest.approx(1.25e-3 + 0.284e-3, rel=1e-15)
+
+
+def test_five_masses_put_the_fifth_frequency_17_percent_low_as_the_source_prints():
+    outputs, status = reduced("rivin", n_keep=5, f_max=100.0)
+    np.testing.assert_allclose(outputs["frequency"][0, :5], [10.591, 19.756, 53.089, 102.732, 187.328], atol=1e-3)
+    np.testing.assert_allclose(
+        100 * outputs["frequency_error"][0, :5], [-0.004, -0.144, -0.028, 0.198, -17.4], atol=0.05, rtol=5e-3
+    )
+    assert status[0] == Status.OK
+
+
+@pytest.mark.parametrize(
+    ("reduction", "percent"),
+    [
+        ("guyan", [0.001, 0.005, 0.011, 0.914, 2.21]), ("irs", [0, 0, 0, 0.007, 0.329]),
+        ("craig_bampton", [0, 0.004, 0, 0.002, 0.012]), ("modal", [0, 0, 0, 0, 0]),
+    ],
+)  # fmt: skip
+def test_other_reductions_to_five_have_the_errors_found_before(reduction, percent):
+    outputs, _ = reduced(reduction, n_keep=5)
+    np.testing.assert_allclose(100 * outputs["frequency_error"][0, :5], percent, atol=6e-4, rtol=1e-3)
+
+
+def test_merging_the_motor_spring_holds_to_one_and_a_half_hertz():
+    outputs, status = reduced("rivin", n_keep=2, f_max=1.4)
+    assert outputs["k_kept"][0, 1] != FULA["k"][7]
+    assert outputs["valid_to"][0] == pytest.approx(0.1 / (2 * np.pi) / (13.0 / 1192), rel=1e-12)
+    assert status[0] == Status.OK
+    assert reduced("rivin", n_keep=2, f_max=1.6)[1][0] == Status.DAMPERS_OUT_OF_RANGE
+    assert reduced("guyan", n_keep=2, f_max=1e3)[1][0] == Status.DAMPERS_OUT_OF_RANGE
+
+
+def places(k):
+    """Flexibility from each mass to ground."""
+    return np.cumsum(1 / k[::-1])[::-1]
+
+
+@settings(max_examples=40 if COMPILED else 2)
+@given(st.integers(0, 2**32 - 1), st.integers(2, 9), st.floats(0, 8))
+def test_every_step_keeps_sum_j_sum_j_x_and_dunkerleys_sum(seed, n, decades):
+    chain = random_chain(seed, n, decades)
+    n = n if COMPILED else 3
+    chain = {name: v[:n] for name, v in chain.items()}
+    moment = (chain["J"] * places(chain["k"])).sum()
+    full = (1 / (2 * np.pi * reduced("none", chain)[0]["frequency"][0]) ** 2).sum()
+    assert full == pytest.approx(moment, rel=1e-13)
+    for n_keep in range(n - 1, 0, -1):
+        outputs, _ = reduced("rivin", chain, n_keep=n_keep)
+        J, k, f = (outputs[name][0, :n_keep] for name in ("J_kept", "k_kept", "frequency"))
+        assert (J * places(k)).sum() == pytest.approx(moment, rel=2e-15 * n)
+        assert (1 / (2 * np.pi * f) ** 2).sum() == pytest.approx(moment, rel=1e-13)
+        assert J.sum() <= chain["J"].sum() * (1 + 1e-15 * n)  # what a last mass gives the ground is gone
+
+
+def test_sum_j_stays_where_the_last_mass_does():
+    chain = random_chain(5, 6, 1.0)
+    chain["J"][-1] *= 1e6
+    for n_keep in range(1, 6):
+        J = reduced("rivin", chain, n_keep=n_keep)[0]["J_kept"][0, :n_keep]
+        if J[-1] >= chain["J"][-1]:
+            assert J.sum() == pytest.approx(chain["J"].sum(), rel=1e-15)
+
+
+@settings(max_examples=30 if COMPILED else 1)
+@given(st.integers(0, 2**32 - 1), st.floats(0, 3))
+def test_a_basis_only_raises_frequencies(seed, decades):
+    chain = random_chain(seed, 6 if COMPILED else 3, decades)
+    for reduction in BASES:
+        for n_keep in (1, 2, 5)[: None if COMPILED else 1]:
+            error = reduced(reduction, chain, n_keep=n_keep)[0]["frequency_error"][0, :n_keep]
+            assert (error > -1e-12).all(), reduction
+
+
+@pytest.mark.parametrize("tol", [0.01] if not COMPILED else [1e-1, 1e-2, 1e-4])
+@pytest.mark.parametrize("reduction", REDUCING if COMPILED else ("rivin", "modal"))
+def test_the_fewest_masses_hold_the_tolerance_and_one_less_does_not(reduction, tol):
+    f_max = 150.0
+    outputs, _ = reduced(reduction, tol=tol, f_max=f_max)
+    kept = int(outputs["n_kept"][0])
+    inside = outputs["frequency"][0] / (1 + outputs["frequency_error"][0]) <= f_max
+    assert inside.sum() >= 4 or kept == 1
+    assert abs(outputs["frequency_error"][0, :4]).max() <= tol
+    if reduction == "exact":
+        assert kept == 1
+    else:
+        less = reduced(reduction, n_keep=kept - 1)[0]["frequency_error"][0, :4]
+        assert kept == 4 or abs(less).max() > tol
+    if reduction == "modal":
+        assert kept == 4
+
+
+def test_a_missing_mode_breaks_the_tolerance_however_large():
+    for reduction in ("rivin", "guyan", "modal")[: None if COMPILED else 1]:
+        assert reduced(reduction, tol=1e3, f_max=150.0)[0]["n_kept"][0] == 4
+
+
+@pytest.mark.parametrize("reduction", ["none", *REDUCING] if COMPILED else ["rivin", "irs", "craig_bampton"])
+def test_a_chain_with_free_ends_keeps_its_free_motion(reduction):
+    chain = FULA | {"k": np.append(FULA["k"][:-1], 0.0)}
+    outputs, _ = reduced(reduction, chain, n_keep=5, f_max=100.0)
+    assert outputs["frequency"][0, 0] == 0
+    assert outputs["frequency_error"][0, 0] == 0
+    assert np.isnan(outputs["frf_error"][0]) or reduction == "none"
+    masters = [0, 3, 5, 6, 7]
+    if reduction in BASES:
+        with oracles.mp.workdps(50):
+            truth = oracles.Reduced(reduction if reduction != "modal" else "irs", *chain.values(), 5, masters)
+            if reduction != "modal":
+                expected = truth.frequencies()[1:]
+                assert relative_error(outputs["frequency"][0, 1:5], expected).max() < 1e-12
+
+
+def test_without_dampers_nothing_is_damped():
+    chain = FULA | {"h": np.zeros(8)}
+    for reduction in ("rivin", "guyan", "modal", "exact")[: None if COMPILED else 2]:
+        outputs, status = reduced(reduction, chain, n_keep=5, f_max=8.0)
+        assert (outputs["damping"][0, :5] == 0).all()
+        assert np.isfinite(outputs["frf_error"][0])  # the first resonance is at 10.6 Hz
+        assert status[0] == Status.OK
+        assert np.isnan(reduced(reduction, chain, n_keep=5, f_max=20.0)[0]["frf_error"][0])
+
+
+@pytest.mark.parametrize("reduction", ["rivin", "irs", "exact"] if COMPILED else ["rivin"])
+@pytest.mark.parametrize(
+    ("mass", "spring"), [(200, 100), (-900, -960), (700, 740), (0, -400)] if COMPILED else [(700, 740)]
+)
+def test_units_scale_out_exactly(reduction, mass, spring):
+    here = reduced(reduction, n_keep=4, f_max=100.0)[0]
+    time = 2.0 ** ((mass - spring) // 2)
+    scaled = {"J": FULA["J"] * 2.0**mass, "k": FULA["k"] * 2.0**spring}
+    scaled["h"] = FULA["h"] * 2.0 ** ((mass + spring) // 2)
+    outputs, status = reduced(reduction, scaled, n_keep=4, f_max=100.0 / time)
+    assert status[0] == Status.OK
+    for name, factor in {"frequency": 1 / time, "damping": 1, "frf_error": 1, "J_kept": 2.0**mass}.items():
+        assert np.array_equal(outputs[name], here[name] * factor, equal_nan=True), name
+
+
+def test_the_company_of_a_cell_does_not_matter():
+    n = 35 if COMPILED else 3
+    cells = [random_chain(seed, 4) for seed in range(n)]
+    chain = {name: np.array([c[name] for c in cells]) for name in "Jkh"}
+    codes = np.resize([1.0, 4.0, 0.0, 3.0, 5.0, 6.0, 2.0], n)
+    together, status = solve(DRIVETRAIN, "direct", **chain, reduction=codes, n_keep=2.0, f_max=1.0)
+    for i in range(0, n, 4 if COMPILED else 2):
+        alone, verdict = solve(
+            DRIVETRAIN, "direct", **{name: v[i : i + 1] for name, v in chain.items()}, reduction=codes[i : i + 1],
+            n_keep=2.0, f_max=1.0,
+        )  # fmt: skip
+        assert verdict[0] == status[i]
+        assert all(np.array_equal(alone[name][0], together[name][i], equal_nan=True) for name in alone)
+
+
+def verdict(J=(1.0, 2.0), k=(1.0, 1.0), h=0.0, **named):
+    return checked(DRIVETRAIN, [J], [k], [np.broadcast_to(h, len(J))], **{n: [v] for n, v in named.items()})[0]
+
+
+@pytest.mark.parametrize(
+    ("cell", "status"),
+    [
+        ({}, Status.OK), ({"k": (1.0, 0.0)}, Status.OK), ({"k": (0.0, 1.0)}, Status.BAD_INPUT),
+        ({"J": (1.0, 0.0)}, Status.BAD_INPUT), ({"J": (1.0, -1.0)}, Status.BAD_INPUT),
+        ({"k": (1.0, -1.0)}, Status.BAD_INPUT), ({"h": (0.0, -1.0)}, Status.BAD_INPUT),
+        ({"J": (1.0, NAN)}, Status.BAD_INPUT), ({"k": (1.0, INF)}, Status.BAD_INPUT), ({"h": NAN}, Status.BAD_INPUT),
+        ({"reduction": 1.0}, Status.BAD_INPUT), ({"reduction": 1.0, "n_keep": 1.0}, Status.OK),
+        ({"reduction": 1.0, "n_keep": 3.0}, Status.BAD_INPUT), ({"reduction": 1.0, "n_keep": 1.5}, Status.BAD_INPUT),
+        ({"reduction": 1.0, "n_keep": -1.0}, Status.BAD_INPUT), ({"reduction": 1.0, "tol": 0.1}, Status.OK),
+        ({"reduction": 1.0, "n_keep": 1.0, "tol": 0.1}, Status.BAD_INPUT), ({"tol": -0.1}, Status.BAD_INPUT),
+        ({"reduction": 6.5, "n_keep": 1.0}, Status.BAD_INPUT), ({"reduction": 7.0, "n_keep": 1.0}, Status.BAD_INPUT),
+        ({"f_max": 0.0}, Status.BAD_INPUT), ({"f_max": -1.0}, Status.BAD_INPUT), ({"f_max": NAN}, Status.BAD_INPUT),
+        ({"order": 2.0}, Status.BAD_INPUT), ({"order": NAN}, Status.BAD_INPUT),
+        ({"J": np.ones(65), "k": np.ones(65)}, Status.BAD_INPUT), ({"J": np.ones(64), "k": np.ones(64)}, Status.OK),
+        ({"J": (1e-300, 1.0)}, Status.OUT_OF_RANGE), ({"J": (1e-300, 1e-299)}, Status.OK),
+    ],
+)  # fmt: skip
+def test_what_cannot_run_is_refused_by_name(cell, status):
+    assert verdict(**cell) == status
+
+
+def test_a_result_that_no_float64_can_hold_is_refused():
+    chain = {"J": np.array([1e300, 1e300]), "k": np.array([1e-300, 1e-300]), "h": np.zeros(2)}
+    outputs, status = reduced("rivin", chain, n_keep=1, f_max=1.0)
+    assert status[0] == Status.OK
+    truth = oracles.rivin(*chain.values(), oracles.strict_steps(*chain.values(), 1))
+    assert relative_error(outputs["frequency"][0, :1], oracles.chain_frequencies(*truth[:2]))[0] < 1e-14
+    huge = {"J": np.full(3, 1.7e308), "k": np.ones(3), "h": np.zeros(3)}
+    assert reduced("rivin", huge, n_keep=1)[1][0] == Status.OUT_OF_RANGE  # the sum of the inertias
+
+
+def test_more_digits_than_there_are_is_inaccurate():
+    for reduction in ("rivin", "irs"):
+        assert reduced(reduction, n_keep=4, rtol=1e-16)[1][0] == Status.INACCURATE
+
+
+PLAIN = """
+import sys
+sys.path += ["tests/oracles", "tests/helpers"]
+from columns import solve
+from kernels.drivetrain.reduced import DRIVETRAIN
+J, k, h = [[1.0, 0.2, 0.05, 3.0]], [[40.0, 90.0, 30.0, 20.0]], [[0.1, 0.05, 0.02, 0.3]]
+for code in range(7):
+    outputs, status = solve(DRIVETRAIN, "direct", J, k, h, reduction=[code], n_keep=[2], f_max=[1.5])
+    print(*(float(v).hex() for column in outputs.values() for v in column.ravel()), *status)
+"""
+
+
+@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
+def test_plain_python_gives_the_bits_of_compiled_code():
+    compiled, plain = printed_both_ways(PLAIN)
+    assert compiled == plain != ""

@@ -1,0 +1,77 @@
+"""Angle and speed over a period: against 50 digits, and against the energy and the equation of motion."""
+
+import numpy as np
+import oracles
+import pytest
+from columns import bounds, checked, solve
+from mpmath import mpf
+
+from kernels.foliot.cycle import FOLIOT
+from kernels.foliot.motion import FOLIOT_MOTION
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+
+
+def test_angle_and_speed_are_right_to_4e_15_of_their_largest():
+    random = np.random.default_rng(7)
+    alpha, a, phi0 = 10 ** random.uniform(-12, 12, 40), 10 ** random.uniform(-2, 2, 40), np.full(40, 0.3)
+    mu, phase = alpha * a * a * phi0, np.sort(random.uniform(0, 1, 12))
+    outputs, status = solve(FOLIOT_MOTION, "closed", mu, phi0, a, along=[phase])
+    limit = bounds(FOLIOT_MOTION, "closed", mu, phi0, a, along=[phase])
+    assert (status == Status.OK).all()
+    assert (limit == 4e-15).all()
+    for i in range(40):
+        _, amplitude, speed, _, _ = oracles.foliot(mu[i], phi0[i], a[i])
+        for j in range(12):
+            x, v = oracles.foliot_angle(mu[i], phi0[i], a[i], phase[j])
+            assert abs(mpf(outputs["angle"][i, j]) - x) < limit[i] * amplitude
+            assert abs(mpf(outputs["speed"][i, j]) - v) < limit[i] * speed
+
+
+@pytest.mark.parametrize("alpha", [0.05, 1.46, 100.0])
+def test_friction_takes_2_mu_phi0_in_every_half_swing(alpha):
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    phase = np.ascontiguousarray(0.25 * (nodes + 1))
+    a, phi0, mu = 0.7, 0.4, alpha * 0.7**2 * 0.4
+    motion, _ = solve(FOLIOT_MOTION, "closed", [mu], [phi0], [a], along=[phase])
+    cycle, _ = solve(FOLIOT, "closed", [mu], [phi0], [a])
+    lost = a * np.sum(weights * motion["speed"][0] ** 2) * 0.25 * cycle["period"][0]
+    assert lost == pytest.approx(2 * mu * phi0, rel=1e-12)
+
+
+def test_it_starts_at_the_switch_rises_to_the_amplitude_and_turns_over_at_half_time():
+    half = 10000 if COMPILED else 1000
+    phase = np.linspace(0, 1, 2 * half + 1)
+    motion, _ = solve(FOLIOT_MOTION, "closed", [3.0], [0.5], [1.1], along=[phase])
+    cycle, _ = solve(FOLIOT, "closed", [3.0], [0.5], [1.1])
+    angle, speed = motion["angle"][0], motion["speed"][0]
+    assert angle[0] == 0.5 == -angle[half]
+    assert speed[0] == -speed[half]
+    assert speed[0] == pytest.approx(cycle["crossing_speed"][0], rel=1e-15)
+    assert angle.max() == pytest.approx(cycle["amplitude"][0], rel=10 / half**2)
+    assert np.allclose(angle[:half], -angle[half:-1], atol=1e-14)
+    assert np.allclose(np.gradient(angle, phase * cycle["period"][0])[1:-1], speed[1:-1], atol=10 / half)
+
+
+@pytest.mark.parametrize(
+    ("mu", "phi0", "a"), [(1e-200, 1e100, 1e-150), (1e-150, 1e-250, 1e60), (1e90, 1e90, 1e90), (1e-90, 1e-90, 1e-90)]
+)
+def test_units_beyond_the_usual_lose_no_digits(mu, phi0, a):
+    phase = np.array([0.1, 0.3, 0.7])
+    outputs, status = solve(FOLIOT_MOTION, "closed", [mu], [phi0], [a], along=[phase])
+    assert status[0] == Status.OK
+    _, amplitude, speed, _, _ = oracles.foliot(mu, phi0, a)
+    for j in range(3):
+        x, v = oracles.foliot_angle(mu, phi0, a, phase[j])
+        assert abs(mpf(outputs["angle"][0, j]) - x) < 4e-15 * amplitude
+        assert abs(mpf(outputs["speed"][0, j]) - v) < 4e-15 * speed
+
+
+def test_it_refuses_what_the_cycle_refuses():
+    status = checked(FOLIOT_MOTION, [0.0, 1.0, 1.0], [1.0, 1.0, -1.0], [1.0, 0.0, 1.0])
+    assert status.tolist() == [Status.NEVER_STARTS, Status.NO_LIMIT_CYCLE, Status.BAD_INPUT]
+
+
+def test_what_no_float_can_hold_is_out_of_range():
+    _, status = solve(FOLIOT_MOTION, "closed", [1.7e308], [1.7e308], [1e-3], along=[np.array([0.25])])
+    assert status[0] == Status.OUT_OF_RANGE

@@ -1,0 +1,157 @@
+"""The foliot with torque that varies over the swing, against energy and against Taylor series."""
+
+import numpy as np
+import pytest
+import ripple_oracles
+from columns import checked, relative_error, solve
+
+from kernels.foliot.ripple import FOLIOT_RIPPLE
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+
+NAMES = ("period", "amplitude", "crossing_speed", "sensitivity", "multiplier")
+
+BY_ENERGY = [
+    {"R": 0.3, "depth": 0.5, "harmonic": 1},
+    {"R": 0.3, "depth": 0.5, "harmonic": 3},
+    {"R": 0.9, "depth": 0.6, "harmonic": 2},  # a swing that starts faster than the cycle's sticks at its turning point
+    {"mu": 2.0, "phi0": 0.7, "R": 0.1, "k": 3.0, "e": 0.8, "depth": 0.9, "harmonic": 2},
+    {"mu": 3.0, "phi0": 0.2, "k": 40.0, "e": 0.6, "depth": 0.99, "harmonic": 7},
+    {"mu": 0.5, "phi0": 1.5, "R": 0.2, "e": -0.4, "depth": 0.3, "harmonic": 4},
+    {"mu": 1.0, "R": 0.2, "e": 0.5, "depth": 0.0, "harmonic": 1},
+]
+BY_TAYLOR = [
+    {"mu": 2.0, "phi0": 0.7, "a": 0.3, "R": 0.2, "c": 0.8, "k": 1.0, "e": 0.9, "depth": 0.7, "harmonic": 3},
+]
+
+
+def as_columns(cells):
+    names = ("mu", "phi0", "a", "R", "c", "n", "k", "e", "depth", "harmonic")
+    plain = {"mu": 1.0, "phi0": 1.0, "a": 0.0, "R": 0.0, "c": 0.0, "n": 2.0, "k": 0.0, "e": 1.0}
+    return {name: np.array([(plain | cell)[name] for cell in cells], float) for name in names}
+
+
+def compare(cells, truths, rtol):
+    outputs, status = solve(FOLIOT_RIPPLE, "dopri5", rtol=rtol, **as_columns(cells))
+    assert (status == Status.OK).all(), status
+    for j, name in enumerate(NAMES):
+        error = relative_error(outputs[name], [t[j] for t in truths])
+        assert error.max() <= 0.5 * rtol, (name, cells[error.argmax()], error.max() / rtol)
+
+
+@pytest.fixture(scope="module")
+def energy_truths():
+    cells = BY_ENERGY if COMPILED else BY_ENERGY[:3]
+    return cells, [ripple_oracles.by_energy(**({"mu": 1.0, "phi0": 1.0} | cell)) for cell in cells]
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9] if COMPILED else [1e-3])
+def test_ripple_is_right_to_half_of_rtol_where_energy_gives_the_speed(rtol, energy_truths):
+    compare(*energy_truths, rtol)
+
+
+@pytest.mark.skipif(not COMPILED, reason="the oracle alone takes ten seconds")
+def test_ripple_with_drag_is_right_to_half_of_rtol():
+    truths = [ripple_oracles.by_taylor(**({"mu": 1.0, "phi0": 1.0} | cell)) for cell in BY_TAYLOR]
+    for rtol in (1e-3, 1e-6, 1e-9):
+        compare(BY_TAYLOR, truths, rtol)
+
+
+def test_under_dry_friction_alone_the_amplitude_knows_nothing_of_the_ripple():
+    depth = np.array([0.0, 0.3, 0.6] if COMPILED else [0.6])
+    for harmonic in (1.0, 2.0, 5.0) if COMPILED else (2.0,):
+        outputs, status = solve(FOLIOT_RIPPLE, "dopri5", 1.0, 1.0, R=0.25, depth=depth, harmonic=harmonic, rtol=1e-6)
+        assert (status == Status.OK).all()
+        assert np.allclose(outputs["amplitude"], 4.0, rtol=1e-6)
+
+
+def test_a_cycle_that_would_stop_where_torque_is_low_sticks():
+    cells = [{"R": 0.95, "depth": 0.9, "harmonic": 4}, {"mu": 1.0, "R": 0.97, "depth": 0.5, "harmonic": 6}]
+    for cell in cells:
+        with pytest.raises(ripple_oracles.NoCycle):
+            ripple_oracles.by_energy(**({"mu": 1.0, "phi0": 1.0} | cell))
+    _, status = solve(FOLIOT_RIPPLE, "dopri5", rtol=1e-6 if COMPILED else 1e-3, **as_columns(cells))
+    assert (status == Status.STICKS).all()
+
+
+def test_sticking_agrees_with_energy_over_a_grid():
+    grid = [(R, depth, h) for R in (0.7, 0.95) for depth in (0.3, 0.8) for h in (1, 2, 3)]
+    grid = grid if COMPILED else grid[::5]
+    cells = [{"R": R, "depth": depth, "harmonic": h} for R, depth, h in grid]
+    exists = []
+    for cell in cells:
+        try:
+            ripple_oracles.by_energy(1.0, 1.0, **cell)
+            exists.append(True)
+        except ripple_oracles.NoCycle:
+            exists.append(False)
+    _, status = solve(FOLIOT_RIPPLE, "dopri5", rtol=1e-4, **as_columns(cells))
+    found = [s in (Status.OK, Status.INACCURATE) for s in status]
+    assert found == exists, [c for c, f, x in zip(cells, found, exists, strict=True) if f != x]
+    assert not COMPILED or 0 < sum(exists) < len(exists)
+
+
+def test_units_of_time_and_angle_scale_out():
+    cell = {"a": 0.3, "R": 0.2, "depth": 0.4, "harmonic": 2.0, "rtol": 1e-4}
+    one, _ = solve(FOLIOT_RIPPLE, "dopri5", [1.0], [1.0], **cell)
+    other, _ = solve(FOLIOT_RIPPLE, "dopri5", [16.0 * 8.0], [8.0], **(cell | {"a": 1.2, "R": 0.2 * 128.0}))
+    for name, factor in zip(NAMES, (0.25, 8.0, 32.0, 1.0, 1.0), strict=True):
+        assert other[name][0] == one[name][0] * factor, name
+
+
+def test_the_same_bits_alone_and_among_others_that_have_no_ripple():
+    n = 40 if COMPILED else 3
+    depth = np.where(np.arange(n) % 2, 0.0, np.linspace(0.1, 0.8, n))
+    cells = {"a": np.linspace(0.2, 3.0, n), "depth": depth, "harmonic": 1.0 + np.arange(n) % 3, "rtol": 1e-4}
+    together, status = solve(FOLIOT_RIPPLE, "dopri5", np.ones(n), np.ones(n), **cells)
+    assert (status == Status.OK).all()
+    for i in range(0, n, 9):
+        one = {name: np.broadcast_to(values, n)[i : i + 1] for name, values in cells.items()}
+        alone, _ = solve(FOLIOT_RIPPLE, "dopri5", [1.0], [1.0], **one)
+        assert all(alone[name][0] == together[name][i] for name in NAMES), i
+
+
+@pytest.mark.parametrize(
+    ("depth", "harmonic", "status"),
+    [
+        (0.0, 1.0, Status.OK), (0.999, 3.0, Status.OK), (1.0, 1.0, Status.BAD_INPUT), (-0.1, 1.0, Status.BAD_INPUT),
+        (np.nan, 1.0, Status.BAD_INPUT), (0.5, 0.0, Status.BAD_INPUT), (0.5, 1.5, Status.BAD_INPUT),
+        (0.5, np.nan, Status.BAD_INPUT), (0.5, np.inf, Status.BAD_INPUT), (0.5, -1.0, Status.BAD_INPUT),
+    ],
+)  # fmt: skip
+def test_depth_and_harmonic_outside_their_limits_are_refused(depth, harmonic, status):
+    assert checked(FOLIOT_RIPPLE, [1.0], [1.0], a=1.0, depth=depth, harmonic=harmonic)[0] == status
+
+
+def test_what_foliot_refuses_is_refused():
+    assert checked(FOLIOT_RIPPLE, [0.0], [1.0], a=1.0)[0] == Status.NEVER_STARTS
+    assert checked(FOLIOT_RIPPLE, [1.0], [1.0])[0] == Status.NO_LIMIT_CYCLE
+
+
+STEEP = (
+    (2.183475312299929, 16.348777644888933, 0.3532330000497271, 0.0, 0.25423910777232167, 2.0, 8.3e-12),
+    (1.432290375227723, 21.221347580046988, 0.05613272209898147, 0.0, 0.8317911077867322, 1.0, 3.2e-8),
+    (0.537833989184306, 9.716066073800102, 0.0750440878486072, 0.0005989911811167501, 0.429563156182185, 4.0, 2.6e-12),
+    (
+        0.12622874354475647,
+        3.5010722719100165,
+        0.02024564613697914,
+        0.00256207660014646,
+        0.2430482683711905,
+        2.0,
+        4.3e-4,
+    ),
+    (3.7417608068745136, 0.1749063230831624, 1.4468364501086028, 0.0, 0.3151386992621531, 4.0, 5.4e-13),
+)
+"""mu, phi0, R, k, depth, harmonic and rtol where s hangs on the speed at the switch a hundredfold and more."""
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+@pytest.mark.parametrize("cell", STEEP)
+def test_a_sensitivity_that_hangs_steeply_on_the_speed_is_right_or_said_not_to_be(cell):
+    *values, rtol = cell
+    names = ("mu", "phi0", "R", "k", "depth", "harmonic")
+    found, status = solve(FOLIOT_RIPPLE, "dopri5", rtol=rtol, **{n: [v] for n, v in zip(names, values, strict=True)})
+    true = ripple_oracles.by_energy(**dict(zip(names, values, strict=True)))[3]
+    assert status[0] == Status.INACCURATE or abs(found["sensitivity"][0] / float(true) - 1) < rtol
+    assert rtol < 1e-11 or status[0] == Status.OK

@@ -1,0 +1,346 @@
+"""The first flips of the foliot: against 40 digits, and against what must be so."""
+
+import foliot_oracles
+import numpy as np
+import pytest
+from columns import checked, relative_error, solve
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpmath import expm1, log1p, mp, mpf
+
+from kernels.foliot import start as foliot_start
+from kernels.foliot.cycle import FOLIOT
+from kernels.foliot.start import FLIP_LIMIT, FOLIOT_START
+from kernels.interface import Status
+from kernels.lanes.columns import entry, one_by_one
+from kernels.lanes.jit import COMPILED, jit
+
+SOME = 300 if COMPILED else 12
+LOSSES = ("a", "R", "k", "e")
+INF, NAN = np.inf, np.nan
+
+
+def start(*parameters, flips=4, **named):
+    """Times and speeds of the first flips (a count, or their numbers), and the status."""
+    along = [np.arange(1.0, flips + 1) if np.isscalar(flips) else np.asarray(flips, float)]
+    outputs, status = solve(FOLIOT_START, "segments", *parameters, along=along, **named)
+    return outputs["flip_time"], outputs["flip_speed"], status
+
+
+def scenes(n, seed):
+    """Foliots over 24 decades of alpha, every damping ratio up to 10, Coulomb friction up to mu (1 - 1e-9)."""
+    random = np.random.default_rng(seed)
+
+    def some(share):
+        return random.random(n) < share
+
+    a = np.where(some(0.1), 0.0, 10 ** random.uniform(-2, 2, n))
+    phi0 = 10 ** random.uniform(-2, 2, n)
+    mu = np.where(a > 0, 10 ** random.uniform(-12, 12, n) * a * a * phi0, 1.0)
+    rho = np.select([some(0.3), some(0.5)], [0.0, random.random(n)], 1 - 10 ** random.uniform(-9, -1, n))
+    by_damping, by_drive = (a / 2 / 10 ** random.uniform(-6, 1, n)) ** 2, mu / phi0 * 10 ** random.uniform(-6, 0, n)
+    k = np.select([some(0.3), (a > 0) & (by_damping * phi0 < 3 * mu)], [0.0, by_damping], by_drive)
+    e = np.select([some(0.5), some(0.7)], [1.0, random.random(n)], random.uniform(-0.95, 0, n))
+    phi_start = phi0 * np.select(
+        [some(0.3), some(0.5)], [0.0, random.uniform(-1, 1, n)], -(10 ** random.uniform(0, 2, n))
+    )
+    return {"mu": mu, "phi0": phi0, "a": a, "R": rho * mu, "k": k, "e": e, "phi_start": phi_start}
+
+
+def truths(cell, count):
+    """The oracle's times and speeds, for a release below +phi0."""
+    cell = {name: float(v) for name, v in cell.items()}
+    return foliot_oracles.flips(cell["mu"], cell["phi0"], cell["phi_start"], count, **{n: cell[n] for n in LOSSES})
+
+
+def compare(columns, times, speeds):
+    """The worst relative error of every cell; the flips that come must be those of the oracle."""
+    worst = np.zeros(len(times))
+    for i in range(len(times)):
+        cell = {name: column[i] for name, column in columns.items()}
+        true_times, true_speeds = truths(cell, times.shape[1])
+        come = np.isfinite(times[i])
+        assert np.array_equal(come, np.arange(len(come)) < len(true_times)), cell
+        assert np.array_equal(come, np.isfinite(speeds[i])), cell
+        found = (*relative_error(times[i][come], true_times), *relative_error(speeds[i][come], true_speeds))
+        worst[i] = max(found, default=0.0)
+    return worst
+
+
+def test_flips_are_right_to_1e_13_or_say_that_they_are_not():
+    columns = scenes(SOME, seed=1)
+    times, speeds, status = start(**columns, flips=6, rtol=1e-13)
+    worst = compare(columns, times, speeds)
+    right = np.isin(status, (Status.OK, Status.COMES_TO_REST))
+    assert set(status) <= {Status.OK, Status.INACCURATE, Status.COMES_TO_REST, Status.NEVER_STARTS, Status.STICKS}
+    assert right.mean() > 0.8
+    assert (status == Status.INACCURATE).mean() < 0.1
+    assert worst[right].max() < 2e-14
+
+
+@pytest.mark.parametrize("rtol", [1e-14, 1e-9])
+def test_a_promise_is_kept_where_the_swing_just_comes_or_just_fails_to_come(rtol):
+    """Releases at which one more flip just comes, found by bisection, and others near them."""
+    n = SOME // 3
+    random = np.random.default_rng(5)
+    columns = {
+        "mu": np.ones(n), "phi0": np.ones(n),
+        "a": np.where(random.random(n) < 0.2, 0.0, 10 ** random.uniform(-2, 0.5, n)),
+        "R": np.where(random.random(n) < 0.5, 0.0, 3 * random.random(n)), "k": 10 ** random.uniform(-0.5, 1.5, n),
+        "e": np.where(random.random(n) < 0.5, 1.0, random.uniform(-0.99, 1, n)),
+    }  # fmt: skip
+    low, high = np.where(random.random(n) < 0.5, 0.9, -1.0), -(10 ** random.uniform(0.1, 2, n))
+
+    def count(release):
+        return np.isfinite(start(**columns, phi_start=release, flips=5)[0]).sum(axis=1)
+
+    few, many = count(low), count(high)
+    for _ in range(55 if COMPILED else 8):
+        middle = 0.5 * (low + high)
+        same = count(middle) == few
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    columns["phi_start"] = high * (1 + np.where(random.random(n) < 0.2, 0.0, 10 ** random.uniform(-16, -3, n)))
+    times, speeds, status = start(**columns, flips=5, rtol=rtol)
+    assert (few != many).mean() > 0.2
+    sure = np.isin(status, (Status.OK, Status.COMES_TO_REST, Status.NEVER_STARTS, Status.STICKS))
+    assert sure.mean() > 0.2
+    worst = compare({name: c[sure] for name, c in columns.items()}, times[sure], speeds[sure])
+    assert worst.max() < rtol
+    if COMPILED:
+        assert {Status.INACCURATE, Status.GRAZING} <= set(status)
+
+
+def by_hand(mu, phi0, a, count):
+    """Times and speeds of a viscous foliot from rest at 0, by Newton on its closed motion; not the oracle's way."""
+    mu, phi0, a = mpf(mu), mpf(phi0), mpf(a)
+    times, speeds, t, v, distance = [], [], mpf(0), mpf(0), phi0
+    for _ in range(count):
+        flight = (v + (v * v + 2 * mu * distance) ** mpf("0.5")) / mu + a * distance / mu  # too long
+        for _ in range(60):
+            gone = -expm1(-a * flight) / a
+            way, speed = -v * gone + mu / a * (flight - gone), -v + (mu + a * v) * gone
+            step = (way - distance) / speed
+            flight -= step
+            if abs(step) < flight * mpf(10) ** (-mp.dps * 2 // 3):
+                break
+        gone = -expm1(-a * flight) / a
+        v, t, distance = -v + (mu + a * v) * gone, t + flight, 2 * phi0
+        times.append(t)
+        speeds.append(v)
+    return times, speeds
+
+
+@pytest.mark.parametrize("alpha", [1.0, 1e4, 1e9])
+def test_errors_of_a_thousand_flips_stay_within_what_is_promised(alpha):
+    count = 1000 if COMPILED else 20
+    with mp.workdps(50):
+        times, speeds = by_hand(alpha, 1.0, 1.0, count)
+    at = [1.0, count // 3, count]
+    found, fast, status = start([alpha], [1.0], a=[1.0], flips=at, rtol=1e-11)
+    tight = start([alpha], [1.0], a=[1.0], flips=at, rtol=1e-15)[2]
+    rows = [int(j) - 1 for j in at]
+    error = [*relative_error(found[0], [times[j] for j in rows]), *relative_error(fast[0], [speeds[j] for j in rows])]
+    assert max(error) < 1e-13
+    assert error[2] < 5e-16 or alpha > 1  # the sum of the durations loses nothing
+    assert status[0] == Status.OK
+    assert tight[0] == Status.INACCURATE
+
+
+@jit
+def _pass_on(i, d, rho, kappa, e, before, wrong, late, time, speed, now_wrong, now_late):
+    scene = (d[i], rho[i], rho[i], 0.0 * d[i], 1.0, kappa[i], e[i], 1.0 - rho[i])
+    flip, _, _ = foliot_start._next(scene, (0.0 * d[i], 0.0 * d[i], before[i], wrong[i], late[i]))
+    time[i], _, speed[i], now_wrong[i], now_late[i] = flip
+
+
+@entry()
+def pass_on(d, rho, kappa, e, before, wrong, late, time, speed, now_wrong, now_late):
+    one_by_one(_pass_on, (d, rho, kappa, e, before, wrong, late, time, speed, now_wrong, now_late))
+
+
+@pytest.mark.parametrize("e", [1.0, 0.6, -0.7])
+@pytest.mark.parametrize(("d", "rho", "kappa"), [(0.3, 0.1, 0.2), (2.0, 0.0, 0.0), (0.0, 0.4, 0.3), (0.05, 0.0, 0.0)])
+def test_an_error_of_the_speed_is_passed_on_as_two_swings_show(d, rho, kappa, e):
+    share, h = 1e-3, 1e-6
+    columns = [np.full(3, x) for x in (d, rho, kappa, e)]
+    before = 1.7 * np.array([1.0, 1.0 + h, 1.0 - h])
+    time, speed, wrong, late = (np.empty(3) for _ in range(4))
+    pass_on(*columns, before, np.full(3, share), np.full(3, 0.25), time, speed, wrong, late)
+    assert wrong[0] == pytest.approx(share * (speed[1] - speed[2]) / (2 * h * speed[0]), rel=1e-6)
+    assert late[0] - 0.25 == pytest.approx(share * abs(time[1] - time[2]) / (2 * h), rel=1e-6)
+
+
+def test_at_strong_drive_forty_flips_are_still_far_from_the_cycle():
+    """At alpha = 1e4 a half swing forgets exp(-2 b), b = (3/alpha)^(1/3) = 0.067: after forty 0.5 % is left."""
+    times, _, _ = start([1e4], [1.0], a=[1.0], flips=[39, 40, 41])
+    cycle, _ = solve(FOLIOT, "closed", [1e4], [1.0], a=[1.0])
+    assert 0.003 < 1 - (times[0, 2] - times[0, 0]) / cycle["period"][0] < 0.006
+
+
+def test_the_flips_come_to_the_limit_cycle_by_its_multiplier():
+    cell = {"mu": [1.3], "phi0": [0.9], "a": [0.4], "R": [0.1], "k": [0.2], "e": [0.8]}
+    cycle, _ = solve(FOLIOT, "segments", **cell)
+    speed, multiplier, half = cycle["crossing_speed"][0], cycle["multiplier"][0], 0.5 * cycle["period"][0]
+    times, speeds, _ = start(**cell, flips=40 if COMPILED else 12)
+    near = speeds[0] - speed
+    assert near[5] / near[4] == pytest.approx(multiplier, rel=1e-2)
+    if COMPILED:
+        assert speeds[0, -1] == pytest.approx(speed, rel=1e-14)
+        assert times[0, -1] - times[0, -2] == pytest.approx(half, rel=1e-13)
+
+
+def test_a_clock_that_loses_nothing_swings_ever_wider():
+    """Each half swing adds 2 mu phi0 to v^2/2: v^2 = 2 mu phi0 (2 j - 1) at flip j."""
+    times, speeds, status = start([2.0], [0.5], flips=6)
+    j = np.arange(1, 7)
+    v = np.sqrt(2 * 2.0 * 0.5 * (2 * j - 1))
+    assert np.allclose(speeds[0], v, rtol=1e-14)
+    assert np.allclose(times[0], np.cumsum(np.r_[v[0], v[1:] + v[:-1]]) / 2.0, rtol=1e-14)
+    assert status[0] == Status.OK
+    assert checked(FOLIOT_START, [2.0], [0.5])[0] == Status.OK
+
+
+def test_restitution_takes_its_share_at_every_switch():
+    _, speeds, _ = start([1.0], [1.0], e=[-0.6], flips=3)
+    expected = np.sqrt([2.0, 4 + 0.36 * 2, 4 + 0.36 * (4 + 0.36 * 2)])
+    assert np.allclose(speeds[0], expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize("phi_start", [1.0, 1.5, 30.0])
+def test_above_the_switch_the_torque_has_switched_already(phi_start):
+    scene = {"mu": [1.0], "phi0": [1.0], "a": [0.3], "R": [0.1], "k": [0.4], "e": [0.9]}
+    above, below = start(**scene, phi_start=[phi_start]), start(**scene, phi_start=[-phi_start])
+    for one, other in zip(above, below, strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
+
+
+def test_just_below_the_switch_the_first_flip_is_at_hand():
+    gap = 2.0**-52
+    times, speeds, status = start([1.0], [1.0], a=[1.0], phi_start=[1 - gap], flips=1)
+    assert times[0, 0] == pytest.approx(np.sqrt(2 * gap), rel=1e-7)
+    assert speeds[0, 0] == pytest.approx(np.sqrt(2 * gap), rel=1e-7)
+    assert status[0] == Status.OK
+    with mp.workdps(40):
+        z = mpf(gap)  # a t + exp(-a t) - 1 = gap
+        t = (2 * z) ** mpf("0.5")
+        for _ in range(50):
+            t -= (t + expm1(-t) - z) / -expm1(-t)
+        assert relative_error(times[0], [t])[0] < 1e-15
+        assert relative_error(speeds[0], [-expm1(-t)])[0] < 1e-15
+        assert abs(log1p(-speeds[0, 0]) + t) < mpf(10) ** -20
+
+
+@pytest.mark.parametrize(
+    ("named", "status", "come"),
+    [
+        ({"R": 1.0}, Status.NEVER_STARTS, 0),
+        ({"R": 0.5, "R_s": 1.0}, Status.NEVER_STARTS, 0),
+        ({"R": 0.5, "R_s": 0.999}, Status.OK, 4),
+        ({"R": 0.5, "R_s": 1.45, "k": 0.2, "phi_start": -3.0}, Status.COMES_TO_REST, 3),  # held at the turning point
+        ({"R": 0.5, "R_s": 1.4, "k": 0.2, "phi_start": -1.9}, Status.NEVER_STARTS, 0),
+        ({"R": 0.5, "R_s": 1.4, "k": 0.2, "phi_start": -3.0, "e": -0.9}, Status.OK, 4),  # no turning point
+        ({"k": 2.5}, Status.STICKS, 0),
+        ({"k": 2.0, "a": 1.0, "phi_start": -4.0}, Status.COMES_TO_REST, 2),
+        ({"k": 2.0, "a": 5.0, "phi_start": -4.0}, Status.STICKS, 0),  # creeps to 1/2
+        ({"k": 2.0, "phi_start": 0.9}, Status.STICKS, 0),  # pulled back, and swings about 1/2
+        ({"R": 3.0, "k": 1.0, "phi_start": -9.0, "e": -0.5}, Status.COMES_TO_REST, 2),
+        ({"e": 0.0}, Status.OK, 4),
+        ({"e": 0.0, "k": 0.5, "R": 0.2, "R_s": 1.6, "phi_start": -2.0}, Status.COMES_TO_REST, 1),  # held at the switch
+    ],
+)  # fmt: skip
+def test_a_motion_that_ends_says_so(named, status, come):
+    times, speeds, verdict = start([1.0], [1.0], **{name: [v] for name, v in named.items()})
+    assert (verdict[0], np.isfinite(times[0]).sum()) == (status, come)
+    assert np.array_equal(np.isfinite(times), np.isfinite(speeds))
+
+
+def test_what_the_last_digits_decide_is_grazing():
+    """Without losses and about 1/2, a release at -y turns at 1 + y: y = 0 would just reach the switch at 1."""
+    _, _, status = start([1.0] * 4, [1.0] * 4, k=[2.0] * 4, phi_start=[0.0, -2e-15, -1e-4, 1e-4], flips=1)
+    assert status.tolist() == [Status.GRAZING, Status.GRAZING, Status.OK, Status.STICKS]
+
+
+def test_the_last_digits_may_decide_a_later_flip():
+    """With e = 0 the half swing starts from rest at the switch and works 2 (mu - R) phi0 whatever the spring."""
+    gap = np.array([0.0, 1e-16, -1e-15, 1e-6, -1e-6])
+    times, _, status = start(np.ones(5), np.ones(5), R=1 - gap, k=0.5, e=0.0, phi_start=-3.0, flips=2, rtol=1e-7)
+    assert status.tolist() == [Status.GRAZING] * 3 + [Status.OK, Status.COMES_TO_REST]
+    assert np.isfinite(times[:, 0]).all()
+
+
+@pytest.mark.parametrize(
+    ("flip", "named"),
+    [
+        (2, {"R": 1 - 1e-12, "k": 0.5, "e": 0.0, "phi_start": -3.0}),  # arrives with 1e-12 of its energy
+        (2, {"mu": 1.3, "phi0": 0.7, "k": 2.6 / 0.7, "phi_start": -1e-12}),  # comes after one that was late
+        (
+            1,
+            {"mu": 1.3, "phi0": 0.7, "R": 0.65, "k": 1.3 / 0.7 * (0.5 - 1e-9), "phi_start": 0.7 * (1 - 1e-9)},
+        ),  # is released where the forces cancel to 1e-9
+    ],
+)
+def test_digits_that_cancel_are_missed(flip, named):
+    cell = {"mu": 1.0, "phi0": 1.0, "a": 0.0, "R": 0.0, "e": 1.0} | named
+    columns = {name: np.array([v]) for name, v in cell.items()}
+    times, speeds, status = start(**columns, flips=[flip], rtol=1e-12)
+    true_times, true_speeds = truths(cell, flip)
+    error = max(relative_error(times[0], true_times[-1:])[0], relative_error(speeds[0], true_speeds[-1:])[0])
+    assert status[0] == Status.INACCURATE
+    assert 1e-12 < error < 1e-4
+    assert start(**columns, flips=[flip], rtol=1e-3)[2][0] == Status.OK
+    assert start(**columns, flips=[flip], rtol=0.5 * error)[2][0] == Status.INACCURATE
+
+
+def test_flips_may_be_asked_for_in_any_order():
+    columns = scenes(40 if COMPILED else 3, seed=3)
+    every = start(**columns, flips=9)
+    for asked in ([2, 5, 9], [9, 2, 5], [3, 3, 1, 9, 9]):
+        times, speeds, _ = start(**columns, flips=asked)
+        rows = np.array(asked) - 1
+        assert np.array_equal(times, every[0][:, rows], equal_nan=True)
+        assert np.array_equal(speeds, every[1][:, rows], equal_nan=True)
+
+
+@pytest.mark.parametrize("asked", [[0.0], [1.5], [1.0, NAN], [INF], [-1.0], [2 * FLIP_LIMIT]])
+def test_a_coordinate_that_does_not_count_is_refused(asked):
+    assert (start(np.ones(40), np.ones(40), flips=asked)[2] == Status.BAD_INPUT).all()
+
+
+def test_the_same_bits_alone_in_lanes_and_in_tails():
+    columns = scenes(75 if COMPILED else 3, seed=7)
+    together = start(**columns)
+    for i in range(len(together[2])):
+        alone = start(**{name: c[i : i + 1] for name, c in columns.items()})
+        for one, all_ in zip(alone, together, strict=True):
+            assert np.array_equal(one[0], all_[i], equal_nan=True), i
+
+
+@settings(max_examples=100 if COMPILED else 3)
+@given(st.floats(-3, 3), st.floats(-5, 5), st.integers(-40, 40), st.integers(-40, 40))
+def test_units_of_time_and_angle_scale_out_exactly(log_mu, release, time, angle):
+    t, x = np.array([1.0, 2.0**time]), np.array([1.0, 2.0**angle])
+    times, speeds, _ = start(
+        10.0**log_mu * x * t * t, 0.7 * x, a=0.4 * t, R=0.03 * 10.0**log_mu * x * t * t, k=0.05 * t * t,
+        phi_start=release * x, flips=3,
+    )  # fmt: skip
+    assert np.array_equal(times[1], times[0] / t[1], equal_nan=True)
+    assert np.array_equal(speeds[1], speeds[0] * x[1] * t[1], equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("named", "status"),
+    [
+        ({}, Status.OK), ({"mu": 0.0}, Status.NEVER_STARTS), ({"phi_start": -1e300}, Status.OK),
+        ({"R": 2.0}, Status.OK), ({"R": 2.0, "R_s": 1.0}, Status.BAD_INPUT),
+        ({"phi_start": NAN}, Status.BAD_INPUT), ({"phi_start": -INF}, Status.BAD_INPUT),
+        ({"a": NAN}, Status.BAD_INPUT), ({"mu": NAN}, Status.BAD_INPUT), ({"e": -1.0}, Status.BAD_INPUT),
+    ],
+)  # fmt: skip
+def test_what_cannot_run_is_refused_by_name(named, status):
+    cell = {"mu": 1.0, "phi0": 1.0} | named
+    assert (checked(FOLIOT_START, **{name: np.full(40, v) for name, v in cell.items()}) == status).all()
+
+
+def test_what_no_float_can_hold_is_out_of_range():
+    _, _, status = start([1.7e308, 1e-300], [1e-10, 1e300], a=[1e-3, 1.0], phi_start=[-1e308, 0.0])
+    assert (status == Status.OUT_OF_RANGE).all()

@@ -1,0 +1,269 @@
+"""Integrators at a fixed step: their order with each way to find a switch, closed forms, and what is refused."""
+
+import numpy as np
+import pytest
+import scene_oracles as oracles
+from columns import bounds, checked, solve
+from mpmath import mp, mpf
+
+from kernels.catalogue import get
+from kernels.integrate.events import LOCATIONS, METHODS, ORDER
+from kernels.interface import FIRST_REFUSAL, Status
+from kernels.lanes.jit import COMPILED
+
+KERNEL = get("foliot_steps")
+CELL = {"mu": 1.0, "phi0": 1.0, "a": 0.5, "c": 0.3}
+MILD = {"mu": 1.0, "phi0": 1.0, "a": 1.0, "c": 1e-9}
+"""Here order 8 shows before rounding does."""
+FLIPS = 3
+FIRST_STEP = {
+    "euler": 0.02,
+    "semi_implicit": 0.02,
+    "verlet": 0.02,
+    "rk4": 0.16,
+    "dopri5": 0.32,
+    "dop853": 0.9,
+    "moreau": 0.02,
+}
+SAMPLES = 24
+
+
+def errors(method, location, halvings):
+    """Mean relative error of the last switch's time, of steps about h, h/2 ..., with grids that lie differently."""
+    shift = np.linspace(0.8, 1.2, SAMPLES)
+    steps = (FIRST_STEP[method] * 0.5 ** np.arange(halvings)[:, None] * shift).ravel()
+    cell = MILD if method == "dop853" else CELL
+    cells = {**cell, "mu": np.full(len(steps), cell["mu"])}
+    outputs, status = solve(KERNEL, method, flips=FLIPS, step=steps, location=float(LOCATIONS[location]), **cells)
+    assert (status < FIRST_REFUSAL).all()
+    truth, _ = oracles.quadratic_foliot(*cell.values(), FLIPS)
+    error = abs(outputs["time"] / float(truth) - 1).reshape(halvings, SAMPLES)
+    return np.exp(np.log(error).mean(axis=1)), outputs, error
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("location", ["root", "henon"])
+def test_a_located_switch_keeps_the_order_of_each_method(method, location):
+    mean, *_ = errors(method, location, 3)
+    order = np.log2(mean[:-1] / mean[1:])
+    wanted = ORDER[METHODS.index(method)]
+    assert (order > wanted - 0.35).all()
+    assert order[-1] < wanted + 0.9
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+@pytest.mark.parametrize("method", METHODS)
+def test_a_switch_at_the_end_of_its_step_takes_every_method_to_the_first_order(method):
+    mean, *_ = errors(method, "none", 5)
+    order = np.log2(mean[0] / mean[-1]) / 4
+    assert 0.6 < order < 1.5
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+@pytest.mark.parametrize(("location", "order"), [("linear", 2), ("hermite", 4)])
+@pytest.mark.parametrize("method", ["rk4", "dop853"])
+def test_a_switch_found_by_a_polynomial_has_the_polynomials_order(method, location, order):
+    mean, *_ = errors(method, location, 4)
+    measured = np.log2(mean[0] / mean[-1]) / 3
+    assert order - 0.5 < measured < order + 0.8
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+@pytest.mark.parametrize("location", LOCATIONS)
+@pytest.mark.parametrize("method", METHODS)
+def test_the_estimated_error_is_no_smaller_than_the_true_one(method, location):
+    _, outputs, error = errors(method, location, 3)
+    assert (error.ravel() <= 1.3 * outputs["error"] + 1e-15).all()
+
+
+def test_the_stated_bound_is_the_estimated_error():
+    outputs, _ = solve(KERNEL, "rk4", [1.0], flips=1.0, step=0.1, phi0=1.0, a=0.5)
+    assert bounds(KERNEL, "rk4", [1.0], flips=1.0, step=0.1, phi0=1.0, a=0.5)[0] == outputs["error"][0] > 0
+
+
+def test_a_grid_that_meets_the_same_points_again_does_not_make_two_runs_believed():
+    cell = {"phi0": 0.09737491865214114, "k": 640.955635182617, "flips": 1.0}  # grazes; halves of the step agree
+    how = {"step": 0.012529584097168095, "location": float(LOCATIONS["linear"])}
+    mu = 31.253343950955195
+    outputs, status = solve(KERNEL, "dopri5", [mu], **cell, **how)
+    k = mpf(cell["k"])
+    off = abs(outputs["time"][0] / float(mp.acos(1 - k * mpf(cell["phi0"]) / mpf(mu)) / mp.sqrt(k)) - 1)
+    assert off > 0.01
+    assert off < outputs["error"][0]
+    assert status[0] == Status.GRAZING
+
+
+def test_a_switch_that_goes_as_the_step_shrinks_is_no_switch():
+    mu, phi0, a, k = 0.001266349113732273, 1.402429638167423, 0.000266272676099387, 0.0017970706542706216
+    cell = {"phi0": phi0, "a": a, "k": k, "flips": 1.0}
+    how = {"step": 53.94530913252986, "location": float(LOCATIONS["hermite"])}  # more energy than there is
+    _, status = solve(KERNEL, "semi_implicit", [mu], **cell, **how)
+    drag, stiffness = mpf(a) / 2, mpf(k)
+    turn = mpf(mu) / stiffness * (1 + mp.exp(-mp.pi * drag / mp.sqrt(stiffness - drag**2)))
+    assert turn < phi0
+    assert status[0] == Status.GRAZING
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+def test_steps_of_a_half_and_a_quarter_that_are_as_wrong_are_not_believed():
+    mu, R, phi0 = 0.3728952659438824, 0.36853454347820896, 167.44256859441495
+    outputs, status = solve(
+        KERNEL, "semi_implicit", [mu], R=R, phi0=phi0, flips=8.0, step=3.238507460064415, location=0.0
+    )
+    off = abs(outputs["period"][0] / float(2 * parabolas(mu, R, phi0, 8)[0][-1]) - 1)
+    assert off > 0.2
+    assert status[0] != Status.OK or off < outputs["error"][0]
+
+
+def test_where_differences_grow_as_the_step_shrinks_nothing_is_promised():
+    mu, phi0, a = cell = 55.9382192261618, 0.16322424255323054, 59.090741848524814  # each step takes 0.95 of the way
+    how = {"phi0": phi0, "a": a, "flips": 1.0, "location": float(LOCATIONS["henon"])}
+    outputs, status = solve(KERNEL, "euler", [mu, mu], **how, step=np.array([0.016034811141985534, 0.001]))
+    drive, way, drag = map(mpf, cell)
+    time = mp.findroot(lambda t: drive / drag * (t + mp.expm1(-drag * t) / drag) - way, way * drag / drive)
+    true = float(-drive / drag * mp.expm1(-drag * time))
+    off = abs(outputs["crossing_speed"] / true - 1)
+    assert status.tolist() == [Status.INACCURATE, Status.OK]
+    assert off[0] > outputs["error"][0]
+    assert off[1] < outputs["error"][1]
+    assert bounds(KERNEL, "euler", [mu], **how, step=0.016034811141985534)[0] == np.inf
+
+
+def parabolas(mu, R, phi0, flips):
+    """Times between switches under dry friction alone, the speed at the last, the largest angle before it."""
+    mu, R, phi0 = mpf(mu), mpf(R), mpf(phi0)
+    v, top = mp.sqrt(2 * (mu - R) * phi0), None
+    times = [v / (mu - R)]
+    for _ in range(flips - 1):
+        top = v * v / (2 * (mu + R))
+        down = mp.sqrt(2 * (top + 2 * phi0) / (mu - R))
+        times.append(v / (mu + R) + down)
+        v = down * (mu - R)
+    return times, v, top
+
+
+@pytest.mark.parametrize("method", ["verlet", "rk4"])
+def test_free_flight_with_dry_friction_is_exact_for_methods_of_order_two(method):
+    mu, R, phi0 = 3.0, 1.0, 2.0
+    outputs, status = solve(KERNEL, method, [mu], phi0=phi0, R=R, flips=3.0, step=0.7)
+    times, v, top = parabolas(mu, R, phi0, 3)
+    assert status[0] == Status.OK
+    assert outputs["time"][0] == pytest.approx(float(sum(times)), rel=1e-13)
+    assert outputs["period"][0] == pytest.approx(float(2 * times[-1]), rel=1e-13)
+    assert outputs["crossing_speed"][0] == pytest.approx(float(v), rel=1e-13)
+    assert outputs["amplitude"][0] == pytest.approx(float(phi0 + top), rel=1e-13)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_work_is_counted(method):
+    outputs, status = solve(KERNEL, method, [1.0], phi0=1.0, flips=1.0, step=0.1, location=0.0)
+    calls = {"euler": 1, "semi_implicit": 1, "verlet": 2, "rk4": 4, "dopri5": 6, "dop853": 12, "moreau": 2}
+    assert status[0] == Status.OK
+    assert outputs["time"][0] == pytest.approx(0.1 * outputs["steps"][0], rel=1e-12)
+    assert outputs["rate_calls"][0] == calls[method] * outputs["steps"][0]
+
+
+@pytest.mark.parametrize(
+    ("cell", "method", "location", "statuses"),
+    [
+        ({"k": 4.0}, "rk4", "root", {Status.STEP_LIMIT, Status.STICKS}),  # swings below the switch for good
+        ({"R": 0.999}, "rk4", "root", {Status.OK}),
+        ({"a": 1.0, "step": 1e3}, "euler", "none", {Status.GRAZING, Status.STEP_LIMIT, Status.OUT_OF_RANGE}),
+        ({"mu": 1e300, "phi0": 1e300, "step": 1e-3}, "rk4", "root", {Status.OUT_OF_RANGE}),
+        ({"mu": 1e-300, "phi0": 1e-300, "a": 0.5}, "rk4", "root", {Status.OUT_OF_RANGE}),
+        ({"step": 1e-7}, "rk4", "root", {Status.STEP_LIMIT}),
+    ],
+)
+def test_what_a_cell_comes_to_is_named(cell, method, location, statuses):
+    if not COMPILED and (Status.STEP_LIMIT in statuses or "R" in cell):
+        pytest.skip("thousands of steps")
+    values = {"mu": 1.0, "phi0": 1.0, "step": 0.1, "flips": 4.0, **cell, "location": float(LOCATIONS[location])}
+    outputs, status = solve(KERNEL, method, **{k: [v] for k, v in values.items()})
+    assert status[0] in statuses, Status(status[0])
+    if status[0] < FIRST_REFUSAL:
+        assert np.isfinite([outputs[name][0] for name in ("time", "period", "amplitude")]).all()
+
+
+@pytest.mark.skipif(not COMPILED, reason="lanes")
+def test_the_bits_hang_neither_on_neighbours_nor_on_how_many_there_are():
+    random = np.random.default_rng(5)
+    n = 75
+    cells = {name: 10.0 ** random.uniform(-1, 1, n) for name in ("mu", "phi0", "a", "c")}
+    cells |= {
+        "R": random.choice([0.0, 0.05], n),
+        "step": random.choice([0.3, 0.01], n),
+        "flips": random.choice([1.0, 9.0], n),
+    }
+    cells["location"] = random.choice([0.0, 1.0, 2.0, 3.0, 4.0], n)
+    for method in ("verlet", "dop853"):
+        outputs, status = solve(KERNEL, method, **cells)
+        for some in (slice(0, 1), slice(30, 34), slice(None, None, -1)):
+            again, state = solve(KERNEL, method, **{k: np.ascontiguousarray(v[some]) for k, v in cells.items()})
+            np.testing.assert_array_equal(state, status[some])
+            for name in outputs:
+                np.testing.assert_array_equal(again[name], outputs[name][some])
+
+
+def test_a_drive_below_the_friction_never_starts():
+    assert checked(KERNEL, [1.0], phi0=1.0, R=1.0, step=0.1)[0] == Status.NEVER_STARTS
+    assert checked(KERNEL, [1.0], phi0=1.0, step=0.1, flips=1.5)[0] == Status.BAD_INPUT
+
+
+@pytest.mark.parametrize("method", ["rk4", "dop853"])
+@pytest.mark.parametrize("excess", [1e-2, 1e-3])
+def test_two_roots_within_a_step_are_both_seen(method, excess):
+    k = 2.0 / (1.0 + excess)  # passes the switch by so little that it is back within the step
+    cell = {"phi0": 1.0, "k": k, "flips": 1.0, "step": 0.21, "location": float(LOCATIONS["root"])}
+    outputs, status = solve(KERNEL, method, [1.0], **cell)
+    true = mp.acos(1 - mpf(k)) / mp.sqrt(mpf(k))
+    assert status[0] == Status.OK
+    assert abs(outputs["time"][0] / float(true) - 1) < 2 * outputs["error"][0] + 1e-14
+    assert outputs["error"][0] < 0.01
+
+
+@pytest.mark.skipif(not COMPILED, reason="many steps")
+def test_without_location_a_switch_is_passed_over_and_the_error_tells():
+    k = 2.0 / 1.001
+    outputs, status = solve(KERNEL, "rk4", [1.0], phi0=1.0, k=k, flips=1.0, step=0.21, location=0.0)
+    true = mp.acos(1 - mpf(k)) / mp.sqrt(mpf(k))
+    assert status[0] >= FIRST_REFUSAL or abs(outputs["time"][0] / float(true) - 1) < 2 * outputs["error"][0]
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+def test_moreau_and_a_located_method_agree_under_dry_friction():
+    cell = {"phi0": 1.0, "R": np.array([0.3, 0.9]), "a": 0.2, "flips": 2.0}
+    moreau, rough = solve(KERNEL, "moreau", [1.0, 1.0], **cell, step=2e-3, location=0.0)
+    located, status = solve(KERNEL, "dop853", [1.0, 1.0], **cell, step=0.05)
+    assert not rough.any()
+    assert not status.any()
+    assert (moreau["error"] < 0.01).all()
+    for name in ("time", "period", "amplitude", "crossing_speed"):
+        np.testing.assert_allclose(moreau[name], located[name], rtol=3e-3)
+        assert (abs(moreau[name] / located[name] - 1) < 2 * moreau["error"]).all()
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+def test_where_the_run_at_a_finer_step_does_not_end_the_error_is_unknown():
+    outputs, status = solve(KERNEL, "moreau", [1.0], phi0=1.0, R=0.9, a=0.2, flips=2.0, step=6e-4)
+    assert status[0] == Status.OK
+    assert outputs["error"][0] == np.inf
+
+
+def test_a_motion_that_comes_to_rest_in_the_switch_sticks_for_every_method_that_can_tell():
+    cell = {"phi0": 1.0, "R": 0.9, "k": 0.5, "flips": 1.0, "step": 0.02}  # the spring stops it before the switch
+    for method, location in (("moreau", "none"), ("rk4", "root"), ("dop853", "henon")):
+        _, status = solve(KERNEL, method, [1.0], **cell, location=float(LOCATIONS[location]))
+        assert status[0] == Status.STICKS
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+@pytest.mark.parametrize("location", LOCATIONS)
+@pytest.mark.parametrize("method", ["euler", "verlet", "rk4", "moreau"])
+def test_a_switch_that_only_the_steps_error_reaches_is_no_quiet_number(method, location):
+    missed = 10.0 ** -np.arange(1.0, 8.0)[:, None]
+    step = np.array([0.003, 0.03, 0.3])
+    k, step = (np.broadcast_to(v, (7, 3)).ravel() for v in (2.0 * (1.0 + missed), step))  # turns at 1 - missed
+    cells = {"mu": [1.0] * 21, "k": k, "step": step, "location": float(LOCATIONS[location])}
+    outputs, status = solve(KERNEL, method, phi0=1.0, flips=1.0, **cells)
+    assert ((status != Status.OK) | np.isinf(outputs["error"])).all()

@@ -1,0 +1,285 @@
+"""The foliot with Coulomb friction, hairspring and restitution against 50 digits, and what cannot run."""
+
+import foliot_oracles
+import numpy as np
+import pytest
+from columns import bounds, checked, relative_error, solve
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpmath import mp, mpf, sqrt
+
+from kernels.foliot.cycle import FOLIOT
+from kernels.interface import FIRST_REFUSAL, Status
+from kernels.lanes.jit import COMPILED
+
+NAMES = ("period", "amplitude", "crossing_speed", "sensitivity", "multiplier")
+SOME = 16 if COMPILED else 4
+
+
+def random_cells(terms, seed, n=SOME):
+    """Foliots with alpha over 24 decades (a = 1 or 0), R/mu to 1 - 1e-9 or down to 1e-12, zeta from 1e-4 to 10."""
+    random = np.random.default_rng(seed)
+    reach = 12 if terms in ("a", "aR") else 5
+    mu, one = 10.0 ** random.uniform(-reach, reach, n), np.ones(n)
+    cells = {"mu": mu, "phi0": one, "a": one if "a" in terms else 0.0 * one}
+    if "R" in terms:
+        close, small = 1.0 - 10.0 ** random.uniform(-9, -0.1, n), 10.0 ** random.uniform(-12, -0.1, n)
+        cells["R"] = mu * np.where(random.random(n) < 0.5, close, small)
+    if "k" in terms:
+        zeta = np.where(random.random(n) < 0.15, 1.0, 10.0 ** random.uniform(-4, 1, n))
+        cells["k"] = 0.25 / zeta**2
+        cells["mu"] = np.maximum(mu, 2.0 * cells["k"])  # few that come to rest
+    if "e" in terms:
+        near = 1.0 - 10.0 ** random.uniform(-6, 0, n)
+        cells["e"] = np.where(random.random(n) < 0.3, near, random.uniform(-0.95, 1, n))
+    return cells
+
+
+def truths(cells):
+    rows = zip(*cells.values(), strict=True)
+    return [foliot_oracles.cycle(**dict(zip(cells, map(float, row), strict=True))) for row in rows]
+
+
+def worst_cell(error, cells):
+    return {name: float(column[error.argmax()]) for name, column in cells.items()}
+
+
+def assert_right(outputs, status, cells, allowed):
+    good = np.isin(status, (Status.OK, Status.NOT_SELF_STARTING))
+    kept = {name: column[good] for name, column in cells.items()}
+    exact = truths(kept)
+    for position, name in enumerate(NAMES):
+        exact_or_one = [t[position] if t[position] > 1e-300 else 1 for t in exact]  # a multiplier may be 0 for good
+        error = relative_error(np.where(outputs[name][good] > 1e-300, outputs[name][good], 1.0), exact_or_one)
+        limit = 3e-13 if name == "multiplier" else allowed
+        assert error.max() < limit, (name, error.max(), worst_cell(error, kept))
+    return good.mean()
+
+
+@pytest.mark.parametrize(("terms", "seed"), [("a", 1), ("aR", 2), ("aR", 3), ("R", 4)])
+def test_viscous_and_coulomb_friction_are_right_to_4e_15(terms, seed):
+    cells = random_cells(terms, seed)
+    outputs, status = solve(FOLIOT, "coulomb", **cells)
+    assert (status == Status.OK).all()
+    assert assert_right(outputs, status, cells, 4e-15) == 1.0
+    assert (bounds(FOLIOT, "coulomb", **cells, asked=NAMES[:4]) <= 4e-15).all()
+
+
+@pytest.mark.parametrize("terms", ["a", "aR", "R", "ak", "aRk", "ae", "aRe", "Re", "e", "aRke"])
+def test_every_linear_term_in_every_combination_is_right_to_1e_13(terms):
+    cells = random_cells(terms, seed=len(terms))
+    outputs, status = solve(FOLIOT, "segments", **cells, rtol=1e-13)
+    assert (status != Status.NOT_CONVERGED).all()
+    share = assert_right(outputs, status, cells, 1e-13)
+    assert share > (0.2 if terms in ("R", "aRk") else 0.5) or not COMPILED  # small s are remarked
+
+
+WIDE_SWINGS = (
+    {"mu": 0.8325162231299857, "phi0": 3.4541739652892662, "R": 1.9419516558116308e-09, "k": 0.24326608631850752},
+    {"mu": 23.45755854915434, "phi0": 39.6822014183762, "R": 1.4281577786622918e-06, "k": 3.5446926172047624},
+    {"mu": 0.5509590625740179, "phi0": 3.82539277366175, "R": 6.98390917575075e-05, "k": 1.3309086167759927},
+    {"mu": 31.030687325891886, "phi0": 1.1298248019711736, "R": 0.0012675897912571012, "k": 0.0},
+    {"mu": 0.17484109976698284, "phi0": 0.0010605806583133613, "R": 4.989492920121259e-05, "k": 0.0},
+)
+"""With next to no loss: the sensitivity, down to 8e-27, is a difference of terms near 1."""
+
+
+@pytest.mark.parametrize("method", ["segments", "dopri5"] if COMPILED else ["segments"])
+@pytest.mark.parametrize("rtol", [5e-5, 1e-6, 1e-9] if COMPILED else [5e-5])
+def test_a_sensitivity_that_all_but_cancels_is_right_or_said_not_to_be(method, rtol):
+    cells = {name: np.array([cell[name] for cell in WIDE_SWINGS]) for name in WIDE_SWINGS[0]}
+    outputs, status = solve(FOLIOT, method, **cells, rtol=rtol)
+    assert (status < FIRST_REFUSAL).any()
+    for i, truth in enumerate(truths(cells)):
+        if status[i] in (Status.OK, Status.NOT_SELF_STARTING):
+            assert abs(outputs["sensitivity"][i] / float(truth[3]) - 1) <= rtol, (i, status[i])
+
+
+def test_both_exact_methods_agree_with_the_fitted_closed_form():
+    mu = np.geomspace(1e-12, 1e12, 97)
+    closed = solve(FOLIOT, "closed", mu, 1.0, 1.0)[0]
+    for method in ("coulomb", "segments"):
+        other, status = solve(FOLIOT, method, mu, 1.0, 1.0, rtol=1e-12)
+        assert (status == Status.OK).all()
+        for name in NAMES[:4]:
+            np.testing.assert_allclose(other[name], closed[name], rtol=5e-15, err_msg=method)
+
+
+@pytest.mark.parametrize("method", ["coulomb", "segments"])
+def test_coulomb_friction_alone_follows_its_closed_law(method):
+    rho = np.array([0.01, 0.3, 1 / np.sqrt(3), 0.9, 1 - 1e-6])
+    outputs, status = solve(FOLIOT, method, 2.0, 0.5, R=2.0 * rho)
+    rest = (1 - rho) * (1 + rho)
+    assert (status == Status.OK).all()
+    np.testing.assert_allclose(outputs["period"], 4 * np.sqrt(2 * 0.5 / (2 * rho)) / np.sqrt(rest), rtol=1e-14)
+    np.testing.assert_allclose(outputs["amplitude"], 0.5 / rho, rtol=1e-14)
+    np.testing.assert_allclose(outputs["sensitivity"], rho**2 / rest, rtol=1e-13, atol=1e-15)
+    np.testing.assert_allclose(outputs["multiplier"], (1 - rho) / (1 + rho), rtol=1e-13)
+
+
+def test_restitution_alone_follows_its_closed_law():
+    e = np.array([-0.99, -0.5, 0.0, 0.5, 0.9, 1 - 1e-7])
+    outputs, status = solve(FOLIOT, "segments", 2.0, 0.5, e=e, rtol=1e-12)
+    assert (status == Status.OK).all()
+    np.testing.assert_allclose(outputs["period"], 4 * np.sqrt(0.25 * (1 + e) / (1 - e)), rtol=1e-14)
+    swing = np.where(e > 0, (1 + e * e) / ((1 - e) * (1 + e)), 1.0)
+    np.testing.assert_allclose(outputs["amplitude"], 0.5 * swing, rtol=1e-14)
+    np.testing.assert_allclose(outputs["sensitivity"], 0.5, rtol=1e-14)
+    np.testing.assert_allclose(outputs["multiplier"], e * e, rtol=1e-14, atol=1e-300)
+
+
+def test_an_interior_best_torque_exists_beyond_r_of_0_8():
+    """Values of the drive with the smallest sensitivity, from 50 digits: 8.719 R at R = 10, 6.098 R at R = 100."""
+    span, n = (0.1, 2001) if COMPILED else (0.01, 201)
+    for R, where, least in ((10.0, 8.719, 0.27318), (100.0, 6.098, 0.17768)):
+        ratio = np.linspace((1 - span) * where, (1 + span) * where, n)
+        s = solve(FOLIOT, "coulomb", ratio * R, 1.0, 1.0, R=R)[0]["sensitivity"]
+        assert ratio[s.argmin()] == pytest.approx(where, abs=2e-3)
+        assert s.min() == pytest.approx(least, abs=5e-6)
+    assert solve(FOLIOT, "coulomb", np.geomspace(1, 1e9, n), 1.0, 1.0, R=0.79)[0]["sensitivity"].min() > 1 / 3
+
+
+def test_sensitivity_and_multiplier_are_slopes_of_the_cycle_and_of_its_map():
+    cells = {"phi0": 0.8, "a": 0.5, "R": 0.2, "k": 0.7, "e": 0.9}
+    step = 1e-5
+    low, mid, high = (solve(FOLIOT, "segments", [3.0 * np.exp(x)], **cells)[0] for x in (-step, 0.0, step))
+    slope = -np.log(high["period"] / low["period"]) / (2 * step)
+    np.testing.assert_allclose(mid["sensitivity"], slope, rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("cell", "status"),
+    [
+        ({"a": 1.0, "R": 1.0}, Status.NEVER_STARTS),
+        ({"a": 1.0, "R": 1.1}, Status.NEVER_STARTS),
+        ({"a": 1.0, "R": 0.5, "R_s": 1.0}, Status.NEVER_STARTS),
+        ({"c": 1.0, "n": 0.0}, Status.NEVER_STARTS),
+        ({"R": 0.5, "R_s": 0.9}, Status.OK),
+        ({"R": 0.5, "R_s": 0.4}, Status.BAD_INPUT),
+        ({"a": 1.0, "k": 1.0, "R": 0.5, "R_s": 1.2}, Status.OK),  # the spring may help
+        ({}, Status.NO_LIMIT_CYCLE),
+        ({"k": 2.0}, Status.NO_LIMIT_CYCLE),
+        ({"e": 0.5}, Status.OK),
+        ({"e": -1.0}, Status.BAD_INPUT),
+        ({"e": 1.0001}, Status.BAD_INPUT),
+        ({"c": 1.0, "n": -1.0}, Status.BAD_INPUT),
+        ({"c": -1.0}, Status.BAD_INPUT),
+        ({"k": -1.0}, Status.BAD_INPUT),
+        ({"a": 1.0, "R": np.nan}, Status.BAD_INPUT),
+        ({"a": 1.0, "n": np.nan}, Status.BAD_INPUT),
+        ({"a": 1.0, "R_s": np.inf}, Status.BAD_INPUT),
+    ],
+)
+def test_what_no_method_can_run_is_refused_by_name(cell, status):
+    for n in (1, 40):
+        assert (checked(FOLIOT, np.ones(n), 1.0, **cell) == status).all()
+
+
+def test_a_spring_that_the_drive_cannot_throw_over_makes_the_foliot_stick():
+    """(mu - R)/k against phi0 tanh(delta/2), delta = pi zeta/sqrt(1 - zeta^2); against phi0 from zeta = 1 on."""
+    zeta = np.array([0.01, 0.1, 0.5, 0.9, 1.0, 3.0])
+    root = np.sqrt(np.maximum(1 - zeta**2, 1e-30))
+    least = np.tanh(0.5 * np.pi * zeta / root)
+    for factor, found in ((1 - 1e-6, Status.STICKS), (1 + 1e-6, Status.OK)):
+        _, status = solve(FOLIOT, "segments", 0.3 + least * factor, 1.0, 2 * zeta, R=0.3, k=1.0, rtol=1e-3)
+        assert ((status == found) | (status == Status.NOT_SELF_STARTING) & (found == Status.OK)).all()
+
+
+def test_from_rest_at_the_centre_a_weak_drive_does_not_throw_a_spring_over():
+    """It reaches (mu/k)(1 + exp(-delta)) at first, and less ever after."""
+    zeta = np.array([0.01, 0.1, 0.5, 0.9])
+    reach = 1 / (1 + np.exp(-np.pi * zeta / np.sqrt(1 - zeta**2)))
+    weak = solve(FOLIOT, "segments", reach * (1 - 1e-9), 1.0, 2 * zeta, k=1.0)[1]
+    assert (weak == Status.NOT_SELF_STARTING).all()
+    assert (solve(FOLIOT, "segments", reach * (1 + 1e-9), 1.0, 2 * zeta, k=1.0)[1] == Status.OK).all()
+
+
+def test_stiction_holds_a_foliot_at_its_turning_point():
+    stuck = solve(FOLIOT, "segments", [1.0, 1.0], 1.0, 0.5, R=0.1, R_s=[1.5, 1.05], k=0.1)[1]
+    assert stuck.tolist() == [Status.STICKS, Status.NOT_SELF_STARTING]
+
+
+def test_near_a_threshold_lost_digits_are_remarked():
+    k = 2.0
+    mu = k * (1.0 + np.array([1e-13, 1e-10, 1e-6, 1e-2]))  # overdamped: the drive just throws the spring over
+    cells = {"mu": mu, "phi0": np.ones(4), "a": np.full(4, 4.0), "k": np.full(4, k)}
+    outputs, status = solve(FOLIOT, "segments", **cells, rtol=1e-9)
+    for i, truth in enumerate(truths(cells)):
+        error = max(relative_error(outputs[name][i : i + 1], truth[j : j + 1])[0] for j, name in enumerate(NAMES[:4]))
+        assert error < 1e-9 or status[i] in (Status.INACCURATE, Status.STICKS), (mu[i], error)
+    assert status[-1] == Status.OK
+
+
+@pytest.mark.parametrize("method", ["coulomb", "segments"])
+def test_the_same_bits_alone_and_in_lanes(method):
+    n = 70 if COMPILED else 3
+    cells = random_cells("aR" if method == "coulomb" else "aRke", seed=9, n=n)
+    together, status = solve(FOLIOT, method, **cells)
+    for i in range(n):
+        alone, verdict = solve(FOLIOT, method, **{name: column[i : i + 1] for name, column in cells.items()})
+        assert verdict[0] == status[i]
+        if verdict[0] < FIRST_REFUSAL:
+            assert [alone[name][0] for name in NAMES] == [together[name][i] for name in NAMES], i
+
+
+@settings(max_examples=100 if COMPILED else 15)
+@given(st.integers(-40, 40), st.integers(-40, 40), st.floats(0.01, 0.99), st.floats(1e-3, 3.0), st.floats(0.1, 1.0))
+def test_units_of_time_and_angle_scale_out(time, angle, rho, k, e):
+    t, x = 4.0**time, 2.0**angle
+    cells = {"mu": [1.7, 1.7 * x * t * t], "phi0": [0.9, 0.9 * x], "a": [0.4, 0.4 * t]}
+    cells |= {"R": [1.7 * rho, 1.7 * rho * x * t * t], "k": [k, k * t * t], "e": [e, e]}
+    outputs, status = solve(FOLIOT, "segments", **{name: np.array(c) for name, c in cells.items()})
+    assert status[0] == status[1]
+    if status[0] < FIRST_REFUSAL:
+        for name, factor in zip(NAMES, (1 / t, x, x * t, 1.0, 1.0), strict=True):
+            assert outputs[name][1] == pytest.approx(outputs[name][0] * factor, rel=1e-12), name
+
+
+def test_nothing_is_wrong_in_silence_in_the_wildest_units():
+    random = np.random.default_rng(12)
+    n = SOME
+    phi0, a = 10.0 ** random.uniform(-100, 100, n), 10.0 ** random.uniform(-90, 90, n)
+    mu = 10.0 ** random.uniform(-12, 12, n) * a * a * phi0
+    cells = {"mu": mu, "phi0": phi0, "a": a, "R": mu * random.random(n)}
+    for method in ("coulomb", "segments"):
+        outputs, status = solve(FOLIOT, method, **cells, rtol=1e-9)
+        good = status == Status.OK
+        assert set(status) <= {Status.OK, Status.OUT_OF_RANGE, Status.INACCURATE, Status.NOT_CONVERGED}
+        kept = {name: column[good] for name, column in cells.items()}
+        exact = truths(kept)
+        for position, name in enumerate(NAMES[:4]):
+            error = relative_error(outputs[name][good], [t[position] for t in exact])
+            assert error.max(initial=0.0) < 1e-9, (method, name, worst_cell(error, kept))
+
+
+@pytest.mark.parametrize("method", ["pure", "quadrature", "dopri5"])
+@pytest.mark.parametrize(("mu", "R", "c"), [(3.0, 1.1, 1.9 - 1e-12), (0.8, 0.1, 0.7 - 1e-9), (2.0, 0.5, 0.25)])
+def test_drag_of_degree_0_is_coulomb_friction_to_the_last_digit_of_what_is_left(method, mu, R, c):
+    """P = 4 sqrt(2 phi0/F)/sqrt(1 - (F/mu)^2), F = R + c, in exact arithmetic on the floats."""
+    with mp.workdps(50):
+        friction = mpf(R) + mpf(c)
+        rho = friction / mpf(mu)
+        period, s = 4 * sqrt(2 / friction) / sqrt(1 - rho**2), rho**2 / (1 - rho**2)
+    rtol = 1e-6 if method == "dopri5" else 1e-12
+    outputs, status = solve(FOLIOT, method, [mu], 1.0, R=R, c=c, n=0.0, rtol=rtol)
+    assert relative_error(outputs["period"], [period])[0] < rtol or status[0] != Status.OK
+    assert relative_error(outputs["sensitivity"], [s])[0] < rtol or status[0] != Status.OK
+    assert status[0] == Status.OK or method == "dopri5"
+
+
+def test_nothing_rests_at_a_switch_that_throws_back():
+    cell = {"a": 0.1, "R": 0.1, "R_s": 3.0, "k": 1.0}
+    outputs, status = solve(FOLIOT, "segments", [1.0, 1.0], 1.0, **cell, e=[-0.5, 0.5])
+    assert status.tolist() == [Status.NOT_SELF_STARTING, Status.STICKS]
+    assert outputs["crossing_speed"][0] == pytest.approx(1.96733823, rel=1e-8)
+
+
+def test_beyond_their_range_segments_leave_the_cell_to_others():
+    assert solve(FOLIOT, "segments", [1.0, 1.0], 1.0, [1e80, 1e50], e=0.5)[1].tolist() == [Status.NO_METHOD, Status.OK]
+
+
+def test_integration_arrives_at_the_switch_from_a_wide_swing():
+    e = np.array([0.999, 0.9999])
+    outputs, status = solve(FOLIOT, "dopri5", np.ones(2), 1.0, e=e, rtol=1e-6)
+    assert (status == Status.OK).all()
+    np.testing.assert_allclose(outputs["period"], 4 * np.sqrt((1 + e) / (1 - e)), rtol=1e-6)

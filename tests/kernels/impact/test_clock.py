@@ -1,0 +1,412 @@
+"""The impact clock's own cycle against 50 digits, its borders, and its laws."""
+
+import functools
+import itertools
+
+import impact_oracles as oracles
+import numpy as np
+import pytest
+from columns import bounds, checked, printed_both_ways, solve
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpmath import mp, mpf
+
+from kernels.impact.clock import IMPACT
+from kernels.interface import FIRST_REFUSAL, Status
+from kernels.lanes.jit import COMPILED
+from kernels.maths.cubic import largest_modulus
+
+NAMES = tuple(f.name for f in IMPACT.outputs)
+METHODS = ("closed", "map")
+WORST = 1.2e-15
+"""Of any output; the recoil and the plastic swing come to 1.1e-15."""
+SOME = 60 if COMPILED else 8
+INF, NAN = np.inf, np.nan
+
+
+def pitch(r_c, teeth):
+    return 2 * np.pi * r_c / teeth
+
+
+def clocks(n=SOME, seed=1, kappa=(-6, 6), e=None, nu=0.0, units=10.0):
+    """Columns of random clocks: kappa log-uniform, h up to p/4, SI units over `units` decades up and down."""
+    random = np.random.default_rng(seed)
+    kappa = 10 ** random.uniform(*kappa, n)
+    if e is None:
+        e = np.where(random.random(n) < 0.5, random.uniform(0, 0.9, n), 10 ** random.uniform(-6, 0, n))
+    r_c, r_v, I_c = (10 ** random.uniform(-units, units, n) for _ in range(3))
+    teeth = random.choice([3.0, 15.0, 31.0, 101.0], n)
+    h = 0.25 * pitch(r_c, teeth) * random.choice([0, 1], n) * random.random(n)
+    nu = nu * random.normal(size=n) * 10 ** random.uniform(-2, 1, n) * (1 + kappa) / kappa**2
+    torque = 10 ** random.uniform(-units, units, n)
+    return [torque, I_c, I_c * (r_v / r_c) ** 2 / kappa, r_c, r_v, teeth, h, np.broadcast_to(e, n) + 0.0, nu]
+
+
+def cell_of(kappa, e, h=0.0, nu=0.0):
+    """One clock with the pitch 1 m and T0 = 1 s, but for rounding; h in pitches."""
+    teeth = 3.0
+    r_c = teeth / (2 * np.pi)
+    return [np.array([v], float) for v in (r_c * r_c * r_c, r_c**4, r_c**4 / kappa, r_c, r_c, teeth, h, e, nu)]
+
+
+def joined(*cells):
+    """Columns of several clocks."""
+    return [np.concatenate(c) for c in zip(*cells, strict=True)]
+
+
+def errors(outputs, truths):
+    """Largest relative errors by name; 0 for an exact 0."""
+    found = {}
+    for name, true in zip(NAMES, zip(*truths, strict=True), strict=True):
+        with mp.workdps(60):
+            found[name] = max(
+                float(abs(mpf(float(v)) - t) / (abs(t) or 1)) for v, t in zip(outputs[name], true, strict=True)
+            )
+    return found
+
+
+@functools.cache
+def truth(*cell, digits=oracles.DIGITS):
+    """Values and existence of the impact cycle, or of the plastic one for e = 0."""
+    if cell[7] > 0:
+        return oracles.impact_cycle(*cell, digits=digits)
+    return oracles.plastic_cycle(*cell, digits=digits), True
+
+
+def assert_cycle(method, columns, rtol=1e-13):
+    """The verdicts and values of a method against the oracle; returns the statuses."""
+    outputs, status = solve(IMPACT, method, *columns, rtol=rtol)
+    truths = [truth(*cell) for cell in zip(*columns, strict=True)]
+    exist = np.array([t[1] for t in truths])
+    grows = np.array([t[0][4] > 1 for t in truths])
+    expected = np.where(exist, np.where(grows, Status.UNSTABLE, Status.OK), Status.NO_CYCLE)
+    assert status.tolist() == expected.tolist()
+    kept = {name: column[exist] for name, column in outputs.items()}
+    worst = errors(kept, [t[0] for t in truths if t[1]])
+    assert max(worst.values()) < WORST, worst
+    return status
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("nu", "seed"), [(0.0, 1), (1.0, 2)])
+def test_the_impact_cycle_its_existence_and_its_multiplier_are_those_of_50_digits(method, nu, seed):
+    status = assert_cycle(method, clocks(seed=seed, nu=nu))
+    assert not COMPILED or set(status) == {Status.OK, Status.UNSTABLE, Status.NO_CYCLE}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_plastic_cycle_is_that_of_50_digits_for_every_escape_height(method):
+    assert (assert_cycle(method, clocks(seed=3, e=0.0)) == Status.OK).all()
+
+
+def meeting(kappa):
+    """The restitution at which two multipliers of the flat lever's cycle are the same, in 60 digits; and its cubic."""
+    with mp.workdps(60):
+        k = mpf(kappa)
+
+        def cubic(e):
+            plus = 4 * (1 - e * e) / (1 + k)
+            minus = -2 * k * (k - 1) * (1 + e) ** 2 / (1 + k) ** 2
+            return (plus + minus) / 2 + e * e, (plus - minus) / 2 - 1, -e * e
+
+        def discriminant(e):
+            a, b, c = cubic(e)
+            return a * a * b * b - 4 * b**3 - 4 * a**3 * c + 18 * a * b * c - 27 * c * c
+
+        grid = [mpf(j) / 400 for j in range(2, 200)]
+        pairs = [(x, y) for x, y in itertools.pairwise(grid) if discriminant(x) * discriminant(y) < 0]
+        return [mp.findroot(discriminant, pair, solver="anderson", tol=1e-50) for pair in pairs]
+
+
+MEETING = [(k, e) for k in (2.0, 6.0, 40.0) for e in meeting(k)]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_multiplier_that_two_roots_share_keeps_its_digits(method):
+    shifts = (0.0, 1e-15, -1e-13, 1e-11, -1e-9, 1e-6) if COMPILED else (1e-13,)
+    assert len(MEETING) >= 3
+    columns = joined(*(cell_of(k, float(e * (1 + mpf(s)))) for k, e in MEETING for s in shifts))
+    status = assert_cycle(method, columns, rtol=1e-13)
+    assert (status != Status.NO_CYCLE).mean() > 0.6
+
+
+ROOTS = [
+    (1e-24, 0.5, 0.6),
+    (1e-24, 0.5, -0.4),
+    (-1e-22, 0.3 + 0.4j, 0.3 - 0.4j),
+    (1.0, 1e-20, -1e-21),
+    (0.9, 0.8, -0.7),
+    (3e5, 2e5, 1e-9),
+]
+
+
+def cubic(roots):
+    """The coefficients, as pairs of float64, and the largest modulus of (x - r)(x - s)(x - t) with those."""
+    with mp.workdps(80):
+        r, s, t = (mp.mpmathify(x) for x in roots)
+        pairs = []
+        for a in (-(r + s + t), r * s + s * t + t * r, -r * s * t):
+            high = float(mp.re(a))
+            pairs.append((high, float(mp.re(a) - high)))
+        return pairs, float(max(abs(r), abs(s), abs(t)))
+
+
+@pytest.mark.parametrize("roots", ROOTS)
+def test_the_largest_modulus_of_three_roots_is_right_however_far_they_lie_apart(roots):
+    pairs, true = cubic(roots)
+    modulus, doubt = largest_modulus(*pairs)
+    assert abs(modulus / true - 1) < 4e-16
+    assert doubt < 1e-22
+
+
+def test_where_two_roots_meet_the_largest_modulus_is_in_doubt_by_half_the_digits():
+    pairs, true = cubic((0.75, 0.75, 0.1))
+    modulus, doubt = largest_modulus(*pairs)
+    assert abs(modulus / true - 1) <= doubt
+    assert 1e-16 < doubt < 1e-13
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_wheel_that_an_impact_nearly_stops_keeps_the_digits_of_its_speed(method):
+    """V is proportional to kappa (1 - e) - 2 e; the recoil to its square."""
+    e = 0.3 * (1 + np.array([-1e-15, 1e-15, -1e-12, 1e-9, -1e-5, 1e-5]))
+    columns = joined(*(cell_of(0.6 / 0.7, float(v)) for v in e))
+    assert (assert_cycle(method, columns) == Status.UNSTABLE).all()
+    speeds = solve(IMPACT, method, *columns)[0]["wheel_speed"]
+    assert abs(speeds).min() < 1e-13
+
+
+EDGES = [(2.0, 0.3, 0.0), (30.0, 0.4, 0.0), (1.5, 0.55, 0.0), (0.05, 0.45, 0.0), (3.0, 0.2, 0.5), (0.5, 0.35, -2.8)]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_border_of_existence_is_exact_and_said_to_be_grazing(method):
+    for kappa, e, nu in EDGES if COMPILED else EDGES[:3]:
+        border = oracles.highest_escape(*(c[0] for c in cell_of(kappa, e, nu=nu)))
+        shifts = (-1e-9, -1e-12, -1e-16, 1e-16, 1e-12, 1e-9)
+        columns = joined(*(cell_of(kappa, e, float(border * (1 + mpf(s))), nu) for s in shifts))
+        _, status = solve(IMPACT, method, *columns, rtol=1e-13)
+        there = Status.UNSTABLE if status[0] == Status.UNSTABLE else Status.OK
+        middle = Status.GRAZING if there == Status.OK else Status.UNSTABLE
+        assert status.tolist() == [there] * 2 + [middle] * 2 + [Status.NO_CYCLE] * 2, (kappa, e, nu)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_border_where_the_tooth_turns_before_it_meets_the_pallet_again_is_exact(method):
+    """There 1/(2 q) = 1 - e with q = (1 + e)/(1 + kappa), whatever the escape height: e^2 = (1 - kappa)/2."""
+    border = mp.sqrt((1 - mpf(0.375)) / 2)
+    columns = joined(*(cell_of(0.375, float(border * (1 + mpf(s))), 0.22) for s in (-1e-9, -1e-12, 1e-12, 1e-9)))
+    assert assert_cycle(method, columns).tolist() == [Status.UNSTABLE] * 2 + [Status.NO_CYCLE] * 2
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_flat_lever_is_stable_just_for_a_wheel_heavier_than_the_pallets(method):
+    kappa = 1 + np.array([-1e-6, -1e-12, 0.0, 1e-12, 1e-6])
+    columns = joined(*(cell_of(k, 0.4) for k in kappa))
+    columns[1], columns[2], columns[3], columns[4] = kappa, np.ones(5), np.full(5, 1.5), np.full(5, 1.5)
+    outputs, status = solve(IMPACT, method, *columns)
+    expected = [Status.UNSTABLE] * 2 + [Status.GRAZING] + [Status.OK] * 2
+    assert status.tolist() == expected
+    assert outputs["multiplier"][2] == 1.0
+    assert (np.sign(outputs["multiplier"] - 1) == [1, 1, 0, -1, -1]).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_lever_that_shrinks_as_the_pallet_is_pushed_makes_a_heavy_foliot_stable(method):
+    kappa, e = 0.5, 0.35
+    first = -4 * (1 + kappa) / (kappa * (1 - kappa))
+    last = -4 * (1 + e) ** 2 / ((1 - e) ** 2 * kappa + 2 * (1 + e * e))
+    nu = np.array([last * (1 - 1e-9), last * (1 + 1e-9), 0.5 * (last + max(first, -4.0))])
+    columns = joined(*(cell_of(kappa, e, 0.0, v) for v in nu))
+    assert assert_cycle(method, columns).tolist() == [Status.UNSTABLE, Status.OK, Status.OK]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_loss_of_each_impact_is_the_work_of_the_torque_over_half_a_pitch(method):
+    columns = clocks(SOME, seed=5, kappa=(-1, 2), e=0.3, units=3.0)
+    columns[6][:] = 0.0
+    torque, I_c, I_v, r_c, r_v, teeth = columns[:6]
+    outputs, status = solve(IMPACT, method, *columns)
+    there = status != Status.NO_CYCLE
+    apart = outputs["pallet_speed"] * r_v - outputs["wheel_speed"] * r_c
+    M, m = I_c / r_c**2, I_v / r_v**2
+    loss = 0.5 * M * m / (M + m) * (apart / 0.3) ** 2 * (1 - 0.3**2)
+    np.testing.assert_allclose(loss[there], (torque * np.pi / teeth)[there], rtol=1e-13)
+    momentum = 2 * m * outputs["pallet_speed"] * r_v  # turned round by the force at the rim in half a period
+    np.testing.assert_allclose(momentum[there], (torque / r_c * outputs["period"] / 2)[there], rtol=1e-14)
+    assert there.sum() > len(there) / 4
+
+
+@given(st.floats(-2, 4), st.floats(0, 0.8), st.floats(0, 0.24), st.integers(-150, 150))
+@settings(deadline=None)
+def test_the_period_falls_as_the_root_of_the_torque_and_the_swing_knows_no_torque(log_kappa, e, h, power):
+    cells = joined(*[cell_of(10.0**log_kappa, e, h)] * 2)
+    cells[0] = cells[0] * np.array([1.0, 4.0**power])
+    outputs, status = solve(IMPACT, "closed", *cells)
+    assert status[0] == status[1]
+    for name, factor in zip(NAMES, (0.5**power, 1.0, 2.0**power, 2.0**power, 1, 1, 1, 1, 1), strict=True):
+        assert outputs[name][1] == outputs[name][0] * factor, name
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_exponent_of_the_torque_is_exact_over_24_decades(method):
+    n = 49 if COMPILED else 5
+    torque = 10 ** np.linspace(-12, 12, n)
+    columns = joined(*[cell_of(3.0, 0.2, 0.01)] * n)
+    columns[0] = torque
+    outputs, _ = solve(IMPACT, method, *columns)
+    steady = outputs["period"] * np.sqrt(torque)
+    assert abs(steady / steady[0] - 1).max() < 1e-15
+    assert (outputs["swing"] == outputs["swing"][0]).all()
+
+
+@given(st.floats(-3, 5), st.floats(0.875, 1, exclude_max=True), st.floats(0, 0.24), st.floats(-20, 20))
+@settings(deadline=None)
+def test_no_impact_cycle_keeps_more_than_seven_eighths_of_the_speed(log_kappa, e, h, nu):
+    _, status = solve(IMPACT, "closed", *cell_of(10.0**log_kappa, e, h, nu))
+    assert status[0] == Status.NO_CYCLE
+
+
+QUARTERS = [(0.03, 31), (0.1, 3), (1 / 3, 101), (0.0127, 15)]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_escape_height_of_a_quarter_pitch_is_the_clock_without_drop_however_it_was_rounded(method):
+    for r_c, teeth in QUARTERS:
+        h = 2 * np.pi * r_c / teeth / 4
+        heights = np.array([np.nextafter(h, 0), h, np.nextafter(h, 1), h * (1 + 4e-15), h * (1 - 4e-15)])
+        columns = [np.full(5, v) for v in (1e-3, 1e-5, 3e-5, r_c, 0.02, float(teeth))] + [heights]
+        assert checked(IMPACT, *columns, e=0.0).tolist() == [0, 0, 0, Status.NEVER_MEETS, 0]
+        assert checked(IMPACT, *columns, e=0.1).tolist() == [Status.NEVER_MEETS] * 4 + [0]
+        outputs, status = solve(IMPACT, method, *columns, e=0.0)
+        assert (status[:3] == Status.OK).all()
+        assert (outputs["contact_share"][:3] == 1).all()
+        kappa = 1e-5 * 0.02**2 / (3e-5 * r_c**2)
+        half = 2 / kappa * np.sqrt(h * (1 + kappa) * 1e-5 / (1e-3 * r_c))  # g = torque r_c/I_c
+        np.testing.assert_allclose(outputs["period"][:3], 2 * half, rtol=3e-15)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_bent_lever_with_plastic_impacts_has_no_closed_cycle(method):
+    _, status = solve(IMPACT, method, *cell_of(2.0, 0.0, 0.1, 0.3))
+    assert status[0] == Status.NO_METHOD
+
+
+WIDE = [
+    (1e100, 0.3, 0.0, 0.0), (1e-100, 0.5, 0.0, 0.0), (1e200, 1e-180, 0.0, 0.0), (1e-200, 0.0, 0.0, 0.0),
+    (1e200, 0.0, 0.2, 0.0), (1e-100, 0.0, 0.2, 0.0), (1e-90, 0.4, 0.0, 1.5e180), (1e-90, 0.4, 0.0, -1.5e180),
+    (1e-155, 0.4, 0.0, 1.5e308), (1e60, 0.3, 0.1, 2e-60), (1e-8, 0.45, 0.0, 1e300), (3.0, 0.2, 0.0, -1e308),
+    (1e12, 1e-11, 0.24, 0.0), (2.0, 1 - 1e-9, 0.1, 0.0), (0.5, 1 - 2**-53, 0.1, 0.0), (1e20, 5e-324, 0.1, 0.0),
+]  # fmt: skip
+
+
+def wide():
+    """Clocks whose mass ratios and curvatures are far from 1; the heights are pitches."""
+    columns = joined(*(cell_of(*cell) for cell in WIDE))
+    kappa = np.array([cell[0] for cell in WIDE])
+    columns[1], columns[2] = np.sqrt(kappa), 1 / np.sqrt(kappa)
+    return columns
+
+
+def test_over_the_range_of_float64_a_cell_is_right_or_refused():
+    columns = wide()
+    outputs, status = solve(IMPACT, "closed", *columns, rtol=1e-14)
+    for i, cell in enumerate(zip(*columns, strict=True)):
+        kappa, e, _, nu = WIDE[i]
+        if status[i] == Status.NO_CYCLE and (e > 0.99 or abs(nu) * kappa / (1 + 1 / kappa) > 100):
+            continue  # far beyond what can be, and long to be followed
+        values, there = truth(*cell, digits=1400)
+        assert there == (status[i] != Status.NO_CYCLE), WIDE[i]
+        if there:
+            assert status[i] == (Status.UNSTABLE if values[4] > 1 else Status.OK), WIDE[i]
+            assert max(errors({k: v[i : i + 1] for k, v in outputs.items()}, [values]).values()) < WORST, WIDE[i]
+
+
+def test_the_map_says_where_its_32_digits_end():
+    columns = wide()
+    outputs, status = solve(IMPACT, "map", *columns)
+    assert set(status) <= {Status.NO_METHOD, Status.NO_CYCLE, Status.OK}
+    exact, verdict = solve(IMPACT, "closed", *columns)
+    for name in NAMES:
+        same = status == Status.OK
+        np.testing.assert_allclose(outputs[name][same], exact[name][same], rtol=2 * WORST)
+    assert (verdict[status != Status.NO_METHOD] == status[status != Status.NO_METHOD]).all()
+    assert (status == Status.NO_METHOD).sum() == 11
+
+
+def test_results_that_no_float64_can_hold_are_out_of_range():
+    columns = joined(*[cell_of(2.0, 0.2)] * 6)
+    for column, values in (
+        (0, (1.0, 1e300, 1e-300, 1e-300, 1e300, 1.0)), (1, (1.0, 1.0, 1e300, 1e308, 1e-308, 1e308)),
+        (2, (0.5, 0.5, 5e299, 5e307, 5e-309, 1e-308)),
+    ):  # fmt: skip
+        columns[column] = np.array(values)
+    _, status = solve(IMPACT, "closed", *columns)
+    assert status.tolist() == [0, 0, 0, 0, 0, Status.OUT_OF_RANGE]
+    columns[3][:], columns[4][:] = [1e-308, 1e-300, 1.0, 1e300, 1e308, 1.0], [1e-308, 1e-300, 1.0, 1e300, 1e308, 1e155]
+    outputs, status = solve(IMPACT, "closed", *columns)
+    finite = np.array([np.isfinite(outputs[name]) for name in NAMES]).all(axis=0)
+    assert (finite | (status >= FIRST_REFUSAL)).all()
+    assert status[0] == Status.OUT_OF_RANGE
+    assert (status[1:4] == Status.OK).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_same_bits_alone_in_lanes_and_in_tails(method):
+    columns = [c.copy() for c in clocks(75 if COMPILED else 4, seed=6, kappa=(-2, 2), nu=0.1, units=3)]
+    columns[7][::4], columns[8][::3], columns[7][1::9] = 0.0, 0.0, 0.99
+    together, status = solve(IMPACT, method, *columns)
+    for i in range(len(status)):
+        alone, verdict = solve(IMPACT, method, *(c[i : i + 1] for c in columns))
+        assert verdict[0] == status[i]
+        for name in NAMES:
+            assert np.array_equal(alone[name][:1], together[name][i : i + 1], equal_nan=True), (name, i)
+
+
+PLAIN = """
+import sys
+sys.path += ["tests/oracles", "tests/helpers"]
+from columns import solve
+from kernels.impact.clock import IMPACT
+e, nu = [0.0, 0.2, 0.4, 0.3, 0.35, 0.0], [0.0, 0.0, 0.1, 0.0, -2.8, 0.0]
+for method in ("closed", "map"):
+    outputs, status = solve(
+        IMPACT, method, [1e-3] * 6, [1e-5], [1e-5, 3e-6, 1e-6, 1e-7, 2e-5, 1e-3], [0.03], [0.03], [31], [5e-4], e, nu
+    )
+    print(*(float(v).hex() for column in outputs.values() for v in column), *status)
+"""
+
+
+@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
+def test_plain_python_gives_the_bits_of_compiled_code():
+    compiled, plain = printed_both_ways(PLAIN)
+    assert compiled == plain != ""
+
+
+GOOD = (1.0, 1.0, 1.0, 1.0, 1.0, 3.0, 0.1, 0.2, 0.0)
+
+
+def with_value(place, value):
+    return (*GOOD[:place], value, *GOOD[place + 1 :])
+
+
+def test_what_cannot_run_is_refused_by_name():
+    cells = [(GOOD, Status.OK), (with_value(0, 0.0), Status.NEVER_STARTS), (with_value(6, 0.53), Status.NEVER_MEETS)]
+    cells += [(with_value(k, x), Status.BAD_INPUT) for k in range(9) for x in (NAN, INF, -INF)]
+    cells += [(with_value(k, -0.1), Status.BAD_INPUT) for k in range(8)]
+    cells += [(with_value(k, 0.0), Status.BAD_INPUT) for k in range(1, 6)]
+    cells += [(with_value(5, x), Status.BAD_INPUT) for x in (1.0, 2.0, 4.0, 3.5, 30.0, 2.0**31, 1e300)]
+    cells += [(with_value(5, x), Status.OK) for x in (3.0, 5.0, 13.0)]
+    cells += [(with_value(7, x), Status.BAD_INPUT) for x in (1.0, 1.5)]
+    cells += [(with_value(7, 0.9999999999999999), Status.OK), (with_value(6, 1e308), Status.NEVER_MEETS)]
+    found = checked(IMPACT, *(np.array(c) for c in zip(*(cell for cell, _ in cells), strict=True)))
+    assert found.tolist() == [status for _, status in cells]
+
+
+def test_the_closed_form_promises_what_it_keeps():
+    assert (bounds(IMPACT, "closed", *clocks(40)) == 2e-15).all()
+    assert WORST < 2e-15
+    for method in METHODS:
+        for rtol, verdict in ((2e-15, Status.OK), (1e-15, Status.INACCURATE)):
+            _, status = solve(IMPACT, method, *cell_of(2.0, 0.2), rtol=rtol)
+            assert status[0] == verdict

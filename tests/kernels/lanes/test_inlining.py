@@ -1,0 +1,75 @@
+"""Machine code of parts and entries, and where vectors lie in memory."""
+
+import re
+
+import numpy as np
+import pytest
+
+from kernels.lanes.columns import each_cell, entry, entry_of_cells
+from kernels.lanes.groups import GROUP, room
+from kernels.lanes.inlining import LINE
+from kernels.lanes.jit import COMPILED, jit, jit_call
+from kernels.lanes.vectors import fma, sqrt
+
+
+@jit_call
+def _root(x, y):
+    return sqrt(fma(x, y, 1.0))
+
+
+@jit
+def _cell(i, x, y, z):
+    z[i] = _root(x[i], y[i]) + _root(y[i], y[i])
+
+
+@entry()
+def roots(x, y, z):
+    """sqrt(x y + 1) + sqrt(y^2 + 1)."""
+    each_cell(_cell, (x, y, z))
+
+
+@jit
+def _offsets(counts, found):
+    for i in range(counts.size):
+        space = room(counts[i])
+        found[i, 0], found[i, 1] = np.int64(space.ctypes.data) % LINE, space.size
+
+
+@entry("counts", "found")
+def offsets(counts, found):
+    """Of rooms: bytes from the last border of a cache line, and size."""
+    _offsets(counts, found)
+
+
+def test_rooms_begin_on_the_border_of_a_cache_line():
+    counts = np.repeat(np.arange(1, 30), 3)
+    found = np.full((counts.size, 2), -1)
+    offsets(counts, found)
+    assert (found[:, 0] == 0).all()
+    assert (found[:, 1] == counts * GROUP).all()
+
+
+@pytest.mark.skipif(not COMPILED, reason="plain Python has no stack of ours")
+def test_the_stack_of_machine_code_begins_on_such_a_border():
+    columns = np.linspace(0.0, 1.0, 40), np.ones(40), np.empty(40)
+    roots(*columns)
+    assert (columns[2] == np.sqrt(columns[0] + 1.0) + np.sqrt(2.0)).all()
+    (text,) = roots.compiled.inspect_llvm().values()
+    wide = re.findall(r"^attributes (#\d+) = \{.* alignstack=64 ", text, re.M)
+    defined = [line.split()[-2] for line in text.splitlines() if line.startswith("define") and "NRT" not in line]
+    assert set(defined) <= set(wide) != set()
+
+
+@entry_of_cells
+def seen(count, total):
+    """total = how many cells one call is given."""
+    for i in range(count.size):
+        total[i] = count.size
+
+
+@pytest.mark.parametrize("n", [1, 3, 40])
+def test_what_takes_one_cell_at_a_time_is_not_given_more(n):
+    count, total = np.ones(n), np.zeros(n)
+    count.flags.writeable = False
+    seen(count, total)
+    assert (total == n).all()

@@ -1,0 +1,338 @@
+"""The polisher's arm against 50 digits, next to dead points, in tiny and lopsided machines, and beyond the domain."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import polisher_oracles as oracles
+import pytest
+from columns import bounds, checked, solve
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpmath import mp, mpf, pi
+
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+from kernels.polisher.arm import POLISHER
+
+ROOT = Path(__file__).parents[3]
+SOME = 60 if COMPILED else 12
+FEW = 1
+FIGURE = (62.01, 38.0, 40.5)
+"""b, d, f of the paper's figures."""
+RATES = ("thd", "rate_max", "rate_min")
+CLOSED = tuple(oracles.closed(*FIGURE, 10.0))
+INF, NAN = np.inf, np.nan
+
+
+def swings(b, d, f, e):
+    return e < min(b, d, f) and min(d + f - b - e, b + f - d - e, b + d - f - e) > 0
+
+
+def machine(kind, random):
+    """A random crank-rocker."""
+    while True:
+        b, d, f = 10 ** random.uniform(-4 if kind == "lopsided" else -1, 0, 3)
+        e = min(b, d, f) * 10 ** random.uniform({"small crank": -12, "lopsided": -3}.get(kind, -1), 0)
+        if kind == "near dead":
+            gap = 10 ** random.uniform(-13, -3)
+            e = (d + f - b, b + f - d, b + d - f)[random.integers(3)] * (1 - gap)
+        if e > 0 and swings(b, d, f, e):
+            return b, d, f, e
+
+
+def machines(kind, n=SOME, seed=1):
+    random = np.random.default_rng(seed)
+    return np.array([machine(kind, random) for _ in range(n)]).T
+
+
+KINDS = ("usual", "small crank", "near dead", "lopsided")
+
+
+def errors(outputs, columns, names=CLOSED, sign=1):
+    """The largest relative error of each output; angles of the arm are compared with `sign` times type A's."""
+    truths = [oracles.closed(*cell) for cell in np.transpose(columns)]
+    found = {}
+    for name in names:
+        turned = 1 if name == "transmission_angle" or name.startswith("A1") else sign
+        found[name] = [
+            float(abs(mpf(float(v)) / (turned * t[name]) - 1)) for v, t in zip(outputs[name], truths, strict=True)
+        ]
+    return {name: np.array(column) for name, column in found.items()}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind_of_arm", [0, 1])
+def test_every_closed_output_has_its_digits(kind, kind_of_arm):
+    columns = machines(kind)
+    outputs, status = solve(POLISHER, "stable", *columns, type=kind_of_arm, rtol=1e-14)
+    assert (status == Status.OK).all()
+    for name, error in errors(outputs, columns, sign=-1 if kind_of_arm else 1).items():
+        assert error.max() < 2e-15, name
+    assert np.isnan([outputs[name] for name in (*RATES, "theta_lock", "theta_lock_outer")]).all()
+
+
+VANISHING = [
+    (0.7646033079641995, 0.24600515147746116, 0.7241413559202836, 0.016763631996645822),
+    (0.22432158267627217, 0.4357277682414095, 0.37378230652899247, 0.013217303502674473),
+]
+"""d^2 + f^2 - b^2 - e^2, or the same with b and d exchanged, is 0 but for 1e-19."""
+
+
+def test_a_derivative_that_nearly_vanishes_has_its_digits():
+    outputs, status = solve(POLISHER, "stable", *np.transpose(VANISHING), rtol=1e-14)
+    assert (status == Status.OK).all()
+    for name, error in errors(outputs, np.transpose(VANISHING)).items():
+        assert error.max() < 2e-15, name
+
+
+def test_the_papers_machine_swings_as_its_figures_say():
+    e = [0.0, 5.0, 10.0, 15.0]
+    outputs, status = solve(POLISHER, "stable", *FIGURE, e)
+    assert (status == Status.OK).all()
+    np.testing.assert_allclose(np.degrees(outputs["A0"]), [39.2603, 39.0843, 38.4038, 36.0997], atol=1e-4)
+    np.testing.assert_allclose(outputs["A1"], [0, 0.136733, 0.280338, 0.452891], atol=1e-6)
+    np.testing.assert_allclose(np.degrees(outputs["theta_plus"]), [143.574, 142.411, 142.241, 142.785], atol=1e-3)
+    np.testing.assert_allclose(np.degrees(outputs["theta_minus"]), [-36.426, -33.732, -28.268, -15.227], atol=1e-3)
+
+
+def test_derivatives_are_those_of_the_angles():
+    """Of the oracle, which the kernel is compared with: its differences over 1e-20."""
+    with mp.workdps(50):
+        cell = [mpf(v) for v in (0.62, 0.38, 0.405, 0.1)]
+        exact, step = oracles.closed(*cell), mpf(10) ** -20
+        for k, length in enumerate("bdfe"):
+            beside = oracles.closed(*(x + step * (j == k) for j, x in enumerate(cell)))
+            for name in ("A0", "A1"):
+                assert abs((beside[name] - exact[name]) / step - exact[f"{name}_{length}"]) < mpf(10) ** -18
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_papers_arccos_is_within_its_bound_and_loses_digits_next_to_a_dead_point(kind):
+    columns = machines(kind)
+    outputs, status = solve(POLISHER, "textbook", *columns)
+    assert (status == Status.OK).all()
+    for name, error in errors(outputs, columns).items():
+        promised = bounds(POLISHER, "textbook", *columns, asked=[name])
+        assert (error <= promised).all(), name
+        if COMPILED:  # of many machines
+            assert np.median(promised) < 300 * max(np.median(error), 1e-15), name
+    if kind == "near dead":
+        assert bounds(POLISHER, "textbook", *columns, asked=["A1"]).max() > 1e-9
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_distortion_and_fastest_rates_are_right_to_1e_14(kind):
+    columns = machines(kind, FEW, seed=2)
+    outputs, status = solve(POLISHER, "waveform", *columns, rtol=1e-12)
+    assert (status == Status.OK).all()
+    for j, cell in enumerate(columns.T):
+        truth = oracles.distortion(*cell), oracles.fastest(*cell, 1), -oracles.fastest(*cell, -1)
+        for name, true in zip(RATES, truth, strict=True):
+            assert abs(float(mpf(float(outputs[name][j])) / true - 1)) < 1e-14, (name, cell)
+
+
+@pytest.mark.skipif(not COMPILED, reason="2048 samples a machine in plain Python")
+@pytest.mark.parametrize("kind", ["usual", "any"])
+def test_dense_sampling_finds_what_the_other_methods_say(kind):
+    columns = machines("usual") if kind == "usual" else 10 ** np.random.default_rng(3).uniform(-1, 0, (4, 300))
+    expected, verdict = solve(POLISHER, "waveform", *columns, type=1.0, rtol=1e-12)
+    outputs, status = solve(POLISHER, "sampled", *columns, type=1.0, rtol=1e-9)
+    sure = status != Status.INACCURATE
+    assert sure.mean() > 0.8
+    assert (status[sure] == verdict[sure]).all()
+    given = [name for name in outputs if name not in POLISHER.method("sampled").lacks]
+    assert set(given) > {*RATES, "A0", "A1", "eta_minus", "theta_plus", "theta_lock", "transmission_angle"}
+    for name in given:
+        np.testing.assert_allclose(outputs[name][sure], expected[name][sure], rtol=1e-9, err_msg=name)
+
+
+@pytest.mark.skipif(not COMPILED, reason="2048 samples a machine in plain Python")
+def test_dense_sampling_says_where_it_sees_too_little():
+    columns = machines("near dead", 3)
+    assert (solve(POLISHER, "sampled", *columns, rtol=1e-9)[1] == Status.INACCURATE).all()
+
+
+def test_a_finer_tolerance_than_any_method_holds_is_inaccurate():
+    for method in ("waveform", *(["sampled"] if COMPILED else [])):
+        _, status = solve(POLISHER, method, *FIGURE, [15.0], rtol=1e-16)
+        assert status[0] == Status.INACCURATE
+
+
+def test_rates_of_both_types_are_the_same_and_small_cranks_swing_harmonically():
+    e = np.array([10.0, 1e-3, 1e-6])
+    one, _ = solve(POLISHER, "waveform", *FIGURE, e, rtol=1e-12)
+    other, status = solve(POLISHER, "waveform", *FIGURE, e, type=1, rtol=1e-12)
+    assert (status == Status.OK).all()
+    for name in RATES:
+        assert (one[name] == other[name]).all()
+    np.testing.assert_allclose(one["thd"][1:] / e[1:], one["thd"][2] / e[2], rtol=1e-3)
+    np.testing.assert_allclose(one["rate_max"][2], one["A1"][2], rtol=1e-6)
+
+
+def exact_lengths(seed, n):
+    """Lengths in whole 2^-40, and often such that a sum that decides is 0 or a few units."""
+    random = np.random.default_rng(seed)
+    for _ in range(n):
+        b, d, f = (int(x) for x in random.integers(2**36, 2**40, 3))
+        e = (d + f - b, b + f - d, b + d - f, b + d + f, b - d - f, d - b - f, f - b - d)[random.integers(7)]
+        e += int(random.integers(-3, 4)) * int(10 ** random.uniform(0, 11))
+        if e > 0:
+            yield [x * 2.0**-40 for x in (b, d, f, e)]
+
+
+def test_the_verdict_is_that_of_the_exact_lengths():
+    cells = list(exact_lengths(4, 40 * SOME))
+    _, status = solve(POLISHER, "stable", *np.transpose(cells))
+    names = [Status(s).name for s in status]
+    assert names == [oracles.verdict(*cell) for cell in cells]
+    assert min(names.count(name) for name in ("OK", "LOCK_UP", "CHANGE_POINT", "DOUBLE_CRANK", "NO_ASSEMBLY")) > 2
+
+
+def test_the_shortest_link_as_coupler_locks_though_the_arccos_has_a_value():
+    outputs, status = solve(POLISHER, "stable", [62.0], 60.0, 5.0, 10.0)
+    assert status[0] == Status.LOCK_UP
+    inner, outer = oracles.locks(62, 60, 5, 10)
+    assert outputs["theta_lock"][0] == pytest.approx(float(inner), rel=1e-15)
+    assert outputs["theta_lock_outer"][0] == pytest.approx(float(outer), rel=1e-15)
+    assert np.isnan(outputs["A0"][0])
+    assert outputs["transmission_angle"][0] == 0
+
+
+def test_crank_angles_of_locks_have_their_digits():
+    columns = 10 ** np.random.default_rng(5).uniform(-1, 0, (4, 10 * SOME))
+    outputs, status = solve(POLISHER, "stable", *columns)
+    seen = set()
+    for j in np.flatnonzero(status == Status.LOCK_UP):
+        expected = [x for x in oracles.locks(*columns[:, j]) if x is not None]
+        found = [outputs[name][j] for name in ("theta_lock", "theta_lock_outer")][: len(expected)]
+        seen.add(len(expected))
+        assert all(abs(float(mpf(float(v)) / t - 1)) < 2e-15 for v, t in zip(found, expected, strict=True))
+    assert seen == {1, 2}
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.01])
+def test_a_change_point_in_decimals_is_named_and_its_angles_are_sensible(unit):
+    outputs, status = solve(POLISHER, "stable", *(unit * x for x in FIGURE), [unit * 16.49], type=[1.0])
+    assert status[0] == Status.CHANGE_POINT
+    assert np.degrees(outputs["A1"][0]) == pytest.approx(32.1659, abs=1e-4)
+    assert np.degrees(outputs["A0"][0]) == pytest.approx(-32.1659, abs=1e-4)
+    assert abs(outputs["eta_minus"][0]) < 2e-8
+    assert outputs["transmission_angle"][0] < 1e-7
+    assert np.isnan([outputs[name][0] for name in ("A0_b", "A1_e", "thd")]).all()
+
+
+@pytest.mark.parametrize("cell", [(1, 1, 1, 1), (2, 1, 2, 1), (3, 4, 7, 0), (7, 4, 3, 0), (4, 7, 3, 0)])
+def test_a_linkage_that_lies_flat_has_finite_angles(cell):
+    outputs, status = solve(POLISHER, "stable", *([float(x)] for x in cell))
+    assert status[0] == Status.CHANGE_POINT
+    for name in ("A0", "A1", "eta_plus", "eta_minus", "theta_plus", "theta_minus", "transmission_angle"):
+        assert np.isfinite(outputs[name][0]), name
+
+
+@pytest.mark.parametrize("method", ["stable", "waveform"])
+def test_a_motor_without_throw_holds_the_arm_where_the_triangle_does(method):
+    outputs, status = solve(POLISHER, method, [3.0], 4.0, 5.0, 0.0)
+    assert status[0] == Status.OK
+    assert outputs["A0"][0] == outputs["eta_plus"][0] == outputs["eta_minus"][0] == pytest.approx(np.pi / 2, rel=1e-15)
+    assert outputs["A1"][0] == outputs["A1_b"][0] == 0
+    assert outputs["A1_e"][0] == pytest.approx(5 / 12, rel=1e-15)
+    if method == "waveform":
+        assert [outputs[name][0] for name in RATES] == [0, 0, 0]
+
+
+def test_an_arm_that_turns_fully_has_rates_but_no_extremes():
+    b, d, f, e = 1.0, 3.0, 3.5, 2.0
+    outputs, status = solve(POLISHER, "waveform", [b], d, f, e)
+    assert status[0] == Status.DOUBLE_CRANK
+    grid = [oracles.rate(b, d, f, e, 1, mpf(k) * 2 * pi / 4000) for k in range(4000)]
+    assert outputs["rate_max"][0] == pytest.approx(float(max(grid)), rel=1e-6)
+    assert outputs["rate_min"][0] == pytest.approx(float(min(grid)), rel=1e-6)
+    assert np.isnan([outputs[name][0] for name in ("A0", "A1", "thd", "theta_plus")]).all()
+    least = min(oracles.closed(e, d, f, b)["transmission_angle"], np.pi)  # as a linkage with frame and crank swapped
+    assert outputs["transmission_angle"][0] == pytest.approx(float(least), rel=1e-14)
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(-600, 600), st.integers(0, 10**6))
+def test_angles_do_not_depend_on_the_unit_of_length(power, seed):
+    cell = machines("usual", 1, seed)
+    one, _ = solve(POLISHER, "stable", *cell)
+    other, status = solve(POLISHER, "stable", *(cell * 2.0**power))
+    assert status[0] == Status.OK
+    for name, column in one.items():
+        per_length = "_" in name and name[:2] in ("A0", "A1")
+        np.testing.assert_array_equal(other[name] * (2.0**power if per_length else 1.0), column, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("cell", "status"),
+    [
+        ((1e300, 1e300, 1e300, 1e299), Status.OUT_OF_RANGE), ((1e-300, 1e-300, 1e-300, 1e-301), Status.OUT_OF_RANGE),
+        ((1e200, 0.6e200, 0.7e200, 0.1e200), Status.OK), ((1e-200, 0.6e-200, 0.7e-200, 0.1e-200), Status.OK),
+        ((1.0, 0.6, 0.7, 1e-40), Status.OUT_OF_RANGE), ((1.0, 0.6, 0.7, 1e-35), Status.OK),
+        ((1.0, 1e-300, 1.0, 1e-301), Status.OUT_OF_RANGE), ((1.0, 0.3, 0.3, 0.1), Status.NO_ASSEMBLY),
+        ((5e-324, 5e-324, 5e-324, 0.0), Status.OUT_OF_RANGE), ((1.0, 1e300, 1.0, 1.0), Status.OUT_OF_RANGE),
+    ],
+)  # fmt: skip
+def test_over_the_range_of_float64_a_machine_is_right_or_refused(cell, status):
+    columns = np.array([cell]).T
+    outputs, verdict = solve(POLISHER, "stable", *columns)
+    assert verdict[0] == status
+    if status == Status.OK:
+        for name, error in errors(outputs, columns).items():
+            assert error[0] < 2e-15, name
+
+
+@pytest.mark.parametrize("k", range(5))
+@pytest.mark.parametrize("value", [NAN, INF, -INF, -1.0, 0.0, 0.5, 2.0])
+def test_what_is_no_machine_is_bad_input(k, value):
+    cell = [0.62, 0.38, 0.405, 0.1, 0.0]
+    cell[k] = value
+    allowed = value >= 0.0 and value < INF if k == 3 else value == 0.0 if k == 4 else value in (0.5, 2.0)
+    for n in (1, 40):
+        status = checked(POLISHER, *(np.full(n, float(c)) for c in cell))
+        assert (status == (Status.OK if allowed else Status.BAD_INPUT)).all()
+
+
+@pytest.mark.skipif(not COMPILED, reason="cells go one by one in plain Python")
+def test_neighbours_do_not_change_a_cell():
+    mixed = np.concatenate(
+        [machines(kind, 20) for kind in KINDS] + [10 ** np.random.default_rng(6).uniform(-1, 0, (4, 30))], 1
+    )
+    for method in ("stable", "waveform"):
+        together, _ = solve(POLISHER, method, *mixed, rtol=1e-12)
+        for j in range(0, mixed.shape[1], 9):
+            alone, _ = solve(POLISHER, method, *mixed[:, j : j + 1], rtol=1e-12)
+            for name, column in together.items():
+                np.testing.assert_array_equal(column[j : j + 1], alone[name])
+
+
+PLAIN = """
+import sys
+sys.path += ["tests/oracles", "tests/helpers", "tests/kernels/polisher"]
+import test_arm
+print(test_arm.bits())
+"""
+
+
+def bits():
+    """Every bit of some machines of each verdict, by every method that goes in lanes."""
+    d, f = [38.0] * 4 + [60.0, 38.0, 100.0], [40.5] * 4 + [5.0, 40.5, 150.0]
+    cells = np.array([[62.01] * 7, d, f, [0.0, 1e-3, 15.0, 16.49, 10.0, 20.0, 99.0]])
+    found = bounds(POLISHER, "textbook", *cells).tolist()
+    for method, some in (("stable", cells), ("textbook", cells), ("waveform", cells[:, [1, 2]])):
+        outputs, status = solve(POLISHER, method, *some, type=1.0, rtol=1e-12)
+        found += [*np.ravel(list(outputs.values())).tolist(), *status.tolist()]
+    return " ".join(float(v).hex() for v in found)
+
+
+@pytest.mark.skipif(not COMPILED, reason="nothing to compare with")
+def test_plain_python_gives_the_bits_of_compiled_code():
+    printed = subprocess.run(
+        [sys.executable, "-c", PLAIN],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, cwd=ROOT, capture_output=True, text=True, check=True,
+    ).stdout  # fmt: skip
+    assert printed.strip() == bits() != ""

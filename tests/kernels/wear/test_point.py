@@ -1,0 +1,154 @@
+"""Wear of one point of the workpiece against its way in small steps, against the ring's wear, and at its limits."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+import wear_oracles as oracles
+from columns import checked, solve
+from paper_machine import PAPER
+
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+from kernels.wear.point import POLISHER_WEAR_POINT
+
+POINT = PAPER | {"r0": 6.0, "theta0": 0.3, "tau": 20.0}
+INF, NAN = np.inf, np.nan
+NEAREST = 1e-9 if COMPILED else 1e-4
+
+
+def wear(rtol=NEAREST, **changed):
+    """Wear, its error and status; values of `changed` may be columns."""
+    outputs, status = solve(POLISHER_WEAR_POINT, "path", rtol=rtol, **(
+        {name: np.atleast_1d(value) for name, value in (POINT | changed).items()}
+    ))  # fmt: skip
+    return outputs["wear"], outputs["wear_error"], status
+
+
+def truth(**changed):
+    """The same: entries and exits by sampling and bisection, then Gauss between them, in 40 pieces each."""
+    p = POINT | changed
+    side = -1 if p["type"] else 1
+    machine = oracles.Machine(
+        p["b"], p["d"], p["f"], p["e"], side, p["omega"], p["b_angle"], p["L"], p["beta"], p["w_x"], p["w_y"],
+        p["Omega"], p["tool_a"], p["tool_b"], p["tool_n"], p["tool_m"],
+    )  # fmt: skip
+
+    def place(t):
+        return machine.ring(p["r0"], p["theta0"] + p["Omega"] * t)
+
+    def excess(t):
+        return machine.excess(p["omega"] * t - p["b_angle"], place(t))
+
+    times = np.linspace(0, p["tau"], 20_001)
+    value = excess(times)
+    j = np.nonzero((value[1:] > 0) != (value[:-1] > 0))[0]
+    cuts = np.concatenate([[0.0], oracles.bisected(excess, times[j], times[j + 1]), [p["tau"]]])
+    y, weight = np.polynomial.legendre.leggauss(20)
+    total = 0.0
+    for low, high in itertools.pairwise(cuts):
+        if excess(np.array([0.5 * (low + high)]))[0] < 0:
+            edges = np.linspace(low, high, 41)
+            t = edges[:-1, None] + np.diff(edges)[:, None] * 0.5 * (y + 1)
+            rate = machine.arm(p["omega"] * t - p["b_angle"])[1]
+            speed = abs(1j * rate * place(t) - 1j * p["Omega"] * (place(t) - machine.centre))
+            total += float((speed * weight).sum() * 0.5 * (edges[1] - edges[0]))
+    return total
+
+
+AWKWARD = {
+    "round tool": {},
+    "type B, rhombus": {"type": 1.0, "b_angle": 0.6, "tool_n": 1.0, "tool_m": 1.0},
+    "square, fast workpiece": {"tool_n": 100.0, "tool_m": 100.0, "Omega": 7.0, "tau": 9.0},
+    "astroid": {"tool_n": 0.5, "tool_m": 0.5, "tool_a": 8.0, "tool_b": 8.0, "r0": 4.0},
+    "resting workpiece": {"Omega": 0.0, "r0": 2.0},
+    "crank backward": {"omega": -1.0},
+    "arm that turns": {"b": 10.0, "e": 15.0, "L": 5.0, "w_x": -8.0, "beta": 1.0},
+}
+
+
+@pytest.mark.parametrize("name", list(AWKWARD) if COMPILED else ["round tool"])
+def test_wear_is_that_of_the_way_within_its_stated_error(name):
+    changed = AWKWARD[name] if COMPILED else AWKWARD[name] | {"tau": 1.5, "theta0": -1.0}
+    value, error, status = wear(**changed)
+    exact = truth(**changed)
+    assert status[0] in (Status.OK, Status.DOUBLE_CRANK)
+    assert value[0] > 0
+    assert abs(value[0] - exact) <= error[0] + 2e-12 * exact
+    assert error[0] <= NEAREST * exact
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of turns")
+def test_over_many_turns_a_point_wears_as_its_ring():
+    from kernels.wear.ring import POLISHER_WEAR
+
+    ring, _ = solve(POLISHER_WEAR, "contour", along=[np.array([6.0])], **{k: [v] for k, v in PAPER.items()})
+    tau = 500 * 2 * math.pi
+    value, _, status = wear(Omega=0.4 * 1.0061803398, tau=tau, rtol=1e-6)
+    assert status[0] == Status.OK
+    assert value[0] / tau == pytest.approx(ring["wear"][0, 0], rel=5e-3)
+
+
+@pytest.mark.skipif(not COMPILED, reason="many turns")
+def test_wear_adds_up_over_time():
+    """The second half of the time is a run of its own, from where the first ended after whole turns of the crank."""
+    turns = 8 * 2 * math.pi
+    whole, _, _ = wear(tau=2 * turns)
+    first, _, _ = wear(tau=turns)
+    second, _, _ = wear(tau=turns, theta0=0.3 + 0.4 * turns)
+    assert whole[0] == pytest.approx(first[0] + second[0], rel=1e-10)
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of areas")
+def test_under_a_load_a_point_wears_by_the_speed_over_the_area_of_contact():
+    """In time steps of 1e-5 of it, as far as they tell; within the rim as under a pressure."""
+    changed = {"w_x": 52.0, "w_y": 0.0, "pressure": 0.0, "load": 3.0, "r0": 4.0, "tau": 3.0}
+    machine = oracles.Machine(62.01, 38.0, 40.5, 10.0, 1, 1.0, -0.66, 50.0, 0.0, 52.0, 0.0, 0.4, 5.0, 5.0, 2.0, 2.0)
+    h = changed["tau"] / 100_000
+    t = (np.arange(100_000) + 0.5) * h
+    place, theta = machine.ring(4.0, 0.3 + 0.4 * t), t + 0.66
+    alpha, rate = machine.arm(theta)
+    speed = abs(1j * rate * place - 0.4j * (place - machine.centre))
+    area = oracles.lens(5.0, 7.0, abs(50.0 * np.exp(1j * alpha) - machine.centre))
+    inside = machine.excess(theta, place) < 0
+    expected = 3.0 * np.sum(speed[inside] / area[inside]) * h
+    value, error, status = wear(workpiece_radius=7.0, **changed)
+    assert status[0] == Status.OK
+    assert value[0] == pytest.approx(expected, rel=1e-4)
+    assert error[0] <= 1e-9 * value[0]
+    inside, _, _ = wear(workpiece_radius=40.0, **changed)
+    pressed, _, _ = wear(**(changed | {"load": 0.0, "pressure": 3.0 / (25 * math.pi)}))
+    assert inside[0] == pytest.approx(pressed[0], rel=1e-11)
+    assert wear(workpiece_radius=3.9, **changed)[0][0] == 0.0
+
+
+def test_no_time_and_no_touch_wear_nothing():
+    value, error, status = wear(tau=[0.0, 20.0, 20.0], r0=[6.0, 40.0, 1e300])
+    assert (status == Status.OK).all()
+    assert not value.any()
+    assert not error.any()
+
+
+def test_too_long_a_time_is_refused():
+    _, _, status = wear(tau=1e12)
+    assert status[0] == Status.STEP_LIMIT
+
+
+@pytest.mark.parametrize(
+    ("changed", "status"),
+    [({"e": 20.0}, Status.LOCK_UP), ({"b": 200.0}, Status.NO_ASSEMBLY), ({"tool_a": 1e-200}, Status.OUT_OF_RANGE)],
+)
+def test_what_has_no_motion_has_no_wear(changed, status):
+    value, _, said = wear(**changed)
+    assert said[0] == status
+    assert np.isnan(value[0])
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [{"tau": -1.0}, {"theta0": 2e6}, {"r0": -1.0}, *({n: x} for n in ("tau", "r0", "theta0", "e") for x in (NAN, INF))],
+)
+def test_what_is_no_point_is_bad_input(changed):
+    cells = {name: [float(value)] for name, value in (POINT | changed).items()}
+    assert checked(POLISHER_WEAR_POINT, **cells)[0] == Status.BAD_INPUT

@@ -1,0 +1,74 @@
+"""What the study of the three models concludes is so."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import three_models
+import xarray as xr
+
+import sweep
+from kernels.lanes.jit import COMPILED
+
+pytestmark = pytest.mark.skipif(not COMPILED, reason="three kernels; their own tests run as plain Python")
+
+NAMES = ("three_models", "three_models_denny", "three_models_viscous")
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("models")
+    for name in NAMES:
+        study = sweep.read_study(three_models.__file__.replace("three_models.py", f"{name}.toml"))
+        (axis,) = study.axes.values()
+        short = dataclasses.replace(axis, values=axis.values[::4])
+        sweep.run(dataclasses.replace(study, axes={axis.name: short}), folder / f"{name}.h5", workers=1).close()
+    return [folder / f"{name}.h5" for name in NAMES]
+
+
+@pytest.fixture(scope="module")
+def parts(results):
+    return [sweep.open_result(path).load() for path in results]
+
+
+def failing(statements):
+    return [s.what for s in statements if s.holds is False]
+
+
+def test_the_study_draws_its_figure_and_every_statement_holds(results, capsys):
+    assert three_models.main([str(path) for path in results]) == 0
+    assert " NO" not in capsys.readouterr().out
+    assert results[0].with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_three_are_one_dataset_over_one_torque(results):
+    three_models.main([str(path) for path in results])
+    with xr.open_dataset(results[0].with_name("three_models_all.nc"), engine="netcdf4") as ds:
+        assert ds.period.dims == ("model", "torque")
+        assert ds.model.values.tolist() == list(three_models.MODELS)
+        assert ds.period.attrs["units"] == "s"
+        assert ds.torque.attrs["units"] == "N m"
+        assert np.isfinite(ds.period).all()
+
+
+def test_other_results_make_the_statements_fail(parts):
+    impact, denny, viscous = parts
+    for k, wrong in enumerate(
+        (
+            impact.assign(period=impact.period * impact.torque**0.01, swing=impact.swing * impact.torque**0.01),
+            denny.assign(period=denny.period * denny.mu**0.01, amplitude=denny.amplitude * denny.mu**0.01),
+            viscous.assign(period=viscous.period * viscous.mu**0.05),
+        )
+    ):
+        ds = three_models.together(*parts[:k], wrong, *parts[k + 1 :])
+        assert failing(three_models.laws(ds))
+        assert k == 2 or failing(three_models.swings(ds))
+    ds = three_models.together(impact.assign(period=1.02 * impact.period), denny, viscous)
+    assert failing(three_models.identity(ds, impact))
+    assert not failing(three_models.identity(three_models.together(*parts), impact))
+
+
+def test_grids_of_other_torques_are_refused(parts):
+    impact, denny, viscous = parts
+    with pytest.raises(sweep.SweepError, match="same torques"):
+        three_models.together(impact, denny.assign_coords(mu=denny.mu * 1.1), viscous)

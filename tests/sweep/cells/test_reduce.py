@@ -1,0 +1,371 @@
+"""Summaries against numpy on the cells that a study without one keeps."""
+
+import itertools
+import math
+from fractions import Fraction
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import sweep
+from kernels.interface import Status
+from sweep.cells.reduce import BY_STATUS, Reducer, merge, tree_sum
+from sweep.cells.row_blocks import Granules, granules
+from sweep.results.statuses import account
+from sweep.store.store import folder_of
+from sweep.study.read import build_study
+
+HEIGHTS = np.array([-1.0, 1.0, 2.0, 5.0, math.nan, 13.5, 100.0, 0.3, 0.7, 77.0])
+SPEEDS = np.array([0.0, 0.5, 3.0, 1e-9, 1e4, 2.0])
+EDGES = [1e-3, 0.1, 1.0, 2.0]
+EVERYTHING = ["min", "max", "mean", "argmin", "argmax", "histogram"]
+
+
+def stone(summary=None, **keys):
+    keys = {"axes": {"height": HEIGHTS, "v0": SPEEDS}, "outputs": ["fall_time"], **keys}
+    keys |= {} if summary is None else {"summary": summary}
+    return build_study(allow_import=True, kernel="toy:KERNEL", title="A stone", **keys)
+
+
+def whole(**keys):
+    return {"outputs": {"fall_time": EVERYTHING}, "edges": {"fall_time": EDGES}, **keys}
+
+
+def quiet(study, path=None, **keys):
+    return sweep.run(study, path, **{"progress": False, "workers": 2, **keys})
+
+
+def same(left, right):
+    """Bit for bit, NaN included."""
+    assert list(left.data_vars) == list(right.data_vars)
+    for name in left.data_vars:
+        assert left[name].dims == right[name].dims
+        assert left[name].values.tobytes() == right[name].values.tobytes(), name
+
+
+def exact_mean(values):
+    """The mean as a fraction, rounded once."""
+    return float(sum(map(Fraction, values.tolist())) / len(values))
+
+
+def agree(found, cells, over):
+    """The reductions of fall_time in `found` are those of the cells."""
+    kept = [d for d in cells.fall_time.dims if d not in over]
+    rows = cells.transpose(*kept, *over)
+    for at in np.ndindex(*(rows.sizes[d] for d in kept)):
+        one, got = rows.isel(dict(zip(kept, at, strict=True))), found.isel(dict(zip(kept, at, strict=True)))
+        values = one.fall_time.values.ravel()
+        good = values[~np.isnan(values)]
+        assert got.fall_time_count == len(good)
+        assert got[BY_STATUS].sum() == values.size
+        for status in Status:
+            assert got[BY_STATUS].sel(status_name=status.name) == (one.status == status).sum()
+        if not len(good):
+            assert np.isnan([got.fall_time_min, got.fall_time_mean, got[f"fall_time_argmin_{over[0]}"]]).all()
+            assert got.fall_time_argmax_status == Status.PENDING
+            continue
+        assert (got.fall_time_min.item(), got.fall_time_max.item()) == (good.min(), good.max())
+        assert got.fall_time_mean.item() == pytest.approx(exact_mean(good), rel=3e-16)
+        for end, place in (("argmin", np.nanargmin(values)), ("argmax", np.nanargmax(values))):
+            where = np.unravel_index(place, one.fall_time.shape)
+            for axis, index in zip(over, where, strict=True):
+                assert got[f"fall_time_{end}_{axis}"] == one[axis][index]
+            assert got[f"fall_time_{end}_status"] == one.status.values[where]
+        expected, _ = np.histogram(good, EDGES)
+        assert got.fall_time_histogram.values.tolist() == expected.tolist()
+        assert got.fall_time_below == (good < EDGES[0]).sum()
+        assert got.fall_time_above == (good > EDGES[-1]).sum()
+
+
+@pytest.mark.parametrize("over", [["height", "v0"], ["height"], ["v0"]])
+@pytest.mark.parametrize("at_once", [8 << 20, 2000])
+def test_reductions_are_those_of_the_cells(over, at_once, tmp_path, monkeypatch):
+    monkeypatch.setattr("sweep.store.assemble.CHUNK_BYTES", at_once)
+    cells = quiet(stone())
+    found = quiet(stone(whole(over=over)))
+    agree(found, cells, over)
+    with quiet(stone(whole(over=over)), tmp_path / "out.h5", block_cells=4) as stored:
+        same(stored, found)
+        xr.testing.assert_identical(stored.drop_attrs(), found.drop_attrs())
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["out.h5"]
+
+
+def test_without_a_word_everything_is_reduced_to_all_that_needs_no_edges():
+    found = quiet(stone({}))
+    assert found.fall_time_min.dims == ()
+    assert not [name for name in found if "histogram" in name]
+    assert found.fall_time_max == quiet(stone()).fall_time.max()
+
+
+def long_study(cells, **keys):
+    """Many cells, so that granules are shorter than groups."""
+    rng = np.random.default_rng(5)
+    heights = rng.lognormal(size=cells // 6)
+    heights[rng.random(cells // 6) < 0.1] *= -1
+    return stone(whole(**keys), axes={"height": heights, "v0": SPEEDS})
+
+
+@pytest.fixture(scope="module")
+def long():
+    return {over: quiet(long_study(12_000, over=list(over))) for over in (("height", "v0"), ("height",), ("v0",))}
+
+
+@settings(max_examples=9, deadline=None)
+@given(
+    over=st.sampled_from([("height", "v0"), ("height",), ("v0",)]),
+    cells=st.integers(400, 12_000),
+    workers=st.integers(1, 4),
+)
+def test_the_same_bits_for_any_block_shape_and_thread_count(tmp_path_factory, long, over, cells, workers):
+    path = tmp_path_factory.mktemp("run") / "out.h5"
+    study = long_study(12_000, over=list(over))
+    with quiet(study, path, workers=workers, block_cells=cells) as found:
+        same(found, long[over])
+
+
+def test_many_granules_agree_with_the_cells(long):
+    cells = quiet(build_study(allow_import=True, kernel="toy:KERNEL", outputs=["fall_time"],
+                              axes={n: a.values for n, a in long_study(12_000).axes.items()}))  # fmt: skip
+    assert granules(long_study(12_000)).per_group > 1000
+    agree(long["height", "v0"], cells, ["height", "v0"])
+    assert granules(long_study(12_000, over=["height"])).per_group > 100
+    agree(long["height",], cells, ["height"])
+
+
+def test_an_interrupted_summary_tells_of_what_there_is_and_ends_with_the_same_bits(tmp_path, long, monkeypatch):
+    study, output = long_study(12_000), tmp_path / "out.h5"
+    real = Reducer.solve
+
+    def failing(self, start, stop, rows):
+        if start > 300:
+            raise RuntimeError("stop here")
+        real(self, start, stop, rows)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Reducer, "solve", failing)
+        with pytest.raises(sweep.SweepError, match="stop here"):
+            quiet(study, output, block_cells=1000, workers=1)
+    done = len(list(folder_of(output).glob("*.h5")))
+    assert done
+    with sweep.open_result(output) as so_far:
+        found = account(so_far)
+        assert found.total == 12_000
+        assert 0 < found.pending < 12_000
+        assert so_far.fall_time_count == found.ok
+    with quiet(study, output, workers=3) as found:
+        same(found, long["height", "v0"])
+
+
+@pytest.mark.parametrize("place", [0, 2])
+def test_a_damaged_part_is_computed_again(tmp_path, long, monkeypatch, place):
+    study, output = long_study(12_000), tmp_path / "out.h5"
+    with monkeypatch.context() as patch:
+        patch.setattr("sweep.runs.run.assemble", lambda *a: (_ for _ in ()).throw(sweep.SweepError("enough")))
+        with pytest.raises(sweep.SweepError, match="enough"):
+            quiet(study, output, block_cells=4000)
+    part = sorted(folder_of(output).glob("*.h5"))[place]
+    with h5py.File(part, "r+") as file:
+        file["fall_time sum"][3] += 1
+    with quiet(study, output) as found:
+        same(found, long["height", "v0"])
+
+
+def test_traces_are_reduced_point_by_point():
+    keys = {"outputs": ["drop"], "along": {"phase": [0.0, 0.25, 1.0]}}
+    cells = quiet(stone(**keys))["drop"]
+    found = quiet(
+        stone({"over": ["height"], "outputs": {"drop": EVERYTHING}, "edges": {"drop": [0.0, 1.0, 5.0]}}, **keys)
+    )
+    assert found.drop_max.dims == ("v0", "phase")
+    np.testing.assert_array_equal(found.drop_max, cells.max("height"))
+    assert found.drop_histogram.dims == ("v0", "phase", "drop_bin")
+    for v, p in np.ndindex(6, 3):
+        good = cells.values[:, v, p][~np.isnan(cells.values[:, v, p])]
+        assert found.drop_histogram[v, p].values.tolist() == np.histogram(good, [0, 1, 5])[0].tolist()
+        assert found.drop_argmax_height[v, p] == cells.height[np.nanargmax(cells.values[:, v, p])]
+
+
+def test_arrays_and_words_are_told_at_an_extreme():
+    masses = [[1.0, 2.0], [5.0, 1.0], [0.1, 0.1]]
+    study = build_study(allow_import=True, kernel="beads:KERNEL", design="zip", outputs=["total"], summary={},
+                        axes={"mass": masses, "method": ["quick", "whole", "quick"]})  # fmt: skip
+    found = quiet(study)
+    assert found.total_argmax_mass.values.tolist() == [5.0, 1.0]
+    words = found.total_argmax_method.attrs["flag_meanings"].split()
+    assert (
+        words[list(found.total_argmax_method.attrs["flag_values"]).index(found.total_argmax_method.item())] == "whole"
+    )
+
+
+def test_a_result_of_a_summary_can_be_shown_and_run_again(tmp_path, capsys, read):
+    read("""
+[axes]
+height = [1.0, 2.0, -1.0]
+[summary]
+outputs.fall_time = ["min", "argmin", "histogram"]
+[summary.edges.fall_time]
+spacing = "log"
+start = 100
+stop = 1e4
+num = 3
+unit = "ms"
+""")
+    from sweep.cli import main
+
+    output = str(tmp_path / "out.h5")
+    assert main(["run", str(tmp_path / "fall.toml"), "-o", output, "--allow-import"]) == 0
+    assert "3 cells: 2 ok, 0 remarks, 1 refused, 0 failed, 0 pending" in capsys.readouterr().out
+    assert main(["show", output]) == 0
+    told = capsys.readouterr().out
+    assert "reduced over\n  height" in told
+    assert "fall_time_argmin_height" in told
+    assert "BAD_INPUT" in told
+    with sweep.open_result(output) as found:
+        np.testing.assert_array_equal(found.fall_time_bin_lower, [0.1, 1.0])
+        np.testing.assert_array_equal(found.fall_time_bin_upper, [1.0, 10.0])
+        assert found.fall_time_histogram.values.tolist() == [2, 0]
+    assert main(["run", str(tmp_path / "fall.toml"), "-o", output, "--allow-import"]) == 0
+    assert "done before" in capsys.readouterr().out
+
+
+@given(st.lists(st.floats(allow_nan=False, width=64, min_value=-1e300, max_value=1e300), min_size=1, max_size=70))
+def test_the_tree_sum_is_right_to_twice_the_digits(numbers):
+    total, rest = tree_sum(np.array([numbers]))
+    exact = sum(map(Fraction, numbers))
+    size = sum(abs(Fraction(n)) for n in numbers)
+    assert abs(Fraction(total[0]) + Fraction(rest[0]) - exact) <= size * Fraction(2) ** -98
+    assert total[0] + rest[0] == pytest.approx(float(exact), abs=float(size) * 1e-29, rel=2.3e-16)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "expected"),
+    [([math.inf, 1.0], math.inf), ([-math.inf, 1.0, 2.0], -math.inf), ([1e308, 1e308, 5.0], math.inf)],
+)
+def test_an_infinite_sum_stays_infinite(numbers, expected):
+    total, rest = tree_sum(np.array([numbers]))
+    assert (total[0], rest[0]) == (expected, 0.0)
+
+
+def test_infinities_are_values_and_nan_is_none():
+    study = stone({"outputs": {"fall_time": ["min", "max", "argmin", "argmax"]}}, axes={"height": np.arange(1.0, 5)})
+    reducer = Reducer(study)
+    for values, low, high in [
+        ([math.nan, math.inf, math.inf, math.nan], 1, 1),
+        ([-math.inf, math.nan, math.inf, 3.0], 0, 2),
+        ([math.nan, math.nan, math.nan, math.nan], -1, -1),
+        ([math.nan, -0.0, 0.0, math.nan], 1, 1),
+    ]:
+        zeros = np.zeros(4, np.int8)
+        found = reducer.reduce(10, 1, {"fall_time": np.array(values)}, zeros, zeros)
+        assert found["fall_time min at"] == (low + 10 if low >= 0 else -1)
+        assert found["fall_time max at"] == (high + 10 if high >= 0 else -1)
+        other = reducer.reduce(0, 1, {"fall_time": np.full(4, math.nan)}, zeros, zeros)
+        merge(other, found)
+        assert other["fall_time min at"] == found["fall_time min at"]
+
+
+@given(
+    groups=st.integers(1, 9),
+    group=st.integers(1, 60),
+    length=st.integers(1, 70),
+    room=st.integers(1, 80),
+    data=st.data(),
+)
+def test_strips_cover_the_rows_and_are_cut_at_the_same_places(groups, group, length, room, data):
+    grains = Granules(groups, group, min(length, group))
+    edges = [grains.first(row) for row in range(grains.count + 1)]
+    assert edges[-1] == grains.size
+    assert all(b > a for a, b in itertools.pairwise(edges))
+    assert set(range(0, grains.size + 1, group)) <= set(edges)
+    start = data.draw(st.integers(0, grains.count - 1))
+    stop = data.draw(st.integers(start + 1, grains.count))
+    at = edges[start]
+    for row, rows, cell, cells in grains.strips(start, stop, room):
+        assert cell == at
+        assert rows * cells <= room
+        if rows > 1:
+            assert edges[row : row + rows + 1] == list(range(cell, cell + rows * cells + 1, cells))
+        assert edges[row] <= cell < edges[row + 1]
+        assert (cell - edges[row]) % room == 0
+        at += rows * cells
+    assert at == edges[stop]
+
+
+def test_granules_depend_on_the_study_alone_and_stay_few():
+    def of(n, **keys):
+        axes = {"height": np.arange(1.0, n + 1), "v0": np.arange(1000.0)}
+        return granules(stone(whole(**keys), axes=axes))
+
+    assert of(10**6).length == 524288
+    assert of(10**6).count < 2048
+    assert of(10**6, over=["v0"]) == Granules(10**6, 1000, 1000)
+    assert of(1).length == 1
+
+
+MISTAKES = {
+    'over = "height"': ("summary.over", 'a list of axes, e.g. ["mu"]'),
+    "over = []": ("summary.over", "found an empty list"),
+    'over = ["hight"]': ("summary.over[0]", "did you mean height?"),
+    'over = ["height", "height"]': ("summary.over[1]", "stands twice"),
+    'outputs.fall_tim = ["min"]': ("summary.outputs.fall_tim", "did you mean fall_time?"),
+    'outputs.fall_time = ["mni"]': ("summary.outputs.fall_time[0]", "did you mean min?"),
+    "outputs.fall_time = []": ("summary.outputs.fall_time", "found an empty list"),
+    'outputs.fall_time = "min"': (
+        "summary.outputs.fall_time",
+        'a list of reductions, e.g. ["min", "max"], found "min"',
+    ),
+    'outputs.fall_time = ["histogram"]': ("summary.edges.fall_time", "missing; its histogram needs them"),
+    "edges.fall_time = [1, 2]": ("summary.edges.fall_time", 'ask for it: outputs.fall_time = ["histogram"]'),
+    'outputs.fall_time = ["histogram"]\nedges.fall_time = [1]': ("summary.edges.fall_time", "at least 2 edges"),
+    'outputs.fall_time = ["histogram"]\nedges.fall_time = [2, 1]': ("summary.edges.fall_time", "each larger"),
+    'outputs.fall_time = ["histogram"]\nedges.fall_time = [1, inf]': ("summary.edges.fall_time", "finite"),
+    "bins = 3": ("summary.bins", "no such key"),
+}
+
+
+@pytest.mark.parametrize("text", MISTAKES)
+def test_every_mistake_is_told(mistakes, text):
+    where, what = MISTAKES[text]
+    found = mistakes(f"axes.height = [1.0, 2.0]\n[summary]\n{text}\n")
+    assert what in found[where], found
+
+
+def test_a_zip_is_reduced_as_a_whole(mistakes):
+    found = mistakes('design = "zip"\naxes.height = [1.0, 2.0]\n[summary]\nover = ["height"]\n')
+    assert "are reduced together" in found["summary.over"]
+
+
+def test_the_summary_is_part_of_the_study():
+    study = stone(whole(over=["v0"]))
+    again = sweep.study.read.Study.from_json(study.to_json(), allow_import=True)
+    assert again == study
+    assert study != stone(whole())
+    assert list(stone(whole(over=["height"])).axes) == ["v0", "height"]
+    assert sweep.build_study(kernel="toy:KERNEL", allow_import=True, axes={"height": [1.0]},
+                             summary={"outputs": {"fall_time": ["min"]}}).outputs == ("fall_time",)  # fmt: skip
+
+
+def test_of_equal_extremes_the_first_cell_is_told():
+    """`rough` does not heed the speed: all cells of a height are equal, over many granules."""
+    speeds = np.arange(3000.0, 0.0, -1.0)
+    found = quiet(stone({}, axes={"height": [2.0], "v0": speeds}, method="rough", rtol=0.9))
+    assert granules(stone({}, axes={"height": [2.0], "v0": speeds})).per_group > 1
+    assert (found.fall_time_argmin_v0, found.fall_time_argmax_v0) == (3000.0, 3000.0)
+
+
+def test_a_summary_exports_as_a_table_of_the_kept_axes(tmp_path):
+    found = quiet(stone(whole(over=["v0"])))
+    lines = sweep.export(found, tmp_path / "out.csv").read_text().splitlines()
+    about = {line[2:].partition(":")[0]: line for line in lines if line.startswith("#")}
+    assert "0.1 to 1: cells in each bin" in about["fall_time_histogram_2 [1]"]
+    heading, *rows = [line.split(",") for line in lines if not line.startswith("#")]
+    assert len(rows) == len(HEIGHTS)
+    table = {name: [row[i] for row in rows] for i, name in enumerate(heading)}
+    assert table["cells_OK"] == ["0", "6", "6", "6", "0", "6", "6", "6", "6", "6"]
+    assert [float(x) for x in table["fall_time_min"]] == pytest.approx(found.fall_time_min.values, nan_ok=True)
+    assert table["fall_time_argmin_status"][:2] == ["PENDING", "OK"]
+    assert "cells_NEVER_STARTS" not in table

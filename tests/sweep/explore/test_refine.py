@@ -1,0 +1,166 @@
+"""Refined sweeps: interpolation as right as asked, borders followed, fewer cells than an even grid."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import LinearNDInterpolator
+
+import sweep
+from sweep.cli import main
+from sweep.explore.refine import _Refiner
+from sweep.system.errors import SweepError
+
+
+def foliot(**axes):
+    keys = {name: {"spacing": "log", "start": a, "stop": b, "num": n} for name, (a, b, n) in axes.items()}
+    return sweep.build_study(
+        kernel="foliot", axes=keys, fixed={"phi0": 1.0, "a": 1.0}, outputs=["period", "multiplier"]
+    )
+
+
+def toy(heights, v0):
+    keys = {"axes": {"height": heights, "v0": v0}, "outputs": ["fall_time"]}
+    return sweep.build_study(kernel="toy:KERNEL", allow_import=True, **keys)
+
+
+def test_a_curve_is_interpolated_as_right_as_asked():
+    study = foliot(mu=(1e-3, 1e5, 9))
+    found = sweep.refine(sweep.run(study), "period", 1e-4)
+    assert found.complete
+    assert found.error <= 1e-4
+    ds = found.dataset.sortby("mu")
+    mu = np.exp(np.random.default_rng(1).uniform(np.log(1e-3), np.log(1e5), 300))
+    truth = sweep.run(sweep.build_study(kernel="foliot", axes={"mu": mu}, fixed={"phi0": 1.0, "a": 1.0})).period
+    guess = np.exp(np.interp(np.log(mu), np.log(ds.mu.values), np.log(ds.period.values)))
+    assert float(abs(guess / truth - 1).max()) < 1.2e-4
+    assert found.dataset.sizes["cell"] < found.uniform / 1.5
+    assert found.dataset.sizes["cell"] == 9 + found.added
+
+
+def test_a_tighter_tolerance_costs_more_cells_as_the_square_root():
+    ds = sweep.run(foliot(mu=(1e-3, 1e5, 9)))
+    few, many = (sweep.refine(ds, "period", tolerance).added for tolerance in (1e-3, 1e-5))
+    assert 6 < many / few < 16
+
+
+def test_a_surface_with_a_border_of_statuses():
+    """period over mu and R: no start where R >= mu."""
+    study = foliot(mu=(0.1, 100.0, 7), R=(0.01, 10.0, 7))
+    ds = sweep.run(study)
+    found = sweep.refine(ds, ["period", "multiplier"], 1e-2, most_cells=8000)  # the period diverges at the border
+    whole = found.dataset
+    assert {0, 65} <= set(whole.status.values.tolist())
+    near = abs(np.log(whole.R / whole.mu)) < 0.1
+    assert int(near.sum()) > 60  # the border is followed
+    fine = whole.isel(cell=np.flatnonzero((whole.status == 0) & (whole.R / whole.mu < 0.5)))
+    guess = LinearNDInterpolator(np.log(np.stack([fine.mu, fine.R], axis=1)), np.log(fine.period.values))
+    rng = np.random.default_rng(2)
+    mu = np.exp(rng.uniform(np.log(1.0), np.log(90.0), 200))
+    R = mu * np.exp(rng.uniform(np.log(0.02), np.log(0.1), 200))
+    keys = {"fixed": {"phi0": 1.0, "a": 1.0}, "design": "zip"}
+    truth = sweep.run(sweep.build_study(kernel="foliot", axes={"mu": mu, "R": R}, **keys)).period.values
+    off = abs(np.exp(guess(np.log(mu), np.log(R))) / truth - 1)
+    assert np.nanmax(off) < 3e-2
+
+
+def test_beside_a_border_of_statuses_a_curve_is_interpolated_as_right_as_elsewhere():
+    """No start where mu <= R = 0.1; above, the period diverges."""
+    keys = {"fixed": {"phi0": 1.0, "a": 1.0, "R": 0.1}, "outputs": ["period"]}
+    axis = {"spacing": "log", "start": 1e-2, "stop": 1e4, "num": 5}
+    found = sweep.refine(sweep.run(sweep.build_study(kernel="foliot", axes={"mu": axis}, **keys)), "period", 1e-3)
+    assert found.complete
+    ds = found.dataset.isel(cell=np.flatnonzero(found.dataset.status == 0)).sortby("mu")
+    assert 0.1 < float(ds.mu[0]) < 0.1 * 1.1  # the border is followed
+    mu = np.exp(np.random.default_rng(1).uniform(np.log(ds.mu.values[0]), np.log(1e4), 500))
+    truth = sweep.run(sweep.build_study(kernel="foliot", axes={"mu": mu}, **keys)).period
+    guess = np.exp(np.interp(np.log(mu), np.log(ds.mu.values), np.log(ds.period.values)))
+    assert float(abs(guess / truth - 1).max()) < 1.2e-3
+
+
+def test_an_output_that_changes_its_sign_between_two_cells_is_followed():
+    boxes = _Refiner.__new__(_Refiner)
+    boxes.size, boxes.known = np.array([2.0]), {(0,): 0, (1,): 1, (2,): 2}
+    boxes.values = [np.array([0.0, value]) for value in (2.0, -1.0, 1.0)]
+    assert boxes._off((0,), 1) == pytest.approx(2.5 / 2)  # not a NaN that is passed over
+    boxes.values = [np.array([0.0, value]) for value in (1.0, 2.0, 4.0)]
+    assert boxes._off((0,), 1) < 1e-15
+    boxes.values = [np.array([0.0, value]) for value in (1e-320, 0.0, 1e-320)]
+    assert boxes._off((0,), 1) < 1e-300
+    boxes.values = [np.array([status, 1.0]) for status in (0.0, 65.0, 0.0)]
+    assert boxes._off((0,), 1) == np.inf
+
+
+def test_what_is_straight_needs_no_cells_but_the_middles():
+    study = toy([1.0, 2.0, 4.0, 8.0], [1e-9, 2e-9, 4e-9])
+    found = sweep.refine(sweep.run(study), "fall_time", 1e-3, study=study)
+    assert found.added == 7 * 5 - 12
+    assert found.complete
+    assert found.error < 1e-8
+
+
+def test_joined_cells_are_those_of_a_zip_study_and_can_be_run_again():
+    found = sweep.refine(sweep.run(foliot(mu=(1e-3, 1e3, 5))), "period", 1e-2)
+    study = sweep.study_of(found.dataset)
+    again = sweep.run(study)
+    np.testing.assert_array_equal(again.period, found.dataset.period)
+    assert len(np.unique(found.dataset.mu)) == found.dataset.sizes["cell"]
+
+
+def test_too_few_cells_allowed_is_told():
+    found = sweep.refine(sweep.run(foliot(mu=(1e-3, 1e3, 5))), "period", 1e-6, most_cells=40)
+    assert not found.complete
+    assert found.dataset.sizes["cell"] <= 40
+    assert "allow more cells" in str(found)
+    assert found.error > 1e-6  # what is left is told
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"y": "periods"}, "periods"),
+        ({"tolerance": 0.0}, "between 0 and 1"),
+        ({"axes": {"method": ["auto"]}}, "number axes"),
+        ({"axes": {"mu": [2.0, 1.0]}}, "rising"),
+        ({"design": "zip"}, "product"),
+    ],
+)
+def test_what_cannot_be_refined_is_told(change, message):
+    axes = {"mu": [1.0, 2.0], **change.get("axes", {})}
+    keys = {"fixed": {"phi0": 1.0, "a": 1.0}, "design": change.get("design", "product")}
+    ds = sweep.run(sweep.build_study(kernel="foliot", axes=axes, **keys))
+    with pytest.raises(SweepError, match=message):
+        sweep.refine(ds, change.get("y", "period"), change.get("tolerance", 0.1))
+
+
+def test_the_command_writes_a_result_like_any_other(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    sweep.run(foliot(mu=(1e-2, 1e3, 6)), "coarse.h5")
+    command = ["refine", "coarse.h5", "--y", "period", "--tolerance", "1e-2", "-o", "fine.h5"]
+    assert main(command) == 0
+    told = capsys.readouterr().out
+    assert "an even grid as fine has" in told
+    assert main(["verify", "fine.h5"]) == 0
+    ds = sweep.open_result("fine.h5", strict=True)
+    inside = sweep.refine(sweep.open_result("coarse.h5"), "period", 1e-2).dataset
+    np.testing.assert_array_equal(ds.period, inside.period)
+    np.testing.assert_array_equal(ds.mu, inside.mu)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["coarse.h5", "fine.h5"]
+    again = sweep.run(sweep.study_of(ds), "again.h5")
+    np.testing.assert_array_equal(again.period, ds.period)
+    assert main(command) == 0  # done before; nothing is lost by asking twice
+
+
+def test_a_refinement_that_was_stopped_takes_up_its_rounds(tmp_path, monkeypatch):
+    import sweep.runs.run
+
+    monkeypatch.chdir(tmp_path)
+    ds = sweep.run(foliot(mu=(1e-2, 1e3, 6)))
+    stored = sweep.runs.run.store_cells
+    monkeypatch.setattr("sweep.runs.run.store_cells", lambda *given: (_ for _ in ()).throw(KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        sweep.refine(ds, "period", 1e-2, path="fine.h5")
+    before = {p: p.stat().st_mtime_ns for p in (tmp_path / "fine.h5.rounds").iterdir()}
+    assert before
+    monkeypatch.setattr("sweep.runs.run.store_cells", stored)
+    monkeypatch.setattr("sweep.explore.refine.shutil.rmtree", lambda *given, **keys: None)
+    sweep.refine(ds, "period", 1e-2, path="fine.h5")
+    assert {p: p.stat().st_mtime_ns for p in (tmp_path / "fine.h5.rounds").iterdir()} == before

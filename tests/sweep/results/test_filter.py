@@ -1,0 +1,122 @@
+"""Conditions on cells: what they choose, and that nothing else can be written in them."""
+
+import contextlib
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import sweep
+from sweep.cli import main
+from sweep.system.errors import SweepError
+
+
+def result():
+    """Heights by initial speeds, one row refused."""
+    keys = {"axes": {"height": [-1.0, 1.0, 2.0, 3.0], "v0": [0.0, 1.0]}, "along": {"phase": {"num": 3}}}
+    return sweep.run(sweep.build_study(kernel="toy:KERNEL", allow_import=True, **keys))
+
+
+RESULT = result()
+
+
+H, V = np.meshgrid([-1.0, 1.0, 2.0, 3.0], [0.0, 1.0], indexing="ij")
+FALLS = H > 0
+SPEED = np.sqrt(V**2 + 2 * 9.80665 * np.where(FALLS, H, np.nan))
+
+
+@pytest.mark.parametrize(
+    ("condition", "mask"),
+    [
+        ("status == 'OK'", FALLS),
+        ("status != 'OK'", ~FALLS),
+        ("height > 1", H > 1),
+        ("1 < height <= 3 and v0 == 0", (H > 1) & (V == 0)),
+        ("not (height > 1 or v0 > 0.5)", (H <= 1) & (V <= 0.5)),
+        ("v0 < 0.4*height", V < 0.4 * H),
+        ("impact_speed**2 - 40 > 0", SPEED**2 > 40),
+        ("impact_speed / 2 > -(0 - 3)", SPEED > 6),
+        ("method_used == 'rough'", FALLS & (V == 0)),
+        ("g > 9", H == H),
+        ("-height == 1", H == -1),
+        ("2**height > 3", 2**H > 3),
+    ],
+)
+def test_cells_are_those_that_plain_numpy_chooses(condition, mask):
+    chosen = sweep.where(RESULT, condition)
+    assert chosen.status.dims == chosen.height.dims == chosen.v0.dims == ("cell",)
+    assert chosen.height.values.tolist() == H[mask].tolist()
+    assert chosen.v0.values.tolist() == V[mask].tolist()
+
+
+def test_a_chosen_cell_keeps_all_its_values():
+    chosen = sweep.where(RESULT, "height == 2 and v0 == 1")
+    for name in ("fall_time", "impact_speed", "drop", "status"):
+        np.testing.assert_array_equal(chosen[name][0], RESULT[name].sel(height=2.0, v0=1.0))
+    assert chosen.attrs == RESULT.attrs
+    assert chosen.fall_time.attrs == RESULT.fall_time.attrs
+    assert float(chosen.g) == float(RESULT.g)
+
+
+def test_a_result_of_a_zip_can_be_chosen_from_again():
+    once = sweep.where(RESULT, "status == 'OK'")
+    assert sweep.where(once, "v0 > 0").sizes["cell"] == 3
+
+
+@pytest.mark.parametrize(
+    ("condition", "message"),
+    [
+        ("heigth > 1", "did you mean height?"),
+        ("status == 'OKAY'", 'status is never "OKAY"; did you mean OK?'),
+        ("status == 0", "compares words with numbers"),
+        ("height", "is no condition"),
+        ("1 < 2", "two constants"),
+        ("drop > 0", "runs along phase"),
+        ("height >", "cannot be read"),
+        ("height > 1/0", "cannot be read"),
+        ("__import__('os').system('true')", "is not allowed"),
+        ("height.real > 0", "is not allowed"),
+        ("[h for h in height]", "is not allowed"),
+        ("(lambda: 1)() == height", "is not allowed"),
+        ("height > True", "is not allowed"),
+        ("height and v0", "is no condition"),
+        ("'a' + 'b' == status", "is no number"),
+        ("height > " + "1+" * 900 + "1", "longer than"),
+    ],
+)
+def test_what_is_no_condition_is_told(condition, message):
+    with pytest.raises(SweepError) as caught:
+        sweep.where(RESULT, condition)
+    assert message in str(caught.value)
+
+
+@given(st.text("heigtv0 <>=()'andor.+-*/_[]1e9", max_size=30))
+def test_any_text_is_a_condition_or_told(text):
+    with contextlib.suppress(SweepError):
+        assert sweep.where(RESULT, text).sizes["cell"] <= 8
+
+
+def test_export_takes_a_condition(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    sweep.run(sweep.build_study(kernel="foliot", axes={"mu": [-1.0, 1.0, 4.0]}, fixed={"phi0": 1.0, "a": 1.0}), "f.h5")
+    assert main(["export", "f.h5", "-o", "f.csv", "--where", "status == 'OK' and mu < 2"]) == 0
+    table = pd.read_csv("f.csv", comment="#")
+    assert table.mu.tolist() == [1.0]
+    for mistake in ("mu < ", ""):
+        assert main(["export", "f.h5", "-o", "g.csv", "--where", mistake]) == 2
+        assert "cannot be read" in capsys.readouterr().err
+
+
+def test_a_number_beyond_all_is_infinite_and_nothing_is_above_it():
+    assert sweep.where(RESULT, "height > 9**9**9**9").sizes["cell"] == 0
+    assert sweep.where(RESULT, "height < 1e400").sizes["cell"] == 8
+
+
+def test_a_summary_has_no_cells_to_choose_from_or_to_refine():
+    summary = RESULT.drop_vars(["status", "method_used"])
+    with pytest.raises(SweepError, match="a summary keeps no cells"):
+        sweep.where(summary, "height > 1")
+    with pytest.raises(SweepError, match="a summary keeps no cells"):
+        sweep.refine(summary, "fall_time", 0.1, study=sweep.study_of(RESULT, allow_import=True))

@@ -1,0 +1,149 @@
+"""Files that nobody vouches for: no traceback, no hang, no foreign code, no path out of its folder."""
+
+import pickle
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import pytest
+import toy_studies
+from fuzzing import STUDY, fuzz_result, fuzz_study, prepared, quietly
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from running import environment, quiet, tall
+
+import sweep
+from sweep.results.verify import verify
+from sweep.store import seal
+from sweep.system.errors import StudyError, SweepError
+
+SHARED = [HealthCheck.function_scoped_fixture]
+GOLDEN = Path(__file__).parents[2] / "golden" / "format_1.h5"
+
+
+@settings(max_examples=200, deadline=2000, suppress_health_check=SHARED)
+@given(seed=st.integers(0, 2**63))
+def test_a_study_of_nonsense_is_read_or_refused(tmp_path, seed):
+    assert fuzz_study(random.Random(seed), tmp_path) in ("read", "refused")
+
+
+@settings(max_examples=100, deadline=2000, suppress_health_check=SHARED)
+@given(content=st.binary(max_size=300) | st.text(max_size=300).map(lambda text: text.encode("utf-8", "replace")))
+def test_any_bytes_as_a_study_are_refused(tmp_path, content):
+    path = tmp_path / "study.toml"
+    path.write_bytes(content)
+    with pytest.raises(SweepError):
+        sweep.read_study(path)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    return prepared(tmp_path_factory.mktemp("whole"))
+
+
+def test_commands_on_a_damaged_result_end_with_a_message(whole, tmp_path):
+    for seed in range(5):
+        assert set(fuzz_result(random.Random(seed), whole, tmp_path)) <= {0, 2}, seed
+
+
+def test_a_file_that_hdf5_cannot_come_to_an_end_with_is_given_up(whole, tmp_path, monkeypatch):
+    """HDF5 2.0 loops for ever in some damaged files; the process that tries them first takes the blow."""
+    monkeypatch.setattr(seal, "PROBE", "while True: pass")
+    monkeypatch.setattr(seal, "PROBE_SECONDS", 0.3)
+    path = tmp_path / "out.h5"
+    path.write_bytes(whole.read_bytes() + b"x")
+    begun = time.monotonic()
+    with pytest.raises(SweepError, match="damaged"):
+        sweep.open_result(path)
+    assert not verify(path).whole
+    assert time.monotonic() - begun < 20
+
+
+def test_a_result_that_was_changed_on_purpose_can_still_be_opened(whole, tmp_path):
+    path = tmp_path / "out.h5"
+    path.write_bytes(whole.read_bytes())
+    with h5py.File(path, "r+") as file:
+        file.attrs["comment"] = "mine"
+    with sweep.open_result(path) as found:
+        assert found.attrs["comment"] == "mine"
+    assert not verify(path).whole
+
+
+@pytest.mark.parametrize("name", ["../secret.csv", "/etc/passwd", "sub/../../secret.csv", "link.csv", "\0", "a" * 5000])
+def test_a_study_names_no_file_outside_of_its_folder(tmp_path, name):
+    (tmp_path / "secret.csv").write_text("height\n1\n2\n")
+    folder = tmp_path / "study"
+    (folder / "sub").mkdir(parents=True)
+    (folder / "link.csv").symlink_to(tmp_path / "secret.csv")
+    text = name.replace("\0", "\\u0000")
+    (folder / "study.toml").write_text(f'kernel = "toy:KERNEL"\noutputs = ["fall_time"]\naxes.height.file = "{text}"\n')
+    with pytest.raises(StudyError) as told:
+        sweep.read_study(folder / "study.toml", allow_import=True)
+    assert [m.where for m in told.value.mistakes] == ["axes.height.file"]
+
+
+def test_a_path_of_python_may_be_anywhere(tmp_path):
+    (tmp_path / "points.csv").write_text("height\n1\n2\n")
+    found = toy_studies.build(axes={"height": {"file": tmp_path / "points.csv"}})
+    assert found.axes["height"].values.tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize("command", ["run", "plan"])
+def test_foreign_code_runs_only_where_it_is_allowed(tmp_path, command):
+    (tmp_path / "evil.py").write_text("raise SystemExit('run')\n")
+    path = tmp_path / "study.toml"
+    path.write_text('kernel = "evil:KERNEL"\naxes.height = [1.0]\n')
+    assert quietly(command, path) == 2
+
+
+def test_no_result_or_part_is_unpickled(whole, tmp_path, monkeypatch):
+    monkeypatch.setattr(pickle, "loads", None)
+    monkeypatch.setattr(pickle, "load", None)
+    monkeypatch.setattr(pickle, "Unpickler", None)
+    with sweep.open_result(whole) as found:
+        found.load()
+    assert verify(whole).whole
+    quiet(tall(30), tmp_path / "out.h5", block_cells=10).close()
+
+
+READERS = {
+    "h5py": "import h5py; f = h5py.File(path); print(f['fall_time'][1, 2])",
+    "h5netcdf": "import xarray; print(xarray.open_dataset(path, engine='h5netcdf').fall_time.values[1, 2])",
+    "netcdf4": "import xarray; print(xarray.open_dataset(path, engine='netcdf4').fall_time.values[1, 2])",
+    "netCDF4": "import netCDF4; print(netCDF4.Dataset(path)['fall_time'][1, 2])",
+}
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_the_golden_file_of_format_1_opens_with_every_reader(reader):
+    pytest.importorskip({"netcdf4": "netCDF4"}.get(reader, reader))
+    code = f"path = {str(GOLDEN)!r}\n{READERS[reader]}"
+    done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True, text=True)
+    # 2 h / (v0 + sqrt(v0^2 + 2 g h)) of h = 3, v0 = 2
+    assert float(done.stdout) == pytest.approx(6 / (2 + (4 + 6 * 9.80665) ** 0.5), rel=1e-15), done.stderr
+
+
+def test_the_golden_file_of_format_1_is_read_and_whole():
+    with sweep.open_result(GOLDEN, strict=True) as found:
+        assert found.sizes == {"v0": 2, "height": 3, "phase": 3}
+        assert found.height.values.tolist() == [-1.0, 1.0, 3.0]
+        assert found.status.values[0].tolist() == [64, 0, 0]
+        assert found.fall_time.attrs["units"] == "s"
+    assert verify(GOLDEN).whole
+    assert quietly("show", GOLDEN) == 0
+
+
+def test_ncdump_lists_the_golden_file():
+    import shutil
+
+    if shutil.which("ncdump") is None:
+        pytest.skip("ncdump is not installed")
+    done = subprocess.run(["ncdump", "-h", str(GOLDEN)], capture_output=True, text=True)
+    assert "double fall_time(v0, height)" in done.stdout
+
+
+def test_the_study_that_nonsense_is_made_of_is_a_sound_one(read):
+    assert read(STUDY, head="").kernel_name == "toy:KERNEL"

@@ -1,0 +1,358 @@
+import json
+import shutil
+import warnings
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+from kernels.interface import Status
+from sweep.cells.fingerprint import fingerprint
+from sweep.cells.solve import Solver
+from sweep.results import open, statuses
+from sweep.results.open import open_result
+from sweep.results.statuses import count_methods, count_statuses, failures
+from sweep.runs.run import run
+from sweep.store.assemble import CHUNK_CELLS, chunk_shape
+from sweep.store.canvas import Canvas
+from sweep.store.store import folder_of
+from sweep.study.model import Study
+from sweep.study.read import build_study
+from sweep.system.errors import SweepError
+
+
+def stone(**keys):
+    keys = {
+        "title": "A stone",
+        "axes": {"height": [-1.0, 1.0, 2.0, 5.0], "v0": [0.0, 0.5, 3.0], "method": ["rough", "auto"]},
+        "along": {"phase": [0.0, 0.25, 1.0]},
+        "rtol": 0.01,
+        **keys,
+    }
+    keys = {name: value for name, value in keys.items() if value is not None}
+    return build_study(allow_import=True, kernel="toy:KERNEL", **keys)
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    path = tmp_path_factory.mktemp("stored") / "out.h5"
+    run(stone(), path, block_cells=5, progress=False).close()
+    return path
+
+
+@pytest.fixture
+def unfinished(tmp_path):
+    """An output of 24 cells whose cells 10 to 14 are missing."""
+    path = tmp_path / "out.h5"
+    real = Solver.solve
+
+    def failing(self, start, stop, *rest):
+        if (start, stop) == (10, 15):
+            raise RuntimeError("stop here")
+        real(self, start, stop, *rest)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Solver, "solve", failing)
+        patch.setattr("sweep.runs.session.order", lambda sample, blocks, first: np.array([0, 1, 3, 4, 2]))
+        with pytest.raises(SweepError, match="stop here"):
+            run(stone(), path, block_cells=5, workers=1, progress=False)
+    for index in (3, 4):
+        assert list(folder_of(path).glob(f"{5 * index:012d}-*.h5"))
+    return path
+
+
+@pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
+def test_the_file_opens_with_plain_xarray(stored, engine):
+    with xr.open_dataset(stored, engine=engine) as plain, open_result(stored) as ours:
+        assert plain.sizes == {"height": 4, "v0": 3, "method": 2, "phase": 3}
+        assert set(plain.coords) == {"height", "v0", "method", "phase", "g"}
+        assert plain.method.values.tolist() == ["rough", "auto"]
+        for name in ours.data_vars:
+            assert plain[name].dtype == ours[name].dtype
+            np.testing.assert_array_equal(plain[name], ours[name])
+
+
+def test_the_file_opens_with_the_netcdf_library(stored):
+    import netCDF4 as netcdf
+
+    with netcdf.Dataset(stored) as file:
+        assert file["drop"].dimensions == ("height", "v0", "method", "phase")
+        assert file["status"].dtype == np.int8
+        assert "_FillValue" not in file["status"].ncattrs()
+        assert "_FillValue" not in file["fall_time"].ncattrs()
+        assert file["status"][0, 0, 0] == Status.BAD_INPUT
+        assert file["g"].dimensions == ()
+
+
+def test_the_file_opens_with_plain_h5py_and_is_stored_as_promised(stored):
+    with h5py.File(stored) as file:
+        assert file["fall_time"].shape == (4, 3, 2)
+        assert file["fall_time"].chunks is None
+        assert file["fall_time"].compression is None
+        assert file["status"].compression == "gzip"
+        assert file["method_used"].compression == "gzip"
+        assert [scale[0].name for scale in file["drop"].dims] == ["/height", "/v0", "/method", "/phase"]
+
+
+def test_attributes_follow_cf(stored):
+    with open_result(stored) as found:
+        assert found.attrs["Conventions"] == "CF-1.11"
+        assert (found.attrs["title"], found.attrs["kernel"], found.attrs["design"]) == (
+            "A stone",
+            "toy:KERNEL",
+            "product",
+        )
+        assert found.fall_time.attrs == {
+            "units": "s",
+            "long_name": "time until the ground is reached",
+            "ancillary_variables": "status method_used",
+        }
+        assert found.height.attrs == {"units": "m", "long_name": "height above the ground"}
+        assert found.g.attrs["units"] == "m/s^2"
+        assert "units" not in found.method.attrs
+        assert found.status.attrs["flag_values"].dtype == np.int8
+        flags = dict(zip(found.status.attrs["flag_meanings"].split(), found.status.attrs["flag_values"], strict=True))
+        assert flags == {s.name: int(s) for s in Status}
+        used = found.method_used.attrs
+        assert dict(zip(used["flag_meanings"].split(), used["flag_values"].tolist(), strict=True)) == {
+            "none": -1, "rough": 0, "exact": 1,
+        }  # fmt: skip
+
+
+def test_what_is_an_axis_is_no_attribute(stored):
+    with open_result(stored) as found:
+        assert "method" not in found.attrs
+        assert found.attrs["rtol"] == 0.01
+    found = run(stone(axes={"height": [1.0], "rtol": [1e-3, 1e-9]}, rtol=None), progress=False)
+    assert "rtol" not in found.attrs
+    assert found.attrs["method"] == "auto"
+    assert found.rtol.attrs["units"] == "1"
+
+
+def test_the_file_alone_suffices_to_run_it_again(stored, tmp_path):
+    with open_result(stored) as found:
+        study = Study.from_json(found.attrs["study_json"], allow_import=True)
+        assert json.loads(found.attrs["fingerprint"]) == fingerprint(study)
+        with run(study, tmp_path / "again.h5", progress=False) as again:
+            for name in found.data_vars:
+                assert again[name].values.tobytes() == found[name].values.tobytes()
+            assert again.attrs["study_json"] == found.attrs["study_json"]
+
+
+def test_attributes_longer_than_64_kilobytes_are_kept(tmp_path):
+    study = stone(axes={"height": np.linspace(1, 2, 20_000)}, outputs=["fall_time"], along={})
+    assert len(study.to_json()) > 65536
+    with run(study, tmp_path / "long.h5", progress=False) as found:
+        assert found.attrs["study_json"] == study.to_json()
+
+
+def test_missing_cells_of_an_unfinished_sweep_are_nan_and_pending(unfinished, stored):
+    found, whole = open_result(unfinished), open_result(stored)
+    pending = found.status.values.ravel() == Status.PENDING
+    assert np.flatnonzero(pending).tolist() == [10, 11, 12, 13, 14]
+    for name in ("fall_time", "impact_speed"):
+        values = found[name].values.ravel()
+        assert np.isnan(values[pending]).all()
+        np.testing.assert_array_equal(values[~pending], whole[name].values.ravel()[~pending])
+    assert (found.method_used.values.ravel()[pending] == -1).all()
+    assert np.isnan(found["drop"].values.reshape(24, 3)[pending]).all()
+    xr.testing.assert_identical(found.height, whole.height.load().drop_vars("g").assign_coords(g=found.g))
+
+
+@pytest.mark.parametrize(
+    "name", [f"000000000001-000000000002.{'0' * 32}.h5", f"000000990000-000000990005.{'0' * 32}.h5", "{}{}.h5"]
+)
+def test_strange_and_doubled_parts_hide_no_sound_one(unfinished, name):
+    with open_result(unfinished) as before:
+        before.load()
+    for part in sorted(folder_of(unfinished).glob("*-*.h5")):
+        for letter in "0f":
+            path = part.with_name(name.format(part.name[:26], letter * 32))
+            path.write_bytes(part.read_bytes())
+    for most in (open.LARGEST_AT_ONCE, 0):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(open, "LARGEST_AT_ONCE", most)
+            with open_result(unfinished) as found:
+                xr.testing.assert_identical(found.load(), before)
+
+
+def test_an_unfinished_sweep_is_refused_when_strict(unfinished):
+    with pytest.raises(SweepError, match="1 of 5 blocks are missing"):
+        open_result(unfinished, strict=True)
+
+
+def test_a_finished_sweep_is_opened_when_strict(stored):
+    open_result(stored, strict=True).close()
+
+
+def test_a_damaged_part_of_an_unfinished_sweep_is_pending(unfinished):
+    part = min(folder_of(unfinished).glob("*.h5"))
+    part.write_bytes(part.read_bytes()[:3000])
+    assert (open_result(unfinished).status.values.ravel()[:5] == Status.PENDING).all()
+
+
+def test_an_unfinished_sweep_is_read_without_its_kernel(unfinished, monkeypatch):
+    monkeypatch.setattr("sweep.study.kernels.load_kernel", None)
+    assert open_result(unfinished).fall_time.attrs["units"] == "s"
+
+
+def test_large_results_come_in_pieces_and_are_the_same(unfinished, stored, monkeypatch):
+    few, whole = open_result(unfinished).load(), open_result(stored).load()
+    monkeypatch.setattr(open, "memory", lambda: 100)
+    for path, expected in ((unfinished, few), (stored, whole)):
+        found = open_result(path)
+        assert found["drop"].chunks is not None
+        for name in expected.data_vars:
+            assert found[name].dtype == expected[name].dtype
+            np.testing.assert_array_equal(found[name].compute(), expected[name])
+
+
+def test_a_sweep_that_ends_while_it_is_read_is_opened_finished(unfinished, stored, monkeypatch):
+    real = open.read_part
+
+    def ending(*rest, **keys):
+        monkeypatch.setattr(open, "read_part", real)
+        shutil.rmtree(folder_of(unfinished))
+        shutil.copy(stored, unfinished)
+        return real(*rest, **keys)
+
+    monkeypatch.setattr(open, "read_part", ending)
+    assert (open_result(unfinished).status != Status.PENDING).all()
+
+
+def test_nothing_at_all_is_one_clear_line(tmp_path):
+    with pytest.raises(SweepError, match="no such file, and no sweep"):
+        open_result(tmp_path / "none.h5")
+
+
+@pytest.mark.parametrize("content", [b"", b"words", b"\x89HDF\r\n\x1a\n" + bytes(100)])
+def test_a_foreign_file_is_one_clear_line(tmp_path, content):
+    path = tmp_path / "foreign.h5"
+    path.write_bytes(content)
+    with pytest.raises(SweepError, match="not the result of a sweep, or damaged") as told:
+        open_result(path)
+    assert "\n" not in str(told.value)
+
+
+def test_a_folder_is_one_clear_line(tmp_path):
+    with pytest.raises(SweepError, match="is a folder"):
+        open_result(tmp_path)
+
+
+def test_a_result_cut_short_is_one_clear_line(stored, tmp_path):
+    path = tmp_path / "cut.h5"
+    path.write_bytes(stored.read_bytes()[:-500])
+    with pytest.raises(SweepError, match="not the result of a sweep, or damaged"):
+        open_result(path)
+
+
+def test_times_stay_numbers(tmp_path):
+    study = build_study(allow_import=True, kernel="slow:DAYS", axes={"height": [1.0]}, outputs=["fall_time"])
+    with run(study, tmp_path / "days.h5", progress=False) as found:
+        assert found.fall_time.dtype == np.float64
+        assert found.fall_time.attrs["units"] == "days"
+
+
+def test_statuses_are_counted_with_an_example(stored):
+    with open_result(stored) as found:
+        told = [str(count) for count in count_statuses(found)]
+        # v0 = 3 on the rough method promises less than rtol
+        assert told[-1] == "6 of 24 cells: BAD_INPUT, e.g. height=-1.0 v0=0.0 method=rough"
+        assert sum(count.cells for count in count_statuses(found)) == 24
+        assert [c.name for c in failures(found)] == ["INACCURATE", "BAD_INPUT"]
+        assert count_methods(found).keys() == {"rough", "exact"}
+        assert sum(count_methods(found).values()) == 18
+
+
+def flags(shape, **special):
+    values = np.zeros(shape, "i1")
+    for number, index in special.values():
+        values[index] = number
+    dims = ("x", "y", "z")[: len(shape)]
+    coords = {d: np.arange(n) / 4 for d, n in zip(dims, shape, strict=True)}
+    return xr.Dataset({"status": (dims, values)}, coords)
+
+
+@pytest.mark.parametrize("at_once", [1, 3, 7, 1000])
+def test_statuses_are_counted_the_same_in_any_pieces(monkeypatch, at_once):
+    monkeypatch.setattr(statuses, "CELLS_AT_ONCE", at_once)
+    found = flags((3, 4, 5), first=(65, (1, 2, 3)), second=(65, (2, 0, 0)), third=(127, (2, 3, 4)))
+    assert [str(count) for count in count_statuses(found)] == [
+        "57 of 60 cells: OK",
+        "2 of 60 cells: NEVER_STARTS, e.g. x=0.25 y=0.5 z=0.75",
+        "1 of 60 cells: PENDING, e.g. x=0.5 y=0.75 z=1.0",
+    ]
+
+
+def test_examples_of_a_zip_name_its_axes_only():
+    found = run(stone(design="zip", axes={"height": [1.0, -2.5], "v0": [0.0, 0.1]}), progress=False)
+    assert str(failures(found)[-1]) == "1 of 2 cells: BAD_INPUT, e.g. height=-2.5 v0=0.1"
+
+
+def test_a_status_of_a_later_version_is_told_by_its_number():
+    assert str(count_statuses(flags((2,), later=(42, 1)))[1]) == "1 of 2 cells: status 42, e.g. x=0.25"
+
+
+@pytest.mark.parametrize("shape", [(7,), (10**6,), (1000, 1000), (3, 10**6), (100, 100, 100, 100), (1, 1, 5)])
+def test_chunks_follow_the_order_of_cells(shape):
+    chunks = chunk_shape(shape)
+    assert np.prod(chunks) <= CHUNK_CELLS
+    split = next((d for d in range(len(shape)) if chunks[d] > 1), len(shape) - 1)
+    assert chunks[split + 1 :] == shape[split + 1 :]
+    assert np.prod(chunks) > min(CHUNK_CELLS, np.prod(shape)) / 2
+
+
+def test_hdf5_never_notices_that_the_disk_fails(tmp_path, monkeypatch):
+    from sweep.system import disk
+
+    real, calls = disk.pwrite, []
+
+    def failing(*args):
+        calls.append(args)
+        if len(calls) == 3:
+            raise OSError(28, "No space left on device")
+        return real(*args)
+
+    monkeypatch.setattr(disk, "pwrite", failing)
+    with (tmp_path / "file").open("w+b") as raw:
+        canvas = Canvas(raw.fileno())
+        with h5py.File(canvas, "w") as file:
+            file["x"] = np.arange(1000.0)
+            file.attrs["long"] = "x" * 10_000
+        with h5py.File(canvas, "r") as file:
+            np.testing.assert_array_equal(file["x"], np.arange(1000.0))
+            assert file.attrs["long"] == "x" * 10_000
+        assert len(calls) == 3
+        with pytest.raises(OSError, match="No space"):
+            canvas.finish()
+
+
+def test_what_hdf5_never_wrote_is_zero_and_the_file_gets_its_size(tmp_path):
+    with (tmp_path / "file").open("w+b") as raw:
+        canvas = Canvas(raw.fileno())
+        canvas.seek(10)
+        canvas.write(b"abc")
+        canvas.truncate(100)
+        assert canvas.piece(0, 20) == bytes(10) + b"abc" + bytes(7)
+        assert (canvas.seek(-1, 2), canvas.seek(-9, 1)) == (99, 90)
+        canvas.finish()
+    assert (tmp_path / "file").stat().st_size == 100
+
+
+def test_results_open_without_a_warning(stored):
+    with warnings.catch_warnings(), open_result(stored) as found:
+        warnings.simplefilter("error")
+        assert found.load() is found
+
+
+def test_a_result_that_is_open_can_be_opened_and_run_again_and_closing_it_frees_the_file(tmp_path):
+    study = build_study(kernel="foliot", axes={"mu": [1.0, 2.0]}, fixed={"a": 1.0, "phi0": 1.0})
+    path = tmp_path / "out.h5"
+    first = run(study, path, progress=False)
+    second, third = run(study, path, progress=False), open_result(path)
+    assert first.period.values.tolist() == second.period.values.tolist() == third.period.values.tolist()
+    for dataset in (first, second, third):
+        dataset.close()
+    with h5py.File(path, "r+") as file:
+        assert file["period"].shape == (2,)

@@ -1,0 +1,173 @@
+"""A finished result grows by the new cells only, and ends as one run would have made it."""
+
+import numpy as np
+import pytest
+import toy_studies
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from running import quiet, same
+
+import sweep
+from sweep.cells.solve import Solver, _Strip
+from sweep.cli import main
+from sweep.runs import extend as extending
+from sweep.store.store import folder_of
+from sweep.system.errors import SweepError
+
+HEIGHTS = np.round(np.linspace(-1.0, 9.0, 21), 3)
+SPEEDS = np.array([0.0, 0.5, 3.0, np.nan, 1e4])
+
+
+def study(heights=HEIGHTS, speeds=SPEEDS, **keys):
+    keys = {"outputs": ["fall_time", "drop"], "along": {"phase": [0.0, 0.5, 1.0]}, **keys}
+    return toy_studies.build(axes={"height": heights, "v0": speeds}, **keys)
+
+
+@pytest.fixture
+def output(tmp_path):
+    return tmp_path / "out.h5"
+
+
+@pytest.fixture
+def solved(monkeypatch):
+    """The cells that methods were asked for, apart from those of samples."""
+    counts = []
+    real, sampling = _Strip.run, []
+
+    def run(self, number, cells):
+        if not sampling:
+            counts.append(len(self.status[cells]))
+        real(self, number, cells)
+
+    from sweep.runs import session
+
+    take = session.take_sample
+    warm = Solver.warm
+
+    def quietly(action):
+        def acting(*rest):
+            sampling.append(1)
+            try:
+                return action(*rest)
+            finally:
+                sampling.pop()
+
+        return acting
+
+    monkeypatch.setattr(session, "take_sample", quietly(take))
+    monkeypatch.setattr(Solver, "warm", quietly(warm))
+    monkeypatch.setattr(_Strip, "run", run)
+    return counts
+
+
+chosen = st.tuples(
+    st.sets(st.integers(0, 20), min_size=1, max_size=20), st.sets(st.integers(0, 4), min_size=1, max_size=5)
+)
+
+
+@settings(max_examples=10, deadline=None)
+@given(rows=chosen, cells=st.integers(3, 110), before=st.integers(3, 110))
+def test_an_extended_result_is_bit_for_bit_that_of_one_run(tmp_path_factory, rows, cells, before):
+    output = tmp_path_factory.mktemp("run") / "out.h5"
+    few = study(HEIGHTS[sorted(rows[0])], SPEEDS[sorted(rows[1])])
+    quiet(few, output, block_cells=before).close()
+    with quiet(study(), output, extend=True, block_cells=cells) as found:
+        same(found, quiet(study()))
+    assert list(output.parent.iterdir()) == [output]
+
+
+def test_only_new_cells_are_computed(output, solved):
+    heights, speeds = np.arange(1.0, 31), np.arange(5.0)
+    keys = {"method": "exact"}
+    quiet(study(heights[::2], speeds[:4], **keys), output).close()
+    assert sum(solved) == 15 * 4
+    solved.clear()
+    with quiet(study(heights, speeds, **keys), output, extend=True, block_cells=7) as found:
+        assert sum(solved) == 30 * 5 - 15 * 4
+        same(found, quiet(study(heights, speeds, **keys)))
+
+
+def test_old_cells_are_taken_from_the_file(output, monkeypatch):
+    quiet(study(), output).close()
+    with extending.Known(output, study(np.append(HEIGHTS, 20.0))) as known:
+        assert known.cells == 105
+        assert known.missing(0, 110).tolist() == [False] * 105 + [True] * 5
+        assert known.missing(104, 107).tolist() == [False, True, True]
+
+
+def test_a_killed_extension_continues(output, monkeypatch):
+    few, more = study(HEIGHTS[3:]), study()
+    quiet(few, output).close()
+    real = Solver.solve
+
+    def failing(self, start, stop, *rest):
+        if (start, stop) == (10, 15):
+            raise RuntimeError("stop here")
+        real(self, start, stop, *rest)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Solver, "solve", failing)
+        patch.setattr("sweep.runs.session.order", lambda sample, blocks, first: np.arange(blocks.count))
+        with pytest.raises(SweepError, match="stop here"):
+            quiet(more, output, extend=True, block_cells=5, workers=1)
+    with sweep.open_result(output) as before:
+        same(before, quiet(few))
+    assert list(folder_of(output).glob("*.h5"))
+    with pytest.raises(SweepError, match="--extend"):
+        quiet(more, output)
+    with quiet(more, output, extend=True) as found:
+        same(found, quiet(more))
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"heights": HEIGHTS[1:]}, r"axes\.height: 1 of its 21 values so far are not among the new ones, e\.g\. -1"),
+        ({"heights": HEIGHTS[::-1]}, r"axes\.height: its values so far stand in another order"),
+        ({"heights": np.append(HEIGHTS[:-1], np.nextafter(9.0, 10))}, "to the last digit"),
+        ({"speeds": np.append(np.where(SPEEDS == 0, -0.0, SPEEDS), 2e4)}, "0 is not; extended, an axis keeps"),
+        ({"heights": np.append(HEIGHTS, 20.0), "fixed": {"g": 1.6}}, "cannot be extended, for fixed"),
+        ({"heights": np.append(HEIGHTS, 20.0), "rtol": 1e-3}, "cannot be extended, for rtol differs, too"),
+        ({"heights": np.append(HEIGHTS, 20.0), "outputs": ["fall_time"], "along": {}}, "cannot be extended, for"),
+        ({"heights": np.append(HEIGHTS, 20.0), "summary": {}}, "cannot be extended, for summary"),
+    ],
+)
+def test_what_cannot_be_extended_is_told_and_kept(output, keys, told):
+    quiet(study(), output).close()
+    before = output.read_bytes()
+    with pytest.raises(SweepError, match=told):
+        quiet(study(**keys), output, extend=True)
+    assert output.read_bytes() == before
+    assert list(output.parent.iterdir()) == [output]
+
+
+def test_a_damaged_result_is_not_extended(output):
+    quiet(study(), output).close()
+    import h5py
+
+    with h5py.File(output, "r+") as file:
+        file["fall_time"][3, 0] = 7.0
+    with pytest.raises(SweepError, match="not whole"):
+        quiet(study(np.append(HEIGHTS, 20.0)), output, extend=True)
+
+
+def test_a_summary_and_a_zip_are_not_extended(output):
+    quiet(study(summary={}), output).close()
+    with pytest.raises(SweepError, match="holds a summary"):
+        quiet(study(np.append(HEIGHTS, 20.0), summary={}), output, extend=True)
+    zipped = output.with_name("zip.h5")
+    quiet(study(HEIGHTS[:3], SPEEDS[:3], design="zip"), zipped).close()
+    with pytest.raises(SweepError, match='design is not "product"'):
+        quiet(study(HEIGHTS[:4], SPEEDS[:4], design="zip"), zipped, extend=True)
+
+
+def test_extend_on_the_command_line(tmp_path, read, capsys):
+    read('[axes.height]\nspacing = "log"\nstart = 1\nstop = 100\nnum = 11\n')
+    path, output = str(tmp_path / "fall.toml"), str(tmp_path / "out.h5")
+    assert main(["run", path, "-o", output, "--allow-import"]) == 0
+    read('[axes.height]\nspacing = "log"\nstart = 1\nstop = 10000\nnum = 21\n')
+    assert main(["run", path, "-o", output, "--allow-import"]) == 2
+    assert "--extend computes the new cells alone" in capsys.readouterr().err
+    assert main(["run", path, "-o", output, "--allow-import", "--extend"]) == 0
+    assert "21 cells: 21 ok" in capsys.readouterr().out
+    assert main(["verify", output]) == 0

@@ -1,0 +1,101 @@
+"""Runs that are killed, files that are damaged, calls that fail: nothing acknowledged is lost, no damage is missed."""
+
+import errno
+import random
+import time
+
+import numpy as np
+import pytest
+import toy_studies
+from havoc import Victims, damaged_parts, damaged_result, numbers, study, torture, unfinished
+from running import fail_on, quiet, same, told_by
+
+import sweep
+from sweep.results.verify import verify
+from sweep.store.store import folder_of
+
+KILLS, DAMAGED = 30, 30
+FAULTS = [("open_file", errno.EMFILE), ("write", errno.ENOSPC), ("pwrite", errno.ENOSPC), ("fsync", errno.EIO),
+          ("rename", errno.EIO), ("remove", errno.EIO)]  # fmt: skip
+STEP = 11
+"""Of the calls that may fail in an extension or a summary, the first ones and every so manieth do; 1: each does."""
+SHAPES = (100, 400, 3000)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A finished result."""
+    path = tmp_path_factory.mktemp("whole") / "out.h5"
+    quiet(study(), path, block_cells=300).close()
+    return path
+
+
+@pytest.fixture
+def rng():
+    return random.Random()
+
+
+def test_killed_at_any_moment_a_run_loses_nothing_and_ends_with_the_same_bits(whole, tmp_path, rng):
+    with Victims() as victims:
+        victims.run(tmp_path / "first.h5", 2, 300, 60.0)
+        begun = time.monotonic()
+        assert victims.run(tmp_path / "second.h5", 2, 100, 60.0)[0]
+        found = torture(rng, victims, tmp_path, KILLS, numbers(whole), time.monotonic() - begun, SHAPES)
+    assert found["kills"] >= KILLS
+    assert found["acknowledged"] > 0
+    assert (found["lost"], found["different"]) == (0, 0)
+
+
+def test_damaged_parts_are_found_named_set_aside_and_computed_again(whole, tmp_path, rng):
+    (tmp_path / "scratch").mkdir()
+    folder = unfinished(tmp_path / "out.h5")
+    wrong = [damaged_parts(rng, folder, tmp_path / "scratch", numbers(whole)) for _ in range(DAMAGED)]
+    assert [(kind, what) for kind, what in wrong if what] == []
+
+
+def test_a_damaged_result_is_found_by_verify(whole, tmp_path, rng):
+    assert [kind for _ in range(5 * DAMAGED) if (kind := damaged_result(rng, whole, tmp_path))[1]] == []
+
+
+def falls(count, **keys):
+    return toy_studies.build(axes={"height": np.arange(1.0, count + 1)}, **keys)
+
+
+def an_extension(path):
+    quiet(falls(30), path, block_cells=10).close()
+    return falls(60), {"extend": True}
+
+
+def a_summary(path):
+    return falls(60, summary={"outputs": {"fall_time": ["min", "mean"]}}), {}
+
+
+@pytest.mark.parametrize("prepared", [an_extension, a_summary])
+@pytest.mark.parametrize(("name", "number"), FAULTS)
+def test_whichever_call_fails_an_extension_and_a_summary_continue(tmp_path, prepared, name, number):
+    turn, failed = 0, True
+    while failed:
+        turn += 1 if turn < 3 else STEP
+        output = tmp_path / f"out{turn}.h5"
+        made, keys = prepared(output)
+        before = output.read_bytes() if output.exists() else None
+        with pytest.MonkeyPatch.context() as patch:
+            calls = fail_on(patch, name, turn, number)
+            told = told_by(lambda: quiet(made, output, block_cells=10, workers=1, **keys).close())  # noqa: B023
+            failed = len(calls) >= turn
+        assert "\n" not in told
+        assert not told or before is None or output.read_bytes() == before or verify(output).whole
+        with quiet(made, output, **keys) as found:
+            same(found, quiet(made))
+        assert not folder_of(output).exists()
+    assert turn > 1
+
+
+def test_verify_tells_of_a_disk_that_fails_in_one_line(whole, monkeypatch):
+    for number in (errno.EIO, errno.EMFILE):
+        with monkeypatch.context() as patch:
+            fail_on(patch, "open_file", 1, number)
+            told = told_by(lambda: verify(whole))
+            assert told
+            assert "\n" not in told
+    assert sweep.verify(whole).whole

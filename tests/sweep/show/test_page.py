@@ -1,0 +1,114 @@
+"""The page of a result: all of it in one file, nothing from elsewhere, nothing of the result's text run."""
+
+import base64
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.cli import main
+from sweep.show.page import page, write_page
+
+VOID = {"meta", "img", "br"}
+
+
+class Tree(HTMLParser):
+    """Fails on tags that are not closed in order; gathers text, tags and attributes."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.words, self.attributes = [], [], [], []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.attributes += attrs
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+    @property
+    def text(self):
+        return " ".join(" ".join(self.words).split())
+
+
+def foliot(**keys):
+    axes = {"mu": {"spacing": "log", "start": 1e-3, "stop": 1e4, "num": 43}}
+    return sweep.build_study(kernel="foliot", **{"axes": axes, "fixed": {"a": 1.0, "phi0": 1.0}} | keys)
+
+
+@pytest.fixture(scope="module")
+def ds():
+    return sweep.run(foliot(title="Period & drive", question="How does <b>it</b> fall?", fixed={"a": 1.0, "phi0": 1.0}))
+
+
+def test_the_page_tells_question_axes_exponents_statuses_and_provenance(ds, tmp_path):
+    tree = Tree(page(ds, tmp_path / "foliot.h5"))
+    for words in (
+        "Period & drive",
+        "How does <b>it</b> fall?",
+        "foliot.h5: complete, 43 cells.",
+        "drive torque per moment of inertia",
+        "period mu <<",
+        "right to the wanted rtol",
+        "numba",
+        "Fingerprint",
+    ):
+        assert words in tree.text, words
+
+
+def test_nothing_comes_from_elsewhere_and_no_text_of_the_result_becomes_markup(ds, tmp_path):
+    evil = ds.assign_attrs(title='<script>alert("x")</script>', study="</pre><img src=x onerror=y>")
+    tree = Tree(page(evil, tmp_path / "a<b>.h5"))
+    assert not {"script", "link", "iframe", "b"} & set(tree.tags)
+    sources = [value for name, value in tree.attributes if name in ("src", "href")]
+    assert sources
+    assert all(value.startswith("data:image/png;base64,") for value in sources)
+    assert "url(" not in page(ds, tmp_path / "x.h5")
+
+
+def test_each_output_has_its_picture(ds, tmp_path):
+    found = re.findall(r'alt="(\w+)" src="data:image/png;base64,([^"]+)"', page(ds, tmp_path / "x.h5"))
+    assert [name for name, _ in found] == ["period", "amplitude", "crossing_speed", "sensitivity", "multiplier"]
+    assert all(base64.b64decode(data).startswith(b"\x89PNG") for _, data in found)
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"axes": {"mu": [1.0]}},
+        {"axes": {"mu": [-1.0, -2.0]}},
+        {"axes": {"method": ["closed", "map"]}, "fixed": {"a": 1.0, "phi0": 1.0, "mu": 1.0}},
+        {"axes": {"mu": [1.0, 2.0], "a": [0.5, 0.6]}, "fixed": {"phi0": 1.0}, "design": "zip"},
+        {"axes": {"mu": np.geomspace(0.1, 10, 9), "a": np.geomspace(0.1, 10, 9)}, "fixed": {"phi0": 1.0}},
+        {"summary": {"outputs": {"period": ["min", "max"]}}},
+    ],
+)
+def test_every_kind_of_result_has_a_page(keys, tmp_path):
+    assert "cells" in Tree(page(sweep.run(foliot(**keys)), tmp_path / "x.h5")).text
+
+
+def test_the_command_writes_it_in_the_units_asked_for(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    sweep.run(foliot(), "foliot.h5")
+    assert main(["report", "foliot.h5", "--unit", "amplitude=degree"]) == 0
+    assert capsys.readouterr().out == "foliot.html\n"
+    assert "[degree]" in (tmp_path / "foliot.html").read_text()
+    with pytest.raises(sweep.SweepError, match="cannot be written"):
+        write_page(sweep.open_result("foliot.h5"), tmp_path / "foliot.h5", tmp_path / "no" / "page.html")
+    assert [p.name for p in tmp_path.iterdir() if "tmp" in p.name] == []
+
+
+def test_outputs_without_a_value_have_no_picture(tmp_path):
+    refused = sweep.run(foliot(axes={"mu": [0.01, 0.02, 0.03]}, fixed={"a": 1.0, "phi0": 1.0, "R": 1.0}))
+    tree = Tree(page(refused, tmp_path / "foliot.h5"))
+    assert "img" not in tree.tags
+    assert "NEVER_STARTS" in tree.text

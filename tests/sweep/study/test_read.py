@@ -1,0 +1,342 @@
+"""What studies in TOML and Python become."""
+
+import dataclasses
+
+import mpmath
+import numpy as np
+import pytest
+import toy
+from hypothesis import given
+from hypothesis import strategies as st
+from toy_studies import build, build_rich, message_of
+
+import sweep
+from sweep.cells.grid import Grid
+
+
+def test_a_whole_study_is_read(read):
+    study = read(
+        """# How fast does a stone fall?
+        title = "Falling stones"
+        kernel = "toy:KERNEL"
+        method = "exact"
+        rtol = 1e-6
+        outputs = ["drop", "fall_time"]
+        axes.v0 = [0, 0.5]
+        [axes.height]
+        spacing = "log"
+        start = 1
+        stop = 100
+        num = 3
+        unit = "mm"
+        [fixed]
+        g = { value = 981, unit = "cm/s^2" }
+        [along.phase]
+        num = 3
+        """,
+        head="",
+    )
+    assert (study.title, study.question) == ("Falling stones", "How fast does a stone fall?")
+    assert (study.kernel_name, study.kernel, study.method, study.rtol) == ("toy:KERNEL", toy.KERNEL, "exact", 1e-6)
+    assert study.outputs == ("fall_time", "drop")  # the kernel's order
+    assert [f.name for f in study.asked] == ["fall_time", "drop"]
+    assert list(study.axes) == ["v0", "height"]
+    assert study.axes["height"].values.tolist() == [0.001, 0.01, 0.1]
+    assert study.axes["height"].spacing == "log"
+    assert study.axes["v0"].spacing == "values"
+    assert study.fixed == {"g": 9.81}
+    assert study.along["phase"].tolist() == [0.0, 0.5, 1.0]
+    assert "spacing" in study.text
+
+
+def test_a_study_shows_itself_in_one_line():
+    study = build(axes={"height": [1.0, 2.0], "v0": [0.5]}, title="Falling stones")
+    assert repr(study) == "<Study 'Falling stones': toy:KERNEL over height (2), v0 (1)>"
+
+
+def test_terms_are_what_a_method_must_be_able_to_do():
+    assert build_rich().terms == {"load"}
+    assert build_rich(fixed={"drag": 0, "grip": 3}).terms == {"load", "grip"}
+    assert build_rich(axes={"drag": [0.0]}, fixed={"load": 1, "grip": 1, "shape": "square"}).terms == {"drag", "shape"}
+
+
+def test_defaults_are_filled_in(read):
+    study = read("axes.height = [1.0]")
+    assert (study.method, study.rtol, study.design, study.question) == ("auto", 1e-9, "product", "")
+    assert study.title == "toy over height"
+    assert study.fixed == {"v0": 0.0, "g": 9.80665}
+
+
+def test_all_outputs_are_taken_where_none_is_named():
+    assert build(outputs=None, axes={"height": [1.0]}, along={"phase": {"num": 2}}).outputs == (
+        "fall_time",
+        "impact_speed",
+        "drop",
+    )
+
+
+def test_a_coordinate_that_no_output_needs_is_empty():
+    assert build(axes={"height": [1.0]}).along["phase"].size == 0
+    assert build(axes={"height": [1.0]}, along={"phase": {"num": 5}}).along["phase"].size == 0
+
+
+FLIPS = """
+kernel = "foliot_start"
+axes.mu = [1.0]
+fixed = {{ phi0 = 1, a = 1 }}
+along.flip = {}
+"""
+
+
+def test_a_coordinate_that_counts_takes_the_first_whole_numbers(tmp_path):
+    path = tmp_path / "flips.toml"
+    path.write_text(FLIPS.format("{ num = 4 }"))
+    assert sweep.read_study(path).along["flip"].tolist() == [1.0, 2.0, 3.0, 4.0]
+    path.write_text(FLIPS.format("[1, 2.5]"))
+    with pytest.raises(sweep.SweepError, match=r"expected whole numbers from 1 to 1e\+06, found 2.5"):
+        sweep.read_study(path)
+
+
+def test_python_and_toml_give_the_same_study(read):
+    toml = read(
+        """
+        title = "t"
+        method = "exact"
+        [axes.height]
+        spacing = "log"
+        start = 0.3
+        stop = 1e5
+        num = 57
+        unit = "ft"
+        [axes.v0]
+        spacing = "linear"
+        start = -1
+        stop = 1.7
+        num = 28
+        unit = "km/hour"
+        [axes.rtol]
+        values = [1e-3, 1e-6]
+        [fixed]
+        g = { value = 32.174, unit = "ft/s^2" }
+        """
+    )
+    python = build(
+        title="t",
+        method="exact",
+        axes={
+            "height": {"spacing": "log", "start": 0.3, "stop": 1e5, "num": 57, "unit": "ft"},
+            "v0": {"spacing": "linear", "start": -1, "stop": 1.7, "num": 28, "unit": "km/hour"},
+            "rtol": np.array([1e-3, 1e-6]),
+        },
+        fixed={"g": {"value": 32.174, "unit": "ft/s^2"}},
+    )
+    assert dataclasses.replace(toml, text="") == python
+    for name, axis in toml.axes.items():
+        assert axis.values.tobytes() == python.axes[name].values.tobytes()
+
+
+def test_axes_cannot_be_written_to():
+    study = build(axes={"height": [1.0]})
+    with pytest.raises(ValueError, match="read-only"):
+        study.axes["height"].values[0] = 2
+
+
+def test_an_axis_does_not_share_memory_with_the_array_it_came_from():
+    values = np.array([1.0, 2.0])
+    study = build(axes={"height": values})
+    values[0] = 5
+    assert study.axes["height"].values[0] == 1.0
+
+
+# spacings
+
+
+@given(st.floats(1e-300, 1e300), st.floats(1e-300, 1e300), st.integers(2, 40), st.sampled_from(["log", "linear"]))
+def test_the_first_and_last_values_are_exactly_start_and_stop(start, stop, num, spacing):
+    if start == stop or abs(start - stop) < 1e-6 * start:
+        return
+    values = (
+        build(axes={"height": {"spacing": spacing, "start": start, "stop": stop, "num": num}}).axes["height"].values
+    )
+    assert (values[0], values[-1], len(values)) == (start, stop, num)
+    assert (np.diff(values) > 0).all() if stop > start else (np.diff(values) < 0).all()
+
+
+@given(st.floats(1e-20, 1e20), st.floats(1e-20, 1e20), st.integers(3, 30))
+def test_log_values_are_the_nearest_floats_to_the_true_geometric_ones(start, stop, num):
+    if abs(start - stop) < 1e-6 * start:
+        return
+    values = build(axes={"height": {"spacing": "log", "start": start, "stop": stop, "num": num}}).axes["height"].values
+    with mpmath.workdps(60):
+        # the decimals that the user wrote, not the floats they became
+        first, last = mpmath.mpf(repr(start)), mpmath.mpf(repr(stop))
+        expected = [float(first * (last / first) ** (mpmath.mpf(i) / (num - 1))) for i in range(1, num - 1)]
+    assert values[1:-1].tolist() == expected
+
+
+def test_decades_of_a_log_axis_are_exact():
+    values = build(axes={"height": {"spacing": "log", "start": 1e-4, "stop": 1e6, "num": 401}}).axes["height"].values
+    assert values[::40].tolist() == [1e-4, 1e-3, 1e-2, 0.1, 1, 10, 100, 1e3, 1e4, 1e5, 1e6]
+
+
+def test_tenths_of_a_linear_axis_are_exact():
+    values = build(axes={"height": {"spacing": "linear", "start": -1, "stop": 1, "num": 21}}).axes["height"].values
+    assert values.tolist() == [k / 10 for k in range(-10, 11)]
+
+
+@pytest.mark.parametrize("spacing", ["log", "linear"])
+def test_an_axis_with_a_unit_is_what_its_values_are_one_by_one(spacing):
+    axis = {"spacing": spacing, "start": 1, "stop": 1000, "num": 4, "unit": "ms"}
+    numbers = build(axes={"height": {**axis, "unit": "mm"}}).axes["height"].values
+    listed = [1, 10, 100, 1000] if spacing == "log" else [1, 334, 667, 1000]
+    assert numbers.tolist() == build(axes={"height": {"values": listed, "unit": "mm"}}).axes["height"].values.tolist()
+    assert numbers.tolist() == [n / 1000 for n in listed]
+    assert [build(axes={"height": [1.0]}, fixed={"v0": {"value": n, "unit": "mm/s"}}).fixed["v0"] for n in listed] == [
+        n / 1000 for n in listed
+    ]
+
+
+# files
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "height\n1\n2.5\n1e3\n",
+        "1\n2.5\n1e3\n",
+        '# heights [m], said "roughly\n\nv0,height\n0,1\n# one more\n0, 2.5\n\n0,1e3',
+        "\ufeffheight,v0\r\n1,0\r\n2.5,0\r\n1e3,0\r\n",
+    ],
+)
+def test_an_axis_may_be_a_column_of_a_csv_file(read, tmp_path, text):
+    (tmp_path / "points.csv").write_text(text, encoding="utf-8", newline="")
+    study = read('axes.height.file = "points.csv"')
+    assert study.axes["height"].values.tolist() == [1.0, 2.5, 1000.0]
+    assert study.axes["height"].spacing == "file"
+
+
+def test_a_unit_holds_for_a_whole_column(read, tmp_path):
+    (tmp_path / "points.csv").write_text("height\n1\n7\n")
+    assert read('axes.height = { file = "points.csv", unit = "mm" }').axes["height"].values.tolist() == [0.001, 0.007]
+
+
+def test_a_result_in_csv_is_the_points_of_the_next_study(read, tmp_path):
+    (tmp_path / "points.csv").write_text("height,method_used\n1,exact\n2,rough\n")
+    study = read('design = "zip"\naxes.height.file = "points.csv"\n')
+    assert study.axes["height"].values.tolist() == [1.0, 2.0]
+
+
+def test_words_may_come_from_a_file(read, tmp_path):
+    (tmp_path / "points.csv").write_text("height,method\n1,exact\n2,auto\n")
+    study = read('design = "zip"\naxes.height.file = "points.csv"\naxes.method.file = "points.csv"')
+    assert study.axes["method"].words == ("exact", "auto")
+    assert study.axes["method"].values.tolist() == [1.0, -1.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("height\n1\nabc\n", 'points.csv, line 3: expected a number, found "abc"'),
+        ("height\n1\n\n# x\n''\n", "points.csv, line 5: expected a number, found \"''\""),
+        ("height,v0\n1,2\n3\n", "points.csv, line 3: expected 2 columns, found 1"),
+        ("v0,g\n1,2\n", 'points.csv has no column "height"; its first line is v0,g'),
+        ("v0\n1\n", 'points.csv, line 1: expected a number, found "v0"'),
+        ("height\n", "points.csv holds no values"),
+        ("", "points.csv holds no values"),
+        (b"height\n\xff\n", "points.csv is not a csv file"),
+        (b"height\n\x00\n", "points.csv"),
+    ],
+)
+def test_a_bad_csv_file_is_told_by_line(mistakes, tmp_path, text, message):
+    (tmp_path / "points.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
+    found = mistakes('axes.height.file = "points.csv"')["axes.height.file"]
+    assert message in found
+
+
+def test_of_many_bad_cells_the_first_are_told_and_the_rest_counted(read, tmp_path):
+    (tmp_path / "points.csv").write_text("height\n" + "x\n" * 10)
+    with pytest.raises(sweep.StudyError) as caught:
+        read('axes.height.file = "points.csv"')
+    assert [m.message.split("points.csv")[-1] for m in caught.value.mistakes] == [
+        ', line 2: expected a number, found "x"',
+        ', line 3: expected a number, found "x"',
+        ', line 4: expected a number, found "x"',
+        "and 7 more like these",
+    ]
+
+
+def test_a_csv_file_with_too_many_lines_is_refused(mistakes, tmp_path, monkeypatch):
+    monkeypatch.setattr("sweep.study.spacing.LARGEST_AXIS", 10)
+    (tmp_path / "points.csv").write_text("height\n" + "".join(f"{k}\n" for k in range(1, 1000)))
+    found = mistakes('axes.height.file = "points.csv"')
+    assert found["axes.height.file"] == "expected at most 10 values, found more"
+
+
+@pytest.mark.parametrize("name", ["nowhere.csv", ".", "/dev/zero"])
+def test_a_csv_file_that_cannot_be_read_is_a_mistake(mistakes, name):
+    assert "cannot be read" in mistakes(f'axes.height.file = "{name}"')["axes.height.file"]
+
+
+# words, followers, methods
+
+
+def test_words_become_the_numbers_of_the_kernel():
+    study = build_rich(axes={"load": [1.0], "shape": ["square", "round"], "method": ["slow", "auto"]})
+    assert study.axes["shape"].values.tolist() == [3.0, 0.0]
+    assert study.axes["shape"].words == ("square", "round")
+    assert study.axes["method"].values.tolist() == [1.0, -1.0]
+    assert build_rich(fixed={"shape": "square"}).fixed["shape"] == 3.0
+
+
+def test_a_parameter_that_follows_an_axis_is_not_fixed():
+    study = build_rich()
+    assert study.follows == {"grip": "load", "hold": "load"}
+    assert study.fixed == {"shape": 0.0, "drag": 0.0}
+
+
+def test_a_parameter_that_follows_a_fixed_one_has_its_value():
+    study = build_rich(axes={"drag": [0.0, 1.0]}, fixed={"load": 5, "grip": 7}, method="auto")
+    assert study.follows == {}
+    assert study.fixed == {"load": 5.0, "shape": 0.0, "grip": 7.0, "hold": 7.0}
+
+
+def test_a_follower_takes_the_column_of_its_axis():
+    study = build_rich()
+    out = [np.zeros(2) for _ in study.kernel.parameters]
+    Grid(study).columns(0, 2, out)
+    assert [column.tolist() for column in out] == [[1, 2], [0, 0], [0, 0], [1, 2], [1, 2]]
+
+
+def test_a_method_that_cannot_do_a_term_of_the_study_is_a_mistake():
+    assert message_of(lambda: build_rich(method="quick", fixed={"drag": 0.1}), "method") == (
+        "quick cannot do drag; use auto or slow"
+    )
+    axes = {"load": [1.0], "drag": [0.0, 1.0], "method": ["quick", "slow"]}
+    assert message_of(lambda: build_rich(axes=axes), "axes.method") == "quick cannot do drag; use auto or slow"
+    both = {"drag": 0.1, "grip": 3, "hold": 2}
+    assert (
+        message_of(lambda: build_rich(fixed=both), "method") == "no method of rich can do drag, grip and hold together"
+    )
+
+
+def test_a_term_at_its_default_is_no_hindrance():
+    assert build_rich(method="quick", fixed={"drag": 0}).method == "quick"
+    assert build_rich(axes={"drag": [0.0]}, fixed={"load": 5, "grip": 5}, method="slow").method == "slow"
+    assert (
+        build_rich(axes={"shape": ["round"]}, fixed={"load": 5, "grip": 5, "hold": 5}, method="quick").method == "quick"
+    )
+
+
+def test_words_are_checked():
+    assert message_of(lambda: build_rich(fixed={"shape": "sqare"}), "fixed.shape") == (
+        'expected "round" or "square", found "sqare"; did you mean square?'
+    )
+    assert message_of(lambda: build_rich(fixed={"shape": 3}), "fixed.shape") == 'expected "round" or "square", found 3'
+    assert message_of(lambda: build_rich(fixed={"shape": {"value": "round", "unit": "1"}}), "fixed.shape.unit") == (
+        "shape takes words, which have no unit; leave it out"
+    )
+    axes = {"load": [1.0], "shape": {"spacing": "linear", "start": 0, "stop": 3, "num": 2}}
+    assert (
+        message_of(lambda: build_rich(axes=axes), "axes.shape")
+        == 'shape takes words; write e.g. values = ["round", "square"]'
+    )

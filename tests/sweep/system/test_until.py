@@ -1,0 +1,157 @@
+"""Runs that end early: at a time of day, on SIGTERM; and that every cell is accounted for at any moment."""
+
+import io
+import os
+import signal
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from running import names, quiet, same, slow_run, tall, wait_for
+
+import sweep
+from kernels.interface import Status
+from sweep.cli import main
+from sweep.results.statuses import FAILED, account
+from sweep.store import assemble
+from sweep.store.store import folder_of
+from sweep.system.errors import SweepError
+from sweep.system.pool import Terminated
+from sweep.system.until import deadline
+
+
+def at(hour, minute=0, day=21):
+    return datetime(2026, 11, day, hour, minute).astimezone()
+
+
+@pytest.mark.parametrize(
+    ("text", "now", "expected"),
+    [
+        ("07:00", at(3), at(7)),
+        ("07:00", at(7, 1), at(7, day=22)),
+        ("07:00", at(7), at(7, day=22)),
+        (" 23:59 ", at(7), at(23, 59)),
+        ("2026-11-25 07:30", at(3), at(7, 30, day=25)),
+        ("2026-11-20", at(3), at(0, day=20)),
+    ],
+)
+def test_a_time_of_day_is_the_next_one(text, now, expected):
+    assert deadline(text, now) == expected
+
+
+def test_a_time_with_a_zone_is_the_next_one_there():
+    found = deadline("07:00+05:00", datetime.fromisoformat("2026-11-21T03:00+00:00"))
+    assert found == datetime.fromisoformat("2026-11-22T07:00+05:00")
+
+
+@pytest.mark.parametrize("text", ["7 o'clock", "", "25:00", "in the morning", 7])
+def test_what_is_no_time_is_told(text, tmp_path):
+    with pytest.raises(SweepError, match="until: expected a time"):
+        quiet(tall(3), tmp_path / "out.h5", until=text)
+
+
+def test_a_run_ends_at_its_time_with_what_there_is_and_continues(tmp_path):
+    output, study, log = tmp_path / "out.h5", tall(1000, "slow:SLOW"), io.StringIO()
+    begun = datetime.now()
+    found = quiet(study, output, until=begun + timedelta(seconds=0.5), block_cells=10, progress=log)
+    assert datetime.now() - begun < timedelta(seconds=10)
+    told = account(found)
+    assert 0 < told.ok < 1000
+    assert told.ok + told.pending == told.total == 1000
+    assert "run the same command again to continue" in log.getvalue()
+    assert len(names(output)) == told.ok // 10
+    fast = tall(1000, "slow:SLOW")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("slow.CELL_SECONDS", 0.0)
+        same(quiet(fast, output, until="2999-01-01"), quiet(fast))
+    assert not folder_of(output).exists()
+
+
+def test_a_time_that_is_over_computes_next_to_nothing_and_exits_with_0(tmp_path, read, capsys):
+    read("axes.height = [1.0, 2.0, 3.0]\n")
+    arguments = ["run", str(tmp_path / "fall.toml"), "-o", str(tmp_path / "out.h5"), "--allow-import"]
+    assert main([*arguments, "--until", "2001-01-01"]) == 0
+    assert "unfinished; 3 cells: " in capsys.readouterr().out
+    assert main(arguments) == 0
+    assert "3 cells: 3 ok, 0 remarks, 0 refused, 0 failed, 0 pending" in capsys.readouterr().out
+    assert main([*arguments, "--until", "noon"]) == 2
+
+
+def test_a_time_needs_an_output():
+    with pytest.raises(SweepError, match="give a path"):
+        quiet(tall(3), until="07:00")
+
+
+def test_sigterm_ends_within_a_block_with_143_and_the_next_start_tidies_up(tmp_path):
+    output = tmp_path / "out.h5"
+    with slow_run(output, 2, 10) as process:
+        wait_for(lambda: len(names(output)) >= 2, process)
+        process.send_signal(signal.SIGTERM)
+        _, told = process.communicate(timeout=30)
+    assert process.returncode == 143
+    assert "run the same command again to continue" in told
+    assert "Traceback" not in told
+    assert len(names(output)) >= 2
+    (folder_of(output) / "000000000010.abcd.tmp").write_bytes(b"half")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("slow.CELL_SECONDS", 0.0)
+        same(quiet(tall(400, "slow:SLOW"), output), quiet(tall(400, "slow:SLOW")))
+    assert list(tmp_path.iterdir()) == [output]
+
+
+@pytest.mark.parametrize("name", ["write_frame", "seal", "frame_digest", "_check"])
+def test_sigterm_while_the_output_is_put_together_leaves_no_file_half_written(tmp_path, name):
+    output, log = tmp_path / "out.h5", io.StringIO()
+    real = getattr(assemble, name)
+
+    def struck(*rest):
+        os.kill(os.getpid(), signal.SIGTERM)
+        return real(*rest)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(assemble, name, struck)
+        with pytest.raises(Terminated):
+            quiet(tall(50), output, block_cells=10, progress=log)
+    assert not list(tmp_path.rglob("*.tmp"))
+    assert output.exists() != ("run the same command again" in log.getvalue())
+    same(quiet(tall(50), output), quiet(tall(50)))
+    assert list(tmp_path.iterdir()) == [output]
+
+
+def test_an_unfinished_extension_returns_what_there_is_of_the_new_one(tmp_path):
+    output = tmp_path / "out.h5"
+    quiet(tall(5), output).close()
+    found = quiet(tall(9), output, extend=True, until="2001-01-01", block_cells=2)
+    assert account(found).total == 9
+    with sweep.open_result(output) as old:
+        assert old.sizes["height"] == 5
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    codes=st.lists(st.sampled_from([*map(int, Status), 33, 100, -5, -1, -128]), min_size=1, max_size=60),
+    summed=st.booleans(),
+)
+def test_every_cell_is_in_the_account_once(codes, summed):
+    keys = {"outputs": {"fall_time": ["min"]}} if summed else None
+
+    def kernel_status(self, start, stop, outputs, status, used, wanted=None):
+        status[:] = codes[start:stop]
+        used[:] = -1
+        for column in outputs.values():
+            column[:] = np.nan
+
+    study = tall(len(codes))
+    if summed:
+        study = sweep.build_study(kernel="toy:KERNEL", allow_import=True, summary=keys,
+                                  axes={"height": np.arange(1.0, len(codes) + 1)})  # fmt: skip
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sweep.cells.solve.Solver.solve", kernel_status)
+        found = account(quiet(study, block_cells=7))
+    assert found.total == len(codes)
+    assert found.ok == codes.count(0)
+    assert found.pending == codes.count(127)
+    assert found.refused == sum(c in map(int, Status) and 64 <= c < 127 and c not in FAILED for c in codes)
+    assert found.remarks == sum(c in map(int, Status) and 0 < c < 64 for c in codes)
