@@ -7,17 +7,32 @@ arXiv:1604.06681, appendix A.
 """
 
 import math
+from typing import NamedTuple
 
 from kernels.foliot import _viscous
-from kernels.interface import Field, Kernel, Method, Status
-from kernels.lanes.columns import each_cell, entry
+from kernels.interface import Field
+from kernels.lanes.codes import BAD_INPUT, NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import magnitude, some, where
+from kernels.lanes.wiring import kernel, method
 from kernels.maths.elementary import is_normal, mantissa_exponent, scale
 
-_OK, _BAD_INPUT = float(Status.OK), float(Status.BAD_INPUT)
-_OUT_OF_RANGE, _NOT_CONVERGED = float(Status.OUT_OF_RANGE), float(Status.NOT_CONVERGED)
 _NEWTON_LIMIT = 20
+
+
+class Wanted(NamedTuple):
+    """Parameters."""
+
+    period: float
+    amplitude: float
+    phi0: float
+
+
+class Clock(NamedTuple):
+    """Outputs."""
+
+    a: float
+    mu: float
 
 
 @jit
@@ -41,45 +56,28 @@ def _inverse_alpha(overshoot):
 
 
 @jit
-def _solve(i, period, amplitude, phi0, a, mu, status):
-    (p, e_p), (f, e_f) = mantissa_exponent(period[i]), mantissa_exponent(phi0[i])
-    k, unsettled = _inverse_alpha((amplitude[i] - phi0[i]) / phi0[i])
-    q, _, _, _, _ = _viscous.closed(k, 0.0 * k)
-    unit_a = 4.0 * q / p
-    unit_k, e_k = mantissa_exponent(k)
-    a[i] = scale(unit_a, -e_p)
-    mu[i] = scale(unit_a * unit_a * f / unit_k, e_f - 2.0 * e_p - e_k)
-    normal = is_normal(a[i]) & is_normal(mu[i]) & is_normal(k)
-    status[i] = where(normal, where(unsettled, _NOT_CONVERGED, _OK), _OUT_OF_RANGE)
-
-
-@entry()
-def newton(period, amplitude, phi0, rtol, a, mu, status):
+def newton(p, rtol):
     """Newton on (1) from a start within 15 %."""
-    each_cell(_solve, (period, amplitude, phi0, a, mu, status))
-
-
-@entry("asked")
-def newton_bound(period, amplitude, phi0, rtol, asked, out):
-    """Rounding: amplitude and phi0 are taken as exact."""
-    out[:] = 2.0 * _viscous.ROUNDING
+    (period, e_p), (phi0, e_f) = mantissa_exponent(p.period), mantissa_exponent(p.phi0)
+    k, unsettled = _inverse_alpha((p.amplitude - p.phi0) / p.phi0)
+    q, _, _, _, _ = _viscous.closed(k, 0.0 * k)
+    unit_a = 4.0 * q / period
+    unit_k, e_k = mantissa_exponent(k)
+    found = Clock(scale(unit_a, -e_p), scale(unit_a * unit_a * phi0 / unit_k, e_f - 2.0 * e_p - e_k))
+    normal = is_normal(found.a) & is_normal(found.mu) & is_normal(k)
+    return found, where(normal, where(unsettled, NOT_CONVERGED, OK), OUT_OF_RANGE)
 
 
 @jit
-def _check(i, period, amplitude, phi0, status):
-    finite = (period[i] < math.inf) & (amplitude[i] < math.inf)
-    allowed = (period[i] > 0.0) & (phi0[i] > 0.0) & (amplitude[i] > phi0[i])  # NaN fails
-    status[i] = where(finite & allowed, _OK, _BAD_INPUT)
-
-
-@entry()
-def check(period, amplitude, phi0, status):
+def check(p):
     """BAD_INPUT for what is NaN, infinite or not positive, and for an amplitude that does not exceed phi0."""
-    each_cell(_check, (period, amplitude, phi0, status))
+    finite = (p.period < math.inf) & (p.amplitude < math.inf)
+    allowed = (p.period > 0.0) & (p.phi0 > 0.0) & (p.amplitude > p.phi0)  # NaN fails
+    return where(finite & allowed, OK, BAD_INPUT)
 
 
-FOLIOT_DESIGN = Kernel(
-    name="foliot_design",
+FOLIOT_DESIGN = kernel(
+    "foliot_design",
     doc="friction and torque that give a verge and foliot a wanted period and amplitude",
     source="derived from Hoyng & Nieuwenhuizen, arXiv:1604.06681, appendix A",
     parameters=(
@@ -91,7 +89,9 @@ FOLIOT_DESIGN = Kernel(
         Field("a", "1/s", "viscous friction per moment of inertia"),
         Field("mu", "rad/s^2", "drive torque per moment of inertia"),
     ),
+    record=Wanted,
     check=check,
-    methods=(Method("newton", "Newton's method on the closed-form cycle", newton, newton_bound),),
+    # amplitude and phi0 are taken as exact
+    methods=(method("newton", "Newton's method on the closed-form cycle", newton, 2.0 * _viscous.ROUNDING),),
     example={"period": 4.0, "amplitude": 0.8, "phi0": 0.5},
 )

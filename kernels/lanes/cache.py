@@ -101,7 +101,12 @@ class _Cache(FunctionCache):
 
 def enable(dispatcher):
     """Keeps the compiled versions of a function of this package, or of what it wrote into FOLDER, on the disk."""
-    file = Path(dispatcher.py_func.__code__.co_filename)
-    if (PACKAGE in file.parents or file.parent == FOLDER) and FOLDER is not None:
+    if is_ours(dispatcher) and FOLDER is not None:
         dispatcher._cache = _Cache(dispatcher.py_func)
     return dispatcher
+
+
+def is_ours(function):
+    """Whether a function, compiled or not, is of this package, or written by it."""
+    file = Path(getattr(function, "py_func", function).__code__.co_filename)
+    return PACKAGE in file.parents or file.parent == FOLDER

@@ -5,7 +5,7 @@ import inspect
 
 import numpy as np
 
-from kernels.lanes.jit import COMPILED, cached, jit
+from kernels.lanes.jit import COMPILED, cached, jit, jit_entry
 from kernels.lanes.vectors import WIDTH, lanes_at
 
 
@@ -83,3 +83,52 @@ def _filled_up(compiled, columns, per_cell):
     for column, result in zip(columns, full, strict=True):
         if column is not result and column.flags.writeable:
             column[...] = result[:n]
+
+
+@jit
+def _lanes_of_records(body, columns, buffers):
+    n = columns[0].shape[0]
+    for i in range(0, n, WIDTH):
+        body(lanes_at(min(i, n - WIDTH)), columns, *buffers)
+
+
+@jit
+def _cells_of_records(body, columns, buffers):
+    for i in range(columns[0].shape[0]):
+        body(i, columns, *buffers)
+
+
+@jit
+def _groups_of_records(body, columns, buffers):
+    n = columns[0].shape[0]
+    for i in range(0, n, WIDTH):
+        body(min(i, n - WIDTH), columns, *buffers)
+
+
+def _plain_records(body, columns, buffers):
+    with np.errstate(all="ignore"):
+        for i in range(columns[0].shape[0]):
+            body(i, columns, *buffers)
+
+
+in_lanes = _lanes_of_records if COMPILED else _plain_records
+cell_by_cell = _cells_of_records if COMPILED else functools.partial(_plain_records)
+in_groups = _groups_of_records if COMPILED else _plain_records
+
+
+def entry_of(function, per_cell, kept):
+    """An entry of columns. `per_cell` says which hold one cell a row (None: few cells need no filling up)."""
+    if not COMPILED:
+        return function
+    compiled = cached(function) if kept else jit_entry(function)
+
+    def call(*columns):
+        if per_cell is None:
+            compiled(*(c if c.flags.writeable else c.copy() for c in columns))
+        elif 0 < len(columns[0]) < WIDTH:
+            _filled_up(compiled, columns, per_cell)
+        elif len(columns[0]):
+            compiled(*columns)
+
+    call.compiled = compiled
+    return call

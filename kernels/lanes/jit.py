@@ -30,8 +30,13 @@ def jit_call(function):
     return part(function, **_OPTIONS)
 
 
+def jit_entry(function):
+    """As `jit_call`, called from Python."""
+    return aligned(function, **_OPTIONS)
+
+
 def cached(function):
-    """As `jit_call`, called from Python; machine code of this package is kept on the disk."""
+    """As `jit_entry`; machine code of this package is kept on the disk."""
     from kernels.lanes.cache import enable
 
-    return enable(aligned(function, **_OPTIONS))
+    return enable(jit_entry(function))

@@ -302,12 +302,14 @@ def where(condition, x, y):
 
 
 def choose(condition, xs, ys):
-    """`where` for each pair of two tuples."""
-    return tuple(where(condition, x, y) for x, y in zip(xs, ys, strict=True))
+    """`where` for each pair of two tuples; a record, if the first is one."""
+    chosen = tuple(where(condition, x, y) for x, y in zip(xs, ys, strict=True))
+    return type(xs)(*chosen) if hasattr(xs, "_fields") else chosen
 
 
 def _type_choose(condition, xs, ys):
-    return types.Tuple([_number(condition, x, y) for x, y in zip(xs, ys, strict=True)])
+    chosen = tuple(_number(condition, x, y) for x, y in zip(xs, ys, strict=True))
+    return types.BaseTuple.from_types(chosen, getattr(xs, "instance_class", None))
 
 
 def _lower_choose(context, builder, signature, values):

@@ -15,16 +15,19 @@ count more than once: INACCURATE.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
-from kernels.lanes.columns import each_cell, entry
-from kernels.lanes.groups import GROUP, cells_at, each_group, write_row
+from kernels.interface import Field
+from kernels.lanes.codes import BAD_INPUT, CHANGE_POINT, INACCURATE, LOCK_UP, OK, OUT_OF_RANGE, REFUSED
+from kernels.lanes.groups import GROUP, cells_at, write_row
 from kernels.lanes.jit import jit
+from kernels.lanes.records import read
 from kernels.lanes.vectors import isnt, magnitude, where
+from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import arctan, sincos
-from kernels.polisher._cell import CHANGE_POINT, LOCK_UP, OK, OUT_OF_RANGE, judged, said
+from kernels.polisher._cell import judged, said
 from kernels.polisher.arm import EXAMPLE as MACHINE
 from kernels.polisher.arm import PARAMETERS as LENGTHS
 from kernels.polisher.arm import allowed
@@ -38,8 +41,19 @@ FARTHEST = 1e6
 RATE_LIMIT = 1e140
 """omega, beyond which, or below the inverse of which, its square leaves float64."""
 
-_BAD_INPUT, _INACCURATE = float(Status.BAD_INPUT), float(Status.INACCURATE)
-_REFUSED = int(Status.BAD_INPUT)
+
+class Machine(NamedTuple):
+    """Parameters: the linkage, and how it turns and carries the tool."""
+
+    b: float
+    d: float
+    f: float
+    e: float
+    type: float
+    omega: float
+    b_angle: float
+    L: float
+    beta: float
 
 
 @jit
@@ -73,66 +87,44 @@ def _angles(lengths, margin, side, crank_angle, b_angle):
 
 
 @jit
-def _follow(
-    first, b, d, f, e, type, omega, b_angle, L, beta, rtol, crank_angle, row,
-    alpha, alpha_rate, alpha_acceleration, x, y, status,
-):  # fmt: skip
+def _follow(first, columns, row):
+    """Closed forms of sums without error."""
     i = cells_at(first)
-    lengths, _, margin, code = judged(b[i], d[i], f[i], e[i])
-    margin, side, w = _branch(lengths, margin, code), side_of(type[i]), omega[i]
+    p = read(Machine, columns, i)
+    lengths, _, margin, code = judged(p.b, p.d, p.f, p.e)
+    margin, side, w = _branch(lengths, margin, code), side_of(p.type), p.omega
     worst = 0.0 * code
-    for j in range(crank_angle.size):
-        angles, doubt = _angles(lengths, margin, side, 0.0 * code + crank_angle[j], b_angle[i])
+    for j in range(columns.crank_angle.size):
+        angles, doubt = _angles(lengths, margin, side, 0.0 * code + columns.crank_angle[j], p.b_angle)
         worst = larger(worst, doubt)
-        write_row(first, j, b_angle[i] + (angles[0] + angles[1]), row, alpha)
-        write_row(first, j, w * angles[2], row, alpha_rate)
-        write_row(first, j, w * w * angles[3], row, alpha_acceleration)
-        sine, cosine = sincos(b_angle[i] + (angles[0] + beta[i]))
-        write_row(first, j, L[i] * cosine, row, x)
-        write_row(first, j, L[i] * sine, row, y)
+        write_row(first, j, p.b_angle + (angles[0] + angles[1]), row, columns.alpha)
+        write_row(first, j, w * angles[2], row, columns.alpha_rate)
+        write_row(first, j, w * w * angles[3], row, columns.alpha_acceleration)
+        sine, cosine = sincos(p.b_angle + (angles[0] + p.beta))
+        write_row(first, j, p.L * cosine, row, columns.x)
+        write_row(first, j, p.L * sine, row, columns.y)
     fast = magnitude(w)
     fine = ((fast <= RATE_LIMIT) & (fast >= 1.0 / RATE_LIMIT)) | isnt(fast > 0.0)
-    code = where(said(code, LOCK_UP) & isnt(worst <= rtol[i]), _INACCURATE, code)
-    status[i] = where(fine | (code >= FIRST_REFUSAL), code, OUT_OF_RANGE)
-
-
-@entry("crank_angle")
-def closed(
-    b, d, f, e, type, omega, b_angle, L, beta, rtol, crank_angle, alpha, alpha_rate, alpha_acceleration, x, y, status
-):
-    """Closed forms of sums without error."""
-    row = np.empty(GROUP)
-    if _within(crank_angle):
-        columns = (
-            b, d, f, e, type, omega, b_angle, L, beta, rtol, crank_angle, row,
-            alpha, alpha_rate, alpha_acceleration, x, y, status,
-        )  # fmt: skip
-        each_group(_follow, columns)
-    else:
-        status[:] = _REFUSED
-
-
-@entry("crank_angle", "asked")
-def closed_bound(b, d, f, e, type, omega, b_angle, L, beta, rtol, crank_angle, asked, out):
-    """Rounding; close to a lock the status says more."""
-    out[:] = ROUNDING
+    code = where(said(code, LOCK_UP) & isnt(worst <= columns.rtol[i]), INACCURATE, code)
+    code = where(fine | (code >= REFUSED), code, OUT_OF_RANGE)
+    columns.status[i] = where(_within(columns.crank_angle), code, BAD_INPUT)
 
 
 @jit
-def _check(i, b, d, f, e, type, omega, b_angle, L, beta, status):
-    fine = allowed(b[i], d[i], f[i], e[i], type[i]) & (magnitude(omega[i]) < math.inf)
-    fine = fine & (magnitude(b_angle[i]) <= math.tau) & (magnitude(beta[i]) <= math.tau)
-    status[i] = where(fine & (L[i] >= 0.0) & (L[i] < math.inf), OK, _BAD_INPUT)
+def _row():
+    return (np.empty(GROUP),)
 
 
-@entry()
-def check(b, d, f, e, type, omega, b_angle, L, beta, status):
+@jit
+def check(p):
     """BAD_INPUT as for `polisher`, and angles beyond a turn."""
-    each_cell(_check, (b, d, f, e, type, omega, b_angle, L, beta, status))
+    fine = allowed(p.b, p.d, p.f, p.e, p.type) & (magnitude(p.omega) < math.inf)
+    fine = fine & (magnitude(p.b_angle) <= math.tau) & (magnitude(p.beta) <= math.tau)
+    return where(fine & (p.L >= 0.0) & (math.inf > p.L), OK, BAD_INPUT)
 
 
-POLISHER_MOTION = Kernel(
-    name="polisher_motion",
+POLISHER_MOTION = kernel(
+    "polisher_motion",
     doc="motion of a polishing machine's arm and tool along the crank's angle",
     source="Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (2)-(19), corrected",
     parameters=(
@@ -163,7 +155,9 @@ POLISHER_MOTION = Kernel(
     along=(
         Field("crank_angle", "rad", "angle of the crank, from where b_angle counts", lower=-FARTHEST, upper=FARTHEST),
     ),
+    record=Machine,
     check=check,
-    methods=(Method("closed", "closed forms of sums without error", closed, closed_bound),),
+    # close to a lock the status says more
+    methods=(tracing("closed", "closed forms of sums without error", _follow, ROUNDING, buffers=_row),),
     example=dict(MACHINE) | {"omega": 6.0},
 )
