@@ -17,8 +17,8 @@ from kernels.lanes.vectors import isnt, where
 
 
 def named(record, values):
-    """The tuple as a record of that class."""
-    return record(*values)
+    """A plain tuple as a record of that class; what is a record already stays one."""
+    return values if hasattr(values, "_fields") else record(*values)
 
 
 def read(record, columns, i):
@@ -42,7 +42,12 @@ def _flat(values):
 
 @type_callable(named)
 def _type_named(context):
-    return lambda record, values: types.BaseTuple.from_types(tuple(values), record.instance_class)
+    def typer(record, values):
+        if isinstance(values, types.BaseNamedTuple):
+            return values
+        return types.BaseTuple.from_types(tuple(values), record.instance_class)
+
+    return typer
 
 
 @lower_builtin(named, types.Any, types.Any)

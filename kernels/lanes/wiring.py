@@ -3,7 +3,7 @@
 An author writes functions of one cell, the same source for numbers and for lanes, and declares them by `kernel`:
 
     check(p) -> status                            p: a record of the parameters
-    solve(p, rtol, *buffers) -> outputs, status   outputs: a record of those that the method gives
+    solve(p, rtol, *buffers) -> outputs, status   outputs: a record of those that the method gives, or a tuple in order
     bound(p) -> error                             a number, or a record with one for each output
     fill(i, columns, *buffers)                    for traces, instead of `solve`: writes the rows of cell i itself
 
@@ -59,14 +59,14 @@ def tracing(name, doc, fill, bound=None, *, excludes=(), lacks=(), buffers=None,
 
 
 def kernel(
-    name, *, doc, source, parameters, outputs, record, check, methods, along=(), example=(), same_length=(),
+    name, *, doc, source, parameters, outputs, check, methods, along=(), example=(), same_length=(), record=None,
     loop=loops.in_lanes,
 ):  # fmt: skip
     """The declaration that the engine reads.
 
     Parameters
     ----------
-    record : NamedTuple class whose fields are the parameters, in their order
+    record : NamedTuple class whose fields are the parameters, in their order; None: one is made of their names
     check : `check(p)`, the status of a cell before any method is asked
     methods : of `method` or `tracing`, the cheapest first
     loop : how `check` and bounds are looped, `in_lanes`; `cell_by_cell` where parameters are arrays
@@ -98,9 +98,9 @@ class _Wiring:
     """Makes a kernel's entries; each is a function of its own name, for its machine code is kept by it."""
 
     def __init__(self, name, record, parameters, along, outputs, loop):
-        if list(record._fields) != parameters:
+        if record is not None and list(record._fields) != parameters:
             raise TypeError(f"{name}: the record has {record._fields}, the parameters are {parameters}")
-        self.name, self.record, self.loop = name, record, loop
+        self.name, self.record, self.loop = name, record or namedtuple("Parameters", parameters), loop
         self.parameters, self.along, self.outputs = parameters, along, outputs
 
     def check(self, check):
@@ -120,12 +120,13 @@ class _Wiring:
 
     def _body(self, solver):
         record, solve = self.record, solver.function
+        given = namedtuple("Given", [name for name in self.outputs if name not in solver.lacks])
         none = namedtuple("Lacking", solver.lacks)(*(math.nan for _ in solver.lacks))
 
         @jit
         def body(i, columns, *buffers):
             outputs, status = solve(read(record, columns, i), columns.rtol[i], *buffers)
-            write(columns, i, outputs)
+            write(columns, i, named(given, outputs))
             write(columns, i, none)
             columns.status[i] = status
 
@@ -149,7 +150,7 @@ class _Wiring:
         columns = namedtuple("Columns", names)
         scope = {"named": named, "COLUMNS": columns, "BODY": body, "LOOP": loop, "BUFFERS": buffers}
         made = FunctionType(_all_cells.__code__, scope, name)
-        made.__qualname__, made.__module__ = f"{self.name}.{name}", self.record.__module__
+        made.__qualname__, made.__module__ = f"{self.name}.{name}", function.__module__
         per_cell = None if loop is loops.cell_by_cell else [n not in self.along and n != "asked" for n in names]
         return entry_of(made, per_cell, kept=is_ours(function))
 
