@@ -8,16 +8,18 @@ column. They hold no lock (nogil), raise nothing and always end; what goes wrong
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from pathlib import Path
 from typing import Any
 
 
 class Status(IntEnum):
-    """What became of a cell: OK, a remark (1..63, values given) or a refusal (64..126, every output NaN).
+    """What became of a cell: OK, a remark (1..63, values given) or a refusal (64..125, every output NaN).
 
-    Numbers are stored in files and never reused.
+    FAILED is the engine's word, for what no kernel may do. Numbers are stored in files and never reused.
     """
 
     OK = 0, "right to the wanted rtol"
@@ -36,6 +38,7 @@ class Status(IntEnum):
     CHANGE_POINT = 13, "the linkage can be folded flat, where its arm may leave its branch"
     DOUBLE_CRANK = 14, "the arm turns fully with the crank and has no extreme angles"
     DAMPERS_OUT_OF_RANGE = 15, "merged dampers hold only up to valid_to, which is below f_max"
+    PARTLY_OUT_OF_RANGE = 16, "some outputs, or entries of them, are no normal float64, and NaN; the others are right"
     BAD_INPUT = 64, "a parameter is NaN, infinite or outside its limits, or two contradict each other"
     NEVER_STARTS = 65, "the drive cannot set the scene in motion"
     NO_LIMIT_CYCLE = 66, "nothing dissipates energy, so no limit cycle exists"
@@ -47,6 +50,7 @@ class Status(IntEnum):
     NO_CYCLE = 72, "a cycle of this kind does not exist here"
     NEVER_MEETS = 73, "the pallets never meet a tooth"
     NO_ASSEMBLY = 74, "the links are too short or too long to be joined"
+    FAILED = 126, "the kernel gave no number and no reason"
     PENDING = 127, "not computed yet"
 
     doc: str
@@ -59,7 +63,7 @@ class Status(IntEnum):
 
     @property
     def refused(self) -> bool:
-        return 64 <= self < 127
+        return 64 <= self < 126
 
 
 FIRST_REFUSAL = 64
@@ -75,6 +79,7 @@ class Field:
     `dims` names the axes of an array: coordinates of `Kernel.along` ("phase",), or what array parameters share
     ("mass",), whose length a study gives with their values; a column then has the shape `(n_cells, *dims)`.
     `choices` maps words of a study to the numbers in the column.
+    `gaps`: an output that may be NaN or infinite in a cell that is OK, as what it names need not exist there.
     """
 
     name: str
@@ -87,6 +92,7 @@ class Field:
     dims: tuple[str, ...] = ()
     choices: Mapping[str, int] = field(default_factory=dict)
     integer: bool = False
+    gaps: bool = False
 
 
 @dataclass(frozen=True)
@@ -94,11 +100,15 @@ class Method:
     """One way to solve a cell.
 
     `solve(*parameters, rtol, *along, *outputs, status)` fills every output column of the kernel and the status of
-    every cell. It gets no cell that `check` refused.
+    every cell; what is OK is finite but for `gaps`. It gets no cell that `check` refused.
 
     `bound(*parameters, rtol, *along, asked, out)` fills `out` with a bound on the largest relative error (of traces:
     relative to the amplitude) over the outputs whose entry in the uint8 array `asked` is 1. None: the method itself
     holds `rtol` or says by its status that it cannot.
+
+    `estimates`: the method knows only afterwards what its values are right to. It is called as
+    `solve(*parameters, rtol, *along, asked, *outputs, error, status)`, fills `error` as a bound would, and leaves it to
+    the engine to call INACCURATE where that exceeds `rtol`.
 
     `excludes` are parameters it cannot do: where a study sets one, away from its default or as an axis, the method is
     not to be had in the whole study. `lacks` are outputs it does not give: it cannot be had where one of them is asked
@@ -111,6 +121,7 @@ class Method:
     bound: Callable[..., None] | None = None
     excludes: tuple[str, ...] = ()
     lacks: tuple[str, ...] = ()
+    estimates: bool = False
 
 
 @dataclass(frozen=True)
@@ -149,3 +160,14 @@ def load(entry: str) -> Any:
 
     module, _, name = entry.partition(":")
     return getattr(import_module(module), name)
+
+
+def machine_code_folder() -> Path | None:
+    """Where machine code of kernels is kept; None: nowhere, or none has been loaded."""
+    return getattr(sys.modules.get("kernels.lanes.cache"), "FOLDER", None)
+
+
+def is_kept(function: Callable[..., None]) -> bool:
+    """Whether a function's machine code is kept, so that its first call loads it and compiles nothing."""
+    cache = sys.modules.get("kernels.lanes.cache")
+    return cache is not None and bool(cache.kept(function))

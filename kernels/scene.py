@@ -5,9 +5,9 @@
 The functions are plain Python of named scalars; each asks by name for the states, parameters and `side` that it needs.
 They are called once, with objects that record what is done to them (`expression`), and written out as compiled
 functions for one cell and for lanes (`module`), in a file that can be read. In them are allowed + - * / ** abs,
-and sqrt, exp, log, sin, cos, power and sign of this module. power(abs(u), n), u a state and n > -1 any number, has no
-Taylor series at u = 0; there it is followed as `power_core` says, right to the same tolerance. Of what is not a
-state, power and sqrt want something above 0 (else OUT_OF_RANGE).
+and sqrt, exp, log, sin, cos, power, sign, maximum, minimum and where of this module. power(abs(u), n), u a state and
+n > -1 any number, has no Taylor series at u = 0; there it is followed as `power_core` says, right to the same
+tolerance. Of what is not a state, power and sqrt want something above 0 (else OUT_OF_RANGE).
 """
 
 import inspect
@@ -20,12 +20,15 @@ import numpy as np
 
 from kernels.codegen import followed_twice
 from kernels.codegen.adaptive_solve import twice_by
-from kernels.codegen.expression import SceneError, cos, exp, log, power, sign, sin, sqrt
-from kernels.codegen.module import build
+from kernels.codegen.expression import SceneError, cos, exp, log, maximum, minimum, power, sign, sin, sqrt, where
+from kernels.codegen.module import build, compiling
 from kernels.codegen.record import RESERVED
 from kernels.interface import Field, Kernel, Method, Status
 
-__all__ = ["Field", "Scene", "SceneError", "cos", "exp", "log", "power", "scene_kernel", "sign", "sin", "sqrt"]
+__all__ = [
+    "Field", "Scene", "SceneError", "cos", "exp", "log", "maximum", "minimum", "power", "scene_kernel", "sign", "sin",
+    "sqrt", "where",
+]  # fmt: skip
 
 MOST_FLIPS = 1_000_000
 
@@ -114,6 +117,10 @@ def scene_kernel(
     )
     module = build(scene)
     names = [f.name for f in fields], [f.name for f in outputs]
+
+    def solve(method, how):
+        return _solve((name, method), how, module, *names)
+
     return Kernel(
         name=name,
         doc=doc,
@@ -125,35 +132,37 @@ def scene_kernel(
             Method(
                 "taylor",
                 "Taylor series of order 12 or 18 in lanes, no switch passed over; followed twice",
-                _solve(followed_twice.twice, module, *names),
+                solve("taylor", followed_twice.twice),
             ),
             Method(
                 "taylor_once",
                 "the same, each step right to rtol, followed once",
-                _solve(followed_twice.once, module, *names),
+                solve("taylor_once", followed_twice.once),
                 _no_bound(names[0]),
             ),
             Method(
                 "dop853",
                 "Dormand-Prince 8(5,3) in lanes, switches on its dense output; followed twice",
-                _solve(twice_by("dop853", scene), module, *names),
+                solve("dop853", twice_by("dop853", scene)),
             ),
             Method(
                 "dopri5",
                 "Dormand-Prince 5(4) in lanes, switches on its dense output; followed twice",
-                _solve(twice_by("dopri5", scene), module, *names),
+                solve("dopri5", twice_by("dopri5", scene)),
             ),
         ),
         example=dict(example or {}),
     )
 
 
-def _solve(how, module, parameters, outputs):
-    """A method's function of columns."""
+def _solve(names, how, module, parameters, outputs):
+    """A method's function of columns; `names` are those of the scene and of the method."""
 
     def solve(*columns):
         n = len(parameters)
-        if len(columns[0]):
+        if not len(columns[0]):
+            return
+        with compiling(*names):
             how(module, columns[:n], columns[n], columns[n + 1 : -1], columns[-1])
 
     return _signed(solve, [*parameters, "rtol", *outputs, "status"])

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from kernels.codegen import three_steps
+from kernels.codegen.module import compiling
 from kernels.codegen.stepped_source import methods_of, stepped
 from kernels.integrate.events import LOCATIONS, METHODS
 from kernels.interface import Field, Kernel, Method, Status
@@ -57,7 +58,8 @@ def stepping_methods(scene, parameters, outputs, fill):
     n = len(scene.states)
 
     def solved(name, columns):
-        return three_steps.solved(stepped(scene), name, columns[: count - 2], *columns[count - 2 : count])
+        with compiling(scene.name, name):
+            return three_steps.solved(stepped(scene), name, columns[: count - 2], *columns[count - 2 : count])
 
     def method(name):
         def solve(*columns):

@@ -4,7 +4,7 @@
     sweep run studies/stability_maps_oscillator.toml --allow-import
     sweep run studies/stability_maps_sticking.toml
     sweep run studies/stability_maps_spring.toml
-    python studies/stability_maps.py stability_maps_oscillator.h5 stability_maps.h5 stability_maps_sticking.h5 \\
+    python studies/stability_maps.py stability_maps.h5 stability_maps_oscillator.h5 stability_maps_sticking.h5 \\
         stability_maps_spring.h5
 
 draws stability_maps.png. The second sweep is of a damped oscillator x'' = -a x' - w^2 x, which a method makes grow

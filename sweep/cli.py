@@ -9,14 +9,16 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from sweep.system.errors import SweepError
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from sweep.results.stored import Stored
     from sweep.study.model import Study
 
 OK, FAULT, MISTAKE, INTERRUPTED = 0, 1, 2, 130
@@ -102,6 +104,7 @@ def parser() -> argparse.ArgumentParser:
     text = "whether the values carry independent noise; default: as their scatter shows"
     fit.add_argument("--noise", choices=("yes", "no"), help=text)
     fit.add_argument("-o", "--output", metavar="FILE.csv", type=Path, help="also write the table")
+    _add_force(fit)
     _add_at(fit)
 
     plot = _command(commands, "plot", _plot, "a figure of one output")
@@ -109,6 +112,7 @@ def parser() -> argparse.ArgumentParser:
     plot.add_argument(
         "-o", "--output", metavar="FILE.png", type=Path, help="default: the result's name with .png, here"
     )
+    _add_force(plot)
     plot.add_argument("--y", metavar="OUTPUT", help="default: the first output")
     plot.add_argument("--x", metavar="AXIS", help="default: the first axis")
     _add_at(plot)
@@ -121,6 +125,7 @@ def parser() -> argparse.ArgumentParser:
     chart.add_argument(
         "-o", "--output", metavar="FILE.png", type=Path, help="default: the study's name with _chart.png, here"
     )
+    _add_force(chart)
     chart.add_argument("--methods", metavar="METHOD", nargs="+", help="default: auto and all that can do the study")
     chart.add_argument("--rtol", metavar="RTOL", nargs="+", type=float, help="default: 1e-3 to 1e-13")
     chart.add_argument("--cells", metavar="N", type=int, default=1024, help="of the study at most; default: 1024")
@@ -134,6 +139,7 @@ def parser() -> argparse.ArgumentParser:
     refine.add_argument("--y", metavar="OUTPUT", nargs="+", required=True)
     refine.add_argument("--tolerance", metavar="SHARE", type=float, required=True, help="relative, e.g. 1e-3")
     refine.add_argument("-o", "--output", metavar="REFINED.h5", type=Path, required=True)
+    _add_force(refine)
     refine.add_argument("--most-cells", metavar="N", type=int, default=1_000_000, help="altogether; default: 1000000")
     refine.add_argument("--workers", metavar="N", type=int, help="cores to use; default: all")
     _add_allow_import(refine)
@@ -143,11 +149,13 @@ def parser() -> argparse.ArgumentParser:
     report.add_argument(
         "-o", "--output", metavar="FILE.html", type=Path, help="default: the result's name with .html, here"
     )
+    _add_force(report)
     _add_units(report)
 
     export = _command(commands, "export", _export, "write a result as csv, parquet, netCDF4 or zarr")
     _add_result(export)
     export.add_argument("-o", "--output", metavar="FILE.csv|.parquet|.nc|.zarr", type=Path, required=True)
+    _add_force(export)
     text = "only cells for which this holds, e.g. \"status == 'OK' and R < 0.1\""
     export.add_argument("--where", metavar="CONDITION", help=text)
     _add_units(export)
@@ -174,6 +182,11 @@ def _add_allow_import(command: Any) -> None:
     command.add_argument("--allow-import", action="store_true", help='allow a kernel "module:NAME" of your own')
 
 
+def _add_force(command: Any) -> None:
+    text = "overwrite what is there even if it is not from an earlier command of this kind"
+    command.add_argument("--force", action="store_true", help=text)
+
+
 def _add_at(command: Any) -> None:
     command.add_argument(
         "--at", metavar="AXIS=VALUE", nargs="+", action="extend", default=[], help="pick one value of another axis"
@@ -192,59 +205,77 @@ def _kernels(arguments: argparse.Namespace) -> None:
         raise SweepError("--study: name a kernel as well, e.g. sweep kernels foliot --study foliot.toml")
     if arguments.study:
         write_starter(arguments.name, arguments.study, arguments.allow_import)
-        print(arguments.study)
+        _tell(arguments.study)
         return
-    print(kernel_text(arguments.name, arguments.allow_import) if arguments.name else catalogue_text())
+    _tell(kernel_text(arguments.name, arguments.allow_import) if arguments.name else catalogue_text())
 
 
 def _plan(arguments: argparse.Namespace) -> None:
     from sweep.explore.plan import plan
+    from sweep.system.progress import Progress
 
-    print(plan(_study(arguments), workers=arguments.workers))
+    found = plan(_study(arguments), workers=arguments.workers, note=Progress(1, sys.stderr, "plan").note)
+    _tell(found)
+    if found.warnings:
+        raise SweepError("\n".join(f"{arguments.study}: {text}" for text in found.warnings))
 
 
 def _run(arguments: argparse.Namespace) -> None:
     study = _study(arguments)
-    from sweep.results.statuses import account
-    from sweep.runs.run import run
-    from sweep.show.text import summary_text
+    from sweep.results.statuses import summary_text
+    from sweep.runs.run import complete
 
     output = arguments.output or Path(f"{arguments.study.stem}.h5")
+    _check_readable(output)
     before = _mark(output)
     options = {name: getattr(arguments, name) for name in ("workers", "cluster", "force", "extend", "until")}
-    with run(study, output, **options) as dataset:
-        told = "done before; " if before is not None and _mark(output) == before else ""
-        told = told if account(dataset).pending == 0 else "unfinished; "
-        print(f"{output}: {told}{summary_text(dataset)}")
+    whole = complete(study, output, **options)
+    told = "unfinished; " if not whole else "done before; " if before and _mark(output) == before else ""
+    with _after(study, output, told) as found:
+        _tell(f"{output}: {told}{summary_text(found)}")
+
+
+def _after(study: Study, output: Path, told: str) -> xr.Dataset | Stored:
+    """The result after a run; of one written just now without xarray, which takes longer to load than a small run."""
+    if not told:
+        from sweep.results.stored import Stored
+
+        return Stored(output, study)
+    from sweep.results.open import open_result, open_unfinished
+
+    return open_unfinished(output) if told.startswith("unfinished") else open_result(output)
 
 
 def _show(arguments: argparse.Namespace) -> None:
     from sweep.show.text import result_text
 
     with _result(arguments) as dataset:
-        print(result_text(arguments.result, dataset))
+        _tell(result_text(arguments.result, dataset))
 
 
 def _verify(arguments: argparse.Namespace) -> None:
     from sweep.results.verify import verify
 
+    _check_readable(arguments.result)
     verdict = verify(arguments.result)
     if not verdict.whole:
         raise SweepError(str(verdict))
-    print(verdict)
+    _tell(verdict)
 
 
 def _fit(arguments: argparse.Namespace) -> None:
     from sweep.show.laws import laws, laws_text, pick, write_laws
 
+    if arguments.output:
+        _check_target(arguments, arguments.output, "laws")
     with _result(arguments) as dataset:
         part = pick(dataset, arguments.at)
         noise = {None: None, "yes": True, "no": False}[arguments.noise]
         found = laws(part, arguments.y, arguments.x, arguments.window or [], arguments.confidence, noise)
-    print(laws_text(found))
+    _tell(laws_text(found))
     if arguments.output:
         write_laws(found, arguments.output)
-        print(arguments.output)
+        _tell(arguments.output)
 
 
 def _plot(arguments: argparse.Namespace) -> None:
@@ -252,31 +283,35 @@ def _plot(arguments: argparse.Namespace) -> None:
     from sweep.show.laws import pick
 
     output = arguments.output or Path(f"{arguments.result.stem}.png")
+    _check_target(arguments, output)
     with _result(arguments) as dataset:
         plot(_in_units(pick(dataset, arguments.at), arguments.unit), output, y=arguments.y, x=arguments.x)
-    print(output)
+    _tell(output)
 
 
 def _chart(arguments: argparse.Namespace) -> None:
     from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
     from sweep.show.charts import plot_precision
 
+    study = _study(arguments)
+    output = arguments.output or Path(f"{arguments.study.stem}_chart.png")
+    _check_target(arguments, output)
     found = work_precision(
-        _study(arguments),
+        study,
         methods=arguments.methods,
         tolerances=arguments.rtol or TOLERANCES,
         cells=arguments.cells,
         reference=arguments.reference,
     )
-    output = arguments.output or Path(f"{arguments.study.stem}_chart.png")
-    print(precision_text(found))
+    _tell(precision_text(found))
     plot_precision(found, output)
-    print(output)
+    _tell(output)
 
 
 def _refine(arguments: argparse.Namespace) -> None:
     from sweep.explore.refine import refine, study_of
 
+    _check_target(arguments, arguments.output, "result")
     with _result(arguments) as dataset:
         study = study_of(dataset, allow_import=arguments.allow_import)
         found = refine(
@@ -287,25 +322,28 @@ def _refine(arguments: argparse.Namespace) -> None:
             study=study,
             most_cells=arguments.most_cells,
             workers=arguments.workers,
+            force=arguments.force,
         )
-    print(f"{arguments.output}: {found}")
+    _tell(f"{arguments.output}: {found}")
 
 
 def _report(arguments: argparse.Namespace) -> None:
     from sweep.show.page import write_page
 
     output = arguments.output or Path(f"{arguments.result.stem}.html")
+    _check_target(arguments, output, "page")
     with _result(arguments) as dataset:
-        print(write_page(_in_units(dataset, arguments.unit), arguments.result, output))
+        _tell(write_page(_in_units(dataset, arguments.unit), arguments.result, output))
 
 
 def _export(arguments: argparse.Namespace) -> None:
     from sweep.results.export import export
     from sweep.results.filter import where
 
+    _check_target(arguments, arguments.output)
     with _result(arguments) as dataset:
         chosen = dataset if arguments.where is None else where(dataset, arguments.where)
-        print(export(_in_units(chosen, arguments.unit), arguments.output))
+        _tell(export(_in_units(chosen, arguments.unit), arguments.output, force=arguments.force))
 
 
 def _in_units(dataset: xr.Dataset, given: Sequence[str]) -> xr.Dataset:
@@ -335,8 +373,38 @@ def _result(arguments: argparse.Namespace) -> xr.Dataset:
     if path.suffix == ".toml":
         raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
     if not path.exists() and path.with_name(path.name + ".parts").is_dir():
-        print(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
+        _tell(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
+    _check_readable(path, "xarray")
     return open_result(path)
+
+
+def _check_target(arguments: argparse.Namespace, target: Path, kind: str | None = None) -> None:
+    """Raises SweepError where a command is not to write there; its kind is the suffix unless it has a name."""
+    from sweep.system.overwriting import check_target
+
+    read = [getattr(arguments, name) for name in ("result", "study") if name in arguments]
+    check_target(target, kind or target.suffix.lower(), force=arguments.force, read=read)
+
+
+def _check_readable(path: Path, *meanwhile: str) -> None:
+    """Raises SweepError where HDF5 hangs or crashes in a result although it is sealed: then it is forged.
+
+    A result that is not sealed, or not there, is looked at by who opens it.
+
+    Parameters
+    ----------
+    meanwhile : names of modules to import while another process reads the result
+    """
+    from sweep.results.open import unreadable
+    from sweep.store.seal import probing, sealed
+
+    if not sealed(path):
+        return
+    read = probing(path)
+    for name in meanwhile:
+        import_module(name)
+    if not read():
+        raise unreadable(path, ValueError("HDF5 cannot read it"))
 
 
 def _mark(path: Path) -> tuple[int, int] | None:
@@ -348,8 +416,15 @@ def _mark(path: Path) -> tuple[int, int] | None:
     return status.st_mtime_ns, status.st_ino
 
 
+def _tell(text: object, file: TextIO | None = None) -> None:
+    """Prints, to stdout unless said otherwise, what may hold text of other people."""
+    from sweep.system.table import printable
+
+    print(printable(str(text)), file=file)
+
+
 def _fail(message: str, code: int) -> int:
-    print(message, file=sys.stderr)
+    _tell(message, sys.stderr)
     return code
 
 

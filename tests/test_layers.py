@@ -44,3 +44,15 @@ def test_a_study_without_foreign_units_does_without_pint():
     assert "pint" not in loaded(
         "import sweep\nsweep.build_study(kernel='foliot', axes={'mu': [1.0]}, fixed={'a': 1.0, 'phi0': 1.0})"
     )
+
+
+def test_a_small_run_to_a_file_needs_neither_xarray_nor_pandas(tmp_path):
+    """What says how it ended is read from the file; their import takes longer than all else of a small run."""
+    (tmp_path / "study.toml").write_text(
+        'kernel = "foliot"\n[axes]\nmu = [1.0, 2.0, nan]\n[fixed]\na = 1.0\nphi0 = { value = 60, unit = "degree" }\n'
+    )
+    told = loaded(
+        f"import sweep.cli\nassert sweep.cli.main(['run', r'{tmp_path}/study.toml', '-o', r'{tmp_path}/out.h5']) == 0"
+    )
+    assert told.isdisjoint({"xarray", "pandas", "pint", "dask"})
+    assert (tmp_path / "out.h5").exists()

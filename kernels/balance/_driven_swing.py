@@ -15,11 +15,11 @@ Derived here.
 
 import math
 
-from kernels.balance import _ringdown
+from kernels.balance import _driven_refined, _ringdown
 from kernels.integrate import linear_flow
 from kernels.interface import Status
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import fma, isnt, magnitude, nearest, some, sqrt, where
+from kernels.lanes.vectors import choose, fma, isnt, magnitude, nearest, some, sqrt, where
 from kernels.maths import pairs
 from kernels.maths.elementary import arctan, exp, expm1, in_unit, mantissa_exponent
 
@@ -135,6 +135,21 @@ def _light_losses(scene):
 
 
 @jit_call
+def _refined(scene, p, cycle, poor):
+    """Amplitude, half period and multiplier in 32 digits where they are `poor`, and where that was possible."""
+    zeta, r, _, beta, _ = scene
+    p = where(poor & (p < _LARGEST), p, 1.0)
+    f1 = (beta - r) + p
+    t1 = linear_flow.first_crossing(zeta, 1.0, 0.0 * p, f1, p)
+    comes = poor & (t1 < math.inf)
+    t1 = where(comes, t1, 0.0)
+    s1, _, _ = linear_flow.response(zeta, 1.0, t1)
+    _, _, _, t2, t3, passes, _, _, _ = _from_lift(scene, f1 * s1)
+    a, time, kept, found = _driven_refined.refined(scene, p, (t1, t2, t3), comes & passes)
+    return choose(found, (a, time, kept), cycle), found
+
+
+@jit_call
 def newton(scene, rtol):
     """Amplitude, half period and multiplier of the cycle in units, and its verdict."""
     zeta, r, _, beta, _ = scene
@@ -170,7 +185,12 @@ def newton(scene, rtol):
     of_multiplier = 2.0 * zeta * of_time * time + 2.0 * error / ((beta - r) + p)
     of_multiplier = where(kept > 1e-300, of_multiplier, 0.0)
     right = (error <= rtol * a) & (of_time <= rtol) & (of_multiplier <= rtol)
-    verdict = where(active | isnt(comes), _NOT_CONVERGED, where(right, _OK, _INACCURATE))
+    lost = active | isnt(comes)
+    verdict = where(lost, _NOT_CONVERGED, where(right, _OK, _INACCURATE))
+    poor = swings & tame & (lost | isnt(right))
+    if some(poor):
+        (a, time, kept), found = _refined(scene, where(comes, p, high), (a, time, kept), poor)
+        verdict = where(found, where(rtol >= ROUNDING, _OK, _INACCURATE), verdict)
     verdict = where(swings, verdict, _STICKS)
     return a, time, kept, where(tame, verdict, _OUT_OF_RANGE)
 

@@ -12,9 +12,10 @@ balance released from rest comes to th = 0.
 import math
 
 from kernels.balance import _driven_swing
-from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
+from kernels.interface import Field, Kernel, Method, Status
 from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.jit import jit
+from kernels.lanes.ranges import or_none, partly
 from kernels.lanes.vectors import isnt, where
 from kernels.maths.elementary import is_normal, scale
 
@@ -30,9 +31,9 @@ def _write(i, cycle, units, omega_n, amplitude, period, multiplier, status):
     a, time, kept, verdict = cycle
     e, fine = units
     swing, whole = scale(a, e), 2.0 * time / omega_n
-    amplitude[i], period[i], multiplier[i] = swing, whole, kept
-    fine = fine & ((verdict >= FIRST_REFUSAL) | (is_normal(swing) & is_normal(whole)))
-    status[i] = where(fine, verdict, _OUT_OF_RANGE)
+    wide, timed = is_normal(swing), is_normal(whole)
+    amplitude[i], period[i], multiplier[i] = or_none(swing, wide), or_none(whole, timed), kept
+    status[i] = where(fine, partly(wide & timed, verdict), _OUT_OF_RANGE)
 
 
 @jit
@@ -67,7 +68,7 @@ def _newton(i, zeta, omega_n, r, w, m, beta, rtol, *outputs):
 
 @entry()
 def newton(zeta, omega_n, r, w, m, beta, rtol, amplitude, period, multiplier, status):
-    """Exact pieces of the half swing and Newton on its map; INACCURATE where conditioning leaves less than rtol."""
+    """Exact pieces of the half swing and Newton on its map, in 32 digits where conditioning leaves less than rtol."""
     each_cell(_newton, (zeta, omega_n, r, w, m, beta, rtol, amplitude, period, multiplier, status))
 
 

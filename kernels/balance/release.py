@@ -7,7 +7,8 @@ Source: "Theory of Horology", section 2-3; the count of half swings is derived i
 
 Where there is no such end, the cell is remarked and what exists is given: OVERDAMPED for zeta >= 1 (never turns, creeps
 to r on the side of release, where `stop_angle` is), NEVER_ENDS without any solid friction (a motion of any length is:
-it fades to 0 and never ends). GRAZING: the count hangs on the last digits of the input.
+it fades to 0 and never ends). GRAZING: the count hangs on the last digits of the input. PARTLY_OUT_OF_RANGE: an output,
+such as the angle of rest near critical damping without friction of motion, is too small or too large for a float64.
 """
 
 import math
@@ -17,6 +18,7 @@ from kernels.balance._ringdown import RECURSION_LIMIT
 from kernels.interface import Field, Kernel, Method, Status
 from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.jit import jit
+from kernels.lanes.ranges import or_none, partly
 from kernels.lanes.vectors import isnt, magnitude, nearest, where
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW, is_normal, scale
 
@@ -45,16 +47,18 @@ def half_swing_time(zeta, omega_n):
 
 
 @jit
-def _verdict(ring, scene, rtol, unsettled):
-    """The status of a swinging cell."""
+def _verdict(ring, scene, rtol, unsettled, faint):
+    """The status of a swinging cell; an angle of rest too `faint` for a float64 is not asked for its error."""
     _, last, margin, grazes, doubt, unsure = ring
-    loose = isnt(doubt <= rtol * magnitude(last)) | isnt(doubt <= rtol * margin * scene[2])
+    loose = isnt(faint | (doubt <= rtol * magnitude(last))) | isnt(doubt <= rtol * margin * scene[2])
     verdict = where(grazes, _GRAZING, where(loose, _INACCURATE, _OK))
     return where(unsure, unsettled, verdict)
 
 
 @jit
-def _write(i, scene, units, ring, verdict, omega_n, theta0, half_swings, stop_angle, stop_time, margin, period, status):
+def _write(
+    i, scene, units, ring, rtol, unsettled, omega_n, theta0, half_swings, stop_angle, stop_time, margin, period, status
+):
     """One cell, or the lanes', in SI units; overdamped and endless motions get what exists of them."""
     zeta, r, r_s, start = scene
     count, last, distance = ring[0], ring[1], ring[2]
@@ -69,15 +73,17 @@ def _write(i, scene, units, ring, verdict, omega_n, theta0, half_swings, stop_an
     away = where(r_s > 0.0, magnitude(start - r_s) / _ringdown.unit(r_s), math.nan)
     distance = where(creeps, away, where(r_s > 0.0, distance, 0.0))
     lasting = isnt((creeps & moves) | endless)
-    half_swings[i] = where(creeps, 0.0, where(endless, math.nan, count))
-    stop_angle[i], stop_time[i] = angle, where(lasting, time, math.nan)
-    margin[i], period[i] = where(endless, math.nan, distance), where(creeps, math.nan, 2.0 * half)
-    verdict = where(start > 0.0, verdict, _OK)
-    verdict = where(creeps, _OVERDAMPED, where(endless, _NEVER_ENDS, verdict))
     faded = isnt(r > 0.0) & lasting  # to a positive angle, however small
-    small = moves & (magnitude(angle) < NORMAL_LOW) & (faded | (magnitude(angle) > 0.0))
-    fine = fine & (creeps | is_normal(half)) & isnt(lasting & (time > NORMAL_HIGH)) & isnt(small)
-    status[i] = where(fine, verdict, _OUT_OF_RANGE)
+    faint = moves & (magnitude(angle) < NORMAL_LOW) & (faded | (magnitude(angle) > 0.0))
+    timed = is_normal(half) & is_normal(2.0 * half)
+    ends = timed & isnt(time > NORMAL_HIGH)
+    half_swings[i] = where(creeps, 0.0, or_none(count, isnt(endless) & isnt(count > NORMAL_HIGH)))
+    stop_angle[i], stop_time[i] = or_none(angle, isnt(faint)), or_none(time, lasting & (ends | isnt(time > 0.0)))
+    margin[i], period[i] = or_none(distance, isnt(endless)), or_none(2.0 * half, timed & isnt(creeps))
+    whole = isnt(faint) & (creeps | (timed & (ends | isnt(lasting))))
+    verdict = where(start > 0.0, _verdict(ring, scene, rtol, unsettled, faint), _OK)
+    verdict = where(creeps, _OVERDAMPED, where(endless, _NEVER_ENDS, verdict))
+    status[i] = where(fine, partly(whole, verdict), _OUT_OF_RANGE)
 
 
 @jit
@@ -98,7 +104,7 @@ def swinging(scene):
 def _closed(i, zeta, omega_n, r, r_s, theta0, rtol, *outputs):
     scene, units = without_units(zeta[i], r[i], r_s[i], theta0[i])
     ring = _ringdown.closed(swinging(scene))
-    _write(i, scene, units, ring, _verdict(ring, scene, rtol[i], _NOT_CONVERGED), omega_n[i], theta0[i], *outputs)
+    _write(i, scene, units, ring, rtol[i], _NOT_CONVERGED, omega_n[i], theta0[i], *outputs)
 
 
 @entry()
@@ -120,7 +126,7 @@ def closed_bound(zeta, omega_n, r, r_s, theta0, rtol, asked, out):
 def _recursion(i, zeta, omega_n, r, r_s, theta0, rtol, *outputs):
     scene, units = without_units(zeta[i], r[i], r_s[i], theta0[i])
     ring = _ringdown.recursion(swinging(scene))
-    _write(i, scene, units, ring, _verdict(ring, scene, rtol[i], _STEP_LIMIT), omega_n[i], theta0[i], *outputs)
+    _write(i, scene, units, ring, rtol[i], _STEP_LIMIT, omega_n[i], theta0[i], *outputs)
 
 
 @entry()

@@ -94,7 +94,7 @@ BALANCE_TRACE = Kernel(
     doc="turning points of a balance with viscous and solid friction",
     source='"Theory of Horology", section 2-3, equation (10), restarted at every turning point',
     parameters=PARAMETERS,
-    outputs=(Field("turning_point", "rad", "angle at the end of a half swing", dims=("half_swing",)),),
+    outputs=(Field("turning_point", "rad", "angle at the end of a half swing", dims=("half_swing",), gaps=True),),
     along=(
         Field(
             "half_swing", "1", "number of the half swing, 0 for the release",

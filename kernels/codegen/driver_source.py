@@ -9,10 +9,16 @@ KINK_LIMIT = 1000
 EVENTS = 1_000_000
 """Of lanes none of which finishes, before what they know is put down."""
 
+BLUR = 16.0
+"""Tolerances of the surface's value at the start that rounding may take from it: rtol/2 in the finer run."""
+
 SETTLED = '''
 @jit_call
-def settled(state, side, parameters, unit):
-    """The sign of each kink's u, and whether the state is on it: there the sign is that of u in the next moment."""
+def settled(state, side, parameters, unit, near):
+    """The sign of each kink's u, and whether the state is on it: there the sign is that of u in the next moment.
+
+    `near` is 1 for the kinks that the state is on but for rounding.
+    """
     {signs} = natural_signs(state, side, parameters)
     {unpack} = series_2(state, side, ({signs}), parameters, unit)
     {turn}
@@ -21,18 +27,22 @@ def settled(state, side, parameters, unit):
 
 BEGUN = '''
 @jit
-def begun(parameters):
-    """State, side, signs, unit, on, and whether the start is beyond the surface."""
-    side = 0.0 * parameters[0] + 1.0
+def begun(flips, parameters):
+    """State, side, signs, unit, on, whether the start is beyond the surface, and what rounding takes from its value.
+
+    The last is relative to that value; nothing of nothing is nothing.
+    """
+    side = 0.0 * flips + 1.0
     {states} = started(side, parameters)
     state = ({lasting})
     one = 0.0 * side + 1.0
-    signs, on = settled(state, side, parameters, one)
+    signs, on = settled(state, side, parameters, one, ({zeros}))
     {unpack} = series_2(state, side, signs, parameters, one)
     e, d, dd = fma(factor_0, event_0[0], offset_0), factor_0 * event_0[1], factor_0 * event_0[2]
     away = (d > 0.0) | ((d >= 0.0) & (dd > 0.0))
     at = where((e <= 0.0) & (e >= 0.0) & away, 1.0, 0.0)
-    return state, side, signs, time_unit(e, d, dd), (at, {also_on}), isnt(e >= 0.0)
+    lost = lost_by_surface(state, side, signs, parameters)
+    return state, side, signs, time_unit(e, d, dd), (at, {also_on}), isnt(e >= 0.0), where(lost > 0.0, lost / e, 0.0)
 '''
 
 EVENT = '''
@@ -44,9 +54,10 @@ def advance_{order}(memory, i):
     fresh = (stage > 0.5) & (stage < 1.5)
     active = fresh | ((stage > 1.5) & (stage < 2.5))
     if some(fresh):
-        s, p, g, u, o, beyond = begun(parameters)
+        s, p, g, u, o, beyond, blur = begun(flips, parameters)
         {begin}
-        verdict = where(fresh, where(beyond | isnt(flips >= 1.0), BAD_INPUT, 0.0), verdict)
+        unsure = where(blur <= BLUR * tolerance, 0.0, INACCURATE)
+        verdict = where(fresh, where(beyond | isnt(flips >= 1.0), BAD_INPUT, unsure), verdict)
     done = active & isnt(active)
     for _ in range(EVENTS):
         moving = active & (verdict < REFUSAL)
@@ -72,9 +83,11 @@ def advance_{order}(memory, i):
                 {keep}
             since = where(switches, 0.0, since)
             left = surface(({states}), side, ({signs}), parameters)
+            gaps = kink_values(({states}), side, ({signs}), parameters)
             s = switched(({states}), side, ({signs}), parameters)
             side = where(switches, -side, side)
-            g, o = settled(s, side, parameters, unit)
+            gaps_behind = kink_values(s, side, ({signs}), parameters)
+            g, o = settled(s, side, parameters, unit, ({near}))
             {jump}
             after = surface(({states}), side, ({signs}), parameters)
             size = magnitude({offset}) + magnitude(after - {offset})
@@ -140,7 +153,7 @@ def shared(states, parameters, kinks):
     unpack = ", ".join([f"s_{s}" for s in states] + [f"(offset_{j}, factor_{j}, event_{j})" for j in (0, *e)])
     turn = [
         f"""\
-on_{j} = (event_{j}[0] <= 0.0) & (event_{j}[0] >= 0.0)
+on_{j} = ((event_{j}[0] <= 0.0) & (event_{j}[0] >= 0.0)) | (near[{j - 1}] > 0.5)
 back = (factor_{j} * event_{j}[1] < 0.0) | ((factor_{j} * event_{j}[1] <= 0.0) & (factor_{j} * event_{j}[2] < 0.0))
 sign_{j - 1} = where(on_{j} & back, -sign_{j - 1}, sign_{j - 1})"""
         for j in e
@@ -151,13 +164,13 @@ sign_{j - 1} = where(on_{j} & back, -sign_{j - 1}, sign_{j - 1})"""
         on=listed(f"where(on_{j}, 1.0, 0.0)" for j in e),
     ) + filled(
         BEGUN, states=listed(states), lasting=listed(f"{s} + 0.0 * side" for s in states), unpack=unpack,
-        also_on=", ".join(f"on[{j - 1}]" for j in e),
+        also_on=", ".join(f"on[{j - 1}]" for j in e), zeros=listed("0.0 * side" for _ in e),
     ) + f"\n\nROWS = {tuple(_rows(states, parameters, kinks))}\n"  # fmt: skip
 
 
 SETTLED_EMPTY = '''
 @jit
-def settled(state, side, parameters, unit):
+def settled(state, side, parameters, unit, near):
     """No kinks, no signs."""
     return (), ()
 '''
@@ -187,5 +200,9 @@ def advance(states, parameters, kinks, order, offset):
                            *(f"{place} = where(grazing, math.nan, {place})" for place in results.values())]),
         keep="\n".join(f"{results[r]} = where(watched, {x}, {results[r]})" for r, x in keep.items()),
         jump="\n".join(jump), offset=offset,
+        near=listed(
+            f"where(magnitude(gaps_behind[{j}]) <= 2.0 * magnitude(gaps[{j}]), {on}, 0.0)"
+            for j, on in enumerate(ons[1:])
+        ),
         store="\n".join(f"memory[{rows.index(r)}][i] = {r}" for r in changed),
     )  # fmt: skip

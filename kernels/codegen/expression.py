@@ -10,10 +10,16 @@ input of the graph; an integrator stops at a kink and turns the sign round.
 """
 
 import math
+import sys
 from dataclasses import dataclass
 from numbers import Real
 
+FLOAT_MAX = sys.float_info.max
 NUMBER, INPUT, ADD, MUL, HALF_SQUARE, SCALED, DIV = "number", "input", "add", "mul", "half_square", "scaled", "div"
+
+
+FUNCTIONS = "use + - * / ** abs and sqrt, exp, log, sin, cos, power, sign, maximum, minimum, where of kernels.scene"
+INSTEAD = "say it with where(x > y, a, b), maximum, minimum, abs, sign or side"
 
 
 class SceneError(ValueError):
@@ -21,6 +27,17 @@ class SceneError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
+class Comparison:
+    """That an expression is above 0, or that it is not, for `where`."""
+
+    above: "Expression"
+    negated: bool = False
+
+    def __bool__(self):
+        raise SceneError(f"it compares values to branch on them, which is not recorded; {INSTEAD}")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Expression:
     """One operation; `args` are expressions, a number, or a name."""
 
@@ -51,6 +68,9 @@ class Expression:
     def __pow__(self, exponent):
         return self.graph.power(self, exponent)
 
+    def __rpow__(self, base):
+        return self.graph.power(base, self)
+
     def __neg__(self):
         return self.graph.multiply(-1.0, self)
 
@@ -62,29 +82,51 @@ class Expression:
 
     __radd__, __rmul__ = __add__, __mul__
 
+    def __repr__(self):
+        return self.args[0] if self.kind == INPUT else f"<an expression: {self.kind}>"
+
+    __hash__ = object.__hash__
+
+    def __eq__(self, other):
+        raise SceneError(f"it asks whether two values are equal, which is not recorded; {INSTEAD}")
+
     def __bool__(self):
-        raise SceneError("a scene's function cannot branch on a value; say it with abs, sign, side or a second scene")
+        raise SceneError(f"it branches on a value, which is not recorded; {INSTEAD}")
 
-    def _no_comparison(self, other):
-        raise SceneError("a scene's function cannot compare values; say it with abs, sign, side or a second scene")
+    def __gt__(self, other):
+        return Comparison(self - other)
 
-    __lt__ = __le__ = __gt__ = __ge__ = _no_comparison
+    def __lt__(self, other):
+        return Comparison(other - self)
+
+    def __ge__(self, other):
+        return Comparison(other - self, negated=True)
+
+    def __le__(self, other):
+        return Comparison(self - other, negated=True)
 
     def __float__(self):
-        raise SceneError("use the functions of kernels.scene (sqrt, exp, log, sin, cos, power), not those of math")
+        raise SceneError("it calls a function of plain numbers (of math, or a cast) with a value; " + FUNCTIONS)
+
+    def __array_ufunc__(self, ufunc, method, *inputs, **named):
+        """numpy's functions that have a counterpart here; also what numpy makes of a product with its numbers."""
+        known = _OF_NUMPY.get(ufunc.__name__)
+        if known is None or method != "__call__" or named:
+            raise SceneError(f"numpy's {ufunc.__name__} is not recorded; {FUNCTIONS}")
+        return known(*(self.graph.of(value) for value in inputs))
 
 
 class Graph:
     """Expressions over named inputs, each recorded once, in the order in which they can be computed.
 
-    `kinks` are the series whose signs are inputs ".sign_0", ".sign_1", ...; `powers` are those of abs(u), u a state,
-    which have no series at u = 0.
+    `kinks` are the series whose signs are inputs ".sign_0", ".sign_1", ..., with their numbers; `powers` are those of
+    abs(u), u a state, which have no series at u = 0, with theirs.
     """
 
     def __init__(self):
         self.nodes = []
-        self.kinks = []
-        self.powers = []
+        self.kinks = {}
+        self.powers = {}
         self._known = {}
 
     def _node(self, kind, args, varies):
@@ -106,8 +148,12 @@ class Graph:
         """The value as an expression. Raises SceneError for what is none."""
         if isinstance(value, Expression):
             return value
+        if getattr(value, "shape", None) == ():
+            value = value.item()  # a number of numpy's
         if not isinstance(value, Real):
             raise SceneError(f"expected a number or an expression, found {value!r}")
+        if not abs(value) <= FLOAT_MAX:
+            raise SceneError(f"{str(value)[:40]} is no number that a float64 can hold")
         return self._node(NUMBER, (float(value),), False)
 
     def parts(self, x):
@@ -148,7 +194,9 @@ class Graph:
 
     def divide(self, x, y):
         x, y = self.of(x), self.of(y)
-        if x.kind == y.kind == NUMBER and y.args[0]:
+        if _is(y, 0.0):
+            raise SceneError("it divides by 0")
+        if x.kind == y.kind == NUMBER:
             return self.of(x.args[0] / y.args[0])
         (c, u), (d, w) = self.parts(x), self.parts(y)
         constant = c if _is(d, 1.0) else self._node(DIV, (c, d), False)
@@ -171,7 +219,7 @@ class Graph:
             return product if exponent >= 0 else 1.0 / product
         exponent = self.of(exponent)
         if exponent.varies:
-            raise SceneError("the exponent of a power must not vary along the motion")
+            raise SceneError("the exponent of a power must not vary along the motion; use exp and log")
         if self._is_side(x):
             return self._power_of_side(x, exponent)
         return self._node("power", (x, exponent), x.varies)
@@ -185,8 +233,7 @@ class Graph:
         constant, u = x.args
         side = self._side_of(u)
         node = self._node("power_of_side", (self._scaled(side, u), exponent), True)
-        if node not in self.powers:
-            self.powers.append(node)
+        self.powers.setdefault(node, len(self.powers))
         if constant is side:
             return node
         return self.multiply(self._node("power", (self._plain(constant, side), exponent), False), node)
@@ -205,9 +252,7 @@ class Graph:
 
     def _side_of(self, u):
         """The sign of a series, constant between kinks."""
-        if u not in self.kinks:
-            self.kinks.append(u)
-        return self.constant(f".sign_{self.kinks.index(u)}")
+        return self.constant(f".sign_{self.kinks.setdefault(u, len(self.kinks))}")
 
     def timed(self, x, unit):
         """x times a constant, which in a sum of series goes into their constants and costs nothing there."""
@@ -260,3 +305,36 @@ def power(x, exponent):
 def sign(x):
     """-1 or 1: the side of 0 on which x is; where x passes 0 a kink. 0 only for a constant 0."""
     return x.graph.sign(x) if isinstance(x, Expression) else math.copysign(1.0, x) if x else 0.0
+
+
+def where(condition, x, y):
+    """x where the condition, `a > b` or the like, holds, else y; a kink where a is b. x and y must be finite."""
+    if not isinstance(condition, Comparison):
+        return x if condition else y
+    return _chosen(condition.above, y, x) if condition.negated else _chosen(condition.above, x, y)
+
+
+def maximum(x, y):
+    """The larger of two values; where they are equal a kink."""
+    return _chosen(x - y, x, y)
+
+
+def minimum(x, y):
+    """The smaller of two values; where they are equal a kink."""
+    return _chosen(y - x, x, y)
+
+
+def _chosen(above, x, y):
+    """x where `above` is above 0, else y: exact, for the share of each is 0 or 1."""
+    side = sign(above)
+    share = 0.5 * side * (1.0 + side)
+    return share * x + (1.0 - share) * y
+
+
+_OF_NUMPY = {
+    "add": lambda x, y: x + y, "subtract": lambda x, y: x - y, "multiply": lambda x, y: x * y,
+    "divide": lambda x, y: x / y, "power": power, "float_power": power, "negative": lambda x: -x, "absolute": abs,
+    "fabs": abs, "square": lambda x: x * x, "sqrt": sqrt, "exp": exp, "log": log, "sin": sin, "cos": cos, "sign": sign,
+    "maximum": maximum, "minimum": minimum, "greater": lambda x, y: x > y, "less": lambda x, y: x < y,
+    "greater_equal": lambda x, y: x >= y, "less_equal": lambda x, y: x <= y,
+}  # fmt: skip

@@ -26,6 +26,9 @@ STOPS = 2.0, 4.0, math.inf
 ROUGH, FINER = 2.0, 16.0
 ROUNDINGS, GOLDEN = 8.0, 0.6180339887498949
 """By how many roundings a parameter is changed at most, and what makes that differ from one to the next."""
+TIGHTER, TIGHT = 1e-3, 1e-13
+"""The second tolerance, over the first one, and at most: what is stiff may come to rest only in the last digits."""
+TRIED_AGAIN = Status.INACCURATE, Status.STEP_LIMIT, Status.OUT_OF_RANGE
 APART = 8.0
 """How many rtol the two runs may differ by: the finer one is then right to rtol/2."""
 
@@ -76,21 +79,37 @@ def _run(module, run, inputs, together):
 def once(module, columns, rtol, outputs, status):
     """Fills outputs and status by one run, each step right to `rtol`."""
     results = followed(module, columns, rtol)
-    _write(results, outputs, status)
+    _write(results, _status(results, len(outputs)), outputs, status)
 
 
-def twice(module, columns, rtol, outputs, status, most=APART):
-    """Fills outputs and status by two runs; INACCURATE where they differ by more than the finer one could mend."""
+def twice(module, columns, rtol, outputs, status, most=APART, finest=0.0):
+    """Fills outputs and status by two runs; INACCURATE where they differ by more than the finer one could mend.
+
+    Where they do, or a run breaks off, the cell is followed twice again with a tighter tolerance, of at least `finest`.
+    """
+    results, found = _compared(module, columns, rtol, rtol, most)
+    tighter = np.maximum(np.minimum(TIGHT, TIGHTER * rtol), finest)
+    again = np.flatnonzero(np.isin(found, TRIED_AGAIN) & (tighter < rtol) & (rtol >= ROUNDING))
+    if len(again):
+        better, verdict = _compared(module, [c[again] for c in columns], tighter[again], rtol[again], most)
+        right = verdict == Status.OK
+        results[:, again[right]], found[again[right]] = better[:, right], Status.OK
+    _write(results, found, outputs, status)
+
+
+def _compared(module, columns, rtol, wanted, most):
+    """The results of the finer of two runs to the tolerance `rtol`, and the status where `wanted` is to be met."""
     rough = followed(module, off_by_roundings(columns), rtol, ROUGH)
     fine = followed(module, columns, rtol, ROUGH * FINER)
-    _write(fine, outputs, status)
     states = len(module.STATES)
+    status = _status(fine, 2 + states)
     scale = np.concatenate([abs(fine[:2]), np.maximum(abs(fine[2 : 2 + states]), fine[2 + states : -1])])
     with np.errstate(all="ignore"):
-        apart = (rtol < ROUNDING) | ~(abs(fine[: len(scale)] - rough[: len(scale)]) <= most * rtol * scale).all(axis=0)
-    status[apart & (status == Status.OK)] = Status.INACCURATE
+        near = (abs(fine[: len(scale)] - rough[: len(scale)]) <= most * wanted * scale).all(axis=0)
+    status[((wanted < ROUNDING) | ~near) & (status == Status.OK)] = Status.INACCURATE
     worse = (rough[-1] > 0) & (status <= Status.INACCURATE)
     status[worse] = np.where(rough[-1][worse] < FIRST_REFUSAL, rough[-1][worse], Status.INACCURATE)
+    return fine, status
 
 
 def off_by_roundings(columns):
@@ -109,10 +128,15 @@ def off_by_roundings(columns):
     return [*changed, flips]
 
 
-def _write(results, outputs, status):
+def _status(results, outputs):
+    """What the motion came to; OUT_OF_RANGE where one of so many outputs is no normal number."""
+    sizes, status = abs(results[:outputs]), results[-1].astype(np.int8)
+    normal = (sizes == 0) | ((sizes >= NORMAL_LOW) & (sizes <= NORMAL_HIGH))
+    status[~normal.all(axis=0) & (status == Status.OK)] = Status.OUT_OF_RANGE
+    return status
+
+
+def _write(results, found, outputs, status):
     for column, row in zip(outputs, results, strict=False):
         column[...] = row
-    status[...] = results[-1]
-    sizes = abs(results[: len(outputs)])
-    normal = (sizes == 0) | ((sizes >= NORMAL_LOW) & (sizes <= NORMAL_HIGH))
-    status[~normal.all(axis=0) & (results[-1] == Status.OK)] = Status.OUT_OF_RANGE
+    status[...] = found

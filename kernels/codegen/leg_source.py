@@ -36,7 +36,7 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
 
     Returns
     -------
-    state, t, h, on : at the event, after the time t; `on` is 1 for the event that fired
+    state, t, h, on : at the event, after the time t; `on` is 1 for the event that fired, and for what fell with it
     stuck, lost, broken : pressed on what it started on; not there within limits; coefficients that are no numbers
     grazing, hangs : neither met nor missed for sure; met, but only just
     tried : steps
@@ -50,13 +50,16 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
     {no_margins}
     stuck, lost, broken, grazing = nothing, nothing, nothing, nothing
     power_h, allowed = natural_power(h, {order} - 1), SLACK * tolerance
+    {longest}
     for step in range(STEP_LIMIT):
         {cores}
         {series_and_events} = series_{order}(({states}), side, signs, parameters, unit{all_cores})
         {facts}
         left_out, over = {left_out}
-        h = where(moving, next_step(h, left_out * power_h / (tolerance * over), {order}), h)
+        ratio = where(left_out <= 0.0, 0.0, left_out * power_h / (tolerance * over))
+        h = where(moving, next_step(h, ratio, {order}), h)
         {no_longer}
+        {not_longest}
         power_h = natural_power(h, {order} - 1)
         fine = {keeps}
         trial = h
@@ -69,15 +72,16 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
             {margins}
             moving = moving & isnt(broken | stuck)
         tried = where(moving, tried + 1.0, tried)
+        {look}
         {judge}
-        unsure = moving & isnt({all_sure})
+        unsure = moving{and_seen} & isnt({all_sure})
         if some(unsure):
             trial, unsure, {no_falls} = doubted_{order}(
                 trial, unsure, ({facts_of_all}), ({series_of_all})
             )
         grazing = grazing | unsure
         moving = moving & isnt(unsure)
-        steps = moving & fine
+        steps = moving & fine{and_seen}
         {ends}
         {passed}
         meets = steps & ({any_passed})
@@ -93,14 +97,43 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
     met = active & isnt(lost | stuck | broken | grazing)
     part, which, hangs = span, -1.0 - 0.0 * h, nothing
     {roots}
+    {with_it}
     {at_root}
+    {on_kink}
     t = where(met, t + part, t)
     h = where(met & (t > 0.0) & (h > LONGEST * t), LONGEST * t, h)
     return ({final}), t, h, ({fired}), stuck, lost, broken, grazing, hangs, tried
 '''
 
 
-def leg(states, events, order, nested=0, summed=(), seen=(), kinks_of_powers=()):
+LOOK = """\
+of_rates, of_events = hidden(({states}), ({boxes}), side, signs, parameters)
+{power}
+seen = {all_seen}
+longest = where(seen, longest / COME_UP, COME_UP * trial)"""
+
+
+def look(states, order, hides):
+    """The text of what a step may hide; none where rates and events hide nothing.
+
+    Of an event that can, the series is asked for its last term too, for the states' do not tell of it.
+    """
+    rates, events = hides
+    seen = [
+        f"(unit * trial * of_rates[{i}] <= tolerance * size(trial, s_{s}))" for i, s in enumerate(states) if rates[i]
+    ]
+    seen += [
+        f"(most(of_events[{j}], magnitude(factor_{j}) * last_term(trial, event_{j}) * power_trial) "
+        f"<= tolerance * (magnitude(offset_{j}) + magnitude(factor_{j}) * size(trial, event_{j})))"
+        for j, hides_some in enumerate(events)
+        if hides_some
+    ]
+    power = f"power_trial = natural_power(trial, {order} - 1)" if any(events) else ""
+    boxes = listed(f"box(trial, s_{s})" for s in states)
+    return seen and filled(LOOK, states=listed(states), boxes=boxes, power=power, all_seen=" & ".join(seen))
+
+
+def leg(states, events, order, nested=0, summed=(), seen=(), kinks_of_powers=(), hides=((), ())):
     """The text of `to_event_{order}`: `states` are names, `events` the number of events."""
     e = range(events)
 
@@ -126,6 +159,16 @@ if some(first):
     {among if j else "# whatever else passed in this step"}
     at, only_just = crossing({watched}, (offset_{j}, factor_{j}, {value}), span, tolerance, first)
     part, which, hangs = where(first, at, part), where(first, {j}.0, which), (hangs & isnt(first)) | only_just"""
+
+    def with_it(j):
+        return (
+            f"beside_{j} = met & passed_{j} & (magnitude(fma(factor_{j}, {seen_at(j, 'part')}, offset_{j}))"
+            f" <= fma(SAME, tolerance, ROUNDING) * (magnitude(offset_{j}) + magnitude(factor_{j} * event_{j}[0])))"
+        )
+
+    def fires(j):
+        own = f"met & (which > {j - 0.5}) & (which < {j + 0.5})"
+        return f"beside_{j} | ({own})" if events > 1 else own
 
     facts = [
         f"""\
@@ -162,15 +205,22 @@ down_{j} = falls(d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial) | now_{j}"""
         for j in e
     ]
 
+    on_kink = [(1 + j, seen[1 + j]) for j in sorted(set(kinks_of_powers))]
     cores = [
         f"at_core_{i}, longest_{i} = "
-        f"core_{i}(({listed(states)}), side, signs, parameters, unit, tolerance, (on_{1 + j} > 0.5) & (t <= 0.0))"
+        f"core_{i}(({listed(states)}), side, signs, parameters, unit, tolerance,"
+        f" (on_{1 + j} > 0.5) & (t <= 0.0), t, margin_{1 + j})"
         for i, j in enumerate(kinks_of_powers)
     ]
     each = ("e", "d", "dd", "ddd", "margin", "now", "falls")
     facts_of = [f"{name}_{j}" for j in e for name in each]
     passed = [f"passed_{j} = passed_{j} | (steps & falls_{j} & (end_{j} <= 0.0))" for j in e]
+    looked = look(states, order, hides)
     parts = {
+        "longest": "longest = 0.0 * h + FAR" if looked else "",
+        "not_longest": "h = where(h < longest, h, longest)" if looked else "",
+        "look": looked or "",
+        "and_seen": " & seen" if looked else "",
         "series_and_events": ", ".join(
             [f"s_{s}" for s in states] + [f"(offset_{j}, factor_{j}, event_{j})" for j in e]
         ),
@@ -210,8 +260,10 @@ down_{j} = falls(d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial) | now_{j}"""
         "no_longer": "\n".join(f"h = where(h < longest_{i}, h, longest_{i})" for i in range(len(cores))),
         "roots": "\n".join(root(j) for j in e),
         "at_root": "\n".join(f"end_{s} = where(met, {state_at(s, 'part')}, {s})" for s in states),
+        "on_kink": "\n".join(f"end_{u} = where({fires(j)}, 0.0 * end_{u}, end_{u})" for j, u in on_kink),
         "final": listed(f"end_{s}" for s in states),
-        "fired": listed(f"where(met & (which > {j - 0.5}) & (which < {j + 0.5}), 1.0, 0.0)" for j in e),
+        "with_it": "\n".join(with_it(j) for j in e) if events > 1 else "",
+        "fired": listed(f"where({fires(j)}, 1.0, 0.0)" for j in e),
         "left_out": folded("worse({}, {})", [f"(last_term(h, s_{s}), size(h, s_{s}))" for s in states]),
         "keeps": " & ".join(f"keeps(h, power_h, s_{s}, allowed)" for s in states),
         "states": listed(states),

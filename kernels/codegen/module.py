@@ -4,23 +4,27 @@ The file lies in the folder of the kernels' own machine code (`cache`), named by
 """
 
 import builtins
+import contextlib
 import functools
 import hashlib
-import importlib.util
 import os
 import re
 import sys
 import tempfile
 import threading
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
+from numba.core.errors import NumbaError
 
 from kernels.codegen.driver_source import BEGUN, EVENT, SETTLED, advance, shared
-from kernels.codegen.expression import DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, needed
-from kernels.codegen.leg_source import LEG, leg
+from kernels.codegen.expression import DIV, FUNCTIONS, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, SceneError, needed
+from kernels.codegen.hidden_source import HIDDEN, hidden
+from kernels.codegen.leg_source import LEG, LOOK, leg
 from kernels.codegen.power_core import CORE, core
 from kernels.codegen.record import record
+from kernels.codegen.rounding_source import LOST, lost_by_surface
 from kernels.codegen.series_source import Lines
 from kernels.codegen.template import filled, listed
 from kernels.lanes import cache
@@ -38,23 +42,30 @@ Written by kernels.scene from the functions of the scene; do not change it here.
 
 import math
 
+from kernels.maths.intervals import (
+    above, added, half_squared, hidden_by_exp, hidden_by_over, hidden_by_power, hidden_by_root, largest, most,
+    multiplied, of_exp, of_log, of_power, of_sqrt, of_wave, over, smallest, times, widened,
+)
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import dot, fma, horner, isnt, magnitude, some, sqrt, where
+from kernels.maths.pairs import two_sum
 from kernels.lanes.refill import each_refilled
 from kernels.codegen.module import kept
 from kernels.integrate.taylor import (
-    HALVINGS, LONGEST, SLACK, STEP_LIMIT, clear, crossing, falls, keeps, last_term, mean, natural_power, next_step,
-    of_series, of_sum, rises, size, stays_apart, tail, worse,
+    COME_UP, HALVINGS, LONGEST, ROUNDING, SAME, SLACK, STEP_LIMIT, box, clear, crossing, falls, keeps, last_term, mean,
+    natural_power, next_step, of_series, of_sum, rises, size, stays_apart, tail, worse,
 )
-from kernels.codegen.power_core import FAR, UNEVEN, core_time, mean_power, size_in_unit
-from kernels.codegen.driver_source import EVENTS, KINK_LIMIT, time_unit
+from kernels.codegen.power_core import FAR, SHORT, UNEVEN, core_time, mean_power, no_matter, size_in_unit
+from kernels.codegen.driver_source import BLUR, EVENTS, KINK_LIMIT, time_unit
 from kernels.maths.elementary import exp, log, power, sincos
 from kernels.interface import FIRST_REFUSAL, Status
 
 STATES = {states}
 PARAMETERS = {parameters}
 KINKS = {kinks}
+HIDES = {hides}
 REMARK, REFUSAL, BAD_INPUT = float(Status.GRAZING), float(FIRST_REFUSAL), float(Status.BAD_INPUT)
+INACCURATE = float(Status.INACCURATE)
 OUT_OF_RANGE, STICKS, STEP_LIMIT_MET = float(Status.OUT_OF_RANGE), float(Status.STICKS), float(Status.STEP_LIMIT)
 '''
 
@@ -78,13 +89,19 @@ def series_{order}(state, side, signs, parameters, unit{also}):
 '''
 
 
-_TAKEN = set(re.findall(r"\w+", "".join((HEAD, FUNCTION, SERIES, LEG, CORE, EVENT, BEGUN, SETTLED)))) | {"n", "p", "s"}
-_NUMBERED = re.compile(r"\w*_\d+|n\d+|(at|s|end|size|bare|full|most|half|over|and_one|half_over)_\w*")
+_TEXTS = HEAD, FUNCTION, SERIES, HIDDEN, LOST, LEG, LOOK, CORE, EVENT, BEGUN, SETTLED
+_TAKEN = set(re.findall(r"\w+", "".join(_TEXTS))) | {"n", "p", "s"}
+_NUMBERED = re.compile(r"\w*_\d+|n\d+|(at|s|end|box|size|bare|full|kink|most|half|over|and_one|half_over)_\w*")
 
 
 def _apart(name):
     """A name of a scene's as it is written: apart from those of the text itself."""
     return f"{name}_" if name in _TAKEN or _NUMBERED.fullmatch(name) or hasattr(builtins, name) else name
+
+
+def _in_every_lane(value, expression):
+    """The value as text; a plain number is repeated in every lane, or a tuple of both could not be looped over."""
+    return value if any(node.kind == INPUT for node in needed(expression)) else f"0.0 * side + {value}"
 
 
 class Writer:
@@ -111,7 +128,7 @@ class Writer:
     def function(self, name, doc, expressions, arguments, single=False):
         """A function of the values of expressions."""
         lines = Lines(self.names)
-        values = [lines.value(x) for x in expressions]
+        values = [_in_every_lane(lines.value(x), x) for x in expressions]
         return filled(
             FUNCTION, name=name, doc=doc, arguments=", ".join(arguments),
             unpack=self.unpacked(*(a for a in arguments if a in ("state", "signs", "parameters"))),
@@ -165,7 +182,7 @@ class Writer:
 
     def kinks_of_powers(self):
         """For each power its kink."""
-        return [self.recorded.graph.kinks.index(x.args[0].args[1]) for x in self.recorded.graph.powers]
+        return [self.recorded.graph.kinks[x.args[0].args[1]] for x in self.recorded.graph.powers]
 
     def series(self, order, powers=0):
         """The text of `series_{order}`, with a core for each of so many powers."""
@@ -186,17 +203,21 @@ class Writer:
         """The whole module."""
         scene, recorded = self.scene, self.recorded
         moving = ("state", "side", "signs", "parameters")
+        of_hidden, *hides = hidden(self)
         parts = [
             filled(HEAD, name=scene.name, doc=scene.doc, states=tuple(scene.states), parameters=tuple(scene.parameters),
-                   kinks=self.kinks).lstrip(),
+                   kinks=self.kinks, hides=any(map(any, hides))).lstrip(),
             self.function("rates", "Time derivative of each state.", recorded.rates, moving),
             self.function("surface", "Falls through 0 at the switch.", (recorded.surface,), moving, True),
             self.natural_signs(),
+            self.function("kink_values", "What is 0 at each kink.", recorded.graph.kinks, moving),
             self.function("switched", "The state behind the switch; the side then turns.", recorded.switched, moving),
             self.function("started", "The state at the start.", recorded.started, ("side", "parameters")),
             self.underflows(),
             self.series(2),
+            lost_by_surface(self),
             shared(self.states, self.parameters, self.kinks),
+            of_hidden,
         ]  # fmt: skip
         parts += [core(self, i) for i in range(len(recorded.graph.powers))]
         for order in ORDERS:
@@ -210,6 +231,7 @@ class Writer:
                     self.summed(),
                     self.seen(),
                     self.kinks_of_powers(),
+                    hides,
                 )
             )
             parts.append(advance(self.states, self.parameters, self.kinks, order, self.offset()))
@@ -219,6 +241,19 @@ class Writer:
 def kept(function):
     """A function called from Python, whose machine code is kept: its file is named by all it was made from."""
     return cached(function) if COMPILED else _quiet(function)
+
+
+@contextlib.contextmanager
+def compiling(scene, method):
+    """Where numba fails inside, a SceneError of two lines in place of its hundred."""
+    try:
+        yield
+    except NumbaError as error:
+        why = next((line.strip() for line in str(error).splitlines() if line.strip() and "Failed in" not in line), "")
+        raise SceneError(
+            f"the scene {scene} cannot be compiled for the method {method}: {why[:200]}\n"
+            f"Take another method, or say the scene in simpler terms: {FUNCTIONS}"
+        ) from None
 
 
 def _quiet(function):
@@ -243,11 +278,12 @@ def loaded(kind, scene, text):
     name = f"{kind}_{scene.name}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
     with _BUILDING:
         if name not in sys.modules:
-            spec = importlib.util.spec_from_file_location(name, _written(name, text))
-            module = importlib.util.module_from_spec(spec)
+            module = ModuleType(name)
+            module.__file__ = str(_written(name, text))
             sys.modules[name] = module
             try:
-                spec.loader.exec_module(module)
+                # not what the file says, nor Python's compiled copy of it: others may have been there
+                exec(compile(text, module.__file__, "exec"), module.__dict__)
             except BaseException:
                 del sys.modules[name]
                 raise

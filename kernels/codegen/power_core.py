@@ -6,9 +6,14 @@ is right for whatever n, and what is left of a state whose rate the power change
 for the speed between differs from the true one by less than D t, and the motion is not quite even: d, at most 1/4.
 The core ends where that is the tolerance times the state's own size; outside the series steps towards it or away from
 it by parts of the way that is left, as the radius of convergence allows.
+
+Where nothing but the power acts at u = 0, u' = -c u^n with n < 1 comes to rest there after u^(1 - n)/((1 - n) c), while
+every state's rate changes by the power as u's does: with (1 - n) u^n in the power's place that time and all impulses
+are right, and what hangs on u is off by less than u times that time.
 """
 
 from kernels.codegen.template import filled, listed
+from kernels.integrate.taylor import SLACK
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import magnitude, where
 from kernels.maths.elementary import power
@@ -16,6 +21,8 @@ from kernels.maths.elementary import power
 UNEVEN = 0.25
 """d of (1), at most."""
 FAR = 1e300
+SHORT = 0.9
+"""Of the way to rest, that a step may take: at the end of it the series may turn round instead."""
 
 CORE = '''
 @jit
@@ -27,8 +34,11 @@ def given_{i}(state, side, signs, parameters, unit, power_{i}):
 
 
 @jit_call
-def core_{i}(state, side, signs, parameters, unit, tolerance, leaves):
-    """The mean of power {i} in its core, -1 where the motion is not in it; and the longest step from the kink on."""
+def core_{i}(state, side, signs, parameters, unit, tolerance, leaves, t, margin):
+    """The mean of power {i} in its core, -1 where the motion is not in it; and the longest step from the kink on.
+
+    `t` is the time since the last event, `margin` what there is of u for next to nothing.
+    """
     {unpack}
     {value_of_n}
     base = sign_{kink} * {u}
@@ -38,10 +48,17 @@ def core_{i}(state, side, signs, parameters, unit, tolerance, leaves):
     if some(nears):
         {bare} = given_{i}(state, side, signs, parameters, unit, nothing)
         over = 1.0 / magnitude(full_{u})
-        t, d = base * over, magnitude(full_{u} - bare_{u}) * over
+        t_{u}, d = base * over, magnitude(full_{u} - bare_{u}) * over
+        uneven = t_{u} * (t_{u} + d)
         inside = nears & (d <= UNEVEN)
         {inside}
         core = where(inside, mean_power(value, {n}), -1.0)
+        {at_kink} = given_{i}(({on_kink}), side, signs, parameters, unit, nothing)
+        settles = nears & (kink_{u} <= 0.0) & (kink_{u} >= 0.0) & ({n} < 1.0)
+        left = t_{u} / (1.0 - {n})
+        rests = settles & no_matter(base, left, t, margin)
+        core = where(rests, value * (1.0 - {n}), core)
+        longest = where(settles & isnt(rests), SHORT * left, longest)
     if some(leaves):
         {bare} = given_{i}(state, side, signs, parameters, unit, nothing)
         {most} = given_{i}(state, side, signs, parameters, unit, nothing + 1.0)
@@ -67,6 +84,12 @@ def mean_power(last, n):
 
 
 @jit
+def no_matter(u, left, t, margin):
+    """Whether so little is left of u that its way to rest, in the time `left`, does not matter."""
+    return (SLACK * u * left <= margin * (t + left)) | (u <= SLACK * margin)
+
+
+@jit
 def core_time(room, rate, most, n, tolerance):
     """How long u = rate t may be taken for small, by (1); at most 1 unit.
 
@@ -88,7 +111,7 @@ def _no_more_than_one(x):
 
 def core(writer, i):
     """The text of `core_{i}` and what it calls."""
-    node = writer.recorded.graph.powers[i]
+    node = list(writer.recorded.graph.powers)[i]
     base, exponent = node.args
     kink = writer.kinks_of_powers()[i]
     states, u = writer.states, writer.names[base.args[1].args[0]]
@@ -97,7 +120,7 @@ def core(writer, i):
     of_n = writer.lines_given({})
     n = of_n.value(exponent)
     inside = [
-        f"inside = inside & (magnitude(full_{s} - bare_{s}) * (t * (t + d)) <= tolerance * size_in_unit({s}, full_{s}))"
+        f"inside = inside & (magnitude(full_{s} - bare_{s}) * uneven <= tolerance * size_in_unit({s}, full_{s}))"
         for s in states
     ]
     room = [
@@ -111,5 +134,6 @@ room = where(share < room, share, room)"""
         rates=f"({listed(rates)})",
         value_of_n="\n".join(of_n.text), inside="\n".join(inside), room="\n".join(room),
         bare=listed(f"bare_{s}" for s in states), full=listed(f"full_{s}" for s in states),
-        most=listed(f"most_{s}" for s in states),
+        most=listed(f"most_{s}" for s in states), at_kink=listed(f"kink_{s}" for s in states),
+        on_kink=listed("0.0 * side" if s == u else s for s in states),
     )  # fmt: skip

@@ -3,7 +3,9 @@
 import inspect
 from dataclasses import dataclass
 
-from kernels.codegen.expression import ADD, SCALED, Expression, Graph, SceneError
+import numpy as np
+
+from kernels.codegen.expression import ADD, FUNCTIONS, SCALED, Expression, Graph, SceneError
 
 RESERVED = ("side", "flips", "time", "interval", "rtol", "status")
 """Names that a scene's states and parameters cannot have."""
@@ -32,16 +34,16 @@ def record(scene):
     graph = Graph()
     states = {name: graph.series(name) for name in scene.states}
     known = {name: graph.constant(name) for name in (*scene.parameters, "side")}
-    rates = _called(graph, scene.rates, states | known, len(states))
-    surface = _called(graph, scene.surface, states | known, 1)[0]
+    rates = _called(graph, scene, "rates", states | known, len(states))
+    surface = _called(graph, scene, "surface", states | known, 1)[0]
     if not surface.varies:
-        raise SceneError("the surface does not depend on a state, so the motion never meets it")
+        raise SceneError(f"surface of the scene {scene.name}: it does not depend on a state, so no motion meets it")
     switched = tuple(states.values())
     if scene.switch is not None:
-        switched = _called(graph, scene.switch, states | known, len(states))
+        switched = _called(graph, scene, "switch", states | known, len(states))
     unit = graph.constant(".unit")
     timed = tuple(graph.timed(rate, unit) for rate in rates)
-    started = _called(graph, scene.start, known, len(states))
+    started = _called(graph, scene, "start", known, len(states))
     kinks = [(graph.of(0.0), graph.constant(f".sign_{j}"), u) for j, u in enumerate(graph.kinks)]
     events = (_affine(graph, surface), *kinks)
     return Recorded(
@@ -56,16 +58,26 @@ def record(scene):
     )
 
 
-def _called(graph, function, named, length):
+def _called(graph, scene, role, named, length):
     """What a function of some of the named scalars returns, as expressions."""
+    try:
+        return _recorded(graph, getattr(scene, role), named, length)
+    except SceneError as error:
+        raise SceneError(f"{role} of the scene {scene.name}: {error}") from None
+    except Exception as error:
+        said = f"{type(error).__name__}: {error}".splitlines()[0][:200]
+        raise SceneError(f"{role} of the scene {scene.name} cannot be recorded: {said}; {FUNCTIONS}") from error
+
+
+def _recorded(graph, function, named, length):
     wanted = inspect.signature(function).parameters
     unknown = [name for name in wanted if name not in named]
     if unknown:
-        raise SceneError(f"{function.__name__} asks for {unknown[0]!r}; there are {', '.join(named)}")
+        raise SceneError(f"it asks for {unknown[0]!r}; there are {', '.join(named)}")
     found = function(**{name: named[name] for name in wanted})
-    found = found if isinstance(found, tuple | list) else (found,)
+    found = found if isinstance(found, tuple | list | np.ndarray) else (found,)
     if len(found) != length:
-        raise SceneError(f"{function.__name__} returns {len(found)} values instead of {length}")
+        raise SceneError(f"it returns {len(found)} values instead of {length}")
     return tuple(graph.of(value) for value in found)
 
 
@@ -80,8 +92,8 @@ def _affine(graph, surface):
 
 def _nested(events, rates):
     """The number of the kink whose u is, but for a constant factor, the rate of the surface; 0 where there is none."""
-    surface, *kinks = (u for _, _, u in events)
+    surface = events[0][2]
     if surface not in rates:
         return 0
     _, rate = surface.graph.parts(rates[surface])
-    return 1 + kinks.index(rate) if rate in kinks else 0
+    return 1 + surface.graph.kinks.get(rate, -1)

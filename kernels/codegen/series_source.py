@@ -145,7 +145,7 @@ class Lines:
 
     def _power_of_side(self, x, k):
         """abs(u)^n, of which the sign of u leaves the recurrence as it is; constant in its core, and at u = 0."""
-        (_, u), i = x.args[0].args, x.graph.powers.index(x)
+        (_, u), i = x.args[0].args, x.graph.powers[x]
         if k == 0:
             plain = f"power({self.value(x.args[0])}, {self.value(x.args[1])})"
             return f"where(core_{i} < 0.0, {plain}, core_{i})" if self._cores else plain

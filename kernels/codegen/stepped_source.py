@@ -10,6 +10,9 @@ from kernels.codegen.record import record
 from kernels.codegen.template import filled, listed
 from kernels.integrate.events import METHODS
 
+BLUR = 1e-14
+"""Of the surface's value at the start, what rounding may take from it unremarked."""
+
 TEXT = '''
 """Fixed-step methods of {name}: written by kernels; do not change it here."""
 
@@ -24,7 +27,7 @@ from kernels.lanes.refill import each_refilled
 from kernels.codegen.module import kept
 
 scene = sys.modules["{module}"]
-STATES, series_2, rates, begun = scene.STATES, scene.series_2, scene.rates, scene.begun
+STATES, series_2, rates, begun, hidden = scene.STATES, scene.series_2, scene.rates, scene.begun, scene.hidden
 
 
 @jit
@@ -54,9 +57,9 @@ def natural_signs_of(wide, side, parameters):
 
 scene_signs = scene.natural_signs
 Swap = namedtuple("Swap", "rates natural_signs")
-Moves = namedtuple("Moves", "rates natural_signs events switched settled underflows swap ahead behind")
+Moves = namedtuple("Moves", "rates natural_signs events switched settled underflows hidden hides swap ahead behind")
 M = Moves(
-    rates, scene.natural_signs, events, scene.switched, scene.settled, scene.underflows,
+    rates, scene.natural_signs, events, scene.switched, scene.settled, scene.underflows, hidden, scene.HIDES,
     Swap(swapped_rates, natural_signs_of),
     (1.0,) * {kinks}, (-1.0,) * {kinks},
 )
@@ -70,10 +73,11 @@ def advance(memory, i):
     fresh = (stage > 0.5) & (stage < 1.5)
     active = fresh | ((stage > 1.5) & (stage < 2.5))
     if some(fresh):
-        s, p, g, u, o, beyond = begun(parameters)
+        s, p, g, u, o, beyond, blur = begun(flips, parameters)
         {begin}
         endless = isnt((flips >= 1.0) & (flips < math.inf))
-        verdict = where(fresh, where(beyond | endless, {bad_input}, 0.0), verdict)
+        unsure = where(blur <= {blur}, 0.0, {inaccurate})
+        verdict = where(fresh, where(beyond | endless, {bad_input}, unsure), verdict)
     how = int(memory[{method}][0]), int(memory[{method} + 1][0]), int(memory[{method} + 2][0])
     motion = ({states},), side, ({signs}), ({ons}), cut, cuts
     tally = time, since, interval, count, steps, calls, trials, ({reach}), ({at}), ({before}), wide, slim, verdict
@@ -142,7 +146,8 @@ def _text(scene, module):
             f"slope = where((which > {j}.0 - 0.5) & (which < {j}.0 + 0.5), slopes[{j}], slope)" for j in events[1:]
         ),
         load="\n".join(f"{r} = memory[{j}][i]" for j, r in enumerate(rows) if r not in ("method", "location", "parts")),
-        begin="\n".join(begin), bad_input=64.0, method=rows.index("method"), rows=tuple(rows),
+        begin="\n".join(begin), bad_input=64.0, inaccurate=1.0, blur=BLUR,
+        method=rows.index("method"), rows=tuple(rows),
         store="\n".join(f"memory[{rows.index(r)}][i] = {r}" for r in changed),
     )  # fmt: skip
 

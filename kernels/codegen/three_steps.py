@@ -112,9 +112,10 @@ def _apart(one, other, finest, states):
 
 
 def _status(first, finest, between):
-    status = first[-1].astype(np.int8)
-    for other in (finest, between):
-        remark = other[-1] * (other[-1] < FIRST_REFUSAL)
+    """What the finest run does not hide, the others' differences from it tell."""
+    status, near = (np.where(run[-1] == Status.INACCURATE, 0.0, run[-1]).astype(np.int8) for run in (first, between))
+    for other in (finest[-1], near):
+        remark = other * (other < FIRST_REFUSAL)
         status = np.where(status == Status.OK, remark, status)
     sizes = abs(first[:-4])
     normal = ((sizes == 0) | ((sizes >= NORMAL_LOW) & (sizes <= NORMAL_HIGH))).all(axis=0)

@@ -8,7 +8,8 @@ Leaves out: backlash, solid friction, damping that is not viscous. Source: the d
 Rivin; how (1) is solved, and the bound by which a cell is called INACCURATE, is told in `_chain_receptance`.
 
 rtol is of abs(dH)/abs(H) at every frequency: the phase is right to it in radian, the decibel to 8.7 times it.
-An undamped resonance, or 0 Hz without a spring to ground, is OUT_OF_RANGE: there H is infinite.
+At an undamped resonance, and at 0 Hz without a spring to ground, H is infinite: there it is NaN and the cell is
+PARTLY_OUT_OF_RANGE, or OUT_OF_RANGE where no other frequency is left.
 """
 
 import math
@@ -28,45 +29,50 @@ from kernels.maths.elementary import is_normal, log
 
 _OK, _INACCURATE = float(Status.OK), float(Status.INACCURATE)
 _BAD_INPUT, _OUT_OF_RANGE = float(Status.BAD_INPUT), float(Status.OUT_OF_RANGE)
+_PARTLY = float(Status.PARTLY_OUT_OF_RANGE)
 _TWO_PI, _DB = 2.0 * math.pi, 20.0 / math.log(10.0)
 
 
 @jit_call
-def _write(i, j, lanes, values, output, rows):
-    """output[i, j ...] = values of the lanes that are frequencies."""
-    rows[row_at(0)] = values
+def _write(i, j, lanes, sound, values, output, rows):
+    """output[i, j ...] = values of the lanes that are frequencies; NaN where they are not `sound`."""
+    rows[row_at(0)] = where(sound, values, math.nan)
     for lane in range(lanes):
         output[i, j + lane] = rows[lane]
 
 
 @jit_call
 def _group(i, j, J, k, h, drive, read, frequency, outputs, rows):
-    """Outputs at frequencies j ... j + GROUP - 1 of a cell; the largest error of them, inf where there is none."""
+    """Outputs at frequencies j ... j + GROUP - 1 of a cell; their largest error, and at how many there are any."""
     n, lanes = J.shape[1], min(GROUP, frequency.size - j)
     for lane in range(GROUP):
         rows[lane] = frequency[min(j + lane, frequency.size - 1)]
     omega = rows[row_at(0)] * _TWO_PI
     re, im, error = _chain_receptance.receptance(n, J[i], k[i], h[i], omega, drive, read, row_at, rows)
     amplitude = complex.modulus(re, im)
-    sound = is_normal(amplitude)
-    _write(i, j, lanes, re, outputs[0], rows)
-    _write(i, j, lanes, im, outputs[1], rows)
-    _write(i, j, lanes, amplitude, outputs[2], rows)
-    _write(i, j, lanes, complex.argument(re, im), outputs[3], rows)
-    _write(i, j, lanes, _DB * log(where(sound, amplitude, 1.0)), outputs[4], rows)
-    rows[row_at(0)] = where(sound, error, math.inf)
-    largest = 0.0
+    sound = is_normal(amplitude) & (error < math.inf)
+    decibel = _DB * log(where(sound, amplitude, 1.0))
+    _write(i, j, lanes, sound, re, outputs[0], rows)
+    _write(i, j, lanes, sound, im, outputs[1], rows)
+    _write(i, j, lanes, sound, amplitude, outputs[2], rows)
+    _write(i, j, lanes, sound, complex.argument(re, im), outputs[3], rows)
+    _write(i, j, lanes, sound, decibel, outputs[4], rows)
+    rows[row_at(0)] = where(sound, error, -1.0)
+    largest, given = 0.0, 0
     for lane in range(lanes):
         largest = max(largest, rows[lane])
-    return largest
+        given += rows[lane] >= 0.0
+    return largest, given
 
 
 @jit
 def _cell(i, J, k, h, drive, read, rtol, frequency, re, im, amplitude, phase, decibel, status, rows):
-    outputs, error = (re, im, amplitude, phase, decibel), 0.0
+    outputs, error, given = (re, im, amplitude, phase, decibel), 0.0, 0
     for j in range(0, frequency.size, GROUP):
-        error = max(error, _group(i, j, J, k, h, int(drive[i]), int(read[i]), frequency, outputs, rows))
-    status[i] = where(error <= rtol[i], _OK, where(error < math.inf, _INACCURATE, _OUT_OF_RANGE))
+        worst, there = _group(i, j, J, k, h, int(drive[i]), int(read[i]), frequency, outputs, rows)
+        error, given = max(error, worst), given + there
+    verdict = _OK if given == frequency.size else _PARTLY
+    status[i] = where(error <= rtol[i], verdict, _INACCURATE) if given > 0 else _OUT_OF_RANGE
 
 
 @entry_of_cells

@@ -31,6 +31,7 @@ from kernels.drivetrain._model import EXACT, RIVIN, new_chain, new_modes, new_ro
 from kernels.interface import Field, Kernel, Method, Status
 from kernels.lanes.columns import entry_of_cells
 from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.ranges import partly
 from kernels.lanes.vectors import magnitude, nearest
 from kernels.maths.elementary import in_unit, is_normal, scale
 
@@ -45,7 +46,14 @@ SMALL_PHASE = 0.1
 """w h e up to which (w h e)^2 << 1."""
 
 _OK, _INACCURATE, _BAD_INPUT = float(Status.OK), float(Status.INACCURATE), float(Status.BAD_INPUT)
-_DAMPERS, _OUT_OF_RANGE = float(Status.DAMPERS_OUT_OF_RANGE), float(Status.OUT_OF_RANGE)
+_DAMPERS = float(Status.DAMPERS_OUT_OF_RANGE)
+
+
+@jit
+def _held(x, e):
+    """x 2^e; NaN where a float64 cannot hold it."""
+    value = scale(x, e)
+    return value if is_normal(value) or x == 0.0 else math.nan
 
 
 @jit_call
@@ -53,9 +61,9 @@ def _write_modes(i, count, e, full, kept, of_poles, frequency, frequency_error, 
     """Frequencies, their errors and the damping, in Hz. Whether all are in range."""
     fine = True
     for mode in range(count):
-        frequency[i, mode] = scale(kept.f[mode], e)
+        frequency[i, mode] = _held(kept.f[mode], e)
         frequency_error[i, mode] = off_by(kept.f[mode], full.f[mode])
-        fine = fine and (is_normal(frequency[i, mode]) or kept.f[mode] == 0.0)
+        fine = fine and frequency[i, mode] >= 0.0
     modal_damping(count, kept.re, kept.im, of_poles, damping[i])
     return fine
 
@@ -65,10 +73,9 @@ def _write_chain(i, p, e_J, e_k, kept, J_kept, k_kept, h_kept):
     """The reduced chain in SI units. Whether all is in range."""
     fine = True
     for j in range(p):
-        J_kept[i, j], k_kept[i, j] = scale(kept.J[j], e_J), scale(kept.k[j], e_k)
-        h_kept[i, j] = scale(kept.h[j], 0.5 * (e_J + e_k))
-        fine = fine and is_normal(J_kept[i, j]) and (is_normal(k_kept[i, j]) or kept.k[j] == 0.0)
-        fine = fine and (is_normal(h_kept[i, j]) or kept.h[j] == 0.0)
+        J_kept[i, j], k_kept[i, j] = _held(kept.J[j], e_J), _held(kept.k[j], e_k)
+        h_kept[i, j] = _held(kept.h[j], 0.5 * (e_J + e_k))
+        fine = fine and J_kept[i, j] >= 0.0 and k_kept[i, j] >= 0.0 and h_kept[i, j] >= 0.0
     return fine
 
 
@@ -103,7 +110,7 @@ def _solve_cell(
     limit = SMALL_PHASE / (TURN * slower) if slower > 0.0 else math.inf
     valid_to[i] = scale(limit, e) if slower > 0.0 else f_max[i]
     verdict = (_OK if limit >= band else _DAMPERS) if error <= rtol[i] else _INACCURATE
-    status[i] = int(verdict if fine else _OUT_OF_RANGE)
+    status[i] = int(partly(fine, verdict))
 
 
 @jit_call
@@ -215,16 +222,16 @@ DRIVETRAIN = Kernel(
               default=0.0, lower=0.0, upper=1.0, choices=ORDERS, integer=True),
     ),
     outputs=(
-        Field("frequency", "Hz", "natural frequencies without damping, rising", dims=("mode",)),
-        Field("frequency_error", "1", "frequency over that of the full chain, minus 1", dims=("mode",)),
-        Field("damping", "1", "-Re s/abs(s) of the damped poles; of two real ones above 1", dims=("mode",)),
+        Field("frequency", "Hz", "natural frequencies without damping, rising", dims=("mode",), gaps=True),
+        Field("frequency_error", "1", "frequency over that of the full chain, minus 1", dims=("mode",), gaps=True),
+        Field("damping", "1", "-Re s/abs(s) of the damped poles; of two real ones above 1", dims=("mode",), gaps=True),
         Field("n_kept", "1", "masses (or modes) of the reduced model", integer=True),
         Field("frf_error", "1", "largest error of the spindle's receptance up to `f_max` over its largest value; NaN "
-              "where that is infinite: an undamped resonance, a free end"),
+              "where that is infinite: an undamped resonance, a free end", gaps=True),
         Field("valid_to", "Hz", "frequency up to which merged dampers hold, w h e = 0.1; `f_max` where none is"),
-        Field("J_kept", "kg m^2", "moments of inertia of the reduced chain", dims=("mass",)),
-        Field("k_kept", "N m/rad", "its springs", dims=("mass",)),
-        Field("h_kept", "N m s/rad", "its dampers", dims=("mass",)),
+        Field("J_kept", "kg m^2", "moments of inertia of the reduced chain", dims=("mass",), gaps=True),
+        Field("k_kept", "N m/rad", "its springs", dims=("mass",), gaps=True),
+        Field("h_kept", "N m s/rad", "its dampers", dims=("mass",), gaps=True),
     ),
     check=check,
     methods=(Method("direct", "frequencies by dqds, reduced models as they are defined", direct),),

@@ -20,6 +20,10 @@ from kernels.maths.elementary import cbrt, exp, expm1, log1p, log_remainder, log
 HALLEY_LIMIT = 40
 ROUNDING = 4e-15
 """What period, amplitude, speed and sensitivity are right to."""
+_EXPONENT_ROUNDING = 6.7e-16
+"""Of the multiplier exp(-tau), for each 1 + tau: 3 units of the last place; found up to 2.1."""
+_DEEPEST = 710.0
+"""tau beyond which exp(-tau) is 0, no normal number being so small."""
 _FAINT = 1e-100
 """Viscous friction d below which it changes no digit, provided Coulomb friction is not faint too."""
 _FAINT_COULOMB = 1e-55
@@ -80,6 +84,18 @@ def _viscous_and_coulomb(d, rho, slack):
     share = rho / (slack * (1.0 + rho))
     s = (2.0 * rho * (share * u) * (share * u) + m3 + l3) / ((rho + u) * u * tau)
     return (tau / d, top, u / d, s, exp(-tau) * slack / (1.0 + rho)), unsettled
+
+
+@jit
+def multiplier_bound(scene):
+    """What the multiplier is right to, from an upper limit of tau.
+
+    In (1) (1 + rho)(x - ln(1 + x)) <= (1 - rho)/2 as x <= (1 - rho)/(1 + rho), so z <= 2 k/(1 - rho) + 3/2; and
+    ln(1 + x) <= ln 2.
+    """
+    d, slack = scene[0], scene[7]
+    tau = 2.0 * d * d / slack + 2.2
+    return _EXPONENT_ROUNDING * (1.0 + where(tau < _DEEPEST, tau, _DEEPEST))
 
 
 @jit_call

@@ -11,6 +11,8 @@ The loss on the right of (4) grows strictly with the swing, so there is one limi
 switch comes through, and none elsewhere. Units: see `_units`. Derived here.
 """
 
+import math
+
 from kernels.integrate import linear_flow
 from kernels.interface import Status
 from kernels.lanes.jit import jit, jit_call
@@ -26,8 +28,7 @@ _STIFFEST = 1e60
 ROUNDING = 2e-15
 """Relative error of one half swing: of time, amplitude, speed and of the terms of (4)."""
 
-_OK, _NOT_CONVERGED, _INACCURATE = float(Status.OK), float(Status.NOT_CONVERGED), float(Status.INACCURATE)
-_NO_METHOD = float(Status.NO_METHOD)
+_OK, _NOT_CONVERGED, _NO_METHOD = float(Status.OK), float(Status.NOT_CONVERGED), float(Status.NO_METHOD)
 _STICKS, _NOT_SELF_STARTING = float(Status.STICKS), float(Status.NOT_SELF_STARTING)
 
 
@@ -142,14 +143,15 @@ def _variation(scene, swing, start, dstart, dmu):
 
 @jit
 def _sensitivity(scene, energy, swing, time, rest):
-    """-dlnP/dlnmu of the fixed point E_1(E, mu) = E; the sizes of its terms, and of the terms of those."""
+    """-dlnP/dlnmu of the fixed point E_1(E, mu) = E; the sizes of its terms, and of the terms of those; dlnT/dlnE."""
     start = magnitude(scene[6]) * sqrt(2.0 * energy)
     gain_by_mu, time_by_mu, (of_gain, of_time) = _variation(scene, swing, start, 0.0 * start, 0.0 * start + 1.0)
     _, time_by_start, (_, of_slope) = _variation(scene, swing, start, 0.0 * start + 1.0, 0.0 * start)
     by_gain = magnitude(scene[6]) / sqrt(2.0 * energy) / rest
     chain = time_by_start * (by_gain * gain_by_mu)
     of_chain = magnitude(time_by_start) * (by_gain * of_gain) + of_slope * (by_gain * magnitude(gain_by_mu))
-    return -(time_by_mu + chain) / time, (magnitude(time_by_mu) + magnitude(chain)) / time, (of_time + of_chain) / time
+    terms, of_terms = (magnitude(time_by_mu) + magnitude(chain)) / time, (of_time + of_chain) / time
+    return -(time_by_mu + chain) / time, terms, of_terms, 0.5 * start * magnitude(time_by_start) / time
 
 
 @jit
@@ -180,23 +182,26 @@ def _search(scene):
 
 
 @jit_call
-def limit_cycle(scene, rtol):
-    """The cycle, and its verdict."""
+def limit_cycle(scene):
+    """The cycle, the relative errors of its first three numbers, of s and of the multiplier, and its verdict."""
     d, _, rho_s, _, _, kappa, e, slack = scene
     energy, comes, unsettled = _search(scene)
     _, noise, balanced, time, top, speed, _, legs = _turn(scene, energy)
     area, rest = _area(scene, time, top, legs)
-    s, terms, of_terms = _sensitivity(scene, energy, (balanced, top, speed, legs), time, rest)
-    loose = noise / (rest * energy) + ROUNDING * (1.0 + (1.0 + top) / (speed * time))
+    s, terms, of_terms, by_energy = _sensitivity(scene, energy, (balanced, top, speed, legs), time, rest)
+    of_energy, of_pieces = noise / (rest * energy), 1.0 + (1.0 + top) / (speed * time)
+    loose = fma(ROUNDING, of_pieces, of_energy)
+    loose_cycle = fma(ROUNDING, of_pieces, of_energy * where(by_energy > 1.0, by_energy, 1.0))
     loose_s = fma(2.0 * loose, terms, _ULPS * of_terms) / magnitude(s)
-    loose_m = loose + where(area > 1e-300, 0.3 * ROUNDING * d * time, 0.0)
+    loose_s = where(loose_s < 1.0, loose_s / (1.0 - loose_s), math.inf)  # of the true s
+    of_time = fma(of_energy, by_energy, 0.3 * ROUNDING * of_pieces)
+    loose_m = loose_cycle + where(area > 0.0, of_time * d * time, 0.0)
     verdict = where(_self_starting(d, kappa, slack, rho_s), _OK, _NOT_SELF_STARTING)
-    verdict = where((loose_s <= rtol) & (loose_m <= rtol), verdict, _INACCURATE)
     verdict = where(unsettled, _NOT_CONVERGED, verdict)
     passes = (e < 0.0) | (1.0 + kappa * top > rho_s)  # for e < 0 nothing comes to rest at the switch
     verdict = where(comes & (energy > 0.0) & passes, verdict, _STICKS)
     verdict = where(d < _STIFFEST, verdict, _NO_METHOD)
-    return (time, top, sqrt(2.0 * energy), s, e * e * area), verdict
+    return (time, top, sqrt(2.0 * energy), s, e * e * area), (loose_cycle, loose_s, loose_m), verdict
 
 
 @jit

@@ -10,6 +10,7 @@ A *cycle* is the tuple (half period, amplitude, speed before the switch, s = -dl
 """
 
 from kernels.lanes.jit import jit
+from kernels.lanes.ranges import or_none
 from kernels.lanes.vectors import isnt, nearest, sqrt, where
 from kernels.maths.elementary import is_normal, mantissa_exponent, power, scale
 from kernels.maths.pairs import two_sum
@@ -64,9 +65,13 @@ def _kept(x, group):
 
 @jit
 def dimensional(units, cycle):
-    """Period [s], amplitude [rad], crossing speed [rad/s], and whether these and all groups are normal numbers."""
+    """Period [s], amplitude [rad], crossing speed [rad/s], each NaN where it is no normal number.
+
+    Also whether all groups are normal numbers, and whether all of these are.
+    """
     t, e_t, m_phi, e_phi, fine = units
     half_period, amplitude, speed, _, _ = cycle
     period = scale(2.0 * t * half_period, e_t)
     swing, fast = scale(m_phi * amplitude, e_phi), scale(m_phi / t * speed, e_phi - e_t)
-    return period, swing, fast, fine & is_normal(period) & is_normal(swing) & is_normal(fast)
+    timed, wide, moves = is_normal(period), is_normal(swing), is_normal(fast)
+    return or_none(period, timed), or_none(swing, wide), or_none(fast, moves), fine, timed & wide & moves

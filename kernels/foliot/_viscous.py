@@ -13,6 +13,7 @@ import math
 
 from kernels.foliot._viscous_fit import AMPLITUDE_STRONG, GAP_WEAK, OVERSHOOT_WEAK, Q_STRONG, SENSITIVITY_STRONG, SPLIT
 from kernels.lanes.jit import jit
+from kernels.lanes.ranges import or_none
 from kernels.lanes.vectors import choose, fma, horner, isnt, magnitude, some, sqrt, where
 from kernels.maths.elementary import cbrt, exp, exp_remainder, is_normal, log_remainder, mantissa_exponent, scale
 
@@ -60,14 +61,18 @@ def _tame(x):
 
 @jit
 def dimensional(scene, cycle):
-    """Period [s], amplitude [rad], crossing speed [rad/s], and whether these and k are normal numbers."""
+    """Period [s], amplitude [rad], crossing speed [rad/s], each NaN where it is no normal number.
+
+    Also whether k is one, and whether all of the others are.
+    """
     mu, phi0, a, e_mu, e_phi, e_a, wild, representable = scene
     q, lam, amplitude, _, _ = cycle
     period, swing, speed = q / (0.25 * a), amplitude * phi0, lam * mu / a
     if some(wild):
         period = scale(0.0625 * q / a, 6.0 - e_a)  # 4 q may be too large where 4 q/a is not
         swing, speed = scale(swing, e_phi), scale(speed, e_mu - e_a)
-    return period, swing, speed, representable & is_normal(period) & is_normal(swing) & is_normal(speed)
+    timed, wide, fast = is_normal(period), is_normal(swing), is_normal(speed)
+    return or_none(period, timed), or_none(swing, wide), or_none(speed, fast), representable, timed & wide & fast
 
 
 @jit

@@ -3,24 +3,26 @@
 They read mu, phi0 and a only; the physics is in `_viscous`, the declaration in `foliot`.
 """
 
+import math
+
 from kernels.foliot import _viscous
-from kernels.interface import FIRST_REFUSAL, Status
+from kernels.interface import Status
 from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.jit import jit
+from kernels.lanes.ranges import judged
 from kernels.lanes.vectors import where
 
 SENSITIVITY, MULTIPLIER = 3, 4
 """Positions of these outputs."""
 
-_OK, _OUT_OF_RANGE = float(Status.OK), float(Status.OUT_OF_RANGE)
-_NOT_CONVERGED = float(Status.NOT_CONVERGED)
+_OK, _NOT_CONVERGED = float(Status.OK), float(Status.NOT_CONVERGED)
 
 
 @jit
 def _write(i, scene, cycle, verdict, period, amplitude, crossing_speed, sensitivity, multiplier, status):
-    period[i], amplitude[i], crossing_speed[i], normal = _viscous.dimensional(scene, cycle)
+    period[i], amplitude[i], crossing_speed[i], sound, whole = _viscous.dimensional(scene, cycle)
     sensitivity[i], multiplier[i] = cycle[3], cycle[4]
-    status[i] = where(normal | (verdict >= FIRST_REFUSAL), verdict, _OUT_OF_RANGE)
+    status[i] = judged(sound, whole, verdict)
 
 
 @jit
@@ -70,8 +72,15 @@ def event_map(
 @jit
 def worst(asked, cycle, sensitivity, multiplier):
     """The largest bound of the outputs asked for: period, amplitude and speed share the first."""
-    worst = where(asked[SENSITIVITY] == 1, sensitivity, cycle)
-    return where((asked[MULTIPLIER] == 1) & (multiplier > worst), multiplier, worst)
+    swing = where((asked[0] | asked[1] | asked[2]) > 0, cycle, 0.0)
+    found = _larger(swing, where(asked[SENSITIVITY] > 0, sensitivity, 0.0))
+    return _larger(found, where(asked[MULTIPLIER] > 0, multiplier, 0.0))
+
+
+@jit
+def _larger(x, y):
+    """NaN is infinite."""
+    return where(x <= y, y, where(x > y, x, math.inf))
 
 
 @jit

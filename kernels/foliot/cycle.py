@@ -22,12 +22,13 @@ from kernels.foliot import (
     _viscous_methods,
 )
 from kernels.foliot._viscous_methods import worst
-from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
+from kernels.interface import Field, Kernel, Method, Status
 from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.jit import jit
+from kernels.lanes.ranges import judged
 from kernels.lanes.vectors import isnt, where
 
-_OK, _BAD_INPUT, _OUT_OF_RANGE = float(Status.OK), float(Status.BAD_INPUT), float(Status.OUT_OF_RANGE)
+_OK, _BAD_INPUT = float(Status.OK), float(Status.BAD_INPUT)
 _NEVER_STARTS, _NO_LIMIT_CYCLE = float(Status.NEVER_STARTS), float(Status.NO_LIMIT_CYCLE)
 _NO_METHOD = float(Status.NO_METHOD)
 
@@ -35,9 +36,9 @@ _NO_METHOD = float(Status.NO_METHOD)
 @jit
 def write(i, units, cycle, verdict, period, amplitude, crossing_speed, sensitivity, multiplier, status):
     """One cell's cycle, or the lanes', in SI units."""
-    period[i], amplitude[i], crossing_speed[i], normal = _units.dimensional(units, cycle)
+    period[i], amplitude[i], crossing_speed[i], sound, whole = _units.dimensional(units, cycle)
     sensitivity[i], multiplier[i] = cycle[3], cycle[4]
-    status[i] = where(normal | (verdict >= FIRST_REFUSAL), verdict, _OUT_OF_RANGE)
+    status[i] = judged(sound, whole, verdict)
 
 
 @jit
@@ -90,27 +91,52 @@ def coulomb(mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_s
     )
 
 
+@jit
+def _coulomb_bound(i, mu, phi0, a, R, R_s, c, n, k, e, out, asked):
+    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
+    scene, _ = _units.without_dimensions(*terms)
+    out[i] = worst(asked, _coulomb.ROUNDING, _coulomb.ROUNDING, _coulomb.multiplier_bound(scene))
+
+
 @entry("asked")
 def coulomb_bound(mu, phi0, a, R, R_s, c, n, k, e, rtol, asked, out):
-    """Rounding; the multiplier exp(-tau), a normal number up to tau = 708, repeats that of tau."""
-    out[:] = worst(asked, _coulomb.ROUNDING, _coulomb.ROUNDING, 3e-13)
+    """Rounding; the multiplier exp(-tau) repeats that of tau."""
+    each_cell(_coulomb_bound, (mu, phi0, a, R, R_s, c, n, k, e, out, asked))
 
 
 @jit
-def _segments_cell(i, mu, phi0, a, R, R_s, c, n, k, e, rtol, *outputs):
+def _segments_cell(i, mu, phi0, a, R, R_s, c, n, k, e, asked, error, *outputs):
     terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
     scene, units = _units.without_dimensions(*terms)
-    cycle, verdict = _linear_swing.limit_cycle(scene, rtol[i])
+    cycle, errors, verdict = _linear_swing.limit_cycle(scene)
+    error[i] = worst(asked, *errors)
     write(i, units, cycle, verdict, *outputs)
 
 
-@entry()
-def segments(mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
-    """Exact pieces of the swing and Newton on their map; INACCURATE where conditioning leaves less than rtol."""
-    each_cell(
-        _segments_cell,
-        (mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status),
-    )
+@entry("asked")
+def segments(
+    mu,
+    phi0,
+    a,
+    R,
+    R_s,
+    c,
+    n,
+    k,
+    e,
+    rtol,
+    asked,
+    period,
+    amplitude,
+    crossing_speed,
+    sensitivity,
+    multiplier,
+    error,
+    status,
+):
+    """Exact pieces of the swing and Newton on their map; with what conditioning leaves of the outputs asked for."""
+    outputs = (period, amplitude, crossing_speed, sensitivity, multiplier, status)
+    each_cell(_segments_cell, (mu, phi0, a, R, R_s, c, n, k, e, asked, error, *outputs))
 
 
 @jit
@@ -250,7 +276,13 @@ FOLIOT = Kernel(
             coulomb_bound,
             ("c", "k", "e"),
         ),
-        Method("segments", "exact pieces of linear terms, Newton on the half-swing map", segments, excludes=("c",)),
+        Method(
+            "segments",
+            "exact pieces of linear terms, Newton on the half-swing map",
+            segments,
+            excludes=("c",),
+            estimates=True,
+        ),
         Method("quadrature", "integrals over the speed, for any friction", quadrature, quadrature_bound, ("k",)),
         Method(
             "map",

@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 from kernels.foliot import _viscous
 from kernels.interface import Field
-from kernels.lanes.codes import BAD_INPUT, NOT_CONVERGED, OK, OUT_OF_RANGE
+from kernels.lanes.codes import BAD_INPUT, NOT_CONVERGED, OK
 from kernels.lanes.jit import jit
+from kernels.lanes.ranges import judged, or_none
 from kernels.lanes.vectors import magnitude, some, where
 from kernels.lanes.wiring import kernel, method
 from kernels.maths.elementary import is_normal, mantissa_exponent, scale
@@ -63,9 +64,10 @@ def newton(p, rtol):
     q, _, _, _, _ = _viscous.closed(k, 0.0 * k)
     unit_a = 4.0 * q / period
     unit_k, e_k = mantissa_exponent(k)
-    found = Clock(scale(unit_a, -e_p), scale(unit_a * unit_a * phi0 / unit_k, e_f - 2.0 * e_p - e_k))
-    normal = is_normal(found.a) & is_normal(found.mu) & is_normal(k)
-    return found, where(normal, where(unsettled, NOT_CONVERGED, OK), OUT_OF_RANGE)
+    a, mu = scale(unit_a, -e_p), scale(unit_a * unit_a * phi0 / unit_k, e_f - 2.0 * e_p - e_k)
+    rubs, drives = is_normal(a), is_normal(mu)
+    verdict = judged(is_normal(k) & (rubs | drives), rubs & drives, where(unsettled, NOT_CONVERGED, OK))
+    return Clock(or_none(a, rubs), or_none(mu, drives)), verdict
 
 
 @jit

@@ -10,13 +10,14 @@ from kernels.foliot import _linear_swing, _units, _viscous
 from kernels.foliot.cycle import PARAMETERS as ALL_TERMS
 from kernels.foliot.cycle import refusal
 from kernels.integrate import linear_flow
-from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
+from kernels.interface import Field, Kernel, Method, Status
 from kernels.lanes.columns import entry, one_by_one
 from kernels.lanes.jit import jit
+from kernels.lanes.ranges import judged, or_none
 from kernels.lanes.vectors import fma, where
 from kernels.maths.elementary import exp, exp_remainder, scale
 
-_OK, _OUT_OF_RANGE = float(Status.OK), float(Status.OUT_OF_RANGE)
+_OK = float(Status.OK)
 
 PARAMETERS = tuple(p for p in ALL_TERMS if p.name not in ("c", "n"))
 
@@ -36,13 +37,14 @@ def _shape(phase, k, q, lam):
 def _closed(i, mu, phi0, a, phase, angle, speed, status):
     k, rest, scene = _viscous.without_dimensions(mu[i], phi0[i], a[i])
     cycle = _viscous.closed(k, rest)
-    _, _, _, normal = _viscous.dimensional(scene, cycle)
+    _, top, fast, sound, _ = _viscous.dimensional(scene, cycle)
+    wide, moves = top > 0.0, fast > 0.0
     unit_mu, unit_phi, unit_a, e_mu, e_phi, e_a, _, _ = scene
     for j in range(phase.size):
         x, u = _shape(phase[j], k, cycle[0], cycle[1])
-        angle[i, j] = scale(unit_phi * x, e_phi)
-        speed[i, j] = scale(unit_mu / unit_a * u, e_mu - e_a)
-    status[i] = where(normal, _OK, _OUT_OF_RANGE)
+        angle[i, j] = or_none(scale(unit_phi * x, e_phi), wide)
+        speed[i, j] = or_none(scale(unit_mu / unit_a * u, e_mu - e_a), moves)
+    status[i] = judged(sound & (wide | moves), wide & moves, _OK)
 
 
 @entry("phase")
@@ -69,26 +71,28 @@ def _state(scene, start, top, legs, t):
 
 
 @jit
-def _segments(i, mu, phi0, a, R, R_s, k, e, rtol, phase, angle, speed, status):
+def _segments(i, mu, phi0, a, R, R_s, k, e, phase, angle, speed, error, status):
     terms = (mu[i], phi0[i], a[i], R[i], R_s[i], 0.0 * a[i], 1.0, k[i], e[i])
     scene, units = _units.without_dimensions(*terms)
-    cycle, verdict = _linear_swing.limit_cycle(scene, rtol[i])
+    cycle, (of_cycle, _, of_decay), verdict = _linear_swing.limit_cycle(scene)
+    error[i] = of_cycle if of_cycle > of_decay else of_decay
     start = e[i] * cycle[2]
     half, top, _, _, legs = _linear_swing.half_swing(1.0, scene, start)
     t0, e_t, m_phi, e_phi, _ = units
+    _, reach, fast, sound, _ = _units.dimensional(units, cycle)
+    wide, moves = reach > 0.0, fast > 0.0
     for j in range(phase.size):
         sign = where(phase[j] < 0.5, 1.0, -1.0)
         x, v = _state(scene, start, top, legs, 2.0 * half * where(phase[j] < 0.5, phase[j], phase[j] - 0.5))
-        angle[i, j] = sign * scale(m_phi * x, e_phi)
-        speed[i, j] = sign * scale(m_phi / t0 * v, e_phi - e_t)
-    normal = _units.dimensional(units, cycle)[3]
-    status[i] = where(normal | (verdict >= FIRST_REFUSAL), verdict, _OUT_OF_RANGE)
+        angle[i, j] = or_none(sign * scale(m_phi * x, e_phi), wide)
+        speed[i, j] = or_none(sign * scale(m_phi / t0 * v, e_phi - e_t), moves)
+    status[i] = judged(sound & (wide | moves), wide & moves, verdict)
 
 
-@entry("phase")
-def segments(mu, phi0, a, R, R_s, k, e, rtol, phase, angle, speed, status):
+@entry("phase", "asked")
+def segments(mu, phi0, a, R, R_s, k, e, rtol, phase, asked, angle, speed, error, status):
     """The exact pieces of the swing on the cycle that `foliot` finds with them."""
-    one_by_one(_segments, (mu, phi0, a, R, R_s, k, e, rtol, phase, angle, speed, status))
+    one_by_one(_segments, (mu, phi0, a, R, R_s, k, e, phase, angle, speed, error, status))
 
 
 @jit
@@ -117,7 +121,7 @@ FOLIOT_MOTION = Kernel(
         Method(
             "closed", "viscous friction: exponentials on the closed-form cycle", closed, closed_bound, ("R", "k", "e")
         ),
-        Method("segments", "exact pieces of linear terms", segments),
+        Method("segments", "exact pieces of linear terms", segments, estimates=True),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
 )

@@ -159,7 +159,7 @@ def _cells(
 ):  # fmt: skip
     i = cells_at(first)
     scene, units = _units.without_dimensions(mu[i], phi0[i], a[i], R[i], R_s[i], 0.0 * c[i], 1.0, k[i], e[i])
-    (nominal, _, speed, _, _), found = _linear_swing.limit_cycle(scene, rtol[i])
+    (nominal, _, speed, _, _), _, found = _linear_swing.limit_cycle(scene)
     m_tau, e_tau = mantissa_exponent(averaging_time[i])
     tau = scale(m_tau / units[0], e_tau - units[1])
     least = _least_torque(scene)
@@ -174,7 +174,7 @@ def _cells(
     rate_error_s_per_day[i] = SECONDS_PER_DAY * gain / t
     rate_scatter_s_per_day[i] = where(enough, SECONDS_PER_DAY * deviation, math.nan)
     truncated[i] = short / half_swings[i]
-    starts = magnitude(found - _NOT_SELF_STARTING) > 0.0  # that foliot's s is INACCURATE does not matter here
+    starts = magnitude(found - _NOT_SELF_STARTING) > 0.0
     verdict = where(enough, where(starts, _OK, found), _TOO_SHORT)
     verdict = where(_uncertainty(scene, nominal, speed) <= rtol[i], verdict, _INACCURATE)
     verdict = where(stopped | isnt(least < 1.0), _STICKS, verdict)

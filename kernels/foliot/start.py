@@ -22,6 +22,7 @@ from kernels.interface import Field, Kernel, Method, Status
 from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.groups import GROUP, cells_at, each_group, write_row
 from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.ranges import or_none, partly
 from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, where
 from kernels.maths.elementary import is_normal, scale
 
@@ -128,10 +129,11 @@ def _countable(flip):
 
 @jit
 def _in_units(units, flip):
-    """Time [s] and speed [rad/s], and whether they are normal numbers."""
+    """Time [s] and speed [rad/s], NaN where no normal numbers, and whether one of them and whether both are normal."""
     t, e_t, m_phi, e_phi, _ = units
     time, speed = scale(t * (flip[0] + flip[1]), e_t), scale(m_phi / t * flip[2], e_phi - e_t)
-    return time, speed, is_normal(time) & is_normal(speed)
+    timed, moves = is_normal(time), is_normal(speed)
+    return or_none(time, timed), or_none(speed, moves), timed | moves, timed & moves
 
 
 @jit
@@ -150,8 +152,8 @@ def _follow(first, mu, phi0, a, R, R_s, c, n, k, e, phi_start, rtol, flip, row, 
     fine = units[4] & is_normal(way)
     released, starts, doubt = _release(scene, x, where(fine, way, 1.0))
     now, going, unsure = released, starts, doubt
-    right, here = fine, 1.0
-    accurate = fine
+    whole, here = fine, 1.0
+    accurate, given = fine, isnt(going)
     for j in range(flip.size):
         if flip[j] < here:
             now, going, here = released, starts, 1.0
@@ -162,8 +164,8 @@ def _follow(first, mu, phi0, a, R, R_s, c, n, k, e, phi_start, rtol, flip, row, 
                 unsure = unsure | (going & grazes)
                 going = going & comes
                 now = choose(going, new, now)
-        time, speed, normal = _in_units(units, now)
-        right = right & (normal | isnt(going))
+        time, speed, some_normal, normal = _in_units(units, now)
+        whole, given = whole & (normal | isnt(going)), given | some_normal
         accurate = accurate & ((_error(now) <= rtol[i]) | isnt(going))
         write_row(first, j, where(going, time, math.nan), row, flip_time)
         write_row(first, j, where(going, speed, math.nan), row, flip_speed)
@@ -172,7 +174,7 @@ def _follow(first, mu, phi0, a, R, R_s, c, n, k, e, phi_start, rtol, flip, row, 
     held = isnt(magnitude(fma(scene[5], x, 1.0)) > scene[2])
     verdict = where(starts, verdict, where(held, _NEVER_STARTS, _STICKS))
     verdict = where(unsure, _GRAZING, verdict)
-    status[i] = where(right, verdict, _OUT_OF_RANGE)
+    status[i] = where(fine & given, partly(whole, verdict), _OUT_OF_RANGE)
 
 
 @entry("flip")

@@ -24,6 +24,7 @@ import math
 
 from kernels.interface import Status
 from kernels.lanes.jit import jit
+from kernels.lanes.ranges import or_none
 from kernels.lanes.vectors import choose, isnt, magnitude, nearest, sqrt, where
 from kernels.maths import pairs as _pairs
 from kernels.maths.elementary import in_unit, is_normal, mantissa_exponent, scale
@@ -100,7 +101,10 @@ def _units(torque, I_c, r_c, r_v, teeth):
 
 @jit
 def dimensional(units, cycle):
-    """Period [s], swing [m], wheel and pallet speed [rad/s], recoil [rad], and whether all are normal numbers or 0."""
+    """Period [s], swing [m], wheel and pallet speed [rad/s], recoil [rad], each NaN where it is no normal number nor 0.
+
+    Also whether the scene is one of normal numbers, and whether all of these are.
+    """
     time, e_time, pitch, e_pitch, arm, e_arm, step, fine = units
     half_period, travel, rim, pallet, _, back = cycle
     period = scale(2.0 * time * half_period, e_time)
@@ -108,9 +112,10 @@ def dimensional(units, cycle):
     wheel_speed = scale(step / time * rim, -e_time)
     pallet_speed = scale(step / time * arm * pallet, e_arm - e_time)
     recoil = step * back
-    fine = fine & is_normal(period) & is_normal(swing)
-    fine = fine & _normal_or_none(rim, wheel_speed) & _normal_or_none(pallet, pallet_speed)
-    return period, swing, wheel_speed, pallet_speed, recoil, fine
+    timed, wide = is_normal(period), is_normal(swing)
+    rolls, beats = _normal_or_none(rim, wheel_speed), _normal_or_none(pallet, pallet_speed)
+    values = or_none(period, timed), or_none(swing, wide), or_none(wheel_speed, rolls), or_none(pallet_speed, beats)
+    return (*values, recoil), fine, timed & wide & rolls & beats
 
 
 @jit

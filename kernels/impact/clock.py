@@ -23,12 +23,10 @@ watched for; a flat lever lets no tooth pass alone (`_half_swing`), and no bent 
 """
 
 from kernels.impact import _closed_cycle, _followed, _return_map, _units
-from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
+from kernels.interface import Field, Kernel, Method
 from kernels.lanes.columns import each_cell, entry, entry_of_cells, one_by_one
 from kernels.lanes.jit import jit
-from kernels.lanes.vectors import where
-
-_OUT_OF_RANGE = float(Status.OUT_OF_RANGE)
+from kernels.lanes.ranges import judged
 
 
 @jit
@@ -37,9 +35,10 @@ def write(
     period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status,
 ):  # fmt: skip
     """One cell's symmetric cycle, or the lanes', in SI units."""
-    period[i], swing[i], wheel_speed[i], pallet_speed[i], recoil[i], fine = _units.dimensional(units, cycle)
+    values, sound, whole = _units.dimensional(units, cycle)
+    period[i], swing[i], wheel_speed[i], pallet_speed[i], recoil[i] = values
     multiplier[i], contact_share[i], impacts[i], offset[i] = cycle[4], held, count, 0.0 * count
-    status[i] = where(fine | (verdict >= FIRST_REFUSAL), verdict, _OUT_OF_RANGE)
+    status[i] = judged(sound, whole, verdict)
 
 
 @jit
@@ -140,7 +139,7 @@ OUTPUTS = (
     Field("multiplier", "1", "largest factor by which disturbances grow in a half swing, from release to release"),
     Field("recoil", "rad", "largest angle by which the crown wheel is thrown back (0 where it is not)"),
     Field("contact_share", "1", "share of the time that a tooth and a pallet are in contact"),
-    Field("impacts", "1", "impacts in half a period (inf where bounces die out in contact)"),
+    Field("impacts", "1", "impacts in half a period (inf where bounces die out in contact)", gaps=True),
     Field("offset", "m", "how far the middle of the pallet's swing is from the middle of its teeth"),
 )
 

@@ -3,7 +3,8 @@
 A leg has the signature of the Taylor method's (`leg_source`) and drops into the same driver. Of each step the events
 are known at both ends by value and rate. One that ends below 0 is located on the dense output by Newton's method in a
 bracket; one that falls at the start and rises at the end is looked at where the cubic between is lowest, and a turning
-point closer to 0 than the tolerance tells is called grazing.
+point closer to 0 than the tolerance tells is called grazing. A step within which the rates may hide more than the
+tolerance (`hidden_source`) is not taken: the points that an error is estimated from may miss it.
 """
 
 from kernels.integrate.events import cubic_root, of_event
@@ -18,9 +19,9 @@ from kernels.integrate.tableaux import (
     DOPRI5_DENSE,
     DOPRI5_ERROR,
 )
-from kernels.integrate.taylor import next_step
+from kernels.integrate.taylor import COME_UP, next_step
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.tuples import after, marks, reached, times
+from kernels.lanes.tuples import after, boxes, marks, reached, times
 from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
 
 STEP_LIMIT = 10_000
@@ -56,6 +57,22 @@ def of_size(state, new, first, h, error):
 def at_least(error, least):
     """The larger one; NaN stays."""
     return where(error < least, least, error)
+
+
+@jit_call
+def hides_nothing(m, state, new, rates, scene, h, ends, tolerance):
+    """Whether what a step may hide is within the tolerance of each state's size and of each event's value; NaN fails.
+
+    `rates` and `ends` are what the rates and the events are where the step begins and where it ends.
+    """
+    side, signs, parameters, _ = scene
+    (first, last), (start, end) = rates, ends
+    box = boxes(state, new, times(h, after(last, -1.0, ONE, (first,))))
+    of_rates, of_events = m.hidden(state, box, side, signs, parameters)
+    seen = of_size(state, new, first, h, times(h, of_rates)) <= tolerance
+    for j in range(len(start)):
+        seen = seen & (of_events[j] <= tolerance * (magnitude(start[j]) + magnitude(end[j])))
+    return seen
 
 
 @jit_call
@@ -197,6 +214,8 @@ def to_event(
         h_next = where(h_next > SHRINK * h, h_next, SHRINK * h)
         count = where(moving, count + 1.0, count)
         end, end_rate = m.events(new, side, signs, parameters)
+        seen = hides_nothing(m, state, new, (stages[0], last), scene, length, (start, end), tolerance)
+        fine, h_next = fine & seen, where(seen | isnt(fine), h_next, COME_UP * h)
         wide = reached(wide, start)
         margins = times(CLOSE * tolerance, wide)
         blown = blown | (moving & isnt(finite(new)))

@@ -22,9 +22,10 @@ from kernels.integrate.events import (
     shortened,
     swapped,
 )
+from kernels.integrate.steps import ONE, rate
 from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.tuples import joined, marks, reached, times, turned
+from kernels.lanes.tuples import after, boxes, joined, marks, reached, times, turned
 from kernels.lanes.vectors import choose, isnt, magnitude, some, where
 
 STEP_LIMIT = 20_000
@@ -33,12 +34,14 @@ CUTS = 60
 """Times that a step may be cut one after the other."""
 TOGETHER = 32
 """Steps that lanes take before those that have finished are given new cells."""
+HIDDEN = 1e-13
+"""Of a state's size, what the rates may hide in a step (`hidden_source`) unremarked."""
 LOW = 0.25
 """Of the smaller end: an event that the cubic takes below this share of it is looked at where it is lowest."""
 
 _REFUSAL, _GRAZING = float(FIRST_REFUSAL), float(Status.GRAZING)
 _STICKS, _STEP_LIMIT, _OUT_OF_RANGE = float(Status.STICKS), float(Status.STEP_LIMIT), float(Status.OUT_OF_RANGE)
-_NOT_CONVERGED = float(Status.NOT_CONVERGED)
+_NOT_CONVERGED, _INACCURATE = float(Status.NOT_CONVERGED), float(Status.INACCURATE)
 
 
 @jit
@@ -137,6 +140,18 @@ def margin_behind(which, start, slopes, part, h, wide):
 
 
 @jit_call
+def hides_something(m, state, new, scene, h):
+    """Whether a step may hide more of a state than its stages tell; NaN does."""
+    side, signs, parameters, _ = scene
+    change = times(h, after(rate(m, new, scene), -1.0, ONE, (rate(m, state, scene),)))
+    of_rates, _ = m.hidden(state, boxes(state, new, change), side, signs, parameters)
+    seen = h <= math.inf
+    for i in range(len(state)):
+        seen = seen & (h * of_rates[i] <= HIDDEN * (magnitude(state[i]) + magnitude(new[i])))
+    return isnt(seen)
+
+
+@jit_call
 def attempt(m, how, parameters, step, graze, wide, motion, active):
     """Try one step.
 
@@ -197,6 +212,9 @@ def attempt(m, how, parameters, step, graze, wide, motion, active):
         cut, cuts = where(again, shorter, 0.0), where(again, cuts + 1.0, 0.0)
         which = where(again, -2.0, which)
     moved = active & isnt(again) & (verdict < _REFUSAL)
+    if m.hides:
+        hidden = moved & hides_something(m, state, new, scene, taken)
+        verdict = where(hidden & (verdict < _INACCURATE), _INACCURATE, verdict)
     below = moved & natural & (which < -0.5) & (end[0] <= 0.0)  # not yet above where it began
     on = choose(moved & isnt(below), marks(which, on), on)
     signs = choose(moved, turned(signs, on), signs)
@@ -210,7 +228,7 @@ def switch(m, parameters, motion, left, switches):
     state, side, signs, on, cut, cuts = motion
     jumped = m.switched(state, side, signs, parameters)
     state, side = choose(switches, jumped, state), where(switches, -side, side)
-    new_signs, kinks_on = m.settled(state, side, parameters, 0.0 * side + 1.0)
+    new_signs, kinks_on = m.settled(state, side, parameters, 0.0 * side + 1.0, times(0.0, signs))
     signs = choose(switches, new_signs, signs)
     behind = m.events(state, side, signs, parameters)[0][0]
     still = magnitude(behind) <= 2.0 * magnitude(left)

@@ -39,8 +39,12 @@ LARGEST = 5.0
 """log2 of the factor by which a step may change."""
 LONGEST = 8.0
 """First guess of a step, at most, over the time of the last motion between events."""
+COME_UP = 0.25
+"""Of a step within which something is hidden (`hidden_source`): the next trial. The longest one grows back as fast."""
 WIDER = 5.0 / 4.0
 GRAZING = 16.0
+SAME, ROUNDING = 0.04, 1e-15
+"""Tolerances, and besides of its size, within which an event is 0 where another one fires: they fire together."""
 
 
 def tail(h, series):
@@ -63,6 +67,27 @@ def _lower_tail(context, builder, signature, values):
 
 
 _function(tail, 2, lambda h, series: _number(h, *series), _lower_tail)
+
+
+def bend(h, series):
+    """Sum over k > 1 of abs(u_k) h^k: how far u may be from its tangent on [0, h]."""
+    total = abs(series[-1])
+    for k in range(len(series) - 2, 1, -1):
+        total = fma(total, h, abs(series[k]))
+    return total * (h * h)
+
+
+def _lower_bend(context, builder, signature, values):
+    target = signature.return_type
+    h = context.cast(builder, values[0], signature.args[0], target)
+    sizes = [_called("fabs")(builder, item) for item in _items(context, builder, signature.args[1], values[1], target)]
+    total = sizes[-1]
+    for k in range(len(sizes) - 2, 1, -1):
+        total = _called("fma")(builder, total, h, sizes[k])
+    return builder.fmul(total, builder.fmul(h, h))
+
+
+_function(bend, 2, lambda h, series: _number(h, *series), _lower_bend)
 
 
 def _nested(x, terms, ratios):
@@ -139,9 +164,9 @@ def size(h, series):
 
 @jit
 def worse(first, second):
-    """Of two pairs (what is left out, size) the one that is worse in its size."""
+    """Of two pairs (what is left out, size) the one that is worse in its size; a state that stays 0 never is."""
     (x, of_x), (y, of_y) = first, second
-    smaller = y * of_x <= x * of_y
+    smaller = (y * of_x <= x * of_y) & isnt(x <= 0.0)
     return where(smaller, x, y), where(smaller, of_x, of_y)
 
 
@@ -167,6 +192,13 @@ def keeps(h, power_h, series, allowed):
     To be asked after `next_step`, for on a shorter step the size is smaller.
     """
     return last_term(h, series) * power_h <= allowed * size(h, series)
+
+
+@jit
+def box(h, series):
+    """An interval that u does not leave on [0, h]."""
+    along, aside = h * series[1], bend(h, series)
+    return series[0] + where(along < 0.0, along, 0.0) - aside, series[0] + where(along > 0.0, along, 0.0) + aside
 
 
 @jit

@@ -4,19 +4,30 @@ numba's own cache is stale when a *called* module changes. Ours lives in a folde
 sources, numba, llvmlite and the CPU, so what is found there was compiled from these very sources. A function from
 elsewhere (a user's kernel) is never cached: what it calls is not known here. A cache that cannot be read or written
 is no fault: the function is compiled again.
+
+What is read here runs with the user's rights. So nothing is read that is not the user's alone: neither from a folder
+that belongs to somebody else or that others may write to, nor from such a file. Whoever may rename the folder can put
+nothing in its place that is read.
 """
 
 import contextlib
+import functools
 import hashlib
+import multiprocessing
 import os
+import pickle
+import re
 import shutil
+import stat
+import sys
+import tempfile
 import time
 from pathlib import Path
 
 import llvmlite
 import numba
 from llvmlite import binding
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, _CacheLocator
 
 PACKAGE = Path(__file__).parents[1]
 OLD_SECONDS = 30 * 24 * 3600
@@ -32,6 +43,29 @@ def _digest():
     return digest.hexdigest()[:20]
 
 
+def _is_ours_alone(info):
+    """Whether a file or folder of that `os.stat` belongs to the user, and nobody else may write to it."""
+    return info.st_uid == os.geteuid() and not info.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+@functools.cache
+def _refuse(path):
+    """Says once, and not in every worker, that something is not used."""
+    if multiprocessing.parent_process() is None:
+        print(
+            f"foliot compiles without {path}: it belongs to somebody else, or others may write to it", file=sys.stderr
+        )
+
+
+def _own_folder(folder):
+    """Whether a folder, made where there is none, is the user's alone, and so is the link that may lead to it."""
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    own = _is_ours_alone(folder.stat()) and folder.lstat().st_uid == os.geteuid()
+    if not own:
+        _refuse(folder)
+    return own
+
+
 def _folder():
     """The folder of these sources, made and marked as used; None where there can be none."""
     home = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
@@ -39,7 +73,8 @@ def _folder():
         base = (Path(home) if home else Path.home() / ".cache") / "foliot"
         folder = base / _digest()
         fresh = not folder.is_dir()
-        folder.mkdir(parents=True, exist_ok=True)
+        if not (_own_folder(base) and _own_folder(folder)):
+            return None
         os.utime(folder)
         if fresh:
             _remove_old(base)
@@ -50,7 +85,8 @@ def _folder():
 
 def _remove_old(base):
     for folder in base.iterdir():
-        if time.time() - folder.stat().st_mtime > OLD_SECONDS:
+        ours = re.fullmatch("[0-9a-f]{20}", folder.name)  # a name that `_digest` gives
+        if ours and time.time() - folder.stat().st_mtime > OLD_SECONDS:
             shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -61,7 +97,10 @@ class _Locator(_CacheLocator):
     """Says that everything is in FOLDER and never out of date: the folder's name says what it was made from."""
 
     def __init__(self, py_func):
-        self._lineno = py_func.__code__.co_firstlineno
+        self._py_file, self._lineno = py_func.__code__.co_filename, py_func.__code__.co_firstlineno
+
+    def ensure_cache_path(self):
+        """Whoever takes the folder away while we run has compiled code not kept."""
 
     def get_cache_path(self):
         return str(FOLDER)
@@ -81,21 +120,57 @@ class _Implementation(CompileResultCacheImpl):
     _locator_classes = (_Locator,)
 
 
+class _Files(IndexDataCacheFile):
+    """The files of one function. One that is damaged, or not the user's alone, is as good as none."""
+
+    def _load_index(self):
+        stamp, overloads = _unpickled(self._index_path) or (None, {})
+        return overloads if stamp == self._source_stamp else {}
+
+    def _load_data(self, name):
+        return _unpickled(self._data_path(name))
+
+    def _save_index(self, overloads):
+        _write(self._index_path, self._dump((self._source_stamp, overloads)))
+
+    def _save_data(self, name, data):
+        _write(self._data_path(name), self._dump(data))
+
+
+def _unpickled(path):
+    """What a file of the user's holds; None where there is none, or it is damaged."""
+    with contextlib.suppress(Exception), Path(path).open("rb") as file:  # whatever comes of a damaged pickle
+        if _is_ours_alone(os.fstat(file.fileno())):
+            return pickle.load(file)
+        _refuse(path)
+    return None
+
+
+def _write(path, content):
+    """A file that only the user may read and write, in one piece."""
+    handle, draft = tempfile.mkstemp(dir=FOLDER, suffix=".draft")
+    with os.fdopen(handle, "wb") as file:
+        file.write(content)
+    Path(draft).replace(path)
+
+
 class _Cache(FunctionCache):
     """numba's cache of one function, in FOLDER; a fault of the disk or a damaged file only means to compile."""
 
     _impl_class = _Implementation
 
+    def __init__(self, py_func):
+        super().__init__(py_func)
+        self._cache_file = _Files(self._cache_path, self._impl.filename_base, FOLDER.name)
+
     def load_overload(self, sig, target_context):
         try:
             return super().load_overload(sig, target_context)
-        except Exception:  # whatever comes of reading a damaged file
-            with contextlib.suppress(Exception):
-                self.flush()
+        except Exception:  # code that is there, but is none
             return None
 
     def save_overload(self, sig, data):
-        with contextlib.suppress(Exception):
+        with contextlib.suppress(OSError):
             super().save_overload(sig, data)
 
 
@@ -110,3 +185,9 @@ def is_ours(function):
     """Whether a function, compiled or not, is of this package, or written by it."""
     file = Path(getattr(function, "py_func", function).__code__.co_filename)
     return PACKAGE in file.parents or file.parent == FOLDER
+
+
+def kept(function):
+    """Whether machine code of an entry function is on the disk, to be loaded and not compiled."""
+    cache = getattr(getattr(function, "compiled", function), "_cache", None)
+    return isinstance(cache, _Cache) and Path(cache._cache_file._index_path).exists()

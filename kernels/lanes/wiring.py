@@ -4,6 +4,7 @@ An author writes functions of one cell, the same source for numbers and for lane
 
     check(p) -> status                            p: a record of the parameters
     solve(p, rtol, *buffers) -> outputs, status   outputs: a record of those that the method gives, or a tuple in order
+    solve(...) -> outputs, errors, status         of a method that estimates; `errors` as of a bound
     bound(p) -> error                             a number, or a record with one for each output
     fill(i, columns, *buffers)                    for traces, instead of `solve`: writes the rows of cell i itself
 
@@ -38,24 +39,29 @@ class Solver:
     buffers: Callable | None
     loop: Callable
     fills: bool
+    estimates: bool
 
 
-def method(name, doc, solve, bound=None, *, excludes=(), lacks=(), buffers=None, loop=loops.in_lanes):
+def method(
+    name, doc, solve, bound=None, *, excludes=(), lacks=(), buffers=None, loop=loops.in_lanes, estimates=False
+):  # fmt: skip
     """A method by `solve(p, rtol, *buffers())`.
 
     Parameters
     ----------
     bound : what `solve` is right to: a number, or `bound(p)`; None where its status says so
-    excludes, lacks : as in `kernels.interface.Method`
+    excludes, lacks, estimates : as in `kernels.interface.Method`
     buffers : makes a tuple of arrays that a thread's cells use one after the other
     loop : `in_lanes`; `cell_by_cell`, where every search goes its own way
     """
-    return Solver(name, doc, solve, bound, excludes, lacks, buffers, loop, False)
+    return Solver(name, doc, solve, bound, excludes, lacks, buffers, loop, False, estimates)
 
 
-def tracing(name, doc, fill, bound=None, *, excludes=(), lacks=(), buffers=None, loop=loops.in_groups):
+def tracing(
+    name, doc, fill, bound=None, *, excludes=(), lacks=(), buffers=None, loop=loops.in_groups, estimates=False
+):  # fmt: skip
     """A method by `fill(i, columns, *buffers())`: `i` is a cell, or by `in_groups` the first of a group."""
-    return Solver(name, doc, fill, bound, excludes, lacks, buffers, loop, True)
+    return Solver(name, doc, fill, bound, excludes, lacks, buffers, loop, True, estimates)
 
 
 def kernel(
@@ -114,9 +120,11 @@ class _Wiring:
 
     def method(self, solver):
         body = solver.function if solver.fills else self._body(solver)
-        names = [*self.parameters, "rtol", *self.along, *self.outputs, "status"]
+        asked, error = (["asked"], ["error"]) if solver.estimates else ([], [])
+        names = [*self.parameters, "rtol", *self.along, *asked, *self.outputs, *error, "status"]
         solve = self._entry(solver.name, solver.function, body, names, solver.loop, solver.buffers or nothing)
-        return Method(solver.name, solver.doc, solve, self._bound(solver), solver.excludes, solver.lacks)
+        bound = self._bound(solver)
+        return Method(solver.name, solver.doc, solve, bound, solver.excludes, solver.lacks, solver.estimates)
 
     def _body(self, solver):
         record, solve = self.record, solver.function
@@ -130,7 +138,17 @@ class _Wiring:
             write(columns, i, none)
             columns.status[i] = status
 
-        return body
+        order = namedtuple("Order", self.outputs)
+
+        @jit
+        def estimating(i, columns, *buffers):
+            outputs, errors, status = solve(read(record, columns, i), columns.rtol[i], *buffers)
+            write(columns, i, named(given, outputs))
+            write(columns, i, none)
+            columns.error[i] = largest(errors, columns.asked, order)
+            columns.status[i] = status
+
+        return estimating if solver.estimates else body
 
     def _bound(self, solver):
         if solver.bound is None:

@@ -20,9 +20,10 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.interface import Field
-from kernels.lanes.codes import BAD_INPUT, CHANGE_POINT, INACCURATE, LOCK_UP, OK, OUT_OF_RANGE, REFUSED
+from kernels.lanes.codes import BAD_INPUT, CHANGE_POINT, INACCURATE, LOCK_UP, OK
 from kernels.lanes.groups import GROUP, cells_at, write_row
 from kernels.lanes.jit import jit
+from kernels.lanes.ranges import or_none, partly
 from kernels.lanes.records import read
 from kernels.lanes.vectors import isnt, magnitude, where
 from kernels.lanes.wiring import kernel, tracing
@@ -93,21 +94,22 @@ def _follow(first, columns, row):
     p = read(Machine, columns, i)
     lengths, _, margin, code = judged(p.b, p.d, p.f, p.e)
     margin, side, w = _branch(lengths, margin, code), side_of(p.type), p.omega
+    fast = magnitude(w)
+    rests = isnt(fast > 0.0)
+    rated = ((fast <= RATE_LIMIT * RATE_LIMIT) & (fast >= 1.0 / RATE_LIMIT / RATE_LIMIT)) | rests
+    held = ((fast <= RATE_LIMIT) & (fast >= 1.0 / RATE_LIMIT)) | rests
     worst = 0.0 * code
     for j in range(columns.crank_angle.size):
         angles, doubt = _angles(lengths, margin, side, 0.0 * code + columns.crank_angle[j], p.b_angle)
         worst = larger(worst, doubt)
         write_row(first, j, p.b_angle + (angles[0] + angles[1]), row, columns.alpha)
-        write_row(first, j, w * angles[2], row, columns.alpha_rate)
-        write_row(first, j, w * w * angles[3], row, columns.alpha_acceleration)
+        write_row(first, j, or_none(w * angles[2], rated), row, columns.alpha_rate)
+        write_row(first, j, or_none(w * w * angles[3], held), row, columns.alpha_acceleration)
         sine, cosine = sincos(p.b_angle + (angles[0] + p.beta))
         write_row(first, j, p.L * cosine, row, columns.x)
         write_row(first, j, p.L * sine, row, columns.y)
-    fast = magnitude(w)
-    fine = ((fast <= RATE_LIMIT) & (fast >= 1.0 / RATE_LIMIT)) | isnt(fast > 0.0)
     code = where(said(code, LOCK_UP) & isnt(worst <= columns.rtol[i]), INACCURATE, code)
-    code = where(fine | (code >= REFUSED), code, OUT_OF_RANGE)
-    columns.status[i] = where(_within(columns.crank_angle), code, BAD_INPUT)
+    columns.status[i] = where(_within(columns.crank_angle), partly(held, code), BAD_INPUT)
 
 
 @jit

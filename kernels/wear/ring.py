@@ -24,6 +24,7 @@ import math
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
 from kernels.lanes.columns import entry_of_cells, one_by_one
 from kernels.lanes.jit import jit, jit_inline
+from kernels.lanes.ranges import partly
 from kernels.maths.elementary import in_unit, is_normal
 from kernels.wear import _pressure, _profile, _scene
 from kernels.wear._scene import BAD_INPUT, OK, OUT_OF_RANGE, allowed, pressed
@@ -66,14 +67,17 @@ def _cell(p, rtol, loaded, radius, wear, wear_error, work):
         wear[k], wear_error[k] = math.nan, math.nan
         if turns:
             amount = p[16], max(p[17], p[18]), pace + (unit if loaded[1] == 0 else -unit), p[19]
-            wear[k], wear_error[k], held = _wear_at(radius[k], (arm, tool, ride, loaded), unit, amount, rtol, work)
-            normal, most = normal and held, wear[k] if wear[k] > most else most
-            worst = worst if wear_error[k] <= worst else wear_error[k]  # NaN stays
+            value, doubt, held = _wear_at(radius[k], (arm, tool, ride, loaded), unit, amount, rtol, work)
+            if held:
+                wear[k], wear_error[k] = value, doubt
+                most = value if value > most else most
+                worst = worst if doubt <= worst else doubt  # NaN stays
+            normal = normal and held
     if not turns:
         return verdict
-    if not normal:
+    if not (normal or most > 0.0):
         return OUT_OF_RANGE
-    return verdict if worst <= rtol * most else _INACCURATE
+    return partly(normal, verdict) if worst <= rtol * most else _INACCURATE
 
 
 @entry_of_cells

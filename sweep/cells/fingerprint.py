@@ -6,8 +6,9 @@ import ast
 import hashlib
 import importlib.util
 import json
+import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
@@ -29,6 +30,11 @@ REDUCING = ("sweep.cells.row_blocks", "sweep.cells.reduce", "sweep.cells.content
 """Those that decide the values of a summary."""
 
 SOURCE = "source "
+
+IMPORTERS = ("import_module", "__import__", "load")
+NAME = re.compile(r"[\w.]+")
+IMPORT_FROM = re.compile(r"^[ \t]*from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n(]*)", re.MULTILINE)
+IMPORT = re.compile(r"^[ \t]*import[ \t]+([\w., \t]+)", re.MULTILINE)
 
 
 def fingerprint(study: Study) -> dict[str, str]:
@@ -151,16 +157,48 @@ def _path(name: str) -> Path | None:
 
 
 def _imported(text: bytes, name: str, path: Path) -> Iterator[str]:
-    """Names of modules that a source may import; of `from a import b` both a and a.b, as b may be a module."""
+    """Names of modules that a source may import: in statements, in calls, or in a text that modules are written from.
+
+    A call whose argument is no text in the source tells nothing here.
+    """
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            above = package[: len(package) - node.level + 1] if node.level else []
-            base = ".".join([*above, *filter(None, [node.module])])
-            yield base
-            yield from (f"{base}.{alias.name}" for alias in node.names)
+            yield from _members(_absolute(package, node.level, node.module), [alias.name for alias in node.names])
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield from _written(node.value)
+        elif isinstance(node, ast.Call):
+            yield from _called(node, package)
+
+
+def _members(base: str, names: Iterable[str]) -> Iterator[str]:
+    """Of `from a import b` both a and a.b, as b may be a module."""
+    yield base
+    yield from (f"{base}.{name}" for name in names)
+
+
+def _absolute(package: Sequence[str], level: int, module: str | None) -> str:
+    above = package[: len(package) - level + 1] if level else []
+    return ".".join([*above, *filter(None, [module])])
+
+
+def _written(text: str) -> Iterator[str]:
+    """What the lines of a text import; names in braces are filled in later and are not followed."""
+    for base, names in IMPORT_FROM.findall(text):
+        yield from _members(base, NAME.findall(names))
+    for names in IMPORT.findall(text):
+        yield from NAME.findall(names)
+
+
+def _called(node: ast.Call, package: Sequence[str]) -> Iterator[str]:
+    """The module of `import_module("a.b")` and its like."""
+    function = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+    if function in IMPORTERS and node.args and isinstance(node.args[0], ast.Constant):
+        name = str(node.args[0].value).partition(":")[0]
+        module = name.lstrip(".")
+        yield _absolute(package, len(name) - len(module), module)
 
 
 def _version(name: str) -> str:

@@ -1,4 +1,4 @@
-"""How a grid is cut into blocks, and in which order they are computed: from a timed sample spread over the grid."""
+"""How a grid is cut into blocks: from a timed sample spread over the grid."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sweep.cells.row_blocks import Granules
-from sweep.cells.schema import METHOD_USED, STATUS, Column
+from sweep.cells.schema import ANCILLARY, METHOD_USED, STATUS, Column
 
 if TYPE_CHECKING:
     from sweep.cells.solve import Solver
@@ -126,14 +126,6 @@ def row_partition(sample: Sample, grains: Granules, row_bytes: float, workers: i
     return Partition(grains.count, rows)
 
 
-def order(sample: Sample, blocks: Partition, first: Callable[[Any], Any] | None = None) -> Any:
-    """Block numbers, dear ones first, lest a worker be left alone with one; as they come where all cost alike."""
-    weights = np.maximum(sample.weights(blocks, first), 1e-300)
-    if weights.max() < 1.5 * np.median(weights):
-        return np.arange(blocks.count)
-    return np.argsort(-np.round(2 * np.log2(weights)), kind="stable")
-
-
 def _probe_cells(solver: Solver, columns: Sequence[Column], size: int) -> tuple[int, bool | None]:
     """Cells a probe: few enough for 64 probes in the budget, enough to see past the cost of a call.
 
@@ -166,7 +158,7 @@ def _timed(solver: Solver, arrays: dict[str, Any], start: int, cells: int, usual
 
     `usual`: seconds that other probes took.
     """
-    outputs = {name: array for name, array in arrays.items() if name not in (STATUS, METHOD_USED)}
+    outputs = {name: array for name, array in arrays.items() if name not in ANCILLARY}
 
     def once() -> float:
         begun = time.perf_counter()

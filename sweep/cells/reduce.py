@@ -139,9 +139,9 @@ class Reducer:
             merge({name: column[row - start : row - start + count] for name, column in rows.items()}, found)
 
     def seconds(self) -> float:
-        """What reducing a cell takes."""
-        rows = min(max(1, self.room // self.granules.length), self.granules.count)
-        cells = min(self.granules.length, self.room)
+        """What reducing a cell takes, tried on as many whole granules as a strip has room for, or on as much of one."""
+        cells = min(self.granules.length, len(self._status))
+        rows = len(self._status) // cells
         outputs = {name: column[: rows * cells] for name, column in self._outputs.items()}
         for column in outputs.values():
             column.fill(1.0)

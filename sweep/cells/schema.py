@@ -19,12 +19,14 @@ if TYPE_CHECKING:
     from sweep.study.model import Axis, Study
 
 CONVENTIONS = "CF-1.11"
-STATUS, METHOD_USED = "status", "method_used"
+STATUS, METHOD_USED, ERROR_BOUND = "status", "method_used", "error_bound"
+ANCILLARY = (STATUS, METHOD_USED, ERROR_BOUND)
+"""What a result says of every cell besides its outputs."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """One variable of the result: an output, the status, or the method used.
+    """One variable of the result: an output, or one of `ANCILLARY`.
 
     `dims` and `shape` are its own, behind those of the grid ("phase",), (200,).
     """
@@ -92,8 +94,8 @@ def layout(study: Study, fingerprint: Mapping[str, str]) -> Layout:
 
 
 def columns(study: Study) -> tuple[Column, ...]:
-    """The asked outputs in kernel order, then status and method_used."""
-    return (*(_output(f, study) for f in study.asked), _status(), _method_used(study.kernel))
+    """The asked outputs in kernel order, then what is said of them."""
+    return (*(_output(f, study) for f in study.asked), _error_bound(), _status(), _method_used(study.kernel))
 
 
 def coordinates(study: Study) -> tuple[Coordinate, ...]:
@@ -135,7 +137,7 @@ def attributes(study: Study, fingerprint: Mapping[str, str]) -> dict[str, Any]:
 
 def _output(field: Field, study: Study) -> Column:
     shape = tuple(study.lengths[d] for d in field.dims)
-    attrs = {**_field_attrs(field), "ancillary_variables": f"{STATUS} {METHOD_USED}"}
+    attrs = {**_field_attrs(field), "ancillary_variables": " ".join(ANCILLARY)}
     return Column(field.name, "f8", field.dims, shape, attrs)
 
 
@@ -155,6 +157,14 @@ def _method_used(kernel: Kernel) -> Column:
         "flag_meanings": " ".join(["none", *(m.name for m in kernel.methods)]),
     }
     return Column(METHOD_USED, "i1", (), (), attrs)
+
+
+def _error_bound() -> Column:
+    attrs = {
+        "units": "1",
+        "long_name": "relative error that INACCURATE values are right to, inf where unknown; NaN where rtol holds",
+    }
+    return Column(ERROR_BOUND, "f4", (), (), attrs)
 
 
 def _axis(axis: Axis, dims: tuple[str, ...], fields: Mapping[str, Field]) -> Coordinate:

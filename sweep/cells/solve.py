@@ -1,8 +1,10 @@
 """Solves runs of cells: checks them, chooses their methods, and says what became of each.
 
 A cell that `check` refuses is never solved. With a method given, the cell is solved by it and remarked INACCURATE,
-whatever else is special about it, where the method's bound exceeds rtol. With `auto` it goes to the first method,
-cheapest first, whose bound meets rtol, and on to the next where that one gives up or says INACCURATE.
+whatever else is special about it, where the method's bound or estimate exceeds rtol. With `auto` it goes to the first
+method, cheapest first, whose bound meets rtol, and on to the next where that one gives up or says INACCURATE. Where
+none meets rtol, the values of the smallest bound are given, INACCURATE. A later method replaces only what it betters.
+Where a kernel of somebody's own says OK without a number, or a status that a kernel has not got, the cell FAILED.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Method, Status
 from sweep.cells.grid import Grid
 from sweep.study.model import AUTO, Study
@@ -31,11 +34,17 @@ GIVEN_UP = (
     Status.STEP_LIMIT,
     Status.INACCURATE,
     Status.UNSTABLE,
+    Status.FAILED,
 )
 """After these `auto` tries the next method."""
+VAGUE = (Status.NO_METHOD, Status.NO_CYCLE)
+"""Refusals that tell less than how another method gave up."""
+UNKNOWN = (Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT)
+"""A method that ends so has not learnt what the scene does: another's NO_CYCLE, of its own kind alone, is no answer."""
 WARM_UP_CELLS = 3
 
 Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
 Codes = NDArray[np.int8]
 Cells = slice | NDArray[np.intp]
 
@@ -66,7 +75,8 @@ class Solver:
             if field.name not in study.outputs
         }
         self._asked = np.array([field.name in study.outputs for field in kernel.outputs], np.uint8)
-        self._rtol, self._bound = np.empty(room), np.empty(room)
+        self._rtol, self._bound, self._error = np.empty(room), np.empty(room), np.empty(room)
+        self._promised = None if study.kernel_name in catalogue.KERNELS else promised(study)
 
     def solve(
         self,
@@ -76,6 +86,7 @@ class Solver:
         status: Codes,
         method_used: Codes,
         wanted: NDArray[np.bool_] | None = None,
+        error_bound: Singles | None = None,
     ) -> None:
         """Fill the rows of every output asked for, and status and method number, of the cells `start` to `stop`.
 
@@ -88,6 +99,8 @@ class Solver:
             A `Status`; the position in `kernel.methods`, or -1 where the cell is refused.
         wanted : ndarray of bool, optional
             Cells to solve; what comes out for the others means nothing. Default: all.
+        error_bound : ndarray of float32, shape (stop - start,), optional
+            To be filled with what INACCURATE values are right to, infinite where nobody knows; NaN for other cells.
         """
         for low in range(start, stop, self._strip):
             high = min(low + self._strip, stop)
@@ -100,6 +113,8 @@ class Solver:
             ]
             some = None if wanted is None or wanted[rows].all() else wanted[rows]
             self._solve_strip(low, high, columns, status[rows], method_used[rows], some)
+            if error_bound is not None:
+                _tell_errors(error_bound[rows], self._error[: high - low], status[rows])
 
     def warm(self) -> None:
         """Solve a few cells spread over the grid: what they need is compiled before threads start."""
@@ -123,6 +138,8 @@ class Solver:
         strip = _Strip(self, high - low, outputs, status, used)
         self.grid.columns(low, high, strip.parameters)
         self.study.kernel.check(*strip.parameters, status)
+        if self._promised is not None:
+            fail(status, [])
         used.fill(NONE)
         method, strip.rtol[:] = self.grid.settings(low, high)
         sound = status < FIRST_REFUSAL
@@ -144,42 +161,75 @@ class _Strip:
     def __init__(self, solver: Solver, n: int, outputs: Sequence[Floats], status: Codes, used: Codes) -> None:
         self.kernel, self.along, self.asked = solver.study.kernel, solver._along, solver._asked
         self.parameters = [column[:n] for column in solver._parameters]
-        self.rtol, self._bound = solver._rtol[:n], solver._bound[:n]
+        self.rtol, self._bound, self.error = solver._rtol[:n], solver._bound[:n], solver._error[:n]
         self.outputs, self.status, self.used = outputs, status, used
-        self.usable = solver.usable
+        self.usable, self.promised = solver.usable, solver._promised
 
     def take(self, number: int, cells: Cells) -> None:
         """Solve the cells by one method; remark those for which it promises less than rtol."""
         method = self.kernel.methods[number]
-        self.run(number, cells)
-        if method.bound is not None and _count(cells):
-            loose = ~(self.bound(method, cells) <= self.rtol[cells])  # NaN is loose
-            self.status[_pick(cells, loose & (self.status[cells] < FIRST_REFUSAL))] = Status.INACCURATE
+        if _count(cells):
+            self.run(number, cells, None if method.bound is None else self.bound(method, cells))
 
     def choose(self, cells: Cells) -> None:
         """Solve each cell by the first method whose bound meets rtol and which does not give up."""
         self.status[cells] = Status.NO_METHOD
+        missed: list[tuple[int, Cells, Floats]] = []
         for number in self.usable:
             if not _count(cells):
                 return
-            method = self.kernel.methods[number]
-            meets = None if method.bound is None else self.bound(method, cells) <= self.rtol[cells]
-            self._improve(number, cells if meets is None else _pick(cells, meets))
+            method, able = self.kernel.methods[number], cells
+            if method.bound is not None:
+                bound = self.bound(method, cells)
+                meets = bound <= self.rtol[cells]
+                able = _pick(cells, meets)
+                if not meets.all():
+                    missed.append((number, cells, np.where(meets | np.isnan(bound), np.inf, bound)))
+            before = np.where(self.used[able] != NONE, self.status[able], Status.OK)
+            self._improve(number, able)
+            self._leave_open(able, before)
             cells = _pick(cells, np.isin(self.status[cells], GIVEN_UP))
+        if missed and _count(cells):
+            self._settle(cells, missed)
 
-    def _improve(self, number: int, cells: Cells) -> None:
-        """Run a method, but keep values of an earlier one in cells where this one is not better."""
-        columns: list[NDArray[Any]] = [*self.outputs, self.status, self.used]
-        usable = _pick(cells, self.status[cells] < FIRST_REFUSAL)
-        kept = [column[usable].copy() for column in columns] if _count(usable) else []
-        before = self.status[usable].copy()
-        self.run(number, cells)
+    def _settle(self, cells: Cells, missed: Sequence[tuple[int, Cells, Floats]]) -> None:
+        """Give cells for which nothing meets rtol the values of the smallest bound.
+
+        `missed`: numbers of methods, the cells for which their bounds exceed rtol, and these bounds.
+        """
+        bounds = np.full((len(missed), len(self.status)), np.inf)
+        for row, (_, some, bound) in zip(bounds, missed, strict=True):
+            row[some] = bound
+        for _ in missed:
+            best, least = bounds[:, cells].argmin(axis=0), bounds[:, cells].min(axis=0)
+            better = least < self._known(cells)
+            for place in np.unique(best[better]):
+                tried = _pick(cells, better & (best == place))
+                self._improve(missed[place][0], tried, bounds[place, tried])
+                bounds[place, tried] = np.inf
+
+    def _known(self, cells: Cells) -> Floats:
+        """What the values of cells are right to at least; infinite where there are none, 0 where rtol is met."""
+        status = self.status[cells]
+        error = np.where(status == Status.INACCURATE, self.error[cells], 0.0)
+        return np.where(status < FIRST_REFUSAL, error, np.inf)
+
+    def _improve(self, number: int, cells: Cells, bound: Floats | None = None) -> None:
+        """Run a method, but keep what an earlier one gave to cells where this one is not better."""
+        columns: list[NDArray[Any]] = [*self.outputs, self.used, self.status, self.error]
+        held = _pick(cells, self.status[cells] != Status.NO_METHOD)
+        kept = [column[held].copy() for column in columns] if _count(held) else []
+        self.run(number, cells, bound)
         if kept:
-            now = self.status[usable]
-            worse = (now >= FIRST_REFUSAL) | ((now == before) & (now == Status.INACCURATE))
-            back = _pick(usable, worse)
+            worse = _worse(self.status[held], self.error[held], *kept[-2:])
+            back = _pick(held, worse)
             for column, values in zip(columns, kept, strict=True):
                 column[back] = values[worse]
+
+    def _leave_open(self, cells: Cells, before: Codes) -> None:
+        """Give back what an earlier method said where it did not know, and this one knows no cycle of its kind."""
+        open_ = np.isin(before, UNKNOWN) & (self.status[cells] == Status.NO_CYCLE)
+        self.status[_pick(cells, open_)] = before[open_]
 
     def bound(self, method: Method, cells: Cells) -> Floats:
         """The method's error bound for the cells, over the outputs asked for."""
@@ -189,18 +239,37 @@ class _Strip:
         method.bound(*columns, *self.along, self.asked, out)
         return out
 
-    def run(self, number: int, cells: Cells) -> None:
-        """Solve the cells by one method: in place where they lie side by side, else gathered and put back."""
+    def run(self, number: int, cells: Cells, bound: Floats | None = None) -> None:
+        """Solve the cells by one method: in place where they lie side by side, else gathered and put back.
+
+        `bound` is the method's where it may exceed rtol.
+        """
         if not _count(cells):
             return
+        method = self.kernel.methods[number]
         columns = [column[cells] for column in (*self.parameters, self.rtol)]
-        targets: list[NDArray[Any]] = [*self.outputs, self.status]
+        asked, error = ([self.asked], [self.error]) if method.estimates else ([], [])
+        targets: list[NDArray[Any]] = [*self.outputs, *error, self.status]
         results = [column[cells] for column in targets]
-        self.kernel.methods[number].solve(*columns, *self.along, *results)
+        method.solve(*columns, *self.along, *asked, *results)
+        if self.promised is not None:
+            fail(results[-1], [results[k] for k in self.promised])
         if not isinstance(cells, slice):
             for column, result in zip(targets, results, strict=True):
                 column[cells] = result
         self.used[cells] = number
+        self._judge(method, cells, bound)
+
+    def _judge(self, method: Method, cells: Cells, bound: Floats | None) -> None:
+        """Remark values of which less is known than rtol, and note what they are right to; NaN tells nothing."""
+        status = self.status[cells]
+        said = status == Status.INACCURATE
+        if bound is None and not method.estimates and not said.any():
+            return
+        known = self.error[cells] if method.estimates else np.where(said, np.inf, 0.0)
+        known = known if bound is None else np.maximum(known, bound)
+        self.error[cells] = np.where(np.isnan(known), np.inf, known)
+        self.status[_pick(cells, ~(known <= self.rtol[cells]) & (status < FIRST_REFUSAL))] = Status.INACCURATE
 
 
 def usable_methods(study: Study) -> tuple[int, ...]:
@@ -211,6 +280,45 @@ def usable_methods(study: Study) -> tuple[int, ...]:
         for number, method in methods
         if study.terms.isdisjoint(method.excludes) and set(study.outputs).isdisjoint(method.lacks)
     )
+
+
+def _worse(status: Codes, error: Floats, earlier: Codes, earlier_error: Floats) -> NDArray[np.bool_]:
+    """Where what a method gave is not better than what an earlier one did."""
+    refused, valued = status >= FIRST_REFUSAL, earlier < FIRST_REFUSAL
+    lost = refused & (valued | (np.isin(status, VAGUE) & ~np.isin(earlier, VAGUE)))
+    doubtful = earlier == Status.INACCURATE
+    loose = doubtful & (status == Status.INACCURATE) & ~(error < earlier_error)
+    worse: NDArray[np.bool_] = lost | loose | (doubtful & (status == Status.UNSTABLE))
+    return worse
+
+
+def _tell_errors(column: Singles, error: Floats, status: Codes) -> None:
+    """What INACCURATE values are right to, rounded up; NaN elsewhere."""
+    column.fill(np.nan)
+    hits = status == Status.INACCURATE
+    with np.errstate(over="ignore"):
+        column[hits] = error[hits] * (1 + 2.0**-23)
+
+
+def promised(study: Study) -> tuple[int, ...]:
+    """Positions of the outputs asked for that are finite in every cell that is OK."""
+    fields = enumerate(study.kernel.outputs)
+    return tuple(k for k, field in fields if field.name in study.outputs and not field.gaps)
+
+
+def fail(status: Codes, columns: Sequence[Floats]) -> None:
+    """Turn OK into FAILED where a number is missing, and what is no status of a kernel's too.
+
+    It takes 0.2 ns a number, which is much for the cheapest of our own kernels alone: tests see to those.
+    """
+    for column in columns:
+        finite = np.isfinite(column)
+        if not finite.all():
+            whole = finite.reshape(len(status), -1).all(axis=1)
+            status[~whole & (status == Status.OK)] = Status.FAILED
+    codes = status.view(np.uint8)
+    if codes.size and codes.max() >= Status.PENDING:
+        status[codes >= Status.PENDING] = Status.FAILED
 
 
 def _pick(cells: Cells, condition: NDArray[np.bool_]) -> Cells:

@@ -8,13 +8,15 @@ import shutil
 import tempfile
 import time
 import zlib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kernels.interface import Status
+from kernels.interface import Status, machine_code_folder
+from sweep.cells.compiling import Compiling
 from sweep.cells.contents import contents, part_columns
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.grid import Grid
@@ -30,6 +32,7 @@ from sweep.store.canvas import Canvas
 from sweep.store.digests import Seals
 from sweep.store.hdf5_bytes import Images
 from sweep.store.parts import FLAGS
+from sweep.study.read import as_study
 from sweep.system.errors import SweepError
 from sweep.system.pool import cores, whole_number
 from sweep.system.progress import duration, quantity
@@ -62,6 +65,8 @@ class Plan:
         On the disk of the output.
     cell_seconds, seconds : float
         On one core; and altogether, from the call of `run` in a program that has called it before.
+    compile_seconds : float
+        What compiling the methods took just now; 0 where their machine code was kept.
     methods, statuses : dict of str to float
         Shares of the sampled cells.
     scaling : str
@@ -83,6 +88,7 @@ class Plan:
     folder: str
     cell_seconds: float
     seconds: float
+    compile_seconds: float = 0.0
     methods: dict[str, float] = field(default_factory=dict)
     statuses: dict[str, float] = field(default_factory=dict)
     scaling: str = ""
@@ -98,6 +104,13 @@ class Plan:
             found.append(f"the memory is too small: {quantity(self.memory_bytes)} needed, {quantity(memory())} there")
         return found
 
+    def _compile_text(self) -> str:
+        if not self.compile_seconds:
+            return ""
+        kept = machine_code_folder() is not None and ":" not in self.kernel
+        when = "just now; the machine code is kept" if kept else "before the first cell"
+        return f"about {duration(self.compile_seconds)} {when}"
+
     def __str__(self) -> str:
         shape = " x ".join(f"{name} {n:,}" for name, n in self.shape.items())
         rows = {
@@ -111,6 +124,7 @@ class Plan:
             "memory": quantity(self.memory_bytes),
             "time": f"{duration(self.seconds)} on {self.workers} core{'s' * (self.workers > 1)}, "
             f"{small_duration(self.cell_seconds)} a cell",
+            "compile": self._compile_text(),
             "methods": _shares(self.methods),
             "statuses": _shares(self.statuses),
             "scaling": self.scaling,
@@ -120,7 +134,12 @@ class Plan:
         return "\n".join([*lines, *(f"  warning   {text}" for text in self.warnings)])
 
 
-def plan(study: Study, workers: int | None = None, path: str | os.PathLike[str] | None = None) -> Plan:
+def plan(
+    study: Study | Mapping[str, Any],
+    workers: int | None = None,
+    path: str | os.PathLike[str] | None = None,
+    note: Callable[[str], None] | None = None,
+) -> Plan:
     """Forecast of a run, from runs of some of its cells, spread over the grid, in a folder beside the output.
 
     Parameters
@@ -129,6 +148,8 @@ def plan(study: Study, workers: int | None = None, path: str | os.PathLike[str] 
         Cores; default: all this process may use.
     path : path, optional
         Where the output would be; default: the current folder.
+    note : callable, optional
+        Told what is compiled, where that takes long.
 
     Raises
     ------
@@ -137,14 +158,17 @@ def plan(study: Study, workers: int | None = None, path: str | os.PathLike[str] 
     """
     from sweep.explore.groups import scaling
 
+    study = as_study(study)
     crew = cores() if workers is None else whole_number("workers", workers)
     folder = Path(path).absolute().parent if path is not None else Path.cwd()
     if not folder.is_dir():
         raise SweepError(f"{path}: there is no folder {folder}")
-    sample = sampled_study(study)
+    compiling = Compiling(study.kernel, study.kernel_name, note)
+    sample = sampled_study(study, compiling)
     with faults_told(f"{study.kernel_name}: the kernel failed"):
         advice = scaling(study).advice
-    return replace(_forecast(study, sample, crew, folder), scaling=advice)
+    forecast = _forecast(study, sample, crew, folder)
+    return replace(forecast, compile_seconds=sum(compiling.seconds.values()), scaling=advice)
 
 
 def _forecast(study: Study, sample: Sample, workers: int, folder: Path) -> Plan:

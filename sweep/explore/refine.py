@@ -2,8 +2,9 @@
 
 A box of the grid, with a cell in each corner, is tried by solving the middles of its edges, faces and itself. Where one
 of them is off the multilinear interpolation from the corners, or has another status, the box is cut in two along every
-axis, and its parts are tried in turn. What is tried is logarithmic where the grid is, and in the output where that is
-positive in all of the box, as a scaling law wants it; elsewhere distances are relative to the largest value.
+axis, and its parts are tried in turn; middles of boxes that pass are not kept. What is tried is logarithmic where the
+grid is, and in the output where that is positive in all of the box, as a scaling law wants it; elsewhere distances are
+relative to the largest value.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from numpy.typing import NDArray
 
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.analysis.loglog import Array, is_logarithmic
-from sweep.cells.schema import METHOD_USED, STATUS, layout
+from sweep.cells.schema import ANCILLARY, STATUS, layout
 from sweep.study.model import Axis, Study, frozen
 from sweep.system.errors import SweepError
 
@@ -50,6 +51,8 @@ class Refinement:
     dataset : Dataset
         All cells, the first ones and those added, along `cell`.
     added : int
+        Cells kept beyond the first grid.
+    tried : int
         Cells solved beyond the first grid.
     uniform : int
         Cells of an even grid as fine as the finest box.
@@ -62,6 +65,7 @@ class Refinement:
 
     dataset: xr.Dataset
     added: int
+    tried: int
     uniform: int
     error: float
     complete: bool
@@ -74,7 +78,8 @@ class Refinement:
             else "; not all boxes meet the tolerance, allow more cells, or leave out where it diverges"
         )
         return (
-            f"{cells:,} cells, {self.added:,} of them added; an even grid as fine has {self.uniform:,}\n"
+            f"{cells:,} cells, {self.added:,} of them added, {self.tried:,} tried; an even grid as fine has "
+            f"{self.uniform:,}\n"
             f"largest interpolation error left: {self.error:.2g}{told}"
         )
 
@@ -88,6 +93,7 @@ def refine(
     study: Study | None = None,
     most_cells: int = MOST_CELLS,
     workers: int | None = None,
+    force: bool = False,
 ) -> Refinement:
     """Add cells to a finished sweep until outputs can be interpolated to a tolerance.
 
@@ -105,25 +111,46 @@ def refine(
     study : Study, optional
         That of the dataset; default: the one in its attributes.
     most_cells : int
-        Largest number of cells altogether.
+        Largest number of cells altogether, with those that are tried and not kept.
     workers : int, optional
         As of `run`.
+    force : bool
+        Overwrite the result of another study.
 
     Raises
     ------
     SweepError
-        The dataset is no finished product of number axes, or an output is not there or runs along something.
+        The dataset is no finished product of number axes, an output is not there or runs along something, or `path` is
+        not to be written.
     """
     study = study or study_of(dataset)
     names = [y] if isinstance(y, str) else list(y)
     _require(dataset, study, names, tolerance)
     rounds = None if path is None else Path(path).with_name(f"{Path(path).name}.rounds")
-    if rounds is not None:
+    if path is not None and rounds is not None:
+        _check_output(dataset, study, Path(path), force)
         _make(rounds)
-    found = _Refiner(dataset, study, names, tolerance, _Runs(rounds, workers), most_cells, path).refined()
+    found = _Refiner(dataset, study, names, tolerance, _Runs(rounds, workers), most_cells, path, force).refined()
     if rounds is not None:
         shutil.rmtree(rounds, ignore_errors=True)
     return found
+
+
+def _check_output(dataset: xr.Dataset, study: Study, path: Path, force: bool) -> None:
+    """Raises SweepError, before anything is computed, where all cells are not to be written there."""
+    from sweep.results.open import open_result
+    from sweep.system.overwriting import check_target
+
+    source = dataset.encoding.get("source")
+    check_target(path, "result", read=[Path(source)] if source else [])
+    if path.exists():
+        with open_result(path) as there:
+            if not force and there.attrs["title"] != _title(study):
+                raise SweepError(f"{path}: holds another result; name another file, or overwrite it with --force")
+
+
+def _title(study: Study) -> str:
+    return f"{study.title}, refined"
 
 
 def _make(folder: Path) -> None:
@@ -184,14 +211,17 @@ class _Refiner:
         run: Callable[[Study], xr.Dataset],
         most_cells: int,
         path: str | os.PathLike[str] | None,
+        force: bool,
     ) -> None:
-        self.path = path
+        self.path, self.force = path, force
         self.study, self.names, self.tolerance, self.run, self.most = study, names, tolerance, run, most_cells
         self.axes = [axis.values for axis in study.axes.values()]
         self.logarithmic = [is_logarithmic(values) for values in self.axes]
         self.first = dataset.load()
         self.parts: list[xr.Dataset] = []
         self.known: dict[Index, int] = {}
+        """Rows of the cells solved, those of the first grid before the others."""
+        self.kept: set[int] = set()
         self.values: list[Array] = []
         self.size = np.array([float(abs(self.first[name]).max()) or 1.0 for name in names])
         self.error, self.deepest = 0.0, 0
@@ -202,6 +232,7 @@ class _Refiner:
         steps = [range(len(values)) for values in self.axes]
         unit = 2**LEVELS
         self._learn([tuple(i * unit for i in index) for index in itertools.product(*steps)], _flat(self.first))
+        self.kept.update(self.known.values())
         boxes = [tuple(i * unit for i in index) for index in itertools.product(*(range(len(s) - 1) for s in steps))]
         left = 0.0
         for level in range(LEVELS):
@@ -214,7 +245,9 @@ class _Refiner:
             off = {box: self._off(box, half) for box in boxes}
             self.error = max([self.error, *(e for e in off.values() if e <= self.tolerance)])
             left = max((e for e in off.values() if math.inf > e > self.tolerance), default=0.0)
-            boxes = [part for box in boxes if off[box] > self.tolerance for part in _parts(box, half)]
+            cut = [box for box in boxes if off[box] > self.tolerance]
+            self.kept.update(self.known[p] for box in cut for p in self._points(box, half))
+            boxes = [part for box in cut for part in _parts(box, half)]
             if level >= BORDER_LEVELS:
                 boxes = [box for box in boxes if self._of_one_status(box, half)]
             if not boxes:
@@ -254,7 +287,7 @@ class _Refiner:
         axes = {
             name: Axis(name, frozen(column), "values") for name, column in zip(self.study.axes, columns, strict=True)
         }
-        further = dataclasses.replace(self.study, design="zip", axes=axes, title=f"{self.study.title}, refined")
+        further = dataclasses.replace(self.study, design="zip", axes=axes, title=_title(self.study))
         found = self.run(further)
         self.parts.append(found)
         self._learn(points, found)
@@ -283,16 +316,19 @@ class _Refiner:
         from sweep.results.open import in_memory
         from sweep.runs.run import store_cells
 
-        parts = [_flat(self.first), *self.parts]
+        parts, rows = [_flat(self.first), *self.parts], sorted(self.kept)
         names = list(self.study.axes)
-        axes = {n: Axis(n, frozen(np.concatenate([p[n].values for p in parts])), "values") for n in names}
-        whole = dataclasses.replace(self.study, design="zip", axes=axes, title=f"{self.study.title}, refined")
-        columns = [*self.study.outputs, STATUS, METHOD_USED]
-        arrays = {name: np.concatenate([part[name].values for part in parts]) for name in columns}
-        dataset = store_cells(whole, self.path, arrays) if self.path else in_memory(layout(whole, {}), arrays)
+        axes = {n: Axis(n, frozen(np.concatenate([p[n].values for p in parts])[rows]), "values") for n in names}
+        whole = dataclasses.replace(self.study, design="zip", axes=axes, title=_title(self.study))
+        columns = [*self.study.outputs, *ANCILLARY]
+        arrays = {name: np.concatenate([part[name].values for part in parts])[rows] for name in columns}
+        dataset = (
+            store_cells(whole, self.path, arrays, self.force) if self.path else in_memory(layout(whole, {}), arrays)
+        )
         finest = [(len(values) - 1) * 2**self.deepest + 1 for values in self.axes]
         uniform = int(np.prod([float(n) for n in finest]))
-        return Refinement(dataset, sum(p.sizes["cell"] for p in self.parts), uniform, self.error, self.complete)
+        first = self.first[STATUS].size
+        return Refinement(dataset, len(rows) - first, len(self.values) - first, uniform, self.error, self.complete)
 
 
 def _flat(dataset: xr.Dataset) -> xr.Dataset:

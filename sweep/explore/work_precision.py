@@ -2,8 +2,9 @@
 
 Errors are against values that are given, or against a reference: the method that leaves the fewest cells open, of those
 that state a bound before those that do not. What the reference is right to itself is the floor below which no error
-here means anything, its own least of all. Times are what one core spends on it, not what it spends on others, the least
-of a few rounds over all methods; they are noisy, errors, shares of cells and counts of work are not.
+here means anything; cells that it has solved itself, by name or by `auto`, are told to be that much off. Times are what
+one core spends on it, not what it spends on others, the least of a few rounds over all methods; they are noisy, errors,
+shares of cells and counts of work are not.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from sweep.explore.plan import small_duration
 from sweep.explore.reference import Truth, best_reference, errors, given_truth
 from sweep.study.mistakes import did_you_mean
 from sweep.study.model import Study
+from sweep.study.read import as_study
 from sweep.system.errors import SweepError
 from sweep.system.table import columns, page
 
@@ -62,7 +64,7 @@ def precision_cells(study: Study, cells: int = CELLS) -> dict[str, Any]:
 
 
 def work_precision(
-    study: Study,
+    study: Study | Mapping[str, Any],
     *,
     methods: Sequence[str] | None = None,
     tolerances: Sequence[float] = TOLERANCES,
@@ -105,9 +107,10 @@ def work_precision(
     """
     import xarray as xr
 
+    study = as_study(study)
     part = sampled(study, cells)
     able = _able(part)
-    names = _chosen(methods, able)
+    names, tolerances = _chosen(methods, able), list(dict.fromkeys(tolerances))
     if not len(tolerances) or not all(0 < rtol < math.inf for rtol in tolerances):
         raise SweepError(f"rtol: expected numbers above 0, found {list(tolerances)}")
     if cells < 1:
@@ -154,7 +157,7 @@ def precision_text(found: xr.Dataset) -> str:
 
 def _error(value: float, attributes: Mapping[str, Any], name: str) -> str:
     """An error as text; of the reference itself nothing can be said but that it is below its floor."""
-    if name == attributes["reference"] and value < attributes["reference_error"]:
+    if name == attributes["reference"] and value <= attributes["reference_error"]:
         return "reference"
     return f"{value:.1e}"
 
@@ -213,6 +216,8 @@ def _measured(study: Study, name: str, rtol: float, truth: Truth) -> dict[str, A
     part = with_method(study, name, rtol)
     outputs, status, used = solved(part)
     error = errors(outputs, truth.values)
+    # against itself the reference has no error; what can be said is what it is right to, also where auto took it
+    error = np.where(_solved_by(study, used, truth.source), np.maximum(error, truth.floor), error)
     valued, total = truth.sound & (status < FIRST_REFUSAL), truth.judged
     sure = valued & ~np.isin(status, UNSURE)
     refused = truth.sound & ~valued
@@ -232,6 +237,10 @@ def _measured(study: Study, name: str, rtol: float, truth: Truth) -> dict[str, A
         "methods_used": _shares(study, used),
         **{key: float(outputs[key][valued].mean()) if valued.any() else math.nan for key in WORK if key in outputs},
     }
+
+
+def _solved_by(study: Study, used: Any, name: str) -> Any:
+    return np.isin(used, [i for i, method in enumerate(study.kernel.methods) if method.name == name])
 
 
 def _shares(study: Study, used: Any) -> str:

@@ -17,6 +17,8 @@ from sweep.results.flat import flat
 from sweep.study.mistakes import listed
 from sweep.system import disk
 from sweep.system.errors import SweepError
+from sweep.system.overwriting import EXPORTED, check_target
+from sweep.system.table import cell
 
 ROWS = 65536
 """Rows of csv in memory at a time."""
@@ -25,10 +27,11 @@ LARGE = 256 * 2**20
 """Bytes from which a Dataset is written to netCDF4 piece by piece."""
 
 
-def export(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+def export(dataset: xr.Dataset, path: str | os.PathLike[str], *, force: bool = False) -> Path:
     """Write a Dataset to `path`, as its suffix says: .csv, .parquet, .nc or .zarr.
 
-    What is there is replaced once all is written.
+    An earlier export of the same kind is replaced once all is written; anything else that is there only by `force`,
+    and never the file that the Dataset is read from.
 
     csv: one row per cell (per cell and phase, for outputs along a phase), one column per coordinate and output,
     `status` and `method_used` as words, numbers with all their digits. Lines that start with "#" name the unit of
@@ -43,7 +46,7 @@ def export(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     SweepError
-        If the suffix is another, what writes it is not installed, or the file cannot be written.
+        If the suffix is another, what writes it is not installed, or the file cannot be, or is not to be, written.
     """
     target = Path(path)
     kind = target.suffix.lower()
@@ -52,9 +55,11 @@ def export(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         raise SweepError(f"{target}: found {found}; export writes {listed(WRITERS, word='and')}, as the suffix says")
     if target.is_dir() and kind != ".zarr":
         raise SweepError(f"{target} is a folder; name a file in it")
+    source = dataset.encoding.get("source")
+    check_target(target, kind, force=force, read=[Path(source)] if source else [])
     try:
         with disk.replacing(target) as part:
-            WRITERS[kind](dataset, part)
+            WRITERS[kind](_marked(dataset), part)
     except ImportError as error:
         raise SweepError(f'{target}: needs {error.name}; install it with: pip install "foliot[export]"') from None
     except RuntimeError as error:  # from HDF5
@@ -62,15 +67,22 @@ def export(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     return target
 
 
+def _marked(dataset: xr.Dataset) -> xr.Dataset:
+    """The Dataset, whose history says what it is."""
+    history = [text for text in str(dataset.attrs.get("history", "")).splitlines() if text != EXPORTED]
+    return dataset.assign_attrs(history="\n".join([*history, EXPORTED]))
+
+
 def _write_csv(dataset: xr.Dataset, path: Path) -> None:
     dataset = flat(dataset)
     names = [str(name) for name in (*dataset.coords, *dataset.data_vars)]
     with path.open("w", newline="", encoding="utf-8") as file:
+        file.write(f"# {EXPORTED}\n")
         _write_units(dataset, names, file)
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(names)
+        writer.writerow(map(cell, names))
         for block in _blocks(dataset):
-            writer.writerows(zip(*(_column(block, name) for name in names), strict=True))
+            writer.writerows(zip(*(_cells(block, name) for name in names), strict=True))
 
 
 def _write_parquet(dataset: xr.Dataset, path: Path) -> None:
@@ -111,7 +123,7 @@ def _write_units(dataset: xr.Dataset, names: list[str], file: TextIO) -> None:
         unit = f" [{attrs['units']}]" if "units" in attrs else ""
         # a quotation mark could open a quoted field that swallows the lines below
         about = " ".join(str(attrs.get("long_name", "")).replace('"', "'").split())
-        file.write(f"# {name}{unit}{': ' + about if about else ''}\n")
+        file.write(f"# {' '.join(f'{name}{unit}'.split())}{': ' + about if about else ''}\n")
 
 
 def _blocks(dataset: xr.Dataset) -> Iterator[xr.Dataset]:
@@ -142,6 +154,13 @@ def _column(block: xr.Dataset, name: str) -> list[Any]:
     column = np.broadcast_to(values, [block.sizes[dim] for dim in dims]).reshape(-1).tolist()
     words = flag_words(variable)
     return [words.get(code, code) for code in column] if words else column
+
+
+def _cells(block: xr.Dataset, name: str) -> list[Any]:
+    """The same as csv has it."""
+    column = _column(block, name)
+    text = flag_words(block[name]) or block[name].dtype.kind not in "fiu"
+    return [cell(value) for value in column] if text else column
 
 
 def flag_words(variable: xr.DataArray) -> dict[int, str]:

@@ -24,22 +24,25 @@ class PartsArray(BackendArray):
         return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.BASIC, self._read)
 
     def _read(self, key: tuple[Any, ...]) -> Any:
-        run = _run(key[: len(self.grid)], self.grid)
+        run = run_of(key[: len(self.grid)], self.grid)
         if run is not None:
             kept = [range(n)[k] for n, k in zip(self.grid, key, strict=False) if isinstance(k, slice)]
             found = self.parts.run(self.column, *run).reshape((*map(len, kept), *self.column.shape))
             return found[(*[slice(None)] * len(kept), *key[len(self.grid) :])]
-        axes = [np.arange(n)[k] for n, k in zip(self.grid, key, strict=False)]
-        strides = [math.prod(self.grid[i + 1 :]) for i in range(len(self.grid))]
-        cells = sum(
-            np.asarray(a * s, np.int64) for a, s in zip(np.ix_(*map(np.atleast_1d, axes)), strides, strict=True)
-        )
-        found = self.parts.read(self.column, np.asarray(cells).reshape(-1))
-        shape = [len(a) for a in axes if np.ndim(a)]
+        found = self.parts.read(self.column, cells_of(key[: len(self.grid)], self.grid))
+        shape = [len(range(n)[k]) for n, k in zip(self.grid, key, strict=False) if isinstance(k, slice)]
         return found.reshape(*shape, *self.column.shape)[(*[slice(None)] * len(shape), *key[len(self.grid) :])]
 
 
-def _run(key: tuple[Any, ...], grid: tuple[int, ...]) -> tuple[int, int] | None:
+def cells_of(key: tuple[Any, ...], grid: tuple[int, ...]) -> Any:
+    """The numbers of the flat cells of a key of numbers and slices, in its order."""
+    axes = [np.arange(n)[k] for n, k in zip(grid, key, strict=True)]
+    strides = [math.prod(grid[i + 1 :]) for i in range(len(grid))]
+    cells = sum(np.asarray(a * s, np.int64) for a, s in zip(np.ix_(*map(np.atleast_1d, axes)), strides, strict=True))
+    return np.asarray(cells).reshape(-1)
+
+
+def run_of(key: tuple[Any, ...], grid: tuple[int, ...]) -> tuple[int, int] | None:
     """From which flat cell to which one a key reaches; None where it leaves some out between."""
     start, step = 0, math.prod(grid)
     for place, (part, length) in enumerate(zip(key, grid, strict=True)):

@@ -19,7 +19,7 @@ from sweep.results.statuses import StatusCount, count_methods, count_statuses, f
 from sweep.store.hdf5_bytes import Images
 from sweep.store.manifest import SPEC, Spec, read_spec
 from sweep.store.parts import PART_NAME, Parts, at_once, read_part
-from sweep.store.seal import readable
+from sweep.store.seal import BESIDE, MOST_AT_ONCE, check_own, readable, unbroken
 from sweep.store.store import folder_of
 from sweep.study.model import Study
 from sweep.system.errors import SweepError
@@ -115,6 +115,7 @@ def stored_fingerprint(output: Path) -> dict[str, str]:
             if not readable(output, raw.fileno()):
                 raise ValueError("HDF5 cannot read it")
         with h5py.File(output, "r") as file:
+            check_own(file)
             text = file.attrs["fingerprint"]
             file.attrs["study_json"], file[STATUS if STATUS in file else BY_STATUS]
             if any(not _can_be(file, name, output.stat().st_size) for name in file):
@@ -136,17 +137,31 @@ def memory() -> int:
 
 
 def _open_finished(output: Path) -> xr.Dataset:
-    import xarray as xr
+    from sweep.results.backend import open_checked
 
+    _check_frame(output)
     stored_fingerprint(output)
     large = output.stat().st_size > MEMORY_SHARE * memory()
     try:
-        dataset = xr.open_dataset(
-            output, engine="h5netcdf", chunks="auto" if large else None, decode_times=False, decode_timedelta=False
-        )
-        return _with_plain_text(dataset)
+        return _with_plain_text(open_checked(output, "auto" if large else None))
     except (OSError, KeyError, ValueError, TypeError, RuntimeError) as fault:
         raise unreadable(output, fault) from None
+
+
+def _check_frame(output: Path) -> None:
+    """Raises SweepError where all but the outputs' numbers is damaged.
+
+    A program that changes a file by HDF5 cuts the seal off; what it changed on purpose is opened.
+    """
+    if not output.is_file():
+        return
+    try:
+        with output.open("rb") as raw:
+            sound = unbroken(raw.fileno(), MOST_AT_ONCE)
+    except OSError as fault:
+        raise unreadable(output, fault) from None
+    if sound is False:
+        raise SweepError(f"{output}: {BESIDE}; sweep verify tells of all damage")
 
 
 def unreadable(output: Path, fault: Exception) -> SweepError:

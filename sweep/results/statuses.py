@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -16,16 +16,21 @@ from sweep.cells.schema import METHOD_USED, STATUS
 if TYPE_CHECKING:
     import xarray as xr
 
+    from sweep.results.stored import Stored, StoredColumn
+
+    Cells: TypeAlias = xr.Dataset | Stored
+
 CELLS_AT_ONCE = 1 << 22
-FAILED = (Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.NO_METHOD)
-"""Refusals for which the method is to blame, not the scene."""
+FAILED = (Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.NO_METHOD, Status.FAILED)
+"""For these the method or the kernel is to blame, not the scene."""
 
 
 @dataclass(frozen=True)
 class Account:
     """What became of all cells: each is in one of these, and together they are `total`.
 
-    `failed` are those for which no method found an answer, and those of a status that this version does not know.
+    `failed` are those for which no method found an answer, or the kernel none at all, and those of a status that this
+    version does not know.
     """
 
     ok: int
@@ -44,7 +49,7 @@ class Account:
         return f"{self.total:,} cells: " + ", ".join(f"{getattr(self, name):,} {name}" for name in parts)
 
 
-def account(dataset: xr.Dataset) -> Account:
+def account(dataset: Cells) -> Account:
     """What became of the cells of a result, of a summary too."""
     counts = dict.fromkeys(("ok", "remarks", "refused", "failed", "pending"), 0)
     for name, cells in _counts(dataset).items():
@@ -61,22 +66,23 @@ def _kind(name: str) -> str:
     return "refused" if status.refused else "remarks"
 
 
-def _counts(dataset: xr.Dataset) -> dict[str, int]:
+def _counts(dataset: Cells) -> dict[str, int]:
     if is_summary(dataset):
         return summed(dataset, BY_STATUS)
     return {count.name: count.cells for count in count_statuses(dataset)}
 
 
-def is_summary(dataset: xr.Dataset) -> bool:
+def is_summary(dataset: Cells) -> bool:
     """Whether a result holds reductions, not cells."""
     return BY_STATUS in dataset and STATUS not in dataset
 
 
-def summed(dataset: xr.Dataset, name: str) -> dict[str, int]:
+def summed(dataset: Cells, name: str) -> dict[str, int]:
     """Cells of each status or method of a summary, over all it keeps; those that do not occur are left out."""
     counts = dataset[name]
-    total = counts.sum([d for d in counts.dims if d != counts.dims[-1]])
-    return {str(word): int(n) for word, n in zip(total[counts.dims[-1]].values, total.values, strict=True) if n}
+    words = dataset[str(counts.dims[-1])].values
+    total = counts.values.reshape(-1, len(words)).sum(axis=0)
+    return {str(word): int(n) for word, n in zip(words, total, strict=True) if n}
 
 
 @dataclass(frozen=True)
@@ -94,7 +100,7 @@ class StatusCount:
         return f"{text}, e.g. {cell}" if cell else text
 
 
-def count_statuses(dataset: xr.Dataset) -> list[StatusCount]:
+def count_statuses(dataset: Cells) -> list[StatusCount]:
     """Every status that occurs, in the order of its number, with its first cell; OK without one, a summary without any.
 
     Reads a few million cells at a time.
@@ -113,12 +119,12 @@ def count_statuses(dataset: xr.Dataset) -> list[StatusCount]:
     ]
 
 
-def failures(dataset: xr.Dataset) -> list[StatusCount]:
+def failures(dataset: Cells) -> list[StatusCount]:
     """The statuses that are not OK."""
     return [count for count in count_statuses(dataset) if count.name != Status.OK.name]
 
 
-def count_methods(dataset: xr.Dataset) -> dict[str, int]:
+def count_methods(dataset: Cells) -> dict[str, int]:
     """How many cells each method solved; those that none did are left out."""
     if is_summary(dataset):
         return {name: n for name, n in summed(dataset, BY_METHOD).items() if name != "none"}
@@ -127,7 +133,14 @@ def count_methods(dataset: xr.Dataset) -> dict[str, int]:
     return {name: int(n) for name, n in zip(names[1:], counts[1:], strict=False) if n}
 
 
-def _tally(column: xr.DataArray, lowest: int = 0) -> tuple[Any, dict[int, int]]:
+def summary_text(dataset: Cells) -> str:
+    """After a run: what the cells were solved with, and what became of those that are not OK."""
+    used = ", ".join(f"{name} {cells:,}" for name, cells in count_methods(dataset).items())
+    lines = [f"{account(dataset)}" + (f"; solved by {used}" if used else "")]
+    return "\n".join([*lines, *map(str, failures(dataset))])
+
+
+def _tally(column: xr.DataArray | StoredColumn, lowest: int = 0) -> tuple[Any, dict[int, int]]:
     """Cells of each number from `lowest` on, and the flat index of the first of each (both counted from `lowest`)."""
     counts = np.zeros(256, np.int64)
     first: dict[int, int] = {}
@@ -143,32 +156,32 @@ def _tally(column: xr.DataArray, lowest: int = 0) -> tuple[Any, dict[int, int]]:
     return counts, first
 
 
-def _flat_pieces(column: xr.DataArray) -> Iterator[Any]:
-    """The cells in C order, some at a time."""
-    if not column.dims:
-        yield np.atleast_1d(np.asarray(column.values))
-        return
-    row = max(1, math.prod(column.shape[1:]))
-    if row > CELLS_AT_ONCE:
-        for index in range(column.shape[0]):
-            yield from _flat_pieces(column[index])
-        return
-    rows = max(1, CELLS_AT_ONCE // row)
-    for start in range(0, column.shape[0], rows):
-        yield np.asarray(column[start : start + rows].values).reshape(-1)
+def _flat_pieces(column: xr.DataArray | StoredColumn, at: tuple[int, ...] = ()) -> Iterator[Any]:
+    """The cells in C order, some at a time; `at` are indices along the first dimensions."""
+    shape = column.shape[len(at) :]
+    row = math.prod(shape[1:])
+    if not shape:
+        yield np.asarray(column[at]).reshape(1)
+    elif row > CELLS_AT_ONCE:
+        for index in range(shape[0]):
+            yield from _flat_pieces(column, (*at, index))
+    else:
+        rows = max(1, CELLS_AT_ONCE // max(1, row))
+        for start in range(0, shape[0], rows):
+            yield np.asarray(column[(*at, slice(start, start + rows))]).reshape(-1)
 
 
 def _name(number: int) -> str:
     return next((status.name for status in Status if status == number), f"status {number}")
 
 
-def _cell(dataset: xr.Dataset, index: int) -> dict[str, str]:
+def _cell(dataset: Cells, index: int) -> dict[str, str]:
     """Coordinates of a cell, as people write them."""
     column = dataset[STATUS]
-    at = dict(zip(column.dims, np.unravel_index(index, column.shape), strict=True))
+    at = dict(zip(map(str, column.dims), np.unravel_index(index, column.shape), strict=True))
     cell = {}
     for name, coordinate in dataset.coords.items():
         if coordinate.dims and set(coordinate.dims) <= set(column.dims):
-            value = coordinate.isel({d: at[d] for d in coordinate.dims}).item()
+            value = coordinate.values[tuple(at[str(d)] for d in coordinate.dims)].item()
             cell[str(name)] = value if isinstance(value, str) else repr(float(f"{value:.6g}"))
     return cell

@@ -10,23 +10,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xxhash
 
 from sweep.cells.contents import part_columns
 from sweep.cells.partition import Partition
 from sweep.cells.row_blocks import granules
 from sweep.results.open import checked_study, unreadable
-from sweep.store.digests import BYTES, DIGESTS, FRAME, GROUP, frame_digest, frame_place, pieces
+from sweep.store.digests import BYTES, DIGESTS, FRAME, GROUP, frame_digest, frame_place, pieces, table
 from sweep.store.hdf5_bytes import Images
 from sweep.store.manifest import SPEC, Spec, read_spec
 from sweep.store.parts import DAMAGE, PART_NAME, READERS, read_part
-from sweep.store.seal import length, readable, unbroken
+from sweep.store.seal import BESIDE, check_own, length, readable, unbroken
 from sweep.store.store import LOCK, folder_of
 from sweep.system import disk
 from sweep.system.errors import SweepError
 
-BESIDE = "damaged beside the outputs' numbers: in attributes, coordinates, statuses or its structure"
 OF_DAMAGE = (errno.EINVAL, errno.EOVERFLOW)
 """What the system says where a damaged file sends one to a place that cannot be."""
 MOST_TOLD = 8
@@ -101,6 +99,7 @@ def _finished(output: Path) -> Verdict:
         if not _may_be_read(output):
             return Verdict(output, False, f"{size:,} bytes checked", (BESIDE,))
         with h5py.File(output, "r") as file:
+            check_own(file)
             if GROUP not in file and "study_json" in file.attrs:
                 raise SweepError(f"{output}: has no digests; it was written by an earlier version")
             findings = _compare(output, file, *_description(file, size))
@@ -126,15 +125,8 @@ def _may_be_read(output: Path) -> bool:
 
 def _description(file: Any, size: int) -> tuple[list[_Column], Partition]:
     """What the file says that it holds, in so many bytes. Raises one of DAMAGE where that cannot be."""
-    table = file[GROUP][DIGESTS]
-    names = str(table.attrs["columns"]).split()
-    cells, step = (int(np.ravel(table.attrs[key])[0]) for key in ("size", "cells"))
-    if min(cells, step) < 1 or table.nbytes > size or table.dtype != "u1":
-        raise ValueError("its digests cannot be")
-    blocks = Partition(cells, step)
-    if table.shape != (blocks.count, len(names), BYTES):
-        raise ValueError("its digests do not fit its columns")
-    columns = []
+    names, blocks = table(file, size)
+    cells, columns = blocks.size, []
     for number, dataset in enumerate(file[name] for name in names):
         if dataset.size % cells:
             raise ValueError(f"{names[number]} has another shape")

@@ -19,6 +19,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError, Future
 from datetime import datetime
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,6 +46,9 @@ MOST_ROUNDS = 3
 CONNECT_SECONDS = 10
 ASK_SECONDS = 2.0
 """How often the scheduler is asked for its workers."""
+
+Finished = Callable[..., None]
+"""Called with a block that has ended and the seconds it took, and with None now and then."""
 
 Batch = tuple[int, ...]
 Note = Callable[[str], None]
@@ -107,7 +111,7 @@ class Cluster:
         session: Session,
         jobs: Iterator[int],
         receive: Receive,
-        finished: Callable[[int | None], None],
+        finished: Finished,
         note: Note,
         door: Path | None,
     ) -> None:
@@ -178,7 +182,7 @@ class _Errand:
         session: Session,
         assignment: Assignment,
         receive: Receive,
-        finished: Callable[[int | None], None],
+        finished: Finished,
         note: Note,
     ) -> None:
         self._cluster, self._session, self._assignment = cluster, session, assignment
@@ -221,13 +225,13 @@ class _Errand:
 
     def _batches(self, jobs: Iterator[int]) -> Iterator[Batch]:
         """As many blocks together as take about half a second; fewer towards the end."""
-        left = list(jobs)[::-1]
-        while left:
+        left = self._session.forecast.blocks
+        while left > 0:
             enough = int(TASK_SECONDS / max(self._seconds, TASK_SECONDS / 1000))
-            share = len(left) // (2 * max(1, self._cluster.threads))
+            share = left // (2 * max(1, self._cluster.threads))
             size = max(1, min(enough, share, self._most))
-            batch, left = left[: -size - 1 : -1], left[:-size]
-            batch = [job for job in batch if not self._known(job)]
+            batch = [job for job in islice(jobs, size) if not self._known(job)]
+            left -= size
             if batch:
                 yield tuple(batch)
 
@@ -252,7 +256,7 @@ class _Errand:
         self._seconds = mean if math.isinf(self._seconds) else 0.7 * self._seconds + 0.3 * mean
         for job, found in answer.found.items():
             self._receive(job, found if isinstance(found, str) else self._checked(job, found))
-            self._finished(job)
+            self._finished(job, mean)
 
     def _suspect(self, batch: Batch) -> None:
         cells = ", ".join(_range(self._session.cells(job)) for job in batch[:4]) + ", ..." * (len(batch) > 4)

@@ -107,7 +107,7 @@ class Given:
 
     Parameters
     ----------
-    arrays : mapping of output, "status" and "method_used" to ndarray, shape (cells, ...)
+    arrays : mapping of outputs and of `layout.ANCILLARY` to ndarray, shape (cells, ...)
     """
 
     def __init__(self, arrays: Mapping[str, Any]) -> None:

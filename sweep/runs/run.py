@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -23,7 +24,9 @@ from sweep.runs.session import Session, Solve
 from sweep.store.assemble import assemble
 from sweep.store.manifest import Spec, read_spec, restored
 from sweep.store.store import Store, folder_of, opened
+from sweep.study.read import as_study
 from sweep.system.errors import SweepError
+from sweep.system.forecast import Ending
 from sweep.system.pool import CtrlC, Spares, Terminated, cores, whole_number
 from sweep.system.progress import Progress, quantity, stream_of
 from sweep.system.until import TimeUp, deadline
@@ -38,7 +41,7 @@ MOST_ATTEMPTS = 3
 
 
 def run(
-    study: Study,
+    study: Study | Mapping[str, Any],
     path: str | os.PathLike[str] | None = None,
     *,
     workers: int | None = None,
@@ -53,7 +56,7 @@ def run(
 
     Parameters
     ----------
-    study : Study
+    study : Study, or mapping of the keys of `build_study`
     path : path, optional
         The output, an HDF5 (netCDF4) file. A run that was stopped or killed is continued; an output that is complete
         for the same study is opened and left alone. None: in memory.
@@ -82,35 +85,36 @@ def run(
     KeyboardInterrupt, SystemExit
         After Ctrl-C or SIGTERM, when the blocks at work have been stored.
     """
-    cells = None if block_cells is None else whole_number("block_cells", block_cells)
-    crew = cores() if workers is None else whole_number("workers", workers)
-    if cluster is not None and workers is not None:
-        raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
-    stream = stream_of(progress)
-    task = _Task(study, fingerprint(study), crew, stream, cells, force, extend, deadline(until), cluster=cluster)
+    study = as_study(study)
+    task = _task(study, workers, force, progress, block_cells, extend, until, cluster)
     if path is None and until is not None:
         raise SweepError("until: give a path as well, or what is computed by then would be lost")
     if path is None:
         return _run_in_memory(task)
     output = _checked_output(path)
-    if (not _done(task, output) or folder_of(output).exists()) and not _run_to_file(task, output):
-        return open_unfinished(output)
-    return open_result(output)
+    return open_result(output) if _complete(task, output) else open_unfinished(output)
 
 
-def store_cells(study: Study, path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> xr.Dataset:
+def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> bool:
+    """Runs as `run` does, and opens nothing; False where the time was up before the end."""
+    return _complete(_task(study, **options), _checked_output(path))
+
+
+def store_cells(
+    study: Study, path: str | os.PathLike[str], arrays: Mapping[str, Any], force: bool = False
+) -> xr.Dataset:
     """Writes the result of cells that are solved already, a file like that of `run`.
 
     Parameters
     ----------
-    arrays : mapping of output, "status" and "method_used" to ndarray, shape (cells, ...)
+    arrays : mapping of outputs and of `layout.ANCILLARY` to ndarray, shape (cells, ...)
 
     Raises
     ------
     SweepError
         As `run`.
     """
-    task = _Task(study, fingerprint(study), 1, None, None, False, False, None, Given(arrays))
+    task = _Task(study, fingerprint(study), 1, None, None, force, False, None, Given(arrays))
     output = _checked_output(path)
     if not _done(task, output):
         _run_to_file(task, output)
@@ -131,6 +135,30 @@ class _Task:
     cluster: Any = None
 
 
+def _task(
+    study: Study,
+    workers: int | None = None,
+    force: bool = False,
+    progress: bool | TextIO | None = None,
+    block_cells: int | None = None,
+    extend: bool = False,
+    until: str | datetime | None = None,
+    cluster: Any = None,
+) -> _Task:
+    """What `run` was asked for. Raises SweepError."""
+    cells = None if block_cells is None else whole_number("block_cells", block_cells)
+    crew = cores() if workers is None else whole_number("workers", workers)
+    if cluster is not None and workers is not None:
+        raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
+    stream = stream_of(progress)
+    return _Task(study, fingerprint(study), crew, stream, cells, force, extend, deadline(until), cluster=cluster)
+
+
+def _complete(task: _Task, output: Path) -> bool:
+    """False where the time was up before the end."""
+    return (_done(task, output) and not folder_of(output).exists()) or _run_to_file(task, output)
+
+
 def _run_in_memory(task: _Task) -> xr.Dataset:
     with joined(task.cluster) as cluster:
         _wait(cluster, task, task.study.title or "sweep")
@@ -144,7 +172,8 @@ def _wait(cluster: Cluster | None, task: _Task, name: str) -> None:
 
 
 def _compute_in_memory(task: _Task, cluster: Cluster | None) -> xr.Dataset:
-    session = Session(task.study, task.mark, task.workers, block_cells=task.block_cells, cluster=cluster)
+    note = Progress(1, task.stream, task.study.title or "sweep").note
+    session = Session(task.study, task.mark, task.workers, block_cells=task.block_cells, cluster=cluster, note=note)
     rows = session.granules.count
     needed = rows * session.row_bytes
     if needed > memory():
@@ -165,9 +194,9 @@ def _compute_in_memory(task: _Task, cluster: Cluster | None) -> xr.Dataset:
     progress = session.progress(task.stream, task.study.title or "sweep", jobs)
     try:
         if cluster is not None:
-            session.compute_elsewhere(jobs, receive, progress, None)
+            session.compute_elsewhere(receive, progress, None)
         else:
-            session.compute(jobs, min(task.workers, len(jobs)), work, progress)
+            session.compute(min(task.workers, len(jobs)), work, progress)
         progress.end()
     finally:
         progress.stop()
@@ -199,6 +228,7 @@ def _run_to_file(task: _Task, output: Path) -> bool:
                 known,
                 task.until,
                 cluster,
+                Progress(1, task.stream, output.name).note,
             )
             return _run_session(task, session, store, output)
 
@@ -206,14 +236,15 @@ def _run_to_file(task: _Task, output: Path) -> bool:
 def _run_session(task: _Task, session: Session, store: Store, output: Path) -> bool:
     """Computes and puts together what is missing; False where the time was up before the end."""
     jobs = range(session.blocks.count) if store.spec is None else store.missing()
-    progress = session.progress(task.stream, output.name, jobs)
+    ending = Ending(session.blocks.count, task.workers)
+    progress = session.progress(task.stream, output.name, jobs, ending.seconds)
     _check_space(session, output, progress)
     # held back wherever they would leave half a file behind
     with CtrlC():
         if store.spec is None:
             store.begin(task.study.to_json(), task.mark, session.blocks)
         try:
-            _finish(session, store, output, progress)
+            _finish(session, store, output, progress, ending)
         except (KeyboardInterrupt, Terminated):
             progress.note(f"stopped; {_kept(store)}")
             raise
@@ -237,10 +268,15 @@ def _known(task: _Task, output: Path) -> Known | Given | None:
         return task.given
     if not task.extend or task.force or not output.exists():
         return None
+    _check_whole(output)
+    return Known(output, task.study)
+
+
+def _check_whole(output: Path) -> None:
+    """Raises SweepError where a result is damaged."""
     from sweep.results.verify import check_whole
 
     check_whole(output)
-    return Known(output, task.study)
 
 
 def _spec(store: Store, task: _Task) -> Spec | None:
@@ -294,10 +330,10 @@ def _tidy(store: Store, spec: Spec | None, task: _Task) -> None:
         store.clear()
 
 
-def _finish(session: Session, store: Store, output: Path, progress: Progress) -> None:
+def _finish(session: Session, store: Store, output: Path, progress: Progress, ending: Ending) -> None:
     """Computes what is missing and puts the result together, again where a part turns out to be damaged."""
     for _ in range(MOST_ATTEMPTS):
-        _store_blocks(session, store, progress)
+        _store_blocks(session, store, progress, ending)
         assert store.spec is not None
         layout = session.dated(progress, store.spec.begun)
 
@@ -312,12 +348,12 @@ def _finish(session: Session, store: Store, output: Path, progress: Progress) ->
         for index in damaged:
             path = store.set_aside(index)
             start, stop = session.cells(index)
+            session.again(index, progress)
             progress.note(f"cells {start} to {stop} were damaged on the disk and are computed again; see {path}")
-            progress.again(stop - start)
     raise SweepError(f"{store.folder}: what is written there comes back damaged again and again; the disk is failing")
 
 
-def _store_blocks(session: Session, store: Store, progress: Progress) -> None:
+def _store_blocks(session: Session, store: Store, progress: Progress, ending: Ending) -> None:
     jobs = store.missing()
     if not jobs:
         return
@@ -334,9 +370,11 @@ def _store_blocks(session: Session, store: Store, progress: Progress) -> None:
         with buffers.lent() as columns:
             arrays = {name: column[: stop - start] for name, column in columns.items()}
             if solve(start, stop, arrays):
+                begun = time.monotonic()
                 store.put(job, arrays)
+                ending.wrote(time.monotonic() - begun)
 
-    session.compute(jobs, threads, work, progress)
+    session.compute(threads, work, progress)
 
 
 def _store_elsewhere(session: Session, store: Store, jobs: Sequence[int], progress: Progress) -> None:
@@ -348,7 +386,7 @@ def _store_elsewhere(session: Session, store: Store, jobs: Sequence[int], progre
         else:
             store.put(job, found)
 
-    session.compute_elsewhere(jobs, receive, progress, store.open_door())
+    session.compute_elsewhere(receive, progress, store.open_door())
     store.close_doors()
 
 
@@ -357,7 +395,9 @@ def _check_space(session: Session, output: Path, progress: Progress) -> None:
     missing = session.row_bytes * (progress.total - progress.done) / session.granules.mean
     layout = session.layout
     coordinates = sum(np.asarray(coordinate.values).nbytes for coordinate in layout.coordinates)
-    needed = missing + layout.cell_bytes * layout.grid.size + coordinates
+    # the study is in the parts' spec.json, too
+    words = 2 * sum(len(str(text).encode()) for text in layout.attrs.values())
+    needed = missing + layout.cell_bytes * layout.grid.size + coordinates + words
     free = shutil.disk_usage(output.parent).free
     if needed > free:
         raise SweepError(
@@ -374,6 +414,7 @@ def _done(task: _Task, output: Path) -> bool:
     if task.force:
         return False
     if stored == dict(task.mark):
+        _check_whole(output)
         return True
     hindrance = obstacle(stored, task.mark)
     if task.extend and not hindrance:

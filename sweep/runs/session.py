@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
+from sweep.cells.compiling import Compiling
 from sweep.cells.contents import contents, part_columns
-from sweep.cells.partition import UNSAMPLED, Partition, Sample, order, row_partition, take_sample
+from sweep.cells.partition import UNSAMPLED, Partition, Sample, row_partition, take_sample
 from sweep.cells.reduce import Reducer
 from sweep.cells.row_blocks import granules
-from sweep.cells.schema import METHOD_USED, STATUS, Layout, columns
+from sweep.cells.schema import ANCILLARY, ERROR_BOUND, METHOD_USED, STATUS, Layout, columns
 from sweep.system.errors import SweepError
+from sweep.system.forecast import Forecast
 from sweep.system.pool import Halt, Spares, each
 from sweep.system.progress import Progress
 from sweep.system.until import TimeUp, passed
@@ -46,6 +48,7 @@ class Session:
     known : cells that need not be computed
     until : when to stop
     cluster : workers elsewhere, which compute instead of this process
+    note : tells what is compiled
     """
 
     def __init__(
@@ -59,6 +62,7 @@ class Session:
         known: Known | Given | None = None,
         until: datetime | None = None,
         cluster: Cluster | None = None,
+        note: Callable[[str], None] | None = None,
     ) -> None:
         self.study, self.mark, self.workers, self.known, self.until = study, mark, workers, known, until
         self.cluster = cluster
@@ -66,12 +70,13 @@ class Session:
         self.layout: Layout = contents(study, mark)
         self.columns = part_columns(study)
         self.granules = grains = granules(study)
-        self.sample: Sample = sampled_study(study) if sampled else UNSAMPLED
+        compiling = Compiling(study.kernel, study.kernel_name, note)
+        self.sample: Sample = sampled_study(study, compiling) if sampled else UNSAMPLED
         if blocks is None and block_cells is not None:
             blocks = Partition(grains.count, min(math.ceil(block_cells / grains.mean), grains.count))
         crew = cluster.threads if cluster is not None else 0
         self.blocks = blocks or row_partition(self.sample, grains, self.row_bytes, crew or workers)
-        self._weights = self.sample.weights(self.blocks, grains.first)
+        self.forecast = Forecast([], [])
 
     @property
     def row_bytes(self) -> int:
@@ -82,13 +87,24 @@ class Session:
         """The cells of a block."""
         return self.granules.cells(*self.blocks.bounds(job))
 
-    def progress(self, stream: TextIO | None, name: str, jobs: Iterable[int]) -> Progress:
-        """Where the run stands when `jobs` are still to do."""
-        left, work = 0, 0.0
-        for job in jobs:
-            start, stop = self.cells(job)
-            left, work = left + stop - start, work + float(self._weights[job])
-        return Progress(self.granules.size, stream, name, self.granules.size - left, work)
+    def progress(
+        self, stream: TextIO | None, name: str, jobs: Sequence[int], ending: Callable[[], float] = float
+    ) -> Progress:
+        """Where the run stands when `jobs` are still to do; they are what `compute` computes.
+
+        Parameters
+        ----------
+        ending : tells the seconds needed when all cells are computed
+        """
+        self.forecast = Forecast(self.sample.weights(self.blocks, self.granules.first), jobs)
+        left = sum(stop - start for start, stop in map(self.cells, jobs))
+        return Progress(self.granules.size, stream, name, self.granules.size - left, self.forecast, ending=ending)
+
+    def again(self, job: int, progress: Progress) -> None:
+        """A block has to be computed once more."""
+        start, stop = self.cells(job)
+        self.forecast.again(job)
+        progress.again(stop - start)
 
     def dated(self, progress: Progress, began: str) -> Layout:
         """The layout with the times of the run, which now is at its end."""
@@ -96,10 +112,8 @@ class Session:
         times = {"created": end, "start": began, "end": end, "cells_per_second": progress.rate}
         return replace(self.layout, attrs={**self.layout.attrs, **times})
 
-    def compute(
-        self, jobs: Iterable[int], threads: int, work: Callable[[int, Solve], None], progress: Progress
-    ) -> None:
-        """Calls `work(job, solve)` for every block, dear ones first, on a pool of threads.
+    def compute(self, threads: int, work: Callable[[int, Solve], None], progress: Progress) -> None:
+        """Calls `work(job, solve)` for every block that is left, on a pool of threads.
 
         No more than `workers` threads are inside `solve` at a time. Raises SweepError where `work` fails, TimeUp.
         """
@@ -111,12 +125,12 @@ class Session:
             start, stop = self.cells(job)
             with faults_told(f"cells {start} to {stop}: the kernel failed"), solvers.lent() as solve:
                 work(job, solve)
+            self.forecast.end(job)
 
-        each(self._inorder(jobs), guarded, threads, lambda job: self._tell(progress, job), halt)
+        each(self.forecast.order(), guarded, threads, lambda job: self._tell(progress, job), halt)
 
     def compute_elsewhere(
         self,
-        jobs: Iterable[int],
         receive: Receive,
         progress: Progress,
         door: Path | None,
@@ -129,16 +143,13 @@ class Session:
         """
         self.check_time()
 
-        def finished(job: int | None) -> None:
+        def finished(job: int | None, seconds: float = 0.0) -> None:
+            if job is not None:
+                self.forecast.end(job, seconds)
             self._tell(progress, job)
 
         assert self.cluster is not None
-        self.cluster.compute(self, self._inorder(jobs), receive, finished, progress.note, door)
-
-    def _inorder(self, jobs: Iterable[int]) -> Iterator[int]:
-        wanted = set(jobs)
-        inorder = map(int, order(self.sample, self.blocks, self.granules.first))
-        return (job for job in inorder if job in wanted)
+        self.cluster.compute(self, self.forecast.order(), receive, finished, progress.note, door)
 
     def _tell(self, progress: Progress, job: int | None) -> None:
         """Counts a block that is done. Raises TimeUp."""
@@ -146,7 +157,7 @@ class Session:
             progress.tick()
         else:
             start, stop = self.cells(job)
-            progress.add(stop - start, float(self._weights[job]))
+            progress.add(stop - start)
         self.check_time()
 
     def check_time(self) -> None:
@@ -158,6 +169,7 @@ class Session:
         compute, known = block_solver(self.study), self.known
 
         def solve(start: int, stop: int, arrays: Mapping[str, Any]) -> None:
+            self.forecast.begin(start // self.blocks.cells)
             compute(start, stop, arrays, None if known is None else known.missing(start, stop))
             if known is not None:
                 known.fill(start, stop, arrays)
@@ -175,22 +187,24 @@ def block_solver(study: Study) -> Callable[[int, int, Mapping[str, Any], Any], N
     solver = Solver(study)
 
     def solve(start: int, stop: int, arrays: Mapping[str, Any], wanted: Any) -> None:
-        outputs = {name: array for name, array in arrays.items() if name not in (STATUS, METHOD_USED)}
-        solver.solve(start, stop, outputs, arrays[STATUS], arrays[METHOD_USED], wanted)
+        outputs = {name: array for name, array in arrays.items() if name not in ANCILLARY}
+        solver.solve(start, stop, outputs, arrays[STATUS], arrays[METHOD_USED], wanted, arrays[ERROR_BOUND])
 
     return solve
 
 
-def sampled_study(study: Study) -> Sample:
+def sampled_study(study: Study, compiling: Compiling | None = None) -> Sample:
     """Compiles the kernel and times a sample of the grid. Raises SweepError where the kernel fails."""
     from sweep.cells.solve import Solver
 
+    compiling = compiling or Compiling(study.kernel, study.kernel_name)
     with faults_told(f"{study.kernel_name}: the kernel failed"):
-        solver = Solver(study)
+        solver = Solver(replace(study, kernel=compiling.kernel))
         solver.warm()
         sample = take_sample(solver, columns(study), granules(study).size)
         if study.summary is not None:
             sample = replace(sample, costs=sample.costs + Reducer(study).seconds())
+        compiling.remember()
         return sample
 
 

@@ -66,7 +66,7 @@ class Sent:
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of some blocks: the name of each one's part, or its numbers."""
+    """What became of some blocks, in how many seconds: the name of each one's part, or its numbers."""
 
     seconds: float
     found: Mapping[int, str | Sent]
@@ -96,8 +96,8 @@ def compute(run: str, jobs: Sequence[int], masks: Mapping[int, bytes]) -> Answer
     SweepError
         The run is over, this process has another version of the kernel, the kernel fails, or the disk does.
     """
-    begun = time.perf_counter()
     bench = _bench(run)
+    begun = time.perf_counter()
     found = {job: bench.block(job, masks.get(job)) for job in jobs}
     return Answer(time.perf_counter() - begun, found)
 

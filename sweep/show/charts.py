@@ -20,6 +20,7 @@ from sweep.analysis.loglog import is_logarithmic, spans_decades
 from sweep.show.view import View, coordinate, label, setting, view
 from sweep.system import disk
 from sweep.system.errors import SweepError
+from sweep.system.overwriting import DRAWN
 
 try:
     import matplotlib
@@ -89,11 +90,11 @@ NAME_ROOM = 0.11
 """Part of a map's height that a region must reach from the place of its name in all directions."""
 
 METADATA: dict[str, dict[str, Any]] = {
-    ".png": {"Software": None},
-    ".svg": {"Date": None},
-    ".pdf": {"CreationDate": None},
+    ".png": {"Software": DRAWN},
+    ".svg": {"Date": None, "Creator": DRAWN},
+    ".pdf": {"CreationDate": None, "Creator": DRAWN},
 }
-"""Kinds of file, and what is left out of them so that the same picture has the same bytes."""
+"""Kinds of file, what each says of its origin, and what is left out so that the same picture has the same bytes."""
 
 
 def plot(
@@ -129,7 +130,9 @@ def plot(
             _draw_map(axes, shown)
         else:
             _draw_lines(axes, shown)
-        title = "\n".join(part for part in (str(dataset.attrs.get("title", "")), shown.held) if part)
+        # a title is plain text; a lone dollar in it would begin a formula
+        text = str(dataset.attrs.get("title", "")).replace("$", r"\$")
+        title = "\n".join(part for part in (text, shown.held) if part)
         axes.set_title(title, wrap=True)
     if path is not None:
         save(figure, path)
@@ -152,21 +155,43 @@ def plot_precision(found: xr.Dataset, path: str | os.PathLike[str] | None = None
         The file cannot be written.
     """
     with style():
-        figure = new_figure(PAGE, 92.0)
+        lines = _note(found)
+        figure = new_figure(PAGE, 96.0 + 2.6 * len(lines))
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         for axes, key, text in zip(panels, ("error_median", "error_worst"), ("median cell", "worst cell"), strict=True):
             draw_precision(axes, found, key)
             axes.set_title(text)
         panels[0].set_ylabel("relative error")
-        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
-        if found.attrs.get("omissions"):
-            text = "\n".join(textwrap.wrap(f"Omissions: {found.attrs['omissions']}", 170)[:8])
-            figure.supxlabel(text, fontsize=6, ha="left", x=0.02)
+        handles, labels = panels[0].get_legend_handles_labels()
+        marks = precision_marks(found)
+        figure.legend([*handles, *marks.values()], [*labels, *marks], loc="outside upper center", ncols=5)
+        figure.supxlabel("\n".join(lines), fontsize=6, ha="left", x=0.02)
     if path is not None:
         save(figure, path)
     return figure
 
 
+def _note(found: xr.Dataset) -> list[str]:
+    """Lines below the picture."""
+    left_out = found.attrs.get("omissions")
+    return textwrap.wrap(f"Omissions: {left_out}", 170)[:MOST_NOTES] if left_out else []
+
+
+def precision_marks(found: xr.Dataset) -> dict[str, Any]:
+    """What the marks of `draw_precision` that occur mean."""
+    look: dict[str, Any] = {"linestyle": "", "marker": "o", "color": "0.3", "markersize": 4}
+    marks: dict[str, Any] = {"all cells solved": Line2D([], [], **look)}
+    if (found.failed + found.inaccurate > 0).any():
+        marks["some refused or inaccurate"] = Line2D([], [], **{**look, "markerfacecolor": "white"})
+    if (found.silent > 0).any():
+        marks["some silently wrong"] = Line2D([], [], linestyle="", marker="x", color="black", markersize=7)
+    if np.isfinite(found.attrs.get("reference_error", np.nan)):
+        marks["below what the reference is right to"] = Patch(color="0.9", linewidth=0)
+    return marks
+
+
+MOST_NOTES = 8
+"""Lines below a chart."""
 FLOOR = 1e-17
 """Where errors of 0 are drawn."""
 
@@ -175,14 +200,13 @@ def draw_precision(axes: Any, found: xr.Dataset, key: str, names: Sequence[str] 
     """A line for each method; those in `names` look the same in every picture that gives the same names.
 
     Filled marks where all cells are solved, open ones where some are refused or said to be inaccurate, crosses where
-    some are silently wrong. The reference is drawn at what it is right to, since against itself it has no error.
+    some are silently wrong; `precision_marks` says so in a legend.
     """
     floor = found.attrs.get("reference_error", np.nan)
     order = list(dict.fromkeys([*names, *found["method"].values.tolist()]))
     for i, name in ((order.index(name), name) for name in found["method"].values):
         row = found.sel({"method": name})
-        least = max(floor, FLOOR) if name == found.attrs.get("reference") else FLOOR
-        seconds, error = row.seconds.values, np.maximum(row[key].values, least)
+        seconds, error = row.seconds.values, np.maximum(row[key].values, FLOOR)
         whole = (row.failed + row.inaccurate).values == 0
         look = {"color": COLOURS[i % len(COLOURS)], "marker": MARKS[i % len(MARKS)], "markersize": 4}
         axes.plot(seconds, error, linewidth=0.8, linestyle=DASHES[i % len(DASHES)], markevery=whole, label=name, **look)

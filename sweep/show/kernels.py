@@ -10,7 +10,7 @@ from typing import Any
 from kernels import catalogue
 from kernels.interface import Field, Kernel, Method
 from sweep.study.kernels import load_kernel
-from sweep.study.mistakes import listed, quoted
+from sweep.study.mistakes import limits, listed, quoted
 from sweep.system.errors import SweepError
 from sweep.system.table import columns, page, section
 
@@ -71,7 +71,7 @@ def _parameter(field: Field) -> tuple[str, ...]:
     return (
         field.name,
         f"[{field.unit}]",
-        _limits(field),
+        limits(field),
         default,
         field.doc + _along(field).replace(" along", ", one for each"),
     )
@@ -82,7 +82,7 @@ def _output(field: Field) -> tuple[str, ...]:
 
 
 def _coordinate(field: Field) -> tuple[str, ...]:
-    return field.name, f"[{field.unit}]", _limits(field), field.doc
+    return field.name, f"[{field.unit}]", limits(field), field.doc
 
 
 def _method(method: Method) -> tuple[str, ...]:
@@ -93,17 +93,6 @@ def _method(method: Method) -> tuple[str, ...]:
 
 def _along(field: Field) -> str:
     return f" along {listed(field.dims, word='and')}" if field.dims else ""
-
-
-def _limits(field: Field) -> str:
-    """'> 0', '0 to 1', or the words it takes."""
-    if field.choices:
-        return listed(field.choices, quote=True)
-    low = f"{'>' if field.open_lower else '>='} {field.lower:g}" if field.lower > -math.inf else ""
-    # the last float64 below a round number is how a kernel leaves that number out
-    below = float(f"{field.upper:g}") > field.upper
-    high = f"{'<' if below else '<='} {field.upper:g}" if field.upper < math.inf else ""
-    return ", ".join(filter(None, [low, high]))
 
 
 def _default(field: Field) -> str:

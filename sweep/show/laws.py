@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.cells.schema import METHOD_USED, STATUS
+from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.system import disk
 from sweep.system.errors import SweepError
-from sweep.system.table import columns, page
+from sweep.system.table import cell, columns, page
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,7 +87,7 @@ def laws(
     """What `sweep fit` finds; `noise` as of `fit_exponent`. Raises SweepError."""
     from sweep.analysis.exponents import crossover, fit_exponent
 
-    outputs = [str(name) for name in dataset.data_vars if name not in (STATUS, METHOD_USED)]
+    outputs = [str(name) for name in dataset.data_vars if name not in ANCILLARY]
     if y not in outputs:
         hint = did_you_mean(y, outputs) or f"; there are {listed(outputs, word='and')}"
         raise SweepError(f"--y {y}: no such output{hint}")
@@ -174,6 +174,7 @@ def write_laws(found: Laws, path: Path) -> None:
         rows += [row for law in ("low", "high") for row in _table_rows(found.bend.sel(law=law), law)]
     if found.meeting is not None:
         rows += list(_table_rows(found.meeting, "meeting"))
+    rows = [{cell(name): cell(value) for name, value in row.items()} for row in rows]
     names = list(dict.fromkeys(name for row in rows for name in row))
     with disk.replacing(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, names, lineterminator="\n")

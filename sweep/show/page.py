@@ -19,6 +19,7 @@ from sweep.show.laws import explanation, law_rows
 from sweep.show.text import Rows, head, outputs_of, sections
 from sweep.system import disk
 from sweep.system.errors import SweepError
+from sweep.system.overwriting import PAGE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -113,6 +114,7 @@ def page(dataset: xr.Dataset, result: Path) -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"{PAGE}\n"
         f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n{body}\n</body>\n</html>\n"
     )
 

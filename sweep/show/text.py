@@ -11,9 +11,9 @@ import numpy as np
 
 from kernels.interface import Status
 from sweep.cells.reduce import BY_METHOD, BY_STATUS
-from sweep.cells.schema import METHOD_USED, STATUS
+from sweep.cells.schema import ANCILLARY, METHOD_USED, STATUS
 from sweep.results.export import flag_words
-from sweep.results.statuses import account, count_methods, count_statuses, failures, is_summary
+from sweep.results.statuses import account, count_methods, count_statuses, is_summary
 from sweep.study.model import short
 from sweep.system.table import columns, page, section
 
@@ -56,13 +56,6 @@ def _of_cells(dataset: xr.Dataset) -> dict[str, Rows]:
         "status": _status_rows(dataset),
         "methods used": _method_rows(dataset),
     }
-
-
-def summary_text(dataset: xr.Dataset) -> str:
-    """After a run: what the cells were solved with, and what became of those that are not OK."""
-    used = ", ".join(f"{name} {cells:,}" for name, cells in count_methods(dataset).items())
-    lines = [f"{account(dataset)}" + (f"; solved by {used}" if used else "")]
-    return "\n".join([*lines, *map(str, failures(dataset))])
 
 
 def _of_summary(dataset: xr.Dataset) -> dict[str, Rows]:
@@ -149,7 +142,7 @@ def _given(dataset: xr.Dataset) -> list[xr.DataArray]:
 
 
 def outputs_of(dataset: xr.Dataset) -> list[str]:
-    return [str(name) for name in dataset.data_vars if name not in (STATUS, METHOD_USED)]
+    return [str(name) for name in dataset.data_vars if name not in ANCILLARY]
 
 
 def _coordinate(coordinate: xr.DataArray) -> tuple[str, ...]:

@@ -29,7 +29,7 @@ FAMILY = 8
 POINTS, PIXELS = 20_000, 2_000
 """Points along a line and cells along the side of a map that are drawn; beyond, every second, third ... one."""
 
-FLAGS = ("status", "method_used")
+ANCILLARY = ("status", "method_used", "error_bound")
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
 
 
 def _output(dataset: xr.Dataset, y: str | None) -> str:
-    known = [str(n) for n, v in dataset.data_vars.items() if v.ndim and n not in FLAGS and v.dtype.kind in "fiu"]
+    known = [str(n) for n, v in dataset.data_vars.items() if v.ndim and n not in ANCILLARY and v.dtype.kind in "fiu"]
     if not known:
         raise SweepError("there is nothing to draw: no output runs along an axis")
     if y is not None and y not in known:

@@ -24,7 +24,7 @@ from sweep.store.canvas import Canvas
 from sweep.store.digests import BYTES, Seals, column_digests, frame_digest, frame_place
 from sweep.store.hdf5_bytes import unfilled
 from sweep.store.parts import DAMAGE, FLAGS
-from sweep.store.seal import seal
+from sweep.store.seal import seal, written
 from sweep.store.store import Store
 from sweep.study.model import Study
 from sweep.system import disk
@@ -66,6 +66,7 @@ def assemble(store: Store, study: Study, layout: Layout, output: Path, threads: 
             _check(layout, seals, temporary, output)
             disk.rename(temporary, output)
             disk.sync_folder(output.parent)
+            written(output)
         return damaged
     except (OSError, RuntimeError) as fault:
         raise disk.refusal(fault, output) from fault

@@ -68,6 +68,19 @@ def column_digests(columns: Sequence[Column], arrays: Mapping[str, Any]) -> Any:
     return np.array([list(state.digest()) for state in found], "u1")
 
 
+def table(file: Any, size: int) -> tuple[list[str], Partition]:
+    """What columns a file of so many bytes has digests of, and its chunks. Raises ValueError where they cannot be."""
+    digests = file[GROUP][DIGESTS]
+    names = str(digests.attrs["columns"]).split()
+    cells, step = (int(np.ravel(digests.attrs[key])[0]) for key in ("size", "cells"))
+    if min(cells, step) < 1 or digests.nbytes > size or digests.dtype != "u1":
+        raise ValueError("its digests cannot be")
+    chunks = Partition(cells, step)
+    if digests.shape != (chunks.count, len(names), BYTES):
+        raise ValueError("its digests do not fit its columns")
+    return names, chunks
+
+
 def frame_place(file: Any) -> int:
     """Where in the file the frame's digest lies."""
     place: int = file[GROUP][FRAME].id.get_offset()

@@ -27,8 +27,6 @@ AT_ONCE = 64
 """Parts that one thread reads before it asks for more."""
 READERS = 8
 """Parts read at a time: small files wait for the disk most of the time."""
-MOST_FLAGS = 1 << 28
-"""Cells up to which statuses and methods are kept in memory."""
 FLAGS = (STATUS, METHOD_USED)
 PART_NAME = re.compile(r"(\d+)-(\d+)\.([0-9a-f]{32})\.h5")
 
@@ -105,22 +103,6 @@ def _read(
     return arrays
 
 
-def _read_flags(path: str, images: Images, start: int, stop: int) -> dict[str, Any] | None:
-    """Statuses and methods of a part as long as this program writes it, in as few calls as can be; None of others."""
-    cells = stop - start
-    frame = images.frame(cells)
-    places = {name: frame.places[name] for name in FLAGS}
-    first = min(places.values())
-    fd = disk.open_file(path, os.O_RDONLY)
-    try:
-        if os.fstat(fd).st_size != frame.size:
-            return None
-        found = os.pread(fd, max(places.values()) + cells - first, first)
-    finally:
-        os.close(fd)
-    return {name: np.frombuffer(found, np.int8, cells, place - first) for name, place in places.items()}
-
-
 def _places(fd: int, images: Images, start: int, stop: int) -> Mapping[str, int] | None:
     """Where each column begins, in a file as long as this program writes it; None in any other.
 
@@ -159,12 +141,11 @@ def at_once(read: Callable[[list[Any]], None], items: Sequence[Any]) -> None:
 
 
 class Parts:
-    """The parts that are there. Before numbers of a part are used its digest is checked; for its statuses it is not."""
+    """The parts that are there. Before anything of a part is used its digest is checked, once."""
 
     def __init__(self, images: Images, blocks: Partition, folder: Path, names: Mapping[int, str]) -> None:
         self.images, self.blocks, self.folder, self.names = images, blocks, folder, dict(names)
         self._sound: set[int] = set()
-        self._flags: dict[tuple[int, str], Any] = {}
 
     def read(self, column: Column, cells: Any) -> Any:
         """A column of the cells of these numbers, in any order; what is missing or damaged is NaN or PENDING."""
@@ -202,8 +183,6 @@ class Parts:
     def _column(self, index: int, column: Column) -> Any:
         start, stop = self.blocks.bounds(index)
         try:
-            if column.name in FLAGS:
-                return self._flag(index, column.name)
             path = self.folder / self.names[index]
             if index in self._sound:
                 found = _read(path, self.images, start, stop, [column], keep=True)
@@ -216,19 +195,3 @@ class Parts:
             return None
         self._sound.add(index)
         return found[column.name]
-
-    def _flag(self, index: int, name: str) -> Any:
-        """Statuses or methods of a block; the others are kept until they are asked for, as they soon will be."""
-        kept = self._flags.pop((index, name), None)
-        if kept is not None:
-            return kept
-        start, stop = self.blocks.bounds(index)
-        found = _read_flags(f"{self.folder}/{self.names[index]}", self.images, start, stop)
-        if found is None:
-            flags = [c for c in self.images.columns if c.name in FLAGS]
-            found = _read(self.folder / self.names[index], self.images, start, stop, flags, keep=True)
-        if found is None:
-            return None
-        if self.blocks.size <= MOST_FLAGS:
-            self._flags |= {(index, other): found[other] for other in found if other != name}
-        return found[name]

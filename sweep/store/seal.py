@@ -8,6 +8,7 @@ HDF5 may loop for ever, or crash, in a damaged file. So after its last byte, whe
     MAGIC
 
 A result that carries no such seal, or was changed since, is first read by another process, which may hang or crash.
+A seal can be forged, so the command line has each result read so that this process has not written itself.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ import os
 import struct
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import xxhash
 
@@ -29,19 +31,30 @@ TAIL = BYTES + 4 + len(MAGIC)
 MOST_REGIONS = 100_000
 MOST_AT_ONCE = 256 << 20
 """Bytes beside the outputs' numbers up to which they are checked when a result is opened."""
-PROBE_SECONDS = 20.0
+BESIDE = "damaged beside the outputs' numbers: in attributes, coordinates, statuses or its structure"
+PROBE_SECONDS, PROBE_SPEED = 20.0, 2e8
+"""Limit for another process that reads a result; and bytes of the file for each further second."""
 PROBE = """
 import sys, h5py
 def look(name, thing):
     dict(thing.attrs)
     if isinstance(thing, h5py.Dataset):
-        thing.id.get_offset(), thing.chunks, thing.nbytes
-        thing[()] if thing.nbytes < 1 << 20 else thing[(slice(0, 1),) * thing.ndim]
+        if thing.external or thing.is_virtual:
+            sys.exit(1)
+        thing.id.get_offset(), thing.nbytes
+        if thing.chunks:
+            for piece in thing.iter_chunks():
+                thing[piece]
+        else:
+            thing[()] if thing.nbytes < 1 << 20 else thing[(slice(0, 1),) * thing.ndim]
 with h5py.File(sys.argv[1], "r") as file:
     look("/", file)
     file.visititems(look)
 """
-"""Reads what a reader would read."""
+"""Reads what a reader would read, but for numbers that lie in the file as they are."""
+
+_written: set[tuple[int, ...]] = set()
+"""Files that this process has written, or has had read, and nobody changed since."""
 
 
 def seal(regions: Sequence[Region], fd: int) -> bytes:
@@ -85,13 +98,68 @@ def unbroken(fd: int, most: int | None = None) -> bool | None:
     return xxhash.xxh3_128(places + found).digest() == digest
 
 
+def sealed(path: Path) -> bool:
+    """Whether a file is there, can be read, and is sealed and unbroken."""
+    try:
+        if not path.is_file():
+            return False
+        with path.open("rb") as file:
+            return bool(unbroken(file.fileno(), MOST_AT_ONCE))
+    except OSError:
+        return False
+
+
 def readable(path: Path, fd: int) -> bool:
     """Whether HDF5 can be let loose on a result. Raises OSError."""
-    if unbroken(fd, MOST_AT_ONCE):
-        return True
-    try:
-        # it has no seal, or was changed on purpose, or by the disk
-        words = [sys.executable, "-I", "-c", PROBE, str(path)]
-        return subprocess.run(words, capture_output=True, timeout=PROBE_SECONDS).returncode == 0
-    except subprocess.TimeoutExpired:
-        return False
+    # it may have no seal, or have been changed on purpose, or by the disk
+    return bool(unbroken(fd, MOST_AT_ONCE)) or probing(path)()
+
+
+def probing(path: Path) -> Callable[[], bool]:
+    """Has another process read a result; what comes back waits for it, and says whether it could. Raises OSError."""
+    mark = _mark(path)
+    if mark in _written:
+        return lambda: True
+    words = [sys.executable, "-I", "-c", PROBE, str(path)]
+    process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def read() -> bool:
+        try:
+            found = process.wait(PROBE_SECONDS + path.stat().st_size / PROBE_SPEED) == 0
+        except subprocess.TimeoutExpired:
+            found = False
+        finally:
+            process.kill()
+            process.wait()
+        if found:
+            _written.add(mark)
+        return found
+
+    return read
+
+
+def written(path: Path) -> None:
+    """Notes that this process has written a file. Raises OSError."""
+    _written.add(_mark(path))
+
+
+def _mark(path: Path) -> tuple[int, ...]:
+    found = path.stat()
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
+
+
+def check_own(group: Any, inner: bool = False) -> None:
+    """Raises ValueError where what a group of HDF5 holds lies elsewhere: links and storage in other files are followed.
+
+    A result has none of these, and no groups in groups, which may hold themselves.
+    """
+    import h5py
+
+    for name in group:
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            raise ValueError(f"{name} is a link")
+        thing = group[name]
+        if isinstance(thing, h5py.Group) and not inner:
+            check_own(thing, inner=True)
+        elif not isinstance(thing, h5py.Dataset) or thing.external or thing.is_virtual:
+            raise ValueError(f"{name} is not in the file itself")

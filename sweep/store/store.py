@@ -220,6 +220,11 @@ def opened(output: Path, columns: Sequence[Column]) -> Iterator[Store]:
         raise disk.refusal(fault, folder) from fault
     store = Store(folder, columns)
     try:
+        if folder.stat().st_dev != output.parent.stat().st_dev:
+            raise SweepError(
+                f"{folder} is on another file system than its result, which would not get its place at the end; "
+                "remove it, or choose another output with -o"
+            )
         yield store
     finally:
         if store.spec is None:

@@ -11,7 +11,7 @@ from kernels.interface import Kernel, load
 from sweep.study.mistakes import did_you_mean, listed, show
 from sweep.system.errors import SweepError
 
-RESERVED = ("status", "method_used", "method", "rtol", "cell")
+RESERVED = ("status", "method_used", "error_bound", "method", "rtol", "cell")
 """Names that a result has in any case."""
 
 

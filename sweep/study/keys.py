@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from kernels import catalogue
 from kernels.interface import Field, Kernel
 from sweep.study.kernels import load_kernel
-from sweep.study.mistakes import Mistakes, did_you_mean, listed, show
+from sweep.study.mistakes import Mistakes, did_you_mean, limits, listed, show
 from sweep.study.model import AUTO, Axis, Study, differs, frozen
 from sweep.study.summary import SummaryEntry
 from sweep.study.values import EXAMPLE, Entries
@@ -177,10 +177,18 @@ class Reader:
             product = " x ".join(str(n) for n in lengths.values())
             self.mistakes.add("axes", f"{product} cells; a study may have at most {LARGEST_GRID:.0e}")
         for name, axis in axes.items() if design == "product" else ():
-            values, counts = np.unique(axis.values, return_counts=True)
-            if axis.values.ndim == 1 and counts.max() > 1:
-                twice = axis.label(int(np.flatnonzero(axis.values == values[counts.argmax()])[0]))
-                self.mistakes.add(f"axes.{name}", f"{twice} stands more than once; give every value once")
+            twice = self._repeated(axis) if axis.values.ndim == 1 else []
+            if len(twice):
+                self.mistakes.add(
+                    f"axes.{name}", f"{axis.label(twice[0])} stands more than once; give every value once"
+                )
+
+    def _repeated(self, axis: Axis) -> list[int]:
+        """Where values first stand that stand again, NaN among them; not the words of a field not known, all NaN."""
+        known = axis.name in (*SETTINGS, *(p.name for p in self.kernel.parameters)) and self.kernel is not UNKNOWN
+        _, first, counts = np.unique(axis.values, return_index=True, return_counts=True)
+        twice: list[int] = first[(counts > 1) & (known | ~np.isnan(axis.values[first]))].tolist()
+        return twice
 
     def _fixed(self, found: Any, axes: Mapping[str, Axis]) -> dict[str, float | NDArray[np.float64]]:
         given = {}
@@ -189,10 +197,24 @@ class Reader:
             if name in SETTINGS:
                 self.mistakes.add(where, f"stands at the top of a study: {name} = ..., or under [axes.{name}]")
                 continue
-            given[name] = self.entries.quantity(entry, self._field(name, where), where)
+            before = len(self.mistakes)
+            field = self._field(name, where)
+            given[name] = self.entries.quantity(entry, field, where)
+            if field is not None:
+                self._check_limits(field, given[name], before, where)
             if name in axes:
                 self.mistakes.add(where, f"{name} is an axis as well; keep one of the two")
         return given
+
+    def _check_limits(self, field: Field, given: float | NDArray[np.float64], before: int, where: str) -> None:
+        """A fixed value outside of what its field declares would refuse every cell; its default is always allowed."""
+        values = np.atleast_1d(given)
+        inside = (values > field.lower if field.open_lower else values >= field.lower) & (values <= field.upper)
+        bad = values[~(inside & (np.round(values) == values) if field.integer else inside) & (values != field.default)]
+        if len(bad) and len(self.mistakes) == before:
+            unit = f" {field.unit}" if field.unit != "1" else ""
+            kind = "a whole number " * field.integer
+            self.mistakes.add(where, f"expected {kind}{limits(field) or 'a number'}{unit}, found {bad[0]:.6g}{unit}")
 
     def _complete(
         self, axes: Mapping[str, Axis], given: Mapping[str, float | NDArray[np.float64]]

@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from kernels.interface import Field
 from sweep.system.errors import Mistake, StudyError
 
 
@@ -142,6 +143,17 @@ def listed(words: Iterable[str], quote: bool = False, word: str = "or") -> str:
 def quoted(words: Iterable[str]) -> str:
     """'"a", "b"'."""
     return ", ".join(f'"{word}"' for word in words)
+
+
+def limits(field: Field) -> str:
+    """'> 0', '0 to 1', or the words it takes."""
+    if field.choices:
+        return listed(field.choices, quote=True)
+    low = f"{'>' if field.open_lower else '>='} {field.lower:g}" if field.lower > -math.inf else ""
+    # the last float64 below a round number is how a kernel leaves that number out
+    below = float(f"{field.upper:g}") > field.upper
+    high = f"{'<' if below else '<='} {field.upper:g}" if field.upper < math.inf else ""
+    return ", ".join(filter(None, [low, high]))
 
 
 def did_you_mean(found: Any, words: Iterable[str]) -> str:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from sweep.study.keys import Reader
-from sweep.study.mistakes import did_you_mean
+from sweep.study.mistakes import did_you_mean, show
 from sweep.study.model import Axis, Study
 from sweep.system.errors import Mistake, StudyError, SweepError
 
-__all__ = ["Axis", "Study", "build_study", "read_study"]
+__all__ = ["Axis", "Study", "as_study", "build_study", "read_study"]
 
 LARGEST_TEXT = 50_000_000
 """Bytes of a study file."""
@@ -68,9 +69,26 @@ def build_study(*, allow_import: bool = False, **keys: Any) -> Study:
     return Reader("study", Path(), allow_import).study(keys, "")
 
 
+def as_study(given: Study | Mapping[str, Any]) -> Study:
+    """A study as it is, or made of the keys of `build_study`; a kernel of one's own is not imported for a mapping.
+
+    Raises
+    ------
+    SweepError
+        It is neither, or has mistakes.
+    """
+    if isinstance(given, Study):
+        return given
+    if not isinstance(given, Mapping):
+        raise SweepError(f"expected a study, found {show(given)}; read a file with sweep.read_study")
+    return Reader("study", Path(), False).study(given, "")
+
+
 def _read_text(path: Path) -> str:
     if path.is_dir():
         raise SweepError(f"{path} is a folder; name a study file in it, e.g. {path / 'study.toml'}")
+    if path.exists() and not path.is_file():
+        raise SweepError(f"{path} is no regular file; a pipe could be waited for without end")
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST_TEXT + 1)

@@ -11,11 +11,14 @@ import itertools
 from collections.abc import Iterator
 from decimal import Context, Decimal, localcontext
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 LARGEST_AXIS = 10_000_000
+LONGEST_LINE = 1_000_000
+"""Characters of a line of a csv file."""
 DIGITS = Context(prec=50)
 
 
@@ -72,19 +75,19 @@ def read_column(path: Path, name: str) -> list[tuple[int, str]]:
         With the text for the user.
     """
     rows = _rows(path)
-    headings = [cell.strip() for cell in rows[0][1]] if rows else []
-    if name in headings:
-        rows, column = rows[1:], headings.index(name)
-    elif len(headings) > 1:
+    first = next(rows, (1, []))
+    headings = [cell.strip() for cell in first[1]]
+    if name not in headings and len(headings) > 1:
         raise ValueError(f'{path} has no column "{name}"; its first line is {",".join(headings)[:60]}')
-    else:
-        column = 0
-    for line, row in rows:
-        if len(row) != max(len(headings), 1):
-            raise ValueError(f"{path}, line {line}: expected {max(len(headings), 1)} columns, found {len(row)}")
-    if not rows:
+    column = headings.index(name) if name in headings else 0
+    cells = []
+    for line, row in rows if name in headings or not headings else itertools.chain([first], rows):
+        if len(row) != len(headings):
+            raise ValueError(f"{path}, line {line}: expected {len(headings)} columns, found {len(row)}")
+        cells.append((line, row[column].strip()))
+    if not cells:
         raise ValueError(f"{path} holds no values")
-    return [(line, row[column].strip()) for line, row in rows]
+    return cells
 
 
 def numbered_columns(path: Path, name: str) -> int:
@@ -95,25 +98,33 @@ def numbered_columns(path: Path, name: str) -> int:
     ValueError
         With the text for the user.
     """
-    rows = _rows(path)
-    headings = [cell.strip() for cell in rows[0][1]] if rows else []
+    headings = [cell.strip() for cell in next(_rows(path), (1, []))[1]]
     count = next(i for i in itertools.count() if f"{name}_{i + 1}" not in headings)
     if not count:
         raise ValueError(f"{path} has no columns {name}_1, {name}_2, ...; its first line is {','.join(headings)[:60]}")
     return count
 
 
-def _rows(path: Path) -> list[tuple[int, list[str]]]:
+def _lines(file: TextIO) -> Iterator[str]:
+    """Lines of a text, none of which fills the memory. Raises ValueError."""
+    while line := file.readline(LONGEST_LINE + 1):
+        if len(line) > LONGEST_LINE:
+            raise ValueError(f"a line is longer than {LONGEST_LINE:,} characters")
+        yield line
+
+
+def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Numbers and cells of the lines that are no comments. Raises ValueError with the text for the user."""
     if path.exists() and not path.is_file():
         raise ValueError(f"{path} cannot be read: it is no regular file")
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             # a comment becomes an empty line before csv sees it, since a quotation mark in it would open a field
-            lines = ("\n" if line.startswith("#") else line for line in file)
+            lines = ("\n" if line.startswith("#") else line for line in _lines(file))
             reader = csv.reader(lines, skipinitialspace=True)
             rows = ((reader.line_num, row) for row in reader if any(cell.strip() for cell in row))
             # a heading and one value too many suffice to know that there are too many
-            return list(itertools.islice(rows, LARGEST_AXIS + 2))
+            yield from itertools.islice(rows, LARGEST_AXIS + 2)
     except OSError as error:
         raise ValueError(f"{path} cannot be read: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error, ValueError) as error:

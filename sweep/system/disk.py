@@ -89,12 +89,19 @@ def forget(fd: int) -> None:
 
 
 def sync_folder(path: Path) -> None:
-    """Returns when the names in a folder are on the disk. Raises OSError."""
+    """Returns when the names in a folder, or the bytes of a file, are on the disk. Raises OSError."""
     fd = open_file(path, os.O_RDONLY)
     try:
         fsync(fd)
     finally:
         os.close(fd)
+
+
+def sync_tree(path: Path) -> None:
+    """Returns when a file, or a folder and all that is in it, is on the disk. Raises OSError."""
+    for inner in path.iterdir() if path.is_dir() else ():
+        sync_tree(inner)
+    sync_folder(path)
 
 
 def publish(pieces: Iterable[Any], temporary: Path, final: Path) -> None:
@@ -116,7 +123,7 @@ def publish(pieces: Iterable[Any], temporary: Path, final: Path) -> None:
 
 @contextlib.contextmanager
 def replacing(target: Path) -> Iterator[Path]:
-    """A file beside `target` to write to, or to put a folder at; it takes the place of `target` at the end.
+    """A file beside `target` to write to, or to put a folder at; synced, it takes the place of `target` at the end.
 
     Raises SweepError where the system refuses; what was there before then stays.
     """
@@ -124,15 +131,36 @@ def replacing(target: Path) -> Iterator[Path]:
     try:
         part.touch()  # says in plain words that there is no such folder, or no permission
         yield part
-        if target.is_dir():
-            shutil.rmtree(target)
-        rename(part, target)
+        sync_tree(part)
+        _take_place(part, target)
+        sync_folder(target.parent)
     except OSError as fault:
         raise SweepError(f"{target} cannot be written: {fault.strerror or fault}") from None
     finally:
-        if part.is_dir():
-            shutil.rmtree(part, ignore_errors=True)
-        part.unlink(missing_ok=True)
+        _discard(part)
+
+
+def _discard(path: Path) -> None:
+    """Removes a file or a folder, if it is there."""
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _take_place(part: Path, target: Path) -> None:
+    """Renames `part`. A folder cannot be replaced in one step: the old one is kept until the new one has its place."""
+    if not target.exists() or not (target.is_dir() or part.is_dir()):
+        rename(part, target)
+        return
+    old = part.with_suffix(".old")
+    rename(target, old)
+    try:
+        rename(part, target)
+    except BaseException:
+        old.rename(target)
+        raise
+    _discard(old)
 
 
 def try_lock(fd: int) -> bool:

@@ -5,13 +5,20 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from sweep.system.forecast import Forecast
+
+from sweep.system.table import printable
 
 QUIET_SECONDS = 1.0
 """A run that ends sooner says nothing."""
 LINE_SECONDS = 30.0
 LINE_SHARE = 0.05
 REDRAW_SECONDS = 0.1
+AGREE = 1.5
+"""Speeds so far and to come are both told where one is so many times the other."""
 
 
 class Progress:
@@ -27,8 +34,10 @@ class Progress:
         Begins every line.
     done : int
         Cells that were there before.
-    work : float
-        Estimated cost of the cells to come, in any unit; None: as many as there are cells.
+    forecast : Forecast, optional
+        Of the blocks to come; None: every cell takes as long.
+    ending : callable, optional
+        Seconds that are needed when all cells are computed.
     clock : callable
         Seconds.
     """
@@ -39,12 +48,13 @@ class Progress:
         stream: TextIO | None,
         name: str = "sweep",
         done: int = 0,
-        work: float | None = None,
+        forecast: Forecast | None = None,
         clock: Callable[[], float] = time.monotonic,
+        ending: Callable[[], float] = float,
     ) -> None:
         self.total, self.done, self.computed = total, done, 0
-        self._stream, self._name, self._clock = stream, name, clock
-        self._work, self._worked = float(total - done) if work is None else work, 0.0
+        self._stream, self._name, self._clock = stream, printable(name), clock
+        self._forecast, self._ending = forecast, ending
         self._live = stream is not None and stream.isatty()
         self._pause = REDRAW_SECONDS if self._live else LINE_SECONDS
         self._begun = clock()
@@ -62,17 +72,24 @@ class Progress:
         """Cells per second computed here."""
         return self.computed / max(self.seconds, 1e-9)
 
-    def add(self, cells: int, work: float | None = None) -> None:
+    def add(self, cells: int) -> None:
         """Counts cells as done."""
         self.done += cells
         self.computed += cells
-        self._worked += cells if work is None else work
         self.tick()
 
     def again(self, cells: int) -> None:
         """Takes back cells that have to be computed once more."""
         self.done -= cells
-        self._work += cells * self._work / max(self.total, 1)
+
+    @property
+    def left(self) -> float | None:
+        """Seconds that are left, rather too many; None where nothing is known yet."""
+        if self._forecast is not None:
+            left = self._forecast.left
+        else:
+            left = self.seconds * (self.total - self.done) / self.computed if self.computed else None
+        return None if left is None else left + self._ending()
 
     def tick(self) -> None:
         """Says something if it is time to."""
@@ -97,7 +114,7 @@ class Progress:
     def end(self) -> None:
         """Says how it ended, where anything was said before."""
         if self._told is not None:
-            self._say(f"{self._counts()}, {self.rate:,.0f} cells/s, took {duration(self.seconds)}")
+            self._say(f"{self._counts()}, {speed(self.rate)}, took {duration(self.seconds)}")
         self._end_line()
 
     def stop(self) -> None:
@@ -106,9 +123,16 @@ class Progress:
 
     def line(self) -> str:
         """What is told now: `12,300/1,000,000 cells (1.2 %), 5,100 cells/s, 3 min left`."""
-        left = self.seconds * (self._work - self._worked) / self._worked if self._worked > 0 else None
-        tail = "" if left is None else f", {self.rate:,.0f} cells/s, {duration(max(left, 0.0))} left"
+        left = self.left
+        tail = "" if left is None else f", {self._speed(left)}, {duration(left)} left"
         return self._counts() + tail
+
+    def _speed(self, left: float) -> str:
+        """Cells per second; where the cells to come are dearer or cheaper, also theirs, so that it tells the same."""
+        to_come = (self.total - self.done) / max(left, 1e-9)
+        if self.done == self.total or 1 / AGREE < to_come / max(self.rate, 1e-9) < AGREE:
+            return speed(self.rate)
+        return f"{speed(self.rate)} so far, {speed(to_come).removesuffix(' cells/s')} to come"
 
     def _counts(self) -> str:
         share = 100 * self.done / self.total if self.total else 100.0
@@ -160,6 +184,11 @@ def stream_of(progress: bool | TextIO | None) -> TextIO | None:
     if progress is None or progress is True:
         return sys.stderr
     return None if progress is False else progress
+
+
+def speed(rate: float) -> str:
+    """`5,100 cells/s`, `0.25 cells/s`."""
+    return f"{rate:,.0f} cells/s" if rate >= 9.5 else f"{rate:.2g} cells/s"
 
 
 def duration(seconds: float) -> str:

@@ -5,6 +5,28 @@ from __future__ import annotations
 import shutil
 import textwrap
 from collections.abc import Iterable, Sequence
+from typing import Any
+
+CONTROL = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160)) if chr(code) not in "\n\t"}
+"""Characters that a terminal takes for commands, and what is shown of them."""
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""A spreadsheet takes a cell that begins so for a formula."""
+
+
+def printable(text: str) -> str:
+    """A text from elsewhere, which a terminal shows and does not obey."""
+    return text.translate(CONTROL).encode(errors="backslashreplace").decode()
+
+
+def cell(value: Any) -> Any:
+    """A value of a csv table; a text that a spreadsheet would run begins with an apostrophe, a number does not."""
+    if not isinstance(value, str) or not value.startswith(FORMULA):
+        return value
+    try:
+        float(value)
+    except ValueError:
+        return f"'{value}"
+    return value
 
 
 def columns(rows: Iterable[Sequence[str]], indent: str = "  ") -> str:

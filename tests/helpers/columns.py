@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from mpmath import mp, mpf
 
-from kernels.interface import Kernel
+from kernels.interface import FIRST_REFUSAL, Kernel, Status
 
 
 def columns_of(kernel: Kernel, parameters, named):
@@ -25,8 +25,13 @@ def columns_of(kernel: Kernel, parameters, named):
     return [np.array(np.broadcast_to(v, (*cells, length) if array else cells)) for v, array in given]
 
 
-def solve(kernel: Kernel, method: str, *parameters, rtol=1e-9, along=(), **named):
+def solve(kernel: Kernel, method: str, *parameters, rtol=1e-9, along=(), asked=None, **named):
     """Outputs by name, and status, of one method; nothing is checked before or filled after."""
+    return estimated(kernel, method, *parameters, rtol=rtol, along=along, asked=asked, **named)[:2]
+
+
+def estimated(kernel: Kernel, method: str, *parameters, rtol=1e-9, along=(), asked=None, **named):
+    """The same, and the error that the method estimates for the outputs asked for (None: all), NaN if it does not."""
     columns = columns_of(kernel, parameters, named)
     n = len(columns[0])
     lengths = {field.name: len(values) for field, values in zip(kernel.along, along, strict=True)}
@@ -35,16 +40,26 @@ def solve(kernel: Kernel, method: str, *parameters, rtol=1e-9, along=(), **named
     outputs = {f.name: np.full((n, *(lengths[d] for d in f.dims)), np.nan) for f in kernel.outputs}
     status = np.full(n, 99, np.int8)
     tolerances = np.ascontiguousarray(np.broadcast_to(np.asarray(rtol, float), (n,)))
-    kernel.method(method).solve(*columns, tolerances, *along, *outputs.values(), status)
-    return outputs, status
+    error = np.full(n, np.nan)
+    if kernel.method(method).estimates:
+        wanted = asked_for(kernel, asked)
+        kernel.method(method).solve(*columns, tolerances, *along, wanted, *outputs.values(), error, status)
+        status[~(error <= tolerances) & (status < FIRST_REFUSAL)] = Status.INACCURATE
+    else:
+        kernel.method(method).solve(*columns, tolerances, *along, *outputs.values(), status)
+    return outputs, status, error
+
+
+def asked_for(kernel: Kernel, names):
+    """1 for the outputs of these names; None: for all."""
+    return np.array([names is None or f.name in names for f in kernel.outputs], np.uint8)
 
 
 def bounds(kernel: Kernel, method: str, *parameters, asked=None, rtol=1e-9, along=(), **named):
     """The error bound of one method for every cell."""
     columns = columns_of(kernel, parameters, named)
     out = np.full(len(columns[0]), np.nan)
-    asked = np.array([f.name in (asked or [o.name for o in kernel.outputs]) for f in kernel.outputs], np.uint8)
-    kernel.method(method).bound(*columns, np.full(len(out), rtol), *along, asked, out)
+    kernel.method(method).bound(*columns, np.full(len(out), rtol), *along, asked_for(kernel, asked), out)
     return out
 
 

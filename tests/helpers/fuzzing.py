@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import random
 import shutil
+import struct
 from pathlib import Path
 
 from havoc import flip, run, study
 
 from sweep.cells.fingerprint import fingerprint
 from sweep.cli import main
+from sweep.store import seal
 from sweep.study.read import read_study
 from sweep.system.errors import SweepError
 
@@ -96,7 +99,27 @@ def fuzz_result(rng: random.Random, whole: Path, folder: Path) -> list[int]:
         flip(rng, path)
     if rng.random() < 0.1:
         path.write_bytes(path.read_bytes()[: rng.randrange(path.stat().st_size)])
-    return [quietly("show", path), quietly("verify", path), quietly("fit", path, "--y", "fall_time", "--x", "height")]
+    if rng.random() < 0.5:
+        forge(path)
+    return [
+        quietly("show", path),
+        quietly("verify", path),
+        quietly("fit", path, "--y", "fall_time", "--x", "height"),
+        quietly("export", path, "-o", folder / "damaged.csv", "--force"),
+    ]
+
+
+def forge(path: Path) -> None:
+    """Seals a result anew, as somebody who knows how would; one without a seal stays as it is."""
+    with path.open("r+b") as file:
+        behind = seal.length(file.fileno())
+        if behind:
+            end = path.stat().st_size - behind
+            words = os.pread(file.fileno(), behind - seal.TAIL, end)
+            file.truncate(end)
+            file.seek(end)
+            regions = [(b, e) for b, e in struct.iter_unpack("<qq", words) if 0 <= b <= e <= end]
+            file.write(seal.seal(regions, file.fileno()))
 
 
 def quietly(*argv: object) -> int:

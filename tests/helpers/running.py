@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from hypothesis import strategies as st
 
 from sweep.cells.solve import Solver
 from sweep.runs.run import run
@@ -59,6 +60,7 @@ def interrupted(study, output):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Solver, "solve", failing)
+        patch.setattr("sweep.system.forecast.Forecast.order", lambda self: iter(range(self.blocks)))
         patch.setattr("sweep.runs.session.order", lambda sample, blocks, first: np.arange(blocks.count))
         with pytest.raises(SweepError, match="stop here"):
             quiet(study, output, block_cells=5, workers=1)
@@ -117,3 +119,24 @@ def wait_for(condition, process):
         assert process.poll() is None, process.stderr.read()
         assert time.monotonic() < deadline
         time.sleep(0.002)
+
+
+def keys(size):
+    """Whatever xarray may be asked for along a dimension."""
+    ends = st.integers(-size, size)
+    slices = st.builds(slice, st.none() | ends, st.none() | ends, st.none() | st.sampled_from([1, 1, 1, 2]))
+    return (
+        slices
+        | st.just(slice(None, None, -1))
+        | st.integers(-size, size - 1)
+        | st.lists(st.integers(0, size - 1), max_size=4)
+    )
+
+
+def flip(path, place, bit=0):
+    """Changes one bit of a file."""
+    with path.open("r+b") as file:
+        file.seek(place)
+        byte = file.read(1)[0]
+        file.seek(place)
+        file.write(bytes([byte ^ (1 << bit)]))

@@ -22,5 +22,16 @@ def test_the_study_to_begin_with_runs(name, tmp_path):
     assert all(np.isfinite(ds[output.name].where(valued)).any() for output in study.asked if output.name not in LOCKED)
 
 
+@pytest.mark.parametrize("name", sorted(KERNELS))
+def test_what_the_study_to_begin_with_varies_grows_about_the_example(name, tmp_path):
+    write_starter(name, tmp_path / "study.toml")
+    study = sweep.read_study(tmp_path / "study.toml")
+    for values in (*study.along.values(), *(axis.values for axis in study.axes.values())):
+        assert (np.diff(values) > 0).all()
+    for axis, values in ((a, study.axes[a].values) for a in study.axes if a in study.kernel.example):
+        assert np.isscalar(study.kernel.example[axis])
+        assert values.min() <= study.kernel.example[axis] <= values.max()
+
+
 LOCKED = {"theta_lock", "theta_lock_outer"}
 """Given only where a linkage locks."""

@@ -22,6 +22,18 @@ HALF_A = 1.39341841440363426389
 """The point of exponent -1/2 to 20 digits: q - tanh q = 1/alpha and (1 - tanh(q)/q)/tanh(q)^2 = 1/2 at once."""
 
 
+@pytest.mark.parametrize(
+    "name", [p.stem for p in STUDIES.glob("*.py") if "return report(" in p.read_text() and p.stem != "_common"]
+)
+def test_a_script_is_used_as_its_head_and_its_study_say(name, capsys):
+    module = importlib.import_module(name)
+    assert module.main([]) == 2
+    words = capsys.readouterr().err.removeprefix("use: python ").split()[1:]
+    for text in (module.__doc__, (STUDIES / f"{name}.toml").read_text().replace("#", "")):
+        used = re.search(rf"python studies/{name}\.py((?:\s+[\w./\\]+\.(?:h5|toml)|\s+\\\n)+)", text)
+        assert [Path(word).name for word in used[1].replace("\\", "").split()] == words
+
+
 @pytest.fixture(scope="module")
 def scaling():
     """The module studies/foliot_scaling.py."""

@@ -1,7 +1,9 @@
 """The command line: what it prints, and that no fault of a user or a machine ends in a traceback."""
 
+import io
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -15,6 +17,7 @@ from toy_studies import HEAD
 
 import sweep
 from sweep import cli
+from sweep.system.progress import Progress
 
 STUDY = """# How fast does a stone fall?
 title = "Falling stones"
@@ -94,7 +97,7 @@ def test_a_study_without_foreign_units_is_read_without_pint(here):
 def test_every_public_name_is_there():
     for name in sweep.__all__:
         assert callable(getattr(sweep, name)), name
-        assert name in dir(sweep)
+    assert dir(sweep) == sorted(sweep.__all__)
 
 
 def test_an_unknown_name_is_no_attribute():
@@ -157,6 +160,15 @@ def test_plan_tells_the_number_of_cells(here, call):
     assert "124" in out
 
 
+def test_plan_of_what_cannot_fit_is_a_mistake(here, call, monkeypatch):
+    usage = shutil.disk_usage(".")
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage._replace(free=10))
+    code, out, err = call("plan", "stones.toml", "--allow-import")
+    assert code == 2
+    assert "Falling stones" in out
+    assert "stones.toml: the disk is too small: " in err
+
+
 def test_run_writes_beside_the_caller_and_counts_what_failed(here, call):
     code, out, err = call("run", "stones.toml", "--allow-import")
     assert (code, err) == (0, "")
@@ -183,6 +195,23 @@ def test_force_computes_anew(done, call):
     assert code == 0
     assert "done before" not in out
     assert before != (Path("stones.h5").stat().st_ino, Path("stones.h5").stat().st_mtime_ns)
+
+
+def test_what_others_have_written_does_not_command_the_terminal(here, call):
+    title = "\\u001b]0;owned\\u0007\\u009b2JStones"
+    Path("stones.toml").write_text(STUDY.replace("Falling stones", title) + "\n")
+    for argv in (("plan", "stones.toml", "--allow-import"), ("run", "stones.toml", "--allow-import")):
+        assert call(*argv)[0] == 0
+    code, out, _ = call("show", "stones.h5")
+    assert code == 0
+    assert r"\x1b]0;owned\x07\x9b2JStones" in out
+    assert call("plan", "\x1b[2J\udcff.toml") == (2, "", "\\x1b[2J\\udcff.toml: no such file\n")
+
+
+def test_progress_is_told_without_commands_to_the_terminal():
+    stream = io.StringIO()
+    Progress(1, stream, "\x1b[2Jstones").note("begun")
+    assert "\x1b" not in stream.getvalue()
 
 
 def test_the_result_of_another_study_is_not_overwritten(done, call):
@@ -333,6 +362,8 @@ def test_plot_writes_a_picture(done, call):
         (("run", "stones.h5"), "is a result, not a study; look at it with: sweep show stones.h5"),
         (("show", "stones.toml"), "is a study, not a result; compute it with: sweep run stones.toml"),
         (("show", "no.h5"), "no.h5"),
+        (("plan", "pipe.toml"), "pipe.toml is no regular file"),
+        (("run", "pipe.toml"), "pipe.toml is no regular file"),
         (("run", "stones.toml"), "allow it with --allow-import"),
         (("run", "stones.toml", "--allow-import", "--workers", "0"), "workers"),
         (("run", "stones.toml", "--allow-import", "-o", "nowhere/a.h5"), "nowhere"),
@@ -342,6 +373,7 @@ def test_plot_writes_a_picture(done, call):
     ],
 )
 def test_a_mistake_ends_in_one_message_and_status_2(here, call, argv, message):
+    os.mkfifo("pipe.toml")
     Path("broken.toml").write_text('kernel = "toy:KERNEL"\nrtol = 2\n')
     code, out, err = call(*argv)
     assert (code, out) == (2, "")

@@ -74,18 +74,33 @@ def test_on_a_resonance_without_damping_the_loss_of_digits_is_told():
                 assert status == Status.OK
 
 
-def test_where_the_receptance_is_infinite_the_cell_is_out_of_range():
+@pytest.mark.parametrize("count", [2, 7, 33])
+def test_where_a_receptance_is_infinite_it_alone_is_left_out(count):
+    J, k, h = chains(3, 2, 0.1)
+    k[:, -1] = h[:, -1] = 0.0
+    frequency = np.append(np.geomspace(1e-9, 3.0, count - 1), 0.0)
+    outputs, status = receptances(J, k, h, 1, 3, frequency)
+    assert (status == Status.PARTLY_OUT_OF_RANGE).all()
+    for values in outputs.values():
+        assert np.isnan(values[:, -1]).all()
+    for i in range(0, CELLS, 6):
+        assert errors(outputs, i, J[i], k[i], h[i], 1, 3, frequency[:-1]).max() < 1e-12
+    with_it, _ = receptances(J, k, h, 1, 3, frequency[:-1])
+    assert all(np.array_equal(with_it[name], outputs[name][:, :-1]) for name in outputs)
+
+
+def test_where_no_receptance_is_finite_the_cell_is_out_of_range():
     one = [np.array([[1.0]])] * 2
     assert receptances(*one, 0.0 * one[0], 1, 1, [0.1, 1 / (2 * np.pi)])[1][0] in (
         Status.INACCURATE,
-        Status.OUT_OF_RANGE,
+        Status.PARTLY_OUT_OF_RANGE,
     )
     J, k, h = chains(3, 2, 0.1)
     k[:, -1] = h[:, -1] = 0.0
-    _, status = receptances(J, k, h, 1, 3, [0.0, 1.0])
-    assert (status == Status.OUT_OF_RANGE).all()
-    _, status = receptances(J, k, h, 1, 3, [1e-9, 1.0])
-    assert (status == Status.OK).all()
+    assert (receptances(J, k, h, 1, 3, [0.0])[1] == Status.OUT_OF_RANGE).all()
+    assert (receptances(J, k, h, 1, 3, [1e-9])[1] == Status.OK).all()
+    _, status = receptances(J, k, 0.0 * h, 1, 3, [0.0, 0.01], rtol=1e-18)
+    assert (status == Status.INACCURATE).all()
 
 
 def test_at_rest_the_receptance_is_the_flexibility_to_ground():

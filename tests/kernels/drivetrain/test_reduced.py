@@ -341,14 +341,19 @@ def test_what_cannot_run_is_refused_by_name(cell, status):
     assert verdict(**cell) == status
 
 
-def test_a_result_that_no_float64_can_hold_is_refused():
+def test_a_result_that_no_float64_can_hold_is_left_out():
     chain = {"J": np.array([1e300, 1e300]), "k": np.array([1e-300, 1e-300]), "h": np.zeros(2)}
     outputs, status = reduced("rivin", chain, n_keep=1, f_max=1.0)
     assert status[0] == Status.OK
     truth = oracles.rivin(*chain.values(), oracles.strict_steps(*chain.values(), 1))
     assert relative_error(outputs["frequency"][0, :1], oracles.chain_frequencies(*truth[:2]))[0] < 1e-14
     huge = {"J": np.full(3, 1.7e308), "k": np.ones(3), "h": np.zeros(3)}
-    assert reduced("rivin", huge, n_keep=1)[1][0] == Status.OUT_OF_RANGE  # the sum of the inertias
+    outputs, status = reduced("rivin", huge, n_keep=1)
+    assert status[0] == Status.PARTLY_OUT_OF_RANGE
+    assert np.isnan(outputs["J_kept"][0, 0])  # the sum of the inertias
+    small, _ = reduced("rivin", huge | {"J": np.full(3, 1.7)}, n_keep=1)
+    for name, scale in (("frequency", 10.0**-154), ("k_kept", 1.0), ("damping", 1.0)):
+        np.testing.assert_allclose(outputs[name][0, 0], small[name][0, 0] * scale, rtol=1e-13)
 
 
 def test_more_digits_than_there_are_is_inaccurate():

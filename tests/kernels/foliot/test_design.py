@@ -63,14 +63,24 @@ def test_an_amplitude_that_does_not_exceed_the_switching_angle_is_refused(amplit
 @pytest.mark.parametrize(
     ("period", "amplitude", "phi0"),
     [
-        (1e-300, 2.0, 1.0),  # mu too large
         (1.0, 1e150, 1.0),  # all of them
-        (1.7e308, 1.5e308, 5e307),  # a too small
         (1.0, 55.0, 1e-101),  # 1/alpha too small
     ],
 )
 def test_results_beyond_float64_are_out_of_range(period, amplitude, phi0):
     assert solve(FOLIOT_DESIGN, "newton", [period], [amplitude], [phi0])[1][0] == Status.OUT_OF_RANGE
+
+
+@pytest.mark.parametrize(("cell", "missing"), [((1e-300, 2.0, 1.0), "mu"), ((1.7e308, 1.5e308, 5e307), "a")])
+def test_where_only_friction_or_only_torque_is_beyond_float64_the_other_is_given(cell, missing):
+    outputs, status = solve(FOLIOT_DESIGN, "newton", *([v] for v in cell))
+    shape = [cell[1] / cell[2]], [1.0]
+    unit, _ = solve(FOLIOT_DESIGN, "newton", [1.0], *shape)
+    assert status[0] == Status.PARTLY_OUT_OF_RANGE
+    assert np.isnan(outputs[missing][0])
+    with mp.workdps(30):
+        true = unit["a"][0] / mpf(cell[0]) if missing == "mu" else unit["mu"][0] / mpf(cell[0]) ** 2 * mpf(cell[2])
+    assert relative_error(outputs["a" if missing == "mu" else "mu"], [true])[0] < 3e-15
 
 
 def test_friction_and_torque_are_right_to_1e_15_down_to_overshoots_of_a_few_ulp():

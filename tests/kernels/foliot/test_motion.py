@@ -75,3 +75,17 @@ def test_it_refuses_what_the_cycle_refuses():
 def test_what_no_float_can_hold_is_out_of_range():
     _, status = solve(FOLIOT_MOTION, "closed", [1.7e308], [1.7e308], [1e-3], along=[np.array([0.25])])
     assert status[0] == Status.OUT_OF_RANGE
+
+
+@pytest.mark.parametrize("method", ["closed", "segments"])
+@pytest.mark.parametrize(
+    ("cell", "missing", "kept"),
+    [((1e-300, 1e-300, 1e10), "speed", "angle"), ((1.7e308, 1.7e308, 1.0), "angle", "speed")],
+)
+def test_of_angle_and_speed_the_one_that_a_float64_can_hold_is_given(method, cell, missing, kept):
+    phase = np.array([0.0, 0.1, 0.7])
+    outputs, status = solve(FOLIOT_MOTION, method, *([v] for v in cell), along=[phase])
+    assert status[0] == Status.PARTLY_OUT_OF_RANGE
+    assert np.isnan(outputs[missing]).all()
+    small, _ = solve(FOLIOT_MOTION, method, *([v] for v in (cell[0] / cell[1], 1.0, cell[2])), along=[phase])
+    np.testing.assert_allclose(outputs[kept] / cell[1], small[kept], rtol=1e-13)

@@ -344,3 +344,10 @@ def test_what_cannot_run_is_refused_by_name(named, status):
 def test_what_no_float_can_hold_is_out_of_range():
     _, _, status = start([1.7e308, 1e-300], [1e-10, 1e300], a=[1e-3, 1.0], phi_start=[-1e308, 0.0])
     assert (status == Status.OUT_OF_RANGE).all()
+
+
+def test_where_only_a_speed_is_beyond_float64_its_time_is_given():
+    times, speeds, status = start([1.7e308, 1.0], [1.7e308, 1.0], a=[1e-3, 1e-3])
+    assert status.tolist() == [Status.PARTLY_OUT_OF_RANGE, Status.OK]
+    assert np.isnan(speeds[0]).all()
+    assert np.array_equal(times[0], times[1])

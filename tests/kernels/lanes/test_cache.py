@@ -1,6 +1,8 @@
 """Machine code on the disk: never stale, never in the way."""
 
+import json
 import os
+import pickle
 import shutil
 import subprocess
 import sys
@@ -12,6 +14,8 @@ import pytest
 from numba import float64
 from numba.core.errors import TypingError
 
+from kernels.catalogue import KERNELS
+from kernels.lanes.cache import FOLDER
 from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.jit import COMPILED, jit
 
@@ -70,13 +74,15 @@ def test_an_edited_source_is_compiled_anew_wherever_the_cache_is(tmp_path, varia
 
 
 def test_code_of_other_sources_goes_when_it_was_not_used_for_long(tmp_path):
-    old, young = tmp_path / "foliot" / "old", tmp_path / "foliot" / "young"
-    for folder in (old, young):
-        folder.mkdir(parents=True)
-    os.utime(old, (time.time() - 40 * 24 * 3600,) * 2)
+    old, young, alien = (tmp_path / "foliot" / name for name in ("0" * 20, "1" * 20, "letters"))
+    for folder in (old, young, alien):
+        folder.mkdir(parents=True, mode=0o700)
+    for folder in (old, alien):
+        os.utime(folder, (time.time() - 40 * 24 * 3600,) * 2)
     run(PERIOD, tmp_path)
     assert not old.exists()
     assert young.exists()
+    assert alien.exists()
 
 
 def test_a_kernel_of_the_users_own_is_not_cached():
@@ -114,3 +120,94 @@ def test_what_is_written_for_a_scene_of_ones_own_is_compiled_once(tmp_path):
     status, hits = run(OWN_SCENE, tmp_path)
     assert status == "0"
     assert int(hits) > 0
+
+
+@pytest.fixture(scope="module")
+def compiled_again():
+    """For each kernel what a second process compiles."""
+    command = [sys.executable, "-W", "error", Path(__file__).with_name("compiling.py"), *KERNELS, "own_scene:KERNEL"]
+    first, second = (subprocess.run(command, cwd=ROOT, capture_output=True, text=True) for _ in range(2))
+    assert first.returncode == second.returncode == 0, first.stderr + second.stderr
+    return json.loads(second.stdout)
+
+
+@pytest.mark.skipif(FOLDER is None, reason="no folder for compiled code")
+@pytest.mark.parametrize("name", [*KERNELS, "own_scene:KERNEL"])
+def test_a_second_process_compiles_nothing_of_any_kernel_and_method(name, compiled_again):
+    assert compiled_again[name] == []
+
+
+def hits_and_errors(cache, **more):
+    """As `run`, with what is said on stderr."""
+    env = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"} | {"XDG_CACHE_HOME": str(cache), **more}
+    done = subprocess.run([sys.executable, "-c", PERIOD], env=env, capture_output=True, text=True, cwd=ROOT)
+    return done.stdout.split(), done.stderr
+
+
+@pytest.mark.parametrize("others", [0o020, 0o002])
+@pytest.mark.parametrize("which", ["foliot", "foliot/*"])
+def test_a_folder_that_others_may_write_to_is_not_used(tmp_path, which, others):
+    run(PERIOD, tmp_path)
+    (folder,) = tmp_path.glob(which)
+    folder.chmod(0o700 | others)
+    (status, hits, used), said = hits_and_errors(tmp_path)
+    assert (status, hits, used) == ("0", "0", "None")
+    assert said.splitlines() == [
+        f"foliot compiles without {folder}: it belongs to somebody else, or others may write to it"
+    ]
+
+
+@pytest.mark.parametrize("kind", ["*.nbi", "*.nbc"])
+def test_a_file_that_others_may_write_to_is_not_read(tmp_path, kind):
+    run(PERIOD, tmp_path)
+    (path,) = tmp_path.rglob(kind)
+    path.write_bytes(pickle.dumps(Trap(tmp_path / "sprung")))
+    path.chmod(0o620)
+    (status, hits, _), said = hits_and_errors(tmp_path)
+    assert (status, hits) == ("0", "0")
+    assert str(path) in said
+    assert not (tmp_path / "sprung").exists()
+    assert run(PERIOD, tmp_path)[:2] == ["0", "1"]
+
+
+class Trap:
+    """Makes a folder where its pickle is read."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return os.mkdir, (str(self.path),)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
+@pytest.mark.parametrize("link", [False, True])
+def test_a_folder_of_somebody_else_is_not_used(tmp_path, link):
+    if link:
+        (tmp_path / "elsewhere").mkdir(mode=0o700)
+        (tmp_path / "foliot").symlink_to("elsewhere")
+    else:
+        (tmp_path / "foliot").mkdir(mode=0o700)
+    os.chown(tmp_path / "foliot", 65534, 65534, follow_symlinks=False)
+    (status, _, used), said = hits_and_errors(tmp_path)
+    assert (status, used) == ("0", "None")
+    assert "belongs to somebody else" in said
+
+
+def test_what_is_kept_is_the_users_alone_whatever_the_umask(tmp_path):
+    before = os.umask(0)
+    try:
+        assert run(OWN_SCENE, tmp_path) == ["0", "0"]
+    finally:
+        os.umask(before)
+    kept = [tmp_path / "foliot", *(tmp_path / "foliot").rglob("*")]
+    assert not [path for path in kept if path.stat().st_mode & 0o077]
+    assert int(run(OWN_SCENE, tmp_path)[1]) > 0
+
+
+def test_a_scenes_module_is_never_run_from_its_file(tmp_path):
+    run(OWN_SCENE, tmp_path)
+    (path,) = tmp_path.rglob("scene_*.py")
+    assert not list(tmp_path.rglob("*.pyc"))
+    path.write_text("raise SystemExit")
+    assert run(OWN_SCENE, tmp_path)[0] == "0"

@@ -1,9 +1,11 @@
 """Machine code of parts and entries, and where vectors lie in memory."""
 
+import gc
 import re
 
 import numpy as np
 import pytest
+from numba import float64
 
 from kernels.lanes.columns import each_cell, entry, entry_of_cells
 from kernels.lanes.groups import GROUP, room
@@ -58,6 +60,42 @@ def test_the_stack_of_machine_code_begins_on_such_a_border():
     wide = re.findall(r"^attributes (#\d+) = \{.* alignstack=64 ", text, re.M)
     defined = [line.split()[-2] for line in text.splitlines() if line.startswith("define") and "NRT" not in line]
     assert set(defined) <= set(wide) != set()
+
+
+@jit_call
+def _applied(function, x):
+    return function(x, x)
+
+
+@jit
+def _apply(i, x, z):
+    z[i] = _applied(_root, x[i])
+
+
+@entry()
+def apply(x, z):
+    """sqrt(x^2 + 1), by a function that is given one."""
+    each_cell(_apply, (x, z))
+
+
+@pytest.mark.skipif(not COMPILED, reason="plain Python has no machine code")
+def test_machine_code_holds_no_address_of_a_function_that_is_given_to_another():
+    columns = np.arange(40.0), np.empty(40)
+    apply(*columns)
+    assert (columns[1] == np.sqrt(columns[0] ** 2 + 1.0)).all()
+    (result,) = _apply.overloads.values()
+    assert "dynamic.globals" not in result.library.get_llvm_str()
+
+
+@pytest.mark.skipif(not COMPILED, reason="plain Python has no machine code")
+@pytest.mark.parametrize("wanted", [True, False])
+def test_garbage_is_collected_after_compiling_as_before(wanted):
+    (gc.enable if wanted else gc.disable)()
+    try:
+        apply.compiled.compile((float64[::1], float64[::1]))
+        assert gc.isenabled() == wanted
+    finally:
+        gc.enable()
 
 
 @entry_of_cells

@@ -283,6 +283,18 @@ def test_what_is_no_ordinary_machine_is_said_by_name(changed, status):
         assert np.isnan(error).all()
 
 
+def test_wear_too_faint_for_a_float64_at_one_radius_is_left_out_there_alone():
+    radius = np.array([1.0, 6.0])
+    here, _, _ = wear(radius, 1e-6)
+    scale = 2.0 ** np.round(np.log2(2.3e-308 / here.min()) - 0.5)
+    faint = here * scale < 2.3e-308
+    assert faint.sum() == 1
+    value, error, status = wear(radius, 1e-6, preston=PAPER["preston"] * 2.0**-500, pressure=2.0**500 * scale)
+    assert status == Status.PARTLY_OUT_OF_RANGE
+    assert np.isnan(value).tolist() == np.isnan(error).tolist() == faint.tolist()
+    assert value[~faint] == pytest.approx(here[~faint] * scale, rel=1e-12)
+
+
 def test_at_a_change_point_the_branch_wears_as_next_to_it():
     change = {"b": 62.0, "d": 38.0, "f": 40.0, "b_angle": -0.5}
     at, _, _ = wear(3.0, 1e-6, e=16.0, **change)

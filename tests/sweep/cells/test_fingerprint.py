@@ -66,6 +66,22 @@ def test_the_versions_of_compiler_and_arrays_are_in_it():
 
 # sources
 
+WRITER = '''
+from importlib import import_module
+
+TEXT = """
+import math, ownscenes.listed
+from ownscenes import (
+    inlaid,
+)
+from {module} import *
+"""
+
+
+def deep():
+    return import_module("ownscenes.called"), import_module(".beside", __package__)
+'''
+
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
@@ -74,7 +90,13 @@ def package(tmp_path, monkeypatch):
     (folder / "deep").mkdir(parents=True)
     texts = {
         "__init__.py": "",
-        "scene.py": "from . import waves\nfrom .deep.far import far\nimport ownscenes.plain\nfrom toy import KERNEL\n",
+        "scene.py": "from . import waves\nfrom .deep.far import far\nimport ownscenes.plain\nfrom toy import KERNEL\n"
+        "from . import writer\n",
+        "writer.py": WRITER,
+        "called.py": "",
+        "beside.py": "",
+        "listed.py": "",
+        "inlaid.py": "",
         "waves.py": "def lazy():\n    from ownscenes import late\n",
         "late.py": "import math, numpy, json\n",
         "plain.py": "",
@@ -110,10 +132,17 @@ def test_every_module_of_the_package_that_the_kernel_imports_counts(package):
         "ownscenes.deep",
         "ownscenes.deep.near",
         "ownscenes.upper",
+        "ownscenes.writer",
+        "ownscenes.called",
+        "ownscenes.beside",
+        "ownscenes.listed",
+        "ownscenes.inlaid",
     }
 
 
-@pytest.mark.parametrize("name", ["scene", "waves", "late", "plain", "deep.far", "deep.near", "upper"])
+@pytest.mark.parametrize(
+    "name", ["scene", "waves", "late", "plain", "deep.far", "deep.near", "upper", "called", "inlaid"]
+)
 def test_an_edit_of_any_of_them_is_named(package, name):
     study = build(kernel="ownscenes.scene:KERNEL", axes={"height": [1.0]})
     old = fingerprint(study)
@@ -141,8 +170,28 @@ def test_the_foliot_counts_all_it_is_made_of_and_nothing_of_numpy():
     assert all(name.partition(".")[0] in ("kernels", "sweep") for name in found)
 
 
-def test_the_choice_of_methods_counts_too():
-    assert set(module.ENGINE) <= sources(fingerprint(build(**BASE)))
+def of_the_engine(study):
+    return {name for name in sources(fingerprint(study)) if name.startswith("sweep.")}
+
+
+def test_what_chooses_methods_and_what_reduces_cells_counts_too():
+    cells = {"sweep.cells.solve", "sweep.cells.grid"}
+    assert of_the_engine(build(**BASE)) == cells
+    assert of_the_engine(build(**BASE, summary={})) == cells | {
+        "sweep.cells.row_blocks",
+        "sweep.cells.reduce",
+        "sweep.cells.contents",
+    }
+
+
+@pytest.mark.parametrize("name", ["solve", "grid", "granules", "reducing", "contents"])
+def test_an_edit_of_what_reduces_cells_is_named(monkeypatch, tmp_path, name):
+    study = build(**BASE, summary={})
+    old, real = fingerprint(study), module._path
+    edited = tmp_path / f"{name}.py"
+    edited.write_bytes(real(f"sweep.{name}").read_bytes() + b"# edited\n")
+    monkeypatch.setattr(module, "_path", lambda asked: edited if asked == f"sweep.{name}" else real(asked))
+    assert difference(old, fingerprint(study)) == [f"source sweep.{name}: changed"]
 
 
 def test_a_kernel_typed_at_the_prompt_has_no_source_and_is_no_fault(monkeypatch):

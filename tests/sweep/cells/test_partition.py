@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from sweep.cells.partition import BLOCK_BYTES, LANES, MOST_BLOCKS, Partition, Sample, order, partition, take_sample
+from sweep.cells.partition import BLOCK_BYTES, LANES, MOST_BLOCKS, Partition, Sample, partition, take_sample
 from sweep.cells.schema import Column
 
 COLUMNS = tuple(Column(name, "i1", (), (), {}) for name in ("status", "method_used"))
@@ -61,19 +61,6 @@ def test_a_dear_single_cell_is_taken_for_one_of_thirty_two_lanes():
     """One cell costs a lane kernel as much as 32; blocks of one cell would cost 32 times too much."""
     assert partition(sample(3.0, 10**5, cells=1), 10**5, 42, 2).cells == LANES
     assert partition(sample(3.0, 80, cells=1), 80, 42, 2).cells == 10
-
-
-def test_even_blocks_come_in_their_order():
-    even = sample([1.0, 1.1, 0.9, 1.2], 1000)
-    assert order(even, Partition(1000, 10)).tolist() == list(range(100))
-
-
-def test_dear_blocks_come_first():
-    uneven = sample(np.geomspace(1, 400, 64), 1000)
-    first = order(uneven, Partition(1000, 10))
-    assert sorted(first) == list(range(100))
-    assert first[0] >= 90
-    assert first[-1] <= 10
 
 
 def test_the_last_block_weighs_less_for_it_is_shorter():

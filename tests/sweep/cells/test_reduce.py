@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import sweep
@@ -293,6 +293,19 @@ def test_strips_cover_the_rows_and_are_cut_at_the_same_places(groups, group, len
         assert (cell - edges[row]) % room == 0
         at += rows * cells
     assert at == edges[stop]
+
+
+@settings(max_examples=25, deadline=None)
+@given(heights=st.integers(1, 70_000), speeds=st.integers(1, 3), over=st.sampled_from(["height", "v0", None]))
+@example(heights=2049, speeds=1, over=None)
+@example(heights=4099, speeds=1, over=None)
+@example(heights=10_001, speeds=1, over=None)
+@example(heights=65_535, speeds=1, over=None)
+@example(heights=4101, speeds=2, over="height")
+def test_what_reducing_takes_is_known_for_any_number_of_cells(heights, speeds, over):
+    axes = {"height": np.arange(1.0, heights + 1), "v0": SPEEDS[:speeds]}
+    summary = {} if over is None else {"over": [over]}
+    assert 0.0 < Reducer(stone(summary, axes=axes)).seconds() < math.inf
 
 
 def test_granules_depend_on_the_study_alone_and_stay_few():

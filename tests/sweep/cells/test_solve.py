@@ -1,49 +1,22 @@
 """Which method a cell gets, and what is said of it."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from stand_ins import solved, stand_in, toy_study, with_kernel
 from toy import KERNEL
 
 import sweep
-from kernels.interface import FIRST_REFUSAL, Kernel, Status
+from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.grid import Grid
-from sweep.cells.solve import NONE, STRIP, Solver, usable_methods
+from sweep.cells.solve import NONE, STRIP, UNKNOWN, Solver, usable_methods
+from sweep.results.statuses import account
 
 NAMES = [m.name for m in KERNEL.methods]
-
-
-def toy_study(**keys):
-    keys = {"outputs": ["impact_speed"], "fixed": {"v0": 0.0}, **keys}
-    return sweep.build_study(kernel="toy:KERNEL", allow_import=True, **keys)
-
-
-def solved(study, start=0, stop=None):
-    solver = Solver(study)
-    stop = solver.grid.size if stop is None else stop
-    lengths = {"drop": (len(study.along.get("phase", ())),)}
-    outputs = {name: np.full((stop - start, *lengths.get(name, ())), -1.0) for name in study.outputs}
-    status, used = np.full(stop - start, 99, np.int8), np.full(stop - start, 99, np.int8)
-    solver.solve(start, stop, outputs, status, used)
-    return outputs, status, used
-
-
-def stand_in(**methods):
-    """The toy kernel with other functions for some of its methods: name -> (solve, bound)."""
-    from dataclasses import replace
-
-    changed = tuple(
-        replace(m, solve=methods[m.name][0], bound=methods[m.name][1]) if m.name in methods else m
-        for m in KERNEL.methods
-    )
-    return replace(KERNEL, methods=changed)
-
-
-def with_kernel(study, kernel: Kernel):
-    from dataclasses import replace
-
-    return replace(study, kernel=kernel)
 
 
 def test_auto_takes_the_cheapest_method_whose_bound_meets_rtol():
@@ -199,8 +172,6 @@ def test_methods_are_told_apart_behind_a_refused_cell():
 
 
 def test_a_parameter_that_follows_an_axis_runs_along_with_it():
-    from dataclasses import replace
-
     study = replace(toy_study(axes={"height": [1.0, 2.0, 5.0]}), fixed={"v0": 0.0}, follows={"g": "height"})
     columns = [np.full(2, -1.0) for _ in KERNEL.parameters]
     Grid(study).columns(1, 3, columns)
@@ -208,8 +179,6 @@ def test_a_parameter_that_follows_an_axis_runs_along_with_it():
 
 
 def test_a_term_that_a_method_excludes_keeps_auto_from_it():
-    from dataclasses import replace
-
     rough = replace(KERNEL.methods[0], excludes=("v0",))
     kernel = replace(KERNEL, methods=(rough, KERNEL.methods[1]))
     plain = with_kernel(toy_study(axes={"height": [1.0]}), kernel)
@@ -332,8 +301,6 @@ def test_traces_are_solved_a_few_cells_at_a_time():
     ],
 )
 def test_a_kernel_that_no_result_could_hold_is_refused_at_once(monkeypatch, change, message):
-    from dataclasses import replace
-
     import toy
 
     monkeypatch.setattr(toy, "KERNEL", replace(KERNEL, **change(KERNEL)))
@@ -357,3 +324,145 @@ def test_auto_keeps_an_unstable_cycle_only_where_no_later_method_has_values():
     assert status.tolist() == [Status.PERIOD_2, Status.UNSTABLE, Status.INACCURATE]
     assert used.tolist() == [1, 0, 1]
     assert outputs["impact_speed"].tolist() == [2.0, 1.0, 2.0]
+
+
+def said_in_turn(*statuses):
+    """What `auto` says of one cell whose methods, cheapest first, say these."""
+
+    def method(number, says):
+        def solve(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
+            fall_time[...], impact_speed[...], drop[...], status[...] = number, number, number, says
+
+        return replace(KERNEL.methods[1], name=f"method_{number}", solve=solve)
+
+    kernel = replace(KERNEL, methods=tuple(method(number, says) for number, says in enumerate(statuses)))
+    outputs, status, used = solved(with_kernel(toy_study(axes={"height": [1.0]}), kernel))
+    return status[0], used[0], outputs["impact_speed"][0]
+
+
+@pytest.mark.parametrize("unknown", [Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT])
+def test_a_method_that_knows_no_cycle_of_its_kind_does_not_answer_for_one_that_does_not_know(unknown):
+    assert said_in_turn(Status.NO_CYCLE, unknown, Status.NO_CYCLE)[0] == unknown
+    assert said_in_turn(unknown, Status.NO_CYCLE)[0] == unknown
+    assert said_in_turn(Status.NO_CYCLE, Status.NO_CYCLE)[0] == Status.NO_CYCLE
+    assert said_in_turn(unknown, Status.NO_CYCLE, Status.OK) == (Status.OK, 2, 2.0)
+
+
+def test_an_unstable_cycle_does_not_replace_a_motion_that_is_known_loosely():
+    assert said_in_turn(Status.UNSTABLE, Status.INACCURATE, Status.UNSTABLE) == (Status.INACCURATE, 1, 1.0)
+
+
+def test_auto_does_not_deny_what_an_impact_clock_does_where_following_it_leaves_that_open():
+    random = np.random.default_rng(11)
+    near = 1 + 10.0 ** random.uniform(-12, -3, 60) * random.choice([-1, 1], 60)
+    axes = {"I_c": 1e-5 * np.append(1 + 1e-9, near), "e": [0.6, 0.77]}
+    fixed = {"torque": 0.01, "I_v": 1e-5, "r_c": 0.03, "r_v": 0.03, "teeth": 31, "h": 0.001}
+    keys = {"kernel": "impact", "axes": axes, "fixed": fixed, "outputs": ["period"]}
+    _, status, used = solved(sweep.build_study(**keys))
+    _, followed, _ = solved(sweep.build_study(**keys, method="events"))
+    closed = solved(sweep.build_study(**keys, method="closed"))[1]
+    open_ = np.isin(followed, UNKNOWN)
+    assert (closed == Status.NO_CYCLE).all()
+    assert open_[1]
+    assert open_.sum() > 20
+    assert (status == followed).all()
+    assert (used == np.where(open_, NONE, 1)).all()
+
+
+MISSING = [math.nan, math.inf, -math.inf]
+
+
+def without_a_number(number, verdict=Status.OK):
+    """A method that gives a cell of height 2 this in place of its speed, and this verdict."""
+
+    def solve(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
+        fall_time[...], drop[...], status[...] = 1.0, 1.0, Status.OK
+        impact_speed[...] = np.where(height == 2.0, number, height)
+        status[height == 2.0] = verdict
+
+    return solve, None
+
+
+@pytest.mark.parametrize("number", MISSING)
+@pytest.mark.parametrize("method", ["rough", "exact"])
+def test_ok_without_a_number_has_failed(number, method):
+    study = toy_study(axes={"height": [1.0, 2.0, 3.0, -1.0]}, method=method)
+    outputs, status, used = solved(with_kernel(study, stand_in(**{method: without_a_number(number)})))
+    assert status.tolist() == [Status.OK, Status.FAILED, Status.OK, Status.BAD_INPUT]
+    assert np.isnan(outputs["impact_speed"]).tolist() == [False, True, False, True]
+    assert used[1] == NONE
+
+
+@pytest.mark.parametrize("number", MISSING)
+def test_only_outputs_asked_for_can_be_missed(number):
+    study = toy_study(axes={"height": [1.0, 2.0]}, outputs=["fall_time"], method="rough")
+    outputs, status, _ = solved(with_kernel(study, stand_in(rough=without_a_number(number))))
+    assert (status == Status.OK).all()
+    assert outputs["fall_time"].tolist() == [1.0, 1.0]
+
+
+def test_an_output_that_need_not_exist_is_not_missed():
+    from dataclasses import replace
+
+    kernel = stand_in(rough=without_a_number(math.inf))
+    fields = tuple(replace(f, gaps=f.name == "impact_speed") for f in kernel.outputs)
+    study = toy_study(axes={"height": [1.0, 2.0]}, method="rough")
+    outputs, status, _ = solved(with_kernel(study, replace(kernel, outputs=fields)))
+    assert (status == Status.OK).all()
+    assert outputs["impact_speed"].tolist() == [1.0, math.inf]
+
+
+@pytest.mark.parametrize("verdict", [Status.COMES_TO_REST, Status.TOO_SHORT])
+def test_a_remark_may_lack_a_number(verdict):
+    study = toy_study(axes={"height": [1.0, 2.0]}, method="rough")
+    _, status, _ = solved(with_kernel(study, stand_in(rough=without_a_number(math.nan, verdict))))
+    assert status.tolist() == [Status.OK, verdict]
+
+
+def test_a_refusal_is_told_and_not_called_a_failure():
+    study = toy_study(axes={"height": [1.0, 2.0]}, method="rough")
+    _, status, _ = solved(with_kernel(study, stand_in(rough=without_a_number(math.nan, Status.STICKS))))
+    assert status.tolist() == [Status.OK, Status.STICKS]
+
+
+@pytest.mark.parametrize("verdict", [-1, -128, Status.PENDING])
+def test_what_no_kernel_may_say_has_failed(verdict):
+    study = toy_study(axes={"height": [1.0, 2.0]}, method="rough")
+    outputs, status, _ = solved(with_kernel(study, stand_in(rough=without_a_number(5.0, verdict))))
+    assert status.tolist() == [Status.OK, Status.FAILED]
+    assert np.isnan(outputs["impact_speed"]).tolist() == [False, True]
+
+
+def test_a_check_that_says_what_it_may_not_has_failed():
+    from dataclasses import replace
+
+    def check(height, v0, g, status):
+        status[...] = np.where(height == 2.0, Status.PENDING, np.where(height == 3.0, -7, Status.OK))
+
+    study = toy_study(axes={"height": [1.0, 2.0, 3.0]})
+    _, status, _ = solved(with_kernel(study, replace(KERNEL, check=check)))
+    assert status.tolist() == [Status.OK, Status.FAILED, Status.FAILED]
+
+
+def test_a_trace_with_a_hole_has_failed():
+    def hole(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
+        fall_time[...], impact_speed[...], drop[...], status[...] = 1.0, 1.0, 1.0, Status.OK
+        drop[height == 2.0, 1] = math.nan
+
+    study = toy_study(axes={"height": [1.0, 2.0]}, outputs=["drop"], along={"phase": [0.0, 0.5, 1.0]}, method="rough")
+    outputs, status, _ = solved(with_kernel(study, stand_in(rough=(hole, None))))
+    assert status.tolist() == [Status.OK, Status.FAILED]
+    assert np.isnan(outputs["drop"]).all(axis=1).tolist() == [False, True]
+
+
+def test_auto_goes_on_where_a_method_fails():
+    study = toy_study(axes={"height": [1.0, 2.0]})
+    _, status, used = solved(with_kernel(study, stand_in(rough=without_a_number(math.nan))))
+    assert status.tolist() == [Status.OK, Status.OK]
+    assert used.tolist() == [0, 1]
+
+
+def test_failures_are_in_the_account():
+    study = toy_study(axes={"height": [1.0, 2.0, -1.0]}, method="rough")
+    dataset = sweep.run(with_kernel(study, stand_in(rough=without_a_number(math.nan))), progress=False)
+    assert str(account(dataset)) == "3 cells: 1 ok, 0 remarks, 1 refused, 1 failed, 0 pending"

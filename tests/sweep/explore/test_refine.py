@@ -89,12 +89,27 @@ def test_an_output_that_changes_its_sign_between_two_cells_is_followed():
     assert boxes._off((0,), 1) == np.inf
 
 
-def test_what_is_straight_needs_no_cells_but_the_middles():
+def test_a_grid_that_is_fine_enough_stays_as_it_is():
     study = toy([1.0, 2.0, 4.0, 8.0], [1e-9, 2e-9, 4e-9])
-    found = sweep.refine(sweep.run(study), "fall_time", 1e-3, study=study)
-    assert found.added == 7 * 5 - 12
+    ds = sweep.run(study)
+    found = sweep.refine(ds, "fall_time", 1e-3, study=study)
+    assert (found.added, found.tried) == (0, 7 * 5 - 12)
+    assert found.uniform == found.dataset.sizes["cell"] == 12
+    np.testing.assert_array_equal(found.dataset.fall_time, ds.fall_time.values.ravel())
     assert found.complete
     assert found.error < 1e-8
+
+
+def test_cells_are_added_where_it_bends_alone():
+    """height / v0 turns into sqrt(2 height / g) about height = v0^2 / 2 g = 51 m."""
+    keys = {"kernel": "toy:KERNEL", "allow_import": True, "outputs": ["fall_time"], "fixed": {"v0": 31.6}}
+    study = sweep.build_study(axes={"height": 50 * 10.0 ** np.arange(-6, 7)}, **keys)
+    ds = sweep.run(study)
+    found = sweep.refine(ds, "fall_time", 3e-2, study=study)
+    added = sorted(set(found.dataset.height.values) - set(ds.height.values))
+    assert found.complete
+    assert 0 < found.added < found.tried
+    assert 0.5 < added[0] < added[-1] < 5000
 
 
 def test_joined_cells_are_those_of_a_zip_study_and_can_be_run_again():

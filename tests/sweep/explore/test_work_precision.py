@@ -61,7 +61,7 @@ def test_errors_are_those_against_the_truth():
     assert float(cell.error_median) == pytest.approx(np.median(off_by_rough()), rel=1e-9)
     assert cell.worst_cell.item() == "height=2 v0=0.001"
     assert [float(cell[key]) for key in ("ok", "inaccurate", "failed", "silent")] == [0.5, 0.5, 0.0, 0.0]
-    assert float(at(found, "exact").error_worst) == 0
+    assert float(at(found, "exact").error_worst) == found.attrs["reference_error"]
 
 
 def test_auto_is_measured_beside_the_methods_and_says_which_it_took():
@@ -229,7 +229,7 @@ def test_counts_of_work_are_means_beside_the_time_and_no_error():
     study = replace(stones(), kernel=kernel, outputs=("impact_speed", "steps"))
     found = measured(study)
     assert found.steps.sel({"method": "counted"}).values == pytest.approx([3.25, 6.25])
-    assert float(found.error_worst.max()) == 0
+    assert float(found.error_worst.max()) == found.attrs["reference_error"]
     assert "  steps  " in precision_text(found)
 
 
@@ -281,6 +281,10 @@ def test_the_table_tells_errors_shares_and_what_they_are_measured_against():
     assert "Omissions" not in text
 
 
+def test_a_tolerance_given_twice_is_measured_once():
+    assert measured(stones(), tolerances=[1e-3, 1e-3, 1e-6]).rtol.values.tolist() == [1e-3, 1e-6]
+
+
 def test_with_method_is_the_study_but_for_the_method():
     study = stones()
     assert with_method(study, "rough", 0.1).axes is study.axes
@@ -306,6 +310,36 @@ def test_the_picture_has_a_line_for_each_method_open_marks_where_cells_fail_and_
     assert len(open_marks) == 1
     assert (lines["exact"].get_ydata() == found.attrs["reference_error"]).all()
     assert (tmp_path / "chart.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_cells_that_the_reference_has_solved_itself_are_at_what_it_is_right_to():
+    found = measured(stones(), tolerances=[1e-9])
+    reference = found.attrs["reference"]
+    assert reference in str(found.methods_used.sel({"method": "auto"}).item())
+    for name in ("auto", reference):
+        worst = float(found.error_worst.sel({"method": name}).item())
+        assert worst >= found.attrs["reference_error"] > 0, name
+
+
+def test_neither_notes_nor_legend_lie_over_anything(tmp_path):
+    study = with_methods(
+        stones(), *(Method(f"method_{k}", "", bad(1e-5 if k else 0, Status.STEP_LIMIT)) for k in range(9))
+    )
+    study = with_methods(study, *study.kernel.methods, Method("liar", "", bad(1e-5)), Method("exact", "", exact))
+    figure = plot_precision(measured(study, reference="exact"))
+    with style():
+        figure.draw_without_rendering()
+    renderer = figure.canvas.get_renderer()
+    (legend,) = figure.legends
+    texts = [text.get_text() for text in legend.get_texts()]
+    for said in ("all cells solved", "some refused or inaccurate", "some silently wrong", "below what the reference"):
+        assert any(text.startswith(said) for text in texts), said
+    note = next(text for text in figure.texts if text.get_text().startswith("Omissions"))
+    boxes = [thing.get_window_extent(renderer) for thing in (legend, note)]
+    boxes += [axes.get_tightbbox(renderer) for axes in figure.axes[:1]]
+    for i, one in enumerate(boxes):
+        assert figure.bbox.y0 <= one.y0 < one.y1 <= figure.bbox.y1
+        assert not any(one.overlaps(other) for other in boxes[:i])
 
 
 def test_a_method_looks_the_same_in_pictures_that_name_the_same_methods():

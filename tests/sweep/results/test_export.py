@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 
 import sweep
+from sweep.show.laws import laws, write_laws
 from sweep.system.errors import SweepError
 
 FLAGS = {"flag_values": np.array([0, 1, 64, 127], np.int8), "flag_meanings": "OK INACCURATE BAD_INPUT PENDING"}
@@ -80,9 +81,32 @@ def test_csv_columns_do_not_depend_on_the_order_of_an_outputs_dimensions(tmp_pat
 
 def test_csv_says_the_unit_of_each_column_in_lines_that_readers_skip(tmp_path):
     text = sweep.export(result(), tmp_path / "out.csv").read_text()
-    assert text.splitlines()[:2] == ["# mu [rad/s^2]: drive torque per inertia", "# a [1/s]"]
+    assert text.splitlines()[1:3] == ["# mu [rad/s^2]: drive torque per inertia", "# a [1/s]"]
     assert "# period [s]: the 'period', of the cycle" in text
     assert "# status\n" in text
+
+
+def test_no_text_of_a_csv_is_a_formula(tmp_path):
+    words = ["=cmd|'/C calc'!A0", "+1+1", "-x", "@SUM(A1)", "-1.5", "plain"]
+    ds = xr.Dataset({"=y": ("word", -np.arange(6.0))}, {"word": words})
+    ds["=y"].attrs = {"units": "m\n=1", "long_name": "a\n=2"}
+    lines = sweep.export(ds, tmp_path / "out.csv").read_text().splitlines()
+    assert lines[1:4] == ["# word", "# =y [m =1]: a =2", "word,'=y"]
+    assert lines[4:] == [
+        "'=cmd|'/C calc'!A0,-0.0",
+        "'+1+1,-1.0",
+        "'-x,-2.0",
+        "'@SUM(A1),-3.0",
+        "-1.5,-4.0",
+        "plain,-5.0",
+    ]
+
+
+def test_no_text_of_a_table_of_laws_is_a_formula(tmp_path):
+    x = np.geomspace(1, 10, 5)
+    ds = xr.Dataset({"y": (("word", "x"), [x, x])}, {"x": x, "word": ["=1+1", "plain"]})
+    write_laws(laws(ds, "y", "x"), tmp_path / "laws.csv")
+    assert ",'=1+1," in (tmp_path / "laws.csv").read_text()
 
 
 def test_csv_reads_back_with_pandas(tmp_path):
@@ -160,7 +184,7 @@ def test_csv_needs_no_more_memory_for_more_cells(tmp_path, monkeypatch):
 def test_netcdf_reads_back_bit_for_bit_with_units_and_flags(tmp_path, engine):
     ds = result()
     with xr.open_dataset(sweep.export(ds, tmp_path / "out.nc"), engine=engine) as back:
-        xr.testing.assert_identical(back.load(), ds)
+        xr.testing.assert_identical(back.load(), ds.assign_attrs(history="exported by foliot"))
         assert back.status.dtype == np.int8
         assert back.status.attrs["flag_values"].tolist() == [0, 1, 64, 127]
         assert "_FillValue" not in back.status.encoding
@@ -171,7 +195,7 @@ def test_netcdf_of_a_result_larger_than_memory_is_written_piece_by_piece(tmp_pat
     monkeypatch.setattr(sys.modules["sweep.results.export"], "LARGE", 0)
     ds = result()
     with xr.open_dataset(sweep.export(ds, tmp_path / "out.nc"), engine="h5netcdf") as back:
-        xr.testing.assert_identical(back.load(), ds)
+        xr.testing.assert_identical(back.load(), ds.assign_attrs(history="exported by foliot"))
 
 
 def test_netcdf_keeps_full_precision_however_the_source_was_packed(tmp_path):
@@ -221,7 +245,7 @@ def test_a_fault_half_way_leaves_the_old_file_and_nothing_else(tmp_path, monkeyp
 
     monkeypatch.setattr(Path, "replace", full)
     with pytest.raises(SweepError, match="cannot be written: No space left on device"):
-        sweep.export(result(), target)
+        sweep.export(result(), target, force=True)
     assert target.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == [target.name]
 

@@ -1,5 +1,6 @@
 """Files that nobody vouches for: no traceback, no hang, no foreign code, no path out of its folder."""
 
+import os
 import pickle
 import random
 import subprocess
@@ -10,12 +11,13 @@ from pathlib import Path
 import h5py
 import pytest
 import toy_studies
-from fuzzing import STUDY, fuzz_result, fuzz_study, prepared, quietly
+from fuzzing import STUDY, forge, fuzz_result, fuzz_study, prepared, quietly
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from running import environment, quiet, tall
 
 import sweep
+from sweep.cli import main
 from sweep.results.verify import verify
 from sweep.store import seal
 from sweep.system.errors import StudyError, SweepError
@@ -60,6 +62,97 @@ def test_a_file_that_hdf5_cannot_come_to_an_end_with_is_given_up(whole, tmp_path
         sweep.open_result(path)
     assert not verify(path).whole
     assert time.monotonic() - begun < 20
+
+
+COMMANDS = {
+    "show": (), "verify": (), "plot": (), "report": (), "export": ("-o", "out.csv"),
+    "fit": ("--y", "fall_time", "--x", "height"),
+    "refine": ("--y", "fall_time", "--tolerance", "0.1", "-o", "fine.h5", "--allow-import"),
+}  # fmt: skip
+
+
+def forged(whole, path):
+    """A result that has another byte, and a seal as if it always had."""
+    content = bytearray(whole.read_bytes())
+    content[content.index(b"Stone" if b"Stone" in content else b"toy:KERNEL")] ^= 1
+    path.write_bytes(content)
+    forge(path)
+    assert seal.sealed(path)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_forged_seal_does_not_make_a_command_hang(whole, tmp_path, monkeypatch, capfd, command):
+    monkeypatch.chdir(tmp_path)
+    forged(whole, tmp_path / "out.h5")
+    monkeypatch.setattr(seal, "PROBE", "while True: pass")
+    monkeypatch.setattr(seal, "PROBE_SECONDS", 0.3)
+    monkeypatch.setattr("h5py.File", lambda *args: pytest.fail("opened here"))
+    assert main([command, "out.h5", *COMMANDS[command]]) == 2
+    assert "not the result of a sweep, or damaged" in capfd.readouterr().err
+
+
+def test_what_this_process_has_written_is_not_read_by_another_one(tmp_path, monkeypatch):
+    path = prepared(tmp_path)
+    monkeypatch.setattr(seal, "PROBE", "while True: pass")
+    monkeypatch.setattr(seal, "PROBE_SECONDS", 0.3)
+    assert quietly("show", path) == 0
+    path.write_bytes(path.read_bytes())
+    assert quietly("show", path) == 2  # somebody else's by now
+
+
+def test_the_other_process_reads_all_that_hdf5_has_cut_in_pieces(whole, tmp_path):
+    """A piece that is not what gzip makes is behind the first one, where no look at a beginning finds it."""
+    path = tmp_path / "out.h5"
+    with h5py.File(path, "w") as file:
+        data = file.create_dataset("status", (4, 100), "i1", chunks=(1, 100), compression="gzip")
+        data[...] = 0
+        place = data.id.get_chunk_info(3).byte_offset
+    assert seal.probing(path)()
+    content = bytearray(path.read_bytes())
+    content[place : place + 8] = b"\xff" * 8
+    path.write_bytes(content)
+    assert not seal.probing(path)()
+
+
+def lead_away(file, kind, secret):
+    """Makes what a result holds lie in another file."""
+    if kind == "soft link":
+        file["other"] = h5py.SoftLink("/status")
+    elif kind == "external link":
+        file["other"] = h5py.ExternalLink(str(secret), "/")
+    elif kind == "external storage":
+        del file["fall_time"]
+        file.create_dataset("fall_time", (100, 3), "f8", external=[(str(secret), 0, h5py.h5f.UNLIMITED)])
+    elif kind == "virtual":
+        source = h5py.VirtualSource(str(secret), "x", (100, 3))
+        del file["fall_time"]
+        layout = h5py.VirtualLayout((100, 3), "f8")
+        layout[...] = source
+        file.create_virtual_dataset("fall_time", layout)
+    else:
+        file["integrity/round"] = file["integrity"]
+
+
+@pytest.mark.parametrize("sealed", [False, True])
+@pytest.mark.parametrize("kind", ["soft link", "external link", "external storage", "virtual", "round"])
+def test_a_result_leads_to_no_other_file(whole, tmp_path, kind, sealed):
+    secret = tmp_path / "secret"
+    os.mkfifo(secret)  # who opened it would wait for ever
+    path = tmp_path / "out.h5"
+    path.write_bytes(whole.read_bytes())
+    with path.open("r+b") as file:
+        behind = seal.length(file.fileno())
+        file.truncate(path.stat().st_size - behind)
+    with h5py.File(path, "r+") as file:
+        lead_away(file, kind, secret)
+    if sealed:
+        with path.open("r+b") as file:
+            file.seek(0, 2)
+            file.write(seal.seal([], file.fileno()))
+        assert seal.sealed(path)
+    with pytest.raises(SweepError, match="not the result of a sweep, or damaged"):
+        sweep.open_result(path)
+    assert not verify(path).whole
 
 
 def test_a_result_that_was_changed_on_purpose_can_still_be_opened(whole, tmp_path):

@@ -5,7 +5,7 @@ import pytest
 import toy_studies
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from running import interrupted
+from running import interrupted, keys
 
 import sweep
 from sweep.results import open
@@ -26,17 +26,6 @@ def both(tmp_path_factory):
         patch.setattr(open, "LARGEST_AT_ONCE", 0)
         patch.setattr(parts, "AT_ONCE", 2)
         yield at_once, sweep.open_result(path)
-
-
-def keys(size):
-    ends = st.integers(-size, size)
-    slices = st.builds(slice, st.none() | ends, st.none() | ends, st.none() | st.sampled_from([1, 1, 1, 2]))
-    return (
-        slices
-        | st.just(slice(None, None, -1))
-        | st.integers(-size, size - 1)
-        | st.lists(st.integers(0, size - 1), max_size=4)
-    )
 
 
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -54,7 +54,7 @@ def unfinished(tmp_path):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Solver, "solve", failing)
-        patch.setattr("sweep.runs.session.order", lambda sample, blocks, first: np.array([0, 1, 3, 4, 2]))
+        patch.setattr("sweep.system.forecast.Forecast.order", lambda self: iter([0, 1, 3, 4, 2]))
         with pytest.raises(SweepError, match="stop here"):
             run(stone(), path, block_cells=5, workers=1, progress=False)
     for index in (3, 4):
@@ -106,7 +106,7 @@ def test_attributes_follow_cf(stored):
         assert found.fall_time.attrs == {
             "units": "s",
             "long_name": "time until the ground is reached",
-            "ancillary_variables": "status method_used",
+            "ancillary_variables": "status method_used error_bound",
         }
         assert found.height.attrs == {"units": "m", "long_name": "height above the ground"}
         assert found.g.attrs["units"] == "m/s^2"

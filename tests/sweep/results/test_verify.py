@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 import toy_studies
-from running import fail_on, interrupted, tall
+from running import fail_on, flip, interrupted, tall
 
 import sweep
 from sweep.cells.partition import Partition
@@ -38,14 +38,6 @@ def whole(request, tmp_path_factory):
 @pytest.fixture
 def copy(whole, tmp_path):
     return shutil.copy(whole, tmp_path / "out.h5")
-
-
-def flip(path, place, bit=0):
-    with path.open("r+b") as file:
-        file.seek(place)
-        byte = file.read(1)[0]
-        file.seek(place)
-        file.write(bytes([byte ^ (1 << bit)]))
 
 
 def test_a_whole_result_is_whole(copy, capsys):

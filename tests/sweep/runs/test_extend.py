@@ -34,10 +34,10 @@ def solved(monkeypatch):
     counts = []
     real, sampling = _Strip.run, []
 
-    def run(self, number, cells):
+    def run(self, number, cells, *bound):
         if not sampling:
             counts.append(len(self.status[cells]))
-        real(self, number, cells)
+        real(self, number, cells, *bound)
 
     from sweep.runs import session
 
@@ -107,7 +107,7 @@ def test_a_killed_extension_continues(output, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(Solver, "solve", failing)
-        patch.setattr("sweep.runs.session.order", lambda sample, blocks, first: np.arange(blocks.count))
+        patch.setattr("sweep.system.forecast.Forecast.order", lambda self: iter(range(self.blocks)))
         with pytest.raises(SweepError, match="stop here"):
             quiet(more, output, extend=True, block_cells=5, workers=1)
     with sweep.open_result(output) as before:

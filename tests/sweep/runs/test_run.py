@@ -37,6 +37,7 @@ from sweep.results.verify import verify
 from sweep.runs.run import run
 from sweep.store.manifest import SPEC
 from sweep.store.store import Store, folder_of
+from sweep.study.read import build_study
 from sweep.system import disk
 from sweep.system.errors import SweepError
 
@@ -469,6 +470,73 @@ def test_a_disk_that_is_too_small_is_refused_at_once(output, monkeypatch):
     with pytest.raises(SweepError, match="are free here"):
         quiet(stone(), output)
     assert list(output.parent.iterdir()) == []
+
+
+def free(monkeypatch, output, count):
+    """Lets so many bytes be free."""
+    usage = shutil.disk_usage(output.parent)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage._replace(free=count))
+
+
+def needed(cells, left):
+    """Bytes of the output of `tall` (axis, g, v0; fall time, status and method of every cell) and of parts to come."""
+    return 8 * (cells + 2) + 10 * cells + 10 * left
+
+
+def test_space_for_the_output_without_its_parts_is_too_little(output, monkeypatch):
+    free(monkeypatch, output, needed(2000, 2000) - 1)
+    with pytest.raises(SweepError, match="are free here"):
+        quiet(tall(2000), output)
+    assert list(output.parent.iterdir()) == []
+    free(monkeypatch, output, needed(2000, 2000))
+    quiet(tall(2000), output).close()
+
+
+def test_parts_that_are_there_need_no_more_space(unfinished, monkeypatch):
+    left = 23 - 5 * len(names(unfinished))
+    assert 0 < left < 23
+    free(monkeypatch, unfinished, needed(23, left) - 1)
+    with pytest.raises(SweepError, match="are free here"):
+        quiet(tall(23), unfinished)
+    free(monkeypatch, unfinished, needed(23, left))
+    quiet(tall(23), unfinished).close()
+
+
+def test_the_output_and_its_name_are_brought_to_the_disk(output, monkeypatch):
+    events, fsync, rename = [], os.fsync, disk.rename
+
+    def record_rename(old, new):
+        events.append(("rename", old.stat().st_ino))
+        rename(old, new)
+
+    monkeypatch.setattr(os, "fsync", lambda fd: (events.append(("fsync", os.fstat(fd).st_ino)), fsync(fd))[1])
+    monkeypatch.setattr(disk, "rename", record_rename)
+    quiet(tall(23), output, block_cells=5).close()
+    result, folder = output.stat().st_ino, output.parent.stat().st_ino
+    assert events[-3:] == [("fsync", result), ("rename", result), ("fsync", folder)]
+
+
+def test_room_for_the_text_of_the_study_is_needed_too(output, monkeypatch):
+    """In the result and, while it is computed, in spec.json beside it."""
+    import dataclasses
+    import shutil
+
+    study = dataclasses.replace(stone(), text="# " + "long " * 20_000)
+    usage = shutil.disk_usage(output.parent)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage._replace(free=2 * len(study.text)))
+    with pytest.raises(SweepError, match="are free here"):
+        quiet(study, output)
+
+
+def test_a_study_may_be_a_mapping_of_its_keys():
+    keys = {"kernel": "foliot", "outputs": ["period"], "axes": {"mu": [1.0, 2.0]}, "fixed": {"a": 1.0, "phi0": 1.0}}
+    same(quiet(keys), quiet(build_study(**keys)))
+    with pytest.raises(SweepError, match="1 mistake\n  allow_import  no such key"):
+        quiet(keys | {"allow_import": True})
+    with pytest.raises(SweepError, match="runs code of your own"):
+        quiet(keys | {"kernel": "toy:KERNEL"})
+    with pytest.raises(SweepError, match=r'expected a study, found "s\.toml"; read a file with sweep\.read_study'):
+        quiet("s.toml")
 
 
 @pytest.mark.parametrize("place", ["out.h5", "out.h5.parts"])

@@ -272,6 +272,12 @@ def test_a_place_that_cannot_be_written_is_one_clear_line(tmp_path, name, messag
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("title", ["a lone $", "$\\frac$", "{$x_$}", "100 $ and 200 $"])
+def test_a_title_is_plain_text(tmp_path, title):
+    figure = plot(dataset(mu=log()).assign_attrs(title=title), tmp_path / "out.png")
+    assert figure.axes[0].get_title() == title.replace("$", "\\$")
+
+
 def test_a_fault_half_way_leaves_the_old_picture_and_nothing_else(tmp_path, monkeypatch):
     (tmp_path / "out.png").write_text("old")
 

@@ -6,9 +6,10 @@ from toy_studies import build
 
 import sweep
 from kernels.interface import Status
+from sweep.results.statuses import summary_text
 from sweep.show import text as report
 from sweep.show.laws import laws, laws_text, pick
-from sweep.show.text import result_text, summary_text
+from sweep.show.text import result_text
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import textwrap
 from pathlib import Path
 
@@ -261,6 +262,17 @@ def test_a_lock_in_a_folder_that_was_removed_meanwhile_is_no_lock(output, monkey
             pass
 
 
+@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="no second file system is at hand")
+def test_parts_on_another_file_system_are_refused_before_anything_is_computed(output):
+    with tempfile.TemporaryDirectory(dir="/dev/shm") as elsewhere:
+        if Path(elsewhere).stat().st_dev == output.parent.stat().st_dev:
+            pytest.skip("the same file system")
+        folder_of(output).symlink_to(elsewhere)
+        with pytest.raises(SweepError, match="on another file system"), opened(output, COLUMNS):
+            pytest.fail("opened")
+        assert list(Path(elsewhere).iterdir()) == []
+
+
 def test_nothing_is_left_of_a_store_that_was_not_begun(output):
     with opened(output, COLUMNS) as store:
         assert (store.folder / LOCK).exists()
@@ -338,6 +350,81 @@ def test_a_block_is_on_the_disk_before_it_has_its_name(output, monkeypatch):
         order.clear()
         store.put(0, numbers(0, 10))
     assert order == ["fsync", "rename", "fsync"]
+
+
+@pytest.fixture
+def synced(monkeypatch):
+    """What the system itself is asked to bring to the disk, and to rename, in order: (what, number of the file)."""
+    events, fsync, rename = [], os.fsync, disk.rename
+
+    def record_rename(old, new):
+        events.append(("rename", old.stat().st_ino))
+        rename(old, new)
+
+    monkeypatch.setattr(os, "fsync", lambda fd: (events.append(("fsync", os.fstat(fd).st_ino)), fsync(fd))[1])
+    monkeypatch.setattr(disk, "rename", record_rename)
+    return events
+
+
+def test_a_block_its_name_and_its_folder_are_brought_to_the_disk(output, synced):
+    with opened(output, COLUMNS) as store:
+        # the folder of the parts is a name in the folder of the output
+        assert synced == [("fsync", output.parent.stat().st_ino)]
+        begun(store)
+        synced.clear()
+        store.put(0, numbers(0, 10))
+    part, folder = part_files(store.folder)[0].stat().st_ino, store.folder.stat().st_ino
+    assert synced == [("fsync", part), ("rename", part), ("fsync", folder)]
+
+
+def test_the_spec_is_brought_to_the_disk_before_the_first_block(output, synced):
+    with opened(output, COLUMNS) as store:
+        synced.clear()
+        begun(store)
+        spec, folder = (store.folder / SPEC).stat().st_ino, store.folder.stat().st_ino
+        assert synced == [("fsync", spec), ("rename", spec), ("fsync", folder)]
+
+
+def longer(path, **more):
+    """Makes a part longer than this program writes it, by bytes at the end, or with further datasets."""
+    if more:
+        with h5py.File(path, "r+") as file:
+            file.update({name: np.zeros(count) for name, count in more.items()})
+    else:
+        path.write_bytes(path.read_bytes() + bytes(4096))
+
+
+@pytest.mark.parametrize("more", [{}, {"notes": 5000}])
+def test_a_part_longer_than_it_should_be_gives_its_own_numbers(output, filled, more):
+    path = part_files(filled)[1]
+    longer(path, **more)
+    with opened(output, COLUMNS) as store:
+        found = resumed(store).get(1)
+    for name, values in numbers(10, 20).items():
+        np.testing.assert_array_equal(found[name], values)
+
+
+def test_a_longer_part_with_its_columns_elsewhere_is_read_where_they_are(filled):
+    path = part_files(filled)[0]
+    path.unlink()
+    with h5py.File(path, "w") as file:
+        file["notes"] = np.zeros(5000)
+        file.attrs.update(start=0, stop=10)
+        for name, values in reversed(numbers(0, 10).items()):
+            file[name] = values
+    assert path.stat().st_size > IMAGES.frame(10).size
+    np.testing.assert_array_equal(read_part(path, IMAGES, 0, 10)["angle"], numbers(0, 10)["angle"])
+
+
+def test_a_longer_part_of_other_numbers_is_damaged(filled):
+    path = part_files(filled)[0]
+    longer(path)
+    with h5py.File(path) as file:
+        place = file["angle"].id.get_offset()
+    content = bytearray(path.read_bytes())
+    content[place + 5] ^= 1
+    path.write_bytes(content)
+    assert read_part(path, IMAGES, 0, 10) is None
 
 
 def test_the_spec_comes_back_as_it_was(output):

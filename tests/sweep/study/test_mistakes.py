@@ -70,6 +70,7 @@ def axis(spacing, start, stop, num):
         ("axes.v0 = [1.0]", "fixed.height", "missing; height (height above the ground, m) has no default: give it"),
         ("axes.height = []", "axes.height", "has no values"),
         ("axes.height = [1, 2, 1.0]", "axes.height", "1 stands more than once"),
+        ("axes.height = [1, nan, 2, nan]", "axes.height", "nan stands more than once"),
         ("axes.method = ['auto', 'auto']\nfixed.height = 1", "axes.method", "auto stands more than once"),
         ("axes.height = [1, true]", "axes.height[1]", "expected a number, found true"),
         ("axes.height = [1, [2]]", "axes.height[1]", "expected a number, found a list"),
@@ -126,6 +127,9 @@ def axis(spacing, start, stop, num):
         ("axes.height = [1]\nfixed.g = {}", "fixed.g.value", "expected a number, found nothing"),
         ("axes.height = [1]\nfixed.g = '9.81 m/s^2'", "fixed.g", 'write { value = 9.81, unit = "m/s^2" }'),
         ("axes.height = [1]\nfixed.g = false", "fixed.g", "expected a number, found false"),
+        ("axes.height = [1]\nfixed.v0 = -0.5", "fixed.v0", "expected >= 0 m/s, found -0.5 m/s"),
+        ("axes.height = [1]\nfixed.g = { value = 0, unit = 'km/s^2' }", "fixed.g", "expected > 0 m/s^2, found 0 m/s^2"),
+        ("axes.height = [1]\nfixed.g = nan", "fixed.g", "expected > 0 m/s^2, found nan m/s^2"),
         ("axes.height = [1]\nfixed.G = 1", "fixed.G", "no such parameter; did you mean g?"),
         ("axes.height = [1]\nfixed.quality = 1", "fixed.quality", "no such parameter; it has height, v0 and g"),
         ("axes.height = [1]\nfixed.method = 'exact'", "fixed.method", "stands at the top of a study: method = ..."),
@@ -140,6 +144,28 @@ def test_a_mistake_is_told_with_where_and_what_to_do(mistakes, text, where, mess
     found = mistakes(text)
     assert message in found[where]
     assert len(found) == 1, found
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "kernel = 'folio'\naxes.method = ['closed', 'map']",
+        "kernel = 'toy:KERNEL'\naxes.method = ['rough', 'exact']",  # not allowed, so not known
+        "kernel = 'foliot'\naxes.mode = ['a', 'b']\nfixed = { mu = 1, a = 1, phi0 = 1 }",
+    ],
+)
+def test_words_of_what_is_not_known_do_not_repeat_each_other(mistakes, text):
+    found = mistakes(text, head="", allow_import=False)
+    assert [where for where in found if where.startswith("axes")] == ["axes.mode"] * ("axes.mode" in text)
+
+
+@pytest.mark.parametrize(("flips", "good"), [(1, True), (2.5, False), (0, False), (1e300, False)])
+def test_a_fixed_number_that_is_to_be_whole_is(mistakes, read, flips, good):
+    text = f"kernel = 'foliot_steps'\naxes.mu = [1]\nfixed = {{ a = 1, phi0 = 1, step = 0.1, flips = {flips} }}"
+    if good:
+        assert read(text, head="").fixed["flips"] == flips
+    else:
+        assert "expected a whole number >= 1, <= " in mistakes(text, head="")["fixed.flips"]
 
 
 @pytest.mark.parametrize(
@@ -178,7 +204,7 @@ def test_a_list_that_is_too_long_is_refused():
 
 @pytest.mark.parametrize("values", [[1.0, math.nan], [math.inf], [-1.0], [0]])
 def test_values_outside_the_limits_are_no_mistake_of_the_study(values):
-    assert build(axes={"height": values}, fixed={"g": math.nan}).axes["height"].values.shape == (len(values),)
+    assert build(axes={"height": values}).axes["height"].values.shape == (len(values),)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """What studies in TOML and Python become."""
 
 import dataclasses
+import tracemalloc
 
 import mpmath
 import numpy as np
@@ -12,6 +13,7 @@ from toy_studies import build, build_rich, message_of
 
 import sweep
 from sweep.cells.grid import Grid
+from sweep.study import spacing as axes
 
 
 def test_a_whole_study_is_read(read):
@@ -272,6 +274,26 @@ def test_a_csv_file_with_too_many_lines_is_refused(mistakes, tmp_path, monkeypat
     assert found["axes.height.file"] == "expected at most 10 values, found more"
 
 
+def test_a_csv_file_without_ends_of_lines_does_not_fill_the_memory(tmp_path):
+    with (tmp_path / "points.csv").open("wb") as file:
+        file.truncate(100_000_000)
+    tracemalloc.start()
+    with pytest.raises(ValueError, match=r"points\.csv is not a csv file: a line is longer than 1,000,000 characters"):
+        axes.read_column(tmp_path / "points.csv", "height")
+    assert tracemalloc.get_traced_memory()[1] < 10e6
+    tracemalloc.stop()
+
+
+def test_of_a_csv_file_only_the_column_that_is_wanted_is_kept(tmp_path):
+    with (tmp_path / "points.csv").open("w") as file:
+        file.write("height," + ",".join(f"c{k}" for k in range(500)) + "\n")
+        file.writelines(f"{k}," + "0.125," * 499 + "1\n" for k in range(2000))
+    tracemalloc.start()
+    assert len(axes.read_column(tmp_path / "points.csv", "height")) == 2000
+    assert tracemalloc.get_traced_memory()[1] < 5e6
+    tracemalloc.stop()
+
+
 @pytest.mark.parametrize("name", ["nowhere.csv", ".", "/dev/zero"])
 def test_a_csv_file_that_cannot_be_read_is_a_mistake(mistakes, name):
     assert "cannot be read" in mistakes(f'axes.height.file = "{name}"')["axes.height.file"]
@@ -317,6 +339,28 @@ def test_a_method_that_cannot_do_a_term_of_the_study_is_a_mistake():
     assert (
         message_of(lambda: build_rich(fixed=both), "method") == "no method of rich can do drag, grip and hold together"
     )
+
+
+@pytest.mark.parametrize("words", [["segments", "dopri5"], ["dopri5", "segments"], ["dopri5", "auto", "segments"]])
+def test_every_word_of_a_method_axis_is_asked_whether_it_can_do_the_terms(words):
+    keys = {"kernel": "foliot", "axes": {"method": words}, "fixed": {"mu": 1.0, "phi0": 1.0, "c": 0.5}}
+    told = message_of(lambda: sweep.build_study(**keys), "axes.method")
+    assert told == "segments cannot do c; use auto, pure, quadrature or dopri5"
+
+
+@pytest.mark.parametrize("words", [["quick", "whole"], ["whole", "quick"], ["auto", "whole", "quick"]])
+def test_every_word_of_a_method_axis_is_asked_whether_it_gives_the_outputs(words):
+    keys = {"kernel": "beads:KERNEL", "allow_import": True, "outputs": ["share"], "fixed": {"mass": [1.0, 2.0]}}
+    told = message_of(lambda: sweep.build_study(**keys, axes={"method": words}), "axes.method")
+    assert told == "quick does not give share; use auto or whole, or name the outputs you want"
+
+
+@pytest.mark.parametrize("words", [["slow", "quick"], ["quick", "slow"]])
+def test_every_term_of_a_method_axis_counts_be_it_an_axis_or_fixed(words):
+    for keys in ({"fixed": {"drag": 0.1}}, {"axes": {"drag": [0.0, 0.1]}}):
+        axes = {"load": [1.0], **keys.pop("axes", {}), "method": words}
+        told = message_of(lambda axes=axes, keys=keys: build_rich(axes=axes, **keys), "axes.method")
+        assert told == "quick cannot do drag; use auto or slow"
 
 
 def test_a_term_at_its_default_is_no_hindrance():

@@ -46,12 +46,36 @@ def test_a_line_says_how_much_how_fast_and_how_long(clock):
     assert lines(log) == ["out.h5: 250,000/1,000,000 cells (25.0 %), 25,000 cells/s, 30 s left"]
 
 
-def test_time_left_goes_by_work_and_not_by_cells(clock):
-    """A tenth of the cells that took half of the work: as long again, not nine times as long."""
-    progress = Progress(100, None, work=40.0, clock=clock)
+class Left:
+    """A forecast that says what it is told to."""
+
+    def __init__(self, left):
+        self.left = left
+
+
+def test_time_left_is_that_of_the_forecast(clock):
+    """A tenth of the cells that took half of the work: as long again, not nine times as long; and the line says why."""
+    progress = Progress(1000, None, forecast=Left(60.0), clock=clock)
     clock.now += 60
-    progress.add(10, 20.0)
-    assert progress.line() == "10/100 cells (10.0 %), 0 cells/s, 1 min 00 s left"
+    progress.add(100)
+    assert progress.line() == "100/1,000 cells (10.0 %), 1.7 cells/s so far, 15 to come, 1 min 00 s left"
+
+
+@pytest.mark.parametrize("left", [0.1, 1.0, 30.0, 90.0, 91.0, 1000.0, 1e5])
+def test_speed_and_time_left_never_contradict_each_other(clock, left):
+    progress = Progress(1_000_000, None, forecast=Left(left), clock=clock)
+    clock.now += 10
+    progress.add(100_000)
+    told = progress.line()
+    speed = float(re.search(r"([\d,.e+]+)( cells/s,| to come)", told)[1].replace(",", ""))
+    assert 1 / 1.5 < speed * left / 900_000 < 1.5
+
+
+def test_what_comes_after_the_last_cell_is_part_of_the_time_left(clock):
+    progress = Progress(100, None, clock=clock, ending=lambda: 7.0)
+    clock.now += 5
+    progress.add(50)
+    assert progress.line().endswith(" 12 s left")
 
 
 def test_cells_of_an_earlier_run_are_done_but_say_nothing_about_speed(clock):

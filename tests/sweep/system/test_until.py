@@ -3,6 +3,7 @@
 import io
 import os
 import signal
+import time
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -44,6 +45,23 @@ def test_a_time_of_day_is_the_next_one(text, now, expected):
 def test_a_time_with_a_zone_is_the_next_one_there():
     found = deadline("07:00+05:00", datetime.fromisoformat("2026-11-21T03:00+00:00"))
     assert found == datetime.fromisoformat("2026-11-22T07:00+05:00")
+
+
+@pytest.mark.parametrize("place", ["UTC", "America/Los_Angeles", "Asia/Tokyo", "Pacific/Kiritimati"])
+@pytest.mark.parametrize("hours", range(0, 24, 3))
+def test_a_time_with_a_zone_is_less_than_a_day_ahead_wherever_it_is_read(monkeypatch, place, hours):
+    """Its date is that of its own zone, where it may be tomorrow already, or still yesterday."""
+    monkeypatch.setenv("TZ", place)
+    time.tzset()
+    now = datetime.fromisoformat("2026-11-21T00:30+00:00") + timedelta(hours=hours)
+    try:
+        for text in ("04:00+09:00", "04:00-08:00", "23:00+14:00", "00:10-11:00"):
+            found = deadline(text, now)
+            assert timedelta(0) < found - now <= timedelta(days=1)
+            assert found.astimezone(datetime.fromisoformat(f"2026-11-21T{text}").tzinfo).strftime("%H:%M") == text[:5]
+    finally:
+        monkeypatch.undo()
+        time.tzset()
 
 
 @pytest.mark.parametrize("text", ["7 o'clock", "", "25:00", "in the morning", 7])
@@ -153,5 +171,5 @@ def test_every_cell_is_in_the_account_once(codes, summed):
     assert found.total == len(codes)
     assert found.ok == codes.count(0)
     assert found.pending == codes.count(127)
-    assert found.refused == sum(c in map(int, Status) and 64 <= c < 127 and c not in FAILED for c in codes)
+    assert found.refused == sum(c in map(int, Status) and 64 <= c < 126 and c not in FAILED for c in codes)
     assert found.remarks == sum(c in map(int, Status) and 0 < c < 64 for c in codes)

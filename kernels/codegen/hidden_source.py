@@ -1,0 +1,174 @@
+"""Source text of what a scene's rates may hide in a step from one who knows them at its beginning.
+
+A pulse such as exp(-((t - 20)/w)^2) is 0 to all digits at t = 0, and so are its derivatives: no series tells of it, and
+points within the step can miss it. Intervals (`intervals`) of the graph's operations over the box of states that a
+step passes cannot. Of the operations that a polynomial does not follow for ever, each may change by a factor within the
+step (`CHANGE`); where it may change by more, all of it counts as hidden. By the mean value theorem that goes on to
+    u + w: E_u + E_w,  u w: |w| E_u + |u| E_w,  u/w: (E_u + |u/w| E_w)/|w|,  f(u): |f'(u)| E_u            (1)
+over the box. So what is small enough may stay hidden, and what is large is come up to by shorter steps.
+"""
+
+from kernels.codegen.expression import INPUT
+from kernels.codegen.series_source import Lines
+from kernels.codegen.template import filled, listed
+
+HIDDEN = '''
+@jit_call
+def hidden(state, boxes, side, signs, parameters):
+    """How far each rate, and each event, may be in the box from what the state tells, by (1)."""
+    {unpack}
+    {boxes} = boxes
+    {lines}
+    return ({rates}), ({events})
+'''
+
+
+class Enclosures:
+    """Statements that enclose expressions in a box, and what these hide; each is written when first asked for."""
+
+    def __init__(self, names):
+        self.lines = Lines(names)
+        self._names, self._known = names, {}
+
+    def interval(self, x):
+        """The name of an expression's interval."""
+        return self._once(x, "box", self._interval)
+
+    def excess(self, x):
+        """The name of what an expression hides; None where that is nothing."""
+        return self._once(x, "excess", self._excess)
+
+    def _once(self, x, what, write):
+        if (x.index, what) not in self._known:
+            text = write(x)
+            self._known[x.index, what] = text and self._named(f"{what}_{x.index}", text)
+        return self._known[x.index, what]
+
+    def _named(self, name, text):
+        self.lines.text.append(f"{name} = {text}")
+        return name
+
+    def _interval(self, x):
+        if x.kind == INPUT and x.varies:
+            return f"box_{self._names[x.args[0]]}"
+        if not x.varies:
+            return f"({self.lines.value(x)}, {self.lines.value(x)})"
+        plain, excess = self._plain(x), self.excess(x)
+        return f"widened({plain}, {excess})" if excess else plain
+
+    def _plain(self, x):
+        """The name of the interval of an operation, but for what the operation itself hides."""
+        return self._once(x, "plain", lambda x: getattr(self, f"_interval_of_{x.kind}")(x))
+
+    def _interval_of_add(self, x):
+        return f"added({self.interval(x.args[0])}, {self.interval(x.args[1])})"
+
+    def _interval_of_mul(self, x):
+        return f"multiplied({self.interval(x.args[0])}, {self.interval(x.args[1])})"
+
+    _interval_of_scaled = _interval_of_mul
+
+    def _interval_of_half_square(self, x):
+        return f"half_squared({self.interval(x.args[0])})"
+
+    def _interval_of_div(self, x):
+        return f"multiplied({self.interval(x.args[0])}, over({self.interval(x.args[1])}))"
+
+    def _interval_of_power(self, x):
+        return f"of_power({self.interval(x.args[0])}, {self.lines.value(x.args[1])})"
+
+    _interval_of_power_of_side = _interval_of_power
+
+    def _interval_of_wave(self, x):
+        return f"of_wave({self.lines.value(x)}, {self.interval(x.args[0])})"
+
+    _interval_of_sin = _interval_of_cos = _interval_of_wave
+
+    def _interval_of_sqrt(self, x):
+        return f"of_sqrt({self.interval(x.args[0])})"
+
+    def _interval_of_exp(self, x):
+        return f"of_exp({self.interval(x.args[0])})"
+
+    def _interval_of_log(self, x):
+        return f"of_log({self.interval(x.args[0])})"
+
+    def _excess(self, x):
+        if not x.varies or x.kind in (INPUT, "power_of_side"):  # the latter is for `power_core`, from kink to kink
+            return None
+        return " + ".join(filter(None, getattr(self, f"_excess_of_{x.kind}")(x))) or None
+
+    def _passed_on(self, x, factor):
+        """What x hides times what the result changes by per unit of x; None where x hides nothing."""
+        return self.excess(x) and f"times({self.excess(x)}, {factor})"
+
+    def _largest(self, x):
+        return f"largest({self.interval(x)})"
+
+    def _excess_of_add(self, x):
+        return [self.excess(u) for u in x.args]
+
+    def excess_scaled(self, constant, u):
+        """What a constant times an expression hides, as text."""
+        return self._passed_on(u, f"magnitude({self.lines.value(constant)})")
+
+    def _excess_of_scaled(self, x):
+        return [self.excess_scaled(*x.args)]
+
+    def _excess_of_mul(self, x):
+        u, w = x.args
+        return [self._passed_on(u, self._largest(w)), self._passed_on(w, self._largest(u))]
+
+    def _excess_of_half_square(self, x):
+        return [self._passed_on(x.args[0], self._largest(x.args[0]))]
+
+    def _excess_of_div(self, x):
+        u, w = x.args
+        divisor, plain = self.interval(w), self._plain(x)
+        moved = self.excess(w) and f"times({self.excess(w)}, largest({plain}))"
+        moved = " + ".join(filter(None, (self.excess(u), moved)))
+        return [
+            f"hidden_by_over({self.lines.value(w)}, {divisor}, {plain})",
+            moved and f"times({moved}, 1.0 / smallest({divisor}))",
+        ]
+
+    def _excess_of_sqrt(self, x):
+        return self._excess_of_root(x, "0.5 / sqrt({})")
+
+    def _excess_of_log(self, x):
+        return self._excess_of_root(x, "1.0 / {}")
+
+    def _excess_of_root(self, x, slope):
+        u = x.args[0]
+        inside = self.interval(u)
+        own = f"hidden_by_root({self.lines.value(u)}, {inside}, {self._plain(x)})"
+        return [own, self._passed_on(u, slope.format(f"above({inside})[0]"))]
+
+    def _excess_of_exp(self, x):
+        u = x.args[0]
+        own = f"hidden_by_exp({self.lines.value(u)}, {self.interval(u)})"
+        return [own, self._passed_on(u, f"{self._plain(x)}[1]")]
+
+    def _excess_of_power(self, x):
+        u, n = x.args
+        inside, plain = self.interval(u), self._plain(x)
+        own = f"hidden_by_power({self.lines.value(u)}, {self.lines.value(x)}, {inside}, {plain})"
+        return [own, self._passed_on(u, f"magnitude({self.lines.value(n)}) * {plain}[1] / above({inside})[0]")]
+
+    def _excess_of_wave(self, x):
+        return [self.excess(x.args[0])]
+
+    _excess_of_sin = _excess_of_cos = _excess_of_wave
+
+
+def hidden(writer):
+    """The text of `hidden`, and whether each rate and each event can hide anything."""
+    recorded, enclosures = writer.recorded, Enclosures(writer.names)
+    rates = [enclosures.excess(rate) for rate in recorded.rates]
+    events = [enclosures.excess_scaled(factor, u) for _, factor, u in recorded.events]
+    text = filled(
+        HIDDEN, unpack=writer.all_unpacked, boxes=listed(f"box_{s}" for s in writer.states),
+        lines="\n".join(enclosures.lines.text),
+        rates=listed(e or "0.0 * side" for e in rates), events=listed(e or "0.0 * side" for e in events),
+    )  # fmt: skip
+    return text, [e is not None for e in rates], [e is not None for e in events]

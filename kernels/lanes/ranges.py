@@ -1,0 +1,28 @@
+"""What is said of a cell some of whose outputs no float64 can hold: they are NaN, and the others are given."""
+
+import math
+
+from kernels.interface import FIRST_REFUSAL, Status
+from kernels.lanes.jit import jit
+from kernels.lanes.vectors import where
+
+_OUT_OF_RANGE, _PARTLY = float(Status.OUT_OF_RANGE), float(Status.PARTLY_OUT_OF_RANGE)
+
+
+@jit
+def or_none(x, exists):
+    """A number where it exists, else NaN."""
+    return where(exists, x, math.nan)
+
+
+@jit
+def partly(whole, verdict):
+    """The verdict, or that not all outputs could be held: another remark says more than that, and stays."""
+    return where(whole | (verdict > 0.0), verdict, _PARTLY)
+
+
+@jit
+def judged(sound, whole, verdict):
+    """The verdict on a cell by whether its outputs mean anything, and whether all of them could be held."""
+    verdict = partly(whole, verdict)
+    return where(sound | (verdict >= FIRST_REFUSAL), verdict, _OUT_OF_RANGE)

@@ -1,0 +1,144 @@
+"""Intervals (low, high) of what a scene's operations give over a box of states; generic in one cell or lanes.
+
+They are wide by a few roundings less than rigorous ones, which matters to nobody: what they are for is to see what lies
+between two points, and by how much. NaN stays, so what is compared with it fails.
+"""
+
+import math
+
+from kernels.lanes.jit import jit
+from kernels.lanes.vectors import magnitude, sqrt, where
+from kernels.maths.elementary import exp, log, power
+
+CHANGE, LOG_CHANGE = 8.0, 2.0
+"""Factor by which what has no polynomial (exp u, 1/u, sqrt u, ln u, u^n) may change and still be seen where a step
+begins. Within it, a series that leaves out more than some hundred tolerances has a last term above the tolerance."""
+
+
+@jit
+def least(x, y):
+    """The smaller one; NaN stays."""
+    return where(x < y, x, where(y <= x, y, x + y))
+
+
+@jit
+def most(x, y):
+    """The larger one; NaN stays."""
+    return where(x > y, x, where(y >= x, y, x + y))
+
+
+@jit
+def largest(u):
+    """The largest magnitude in an interval."""
+    return most(magnitude(u[0]), magnitude(u[1]))
+
+
+@jit
+def smallest(u):
+    """The smallest magnitude in an interval."""
+    return where(u[0] > 0.0, u[0], where(u[1] < 0.0, -u[1], 0.0))
+
+
+@jit
+def widened(u, by):
+    """An interval with a margin on both sides."""
+    return u[0] - by, u[1] + by
+
+
+@jit
+def added(u, w):
+    """u + w."""
+    return u[0] + w[0], u[1] + w[1]
+
+
+@jit
+def times(x, y):
+    """x y, where 0 times whatever is 0: a term that a parameter switches off."""
+    nothing = ((x <= 0.0) & (x >= 0.0)) | ((y <= 0.0) & (y >= 0.0))
+    return where(nothing, 0.0, x * y)
+
+
+@jit
+def multiplied(u, w):
+    """u w."""
+    a, b, c, d = times(u[0], w[0]), times(u[0], w[1]), times(u[1], w[0]), times(u[1], w[1])
+    return least(least(a, b), least(c, d)), most(most(a, b), most(c, d))
+
+
+@jit
+def half_squared(u):
+    """u^2/2."""
+    return 0.5 * (smallest(u) * smallest(u)), 0.5 * (largest(u) * largest(u))
+
+
+@jit
+def over(w):
+    """1/w; everything where w may be 0."""
+    apart = (w[0] > 0.0) | (w[1] < 0.0)
+    return where(apart, 1.0 / w[1], -math.inf), where(apart, 1.0 / w[0], math.inf)
+
+
+@jit
+def above(u):
+    """The part of an interval that is not below 0."""
+    return where(u[0] < 0.0, 0.0, u[0]), u[1]
+
+
+@jit
+def of_sqrt(u):
+    """sqrt(u)."""
+    low, high = above(u)
+    return sqrt(low), sqrt(high)
+
+
+@jit
+def of_exp(u):
+    """e^u."""
+    return exp(u[0]), exp(u[1])
+
+
+@jit
+def of_log(u):
+    """ln u."""
+    low, high = above(u)
+    return log(low), log(high)
+
+
+@jit
+def of_wave(value, u):
+    """sin u or cos u, `value` at a point of the interval."""
+    wide = u[1] - u[0]
+    return most(value - wide, 0.0 * wide - 1.0), least(value + wide, 0.0 * wide + 1.0)
+
+
+@jit
+def of_power(u, n):
+    """u^n."""
+    low, high = above(u)
+    at_low = where(low > 0.0, power(where(low > 0.0, low, 1.0), n), where(n > 0.0, 0.0, math.inf))
+    at_high = power(high, n)
+    return least(at_low, at_high), most(at_low, at_high)
+
+
+@jit
+def hidden_by_exp(value, u):
+    """What of e^u cannot be seen at a point where u has that value: all, where it grows too much."""
+    return where(u[1] - value <= LOG_CHANGE, 0.0, exp(u[1]))
+
+
+@jit
+def hidden_by_over(value, w, quotient):
+    """What of a quotient cannot be seen where its divisor w has that value: all, where w comes too close to 0."""
+    return where(smallest(w) * CHANGE >= magnitude(value), 0.0, largest(quotient))
+
+
+@jit
+def hidden_by_root(value, u, root):
+    """What of sqrt u or ln u cannot be seen where u has that value: all, where u comes too close to 0."""
+    return where(u[0] * CHANGE >= value, 0.0, root[1] - root[0])
+
+
+@jit
+def hidden_by_power(value, of_value, u, raised):
+    """What of u^n cannot be seen where u has that value: all, where u comes too close to 0, or u^n grows too much."""
+    return where((u[0] * CHANGE >= value) & (raised[1] <= CHANGE * of_value), 0.0, raised[1])

@@ -1,0 +1,125 @@
+"""Compiling a kernel's functions takes seconds: it is told while it lasts, measured, and remembered for the next time.
+
+A function of columns is compiled when it is called first. numba's functions say by their `signatures` whether they
+have been, those of a kernel by those of their `compiled`; of other functions of `kernels` the first call counts.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from kernels.interface import Kernel, is_kept, machine_code_folder
+from sweep.system.progress import duration
+
+SILENT_SECONDS = 1.0
+"""What is compiled in less time is not told."""
+TABLE = "compile_seconds.json"
+"""File beside the folders of machine code."""
+
+_called: set[int] = set()
+
+
+class Compiling:
+    """Watches a kernel's functions.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    name : str
+        As the study has it.
+    note : callable, optional
+        Tells a line.
+
+    Attributes
+    ----------
+    kernel : Kernel
+        The same, watched.
+    seconds : dict of str to float
+        What compiling took, by method, where it took longer than that.
+    """
+
+    def __init__(self, kernel: Kernel, name: str, note: Callable[[str], None] | None = None) -> None:
+        self._name, self._note = name, note
+        self.seconds: dict[str, float] = {}
+        methods = [
+            replace(m, solve=self._watched(m.name, m.solve), bound=m.bound and self._watched(m.name, m.bound))
+            for m in kernel.methods
+        ]
+        self.kernel = replace(kernel, check=self._watched("check", kernel.check), methods=tuple(methods))
+
+    def remember(self) -> None:
+        """For the next time that it is compiled, by another version or on another day."""
+        if self.seconds and (table := _table()) is not None:
+            _write(table, {**_read(table), **{f"{self._name}.{m}": round(s, 2) for m, s in self.seconds.items()}})
+
+    def _watched(self, method: str, function: Callable[..., None]) -> Callable[..., None]:
+        @functools.wraps(function)
+        def call(*columns: Any) -> None:
+            if not _cold(function):
+                function(*columns)
+                return
+            with self._timed(method):
+                function(*columns)
+
+        return call
+
+    @contextlib.contextmanager
+    def _timed(self, method: str) -> Iterator[None]:
+        begun = time.perf_counter()
+        timer = threading.Timer(SILENT_SECONDS, self._tell, [method])
+        timer.daemon = True
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+            taken = time.perf_counter() - begun
+            if taken > SILENT_SECONDS:
+                self.seconds[method] = self.seconds.get(method, 0.0) + taken
+
+    def _tell(self, method: str) -> None:
+        if self._note is not None:
+            what = f"{self._name}.{method}"
+            table = _table()
+            known = _read(table).get(what) if table is not None else None
+            self._note(f"compiling {what} ..." + (f" (about {duration(known)} when last done)" if known else ""))
+
+
+def _cold(function: Any) -> bool:
+    """Whether a call will compile it."""
+    signatures = getattr(getattr(function, "compiled", function), "signatures", None)
+    if signatures is not None:
+        return not signatures and not is_kept(function)
+    first = id(function) not in _called
+    _called.add(id(function))
+    return first and str(getattr(function, "__module__", "")).startswith("kernels.")
+
+
+def _table() -> Path | None:
+    folder = machine_code_folder()
+    return None if folder is None else folder.parent / TABLE
+
+
+def _read(table: Path) -> dict[str, float]:
+    """Seconds by kernel and method; nothing where it cannot be read."""
+    try:
+        found = json.loads(table.read_text("ascii"))
+        return {str(what): float(seconds) for what, seconds in found.items() if 0 < float(seconds) < 1e4}
+    except (OSError, ValueError, TypeError, AttributeError):
+        return {}
+
+
+def _write(table: Path, seconds: dict[str, float]) -> None:
+    part = table.with_name(f"{table.name}.{os.getpid()}")
+    with contextlib.suppress(OSError):
+        part.write_text(json.dumps(seconds, indent=1, sort_keys=True), "ascii")
+        part.replace(table)

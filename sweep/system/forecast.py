@@ -1,0 +1,177 @@
+"""Which block is computed next, and how long those to come will take, from what those that are done took.
+
+The timed sample of the grid tells a first guess of every block's seconds. Blocks from all over the grid come first;
+by what each took, the guesses around it are corrected. Then dear blocks come first, lest a worker be left alone with
+one at the end, and now and then one from anywhere, so that cheap ones are known as well.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+import numpy as np
+
+GOLDEN = 0.6180339887498949
+"""Multiples of it, modulo 1, fill an interval evenly and fall into step with the length of no axis."""
+LEAD = 16
+"""One block of so many is computed in the lead,"""
+LEAST_LEAD = 8
+"""or so many blocks, where that is more,"""
+MOST_LEAD = 4
+"""but no more than one of so many."""
+ANYWHERE = 4
+"""After the lead, one block of so many is not chosen by what it takes."""
+AGAIN = 32
+"""At least one of so many is chosen before all are looked at again."""
+EVEN = 1.5
+"""Blocks of which the dearest is not so many times the median come in no order of cost."""
+ALIKE = 6
+"""Blocks on either side, in the order of what was thought, whose error tells that of a block."""
+DOUBT = 0.5
+"""Share by which a forecast from one block is made longer; from n blocks, its n-th part's root."""
+FRAME_SECONDS = 0.1
+"""What an output takes besides its numbers."""
+SHORTEST = 1e-9
+"""Seconds that a block takes at least."""
+
+
+class Forecast:
+    """What the blocks to come will take. Blocks may begin and end in any thread.
+
+    Parameters
+    ----------
+    weights : ndarray
+        Seconds of every block of the grid, as the timed sample has them.
+    jobs : iterable of int
+        Blocks that are to be computed.
+    clock : callable
+        Seconds.
+    """
+
+    def __init__(self, weights: Any, jobs: Iterable[int], clock: Callable[[], float] = time.monotonic) -> None:
+        self._weights, self._clock = np.maximum(weights, SHORTEST), clock
+        self._begun, self._seconds = np.full((2, self._weights.size), np.nan)
+        self._left = np.zeros(self._weights.size, bool)
+        self._left[np.fromiter(jobs, np.intp)] = True
+        self._start: float | None = None
+
+    def begin(self, job: int) -> None:
+        """A core has begun with a block."""
+        self._begun[job] = self._clock()
+
+    def end(self, job: int, seconds: float | None = None) -> None:
+        """A block is done; it took so long, by default since it was begun.
+
+        Elsewhere, cores are at work only shortly before the first block comes back: until then they load and compile.
+        """
+        now = self._clock()
+        if seconds is None:
+            seconds = now - self._begun[job]
+        elif not self._measured().size:
+            self._start = now - seconds
+        self._seconds[job] = max(seconds, SHORTEST)
+        self._left[job] = False
+
+    def again(self, job: int) -> None:
+        """A block has to be computed once more."""
+        self._begun[job], self._left[job] = np.nan, True
+
+    @property
+    def blocks(self) -> int:
+        """How many are left."""
+        return int(self._left.sum())
+
+    @property
+    def left(self) -> float | None:
+        """Seconds until all blocks are done, rather too many; None before the first one is."""
+        measured, left, now = self._measured(), np.flatnonzero(self._left), self._clock()
+        if self._start is None or not measured.size:
+            return None
+        if not left.size:
+            return 0.0
+        running = np.maximum(np.nan_to_num(now - self._begun[left]), 0.0)
+        doubt = 1 + DOUBT / math.sqrt(measured.size)
+        to_come = np.maximum(doubt * self._expected(measured)[left] - running, 0.0)
+        cores = (self._seconds[measured].sum() + running.sum()) / max(now - self._start, SHORTEST)
+        return max(float(to_come.sum() / cores), float(to_come.max()))
+
+    def order(self) -> Iterator[int]:
+        """The blocks to compute, each chosen when it is asked for."""
+        self._start = self._clock() if self._start is None else self._start
+        jobs = np.flatnonzero(self._left)
+        count = jobs.size
+        anywhere = jobs[np.argsort(np.arange(count) * GOLDEN % 1.0)]
+        lead = max(count // LEAD, min(LEAST_LEAD, count // MOST_LEAD))
+        yield from map(int, anywhere[:lead])
+        waiting = anywhere[lead:]
+        while waiting.size:
+            dear = self._dear_first(waiting)
+            some = max(LEAST_LEAD, self._measured().size // 4, waiting.size // AGAIN)
+            chosen = list(dict.fromkeys(map(int, [*waiting[: some // ANYWHERE], *dear[:some]])))[:some]
+            yield from chosen
+            waiting = waiting[~np.isin(waiting, chosen)]
+
+    def _measured(self) -> Any:
+        """Numbers of the blocks of which it is known what they took."""
+        return np.flatnonzero(~np.isnan(self._seconds))
+
+    def _dear_first(self, jobs: Any) -> Any:
+        """Sorted by powers of two of what they will take; as they are where all take about as long."""
+        seconds = self._expected(self._measured())[jobs]
+        if seconds.max() < EVEN * np.median(seconds):
+            return jobs
+        return jobs[np.argsort(-np.round(np.log2(seconds)), kind="stable")]
+
+    def _expected(self, measured: Any) -> Any:
+        """Seconds of every block."""
+        if not measured.size:
+            return self._weights
+        ratio = self._seconds[measured] / self._weights[measured]
+        thought = self._weights * np.interp(np.arange(self._weights.size), measured, ratio)
+        if measured.size < LEAST_LEAD:
+            return thought
+        return thought * self._error(measured, ratio, thought)
+
+    def _error(self, measured: Any, ratio: Any, thought: Any) -> Any:
+        """How many times what is thought blocks take: as measured ones, if they were thought of by their neighbours."""
+        without = self._weights[measured] * _between(measured, ratio)
+        rank = np.argsort(without)
+        sums = np.cumsum(np.vstack([np.zeros(2), np.stack([self._seconds[measured], without], axis=1)[rank]]), axis=0)
+        middle = np.searchsorted(without[rank], thought)
+        low = np.clip(middle - ALIKE, 0, max(0, rank.size - 2 * ALIKE))
+        high = np.minimum(low + 2 * ALIKE, rank.size)
+        took, guessed = (sums[high] - sums[low]).T
+        return took / guessed
+
+
+class Ending:
+    """What is left when all cells are computed: the parts are put together, which takes about as long as writing them.
+
+    Parameters
+    ----------
+    blocks, workers : int
+        Parts that there will be, and threads that put them together.
+    """
+
+    def __init__(self, blocks: int, workers: int) -> None:
+        self._blocks, self._workers = blocks, workers
+        self._wrote: list[float] = []
+
+    def wrote(self, seconds: float) -> None:
+        """A part was written in so long."""
+        self._wrote.append(seconds)
+
+    def seconds(self) -> float:
+        """Forecast, from the parts written so far."""
+        each = sum(self._wrote) / max(1, len(self._wrote))
+        return FRAME_SECONDS + each * self._blocks / self._workers
+
+
+def _between(places: Any, values: Any) -> Any:
+    """What each of the values would be taken for, from those on both sides of it."""
+    share = (places[1:-1] - places[:-2]) / (places[2:] - places[:-2])
+    inside = values[:-2] + share * (values[2:] - values[:-2])
+    return np.concatenate([values[1:2], inside, values[-2:-1]])

@@ -1,0 +1,174 @@
+"""Pulses that neither a series nor a few points tell of, and starts that rounding hides: right, or a word about it."""
+
+import numpy as np
+import pytest
+from columns import solve
+from mpmath import mp, mpf
+
+from kernels.interface import FIRST_REFUSAL, Field, Status
+from kernels.lanes.jit import COMPILED
+from kernels.maths import intervals
+from kernels.scene import exp, power, scene_kernel, sin, sqrt
+from kernels.stepping import stepped_kernel
+
+END = 30
+METHODS = ("taylor", "dop853", "dopri5")
+
+
+def fields(*names):
+    return tuple(Field(name, "1", name) for name in names)
+
+
+def scene(name, rates, states=("x", "t"), parameters=("w", "H", "c", "clock"), make=scene_kernel, **changed):
+    parts = {"surface": lambda t: END - t, "start": lambda: (*[1.0] * (len(states) - 1), 0.0)} | changed
+    return make(name=name, doc="pulse", states=fields(*states), parameters=fields(*parameters), rates=rates, **parts)
+
+
+def gaussian(x, t, w, H, c, clock):
+    return H * exp(-(((t - c) / w) ** 2)), clock
+
+
+GAUSSIAN = scene("gaussian", gaussian)
+SHAPES = scene(
+    "shapes",
+    lambda t, w, H, c, clock: (
+        H / (1 + ((t - c) / w) ** 2),
+        H * power(1 + ((t - c) / w) ** 2, -1.5),
+        H * sqrt((t - c) ** 2 + w * w),
+        H * exp(-abs(t - c) / w),
+        clock,
+    ),
+    ("rational", "cubed", "corner", "edge", "t"),
+)
+COSH = scene("cosh", lambda t, w, H, c, clock: (H * 4 / (exp((t - c) / w) + exp((c - t) / w)) ** 2, clock))
+
+
+def area(antiderivative, w, H, c):
+    """What a pulse H g(y), y = (t - c)/w, adds to 1."""
+    w, H, c = mpf(w), mpf(H), mpf(c)
+    return 1 + H * w * (antiderivative((END - c) / w) - antiderivative(-c / w))
+
+
+def of_gaussian(y):
+    return mp.sqrt(mp.pi) / 2 * mp.erf(y)
+
+
+def cells():
+    """w, H, c over decades, with the one that was found."""
+    random = np.random.default_rng(3)
+    n = 60 if COMPILED else 1
+    w, H, c = 10.0 ** random.uniform(-3, 0.5, n), 10.0 ** random.uniform(-3, 4, n), random.uniform(3, 29, n)
+    return [*zip(w, H, c, strict=True), (1.0, 1e4, 20.0), (1e-3, 1.0, 20.0)][-60 if COMPILED else -2 :]
+
+
+def solved(kernel, method, rtol, cells):
+    w, H, c = np.transpose(cells)
+    return solve(kernel, method, w, H, c, np.ones(len(w)), flips=np.ones(len(w)), rtol=rtol)
+
+
+def wrong(found, status, true, rtol):
+    """Cells that say OK and are not right."""
+    error = np.array([float(abs(mpf(float(f)) / t - 1)) for f, t in zip(found, true, strict=True)])
+    return (status == Status.OK) & ~(error <= rtol)
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
+@pytest.mark.parametrize("method", METHODS if COMPILED else METHODS[:1])
+def test_a_gaussian_pulse_is_seen_wherever_it_is_and_however_narrow(method, rtol):
+    outputs, status = solved(GAUSSIAN, method, rtol, cells())
+    assert not wrong(outputs["x"], status, [area(of_gaussian, *cell) for cell in cells()], rtol).any()
+    assert (status == Status.OK).mean() > 0.9
+
+
+@pytest.mark.skipif(not COMPILED, reason="many steps")
+@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
+def test_pulses_of_all_shapes_are_seen(rtol):
+    def of_corner(y):
+        return (y * mp.sqrt(1 + y * y) + mp.asinh(y)) / 2
+
+    def of_edge(y):
+        return mp.sign(y) * (1 - mp.exp(-abs(y)))
+
+    outputs, status = solved(SHAPES, "taylor", rtol, cells())
+    assert (status == Status.OK).mean() > 0.5
+    for name, whole in (("rational", mp.atan), ("cubed", lambda y: y / mp.sqrt(1 + y * y)), ("edge", of_edge)):
+        assert not wrong(outputs[name], status, [area(whole, *cell) for cell in cells()], rtol).any()
+    corners = [1 + w * (area(of_corner, w, H, c) - 1) for w, H, c in cells()]
+    assert not wrong(outputs["corner"], status, corners, rtol).any()
+
+
+@pytest.mark.skipif(not COMPILED, reason="many steps")
+@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
+def test_a_pulse_of_exponentials_that_cancel_is_seen_or_refused(rtol):
+    outputs, status = solved(COSH, "taylor", rtol, cells())
+    assert not wrong(outputs["x"], status, [area(mp.tanh, *cell) for cell in cells()], rtol).any()
+    wide = np.array([w > 0.1 for w, _, _ in cells()])
+    assert (status[wide] == Status.OK).mean() > 0.9
+
+
+@pytest.mark.skipif(not COMPILED, reason="many steps")
+def test_a_pulse_of_the_switch_itself_is_seen():
+    kernel = scene(
+        "surface", lambda x, t, w, H, c, clock: (H, clock), surface=lambda t, w, c: 0.5 - exp(-(((t - c) / w) ** 2))
+    )
+    widths = [1e-3, 0.03, 1.0]
+    outputs, status = solved(kernel, "taylor", 1e-10, [(w, 1.0, 20.0) for w in widths])
+    assert not wrong(outputs["time"], status, [20 - mpf(w) * mp.sqrt(mp.log(2)) for w in widths], 1e-10).any()
+    assert (status[:2] == Status.OK).all()  # the last one's unit of time, e/e', is 1e173 s
+
+
+@pytest.mark.skipif(not COMPILED, reason="many steps")
+def test_a_pulse_of_the_state_is_seen():
+    resistance = scene(
+        "resistance", lambda x, t, w, H, c, clock: (clock / (1 + H * exp(-(((x - c) / w) ** 2))), clock),
+        surface=lambda x: END - x,
+    )  # fmt: skip
+    widths = [1e-3, 0.03, 1.0]
+    outputs, status = solved(resistance, "taylor", 1e-10, [(w, 1e4, 20.0) for w in widths])
+    true = [END - 1 + 1e4 * mpf(w) * mp.sqrt(mp.pi) for w in widths]
+    assert not wrong(outputs["time"], status, true, 1e-10).any()
+    assert (status < FIRST_REFUSAL).all()
+
+
+@pytest.mark.skipif(not COMPILED, reason="many steps")
+@pytest.mark.parametrize("method", ["rk4", "dop853"])
+def test_at_a_fixed_step_a_pulse_between_the_points_is_not_quiet(method):
+    kernel = scene("gaussian_steps", gaussian, make=stepped_kernel)
+    w = np.array([1e-3, 0.01, 0.1, 0.3, 1.0])
+    for step in (2.9, 0.3):
+        outputs, status = solve(kernel, method, w, 1e4, 19.3, 1.0, flips=1.0, step=step, rtol=1e-6)
+        true = [float(area(of_gaussian, each, 1e4, 19.3)) for each in w]
+        assert ((status == Status.INACCURATE) | (abs(outputs["x"] / true - 1) <= outputs["error"])).all()
+        assert status[0] == Status.INACCURATE
+    assert status[-1] == Status.OK
+
+
+@pytest.mark.parametrize("method", ["taylor", "dop853"] if COMPILED else ["taylor"])
+def test_a_start_that_rounding_puts_on_the_switch_is_not_quiet(method):
+    kernel = scene(
+        "late", lambda x, t, clock: (sin(3 * t), clock), parameters=("t0", "clock"),
+        surface=lambda t, t0: t0 + 10 - t, start=lambda t0: (0.0, t0),
+    )  # fmt: skip
+    t0 = np.array([0.0, 1e17, 1e18, 1e19] if COMPILED else [1e18])
+    outputs, status = solve(kernel, method, t0, np.ones(len(t0)), flips=np.ones(len(t0)), rtol=1e-12)
+    assert (status[t0 > 1e10] != Status.OK).all()
+    if COMPILED:
+        assert status[0] == Status.OK
+        assert outputs["time"][0] == pytest.approx(10.0, rel=1e-12)
+
+
+def test_intervals_hold_what_they_enclose():
+    random = np.random.default_rng(1)
+    for _ in range(200):
+        u, w = np.sort(random.normal(size=(2, 2)))
+        x, y = (random.uniform(*side) for side in (u, w))
+        e, f = abs(u), random.uniform(*np.sort(abs(u)))
+        e.sort()
+        cases = [
+            (intervals.added(u, w), x + y), (intervals.multiplied(u, w), x * y), (intervals.over(w), 1 / y),
+            (intervals.half_squared(u), x * x / 2), (intervals.of_exp(u), np.exp(x)),
+            (intervals.of_wave(np.sin(u[0]), u), np.sin(x)), (intervals.of_sqrt(e), np.sqrt(f)),
+            (intervals.of_log(e), np.log(f)), (intervals.of_power(e, -1.5), f**-1.5),
+        ]  # fmt: skip
+        for (low, high), value in cases:
+            assert low - 1e-14 * abs(low) <= value <= high + 1e-14 * abs(high)

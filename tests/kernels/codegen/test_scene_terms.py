@@ -1,0 +1,165 @@
+"""What a scene's functions may be made of: plain numbers, comparisons, numpy's; and what is said of the rest."""
+
+import math
+
+import numpy as np
+import pytest
+from columns import relative_error, solve
+from mpmath import mp, mpf
+from numba.core.errors import TypingError
+
+from kernels.codegen import followed_twice
+from kernels.codegen.expression import Graph, SceneError
+from kernels.codegen.module import compiling
+from kernels.codegen.record import record
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+from kernels.scene import Field, Scene, maximum, minimum, scene_kernel, sign, sin, where
+from kernels.stepping import stepped_kernel
+
+METHODS = ["taylor", "taylor_once", "dop853", "dopri5"]
+
+
+def fields(*names):
+    return tuple(Field(name, "1", name) for name in names)
+
+
+PULSE = {
+    "name": "pulse", "doc": "a force of a short time, and rates that no state and no parameter is in",
+    "states": fields("x", "t", "still"), "parameters": fields("H", "w", "unused"),
+    "rates": lambda t, w, H: (H * (sign(t - 20) - sign(t - 20 - w)) / 2, np.int64(1), 0),
+    "surface": lambda t: 30 - t, "start": lambda: (0, 0.0, 7), "switch": lambda: (0, 0, 7),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def pulse():
+    return scene_kernel(**PULSE)
+
+
+@pytest.mark.parametrize("method", METHODS if COMPILED else ["taylor", "dopri5"])
+@pytest.mark.parametrize("flips", [1.0, 2.0])
+def test_a_pulse_between_two_signs_and_rates_that_are_plain_numbers_are_followed_by_every_method(pulse, method, flips):
+    H, w = np.array([2.0, 3.0, 1e4]), np.array([1.0, 1e-3, 3.0])
+    outputs, status = solve(pulse, method, H, w, np.full(3, 5.0), np.full(3, flips))
+    assert (status == Status.OK).all()
+    np.testing.assert_allclose(outputs["time"], 30.0 * flips, rtol=1e-9)
+    np.testing.assert_allclose(outputs["x"], H * w, rtol=1e-9)
+    np.testing.assert_array_equal(outputs["still"], 7.0)
+
+
+def test_a_scene_without_parameters_and_of_one_state_is_followed_by_every_method():
+    clock = {
+        "name": "bare_clock", "doc": "t' = 1", "states": fields("t"), "parameters": (),
+        "rates": lambda: 1, "surface": lambda t: 1 - t, "start": lambda: 0, "switch": lambda: 0,
+    }  # fmt: skip
+    kernel, stepped = scene_kernel(**clock), stepped_kernel(**clock)
+    runs = [(kernel, method, {}) for method in METHODS]
+    runs += [(stepped, method, {"step": np.array([0.25])}) for method in ("euler", "dop853")]
+    for scene, method, step in runs[:1] if COMPILED else runs:
+        outputs, status = solve(scene, method, np.array([3.0]), **step)
+        assert status[0] == Status.OK
+        assert outputs["time"][0] == pytest.approx(3.0, rel=1e-12)
+
+
+def test_maximum_minimum_and_where_are_exact_and_bend_where_they_should():
+    """x' = max(1/2, min(x, c)), y' = 3 or -1: growth at 1/2, then x, then c, to 4."""
+    kernel = scene_kernel(
+        name="bends", doc="growth between limits", states=fields("x", "y"), parameters=fields("c"),
+        rates=lambda x, c: (maximum(np.float64(0.5), minimum(x, c)), where(x >= 1, 3, -1.0)),
+        surface=lambda x: 4.0 - x, start=lambda: (0.0, 0.0),
+    )  # fmt: skip
+    outputs, status = solve(kernel, "taylor", np.array([2.0]), np.array([1.0]), rtol=1e-12)
+    true = 1 + mp.log(2) + mp.log(2) + mpf(2) / 2
+    at_1 = 1 + mp.log(2)
+    assert status[0] == Status.OK
+    assert relative_error(outputs["time"], [true])[0] < 1e-13
+    assert relative_error(outputs["y"], [3 * (true - at_1) - at_1])[0] < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("condition", "chosen"),
+    [
+        (lambda c: c > 2.0, "yyx"), (lambda c: c >= 2.0, "yxx"),
+        (lambda c: c < 2.0, "xyy"), (lambda c: c <= 2.0, "xxy"),
+        (lambda c: np.float64(2.0) < c, "yyx"), (lambda c: np.float64(2.0) >= c, "xxy"),
+    ],
+)  # fmt: skip
+def test_where_of_a_parameter_takes_the_side_that_it_lies_on_and_at_the_edge_what_is_said(condition, chosen):
+    kernel = scene_kernel(
+        name="chosen", doc="", states=fields("t"), parameters=fields("c"), rates=lambda: 1.0,
+        surface=lambda t: 1.0 - t, start=lambda c: where(condition(c), 0.75, 0.5),
+    )  # fmt: skip
+    if COMPILED:
+        pytest.skip("many small compilations; run with NUMBA_DISABLE_JIT=1")
+    outputs, _ = solve(kernel, "taylor_once", np.array([1.0, 2.0, 3.0]), np.ones(3))
+    assert "".join("x" if time == 0.25 else "y" for time in outputs["time"]) == chosen
+
+
+def test_of_plain_numbers_maximum_minimum_and_where_are_plain():
+    assert (maximum(2.0, 3), minimum(2.0, 3), maximum(2.0, 2.0)) == (3.0, 2.0, 2.0)
+    assert (where(2 > 1, 5.0, 6.0), where(2 < 1, 5.0, 6.0)) == (5.0, 6.0)
+
+
+def test_numpys_functions_and_numbers_record_the_same_as_ours():
+    graph = Graph()
+    u = graph.series("u")
+    assert np.sin(u) is sin(u)
+    assert np.abs(u) is abs(u)
+    assert np.float64(2.0) * u is 2.0 * u
+    assert np.maximum(u, 1) is maximum(u, 1.0)
+    assert 1 - np.float64(3.0) / u is 1.0 - 3.0 / u
+
+
+def scene(**changed):
+    parts = {
+        "name": "wrong", "doc": "", "states": ("x", "v"), "parameters": ("c",), "rates": lambda x, v: (v, -x),
+        "surface": lambda x, side: 1.0 - side * x, "start": lambda: (0.0, 1.0),
+    }  # fmt: skip
+    return Scene(**parts | changed)
+
+
+@pytest.mark.parametrize(
+    ("role", "function", "says"),
+    [
+        ("rates", lambda v, side: (v, 1.0 if side == 1 else -1.0), "equal.*where"),
+        ("rates", lambda v, side: (v, 1.0 if side != 1 else -1.0), "equal.*where"),
+        ("rates", lambda x, v: (v, max(x, 0.0)), "compare.*maximum"),
+        ("rates", lambda x, v: (v, np.where(x > 0, 1.0, 2.0)), "compare.*where"),
+        ("rates", lambda x, v: (v, math.sin(x)), "function of plain numbers.*sin"),
+        ("rates", lambda x, v: (v, np.tanh(x)), "tanh is not recorded"),
+        ("rates", lambda x, v: (v, x % 1.0), "unsupported operand"),
+        ("rates", lambda x, v: (v, x.mean()), "no attribute"),
+        ("rates", lambda x, v: (v, 2.0**x), "exponent"),
+        ("rates", lambda x, v: (v, math.inf * x), "float64"),
+        ("rates", lambda x, v: (v, math.nan), "float64"),
+        ("rates", lambda x, v: (v, 10**400 * x), "float64"),
+        ("rates", lambda x, v: (v, x / 0), "divides by 0"),
+        ("rates", lambda x, v: (v, None), "None"),
+        ("surface", lambda x: [x, x], "returns 2 values"),
+        ("start", lambda c: (c, 1 / 0), "ZeroDivisionError"),
+        ("switch", lambda x, w: (x, w), "asks for 'w'"),
+    ],
+)
+def test_what_cannot_be_recorded_is_named_with_its_function_in_a_line(role, function, says):
+    with pytest.raises(SceneError, match=f"^{role} of the scene wrong.*{says}") as refusal:
+        record(scene(**{role: function}))
+    assert len(str(refusal.value).splitlines()) == 1
+    assert len(str(refusal.value)) < 300
+
+
+def test_rates_in_an_array_are_taken_apart():
+    rates = record(scene(rates=lambda x, v: np.array([v, -x]))).rates
+    assert [rate.kind for rate in rates] == ["input", "scaled"]
+
+
+def test_what_numba_cannot_compile_is_told_in_two_lines(monkeypatch, pulse):
+    def fails(*arguments):
+        raise TypingError("Failed in nopython mode pipeline\n\nNo implementation of function\n" + 99 * "more\n")
+
+    monkeypatch.setattr(followed_twice, "followed", fails)
+    with pytest.raises(SceneError, match="pulse cannot be compiled for the method taylor: No implem") as refusal:
+        solve(pulse, "taylor", np.ones(1), np.ones(1), np.ones(1), np.ones(1))
+    assert len(str(refusal.value).splitlines()) == 2
+    with pytest.raises(KeyError), compiling("pulse", "taylor"):
+        raise KeyError

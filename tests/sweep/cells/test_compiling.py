@@ -1,0 +1,126 @@
+"""What is told of compiling: while it lasts, in the plan, and not where there is nothing to compile."""
+
+import dataclasses
+import io
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import toy
+from toy_studies import build
+
+import sweep
+from sweep.cells import compiling
+from sweep.cells.compiling import Compiling
+from sweep.explore.plan import Plan, plan
+
+ROOT = Path(__file__).parents[3]
+STUDY = 'kernel = "foliot"\nmethod = "closed"\n[axes]\nmu = [1.0, 2.0]\n[fixed]\na = 1.0\nphi0 = 1.0\n'
+
+
+class Dispatcher:
+    """A function as numba makes them: compiled, by sleeping, when it is called first."""
+
+    def __init__(self, function, seconds):
+        self.function, self.seconds, self.signatures = function, seconds, []
+
+    def __call__(self, *columns):
+        if not self.signatures:
+            time.sleep(self.seconds)
+            self.signatures.append("float64")
+        self.function(*columns)
+
+
+@pytest.fixture
+def table(tmp_path, monkeypatch):
+    """The file of what compiling took."""
+    monkeypatch.setattr(compiling, "SILENT_SECONDS", 0.05)
+    monkeypatch.setattr(compiling, "machine_code_folder", lambda: tmp_path / "code")
+    return tmp_path / compiling.TABLE
+
+
+def slow_to_compile(seconds=0.2):
+    """The toy's study with one method that takes so long to compile."""
+    study = build(axes={"height": [1.0, 2.0]}, method="exact")
+    methods = [
+        dataclasses.replace(m, solve=Dispatcher(m.solve, seconds)) if m.name == "exact" else m
+        for m in study.kernel.methods
+    ]
+    return dataclasses.replace(study, kernel=dataclasses.replace(toy.KERNEL, methods=tuple(methods)))
+
+
+def test_compiling_is_told_with_the_name_of_the_method_while_it_lasts(table):
+    log = io.StringIO()
+    sweep.run(slow_to_compile(), progress=log)
+    assert log.getvalue().count("compiling toy:KERNEL.exact ...\n") == 1
+    assert json.loads(table.read_text())["toy:KERNEL.exact"] == pytest.approx(0.2, abs=0.15)
+    sweep.run(slow_to_compile(), progress=log)
+    assert "compiling toy:KERNEL.exact ... (about 0.2 s when last done)" in log.getvalue()
+
+
+def test_of_what_is_compiled_in_a_moment_nothing_is_told(table):
+    log = io.StringIO()
+    sweep.run(slow_to_compile(0.0), progress=log)
+    assert log.getvalue() == ""
+    assert not table.exists()
+
+
+@pytest.mark.parametrize("damage", ["", "[]", '{"toy:KERNEL.exact": "long"}', '{"toy:KERNEL.exact": -1}', "\xff"])
+def test_a_damaged_table_is_as_good_as_none(table, damage):
+    table.write_text(damage, "latin-1")
+    log = io.StringIO()
+    sweep.run(slow_to_compile(), progress=log)
+    assert "compiling toy:KERNEL.exact ...\n" in log.getvalue()
+
+
+def test_a_plan_tells_what_compiling_took(table):
+    told = []
+    found = plan(slow_to_compile(), note=told.append)
+    assert found.compile_seconds == pytest.approx(0.2, abs=0.15)
+    assert told == ["compiling toy:KERNEL.exact ..."]
+    assert "  compile   about 0." in str(found)
+    assert plan(slow_to_compile(0.0)).compile_seconds == 0
+    assert "compile " not in str(plan(slow_to_compile(0.0)))
+
+
+@pytest.mark.parametrize(
+    ("kernel", "folder", "text"),
+    [
+        ("foliot", Path(), "about 3.0 s just now; the machine code is kept"),
+        ("foliot", None, "about 3.0 s before the first cell"),
+        ("my:KERNEL", Path(), "about 3.0 s before the first cell"),
+    ],
+)
+def test_a_plan_says_whether_the_run_compiles_again(monkeypatch, kernel, folder, text):
+    monkeypatch.setattr("sweep.explore.plan.machine_code_folder", lambda: folder)
+    assert Plan._compile_text(SimpleNamespace(kernel=kernel, compile_seconds=3.0)) == text
+
+
+def test_a_kernel_of_ours_is_told_once_and_then_kept(tmp_path):
+    """In two processes, everything that is compiled is told, however quick."""
+    (tmp_path / "study.toml").write_text(STUDY)
+    code = (
+        "from sweep import cli, compiling\ncompiling.SILENT_SECONDS = 0\n"
+        f"cli.main(['run', r'{tmp_path}/study.toml', '-o', r'{tmp_path}/out.h5', '--force'])"
+    )
+    env = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    env.pop("NUMBA_CACHE_DIR", None)
+    told = [
+        subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stderr
+        for _ in range(2)
+    ]
+    assert "compiling foliot.closed ..." in told[0]
+    assert told[1] == ""
+    assert "foliot.closed" in json.loads((tmp_path / "foliot" / compiling.TABLE).read_text())
+
+
+def test_values_and_names_are_those_of_the_kernel_that_is_watched():
+    watched = Compiling(toy.KERNEL, "toy:KERNEL").kernel
+    assert watched.check.__name__ == toy.KERNEL.check.__name__
+    assert [m.name for m in watched.methods] == [m.name for m in toy.KERNEL.methods]
+    assert [m.bound is None for m in watched.methods] == [m.bound is None for m in toy.KERNEL.methods]

@@ -1,0 +1,214 @@
+"""Forecasts of runs on a simulated clock, with blocks that take what they are told to take."""
+
+import heapq
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from sweep.cells.partition import Partition, Sample
+from sweep.system.forecast import FRAME_SECONDS, Ending, Forecast
+
+CELLS = 2**18
+
+
+def flat(axis):
+    """Where each cell lies on the first (0 to 1) or second axis of a grid of 512 by 512."""
+    place = np.arange(CELLS) // 512 if axis == 0 else np.arange(CELLS) % 512
+    return place / 511
+
+
+def scattered(share, dear):
+    """A share of the cells, anywhere, that is so many times as dear."""
+    return np.where(np.random.default_rng(1).random(CELLS) < share, dear, 1.0)
+
+
+COSTS = {
+    "even": np.ones(CELLS),
+    "dear last": 10.0 ** (3 * flat(0)),
+    "dear first": 10.0 ** (-3 * flat(0)),
+    "dear along the inner axis": 10.0 ** (3 * flat(1)),
+    "dear in the middle": 1 + 200 * np.exp(-(((flat(0) - 0.43) / 0.05) ** 2)),
+    "a narrow ridge": 1 + 100 * (abs(flat(0) - 0.7) < 0.02),
+    "a border across": 1 + 100 * (abs(flat(0) - flat(1)) < 0.03),
+    "two methods": np.where(flat(0) < 0.35, 1.0, 40.0),
+    "few dear cells": scattered(0.001, 3000.0),
+    "a quarter known": np.where(flat(0) < 0.25, 1e-3, 1.0),
+    "every other known": np.where(np.arange(CELLS) // 512 % 2, 1e-3, 1.0),
+    "in steps": 4.0 ** np.floor(6 * flat(0)),
+}
+
+
+class Run:
+    """Workers that take blocks in the forecast's order; probes of 32 cells at 64 places, each off by up to a half."""
+
+    def __init__(self, costs, blocks, workers, waste=0.0, seed=0):
+        partition = Partition(CELLS, CELLS // blocks)
+        edges = np.arange(partition.count + 1) * partition.cells
+        self.costs = np.add.reduceat(costs, edges[:-1]) + waste
+        places = (2 * np.arange(64) + 1) * CELLS // 128
+        noise = np.random.default_rng(seed).uniform(0.5, 1.5, 64)
+        probed = noise * [costs[p : p + 32].mean() for p in places]
+        self.weights = Sample(places, probed, 32, np.zeros(1), np.zeros(1)).weights(partition)
+        self.now, self.workers = 0.0, workers
+        self.forecast = Forecast(self.weights, range(partition.count), lambda: self.now)
+
+    def ends(self):
+        """The number of blocks that are done, each time it grows; as the pool does, blocks are taken ahead of time."""
+        jobs, busy = self.forecast.order(), []
+        queue = list(islice(jobs, 4 * self.workers))
+        for count in range(1, len(self.costs) + 1):
+            while queue and len(busy) < self.workers:
+                job = queue.pop(0)
+                self.forecast.begin(job)
+                heapq.heappush(busy, (self.now + self.costs[job], job))
+            self.now, job = heapq.heappop(busy)
+            self.forecast.end(job)
+            queue += islice(jobs, 1)
+            yield count
+
+    def forecasts(self):
+        """Share of the blocks that are done, the time, and how much is forecast to be left, after each block."""
+        return [(count / len(self.costs), self.now, self.forecast.left) for count in self.ends()]
+
+
+NOISE = ("few dear cells", "every other known")
+"""Blocks that tell nothing of their neighbours."""
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("workers", [1, 2, 8])
+@pytest.mark.parametrize("name", COSTS)
+def test_from_a_tenth_on_the_time_left_is_within_30_percent(name, workers, seed):
+    told = Run(COSTS[name], 512, workers, seed=seed).forecasts()
+    end, off = told[-1][1], 0.5 if name in NOISE else 0.3
+    for least in (0.10, 0.25, 0.50):
+        share, now, left = next(row for row in told if row[0] >= least)
+        assert left >= (1 - off) * (end - now) - 0.03 * end, (share, left, end - now)
+        assert left <= max((1 + off) * (end - now), end - now + 0.2 * end), (share, left, end - now)
+
+
+@pytest.mark.parametrize("name", sorted(COSTS.keys() - set(NOISE)))
+def test_a_forecast_errs_on_the_long_side(name):
+    """Of all blocks from the tenth part to the last, over three samples of the grid: nine in ten are not too short."""
+    short = []
+    for seed in range(3):
+        told = Run(COSTS[name], 512, 2, seed=seed).forecasts()
+        end = told[-1][1]
+        short += [left < 0.97 * (end - now) for share, now, left in told if 0.1 <= share < 1]
+    assert np.mean(short) < 0.1
+
+
+@pytest.mark.parametrize("name", COSTS)
+def test_every_block_comes_once_whatever_they_take(name):
+    run = Run(COSTS[name], 100, 3)
+    assert len(list(run.ends())) == len(run.costs)
+    assert run.forecast.left == 0.0
+    assert run.forecast.blocks == 0
+
+
+def test_the_lead_is_spread_over_the_grid():
+    lead = np.sort(list(islice(Forecast(np.ones(4096), range(4096)).order(), 256)))
+    assert np.diff(np.r_[0, lead, 4096]).max() <= 4 * 16
+
+
+def test_dear_blocks_come_first_once_some_from_all_over_are_known():
+    forecast = Forecast(np.geomspace(1.0, 1e3, 64), range(64))
+    first = list(forecast.order())
+    assert sorted(first) == list(range(64))
+    assert np.mean(first[8:24]) > 48
+    assert np.mean(first[-16:]) < 16
+
+
+def test_what_was_measured_counts_and_not_what_was_thought():
+    """The sample takes the second half for cheap; the lead finds that it is the dear one."""
+    costs = np.repeat([1.0, 100.0], 256)
+    forecast = Forecast(costs[::-1], range(512))
+    jobs = forecast.order()
+    for job in islice(jobs, 32):
+        forecast.end(job, costs[job])
+    assert np.mean(list(islice(jobs, 12))) > 200
+
+
+def test_only_blocks_that_are_left_are_computed_and_forecast():
+    now = 0.0
+    forecast = Forecast(np.ones(100), range(90, 100), lambda: now)
+    jobs = forecast.order()
+    assert forecast.left is None
+    for _ in range(5):
+        job = next(jobs)
+        forecast.begin(job)
+        now += 2.0
+        forecast.end(job)
+    assert 10.0 <= forecast.left <= 13.0
+    assert sorted([job, *jobs])[0] >= 90
+
+
+def test_a_block_at_work_counts_for_the_part_of_it_that_is_left():
+    now = 0.0
+    forecast = Forecast(np.ones(100), range(100), lambda: now)
+    for job in sorted(forecast.order())[:99]:
+        forecast.begin(job)
+        now += 1.0
+        forecast.end(job)
+    forecast.begin(99)
+    before = forecast.left
+    now += 0.75
+    assert forecast.left == pytest.approx(before - 0.75)
+
+
+def test_what_workers_elsewhere_take_to_start_is_not_taken_for_slowness():
+    now = 0.0
+    forecast = Forecast(np.ones(100), range(100), lambda: now)
+    jobs = forecast.order()
+    next(jobs)
+    now = 60.0
+    for job in range(20):
+        now += 0.5
+        forecast.end(job, 0.5)
+    assert 40.0 <= forecast.left < 50.0
+
+
+def test_one_long_block_is_waited_for_by_all_workers():
+    now = 0.0
+    forecast = Forecast(np.r_[np.ones(99), 50.0], range(100), lambda: now)
+    for job in sorted(forecast.order())[:99]:
+        forecast.begin(job)
+    now += 9.9
+    for job in range(99):
+        forecast.end(job)
+    assert forecast.left >= 50.0
+
+
+def test_a_block_that_comes_again_is_left_again():
+    forecast = Forecast(np.ones(4), range(4))
+    assert len(list(forecast.order())) == 4
+    for job in range(4):
+        forecast.begin(job)
+        forecast.end(job)
+    forecast.again(2)
+    assert forecast.left > 0
+    assert list(forecast.order()) == [2]
+
+
+def test_a_hundred_thousand_blocks_are_ordered_at_once():
+    """For a cluster takes thousands of blocks before the first is done: all are looked at anew a few hundred times."""
+    forecast = Forecast(np.geomspace(1.0, 10.0, 100_000), range(100_000))
+    looked, real = 0, forecast._expected
+
+    def counted(measured):
+        nonlocal looked
+        looked += 1
+        return real(measured)
+
+    forecast._expected = counted
+    assert len(set(forecast.order())) == 100_000
+    assert looked < 1000
+
+
+def test_the_parts_are_put_together_in_as_long_as_they_were_written():
+    ending = Ending(100, 4)
+    assert ending.seconds() == FRAME_SECONDS
+    for seconds in (1.0, 3.0):
+        ending.wrote(seconds)
+    assert ending.seconds() == pytest.approx(2.0 * 100 / 4 + FRAME_SECONDS)
