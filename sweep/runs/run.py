@@ -236,7 +236,7 @@ def _run_to_file(task: _Task, output: Path) -> bool:
 def _run_session(task: _Task, session: Session, store: Store, output: Path) -> bool:
     """Computes and puts together what is missing; False where the time was up before the end."""
     jobs = range(session.blocks.count) if store.spec is None else store.missing()
-    ending = Ending(session.blocks.count, task.workers)
+    ending = Ending(session.blocks.count, task.workers, session.granules.count * session.row_bytes)
     progress = session.progress(task.stream, output.name, jobs, ending.seconds)
     _check_space(session, output, progress)
     # held back wherever they would leave half a file behind

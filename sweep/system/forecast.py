@@ -34,6 +34,8 @@ DOUBT = 0.5
 """Share by which a forecast from one block is made longer; from n blocks, its n-th part's root."""
 FRAME_SECONDS = 0.1
 """What an output takes besides its numbers."""
+SLOW_DISK = 5e7
+"""Bytes a second that any disk writes at a stretch."""
 SHORTEST = 1e-9
 """Seconds that a block takes at least."""
 
@@ -154,10 +156,12 @@ class Ending:
     ----------
     blocks, workers : int
         Parts that there will be, and threads that put them together.
+    size : float
+        Bytes of all parts. Many small parts take long for each is synced, which one output is not.
     """
 
-    def __init__(self, blocks: int, workers: int) -> None:
-        self._blocks, self._workers = blocks, workers
+    def __init__(self, blocks: int, workers: int, size: float) -> None:
+        self._blocks, self._workers, self._size = blocks, workers, size
         self._wrote: list[float] = []
 
     def wrote(self, seconds: float) -> None:
@@ -167,7 +171,7 @@ class Ending:
     def seconds(self) -> float:
         """Forecast, from the parts written so far."""
         each = sum(self._wrote) / max(1, len(self._wrote))
-        return FRAME_SECONDS + each * self._blocks / self._workers
+        return FRAME_SECONDS + min(each * self._blocks / self._workers, self._size / SLOW_DISK)
 
 
 def _between(places: Any, values: Any) -> Any:
