@@ -17,7 +17,7 @@ import math
 
 from kernels.balance import _driven_refined, _ringdown
 from kernels.integrate import linear_flow
-from kernels.interface import Status
+from kernels.lanes.codes import INACCURATE, NO_METHOD, NOT_CONVERGED, OK, OUT_OF_RANGE, STICKS
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import choose, fma, isnt, magnitude, nearest, some, sqrt, where
 from kernels.maths import pairs
@@ -29,9 +29,6 @@ ROUNDING = 4e-15
 """Relative error of one half swing: of times, speeds, rises, and of the terms of (2)."""
 _LARGEST = 1e140
 """Swing, in units, whose square still is well inside float64."""
-
-_OK, _NOT_CONVERGED, _INACCURATE = float(Status.OK), float(Status.NOT_CONVERGED), float(Status.INACCURATE)
-_STICKS, _OUT_OF_RANGE, _NO_METHOD = float(Status.STICKS), float(Status.OUT_OF_RANGE), float(Status.NO_METHOD)
 
 
 @jit
@@ -186,13 +183,13 @@ def newton(scene, rtol):
     of_multiplier = where(kept > 1e-300, of_multiplier, 0.0)
     right = (error <= rtol * a) & (of_time <= rtol) & (of_multiplier <= rtol)
     lost = active | isnt(comes)
-    verdict = where(lost, _NOT_CONVERGED, where(right, _OK, _INACCURATE))
+    verdict = where(lost, NOT_CONVERGED, where(right, OK, INACCURATE))
     poor = swings & tame & (lost | isnt(right))
     if some(poor):
         (a, time, kept), found = _refined(scene, where(comes, p, high), (a, time, kept), poor)
-        verdict = where(found, where(rtol >= ROUNDING, _OK, _INACCURATE), verdict)
-    verdict = where(swings, verdict, _STICKS)
-    return a, time, kept, where(tame, verdict, _OUT_OF_RANGE)
+        verdict = where(found, where(rtol >= ROUNDING, OK, INACCURATE), verdict)
+    verdict = where(swings, verdict, STICKS)
+    return a, time, kept, where(tame, verdict, OUT_OF_RANGE)
 
 
 @jit_call
@@ -210,7 +207,7 @@ def closed(scene):
     kept = where(free, kept, kept_smooth)
     known = free | (smooth & isnt(lifts))
     runs = (free & runs) | (isnt(free) & (zeta < 1.0))
-    return a, time, kept, where(known, where(runs, _OK, _STICKS), _NO_METHOD)
+    return a, time, kept, where(known, where(runs, OK, STICKS), NO_METHOD)
 
 
 @jit

@@ -12,7 +12,8 @@ balance released from rest comes to th = 0.
 import math
 
 from kernels.balance import _driven_swing
-from kernels.interface import Field, Kernel, Method, Status
+from kernels.interface import Field, Kernel, Method
+from kernels.lanes.codes import BAD_INPUT, NO_LIMIT_CYCLE, OK, OUT_OF_RANGE
 from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none, partly
@@ -22,9 +23,6 @@ from kernels.maths.elementary import is_normal, scale
 ROUNDING = 4e-15
 """What `closed` is right to."""
 
-_OK, _OUT_OF_RANGE = float(Status.OK), float(Status.OUT_OF_RANGE)
-_BAD_INPUT, _NO_LIMIT_CYCLE = float(Status.BAD_INPUT), float(Status.NO_LIMIT_CYCLE)
-
 
 @jit
 def _write(i, cycle, units, omega_n, amplitude, period, multiplier, status):
@@ -33,7 +31,7 @@ def _write(i, cycle, units, omega_n, amplitude, period, multiplier, status):
     swing, whole = scale(a, e), 2.0 * time / omega_n
     wide, timed = is_normal(swing), is_normal(whole)
     amplitude[i], period[i], multiplier[i] = or_none(swing, wide), or_none(whole, timed), kept
-    status[i] = where(fine, partly(wide & timed, verdict), _OUT_OF_RANGE)
+    status[i] = where(fine, partly(wide & timed, verdict), OUT_OF_RANGE)
 
 
 @jit
@@ -81,7 +79,7 @@ def _check(i, zeta, omega_n, r, w, m, beta, status):
     one = (kicks & nothing_else) | (lifts & isnt(kicks))
     fine = positive & finite & (m[i] < math.inf) & (beta[i] < math.inf) & one
     lossless = isnt((zeta[i] > 0.0) | (r[i] > 0.0))
-    status[i] = where(fine, where(lossless, _NO_LIMIT_CYCLE, _OK), _BAD_INPUT)
+    status[i] = where(fine, where(lossless, NO_LIMIT_CYCLE, OK), BAD_INPUT)
 
 
 @entry()

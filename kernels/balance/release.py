@@ -15,7 +15,19 @@ import math
 
 from kernels.balance import _ringdown
 from kernels.balance._ringdown import RECURSION_LIMIT
-from kernels.interface import Field, Kernel, Method, Status
+from kernels.interface import Field, Kernel, Method
+from kernels.lanes.codes import (
+    BAD_INPUT,
+    GRAZING,
+    INACCURATE,
+    NEVER_ENDS,
+    NO_LIMIT_CYCLE,
+    NOT_CONVERGED,
+    OK,
+    OUT_OF_RANGE,
+    OVERDAMPED,
+    STEP_LIMIT,
+)
 from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none, partly
@@ -24,12 +36,6 @@ from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW, is_normal, scale
 
 ROUNDING = 2e-15
 """What `closed` is right to."""
-
-_OK, _INACCURATE, _GRAZING = float(Status.OK), float(Status.INACCURATE), float(Status.GRAZING)
-_OVERDAMPED, _NEVER_ENDS = float(Status.OVERDAMPED), float(Status.NEVER_ENDS)
-_BAD_INPUT, _NO_LIMIT_CYCLE = float(Status.BAD_INPUT), float(Status.NO_LIMIT_CYCLE)
-_OUT_OF_RANGE, _NOT_CONVERGED = float(Status.OUT_OF_RANGE), float(Status.NOT_CONVERGED)
-_STEP_LIMIT = float(Status.STEP_LIMIT)
 
 
 @jit
@@ -51,7 +57,7 @@ def _verdict(ring, scene, rtol, unsettled, faint):
     """The status of a swinging cell; an angle of rest too `faint` for a float64 is not asked for its error."""
     _, last, margin, grazes, doubt, unsure = ring
     loose = isnt(faint | (doubt <= rtol * magnitude(last))) | isnt(doubt <= rtol * margin * scene[2])
-    verdict = where(grazes, _GRAZING, where(loose, _INACCURATE, _OK))
+    verdict = where(grazes, GRAZING, where(loose, INACCURATE, OK))
     return where(unsure, unsettled, verdict)
 
 
@@ -81,9 +87,9 @@ def _write(
     stop_angle[i], stop_time[i] = or_none(angle, isnt(faint)), or_none(time, lasting & (ends | isnt(time > 0.0)))
     margin[i], period[i] = or_none(distance, isnt(endless)), or_none(2.0 * half, timed & isnt(creeps))
     whole = isnt(faint) & (creeps | (timed & (ends | isnt(lasting))))
-    verdict = where(start > 0.0, _verdict(ring, scene, rtol, unsettled, faint), _OK)
-    verdict = where(creeps, _OVERDAMPED, where(endless, _NEVER_ENDS, verdict))
-    status[i] = where(fine, partly(whole, verdict), _OUT_OF_RANGE)
+    verdict = where(start > 0.0, _verdict(ring, scene, rtol, unsettled, faint), OK)
+    verdict = where(creeps, OVERDAMPED, where(endless, NEVER_ENDS, verdict))
+    status[i] = where(fine, partly(whole, verdict), OUT_OF_RANGE)
 
 
 @jit
@@ -104,7 +110,7 @@ def swinging(scene):
 def _closed(i, zeta, omega_n, r, r_s, theta0, rtol, *outputs):
     scene, units = without_units(zeta[i], r[i], r_s[i], theta0[i])
     ring = _ringdown.closed(swinging(scene))
-    _write(i, scene, units, ring, rtol[i], _NOT_CONVERGED, omega_n[i], theta0[i], *outputs)
+    _write(i, scene, units, ring, rtol[i], NOT_CONVERGED, omega_n[i], theta0[i], *outputs)
 
 
 @entry()
@@ -126,7 +132,7 @@ def closed_bound(zeta, omega_n, r, r_s, theta0, rtol, asked, out):
 def _recursion(i, zeta, omega_n, r, r_s, theta0, rtol, *outputs):
     scene, units = without_units(zeta[i], r[i], r_s[i], theta0[i])
     ring = _ringdown.recursion(swinging(scene))
-    _write(i, scene, units, ring, rtol[i], _STEP_LIMIT, omega_n[i], theta0[i], *outputs)
+    _write(i, scene, units, ring, rtol[i], STEP_LIMIT, omega_n[i], theta0[i], *outputs)
 
 
 @entry()
@@ -150,7 +156,7 @@ def allowed(zeta, omega_n, r, r_s, theta0):
 def _check(i, zeta, omega_n, r, r_s, theta0, status):
     fine = allowed(zeta[i], omega_n[i], r[i], r_s[i], theta0[i])
     lossless = isnt((zeta[i] > 0.0) | (r[i] > 0.0)) & (magnitude(theta0[i]) > r_s[i])
-    status[i] = where(fine, where(lossless, _NO_LIMIT_CYCLE, _OK), _BAD_INPUT)
+    status[i] = where(fine, where(lossless, NO_LIMIT_CYCLE, OK), BAD_INPUT)
 
 
 @entry()

@@ -13,6 +13,7 @@ import numpy as np
 from kernels.balance import _ringdown
 from kernels.balance.release import EXAMPLE, PARAMETERS, allowed, side, swinging, without_units
 from kernels.interface import Field, Kernel, Method, Status
+from kernels.lanes.codes import BAD_INPUT, GRAZING, NOT_CONVERGED, OK, OUT_OF_RANGE, OVERDAMPED
 from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.groups import GROUP, cells_at, each_group, write_row
 from kernels.lanes.jit import jit
@@ -22,9 +23,6 @@ from kernels.maths.elementary import scale
 ROUNDING = 1e-15
 """Error of a turning point over the angle of release."""
 
-_OK, _GRAZING, _OVERDAMPED = float(Status.OK), float(Status.GRAZING), float(Status.OVERDAMPED)
-_BAD_INPUT, _OUT_OF_RANGE = float(Status.BAD_INPUT), float(Status.OUT_OF_RANGE)
-_NOT_CONVERGED = float(Status.NOT_CONVERGED)
 _REFUSED = int(Status.BAD_INPUT)
 
 
@@ -57,8 +55,8 @@ def _follow(first, zeta, r, r_s, theta0, half_swing, row, farthest, turning_poin
         a, _ = _ringdown.turning_point(*damping, share, scene[1], scene[3], k)
         angle = scale(side(theta0[i], k) * a[0], e)
         write_row(first, j, where(k > last, math.nan, where(k > 0.0, angle, theta0[i])), row, turning_point)
-    verdict = where(unsure, _NOT_CONVERGED, where(grazes & (last <= farthest), _GRAZING, _OK))
-    status[i] = where(fine, where(creeps, _OVERDAMPED, verdict), _OUT_OF_RANGE)
+    verdict = where(unsure, NOT_CONVERGED, where(grazes & (last <= farthest), GRAZING, OK))
+    status[i] = where(fine, where(creeps, OVERDAMPED, verdict), OUT_OF_RANGE)
 
 
 @entry("half_swing")
@@ -80,7 +78,7 @@ def closed_bound(zeta, omega_n, r, r_s, theta0, rtol, half_swing, asked, out):
 
 @jit
 def _check(i, zeta, omega_n, r, r_s, theta0, status):
-    status[i] = where(allowed(zeta[i], omega_n[i], r[i], r_s[i], theta0[i]), _OK, _BAD_INPUT)
+    status[i] = where(allowed(zeta[i], omega_n[i], r[i], r_s[i], theta0[i]), OK, BAD_INPUT)
 
 
 @entry()

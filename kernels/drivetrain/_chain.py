@@ -8,7 +8,7 @@ Source: the drivetrain of a milling machine, type-a and type-b partial systems a
 
 import math
 
-from kernels.interface import Status
+from kernels.lanes.codes import BAD_INPUT, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import exponent, isnt, nearest, where
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW
@@ -17,8 +17,6 @@ MASS_LIMIT = 64
 """Inertias of the longest chain."""
 SPREAD = 2.0**300
 """Largest ratio of two inertias, or of two stiffnesses, of one chain: what leaves room for inverse squares."""
-
-_OK, _BAD_INPUT, _OUT_OF_RANGE = float(Status.OK), float(Status.BAD_INPUT), float(Status.OUT_OF_RANGE)
 
 
 @jit
@@ -59,9 +57,9 @@ def normal_spread(low, high):
 def refusal(n, J, k, h):
     """BAD_INPUT, OUT_OF_RANGE or OK of one chain of n inertias."""
     if not (1 <= n <= MASS_LIMIT):
-        return _BAD_INPUT
+        return BAD_INPUT
     for j in range(n):
         sound = (J[j] > 0.0) & (J[j] < math.inf) & (k[j] < math.inf) & (h[j] >= 0.0) & (h[j] < math.inf)
         if not (sound & ((k[j] > 0.0) | ((k[j] >= 0.0) & (j == n - 1)))):
-            return _BAD_INPUT
-    return _OK if units(n, same, J, k)[2] else _OUT_OF_RANGE
+            return BAD_INPUT
+    return OK if units(n, same, J, k)[2] else OUT_OF_RANGE

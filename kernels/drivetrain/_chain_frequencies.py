@@ -23,7 +23,7 @@ Source: Fernando & Parlett, Numer. Math. 67:191 (1994), sections 4 and 6; (3) an
 import math
 
 from kernels.drivetrain._chain import same, units
-from kernels.interface import Status
+from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.columns import entry
 from kernels.lanes.groups import GROUP, cells_at, each_group, room
 from kernels.lanes.jit import jit, jit_call
@@ -38,7 +38,6 @@ _NEGLIGIBLE = 2.0**-106  # a squared entry, so 2^-53 of a frequency
 _TINY = 2.0**-60  # 63 of them are less than the last digit
 _SPENT = 2.0**-120
 _ROUNDING = 2.0**-53
-_OK, _NOT_CONVERGED, _OUT_OF_RANGE = float(Status.OK), float(Status.NOT_CONVERGED), float(Status.OUT_OF_RANGE)
 _SQUARE_TURNS = 0.025330295910584444  # 1/(2 pi)^2
 
 
@@ -271,7 +270,7 @@ def frequencies(n, at, J, k, frequency, rows):
         f = scale(sqrt(frequency[at(j)]), 0.5 * (e_k - e_J))
         sound = sound & (is_normal(f) | (isnt(k[at(n - 1)] > 0.0) & (j == 0)))
         frequency[at(j)] = f
-    return where(sound, where(failed, _NOT_CONVERGED, _OK), _OUT_OF_RANGE)
+    return where(sound, where(failed, NOT_CONVERGED, OK), OUT_OF_RANGE)
 
 
 @jit_call

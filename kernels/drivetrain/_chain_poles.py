@@ -12,7 +12,7 @@ Source: first-order perturbation of the quadratic eigenvalue problem, derived he
 
 from kernels.drivetrain._chain import extremes, same, units
 from kernels.drivetrain._chain_roots import approach, start, stiffness
-from kernels.interface import Status
+from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import exponent, fma, magnitude, sqrt
 from kernels.maths import complex
@@ -25,7 +25,6 @@ REACH = 2.0**300
 _NEAR = 1e-6  # step over root, above which another joint may do better
 _TWIN = 2.0**-20  # below which rounding moves a double root
 _LIGHT = 0.03
-_OK, _NOT_CONVERGED, _OUT_OF_RANGE = float(Status.OK), float(Status.NOT_CONVERGED), float(Status.OUT_OF_RANGE)
 _TURNS = 0.15915494309189535  # 1/(2 pi)
 
 
@@ -239,8 +238,8 @@ def damped_poles(n, J, k, h, frequency, pole_re, pole_im, work):
         pole_im[i] = scale(pole_im[i], 0.5 * (e_k - e_J))
         sound = sound & ((i < fixed) | is_normal(complex.size((pole_re[i], pole_im[i]))))
     if not sound:
-        return error, _OUT_OF_RANGE
-    return error, _OK if settled and told_apart else _NOT_CONVERGED
+        return error, OUT_OF_RANGE
+    return error, OK if settled and told_apart else NOT_CONVERGED
 
 
 @jit_call

@@ -9,12 +9,11 @@ Source: Holzer's method; the joint is that of Parlett & Dhillon, Linear Algebra 
 """
 
 from kernels.drivetrain._chain import same, units
-from kernels.interface import Status
+from kernels.lanes.codes import OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import exponent, fma, magnitude, sqrt
 from kernels.maths.elementary import is_normal, scale
 
-_OK, _OUT_OF_RANGE = float(Status.OK), float(Status.OUT_OF_RANGE)
 _TWO_PI = 6.283185307179586
 
 
@@ -90,4 +89,4 @@ def mode_shapes(n, J, k, frequency, shape, work):
         sound = sound & is_normal(total)
         for i in range(n):
             shape[i, j] = scale(work[i] / sqrt(total), -0.5 * e_J)
-    return _OK if sound else _OUT_OF_RANGE
+    return OK if sound else OUT_OF_RANGE

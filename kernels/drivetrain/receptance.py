@@ -19,7 +19,8 @@ import numpy as np
 from kernels.drivetrain import _chain_receptance
 from kernels.drivetrain._chain import refusal as chain_refusal
 from kernels.drivetrain._chain_frequencies import row_at
-from kernels.interface import Field, Kernel, Method, Status
+from kernels.interface import Field, Kernel, Method
+from kernels.lanes.codes import BAD_INPUT, INACCURATE, OK, OUT_OF_RANGE, PARTLY_OUT_OF_RANGE
 from kernels.lanes.columns import entry_of_cells, one_by_one
 from kernels.lanes.groups import GROUP
 from kernels.lanes.jit import jit, jit_call
@@ -27,9 +28,6 @@ from kernels.lanes.vectors import nearest, where
 from kernels.maths import complex
 from kernels.maths.elementary import is_normal, log
 
-_OK, _INACCURATE = float(Status.OK), float(Status.INACCURATE)
-_BAD_INPUT, _OUT_OF_RANGE = float(Status.BAD_INPUT), float(Status.OUT_OF_RANGE)
-_PARTLY = float(Status.PARTLY_OUT_OF_RANGE)
 _TWO_PI, _DB = 2.0 * math.pi, 20.0 / math.log(10.0)
 
 
@@ -71,8 +69,8 @@ def _cell(i, J, k, h, drive, read, rtol, frequency, re, im, amplitude, phase, de
     for j in range(0, frequency.size, GROUP):
         worst, there = _group(i, j, J, k, h, int(drive[i]), int(read[i]), frequency, outputs, rows)
         error, given = max(error, worst), given + there
-    verdict = _OK if given == frequency.size else _PARTLY
-    status[i] = where(error <= rtol[i], verdict, _INACCURATE) if given > 0 else _OUT_OF_RANGE
+    verdict = OK if given == frequency.size else PARTLY_OUT_OF_RANGE
+    status[i] = where(error <= rtol[i], verdict, INACCURATE) if given > 0 else OUT_OF_RANGE
 
 
 @entry_of_cells
@@ -95,7 +93,7 @@ def _names_a_mass(number, n):
 def _check(i, J, k, h, drive, read, status):
     n = J.shape[1]
     sound = _names_a_mass(drive[i], n) & _names_a_mass(read[i], n)
-    status[i] = where(sound, chain_refusal(n, J[i], k[i], h[i]), _BAD_INPUT)
+    status[i] = where(sound, chain_refusal(n, J[i], k[i], h[i]), BAD_INPUT)
 
 
 @entry_of_cells

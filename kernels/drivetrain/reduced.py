@@ -28,7 +28,8 @@ from kernels.drivetrain._chain_poles import modal_damping
 from kernels.drivetrain._error import reduced, whole
 from kernels.drivetrain._modal_masses import TURN
 from kernels.drivetrain._model import EXACT, RIVIN, new_chain, new_modes, new_rooms, off_by, take_units
-from kernels.interface import Field, Kernel, Method, Status
+from kernels.interface import Field, Kernel, Method
+from kernels.lanes.codes import BAD_INPUT, DAMPERS_OUT_OF_RANGE, INACCURATE, OK
 from kernels.lanes.columns import entry_of_cells
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.ranges import partly
@@ -44,9 +45,6 @@ EVERYTHING = 1e300
 """Band [Hz] that holds every frequency."""
 SMALL_PHASE = 0.1
 """w h e up to which (w h e)^2 << 1."""
-
-_OK, _INACCURATE, _BAD_INPUT = float(Status.OK), float(Status.INACCURATE), float(Status.BAD_INPUT)
-_DAMPERS = float(Status.DAMPERS_OUT_OF_RANGE)
 
 
 @jit
@@ -95,11 +93,11 @@ def _solve_cell(
     e = 0.5 * (e_k - e_J)
     band = in_unit(f_max[i], e)
     verdict = natural_frequencies(n, full.J, full.k, full.f, rooms.work)
-    if verdict > _OK:
+    if verdict > OK:
         status[i] = int(verdict)
         return
     p, slower, off, error, verdict = model(code, n_keep[i], tol[i], band, order[i], full, kept, modes, rooms)
-    if verdict > _OK:
+    if verdict > OK:
         status[i] = int(verdict)
         return
     count = n if code == EXACT else p
@@ -109,7 +107,7 @@ def _solve_cell(
     n_kept[i], frf_error[i] = p, off
     limit = SMALL_PHASE / (TURN * slower) if slower > 0.0 else math.inf
     valid_to[i] = scale(limit, e) if slower > 0.0 else f_max[i]
-    verdict = (_OK if limit >= band else _DAMPERS) if error <= rtol[i] else _INACCURATE
+    verdict = (OK if limit >= band else DAMPERS_OUT_OF_RANGE) if error <= rtol[i] else INACCURATE
     status[i] = int(partly(fine, verdict))
 
 
@@ -195,7 +193,7 @@ def check(J, k, h, reduction, n_keep, tol, f_max, order, status):
     """
     for i in range(J.shape[0]):
         fine = _choices(J.shape[1], reduction[i], n_keep[i], tol[i], f_max[i], order[i])
-        status[i] = int(refusal(J.shape[1], J[i], k[i], h[i]) if fine else _BAD_INPUT)
+        status[i] = int(refusal(J.shape[1], J[i], k[i], h[i]) if fine else BAD_INPUT)
 
 
 PARAMETERS = (

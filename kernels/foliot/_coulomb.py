@@ -12,7 +12,7 @@ Derived here from the general law of friction; scene and cycle as in `_units`.
 """
 
 from kernels.foliot._single_loss import dry as dry_cycle
-from kernels.interface import Status
+from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import choose, fma, magnitude, some, sqrt, where
 from kernels.maths.elementary import cbrt, exp, expm1, log1p, log_remainder, log_remainder3
@@ -27,8 +27,6 @@ _DEEPEST = 710.0
 _FAINT = 1e-100
 """Viscous friction d below which it changes no digit, provided Coulomb friction is not faint too."""
 _FAINT_COULOMB = 1e-55
-
-_OK, _OUT_OF_RANGE, _NOT_CONVERGED = float(Status.OK), float(Status.OUT_OF_RANGE), float(Status.NOT_CONVERGED)
 
 
 @jit
@@ -105,6 +103,6 @@ def limit_cycle(scene):
     dry = d < _FAINT
     cycle, unsettled = _viscous_and_coulomb(where(dry, 1.0, d), rho, slack)
     alone = dry_cycle(where(rho > _FAINT_COULOMB, rho, 0.5), slack)
-    verdict = where(unsettled, _NOT_CONVERGED, _OK)
-    verdict = where(dry, where(rho > _FAINT_COULOMB, _OK, _OUT_OF_RANGE), verdict)
+    verdict = where(unsettled, NOT_CONVERGED, OK)
+    verdict = where(dry, where(rho > _FAINT_COULOMB, OK, OUT_OF_RANGE), verdict)
     return choose(dry, alone, cycle), verdict

@@ -18,7 +18,7 @@ from decimal import Decimal, localcontext
 import numpy as np
 
 from kernels.foliot._single_loss import without_degree_0
-from kernels.interface import Status
+from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import fma, isnt, magnitude, some, sqrt, where
 from kernels.maths.elementary import exp, expm1, is_normal, log, log1p
@@ -29,7 +29,6 @@ NEWTON_LIMIT = 60
 SETTLED = 1e-8
 """A Newton step in ln v1 below which the next one, about its square, would be below rounding."""
 
-_OK, _NOT_CONVERGED, _OUT_OF_RANGE = float(Status.OK), float(Status.NOT_CONVERGED), float(Status.OUT_OF_RANGE)
 _NEAR = 1.1  # from this z on the pole is taken out; below, where V > 1.5 v1, the rule does without
 _FAR = 1e300  # ln V where there is no drag
 _WIDEST = 750.0  # no ln v1 of a float64 is beyond
@@ -329,7 +328,7 @@ def solve_quadrature(scene, rtol):
     half = v1 * time
     cycle = (half, amplitude, v1, s, e * e * (F1 / (F1 + (m0 + m1 + m2))))
     fine = is_normal(half) & is_normal(v1)
-    return cycle, where(unsettled, _NOT_CONVERGED, where(fine, _OK, _OUT_OF_RANGE))
+    return cycle, where(unsettled, NOT_CONVERGED, where(fine, OK, OUT_OF_RANGE))
 
 
 @jit

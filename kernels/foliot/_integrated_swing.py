@@ -20,13 +20,10 @@ v1^2 - F^2 rising; so the one root is found, and if help was needed on the cycle
 import math
 
 from kernels.integrate.nystrom import integrate_until
-from kernels.interface import Status
+from kernels.lanes.codes import INACCURATE, NOT_CONVERGED, OK, STEP_LIMIT, STICKS
 from kernels.lanes.jit import jit, jit_call, jit_inline
 from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
 from kernels.maths.elementary import exp, power, sincos
-
-_OK, _INACCURATE, _STICKS = float(Status.OK), float(Status.INACCURATE), float(Status.STICKS)
-_NOT_CONVERGED, _STEP_LIMIT = float(Status.NOT_CONVERGED), float(Status.STEP_LIMIT)
 
 NEWTON_LIMIT = 60
 HELP_LIMIT = 1000
@@ -397,7 +394,7 @@ def dopri5(scene, ripple, rtol):
     tolerance = where(slow, _CHECK * _enough(share, rtol, zero, 2.0 * stiffness * pace), _COARSE)
     low, high, tighter, before, steep = zero - 1.0, zero + math.inf, zero + 1.0, zero + 1.0, zero
     cycle = (zero, zero, zero, zero, zero)
-    verdict = where(possible, where(stiff, _STEP_LIMIT, _NOT_CONVERGED), _STICKS)
+    verdict = where(possible, where(stiff, STEP_LIMIT, NOT_CONVERGED), STICKS)
     active = possible & isnt(stiff)
     for _ in range(NEWTON_LIMIT):
         if not some(active):
@@ -428,7 +425,7 @@ def dopri5(scene, ripple, rtol):
         done = active & (settled | stuck | at_floor | lost)
         right = settled & (wanted >= _FINEST) & (_larger(steep, cancels) * _V_ROUNDING <= 0.3 * rtol * (1.0 - slope))
         verdict = where(
-            done, where(lost, _STEP_LIMIT, where(stuck | held, _STICKS, where(right, _OK, _INACCURATE))), verdict
+            done, where(lost, STEP_LIMIT, where(stuck | held, STICKS, where(right, OK, INACCURATE))), verdict
         )
         active = active & isnt(done)
 

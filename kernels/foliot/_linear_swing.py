@@ -14,7 +14,7 @@ switch comes through, and none elsewhere. Units: see `_units`. Derived here.
 import math
 
 from kernels.integrate import linear_flow
-from kernels.interface import Status
+from kernels.lanes.codes import NO_METHOD, NOT_CONVERGED, NOT_SELF_STARTING, OK, STICKS
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import fma, isnt, magnitude, some, sqrt, where
 from kernels.maths.elementary import exp, expm1
@@ -27,9 +27,6 @@ _STIFFEST = 1e60
 """Viscous friction d beyond which its powers leave float64."""
 ROUNDING = 2e-15
 """Relative error of one half swing: of time, amplitude, speed and of the terms of (4)."""
-
-_OK, _NOT_CONVERGED, _NO_METHOD = float(Status.OK), float(Status.NOT_CONVERGED), float(Status.NO_METHOD)
-_STICKS, _NOT_SELF_STARTING = float(Status.STICKS), float(Status.NOT_SELF_STARTING)
 
 
 @jit_call
@@ -196,11 +193,11 @@ def limit_cycle(scene):
     loose_s = where(loose_s < 1.0, loose_s / (1.0 - loose_s), math.inf)  # of the true s
     of_time = fma(of_energy, by_energy, 0.3 * ROUNDING * of_pieces)
     loose_m = loose_cycle + where(area > 0.0, of_time * d * time, 0.0)
-    verdict = where(_self_starting(d, kappa, slack, rho_s), _OK, _NOT_SELF_STARTING)
-    verdict = where(unsettled, _NOT_CONVERGED, verdict)
+    verdict = where(_self_starting(d, kappa, slack, rho_s), OK, NOT_SELF_STARTING)
+    verdict = where(unsettled, NOT_CONVERGED, verdict)
     passes = (e < 0.0) | (1.0 + kappa * top > rho_s)  # for e < 0 nothing comes to rest at the switch
-    verdict = where(comes & (energy > 0.0) & passes, verdict, _STICKS)
-    verdict = where(d < _STIFFEST, verdict, _NO_METHOD)
+    verdict = where(comes & (energy > 0.0) & passes, verdict, STICKS)
+    verdict = where(d < _STIFFEST, verdict, NO_METHOD)
     return (time, top, sqrt(2.0 * energy), s, e * e * area), (loose_cycle, loose_s, loose_m), verdict
 
 

@@ -6,7 +6,7 @@ They read mu, phi0 and a only; the physics is in `_viscous`, the declaration in 
 import math
 
 from kernels.foliot import _viscous
-from kernels.interface import Status
+from kernels.lanes.codes import NOT_CONVERGED, OK
 from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged
@@ -14,8 +14,6 @@ from kernels.lanes.vectors import where
 
 SENSITIVITY, MULTIPLIER = 3, 4
 """Positions of these outputs."""
-
-_OK, _NOT_CONVERGED = float(Status.OK), float(Status.NOT_CONVERGED)
 
 
 @jit
@@ -29,7 +27,7 @@ def _write(i, scene, cycle, verdict, period, amplitude, crossing_speed, sensitiv
 def _closed(i, mu, phi0, a, *outputs):
     k, rest, scene = _viscous.without_dimensions(mu[i], phi0[i], a[i])
     cycle = _viscous.closed(k, rest)
-    _write(i, scene, cycle, _OK, *outputs)
+    _write(i, scene, cycle, OK, *outputs)
 
 
 @entry()
@@ -42,7 +40,7 @@ def closed(mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_sp
 def _asymptotic(i, mu, phi0, a, *outputs):
     k, _, scene = _viscous.without_dimensions(mu[i], phi0[i], a[i])
     cycle = _viscous.asymptotic(k)
-    _write(i, scene, cycle, _OK, *outputs)
+    _write(i, scene, cycle, OK, *outputs)
 
 
 @entry()
@@ -57,7 +55,7 @@ def asymptotic(
 def _event_map(i, mu, phi0, a, rtol, *outputs):
     k, _, scene = _viscous.without_dimensions(mu[i], phi0[i], a[i])
     cycle, unsettled = _viscous.event_map(k, rtol[i])
-    verdict = where(unsettled, _NOT_CONVERGED, _OK)
+    verdict = where(unsettled, NOT_CONVERGED, OK)
     _write(i, scene, cycle, verdict, *outputs)
 
 

@@ -22,15 +22,12 @@ from kernels.foliot import (
     _viscous_methods,
 )
 from kernels.foliot._viscous_methods import worst
-from kernels.interface import Field, Kernel, Method, Status
+from kernels.interface import Field, Kernel, Method
+from kernels.lanes.codes import BAD_INPUT, NEVER_STARTS, NO_LIMIT_CYCLE, NO_METHOD, OK
 from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged
 from kernels.lanes.vectors import isnt, where
-
-_OK, _BAD_INPUT = float(Status.OK), float(Status.BAD_INPUT)
-_NEVER_STARTS, _NO_LIMIT_CYCLE = float(Status.NEVER_STARTS), float(Status.NO_LIMIT_CYCLE)
-_NO_METHOD = float(Status.NO_METHOD)
 
 
 @jit
@@ -46,7 +43,7 @@ def _pure_cell(i, mu, phi0, a, R, R_s, c, n, k, e, rtol, *outputs):
     terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
     scene, units = _units.without_dimensions(*terms)
     cycle, applies = _single_loss.pure(scene)
-    write(i, units, cycle, where(applies, _OK, _NO_METHOD), *outputs)
+    write(i, units, cycle, where(applies, OK, NO_METHOD), *outputs)
 
 
 @entry()
@@ -197,8 +194,8 @@ def refusal(mu, phi0, a, R, R_s, c, n, k, e):
     friction = where(k > 0.0, R, R_s)  # a spring helps stiction be overcome
     spare = _units.spare_torque(mu, friction, where(n > 0.0, 0.0, c))
     lossless = isnt((a > 0.0) | (R > 0.0) | (c > 0.0) | (e < 1.0))
-    verdict = where(spare > 0.0, where(lossless, _NO_LIMIT_CYCLE, _OK), _NEVER_STARTS)
-    return where(allowed, verdict, _BAD_INPUT)
+    verdict = where(spare > 0.0, where(lossless, NO_LIMIT_CYCLE, OK), NEVER_STARTS)
+    return where(allowed, verdict, BAD_INPUT)
 
 
 @jit

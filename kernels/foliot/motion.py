@@ -10,14 +10,13 @@ from kernels.foliot import _linear_swing, _units, _viscous
 from kernels.foliot.cycle import PARAMETERS as ALL_TERMS
 from kernels.foliot.cycle import refusal
 from kernels.integrate import linear_flow
-from kernels.interface import Field, Kernel, Method, Status
+from kernels.interface import Field, Kernel, Method
+from kernels.lanes.codes import OK
 from kernels.lanes.columns import entry, one_by_one
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged, or_none
 from kernels.lanes.vectors import fma, where
 from kernels.maths.elementary import exp, exp_remainder, scale
-
-_OK = float(Status.OK)
 
 PARAMETERS = tuple(p for p in ALL_TERMS if p.name not in ("c", "n"))
 
@@ -44,7 +43,7 @@ def _closed(i, mu, phi0, a, phase, angle, speed, status):
         x, u = _shape(phase[j], k, cycle[0], cycle[1])
         angle[i, j] = or_none(scale(unit_phi * x, e_phi), wide)
         speed[i, j] = or_none(scale(unit_mu / unit_a * u, e_mu - e_a), moves)
-    status[i] = judged(sound & (wide | moves), wide & moves, _OK)
+    status[i] = judged(sound & (wide | moves), wide & moves, OK)
 
 
 @entry("phase")

@@ -24,7 +24,8 @@ from kernels.foliot import _error_propagation, _linear_swing, _units
 from kernels.foliot.cycle import PARAMETERS as FOLIOT_PARAMETERS
 from kernels.foliot.cycle import refusal
 from kernels.integrate import linear_flow
-from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
+from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method
+from kernels.lanes.codes import BAD_INPUT, INACCURATE, NOT_SELF_STARTING, OK, OUT_OF_RANGE, STICKS, TOO_SHORT
 from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.groups import GROUP, cells_at, each_group
 from kernels.lanes.jit import jit, jit_call
@@ -39,9 +40,6 @@ HEADROOM = 0.01
 PAIRS = 64
 """Pairs of random numbers that are made at a time."""
 
-_OK, _BAD_INPUT, _INACCURATE = float(Status.OK), float(Status.BAD_INPUT), float(Status.INACCURATE)
-_NOT_SELF_STARTING = float(Status.NOT_SELF_STARTING)
-_TOO_SHORT, _STICKS, _OUT_OF_RANGE = float(Status.TOO_SHORT), float(Status.STICKS), float(Status.OUT_OF_RANGE)
 _COUNTABLE = 2.0**50
 
 
@@ -174,13 +172,13 @@ def _cells(
     rate_error_s_per_day[i] = SECONDS_PER_DAY * gain / t
     rate_scatter_s_per_day[i] = where(enough, SECONDS_PER_DAY * deviation, math.nan)
     truncated[i] = short / half_swings[i]
-    starts = magnitude(found - _NOT_SELF_STARTING) > 0.0
-    verdict = where(enough, where(starts, _OK, found), _TOO_SHORT)
-    verdict = where(_uncertainty(scene, nominal, speed) <= rtol[i], verdict, _INACCURATE)
-    verdict = where(stopped | isnt(least < 1.0), _STICKS, verdict)
+    starts = magnitude(found - NOT_SELF_STARTING) > 0.0
+    verdict = where(enough, where(starts, OK, found), TOO_SHORT)
+    verdict = where(_uncertainty(scene, nominal, speed) <= rtol[i], verdict, INACCURATE)
+    verdict = where(stopped | isnt(least < 1.0), STICKS, verdict)
     verdict = where(found < FIRST_REFUSAL, verdict, found)
     fine = units[4] & is_normal(tau) & (t < _COUNTABLE * tau)
-    status[i] = where(fine | (verdict >= FIRST_REFUSAL), verdict, _OUT_OF_RANGE)
+    status[i] = where(fine | (verdict >= FIRST_REFUSAL), verdict, OUT_OF_RANGE)
 
 
 @entry()
@@ -215,7 +213,7 @@ def _check(
     run = _counts(half_swings[i], 1.0, HALF_SWING_LIMIT) & _counts(seed[i], 0.0, philox.SEED_LIMIT)
     time = (averaging_time[i] > 0.0) & (averaging_time[i] < math.inf)
     verdict = refusal(mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-    status[i] = where(noise & run & time, verdict, _BAD_INPUT)
+    status[i] = where(noise & run & time, verdict, BAD_INPUT)
 
 
 @entry()

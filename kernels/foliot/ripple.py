@@ -14,12 +14,12 @@ import math
 
 from kernels.foliot import _integrated_swing, _units
 from kernels.foliot.cycle import FOLIOT, OUTPUTS, PARAMETERS, refusal, write
-from kernels.interface import Field, Kernel, Method, Status
+from kernels.interface import Field, Kernel, Method
+from kernels.lanes.codes import BAD_INPUT
 from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import nearest, where
 
-_BAD_INPUT = float(Status.BAD_INPUT)
 HIGHEST = 1000.0
 """Of harmonics: more waves than steps that the integrator may take follow from more."""
 
@@ -48,7 +48,7 @@ def _check(i, mu, phi0, a, R, R_s, c, n, k, e, depth, harmonic, status):
     whole = whole & (nearest(harmonic[i]) <= harmonic[i])
     allowed = (depth[i] >= 0.0) & (depth[i] < 1.0) & whole  # NaN fails
     verdict = refusal(mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-    status[i] = where(allowed, verdict, _BAD_INPUT)
+    status[i] = where(allowed, verdict, BAD_INPUT)
 
 
 @entry()

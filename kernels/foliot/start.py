@@ -19,6 +19,7 @@ from kernels.foliot.cycle import PARAMETERS as FOLIOT_PARAMETERS
 from kernels.foliot.cycle import refusal
 from kernels.integrate import linear_flow
 from kernels.interface import Field, Kernel, Method, Status
+from kernels.lanes.codes import BAD_INPUT, COMES_TO_REST, GRAZING, INACCURATE, NEVER_STARTS, OK, OUT_OF_RANGE, STICKS
 from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.groups import GROUP, cells_at, each_group, write_row
 from kernels.lanes.jit import jit, jit_call
@@ -31,10 +32,6 @@ FLIP_LIMIT = 1e6
 UNSURE = 0.5
 """Error of a speed, as a share of it, from which on it is open whether the switch was reached at all."""
 
-_OK, _BAD_INPUT, _INACCURATE = float(Status.OK), float(Status.BAD_INPUT), float(Status.INACCURATE)
-_COMES_TO_REST, _GRAZING = float(Status.COMES_TO_REST), float(Status.GRAZING)
-_NEVER_STARTS, _OUT_OF_RANGE = float(Status.NEVER_STARTS), float(Status.OUT_OF_RANGE)
-_STICKS = float(Status.STICKS)
 _REFUSED = int(Status.BAD_INPUT)
 
 
@@ -169,12 +166,12 @@ def _follow(first, mu, phi0, a, R, R_s, c, n, k, e, phi_start, rtol, flip, row, 
         accurate = accurate & ((_error(now) <= rtol[i]) | isnt(going))
         write_row(first, j, where(going, time, math.nan), row, flip_time)
         write_row(first, j, where(going, speed, math.nan), row, flip_speed)
-    verdict = where(going, _OK, _COMES_TO_REST)
-    verdict = where(accurate, verdict, _INACCURATE)
+    verdict = where(going, OK, COMES_TO_REST)
+    verdict = where(accurate, verdict, INACCURATE)
     held = isnt(magnitude(fma(scene[5], x, 1.0)) > scene[2])
-    verdict = where(starts, verdict, where(held, _NEVER_STARTS, _STICKS))
-    verdict = where(unsure, _GRAZING, verdict)
-    status[i] = where(fine & given, partly(whole, verdict), _OUT_OF_RANGE)
+    verdict = where(starts, verdict, where(held, NEVER_STARTS, STICKS))
+    verdict = where(unsure, GRAZING, verdict)
+    status[i] = where(fine & given, partly(whole, verdict), OUT_OF_RANGE)
 
 
 @entry("flip")
@@ -193,8 +190,8 @@ def segments(mu, phi0, a, R, R_s, c, n, k, e, phi_start, rtol, flip, flip_time, 
 @jit
 def _check(i, mu, phi0, a, R, R_s, c, n, k, e, phi_start, status):
     verdict = refusal(mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-    bad = isnt(magnitude(verdict - _BAD_INPUT) > 0.0) | isnt(magnitude(phi_start[i]) < math.inf)
-    status[i] = where(bad, _BAD_INPUT, where(mu[i] > 0.0, _OK, _NEVER_STARTS))
+    bad = isnt(magnitude(verdict - BAD_INPUT) > 0.0) | isnt(magnitude(phi_start[i]) < math.inf)
+    status[i] = where(bad, BAD_INPUT, where(mu[i] > 0.0, OK, NEVER_STARTS))
 
 
 @entry()

@@ -27,7 +27,7 @@ map of c^2 is linear with the factor d^2. Derived here.
 
 import math
 
-from kernels.interface import Status
+from kernels.lanes.codes import GRAZING, INACCURATE, NO_CYCLE, NO_METHOD, OK, UNSTABLE
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import choose, fma, isnt, magnitude, sqrt, where
 from kernels.maths import pairs
@@ -40,8 +40,6 @@ GRAZE = 4e-15
 MOST_KEPT = 0.875
 """Restitution from which on no cycle exists."""
 
-_OK, _INACCURATE, _GRAZING = float(Status.OK), float(Status.INACCURATE), float(Status.GRAZING)
-_UNSTABLE, _NO_CYCLE, _NO_METHOD = float(Status.UNSTABLE), float(Status.NO_CYCLE), float(Status.NO_METHOD)
 
 _MOST_BENT = 24.0
 """abs(nu kappa wheel) of (3): beyond it q is below -5 or above 5, and no cycle exists."""
@@ -168,9 +166,9 @@ def plastic_cycle(scene):
 @jit
 def verdict(exists, stable, doubt, rtol):
     """The status by the margins of existence and stability and the error of the multiplier."""
-    status = where(stable < -GRAZE, _UNSTABLE, where((exists <= GRAZE) | (stable <= GRAZE), _GRAZING, _OK))
-    status = where((rtol >= ROUNDING) & (doubt <= 0.2 * rtol), status, _INACCURATE)
-    return where(exists >= -GRAZE, status, _NO_CYCLE)
+    status = where(stable < -GRAZE, UNSTABLE, where((exists <= GRAZE) | (stable <= GRAZE), GRAZING, OK))
+    status = where((rtol >= ROUNDING) & (doubt <= 0.2 * rtol), status, INACCURATE)
+    return where(exists >= -GRAZE, status, NO_CYCLE)
 
 
 @jit
@@ -181,8 +179,8 @@ def closed(scene, rtol):
     nu, tame = bent(scene)
     cycle, doubt = impact_cycle(scene, nu)
     pushed, held = plastic_cycle(scene)
-    status = where(tame, verdict(existence(scene, nu), stability(scene, nu), doubt, rtol), _NO_CYCLE)
+    status = where(tame, verdict(existence(scene, nu), stability(scene, nu), doubt, rtol), NO_CYCLE)
     straight = isnt(magnitude(scene[6]) > 0.0)
-    status = where(plastic, where(straight, _OK, _NO_METHOD), status)
+    status = where(plastic, where(straight, OK, NO_METHOD), status)
     share = where(plastic, held, 0.0)
     return choose(plastic, pushed, cycle), where(isnt(e < 0.0), share, math.nan), status

@@ -14,7 +14,18 @@ from kernels.impact import _half_swing as swing
 from kernels.impact._half_swing import half_swing
 from kernels.impact._periodic import chain, distance, errors, invert, multiplier, newton
 from kernels.impact._units import bend
-from kernels.interface import Status
+from kernels.lanes.codes import (
+    GRAZING,
+    INACCURATE,
+    NO_METHOD,
+    NOT_CONVERGED,
+    NOT_PERIODIC,
+    OK,
+    PERIOD_2,
+    STEP_LIMIT,
+    TOOTH_JUMPED,
+    UNSTABLE,
+)
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude, nearest, sqrt
 
@@ -39,10 +50,6 @@ _KICK, _KICKS = 0.01, 8
 _ROUNDING = 2.3e-16
 _CHAINED = 5.0
 """Errors of the changes after many contacts over those of one: 3.5 at most in 1055 clocks."""
-_OK, _INACCURATE, _GRAZING = float(Status.OK), float(Status.INACCURATE), float(Status.GRAZING)
-_UNSTABLE, _PERIOD_2, _NOT_PERIODIC = float(Status.UNSTABLE), float(Status.PERIOD_2), float(Status.NOT_PERIODIC)
-_TOOTH_JUMPED, _STEP_LIMIT = float(Status.TOOTH_JUMPED), float(Status.STEP_LIMIT)
-_NO_METHOD, _NOT_CONVERGED = float(Status.NO_METHOD), float(Status.NOT_CONVERGED)
 
 
 @jit
@@ -162,14 +169,14 @@ def _none():
 def _verdict(tally, teeth, cycles, fading, worst, gap, rounding, rtol):
     """The status of a motion that repeats, where `fading` is 1 - multiplier in units of its error."""
     if fading < -1.0:
-        return _UNSTABLE
+        return UNSTABLE
     if not (worst <= rtol):
-        return _INACCURATE
+        return INACCURATE
     if fading < 1.0 or tally[swing.MARGIN] <= 4.0 * gap + rounding:
-        return _GRAZING
+        return GRAZING
     if teeth > cycles:
-        return _TOOTH_JUMPED
-    return _OK if teeth == 1.0 else _PERIOD_2
+        return TOOTH_JUMPED
+    return OK if teeth == 1.0 else PERIOD_2
 
 
 @jit
@@ -218,7 +225,7 @@ def attractor(scene, rtol, total, work, history):
             swing.clear(total)
         start, verdict = follow(scene, start, BLOCK, history, total, work[1])
         if verdict != swing.DONE or total[swing.EVENTS] > EVENT_LIMIT:
-            return _none(), _NO_METHOD if verdict == swing.BENT_CONTACT else _STEP_LIMIT
+            return _none(), NO_METHOD if verdict == swing.BENT_CONTACT else STEP_LIMIT
         k = _repeats_after(history, BLOCK)
         if k == 0:
             continue
@@ -227,13 +234,13 @@ def attractor(scene, rtol, total, work, history):
             continue
         k = _shortest(scene, cycle, k, history, work)
         answer, status = _judged(scene, cycle, k, work, rtol)
-        if status != _UNSTABLE:
+        if status != UNSTABLE:
             return answer, status
         if 2 * block < blocks and kicks < _KICKS:
             start, kicks = _left_behind(start, cycle), kicks + 1
     half_swings = HALF_SWINGS // 2
     cycles = max(min(total[swing.WAY], 0.5 * half_swings), 1.0)
-    status = _NOT_CONVERGED if k > 0 else _NOT_PERIODIC
+    status = NOT_CONVERGED if k > 0 else NOT_PERIODIC
     means = total[swing.DIPS] / half_swings, magnitude(total[swing.LEAN]) / half_swings
     return _answer(total, means, 2.0 * cycles, math.nan, scene[3]), status
 
@@ -244,7 +251,7 @@ def settled(scene, rtol):
     kappa = scene[2][0]
     if not (1.0 / KAPPA_LIMIT <= kappa <= KAPPA_LIMIT):
         answer = _none()
-        return answer[0], answer[1], answer[2], answer[3], _NO_METHOD
+        return answer[0], answer[1], answer[2], answer[3], NO_METHOD
     work = np.empty(swing.TALLIES), np.empty((5, 3)), np.empty((4, 3)), np.empty((3, 3))
     answer, status = attractor(plain_scene(scene), rtol, np.empty(swing.TALLIES), work, np.empty((BLOCK + 1, 3)))
     return answer[0], answer[1], answer[2], answer[3], status

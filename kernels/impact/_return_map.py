@@ -17,7 +17,7 @@ of teeth know it. For e = 0 the map is that of the speed c of escape: fall, stop
 
 from kernels.impact._closed_cycle import MOST_KEPT, ROUNDING, behind, bent, lesser, within
 from kernels.impact._closed_cycle import verdict as judged
-from kernels.interface import Status
+from kernels.lanes.codes import INACCURATE, NO_CYCLE, NO_METHOD, NOT_CONVERGED, OK
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
 from kernels.maths.cubic import largest_modulus
@@ -29,9 +29,6 @@ _CONVERGED = 1e-22
 _PAIR_ERROR = 1e-29
 _LEAST = 1e-24
 """A share of mass or of speed below this is lost among 32 digits."""
-
-_OK, _INACCURATE, _NO_METHOD = float(Status.OK), float(Status.INACCURATE), float(Status.NO_METHOD)
-_NO_CYCLE, _NOT_CONVERGED = float(Status.NO_CYCLE), float(Status.NOT_CONVERGED)
 
 
 @jit
@@ -256,7 +253,7 @@ def impact_cycle(scene, nu, rtol):
         where(rim < 0.0, 0.5 * rim * rim, 0.0),
     )  # fmt: skip
     status = judged(passages(scene, bend, state, t), _stability(scene, coefficients), 30.0 * doubt, rtol)
-    return cycle, where(lost, _NOT_CONVERGED, status)
+    return cycle, where(lost, NOT_CONVERGED, status)
 
 
 @jit
@@ -321,7 +318,7 @@ def plastic_cycle(scene, rtol):
     travel = fma(c[0], t[0], eta[0]) + back
     cycle = ((t[0] + contact) * root, travel, start, start, magnitude(slope), back)
     fine = (rtol >= ROUNDING) & (rtol * magnitude(slope) >= _PAIR_ERROR)
-    return cycle, contact / (contact + t[0]), where(lost, _NOT_CONVERGED, where(fine, _OK, _INACCURATE))
+    return cycle, contact / (contact + t[0]), where(lost, NOT_CONVERGED, where(fine, OK, INACCURATE))
 
 
 @jit
@@ -332,8 +329,8 @@ def half_cycle(scene, rtol):
     nu, tame = bent(scene)
     cycle, status = impact_cycle((wheel, pallet, kappa, eta, slack, where(lossy, e, 0.5), nu), nu, rtol)
     pushed, held, verdict = plastic_cycle(scene, rtol)
-    status = where(tame & lossy, status, _NO_CYCLE)
+    status = where(tame & lossy, status, NO_CYCLE)
     straight = isnt(magnitude(curvature) > 0.0)
-    status = where(plastic, where(straight, verdict, _NO_METHOD), status)
-    status = where(_told_apart(scene) | isnt(lossy), status, _NO_METHOD)
+    status = where(plastic, where(straight, verdict, NO_METHOD), status)
+    status = where(_told_apart(scene) | isnt(lossy), status, NO_METHOD)
     return choose(plastic, pushed, cycle), where(plastic, held, 0.0), status

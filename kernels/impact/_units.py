@@ -22,7 +22,7 @@ Leaves out friction, play of the pivots, and the width of teeth and pallets. Der
 
 import math
 
-from kernels.interface import Status
+from kernels.lanes.codes import BAD_INPUT, NEVER_MEETS, NEVER_STARTS, OK
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none
 from kernels.lanes.vectors import choose, isnt, magnitude, nearest, sqrt, where
@@ -37,9 +37,6 @@ MOST_E = math.nextafter(1.0, 0.0)
 _TWO_PI = (2.0 * math.pi, 2.0 * 1.2246467991473532e-16)
 _KAPPA_LIMIT = 900.0
 """log2 of kappa beyond which products would leave float64."""
-
-_OK, _BAD_INPUT = float(Status.OK), float(Status.BAD_INPUT)
-_NEVER_STARTS, _NEVER_MEETS = float(Status.NEVER_STARTS), float(Status.NEVER_MEETS)
 
 
 @jit
@@ -149,5 +146,5 @@ def refusal(torque, I_c, I_v, r_c, r_v, teeth, h, e, nu):
     allowed = known & small & odd & (h < math.inf) & (e >= 0.0) & (e < 1.0) & (magnitude(nu) < math.inf)
     _, slack = _escape(where(allowed, r_c, 1.0), where(allowed, teeth, 3.0), where(allowed, h, 0.0))
     meets = (slack[0] > 0.0) | (isnt(slack[0] < 0.0) & isnt(e > 0.0))
-    verdict = where(torque > 0.0, where(meets, _OK, _NEVER_MEETS), _NEVER_STARTS)
-    return where(allowed, verdict, _BAD_INPUT)
+    verdict = where(torque > 0.0, where(meets, OK, NEVER_MEETS), NEVER_STARTS)
+    return where(allowed, verdict, BAD_INPUT)

@@ -2,11 +2,10 @@
 
 import math
 
-from kernels.interface import FIRST_REFUSAL, Status
+from kernels.interface import FIRST_REFUSAL
+from kernels.lanes.codes import OUT_OF_RANGE, PARTLY_OUT_OF_RANGE
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import where
-
-_OUT_OF_RANGE, _PARTLY = float(Status.OUT_OF_RANGE), float(Status.PARTLY_OUT_OF_RANGE)
 
 
 @jit
@@ -18,11 +17,11 @@ def or_none(x, exists):
 @jit
 def partly(whole, verdict):
     """The verdict, or that not all outputs could be held: another remark says more than that, and stays."""
-    return where(whole | (verdict > 0.0), verdict, _PARTLY)
+    return where(whole | (verdict > 0.0), verdict, PARTLY_OUT_OF_RANGE)
 
 
 @jit
 def judged(sound, whole, verdict):
     """The verdict on a cell by whether its outputs mean anything, and whether all of them could be held."""
     verdict = partly(whole, verdict)
-    return where(sound | (verdict >= FIRST_REFUSAL), verdict, _OUT_OF_RANGE)
+    return where(sound | (verdict >= FIRST_REFUSAL), verdict, OUT_OF_RANGE)

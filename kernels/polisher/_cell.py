@@ -2,7 +2,7 @@
 
 import math
 
-from kernels.interface import Status
+from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, LOCK_UP, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import magnitude, pow2, some, where
 from kernels.polisher import extremes
@@ -10,9 +10,6 @@ from kernels.polisher.linkage import in_units, margins
 
 UNIT_LIMIT = 720.0
 """Power of two of the longest length, beyond which derivatives would leave float64."""
-
-OK, OUT_OF_RANGE = float(Status.OK), float(Status.OUT_OF_RANGE)
-LOCK_UP, CHANGE_POINT, DOUBLE_CRANK = float(Status.LOCK_UP), float(Status.CHANGE_POINT), float(Status.DOUBLE_CRANK)
 
 
 @jit

@@ -20,18 +20,18 @@ import math
 import numpy as np
 
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
+from kernels.lanes.codes import BAD_INPUT, CHANGE_POINT, DOUBLE_CRANK, INACCURATE, LOCK_UP, OK
 from kernels.lanes.columns import each_cell, entry, entry_of_cells, one_by_one
 from kernels.lanes.groups import GROUP, cells_at, each_group, room
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import isnt, where
 from kernels.polisher import _motor_waveform, _sampled_motion, _textbook_angles, extremes
-from kernels.polisher._cell import CHANGE_POINT, DOUBLE_CRANK, LOCK_UP, OK, judged, locks, no_rates, said, write
+from kernels.polisher._cell import judged, locks, no_rates, said, write
 from kernels.polisher.linkage import in_units, larger, margins, side_of
 
 ROUNDING = 3e-15
 """What `stable` is right to."""
 
-_BAD_INPUT, _INACCURATE = float(Status.BAD_INPUT), float(Status.INACCURATE)
 _INACCURATE_CODE = int(Status.INACCURATE)
 _PRESSED, _FIRST_SLOPE = 8, 12  # positions of the transmission angle and of A0_b among the outputs
 
@@ -136,7 +136,7 @@ def _over_a_turn(first, b, d, f, e, rtol, buffers, thd, rate_max, rate_min, stat
     thd[i] = where(swings, distortion, math.nan)
     rate_max[i], rate_min[i] = where(turns, most, math.nan), where(turns, least, math.nan)
     wide = (turns & isnt(rate_doubt <= rtol[i])) | (swings & isnt(doubt <= rtol[i])) | isnt(rtol[i] >= ROUNDING)
-    status[i] = where(wide & (code < FIRST_REFUSAL), _INACCURATE, code)
+    status[i] = where(wide & (code < FIRST_REFUSAL), INACCURATE, code)
 
 
 @entry()
@@ -233,7 +233,7 @@ def allowed(b, d, f, e, type):
 
 @jit
 def _check(i, b, d, f, e, type, status):
-    status[i] = where(allowed(b[i], d[i], f[i], e[i], type[i]), OK, _BAD_INPUT)
+    status[i] = where(allowed(b[i], d[i], f[i], e[i], type[i]), OK, BAD_INPUT)
 
 
 @entry()

@@ -20,7 +20,7 @@ f = 5, e = 10 has two angles by the arccos, and locks).
 
 import math
 
-from kernels.interface import Status
+from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, LOCK_UP, NO_ASSEMBLY, OK
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import choose, fma, horner, isnt, magnitude, some, sqrt, where
 from kernels.maths.pairs import two_product, two_sum
@@ -31,8 +31,6 @@ ROUNDING = 2.0**-53
 NARROW = 2.0**-40
 """Share of b^2+d^2+f^2+e^2 down to which 32 digits of a sum of squares suffice."""
 
-_OK, _LOCK_UP, _CHANGE_POINT = float(Status.OK), float(Status.LOCK_UP), float(Status.CHANGE_POINT)
-_DOUBLE_CRANK, _NO_ASSEMBLY = float(Status.DOUBLE_CRANK), float(Status.NO_ASSEMBLY)
 _TAN_PI_8 = 0.41421356237309503
 _QUARTER, _QUARTER_LOW = 0.7853981633974483, 3.061616997868383e-17
 # of (arctan(c)/c - 1)/c^2 in c^2, interpolated at 12 Chebyshev points of abs(c) < tan(pi/8): 3e-18 of the arctangent
@@ -64,10 +62,10 @@ def verdict(lengths, margin):
     hair = ROUNDING * ((b + d) + (f + e))
     sense = where(e > b, -1.0, 1.0)  # a crank longer than the frame: abs(b-e) = e-b
     least = smaller(m1, smaller(sense * m2, sense * m3))
-    turning = where(least > hair, where(e < b, _OK, _DOUBLE_CRANK), _CHANGE_POINT)
+    turning = where(least > hair, where(e < b, OK, DOUBLE_CRANK), CHANGE_POINT)
     locked = least < -hair
     if some(locked):
-        return where(locked, where(_spare(b, d, f, e) < 0.0, _NO_ASSEMBLY, _LOCK_UP), turning)
+        return where(locked, where(_spare(b, d, f, e) < 0.0, NO_ASSEMBLY, LOCK_UP), turning)
     return turning
 
 

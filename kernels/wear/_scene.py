@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from kernels.interface import Field, Status
+from kernels.interface import Field
+from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths.elementary import in_unit, mantissa_exponent, scale
@@ -13,9 +14,6 @@ from kernels.polisher.arm import EXAMPLE as LINKS
 from kernels.polisher.arm import PARAMETERS as LINK_PARAMETERS
 from kernels.wear import _dwell, _tool
 from kernels.wear._tool import sincos
-
-OK, BAD_INPUT, OUT_OF_RANGE = float(Status.OK), float(Status.BAD_INPUT), float(Status.OUT_OF_RANGE)
-CHANGE_POINT, DOUBLE_CRANK = float(Status.CHANGE_POINT), float(Status.DOUBLE_CRANK)
 
 ANGLE_LIMIT = 1e6
 """Angles beyond which no digits are left of their sines."""

@@ -13,7 +13,8 @@ import math
 
 import numpy as np
 
-from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
+from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method
+from kernels.lanes.codes import BAD_INPUT, INACCURATE, OK, OUT_OF_RANGE, STEP_LIMIT
 from kernels.lanes.columns import entry_of_cells, one_by_one
 from kernels.lanes.jit import jit, jit_call, jit_inline
 from kernels.lanes.vectors import magnitude, sqrt
@@ -22,9 +23,8 @@ from kernels.maths.elementary import in_unit, is_normal, mantissa_exponent, scal
 from kernels.polisher import linkage
 from kernels.wear import _path, _pressure, _scene
 from kernels.wear._path import INSIDE, ONCE, OUTSIDE, STEPS
-from kernels.wear._scene import ANGLE_LIMIT, BAD_INPUT, OK, OUT_OF_RANGE, allowed, pressed
+from kernels.wear._scene import ANGLE_LIMIT, allowed, pressed
 
-_INACCURATE, _STEP_LIMIT = float(Status.INACCURATE), float(Status.STEP_LIMIT)
 _EPS = 2.0**-52
 _TURN = 2.0 * math.pi
 _DEPTH = _path.HALVINGS + 2
@@ -158,13 +158,13 @@ def _cell(p, rtol, loaded, work):
         return 0.0, 0.0, verdict
     value, error, short = way(path, loaded, p[21], tau, 0.25 * rtol, work)
     if not short:
-        return math.nan, math.nan, _STEP_LIMIT
+        return math.nan, math.nan, STEP_LIMIT
     hard, units = (p[17], unit) if loaded[1] == 0 else (p[18], -unit)
     wear = _scene.with_units(value, p[16], hard, units)
     doubt = _scene.with_units(error, p[16], hard, units)
     if value > 0.0 and not is_normal(wear):
         return wear, doubt, OUT_OF_RANGE
-    return wear, doubt, verdict if error <= rtol * value else _INACCURATE
+    return wear, doubt, verdict if error <= rtol * value else INACCURATE
 
 
 @entry_of_cells

@@ -21,15 +21,15 @@ under a load leaves wholly wears without bound: NaN with an infinite error, henc
 
 import math
 
-from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
+from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method
+from kernels.lanes.codes import BAD_INPUT, INACCURATE, OK, OUT_OF_RANGE
 from kernels.lanes.columns import entry_of_cells, one_by_one
 from kernels.lanes.jit import jit, jit_inline
 from kernels.lanes.ranges import partly
 from kernels.maths.elementary import in_unit, is_normal
 from kernels.wear import _pressure, _profile, _scene
-from kernels.wear._scene import BAD_INPUT, OK, OUT_OF_RANGE, allowed, pressed
+from kernels.wear._scene import allowed, pressed
 
-_INACCURATE = float(Status.INACCURATE)
 _FAINT = 2.0**-100
 _AT_RIM = 1e-8
 """Distance from the rim, over the radius, within which wear may have no bound."""
@@ -77,7 +77,7 @@ def _cell(p, rtol, loaded, radius, wear, wear_error, work):
         return verdict
     if not (normal or most > 0.0):
         return OUT_OF_RANGE
-    return partly(normal, verdict) if worst <= rtol * most else _INACCURATE
+    return partly(normal, verdict) if worst <= rtol * most else INACCURATE
 
 
 @entry_of_cells
