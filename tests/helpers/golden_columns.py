@@ -95,10 +95,12 @@ def _solved(kernel, method, cells, rtol, coordinates):
     lengths |= {new: lengths[old] for new, old in kernel.same_length.items()}
     outputs = [np.zeros((rtol.size, *(lengths[d] for d in field.dims))) for field in kernel.outputs]
     status = np.zeros(rtol.size, np.int8)
-    method.solve(*cells, rtol, *coordinates, *outputs, status)
-    for column in outputs:
+    asked = [np.ones(len(outputs), np.uint8)] if method.estimates else []
+    error = [np.zeros(rtol.size)] if method.estimates else []
+    method.solve(*cells, rtol, *coordinates, *asked, *outputs, *error, status)
+    for column in (*outputs, *error):
         column[status >= 64] = np.nan
-    return *outputs, status
+    return *outputs, *error, status
 
 
 if __name__ == "__main__":
