@@ -61,7 +61,6 @@ def interrupted(study, output):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Solver, "solve", failing)
         patch.setattr("sweep.system.forecast.Forecast.order", lambda self: iter(range(self.blocks)))
-        patch.setattr("sweep.runs.session.order", lambda sample, blocks, first: np.arange(blocks.count))
         with pytest.raises(SweepError, match="stop here"):
             quiet(study, output, block_cells=5, workers=1)
 
@@ -94,7 +93,7 @@ def told_by(action):
 
 
 def environment():
-    root = Path(__file__).parents[3]
+    root = Path(__file__).parents[2]
     return {**os.environ, "PYTHONPATH": os.pathsep.join([str(root), str(root / "tests" / "helpers")])}
 
 

@@ -44,7 +44,7 @@ def test_words_and_ways_of_writing_do_not_change_it():
 
 
 def test_it_survives_json():
-    study = build(axes={"height": [np.nan, 1.0, -np.inf, -0.0]}, fixed={"g": -np.nan})
+    study = build(axes={"height": [np.nan, 1.0, -np.inf, -0.0], "g": [-np.nan]})
     assert fingerprint(Study.from_json(study.to_json(), declared=True)) == fingerprint(study)
 
 
@@ -184,14 +184,14 @@ def test_what_chooses_methods_and_what_reduces_cells_counts_too():
     }
 
 
-@pytest.mark.parametrize("name", ["solve", "grid", "granules", "reducing", "contents"])
+@pytest.mark.parametrize("name", ["solve", "grid", "row_blocks", "reduce", "contents"])
 def test_an_edit_of_what_reduces_cells_is_named(monkeypatch, tmp_path, name):
     study = build(**BASE, summary={})
     old, real = fingerprint(study), module._path
     edited = tmp_path / f"{name}.py"
-    edited.write_bytes(real(f"sweep.{name}").read_bytes() + b"# edited\n")
-    monkeypatch.setattr(module, "_path", lambda asked: edited if asked == f"sweep.{name}" else real(asked))
-    assert difference(old, fingerprint(study)) == [f"source sweep.{name}: changed"]
+    edited.write_bytes(real(f"sweep.cells.{name}").read_bytes() + b"# edited\n")
+    monkeypatch.setattr(module, "_path", lambda asked: edited if asked == f"sweep.cells.{name}" else real(asked))
+    assert difference(old, fingerprint(study)) == [f"source sweep.cells.{name}: changed"]
 
 
 def test_a_kernel_typed_at_the_prompt_has_no_source_and_is_no_fault(monkeypatch):

@@ -31,6 +31,8 @@ from running import (
 )
 
 from kernels.interface import Status
+from sweep.cells.contents import contents
+from sweep.cells.fingerprint import fingerprint
 from sweep.cells.solve import Solver
 from sweep.results.open import open_result
 from sweep.results.verify import verify
@@ -479,8 +481,13 @@ def free(monkeypatch, output, count):
 
 
 def needed(cells, left):
-    """Bytes of the output of `tall` (axis, g, v0; fall time, status and method of every cell) and of parts to come."""
-    return 8 * (cells + 2) + 10 * cells + 10 * left
+    """Bytes of the output of `tall` (axis, g, v0; fall time, error, status and method of every cell) and parts to come.
+
+    What the study says is in both.
+    """
+    attrs = contents(tall(cells), fingerprint(tall(cells))).attrs
+    words = 2 * sum(len(str(text).encode()) for text in attrs.values())
+    return words + 8 * (cells + 2) + 14 * cells + 14 * left
 
 
 def test_space_for_the_output_without_its_parts_is_too_little(output, monkeypatch):
