@@ -342,9 +342,13 @@ def test_a_folder_is_no_study(tmp_path):
         sweep.read_study(tmp_path)
 
 
-def test_an_endless_file_is_refused():
-    with pytest.raises(sweep.SweepError, match="is larger than 50000000 bytes"):
+def test_an_endless_file_is_refused(tmp_path):
+    with pytest.raises(sweep.SweepError, match="is no regular file"):
         sweep.read_study("/dev/zero")
+    long = tmp_path / "long.toml"
+    long.write_bytes(b"#" * 50_000_001)
+    with pytest.raises(sweep.SweepError, match="is larger than 50000000 bytes"):
+        sweep.read_study(long)
 
 
 def test_windows_line_ends_and_a_byte_order_mark_do_no_harm(tmp_path):
