@@ -7,13 +7,14 @@ A cycle lasts until the next tooth, or, should more than one pass in it, one swi
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from kernels.impact import _half_swing as swing
 from kernels.impact._half_swing import half_swing
 from kernels.impact._periodic import chain, distance, errors, invert, multiplier, newton
-from kernels.impact._units import bend
+from kernels.impact._units import Cycle, bend
 from kernels.lanes.codes import (
     GRAZING,
     INACCURATE,
@@ -52,12 +53,20 @@ _CHAINED = 5.0
 """Errors of the changes after many contacts over those of one: 3.5 at most in 1055 clocks."""
 
 
+class Answer(NamedTuple):
+    """A cycle, how far the middle of its swing is off, the share of time in contact, and impacts in half a period."""
+
+    cycle: Cycle
+    offset: float
+    held: float
+    impacts: float
+
+
 @jit
 def plain_scene(scene):
     """The scene of `_half_swing`."""
-    wheel, pallet, _, eta, _, e, _ = scene
     c, y_i = bend(scene)
-    return wheel[0], pallet[0], min(eta[0], 0.25), e, c, y_i
+    return scene.wheel[0], scene.pallet[0], min(scene.eta[0], 0.25), scene.e, c, y_i
 
 
 @jit
@@ -154,15 +163,15 @@ def _answer(tally, ends, halves, pace, e):
     rim, pallet = (tally[swing.RIM] / beats, tally[swing.PALLET] / beats) if beats > 0.0 else (math.nan, math.nan)
     endless = e > 0.0 and tally[swing.TRAINS] > 0.0
     impacts = math.inf if endless else tally[swing.IMPACTS] / halves
-    cycle = tally[swing.TIME] / halves, ends[0], rim, pallet, pace, tally[swing.RECOIL]
-    return cycle, ends[1], tally[swing.HELD] / tally[swing.TIME], impacts
+    cycle = Cycle(tally[swing.TIME] / halves, ends[0], rim, pallet, pace, tally[swing.RECOIL])
+    return Answer(cycle, ends[1], tally[swing.HELD] / tally[swing.TIME], impacts)
 
 
 @jit
 def _none():
     """No answer."""
     nan = math.nan
-    return (nan, nan, nan, nan, nan, nan), nan, nan, nan
+    return Answer(Cycle(nan, nan, nan, nan, nan, nan), nan, nan, nan)
 
 
 @jit
@@ -183,8 +192,8 @@ def _verdict(tally, teeth, cycles, fading, worst, gap, rounding, rtol):
 def _worst(answer, gap, V, w, late):
     """Largest relative error of the outputs but the multiplier, by the errors of gap, V and w and the relative one of
     the time."""
-    (_, travel, rim, pallet, _, back), _, share, _ = answer
-    worst = max(max(late, gap / travel), max(V / magnitude(rim), w / magnitude(pallet)))
+    cycle, share, back = answer.cycle, answer.held, answer.cycle.back
+    worst = max(max(late, gap / cycle.travel), max(V / magnitude(cycle.rim), w / magnitude(cycle.pallet)))
     worst = max(worst, late + late / share if share > 0.0 else 0.0)
     return max(worst, 6.0 * (V + w) / sqrt(2.0 * back) if back > 0.0 else 0.0)  # V^2/2, V perhaps that of both bodies
 
@@ -205,7 +214,7 @@ def _judged(scene, start, k, work, rtol):
     half_swings, teeth, cycles = _cycles(k, tally[swing.WAY])
     modulus, blur = multiplier(chained)
     answer = _answer(tally, _ends(tally, k), 2.0 * cycles * k / half_swings, modulus ** (1.0 / k), scene[3])
-    rounding = _ROUNDING * (2.0 + tally[swing.EVENTS] / k) * (1.0 + answer[0][1])
+    rounding = _ROUNDING * (2.0 + tally[swing.EVENTS] / k) * (1.0 + answer.cycle.travel)
     gap, V, w, late = errors(start, rest, inverse, chained, rounding, tally[swing.TIME])
     noise = _CHAINED * blur * (rounding * k + gap)
     worst = max(_worst(answer, gap, V, w, late), noise / (k * modulus) if modulus > 0.0 else 0.0)
@@ -246,12 +255,15 @@ def attractor(scene, rtol, total, work, history):
 
 
 @jit
-def settled(scene, rtol):
-    """`attractor` of a scene of `_units`, in one row."""
-    kappa = scene[2][0]
-    if not (1.0 / KAPPA_LIMIT <= kappa <= KAPPA_LIMIT):
-        answer = _none()
-        return answer[0], answer[1], answer[2], answer[3], NO_METHOD
+def workspace():
+    """Arrays that `settled` uses for one clock after the other."""
     work = np.empty(swing.TALLIES), np.empty((5, 3)), np.empty((4, 3)), np.empty((3, 3))
-    answer, status = attractor(plain_scene(scene), rtol, np.empty(swing.TALLIES), work, np.empty((BLOCK + 1, 3)))
-    return answer[0], answer[1], answer[2], answer[3], status
+    return np.empty(swing.TALLIES), work, np.empty((BLOCK + 1, 3))
+
+
+@jit
+def settled(scene, rtol, total, work, history):
+    """`attractor` of a scene of `_units`."""
+    if not (1.0 / KAPPA_LIMIT <= scene.kappa[0] <= KAPPA_LIMIT):
+        return _none(), NO_METHOD
+    return attractor(plain_scene(scene), rtol, total, work, history)
