@@ -1,7 +1,7 @@
 # How fast is the balance's count of half swings against following them one by one, and how right?
 """Prints ratios measured in this run, on one core, and errors against 120 digits (needs mpmath):
 
-python benchmarks/release.py
+python benchmarks/speed/balance.py
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 
-from kernels.balance import release
+from kernels.balance.release import BALANCE
 from kernels.interface import Status
 
 sys.path.append(str(Path(__file__).parents[2] / "tests" / "oracles"))
@@ -23,6 +23,7 @@ from mpmath import mpf
 CELLS = 256
 """Cells along each axis."""
 REPEATS = 5
+METHODS = {method.name: method.solve for method in BALANCE.methods}
 OUTPUTS = ("half_swings", "stop_angle", "stop_time", "margin", "period")
 
 
@@ -64,7 +65,7 @@ def speed():
     inputs, outputs = grid(CELLS)
     n = CELLS * CELLS
     print(f"{'one core':56} {'ns/cell':>8} {'plain':>8} {'ratio':>7}")
-    for name, solve in (("closed", release.closed), ("recursion", release.recursion)):
+    for name, solve in METHODS.items():
         seconds(solve, inputs, outputs), seconds(plain, inputs, outputs)
         times = [(seconds(solve, inputs, outputs), seconds(plain, inputs, outputs)) for _ in range(REPEATS)]
         ratio = float(np.median([b / a for a, b in times]))
@@ -96,10 +97,10 @@ def main():
     n = 600
     damped, light = random.uniform(1e-4, 0.99, n), 10 ** random.uniform(-14, -2, n)
     coarse, fine = 10 ** random.uniform(-4, -0.5, n), 10 ** random.uniform(-12, -4, n)
-    for name, solve in (("closed", release.closed), ("recursion", release.recursion), ("plain recursion", plain)):
+    for name, solve in (*METHODS.items(), ("plain recursion", plain)):
         errors(f"{name}, zeta 1e-4 to 0.99, r/theta0 1e-4 to 0.3", solve, damped, coarse)
         errors(f"{name}, zeta 1e-14 to 1e-2, r/theta0 1e-4 to 0.3", solve, light, coarse)
-    errors("closed, zeta 1e-14 to 1e-2, r/theta0 1e-12 to 1e-4", release.closed, light, fine)
+    errors("closed, zeta 1e-14 to 1e-2, r/theta0 1e-12 to 1e-4", METHODS["closed"], light, fine)
 
 
 if __name__ == "__main__":

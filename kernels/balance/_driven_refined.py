@@ -11,6 +11,7 @@ and v3 = v2, or v3^2 = v2^2 + 2 w where an impulse takes the place of leg 2. Der
 
 from fractions import Fraction
 from math import factorial
+from typing import NamedTuple
 
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import choose, isnt, magnitude, some, where
@@ -38,6 +39,44 @@ _COSINES = tuple(constant(Fraction((-1) ** k, factorial(2 * k + 2))) for k in ra
 _SINES = tuple(constant(Fraction((-1) ** k, factorial(2 * k + 1))) for k in range(13, -1, -1))
 
 
+class Swing(NamedTuple):
+    """E, S and S' of a free swing, as pairs, and its phase squared."""
+
+    E: tuple
+    S: tuple
+    slope: tuple
+    phase: float
+
+
+class Legs(NamedTuple):
+    """A cycle by its force at rest and the times of its legs, all pairs."""
+
+    f: tuple
+    t1: tuple
+    t2: tuple
+    t3: tuple
+
+
+class Misses(NamedTuple):
+    """What (1), (2), (3) and the speeds miss by."""
+
+    first: float
+    second: float
+    third: float
+    last: float
+
+
+class Slopes(NamedTuple):
+    """E, S and S' of the legs, by which the misses change."""
+
+    E1: float
+    S1: float
+    S2: float
+    slope2: float
+    E3: float
+    S3: float
+
+
 @jit
 def _series(y, shares):
     total = shares[0][0] + 0.0 * y[0], shares[0][1] + 0.0 * y[0]
@@ -62,99 +101,94 @@ def _waves(square):
 
 @jit_call
 def _swing(zeta, t):
-    """E, S and S' at the time t, a pair; and the phase squared."""
+    """The swing until the time t, a pair."""
     high, low = two_product(zeta, zeta)
     square = times(shifted((-high, -low), 1.0), times(t, t))
     gap, sine = _waves(square)
     sine, cosine = times(t, sine), shifted(negative(gap), 1.0)
     decay = whole(*exponential(scaled(t, -zeta)))
     lag = scaled(sine, zeta)
-    return times(decay, add(cosine, lag)), times(decay, sine), times(decay, add(cosine, negative(lag))), square[0]
+    ends = times(decay, add(cosine, negative(lag)))
+    return Swing(times(decay, add(cosine, lag)), times(decay, sine), ends, square[0])
 
 
 @jit_call
-def _residuals(scene, cycle):
-    """What (1), (2), (3) and the speeds miss by; the speeds v1, v2, v3; E and S by which they change; the phases."""
+def _residuals(scene, legs):
+    """The misses, the speeds v1, v2, v3, by what they change, and the phases squared."""
     zeta, r, m, beta, w = scene
-    f, t1, t2, t3 = cycle
-    E1, S1, _, phase1 = _swing(zeta, t1)
-    E2, S2, slope2, phase2 = _swing(zeta, t2)
-    E3, S3, _, phase3 = _swing(-zeta, t3)
+    one, two, three = _swing(zeta, legs.t1), _swing(zeta, legs.t2), _swing(-zeta, legs.t3)
     near, far = two_sum(beta, -r), two_sum(beta, r)
-    f2, g = shifted(near, m), shifted(f, 2.0 * r)
-    v1, v3 = times(f, S1), times(g, S3)
-    v2 = add(times(v1, slope2), times(f2, S2))
-    first = add(times(f, E1), negative(near))[0]
-    second = add(add(times(f2, E2), negative(times(v1, S2))), negative(shifted(f2, -2.0 * beta)))[0]
-    third = add(times(g, E3), negative(far))[0]
+    f2, g = shifted(near, m), shifted(legs.f, 2.0 * r)
+    v1, v3 = times(legs.f, one.S), times(g, three.S)
+    v2 = add(times(v1, two.slope), times(f2, two.S))
+    first = add(times(legs.f, one.E), negative(near))[0]
+    second = add(add(times(f2, two.E), negative(times(v1, two.S))), negative(shifted(f2, -2.0 * beta)))[0]
+    third = add(times(g, three.E), negative(far))[0]
     energy = shifted(add(times(v3, v3), negative(times(v2, v2))), -2.0 * w)[0] / (2.0 * v3[0])
     last = where(beta > 0.0, add(v3, negative(v2))[0], energy)
-    factors = E1[0], S1[0], S2[0], slope2[0], E3[0], S3[0]
-    return (first, second, third, last), (v1[0], v2[0], v3[0]), factors, (phase1, phase2, phase3)
+    slopes = Slopes(one.E[0], one.S[0], two.S[0], two.slope[0], three.E[0], three.S[0])
+    return Misses(first, second, third, last), (v1[0], v2[0], v3[0]), slopes, (one.phase, two.phase, three.phase)
 
 
 @jit
-def _along(scene, misses, speeds, factors, df):
+def _along(scene, misses, speeds, by, df):
     """Changes of t1, t2, t3 that mend all but the last miss where f changes by df, and the last miss after that."""
     zeta, r, m, beta, _ = scene
-    first, second, third, last = misses
     v1, v2, v3 = speeds
-    E1, S1, S2, slope2, E3, S3 = factors
     lifts = beta > 0.0
-    d1, d3 = (first + E1 * df) / v1, (third + E3 * df) / v3
-    dv1 = S1 * df + ((beta - r) - 2.0 * zeta * v1) * d1
-    dv3 = S3 * df + ((beta + r) + 2.0 * zeta * v3) * d3
-    d2 = where(lifts, (second - S2 * dv1) / where(lifts, v2, 1.0), 0.0)
-    dv2 = slope2 * dv1 + (((m - r) - beta) - 2.0 * zeta * v2) * d2
-    return (d1, d2, d3), last + dv3 - where(lifts, 1.0, v2 / v3) * dv2
+    d1, d3 = (misses.first + by.E1 * df) / v1, (misses.third + by.E3 * df) / v3
+    dv1 = by.S1 * df + ((beta - r) - 2.0 * zeta * v1) * d1
+    dv3 = by.S3 * df + ((beta + r) + 2.0 * zeta * v3) * d3
+    d2 = where(lifts, (misses.second - by.S2 * dv1) / where(lifts, v2, 1.0), 0.0)
+    dv2 = by.slope2 * dv1 + (((m - r) - beta) - 2.0 * zeta * v2) * d2
+    return (d1, d2, d3), misses.last + dv3 - where(lifts, 1.0, v2 / v3) * dv2
 
 
 @jit_call
-def _step(scene, cycle):
+def _step(scene, legs):
     """The cycle after a step of Newton, and whether it was the last and there is such a cycle."""
-    zeta = scene[0]
-    misses, speeds, factors, phases = _residuals(scene, cycle)
-    (a1, a2, a3), at = _along(scene, misses, speeds, factors, 0.0 * zeta)
-    unit = cycle[0][0]
-    (b1, b2, b3), beyond = _along(scene, misses, speeds, factors, unit)
+    misses, speeds, slopes, (phase1, phase2, phase3) = _residuals(scene, legs)
+    (a1, a2, a3), at = _along(scene, misses, speeds, slopes, 0.0 * scene.zeta)
+    f, t1, t2, t3 = legs
+    unit = f[0]
+    (b1, b2, b3), beyond = _along(scene, misses, speeds, slopes, unit)
     share = -at / (beyond - at)
     d1, d2, d3 = a1 + share * (b1 - a1), a2 + share * (b2 - a2), a3 + share * (b3 - a3)
-    f, t1, t2, t3 = cycle
-    new = shifted(f, share * unit), shifted(t1, d1), shifted(t2, d2), shifted(t3, d3)
+    new = Legs(shifted(f, share * unit), shifted(t1, d1), shifted(t2, d2), shifted(t3, d3))
     least = _SETTLED * (t1[0] + t2[0] + t3[0])
     settled = (magnitude(share) <= _SETTLED) & (magnitude(d1) <= least) & (magnitude(d3) <= least)
-    forwards = (speeds[0] > 0.0) & (speeds[1] > 0.0) & (speeds[2] > 0.0) & (unit > 0.0)
-    once = (phases[0] < _HALF_TURN) & (phases[1] < _HALF_TURN) & (phases[2] < _HALF_TURN)
+    v1, v2, v3 = speeds
+    forwards = (v1 > 0.0) & (v2 > 0.0) & (v3 > 0.0) & (unit > 0.0)
+    once = (phase1 < _HALF_TURN) & (phase2 < _HALF_TURN) & (phase3 < _HALF_TURN)
     return new, settled & (magnitude(d2) <= least), forwards & once
 
 
 @jit
 def _chosen(condition, new, old):
-    """`choose`, of four pairs."""
-    first, second = choose(condition, new[0], old[0]), choose(condition, new[1], old[1])
-    return first, second, choose(condition, new[2], old[2]), choose(condition, new[3], old[3])
+    """`choose`, of the pairs of two cycles."""
+    f, t1 = choose(condition, new.f, old.f), choose(condition, new.t1, old.t1)
+    return Legs(f, t1, choose(condition, new.t2, old.t2), choose(condition, new.t3, old.t3))
 
 
 @jit_call
-def refined(scene, p, times_, wanted):
+def refined(scene, p, guess, wanted):
     """Amplitude, half period and multiplier of the cycle next to a half swing from beta + p, and whether it is found.
 
-    Looked for where `wanted`; `times_` are those of its legs.
+    Looked for where `wanted`; `guess` are the times of its legs.
     """
     zeta, r, _, beta, _ = scene
-    t1, t2, t3 = times_
+    t1, t2, t3 = guess
     none = 0.0 * p
-    cycle = shifted(two_sum(beta, -r), p), (t1, none), (t2, none), (t3, none)
+    legs = Legs(shifted(two_sum(beta, -r), p), (t1, none), (t2, none), (t3, none))
     active = wanted & (zeta * (t1 + t2 + t3) < LONGEST)
     found = active & isnt(active)
     for _ in range(STEPS):
         if not some(active):
             break
-        new, settled, there = _step(scene, cycle)
-        cycle = _chosen(active, new, cycle)
+        new, settled, there = _step(scene, legs)
+        legs = _chosen(active, new, legs)
         found = found | (active & settled & there)
         active = active & isnt(settled)
-    f, t1, t2, t3 = cycle
-    time = add(add(t1, t2), t3)
+    time = add(add(legs.t1, legs.t2), legs.t3)
     kept = whole(*exponential(scaled(time, where(found, -2.0 * zeta, 0.0))))[0]
-    return shifted(f, r)[0], time[0], kept * f[0] / shifted(f, 2.0 * r)[0], found
+    return shifted(legs.f, r)[0], time[0], kept * legs.f[0] / shifted(legs.f, 2.0 * r)[0], found

@@ -9,11 +9,12 @@ From rest at a = beta + p the balance falls to th = beta (leg 1, where its speed
 At the cycle (3) is the multiplier, of the amplitude as of the energy. The energy that leg 3 needs to rise to a grows
 with a by exp(2 zeta t3) (a + r), what legs 1 and 2 provide by exp(-2 zeta (t1 + t2)) (a - r), which is less: there is
 one cycle, stable, if the least swing that comes through the lift gains, and none otherwise.
-Angles are in units of a power of two near beta, or near the square root of w. A *scene* is (zeta, r, m, beta, w).
+Angles are in units of a power of two near beta, or near the square root of w.
 Derived here.
 """
 
 import math
+from typing import NamedTuple
 
 from kernels.balance import _driven_refined, _ringdown
 from kernels.integrate import linear_flow
@@ -31,83 +32,154 @@ _LARGEST = 1e140
 """Swing, in units, whose square still is well inside float64."""
 
 
+class Scene(NamedTuple):
+    """A driven balance in units of angle."""
+
+    zeta: float
+    r: float
+    m: float
+    beta: float
+    w: float
+
+
+class Cycle(NamedTuple):
+    """A limit cycle in units: its amplitude, the time of half of it, and its multiplier."""
+
+    amplitude: float
+    time: float
+    multiplier: float
+
+
+class FirstLeg(NamedTuple):
+    """From rest to th = beta: the force at rest, the time, the response to it, and whether it comes there."""
+
+    f: float
+    t: float
+    s: float
+    c: float
+    comes: bool
+
+
+class Rise(NamedTuple):
+    """Legs 2 and 3."""
+
+    p: float
+    """How far beyond the lift it comes to rest."""
+    v2: float
+    v3: float
+    t2: float
+    t3: float
+    comes: bool
+    """Whether the lift is passed."""
+    loss: float
+    """Their share of J in (2)."""
+    s2: float
+    slope3: float
+
+
+class HalfSwing(NamedTuple):
+    """From rest at beta + p to rest at -(beta + p')."""
+
+    gain: float
+    """p' - p, a difference where the swing forgets its start and by (2) where it hardly changes."""
+    noise: float
+    """What rounding may be worth in it."""
+    kept: float
+    """da'/da by (3)."""
+    lost: float
+    """1 minus that."""
+    time: float
+    comes: bool
+    """Whether it passes the lift, or the zero."""
+    late: float
+    """Bound on dT/dp."""
+    blunt: float
+    """Error of the time, by the speeds at which its pieces end."""
+
+
 @jit
-def without_units(zeta, r, w, m, beta):
+def in_units(p):
     """The scene, the exponent of its unit, and whether friction and torque are normal numbers in it."""
-    lifts = beta > 0.0
-    m_w, e_w = mantissa_exponent(where(lifts, 1.0, w))
-    _, e_beta = mantissa_exponent(where(lifts, beta, 1.0))
+    lifts = p.beta > 0.0
+    m_w, e_w = mantissa_exponent(where(lifts, 1.0, p.w))
+    _, e_beta = mantissa_exponent(where(lifts, p.beta, 1.0))
     half = nearest(0.5 * e_w - 0.25)
     e = where(lifts, e_beta, half)
     energy = where(lifts, 0.0, m_w * where(e_w - 2.0 * half > 0.5, 2.0, 1.0))
-    friction, torque = in_unit(r, e), in_unit(m, e)
-    fine = (isnt(r > 0.0) | (friction > 1e-300)) & (friction < 1e300) & (isnt(lifts) | (torque > 1e-300))
-    return (zeta, friction, torque, in_unit(beta, e), energy), e, fine & (torque < 1e300)
+    friction, torque = in_unit(p.r, e), in_unit(p.m, e)
+    fine = (isnt(p.r > 0.0) | (friction > 1e-300)) & (friction < 1e300) & (isnt(lifts) | (torque > 1e-300))
+    return Scene(p.zeta, friction, torque, in_unit(p.beta, e), energy), e, fine & (torque < 1e300)
+
+
+@jit
+def _first_leg(scene, p):
+    f = (scene.beta - scene.r) + p
+    t = linear_flow.first_crossing(scene.zeta, 1.0, 0.0 * p, f, p)
+    comes = t < math.inf
+    t = where(comes, t, 0.0)
+    s, c, _ = linear_flow.response(scene.zeta, 1.0, t)
+    return FirstLeg(f, t, s, c, comes)
+
+
+@jit
+def _lift_time(scene, v1):
+    """Time of leg 2 from the speed v1, and whether it is passed."""
+    lifts = scene.beta > 0.0
+    t, comes = 0.0 * v1, v1 >= 0.0
+    if some(lifts):
+        f, way = where(lifts, (scene.beta - scene.r) + scene.m, 1.0), where(lifts, 2.0 * scene.beta, 1.0)
+        t = linear_flow.first_crossing(scene.zeta, 1.0, where(lifts, v1, 1.0), f, way)
+        comes = isnt(lifts) | (t < math.inf)
+        t = where(lifts & comes, t, 0.0)
+    return t, comes
 
 
 @jit_call
-def _from_lift(scene, v1):
-    """Legs 2 and 3 from th = beta with speed v1: rise p', speeds, times, whether the lift is passed; and the losses."""
-    zeta, r, m, beta, w = scene
-    lifts = beta > 0.0
-    f2 = (beta - r) + m
-    t2, comes = 0.0 * v1, v1 >= 0.0
-    if some(lifts):
-        way = where(lifts, 2.0 * beta, 1.0)
-        t2 = linear_flow.first_crossing(zeta, 1.0, where(lifts, v1, 1.0), where(lifts, f2, 1.0), way)
-        comes = isnt(lifts) | (t2 < math.inf)
-        t2 = where(lifts & comes, t2, 0.0)
+def _rise(scene, v1):
+    """Legs 2 and 3 from th = beta with speed v1."""
+    zeta, r, _, beta, w = scene
+    t2, comes = _lift_time(scene, v1)
     s2, _, slope2 = linear_flow.response(zeta, 1.0, t2)
     k2 = linear_flow.loss(zeta, 1.0, t2)
+    f2, f3 = (beta - r) + scene.m, beta + r
     v2 = fma(v1, slope2, f2 * s2)
     v3 = sqrt(fma(v2, v2, 2.0 * w))
-    f3 = beta + r
     t3 = linear_flow.first_reversal(zeta, 1.0, where(comes, v3, 1.0), -f3)
     s3, c3, slope3 = linear_flow.response(zeta, 1.0, t3)
-    rise = fma(v3, s3, -f3 * c3)
-    top = beta + rise
+    p = fma(v3, s3, -f3 * c3)
+    top = beta + p
     j2 = v1 * v1 * (s2 * fma(zeta, s2, slope2) + k2) + f2 * s2 * s2 * v1 + f2 * f2 * k2
     j3 = (top + r) * (top + r) * linear_flow.loss(-zeta, 1.0, t3)
-    return rise, v2, v3, t2, t3, comes, j2 + j3, s2, slope3
+    return Rise(p, v2, v3, t2, t3, comes, j2 + j3, s2, slope3)
 
 
 @jit_call
 def half_swing(scene, p):
-    """From rest at beta + p, p > 0.
-
-    Returns
-    -------
-    gain : p' - p, a difference where the swing forgets its start and by (2) where it hardly changes
-    noise : what rounding may be worth in it
-    kept, lost : da'/da by (3), and 1 minus it
-    time : of the half swing
-    comes : whether it passes the lift, or the zero
-    late : bound on dT/dp
-    blunt : error of the time, by the speeds at which its pieces end
-    """
+    """The half swing from rest at beta + p, p > 0."""
     zeta, r, m, beta, w = scene
-    a = beta + p
-    f1 = (beta - r) + p
-    t1 = linear_flow.first_crossing(zeta, 1.0, 0.0 * p, f1, p)
-    comes = t1 < math.inf
-    t1 = where(comes, t1, 0.0)
-    s1, c1, _ = linear_flow.response(zeta, 1.0, t1)
-    v1 = f1 * s1
-    rise, v2, v3, t2, t3, passes, j, s2, slope3 = _from_lift(scene, v1)
-    top, time = beta + rise, t1 + t2 + t3
-    j = j + f1 * f1 * linear_flow.loss(zeta, 1.0, t1)
+    a, leg = beta + p, _first_leg(scene, p)
+    v1 = leg.f * leg.s
+    rise = _rise(scene, v1)
+    top, time = beta + rise.p, leg.t + rise.t2 + rise.t3
+    j = rise.loss + leg.f * leg.f * linear_flow.loss(zeta, 1.0, leg.t)
     fade = -expm1(-2.0 * zeta * time)
-    kept = exp(-2.0 * zeta * time) * f1 / (top + r)
+    kept = exp(-2.0 * zeta * time) * leg.f / (top + r)
     balanced = kept > 0.5
     work = fma(2.0 * m, beta, w)
     by_energy = 2.0 * (work - r * (a + top) - 2.0 * zeta * j) / (a + top)
-    gain = where(balanced, by_energy, rise - p)
-    lost = (fade * f1 + gain + 2.0 * r) / (top + r)
-    noise = ROUNDING * where(balanced, 4.0 * work / (a + top), rise)
-    early, later = exp(-2.0 * zeta * t1), exp(-2.0 * zeta * (t1 + t2))
-    late = magnitude(1.0 - c1) / v1 + s2 / v2 * early * f1 / v1 + magnitude(slope3) / (top + r) * later * f1 / v3
-    blunt = ROUNDING * (time + 2.0 * p / v1 + 4.0 * beta / v2)
-    return gain, noise, kept, lost, time, comes & passes, late, blunt
+    gain = where(balanced, by_energy, rise.p - p)
+    lost = (fade * leg.f + gain + 2.0 * r) / (top + r)
+    noise = ROUNDING * where(balanced, 4.0 * work / (a + top), rise.p)
+    blunt = ROUNDING * (time + 2.0 * p / v1 + 4.0 * beta / rise.v2)
+    return HalfSwing(gain, noise, kept, lost, time, leg.comes & rise.comes, _late(scene, leg, rise, v1, top), blunt)
+
+
+@jit
+def _late(scene, leg, rise, v1, top):
+    """Bound on dT/dp."""
+    early, later = exp(-2.0 * scene.zeta * leg.t), exp(-2.0 * scene.zeta * (leg.t + rise.t2))
+    late = magnitude(1.0 - leg.c) / v1 + rise.s2 / rise.v2 * early * leg.f / v1
+    return late + magnitude(rise.slope3) / (top + scene.r) * later * leg.f / rise.v3
 
 
 @jit
@@ -133,63 +205,78 @@ def _light_losses(scene):
 
 @jit_call
 def _refined(scene, p, cycle, poor):
-    """Amplitude, half period and multiplier in 32 digits where they are `poor`, and where that was possible."""
-    zeta, r, _, beta, _ = scene
+    """The cycle in 32 digits where it is `poor`, and where that was possible."""
     p = where(poor & (p < _LARGEST), p, 1.0)
-    f1 = (beta - r) + p
-    t1 = linear_flow.first_crossing(zeta, 1.0, 0.0 * p, f1, p)
-    comes = poor & (t1 < math.inf)
-    t1 = where(comes, t1, 0.0)
-    s1, _, _ = linear_flow.response(zeta, 1.0, t1)
-    _, _, _, t2, t3, passes, _, _, _ = _from_lift(scene, f1 * s1)
-    a, time, kept, found = _driven_refined.refined(scene, p, (t1, t2, t3), comes & passes)
-    return choose(found, (a, time, kept), cycle), found
+    leg = _first_leg(scene, p)
+    rise = _rise(scene, leg.f * leg.s)
+    times = leg.t, rise.t2, rise.t3
+    a, time, kept, found = _driven_refined.refined(scene, p, times, poor & leg.comes & rise.comes)
+    return choose(found, Cycle(a, time, kept), cycle), found
+
+
+@jit
+def _start(scene):
+    """Where Newton starts, the least swing, whether the balance swings at all, and whether it does so in range."""
+    least, never = _least(scene)
+    first = _rise(scene, 0.0 * least)
+    impulse_creeps = isnt(scene.beta > 0.0) & (scene.zeta >= 1.0)
+    swings = first.comes & (first.p > least) & isnt(never | impulse_creeps)
+    guess = _light_losses(scene)
+    tame = guess < _LARGEST
+    guess = guess - scene.beta
+    p = where(guess > first.p, guess, first.p)
+    return where(swings & tame, p, 1.0), where(swings, least, 0.0), swings, tame
+
+
+@jit
+def _search(scene, p, low, active):
+    """p where the half swing repeats, the least that is seen to gain nothing, and whether that is not settled.
+
+    Newton's steps, bisections where they leave the bracket.
+    """
+    high = 0.0 * p + 1e300
+    for _ in range(NEWTON_LIMIT):
+        if not some(active):
+            break
+        swing = half_swing(scene, p)
+        up = isnt(swing.comes) | (swing.gain > 0.0)
+        low, high = where(up, p, low), where(up, high, p)
+        new = p + swing.gain / swing.lost
+        change = magnitude(new - p)
+        inside = swing.comes & (new >= low) & (new <= high)
+        new = where(inside, new, where(high < 1e300, 0.5 * (low + high), 2.0 * p))
+        settled = inside & ((change <= 1e-9 * p) | (change * swing.lost <= swing.noise))
+        p = where(active, new, p)
+        active = active & isnt(settled)
+    return p, high, active
+
+
+@jit
+def _right(scene, p, swing, rtol):
+    """Whether the cycle at p is right to rtol."""
+    a = scene.beta + p
+    error = swing.noise / swing.lost + 2.3e-16 * a
+    of_time = (error * swing.late + swing.blunt) / swing.time
+    of_multiplier = 2.0 * scene.zeta * of_time * swing.time + 2.0 * error / ((scene.beta - scene.r) + p)
+    of_multiplier = where(swing.kept > 1e-300, of_multiplier, 0.0)
+    return (error <= rtol * a) & (of_time <= rtol) & (of_multiplier <= rtol)
 
 
 @jit_call
 def newton(scene, rtol):
-    """Amplitude, half period and multiplier of the cycle in units, and its verdict."""
-    zeta, r, _, beta, _ = scene
-    least, never = _least(scene)
-    first, _, _, _, _, passes, _, _, _ = _from_lift(scene, 0.0 * least)
-    impulse_creeps = isnt(beta > 0.0) & (zeta >= 1.0)
-    swings = passes & (first > least) & isnt(never | impulse_creeps)
-    guess = _light_losses(scene)
-    tame = guess < _LARGEST
-    guess = guess - beta
-    p = where(guess > first, guess, first)
-    p = where(swings & tame, p, 1.0)
-    low, high = where(swings, least, 0.0), 0.0 * p + 1e300
-    active = swings & tame
-    for _ in range(NEWTON_LIMIT):
-        if not some(active):
-            break
-        gain, noise, _, lost, _, comes, _, _ = half_swing(scene, p)
-        up = isnt(comes) | (gain > 0.0)
-        low, high = where(up, p, low), where(up, high, p)
-        new = p + gain / lost
-        fallback = where(high < 1e300, 0.5 * (low + high), 2.0 * p)
-        change = magnitude(new - p)
-        inside = comes & (new >= low) & (new <= high)
-        new = where(inside, new, fallback)
-        settled = inside & ((change <= 1e-9 * p) | (change * lost <= noise))
-        p = where(active, new, p)
-        active = active & isnt(settled)
-    _, noise, kept, lost, time, comes, late, blunt = half_swing(scene, p)
-    a = beta + p
-    error = noise / lost + 2.3e-16 * a
-    of_time = (error * late + blunt) / time
-    of_multiplier = 2.0 * zeta * of_time * time + 2.0 * error / ((beta - r) + p)
-    of_multiplier = where(kept > 1e-300, of_multiplier, 0.0)
-    right = (error <= rtol * a) & (of_time <= rtol) & (of_multiplier <= rtol)
-    lost = active | isnt(comes)
+    """The cycle and its verdict."""
+    p, low, swings, tame = _start(scene)
+    p, high, active = _search(scene, p, low, swings & tame)
+    swing = half_swing(scene, p)
+    cycle, right = Cycle(scene.beta + p, swing.time, swing.kept), _right(scene, p, swing, rtol)
+    lost = active | isnt(swing.comes)
     verdict = where(lost, NOT_CONVERGED, where(right, OK, INACCURATE))
     poor = swings & tame & (lost | isnt(right))
     if some(poor):
-        (a, time, kept), found = _refined(scene, where(comes, p, high), (a, time, kept), poor)
+        cycle, found = _refined(scene, where(swing.comes, p, high), cycle, poor)
         verdict = where(found, where(rtol >= ROUNDING, OK, INACCURATE), verdict)
     verdict = where(swings, verdict, STICKS)
-    return a, time, kept, where(tame, verdict, OUT_OF_RANGE)
+    return cycle, where(tame, verdict, OUT_OF_RANGE)
 
 
 @jit_call
@@ -207,7 +294,7 @@ def closed(scene):
     kept = where(free, kept, kept_smooth)
     known = free | (smooth & isnt(lifts))
     runs = (free & runs) | (isnt(free) & (zeta < 1.0))
-    return a, time, kept, where(known, where(runs, OK, STICKS), NO_METHOD)
+    return Cycle(a, time, kept), where(known, where(runs, OK, STICKS), NO_METHOD)
 
 
 @jit

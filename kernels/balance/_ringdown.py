@@ -11,10 +11,10 @@ not where abs(th +- r) < r, as is printed there.
 
 After N half swings (3) is a difference of terms N times as large, so it is taken in pairs of float64: the count is that
 of the inputs as they are given, and (4) only where to begin. Angles are in units of a power of two near r.
-A *scene* is the tuple (zeta, r, r_s, a_0), with 0 <= zeta < 1.
 """
 
 import math
+from typing import NamedTuple
 
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import choose, fma, isnt, magnitude, nearest, some, where
@@ -38,14 +38,56 @@ _UNIT_LIMIT = 2.0**900
 """theta0/r beyond which products would leave float64."""
 
 
+class Scene(NamedTuple):
+    """A balance in units of angle; zeta < 1 where its half swings are counted."""
+
+    zeta: float
+    r: float
+    r_s: float
+    start: float
+
+
+class Decay(NamedTuple):
+    """delta of (2), sqrt(1 - zeta^2), E and 1 - E, each a pair with its own digits."""
+
+    delta: tuple
+    root: tuple
+    kept: tuple
+    lost: tuple
+
+
+class LastSwing(NamedTuple):
+    """The half swing after which it rests: its number and the turning points, pairs, on both sides of r_s."""
+
+    number: float
+    above: tuple
+    below: tuple
+    kept: float
+    """The part a_0 E^k of the turning point at which the search began."""
+    unsure: bool
+
+
+class Rest(NamedTuple):
+    """Where it comes to rest: half swings, a_N, the least abs(a_k - r_s)/r_s, and what is known of them."""
+
+    count: float
+    last: float
+    margin: float
+    grazes: bool
+    """Whether the count hangs on the last digits of the inputs."""
+    doubt: float
+    """Error of a_N."""
+    unsure: bool
+    """Whether the count is not confirmed."""
+
+
 @jit
-def in_units(r, r_s, theta0):
-    """r, r_s and abs(theta0) in units of 2^e, e, and whether they are not too large there; powers of two are exact."""
+def in_units(zeta, r, r_s, theta0):
+    """The scene in units of 2^e, e, and whether it is not too large there; powers of two are exact."""
     angle = magnitude(theta0)
     _, e = mantissa_exponent(where(r > 0.0, r, where(r_s > 0.0, r_s, where(angle > 0.0, angle, 1.0))))
-    release = in_unit(angle, e)
-    held = in_unit(r_s, e)
-    return in_unit(r, e), held, release, e, (release < _UNIT_LIMIT) & (held < _UNIT_LIMIT)
+    scene = Scene(zeta, in_unit(r, e), in_unit(r_s, e), in_unit(angle, e))
+    return scene, e, (scene.start < _UNIT_LIMIT) & (scene.r_s < _UNIT_LIMIT)
 
 
 @jit
@@ -58,55 +100,44 @@ def decrement(zeta):
 
 
 @jit
-def tame(zeta, delta):
-    """zeta and delta, 0 where they count for nothing: products of their parts would be no normal numbers."""
-    felt = zeta > FAINT
-    return where(felt, zeta, 0.0), (where(felt, delta[0], 0.0), where(felt, delta[1], 0.0))
+def decay_of(zeta):
+    """The decay of a half swing, for 0 <= zeta < 1."""
+    delta, root = decrement(zeta)
+    q, n = pairs.exponential(pairs.negative(delta))
+    return Decay(delta, root, pairs.whole(q, n), pairs.missing(q, n))
 
 
 @jit_call
-def turning_point(zeta, delta, share, r, start, k):
-    """a_k of (3), as a pair, and its first term a_0 E^k; `zeta` and `delta` are tame, `share` is of `share_kept`."""
-    _, lost = share
+def turning_point(scene, decay, k):
+    """a_k of (3), as a pair, and its first term a_0 E^k."""
+    smooth = isnt(scene.zeta > FAINT)  # there products of the parts of delta would be no normal numbers
+    delta = choose(smooth, (0.0, 0.0), decay.delta)
     q, n = pairs.exponential(pairs.negative(pairs.scaled(delta, k)))
-    kept = pairs.scaled(pairs.shifted(q, 1.0), start)
+    kept = pairs.scaled(pairs.shifted(q, 1.0), scene.start)
     kept = scale(kept[0], n), scale(kept[1], n)
-    smooth = isnt(zeta > FAINT)
-    ratio = pairs.over(pairs.missing(q, n), choose(smooth, (1.0, 0.0), lost))
+    ratio = pairs.over(pairs.missing(q, n), choose(smooth, (1.0, 0.0), decay.lost))
     ratio = choose(smooth, (k, 0.0 * k), ratio)
-    friction = pairs.scaled(pairs.times(_both(share), ratio), r)
+    friction = pairs.scaled(pairs.times(pairs.shifted(decay.kept, 1.0), ratio), scene.r)
     return pairs.add(kept, pairs.negative(friction)), kept[0]
 
 
 @jit
-def share_kept(delta):
-    """E and 1 - E, each a pair with its own digits."""
-    q, n = pairs.exponential(pairs.negative(delta))
-    return pairs.whole(q, n), pairs.missing(q, n)
-
-
-@jit
-def _both(share):
-    """1 + E."""
-    return pairs.shifted(share[0], 1.0)
-
-
-@jit
-def next_turning_point(share, r, a):
+def _next_turning_point(scene, decay, a):
     """a_{k+1} of (2), as a pair."""
-    return pairs.add(pairs.times(share[0], a), pairs.negative(pairs.scaled(_both(share), r)))
+    lost = pairs.scaled(pairs.shifted(decay.kept, 1.0), scene.r)
+    return pairs.add(pairs.times(decay.kept, a), pairs.negative(lost))
 
 
 @jit
-def count_by_formula(scene, delta, lost):
+def count_by_formula(scene, decay):
     """(4) without its ceil, within 4e-15; a number above 0 where a_0 > r_s."""
-    _, r, r_s, start = scene
+    delta, lost = decay.delta[0], decay.lost[0]
     coth = where(delta > FAINT, delta * (2.0 - lost) / where(delta > FAINT, lost, 1.0), 2.0)  # delta coth(delta/2)
-    below = fma(r, coth, delta * r_s)
+    below = fma(scene.r, coth, delta * scene.r_s)
     high = where(delta > 1.0, delta, 1.0)
-    x = (delta / high) * (start - r_s) / (below / high)
+    x = (delta / high) * (scene.start - scene.r_s) / (below / high)
     small = x < 1e-17
-    return where(small, (start - r_s) / below, log1p(x) / where(small, 1.0, delta))
+    return where(small, (scene.start - scene.r_s) / below, log1p(x) / where(small, 1.0, delta))
 
 
 @jit
@@ -118,57 +149,42 @@ def _whole(x):
     return where(big, where(x < 2.0**52, (x + 2.0**52) - 2.0**52, x), n)
 
 
-@jit_call
-def closed(scene):
-    """The count by (4), confirmed by the turning points on both sides of it.
-
-    Returns
-    -------
-    count, last, margin : half swings, a_N, and the least abs(a_k - r_s)/r_s
-    grazes : whether the count hangs on the last digits of the inputs
-    doubt : error of a_N
-    unsure : whether the count is not confirmed
-    """
-    zeta, r, r_s, start = scene
-    moves = start > r_s
-    delta, root = decrement(zeta)
-    share = share_kept(delta)
-    guess = count_by_formula(scene, delta[0], share[1][0])
-    guess = where(moves, guess, 0.0)
-    countless = isnt(guess < COUNT_LIMIT)
-    k = _whole(where(countless, 0.0, guess * (1.0 - 4e-15) - 1e-6)) - 1.0
-    k = where(k > 0.0, k, 0.0)
-    above, kept = turning_point(*tame(zeta, delta), share, r, start, k)
-    sure = above[0] - r_s + above[1] > 0.0
-    below = next_turning_point(share, r, above)
-    active = moves & isnt(countless) & _exceeds(below, r_s)
+@jit
+def _last_swing(scene, decay, k, counted):
+    """The half swing that ends below r_s, next to the turning point k, where one is `counted`."""
+    above, kept = turning_point(scene, decay, k)
+    sure = above[0] - scene.r_s + above[1] > 0.0
+    below = _next_turning_point(scene, decay, above)
+    active = counted & _exceeds(below, scene.r_s)
     k = k + 1.0
     for _ in range(_CONFIRM_LIMIT):
         if not some(active):
             break
         above = choose(active, below, above)
-        below = choose(active, next_turning_point(share, r, above), below)
+        below = choose(active, _next_turning_point(scene, decay, above), below)
         k = where(active, k + 1.0, k)
-        active = active & _exceeds(below, r_s)
-    last = where(moves, where(countless, math.nan, below[0]), start)
-    over, under = pairs.shifted(above, -r_s)[0], where(moves, -pairs.shifted(below, -r_s)[0], r_s - start)
-    steep = 1.0 / (root[0] * root[0])
-    drift = 2.0 * share[0][0] * where(zeta > FAINT, delta[0] / where(zeta > FAINT, share[1][0], 1.0), 1.0)
-    blur = _blur(steep, drift, delta[0], below[0], share[0][0] * kept, k)
-    blur_above = _blur(steep, drift, delta[0], above[0], kept, k)
-    blur_above = where(k > 1.0, blur_above, _TWO_ULP * start)
-    margin, grazes = _margin(
-        over,
-        under,
-        where(moves, blur_above + _TWO_ULP * r_s, 0.0),
-        where(moves, blur + _TWO_ULP * r_s, 0.0),
-        r_s,
-        moves,
-    )
-    count = where(moves, where(countless, _whole(guess), k), 0.0)
-    doubt = where(moves & (zeta > FAINT), fma(_PAIR_ERROR / _TWO_ULP, blur, _LOST), 0.0)
-    unsure = moves & isnt(countless) & (active | isnt(sure))
-    return count, last, where(countless, 0.0, margin), grazes | countless, doubt, unsure
+        active = active & _exceeds(below, scene.r_s)
+    return LastSwing(k, above, below, kept, counted & (active | isnt(sure)))
+
+
+@jit_call
+def closed(scene):
+    """Its rest: the count by (4), confirmed by the turning points on both sides of it."""
+    moves, decay = scene.start > scene.r_s, decay_of(scene.zeta)
+    guess = where(moves, count_by_formula(scene, decay), 0.0)
+    countless = isnt(guess < COUNT_LIMIT)
+    k = _whole(where(countless, 0.0, guess * (1.0 - 4e-15) - 1e-6)) - 1.0
+    swing = _last_swing(scene, decay, where(k > 0.0, k, 0.0), moves & isnt(countless))
+    count = where(moves, where(countless, _whole(guess), swing.number), 0.0)
+    last = where(moves, where(countless, math.nan, swing.below[0]), scene.start)
+    over = pairs.shifted(swing.above, -scene.r_s)[0]
+    under = where(moves, -pairs.shifted(swing.below, -scene.r_s)[0], scene.r_s - scene.start)
+    blur_above, blur = _blurs(scene, decay, swing)
+    held = _TWO_ULP * scene.r_s
+    over_error, under_error = where(moves, blur_above + held, 0.0), where(moves, blur + held, 0.0)
+    margin, grazes = _margin(over, under, over_error, under_error, scene.r_s, moves)
+    doubt = where(moves & (scene.zeta > FAINT), fma(_PAIR_ERROR / _TWO_ULP, blur, _LOST), 0.0)
+    return Rest(count, last, where(countless, 0.0, margin), grazes | countless, doubt, swing.unsure)
 
 
 @jit
@@ -191,23 +207,34 @@ def unit(r_s):
 
 
 @jit
-def _blur(steep, drift, delta, a, kept, k):
-    """What two units in the last place of a_0, r and zeta are worth in a_k.
+def _blurs(scene, decay, swing):
+    """What two units in the last place of a_0, r and zeta are worth in the turning points above and below r_s.
 
     da/dln a_0 = a_0 E^k, da/dln r = -r (1 + E)(1 - E^k)/(1 - E), and ln zeta counts through ln delta, `steep` times:
     k delta-fold in the first, at most `drift`-fold in the second.
     """
-    friction = magnitude(kept - a)
-    return _TWO_ULP * (kept * fma(k * delta, steep, 1.0) + friction * fma(drift, steep, 1.0))
+    delta, k = decay.delta[0], swing.number
+    steep = 1.0 / (decay.root[0] * decay.root[0])
+    felt = scene.zeta > FAINT
+    drift = 2.0 * decay.kept[0] * where(felt, delta / where(felt, decay.lost[0], 1.0), 1.0)
+    first, second = fma(k * delta, steep, 1.0), fma(drift, steep, 1.0)
+    above = where(k > 1.0, _blur(first, second, swing.above[0], swing.kept), _TWO_ULP * scene.start)
+    return above, _blur(first, second, swing.below[0], decay.kept[0] * swing.kept)
+
+
+@jit
+def _blur(first, second, a, kept):
+    """Two units in the last place of the terms of (3), each so many times."""
+    return _TWO_ULP * (kept * first + magnitude(kept - a) * second)
 
 
 @jit_call
 def recursion(scene):
-    """The count by following (2) in float64, with the error that its rounding has come to; returns as `closed`."""
-    zeta, r, r_s, start = scene
-    delta, _ = decrement(zeta)
+    """As `closed`, by following (2) in float64, with the error that its rounding has come to."""
+    r_s, start = scene.r_s, scene.start
+    delta, _ = decrement(scene.zeta)
     share = exp(-delta[0])
-    loss = r * (1.0 + share)
+    loss = scene.r * (1.0 + share)
     a, before, count, error, error_before = start, start, 0.0 * start, 0.0 * start, 0.0 * start
     rounding = 2.3e-16 * (1.0 + delta[0])  # of `share`
     active = (a > r_s) & (r_s > 0.0)  # r_s = 0: it never ends
@@ -223,4 +250,4 @@ def recursion(scene):
         active = active & (a > r_s)
     moved = count > 0.0
     margin, grazes = _margin(before - r_s, r_s - a, error_before + 2.3e-16 * r_s, error + 2.3e-16 * r_s, r_s, moved)
-    return count, a, margin, grazes, where(moved, error, 0.0), active
+    return Rest(count, a, margin, grazes, where(moved, error, 0.0), active)

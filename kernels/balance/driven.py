@@ -10,90 +10,91 @@ balance released from rest comes to th = 0.
 """
 
 import math
+from typing import NamedTuple
 
 from kernels.balance import _driven_swing
-from kernels.interface import Field, Kernel, Method
+from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, NO_LIMIT_CYCLE, OK, OUT_OF_RANGE
-from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none, partly
 from kernels.lanes.vectors import isnt, where
+from kernels.lanes.wiring import kernel, method
 from kernels.maths.elementary import is_normal, scale
 
 ROUNDING = 4e-15
 """What `closed` is right to."""
 
 
+class Driven(NamedTuple):
+    """Parameters."""
+
+    zeta: float
+    omega_n: float
+    r: float
+    w: float
+    m: float
+    beta: float
+
+
+class LimitCycle(NamedTuple):
+    """Outputs."""
+
+    amplitude: float
+    period: float
+    multiplier: float
+
+
 @jit
-def _write(i, cycle, units, omega_n, amplitude, period, multiplier, status):
-    a, time, kept, verdict = cycle
-    e, fine = units
-    swing, whole = scale(a, e), 2.0 * time / omega_n
+def _outputs(cycle, verdict, e, fine, omega_n):
+    """The cycle in SI units, and the status."""
+    swing, whole = scale(cycle.amplitude, e), 2.0 * cycle.time / omega_n
     wide, timed = is_normal(swing), is_normal(whole)
-    amplitude[i], period[i], multiplier[i] = or_none(swing, wide), or_none(whole, timed), kept
-    status[i] = where(fine, partly(wide & timed, verdict), OUT_OF_RANGE)
+    outputs = LimitCycle(or_none(swing, wide), or_none(whole, timed), cycle.multiplier)
+    return outputs, where(fine, partly(wide & timed, verdict), OUT_OF_RANGE)
 
 
 @jit
-def _closed(i, zeta, omega_n, r, w, m, beta, rtol, *outputs):
-    scene, e, fine = _driven_swing.without_units(zeta[i], r[i], w[i], m[i], beta[i])
-    _write(i, _driven_swing.closed(scene), (e, fine), omega_n[i], *outputs)
-
-
-@entry()
-def closed(zeta, omega_n, r, w, m, beta, rtol, amplitude, period, multiplier, status):
+def closed(p, rtol):
     """Formulas for r = 0 under impulses and for zeta = 0; NO_METHOD elsewhere."""
-    each_cell(_closed, (zeta, omega_n, r, w, m, beta, rtol, amplitude, period, multiplier, status))
+    scene, e, fine = _driven_swing.in_units(p)
+    cycle, verdict = _driven_swing.closed(scene)
+    return _outputs(cycle, verdict, e, fine, p.omega_n)
 
 
 @jit
-def _closed_bound(i, zeta, r, beta, out):
-    known = isnt(zeta[i] > 0.0) | (isnt(r[i] > 0.0) & isnt(beta[i] > 0.0))
-    out[i] = where(known, ROUNDING, math.inf)
-
-
-@entry("asked")
-def closed_bound(zeta, omega_n, r, w, m, beta, rtol, asked, out):
+def closed_bound(p):
     """Rounding where there is a formula, infinite elsewhere."""
-    each_cell(_closed_bound, (zeta, r, beta, out))
+    known = isnt(p.zeta > 0.0) | (isnt(p.r > 0.0) & isnt(p.beta > 0.0))
+    return where(known, ROUNDING, math.inf)
 
 
 @jit
-def _newton(i, zeta, omega_n, r, w, m, beta, rtol, *outputs):
-    scene, e, fine = _driven_swing.without_units(zeta[i], r[i], w[i], m[i], beta[i])
-    _write(i, _driven_swing.newton(scene, rtol[i]), (e, fine), omega_n[i], *outputs)
-
-
-@entry()
-def newton(zeta, omega_n, r, w, m, beta, rtol, amplitude, period, multiplier, status):
+def newton(p, rtol):
     """Exact pieces of the half swing and Newton on its map, in 32 digits where conditioning leaves less than rtol."""
-    each_cell(_newton, (zeta, omega_n, r, w, m, beta, rtol, amplitude, period, multiplier, status))
+    scene, e, fine = _driven_swing.in_units(p)
+    cycle, verdict = _driven_swing.newton(scene, rtol)
+    return _outputs(cycle, verdict, e, fine, p.omega_n)
 
 
 @jit
-def _check(i, zeta, omega_n, r, w, m, beta, status):
-    positive = (zeta[i] >= 0.0) & (omega_n[i] > 0.0) & (r[i] >= 0.0) & (w[i] >= 0.0) & (m[i] >= 0.0) & (beta[i] >= 0.0)
-    finite = (zeta[i] < math.inf) & (omega_n[i] < math.inf) & (r[i] < math.inf) & (w[i] < math.inf)
-    kicks, lifts = w[i] > 0.0, (m[i] > 0.0) & (beta[i] > 0.0)
-    nothing_else = isnt((m[i] > 0.0) | (beta[i] > 0.0))
-    one = (kicks & nothing_else) | (lifts & isnt(kicks))
-    fine = positive & finite & (m[i] < math.inf) & (beta[i] < math.inf) & one
-    lossless = isnt((zeta[i] > 0.0) | (r[i] > 0.0))
-    status[i] = where(fine, where(lossless, NO_LIMIT_CYCLE, OK), BAD_INPUT)
-
-
-@entry()
-def check(zeta, omega_n, r, w, m, beta, status):
+def check(p):
     """What no method is asked.
 
     BAD_INPUT: NaN, infinite, outside its limits; no drive, half of one (m without beta) or two. NO_LIMIT_CYCLE: nothing
     that takes energy.
     """
-    each_cell(_check, (zeta, omega_n, r, w, m, beta, status))
+    positive = (p.zeta >= 0.0) & (p.omega_n > 0.0) & (p.r >= 0.0) & (p.w >= 0.0) & (p.m >= 0.0) & (p.beta >= 0.0)
+    finite = (p.zeta < math.inf) & (p.omega_n < math.inf) & (p.r < math.inf) & (p.w < math.inf)
+    kicks, lifts = p.w > 0.0, (p.m > 0.0) & (p.beta > 0.0)
+    nothing_else = isnt((p.m > 0.0) | (p.beta > 0.0))
+    one = (kicks & nothing_else) | (lifts & isnt(kicks))
+    fine = positive & finite & (p.m < math.inf) & (p.beta < math.inf) & one
+    lossless = isnt((p.zeta > 0.0) | (p.r > 0.0))
+    return where(fine, where(lossless, NO_LIMIT_CYCLE, OK), BAD_INPUT)
 
 
-BALANCE_DRIVEN = Kernel(
-    name="balance_driven",
+BALANCE_DRIVEN = kernel(
+    "balance_driven",
     doc="limit cycle of a balance with viscous and solid friction, kept up by impulses or by a lift",
     source='"Theory of Horology", section 2-3, for the motion; the cycle is derived here',
     parameters=(
@@ -120,10 +121,11 @@ BALANCE_DRIVEN = Kernel(
             "multiplier of the half-swing map, of the amplitude as of the energy (0 where below 1e-308)",
         ),
     ),
+    record=Driven,
     check=check,
     methods=(
-        Method("closed", "formulas: impulses without solid friction, or no viscous damping", closed, closed_bound),
-        Method("newton", "exact damped legs, Newton on the map of a half swing", newton),
+        method("closed", "formulas: impulses without solid friction, or no viscous damping", closed, closed_bound),
+        method("newton", "exact damped legs, Newton on the map of a half swing", newton),
     ),
     example={"zeta": 0.002, "omega_n": 5 * math.pi, "r": 0.0, "w": 0.1},
 )

@@ -12,10 +12,11 @@ such as the angle of rest near critical damping without friction of motion, is t
 """
 
 import math
+from typing import NamedTuple
 
 from kernels.balance import _ringdown
 from kernels.balance._ringdown import RECURSION_LIMIT
-from kernels.interface import Field, Kernel, Method
+from kernels.interface import Field
 from kernels.lanes.codes import (
     BAD_INPUT,
     GRAZING,
@@ -28,14 +29,46 @@ from kernels.lanes.codes import (
     OVERDAMPED,
     STEP_LIMIT,
 )
-from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none, partly
 from kernels.lanes.vectors import isnt, magnitude, nearest, where
+from kernels.lanes.wiring import kernel, method
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW, is_normal, scale
 
 ROUNDING = 2e-15
-"""What `closed` is right to."""
+"""What `closed` is right to; where the differences of (3) in `_ringdown` lose more, the status says so."""
+
+
+class Balance(NamedTuple):
+    """Parameters."""
+
+    zeta: float
+    omega_n: float
+    r: float
+    r_s: float
+    theta0: float
+
+
+class RingDown(NamedTuple):
+    """Outputs."""
+
+    half_swings: float
+    stop_angle: float
+    stop_time: float
+    margin: float
+    period: float
+
+
+class Kind(NamedTuple):
+    """What the balance does, each as a condition."""
+
+    creeps: bool
+    """It is overdamped."""
+    moves: bool
+    endless: bool
+    """It swings for ever."""
+    lasts: bool
+    """Its motion has an end, be it the release."""
 
 
 @jit
@@ -53,120 +86,98 @@ def half_swing_time(zeta, omega_n):
 
 
 @jit
-def _verdict(ring, scene, rtol, unsettled, faint):
-    """The status of a swinging cell; an angle of rest too `faint` for a float64 is not asked for its error."""
-    _, last, margin, grazes, doubt, unsure = ring
-    loose = isnt(faint | (doubt <= rtol * magnitude(last))) | isnt(doubt <= rtol * margin * scene[2])
-    verdict = where(grazes, GRAZING, where(loose, INACCURATE, OK))
-    return where(unsure, unsettled, verdict)
+def _kind(scene):
+    creeps, moves = scene.zeta >= 1.0, scene.start > scene.r_s
+    endless = moves & isnt(creeps) & isnt((scene.r > 0.0) | (scene.r_s > 0.0))
+    return Kind(creeps, moves, endless, isnt((creeps & moves) | endless))
 
 
 @jit
-def _write(
-    i, scene, units, ring, rtol, unsettled, omega_n, theta0, half_swings, stop_angle, stop_time, margin, period, status
-):
-    """One cell, or the lanes', in SI units; overdamped and endless motions get what exists of them."""
-    zeta, r, r_s, start = scene
-    count, last, distance = ring[0], ring[1], ring[2]
-    e, fine = units
-    creeps, moves = zeta >= 1.0, start > r_s
-    endless = moves & isnt(creeps) & isnt((r > 0.0) | (r_s > 0.0))
-    half = half_swing_time(where(creeps, 0.0, zeta), omega_n)
-    whole = where((count < _ringdown.COUNT_LIMIT) & isnt(creeps), count, 0.0)
-    angle = side(theta0, whole) * where(creeps & moves, r, where(endless, 0.0, last))
-    angle = where(moves, scale(angle, e), theta0)
-    time = where(moves, count * half, 0.0)
-    away = where(r_s > 0.0, magnitude(start - r_s) / _ringdown.unit(r_s), math.nan)
-    distance = where(creeps, away, where(r_s > 0.0, distance, 0.0))
-    lasting = isnt((creeps & moves) | endless)
-    faded = isnt(r > 0.0) & lasting  # to a positive angle, however small
-    faint = moves & (magnitude(angle) < NORMAL_LOW) & (faded | (magnitude(angle) > 0.0))
+def _stop_angle(p, scene, e, rest, kind):
+    """Angle of rest [rad], and whether it is too small for a float64."""
+    swings = where((rest.count < _ringdown.COUNT_LIMIT) & isnt(kind.creeps), rest.count, 0.0)
+    angle = where(kind.creeps & kind.moves, scene.r, where(kind.endless, 0.0, rest.last))
+    angle = where(kind.moves, scale(side(p.theta0, swings) * angle, e), p.theta0)
+    fades = isnt(scene.r > 0.0) & kind.lasts  # to a positive angle, however small
+    return angle, kind.moves & (magnitude(angle) < NORMAL_LOW) & (fades | (magnitude(angle) > 0.0))
+
+
+@jit
+def _margin(scene, rest, kind):
+    """The margin, NaN where it comes to no turning point at which it might rest."""
+    away = magnitude(scene.start - scene.r_s) / _ringdown.unit(scene.r_s)
+    away = or_none(away, scene.r_s > 0.0)
+    return or_none(where(kind.creeps, away, where(scene.r_s > 0.0, rest.margin, 0.0)), isnt(kind.endless))
+
+
+@jit
+def _verdict(scene, rest, kind, rtol, unsettled, faint):
+    """The status but for the range; an angle of rest too `faint` for a float64 is not asked for its error."""
+    loose = isnt(faint | (rest.doubt <= rtol * magnitude(rest.last))) | isnt(
+        rest.doubt <= rtol * rest.margin * scene.r_s
+    )
+    verdict = where(rest.unsure, unsettled, where(rest.grazes, GRAZING, where(loose, INACCURATE, OK)))
+    verdict = where(scene.start > 0.0, verdict, OK)
+    return where(kind.creeps, OVERDAMPED, where(kind.endless, NEVER_ENDS, verdict))
+
+
+@jit
+def _outputs(p, rtol, follow, unsettled):
+    """In SI units, by one way to follow the ring-down; overdamped and endless motions get what exists of them."""
+    scene, e, fine = _ringdown.in_units(p.zeta, p.r, p.r_s, p.theta0)
+    rest, kind = follow(swinging(scene)), _kind(scene)
+    angle, faint = _stop_angle(p, scene, e, rest, kind)
+    half = half_swing_time(where(kind.creeps, 0.0, p.zeta), p.omega_n)
+    time = where(kind.moves, rest.count * half, 0.0)
     timed = is_normal(half) & is_normal(2.0 * half)
     ends = timed & isnt(time > NORMAL_HIGH)
-    half_swings[i] = where(creeps, 0.0, or_none(count, isnt(endless) & isnt(count > NORMAL_HIGH)))
-    stop_angle[i], stop_time[i] = or_none(angle, isnt(faint)), or_none(time, lasting & (ends | isnt(time > 0.0)))
-    margin[i], period[i] = or_none(distance, isnt(endless)), or_none(2.0 * half, timed & isnt(creeps))
-    whole = isnt(faint) & (creeps | (timed & (ends | isnt(lasting))))
-    verdict = where(start > 0.0, _verdict(ring, scene, rtol, unsettled, faint), OK)
-    verdict = where(creeps, OVERDAMPED, where(endless, NEVER_ENDS, verdict))
-    status[i] = where(fine, partly(whole, verdict), OUT_OF_RANGE)
-
-
-@jit
-def without_units(zeta, r, r_s, theta0):
-    """The scene, the exponent of its unit, and whether it is in range."""
-    r, r_s, start, e, fine = _ringdown.in_units(r, r_s, theta0)
-    return (zeta, r, r_s, start), (e, fine)
+    outputs = RingDown(
+        where(kind.creeps, 0.0, or_none(rest.count, isnt(kind.endless) & isnt(rest.count > NORMAL_HIGH))),
+        or_none(angle, isnt(faint)),
+        or_none(time, kind.lasts & (ends | isnt(time > 0.0))),
+        _margin(scene, rest, kind),
+        or_none(2.0 * half, timed & isnt(kind.creeps)),
+    )
+    whole = isnt(faint) & (kind.creeps | (timed & (ends | isnt(kind.lasts))))
+    verdict = _verdict(scene, rest, kind, rtol, unsettled, faint)
+    return outputs, where(fine, partly(whole, verdict), OUT_OF_RANGE)
 
 
 @jit
 def swinging(scene):
     """The scene with a tame damping where it is overdamped and nothing is counted."""
-    zeta, r, r_s, start = scene
-    return where(zeta < 1.0, zeta, 0.5), r, r_s, start
+    return _ringdown.Scene(where(scene.zeta < 1.0, scene.zeta, 0.5), scene.r, scene.r_s, scene.start)
 
 
 @jit
-def _closed(i, zeta, omega_n, r, r_s, theta0, rtol, *outputs):
-    scene, units = without_units(zeta[i], r[i], r_s[i], theta0[i])
-    ring = _ringdown.closed(swinging(scene))
-    _write(i, scene, units, ring, rtol[i], NOT_CONVERGED, omega_n[i], theta0[i], *outputs)
-
-
-@entry()
-def closed(zeta, omega_n, r, r_s, theta0, rtol, half_swings, stop_angle, stop_time, margin, period, status):
+def closed(p, rtol):
     """The count by formula, confirmed by the turning points on both sides of it in 32 digits."""
-    each_cell(
-        _closed,
-        (zeta, omega_n, r, r_s, theta0, rtol, half_swings, stop_angle, stop_time, margin, period, status),
-    )
-
-
-@entry("asked")
-def closed_bound(zeta, omega_n, r, r_s, theta0, rtol, asked, out):
-    """Rounding; where the differences of (3) in `_ringdown` lose more, the status says so."""
-    out[:] = ROUNDING
+    return _outputs(p, rtol, _ringdown.closed, NOT_CONVERGED)
 
 
 @jit
-def _recursion(i, zeta, omega_n, r, r_s, theta0, rtol, *outputs):
-    scene, units = without_units(zeta[i], r[i], r_s[i], theta0[i])
-    ring = _ringdown.recursion(swinging(scene))
-    _write(i, scene, units, ring, rtol[i], STEP_LIMIT, omega_n[i], theta0[i], *outputs)
-
-
-@entry()
-def recursion(zeta, omega_n, r, r_s, theta0, rtol, half_swings, stop_angle, stop_time, margin, period, status):
+def recursion(p, rtol):
     """Half swing by half swing; what rounding may have come to is added up beside it."""
-    each_cell(
-        _recursion,
-        (zeta, omega_n, r, r_s, theta0, rtol, half_swings, stop_angle, stop_time, margin, period, status),
-    )
+    return _outputs(p, rtol, _ringdown.recursion, STEP_LIMIT)
 
 
 @jit
-def allowed(zeta, omega_n, r, r_s, theta0):
+def allowed(p):
     """Whether the parameters are numbers within their limits; NaN fails."""
-    positive = (zeta >= 0.0) & (omega_n > 0.0) & (r >= 0.0) & (r_s >= r)
-    finite = (zeta < math.inf) & (omega_n < math.inf) & (r_s < math.inf) & (magnitude(theta0) < math.inf)
+    positive = (p.zeta >= 0.0) & (p.omega_n > 0.0) & (p.r >= 0.0) & (p.r_s >= p.r)
+    finite = (p.zeta < math.inf) & (p.omega_n < math.inf) & (p.r_s < math.inf) & (magnitude(p.theta0) < math.inf)
     return positive & finite
 
 
 @jit
-def _check(i, zeta, omega_n, r, r_s, theta0, status):
-    fine = allowed(zeta[i], omega_n[i], r[i], r_s[i], theta0[i])
-    lossless = isnt((zeta[i] > 0.0) | (r[i] > 0.0)) & (magnitude(theta0[i]) > r_s[i])
-    status[i] = where(fine, where(lossless, NO_LIMIT_CYCLE, OK), BAD_INPUT)
-
-
-@entry()
-def check(zeta, omega_n, r, r_s, theta0, status):
+def check(p):
     """What no method is asked.
 
     BAD_INPUT: NaN, infinite, outside its limits, or stiction below the friction of motion. NO_LIMIT_CYCLE: nothing that
     takes energy from a balance that swings.
     """
-    each_cell(_check, (zeta, omega_n, r, r_s, theta0, status))
+    lossless = isnt((p.zeta > 0.0) | (p.r > 0.0)) & (magnitude(p.theta0) > p.r_s)
+    return where(allowed(p), where(lossless, NO_LIMIT_CYCLE, OK), BAD_INPUT)
 
 
 PARAMETERS = (
@@ -179,8 +190,8 @@ PARAMETERS = (
 
 EXAMPLE = {"zeta": 0.002, "omega_n": 5 * math.pi, "r": 0.01, "theta0": 4.5}
 
-BALANCE = Kernel(
-    name="balance",
+BALANCE = kernel(
+    "balance",
     doc="ring-down of a balance with viscous and solid friction",
     source='"Theory of Horology", section 2-3, equations (3) and (10); the count is derived here',
     parameters=PARAMETERS,
@@ -191,10 +202,11 @@ BALANCE = Kernel(
         Field("margin", "1", "least distance of abs(theta) at a turning point from r_s, over r_s"),
         Field("period", "s", "time of two half swings, the same for each"),
     ),
+    record=Balance,
     check=check,
     methods=(
-        Method("closed", "formula of the count, confirmed in 32 digits", closed, closed_bound),
-        Method("recursion", f"half swing by half swing, up to {RECURSION_LIMIT}", recursion),
+        method("closed", "formula of the count, confirmed in 32 digits", closed, ROUNDING),
+        method("recursion", f"half swing by half swing, up to {RECURSION_LIMIT}", recursion),
     ),
     example=EXAMPLE,
 )

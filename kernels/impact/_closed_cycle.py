@@ -1,6 +1,6 @@
 """The impact clock's own cycle in closed form: one impact a half period, or for e = 0 one push in contact.
 
-Units, *scene* and *cycle* as in `_units`; wheel = M/(M + m), pallet = m/(M + m), so kappa = wheel/pallet.
+Units as in `_units`; wheel = M/(M + m), pallet = m/(M + m), so kappa = wheel/pallet.
 
 Impact, 0 < e < 1. After an impact at y = -Y the pallet flies to +Y, and the wheel half a pitch:
     T^2 = (1 + e) pallet/(1 - e),  w = kappa T/2,  Y = kappa T^2/4,                                      (1)
@@ -27,6 +27,7 @@ map of c^2 is linear with the factor d^2. Derived here.
 
 import math
 
+from kernels.impact._units import Cycle
 from kernels.lanes.codes import GRAZING, INACCURATE, NO_CYCLE, NO_METHOD, OK, UNSTABLE
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import choose, fma, isnt, magnitude, sqrt, where
@@ -68,38 +69,37 @@ def within(u, G, size, t, pitch):
 @jit
 def bent(scene):
     """nu, or 0 where the lever is so bent that no cycle exists, and whether it is not."""
-    wheel, _, kappa, _, _, _, nu = scene
-    tame = magnitude(nu) * kappa[0] * wheel[0] <= _MOST_BENT
-    return where(tame, nu, 0.0), tame
+    tame = magnitude(scene.nu) * scene.kappa[0] * scene.wheel[0] <= _MOST_BENT
+    return where(tame, scene.nu, 0.0), tame
 
 
 @jit
 def existence(scene, nu):
     """The least share by which the conditions (3) hold; negative where the impact cycle does not exist."""
-    wheel, pallet, kappa, eta, _, e, _ = scene
-    reach = 4.0 * eta[0] * (1.0 - e) / (wheel[0] * (1.0 + e))  # eta/Y
+    e, wheel, pallet = scene.e, scene.wheel[0], scene.pallet[0]
+    reach = 4.0 * scene.eta[0] * (1.0 - e) / (wheel * (1.0 + e))  # eta/Y
     a = 0.5 * (1.0 + reach)
-    n = 0.25 * nu * kappa[0] * wheel[0]
-    q, size = (1.0 + e) * (pallet[0] - n), (1.0 + e) * (pallet[0] + magnitude(n))
+    n = 0.25 * nu * scene.kappa[0] * wheel
+    q, size = (1.0 + e) * (pallet - n), (1.0 + e) * (pallet + magnitude(n))
     return lesser(behind(e, q, size, a), within(1.0, q, size, a, 1.0 - e))
 
 
 @jit
 def _excess(scene):
     """d = (M - m)/(M + m), as a pair."""
-    return pairs.add(scene[0], pairs.negative(scene[1]))
+    return pairs.add(scene.wheel, pairs.negative(scene.pallet))
 
 
 @jit
 def stability(scene, nu):
     """The least share by which (4) and (5) have the right signs; negative where disturbances grow."""
-    wheel, pallet, kappa, _, _, e, _ = scene
+    e, wheel = scene.e, scene.wheel[0]
     d = _excess(scene)[0]
-    steep, lost = 4.0 * (1.0 + e) * (1.0 + e), kappa[0] * ((1.0 - e) * (1.0 - e))
-    curved = nu * wheel[0]  # nu alone may be too large to be multiplied
-    flat, bend = 4.0 * pallet[0], curved * d
+    steep, lost = 4.0 * (1.0 + e) * (1.0 + e), scene.kappa[0] * ((1.0 - e) * (1.0 - e))
+    curved = nu * wheel  # nu alone may be too large to be multiplied
+    flat, bend = 4.0 * scene.pallet[0], curved * d
     first = (flat - bend) / (flat + magnitude(bend))
-    flat, bend = steep * wheel[0], curved * fma(2.0, fma(e, e, 1.0), lost)
+    flat, bend = steep * wheel, curved * fma(2.0, fma(e, e, 1.0), lost)
     second = (flat + bend) / (flat + magnitude(bend))
     flip = lesser(magnitude(d), magnitude(second)) * where((d > 0.0) & (second > 0.0), 1.0, -1.0)
     flip = where((d < 0.0) & (second < 0.0), -flip, flip)
@@ -115,14 +115,14 @@ def _number(x, like):
 @jit
 def _polynomial(scene, nu):
     """The coefficients of p, as pairs: p(1) + p(-1) = 2 (a2 + a0), p(1) - p(-1) = 2 (1 + a1), a0 = -e^2."""
-    wheel, pallet, kappa, _, _, e, _ = scene
-    d, one = _excess(scene), _number(1.0, e)
+    pallet, e = scene.pallet, scene.e
+    one = _number(1.0, e)
     more, less, square = pairs.shifted(one, e), pairs.shifted(one, -e), pairs.two_product(e, e)
-    excess = pairs.times(wheel, d)
+    excess = pairs.times(scene.wheel, _excess(scene))
     bend = pairs.scaled(excess, nu)
     flat = (4.0 * pallet[0], 4.0 * pallet[1])
     plus = pairs.times(pairs.times(more, less), pairs.add(flat, pairs.negative(bend)))
-    lost = pairs.times(kappa, pairs.times(less, less))
+    lost = pairs.times(scene.kappa, pairs.times(less, less))
     lost = pairs.add(lost, pairs.shifted((2.0 * square[0], 2.0 * square[1]), 2.0))
     steep = pairs.times(more, more)
     flat = pairs.times(excess, (4.0 * steep[0], 4.0 * steep[1]))
@@ -136,7 +136,7 @@ def _polynomial(scene, nu):
 @jit
 def impact_cycle(scene, nu):
     """The cycle (1), (2), its multiplier from (4), (5), and the relative error of that."""
-    wheel, pallet, kappa, _, _, e, _ = scene
+    wheel, pallet, e = scene.wheel, scene.pallet, scene.e
     loss = (1.0 - e) / (1.0 + e)
     half_period = sqrt(pallet[0] / loss)
     rim = pairs.add(wheel, pairs.scaled(pairs.shifted(pallet, 1.0), -e))[0]  # wheel (1 - e) - 2 e pallet
@@ -144,23 +144,24 @@ def impact_cycle(scene, nu):
     multiplier, doubt = largest_modulus(*_polynomial(scene, nu))
     back = where(rim < 0.0, 0.125 * rim * rim / lossy, 0.0)
     rim = 0.5 * rim / sqrt(lossy)
-    return (half_period, 0.25 * wheel[0] / loss, rim, 0.5 * kappa[0] * half_period, multiplier, back), doubt
+    speed = 0.5 * scene.kappa[0] * half_period
+    return Cycle(half_period, 0.25 * wheel[0] / loss, rim, speed, multiplier, back), doubt
 
 
 @jit
 def plastic_cycle(scene):
     """The cycle (6), and the share of time in contact."""
-    wheel, pallet, kappa, eta, slack, _, _ = scene
+    wheel, kappa, eta = scene.wheel, scene.kappa, scene.eta
     twice = sqrt(fma(4.0, eta[0], kappa[0]))  # 2 c
-    stop = sqrt(1.0 / pallet[0])
-    fall = slack[0] / (stop + twice)
+    stop = sqrt(1.0 / scene.pallet[0])
+    fall = scene.slack[0] / (stop + twice)
     half_period = twice / kappa[0]
     lead = pairs.add(pairs.times(kappa, pairs.shifted(wheel, -0.25)), pairs.negative(eta))  # (wheel R)^2 - c^2
     start = lead[0] / fma(0.5, twice, wheel[0] * stop)
     back = where(start < 0.0, 0.5 * start * start / wheel[0], 0.0)
     d = _excess(scene)[0]
     travel = fma(0.5 * twice, fall, eta[0]) + back
-    return (half_period, travel, start, start, d * d, back), 1.0 - fall / half_period
+    return Cycle(half_period, travel, start, start, d * d, back), 1.0 - fall / half_period
 
 
 @jit
@@ -174,13 +175,12 @@ def verdict(exists, stable, doubt, rtol):
 @jit
 def closed(scene, rtol):
     """The cycle, the share of time in contact, and the status."""
-    e = scene[5]
-    plastic = isnt(e > 0.0)
+    plastic = isnt(scene.e > 0.0)
     nu, tame = bent(scene)
     cycle, doubt = impact_cycle(scene, nu)
     pushed, held = plastic_cycle(scene)
     status = where(tame, verdict(existence(scene, nu), stability(scene, nu), doubt, rtol), NO_CYCLE)
-    straight = isnt(magnitude(scene[6]) > 0.0)
+    straight = isnt(magnitude(scene.nu) > 0.0)
     status = where(plastic, where(straight, OK, NO_METHOD), status)
     share = where(plastic, held, 0.0)
-    return choose(plastic, pushed, cycle), where(isnt(e < 0.0), share, math.nan), status
+    return choose(plastic, pushed, cycle), where(isnt(scene.e < 0.0), share, math.nan), status

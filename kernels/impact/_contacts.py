@@ -10,14 +10,34 @@ of bodies of mass 1 and 1/kappa, at l^2 = 1. Under a flat lever bounces with clo
     t = 2 s1/(1 - e)                                                                                   (3)
 in lasting contact: in that time the common centre, of speed W = wheel V + pallet w, falls freely with `wheel`, the
 share of the torque in both bodies, and the gap is never wider than s1^2/2. In contact both go on with that.
-A *motion* is the tuple (y, V, w). *Slopes* are an array of 5 rows, the changes of x, y, V, w and of the time, and 3
+*Slopes* are an array of 5 rows, the changes of x, y, V, w and of the time, and 3
 columns, by gap, V and w at the beginning of the half swing.
 """
 
 import math
+from typing import NamedTuple
 
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude, sqrt
+
+
+class Scene(NamedTuple):
+    """The clock in float64: shares of mass, height of escape, restitution, and the lever's bend c about y_i."""
+
+    wheel: float
+    pallet: float
+    eta: float
+    e: float
+    c: float
+    y_i: float
+
+
+class Motion(NamedTuple):
+    """Place of the pallet, speed of the rim, speed of the pallet."""
+
+    y: float
+    V: float
+    w: float
 
 
 @jit
@@ -46,37 +66,33 @@ def meets_either(gap, rate, bend):
 @jit
 def impact(scene, motion, lever):
     """The motion after an impact, by (2), and the speed of closing before it."""
-    wheel, pallet, _, e, _, _ = scene
-    y, V, w = motion
-    closing = V - lever * w
-    push = (1.0 + e) * closing / (pallet + wheel * lever * lever)
-    return (y, V - pallet * push, w + lever * wheel * push), closing
+    closing = motion.V - lever * motion.w
+    push = (1.0 + scene.e) * closing / (scene.pallet + scene.wheel * lever * lever)
+    return Motion(motion.y, motion.V - scene.pallet * push, motion.w + lever * scene.wheel * push), closing
 
 
 @jit
 def impact_loss(scene, closing, lever):
     """Energy lost in an impact, for a wheel of mass 1."""
-    wheel, pallet, _, e, _, _ = scene
-    return 0.5 * (1.0 - e) * (1.0 + e) * closing * closing * pallet / (pallet + wheel * lever * lever)
+    inertia = scene.pallet + scene.wheel * lever * lever
+    return 0.5 * (1.0 - scene.e) * (1.0 + scene.e) * closing * closing * scene.pallet / inertia
 
 
 @jit
 def centre(scene, motion, side):
     """Way and speed of the common centre along `side` (1: the holding pallet pushes y up, -1: the other one, down)."""
-    y, V, w = motion
-    return side * y, scene[0] * V + scene[1] * side * w
+    return side * motion.y, scene.wheel * motion.V + scene.pallet * side * motion.w
 
 
 @jit
 def train(scene, motion, side):
     """Duration (3) of the bounces that follow an impact, the motion after them, and the widest gap on the way."""
-    wheel, _, _, e, _, _ = scene
     away, W = centre(scene, motion, side)
-    bounce = side * motion[2] - motion[1]
+    bounce = side * motion.w - motion.V
     bounce = bounce if bounce > 0.0 else 0.0
-    t = 2.0 * bounce / (1.0 - e)
-    speed = W + wheel * t
-    return t, (side * (away + 0.5 * (W + speed) * t), speed, side * speed), 0.5 * bounce * bounce
+    t = 2.0 * bounce / (1.0 - scene.e)
+    speed = W + scene.wheel * t
+    return t, Motion(side * (away + 0.5 * (W + speed) * t), speed, side * speed), 0.5 * bounce * bounce
 
 
 @jit
@@ -95,20 +111,20 @@ def train_ends(scene, motion, side, t, after, gap):
 
     On the holding side that tooth is met where y is in [-1/4, -1/4 + gap/2] and above -eta, on the other mirrored.
     """
-    wheel, _, eta, _, _, _ = scene
+    eta = scene.eta
     away, W = centre(scene, motion, side)
-    low, high = lowest(wheel, away, W, t), side * after[0]
-    high = (high if high > away else away) + wheel * gap
+    low, high = lowest(scene.wheel, away, W, t), side * after.y
+    high = (high if high > away else away) + scene.wheel * gap
     clear = gap <= 0.5 - 2.0 * eta or low > -0.25 + 0.5 * gap or high < -eta
-    return high < eta and clear and (side > 0.0 or low > -eta) and _plain(scene, motion, W, after[1], gap)
+    return high < eta and clear and (side > 0.0 or low > -eta) and _plain(scene, motion, W, after.V, gap)
 
 
 @jit
 def _plain(scene, motion, W, speed, gap):
     """Whether the bounces have no extreme of y or of the rim's way between them: that of the centre is another."""
     if W >= 0.0:
-        return motion[1] >= 0.0
-    return speed <= 0.0 and speed * speed >= 2.0 * scene[0] * scene[1] * gap
+        return motion.V >= 0.0
+    return speed <= 0.0 and speed * speed >= 2.0 * scene.wheel * scene.pallet * gap
 
 
 @jit
@@ -120,8 +136,8 @@ def slide(scene, motion, side):
     t, goal, speed : time, and the way and the speed along `side` at its end
     ends : whether the half swing ends with it
     """
-    wheel, _, eta, _, _, _ = scene
-    away, W = side * motion[0], side * motion[2]
+    wheel, eta = scene.wheel, scene.eta
+    away, W = side * motion.y, side * motion.w
     if side < 0.0 and lowest(wheel, away, W, math.inf) <= -eta:
         speed = -sqrt(max(W * W - 2.0 * wheel * (away + eta), 0.0))
         return (speed - W) / wheel, -eta, speed, True
@@ -139,8 +155,8 @@ def carry_flight(slopes, t):
 @jit
 def _later(slopes, j, motion, by):
     """Column j of the changes, `by` later in free flight."""
-    slopes[0, j] += motion[1] * by
-    slopes[1, j] += motion[2] * by
+    slopes[0, j] += motion.V * by
+    slopes[1, j] += motion.w * by
     slopes[2, j] += by
     slopes[4, j] += by
 
@@ -149,7 +165,7 @@ def _later(slopes, j, motion, by):
 def carry_line(slopes, motion):
     """Changes where y crosses a line."""
     for j in range(3):
-        _later(slopes, j, motion, -slopes[1, j] / motion[2])
+        _later(slopes, j, motion, -slopes[1, j] / motion.w)
         slopes[1, j] = 0.0
 
 
@@ -157,15 +173,15 @@ def carry_line(slopes, motion):
 def carry_impact(scene, slopes, motion, lever):
     """Changes through an impact, (2) by its derivative; `motion` is before it. A pallet at rest on the tooth is met
     by none of them."""
-    wheel, pallet, _, e, c, _ = scene
-    closing = motion[1] - lever * motion[2]
+    wheel, pallet = scene.wheel, scene.pallet
+    closing = motion.V - lever * motion.w
     inertia = pallet + wheel * lever * lever
-    r = (1.0 + e) / inertia
+    r = (1.0 + scene.e) / inertia
     for j in range(3):
         by = -(slopes[0, j] - lever * slopes[1, j]) / closing if magnitude(closing) > 0.0 else 0.0
         _later(slopes, j, motion, by)
-        turned = c * slopes[1, j]
-        faster = slopes[2, j] - lever * slopes[3, j] - motion[2] * turned
+        turned = scene.c * slopes[1, j]
+        faster = slopes[2, j] - lever * slopes[3, j] - motion.w * turned
         softer = -2.0 * r * wheel * lever * turned / inertia
         push = r * faster + closing * softer
         slopes[2, j] -= pallet * push
@@ -175,10 +191,10 @@ def carry_impact(scene, slopes, motion, lever):
 @jit_call
 def carry_train(scene, slopes, motion, side, t):
     """Changes through the bounces (3) into contact; `motion` is after the first impact, of which t comes."""
-    wheel, pallet, _, e, _, _ = scene
+    wheel, pallet = scene.wheel, scene.pallet
     _, W = centre(scene, motion, side)
     for j in range(3):
-        longer = 2.0 * (side * slopes[3, j] - slopes[2, j]) / (1.0 - e)
+        longer = 2.0 * (side * slopes[3, j] - slopes[2, j]) / (1.0 - scene.e)
         faster = wheel * slopes[2, j] + pallet * side * slopes[3, j]
         slopes[1, j] += side * (faster * t + (W + wheel * t) * longer)
         slopes[0, j] = side * slopes[1, j]
@@ -190,10 +206,10 @@ def carry_train(scene, slopes, motion, side, t):
 @jit_call
 def carry_slide(scene, slopes, motion, side, speed):
     """Changes through contact until a line, where both have the signed `speed` along `side`."""
-    wheel = scene[0]
+    wheel = scene.wheel
     for j in range(3):
         away, fast = side * slopes[1, j], side * slopes[3, j]
-        there = (side * motion[2] * fast - wheel * away) / speed
+        there = (side * motion.w * fast - wheel * away) / speed
         slopes[4, j] += (there - fast) / wheel
         slopes[0, j], slopes[1, j] = 0.0, 0.0
         slopes[2, j], slopes[3, j] = there, side * there

@@ -7,13 +7,15 @@ A cycle lasts until the next tooth, or, should more than one pass in it, one swi
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from kernels.impact import _half_swing as swing
-from kernels.impact._half_swing import half_swing
-from kernels.impact._periodic import chain, distance, errors, invert, multiplier, newton
-from kernels.impact._units import bend
+from kernels.impact._contacts import Scene
+from kernels.impact._half_swing import Start, half_swing
+from kernels.impact._periodic import Work, chain, difference, distance, errors, invert, multiplier, newton
+from kernels.impact._units import Cycle, bend
 from kernels.lanes.codes import (
     GRAZING,
     INACCURATE,
@@ -52,12 +54,20 @@ _CHAINED = 5.0
 """Errors of the changes after many contacts over those of one: 3.5 at most in 1055 clocks."""
 
 
+class Answer(NamedTuple):
+    """A cycle, how far the middle of its swing is off, the share of time in contact, and impacts in half a period."""
+
+    cycle: Cycle
+    offset: float
+    held: float
+    impacts: float
+
+
 @jit
 def plain_scene(scene):
     """The scene of `_half_swing`."""
-    wheel, pallet, _, eta, _, e, _ = scene
     c, y_i = bend(scene)
-    return wheel[0], pallet[0], min(eta[0], 0.25), e, c, y_i
+    return Scene(scene.wheel[0], scene.pallet[0], min(scene.eta[0], 0.25), scene.e, c, y_i)
 
 
 @jit
@@ -71,7 +81,7 @@ def beginning(scene, disturbance):
     kappa = wheel / pallet
     if not (e > 0.0):
         c_0 = 0.5 * sqrt(kappa + 4.0 * eta)
-        return swing.reduced(2.0 * eta - 0.5), c_0 * (1.0 + 0.5 * disturbance), -c_0 * (1.0 + disturbance)
+        return Start(swing.reduced(2.0 * eta - 0.5), c_0 * (1.0 + 0.5 * disturbance), -c_0 * (1.0 + disturbance))
     half = sqrt((1.0 + e) / (1.0 - e) * pallet)
     w = 0.5 * kappa * half
     V = half * (kappa * (1.0 - e) - 2.0 * e) / (2.0 * (1.0 + e)) + half
@@ -79,7 +89,7 @@ def beginning(scene, disturbance):
     t = away / w
     V, w = (V - t) * (1.0 + 0.5 * disturbance), w * (1.0 + disturbance)
     gap = -(V + 0.5 * t) * t - away * (1.0 + 0.5 * c * away)
-    return swing.reduced(gap), V, -w
+    return Start(swing.reduced(gap), V, -w)
 
 
 @jit_call
@@ -96,7 +106,7 @@ def follow(scene, start, n, history, tally, slopes):
 
 @jit
 def _past(history, i):
-    return history[i, 0], history[i, 1], history[i, 2]
+    return Start(history[i, 0], history[i, 1], history[i, 2])
 
 
 @jit_call
@@ -111,7 +121,7 @@ def _repeats_after(history, n):
 @jit_call
 def _shortest(scene, start, k, history, work):
     """The shortest repetition of a motion that repeats after k half swings."""
-    follow(scene, start, k, history, work[0], work[1])
+    follow(scene, start, k, history, work.tally, work.slopes)
     for shorter in range(1, k):
         if k % shorter == 0 and distance(_past(history, shorter), start) < _SAME:
             return shorter
@@ -132,9 +142,9 @@ def _left_behind(start, cycle):
     """A start further from an unstable cycle, the way the motion leaves it."""
     away = distance(start, cycle)
     more = _KICK / max(away, 1e-12) if away < _KICK else 1.0
-    gap, V = cycle[0] + more * (start[0] - cycle[0]), cycle[1] + more * (start[1] - cycle[1])
-    w = cycle[2] + more * (start[2] - cycle[2])
-    return (swing.reduced(gap), V, w) if w < 0.0 else start
+    way = difference(start, cycle)
+    w = cycle.w + more * way.w
+    return Start(swing.reduced(cycle.gap + more * way.gap), cycle.V + more * way.V, w) if w < 0.0 else start
 
 
 @jit
@@ -150,19 +160,20 @@ def _ends(tally, k):
 def _answer(tally, ends, halves, pace, e):
     """The cycle as in `_units`, the middle of the swing, the share of time in contact, and impacts, from the
     tally of half swings that are so many half periods; `ends` as `_ends` has them, or means."""
+    half_way, middle = ends
     beats = tally[swing.BEATS]
     rim, pallet = (tally[swing.RIM] / beats, tally[swing.PALLET] / beats) if beats > 0.0 else (math.nan, math.nan)
     endless = e > 0.0 and tally[swing.TRAINS] > 0.0
     impacts = math.inf if endless else tally[swing.IMPACTS] / halves
-    cycle = tally[swing.TIME] / halves, ends[0], rim, pallet, pace, tally[swing.RECOIL]
-    return cycle, ends[1], tally[swing.HELD] / tally[swing.TIME], impacts
+    cycle = Cycle(tally[swing.TIME] / halves, half_way, rim, pallet, pace, tally[swing.RECOIL])
+    return Answer(cycle, middle, tally[swing.HELD] / tally[swing.TIME], impacts)
 
 
 @jit
 def _none():
     """No answer."""
     nan = math.nan
-    return (nan, nan, nan, nan, nan, nan), nan, nan, nan
+    return Answer(Cycle(nan, nan, nan, nan, nan, nan), nan, nan, nan)
 
 
 @jit
@@ -183,8 +194,8 @@ def _verdict(tally, teeth, cycles, fading, worst, gap, rounding, rtol):
 def _worst(answer, gap, V, w, late):
     """Largest relative error of the outputs but the multiplier, by the errors of gap, V and w and the relative one of
     the time."""
-    (_, travel, rim, pallet, _, back), _, share, _ = answer
-    worst = max(max(late, gap / travel), max(V / magnitude(rim), w / magnitude(pallet)))
+    cycle, share, back = answer.cycle, answer.held, answer.cycle.back
+    worst = max(max(late, gap / cycle.travel), max(V / magnitude(cycle.rim), w / magnitude(cycle.pallet)))
     worst = max(worst, late + late / share if share > 0.0 else 0.0)
     return max(worst, 6.0 * (V + w) / sqrt(2.0 * back) if back > 0.0 else 0.0)  # V^2/2, V perhaps that of both bodies
 
@@ -192,21 +203,20 @@ def _worst(answer, gap, V, w, late):
 @jit_call
 def _judged(scene, start, k, work, rtol):
     """The answer for a motion that repeats after k half swings, and its status; UNSTABLE where it leaves that."""
-    tally, slopes, chained, inverse = work
+    tally = work.tally
     swing.clear(tally)
-    image, _ = chain(scene, start, k, tally, slopes, chained)
+    image, _ = chain(scene, start, k, work)
     deep = tally[swing.DEPTH]
     if deep > 0.0:  # the rim is still behind its foremost where the motion begins anew
         swing.clear(tally)
         tally[swing.DEPTH] = deep
-        image, _ = chain(scene, start, k, tally, slopes, chained)
-    invert(chained, inverse)
-    rest = image[0] - start[0], image[1] - start[1], image[2] - start[2]
+        image, _ = chain(scene, start, k, work)
+    invert(work.chained, work.inverse)
     half_swings, teeth, cycles = _cycles(k, tally[swing.WAY])
-    modulus, blur = multiplier(chained)
-    answer = _answer(tally, _ends(tally, k), 2.0 * cycles * k / half_swings, modulus ** (1.0 / k), scene[3])
-    rounding = _ROUNDING * (2.0 + tally[swing.EVENTS] / k) * (1.0 + answer[0][1])
-    gap, V, w, late = errors(start, rest, inverse, chained, rounding, tally[swing.TIME])
+    modulus, blur = multiplier(work.chained)
+    answer = _answer(tally, _ends(tally, k), 2.0 * cycles * k / half_swings, modulus ** (1.0 / k), scene.e)
+    rounding = _ROUNDING * (2.0 + tally[swing.EVENTS] / k) * (1.0 + answer.cycle.travel)
+    gap, V, w, late = errors(start, difference(image, start), work, rounding, tally[swing.TIME])
     noise = _CHAINED * blur * (rounding * k + gap)
     worst = max(_worst(answer, gap, V, w, late), noise / (k * modulus) if modulus > 0.0 else 0.0)
     fading = (1.0 - modulus) / max(noise, _ROUNDING)
@@ -223,7 +233,7 @@ def attractor(scene, rtol, total, work, history):
     for block in range(blocks):
         if 2 * block == blocks:
             swing.clear(total)
-        start, verdict = follow(scene, start, BLOCK, history, total, work[1])
+        start, verdict = follow(scene, start, BLOCK, history, total, work.slopes)
         if verdict != swing.DONE or total[swing.EVENTS] > EVENT_LIMIT:
             return _none(), NO_METHOD if verdict == swing.BENT_CONTACT else STEP_LIMIT
         k = _repeats_after(history, BLOCK)
@@ -242,16 +252,19 @@ def attractor(scene, rtol, total, work, history):
     cycles = max(min(total[swing.WAY], 0.5 * half_swings), 1.0)
     status = NOT_CONVERGED if k > 0 else NOT_PERIODIC
     means = total[swing.DIPS] / half_swings, magnitude(total[swing.LEAN]) / half_swings
-    return _answer(total, means, 2.0 * cycles, math.nan, scene[3]), status
+    return _answer(total, means, 2.0 * cycles, math.nan, scene.e), status
 
 
 @jit
-def settled(scene, rtol):
-    """`attractor` of a scene of `_units`, in one row."""
-    kappa = scene[2][0]
-    if not (1.0 / KAPPA_LIMIT <= kappa <= KAPPA_LIMIT):
-        answer = _none()
-        return answer[0], answer[1], answer[2], answer[3], NO_METHOD
-    work = np.empty(swing.TALLIES), np.empty((5, 3)), np.empty((4, 3)), np.empty((3, 3))
-    answer, status = attractor(plain_scene(scene), rtol, np.empty(swing.TALLIES), work, np.empty((BLOCK + 1, 3)))
-    return answer[0], answer[1], answer[2], answer[3], status
+def workspace():
+    """Arrays that `settled` uses for one clock after the other."""
+    work = Work(np.empty(swing.TALLIES), np.empty((5, 3)), np.empty((4, 3)), np.empty((3, 3)))
+    return np.empty(swing.TALLIES), work, np.empty((BLOCK + 1, 3))
+
+
+@jit
+def settled(scene, rtol, total, work, history):
+    """`attractor` of a scene of `_units`."""
+    if not (1.0 / KAPPA_LIMIT <= scene.kappa[0] <= KAPPA_LIMIT):
+        return _none(), NO_METHOD
+    return attractor(plain_scene(scene), rtol, total, work, history)

@@ -9,17 +9,19 @@ The pallet across meets teeth while y > -eta. Bounces that are bound to end in l
 nothing can come between them. Contact lasts until the pallet's tip: it holds with the force wheel pallet > 0, and both
 pallets are in contact only at y = 1/4, beyond the tips.
 Under a bent lever bounces have no such sum; what comes to that is not followed.
-A *scene* is the tuple (wheel, pallet, eta, e, c, y_i) of float64; a *start* is (gap, V, w), the gap in (-1, 0].
 """
 
 import math
+from typing import NamedTuple
 
 from kernels.impact._contacts import (
+    Motion,
     carry_flight,
     carry_impact,
     carry_line,
     carry_slide,
     carry_train,
+    centre,
     impact,
     impact_loss,
     meets_either,
@@ -49,6 +51,32 @@ that have an impact, time in contact, trains of bounces that end in it, whether 
 TALLIES = 19
 
 
+class Start(NamedTuple):
+    """Where a half swing begins: the gap in (-1, 0], speed of the rim, speed of the pallet."""
+
+    gap: float
+    V: float
+    w: float
+
+
+class State(NamedTuple):
+    """Gaps of the holding pallet and of the one across, the motion, and whether the latter is in the way of teeth."""
+
+    gap: float
+    far: float
+    motion: Motion
+    near: bool
+
+
+class Event(NamedTuple):
+    """What comes next: when, whether it is a contact, with the pallet across, with the tooth behind."""
+
+    t: float
+    contact: bool
+    across: bool
+    behind: bool
+
+
 @jit
 def clear(tally):
     """A tally of nothing."""
@@ -67,13 +95,13 @@ def reduced(gap):
 @jit
 def _lever(scene, y):
     """Slope of the holding pallet's lever at y; that of the pallet across is -lever(-y)."""
-    return 1.0 + scene[4] * (y - scene[5])
+    return 1.0 + scene.c * (y - scene.y_i)
 
 
 @jit
 def _across(scene, gap, y):
     """Gap of the pallet across, from that of the holding one, or the other way round with -y."""
-    return gap + 2.0 * y * (1.0 - scene[4] * scene[5]) - 0.5
+    return gap + 2.0 * y * (1.0 - scene.c * scene.y_i) - 0.5
 
 
 @jit
@@ -92,7 +120,7 @@ def _count_flight(tally, V, t):
 @jit
 def _count_joint(tally, scene, away, W, side, t, after):
     """The same in contact, where the rim goes with `away` and the torque's share `wheel`."""
-    wheel = scene[0]
+    wheel = scene.wheel
     if W < 0.0:
         turn = min(-W, wheel * t)
         tally[RECOIL] = max(tally[RECOIL], tally[DEPTH] - (W + 0.5 * turn) * turn / wheel)
@@ -119,16 +147,16 @@ def _count_impact(tally, scene, motion, closing, lever):
     """An impact; `motion` is after it."""
     tally[LOSS] += impact_loss(scene, closing, lever)
     tally[IMPACTS] += 1.0
-    _count_low(tally, motion[0])
+    _count_low(tally, motion.y)
 
 
 @jit
-def _count_beat(tally, V, w):
+def _count_beat(tally, motion):
     """The speeds just after the holding pallet's first impact of the half swing."""
     if tally[STRUCK] == 0.0:
         tally[STRUCK] = 1.0
-        tally[RIM] += V
-        tally[PALLET] += w
+        tally[RIM] += motion.V
+        tally[PALLET] += motion.w
         tally[BEATS] += 1.0
 
 
@@ -140,9 +168,9 @@ def _bounces_out(scene, motion, side, tally, slopes, follows):
         return motion, False
     if follows:
         carry_train(scene, slopes, motion, side, t)
-    away, W = side * motion[0], scene[0] * motion[1] + scene[1] * side * motion[2]
-    _count_joint(tally, scene, away, W, side, t, side * after[0])
-    tally[LOSS] += scene[1] * gap
+    away, W = centre(scene, motion, side)
+    _count_joint(tally, scene, away, W, side, t, side * after.y)
+    tally[LOSS] += scene.pallet * gap
     tally[TRAINS] += 1.0
     return after, True
 
@@ -153,9 +181,9 @@ def _slides_off(scene, motion, side, tally, slopes, follows):
     t, goal, speed, ends = slide(scene, motion, side)
     if follows:
         carry_slide(scene, slopes, motion, side, speed)
-    _count_joint(tally, scene, side * motion[0], side * motion[2], side, t, goal)
+    _count_joint(tally, scene, side * motion.y, side * motion.w, side, t, goal)
     tally[HELD] += t
-    return (side * goal, speed, side * speed), ends
+    return Motion(side * goal, speed, side * speed), ends
 
 
 @jit
@@ -168,68 +196,76 @@ def _line(eta, y, w, near):
 
 @jit
 def _next(scene, state):
-    """Time of the next event, whether it is a contact, with the pallet across, and with the tooth behind."""
-    gap, far, y, V, w, near = state
-    bend = 1.0 - scene[4] * w * w
-    t, behind = meets_either(gap, V - _lever(scene, y) * w, bend)
+    """The next event."""
+    y, V, w = state.motion
+    bend = 1.0 - scene.c * w * w
+    t, behind = meets_either(state.gap, V - _lever(scene, y) * w, bend)
     across = False
-    if near:
-        other, other_behind = meets_either(far, V + _lever(scene, -y) * w, bend)
+    if state.near:
+        other, other_behind = meets_either(state.far, V + _lever(scene, -y) * w, bend)
         if other < t:
             t, behind, across = other, other_behind, True
-    line = _line(scene[2], y, w, near)
-    return min(t, line), t < line, across, behind
+    line = _line(scene.eta, y, w, state.near)
+    return Event(min(t, line), t < line, across, behind)
 
 
 @jit
 def _flown(scene, state, t, tally, slopes, follows):
     """The state after a free flight."""
-    gap, far, y, V, w, near = state
+    y, V, w = state.motion
     _count_flight(tally, V, t)
     if follows:
         carry_flight(slopes, t)
-    bend = 1.0 - scene[4] * w * w
-    gap += ((V - _lever(scene, y) * w) + 0.5 * bend * t) * t
-    far += ((V + _lever(scene, -y) * w) + 0.5 * bend * t) * t
-    return gap, far, y + w * t, V + t, w, near
+    bend = 1.0 - scene.c * w * w
+    gap = state.gap + ((V - _lever(scene, y) * w) + 0.5 * bend * t) * t
+    far = state.far + ((V + _lever(scene, -y) * w) + 0.5 * bend * t) * t
+    return State(gap, far, Motion(y + w * t, V + t, w), state.near)
 
 
 @jit
 def _across_line(scene, state, tally, slopes, follows):
     """The state where y passes -eta: the pallet across begins, or ceases, to be in the way of teeth."""
-    gap, _, y, V, w, _ = state
     if follows:
-        carry_line(slopes, (y, V, w))
-    y = -scene[2]
-    far = reduced(_across(scene, gap, y))
+        carry_line(slopes, state.motion)
+    y, w = -scene.eta, state.motion.w
+    far = reduced(_across(scene, state.gap, y))
     _count_margin(tally, far)
-    return gap, far, y, V, w, w > 0.0
+    return State(state.gap, far, Motion(y, state.motion.V, w), w > 0.0)
 
 
 @jit
-def _struck(scene, state, across, behind, tally, slopes, follows):
+def _struck(scene, state, event, tally, slopes, follows):
     """The state after an impact, and its speed of closing."""
-    gap, far, y, V, w, near = state
-    lever = -_lever(scene, -y) if across else _lever(scene, y)
+    y = state.motion.y
+    lever = -_lever(scene, -y) if event.across else _lever(scene, y)
     if follows:
-        carry_impact(scene, slopes, (y, V, w), lever)
-    (y, V, w), closing = impact(scene, (y, V, w), lever)
-    _count_impact(tally, scene, (y, V, w), closing, lever)
-    touching = -1.0 if behind else 0.0
-    return (gap if across else touching, touching if across else far, y, V, w, near), closing
+        carry_impact(scene, slopes, state.motion, lever)
+    motion, closing = impact(scene, state.motion, lever)
+    _count_impact(tally, scene, motion, closing, lever)
+    touching = -1.0 if event.behind else 0.0
+    gap, far = (state.gap, touching) if event.across else (touching, state.far)
+    return State(gap, far, motion, state.near), closing
 
 
 @jit
 def _begun(scene, start, tally, slopes, follows):
-    """The state at a start: (gap, gap of the pallet across, y, V, w, whether that is in the way of teeth)."""
-    gap, V, w = start
-    tally[DIP] = -scene[2]
+    """The state at a start."""
+    tally[DIP] = -scene.eta
     tally[STRUCK] = 0.0
     if follows:
         for j in range(3):
             slopes[0, j], slopes[1, j], slopes[2, j], slopes[3, j], slopes[4, j] = 0.0, 0.0, 0.0, 0.0, 0.0
         slopes[0, 0], slopes[2, 1], slopes[3, 2] = 1.0, 1.0, 1.0
-    return gap, 0.0, -scene[2], V, w, False
+    return State(start.gap, 0.0, Motion(-scene.eta, start.V, start.w), False)
+
+
+@jit
+def _arrived(state, tally, slopes, follows):
+    """The start of the next half swing where y has risen through eta."""
+    if follows:
+        carry_line(slopes, state.motion)
+    _count_margin(tally, state.gap)
+    return _reflected(tally, reduced(state.far), state.motion.V, state.motion.w)
 
 
 @jit_call
@@ -238,40 +274,35 @@ def half_swing(scene, start, tally, slopes, follows):
 
     Adds to `tally`; where `follows`, `slopes` become the changes at the end by those at the start, without reflection.
     """
-    eta, e, c = scene[2], scene[3], scene[4]
     state = _begun(scene, start, tally, slopes, follows)
     for _ in range(CONTACT_LIMIT):
-        t, contact, across, behind = _next(scene, state)
-        if not (t < math.inf):
+        event = _next(scene, state)
+        if not (event.t < math.inf):
             return start, TOO_MANY
-        state = _flown(scene, state, t, tally, slopes, follows)
-        if not contact:
-            arrives = state[5] and state[4] > 0.0
-            state = _across_line(scene, state, tally, slopes, follows) if not arrives else state
-            if arrives:
-                if follows:
-                    carry_line(slopes, state[2:5])
-                _count_margin(tally, state[0])
-                return _reflected(tally, reduced(state[1]), state[3], state[4]), DONE
+        state = _flown(scene, state, event.t, tally, slopes, follows)
+        if not event.contact:
+            if state.near and state.motion.w > 0.0:
+                return _arrived(state, tally, slopes, follows), DONE
+            state = _across_line(scene, state, tally, slopes, follows)
             continue
-        state, closing = _struck(scene, state, across, behind, tally, slopes, follows)
-        if behind:
+        state, closing = _struck(scene, state, event, tally, slopes, follows)
+        if event.behind:
             continue
-        if not across:
-            _count_beat(tally, state[3], state[4])
-        if c != 0.0:
-            if magnitude(closing) * e <= FAINT_BOUNCE:
+        if not event.across:
+            _count_beat(tally, state.motion)
+        if scene.c != 0.0:
+            if magnitude(closing) * scene.e <= FAINT_BOUNCE:
                 return start, BENT_CONTACT
             continue
-        side = -1.0 if across else 1.0
-        motion, stays = _bounces_out(scene, state[2:5], side, tally, slopes, follows)
+        side = -1.0 if event.across else 1.0
+        motion, stays = _bounces_out(scene, state.motion, side, tally, slopes, follows)
         if not stays:
             continue
-        (y, V, w), ends = _slides_off(scene, motion, side, tally, slopes, follows)
-        other = reduced(2.0 * eta - 0.5)
+        motion, ends = _slides_off(scene, motion, side, tally, slopes, follows)
+        other = reduced(2.0 * scene.eta - 0.5)
         if ends:
-            return _reflected(tally, 0.0 if across else other, V, w), DONE
-        state = other, 0.0, y, V, w, False
+            return _reflected(tally, 0.0 if event.across else other, motion.V, motion.w), DONE
+        state = State(other, 0.0, motion, False)
     return start, TOO_MANY
 
 
@@ -281,4 +312,4 @@ def _reflected(tally, far, V, w):
     tally[DIPS] -= tally[DIP]
     tally[LEAN] = -(tally[LEAN] + tally[DIP])
     tally[LOWEST], tally[ACROSS] = tally[ACROSS], min(tally[LOWEST], tally[DIP])
-    return far, V, -w
+    return Start(far, V, -w)

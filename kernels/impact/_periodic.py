@@ -3,12 +3,14 @@
 With z = (gap, V, w) at the start and P(z) after k half swings, the derivative D of P is the product of those of half
 swings, each carried along its contacts. Newton's step is (1 - D)^-1 (P - z), and so is the error of z that rounding of
 P leaves. The multipliers are the roots of x^3 - trace x^2 + minors x - determinant.
-*Work* is the tuple of arrays (tally, slopes, chained, inverse): rows of `chained` are changes of gap, V, w and time.
 """
 
 import math
+from typing import NamedTuple
 
-from kernels.impact._half_swing import DONE, half_swing, reduced
+import numpy as np
+
+from kernels.impact._half_swing import DONE, Start, half_swing, reduced
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths.cubic import largest_modulus
@@ -20,22 +22,38 @@ _LEAST_TRACE = 0.25
 """Terms of about 1 cancel in the changes of a motion whose disturbances fade at once."""
 
 
+class Work(NamedTuple):
+    """Arrays to work with; rows of `chained` are changes of gap, V, w and time."""
+
+    tally: np.ndarray
+    slopes: np.ndarray
+    chained: np.ndarray
+    inverse: np.ndarray
+
+
 @jit
 def distance(start, other):
     """How far two beginnings are from each other, relative to what they are."""
-    speed = magnitude(other[1]) + magnitude(other[2])
-    parts = max(magnitude(start[1] - other[1]) / speed, magnitude(start[2] - other[2]) / magnitude(other[2]))
-    return max(magnitude(start[0] - other[0]), parts)
+    speed = magnitude(other.V) + magnitude(other.w)
+    parts = max(magnitude(start.V - other.V) / speed, magnitude(start.w - other.w) / magnitude(other.w))
+    return max(magnitude(start.gap - other.gap), parts)
+
+
+@jit
+def difference(image, start):
+    """P(z) - z."""
+    return Start(image.gap - start.gap, image.V - start.V, image.w - start.w)
 
 
 @jit_call
-def chain(scene, start, k, tally, slopes, chained):
-    """The start after k half swings; `chained` becomes its changes (gap, V, w) and that of the time by `start`."""
+def chain(scene, start, k, work):
+    """The start after k half swings; `work.chained` becomes its changes and that of the time by `start`."""
+    slopes, chained = work.slopes, work.chained
     for j in range(3):
         chained[0, j], chained[1, j], chained[2, j], chained[3, j] = 0.0, 0.0, 0.0, 0.0
         chained[j, j] = 1.0
     for _ in range(k):
-        start, verdict = half_swing(scene, start, tally, slopes, True)
+        start, verdict = half_swing(scene, start, work.tally, slopes, True)
         if verdict != DONE:
             return start, verdict
         for j in range(3):
@@ -63,29 +81,24 @@ def invert(chained, inverse):
 
 
 @jit
-def _row(inverse, row, x):
-    return inverse[row, 0] * x[0] + inverse[row, 1] * x[1] + inverse[row, 2] * x[2]
+def _row(inverse, row, z):
+    return inverse[row, 0] * z.gap + inverse[row, 1] * z.V + inverse[row, 2] * z.w
 
 
 @jit_call
 def newton(scene, start, k, work):
     """The start that repeats after k half swings, near the one given, and whether it is found."""
-    tally, slopes, chained, inverse = work
     last = math.inf
     for _ in range(NEWTON_LIMIT):
-        image, verdict = chain(scene, start, k, tally, slopes, chained)
+        image, verdict = chain(scene, start, k, work)
         if verdict != DONE:
             return start, False
-        invert(chained, inverse)
-        rest = image[0] - start[0], image[1] - start[1], image[2] - start[2]
-        gap, V, w = (
-            start[0] + _row(inverse, 0, rest),
-            start[1] + _row(inverse, 1, rest),
-            start[2] + _row(inverse, 2, rest),
-        )
-        new = reduced(gap), V, w
+        invert(work.chained, work.inverse)
+        rest = difference(image, start)
+        gap, V = start.gap + _row(work.inverse, 0, rest), start.V + _row(work.inverse, 1, rest)
+        new = Start(reduced(gap), V, start.w + _row(work.inverse, 2, rest))
         step = distance(start, new)
-        if not (w < 0.0 and step < 0.5):
+        if not (new.w < 0.0 and step < 0.5):
             return start, False
         start = new
         if step < _CONVERGED or (last < 1e-10 and step > 0.25 * last):
@@ -103,14 +116,13 @@ def multiplier(chained):
     minors = a * e - b * d + (a * i - c * g) + (e * i - f * h)
     third = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
     modulus, _ = largest_modulus((-(a + e + i), 0.0), (minors, 0.0), (-third, 0.0))
-    sizes = (
-        max(magnitude(a) + magnitude(e) + magnitude(i), _LEAST_TRACE),
-        magnitude(a * e) + magnitude(b * d) + magnitude(a * i),
+    first = max(magnitude(a) + magnitude(e) + magnitude(i), _LEAST_TRACE)
+    second = (
+        magnitude(a * e) + magnitude(b * d) + magnitude(a * i) + magnitude(c * g) + magnitude(e * i) + magnitude(f * h)
     )
-    second = sizes[1] + magnitude(c * g) + magnitude(e * i) + magnitude(f * h)
     last = magnitude(a) * (magnitude(e * i) + magnitude(f * h)) + magnitude(b) * (magnitude(d * i) + magnitude(f * g))
     last += magnitude(c) * (magnitude(d * h) + magnitude(e * g))
-    blur = (sizes[0] * modulus + second) * modulus + last
+    blur = (first * modulus + second) * modulus + last
     return modulus, blur / max(_steepness(a + e + i, minors, third, modulus), 1e-300)
 
 
@@ -132,13 +144,11 @@ def _steepness(trace, minors, third, modulus):
 
 
 @jit
-def errors(start, rest, inverse, chained, rounding, time):
+def errors(start, rest, work, rounding, time):
     """Relative errors of gap, V and w where the motion repeats, and of the time."""
-    blur = (
-        magnitude(rest[0]) + rounding,
-        magnitude(rest[1]) + rounding * magnitude(start[1]),
-        magnitude(rest[2]) + rounding * magnitude(start[2]),
-    )
+    inverse, chained = work.inverse, work.chained
+    fast, swings = magnitude(start.V), magnitude(start.w)
+    blur = magnitude(rest.gap) + rounding, magnitude(rest.V) + rounding * fast, magnitude(rest.w) + rounding * swings
     gap, V, w = 0.0, 0.0, 0.0
     for j in range(3):
         gap += magnitude(inverse[0, j]) * blur[j]

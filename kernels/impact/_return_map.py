@@ -1,6 +1,6 @@
 """The impact clock's own cycle as the fixed point of its half-cycle map: flight, impact, reflection.
 
-*Scene* and *cycle* as in `_units`, with M/(M + m) = wheel and m/(M + m) = pallet; the unit of time is here
+With M/(M + m) = wheel and m/(M + m) = pallet; unlike in `_units` the unit of time is here
 sqrt(p M m/(F (M + m))), so the wheel falls with x'' = pallet. The state just after an impact on the upper pallet is
 (Y, V, W): y = wheel Y, x' = V, y' = wheel W. The lower pallet is met after the time t, the root of
     x + V t + pallet t^2/2 - 1/2 = U(-wheel (Y + W t)),  x = U(wheel Y),                                 (1)
@@ -15,8 +15,11 @@ of teeth know it. For e = 0 the map is that of the speed c of escape: fall, stop
     c'^2 = s^2 + 2 wheel pallet (2 eta + c t).                                                           (3)
 """
 
+from typing import NamedTuple
+
 from kernels.impact._closed_cycle import MOST_KEPT, ROUNDING, behind, bent, lesser, within
 from kernels.impact._closed_cycle import verdict as judged
+from kernels.impact._units import Cycle, Scene
 from kernels.lanes.codes import INACCURATE, NO_CYCLE, NO_METHOD, NOT_CONVERGED, OK
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
@@ -29,6 +32,32 @@ _CONVERGED = 1e-22
 _PAIR_ERROR = 1e-29
 _LEAST = 1e-24
 """A share of mass or of speed below this is lost among 32 digits."""
+
+
+class State(NamedTuple):
+    """Just after an impact: Y, V and W of (1), as pairs."""
+
+    Y: tuple
+    V: tuple
+    W: tuple
+
+
+class Column(NamedTuple):
+    """How t, Y', J and u change with one of Y, V and W, as pairs."""
+
+    t: tuple
+    Y: tuple
+    J: tuple
+    u: tuple
+
+
+class FixedPoint(NamedTuple):
+    """The state that the map repeats, t and J (pairs), and whether it is `lost`: Newton did not come to rest."""
+
+    state: State
+    t: tuple
+    J: tuple
+    lost: bool
 
 
 @jit
@@ -47,13 +76,18 @@ def _less(x, y):
     return add(x, negative(y))
 
 
+@jit
+def _closing(scene, state, t):
+    """C, as a pair."""
+    return add(add(state.V, times(scene.pallet, t)), times(scene.wheel, state.W))
+
+
 @jit_call
 def flight(scene, state):
     """The time t of (1) for a flat lever, as a pair: by the quadratic formula, and one Newton step in 32 digits."""
-    wheel, pallet = scene[0], scene[1]
-    Y, V, W = state
-    way = shifted(scaled(times(wheel, Y), -2.0), 0.5)
-    closing = add(V, times(wheel, W))
+    wheel, pallet = scene.wheel, scene.pallet
+    way = shifted(scaled(times(wheel, state.Y), -2.0), 0.5)
+    closing = add(state.V, times(wheel, state.W))
     b = closing[0]
     t = 2.0 * way[0] / (b + sqrt(fma(b, b, 2.0 * pallet[0] * way[0])))
     covered = scaled(add(closing, scaled(pallet, 0.5 * t)), t)
@@ -64,53 +98,47 @@ def flight(scene, state):
 @jit_call
 def residuals(scene, state, t):
     """Y' - Y, t - J and W' - W for a flat lever, with J, all as pairs."""
-    wheel, pallet, _, _, _, e, _ = scene
-    Y, V, W = state
-    closing = add(add(V, times(pallet, t)), times(wheel, W))
-    J = add(closing, scaled(closing, e))
-    return negative(add(_twice(Y), times(W, t))), _less(t, J), _less(J, _twice(W)), J
+    closing = _closing(scene, state, t)
+    J = add(closing, scaled(closing, scene.e))
+    return (negative(add(_twice(state.Y), times(state.W, t))), _less(t, J), _less(J, _twice(state.W))), J
 
 
 @jit
-def _column(scene, bend, state, t, J, unit, gap, inverse):
+def _column(scene, bend, point, inverse, unit, gap):
     """What a disturbance of Y, V or W, one of them by 1 as `unit` says, makes of t, Y', J and u (all slopes at u = 1).
 
     `gap` is the slope of (1) in it, `inverse` is 1/C.
     """
-    wheel, pallet, _, _, _, e, _ = scene
-    _, _, W = state
-    one_Y, one_V, one_W = unit
+    W, (one_Y, one_V, one_W) = point.state.W, unit
     delay = negative(times(gap, inverse))
-    place = negative(shifted(add(scaled(t, one_W), times(W, delay)), one_Y))
+    place = negative(shifted(add(scaled(point.t, one_W), times(W, delay)), one_Y))
     u = times(bend, place)
-    closing = add(times(pallet, delay), times(wheel, shifted(times(W, u), one_W)))
+    closing = add(times(scene.pallet, delay), times(scene.wheel, shifted(times(W, u), one_W)))
     closing = shifted(closing, one_V)
-    push = _less(add(closing, scaled(closing, e)), _twice(times(J, times(wheel, u))))
-    return delay, place, push, u
+    push = _less(add(closing, scaled(closing, scene.e)), _twice(times(point.J, times(scene.wheel, u))))
+    return Column(delay, place, push, u)
 
 
 @jit_call
-def derivative(scene, bend, state, t, J):
-    """The slopes of t, Y', J and u in Y, in V and in W, at a fixed point, where u = 1; `bend` is that of u in Y."""
-    wheel, pallet = scene[0], scene[1]
-    _, V, W = state
+def derivative(scene, bend, point):
+    """The columns for Y, V and W at a fixed point, where u = 1; `bend` is the slope of u in Y."""
+    t = point.t
     one = (1.0 + 0.0 * t[0], 0.0 * t[0])
-    inverse = over(one, add(add(V, times(pallet, t)), times(wheel, W)))
-    there = scaled(wheel, 2.0)
+    inverse = over(one, _closing(scene, point.state, t))
     return (
-        _column(scene, bend, state, t, J, (1.0, 0.0, 0.0), there, inverse),
-        _column(scene, bend, state, t, J, (0.0, 1.0, 0.0), t, inverse),
-        _column(scene, bend, state, t, J, (0.0, 0.0, 1.0), times(wheel, t), inverse),
+        _column(scene, bend, point, inverse, (1.0, 0.0, 0.0), scaled(scene.wheel, 2.0)),
+        _column(scene, bend, point, inverse, (0.0, 1.0, 0.0), t),
+        _column(scene, bend, point, inverse, (0.0, 0.0, 1.0), times(scene.wheel, t)),
     )
 
 
 @jit
-def _newton_matrix(slopes, J):
+def _newton_matrix(columns, J):
     """The slopes of `residuals`, row by row, to float64 digits."""
-    in_Y, in_V, in_W = slopes
-    places = in_Y[1][0] - 1.0, in_V[1][0], in_W[1][0]
-    waits = in_Y[0][0] - in_Y[2][0], in_V[0][0] - in_V[2][0], in_W[0][0] - in_W[2][0]
-    pushes = fma(in_Y[3][0], J, in_Y[2][0]), fma(in_V[3][0], J, in_V[2][0]), fma(in_W[3][0], J, in_W[2][0]) - 2.0
+    in_Y, in_V, in_W = columns
+    places = in_Y.Y[0] - 1.0, in_V.Y[0], in_W.Y[0]
+    waits = in_Y.t[0] - in_Y.J[0], in_V.t[0] - in_V.J[0], in_W.t[0] - in_W.J[0]
+    pushes = fma(in_Y.u[0], J, in_Y.J[0]), fma(in_V.u[0], J, in_V.J[0]), fma(in_W.u[0], J, in_W.J[0]) - 2.0
     return places, waits, pushes
 
 
@@ -138,34 +166,41 @@ def _solved(rows, right):
 @jit
 def _start(scene):
     """The crude state that Newton starts from."""
-    wheel, pallet, _, _, _, e, _ = scene
+    e = scene.e
     t = sqrt(2.0 / (1.0 - e))
     zero = 0.0 * t
-    rim = t * (1.0 / (1.0 + e) - pallet[0] - 0.5 * wheel[0])
-    return (-0.25 * t * t, zero), (rim, zero), (0.5 * t, zero)
+    rim = t * (1.0 / (1.0 + e) - scene.pallet[0] - 0.5 * scene.wheel[0])
+    return State((-0.25 * t * t, zero), (rim, zero), (0.5 * t, zero))
+
+
+@jit
+def _chosen(condition, new, old):
+    """`choose`, of the pairs of two states."""
+    return State(choose(condition, new.Y, old.Y), choose(condition, new.V, old.V), choose(condition, new.W, old.W))
 
 
 @jit_call
 def fixed_point(scene):
-    """The state that the flat lever's map repeats, t and J; and whether Newton did not come to rest."""
+    """The state that the flat lever's map repeats."""
     state = _start(scene)
-    none = (0.0 * scene[5], 0.0 * scene[5])
+    none = (0.0 * scene.e, 0.0 * scene.e)
     t = flight(scene, state)
-    J = residuals(scene, state, t)[3]
-    active = isnt(scene[5] < 0.0)
+    misses, J = residuals(scene, state, t)
+    active = isnt(scene.e < 0.0)
     for _ in range(NEWTON_LIMIT):
         if not some(active):
             break
-        slopes = derivative(scene, none, state, t, J)
-        place, wait, push, _ = residuals(scene, state, t)
-        steps = _solved(_newton_matrix(slopes, J[0]), (place[0], wait[0], push[0]))
-        new = (shifted(state[0], -steps[0]), shifted(state[1], -steps[1]), shifted(state[2], -steps[2]))
-        state = (choose(active, new[0], state[0]), choose(active, new[1], state[1]), choose(active, new[2], state[2]))
+        columns = derivative(scene, none, FixedPoint(state, t, J, active))
+        place, wait, push = misses
+        y, v, w = _solved(_newton_matrix(columns, J[0]), (place[0], wait[0], push[0]))
+        new = State(shifted(state.Y, -y), shifted(state.V, -v), shifted(state.W, -w))
+        state = _chosen(active, new, state)
         t = choose(active, flight(scene, state), t)
-        J = choose(active, residuals(scene, state, t)[3], J)
-        moved = magnitude(steps[0]) + magnitude(steps[1]) + magnitude(steps[2])
-        active = active & isnt(moved <= _CONVERGED * (magnitude(state[0][0]) + magnitude(state[2][0])))
-    return state, t, J, active
+        misses, pushed = residuals(scene, state, t)
+        J = choose(active, pushed, J)
+        moved = magnitude(y) + magnitude(v) + magnitude(w)
+        active = active & isnt(moved <= _CONVERGED * (magnitude(state.Y[0]) + magnitude(state.W[0])))
+    return FixedPoint(state, t, J, active)
 
 
 @jit
@@ -175,26 +210,25 @@ def _minor(a, b, c, d):
 
 
 @jit
-def _rim(pallet, slope):
+def _rim(pallet, column):
     """What of V' - V in (2) comes with t and J."""
-    return times(pallet, _less(slope[0], slope[2]))
+    return times(pallet, _less(column.t, column.J))
 
 
 @jit
-def _lever(J, slope):
+def _lever(J, column):
     """What of W' + W in (2) comes with u and J."""
-    return add(times(slope[3], J), slope[2])
+    return add(times(column.u, J), column.J)
 
 
 @jit_call
-def polynomial(scene, slopes, J):
+def polynomial(scene, columns, J):
     """The characteristic polynomial of the derivative of (2): a2, a1 and a0, as pairs."""
-    pallet = scene[1]
-    in_Y, in_V, in_W = slopes
-    p0, p1, p2 = in_Y[1], in_V[1], in_W[1]
-    v0, v1, v2 = _rim(pallet, in_Y), _rim(pallet, in_V), _rim(pallet, in_W)
-    w0, w1, w2 = _lever(J, in_Y), _lever(J, in_V), _lever(J, in_W)
-    v1, w2 = shifted(v1, 1.0), shifted(w2, -1.0)
+    pallet = scene.pallet
+    in_Y, in_V, in_W = columns
+    p0, p1, p2 = in_Y.Y, in_V.Y, in_W.Y
+    v0, v1, v2 = _rim(pallet, in_Y), shifted(_rim(pallet, in_V), 1.0), _rim(pallet, in_W)
+    w0, w1, w2 = _lever(J, in_Y), _lever(J, in_V), shifted(_lever(J, in_W), -1.0)
     first, second, third = _minor(v1, v2, w1, w2), _minor(v0, v2, w0, w2), _minor(v0, v1, w0, w1)
     det = add(_less(times(p0, first), times(p1, second)), times(p2, third))
     minors = add(add(first, _minor(p0, p2, w0, w2)), _minor(p0, p1, v0, v1))
@@ -204,36 +238,35 @@ def polynomial(scene, slopes, J):
 @jit
 def _stability(scene, coefficients):
     """The lesser of p(1) > 0 and -p(-1) > 0, each over what it is small with; all moduli are below 1 if both hold."""
-    wheel, pallet, _, _, _, e, _ = scene
     a2, a1, a0 = coefficients
     even, odd = shifted(a1, 1.0), add(a2, a0)
-    fades = 0.25 * add(even, odd)[0] / (pallet[0] * (1.0 - e) * (1.0 + e))
-    flips = 0.25 * _less(even, odd)[0] / wheel[0]
+    fades = 0.25 * add(even, odd)[0] / (scene.pallet[0] * (1.0 - scene.e) * (1.0 + scene.e))
+    flips = 0.25 * _less(even, odd)[0] / scene.wheel[0]
     return where(flips < fades, flips, fades)
 
 
 @jit
 def _told_apart(scene):
     """Whether both masses and the restitution are large enough for 32 digits."""
-    wheel, pallet, _, _, _, e, _ = scene
-    return (wheel[0] > _LEAST) & (pallet[0] > _LEAST) & ((e > _LEAST) | isnt(e > 0.0))
+    masses = (scene.wheel[0] > _LEAST) & (scene.pallet[0] > _LEAST)
+    return masses & ((scene.e > _LEAST) | isnt(scene.e > 0.0))
 
 
 @jit
-def passages(scene, bend, state, t):
+def passages(scene, bend, point):
     """The least share by which teeth stay clear of the upper pallet from its escape height down and back up again.
 
     After the impact the tooth falls behind the pallet by u s - G s^2/2, before the next one it is as far ahead of it as
     this with the speed of closing for u, time taken backwards: less than a pitch, and more than 0, while y < eta.
     """
-    wheel, pallet, _, eta, _, _, _ = scene
-    Y, V, W = state
+    wheel, pallet = scene.wheel, scene.pallet[0]
+    Y, V, W = point.state
     speed = wheel[0] * W[0]
     out = _less(times(wheel, W), V)[0]
-    home = fma(pallet[0], t[0], V[0]) + speed
+    home = fma(pallet, point.t[0], V[0]) + speed
     bent_by = bend[0] * W[0] * speed
-    G, size = pallet[0] - bent_by, pallet[0] + magnitude(bent_by)
-    high = fma(-wheel[0], Y[0], eta[0]) / speed
+    G, size = pallet - bent_by, pallet + magnitude(bent_by)
+    high = fma(-wheel[0], Y[0], scene.eta[0]) / speed
     after = lesser(behind(out, G, size, high), within(out, G, size, high, 1.0))
     return lesser(after, lesser(behind(home, G, size, high), within(home, G, size, high, 1.0)))
 
@@ -241,25 +274,23 @@ def passages(scene, bend, state, t):
 @jit
 def impact_cycle(scene, nu, rtol):
     """The cycle with an impact, and its status."""
-    wheel, pallet, kappa, _, _, _, _ = scene
-    state, t, J, lost = fixed_point(scene)
-    bend = scaled(kappa, nu / (t[0] * t[0]))
-    coefficients = polynomial(scene, derivative(scene, bend, state, t, J), J)
+    wheel, point = scene.wheel[0], fixed_point(scene)
+    t, (Y, V, W) = point.t[0], point.state
+    bend = scaled(scene.kappa, nu / (t * t))
+    coefficients = polynomial(scene, derivative(scene, bend, point), point.J)
     multiplier, doubt = largest_modulus(*coefficients)
-    root = sqrt(pallet[0])
-    rim = state[1][0] / root
-    cycle = (
-        t[0] * root, -wheel[0] * state[0][0], rim, wheel[0] * state[2][0] / root, multiplier,
-        where(rim < 0.0, 0.5 * rim * rim, 0.0),
-    )  # fmt: skip
-    status = judged(passages(scene, bend, state, t), _stability(scene, coefficients), 30.0 * doubt, rtol)
-    return cycle, where(lost, NOT_CONVERGED, status)
+    root = sqrt(scene.pallet[0])
+    rim = V[0] / root
+    back = where(rim < 0.0, 0.5 * rim * rim, 0.0)
+    cycle = Cycle(t * root, -wheel * Y[0], rim, wheel * W[0] / root, multiplier, back)
+    status = judged(passages(scene, bend, point), _stability(scene, coefficients), 30.0 * doubt, rtol)
+    return cycle, where(point.lost, NOT_CONVERGED, status)
 
 
 @jit
 def _fall(scene, c):
     """The time t and the speed R of (3), as pairs, with 1/R."""
-    pallet, slack = scene[1], scene[4]
+    pallet, slack = scene.pallet, scene.slack
     fast = 2.0 * c[0]
     t = slack[0] / (fast + sqrt(fma(fast, fast, pallet[0] * slack[0])))
     gap = _less(scaled(add(_twice(c), scaled(pallet, 0.5 * t)), t), _half(slack))[0]
@@ -271,7 +302,7 @@ def _fall(scene, c):
 @jit_call
 def push(scene, c):
     """From one escape to the next: t, R and s of (3), as pairs, and the slopes of t, R and s in c."""
-    wheel, pallet = scene[0], scene[1]
+    wheel, pallet = scene.wheel, scene.pallet
     t, R, inverse = _fall(scene, c)
     delay = scaled(times(t, inverse), -2.0)
     faster = shifted(times(pallet, delay), 2.0)
@@ -284,7 +315,7 @@ def escape_speed(scene):
 
     The residual is (c'^2 - c^2)/(wheel pallet) = wheel t (R + 2 c) - 4 (c^2 - eta).
     """
-    wheel, _, _, eta, _, _, _ = scene
+    wheel, eta = scene.wheel, scene.eta
     start = sqrt(fma(2.0, eta[0], 0.5 * wheel[0]))
     c = (start, 0.0 * start)
     active = isnt(start < 0.0)
@@ -305,7 +336,7 @@ def escape_speed(scene):
 @jit_call
 def plastic_cycle(scene, rtol):
     """The cycle with a push in contact, the share of time in contact, and the status."""
-    wheel, pallet, _, eta, _, _, _ = scene
+    wheel, pallet, eta = scene.wheel, scene.pallet, scene.eta
     c, lost = escape_speed(scene)
     (t, R, s), (delay, _, slower) = push(scene, c)
     way = add(_twice(eta), times(c, t))
@@ -316,7 +347,7 @@ def plastic_cycle(scene, rtol):
     back = where(s[0] < 0.0, 0.5 * s[0] * s[0] / both[0], 0.0)
     start = s[0] / root
     travel = fma(c[0], t[0], eta[0]) + back
-    cycle = ((t[0] + contact) * root, travel, start, start, magnitude(slope), back)
+    cycle = Cycle((t[0] + contact) * root, travel, start, start, magnitude(slope), back)
     fine = (rtol >= ROUNDING) & (rtol * magnitude(slope) >= _PAIR_ERROR)
     return cycle, contact / (contact + t[0]), where(lost, NOT_CONVERGED, where(fine, OK, INACCURATE))
 
@@ -327,7 +358,7 @@ def half_cycle(scene, rtol):
     wheel, pallet, kappa, eta, slack, e, curvature = scene
     plastic, lossy = isnt(e > 0.0), e < MOST_KEPT
     nu, tame = bent(scene)
-    cycle, status = impact_cycle((wheel, pallet, kappa, eta, slack, where(lossy, e, 0.5), nu), nu, rtol)
+    cycle, status = impact_cycle(Scene(wheel, pallet, kappa, eta, slack, where(lossy, e, 0.5), nu), nu, rtol)
     pushed, held, verdict = plastic_cycle(scene, rtol)
     status = where(tame & lossy, status, NO_CYCLE)
     straight = isnt(magnitude(curvature) > 0.0)

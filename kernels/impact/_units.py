@@ -13,14 +13,11 @@ The lever is flat, U(y) = y, or bent about the place y_i = -Y of impact of the s
     T^2 = (1 + e)/((1 - e)(1 + kappa)),  Y = kappa T^2/4.                                              (6)
 So nu = (U''/U'^2) g T^2 leaves that cycle as it is and bends what is beside it, and flights stay parabolas.
 
-A *scene* is the tuple (wheel, pallet, kappa, eta, slack, e, nu): wheel = M/(M + m), pallet = m/(M + m), kappa, eta and
-slack = 1 - 4 eta are pairs of `pairs`. At h = p/4 (within HALF_PITCH) slack is exactly 0: no drop.
-A *cycle* is the tuple (half period, half travel, speed of the rim and of the pallet just after impact, multiplier, way
-that the rim is thrown back), without dimensions.
 Leaves out friction, play of the pivots, and the width of teeth and pallets. Derived here.
 """
 
 import math
+from typing import NamedTuple
 
 from kernels.lanes.codes import BAD_INPUT, NEVER_MEETS, NEVER_STARTS, OK
 from kernels.lanes.jit import jit
@@ -39,11 +36,59 @@ _KAPPA_LIMIT = 900.0
 """log2 of kappa beyond which products would leave float64."""
 
 
+class Scene(NamedTuple):
+    """The clock without dimensions; all but e and nu are pairs of `pairs`."""
+
+    wheel: tuple
+    """M/(M + m)"""
+    pallet: tuple
+    """m/(M + m)"""
+    kappa: tuple
+    eta: tuple
+    slack: tuple
+    """1 - 4 eta; exactly 0 at h = p/4 (within HALF_PITCH): no drop."""
+    e: float
+    nu: float
+
+
+class Cycle(NamedTuple):
+    """A cycle without dimensions: speeds are those just after impact, `back` is the way the rim is thrown back."""
+
+    half_period: float
+    travel: float
+    rim: float
+    pallet: float
+    multiplier: float
+    back: float
+
+
+class Units(NamedTuple):
+    """T0, p, and the share r_c/r_v, each a mantissa and an exponent; and 2 pi/teeth."""
+
+    time: float
+    e_time: float
+    pitch: float
+    e_pitch: float
+    arm: float
+    e_arm: float
+    step: float
+
+
+class Sizes(NamedTuple):
+    """Outputs that have a unit: [s], [m], [rad/s], [rad/s], [rad]."""
+
+    period: float
+    swing: float
+    wheel_speed: float
+    pallet_speed: float
+    recoil: float
+
+
 @jit
-def _masses(I_c, I_v, r_c, r_v):
+def _masses(p):
     """M and m in a common unit, as pairs, the larger in [1/2, 8), and whether neither is too small beside it."""
-    (m_c, e_c), (m_v, e_v) = mantissa_exponent(I_c), mantissa_exponent(I_v)
-    (s_c, f_c), (s_v, f_v) = mantissa_exponent(r_c), mantissa_exponent(r_v)
+    (m_c, e_c), (m_v, e_v) = mantissa_exponent(p.I_c), mantissa_exponent(p.I_v)
+    (s_c, f_c), (s_v, f_v) = mantissa_exponent(p.r_c), mantissa_exponent(p.r_v)
     wheel = _pairs.times((m_c, 0.0 * m_c), _pairs.two_product(s_v, s_v))  # M/m = I_c r_v^2/(I_v r_c^2)
     pallet = _pairs.times((m_v, 0.0 * m_v), _pairs.two_product(s_c, s_c))
     e = (e_c + 2.0 * f_v) - (e_v + 2.0 * f_c)
@@ -71,54 +116,49 @@ def _escape(r_c, teeth, h):
 
 
 @jit
-def without_dimensions(torque, I_c, I_v, r_c, r_v, teeth, h, e, nu):
-    """The scene, and the units for `dimensional`, with whether kappa is in range."""
-    wheel, pallet, fine = _masses(I_c, I_v, r_c, r_v)
+def without_dimensions(p):
+    """The scene, its units, and whether kappa is in range."""
+    wheel, pallet, fine = _masses(p)
     both = _pairs.add(wheel, pallet)
-    kappa = _pairs.over(wheel, pallet)
-    eta, slack = _escape(r_c, teeth, h)
-    scene = (_pairs.over(wheel, both), _pairs.over(pallet, both), kappa, eta, slack, e, nu)
-    return scene, (*_units(torque, I_c, r_c, r_v, teeth), fine)
+    eta, slack = _escape(p.r_c, p.teeth, p.h)
+    shares = _pairs.over(wheel, both), _pairs.over(pallet, both)
+    return Scene(shares[0], shares[1], _pairs.over(wheel, pallet), eta, slack, p.e, p.nu), _units(p), fine
 
 
 @jit
-def _units(torque, I_c, r_c, r_v, teeth):
-    """T0, p, and the share r_c/r_v: each a mantissa and an exponent; and 2 pi/teeth.
+def _units(p):
+    """The units of a clock.
 
     T0^2 = p M/F = 2 pi I_c/(teeth torque) has no r_c in it.
     """
-    (m_tau, e_tau), (m_c, e_c) = mantissa_exponent(torque), mantissa_exponent(I_c)
-    (s_c, f_c), (s_v, f_v) = mantissa_exponent(r_c), mantissa_exponent(r_v)
-    step = _TWO_PI[0] / teeth
+    (m_tau, e_tau), (m_c, e_c) = mantissa_exponent(p.torque), mantissa_exponent(p.I_c)
+    (s_c, f_c), (s_v, f_v) = mantissa_exponent(p.r_c), mantissa_exponent(p.r_v)
+    step = _TWO_PI[0] / p.teeth
     half = nearest(0.5 * (e_c - e_tau) - 0.25)
     odd = (e_c - e_tau) - 2.0 * half > 0.5
     time = sqrt(step * (m_c / m_tau) * where(odd, 2.0, 1.0))
-    return time, half, step * s_c, f_c, s_c / s_v, f_c - f_v, step
+    return Units(time, half, step * s_c, f_c, s_c / s_v, f_c - f_v, step)
 
 
 @jit
 def dimensional(units, cycle):
-    """Period [s], swing [m], wheel and pallet speed [rad/s], recoil [rad], each NaN where it is no normal number nor 0.
-
-    Also whether the scene is one of normal numbers, and whether all of these are.
-    """
-    time, e_time, pitch, e_pitch, arm, e_arm, step, fine = units
-    half_period, travel, rim, pallet, _, back = cycle
-    period = scale(2.0 * time * half_period, e_time)
-    swing = scale(pitch * travel, e_pitch)
-    wheel_speed = scale(step / time * rim, -e_time)
-    pallet_speed = scale(step / time * arm * pallet, e_arm - e_time)
-    recoil = step * back
+    """The sizes of a cycle, each NaN where it is no normal number nor 0, and whether all of them are."""
+    period = scale(2.0 * units.time * cycle.half_period, units.e_time)
+    swing = scale(units.pitch * cycle.travel, units.e_pitch)
+    rate = units.step / units.time
+    wheel_speed = scale(rate * cycle.rim, -units.e_time)
+    pallet_speed = scale(rate * units.arm * cycle.pallet, units.e_arm - units.e_time)
     timed, wide = is_normal(period), is_normal(swing)
-    rolls, beats = _normal_or_none(rim, wheel_speed), _normal_or_none(pallet, pallet_speed)
-    values = or_none(period, timed), or_none(swing, wide), or_none(wheel_speed, rolls), or_none(pallet_speed, beats)
-    return (*values, recoil), fine, timed & wide & rolls & beats
+    rolls, beats = _normal_or_none(cycle.rim, wheel_speed), _normal_or_none(cycle.pallet, pallet_speed)
+    speeds = or_none(wheel_speed, rolls), or_none(pallet_speed, beats)
+    sizes = Sizes(or_none(period, timed), or_none(swing, wide), speeds[0], speeds[1], units.step * cycle.back)
+    return sizes, timed & wide & rolls & beats
 
 
 @jit
 def length(units, x):
     """A length without dimensions in metres."""
-    return scale(units[2] * x, units[3])
+    return scale(units.pitch * x, units.e_pitch)
 
 
 @jit
@@ -130,21 +170,20 @@ def _normal_or_none(x, result):
 @jit
 def bend(scene):
     """c of (5) and y_i, for one float64 each; c is 0 where nu is."""
-    wheel, pallet, _, _, _, e, nu = scene
-    loss = (1.0 - e) / (1.0 + e)
-    return nu * loss / pallet[0], -0.25 * wheel[0] / loss
+    loss = (1.0 - scene.e) / (1.0 + scene.e)
+    return scene.nu * loss / scene.pallet[0], -0.25 * scene.wheel[0] / loss
 
 
 @jit
-def refusal(torque, I_c, I_v, r_c, r_v, teeth, h, e, nu):
+def refusal(p):
     """The status of `check` for one cell, or for lanes; OK where a method is to decide. NaN fails."""
-    known = (torque >= 0.0) & (I_c > 0.0) & (I_v > 0.0) & (r_c > 0.0) & (r_v > 0.0) & (h >= 0.0)
-    small = (torque < math.inf) & (I_c < math.inf) & (I_v < math.inf) & (r_c < math.inf) & (r_v < math.inf)
-    odd = (teeth >= 3.0) & (teeth <= MOST_TEETH)
-    pairs = 0.5 * (where(odd, teeth, 3.0) - 1.0)
+    known = (p.torque >= 0.0) & (p.I_c > 0.0) & (p.I_v > 0.0) & (p.r_c > 0.0) & (p.r_v > 0.0) & (p.h >= 0.0)
+    small = (p.torque < math.inf) & (p.I_c < math.inf) & (p.I_v < math.inf) & (p.r_c < math.inf) & (p.r_v < math.inf)
+    odd = (p.teeth >= 3.0) & (p.teeth <= MOST_TEETH)
+    pairs = 0.5 * (where(odd, p.teeth, 3.0) - 1.0)
     odd = odd & isnt(magnitude(nearest(pairs) - pairs) > 0.0)
-    allowed = known & small & odd & (h < math.inf) & (e >= 0.0) & (e < 1.0) & (magnitude(nu) < math.inf)
-    _, slack = _escape(where(allowed, r_c, 1.0), where(allowed, teeth, 3.0), where(allowed, h, 0.0))
-    meets = (slack[0] > 0.0) | (isnt(slack[0] < 0.0) & isnt(e > 0.0))
-    verdict = where(torque > 0.0, where(meets, OK, NEVER_MEETS), NEVER_STARTS)
+    allowed = known & small & odd & (p.h < math.inf) & (p.e >= 0.0) & (p.e < 1.0) & (magnitude(p.nu) < math.inf)
+    _, slack = _escape(where(allowed, p.r_c, 1.0), where(allowed, p.teeth, 3.0), where(allowed, p.h, 0.0))
+    meets = (slack[0] > 0.0) | (isnt(slack[0] < 0.0) & isnt(p.e > 0.0))
+    verdict = where(p.torque > 0.0, where(meets, OK, NEVER_MEETS), NEVER_STARTS)
     return where(allowed, verdict, BAD_INPUT)

@@ -22,97 +22,85 @@ NO_METHOD: lasting contact under a bent lever, and masses more unequal than 1e12
 watched for; a flat lever lets no tooth pass alone (`_half_swing`), and no bent one was found to.
 """
 
+from typing import NamedTuple
+
 from kernels.impact import _closed_cycle, _followed, _return_map, _units
-from kernels.interface import Field, Kernel, Method
-from kernels.lanes.columns import each_cell, entry, entry_of_cells, one_by_one
+from kernels.interface import Field
+from kernels.lanes.columns import cell_by_cell
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged
+from kernels.lanes.wiring import kernel, method
+
+
+class Clock(NamedTuple):
+    """Parameters."""
+
+    torque: float
+    I_c: float
+    I_v: float
+    r_c: float
+    r_v: float
+    teeth: float
+    h: float
+    e: float
+    nu: float
+
+
+class Beat(NamedTuple):
+    """Outputs, of which those with a unit are the record `sizes`."""
+
+    sizes: _units.Sizes
+    multiplier: float
+    contact_share: float
+    impacts: float
+    offset: float
 
 
 @jit
-def write(
-    i, units, cycle, held, count, verdict,
-    period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status,
-):  # fmt: skip
-    """One cell's symmetric cycle, or the lanes', in SI units."""
-    values, sound, whole = _units.dimensional(units, cycle)
-    period[i], swing[i], wheel_speed[i], pallet_speed[i], recoil[i] = values
-    multiplier[i], contact_share[i], impacts[i], offset[i] = cycle[4], held, count, 0.0 * count
-    status[i] = judged(sound, whole, verdict)
+def _symmetric(units, fine, cycle, held, verdict):
+    """The cycle with one impact a half period, in SI units, and the status."""
+    sizes, whole = _units.dimensional(units, cycle)
+    one = 0.0 * held + 1.0
+    beat = Beat(sizes, cycle.multiplier, held, one, 0.0 * one)
+    return beat, judged(fine, whole, verdict)
 
 
 @jit
-def _closed(i, torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs):
-    scene, units = _units.without_dimensions(torque[i], I_c[i], I_v[i], r_c[i], r_v[i], teeth[i], h[i], e[i], nu[i])
-    cycle, held, verdict = _closed_cycle.closed(scene, rtol[i])
-    write(i, units, cycle, held, 0.0 * held + 1.0, verdict, *outputs)
-
-
-@entry()
-def closed(
-    torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol,
-    period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status,
-):  # fmt: skip
+def closed(p, rtol):
     """The symmetric cycle by formula, with its existence and its multipliers."""
-    outputs = (period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status)
-    each_cell(_closed, (torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs))
-
-
-@entry("asked")
-def closed_bound(torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, asked, out):
-    """Rounding; where two multipliers nearly meet and lose more, the status says so."""
-    out[:] = _closed_cycle.ROUNDING
+    scene, units, fine = _units.without_dimensions(p)
+    cycle, held, verdict = _closed_cycle.closed(scene, rtol)
+    return _symmetric(units, fine, cycle, held, verdict)
 
 
 @jit
-def _events(i, torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs):
-    scene, units = _units.without_dimensions(torque[i], I_c[i], I_v[i], r_c[i], r_v[i], teeth[i], h[i], e[i], nu[i])
-    cycle, offset, held, count, verdict = _followed.settled(scene, rtol[i])
-    write(i, units, cycle, held, count, verdict, *outputs)
-    outputs[-2][i] = _units.length(units, offset)
-
-
-@entry_of_cells
-def events(
-    torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol,
-    period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status,
-):  # fmt: skip
+def events(p, rtol, total, work, history):
     """Followed contact by contact, cell by cell: no two clocks have the same contacts to be followed in lanes."""
-    outputs = (period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status)
-    one_by_one(_events, (torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs))
+    scene, units, fine = _units.without_dimensions(p)
+    answer, verdict = _followed.settled(scene, rtol, total, work, history)
+    sizes, whole = _units.dimensional(units, answer.cycle)
+    offset = _units.length(units, answer.offset)
+    beat = Beat(sizes, answer.cycle.multiplier, answer.held, answer.impacts, offset)
+    return beat, judged(fine, whole, verdict)
 
 
 @jit
-def _map(i, torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs):
-    scene, units = _units.without_dimensions(torque[i], I_c[i], I_v[i], r_c[i], r_v[i], teeth[i], h[i], e[i], nu[i])
-    cycle, held, verdict = _return_map.half_cycle(scene, rtol[i])
-    write(i, units, cycle, held, 0.0 * held + 1.0, verdict, *outputs)
-
-
-@entry()
-def half_cycle_map(
-    torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol,
-    period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status,
-):  # fmt: skip
+def half_cycle_map(p, rtol):
     """The symmetric cycle as the fixed point of the half-cycle map, by Newton, and its multipliers."""
-    outputs = (period, swing, wheel_speed, pallet_speed, multiplier, recoil, contact_share, impacts, offset, status)
-    each_cell(_map, (torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, rtol, *outputs))
+    scene, units, fine = _units.without_dimensions(p)
+    cycle, held, verdict = _return_map.half_cycle(scene, rtol)
+    return _symmetric(units, fine, cycle, held, verdict)
 
 
 @jit
-def _check(i, torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, status):
-    status[i] = _units.refusal(torque[i], I_c[i], I_v[i], r_c[i], r_v[i], teeth[i], h[i], e[i], nu[i])
-
-
-@entry()
-def check(torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, status):
+def check(p):
     """What no method is asked.
 
     BAD_INPUT: NaN, infinite, outside its limits, or an even number of teeth. NEVER_STARTS: no torque. NEVER_MEETS: a
     tooth held until h >= p/4 is met by the other pallet before it escapes; with e = 0 h = p/4 itself is the clock
     without drop.
     """
-    each_cell(_check, (torque, I_c, I_v, r_c, r_v, teeth, h, e, nu, status))
+    return _units.refusal(p)
 
 
 PARAMETERS = (
@@ -143,18 +131,28 @@ OUTPUTS = (
     Field("offset", "m", "how far the middle of the pallet's swing is from the middle of its teeth"),
 )
 
-IMPACT = Kernel(
-    name="impact",
+IMPACT = kernel(
+    "impact",
     doc="limit cycle of a crown wheel and a foliot with inelastic impacts",
     source="two bodies, free flight and restitution; derived here",
     parameters=PARAMETERS,
     outputs=OUTPUTS,
+    record=Clock,
     check=check,
     methods=(
-        # "map" is last: it knows no cycle that "closed" does not
-        Method("closed", "formula of the symmetric cycle, where it exists and is stable", closed, closed_bound),
-        Method("events", "whatever the clock does, contact by contact, and Newton on what repeats", events),
-        Method(
+        # rounding; where two multipliers nearly meet and lose more, the status says so
+        method(
+            "closed", "formula of the symmetric cycle, where it exists and is stable", closed, _closed_cycle.ROUNDING
+        ),
+        method(
+            "events",
+            "whatever the clock does, contact by contact, and Newton on what repeats",
+            events,
+            buffers=_followed.workspace,
+            loop=cell_by_cell,
+        ),
+        # last: it knows no cycle that "closed" does not
+        method(
             "map", "the cycle of `closed` as fixed point of the half-cycle map, by Newton in 32 digits", half_cycle_map
         ),
     ),

@@ -229,14 +229,14 @@ def test_ends_and_middles_of_swings_are_told_pallet_by_pallet():
     assert [tally[name] for name in names] == pytest.approx([0.9, -0.3, -0.3, -0.2])
 
 
-SCENE = 0.75, 0.25, 0.1, 0.3, 0.0, 0.0
+SCENE = _contacts.Scene(wheel=0.75, pallet=0.25, eta=0.1, e=0.3, c=0.0, y_i=0.0)
 
 
 @pytest.mark.parametrize("lever", [1.0, -1.0, 0.6])
 def test_an_impact_keeps_momentum_and_turns_the_closing_speed_back_by_e(lever):
     wheel, pallet, _, e, _, _ = SCENE
     V, w = 0.7, -0.4
-    (_, after, turned), closing = plain(_contacts.impact)(SCENE, (0.0, V, w), lever)
+    (_, after, turned), closing = plain(_contacts.impact)(SCENE, _contacts.Motion(0.0, V, w), lever)
     assert after - lever * turned == pytest.approx(-e * (V - lever * w), rel=1e-15)
     assert lever * (wheel / pallet) * (after - V) == pytest.approx(-(turned - w), rel=1e-15)
     energy = [0.5 * V * V + 0.5 * pallet / wheel * w * w, 0.5 * after**2 + 0.5 * pallet / wheel * turned**2]
@@ -247,18 +247,18 @@ def test_an_impact_keeps_momentum_and_turns_the_closing_speed_back_by_e(lever):
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("e", [0.0, 0.3, 0.9])
 def test_a_train_of_bounces_is_its_geometric_sum(side, e):
-    scene = 0.75, 0.25, 0.1, e, 0.0, 0.0
+    scene = _contacts.Scene(0.75, 0.25, 0.1, e, 0.0, 0.0)
     y, V, w, time, first = -0.2 * side, 0.5, 0.1 * side, 0.0, None
-    (y, V, w), _ = plain(_contacts.impact)(scene, (y, V, w), side)
-    first = y, V, w
+    (y, V, w), _ = plain(_contacts.impact)(scene, _contacts.Motion(y, V, w), side)
+    first = _contacts.Motion(y, V, w)
     for _ in range(600):
         t = 2 * (side * w - V)
         y, V, time = y + w * t, V + t, time + t
-        (y, V, w), _ = plain(_contacts.impact)(scene, (y, V, w), side)
+        (y, V, w), _ = plain(_contacts.impact)(scene, _contacts.Motion(y, V, w), side)
     total, after, widest = plain(_contacts.train)(scene, first, side)
     assert total == pytest.approx(time, rel=1e-12, abs=1e-15)
     assert after == pytest.approx((y, V, w), rel=1e-12)
-    assert widest == pytest.approx(0.5 * (side * first[2] - first[1]) ** 2, abs=1e-30)
+    assert widest == pytest.approx(0.5 * (side * first.w - first.V) ** 2, abs=1e-30)
 
 
 @pytest.mark.parametrize(("below", "ends"), [(0.01, False), (0.02, True)])
@@ -266,19 +266,19 @@ def test_a_train_is_not_summed_where_a_bounce_may_pass_the_tip(below, ends):
     """Its bounces reach 0.75 0.2^2/2 = 0.015 beyond the common centre, which ends so far below the tip."""
     wheel, pallet, eta, e, *_ = SCENE
     t, W = 2 * 0.2 / (1 - e), wheel * 0.1 + pallet * 0.3
-    first = eta - below - W * t - 0.5 * wheel * t * t, 0.1, 0.3
+    first = _contacts.Motion(eta - below - W * t - 0.5 * wheel * t * t, 0.1, 0.3)
     total, after, widest = plain(_contacts.train)(SCENE, first, 1.0)
-    assert (total, after[0]) == pytest.approx((t, eta - below))
+    assert (total, after.y) == pytest.approx((t, eta - below))
     assert plain(_contacts.train_ends)(SCENE, first, 1.0, total, after, widest) == ends
 
 
 def test_contact_with_the_pallet_across_ends_at_its_tip_or_where_y_reaches_eta():
     """From y = 0.05 with the wheel's way W = -0.5 it would turn 1/6 further back, beyond y = eta = 0.1."""
-    t, goal, speed, ends = plain(_contacts.slide)(SCENE, (0.05, -0.5, 0.5), -1.0)
+    t, goal, speed, ends = plain(_contacts.slide)(SCENE, _contacts.Motion(0.05, -0.5, 0.5), -1.0)
     assert (goal, ends) == (-0.1, True)
     assert speed == pytest.approx(-np.sqrt(0.25 - 2 * 0.75 * 0.05))
     assert t == pytest.approx((speed + 0.5) / 0.75)
-    t, goal, speed, ends = plain(_contacts.slide)(SCENE, (0.05, -0.1, 0.1), -1.0)
+    t, goal, speed, ends = plain(_contacts.slide)(SCENE, _contacts.Motion(0.05, -0.1, 0.1), -1.0)
     assert (goal, ends) == (0.1, False)
     assert speed == pytest.approx(np.sqrt(0.01 + 2 * 0.75 * 0.15))
 
@@ -301,33 +301,33 @@ CARRIED = {
 @pytest.mark.parametrize("kind", CARRIED)
 def test_changes_carried_along_contacts_are_the_differences_of_neighbouring_motions(kind):
     wheel, eta, e, c = CARRIED[kind]
-    scene = wheel, 1 - wheel, eta, e, c, -0.25 * wheel * (1 + e) / (1 - e)
-    tally, slopes, changes = np.zeros(_half_swing.TALLIES), np.zeros((5, 3)), np.zeros((4, 3))
+    scene = _contacts.Scene(wheel, 1 - wheel, eta, e, c, -0.25 * wheel * (1 + e) / (1 - e))
+    _, work, _ = plain(_followed.workspace)()
 
     def after(start):
-        _half_swing.clear(tally)
-        end, verdict = _periodic.chain(scene, start, 3, tally, slopes, changes)
+        _half_swing.clear(work.tally)
+        end, verdict = _periodic.chain(scene, _half_swing.Start(*start.tolist()), 3, work)
         assert verdict == _half_swing.DONE
-        return np.array([*end, tally[_half_swing.TIME]])
+        return np.array([*end, work.tally[_half_swing.TIME]])
 
     start = np.array(plain(_followed.beginning)(scene, 1e-3))
     start[0] -= 1e-3
     found = []
     for j in range(3):
         by = 1e-6 * np.eye(3)[j]
-        found.append((after(tuple((start + by).tolist())) - after(tuple((start - by).tolist()))) / 2e-6)
-    after(tuple(start.tolist()))
-    np.testing.assert_allclose(changes, np.transpose(found), rtol=1e-6, atol=1e-7)
-    assert abs(changes[3]).max() > 0.1
+        found.append((after(start + by) - after(start - by)) / 2e-6)
+    after(start)
+    np.testing.assert_allclose(work.chained, np.transpose(found), rtol=1e-6, atol=1e-7)
+    assert abs(work.chained[3]).max() > 0.1
 
 
 def followed(scene, half_swings):
     """Tally, first and last start of a clock followed for so many half swings."""
     wheel, _, _, e = scene[:4]
-    scene = *map(float, scene[:4]), 0.0, -0.25 * wheel * (1 + e) / (1 - e)
+    scene = _contacts.Scene(*map(float, scene[:4]), 0.0, -0.25 * wheel * (1 + e) / (1 - e))
     tally, slopes, history = np.zeros(_half_swing.TALLIES), np.zeros((5, 3)), np.zeros((half_swings + 1, 3))
     tally[_half_swing.MARGIN] = np.inf
-    start = tuple(map(float, plain(_followed.beginning)(scene, 1e-3)))
+    start = _half_swing.Start(*map(float, plain(_followed.beginning)(scene, 1e-3)))
     end, verdict = _followed.follow(scene, start, half_swings, history, tally, slopes)
     assert verdict == _half_swing.DONE
     return tally, start, end, history
@@ -338,10 +338,10 @@ def test_the_work_of_the_torque_is_lost_in_impacts_whatever_the_motion():
     for kappa, eta, e in zip(*random_clocks(n, seed=3, high=0.9), strict=True):
         wheel, pallet = kappa / (1 + kappa), 1 / (1 + kappa)
         tally, start, end, _ = followed((wheel, pallet, eta, e), half_swings)
-        gained = 0.5 * (end[1] ** 2 - start[1] ** 2 + (end[2] ** 2 - start[2] ** 2) / kappa)
+        gained = 0.5 * (end.V**2 - start.V**2 + (end.w**2 - start.w**2) / kappa)
         work, loss = tally[_half_swing.WAY], tally[_half_swing.LOSS]
         assert work > 0.1 * half_swings / 2
-        assert abs(work - loss - gained) < 1e-12 * (work + start[2] ** 2 / kappa)
+        assert abs(work - loss - gained) < 1e-12 * (work + start.w**2 / kappa)
 
 
 def test_no_half_swing_lets_more_than_half_a_pitch_pass():
@@ -349,7 +349,7 @@ def test_no_half_swing_lets_more_than_half_a_pitch_pass():
     n, half_swings = (40, 300) if COMPILED else (3, 20)
     for kappa, eta, e in zip(*random_clocks(n, seed=4, high=0.95), strict=True):
         tally, start, end, history = followed((kappa / (1 + kappa), 1 / (1 + kappa), eta, e), half_swings)
-        most = 0.5 * half_swings + end[0] - start[0]
+        most = 0.5 * half_swings + end.gap - start.gap
         assert tally[_half_swing.WAY] <= most + 1e-9
         assert ((history[:, 0] > -1) & (history[:, 0] <= 0) & (history[:, 2] < 0)).all()
     if COMPILED:
