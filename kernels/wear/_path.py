@@ -33,8 +33,7 @@ _BISECTIONS = 80
 def position(scene, cranked, turned, s):
     """X, Y and their rates at a time s after the crank had turned by `cranked` and the point was at `turned`."""
     (lengths, margin, side, b_angle), (speed, spin, reach, x, y, beta), r, _ = scene
-    theta, half_s, half_c = linkage.crank(cranked + speed * s, b_angle)
-    alpha, rate, _ = linkage.motion(lengths, margin, side, theta, half_s, half_c)
+    alpha, rate, _ = linkage.motion(lengths, margin, side, linkage.crank_at(cranked + speed * s, b_angle))
     rate = speed * rate
     sine, cosine = sincos(turned + spin * s)
     sine, cosine = r * sine, r * cosine
@@ -53,8 +52,7 @@ def position(scene, cranked, turned, s):
 def facing(scene, cranked, s):
     """Cosine and sine of the arm's angle from the direction of w at a time s."""
     (lengths, margin, side, b_angle), (speed, _, _, x, y, beta), _, _ = scene
-    theta, half_s, half_c = linkage.crank(cranked + speed * s, b_angle)
-    alpha, _, _ = linkage.motion(lengths, margin, side, theta, half_s, half_c)
+    alpha, _, _ = linkage.motion(lengths, margin, side, linkage.crank_at(cranked + speed * s, b_angle))
     sine_arm, cosine_arm = sincos(alpha + (b_angle + beta))
     w = sqrt(x * x + y * y)
     if not w > 0.0:
@@ -72,8 +70,7 @@ def bend(scene):
         if k >= _SAMPLES:
             j = k - _SAMPLES
             theta = (math.pi if j % 2 else 0.0) + (1.0 if j % 4 < 2 else -1.0) * 2.0 ** (-(j // 4))
-        theta, s, c = linkage.crank(theta, 0.0)
-        _, first, second = linkage.motion(lengths, margin, side, theta, s, c)
+        _, first, second = linkage.motion(lengths, margin, side, linkage.crank_at(theta, 0.0))
         rate, acceleration = max(rate, magnitude(first)), max(acceleration, magnitude(second))
     rate, acceleration = magnitude(speed) * rate, speed * speed * acceleration
     far = sqrt(x * x + y * y) + r

@@ -10,8 +10,8 @@ from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths.elementary import in_unit, mantissa_exponent, scale
 from kernels.polisher import extremes, linkage
-from kernels.polisher.arm import EXAMPLE as LINKS
-from kernels.polisher.arm import PARAMETERS as LINK_PARAMETERS
+from kernels.polisher.linkage import EXAMPLE as LINKS
+from kernels.polisher.linkage import PARAMETERS as LINK_PARAMETERS
 from kernels.wear import _dwell, _tool
 from kernels.wear._tool import sincos
 
@@ -38,8 +38,8 @@ def allowed(b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, 
 @jit_call
 def arm_without_units(b, d, f, e):
     """The arm of `_dwell`, its lengths and margins, and the verdict on the linkage: OK, a remark or a refusal."""
-    lengths, _, fine = linkage.in_units(b, d, f, e)
-    margin = linkage.margins(*lengths)
+    lengths, _, fine = linkage.in_units(linkage.Lengths(b, d, f, e))
+    margin = linkage.margins(lengths)
     verdict = extremes.verdict(lengths, margin)
     return _dwell.arm_of(lengths, margin), lengths, margin, verdict if fine else OUT_OF_RANGE
 
