@@ -1,7 +1,7 @@
 # How fast are the polisher's stable forms against the textbook's in numpy, and how right are both?
 """Prints ratios measured in this run, on one core, and errors against 50 digits (needs mpmath):
 
-python benchmarks/arm.py
+python benchmarks/speed/polisher.py
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from kernels.interface import Status
-from kernels.polisher import arm
+from kernels.polisher.arm import POLISHER
 
 sys.path.append(str(Path(__file__).parents[2] / "tests" / "oracles"))
 import polisher_oracles as oracles
@@ -25,7 +25,7 @@ STRIP = 16384
 """Machines in one call, as the engine solves them."""
 CALLS = 30
 REPEATS = 7
-NAMES = [field.name for field in arm.OUTPUTS]
+NAMES = [field.name for field in POLISHER.outputs]
 CLOSED = list(oracles.closed(0.62, 0.38, 0.405, 0.1))
 
 
@@ -79,7 +79,7 @@ def speed():
     rivals = {"A0 and A1 by numpy": book, "the same 17 by numpy": whole_book}
     print(f"{'one core, million machines/s':34} {'':>8}" + "".join(f" {'over ' + name:>26}" for name in rivals))
     for name, calls in (("stable", CALLS), ("textbook", CALLS), ("waveform", 1)):
-        ours_of = partial(getattr(arm, name), *columns, *outputs)
+        ours_of = partial(POLISHER.method(name).solve, *columns, *outputs)
         ours_of()
         rounds = [
             [
@@ -102,9 +102,9 @@ def errors():
         columns = machines(n, gap)
         truths = [oracles.closed(*cell) for cell in zip(*columns, strict=True)]
         found = []
-        for method in (arm.stable, arm.textbook):
+        for method in ("stable", "textbook"):
             outputs = [*(np.empty(n) for _ in NAMES), np.empty(n, np.int8)]
-            method(*columns, np.zeros(n), np.full(n, 1e-12), *outputs)
+            POLISHER.method(method).solve(*columns, np.zeros(n), np.full(n, 1e-12), *outputs)
             named = dict(zip(NAMES, outputs, strict=False))
             worst = {
                 name: max(float(abs(mpf(float(v)) / t[name] - 1)) for v, t in zip(named[name], truths, strict=True))

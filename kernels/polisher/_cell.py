@@ -1,15 +1,46 @@
-"""What every method of `polisher` shares: lengths without units, the verdict on the linkage, and writing a cell."""
+"""What every method of `polisher` shares: lengths without units, the verdict on the linkage, and which values exist."""
 
 import math
+from typing import NamedTuple
 
 from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, LOCK_UP, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit
-from kernels.lanes.vectors import magnitude, pow2, some, where
+from kernels.lanes.ranges import or_none
+from kernels.lanes.vectors import choose, magnitude, pow2, some, where
 from kernels.polisher import extremes
-from kernels.polisher.linkage import in_units, margins
+from kernels.polisher.extremes import Angles, Locks, Slopes
+from kernels.polisher.linkage import Lengths, Margins, in_units, margins, side_of
 
+ROUNDING = 3e-15
+"""What closed forms are right to."""
 UNIT_LIMIT = 720.0
 """Power of two of the longest length, beyond which derivatives would leave float64."""
+
+
+class Cell(NamedTuple):
+    """Lengths without units, their unit and margins, and the verdict on the linkage."""
+
+    lengths: Lengths
+    unit: float
+    margin: Margins
+    code: float
+
+
+class Swing(NamedTuple):
+    """Outputs of a closed form."""
+
+    angles: Angles
+    locks: Locks
+    transmission_angle: float
+    slopes: Slopes
+
+
+class Rates(NamedTuple):
+    """Outputs of the motion over a turn."""
+
+    thd: float
+    rate_max: float
+    rate_min: float
 
 
 @jit
@@ -19,70 +50,81 @@ def said(code, status):
 
 
 @jit
-def judged(b, d, f, e):
-    """Lengths without units, their unit, their margins, and the verdict on the linkage."""
-    lengths, unit, fine = in_units(b, d, f, e)
-    margin = margins(*lengths)
+def judged(p):
+    """The `Cell` of a record with b, d, f, e."""
+    lengths, unit, fine = in_units(p)
+    margin = margins(lengths)
     code = extremes.verdict(lengths, margin)
-    return lengths, unit, margin, where(fine & (magnitude(unit) <= UNIT_LIMIT), code, OUT_OF_RANGE)
+    return Cell(lengths, unit, margin, where(fine & (magnitude(unit) <= UNIT_LIMIT), code, OUT_OF_RANGE))
 
 
 @jit
-def no_rates(code):
-    """In place of thd, rate_max and rate_min, where a method does not give them."""
-    none = 0.0 * code + math.nan
-    return none, none, none
+def rocks(cell):
+    """Whether the arm has extremes: it swings, or would but for a change point."""
+    return said(cell.code, OK) | (said(cell.code, CHANGE_POINT) & (cell.lengths.e <= cell.lengths.b))
 
 
 @jit
-def locks(code, lengths, margin):
+def turns(cell):
+    """Whether the crank turns fully, so that the motion has rates."""
+    return said(cell.code, OK) | said(cell.code, DOUBLE_CRANK)
+
+
+@jit
+def moves(cell):
+    """Whether the crank turns fully, be it past a change point."""
+    return turns(cell) | said(cell.code, CHANGE_POINT)
+
+
+@jit
+def _none(cell):
+    return 0.0 * cell.code + math.nan
+
+
+@jit
+def locks(cell):
     """Crank angles at which a linkage locks; computed only where one does."""
-    inner, outer = 0.0 * code + math.nan, 0.0 * code + math.nan
-    locked = said(code, LOCK_UP)
+    none = _none(cell)
+    found, locked = Locks(none, none), said(cell.code, LOCK_UP)
     if some(locked):
-        first, second = extremes.locks(lengths, margin)
-        inner, outer = where(locked, first, math.nan), where(locked, second, math.nan)
-    return inner, outer
+        return choose(locked, extremes.locks(cell.lengths, cell.margin), found)
+    return found
 
 
 @jit
-def write(
-    i, kind, cell, angles, crank_angles, stops, pressed, rates, slopes, verdict,
-    A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer, transmission_angle,
-    thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
-):  # fmt: skip
-    """One cell, or the lanes': values for type A, of which only what exists is written.
-
-    Parameters
-    ----------
-    kind : +1 or -1, of `side_of`
-    cell : of `judged`
-    angles, crank_angles, pressed, slopes : of `extremes`, its transmission and tolerances
-    stops : of `locks`
-    rates : thd and the largest and least rate of that type
-    verdict : status where the linkage is OK, or a double crank
-    """
-    lengths, unit, _, code = cell
-    flat, turns = said(code, CHANGE_POINT), said(code, OK)
-    exists = turns | (flat & (lengths[3] <= lengths[0]))
-    there = where(exists, kind, math.nan)
-    A0[i], A1[i] = there * angles[0], where(exists, angles[1], math.nan)
-    eta_plus[i], eta_minus[i] = there * angles[2], there * angles[3]
-    theta_plus[i], theta_minus[i] = there * crank_angles[0], there * crank_angles[1]
-    theta_lock[i], theta_lock_outer[i] = stops
-    locked, whirls = said(code, LOCK_UP), said(code, DOUBLE_CRANK)
-    transmission_angle[i] = where(turns | flat | whirls, pressed, where(locked, 0.0, math.nan))
-    thd[i] = where(turns, rates[0], math.nan)
-    rate_max[i] = where(turns | whirls, rates[1], math.nan)
-    rate_min[i] = where(turns | whirls, rates[2], math.nan)
-    mean_b, mean_d, swing_b, swing_d, coupler, crank = slopes
-    per_metre = where(turns, pow2(-where(magnitude(unit) <= UNIT_LIMIT, unit, 0.0)), math.nan)
-    of_mean = kind * per_metre
-    A0_b[i], A0_d[i], A0_f[i], A0_e[i] = of_mean * mean_b, of_mean * mean_d, of_mean * crank, of_mean * coupler
-    A1_b[i], A1_d[i], A1_f[i], A1_e[i] = (
-        per_metre * swing_b,
-        per_metre * swing_d,
-        per_metre * coupler,
-        per_metre * crank,
+def mirrored(angles, sign):
+    """Angles of a linkage of type A as those of the type with that sign; NaN for the sign NaN."""
+    return Angles(
+        sign * angles.A0,
+        or_none(angles.A1, sign > -math.inf),
+        sign * angles.eta_plus,
+        sign * angles.eta_minus,
+        sign * angles.theta_plus,
+        sign * angles.theta_minus,
     )
-    status[i] = verdict
+
+
+@jit
+def _per_metre(slopes, per_metre, side):
+    """Derivatives without units, of type A, by lengths in metres."""
+    of_mean = side * per_metre
+    return Slopes(
+        of_mean * slopes.A0_b,
+        of_mean * slopes.A0_d,
+        of_mean * slopes.A0_f,
+        of_mean * slopes.A0_e,
+        per_metre * slopes.A1_b,
+        per_metre * slopes.A1_d,
+        per_metre * slopes.A1_f,
+        per_metre * slopes.A1_e,
+    )
+
+
+@jit
+def swing(type, cell, angles, transmission, slopes):
+    """What exists of the values that the linkage would have as type A; the others are as `Swing` has them."""
+    side, unit = side_of(type), where(magnitude(cell.unit) <= UNIT_LIMIT, cell.unit, 0.0)
+    pressed = where(moves(cell), transmission, or_none(0.0, said(cell.code, LOCK_UP)))
+    per_metre = or_none(pow2(-unit), said(cell.code, OK))
+    there = mirrored(angles, or_none(side, rocks(cell)))
+    return Swing(there, locks(cell), pressed, _per_metre(slopes, per_metre, side))

@@ -13,15 +13,16 @@ root of alpha'' between its neighbours.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from kernels.lanes.groups import GROUP, cells_at
+from kernels.lanes.groups import GROUP, cells_at, room
 from kernels.lanes.jit import jit, jit_call, jit_inline
 from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
 from kernels.maths.elementary import exp, sincos
 from kernels.polisher.extremes import smaller
-from kernels.polisher.linkage import acceleration, dead_gaps, direction, larger, opening, squares
+from kernels.polisher.linkage import Crank, acceleration, dead_gaps, direction, larger, opening, squares
 
 STEP = 0.28
 REACH = 133
@@ -33,6 +34,48 @@ FAR = 1.744
 """A singularity at cos theta = 1 + FAR or -1 - FAR adds harmonics that fall like 5.3^-k."""
 TRIES = 40
 ROUNDING = 5e-15
+
+
+class Turn(NamedTuple):
+    """Buffers of a group, a row for each node: alpha' on either half of the turn (type A), psi_xx and psi."""
+
+    forward: np.ndarray
+    backward: np.ndarray
+    bends: np.ndarray
+    openings: np.ndarray
+
+
+class Even(NamedTuple):
+    """psi_1, the mean of psi, and the sum of the sizes of what makes psi_1."""
+
+    first: float
+    mean: float
+    gross: float
+
+
+class Pace(NamedTuple):
+    """(arg p)' and psi', of which alpha' is the sum (type A) or difference (B), then psi_xx, and psi."""
+
+    turn: float
+    opened: float
+    bend: float
+    psi: float
+
+
+class Peak(NamedTuple):
+    """A local maximum among the nodes: height, node, half of the turn, and height of the lower neighbour."""
+
+    height: float
+    node: float
+    half: float
+    beside: float
+
+
+@jit
+def buffers():
+    """Space for a `Turn`."""
+    space = room(4 * NODES).reshape((4, NODES * GROUP))
+    return (Turn(space[0], space[1], space[2], space[3]),)
 
 
 def _table():
@@ -64,17 +107,18 @@ KERNELS = _kernels(SINE, COSINE, WEIGHT)
 
 @jit_call
 def pace(lengths, margin, s, c):
-    """(arg p)' and psi', of which alpha' is the sum (type A) or difference (B), then psi_xx, and psi."""
+    """The `Pace` at sine and cosine of theta/2."""
     b, d, f, e = lengths
     outer, inner = dead_gaps(lengths, margin, s, c)
     rz = sqrt(outer * inner)
-    p2, q, g, k = squares(lengths, c)
+    squared = squares(lengths, c)
+    p2, q, k = squared.p2, squared.q, squared.k
     spread = b * e / p2
     turn = e * fma(2.0 * b * c, c, e - b) / p2
     opened = 2.0 * (s * c) * spread * (q / rz)
     drift = (d - f) * (d + f) / p2 - (q / rz) * (k / rz)
     bend = -2.0 * (b * e) * spread * (drift / rz)
-    return turn, opened, bend, opening(d, p2, g, rz)
+    return Pace(turn, opened, bend, opening(lengths, squared, rz))
 
 
 @jit
@@ -87,23 +131,20 @@ def smooth(lengths, margin):
 
 
 @jit_inline
-def scan(lengths, margin, forward, backward, bends, angles):
-    """Fills buffers of a group: alpha' on either half of the turn (type A), psi_xx and psi.
-
-    Returns psi_1, the mean of psi, and the sum of the sizes of what makes psi_1.
-    """
-    zero = 0.0 * lengths[0]
+def scan(lengths, margin, turn):
+    """Fills a `Turn`; returns its `Even`."""
+    zero = 0.0 * lengths.b
     first, mean, gross = zero, zero, zero
     for j in range(NODES):
         s, c = SINE[j] + zero, COSINE[j] + zero
-        turn, opened, bend, psi = pace(lengths, margin, s, c)
-        forward[cells_at(j * GROUP)], backward[cells_at(j * GROUP)] = turn + opened, turn - opened
-        bends[cells_at(j * GROUP)], angles[cells_at(j * GROUP)] = bend, psi
+        here, row = pace(lengths, margin, s, c), cells_at(j * GROUP)
+        turn.forward[row], turn.backward[row] = here.turn + here.opened, here.turn - here.opened
+        turn.bends[row], turn.openings[row] = here.bend, here.psi
         share = (2.0 / math.pi) * WEIGHT[j]
-        part = 2.0 * share * (s * c) * opened
-        first, mean = first - part, fma(0.5 * share, psi, mean)
+        part = 2.0 * share * (s * c) * here.opened
+        first, mean = first - part, fma(0.5 * share, here.psi, mean)
         gross = gross + magnitude(part)
-    return first, mean, gross
+    return Even(first, mean, gross)
 
 
 @jit_inline
@@ -124,55 +165,51 @@ def few_harmonics(ratio, bends):
 
 
 @jit_inline
-def all_harmonics(lengths, ratio, first, mean, angles):
+def all_harmonics(lengths, ratio, even_part, openings):
     """The same sum over all k, as twice the mean square of what the first harmonic leaves."""
     zero = 0.0 * ratio
     total = zero
     for j in range(NODES):
         s, c = SINE[j] + zero, COSINE[j] + zero
-        even = angles[cells_at(j * GROUP)] - mean - first * ((c - s) * (c + s))
-        odd = direction(lengths, 2.0 * zero, s, c) - ratio * (2.0 * s * c)
+        even = openings[cells_at(j * GROUP)] - even_part.mean - even_part.first * ((c - s) * (c + s))
+        odd = direction(lengths, Crank(2.0 * zero, s, c)) - ratio * (2.0 * s * c)
         total = fma((2.0 / math.pi) * WEIGHT[j], fma(even, even, odd * odd), total)
     return total
 
 
 @jit_inline
-def distortion(lengths, margin, scanned, bends, angles):
-    """thd of (2), and its relative error; `scanned` is what `scan` returns."""
-    b, _, _, e = lengths
-    first, mean, gross = scanned
+def distortion(lengths, margin, even, turn):
+    """thd of (2), and its relative error; `even` is what `scan` returns."""
+    b, e = lengths.b, lengths.e
     moves = e > 0.0
     ratio = e / b
     few = smooth(lengths, margin)
     rest, lost = 0.0 * b, 0.0 * b
     if some(few):
-        of_few, terms = few_harmonics(ratio, bends)
+        of_few, terms = few_harmonics(ratio, turn.bends)
         root = sqrt(of_few)
         rest, lost = where(few, root, rest), where(few, terms, lost)
     if some(isnt(few)):
-        root = sqrt(all_harmonics(lengths, ratio, first, mean, angles))
-        rest, lost = where(few, rest, root), where(few, lost, 2.0 + mean)
-    fundamental = sqrt(fma(first, first, ratio * ratio))
-    doubt = ROUNDING * 0.1 * (lost / rest + gross / fundamental) + ROUNDING
+        root = sqrt(all_harmonics(lengths, ratio, even, turn.openings))
+        rest, lost = where(few, rest, root), where(few, lost, 2.0 + even.mean)
+    fundamental = sqrt(fma(even.first, even.first, ratio * ratio))
+    doubt = ROUNDING * 0.1 * (lost / rest + even.gross / fundamental) + ROUNDING
     return where(moves, rest / fundamental, 0.0), where(moves, doubt, ROUNDING)
 
 
 @jit_inline
 def _two_peaks(sign, buffer, half, found):
-    """The two highest local maxima of sign alpha' among `found` and the nodes of one half of the turn.
-
-    `found` has height, node, half of the turn and height of the lower neighbour, of the best and the second.
-    """
+    """The two highest peaks of sign alpha' among the two `found` and the nodes of one half of the turn."""
     best, second = found
-    zero = 0.0 * best[1]
+    zero = 0.0 * best.node
     before, here = zero - math.inf, sign * buffer[cells_at(0)]
     for j in range(NODES):
         after = zero - math.inf
         if j + 1 < NODES:
             after = sign * buffer[cells_at((j + 1) * GROUP)]
-        new = here, zero + j, zero + half, smaller(before, after)
+        new = Peak(here, zero + j, zero + half, smaller(before, after))
         peak = (here >= before) & (here > after)
-        first, other = peak & (here > best[0]), peak & (here > second[0])
+        first, other = peak & (here > best.height), peak & (here > second.height)
         second = choose(first, best, choose(other, new, second))
         best = choose(first, new, best)
         before, here = here, after
@@ -219,20 +256,20 @@ def _top(lengths, margin, sign, peak):
         place, done = where(active, new, place), magnitude(new - place) <= 1e-9
         active = active & isnt(done)
     s, c = at_node(place, half)
-    turn, opened, _, _ = pace(lengths, margin, magnitude(s), c)
-    top = sign * fma(half, opened, turn)
+    there = pace(lengths, margin, magnitude(s), c)
+    top = sign * fma(half, there.opened, there.turn)
     better = settled & (top > height)
     missing = where(settled, 0.0, where(beside > -math.inf, height - beside, 0.0))
     return where(better, top, height), missing
 
 
 @jit_call
-def fastest(lengths, margin, sign, forward, backward):
+def fastest(lengths, margin, sign, turn):
     """The largest sign alpha' over the turn, and what may be missing from it."""
-    zero = 0.0 * lengths[0]
-    nowhere = zero - math.inf, zero, zero + 1.0, zero
-    found = _two_peaks(sign, forward, 1.0, (nowhere, nowhere))
-    best, second = _two_peaks(sign, backward, -1.0, found)
+    zero = 0.0 * lengths.b
+    nowhere = Peak(zero - math.inf, zero, zero + 1.0, zero)
+    found = _two_peaks(sign, turn.forward, 1.0, (nowhere, nowhere))
+    best, second = _two_peaks(sign, turn.backward, -1.0, found)
     highest, missing = _top(lengths, margin, sign, best)
     other, more = _top(lengths, margin, sign, second)
     over = other > highest
@@ -240,11 +277,11 @@ def fastest(lengths, margin, sign, forward, backward):
 
 
 @jit_inline
-def rates(lengths, margin, forward, backward):
+def rates(lengths, margin, turn):
     """Largest and least alpha' of a crank that turns, and the larger of their relative errors."""
-    moves = lengths[3] > 0.0
-    most, missing = fastest(lengths, margin, 1.0, forward, backward)
-    least, more = fastest(lengths, margin, -1.0, forward, backward)
+    moves = lengths.e > 0.0
+    most, missing = fastest(lengths, margin, 1.0, turn)
+    least, more = fastest(lengths, margin, -1.0, turn)
     span = larger(magnitude(most), magnitude(least))
     doubt = (missing + 0.2 * ROUNDING * span) / magnitude(most)
     doubt = larger(doubt, (more + 0.2 * ROUNDING * span) / magnitude(least))

@@ -6,11 +6,15 @@ time: every search goes its own way.
 """
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from kernels.lanes.jit import jit, jit_call, jit_inline
 from kernels.lanes.vectors import magnitude, sqrt
-from kernels.polisher.extremes import angle, smaller
-from kernels.polisher.linkage import crank, dead_gaps, larger, motion, squares
+from kernels.polisher._cell import Rates
+from kernels.polisher.extremes import Angles, Locks, angle, smaller
+from kernels.polisher.linkage import crank_at, dead_gaps, larger, motion, squares
 
 SAMPLES = 2048
 HALVINGS = 60
@@ -20,11 +24,23 @@ ROUNDING = 1e-15
 """Error of alpha, of rates over the fastest, and of crank angles where alpha'' is as large as alpha'."""
 
 
+class Samples(NamedTuple):
+    """alpha and alpha' over a turn."""
+
+    alphas: np.ndarray
+    rates: np.ndarray
+
+
+@jit
+def buffers():
+    """Space for `Samples`."""
+    return (Samples(np.empty(SAMPLES), np.empty(SAMPLES)),)
+
+
 @jit_call
 def at(cell, theta):
-    """alpha, alpha', alpha'' of type A; NaN where it is locked. `cell` is lengths and margins."""
-    whole, s, c = crank(theta, 0.0)
-    return motion(cell[0], cell[1], 1.0, whole, s, c)
+    """alpha, alpha', alpha'' of type A; NaN where it is locked."""
+    return motion(cell.lengths, cell.margin, 1.0, crank_at(theta, 0.0))
 
 
 @jit
@@ -34,12 +50,12 @@ def step(j):
 
 
 @jit_inline
-def sample(cell, alphas, rates, bends):
-    """Fills the three columns of a turn; returns inf where a dead point is passed between two samples, else 0."""
+def sample(cell, samples):
+    """Fills the samples; returns inf where a dead point is passed between two of them, else 0."""
     for j in range(SAMPLES):
-        alphas[j], rates[j], bends[j] = at(cell, step(j))
-    b, d, f, e = cell[0]
-    m1, m2, m3 = cell[1]
+        samples.alphas[j], samples.rates[j], _ = at(cell, step(j))
+    b, d, f, e = cell.lengths
+    m1, m2, m3 = cell.margin
     narrow = 4.0 * b * e * (WIDEST * math.pi / SAMPLES) ** 2
     wide = m1 * (b + d + f + e) > narrow and m2 * m3 > narrow and (b - e) ** 2 > narrow
     return 0.0 if wide else math.inf
@@ -56,14 +72,21 @@ def largest(column, sign):
 
 
 @jit_call
+def derivative(cell, theta, order):
+    """alpha' for the order 1, alpha'' for 2."""
+    _, rate, acceleration = at(cell, theta)
+    return rate if order == 1 else acceleration
+
+
+@jit_call
 def turning(cell, order, sign, j):
     """Where sign times the derivative of that order falls through 0, next to sample j; NaN where it does not."""
     low, high = step(j - 1), step(j + 1)
-    if not (sign * at(cell, low)[order] > 0.0 and sign * at(cell, high)[order] < 0.0):
+    if not (sign * derivative(cell, low, order) > 0.0 and sign * derivative(cell, high, order) < 0.0):
         return math.nan
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        if sign * at(cell, middle)[order] > 0.0:
+        if sign * derivative(cell, middle, order) > 0.0:
             low = middle
         else:
             high = middle
@@ -72,7 +95,7 @@ def turning(cell, order, sign, j):
 
 @jit_inline
 def extremes(cell, alphas):
-    """A0, A1, eta_plus, eta_minus; theta_plus, theta_minus; and their largest relative error."""
+    """`Angles`, and their largest relative error."""
     at_plus, at_minus = turning(cell, 1, 1.0, largest(alphas, 1.0)), turning(cell, 1, -1.0, largest(alphas, -1.0))
     at_plus = at_plus if at_plus > 0.0 else at_plus + math.tau
     at_minus = at_minus if at_minus < 0.0 else at_minus - math.tau
@@ -80,9 +103,10 @@ def extremes(cell, alphas):
     minus, _, minus_bend = at(cell, at_minus)
     swing = 0.5 * (plus - minus)
     lost = ROUNDING * (1.0 + plus) / larger(0.0, smaller(minus, swing))
-    misplaced = (1.0 + swing / magnitude(plus_bend)) / at_plus, (1.0 + swing / magnitude(minus_bend)) / -at_minus
-    lost = larger(lost, ROUNDING * larger(misplaced[0], misplaced[1]))
-    return (0.5 * (plus + minus), swing, plus, minus), (at_plus, at_minus), lost
+    plus_lost = (1.0 + swing / magnitude(plus_bend)) / at_plus
+    minus_lost = (1.0 + swing / magnitude(minus_bend)) / -at_minus
+    lost = larger(lost, ROUNDING * larger(plus_lost, minus_lost))
+    return Angles(0.5 * (plus + minus), swing, plus, minus, at_plus, at_minus), lost
 
 
 @jit_call
@@ -94,7 +118,7 @@ def fastest(cell, sign, rates):
         close = here >= top - 0.1 * magnitude(top)
         if close and here >= sign * rates[j - 1] and here >= sign * rates[(j + 1) % SAMPLES]:
             theta = turning(cell, 2, sign, j)
-            here = larger(here, sign * at(cell, theta)[1]) if theta == theta else here
+            here = larger(here, sign * derivative(cell, theta, 1)) if theta == theta else here
             best = larger(best, here)
     return sign * best
 
@@ -116,40 +140,42 @@ def distortion(alphas, stride):
 
 
 @jit_inline
-def rates(cell, alphas, speeds):
-    """thd, the largest and the least rate, and the largest of their relative errors."""
-    most, least = fastest(cell, 1.0, speeds), fastest(cell, -1.0, speeds)
+def rates(cell, samples):
+    """`Rates`, and the largest of their relative errors."""
+    most, least = fastest(cell, 1.0, samples.rates), fastest(cell, -1.0, samples.rates)
     span = larger(magnitude(most), magnitude(least))
     lost = 4.0 * ROUNDING * span / smaller(magnitude(most), magnitude(least))
-    if cell[0][3] > cell[0][0]:
-        return (math.nan, most, least), lost
-    thd, first = distortion(alphas, 1)
-    coarse, _ = distortion(alphas, 2)
-    return (thd, most, least), larger(lost, (magnitude(thd - coarse) + 4.0 * ROUNDING / first) / thd)
+    if cell.lengths.e > cell.lengths.b:
+        return Rates(math.nan, most, least), lost
+    thd, first = distortion(samples.alphas, 1)
+    coarse, _ = distortion(samples.alphas, 2)
+    return Rates(thd, most, least), larger(lost, (magnitude(thd - coarse) + 4.0 * ROUNDING / first) / thd)
 
 
 @jit_inline
-def pressed(cell):
+def transmission(cell):
     """The least angle between coupler and arm, or their extensions, of all samples."""
     least = math.pi
     for j in range(SAMPLES):
-        _, s, c = crank(step(j), 0.0)
-        outer, inner = dead_gaps(cell[0], cell[1], s, c)
-        least = smaller(least, angle(sqrt(outer * inner), magnitude(squares(cell[0], c)[3])))
+        _, s, c = crank_at(step(j), 0.0)
+        outer, inner = dead_gaps(cell.lengths, cell.margin, s, c)
+        least = smaller(least, angle(sqrt(outer * inner), magnitude(squares(cell.lengths, c).k)))
     return least
 
 
 @jit_call
 def is_free(cell, theta):
     """Whether the crank can stand there."""
-    alpha = at(cell, theta)[0]
+    alpha, _, _ = at(cell, theta)
     return alpha == alpha
 
 
 @jit_call
 def lock(cell, goal):
     """Where the crank locks on its way to the goal, 0 or pi; NaN where it does not; and its relative error."""
-    free, start = is_free(cell, goal), math.nan
+    if is_free(cell, goal):
+        return math.nan, 0.0
+    start = math.nan
     for j in range(SAMPLES // 2 + 1):
         theta = goal + (1.0 if goal < 1.0 else -1.0) * math.pi * j / (SAMPLES // 2)
         if start != start and is_free(cell, theta):
@@ -161,14 +187,13 @@ def lock(cell, goal):
             start = middle
         else:
             stuck = middle
-    lost = 4.0 * ROUNDING * (1.0 + 1.0 / (start * start)) if start == start else math.inf
-    return math.nan if free else start, 0.0 if free else lost
+    return start, 4.0 * ROUNDING * (1.0 + 1.0 / (start * start)) if start == start else math.inf
 
 
 @jit_inline
 def locks(cell):
-    """The locks nearest to 0 and to pi, as `extremes.locks`; and their largest relative error."""
+    """`Locks`, and their largest relative error."""
     inner, inner_lost = lock(cell, 0.0)
     outer, outer_lost = lock(cell, math.pi)
-    lost = larger(inner_lost, outer_lost)
-    return ((inner, outer) if inner == inner else (outer, inner)), lost
+    nearest, outer = (inner, outer) if inner == inner else (outer, inner)
+    return Locks(nearest, outer), larger(inner_lost, outer_lost)

@@ -12,7 +12,8 @@ import math
 
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import magnitude, sqrt, where
-from kernels.polisher.extremes import angle, smaller
+from kernels.polisher._cell import ROUNDING
+from kernels.polisher.extremes import Angles, Slopes, angle, smaller
 from kernels.polisher.linkage import larger
 
 _ROUNDINGS = 2.0**-50
@@ -46,17 +47,11 @@ def angle_error(x, y, z):
 
 @jit
 def extremes(lengths):
-    """A0, A1, eta_plus, eta_minus for type A."""
+    """`Angles` for type A."""
     b, d, f, e = lengths
     plus, minus = arccos(cosine(b, d, f + e)), arccos(cosine(b, d, f - e))
-    return 0.5 * (plus + minus), 0.5 * (plus - minus), plus, minus
-
-
-@jit
-def crank_angles(lengths):
-    """theta at eta_plus and at eta_minus, for type A."""
-    b, d, f, e = lengths
-    return math.pi - arccos(cosine(b, f + e, d)), -arccos(cosine(b, f - e, d))
+    crank_plus, crank_minus = math.pi - arccos(cosine(b, f + e, d)), -arccos(cosine(b, f - e, d))
+    return Angles(0.5 * (plus + minus), 0.5 * (plus - minus), plus, minus, crank_plus, crank_minus)
 
 
 @jit
@@ -76,29 +71,37 @@ def _slopes(b, d, c):
 
 @jit
 def tolerances(lengths):
-    """A0_b, A0_d, A1_b, A1_d, A1_f = A0_e and A1_e = A0_f for type A."""
+    """`Slopes` for type A."""
     b, d, f, e = lengths
     pb, pd, pc = _slopes(b, d, f + e)
     mb, md, mc = _slopes(b, d, f - e)
-    return 0.5 * (pb + mb), 0.5 * (pd + md), 0.5 * (pb - mb), 0.5 * (pd - md), 0.5 * (pc - mc), 0.5 * (pc + mc)
+    coupler, crank = 0.5 * (pc - mc), 0.5 * (pc + mc)
+    mean_b, mean_d, swing_b, swing_d = 0.5 * (pb + mb), 0.5 * (pd + md), 0.5 * (pb - mb), 0.5 * (pd - md)
+    return Slopes(mean_b, mean_d, crank, coupler, swing_b, swing_d, coupler, crank)
+
+
+@jit
+def relative(error, value):
+    """An error over its value, but no less than ROUNDING; NaN stays."""
+    share = error / magnitude(value)
+    return where(share <= ROUNDING, ROUNDING, share)
 
 
 @jit
 def angle_errors(lengths):
-    """Relative errors of A0, A1, eta_plus, eta_minus, theta_plus and theta_minus."""
+    """Relative errors of `extremes`."""
     b, d, f, e = lengths
-    mean, swing, plus, minus = extremes(lengths)
-    at_plus, at_minus = crank_angles(lengths)
-    plus_lost, minus_lost = angle_error(b, d, f + e)[0], angle_error(b, d, f - e)[0]
-    both = 0.5 * (plus_lost + minus_lost)
-    crank_lost = angle_error(b, f + e, d)[0] + _ULP * math.pi, angle_error(b, f - e, d)[0]
-    return (
-        both / mean,
-        both / swing,
-        plus_lost / plus,
-        minus_lost / minus,
-        crank_lost[0] / at_plus,
-        crank_lost[1] / magnitude(at_minus),
+    of = extremes(lengths)
+    plus, minus = angle_error(b, d, f + e)[0], angle_error(b, d, f - e)[0]
+    both = 0.5 * (plus + minus)
+    crank_plus, crank_minus = angle_error(b, f + e, d)[0] + _ULP * math.pi, angle_error(b, f - e, d)[0]
+    return Angles(
+        relative(both, of.A0),
+        relative(both, of.A1),
+        relative(plus, of.eta_plus),
+        relative(minus, of.eta_minus),
+        relative(crank_plus, of.theta_plus),
+        relative(crank_minus, of.theta_minus),
     )
 
 
@@ -107,7 +110,7 @@ def transmission_error(lengths):
     """Relative error of the transmission angle."""
     b, d, f, e = lengths
     lost = larger(angle_error(d, f, b - e)[0], angle_error(d, f, b + e)[0] + _ULP * math.pi)
-    return lost / transmission(lengths)
+    return relative(lost, transmission(lengths))
 
 
 @jit
@@ -123,19 +126,20 @@ def _slope_errors(b, d, c):
 
 @jit
 def slope_errors(lengths):
-    """Relative errors of the derivatives of A0 by b, d, f, e, and of those of A1."""
+    """Relative errors of `tolerances`."""
     b, d, f, e = lengths
     pb, pd, pc = _slope_errors(b, d, f + e)
     mb, md, mc = _slope_errors(b, d, f - e)
-    mean_b, mean_d, swing_b, swing_d, coupler, crank = tolerances(lengths)
+    of = tolerances(lengths)
     frame, arm, third = 0.5 * (pb + mb), 0.5 * (pd + md), 0.5 * (pc + mc)
-    return (
-        frame / magnitude(mean_b),
-        arm / magnitude(mean_d),
-        third / crank,
-        third / magnitude(coupler),
-        frame / magnitude(swing_b),
-        arm / magnitude(swing_d),
-        third / magnitude(coupler),
-        third / crank,
+    coupler, crank = relative(third, of.A1_f), relative(third, of.A1_e)
+    return Slopes(
+        relative(frame, of.A0_b),
+        relative(arm, of.A0_d),
+        crank,
+        coupler,
+        relative(frame, of.A1_b),
+        relative(arm, of.A1_d),
+        coupler,
+        crank,
     )

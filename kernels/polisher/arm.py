@@ -16,289 +16,179 @@ rates, no derivatives). A crank e = 0 swings nothing; crank angles are those for
 """
 
 import math
+from typing import NamedTuple
 
-import numpy as np
-
-from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
-from kernels.lanes.codes import BAD_INPUT, CHANGE_POINT, DOUBLE_CRANK, INACCURATE, LOCK_UP, OK
-from kernels.lanes.columns import each_cell, entry, entry_of_cells, one_by_one
-from kernels.lanes.groups import GROUP, cells_at, each_group, room
+from kernels.interface import FIRST_REFUSAL, Field
+from kernels.lanes.codes import BAD_INPUT, INACCURATE, LOCK_UP, OK
+from kernels.lanes.columns import cell_by_cell
+from kernels.lanes.groups import cells_at
 from kernels.lanes.jit import jit
-from kernels.lanes.vectors import isnt, where
+from kernels.lanes.ranges import or_none
+from kernels.lanes.records import read, write
+from kernels.lanes.vectors import choose, isnt, where
+from kernels.lanes.wiring import kernel, method, tracing
 from kernels.polisher import _motor_waveform, _sampled_motion, _textbook_angles, extremes
-from kernels.polisher._cell import judged, locks, no_rates, said, write
-from kernels.polisher.linkage import in_units, larger, margins, side_of
+from kernels.polisher._cell import ROUNDING, Rates, Swing, judged, mirrored, moves, rocks, said, swing, turns
+from kernels.polisher.extremes import Angles, Locks, Slopes
+from kernels.polisher.linkage import EXAMPLE, PARAMETERS, allowed, larger, side_of
 
-ROUNDING = 3e-15
-"""What `stable` is right to."""
 
-_INACCURATE_CODE = int(Status.INACCURATE)
-_PRESSED, _FIRST_SLOPE = 8, 12  # positions of the transmission angle and of A0_b among the outputs
+class Linkage(NamedTuple):
+    """Parameters."""
+
+    b: float
+    d: float
+    f: float
+    e: float
+    type: float
+
+
+class Sampled(NamedTuple):
+    """Outputs of `sampled`."""
+
+    angles: Angles
+    locks: Locks
+    transmission_angle: float
+    rates: Rates
 
 
 @jit
-def _stable(i, b, d, f, e, type, *outputs):
-    cell = judged(b[i], d[i], f[i], e[i])
-    lengths, _, margin, code = cell
-    flat = extremes.flattened(margin)
-    root = extremes.roots(lengths, flat)
-    angles = extremes.extremes(lengths, root)
-    crank_angles = extremes.crank_angles(lengths, flat, root)
-    pressed = extremes.transmission(lengths, margin)
-    slopes = extremes.tolerances(lengths, root)
-    stops = locks(code, lengths, margin)
-    write(i, side_of(type[i]), cell, angles, crank_angles, stops, pressed, no_rates(code), slopes, code, *outputs)
+def _stable(type, cell):
+    flat = extremes.flattened(cell.margin)
+    root = extremes.roots(cell.lengths, flat)
+    angles = extremes.extremes(cell.lengths, flat, root)
+    transmission = extremes.transmission(cell.lengths, cell.margin)
+    return swing(type, cell, angles, transmission, extremes.tolerances(cell.lengths, root))
 
 
-@entry()
-def stable(
-    b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
-    transmission_angle, thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
-):  # fmt: skip
+@jit
+def stable(p, rtol):
     """Half-angle forms of sums without error."""
-    columns = (
-        b, d, f, e, type, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
-        transmission_angle, thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
-    )  # fmt: skip
-    each_cell(_stable, columns)
-
-
-@entry("asked")
-def stable_bound(b, d, f, e, type, rtol, asked, out):
-    """Rounding."""
-    out[:] = ROUNDING
+    cell = judged(p)
+    return _stable(p.type, cell), cell.code
 
 
 @jit
-def _textbook(i, b, d, f, e, type, *outputs):
-    cell = judged(b[i], d[i], f[i], e[i])
-    lengths, _, margin, code = cell
-    angles = _textbook_angles.extremes(lengths)
-    crank_angles = _textbook_angles.crank_angles(lengths)
-    pressed = _textbook_angles.transmission(lengths)
-    slopes = _textbook_angles.tolerances(lengths)
-    stops = locks(code, lengths, margin)
-    write(i, side_of(type[i]), cell, angles, crank_angles, stops, pressed, no_rates(code), slopes, code, *outputs)
-
-
-@entry()
-def textbook(
-    b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
-    transmission_angle, thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
-):  # fmt: skip
+def textbook(p, rtol):
     """The paper's arccos; what that loses is the bound."""
-    columns = (
-        b, d, f, e, type, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
-        transmission_angle, thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
-    )  # fmt: skip
-    each_cell(_textbook, columns)
+    cell = judged(p)
+    angles = _textbook_angles.extremes(cell.lengths)
+    transmission = _textbook_angles.transmission(cell.lengths)
+    return swing(p.type, cell, angles, transmission, _textbook_angles.tolerances(cell.lengths)), cell.code
 
 
 @jit
-def _textbook_bound(i, b, d, f, e, asked, out):
-    """The largest of the errors asked for; verdicts and locks are those of `stable`."""
-    lengths, _, _, code = judged(b[i], d[i], f[i], e[i])
-    angles = _textbook_angles.angle_errors(lengths)
-    slopes = _textbook_angles.slope_errors(lengths)
-    swings = said(code, OK) | (said(code, CHANGE_POINT) & (lengths[3] <= lengths[0]))
-    worst = 0.0 * code + ROUNDING
-    for k in range(len(angles)):
-        worst = where(swings & (asked[k] > 0), _worse(worst, angles[k]), worst)
-    pressed = _textbook_angles.transmission_error(lengths)
-    turns = swings | said(code, CHANGE_POINT) | said(code, DOUBLE_CRANK)
-    worst = where(turns & (asked[_PRESSED] > 0), _worse(worst, pressed), worst)
-    for k in range(len(slopes)):
-        worst = where(said(code, OK) & (asked[_FIRST_SLOPE + k] > 0), _worse(worst, slopes[k]), worst)
-    out[i] = worst
+def textbook_bound(p):
+    """What rounding comes to in an arccos and in differences of two of them; the locks are those of `stable`."""
+    cell, least = judged(p), ROUNDING
+    of_angles = Angles(least, least, least, least, least, least)
+    of_slopes = Slopes(least, least, least, least, least, least, least, least)
+    return Swing(
+        choose(rocks(cell), _textbook_angles.angle_errors(cell.lengths), of_angles),
+        Locks(least, least),
+        where(moves(cell), _textbook_angles.transmission_error(cell.lengths), least),
+        choose(said(cell.code, OK), _textbook_angles.slope_errors(cell.lengths), of_slopes),
+    )
 
 
 @jit
-def _worse(worst, error):
-    """The larger of two errors, inf for NaN."""
-    return where(error <= worst, worst, where(error > worst, error, math.inf))
-
-
-@entry("asked")
-def textbook_bound(b, d, f, e, type, rtol, asked, out):
-    """What rounding comes to in an arccos and in differences of two of them, for each cell."""
-    each_cell(_textbook_bound, (b, d, f, e, asked, out))
-
-
-@jit
-def _over_a_turn(first, b, d, f, e, rtol, buffers, thd, rate_max, rate_min, status):
+def _waveform(first, columns, turn):
+    """As `stable`, and then the motion over a turn; `_motor_waveform` estimates the rounding of that."""
     i = cells_at(first)
-    lengths, _, margin, code = judged(b[i], d[i], f[i], e[i])
-    forward, backward, bends, openings = buffers[0], buffers[1], buffers[2], buffers[3]
-    scanned = _motor_waveform.scan(lengths, margin, forward, backward, bends, openings)
-    distortion, doubt = _motor_waveform.distortion(lengths, margin, scanned, bends, openings)
-    most, least, rate_doubt = _motor_waveform.rates(lengths, margin, forward, backward)
-    swings, turns = said(code, OK), said(code, OK) | said(code, DOUBLE_CRANK)
-    thd[i] = where(swings, distortion, math.nan)
-    rate_max[i], rate_min[i] = where(turns, most, math.nan), where(turns, least, math.nan)
-    wide = (turns & isnt(rate_doubt <= rtol[i])) | (swings & isnt(doubt <= rtol[i])) | isnt(rtol[i] >= ROUNDING)
-    status[i] = where(wide & (code < FIRST_REFUSAL), INACCURATE, code)
-
-
-@entry()
-def over_a_turn(b, d, f, e, rtol, thd, rate_max, rate_min, status):
-    """The outputs that `stable` lacks; `_motor_waveform` estimates their rounding."""
-    buffers = room(4 * _motor_waveform.NODES).reshape((4, _motor_waveform.NODES * GROUP))
-    each_group(_over_a_turn, (b, d, f, e, rtol, buffers, thd, rate_max, rate_min, status))
-
-
-def waveform(
-    b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
-    transmission_angle, thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
-):  # fmt: skip
-    """As `stable`, and then the motion over a turn."""
-    stable(
-        b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
-        transmission_angle, thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
-    )  # fmt: skip
-    over_a_turn(b, d, f, e, rtol, thd, rate_max, rate_min, status)
+    p, rtol = read(Linkage, columns, i), columns.rtol[i]
+    cell = judged(p)
+    write(columns, i, _stable(p.type, cell))
+    even = _motor_waveform.scan(cell.lengths, cell.margin, turn)
+    thd, doubt = _motor_waveform.distortion(cell.lengths, cell.margin, even, turn)
+    most, least, rate_doubt = _motor_waveform.rates(cell.lengths, cell.margin, turn)
+    swings, rates = said(cell.code, OK), turns(cell)
+    write(columns, i, Rates(or_none(thd, swings), or_none(most, rates), or_none(least, rates)))
+    wide = (rates & isnt(rate_doubt <= rtol)) | (swings & isnt(doubt <= rtol)) | isnt(rtol >= ROUNDING)
+    columns.status[i] = where(wide & (cell.code < FIRST_REFUSAL), INACCURATE, cell.code)
 
 
 @jit
-def _in_samples(
-    i, b, d, f, e, type, rtol, alphas, speeds, bends,
-    A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer, transmission_angle,
-    thd, rate_max, rate_min, status,
-):  # fmt: skip
-    """`status` comes with the verdict on the linkage."""
-    lengths, _, _ = in_units(b[i], d[i], f[i], e[i])
-    arm, code, none = (lengths, margins(*lengths)), float(status[i]), math.nan
-    angles, cranks, rates = (none, none, none, none), (none, none), (none, none, none)
-    stops, pressed, doubt = (none, none), none, math.inf
-    if said(code, LOCK_UP):
-        stops, doubt = _sampled_motion.locks(arm)
-        pressed = 0.0
-    elif said(code, OK) or said(code, DOUBLE_CRANK):
-        blind = _sampled_motion.sample(arm, alphas, speeds, bends)
-        pressed = _sampled_motion.pressed(arm)
-        rates, doubt = _sampled_motion.rates(arm, alphas, speeds)
-        if said(code, OK):
-            angles, cranks, lost = _sampled_motion.extremes(arm, alphas)
+def sampled(p, rtol, samples):
+    """The verdict of `stable`, and all its values anew from samples of a turn."""
+    cell, none = judged(p), math.nan
+    angles, locks, rates = Angles(none, none, none, none, none, none), Locks(none, none), Rates(none, none, none)
+    transmission, doubt = none, math.inf
+    if said(cell.code, LOCK_UP):
+        locks, doubt = _sampled_motion.locks(cell)
+        transmission = 0.0
+    elif turns(cell):
+        blind = _sampled_motion.sample(cell, samples)
+        transmission = _sampled_motion.transmission(cell)
+        rates, doubt = _sampled_motion.rates(cell, samples)
+        if said(cell.code, OK):
+            angles, lost = _sampled_motion.extremes(cell, samples.alphas)
             doubt = larger(doubt, lost)
         doubt = larger(doubt, blind)
-    kind = side_of(type[i])
-    A0[i], A1[i], eta_plus[i], eta_minus[i] = kind * angles[0], angles[1], kind * angles[2], kind * angles[3]
-    theta_plus[i], theta_minus[i] = kind * cranks[0], kind * cranks[1]
-    theta_lock[i], theta_lock_outer[i] = stops
-    transmission_angle[i] = pressed
-    thd[i], rate_max[i], rate_min[i] = rates
-    if not doubt <= rtol[i] and code < FIRST_REFUSAL:
-        status[i] = _INACCURATE_CODE
-
-
-@entry_of_cells
-def in_samples(
-    b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
-    transmission_angle, thd, rate_max, rate_min, status,
-):  # fmt: skip
-    """Samples of a turn, followed up; one cell at a time, since every search goes its own way."""
-    n = _sampled_motion.SAMPLES
-    columns = (
-        b, d, f, e, type, rtol, np.empty(n), np.empty(n), np.empty(n),
-        A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer, transmission_angle,
-        thd, rate_max, rate_min, status,
-    )  # fmt: skip
-    one_by_one(_in_samples, columns)
-
-
-def sampled(
-    b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
-    transmission_angle, thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
-):  # fmt: skip
-    """The verdict of `stable`, and all its values anew from samples of a turn."""
-    stable(
-        b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
-        transmission_angle, thd, rate_max, rate_min, A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e, status,
-    )  # fmt: skip
-    in_samples(
-        b, d, f, e, type, rtol, A0, A1, eta_plus, eta_minus, theta_plus, theta_minus, theta_lock, theta_lock_outer,
-        transmission_angle, thd, rate_max, rate_min, status,
-    )  # fmt: skip
-    for slope in (A0_b, A0_d, A0_f, A0_e, A1_b, A1_d, A1_f, A1_e):
-        slope.fill(math.nan)
+    doubtful = not doubt <= rtol and cell.code < FIRST_REFUSAL
+    outputs = Sampled(mirrored(angles, side_of(p.type)), locks, transmission, rates)
+    return outputs, INACCURATE if doubtful else cell.code
 
 
 @jit
-def allowed(b, d, f, e, type):
-    """Whether the parameters are numbers within their limits; NaN fails."""
-    positive = (b > 0.0) & (d > 0.0) & (f > 0.0) & (e >= 0.0)
-    finite = (b < math.inf) & (d < math.inf) & (f < math.inf) & (e < math.inf)
-    a_or_b = ((type >= 0.0) & (type <= 0.0)) | ((type >= 1.0) & (type <= 1.0))
-    return positive & finite & a_or_b
-
-
-@jit
-def _check(i, b, d, f, e, type, status):
-    status[i] = where(allowed(b[i], d[i], f[i], e[i], type[i]), OK, BAD_INPUT)
-
-
-@entry()
-def check(b, d, f, e, type, status):
+def check(p):
     """BAD_INPUT: NaN, infinite, a length that is not positive (the crank's may be 0), or a type that is none."""
-    each_cell(_check, (b, d, f, e, type, status))
+    return where(allowed(p), OK, BAD_INPUT)
 
 
-PARAMETERS = (
-    Field("b", "m", "distance of the motor's shaft from the arm's pivot", lower=0.0, open_lower=True),
-    Field("d", "m", "arm, from its pivot to the coupler", lower=0.0, open_lower=True),
-    Field("f", "m", "coupler, from the arm to the crank", lower=0.0, open_lower=True),
-    Field("e", "m", "crank, the eccentricity of the motor's pin", lower=0.0),
-    Field(
-        "type", "1", "straight upper link (A) or one bent by 90 degrees (B): the side of the arm",
-        default=0.0, lower=0.0, upper=1.0, choices={"A": 0, "B": 1},
-    ),
-)  # fmt: skip
-
-EXAMPLE = {"b": 0.6201, "d": 0.38, "f": 0.405, "e": 0.15, "type": 0.0}
-
-OUTPUTS = (
-    Field("A0", "rad", "middle between the arm's extremes, from b; negative for type B"),
-    Field("A1", "rad", "half amplitude of the arm"),
-    Field("eta_plus", "rad", "angle of the arm where crank and coupler are stretched; negative for type B"),
-    Field("eta_minus", "rad", "angle of the arm where crank and coupler are folded; negative for type B"),
-    Field("theta_plus", "rad", "crank angle from b at eta_plus"),
-    Field("theta_minus", "rad", "crank angle from b at eta_minus"),
-    Field("theta_lock", "rad", "crank angle from b, to either side, where it locks: the one nearest to 0", gaps=True),
-    Field("theta_lock_outer", "rad", "the other one, of a crank that locks at both ends of its way", gaps=True),
-    Field("transmission_angle", "rad", "least angle between coupler and arm over the turn"),
-    Field("thd", "1", "root of the sum of squares of the harmonics from the second on, over the first"),
-    Field("rate_max", "1", "largest angular rate of the arm per rate of the crank"),
-    Field("rate_min", "1", "least, that is fastest backward, rate of the arm per rate of the crank"),
-    Field("A0_b", "rad/m", "derivative of A0 by b"),
-    Field("A0_d", "rad/m", "derivative of A0 by d"),
-    Field("A0_f", "rad/m", "derivative of A0 by f"),
-    Field("A0_e", "rad/m", "derivative of A0 by e"),
-    Field("A1_b", "rad/m", "derivative of A1 by b"),
-    Field("A1_d", "rad/m", "derivative of A1 by d"),
-    Field("A1_f", "rad/m", "derivative of A1 by f"),
-    Field("A1_e", "rad/m", "derivative of A1 by e"),
-)
-
-_RATES = ("thd", "rate_max", "rate_min")
-_SLOPES = ("A0_b", "A0_d", "A0_f", "A0_e", "A1_b", "A1_d", "A1_f", "A1_e")
-
-POLISHER = Kernel(
-    name="polisher",
+POLISHER = kernel(
+    "polisher",
     doc="how far a polishing machine's crank swings its arm, and how well",
     source="Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (37)-(40); stable forms and verdict are ours",
     parameters=PARAMETERS,
-    outputs=OUTPUTS,
+    outputs=(
+        Field("A0", "rad", "middle between the arm's extremes, from b; negative for type B"),
+        Field("A1", "rad", "half amplitude of the arm"),
+        Field("eta_plus", "rad", "angle of the arm where crank and coupler are stretched; negative for type B"),
+        Field("eta_minus", "rad", "angle of the arm where crank and coupler are folded; negative for type B"),
+        Field("theta_plus", "rad", "crank angle from b at eta_plus"),
+        Field("theta_minus", "rad", "crank angle from b at eta_minus"),
+        Field(
+            "theta_lock", "rad", "crank angle from b, to either side, where it locks: the one nearest to 0", gaps=True
+        ),
+        Field("theta_lock_outer", "rad", "the other one, of a crank that locks at both ends of its way", gaps=True),
+        Field("transmission_angle", "rad", "least angle between coupler and arm over the turn"),
+        Field("thd", "1", "root of the sum of squares of the harmonics from the second on, over the first"),
+        Field("rate_max", "1", "largest angular rate of the arm per rate of the crank"),
+        Field("rate_min", "1", "least, that is fastest backward, rate of the arm per rate of the crank"),
+        Field("A0_b", "rad/m", "derivative of A0 by b"),
+        Field("A0_d", "rad/m", "derivative of A0 by d"),
+        Field("A0_f", "rad/m", "derivative of A0 by f"),
+        Field("A0_e", "rad/m", "derivative of A0 by e"),
+        Field("A1_b", "rad/m", "derivative of A1 by b"),
+        Field("A1_d", "rad/m", "derivative of A1 by d"),
+        Field("A1_f", "rad/m", "derivative of A1 by f"),
+        Field("A1_e", "rad/m", "derivative of A1 by e"),
+    ),
+    record=Linkage,
     check=check,
     methods=(
-        Method("stable", "half-angle forms of sums without error", stable, stable_bound, lacks=_RATES),
-        Method(
+        method("stable", "half-angle forms of sums without error", stable, ROUNDING, lacks=Rates._fields),
+        method(
             "textbook",
             "the paper's arccos, which loses digits next to dead points",
             textbook,
             textbook_bound,
-            lacks=_RATES,
+            lacks=Rates._fields,
         ),
-        Method("waveform", "stable, and integrals and extremes of the rate over a turn", waveform),
-        Method("sampled", "2048 samples of the motion over a turn, followed up", sampled, lacks=_SLOPES),
+        tracing(
+            "waveform",
+            "stable, and integrals and extremes of the rate over a turn",
+            _waveform,
+            buffers=_motor_waveform.buffers,
+        ),
+        method(
+            "sampled",
+            "2048 samples of the motion over a turn, followed up",
+            sampled,
+            lacks=Slopes._fields,
+            buffers=_sampled_motion.buffers,
+            loop=cell_by_cell,
+        ),
     ),
     example=EXAMPLE,
 )

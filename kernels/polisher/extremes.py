@@ -19,12 +19,13 @@ f = 5, e = 10 has two angles by the arccos, and locks).
 """
 
 import math
+from typing import NamedTuple
 
 from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, LOCK_UP, NO_ASSEMBLY, OK
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import choose, fma, horner, isnt, magnitude, some, sqrt, where
 from kernels.maths.pairs import two_product, two_sum
-from kernels.polisher.linkage import larger, sum4
+from kernels.polisher.linkage import Margins, larger, sum4
 
 ROUNDING = 2.0**-53
 """Share of b+d+f+e that rounding the four lengths may add to a margin: closer to 0 it is a change point."""
@@ -39,6 +40,46 @@ _ARCTAN = (
     0.07692296375018166, -0.06666424885487231, 0.05878928994948492, -0.052304542493924897, 0.04551593123658399,
     -0.03457055948759698, 0.01628575409147857,
 )  # fmt: skip
+
+
+class Roots(NamedTuple):
+    """k, l, m, n of (2)."""
+
+    k: float
+    low: float
+    m: float
+    n: float
+
+
+class Angles(NamedTuple):
+    """Those of (2), the arm's extremes, and the crank's angles there."""
+
+    A0: float
+    A1: float
+    eta_plus: float
+    eta_minus: float
+    theta_plus: float
+    theta_minus: float
+
+
+class Locks(NamedTuple):
+    """Crank angles from b, to either side, where it locks, the nearest to 0 first; NaN for what there is not."""
+
+    theta_lock: float
+    theta_lock_outer: float
+
+
+class Slopes(NamedTuple):
+    """Derivatives of A0 and A1 by the lengths."""
+
+    A0_b: float
+    A0_d: float
+    A0_f: float
+    A0_e: float
+    A1_b: float
+    A1_d: float
+    A1_f: float
+    A1_e: float
 
 
 @jit
@@ -73,17 +114,17 @@ def verdict(lengths, margin):
 def flattened(margin):
     """The margins of a linkage that turns, without what rounding has taken them below 0 by."""
     m1, m2, m3 = margin
-    return larger(m1, 0.0), larger(m2, 0.0), larger(m3, 0.0)
+    return Margins(larger(m1, 0.0), larger(m2, 0.0), larger(m3, 0.0))
 
 
 @jit
 def roots(lengths, margin):
-    """k, l, m, n of (2)."""
+    """`Roots`."""
     b, d, f, e = lengths
     m1, m2, m3 = margin
     k = sqrt(fma(2.0, e, m1) * fma(2.0, e, m2))
     n = sqrt(fma(2.0, b, m1) * fma(2.0, e, m3))
-    return k, sqrt(m1 * m2), sqrt(((b + d) + (f + e)) * m3), n
+    return Roots(k, sqrt(m1 * m2), sqrt(((b + d) + (f + e)) * m3), n)
 
 
 @jit_call
@@ -100,24 +141,16 @@ def angle(y, x):
 
 
 @jit
-def extremes(lengths, root):
-    """A0, A1, eta_plus, eta_minus for type A, of (1) and (2): sums of positive angles."""
+def extremes(lengths, margin, root):
+    """`Angles` for type A: of the arm by (1) and (2), sums of positive angles; of the crank in the same triangles."""
     b, d, f, e = lengths
     k, low, m, n = root
     across = fma(k, n, low * m) * fma(m, n, k * low)
     swing = angle(16.0 * (e * f) * (b * d), where(e > 0.0, across, 1.0))
     minus = 2.0 * angle(low, n)
-    return minus + swing, swing, fma(2.0, swing, minus), minus
-
-
-@jit
-def crank_angles(lengths, margin, root):
-    """theta at eta_plus and at eta_minus, for type A: the angles of the same triangles at the crank's shaft."""
-    b, d, f, e = lengths
-    m1, m2, m3 = margin
-    k, low, m, n = root
-    plus = angle(((b + d) + (f + e)) * fma(2.0, e, m2), k * m)
-    return 2.0 * plus, -2.0 * angle(m1 * fma(2.0, e, m3), low * n)
+    crank_plus = angle(((b + d) + (f + e)) * fma(2.0, e, margin.back), k * m)
+    crank_minus = angle(margin.stretched * fma(2.0, e, margin.front), low * n)
+    return Angles(minus + swing, swing, fma(2.0, swing, minus), minus, 2.0 * crank_plus, -2.0 * crank_minus)
 
 
 @jit
@@ -142,7 +175,7 @@ def _half_angle(y, x):
 
 @jit
 def locks(lengths, margin):
-    """Where the crank locks at abs(theta), nearest to 0 first; NaN where there is no such place.
+    """`Locks`: abs(theta).
 
     d and f stretched stop it towards 0 where b + e > d + f, d and f folded stop it towards pi where
     abs(b-e) < abs(d-f).
@@ -154,7 +187,7 @@ def locks(lengths, margin):
     opposite = (m2 < 0.0) & (m3 > 0.0) | (m2 > 0.0) & (m3 < 0.0)
     folded = _half_angle(over_d * over_f, where(opposite, -m2 * m3, 0.0))
     inner, outer = where(m1 < 0.0, stretched, math.nan), where(opposite, folded, math.nan)
-    return where(m1 < 0.0, inner, outer), where(m1 < 0.0, outer, math.nan)
+    return Locks(where(m1 < 0.0, inner, outer), where(m1 < 0.0, outer, math.nan))
 
 
 @jit
@@ -209,7 +242,7 @@ def square_sums(lengths):
 
 @jit
 def tolerances(lengths, root):
-    """(3): A0_b, A0_d, A1_b, A1_d, A1_f = A0_e and A1_e = A0_f for type A, in units of one over the unit of lengths.
+    """(3) for type A, in units of one over the unit of lengths.
 
     W cancels for the longer of b and d only: there it is taken from Z1 Z2, and the other one is -`apart`.
     """
@@ -225,4 +258,5 @@ def tolerances(lengths, root):
     mean, swing = width / (4.0 * b * d), 4.0 * (e * f) / width
     leverage = fma(f + e, minus, (f - e) * plus)
     coupler = 4.0 * (e * f) * (z1 * z2) / leverage * per_area
-    return mean * arm, mean * frame, swing * frame, swing * arm, coupler, leverage * per_area
+    crank = leverage * per_area
+    return Slopes(mean * arm, mean * frame, crank, coupler, swing * frame, swing * arm, coupler, crank)

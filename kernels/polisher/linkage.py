@@ -14,7 +14,9 @@ from `in_units`, and differences of them are sums without error, so that nothing
 """
 
 import math
+from typing import NamedTuple
 
+from kernels.interface import Field
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import fma, isnt, magnitude, nearest, pow2, sqrt, where
 from kernels.maths.elementary import arctan, mantissa_exponent, sincos
@@ -22,6 +24,68 @@ from kernels.maths.pairs import two_sum
 
 SPAN_LIMIT = 2.0**-120
 """Shortest length over the longest, beyond which products would leave float64."""
+
+PARAMETERS = (
+    Field("b", "m", "distance of the motor's shaft from the arm's pivot", lower=0.0, open_lower=True),
+    Field("d", "m", "arm, from its pivot to the coupler", lower=0.0, open_lower=True),
+    Field("f", "m", "coupler, from the arm to the crank", lower=0.0, open_lower=True),
+    Field("e", "m", "crank, the eccentricity of the motor's pin", lower=0.0),
+    Field(
+        "type",
+        "1",
+        "straight upper link (A) or one bent by 90 degrees (B): the side of the arm",
+        default=0.0,
+        lower=0.0,
+        upper=1.0,
+        choices={"A": 0, "B": 1},
+    ),
+)
+"""Of a linkage."""
+
+EXAMPLE = {"b": 0.6201, "d": 0.38, "f": 0.405, "e": 0.15, "type": 0.0}
+
+
+class Lengths(NamedTuple):
+    """Frame, arm, coupler and crank, over their unit."""
+
+    b: float
+    d: float
+    f: float
+    e: float
+
+
+class Margins(NamedTuple):
+    """d+f-b-e, b+f-e-d and b+d-e-f: all positive where the crank turns fully and is the shortest link."""
+
+    stretched: float
+    back: float
+    front: float
+
+
+class Crank(NamedTuple):
+    """The crank's angle from b, and sine and cosine of its half."""
+
+    theta: float
+    s: float
+    c: float
+
+
+class Squares(NamedTuple):
+    """P^2, Q = P^2 + f^2 - d^2, g = P^2 + d^2 - f^2 and K = d^2 + f^2 - P^2."""
+
+    p2: float
+    q: float
+    g: float
+    k: float
+
+
+@jit
+def allowed(p):
+    """Whether the parameters of a linkage are numbers within their limits; NaN fails."""
+    positive = (p.b > 0.0) & (p.d > 0.0) & (p.f > 0.0) & (p.e >= 0.0)
+    finite = (p.b < math.inf) & (p.d < math.inf) & (p.f < math.inf) & (p.e < math.inf)
+    a_or_b = ((p.type >= 0.0) & (p.type <= 0.0)) | ((p.type >= 1.0) & (p.type <= 1.0))
+    return positive & finite & a_or_b
 
 
 @jit
@@ -51,27 +115,25 @@ def larger(x, y):
 
 
 @jit
-def in_units(b, d, f, e):
-    """The lengths in units of 2^unit, unit, and whether they are not too unequal; the crank e may be 0."""
-    _, unit = mantissa_exponent(larger(larger(b, d), larger(f, e)))
+def in_units(p):
+    """The lengths b, d, f, e of a record in units of 2^unit, unit, and whether they are not too unequal; e may be 0."""
+    _, unit = mantissa_exponent(larger(larger(p.b, p.d), larger(p.f, p.e)))
     half = nearest(0.5 * unit)
     one, other = pow2(-half), pow2(half - unit)
-    lengths = b * one * other, d * one * other, f * one * other, e * one * other
-    fine = (lengths[0] > SPAN_LIMIT) & (lengths[1] > SPAN_LIMIT) & (lengths[2] > SPAN_LIMIT)
-    return lengths, unit, fine & ((lengths[3] > SPAN_LIMIT) | isnt(e > 0.0))
+    lengths = Lengths(p.b * one * other, p.d * one * other, p.f * one * other, p.e * one * other)
+    fine = (lengths.b > SPAN_LIMIT) & (lengths.d > SPAN_LIMIT) & (lengths.f > SPAN_LIMIT)
+    return lengths, unit, fine & ((lengths.e > SPAN_LIMIT) | isnt(p.e > 0.0))
 
 
 @jit
-def margins(b, d, f, e):
-    """d+f-b-e, b+f-e-d and b+d-e-f: all positive where the crank turns fully and is the shortest link.
-
-    What the first two sums lose is added to the third: within 2 ulp of themselves and 2^-106 of the lengths.
-    """
+def margins(lengths):
+    """`Margins` within 2 ulp of themselves and 2^-106 of the lengths: the third sum adds what the first two lose."""
+    b, d, f, e = lengths
     arm, arm_lost = two_sum(d, -b)
     coupler, coupler_lost = two_sum(f, -e)
     front, front_lost = two_sum(b, -f)
     back, back_lost = two_sum(d, -e)
-    return (
+    return Margins(
         (coupler + arm) + (coupler_lost + arm_lost),
         (coupler - arm) + (coupler_lost - arm_lost),
         (front + back) + (front_lost + back_lost),
@@ -85,11 +147,11 @@ def side_of(kind):
 
 
 @jit
-def crank(crank_angle, b_angle):
+def crank_at(crank_angle, b_angle):
     """theta = crank_angle - b_angle, and sine and cosine of its half to an ulp of themselves, for abs(theta) < 1e6."""
     theta, lost = two_sum(crank_angle, -b_angle)
     s, c = sincos(0.5 * theta)
-    return theta, fma(0.5 * lost, c, s), fma(-0.5 * lost, s, c)
+    return Crank(theta, fma(0.5 * lost, c, s), fma(-0.5 * lost, s, c))
 
 
 @jit
@@ -103,7 +165,7 @@ def dead_gaps(lengths, margin, s, c):
 
 @jit
 def squares(lengths, c):
-    """P^2, Q = P^2 + f^2 - d^2, g = P^2 + d^2 - f^2 and K = d^2 + f^2 - P^2, each without two large terms."""
+    """`Squares`, each without two large terms; c: cosine of theta/2."""
     b, d, f, e = lengths
     way = 4.0 * b * e * (c * c)
     near = b - e
@@ -113,13 +175,14 @@ def squares(lengths, c):
     difference = (f - d) * (f + d)
     q = where(f * f < p2, fma(f, f, over_d), p2 + difference)
     g = where(d * d < p2, fma(d, d, over_f), p2 - difference)
-    return p2, q, g, where(d < f, fma(d, d, -over_f), fma(f, f, -over_d))
+    return Squares(p2, q, g, where(d < f, fma(d, d, -over_f), fma(f, f, -over_d)))
 
 
 @jit
-def direction(lengths, theta, s, c):
+def direction(lengths, crank):
     """arg p from b, continuous in theta: between -pi/2 and pi/2 for e <= b, and turning with the crank for e > b."""
-    b, _, _, e = lengths
+    b, e = lengths.b, lengths.e
+    theta, s, c = crank
     turning = e > b
     small, large = where(turning, b, e), where(turning, e, b)
     swing = arctan(2.0 * small * (s * c) / fma(2.0 * small * c, c, large - small))
@@ -127,9 +190,9 @@ def direction(lengths, theta, s, c):
 
 
 @jit
-def opening(d, p2, g, rz):
+def opening(lengths, squared, rz):
     """psi of (1) between 0 and pi: the angle between p and the arm."""
-    double = 2.0 * d * sqrt(p2)
+    double, g = 2.0 * lengths.d * sqrt(squared.p2), squared.g
     obtuse = g < 0.0
     top, bottom = where(obtuse, double - g, rz), where(obtuse, rz, double + g)
     return 2.0 * arctan(top / bottom)
@@ -138,10 +201,9 @@ def opening(d, p2, g, rz):
 @jit
 def rate(lengths, squared, rz, side, s, c):
     """(3): alpha'."""
-    b, _, _, e = lengths
-    p2, q, _, _ = squared
+    b, e = lengths.b, lengths.e
     turn = e * fma(2.0 * b * c, c, e - b)  # e (e + b cos theta)
-    return fma(side * (2.0 * b * e), (s * c) * q / rz, turn) / p2
+    return fma(side * (2.0 * b * e), (s * c) * squared.q / rz, turn) / squared.p2
 
 
 @jit
@@ -153,7 +215,7 @@ def acceleration(lengths, margin, squared, rz, side, s, c):
     alpha'' = (b e/P^2) [sin theta (e^2 - b^2)/P^2 + side (Q (sin theta/rz)' - 2 b e sin^2 theta (d^2 - f^2)/(P^2 rz))]
     """
     b, d, f, e = lengths
-    p2, q, _, _ = squared
+    p2, q = squared.p2, squared.q
     stretched, back, front = margin
     outer, inner = dead_gaps(lengths, margin, s, c)
     sine = 2.0 * s * c
@@ -165,21 +227,22 @@ def acceleration(lengths, margin, squared, rz, side, s, c):
 
 
 @jit_call
-def motion(lengths, margin, side, theta, s, c):
+def motion(lengths, margin, side, crank):
     """alpha from b, alpha' and alpha''; NaN where the linkage is locked.
 
     Parameters
     ----------
-    lengths : (b, d, f, e) of `in_units`
+    lengths : of `in_units`
     margin : of `margins`
     side : of `side_of`
-    theta, s, c : of `crank`
+    crank : of `crank_at`
     """
+    s, c = crank.s, crank.c
     outer, inner = dead_gaps(lengths, margin, s, c)
     free = (outer >= 0.0) & (inner >= 0.0)
     rz = sqrt(where(free, outer * inner, math.nan))
     squared = squares(lengths, c)
-    alpha = direction(lengths, theta, s, c) + side * opening(lengths[1], squared[0], squared[2], rz)
+    alpha = direction(lengths, crank) + side * opening(lengths, squared, rz)
     return (
         alpha,
         rate(lengths, squared, rz, side, s, c),
@@ -188,9 +251,9 @@ def motion(lengths, margin, side, theta, s, c):
 
 
 @jit
-def lock_doubt(lengths, margin, s, c):
+def lock_doubt(lengths, margin, crank):
     """What rounding may come to in rz^2, relatively: large only close to where a linkage that locks does so."""
+    s, c = crank.s, crank.c
     outer, inner = dead_gaps(lengths, margin, s, c)
-    b, _, _, e = lengths
-    bow = 4.0 * b * e
+    bow = 4.0 * lengths.b * lengths.e
     return 1e-15 * larger(bow * (s * s) / magnitude(outer), bow * (c * c) / magnitude(inner))

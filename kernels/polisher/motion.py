@@ -28,15 +28,21 @@ from kernels.lanes.records import read
 from kernels.lanes.vectors import isnt, magnitude, where
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import arctan, sincos
-from kernels.polisher._cell import judged, said
-from kernels.polisher.arm import EXAMPLE as MACHINE
-from kernels.polisher.arm import PARAMETERS as LENGTHS
-from kernels.polisher.arm import allowed
+from kernels.polisher._cell import ROUNDING, judged, said
 from kernels.polisher.extremes import smaller
-from kernels.polisher.linkage import crank, larger, lock_doubt, motion, side_of
+from kernels.polisher.linkage import (
+    EXAMPLE,
+    PARAMETERS,
+    Crank,
+    Margins,
+    allowed,
+    crank_at,
+    larger,
+    lock_doubt,
+    motion,
+    side_of,
+)
 
-ROUNDING = 3e-15
-"""Error over the largest value of the trace; of x and y over L."""
 FARTHEST = 1e6
 """Crank angle, beyond which a radian has lost its digits."""
 RATE_LIMIT = 1e140
@@ -57,6 +63,15 @@ class Machine(NamedTuple):
     beta: float
 
 
+class State(NamedTuple):
+    """The arm's angle from b within a turn, what turns add to it, rate and acceleration at the crank's rate 1."""
+
+    alpha: float
+    turns: float
+    rate: float
+    acceleration: float
+
+
 @jit
 def _within(crank_angle):
     """Whether every angle asked for is a number that has its digits."""
@@ -67,24 +82,29 @@ def _within(crank_angle):
 
 
 @jit
-def _branch(lengths, margin, code):
+def _branch(cell):
     """The margins; those of a change point without what rounding has taken them past 0 by."""
-    m1, m2, m3 = margin
-    flat, long_crank = said(code, CHANGE_POINT), lengths[3] > lengths[0]
+    m1, m2, m3 = cell.margin
+    flat, long_crank = said(cell.code, CHANGE_POINT), cell.lengths.e > cell.lengths.b
     back = where(long_crank, smaller(m2, 0.0), larger(m2, 0.0))
     front = where(long_crank, smaller(m3, 0.0), larger(m3, 0.0))
-    return where(flat, larger(m1, 0.0), m1), where(flat, back, m2), where(flat, front, m3)
+    return Margins(where(flat, larger(m1, 0.0), m1), where(flat, back, m2), where(flat, front, m3))
 
 
 @jit
-def _angles(lengths, margin, side, crank_angle, b_angle):
-    """alpha from b within a turn, what turns add to it, alpha', alpha'', and the doubt close to a lock."""
-    theta, s, c = crank(crank_angle, b_angle)
-    within = 2.0 * arctan(s / c)  # theta in [-pi, pi]
-    alpha, rate, acceleration = motion(lengths, margin, side, within, s, c)
-    turns = where(lengths[3] > lengths[0], theta - within, 0.0)
-    doubt = where(rate - rate >= 0.0, 2.0 * lock_doubt(lengths, margin, s, c), 0.0)
-    return (alpha, turns, rate, acceleration), doubt
+def _state(lengths, margin, side, crank):
+    """The arm's `State` from b on, and the doubt close to a lock."""
+    within = 2.0 * arctan(crank.s / crank.c)  # theta in [-pi, pi]
+    alpha, rate, acceleration = motion(lengths, margin, side, Crank(within, crank.s, crank.c))
+    turns = where(lengths.e > lengths.b, crank.theta - within, 0.0)
+    doubt = where(rate - rate >= 0.0, 2.0 * lock_doubt(lengths, margin, crank), 0.0)
+    return State(alpha, turns, rate, acceleration), doubt
+
+
+@jit
+def _held(fast, limit):
+    """Whether a rate is 0, or within what its power may be."""
+    return ((fast <= limit) & (fast >= 1.0 / limit)) | isnt(fast > 0.0)
 
 
 @jit
@@ -92,23 +112,20 @@ def _follow(first, columns, row):
     """Closed forms of sums without error."""
     i = cells_at(first)
     p = read(Machine, columns, i)
-    lengths, _, margin, code = judged(p.b, p.d, p.f, p.e)
-    margin, side, w = _branch(lengths, margin, code), side_of(p.type), p.omega
-    fast = magnitude(w)
-    rests = isnt(fast > 0.0)
-    rated = ((fast <= RATE_LIMIT * RATE_LIMIT) & (fast >= 1.0 / RATE_LIMIT / RATE_LIMIT)) | rests
-    held = ((fast <= RATE_LIMIT) & (fast >= 1.0 / RATE_LIMIT)) | rests
-    worst = 0.0 * code
+    cell, side, w = judged(p), side_of(p.type), p.omega
+    margin, worst = _branch(cell), 0.0 * cell.code
+    rated, held = _held(magnitude(w), RATE_LIMIT * RATE_LIMIT), _held(magnitude(w), RATE_LIMIT)
     for j in range(columns.crank_angle.size):
-        angles, doubt = _angles(lengths, margin, side, 0.0 * code + columns.crank_angle[j], p.b_angle)
+        crank = crank_at(0.0 * cell.code + columns.crank_angle[j], p.b_angle)
+        arm, doubt = _state(cell.lengths, margin, side, crank)
         worst = larger(worst, doubt)
-        write_row(first, j, p.b_angle + (angles[0] + angles[1]), row, columns.alpha)
-        write_row(first, j, or_none(w * angles[2], rated), row, columns.alpha_rate)
-        write_row(first, j, or_none(w * w * angles[3], held), row, columns.alpha_acceleration)
-        sine, cosine = sincos(p.b_angle + (angles[0] + p.beta))
+        write_row(first, j, p.b_angle + (arm.alpha + arm.turns), row, columns.alpha)
+        write_row(first, j, or_none(w * arm.rate, rated), row, columns.alpha_rate)
+        write_row(first, j, or_none(w * w * arm.acceleration, held), row, columns.alpha_acceleration)
+        sine, cosine = sincos(p.b_angle + (arm.alpha + p.beta))
         write_row(first, j, p.L * cosine, row, columns.x)
         write_row(first, j, p.L * sine, row, columns.y)
-    code = where(said(code, LOCK_UP) & isnt(worst <= columns.rtol[i]), INACCURATE, code)
+    code = where(said(cell.code, LOCK_UP) & isnt(worst <= columns.rtol[i]), INACCURATE, cell.code)
     columns.status[i] = where(_within(columns.crank_angle), partly(held, code), BAD_INPUT)
 
 
@@ -120,7 +137,7 @@ def _row():
 @jit
 def check(p):
     """BAD_INPUT as for `polisher`, and angles beyond a turn."""
-    fine = allowed(p.b, p.d, p.f, p.e, p.type) & (magnitude(p.omega) < math.inf)
+    fine = allowed(p) & (magnitude(p.omega) < math.inf)
     fine = fine & (magnitude(p.b_angle) <= math.tau) & (magnitude(p.beta) <= math.tau)
     return where(fine & (p.L >= 0.0) & (math.inf > p.L), OK, BAD_INPUT)
 
@@ -130,7 +147,7 @@ POLISHER_MOTION = kernel(
     doc="motion of a polishing machine's arm and tool along the crank's angle",
     source="Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (2)-(19), corrected",
     parameters=(
-        *LENGTHS,
+        *PARAMETERS,
         Field("omega", "rad/s", "angular rate of the crank, either way"),
         Field(
             "b_angle",
@@ -159,7 +176,7 @@ POLISHER_MOTION = kernel(
     ),
     record=Machine,
     check=check,
-    # close to a lock the status says more
+    # over the largest value of the trace, of x and y over L; close to a lock the status says more
     methods=(tracing("closed", "closed forms of sums without error", _follow, ROUNDING, buffers=_row),),
-    example=dict(MACHINE) | {"omega": 6.0},
+    example=EXAMPLE | {"omega": 6.0},
 )

@@ -9,7 +9,7 @@ from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.jit import COMPILED, jit
 from kernels.lanes.vectors import where
 from kernels.polisher.extremes import square_sums
-from kernels.polisher.linkage import SPAN_LIMIT, in_units, margins
+from kernels.polisher.linkage import SPAN_LIMIT, Lengths, in_units, margins
 
 N = 640 if COMPILED else 160
 ULP = 2.0**-52
@@ -17,10 +17,10 @@ ULP = 2.0**-52
 
 @jit
 def _solve(i, b, d, f, e, m1, m2, m3, z1, z2, b_own, d_own, f_own, e_own, unit, fine):
-    lengths = b[i], d[i], f[i], e[i]
-    m1[i], m2[i], m3[i] = margins(*lengths)
+    lengths = Lengths(b[i], d[i], f[i], e[i])
+    m1[i], m2[i], m3[i] = margins(lengths)
     z1[i], z2[i] = square_sums(lengths)
-    own, power, even = in_units(*lengths)
+    own, power, even = in_units(lengths)
     b_own[i], d_own[i], f_own[i], e_own[i] = own
     unit[i], fine[i] = power, where(even, 1.0, 0.0)
 
