@@ -17,6 +17,7 @@ from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import exponent, fma, magnitude, sqrt
 from kernels.maths import complex
 from kernels.maths.elementary import is_normal, scale
+from kernels.maths.small_dense import sort
 
 REFINEMENTS = 3
 ROUNDING = 2.0**-50
@@ -159,15 +160,16 @@ def _twins(n, chain, i, j, pole_re, pole_im, ways):
 
 
 @jit
-def _sort(n, pole_re, pole_im):
-    """Ascending size; of a pair, +Im first."""
-    for i in range(1, n):
-        re, im, j = pole_re[i], pole_im[i], i
-        size = re * re + im * im
-        while j > 0 and pole_re[j - 1] * pole_re[j - 1] + pole_im[j - 1] * pole_im[j - 1] > size:
-            pole_re[j], pole_im[j] = pole_re[j - 1], pole_im[j - 1]
-            j -= 1
-        pole_re[j], pole_im[j] = re, im
+def _farther(poles, i, j):
+    re, im = poles
+    return re[i] * re[i] + im[i] * im[i] > re[j] * re[j] + im[j] * im[j]
+
+
+@jit
+def _swap(poles, i, j):
+    re, im = poles
+    re[i], re[j] = re[j], re[i]
+    im[i], im[j] = im[j], im[i]
 
 
 @jit
@@ -232,7 +234,7 @@ def damped_poles(n, J, k, h, frequency, pole_re, pole_im, work):
     told_apart = _paired(n, fixed, pole_re, pole_im, work) and told_apart
     for i in range(2 * n):
         pole_re[i], pole_im[i] = (work[i], work[2 * n + i]) if i >= fixed else (0.0, 0.0)
-    _sort(2 * n, pole_re, pole_im)
+    sort(0, 2 * n, _farther, _swap, (pole_re, pole_im))  # +Im stays before -Im
     for i in range(2 * n):
         pole_re[i] = scale(pole_re[i], 0.5 * (e_k - e_J))
         pole_im[i] = scale(pole_im[i], 0.5 * (e_k - e_J))

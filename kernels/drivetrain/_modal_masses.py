@@ -12,6 +12,7 @@ from kernels.drivetrain._chain_shapes import mode_shapes
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import fma, magnitude, sqrt
 
+TURN = 6.283185307179586
 HOLD = 2.0**80
 """Inertia of a held spindle, over the largest one."""
 
@@ -33,18 +34,21 @@ def fill_rows(W, G, J, k, angle, square, n):
 
 
 @jit_call
-def modal(W, G, w, J, k, frequency, shapes, angle, p, n, work):
-    """The lowest p modes as rows; what the others give way at rest [rad/(N m)] and a status. `angle` is a buffer."""
-    status = mode_shapes(n, J, k, frequency, shapes, work)
-    residual = 0.0
+def modal(modes, chain, p, shapes, angle, work):
+    """The lowest p modes as rows; what the others give way at rest [rad/(N m)] and a status.
+
+    `shapes`, `angle`, `work` : buffers of n n, n and 6 n
+    """
+    n, residual = chain.J.size, 0.0
+    status = mode_shapes(n, chain.J, chain.k, chain.f, shapes, work)
     for i in range(n):
-        w[i] = TURN * frequency[i]
+        modes.w[i] = TURN * chain.f[i]
         if i < p:
             for j in range(n):
                 angle[j] = shapes[j, i]
-            fill_rows(W[i], G[i], J, k, angle, w[i] * w[i], n)
+            fill_rows(modes.W[i], modes.G[i], chain.J, chain.k, angle, modes.w[i] * modes.w[i], n)
         else:
-            residual += (shapes[0, i] / w[i]) * (shapes[0, i] / w[i])
+            residual += (shapes[0, i] / modes.w[i]) * (shapes[0, i] / modes.w[i])
     return residual, status
 
 
@@ -88,6 +92,3 @@ def at_rest(W, G, J, k, n):
         held = whole < float("inf")
         W[j] = sqrt(J[j]) * (along / whole if held else 1.0)
         G[j] = 1.0 / (sqrt(k[j]) * whole) if held else 0.0
-
-
-TURN = 6.283185307179586

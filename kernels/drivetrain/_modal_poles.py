@@ -5,9 +5,9 @@ and the roots found already kept away,  s -= N/(1 - N sum_j 1/(s - s_j)).
 Starts from the undamped frequencies. Source: Bini & Noferini, Linear Algebra Appl. 439:1130 (2013).
 """
 
-from kernels.drivetrain._rivin_exact_model import over
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import fma, magnitude, sqrt
+from kernels.maths.small_dense import eliminate, over, size, sort, substitute_back
 
 ITERATION_LIMIT = 100
 POLISH = 2
@@ -27,36 +27,14 @@ def _fill(A, B, s, w, C, p):
 
 
 @jit_call
-def _logarithmic_slope(A, B, b, p):
+def _logarithmic_slope(A, B, p):
     """Trace of A^-1 B, by elimination; NaN where A is singular. Uses up A and B."""
-    for i in range(p):
-        best = i
-        for r in range(i + 1, p):
-            if _size(A[r, i]) > _size(A[best, i]):
-                best = r
-        for c in range(p):
-            A[i, c], A[best, c] = A[best, c], A[i, c]
-            B[i, c], B[best, c] = B[best, c], B[i, c]
-        for r in range(i + 1, p):
-            factor = over(A[r, i], A[i, i])
-            for c in range(i + 1, p):
-                A[r, c] -= factor * A[i, c]
-            for c in range(p):
-                B[r, c] -= factor * B[i, c]
+    eliminate(A, B, p, p)
     total = 0.0j
     for column in range(p):
-        for i in range(p - 1, column - 1, -1):
-            b[i] = B[i, column]
-            for c in range(i + 1, p):
-                b[i] -= A[i, c] * b[c]
-            b[i] = over(b[i], A[i, i])
-        total += b[column]
+        substitute_back(A, B, column, column, p)
+        total += B[column, column]
     return total
-
-
-@jit
-def _size(z):
-    return magnitude(z.real) + magnitude(z.imag)
 
 
 @jit
@@ -82,37 +60,37 @@ def _repulsion(s, k, count):
     for j in range(count):
         if j != k:
             away = s[k] - s[j]
-            total += over(1.0 + 0.0j, away if _size(away) > 0.0 else complex(1e-3 * _size(s[k]), 0.0))
+            total += over(1.0 + 0.0j, away if size(away) > 0.0 else complex(1e-3 * size(s[k]), 0.0))
     return total
 
 
 @jit
-def _improve(s, k, w, C, p, A, B, b):
+def _improve(s, k, w, C, p, A, B):
     """One step of root k; its relative size, and that of Newton's step alone. Exactly on a root there is none."""
     _fill(A, B, s[k], w, C, p)
-    slope = _logarithmic_slope(A, B, b, p)
-    if not _size(slope) < float("inf"):
+    slope = _logarithmic_slope(A, B, p)
+    if not size(slope) < float("inf"):
         return 0.0, 0.0
     newton = over(1.0 + 0.0j, slope)
     change = over(newton, 1.0 - newton * _repulsion(s, k, 2 * p))
-    size = _size(s[k])
+    before = size(s[k])
     s[k] -= change
-    return _size(change) / size, _size(newton) / size
-
-
-@jit_call
-def _sort(s, first, count):
-    """By rising modulus; of a conjugate pair the upper one first, where both are as large."""
-    for i in range(first + 1, count):
-        j = i
-        while j > first and _modulus(s[j]) < _modulus(s[j - 1]):
-            s[j], s[j - 1] = s[j - 1], s[j]
-            j -= 1
+    return size(change) / before, size(newton) / before
 
 
 @jit
 def _modulus(z):
     return sqrt(fma(z.real, z.real, z.imag * z.imag))
+
+
+@jit
+def _farther(s, i, j):
+    return _modulus(s[i]) > _modulus(s[j])
+
+
+@jit
+def _swap(s, i, j):
+    s[i], s[j] = s[j], s[i]
 
 
 @jit
@@ -122,7 +100,7 @@ def _write(s, known, p, blur, pole_re, pole_im):
     for k in range(known):
         pole_re[k], pole_im[k] = 0.0, 0.0
     for k in range(known, 2 * p):
-        real = magnitude(s[k].imag) <= blur * _size(s[k])
+        real = magnitude(s[k].imag) <= blur * size(s[k])
         needed = 1 if real else 2
         if (real or s[k].imag > 0.0) and filled + needed <= 2 * p:
             pole_re[filled], pole_im[filled] = s[k].real, 0.0 if real else s[k].imag
@@ -133,11 +111,11 @@ def _write(s, known, p, blur, pole_re, pole_im):
 
 
 @jit_call
-def modal_poles(w, C, p, free, pole_re, pole_im, s, A, B, b):
+def modal_poles(w, C, p, free, pole_re, pole_im, s, A, B):
     """All 2 p poles [rad/s], conjugates together; a bound on their relative error, inf where they did not come.
 
     `free` : whether mode 0 is a free motion, w = 0: one pole is 0, and a second one if nothing damps it
-    `s`, `A`, `B`, `b` : complex buffers
+    `s`, `A`, `B` : complex buffers
     """
     known = 0
     if free:
@@ -147,13 +125,13 @@ def modal_poles(w, C, p, free, pole_re, pole_im, s, A, B, b):
     for _ in range(ITERATION_LIMIT):
         worst, error = 0.0, 0.0
         for k in range(known, 2 * p):
-            change, newton = _improve(s, k, w, C, p, A, B, b)
+            change, newton = _improve(s, k, w, C, p, A, B)
             worst, error = max(worst, change), max(error, newton)
         if worst <= _SETTLED:
             left -= 1
         if left == 0:
             break
     blur = 2.0 * p * max(error, _ROUNDING)  # a root lies within 2 p Newton steps
-    _sort(s, known, 2 * p)
+    sort(known, 2 * p, _farther, _swap, s)  # of a conjugate pair the upper one stays first
     whole = _write(s, known, p, blur, pole_re, pole_im)
     return blur if whole and left == 0 else float("inf")

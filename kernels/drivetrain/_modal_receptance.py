@@ -5,10 +5,10 @@ strains d. It moves as x = sum phi_i q_i,
     q_i'' + sum_j c_ij q_j' + w_i^2 q_i = phi_i M.                                                   (1)
 """
 
-from kernels.drivetrain._rivin_exact_model import over, spindle_receptance
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import fma, magnitude, sqrt
+from kernels.lanes.vectors import fma, sqrt
 from kernels.maths.elementary import exp, log
+from kernels.maths.small_dense import eliminate, over, substitute_back
 
 AROUND = (-16.0, -8.0, -4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 """Where a resonance is looked at, in its half widths."""
@@ -17,12 +17,13 @@ GRID = 96
 
 
 @jit_call
-def damping_matrix(C, W, G, J, k, h, p, n):
+def damping_matrix(C, W, G, chain, p):
     """c_ij of (1) from rows W, G; a damper without a spring, at a free end, is strained by its mass's angle."""
+    J, k, h = chain.J, chain.k, chain.h
     for i in range(p):
         for j in range(i, p):
             total = 0.0
-            for c in range(n):
+            for c in range(J.size):
                 if h[c] > 0.0:
                     by_spring = k[c] > 0.0
                     strains = G[i, c] * G[j, c] if by_spring else W[i, c] * W[j, c]
@@ -30,48 +31,29 @@ def damping_matrix(C, W, G, J, k, h, p, n):
             C[i, j] = C[j, i] = total
 
 
-@jit
-def _swap_rows(A, b, i, j, p):
-    for c in range(p):
-        A[i, c], A[j, c] = A[j, c], A[i, c]
-    b[i], b[j] = b[j], b[i]
-
-
 @jit_call
-def solve_in_place(A, b, p):
-    """b := A^-1 b for complex A, by elimination with the largest pivot of each column."""
-    for i in range(p):
-        best, largest = i, 0.0
-        for r in range(i, p):
-            size = magnitude(A[r, i].real) + magnitude(A[r, i].imag)
-            if size > largest:
-                best, largest = r, size
-        if best != i:
-            _swap_rows(A, b, i, best, p)
-        for r in range(i + 1, p):
-            factor = over(A[r, i], A[i, i])
-            for c in range(i + 1, p):
-                A[r, c] -= factor * A[i, c]
-            b[r] -= factor * b[i]
-    for i in range(p - 1, -1, -1):
-        for c in range(i + 1, p):
-            b[i] -= A[i, c] * b[c]
-        b[i] = over(b[i], A[i, i])
-
-
-@jit_call
-def modal_receptance(w, frequencies, shape, C, p, A, b):
-    """Receptance of the spindle by (1); `A` and `b` are complex buffers."""
+def modal_receptance(w, modes, p, A, B):
+    """Receptance of the spindle by (1); `A` and `B` are square complex buffers."""
     for i in range(p):
         for j in range(p):
-            A[i, j] = complex(0.0, w * C[i, j])
-        A[i, i] += (frequencies[i] - w) * (frequencies[i] + w)
-        b[i] = complex(shape[i], 0.0)
-    solve_in_place(A, b, p)
+            A[i, j] = complex(0.0, w * modes.C[i, j])
+        A[i, i] += (modes.w[i] - w) * (modes.w[i] + w)
+        B[i, 0] = complex(modes.spindle[i], 0.0)
+    eliminate(A, B, p, 1)
+    substitute_back(A, B, 0, 0, p)
     total = 0.0j
     for i in range(p):
-        total += shape[i] * b[i]
+        total += modes.spindle[i] * B[i, 0]
     return total
+
+
+@jit
+def spindle_receptance(J, K, w_square, m):
+    """Angle of the first of m masses over a torque on it, the other end held by K_m."""
+    below = K[m - 1] - w_square * J[m - 1]
+    for j in range(m - 2, -1, -1):
+        below = K[j] * over(below, K[j] + below) - w_square * J[j]
+    return over(1.0 + 0.0j, below)
 
 
 @jit_call
@@ -105,20 +87,6 @@ def sample_poles(at, filled, w_max, pole_re, pole_im, count):
                     at[filled] = w
                     filled += 1
     return filled
-
-
-@jit_call
-def sort(values, count):
-    """Rising order of `count` values; Shell's gaps, so that a thousand take some ten thousand steps."""
-    gap = count // 2
-    while gap > 0:
-        for i in range(gap, count):
-            value, j = values[i], i
-            while j >= gap and values[j - gap] > value:
-                values[j] = values[j - gap]
-                j -= gap
-            values[j] = value
-        gap //= 2
 
 
 @jit

@@ -9,6 +9,7 @@ Source: Demmel & Veselic, SIAM J. Matrix Anal. Appl. 13:1204 (1992).
 
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import fma, magnitude, sqrt
+from kernels.maths.small_dense import sort
 
 SWEEP_LIMIT = 40
 _ORTHOGONAL = 2e-16  # cosine below which two rows are orthogonal, times the root of their length
@@ -98,23 +99,17 @@ def _make_orthonormal(W, G, first, p, n):
 
 
 @jit
-def _swap(rows, i, j, n):
-    for c in range(n):
-        rows[i, c], rows[j, c] = rows[j, c], rows[i, c]
+def _is_higher(modes, i, j):
+    return modes[0][i] > modes[0][j]
 
 
-@jit_call
-def _sort(w, W, G, first, p, n):
-    """By rising frequency."""
-    for i in range(first, p - 1):
-        least = i
-        for j in range(i + 1, p):
-            if w[j] < w[least]:
-                least = j
-        if least != i:
-            w[i], w[least] = w[least], w[i]
-            _swap(W, i, least, n)
-            _swap(G, i, least, n)
+@jit
+def _swap_modes(modes, i, j):
+    w, W, G = modes
+    w[i], w[j] = w[j], w[i]
+    for c in range(W.shape[1]):
+        W[i, c], W[j, c] = W[j, c], W[i, c]
+        G[i, c], G[j, c] = G[j, c], G[i, c]
 
 
 @jit_call
@@ -146,5 +141,5 @@ def ritz(W, G, p, n, free, w, before, sizes):
     w[0] = 0.0
     for i in range(first, p):
         w[i] = length(G[i], n)
-    _sort(w, W, G, first, p, n)
+    sort(first, p, _is_higher, _swap_modes, (w, W, G))
     return _worst(condition, w, before, sizes, W, first, p, n) if reached else float("inf")

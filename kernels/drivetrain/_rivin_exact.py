@@ -1,7 +1,14 @@
-"""Natural frequencies of the chain whose masses and springs depend on the frequency: those of the chain it replaces.
+"""Rivin's reduction without error: partial systems are replaced by what acts alike at one frequency.
 
-At w the steps of `_rivin_exact_model` leave p masses. Each step exchanges unknowns by elimination, so nothing is lost
-of the signs of its pivots (Sylvester, Haynsworth); with the negative ones of all of these counted,
+With K_j = k_j + i w h_j and mu = 1 - (w/w0)^2 the static equivalents of `_rivin_merging` become exact:
+    a: J* = J K_{j-1}/S, J** = J K_j/S, K* = K_{j-1} K_j/S,  S = K_{j-1} + K_j - w^2 J,
+    b: mu times J_j + J_{j+1}, K_left and K_right.
+Rivin's rule is mu = 1. The chain of p masses has every frequency of the full one; its masses and springs are
+complex, and infinite where w is the frequency w0 of an undamped partial system.
+What dangles at the free end carries the spindle's angle: its flexibility is added to that of the chain.
+
+The natural frequencies are those of the chain without dampers. Each step exchanges unknowns by elimination, so nothing
+is lost of the signs of its pivots (Sylvester, Haynsworth); with the negative ones of all of these counted,
     N(w) = pivots of the p masses + those of the steps
 frequencies are below w (Wittrick & Williams). The pivots of a step are
     a: K_(j-1) + K_j - w^2 J_j,                                                                      (1)
@@ -16,10 +23,13 @@ in pairs, which have 32.
 Source: Wittrick & Williams, Q. J. Mech. Appl. Math. 24:263 (1971); (2) derived here.
 """
 
+from kernels.drivetrain._modal_receptance import spindle_receptance
 from kernels.drivetrain._rivin_merging import TYPE_A
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude, sqrt
-from kernels.maths.pairs import add, negative, over, times, two_product
+from kernels.maths import pairs
+from kernels.maths.pairs import add, negative, times, two_product
+from kernels.maths.small_dense import over
 
 STEP_LIMIT = 400
 """Counts for one frequency; 15 to 25 are usual."""
@@ -62,7 +72,7 @@ def _without_mass(J, K, square, j, m):
     """Type a at mass j of m; how many of its pivots (1) are negative."""
     own, left, right = _take(J, j), _take(K, j - 1), _take(K, j)
     pivot = _sum(add(left, right), negative(times(square, own)))
-    to_left, to_right = over(left, pivot), over(right, pivot)
+    to_left, to_right = pairs.over(left, pivot), pairs.over(right, pivot)
     _put(J, j - 1, add(_take(J, j - 1), times(own, to_left)))
     if j + 1 < m:
         _put(J, j + 1, add(_take(J, j + 1), times(own, to_right)))
@@ -76,14 +86,14 @@ def _without_spring(J, K, square, j, m):
     """Type b at spring j of m; how many of its pivots (2) are negative."""
     own, first, second, beyond = _take(K, j), _take(J, j), _take(J, j + 1), _take(K, j + 1)
     between = _negatives(own) + _negatives(first) + _negatives(second)
-    both = _sum(add(first, second), negative(times(times(square, first), over(second, own))))
-    K_left, K_right = times(own, over(both, second)), times(own, over(both, first))
+    both = _sum(add(first, second), negative(times(times(square, first), pairs.over(second, own))))
+    K_left, K_right = times(own, pairs.over(both, second)), times(own, pairs.over(both, first))
     left, right = K_left, _sum(K_right, beyond)
     if j > 0:
         before = _take(K, j - 1)
         left = _sum(K_left, before)
-        _put(K, j - 1, times(before, over(K_left, left)))
-    _put(K, j + 1, times(beyond, over(K_right, right)))
+        _put(K, j - 1, times(before, pairs.over(K_left, left)))
+    _put(K, j + 1, times(beyond, pairs.over(K_right, right)))
     _put(J, j + 1, both)
     _close_gap(J, K, j, m)
     return _negatives(left) + _negatives(right) - between % 2
@@ -108,7 +118,7 @@ def count_below(w, J, k, kinds, places, p, J_w, K_w):
         if j < p - 1:
             pivot = _sum(spring, below)
             count += _negatives(pivot)
-            spring = times(spring, over(below, pivot))
+            spring = times(spring, pairs.over(below, pivot))
         below = add(spring, negative(times(square, _take(J_w, j))))
     return count + _negatives(below), below[0]
 
@@ -165,3 +175,48 @@ def exact_frequencies(J, k, kinds, places, p, frequency, J_w, K_w):
         else:
             w, low = _find(i, low, high, J, k, kinds, places, p, J_w, K_w)
             frequency[i] = _TURNS * w
+
+
+@jit
+def _remove_mass(J, K, w_square, j, m):
+    """Type a at mass j of m."""
+    total = K[j - 1] + K[j] - w_square * J[j]
+    J[j - 1] += J[j] * over(K[j - 1], total)
+    if j + 1 < m:
+        J[j + 1] += J[j] * over(K[j], total)
+    K[j - 1] = K[j - 1] * over(K[j], total)
+    for i in range(j, m - 1):
+        J[i], K[i] = J[i + 1], K[i + 1]
+
+
+@jit
+def _remove_spring(J, K, w_square, j, m):
+    """Type b at spring j of m; the flexibility that dangles at the free end."""
+    total = J[j] + J[j + 1]
+    reduced = J[j] * over(J[j + 1], total)
+    mu = 1.0 - w_square * over(reduced, K[j])
+    K_left, K_right = mu * K[j] * over(total, J[j + 1]), mu * K[j] * over(total, J[j])
+    J[j], K[j] = mu * total, K_right * over(K[j + 1], K_right + K[j + 1])
+    if j > 0:
+        K[j - 1] = K[j - 1] * over(K_left, K[j - 1] + K_left)
+    for i in range(j + 1, m - 1):
+        J[i], K[i] = J[i + 1], K[i + 1]
+    return over(1.0 + 0.0j, K_left) if j == 0 else 0.0j
+
+
+@jit_call
+def receptance(w, J, k, h, kinds, places, n_kept, J_w, K_w):
+    """Receptance of the spindle from the chain of n_kept masses at the angular frequency w.
+
+    `kinds`, `places` : the systems replaced, in order; `J_w`, `K_w` : complex buffers
+    """
+    n = J.size
+    for j in range(n):
+        J_w[j], K_w[j] = complex(J[j], 0.0), complex(k[j], w * h[j])
+    dangling = 0.0j
+    for m in range(n, n_kept, -1):
+        if kinds[n - m] == TYPE_A:
+            _remove_mass(J_w, K_w, w * w, int(places[n - m]), m)
+        else:
+            dangling += _remove_spring(J_w, K_w, w * w, int(places[n - m]), m)
+    return dangling + spindle_receptance(J_w, K_w, w * w, n_kept)

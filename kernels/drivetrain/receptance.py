@@ -13,22 +13,35 @@ PARTLY_OUT_OF_RANGE, or OUT_OF_RANGE where no other frequency is left.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from kernels.drivetrain import _chain_receptance
 from kernels.drivetrain._chain import refusal as chain_refusal
 from kernels.drivetrain._chain_frequencies import row_at
-from kernels.interface import Field, Kernel, Method
+from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, INACCURATE, OK, OUT_OF_RANGE, PARTLY_OUT_OF_RANGE
-from kernels.lanes.columns import entry_of_cells, one_by_one
+from kernels.lanes.columns import cell_by_cell
 from kernels.lanes.groups import GROUP
 from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.records import read
 from kernels.lanes.vectors import nearest, where
+from kernels.lanes.wiring import kernel, tracing
 from kernels.maths import complex
 from kernels.maths.elementary import is_normal, log
 
 _TWO_PI, _DB = 2.0 * math.pi, 20.0 / math.log(10.0)
+
+
+class Drive(NamedTuple):
+    """Parameters: the chain, and the numbers of the inertias with the torque and with the angle."""
+
+    J: np.ndarray
+    k: np.ndarray
+    h: np.ndarray
+    drive_mass: float
+    read_mass: float
 
 
 @jit_call
@@ -39,22 +52,28 @@ def _write(i, j, lanes, sound, values, output, rows):
         output[i, j + lane] = rows[lane]
 
 
-@jit_call
-def _group(i, j, J, k, h, drive, read, frequency, outputs, rows):
-    """Outputs at frequencies j ... j + GROUP - 1 of a cell; their largest error, and at how many there are any."""
-    n, lanes = J.shape[1], min(GROUP, frequency.size - j)
+@jit
+def _omega(j, frequency, rows):
+    """Angular frequencies j ... j + GROUP - 1, the last one again beyond the end."""
     for lane in range(GROUP):
         rows[lane] = frequency[min(j + lane, frequency.size - 1)]
-    omega = rows[row_at(0)] * _TWO_PI
-    re, im, error = _chain_receptance.receptance(n, J[i], k[i], h[i], omega, drive, read, row_at, rows)
+    return rows[row_at(0)] * _TWO_PI
+
+
+@jit_call
+def _group(i, j, p, columns, rows):
+    """Outputs at frequencies j ... j + GROUP - 1 of a cell; their largest error, and at how many there are any."""
+    lanes, drive, read = min(GROUP, columns.frequency.size - j), int(p.drive_mass), int(p.read_mass)
+    omega = _omega(j, columns.frequency, rows)
+    re, im, error = _chain_receptance.receptance(p.J.size, p.J, p.k, p.h, omega, drive, read, row_at, rows)
     amplitude = complex.modulus(re, im)
     sound = is_normal(amplitude) & (error < math.inf)
     decibel = _DB * log(where(sound, amplitude, 1.0))
-    _write(i, j, lanes, sound, re, outputs[0], rows)
-    _write(i, j, lanes, sound, im, outputs[1], rows)
-    _write(i, j, lanes, sound, amplitude, outputs[2], rows)
-    _write(i, j, lanes, sound, complex.argument(re, im), outputs[3], rows)
-    _write(i, j, lanes, sound, decibel, outputs[4], rows)
+    _write(i, j, lanes, sound, re, columns.receptance_re, rows)
+    _write(i, j, lanes, sound, im, columns.receptance_im, rows)
+    _write(i, j, lanes, sound, amplitude, columns.amplitude, rows)
+    _write(i, j, lanes, sound, complex.argument(re, im), columns.phase, rows)
+    _write(i, j, lanes, sound, decibel, columns.amplitude_dB, rows)
     rows[row_at(0)] = where(sound, error, -1.0)
     largest, given = 0.0, 0
     for lane in range(lanes):
@@ -64,24 +83,19 @@ def _group(i, j, J, k, h, drive, read, frequency, outputs, rows):
 
 
 @jit
-def _cell(i, J, k, h, drive, read, rtol, frequency, re, im, amplitude, phase, decibel, status, rows):
-    outputs, error, given = (re, im, amplitude, phase, decibel), 0.0, 0
-    for j in range(0, frequency.size, GROUP):
-        worst, there = _group(i, j, J, k, h, int(drive[i]), int(read[i]), frequency, outputs, rows)
-        error, given = max(error, worst), given + there
-    verdict = OK if given == frequency.size else PARTLY_OUT_OF_RANGE
-    status[i] = where(error <= rtol[i], verdict, INACCURATE) if given > 0 else OUT_OF_RANGE
-
-
-@entry_of_cells
-def continued(
-    J, k, h, drive_mass, read_mass, rtol, frequency,
-    receptance_re, receptance_im, amplitude, phase, amplitude_dB, status,
-):  # fmt: skip
+def _follow(i, columns, rows):
     """Both ends followed to the inertia that is turned, GROUP frequencies at a time: they share their chain."""
-    rows = np.empty(3 * J.shape[1] * GROUP)
-    outputs = receptance_re, receptance_im, amplitude, phase, amplitude_dB
-    one_by_one(_cell, (J, k, h, drive_mass, read_mass, rtol, frequency, *outputs, status, rows))
+    p, error, given = read(Drive, columns, i), 0.0, 0
+    for j in range(0, columns.frequency.size, GROUP):
+        worst, there = _group(i, j, p, columns, rows)
+        error, given = max(error, worst), given + there
+    verdict = OK if given == columns.frequency.size else PARTLY_OUT_OF_RANGE
+    columns.status[i] = where(error <= columns.rtol[i], verdict, INACCURATE) if given > 0 else OUT_OF_RANGE
+
+
+@jit
+def _rows(columns):
+    return (np.empty(3 * columns.J.shape[1] * GROUP),)
 
 
 @jit
@@ -90,19 +104,14 @@ def _names_a_mass(number, n):
 
 
 @jit
-def _check(i, J, k, h, drive, read, status):
-    n = J.shape[1]
-    sound = _names_a_mass(drive[i], n) & _names_a_mass(read[i], n)
-    status[i] = where(sound, chain_refusal(n, J[i], k[i], h[i]), BAD_INPUT)
-
-
-@entry_of_cells
-def check(J, k, h, drive_mass, read_mass, status):
+def check(p):
     """BAD_INPUT where an inertia or spring is not positive (the last spring may be 0), a damper negative, no such mass.
 
     OUT_OF_RANGE where inertias, or springs, are more than 2^300 apart.
     """
-    one_by_one(_check, (J, k, h, drive_mass, read_mass, status))
+    n = p.J.size
+    sound = _names_a_mass(p.drive_mass, n) & _names_a_mass(p.read_mass, n)
+    return where(sound, chain_refusal(n, p.J, p.k, p.h), BAD_INPUT)
 
 
 PARAMETERS = (
@@ -121,8 +130,8 @@ MILLING_MACHINE = {
 }
 """Drive of a milling machine, spindle first (Baran & Marchelek, Mech. Teor. Stos. 9:201 (1971), table 1, in SI)."""
 
-DRIVETRAIN_FRF = Kernel(
-    name="drivetrain_frf",
+DRIVETRAIN_FRF = kernel(
+    "drivetrain_frf",
     doc="angle of one inertia of a drivetrain per torque at another, against frequency",
     source="drivetrain of a milling machine after Rivin; solution and error bound derived in `_chain_receptance`",
     parameters=(
@@ -137,8 +146,15 @@ DRIVETRAIN_FRF = Kernel(
         Field("phase", "rad", "angle of the receptance, in [-pi, pi): negative where it lags", dims=("frequency",)),
         Field("amplitude_dB", "1", "amplitude over 1 rad/(N m), in decibel", dims=("frequency",)),
     ),
+    record=Drive,
     check=check,
-    methods=(Method("continued", "the chain followed from both ends at each frequency", continued),),
+    loop=cell_by_cell,
+    methods=(
+        tracing(
+            "continued", "the chain followed from both ends at each frequency", _follow,
+            buffers=_rows, loop=cell_by_cell,
+        ),
+    ),
     along=(Field("frequency", "Hz", "frequency of the torque", lower=0.0),),
     example=MILLING_MACHINE,
-)
+)  # fmt: skip

@@ -21,30 +21,47 @@ frequency_error of 1e-6 is one to 1e-6 +- rtol.
 """
 
 import math
+from typing import NamedTuple
 
+import numpy as np
+
+from kernels.drivetrain import _reductions
 from kernels.drivetrain._chain import MASS_LIMIT, refusal
 from kernels.drivetrain._chain_frequencies import natural_frequencies
 from kernels.drivetrain._chain_poles import modal_damping
-from kernels.drivetrain._error import reduced, whole
+from kernels.drivetrain._error import exact, reduced, whole
 from kernels.drivetrain._modal_masses import TURN
-from kernels.drivetrain._model import EXACT, RIVIN, new_chain, new_modes, new_rooms, off_by, take_units
-from kernels.interface import Field, Kernel, Method
+from kernels.drivetrain._model import Wanted, chain_scene, modal_scene, off_by, take_units, whole_scene
+from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, DAMPERS_OUT_OF_RANGE, INACCURATE, OK
-from kernels.lanes.columns import entry_of_cells
+from kernels.lanes.columns import cell_by_cell
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.ranges import partly
+from kernels.lanes.records import read
 from kernels.lanes.vectors import magnitude, nearest
+from kernels.lanes.wiring import kernel, split, tracing
 from kernels.maths.elementary import in_unit, is_normal, scale
 
 REDUCTIONS = {"none": 0, "rivin": 1, "guyan": 2, "irs": 3, "craig_bampton": 4, "modal": 5, "exact": 6}
 ORDERS = {"strict": 0, "paper": 1}
-FIRST_OUTPUT = 9
-"""Columns of parameters and of rtol."""
 _REDUCTIONS, _ORDERS = float(len(REDUCTIONS)), float(len(ORDERS))
 EVERYTHING = 1e300
 """Band [Hz] that holds every frequency."""
 SMALL_PHASE = 0.1
 """w h e up to which (w h e)^2 << 1."""
+
+
+class Drivetrain(NamedTuple):
+    """Parameters: the chain, and what it is to be reduced to."""
+
+    J: np.ndarray
+    k: np.ndarray
+    h: np.ndarray
+    reduction: float
+    n_keep: float
+    tol: float
+    f_max: float
+    order: float
 
 
 @jit
@@ -55,119 +72,88 @@ def _held(x, e):
 
 
 @jit_call
-def _write_modes(i, count, e, full, kept, of_poles, frequency, frequency_error, damping):
+def _clear(i, columns):
+    """Every output of a cell to NaN."""
+    for j in range(columns.J.shape[1]):
+        columns.frequency[i, j] = columns.frequency_error[i, j] = columns.damping[i, j] = math.nan
+        columns.J_kept[i, j] = columns.k_kept[i, j] = columns.h_kept[i, j] = math.nan
+    columns.n_kept[i] = columns.frf_error[i] = columns.valid_to[i] = math.nan
+
+
+@jit_call
+def _write_modes(i, columns, count, e, scene):
     """Frequencies, their errors and the damping, in Hz. Whether all are in range."""
-    fine = True
+    fine, full, kept = True, scene.full, scene.kept
     for mode in range(count):
-        frequency[i, mode] = _held(kept.f[mode], e)
-        frequency_error[i, mode] = off_by(kept.f[mode], full.f[mode])
-        fine = fine and frequency[i, mode] >= 0.0
-    modal_damping(count, kept.re, kept.im, of_poles, damping[i])
+        columns.frequency[i, mode] = _held(kept.f[mode], e)
+        columns.frequency_error[i, mode] = off_by(kept.f[mode], full.f[mode])
+        fine = fine and columns.frequency[i, mode] >= 0.0
+    modal_damping(count, kept.re, kept.im, scene.spare.work, columns.damping[i])
     return fine
 
 
 @jit_call
-def _write_chain(i, p, e_J, e_k, kept, J_kept, k_kept, h_kept):
+def _write_chain(i, columns, p, e_J, e_k, kept):
     """The reduced chain in SI units. Whether all is in range."""
     fine = True
     for j in range(p):
-        J_kept[i, j], k_kept[i, j] = _held(kept.J[j], e_J), _held(kept.k[j], e_k)
-        h_kept[i, j] = _held(kept.h[j], 0.5 * (e_J + e_k))
-        fine = fine and J_kept[i, j] >= 0.0 and k_kept[i, j] >= 0.0 and h_kept[i, j] >= 0.0
+        J, k, h = _held(kept.J[j], e_J), _held(kept.k[j], e_k), _held(kept.h[j], 0.5 * (e_J + e_k))
+        columns.J_kept[i, j], columns.k_kept[i, j], columns.h_kept[i, j] = J, k, h
+        fine = fine and J >= 0.0 and k >= 0.0 and h >= 0.0
     return fine
 
 
-@jit_call
-def _solve_cell(
-    i, J, k, h, reduction, n_keep, tol, f_max, order, rtol,
-    frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status,
-    model, full, kept, modes, rooms,
-):  # fmt: skip
-    """One cell at a time: the number of masses, the choice of what goes and every loop differ from cell to cell."""
-    n, code = J.shape[1], int(reduction[i])
-    for j in range(n):
-        frequency[i, j], frequency_error[i, j], damping[i, j] = math.nan, math.nan, math.nan
-        J_kept[i, j], k_kept[i, j], h_kept[i, j] = math.nan, math.nan, math.nan
-    n_kept[i], frf_error[i], valid_to[i] = math.nan, math.nan, math.nan
-    e_J, e_k = take_units(J[i], k[i], h[i], full)
-    e = 0.5 * (e_k - e_J)
-    band = in_unit(f_max[i], e)
-    verdict = natural_frequencies(n, full.J, full.k, full.f, rooms.work)
-    if verdict > OK:
-        status[i] = int(verdict)
-        return
-    p, slower, off, error, verdict = model(code, n_keep[i], tol[i], band, order[i], full, kept, modes, rooms)
-    if verdict > OK:
-        status[i] = int(verdict)
-        return
-    count = n if code == EXACT else p
-    fine = _write_modes(i, count, e, full, kept, rooms.angle, frequency, frequency_error, damping)
-    if code in (0, RIVIN, EXACT):
-        fine = _write_chain(i, p, e_J, e_k, kept, J_kept, k_kept, h_kept) and fine
-    n_kept[i], frf_error[i] = p, off
-    limit = SMALL_PHASE / (TURN * slower) if slower > 0.0 else math.inf
-    valid_to[i] = scale(limit, e) if slower > 0.0 else f_max[i]
-    verdict = (OK if limit >= band else DAMPERS_OUT_OF_RANGE) if error <= rtol[i] else INACCURATE
-    status[i] = int(partly(fine, verdict))
+@jit
+def _verdict(outcome, band, rtol):
+    """Whether bound and dampers hold; the frequency up to which the dampers do, without units."""
+    limit = SMALL_PHASE / (TURN * outcome.slower) if outcome.slower > 0.0 else math.inf
+    if not outcome.error <= rtol:
+        return INACCURATE, limit
+    return OK if limit >= band else DAMPERS_OUT_OF_RANGE, limit
 
 
-@jit_call
-def _solve_cells(
-    J, k, h, reduction, n_keep, tol, f_max, order, rtol,
-    frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status,
-    model,
-):  # fmt: skip
-    n = J.shape[1]
-    full, kept, modes, rooms = new_chain(n), new_chain(n), new_modes(n), new_rooms(n)
-    for i in range(J.shape[0]):
-        _solve_cell(
-            i, J, k, h, reduction, n_keep, tol, f_max, order, rtol,
-            frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status,
-            model, full, kept, modes, rooms,
-        )  # fmt: skip
+def _filling(solve, reduction, is_chain):
+    """Fills a cell by `solve(wanted, scene, reduction)`: the choice of what goes and every loop differ by the cell."""
+
+    @jit
+    def fill(i, columns, scene):
+        _clear(i, columns)
+        p, full = read(Drivetrain, columns, i), scene.full
+        e_J, e_k = take_units(p.J, p.k, p.h, full)
+        e = 0.5 * (e_k - e_J)
+        wanted = Wanted(p.n_keep, p.tol, in_unit(p.f_max, e), p.order)
+        status = natural_frequencies(p.J.size, full.J, full.k, full.f, scene.spare.work)
+        if status > OK:
+            columns.status[i] = status
+            return
+        found = solve(wanted, scene, reduction)
+        if found.status > OK:
+            columns.status[i] = found.status
+            return
+        fine = _write_modes(i, columns, found.count, e, scene)
+        if is_chain:
+            fine = _write_chain(i, columns, found.p, e_J, e_k, scene.kept) and fine
+        verdict, limit = _verdict(found, wanted.f_max, columns.rtol[i])
+        columns.n_kept[i], columns.frf_error[i] = found.p, found.off
+        columns.valid_to[i] = scale(limit, e) if found.slower > 0.0 else p.f_max
+        columns.status[i] = partly(fine, verdict)
+
+    return fill
 
 
-@entry_of_cells
-def _solve_whole(
-    J, k, h, reduction, n_keep, tol, f_max, order, rtol,
-    frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status,
-):  # fmt: skip
-    """Chains that stay as they are: compiled in a third of the time of `_solve_reduced`."""
-    _solve_cells(
-        J, k, h, reduction, n_keep, tol, f_max, order, rtol,
-        frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status, whole,
-    )  # fmt: skip
+def _solver(name, solve, reduction, scene, is_chain):
+    return tracing(name, "", _filling(solve, reduction, is_chain), buffers=scene, loop=cell_by_cell)
 
 
-@entry_of_cells
-def _solve_reduced(
-    J, k, h, reduction, n_keep, tol, f_max, order, rtol,
-    frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status,
-):  # fmt: skip
-    """Each chain and its reduced model, solved and compared."""
-    _solve_cells(
-        J, k, h, reduction, n_keep, tol, f_max, order, rtol,
-        frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status, reduced,
-    )  # fmt: skip
-
-
-def direct(
-    J, k, h, reduction, n_keep, tol, f_max, order, rtol,
-    frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status,
-):  # fmt: skip
-    """Each chain and what becomes of it, in the columns of `_solve_whole` or of `_solve_reduced`."""
-    columns = (
-        J, k, h, reduction, n_keep, tol, f_max, order, rtol,
-        frequency, frequency_error, damping, n_kept, frf_error, valid_to, J_kept, k_kept, h_kept, status,
-    )  # fmt: skip
-    for solve, rows in ((_solve_whole, reduction == 0.0), (_solve_reduced, reduction != 0.0)):
-        if rows.all():
-            solve(*columns)
-        elif rows.any():
-            part = [column[rows] for column in columns]
-            solve(*part)
-            for column, result in zip(columns[FIRST_OUTPUT:], part[FIRST_OUTPUT:], strict=True):
-                column[rows] = result
+SOLVERS = {
+    "none": _solver("none", whole, None, whole_scene, True),
+    "rivin": _solver("rivin", reduced, _reductions.RIVIN, chain_scene, True),
+    "guyan": _solver("guyan", reduced, _reductions.GUYAN, modal_scene, False),
+    "irs": _solver("irs", reduced, _reductions.IRS, modal_scene, False),
+    "craig_bampton": _solver("craig_bampton", reduced, _reductions.CRAIG_BAMPTON, modal_scene, False),
+    "modal": _solver("modal", reduced, _reductions.MODAL, modal_scene, False),
+    "exact": _solver("exact", exact, _reductions.EXACT, chain_scene, True),
+}
 
 
 @jit
@@ -176,24 +162,22 @@ def _is_whole(x, low, high):
     return x >= low and x <= high and not magnitude(x - nearest(x)) > 0.0
 
 
-@jit_call
-def _choices(n, reduction, n_keep, tol, f_max, order):
+@jit
+def _is_one_model(p):
     """Whether reduction, size and band are such that one reduced model is meant."""
-    named = _is_whole(reduction, 0.0, _REDUCTIONS - 1.0) and _is_whole(order, 0.0, _ORDERS - 1.0)
-    numbers = _is_whole(n_keep, 0.0, float(n)) and tol >= 0.0 and tol < math.inf
-    one = not (n_keep > 0.0 and tol > 0.0) and (not reduction > 0.0 or n_keep > 0.0 or tol > 0.0)
-    return named and numbers and one and f_max > 0.0 and f_max < math.inf
+    named = _is_whole(p.reduction, 0.0, _REDUCTIONS - 1.0) and _is_whole(p.order, 0.0, _ORDERS - 1.0)
+    numbers = _is_whole(p.n_keep, 0.0, float(p.J.size)) and p.tol >= 0.0 and p.tol < math.inf
+    one = not (p.n_keep > 0.0 and p.tol > 0.0) and (not p.reduction > 0.0 or p.n_keep > 0.0 or p.tol > 0.0)
+    return named and numbers and one and p.f_max > 0.0 and p.f_max < math.inf
 
 
-@entry_of_cells
-def check(J, k, h, reduction, n_keep, tol, f_max, order, status):
+@jit
+def check(p):
     """BAD_INPUT: NaN, infinite or outside its limits; a reduction without `n_keep` and `tol`, or any cell with both.
 
     OUT_OF_RANGE: inertias, or stiffnesses, further apart than 2^300 or no normal float64.
     """
-    for i in range(J.shape[0]):
-        fine = _choices(J.shape[1], reduction[i], n_keep[i], tol[i], f_max[i], order[i])
-        status[i] = int(refusal(J.shape[1], J[i], k[i], h[i]) if fine else BAD_INPUT)
+    return refusal(p.J.size, p.J, p.k, p.h) if _is_one_model(p) else BAD_INPUT
 
 
 PARAMETERS = (
@@ -203,8 +187,8 @@ PARAMETERS = (
     Field("h", "N m s/rad", "damping beside each spring", default=0.0, lower=0.0, dims=("mass",)),
 )  # fmt: skip
 
-DRIVETRAIN = Kernel(
-    name="drivetrain",
+DRIVETRAIN = kernel(
+    "drivetrain",
     doc="drivetrain chain and its reduction to fewer masses",
     source="Baran & Marchelek, Mechanika Teoretyczna i Stosowana 9 (1971) 201; others in their modules",
     parameters=(
@@ -231,8 +215,15 @@ DRIVETRAIN = Kernel(
         Field("k_kept", "N m/rad", "its springs", dims=("mass",), gaps=True),
         Field("h_kept", "N m s/rad", "its dampers", dims=("mass",), gaps=True),
     ),
+    record=Drivetrain,
     check=check,
-    methods=(Method("direct", "frequencies by dqds, reduced models as they are defined", direct),),
+    loop=cell_by_cell,
+    methods=(
+        split(
+            "direct", "frequencies by dqds, reduced models as they are defined", "reduction",
+            {float(code): SOLVERS[name] for name, code in REDUCTIONS.items()},
+        ),
+    ),
     example={"J": (0.25, 0.012, 0.06, 0.98), "k": (7e4, 1.3e4, 2.7e4, 1.2e4), "h": (1.8, 0.4, 1.8, 60.0),
              "n_keep": 3.0, "f_max": 200.0},
     same_length={"mode": "mass"},

@@ -18,6 +18,8 @@ from llvmlite.binding import Linkage
 from numba import njit, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.core.compiler_machinery import register_pass
+from numba.core.typed_passes import NativeLowering
 from numba.core.imputils import lower_constant
 from numba.core.registry import CPUDispatcher
 from numba.extending import models, register_model
@@ -93,8 +95,51 @@ class _Part(CPUDispatcher):
         return self._type
 
 
+def _holds_arrays(kind):
+    """Whether values of a type are counted by those who hold them."""
+    return isinstance(kind, types.Buffer) or (
+        isinstance(kind, types.BaseTuple) and any(_holds_arrays(item) for item in kind)
+    )
+
+
+def _hands_over(function):
+    """Whether arrays that a function returns may be new: not those of a record, made of what its caller holds."""
+    borrows = getattr(getattr(function, "typing_key", None), "borrows", False)
+    return not (borrows or isinstance(function, types.NamedTupleClass))
+
+
+def _only_borrows(state):
+    """Whether a function makes no array, gets none from what it calls, and hands none back: its callers hold all."""
+    made = (
+        signature.return_type
+        for node, signature in state.calltypes.items()
+        if getattr(node, "op", None) == "call" and _hands_over(state.typemap[node.func.name])
+    )
+    return not any(map(_holds_arrays, (state.return_type, *made)))
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _BorrowingLowering(NativeLowering):
+    """numba's lowering; arrays that a function only borrows are not counted: that is half of its lines."""
+
+    _name = "borrowing_lowering"
+
+    def run_pass(self, state):
+        if _only_borrows(state):
+            state.targetctx = state.targetctx.subtarget(enable_nrt=False)
+        return super().run_pass(state)
+
+
 class _PartCompiler(Compiler):
     """numba's compiler, into a `_PartLibrary` and without what Python would need to call it."""
+
+    def define_pipelines(self):
+        pipelines = super().define_pipelines()
+        for pipeline in pipelines:
+            pipeline.passes = [
+                (_BorrowingLowering if kind is NativeLowering else kind, text) for kind, text in pipeline.passes
+            ]
+        return pipelines
 
     def __init__(self, typing_context, target_context, library, *rest):
         library = library or _PartLibrary(target_context.codegen(), "part")

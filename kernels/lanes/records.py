@@ -40,6 +40,9 @@ def _flat(values):
             yield name, value
 
 
+named.borrows = read.borrows = True  # their arrays are their caller's: `kernels.lanes.inlining`
+
+
 @type_callable(named)
 def _type_named(context):
     def typer(record, values):

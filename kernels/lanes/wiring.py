@@ -12,11 +12,14 @@ Loops, entries with one column a parameter, copies that fill up few cells, the l
 NaN for outputs that a method lacks are made here.
 """
 
+import inspect
 import math
 from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import FunctionType
+
+import numpy as np
 
 from kernels.interface import Kernel, Method
 from kernels.lanes import columns as loops
@@ -51,7 +54,7 @@ def method(
     ----------
     bound : what `solve` is right to: a number, or `bound(p)`; None where its status says so
     excludes, lacks, estimates : as in `kernels.interface.Method`
-    buffers : makes a tuple of arrays that a thread's cells use one after the other
+    buffers : makes a tuple of arrays that a thread's cells use one after the other: `buffers()`, or `buffers(columns)`
     loop : `in_lanes`; `cell_by_cell`, where every search goes its own way
     """
     return Solver(name, doc, solve, bound, excludes, lacks, buffers, loop, False, estimates)
@@ -62,6 +65,21 @@ def tracing(
 ):  # fmt: skip
     """A method by `fill(i, columns, *buffers())`: `i` is a cell, or by `in_groups` the first of a group."""
     return Solver(name, doc, fill, bound, excludes, lacks, buffers, loop, True, estimates)
+
+
+@dataclass(frozen=True)
+class Split:
+    """A method that is several: the value of one parameter says which of them solves a cell."""
+
+    name: str
+    doc: str
+    parameter: str
+    solvers: dict[float, Solver]
+
+
+def split(name, doc, parameter, solvers):
+    """A method by {value of a parameter: `method` or `tracing`}; each is compiled when a cell asks for it first."""
+    return Split(name, doc, parameter, solvers)
 
 
 def kernel(
@@ -100,6 +118,18 @@ def nothing():
     return ()
 
 
+def _of_columns(buffers):
+    """`buffers` as a function of the columns."""
+    if inspect.signature(buffers).parameters:
+        return buffers
+
+    @jit
+    def made(columns):
+        return buffers()
+
+    return made
+
+
 class _Wiring:
     """Makes a kernel's entries; each is a function of its own name, for its machine code is kept by it."""
 
@@ -119,12 +149,30 @@ class _Wiring:
         return self._entry("check", check, body, [*self.parameters, "status"], self.loop)
 
     def method(self, solver):
+        if isinstance(solver, Split):
+            return Method(solver.name, solver.doc, self._split(solver))
         body = solver.function if solver.fills else self._body(solver)
         asked, error = (["asked"], ["error"]) if solver.estimates else ([], [])
         names = [*self.parameters, "rtol", *self.along, *asked, *self.outputs, *error, "status"]
         solve = self._entry(solver.name, solver.function, body, names, solver.loop, solver.buffers or nothing)
         bound = self._bound(solver)
         return Method(solver.name, solver.doc, solve, bound, solver.excludes, solver.lacks, solver.estimates)
+
+    def _split(self, split):
+        solvers = {value: self.method(solver).solve for value, solver in split.solvers.items()}
+        chosen, first_output = self.parameters.index(split.parameter), len(self.parameters) + 1
+
+        def solve(*columns):
+            for value in np.unique(columns[chosen]):
+                rows = columns[chosen] == value
+                if rows.all():
+                    return solvers[value](*columns)
+                part = [column[rows] for column in columns]
+                solvers[value](*part)
+                for column, result in zip(columns[first_output:], part[first_output:], strict=True):
+                    column[rows] = result
+
+        return solve
 
     def _body(self, solver):
         record, solve = self.record, solver.function
@@ -166,7 +214,7 @@ class _Wiring:
 
     def _entry(self, name, function, body, names, loop, buffers=nothing):
         columns = namedtuple("Columns", names)
-        scope = {"named": named, "COLUMNS": columns, "BODY": body, "LOOP": loop, "BUFFERS": buffers}
+        scope = {"named": named, "COLUMNS": columns, "BODY": body, "LOOP": loop, "BUFFERS": _of_columns(buffers)}
         made = FunctionType(_all_cells.__code__, scope, name)
         made.__qualname__, made.__module__ = f"{self.name}.{name}", function.__module__
         per_cell = None if loop is loops.cell_by_cell else [n not in self.along and n != "asked" for n in names]
@@ -174,4 +222,5 @@ class _Wiring:
 
 
 def _all_cells(*columns):
-    LOOP(BODY, named(COLUMNS, columns), BUFFERS())  # noqa: F821  the names of `_Wiring._entry`
+    columns = named(COLUMNS, columns)  # noqa: F821  the names of `_Wiring._entry`
+    LOOP(BODY, columns, BUFFERS(columns))  # noqa: F821

@@ -1,0 +1,222 @@
+"""The ways in which a chain is reduced, each as how its model is made, its poles found, and its spindle's receptance.
+
+reduce(p, order, scene) -> Model          of p masses, into `scene`
+poles(p, scene) -> error, count           of the chain and of the model, and how many the model has of its own
+receptance(w, model, scene)               of the spindle, by the model
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from kernels.drivetrain import _guyan_masses, _modal_masses, _rivin_exact, _rivin_merging
+from kernels.drivetrain._chain_frequencies import natural_frequencies
+from kernels.drivetrain._chain_poles import damped_poles
+from kernels.drivetrain._modal_masses import TURN
+from kernels.drivetrain._modal_poles import modal_poles
+from kernels.drivetrain._modal_receptance import chain_receptance, damping_matrix, modal_receptance
+from kernels.drivetrain._model import CHAIN_ROUNDING, Model, off_by
+from kernels.drivetrain._ritz import ritz
+from kernels.lanes.jit import jit_call
+from kernels.lanes.vectors import magnitude, sqrt
+
+_ROUNDING = 4e-16
+
+
+class Reduction(NamedTuple):
+    """A way to reduce a chain."""
+
+    reduce: Callable
+    poles: Callable
+    receptance: Callable
+
+
+@jit_call
+def damped(chain):
+    """Whether a chain has a damper."""
+    most = 0.0
+    for j in range(chain.h.size):
+        most = max(most, chain.h[j])
+    return most > 0.0
+
+
+@jit_call
+def _undamped_poles(chain):
+    """Poles on the imaginary axis."""
+    for i in range(chain.f.size):
+        chain.re[2 * i], chain.re[2 * i + 1] = 0.0, 0.0
+        chain.im[2 * i], chain.im[2 * i + 1] = TURN * chain.f[i], -TURN * chain.f[i]
+
+
+@jit_call
+def chain_poles(chain, m, is_damped, work):
+    """Poles of a chain of m masses; a bound on their relative error, inf where they did not come."""
+    if not is_damped:
+        _undamped_poles(chain)
+        return 0.0
+    error, status = damped_poles(m, chain.J, chain.k, chain.h, chain.f, chain.re, chain.im, work)
+    return error if status == 0.0 else float("inf")
+
+
+@jit_call
+def _copy(full, kept):
+    for j in range(full.J.size):
+        kept.J[j], kept.k[j], kept.h[j] = full.J[j], full.k[j], full.h[j]
+
+
+@jit_call
+def _merge(p, order, full, kept, spare):
+    """The chain of p masses by Rivin's steps; the largest h e of merged springs."""
+    n, slower = full.J.size, 0.0
+    _copy(full, kept)
+    for m in range(n, p, -1):
+        kind, place, late = _rivin_merging.step(kept.J, kept.k, kept.h, m, order)
+        spare.kinds[n - m], spare.places[n - m], slower = kind, place, max(slower, late)
+    return slower
+
+
+@jit_call
+def _reduce_rivin(p, order, scene):
+    kept = scene.kept
+    slower = _merge(p, order, scene.full, kept, scene.spare)
+    status = natural_frequencies(p, kept.J, kept.k, kept.f, scene.spare.work)
+    return Model(p, CHAIN_ROUNDING, slower, 0.0, status)
+
+
+@jit_call
+def _poles_of_both(p, scene):
+    full, kept, work = scene.full, scene.kept, scene.spare.work
+    is_damped, error = damped(full), 0.0
+    error = max(error, chain_poles(full, full.J.size, is_damped, work))
+    return max(error, chain_poles(kept, p, is_damped, work)), 2 * p
+
+
+@jit_call
+def _chain_receptance(w, model, scene):
+    kept, spare = scene.kept, scene.spare
+    return chain_receptance(w, kept.J, kept.k, kept.h, model.p, spare.J_w, spare.K_w)
+
+
+@jit_call
+def _reduce_exactly(p, order, scene):
+    """All frequencies, from p masses that depend on the frequency; how far they are from the full chain's is error."""
+    full, kept, spare = scene.full, scene.kept, scene.spare
+    _merge(p, order, full, kept, spare)
+    n, apart, work = full.J.size, 0.0, spare.work
+    _rivin_exact.exact_frequencies(full.J, full.k, spare.kinds, spare.places, p, kept.f, work, work[2 * n :])
+    for i in range(n):
+        off = magnitude(off_by(kept.f[i], full.f[i]))
+        apart = max(apart, off if off >= 0.0 else float("inf"))
+    return Model(p, CHAIN_ROUNDING + apart, 0.0, 0.0, 0.0)
+
+
+@jit_call
+def _poles_of_full(p, scene):
+    full, kept = scene.full, scene.kept
+    error = max(0.0, chain_poles(full, full.J.size, damped(full), scene.spare.work))
+    for i in range(2 * full.J.size):
+        kept.re[i], kept.im[i] = full.re[i], full.im[i]
+    return error, 0
+
+
+@jit_call
+def _exact_receptance(w, model, scene):
+    full, spare = scene.full, scene.spare
+    return _rivin_exact.receptance(w, full.J, full.k, full.h, spare.kinds, spare.places, model.p, spare.J_w, spare.K_w)
+
+
+@jit_call
+def _solve_basis(p, scene):
+    """Modes of the basis in `modes`; a bound on the error of their frequencies."""
+    full, modes, dense = scene.full, scene.modes, scene.dense
+    n = full.J.size
+    free = not full.k[n - 1] > 0.0
+    error = ritz(modes.W, modes.G, p, n, free, modes.w, dense.square, dense.angle)
+    for i in range(p):
+        scene.kept.f[i] = modes.w[i] / TURN
+    return error
+
+
+@jit_call
+def _take_masters(p, order, scene):
+    """Guyan's basis; the largest h e of springs that come in series."""
+    full, kept, modes, masters = scene.full, scene.kept, scene.modes, scene.dense.masters
+    _copy(full, kept)
+    slower = _guyan_masses.choose_masters(kept.J, kept.k, kept.h, masters, full.J.size, p, order)
+    _guyan_masses.static_shapes(modes.W, modes.G, full.J, full.k, masters, full.J.size, p)
+    return slower
+
+
+@jit_call
+def _reduce_guyan(p, order, scene):
+    slower = _take_masters(p, order, scene)
+    return Model(p, _solve_basis(p, scene), slower, 0.0, 0.0)
+
+
+@jit_call
+def _reduce_irs(p, order, scene):
+    full, modes, dense = scene.full, scene.modes, scene.dense
+    slower, error = _take_masters(p, order, scene), 0.0
+    for improved in range(2):
+        if improved > 0:
+            _guyan_masses.add_inertia(
+                modes.W, modes.G, full.J, full.k, dense.masters, modes.w, p, full.J.size, dense.angle
+            )
+        error += _solve_basis(p, scene)
+    return Model(p, error, slower, 0.0, 0.0)
+
+
+@jit_call
+def _reduce_craig_bampton(p, order, scene):
+    full, modes, dense = scene.full, scene.modes, scene.dense
+    status = _modal_masses.craig_bampton(
+        modes.W, modes.G, full.J, full.k, scene.kept.f, dense.square, dense.angle, p, full.J.size, scene.spare.work
+    )
+    return Model(p, _solve_basis(p, scene), 0.0, 0.0, status)
+
+
+@jit_call
+def _reduce_modal(p, order, scene):
+    full, dense = scene.full, scene.dense
+    for i in range(full.J.size):
+        scene.kept.f[i] = full.f[i]
+    residual, status = _modal_masses.modal(scene.modes, full, p, dense.square, dense.angle, scene.spare.work)
+    return Model(p, CHAIN_ROUNDING, 0.0, residual, status)
+
+
+@jit_call
+def _least_gap(f, p):
+    """Smallest relative distance of two of p frequencies: shapes are right to rounding over it."""
+    gap = 1.0
+    for i in range(1, p):
+        gap = min(gap, (f[i] - f[i - 1]) / f[i])
+    return gap
+
+
+@jit_call
+def _poles_of_modes(p, scene):
+    full, kept, modes, dense = scene.full, scene.kept, scene.modes, scene.dense
+    n, is_damped, error = full.J.size, damped(full), 0.0
+    for i in range(p):
+        modes.spindle[i] = modes.W[i, 0] / sqrt(full.J[0])
+    damping_matrix(modes.C, modes.W, modes.G, full, p)
+    error = max(error, chain_poles(full, n, is_damped, scene.spare.work))
+    if is_damped:
+        free = not full.k[n - 1] > 0.0
+        blur = modal_poles(modes.w, modes.C, p, free, kept.re, kept.im, dense.s, dense.A, dense.B)
+        error = max(error, blur, _ROUNDING * n / _least_gap(kept.f, p))
+    else:
+        _undamped_poles(kept)
+    return error, 2 * p
+
+
+@jit_call
+def _modal_receptance(w, model, scene):
+    return model.residual + modal_receptance(w, scene.modes, model.p, scene.dense.A, scene.dense.B)
+
+
+RIVIN = Reduction(_reduce_rivin, _poles_of_both, _chain_receptance)
+EXACT = Reduction(_reduce_exactly, _poles_of_full, _exact_receptance)
+GUYAN = Reduction(_reduce_guyan, _poles_of_modes, _modal_receptance)
+IRS = Reduction(_reduce_irs, _poles_of_modes, _modal_receptance)
+CRAIG_BAMPTON = Reduction(_reduce_craig_bampton, _poles_of_modes, _modal_receptance)
+MODAL = Reduction(_reduce_modal, _poles_of_modes, _modal_receptance)
