@@ -23,7 +23,7 @@ def unit_scales(state, scene):
 
 
 @jit
-def crossing(state, acceleration):
+def crossing(state, acceleration, scene):
     return state[0], state[1]
 
 
@@ -118,7 +118,7 @@ def test_the_event_is_located_to_the_tolerance(tolerance):
 @pytest.mark.skipif(not COMPILED, reason="ten thousand steps in plain Python")
 def test_a_motion_that_never_meets_the_event_is_given_up():
     @jit
-    def never(state, acceleration):
+    def never(state, acceleration, scene):
         return state[0] + 2.0, state[1]
 
     @jit_call
