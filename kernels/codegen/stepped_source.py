@@ -171,7 +171,8 @@ LEGS = '''
 
 from {module} import *
 from {steps} import M
-from kernels.integrate.adaptive import DOP853, DOPRI5, to_event
+from kernels.integrate.adaptive import to_event
+from kernels.integrate.pairs import DOP853, DOPRI5
 from kernels.integrate.records import Mode
 
 
