@@ -2,10 +2,14 @@
 
 A scene carries its motion and two tangents of it, so a state is (x, v, x1, v1, x2, v2), each pair a position and its
 rate, and a right-hand side is `accelerations(state, scene) -> (x'', x1'', x2'')`. Because every position is the
-integral of a rate, the stages of a position are folded into those of its rate (Nystroem form), which halves the work:
+integral of a rate, the stages of a position are folded into those of its rate (Nystroem form):
     V_i = v + h sum_j a_ij F_j,  X_i = x + c_i h v + h^2 sum_j (sum_m a_im a_mj) F_j.                     (1)
 An integral y along the motion may follow as a seventh entry of the state; its rate y' is then the fourth of the
 right-hand side.
+
+Measured on columns of foliot (40 000 cells) and foliot_ripple (20 000) at rtol 1e-9: by first-order stages of the same
+table, as `steps` takes them, the CPU time is 0.98 and 0.85 of this form's, and of foliot 0.93 with the step control of
+`taylor` besides. Results differ by 1.4e-14 at most. This form is kept for the bits of what has been computed by it.
 """
 
 import numpy as np
