@@ -19,10 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from kernels.codegen import followed_twice
-from kernels.codegen.adaptive_solve import twice_by
 from kernels.codegen.expression import SceneError, cos, exp, log, maximum, minimum, power, sign, sin, sqrt, where
 from kernels.codegen.module import build, compiling
 from kernels.codegen.record import RESERVED
+from kernels.codegen.stepped_source import twice_by
 from kernels.interface import Field, Kernel, Method, Status
 
 __all__ = [
@@ -31,6 +31,8 @@ __all__ = [
 ]  # fmt: skip
 
 MOST_FLIPS = 1_000_000
+SERIES = "Taylor series of order 12 or 18 in lanes, no switch passed over"
+LOCATED = "in lanes, switches on its dense output; followed twice"
 
 
 @dataclass(frozen=True)
@@ -103,55 +105,55 @@ def scene_kernel(
     SceneError
         Where the functions ask for what is not there, or do what cannot be recorded.
     """
-    scene = Scene(
-        name, doc, tuple(s.name for s in states), tuple(p.name for p in parameters), rates, surface, start, switch
-    )
-    fields = (
-        *parameters,
-        Field("flips", "1", "switches to follow", default=40.0, lower=1.0, upper=float(MOST_FLIPS), integer=True),
-    )
-    outputs = (
-        Field("time", "s", "time of the last switch"),
-        Field("interval", "s", "time between the last two switches, or from the start to the only one"),
-        *states,
-    )
-    module = build(scene)
-    names = [f.name for f in fields], [f.name for f in outputs]
-
-    def solve(method, how):
-        return _solve((name, method), how, module, *names)
-
+    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch)
+    fields, outputs = (*parameters, flips_field(40.0, MOST_FLIPS)), (*TIMES, *states)
     return Kernel(
         name=name,
         doc=doc,
         source=source,
         parameters=fields,
         outputs=outputs,
-        check=_check(fields),
-        methods=(
-            Method(
-                "taylor",
-                "Taylor series of order 12 or 18 in lanes, no switch passed over; followed twice",
-                solve("taylor", followed_twice.twice),
-            ),
-            Method(
-                "taylor_once",
-                "the same, each step right to rtol, followed once",
-                solve("taylor_once", followed_twice.once),
-                _no_bound(names[0]),
-            ),
-            Method(
-                "dop853",
-                "Dormand-Prince 8(5,3) in lanes, switches on its dense output; followed twice",
-                solve("dop853", twice_by("dop853", scene)),
-            ),
-            Method(
-                "dopri5",
-                "Dormand-Prince 5(4) in lanes, switches on its dense output; followed twice",
-                solve("dopri5", twice_by("dopri5", scene)),
-            ),
-        ),
+        check=limits_check(fields),
+        methods=_methods(scene, [f.name for f in fields], [f.name for f in outputs]),
         example=dict(example or {}),
+    )
+
+
+TIMES = (
+    Field("time", "s", "time of the last switch"),
+    Field("interval", "s", "time between the last two switches, or from the start to the only one"),
+)
+"""The first outputs of every scene."""
+
+
+def scene_of(name, doc, states, parameters, rates, surface, start, switch):
+    """The scene of states and parameters that are given as fields."""
+    names = (tuple(field.name for field in fields) for fields in (states, parameters))
+    return Scene(name, doc, *names, rates, surface, start, switch)
+
+
+def flips_field(default, most):
+    """The number of switches to follow, a parameter of every scene."""
+    return Field("flips", "1", "switches to follow", default=default, lower=1.0, upper=float(most), integer=True)
+
+
+def _methods(scene, parameters, outputs):
+    """The methods to a tolerance."""
+    module = build(scene)
+
+    def method(name, doc, how, bound=None):
+        return Method(name, doc, _solve((scene.name, name), how, module, parameters, outputs), bound)
+
+    return (
+        method("taylor", f"{SERIES}; followed twice", followed_twice.twice),
+        method(
+            "taylor_once",
+            "the same, each step right to rtol, followed once",
+            followed_twice.once,
+            _no_bound(parameters),
+        ),
+        method("dop853", f"Dormand-Prince 8(5,3) {LOCATED}", twice_by("dop853", scene)),
+        method("dopri5", f"Dormand-Prince 5(4) {LOCATED}", twice_by("dopri5", scene)),
     )
 
 
@@ -165,7 +167,7 @@ def _solve(names, how, module, parameters, outputs):
         with compiling(*names):
             how(module, columns[:n], columns[n], columns[n + 1 : -1], columns[-1])
 
-    return _signed(solve, [*parameters, "rtol", *outputs, "status"])
+    return signed(solve, [*parameters, "rtol", *outputs, "status"])
 
 
 def _no_bound(parameters):
@@ -174,10 +176,10 @@ def _no_bound(parameters):
     def bound(*columns):
         columns[-1][:] = math.inf
 
-    return _signed(bound, [*parameters, "rtol", "asked", "out"])
+    return signed(bound, [*parameters, "rtol", "asked", "out"])
 
 
-def _check(fields):
+def limits_check(fields):
     """BAD_INPUT for what is NaN, infinite or outside its limits, and for a number of switches that is not whole."""
 
     def check(*columns):
@@ -189,10 +191,10 @@ def _check(fields):
                 good &= value == np.floor(value)
         status[...] = np.where(good, Status.OK, Status.BAD_INPUT)
 
-    return _signed(check, [*(f.name for f in fields), "status"])
+    return signed(check, [*(f.name for f in fields), "status"])
 
 
-def _signed(function, names):
+def signed(function, names):
     """The function with the names of its columns, as the contract of a kernel asks."""
     kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
     function.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])

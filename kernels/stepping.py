@@ -15,7 +15,7 @@ from kernels.codegen.module import compiling
 from kernels.codegen.stepped_source import methods_of, stepped
 from kernels.integrate.events import LOCATIONS, METHODS
 from kernels.interface import Field, Kernel, Method, Status
-from kernels.scene import Scene, _check, _signed
+from kernels.scene import TIMES, flips_field, limits_check, scene_of, signed
 
 __all__ = ["METHODS", "stepped_kernel", "stepping_fields", "stepping_methods"]
 
@@ -29,7 +29,7 @@ DOCS = {
     "dop853": "Dormand-Prince at a fixed step, order 8",
     "moreau": "Moreau's time-stepping, order 1: dry friction without location",
 }
-WORK = (
+COST = (
     Field("error", "1", "estimated largest relative error"),
     Field("steps", "1", "steps taken", integer=True),
     Field("rate_calls", "1", "evaluations of the right-hand side", integer=True),
@@ -40,7 +40,7 @@ def stepping_fields(flips=20.0):
     """The parameters that every scene has: switches to follow, step, location."""
     words = {"lower": 0.0, "upper": 4.0, "choices": LOCATIONS, "integer": True}
     return (
-        Field("flips", "1", "switches to follow", default=flips, lower=1.0, upper=float(MOST_FLIPS), integer=True),
+        flips_field(flips, MOST_FLIPS),
         Field("step", "s", "time step", lower=0.0, open_lower=True),
         Field("location", "1", "how a switch is found in its step", default=3.0, **words),
     )
@@ -51,7 +51,7 @@ def stepping_methods(scene, parameters, outputs, fill):
 
     Parameters
     ----------
-    parameters, outputs : fields; the last parameters are those of `stepping_fields`, the last outputs `WORK`
+    parameters, outputs : fields; the last parameters are those of `stepping_fields`, the last outputs `COST`
     fill : (time, interval, states, their reach, outputs but the last three) writes these
     """
     count, names = len(parameters), [f.name for f in parameters]
@@ -63,10 +63,10 @@ def stepping_methods(scene, parameters, outputs, fill):
 
     def method(name):
         def solve(*columns):
-            *given, error, steps, rate_calls, status = columns[count + 1 :]
+            *wanted, error, steps, rate_calls, status = columns[count + 1 :]
             if len(status):
                 found, error[:], status[:] = solved(name, columns)
-                fill(found[0], found[1], found[2 : 2 + n], found[2 + n : 2 + 2 * n], given)
+                fill(found[0], found[1], found[2 : 2 + n], found[2 + n : 2 + 2 * n], wanted)
                 steps[:], rate_calls[:] = found[-2:]
 
         def bound(*columns):
@@ -74,8 +74,8 @@ def stepping_methods(scene, parameters, outputs, fill):
                 _, error, status = solved(name, columns)
                 columns[-1][:] = np.where(np.isnan(error) | (status == Status.INACCURATE), math.inf, error)
 
-        solve = _signed(solve, [*names, "rtol", *(f.name for f in outputs), "status"])
-        return Method(name, DOCS[name], solve, _signed(bound, [*names, "rtol", "asked", "out"]))
+        solve = signed(solve, [*names, "rtol", *(f.name for f in outputs), "status"])
+        return Method(name, DOCS[name], solve, signed(bound, [*names, "rtol", "asked", "out"]))
 
     return tuple(method(name) for name in methods_of(scene))
 
@@ -94,23 +94,15 @@ def stepped_kernel(*, name, doc, states, parameters, rates, surface, start, swit
         Of the scene's parameters, `flips`, `step` and `location`; its outputs are `time` of the last switch, `interval`
         since the one before, each state just before it, and `error`, `steps`, `rate_calls`.
     """
-    scene = Scene(
-        name, doc, tuple(s.name for s in states), tuple(p.name for p in parameters), rates, surface, start, switch
-    )
-    fields = (*parameters, *stepping_fields())
-    outputs = (
-        Field("time", "s", "time of the last switch"),
-        Field("interval", "s", "time between the last two switches, or from the start to the only one"),
-        *states,
-        *WORK,
-    )
+    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch)
+    fields, outputs = (*parameters, *stepping_fields()), (*TIMES, *states, *COST)
     return Kernel(
         name=name,
         doc=doc,
         source=source or "a study's own",
         parameters=fields,
         outputs=outputs,
-        check=_check(fields),
+        check=limits_check(fields),
         methods=stepping_methods(scene, fields, outputs, _fill_plainly),
         example=dict(example or {}),
     )

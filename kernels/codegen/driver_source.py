@@ -1,5 +1,6 @@
 """Source text of what a lane does from one event to the next: start, switch, turn signs round, count, end."""
 
+from kernels.codegen.lane_source import BEGIN, begun_rows, chosen, loaded_rows, stored_rows
 from kernels.codegen.template import filled, listed
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import exponent, magnitude, pow2, sqrt, where
@@ -7,7 +8,7 @@ from kernels.lanes.vectors import exponent, magnitude, pow2, sqrt, where
 KINK_LIMIT = 1000
 """Kinks between two switches after which a cell is given up."""
 EVENTS = 1_000_000
-"""Of lanes none of which finishes, before what they know is put down."""
+"""Of lanes none of which finishes, before what they keep is put down."""
 
 BLUR = 16.0
 """Tolerances of the surface's value at the start that rounding may take from it: rtol/2 in the finer run."""
@@ -28,10 +29,7 @@ def settled(state, side, parameters, unit, near):
 BEGUN = '''
 @jit
 def begun(flips, parameters):
-    """State, side, signs, unit, on, whether the start is beyond the surface, and what rounding takes from its value.
-
-    The last is relative to that value; nothing of nothing is nothing.
-    """
+    """The start. Of what rounding takes from the surface's value, nothing of nothing is nothing."""
     side = 0.0 * flips + 1.0
     {states} = started(side, parameters)
     state = ({lasting})
@@ -42,7 +40,8 @@ def begun(flips, parameters):
     away = (d > 0.0) | ((d >= 0.0) & (dd > 0.0))
     at = where((e <= 0.0) & (e >= 0.0) & away, 1.0, 0.0)
     lost = lost_by_surface(state, side, signs, parameters)
-    return state, side, signs, time_unit(e, d, dd), (at, {also_on}), isnt(e >= 0.0), where(lost > 0.0, lost / e, 0.0)
+    blur = where(lost > 0.0, lost / e, 0.0)
+    return Start(state, side, signs, time_unit(e, d, dd), (at, {also_on}), isnt(e >= 0.0), blur)
 '''
 
 EVENT = '''
@@ -51,25 +50,22 @@ def advance_{order}(memory, i):
     """Every lane on from event to event, until one has finished; whether one has."""
     {load}
     parameters = ({parameters})
-    fresh = (stage > 0.5) & (stage < 1.5)
-    active = fresh | ((stage > 1.5) & (stage < 2.5))
-    if some(fresh):
-        s, p, g, u, o, beyond, blur = begun(flips, parameters)
-        {begin}
-        unsure = where(blur <= BLUR * tolerance, 0.0, INACCURATE)
-        verdict = where(fresh, where(beyond | isnt(flips >= 1.0), BAD_INPUT, unsure), verdict)
+    {begin}
     done = active & isnt(active)
     for _ in range(EVENTS):
-        moving = active & (verdict < REFUSAL)
-        new, t, h, on, stuck, lost, broken, grazing, hangs, tried = to_event_{order}(
+        moving = active & (verdict < REFUSED)
+        leg = to_event_{order}(
             ({states}), side, ({signs}), parameters, unit, h, ({ons}), tolerance, moving
         )
-        verdict = where((hangs | grazing) & (verdict < REMARK), REMARK, verdict)
-        verdict = where(lost, STEP_LIMIT_MET, where(stuck, STICKS, where(broken, OUT_OF_RANGE, verdict)))
-        moving = moving & (verdict < REFUSAL) & isnt(grazing)
+        verdict = where((leg.hangs | leg.grazing) & (verdict < GRAZING), GRAZING, verdict)
+        refused = where(leg.stuck, STICKS, where(leg.broken, OUT_OF_RANGE, verdict))
+        verdict = where(leg.lost, STEP_LIMIT_MET, refused)
+        moving = moving & (verdict < REFUSED) & isnt(leg.grazing)
         {land}
-        {ons} = on
-        time, since = where(moving, fma(t, unit, time), time), where(moving, fma(t, unit, since), since)
+        h = leg.h
+        {ons} = leg.on
+        time = where(moving, fma(leg.t, unit, time), time)
+        since = where(moving, fma(leg.t, unit, since), since)
         switches = moving & (on_0 > 0.5)
         kinks_met = where(switches, 0.0, where(moving, kinks_met + 1.0, kinks_met))
         {turn}
@@ -84,19 +80,19 @@ def advance_{order}(memory, i):
             since = where(switches, 0.0, since)
             left = surface(({states}), side, ({signs}), parameters)
             gaps = kink_values(({states}), side, ({signs}), parameters)
-            s = switched(({states}), side, ({signs}), parameters)
+            jumped = switched(({states}), side, ({signs}), parameters)
             side = where(switches, -side, side)
-            gaps_behind = kink_values(s, side, ({signs}), parameters)
-            g, o = settled(s, side, parameters, unit, ({near}))
+            gaps_behind = kink_values(jumped, side, ({signs}), parameters)
+            signs, kinks_on = settled(jumped, side, parameters, unit, ({near}))
             {jump}
             after = surface(({states}), side, ({signs}), parameters)
             size = magnitude({offset}) + magnitude(after - {offset})
             still = magnitude(after) <= fma(1e-12, size, 2.0 * magnitude(left))
             on_0 = where(switches, where(still, 1.0, 0.0), on_0)
-        steps, before = where(active, tried, steps), where(active, steps, before)
+        steps, before = where(active, leg.tried, steps), where(active, steps, before)
         verdict = where(moving & (kinks_met > KINK_LIMIT), STEP_LIMIT_MET, verdict)
-        done = active & (grazing | (verdict >= REFUSAL) | (count >= flips))
-        if some(grazing):
+        done = active & (leg.grazing | (verdict >= REFUSED) | (count >= flips))
+        if some(leg.grazing):
             {nothing}
         if some(done):
             break
@@ -126,25 +122,25 @@ def time_unit(e, d, dd):
 
 
 _STARTS = (
-    ("side", "p"), ("unit", "u"), ("h", "1.0"),
+    ("side", "start.side"), ("unit", "start.unit"), ("h", "1.0"),
     *((name, "0.0") for name in ("time", "count", "since", "kinks_met", "steps", "before")),
 )  # fmt: skip
 
 
 def results_of(states):
-    """Names of what is known of a cell in the end."""
+    """Names of what a cell comes to."""
     return ["time", "interval", *(f"at_{s}" for s in states), *(f"size_{s}" for s in states), "verdict"]
 
 
-def _work_of(states, kinks):
-    """Names of what a lane knows of its cell between two events, beside results."""
+def _between_events(states, kinks):
+    """Names of what a lane keeps of its cell between two events, beside results."""
     signs, ons = [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]
     return [*states, "side", *signs, "unit", "h", *ons, "count", "since", "kinks_met", "steps", "before"]
 
 
 def _rows(states, parameters, kinks):
-    """Names of all that a lane knows."""
-    return ["stage", *parameters, "flips", "tolerance", *results_of(states), *_work_of(states, kinks)]
+    """Names of all that a lane keeps."""
+    return ["stage", *parameters, "flips", "tolerance", *results_of(states), *_between_events(states, kinks)]
 
 
 def shared(states, parameters, kinks):
@@ -179,30 +175,37 @@ def settled(state, side, parameters, unit, near):
 def advance(states, parameters, kinks, order, offset):
     """The text of `advance_{order}` and `run_{order}`; `offset` is that of the surface, as text."""
     signs, ons = [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]
-    rows, changed = _rows(states, parameters, kinks), ["stage", "time", "verdict", *_work_of(states, kinks)]
+    rows, changed = _rows(states, parameters, kinks), ["stage", "time", "verdict", *_between_events(states, kinks)]
     results = {name: f"memory[{rows.index(name)}][i]" for name in results_of(states)[1:-1]}
-    held = [name for name in rows if name not in results]
-    begin = [f"{s} = where(fresh, s[{j}], {s})" for j, s in enumerate(states)]
-    begin += [f"{s} = where(fresh, g[{j}], {s})" for j, s in enumerate(signs)]
-    begin += [f"{o} = where(fresh, o[{j}], {o})" for j, o in enumerate(ons)]
-    begin += [f"{r} = where(fresh, {start}, {r})" for r, start in _STARTS]
-    jump = [f"{s} = where(switches, s[{j}], {s})" for j, s in enumerate(states)]
-    jump += [f"{s} = where(switches, g[{j}], {s})" for j, s in enumerate(signs)]
-    jump += [f"{o} = where(switches, o[{j}], {o})" for j, o in enumerate(ons[1:])]
+    begin = filled(BEGIN, begin=begun_rows(states, signs, ons, _STARTS), blur="BLUR * tolerance")
+    return filled(
+        EVENT, order=order, load=loaded_rows(rows, [name for name in rows if name not in results]),
+        parameters=listed(parameters), begin=begin.rstrip(), states=listed(states), signs=listed(signs),
+        ons=listed(ons), offset=offset, store=stored_rows(rows, changed),
+        **_landing(states, signs, ons), **_switching(states, signs, ons, results),
+    )  # fmt: skip
+
+
+def _landing(states, signs, ons):
+    """Statements at the end of a leg."""
+    return {
+        "land": "\n".join(chosen("moving", states, "leg.state")),
+        "turn": "\n".join(f"{s} = where(moving & ({o} > 0.5), -{s}, {s})" for s, o in zip(signs, ons[1:], strict=True)),
+    }
+
+
+def _switching(states, signs, ons, results):
+    """Statements at a switch; `results` are the places in memory of what is put down there."""
     keep = {"interval": "since"} | {f"at_{s}": s for s in states}
     keep |= {f"size_{s}": f"fma(magnitude(rate[{j}]), since, magnitude({s}))" for j, s in enumerate(states)}
-    return filled(
-        EVENT, order=order, load="\n".join(f"{r} = memory[{rows.index(r)}][i]" for r in held),
-        parameters=listed(parameters), begin="\n".join(begin), states=listed(states), signs=listed(signs),
-        ons=listed(ons), land="\n".join(f"{s} = where(moving, new[{j}], {s})" for j, s in enumerate(states)),
-        turn="\n".join(f"{s} = where(moving & ({o} > 0.5), -{s}, {s})" for s, o in zip(signs, ons[1:], strict=True)),
-        nothing="\n".join(["time = where(grazing, math.nan, time)",
-                           *(f"{place} = where(grazing, math.nan, {place})" for place in results.values())]),
-        keep="\n".join(f"{results[r]} = where(watched, {x}, {results[r]})" for r, x in keep.items()),
-        jump="\n".join(jump), offset=offset,
-        near=listed(
-            f"where(magnitude(gaps_behind[{j}]) <= 2.0 * magnitude(gaps[{j}]), {on}, 0.0)"
-            for j, on in enumerate(ons[1:])
-        ),
-        store="\n".join(f"memory[{rows.index(r)}][i] = {r}" for r in changed),
-    )  # fmt: skip
+    jump = chosen("switches", states, "jumped") + chosen("switches", signs, "signs")
+    near = [
+        f"where(magnitude(gaps_behind[{j}]) <= 2.0 * magnitude(gaps[{j}]), {on}, 0.0)" for j, on in enumerate(ons[1:])
+    ]
+    places = ["time", *results.values()]
+    return {
+        "keep": "\n".join(f"{results[r]} = where(watched, {x}, {results[r]})" for r, x in keep.items()),
+        "jump": "\n".join(jump + chosen("switches", ons[1:], "kinks_on")),
+        "near": listed(near),
+        "nothing": "\n".join(f"{place} = where(leg.grazing, math.nan, {place})" for place in places),
+    }

@@ -57,15 +57,15 @@ def followed(module, columns, rtol, finer=1.0, together=False):
 def _run(module, run, inputs, together):
     """The results of cells; those that take as many steps side by side, for so lanes wait less for each other."""
     row = {name: j for j, name in enumerate(module.ROWS)}
-    known = slice(row["time"], row["verdict"] + 1)
+    found = slice(row["time"], row["verdict"] + 1)
     cells, places = fresh(len(row), inputs), np.arange(len(inputs[0]))
     whole = np.where(inputs[-2] < math.inf, inputs[-2], math.nan)  # NaN is refused, without end not followed
-    cells[:, known] = np.nan
-    results = np.empty((known.stop - known.start, len(cells)))
+    cells[:, found] = np.nan
+    results = np.empty((found.stop - found.start, len(cells)))
     for stop in (math.inf,) if together else STOPS:
         cells[:, row["flips"]] = np.minimum(whole, stop)
         run(cells, together)
-        results[:, places] = cells[:, known].T
+        results[:, places] = cells[:, found].T
         count, verdict, steps, before = (cells[:, row[name]] for name in ("count", "verdict", "steps", "before"))
         going = np.flatnonzero((count >= stop) & (count < whole) & (verdict < FIRST_REFUSAL))
         going = going[np.lexsort([key[going].astype(np.int16) for key in (steps, before)])]

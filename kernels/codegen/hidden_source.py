@@ -28,7 +28,7 @@ class Enclosures:
 
     def __init__(self, names):
         self.lines = Lines(names)
-        self._names, self._known = names, {}
+        self._names, self._reused = names, {}
 
     def interval(self, x):
         """The name of an expression's interval."""
@@ -39,10 +39,10 @@ class Enclosures:
         return self._once(x, "excess", self._excess)
 
     def _once(self, x, what, write):
-        if (x.index, what) not in self._known:
+        if (x.index, what) not in self._reused:
             text = write(x)
-            self._known[x.index, what] = text and self._named(f"{what}_{x.index}", text)
-        return self._known[x.index, what]
+            self._reused[x.index, what] = text and self._named(f"{what}_{x.index}", text)
+        return self._reused[x.index, what]
 
     def _named(self, name, text):
         self.lines.text.append(f"{name} = {text}")

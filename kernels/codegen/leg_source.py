@@ -3,6 +3,8 @@
 The text is of named scalars, one statement per event; what can be said once for all scenes is in `taylor`.
 """
 
+from dataclasses import dataclass
+
 from kernels.codegen.template import filled, folded, listed
 
 LEG = '''
@@ -14,9 +16,9 @@ def doubted_{order}(trial, unsure, facts, series):
     {unpack_series}
     for _ in range(HALVINGS):
         {judge_all}
-        known = {all_known}
+        proved = {all_proved}
         {falls_of_unsure}
-        unsure = unsure & isnt(known)
+        unsure = unsure & isnt(proved)
         if not some(unsure):
             break
         trial = where(unsure, 0.5 * trial, trial)
@@ -36,10 +38,7 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
 
     Returns
     -------
-    state, t, h, on : at the event, after the time t; `on` is 1 for the event that fired, and for what fell with it
-    stuck, lost, broken : pressed on what it started on; not there within limits; coefficients that are no numbers
-    grazing, hangs : neither met nor missed for sure; met, but only just
-    tried : steps
+    Leg
     """
     {states} = state
     {ons} = on
@@ -95,14 +94,14 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
             break
     lost = moving
     met = active & isnt(lost | stuck | broken | grazing)
-    part, which, hangs = span, -1.0 - 0.0 * h, nothing
+    end, which, hangs = span, -1.0 - 0.0 * h, nothing
     {roots}
     {with_it}
     {at_root}
     {on_kink}
-    t = where(met, t + part, t)
+    t = where(met, t + end, t)
     h = where(met & (t > 0.0) & (h > LONGEST * t), LONGEST * t, h)
-    return ({final}), t, h, ({fired}), stuck, lost, broken, grazing, hangs, tried
+    return Leg(({final}), t, h, ({fired}), stuck, lost, broken, grazing, hangs, tried)
 '''
 
 
@@ -111,6 +110,33 @@ of_rates, of_events = hidden(({states}), ({boxes}), side, signs, parameters)
 {power}
 seen = {all_seen}
 longest = where(seen, longest / COME_UP, COME_UP * trial)"""
+
+
+FACTS = """\
+e_{j}, d_{j} = fma(factor_{j}, event_{j}[0], offset_{j}), factor_{j} * event_{j}[1]
+dd_{j}, ddd_{j} = factor_{j} * event_{j}[2], factor_{j} * event_{j}[3]"""
+
+START = """\
+away_{j} = (d_{j} > 0.0) | ((d_{j} >= 0.0) & (dd_{j} > 0.0))
+now_{j} = (on_{j} < 0.5) & (e_{j} <= 0.0)"""
+
+MARGIN = "margin_{j} = SLACK * tolerance * (magnitude(offset_{j}) + magnitude(factor_{j} * event_{j}[0]))"
+
+CLEAR = "clear_{j} = clear(e_{j}, d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial, margin_{j})"
+
+FALLS = "falls(d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial) | now_{j}"
+
+BY_KINK = """\
+lead = where(e_{nested} > 0.0, d_0, 0.0)
+clear_0 = rises(lead, dd_0) & (clear_{nested} | falls_{nested})
+falls_0 = (rises(-lead, -dd_0) & clear_{nested}) | now_0"""
+
+ROOT = """\
+first = met & passed_{j}
+if some(first):
+    {among}
+    at, only_just = crossing({watched}, (offset_{j}, factor_{j}, {value}), span, tolerance, first)
+    end, which, hangs = where(first, at, end), where(first, {j}.0, which), (hangs & isnt(first)) | only_just"""
 
 
 def look(states, order, hides):
@@ -133,140 +159,208 @@ def look(states, order, hides):
     return seen and filled(LOOK, states=listed(states), boxes=boxes, power=power, all_seen=" & ".join(seen))
 
 
-def leg(states, events, order, nested=0, summed=(), seen=(), kinks_of_powers=(), hides=((), ())):
-    """The text of `to_event_{order}`: `states` are names, `events` the number of events."""
-    e = range(events)
+def leg(writer, order, hides):
+    """The text of `to_event_{order}`; `hides` says of each rate and of each event whether it can hide anything."""
+    source = LegSource(
+        writer.states,
+        1 + writer.kinks,
+        order,
+        writer.recorded.nested,
+        writer.summed(),
+        writer.seen(),
+        writer.kinks_of_powers(),
+        hides,
+    )
+    return source.text()
 
-    def state_at(s, x):
-        return f"fma(unit * {x}, mean({x}, s_{summed[s]}), {s})" if s in summed else f"horner({x}, s_{s})"
 
-    def seen_at(j, x):
-        return state_at(seen[j], x) if seen[j] else f"horner({x}, event_{j})"
+@dataclass(frozen=True)
+class LegSource:
+    """What the text of a leg is made of.
 
-    def curve(j):
+    states : names
+    events : how many
+    order : of the series
+    nested : number of the kink whose u is the rate of the surface; 0: none
+    summed : the states whose rate is another state, and which
+    seen : for each event the state that it watches, or None
+    kinks_of_powers : for each power its kink
+    hides : see `leg`
+    """
+
+    states: list
+    events: int
+    order: int
+    nested: int
+    summed: dict
+    seen: list
+    kinks_of_powers: list
+    hides: tuple
+
+    def text(self):
+        return filled(
+            LEG,
+            order=self.order,
+            states=listed(self.states),
+            **self._events(),
+            **self._facts(),
+            **self._start(),
+            **self._proofs(),
+            **self._doubts(),
+            **self._look(),
+            **self._cores(),
+            **self._step(),
+            **self._roots(),
+        )
+
+    def _each(self, pattern):
+        """The pattern for each event, `{j}` its number."""
+        return [pattern.format(j=j) for j in range(self.events)]
+
+    def _lines(self, pattern):
+        return "\n".join(self._each(pattern))
+
+    def _state_at(self, s, x):
+        return f"fma(unit * {x}, mean({x}, s_{self.summed[s]}), {s})" if s in self.summed else f"horner({x}, s_{s})"
+
+    def _seen_at(self, j, x):
+        """What an event watches."""
+        return self._state_at(self.seen[j], x) if self.seen[j] else f"horner({x}, event_{j})"
+
+    def _events(self):
+        """Tuples with an entry for each event."""
+        return {
+            "ons": listed(self._each("on_{j}")),
+            "nothings": listed(["nothing"] * self.events),
+            "no_passed": listed(self._each("passed_{j}")),
+            "no_now": listed(self._each("now_{j}")),
+            "no_falls": ", ".join(self._each("falls_{j}")),
+            "no_margins": self._lines("margin_{j} = 0.0 * h"),
+        }
+
+    def _facts(self):
+        """Series of the states and of the events, and the first coefficients of these."""
+        series = [f"s_{s}" for s in self.states] + self._each("(offset_{j}, factor_{j}, event_{j})")
+        left_out = [f"(last_term(h, s_{s}), size(h, s_{s}))" for s in self.states]
+        return {
+            "series_and_events": ", ".join(series),
+            "facts": self._lines(FACTS),
+            "left_out": folded("worse({}, {})", left_out),
+            "keeps": " & ".join(f"keeps(h, power_h, s_{s}, allowed)" for s in self.states),
+        }
+
+    def _start(self):
+        """What is asked at the start of a leg only."""
+        return {
+            "sum_last": "last = " + " + ".join(f"magnitude(s_{s}[-1])" for s in self.states),
+            "start": self._lines(START),
+            "margins": self._lines(MARGIN),
+            "any_stuck": " | ".join(self._each("((on_{j} > 0.5) & isnt(away_{j}))")),
+            "any_now": " | ".join(self._each("now_{j}")),
+        }
+
+    def _tail(self, j):
+        """A bound on A of (1) for an event; the factor of one that is a state is 1."""
+        return f"rest_{j} = {'tail' if j else 'magnitude(factor_0) * tail'}(trial, event_{j})"
+
+    def _proofs(self):
+        """What each event is proved to do in a step; where the surface's rate is a kink's u, by that kink."""
+        by_tails = [f"{self._tail(j)}\n{CLEAR}\nfalls_{{j}} = {FALLS}".format(j=j) for j in range(self.events)]
+        by_kink = BY_KINK.format(nested=self.nested)
+        return {
+            "judge": "\n".join([*by_tails[1:], by_kink] if self.nested else by_tails),
+            "all_sure": " & ".join(self._each("(clear_{j} | falls_{j})")),
+        }
+
+    def _doubts(self):
+        """The same for lanes whose step is halved until all is proved."""
+        names = ("e", "d", "dd", "ddd", "margin", "now", "falls")
+        facts = ", ".join(["factor_0", *(f"{name}_{j}" for j in range(self.events) for name in names)])
+        series = listed(self._each("event_{j}"))
+        doubts = [f"{self._tail(j)}\n{CLEAR}\ndown_{{j}} = {FALLS}".format(j=j) for j in range(self.events)]
+        return {
+            "judge_all": "\n".join(doubts),
+            "all_proved": " & ".join(self._each("(clear_{j} | down_{j})")),
+            "falls_of_unsure": self._lines("falls_{j} = (unsure & down_{j}) | (falls_{j} & isnt(unsure))"),
+            "facts_of_all": facts,
+            "series_of_all": series,
+            "unpack_facts": f"{facts} = facts",
+            "unpack_series": f"{series} = series",
+        }
+
+    def _look(self):
+        """What a step may hide."""
+        looked = look(self.states, self.order, self.hides)
+        return {
+            "longest": "longest = 0.0 * h + FAR" if looked else "",
+            "not_longest": "h = where(h < longest, h, longest)" if looked else "",
+            "look": looked or "",
+            "and_seen": " & seen" if looked else "",
+        }
+
+    def _cores(self):
+        """The cores of powers, and the steps that end with them."""
+        n = len(self.kinks_of_powers)
+        cores = [
+            f"at_core_{i}, longest_{i} = "
+            f"core_{i}(({listed(self.states)}), side, signs, parameters, unit, tolerance,"
+            f" (on_{1 + j} > 0.5) & (t <= 0.0), t, margin_{1 + j})"
+            for i, j in enumerate(self.kinks_of_powers)
+        ]
+        return {
+            "cores": "\n".join(cores),
+            "all_cores": f", ({listed(f'at_core_{i}' for i in range(n))})" if n else "",
+            "no_longer": "\n".join(f"h = where(h < longest_{i}, h, longest_{i})" for i in range(n)),
+        }
+
+    def _step(self):
+        """The end of a step, and which events are behind it."""
+        ends = [f"end_{s} = {self._state_at(s, 'trial')}" for s in self.states]
+        for j in range(self.events):
+            value = f"end_{self.seen[j]}" if self.seen[j] else self._seen_at(j, "trial")
+            ends.append(f"end_{j} = fma(factor_{j}, {value}, offset_{j})")
+        return {
+            "ends": "\n".join(ends),
+            "passed": self._lines("passed_{j} = passed_{j} | (steps & falls_{j} & (end_{j} <= 0.0))"),
+            "any_passed": " | ".join(self._each("passed_{j}")),
+            "advance": "\n".join(f"{s} = where(steps, end_{s}, {s})" for s in self.states),
+            "off": self._lines("now_{j} = now_{j} & meets"),
+        }
+
+    def _roots(self):
+        """Where in the last step the first event fires, what fires with it, and the state there."""
+        e = range(self.events)
+        on_kink = [(1 + j, self.seen[1 + j]) for j in sorted(set(self.kinks_of_powers))]
+        at_rest = [f"end_{u} = where({self._fires(j)}, 0.0 * end_{u}, end_{u})" for j, u in on_kink]
+        return {
+            "roots": "\n".join(self._root(j) for j in e),
+            "with_it": "\n".join(self._beside(j) for j in e) if self.events > 1 else "",
+            "at_root": "\n".join(f"end_{s} = where(met, {self._state_at(s, 'end')}, {s})" for s in self.states),
+            "on_kink": "\n".join(at_rest),
+            "final": listed(f"end_{s}" for s in self.states),
+            "fired": listed(f"where({self._fires(j)}, 1.0, 0.0)" for j in e),
+        }
+
+    def _curve(self, j):
         """Of what the event watches: how it is evaluated, its value at the start of the step."""
-        s = seen[j]
-        if s in summed:
-            return f"of_sum, ({s}, unit, s_{summed[s]})", s
+        s = self.seen[j]
+        if s in self.summed:
+            return f"of_sum, ({s}, unit, s_{self.summed[s]})", s
         return f"of_series, (event_{j},)", f"event_{j}[0]"
 
-    def root(j):
-        among = f"first = first & ((which < 0.0) | (fma(factor_{j}, {seen_at(j, 'part')}, offset_{j}) <= 0.0))"
-        watched, value = curve(j)
-        return f"""\
-first = met & passed_{j}
-if some(first):
-    {among if j else "# whatever else passed in this step"}
-    at, only_just = crossing({watched}, (offset_{j}, factor_{j}, {value}), span, tolerance, first)
-    part, which, hangs = where(first, at, part), where(first, {j}.0, which), (hangs & isnt(first)) | only_just"""
+    def _root(self, j):
+        among = f"first = first & ((which < 0.0) | (fma(factor_{j}, {self._seen_at(j, 'end')}, offset_{j}) <= 0.0))"
+        watched, value = self._curve(j)
+        return ROOT.format(
+            j=j, among=among if j else "# whatever else passed in this step", watched=watched, value=value
+        )
 
-    def with_it(j):
+    def _beside(self, j):
         return (
-            f"beside_{j} = met & passed_{j} & (magnitude(fma(factor_{j}, {seen_at(j, 'part')}, offset_{j}))"
+            f"beside_{j} = met & passed_{j} & (magnitude(fma(factor_{j}, {self._seen_at(j, 'end')}, offset_{j}))"
             f" <= fma(SAME, tolerance, ROUNDING) * (magnitude(offset_{j}) + magnitude(factor_{j} * event_{j}[0])))"
         )
 
-    def fires(j):
+    def _fires(self, j):
         own = f"met & (which > {j - 0.5}) & (which < {j + 0.5})"
-        return f"beside_{j} | ({own})" if events > 1 else own
-
-    facts = [
-        f"""\
-e_{j}, d_{j} = fma(factor_{j}, event_{j}[0], offset_{j}), factor_{j} * event_{j}[1]
-dd_{j}, ddd_{j} = factor_{j} * event_{j}[2], factor_{j} * event_{j}[3]"""
-        for j in e
-    ]
-    start = [
-        f"""\
-away_{j} = (d_{j} > 0.0) | ((d_{j} >= 0.0) & (dd_{j} > 0.0))
-now_{j} = (on_{j} < 0.5) & (e_{j} <= 0.0)"""
-        for j in e
-    ]
-    margins = [
-        f"margin_{j} = SLACK * tolerance * (magnitude(offset_{j}) + magnitude(factor_{j} * event_{j}[0]))" for j in e
-    ]
-    by_tails = [
-        f"""\
-rest_{j} = {"tail" if j else "magnitude(factor_0) * tail"}(trial, event_{j})
-clear_{j} = clear(e_{j}, d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial, margin_{j})
-falls_{j} = falls(d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial) | now_{j}"""
-        for j in e
-    ]
-    by_kink = f"""\
-lead = where(e_{nested} > 0.0, d_0, 0.0)
-clear_0 = rises(lead, dd_0) & (clear_{nested} | falls_{nested})
-falls_0 = (rises(-lead, -dd_0) & clear_{nested}) | now_0"""
-    judge = [*by_tails[1:], by_kink] if nested else by_tails
-    doubt = [
-        f"""\
-rest_{j} = {"tail" if j else "magnitude(factor_0) * tail"}(trial, event_{j})
-clear_{j} = clear(e_{j}, d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial, margin_{j})
-down_{j} = falls(d_{j}, dd_{j}, ddd_{j}, rest_{j}, trial) | now_{j}"""
-        for j in e
-    ]
-
-    on_kink = [(1 + j, seen[1 + j]) for j in sorted(set(kinks_of_powers))]
-    cores = [
-        f"at_core_{i}, longest_{i} = "
-        f"core_{i}(({listed(states)}), side, signs, parameters, unit, tolerance,"
-        f" (on_{1 + j} > 0.5) & (t <= 0.0), t, margin_{1 + j})"
-        for i, j in enumerate(kinks_of_powers)
-    ]
-    each = ("e", "d", "dd", "ddd", "margin", "now", "falls")
-    facts_of = [f"{name}_{j}" for j in e for name in each]
-    passed = [f"passed_{j} = passed_{j} | (steps & falls_{j} & (end_{j} <= 0.0))" for j in e]
-    looked = look(states, order, hides)
-    parts = {
-        "longest": "longest = 0.0 * h + FAR" if looked else "",
-        "not_longest": "h = where(h < longest, h, longest)" if looked else "",
-        "look": looked or "",
-        "and_seen": " & seen" if looked else "",
-        "series_and_events": ", ".join(
-            [f"s_{s}" for s in states] + [f"(offset_{j}, factor_{j}, event_{j})" for j in e]
-        ),
-        "sum_last": "last = " + " + ".join(f"magnitude(s_{s}[-1])" for s in states),
-        "facts": "\n".join(facts),
-        "start": "\n".join(start),
-        "margins": "\n".join(margins),
-        "any_stuck": " | ".join(f"((on_{j} > 0.5) & isnt(away_{j}))" for j in e),
-        "any_now": " | ".join(f"now_{j}" for j in e),
-        "nothings": listed(["nothing"] * events),
-        "no_passed": listed(f"passed_{j}" for j in e),
-        "no_now": listed(f"now_{j}" for j in e),
-        "no_margins": "\n".join(f"margin_{j} = 0.0 * h" for j in e),
-        "judge": "\n".join(judge),
-        "judge_all": "\n".join(doubt),
-        "all_known": " & ".join(f"(clear_{j} | down_{j})" for j in e),
-        "falls_of_unsure": "\n".join(f"falls_{j} = (unsure & down_{j}) | (falls_{j} & isnt(unsure))" for j in e),
-        "no_falls": ", ".join(f"falls_{j}" for j in e),
-        "facts_of_all": ", ".join(["factor_0", *facts_of]),
-        "series_of_all": listed(f"event_{j}" for j in e),
-        "unpack_facts": ", ".join(["factor_0", *facts_of]) + " = facts",
-        "unpack_series": listed(f"event_{j}" for j in e) + " = series",
-        "all_sure": " & ".join(f"(clear_{j} | falls_{j})" for j in e),
-        "ends": "\n".join(
-            [f"end_{s} = {state_at(s, 'trial')}" for s in states]
-            + [
-                f"end_{j} = fma(factor_{j}, {f'end_{seen[j]}' if seen[j] else seen_at(j, 'trial')}, offset_{j})"
-                for j in e
-            ]
-        ),
-        "passed": "\n".join(passed),
-        "any_passed": " | ".join(f"passed_{j}" for j in e),
-        "advance": "\n".join(f"{s} = where(steps, end_{s}, {s})" for s in states),
-        "off": "\n".join(f"now_{j} = now_{j} & meets" for j in e),
-        "cores": "\n".join(cores),
-        "all_cores": f", ({listed(f'at_core_{i}' for i in range(len(cores)))})" if cores else "",
-        "no_longer": "\n".join(f"h = where(h < longest_{i}, h, longest_{i})" for i in range(len(cores))),
-        "roots": "\n".join(root(j) for j in e),
-        "at_root": "\n".join(f"end_{s} = where(met, {state_at(s, 'part')}, {s})" for s in states),
-        "on_kink": "\n".join(f"end_{u} = where({fires(j)}, 0.0 * end_{u}, end_{u})" for j, u in on_kink),
-        "final": listed(f"end_{s}" for s in states),
-        "with_it": "\n".join(with_it(j) for j in e) if events > 1 else "",
-        "fired": listed(f"where({fires(j)}, 1.0, 0.0)" for j in e),
-        "left_out": folded("worse({}, {})", [f"(last_term(h, s_{s}), size(h, s_{s}))" for s in states]),
-        "keeps": " & ".join(f"keeps(h, power_h, s_{s}, allowed)" for s in states),
-        "states": listed(states),
-        "ons": listed(f"on_{j}" for j in e),
-    }
-    return filled(LEG, order=order, **parts)
+        return f"beside_{j} | ({own})" if self.events > 1 else own

@@ -21,7 +21,8 @@ from numba.core.errors import NumbaError
 from kernels.codegen.driver_source import BEGUN, EVENT, SETTLED, advance, shared
 from kernels.codegen.expression import DIV, FUNCTIONS, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, SceneError, needed
 from kernels.codegen.hidden_source import HIDDEN, hidden
-from kernels.codegen.leg_source import LEG, LOOK, leg
+from kernels.codegen.lane_source import BEGIN
+from kernels.codegen.leg_source import BY_KINK, FACTS, LEG, LOOK, ROOT, START, leg
 from kernels.codegen.power_core import CORE, core
 from kernels.codegen.record import record
 from kernels.codegen.rounding_source import LOST, lost_by_surface
@@ -58,15 +59,14 @@ from kernels.integrate.taylor import (
 from kernels.codegen.power_core import FAR, SHORT, UNEVEN, core_time, mean_power, no_matter, size_in_unit
 from kernels.codegen.driver_source import BLUR, EVENTS, KINK_LIMIT, time_unit
 from kernels.maths.elementary import exp, log, power, sincos
-from kernels.interface import FIRST_REFUSAL, Status
+from kernels.integrate.records import Leg, Start
+from kernels.lanes.codes import BAD_INPUT, GRAZING, INACCURATE, OUT_OF_RANGE, REFUSED, STICKS
+from kernels.lanes.codes import STEP_LIMIT as STEP_LIMIT_MET
 
 STATES = {states}
 PARAMETERS = {parameters}
 KINKS = {kinks}
 HIDES = {hides}
-REMARK, REFUSAL, BAD_INPUT = float(Status.GRAZING), float(FIRST_REFUSAL), float(Status.BAD_INPUT)
-INACCURATE = float(Status.INACCURATE)
-OUT_OF_RANGE, STICKS, STEP_LIMIT_MET = float(Status.OUT_OF_RANGE), float(Status.STICKS), float(Status.STEP_LIMIT)
 '''
 
 FUNCTION = '''
@@ -89,7 +89,8 @@ def series_{order}(state, side, signs, parameters, unit{also}):
 '''
 
 
-_TEXTS = HEAD, FUNCTION, SERIES, HIDDEN, LOST, LEG, LOOK, CORE, EVENT, BEGUN, SETTLED
+_OF_LEG = LEG, LOOK, FACTS, START, BY_KINK, ROOT
+_TEXTS = HEAD, FUNCTION, SERIES, HIDDEN, LOST, CORE, BEGIN, EVENT, BEGUN, SETTLED, *_OF_LEG
 _TAKEN = set(re.findall(r"\w+", "".join(_TEXTS))) | {"n", "p", "s"}
 _NUMBERED = re.compile(r"\w*_\d+|n\d+|(at|s|end|box|size|bare|full|kink|most|half|over|and_one|half_over)_\w*")
 
@@ -176,9 +177,9 @@ class Writer:
         """For each event the state that it watches; None where it is more than one."""
         return [self.names[u.args[0]] if u.kind == INPUT else None for _, _, u in self.recorded.events]
 
-    def lines_given(self, given):
-        """Lines of values, of which some are known."""
-        return Lines(self.names, given=given)
+    def lines_with(self, precomputed):
+        """Lines of values, of which some have names already."""
+        return Lines(self.names, precomputed=precomputed)
 
     def kinks_of_powers(self):
         """For each power its kink."""
@@ -222,18 +223,7 @@ class Writer:
         parts += [core(self, i) for i in range(len(recorded.graph.powers))]
         for order in ORDERS:
             parts.append(self.series(order, len(recorded.graph.powers)))
-            parts.append(
-                leg(
-                    self.states,
-                    1 + self.kinks,
-                    order,
-                    recorded.nested,
-                    self.summed(),
-                    self.seen(),
-                    self.kinks_of_powers(),
-                    hides,
-                )
-            )
+            parts.append(leg(self, order, hides))
             parts.append(advance(self.states, self.parameters, self.kinks, order, self.offset()))
         return "\n".join(parts)
 

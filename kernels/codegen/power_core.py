@@ -26,7 +26,7 @@ SHORT = 0.9
 
 CORE = '''
 @jit
-def given_{i}(state, side, signs, parameters, unit, power_{i}):
+def with_power_{i}(state, side, signs, parameters, unit, power_{i}):
     """The rates per unit of time, with a value of power {i}."""
     {unpack}
     {lines}
@@ -43,28 +43,28 @@ def core_{i}(state, side, signs, parameters, unit, tolerance, leaves, t, margin)
     {value_of_n}
     base = sign_{kink} * {u}
     value, nothing = power(base, {n}), 0.0 * side
-    {full} = given_{i}(state, side, signs, parameters, unit, value)
+    {full} = with_power_{i}(state, side, signs, parameters, unit, value)
     core, longest, nears = nothing - 1.0, nothing + FAR, sign_{kink} * full_{u} < 0.0
     if some(nears):
-        {bare} = given_{i}(state, side, signs, parameters, unit, nothing)
+        {bare} = with_power_{i}(state, side, signs, parameters, unit, nothing)
         over = 1.0 / magnitude(full_{u})
         t_{u}, d = base * over, magnitude(full_{u} - bare_{u}) * over
         uneven = t_{u} * (t_{u} + d)
         inside = nears & (d <= UNEVEN)
         {inside}
         core = where(inside, mean_power(value, {n}), -1.0)
-        {at_kink} = given_{i}(({on_kink}), side, signs, parameters, unit, nothing)
+        {at_kink} = with_power_{i}(({on_kink}), side, signs, parameters, unit, nothing)
         settles = nears & (kink_{u} <= 0.0) & (kink_{u} >= 0.0) & ({n} < 1.0)
         left = t_{u} / (1.0 - {n})
         rests = settles & no_matter(base, left, t, margin)
         core = where(rests, value * (1.0 - {n}), core)
         longest = where(settles & isnt(rests), SHORT * left, longest)
     if some(leaves):
-        {bare} = given_{i}(state, side, signs, parameters, unit, nothing)
-        {most} = given_{i}(state, side, signs, parameters, unit, nothing + 1.0)
-        room = nothing + FAR
-        {room}
-        reach = core_time(room, magnitude(bare_{u}), magnitude(most_{u} - bare_{u}), {n}, tolerance)
+        {bare} = with_power_{i}(state, side, signs, parameters, unit, nothing)
+        {most} = with_power_{i}(state, side, signs, parameters, unit, nothing + 1.0)
+        capacity = nothing + FAR
+        {capacity}
+        reach = core_time(capacity, magnitude(bare_{u}), magnitude(most_{u} - bare_{u}), {n}, tolerance)
         mean = mean_power(power(magnitude(bare_{u}) * reach, {n}), {n})
         core, longest = where(leaves, mean, core), where(leaves, reach, longest)
     return core, longest
@@ -90,13 +90,13 @@ def no_matter(u, left, t, margin):
 
 
 @jit
-def core_time(room, rate, most, n, tolerance):
+def core_time(capacity, rate, most, n, tolerance):
     """How long u = rate t may be taken for small, by (1); at most 1 unit.
 
-    `room` is the least size of a state over what the power, were it 1, would add to its rate; `most` is that of u.
+    `capacity` is the least size of a state over what the power, were it 1, would add to its rate; `most` is that of u.
     """
     drag = power(rate, n)
-    whole = 0.5 * tolerance * room / drag  # D t^2 <= half the tolerance times the size
+    whole = 0.5 * tolerance * capacity / drag  # D t^2 <= half the tolerance times the size
     slow = power(_no_more_than_one(whole), 1.0 / (n + 2.0))
     even = power(_no_more_than_one(whole * (rate / (most * drag))), 1.0 / (2.0 * n + 1.0))
     mild = where(n > 0.0, power(_no_more_than_one(UNEVEN * (rate / (most * drag))), 1.0 / where(n > 0.0, n, 1.0)), 1.0)
@@ -115,24 +115,24 @@ def core(writer, i):
     base, exponent = node.args
     kink = writer.kinks_of_powers()[i]
     states, u = writer.states, writer.names[base.args[1].args[0]]
-    lines = writer.lines_given({node: f"power_{i}"})
+    lines = writer.lines_with({node: f"power_{i}"})
     rates = [lines.value(rate) for rate in writer.recorded.timed]
-    of_n = writer.lines_given({})
+    of_n = writer.lines_with({})
     n = of_n.value(exponent)
     inside = [
         f"inside = inside & (magnitude(full_{s} - bare_{s}) * uneven <= tolerance * size_in_unit({s}, full_{s}))"
         for s in states
     ]
-    room = [
+    capacity = [
         f"""\
 share = size_in_unit({s}, bare_{s}) / magnitude(most_{s} - bare_{s})
-room = where(share < room, share, room)"""
+capacity = where(share < capacity, share, capacity)"""
         for s in states
     ]
     return filled(
         CORE, i=i, kink=kink, u=u, n=n, unpack=writer.all_unpacked, lines="\n".join(lines.text),
         rates=f"({listed(rates)})",
-        value_of_n="\n".join(of_n.text), inside="\n".join(inside), room="\n".join(room),
+        value_of_n="\n".join(of_n.text), inside="\n".join(inside), capacity="\n".join(capacity),
         bare=listed(f"bare_{s}" for s in states), full=listed(f"full_{s}" for s in states),
         most=listed(f"most_{s}" for s in states), at_kink=listed(f"kink_{s}" for s in states),
         on_kink=listed("0.0 * side" if s == u else s for s in states),

@@ -33,17 +33,17 @@ def record(scene):
     """Calls each function of the scene once with recording objects. Raises SceneError."""
     graph = Graph()
     states = {name: graph.series(name) for name in scene.states}
-    known = {name: graph.constant(name) for name in (*scene.parameters, "side")}
-    rates = _called(graph, scene, "rates", states | known, len(states))
-    surface = _called(graph, scene, "surface", states | known, 1)[0]
+    constants = {name: graph.constant(name) for name in (*scene.parameters, "side")}
+    rates = _called(graph, scene, "rates", states | constants, len(states))
+    surface = _called(graph, scene, "surface", states | constants, 1)[0]
     if not surface.varies:
         raise SceneError(f"surface of the scene {scene.name}: it does not depend on a state, so no motion meets it")
     switched = tuple(states.values())
     if scene.switch is not None:
-        switched = _called(graph, scene, "switch", states | known, len(states))
+        switched = _called(graph, scene, "switch", states | constants, len(states))
     unit = graph.constant(".unit")
     timed = tuple(graph.timed(rate, unit) for rate in rates)
-    started = _called(graph, scene, "start", known, len(states))
+    started = _called(graph, scene, "start", constants, len(states))
     kinks = [(graph.of(0.0), graph.constant(f".sign_{j}"), u) for j, u in enumerate(graph.kinks)]
     events = (_affine(graph, surface), *kinks)
     return Recorded(

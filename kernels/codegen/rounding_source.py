@@ -33,17 +33,17 @@ class Losses:
 
     def __init__(self, names, started):
         self.lines = Lines(names)
-        self._started, self._known = started, {}
+        self._started, self._reused = started, {}
 
     def lost(self, x):
         """The name of what the value of an expression has lost."""
-        if x.index not in self._known:
-            self._known[x.index] = None
+        if x.index not in self._reused:
+            self._reused[x.index] = None
             text = " + ".join(filter(None, self._terms(x)))
             if text:
                 self.lines.text.append(f"lost_{x.index} = {text}")
-                self._known[x.index] = f"lost_{x.index}"
-        return self._known[x.index]
+                self._reused[x.index] = f"lost_{x.index}"
+        return self._reused[x.index]
 
     def _terms(self, x):
         if x.kind == NUMBER:

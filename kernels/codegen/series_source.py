@@ -18,20 +18,20 @@ from kernels.codegen.expression import INPUT, NUMBER, SCALED
 class Lines:
     """Statements that compute expressions; each is written when it is first asked for.
 
-    An expression's coefficient is known by a name, a literal, or None where it is 0.
+    An expression's coefficient is told by a name, a literal, or None where it is 0.
 
     Parameters
     ----------
     names : dict from the name of an input to its name in the text
     rates : dict from the name of a state to the expression of its rate, for coefficients above the 0th
     cores : whether constants core_0, core_1, ... stand for the powers of a state's abs, where they are not below 0
-    given : dict from an expression to the name of its value, where that is known
+    precomputed : dict from an expression to the name of its value, where there is one
     """
 
-    def __init__(self, names, rates=None, cores=False, given=None):
+    def __init__(self, names, rates=None, cores=False, precomputed=None):
         self.text = []
         self._names, self._rates, self._cores = names, rates or {}, cores
-        self._known = {(x.index, 0): name for x, name in (given or {}).items()}
+        self._reused = {(x.index, 0): name for x, name in (precomputed or {}).items()}
 
     def value(self, x):
         """The name of an expression's value."""
@@ -39,9 +39,9 @@ class Lines:
 
     def coefficient(self, x, k):
         """The name of the k-th Taylor coefficient; None where it is 0 for every motion."""
-        if (x.index, k) not in self._known:
-            self._known[x.index, k] = None if k and not x.varies else self._write(x, k)
-        return self._known[x.index, k]
+        if (x.index, k) not in self._reused:
+            self._reused[x.index, k] = None if k and not x.varies else self._write(x, k)
+        return self._reused[x.index, k]
 
     def coefficients(self, x, order):
         """A tuple of the coefficients up to `order`, as text."""
@@ -170,18 +170,18 @@ class Lines:
 
     def _once(self, x, what, text):
         """A quantity of a value, written once."""
-        if (x.index, what) not in self._known:
-            self._known[x.index, what] = self._named(f"{what}_{x.index}", text.format(self.value(x)))
-        return self._known[x.index, what]
+        if (x.index, what) not in self._reused:
+            self._reused[x.index, what] = self._named(f"{what}_{x.index}", text.format(self.value(x)))
+        return self._reused[x.index, what]
 
     def _rate(self, x, j):
         """j x_j."""
-        if (x.index, j, "rate") not in self._known:
+        if (x.index, j, "rate") not in self._reused:
             name = self.coefficient(x, j)
-            self._known[x.index, j, "rate"] = name and (
+            self._reused[x.index, j, "rate"] = name and (
                 name if j == 1 else self._named(f"{name}_rate", f"{float(j)!r} * {name}")
             )
-        return self._known[x.index, j, "rate"]
+        return self._reused[x.index, j, "rate"]
 
     def _rate_sum(self, u, x, k):
         """sum over j > 0 of j u_j x_{k-j}."""

@@ -1,10 +1,15 @@
-"""The written module of a scene's fixed-step methods: what does not fit in one function for all scenes.
+"""The written modules of a scene's Runge-Kutta methods, at a fixed step and to a tolerance.
 
-It lies beside the scene's own module (`module`), whose functions it takes.
+They have what does not fit in one function for all scenes, and lie beside the scene's own module (`module`), whose
+functions they take. To a tolerance a cell is followed twice, as by the Taylor method.
 """
 
+from types import SimpleNamespace
+
+from kernels.codegen import followed_twice
 from kernels.codegen.driver_source import advance
 from kernels.codegen.expression import INPUT
+from kernels.codegen.lane_source import BEGIN, begun_rows, loaded_rows, stored_rows
 from kernels.codegen.module import Writer, build, loaded
 from kernels.codegen.record import record
 from kernels.codegen.template import filled, listed
@@ -12,6 +17,12 @@ from kernels.integrate.events import METHODS
 
 BLUR = 1e-14
 """Of the surface's value at the start, what rounding may take from it unremarked."""
+
+APART = {"dopri5": followed_twice.APART, "dop853": 4.0}
+"""How many rtol the two runs may differ by; DOP853's weights of up to 43 make more of rounding than the others do."""
+
+FINEST = 1e-13
+"""The tightest tolerance that is tried where a wider one fails: below it rounding stops the steps."""
 
 TEXT = '''
 """Fixed-step methods of {name}: written by kernels; do not change it here."""
@@ -21,6 +32,8 @@ import sys
 from collections import namedtuple
 
 from kernels.integrate.fixed_step import follow
+from kernels.integrate.records import Limits, Motion, Scheme, Tally
+from kernels.lanes.codes import BAD_INPUT, INACCURATE, REFUSED
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import fma, isnt, magnitude, some, where
 from kernels.lanes.refill import each_refilled
@@ -70,22 +83,18 @@ def advance(memory, i):
     """Every lane on by some steps; whether one has finished."""
     {load}
     parameters = ({parameters})
-    fresh = (stage > 0.5) & (stage < 1.5)
-    active = fresh | ((stage > 1.5) & (stage < 2.5))
-    if some(fresh):
-        s, p, g, u, o, beyond, blur = begun(flips, parameters)
-        {begin}
-        endless = isnt((flips >= 1.0) & (flips < math.inf))
-        unsure = where(blur <= {blur}, 0.0, {inaccurate})
-        verdict = where(fresh, where(beyond | endless, {bad_input}, unsure), verdict)
-    how = int(memory[{method}][0]), int(memory[{method} + 1][0]), int(memory[{method} + 2][0])
-    motion = ({states},), side, ({signs}), ({ons}), cut, cuts
-    tally = time, since, interval, count, steps, calls, trials, ({reach}), ({at}), ({before}), wide, slim, verdict
-    moving = active & (verdict < 64.0)
-    motion, tally, ended = follow(M, how, parameters, (flips, step, graze), motion, tally, moving)
+    {begin}
+    scheme = Scheme(int(memory[{method}][0]), int(memory[{location}][0]), int(memory[{substeps}][0]))
+    motion = Motion(({states},), side, ({signs}), ({ons}), cut, cuts)
+    tally = Tally(
+        time, since, interval, count, steps, calls, trials, ({reach}), ({at}), ({before}), wide, slim
+    )
+    moving = active & (verdict < REFUSED)
+    limits = Limits(flips, step, graze)
+    motion, tally, verdict, ended = follow(M, scheme, parameters, limits, motion, tally, verdict, moving)
     ({states},), side, ({signs}), ({ons}), cut, cuts = motion
-    time, since, interval, count, steps, calls, trials, ({reach}), ({at}), ({before}), wide, slim, verdict = tally
-    done = active & (ended | (verdict >= 64.0))
+    time, since, interval, count, steps, calls, trials, ({reach}), ({at}), ({before}), wide, slim = tally
+    done = active & (ended | (verdict >= REFUSED))
     stage = where(done, 3.0, where(active, 2.0, stage))
     {store}
     return some(done)
@@ -115,68 +124,80 @@ def methods_of(scene):
     return tuple(name for name in METHODS if lacks.get(name, True))
 
 
+def _prefixed(prefix, names):
+    return [f"{prefix}_{name}" for name in names]
+
+
 def _text(scene, module):
     kinks = module.KINKS
-    states, parameters = ([f"q_{name}" for name in names] for names in (scene.states, scene.parameters))
-    signs = [f"sign_{j}" for j in range(kinks)]
-    ons = [f"on_{j}" for j in range(1 + kinks)]
-    reach, at, before = ([f"{kind}_{s}" for s in states] for kind in ("reach", "at", "before"))
-    inputs = [*parameters, "flips", "step", "graze", "method", "location", "parts"]
+    states, parameters = _prefixed("q", scene.states), _prefixed("q", scene.parameters)
+    signs, ons = _prefixed("sign", range(kinks)), _prefixed("on", range(1 + kinks))
+    reach, at, before = (_prefixed(kind, states) for kind in ("reach", "at", "before"))
+    scheme = ["method", "location", "substeps"]
+    inputs = [*parameters, "flips", "step", "graze", *scheme]
     results = ["time", "interval", *at, *before, "slim", "steps", "calls", "verdict"]
-    work = [*states, "side", *signs, *ons, "cut", "cuts", "since", "count", "trials", "wide", *reach]
-    rows = ["stage", *inputs, *results, *work]
-    begin = [f"{s} = where(fresh, s[{j}], {s})" for j, s in enumerate(states)]
-    begin += [f"{s} = where(fresh, g[{j}], {s})" for j, s in enumerate(signs)]
-    begin += [f"{o} = where(fresh, o[{j}], {o})" for j, o in enumerate(ons)]
-    begin += ["side = where(fresh, p, side)"]
-    begin += [f"{r} = where(fresh, magnitude({s}), {r})" for r, s in zip(reach, states, strict=True)]
+    between = [*states, "side", *signs, *ons, "cut", "cuts", "since", "count", "trials", "wide", *reach]
+    rows = ["stage", *inputs, *results, *between]
     zeros = ("time", "interval", "steps", "calls", "cut", "cuts", "since", "count", "trials", "wide", *at, *before)
-    begin += [f"{r} = where(fresh, 0.0, {r})" for r in zeros] + ["slim = where(fresh, math.inf, slim)"]
-    changed = ["stage", *results, *work]
-    events = range(1 + kinks)
+    values = [("side", "start.side"), ("slim", "math.inf"), *((name, "0.0") for name in zeros)]
+    values += [(r, f"magnitude({s})") for r, s in zip(reach, states, strict=True)]
+    begin = filled(BEGIN, begin=begun_rows(states, signs, ons, values), blur=repr(BLUR))
     return filled(
-        TEXT, name=scene.name, module=module.__name__, kinks=kinks, signs=listed(signs),
-        states=", ".join(states),
+        TEXT, name=scene.name, module=module.__name__, kinks=kinks, signs=listed(signs), states=", ".join(states),
         ons=listed(ons), reach=listed(reach), at=listed(at), before=listed(before), parameters=listed(parameters),
-        unpack=", ".join([f"s_{s}" for s in states] + [f"(offset_{j}, factor_{j}, event_{j})" for j in events]),
-        values=listed(f"fma(factor_{j}, event_{j}[0], offset_{j})" for j in events),
-        slopes=listed(f"factor_{j} * event_{j}[1]" for j in events),
-        rates=listed(f"d_{s}" for s in states), over=", ".join(f"d_{s} / slope" for s in states),
-        choose_slope="\n".join(
-            f"slope = where((which > {j}.0 - 0.5) & (which < {j}.0 + 0.5), slopes[{j}], slope)" for j in events[1:]
-        ),
-        load="\n".join(f"{r} = memory[{j}][i]" for j, r in enumerate(rows) if r not in ("method", "location", "parts")),
-        begin="\n".join(begin), bad_input=64.0, inaccurate=1.0, blur=BLUR,
-        method=rows.index("method"), rows=tuple(rows),
-        store="\n".join(f"memory[{rows.index(r)}][i] = {r}" for r in changed),
+        load=loaded_rows(rows, [name for name in rows if name not in scheme]), begin=begin.rstrip(),
+        **{name: rows.index(name) for name in scheme}, rows=tuple(rows),
+        store=stored_rows(rows, ["stage", *results, *between]), **_events_of(states, kinks),
     )  # fmt: skip
+
+
+def _events_of(states, kinks):
+    """What the texts of `events` and of `swapped_rates` are made of."""
+    events = range(1 + kinks)
+    series = [f"s_{s}" for s in states] + [f"(offset_{j}, factor_{j}, event_{j})" for j in events]
+    choices = [f"slope = where((which > {j}.0 - 0.5) & (which < {j}.0 + 0.5), slopes[{j}], slope)" for j in events[1:]]
+    return {
+        "unpack": ", ".join(series),
+        "values": listed(f"fma(factor_{j}, event_{j}[0], offset_{j})" for j in events),
+        "slopes": listed(f"factor_{j} * event_{j}[1]" for j in events),
+        "rates": listed(f"d_{s}" for s in states),
+        "over": ", ".join(f"d_{s} / slope" for s in states),
+        "choose_slope": "\n".join(choices),
+    }
 
 
 LEGS = '''
 """Legs of {name} to a tolerance: written by kernels; do not change it here."""
 
-from kernels.integrate import adaptive as _adaptive_step
 from {module} import *
 from {steps} import M
+from kernels.integrate.adaptive import to_event
+from kernels.integrate.pairs import DOP853, DOPRI5
+from kernels.integrate.records import Mode
 
 
 @jit_call
 def to_event_dopri5(state, side, signs, parameters, unit, h, on, tolerance, active):
     """The leg of Dormand-Prince 5(4)."""
-    return _adaptive_step.to_event(
-        M, _adaptive_step.dopri5_tried, _adaptive_step.dopri5_series, _adaptive_step.dopri5_dense,
-        _adaptive_step.dopri5_vague, 5.0, state, side, signs, parameters, unit, h, on, tolerance, active,
-    )
+    return to_event(M, DOPRI5, state, Mode(side, signs, parameters, False), unit, h, on, tolerance, active)
 
 
 @jit_call
 def to_event_dop853(state, side, signs, parameters, unit, h, on, tolerance, active):
     """The leg of DOP853."""
-    return _adaptive_step.to_event(
-        M, _adaptive_step.dop853_tried, _adaptive_step.dop853_series, _adaptive_step.dop853_dense,
-        _adaptive_step.dop853_vague, 8.0, state, side, signs, parameters, unit, h, on, tolerance, active,
-    )
+    return to_event(M, DOP853, state, Mode(side, signs, parameters, False), unit, h, on, tolerance, active)
 '''
+
+
+def twice_by(method, scene):
+    """The function of columns (`followed_twice.twice`) that follows the scene by "dopri5" or "dop853"."""
+
+    def twice(module, columns, rtol, outputs, status):
+        run = getattr(adaptive(scene), f"run_{method}")
+        runs = SimpleNamespace(STATES=module.STATES, ROWS=module.ROWS, run_12=run, run_18=run)
+        followed_twice.twice(runs, columns, rtol, outputs, status, APART[method], FINEST)
+
+    return twice
 
 
 def adaptive(scene):

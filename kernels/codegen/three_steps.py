@@ -19,7 +19,7 @@ from kernels.lanes.refill import fresh
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW
 
 LOCATED, BLIND = ((0.37, 2.0), (0.77, 1.0)), ((0.23, 1.0), (0.61, 1.0))
-"""Length of the finest run's steps and of those of the run between, and how many parts a step has."""
+"""Length of the finest run's steps and of those of the run between, and how many substeps a step has."""
 SAFETY = 2.0
 """A switch found by a line or a polynomial is off by 1/(1 - 0.37) of what two runs differ by if only the order is 1."""
 GROWS = 0.1
@@ -34,19 +34,19 @@ GRAZING = 1e-9
 """Of an event's value at the start of a step: how close to 0 it may turn round in it unremarked."""
 
 
-def followed(module, method, columns, step, location, parts=1.0):
+def followed(module, method, columns, step, location, substeps=1.0):
     """A column per cell of: time, interval, states, their reach, margin behind a switch, steps, calls, status.
 
     Parameters
     ----------
     columns : the parameters and the number of switches
     step, location : columns
-    parts : of a step
+    substeps : of a step
     """
     results = np.full((6 + 2 * len(module.STATES), len(step)), np.nan)
-    for way in np.unique(location):
-        cells = location == way
-        extra = (step, GRAZING, METHODS.index(method), way, parts)
+    for one in np.unique(location):
+        cells = location == one
+        extra = (step, GRAZING, METHODS.index(method), one, substeps)
         rows = [np.broadcast_to(c, step.shape)[cells] for c in (*columns, *extra)]
         table = fresh(len(module.ROWS), rows)
         module.run(table, False)
@@ -69,22 +69,22 @@ def solved(module, method, columns, step, location):
     with np.errstate(all="ignore"):
         error = np.where(blind, np.maximum(error, step / first[1]), error)
     status = _status(first, finest, between)
-    known = (finest[-1] < FIRST_REFUSAL) & (between[-1] < FIRST_REFUSAL)
-    status = np.where((status < Status.GRAZING) & unsure & known, Status.GRAZING, status)
-    status = np.where((status == Status.OK) & grows & known, Status.INACCURATE, status)
-    error = np.where(status < FIRST_REFUSAL, np.where(known & (error < np.inf), error, np.inf), np.nan)
+    reliable = (finest[-1] < FIRST_REFUSAL) & (between[-1] < FIRST_REFUSAL)
+    status = np.where((status < Status.GRAZING) & unsure & reliable, Status.GRAZING, status)
+    status = np.where((status == Status.OK) & grows & reliable, Status.INACCURATE, status)
+    error = np.where(status < FIRST_REFUSAL, np.where(reliable & (error < np.inf), error, np.inf), np.nan)
     return np.delete(first, (-4, -1), axis=0), error, status
 
 
 def _again(module, method, columns, step, location, blind):
     """The finest run and the one between."""
     runs = []
-    for ways in zip(LOCATED, BLIND, strict=True):
+    for located, unlocated in zip(LOCATED, BLIND, strict=True):
         run = np.full((6 + 2 * len(module.STATES), len(step)), np.nan)
-        for cells, (length, parts) in zip((~blind, blind), ways, strict=True):
+        for cells, (length, substeps) in ((~blind, located), (blind, unlocated)):
             if cells.any():
-                some = [np.broadcast_to(c, step.shape)[cells] for c in columns]
-                run[:, cells] = followed(module, method, some, length * step[cells], location[cells], parts)
+                those = [np.broadcast_to(c, step.shape)[cells] for c in columns]
+                run[:, cells] = followed(module, method, those, length * step[cells], location[cells], substeps)
         runs.append(run)
     return runs
 

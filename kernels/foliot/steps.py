@@ -11,8 +11,8 @@ OUT_OF_RANGE: the method blew up.
 """
 
 from kernels.interface import Field, Kernel, Status
-from kernels.scene import Scene, _check, _signed, sign
-from kernels.stepping import WORK, stepping_fields, stepping_methods
+from kernels.scene import Scene, limits_check, sign, signed
+from kernels.stepping import COST, stepping_fields, stepping_methods
 
 
 def rates(angle, speed, side, mu, a, R, c, k):
@@ -51,12 +51,12 @@ OUTPUTS = (
     Field("time", "s", "time of the last switch"),
     Field("amplitude", "rad", "largest angle since the switch before the last"),
     Field("crossing_speed", "rad/s", "speed just before the last switch"),
-    *WORK,
+    *COST,
 )
 
 
 def _fill(time, interval, states, reach, columns):
-    """The outputs but those of the work."""
+    """The outputs but those of the cost."""
     period, last, amplitude, crossing_speed = columns
     period[:], last[:], amplitude[:], crossing_speed[:] = 2.0 * interval, time, reach[0], abs(states[1])
 
@@ -68,8 +68,8 @@ def _check_columns(*columns):
     status[(status == Status.OK) & (mu <= R)] = Status.NEVER_STARTS
 
 
-_limits = _check(PARAMETERS)
-check = _signed(_check_columns, [*(f.name for f in PARAMETERS), "status"])
+_limits = limits_check(PARAMETERS)
+check = signed(_check_columns, [*(f.name for f in PARAMETERS), "status"])
 
 FOLIOT_STEPS = Kernel(
     name="foliot_steps",

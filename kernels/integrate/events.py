@@ -8,7 +8,8 @@ extension. `henon` goes from behind the event back onto it in one step, with the
 Source: Henon, Physica D 5:412 (1982). `none` takes the event to fire at the end of the step: the fault to be shown.
 """
 
-from kernels.integrate.steps import dop853, dopri5, euler, moreau, rk4, semi_implicit, verlet
+from kernels.integrate.records import Mode
+from kernels.integrate.steps import dop853, dopri5, euler, events, moreau, rk4, semi_implicit, verlet
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.tuples import but_last, with_last
 from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
@@ -29,24 +30,24 @@ CLOSE = 0.1
 
 
 @jit_call
-def leap(m, method, parts, state, scene, h):
-    """`parts` equal steps that make up h."""
-    part = h / parts
-    for _ in range(parts):
-        if method == EULER:
-            state = euler(m, state, scene, part)
-        elif method == SEMI_IMPLICIT:
-            state = semi_implicit(m, state, scene, part)
-        elif method == VERLET:
-            state = verlet(m, state, scene, part)
-        elif method == RK4:
-            state = rk4(m, state, scene, part)
-        elif method == DOPRI5:
-            state = dopri5(m, state, scene, part)
-        elif method == DOP853:
-            state = dop853(m, state, scene, part)
+def leap(m, scheme, state, mode, h):
+    """The equal substeps that make up h."""
+    substep = h / scheme.substeps
+    for _ in range(scheme.substeps):
+        if scheme.method == EULER:
+            state = euler(m, state, mode, substep)
+        elif scheme.method == SEMI_IMPLICIT:
+            state = semi_implicit(m, state, mode, substep)
+        elif scheme.method == VERLET:
+            state = verlet(m, state, mode, substep)
+        elif scheme.method == RK4:
+            state = rk4(m, state, mode, substep)
+        elif scheme.method == DOPRI5:
+            state = dopri5(m, state, mode, substep)
+        elif scheme.method == DOP853:
+            state = dop853(m, state, mode, substep)
         else:
-            state = moreau(m, state, scene, part)
+            state = moreau(m, state, mode, substep)
     return state
 
 
@@ -96,22 +97,22 @@ def of_event(values, which):
 
 
 @jit_call
-def shortened(m, method, parts, state, scene, h, which, first, ends, seeking):
+def shortened(m, scheme, mode, step, which, first, seeking):
     """The step that ends on the event: part of h, state, trials, and whether it is not found.
 
     Regula falsi with halving (Illinois): the event's rate is not the slope of its value over the step's length.
     """
-    side, signs, parameters, _ = scene
+    h = step.h
     low, high, part, trials = 0.0 * h, 0.0 * h + 1.0, first, 0.0 * h
-    above, below = ends
-    new = leap(m, method, parts, state, scene, part * h)
+    above, below = of_event(step.start, which), of_event(step.end, which)
+    new = leap(m, scheme, step.state, mode, part * h)
     settled, last = seeking & isnt(seeking), 0.0 * h
     for _ in range(ROOT_LIMIT):
         trials = where(seeking, trials + 1.0, trials)
         seeking = seeking & isnt(settled)
         if not some(seeking):
             break
-        value = of_event(m.events(new, side, signs, parameters)[0], which)
+        value = of_event(events(m, new, mode)[0], which)
         before = value > 0.0
         above = where(before, value, where(last < 0.0, 0.5 * above, above))
         below = where(before, where(last > 0.0, 0.5 * below, below), value)
@@ -120,23 +121,22 @@ def shortened(m, method, parts, state, scene, h, which, first, ends, seeking):
         guess = fma(high - low, above / (above - below), low)
         settled = (magnitude(guess - part) <= SETTLED) | (magnitude(value) <= 0.0)
         part = where(seeking, guess, part)
-        new = choose(seeking, leap(m, method, parts, state, scene, part * h), new)
+        new = choose(seeking, leap(m, scheme, step.state, mode, part * h), new)
     return part, new, trials, seeking
 
 
 @jit_call
-def swapped(m, method, parts, state, scene, h, which, value):
+def swapped(m, scheme, mode, step, which, value):
     """From behind the event, where it has that value, back onto it by (1): part of h, state, whether it is there."""
-    side, signs, parameters, _ = scene
-    wide = with_last(with_last(state, h), which)
-    held = side, signs, parameters, False
-    if method in (DOP853, DOPRI5):
-        for _ in range(parts):
-            wide = dop853(m.swap, wide, held, -value / parts)
+    wide = with_last(with_last(step.new, step.h), which)
+    held = Mode(mode.side, mode.signs, mode.parameters, False)
+    if scheme.method in (DOP853, DOPRI5):
+        for _ in range(scheme.substeps):
+            wide = dop853(m.swap, wide, held, -value / scheme.substeps)
     else:
-        for _ in range(parts):
-            wide = rk4(m.swap, wide, held, -value / parts)
+        for _ in range(scheme.substeps):
+            wide = rk4(m.swap, wide, held, -value / scheme.substeps)
     time, found = but_last(wide)[-1], but_last(but_last(wide))
-    left = of_event(m.events(found, side, signs, parameters)[0], which)
-    there = (magnitude(left) <= -CLOSE * value) & (time > -CLOSE * h) & (time <= h)
-    return time / h, found, there
+    left = of_event(events(m, found, mode)[0], which)
+    there = (magnitude(left) <= -CLOSE * value) & (time > -CLOSE * step.h) & (time <= step.h)
+    return time / step.h, found, there

@@ -7,6 +7,7 @@ halved; what cannot leave it sticks.
 """
 
 import math
+from typing import NamedTuple
 
 from kernels.integrate.events import (
     CALLS,
@@ -22,8 +23,10 @@ from kernels.integrate.events import (
     shortened,
     swapped,
 )
-from kernels.integrate.steps import ONE, rate
-from kernels.interface import FIRST_REFUSAL, Status
+from kernels.integrate.records import Mode, Motion, Step, Tally
+from kernels.integrate.steps import ONE, events, rate
+from kernels.lanes import codes
+from kernels.lanes.codes import GRAZING, INACCURATE, NOT_CONVERGED, OUT_OF_RANGE, REFUSED, STICKS
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.tuples import after, boxes, joined, marks, reached, times, turned
 from kernels.lanes.vectors import choose, isnt, magnitude, some, where
@@ -39,34 +42,31 @@ HIDDEN = 1e-13
 LOW = 0.25
 """Of the smaller end: an event that the cubic takes below this share of it is looked at where it is lowest."""
 
-_REFUSAL, _GRAZING = float(FIRST_REFUSAL), float(Status.GRAZING)
-_STICKS, _STEP_LIMIT, _OUT_OF_RANGE = float(Status.STICKS), float(Status.STEP_LIMIT), float(Status.OUT_OF_RANGE)
-_NOT_CONVERGED, _INACCURATE = float(Status.NOT_CONVERGED), float(Status.INACCURATE)
-
 
 @jit
-def first_event(start, end, end_rate, on, natural):
+def first_event(step, on, natural):
     """The event passed first in a step, by the line between the ends; -1 where none is.
 
     Without location only the switch counts, and not while it still rises from below.
     """
+    start, end = step.start, step.end
     which, earliest = 0.0 * start[0] - 1.0, 0.0 * start[0] + math.inf
     for j in range(1 if natural else len(start)):
         part = where(start[j] > 0.0, start[j] / (start[j] - end[j]), 0.0)
         passed = (end[j] <= 0.0) & (part < earliest)
         if natural:
-            passed = passed & isnt((on[j] > 0.5) & (end_rate[j] > 0.0))
+            passed = passed & isnt((on[j] > 0.5) & (step.end_rates[j] > 0.0))
         which, earliest = where(passed, float(j), which), where(passed, part, earliest)
-    return which, earliest
+    return which
 
 
 @jit
-def dip(start, end, start_rate, end_rate, h):
+def dip(step):
     """Where in the step an event that ends above 0 may have been below it; 0 where none was."""
-    at = 0.0 * h
+    start, end, h, at = step.start, step.end, step.h, 0.0 * step.h
     for j in range(len(start)):
-        turns = (start[j] > 0.0) & (end[j] > 0.0) & (start_rate[j] < 0.0) & (end_rate[j] > 0.0)
-        s, low = lowest(start[j], end[j], h * start_rate[j], h * end_rate[j])
+        turns = (start[j] > 0.0) & (end[j] > 0.0) & (step.start_rates[j] < 0.0) & (step.end_rates[j] > 0.0)
+        s, low = lowest(start[j], end[j], h * step.start_rates[j], h * step.end_rates[j])
         smaller = where(start[j] < end[j], start[j], end[j])
         deep = turns & (low < LOW * smaller) & (s > 1e-3) & (s < 0.999)
         at = where(deep & isnt((at > 0.0) & (at < s)), s, at)
@@ -101,184 +101,265 @@ def finite(state):
     return total < math.inf
 
 
+class Trial(NamedTuple):
+    """A step that is being judged.
+
+    new, taken, calls : the state that it ends in, its length, calls of the rates
+    verdict : what went wrong; 0: nothing
+    again, shorter : whether it must be tried again, with which length
+    """
+
+    new: tuple
+    taken: float
+    calls: float
+    verdict: float
+    again: bool
+    shorter: float
+
+
+class Moved(NamedTuple):
+    """What a step has come to.
+
+    which : the event that it ends on, -1 for none, -2 where it must be tried again
+    taken, calls, verdict : as of `Trial`
+    wide, behind : the surface's largest value, with this step's start; see `margin_behind`
+    """
+
+    which: float
+    taken: float
+    calls: float
+    verdict: float
+    wide: float
+    behind: float
+
+
 @jit_call
-def located(m, how, state, new, scene, h, which, ends, seeking):
+def located(m, scheme, mode, step, which, seeking):
     """The part of the step at which the event fires, the state there, calls of the rates, and whether it is lost."""
-    method, location, parts = how
-    e0, e1, d0, d1 = ends
+    e0, e1, h = of_event(step.start, which), of_event(step.end, which), step.h
     part = where(e0 > 0.0, e0 / (e0 - e1), 0.0)
-    calls, lost = 0.0 * h, seeking & isnt(seeking)
+    new, calls, lost = step.new, 0.0 * h, seeking & isnt(seeking)
     curved = seeking & (e0 > 0.0)
-    if location in (HERMITE, ROOT):
+    if scheme.location in (HERMITE, ROOT):
+        d0, d1 = of_event(step.start_rates, which), of_event(step.end_rates, which)
         part = where(curved, cubic_root(e0, e1, h * d0, h * d1, curved), part)
-    if location == HENON:
-        part, new, there = swapped(m, method, parts, new, scene, h, which, e1)
+    if scheme.location == HENON:
+        part, new, there = swapped(m, scheme, mode, step, which, e1)
         lost = curved & isnt(there)
-        calls = calls + where(method > 3.5, 12.0, 4.0) * parts
-        part, new = where(curved, part, 0.0), choose(curved, new, state)
-    elif location == ROOT:
-        part, new, trials, lost = shortened(m, method, parts, state, scene, h, which, part, (e0, e1), curved)
-        part, new = where(curved, part, 0.0), choose(curved, new, state)
-        calls = trials * (CALLS[method] * parts)
+        calls = calls + where(scheme.method > 3.5, 12.0, 4.0) * scheme.substeps
+        part, new = where(curved, part, 0.0), choose(curved, new, step.state)
+    elif scheme.location == ROOT:
+        part, new, trials, lost = shortened(m, scheme, mode, step, which, part, curved)
+        part, new = where(curved, part, 0.0), choose(curved, new, step.state)
+        calls = trials * (CALLS[scheme.method] * scheme.substeps)
     else:
-        new = choose(curved, leap(m, method, parts, state, scene, part * h), state)
-        calls = calls + CALLS[method] * parts
+        new = choose(curved, leap(m, scheme, step.state, mode, part * h), step.state)
+        calls = calls + CALLS[scheme.method] * scheme.substeps
     return part, new, where(curved, calls, 0.0), lost
 
 
 @jit
-def margin_behind(which, start, slopes, part, h, wide):
+def margin_behind(which, step, wide):
     """How far behind the switch the motion would turn round, over the surface's largest value so far; infinite if not.
 
     From the rates at the ends of the step: what bends the surface's value back is their difference.
     """
-    first, last = slopes
-    rate = (last[0] - first[0]) * part + first[0]
-    back = (which > -0.5) & (which < 0.5) & (last[0] > first[0]) & (start[0] > 0.0)
-    bend = where(back, (last[0] - first[0]) / h, 1.0)
+    start, end, first, last = step.start[0], step.end[0], step.start_rates[0], step.end_rates[0]
+    part = where(start > end, start / (start - end), 0.0)
+    rate = (last - first) * part + first
+    back = (which > -0.5) & (which < 0.5) & (last > first) & (start > 0.0)
+    bend = where(back, (last - first) / step.h, 1.0)
     return where(back, rate * rate / (2.0 * bend * where(wide > 0.0, wide, 1.0)), math.inf)
 
 
 @jit_call
-def hides_something(m, state, new, scene, h):
+def hides_something(m, state, new, mode, h):
     """Whether a step may hide more of a state than its stages tell; NaN does."""
-    side, signs, parameters, _ = scene
-    change = times(h, after(rate(m, new, scene), -1.0, ONE, (rate(m, state, scene),)))
-    of_rates, _ = m.hidden(state, boxes(state, new, change), side, signs, parameters)
+    change = times(h, after(rate(m, new, mode), -1.0, ONE, (rate(m, state, mode),)))
+    of_rates, _ = m.hidden(state, boxes(state, new, change), mode.side, mode.signs, mode.parameters)
     seen = h <= math.inf
     for i in range(len(state)):
         seen = seen & (h * of_rates[i] <= HIDDEN * (magnitude(state[i]) + magnitude(new[i])))
     return isnt(seen)
 
 
+@jit
+def uncut(m, scheme, mode, motion, h):
+    """The step as it is first tried."""
+    start, start_rates = events(m, motion.state, mode)
+    new = leap(m, scheme, motion.state, mode, h)
+    end, end_rates = events(m, new, mode)
+    return Step(motion.state, new, h, start, start_rates, end, end_rates)
+
+
+@jit
+def onto_event(m, scheme, mode, step, which, on, seeking, trial):
+    """The trial, ended on its event; to be tried again with that length where another event is behind by then."""
+    part, found, calls, lost = located(m, scheme, mode, step, which, seeking)
+    other = seeking & (part < 0.999999) & (part > 0.0) & isnt(lost)
+    other = other & passed_another(events(m, found, mode)[0], which, on)
+    return Trial(
+        choose(seeking, found, trial.new),
+        where(seeking, part * step.h, trial.taken),
+        where(seeking, trial.calls + calls, trial.calls),
+        where(seeking & lost, NOT_CONVERGED, trial.verdict),
+        trial.again | other,
+        where(other, part * step.h, trial.shorter),
+    )
+
+
+@jit
+def searched(m, scheme, mode, step, which, motion, graze, met, missed, trial):
+    """The trial, ended on the event that it met; or what it must be cut to, for it may hide a root of an event."""
+    on, was_cut = motion.on, motion.cuts > 0.5
+    pressed = met & (of_event(on, which) > 0.5)
+    away = of_event(step.start_rates, which) > 0.0
+    verdict = where(pressed & isnt(away), STICKS, trial.verdict)
+    low = where(missed & isnt(was_cut), dip(step), 0.0)
+    again = (pressed & away) | (low > 0.0)
+    shorter = where(low > 0.0, low * step.h, 0.5 * step.h)
+    turning = missed & was_cut & near_an_event(step.end, on, times(graze, reached(times(0.0, on), step.start)))
+    verdict = where(turning & (verdict < GRAZING), GRAZING, verdict)
+    trial = Trial(trial.new, trial.taken, trial.calls, verdict, again, shorter)
+    seeking = met & isnt(pressed)
+    if some(seeking):
+        trial = onto_event(m, scheme, mode, step, which, on, seeking, trial)
+    return trial
+
+
+@jit
+def tried(m, scheme, mode, step, which, motion, graze, active):
+    """The step, judged."""
+    broken = active & isnt(finite(step.new) & finite(step.end))
+    met = active & (which > -0.5) & isnt(broken)
+    verdict = where(broken, OUT_OF_RANGE, 0.0)
+    if scheme.method == MOREAU:
+        rests = (magnitude(step.state[-1]) <= 0.0) & (magnitude(step.new[-1]) <= 0.0) & isnt(met)
+        verdict = where(active & rests, STICKS, verdict)
+    calls = 0.0 * step.h + CALLS[scheme.method] * scheme.substeps
+    trial = Trial(step.new, step.h, calls, verdict, active & isnt(active), step.h)
+    if not mode.natural:
+        missed = active & isnt(met | broken)
+        trial = searched(m, scheme, mode, step, which, motion, graze, met, missed, trial)
+    return trial
+
+
+@jit
+def arrived(motion, trial, which, moved, on):
+    """The motion behind the step, of the lanes that have moved; the others' next trial is shorter."""
+    return Motion(
+        choose(moved, trial.new, motion.state),
+        motion.side,
+        choose(moved, turned(motion.signs, on), motion.signs),
+        on,
+        where(trial.again, trial.shorter, 0.0),
+        where(trial.again, motion.cuts + 1.0, 0.0),
+    )
+
+
 @jit_call
-def attempt(m, how, parameters, step, graze, wide, motion, active):
+def attempt(m, scheme, parameters, limits, wide, motion, active):
     """Try one step.
 
     Parameters
     ----------
-    how : method, location, parts of a step
     wide : largest value of the surface since the last switch
-    motion : state, side, signs, on (1 for the event that the motion starts on), cut (the step's length; 0: whole), cuts
     active : lanes that move
 
     Returns
     -------
-    motion, which : after the step; the event that it ends on, -1 for none, -2 where it must be tried again
-    taken, calls, verdict : length of the step, calls of the rates, what went wrong (0: nothing)
-    wide, behind : with this step's start; see `margin_behind`
+    motion : Motion
+        After the step.
+    moved : Moved
     """
-    method, location, parts = how
-    state, side, signs, on, cut, cuts = motion
-    natural = location == NONE
-    scene = side, signs, parameters, natural
-    h = where(cut > 0.0, cut, step)
-    start, start_rate = m.events(state, side, signs, parameters)
-    new = leap(m, method, parts, state, scene, h)
-    end, end_rate = m.events(new, side, signs, parameters)
-    calls = 0.0 * h + CALLS[method] * parts
-    which, _ = first_event(start, end, end_rate, on, natural)
-    wide = where(active & (start[0] > wide), start[0], wide)
-    part = where(start[0] > end[0], start[0] / (start[0] - end[0]), 0.0)
-    behind = margin_behind(which, start, (start_rate, end_rate), part, h, wide)
-    broken = active & isnt(finite(new) & finite(end))
-    met = active & (which > -0.5) & isnt(broken)
-    verdict, taken, again = where(broken, _OUT_OF_RANGE, 0.0), h, active & isnt(active)
-    if method == MOREAU:
-        rests = (magnitude(state[-1]) <= 0.0) & (magnitude(new[-1]) <= 0.0) & isnt(met)
-        verdict = where(active & rests, _STICKS, verdict)
-    if not natural:
-        pressed = met & (of_event(on, which) > 0.5)
-        away = of_event(start_rate, which) > 0.0
-        verdict = where(pressed & isnt(away), _STICKS, verdict)
-        low = where(active & isnt(met | broken | (cuts > 0.5)), dip(start, end, start_rate, end_rate, h), 0.0)
-        again = (pressed & away) | (low > 0.0)
-        shorter = where(low > 0.0, low * h, 0.5 * h)
-        turning = (
-            active & (cuts > 0.5) & isnt(met) & near_an_event(end, on, times(graze, reached(times(0.0, on), start)))
-        )
-        verdict = where(turning & (verdict < _GRAZING), _GRAZING, verdict)
-        seeking = met & isnt(pressed)
-        if some(seeking):
-            ends = of_event(start, which), of_event(end, which), of_event(start_rate, which), of_event(end_rate, which)
-            part, found, more, lost = located(m, how, state, new, scene, h, which, ends, seeking)
-            new, calls = choose(seeking, found, new), where(seeking, calls + more, calls)
-            verdict = where(seeking & lost, _NOT_CONVERGED, verdict)
-            taken = where(seeking, part * h, taken)
-            other = seeking & (part < 0.999999) & (part > 0.0) & isnt(lost)
-            other = other & passed_another(m.events(found, side, signs, parameters)[0], which, on)
-            again, shorter = again | other, where(other, part * h, shorter)
-        verdict = where(again & (cuts > CUTS), _STEP_LIMIT, verdict)
-        cut, cuts = where(again, shorter, 0.0), where(again, cuts + 1.0, 0.0)
-        which = where(again, -2.0, which)
-    moved = active & isnt(again) & (verdict < _REFUSAL)
+    mode = Mode(motion.side, motion.signs, parameters, scheme.location == NONE)
+    step = uncut(m, scheme, mode, motion, where(motion.cut > 0.0, motion.cut, limits.step))
+    which = first_event(step, motion.on, mode.natural)
+    wide = where(active & (step.start[0] > wide), step.start[0], wide)
+    behind = margin_behind(which, step, wide)
+    trial = tried(m, scheme, mode, step, which, motion, limits.graze, active)
+    verdict = where(trial.again & (motion.cuts > CUTS), codes.STEP_LIMIT, trial.verdict)
+    which = where(trial.again, -2.0, which)
+    moved = active & isnt(trial.again) & (verdict < REFUSED)
     if m.hides:
-        hidden = moved & hides_something(m, state, new, scene, taken)
-        verdict = where(hidden & (verdict < _INACCURATE), _INACCURATE, verdict)
-    below = moved & natural & (which < -0.5) & (end[0] <= 0.0)  # not yet above where it began
-    on = choose(moved & isnt(below), marks(which, on), on)
-    signs = choose(moved, turned(signs, on), signs)
-    motion = choose(moved, new, state), side, signs, on, cut, cuts
-    return motion, which, where(moved, taken, 0.0), calls, verdict, wide, behind
+        hidden = moved & hides_something(m, motion.state, trial.new, mode, trial.taken)
+        verdict = where(hidden & (verdict < INACCURATE), INACCURATE, verdict)
+    below = moved & mode.natural & (which < -0.5) & (step.end[0] <= 0.0)  # not yet above where it began
+    on = choose(moved & isnt(below), marks(which, motion.on), motion.on)
+    motion = arrived(motion, trial, which, moved, on)
+    return motion, Moved(which, where(moved, trial.taken, 0.0), trial.calls, verdict, wide, behind)
 
 
 @jit_call
 def switch(m, parameters, motion, left, switches):
     """The motion behind the switch, of the lanes that are on it; `left` is the surface's value there."""
-    state, side, signs, on, cut, cuts = motion
-    jumped = m.switched(state, side, signs, parameters)
-    state, side = choose(switches, jumped, state), where(switches, -side, side)
-    new_signs, kinks_on = m.settled(state, side, parameters, 0.0 * side + 1.0, times(0.0, signs))
-    signs = choose(switches, new_signs, signs)
+    jumped = m.switched(motion.state, motion.side, motion.signs, parameters)
+    state, side = choose(switches, jumped, motion.state), where(switches, -motion.side, motion.side)
+    signs, kinks_on = m.settled(state, side, parameters, 0.0 * side + 1.0, times(0.0, motion.signs))
+    signs = choose(switches, signs, motion.signs)
     behind = m.events(state, side, signs, parameters)[0][0]
     still = magnitude(behind) <= 2.0 * magnitude(left)
-    on = choose(switches, joined(where(still, 1.0, 0.0), kinks_on), on)
-    return state, side, signs, on, cut, cuts
+    on = choose(switches, joined(where(still, 1.0, 0.0), kinks_on), motion.on)
+    return Motion(state, side, signs, on, motion.cut, motion.cuts)
+
+
+@jit
+def counted(tally, state, moved, active):
+    """The tally with one more step of the active lanes."""
+    return Tally(
+        where(active, tally.time + moved.taken, tally.time),
+        where(active, tally.since + moved.taken, tally.since),
+        tally.interval,
+        tally.count,
+        where(active & (moved.which > -1.5), tally.steps + 1.0, tally.steps),
+        where(active, tally.calls + moved.calls, tally.calls),
+        where(active, tally.trials + 1.0, tally.trials),
+        choose(active, reached(tally.reach, state), tally.reach),
+        tally.at,
+        tally.reach_at,
+        moved.wide,
+        tally.slim,
+    )
+
+
+@jit
+def behind_switch(tally, at, state, behind, switches):
+    """The tally of the lanes that have passed a switch: before it in the state `at`, behind it in `state`."""
+    return Tally(
+        tally.time,
+        where(switches, 0.0, tally.since),
+        where(switches, tally.since, tally.interval),
+        where(switches, tally.count + 1.0, tally.count),
+        tally.steps,
+        tally.calls,
+        where(switches, 0.0, tally.trials),
+        choose(switches, reached(times(0.0, tally.reach), state), tally.reach),
+        choose(switches, at, tally.at),
+        choose(switches, tally.reach, tally.reach_at),
+        where(switches, 0.0, tally.wide),
+        where(switches & (behind < tally.slim), behind, tally.slim),
+    )
 
 
 @jit_call
-def follow(m, how, parameters, limits, motion, tally, active):
-    """A few steps of the active lanes.
-
-    Parameters
-    ----------
-    limits : flips, step, margin of grazing over an event's value at the start of the step
-    tally : time, since, interval, count, steps, calls, trials since the last switch,
-        reach (largest of each state since the last switch), states at the last switch, their reach before it,
-        largest value of the surface since the last switch, least margin behind a switch, verdict
-
-    Returns
-    -------
-    motion, tally, done
-    """
-    flips, step, graze = limits
+def follow(m, scheme, parameters, limits, motion, tally, verdict, active):
+    """A few steps of the active lanes: the records `motion` and `tally`, the verdict, and which are done."""
     done = active & isnt(active)
     for _ in range(TOGETHER):
-        time, since, interval, count, steps, calls, trials, reach, at, reach_at, wide, slim, verdict = tally
-        side = motion[1]
-        motion, which, taken, more, found, wide, behind = attempt(m, how, parameters, step, graze, wide, motion, active)
-        verdict = where(active & (found > verdict), found, verdict)
-        trials, calls = where(active, trials + 1.0, trials), where(active, calls + more, calls)
-        steps = where(active & (which > -1.5), steps + 1.0, steps)
-        time, since = where(active, time + taken, time), where(active, since + taken, since)
-        reach = choose(active, reached(reach, motion[0]), reach)
-        switches = active & (which > -0.5) & (which < 0.5) & (verdict < _REFUSAL)
+        motion, moved = attempt(m, scheme, parameters, limits, tally.wide, motion, active)
+        verdict = where(active & (moved.verdict > verdict), moved.verdict, verdict)
+        tally = counted(tally, motion.state, moved, active)
+        switches = active & (moved.which > -0.5) & (moved.which < 0.5) & (verdict < REFUSED)
         if some(switches):
-            at, reach_at = choose(switches, motion[0], at), choose(switches, reach, reach_at)
-            left = m.events(motion[0], side, motion[2], parameters)[0][0]
-            faint = m.underflows(motion[0], side, motion[2], parameters, step)
-            verdict = where(switches & faint, _OUT_OF_RANGE, verdict)
+            at = motion.state
+            left = m.events(at, motion.side, motion.signs, parameters)[0][0]
+            faint = m.underflows(at, motion.side, motion.signs, parameters, limits.step)
+            verdict = where(switches & faint, OUT_OF_RANGE, verdict)
             motion = switch(m, parameters, motion, left, switches)
-            reach = choose(switches, reached(times(0.0, reach), motion[0]), reach)
-            interval, since = where(switches, since, interval), where(switches, 0.0, since)
-            count = where(switches, count + 1.0, count)
-            trials = where(switches, 0.0, trials)
-            slim = where(switches & (behind < slim), behind, slim)
-            wide = where(switches, 0.0, wide)
-        verdict = where(active & (trials > STEP_LIMIT) & (verdict < _REFUSAL), _STEP_LIMIT, verdict)
-        ended = active & ((verdict >= _REFUSAL) | (count >= flips))
-        tally = time, since, interval, count, steps, calls, trials, reach, at, reach_at, wide, slim, verdict
+            tally = behind_switch(tally, at, motion.state, moved.behind, switches)
+        verdict = where(active & (tally.trials > STEP_LIMIT) & (verdict < REFUSED), codes.STEP_LIMIT, verdict)
+        ended = active & ((verdict >= REFUSED) | (tally.count >= limits.flips))
         done, active = done | ended, active & isnt(ended)
         if some(done):
             break
-    return motion, tally, done
+    return motion, tally, verdict, done

@@ -2,14 +2,19 @@
 
 A scene carries its motion and two tangents of it, so a state is (x, v, x1, v1, x2, v2), each pair a position and its
 rate, and a right-hand side is `accelerations(state, scene) -> (x'', x1'', x2'')`. Because every position is the
-integral of a rate, the stages of a position are folded into those of its rate (Nystroem form), which halves the work:
+integral of a rate, the stages of a position are folded into those of its rate (Nystroem form):
     V_i = v + h sum_j a_ij F_j,  X_i = x + c_i h v + h^2 sum_j (sum_m a_im a_mj) F_j.                     (1)
 An integral y along the motion may follow as a seventh entry of the state; its rate y' is then the fourth of the
-right-hand side. Entries behind it do not change in a step: what an event or a right-hand side knows a cell by.
+right-hand side.
+
+Measured on columns of foliot (40 000 cells) and foliot_ripple (20 000) at rtol 1e-9: by first-order stages of the same
+table, as `steps` takes them, the CPU time is 0.98 and 0.85 of this form's, and of foliot 0.93 with the step control of
+`taylor` besides. Results differ by 1.4e-14 at most. This form is kept for the bits of what has been computed by it.
 """
 
 import numpy as np
 
+from kernels.integrate.tableaux import DOPRI5, DOPRI5_ERROR
 from kernels.lanes.jit import jit, jit_call, jit_inline
 from kernels.lanes.vectors import choose, dot, exponent, fma, isnt, magnitude, pow2, some, where
 from kernels.maths.elementary import LN2, exp
@@ -21,15 +26,13 @@ ROOT_LIMIT = 60
 SETTLED = 1e-9
 """Newton's step, over the whole one, after which the event is where the next trial ends: its error is the square."""
 
-# Dormand & Prince, J. Comput. Appl. Math. 6:19 (1980), RK5(4)7M; the last row is the fifth-order result
+# The last row is the fifth-order result
 _A = np.zeros((7, 7))
-_A[1, :1] = (1 / 5,)
-_A[2, :2] = 3 / 40, 9 / 40
-_A[3, :3] = 44 / 45, -56 / 15, 32 / 9
-_A[4, :4] = 19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729
-_A[5, :5] = 9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656
-_A[6, :6] = 35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84
-_E = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+for _i, _weights in enumerate(DOPRI5[:5]):
+    _A[_i + 1, : _i + 1] = _weights
+_A[6, [0, 2, 3, 4, 5]] = DOPRI5[5]
+_E = np.zeros(7)
+_E[[0, 2, 3, 4, 5, 6]] = DOPRI5_ERROR
 _AA = _A @ _A
 
 
@@ -63,7 +66,7 @@ def _with_integral(pairs, state, h, weights, rates):
     """The pairs, and behind them the integral, where the state has one (known when compiled)."""
     if len(state) == 6:
         return pairs
-    return (*pairs, fma(h, dot(weights, rates), state[6]), *state[7:])
+    return (*pairs, fma(h, dot(weights, rates), state[6]))
 
 
 @jit
@@ -142,7 +145,7 @@ def integrate_until(event, accelerations, scales, state, scene, h, tolerance, ac
 
     Parameters
     ----------
-    event(state, acceleration) -> (value, rate) : positive at the start, falling monotonically through 0
+    event(state, acceleration, scene) -> (value, rate) : positive at the start, falling monotonically through 0
     accelerations(state, scene) : tuple of the three second derivatives
     scales(state, scene) : tuple of six, what `tolerance` is relative to
     h : first step
@@ -162,7 +165,7 @@ def integrate_until(event, accelerations, scales, state, scene, h, tolerance, ac
         new, error = dopri5_step(accelerations, state, scene, h, scales(state, scene))
         ratio = error / tolerance
         accepted = moving & (ratio <= 1.0)
-        passed = accepted & (event(new, 0.0)[0] <= 0.0)
+        passed = accepted & (event(new, 0.0, scene)[0] <= 0.0)
         moving = moving & isnt(passed)
         accepted = accepted & moving
         state = choose(accepted, new, state)
@@ -180,19 +183,19 @@ def _locate(event, accelerations, scales, state, scene, h, active):
     """
     scale = scales(state, scene)
     low, high = 0.0 * h, h
-    part = 0.5 * h
-    new, _ = dopri5_step(accelerations, state, scene, part, scale)
+    shorter = 0.5 * h
+    new, _ = dopri5_step(accelerations, state, scene, shorter, scale)
     searching = active
     for _ in range(ROOT_LIMIT):
         if not some(searching):
             break
-        value, rate = event(new, accelerations(new, scene)[0])
-        low, high = where(value > 0.0, part, low), where(value > 0.0, high, part)
-        guess = part - value / rate
-        settled = magnitude(guess - part) <= SETTLED * h
+        value, rate = event(new, accelerations(new, scene)[0], scene)
+        low, high = where(value > 0.0, shorter, low), where(value > 0.0, high, shorter)
+        guess = shorter - value / rate
+        settled = magnitude(guess - shorter) <= SETTLED * h
         guess = where(settled | ((guess > low) & (guess < high)), guess, 0.5 * (low + high))
-        part = where(searching, guess, part)
-        trial, _ = dopri5_step(accelerations, state, scene, part, scale)
+        shorter = where(searching, guess, shorter)
+        trial, _ = dopri5_step(accelerations, state, scene, shorter, scale)
         new = choose(searching, trial, new)
         searching = searching & isnt(settled)
-    return choose(active, new, state), where(active, part, 0.0)
+    return choose(active, new, state), where(active, shorter, 0.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kernels.integrate.nystrom import dopri5_step, integrate_until
-from kernels.lanes.jit import COMPILED, jit, jit_call
+from kernels.lanes.jit import COMPILED, jit, jit_entry
 
 
 @jit
@@ -23,11 +23,11 @@ def unit_scales(state, scene):
 
 
 @jit
-def crossing(state, acceleration):
+def crossing(state, acceleration, scene):
     return state[0], state[1]
 
 
-@jit_call
+@jit_entry
 def march(w, t, steps):
     state = (1.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     for _ in range(steps):
@@ -35,7 +35,7 @@ def march(w, t, steps):
     return state, error
 
 
-@jit_call
+@jit_entry
 def quarter(w, tolerance):
     start = (1.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     return integrate_until(crossing, oscillation, unit_scales, start, (w,), 0.1, tolerance, True)
@@ -74,7 +74,7 @@ def by_the_table(state, w, h):
     return point, np.abs(point - fourth)
 
 
-@jit_call
+@jit_entry
 def one_step(state, w, h, scale):
     return dopri5_step(oscillation, state, (w,), h, scale)
 
@@ -118,10 +118,10 @@ def test_the_event_is_located_to_the_tolerance(tolerance):
 @pytest.mark.skipif(not COMPILED, reason="ten thousand steps in plain Python")
 def test_a_motion_that_never_meets_the_event_is_given_up():
     @jit
-    def never(state, acceleration):
+    def never(state, acceleration, scene):
         return state[0] + 2.0, state[1]
 
-    @jit_call
+    @jit_entry
     def wait():
         start = (1.0, 0.0, 1.0, 0.0, 0.0, 0.0)
         return integrate_until(never, oscillation, unit_scales, start, (1.0,), 0.1, 1e-3, True)

@@ -79,4 +79,5 @@ def test_what_solves_a_cell_is_in_the_fingerprint(name):
 
 def test_of_a_scene_all_that_its_written_modules_use_is_in_the_fingerprint():
     found = executed("rich_scene:RICH") | executed("foliot_steps")
-    assert {f"kernels.{n}" for n in ("_taylor", "_fixed_step", "_adaptive_step", "_stages", "_steppers")} <= found
+    integrators = ("taylor", "fixed_step", "adaptive", "steps", "events", "records")
+    assert {*(f"kernels.integrate.{name}" for name in integrators), "kernels.lanes.codes"} <= found

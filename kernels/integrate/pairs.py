@@ -1,0 +1,169 @@
+"""The embedded pairs Dormand-Prince 5(4) and DOP853: a step with its estimated error, and dense output.
+
+Generic in one cell or lanes; `m` and `mode` as in `steps`.
+"""
+
+from typing import NamedTuple
+
+from kernels.integrate.steps import ONE, dop853_stages, dopri5_stages, rate
+from kernels.integrate.tableaux import (
+    DOP853_DENSE,
+    DOP853_ERROR_3,
+    DOP853_ERROR_5,
+    DOP853_MORE,
+    DOPRI5_DENSE,
+    DOPRI5_ERROR,
+)
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.tuples import after, times
+from kernels.lanes.vectors import fma, magnitude, sqrt, where
+
+CHANCE_3, CHANCE_5 = 0.02, 0.01
+"""An estimate of high order may be 0 by chance on a step far too long, the first behind a switch for one; a rough one
+of low order tells. The square of DOP853's third-order estimate, times 0.02, is of the order of its estimate, and below
+it on any step worth taking; so is for Dormand-Prince 5(4) 0.01 of that of what the last two rates differ by."""
+VAGUE = 0.6
+"""Of the last term of DOP853's dense output, which is off by 0.13 to 0.17 of it: little beside the step's own error
+where the tolerance limits the step, up to 130 times as much where friction does. Where this is over the tolerance, a
+step that ends nearer to the event is taken."""
+
+
+class Trial(NamedTuple):
+    """A step that is tried: the state after it, its stages, the last rates, the error over the states' sizes."""
+
+    new: tuple
+    stages: tuple
+    last: tuple
+    error: float
+
+
+@jit
+def of_size(state, new, first, h, error):
+    """The largest error of a state over its own size on the step."""
+    worst = 0.0 * h
+    for i in range(len(state)):
+        start, end = magnitude(state[i]), magnitude(new[i])
+        size = fma(magnitude(h), magnitude(first[i]), where(start > end, start, end))
+        part = magnitude(error[i]) / where(size > 0.0, size, 1.0)
+        worst = where(part <= worst, worst, part)  # NaN stays
+    return worst
+
+
+@jit
+def at_least(error, least):
+    """The larger one; NaN stays."""
+    return where(error < least, least, error)
+
+
+@jit_call
+def dop853_tried(m, state, mode, h):
+    """A step with its estimated error."""
+    new, stages = dop853_stages(m, state, mode, h)
+    nothing = times(0.0, state)
+    fifth, third = after(nothing, h, DOP853_ERROR_5, stages), after(nothing, h, DOP853_ERROR_3, stages)
+    worst_5, worst_3 = of_size(state, new, stages[0], h, fifth), of_size(state, new, stages[0], h, third)
+    total = fma(0.01 * worst_3, worst_3, worst_5 * worst_5)
+    error = where(total <= 0.0, 0.0, worst_5 * worst_5 / sqrt(total))
+    return Trial(new, stages, rate(m, new, mode), at_least(error, CHANCE_3 * worst_3 * worst_3))
+
+
+@jit_call
+def dop853_series(m, state, trial, mode, h):
+    """What the dense output is made of: seven terms."""
+    k0, k5, k6, k7, k8, k9, k10, k11 = trial.stages
+    new, last = trial.new, trial.last
+    k13 = rate(m, after(state, h, DOP853_MORE[0], (k0, k6, k7, k8, k9, k10, k11, last)), mode)
+    k14 = rate(m, after(state, h, DOP853_MORE[1], (k0, k5, k6, k7, k10, k11, last, k13)), mode)
+    k15 = rate(m, after(state, h, DOP853_MORE[2], (k0, k5, k6, k7, k8, last, k13, k14)), mode)
+    nothing = times(0.0, state)
+    change = after(new, -1.0, ONE, (state,))
+    all_stages = (*trial.stages, last, k13, k14, k15)
+    return (
+        change,
+        after(times(-1.0, change), h, ONE, (k0,)),
+        after(times(2.0, change), -h, (1.0, 1.0), (last, k0)),
+        after(nothing, h, DOP853_DENSE[0], all_stages),
+        after(nothing, h, DOP853_DENSE[1], all_stages),
+        after(nothing, h, DOP853_DENSE[2], all_stages),
+        after(nothing, h, DOP853_DENSE[3], all_stages),
+    )
+
+
+@jit
+def dop853_dense(state, terms, h, part):
+    """The state at that part of the step."""
+    f0, f1, f2, f3, f4, f5, f6 = terms
+    rest = 1.0 - part
+    y = after(f5, part, ONE, (f6,))
+    y = after(f4, rest, ONE, (y,))
+    y = after(f3, part, ONE, (y,))
+    y = after(f2, rest, ONE, (y,))
+    y = after(f1, part, ONE, (y,))
+    y = after(f0, rest, ONE, (y,))
+    return after(state, part, ONE, (y,))
+
+
+@jit
+def dop853_vague(terms, part):
+    """How far the dense output may be off at that part of the step, four times over."""
+    rest = 1.0 - part
+    square = part * part
+    return times(VAGUE * square * square * rest * rest * rest, terms[6])
+
+
+@jit_call
+def dopri5_tried(m, state, mode, h):
+    """A step with its estimated error."""
+    new, stages = dopri5_stages(m, state, mode, h)
+    last = rate(m, new, mode)
+    error = after(times(0.0, state), h, DOPRI5_ERROR, (*stages, last))
+    bend = of_size(state, new, stages[0], h, times(h, after(last, -1.0, ONE, (stages[4],))))
+    worst = of_size(state, new, stages[0], h, error)
+    return Trial(new, stages, last, at_least(worst, CHANCE_5 * bend * bend / (1.0 + bend)))
+
+
+@jit
+def dopri5_series(m, state, trial, mode, h):
+    """What the dense output is made of."""
+    return (*trial.stages, trial.last)
+
+
+@jit
+def dopri5_vague(terms, part):
+    """The dense output is off by no more than 1.3 times what the step is."""
+    return times(0.0 * part, terms[0])
+
+
+@jit
+def dopri5_dense(state, terms, h, part):
+    """The state at that part of the step."""
+    k0, k2, k3, k4, k5, k6 = terms
+    weights = (
+        _weight(part, DOPRI5_DENSE[0]),
+        _weight(part, DOPRI5_DENSE[1]),
+        _weight(part, DOPRI5_DENSE[2]),
+        _weight(part, DOPRI5_DENSE[3]),
+        _weight(part, DOPRI5_DENSE[4]),
+        _weight(part, DOPRI5_DENSE[5]),
+    )
+    return after(state, h, weights, (k0, k2, k3, k4, k5, k6))
+
+
+@jit
+def _weight(part, powers):
+    a, b, c, d = powers
+    return part * fma(part, fma(part, fma(part, d, c), b), a)
+
+
+class Pair(NamedTuple):
+    """An embedded pair of methods, as functions: a step with its error, its dense output, how far that may be off."""
+
+    tried: object
+    series: object
+    dense: object
+    vague: object
+    order: float
+
+
+DOPRI5 = Pair(dopri5_tried, dopri5_series, dopri5_dense, dopri5_vague, 5.0)
+DOP853 = Pair(dop853_tried, dop853_series, dop853_dense, dop853_vague, 8.0)
