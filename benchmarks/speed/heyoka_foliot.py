@@ -18,7 +18,7 @@ from pathlib import Path
 import heyoka as hy
 import numpy as np
 
-from kernels.foliot import cycle
+from kernels.foliot.cycle import FOLIOT
 
 sys.path.append(str(Path(__file__).parents[2] / "tests" / "oracles"))
 import foliot_oracles
@@ -77,12 +77,16 @@ def ours(n):
     mu, phi0, a, friction = cells(n)
     zero = np.zeros(n)
     inputs = [mu, phi0, a, friction, friction, zero, zero + 1.0, zero, zero + 1.0, np.full(n, WANTED)]
-    outputs = [*(np.empty(n) for _ in range(5)), np.empty(n, np.int8)]
+    outputs, status = [np.empty(n) for _ in range(5)], np.empty(n, np.int8)
+    asked, error = np.ones(5, np.uint8), np.empty(n)
+    calls = {
+        "segments": lambda: FOLIOT.method("segments").solve(*inputs, asked, *outputs, error, status),
+        "coulomb": lambda: FOLIOT.method("coulomb").solve(*inputs, *outputs, status),
+    }
     found = {}
-    for name in ("segments", "coulomb"):
-        solve = getattr(cycle, name)
-        solve(*inputs, *outputs)  # compiled before it is timed
-        found[name] = n / min(_timed(lambda: solve(*inputs, *outputs)) for _ in range(3)), outputs[0].copy()  # noqa: B023
+    for name, solve in calls.items():
+        solve()  # compiled before it is timed
+        found[name] = n / min(_timed(solve) for _ in range(3)), outputs[0].copy()
     return found, outputs[2], outputs[4]
 
 

@@ -12,9 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from kernels.foliot import _viscous_methods, cycle
+from kernels.foliot._units import Foliot
+from kernels.foliot.cycle import FOLIOT, check, event_map
 from kernels.interface import Status
-from kernels.lanes.columns import entry, one_by_one
+from kernels.lanes.columns import cell_by_cell
+from kernels.lanes.wiring import kernel, method
 
 sys.path.append(str(Path(__file__).parents[2] / "tests" / "oracles"))
 import oracles
@@ -30,15 +32,27 @@ SERIES = (
 OUTPUTS = ("period", "amplitude", "crossing_speed", "sensitivity", "multiplier")
 
 
-@entry()
-def map_one_by_one(
-    mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status
-):
-    """The iterated map one cell at a time: the same function, without lanes."""
-    one_by_one(
-        _viscous_methods._event_map,
-        (mu, phi0, a, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status),
-    )
+ONE_BY_ONE = kernel(
+    "foliot_one_by_one",
+    doc="the iterated map one cell at a time: the same function, without lanes",
+    source=FOLIOT.source,
+    parameters=FOLIOT.parameters,
+    outputs=FOLIOT.outputs,
+    record=Foliot,
+    check=check,
+    methods=(method("map", "one cell at a time", event_map, loop=cell_by_cell),),
+)
+
+
+def solver(name):
+    """A method of the foliot by its inputs, its outputs and the status alone."""
+    chosen = FOLIOT.method(name)
+
+    def estimating(*columns):
+        inputs, outputs, status = columns[:10], columns[10:-1], columns[-1]
+        chosen.solve(*inputs, np.ones(len(outputs), np.uint8), *outputs, np.empty(len(status)), status)
+
+    return estimating if chosen.estimates else chosen.solve
 
 
 def numpy_newton(
@@ -112,31 +126,29 @@ def speed():
     inputs, _ = columns(64 * BLOCK)
     report(
         "closed, in order; numpy Newton in blocks of 8192",
-        *paired(_viscous_methods.closed, numpy_newton, inputs),
+        *paired(solver("closed"), numpy_newton, inputs),
         64 * BLOCK,
     )
     shuffled = [np.random.default_rng(0).permutation(inputs[0]), *inputs[1:]]
-    report("closed, shuffled; the same", *paired(_viscous_methods.closed, numpy_newton, shuffled), 64 * BLOCK)
+    report("closed, shuffled; the same", *paired(solver("closed"), numpy_newton, shuffled), 64 * BLOCK)
     report(
         "asymptotic, in order; closed",
-        *paired(_viscous_methods.asymptotic, _viscous_methods.closed, inputs),
+        *paired(solver("asymptotic"), solver("closed"), inputs),
         64 * BLOCK,
     )
     some, _ = columns(1024)
     some[0] = np.geomspace(1e-3, 1e6, 1024) * 0.09 * 0.7
     report(
         "map in lanes; one cell at a time, alpha 1e-3 to 1e6",
-        *paired(_viscous_methods.event_map, map_one_by_one, some),
+        *paired(solver("map"), ONE_BY_ONE.method("map").solve, some),
         1024,
     )
-    report(
-        "dopri5 in lanes; map in lanes, the same cells", *paired(cycle.dopri5, _viscous_methods.event_map, some), 1024
-    )
+    report("dopri5 in lanes; map in lanes, the same cells", *paired(solver("dopri5"), solver("map"), some), 1024)
     some[3] = some[4] = 0.5 * some[0]
     title = "with Coulomb friction R = mu/2: "
-    report(f"{title}coulomb; segments", *paired(cycle.coulomb, cycle.segments, some), 1024)
-    report(f"{title}segments; quadrature", *paired(cycle.segments, cycle.quadrature, some), 1024)
-    report(f"{title}quadrature; dopri5", *paired(cycle.quadrature, cycle.dopri5, some), 1024)
+    report(f"{title}coulomb; segments", *paired(solver("coulomb"), solver("segments"), some), 1024)
+    report(f"{title}segments; quadrature", *paired(solver("segments"), solver("quadrature"), some), 1024)
+    report(f"{title}quadrature; dopri5", *paired(solver("quadrature"), solver("dopri5"), some), 1024)
 
 
 def errors(name, solve, low, high, rtol=1e-9, cells=2000):
@@ -162,10 +174,10 @@ def errors(name, solve, low, high, rtol=1e-9, cells=2000):
 def main():
     """Measure and print."""
     speed()
-    errors("closed", _viscous_methods.closed, -12, 12)
-    errors("asymptotic", _viscous_methods.asymptotic, -12, 12)
-    errors("map", _viscous_methods.event_map, -12, 9)
-    errors("dopri5", cycle.dopri5, -4, 9)
+    errors("closed", solver("closed"), -12, 12)
+    errors("asymptotic", solver("asymptotic"), -12, 12)
+    errors("map", solver("map"), -12, 9)
+    errors("dopri5", solver("dopri5"), -4, 9)
     errors("numpy Newton", numpy_newton, -12, 12)
 
 

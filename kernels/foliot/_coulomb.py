@@ -8,10 +8,11 @@ With u = a v/mu just before the switch, rho = R/mu, k = a^2 phi0/mu = d^2 and z 
     2 k = rho u^2/(1 - rho^2) + (1 - rho) M3 + (1 + rho) L3,                                         (4)
 and so is the sensitivity, from the derivatives of (1) and (2) by mu at fixed a, R, phi0:
     s = (2 rho^3 u^2/(1 - rho^2)^2 + M3 + L3)/((rho + u) u tau).                                     (5)
-Derived here from the general law of friction; scene and cycle as in `_units`.
+Derived here from the general law of friction; units and records as in `_units`.
 """
 
 from kernels.foliot._single_loss import dry as dry_cycle
+from kernels.foliot._units import Cycle, errors
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import choose, fma, magnitude, some, sqrt, where
@@ -81,25 +82,24 @@ def _viscous_and_coulomb(d, rho, slack):
     top = 1.0 + 2.0 * (1.0 + rho) * log_remainder(x) / double_k
     share = rho / (slack * (1.0 + rho))
     s = (2.0 * rho * (share * u) * (share * u) + m3 + l3) / ((rho + u) * u * tau)
-    return (tau / d, top, u / d, s, exp(-tau) * slack / (1.0 + rho)), unsettled
+    return Cycle(tau / d, top, u / d, s, exp(-tau) * slack / (1.0 + rho)), unsettled
 
 
 @jit
-def multiplier_bound(scene):
-    """What the multiplier is right to, from an upper limit of tau.
+def bound(scene):
+    """Relative errors of `limit_cycle`; the multiplier's from an upper limit of tau.
 
     In (1) (1 + rho)(x - ln(1 + x)) <= (1 - rho)/2 as x <= (1 - rho)/(1 + rho), so z <= 2 k/(1 - rho) + 3/2; and
     ln(1 + x) <= ln 2.
     """
-    d, slack = scene[0], scene[7]
-    tau = 2.0 * d * d / slack + 2.2
-    return _EXPONENT_ROUNDING * (1.0 + where(tau < _DEEPEST, tau, _DEEPEST))
+    tau = 2.0 * scene.d * scene.d / scene.slack + 2.2
+    return errors(ROUNDING, ROUNDING, _EXPONENT_ROUNDING * (1.0 + where(tau < _DEEPEST, tau, _DEEPEST)))
 
 
 @jit_call
 def limit_cycle(scene):
     """The cycle, and its verdict."""
-    d, rho, _, _, _, _, _, slack = scene
+    d, rho, slack = scene.d, scene.rho, scene.slack
     dry = d < _FAINT
     cycle, unsettled = _viscous_and_coulomb(where(dry, 1.0, d), rho, slack)
     alone = dry_cycle(where(rho > _FAINT_COULOMB, rho, 0.5), slack)

@@ -9,15 +9,17 @@ With v = v1 s, F = 1 - f(v1 s), B = 1 + sigma f(E v1 s) and M = B - F, a sum of 
     2 = v1^2 int_0^1 s N/(F B) ds,  N = (1 - e^2) F + M;  (3) has (1 + sigma E) F + M for s N,      (4)
 in which nothing cancels however weak the friction. Friction holds v1 below V, where f(V) = 1. At weak drive 1 - v1/V
 may be exp(-1e12), so the unknown is z = -ln(1 - v1/V), and the pole of 1/F at v = V, of strength 1/f'(V), is taken out:
-its integral is z/f'(V). Units and *scene*: see `_units`. Derived here.
+its integral is z/f'(V). Units and records: see `_units`. Derived here.
 """
 
 import math
 from decimal import Decimal, localcontext
+from typing import NamedTuple
 
 import numpy as np
 
 from kernels.foliot._single_loss import without_degree_0
+from kernels.foliot._units import Cycle, errors
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import fma, isnt, magnitude, some, sqrt, where
@@ -65,9 +67,40 @@ def _rule():
 _S, _REST, _LOG_S, _WEIGHT = _rule()
 
 
+class Terminal(NamedTuple):
+    """ln V of f(V) = 1, and the shares D = d V and G = gamma V^n of 1 - rho there."""
+
+    log_V: float
+    D: float
+    G: float
+
+
+class Speeds(NamedTuple):
+    """All that the integrands need at z = exp(y)/V, so that exp(y) is v1 at strong drive.
+
+    v1, log_v1
+    z, far, near : z, v1/V and 1 - v1/V
+    F1, slope : 1 - f(v1), and the same over `near`, which tends to V f'(V)
+    a, b : d v1 and gamma v1^n
+    kept, power : (v1/V)^n from 1 down, and as it is
+    """
+
+    v1: float
+    log_v1: float
+    z: float
+    far: float
+    near: float
+    F1: float
+    slope: float
+    a: float
+    b: float
+    kept: float
+    power: float
+
+
 @jit_call
 def _terminal(law):
-    """ln V of f(V) = 1, and the shares D = d V and G = gamma V^n of 1 - rho there; without drag V is infinite, D = 0.
+    """The terminal speed V; without drag it is infinite, D = 0.
 
     Newton for ln(D + G) in ln V, which is convex: from above the root, where each share alone is at most 1 - rho, the
     steps are monotone.
@@ -89,22 +122,13 @@ def _terminal(law):
     D, G = exp(u + log_d), exp(fma(n, u, log_gamma))
     share = where(drag, D / (D + G), 0.0)
     rest = where(drag, G / (D + G), 1.0)
-    return where(drag, u, _FAR), slack * share, slack * rest
+    return Terminal(where(drag, u, _FAR), slack * share, slack * rest)
 
 
 @jit
 def _speeds(law, terminal, y):
-    """All that the integrands need at z = exp(y)/V, so that exp(y) is v1 at strong drive.
-
-    Returns
-    -------
-    v1, log_v1
-    z, far, near : z, v1/V and 1 - v1/V
-    F1, slope : 1 - f(v1), and the same over `near`, which tends to V f'(V)
-    a, b : d v1 and gamma v1^n
-    kept, power : (v1/V)^n from 1 down, and as it is
-    """
-    d, _, _, n, _, _ = law
+    """The speeds at y."""
+    n = law.n
     log_V, D, G = terminal
     log_z = y - log_V
     z = exp(log_z)
@@ -115,17 +139,18 @@ def _speeds(law, terminal, y):
     power, kept = exp(n * log_far), -expm1(n * log_far)
     slope = fma(G, where(near > 1e-290, kept / near, n), D)
     v1 = exp(y) * ratio
-    return v1, y + log_ratio, z, far, near, fma(G, kept, D * near), slope, d * v1, G * power, kept, power
+    F1, log_v1 = fma(G, kept, D * near), y + log_ratio
+    return Speeds(v1, log_v1, z, far, near, F1, slope, law.d * v1, G * power, kept, power)
 
 
 @jit
 def _leg(law, a, b):
     """1 - e^2, and the coefficients of M = m0 + m1 s + m2 s^n."""
-    _, rho, _, n, e, _ = law
+    n, e = law.n, law.e
     outward = e > 0.0
     less = -expm1(n * log(magnitude(e)))  # 1 - E^n
     m1, m2 = a * (1.0 + e), b * where(outward, 2.0 - less, less)
-    return (1.0 - e) * (1.0 + e), where(outward, 2.0 * rho, 0.0), m1, m2
+    return (1.0 - e) * (1.0 + e), where(outward, 2.0 * law.rho, 0.0), m1, m2
 
 
 @jit
@@ -156,7 +181,7 @@ def _defect(z, rule, e, far, near):
 @jit_call
 def _excess(law, terminal, y):
     """ln of the right side of (2) over its left, and its slope in y."""
-    n, e = law[3], law[4]
+    n, e = law.n, law.e
     _, log_v1, z, far, near, F1, slope, a, b, _, _ = _speeds(law, terminal, y)
     lost, m0, m1, m2 = _leg(law, a, b)
     total, rule = 0.0 * y, 0.0 * y
@@ -166,7 +191,7 @@ def _excess(law, terminal, y):
         M = fma(m1, _S[j], fma(m2, 1.0 - q, m0))
         total = fma(_WEIGHT[j] * _S[j], fma(lost, F, M) / (F * (F + M)), total)
         rule = fma(_WEIGHT[j], _pole(e, far, near, _REST[j], _S[j]), rule)
-    K = fma(n, terminal[2], terminal[1])
+    K = fma(n, terminal.G, terminal.D)
     total = total + _defect(z, rule, e, far, near) / (where(z > _NEAR, far, 1.0) * K)
     M1 = m0 + m1 + m2
     rate = fma(lost, F1, M1) / (slope * (F1 + M1))
@@ -224,7 +249,8 @@ def _strong(law, terminal, y):
     1/F^2 - E^2/B^2 as products, where ones would cancel.
     """
     _, rho, _, n, e, _ = law
-    _, _, _, _, _, F1, _, a, b, _, _ = _speeds(law, terminal, y)
+    speeds = _speeds(law, terminal, y)
+    F1, a, b = speeds.F1, speeds.a, speeds.b
     lost, m0, m1, m2 = _leg(law, a, b)
     E = magnitude(e)
     log_E = log(E)
@@ -314,10 +340,10 @@ def solve_quadrature(scene, rtol):
     law = without_degree_0(scene)
     terminal = _terminal(law)
     y, unsettled = _solve(law, terminal)
-    v1, _, z, _, _, F1, _, a, b, _, _ = _speeds(law, terminal, y)
-    _, m0, m1, m2 = _leg(law, a, b)
-    e = law[4]
-    near = z > _NEAR
+    speeds = _speeds(law, terminal, y)
+    v1, F1 = speeds.v1, speeds.F1
+    _, m0, m1, m2 = _leg(law, speeds.a, speeds.b)
+    e, near = law.e, speeds.z > _NEAR
     time, rise, s = 0.0 * y, 0.0 * y, 0.0 * y
     if some(isnt(near)):
         time, rise, s = _strong(law, terminal, y)
@@ -326,29 +352,28 @@ def solve_quadrature(scene, rtol):
         time, rise, s = where(near, late, time), where(near, high, rise), where(near, weak, s)
     amplitude = 1.0 + where(e > 0.0, v1 * v1 * (e * e) * rise, 0.0)
     half = v1 * time
-    cycle = (half, amplitude, v1, s, e * e * (F1 / (F1 + (m0 + m1 + m2))))
+    cycle = Cycle(half, amplitude, v1, s, e * e * (F1 / (F1 + (m0 + m1 + m2))))
     fine = is_normal(half) & is_normal(v1)
     return cycle, where(unsettled, NOT_CONVERGED, where(fine, OK, OUT_OF_RANGE))
 
 
 @jit
 def quadrature_bound(scene):
-    """Bounds on the relative errors of `solve_quadrature`: of time, amplitude and speed; of s; and of the multiplier.
+    """Relative errors of `solve_quadrature`.
 
     Measured: 1e-14 everywhere, 1e-16/(1 + e) where the switch gives almost all speed back inward. Beyond that, what
     rounding of gamma leaves of V = ((1 - rho)/gamma)^(1/n), 1/n ulp; of its logarithm; and of z, 2 V f'(V)/V^2 + 2, in
     the multiplier exp(-z). For n > 4 singularities at v = V exp(+-i pi/n) come near: the rule misses (n/4)^11 4e-14.
     """
-    kappa = scene[5]
     law = without_degree_0(scene)
     log_V, D, G = _terminal(law)
-    n, e = law[3], law[4]
+    n, e = law.n, law.e
     high, deep = where(log_V > 0.0, log_V, 0.0), where(log_V < 0.0, -log_V, 0.0)
     shape = 1.0 / (n * where(high > 1.0, high, 1.0)) + where(high < _FAR, n * high, 0.0) + deep
     steep = where(n > 4.0, 0.25 * n, 0.0)
     square = steep * steep
     missed = 4e-14 * (square * square) * (square * square) * square * steep
     cycle = 1e-14 + 4e-16 * shape + missed + where(e > 0.0, 0.0, 1e-16 / (1.0 + e))
-    cycle = where((kappa > 0.0) | (n > 16.0) | (log_V < -350.0), math.inf, cycle)
+    cycle = where((scene.kappa > 0.0) | (n > 16.0) | (log_V < -350.0), math.inf, cycle)
     z = 2.0 * fma(n, G, D) * exp(-2.0 * log_V) + 2.0
-    return cycle, 2.0 * cycle, 10.0 * cycle + where(z < 800.0, 4e-15 * z, 0.0)
+    return errors(cycle, 2.0 * cycle, 10.0 * cycle + where(z < 800.0, 4e-15 * z, 0.0))

@@ -8,11 +8,17 @@ With E = v^2/2 the half swing maps E_0 to E_1. The phase area gives its slope, t
     dE_1/dE_0 = exp(-d T) g2/(torque + rho + kappa A),                                               (3)
     E_1 - E_0 = 2 torque - 2 rho A - d (J1 + J2),  J = integral of v^2 over a leg.                    (4)
 The loss on the right of (4) grows strictly with the swing, so there is one limit cycle where a start from rest at the
-switch comes through, and none elsewhere. Units: see `_units`. Derived here.
+switch comes through, and none elsewhere.
+A speed wrong by the share r is an energy wrong by v^2 r. A half swing passes on (3) of it, and adds what rounding
+moves in forces (over the way they act) and in speeds:
+    v_1^2 r_1 = (dE_1/dE_0) v_0^2 r_0 + noise,  dT = abs(dT/dv_0) v_0 r_0 + ROUNDING (T + way/v_1).  (5)
+Units and records: see `_units`. Derived here.
 """
 
 import math
+from typing import NamedTuple
 
+from kernels.foliot._units import Cycle, Legs, errors
 from kernels.integrate import linear_flow
 from kernels.lanes.codes import NO_METHOD, NOT_CONVERGED, NOT_SELF_STARTING, OK, STICKS
 from kernels.lanes.jit import jit, jit_call
@@ -29,95 +35,119 @@ ROUNDING = 2e-15
 """Relative error of one half swing: of time, amplitude, speed and of the terms of (4)."""
 
 
+class Turn(NamedTuple):
+    """E_1 - E of a half swing, the noise of that, whether it was found by the balance (4), and the half swing."""
+
+    gain: float
+    noise: float
+    balanced: bool
+    legs: Legs
+
+
+class Variation(NamedTuple):
+    """Changes of E_1 and of the time of a half swing; of each, the sum of the sizes of its terms: they round so."""
+
+    gain: float
+    time: float
+    of_gain: float
+    of_time: float
+
+
 @jit_call
 def half_swing(torque, scene, start):
-    """From x = 1 with speed `start`, outward if positive, else inward, to x = -1.
-
-    Returns
-    -------
-    time, top, speed : until the switch, largest x, speed at the switch
-    comes : whether the switch is reached
-    legs : what the derivatives need of each leg
-    """
-    d, rho, _, _, _, kappa, _, slack = scene
-    beta = 0.5 * d
+    """From x = 1 with speed `start`, outward if positive, else inward, to x = -1."""
+    kappa, beta = scene.kappa, 0.5 * scene.d
     up = where(start > 0.0, start, 0.0)
-    g1 = torque + rho + kappa
+    g1 = torque + scene.rho + kappa
     t1 = linear_flow.first_reversal(beta, kappa, where(up > 0.0, up, 1.0), -g1)
     t1 = where(up > 0.0, t1, 0.0)
     s1, c1, slope1 = linear_flow.response(beta, kappa, t1)
     rise = fma(up, s1, -g1 * c1)
     top = 1.0 + rise
     down = where(start < 0.0, -start, 0.0)
-    g2 = (torque - 1.0) + slack + kappa * top
+    g2 = (torque - 1.0) + scene.slack + kappa * top
     t2 = linear_flow.first_crossing(beta, kappa, down, g2, 2.0 + rise)
     comes = t2 < 1e300
     t2 = where(comes, t2, 0.0)
     s2, c2, slope2 = linear_flow.response(beta, kappa, t2)
     speed = fma(down, slope2, g2 * s2)
-    return t1 + t2, top, speed, comes, (t1, s1, c1, slope1, g1, t2, s2, c2, slope2, g2, down)
+    return Legs(t1 + t2, top, speed, comes, t1, s1, c1, slope1, g1, t2, s2, c2, slope2, g2, down)
 
 
 @jit
-def _losses(scene, legs, top):
+def _back(scene, legs):
+    """Force at the turning point just before it."""
+    return 1.0 + scene.rho + scene.kappa * legs.top
+
+
+@jit
+def _losses(scene, legs):
     """d (J1 + J2) of (4) after a rise from x = 1; leg 1 is taken backwards from its turning point."""
-    d, rho, _, _, _, kappa, _, _ = scene
-    t1, t2, g2 = legs[0], legs[5], legs[9]
-    back = 1.0 + rho + kappa * top
-    return d * (back * back * linear_flow.loss(-0.5 * d, kappa, t1) + g2 * g2 * linear_flow.loss(0.5 * d, kappa, t2))
+    d, kappa, back, g2 = scene.d, scene.kappa, _back(scene, legs), legs.g2
+    risen, fallen = linear_flow.loss(-0.5 * d, kappa, legs.t1), linear_flow.loss(0.5 * d, kappa, legs.t2)
+    return d * (back * back * risen + g2 * g2 * fallen)
 
 
 @jit
-def _area(scene, time, top, legs):
+def _area(scene, legs):
     """dE_1/dE_0 by (3), and 1 minus e^2 times it, with its digits where that is small."""
-    d, rho, _, _, _, kappa, e, _ = scene
-    back = 1.0 + rho + kappa * top
+    d, e, back = scene.d, scene.e, _back(scene, legs)
     rises = e > 0.0
-    ratio = where(rises, legs[9] / back, 1.0)
-    shrink = where(rises, 2.0 * rho / back, 0.0)  # 1 - ratio
+    ratio = where(rises, legs.g2 / back, 1.0)
+    shrink = where(rises, 2.0 * scene.rho / back, 0.0)  # 1 - ratio
     lost = (1.0 - e) * (1.0 + e)
-    kept = -expm1(-d * time)
+    kept = -expm1(-d * legs.time)
     rest = lost + e * e * (kept + (1.0 - kept) * shrink)
-    return exp(-d * time) * ratio, rest
+    return exp(-d * legs.time) * ratio, rest
 
 
 @jit
 def _end(scene, legs):
     """Acceleration along the drive on arrival at the switch."""
-    _, _, _, _, _, _, s2, _, slope2, g2, down = legs
-    return fma(g2, slope2, -down * fma(scene[0], slope2, scene[5] * s2))
+    return fma(legs.g2, legs.slope2, -legs.down * fma(scene.d, legs.slope2, scene.kappa * legs.s2))
+
+
+@jit_call
+def slopes(scene, start, legs):
+    """dE_1/dE_0 and dT/dv_0 of (5), of a half swing that began with the speed `start` after the switch."""
+    rises, back = start > 0.0, _back(scene, legs)
+    kept = exp(-scene.d * legs.time) * where(rises, legs.g2 / back, 1.0)
+    rising = legs.slope1 / back + legs.s1 * (1.0 - scene.kappa * legs.c2) / legs.speed
+    return kept, where(rises, rising, legs.s2 / legs.speed)
+
+
+@jit
+def own_noise(scene, start, legs):
+    """What rounding adds to E_1 and to the time."""
+    way = 1.0 + legs.top
+    energy = 0.5 * (legs.speed * legs.speed + start * start) + way * magnitude(_end(scene, legs))
+    return ROUNDING * energy, ROUNDING * (legs.time + way / legs.speed)
 
 
 @jit_call
 def _turn(scene, energy):
-    """One half swing from the energy E before the switch: E_1 - E, and what belongs to it.
+    """One half swing from the energy E before the switch.
 
     E_1 - E is a difference of speeds where the swing forgets its start (weak drive), and the balance (4) where it
     hardly changes (strong drive).
     """
-    _, rho, _, _, _, _, e, _ = scene
-    time, top, speed, comes, legs = half_swing(1.0, scene, e * sqrt(2.0 * energy))
-    after = 0.5 * speed * speed
+    e = scene.e
+    legs = half_swing(1.0, scene, e * sqrt(2.0 * energy))
+    after = 0.5 * legs.speed * legs.speed
     balanced = (after > 2.0) & (e > 0.0)
-    work = 2.0 - 2.0 * rho * top - _losses(scene, legs, top) - (1.0 - e) * (1.0 + e) * energy
-    noise = ROUNDING * where(balanced, 4.0, after + energy + (1.0 + top) * magnitude(_end(scene, legs)))
-    return where(balanced, work, after - energy), noise, balanced, time, top, speed, comes, legs
+    work = 2.0 - 2.0 * scene.rho * legs.top - _losses(scene, legs) - (1.0 - e) * (1.0 + e) * energy
+    noise = ROUNDING * where(balanced, 4.0, after + energy + (1.0 + legs.top) * magnitude(_end(scene, legs)))
+    return Turn(where(balanced, work, after - energy), noise, balanced, legs)
 
 
 @jit_call
-def _variation(scene, swing, start, dstart, dmu):
-    """Changes of E_1 and of the time of one half swing with the speed after the switch and with the torque.
-
-    Returns
-    -------
-    gain, time : the changes
-    sizes : of gain and time, the sum of the sizes of their terms, whose rounding they inherit
-    """
+def _variation(scene, turn, start, dstart, dmu):
+    """Of a half swing, with the speed after the switch and with the torque."""
     d, rho, _, _, _, kappa, e, _ = scene
-    balanced, top, speed, legs = swing
-    t1, s1, c1, slope1, _, t2, s2, c2, slope2, g2, _ = legs
+    balanced, legs = turn.balanced, turn.legs
+    _, _, speed, _, t1, s1, c1, slope1, _, t2, s2, c2, slope2, g2, _ = legs
     rises = e > 0.0
-    back, by_mu = 1.0 + rho + kappa * top, magnitude(dmu)
+    back, by_mu = _back(scene, legs), magnitude(dmu)
     dtop = where(rises, fma(s1, dstart, -c1 * dmu), 0.0)
     dt1 = where(rises, fma(slope1, dstart, -s1 * dmu) / back, 0.0)
     of_top = where(rises, magnitude(s1 * dstart) + magnitude(c1 * dmu), 0.0)
@@ -135,20 +165,21 @@ def _variation(scene, swing, start, dstart, dmu):
     of_loss = magnitude(of_g1 + of_g2) * of_g + start * start * of_t1 + speed * speed * of_t2
     of_work = start * magnitude(dstart) + 2.0 * by_mu + 2.0 * rho * of_top + d * of_loss
     gain, of_gain = where(balanced, work, speed * dspeed), where(balanced, of_work, speed * of_speed)
-    return gain, dt1 + dt2, (of_gain, of_t1 + of_t2)
+    return Variation(gain, dt1 + dt2, of_gain, of_t1 + of_t2)
 
 
 @jit
-def _sensitivity(scene, energy, swing, time, rest):
+def _sensitivity(scene, energy, turn, rest):
     """-dlnP/dlnmu of the fixed point E_1(E, mu) = E; the sizes of its terms, and of the terms of those; dlnT/dlnE."""
-    start = magnitude(scene[6]) * sqrt(2.0 * energy)
-    gain_by_mu, time_by_mu, (of_gain, of_time) = _variation(scene, swing, start, 0.0 * start, 0.0 * start + 1.0)
-    _, time_by_start, (_, of_slope) = _variation(scene, swing, start, 0.0 * start + 1.0, 0.0 * start)
-    by_gain = magnitude(scene[6]) / sqrt(2.0 * energy) / rest
-    chain = time_by_start * (by_gain * gain_by_mu)
-    of_chain = magnitude(time_by_start) * (by_gain * of_gain) + of_slope * (by_gain * magnitude(gain_by_mu))
-    terms, of_terms = (magnitude(time_by_mu) + magnitude(chain)) / time, (of_time + of_chain) / time
-    return -(time_by_mu + chain) / time, terms, of_terms, 0.5 * start * magnitude(time_by_start) / time
+    start, time = magnitude(scene.e) * sqrt(2.0 * energy), turn.legs.time
+    by_mu = _variation(scene, turn, start, 0.0 * start, 0.0 * start + 1.0)
+    by_start = _variation(scene, turn, start, 0.0 * start + 1.0, 0.0 * start)
+    by_gain = magnitude(scene.e) / sqrt(2.0 * energy) / rest
+    chain = by_start.time * (by_gain * by_mu.gain)
+    of_chain = magnitude(by_start.time) * (by_gain * by_mu.of_gain)
+    of_chain = of_chain + by_start.of_time * (by_gain * magnitude(by_mu.gain))
+    terms, of_terms = (magnitude(by_mu.time) + magnitude(chain)) / time, (by_mu.of_time + of_chain) / time
+    return -(by_mu.time + chain) / time, terms, of_terms, 0.5 * start * magnitude(by_start.time) / time
 
 
 @jit
@@ -157,17 +188,17 @@ def _search(scene):
 
     A half swing's gain falls with E: where it is positive is a lower end of the bracket, where negative an upper one.
     """
-    energy = 0.0 * scene[0]
+    energy = 0.0 * scene.d
     low, high = energy, energy + 1e308
     active = energy < 1.0
     comes = active
     for _ in range(NEWTON_LIMIT):
         if not some(active):
             break
-        gain, noise, _, time, top, _, through, legs = _turn(scene, energy)
-        comes = comes & (through | isnt(active))
-        active = active & through
-        _, rest = _area(scene, time, top, legs)
+        gain, noise, _, legs = _turn(scene, energy)
+        comes = comes & (legs.comes | isnt(active))
+        active = active & legs.comes
+        _, rest = _area(scene, legs)
         low, high = where(gain > 0.0, energy, low), where(gain > 0.0, high, energy)
         guess = energy + gain / rest
         guess = where((guess >= low) & (guess <= high), guess, 0.5 * (low + high))
@@ -180,29 +211,37 @@ def _search(scene):
 
 @jit_call
 def limit_cycle(scene):
-    """The cycle, the relative errors of its first three numbers, of s and of the multiplier, and its verdict."""
-    d, _, rho_s, _, _, kappa, e, slack = scene
+    """The cycle, the relative errors of its outputs, and its verdict."""
     energy, comes, unsettled = _search(scene)
-    _, noise, balanced, time, top, speed, _, legs = _turn(scene, energy)
-    area, rest = _area(scene, time, top, legs)
-    s, terms, of_terms, by_energy = _sensitivity(scene, energy, (balanced, top, speed, legs), time, rest)
-    of_energy, of_pieces = noise / (rest * energy), 1.0 + (1.0 + top) / (speed * time)
+    turn = _turn(scene, energy)
+    legs = turn.legs
+    area, rest = _area(scene, legs)
+    s, terms, of_terms, by_energy = _sensitivity(scene, energy, turn, rest)
+    of_energy, of_pieces = turn.noise / (rest * energy), 1.0 + (1.0 + legs.top) / (legs.speed * legs.time)
     loose = fma(ROUNDING, of_pieces, of_energy)
     loose_cycle = fma(ROUNDING, of_pieces, of_energy * where(by_energy > 1.0, by_energy, 1.0))
     loose_s = fma(2.0 * loose, terms, _ULPS * of_terms) / magnitude(s)
     loose_s = where(loose_s < 1.0, loose_s / (1.0 - loose_s), math.inf)  # of the true s
     of_time = fma(of_energy, by_energy, 0.3 * ROUNDING * of_pieces)
-    loose_m = loose_cycle + where(area > 0.0, of_time * d * time, 0.0)
-    verdict = where(_self_starting(d, kappa, slack, rho_s), OK, NOT_SELF_STARTING)
-    verdict = where(unsettled, NOT_CONVERGED, verdict)
-    passes = (e < 0.0) | (1.0 + kappa * top > rho_s)  # for e < 0 nothing comes to rest at the switch
-    verdict = where(comes & (energy > 0.0) & passes, verdict, STICKS)
-    verdict = where(d < _STIFFEST, verdict, NO_METHOD)
-    return (time, top, sqrt(2.0 * energy), s, e * e * area), (loose_cycle, loose_s, loose_m), verdict
+    loose_m = loose_cycle + where(area > 0.0, of_time * scene.d * legs.time, 0.0)
+    cycle = Cycle(legs.time, legs.top, sqrt(2.0 * energy), s, scene.e * scene.e * area)
+    verdict = _verdict(scene, legs, comes & (energy > 0.0), unsettled)
+    return cycle, errors(loose_cycle, loose_s, loose_m), verdict
 
 
 @jit
-def _self_starting(d, kappa, slack, rho_s):
+def _verdict(scene, legs, comes, unsettled):
+    """On a cycle whose half swing comes through or not, by what else may keep the foliot from it."""
+    verdict = where(_self_starting(scene), OK, NOT_SELF_STARTING)
+    verdict = where(unsettled, NOT_CONVERGED, verdict)
+    # for e < 0 nothing comes to rest at the switch
+    passes = (scene.e < 0.0) | (1.0 + scene.kappa * legs.top > scene.rho_s)
+    verdict = where(comes & passes, verdict, STICKS)
+    return where(scene.d < _STIFFEST, verdict, NO_METHOD)
+
+
+@jit
+def _self_starting(scene):
     """Whether the motion from rest at x = 0 reaches the switch at x = 1."""
-    none = 0.0 * d
-    return (rho_s < 1.0) & (linear_flow.reach(0.5 * d, kappa, none, slack) > 1.0)
+    none = 0.0 * scene.d
+    return (scene.rho_s < 1.0) & (linear_flow.reach(0.5 * scene.d, scene.kappa, none, scene.slack) > 1.0)

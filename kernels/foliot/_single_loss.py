@@ -3,9 +3,13 @@
 Dry friction rho: A = 1/rho, T = 2 sqrt(2/(rho (1 - rho^2))), v^2 = 2 (1 - rho^2)/rho, s = rho^2/(1 - rho^2).        (1)
 Drag gamma v^2, lambda = v/V: lambda^4 = 1 - exp(-4 gamma), T = (artanh lambda + arctan lambda)/sqrt(gamma), s = 1/2 (2)
 Restitution e: A = (1 + e^2)/(1 - e^2), or 1 for e < 0, T = 2 sqrt((1 + e)/(1 - e)), s = 1/2.                        (3)
-T is half the period; units, *scene* and *cycle* as in `_units`. Derived from the general law of friction.
+T is half the period; units and records as in `_units`. Derived from the general law of friction.
 """
 
+import math
+from typing import NamedTuple
+
+from kernels.foliot._units import Cycle, errors
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import choose, fma, isnt, some, sqrt, where
 from kernels.maths.elementary import arctan, exp, expm1, log1p
@@ -14,22 +18,31 @@ ROUNDING = 2e-15
 """What the closed forms are right to; the multiplier to twice that."""
 
 
+class Law(NamedTuple):
+    """A scene without spring: drag of degree 0 is dry friction, and the degree does no harm where there is no drag."""
+
+    d: float
+    rho: float
+    gamma: float
+    n: float
+    e: float
+    slack: float
+
+
 @jit
 def without_degree_0(scene):
-    """The law with drag of degree 0 counted as dry friction, and a degree that does no harm where there is no drag."""
-    d, rho, _, gamma, n, _, e, slack = scene
-    dry = isnt(n > 0.0)
-    rho, slack = where(dry, rho + gamma, rho), where(dry, slack - gamma, slack)
-    gamma = where(dry, 0.0, gamma)
-    return d, rho, gamma, where(gamma > 0.0, n, 1.0), e, slack
+    """The law of friction of a scene."""
+    dry = isnt(scene.n > 0.0)
+    rho, slack = where(dry, scene.rho + scene.gamma, scene.rho), where(dry, scene.slack - scene.gamma, scene.slack)
+    gamma = where(dry, 0.0, scene.gamma)
+    return Law(scene.d, rho, gamma, where(gamma > 0.0, scene.n, 1.0), scene.e, slack)
 
 
 @jit
 def pure(scene):
     """The cycle where one loss acts alone, and whether one does."""
-    kappa = scene[5]
     d, rho, gamma, n, e, slack = without_degree_0(scene)
-    smooth, elastic = isnt(d > 0.0) & isnt(kappa > 0.0), e >= 1.0
+    smooth, elastic = isnt(d > 0.0) & isnt(scene.kappa > 0.0), e >= 1.0
     alone = smooth & elastic & (rho > 0.0) & isnt(gamma > 0.0)
     drag = smooth & elastic & isnt(rho > 0.0) & (gamma > 0.0) & (n >= 2.0) & (n <= 2.0)
     switch = smooth & isnt(elastic) & isnt(rho > 0.0) & isnt(gamma > 0.0)
@@ -40,11 +53,19 @@ def pure(scene):
 
 
 @jit
+def bound(scene):
+    """Relative errors of `pure`: rounding, and infinite where no loss acts alone."""
+    _, applies = pure(scene)
+    rounding = where(applies, ROUNDING, math.inf)
+    return errors(rounding, rounding, 2.0 * rounding)
+
+
+@jit
 def dry(rho, slack):
     """The cycle (1)."""
     left = slack * (1.0 + rho)  # 1 - rho^2
     half = 2.0 * sqrt(2.0 / (rho * left))
-    return half, 1.0 / rho, sqrt(2.0 * left / rho), rho * rho / left, slack / (1.0 + rho)
+    return Cycle(half, 1.0 / rho, sqrt(2.0 * left / rho), rho * rho / left, slack / (1.0 + rho))
 
 
 @jit
@@ -52,7 +73,7 @@ def _switch(e):
     """The cycle (3)."""
     lost = (1.0 - e) * (1.0 + e)
     amplitude = where(e > 0.0, fma(e, e, 1.0) / lost, 1.0)
-    return 2.0 * sqrt((1.0 + e) / (1.0 - e)), amplitude, 2.0 / sqrt(lost), 0.5, e * e
+    return Cycle(2.0 * sqrt((1.0 + e) / (1.0 - e)), amplitude, 2.0 / sqrt(lost), 0.5, e * e)
 
 
 @jit
@@ -62,4 +83,4 @@ def _drag(gamma):
     lam, root, swell = sqrt(square), sqrt(gamma), log1p(square)
     half = (2.0 * gamma + log1p(lam) + 0.5 * swell + arctan(lam)) / root
     kept = exp(-2.0 * gamma) / (1.0 + square)
-    return half, 1.0 + swell / (2.0 * gamma), lam / root, 0.5, kept * kept
+    return Cycle(half, 1.0 + swell / (2.0 * gamma), lam / root, 0.5, kept * kept)

@@ -1,19 +1,132 @@
-"""The general foliot without dimensions, and back.
+"""The general foliot without dimensions, and back; the records of its state.
 
 In units of phi0 and of T0 = sqrt(phi0/mu) the half swing after the switch at x = +1 obeys
     x'' = -1 - (d x' + (rho + gamma abs(x')^n) sgn x') - kappa x                                     (1)
     d = a T0,  rho = R/mu,  rho_s = R_s/mu,  gamma = c (phi0 mu)^(n/2)/mu,  kappa = k T0^2.
 It starts with e times the speed before the switch and ends at x = -1; the other half mirrors it. Drive work is 2.
-A *scene* is the tuple (d, rho, rho_s, gamma, n, kappa, e, slack), slack = 1 - rho without the rounding of rho. Drag of
-degree 0 is Coulomb friction: it is counted in rho, rho_s and slack, and gamma is 0.
-A *cycle* is the tuple (half period, amplitude, speed before the switch, s = -dlnP/dlnmu, multiplier).
 """
 
+from typing import NamedTuple
+
 from kernels.lanes.jit import jit
-from kernels.lanes.ranges import or_none
+from kernels.lanes.ranges import judged, or_none
 from kernels.lanes.vectors import isnt, nearest, sqrt, where
 from kernels.maths.elementary import is_normal, mantissa_exponent, power, scale
 from kernels.maths.pairs import two_sum
+
+
+class Foliot(NamedTuple):
+    """Parameters."""
+
+    mu: float
+    phi0: float
+    a: float
+    R: float
+    R_s: float
+    c: float
+    n: float
+    k: float
+    e: float
+
+
+class LinearFoliot(NamedTuple):
+    """Parameters without drag."""
+
+    mu: float
+    phi0: float
+    a: float
+    R: float
+    R_s: float
+    k: float
+    e: float
+
+
+class Outputs(NamedTuple):
+    """Outputs of a limit cycle, or the relative error of each."""
+
+    period: float
+    amplitude: float
+    crossing_speed: float
+    sensitivity: float
+    multiplier: float
+
+
+class Scene(NamedTuple):
+    """Coefficients of (1), and slack = 1 - rho without the rounding of rho.
+
+    Drag of degree 0 is Coulomb friction: it is counted in rho, rho_s and slack, and gamma is 0.
+    """
+
+    d: float
+    rho: float
+    rho_s: float
+    gamma: float
+    n: float
+    kappa: float
+    e: float
+    slack: float
+
+
+class Units(NamedTuple):
+    """T0 = t 2^e_t and phi0 = m_phi 2^e_phi, and whether all groups of (1) are normal numbers."""
+
+    t: float
+    e_t: float
+    m_phi: float
+    e_phi: float
+    fine: bool
+
+
+class Cycle(NamedTuple):
+    """A limit cycle: half period, amplitude, speed before the switch, s = -dlnP/dlnmu, multiplier."""
+
+    half_period: float
+    amplitude: float
+    speed: float
+    sensitivity: float
+    multiplier: float
+
+
+class Legs(NamedTuple):
+    """A half swing: until the switch, largest x, speed there, whether it comes; and each leg.
+
+    Leg 1 rises, for the time t1, against the force g1; leg 2 falls under g2, beginning with the speed `down`. s, c and
+    slope are the responses of `linear_flow` over a leg.
+    """
+
+    time: float
+    top: float
+    speed: float
+    comes: bool
+    t1: float
+    s1: float
+    c1: float
+    slope1: float
+    g1: float
+    t2: float
+    s2: float
+    c2: float
+    slope2: float
+    g2: float
+    down: float
+
+
+@jit
+def terms(p):
+    """The foliot of a record that has more parameters."""
+    return Foliot(p.mu, p.phi0, p.a, p.R, p.R_s, p.c, p.n, p.k, p.e)
+
+
+@jit
+def without_drag(p):
+    """The foliot of a `LinearFoliot`."""
+    return Foliot(p.mu, p.phi0, p.a, p.R, p.R_s, 0.0, 1.0, p.k, p.e)
+
+
+@jit
+def errors(swing, sensitivity, multiplier):
+    """Relative errors of the outputs; period, amplitude and speed share the first."""
+    return Outputs(swing, swing, swing, sensitivity, multiplier)
 
 
 @jit
@@ -24,17 +137,19 @@ def _root(m, e):
 
 
 @jit
-def without_dimensions(mu, phi0, a, R, R_s, c, n, k, e):
-    """The scene, and the units: T0 and phi0, each as mantissa and exponent, with whether all groups are normal."""
-    (m_mu, e_mu), (m_phi, e_phi) = mantissa_exponent(mu), mantissa_exponent(phi0)
+def without_dimensions(p):
+    """The scene of a `Foliot`, and its units."""
+    (m_mu, e_mu), (m_phi, e_phi) = mantissa_exponent(p.mu), mantissa_exponent(p.phi0)
     t, e_t = _root(m_phi / m_mu, e_phi - e_mu)
     v, e_v = _root(m_phi * m_mu, e_phi + e_mu)
-    d, kappa = _in_units(a, t, e_t), _in_units(k, t * t, 2.0 * e_t)
-    solid, drag = where(n > 0.0, 0.0, c), where(n > 0.0, c, 0.0)
-    gamma = _strength(mu, drag, n, scale(v, e_v))
-    rho, slack = (R + solid) / mu, spare_torque(mu, R, solid) / mu
-    fine = _kept(a, d) & _kept(k, kappa) & _kept(drag, gamma) & _kept(R + solid, rho)
-    return (d, rho, (R_s + solid) / mu, gamma, where(n > 0.0, n, 1.0), kappa, e, slack), (t, e_t, m_phi, e_phi, fine)
+    d, kappa = _in_units(p.a, t, e_t), _in_units(p.k, t * t, 2.0 * e_t)
+    powered = p.n > 0.0
+    solid, drag = where(powered, 0.0, p.c), where(powered, p.c, 0.0)
+    gamma = _strength(p.mu, drag, p.n, scale(v, e_v))
+    rho, slack = (p.R + solid) / p.mu, spare_torque(p.mu, p.R, solid) / p.mu
+    fine = _kept(p.a, d) & _kept(p.k, kappa) & _kept(drag, gamma) & _kept(p.R + solid, rho)
+    scene = Scene(d, rho, (p.R_s + solid) / p.mu, gamma, where(powered, p.n, 1.0), kappa, p.e, slack)
+    return scene, Units(t, e_t, m_phi, e_phi, fine)
 
 
 @jit
@@ -65,13 +180,21 @@ def _kept(x, group):
 
 @jit
 def dimensional(units, cycle):
-    """Period [s], amplitude [rad], crossing speed [rad/s], each NaN where it is no normal number.
+    """The outputs of a `Cycle`, each NaN where it is no normal number.
 
     Also whether all groups are normal numbers, and whether all of these are.
     """
-    t, e_t, m_phi, e_phi, fine = units
-    half_period, amplitude, speed, _, _ = cycle
-    period = scale(2.0 * t * half_period, e_t)
-    swing, fast = scale(m_phi * amplitude, e_phi), scale(m_phi / t * speed, e_phi - e_t)
+    half_period, amplitude, speed, sensitivity, multiplier = cycle
+    period = scale(2.0 * units.t * half_period, units.e_t)
+    swing = scale(units.m_phi * amplitude, units.e_phi)
+    fast = scale(units.m_phi / units.t * speed, units.e_phi - units.e_t)
     timed, wide, moves = is_normal(period), is_normal(swing), is_normal(fast)
-    return or_none(period, timed), or_none(swing, wide), or_none(fast, moves), fine, timed & wide & moves
+    period, swing, fast = or_none(period, timed), or_none(swing, wide), or_none(fast, moves)
+    return Outputs(period, swing, fast, sensitivity, multiplier), units.fine, timed & wide & moves
+
+
+@jit
+def given(units, cycle, verdict):
+    """What a method gives of a cycle: its outputs and its status."""
+    outputs, sound, whole = dimensional(units, cycle)
+    return outputs, judged(sound, whole, verdict)

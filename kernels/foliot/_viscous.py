@@ -6,14 +6,15 @@
 
 Source: Hoyng & Nieuwenhuizen, arXiv:1604.06681, appendix A; q = a P/4 turns its two conditions into (2), and (3)
 follows by differentiating (2). Everything depends on k alone; `dimensional` puts the units back.
-A *cycle* below is the tuple (q, lambda, A, s, m).
 """
 
 import math
+from typing import NamedTuple
 
+from kernels.foliot._units import Outputs, errors
 from kernels.foliot._viscous_fit import AMPLITUDE_STRONG, GAP_WEAK, OVERSHOOT_WEAK, Q_STRONG, SENSITIVITY_STRONG, SPLIT
 from kernels.lanes.jit import jit
-from kernels.lanes.ranges import or_none
+from kernels.lanes.ranges import judged, or_none
 from kernels.lanes.vectors import choose, fma, horner, isnt, magnitude, some, sqrt, where
 from kernels.maths.elementary import cbrt, exp, exp_remainder, is_normal, log_remainder, mantissa_exponent, scale
 
@@ -31,12 +32,36 @@ _AMPLITUDE_SERIES = (1 / 10, 4 / 525, -1 / 31500)
 _SENSITIVITY_SERIES = (4 / 45, 52 / 4725, -32 / 70875)
 
 
+class ViscousCycle(NamedTuple):
+    """The limit cycle as in (2) and (3)."""
+
+    q: float
+    lam: float
+    amplitude: float
+    sensitivity: float
+    multiplier: float
+
+
+class Scaled(NamedTuple):
+    """mu = m_mu 2^e_mu and so on, whether powers of two were taken out of any, and whether k is a normal number."""
+
+    m_mu: float
+    m_phi: float
+    m_a: float
+    e_mu: float
+    e_phi: float
+    e_a: float
+    wild: bool
+    representable: bool
+
+
 @jit
-def without_dimensions(mu, phi0, a):
-    """k as an unevaluated sum (k, rest), and the scene with powers of two taken out where a product could overflow.
+def without_dimensions(p):
+    """k as an unevaluated sum (k, rest), and units with powers of two taken out where a product could overflow.
 
     Scaling by powers of two is exact, so the bits do not depend on whether a neighbouring cell needed it.
     """
+    mu, phi0, a = p.mu, p.phi0, p.a
     wild = isnt(_tame(mu) & _tame(phi0) & _tame(a))
     e_mu, e_phi, e_a = 0.0, 0.0, 0.0
     if some(wild):
@@ -51,7 +76,7 @@ def without_dimensions(mu, phi0, a):
     if some(wild):
         n = 2.0 * e_a + e_phi - e_mu
         k, rest = scale(k, n), scale(rest, n)
-    return k, rest, (mu, phi0, a, e_mu, e_phi, e_a, wild, is_normal(k))
+    return k, rest, Scaled(mu, phi0, a, e_mu, e_phi, e_a, wild, is_normal(k))
 
 
 @jit
@@ -60,19 +85,27 @@ def _tame(x):
 
 
 @jit
-def dimensional(scene, cycle):
-    """Period [s], amplitude [rad], crossing speed [rad/s], each NaN where it is no normal number.
+def dimensional(units, cycle):
+    """The outputs of a cycle, each NaN where it is no normal number.
 
     Also whether k is one, and whether all of the others are.
     """
-    mu, phi0, a, e_mu, e_phi, e_a, wild, representable = scene
-    q, lam, amplitude, _, _ = cycle
-    period, swing, speed = q / (0.25 * a), amplitude * phi0, lam * mu / a
-    if some(wild):
-        period = scale(0.0625 * q / a, 6.0 - e_a)  # 4 q may be too large where 4 q/a is not
-        swing, speed = scale(swing, e_phi), scale(speed, e_mu - e_a)
+    q, a = cycle.q, units.m_a
+    period, swing, speed = q / (0.25 * a), cycle.amplitude * units.m_phi, cycle.lam * units.m_mu / a
+    if some(units.wild):
+        period = scale(0.0625 * q / a, 6.0 - units.e_a)  # 4 q may be too large where 4 q/a is not
+        swing, speed = scale(swing, units.e_phi), scale(speed, units.e_mu - units.e_a)
     timed, wide, fast = is_normal(period), is_normal(swing), is_normal(speed)
-    return or_none(period, timed), or_none(swing, wide), or_none(speed, fast), representable, timed & wide & fast
+    period, swing, speed = or_none(period, timed), or_none(swing, wide), or_none(speed, fast)
+    outputs = Outputs(period, swing, speed, cycle.sensitivity, cycle.multiplier)
+    return outputs, units.representable, timed & wide & fast
+
+
+@jit
+def given(units, cycle, verdict):
+    """What a method gives of a cycle: its outputs and its status."""
+    outputs, sound, whole = dimensional(units, cycle)
+    return outputs, judged(sound, whole, verdict)
 
 
 @jit
@@ -82,17 +115,20 @@ def closed(k, rest):
     A group of cells that lies on one side pays for that side only.
     """
     strong = k < SPLIT
-    cycle = (0.0 * k, 0.0 * k, 0.0 * k, 0.0 * k)
+    none = 0.0 * k
+    q, lam, amplitude, sensitivity = none, none, none, none
     if some(strong):
-        cycle = _closed_strong(k)
-    decay = exp(-2.0 * where(strong, cycle[0], k))
+        q, lam, amplitude, sensitivity = _closed_strong(k)
+    decay = exp(-2.0 * where(strong, q, k))
+    cycle = ViscousCycle(q, lam, amplitude, sensitivity, decay)
     if some(isnt(strong)):
-        return choose(strong, (*cycle, decay), _closed_weak(k, rest, decay))
-    return (*cycle, decay)
+        return choose(strong, cycle, _closed_weak(k, rest, decay))
+    return cycle
 
 
 @jit
 def _closed_strong(k):
+    """q, lambda, A and s."""
     y = cbrt(3.0 * k)
     w = y * y
     tail = horner(w, Q_STRONG)
@@ -110,7 +146,7 @@ def _closed_weak(k, rest, decay):
     lam = 1.0 - gap
     q = k + (lam + rest)
     amplitude = 1.0 + fma(x, horner(x, OVERSHOOT_WEAK), _OVERSHOOT) / k
-    return q, lam, amplitude, k / (q * (lam * lam)), gap / (2.0 - gap)
+    return ViscousCycle(q, lam, amplitude, k / (q * (lam * lam)), gap / (2.0 - gap))
 
 
 @jit
@@ -137,8 +173,8 @@ def asymptotic(k):
     Strong: q = b (1 + 2 b^2/15 + 3 b^4/175 + 2 b^6/1575), A = 1.5/b (1 + b^2/10 + 4 b^4/525 - b^6/31500),
     s = 1/3 + 4 b^2/45 + 52 b^4/4725 - 32 b^6/70875. Weak: lambda = 1 - 2x, A = 1 + alpha (1 - ln 2 - x).
     """
-    strong = k < SPLIT
-    cycle = (0.0 * k, 0.0 * k, 0.0 * k, 0.0 * k, 0.0 * k)
+    strong, none = k < SPLIT, 0.0 * k
+    cycle = ViscousCycle(none, none, none, none, none)
     if some(strong):
         cycle = _asymptotic_strong(k)
     if some(isnt(strong)):
@@ -154,7 +190,7 @@ def _asymptotic_strong(k):
     lam = fma(b * w, tail - 1.0 / 3.0, b)
     amplitude = fma(w, horner(w, _AMPLITUDE_SERIES), 1.0) * (1.5 / b)
     s = fma(w, horner(w, _SENSITIVITY_SERIES), 1.0 / 3.0)
-    return fma(b * w, tail, b), lam, amplitude, s, (1.0 - lam) / (1.0 + lam)
+    return ViscousCycle(fma(b * w, tail, b), lam, amplitude, s, (1.0 - lam) / (1.0 + lam))
 
 
 @jit
@@ -162,12 +198,12 @@ def _asymptotic_weak(k):
     x = exp(-2.0 * k) * _EXP_MINUS_2
     lam = 1.0 - 2.0 * x
     q = k + lam
-    return q, lam, 1.0 + (_OVERSHOOT - x) / k, k / (q * (lam * lam)), x
+    return ViscousCycle(q, lam, 1.0 + (_OVERSHOOT - x) / k, k / (q * (lam * lam)), x)
 
 
 @jit
 def asymptotic_bound(k):
-    """Bounds on the relative errors of `asymptotic`: of period, amplitude and speed; of s; and of m.
+    """Relative errors of `asymptotic`.
 
     Strong: the first terms left out are below 2.2e-4 b^8, in s 2e-3 b^8, and up to the split b^8 = (3k)^(8/3) is at
     most 1.15 (3k)^2 sqrt(3k). Weak: (1 - lambda)/x - 2 = 6x + ... <= 7.3x gives 8 x^2, and 20 x^2 in s, which has
@@ -187,7 +223,7 @@ def asymptotic_bound(k):
     cycle = where(strong, 2.2e-4 * b8, 8.0 * (x * x)) + ROUNDING
     sensitivity = where(strong, 2e-3 * b8, 20.0 * (x * x)) + ROUNDING
     rounding = where(k < 400.0, 1e-15 * k, 0.0)  # below exp(-800) the multiplier is 0 for good
-    return cycle, sensitivity, where(strong, 4e-3 * b8, 5.0 * x + rounding) + 2.0 * ROUNDING
+    return errors(cycle, sensitivity, where(strong, 4e-3 * b8, 5.0 * x + rounding) + 2.0 * ROUNDING)
 
 
 @jit
@@ -227,7 +263,7 @@ def event_map(k, rtol):
         active = active & unsettled
     q = u + k
     decay = exp(-z)  # 1 - u
-    return (q, u, 1.0 + log_remainder(u) / k, k / (q * (u * u)), decay / (2.0 - decay)), active
+    return ViscousCycle(q, u, 1.0 + log_remainder(u) / k, k / (q * (u * u)), decay / (2.0 - decay)), active
 
 
 @jit
@@ -238,4 +274,4 @@ def event_map_bound(k):
     if some(strong):
         b = cbrt(3.0 * where(strong, k, 1.0))
     cycle = 8e-15 + 2e-15 / b
-    return cycle, cycle, cycle + where(k < 400.0, 4e-15 * k, 0.0)
+    return errors(cycle, cycle, cycle + where(k < 400.0, 4e-15 * k, 0.0))

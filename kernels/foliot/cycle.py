@@ -19,175 +19,128 @@ from kernels.foliot import (
     _linear_swing,
     _single_loss,
     _units,
-    _viscous_methods,
+    _viscous,
 )
-from kernels.foliot._viscous_methods import worst
-from kernels.interface import Field, Kernel, Method
-from kernels.lanes.codes import BAD_INPUT, NEVER_STARTS, NO_LIMIT_CYCLE, NO_METHOD, OK
-from kernels.lanes.columns import each_cell, entry
+from kernels.foliot._units import Foliot
+from kernels.interface import Field
+from kernels.lanes.codes import BAD_INPUT, NEVER_STARTS, NO_LIMIT_CYCLE, NO_METHOD, NOT_CONVERGED, OK
 from kernels.lanes.jit import jit
-from kernels.lanes.ranges import judged
 from kernels.lanes.vectors import isnt, where
+from kernels.lanes.wiring import kernel, method
 
 
 @jit
-def write(i, units, cycle, verdict, period, amplitude, crossing_speed, sensitivity, multiplier, status):
-    """One cell's cycle, or the lanes', in SI units."""
-    period[i], amplitude[i], crossing_speed[i], sound, whole = _units.dimensional(units, cycle)
-    sensitivity[i], multiplier[i] = cycle[3], cycle[4]
-    status[i] = judged(sound, whole, verdict)
+def closed(p, rtol):
+    """The root q of q - tanh q = 1/alpha from fitted polynomials: 1e-15 at every drive, no iteration."""
+    k, rest, units = _viscous.without_dimensions(p)
+    return _viscous.given(units, _viscous.closed(k, rest), OK)
 
 
 @jit
-def _pure_cell(i, mu, phi0, a, R, R_s, c, n, k, e, rtol, *outputs):
-    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-    scene, units = _units.without_dimensions(*terms)
-    cycle, applies = _single_loss.pure(scene)
-    write(i, units, cycle, where(applies, OK, NO_METHOD), *outputs)
+def closed_bound(p):
+    """`closed` is right to rounding everywhere."""
+    return _units.errors(_viscous.ROUNDING, _viscous.ROUNDING, 2.0 * _viscous.ROUNDING)
 
 
-@entry()
-def pure(mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+@jit
+def asymptotic(p, rtol):
+    """Weak and strong series: the period within 0.5 %, the sensitivity within 2.2 % at every drive."""
+    k, _, units = _viscous.without_dimensions(p)
+    return _viscous.given(units, _viscous.asymptotic(k), OK)
+
+
+@jit
+def asymptotic_bound(p):
+    """Bound on the error of `asymptotic`: the first terms left out."""
+    k, _, _ = _viscous.without_dimensions(p)
+    return _viscous.asymptotic_bound(k)
+
+
+@jit
+def event_map(p, rtol):
+    """The exact map from switch to switch, iterated from rest; slow at strong drive, where a swing forgets little."""
+    k, _, units = _viscous.without_dimensions(p)
+    cycle, unsettled = _viscous.event_map(k, rtol)
+    return _viscous.given(units, cycle, where(unsettled, NOT_CONVERGED, OK))
+
+
+@jit
+def event_map_bound(p):
+    """What rounding leaves of the iterated map; that it settles to rtol, its status says."""
+    k, _, _ = _viscous.without_dimensions(p)
+    return _viscous.event_map_bound(k)
+
+
+@jit
+def pure(p, rtol):
     """Closed forms where one loss acts alone: Coulomb friction, quadratic drag or restitution; else NO_METHOD."""
-    each_cell(
-        _pure_cell,
-        (mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status),
-    )
+    scene, units = _units.without_dimensions(p)
+    cycle, applies = _single_loss.pure(scene)
+    return _units.given(units, cycle, where(applies, OK, NO_METHOD))
 
 
 @jit
-def _pure_bound(i, mu, phi0, a, R, R_s, c, n, k, e, out, asked):
-    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-    scene, _ = _units.without_dimensions(*terms)
-    _, applies = _single_loss.pure(scene)
-    out[i] = where(
-        applies, worst(asked, _single_loss.ROUNDING, _single_loss.ROUNDING, 2.0 * _single_loss.ROUNDING), math.inf
-    )
-
-
-@entry("asked")
-def pure_bound(mu, phi0, a, R, R_s, c, n, k, e, rtol, asked, out):
+def pure_bound(p):
     """Rounding where one loss acts alone, infinite elsewhere."""
-    each_cell(_pure_bound, (mu, phi0, a, R, R_s, c, n, k, e, out, asked))
+    scene, _ = _units.without_dimensions(p)
+    return _single_loss.bound(scene)
 
 
 @jit
-def _coulomb_cell(i, mu, phi0, a, R, R_s, c, n, k, e, rtol, *outputs):
-    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-    scene, units = _units.without_dimensions(*terms)
-    cycle, verdict = _coulomb.limit_cycle(scene)
-    write(i, units, cycle, verdict, *outputs)
-
-
-@entry()
-def coulomb(mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+def coulomb(p, rtol):
     """One transcendental equation by Halley's steps: 4e-15 at every drive."""
-    each_cell(
-        _coulomb_cell,
-        (mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status),
-    )
+    scene, units = _units.without_dimensions(p)
+    cycle, verdict = _coulomb.limit_cycle(scene)
+    return _units.given(units, cycle, verdict)
 
 
 @jit
-def _coulomb_bound(i, mu, phi0, a, R, R_s, c, n, k, e, out, asked):
-    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-    scene, _ = _units.without_dimensions(*terms)
-    out[i] = worst(asked, _coulomb.ROUNDING, _coulomb.ROUNDING, _coulomb.multiplier_bound(scene))
-
-
-@entry("asked")
-def coulomb_bound(mu, phi0, a, R, R_s, c, n, k, e, rtol, asked, out):
+def coulomb_bound(p):
     """Rounding; the multiplier exp(-tau) repeats that of tau."""
-    each_cell(_coulomb_bound, (mu, phi0, a, R, R_s, c, n, k, e, out, asked))
+    scene, _ = _units.without_dimensions(p)
+    return _coulomb.bound(scene)
 
 
 @jit
-def _segments_cell(i, mu, phi0, a, R, R_s, c, n, k, e, asked, error, *outputs):
-    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-    scene, units = _units.without_dimensions(*terms)
+def segments(p, rtol):
+    """Exact pieces of the swing and Newton on their map; with what conditioning leaves of each output."""
+    scene, units = _units.without_dimensions(p)
     cycle, errors, verdict = _linear_swing.limit_cycle(scene)
-    error[i] = worst(asked, *errors)
-    write(i, units, cycle, verdict, *outputs)
-
-
-@entry("asked")
-def segments(
-    mu,
-    phi0,
-    a,
-    R,
-    R_s,
-    c,
-    n,
-    k,
-    e,
-    rtol,
-    asked,
-    period,
-    amplitude,
-    crossing_speed,
-    sensitivity,
-    multiplier,
-    error,
-    status,
-):
-    """Exact pieces of the swing and Newton on their map; with what conditioning leaves of the outputs asked for."""
-    outputs = (period, amplitude, crossing_speed, sensitivity, multiplier, status)
-    each_cell(_segments_cell, (mu, phi0, a, R, R_s, c, n, k, e, asked, error, *outputs))
+    outputs, status = _units.given(units, cycle, verdict)
+    return outputs, errors, status
 
 
 @jit
-def _quadrature_cell(i, mu, phi0, a, R, R_s, c, n, k, e, rtol, *outputs):
-    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-    scene, units = _units.without_dimensions(*terms)
-    cycle, verdict = _friction_quadrature.solve_quadrature(scene, rtol[i])
-    write(i, units, cycle, verdict, *outputs)
-
-
-@entry()
-def quadrature(
-    mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status
-):
+def quadrature(p, rtol):
     """Integrals over the speed for any sum of friction laws, and Newton on their balance."""
-    each_cell(
-        _quadrature_cell,
-        (mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status),
-    )
+    scene, units = _units.without_dimensions(p)
+    cycle, verdict = _friction_quadrature.solve_quadrature(scene, rtol)
+    return _units.given(units, cycle, verdict)
 
 
 @jit
-def _quadrature_bound(i, mu, phi0, a, R, R_s, c, n, k, e, out, asked):
-    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-    scene, _ = _units.without_dimensions(*terms)
-    out[i] = worst(asked, *_friction_quadrature.quadrature_bound(scene))
-
-
-@entry("asked")
-def quadrature_bound(mu, phi0, a, R, R_s, c, n, k, e, rtol, asked, out):
+def quadrature_bound(p):
     """The error of the rule and rounding: 1e-14 to 1e-13 for drag of degree 0.05 to 4."""
-    each_cell(_quadrature_bound, (mu, phi0, a, R, R_s, c, n, k, e, out, asked))
+    scene, _ = _units.without_dimensions(p)
+    return _friction_quadrature.quadrature_bound(scene)
 
 
 @jit
-def _dopri5_cell(i, mu, phi0, a, R, R_s, c, n, k, e, rtol, *outputs):
-    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-    scene, units = _units.without_dimensions(*terms)
-    cycle, verdict = _integrated_swing.dopri5(scene, _integrated_swing.SMOOTH, rtol[i])
-    write(i, units, cycle, verdict, *outputs)
-
-
-@entry()
-def dopri5(mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status):
+def dopri5(p, rtol):
     """Dormand-Prince 5(4) over half swings, each switch located and restarted at, and Newton on their map."""
-    each_cell(
-        _dopri5_cell,
-        (mu, phi0, a, R, R_s, c, n, k, e, rtol, period, amplitude, crossing_speed, sensitivity, multiplier, status),
-    )
+    scene, units = _units.without_dimensions(p)
+    cycle, verdict = _integrated_swing.dopri5(scene, _integrated_swing.SMOOTH, rtol)
+    return _units.given(units, cycle, verdict)
 
 
 @jit
-def refusal(mu, phi0, a, R, R_s, c, n, k, e):
-    """The status of `check` for one cell, or for lanes; OK where a method is to decide."""
+def check(p):
+    """What no method is asked.
+
+    BAD_INPUT: NaN, infinite, outside its limits, or stiction below the friction of motion. NEVER_STARTS: torque that
+    cannot overcome solid friction. NO_LIMIT_CYCLE: nothing that takes energy.
+    """
+    mu, phi0, a, R, R_s, c, n, k, e = p
     known = (mu >= 0.0) & (phi0 > 0.0) & (a >= 0.0) & (R >= 0.0) & (c >= 0.0) & (n >= 0.0) & (k >= 0.0)  # NaN fails
     small = (mu < math.inf) & (phi0 < math.inf) & (a < math.inf) & (R_s < math.inf) & (c < math.inf)
     allowed = known & small & (n < math.inf) & (k < math.inf) & (R_s >= R) & (e > -1.0) & (e <= 1.0)
@@ -196,21 +149,6 @@ def refusal(mu, phi0, a, R, R_s, c, n, k, e):
     lossless = isnt((a > 0.0) | (R > 0.0) | (c > 0.0) | (e < 1.0))
     verdict = where(spare > 0.0, where(lossless, NO_LIMIT_CYCLE, OK), NEVER_STARTS)
     return where(allowed, verdict, BAD_INPUT)
-
-
-@jit
-def _check(i, mu, phi0, a, R, R_s, c, n, k, e, status):
-    status[i] = refusal(mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-
-
-@entry()
-def check(mu, phi0, a, R, R_s, c, n, k, e, status):
-    """What no method is asked.
-
-    BAD_INPUT: NaN, infinite, outside its limits, or stiction below the friction of motion. NEVER_STARTS: torque that
-    cannot overcome solid friction. NO_LIMIT_CYCLE: nothing that takes energy.
-    """
-    each_cell(_check, (mu, phi0, a, R, R_s, c, n, k, e, status))
 
 
 PARAMETERS = (
@@ -243,52 +181,55 @@ OUTPUTS = (
 
 _VISCOUS_ONLY = ("R", "c", "k", "e")
 
-FOLIOT = Kernel(
-    name="foliot",
+FOLIOT = kernel(
+    "foliot",
     doc="limit cycle of a verge and foliot",
     source="Hoyng & Nieuwenhuizen, arXiv:1604.06681; terms beyond viscous friction derived here",
     parameters=PARAMETERS,
     outputs=OUTPUTS,
+    record=Foliot,
     check=check,
     methods=(
-        Method(
+        method(
             "closed",
             "root of q - tanh q = 1/alpha by fitted polynomials",
-            _viscous_methods.closed,
-            _viscous_methods.closed_bound,
-            _VISCOUS_ONLY,
+            closed,
+            closed_bound,
+            excludes=_VISCOUS_ONLY,
         ),
-        Method(
+        method(
             "asymptotic",
             "weak and strong series with a bound each",
-            _viscous_methods.asymptotic,
-            _viscous_methods.asymptotic_bound,
-            _VISCOUS_ONLY,
+            asymptotic,
+            asymptotic_bound,
+            excludes=_VISCOUS_ONLY,
         ),
-        Method("pure", "closed forms where one loss acts alone", pure, pure_bound, ("a", "k")),
-        Method(
+        method("pure", "closed forms where one loss acts alone", pure, pure_bound, excludes=("a", "k")),
+        method(
             "coulomb",
             "viscous and Coulomb friction: one equation by Halley's steps",
             coulomb,
             coulomb_bound,
-            ("c", "k", "e"),
+            excludes=("c", "k", "e"),
         ),
-        Method(
+        method(
             "segments",
             "exact pieces of linear terms, Newton on the half-swing map",
             segments,
             excludes=("c",),
             estimates=True,
         ),
-        Method("quadrature", "integrals over the speed, for any friction", quadrature, quadrature_bound, ("k",)),
-        Method(
+        method(
+            "quadrature", "integrals over the speed, for any friction", quadrature, quadrature_bound, excludes=("k",)
+        ),
+        method(
             "map",
             "exact map from switch to switch, iterated from rest",
-            _viscous_methods.event_map,
-            _viscous_methods.event_map_bound,
-            _VISCOUS_ONLY,
+            event_map,
+            event_map_bound,
+            excludes=_VISCOUS_ONLY,
         ),
-        Method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", dopri5),
+        method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", dopri5),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
 )

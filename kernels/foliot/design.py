@@ -61,8 +61,7 @@ def newton(p, rtol):
     """Newton on (1) from a start within 15 %."""
     (period, e_p), (phi0, e_f) = mantissa_exponent(p.period), mantissa_exponent(p.phi0)
     k, unsettled = _inverse_alpha((p.amplitude - p.phi0) / p.phi0)
-    q, _, _, _, _ = _viscous.closed(k, 0.0 * k)
-    unit_a = 4.0 * q / period
+    unit_a = 4.0 * _viscous.closed(k, 0.0 * k).q / period
     unit_k, e_k = mantissa_exponent(k)
     a, mu = scale(unit_a, -e_p), scale(unit_a * unit_a * phi0 / unit_k, e_f - 2.0 * e_p - e_k)
     rubs, drives = is_normal(a), is_normal(mu)

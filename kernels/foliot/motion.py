@@ -7,18 +7,19 @@ hairspring or restitution the two pieces of the half swing follow `linear_flow`;
 """
 
 from kernels.foliot import _linear_swing, _units, _viscous
-from kernels.foliot.cycle import PARAMETERS as ALL_TERMS
-from kernels.foliot.cycle import refusal
+from kernels.foliot._units import LinearFoliot
+from kernels.foliot.cycle import FOLIOT
+from kernels.foliot.cycle import check as check_foliot
 from kernels.integrate import linear_flow
-from kernels.interface import Field, Kernel, Method
+from kernels.interface import Field
 from kernels.lanes.codes import OK
-from kernels.lanes.columns import entry, one_by_one
+from kernels.lanes.columns import cell_by_cell
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged, or_none
+from kernels.lanes.records import read
 from kernels.lanes.vectors import fma, where
+from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import exp, exp_remainder, scale
-
-PARAMETERS = tuple(p for p in ALL_TERMS if p.name not in ("c", "n"))
 
 
 @jit
@@ -33,94 +34,78 @@ def _shape(phase, k, q, lam):
 
 
 @jit
-def _closed(i, mu, phi0, a, phase, angle, speed, status):
-    k, rest, scene = _viscous.without_dimensions(mu[i], phi0[i], a[i])
-    cycle = _viscous.closed(k, rest)
-    _, top, fast, sound, _ = _viscous.dimensional(scene, cycle)
-    wide, moves = top > 0.0, fast > 0.0
-    unit_mu, unit_phi, unit_a, e_mu, e_phi, e_a, _, _ = scene
-    for j in range(phase.size):
-        x, u = _shape(phase[j], k, cycle[0], cycle[1])
-        angle[i, j] = or_none(scale(unit_phi * x, e_phi), wide)
-        speed[i, j] = or_none(scale(unit_mu / unit_a * u, e_mu - e_a), moves)
-    status[i] = judged(sound & (wide | moves), wide & moves, OK)
-
-
-@entry("phase")
-def closed(mu, phi0, a, R, R_s, k, e, rtol, phase, angle, speed, status):
+def _closed(i, columns):
     """Equation (1) on the cycle from fitted polynomials: 4e-15 of amplitude and crossing speed at every drive."""
-    one_by_one(_closed, (mu, phi0, a, phase, angle, speed, status))
-
-
-@entry("phase", "asked")
-def closed_bound(mu, phi0, a, R, R_s, k, e, rtol, phase, asked, out):
-    """Rounding, relative to the amplitude and to the crossing speed."""
-    out[:] = 4.0 * _viscous.ROUNDING
+    k, rest, units = _viscous.without_dimensions(read(LinearFoliot, columns, i))
+    cycle = _viscous.closed(k, rest)
+    outputs, sound, _ = _viscous.dimensional(units, cycle)
+    wide, moves = outputs.amplitude > 0.0, outputs.crossing_speed > 0.0
+    for j in range(columns.phase.size):
+        x, u = _shape(columns.phase[j], k, cycle.q, cycle.lam)
+        columns.angle[i, j] = or_none(scale(units.m_phi * x, units.e_phi), wide)
+        columns.speed[i, j] = or_none(scale(units.m_mu / units.m_a * u, units.e_mu - units.e_a), moves)
+    columns.status[i] = judged(sound & (wide | moves), wide & moves, OK)
 
 
 @jit
-def _state(scene, start, top, legs, t):
+def _state(scene, legs, start, t):
     """x and its rate at a time t after the switch at x = 1."""
-    beta, kappa = 0.5 * scene[0], scene[5]
-    t1, g1, g2, down = legs[0], legs[4], legs[9], legs[10]
-    rising = t < t1
+    rising = t < legs.t1
     up = where(start > 0.0, start, 0.0)
-    y, v = linear_flow.motion(beta, kappa, where(rising, up, down), where(rising, -g1, g2), where(rising, t, t - t1))
-    return where(rising, 1.0 + y, top - y), where(rising, v, -v)
+    v, force = where(rising, up, legs.down), where(rising, -legs.g1, legs.g2)
+    y, v = linear_flow.motion(0.5 * scene.d, scene.kappa, v, force, where(rising, t, t - legs.t1))
+    return where(rising, 1.0 + y, legs.top - y), where(rising, v, -v)
 
 
 @jit
-def _segments(i, mu, phi0, a, R, R_s, k, e, phase, angle, speed, error, status):
-    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], 0.0 * a[i], 1.0, k[i], e[i])
-    scene, units = _units.without_dimensions(*terms)
-    cycle, (of_cycle, _, of_decay), verdict = _linear_swing.limit_cycle(scene)
-    error[i] = of_cycle if of_cycle > of_decay else of_decay
-    start = e[i] * cycle[2]
-    half, top, _, _, legs = _linear_swing.half_swing(1.0, scene, start)
-    t0, e_t, m_phi, e_phi, _ = units
-    _, reach, fast, sound, _ = _units.dimensional(units, cycle)
-    wide, moves = reach > 0.0, fast > 0.0
-    for j in range(phase.size):
-        sign = where(phase[j] < 0.5, 1.0, -1.0)
-        x, v = _state(scene, start, top, legs, 2.0 * half * where(phase[j] < 0.5, phase[j], phase[j] - 0.5))
-        angle[i, j] = or_none(sign * scale(m_phi * x, e_phi), wide)
-        speed[i, j] = or_none(sign * scale(m_phi / t0 * v, e_phi - e_t), moves)
-    status[i] = judged(sound & (wide | moves), wide & moves, verdict)
-
-
-@entry("phase", "asked")
-def segments(mu, phi0, a, R, R_s, k, e, rtol, phase, asked, angle, speed, error, status):
+def _segments(i, columns):
     """The exact pieces of the swing on the cycle that `foliot` finds with them."""
-    one_by_one(_segments, (mu, phi0, a, R, R_s, k, e, phase, angle, speed, error, status))
+    p = read(LinearFoliot, columns, i)
+    scene, units = _units.without_dimensions(_units.without_drag(p))
+    cycle, errors, verdict = _linear_swing.limit_cycle(scene)
+    columns.error[i] = errors.period if errors.period > errors.multiplier else errors.multiplier
+    start = p.e * cycle.speed
+    legs = _linear_swing.half_swing(1.0, scene, start)
+    outputs, sound, _ = _units.dimensional(units, cycle)
+    wide, moves = outputs.amplitude > 0.0, outputs.crossing_speed > 0.0
+    for j in range(columns.phase.size):
+        first = columns.phase[j] < 0.5
+        sign = where(first, 1.0, -1.0)
+        since = where(first, columns.phase[j], columns.phase[j] - 0.5)
+        x, v = _state(scene, legs, start, 2.0 * legs.time * since)
+        columns.angle[i, j] = or_none(sign * scale(units.m_phi * x, units.e_phi), wide)
+        columns.speed[i, j] = or_none(sign * scale(units.m_phi / units.t * v, units.e_phi - units.e_t), moves)
+    columns.status[i] = judged(sound & (wide | moves), wide & moves, verdict)
 
 
 @jit
-def _check(i, mu, phi0, a, R, R_s, k, e, status):
-    status[i] = refusal(mu[i], phi0[i], a[i], R[i], R_s[i], 0.0, 1.0, k[i], e[i])
-
-
-@entry()
-def check(mu, phi0, a, R, R_s, k, e, status):
+def check(p):
     """As for `foliot`."""
-    one_by_one(_check, (mu, phi0, a, R, R_s, k, e, status))
+    return check_foliot(_units.without_drag(p))
 
 
-FOLIOT_MOTION = Kernel(
-    name="foliot_motion",
+FOLIOT_MOTION = kernel(
+    "foliot_motion",
     doc="angle and speed of a verge and foliot over one period",
     source="Hoyng & Nieuwenhuizen, arXiv:1604.06681",
-    parameters=PARAMETERS,
+    parameters=tuple(field for field in FOLIOT.parameters if field.name in LinearFoliot._fields),
     outputs=(
         Field("angle", "rad", "angle of the foliot", dims=("phase",)),
         Field("speed", "rad/s", "angular speed of the foliot", dims=("phase",)),
     ),
     along=(Field("phase", "1", "time over period, from the switch at +phi0 on", lower=0.0, upper=1.0),),
+    record=LinearFoliot,
     check=check,
     methods=(
-        Method(
-            "closed", "viscous friction: exponentials on the closed-form cycle", closed, closed_bound, ("R", "k", "e")
+        tracing(
+            "closed",
+            "viscous friction: exponentials on the closed-form cycle",
+            _closed,
+            4.0 * _viscous.ROUNDING,  # relative to the amplitude and to the crossing speed
+            excludes=("R", "k", "e"),
+            loop=cell_by_cell,
         ),
-        Method("segments", "exact pieces of linear terms", segments, estimates=True),
+        tracing("segments", "exact pieces of linear terms", _segments, loop=cell_by_cell, estimates=True),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
 )

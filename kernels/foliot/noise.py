@@ -17,19 +17,22 @@ Derived here; the model without noise is that of Hoyng & Nieuwenhuizen, arXiv:16
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from kernels.foliot import _error_propagation, _linear_swing, _units
-from kernels.foliot.cycle import PARAMETERS as FOLIOT_PARAMETERS
-from kernels.foliot.cycle import refusal
+from kernels.foliot import _linear_swing, _units
+from kernels.foliot._units import LinearFoliot, Scene
+from kernels.foliot.cycle import FOLIOT
+from kernels.foliot.cycle import check as check_foliot
 from kernels.integrate import linear_flow
-from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method
+from kernels.interface import FIRST_REFUSAL, Field
 from kernels.lanes.codes import BAD_INPUT, INACCURATE, NOT_SELF_STARTING, OK, OUT_OF_RANGE, STICKS, TOO_SHORT
-from kernels.lanes.columns import each_cell, entry
-from kernels.lanes.groups import GROUP, cells_at, each_group
+from kernels.lanes.groups import GROUP, cells_at
 from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.records import read
 from kernels.lanes.vectors import choose, fma, isnt, magnitude, nearest, some, sqrt, where
+from kernels.lanes.wiring import kernel, tracing
 from kernels.maths import philox
 from kernels.maths.elementary import exp, expm1, is_normal, mantissa_exponent, scale
 
@@ -43,12 +46,53 @@ PAIRS = 64
 _COUNTABLE = 2.0**50
 
 
+class Noise(NamedTuple):
+    """Parameters beside those of the foliot."""
+
+    sigma: float
+    tau_c: float
+    half_swings: float
+    seed: float
+    averaging_time: float
+
+
+class Clock(NamedTuple):
+    """What a half swing needs: (1) in units of mu, T and the averaging time in those of the scene."""
+
+    scene: Scene
+    sigma: float
+    remembered: float
+    fresh: float
+    floor: float
+    nominal: float
+    tau: float
+
+
+class Run(NamedTuple):
+    """x and the speed, t and D of (2) after a half swing, and how many had their torque raised to the floor."""
+
+    x: float
+    speed: float
+    t: float
+    gain: float
+    truncated: float
+
+
+class Averages(NamedTuple):
+    """How many averaging times are closed, D at the end of the last, its y, and the sum of squares in (3)."""
+
+    closed: float
+    reading: float
+    rate: float
+    squares: float
+
+
 @jit_call
 def _least_torque(scene):
     """h of (3)'s floor, over mu: the force f from rest at the switch must reach over the way 2, which grows with f."""
-    d, rho, rho_s, _, _, kappa, e, _ = scene
+    d, kappa, rho = scene.d, scene.kappa, scene.rho
     swings = 2.0 / linear_flow.reach(0.5 * d, kappa, 0.0 * d, 0.0 * d + 1.0) + rho - kappa
-    frees = where(e >= 0.0, rho_s, rho) - kappa
+    frees = where(scene.e >= 0.0, scene.rho_s, rho) - kappa
     least = where(swings > frees, swings, frees)
     return where(least > 0.0, least, 0.0)
 
@@ -69,42 +113,40 @@ def _whole(ratio):
 
 
 @jit_call
-def _averages(marks, before, gain, time, nominal, tau):
-    """Closes the averaging times that end within a half swing that began at (t, D) = (before, gain) and lasted `time`.
+def _closed(averages, run, time, clock):
+    """Closes the averaging times that end within a half swing that began at `run` and lasted `time`.
 
-    `marks` are how many are closed, D at the end of the last, its y, and the sum of squares in (3). Those that lie
-    wholly within the half swing share one y.
+    Those that lie wholly within the half swing share one y.
     """
-    closed, reading, rate, squares = marks
-    slope = (nominal - time) / time
-    until = _whole((before + time) / tau)
-    at_first = fma(slope, (closed + 1.0) * tau - before, gain)
+    closed, reading, rate, squares = averages
+    tau = clock.tau
+    slope = (clock.nominal - time) / time
+    until = _whole((run.t + time) / tau)
+    at_first = fma(slope, (closed + 1.0) * tau - run.t, run.gain)
     first = (at_first - reading) / tau
     squares = where(closed > 0.0, fma(first - rate, first - rate, squares), squares)
     more = until > closed + 1.0
     squares = where(more, fma(slope - first, slope - first, squares), squares)
-    return until, fma(slope, until * tau - before, gain), where(more, slope, first), squares
+    return Averages(until, fma(slope, until * tau - run.t, run.gain), where(more, slope, first), squares)
 
 
 @jit_call
-def _beat(state, z, clock):
-    """One half swing with the torque of (1). A *run* is (x, speed, t, D, half swings cut, *marks)."""
-    scene, (sigma, remembered, fresh, floor), nominal, tau = clock
-    x, before, t, gain, truncated, closed, reading, rate, squares = state
-    x = where(t > 0.0, fma(remembered, x, fresh * z), z)
-    torque = fma(sigma, x, 1.0)
-    short = isnt(torque > floor)
-    torque = where(short, floor, torque)
-    start = scene[6] * before
-    time, top, speed, comes, _ = _linear_swing.half_swing(torque, scene, start)
-    goes_on = comes & ((start < 0.0) | (fma(scene[5], top, torque) > scene[2]))
-    marks = (closed, reading, rate, squares)
-    later = t + time
-    passes = later >= (closed + 1.0) * tau
+def _beat(run, averages, z, clock):
+    """One half swing with the torque of (1), and whether it comes to the switch."""
+    scene = clock.scene
+    x = where(run.t > 0.0, fma(clock.remembered, run.x, clock.fresh * z), z)
+    torque = fma(clock.sigma, x, 1.0)
+    short = isnt(torque > clock.floor)
+    torque = where(short, clock.floor, torque)
+    start = scene.e * run.speed
+    legs = _linear_swing.half_swing(torque, scene, start)
+    goes_on = legs.comes & ((start < 0.0) | (fma(scene.kappa, legs.top, torque) > scene.rho_s))
+    later = run.t + legs.time
+    passes = later >= (averages.closed + 1.0) * clock.tau
     if some(passes):
-        marks = choose(passes, _averages(marks, t, gain, time, nominal, tau), marks)
-    run = (x, speed, later, gain + (nominal - time), where(short, truncated + 1.0, truncated))
-    return (*run, *marks), goes_on
+        averages = choose(passes, _closed(averages, run, legs.time, clock), averages)
+    truncated = where(short, run.truncated + 1.0, run.truncated)
+    return Run(x, legs.speed, later, run.gain + (clock.nominal - legs.time), truncated), averages, goes_on
 
 
 @jit
@@ -120,7 +162,7 @@ def _run(first, seed, half_swings, clock, speed, active, radii, turns):
     """All half swings of the active cells of a group, and those of them that did not come to a switch."""
     count = half_swings[cells_at(first)]
     zero = 0.0 * speed
-    state = (zero, speed, zero, zero, zero, zero, zero, zero, zero)
+    run, averages = Run(zero, speed, zero, zero, zero), Averages(zero, zero, zero, zero)
     stopped = count < 0.0
     for chunk in range(int(_longest(first, half_swings)) // (2 * PAIRS) + 1):
         philox.fill(first, seed, chunk * PAIRS, PAIRS, radii, turns)
@@ -131,70 +173,70 @@ def _run(first, seed, half_swings, clock, speed, active, radii, turns):
                 active = active & (2.0 * (chunk * PAIRS + j) + second < count)
                 if not some(active):
                     break
-                new, goes_on = _beat(state, where(second > 0, z_1, z_0), clock)
+                new, newer, goes_on = _beat(run, averages, where(second > 0, z_1, z_0), clock)
                 stopped = stopped | (active & isnt(goes_on))
                 active = active & goes_on
-                state = choose(active, new, state)
-    return state, stopped
+                run, averages = choose(active, new, run), choose(active, newer, averages)
+    return run, averages, stopped
 
 
 @jit_call
-def _uncertainty(scene, nominal, speed):
+def _uncertainty(scene, cycle):
     """Error of the rate as a fraction: of each half swing, and of all that they pass on."""
-    start = scene[6] * speed
-    time, top, after, _, legs = _linear_swing.half_swing(1.0, scene, start)
-    swing = (time, top, after, 1.0, legs)
-    kept, longer = _error_propagation.slopes(scene, start, swing)
-    energy, late = _error_propagation.own_noise(scene, start, swing)
-    remembered = energy / (speed * speed * (1.0 - scene[6] * scene[6] * kept))
-    return (late + magnitude(longer * start) * remembered) / nominal
+    speed, e = cycle.speed, scene.e
+    start = e * speed
+    legs = _linear_swing.half_swing(1.0, scene, start)
+    kept, longer = _linear_swing.slopes(scene, start, legs)
+    energy, late = _linear_swing.own_noise(scene, start, legs)
+    remembered = energy / (speed * speed * (1.0 - e * e * kept))
+    return (late + magnitude(longer * start) * remembered) / cycle.half_period
 
 
 @jit
-def _cells(
-    first, mu, phi0, a, R, R_s, c, n, k, e, sigma, tau_c, half_swings, seed, averaging_time, rtol,
-    rate_error_s_per_day, rate_scatter_s_per_day, truncated, status, radii, turns,
-):  # fmt: skip
-    i = cells_at(first)
-    scene, units = _units.without_dimensions(mu[i], phi0[i], a[i], R[i], R_s[i], 0.0 * c[i], 1.0, k[i], e[i])
-    (nominal, _, speed, _, _), _, found = _linear_swing.limit_cycle(scene)
-    m_tau, e_tau = mantissa_exponent(averaging_time[i])
-    tau = scale(m_tau / units[0], e_tau - units[1])
-    least = _least_torque(scene)
-    floor = fma(HEADROOM, 1.0 - least, least)
-    runs = units[4] & (found < FIRST_REFUSAL) & (least < 1.0)
-    clock = (scene, (sigma[i], *_correlation(tau_c[i]), floor), nominal, tau)
-    state, stopped = _run(first, seed, half_swings, clock, speed, runs, radii, turns)
-    _, _, t, gain, short, closed, _, _, squares = state
-    t = where(runs, t, 1.0)
-    enough = closed > 1.0
-    deviation = sqrt(squares / (2.0 * where(enough, closed - 1.0, 1.0)))
-    rate_error_s_per_day[i] = SECONDS_PER_DAY * gain / t
-    rate_scatter_s_per_day[i] = where(enough, SECONDS_PER_DAY * deviation, math.nan)
-    truncated[i] = short / half_swings[i]
+def _clock(scene, units, nominal, least, p):
+    """The clock of a scene whose half swings without noise last `nominal`, and which `least` torque keeps going."""
+    m_tau, e_tau = mantissa_exponent(p.averaging_time)
+    tau = scale(m_tau / units.t, e_tau - units.e_t)
+    remembered, fresh = _correlation(p.tau_c)
+    return Clock(scene, p.sigma, remembered, fresh, fma(HEADROOM, 1.0 - least, least), nominal, tau)
+
+
+@jit
+def _verdict(found, enough, accurate, sticks):
+    """On a run, by what was found of the cycle without noise."""
     starts = magnitude(found - NOT_SELF_STARTING) > 0.0
     verdict = where(enough, where(starts, OK, found), TOO_SHORT)
-    verdict = where(_uncertainty(scene, nominal, speed) <= rtol[i], verdict, INACCURATE)
-    verdict = where(stopped | isnt(least < 1.0), STICKS, verdict)
-    verdict = where(found < FIRST_REFUSAL, verdict, found)
-    fine = units[4] & is_normal(tau) & (t < _COUNTABLE * tau)
-    status[i] = where(fine | (verdict >= FIRST_REFUSAL), verdict, OUT_OF_RANGE)
+    verdict = where(accurate, verdict, INACCURATE)
+    return where(found < FIRST_REFUSAL, where(sticks, STICKS, verdict), found)
 
 
-@entry()
-def segments(
-    mu, phi0, a, R, R_s, c, n, k, e, sigma, tau_c, half_swings, seed, averaging_time, rtol,
-    rate_error_s_per_day, rate_scatter_s_per_day, truncated, status,
-):  # fmt: skip
+@jit
+def segments(first, columns, radii, turns):
     """Every half swing from exact pieces. `rtol` is meant of rates as fractions: 1e-9 of a day is 8.6e-5 s."""
-    radii, turns = np.empty(PAIRS * GROUP), np.empty(PAIRS * GROUP)
-    each_group(
-        _cells,
-        (
-            mu, phi0, a, R, R_s, c, n, k, e, sigma, tau_c, half_swings, seed, averaging_time, rtol,
-            rate_error_s_per_day, rate_scatter_s_per_day, truncated, status, radii, turns,
-        ),
-    )  # fmt: skip
+    i = cells_at(first)
+    p = read(Noise, columns, i)
+    scene, units = _units.without_dimensions(_units.without_drag(read(LinearFoliot, columns, i)))
+    cycle, _, found = _linear_swing.limit_cycle(scene)
+    least = _least_torque(scene)
+    clock = _clock(scene, units, cycle.half_period, least, p)
+    runs = units.fine & (found < FIRST_REFUSAL) & (least < 1.0)
+    run, averages, stopped = _run(first, columns.seed, columns.half_swings, clock, cycle.speed, runs, radii, turns)
+    t, closed = where(runs, run.t, 1.0), averages.closed
+    enough = closed > 1.0
+    deviation = sqrt(averages.squares / (2.0 * where(enough, closed - 1.0, 1.0)))
+    columns.rate_error_s_per_day[i] = SECONDS_PER_DAY * run.gain / t
+    columns.rate_scatter_s_per_day[i] = where(enough, SECONDS_PER_DAY * deviation, math.nan)
+    columns.truncated[i] = run.truncated / p.half_swings
+    accurate = _uncertainty(scene, cycle) <= columns.rtol[i]
+    verdict = _verdict(found, enough, accurate, stopped | isnt(least < 1.0))
+    fine = units.fine & is_normal(clock.tau) & (t < _COUNTABLE * clock.tau)
+    columns.status[i] = where(fine | (verdict >= FIRST_REFUSAL), verdict, OUT_OF_RANGE)
+
+
+@jit
+def _uniforms():
+    """Rows for random numbers."""
+    return np.empty(PAIRS * GROUP), np.empty(PAIRS * GROUP)
 
 
 @jit
@@ -206,25 +248,15 @@ def _counts(x, low, high):
 
 
 @jit
-def _check(
-    i, mu, phi0, a, R, R_s, c, n, k, e, sigma, tau_c, half_swings, seed, averaging_time, status
-):  # fmt: skip
-    noise = (sigma[i] >= 0.0) & (sigma[i] < math.inf) & (tau_c[i] >= 0.0) & (tau_c[i] < math.inf)  # NaN fails
-    run = _counts(half_swings[i], 1.0, HALF_SWING_LIMIT) & _counts(seed[i], 0.0, philox.SEED_LIMIT)
-    time = (averaging_time[i] > 0.0) & (averaging_time[i] < math.inf)
-    verdict = refusal(mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-    status[i] = where(noise & run & time, verdict, BAD_INPUT)
-
-
-@entry()
-def check(mu, phi0, a, R, R_s, c, n, k, e, sigma, tau_c, half_swings, seed, averaging_time, status):
+def check(p):
     """As for `foliot`; BAD_INPUT, too, for a count or a seed that is no whole number within its limits."""
-    each_cell(
-        _check, (mu, phi0, a, R, R_s, c, n, k, e, sigma, tau_c, half_swings, seed, averaging_time, status)
-    )  # fmt: skip
+    noise = (p.sigma >= 0.0) & (p.sigma < math.inf) & (p.tau_c >= 0.0) & (p.tau_c < math.inf)  # NaN fails
+    run = _counts(p.half_swings, 1.0, HALF_SWING_LIMIT) & _counts(p.seed, 0.0, philox.SEED_LIMIT)
+    time = (p.averaging_time > 0.0) & (p.averaging_time < math.inf)
+    return where(noise & run & time, check_foliot(_units.terms(p)), BAD_INPUT)
 
 
-NOISE = (
+PARAMETERS = (
     Field("sigma", "1", "standard deviation of the torque of a half swing over mu", lower=0.0),
     Field("tau_c", "1", "half swings over which the noise forgets all but 1/e; 0: white", default=0.0, lower=0.0),
     Field("half_swings", "1", "length of the run", lower=1.0, upper=HALF_SWING_LIMIT, integer=True),
@@ -233,17 +265,25 @@ NOISE = (
     Field("averaging_time", "s", "averaging time of the scatter", default=SECONDS_PER_DAY, lower=0.0, open_lower=True),
 )  # fmt: skip
 
-FOLIOT_NOISE = Kernel(
-    name="foliot_noise",
+FOLIOT_NOISE = kernel(
+    "foliot_noise",
     doc="rate of a verge and foliot whose torque is noisy",
     source="derived here; the foliot of Hoyng & Nieuwenhuizen, arXiv:1604.06681",
-    parameters=(*FOLIOT_PARAMETERS, *NOISE),
+    parameters=(*FOLIOT.parameters, *PARAMETERS),
     outputs=(
         Field("rate_error_s_per_day", "s/day", "gain against the clock without noise; losses are negative"),
         Field("rate_scatter_s_per_day", "s/day", "Allan deviation of the rate at the averaging time"),
         Field("truncated", "1", "share of half swings whose torque was raised to the floor"),
     ),
     check=check,
-    methods=(Method("segments", "every half swing from exact pieces of linear terms", segments, excludes=("c",)),),
+    methods=(
+        tracing(
+            "segments",
+            "every half swing from exact pieces of linear terms",
+            segments,
+            excludes=("c",),
+            buffers=_uniforms,
+        ),
+    ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0, "sigma": 0.01, "half_swings": 1000.0, "averaging_time": 600.0},
 )

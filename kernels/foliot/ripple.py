@@ -13,56 +13,41 @@ Leaves out: the geometry of the pallets that makes the ripple. Source: as `folio
 import math
 
 from kernels.foliot import _integrated_swing, _units
-from kernels.foliot.cycle import FOLIOT, OUTPUTS, PARAMETERS, refusal, write
-from kernels.interface import Field, Kernel, Method
+from kernels.foliot.cycle import FOLIOT
+from kernels.foliot.cycle import check as check_foliot
+from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT
-from kernels.lanes.columns import each_cell, entry
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import nearest, where
+from kernels.lanes.wiring import kernel, method
 
 HIGHEST = 1000.0
 """Of harmonics: more waves than steps that the integrator may take follow from more."""
 
 
 @jit
-def _dopri5_cell(i, mu, phi0, a, R, R_s, c, n, k, e, depth, harmonic, rtol, *outputs):
-    terms = (mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-    scene, units = _units.without_dimensions(*terms)
-    cycle, verdict = _integrated_swing.dopri5(scene, (depth[i], harmonic[i]), rtol[i])
-    write(i, units, cycle, verdict, *outputs)
-
-
-@entry()
-def dopri5(
-    mu, phi0, a, R, R_s, c, n, k, e, depth, harmonic, rtol,
-    period, amplitude, crossing_speed, sensitivity, multiplier, status,
-):  # fmt: skip
+def dopri5(p, rtol):
     """Dormand-Prince 5(4) over half swings, each switch located and restarted at, and Newton on their map."""
-    scene = (mu, phi0, a, R, R_s, c, n, k, e, depth, harmonic, rtol)
-    each_cell(_dopri5_cell, (*scene, period, amplitude, crossing_speed, sensitivity, multiplier, status))
+    scene, units = _units.without_dimensions(_units.terms(p))
+    cycle, verdict = _integrated_swing.dopri5(scene, (p.depth, p.harmonic), rtol)
+    return _units.given(units, cycle, verdict)
 
 
 @jit
-def _check(i, mu, phi0, a, R, R_s, c, n, k, e, depth, harmonic, status):
-    whole = (harmonic[i] >= 1.0) & (harmonic[i] <= HIGHEST) & (nearest(harmonic[i]) >= harmonic[i])
-    whole = whole & (nearest(harmonic[i]) <= harmonic[i])
-    allowed = (depth[i] >= 0.0) & (depth[i] < 1.0) & whole  # NaN fails
-    verdict = refusal(mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-    status[i] = where(allowed, verdict, BAD_INPUT)
-
-
-@entry()
-def check(mu, phi0, a, R, R_s, c, n, k, e, depth, harmonic, status):
+def check(p):
     """As of `foliot`, and BAD_INPUT for a depth outside [0, 1) or a harmonic that is no whole number from 1 on."""
-    each_cell(_check, (mu, phi0, a, R, R_s, c, n, k, e, depth, harmonic, status))
+    whole = (p.harmonic >= 1.0) & (p.harmonic <= HIGHEST) & (nearest(p.harmonic) >= p.harmonic)
+    whole = whole & (nearest(p.harmonic) <= p.harmonic)
+    allowed = (p.depth >= 0.0) & (p.depth < 1.0) & whole  # NaN fails
+    return where(allowed, check_foliot(_units.terms(p)), BAD_INPUT)
 
 
-FOLIOT_RIPPLE = Kernel(
-    name="foliot_ripple",
+FOLIOT_RIPPLE = kernel(
+    "foliot_ripple",
     doc="limit cycle of a verge and foliot whose torque varies over the swing",
     source=FOLIOT.source,
     parameters=(
-        *PARAMETERS,
+        *FOLIOT.parameters,
         Field(
             "depth",
             "1",
@@ -81,8 +66,8 @@ FOLIOT_RIPPLE = Kernel(
             integer=True,
         ),
     ),
-    outputs=OUTPUTS,
+    outputs=FOLIOT.outputs,
     check=check,
-    methods=(Method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", dopri5),),
+    methods=(method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", dopri5),),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0, "depth": 0.3, "harmonic": 2.0},
 )

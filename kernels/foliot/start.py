@@ -11,20 +11,23 @@ Derived here from Hoyng & Nieuwenhuizen, arXiv:1604.06681, section 2, and from `
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from kernels.foliot import _error_propagation, _linear_swing, _units
-from kernels.foliot.cycle import PARAMETERS as FOLIOT_PARAMETERS
-from kernels.foliot.cycle import refusal
+from kernels.foliot import _linear_swing, _units
+from kernels.foliot._units import LinearFoliot
+from kernels.foliot.cycle import FOLIOT
+from kernels.foliot.cycle import check as check_foliot
 from kernels.integrate import linear_flow
-from kernels.interface import Field, Kernel, Method, Status
+from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, COMES_TO_REST, GRAZING, INACCURATE, NEVER_STARTS, OK, OUT_OF_RANGE, STICKS
-from kernels.lanes.columns import each_cell, entry
-from kernels.lanes.groups import GROUP, cells_at, each_group, write_row
+from kernels.lanes.groups import GROUP, cells_at, write_row
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.ranges import or_none, partly
+from kernels.lanes.records import read
 from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, where
+from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import is_normal, scale
 
 FLIP_LIMIT = 1e6
@@ -32,7 +35,15 @@ FLIP_LIMIT = 1e6
 UNSURE = 0.5
 """Error of a speed, as a share of it, from which on it is open whether the switch was reached at all."""
 
-_REFUSED = int(Status.BAD_INPUT)
+
+class Flip(NamedTuple):
+    """Time and its low part, speed, share by which the speed may be wrong, error of the time."""
+
+    time: float
+    low: float
+    speed: float
+    wrong: float
+    late: float
 
 
 @jit
@@ -46,7 +57,7 @@ def _place(phi0, phi_start):
 @jit
 def _held(scene, x):
     """Whether stiction holds at rest at x, and whether the last digits decide it."""
-    rho_s, kappa = scene[2], scene[5]
+    rho_s, kappa = scene.rho_s, scene.kappa
     pull = fma(kappa, x, 1.0)
     unsure = (kappa > 0.0) & (magnitude(pull - rho_s) <= _linear_swing.ROUNDING * (magnitude(kappa * x) + rho_s))
     return isnt(pull > rho_s), unsure
@@ -59,33 +70,30 @@ def _near_miss(scene, energy, push, speed, way):
     It starts with `speed` and the force `push`; what it lacked is at most the force against it at the switch, times
     the way left.
     """
-    d, kappa = scene[0], scene[5]
+    kappa = scene.kappa
     against = fma(kappa, way, -push)
-    left = way - linear_flow.reach(0.5 * d, kappa, speed, push)
+    left = way - linear_flow.reach(0.5 * scene.d, kappa, speed, push)
     rounding = 8.0 * _linear_swing.ROUNDING * way * (magnitude(against) + 1.0 + kappa * (1.0 + way))
     return left * against <= 2.0 * energy + rounding
 
 
 @jit_call
 def _release(scene, x, way):
-    """The first flip, whether it comes, and whether the last digits decide that.
-
-    A *flip* is (time, its low part, speed, share by which the speed may be wrong, error of the time).
-    """
-    d, _, _, _, _, kappa, _, slack = scene
+    """The first flip, whether it comes, and whether the last digits decide that."""
+    kappa, beta = scene.kappa, 0.5 * scene.d
     held, unsure = _held(scene, x)
-    push = fma(kappa, x, slack)
-    time = linear_flow.first_crossing(0.5 * d, kappa, 0.0 * way, push, way)
+    push = fma(kappa, x, scene.slack)
+    time = linear_flow.first_crossing(beta, kappa, 0.0 * way, push, way)
     through = time < 1e300
     time = where(through, time, 0.0)
-    s, _, slope = linear_flow.response(0.5 * d, kappa, time)
+    s, _, slope = linear_flow.response(beta, kappa, time)
     speed = push * s
     rounded = _linear_swing.ROUNDING * (1.0 + magnitude(kappa * x) / push)  # of the push
     wrong = rounded + _linear_swing.ROUNDING * way * magnitude(push * slope) / (speed * speed)
     late = rounded * way / speed + _linear_swing.ROUNDING * time
     near = (push > 0.0) & _near_miss(scene, 0.0 * way, push, 0.0 * way, way)
     unsure = unsure | _either(through, wrong > UNSURE, near & isnt(held))
-    return (time, 0.0 * time, speed, wrong, late), through & isnt(held), unsure
+    return Flip(time, 0.0 * time, speed, wrong, late), through & isnt(held), unsure
 
 
 @jit
@@ -97,22 +105,32 @@ def _either(condition, yes, no):
 @jit_call
 def _next(scene, flip):
     """The flip after `flip`, whether it comes, and whether the last digits decide that."""
-    total, low, before, wrong, late = flip
-    start = scene[6] * before
-    time, top, speed, through, legs = _linear_swing.half_swing(1.0, scene, start)
-    held, unsure = _held(scene, top)
+    start = scene.e * flip.speed
+    legs = _linear_swing.half_swing(1.0, scene, start)
+    held, unsure = _held(scene, legs.top)
     turns = isnt(start < 0.0)
-    swing = (time, top, speed, 1.0, legs)
-    kept, longer = _error_propagation.slopes(scene, start, swing)
-    energy_noise, time_noise = _error_propagation.own_noise(scene, start, swing)
-    now_wrong = fma(kept * start * start, wrong, energy_noise) / (speed * speed)
-    now_late = late + magnitude(longer * start) * wrong + time_noise
-    energy = start * start * (wrong + _linear_swing.ROUNDING)
-    near = _near_miss(scene, energy, legs[9], legs[10], 1.0 + top)
-    unsure = (turns & unsure) | _either(through, now_wrong > UNSURE, near)
-    later = total + time
-    low = low + (time - (later - total))
-    return (later, low, speed, now_wrong, now_late), through & isnt(turns & held), unsure
+    kept, longer = _linear_swing.slopes(scene, start, legs)
+    energy_noise, time_noise = _linear_swing.own_noise(scene, start, legs)
+    wrong = fma(kept * start * start, flip.wrong, energy_noise) / (legs.speed * legs.speed)
+    late = flip.late + magnitude(longer * start) * flip.wrong + time_noise
+    energy = start * start * (flip.wrong + _linear_swing.ROUNDING)
+    near = _near_miss(scene, energy, legs.g2, legs.down, 1.0 + legs.top)
+    unsure = (turns & unsure) | _either(legs.comes, wrong > UNSURE, near)
+    later = flip.time + legs.time
+    low = flip.low + (legs.time - (later - flip.time))
+    return Flip(later, low, legs.speed, wrong, late), legs.comes & isnt(turns & held), unsure
+
+
+@jit
+def _onward(scene, now, going, unsure, flips):
+    """So many flips on from `now`: the last that came, where all came, and where the last digits decided."""
+    for _ in range(flips):
+        if some(going):
+            new, comes, grazes = _next(scene, now)
+            unsure = unsure | (going & grazes)
+            going = going & comes
+            now = choose(going, new, now)
+    return now, going, unsure
 
 
 @jit
@@ -127,8 +145,8 @@ def _countable(flip):
 @jit
 def _in_units(units, flip):
     """Time [s] and speed [rad/s], NaN where no normal numbers, and whether one of them and whether both are normal."""
-    t, e_t, m_phi, e_phi, _ = units
-    time, speed = scale(t * (flip[0] + flip[1]), e_t), scale(m_phi / t * flip[2], e_phi - e_t)
+    time = scale(units.t * (flip.time + flip.low), units.e_t)
+    speed = scale(units.m_phi / units.t * flip.speed, units.e_phi - units.e_t)
     timed, moves = is_normal(time), is_normal(speed)
     return or_none(time, timed), or_none(speed, moves), timed | moves, timed & moves
 
@@ -136,75 +154,70 @@ def _in_units(units, flip):
 @jit
 def _error(flip):
     """The larger of the relative errors of time and speed."""
-    of_time = flip[4] / flip[0]
-    return where(of_time > flip[3], of_time, flip[3])
+    of_time = flip.late / flip.time
+    return where(of_time > flip.wrong, of_time, flip.wrong)
 
 
 @jit
-def _follow(first, mu, phi0, a, R, R_s, c, n, k, e, phi_start, rtol, flip, row, flip_time, flip_speed, status):
+def _verdict(scene, x, starts, going, accurate, unsure):
+    """On a start from rest at x: whether it starts, goes on, and is known well enough."""
+    verdict = where(accurate, where(going, OK, COMES_TO_REST), INACCURATE)
+    held = isnt(magnitude(fma(scene.kappa, x, 1.0)) > scene.rho_s)
+    verdict = where(starts, verdict, where(held, NEVER_STARTS, STICKS))
+    return where(unsure, GRAZING, verdict)
+
+
+@jit
+def _follow(first, columns, row):
     """One group of cells from flip to flip; flips asked for in falling order are followed from the release again."""
-    i = cells_at(first)
-    scene, units = _units.without_dimensions(mu[i], phi0[i], a[i], R[i], R_s[i], 0.0 * c[i], 1.0, k[i], e[i])
-    x, way = _place(phi0[i], phi_start[i])
-    fine = units[4] & is_normal(way)
+    i, flip = cells_at(first), columns.flip
+    scene, units = _units.without_dimensions(_units.without_drag(read(LinearFoliot, columns, i)))
+    x, way = _place(columns.phi0[i], columns.phi_start[i])
+    fine = units.fine & is_normal(way)
     released, starts, doubt = _release(scene, x, where(fine, way, 1.0))
-    now, going, unsure = released, starts, doubt
-    whole, here = fine, 1.0
-    accurate, given = fine, isnt(going)
+    now, going, unsure, here = released, starts, doubt, 1.0
+    whole, accurate, given = fine, fine, isnt(going)
     for j in range(flip.size):
         if flip[j] < here:
             now, going, here = released, starts, 1.0
-        while here < flip[j]:
-            here += 1.0
-            if some(going):
-                new, comes, grazes = _next(scene, now)
-                unsure = unsure | (going & grazes)
-                going = going & comes
-                now = choose(going, new, now)
+        now, going, unsure = _onward(scene, now, going, unsure, int(flip[j] - here))
+        here = flip[j]
         time, speed, some_normal, normal = _in_units(units, now)
         whole, given = whole & (normal | isnt(going)), given | some_normal
-        accurate = accurate & ((_error(now) <= rtol[i]) | isnt(going))
-        write_row(first, j, where(going, time, math.nan), row, flip_time)
-        write_row(first, j, where(going, speed, math.nan), row, flip_speed)
-    verdict = where(going, OK, COMES_TO_REST)
-    verdict = where(accurate, verdict, INACCURATE)
-    held = isnt(magnitude(fma(scene[5], x, 1.0)) > scene[2])
-    verdict = where(starts, verdict, where(held, NEVER_STARTS, STICKS))
-    verdict = where(unsure, GRAZING, verdict)
-    status[i] = where(fine & given, partly(whole, verdict), OUT_OF_RANGE)
-
-
-@entry("flip")
-def segments(mu, phi0, a, R, R_s, c, n, k, e, phi_start, rtol, flip, flip_time, flip_speed, status):
-    """Exact pieces from switch to switch, and how far their rounding may have added up: INACCURATE beyond rtol."""
-    row = np.empty(GROUP)
-    if _countable(flip):
-        each_group(
-            _follow,
-            (mu, phi0, a, R, R_s, c, n, k, e, phi_start, rtol, flip, row, flip_time, flip_speed, status),
-        )
-    else:
-        status[:] = _REFUSED
+        accurate = accurate & ((_error(now) <= columns.rtol[i]) | isnt(going))
+        write_row(first, j, where(going, time, math.nan), row, columns.flip_time)
+        write_row(first, j, where(going, speed, math.nan), row, columns.flip_speed)
+    verdict = partly(whole, _verdict(scene, x, starts, going, accurate, unsure))
+    columns.status[i] = where(fine & given, verdict, OUT_OF_RANGE)
 
 
 @jit
-def _check(i, mu, phi0, a, R, R_s, c, n, k, e, phi_start, status):
-    verdict = refusal(mu[i], phi0[i], a[i], R[i], R_s[i], c[i], n[i], k[i], e[i])
-    bad = isnt(magnitude(verdict - BAD_INPUT) > 0.0) | isnt(magnitude(phi_start[i]) < math.inf)
-    status[i] = where(bad, BAD_INPUT, where(mu[i] > 0.0, OK, NEVER_STARTS))
+def segments(first, columns, row):
+    """Exact pieces from switch to switch, and how far their rounding may have added up: INACCURATE beyond rtol."""
+    if _countable(columns.flip):
+        _follow(first, columns, row)
+    else:
+        columns.status[cells_at(first)] = BAD_INPUT
 
 
-@entry()
-def check(mu, phi0, a, R, R_s, c, n, k, e, phi_start, status):
+@jit
+def _row():
+    return (np.empty(GROUP),)
+
+
+@jit
+def check(p):
     """BAD_INPUT as for `foliot`, and NEVER_STARTS without torque; a clock that loses nothing may start."""
-    each_cell(_check, (mu, phi0, a, R, R_s, c, n, k, e, phi_start, status))
+    verdict = check_foliot(_units.terms(p))
+    bad = isnt(magnitude(verdict - BAD_INPUT) > 0.0) | isnt(magnitude(p.phi_start) < math.inf)
+    return where(bad, BAD_INPUT, where(p.mu > 0.0, OK, NEVER_STARTS))
 
 
-FOLIOT_START = Kernel(
-    name="foliot_start",
+FOLIOT_START = kernel(
+    "foliot_start",
     doc="the first flips of a verge and foliot from rest",
     source="Hoyng & Nieuwenhuizen, arXiv:1604.06681; terms beyond viscous friction derived here",
-    parameters=(*FOLIOT_PARAMETERS, Field("phi_start", "rad", "angle of release from rest", default=0.0)),
+    parameters=(*FOLIOT.parameters, Field("phi_start", "rad", "angle of release from rest", default=0.0)),
     outputs=(
         Field("flip_time", "s", "time of the flip after the release; NaN where none comes", dims=("flip",)),
         Field(
@@ -213,6 +226,14 @@ FOLIOT_START = Kernel(
     ),
     along=(Field("flip", "1", "number of the flip, from 1 on", lower=1.0, upper=FLIP_LIMIT, integer=True),),
     check=check,
-    methods=(Method("segments", "exact pieces of linear terms, from switch to switch", segments, excludes=("c",)),),
+    methods=(
+        tracing(
+            "segments",
+            "exact pieces of linear terms, from switch to switch",
+            segments,
+            excludes=("c",),
+            buffers=_row,
+        ),
+    ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
 )

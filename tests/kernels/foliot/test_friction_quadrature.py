@@ -11,6 +11,7 @@ from mpmath import atan, atanh, exp, expm1, findroot, hyp2f1, log, log1p, mp, mp
 
 from kernels.foliot import _friction_quadrature as quadrature
 from kernels.foliot import _single_loss
+from kernels.foliot._units import Scene
 from kernels.interface import Status
 from kernels.lanes.columns import each_cell, entry, one_by_one
 from kernels.lanes.jit import COMPILED, jit
@@ -23,10 +24,10 @@ TINY = 1e-290
 
 @jit
 def _solved(i, d, rho, slack, gamma, n, e, half, amplitude, speed, s, m, for_cycle, for_s, for_m, status):
-    scene = (d[i], rho[i], rho[i], gamma[i], n[i], 0.0, e[i], slack[i])
+    scene = Scene(d[i], rho[i], rho[i], gamma[i], n[i], 0.0, e[i], slack[i])
     cycle, verdict = quadrature.solve_quadrature(scene, 1e-9)
     half[i], amplitude[i], speed[i], s[i], m[i] = cycle
-    for_cycle[i], for_s[i], for_m[i] = quadrature.quadrature_bound(scene)
+    for_cycle[i], _, _, for_s[i], for_m[i] = quadrature.quadrature_bound(scene)
     status[i] = verdict
 
 
@@ -42,7 +43,7 @@ def solved_one_by_one(d, rho, slack, gamma, n, e, half, amplitude, speed, s, m, 
 
 @jit
 def _pure(i, d, rho, slack, gamma, n, kappa, e, half, amplitude, speed, s, m, status):
-    cycle, applies = _single_loss.pure((d[i], rho[i], rho[i], gamma[i], n[i], kappa[i], e[i], slack[i]))
+    cycle, applies = _single_loss.pure(Scene(d[i], rho[i], rho[i], gamma[i], n[i], kappa[i], e[i], slack[i]))
     half[i], amplitude[i], speed[i], s[i], m[i] = cycle
     status[i] = where(applies, 1.0, 0.0)
 

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from mpmath import expm1, log1p, mp, mpf
 
 from kernels.foliot import start as foliot_start
+from kernels.foliot._units import Scene
 from kernels.foliot.cycle import FOLIOT
-from kernels.foliot.start import FLIP_LIMIT, FOLIOT_START
+from kernels.foliot.start import FLIP_LIMIT, FOLIOT_START, Flip
 from kernels.interface import Status
 from kernels.lanes.columns import entry, one_by_one
 from kernels.lanes.jit import COMPILED, jit
@@ -148,8 +149,8 @@ def test_errors_of_a_thousand_flips_stay_within_what_is_promised(alpha):
 
 @jit
 def _pass_on(i, d, rho, kappa, e, before, wrong, late, time, speed, now_wrong, now_late):
-    scene = (d[i], rho[i], rho[i], 0.0 * d[i], 1.0, kappa[i], e[i], 1.0 - rho[i])
-    flip, _, _ = foliot_start._next(scene, (0.0 * d[i], 0.0 * d[i], before[i], wrong[i], late[i]))
+    scene = Scene(d[i], rho[i], rho[i], 0.0 * d[i], 1.0, kappa[i], e[i], 1.0 - rho[i])
+    flip, _, _ = foliot_start._next(scene, Flip(0.0 * d[i], 0.0 * d[i], before[i], wrong[i], late[i]))
     time[i], _, speed[i], now_wrong[i], now_late[i] = flip
 
 

@@ -25,12 +25,12 @@ ROOT = Path(__file__).parents[3]
 PERIOD = """
 import numpy as np
 from kernels.lanes import cache as _cache
-from kernels.foliot import cycle
+from kernels.foliot.cycle import FOLIOT
 x = [np.ones(1) for _ in range(9)]
 status = np.zeros(1, np.int8)
 x[3], x[4] = 0.5 * x[3], 0.5 * x[4]  # R, R_s
-cycle.check(*x, status)
-print(status[0], sum(cycle.check.compiled.stats.cache_hits.values()), _cache.FOLDER)
+FOLIOT.check(*x, status)
+print(status[0], sum(FOLIOT.check.compiled.stats.cache_hits.values()), _cache.FOLDER)
 """
 
 
