@@ -1,4 +1,4 @@
-"""Hypothesis profiles; and the helpers of the tests (`oracles`, `columns`, `toy`) and studies as modules."""
+"""Hypothesis profiles; and the helpers of the tests (`oracles`, `columns`, `toy`) and studies, and what draws docs, as modules."""
 
 import os
 import signal
@@ -12,7 +12,7 @@ settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True
 settings.load_profile("ci" if os.environ.get("CI") else "local")
 
 TESTS = Path(__file__).parent
-sys.path += [str(TESTS / "oracles"), str(TESTS / "helpers"), str(TESTS.parent / "studies")]
+sys.path += [str(TESTS / "oracles"), str(TESTS / "helpers"), str(TESTS.parent / "studies"), str(TESTS.parent / "docs")]
 
 # a shell ignores Ctrl-C for what it runs in the background, and children inherit that; here it is under test
 signal.signal(signal.SIGINT, signal.default_int_handler)

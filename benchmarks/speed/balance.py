@@ -1,7 +1,7 @@
 # How fast is the balance's count of half swings against following them one by one, and how right?
 """Prints ratios measured in this run, on one core, and errors against 120 digits (needs mpmath):
 
-python benchmarks/release.py
+python benchmarks/speed/balance.py
 """
 
 from __future__ import annotations

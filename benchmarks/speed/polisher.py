@@ -1,7 +1,7 @@
 # How fast are the polisher's stable forms against the textbook's in numpy, and how right are both?
 """Prints ratios measured in this run, on one core, and errors against 50 digits (needs mpmath):
 
-python benchmarks/arm.py
+python benchmarks/speed/polisher.py
 """
 
 from __future__ import annotations
