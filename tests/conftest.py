@@ -1,4 +1,4 @@
-"""Hypothesis profiles; and the helpers of the tests (`oracles`, `columns`, `toy`) and studies, and what draws docs, as modules."""
+"""Hypothesis profiles; the helpers of the tests (`oracles`, `columns`, `toy`), studies and docs as modules."""
 
 import os
 import signal
