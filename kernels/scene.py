@@ -15,6 +15,7 @@ import keyword
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from kernels.codegen.adaptive_solve import twice_by
 from kernels.codegen.expression import SceneError, cos, exp, log, maximum, minimum, power, sign, sin, sqrt, where
 from kernels.codegen.module import build, compiling
 from kernels.codegen.record import RESERVED
-from kernels.interface import Field, Kernel, Method, Status
+from kernels.interface import Field, Kernel, Method, OnColumns, Status
 
 __all__ = [
     "Field", "Scene", "SceneError", "cos", "exp", "log", "maximum", "minimum", "power", "scene_kernel", "sign", "sin",
@@ -31,6 +32,8 @@ __all__ = [
 ]  # fmt: skip
 
 MOST_FLIPS = 1_000_000
+Function = Callable[..., Any]
+"""Of named scalars, as its author writes it."""
 
 
 @dataclass(frozen=True)
@@ -55,12 +58,12 @@ class Scene:
     doc: str
     states: tuple[str, ...]
     parameters: tuple[str, ...]
-    rates: Callable
-    surface: Callable
-    start: Callable
-    switch: Callable | None = None
+    rates: Function
+    surface: Function
+    start: Function
+    switch: Function | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         names = [*self.states, *self.parameters]
         for name in [self.name, *names]:
             if not name.isidentifier() or keyword.iskeyword(name) or name in RESERVED:
@@ -77,10 +80,10 @@ def scene_kernel(
     doc: str,
     states: Sequence[Field],
     parameters: Sequence[Field],
-    rates: Callable,
-    surface: Callable,
-    start: Callable,
-    switch: Callable | None = None,
+    rates: Function,
+    surface: Function,
+    start: Function,
+    switch: Function | None = None,
     source: str = "a study's own",
     example: Mapping[str, float] | None = None,
 ) -> Kernel:
@@ -118,7 +121,7 @@ def scene_kernel(
     module = build(scene)
     names = [f.name for f in fields], [f.name for f in outputs]
 
-    def solve(method, how):
+    def solve(method: str, how: Function) -> OnColumns:
         return _solve((name, method), how, module, *names)
 
     return Kernel(
@@ -155,10 +158,10 @@ def scene_kernel(
     )
 
 
-def _solve(names, how, module, parameters, outputs):
+def _solve(names: tuple[str, str], how: Function, module: Any, parameters: list[str], outputs: list[str]) -> OnColumns:
     """A method's function of columns; `names` are those of the scene and of the method."""
 
-    def solve(*columns):
+    def solve(*columns: Any) -> None:
         n = len(parameters)
         if not len(columns[0]):
             return
@@ -168,19 +171,19 @@ def _solve(names, how, module, parameters, outputs):
     return _signed(solve, [*parameters, "rtol", *outputs, "status"])
 
 
-def _no_bound(parameters):
+def _no_bound(parameters: list[str]) -> OnColumns:
     """Says that nothing is promised."""
 
-    def bound(*columns):
+    def bound(*columns: Any) -> None:
         columns[-1][:] = math.inf
 
     return _signed(bound, [*parameters, "rtol", "asked", "out"])
 
 
-def _check(fields):
+def _check(fields: Sequence[Field]) -> OnColumns:
     """BAD_INPUT for what is NaN, infinite or outside its limits, and for a number of switches that is not whole."""
 
-    def check(*columns):
+    def check(*columns: Any) -> None:
         *values, status = columns
         good = np.ones(len(status), bool)
         for value, f in zip(values, fields, strict=True):
@@ -192,8 +195,9 @@ def _check(fields):
     return _signed(check, [*(f.name for f in fields), "status"])
 
 
-def _signed(function, names):
+def _signed(function: Any, names: Sequence[str]) -> OnColumns:
     """The function with the names of its columns, as the contract of a kernel asks."""
     kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
     function.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])
-    return function
+    signed: OnColumns = function
+    return signed

@@ -22,17 +22,20 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": F
 
 def jit(function: F) -> F:
     """Physics: compiled where it is called, for one cell or for lanes, and always inlined."""
-    return part(function, forceinline=True, **_OPTIONS)
+    made: F = part(function, forceinline=True, **_OPTIONS)
+    return made
 
 
 def jit_inline(function: F) -> F:
     """As `jit`, but pasted in before anything is compiled: for what is long and used once; saves compile seconds."""
-    return njit(inline="always", **_OPTIONS)(function)
+    made: F = njit(inline="always", **_OPTIONS)(function)
+    return made
 
 
 def jit_call(function: F) -> F:
     """As `jit`, but left a call: for what is long and used in several places."""
-    return part(function, **_OPTIONS)
+    made: F = part(function, **_OPTIONS)
+    return made
 
 
 def jit_entry(function: Callable[..., Any]) -> Any:

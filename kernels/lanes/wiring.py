@@ -32,7 +32,6 @@ from kernels.lanes.columns import entry_of
 from kernels.lanes.jit import jit
 from kernels.lanes.records import largest, named, read, write
 
-
 Buffers = Callable[[], tuple[Any, ...]]
 Loop = Callable[..., None]
 Record = Callable[..., Any]
@@ -190,7 +189,8 @@ class _Wiring:
         return _record("Given", [name for name in self.outputs if name not in solver.lacks])
 
     def _body(self, solver: Solver) -> FillCells:
-        record, solve, given, order = self.record, solver.function, self._given(solver), _record("Order", self.outputs)
+        record, given, order = self.record, self._given(solver), _record("Order", self.outputs)
+        solve: Any = solver.function
         none = _record("Lacking", solver.lacks)(*(math.nan for _ in solver.lacks))
 
         @jit
@@ -227,8 +227,8 @@ class _Wiring:
     def _entry(
         self,
         name: str,
-        function: Callable[..., Any],
-        body: Callable[..., None],
+        function: Any,
+        body: Any,
         names: list[str],
         loop: Loop,
         buffers: Buffers = nothing,
@@ -246,4 +246,4 @@ def _record(name: str, fields: Sequence[str]) -> Record:
 
 
 def _all_cells(*columns: Any) -> None:
-    LOOP(BODY, named(COLUMNS, columns), BUFFERS())  # noqa: F821  the names of `_Wiring._entry`
+    LOOP(BODY, named(COLUMNS, columns), BUFFERS())  # type: ignore[name-defined]  # noqa: F821  names of `_Wiring._entry`
