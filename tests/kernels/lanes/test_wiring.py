@@ -10,6 +10,7 @@ from numba.core.errors import TypingError
 from triangle import FIELDS, TRIANGLE, Area, Sides, Triangle, check, in_order, pythagoras
 
 from kernels.interface import Status
+from kernels.lanes import codes
 from kernels.lanes.codes import OK
 from kernels.lanes.jit import COMPILED, jit
 from kernels.lanes.vectors import WIDTH
@@ -214,3 +215,9 @@ def test_a_record_that_has_not_the_parameters_in_their_order_is_refused():
 def test_what_there_is_not_can_be_neither_lacked_nor_excluded(options):
     with pytest.raises(TypeError, match=r"triangle\.strange .*weight"):
         triangle_by(pythagoras, **options)
+
+
+def test_each_status_of_a_kernel_is_a_number_for_lanes():
+    engine = {Status.FAILED, Status.PENDING}
+    assert {s: getattr(codes, s.name) for s in Status if s not in engine} == {s: s for s in Status if s not in engine}
+    assert not any(hasattr(codes, status.name) for status in engine)
