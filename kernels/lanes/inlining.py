@@ -164,7 +164,7 @@ def aligned(function, **options):
 
 def part(function, **options):
     """As numba's `njit` with these options, for what is called by compiled code."""
-    whole = njit(**options)(function)
+    whole = aligned(function, **options)
     if not _is_tried():
         return whole
     inner = _made(_Part, _PartCompiler, function, options)
