@@ -10,7 +10,6 @@ n > -1 any number, has no Taylor series at u = 0; there it is followed as `power
 tolerance. Of what is not a state, power and sqrt want something above 0 (else OUT_OF_RANGE).
 """
 
-import inspect
 import keyword
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -25,6 +24,7 @@ from kernels.codegen.expression import SceneError, cos, exp, log, maximum, minim
 from kernels.codegen.module import build, compiling
 from kernels.codegen.record import RESERVED
 from kernels.interface import Field, Kernel, Method, OnColumns, Status
+from kernels.lanes.wiring import signed as _signed
 
 __all__ = [
     "Field", "Scene", "SceneError", "cos", "exp", "log", "maximum", "minimum", "power", "scene_kernel", "sign", "sin",
@@ -193,11 +193,3 @@ def _check(fields: Sequence[Field]) -> OnColumns:
         status[...] = np.where(good, Status.OK, Status.BAD_INPUT)
 
     return _signed(check, [*(f.name for f in fields), "status"])
-
-
-def _signed(function: Any, names: Sequence[str]) -> OnColumns:
-    """The function with the names of its columns, as the contract of a kernel asks."""
-    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
-    function.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])
-    signed: OnColumns = function
-    return signed

@@ -17,7 +17,8 @@ from kernels.codegen.module import compiling
 from kernels.codegen.stepped_source import methods_of, stepped
 from kernels.integrate.events import LOCATIONS, METHODS
 from kernels.interface import Field, Kernel, Method, Status
-from kernels.scene import Function, Scene, _check, _signed
+from kernels.lanes.wiring import signed
+from kernels.scene import Function, Scene, _check
 
 __all__ = ["METHODS", "stepped_kernel", "stepping_fields", "stepping_methods"]
 
@@ -78,8 +79,8 @@ def stepping_methods(
                 _, error, status = solved(name, columns)
                 columns[-1][:] = np.where(np.isnan(error) | (status == Status.INACCURATE), math.inf, error)
 
-        signed = _signed(solve, [*names, "rtol", *(f.name for f in outputs), "status"])
-        return Method(name, DOCS[name], signed, _signed(bound, [*names, "rtol", "asked", "out"]))
+        found = signed(solve, [*names, "rtol", *(f.name for f in outputs), "status"])
+        return Method(name, DOCS[name], found, signed(bound, [*names, "rtol", "asked", "out"]))
 
     return tuple(method(name) for name in methods_of(scene))
 

@@ -18,6 +18,7 @@ that loops this body by `in_lanes`, `cell_by_cell` or `in_groups` of `columns`. 
 (`records`), so the order of columns is known nowhere else.
 """
 
+import inspect
 import math
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
@@ -215,7 +216,7 @@ class _Wiring:
             return None
         names = [*self.parameters, "rtol", *self.along, "asked", "out"]
         if isinstance(solver.bound, float):
-            return lambda *columns: columns[-1].fill(solver.bound)
+            return signed(lambda *columns: columns[-1].fill(solver.bound), names)
         record, bound, order, given = self.record, solver.bound, _record("Order", self.outputs), self._given(solver)
 
         @jit
@@ -237,8 +238,15 @@ class _Wiring:
         made = FunctionType(_all_cells.__code__, scope, name)
         made.__qualname__, made.__module__ = f"{self.name}.{name}", function.__module__
         per_cell = None if loop is loops.cell_by_cell else [n not in self.along and n != "asked" for n in names]
-        entry: OnColumns = entry_of(made, per_cell, kept=is_ours(function))
-        return entry
+        return signed(entry_of(made, per_cell, kept=is_ours(function)), names)
+
+
+def signed(function: Any, names: Sequence[str]) -> OnColumns:
+    """The function with the names of its columns, as the contract of a kernel has them."""
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    function.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])
+    made: OnColumns = function
+    return made
 
 
 def _record(name: str, fields: Sequence[str]) -> Record:

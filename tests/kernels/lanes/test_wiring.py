@@ -1,5 +1,6 @@
 """What `wiring` and `records` make of the physics of one cell; the kernel is that of `triangle`."""
 
+import inspect
 import math
 from typing import NamedTuple
 
@@ -221,3 +222,13 @@ def test_each_status_of_a_kernel_is_a_number_for_lanes():
     engine = {Status.FAILED, Status.PENDING}
     assert {s: getattr(codes, s.name) for s in Status if s not in engine} == {s: s for s in Status if s not in engine}
     assert not any(hasattr(codes, status.name) for status in engine)
+
+
+def test_functions_of_columns_say_which_they_take():
+    assert str(inspect.signature(TRIANGLE.check)) == "(a, b, status)"
+    for name, columns in (("one_by_one", ""), ("area_only", ""), ("estimating", "error, ")):
+        asked = "asked, " if columns else ""
+        wanted = f"(a, b, rtol, {asked}longest, area, angle, {columns}status)"
+        assert str(inspect.signature(TRIANGLE.method(name).solve)) == wanted
+    for name in ("in_order", "pythagoras"):
+        assert str(inspect.signature(TRIANGLE.method(name).bound)) == "(a, b, rtol, asked, out)"
