@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 
 class Status(IntEnum):
@@ -70,6 +70,36 @@ FIRST_REFUSAL = 64
 """Every status from here on means NaN in every output."""
 
 
+class OnColumns(Protocol):
+    """What the engine calls: takes columns in the order that `Kernel` and `Method` say, and fills the last ones."""
+
+    def __call__(self, *columns: Any, **named: Any) -> None: ...
+
+
+class CheckCell(Protocol):
+    """`check(p) -> status`: OK or a refusal of a cell, before any method is asked; p is a record of the parameters."""
+
+    def __call__(self, p: Any, /) -> Any: ...
+
+
+class SolveCell(Protocol):
+    """`solve(p, rtol, *buffers) -> outputs, status`; of a method that estimates, `-> outputs, errors, status`."""
+
+    def __call__(self, p: Any, rtol: Any, /, *buffers: Any, **named: Any) -> tuple[Any, Any] | tuple[Any, Any, Any]: ...
+
+
+class BoundCell(Protocol):
+    """`bound(p) -> error`: relative, a number for all outputs, or a record with one for each."""
+
+    def __call__(self, p: Any, /) -> Any: ...
+
+
+class FillCells(Protocol):
+    """`fill(i, columns, *buffers)`: writes the rows of cell i, or of the group that begins with it, itself."""
+
+    def __call__(self, i: Any, columns: Any, /, *buffers: Any, **named: Any) -> None: ...
+
+
 @dataclass(frozen=True)
 class Field:
     """A parameter, an output, or a coordinate that all cells share.
@@ -117,8 +147,8 @@ class Method:
 
     name: str
     doc: str
-    solve: Callable[..., None]
-    bound: Callable[..., None] | None = None
+    solve: OnColumns
+    bound: OnColumns | None = None
     excludes: tuple[str, ...] = ()
     lacks: tuple[str, ...] = ()
     estimates: bool = False
@@ -139,7 +169,7 @@ class Kernel:
     source: str
     parameters: tuple[Field, ...]
     outputs: tuple[Field, ...]
-    check: Callable[..., None]
+    check: OnColumns
     methods: tuple[Method, ...]
     along: tuple[Field, ...] = ()
     example: Mapping[str, float | Sequence[float]] = field(default_factory=dict)

@@ -10,11 +10,11 @@ n > -1 any number, has no Taylor series at u = 0; there it is followed as `power
 tolerance. Of what is not a state, power and sqrt want something above 0 (else OUT_OF_RANGE).
 """
 
-import inspect
 import keyword
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +23,8 @@ from kernels.codegen.expression import SceneError, cos, exp, log, maximum, minim
 from kernels.codegen.module import build, compiling
 from kernels.codegen.record import RESERVED
 from kernels.codegen.stepped_source import twice_by
-from kernels.interface import Field, Kernel, Method, Status
+from kernels.interface import Field, Kernel, Method, OnColumns, Status
+from kernels.lanes.wiring import signed
 
 __all__ = [
     "Field", "Scene", "SceneError", "cos", "exp", "log", "maximum", "minimum", "power", "scene_kernel", "sign", "sin",
@@ -33,6 +34,8 @@ __all__ = [
 MOST_FLIPS = 1_000_000
 SERIES = "Taylor series of order 12 or 18 in lanes, no switch passed over"
 LOCATED = "in lanes, switches on its dense output; followed twice"
+Function = Callable[..., Any]
+"""Of named scalars, as its author writes it."""
 
 
 @dataclass(frozen=True)
@@ -57,12 +60,12 @@ class Scene:
     doc: str
     states: tuple[str, ...]
     parameters: tuple[str, ...]
-    rates: Callable
-    surface: Callable
-    start: Callable
-    switch: Callable | None = None
+    rates: Function
+    surface: Function
+    start: Function
+    switch: Function | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         names = [*self.states, *self.parameters]
         for name in [self.name, *names]:
             if not name.isidentifier() or keyword.iskeyword(name) or name in RESERVED:
@@ -79,10 +82,10 @@ def scene_kernel(
     doc: str,
     states: Sequence[Field],
     parameters: Sequence[Field],
-    rates: Callable,
-    surface: Callable,
-    start: Callable,
-    switch: Callable | None = None,
+    rates: Function,
+    surface: Function,
+    start: Function,
+    switch: Function | None = None,
     source: str = "a study's own",
     example: Mapping[str, float] | None = None,
 ) -> Kernel:
@@ -126,22 +129,31 @@ TIMES = (
 """The first outputs of every scene."""
 
 
-def scene_of(name, doc, states, parameters, rates, surface, start, switch):
+def scene_of(
+    name: str,
+    doc: str,
+    states: Sequence[Field],
+    parameters: Sequence[Field],
+    rates: Function,
+    surface: Function,
+    start: Function,
+    switch: Function | None,
+) -> Scene:
     """The scene of states and parameters that are given as fields."""
-    names = (tuple(field.name for field in fields) for fields in (states, parameters))
-    return Scene(name, doc, *names, rates, surface, start, switch)
+    of_states, of_parameters = (tuple(field.name for field in fields) for fields in (states, parameters))
+    return Scene(name, doc, of_states, of_parameters, rates, surface, start, switch)
 
 
-def flips_field(default, most):
+def flips_field(default: float, most: float) -> Field:
     """The number of switches to follow, a parameter of every scene."""
     return Field("flips", "1", "switches to follow", default=default, lower=1.0, upper=float(most), integer=True)
 
 
-def _methods(scene, parameters, outputs):
+def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[Method, ...]:
     """The methods to a tolerance."""
     module = build(scene)
 
-    def method(name, doc, how, bound=None):
+    def method(name: str, doc: str, how: Function, bound: OnColumns | None = None) -> Method:
         return Method(name, doc, _solve((scene.name, name), how, module, parameters, outputs), bound)
 
     return (
@@ -157,10 +169,10 @@ def _methods(scene, parameters, outputs):
     )
 
 
-def _solve(names, how, module, parameters, outputs):
+def _solve(names: tuple[str, str], how: Function, module: Any, parameters: list[str], outputs: list[str]) -> OnColumns:
     """A method's function of columns; `names` are those of the scene and of the method."""
 
-    def solve(*columns):
+    def solve(*columns: Any) -> None:
         n = len(parameters)
         if not len(columns[0]):
             return
@@ -170,19 +182,19 @@ def _solve(names, how, module, parameters, outputs):
     return signed(solve, [*parameters, "rtol", *outputs, "status"])
 
 
-def _no_bound(parameters):
+def _no_bound(parameters: list[str]) -> OnColumns:
     """Says that nothing is promised."""
 
-    def bound(*columns):
+    def bound(*columns: Any) -> None:
         columns[-1][:] = math.inf
 
     return signed(bound, [*parameters, "rtol", "asked", "out"])
 
 
-def limits_check(fields):
+def limits_check(fields: Sequence[Field]) -> OnColumns:
     """BAD_INPUT for what is NaN, infinite or outside its limits, and for a number of switches that is not whole."""
 
-    def check(*columns):
+    def check(*columns: Any) -> None:
         *values, status = columns
         good = np.ones(len(status), bool)
         for value, f in zip(values, fields, strict=True):
@@ -192,10 +204,3 @@ def limits_check(fields):
         status[...] = np.where(good, Status.OK, Status.BAD_INPUT)
 
     return signed(check, [*(f.name for f in fields), "status"])
-
-
-def signed(function, names):
-    """The function with the names of its columns, as the contract of a kernel asks."""
-    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
-    function.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])
-    return function

@@ -7,6 +7,8 @@ pairs (place, speed), Moreau's method for one pair with dry friction at speed 0.
 """
 
 import math
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +17,8 @@ from kernels.codegen.module import compiling
 from kernels.codegen.stepped_source import methods_of, stepped
 from kernels.integrate.events import LOCATIONS, METHODS
 from kernels.interface import Field, Kernel, Method, Status
-from kernels.scene import TIMES, flips_field, limits_check, scene_of, signed
+from kernels.lanes.wiring import signed
+from kernels.scene import TIMES, Function, Scene, flips_field, limits_check, scene_of
 
 __all__ = ["METHODS", "stepped_kernel", "stepping_fields", "stepping_methods"]
 
@@ -36,9 +39,9 @@ COST = (
 )
 
 
-def stepping_fields(flips=20.0):
+def stepping_fields(flips: float = 20.0) -> tuple[Field, Field, Field]:
     """The parameters that every scene has: switches to follow, step, location."""
-    words = {"lower": 0.0, "upper": 4.0, "choices": LOCATIONS, "integer": True}
+    words: dict[str, Any] = {"lower": 0.0, "upper": 4.0, "choices": LOCATIONS, "integer": True}
     return (
         flips_field(flips, MOST_FLIPS),
         Field("step", "s", "time step", lower=0.0, open_lower=True),
@@ -46,7 +49,9 @@ def stepping_fields(flips=20.0):
     )
 
 
-def stepping_methods(scene, parameters, outputs, fill):
+def stepping_methods(
+    scene: Scene, parameters: Sequence[Field], outputs: Sequence[Field], fill: Function
+) -> tuple[Method, ...]:
     """The methods that can do the scene.
 
     Parameters
@@ -57,35 +62,47 @@ def stepping_methods(scene, parameters, outputs, fill):
     count, names = len(parameters), [f.name for f in parameters]
     n = len(scene.states)
 
-    def solved(name, columns):
+    def solved(name: str, columns: Sequence[Any]) -> Any:
         with compiling(scene.name, name):
             return three_steps.solved(stepped(scene), name, columns[: count - 2], *columns[count - 2 : count])
 
-    def method(name):
-        def solve(*columns):
+    def method(name: str) -> Method:
+        def solve(*columns: Any) -> None:
             *wanted, error, steps, rate_calls, status = columns[count + 1 :]
             if len(status):
                 found, error[:], status[:] = solved(name, columns)
                 fill(found[0], found[1], found[2 : 2 + n], found[2 + n : 2 + 2 * n], wanted)
                 steps[:], rate_calls[:] = found[-2:]
 
-        def bound(*columns):
+        def bound(*columns: Any) -> None:
             if len(columns[0]):
                 _, error, status = solved(name, columns)
                 columns[-1][:] = np.where(np.isnan(error) | (status == Status.INACCURATE), math.inf, error)
 
-        solve = signed(solve, [*names, "rtol", *(f.name for f in outputs), "status"])
-        return Method(name, DOCS[name], solve, signed(bound, [*names, "rtol", "asked", "out"]))
+        whole = signed(solve, [*names, "rtol", *(f.name for f in outputs), "status"])
+        return Method(name, DOCS[name], whole, signed(bound, [*names, "rtol", "asked", "out"]))
 
     return tuple(method(name) for name in methods_of(scene))
 
 
-def _fill_plainly(time, interval, states, reach, columns):
+def _fill_plainly(time: Any, interval: Any, states: Any, reach: Any, columns: Any) -> None:
     for column, row in zip(columns, (time, interval, *states), strict=True):
         column[:] = row
 
 
-def stepped_kernel(*, name, doc, states, parameters, rates, surface, start, switch=None, source="", example=None):
+def stepped_kernel(
+    *,
+    name: str,
+    doc: str,
+    states: Sequence[Field],
+    parameters: Sequence[Field],
+    rates: Function,
+    surface: Function,
+    start: Function,
+    switch: Function | None = None,
+    source: str = "",
+    example: Mapping[str, float] | None = None,
+) -> Kernel:
     """A kernel that follows a scene at a fixed step; the arguments are those of `kernels.scene.scene_kernel`.
 
     Returns

@@ -1,4 +1,8 @@
-"""The statuses as numbers that lanes can hold: `where(condition, OK, BAD_INPUT)`."""
+"""The statuses as numbers that lanes can hold: `where(condition, OK, BAD_INPUT)`; their one home in `kernels/`.
+
+A verdict is a float64 of a cell or WIDTH of them until `write` puts it into the int8 column. What each status means
+stands in `kernels.interface.Status`, in whose order they are: OK, remarks, refusals.
+"""
 
 from kernels.interface import FIRST_REFUSAL, Status
 

@@ -1,9 +1,9 @@
 """Functions that are compiled only into what calls them, so that every line becomes machine code once.
 
 numba makes machine code of every function by itself: it links in all that the function calls, optimises that and
-translates it, level above level, although only what Python calls is ever run. A *part* stops before that. Its code is
-handed on as it is written, and optimised in the function called by Python (an `entry`) that it ends up in: the same
-digits in less than half of the seconds. Called from Python after all, a part is compiled by itself, as numba does.
+translates it, level above level, although only what Python calls is ever run. An *inlined function* stops before that.
+Its code is handed on as it is written, and optimised in the function called by Python (an *entry*) that it ends up in:
+the same digits in less than half of the seconds. Called from Python after all, it is compiled by itself, as numba does.
 
 Both begin their stack on the border of a cache line. numba asks for 16 bytes, so that of the vectors that found no
 register all but one in four straddle two lines: up to 1.4 times the time, more or less from one process to the next.
@@ -19,9 +19,9 @@ from numba import njit, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import register_pass
-from numba.core.typed_passes import NativeLowering
 from numba.core.imputils import lower_constant
 from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NativeLowering
 from numba.extending import models, register_model
 
 TRIED = ("0.68",)
@@ -69,7 +69,7 @@ class _PartLibrary(_AlignedLibrary):
 
 
 class _PartType(types.Dispatcher):
-    """The type of a part, which says all there is to say of it.
+    """The type of an inlined function, which says all there is to say of it.
 
     Given to another function, numba's own comes with its address in this process, and then machine code is never kept.
     """
@@ -149,7 +149,7 @@ class _PartCompiler(Compiler):
 
 
 class _EntryLibrary(_AlignedLibrary):
-    """Code of a function that Python calls, and of all parts below it, each linked in once."""
+    """Code of a function that Python calls, and of all inlined functions below it, each linked in once."""
 
     def finalize(self):
         self._linking_libraries = _callers_first(self)
@@ -209,7 +209,7 @@ def aligned(function, **options):
 
 def part(function, **options):
     """As numba's `njit` with these options, for what is called by compiled code."""
-    whole = njit(**options)(function)
+    whole = aligned(function, **options)
     if not _is_tried():
         return whole
     inner = _made(_Part, _PartCompiler, function, options)

@@ -4,38 +4,46 @@ No fast-math: with explicit `fma` and no contraction the same source gives the s
 on every CPU. `error_model="numpy"`: 1/0 is inf, nothing raises.
 """
 
+from collections.abc import Callable
+from typing import Any, TypeVar
+
 import numba
 from numba import njit
 
 from kernels.lanes.inlining import aligned, part
 
+F = TypeVar("F", bound=Callable[..., Any])
+
 COMPILED = not numba.config.DISABLE_JIT
 """False under NUMBA_DISABLE_JIT=1, where every function here is plain Python of one cell."""
 
-_OPTIONS = {"error_model": "numpy", "nogil": True, "fastmath": False}
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": False}
 
 
-def jit(function):
+def jit(function: F) -> F:
     """Physics: compiled where it is called, for one cell or for lanes, and always inlined."""
-    return part(function, forceinline=True, **_OPTIONS)
+    made: F = part(function, forceinline=True, **_OPTIONS)
+    return made
 
 
-def jit_inline(function):
+def jit_inline(function: F) -> F:
     """As `jit`, but pasted in before anything is compiled: for what is long and used once; saves compile seconds."""
-    return njit(inline="always", **_OPTIONS)(function)
+    made: F = njit(inline="always", **_OPTIONS)(function)
+    return made
 
 
-def jit_call(function):
+def jit_call(function: F) -> F:
     """As `jit`, but left a call: for what is long and used in several places."""
-    return part(function, **_OPTIONS)
+    made: F = part(function, **_OPTIONS)
+    return made
 
 
-def jit_entry(function):
+def jit_entry(function: Callable[..., Any]) -> Any:
     """As `jit_call`, called from Python."""
     return aligned(function, **_OPTIONS)
 
 
-def cached(function):
+def cached(function: Callable[..., Any]) -> Any:
     """As `jit_entry`; machine code of this package is kept on the disk."""
     from kernels.lanes.cache import enable
 

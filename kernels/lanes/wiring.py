@@ -5,28 +5,40 @@ An author writes functions of one cell, the same source for numbers and for lane
     check(p) -> status                            p: a record of the parameters
     solve(p, rtol, *buffers) -> outputs, status   outputs: a record of those that the method gives, or a tuple in order
     solve(...) -> outputs, errors, status         of a method that estimates; `errors` as of a bound
-    bound(p) -> error                             a number, or a record with one for each output
+    bound(p) -> error                             a number, or a record with one for each output that the method gives
     fill(i, columns, *buffers)                    for traces, instead of `solve`: writes the rows of cell i itself
 
 Loops, entries with one column a parameter, copies that fill up few cells, the largest bound of what was asked for, and
-NaN for outputs that a method lacks are made here.
+NaN for outputs that a method lacks are made here. Names that do not fit the fields are refused: those of the
+parameters when a kernel is declared, those of outputs when a method is compiled, which is at its first call.
+
+What the engine calls is made in three steps. `_Wiring.method` lists the names of the columns as `kernels.interface`
+has them; `_Wiring._body` is the work on one cell, or on WIDTH of them; `_Wiring._entry` makes a function of columns
+that loops this body by `in_lanes`, `cell_by_cell` or `in_groups` of `columns`. Records are read and written by name
+(`records`), so the order of columns is known nowhere else.
 """
 
 import inspect
 import math
 from collections import namedtuple
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import FunctionType
+from typing import Any
 
 import numpy as np
 
-from kernels.interface import Kernel, Method
+from kernels.interface import BoundCell, CheckCell, Field, FillCells, Kernel, Method, OnColumns, SolveCell
 from kernels.lanes import columns as loops
 from kernels.lanes.cache import is_ours
 from kernels.lanes.columns import entry_of
 from kernels.lanes.jit import jit
 from kernels.lanes.records import largest, named, read, write
+
+Buffers = Callable[[], tuple[Any, ...]]
+Loop = Callable[..., None]
+Record = Callable[..., Any]
+"""A NamedTuple class."""
 
 
 @dataclass(frozen=True)
@@ -35,19 +47,28 @@ class Solver:
 
     name: str
     doc: str
-    function: Callable
-    bound: Callable | float | None
+    function: SolveCell | FillCells
+    bound: BoundCell | float | None
     excludes: tuple[str, ...]
     lacks: tuple[str, ...]
-    buffers: Callable | None
-    loop: Callable
+    buffers: Buffers | None
+    loop: Loop
     fills: bool
     estimates: bool
 
 
 def method(
-    name, doc, solve, bound=None, *, excludes=(), lacks=(), buffers=None, loop=loops.in_lanes, estimates=False
-):  # fmt: skip
+    name: str,
+    doc: str,
+    solve: SolveCell,
+    bound: BoundCell | float | None = None,
+    *,
+    excludes: tuple[str, ...] = (),
+    lacks: tuple[str, ...] = (),
+    buffers: Buffers | None = None,
+    loop: Loop = loops.in_lanes,
+    estimates: bool = False,
+) -> Solver:
     """A method by `solve(p, rtol, *buffers())`.
 
     Parameters
@@ -61,8 +82,17 @@ def method(
 
 
 def tracing(
-    name, doc, fill, bound=None, *, excludes=(), lacks=(), buffers=None, loop=loops.in_groups, estimates=False
-):  # fmt: skip
+    name: str,
+    doc: str,
+    fill: FillCells,
+    bound: BoundCell | float | None = None,
+    *,
+    excludes: tuple[str, ...] = (),
+    lacks: tuple[str, ...] = (),
+    buffers: Buffers | None = None,
+    loop: Loop = loops.in_groups,
+    estimates: bool = False,
+) -> Solver:
     """A method by `fill(i, columns, *buffers())`: `i` is a cell, or by `in_groups` the first of a group."""
     return Solver(name, doc, fill, bound, excludes, lacks, buffers, loop, True, estimates)
 
@@ -77,15 +107,26 @@ class Split:
     solvers: dict[float, Solver]
 
 
-def split(name, doc, parameter, solvers):
+def split(name: str, doc: str, parameter: str, solvers: dict[float, Solver]) -> Split:
     """A method by {value of a parameter: `method` or `tracing`}; each is compiled when a cell asks for it first."""
     return Split(name, doc, parameter, solvers)
 
 
 def kernel(
-    name, *, doc, source, parameters, outputs, check, methods, along=(), example=(), same_length=(), record=None,
-    loop=loops.in_lanes,
-):  # fmt: skip
+    name: str,
+    *,
+    doc: str,
+    source: str,
+    parameters: Sequence[Field],
+    outputs: Sequence[Field],
+    check: CheckCell,
+    methods: Sequence[Solver | Split],
+    along: Sequence[Field] = (),
+    example: Mapping[str, float | Sequence[float]] | None = None,
+    same_length: Mapping[str, str] | None = None,
+    record: Record | None = None,
+    loop: Loop = loops.in_lanes,
+) -> Kernel:
     """The declaration that the engine reads.
 
     Parameters
@@ -95,6 +136,11 @@ def kernel(
     methods : of `method` or `tracing`, the cheapest first
     loop : how `check` and bounds are looped, `in_lanes`; `cell_by_cell` where parameters are arrays
     The others as in `kernels.interface.Kernel`.
+
+    Raises
+    ------
+    TypeError
+        Where the record's fields are not the parameters, or a method lacks what is no output.
     """
     names = [field.name for field in parameters], [field.name for field in along], [field.name for field in outputs]
     wiring = _Wiring(name, record, *names, loop)
@@ -107,24 +153,24 @@ def kernel(
         check=wiring.check(check),
         methods=tuple(wiring.method(solver) for solver in methods),
         along=tuple(along),
-        example=dict(example),
-        same_length=dict(same_length),
+        example=dict(example or {}),
+        same_length=dict(same_length or {}),
     )
 
 
 @jit
-def nothing():
+def nothing() -> tuple[()]:
     """No buffers."""
     return ()
 
 
-def _of_columns(buffers):
+def _of_columns(buffers: Any) -> Any:
     """`buffers` as a function of the columns."""
     if inspect.signature(buffers).parameters:
         return buffers
 
     @jit
-    def made(columns):
+    def made(columns: Any) -> Any:
         return buffers()
 
     return made
@@ -133,24 +179,36 @@ def _of_columns(buffers):
 class _Wiring:
     """Makes a kernel's entries; each is a function of its own name, for its machine code is kept by it."""
 
-    def __init__(self, name, record, parameters, along, outputs, loop):
-        if record is not None and list(record._fields) != parameters:
-            raise TypeError(f"{name}: the record has {record._fields}, the parameters are {parameters}")
-        self.name, self.record, self.loop = name, record or namedtuple("Parameters", parameters), loop
+    def __init__(
+        self,
+        name: str,
+        record: Record | None,
+        parameters: list[str],
+        along: list[str],
+        outputs: list[str],
+        loop: Loop,
+    ) -> None:
+        found = parameters if record is None else list(getattr(record, "_fields", ()))
+        if found != parameters:
+            raise TypeError(f"{name}: the record has {found}, the parameters are {parameters}")
+        self.name, self.record, self.loop = name, record or _record("Parameters", parameters), loop
         self.parameters, self.along, self.outputs = parameters, along, outputs
 
-    def check(self, check):
+    def check(self, check: CheckCell) -> OnColumns:
         record = self.record
 
         @jit
-        def body(i, columns):
+        def body(i: Any, columns: Any) -> None:
             columns.status[i] = check(read(record, columns, i))
 
         return self._entry("check", check, body, [*self.parameters, "status"], self.loop)
 
-    def method(self, solver):
+    def method(self, solver: Solver | Split) -> Method:
         if isinstance(solver, Split):
             return Method(solver.name, solver.doc, self._split(solver))
+        strange = set(solver.lacks) - set(self.outputs) | set(solver.excludes) - set(self.parameters)
+        if strange:
+            raise TypeError(f"{self.name}.{solver.name} lacks or excludes what there is not: {sorted(strange)}")
         body = solver.function if solver.fills else self._body(solver)
         asked, error = (["asked"], ["error"]) if solver.estimates else ([], [])
         names = [*self.parameters, "rtol", *self.along, *asked, *self.outputs, *error, "status"]
@@ -158,11 +216,11 @@ class _Wiring:
         bound = self._bound(solver)
         return Method(solver.name, solver.doc, solve, bound, solver.excludes, solver.lacks, solver.estimates)
 
-    def _split(self, split):
+    def _split(self, split: Split) -> OnColumns:
         solvers = {value: self.method(solver).solve for value, solver in split.solvers.items()}
         chosen, first_output = self.parameters.index(split.parameter), len(self.parameters) + 1
 
-        def solve(*columns):
+        def solve(*columns: Any) -> None:
             for value in np.unique(columns[chosen]):
                 rows = columns[chosen] == value
                 if rows.all():
@@ -174,53 +232,75 @@ class _Wiring:
 
         return solve
 
-    def _body(self, solver):
-        record, solve = self.record, solver.function
-        given = namedtuple("Given", [name for name in self.outputs if name not in solver.lacks])
-        none = namedtuple("Lacking", solver.lacks)(*(math.nan for _ in solver.lacks))
+    def _given(self, solver: Solver) -> Record:
+        """A record of the outputs that the method gives."""
+        return _record("Given", [name for name in self.outputs if name not in solver.lacks])
+
+    def _body(self, solver: Solver) -> FillCells:
+        record, given, order = self.record, self._given(solver), _record("Order", self.outputs)
+        solve: Any = solver.function
+        none = _record("Lacking", solver.lacks)(*(math.nan for _ in solver.lacks))
 
         @jit
-        def body(i, columns, *buffers):
+        def body(i: Any, columns: Any, *buffers: Any) -> None:
             outputs, status = solve(read(record, columns, i), columns.rtol[i], *buffers)
             write(columns, i, named(given, outputs))
             write(columns, i, none)
             columns.status[i] = status
 
-        order = namedtuple("Order", self.outputs)
-
         @jit
-        def estimating(i, columns, *buffers):
+        def estimating(i: Any, columns: Any, *buffers: Any) -> None:
             outputs, errors, status = solve(read(record, columns, i), columns.rtol[i], *buffers)
             write(columns, i, named(given, outputs))
             write(columns, i, none)
-            columns.error[i] = largest(errors, columns.asked, order)
+            columns.error[i] = largest(errors, columns.asked, order, given)
             columns.status[i] = status
 
         return estimating if solver.estimates else body
 
-    def _bound(self, solver):
+    def _bound(self, solver: Solver) -> OnColumns | None:
         if solver.bound is None:
             return None
         names = [*self.parameters, "rtol", *self.along, "asked", "out"]
         if isinstance(solver.bound, float):
-            return lambda *columns: columns[-1].fill(solver.bound)
-        record, bound, order = self.record, solver.bound, namedtuple("Order", self.outputs)
+            return signed(lambda *columns: columns[-1].fill(solver.bound), names)
+        record, bound, order, given = self.record, solver.bound, _record("Order", self.outputs), self._given(solver)
 
         @jit
-        def body(i, columns):
-            columns.out[i] = largest(bound(read(record, columns, i)), columns.asked, order)
+        def body(i: Any, columns: Any) -> None:
+            columns.out[i] = largest(bound(read(record, columns, i)), columns.asked, order, given)
 
         return self._entry(f"{solver.name}_bound", bound, body, names, self.loop)
 
-    def _entry(self, name, function, body, names, loop, buffers=nothing):
-        columns = namedtuple("Columns", names)
-        scope = {"named": named, "COLUMNS": columns, "BODY": body, "LOOP": loop, "BUFFERS": _of_columns(buffers)}
+    def _entry(
+        self,
+        name: str,
+        function: Any,
+        body: Any,
+        names: list[str],
+        loop: Loop,
+        buffers: Buffers = nothing,
+    ) -> OnColumns:
+        scope = {"named": named, "COLUMNS": _record("Columns", names), "BODY": body, "LOOP": loop}
+        scope["BUFFERS"] = _of_columns(buffers)
         made = FunctionType(_all_cells.__code__, scope, name)
         made.__qualname__, made.__module__ = f"{self.name}.{name}", function.__module__
         per_cell = None if loop is loops.cell_by_cell else [n not in self.along and n != "asked" for n in names]
-        return entry_of(made, per_cell, kept=is_ours(function))
+        return signed(entry_of(made, per_cell, kept=is_ours(function)), names)
 
 
-def _all_cells(*columns):
-    columns = named(COLUMNS, columns)  # noqa: F821  the names of `_Wiring._entry`
-    LOOP(BODY, columns, BUFFERS(columns))  # noqa: F821
+def signed(function: Any, names: Sequence[str]) -> OnColumns:
+    """The function with the names of its columns, as the contract of a kernel has them."""
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    function.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])
+    made: OnColumns = function
+    return made
+
+
+def _record(name: str, fields: Sequence[str]) -> Record:
+    return namedtuple(name, fields)
+
+
+def _all_cells(*columns: Any) -> None:
+    record = named(COLUMNS, columns)  # type: ignore[name-defined]  # noqa: F821  names of `_Wiring._entry`
+    LOOP(BODY, record, BUFFERS(record))  # type: ignore[name-defined]  # noqa: F821

@@ -9,7 +9,7 @@ Source: W. Kahan, "To solve a real cubic equation", Berkeley PAM-352 (1986).
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
 from kernels.maths import pairs
-from kernels.maths.elementary import cbrt, exponent, scale
+from kernels.maths.elementary import cbrt, exponent, larger, scale
 
 _START = 1.324718
 """The root of x^3 = x + 1: as far outside as a root can be."""
@@ -46,7 +46,7 @@ def _start(a2, a1, a0):
     height = magnitude(value)
     reach = where(height > _NOTHING, cbrt(where(height > _NOTHING, height, 1.0)), 0.0)
     bend = where(slope < 0.0, sqrt(where(slope < 0.0, -slope, 0.0)), 0.0)
-    reach = where(slope < 0.0, _START * where(reach > bend, reach, bend), reach)
+    reach = where(slope < 0.0, _START * larger(reach, bend), reach)
     return middle - side * reach, side
 
 
@@ -72,7 +72,7 @@ def _polished(x, a2, a1, a0):
     root, step, slope = (x, 0.0 * x), 0.0 * x, 0.0 * x
     for _ in range(_PAIR_STEPS):
         slope = fma(fma(3.0, root[0], 2.0 * a2[0]), root[0], a1[0])
-        slope = where(slope > _PAIR_ERROR, slope, _PAIR_ERROR)
+        slope = larger(slope, _PAIR_ERROR)
         value = pairs.add(pairs.times(pairs.add(root, a2), root), a1)
         step = -pairs.add(pairs.times(value, root), a0)[0] / slope
         root = pairs.shifted(root, step)
@@ -118,5 +118,5 @@ def largest_modulus(a2, a1, a0):
     modulus, blur = _of_two(b, c, error)
     alone = magnitude(root[0])
     doubt = where(alone > modulus, error, blur)
-    modulus = where(alone > modulus, alone, modulus)
+    modulus = larger(alone, modulus)
     return scale(modulus, e), where(modulus > 0.0, doubt / where(modulus > 0.0, modulus, 1.0), 0.0)

@@ -49,6 +49,18 @@ def is_normal(x):
 
 
 @jit
+def larger(x, y):
+    """The larger of two numbers; y where either is NaN."""
+    return where(x > y, x, y)
+
+
+@jit
+def smaller(x, y):
+    """The smaller of two numbers; y where either is NaN."""
+    return where(x < y, x, y)
+
+
+@jit
 def scale(x, n):
     """x 2^n for an integer-valued n and x between 1e-300 and 1e300; overflows to inf and underflows to 0."""
     n = where(n > -2040.0, n, -2040.0)

@@ -1,4 +1,4 @@
-"""A study: TOML (or a dict) in, a checked `Study` out, all mistakes at once.
+"""From TOML, or a dict, to a checked `Study`, all mistakes told at once.
 
 Faces: `model` (Study, Axis), `read` (read_study, build_study), `kernels` (kernel lookup), `mistakes`, `units` (the only
 place that imports pint), `summary`, `spacing`.

@@ -244,3 +244,23 @@ def test_elementary_functions_at_the_ends_of_their_ranges():
     assert sines[0] == 0.0
     assert angles[2:4].tolist() == [np.pi / 2, -np.pi / 2]
     assert powers[:2].tolist() == [1.0, 1e-310]  # 0^0 = 1
+
+
+@jit
+def _of_two(i, x, y, high, low):
+    high[i], low[i] = elementary.larger(x[i], y[i]), elementary.smaller(x[i], y[i])
+
+
+@entry()
+def of_two(x, y, high, low):
+    each_cell(_of_two, (x, y, high, low))
+
+
+def test_of_two_numbers_the_larger_and_the_smaller_and_of_what_is_none_the_second():
+    x = np.array([1.0, 2.0, -np.inf, np.inf, np.nan, 3.0, -0.0])
+    y = np.array([2.0, 1.0, 0.0, 0.0, 4.0, np.nan, 0.0])
+    high, low = np.empty(7), np.empty(7)
+    of_two(x, y, high, low)
+    np.testing.assert_array_equal(high, [2.0, 2.0, 0.0, np.inf, 4.0, np.nan, 0.0])
+    np.testing.assert_array_equal(low, [1.0, 1.0, -np.inf, 0.0, 4.0, np.nan, 0.0])
+    assert not np.signbit([high[-1], low[-1]]).any()

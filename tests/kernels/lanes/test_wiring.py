@@ -1,0 +1,234 @@
+"""What `wiring` and `records` make of the physics of one cell; the kernel is that of `triangle`."""
+
+import inspect
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from columns import asked_for, bounds, checked, printed_both_ways, solve
+from numba.core.errors import TypingError
+from triangle import FIELDS, TRIANGLE, Area, Sides, Triangle, check, in_order, pythagoras
+
+from kernels.interface import Status
+from kernels.lanes import codes
+from kernels.lanes.codes import OK
+from kernels.lanes.jit import COMPILED, jit
+from kernels.lanes.vectors import WIDTH
+from kernels.lanes.wiring import kernel, method
+
+OUTPUTS = ("longest", "area", "angle")
+WHOLE = ("pythagoras", "in_order", "one_by_one", "estimating", "by_hand")
+MANY = 2 * WIDTH + 5
+
+
+def legs(n=MANY):
+    random = np.random.default_rng(3)
+    return random.uniform(0.1, 9.0, n), random.uniform(0.1, 9.0, n)
+
+
+def triangle_by(function, *more, **options):
+    return kernel("triangle", **FIELDS, methods=(method("strange", "", function, *more, **options),))
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_each_output_goes_to_the_column_of_its_name(name):
+    a, b = legs()
+    found, status = solve(TRIANGLE, name, a, b, rtol=math.inf)
+    assert (status == Status.OK).all()
+    np.testing.assert_allclose(found["longest"], np.hypot(a, b), rtol=1e-15)
+    np.testing.assert_allclose(found["area"], a * b / 2, rtol=1e-15)
+    np.testing.assert_allclose(found["angle"], np.arctan2(a, b), rtol=1e-15)
+
+
+@pytest.mark.parametrize("name", WHOLE)
+@pytest.mark.parametrize("n", [1, 3, WIDTH - 1, WIDTH, WIDTH + 1])
+def test_few_cells_have_the_bits_that_they_have_among_many(name, n):
+    a, b = legs()
+    many, few = solve(TRIANGLE, name, a, b)[0], solve(TRIANGLE, name, a[-n:], b[-n:])[0]
+    for output in OUTPUTS:
+        assert (many[output][-n:] == few[output]).all()
+
+
+def test_all_forms_of_a_method_have_the_same_bits():
+    first, *others = (solve(TRIANGLE, name, *legs())[0] for name in WHOLE)
+    for other in others:
+        for output in OUTPUTS:
+            assert (first[output] == other[output]).all()
+
+
+PROGRAM = """
+import sys
+sys.path.append("tests/helpers")
+from columns import bounds, solve
+from triangle import TRIANGLE
+for name in ("pythagoras", "in_order", "one_by_one", "estimating", "by_hand", "area_only"):
+    found, status = solve(TRIANGLE, name, [0.3, 1.7, 4.1], [2.2, 0.9, 4.0])
+    print(name, [[x.hex() for x in column.tolist()] for column in found.values()], status.tolist())
+print(bounds(TRIANGLE, "pythagoras", [0.3, 1.7], [2.2, 0.9]).tolist())
+"""
+
+
+@pytest.mark.skipif(not COMPILED, reason="both ways are tried from the compiled run")
+def test_compiled_and_as_plain_python_the_bits_are_the_same():
+    compiled, plain = printed_both_ways(PROGRAM)
+    assert compiled == plain
+    assert "0x1." in compiled
+
+
+def test_no_cells_are_no_fault():
+    assert solve(TRIANGLE, "pythagoras", np.empty(0), np.empty(0))[1].size == 0
+
+
+def test_the_check_is_of_each_cell():
+    a = [1.0, 0.0, -1.0, math.nan, math.inf, 2.0]
+    assert checked(TRIANGLE, a, 1.0).tolist() == [0, 64, 64, 64, 64, 0]
+
+
+def test_outputs_that_a_method_lacks_are_no_numbers():
+    a, b = legs()
+    found, _ = solve(TRIANGLE, "area_only", a, b)
+    assert (found["area"] == 0.5 * a * b).all()
+    assert np.isnan(found["longest"]).all()
+    assert np.isnan(found["angle"]).all()
+
+
+@pytest.mark.parametrize(
+    ("asked", "bound"),
+    [(["longest"], 1e-9), (["area"], 1e-7), (["longest", "area"], 1e-7), (["angle"], 1e-3), (None, 1e-3), ([], 0.0)],
+)
+def test_the_bound_is_the_worst_of_the_outputs_asked_for(asked, bound):
+    assert bounds(TRIANGLE, "pythagoras", [1.0, 1.0], 2.0, asked=asked).tolist() == [bound, bound]
+
+
+def test_a_bound_that_is_no_number_promises_nothing():
+    found = bounds(TRIANGLE, "pythagoras", [1.0, 3.0], 2.0, asked=["angle", "area"])
+    assert found.tolist() == [1e-3, math.inf]
+    assert bounds(TRIANGLE, "pythagoras", [4.0], 2.0, asked=["longest"]).tolist() == [4e-9]
+
+
+def test_one_number_bounds_all_outputs():
+    assert bounds(TRIANGLE, "in_order", *legs(3), asked=["area"]).tolist() == [1e-15] * 3
+    assert TRIANGLE.method("one_by_one").bound is None
+
+
+def test_of_a_method_that_lacks_outputs_the_others_have_a_bound():
+    assert bounds(TRIANGLE, "area_only", 1.0, [2.0], asked=["area"]).tolist() == [2e-5]
+
+
+@pytest.mark.parametrize(("asked", "error"), [(["area"], 1e-7), (["longest"], 1e-9), (["angle"], math.inf)])
+def test_a_method_that_estimates_tells_the_worst_error_of_those_asked_for(asked, error):
+    columns = [np.array([1.0]), np.array([0.5])]
+    outputs, found, status = [np.empty(1) for _ in OUTPUTS], np.empty(1), np.empty(1, np.int8)
+    estimating = TRIANGLE.method("estimating")
+    assert estimating.estimates
+    estimating.solve(*columns, np.array([1e-9]), asked_for(TRIANGLE, asked), *outputs, found, status)
+    assert found.tolist() == [error]
+
+
+class Swapped(NamedTuple):
+    b: float
+    a: float
+
+
+class Weight(NamedTuple):
+    longest: float
+    area: float
+    weight: float
+
+
+@jit
+def short(p, rtol):
+    return Area(p.a), OK
+
+
+@jit
+def foreign(p, rtol):
+    return Weight(p.a, p.a, p.a), OK
+
+
+@jit
+def doubled(p, rtol):
+    return Triangle(p.a, Triangle(p.a, Sides(p.a, p.b))), OK
+
+
+@jit
+def two(p, rtol):
+    return (p.a, p.b), OK
+
+
+@jit
+def four(p, rtol):
+    return (p.a, p.b, p.a, p.b), OK
+
+
+@jit
+def bare(p, rtol):
+    return p.a, OK
+
+
+@jit
+def wrong_bound(p):
+    return Weight(p.a, p.a, p.a)
+
+
+@jit
+def short_bound(p):
+    return Area(p.a)
+
+
+@jit
+def misnamed(p, rtol):
+    return (p.a, p.height, p.b), OK
+
+
+REFUSED = (TypingError, TypeError, AttributeError)
+
+
+@pytest.mark.parametrize("function", [short, foreign, doubled, two, four, bare, misnamed])
+def test_outputs_that_do_not_fit_the_fields_are_refused(function):
+    strange = triangle_by(function)
+    with pytest.raises(REFUSED):
+        solve(strange, "strange", *legs(3))
+
+
+@pytest.mark.parametrize("bound", [wrong_bound, short_bound])
+def test_a_bound_that_forgets_an_output_or_has_a_strange_one_is_refused(bound):
+    """For one that is forgotten would count as exact."""
+    strange = triangle_by(in_order, bound)
+    with pytest.raises(REFUSED):
+        bounds(strange, "strange", *legs(3))
+
+
+def test_what_is_expected_is_told():
+    with pytest.raises(REFUSED, match="expected longest, area, angle"):
+        solve(triangle_by(foreign), "strange", *legs(3))
+
+
+def test_a_record_that_has_not_the_parameters_in_their_order_is_refused():
+    with pytest.raises(TypeError, match=r"triangle: the record has \['b', 'a'\]"):
+        kernel("triangle", **FIELDS, record=Swapped, methods=())
+    with pytest.raises(TypeError, match="the record has"):
+        kernel("triangle", **FIELDS, record=check, methods=())
+
+
+@pytest.mark.parametrize("options", [{"lacks": ("weight",)}, {"excludes": ("weight",)}])
+def test_what_there_is_not_can_be_neither_lacked_nor_excluded(options):
+    with pytest.raises(TypeError, match=r"triangle\.strange .*weight"):
+        triangle_by(pythagoras, **options)
+
+
+def test_each_status_of_a_kernel_is_a_number_for_lanes():
+    engine = {Status.FAILED, Status.PENDING}
+    assert {s: getattr(codes, s.name) for s in Status if s not in engine} == {s: s for s in Status if s not in engine}
+    assert not any(hasattr(codes, status.name) for status in engine)
+
+
+def test_functions_of_columns_say_which_they_take():
+    assert str(inspect.signature(TRIANGLE.check)) == "(a, b, status)"
+    for name, columns in (("one_by_one", ""), ("area_only", ""), ("estimating", "error, ")):
+        asked = "asked, " if columns else ""
+        wanted = f"(a, b, rtol, {asked}longest, area, angle, {columns}status)"
+        assert str(inspect.signature(TRIANGLE.method(name).solve)) == wanted
+    for name in ("in_order", "pythagoras"):
+        assert str(inspect.signature(TRIANGLE.method(name).bound)) == "(a, b, rtol, asked, out)"
