@@ -19,9 +19,9 @@ from numba import njit, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import register_pass
-from numba.core.typed_passes import NativeLowering
 from numba.core.imputils import lower_constant
 from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NativeLowering
 from numba.extending import models, register_model
 
 TRIED = ("0.68",)
@@ -209,7 +209,7 @@ def aligned(function, **options):
 
 def part(function, **options):
     """As numba's `njit` with these options, for what is called by compiled code."""
-    whole = njit(**options)(function)
+    whole = aligned(function, **options)
     if not _is_tried():
         return whole
     inner = _made(_Part, _PartCompiler, function, options)
