@@ -7,6 +7,9 @@ Source: the drivetrain of a milling machine, type-a and type-b partial systems a
 """
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from kernels.lanes.codes import BAD_INPUT, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
@@ -17,6 +20,16 @@ MASS_LIMIT = 64
 """Inertias of the longest chain."""
 SPREAD = 2.0**300
 """Largest ratio of two inertias, or of two stiffnesses, of one chain: what leaves room for inverse squares."""
+
+
+class Scaled(NamedTuple):
+    """A chain, and the exponents of the units that its inertias and stiffnesses are taken in."""
+
+    J: np.ndarray
+    k: np.ndarray
+    h: np.ndarray
+    e_J: float
+    e_k: float
 
 
 @jit

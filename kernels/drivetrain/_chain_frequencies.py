@@ -21,6 +21,7 @@ Source: Fernando & Parlett, Numer. Math. 67:191 (1994), sections 4 and 6; (3) an
 """
 
 import math
+from typing import NamedTuple
 
 from kernels.drivetrain._chain import same, units
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
@@ -39,6 +40,16 @@ _TINY = 2.0**-60  # 63 of them are less than the last digit
 _SPENT = 2.0**-120
 _ROUNDING = 2.0**-53
 _SQUARE_TURNS = 0.025330295910584444  # 1/(2 pi)^2
+
+
+class _Row(NamedTuple):
+    """The next row's q before the step (2) and its d, the e between, and u and h of (3)."""
+
+    q: float
+    d: float
+    e: float
+    u: float
+    h: float
 
 
 @jit
@@ -68,31 +79,33 @@ def _sweep(m, n, at, rows, shift, active):
     old_q = rows[at(0)]
     d = old_q - shift
     nothing = 0.0 * d
-    lost, e, u, h, sums = isnt(d >= 0.0), nothing, nothing, nothing, (nothing, nothing)
+    row = _Row(old_q, d, nothing, nothing, nothing)
+    lost, sums = isnt(d >= 0.0), (nothing, nothing)
     for j in range(m - 2):
-        old_q, d, e, u, h = _row(j, n, at, rows, shift, active, old_q, d, e, u, h)
-        sums, lost = (sums[0] + u, sums[1] + h), lost | isnt(d >= 0.0)
+        row = _next_row(j, n, at, rows, shift, active, row)
+        sums, lost = (sums[0] + row.u, sums[1] + row.h), lost | isnt(row.d >= 0.0)
     fewest = sums
-    old_q, d, e, u, h = _row(m - 2, n, at, rows, shift, active, old_q, d, e, u, h)
-    sums, lost = (sums[0] + u, sums[1] + h), lost | isnt(d >= 0.0)
+    row = _next_row(m - 2, n, at, rows, shift, active, row)
+    sums, lost = (sums[0] + row.u, sums[1] + row.h), lost | isnt(row.d >= 0.0)
     left = rows[at(n + m - 1)]
-    q = d + left
-    u, h = _next(e, 1.0 / q, u, h)
-    rows[at(m - 1)], rows[at(n + m - 1)] = where(active, q, old_q), where(active, 0.0, left)
+    q = row.d + left
+    u, h = _next(row.e, 1.0 / q, row.u, row.h)
+    rows[at(m - 1)], rows[at(n + m - 1)] = where(active, q, row.q), where(active, 0.0, left)
     return lost, (sums[0] + u, sums[1] + h, *sums, *fewest)
 
 
 @jit
-def _row(j, n, at, rows, shift, active, old_q, d, e, u, h):
+def _next_row(j, n, at, rows, shift, active, row):
     """One row but the last of (2), and u and h of (3): its d becomes that of the next row."""
+    d = row.d
     next_q, old_e = rows[at(j + 1)], rows[at(n + j)]
     q = d + old_e
     inverse = 1.0 / q
-    u, h = _next(e, inverse, u, h)
+    u, h = _next(row.e, inverse, row.u, row.h)
     t = next_q * inverse
     e = old_e * t
-    rows[at(j)], rows[at(n + j)] = where(active, q, old_q), where(active, e, old_e)
-    return next_q, fma(d, t, -shift), e, u, h
+    rows[at(j)], rows[at(n + j)] = where(active, q, row.q), where(active, e, old_e)
+    return _Row(next_q, fma(d, t, -shift), e, u, h)
 
 
 @jit

@@ -10,7 +10,7 @@ critical damping both poles are those of this quadratic.
 Source: first-order perturbation of the quadratic eigenvalue problem, derived here.
 """
 
-from kernels.drivetrain._chain import extremes, same, units
+from kernels.drivetrain._chain import Scaled, extremes, same, units
 from kernels.drivetrain._chain_roots import approach, start, stiffness
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
@@ -67,7 +67,7 @@ def _joint(n, chain, ways):
     best, top, power = 0, 0.0, 0.0
     for j in range(n):
         both = complex.size((ways[j], ways[n + j])) * complex.size((ways[7 * n + j], ways[8 * n + j]))
-        size, e = both * scale(chain[0][j], -chain[3]), ways[6 * n + j] + ways[13 * n + j]
+        size, e = both * scale(chain.J[j], -chain.e_J), ways[6 * n + j] + ways[13 * n + j]
         if size > 0.0 and (not top > 0.0 or size > scale(top, power - e)):
             best, top, power = j, size, e
     return best
@@ -225,7 +225,7 @@ def damped_poles(n, J, k, h, frequency, pole_re, pole_im, work):
     bound says; abs(s) and damping of both together do not. NOT_CONVERGED where others cannot be told apart.
     """
     e_J, e_k, sound = units(n, same, J, k)
-    chain = J, k, h, e_J, e_k
+    chain = Scaled(J, k, h, e_J, e_k)
     sound = sound & (scale(extremes(n, same, h)[1], -0.5 * (e_J + e_k)) < REACH)
     fixed = start(n, chain, frequency, pole_re, pole_im, work)
     settled = approach(n, chain, fixed, pole_re, pole_im, work)

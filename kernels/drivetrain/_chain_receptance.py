@@ -12,8 +12,9 @@ Source: (2) is the Green's function of a three-term recurrence; bound derived he
 """
 
 import math
+from typing import NamedTuple
 
-from kernels.drivetrain._chain import extremes, same, units
+from kernels.drivetrain._chain import Scaled, extremes, same, units
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import choose, exponent, fma, magnitude, some, where
 from kernels.maths import complex
@@ -26,6 +27,15 @@ REACH = 2.0**300
 _FAR = 2.0**100
 
 
+class Way(NamedTuple):
+    """A chain followed from one end: x and g over 2^e, and the sum of (3) so far, without W."""
+
+    x: tuple
+    g: tuple
+    e: float
+    work: float
+
+
 @jit
 def _renormed(way):
     """A way, its numbers over a power of two where they leave the middle of the range; exact."""
@@ -36,7 +46,7 @@ def _renormed(way):
         own = where(off, exponent(where(size > 0.0, size, 1.0)), 0.0)
         x, g = complex.scaled(x, -own), complex.scaled(g, -own)
         e, work = e + own, scale(work, -2.0 * own)
-    return x, g, e, work
+    return Way(x, g, e, work)
 
 
 @jit
@@ -47,12 +57,13 @@ def _turned(x, g, inertia):
 
 @jit_call
 def _on(way, inertia, spring):
-    """The way across an inertia and a spring: x, g, their exponent, and the sum of (3) so far, without W."""
+    """The way across an inertia and a spring."""
     x, g, e, work = way
     work = fma(inertia, complex.square(x), work)
     g = _turned(x, g, inertia)
     wound = complex.over(g, spring)
-    return _renormed(((x[0] + wound[0], x[1] + wound[1]), g, e, fma(complex.size(g), complex.size(wound), work)))
+    work = fma(complex.size(g), complex.size(wound), work)
+    return _renormed(Way((x[0] + wound[0], x[1] + wound[1]), g, e, work))
 
 
 @jit
@@ -66,15 +77,15 @@ def _element(j, chain, w):
 def _from_left(p, q, chain, w, n, at, rows):
     """The ways as they come to p and to q >= p; abs x and g' and their exponents between are kept in `rows`."""
     zero = 0.0 * w
-    way = (zero + 1.0, zero), (zero, zero), zero, zero
+    way = Way((zero + 1.0, zero), (zero, zero), zero, zero)
     first = way
     for j in range(q + 1):
         inertia, spring = _element(j, chain, w)
         if j == p:
             first = way
         if j >= p:
-            rows[at(j)], rows[at(2 * n + j)] = complex.size(way[0]), way[2]
-            rows[at(n + j)] = complex.size(_turned(way[0], way[1], inertia))
+            rows[at(j)], rows[at(2 * n + j)] = complex.size(way.x), way.e
+            rows[at(n + j)] = complex.size(_turned(way.x, way.g, inertia))
         if j < q:
             way = _on(way, inertia, spring)
     return first, way
@@ -85,7 +96,7 @@ def _from_right(q, chain, w, n):
     """The way as it comes to q."""
     zero = 0.0 * w
     _, spring = _element(n - 1, chain, w)
-    way = (zero + 1.0, zero), spring, zero, complex.size(spring)
+    way = Way((zero + 1.0, zero), spring, zero, complex.size(spring))
     for j in range(n - 1, q, -1):
         way = _on(way, _element(j, chain, w)[0], _element(j - 1, chain, w)[1])
     return way
@@ -97,11 +108,11 @@ def _between(p, q, way, e_W, chain, w, n, at, rows):
     total = 0.0 * w
     for j in range(q, p - 1, -1):
         inertia, _ = _element(j, chain, w)
-        total = total + scale(inertia * rows[at(j)] * complex.size(way[0]), rows[at(2 * n + j)] + way[2] - e_W)
+        total = total + scale(inertia * rows[at(j)] * complex.size(way.x), rows[at(2 * n + j)] + way.e - e_W)
         if j > p:
             _, spring = _element(j - 1, chain, w)
-            wound = complex.size(complex.over(_turned(way[0], way[1], inertia), spring))
-            total = total + scale(rows[at(n + j - 1)] * wound, rows[at(2 * n + j - 1)] + way[2] - e_W)
+            wound = complex.size(complex.over(_turned(way.x, way.g, inertia), spring))
+            total = total + scale(rows[at(n + j - 1)] * wound, rows[at(2 * n + j - 1)] + way.e - e_W)
             way = _on(way, inertia, spring)
     return total, way
 
@@ -109,8 +120,8 @@ def _between(p, q, way, e_W, chain, w, n, at, rows):
 @jit
 def _net(left, right, inertia):
     """W of (2)."""
-    one, other = complex.product(left[1], right[0]), complex.product(right[1], left[0])
-    third = complex.product(left[0], right[0])
+    one, other = complex.product(left.g, right.x), complex.product(right.g, left.x)
+    third = complex.product(left.x, right.x)
     return fma(-inertia, third[0], one[0] + other[0]), fma(-inertia, third[1], one[1] + other[1])
 
 
@@ -122,7 +133,7 @@ def receptance(n, J, k, h, omega, drive, read, at, rows):
     receptance is. `rows` has room for 3 n entries, one after the other as `at` says.
     """
     e_J, e_k, sound = units(n, same, J, k)
-    chain = J, k, h, e_J, e_k
+    chain = Scaled(J, k, h, e_J, e_k)
     p, q = min(drive, read) - 1, max(drive, read) - 1
     w = scale(omega, -0.5 * (e_k - e_J))
     near, left = _from_left(p, q, chain, w, n, at, rows)
@@ -130,14 +141,14 @@ def receptance(n, J, k, h, omega, drive, read, at, rows):
     inertia, _ = _element(q, chain, w)
     net = _net(left, right, inertia)
     own = exponent(where(complex.size(net) > 0.0, complex.size(net), 1.0))
-    ratio = complex.over(complex.product(near[0], right[0]), complex.scaled(net, -own))
-    e_W = left[2] + right[2]
+    ratio = complex.over(complex.product(near.x, right.x), complex.scaled(net, -own))
+    e_W = left.e + right.e
     total, far = _between(p, q, right, e_W, chain, w, n, at, rows)
-    outer = near[3] * (complex.size(far[0]) / complex.size(near[0]))
-    total = total + scale(outer, near[2] + far[2] - e_W)
-    total = total + right[3] * (complex.size(left[0]) / complex.size(right[0]))
+    outer = near.work * (complex.size(far.x) / complex.size(near.x))
+    total = total + scale(outer, near.e + far.e - e_W)
+    total = total + right.work * (complex.size(left.x) / complex.size(right.x))
     error = ROUNDING * (1.0 + total / complex.size(net))
     sound = sound & (w < REACH) & (w * scale(extremes(n, same, h)[1], -0.5 * (e_J + e_k)) < REACH)
-    shift = near[2] - left[2] - e_k - own
+    shift = near.e - left.e - e_k - own
     re, im = choose(sound, complex.scaled(ratio, shift), (math.nan * w, math.nan * w))
     return re, im, where(sound & (error < math.inf), error, math.inf)

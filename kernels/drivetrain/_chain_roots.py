@@ -72,7 +72,7 @@ def start(n, chain, frequency, pole_re, pole_im, work):
     """Roots of every mode with its own damping, turned a little so that none is real and no two are equal."""
     J, _, h, e_J, e_k = chain
     for j in range(n):
-        total = follow_mode(n, J, chain[1], e_J, e_k, frequency[j], work)
+        total = follow_mode(n, J, chain.k, e_J, e_k, frequency[j], work)
         w = scale(frequency[j] / _TURNS, -0.5 * (e_k - e_J)) if frequency[j] > 0.0 else 0.0
         half = 0.0
         for i in range(n):
@@ -87,7 +87,7 @@ def start(n, chain, frequency, pole_re, pole_im, work):
         pole_re[2 * j], pole_im[2 * j] = near - turn * up, up - turn * near
         pole_re[2 * j + 1], pole_im[2 * j + 1] = far - 0.7 * turn * up, -up + 0.7 * turn * far
     fixed = 0
-    if not chain[1][n - 1] > 0.0:
+    if not chain.k[n - 1] > 0.0:
         pole_re[0] = pole_im[0] = 0.0
         fixed = 1
         if not h[n - 1] > 0.0:

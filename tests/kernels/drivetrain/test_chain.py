@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp, mpc, mpf
 
-from kernels.drivetrain._chain import refusal, same
+from kernels.drivetrain._chain import Scaled, refusal, same
 from kernels.drivetrain._chain_frequencies import (
     _rotate,
     _shift,
@@ -353,7 +353,7 @@ def unit_chain(n, seed=6):
     """A chain in its own units, as the solvers of poles have it: J, k, h and two exponents."""
     random = np.random.default_rng(seed)
     J, k, h = (random.uniform(0.5, 1.0, n) for _ in range(3))
-    return J, k, 0.2 * h, 0.0, 0.0
+    return Scaled(J, k, 0.2 * h, 0.0, 0.0)
 
 
 def test_a_root_of_five_digits_is_refined_to_its_last():

@@ -2,11 +2,13 @@
 
 import gc
 import re
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from columns import printed_both_ways
 from numba import float64
+from numba.core.runtime import _nrt_python, rtsys
 
 from kernels.lanes.columns import each_cell, entry, entry_of_cells
 from kernels.lanes.groups import GROUP, room
@@ -141,3 +143,51 @@ print(whole(0.0), both(0.0), root(0.0), squared(0.0))
 def test_what_is_meant_to_be_inlined_can_be_called_from_python_however_deep_it_calls():
     """In a process of its own, since code that is not linked in is a fault of the whole process."""
     assert printed_both_ways(DEEP) == ("2.0 2.0 1.0 1.0\n",) * 2
+
+
+class Pair(NamedTuple):
+    """A record of arrays."""
+
+    a: np.ndarray
+    b: np.ndarray
+
+
+@jit_call
+def ones_and_zeros(n):
+    """A part that makes arrays, and hands them over."""
+    return Pair(np.ones(n), np.zeros(n))
+
+
+@jit_call
+def add(pair):
+    """A part that borrows arrays, and a record made of them."""
+    again = Pair(pair.a, pair.b)
+    for j in range(again.a.size):
+        again.b[j] += again.a[j]
+
+
+@jit_call
+def added_twice(n):
+    """A part that makes arrays for itself alone."""
+    pair = ones_and_zeros(n)
+    add(pair)
+    add(pair)
+    return pair.b.sum()
+
+
+def allocated():
+    """How many arrays of compiled code are not freed yet."""
+    stats = rtsys.get_allocation_stats()
+    return stats.alloc - stats.free
+
+
+@pytest.mark.skipif(not COMPILED, reason="plain Python counts by itself")
+def test_arrays_that_parts_borrow_are_kept_and_those_they_make_are_freed():
+    _nrt_python.memsys_enable_stats()
+    assert added_twice(3) == 6.0  # parts of parts, called from Python
+    held, lent = allocated(), Pair(np.ones(4), np.zeros(4))
+    for n in range(1, 40):
+        assert added_twice(n) == 2.0 * n
+        add(lent)
+    assert allocated() == held
+    assert (lent.b == 39.0).all()
