@@ -387,18 +387,18 @@ def _check_target(arguments: argparse.Namespace, target: Path, kind: str | None 
 
 
 def _check_readable(path: Path, *meanwhile: str) -> None:
-    """Raises SweepError where HDF5 hangs or crashes in a result although it is sealed: then it is forged.
+    """Raises SweepError where HDF5 hangs or crashes in a result although its trailer is right: then it is forged.
 
-    A result that is not sealed, or not there, is looked at by who opens it.
+    A result that is not intact, or not there, is looked at by who opens it.
 
     Parameters
     ----------
     meanwhile : names of modules to import while another process reads the result
     """
     from sweep.results.open import unreadable
-    from sweep.store.seal import probing, sealed
+    from sweep.store.probe import intact, probing
 
-    if not sealed(path):
+    if not intact(path):
         return
     read = probing(path)
     for name in meanwhile:

@@ -27,10 +27,9 @@ from sweep.cells.schema import Column
 from sweep.explore.calibration import rehearsed
 from sweep.results.open import memory
 from sweep.runs.session import faults_told, sampled_study
-from sweep.store.assemble import chunks, write_frame
-from sweep.store.canvas import Canvas
-from sweep.store.digests import Seals
-from sweep.store.hdf5_bytes import Images
+from sweep.store.assemble import chunks, write_structure
+from sweep.store.digests import Digests
+from sweep.store.hdf5_bytes import Hdf5Bytes, PartBytes
 from sweep.store.parts import FLAGS
 from sweep.study.read import as_study
 from sweep.system.errors import SweepError
@@ -215,20 +214,20 @@ def _seconds(
 
 def _part_bytes(columns: tuple[Column, ...], blocks: Partition) -> int:
     """All parts, as files."""
-    images = Images(columns)
+    part_bytes = PartBytes(columns)
     last = blocks.bounds(blocks.count - 1)
-    return (blocks.count - 1) * images.frame(blocks.cells).size + images.frame(last[1] - last[0]).size
+    return (blocks.count - 1) * part_bytes.template(blocks.cells).size + part_bytes.template(last[1] - last[0]).size
 
 
 def _output_bytes(study: Study, sample: Sample, blocks: Partition) -> tuple[int, int]:
     """The output, and all of it but the outputs' numbers; its frame is made for this, in memory."""
-    content, canvas = contents(study, fingerprint(study)), Canvas()
-    write_frame(canvas, content, Seals(content.columns, chunks(study, blocks)))
+    content, hdf5 = contents(study, fingerprint(study)), Hdf5Bytes()
+    write_structure(hdf5, content, Digests(content.columns, chunks(study, blocks)))
     numbers = sum(c.cell_bytes for c in content.columns if c.name not in FLAGS) * content.grid.size
     flags = sum(c.name in FLAGS for c in content.columns) * content.grid.size
     told = len(zlib.compress(sample.status.tobytes(), 1)) / max(len(sample.status), 1)
     uniform = len(set(sample.status.tolist())) < 2
-    return canvas.size + int(flags * (UNIFORM if uniform else told)), canvas.size - numbers
+    return hdf5.size + int(flags * (UNIFORM if uniform else told)), hdf5.size - numbers
 
 
 def _disk_speed(folder: Path) -> float:

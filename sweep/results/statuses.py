@@ -77,6 +77,13 @@ def is_summary(dataset: Cells) -> bool:
     return BY_STATUS in dataset and STATUS not in dataset
 
 
+def flag_words(variable: xr.DataArray) -> dict[int, str]:
+    """What the codes of a flag variable mean, {} for others; -1 is "none" where the flags do not say."""
+    values = np.atleast_1d(variable.attrs.get("flag_values", ())).tolist()
+    words = dict(zip(values, str(variable.attrs.get("flag_meanings", "")).split(), strict=False))
+    return {-1: "none", **words} if words else {}
+
+
 def summed(dataset: Cells, name: str) -> dict[str, int]:
     """Cells of each status or method of a summary, over all it keeps; those that do not occur are left out."""
     counts = dataset[name]

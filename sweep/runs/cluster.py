@@ -308,7 +308,7 @@ class _Errand:
         return arrays
 
 
-def show_key(door: Path, key: str) -> None:
+def write_token(door: Path, key: str) -> None:
     """Puts the key at the door: a worker that reads it there sees the same folder. Raises SweepError."""
     try:
         disk.publish([key.encode("ascii")], door / "key.tmp", door / worker.KEY)
@@ -319,11 +319,11 @@ def show_key(door: Path, key: str) -> None:
 def _assignment(session: Session, door: Path | None) -> Assignment:
     key = secrets.token_hex(16)
     # what is known already is filled in here
-    through_door = door is not None and session.known is None
-    if door is not None and through_door:
-        show_key(door, key)
+    by_folder = door is not None and session.known is None
+    if door is not None and by_folder:
+        write_token(door, key)
     mark, study = session.mark, session.study
-    place = str(door) if through_door else ""
+    place = str(door) if by_folder else ""
     return Assignment(f"foliot-{key[:8]}", study.to_json(), mark, session.blocks, place, key, _paths(study))
 
 

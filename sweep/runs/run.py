@@ -22,7 +22,7 @@ from sweep.runs.cluster import Cluster, joined
 from sweep.runs.extend import Given, Known, obstacle
 from sweep.runs.session import Session, Solve
 from sweep.store.assemble import assemble
-from sweep.store.manifest import Spec, read_spec, restored
+from sweep.store.manifest import Manifest, read_manifest, restored
 from sweep.store.store import Store, folder_of, opened
 from sweep.study.read import as_study
 from sweep.system.errors import SweepError
@@ -207,14 +207,14 @@ def _compute_in_memory(task: _Task, cluster: Cluster | None) -> xr.Dataset:
 def _run_to_file(task: _Task, output: Path) -> bool:
     """False where the time was up before the end."""
     with opened(output, part_columns(task.study)) as store:
-        spec = _spec(store, task)
+        manifest = _manifest(store, task)
         # looked at again, for another run may have ended before this one had the lock
         if _done(task, output):
-            _tidy(store, spec, task)
+            _tidy(store, manifest, task)
             return True
-        _take_up(store, spec, task)
-        blocks = None if store.spec is None else store.blocks
-        all_there = store.spec is not None and not store.missing()
+        _take_up(store, manifest, task)
+        blocks = None if store.manifest is None else store.blocks
+        all_there = store.manifest is not None and not store.missing()
         known = None if all_there else _known(task, output)
         with known or contextlib.nullcontext(), joined(None if all_there else task.cluster) as cluster:
             _wait(cluster, task, output.name)
@@ -235,13 +235,13 @@ def _run_to_file(task: _Task, output: Path) -> bool:
 
 def _run_session(task: _Task, session: Session, store: Store, output: Path) -> bool:
     """Computes and puts together what is missing; False where the time was up before the end."""
-    jobs = range(session.blocks.count) if store.spec is None else store.missing()
+    jobs = range(session.blocks.count) if store.manifest is None else store.missing()
     ending = Ending(session.blocks.count, task.workers, session.granules.count * session.row_bytes)
     progress = session.progress(task.stream, output.name, jobs, ending.seconds)
     _check_space(session, output, progress)
     # held back wherever they would leave half a file behind
     with CtrlC():
-        if store.spec is None:
+        if store.manifest is None:
             store.begin(task.study.to_json(), task.mark, session.blocks)
         try:
             _finish(session, store, output, progress, ending)
@@ -279,54 +279,54 @@ def _check_whole(output: Path) -> None:
     check_whole(output)
 
 
-def _spec(store: Store, task: _Task) -> Spec | None:
+def _manifest(store: Store, task: _Task) -> Manifest | None:
     """What an earlier run left, if it can be read. Raises SweepError where it cannot, unless forced."""
     try:
-        spec = read_spec(store.folder)
-        if spec is not None:
-            checked_study(store.folder, spec)
-            return spec
+        manifest = read_manifest(store.folder)
+        if manifest is not None:
+            checked_study(store.folder, manifest)
+            return manifest
     except SweepError:
         if task.force:
             return None
-        spec = _restored(store, task)
-        if spec is None:
+        manifest = _restored(store, task)
+        if manifest is None:
             raise
-        return spec
+        return manifest
     return None if task.force else _restored(store, task)
 
 
-def _restored(store: Store, task: _Task) -> Spec | None:
-    """The spec that is lost or damaged, written anew where the parts are of this study. Raises SweepError."""
+def _restored(store: Store, task: _Task) -> Manifest | None:
+    """The manifest that is lost or damaged, written anew where the parts are of this study. Raises SweepError."""
     study = task.study
-    spec = restored(store.folder, store.columns, study.to_json(), task.mark, granules(study).count)
-    if spec is not None:
-        store.write(spec)
+    manifest = restored(store.folder, store.columns, study.to_json(), task.mark, granules(study).count)
+    if manifest is not None:
+        store.write(manifest)
         Progress(1, task.stream, store.folder.name).note("its spec.json was lost or damaged; it is written anew")
-    return spec
+    return manifest
 
 
-def _take_up(store: Store, spec: Spec | None, task: _Task) -> None:
+def _take_up(store: Store, manifest: Manifest | None, task: _Task) -> None:
     """Continues what an earlier run left. Raises SweepError where that was another study, unless forced."""
-    if spec is not None and dict(spec.fingerprint) == dict(task.mark):
-        store.resume(spec)
-    elif spec is None and store.orphans() and not task.force:
+    if manifest is not None and dict(manifest.fingerprint) == dict(task.mark):
+        store.resume(manifest)
+    elif manifest is None and store.orphans() and not task.force:
         raise SweepError(
             f"{store.folder}: {store.orphans()} finished blocks, but no spec.json that says of which study; "
             "put it back, or give the blocks up with --force"
         )
-    elif spec is None or task.force:
+    elif manifest is None or task.force:
         store.clear()
     else:
         raise SweepError(
             f"{store.folder}: unfinished parts of another study or version; finish that one first, choose another "
-            "name, or give its parts up with --force\n" + _listed(spec.fingerprint, task.mark)
+            "name, or give its parts up with --force\n" + _listed(manifest.fingerprint, task.mark)
         )
 
 
-def _tidy(store: Store, spec: Spec | None, task: _Task) -> None:
+def _tidy(store: Store, manifest: Manifest | None, task: _Task) -> None:
     """Removes parts that were left over although their output is complete; not those of another study."""
-    if spec is None or dict(spec.fingerprint) == dict(task.mark):
+    if manifest is None or dict(manifest.fingerprint) == dict(task.mark):
         store.clear()
 
 
@@ -334,8 +334,8 @@ def _finish(session: Session, store: Store, output: Path, progress: Progress, en
     """Computes what is missing and puts the result together, again where a part turns out to be damaged."""
     for _ in range(MOST_ATTEMPTS):
         _store_blocks(session, store, progress, ending)
-        assert store.spec is not None
-        layout = session.dated(progress, store.spec.begun)
+        assert store.manifest is not None
+        layout = session.dated(progress, store.manifest.begun)
 
         def tell(done: int, total: int) -> None:
             progress.gather(done, total)
@@ -386,8 +386,8 @@ def _store_elsewhere(session: Session, store: Store, jobs: Sequence[int], progre
         else:
             store.put(job, found)
 
-    session.compute_elsewhere(receive, progress, store.open_door())
-    store.close_doors()
+    session.compute_elsewhere(receive, progress, store.open_shared())
+    store.close_shared()
 
 
 def _check_space(session: Session, output: Path, progress: Progress) -> None:

@@ -183,4 +183,4 @@ def _store(assignment: Assignment, columns: Any) -> Store | None:
         return None
     if not same or not os.access(door, os.W_OK) or not os.access(door.parent, os.W_OK):
         return None
-    return Store.through(door, columns, assignment.mark, assignment.blocks)
+    return Store.sharing(door, columns, assignment.mark, assignment.blocks)

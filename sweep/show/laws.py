@@ -103,7 +103,7 @@ def laws(
 
 def _remark(dataset: xr.Dataset, y: str) -> str:
     """Cells that are not OK, by status; those with a value are in the fit."""
-    from sweep.results.export import flag_words
+    from sweep.results.statuses import flag_words
 
     if STATUS not in dataset or dataset[y].dims != dataset[STATUS].dims:
         return ""

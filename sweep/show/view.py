@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from sweep.results.export import flag_words
+from sweep.results.statuses import flag_words
 from sweep.system.errors import SweepError
 
 GREEK = frozenset(

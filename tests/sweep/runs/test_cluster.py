@@ -65,7 +65,7 @@ def stones(kind, count=41):
 @pytest.mark.parametrize("place", ["memory", "shared folder", "no shared folder"])
 def test_the_same_bits_wherever_the_cells_are_computed(client, output, monkeypatch, kind, place):
     if place == "no shared folder":
-        monkeypatch.setattr(clusters, "show_key", lambda door, key: None)
+        monkeypatch.setattr(clusters, "write_token", lambda shared, token: None)
     sent = []
     monkeypatch.setattr(
         clusters._Errand,
@@ -82,7 +82,7 @@ def test_the_same_bits_wherever_the_cells_are_computed(client, output, monkeypat
 @pytest.mark.parametrize("shared", [True, False])
 def test_an_extension_sends_only_new_cells_out(client, output, monkeypatch, shared):
     if not shared:
-        monkeypatch.setattr(clusters, "show_key", lambda door, key: None)
+        monkeypatch.setattr(clusters, "write_token", lambda shared, token: None)
     more = toy_studies.build(axes={"height": np.sort(np.r_[np.arange(1.0, 21), np.arange(10.5, 40)])})
     few = toy_studies.build(axes={"height": np.arange(1.0, 21)})
     quiet(few, output).close()
@@ -160,7 +160,7 @@ def soon():
 @pytest.mark.parametrize("shared", [True, False])
 def test_workers_killed_in_the_middle_cost_nothing_but_time(client, output, monkeypatch, shared):
     if not shared:
-        monkeypatch.setattr(clusters, "show_key", lambda door, key: None)
+        monkeypatch.setattr(clusters, "write_token", lambda shared, token: None)
     study = tall(400, "slow:SLOW")
     killer = threading.Thread(target=kill_a_worker, args=(client, output))
     killer.start()
@@ -215,13 +215,13 @@ def test_a_worker_that_comes_too_late_has_no_place_to_write(output):
     study = tall(30)
     with opened(output, sweep.cells.contents.part_columns(study)) as store:
         store.begin(study.to_json(), {}, sweep.cells.partition.Partition(30, 10))
-        door = store.open_door()
-        clusters.show_key(door, "key")
-        late = store.through(door, store.columns, {}, store.blocks)
+        shared = store.open_shared()
+        clusters.write_token(shared, "token")
+        late = store.sharing(shared, store.columns, {}, store.blocks)
         arrays = {c.name: c.empty(10) for c in store.columns}
         late.put(0, arrays)
         store.take(0, late.names[0])
-        store.close_doors()
+        store.close_shared()
         with pytest.raises(SweepError, match="cannot be written"):
             late.put(1, arrays)
         assert len(names(output)) == 1
