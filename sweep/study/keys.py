@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kernels import catalogue
 from kernels.interface import Field, Kernel
-from sweep.study.kernels import load_kernel
+from sweep.study.kernel_lookup import load_kernel
 from sweep.study.mistakes import Mistakes, did_you_mean, limits, listed, show
 from sweep.study.model import AUTO, Axis, Study, differs, frozen
 from sweep.study.summary import SummaryEntry

@@ -193,7 +193,7 @@ class Study:
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise SweepError(f"not the JSON of a study: {type(error).__name__} {error}") from None
         if not declared:
-            from sweep.study.kernels import load_kernel
+            from sweep.study.kernel_lookup import load_kernel
 
             kernel = load_kernel(known["kernel_name"], allow_import)
         return cls(kernel=kernel, **known)
