@@ -22,8 +22,8 @@ import numpy as np
 from engine import kernel_seconds
 
 import sweep
-from sweep.cells.contents import part_columns
 from sweep.cells.fingerprint import fingerprint
+from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import Partition
 from sweep.cells.solve import Solver
 from sweep.results.statuses import account

@@ -26,7 +26,7 @@ OURS = ("kernels",)
 ENGINE = ("sweep.cells.solve", "sweep.cells.grid")
 """Modules of the engine that decide values: the method of each cell, and its parameters."""
 
-REDUCING = ("sweep.cells.row_blocks", "sweep.cells.reduce", "sweep.cells.contents")
+REDUCING = ("sweep.cells.partition", "sweep.cells.reduce", "sweep.cells.output_schema")
 """Those that decide the values of a summary."""
 
 SOURCE = "source "

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.interface import Status
-from sweep.cells.row_blocks import granules
+from sweep.cells.partition import row_blocks
 from sweep.cells.schema import Column
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ _NUMBERS[[int(s) for s in Status]] = np.arange(len(Status))
 
 
 def row_columns(study: Study) -> tuple[Column, ...]:
-    """The columns of a part of a study with a summary: what is known of each granule."""
+    """The columns of a part of a study with a summary: what is known of each row block."""
     assert study.summary is not None
     found = [_column(BY_STATUS, "i8", len(STATUSES)), _column(BY_METHOD, "i8", len(study.kernel.methods) + 1)]
     for field in study.asked:
@@ -76,7 +76,7 @@ def cleared(rows: Mapping[str, Any]) -> None:
 def pending(study: Study, start: int, stop: int) -> Rows:
     """The rows `start` to `stop`, not computed yet."""
     rows = nothing(study, stop - start)
-    first = granules(study).first(np.arange(start, stop + 1, dtype=np.int64))
+    first = row_blocks(study).first(np.arange(start, stop + 1, dtype=np.int64))
     rows[BY_STATUS][:, STATUSES.index(Status.PENDING.name)] = np.diff(first)
     return rows
 
@@ -108,7 +108,7 @@ def _take_extreme(into: Rows, other: Mapping[str, Any], name: str, end: str) -> 
 
 
 class Reducer:
-    """Solves granules and reduces each to a row, for one thread at a time.
+    """Solves row blocks and reduces each to a row, for one thread at a time.
 
     Parameters
     ----------
@@ -120,17 +120,17 @@ class Reducer:
         from sweep.cells.solve import Solver
 
         assert study.summary is not None
-        self.study, self.granules, self.solver = study, granules(study), Solver(study)
+        self.study, self.row_blocks, self.solver = study, row_blocks(study), Solver(study)
         shapes = _shapes(study)
         self.room = _room(study)
-        room = min(self.room, self.granules.size)
+        room = min(self.room, self.row_blocks.size)
         self._outputs = {name: np.empty((room, *shape)) for name, shape in shapes.items()}
         self._status, self._used = np.empty(room, np.int8), np.empty(room, np.int8)
 
     def solve(self, start: int, stop: int, rows: Mapping[str, Any]) -> None:
         """Fill `rows` with the rows `start` to `stop`."""
         cleared(rows)
-        for row, count, cell, cells in self.granules.strips(start, stop, self.room):
+        for row, count, cell, cells in self.row_blocks.strips(start, stop, self.room):
             n = count * cells
             outputs = {name: column[:n] for name, column in self._outputs.items()}
             status, used = self._status[:n], self._used[:n]
@@ -139,8 +139,8 @@ class Reducer:
             merge({name: column[row - start : row - start + count] for name, column in rows.items()}, found)
 
     def seconds(self) -> float:
-        """What reducing a cell takes, tried on as many whole granules as a strip has room for, or on as much of one."""
-        cells = min(self.granules.length, len(self._status))
+        """What reducing a cell takes, tried on as many whole row blocks as a strip holds, or on as much of one."""
+        cells = min(self.row_blocks.length, len(self._status))
         rows = len(self._status) // cells
         outputs = {name: column[: rows * cells] for name, column in self._outputs.items()}
         for column in outputs.values():

@@ -63,7 +63,7 @@ class Coordinate:
 
 
 @dataclass(frozen=True)
-class Layout:
+class Schema:
     """Everything of a result except its numbers."""
 
     grid: Box
@@ -88,9 +88,9 @@ class Layout:
         return (*self.grid.shape, *column.shape)
 
 
-def layout(study: Study, fingerprint: Mapping[str, str]) -> Layout:
-    """The layout of a study's result."""
-    return Layout(Grid(study), columns(study), coordinates(study), attributes(study, fingerprint))
+def cell_schema(study: Study, fingerprint: Mapping[str, str]) -> Schema:
+    """The schema of a result of cells."""
+    return Schema(Grid(study), columns(study), coordinates(study), attributes(study, fingerprint))
 
 
 def columns(study: Study) -> tuple[Column, ...]:

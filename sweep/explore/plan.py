@@ -17,16 +17,16 @@ import numpy as np
 
 from kernels.interface import Status, machine_code_folder
 from sweep.cells.compiling import Compiling
-from sweep.cells.contents import contents, part_columns
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.grid import Grid
-from sweep.cells.partition import Partition, Sample, row_partition
+from sweep.cells.output_schema import output_schema, part_columns
+from sweep.cells.partition import Partition, row_blocks
 from sweep.cells.reduce import strip_bytes
-from sweep.cells.row_blocks import granules
 from sweep.cells.schema import Column
+from sweep.cells.timing import Sample, row_partition
 from sweep.explore.calibration import rehearsed
 from sweep.results.open import memory
-from sweep.runs.session import faults_told, sampled_study
+from sweep.runs.session import faults_reported, sampled_study
 from sweep.store.assemble import chunks, write_structure
 from sweep.store.digests import Digests
 from sweep.store.hdf5_bytes import Hdf5Bytes, PartBytes
@@ -164,27 +164,27 @@ def plan(
         raise SweepError(f"{path}: there is no folder {folder}")
     compiling = Compiling(study.kernel, study.kernel_name, note)
     sample = sampled_study(study, compiling)
-    with faults_told(f"{study.kernel_name}: the kernel failed"):
+    with faults_reported(f"{study.kernel_name}: the kernel failed"):
         advice = scaling(study).advice
     forecast = _forecast(study, sample, crew, folder)
     return replace(forecast, compile_seconds=sum(compiling.seconds.values()), scaling=advice)
 
 
 def _forecast(study: Study, sample: Sample, workers: int, folder: Path) -> Plan:
-    grains, columns = granules(study), part_columns(study)
+    rows, columns = row_blocks(study), part_columns(study)
     row_bytes = sum(c.cell_bytes for c in columns)
-    blocks = row_partition(sample, grains, row_bytes, workers)
+    blocks = row_partition(sample, rows, row_bytes, workers)
     parts = _part_bytes(columns, blocks)
     output, frame = _output_bytes(study, sample, blocks)
     names = [m.name for m in study.kernel.methods]
     return Plan(
         title=study.title,
         kernel=study.kernel_name,
-        cells=grains.size,
+        cells=rows.size,
         shape=dict(zip((grid := Grid(study)).dims, grid.shape, strict=True)),
         outputs=study.outputs,
         blocks=blocks.count,
-        cells_per_block=grains.cells(0, blocks.cells)[1],
+        cells_per_block=rows.cells(0, blocks.cells)[1],
         workers=workers,
         part_bytes=parts,
         output_bytes=output,
@@ -202,8 +202,8 @@ def _seconds(
     study: Study, sample: Sample, blocks: Partition, parts: int, output: int, workers: int, folder: Path
 ) -> float:
     """What a run takes, of some of the cells in earnest; or, where that cannot be, from the probes alone."""
-    grains = granules(study)
-    cells, block = grains.size, grains.cells(0, blocks.cells)[1]
+    rows = row_blocks(study)
+    cells, block = rows.size, rows.cells(0, blocks.cells)[1]
     found = rehearsed(study, cells, block, sample.cost, (parts + output) / cells, folder, workers)
     if not math.isnan(found):
         return found
@@ -221,7 +221,7 @@ def _part_bytes(columns: tuple[Column, ...], blocks: Partition) -> int:
 
 def _output_bytes(study: Study, sample: Sample, blocks: Partition) -> tuple[int, int]:
     """The output, and all of it but the outputs' numbers; its frame is made for this, in memory."""
-    content, hdf5 = contents(study, fingerprint(study)), Hdf5Bytes()
+    content, hdf5 = output_schema(study, fingerprint(study)), Hdf5Bytes()
     write_structure(hdf5, content, Digests(content.columns, chunks(study, blocks)))
     numbers = sum(c.cell_bytes for c in content.columns if c.name not in FLAGS) * content.grid.size
     flags = sum(c.name in FLAGS for c in content.columns) * content.grid.size

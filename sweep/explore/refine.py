@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.analysis.loglog import Array, is_logarithmic
-from sweep.cells.schema import ANCILLARY, STATUS, layout
+from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
 from sweep.study.model import Axis, Study, frozen
 from sweep.system.errors import SweepError
 
@@ -323,7 +323,9 @@ class _Refiner:
         columns = [*self.study.outputs, *ANCILLARY]
         arrays = {name: np.concatenate([part[name].values for part in parts])[rows] for name in columns}
         dataset = (
-            store_cells(whole, self.path, arrays, self.force) if self.path else in_memory(layout(whole, {}), arrays)
+            store_cells(whole, self.path, arrays, self.force)
+            if self.path
+            else in_memory(cell_schema(whole, {}), arrays)
         )
         finest = [(len(values) - 1) * 2**self.deepest + 1 for values in self.axes]
         uniform = int(np.prod([float(n) for n in finest]))

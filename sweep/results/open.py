@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.cells.contents import contents, gathered, part_columns
+from sweep.cells.output_schema import gathered, output_schema, part_columns
+from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import BY_STATUS, pending
-from sweep.cells.row_blocks import granules
-from sweep.cells.schema import STATUS, Layout
+from sweep.cells.schema import STATUS, Schema
 from sweep.results.statuses import StatusCount, count_methods, count_statuses, failures
 from sweep.store.digests import BESIDE, unbroken
 from sweep.store.hdf5_bytes import PartBytes
@@ -88,7 +88,7 @@ def open_unfinished(path: str | os.PathLike[str]) -> xr.Dataset:
     return _open_parts(output, manifest, False)
 
 
-def in_memory(plan: Layout, arrays: Mapping[str, Any]) -> xr.Dataset:
+def in_memory(plan: Schema, arrays: Mapping[str, Any]) -> xr.Dataset:
     """A Dataset of columns of shape `(size, ...)`."""
     import xarray as xr
 
@@ -195,7 +195,7 @@ def _open_parts(output: Path, manifest: Manifest, strict: bool) -> xr.Dataset:
             f"{output}: unfinished, {left} of {manifest.blocks.count} blocks are missing; run its sweep again to "
             "continue"
         )
-    plan = contents(study, manifest.fingerprint)
+    plan = output_schema(study, manifest.fingerprint)
     plan = replace(plan, attrs={**plan.attrs, "start": manifest.begun})
     if study.summary is not None:
         return in_memory(plan, gathered(study, _read_all(parts, pending(study, 0, manifest.blocks.size))))
@@ -209,8 +209,8 @@ def checked_study(folder: Path, manifest: Manifest) -> Study:
     """The study of an unfinished sweep. Raises SweepError where its grid is not the one that was cut."""
     study = Study.from_json(manifest.study, declared=True)
     try:
-        rows = granules(study).count
-        contents(study, manifest.fingerprint)
+        rows = row_blocks(study).count
+        output_schema(study, manifest.fingerprint)
     except (LookupError, ValueError, TypeError, AttributeError, ArithmeticError) as fault:
         raise SweepError(f"{folder / MANIFEST}: damaged (its study cannot be: {fault})") from None
     if manifest.blocks.size != rows or not 1 <= manifest.blocks.cells <= rows:
@@ -245,7 +245,7 @@ def _read_all(parts: Parts, rows: dict[str, Any]) -> dict[str, Any]:
     return rows
 
 
-def _lazily(plan: Layout, parts: Parts) -> xr.Dataset:
+def _lazily(plan: Schema, parts: Parts) -> xr.Dataset:
     """A Dataset that reads parts when their numbers are used."""
     import xarray as xr
 

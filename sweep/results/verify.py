@@ -12,9 +12,8 @@ from typing import Any
 
 import xxhash
 
-from sweep.cells.contents import part_columns
-from sweep.cells.partition import Partition
-from sweep.cells.row_blocks import granules
+from sweep.cells.output_schema import part_columns
+from sweep.cells.partition import Partition, row_blocks
 from sweep.results.open import checked_study, unreadable
 from sweep.store.digests import (
     BESIDE,
@@ -198,8 +197,8 @@ def _parts(output: Path, folder: Path, manifest: Manifest) -> Verdict:
     every = [name for several in names.values() for name in several]
     with ThreadPoolExecutor(READERS) as pool:
         good = dict(zip(every, pool.map(sound, every), strict=True))
-    grains = granules(study)
-    missing = (grains.cells(*manifest.blocks.bounds(i)) for i in range(manifest.blocks.count) if i not in names)
+    rows = row_blocks(study)
+    missing = (rows.cells(*manifest.blocks.bounds(i)) for i in range(manifest.blocks.count) if i not in names)
     findings = [
         *_lines("damaged", (name for name, fine in good.items() if not fine)),
         *_lines("twice there", (name for several in names.values() if len(several) > 1 for name in several)),

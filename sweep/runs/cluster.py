@@ -31,7 +31,7 @@ from sweep.store.parts import digest
 from sweep.system import disk
 from sweep.system.errors import SweepError
 from sweep.system.pool import TICK, CtrlC, through
-from sweep.system.until import passed
+from sweep.system.progress import passed
 
 if TYPE_CHECKING:
     from sweep.runs.session import Receive, Session
@@ -196,7 +196,7 @@ class _Errand:
     def run(self, jobs: Iterator[int]) -> None:
         """Raises SweepError."""
         with CtrlC() as ctrl_c:
-            self._submit(self._batches(jobs), self._room, self._suspect, ctrl_c)
+            self._submit(self._batches(jobs), self._capacity, self._suspect, ctrl_c)
             for _ in range(MOST_ROUNDS):
                 # nothing else is under way now, so what kills its worker is found out for certain
                 suspects, self._suspects = [(job,) for job in self._suspects], []
@@ -206,7 +206,7 @@ class _Errand:
             raise SweepError(self._obituary())
 
     def _submit(
-        self, batches: Iterator[Batch], room: Callable[[], int], killed: Callable[[Batch], None], ctrl_c: CtrlC
+        self, batches: Iterator[Batch], capacity: Callable[[], int], killed: Callable[[Batch], None], ctrl_c: CtrlC
     ) -> None:
         executor = self._cluster.executor()
 
@@ -221,7 +221,7 @@ class _Errand:
                 self._look_for_workers()
                 self._finished(None)
 
-        through(batches, submit, room, settled, lambda: self._cluster.cancel(executor), ctrl_c)
+        through(batches, submit, capacity, settled, lambda: self._cluster.cancel(executor), ctrl_c)
 
     def _batches(self, jobs: Iterator[int]) -> Iterator[Batch]:
         """As many blocks together as take about half a second; fewer towards the end."""
@@ -230,12 +230,12 @@ class _Errand:
             enough = int(TASK_SECONDS / max(self._seconds, TASK_SECONDS / 1000))
             share = left // (2 * max(1, self._cluster.threads))
             size = max(1, min(enough, share, self._most))
-            batch = [job for job in islice(jobs, size) if not self._known(job)]
+            batch = [job for job in islice(jobs, size) if not self._reused(job)]
             left -= size
             if batch:
                 yield tuple(batch)
 
-    def _room(self) -> int:
+    def _capacity(self) -> int:
         return 2 + 2 * self._cluster.threads
 
     def _take(self, batch: Batch, future: Future[Answer], killed: Callable[[Batch], None]) -> None:
@@ -279,16 +279,16 @@ class _Errand:
 
     def _mask(self, job: int) -> bytes | None:
         """Of a block that is known in part: which of its cells are not, a bit each."""
-        known = self._session.known
-        return None if known is None else np.packbits(known.missing(*self._session.blocks.bounds(job))).tobytes()
+        reused = self._session.reused
+        return None if reused is None else np.packbits(reused.missing(*self._session.blocks.bounds(job))).tobytes()
 
-    def _known(self, job: int) -> bool:
+    def _reused(self, job: int) -> bool:
         """Whether nothing of a block has to be computed; then it is received at once."""
-        known, bounds = self._session.known, self._session.blocks.bounds(job)
-        if known is None or known.missing(*bounds).any():
+        reused, bounds = self._session.reused, self._session.blocks.bounds(job)
+        if reused is None or reused.missing(*bounds).any():
             return False
         arrays = {c.name: c.empty(bounds[1] - bounds[0]) for c in self._session.columns}
-        known.fill(*bounds, arrays)
+        reused.fill(*bounds, arrays)
         self._receive(job, arrays)
         self._finished(job)
         return True
@@ -302,9 +302,9 @@ class _Errand:
         )
         if not fits or digest(columns, arrays) != sent.digest:
             raise SweepError(f"cells {_range(self._session.cells(job))}: damaged on their way from the worker")
-        if self._session.known is not None:
+        if self._session.reused is not None:
             arrays = {name: column if column.flags.writeable else column.copy() for name, column in arrays.items()}
-            self._session.known.fill(start, stop, arrays)
+            self._session.reused.fill(start, stop, arrays)
         return arrays
 
 
@@ -319,12 +319,12 @@ def write_token(door: Path, key: str) -> None:
 def _assignment(session: Session, door: Path | None) -> Assignment:
     key = secrets.token_hex(16)
     # what is known already is filled in here
-    by_folder = door is not None and session.known is None
+    by_folder = door is not None and session.reused is None
     if door is not None and by_folder:
         write_token(door, key)
-    mark, study = session.mark, session.study
+    fingerprint, study = session.fingerprint, session.study
     place = str(door) if by_folder else ""
-    return Assignment(f"foliot-{key[:8]}", study.to_json(), mark, session.blocks, place, key, _paths(study))
+    return Assignment(f"foliot-{key[:8]}", study.to_json(), fingerprint, session.blocks, place, key, _paths(study))
 
 
 def _paths(study: Study) -> tuple[str, ...]:

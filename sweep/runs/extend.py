@@ -32,7 +32,7 @@ def obstacle(old: Mapping[str, str], new: Mapping[str, str]) -> str:
     return "" if changed else "nothing differs but words"
 
 
-class Known:
+class Reused:
     """The cells of a finished result, in the grid of an extended study. To be used in a `with` statement.
 
     Parameters
@@ -60,7 +60,7 @@ class Known:
             raise unreadable(output, fault) from None
         self._positions = [_positions(old.axes[name], axis) for name, axis in study.axes.items()]
 
-    def __enter__(self) -> Known:
+    def __enter__(self) -> Reused:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, fault: BaseException | None, at: TracebackType | None) -> None:
@@ -102,18 +102,18 @@ class Known:
                 yield slices, known, begin, end
 
 
-class Given:
-    """All cells of a study, solved before: what `Known` is, without a file to look them up in.
+class Precomputed:
+    """All cells of a study, solved before: what `Reused` is, without a file to look them up in.
 
     Parameters
     ----------
-    arrays : mapping of outputs and of `layout.ANCILLARY` to ndarray, shape (cells, ...)
+    arrays : mapping of outputs and of `schema.ANCILLARY` to ndarray, shape (cells, ...)
     """
 
     def __init__(self, arrays: Mapping[str, Any]) -> None:
         self._arrays = arrays
 
-    def __enter__(self) -> Given:
+    def __enter__(self) -> Precomputed:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, fault: BaseException | None, at: TracebackType | None) -> None:

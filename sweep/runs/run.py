@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
-from sweep.cells.contents import gathered, part_columns
 from sweep.cells.fingerprint import difference, fingerprint
-from sweep.cells.row_blocks import granules
+from sweep.cells.output_schema import gathered, part_columns
+from sweep.cells.partition import row_blocks
 from sweep.results.open import checked_study, in_memory, memory, open_result, open_unfinished, stored_fingerprint
 from sweep.runs.cluster import Cluster, joined
-from sweep.runs.extend import Given, Known, obstacle
+from sweep.runs.extend import Precomputed, Reused, obstacle
 from sweep.runs.session import Session, Solve
 from sweep.store.assemble import assemble
 from sweep.store.manifest import Manifest, read_manifest, restored
@@ -27,9 +27,8 @@ from sweep.store.store import Store, folder_of, opened
 from sweep.study.read import as_study
 from sweep.system.errors import SweepError
 from sweep.system.forecast import Ending
-from sweep.system.pool import CtrlC, Spares, Terminated, cores, whole_number
-from sweep.system.progress import Progress, quantity, stream_of
-from sweep.system.until import TimeUp, deadline
+from sweep.system.pool import BufferPool, CtrlC, Terminated, cores, whole_number
+from sweep.system.progress import Progress, TimeUp, deadline, quantity, stream_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -107,14 +106,14 @@ def store_cells(
 
     Parameters
     ----------
-    arrays : mapping of outputs and of `layout.ANCILLARY` to ndarray, shape (cells, ...)
+    arrays : mapping of outputs and of `schema.ANCILLARY` to ndarray, shape (cells, ...)
 
     Raises
     ------
     SweepError
         As `run`.
     """
-    task = _Task(study, fingerprint(study), 1, None, None, force, False, None, Given(arrays))
+    task = _Task(study, fingerprint(study), 1, None, None, force, False, None, Precomputed(arrays))
     output = _checked_output(path)
     if not _done(task, output):
         _run_to_file(task, output)
@@ -124,14 +123,14 @@ def store_cells(
 @dataclass(frozen=True)
 class _Task:
     study: Study
-    mark: Mapping[str, str]
+    fingerprint: Mapping[str, str]
     workers: int
     stream: TextIO | None
     block_cells: int | None
     force: bool
     extend: bool
     until: datetime | None
-    given: Given | None = None
+    precomputed: Precomputed | None = None
     cluster: Any = None
 
 
@@ -173,8 +172,10 @@ def _wait(cluster: Cluster | None, task: _Task, name: str) -> None:
 
 def _compute_in_memory(task: _Task, cluster: Cluster | None) -> xr.Dataset:
     note = Progress(1, task.stream, task.study.title or "sweep").note
-    session = Session(task.study, task.mark, task.workers, block_cells=task.block_cells, cluster=cluster, note=note)
-    rows = session.granules.count
+    session = Session(
+        task.study, task.fingerprint, task.workers, block_cells=task.block_cells, cluster=cluster, note=note
+    )
+    rows = session.row_blocks.count
     needed = rows * session.row_bytes
     if needed > memory():
         raise SweepError(f"the result takes {needed / 1e9:.1f} GB, more than the memory; give a path to store it")
@@ -215,17 +216,17 @@ def _run_to_file(task: _Task, output: Path) -> bool:
         _take_up(store, manifest, task)
         blocks = None if store.manifest is None else store.blocks
         all_there = store.manifest is not None and not store.missing()
-        known = None if all_there else _known(task, output)
-        with known or contextlib.nullcontext(), joined(None if all_there else task.cluster) as cluster:
+        reused = None if all_there else _reused(task, output)
+        with reused or contextlib.nullcontext(), joined(None if all_there else task.cluster) as cluster:
             _wait(cluster, task, output.name)
             session = Session(
                 task.study,
-                task.mark,
+                task.fingerprint,
                 task.workers,
                 blocks,
                 task.block_cells,
                 not all_there,
-                known,
+                reused,
                 task.until,
                 cluster,
                 Progress(1, task.stream, output.name).note,
@@ -236,13 +237,13 @@ def _run_to_file(task: _Task, output: Path) -> bool:
 def _run_session(task: _Task, session: Session, store: Store, output: Path) -> bool:
     """Computes and puts together what is missing; False where the time was up before the end."""
     jobs = range(session.blocks.count) if store.manifest is None else store.missing()
-    ending = Ending(session.blocks.count, task.workers, session.granules.count * session.row_bytes)
+    ending = Ending(session.blocks.count, task.workers, session.row_blocks.count * session.row_bytes)
     progress = session.progress(task.stream, output.name, jobs, ending.seconds)
     _check_space(session, output, progress)
     # held back wherever they would leave half a file behind
     with CtrlC():
         if store.manifest is None:
-            store.begin(task.study.to_json(), task.mark, session.blocks)
+            store.begin(task.study.to_json(), task.fingerprint, session.blocks)
         try:
             _finish(session, store, output, progress, ending)
         except (KeyboardInterrupt, Terminated):
@@ -262,14 +263,14 @@ def _kept(store: Store) -> str:
     return f"{kept}, run the same command again to continue"
 
 
-def _known(task: _Task, output: Path) -> Known | Given | None:
+def _reused(task: _Task, output: Path) -> Reused | Precomputed | None:
     """The cells of the result that is extended. Raises SweepError where that is not possible."""
-    if task.given is not None:
-        return task.given
+    if task.precomputed is not None:
+        return task.precomputed
     if not task.extend or task.force or not output.exists():
         return None
     _check_whole(output)
-    return Known(output, task.study)
+    return Reused(output, task.study)
 
 
 def _check_whole(output: Path) -> None:
@@ -299,7 +300,7 @@ def _manifest(store: Store, task: _Task) -> Manifest | None:
 def _restored(store: Store, task: _Task) -> Manifest | None:
     """The manifest that is lost or damaged, written anew where the parts are of this study. Raises SweepError."""
     study = task.study
-    manifest = restored(store.folder, store.columns, study.to_json(), task.mark, granules(study).count)
+    manifest = restored(store.folder, store.columns, study.to_json(), task.fingerprint, row_blocks(study).count)
     if manifest is not None:
         store.write(manifest)
         Progress(1, task.stream, store.folder.name).note("its spec.json was lost or damaged; it is written anew")
@@ -308,7 +309,7 @@ def _restored(store: Store, task: _Task) -> Manifest | None:
 
 def _take_up(store: Store, manifest: Manifest | None, task: _Task) -> None:
     """Continues what an earlier run left. Raises SweepError where that was another study, unless forced."""
-    if manifest is not None and dict(manifest.fingerprint) == dict(task.mark):
+    if manifest is not None and dict(manifest.fingerprint) == dict(task.fingerprint):
         store.resume(manifest)
     elif manifest is None and store.orphans() and not task.force:
         raise SweepError(
@@ -320,13 +321,13 @@ def _take_up(store: Store, manifest: Manifest | None, task: _Task) -> None:
     else:
         raise SweepError(
             f"{store.folder}: unfinished parts of another study or version; finish that one first, choose another "
-            "name, or give its parts up with --force\n" + _listed(manifest.fingerprint, task.mark)
+            "name, or give its parts up with --force\n" + _listed(manifest.fingerprint, task.fingerprint)
         )
 
 
 def _tidy(store: Store, manifest: Manifest | None, task: _Task) -> None:
     """Removes parts that were left over although their output is complete; not those of another study."""
-    if manifest is None or dict(manifest.fingerprint) == dict(task.mark):
+    if manifest is None or dict(manifest.fingerprint) == dict(task.fingerprint):
         store.clear()
 
 
@@ -335,13 +336,13 @@ def _finish(session: Session, store: Store, output: Path, progress: Progress, en
     for _ in range(MOST_ATTEMPTS):
         _store_blocks(session, store, progress, ending)
         assert store.manifest is not None
-        layout = session.dated(progress, store.manifest.begun)
+        schema = session.dated(progress, store.manifest.begun)
 
         def tell(done: int, total: int) -> None:
             progress.gather(done, total)
             session.check_time()
 
-        damaged = assemble(store, session.study, layout, output, session.workers, tell)
+        damaged = assemble(store, session.study, schema, output, session.workers, tell)
         if not damaged:
             progress.end()
             return
@@ -363,11 +364,11 @@ def _store_blocks(session: Session, store: Store, progress: Progress, ending: En
     # twice as many threads as cores: some wait for the disk while the others compute
     threads = min(2 * session.workers, len(jobs))
     cells = min(store.blocks.cells, store.blocks.size)
-    buffers = Spares(lambda: {c.name: c.empty(cells) for c in store.columns}, threads)
+    buffers = BufferPool(lambda: {c.name: c.empty(cells) for c in store.columns}, threads)
 
     def work(job: int, solve: Solve) -> None:
         start, stop = store.blocks.bounds(job)
-        with buffers.lent() as columns:
+        with buffers.borrow() as columns:
             arrays = {name: column[: stop - start] for name, column in columns.items()}
             if solve(start, stop, arrays):
                 begun = time.monotonic()
@@ -392,12 +393,12 @@ def _store_elsewhere(session: Session, store: Store, jobs: Sequence[int], progre
 
 def _check_space(session: Session, output: Path, progress: Progress) -> None:
     """Raises SweepError where the parts to come and the output have no room on the disk."""
-    missing = session.row_bytes * (progress.total - progress.done) / session.granules.mean
-    layout = session.layout
-    coordinates = sum(np.asarray(coordinate.values).nbytes for coordinate in layout.coordinates)
+    missing = session.row_bytes * (progress.total - progress.done) / session.row_blocks.mean
+    schema = session.schema
+    coordinates = sum(np.asarray(coordinate.values).nbytes for coordinate in schema.coordinates)
     # the study is in the parts' spec.json, too
-    words = 2 * sum(len(str(text).encode()) for text in layout.attrs.values())
-    needed = missing + layout.cell_bytes * layout.grid.size + coordinates + words
+    words = 2 * sum(len(str(text).encode()) for text in schema.attrs.values())
+    needed = missing + schema.cell_bytes * schema.grid.size + coordinates + words
     free = shutil.disk_usage(output.parent).free
     if needed > free:
         raise SweepError(
@@ -413,18 +414,18 @@ def _done(task: _Task, output: Path) -> bool:
     stored = stored_fingerprint(output)
     if task.force:
         return False
-    if stored == dict(task.mark):
+    if stored == dict(task.fingerprint):
         _check_whole(output)
         return True
-    hindrance = obstacle(stored, task.mark)
+    hindrance = obstacle(stored, task.fingerprint)
     if task.extend and not hindrance:
         return False
     cure = "choose another name, or overwrite it with --force"
     if task.extend:
-        raise SweepError(f"{output}: cannot be extended, for {hindrance}; {cure}\n" + _listed(stored, task.mark))
+        raise SweepError(f"{output}: cannot be extended, for {hindrance}; {cure}\n" + _listed(stored, task.fingerprint))
     more = "" if hindrance else "; where its axes have only got more values, --extend computes the new cells alone"
     raise SweepError(
-        f"{output}: holds the result of another study or version; {cure}{more}\n" + _listed(stored, task.mark)
+        f"{output}: holds the result of another study or version; {cure}{more}\n" + _listed(stored, task.fingerprint)
     )
 
 

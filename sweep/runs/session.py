@@ -1,4 +1,4 @@
-"""One run of a study: its layout, how it is cut into blocks, and the threads that compute them."""
+"""One run of a study: its schema, how it is cut into blocks, and the threads that compute them."""
 
 from __future__ import annotations
 
@@ -11,20 +11,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from sweep.cells.compiling import Compiling
-from sweep.cells.contents import contents, part_columns
-from sweep.cells.partition import UNSAMPLED, Partition, Sample, row_partition, take_sample
+from sweep.cells.output_schema import output_schema, part_columns
+from sweep.cells.partition import Partition, row_blocks
 from sweep.cells.reduce import Reducer
-from sweep.cells.row_blocks import granules
-from sweep.cells.schema import ANCILLARY, ERROR_BOUND, METHOD_USED, STATUS, Layout, columns
+from sweep.cells.schema import ANCILLARY, ERROR_BOUND, METHOD_USED, STATUS, Schema, columns
+from sweep.cells.timing import UNSAMPLED, Sample, row_partition, take_sample
 from sweep.system.errors import SweepError
 from sweep.system.forecast import Forecast
-from sweep.system.pool import Halt, Spares, each
-from sweep.system.progress import Progress
-from sweep.system.until import TimeUp, passed
+from sweep.system.pool import BufferPool, Stopper, each
+from sweep.system.progress import Progress, TimeUp, passed
 
 if TYPE_CHECKING:
     from sweep.runs.cluster import Cluster
-    from sweep.runs.extend import Given, Known
+    from sweep.runs.extend import Precomputed, Reused
     from sweep.study.model import Study
 
 Solve = Callable[[int, int, Mapping[str, Any]], bool]
@@ -40,12 +39,12 @@ class Session:
     Parameters
     ----------
     study : Study
-    mark : fingerprint of the study
+    fingerprint : fingerprint of the study
     workers : cores to compute on
     blocks : how the grid is cut, where that is settled already
     block_cells : cells a block, instead of a size taken from the sample
     sampled : False where nothing is left to compute
-    known : cells that need not be computed
+    reused : cells that need not be computed
     until : when to stop
     cluster : workers elsewhere, which compute instead of this process
     note : tells what is compiled
@@ -54,28 +53,28 @@ class Session:
     def __init__(
         self,
         study: Study,
-        mark: Mapping[str, str],
+        fingerprint: Mapping[str, str],
         workers: int,
         blocks: Partition | None = None,
         block_cells: int | None = None,
         sampled: bool = True,
-        known: Known | Given | None = None,
+        reused: Reused | Precomputed | None = None,
         until: datetime | None = None,
         cluster: Cluster | None = None,
         note: Callable[[str], None] | None = None,
     ) -> None:
-        self.study, self.mark, self.workers, self.known, self.until = study, mark, workers, known, until
+        self.study, self.fingerprint, self.workers, self.reused, self.until = study, fingerprint, workers, reused, until
         self.cluster = cluster
         self.began = now()
-        self.layout: Layout = contents(study, mark)
+        self.schema: Schema = output_schema(study, fingerprint)
         self.columns = part_columns(study)
-        self.granules = grains = granules(study)
+        self.row_blocks = rows = row_blocks(study)
         compiling = Compiling(study.kernel, study.kernel_name, note)
         self.sample: Sample = sampled_study(study, compiling) if sampled else UNSAMPLED
         if blocks is None and block_cells is not None:
-            blocks = Partition(grains.count, min(math.ceil(block_cells / grains.mean), grains.count))
+            blocks = Partition(rows.count, min(math.ceil(block_cells / rows.mean), rows.count))
         crew = cluster.threads if cluster is not None else 0
-        self.blocks = blocks or row_partition(self.sample, grains, self.row_bytes, crew or workers)
+        self.blocks = blocks or row_partition(self.sample, rows, self.row_bytes, crew or workers)
         self.forecast = Forecast([], [])
 
     @property
@@ -85,7 +84,7 @@ class Session:
 
     def cells(self, job: int) -> tuple[int, int]:
         """The cells of a block."""
-        return self.granules.cells(*self.blocks.bounds(job))
+        return self.row_blocks.cells(*self.blocks.bounds(job))
 
     def progress(
         self, stream: TextIO | None, name: str, jobs: Sequence[int], ending: Callable[[], float] = float
@@ -96,9 +95,9 @@ class Session:
         ----------
         ending : tells the seconds needed when all cells are computed
         """
-        self.forecast = Forecast(self.sample.weights(self.blocks, self.granules.first), jobs)
+        self.forecast = Forecast(self.sample.weights(self.blocks, self.row_blocks.first), jobs)
         left = sum(stop - start for start, stop in map(self.cells, jobs))
-        return Progress(self.granules.size, stream, name, self.granules.size - left, self.forecast, ending=ending)
+        return Progress(self.row_blocks.size, stream, name, self.row_blocks.size - left, self.forecast, ending=ending)
 
     def again(self, job: int, progress: Progress) -> None:
         """A block has to be computed once more."""
@@ -106,11 +105,11 @@ class Session:
         self.forecast.again(job)
         progress.again(stop - start)
 
-    def dated(self, progress: Progress, began: str) -> Layout:
-        """The layout with the times of the run, which now is at its end."""
+    def dated(self, progress: Progress, began: str) -> Schema:
+        """The schema with the times of the run, which now is at its end."""
         end = now()
         times = {"created": end, "start": began, "end": end, "cells_per_second": progress.rate}
-        return replace(self.layout, attrs={**self.layout.attrs, **times})
+        return replace(self.schema, attrs={**self.schema.attrs, **times})
 
     def compute(self, threads: int, work: Callable[[int, Solve], None], progress: Progress) -> None:
         """Calls `work(job, solve)` for every block that is left, on a pool of threads.
@@ -118,16 +117,16 @@ class Session:
         No more than `workers` threads are inside `solve` at a time. Raises SweepError where `work` fails, TimeUp.
         """
         self.check_time()
-        halt = Halt(self.workers)
-        solvers = Spares(lambda: self._solver(halt), threads)
+        stopper = Stopper(self.workers)
+        solvers = BufferPool(lambda: self._solver(stopper), threads)
 
         def guarded(job: int) -> None:
             start, stop = self.cells(job)
-            with faults_told(f"cells {start} to {stop}: the kernel failed"), solvers.lent() as solve:
+            with faults_reported(f"cells {start} to {stop}: the kernel failed"), solvers.borrow() as solve:
                 work(job, solve)
             self.forecast.end(job)
 
-        each(self.forecast.order(), guarded, threads, lambda job: self._tell(progress, job), halt)
+        each(self.forecast.order(), guarded, threads, lambda job: self._tell(progress, job), stopper)
 
     def compute_elsewhere(
         self,
@@ -165,16 +164,16 @@ class Session:
         if passed(self.until):
             raise TimeUp
 
-    def _solver(self, halt: Halt) -> Solve:
-        compute, known = block_solver(self.study), self.known
+    def _solver(self, stopper: Stopper) -> Solve:
+        compute, reused = block_solver(self.study), self.reused
 
         def solve(start: int, stop: int, arrays: Mapping[str, Any]) -> None:
             self.forecast.begin(start // self.blocks.cells)
-            compute(start, stop, arrays, None if known is None else known.missing(start, stop))
-            if known is not None:
-                known.fill(start, stop, arrays)
+            compute(start, stop, arrays, None if reused is None else reused.missing(start, stop))
+            if reused is not None:
+                reused.fill(start, stop, arrays)
 
-        return lambda start, stop, arrays: halt.compute(lambda: solve(start, stop, arrays))
+        return lambda start, stop, arrays: stopper.compute(lambda: solve(start, stop, arrays))
 
 
 def block_solver(study: Study) -> Callable[[int, int, Mapping[str, Any], Any], None]:
@@ -198,10 +197,10 @@ def sampled_study(study: Study, compiling: Compiling | None = None) -> Sample:
     from sweep.cells.solve import Solver
 
     compiling = compiling or Compiling(study.kernel, study.kernel_name)
-    with faults_told(f"{study.kernel_name}: the kernel failed"):
+    with faults_reported(f"{study.kernel_name}: the kernel failed"):
         solver = Solver(replace(study, kernel=compiling.kernel))
         solver.warm()
-        sample = take_sample(solver, columns(study), granules(study).size)
+        sample = take_sample(solver, columns(study), row_blocks(study).size)
         if study.summary is not None:
             sample = replace(sample, costs=sample.costs + Reducer(study).seconds())
         compiling.remember()
@@ -209,7 +208,7 @@ def sampled_study(study: Study, compiling: Compiling | None = None) -> Sample:
 
 
 @contextlib.contextmanager
-def faults_told(what: str) -> Iterator[None]:
+def faults_reported(what: str) -> Iterator[None]:
     """Every fault as a SweepError of one line."""
     try:
         yield

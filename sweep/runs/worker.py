@@ -18,11 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from sweep.cells.contents import part_columns
 from sweep.cells.fingerprint import difference, fingerprint
-from sweep.cells.partition import Partition
-from sweep.cells.row_blocks import granules
-from sweep.runs.session import block_solver, faults_told
+from sweep.cells.output_schema import part_columns
+from sweep.cells.partition import Partition, row_blocks
+from sweep.runs.session import block_solver, faults_reported
 from sweep.store.parts import digest
 from sweep.store.store import Store
 from sweep.study.model import Study
@@ -37,7 +36,7 @@ class Assignment:
     ----------
     run : its name
     study : JSON
-    mark : fingerprint of the study where the run was started; a worker with another one refuses
+    fingerprint : fingerprint of the study where the run was started; a worker with another one refuses
     blocks : how the rows are cut
     door : folder through which parts are to be written, or "" where they are to be sent
     key : what stands in the file `KEY` of that folder, if it is the same folder as there
@@ -46,7 +45,7 @@ class Assignment:
 
     run: str
     study: str
-    mark: Mapping[str, str]
+    fingerprint: Mapping[str, str]
     blocks: Partition
     door: str
     key: str
@@ -116,22 +115,22 @@ class _Bench:
 
     def __init__(self, assignment: Assignment) -> None:
         self._study = _study(assignment)
-        self._blocks, self._granules = assignment.blocks, granules(self._study)
+        self._blocks, self._row_blocks = assignment.blocks, row_blocks(self._study)
         self._columns = part_columns(self._study)
         self._store = _store(assignment, self._columns)
         self._own = _Own()
         from sweep.cells.solve import Solver
 
-        with faults_told(f"{self._study.kernel_name}: the kernel failed"):
+        with faults_reported(f"{self._study.kernel_name}: the kernel failed"):
             # what all threads need is compiled once
             Solver(self._study).warm()
 
     def block(self, job: int, mask: bytes | None) -> str | Sent:
         """The name of the part that is written, or the numbers."""
         start, stop = self._blocks.bounds(job)
-        first, last = self._granules.cells(start, stop)
+        first, last = self._row_blocks.cells(start, stop)
         wanted = None if mask is None else np.unpackbits(np.frombuffer(mask, np.uint8), count=stop - start).view(bool)
-        with faults_told(f"cells {first} to {last}: the kernel failed"):
+        with faults_reported(f"cells {first} to {last}: the kernel failed"):
             solve, buffers = self._own.solver(self._study), self._own.buffers
             if self._store is None or mask is not None:
                 arrays = {c.name: c.empty(stop - start) for c in self._columns}
@@ -162,7 +161,7 @@ def _study(assignment: Assignment) -> Study:
     sys.path.extend(path for path in assignment.paths if path not in sys.path and Path(path).is_dir())
     try:
         study = Study.from_json(assignment.study, allow_import=True)
-        changed = difference(assignment.mark, fingerprint(study))
+        changed = difference(assignment.fingerprint, fingerprint(study))
     except SweepError as fault:
         raise SweepError(f"worker on {socket.gethostname()}: {fault}") from None
     if changed:
@@ -183,4 +182,4 @@ def _store(assignment: Assignment, columns: Any) -> Store | None:
         return None
     if not same or not os.access(door, os.W_OK) or not os.access(door.parent, os.W_OK):
         return None
-    return Store.sharing(door, columns, assignment.mark, assignment.blocks)
+    return Store.sharing(door, columns, assignment.fingerprint, assignment.blocks)

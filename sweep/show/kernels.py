@@ -9,7 +9,7 @@ from typing import Any
 
 from kernels import catalogue
 from kernels.interface import Field, Kernel, Method
-from sweep.study.kernels import load_kernel
+from sweep.study.kernel_lookup import load_kernel
 from sweep.study.mistakes import limits, listed, quoted
 from sweep.system.errors import SweepError
 from sweep.system.table import columns, page, section

@@ -21,7 +21,7 @@ import xxhash
 HERE = Path(__file__)
 sys.path[:0] = [p for p in (str(HERE.parent), str(HERE.parents[2])) if p not in sys.path]
 
-from sweep.cells.contents import part_columns  # noqa: E402
+from sweep.cells.output_schema import part_columns  # noqa: E402
 from sweep.results.open import open_result  # noqa: E402
 from sweep.results.verify import verify  # noqa: E402
 from sweep.runs import run as runner  # noqa: E402

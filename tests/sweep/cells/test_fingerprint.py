@@ -178,20 +178,20 @@ def test_what_chooses_methods_and_what_reduces_cells_counts_too():
     cells = {"sweep.cells.solve", "sweep.cells.grid"}
     assert of_the_engine(build(**BASE)) == cells
     assert of_the_engine(build(**BASE, summary={})) == cells | {
-        "sweep.cells.row_blocks",
+        "sweep.cells.partition",
         "sweep.cells.reduce",
-        "sweep.cells.contents",
+        "sweep.cells.output_schema",
     }
 
 
-@pytest.mark.parametrize("name", ["solve", "grid", "granules", "reducing", "contents"])
+@pytest.mark.parametrize("name", ["solve", "grid", "partition", "reduce", "output_schema"])
 def test_an_edit_of_what_reduces_cells_is_named(monkeypatch, tmp_path, name):
     study = build(**BASE, summary={})
     old, real = fingerprint(study), module._path
     edited = tmp_path / f"{name}.py"
-    edited.write_bytes(real(f"sweep.{name}").read_bytes() + b"# edited\n")
-    monkeypatch.setattr(module, "_path", lambda asked: edited if asked == f"sweep.{name}" else real(asked))
-    assert difference(old, fingerprint(study)) == [f"source sweep.{name}: changed"]
+    edited.write_bytes(real(f"sweep.cells.{name}").read_bytes() + b"# edited\n")
+    monkeypatch.setattr(module, "_path", lambda asked: edited if asked == f"sweep.cells.{name}" else real(asked))
+    assert difference(old, fingerprint(study)) == [f"source sweep.cells.{name}: changed"]
 
 
 def test_a_kernel_typed_at_the_prompt_has_no_source_and_is_no_fault(monkeypatch):

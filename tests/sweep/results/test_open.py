@@ -193,7 +193,7 @@ def test_a_damaged_part_of_an_unfinished_sweep_is_pending(unfinished):
 
 
 def test_an_unfinished_sweep_is_read_without_its_kernel(unfinished, monkeypatch):
-    monkeypatch.setattr("sweep.study.kernels.load_kernel", None)
+    monkeypatch.setattr("sweep.study.kernel_lookup.load_kernel", None)
     assert open_result(unfinished).fall_time.attrs["units"] == "s"
 
 

@@ -213,7 +213,7 @@ def test_a_lost_scheduler_is_one_line_and_the_run_continues(output):
 
 def test_a_worker_that_comes_too_late_has_no_place_to_write(output):
     study = tall(30)
-    with opened(output, sweep.cells.contents.part_columns(study)) as store:
+    with opened(output, sweep.cells.output_schema.part_columns(study)) as store:
         store.begin(study.to_json(), {}, sweep.cells.partition.Partition(30, 10))
         shared = store.open_shared()
         clusters.write_token(shared, "token")

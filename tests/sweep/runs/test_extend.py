@@ -89,10 +89,10 @@ def test_only_new_cells_are_computed(output, solved):
 
 def test_old_cells_are_taken_from_the_file(output, monkeypatch):
     quiet(study(), output).close()
-    with extending.Known(output, study(np.append(HEIGHTS, 20.0))) as known:
-        assert known.cells == 105
-        assert known.missing(0, 110).tolist() == [False] * 105 + [True] * 5
-        assert known.missing(104, 107).tolist() == [False, True, True]
+    with extending.Reused(output, study(np.append(HEIGHTS, 20.0))) as reused:
+        assert reused.cells == 105
+        assert reused.missing(0, 110).tolist() == [False] * 105 + [True] * 5
+        assert reused.missing(104, 107).tolist() == [False, True, True]
 
 
 def test_a_killed_extension_continues(output, monkeypatch):

@@ -20,7 +20,7 @@ from sweep.store import assemble
 from sweep.store.store import folder_of
 from sweep.system.errors import SweepError
 from sweep.system.pool import Terminated
-from sweep.system.until import deadline
+from sweep.system.progress import deadline
 
 
 def at(hour, minute=0, day=21):
