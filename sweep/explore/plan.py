@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels.interface import Status, machine_code_folder
+from sweep.cells.block import faults_reported, sampled_study
 from sweep.cells.compiling import Compiling
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.grid import Grid
@@ -26,7 +27,6 @@ from sweep.cells.schema import Column
 from sweep.cells.timing import Sample, row_partition
 from sweep.explore.calibration import rehearsed
 from sweep.results.open import memory
-from sweep.runs.session import faults_reported, sampled_study
 from sweep.store.assemble import chunks, write_structure
 from sweep.store.digests import Digests
 from sweep.store.hdf5_bytes import Hdf5Bytes, PartBytes

@@ -1,1 +1,1 @@
-"""One run of a study: `run` (the front), `session` (its blocks), `cluster` and `worker` (dask), `extend`."""
+"""One run of a study: faces `run`, `session`, `extend`; `cluster`, `dispatch` and `worker` on dask."""

@@ -93,7 +93,7 @@ def told_by(action):
 
 
 def environment():
-    root = Path(__file__).parents[3]
+    root = Path(__file__).parents[2]
     return {**os.environ, "PYTHONPATH": os.pathsep.join([str(root), str(root / "tests" / "helpers")])}
 
 

@@ -39,9 +39,9 @@ def solved(monkeypatch):
             counts.append(len(self.status[cells]))
         real(self, number, cells, *bound)
 
-    from sweep.runs import session
+    from sweep.cells import block
 
-    take = session.take_sample
+    take = block.take_sample
     warm = Solver.warm
 
     def quietly(action):
@@ -54,7 +54,7 @@ def solved(monkeypatch):
 
         return acting
 
-    monkeypatch.setattr(session, "take_sample", quietly(take))
+    monkeypatch.setattr(block, "take_sample", quietly(take))
     monkeypatch.setattr(Solver, "warm", quietly(warm))
     monkeypatch.setattr(_Strip, "run", run)
     return counts
