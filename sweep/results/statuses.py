@@ -152,7 +152,7 @@ def _tally(column: xr.DataArray | StoredColumn, lowest: int = 0) -> tuple[Any, d
     counts = np.zeros(256, np.int64)
     first: dict[int, int] = {}
     done = 0
-    for piece in _flat_pieces(column):
+    for piece in flat_pieces(column):
         values = (piece.astype(np.int16) - lowest) & 255
         found = np.bincount(values, minlength=256)
         for number in np.flatnonzero(found):
@@ -163,7 +163,7 @@ def _tally(column: xr.DataArray | StoredColumn, lowest: int = 0) -> tuple[Any, d
     return counts, first
 
 
-def _flat_pieces(column: xr.DataArray | StoredColumn, at: tuple[int, ...] = ()) -> Iterator[Any]:
+def flat_pieces(column: xr.DataArray | StoredColumn, at: tuple[int, ...] = ()) -> Iterator[Any]:
     """The cells in C order, some at a time; `at` are indices along the first dimensions."""
     shape = column.shape[len(at) :]
     row = math.prod(shape[1:])
@@ -171,7 +171,7 @@ def _flat_pieces(column: xr.DataArray | StoredColumn, at: tuple[int, ...] = ()) 
         yield np.asarray(column[at]).reshape(1)
     elif row > CELLS_AT_ONCE:
         for index in range(shape[0]):
-            yield from _flat_pieces(column, (*at, index))
+            yield from flat_pieces(column, (*at, index))
     else:
         rows = max(1, CELLS_AT_ONCE // max(1, row))
         for start in range(0, shape[0], rows):

@@ -13,6 +13,11 @@ from sweep.store.manifest import Manifest, read_manifest, restored
 from sweep.store.store import Store
 from sweep.system.errors import SweepError
 
+EXTENDABLE = (
+    "where its axes have only got more values, --extend computes the new cells alone; those of another version it "
+    "keeps if a sample of them still has the same bits"
+)
+
 
 def is_complete(task: Task) -> bool:
     """Whether the output is complete for this study. Raises SweepError where it is something else."""
@@ -28,7 +33,7 @@ def is_complete(task: Task) -> bool:
     if task.extend and not hindrance:
         return False
     cure = "choose another name, or overwrite it with --force"
-    more = "" if hindrance else "; where its axes have only got more values, --extend computes the new cells alone"
+    more = "" if hindrance else f"; {EXTENDABLE}"
     what = f"cannot be extended, for {hindrance}" if task.extend else "holds the result of another study or version"
     raise SweepError(f"{task.output}: {what}; {cure}{more}\n" + _listed(stored, task.fingerprint))
 

@@ -16,9 +16,9 @@ import numpy as np
 from sweep.cells.block import Found
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.output_schema import gathered, part_columns
-from sweep.results.open import in_memory, memory, open_result, open_unfinished
+from sweep.results.open import in_memory, memory, open_result, open_unfinished, stored_fingerprint
 from sweep.runs import resume
-from sweep.runs.extend import Precomputed, Reused
+from sweep.runs.extend import Precomputed, Reused, is_of_another_version
 from sweep.runs.session import Session, Solve
 from sweep.runs.task import Task
 from sweep.store.assemble import assemble
@@ -243,20 +243,22 @@ def _run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
         resume.take_up(store, manifest, task)
         if store.manifest is not None and not store.missing():
             return _run_session(Session(task, task.workers, store.blocks, sampled=False), store, None)
-        reused = precomputed or _reused(task)
-        if isinstance(reused, Reused):
-            stack.enter_context(reused)
+        reused = precomputed or _reused(task, stack)
         cluster = stack.enter_context(_joined(task))
         blocks = None if store.manifest is None else store.blocks
         return _run_session(Session(task, _threads(task, cluster), blocks, reused=reused), store, cluster)
 
 
-def _reused(task: Task) -> Reused | None:
+def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
     """The cells of the result that is extended. Raises SweepError where that is not possible."""
     if not task.extend or task.force or not task.output.exists():
         return None
     resume.check_whole(task)
-    return Reused(task.output, task.study)
+    reused = stack.enter_context(Reused(task.output, task.study))
+    if is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
+        task.note("another version has computed it; a sample of its cells is computed again")
+        reused.check_sample()
+    return reused
 
 
 def _run_session(session: Session, store: Store, cluster: Cluster | None) -> bool:

@@ -14,7 +14,7 @@ from sweep.cells.output_schema import output_schema, part_columns
 from sweep.cells.partition import Partition, row_blocks
 from sweep.cells.schema import Schema
 from sweep.cells.timing import UNSAMPLED, Sample, row_partition
-from sweep.runs.extend import Precomputed, Reused
+from sweep.runs.extend import TAKEN_OVER, Precomputed, Reused
 from sweep.runs.task import Task
 from sweep.system.forecast import Forecast
 from sweep.system.pool import BufferPool, Stopper, each
@@ -89,10 +89,11 @@ class Session:
         self.progress.again(stop - start)
 
     def dated(self, began: str) -> Schema:
-        """The schema with the times of the run, which now is at its end."""
+        """The schema with the times of the run, which now is at its end, and what was reused."""
         end = now()
         times = {"created": end, "start": began, "end": end, "cells_per_second": self.progress.rate}
-        return replace(self.schema, attrs={**self.schema.attrs, **times})
+        reused = {TAKEN_OVER: self.reused.taken_over} if self.reused and self.reused.taken_over else {}
+        return replace(self.schema, attrs={**self.schema.attrs, **times, **reused})
 
     def compute(self, threads: int, work: Callable[[int, Solve], None]) -> None:
         """Calls `work(job, solve)` for every block that is left, on a pool of threads.
