@@ -24,7 +24,7 @@ from sweep.cells.partition import Partition, row_blocks
 from sweep.cells.reduce import strip_bytes
 from sweep.cells.schema import Column
 from sweep.cells.timing import Sample, row_partition
-from sweep.explore.calibration import rehearsed
+from sweep.explore.calibration import Calibration
 from sweep.results.open import memory
 from sweep.runs.session import faults_reported, sampled_study
 from sweep.store.assemble import chunks, write_frame
@@ -205,7 +205,7 @@ def _seconds(
     """What a run takes, of some of the cells in earnest; or, where that cannot be, from the probes alone."""
     rows = row_blocks(study)
     cells, block = rows.size, rows.cells(0, blocks.cells)[1]
-    found = rehearsed(study, cells, block, sample.cost, (parts + output) / cells, folder, workers)
+    found = Calibration(study, cells, block, sample.cost, (parts + output) / cells, workers).seconds(folder)
     if not math.isnan(found):
         return found
     speed = _disk_speed(folder) if parts + output > WORTH_A_TRIAL else math.inf
@@ -226,9 +226,9 @@ def _output_bytes(study: Study, sample: Sample, blocks: Partition) -> tuple[int,
     write_frame(canvas, content, Seals(content.columns, chunks(study, blocks)))
     numbers = sum(c.cell_bytes for c in content.columns if c.name not in FLAGS) * content.grid.size
     flags = sum(c.name in FLAGS for c in content.columns) * content.grid.size
-    told = len(zlib.compress(sample.status.tobytes(), 1)) / max(len(sample.status), 1)
+    packed = len(zlib.compress(sample.status.tobytes(), 1)) / max(len(sample.status), 1)
     uniform = len(set(sample.status.tolist())) < 2
-    return canvas.size + int(flags * (UNIFORM if uniform else told)), canvas.size - numbers
+    return canvas.size + int(flags * (UNIFORM if uniform else packed)), canvas.size - numbers
 
 
 def _disk_speed(folder: Path) -> float:
