@@ -25,7 +25,7 @@ from sweep.cells.partition import Partition, row_blocks
 from sweep.cells.reduce import strip_bytes
 from sweep.cells.schema import Column
 from sweep.cells.timing import Sample, row_partition
-from sweep.explore.calibration import rehearsed
+from sweep.explore.calibration import Calibration
 from sweep.results.open import memory
 from sweep.store.assemble import chunks, write_structure
 from sweep.store.digests import Digests
@@ -204,7 +204,7 @@ def _seconds(
     """What a run takes, of some of the cells in earnest; or, where that cannot be, from the probes alone."""
     rows = row_blocks(study)
     cells, block = rows.size, rows.cells(0, blocks.cells)[1]
-    found = rehearsed(study, cells, block, sample.cost, (parts + output) / cells, folder, workers)
+    found = Calibration(study, cells, block, sample.cost, (parts + output) / cells, workers).seconds(folder)
     if not math.isnan(found):
         return found
     speed = _disk_speed(folder) if parts + output > WORTH_A_TRIAL else math.inf
@@ -220,14 +220,14 @@ def _part_bytes(columns: tuple[Column, ...], blocks: Partition) -> int:
 
 
 def _output_bytes(study: Study, sample: Sample, blocks: Partition) -> tuple[int, int]:
-    """The output, and all of it but the outputs' numbers; its frame is made for this, in memory."""
+    """The output, and all of it but the outputs' numbers; its structure is made for this, in memory."""
     content, hdf5 = output_schema(study, fingerprint(study)), Hdf5Bytes()
     write_structure(hdf5, content, Digests(content.columns, chunks(study, blocks)))
     numbers = sum(c.cell_bytes for c in content.columns if c.name not in FLAGS) * content.grid.size
     flags = sum(c.name in FLAGS for c in content.columns) * content.grid.size
-    told = len(zlib.compress(sample.status.tobytes(), 1)) / max(len(sample.status), 1)
+    packed = len(zlib.compress(sample.status.tobytes(), 1)) / max(len(sample.status), 1)
     uniform = len(set(sample.status.tolist())) < 2
-    return hdf5.size + int(flags * (UNIFORM if uniform else told)), hdf5.size - numbers
+    return hdf5.size + int(flags * (UNIFORM if uniform else packed)), hdf5.size - numbers
 
 
 def _disk_speed(folder: Path) -> float:
