@@ -113,9 +113,14 @@ def _write_zarr(dataset: xr.Dataset, path: Path) -> None:
     import zarr  # noqa: F401  xarray would say in other words that it is missing
 
     path.unlink()
-    whole = dataset.chunk("auto") if dataset.nbytes > LARGE and not dataset.chunks else dataset
+    whole = _in_pieces(dataset)
     words = {str(name): whole[name].astype(object) for name in whole.variables if whole[name].dtype.kind == "U"}
     whole.assign(words).drop_encoding().to_zarr(path, mode="w", consolidated=False)
+
+
+def _in_pieces(dataset: xr.Dataset) -> xr.Dataset:
+    """The same, in pieces where it is large."""
+    return dataset.chunk("auto") if dataset.nbytes > LARGE and not dataset.chunks else dataset
 
 
 def _write_units(dataset: xr.Dataset, names: list[str], file: TextIO) -> None:
@@ -194,7 +199,7 @@ def _flat_columns(variable: xr.DataArray) -> Iterator[tuple[str, xr.DataArray]]:
 
 
 def _write_netcdf(dataset: xr.Dataset, path: Path) -> None:
-    whole = dataset.chunk("auto") if dataset.nbytes > LARGE and not dataset.chunks else dataset
+    whole = _in_pieces(dataset)
     encoding: dict[str, dict[str, Any]] = {str(name): {"_FillValue": None} for name in whole.variables}
     for name, variable in whole.data_vars.items():
         if variable.dtype.kind in "iu" and math.prod(variable.shape) > 1:

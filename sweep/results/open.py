@@ -15,7 +15,6 @@ from sweep.cells.output_schema import gathered, output_schema, part_columns
 from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import BY_STATUS, pending
 from sweep.cells.schema import STATUS, Schema
-from sweep.results.statuses import StatusCount, count_methods, count_statuses, failures
 from sweep.store.digests import BESIDE, unbroken
 from sweep.store.hdf5_bytes import PartBytes
 from sweep.store.manifest import MANIFEST, Manifest, read_manifest
@@ -27,17 +26,6 @@ from sweep.system.errors import SweepError
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = [
-    "StatusCount",
-    "count_methods",
-    "count_statuses",
-    "failures",
-    "in_memory",
-    "memory",
-    "open_result",
-    "stored_fingerprint",
-]
 
 LARGEST_AT_ONCE = 1 << 28
 """Bytes of an unfinished result that are read at once; of larger ones, parts are read when they are used."""
@@ -226,7 +214,7 @@ def _part_names(folder: Path, manifest: Manifest, part_bytes: PartBytes) -> dict
         if match is None or not manifest.blocks.holds(int(match[1]), int(match[2])):
             continue
         index = int(match[1]) // manifest.blocks.cells
-        if index not in names or read_part(folder / names[index], part_bytes, *manifest.blocks.bounds(index)) is None:
+        if index not in names or read_part(folder / names[index], part_bytes) is None:
             names[index] = entry.name
     return names
 
@@ -238,7 +226,7 @@ def _read_all(parts: Parts, rows: dict[str, Any]) -> dict[str, Any]:
         for index in indices:
             start, stop = parts.blocks.bounds(index)
             path = parts.folder / parts.names[index]
-            for name, values in (read_part(path, parts.part_bytes, start, stop, keep=True) or {}).items():
+            for name, values in (read_part(path, parts.part_bytes, keep=True) or {}).items():
                 rows[name][start:stop] = values
 
     at_once(fill, sorted(parts.names))

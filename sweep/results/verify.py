@@ -30,7 +30,7 @@ from sweep.store.digests import (
 )
 from sweep.store.hdf5_bytes import PartBytes
 from sweep.store.manifest import MANIFEST, Manifest, read_manifest
-from sweep.store.parts import DAMAGE, PART_NAME, READERS, read_part
+from sweep.store.parts import DAMAGE, PART_NAME, READERS, is_sound
 from sweep.store.probe import check_own, readable
 from sweep.store.store import LOCK, folder_of
 from sweep.system import disk
@@ -186,17 +186,9 @@ def _parts(output: Path, folder: Path, manifest: Manifest) -> Verdict:
     part_bytes = PartBytes(part_columns(study), manifest.mark)
     names, strange = _sorted_out(folder, manifest.blocks)
 
-    def sound(name: str) -> bool:
-        match = PART_NAME.fullmatch(name)
-        assert match is not None
-        try:
-            return read_part(folder / name, part_bytes, int(match[1]), int(match[2])) is not None
-        except FileNotFoundError:
-            return False
-
     every = [name for several in names.values() for name in several]
     with ThreadPoolExecutor(READERS) as pool:
-        good = dict(zip(every, pool.map(sound, every), strict=True))
+        good = dict(zip(every, pool.map(lambda name: is_sound(folder / name, part_bytes), every), strict=True))
     rows = row_blocks(study)
     missing = (rows.cells(*manifest.blocks.bounds(i)) for i in range(manifest.blocks.count) if i not in names)
     findings = [

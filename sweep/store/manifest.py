@@ -20,7 +20,7 @@ import xxhash
 from sweep.cells.partition import Partition
 from sweep.cells.schema import Column
 from sweep.store.hdf5_bytes import PartBytes
-from sweep.store.parts import PART_NAME, read_part
+from sweep.store.parts import PART_NAME, is_sound
 from sweep.system.errors import SweepError
 
 FORMAT = 2
@@ -100,13 +100,4 @@ def restored(
     manifest = new_manifest(study, fingerprint, Partition(rows, max(1, usual)))
     part_bytes = PartBytes(columns, manifest.mark)
     names = [match[0] for match in found if manifest.blocks.holds(int(match[1]), int(match[2]))]
-    return manifest if any(_sound(folder / name, part_bytes) for name in names) else None
-
-
-def _sound(path: Path, part_bytes: PartBytes) -> bool:
-    match = PART_NAME.fullmatch(path.name)
-    assert match is not None
-    try:
-        return read_part(path, part_bytes, int(match[1]), int(match[2])) is not None
-    except FileNotFoundError:
-        return False
+    return manifest if any(is_sound(folder / name, part_bytes) for name in names) else None

@@ -51,13 +51,10 @@ def digest(columns: Sequence[Column], arrays: Mapping[str, Any], mark: bytes = b
 def read_part(
     path: Path,
     part_bytes: PartBytes,
-    start: int,
-    stop: int,
     buffers: Mapping[str, Any] | None = None,
     keep: bool = False,
 ) -> dict[str, Any] | None:
-    """The numbers of one block, each of shape `(stop - start, ...)`; None where the file is damaged,
-    or of another study.
+    """The numbers of the block that a file is named by; None where it is damaged, or of another study.
 
     Parameters
     ----------
@@ -70,8 +67,17 @@ def read_part(
     """
     match = PART_NAME.fullmatch(path.name)
     assert match is not None
+    start, stop = int(match[1]), int(match[2])
     arrays = _read(path, part_bytes, start, stop, part_bytes.columns, buffers, keep)
     return arrays if arrays is not None and digest(part_bytes.columns, arrays, part_bytes.mark) == match[3] else None
+
+
+def is_sound(path: Path, part_bytes: PartBytes) -> bool:
+    """Whether a part is there and what was written."""
+    try:
+        return read_part(path, part_bytes) is not None
+    except FileNotFoundError:
+        return False
 
 
 def _read(
@@ -187,7 +193,7 @@ class Parts:
             if index in self._sound:
                 found = _read(path, self.part_bytes, start, stop, [column], keep=True)
             else:
-                found = read_part(path, self.part_bytes, start, stop, keep=True)
+                found = read_part(path, self.part_bytes, keep=True)
         except FileNotFoundError:
             raise SweepError(f"{self.folder}: the sweep has ended meanwhile; open its result again") from None
         if found is None:

@@ -117,7 +117,7 @@ class Store:
 
     def get(self, index: int, buffers: Mapping[str, Any] | None = None) -> dict[str, Any] | None:
         """The numbers of a finished block, or None where its file is damaged. Raises FileNotFoundError."""
-        return read_part(self.folder / self.names[index], self._part_bytes, *self.blocks.bounds(index), buffers)
+        return read_part(self.folder / self.names[index], self._part_bytes, buffers)
 
     def set_aside(self, index: int) -> Path:
         """Takes a damaged block out of the finished ones, keeping its file for a look. Raises OSError."""
@@ -197,7 +197,7 @@ class Store:
         """Of two files of one block, one must be damaged."""
         start, stop = self.blocks.bounds(index)
         both = (self.names[index], other)
-        sound = [name for name in both if read_part(self.folder / name, self._part_bytes, start, stop) is not None]
+        sound = [name for name in both if read_part(self.folder / name, self._part_bytes) is not None]
         if len(sound) == 2:
             raise SweepError(
                 f"{self.folder}: cells {start} to {stop} came out differently twice; the kernel is not deterministic"

@@ -138,9 +138,9 @@ def test_every_flipped_bit_of_the_numbers_is_found(filled):
         changed = bytearray(whole)
         changed[place] ^= 1 << place % 8
         path.write_bytes(changed)
-        assert read_part(path, PART_BYTES, 0, 10) is None
+        assert read_part(path, PART_BYTES) is None
     path.write_bytes(whole)
-    assert read_part(path, PART_BYTES, 0, 10) is not None
+    assert read_part(path, PART_BYTES) is not None
 
 
 def test_no_damaged_file_is_read_as_something_else(filled):
@@ -149,7 +149,7 @@ def test_no_damaged_file_is_read_as_something_else(filled):
     whole = path.read_bytes()
     for place in range(0, len(whole), 7):
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 0xFF]) + whole[place + 1 :])
-        found = read_part(path, PART_BYTES, 0, 10)
+        found = read_part(path, PART_BYTES)
         if found is not None:
             np.testing.assert_array_equal(found["angle"], numbers(0, 10)["angle"])
 
@@ -159,7 +159,7 @@ def test_a_part_cut_off_anywhere_is_found(filled):
     whole = path.read_bytes()
     for length in [0, 1, 100, *range(2000, len(whole), 13)]:
         path.write_bytes(whole[:length])
-        found = read_part(path, PART_BYTES, 0, 10)
+        found = read_part(path, PART_BYTES)
         assert found is None or digest(COLUMNS, found, PART_BYTES.mark) in path.name
 
 
@@ -170,14 +170,14 @@ def test_a_part_that_another_version_of_hdf5_laid_out_is_read_as_well(filled):
         for name, values in reversed(numbers(0, 10).items()):
             file[name] = values
     (filled / "other").rename(path)
-    np.testing.assert_array_equal(read_part(path, PART_BYTES, 0, 10)["angle"], numbers(0, 10)["angle"])
+    np.testing.assert_array_equal(read_part(path, PART_BYTES)["angle"], numbers(0, 10)["angle"])
 
 
 def test_a_part_under_the_name_of_another_range_is_found(filled):
     first, second, _ = part_files(filled)
     path = first.with_name(second.name.split(".")[0] + "." + first.name.split(".")[1] + ".h5")
     first.rename(path)
-    assert read_part(path, PART_BYTES, 10, 20) is None
+    assert read_part(path, PART_BYTES) is None
 
 
 def test_a_short_file_is_set_aside_at_the_start(output, filled):
@@ -413,7 +413,7 @@ def test_a_longer_part_with_its_columns_elsewhere_is_read_where_they_are(filled)
         for name, values in reversed(numbers(0, 10).items()):
             file[name] = values
     assert path.stat().st_size > PART_BYTES.template(10).size
-    np.testing.assert_array_equal(read_part(path, PART_BYTES, 0, 10)["angle"], numbers(0, 10)["angle"])
+    np.testing.assert_array_equal(read_part(path, PART_BYTES)["angle"], numbers(0, 10)["angle"])
 
 
 def test_a_longer_part_of_other_numbers_is_damaged(filled):
@@ -424,7 +424,7 @@ def test_a_longer_part_of_other_numbers_is_damaged(filled):
     content = bytearray(path.read_bytes())
     content[place + 5] ^= 1
     path.write_bytes(content)
-    assert read_part(path, PART_BYTES, 0, 10) is None
+    assert read_part(path, PART_BYTES) is None
 
 
 def test_the_spec_comes_back_as_it_was(output):

@@ -155,7 +155,7 @@ def test_an_unfinished_extension_returns_what_there_is_of_the_new_one(tmp_path):
 def test_every_cell_is_in_the_account_once(codes, summed):
     keys = {"outputs": {"fall_time": ["min"]}} if summed else None
 
-    def kernel_status(self, start, stop, outputs, status, used, wanted=None):
+    def kernel_status(self, start, stop, outputs, status, used, wanted=None, error_bound=None):
         status[:] = codes[start:stop]
         used[:] = -1
         for column in outputs.values():
