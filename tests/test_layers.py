@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -115,3 +116,20 @@ def test_no_room_reaches_for_the_private_modules_of_another(top):
     rooms = {file: list(file.relative_to(ROOT).parent.parts) for file in files}
     found = {file.name: list(foreign_private(file.read_text("utf-8"), rooms[file])) for file in files}
     assert not {file: names for file, names in found.items() if names}
+
+
+def faces_used():
+    """Rooms of the engine, and the modules of each that other rooms import."""
+    for file in Path(sweep.__file__).parent.rglob("*.py"):
+        package = list(file.relative_to(ROOT).parent.parts)
+        for name in imported(file.read_text("utf-8"), package):
+            top, room, module, *_ = [*name.split("."), "", ""]
+            if top == "sweep" and is_module([top, room, module]) and package[:2] != [top, room]:
+                yield room, module
+
+
+def test_a_room_says_which_of_its_modules_others_may_use():
+    used = set(faces_used())
+    assert len({room for room, _ in used}) == 9
+    doc = {room: import_module(f"sweep.{room}").__doc__ for room, _ in used}
+    assert not sorted((room, module) for room, module in used if f"`{module}`" not in doc[room])

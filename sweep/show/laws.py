@@ -108,12 +108,12 @@ def _remark(dataset: xr.Dataset, y: str) -> str:
     if STATUS not in dataset or dataset[y].dims != dataset[STATUS].dims:
         return ""
     status, valued, words = dataset[STATUS].values, dataset[y].notnull().values, flag_words(dataset[STATUS])
-    told = []
+    parts = []
     for code in np.unique(status[status != 0]).tolist():
         here = status == code
         counts = {"in the fit": int((here & valued).sum()), "left out": int((here & ~valued).sum())}
-        told += [f"{count} {words.get(code, code)} ({fate})" for fate, count in counts.items() if count]
-    return f"Of {status.size} cells: {', '.join(told)}." if told else ""
+        parts += [f"{count} {words.get(code, code)} ({fate})" for fate, count in counts.items() if count]
+    return f"Of {status.size} cells: {', '.join(parts)}." if parts else ""
 
 
 def _bend(
@@ -280,10 +280,10 @@ def _bend_cells(bend: xr.Dataset) -> tuple[str, ...]:
         one = bend.sel(law=law)
         cells += [f"{one.exponent.item():.6g}", _interval(one.exponent_low.item(), one.exponent_high.item())]
     place = _interval(bend.crossover_low.item(), bend.crossover_high.item())
-    told = f"{bend.width.item():.2g} decades wide, residual {bend.residual.item():.1e}"
+    width = f"{bend.width.item():.2g} decades wide, residual {bend.residual.item():.1e}"
     if bend.regimes.item() == 1:
-        told += "; one law does as well"
-    return *cells, f"{bend.crossover.item():.6g}", place, told
+        width += "; one law does as well"
+    return *cells, f"{bend.crossover.item():.6g}", place, width
 
 
 def _meeting_cells(meeting: xr.Dataset) -> tuple[str, ...]:
