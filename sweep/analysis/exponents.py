@@ -79,11 +79,7 @@ def local_exponent(y: xr.DataArray, dim: str) -> xr.DataArray:
     SweepError
         If `dim` is unknown, not positive, not monotone, or shorter than three.
     """
-    dimension, x = positive_axis(y, dim)
-    found = along(lambda z: slopes(np.log(x), z, 5), log_of(y), dimension)
-    found.name = f"{y.name}_exponent" if y.name is not None else "exponent"
-    found.attrs = {"units": "1", "long_name": f"local exponent of {title(y)} in {dim}"}
-    return found
+    return _local(y, dim, lambda t, z: slopes(t, z, 5), "exponent", "local exponent")
 
 
 def local_exponent_error(y: xr.DataArray, dim: str) -> xr.DataArray:
@@ -104,10 +100,14 @@ def local_exponent_error(y: xr.DataArray, dim: str) -> xr.DataArray:
     SweepError
         As `local_exponent`.
     """
+    return _local(y, dim, slope_errors, "exponent_error", "error of the local exponent")
+
+
+def _local(y: xr.DataArray, dim: str, function: Callable[[Array, Array], Array], name: str, words: str) -> xr.DataArray:
     dimension, x = positive_axis(y, dim)
-    found = along(lambda z: slope_errors(np.log(x), z), log_of(y), dimension)
-    found.name = f"{y.name}_exponent_error" if y.name is not None else "exponent_error"
-    found.attrs = {"units": "1", "long_name": f"error of the local exponent of {title(y)} in {dim}"}
+    found = along(lambda z: function(np.log(x), z), log_of(y), dimension)
+    found.name = name if y.name is None else f"{y.name}_{name}"
+    found.attrs = {"units": "1", "long_name": f"{words} of {title(y)} in {dim}"}
     return found
 
 

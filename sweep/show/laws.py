@@ -214,16 +214,8 @@ def _dims(dataset: xr.Dataset, *without: str) -> list[str]:
 
 
 def _heading(fit: xr.Dataset) -> tuple[str, ...]:
-    return (
-        *_dims(fit),
-        "window",
-        "p",
-        "interval",
-        "points",
-        "drift",
-        "residual",
-        f"{fit.attrs['y']} at {fit.attrs['x']} = 1",
-    )
+    at_one = f"{fit.attrs['y']} at {fit.attrs['x']} = 1"
+    return (*_dims(fit), "window", "p", "interval", "points", "drift", "residual", at_one)
 
 
 def _table(title: str, heading: Sequence[str], datasets: Sequence[xr.Dataset], cells: Any) -> str:
@@ -237,17 +229,14 @@ def _table(title: str, heading: Sequence[str], datasets: Sequence[xr.Dataset], c
 def _points(dataset: xr.Dataset, *without: str) -> Iterator[tuple[list[str], xr.Dataset]]:
     dims = _dims(dataset, *without)
     for position in itertools.product(*(range(dataset.sizes[dim]) for dim in dims)):
-        point = dataset.isel(dict(zip(dims, position, strict=True)))
-        yield (
-            [
-                _label(point[dim].item()) if dim in point.coords else str(i)
-                for dim, i in zip(dims, position, strict=True)
-            ],
-            point,
-        )
+        places = dict(zip(dims, position, strict=True))
+        point = dataset.isel(places)
+        yield [_label(point, dim, i) for dim, i in places.items()], point
 
 
-def _label(value: Any) -> str:
+def _label(point: xr.Dataset, dim: str, place: int) -> str:
+    """A value of an axis; of a dimension that has none its number."""
+    value = point[dim].item() if dim in point.coords else str(place)
     return value if isinstance(value, str) else f"{value:.6g}"
 
 
