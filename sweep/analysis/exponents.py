@@ -342,6 +342,7 @@ def _where(
     inside, t = inside_window(x, window, dim), np.log(x)
 
     def one(z: Array) -> tuple[float, float]:
+        """The place and its error; NaN and the number of places where that is not one."""
         places = brackets(np.where(inside, seen(t, z), np.nan), value)
         return find(t, z, places[0]) if len(places) == 1 else (np.nan, len(places))
 
@@ -355,6 +356,13 @@ def _where(
         count = int(error.max())
         said = f"passes {value:g} {count} times" if count else f"does not pass {value:g}"
         raise SweepError(f"{title(curve)} {said} along {dim} in the window; choose another window")
+    return _describe_place(curve, dim, value, place, error)
+
+
+def _describe_place(
+    curve: xr.DataArray, dim: str, value: float, place: xr.DataArray, error: xr.DataArray
+) -> xr.Dataset:
+    """From `place` and `error` in ln dim."""
     abscissa: xr.DataArray = xr.apply_ufunc(np.exp, place, keep_attrs=True)
     found = xr.Dataset({"abscissa": abscissa, "abscissa_error": (abscissa * error).where(place.notnull())})
     units = str(curve.coords[dim].attrs.get("units", "1"))

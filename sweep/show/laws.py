@@ -152,8 +152,8 @@ def law_rows(found: Laws) -> Iterator[tuple[str, ...]]:
         name = f"{found.y} ({where})" if where else found.y
         both = None if bend is None else bend.sel({d: fit[d] for d in _dims(bend, "law") if d in fit.coords})
         if both is None or both.exponent.ndim != 1 or both.regimes.item() != 2 or both.residual.item() > WORST_MISFIT:
-            cells = _fit_cells(fit)
-            yield name, f"{found.x} {cells[0]}", cells[1], cells[2], cells[5]
+            window, exponent, interval, _, _, residual, _ = _fit_cells(fit)
+            yield name, f"{found.x} {window}", exponent, interval, residual
             continue
         for law, sign in (("low", "<<"), ("high", ">>")):
             one = both.sel(law=law)
