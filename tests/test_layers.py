@@ -5,6 +5,7 @@ import graphlib
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -153,3 +154,20 @@ def test_no_file_imports_itself_by_way_of_others(top):
         graphlib.TopologicalSorter(imports).prepare()
     except graphlib.CycleError as circle:
         pytest.fail(" <- ".join(str(file.relative_to(ROOT)) for file in circle.args[1]))
+
+
+def faces_used():
+    """Rooms of the engine, and the modules of each that other rooms import."""
+    for file in Path(sweep.__file__).parent.rglob("*.py"):
+        package = list(file.relative_to(ROOT).parent.parts)
+        for name in imported(file.read_text("utf-8"), package):
+            top, room, module, *_ = [*name.split("."), "", ""]
+            if top == "sweep" and is_module([top, room, module]) and package[:2] != [top, room]:
+                yield room, module
+
+
+def test_a_room_says_which_of_its_modules_others_may_use():
+    used = set(faces_used())
+    assert len({room for room, _ in used}) == 9
+    doc = {room: import_module(f"sweep.{room}").__doc__ for room, _ in used}
+    assert not sorted((room, module) for room, module in used if f"`{module}`" not in doc[room])

@@ -79,11 +79,7 @@ def local_exponent(y: xr.DataArray, dim: str) -> xr.DataArray:
     SweepError
         If `dim` is unknown, not positive, not monotone, or shorter than three.
     """
-    dimension, x = positive_axis(y, dim)
-    found = along(lambda z: slopes(np.log(x), z, 5), log_of(y), dimension)
-    found.name = f"{y.name}_exponent" if y.name is not None else "exponent"
-    found.attrs = {"units": "1", "long_name": f"local exponent of {title(y)} in {dim}"}
-    return found
+    return _local(y, dim, lambda t, z: slopes(t, z, 5), "exponent", "local exponent")
 
 
 def local_exponent_error(y: xr.DataArray, dim: str) -> xr.DataArray:
@@ -104,10 +100,14 @@ def local_exponent_error(y: xr.DataArray, dim: str) -> xr.DataArray:
     SweepError
         As `local_exponent`.
     """
+    return _local(y, dim, slope_errors, "exponent_error", "error of the local exponent")
+
+
+def _local(y: xr.DataArray, dim: str, function: Callable[[Array, Array], Array], name: str, words: str) -> xr.DataArray:
     dimension, x = positive_axis(y, dim)
-    found = along(lambda z: slope_errors(np.log(x), z), log_of(y), dimension)
-    found.name = f"{y.name}_exponent_error" if y.name is not None else "exponent_error"
-    found.attrs = {"units": "1", "long_name": f"error of the local exponent of {title(y)} in {dim}"}
+    found = along(lambda z: function(np.log(x), z), log_of(y), dimension)
+    found.name = name if y.name is None else f"{y.name}_{name}"
+    found.attrs = {"units": "1", "long_name": f"{words} of {title(y)} in {dim}"}
     return found
 
 
@@ -342,6 +342,7 @@ def _where(
     inside, t = inside_window(x, window, dim), np.log(x)
 
     def one(z: Array) -> tuple[float, float]:
+        """The place and its error; NaN and the number of places where that is not one."""
         places = brackets(np.where(inside, seen(t, z), np.nan), value)
         return find(t, z, places[0]) if len(places) == 1 else (np.nan, len(places))
 
@@ -355,6 +356,13 @@ def _where(
         count = int(error.max())
         said = f"passes {value:g} {count} times" if count else f"does not pass {value:g}"
         raise SweepError(f"{title(curve)} {said} along {dim} in the window; choose another window")
+    return _describe_place(curve, dim, value, place, error)
+
+
+def _describe_place(
+    curve: xr.DataArray, dim: str, value: float, place: xr.DataArray, error: xr.DataArray
+) -> xr.Dataset:
+    """From `place` and `error` in ln dim."""
     abscissa: xr.DataArray = xr.apply_ufunc(np.exp, place, keep_attrs=True)
     found = xr.Dataset({"abscissa": abscissa, "abscissa_error": (abscissa * error).where(place.notnull())})
     units = str(curve.coords[dim].attrs.get("units", "1"))

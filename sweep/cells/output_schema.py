@@ -124,7 +124,7 @@ def _columns(study: Study) -> Iterator[Column]:
 
 def _output(study: Study, field: Field) -> Iterator[Column]:
     assert study.summary is not None
-    shape = tuple(study.lengths[d] for d in field.dims)
+    shape = study.shape(field)
     over = ": ".join(study.summary.over)
     counts = {"units": "1", "long_name": f"cells with a value: {field.doc}"}
     yield Column(f"{field.name}_count", "i8", field.dims, shape, counts)

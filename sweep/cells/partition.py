@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     from sweep.study.model import Study
@@ -42,6 +42,15 @@ class Partition:
     def holds(self, start: int, stop: int) -> bool:
         """Whether there is a block of just these cells."""
         return 0 <= start < stop and self.bounds(start // self.cells) == (start, stop)
+
+
+class RowStrip(NamedTuple):
+    """Rows from `row` on, of `cells` cells each, from cell number `cell` on."""
+
+    row: int
+    rows: int
+    cell: int
+    cells: int
 
 
 @dataclass(frozen=True)
@@ -81,26 +90,22 @@ class RowBlocks:
         """The cells of the rows `start` to `stop`."""
         return int(self.first(start)), int(self.first(stop))
 
-    def strips(self, start: int, stop: int, room: int) -> Iterator[tuple[int, int, int, int]]:
-        """Cut the rows `start` to `stop` into strips of at most `room` cells, or one row.
+    def strips(self, start: int, stop: int, capacity: int) -> Iterator[RowStrip]:
+        """Cut the rows `start` to `stop` into strips of at most `capacity` cells, or one row.
 
-        Yields
-        ------
-        row, rows, cell, cells : int
-            The strip has `rows` rows from `row` on, of `cells` cells each, from cell number `cell` on. A row
-            block longer than `room` comes in several strips, cut at the same places always.
+        A row block longer than that comes in several strips, cut at the same places always.
         """
         row = start
         while row < stop:
             cell, end = self.cells(row, row + 1)
             cells = end - cell
-            if cells > room:
-                for first in range(cell, end, room):
-                    yield row, 1, first, min(room, end - first)
+            if cells > capacity:
+                for first in range(cell, end, capacity):
+                    yield RowStrip(row, 1, first, min(capacity, end - first))
                 row += 1
                 continue
-            rows = min(stop - row, max(1, room // cells), self._alike(row))
-            yield row, rows, cell, cells
+            rows = min(stop - row, max(1, capacity // cells), self._alike(row))
+            yield RowStrip(row, rows, cell, cells)
             row += rows
 
     def _alike(self, row: int) -> int:

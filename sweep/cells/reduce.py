@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.interface import Status
+from sweep.cells.grid import empty_cells
 from sweep.cells.partition import row_blocks
 from sweep.cells.schema import Column
 
@@ -45,7 +46,7 @@ def row_columns(study: Study) -> tuple[Column, ...]:
     assert study.summary is not None
     found = [_column(BY_STATUS, "i8", len(STATUSES)), _column(BY_METHOD, "i8", len(study.kernel.methods) + 1)]
     for field in study.asked:
-        shape = tuple(study.lengths[d] for d in field.dims)
+        shape = study.shape(field)
         reductions = study.summary.outputs[field.name]
         found.append(_column(f"{field.name} count", "i8", *shape))
         for end in _ends(reductions):
@@ -121,37 +122,32 @@ class Reducer:
 
         assert study.summary is not None
         self.study, self.row_blocks, self.solver = study, row_blocks(study), Solver(study)
-        shapes = _shapes(study)
-        self.room = _room(study)
-        room = min(self.room, self.row_blocks.size)
-        self._outputs = {name: np.empty((room, *shape)) for name, shape in shapes.items()}
-        self._status, self._used = np.empty(room, np.int8), np.empty(room, np.int8)
+        self.strip = _strip_cells(study)
+        self._cells = empty_cells(study, min(self.strip, self.row_blocks.size))
 
     def solve(self, start: int, stop: int, rows: Mapping[str, Any]) -> None:
         """Fill `rows` with the rows `start` to `stop`."""
         cleared(rows)
-        for row, count, cell, cells in self.row_blocks.strips(start, stop, self.room):
-            n = count * cells
-            outputs = {name: column[:n] for name, column in self._outputs.items()}
-            status, used = self._status[:n], self._used[:n]
-            self.solver.solve(cell, cell + n, outputs, status, used)
-            found = self.reduce(cell, count, outputs, status, used)
-            merge({name: column[row - start : row - start + count] for name, column in rows.items()}, found)
+        for strip in self.row_blocks.strips(start, stop, self.strip):
+            cells = self._cells.first(strip.rows * strip.cells)
+            self.solver.solve(strip.cell, strip.cell + cells.number, *cells)
+            found = self.reduce(strip.cell, strip.rows, *cells)
+            place = slice(strip.row - start, strip.row - start + strip.rows)
+            merge({name: column[place] for name, column in rows.items()}, found)
 
     def seconds(self) -> float:
         """What reducing a cell takes, tried on as many whole row blocks as a strip holds, or on as much of one."""
-        cells = min(self.row_blocks.length, len(self._status))
-        rows = len(self._status) // cells
-        outputs = {name: column[: rows * cells] for name, column in self._outputs.items()}
-        for column in outputs.values():
-            column.fill(1.0)
-        status, used = np.zeros(rows * cells, np.int8), np.zeros(rows * cells, np.int8)
+        length = min(self.row_blocks.length, self._cells.number)
+        rows = self._cells.number // length
+        cells = self._cells.first(rows * length)
+        for column in (*cells.outputs.values(), cells.status, cells.used):
+            column.fill(0)
         taken = []
         for _ in range(3):
             begun = time.perf_counter()
-            self.reduce(0, rows, outputs, status, used)
+            self.reduce(0, rows, *cells)
             taken.append(time.perf_counter() - begun)
-        return min(taken) / (rows * cells)
+        return min(taken) / cells.number
 
     def reduce(self, cell: int, rows: int, outputs: Mapping[str, Floats], status: Any, used: Any) -> Rows:
         """Rows of equally many cells, which lie one behind the other from cell number `cell` on."""
@@ -189,20 +185,16 @@ class Reducer:
 
 def strip_bytes(study: Study) -> int:
     """Bytes of the cells that a thread holds while it reduces them."""
-    return 0 if study.summary is None else _room(study) * (_cell_bytes(study) + 2)
+    return 0 if study.summary is None else _strip_cells(study) * (_cell_bytes(study) + 2)
 
 
-def _room(study: Study) -> int:
+def _strip_cells(study: Study) -> int:
     """Cells of a strip, of the study alone, for sums hang on it."""
     return min(STRIP, 1 << max(0, (STRIP_BYTES // _cell_bytes(study)).bit_length() - 1))
 
 
 def _cell_bytes(study: Study) -> int:
-    return sum(8 * math.prod(shape) for shape in _shapes(study).values())
-
-
-def _shapes(study: Study) -> dict[str, tuple[int, ...]]:
-    return {f.name: tuple(study.lengths[d] for d in f.dims) for f in study.asked}
+    return sum(8 * math.prod(shape) for shape in study.shapes.values())
 
 
 def _column(name: str, dtype: str, *shape: int) -> Column:

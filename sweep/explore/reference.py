@@ -51,8 +51,8 @@ class Reference:
 
 def given_reference(study: Study, values: Mapping[str, Any]) -> Reference:
     """Values of some outputs in all cells of a study; NaN in all of them: there is nothing to give."""
-    size, lengths = Grid(study).size, study.lengths
-    shapes = {f.name: (size, *(lengths[d] for d in f.dims)) for f in study.asked}
+    size = Grid(study).size
+    shapes = {name: (size, *shape) for name, shape in study.shapes.items()}
     taken = {}
     for name, column in values.items():
         if name not in shapes:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.interface import FIRST_REFUSAL, Status
-from sweep.cells.grid import Grid
+from sweep.cells.grid import Grid, empty_cells
 from sweep.cells.sample import sampled, solved, with_method
 from sweep.explore.plan import small_duration
 from sweep.explore.reference import Reference, best_reference, errors, given_reference
@@ -280,14 +280,12 @@ def _timed(study: Study) -> float:
     """Time per cell that this thread spends: what else runs on the machine matters less."""
     from sweep.cells.solve import Solver
 
-    size, lengths, solver = Grid(study).size, study.lengths, Solver(study)
-    outputs = {f.name: np.empty((size, *(lengths[d] for d in f.dims))) for f in study.asked}
-    status, used = np.empty(size, np.int8), np.empty(size, np.int8)
+    cells, solver = empty_cells(study, Grid(study).size), Solver(study)
     count, begin = 0, time.thread_time()
     while (spent := time.thread_time() - begin) < LEAST_SECONDS or not count:
-        solver.solve(0, size, outputs, status, used)
+        solver.solve(0, cells.number, *cells)
         count += 1
-    return spent / count / size
+    return spent / count / cells.number
 
 
 def _cell(study: Study, index: int) -> str:

@@ -1,1 +1,5 @@
-"""One run of a study: faces `run`, `session`, `extend`; `cluster`, `dispatch` and `worker` on dask."""
+"""One run of a study, here or on a cluster: `run` is what others may use.
+
+A `task` is what was asked for; `resume` looks at what stands at its place; a `session` computes blocks on threads, or has
+an executor compute them: `dispatch`, which gives them to a `worker` of a `cluster`. `extend` takes known cells over.
+"""

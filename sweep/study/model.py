@@ -145,6 +145,16 @@ class Study:
         found |= {name: len(values) for name, values in self.along.items()}
         return found | {dim: found[other] for dim, other in self.kernel.same_length.items()}
 
+    def shape(self, field: Field) -> tuple[int, ...]:
+        """Shape of a parameter or output in one cell."""
+        lengths = self.lengths if field.dims else {}
+        return tuple(lengths[dim] for dim in field.dims)
+
+    @property
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Shapes in one cell of the outputs asked for."""
+        return {field.name: self.shape(field) for field in self.asked}
+
     def array(self, name: str) -> NDArray[np.float64]:
         """What is given of an array parameter: its values, or those of all cells."""
         source = self.follows.get(name, name)
