@@ -1,5 +1,5 @@
 """One run of a study, here or on a cluster: `run` is what others may use.
 
-A `task` is what was asked for; `resume` looks at what stands at its place; a `session` computes blocks on threads, or has
-an executor compute them: `dispatch`, which gives them to a `worker` of a `cluster`. `extend` takes known cells over.
+A `task` is what was asked for; `resume` looks at what stands at its place already; a `session` computes blocks on
+threads, or has an executor do it: `dispatch`, which gives them to a `worker` of a `cluster`. `extend` reuses cells.
 """
