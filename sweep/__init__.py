@@ -36,37 +36,28 @@ if TYPE_CHECKING:
     from sweep.system.errors import StudyError as StudyError
     from sweep.system.errors import SweepError as SweepError
 
-_HOMES = {
-    "read_study": "study.read",
-    "build_study": "study.read",
-    "plan": "explore.plan",
-    "run": "runs.run",
-    "open_result": "results.open",
-    "verify": "results.verify",
-    "local_exponent": "analysis.exponents",
-    "local_exponent_error": "analysis.exponents",
-    "exponent": "analysis.exponents",
-    "fit_exponent": "analysis.exponents",
-    "crossover": "analysis.exponents",
-    "fit_two_laws": "analysis.two_laws",
-    "where_exponent": "analysis.exponents",
-    "where_value": "analysis.exponents",
-    "scaling": "explore.groups",
-    "rescaled": "explore.groups",
-    "collapse_quality": "explore.groups",
-    "plot": "show.charts",
-    "plot_precision": "show.charts",
-    "work_precision": "explore.work_precision",
-    "in_units": "results.units",
-    "contours": "analysis.maps",
-    "exponent_map": "analysis.maps",
-    "refine": "explore.refine",
-    "study_of": "explore.refine",
-    "where": "results.filter",
-    "export": "results.export",
-    "SweepError": "system.errors",
-    "StudyError": "system.errors",
+_PUBLIC = {
+    "study.read": ("read_study", "build_study"),
+    "runs.run": ("run",),
+    "results.open": ("open_result",),
+    "results.verify": ("verify",),
+    "results.filter": ("where",),
+    "results.units": ("in_units",),
+    "results.export": ("export",),
+    "analysis.exponents": (
+        *("local_exponent", "local_exponent_error", "exponent", "fit_exponent"),
+        *("crossover", "where_exponent", "where_value"),
+    ),
+    "analysis.two_laws": ("fit_two_laws",),
+    "analysis.maps": ("contours", "exponent_map"),
+    "explore.plan": ("plan",),
+    "explore.groups": ("scaling", "rescaled", "collapse_quality"),
+    "explore.work_precision": ("work_precision",),
+    "explore.refine": ("refine", "study_of"),
+    "show.charts": ("plot", "plot_precision"),
+    "system.errors": ("SweepError", "StudyError"),
 }
+_HOMES = {name: home for home, names in _PUBLIC.items() for name in names}
 """Public names and the modules they live in; a module is imported when one of its names is first used."""
 
 __all__ = list(_HOMES)

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
 from sweep.system.errors import SweepError
 
@@ -63,141 +63,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     return OK
 
 
-def parser() -> argparse.ArgumentParser:
-    """All commands and their options."""
-    top = argparse.ArgumentParser(prog="sweep", description="Sweep a kernel over a grid of parameters.")
-    top.add_argument("--version", action="version", version=_version())
-    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-
-    kernels = _command(commands, "kernels", _kernels, "what can be swept: parameters, units, outputs, methods")
-    kernels.add_argument("name", metavar="NAME", nargs="?", help="tell all about this one")
-    kernels.add_argument("--study", metavar="FILE.toml", type=Path, help="write a study of it to begin with")
-    _add_allow_import(kernels)
-
-    plan = _command(commands, "plan", _plan, "cells, bytes, memory and a timed forecast, before anything runs")
-    _add_study(plan)
-
-    run = _command(commands, "run", _run, "compute a study, or continue where it stopped")
-    _add_study(run)
-    run.add_argument("-o", "--output", metavar="OUT.h5", type=Path, help="default: the study's name with .h5, here")
-    run.add_argument("--force", action="store_true", help="overwrite the result of another study")
-    text = "of a result of the same study with fewer values on its axes, compute the new cells only"
-    run.add_argument("--extend", action="store_true", help=text)
-    text = "compute on the workers of a dask scheduler, e.g. tcp://10.0.0.1:8786, instead of here"
-    run.add_argument("--cluster", metavar="ADDRESS", help=text)
-    text = "stop within a block's time of it, exit status 0; the same command continues"
-    run.add_argument("--until", metavar="07:00", help=text)
-
-    show = _command(commands, "show", _show, "what is in a result, how much is done, what became of its cells")
-    _add_result(show)
-
-    verify = _command(commands, "verify", _verify, "whether a result, finished or not, is what was written")
-    _add_result(verify)
-
-    fit = _command(commands, "fit", _fit, "exponent of a power law, and where two laws meet")
-    _add_result(fit)
-    fit.add_argument("--y", metavar="OUTPUT", required=True)
-    fit.add_argument("--x", metavar="AXIS", required=True)
-    window = "part of the axis to fit over; given twice, also tells where the two laws meet"
-    fit.add_argument("--window", nargs=2, type=float, metavar=("LO", "HI"), action="append", help=window)
-    fit.add_argument("--confidence", type=float, default=0.95, metavar="SHARE", help="of the intervals; default: 0.95")
-    text = "whether the values carry independent noise; default: as their scatter shows"
-    fit.add_argument("--noise", choices=("yes", "no"), help=text)
-    fit.add_argument("-o", "--output", metavar="FILE.csv", type=Path, help="also write the table")
-    _add_force(fit)
-    _add_at(fit)
-
-    plot = _command(commands, "plot", _plot, "a figure of one output")
-    _add_result(plot)
-    plot.add_argument(
-        "-o", "--output", metavar="FILE.png", type=Path, help="default: the result's name with .png, here"
-    )
-    _add_force(plot)
-    plot.add_argument("--y", metavar="OUTPUT", help="default: the first output")
-    plot.add_argument("--x", metavar="AXIS", help="default: the first axis")
-    _add_at(plot)
-    _add_units(plot)
-
-    chart = _command(
-        commands, "chart", _chart, "error against time of every method of a kernel, on the cells of a study"
-    )
-    chart.add_argument("study", metavar="STUDY.toml", type=Path)
-    chart.add_argument(
-        "-o", "--output", metavar="FILE.png", type=Path, help="default: the study's name with _chart.png, here"
-    )
-    _add_force(chart)
-    chart.add_argument("--methods", metavar="METHOD", nargs="+", help="default: auto and all that can do the study")
-    chart.add_argument("--rtol", metavar="RTOL", nargs="+", type=float, help="default: 1e-3 to 1e-13")
-    chart.add_argument("--cells", metavar="N", type=int, default=1024, help="of the study at most; default: 1024")
-    chart.add_argument(
-        "--reference", metavar="METHOD", help="taken for the truth; default: the one with the best bound"
-    )
-    _add_allow_import(chart)
-
-    refine = _command(commands, "refine", _refine, "add cells to a result where it bends, until it can be interpolated")
-    _add_result(refine)
-    refine.add_argument("--y", metavar="OUTPUT", nargs="+", required=True)
-    refine.add_argument("--tolerance", metavar="SHARE", type=float, required=True, help="relative, e.g. 1e-3")
-    refine.add_argument("-o", "--output", metavar="REFINED.h5", type=Path, required=True)
-    _add_force(refine)
-    refine.add_argument("--most-cells", metavar="N", type=int, default=1_000_000, help="altogether; default: 1000000")
-    refine.add_argument("--workers", metavar="N", type=int, help="cores to use; default: all")
-    _add_allow_import(refine)
-
-    report = _command(commands, "report", _report, "one self-contained page of HTML: figures, exponents, provenance")
-    _add_result(report)
-    report.add_argument(
-        "-o", "--output", metavar="FILE.html", type=Path, help="default: the result's name with .html, here"
-    )
-    _add_force(report)
-    _add_units(report)
-
-    export = _command(commands, "export", _export, "write a result as csv, parquet, netCDF4 or zarr")
-    _add_result(export)
-    export.add_argument("-o", "--output", metavar="FILE.csv|.parquet|.nc|.zarr", type=Path, required=True)
-    _add_force(export)
-    text = "only cells for which this holds, e.g. \"status == 'OK' and R < 0.1\""
-    export.add_argument("--where", metavar="CONDITION", help=text)
-    _add_units(export)
-    return top
-
-
-def _command(commands: Any, name: str, function: Callable[[argparse.Namespace], None], text: str) -> Any:
-    command = commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
-    command.set_defaults(command=function)
-    return command
-
-
-def _add_study(command: Any) -> None:
-    command.add_argument("study", metavar="STUDY.toml", type=Path)
-    command.add_argument("--workers", metavar="N", type=int, help="cores to use; default: all")
-    _add_allow_import(command)
-
-
-def _add_result(command: Any) -> None:
-    command.add_argument("result", metavar="OUT.h5", type=Path)
-
-
-def _add_allow_import(command: Any) -> None:
-    command.add_argument("--allow-import", action="store_true", help='allow a kernel "module:NAME" of your own')
-
-
-def _add_force(command: Any) -> None:
-    text = "overwrite what is there even if it is not from an earlier command of this kind"
-    command.add_argument("--force", action="store_true", help=text)
-
-
-def _add_at(command: Any) -> None:
-    command.add_argument(
-        "--at", metavar="AXIS=VALUE", nargs="+", action="extend", default=[], help="pick one value of another axis"
-    )
-
-
-def _add_units(command: Any) -> None:
-    text = "give a variable in another unit, e.g. A0=degree e=mm wear=mm/hour"
-    command.add_argument("--unit", metavar="NAME=UNIT", nargs="+", action="extend", default=[], help=text)
-
-
 def _kernels(arguments: argparse.Namespace) -> None:
     from sweep.show.kernels import catalogue_text, kernel_text, write_starter
 
@@ -205,9 +70,9 @@ def _kernels(arguments: argparse.Namespace) -> None:
         raise SweepError("--study: name a kernel as well, e.g. sweep kernels foliot --study foliot.toml")
     if arguments.study:
         write_starter(arguments.name, arguments.study, arguments.allow_import)
-        _tell(arguments.study)
+        _print(arguments.study)
         return
-    _tell(kernel_text(arguments.name, arguments.allow_import) if arguments.name else catalogue_text())
+    _print(kernel_text(arguments.name, arguments.allow_import) if arguments.name else catalogue_text())
 
 
 def _plan(arguments: argparse.Namespace) -> None:
@@ -215,7 +80,7 @@ def _plan(arguments: argparse.Namespace) -> None:
     from sweep.system.progress import Progress
 
     found = plan(_study(arguments), workers=arguments.workers, note=Progress(1, sys.stderr, "plan").note)
-    _tell(found)
+    _print(found)
     if found.warnings:
         raise SweepError("\n".join(f"{arguments.study}: {text}" for text in found.warnings))
 
@@ -227,30 +92,30 @@ def _run(arguments: argparse.Namespace) -> None:
 
     output = arguments.output or Path(f"{arguments.study.stem}.h5")
     _check_readable(output)
-    before = _mark(output)
+    before = _identity(output)
     options = {name: getattr(arguments, name) for name in ("workers", "cluster", "force", "extend", "until")}
     whole = complete(study, output, **options)
-    told = "unfinished; " if not whole else "done before; " if before and _mark(output) == before else ""
-    with _after(study, output, told) as found:
-        _tell(f"{output}: {told}{summary_text(found)}")
+    state = "unfinished; " if not whole else "done before; " if before and _identity(output) == before else ""
+    with _after(study, output, state) as found:
+        _print(f"{output}: {state}{summary_text(found)}")
 
 
-def _after(study: Study, output: Path, told: str) -> xr.Dataset | Stored:
+def _after(study: Study, output: Path, state: str) -> xr.Dataset | Stored:
     """The result after a run; of one written just now without xarray, which takes longer to load than a small run."""
-    if not told:
+    if not state:
         from sweep.results.stored import Stored
 
         return Stored(output, study)
     from sweep.results.open import open_result, open_unfinished
 
-    return open_unfinished(output) if told.startswith("unfinished") else open_result(output)
+    return open_unfinished(output) if state.startswith("unfinished") else open_result(output)
 
 
 def _show(arguments: argparse.Namespace) -> None:
     from sweep.show.text import result_text
 
     with _result(arguments) as dataset:
-        _tell(result_text(arguments.result, dataset))
+        _print(result_text(arguments.result, dataset))
 
 
 def _verify(arguments: argparse.Namespace) -> None:
@@ -260,7 +125,7 @@ def _verify(arguments: argparse.Namespace) -> None:
     verdict = verify(arguments.result)
     if not verdict.whole:
         raise SweepError(str(verdict))
-    _tell(verdict)
+    _print(verdict)
 
 
 def _fit(arguments: argparse.Namespace) -> None:
@@ -272,10 +137,10 @@ def _fit(arguments: argparse.Namespace) -> None:
         part = pick(dataset, arguments.at)
         noise = {None: None, "yes": True, "no": False}[arguments.noise]
         found = laws(part, arguments.y, arguments.x, arguments.window or [], arguments.confidence, noise)
-    _tell(laws_text(found))
+    _print(laws_text(found))
     if arguments.output:
         write_laws(found, arguments.output)
-        _tell(arguments.output)
+        _print(arguments.output)
 
 
 def _plot(arguments: argparse.Namespace) -> None:
@@ -286,7 +151,7 @@ def _plot(arguments: argparse.Namespace) -> None:
     _check_target(arguments, output)
     with _result(arguments) as dataset:
         plot(_in_units(pick(dataset, arguments.at), arguments.unit), output, y=arguments.y, x=arguments.x)
-    _tell(output)
+    _print(output)
 
 
 def _chart(arguments: argparse.Namespace) -> None:
@@ -303,9 +168,9 @@ def _chart(arguments: argparse.Namespace) -> None:
         cells=arguments.cells,
         reference=arguments.reference,
     )
-    _tell(precision_text(found))
+    _print(precision_text(found))
     plot_precision(found, output)
-    _tell(output)
+    _print(output)
 
 
 def _refine(arguments: argparse.Namespace) -> None:
@@ -324,7 +189,7 @@ def _refine(arguments: argparse.Namespace) -> None:
             workers=arguments.workers,
             force=arguments.force,
         )
-    _tell(f"{arguments.output}: {found}")
+    _print(f"{arguments.output}: {found}")
 
 
 def _report(arguments: argparse.Namespace) -> None:
@@ -333,7 +198,7 @@ def _report(arguments: argparse.Namespace) -> None:
     output = arguments.output or Path(f"{arguments.result.stem}.html")
     _check_target(arguments, output, "page")
     with _result(arguments) as dataset:
-        _tell(write_page(_in_units(dataset, arguments.unit), arguments.result, output))
+        _print(write_page(_in_units(dataset, arguments.unit), arguments.result, output))
 
 
 def _export(arguments: argparse.Namespace) -> None:
@@ -343,7 +208,7 @@ def _export(arguments: argparse.Namespace) -> None:
     _check_target(arguments, arguments.output)
     with _result(arguments) as dataset:
         chosen = dataset if arguments.where is None else where(dataset, arguments.where)
-        _tell(export(_in_units(chosen, arguments.unit), arguments.output, force=arguments.force))
+        _print(export(_in_units(chosen, arguments.unit), arguments.output, force=arguments.force))
 
 
 def _in_units(dataset: xr.Dataset, given: Sequence[str]) -> xr.Dataset:
@@ -373,7 +238,7 @@ def _result(arguments: argparse.Namespace) -> xr.Dataset:
     if path.suffix == ".toml":
         raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
     if not path.exists() and path.with_name(path.name + ".parts").is_dir():
-        _tell(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
+        _print(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
     _check_readable(path, "xarray")
     return open_result(path)
 
@@ -387,18 +252,18 @@ def _check_target(arguments: argparse.Namespace, target: Path, kind: str | None 
 
 
 def _check_readable(path: Path, *meanwhile: str) -> None:
-    """Raises SweepError where HDF5 hangs or crashes in a result although it is sealed: then it is forged.
+    """Raises SweepError where HDF5 hangs or crashes in a result although its trailer is right: then it is forged.
 
-    A result that is not sealed, or not there, is looked at by who opens it.
+    A result that is not intact, or not there, is looked at by who opens it.
 
     Parameters
     ----------
     meanwhile : names of modules to import while another process reads the result
     """
     from sweep.results.open import unreadable
-    from sweep.store.seal import probing, sealed
+    from sweep.store.probe import intact, probing
 
-    if not sealed(path):
+    if not intact(path):
         return
     read = probing(path)
     for name in meanwhile:
@@ -407,7 +272,7 @@ def _check_readable(path: Path, *meanwhile: str) -> None:
         raise unreadable(path, ValueError("HDF5 cannot read it"))
 
 
-def _mark(path: Path) -> tuple[int, int] | None:
+def _identity(path: Path) -> tuple[int, int] | None:
     """What changes when a file is written anew."""
     try:
         status = path.stat()
@@ -416,7 +281,7 @@ def _mark(path: Path) -> tuple[int, int] | None:
     return status.st_mtime_ns, status.st_ino
 
 
-def _tell(text: object, file: TextIO | None = None) -> None:
+def _print(text: object, file: TextIO | None = None) -> None:
     """Prints, to stdout unless said otherwise, what may hold text of other people."""
     from sweep.system.table import printable
 
@@ -424,7 +289,7 @@ def _tell(text: object, file: TextIO | None = None) -> None:
 
 
 def _fail(message: str, code: int) -> int:
-    _tell(message, sys.stderr)
+    _print(message, sys.stderr)
     return code
 
 
@@ -435,6 +300,170 @@ def _version() -> str:
         return f"foliot {metadata.version('foliot')}"
     except metadata.PackageNotFoundError:
         return "foliot (not installed)"
+
+
+class Option(NamedTuple):
+    """What argparse's `add_argument` takes."""
+
+    names: tuple[str, ...]
+    keys: dict[str, Any]
+
+
+def option(name: str, text: str | None = None, **keys: Any) -> Option:
+    """An option, or an argument where the name has no dash."""
+    return Option(tuple(name.split()), {"help": text, **keys})
+
+
+def switch(name: str, text: str) -> Option:
+    """An option without a value."""
+    return option(name, text, action="store_true")
+
+
+def several(name: str, text: str, metavar: str) -> Option:
+    """An option with values, which may be given again."""
+    return option(name, text, metavar=metavar, nargs="+", action="extend", default=[])
+
+
+def output(metavar: str, text: str | None = None, required: bool = False) -> Option:
+    """Where a command writes."""
+    return option("-o --output", text, metavar=metavar, type=Path, required=required)
+
+
+class Command(NamedTuple):
+    """One command: what it is for, what does it, and what may stand behind its name."""
+
+    text: str
+    function: Callable[[argparse.Namespace], None]
+    options: tuple[Option, ...]
+
+    @classmethod
+    def of(cls, text: str, function: Callable[[argparse.Namespace], None], *options: Option) -> Command:
+        return cls(text, function, options)
+
+
+STUDY = option("study", metavar="STUDY.toml", type=Path)
+RESULT = option("result", metavar="OUT.h5", type=Path)
+WORKERS = option("--workers", "cores to use; default: all", metavar="N", type=int)
+ALLOW_IMPORT = switch("--allow-import", 'allow a kernel "module:NAME" of your own')
+FORCE = switch("--force", "overwrite what is there even if it is not from an earlier command of this kind")
+AT = several("--at", "pick one value of another axis", "AXIS=VALUE")
+UNITS = several("--unit", "give a variable in another unit, e.g. A0=degree e=mm wear=mm/hour", "NAME=UNIT")
+
+COMMANDS = {
+    "kernels": Command.of(
+        "what can be swept: parameters, units, outputs, methods",
+        _kernels,
+        option("name", "tell all about this one", metavar="NAME", nargs="?"),
+        option("--study", "write a study of it to begin with", metavar="FILE.toml", type=Path),
+        ALLOW_IMPORT,
+    ),
+    "plan": Command.of(
+        "cells, bytes, memory and a timed forecast, before anything runs", _plan, STUDY, WORKERS, ALLOW_IMPORT
+    ),
+    "run": Command.of(
+        "compute a study, or continue where it stopped",
+        _run,
+        *(STUDY, WORKERS, ALLOW_IMPORT),
+        output("OUT.h5", "default: the study's name with .h5, here"),
+        switch("--force", "overwrite the result of another study"),
+        switch("--extend", "of a result of the same study with fewer values on its axes, compute the new cells only"),
+        option(
+            "--cluster",
+            "compute on the workers of a dask scheduler, e.g. tcp://10.0.0.1:8786, instead of here",
+            metavar="ADDRESS",
+        ),
+        option(
+            "--until", "stop within a block's time of it, exit status 0; the same command continues", metavar="07:00"
+        ),
+    ),
+    "show": Command.of("what is in a result, how much is done, what became of its cells", _show, RESULT),
+    "verify": Command.of("whether a result, finished or not, is what was written", _verify, RESULT),
+    "fit": Command.of(
+        "exponent of a power law, and where two laws meet",
+        _fit,
+        RESULT,
+        option("--y", metavar="OUTPUT", required=True),
+        option("--x", metavar="AXIS", required=True),
+        option(
+            "--window",
+            "part of the axis to fit over; given twice, also tells where the two laws meet",
+            nargs=2,
+            type=float,
+            metavar=("LO", "HI"),
+            action="append",
+        ),
+        option("--confidence", "of the intervals; default: 0.95", type=float, default=0.95, metavar="SHARE"),
+        option(
+            "--noise",
+            "whether the values carry independent noise; default: as their scatter shows",
+            choices=("yes", "no"),
+        ),
+        output("FILE.csv", "also write the table"),
+        *(FORCE, AT),
+    ),
+    "plot": Command.of(
+        "a figure of one output",
+        _plot,
+        RESULT,
+        output("FILE.png", "default: the result's name with .png, here"),
+        FORCE,
+        option("--y", "default: the first output", metavar="OUTPUT"),
+        option("--x", "default: the first axis", metavar="AXIS"),
+        *(AT, UNITS),
+    ),
+    "chart": Command.of(
+        "error against time of every method of a kernel, on the cells of a study",
+        _chart,
+        STUDY,
+        output("FILE.png", "default: the study's name with _chart.png, here"),
+        FORCE,
+        option("--methods", "default: auto and all that can do the study", metavar="METHOD", nargs="+"),
+        option("--rtol", "default: 1e-3 to 1e-13", metavar="RTOL", nargs="+", type=float),
+        option("--cells", "of the study at most; default: 1024", metavar="N", type=int, default=1024),
+        option("--reference", "taken for the truth; default: the one with the best bound", metavar="METHOD"),
+        ALLOW_IMPORT,
+    ),
+    "refine": Command.of(
+        "add cells to a result where it bends, until it can be interpolated",
+        _refine,
+        RESULT,
+        option("--y", metavar="OUTPUT", nargs="+", required=True),
+        option("--tolerance", "relative, e.g. 1e-3", metavar="SHARE", type=float, required=True),
+        output("REFINED.h5", required=True),
+        FORCE,
+        option("--most-cells", "altogether; default: 1000000", metavar="N", type=int, default=1_000_000),
+        *(WORKERS, ALLOW_IMPORT),
+    ),
+    "report": Command.of(
+        "one self-contained page of HTML: figures, exponents, provenance",
+        _report,
+        RESULT,
+        output("FILE.html", "default: the result's name with .html, here"),
+        *(FORCE, UNITS),
+    ),
+    "export": Command.of(
+        "write a result as csv, parquet, netCDF4 or zarr",
+        _export,
+        RESULT,
+        output("FILE.csv|.parquet|.nc|.zarr", required=True),
+        FORCE,
+        option("--where", "only cells for which this holds, e.g. \"status == 'OK' and R < 0.1\"", metavar="CONDITION"),
+        UNITS,
+    ),
+}
+
+
+def parser() -> argparse.ArgumentParser:
+    """All commands and their options."""
+    top = argparse.ArgumentParser(prog="sweep", description="Sweep a kernel over a grid of parameters.")
+    top.add_argument("--version", action="version", version=_version())
+    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for name, (text, function, options) in COMMANDS.items():
+        command = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+        command.set_defaults(command=function)
+        for names, keys in options:
+            command.add_argument(*names, **keys)
+    return top
 
 
 if __name__ == "__main__":

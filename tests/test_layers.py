@@ -1,7 +1,11 @@
-"""What the packages are, and what importing them costs."""
+"""What the packages are, what importing them costs, and that a room's private modules stay in it."""
 
+import ast
+import graphlib
+import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -56,3 +60,114 @@ def test_a_small_run_to_a_file_needs_neither_xarray_nor_pandas(tmp_path):
     )
     assert told.isdisjoint({"xarray", "pandas", "pint", "dask"})
     assert (tmp_path / "out.h5").exists()
+
+
+# private modules: contracts of import-linter know no names, so the sources are walked here
+
+
+def stated(source, package):
+    """Dotted names in the import statements of a source, wherever they stand."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = ".".join(package[: len(package) - node.level + 1]) if node.level else ""
+            yield from (".".join(filter(None, [base, node.module, alias.name])) for alias in node.names)
+
+
+def imported(source, package):
+    """Dotted names that a source imports, also in the texts that it writes modules from."""
+    yield from stated(source, package)
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield from re.findall(r"\b(?:kernels|sweep)(?:\.\w+)+", node.value)
+
+
+def is_module(parts):
+    path = ROOT.joinpath(*parts)
+    return path.with_suffix(".py").is_file() or path.is_dir()
+
+
+def foreign_private(source, package):
+    """Private modules of another room than `package`, which is e.g. ["kernels", "foliot"]."""
+    for name in imported(source, package):
+        parts = name.split(".")
+        private = [k for k, part in enumerate(parts) if re.match("_[^_]", part) and is_module(parts[: k + 1])]
+        if private and parts[: private[0]][:2] != package[:2]:
+            yield ".".join(parts[: private[0] + 1])
+
+
+PRIVATE = next((ROOT / "kernels" / "foliot").glob("_[a-z]*.py")).stem
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        f"from kernels.foliot.{PRIVATE} import size",
+        f"import kernels.foliot.{PRIVATE}",
+        f"from kernels.foliot import {PRIVATE}",
+        f"from ..foliot.{PRIVATE} import size",
+        f"HEAD = 'from kernels.foliot.{PRIVATE} import size'",
+    ],
+)
+def test_a_private_module_of_another_room_is_found(source):
+    assert list(foreign_private(source, ["kernels", "wear"])) == [f"kernels.foliot.{PRIVATE}"]
+    assert not list(foreign_private(source, ["kernels", "foliot"]))
+
+
+@pytest.mark.parametrize("top", [kernels, sweep])
+def test_no_room_reaches_for_the_private_modules_of_another(top):
+    files = list(Path(top.__file__).parent.rglob("*.py"))
+    assert len(files) > 50
+    rooms = {file: list(file.relative_to(ROOT).parent.parts) for file in files}
+    found = {file.name: list(foreign_private(file.read_text("utf-8"), rooms[file])) for file in files}
+    assert not {file: names for file, names in found.items() if names}
+
+
+def file_of(name):
+    """The file of a module, or of the one that a name is in; None of other packages."""
+    parts = name.split(".")
+    for end in range(len(parts), 0, -1):
+        path = ROOT.joinpath(*parts[:end])
+        for file in (path.with_suffix(".py"), path / "__init__.py"):
+            if file.is_file():
+                return file
+    return None
+
+
+def graph(top):
+    """Which files each file of a package imports, lazily and for types alone, too."""
+    found = {}
+    for file in Path(top.__file__).parent.rglob("*.py"):
+        names = stated(file.read_text("utf-8"), list(file.relative_to(ROOT).parent.parts))
+        found[file] = {file_of(name) for name in names} - {None, file}
+    return found
+
+
+@pytest.mark.parametrize("top", [kernels, sweep])
+def test_no_file_imports_itself_by_way_of_others(top):
+    imports = graph(top)
+    assert sum(map(len, imports.values())) > len(imports)
+    # the public names of the package itself are for users
+    imports.pop(Path(top.__file__))
+    try:
+        graphlib.TopologicalSorter(imports).prepare()
+    except graphlib.CycleError as circle:
+        pytest.fail(" <- ".join(str(file.relative_to(ROOT)) for file in circle.args[1]))
+
+
+def faces_used():
+    """Rooms of the engine, and the modules of each that other rooms import."""
+    for file in Path(sweep.__file__).parent.rglob("*.py"):
+        package = list(file.relative_to(ROOT).parent.parts)
+        for name in imported(file.read_text("utf-8"), package):
+            top, room, module, *_ = [*name.split("."), "", ""]
+            if top == "sweep" and is_module([top, room, module]) and package[:2] != [top, room]:
+                yield room, module
+
+
+def test_a_room_says_which_of_its_modules_others_may_use():
+    used = set(faces_used())
+    assert len({room for room, _ in used}) == 9
+    doc = {room: import_module(f"sweep.{room}").__doc__ for room, _ in used}
+    assert not sorted((room, module) for room, module in used if f"`{module}`" not in doc[room])

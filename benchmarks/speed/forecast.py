@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 import sweep
+from sweep.cells.block import sampled_study
 from sweep.explore.plan import plan
-from sweep.runs.session import sampled_study
 from sweep.study.model import Study
 from sweep.system.pool import cores
 from sweep.system.progress import Progress

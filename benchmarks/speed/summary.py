@@ -22,12 +22,12 @@ import numpy as np
 from engine import kernel_seconds
 
 import sweep
-from sweep.cells.contents import part_columns
 from sweep.cells.fingerprint import fingerprint
+from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import Partition
 from sweep.cells.solve import Solver
 from sweep.results.statuses import account
-from sweep.store.manifest import read_spec
+from sweep.store.manifest import read_manifest
 from sweep.store.store import folder_of, opened
 from sweep.study.model import Study
 
@@ -108,9 +108,9 @@ def parts(folder: Path, count: int) -> None:
         disk.fsync = real
     begun = time.perf_counter()
     with opened(path, columns) as store:
-        spec = read_spec(store.folder)
-        assert spec is not None
-        store.resume(spec)
+        manifest = read_manifest(store.folder)
+        assert manifest is not None
+        store.resume(manifest)
         left = store.missing()
         taken = time.perf_counter() - begun
     assert left == [count - 1]

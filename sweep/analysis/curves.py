@@ -47,6 +47,19 @@ def _coordinate(y: xr.DataArray, dim: str) -> tuple[str, NDArray[Any]]:
     raise SweepError(f"{title(y)} has no axis {dim!r}; " + (f"did you mean {close[0]}?" if close else there))
 
 
+def window_logs(y: xr.DataArray, dim: str, window: Window | None) -> tuple[str, Array, xr.DataArray]:
+    """Dimension that `dim` runs along, ln dim inside the window, and ln y there. Raises SweepError."""
+    dimension, x = positive_axis(y, dim)
+    inside = np.flatnonzero(inside_window(x, window, dim))
+    return dimension, np.log(x[inside]), logarithm(y.isel({dimension: inside}), dim)
+
+
+def check_confidence(confidence: float) -> None:
+    """Raises SweepError where it is no share."""
+    if not 0 < confidence < 1:
+        raise SweepError(f"confidence: expected a number between 0 and 1, found {confidence}")
+
+
 def inside_window(x: Array, window: Window | None, dim: str) -> NDArray[np.bool_]:
     low, high = ends(window, dim)
     # an end that is a grid point up to rounding is meant to be in

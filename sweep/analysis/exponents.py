@@ -6,7 +6,7 @@ coordinate along a dimension, such as an axis of a zip design: `local_exponent(d
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import xarray as xr
@@ -14,16 +14,17 @@ import xarray as xr
 from sweep.analysis.curves import (
     Window,
     along,
+    check_confidence,
     ends,
     inside_window,
     log_of,
-    logarithm,
     missing_is_nan,
     positive_axis,
     scatter_is_noise,
     title,
+    window_logs,
 )
-from sweep.analysis.loglog import EPSILON, FEWEST, LINE, Array, brackets, line, root, slope_errors, slopes
+from sweep.analysis.loglog import EPSILON, FEWEST, Array, Line, brackets, line, root, slope_errors, slopes
 from sweep.system.errors import SweepError
 
 Finder = Callable[[Array, Array, int], tuple[float, float]]
@@ -78,11 +79,7 @@ def local_exponent(y: xr.DataArray, dim: str) -> xr.DataArray:
     SweepError
         If `dim` is unknown, not positive, not monotone, or shorter than three.
     """
-    dimension, x = positive_axis(y, dim)
-    found = along(lambda z: slopes(np.log(x), z, 5), log_of(y), dimension)
-    found.name = f"{y.name}_exponent" if y.name is not None else "exponent"
-    found.attrs = {"units": "1", "long_name": f"local exponent of {title(y)} in {dim}"}
-    return found
+    return _local(y, dim, lambda t, z: slopes(t, z, 5), "exponent", "local exponent")
 
 
 def local_exponent_error(y: xr.DataArray, dim: str) -> xr.DataArray:
@@ -103,10 +100,14 @@ def local_exponent_error(y: xr.DataArray, dim: str) -> xr.DataArray:
     SweepError
         As `local_exponent`.
     """
+    return _local(y, dim, slope_errors, "exponent_error", "error of the local exponent")
+
+
+def _local(y: xr.DataArray, dim: str, function: Callable[[Array, Array], Array], name: str, words: str) -> xr.DataArray:
     dimension, x = positive_axis(y, dim)
-    found = along(lambda z: slope_errors(np.log(x), z), log_of(y), dimension)
-    found.name = f"{y.name}_exponent_error" if y.name is not None else "exponent_error"
-    found.attrs = {"units": "1", "long_name": f"error of the local exponent of {title(y)} in {dim}"}
+    found = along(lambda z: function(np.log(x), z), log_of(y), dimension)
+    found.name = name if y.name is None else f"{y.name}_{name}"
+    found.attrs = {"units": "1", "long_name": f"{words} of {title(y)} in {dim}"}
     return found
 
 
@@ -154,24 +155,24 @@ def fit_exponent(
     SweepError
         If `dim` is unknown or unfit, if y is not positive somewhere in the window, or if no line has three points.
     """
-    if not 0 < confidence < 1:
-        raise SweepError(f"confidence: expected a number between 0 and 1, found {confidence}")
-    dimension, x = positive_axis(y, dim)
-    inside = np.flatnonzero(inside_window(x, window, dim))
-    part = y.isel({dimension: inside})
-    logs = logarithm(part, dim)
-    numbers = along(lambda z: line(np.log(x[inside]), z), logs, dimension, "number")
-    fit = xr.Dataset({name: numbers.isel(number=k, drop=True) for k, name in enumerate(LINE)})
+    check_confidence(confidence)
+    dimension, t, logs = window_logs(y, dim, window)
+    fit = _numbers(Line._fields, lambda z: np.stack(line(t, z), axis=-1), logs, dimension)
     if not bool(fit.exponent.notnull().any()):
         raise SweepError(
             f"a line needs at least {FEWEST} points, found {int(fit.points.max())} of {title(y)} in the window "
             f"{ends(window, dim)[0]:g} to {ends(window, dim)[1]:g} of {dim}; choose a wider one"
         )
     fit["points"] = fit.points.astype(np.int64)
-    bounds = along(lambda z: _interval(np.log(x[inside]), z, confidence, noise), logs, dimension, "number")
-    for k, name in enumerate(("exponent_low", "exponent_high", "noisy")):
-        fit[name] = bounds.isel(number=k, drop=True)
+    names = ("exponent_low", "exponent_high", "noisy")
+    fit = fit.assign(_numbers(names, lambda z: _interval(t, z, confidence, noise), logs, dimension).data_vars)
     return _describe_fit(fit, y, dim)
+
+
+def _numbers(names: Sequence[str], function: Callable[[Array], Array], y: xr.DataArray, dimension: str) -> xr.Dataset:
+    """Numbers that a function puts in place of the points of each line, under these names."""
+    numbers = along(function, y, dimension, "number")
+    return xr.Dataset({name: numbers.isel(number=k, drop=True) for k, name in enumerate(names)})
 
 
 def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
@@ -242,7 +243,7 @@ def where_value(curve: xr.DataArray, dim: str, value: float, window: Window | No
         fine, coarse = (root(t, c, bracket, value, points) for points in (6, 4))
         return fine, abs(fine - coarse) + _rounding(t, c, bracket, EPSILON * _largest(c))
 
-    return _where(missing_is_nan(curve), dim, value, window, (lambda t, c: c, find))
+    return _where(missing_is_nan(curve), dim, value, window, lambda t, c: c, find)
 
 
 def where_exponent(y: xr.DataArray, dim: str, value: float, window: Window | None = None) -> xr.Dataset:
@@ -276,7 +277,7 @@ def where_exponent(y: xr.DataArray, dim: str, value: float, window: Window | Non
         noise = EPSILON * _largest(z) / float(abs(np.diff(t)).min())
         return fine, apart + _rounding(t, sixth, bracket, noise)
 
-    found = _where(log_of(y), dim, value, window, (lambda t, z: slopes(t, z, 7), find))
+    found = _where(log_of(y), dim, value, window, lambda t, z: slopes(t, z, 7), find)
     found.abscissa.attrs["long_name"] = f"where the exponent of {title(y)} is {value:g}"
     return found
 
@@ -285,12 +286,11 @@ def _interval(t: Array, z: Array, confidence: float, noise: bool | None) -> Arra
     """Ends of the confidence interval of a line's slope, and 1 where it is of noise; (..., n) to (..., 3)."""
     from scipy.special import stdtrit
 
-    numbers = line(t, z)
-    slope, error, count = (numbers[..., LINE.index(name)] for name in ("exponent", "exponent_error", "points"))
-    level, centre = (np.log(numbers[..., LINE.index(name)])[..., None] for name in ("level", "centre"))
+    fit = line(t, z)
+    slope, level, centre = fit.exponent, np.log(fit.level)[..., None], np.log(fit.centre)[..., None]
     noisy = scatter_is_noise(z - level - slope[..., None] * (t - centre), z) if noise is None else np.array(noise)
     rounding = EPSILON * (1.0 + np.nanmax(abs(z), axis=-1, initial=0.0)) / abs(t[-1] - t[0])
-    reach = stdtrit(np.maximum(count - 2, 1), (1 + confidence) / 2) * error + rounding
+    reach = stdtrit(np.maximum(fit.points - 2, 1), (1 + confidence) / 2) * fit.exponent_error + rounding
     local, doubt = _range_of_slopes(t, z)
     low, high = np.fmin(local[..., 0] - doubt, slope), np.fmax(local[..., 1] + doubt, slope)
     ends = np.where(noisy, slope - reach, low), np.where(noisy, slope + reach, high)
@@ -330,14 +330,19 @@ def _require_apart(low_fit: xr.Dataset, high_fit: xr.Dataset) -> None:
 
 
 def _where(
-    curve: xr.DataArray, dim: str, value: float, window: Window | None, ways: tuple[Callable[..., Array], Finder]
+    curve: xr.DataArray,
+    dim: str,
+    value: float,
+    window: Window | None,
+    seen: Callable[[Array, Array], Array],
+    find: Finder,
 ) -> xr.Dataset:
-    """The one passage of each line: ways[0] gives what passes `value`, ways[1] the place and its error in ln dim."""
+    """The one passage of each line: `seen` gives what passes `value`, `find` the place and its error in ln dim."""
     dimension, x = positive_axis(curve, dim)
     inside, t = inside_window(x, window, dim), np.log(x)
-    seen, find = ways
 
     def one(z: Array) -> tuple[float, float]:
+        """The place and its error; NaN and the number of places where that is not one."""
         places = brackets(np.where(inside, seen(t, z), np.nan), value)
         return find(t, z, places[0]) if len(places) == 1 else (np.nan, len(places))
 
@@ -345,12 +350,19 @@ def _where(
         lines = np.array([one(z) for z in values.reshape(-1, t.size)])
         return lines.reshape(*values.shape[:-1], 2)
 
-    numbers = along(all_lines, curve, dimension, "number")
-    place, error = numbers.isel(number=0, drop=True), numbers.isel(number=1, drop=True)
+    numbers = _numbers(("place", "error"), all_lines, curve, dimension)
+    place, error = numbers.place, numbers.error
     if not bool(place.notnull().any()):
         count = int(error.max())
         said = f"passes {value:g} {count} times" if count else f"does not pass {value:g}"
         raise SweepError(f"{title(curve)} {said} along {dim} in the window; choose another window")
+    return _describe_place(curve, dim, value, place, error)
+
+
+def _describe_place(
+    curve: xr.DataArray, dim: str, value: float, place: xr.DataArray, error: xr.DataArray
+) -> xr.Dataset:
+    """From `place` and `error` in ln dim."""
     abscissa: xr.DataArray = xr.apply_ufunc(np.exp, place, keep_attrs=True)
     found = xr.Dataset({"abscissa": abscissa, "abscissa_error": (abscissa * error).where(place.notnull())})
     units = str(curve.coords[dim].attrs.get("units", "1"))

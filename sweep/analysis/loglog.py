@@ -6,7 +6,7 @@ A missing point is NaN, and no stencil reaches across one: each run of neighbour
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,44 +136,58 @@ def _weights(nodes: Array, home: NDArray[np.intp]) -> Array:
     return weights
 
 
-LINE = (
-    "exponent", "exponent_error", "prefactor", "prefactor_error", "drift", "residual",
-    "points", "low", "high", "centre", "level", "level_error",
-)  # fmt: skip
-"""What `line` puts along its last axis."""
+class Line(NamedTuple):
+    """A straight line in log-log; `low`, `high`: first and last abscissa, `centre`, `level`: geometric means."""
+
+    exponent: Array
+    exponent_error: Array
+    prefactor: Array
+    prefactor_error: Array
+    drift: Array
+    residual: Array
+    points: Array
+    low: Array
+    high: Array
+    centre: Array
+    level: Array
+    level_error: Array
 
 
-def line(t: Array, z: Array) -> Array:
-    """Least-squares line z = level + exponent (t - centre), (..., n) to (..., 12) in the order of `LINE`.
+def line(t: Array, z: Array) -> Line:
+    """Least-squares line z = level + exponent (t - centre) of each line (..., n) of `z`.
 
     Sums run over deviations from the means, so a narrow window far from t = 0 costs no digits. `prefactor`,
     `low`, `high`, `centre` and `level` are turned back from logarithms. NaN where fewer than three points are left.
     """
     present = np.isfinite(z)
     n = present.sum(axis=-1)
-    enough = n >= FEWEST
     with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
-        count = np.where(enough, n, np.nan)
-        centre = _sum(present, t) / count
+        count = np.where(n >= FEWEST, n, np.nan)
+        centre, level = _sum(present, t) / count, _sum(present, z) / count
         u = np.where(present, t - centre[..., None], 0.0)
-        level = _sum(present, z) / count
         rise = np.where(present, z - level[..., None], 0.0)
         spread = (u * u).sum(axis=-1)
         slope = (u * rise).sum(axis=-1) / spread
         off = rise - slope[..., None] * u
         variance = (off * off).sum(axis=-1) / (count - 2)
-        at_one = np.sqrt(variance * (1 / count + centre**2 / spread))
         prefactor = np.exp(level - slope * centre)
         low = np.where(present, t, np.inf).min(axis=-1, initial=np.inf)
         high = np.where(present, t, -np.inf).max(axis=-1, initial=-np.inf)
-        columns = (
-            slope, np.sqrt(variance / spread), prefactor, prefactor * at_one,
-            _drift(u, off, present, high - low), np.expm1(abs(off).max(axis=-1, initial=0.0)),
-            n, np.exp(low), np.exp(high), np.exp(centre), np.exp(level), np.sqrt(variance / count),
-        )  # fmt: skip
-    found = np.stack([np.where(enough, column, np.nan) for column in columns], axis=-1)
-    found[..., LINE.index("points")] = n
-    return found
+        found = Line(
+            exponent=slope,
+            exponent_error=np.sqrt(variance / spread),
+            prefactor=prefactor,
+            prefactor_error=prefactor * np.sqrt(variance * (1 / count + centre**2 / spread)),
+            drift=_drift(u, off, present, high - low),
+            residual=np.expm1(abs(off).max(axis=-1, initial=0.0)),
+            points=n,
+            low=np.exp(low),
+            high=np.exp(high),
+            centre=np.exp(centre),
+            level=np.exp(level),
+            level_error=np.sqrt(variance / count),
+        )
+    return Line(*(np.where(n >= FEWEST, column, np.nan) for column in found))._replace(points=n)
 
 
 def _sum(present: NDArray[np.bool_], values: Array) -> Array:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep.analysis.curves import Window, inside_window, logarithm, noise_of, positive_axis, scatter_is_noise, title
+from sweep.analysis.curves import Window, along, check_confidence, noise_of, scatter_is_noise, title, window_logs
 from sweep.analysis.loglog import EPSILON, Array, line, slopes
 from sweep.system.errors import SweepError
 
@@ -25,10 +25,14 @@ FEWEST_POINTS = 8
 TELLING = 16
 """Points from which noise is told from the misfit of a smooth truth."""
 
-NUMBERS = (
-    "exponent", "exponent_low", "exponent_high", "crossover", "crossover_low", "crossover_high",
-    "width", "level", "residual", "points", "regimes", "evidence", "noisy",
-)  # fmt: skip
+LAWS = ("low", "high")
+EXPONENTS = ("exponent", "exponent_low", "exponent_high")
+"""Numbers of each law,"""
+OTHERS = (
+    *("crossover", "crossover_low", "crossover_high", "width", "level"),
+    *("residual", "points", "regimes", "evidence", "noisy"),
+)
+"""and those of both, which stand behind them in the result of one line."""
 
 NAMES = {
     "exponent": "exponent of the power law",
@@ -91,20 +95,10 @@ def fit_two_laws(
     SweepError
         If `dim` is unknown or unfit, y is not positive in the window, or no line has eight points.
     """
-    if not 0 < confidence < 1:
-        raise SweepError(f"confidence: expected a number between 0 and 1, found {confidence}")
-    dimension, x = positive_axis(y, dim)
-    inside = np.flatnonzero(inside_window(x, window, dim))
-    t = np.log(x[inside])
-    numbers: xr.DataArray = xr.apply_ufunc(
-        lambda z: _each(t, z, confidence, noise),
-        logarithm(y.isel({dimension: inside}), dim).compute(),
-        input_core_dims=[[dimension]],
-        output_core_dims=[["number"]],
-        exclude_dims={dimension},
-    )
-    found = numbers.isel(number=slice(0, 6)).values
-    if not np.isfinite(found).any():
+    check_confidence(confidence)
+    dimension, t, logs = window_logs(y, dim, window)
+    numbers = along(lambda z: _each(t, z, confidence, noise), logs, dimension, "number")
+    if not np.isfinite(numbers.isel(number=slice(len(LAWS) * len(EXPONENTS))).values).any():
         raise SweepError(f"two laws need at least {FEWEST_POINTS} points of {title(y)}, found fewer; widen the window")
     return _described(numbers, y, dim, confidence)
 
@@ -114,15 +108,11 @@ def _each(t: Array, z: Array, confidence: float, noise: bool | None) -> Array:
     return np.array(rows).reshape(*z.shape[:-1], -1)
 
 
-WIDTH = 16
-"""Numbers of one fit: two of each exponent's three, then the rest in the order of `NUMBERS`."""
-
-
 def _one(t: Array, z: Array, confidence: float, noise: bool | None) -> Array:
     present = np.isfinite(z)
     t, z = t[present], z[present]
     if t.size < FEWEST_POINTS:
-        return np.full(WIDTH, np.nan)
+        return np.full(len(LAWS) * len(EXPONENTS) + len(OTHERS), np.nan)
     order = np.argsort(t)
     t, z = t[order], z[order]
     best, off, jacobian = _fit(t, z)
@@ -132,14 +122,14 @@ def _one(t: Array, z: Array, confidence: float, noise: bool | None) -> Array:
     if not noisy:
         low, high = _widened(t, z, off, best, low, high)
     evidence = _evidence(t, z, off)
-    ends = [best[1], low[1], high[1], best[2], low[2], high[2]]
+    _, *exponents, places, _ = np.stack([best, low, high], axis=1)
     with np.errstate(over="ignore"):  # a crossover that is not determined reaches to infinity
-        place = np.exp([best[3], low[3], high[3]])
-    bend = [math.exp(best[4]) / math.log(10), math.exp(best[0])]
+        places = np.exp(places)
+    bend = [math.exp(best[WIDTH]) / math.log(10), math.exp(best[LEVEL])]
     if evidence <= 0 and not noisy:  # straight to rounding: nothing meets anywhere
-        place, bend = np.array([np.nan, 0.0, np.inf]), [np.nan, np.nan]
-    rest = [*bend, math.expm1(abs(off).max()), t.size]
-    return np.array([*ends, *place, *rest, 2 if evidence > 0 else 1, evidence, noisy])
+        places, bend = np.array([np.nan, 0.0, np.inf]), [np.nan, np.nan]
+    rest = [math.expm1(abs(off).max()), t.size, 2 if evidence > 0 else 1, evidence, noisy]
+    return np.array([*np.concatenate(exponents), *places, *bend, *rest])
 
 
 def _is_noise(z: Array, off: Array) -> bool:
@@ -152,20 +142,26 @@ def _is_noise(z: Array, off: Array) -> bool:
     return off.size >= TELLING and bool(scatter_is_noise(off, z)) and size < 3 * noise_of(z)
 
 
-def _curve(q: Array, t: Array) -> Array:
-    """(1); q = c, p1, p2, ln x0, ln w."""
-    width, u = math.exp(q[4]), t - q[3]
-    found: Array = q[0] + q[1] * u + (q[2] - q[1]) * width * np.logaddexp(0, u / width)
+LEVEL, LOW, HIGH, PLACE, WIDTH = range(5)
+"""Positions of c, p1, p2, ln x0, ln w among the five numbers of (1)."""
+
+
+def _curve(numbers: Array, t: Array) -> Array:
+    """(1)."""
+    level, low, high, place, log_width = numbers
+    width, u = math.exp(log_width), t - place
+    found: Array = level + low * u + (high - low) * width * np.logaddexp(0, u / width)
     return found
 
 
-def _slopes_of_curve(q: Array, t: Array) -> Array:
-    """Derivatives of (1) by c, p1, p2, ln x0, ln w."""
-    width, u = math.exp(q[4]), t - q[3]
+def _slopes_of_curve(numbers: Array, t: Array) -> Array:
+    """Derivatives of (1) by its five numbers."""
+    _, low, high, place, log_width = numbers
+    width, u = math.exp(log_width), t - place
     share = 0.5 * (1 + np.tanh(0.5 * u / width))
     bend = width * np.logaddexp(0, u / width)
-    by_place = -q[1] - (q[2] - q[1]) * share
-    return np.stack([np.ones_like(t), u - bend, bend, by_place, (q[2] - q[1]) * (bend - u * share)], axis=1)
+    by_place = -low - (high - low) * share
+    return np.stack([np.ones_like(t), u - bend, bend, by_place, (high - low) * (bend - u * share)], axis=1)
 
 
 def _fit(t: Array, z: Array) -> tuple[Array, Array, Array]:
@@ -175,7 +171,7 @@ def _fit(t: Array, z: Array) -> tuple[Array, Array, Array]:
     narrowest = math.log(float(np.diff(t).min()) / 30)  # a sharper bend looks the same at these points
 
     def held(q: Array) -> Array:
-        return np.array([*q[:4], min(max(q[4], narrowest), math.log(t[-1] - t[0]))])
+        return np.array([*q[:WIDTH], min(max(q[WIDTH], narrowest), math.log(t[-1] - t[0]))])
 
     found = least_squares(
         lambda q: _curve(held(q), t) - z,
@@ -228,16 +224,17 @@ def _widened(t: Array, z: Array, off: Array, best: Array, low: Array, high: Arra
     """Intervals that reach to where the local exponents tend; of the crossover, to where they are half-way between the
     laws and to where the tangents at the ends of the window meet."""
     local, mirrored = slopes(t, z, 5), -t[::-1]
-    half = np.flatnonzero(np.diff(np.sign(local - (best[1] + best[2]) / 2)))
-    place = t[half[np.argmin(abs(t[half] - best[3]))]] if half.size else best[3]
+    half = np.flatnonzero(np.diff(np.sign(local - (best[LOW] + best[HIGH]) / 2)))
+    place = t[half[np.argmin(abs(t[half] - best[PLACE]))]] if half.size else best[PLACE]
     doubt = 2.5 * noise_of(off) * np.array([_amplified(t), _amplified(mirrored)])
     ends = np.array([_tends(t, local, doubt[0]), _tends(mirrored, local[::-1], doubt[1])])
     low, high = low.copy(), high.copy()
-    low[1:3] = np.minimum(low[1:3], ends.min(axis=1) - doubt)
-    high[1:3] = np.maximum(high[1:3], ends.max(axis=1) + doubt)
-    slopes_told = np.concatenate([ends, (ends[:, 0] - doubt)[:, None], (ends[:, 0] + doubt)[:, None]], axis=1)
-    meetings = [_meeting(t, z, pair) for pair in itertools.product(*slopes_told) if pair[0] != pair[1]]
-    low[3], high[3] = min(low[3], place, *meetings), max(high[3], place, *meetings)
+    laws = slice(LOW, HIGH + 1)
+    low[laws] = np.minimum(low[laws], ends.min(axis=1) - doubt)
+    high[laws] = np.maximum(high[laws], ends.max(axis=1) + doubt)
+    steep = np.concatenate([ends, (ends[:, 0] - doubt)[:, None], (ends[:, 0] + doubt)[:, None]], axis=1)
+    meetings = [_meeting(t, z, pair) for pair in itertools.product(*steep) if pair[0] != pair[1]]
+    low[PLACE], high[PLACE] = min(low[PLACE], place, *meetings), max(high[PLACE], place, *meetings)
     return low, high
 
 
@@ -268,24 +265,25 @@ def _tends(t: Array, local: Array, doubt: float) -> tuple[float, float]:
 
 def _evidence(t: Array, z: Array, off: Array) -> float:
     """BIC of a straight line minus BIC of (1): n ln(S1/S2) - 3 ln n, S the sums of squares."""
-    numbers = line(t, z)
-    straight = z - math.log(numbers[10]) - numbers[0] * (t - math.log(numbers[9]))
+    fit = line(t, z)
+    straight = z - math.log(fit.level) - fit.exponent * (t - math.log(fit.centre))
     floor = t.size * (4 * EPSILON * (1 + abs(z).max())) ** 2  # what rounding leaves
     ratio = (straight @ straight + floor) / (off @ off + floor)
     return float(t.size * math.log(ratio) - 3 * math.log(t.size))
 
 
 def _described(numbers: xr.DataArray, y: xr.DataArray, dim: str, confidence: float) -> xr.Dataset:
-    laws = xr.DataArray(["low", "high"], dims="law")
+    labels = [f"{name} {law}" for law in LAWS for name in EXPONENTS] + list(OTHERS)
+    numbers = numbers.assign_coords(number=labels)
     found = xr.Dataset()
-    for k, name in enumerate(NUMBERS[:3]):
-        pair = [numbers.isel(number=k + 3 * i, drop=True) for i in (0, 1)]
-        found[name] = xr.concat(pair, dim=laws.rename("law"))
-    for k, name in enumerate(NUMBERS[3:]):
-        found[name] = numbers.isel(number=6 + k, drop=True)
+    for name in EXPONENTS:
+        pair = [numbers.sel(number=f"{name} {law}", drop=True) for law in LAWS]
+        found[name] = xr.concat(pair, dim=xr.DataArray(list(LAWS), dims="law", name="law"))
+    for name in OTHERS:
+        found[name] = numbers.sel(number=name, drop=True)
     place, units = (str(c.attrs.get("units", "1")) for c in (y.coords[dim], y))
     of: dict[str, Any] = {"crossover": place, "crossover_low": place, "crossover_high": place, "level": units}
-    for name in NUMBERS:
+    for name in (*EXPONENTS, *OTHERS):
         found[name].attrs = {"units": of.get(name, "1"), "long_name": NAMES[name]}
     found.attrs = {"y": title(y), "x": dim, "confidence": confidence, "law": "equation (1) of sweep.analysis.two_laws"}
     return found

@@ -26,7 +26,7 @@ OURS = ("kernels",)
 ENGINE = ("sweep.cells.solve", "sweep.cells.grid")
 """Modules of the engine that decide values: the method of each cell, and its parameters."""
 
-REDUCING = ("sweep.cells.row_blocks", "sweep.cells.reduce", "sweep.cells.contents")
+REDUCING = ("sweep.cells.partition", "sweep.cells.reduce", "sweep.cells.output_schema")
 """Those that decide the values of a summary."""
 
 SOURCE = "source "
@@ -54,7 +54,7 @@ def fingerprint(study: Study) -> dict[str, str]:
         "study": whole,
         **said,
         **_sources(study.kernel_name, engine),
-        **{name: _version(name) for name in COMPILERS},
+        **{name: version(name) for name in COMPILERS},
     }
 
 
@@ -63,8 +63,8 @@ def difference(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
     names = [*new, *(name for name in old if name not in new)]
     changed = [name for name in names if old.get(name) != new.get(name)]
     # the digest of the whole study tells nothing where its parts do
-    told = [name for name in changed if name != "study"] or changed
-    return [_change(name, old.get(name), new.get(name)) for name in told]
+    changed = [name for name in changed if name != "study"] or changed
+    return [_change(name, old.get(name), new.get(name)) for name in changed]
 
 
 def _change(name: str, old: str | None, new: str | None) -> str:
@@ -201,8 +201,9 @@ def _called(node: ast.Call, package: Sequence[str]) -> Iterator[str]:
         yield _absolute(package, len(name) - len(module), module)
 
 
-def _version(name: str) -> str:
+def version(name: str) -> str:
+    """Of a package."""
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
-        return "not installed"
+        return "(not installed)"

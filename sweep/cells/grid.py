@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,6 +135,30 @@ class Grid(Box):
             more = min(filled, len(out) - filled)
             out[filled : filled + more] = out[:more]
             filled += more
+
+
+class Cells(NamedTuple):
+    """Outputs by name, statuses, and numbers of the methods used."""
+
+    outputs: dict[str, Any]
+    status: Any
+    used: Any
+
+    @property
+    def number(self) -> int:
+        """How many cells."""
+        return len(self.status)
+
+    def first(self, cells: int) -> Cells:
+        """Views of the first ones."""
+        outputs = {name: column[:cells] for name, column in self.outputs.items()}
+        return Cells(outputs, self.status[:cells], self.used[:cells])
+
+
+def empty_cells(study: Study, cells: int) -> Cells:
+    """Uninitialised arrays for so many cells."""
+    outputs = {name: np.empty((cells, *shape)) for name, shape in study.shapes.items()}
+    return Cells(outputs, np.empty(cells, np.int8), np.empty(cells, np.int8))
 
 
 def _cyclic(values: Floats, first: int, count: int) -> Floats:

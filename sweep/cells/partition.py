@@ -1,35 +1,25 @@
-"""How a grid is cut into blocks: from a timed sample spread over the grid."""
+"""How a grid is cut: into blocks that are computed and kept as a whole, and into rows.
+
+A part holds a line of numbers for each row: a cell; or, of a study with a summary, a row block, whose cells are reduced
+to one. Row blocks depend on the study alone, so that a summary has the same bits for any blocks, workers and
+interruptions. The axes that are kept come first, so a group (the cells that are reduced to one number in the end) is
+one run of flat cell numbers; it is cut into row blocks of equal length, the last one shorter.
+"""
 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
-
-from sweep.cells.row_blocks import Granules
-from sweep.cells.schema import ANCILLARY, METHOD_USED, STATUS, Column
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
-    from sweep.cells.solve import Solver
+    from sweep.study.model import Study
 
-POSITIONS = 64
-BUDGET = 0.03
-"""Seconds a sample may take, unless one call takes longer;"""
-SHARE = 0.005
-"""or this share of the run, where that is more."""
-PROBE_SECONDS = 3e-4
-"""A probe as long as this sees past the cost of a call, and 64 of them take a few hundredths of a second."""
-SUSPECT = 0.01
-"""Seconds of a probe that may hold the compilation of a method met for the first time."""
-LANES = 32
-"""Cells that a lane kernel solves at once: it takes as long for one of them."""
-BLOCK_SECONDS = (0.05, 1.0)
-BLOCK_BYTES = 8 << 20
-MOST_BLOCKS = 100_000
+FINENESS = 1024
+"""Row blocks a study is cut into, about: enough for many workers, and few to merge in the end."""
+LARGEST = 1 << 22
+"""Cells of a row block, so that a block of dear cells stays short."""
 
 
 @dataclass(frozen=True)
@@ -54,128 +44,87 @@ class Partition:
         return 0 <= start < stop and self.bounds(start // self.cells) == (start, stop)
 
 
-@dataclass(frozen=True)
-class Sample:
-    """Timed probes: cell each starts at (ascending), its seconds per cell, and what the probed cells gave.
+class RowStrip(NamedTuple):
+    """Rows from `row` on, of `cells` cells each, from cell number `cell` on."""
 
-    `lanes`: whether one cell takes as long as 32; None where that was not asked.
-    """
-
-    positions: Any
-    costs: Any
+    row: int
+    rows: int
+    cell: int
     cells: int
-    status: Any
-    method_used: Any
-    lanes: bool | None = None
+
+
+@dataclass(frozen=True)
+class RowBlocks:
+    """`groups` groups of `group` cells, in row blocks of `length` cells."""
+
+    groups: int
+    group: int
+    length: int
 
     @property
-    def cost(self) -> float:
-        """Mean seconds per cell over the grid."""
-        return float(np.mean(self.costs))
+    def per_group(self) -> int:
+        """Row blocks of a group."""
+        return -(-self.group // self.length)
 
-    def weights(self, partition: Partition, first: Callable[[Any], Any] | None = None) -> Any:
-        """Estimated seconds of every block; `first` tells the first cells of rows where a row is more than a cell."""
-        edges = np.minimum(np.arange(partition.count + 1, dtype=np.int64) * partition.cells, partition.size)
-        starts, stops = (found := edges if first is None else first(edges))[:-1], found[1:]
-        return np.interp((starts + stops) / 2, self.positions, self.costs) * (stops - starts)
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return self.groups * self.per_group
 
+    @property
+    def size(self) -> int:
+        """Number of cells."""
+        return self.groups * self.group
 
-UNSAMPLED = Sample(np.zeros(1), np.ones(1), 1, np.empty(0, np.int8), np.empty(0, np.int8))
-"""Stands in where no cell is left to compute: every block weighs its cells."""
+    @property
+    def mean(self) -> float:
+        """Cells of a row, on average."""
+        return self.size / self.count
 
+    def first(self, row: Any) -> Any:
+        """Number of the first cell of a row, or of an array of rows; of the row behind the last one: all cells."""
+        group, place = row // self.per_group, row % self.per_group
+        return group * self.group + place * self.length
 
-def take_sample(solver: Solver, columns: Sequence[Column], size: int) -> Sample:
-    """Times a few cells at up to 64 places of the grid, in a few hundredths of a second or a hundredth of the run."""
-    cells, lanes = _probe_cells(solver, columns, size)
-    count = max(1, min(POSITIONS, size // (4 * cells)))
-    arrays = {column.name: column.empty(cells) for column in columns}
-    probes: dict[int, tuple[float, Any, Any]] = {}
-    spent = 0.0
-    for index in _scattered(count):
-        start = _place(index, count, cells, size)
-        usual = cells * float(np.median([p[0] for p in probes.values()])) if probes else 0.0
-        seconds = _timed(solver, arrays, start, cells, usual)
-        probes[start] = seconds / cells, arrays[STATUS].copy(), arrays[METHOD_USED].copy()
-        spent += seconds
-        if spent > max(BUDGET, SHARE * spent / (len(probes) * cells) * size):
-            break
-    places = sorted(probes)
-    costs, status, used = zip(*(probes[p] for p in places), strict=True)
-    return Sample(np.array(places), np.array(costs), cells, np.concatenate(status), np.concatenate(used), lanes)
+    def cells(self, start: int, stop: int) -> tuple[int, int]:
+        """The cells of the rows `start` to `stop`."""
+        return int(self.first(start)), int(self.first(stop))
 
+    def strips(self, start: int, stop: int, capacity: int) -> Iterator[RowStrip]:
+        """Cut the rows `start` to `stop` into strips of at most `capacity` cells, or one row.
 
-def partition(sample: Sample, size: int, cell_bytes: float, workers: int) -> Partition:
-    """Blocks of about 1/200 of each worker's share, within bounds of time, bytes and number."""
-    cost = max(sample.cost, 1e-12)
-    shortest, longest = BLOCK_SECONDS
-    seconds = min(max(cost * size / (200 * workers), shortest), longest)
-    cells = min(seconds / cost, BLOCK_BYTES / cell_bytes, size)
-    if sample.lanes:
-        cells = max(cells, min(LANES, math.ceil(size / workers)))
-    elif sample.cells < LANES and sample.lanes is None:
-        cells = max(cells, min(LANES, size / (4 * workers)))
-    cells = max(1, math.floor(cells), -(-size // MOST_BLOCKS))
-    whole_lanes = cells if cells < LANES else -(-cells // LANES) * LANES
-    return Partition(size, min(whole_lanes, size))
+        A row block longer than that comes in several strips, cut at the same places always.
+        """
+        row = start
+        while row < stop:
+            cell, end = self.cells(row, row + 1)
+            cells = end - cell
+            if cells > capacity:
+                for first in range(cell, end, capacity):
+                    yield RowStrip(row, 1, first, min(capacity, end - first))
+                row += 1
+                continue
+            rows = min(stop - row, max(1, capacity // cells), self._alike(row))
+            yield RowStrip(row, rows, cell, cells)
+            row += rows
 
-
-def row_partition(sample: Sample, grains: Granules, row_bytes: float, workers: int) -> Partition:
-    """The same of rows."""
-    blocks = partition(sample, grains.size, row_bytes / grains.mean, workers)
-    rows = min(grains.count, math.ceil(blocks.cells / grains.mean))
-    return Partition(grains.count, rows)
+    def _alike(self, row: int) -> int:
+        """Rows from this one on that are of equal length and follow each other."""
+        if self.per_group == 1:
+            return self.groups
+        place = row % self.per_group
+        whole = self.group // self.length
+        return whole - place if place < whole else 1
 
 
-def _probe_cells(solver: Solver, columns: Sequence[Column], size: int) -> tuple[int, bool | None]:
-    """Cells a probe: few enough for 64 probes in the budget, enough to see past the cost of a call.
-
-    Where single cells are dear and few, also whether two take as long as one: then 32 will.
-    """
-    cells = 1
-    while True:
-        seconds = _probe(solver, columns, size, cells)
-        more = LANES if cells == 1 else 4 * cells
-        dear = seconds > PROBE_SECONDS
-        worth_a_look = cells == 1 and (seconds < BUDGET / 4 or more * 50 < size)
-        few = size < (4 if cells == 1 else POSITIONS) * more
-        if cells == 1 and dear and (few or not worth_a_look) and size > 1:
-            lanes = _probe(solver, columns, size, 2) < 1.5 * seconds
-            return (max(1, min(LANES, size // 4)), True) if lanes else (1, False)
-        if few or (dear and not worth_a_look):
-            return cells, None
-        cells = more
-
-
-def _probe(solver: Solver, columns: Sequence[Column], size: int, cells: int) -> float:
-    """Seconds that some cells in the middle of the grid take together."""
-    arrays = {column.name: column.empty(cells) for column in columns}
-    start = _place(0, 1, cells, size)
-    return min(_timed(solver, arrays, start, cells) for _ in range(2 if cells == 1 else 1))
-
-
-def _timed(solver: Solver, arrays: dict[str, Any], start: int, cells: int, usual: float = 0.0) -> float:
-    """Seconds to solve the cells; taken again where a method may have been compiled or loaded meanwhile.
-
-    `usual`: seconds that other probes took.
-    """
-    outputs = {name: array for name, array in arrays.items() if name not in ANCILLARY}
-
-    def once() -> float:
-        begun = time.perf_counter()
-        solver.solve(start, start + cells, outputs, arrays[STATUS], arrays[METHOD_USED])
-        return time.perf_counter() - begun
-
-    seconds = once()
-    return min(seconds, once()) if seconds > max(SUSPECT, 4 * usual) else seconds
-
-
-def _place(index: int, count: int, cells: int, size: int) -> int:
-    middle = (2 * index + 1) * size // (2 * count)
-    return min(max(middle - cells // 2, 0), size - cells)
-
-
-def _scattered(count: int) -> list[int]:
-    """0 .. count-1 from the middle on, so that every beginning of the list is spread over all of it (bits reversed)."""
-    bits = max(1, (count - 1).bit_length())
-    turned = (int(f"{i:0{bits}b}"[::-1], 2) for i in range(1 << bits))
-    return [(i + count // 2) % count for i in turned if i < count]
+def row_blocks(study: Study) -> RowBlocks:
+    """How the cells of a study make rows."""
+    lengths = {name: len(axis) for name, axis in study.axes.items()}
+    size = math.prod(lengths.values()) if study.design == "product" else next(iter(lengths.values()))
+    if study.summary is None:
+        return RowBlocks(size, 1, 1)
+    over = study.summary.over
+    groups = math.prod(n for name, n in lengths.items() if name not in over) if study.design == "product" else 1
+    group = size // groups
+    wanted = min(1 << max(0, (size // FINENESS).bit_length() - 1), LARGEST)
+    return RowBlocks(groups, group, group if group <= 4 * wanted else wanted)

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.interface import Status
-from sweep.cells.row_blocks import granules
+from sweep.cells.grid import empty_cells
+from sweep.cells.partition import row_blocks
 from sweep.cells.schema import Column
 
 if TYPE_CHECKING:
@@ -41,11 +42,11 @@ _NUMBERS[[int(s) for s in Status]] = np.arange(len(Status))
 
 
 def row_columns(study: Study) -> tuple[Column, ...]:
-    """The columns of a part of a study with a summary: what is known of each granule."""
+    """The columns of a part of a study with a summary: what is known of each row block."""
     assert study.summary is not None
     found = [_column(BY_STATUS, "i8", len(STATUSES)), _column(BY_METHOD, "i8", len(study.kernel.methods) + 1)]
     for field in study.asked:
-        shape = tuple(study.lengths[d] for d in field.dims)
+        shape = study.shape(field)
         reductions = study.summary.outputs[field.name]
         found.append(_column(f"{field.name} count", "i8", *shape))
         for end in _ends(reductions):
@@ -76,7 +77,7 @@ def cleared(rows: Mapping[str, Any]) -> None:
 def pending(study: Study, start: int, stop: int) -> Rows:
     """The rows `start` to `stop`, not computed yet."""
     rows = nothing(study, stop - start)
-    first = granules(study).first(np.arange(start, stop + 1, dtype=np.int64))
+    first = row_blocks(study).first(np.arange(start, stop + 1, dtype=np.int64))
     rows[BY_STATUS][:, STATUSES.index(Status.PENDING.name)] = np.diff(first)
     return rows
 
@@ -108,7 +109,7 @@ def _take_extreme(into: Rows, other: Mapping[str, Any], name: str, end: str) -> 
 
 
 class Reducer:
-    """Solves granules and reduces each to a row, for one thread at a time.
+    """Solves row blocks and reduces each to a row, for one thread at a time.
 
     Parameters
     ----------
@@ -120,38 +121,33 @@ class Reducer:
         from sweep.cells.solve import Solver
 
         assert study.summary is not None
-        self.study, self.granules, self.solver = study, granules(study), Solver(study)
-        shapes = _shapes(study)
-        self.room = _room(study)
-        room = min(self.room, self.granules.size)
-        self._outputs = {name: np.empty((room, *shape)) for name, shape in shapes.items()}
-        self._status, self._used = np.empty(room, np.int8), np.empty(room, np.int8)
+        self.study, self.row_blocks, self.solver = study, row_blocks(study), Solver(study)
+        self.strip = _strip_cells(study)
+        self._cells = empty_cells(study, min(self.strip, self.row_blocks.size))
 
     def solve(self, start: int, stop: int, rows: Mapping[str, Any]) -> None:
         """Fill `rows` with the rows `start` to `stop`."""
         cleared(rows)
-        for row, count, cell, cells in self.granules.strips(start, stop, self.room):
-            n = count * cells
-            outputs = {name: column[:n] for name, column in self._outputs.items()}
-            status, used = self._status[:n], self._used[:n]
-            self.solver.solve(cell, cell + n, outputs, status, used)
-            found = self.reduce(cell, count, outputs, status, used)
-            merge({name: column[row - start : row - start + count] for name, column in rows.items()}, found)
+        for strip in self.row_blocks.strips(start, stop, self.strip):
+            cells = self._cells.first(strip.rows * strip.cells)
+            self.solver.solve(strip.cell, strip.cell + cells.number, *cells)
+            found = self.reduce(strip.cell, strip.rows, *cells)
+            place = slice(strip.row - start, strip.row - start + strip.rows)
+            merge({name: column[place] for name, column in rows.items()}, found)
 
     def seconds(self) -> float:
-        """What reducing a cell takes, tried on as many whole granules as a strip has room for, or on as much of one."""
-        cells = min(self.granules.length, len(self._status))
-        rows = len(self._status) // cells
-        outputs = {name: column[: rows * cells] for name, column in self._outputs.items()}
-        for column in outputs.values():
-            column.fill(1.0)
-        status, used = np.zeros(rows * cells, np.int8), np.zeros(rows * cells, np.int8)
+        """What reducing a cell takes, tried on as many whole row blocks as a strip holds, or on as much of one."""
+        length = min(self.row_blocks.length, self._cells.number)
+        rows = self._cells.number // length
+        cells = self._cells.first(rows * length)
+        for column in (*cells.outputs.values(), cells.status, cells.used):
+            column.fill(0)
         taken = []
         for _ in range(3):
             begun = time.perf_counter()
-            self.reduce(0, rows, outputs, status, used)
+            self.reduce(0, rows, *cells)
             taken.append(time.perf_counter() - begun)
-        return min(taken) / (rows * cells)
+        return min(taken) / cells.number
 
     def reduce(self, cell: int, rows: int, outputs: Mapping[str, Floats], status: Any, used: Any) -> Rows:
         """Rows of equally many cells, which lie one behind the other from cell number `cell` on."""
@@ -189,20 +185,16 @@ class Reducer:
 
 def strip_bytes(study: Study) -> int:
     """Bytes of the cells that a thread holds while it reduces them."""
-    return 0 if study.summary is None else _room(study) * (_cell_bytes(study) + 2)
+    return 0 if study.summary is None else _strip_cells(study) * (_cell_bytes(study) + 2)
 
 
-def _room(study: Study) -> int:
+def _strip_cells(study: Study) -> int:
     """Cells of a strip, of the study alone, for sums hang on it."""
     return min(STRIP, 1 << max(0, (STRIP_BYTES // _cell_bytes(study)).bit_length() - 1))
 
 
 def _cell_bytes(study: Study) -> int:
-    return sum(8 * math.prod(shape) for shape in _shapes(study).values())
-
-
-def _shapes(study: Study) -> dict[str, tuple[int, ...]]:
-    return {f.name: tuple(study.lengths[d] for d in f.dims) for f in study.asked}
+    return sum(8 * math.prod(shape) for shape in study.shapes.values())
 
 
 def _column(name: str, dtype: str, *shape: int) -> Column:

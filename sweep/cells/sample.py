@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.cells.grid import Grid
+from sweep.cells.grid import Cells, Grid, empty_cells
 from sweep.study.model import Axis, Study, frozen
 
 ONE: Mapping[str, float] = {}
@@ -45,15 +45,13 @@ def _times(value: Any, factor: float) -> Any:
     return frozen(value * factor) if np.ndim(value) else value * factor
 
 
-def solved(study: Study) -> tuple[dict[str, Any], Any, Any]:
-    """Outputs by name, statuses, and numbers of the methods used, of all cells of a study, in memory."""
+def solved(study: Study) -> Cells:
+    """All cells of a study, in memory."""
     from sweep.cells.solve import Solver
 
-    size, lengths = Grid(study).size, study.lengths
-    outputs = {f.name: np.empty((size, *(lengths[d] for d in f.dims))) for f in study.asked}
-    status, used = np.empty(size, np.int8), np.empty(size, np.int8)
-    Solver(study).solve(0, size, outputs, status, used)
-    return outputs, status, used
+    cells = empty_cells(study, Grid(study).size)
+    Solver(study).solve(0, cells.number, *cells)
+    return cells
 
 
 def with_method(study: Study, method: str, rtol: float) -> Study:

@@ -7,12 +7,12 @@ import math
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kernels.interface import Field, Kernel, Status
+from sweep.cells.fingerprint import version
 from sweep.cells.grid import Box, Grid
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class Coordinate:
 
 
 @dataclass(frozen=True)
-class Layout:
+class Schema:
     """Everything of a result except its numbers."""
 
     grid: Box
@@ -88,9 +88,9 @@ class Layout:
         return (*self.grid.shape, *column.shape)
 
 
-def layout(study: Study, fingerprint: Mapping[str, str]) -> Layout:
-    """The layout of a study's result."""
-    return Layout(Grid(study), columns(study), coordinates(study), attributes(study, fingerprint))
+def cell_schema(study: Study, fingerprint: Mapping[str, str]) -> Schema:
+    """The schema of a result of cells."""
+    return Schema(Grid(study), columns(study), coordinates(study), attributes(study, fingerprint))
 
 
 def columns(study: Study) -> tuple[Column, ...]:
@@ -136,9 +136,8 @@ def attributes(study: Study, fingerprint: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _output(field: Field, study: Study) -> Column:
-    shape = tuple(study.lengths[d] for d in field.dims)
     attrs = {**_field_attrs(field), "ancillary_variables": " ".join(ANCILLARY)}
-    return Column(field.name, "f8", field.dims, shape, attrs)
+    return Column(field.name, "f8", field.dims, study.shape(field), attrs)
 
 
 def _status() -> Column:
@@ -186,12 +185,5 @@ def _field_attrs(field: Field) -> dict[str, Any]:
 
 def _versions() -> str:
     names = ("foliot", "numba", "llvmlite", "numpy", "xarray", "h5py", "h5netcdf")
-    found = [f"{name} {_version(name)}" for name in names]
+    found = [f"{name} {version(name)}" for name in names]
     return ", ".join([*found, f"python {platform.python_version()}", platform.machine()])
-
-
-def _version(name: str) -> str:
-    try:
-        return metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return "(not installed)"

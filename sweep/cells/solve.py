@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Method, Status
-from sweep.cells.grid import Grid
+from sweep.cells.grid import Grid, empty_cells
 from sweep.study.model import AUTO, Study
 
 STRIP = 16384
@@ -61,21 +61,20 @@ class Solver:
         self.study, self.grid = study, Grid(study)
         self.usable = usable_methods(study)
         kernel = study.kernel
-        lengths = study.lengths
-        shapes = {field.name: tuple(lengths[d] for d in field.dims) for field in (*kernel.parameters, *kernel.outputs)}
+        shapes = {field.name: study.shape(field) for field in (*kernel.parameters, *kernel.outputs)}
         cell_bytes = sum(8 * math.prod(shapes[field.name]) for field in kernel.outputs)
-        room = self._strip = max(1, min(STRIP, self.grid.size, STRIP_BYTES // cell_bytes))
-        self._parameters = [np.empty((room, *shapes[field.name])) for field in kernel.parameters]
+        cells = self._strip = max(1, min(STRIP, self.grid.size, STRIP_BYTES // cell_bytes))
+        self._parameters = [np.empty((cells, *shapes[field.name])) for field in kernel.parameters]
         for k, value in self.grid.constants().items():
             self._parameters[k][:] = value
         self._along = [np.array(study.along[field.name]) for field in kernel.along]
         self._unasked = {
-            field.name: np.empty((room, *shapes[field.name]))
+            field.name: np.empty((cells, *shapes[field.name]))
             for field in kernel.outputs
             if field.name not in study.outputs
         }
         self._asked = np.array([field.name in study.outputs for field in kernel.outputs], np.uint8)
-        self._rtol, self._bound, self._error = np.empty(room), np.empty(room), np.empty(room)
+        self._rtol, self._bound, self._error = np.empty(cells), np.empty(cells), np.empty(cells)
         self._promised = None if study.kernel_name in catalogue.KERNELS else promised(study)
 
     def solve(
@@ -118,13 +117,9 @@ class Solver:
 
     def warm(self) -> None:
         """Solve a few cells spread over the grid: what they need is compiled before threads start."""
-        outputs = {name: np.empty((1, *shape)) for name, shape in self._shapes().items()}
-        status, used = np.empty(1, np.int8), np.empty(1, np.int8)
+        cell = empty_cells(self.study, 1)
         for index in np.unique(np.linspace(0, self.grid.size - 1, WARM_UP_CELLS).astype(np.int64)):
-            self.solve(int(index), int(index) + 1, outputs, status, used)
-
-    def _shapes(self) -> dict[str, tuple[int, ...]]:
-        return {f.name: tuple(self.study.lengths[d] for d in f.dims) for f in self.study.asked}
+            self.solve(int(index), int(index) + 1, *cell)
 
     def _solve_strip(
         self,

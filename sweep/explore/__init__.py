@@ -1,1 +1,10 @@
-"""What runs sweeps to learn something: `plan`, `work_precision`, `refine`, `groups` (superfluous axes), `reference`."""
+"""What runs sweeps to learn something.
+
+Others may use
+    `plan`            what a study will take
+    `work_precision`  error against time of every method of a kernel
+    `refine`          cells where they are needed; study_of
+    `groups`          superfluous axes, outputs free of units
+
+`calibration` (trial runs) is behind `plan`, `reference` (what errors are against) behind `work_precision`.
+"""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import tempfile
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,15 +13,15 @@ import numpy as np
 from sweep.study.model import Axis, Study
 from sweep.system.errors import SweepError
 
-REHEARSAL_SECONDS = 0.5
-"""What the longer of two rehearsals is meant to take."""
+CALIBRATION_SECONDS = 0.5
+"""What the longer of two trial runs is meant to take."""
 LEAST_CELLS = 16
 """With fewer than so many cells in that time, what any run costs does not matter."""
 MOST_BYTES = 128 << 20
 USUAL_SPEED = 3e8
-"""Bytes a second that a disk may take; only to choose the size of a rehearsal."""
+"""Bytes a second that a disk may take; only to choose the size of a trial run."""
 SHORTER = 8
-"""Of the two rehearsals one has so many times fewer cells."""
+"""Of the two trial runs one has so many times fewer cells."""
 LEAST_VALUES = 8
 """An axis keeps so many of its values as long as others have more."""
 
@@ -35,59 +34,60 @@ class Timed:
     seconds: float
 
 
-def rehearsed(
-    study: Study, cells: int, block: int, cell_seconds: float, cell_bytes: float, folder: Path, workers: int
-) -> float:
-    """Seconds that a run into this folder will take; NaN where that cannot be tried.
+@dataclass(frozen=True)
+class Calibration:
+    """What a run of a study into a folder will take, from runs of some of its cells.
 
-    Parameters
+    Attributes
     ----------
     cells, block : of the study, and of a block of it
     cell_seconds, cell_bytes : about what one costs on one core, and on the disk
     """
-    guess = cell_seconds / workers + cell_bytes / USUAL_SPEED
-    some = int(min(cells, REHEARSAL_SECONDS / guess, MOST_BYTES / cell_bytes))
-    if some < min(cells, LEAST_CELLS) or cell_seconds > REHEARSAL_SECONDS / 4:
-        return math.nan
-    try:
-        with tempfile.TemporaryDirectory(prefix="plan.", dir=folder) as name:
-            stage = _Stage(Path(name) / "rehearsal.h5", workers, cells, block)
-            return _forecast(study, stage, some, guess)
-    except (OSError, SweepError):
-        return math.nan
 
-
-@dataclass(frozen=True)
-class _Stage:
-    """Where rehearsals are held, and for what: so many cells in such blocks."""
-
-    path: Path
-    workers: int
+    study: Study
     cells: int
     block: int
+    cell_seconds: float
+    cell_bytes: float
+    workers: int
 
-    def timed(self, study: Study) -> Timed:
+    @property
+    def _guess(self) -> float:
+        """Seconds a cell."""
+        return self.cell_seconds / self.workers + self.cell_bytes / USUAL_SPEED
+
+    def seconds(self, folder: Path) -> float:
+        """NaN where that cannot be tried."""
+        some = int(min(self.cells, CALIBRATION_SECONDS / self._guess, MOST_BYTES / self.cell_bytes))
+        if some < min(self.cells, LEAST_CELLS) or self.cell_seconds > CALIBRATION_SECONDS / 4:
+            return math.nan
+        try:
+            with tempfile.TemporaryDirectory(prefix="plan.", dir=folder) as name:
+                return self._forecast(Path(name) / "trial.h5", some)
+        except (OSError, SweepError):
+            return math.nan
+
+    def _forecast(self, path: Path, some: int) -> float:
+        few = thinned(self.study, max(1, some // SHORTER))
+        # the first run imports and compiles
+        self._timed(few, path)
+        short, long = self._timed(few, path), self._timed(thinned(self.study, some), path)
+        if long.cells >= self.cells or long.cells <= short.cells:
+            return long.seconds * self.cells / long.cells
+        slope = max((long.seconds - short.seconds) / (long.cells - short.cells), 0.5 * self._guess)
+        return long.seconds + slope * (self.cells - long.cells)
+
+    def _timed(self, study: Study, path: Path) -> Timed:
         """A run. Raises SweepError, OSError."""
         from sweep.runs.run import run
 
         cells = math.prod(_lengths(study).values())
         block = self.block if cells == self.cells else max(1, min(self.block, cells // (2 * self.workers)))
         begun = time.perf_counter()
-        run(study, self.path, workers=self.workers, progress=False, block_cells=block).close()
+        run(study, path, workers=self.workers, progress=False, block_cells=block).close()
         seconds = time.perf_counter() - begun
-        self.path.unlink()
+        path.unlink()
         return Timed(cells, seconds)
-
-
-def _forecast(study: Study, stage: _Stage, some: int, guess: float) -> float:
-    few = thinned(study, max(1, some // SHORTER))
-    # the first run imports and compiles
-    stage.timed(few)
-    short, long = stage.timed(few), stage.timed(thinned(study, some))
-    if long.cells >= stage.cells or long.cells <= short.cells:
-        return long.seconds * stage.cells / long.cells
-    slope = max((long.seconds - short.seconds) / (long.cells - short.cells), 0.5 * guess)
-    return long.seconds + slope * (stage.cells - long.cells)
 
 
 def _lengths(study: Study) -> dict[str, int]:
@@ -105,11 +105,7 @@ def thinned(study: Study, cells: int) -> Study:
         lengths[name] = max(least, min(lengths[name], cells // others))
     if study.design != "product":
         lengths = dict.fromkeys(study.axes, next(iter(lengths.values())))
-    return replace(study, axes=_cut(study.axes, lengths))
-
-
-def _cut(axes: Mapping[str, Axis], lengths: Mapping[str, int]) -> dict[str, Axis]:
-    return {name: _some(axis, lengths[name]) for name, axis in axes.items()}
+    return replace(study, axes={name: _some(axis, lengths[name]) for name, axis in study.axes.items()})
 
 
 def _some(axis: Axis, count: int) -> Axis:

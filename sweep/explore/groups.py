@@ -190,16 +190,14 @@ def _is_a_matter_of_units(study: Study, units: Units, base: str) -> bool:
     """Whether solving some cells with another unit of `base` changes nothing but the numbers."""
     factors = {name: FACTOR ** float(powers.get(base, 0)) for name, powers in units.items()}
     old, new = solved(sampled(study, TRIED_CELLS)), solved(sampled(study, TRIED_CELLS, factors))
-    fine = (old[1] < FIRST_REFUSAL) & (old[1] == new[1]) & (old[1] != Status.PENDING)
-    if not fine.any() or (old[1] != new[1]).any():
+    fine = (old.status < FIRST_REFUSAL) & (old.status != Status.PENDING)
+    if not fine.any() or (old.status != new.status).any():
         return False
-    for name, values in old[0].items():
-        factor = FACTOR ** float(units[name].get(base, 0))
-        if not np.allclose(
-            new[0][name][fine], factor * values[fine], rtol=AGREEMENT * study.rtol, atol=0, equal_nan=True
-        ):
-            return False
-    return True
+    rtol = AGREEMENT * study.rtol
+    return all(
+        np.allclose(new.outputs[name][fine], factors[name] * values[fine], rtol=rtol, atol=0, equal_nan=True)
+        for name, values in old.outputs.items()
+    )
 
 
 def _groups(names: Sequence[str], units: Units) -> tuple[list[str], list[Group]]:

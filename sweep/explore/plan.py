@@ -16,21 +16,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels.interface import Status, machine_code_folder
+from sweep.cells.block import faults_reported, sampled_study
 from sweep.cells.compiling import Compiling
-from sweep.cells.contents import contents, part_columns
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.grid import Grid
-from sweep.cells.partition import Partition, Sample, row_partition
+from sweep.cells.output_schema import output_schema, part_columns
+from sweep.cells.partition import Partition, row_blocks
 from sweep.cells.reduce import strip_bytes
-from sweep.cells.row_blocks import granules
 from sweep.cells.schema import Column
-from sweep.explore.calibration import rehearsed
+from sweep.cells.timing import Sample, row_partition
+from sweep.explore.calibration import Calibration
 from sweep.results.open import memory
-from sweep.runs.session import faults_told, sampled_study
-from sweep.store.assemble import chunks, write_frame
-from sweep.store.canvas import Canvas
-from sweep.store.digests import Seals
-from sweep.store.hdf5_bytes import Images
+from sweep.store.assemble import chunks, write_structure
+from sweep.store.digests import Digests
+from sweep.store.hdf5_bytes import Hdf5Bytes, PartBytes
 from sweep.store.parts import FLAGS
 from sweep.study.read import as_study
 from sweep.system.errors import SweepError
@@ -165,27 +164,27 @@ def plan(
         raise SweepError(f"{path}: there is no folder {folder}")
     compiling = Compiling(study.kernel, study.kernel_name, note)
     sample = sampled_study(study, compiling)
-    with faults_told(f"{study.kernel_name}: the kernel failed"):
+    with faults_reported(f"{study.kernel_name}: the kernel failed"):
         advice = scaling(study).advice
     forecast = _forecast(study, sample, crew, folder)
     return replace(forecast, compile_seconds=sum(compiling.seconds.values()), scaling=advice)
 
 
 def _forecast(study: Study, sample: Sample, workers: int, folder: Path) -> Plan:
-    grains, columns = granules(study), part_columns(study)
+    rows, columns = row_blocks(study), part_columns(study)
     row_bytes = sum(c.cell_bytes for c in columns)
-    blocks = row_partition(sample, grains, row_bytes, workers)
+    blocks = row_partition(sample, rows, row_bytes, workers)
     parts = _part_bytes(columns, blocks)
     output, frame = _output_bytes(study, sample, blocks)
     names = [m.name for m in study.kernel.methods]
     return Plan(
         title=study.title,
         kernel=study.kernel_name,
-        cells=grains.size,
+        cells=rows.size,
         shape=dict(zip((grid := Grid(study)).dims, grid.shape, strict=True)),
         outputs=study.outputs,
         blocks=blocks.count,
-        cells_per_block=grains.cells(0, blocks.cells)[1],
+        cells_per_block=rows.cells(0, blocks.cells)[1],
         workers=workers,
         part_bytes=parts,
         output_bytes=output,
@@ -203,9 +202,9 @@ def _seconds(
     study: Study, sample: Sample, blocks: Partition, parts: int, output: int, workers: int, folder: Path
 ) -> float:
     """What a run takes, of some of the cells in earnest; or, where that cannot be, from the probes alone."""
-    grains = granules(study)
-    cells, block = grains.size, grains.cells(0, blocks.cells)[1]
-    found = rehearsed(study, cells, block, sample.cost, (parts + output) / cells, folder, workers)
+    rows = row_blocks(study)
+    cells, block = rows.size, rows.cells(0, blocks.cells)[1]
+    found = Calibration(study, cells, block, sample.cost, (parts + output) / cells, workers).seconds(folder)
     if not math.isnan(found):
         return found
     speed = _disk_speed(folder) if parts + output > WORTH_A_TRIAL else math.inf
@@ -215,20 +214,20 @@ def _seconds(
 
 def _part_bytes(columns: tuple[Column, ...], blocks: Partition) -> int:
     """All parts, as files."""
-    images = Images(columns)
+    part_bytes = PartBytes(columns)
     last = blocks.bounds(blocks.count - 1)
-    return (blocks.count - 1) * images.frame(blocks.cells).size + images.frame(last[1] - last[0]).size
+    return (blocks.count - 1) * part_bytes.template(blocks.cells).size + part_bytes.template(last[1] - last[0]).size
 
 
 def _output_bytes(study: Study, sample: Sample, blocks: Partition) -> tuple[int, int]:
-    """The output, and all of it but the outputs' numbers; its frame is made for this, in memory."""
-    content, canvas = contents(study, fingerprint(study)), Canvas()
-    write_frame(canvas, content, Seals(content.columns, chunks(study, blocks)))
+    """The output, and all of it but the outputs' numbers; its structure is made for this, in memory."""
+    content, hdf5 = output_schema(study, fingerprint(study)), Hdf5Bytes()
+    write_structure(hdf5, content, Digests(content.columns, chunks(study, blocks)))
     numbers = sum(c.cell_bytes for c in content.columns if c.name not in FLAGS) * content.grid.size
     flags = sum(c.name in FLAGS for c in content.columns) * content.grid.size
-    told = len(zlib.compress(sample.status.tobytes(), 1)) / max(len(sample.status), 1)
+    packed = len(zlib.compress(sample.status.tobytes(), 1)) / max(len(sample.status), 1)
     uniform = len(set(sample.status.tolist())) < 2
-    return canvas.size + int(flags * (UNIFORM if uniform else told)), canvas.size - numbers
+    return hdf5.size + int(flags * (UNIFORM if uniform else packed)), hdf5.size - numbers
 
 
 def _disk_speed(folder: Path) -> float:

@@ -24,7 +24,7 @@ ROUNDING = 2.0**-53
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
+class Reference:
     """Values by output, and in each cell what they are right to.
 
     Attributes
@@ -49,10 +49,10 @@ class Truth:
         return int((self.sound | self.void).sum())
 
 
-def given_truth(study: Study, values: Mapping[str, Any]) -> Truth:
+def given_reference(study: Study, values: Mapping[str, Any]) -> Reference:
     """Values of some outputs in all cells of a study; NaN in all of them: there is nothing to give."""
-    size, lengths = Grid(study).size, study.lengths
-    shapes = {f.name: (size, *(lengths[d] for d in f.dims)) for f in study.asked}
+    size = Grid(study).size
+    shapes = {name: (size, *shape) for name, shape in study.shapes.items()}
     taken = {}
     for name, column in values.items():
         if name not in shapes:
@@ -64,10 +64,10 @@ def given_truth(study: Study, values: Mapping[str, Any]) -> Truth:
     if not taken:
         raise SweepError("truth: no output is given")
     void = np.all([np.isnan(column).reshape(size, -1).all(axis=1) for column in taken.values()], axis=0)
-    return Truth(GIVEN, taken, np.full(size, ROUNDING), ~void, void)
+    return Reference(GIVEN, taken, np.full(size, ROUNDING), ~void, void)
 
 
-def best_reference(study: Study, able: Sequence[str], asked: str | None) -> Truth:
+def best_reference(study: Study, able: Sequence[str], asked: str | None) -> Reference:
     """Of the method asked for, or of the one that leaves the fewest cells open; then: states a bound, is right to less.
 
     Raises
@@ -78,22 +78,23 @@ def best_reference(study: Study, able: Sequence[str], asked: str | None) -> Trut
     if asked is not None and asked not in able:
         raise SweepError(f"no method {asked} that can do this study; there are {', '.join(able)}")
     names = [asked] if asked else sorted(able, key=lambda name: study.kernel.method(name).bound is None)
-    found: list[Truth] = []
+    found: list[Reference] = []
     for name in names:
         if study.kernel.method(name).bound is None and any(t.judged == len(t.floor) for t in found):
             break  # those that state a bound suffice
-        found.append(reference(study, name))
+        found.append(reference_by(study, name))
     best = min(found, key=lambda t: (-t.judged, study.kernel.method(t.source).bound is None, _digits_lost(t)))
     if not best.sound.any():
         raise SweepError(f"{best.source} solves none of the cells, so there is nothing to measure against")
     return best
 
 
-def _digits_lost(truth: Truth) -> float:
-    return float(np.log10(truth.floor[truth.sound]).mean()) if truth.sound.any() else math.inf
+def _digits_lost(reference: Reference) -> float:
+    known = reference.floor[reference.sound]
+    return float(np.log10(known).mean()) if known.size else math.inf
 
 
-def reference(study: Study, name: str) -> Truth:
+def reference_by(study: Study, name: str) -> Reference:
     """The values of a method at the least rtol at which it says of a cell that it is right."""
     size = Grid(study).size
     floor, sound, void = np.full(size, np.inf), np.zeros(size, bool), np.zeros(size, bool)
@@ -109,13 +110,13 @@ def reference(study: Study, name: str) -> Truth:
         floor[now], sound = rtol, sound | now
         if (sound | void).all():
             break
-    return Truth(name, values, floor, sound, void)
+    return Reference(name, values, floor, sound, void)
 
 
-def errors(outputs: Mapping[str, Any], truth: Mapping[str, Any]) -> Any:
+def errors(outputs: Mapping[str, Any], reference: Mapping[str, Any]) -> Any:
     """Largest relative error of each cell over its outputs, of traces relative to their largest value."""
-    worst = np.zeros(len(next(iter(truth.values()))))
-    for name, true in truth.items():
+    worst = np.zeros(len(next(iter(reference.values()))))
+    for name, true in reference.items():
         values, rest = outputs[name], tuple(range(1, true.ndim))
         size = np.nanmax(np.abs(true), axis=rest, keepdims=True, initial=0.0) if rest else np.abs(true)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):

@@ -15,7 +15,7 @@ import itertools
 import math
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,9 +25,10 @@ from numpy.typing import NDArray
 
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.analysis.loglog import Array, is_logarithmic
-from sweep.cells.schema import ANCILLARY, STATUS, layout
+from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
 from sweep.study.model import Axis, Study, frozen
 from sweep.system.errors import SweepError
+from sweep.system.overwriting import check_target
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -72,16 +73,11 @@ class Refinement:
 
     def __str__(self) -> str:
         cells = self.dataset.sizes["cell"]
-        told = (
-            ""
-            if self.complete
-            else "; not all boxes meet the tolerance, allow more cells, or leave out where it diverges"
-        )
-        return (
-            f"{cells:,} cells, {self.added:,} of them added, {self.tried:,} tried; an even grid as fine has "
-            f"{self.uniform:,}\n"
-            f"largest interpolation error left: {self.error:.2g}{told}"
-        )
+        text = f"{cells:,} cells, {self.added:,} of them added, {self.tried:,} tried; an even grid as fine has "
+        text += f"{self.uniform:,}\nlargest interpolation error left: {self.error:.2g}"
+        if not self.complete:
+            text += "; not all boxes meet the tolerance, allow more cells, or leave out where it diverges"
+        return text
 
 
 def refine(
@@ -126,56 +122,83 @@ def refine(
     study = study or study_of(dataset)
     names = [y] if isinstance(y, str) else list(y)
     _require(dataset, study, names, tolerance)
-    rounds = None if path is None else Path(path).with_name(f"{Path(path).name}.rounds")
-    if path is not None and rounds is not None:
-        _check_output(dataset, study, Path(path), force)
-        _make(rounds)
-    found = _Refiner(dataset, study, names, tolerance, _Runs(rounds, workers), most_cells, path, force).refined()
-    if rounds is not None:
-        shutil.rmtree(rounds, ignore_errors=True)
+    output = _Output(study, None if path is None else Path(path), force, workers)
+    output.prepare(dataset)
+    found = _Refiner(dataset, output, names, tolerance, most_cells).refined()
+    output.tidy()
     return found
 
 
-def _check_output(dataset: xr.Dataset, study: Study, path: Path, force: bool) -> None:
-    """Raises SweepError, before anything is computed, where all cells are not to be written there."""
-    from sweep.results.open import open_result
-    from sweep.system.overwriting import check_target
+@dataclass(frozen=True)
+class _Output:
+    """Solves further cells of a study, each round into a file in a folder, and writes all cells at the end.
 
-    source = dataset.encoding.get("source")
-    check_target(path, "result", read=[Path(source)] if source else [])
-    if path.exists():
-        with open_result(path) as there:
-            if not force and there.attrs["title"] != _title(study):
-                raise SweepError(f"{path}: holds another result; name another file, or overwrite it with --force")
+    `path`: None: everything stays in memory.
+    """
 
-
-def _title(study: Study) -> str:
-    return f"{study.title}, refined"
-
-
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise SweepError(f"{folder} cannot be made: {error.strerror}") from None
-
-
-@dataclass
-class _Runs:
-    """Solves studies of further cells, each into its file in a folder, or in memory."""
-
-    folder: Path | None
+    study: Study
+    path: Path | None
+    force: bool
     workers: int | None
 
-    def __call__(self, further: Study) -> xr.Dataset:
+    @property
+    def title(self) -> str:
+        return f"{self.study.title}, refined"
+
+    @property
+    def rounds(self) -> Path | None:
+        """The folder of what is computed on the way."""
+        return None if self.path is None else self.path.with_name(f"{self.path.name}.rounds")
+
+    def prepare(self, dataset: xr.Dataset) -> None:
+        """Raises SweepError, before anything is computed, where all cells are not to be written there."""
+        if self.path is None or self.rounds is None:
+            return
+        source = dataset.encoding.get("source")
+        check_target(self.path, "result", read=[Path(source)] if source else [])
+        self._check_earlier(self.path)
+        try:
+            self.rounds.mkdir(exist_ok=True)
+        except OSError as error:
+            raise SweepError(f"{self.rounds} cannot be made: {error.strerror}") from None
+
+    def _check_earlier(self, path: Path) -> None:
+        from sweep.results.open import open_result
+
+        if path.exists() and not self.force:
+            with open_result(path) as there:
+                if there.attrs["title"] != self.title:
+                    raise SweepError(f"{path}: holds another result; name another file, or overwrite it with --force")
+
+    def solved(self, axes: dict[str, Axis]) -> xr.Dataset:
+        """Cells with these values."""
         from sweep.cells.fingerprint import fingerprint
         from sweep.runs.run import run
 
-        if self.folder is None:
+        further = self._study(axes)
+        if self.rounds is None:
             return run(further, workers=self.workers, progress=False)
-        mark = hashlib.sha256(repr(sorted(fingerprint(further).items())).encode()).hexdigest()[:16]
-        with run(further, self.folder / f"{mark}.h5", workers=self.workers) as found:
+        name = hashlib.sha256(repr(sorted(fingerprint(further).items())).encode()).hexdigest()[:16]
+        with run(further, self.rounds / f"{name}.h5", workers=self.workers) as found:
             return found.load()
+
+    def written(self, axes: dict[str, Axis], arrays: dict[str, Any]) -> xr.Dataset:
+        """All cells, with these values of the axes, outputs and statuses."""
+        from sweep.results.open import in_memory
+        from sweep.runs.run import store_cells
+
+        whole = self._study(axes)
+        if self.path is None:
+            return in_memory(cell_schema(whole, {}), arrays)
+        return store_cells(whole, self.path, arrays, self.force)
+
+    def _study(self, axes: dict[str, Axis]) -> Study:
+        return dataclasses.replace(self.study, design="zip", axes=axes, title=self.title)
+
+    def tidy(self) -> None:
+        """Removes what was computed on the way."""
+        if self.rounds is not None:
+            shutil.rmtree(self.rounds, ignore_errors=True)
 
 
 def study_of(dataset: xr.Dataset, allow_import: bool = False) -> Study:
@@ -202,61 +225,59 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
 
 
 class _Refiner:
+    """Boxes of a grid, tried and cut until outputs can be interpolated in them."""
+
     def __init__(
-        self,
-        dataset: xr.Dataset,
-        study: Study,
-        names: Sequence[str],
-        tolerance: float,
-        run: Callable[[Study], xr.Dataset],
-        most_cells: int,
-        path: str | os.PathLike[str] | None,
-        force: bool,
+        self, dataset: xr.Dataset, output: _Output, names: Sequence[str], tolerance: float, most_cells: int
     ) -> None:
-        self.path, self.force = path, force
-        self.study, self.names, self.tolerance, self.run, self.most = study, names, tolerance, run, most_cells
-        self.axes = [axis.values for axis in study.axes.values()]
-        self.logarithmic = [is_logarithmic(values) for values in self.axes]
+        self.output, self.names, self.tolerance, self.most = output, names, tolerance, most_cells
+        self.axes = {name: axis.values for name, axis in output.study.axes.items()}
+        self.logarithmic = {name: is_logarithmic(values) for name, values in self.axes.items()}
         self.first = dataset.load()
         self.parts: list[xr.Dataset] = []
-        self.known: dict[Index, int] = {}
+        self.rows: dict[Index, int] = {}
         """Rows of the cells solved, those of the first grid before the others."""
         self.kept: set[int] = set()
         self.values: list[Array] = []
         self.size = np.array([float(abs(self.first[name]).max()) or 1.0 for name in names])
-        self.error, self.deepest = 0.0, 0
-        self.complete = True
+        self.error, self.left, self.deepest = 0.0, 0.0, 0
 
     def refined(self) -> Refinement:
         """Boxes of one level at a time, coarse ones first."""
-        steps = [range(len(values)) for values in self.axes]
-        unit = 2**LEVELS
-        self._learn([tuple(i * unit for i in index) for index in itertools.product(*steps)], _flat(self.first))
-        self.kept.update(self.known.values())
-        boxes = [tuple(i * unit for i in index) for index in itertools.product(*(range(len(s) - 1) for s in steps))]
-        left = 0.0
+        self._learn(self._corners(0), _flat(self.first))
+        self.kept.update(self.rows.values())
+        boxes = self._corners(1)
         for level in range(LEVELS):
             half = 2 ** (LEVELS - level - 1)
-            wanted = {p for box in boxes for p in self._points(box, half)} - self.known.keys()
-            if len(self.known) + len(wanted) > self.most:
-                self.complete = False
+            if not boxes or not self._try(boxes, half):
                 break
-            self._solve(sorted(wanted))
-            off = {box: self._off(box, half) for box in boxes}
-            self.error = max([self.error, *(e for e in off.values() if e <= self.tolerance)])
-            left = max((e for e in off.values() if math.inf > e > self.tolerance), default=0.0)
-            cut = [box for box in boxes if off[box] > self.tolerance]
-            self.kept.update(self.known[p] for box in cut for p in self._points(box, half))
-            boxes = [part for box in cut for part in _parts(box, half)]
+            boxes = self._cut(boxes, half)
             if level >= BORDER_LEVELS:
                 boxes = [box for box in boxes if self._of_one_status(box, half)]
-            if not boxes:
-                break
-            self.deepest = level + 1
-        else:
-            self.complete = not boxes
-        self.error = max(self.error, 0.0 if self.complete else left)
-        return self._joined()
+            self.deepest = level + bool(boxes)
+        return self._joined(complete=not boxes)
+
+    def _corners(self, less: int) -> list[Index]:
+        """Places of the first grid's cells, without the last `less` of every axis."""
+        places = (range(len(values) - less) for values in self.axes.values())
+        return [tuple(i * 2**LEVELS for i in index) for index in itertools.product(*places)]
+
+    def _try(self, boxes: Sequence[Index], half: int) -> bool:
+        """Solves the middles of boxes; False where that would be too many cells."""
+        wanted = {p for box in boxes for p in self._points(box, half)} - self.rows.keys()
+        if len(self.rows) + len(wanted) > self.most:
+            return False
+        self._solve(sorted(wanted))
+        return True
+
+    def _cut(self, boxes: Sequence[Index], half: int) -> list[Index]:
+        """The parts of boxes that are off by more than the tolerance."""
+        off = {box: self._off(box, half) for box in boxes}
+        self.error = max([self.error, *(e for e in off.values() if e <= self.tolerance)])
+        self.left = max((e for e in off.values() if math.inf > e > self.tolerance), default=0.0)
+        cut = [box for box in boxes if off[box] > self.tolerance]
+        self.kept.update(self.rows[p] for box in cut for p in self._points(box, half))
+        return [part for box in cut for part in _parts(box, half)]
 
     def _points(self, corner: Index, half: int) -> list[Index]:
         """Corners and middles of a box, 3^D of them in C order."""
@@ -265,11 +286,11 @@ class _Refiner:
     def _of_one_status(self, corner: Index, side: int) -> bool:
         """Whether a box has the same status in all its corners; no border is known to pass through it."""
         corners = itertools.product(*((i, i + side) for i in corner))
-        return len({self.values[self.known[p]][0] for p in corners}) == 1
+        return len({self.values[self.rows[p]][0] for p in corners}) == 1
 
     def _off(self, corner: Index, half: int) -> float:
         """How far a middle of the box is off the interpolation from its corners, infinite if it has another status."""
-        rows = np.array([self.values[self.known[p]] for p in self._points(corner, half)])
+        rows = np.array([self.values[self.rows[p]] for p in self._points(corner, half)])
         rows = rows.reshape(*[3] * len(corner), -1)
         if (rows[..., 0] != rows[..., 0].flat[0]).any():
             return math.inf
@@ -283,52 +304,49 @@ class _Refiner:
     def _solve(self, points: list[Index]) -> None:
         if not points:
             return
-        columns = [self._values(k, np.array([p[k] for p in points])) for k in range(len(self.axes))]
-        axes = {
-            name: Axis(name, frozen(column), "values") for name, column in zip(self.study.axes, columns, strict=True)
-        }
-        further = dataclasses.replace(self.study, design="zip", axes=axes, title=_title(self.study))
-        found = self.run(further)
+        places = zip(self.axes, np.array(points).T, strict=True)
+        axes = {name: Axis(name, frozen(self._values(name, column)), "values") for name, column in places}
+        found = self.output.solved(axes)
         self.parts.append(found)
         self._learn(points, found)
 
-    def _values(self, k: int, places: NDArray[np.int64]) -> Array:
+    def _values(self, name: str, places: NDArray[np.int64]) -> Array:
         """Axis values at places in the grid; those of the first grid exactly."""
-        grid, unit = self.axes[k], 2**LEVELS
+        grid, unit = self.axes[name], 2**LEVELS
         low = np.minimum(places // unit, len(grid) - 2)
         share = (places - low * unit) / unit
-        found: Array
-        if not self.logarithmic[k]:
-            found = np.where(share == 1, grid[low + 1], grid[low] + share * (grid[low + 1] - grid[low]))
-            return found
-        between = np.exp((1 - share) * np.log(grid[low]) + share * np.log(grid[low + 1]))
-        found = np.where(share == 0, grid[low], np.where(share == 1, grid[low + 1], between))
+        if self.logarithmic[name]:
+            between = np.exp((1 - share) * np.log(grid[low]) + share * np.log(grid[low + 1]))
+        else:
+            between = grid[low] + share * (grid[low + 1] - grid[low])
+        found: Array = np.where(share == 0, grid[low], np.where(share == 1, grid[low + 1], between))
         return found
 
     def _learn(self, points: Sequence[Index], solved: xr.Dataset) -> None:
         columns = [solved[STATUS].values.ravel().astype(float), *(solved[name].values.ravel() for name in self.names)]
         rows = np.stack(columns, axis=1)
         for point, row in zip(points, rows, strict=True):
-            self.known[point] = len(self.values)
+            self.rows[point] = len(self.values)
             self.values.append(row)
 
-    def _joined(self) -> Refinement:
-        from sweep.results.open import in_memory
-        from sweep.runs.run import store_cells
-
+    def _joined(self, complete: bool) -> Refinement:
         parts, rows = [_flat(self.first), *self.parts], sorted(self.kept)
-        names = list(self.study.axes)
-        axes = {n: Axis(n, frozen(np.concatenate([p[n].values for p in parts])[rows]), "values") for n in names}
-        whole = dataclasses.replace(self.study, design="zip", axes=axes, title=_title(self.study))
-        columns = [*self.study.outputs, *ANCILLARY]
-        arrays = {name: np.concatenate([part[name].values for part in parts])[rows] for name in columns}
-        dataset = (
-            store_cells(whole, self.path, arrays, self.force) if self.path else in_memory(layout(whole, {}), arrays)
-        )
-        finest = [(len(values) - 1) * 2**self.deepest + 1 for values in self.axes]
-        uniform = int(np.prod([float(n) for n in finest]))
+
+        def joined(name: str) -> Any:
+            return np.concatenate([part[name].values for part in parts])[rows]
+
+        axes = {name: Axis(name, frozen(joined(name)), "values") for name in self.axes}
+        arrays = {name: joined(name) for name in (*self.output.study.outputs, *ANCILLARY)}
+        finest = math.prod(float((len(values) - 1) * 2**self.deepest + 1) for values in self.axes.values())
         first = self.first[STATUS].size
-        return Refinement(dataset, len(rows) - first, len(self.values) - first, uniform, self.error, self.complete)
+        return Refinement(
+            dataset=self.output.written(axes, arrays),
+            added=len(rows) - first,
+            tried=len(self.values) - first,
+            uniform=int(finest),
+            error=self.error if complete else max(self.error, self.left),
+            complete=complete,
+        )
 
 
 def _flat(dataset: xr.Dataset) -> xr.Dataset:

@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.interface import FIRST_REFUSAL, Status
-from sweep.cells.grid import Grid
+from sweep.cells.grid import Grid, empty_cells
 from sweep.cells.sample import sampled, solved, with_method
 from sweep.explore.plan import small_duration
-from sweep.explore.reference import Truth, best_reference, errors, given_truth
+from sweep.explore.reference import Reference, best_reference, errors, given_reference
 from sweep.study.mistakes import did_you_mean
 from sweep.study.model import Study
 from sweep.study.read import as_study
@@ -105,31 +105,39 @@ def work_precision(
         There is no such method, or none that can do the study; the reference solves no cell; truth has another shape;
         a tolerance is not above 0.
     """
-    import xarray as xr
-
-    study = as_study(study)
-    part = sampled(study, cells)
+    part = sampled(as_study(study), cells)
     able = _able(part)
     names, tolerances = _chosen(methods, able), list(dict.fromkeys(tolerances))
-    if not len(tolerances) or not all(0 < rtol < math.inf for rtol in tolerances):
+    _require(cells, tolerances)
+    against = best_reference(_without_work(part), able, reference) if truth is None else given_reference(part, truth)
+    found = _table(part, names, tolerances, against)
+    missing = _missing(part, able) if methods is None else []
+    return found.assign_attrs(omissions="; ".join([*missing, *omissions(found)]))
+
+
+def _require(cells: int, tolerances: Sequence[float]) -> None:
+    if not tolerances or not all(0 < rtol < math.inf for rtol in tolerances):
         raise SweepError(f"rtol: expected numbers above 0, found {list(tolerances)}")
     if cells < 1:
         raise SweepError(f"cells: expected at least 1, found {cells}")
-    known = best_reference(_without_work(part), able, reference) if truth is None else given_truth(part, truth)
-    rows = [[_measured(part, name, rtol, known) for rtol in tolerances] for name in names]
+
+
+def _table(study: Study, names: Sequence[str], tolerances: Sequence[float], against: Reference) -> xr.Dataset:
+    """What is measured of each method at each tolerance."""
+    import xarray as xr
+
+    rows = [[_measured(study, name, rtol, against) for rtol in tolerances] for name in names]
     found = xr.Dataset(
         {key: (("method", "rtol"), np.array([[cell[key] for cell in row] for row in rows])) for key in rows[0][0]},
-        {"method": names, "rtol": list(tolerances)},
+        {"method": list(names), "rtol": list(tolerances)},
     )
-    found["seconds"] = (("method", "rtol"), _seconds(part, names, tolerances))
+    found["seconds"] = (("method", "rtol"), _seconds(study, names, tolerances))
     for key in found.data_vars:
         found[key].attrs = {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[str(key)]}
-    floor = float(known.floor[known.sound].max()) if known.sound.any() else math.nan
-    found.attrs = {"title": study.title, "kernel": study.kernel_name, "cells": known.judged}
-    found.attrs |= {"open_cells": Grid(part).size - known.judged, "reference": known.source, "reference_error": floor}
-    found.attrs["omissions"] = "; ".join(
-        [*_missing(part, able), *omissions(found)] if methods is None else omissions(found)
-    )
+    floor = float(against.floor[against.sound].max()) if against.sound.any() else math.nan
+    found.attrs = {"title": study.title, "kernel": study.kernel_name, "cells": against.judged}
+    open_cells = Grid(study).size - against.judged
+    found.attrs |= {"open_cells": open_cells, "reference": against.source, "reference_error": floor}
     return found
 
 
@@ -146,13 +154,13 @@ def precision_text(found: xr.Dataset) -> str:
             shares = (f"{100 * float(cell[key]):.3g} %" for key in ("ok", "inaccurate", "failed", "silent"))
             taken = small_duration(float(cell.seconds))
             rows.append((str(name), f"{rtol:.0e}", *off, taken, *counts, *shares, str(cell.worst_cell.item())))
-    truth = f"errors against {found.attrs['reference']}, in {found.attrs['cells']} cells"
-    truth += f", itself right to {found.attrs['reference_error']:.1e}"
-    truth += f"; {found.attrs['open_cells']} cells left aside, of which it is not sure" * (
+    basis = f"errors against {found.attrs['reference']}, in {found.attrs['cells']} cells"
+    basis += f", itself right to {found.attrs['reference_error']:.1e}"
+    basis += f"; {found.attrs['open_cells']} cells left aside, of which it is not sure" * (
         found.attrs["open_cells"] > 0
     )
     left_out = found.attrs["omissions"]
-    return page(columns(rows), truth, f"Omissions: {left_out}" if left_out else "")
+    return page(columns(rows), basis, f"Omissions: {left_out}" if left_out else "")
 
 
 def _error(value: float, attributes: Mapping[str, Any], name: str) -> str:
@@ -212,21 +220,21 @@ def _without_work(study: Study) -> Study:
     return dataclasses.replace(study, outputs=left) if left else study
 
 
-def _measured(study: Study, name: str, rtol: float, truth: Truth) -> dict[str, Any]:
+def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[str, Any]:
     part = with_method(study, name, rtol)
     outputs, status, used = solved(part)
-    error = errors(outputs, truth.values)
+    error = errors(outputs, against.values)
     # against itself the reference has no error; what can be said is what it is right to, also where auto took it
-    error = np.where(_solved_by(study, used, truth.source), np.maximum(error, truth.floor), error)
-    valued, total = truth.sound & (status < FIRST_REFUSAL), truth.judged
+    error = np.where(_solved_by(study, used, against.source), np.maximum(error, against.floor), error)
+    valued, total = against.sound & (status < FIRST_REFUSAL), against.judged
     sure = valued & ~np.isin(status, UNSURE)
-    refused = truth.sound & ~valued
-    wrong = sure & ~(error <= rtol + truth.floor) | truth.void & (status == Status.OK)
+    refused = against.sound & ~valued
+    wrong = sure & ~(error <= rtol + against.floor) | against.void & (status == Status.OK)
     worst = int(np.where(sure, error, -1.0).argmax())
     return {
         "error_median": float(np.median(error[valued])) if valued.any() else math.nan,
         "error_worst": float(error[worst]) if sure.any() else math.nan,
-        "ok": float((truth.sound & (status == Status.OK)).sum() / total),
+        "ok": float((against.sound & (status == Status.OK)).sum() / total),
         "remarked": float((valued & (status != Status.OK) & (status != Status.INACCURATE)).sum() / total),
         "inaccurate": float((valued & (status == Status.INACCURATE)).sum() / total),
         "failed": float(refused.sum() / total),
@@ -272,14 +280,12 @@ def _timed(study: Study) -> float:
     """Time per cell that this thread spends: what else runs on the machine matters less."""
     from sweep.cells.solve import Solver
 
-    size, lengths, solver = Grid(study).size, study.lengths, Solver(study)
-    outputs = {f.name: np.empty((size, *(lengths[d] for d in f.dims))) for f in study.asked}
-    status, used = np.empty(size, np.int8), np.empty(size, np.int8)
+    cells, solver = empty_cells(study, Grid(study).size), Solver(study)
     count, begin = 0, time.thread_time()
     while (spent := time.thread_time() - begin) < LEAST_SECONDS or not count:
-        solver.solve(0, size, outputs, status, used)
+        solver.solve(0, cells.number, *cells)
         count += 1
-    return spent / count / size
+    return spent / count / cells.number
 
 
 def _cell(study: Study, index: int) -> str:

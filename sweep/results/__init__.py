@@ -1,1 +1,1 @@
-"""A finished or growing file as a Dataset: `open`, `statuses`, `verify`, `filter`, `export`, `units`."""
+"""A finished or growing file as a Dataset: `open`, `stored`, `statuses`, `verify`, `filter`, `export`, `units`."""

@@ -13,7 +13,8 @@ from typing import Any, TextIO
 import numpy as np
 import xarray as xr
 
-from sweep.results.flat import flat
+from sweep.cells.reduce import BY_METHOD, BY_STATUS
+from sweep.results.statuses import flag_words, is_summary
 from sweep.study.mistakes import listed
 from sweep.system import disk
 from sweep.system.errors import SweepError
@@ -112,9 +113,14 @@ def _write_zarr(dataset: xr.Dataset, path: Path) -> None:
     import zarr  # noqa: F401  xarray would say in other words that it is missing
 
     path.unlink()
-    whole = dataset.chunk("auto") if dataset.nbytes > LARGE and not dataset.chunks else dataset
+    whole = _in_pieces(dataset)
     words = {str(name): whole[name].astype(object) for name in whole.variables if whole[name].dtype.kind == "U"}
     whole.assign(words).drop_encoding().to_zarr(path, mode="w", consolidated=False)
+
+
+def _in_pieces(dataset: xr.Dataset) -> xr.Dataset:
+    """The same, in pieces where it is large."""
+    return dataset.chunk("auto") if dataset.nbytes > LARGE and not dataset.chunks else dataset
 
 
 def _write_units(dataset: xr.Dataset, names: list[str], file: TextIO) -> None:
@@ -163,15 +169,37 @@ def _cells(block: xr.Dataset, name: str) -> list[Any]:
     return [cell(value) for value in column] if text else column
 
 
-def flag_words(variable: xr.DataArray) -> dict[int, str]:
-    """What the codes of a flag variable mean, {} for others; -1 is "none" where the flags do not say."""
-    values = np.atleast_1d(variable.attrs.get("flag_values", ())).tolist()
-    words = dict(zip(values, str(variable.attrs.get("flag_meanings", "")).split(), strict=False))
-    return {-1: "none", **words} if words else {}
+def flat(dataset: xr.Dataset) -> xr.Dataset:
+    """A summary with what runs along statuses, methods or bins as variables of their own; any other Dataset as it is.
+
+    Statuses and methods that no cell has are left out.
+    """
+    if not is_summary(dataset):
+        return dataset
+    found = {name: column for name, variable in dataset.data_vars.items() for name, column in _flat_columns(variable)}
+    dims = {dim for column in found.values() for dim in column.dims}
+    kept = {name: c for name, c in dataset.coords.items() if set(c.dims) <= dims}
+    return xr.Dataset({name: column.drop_vars(column.coords) for name, column in found.items()}, kept, dataset.attrs)
+
+
+def _flat_columns(variable: xr.DataArray) -> Iterator[tuple[str, xr.DataArray]]:
+    name, last = str(variable.name), str(variable.dims[-1]) if variable.dims else ""
+    if name in (BY_STATUS, BY_METHOD):
+        for word in variable[last].values:
+            column = variable.sel({last: word})
+            if column.any():
+                yield f"cells_{word}", column.assign_attrs(long_name=f"cells: {word}")
+    elif f"{last}_lower" in variable.coords:
+        for place in range(variable.sizes[last]):
+            column = variable.isel({last: place})
+            ends = " to ".join(f"{column[f'{last}_{end}'].item():g}" for end in ("lower", "upper"))
+            yield f"{name}_{place + 1}", column.assign_attrs(long_name=f"{ends}: {variable.attrs['long_name']}")
+    else:
+        yield name, variable
 
 
 def _write_netcdf(dataset: xr.Dataset, path: Path) -> None:
-    whole = dataset.chunk("auto") if dataset.nbytes > LARGE and not dataset.chunks else dataset
+    whole = _in_pieces(dataset)
     encoding: dict[str, dict[str, Any]] = {str(name): {"_FillValue": None} for name in whole.variables}
     for name, variable in whole.data_vars.items():
         if variable.dtype.kind in "iu" and math.prod(variable.shape) > 1:

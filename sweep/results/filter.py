@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.cells.schema import STATUS
-from sweep.results.export import flag_words
+from sweep.results.statuses import flag_words
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.system.errors import SweepError
 

@@ -11,32 +11,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.cells.contents import contents, gathered, part_columns
+from sweep.cells.output_schema import gathered, output_schema, part_columns
+from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import BY_STATUS, pending
-from sweep.cells.row_blocks import granules
-from sweep.cells.schema import STATUS, Layout
-from sweep.results.statuses import StatusCount, count_methods, count_statuses, failures
-from sweep.store.hdf5_bytes import Images
-from sweep.store.manifest import SPEC, Spec, read_spec
+from sweep.cells.schema import STATUS, Schema
+from sweep.store.digests import BESIDE, unbroken
+from sweep.store.hdf5_bytes import PartBytes
+from sweep.store.manifest import MANIFEST, Manifest, read_manifest
 from sweep.store.parts import PART_NAME, Parts, at_once, read_part
-from sweep.store.seal import BESIDE, MOST_AT_ONCE, check_own, readable, unbroken
+from sweep.store.probe import MOST_AT_ONCE, check_own, readable
 from sweep.store.store import folder_of
 from sweep.study.model import Study
 from sweep.system.errors import SweepError
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = [
-    "StatusCount",
-    "count_methods",
-    "count_statuses",
-    "failures",
-    "in_memory",
-    "memory",
-    "open_result",
-    "stored_fingerprint",
-]
 
 LARGEST_AT_ONCE = 1 << 28
 """Bytes of an unfinished result that are read at once; of larger ones, parts are read when they are used."""
@@ -68,11 +57,11 @@ def open_result(path: str | os.PathLike[str], strict: bool = False) -> xr.Datase
     for _ in range(3):
         if output.exists():
             return _open_finished(output)
-        spec = read_spec(folder_of(output))
-        if spec is None:
+        manifest = read_manifest(folder_of(output))
+        if manifest is None:
             raise SweepError(f"{output}: no such file, and no sweep that writes it")
         try:
-            return _open_parts(output, spec, strict)
+            return _open_parts(output, manifest, strict)
         except FileNotFoundError:
             continue  # the sweep has ended meanwhile
     raise SweepError(f"{output}: its parts are vanishing while they are read; try again")
@@ -81,13 +70,13 @@ def open_result(path: str | os.PathLike[str], strict: bool = False) -> xr.Datase
 def open_unfinished(path: str | os.PathLike[str]) -> xr.Dataset:
     """What there is of an unfinished sweep, also where its output holds an earlier result. Raises SweepError."""
     output = Path(path)
-    spec = read_spec(folder_of(output))
-    if spec is None:
+    manifest = read_manifest(folder_of(output))
+    if manifest is None:
         raise SweepError(f"{output}: there is no sweep that writes it")
-    return _open_parts(output, spec, False)
+    return _open_parts(output, manifest, False)
 
 
-def in_memory(plan: Layout, arrays: Mapping[str, Any]) -> xr.Dataset:
+def in_memory(plan: Schema, arrays: Mapping[str, Any]) -> xr.Dataset:
     """A Dataset of columns of shape `(size, ...)`."""
     import xarray as xr
 
@@ -137,7 +126,7 @@ def memory() -> int:
 
 
 def _open_finished(output: Path) -> xr.Dataset:
-    from sweep.results.backend import open_checked
+    from sweep.results.lazy import open_checked
 
     _check_frame(output)
     stored_fingerprint(output)
@@ -151,7 +140,7 @@ def _open_finished(output: Path) -> xr.Dataset:
 def _check_frame(output: Path) -> None:
     """Raises SweepError where all but the outputs' numbers is damaged.
 
-    A program that changes a file by HDF5 cuts the seal off; what it changed on purpose is opened.
+    A program that changes a file by HDF5 cuts the trailer off; what it changed on purpose is opened.
     """
     if not output.is_file():
         return
@@ -181,50 +170,51 @@ def _with_plain_text(dataset: xr.Dataset) -> xr.Dataset:
     return plain
 
 
-def _open_parts(output: Path, spec: Spec, strict: bool) -> xr.Dataset:
+def _open_parts(output: Path, manifest: Manifest, strict: bool) -> xr.Dataset:
     folder = folder_of(output)
-    study = checked_study(folder, spec)
-    images = Images(part_columns(study), spec.mark)
-    parts = Parts(images, spec.blocks, folder, _part_names(folder, spec, images))
-    if strict and len(parts.names) == spec.blocks.count:
+    study = checked_study(folder, manifest)
+    part_bytes = PartBytes(part_columns(study), manifest.mark)
+    parts = Parts(part_bytes, manifest.blocks, folder, _part_names(folder, manifest, part_bytes))
+    if strict and len(parts.names) == manifest.blocks.count:
         raise SweepError(f"{output}: all is computed but not put together yet; run its sweep again to finish")
     if strict:
-        left = spec.blocks.count - len(parts.names)
+        left = manifest.blocks.count - len(parts.names)
         raise SweepError(
-            f"{output}: unfinished, {left} of {spec.blocks.count} blocks are missing; run its sweep again to continue"
+            f"{output}: unfinished, {left} of {manifest.blocks.count} blocks are missing; run its sweep again to "
+            "continue"
         )
-    plan = contents(study, spec.fingerprint)
-    plan = replace(plan, attrs={**plan.attrs, "start": spec.begun})
+    plan = output_schema(study, manifest.fingerprint)
+    plan = replace(plan, attrs={**plan.attrs, "start": manifest.begun})
     if study.summary is not None:
-        return in_memory(plan, gathered(study, _read_all(parts, pending(study, 0, spec.blocks.size))))
+        return in_memory(plan, gathered(study, _read_all(parts, pending(study, 0, manifest.blocks.size))))
     if plan.grid.size * plan.cell_bytes > min(LARGEST_AT_ONCE, MEMORY_SHARE * memory()):
         return _lazily(plan, parts)
     empty = {c.name: np.full((plan.grid.size, *c.shape), c.missing, c.dtype) for c in plan.columns}
     return in_memory(plan, _read_all(parts, empty))
 
 
-def checked_study(folder: Path, spec: Spec) -> Study:
+def checked_study(folder: Path, manifest: Manifest) -> Study:
     """The study of an unfinished sweep. Raises SweepError where its grid is not the one that was cut."""
-    study = Study.from_json(spec.study, declared=True)
+    study = Study.from_json(manifest.study, declared=True)
     try:
-        rows = granules(study).count
-        contents(study, spec.fingerprint)
+        rows = row_blocks(study).count
+        output_schema(study, manifest.fingerprint)
     except (LookupError, ValueError, TypeError, AttributeError, ArithmeticError) as fault:
-        raise SweepError(f"{folder / SPEC}: damaged (its study cannot be: {fault})") from None
-    if spec.blocks.size != rows or not 1 <= spec.blocks.cells <= rows:
-        raise SweepError(f"{folder / SPEC}: damaged (its blocks do not fit its study)")
+        raise SweepError(f"{folder / MANIFEST}: damaged (its study cannot be: {fault})") from None
+    if manifest.blocks.size != rows or not 1 <= manifest.blocks.cells <= rows:
+        raise SweepError(f"{folder / MANIFEST}: damaged (its blocks do not fit its study)")
     return study
 
 
-def _part_names(folder: Path, spec: Spec, images: Images) -> dict[int, str]:
+def _part_names(folder: Path, manifest: Manifest, part_bytes: PartBytes) -> dict[int, str]:
     """The part of every block that is there; of two of one block, a sound one."""
     names: dict[int, str] = {}
     for entry in os.scandir(folder):
         match = PART_NAME.fullmatch(entry.name)
-        if match is None or not spec.blocks.holds(int(match[1]), int(match[2])):
+        if match is None or not manifest.blocks.holds(int(match[1]), int(match[2])):
             continue
-        index = int(match[1]) // spec.blocks.cells
-        if index not in names or read_part(folder / names[index], images, *spec.blocks.bounds(index)) is None:
+        index = int(match[1]) // manifest.blocks.cells
+        if index not in names or read_part(folder / names[index], part_bytes) is None:
             names[index] = entry.name
     return names
 
@@ -236,14 +226,14 @@ def _read_all(parts: Parts, rows: dict[str, Any]) -> dict[str, Any]:
         for index in indices:
             start, stop = parts.blocks.bounds(index)
             path = parts.folder / parts.names[index]
-            for name, values in (read_part(path, parts.images, start, stop, keep=True) or {}).items():
+            for name, values in (read_part(path, parts.part_bytes, keep=True) or {}).items():
                 rows[name][start:stop] = values
 
     at_once(fill, sorted(parts.names))
     return rows
 
 
-def _lazily(plan: Layout, parts: Parts) -> xr.Dataset:
+def _lazily(plan: Schema, parts: Parts) -> xr.Dataset:
     """A Dataset that reads parts when their numbers are used."""
     import xarray as xr
 

@@ -77,6 +77,13 @@ def is_summary(dataset: Cells) -> bool:
     return BY_STATUS in dataset and STATUS not in dataset
 
 
+def flag_words(variable: xr.DataArray) -> dict[int, str]:
+    """What the codes of a flag variable mean, {} for others; -1 is "none" where the flags do not say."""
+    values = np.atleast_1d(variable.attrs.get("flag_values", ())).tolist()
+    words = dict(zip(values, str(variable.attrs.get("flag_meanings", "")).split(), strict=False))
+    return {-1: "none", **words} if words else {}
+
+
 def summed(dataset: Cells, name: str) -> dict[str, int]:
     """Cells of each status or method of a summary, over all it keeps; those that do not occur are left out."""
     counts = dataset[name]
@@ -145,7 +152,7 @@ def _tally(column: xr.DataArray | StoredColumn, lowest: int = 0) -> tuple[Any, d
     counts = np.zeros(256, np.int64)
     first: dict[int, int] = {}
     done = 0
-    for piece in _flat_pieces(column):
+    for piece in flat_pieces(column):
         values = (piece.astype(np.int16) - lowest) & 255
         found = np.bincount(values, minlength=256)
         for number in np.flatnonzero(found):
@@ -156,7 +163,7 @@ def _tally(column: xr.DataArray | StoredColumn, lowest: int = 0) -> tuple[Any, d
     return counts, first
 
 
-def _flat_pieces(column: xr.DataArray | StoredColumn, at: tuple[int, ...] = ()) -> Iterator[Any]:
+def flat_pieces(column: xr.DataArray | StoredColumn, at: tuple[int, ...] = ()) -> Iterator[Any]:
     """The cells in C order, some at a time; `at` are indices along the first dimensions."""
     shape = column.shape[len(at) :]
     row = math.prod(shape[1:])
@@ -164,7 +171,7 @@ def _flat_pieces(column: xr.DataArray | StoredColumn, at: tuple[int, ...] = ()) 
         yield np.asarray(column[at]).reshape(1)
     elif row > CELLS_AT_ONCE:
         for index in range(shape[0]):
-            yield from _flat_pieces(column, (*at, index))
+            yield from flat_pieces(column, (*at, index))
     else:
         rows = max(1, CELLS_AT_ONCE // max(1, row))
         for start in range(0, shape[0], rows):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.cells.contents import contents
+from sweep.cells.output_schema import output_schema
 
 if TYPE_CHECKING:
     from sweep.cells.schema import Coordinate
@@ -52,10 +52,10 @@ class Stored:
     def __init__(self, output: Path, study: Study) -> None:
         import h5py
 
-        layout = self._layout = contents(study, {})
+        schema = self._schema = output_schema(study, {})
         self._file = h5py.File(output, "r")
-        self.coords: dict[str, Coordinate] = {c.name: c for c in layout.coordinates}
-        self._columns = {c.name: c for c in layout.columns}
+        self.coords: dict[str, Coordinate] = {c.name: c for c in schema.coordinates}
+        self._columns = {c.name: c for c in schema.columns}
 
     def __enter__(self) -> Stored:
         return self
@@ -71,4 +71,4 @@ class Stored:
             coordinate = self.coords[name]
             return StoredColumn(coordinate.dims, coordinate.attrs, np.asarray(coordinate.values))
         column = self._columns[name]
-        return StoredColumn((*self._layout.grid.dims, *column.dims), column.attrs, self._file[name])
+        return StoredColumn((*self._schema.grid.dims, *column.dims), column.attrs, self._file[name])

@@ -12,15 +12,26 @@ from typing import Any
 
 import xxhash
 
-from sweep.cells.contents import part_columns
-from sweep.cells.partition import Partition
-from sweep.cells.row_blocks import granules
+from sweep.cells.output_schema import part_columns
+from sweep.cells.partition import Partition, row_blocks
 from sweep.results.open import checked_study, unreadable
-from sweep.store.digests import BYTES, DIGESTS, FRAME, GROUP, frame_digest, frame_place, pieces, table
-from sweep.store.hdf5_bytes import Images
-from sweep.store.manifest import SPEC, Spec, read_spec
-from sweep.store.parts import DAMAGE, PART_NAME, READERS, read_part
-from sweep.store.seal import BESIDE, check_own, length, readable, unbroken
+from sweep.store.digests import (
+    BESIDE,
+    BYTES,
+    DIGESTS,
+    GROUP,
+    STRUCTURE,
+    pieces,
+    read_table,
+    structure_digest,
+    structure_place,
+    trailer_bytes,
+    unbroken,
+)
+from sweep.store.hdf5_bytes import PartBytes
+from sweep.store.manifest import MANIFEST, Manifest, read_manifest
+from sweep.store.parts import DAMAGE, PART_NAME, READERS, is_sound
+from sweep.store.probe import check_own, readable
 from sweep.store.store import LOCK, folder_of
 from sweep.system import disk
 from sweep.system.errors import SweepError
@@ -66,10 +77,10 @@ def verify(path: str | os.PathLike[str]) -> Verdict:
     if output.exists():
         return _finished(output)
     folder = folder_of(output)
-    spec = read_spec(folder)
-    if spec is None:
+    manifest = read_manifest(folder)
+    if manifest is None:
         raise SweepError(f"{output}: no such file, and no sweep that writes it")
-    return _parts(output, folder, spec)
+    return _parts(output, folder, manifest)
 
 
 @dataclass(frozen=True)
@@ -125,7 +136,7 @@ def _may_be_read(output: Path) -> bool:
 
 def _description(file: Any, size: int) -> tuple[list[_Column], Partition]:
     """What the file says that it holds, in so many bytes. Raises one of DAMAGE where that cannot be."""
-    names, blocks = table(file, size)
+    names, blocks = read_table(file, size)
     cells, columns = blocks.size, []
     for number, dataset in enumerate(file[name] for name in names):
         if dataset.size % cells:
@@ -144,11 +155,11 @@ def _compare(output: Path, file: Any, columns: list[_Column], blocks: Partition)
             found = (column.digest(fd, *blocks.bounds(index)) for index in range(blocks.count))
             bad = [i for i, one in enumerate(found) if one != bytes(digests[i, column.number])]
             findings += _told(column.name, blocks, bad)
-        place = frame_place(file)
+        place = structure_place(file)
         apart = [(c.place, c.place + c.cell_bytes * blocks.size) for c in columns]
         size = os.fstat(fd).st_size
-        if frame_digest(fd, [*apart, (place, place + BYTES), (size - length(fd), size)]) != bytes(
-            file[GROUP][FRAME][...]
+        if structure_digest(fd, [*apart, (place, place + BYTES), (size - trailer_bytes(fd), size)]) != bytes(
+            file[GROUP][STRUCTURE][...]
         ):
             findings.append(BESIDE)
         return findings
@@ -170,24 +181,16 @@ def _told(name: str, blocks: Partition, bad: list[int]) -> Iterator[str]:
         yield f"{name}: damaged in {len(runs) - MOST_TOLD} more places"
 
 
-def _parts(output: Path, folder: Path, spec: Spec) -> Verdict:
-    study = checked_study(folder, spec)
-    images = Images(part_columns(study), spec.mark)
-    names, strange = _sorted_out(folder, spec.blocks)
-
-    def sound(name: str) -> bool:
-        match = PART_NAME.fullmatch(name)
-        assert match is not None
-        try:
-            return read_part(folder / name, images, int(match[1]), int(match[2])) is not None
-        except FileNotFoundError:
-            return False
+def _parts(output: Path, folder: Path, manifest: Manifest) -> Verdict:
+    study = checked_study(folder, manifest)
+    part_bytes = PartBytes(part_columns(study), manifest.mark)
+    names, strange = _sorted_out(folder, manifest.blocks)
 
     every = [name for several in names.values() for name in several]
     with ThreadPoolExecutor(READERS) as pool:
-        good = dict(zip(every, pool.map(sound, every), strict=True))
-    grains = granules(study)
-    missing = (grains.cells(*spec.blocks.bounds(i)) for i in range(spec.blocks.count) if i not in names)
+        good = dict(zip(every, pool.map(lambda name: is_sound(folder / name, part_bytes), every), strict=True))
+    rows = row_blocks(study)
+    missing = (rows.cells(*manifest.blocks.bounds(i)) for i in range(manifest.blocks.count) if i not in names)
     findings = [
         *_lines("damaged", (name for name, fine in good.items() if not fine)),
         *_lines("twice there", (name for several in names.values() if len(several) > 1 for name in several)),
@@ -196,7 +199,7 @@ def _parts(output: Path, folder: Path, spec: Spec) -> Verdict:
     ]
     if not findings:
         findings = ["all blocks are there, but not put together yet; run the sweep again to finish"]
-    checked = f"unfinished, {len(names):,} of {spec.blocks.count:,} blocks there and checked"
+    checked = f"unfinished, {len(names):,} of {manifest.blocks.count:,} blocks there and checked"
     return Verdict(output, False, checked, tuple(findings))
 
 
@@ -209,7 +212,7 @@ def _sorted_out(folder: Path, blocks: Partition) -> tuple[Mapping[int, list[str]
         index = int(match[1]) // blocks.cells if match else -1
         if match and blocks.holds(int(match[1]), int(match[2])):
             names.setdefault(index, []).append(entry.name)
-        elif entry.name not in (SPEC, LOCK) and not entry.name.endswith(".tmp"):
+        elif entry.name not in (MANIFEST, LOCK) and not entry.name.endswith(".tmp"):
             strange.append(entry.name)
     return names, strange
 

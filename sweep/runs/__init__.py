@@ -1,1 +1,5 @@
-"""One run of a study: `run` (the front), `session` (its blocks), `cluster` and `worker` (dask), `extend`."""
+"""One run of a study, here or on a cluster: `run` is what others may use.
+
+A `task` is what was asked for; `resume` looks at what stands at its place already; a `session` computes blocks on
+threads, or has an executor do it: `dispatch`, which gives them to a `worker` of a `cluster`. `extend` reuses cells.
+"""

@@ -1,28 +1,54 @@
-"""Extending a finished result: a study with more values on its axes takes the cells it shares over, bit for bit."""
+"""Extending a finished result: a study with more values on its axes takes the cells it shares over, bit for bit.
+
+A result that another version of foliot or of the compiler has computed is taken over where a sample of its cells, some
+of every status and method, comes out with the same bits again.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from kernels.interface import Status
+from sweep.cells.block import block_solver
+from sweep.cells.fingerprint import COMPILERS, SOURCE
 from sweep.cells.grid import Grid
-from sweep.cells.schema import STATUS, Column, columns
+from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS, Column, columns
 from sweep.results.open import unreadable
+from sweep.results.statuses import flat_pieces
 from sweep.store.parts import DAMAGE
 from sweep.study.model import Axis, Study
 from sweep.system.errors import SweepError
 
-Slab = tuple[tuple[slice, ...], list[Any], int, int]
+SAMPLE = 8
+"""Cells of every status and method that are computed again where another version has computed the result."""
+TAKEN_OVER = "taken_over"
+"""Attribute of a result that says which of its cells another version has computed."""
+
+
+class Slab(NamedTuple):
+    """A hyperslab of the grid with cells that are known."""
+
+    slices: tuple[slice, ...]
+    known: list[Any]
+    """For each axis, which of the slab's positions the result has."""
+    begin: int
+    end: int
+
+    @property
+    def shape(self) -> list[int]:
+        """Length along each axis."""
+        return [s.stop - s.start for s in self.slices]
 
 
 def obstacle(old: Mapping[str, str], new: Mapping[str, str]) -> str:
     """Why a result of one fingerprint cannot be extended to that of another, in a word; "" where it may be."""
-    changed = {name for name in {*old, *new} if old.get(name) != new.get(name)} - {"study"}
-    others = sorted((name for name in changed if not name.startswith("axes.")), key=lambda name: (" " in name, name))
+    changed = _changed(old, new)
+    others = sorted(name for name in changed if not name.startswith("axes.") and not _is_program(name))
     if others:
         return f"{others[0]} differs, too"
     if new.get("design") != "product":
@@ -32,7 +58,20 @@ def obstacle(old: Mapping[str, str], new: Mapping[str, str]) -> str:
     return "" if changed else "nothing differs but words"
 
 
-class Known:
+def is_of_another_version(old: Mapping[str, str], new: Mapping[str, str]) -> bool:
+    """Whether the program differs that two fingerprints tell of."""
+    return any(map(_is_program, _changed(old, new)))
+
+
+def _changed(old: Mapping[str, str], new: Mapping[str, str]) -> set[str]:
+    return {name for name in {*old, *new} if old.get(name) != new.get(name)} - {"study"}
+
+
+def _is_program(name: str) -> bool:
+    return name.startswith(SOURCE) or name in COMPILERS
+
+
+class Reused:
     """The cells of a finished result, in the grid of an extended study. To be used in a `with` statement.
 
     Parameters
@@ -51,16 +90,17 @@ class Known:
     def __init__(self, output: Path, study: Study) -> None:
         import h5py
 
-        self._output, self._grid = output, Grid(study)
+        self._output, self._study, self._grid = output, study, Grid(study)
         self._columns: tuple[Column, ...] = columns(study)
         try:
             self._file = h5py.File(output, "r")
             old = Study.from_json(str(self._file.attrs["study_json"]), declared=True)
+            self.taken_over = str(self._file.attrs.get(TAKEN_OVER, ""))
         except DAMAGE as fault:
             raise unreadable(output, fault) from None
         self._positions = [_positions(old.axes[name], axis) for name, axis in study.axes.items()]
 
-    def __enter__(self) -> Known:
+    def __enter__(self) -> Reused:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, fault: BaseException | None, at: TracebackType | None) -> None:
@@ -74,54 +114,90 @@ class Known:
     def missing(self, start: int, stop: int) -> Any:
         """Of the cells `start` to `stop`, which have to be computed."""
         missing = np.ones(stop - start, bool)
-        for slices, known, begin, end in self._slabs(start, stop):
-            missing[begin:end].reshape([s.stop - s.start for s in slices])[np.ix_(*known)] = False
+        for slab in self._slabs(start, stop):
+            missing[slab.begin : slab.end].reshape(slab.shape)[np.ix_(*slab.known)] = False
         return missing
 
     def fill(self, start: int, stop: int, arrays: Mapping[str, Any]) -> None:
         """Writes the known ones among the cells `start` to `stop`. Raises SweepError where the file fails."""
-        for slices, known, begin, end in self._slabs(start, stop):
-            shape = [s.stop - s.start for s in slices]
+        for slab in self._slabs(start, stop):
             # values of the result that are neighbours there have none of its values between them here
             old = tuple(
                 slice(int(p[s][k].min()), int(p[s][k].max()) + 1)
-                for p, s, k in zip(self._positions, slices, known, strict=True)
+                for p, s, k in zip(self._positions, slab.slices, slab.known, strict=True)
             )
             for column in self._columns:
-                try:
-                    values = self._file[column.name][old]
-                except DAMAGE as fault:
-                    raise unreadable(self._output, fault) from None
-                arrays[column.name][begin:end].reshape(*shape, *column.shape)[np.ix_(*known)] = values
+                values = self._values(column, old)
+                place = arrays[column.name][slab.begin : slab.end].reshape(*slab.shape, *column.shape)
+                place[np.ix_(*slab.known)] = values
+
+    def _values(self, column: Column, slices: tuple[slice, ...]) -> Any:
+        """Those of a piece of the result. Raises SweepError where the file fails."""
+        try:
+            # earlier versions did not write the error bounds; none of their cells that are taken over has one
+            return np.nan if self._lacks(column.name) else self._file[column.name][slices]
+        except DAMAGE as fault:
+            raise unreadable(self._output, fault) from None
+
+    def _lacks(self, name: str) -> bool:
+        return name == ERROR_BOUND and name not in self._file
+
+    def check_sample(self) -> None:
+        """Computes some cells of every status and method again. Raises SweepError where one has other bits now."""
+        if self._lacks(ERROR_BOUND) and any((p == Status.INACCURATE).any() for p in flat_pieces(self._file[STATUS])):
+            raise self._refusal("it does not say what its INACCURATE values are right to")
+        solve, cells = block_solver(self._study), self._sample()
+        for cell in cells:
+            old, new = ({c.name: c.empty(1) for c in self._columns} for _ in range(2))
+            self.fill(cell, cell + 1, old)
+            solve(cell, cell + 1, new, None)
+            for name in old:
+                if old[name].tobytes() != new[name].tobytes():
+                    raise self._refusal(f"{name} of a cell was {old[name][0]}, and comes out as {new[name][0]} now")
+        said = f"{self.cells} cells of another version, {len(cells)} of which came out with the same bits again"
+        self.taken_over = "\n".join(filter(None, [self.taken_over, said]))
+
+    def _refusal(self, why: str) -> SweepError:
+        return SweepError(
+            f"{self._output}: cannot be extended, for another version has computed it: {why}; choose another name, or "
+            "overwrite it with --force"
+        )
+
+    def _sample(self) -> list[int]:
+        """Some cells of every status and method, by their numbers in the grid of the extended study."""
+        kinds: dict[tuple[int, int], list[Any]] = {}
+        done = 0
+        for status, used in zip(*(flat_pieces(self._file[name]) for name in (STATUS, METHOD_USED)), strict=True):
+            for kind in np.unique(np.stack([status, used]), axis=1).T.tolist():
+                cells = np.flatnonzero((status == kind[0]) & (used == kind[1]))
+                kinds.setdefault((kind[0], kind[1]), []).append(done + _spread(cells))
+            done += len(status)
+        chosen = np.concatenate([_spread(np.concatenate(cells)) for cells in kinds.values()])
+        places = np.unravel_index(chosen, self._file[STATUS].shape)
+        # the old values keep their order among the new ones
+        new = [np.flatnonzero(p >= 0)[place] for p, place in zip(self._positions, places, strict=True)]
+        return list(map(int, np.ravel_multi_index(new, self._grid.shape)))
 
     def _slabs(self, start: int, stop: int) -> Iterator[Slab]:
-        """Hyperslabs with known cells: which of its positions along each axis are known, and where its cells lie."""
+        """Hyperslabs with known cells."""
         for slices, begin, end in self._grid.pieces(start, stop):
             known = [positions[s] >= 0 for positions, s in zip(self._positions, slices, strict=True)]
             if all(k.any() for k in known):
-                yield slices, known, begin, end
+                yield Slab(slices, known, begin, end)
 
 
-class Given:
-    """All cells of a study, solved before: what `Known` is, without a file to look them up in.
+class Precomputed:
+    """All cells of a study, solved before: what `Reused` is, without a file to look them up in.
 
     Parameters
     ----------
-    arrays : mapping of outputs and of `layout.ANCILLARY` to ndarray, shape (cells, ...)
+    arrays : mapping of outputs and of `schema.ANCILLARY` to ndarray, shape (cells, ...)
     """
+
+    taken_over = ""
 
     def __init__(self, arrays: Mapping[str, Any]) -> None:
         self._arrays = arrays
-
-    def __enter__(self) -> Given:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, fault: BaseException | None, at: TracebackType | None) -> None:
-        pass
-
-    @property
-    def cells(self) -> int:
-        return len(self._arrays[STATUS])
 
     def missing(self, start: int, stop: int) -> Any:
         return np.zeros(stop - start, bool)
@@ -129,6 +205,11 @@ class Given:
     def fill(self, start: int, stop: int, arrays: Mapping[str, Any]) -> None:
         for name, values in self._arrays.items():
             arrays[name][...] = values[start:stop]
+
+
+def _spread(cells: Any) -> Any:
+    """No more than `SAMPLE` of some cells, evenly spread among them."""
+    return cells[np.unique(np.linspace(0, len(cells) - 1, min(SAMPLE, len(cells))).astype(np.intp))]
 
 
 def _positions(old: Axis, new: Axis) -> Any:

@@ -1,4 +1,4 @@
-"""Runs a study: blocks of cells on a pool of threads, into memory or into a store that survives a kill."""
+"""Runs a study: blocks of cells on threads or on a cluster, into memory or into a store that survives a kill."""
 
 from __future__ import annotations
 
@@ -6,34 +6,33 @@ import contextlib
 import os
 import shutil
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
-from sweep.cells.contents import gathered, part_columns
-from sweep.cells.fingerprint import difference, fingerprint
-from sweep.cells.row_blocks import granules
-from sweep.results.open import checked_study, in_memory, memory, open_result, open_unfinished, stored_fingerprint
-from sweep.runs.cluster import Cluster, joined
-from sweep.runs.extend import Given, Known, obstacle
+from sweep.cells.block import Found
+from sweep.cells.fingerprint import fingerprint
+from sweep.cells.output_schema import gathered, part_columns
+from sweep.results.open import in_memory, memory, open_result, open_unfinished, stored_fingerprint
+from sweep.runs import resume
+from sweep.runs.extend import Precomputed, Reused, is_of_another_version
 from sweep.runs.session import Session, Solve
+from sweep.runs.task import Task
 from sweep.store.assemble import assemble
-from sweep.store.manifest import Spec, read_spec, restored
 from sweep.store.store import Store, folder_of, opened
 from sweep.study.read import as_study
 from sweep.system.errors import SweepError
 from sweep.system.forecast import Ending
-from sweep.system.pool import CtrlC, Spares, Terminated, cores, whole_number
-from sweep.system.progress import Progress, quantity, stream_of
-from sweep.system.until import TimeUp, deadline
+from sweep.system.pool import BufferPool, CtrlC, Terminated, cores, whole_number
+from sweep.system.progress import TimeUp, deadline, quantity, stream_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from sweep.runs.cluster import Cluster
     from sweep.study.model import Study
 
 MOST_ATTEMPTS = 3
@@ -70,7 +69,8 @@ def run(
         Cells a block, instead of a size taken from a timed sample. A run that is continued keeps its own.
     extend : bool
         Where the output is complete for a study of which this one has all values on every axis, and more, compute the
-        new cells only; the output is replaced when all are there.
+        new cells only; the output is replaced when all are there. One of an earlier version of foliot is taken over
+        if a sample of its cells, computed again, has the same bits.
     until : str or datetime, optional
         Stop within a block's time of "07:00" or "2027-01-31 07:00"; what there is by then is returned.
     cluster : str or distributed.Client, optional
@@ -85,19 +85,15 @@ def run(
     KeyboardInterrupt, SystemExit
         After Ctrl-C or SIGTERM, when the blocks at work have been stored.
     """
-    study = as_study(study)
-    task = _task(study, workers, force, progress, block_cells, extend, until, cluster)
-    if path is None and until is not None:
-        raise SweepError("until: give a path as well, or what is computed by then would be lost")
+    task = _task(as_study(study), path, workers, force, progress, block_cells, extend, until, cluster)
     if path is None:
         return _run_in_memory(task)
-    output = _checked_output(path)
-    return open_result(output) if _complete(task, output) else open_unfinished(output)
+    return open_result(task.output) if _complete(task) else open_unfinished(task.output)
 
 
 def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> bool:
     """Runs as `run` does, and opens nothing; False where the time was up before the end."""
-    return _complete(_task(study, **options), _checked_output(path))
+    return _complete(_task(study, path, **options))
 
 
 def store_cells(
@@ -107,36 +103,22 @@ def store_cells(
 
     Parameters
     ----------
-    arrays : mapping of outputs and of `layout.ANCILLARY` to ndarray, shape (cells, ...)
+    arrays : mapping of outputs and of `schema.ANCILLARY` to ndarray, shape (cells, ...)
 
     Raises
     ------
     SweepError
         As `run`.
     """
-    task = _Task(study, fingerprint(study), 1, None, None, force, False, None, Given(arrays))
-    output = _checked_output(path)
-    if not _done(task, output):
-        _run_to_file(task, output)
-    return open_result(output)
-
-
-@dataclass(frozen=True)
-class _Task:
-    study: Study
-    mark: Mapping[str, str]
-    workers: int
-    stream: TextIO | None
-    block_cells: int | None
-    force: bool
-    extend: bool
-    until: datetime | None
-    given: Given | None = None
-    cluster: Any = None
+    task = Task(study, fingerprint(study), _checked(path), 1, force=force)
+    if not resume.is_complete(task):
+        _run_to_file(task, Precomputed(arrays))
+    return open_result(task.output)
 
 
 def _task(
     study: Study,
+    path: str | os.PathLike[str] | None,
     workers: int | None = None,
     force: bool = False,
     progress: bool | TextIO | None = None,
@@ -144,107 +126,153 @@ def _task(
     extend: bool = False,
     until: str | datetime | None = None,
     cluster: Any = None,
-) -> _Task:
+) -> Task:
     """What `run` was asked for. Raises SweepError."""
-    cells = None if block_cells is None else whole_number("block_cells", block_cells)
-    crew = cores() if workers is None else whole_number("workers", workers)
     if cluster is not None and workers is not None:
         raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
-    stream = stream_of(progress)
-    return _Task(study, fingerprint(study), crew, stream, cells, force, extend, deadline(until), cluster=cluster)
+    if path is None and until is not None:
+        raise SweepError("until: give a path as well, or what is computed by then would be lost")
+    return Task(
+        study,
+        fingerprint(study),
+        None if path is None else _checked(path),
+        cores() if workers is None else whole_number("workers", workers),
+        stream_of(progress),
+        force,
+        None if block_cells is None else whole_number("block_cells", block_cells),
+        extend,
+        deadline(until),
+        cluster,
+    )
 
 
-def _complete(task: _Task, output: Path) -> bool:
+def _checked(path: str | os.PathLike[str]) -> Path:
+    output = Path(os.path.realpath(path))
+    if not output.parent.is_dir():
+        raise SweepError(f"{path}: there is no folder {output.parent}")
+    return output
+
+
+def _complete(task: Task) -> bool:
     """False where the time was up before the end."""
-    return (_done(task, output) and not folder_of(output).exists()) or _run_to_file(task, output)
+    return (resume.is_complete(task) and not folder_of(task.output).exists()) or _run_to_file(task)
 
 
-def _run_in_memory(task: _Task) -> xr.Dataset:
-    with joined(task.cluster) as cluster:
-        _wait(cluster, task, task.study.title or "sweep")
-        return _compute_in_memory(task, cluster)
+@contextlib.contextmanager
+def _joined(task: Task) -> Iterator[Cluster | None]:
+    """The cluster, once it has a worker; None where none is asked for. Raises SweepError."""
+    if task.cluster is None:
+        yield None
+        return
+    try:
+        from sweep.runs.cluster import Cluster
+    except ImportError:
+        raise SweepError(
+            'cluster: needs the package distributed; install it with: pip install "foliot[cluster]"'
+        ) from None
+    with Cluster(task.cluster) as cluster:
+        cluster.wait(task.note, task.until)
+        yield cluster
 
 
-def _wait(cluster: Cluster | None, task: _Task, name: str) -> None:
-    """Until the cluster has a worker."""
-    if cluster is not None:
-        cluster.wait(Progress(1, task.stream, name).note, task.until)
+def _threads(task: Task, cluster: Cluster | None) -> int:
+    """How many threads compute, here or elsewhere."""
+    return task.workers if cluster is None else cluster.threads or task.workers
 
 
-def _compute_in_memory(task: _Task, cluster: Cluster | None) -> xr.Dataset:
-    note = Progress(1, task.stream, task.study.title or "sweep").note
-    session = Session(task.study, task.mark, task.workers, block_cells=task.block_cells, cluster=cluster, note=note)
-    rows = session.granules.count
-    needed = rows * session.row_bytes
-    if needed > memory():
-        raise SweepError(f"the result takes {needed / 1e9:.1f} GB, more than the memory; give a path to store it")
-    arrays = {c.name: c.empty(rows) for c in session.columns}
+def _elsewhere(session: Session, cluster: Cluster, shared: Path | None, receive: Callable[[int, Found], None]) -> None:
+    """Has what is left of a session computed by a cluster."""
+    from sweep.runs.dispatch import Dispatch
+
+    left = session.forecast.blocks
+    executor = Dispatch(cluster, session.task, session.blocks, left, session.reused, shared)
+    session.compute_elsewhere(executor, receive)
+
+
+def _run_in_memory(task: Task) -> xr.Dataset:
+    with _joined(task) as cluster:
+        session = Session(task, _threads(task, cluster))
+        arrays = _arrays(session)
+        progress = session.begin(range(session.blocks.count))
+        try:
+            _fill(session, arrays, cluster)
+            progress.end()
+        finally:
+            progress.stop()
+    found = arrays if task.study.summary is None else gathered(task.study, arrays)
+    return in_memory(session.dated(session.began), found)
+
+
+def _fill(session: Session, arrays: Mapping[str, Any], cluster: Cluster | None) -> None:
+    """Computes all rows into their places."""
+
+    def place(job: int) -> dict[str, Any]:
+        return {name: array[slice(*session.blocks.bounds(job))] for name, array in arrays.items()}
 
     def work(job: int, solve: Solve) -> None:
-        start, stop = session.blocks.bounds(job)
-        solve(start, stop, {name: array[start:stop] for name, array in arrays.items()})
+        solve(*session.blocks.bounds(job), place(job))
 
-    def receive(job: int, found: str | Mapping[str, Any]) -> None:
+    def receive(job: int, found: Found) -> None:
         assert not isinstance(found, str)
-        start, stop = session.blocks.bounds(job)
-        for name, array in arrays.items():
-            array[start:stop] = found[name]
+        for name, column in place(job).items():
+            column[...] = found[name]
 
-    jobs = range(session.blocks.count)
-    progress = session.progress(task.stream, task.study.title or "sweep", jobs)
-    try:
-        if cluster is not None:
-            session.compute_elsewhere(receive, progress, None)
-        else:
-            session.compute(min(task.workers, len(jobs)), work, progress)
-        progress.end()
-    finally:
-        progress.stop()
-    found = arrays if task.study.summary is None else gathered(task.study, arrays)
-    return in_memory(session.dated(progress, session.began), found)
+    if cluster is None:
+        session.compute(min(session.task.workers, session.blocks.count), work)
+    else:
+        _elsewhere(session, cluster, None, receive)
 
 
-def _run_to_file(task: _Task, output: Path) -> bool:
+def _arrays(session: Session) -> dict[str, Any]:
+    """Columns of all rows. Raises SweepError where the memory is too small."""
+    rows = session.blocks.rows.count
+    needed = rows * session.blocks.row_bytes
+    if needed > memory():
+        raise SweepError(f"the result takes {needed / 1e9:.1f} GB, more than the memory; give a path to store it")
+    return session.blocks.empty(rows)
+
+
+def _run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
     """False where the time was up before the end."""
-    with opened(output, part_columns(task.study)) as store:
-        spec = _spec(store, task)
+    with opened(task.output, part_columns(task.study)) as store, contextlib.ExitStack() as stack:
+        manifest = resume.earlier(store, task)
         # looked at again, for another run may have ended before this one had the lock
-        if _done(task, output):
-            _tidy(store, spec, task)
+        if resume.is_complete(task):
+            resume.tidy(store, manifest, task)
             return True
-        _take_up(store, spec, task)
-        blocks = None if store.spec is None else store.blocks
-        all_there = store.spec is not None and not store.missing()
-        known = None if all_there else _known(task, output)
-        with known or contextlib.nullcontext(), joined(None if all_there else task.cluster) as cluster:
-            _wait(cluster, task, output.name)
-            session = Session(
-                task.study,
-                task.mark,
-                task.workers,
-                blocks,
-                task.block_cells,
-                not all_there,
-                known,
-                task.until,
-                cluster,
-                Progress(1, task.stream, output.name).note,
-            )
-            return _run_session(task, session, store, output)
+        resume.take_up(store, manifest, task)
+        if store.manifest is not None and not store.missing():
+            return _run_session(Session(task, task.workers, store.blocks, sampled=False), store, None)
+        reused = precomputed or _reused(task, stack)
+        cluster = stack.enter_context(_joined(task))
+        blocks = None if store.manifest is None else store.blocks
+        return _run_session(Session(task, _threads(task, cluster), blocks, reused=reused), store, cluster)
 
 
-def _run_session(task: _Task, session: Session, store: Store, output: Path) -> bool:
+def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
+    """The cells of the result that is extended. Raises SweepError where that is not possible."""
+    if not task.extend or task.force or not task.output.exists():
+        return None
+    resume.check_whole(task)
+    reused = stack.enter_context(Reused(task.output, task.study))
+    if is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
+        task.note("another version has computed it; a sample of its cells is computed again")
+        reused.check_sample()
+    return reused
+
+
+def _run_session(session: Session, store: Store, cluster: Cluster | None) -> bool:
     """Computes and puts together what is missing; False where the time was up before the end."""
-    jobs = range(session.blocks.count) if store.spec is None else store.missing()
-    ending = Ending(session.blocks.count, task.workers, session.granules.count * session.row_bytes)
-    progress = session.progress(task.stream, output.name, jobs, ending.seconds)
-    _check_space(session, output, progress)
+    blocks, task = session.blocks, session.task
+    ending = Ending(blocks.count, task.workers, blocks.rows.count * blocks.row_bytes)
+    progress = session.begin(range(blocks.count) if store.manifest is None else store.missing(), ending.seconds)
+    _check_space(session)
     # held back wherever they would leave half a file behind
     with CtrlC():
-        if store.spec is None:
-            store.begin(task.study.to_json(), task.mark, session.blocks)
+        if store.manifest is None:
+            store.begin(task.study.to_json(), task.fingerprint, blocks.partition)
         try:
-            _finish(session, store, output, progress, ending)
+            _finish(session, store, cluster, ending)
         except (KeyboardInterrupt, Terminated):
             progress.note(f"stopped; {_kept(store)}")
             raise
@@ -262,178 +290,79 @@ def _kept(store: Store) -> str:
     return f"{kept}, run the same command again to continue"
 
 
-def _known(task: _Task, output: Path) -> Known | Given | None:
-    """The cells of the result that is extended. Raises SweepError where that is not possible."""
-    if task.given is not None:
-        return task.given
-    if not task.extend or task.force or not output.exists():
-        return None
-    _check_whole(output)
-    return Known(output, task.study)
-
-
-def _check_whole(output: Path) -> None:
-    """Raises SweepError where a result is damaged."""
-    from sweep.results.verify import check_whole
-
-    check_whole(output)
-
-
-def _spec(store: Store, task: _Task) -> Spec | None:
-    """What an earlier run left, if it can be read. Raises SweepError where it cannot, unless forced."""
-    try:
-        spec = read_spec(store.folder)
-        if spec is not None:
-            checked_study(store.folder, spec)
-            return spec
-    except SweepError:
-        if task.force:
-            return None
-        spec = _restored(store, task)
-        if spec is None:
-            raise
-        return spec
-    return None if task.force else _restored(store, task)
-
-
-def _restored(store: Store, task: _Task) -> Spec | None:
-    """The spec that is lost or damaged, written anew where the parts are of this study. Raises SweepError."""
-    study = task.study
-    spec = restored(store.folder, store.columns, study.to_json(), task.mark, granules(study).count)
-    if spec is not None:
-        store.write(spec)
-        Progress(1, task.stream, store.folder.name).note("its spec.json was lost or damaged; it is written anew")
-    return spec
-
-
-def _take_up(store: Store, spec: Spec | None, task: _Task) -> None:
-    """Continues what an earlier run left. Raises SweepError where that was another study, unless forced."""
-    if spec is not None and dict(spec.fingerprint) == dict(task.mark):
-        store.resume(spec)
-    elif spec is None and store.orphans() and not task.force:
-        raise SweepError(
-            f"{store.folder}: {store.orphans()} finished blocks, but no spec.json that says of which study; "
-            "put it back, or give the blocks up with --force"
-        )
-    elif spec is None or task.force:
-        store.clear()
-    else:
-        raise SweepError(
-            f"{store.folder}: unfinished parts of another study or version; finish that one first, choose another "
-            "name, or give its parts up with --force\n" + _listed(spec.fingerprint, task.mark)
-        )
-
-
-def _tidy(store: Store, spec: Spec | None, task: _Task) -> None:
-    """Removes parts that were left over although their output is complete; not those of another study."""
-    if spec is None or dict(spec.fingerprint) == dict(task.mark):
-        store.clear()
-
-
-def _finish(session: Session, store: Store, output: Path, progress: Progress, ending: Ending) -> None:
+def _finish(session: Session, store: Store, cluster: Cluster | None, ending: Ending) -> None:
     """Computes what is missing and puts the result together, again where a part turns out to be damaged."""
     for _ in range(MOST_ATTEMPTS):
-        _store_blocks(session, store, progress, ending)
-        assert store.spec is not None
-        layout = session.dated(progress, store.spec.begun)
-
-        def tell(done: int, total: int) -> None:
-            progress.gather(done, total)
-            session.check_time()
-
-        damaged = assemble(store, session.study, layout, output, session.workers, tell)
+        if store.missing() and cluster is not None:
+            _store_elsewhere(session, store, cluster)
+        elif store.missing():
+            _store_blocks(session, store, ending)
+        damaged = _assembled(session, store)
         if not damaged:
-            progress.end()
+            session.progress.end()
             return
         for index in damaged:
             path = store.set_aside(index)
-            start, stop = session.cells(index)
-            session.again(index, progress)
-            progress.note(f"cells {start} to {stop} were damaged on the disk and are computed again; see {path}")
+            session.again(index)
+            session.progress.note(
+                f"{session.blocks.label(index)} were damaged on the disk and are computed again; see {path}"
+            )
     raise SweepError(f"{store.folder}: what is written there comes back damaged again and again; the disk is failing")
 
 
-def _store_blocks(session: Session, store: Store, progress: Progress, ending: Ending) -> None:
-    jobs = store.missing()
-    if not jobs:
-        return
-    if session.cluster is not None:
-        _store_elsewhere(session, store, jobs, progress)
-        return
+def _assembled(session: Session, store: Store) -> list[int]:
+    """Blocks that turn out to be damaged while the result is put together; where there are none, it is there."""
+    assert store.manifest is not None
+
+    def tell(done: int, total: int) -> None:
+        session.progress.gather(done, total)
+        session.check_time()
+
+    schema, task = session.dated(store.manifest.begun), session.task
+    return assemble(store, session.study, schema, task.output, task.workers, tell)
+
+
+def _store_blocks(session: Session, store: Store, ending: Ending) -> None:
     # twice as many threads as cores: some wait for the disk while the others compute
-    threads = min(2 * session.workers, len(jobs))
-    cells = min(store.blocks.cells, store.blocks.size)
-    buffers = Spares(lambda: {c.name: c.empty(cells) for c in store.columns}, threads)
+    threads = min(2 * session.task.workers, len(store.missing()))
+    buffers = BufferPool(session.blocks.empty, threads)
 
     def work(job: int, solve: Solve) -> None:
         start, stop = store.blocks.bounds(job)
-        with buffers.lent() as columns:
+        with buffers.borrow() as columns:
             arrays = {name: column[: stop - start] for name, column in columns.items()}
             if solve(start, stop, arrays):
                 begun = time.monotonic()
                 store.put(job, arrays)
                 ending.wrote(time.monotonic() - begun)
 
-    session.compute(threads, work, progress)
+    session.compute(threads, work)
 
 
-def _store_elsewhere(session: Session, store: Store, jobs: Sequence[int], progress: Progress) -> None:
+def _store_elsewhere(session: Session, store: Store, cluster: Cluster) -> None:
     """Blocks that workers of a cluster compute, and write themselves where they can."""
 
-    def receive(job: int, found: str | Mapping[str, Any]) -> None:
+    def receive(job: int, found: Found) -> None:
         if isinstance(found, str):
             store.take(job, found)
         else:
             store.put(job, found)
 
-    session.compute_elsewhere(receive, progress, store.open_door())
-    store.close_doors()
+    _elsewhere(session, cluster, store.open_shared(), receive)
+    store.close_shared()
 
 
-def _check_space(session: Session, output: Path, progress: Progress) -> None:
+def _check_space(session: Session) -> None:
     """Raises SweepError where the parts to come and the output have no room on the disk."""
-    missing = session.row_bytes * (progress.total - progress.done) / session.granules.mean
-    layout = session.layout
-    coordinates = sum(np.asarray(coordinate.values).nbytes for coordinate in layout.coordinates)
+    schema, blocks, progress, output = session.schema, session.blocks, session.progress, session.task.output
+    missing = blocks.row_bytes * (progress.total - progress.done) / blocks.rows.mean
+    coordinates = sum(np.asarray(coordinate.values).nbytes for coordinate in schema.coordinates)
     # the study is in the parts' spec.json, too
-    words = 2 * sum(len(str(text).encode()) for text in layout.attrs.values())
-    needed = missing + layout.cell_bytes * layout.grid.size + coordinates + words
+    words = 2 * sum(len(str(text).encode()) for text in schema.attrs.values())
+    needed = missing + schema.cell_bytes * schema.grid.size + coordinates + words
     free = shutil.disk_usage(output.parent).free
     if needed > free:
         raise SweepError(
             f"{output}: needs {quantity(needed)} more, only {quantity(free)} are free here; free some space, choose "
             "another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
         )
-
-
-def _done(task: _Task, output: Path) -> bool:
-    """Whether the output is complete for this study. Raises SweepError where it is something else."""
-    if not output.exists():
-        return False
-    stored = stored_fingerprint(output)
-    if task.force:
-        return False
-    if stored == dict(task.mark):
-        _check_whole(output)
-        return True
-    hindrance = obstacle(stored, task.mark)
-    if task.extend and not hindrance:
-        return False
-    cure = "choose another name, or overwrite it with --force"
-    if task.extend:
-        raise SweepError(f"{output}: cannot be extended, for {hindrance}; {cure}\n" + _listed(stored, task.mark))
-    more = "" if hindrance else "; where its axes have only got more values, --extend computes the new cells alone"
-    raise SweepError(
-        f"{output}: holds the result of another study or version; {cure}{more}\n" + _listed(stored, task.mark)
-    )
-
-
-def _listed(old: Mapping[str, str], new: Mapping[str, str]) -> str:
-    return "\n".join(f"  {line}" for line in difference(dict(old), dict(new)))
-
-
-def _checked_output(path: str | os.PathLike[str]) -> Path:
-    output = Path(os.path.realpath(path))
-    if not output.parent.is_dir():
-        raise SweepError(f"{path}: there is no folder {output.parent}")
-    return output

@@ -1,37 +1,34 @@
-"""One run of a study: its layout, how it is cut into blocks, and the threads that compute them."""
+"""One run of a study: its schema, how it is cut into blocks, and the threads here that compute them, or an executor."""
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, Protocol
 
+from sweep.cells.block import Blocks, Computed, Found, block_solver, faults_reported, sampled_study
 from sweep.cells.compiling import Compiling
-from sweep.cells.contents import contents, part_columns
-from sweep.cells.partition import UNSAMPLED, Partition, Sample, row_partition, take_sample
-from sweep.cells.reduce import Reducer
-from sweep.cells.row_blocks import granules
-from sweep.cells.schema import ANCILLARY, ERROR_BOUND, METHOD_USED, STATUS, Layout, columns
-from sweep.system.errors import SweepError
+from sweep.cells.output_schema import output_schema, part_columns
+from sweep.cells.partition import Partition, row_blocks
+from sweep.cells.schema import Schema
+from sweep.cells.timing import UNSAMPLED, Sample, row_partition
+from sweep.runs.extend import TAKEN_OVER, Precomputed, Reused
+from sweep.runs.task import Task
 from sweep.system.forecast import Forecast
-from sweep.system.pool import Halt, Spares, each
-from sweep.system.progress import Progress
-from sweep.system.until import TimeUp, passed
-
-if TYPE_CHECKING:
-    from sweep.runs.cluster import Cluster
-    from sweep.runs.extend import Given, Known
-    from sweep.study.model import Study
+from sweep.system.pool import BufferPool, Stopper, each
+from sweep.system.progress import Progress, TimeUp, passed
 
 Solve = Callable[[int, int, Mapping[str, Any]], bool]
 """Computes the rows start .. stop into columns of that length; False where the run is being stopped."""
 
-Receive = Callable[[int, "str | Mapping[str, Any]"], None]
-"""Takes a block that was computed elsewhere: the name of its part, or its numbers."""
+
+class Executor(Protocol):
+    """What computes blocks elsewhere."""
+
+    def compute(self, blocks: Iterator[int], receive: Callable[[Computed | None], None]) -> None:
+        """Calls `receive` with every block that is done, and with None now and then. Raises SweepError."""
 
 
 class Session:
@@ -39,186 +36,117 @@ class Session:
 
     Parameters
     ----------
-    study : Study
-    mark : fingerprint of the study
-    workers : cores to compute on
-    blocks : how the grid is cut, where that is settled already
-    block_cells : cells a block, instead of a size taken from the sample
+    task : what is asked for
+    threads : how many there are to compute, here or elsewhere
+    partition : how the rows are cut, where that is settled already
     sampled : False where nothing is left to compute
-    known : cells that need not be computed
-    until : when to stop
-    cluster : workers elsewhere, which compute instead of this process
-    note : tells what is compiled
+    reused : cells that need not be computed
     """
 
     def __init__(
         self,
-        study: Study,
-        mark: Mapping[str, str],
-        workers: int,
-        blocks: Partition | None = None,
-        block_cells: int | None = None,
+        task: Task,
+        threads: int,
+        partition: Partition | None = None,
         sampled: bool = True,
-        known: Known | Given | None = None,
-        until: datetime | None = None,
-        cluster: Cluster | None = None,
-        note: Callable[[str], None] | None = None,
+        reused: Reused | Precomputed | None = None,
     ) -> None:
-        self.study, self.mark, self.workers, self.known, self.until = study, mark, workers, known, until
-        self.cluster = cluster
+        study = task.study
+        self.task, self.study, self.reused = task, study, reused
         self.began = now()
-        self.layout: Layout = contents(study, mark)
-        self.columns = part_columns(study)
-        self.granules = grains = granules(study)
-        compiling = Compiling(study.kernel, study.kernel_name, note)
+        self.schema: Schema = output_schema(study, task.fingerprint)
+        compiling = Compiling(study.kernel, study.kernel_name, task.note)
         self.sample: Sample = sampled_study(study, compiling) if sampled else UNSAMPLED
-        if blocks is None and block_cells is not None:
-            blocks = Partition(grains.count, min(math.ceil(block_cells / grains.mean), grains.count))
-        crew = cluster.threads if cluster is not None else 0
-        self.blocks = blocks or row_partition(self.sample, grains, self.row_bytes, crew or workers)
-        self.forecast = Forecast([], [])
+        self.blocks = Blocks(study, partition or self._partition(threads))
+        self.begin([])
 
-    @property
-    def row_bytes(self) -> int:
-        """Bytes of one row over all columns of a part."""
-        return sum(column.cell_bytes for column in self.columns)
+    def _partition(self, threads: int) -> Partition:
+        rows, cells = row_blocks(self.study), self.task.block_cells
+        if cells is not None:
+            return Partition(rows.count, min(math.ceil(cells / rows.mean), rows.count))
+        row_bytes = sum(column.cell_bytes for column in part_columns(self.study))
+        return row_partition(self.sample, rows, row_bytes, threads)
 
-    def cells(self, job: int) -> tuple[int, int]:
-        """The cells of a block."""
-        return self.granules.cells(*self.blocks.bounds(job))
-
-    def progress(
-        self, stream: TextIO | None, name: str, jobs: Sequence[int], ending: Callable[[], float] = float
-    ) -> Progress:
-        """Where the run stands when `jobs` are still to do; they are what `compute` computes.
+    def begin(self, jobs: Sequence[int], ending: Callable[[], float] = float) -> Progress:
+        """Where the run stands when the blocks `jobs` are still to do; they are what is computed.
 
         Parameters
         ----------
         ending : tells the seconds needed when all cells are computed
         """
-        self.forecast = Forecast(self.sample.weights(self.blocks, self.granules.first), jobs)
-        left = sum(stop - start for start, stop in map(self.cells, jobs))
-        return Progress(self.granules.size, stream, name, self.granules.size - left, self.forecast, ending=ending)
+        rows = self.blocks.rows
+        left = sum(stop - start for start, stop in map(self.blocks.cells, jobs))
+        self.forecast = Forecast(self.sample.weights(self.blocks.partition, rows.first), jobs)
+        self.progress = Progress(
+            rows.size, self.task.stream, self.task.name, rows.size - left, self.forecast, ending=ending
+        )
+        return self.progress
 
-    def again(self, job: int, progress: Progress) -> None:
+    def again(self, job: int) -> None:
         """A block has to be computed once more."""
-        start, stop = self.cells(job)
+        start, stop = self.blocks.cells(job)
         self.forecast.again(job)
-        progress.again(stop - start)
+        self.progress.again(stop - start)
 
-    def dated(self, progress: Progress, began: str) -> Layout:
-        """The layout with the times of the run, which now is at its end."""
+    def dated(self, began: str) -> Schema:
+        """The schema with the times of the run, which now is at its end, and what was reused."""
         end = now()
-        times = {"created": end, "start": began, "end": end, "cells_per_second": progress.rate}
-        return replace(self.layout, attrs={**self.layout.attrs, **times})
+        times = {"created": end, "start": began, "end": end, "cells_per_second": self.progress.rate}
+        reused = {TAKEN_OVER: self.reused.taken_over} if self.reused and self.reused.taken_over else {}
+        return replace(self.schema, attrs={**self.schema.attrs, **times, **reused})
 
-    def compute(self, threads: int, work: Callable[[int, Solve], None], progress: Progress) -> None:
+    def compute(self, threads: int, work: Callable[[int, Solve], None]) -> None:
         """Calls `work(job, solve)` for every block that is left, on a pool of threads.
 
         No more than `workers` threads are inside `solve` at a time. Raises SweepError where `work` fails, TimeUp.
         """
         self.check_time()
-        halt = Halt(self.workers)
-        solvers = Spares(lambda: self._solver(halt), threads)
+        stopper = Stopper(self.task.workers)
+        solvers = BufferPool(lambda: self._solver(stopper), threads)
 
         def guarded(job: int) -> None:
-            start, stop = self.cells(job)
-            with faults_told(f"cells {start} to {stop}: the kernel failed"), solvers.lent() as solve:
+            with faults_reported(f"{self.blocks.label(job)}: the kernel failed"), solvers.borrow() as solve:
                 work(job, solve)
             self.forecast.end(job)
 
-        each(self.forecast.order(), guarded, threads, lambda job: self._tell(progress, job), halt)
+        each(self.forecast.order(), guarded, threads, self._count, stopper)
 
-    def compute_elsewhere(
-        self,
-        receive: Receive,
-        progress: Progress,
-        door: Path | None,
-    ) -> None:
-        """The same on the workers of a cluster: calls `receive` with every block and its part's name, or its numbers.
-
-        Parameters
-        ----------
-        door : the way to the folder of the parts; None: all numbers are wanted here
-        """
+    def compute_elsewhere(self, executor: Executor, receive: Callable[[int, Found], None]) -> None:
+        """The same by an executor: calls `receive` with every block and its part's name, or its numbers."""
         self.check_time()
 
-        def finished(job: int | None, seconds: float = 0.0) -> None:
-            if job is not None:
-                self.forecast.end(job, seconds)
-            self._tell(progress, job)
+        def take(done: Computed | None) -> None:
+            if done is not None:
+                receive(done.block, done.found)
+                self.forecast.end(done.block, done.seconds)
+            self._count(None if done is None else done.block)
 
-        assert self.cluster is not None
-        self.cluster.compute(self, self.forecast.order(), receive, finished, progress.note, door)
+        executor.compute(self.forecast.order(), take)
 
-    def _tell(self, progress: Progress, job: int | None) -> None:
+    def _count(self, job: int | None) -> None:
         """Counts a block that is done. Raises TimeUp."""
         if job is None:
-            progress.tick()
+            self.progress.tick()
         else:
-            start, stop = self.cells(job)
-            progress.add(stop - start)
+            start, stop = self.blocks.cells(job)
+            self.progress.add(stop - start)
         self.check_time()
 
     def check_time(self) -> None:
         """Raises TimeUp when it is time to stop."""
-        if passed(self.until):
+        if passed(self.task.until):
             raise TimeUp
 
-    def _solver(self, halt: Halt) -> Solve:
-        compute, known = block_solver(self.study), self.known
+    def _solver(self, stopper: Stopper) -> Solve:
+        compute, reused = block_solver(self.study), self.reused
 
         def solve(start: int, stop: int, arrays: Mapping[str, Any]) -> None:
-            self.forecast.begin(start // self.blocks.cells)
-            compute(start, stop, arrays, None if known is None else known.missing(start, stop))
-            if known is not None:
-                known.fill(start, stop, arrays)
+            self.forecast.begin(start // self.blocks.partition.cells)
+            compute(start, stop, arrays, None if reused is None else reused.missing(start, stop))
+            if reused is not None:
+                reused.fill(start, stop, arrays)
 
-        return lambda start, stop, arrays: halt.compute(lambda: solve(start, stop, arrays))
-
-
-def block_solver(study: Study) -> Callable[[int, int, Mapping[str, Any], Any], None]:
-    """Computes rows into the columns of a part; of cells, only those wanted (None: all). For one thread at a time."""
-    if study.summary is not None:
-        reducer = Reducer(study)
-        return lambda start, stop, arrays, wanted: reducer.solve(start, stop, arrays)
-    from sweep.cells.solve import Solver
-
-    solver = Solver(study)
-
-    def solve(start: int, stop: int, arrays: Mapping[str, Any], wanted: Any) -> None:
-        outputs = {name: array for name, array in arrays.items() if name not in ANCILLARY}
-        solver.solve(start, stop, outputs, arrays[STATUS], arrays[METHOD_USED], wanted, arrays[ERROR_BOUND])
-
-    return solve
-
-
-def sampled_study(study: Study, compiling: Compiling | None = None) -> Sample:
-    """Compiles the kernel and times a sample of the grid. Raises SweepError where the kernel fails."""
-    from sweep.cells.solve import Solver
-
-    compiling = compiling or Compiling(study.kernel, study.kernel_name)
-    with faults_told(f"{study.kernel_name}: the kernel failed"):
-        solver = Solver(replace(study, kernel=compiling.kernel))
-        solver.warm()
-        sample = take_sample(solver, columns(study), granules(study).size)
-        if study.summary is not None:
-            sample = replace(sample, costs=sample.costs + Reducer(study).seconds())
-        compiling.remember()
-        return sample
-
-
-@contextlib.contextmanager
-def faults_told(what: str) -> Iterator[None]:
-    """Every fault as a SweepError of one line."""
-    try:
-        yield
-    except SweepError:
-        raise
-    except MemoryError as fault:
-        raise SweepError("out of memory; fewer workers need less; what is finished is kept") from fault
-    except Exception as fault:
-        raise SweepError(f"{what} ({type(fault).__name__}: {fault}); what is finished is kept") from fault
+        return lambda start, stop, arrays: stopper.compute(lambda: solve(start, stop, arrays))
 
 
 def now() -> str:

@@ -17,16 +17,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from distributed import WorkerPlugin
 
-from sweep.cells.contents import part_columns
+from sweep.cells.block import Blocks, SolveBlock, block_solver, faults_reported
 from sweep.cells.fingerprint import difference, fingerprint
 from sweep.cells.partition import Partition
-from sweep.cells.row_blocks import granules
-from sweep.runs.session import block_solver, faults_told
 from sweep.store.parts import digest
 from sweep.store.store import Store
 from sweep.study.model import Study
 from sweep.system.errors import SweepError
+
+TOKEN = "token"
 
 
 @dataclass(frozen=True)
@@ -37,23 +38,20 @@ class Assignment:
     ----------
     run : its name
     study : JSON
-    mark : fingerprint of the study where the run was started; a worker with another one refuses
-    blocks : how the rows are cut
-    door : folder through which parts are to be written, or "" where they are to be sent
-    key : what stands in the file `KEY` of that folder, if it is the same folder as there
+    fingerprint : fingerprint of the study where the run was started; a worker with another one refuses
+    partition : how the rows are cut
+    shared : folder in which parts are to be written, or "" where they are to be sent
+    token : what stands in the file `TOKEN` of that folder, if it is the same folder as there
     paths : where to look for the module of a kernel of the user's own; his study was allowed to run it
     """
 
     run: str
     study: str
-    mark: Mapping[str, str]
-    blocks: Partition
-    door: str
-    key: str
+    fingerprint: Mapping[str, str]
+    partition: Partition
+    shared: str
+    token: str
     paths: tuple[str, ...]
-
-
-KEY = "key"
 
 
 @dataclass(frozen=True)
@@ -72,20 +70,25 @@ class Answer:
     found: Mapping[int, str | Sent]
 
 
+class Plugin(WorkerPlugin):  # type: ignore[misc]
+    """Tells every worker process of a run, also those that come later, and lets it forget the run at the end."""
+
+    def __init__(self, assignment: Assignment) -> None:
+        self.assignment = assignment
+
+    def setup(self, worker: Any) -> None:
+        """Called in the worker."""
+        _assignments[self.assignment.run] = self.assignment
+
+    def teardown(self, worker: Any) -> None:
+        """Called in the worker."""
+        _assignments.pop(self.assignment.run, None)
+        _contexts.pop(self.assignment.run, None)
+
+
 _assignments: dict[str, Assignment] = {}
-_benches: dict[str, _Bench] = {}
+_contexts: dict[str, _Context] = {}
 _lock = threading.Lock()
-
-
-def assign(assignment: Assignment) -> None:
-    """Tells this process of a run."""
-    _assignments[assignment.run] = assignment
-
-
-def dismiss(run: str) -> None:
-    """Forgets a run."""
-    _assignments.pop(run, None)
-    _benches.pop(run, None)
 
 
 def compute(run: str, jobs: Sequence[int], masks: Mapping[int, bytes]) -> Answer:
@@ -96,62 +99,64 @@ def compute(run: str, jobs: Sequence[int], masks: Mapping[int, bytes]) -> Answer
     SweepError
         The run is over, this process has another version of the kernel, the kernel fails, or the disk does.
     """
-    bench = _bench(run)
+    context = _context(run)
     begun = time.perf_counter()
-    found = {job: bench.block(job, masks.get(job)) for job in jobs}
+    found = {job: context.block(job, masks.get(job)) for job in jobs}
     return Answer(time.perf_counter() - begun, found)
 
 
-def _bench(run: str) -> _Bench:
+def _context(run: str) -> _Context:
     with _lock:
         if run not in _assignments:
             raise SweepError("the run is over")
-        if run not in _benches:
-            _benches[run] = _Bench(_assignments[run])
-        return _benches[run]
+        if run not in _contexts:
+            _contexts[run] = _Context(_assignments[run])
+        return _contexts[run]
 
 
-class _Bench:
+class _Context:
     """Solvers and buffers of a run, one of each for every thread; compiles the kernel."""
 
     def __init__(self, assignment: Assignment) -> None:
         self._study = _study(assignment)
-        self._blocks, self._granules = assignment.blocks, granules(self._study)
-        self._columns = part_columns(self._study)
-        self._store = _store(assignment, self._columns)
-        self._own = _Own()
+        self._blocks = Blocks(self._study, assignment.partition)
+        self._store = _store(assignment, self._blocks.columns)
+        self._thread = _ThreadState()
         from sweep.cells.solve import Solver
 
-        with faults_told(f"{self._study.kernel_name}: the kernel failed"):
+        with faults_reported(f"{self._study.kernel_name}: the kernel failed"):
             # what all threads need is compiled once
             Solver(self._study).warm()
 
     def block(self, job: int, mask: bytes | None) -> str | Sent:
         """The name of the part that is written, or the numbers."""
-        start, stop = self._blocks.bounds(job)
-        first, last = self._granules.cells(start, stop)
-        wanted = None if mask is None else np.unpackbits(np.frombuffer(mask, np.uint8), count=stop - start).view(bool)
-        with faults_told(f"cells {first} to {last}: the kernel failed"):
-            solve, buffers = self._own.solver(self._study), self._own.buffers
+        with faults_reported(f"{self._blocks.label(job)}: the kernel failed"):
             if self._store is None or mask is not None:
-                arrays = {c.name: c.empty(stop - start) for c in self._columns}
-                solve(start, stop, arrays, wanted)
-                return Sent(digest(self._columns, arrays), arrays)
-            cells = min(self._blocks.cells, self._blocks.size)
-            arrays = {c.name: buffers.setdefault(c.name, c.empty(cells))[: stop - start] for c in self._columns}
-            solve(start, stop, arrays, None)
+                return self._sent(job, mask)
+            start, stop = self._blocks.bounds(job)
+            buffers = self._thread.buffers or self._blocks.empty()
+            self._thread.buffers = buffers
+            arrays = {name: buffer[: stop - start] for name, buffer in buffers.items()}
+            self._thread.solver(self._study)(start, stop, arrays, None)
             self._store.put(job, arrays)
             return self._store.names.pop(job)
 
+    def _sent(self, job: int, mask: bytes | None) -> Sent:
+        start, stop = self._blocks.bounds(job)
+        wanted = None if mask is None else np.unpackbits(np.frombuffer(mask, np.uint8), count=stop - start).view(bool)
+        arrays = self._blocks.empty(stop - start)
+        self._thread.solver(self._study)(start, stop, arrays, wanted)
+        return Sent(digest(self._blocks.columns, arrays), arrays)
+
 
 @dataclass
-class _Own(threading.local):
+class _ThreadState(threading.local):
     """What a thread needs for itself."""
 
-    solve: Any = None
-    buffers: dict[str, Any] = field(default_factory=dict)
+    solve: SolveBlock | None = None
+    buffers: Mapping[str, Any] = field(default_factory=dict)
 
-    def solver(self, study: Study) -> Any:
+    def solver(self, study: Study) -> SolveBlock:
         if self.solve is None:
             self.solve = block_solver(study)
         return self.solve
@@ -162,7 +167,7 @@ def _study(assignment: Assignment) -> Study:
     sys.path.extend(path for path in assignment.paths if path not in sys.path and Path(path).is_dir())
     try:
         study = Study.from_json(assignment.study, allow_import=True)
-        changed = difference(assignment.mark, fingerprint(study))
+        changed = difference(assignment.fingerprint, fingerprint(study))
     except SweepError as fault:
         raise SweepError(f"worker on {socket.gethostname()}: {fault}") from None
     if changed:
@@ -176,11 +181,11 @@ def _study(assignment: Assignment) -> Study:
 
 def _store(assignment: Assignment, columns: Any) -> Store | None:
     """Where this process writes parts; None where it does not see the folder, or may not write there."""
-    door = Path(assignment.door)
+    shared = Path(assignment.shared)
     try:
-        same = bool(assignment.door) and (door / KEY).read_text("ascii") == assignment.key
+        same = bool(assignment.shared) and (shared / TOKEN).read_text("ascii") == assignment.token
     except (OSError, ValueError):
         return None
-    if not same or not os.access(door, os.W_OK) or not os.access(door.parent, os.W_OK):
+    if not same or not os.access(shared, os.W_OK) or not os.access(shared.parent, os.W_OK):
         return None
-    return Store.through(door, columns, assignment.mark, assignment.blocks)
+    return Store.sharing(shared, columns, assignment.fingerprint, assignment.partition)

@@ -1,1 +1,11 @@
-"""Results for people: `charts` (the only place that imports matplotlib), `text`, `page` (HTML), `laws`, `kernels`."""
+"""Results for people: pictures, pages and words. Runs nothing; the only room that imports matplotlib.
+
+Others may use
+    `charts`   plot, plot_precision; for figures of one's own: style, new_figure, save and what draws panels
+    `page`     write_page: a result as one page of HTML
+    `text`     result_text
+    `laws`     power laws along an axis, as text and csv; pick
+    `kernels`  what can be swept, and a study to begin with
+
+`view` chooses and letters what `charts` draws.
+"""

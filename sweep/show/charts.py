@@ -86,7 +86,7 @@ FLAGGED = ("#D55E00", "#000000", "#CC79A7", "#666666")
 HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "----")
 """Patterns of cells without a value, told apart without colour."""
 
-NAME_ROOM = 0.11
+NAME_SPACE = 0.11
 """Part of a map's height that a region must reach from the place of its name in all directions."""
 
 METADATA: dict[str, dict[str, Any]] = {
@@ -339,7 +339,7 @@ def _name(axes: Any, corners: list[Any], here: Any, name: str) -> None:
     depth = distance_transform_edt(inside, sampling=(1.0, aspect))[1:-1, 1:-1]
     widest = np.argwhere(depth > 0.999 * depth.max())
     row, column = widest[abs(widest - widest.mean(axis=0)).sum(axis=1).argmin()]
-    if depth[row, column] < NAME_ROOM * here.shape[0]:
+    if depth[row, column] < NAME_SPACE * here.shape[0]:
         return
     at = [
         np.sqrt(c[i] * c[i + 1]) if c[0] > 0 else (c[i] + c[i + 1]) / 2

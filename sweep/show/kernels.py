@@ -9,7 +9,7 @@ from typing import Any
 
 from kernels import catalogue
 from kernels.interface import Field, Kernel, Method
-from sweep.study.kernels import load_kernel
+from sweep.study.kernel_lookup import load_kernel
 from sweep.study.mistakes import limits, listed, quoted
 from sweep.system.errors import SweepError
 from sweep.system.table import columns, page, section
@@ -68,13 +68,8 @@ def _name_and_default(field: Field) -> str:
 
 def _parameter(field: Field) -> tuple[str, ...]:
     default = "required" if field.default is None else f"default {_default(field)}"
-    return (
-        field.name,
-        f"[{field.unit}]",
-        limits(field),
-        default,
-        field.doc + _along(field).replace(" along", ", one for each"),
-    )
+    doc = field.doc + _along(field).replace(" along", ", one for each")
+    return field.name, f"[{field.unit}]", limits(field), default, doc
 
 
 def _output(field: Field) -> tuple[str, ...]:
@@ -122,16 +117,9 @@ def _axis(field: Field, middle: Any) -> Iterable[str]:
     elif field.integer:
         yield f"values = [{', '.join(f'{max(field.lower, 1) + i:g}' for i in range(3))}]"
     elif field.unit == "m":  # machines keep their kind when a length is changed by a fifth, not by ten
-        yield from (
-            'spacing = "linear"',
-            f"start = {0.8 * middle:g}",
-            f"stop = {1.2 * middle:g}",
-            "num = 41",
-            'unit = "m"',
-        )
+        yield from _spaced("linear", 0.8 * middle, 1.2 * middle, 41, "m")
     else:
-        yield from ('spacing = "log"', f"start = {middle / 10:g}", f"stop = {middle * 10:g}", "num = 41")
-        yield f'unit = "{field.unit}"'
+        yield from _spaced("log", middle / 10, middle * 10, 41, field.unit)
 
 
 def _entry(field: Field, value: Any) -> str:
@@ -145,9 +133,11 @@ def _range(field: Field) -> Iterable[str]:
     if field.integer:
         return ["num = 10"]
     if field.unit == "rad" and field.upper - field.lower > 2 * math.pi:
-        return ['spacing = "linear"', "start = 0", "stop = 360", "num = 181", 'unit = "degree"']
+        return _spaced("linear", 0, 360, 181, "degree")
     if math.isfinite(field.upper - field.lower):
         return ["num = 200"]
-    if field.unit == "m":
-        return ['spacing = "linear"', "start = 0", "stop = 0.1", "num = 51", 'unit = "m"']
-    return ['spacing = "log"', "start = 0.1", "stop = 100", "num = 200", f'unit = "{field.unit}"']
+    return _spaced("linear", 0, 0.1, 51, "m") if field.unit == "m" else _spaced("log", 0.1, 100, 200, field.unit)
+
+
+def _spaced(spacing: str, start: float, stop: float, num: int, unit: str) -> list[str]:
+    return [f'spacing = "{spacing}"', f"start = {start:g}", f"stop = {stop:g}", f"num = {num}", f'unit = "{unit}"']

@@ -103,17 +103,17 @@ def laws(
 
 def _remark(dataset: xr.Dataset, y: str) -> str:
     """Cells that are not OK, by status; those with a value are in the fit."""
-    from sweep.results.export import flag_words
+    from sweep.results.statuses import flag_words
 
     if STATUS not in dataset or dataset[y].dims != dataset[STATUS].dims:
         return ""
     status, valued, words = dataset[STATUS].values, dataset[y].notnull().values, flag_words(dataset[STATUS])
-    told = []
+    parts = []
     for code in np.unique(status[status != 0]).tolist():
         here = status == code
         counts = {"in the fit": int((here & valued).sum()), "left out": int((here & ~valued).sum())}
-        told += [f"{count} {words.get(code, code)} ({fate})" for fate, count in counts.items() if count]
-    return f"Of {status.size} cells: {', '.join(told)}." if told else ""
+        parts += [f"{count} {words.get(code, code)} ({fate})" for fate, count in counts.items() if count]
+    return f"Of {status.size} cells: {', '.join(parts)}." if parts else ""
 
 
 def _bend(
@@ -152,8 +152,8 @@ def law_rows(found: Laws) -> Iterator[tuple[str, ...]]:
         name = f"{found.y} ({where})" if where else found.y
         both = None if bend is None else bend.sel({d: fit[d] for d in _dims(bend, "law") if d in fit.coords})
         if both is None or both.exponent.ndim != 1 or both.regimes.item() != 2 or both.residual.item() > WORST_MISFIT:
-            cells = _fit_cells(fit)
-            yield name, f"{found.x} {cells[0]}", cells[1], cells[2], cells[5]
+            window, exponent, interval, _, _, residual, _ = _fit_cells(fit)
+            yield name, f"{found.x} {window}", exponent, interval, residual
             continue
         for law, sign in (("low", "<<"), ("high", ">>")):
             one = both.sel(law=law)
@@ -214,16 +214,8 @@ def _dims(dataset: xr.Dataset, *without: str) -> list[str]:
 
 
 def _heading(fit: xr.Dataset) -> tuple[str, ...]:
-    return (
-        *_dims(fit),
-        "window",
-        "p",
-        "interval",
-        "points",
-        "drift",
-        "residual",
-        f"{fit.attrs['y']} at {fit.attrs['x']} = 1",
-    )
+    at_one = f"{fit.attrs['y']} at {fit.attrs['x']} = 1"
+    return (*_dims(fit), "window", "p", "interval", "points", "drift", "residual", at_one)
 
 
 def _table(title: str, heading: Sequence[str], datasets: Sequence[xr.Dataset], cells: Any) -> str:
@@ -237,17 +229,14 @@ def _table(title: str, heading: Sequence[str], datasets: Sequence[xr.Dataset], c
 def _points(dataset: xr.Dataset, *without: str) -> Iterator[tuple[list[str], xr.Dataset]]:
     dims = _dims(dataset, *without)
     for position in itertools.product(*(range(dataset.sizes[dim]) for dim in dims)):
-        point = dataset.isel(dict(zip(dims, position, strict=True)))
-        yield (
-            [
-                _label(point[dim].item()) if dim in point.coords else str(i)
-                for dim, i in zip(dims, position, strict=True)
-            ],
-            point,
-        )
+        places = dict(zip(dims, position, strict=True))
+        point = dataset.isel(places)
+        yield [_label(point, dim, i) for dim, i in places.items()], point
 
 
-def _label(value: Any) -> str:
+def _label(point: xr.Dataset, dim: str, place: int) -> str:
+    """A value of an axis; of a dimension that has none its number."""
+    value = point[dim].item() if dim in point.coords else str(place)
     return value if isinstance(value, str) else f"{value:.6g}"
 
 
@@ -280,10 +269,10 @@ def _bend_cells(bend: xr.Dataset) -> tuple[str, ...]:
         one = bend.sel(law=law)
         cells += [f"{one.exponent.item():.6g}", _interval(one.exponent_low.item(), one.exponent_high.item())]
     place = _interval(bend.crossover_low.item(), bend.crossover_high.item())
-    told = f"{bend.width.item():.2g} decades wide, residual {bend.residual.item():.1e}"
+    width = f"{bend.width.item():.2g} decades wide, residual {bend.residual.item():.1e}"
     if bend.regimes.item() == 1:
-        told += "; one law does as well"
-    return *cells, f"{bend.crossover.item():.6g}", place, told
+        width += "; one law does as well"
+    return *cells, f"{bend.crossover.item():.6g}", place, width
 
 
 def _meeting_cells(meeting: xr.Dataset) -> tuple[str, ...]:

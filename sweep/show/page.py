@@ -96,15 +96,15 @@ def page(dataset: xr.Dataset, result: Path) -> str:
     attrs = dataset.attrs
     title = str(attrs.get("title") or result.stem)
     name, *texts = head(Path(result.name), dataset)
-    told = sections(dataset)
-    settings = told.pop("")
+    tables = sections(dataset)
+    settings = tables.pop("")
     parts = [
         f"<h1>{escape(title)}</h1>",
         *(f'<p class="question">{escape(text)}</p>' for text in texts[:-1] if text != title),
         f'<p class="account">{escape(name)}. {escape(texts[-1])}.</p>',
         *_figures(dataset),
         *_exponents(dataset),
-        *(_section(heading, rows) for heading, rows in told.items()),
+        *(_section(heading, rows) for heading, rows in tables.items()),
         "<h2>provenance</h2>",
         _table((), settings),
         *_study(attrs),

@@ -12,8 +12,7 @@ import numpy as np
 from kernels.interface import Status
 from sweep.cells.reduce import BY_METHOD, BY_STATUS
 from sweep.cells.schema import ANCILLARY, METHOD_USED, STATUS
-from sweep.results.export import flag_words
-from sweep.results.statuses import account, count_methods, count_statuses, is_summary
+from sweep.results.statuses import account, count_methods, count_statuses, flag_words, is_summary
 from sweep.study.model import short
 from sweep.system.table import columns, page, section
 

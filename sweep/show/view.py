@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 import textwrap
 from collections.abc import Iterable
@@ -13,7 +12,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from sweep.results.export import flag_words
+from sweep.results.statuses import flag_words
+from sweep.study.mistakes import did_you_mean
 from sweep.system.errors import SweepError
 
 GREEK = frozenset(
@@ -103,7 +103,7 @@ def _output(dataset: xr.Dataset, y: str | None) -> str:
     if not known:
         raise SweepError("there is nothing to draw: no output runs along an axis")
     if y is not None and y not in known:
-        raise SweepError(f"there is no output {y!r} to draw; {_hint(y, known)}")
+        raise SweepError(f"there is no output {y!r} to draw{_hint(y, known)}")
     return known[0] if y is None else y
 
 
@@ -111,7 +111,7 @@ def _x(output: xr.DataArray, x: str | None, cell_dims: tuple[Any, ...]) -> str:
     known = [str(name) for name, c in output.coords.items() if c.ndim == 1 and c.dtype.kind in "fiu"]
     if x is not None:
         if x not in known:
-            raise SweepError(f"there is no number axis {x!r} to draw {output.name} along; {_hint(x, known)}")
+            raise SweepError(f"there is no number axis {x!r} to draw {output.name} along{_hint(x, known)}")
         return x
     traces = [str(dim) for dim in output.dims if cell_dims and dim not in cell_dims and dim in known]
     axes = traces or [str(dim) for dim in output.dims if dim in known] or known
@@ -121,8 +121,7 @@ def _x(output: xr.DataArray, x: str | None, cell_dims: tuple[Any, ...]) -> str:
 
 
 def _hint(name: str, known: Iterable[str]) -> str:
-    close = difflib.get_close_matches(name, known, 1)
-    return f"did you mean {close[0]}?" if close else f"there are {', '.join(known) or 'none'}"
+    return did_you_mean(name, known) or f"; there are {', '.join(known) or 'none'}"
 
 
 def _thinned(shown: xr.Dataset, along: str, across: str | None) -> xr.Dataset:

@@ -1,6 +1,6 @@
 """From parts to one file that netCDF4 and HDF5 readers open.
 
-HDF5 writes the frame: dimensions, coordinates, attributes, statuses, and the places of the outputs. These are
+HDF5 writes the structure: dimensions, coordinates, attributes, statuses, and the places of the outputs. These are
 contiguous, so a block's cells are consecutive bytes there, and threads copy them in by plain writes at disk speed.
 """
 
@@ -15,21 +15,19 @@ from typing import Any
 
 import numpy as np
 
-from sweep.cells.contents import gathered, part_columns
 from sweep.cells.grid import Box
-from sweep.cells.partition import Partition
-from sweep.cells.row_blocks import granules
-from sweep.cells.schema import Column, Coordinate, Layout
-from sweep.store.canvas import Canvas
-from sweep.store.digests import BYTES, Seals, column_digests, frame_digest, frame_place
-from sweep.store.hdf5_bytes import unfilled
+from sweep.cells.output_schema import gathered, part_columns
+from sweep.cells.partition import Partition, row_blocks
+from sweep.cells.schema import Column, Coordinate, Schema
+from sweep.store.digests import BYTES, Digests, column_digests, structure_digest, structure_place, trailer
+from sweep.store.hdf5_bytes import Hdf5Bytes, unfilled
 from sweep.store.parts import DAMAGE, FLAGS
-from sweep.store.seal import seal, written
+from sweep.store.probe import written
 from sweep.store.store import Store
 from sweep.study.model import Study
 from sweep.system import disk
 from sweep.system.errors import SweepError
-from sweep.system.pool import CtrlC, Spares, each
+from sweep.system.pool import BufferPool, CtrlC, each
 
 CHUNK_CELLS = 1 << 18
 """Cells of one compressed piece of status and method_used; HDF5 keeps at least four of them in memory."""
@@ -41,7 +39,7 @@ CHUNK_BYTES = 8 << 20
 Tell = Callable[[int, int], None]
 
 
-def assemble(store: Store, study: Study, layout: Layout, output: Path, threads: int, tell: Tell) -> list[int]:
+def assemble(store: Store, study: Study, schema: Schema, output: Path, threads: int, tell: Tell) -> list[int]:
     """Puts the parts together under the output's name; then the parts are not needed any more.
 
     Parameters
@@ -60,10 +58,10 @@ def assemble(store: Store, study: Study, layout: Layout, output: Path, threads: 
     """
     temporary = store.temporary("result.h5")
     try:
-        seals = Seals(layout.columns, chunks(study, store.blocks))
-        damaged = _build(store, study, layout, seals, temporary, threads, tell)
+        digests = Digests(schema.columns, chunks(study, store.blocks))
+        damaged = _build(store, study, schema, digests, temporary, threads, tell)
         if not damaged:
-            _check(layout, seals, temporary, output)
+            _check(schema, digests, temporary, output)
             disk.rename(temporary, output)
             disk.sync_folder(output.parent)
             written(output)
@@ -79,22 +77,24 @@ def chunks(study: Study, blocks: Partition) -> Partition:
     """The output's cells that are written, and have a digest, together: those of a part, or some groups."""
     if study.summary is None:
         return blocks
-    grains = granules(study)
+    rows = row_blocks(study)
     row_bytes = sum(column.cell_bytes for column in part_columns(study))
-    return Partition(grains.groups, min(grains.groups, max(1, CHUNK_BYTES // (row_bytes * grains.per_group))))
+    return Partition(rows.groups, min(rows.groups, max(1, CHUNK_BYTES // (row_bytes * rows.per_group))))
 
 
-def _build(store: Store, study: Study, layout: Layout, seals: Seals, path: Path, threads: int, tell: Tell) -> list[int]:
+def _build(
+    store: Store, study: Study, schema: Schema, digests: Digests, path: Path, threads: int, tell: Tell
+) -> list[int]:
     fd = disk.open_file(path, os.O_CREAT | os.O_EXCL | os.O_RDWR)
     try:
-        canvas = Canvas(fd)
+        hdf5 = Hdf5Bytes(fd)
         with CtrlC():
-            write_frame(canvas, layout, seals)
-        canvas.check()
-        writer = _fill(store, study, layout, seals, canvas, fd, threads, tell)
-        canvas.finish()
+            write_structure(hdf5, schema, digests)
+        hdf5.check()
+        writer = _fill(store, study, schema, digests, hdf5, fd, threads, tell)
+        hdf5.finish()
         if not writer.damaged:
-            _seal(fd, writer)
+            _end(fd, writer)
             disk.fsync(fd)
         return sorted(writer.damaged)
     finally:
@@ -102,54 +102,54 @@ def _build(store: Store, study: Study, layout: Layout, seals: Seals, path: Path,
 
 
 def _fill(
-    store: Store, study: Study, layout: Layout, seals: Seals, canvas: Canvas, fd: int, threads: int, tell: Tell
+    store: Store, study: Study, schema: Schema, digests: Digests, hdf5: Hdf5Bytes, fd: int, threads: int, tell: Tell
 ) -> _Writer:
     """Writes all columns on a pool of threads."""
     import h5py
 
-    with h5py.File(canvas, "r+") as file:
-        writer = _Writer(layout, seals, file, canvas, fd)
+    with h5py.File(hdf5, "r+") as file:
+        writer = _Writer(schema, digests, file, hdf5, fd)
         work: Callable[[int], None]
         if study.summary is None:
             work = _Copier(store, writer, threads).copy
         else:
             work, threads = _Gatherer(store, study, writer).gather, 1
-        each(range(seals.chunks.count), work, threads, lambda job: tell(writer.written, seals.chunks.count))
+        each(range(digests.chunks.count), work, threads, lambda job: tell(writer.written, digests.chunks.count))
         if not writer.damaged:
-            seals.write(file)
+            digests.write(file)
     return writer
 
 
-def _seal(fd: int, writer: _Writer) -> None:
+def _end(fd: int, writer: _Writer) -> None:
     """Writes the digests of everything else, which must be in its place by now."""
-    place = writer.frame_place
-    found = frame_digest(fd, [*writer.regions, (place, place + BYTES)])
+    place = writer.structure_place
+    found = structure_digest(fd, [*writer.regions, (place, place + BYTES)])
     disk.pwrite_all(fd, found, place)
-    disk.pwrite_all(fd, seal(writer.regions, fd), os.fstat(fd).st_size)
+    disk.pwrite_all(fd, trailer(writer.regions, fd), os.fstat(fd).st_size)
 
 
-def write_frame(path: Any, layout: Layout, seals: Seals) -> None:
+def write_structure(path: Any, schema: Schema, digests: Digests) -> None:
     """Writes everything but the columns' numbers and digests to a file, or what HDF5 takes for one."""
     import h5netcdf
 
     with h5netcdf.File(path, "w") as file:
-        shared = [c.name for c in layout.coordinates if c.dims and not set(c.dims) & {c.name, *layout.grid.dims}]
+        shared = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
         # xarray's way to mark what belongs to the coordinates of all variables
-        file.attrs.update({**layout.attrs, **({"coordinates": " ".join(shared)} if shared else {})})
-        file.dimensions = layout.sizes
-        for coordinate in layout.coordinates:
+        file.attrs.update({**schema.attrs, **({"coordinates": " ".join(shared)} if shared else {})})
+        file.dimensions = schema.sizes
+        for coordinate in schema.coordinates:
             _write_coordinate(file, coordinate)
-        for column in layout.columns:
-            away = " ".join(_auxiliary(layout, column))
-            variable = _declare(file, layout, column)
+        for column in schema.columns:
+            away = " ".join(_auxiliary(schema, column))
+            variable = _declare(file, schema, column)
             variable.attrs.update({**column.attrs, **({"coordinates": away} if away else {})})
-        seals.declare(file)
+        digests.declare(file)
 
 
-def _auxiliary(layout: Layout, column: Column) -> Iterator[str]:
+def _auxiliary(schema: Schema, column: Column) -> Iterator[str]:
     """Coordinates of a variable that are not among its dimensions."""
-    dims = {*layout.grid.dims, *column.dims}
-    return (c.name for c in layout.coordinates if c.dims != (c.name,) and set(c.dims) <= dims)
+    dims = {*schema.grid.dims, *column.dims}
+    return (c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= dims)
 
 
 def _write_coordinate(file: Any, coordinate: Coordinate) -> None:
@@ -162,14 +162,14 @@ def _write_coordinate(file: Any, coordinate: Coordinate) -> None:
     file.create_variable(coordinate.name, coordinate.dims, dtype, data=data).attrs.update(coordinate.attrs)
 
 
-def _declare(file: Any, layout: Layout, column: Column) -> Any:
-    dims = (*layout.grid.dims, *column.dims)
-    if not layout.shape(column):
+def _declare(file: Any, schema: Schema, column: Column) -> Any:
+    dims = (*schema.grid.dims, *column.dims)
+    if not schema.shape(column):
         # h5py does not heed the properties of a single number; written, it has its place
         return file.create_variable(column.name, (), column.dtype, data=np.zeros((), column.dtype))
     if column.name not in FLAGS:
         return file.create_variable(column.name, dims, column.dtype, dcpl=unfilled())
-    chunks = chunk_shape(layout.grid.shape)
+    chunks = chunk_shape(schema.grid.shape)
     return file.create_variable(column.name, dims, column.dtype, chunks=chunks, compression="gzip", compression_opts=1)
 
 
@@ -186,25 +186,25 @@ def chunk_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
 class _Writer:
     """Writes chunks of cells to their places, in any order."""
 
-    def __init__(self, layout: Layout, seals: Seals, file: Any, canvas: Canvas, fd: int) -> None:
+    def __init__(self, schema: Schema, digests: Digests, file: Any, hdf5: Hdf5Bytes, fd: int) -> None:
         self.damaged: set[int] = set()
         self.written = 0
-        self._columns, self._seals, self._fd = layout.columns, seals, fd
+        self._columns, self._digests, self._fd = schema.columns, digests, fd
         # contiguous ones; those in chunks are left to HDF5
-        datasets = {c.name: file[c.name] for c in layout.columns if c.name not in FLAGS}
+        datasets = {c.name: file[c.name] for c in schema.columns if c.name not in FLAGS}
         self._places = {name: dataset.id.get_offset() for name, dataset in datasets.items()}
         self.regions = [(at, at + datasets[name].nbytes) for name, at in self._places.items()]
-        self.frame_place = frame_place(file)
-        flags = [c.name for c in layout.columns if c.name in FLAGS]
-        self._flags = _Flags({name: file[name] for name in flags}, layout, seals.chunks, canvas)
+        self.structure_place = structure_place(file)
+        flags = [c.name for c in schema.columns if c.name in FLAGS]
+        self._flags = _Flags({name: file[name] for name in flags}, schema, digests.chunks, hdf5)
         self._unsynced = 0
         self._lock = threading.Lock()
 
     def put(self, chunk: int, arrays: Mapping[str, Any]) -> None:
         """Raises OSError where the disk fails."""
-        self._seals.take(chunk, arrays)
+        self._digests.take(chunk, arrays)
         self._flags.put(chunk, arrays)
-        start = self._seals.chunks.bounds(chunk)[0]
+        start = self._digests.chunks.bounds(chunk)[0]
         # the system lets one thread at a time write to a file; those that wait for it there burn time
         with self._lock:
             for column in self._columns:
@@ -225,10 +225,10 @@ class _Copier:
     def __init__(self, store: Store, writer: _Writer, threads: int) -> None:
         self._store, self._writer = store, writer
         cells = min(store.blocks.cells, store.blocks.size)
-        self._buffers = Spares(lambda: {column.name: column.empty(cells) for column in store.columns}, threads)
+        self._buffers = BufferPool(lambda: {column.name: column.empty(cells) for column in store.columns}, threads)
 
     def copy(self, index: int) -> None:
-        with self._buffers.lent() as buffers:
+        with self._buffers.borrow() as buffers:
             arrays = self._store.get(index, buffers)
             if arrays is None:
                 self._writer.damaged.add(index)
@@ -241,7 +241,7 @@ class _Gatherer:
 
     def __init__(self, store: Store, study: Study, writer: _Writer) -> None:
         self._study, self._writer, self._chunks = study, writer, chunks(study, store.blocks)
-        self._rows = granules(study).per_group
+        self._rows = row_blocks(study).per_group
         self._store = store
         self._last: tuple[int, dict[str, Any]] | None = None
 
@@ -273,8 +273,8 @@ class _Flags:
     Blocks that come early wait in memory, two bytes a cell.
     """
 
-    def __init__(self, datasets: Mapping[str, Any], layout: Layout, blocks: Partition, canvas: Canvas) -> None:
-        self._layout, self._blocks, self._canvas, self._datasets = layout, blocks, canvas, datasets
+    def __init__(self, datasets: Mapping[str, Any], schema: Schema, blocks: Partition, hdf5: Hdf5Bytes) -> None:
+        self._schema, self._blocks, self._hdf5, self._datasets = schema, blocks, hdf5, datasets
         self._early: dict[int, dict[str, Any]] = {}
         self._next = 0
         self._lock = threading.Lock()
@@ -285,34 +285,34 @@ class _Flags:
             self._early[index] = {name: arrays[name].copy() for name in self._datasets}
             while self._next in self._early:
                 for name, column in self._early.pop(self._next).items():
-                    _write_cells(self._datasets[name], self._layout, self._blocks.bounds(self._next), column)
+                    _write_cells(self._datasets[name], self._schema, self._blocks.bounds(self._next), column)
                 self._next += 1
-        self._canvas.check()
+        self._hdf5.check()
 
 
-def _write_cells(dataset: Any, layout: Layout, bounds: tuple[int, int], column: Any) -> None:
-    for slices, begin, end in layout.grid.pieces(*bounds):
+def _write_cells(dataset: Any, schema: Schema, bounds: tuple[int, int], column: Any) -> None:
+    for slices, begin, end in schema.grid.pieces(*bounds):
         dataset[slices] = column[begin:end].reshape([s.stop - s.start for s in slices])
 
 
-def _check(layout: Layout, seals: Seals, path: Path, output: Path) -> None:
+def _check(schema: Schema, digests: Digests, path: Path, output: Path) -> None:
     """Reads some chunks back as any reader would. Raises SweepError where they differ."""
     import h5py
 
-    last = seals.chunks.count - 1
+    last = digests.chunks.count - 1
     try:
         with h5py.File(path, "r") as file:
-            same = all(_reads_back(layout, seals, file, chunk) for chunk in {0, last // 2, last})
+            same = all(_reads_back(schema, digests, file, chunk) for chunk in {0, last // 2, last})
     except DAMAGE:
         same = False
     if not same:
         raise SweepError(f"{output}: differs when read back from what was written; the disk may be failing")
 
 
-def _reads_back(layout: Layout, seals: Seals, file: Any, chunk: int) -> bool:
-    bounds = seals.chunks.bounds(chunk)
-    arrays = {c.name: read_cells(file[c.name], layout.grid, bounds, c) for c in layout.columns}
-    return bool((column_digests(layout.columns, arrays) == seals.digests[chunk]).all())
+def _reads_back(schema: Schema, digests: Digests, file: Any, chunk: int) -> bool:
+    bounds = digests.chunks.bounds(chunk)
+    arrays = {c.name: read_cells(file[c.name], schema.grid, bounds, c) for c in schema.columns}
+    return bool((column_digests(schema.columns, arrays) == digests.table[chunk]).all())
 
 
 def read_cells(dataset: Any, box: Box, bounds: tuple[int, int], column: Column) -> Any:

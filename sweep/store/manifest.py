@@ -1,7 +1,7 @@
 """spec.json: what a sweep that is not finished was begun with.
 
-It ends with a digest of itself. Parts are of the sweep whose fingerprint their digests begin with, so that a spec that
-is lost or damaged is written anew from a study and the parts that prove to be its own.
+It ends with a digest of itself. Parts are of the sweep whose fingerprint their digests begin with, so that a manifest
+that is lost or damaged is written anew from a study and the parts that prove to be its own.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ import xxhash
 
 from sweep.cells.partition import Partition
 from sweep.cells.schema import Column
-from sweep.store.hdf5_bytes import Images
-from sweep.store.parts import PART_NAME, read_part
+from sweep.store.hdf5_bytes import PartBytes
+from sweep.store.parts import PART_NAME, is_sound
 from sweep.system.errors import SweepError
 
 FORMAT = 2
-SPEC = "spec.json"
+MANIFEST = "spec.json"
 
 
 @dataclass(frozen=True)
-class Spec:
+class Manifest:
     """What spec.json says: all that a sweep needs to be continued or read."""
 
     study: str
@@ -54,14 +54,14 @@ class Spec:
         return json.dumps({**keys, "digest": _digest(keys)}, indent=1)
 
 
-def new_spec(study: str, fingerprint: Mapping[str, str], blocks: Partition) -> Spec:
-    """The spec of a sweep that begins now."""
-    return Spec(study, fingerprint, blocks, datetime.now(UTC).isoformat(timespec="seconds"))
+def new_manifest(study: str, fingerprint: Mapping[str, str], blocks: Partition) -> Manifest:
+    """The manifest of a sweep that begins now."""
+    return Manifest(study, fingerprint, blocks, datetime.now(UTC).isoformat(timespec="seconds"))
 
 
-def read_spec(folder: Path) -> Spec | None:
-    """The spec of a sweep that has not ended, or None where there is none. Raises SweepError."""
-    path = folder / SPEC
+def read_manifest(folder: Path) -> Manifest | None:
+    """The manifest of a sweep that has not ended, or None where there is none. Raises SweepError."""
+    path = folder / MANIFEST
     try:
         if path.exists() and not path.is_file():
             raise ValueError("it is no regular file")
@@ -71,7 +71,7 @@ def read_spec(folder: Path) -> Spec | None:
         if keys.pop("digest") != _digest(keys):
             raise ValueError("its digest differs")
         blocks = Partition(int(keys["cells"]), int(keys["cells_per_block"]))
-        return Spec(keys["study"], keys["fingerprint"], blocks, keys["begun"])
+        return Manifest(keys["study"], keys["fingerprint"], blocks, keys["begun"])
     except FileNotFoundError:
         return None
     except OSError as fault:
@@ -89,24 +89,15 @@ def _digest(keys: Mapping[str, Any]) -> str:
 
 def restored(
     folder: Path, columns: Sequence[Column], study: str, fingerprint: Mapping[str, str], rows: int
-) -> Spec | None:
-    """The spec that a lost one was, where there are parts of just this study; None where there are none."""
+) -> Manifest | None:
+    """The manifest that a lost one was, where there are parts of just this study; None where there are none."""
     found = [match for entry in os.scandir(folder) if (match := PART_NAME.fullmatch(entry.name))]
     counts = Counter(int(match[2]) - int(match[1]) for match in found)
     if not counts:
         return None
     # all but the last are equally long
     usual = max(counts, key=lambda cells: (counts[cells], cells))
-    spec = new_spec(study, fingerprint, Partition(rows, max(1, usual)))
-    images = Images(columns, spec.mark)
-    names = [match[0] for match in found if spec.blocks.holds(int(match[1]), int(match[2]))]
-    return spec if any(_sound(folder / name, images) for name in names) else None
-
-
-def _sound(path: Path, images: Images) -> bool:
-    match = PART_NAME.fullmatch(path.name)
-    assert match is not None
-    try:
-        return read_part(path, images, int(match[1]), int(match[2])) is not None
-    except FileNotFoundError:
-        return False
+    manifest = new_manifest(study, fingerprint, Partition(rows, max(1, usual)))
+    part_bytes = PartBytes(columns, manifest.mark)
+    names = [match[0] for match in found if manifest.blocks.holds(int(match[1]), int(match[2]))]
+    return manifest if any(is_sound(folder / name, part_bytes) for name in names) else None

@@ -19,7 +19,7 @@ import xxhash
 
 from sweep.cells.partition import Partition
 from sweep.cells.schema import METHOD_USED, STATUS, Column
-from sweep.store.hdf5_bytes import Images
+from sweep.store.hdf5_bytes import PartBytes
 from sweep.system import disk
 from sweep.system.errors import SweepError
 
@@ -50,14 +50,11 @@ def digest(columns: Sequence[Column], arrays: Mapping[str, Any], mark: bytes = b
 
 def read_part(
     path: Path,
-    images: Images,
-    start: int,
-    stop: int,
+    part_bytes: PartBytes,
     buffers: Mapping[str, Any] | None = None,
     keep: bool = False,
 ) -> dict[str, Any] | None:
-    """The numbers of one block, each of shape `(stop - start, ...)`; None where the file is damaged,
-    or of another study.
+    """The numbers of the block that a file is named by; None where it is damaged, or of another study.
 
     Parameters
     ----------
@@ -70,13 +67,22 @@ def read_part(
     """
     match = PART_NAME.fullmatch(path.name)
     assert match is not None
-    arrays = _read(path, images, start, stop, images.columns, buffers, keep)
-    return arrays if arrays is not None and digest(images.columns, arrays, images.mark) == match[3] else None
+    start, stop = int(match[1]), int(match[2])
+    arrays = _read(path, part_bytes, start, stop, part_bytes.columns, buffers, keep)
+    return arrays if arrays is not None and digest(part_bytes.columns, arrays, part_bytes.mark) == match[3] else None
+
+
+def is_sound(path: Path, part_bytes: PartBytes) -> bool:
+    """Whether a part is there and what was written."""
+    try:
+        return read_part(path, part_bytes) is not None
+    except FileNotFoundError:
+        return False
 
 
 def _read(
     path: Path,
-    images: Images,
+    part_bytes: PartBytes,
     start: int,
     stop: int,
     columns: Sequence[Column],
@@ -89,7 +95,7 @@ def _read(
     try:
         fd = disk.open_file(path, os.O_RDONLY)
         try:
-            places = _places(fd, images, start, stop) or _places_by_hdf5(path, images.columns, start, stop)
+            places = _places(fd, part_bytes, start, stop) or _places_by_hdf5(path, part_bytes.columns, start, stop)
             for column in columns:
                 disk.read_into(fd, arrays[column.name], places[column.name])
         finally:
@@ -103,19 +109,19 @@ def _read(
     return arrays
 
 
-def _places(fd: int, images: Images, start: int, stop: int) -> Mapping[str, int] | None:
+def _places(fd: int, part_bytes: PartBytes, start: int, stop: int) -> Mapping[str, int] | None:
     """Where each column begins, in a file as long as this program writes it; None in any other.
 
     Raises ValueError where a byte beside the columns differs, or it is no file.
     """
-    frame, found = images.frame(stop - start), os.fstat(fd)
+    template, found = part_bytes.template(stop - start), os.fstat(fd)
     if not stat.S_ISREG(found.st_mode):
         raise ValueError("is no regular file")
-    if found.st_size != frame.size:
+    if found.st_size != template.size:
         return None
-    if any(os.pread(fd, len(piece), at) != piece for at, piece in images.between(start, stop)):
+    if any(os.pread(fd, len(piece), at) != piece for at, piece in part_bytes.between(start, stop)):
         raise ValueError("differs from what is written there")
-    return frame.places
+    return template.places
 
 
 def _places_by_hdf5(path: Path, columns: Sequence[Column], start: int, stop: int) -> dict[str, int]:
@@ -143,8 +149,8 @@ def at_once(read: Callable[[list[Any]], None], items: Sequence[Any]) -> None:
 class Parts:
     """The parts that are there. Before anything of a part is used its digest is checked, once."""
 
-    def __init__(self, images: Images, blocks: Partition, folder: Path, names: Mapping[int, str]) -> None:
-        self.images, self.blocks, self.folder, self.names = images, blocks, folder, dict(names)
+    def __init__(self, part_bytes: PartBytes, blocks: Partition, folder: Path, names: Mapping[int, str]) -> None:
+        self.part_bytes, self.blocks, self.folder, self.names = part_bytes, blocks, folder, dict(names)
         self._sound: set[int] = set()
 
     def read(self, column: Column, cells: Any) -> Any:
@@ -185,9 +191,9 @@ class Parts:
         try:
             path = self.folder / self.names[index]
             if index in self._sound:
-                found = _read(path, self.images, start, stop, [column], keep=True)
+                found = _read(path, self.part_bytes, start, stop, [column], keep=True)
             else:
-                found = read_part(path, self.images, start, stop, keep=True)
+                found = read_part(path, self.part_bytes, keep=True)
         except FileNotFoundError:
             raise SweepError(f"{self.folder}: the sweep has ended meanwhile; open its result again") from None
         if found is None:

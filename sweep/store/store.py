@@ -22,14 +22,14 @@ from typing import Any
 
 from sweep.cells.partition import Partition
 from sweep.cells.schema import Column
-from sweep.store.hdf5_bytes import Images
-from sweep.store.manifest import SPEC, Spec, new_spec
+from sweep.store.hdf5_bytes import PartBytes
+from sweep.store.manifest import MANIFEST, Manifest, new_manifest
 from sweep.store.parts import PART_NAME, digest, part_name, read_part
 from sweep.system import disk
 from sweep.system.errors import SweepError
 
 LOCK = "lock"
-DOOR, CLOSED = "workers", "closed"
+SHARED, CLOSED = "workers", "closed"
 
 
 def folder_of(output: Path) -> Path:
@@ -44,7 +44,7 @@ class Store:
     ----------
     folder : Path
     columns : tuple of Column
-    spec : Spec or None
+    manifest : Manifest or None
         None until `begin`, where the sweep is new.
     names : dict of int to str
         File of every finished block.
@@ -53,29 +53,31 @@ class Store:
     def __init__(self, folder: Path, columns: Sequence[Column]) -> None:
         self.folder = folder
         self.columns = tuple(columns)
-        self.spec: Spec | None = None
+        self.manifest: Manifest | None = None
         self.names: dict[int, str] = {}
         self.run = secrets.token_hex(4)
-        self._images = Images(columns)
+        self._part_bytes = PartBytes(columns)
         self._scratch = folder
 
-    def _of(self, spec: Spec) -> None:
+    def _of(self, manifest: Manifest) -> None:
         """The parts are those of this sweep from now on."""
-        self.spec, self._images = spec, Images(self.columns, spec.mark)
+        self.manifest, self._part_bytes = manifest, PartBytes(self.columns, manifest.mark)
 
     @classmethod
-    def through(cls, door: Path, columns: Sequence[Column], fingerprint: Mapping[str, str], blocks: Partition) -> Store:
-        """The store of a process that writes parts for the one that has made the door, and has the lock."""
-        store = cls(door.parent, columns)
-        store._scratch = door
-        store._of(Spec("", fingerprint, blocks, ""))
+    def sharing(
+        cls, shared: Path, columns: Sequence[Column], fingerprint: Mapping[str, str], blocks: Partition
+    ) -> Store:
+        """The store of a process that writes parts for the one that has made the shared folder, and has the lock."""
+        store = cls(shared.parent, columns)
+        store._scratch = shared
+        store._of(Manifest("", fingerprint, blocks, ""))
         return store
 
     @property
     def blocks(self) -> Partition:
         """How the grid is cut."""
-        assert self.spec is not None, "the sweep has not begun"
-        return self.spec.blocks
+        assert self.manifest is not None, "the sweep has not begun"
+        return self.manifest.blocks
 
     def missing(self) -> list[int]:
         """Numbers of the blocks that are not done, ascending."""
@@ -83,20 +85,20 @@ class Store:
 
     def begin(self, study: str, fingerprint: Mapping[str, str], blocks: Partition) -> None:
         """Fixes study and partition for good. Raises SweepError."""
-        self.write(new_spec(study, fingerprint, blocks))
+        self.write(new_manifest(study, fingerprint, blocks))
 
-    def write(self, spec: Spec) -> None:
-        """Puts a spec in place; the parts that are there are not taken up. Raises SweepError."""
-        path = self.folder / SPEC
+    def write(self, manifest: Manifest) -> None:
+        """Puts a manifest in place; the parts that are there are not taken up. Raises SweepError."""
+        path = self.folder / MANIFEST
         try:
-            disk.publish([spec.to_json().encode()], self.temporary(SPEC), path)
+            disk.publish([manifest.to_json().encode()], self.temporary(MANIFEST), path)
         except OSError as fault:
             raise disk.refusal(fault, path) from fault
-        self._of(spec)
+        self._of(manifest)
 
-    def resume(self, spec: Spec) -> None:
+    def resume(self, manifest: Manifest) -> None:
         """Takes up the parts that are there. Raises SweepError."""
-        self._of(spec)
+        self._of(manifest)
         try:
             self._sort_out()
         except OSError as fault:
@@ -105,8 +107,8 @@ class Store:
     def put(self, index: int, arrays: Mapping[str, Any]) -> None:
         """Stores a block: on return it is on the disk. Raises SweepError."""
         start, stop = self.blocks.bounds(index)
-        name = part_name(start, stop, digest(self.columns, arrays, self._images.mark))
-        pieces = self._images.pieces(start, stop, arrays)
+        name = part_name(start, stop, digest(self.columns, arrays, self._part_bytes.mark))
+        pieces = self._part_bytes.pieces(start, stop, arrays)
         try:
             disk.publish(pieces, self.temporary(f"{start:012d}"), self.folder / name)
         except OSError as fault:
@@ -115,7 +117,7 @@ class Store:
 
     def get(self, index: int, buffers: Mapping[str, Any] | None = None) -> dict[str, Any] | None:
         """The numbers of a finished block, or None where its file is damaged. Raises FileNotFoundError."""
-        return read_part(self.folder / self.names[index], self._images, *self.blocks.bounds(index), buffers)
+        return read_part(self.folder / self.names[index], self._part_bytes, buffers)
 
     def set_aside(self, index: int) -> Path:
         """Takes a damaged block out of the finished ones, keeping its file for a look. Raises OSError."""
@@ -126,21 +128,21 @@ class Store:
         """A name for a file that is not whole yet."""
         return self._scratch / f"{name}.{self.run}.tmp"
 
-    def open_door(self) -> Path:
+    def open_shared(self) -> Path:
         """A folder in which processes elsewhere make files that become parts. Raises SweepError."""
-        door = self.folder / f"{DOOR}.{self.run}.tmp"
-        self.close_doors()
+        shared = self.folder / f"{SHARED}.{self.run}.tmp"
+        self.close_shared()
         try:
-            disk.make_folder(door)
+            disk.make_folder(shared)
         except OSError as fault:
-            raise disk.refusal(fault, door) from fault
-        return door
+            raise disk.refusal(fault, shared) from fault
+        return shared
 
-    def close_doors(self) -> None:
+    def close_shared(self) -> None:
         """From now on nobody else brings a part, however late: what was begun has lost its place. Raises SweepError."""
         for name in [entry.name for entry in os.scandir(self.folder) if entry.name.endswith(".tmp")]:
             path = self.folder / name
-            if name.startswith(f"{DOOR}."):
+            if name.startswith(f"{SHARED}."):
                 # renamed, it is gone for everybody in one step; what is in it goes then
                 path = path.with_name(f"{CLOSED}.{secrets.token_hex(4)}.tmp")
                 try:
@@ -158,23 +160,23 @@ class Store:
         self.names[index] = name
 
     def clear(self) -> None:
-        """Removes what a sweep writes, the spec last, so that a removal cut short leaves a store. Raises SweepError."""
+        """Removes what a sweep writes, the manifest last: a removal cut short leaves a store. Raises SweepError."""
         try:
-            self.close_doors()
+            self.close_shared()
             for path in list(self.folder.iterdir()):
                 if PART_NAME.fullmatch(path.name) or path.suffix in (".tmp", ".damaged"):
                     _remove(path)
-            disk.remove(self.folder / SPEC)
+            disk.remove(self.folder / MANIFEST)
         except OSError as fault:
             raise disk.refusal(fault, self.folder) from fault
-        self.spec, self.names = None, {}
+        self.manifest, self.names = None, {}
 
     def orphans(self) -> int:
-        """Parts that are there although no spec says of what."""
-        return 0 if self.spec else sum(bool(PART_NAME.fullmatch(path.name)) for path in self.folder.iterdir())
+        """Parts that are there although no manifest says of what."""
+        return 0 if self.manifest else sum(bool(PART_NAME.fullmatch(path.name)) for path in self.folder.iterdir())
 
     def _sort_out(self) -> None:
-        self.close_doors()
+        self.close_shared()
         row_bytes = sum(column.cell_bytes for column in self.columns)
         for entry in list(os.scandir(self.folder)):
             if entry.name.endswith(".tmp"):
@@ -195,7 +197,7 @@ class Store:
         """Of two files of one block, one must be damaged."""
         start, stop = self.blocks.bounds(index)
         both = (self.names[index], other)
-        sound = [name for name in both if read_part(self.folder / name, self._images, start, stop) is not None]
+        sound = [name for name in both if read_part(self.folder / name, self._part_bytes) is not None]
         if len(sound) == 2:
             raise SweepError(
                 f"{self.folder}: cells {start} to {stop} came out differently twice; the kernel is not deterministic"
@@ -227,7 +229,7 @@ def opened(output: Path, columns: Sequence[Column]) -> Iterator[Store]:
             )
         yield store
     finally:
-        if store.spec is None:
+        if store.manifest is None:
             _remove_folder(folder)
         os.close(fd)
 

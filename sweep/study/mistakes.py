@@ -6,7 +6,7 @@ import difflib
 import math
 import numbers
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from kernels.interface import Field
@@ -64,6 +64,19 @@ class Mistakes:
             return value
         self.add(where, f"expected {listed(words, quote=True)}, found {show(value)}{did_you_mean(value, words)}")
         return None
+
+    def words(self, value: Any, where: str, allowed: Iterable[str] | None, example: str, cure: str = "") -> list[str]:
+        """A list of some of the words `allowed` (None: of any), none twice and not empty."""
+        if isinstance(value, str) or not isinstance(value, Sequence) or not value:
+            what = "an empty list" if isinstance(value, Sequence) and not isinstance(value, str) else show(value)
+            self.add(where, f"expected {example}, found {what}{cure}")
+            return []
+        words = list(value if allowed is None else allowed)
+        for i, item in enumerate(value):
+            self.word(item, f"{where}[{i}]", words)
+            if item in list(value)[:i]:
+                self.add(f"{where}[{i}]", f"{show(item)} stands twice")
+        return [item for item in value if item in words]
 
     def text(self, value: Any, where: str) -> str:
         if isinstance(value, str):

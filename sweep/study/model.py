@@ -145,6 +145,16 @@ class Study:
         found |= {name: len(values) for name, values in self.along.items()}
         return found | {dim: found[other] for dim, other in self.kernel.same_length.items()}
 
+    def shape(self, field: Field) -> tuple[int, ...]:
+        """Shape of a parameter or output in one cell."""
+        lengths = self.lengths if field.dims else {}
+        return tuple(lengths[dim] for dim in field.dims)
+
+    @property
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Shapes in one cell of the outputs asked for."""
+        return {field.name: self.shape(field) for field in self.asked}
+
     def array(self, name: str) -> NDArray[np.float64]:
         """What is given of an array parameter: its values, or those of all cells."""
         source = self.follows.get(name, name)
@@ -182,9 +192,9 @@ class Study:
             if keys["format"] != FORMAT:
                 raise SweepError(f"study of format {keys['format']}; this version of foliot reads format {FORMAT}")
             axes = {
-                a["name"]: Axis(a["name"], _array(a["values"]), a["spacing"], _words(a["words"])) for a in keys["axes"]
+                a["name"]: Axis(a["name"], frozen(a["values"]), a["spacing"], _words(a["words"])) for a in keys["axes"]
             }
-            along = {name: _array(values) for name, values in keys["along"].items()}
+            along = {name: frozen(values) for name, values in keys["along"].items()}
             known = {name: keys[name] for name in PLAIN} | {"axes": axes, "along": along}
             known["outputs"] = tuple(known["outputs"])
             known["fixed"] = {name: _value(value) for name, value in keys["fixed"].items()}
@@ -193,7 +203,7 @@ class Study:
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise SweepError(f"not the JSON of a study: {type(error).__name__} {error}") from None
         if not declared:
-            from sweep.study.kernels import load_kernel
+            from sweep.study.kernel_lookup import load_kernel
 
             kernel = load_kernel(known["kernel_name"], allow_import)
         return cls(kernel=kernel, **known)
@@ -228,17 +238,13 @@ def frozen(values: Any) -> NDArray[np.float64]:
     return array
 
 
-def _array(values: Any) -> NDArray[np.float64]:
-    return frozen(values)
-
-
 def _value(value: Any) -> float | NDArray[np.float64]:
-    return _array(value) if np.ndim(value) else value
+    return frozen(value) if np.ndim(value) else value
 
 
 def _summary(keys: dict[str, Any]) -> Summary:
     outputs = {name: tuple(reductions) for name, reductions in keys["outputs"].items()}
-    return Summary(tuple(keys["over"]), outputs, {name: _array(edges) for name, edges in keys["edges"].items()})
+    return Summary(tuple(keys["over"]), outputs, {name: frozen(edges) for name, edges in keys["edges"].items()})
 
 
 def _words(words: list[str] | None) -> tuple[str, ...] | None:

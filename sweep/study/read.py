@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from sweep.study.keys import Reader
 from sweep.study.mistakes import did_you_mean, show
 from sweep.study.model import Axis, Study
+from sweep.study.study_parser import StudyParser
 from sweep.system.errors import Mistake, StudyError, SweepError
 
 __all__ = ["Axis", "Study", "as_study", "build_study", "read_study"]
@@ -41,7 +41,7 @@ def read_study(path: str | Path, allow_import: bool = False) -> Study:
     keys = _parse(text, str(path))
     first = next((line.strip() for line in text.splitlines() if line.strip()), "")
     question = {"question": first.lstrip("# ").rstrip()} if first.startswith("#") else {}
-    return Reader(str(path), path.parent, allow_import).study({**question, **keys}, text)
+    return StudyParser(str(path), path.parent, allow_import).study({**question, **keys}, text)
 
 
 def build_study(*, allow_import: bool = False, **keys: Any) -> Study:
@@ -66,7 +66,7 @@ def build_study(*, allow_import: bool = False, **keys: Any) -> Study:
     >>> study.axes["mu"].values
     array([0.1, 1. ])
     """
-    return Reader("study", Path(), allow_import).study(keys, "")
+    return StudyParser("study", Path(), allow_import).study(keys, "")
 
 
 def as_study(given: Study | Mapping[str, Any]) -> Study:
@@ -81,7 +81,7 @@ def as_study(given: Study | Mapping[str, Any]) -> Study:
         return given
     if not isinstance(given, Mapping):
         raise SweepError(f"expected a study, found {show(given)}; read a file with sweep.read_study")
-    return Reader("study", Path(), False).study(given, "")
+    return StudyParser("study", Path(), False).study(given, "")
 
 
 def _read_text(path: Path) -> str:

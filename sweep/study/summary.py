@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.interface import Field
-from sweep.study.mistakes import Mistakes, did_you_mean, listed, show
+from sweep.study.field_parser import FieldParser
+from sweep.study.mistakes import Mistakes, did_you_mean, listed
 from sweep.study.model import Axis, Summary
-from sweep.study.values import Entries
 
 REDUCTIONS = ("min", "max", "mean", "argmin", "argmax", "histogram")
 WITHOUT_EDGES = REDUCTIONS[:-1]
@@ -31,15 +31,15 @@ KEYS = ("over", "outputs", "edges")
 
 
 @dataclass
-class SummaryEntry:
-    """Reads `[summary]` of one study; what is wrong goes to the mistakes of `entries`."""
+class SummaryParser:
+    """Reads `[summary]` of one study; what is wrong goes to the mistakes of `fields`."""
 
-    entries: Entries
+    fields: FieldParser
 
     @property
     def mistakes(self) -> Mistakes:
         """Where mistakes gather."""
-        return self.entries.mistakes
+        return self.fields.mistakes
 
     def read(self, found: Any, axes: Mapping[str, Axis], design: str, asked: Sequence[Field]) -> Summary:
         """The summary that the table says, of the output fields asked for."""
@@ -59,7 +59,7 @@ class SummaryEntry:
         if design == "zip":
             self.mistakes.add(where, 'axes of a design "zip" are reduced together; leave it out')
             return tuple(axes)
-        names = self._words(found, where, axes, 'a list of axes, e.g. ["mu"]; leave it out to reduce all')
+        names = self.mistakes.words(found, where, axes, 'a list of axes, e.g. ["mu"]; leave it out to reduce all')
         return tuple(name for name in axes if name in names)
 
     def _outputs(self, found: Any, asked: Sequence[str]) -> dict[str, tuple[str, ...]]:
@@ -69,20 +69,9 @@ class SummaryEntry:
                 hint = did_you_mean(name, asked) or f"; there are {listed(asked, word='and')}"
                 self.mistakes.add(f"summary.outputs.{name}", f"is none of the outputs asked for{hint}")
         example = 'a list of reductions, e.g. ["min", "max"]'
-        words = {name: self._words(w, f"summary.outputs.{name}", REDUCTIONS, example) for name, w in given.items()}
+        where = "summary.outputs"
+        words = {n: self.mistakes.words(w, f"{where}.{n}", REDUCTIONS, example) for n, w in given.items()}
         return {name: tuple(r for r in REDUCTIONS if r in words.get(name, WITHOUT_EDGES)) for name in asked}
-
-    def _words(self, found: Any, where: str, allowed: Sequence[str] | Mapping[str, Any], example: str) -> list[str]:
-        """A list of some of the words allowed, none twice and not empty."""
-        if isinstance(found, str) or not isinstance(found, Sequence) or not found:
-            what = "an empty list" if isinstance(found, Sequence) and not isinstance(found, str) else show(found)
-            self.mistakes.add(where, f"expected {example}, found {what}")
-            return []
-        for i, item in enumerate(found):
-            self.mistakes.word(item, f"{where}[{i}]", allowed)
-            if item in list(found)[:i]:
-                self.mistakes.add(f"{where}[{i}]", f"{show(item)} stands twice")
-        return [item for item in found if item in list(allowed)]
 
     def _edges(
         self, found: Any, outputs: Mapping[str, Sequence[str]], fields: Mapping[str, Field]
@@ -96,7 +85,7 @@ class SummaryEntry:
                 cure = f'; ask for it: outputs.{name} = ["histogram"]' if name in outputs else ""
                 self.mistakes.add(where, f"there is no histogram of {name}{cure}")
                 continue
-            edges[name] = self.entries.axis(name, entry, _plain(fields[name]), where).values
+            edges[name] = self.fields.axis(name, entry, _plain(fields[name]), where).values
             self._rising(edges[name], where)
         for name in wanted:
             if name not in given:

@@ -1,1 +1,11 @@
-"""Ground floor of the engine: errors, words, disk, threads, progress, tables. Knows no study and no result."""
+"""Ground floor of the engine: what any of its rooms may need. Knows no study and no result.
+
+Others may use
+    `errors`       SweepError, and the mistakes of a study
+    `disk`         every call that changes the disk
+    `pool`         many jobs through threads or workers; BufferPool, Stopper, CtrlC
+    `progress`     how far a sweep has come, in words; when it is to stop
+    `forecast`     which block is next, and how long those to come take
+    `overwriting`  what may be overwritten
+    `table`        plain text in columns
+"""

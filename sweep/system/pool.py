@@ -30,7 +30,7 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-class Halt:
+class Stopper:
     """Tells the jobs that wait for their turn that they need not start."""
 
     def __init__(self, slots: int) -> None:
@@ -50,8 +50,8 @@ class Halt:
             return True
 
 
-class Spares(Generic[T]):
-    """Things that one thread at a time may use, made once and lent out again and again."""
+class BufferPool(Generic[T]):
+    """Things that one thread at a time may use, made once and borrowed again and again."""
 
     def __init__(self, make: Callable[[], T], count: int) -> None:
         self._free: queue.SimpleQueue[T] = queue.SimpleQueue()
@@ -59,7 +59,7 @@ class Spares(Generic[T]):
             self._free.put(make())
 
     @contextlib.contextmanager
-    def lent(self) -> Iterator[T]:
+    def borrow(self) -> Iterator[T]:
         """Waits for a free one."""
         one = self._free.get()
         try:
@@ -73,7 +73,7 @@ def each(
     work: Callable[[int], None],
     threads: int,
     finished: Callable[[int | None], None],
-    halt: Halt | None = None,
+    stopper: Stopper | None = None,
 ) -> None:
     """Calls `work` for every job on a pool of threads.
 
@@ -86,8 +86,8 @@ def each(
     with CtrlC() as ctrl_c, ThreadPoolExecutor(threads) as pool:
 
         def stop() -> None:
-            if halt is not None:
-                halt.set()
+            if stopper is not None:
+                stopper.set()
             pool.shutdown(wait=True, cancel_futures=True)
 
         def settled(job: int | None, future: Future[None] | None) -> None:
@@ -101,12 +101,12 @@ def each(
 def through(
     jobs: Iterable[J],
     submit: Callable[[J], Future[R]],
-    room: Callable[[], int],
+    capacity: Callable[[], int],
     settled: Callable[[J | None, Future[R] | None], None],
     stop: Callable[[], None],
     ctrl_c: CtrlC,
 ) -> None:
-    """Submits every job, no more than `room()` at a time; the same for threads and for workers elsewhere.
+    """Submits every job, no more than `capacity()` at a time; the same for threads and for workers elsewhere.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def through(
     try:
         for job in jobs:
             waiting[submit(job)] = job
-            while len(waiting) >= room():
+            while len(waiting) >= capacity():
                 _settle(waiting, settled)
                 ctrl_c.check()
         while waiting:

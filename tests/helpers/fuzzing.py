@@ -14,7 +14,7 @@ from havoc import flip, run, study
 
 from sweep.cells.fingerprint import fingerprint
 from sweep.cli import main
-from sweep.store import seal
+from sweep.store import digests
 from sweep.study.read import read_study
 from sweep.system.errors import SweepError
 
@@ -112,14 +112,14 @@ def fuzz_result(rng: random.Random, whole: Path, folder: Path) -> list[int]:
 def forge(path: Path) -> None:
     """Seals a result anew, as somebody who knows how would; one without a seal stays as it is."""
     with path.open("r+b") as file:
-        behind = seal.length(file.fileno())
+        behind = digests.trailer_bytes(file.fileno())
         if behind:
             end = path.stat().st_size - behind
-            words = os.pread(file.fileno(), behind - seal.TAIL, end)
+            words = os.pread(file.fileno(), behind - digests.TAIL, end)
             file.truncate(end)
             file.seek(end)
             regions = [(b, e) for b, e in struct.iter_unpack("<qq", words) if 0 <= b <= e <= end]
-            file.write(seal.seal(regions, file.fileno()))
+            file.write(digests.trailer(regions, file.fileno()))
 
 
 def quietly(*argv: object) -> int:

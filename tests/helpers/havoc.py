@@ -21,13 +21,13 @@ import xxhash
 HERE = Path(__file__)
 sys.path[:0] = [p for p in (str(HERE.parent), str(HERE.parents[2])) if p not in sys.path]
 
-from sweep.cells.contents import part_columns  # noqa: E402
+from sweep.cells.output_schema import part_columns  # noqa: E402
 from sweep.results.open import open_result  # noqa: E402
 from sweep.results.verify import verify  # noqa: E402
 from sweep.runs import run as runner  # noqa: E402
 from sweep.runs.run import run  # noqa: E402
-from sweep.store.hdf5_bytes import Images  # noqa: E402
-from sweep.store.manifest import SPEC  # noqa: E402
+from sweep.store.hdf5_bytes import PartBytes  # noqa: E402
+from sweep.store.manifest import MANIFEST  # noqa: E402
 from sweep.store.parts import digest, part_name  # noqa: E402
 from sweep.store.store import Store, folder_of  # noqa: E402
 from sweep.study.read import build_study  # noqa: E402
@@ -166,8 +166,8 @@ def damage(rng, folder):
         (folder / name).write_bytes(rng.randbytes(3000))
         return kind, f"not of this sweep: {name}"
     if kind == "spec":
-        flip(rng, folder / SPEC)
-        return kind, SPEC
+        flip(rng, folder / MANIFEST)
+        return kind, MANIFEST
     if kind == "stranger":
         return kind, f"damaged: {stranger(path).name}"
     if kind == "flip":
@@ -187,7 +187,7 @@ def stranger(path):
     arrays["fall_time"] += 1.0
     path.unlink()
     other = path.with_name(part_name(start, stop, digest(columns, arrays, b"another")))
-    other.write_bytes(b"".join(map(bytes, Images(columns).pieces(start, stop, arrays))))
+    other.write_bytes(b"".join(map(bytes, PartBytes(columns).pieces(start, stop, arrays))))
     return other
 
 
@@ -199,9 +199,9 @@ def damaged_parts(rng, folder, scratch, whole):
     try:
         told = verify(output).findings
     except SweepError as fault:
-        # of a spec whose white space was hit nothing is said
-        told = (SPEC,) if f"{SPEC}: " in str(fault) else (str(fault),)
-    told = (*told, SPEC) if kind == "spec" and "put together yet" in told[0] else told
+        # of a manifest whose white space was hit nothing is said
+        told = (MANIFEST,) if f"{MANIFEST}: " in str(fault) else (str(fault),)
+    told = (*told, MANIFEST) if kind == "spec" and "put together yet" in told[0] else told
     log = io.StringIO()
     run(study(), output, workers=1, progress=log).close()
     wrong = [] if expected in told else [f"not told: {expected}"]

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from sweep.cells.partition import BLOCK_BYTES, LANES, MOST_BLOCKS, Partition, Sample, partition, take_sample
+from sweep.cells.partition import Partition
 from sweep.cells.schema import Column
+from sweep.cells.timing import BLOCK_BYTES, LANES, MOST_BLOCKS, Sample, partition, take_sample
 
 COLUMNS = tuple(Column(name, "i1", (), (), {}) for name in ("status", "method_used"))
 
@@ -73,7 +74,7 @@ class Uneven:
 
     def __init__(self, seconds, monkeypatch):
         self.seconds, self.ranges, self.now = seconds, [], 0.0
-        monkeypatch.setattr("sweep.cells.partition.time", SimpleNamespace(perf_counter=lambda: self.now))
+        monkeypatch.setattr("sweep.cells.timing.time", SimpleNamespace(perf_counter=lambda: self.now))
 
     def solve(self, start, stop, outputs, status, used):
         assert 0 <= start < stop

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 import sweep
 from kernels.interface import Status
+from sweep.cells.partition import RowBlocks, row_blocks
 from sweep.cells.reduce import BY_STATUS, Reducer, merge, tree_sum
-from sweep.cells.row_blocks import Granules, granules
 from sweep.results.statuses import account
 from sweep.store.store import folder_of
 from sweep.study.read import build_study
@@ -102,7 +102,7 @@ def test_without_a_word_everything_is_reduced_to_all_that_needs_no_edges():
 
 
 def long_study(cells, **keys):
-    """Many cells, so that granules are shorter than groups."""
+    """Many cells, so that row blocks are shorter than groups."""
     rng = np.random.default_rng(5)
     heights = rng.lognormal(size=cells // 6)
     heights[rng.random(cells // 6) < 0.1] *= -1
@@ -127,12 +127,12 @@ def test_the_same_bits_for_any_block_shape_and_thread_count(tmp_path_factory, lo
         same(found, long[over])
 
 
-def test_many_granules_agree_with_the_cells(long):
+def test_many_row_blocks_agree_with_the_cells(long):
     cells = quiet(build_study(allow_import=True, kernel="toy:KERNEL", outputs=["fall_time"],
                               axes={n: a.values for n, a in long_study(12_000).axes.items()}))  # fmt: skip
-    assert granules(long_study(12_000)).per_group > 1000
+    assert row_blocks(long_study(12_000)).per_group > 1000
     agree(long["height", "v0"], cells, ["height", "v0"])
-    assert granules(long_study(12_000, over=["height"])).per_group > 100
+    assert row_blocks(long_study(12_000, over=["height"])).per_group > 100
     agree(long["height",], cells, ["height"])
 
 
@@ -276,15 +276,15 @@ def test_infinities_are_values_and_nan_is_none():
     data=st.data(),
 )
 def test_strips_cover_the_rows_and_are_cut_at_the_same_places(groups, group, length, room, data):
-    grains = Granules(groups, group, min(length, group))
-    edges = [grains.first(row) for row in range(grains.count + 1)]
-    assert edges[-1] == grains.size
+    blocks = RowBlocks(groups, group, min(length, group))
+    edges = [blocks.first(row) for row in range(blocks.count + 1)]
+    assert edges[-1] == blocks.size
     assert all(b > a for a, b in itertools.pairwise(edges))
-    assert set(range(0, grains.size + 1, group)) <= set(edges)
-    start = data.draw(st.integers(0, grains.count - 1))
-    stop = data.draw(st.integers(start + 1, grains.count))
+    assert set(range(0, blocks.size + 1, group)) <= set(edges)
+    start = data.draw(st.integers(0, blocks.count - 1))
+    stop = data.draw(st.integers(start + 1, blocks.count))
     at = edges[start]
-    for row, rows, cell, cells in grains.strips(start, stop, room):
+    for row, rows, cell, cells in blocks.strips(start, stop, room):
         assert cell == at
         assert rows * cells <= room
         if rows > 1:
@@ -308,14 +308,14 @@ def test_what_reducing_takes_is_known_for_any_number_of_cells(heights, speeds, o
     assert 0.0 < Reducer(stone(summary, axes=axes)).seconds() < math.inf
 
 
-def test_granules_depend_on_the_study_alone_and_stay_few():
+def test_row_blocks_depend_on_the_study_alone_and_stay_few():
     def of(n, **keys):
         axes = {"height": np.arange(1.0, n + 1), "v0": np.arange(1000.0)}
-        return granules(stone(whole(**keys), axes=axes))
+        return row_blocks(stone(whole(**keys), axes=axes))
 
     assert of(10**6).length == 524288
     assert of(10**6).count < 2048
-    assert of(10**6, over=["v0"]) == Granules(10**6, 1000, 1000)
+    assert of(10**6, over=["v0"]) == RowBlocks(10**6, 1000, 1000)
     assert of(1).length == 1
 
 
@@ -363,10 +363,10 @@ def test_the_summary_is_part_of_the_study():
 
 
 def test_of_equal_extremes_the_first_cell_is_told():
-    """`rough` does not heed the speed: all cells of a height are equal, over many granules."""
+    """`rough` does not heed the speed: all cells of a height are equal, over many row blocks."""
     speeds = np.arange(3000.0, 0.0, -1.0)
     found = quiet(stone({}, axes={"height": [2.0], "v0": speeds}, method="rough", rtol=0.9))
-    assert granules(stone({}, axes={"height": [2.0], "v0": speeds})).per_group > 1
+    assert row_blocks(stone({}, axes={"height": [2.0], "v0": speeds})).per_group > 1
     assert (found.fall_time_argmin_v0, found.fall_time_argmax_v0) == (3000.0, 3000.0)
 
 

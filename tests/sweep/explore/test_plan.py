@@ -58,11 +58,11 @@ def test_a_plan_forecasts_the_time_of_a_run(tmp_path, count):
 
 
 @pytest.mark.parametrize("why", ["no room", "dear"])
-def test_where_nothing_can_be_rehearsed_the_probes_alone_tell_the_time(tmp_path, monkeypatch, why):
+def test_where_nothing_can_be_tried_the_probes_alone_tell_the_time(tmp_path, monkeypatch, why):
     if why == "no room":
         fail_on(monkeypatch, "make_folder", 1, errno.ENOSPC)
     else:
-        monkeypatch.setattr(calibration, "REHEARSAL_SECONDS", 1e-3)
+        monkeypatch.setattr(calibration, "CALIBRATION_SECONDS", 1e-3)
     found = plan(slow(100), workers=2, path=tmp_path / "out.h5")
     assert found.seconds == pytest.approx(100 * found.cell_seconds / 2)
     assert list(tmp_path.iterdir()) == []
@@ -70,15 +70,13 @@ def test_where_nothing_can_be_rehearsed_the_probes_alone_tell_the_time(tmp_path,
 
 @given(fixed=st.floats(0.0, 10.0), each=st.floats(1e-6, 1.0), some=st.integers(1, 1500))
 @settings(max_examples=30, deadline=None)
-def test_two_rehearsals_tell_what_any_run_costs_from_what_cells_cost(fixed, each, some):
-    class Stage:
-        cells = 1000
-
-        def timed(self, study):
+def test_two_trial_runs_tell_what_any_run_costs_from_what_cells_cost(fixed, each, some):
+    class Trial(calibration.Calibration):
+        def _timed(self, study, path):
             size = Grid(study).size
             return calibration.Timed(size, fixed + each * size)
 
-    found = calibration._forecast(slow(1000), Stage(), some, 0.0)
+    found = Trial(slow(1000), 1000, block=1, cell_seconds=0.0, cell_bytes=0.0, workers=1)._forecast(None, some)
     assert found == pytest.approx(fixed + 1000 * each if some > 1 else 1000 * (fixed + each))
 
 

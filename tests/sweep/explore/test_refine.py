@@ -78,7 +78,7 @@ def test_beside_a_border_of_statuses_a_curve_is_interpolated_as_right_as_elsewhe
 
 def test_an_output_that_changes_its_sign_between_two_cells_is_followed():
     boxes = _Refiner.__new__(_Refiner)
-    boxes.size, boxes.known = np.array([2.0]), {(0,): 0, (1,): 1, (2,): 2}
+    boxes.size, boxes.rows = np.array([2.0]), {(0,): 0, (1,): 1, (2,): 2}
     boxes.values = [np.array([0.0, value]) for value in (2.0, -1.0, 1.0)]
     assert boxes._off((0,), 1) == pytest.approx(2.5 / 2)  # not a NaN that is passed over
     boxes.values = [np.array([0.0, value]) for value in (1.0, 2.0, 4.0)]

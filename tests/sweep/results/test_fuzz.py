@@ -19,7 +19,7 @@ from running import environment, quiet, tall
 import sweep
 from sweep.cli import main
 from sweep.results.verify import verify
-from sweep.store import seal
+from sweep.store import digests, probe
 from sweep.system.errors import StudyError, SweepError
 
 SHARED = [HealthCheck.function_scoped_fixture]
@@ -53,8 +53,8 @@ def test_commands_on_a_damaged_result_end_with_a_message(whole, tmp_path):
 
 def test_a_file_that_hdf5_cannot_come_to_an_end_with_is_given_up(whole, tmp_path, monkeypatch):
     """HDF5 2.0 loops for ever in some damaged files; the process that tries them first takes the blow."""
-    monkeypatch.setattr(seal, "PROBE", "while True: pass")
-    monkeypatch.setattr(seal, "PROBE_SECONDS", 0.3)
+    monkeypatch.setattr(probe, "PROBE", "while True: pass")
+    monkeypatch.setattr(probe, "PROBE_SECONDS", 0.3)
     path = tmp_path / "out.h5"
     path.write_bytes(whole.read_bytes() + b"x")
     begun = time.monotonic()
@@ -77,15 +77,15 @@ def forged(whole, path):
     content[content.index(b"Stone" if b"Stone" in content else b"toy:KERNEL")] ^= 1
     path.write_bytes(content)
     forge(path)
-    assert seal.sealed(path)
+    assert probe.intact(path)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_forged_seal_does_not_make_a_command_hang(whole, tmp_path, monkeypatch, capfd, command):
     monkeypatch.chdir(tmp_path)
     forged(whole, tmp_path / "out.h5")
-    monkeypatch.setattr(seal, "PROBE", "while True: pass")
-    monkeypatch.setattr(seal, "PROBE_SECONDS", 0.3)
+    monkeypatch.setattr(probe, "PROBE", "while True: pass")
+    monkeypatch.setattr(probe, "PROBE_SECONDS", 0.3)
     monkeypatch.setattr("h5py.File", lambda *args: pytest.fail("opened here"))
     assert main([command, "out.h5", *COMMANDS[command]]) == 2
     assert "not the result of a sweep, or damaged" in capfd.readouterr().err
@@ -93,8 +93,8 @@ def test_a_forged_seal_does_not_make_a_command_hang(whole, tmp_path, monkeypatch
 
 def test_what_this_process_has_written_is_not_read_by_another_one(tmp_path, monkeypatch):
     path = prepared(tmp_path)
-    monkeypatch.setattr(seal, "PROBE", "while True: pass")
-    monkeypatch.setattr(seal, "PROBE_SECONDS", 0.3)
+    monkeypatch.setattr(probe, "PROBE", "while True: pass")
+    monkeypatch.setattr(probe, "PROBE_SECONDS", 0.3)
     assert quietly("show", path) == 0
     path.write_bytes(path.read_bytes())
     assert quietly("show", path) == 2  # somebody else's by now
@@ -107,11 +107,11 @@ def test_the_other_process_reads_all_that_hdf5_has_cut_in_pieces(whole, tmp_path
         data = file.create_dataset("status", (4, 100), "i1", chunks=(1, 100), compression="gzip")
         data[...] = 0
         place = data.id.get_chunk_info(3).byte_offset
-    assert seal.probing(path)()
+    assert probe.probing(path)()
     content = bytearray(path.read_bytes())
     content[place : place + 8] = b"\xff" * 8
     path.write_bytes(content)
-    assert not seal.probing(path)()
+    assert not probe.probing(path)()
 
 
 def lead_away(file, kind, secret):
@@ -141,15 +141,15 @@ def test_a_result_leads_to_no_other_file(whole, tmp_path, kind, sealed):
     path = tmp_path / "out.h5"
     path.write_bytes(whole.read_bytes())
     with path.open("r+b") as file:
-        behind = seal.length(file.fileno())
+        behind = digests.trailer_bytes(file.fileno())
         file.truncate(path.stat().st_size - behind)
     with h5py.File(path, "r+") as file:
         lead_away(file, kind, secret)
     if sealed:
         with path.open("r+b") as file:
             file.seek(0, 2)
-            file.write(seal.seal([], file.fileno()))
-        assert seal.sealed(path)
+            file.write(digests.trailer([], file.fileno()))
+        assert probe.intact(path)
     with pytest.raises(SweepError, match="not the result of a sweep, or damaged"):
         sweep.open_result(path)
     assert not verify(path).whole

@@ -15,7 +15,7 @@ from sweep.results.open import open_result
 from sweep.results.statuses import count_methods, count_statuses, failures
 from sweep.runs.run import run
 from sweep.store.assemble import CHUNK_CELLS, chunk_shape
-from sweep.store.canvas import Canvas
+from sweep.store.hdf5_bytes import Hdf5Bytes
 from sweep.store.store import folder_of
 from sweep.study.model import Study
 from sweep.study.read import build_study
@@ -193,7 +193,7 @@ def test_a_damaged_part_of_an_unfinished_sweep_is_pending(unfinished):
 
 
 def test_an_unfinished_sweep_is_read_without_its_kernel(unfinished, monkeypatch):
-    monkeypatch.setattr("sweep.study.kernels.load_kernel", None)
+    monkeypatch.setattr("sweep.study.kernel_lookup.load_kernel", None)
     assert open_result(unfinished).fall_time.attrs["units"] == "s"
 
 
@@ -316,27 +316,27 @@ def test_hdf5_never_notices_that_the_disk_fails(tmp_path, monkeypatch):
 
     monkeypatch.setattr(disk, "pwrite", failing)
     with (tmp_path / "file").open("w+b") as raw:
-        canvas = Canvas(raw.fileno())
-        with h5py.File(canvas, "w") as file:
+        hdf5 = Hdf5Bytes(raw.fileno())
+        with h5py.File(hdf5, "w") as file:
             file["x"] = np.arange(1000.0)
             file.attrs["long"] = "x" * 10_000
-        with h5py.File(canvas, "r") as file:
+        with h5py.File(hdf5, "r") as file:
             np.testing.assert_array_equal(file["x"], np.arange(1000.0))
             assert file.attrs["long"] == "x" * 10_000
         assert len(calls) == 3
         with pytest.raises(OSError, match="No space"):
-            canvas.finish()
+            hdf5.finish()
 
 
 def test_what_hdf5_never_wrote_is_zero_and_the_file_gets_its_size(tmp_path):
     with (tmp_path / "file").open("w+b") as raw:
-        canvas = Canvas(raw.fileno())
-        canvas.seek(10)
-        canvas.write(b"abc")
-        canvas.truncate(100)
-        assert canvas.piece(0, 20) == bytes(10) + b"abc" + bytes(7)
-        assert (canvas.seek(-1, 2), canvas.seek(-9, 1)) == (99, 90)
-        canvas.finish()
+        hdf5 = Hdf5Bytes(raw.fileno())
+        hdf5.seek(10)
+        hdf5.write(b"abc")
+        hdf5.truncate(100)
+        assert hdf5.piece(0, 20) == bytes(10) + b"abc" + bytes(7)
+        assert (hdf5.seek(-1, 2), hdf5.seek(-9, 1)) == (99, 90)
+        hdf5.finish()
     assert (tmp_path / "file").stat().st_size == 100
 
 

@@ -15,8 +15,8 @@ import sweep
 from sweep.cells.partition import Partition
 from sweep.cli import main
 from sweep.results.verify import verify
-from sweep.store import seal
-from sweep.store.manifest import SPEC, read_spec
+from sweep.store import digests
+from sweep.store.manifest import MANIFEST, read_manifest
 from sweep.store.store import folder_of
 
 
@@ -173,15 +173,15 @@ def test_all_parts_but_no_output_is_not_whole(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("blocks", [(10**16, 5), (23, 0), (23, -5)])
 def test_a_spec_that_lies_about_its_size_is_refused_at_once(unfinished, blocks):
-    path = folder_of(unfinished) / SPEC
-    path.write_text(dataclasses.replace(read_spec(path.parent), blocks=Partition(*blocks)).to_json())
+    path = folder_of(unfinished) / MANIFEST
+    path.write_text(dataclasses.replace(read_manifest(path.parent), blocks=Partition(*blocks)).to_json())
     for action in (verify, sweep.open_result, lambda path: sweep.run(tall(24), path, progress=False)):
         with pytest.raises(sweep.SweepError, match="damaged"):
             action(unfinished)
 
 
 def test_a_result_of_absurd_size_is_refused_before_memory_is_asked_for(tmp_path, monkeypatch):
-    monkeypatch.setattr(seal, "PROBE_SECONDS", 1.0)  # HDF5 comes to no end with it
+    monkeypatch.setattr(digests, "PROBE_SECONDS", 1.0)  # HDF5 comes to no end with it
     path = tmp_path / "out.h5"
     sweep.run(tall(3), path, progress=False).close()
     with h5py.File(path, "r+") as file:

@@ -20,7 +20,7 @@ from sweep.cli import main
 from sweep.results.statuses import account
 from sweep.results.verify import verify
 from sweep.runs import cluster as clusters
-from sweep.runs import worker
+from sweep.runs import dispatch, worker
 from sweep.store.store import folder_of, opened
 from sweep.system.errors import SweepError
 
@@ -65,12 +65,12 @@ def stones(kind, count=41):
 @pytest.mark.parametrize("place", ["memory", "shared folder", "no shared folder"])
 def test_the_same_bits_wherever_the_cells_are_computed(client, output, monkeypatch, kind, place):
     if place == "no shared folder":
-        monkeypatch.setattr(clusters, "show_key", lambda door, key: None)
+        monkeypatch.setattr(dispatch, "write_token", lambda shared, token: None)
     sent = []
     monkeypatch.setattr(
-        clusters._Errand,
+        dispatch.Dispatch,
         "_checked",
-        lambda self, job, s, real=clusters._Errand._checked: sent.append(job) or real(self, job, s),
+        lambda self, job, s, real=dispatch.Dispatch._checked: sent.append(job) or real(self, job, s),
     )
     path = None if place == "memory" else output
     with elsewhere(stones(kind), path, cluster=client, block_cells=10) as found:
@@ -82,13 +82,13 @@ def test_the_same_bits_wherever_the_cells_are_computed(client, output, monkeypat
 @pytest.mark.parametrize("shared", [True, False])
 def test_an_extension_sends_only_new_cells_out(client, output, monkeypatch, shared):
     if not shared:
-        monkeypatch.setattr(clusters, "show_key", lambda door, key: None)
+        monkeypatch.setattr(dispatch, "write_token", lambda shared, token: None)
     more = toy_studies.build(axes={"height": np.sort(np.r_[np.arange(1.0, 21), np.arange(10.5, 40)])})
     few = toy_studies.build(axes={"height": np.arange(1.0, 21)})
     quiet(few, output).close()
     bits = []
-    real = clusters._Errand._mask
-    monkeypatch.setattr(clusters._Errand, "_mask", lambda self, job: bits.append(real(self, job)) or bits[-1])
+    real = dispatch.Dispatch._mask
+    monkeypatch.setattr(dispatch.Dispatch, "_mask", lambda self, job: bits.append(real(self, job)) or bits[-1])
     with elsewhere(more, output, cluster=client, extend=True, block_cells=4) as found:
         same(found, quiet(more))
     assert sum(np.unpackbits(np.frombuffer(b, np.uint8)).sum() for b in bits) == 30
@@ -117,6 +117,7 @@ def test_an_address_where_nobody_answers_is_one_clear_line(output, monkeypatch, 
 
 def test_a_missing_package_is_told_with_its_cure(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
+    monkeypatch.delitem(sys.modules, "sweep.runs.cluster")
     with pytest.raises(SweepError, match=r"pip install \"foliot\[cluster\]\""):
         elsewhere(tall(3), cluster="tcp://127.0.0.1:1")
 
@@ -160,7 +161,7 @@ def soon():
 @pytest.mark.parametrize("shared", [True, False])
 def test_workers_killed_in_the_middle_cost_nothing_but_time(client, output, monkeypatch, shared):
     if not shared:
-        monkeypatch.setattr(clusters, "show_key", lambda door, key: None)
+        monkeypatch.setattr(dispatch, "write_token", lambda shared, token: None)
     study = tall(400, "slow:SLOW")
     killer = threading.Thread(target=kill_a_worker, args=(client, output))
     killer.start()
@@ -213,15 +214,15 @@ def test_a_lost_scheduler_is_one_line_and_the_run_continues(output):
 
 def test_a_worker_that_comes_too_late_has_no_place_to_write(output):
     study = tall(30)
-    with opened(output, sweep.cells.contents.part_columns(study)) as store:
+    with opened(output, sweep.cells.output_schema.part_columns(study)) as store:
         store.begin(study.to_json(), {}, sweep.cells.partition.Partition(30, 10))
-        door = store.open_door()
-        clusters.show_key(door, "key")
-        late = store.through(door, store.columns, {}, store.blocks)
+        shared = store.open_shared()
+        dispatch.write_token(shared, "token")
+        late = store.sharing(shared, store.columns, {}, store.blocks)
         arrays = {c.name: c.empty(10) for c in store.columns}
         late.put(0, arrays)
         store.take(0, late.names[0])
-        store.close_doors()
+        store.close_shared()
         with pytest.raises(SweepError, match="cannot be written"):
             late.put(1, arrays)
         assert len(names(output)) == 1
@@ -231,24 +232,24 @@ def test_a_worker_that_comes_too_late_has_no_place_to_write(output):
     assert list(output.parent.iterdir()) == []
 
 
-def test_a_worker_that_does_not_know_the_key_sends_its_numbers(tmp_path):
+def test_a_worker_that_does_not_know_the_token_sends_its_numbers(tmp_path):
     study = tall(3)
-    for text in (None, "other", "key"):
+    for text in (None, "other", "token"):
         if text:
-            (tmp_path / worker.KEY).write_text(text)
-        assignment = worker.Assignment("r", study.to_json(), {}, None, str(tmp_path), "key", ())
-        assert (worker._store(assignment, ()) is not None) == (text == "key")
+            (tmp_path / worker.TOKEN).write_text(text)
+        assignment = worker.Assignment("r", study.to_json(), {}, None, str(tmp_path), "token", ())
+        assert (worker._store(assignment, ()) is not None) == (text == "token")
 
 
 def test_numbers_that_were_damaged_on_their_way_are_refused(client, output, monkeypatch):
-    real = clusters._Errand._checked
+    real = dispatch.Dispatch._checked
 
     def harmed(self, job, sent):
         arrays = {name: column.copy() for name, column in sent.arrays.items()}
         arrays["fall_time"][0] += 1
         return real(self, job, worker.Sent(sent.digest, arrays))
 
-    monkeypatch.setattr(clusters._Errand, "_checked", harmed)
+    monkeypatch.setattr(dispatch.Dispatch, "_checked", harmed)
     with pytest.raises(SweepError, match="damaged on their way"):
         elsewhere(tall(3), cluster=client)
 
@@ -284,7 +285,7 @@ def test_an_answer_that_gets_lost_in_the_executor_is_asked_for_again(client, mon
             elsewhere(tall(20), cluster=client, block_cells=1)
     else:
         same(elsewhere(tall(20), cluster=client, block_cells=1), quiet(tall(20)))
-    assert len(lost) == min(times, 1 + clusters.MOST_ROUNDS)
+    assert len(lost) == min(times, 1 + dispatch.MOST_ROUNDS)
 
 
 def test_ctrl_c_ends_a_run_on_a_cluster(client, output):

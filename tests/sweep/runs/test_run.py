@@ -29,15 +29,15 @@ from running import (
     told_by,
     wait_for,
 )
+from sweep.cells.contents import contents
 
 from kernels.interface import Status
-from sweep.cells.contents import contents
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.solve import Solver
 from sweep.results.open import open_result
 from sweep.results.verify import verify
 from sweep.runs.run import run
-from sweep.store.manifest import SPEC
+from sweep.store.manifest import MANIFEST
 from sweep.store.store import Store, folder_of
 from sweep.study.read import build_study
 from sweep.system import disk
@@ -180,8 +180,8 @@ def test_parts_of_another_study_beside_a_complete_output_are_left_alone(output):
 
 @pytest.mark.parametrize("text", ["?", None])
 def test_a_damaged_or_lost_spec_is_written_anew_for_its_own_study_alone(unfinished, text, monkeypatch):
-    spec, before = folder_of(unfinished) / SPEC, names(unfinished)
-    spec.unlink() if text is None else spec.write_text(text)
+    manifest, before = folder_of(unfinished) / MANIFEST, names(unfinished)
+    manifest.unlink() if text is None else manifest.write_text(text)
     with pytest.raises(SweepError, match="damaged" if text else "finished blocks, but no spec"):
         quiet(tall(24), unfinished)
     assert names(unfinished) == before != []
@@ -194,7 +194,7 @@ def test_a_damaged_or_lost_spec_is_written_anew_for_its_own_study_alone(unfinish
 
 
 def test_a_damaged_spec_without_parts_of_this_study_is_given_up_when_forced(unfinished):
-    (folder_of(unfinished) / SPEC).write_text("?")
+    (folder_of(unfinished) / MANIFEST).write_text("?")
     same(quiet(tall(24), unfinished, force=True), quiet(tall(24)))
 
 

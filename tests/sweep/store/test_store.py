@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from sweep.cells.partition import Partition
 from sweep.cells.schema import Column
-from sweep.store.hdf5_bytes import Images
-from sweep.store.manifest import SPEC, Spec, read_spec
+from sweep.store.hdf5_bytes import PartBytes
+from sweep.store.manifest import MANIFEST, Manifest, read_manifest
 from sweep.store.parts import digest, read_part
 from sweep.store.store import LOCK, folder_of, opened
 from sweep.system import disk
@@ -30,7 +30,7 @@ COLUMNS = (
     Column("method_used", "i1", (), (), {}),
 )
 MARK = {"study": "abc"}
-IMAGES = Images(COLUMNS, Spec("{}", MARK, Partition(25, 10), "").mark)
+PART_BYTES = PartBytes(COLUMNS, Manifest("{}", MARK, Partition(25, 10), "").mark)
 
 
 def numbers(start, stop):
@@ -67,7 +67,7 @@ def filled(output):
 
 
 def resumed(store):
-    store.resume(read_spec(store.folder))
+    store.resume(read_manifest(store.folder))
     return store
 
 
@@ -95,7 +95,7 @@ def test_any_block_is_a_valid_file_with_its_own_range(tmp_path_factory, cells, s
     columns = (Column("x", "f8", ("k",), (tail,), {}), Column("status", "i1", (), (), {}))
     arrays = {"x": np.random.default_rng(cells).random((cells, tail)), "status": np.full(cells, 7, "i1")}
     path = tmp_path_factory.mktemp("image") / "part.h5"
-    path.write_bytes(b"".join(map(bytes, Images(columns).pieces(start, start + cells, arrays))))
+    path.write_bytes(b"".join(map(bytes, PartBytes(columns).pieces(start, start + cells, arrays))))
     with h5py.File(path) as file:
         assert (file.attrs["start"], file.attrs["stop"]) == (start, start + cells)
         np.testing.assert_array_equal(file["x"], arrays["x"])
@@ -138,9 +138,9 @@ def test_every_flipped_bit_of_the_numbers_is_found(filled):
         changed = bytearray(whole)
         changed[place] ^= 1 << place % 8
         path.write_bytes(changed)
-        assert read_part(path, IMAGES, 0, 10) is None
+        assert read_part(path, PART_BYTES) is None
     path.write_bytes(whole)
-    assert read_part(path, IMAGES, 0, 10) is not None
+    assert read_part(path, PART_BYTES) is not None
 
 
 def test_no_damaged_file_is_read_as_something_else(filled):
@@ -149,7 +149,7 @@ def test_no_damaged_file_is_read_as_something_else(filled):
     whole = path.read_bytes()
     for place in range(0, len(whole), 7):
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 0xFF]) + whole[place + 1 :])
-        found = read_part(path, IMAGES, 0, 10)
+        found = read_part(path, PART_BYTES)
         if found is not None:
             np.testing.assert_array_equal(found["angle"], numbers(0, 10)["angle"])
 
@@ -159,8 +159,8 @@ def test_a_part_cut_off_anywhere_is_found(filled):
     whole = path.read_bytes()
     for length in [0, 1, 100, *range(2000, len(whole), 13)]:
         path.write_bytes(whole[:length])
-        found = read_part(path, IMAGES, 0, 10)
-        assert found is None or digest(COLUMNS, found, IMAGES.mark) in path.name
+        found = read_part(path, PART_BYTES)
+        assert found is None or digest(COLUMNS, found, PART_BYTES.mark) in path.name
 
 
 def test_a_part_that_another_version_of_hdf5_laid_out_is_read_as_well(filled):
@@ -170,14 +170,14 @@ def test_a_part_that_another_version_of_hdf5_laid_out_is_read_as_well(filled):
         for name, values in reversed(numbers(0, 10).items()):
             file[name] = values
     (filled / "other").rename(path)
-    np.testing.assert_array_equal(read_part(path, IMAGES, 0, 10)["angle"], numbers(0, 10)["angle"])
+    np.testing.assert_array_equal(read_part(path, PART_BYTES)["angle"], numbers(0, 10)["angle"])
 
 
 def test_a_part_under_the_name_of_another_range_is_found(filled):
     first, second, _ = part_files(filled)
     path = first.with_name(second.name.split(".")[0] + "." + first.name.split(".")[1] + ".h5")
     first.rename(path)
-    assert read_part(path, IMAGES, 10, 20) is None
+    assert read_part(path, PART_BYTES) is None
 
 
 def test_a_short_file_is_set_aside_at_the_start(output, filled):
@@ -291,7 +291,7 @@ def test_the_spec_is_removed_after_the_parts_and_the_lock_last(output, filled, m
     monkeypatch.setattr(disk, "remove", lambda path: (removed.append(path.name), real(path)))
     with opened(output, COLUMNS) as store:
         resumed(store).clear()
-    assert removed[-2:] == [SPEC, LOCK]
+    assert removed[-2:] == [MANIFEST, LOCK]
     assert len(removed) == 5
 
 
@@ -381,8 +381,8 @@ def test_the_spec_is_brought_to_the_disk_before_the_first_block(output, synced):
     with opened(output, COLUMNS) as store:
         synced.clear()
         begun(store)
-        spec, folder = (store.folder / SPEC).stat().st_ino, store.folder.stat().st_ino
-        assert synced == [("fsync", spec), ("rename", spec), ("fsync", folder)]
+        manifest, folder = (store.folder / MANIFEST).stat().st_ino, store.folder.stat().st_ino
+        assert synced == [("fsync", manifest), ("rename", manifest), ("fsync", folder)]
 
 
 def longer(path, **more):
@@ -412,8 +412,8 @@ def test_a_longer_part_with_its_columns_elsewhere_is_read_where_they_are(filled)
         file.attrs.update(start=0, stop=10)
         for name, values in reversed(numbers(0, 10).items()):
             file[name] = values
-    assert path.stat().st_size > IMAGES.frame(10).size
-    np.testing.assert_array_equal(read_part(path, IMAGES, 0, 10)["angle"], numbers(0, 10)["angle"])
+    assert path.stat().st_size > PART_BYTES.template(10).size
+    np.testing.assert_array_equal(read_part(path, PART_BYTES)["angle"], numbers(0, 10)["angle"])
 
 
 def test_a_longer_part_of_other_numbers_is_damaged(filled):
@@ -424,37 +424,37 @@ def test_a_longer_part_of_other_numbers_is_damaged(filled):
     content = bytearray(path.read_bytes())
     content[place + 5] ^= 1
     path.write_bytes(content)
-    assert read_part(path, IMAGES, 0, 10) is None
+    assert read_part(path, PART_BYTES) is None
 
 
 def test_the_spec_comes_back_as_it_was(output):
     with opened(output, COLUMNS) as store:
         begun(store, 10**12, 12345)
-        found = read_spec(store.folder)
-        assert found == store.spec
+        found = read_manifest(store.folder)
+        assert found == store.manifest
         assert (found.blocks, found.fingerprint, found.study) == (Partition(10**12, 12345), MARK, "{}")
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"format": 2}', "\x00"])
 def test_a_damaged_spec_is_one_clear_line(filled, text):
-    (filled / SPEC).write_text(text)
+    (filled / MANIFEST).write_text(text)
     with pytest.raises(SweepError, match=r"damaged.*run its study again"):
-        read_spec(filled)
+        read_manifest(filled)
 
 
 def test_a_flipped_bit_anywhere_in_a_spec_is_found(filled):
-    whole, before = (filled / SPEC).read_bytes(), read_spec(filled)
+    whole, before = (filled / MANIFEST).read_bytes(), read_manifest(filled)
     for place in range(len(whole)):
-        (filled / SPEC).write_bytes(whole[:place] + bytes([whole[place] ^ 1 << place % 8]) + whole[place + 1 :])
+        (filled / MANIFEST).write_bytes(whole[:place] + bytes([whole[place] ^ 1 << place % 8]) + whole[place + 1 :])
         # white space may be flipped
         with contextlib.suppress(SweepError):
-            assert read_spec(filled) == before
+            assert read_manifest(filled) == before
 
 
 def test_a_spec_of_a_later_version_is_named_as_such(filled):
-    (filled / SPEC).write_text('{"format": 99}')
+    (filled / MANIFEST).write_text('{"format": 99}')
     with pytest.raises(SweepError, match="format 99"):
-        read_spec(filled)
+        read_manifest(filled)
 
 
 def test_a_folder_that_cannot_be_made_is_one_clear_line(tmp_path):

@@ -6,7 +6,8 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from sweep.cells.partition import Partition, Sample
+from sweep.cells.partition import Partition
+from sweep.cells.timing import Sample
 from sweep.system.forecast import FRAME_SECONDS, Ending, Forecast
 
 CELLS = 2**18

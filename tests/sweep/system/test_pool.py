@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from sweep.system.pool import CtrlC, Halt, Terminated, each
+from sweep.system.pool import CtrlC, Stopper, Terminated, each
 
 
 def test_every_job_is_done_once_and_told():
@@ -45,7 +45,7 @@ def test_after_a_fault_no_job_is_begun():
 
 
 def test_a_halt_lets_in_no_more_than_its_slots_and_nobody_afterwards():
-    halt = Halt(2)
+    stopper = Stopper(2)
     inside, most = [], []
 
     def enter():
@@ -54,15 +54,15 @@ def test_a_halt_lets_in_no_more_than_its_slots_and_nobody_afterwards():
         time.sleep(0.005)
         inside.pop()
 
-    threads = [threading.Thread(target=halt.compute, args=(enter,)) for _ in range(8)]
+    threads = [threading.Thread(target=stopper.compute, args=(enter,)) for _ in range(8)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
     assert len(most) == 8
     assert max(most) == 2
-    halt.set()
-    assert not halt.compute(enter)
+    stopper.set()
+    assert not stopper.compute(enter)
     assert len(most) == 8
 
 

@@ -20,7 +20,7 @@ from sweep.store import assemble
 from sweep.store.store import folder_of
 from sweep.system.errors import SweepError
 from sweep.system.pool import Terminated
-from sweep.system.until import deadline
+from sweep.system.progress import deadline
 
 
 def at(hour, minute=0, day=21):
@@ -119,7 +119,7 @@ def test_sigterm_ends_within_a_block_with_143_and_the_next_start_tidies_up(tmp_p
     assert list(tmp_path.iterdir()) == [output]
 
 
-@pytest.mark.parametrize("name", ["write_frame", "seal", "frame_digest", "_check"])
+@pytest.mark.parametrize("name", ["write_structure", "trailer", "structure_digest", "_check"])
 def test_sigterm_while_the_output_is_put_together_leaves_no_file_half_written(tmp_path, name):
     output, log = tmp_path / "out.h5", io.StringIO()
     real = getattr(assemble, name)

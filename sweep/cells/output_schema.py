@@ -11,9 +11,9 @@ import numpy as np
 from kernels.interface import Field, Status
 from sweep.cells import schema as cells
 from sweep.cells.grid import Box
+from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import BY_METHOD, BY_STATUS, NO_CELL, STATUSES, Rows, merge, row_columns
-from sweep.cells.row_blocks import granules
-from sweep.cells.schema import Column, Coordinate, Layout
+from sweep.cells.schema import Column, Coordinate, Schema
 
 if TYPE_CHECKING:
     from sweep.study.model import Axis, Study
@@ -26,18 +26,18 @@ def part_columns(study: Study) -> tuple[Column, ...]:
     return cells.columns(study) if study.summary is None else row_columns(study)
 
 
-def contents(study: Study, fingerprint: Mapping[str, str]) -> Layout:
-    """The layout of the output."""
+def output_schema(study: Study, fingerprint: Mapping[str, str]) -> Schema:
+    """The schema of the output."""
     if study.summary is None:
-        return cells.layout(study, fingerprint)
+        return cells.cell_schema(study, fingerprint)
     attributes = {**cells.attributes(study, fingerprint), "over": " ".join(study.summary.over)}
-    return Layout(_kept(study), tuple(_columns(study)), tuple(_coordinates(study)), attributes)
+    return Schema(_kept(study), tuple(_columns(study)), tuple(_coordinates(study)), attributes)
 
 
 def gathered(study: Study, rows: Rows) -> dict[str, Any]:
     """The output's columns of the groups that `rows`, whole groups of them, are of."""
     assert study.summary is not None
-    per_group = granules(study).per_group
+    per_group = row_blocks(study).per_group
     groups = len(rows[BY_STATUS]) // per_group
     split = {name: column.reshape(groups, per_group, *column.shape[1:]) for name, column in rows.items()}
     merged = {name: column[:, 0].copy() for name, column in split.items()}
@@ -124,7 +124,7 @@ def _columns(study: Study) -> Iterator[Column]:
 
 def _output(study: Study, field: Field) -> Iterator[Column]:
     assert study.summary is not None
-    shape = tuple(study.lengths[d] for d in field.dims)
+    shape = study.shape(field)
     over = ": ".join(study.summary.over)
     counts = {"units": "1", "long_name": f"cells with a value: {field.doc}"}
     yield Column(f"{field.name}_count", "i8", field.dims, shape, counts)

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from kernels import catalogue
 from kernels.interface import Field, Kernel
-from sweep.study.kernels import load_kernel
-from sweep.study.mistakes import Mistakes, did_you_mean, limits, listed, show
-from sweep.study.model import AUTO, Axis, Study, differs, frozen
-from sweep.study.summary import SummaryEntry
-from sweep.study.values import EXAMPLE, Entries
+from sweep.study.field_parser import EXAMPLE, FieldParser
+from sweep.study.kernel_lookup import load_kernel
+from sweep.study.mistakes import Mistakes, did_you_mean, limits, listed
+from sweep.study.model import AUTO, Axis, Study, Summary, differs, frozen
+from sweep.study.summary import SummaryParser
 from sweep.system.errors import SweepError
 
 KEYS = ("title", "question", "kernel", "method", "rtol", "outputs", "design", "axes", "fixed", "along", "summary")
@@ -31,34 +31,29 @@ UNKNOWN = Kernel("?", "", "", (), (), lambda *columns: None, ())
 """Stands for a kernel that could not be found, so that the rest of a study is checked all the same."""
 
 
-class Reader:
+class StudyParser:
     """Turns the keys of one study into a `Study`; mistakes gather on the way and are raised together."""
 
     def __init__(self, source: str, folder: Path, allow_import: bool) -> None:
         self.source, self.folder, self.allow_import = source, folder, allow_import
         self.mistakes = Mistakes()
-        self.entries = Entries(self.mistakes, folder)
+        self.fields = FieldParser(self.mistakes, folder)
         self.kernel = UNKNOWN
 
     def study(self, keys: Mapping[str, Any], text: str) -> Study:
+        """The study. Raises StudyError with all that is wrong with it."""
         self.mistakes.keys(keys, KEYS)
         self.kernel = self._kernel(keys)
         title, question = (self.mistakes.text(keys.get(key, ""), key) for key in ("title", "question"))
-        method = self._method(keys)
-        rtol = self._rtol(keys)
+        method, rtol = self._method(keys), self._rtol(keys)
         outputs = self._outputs(keys.get("outputs", self._named(keys.get("summary"))))
         design = self.mistakes.word(keys.get("design", "product"), "design", DESIGNS) or ""
         axes = self._axes(keys.get("axes", {}), design)
         given = self._fixed(keys.get("fixed", {}), axes)
         along = self._along(keys.get("along", {}), outputs)
         fixed, follows = self._complete(axes, given)
-        self._excluded(method, axes, fixed)
-        self._lacked(method, axes, outputs)
-        summary = None
-        if "summary" in keys:
-            asked = [o for o in self.kernel.outputs if o.name in outputs]
-            summary = SummaryEntry(self.entries).read(keys["summary"], axes, design, asked)
-            axes = dict(sorted(axes.items(), key=lambda item: item[0] in summary.over))
+        self._check_methods(method, axes, fixed, outputs)
+        summary = self._summary(keys, axes, design, outputs)
         self.mistakes.raise_if_any(self.source)
         return Study(
             title=title or f"{self.kernel.name} over {listed(axes, word='and')}",
@@ -69,13 +64,21 @@ class Reader:
             rtol=rtol,
             outputs=outputs,
             design=design,
-            axes=axes,
+            axes=_kept_first(axes, summary),
             fixed=fixed,
             follows=follows,
             along=along,
             text=text,
             summary=summary,
         )
+
+    def _summary(
+        self, keys: Mapping[str, Any], axes: Mapping[str, Axis], design: str, outputs: tuple[str, ...]
+    ) -> Summary | None:
+        if "summary" not in keys:
+            return None
+        asked = [o for o in self.kernel.outputs if o.name in outputs]
+        return SummaryParser(self.fields).read(keys["summary"], axes, design, asked)
 
     def _kernel(self, keys: Mapping[str, Any]) -> Kernel:
         if "kernel" not in keys:
@@ -138,23 +141,16 @@ class Reader:
         names = [o.name for o in self.kernel.outputs]
         if found is None:
             return tuple(names)
-        if isinstance(found, str) or not isinstance(found, Sequence) or not found:
-            what = "an empty list" if isinstance(found, Sequence) and not found else show(found)
-            self.mistakes.add("outputs", f"expected a list of outputs, found {what}; leave it out to get all of them")
-            return ()
-        for i, item in enumerate(found):
-            if self.kernel is not UNKNOWN:
-                self.mistakes.word(item, f"outputs[{i}]", names)
-            if item in list(found)[:i]:
-                self.mistakes.add(f"outputs[{i}]", f"{show(item)} stands twice")
-        return tuple(name for name in names if name in found)
+        allowed, cure = None if self.kernel is UNKNOWN else names, "; leave it out to get all of them"
+        asked = self.mistakes.words(found, "outputs", allowed, "a list of outputs", cure)
+        return tuple(name for name in names if name in asked)
 
     def _axes(self, found: Any, design: str) -> dict[str, Axis]:
         axes: dict[str, Axis] = {}
         for name, entry in self.mistakes.table(found, "axes", f"[axes.mu] with {EXAMPLE}").items():
             where = f"axes.{name}"
             field = self._setting(name) if name in SETTINGS else self._field(name, where)
-            axes[name] = self.entries.axis(name, entry, field, where)
+            axes[name] = self.fields.axis(name, entry, field, where)
         if not found:
             self.mistakes.add("axes", f"missing; give at least one, e.g. axes.mu = {EXAMPLE}")
         self._check_axes(axes, design)
@@ -199,7 +195,7 @@ class Reader:
                 continue
             before = len(self.mistakes)
             field = self._field(name, where)
-            given[name] = self.entries.quantity(entry, field, where)
+            given[name] = self.fields.quantity(entry, field, where)
             if field is not None:
                 self._check_limits(field, given[name], before, where)
             if name in axes:
@@ -291,7 +287,7 @@ class Reader:
             counted = field.integer and isinstance(entry["num"], int)
             last = min(field.upper, field.lower + entry["num"] - 1) if counted else field.upper
             entry = {"spacing": "linear", "start": field.lower, "stop": last, **entry}
-        values = self.entries.axis(field.name, entry, field, where).values
+        values = self.fields.axis(field.name, entry, field, where).values
         inside = (values >= field.lower) & (values <= field.upper) & np.isfinite(values)
         bad = values[~(inside & (values == np.round(values)) if field.integer else inside)]
         if len(bad):
@@ -299,29 +295,35 @@ class Reader:
             self.mistakes.add(where, f"expected {kind} from {field.lower:g} to {field.upper:g}, found {bad[0]:g}")
         return values
 
-    def _lacked(self, method: str, axes: Mapping[str, Axis], outputs: tuple[str, ...]) -> None:
-        """Methods that do not give an output asked for."""
-        lacking = {m.name: [name for name in m.lacks if name in outputs] for m in self.kernel.methods}
-        able = [name for name, found in lacking.items() if not found]
-        where, words = _methods_named(method, axes)
-        for word in words:
-            if lacking.get(word):
-                cure = f"use {listed(['auto', *able])}, or name the outputs you want" if able else "name other outputs"
-                self.mistakes.add(where, f"{word} does not give {listed(lacking[word], word='and')}; {cure}")
-
-    def _excluded(self, method: str, axes: Mapping[str, Axis], fixed: Mapping[str, Any]) -> None:
-        """Methods that cannot do a term which the study has."""
+    def _check_methods(
+        self, method: str, axes: Mapping[str, Axis], fixed: Mapping[str, Any], outputs: tuple[str, ...]
+    ) -> None:
+        """Methods named that cannot do a term which the study has, or do not give an output asked for."""
         terms = [p.name for p in self.kernel.parameters if p.name in axes or differs(p, fixed)]
-        lacking = {m.name: [t for t in m.excludes if t in terms] for m in self.kernel.methods}
-        able = [name for name, found in lacking.items() if not found]
+        excluded = {m.name: [term for term in m.excludes if term in terms] for m in self.kernel.methods}
+        lacking = {m.name: [name for name in m.lacks if name in outputs] for m in self.kernel.methods}
         where, words = _methods_named(method, axes)
+        self._refuse(where, words, excluded, "cannot do", "", "leave it out")
+        if "auto" in words and excluded and all(excluded.values()):
+            hard = [term for term in terms if any(term in found for found in excluded.values())]
+            self.mistakes.add(where, f"no method of {self.kernel.name} can do {listed(hard, word='and')} together")
+        self._refuse(where, words, lacking, "does not give", ", or name the outputs you want", "name other outputs")
+
+    def _refuse(
+        self, where: str, words: Sequence[str], wanting: Mapping[str, Sequence[str]], verb: str, too: str, cure: str
+    ) -> None:
+        """A mistake for each method named that wants something; the cure: the others (`too`), or where none is left."""
+        able = [name for name, found in wanting.items() if not found]
+        cure = f"use {listed(['auto', *able])}{too}" if able else cure
         for word in words:
-            if lacking.get(word):
-                cure = f"use {listed(['auto', *able])}" if able else "leave it out"
-                self.mistakes.add(where, f"{word} cannot do {listed(lacking[word], word='and')}; {cure}")
-            if word == "auto" and self.kernel.methods and not able:
-                hard = [term for term in terms if any(term in found for found in lacking.values())]
-                self.mistakes.add(where, f"no method of {self.kernel.name} can do {listed(hard, word='and')} together")
+            if wanting.get(word):
+                self.mistakes.add(where, f"{word} {verb} {listed(wanting[word], word='and')}; {cure}")
+
+
+def _kept_first(axes: dict[str, Axis], summary: Summary | None) -> dict[str, Axis]:
+    """The axes, those that are reduced behind the others."""
+    over = () if summary is None else summary.over
+    return dict(sorted(axes.items(), key=lambda item: item[0] in over))
 
 
 def _methods_named(method: str, axes: Mapping[str, Axis]) -> tuple[str, list[str]]:

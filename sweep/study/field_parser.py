@@ -34,8 +34,10 @@ NONE: Floats = np.empty(0)
 
 
 @dataclass
-class Entries:
-    """Reads entries of one study; what is wrong goes to `mistakes`, and NaN or no values come back.
+class FieldParser:
+    """Reads the entries of one study, each for a field of the kernel.
+
+    What is wrong goes to `mistakes`, and NaN or no values come back.
 
     A field of None is one that is not known: then only the shape of the entry is checked.
     """

@@ -1,0 +1,227 @@
+"""The blocks of a run on their way to the workers of a cluster and back.
+
+Tasks hold several short blocks, so that the scheduler has some tasks a second to place, not thousands. A worker that
+dies costs the blocks it had at hand, which go to others. Where workers died of a block again and again, the blocks of
+its task are tried one by one, alone, to find the poison among them; it is reported when all others are done.
+"""
+
+from __future__ import annotations
+
+import math
+import secrets
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import CancelledError, Future
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from distributed import KilledWorker
+
+from sweep.cells.block import Blocks, Computed
+from sweep.runs.cluster import Cluster
+from sweep.runs.extend import Precomputed, Reused
+from sweep.runs.task import Task
+from sweep.runs.worker import TOKEN, Answer, Assignment, Sent
+from sweep.store.parts import digest
+from sweep.study.model import Study
+from sweep.system import disk
+from sweep.system.errors import SweepError
+from sweep.system.pool import CtrlC, through
+
+TASK_SECONDS = 0.5
+"""Blocks shorter than this go to a worker several at a time;"""
+TASK_BYTES = 32 << 20
+"""but no more than this, where their numbers are sent back."""
+MOST_ROUNDS = 3
+"""Times that a block is tried alone where nothing could be made of its answer."""
+MOST_NAMED = 8
+"""Blocks that are named one by one in a message."""
+
+Batch = tuple[int, ...]
+
+
+class Dispatch:
+    """Computes blocks on the workers of a cluster: the executor of a session, once.
+
+    Parameters
+    ----------
+    cluster : Cluster
+    task : Task
+    blocks : how the rows are cut
+    left : how many blocks there are to compute
+    reused : cells that need not be computed; they are filled in here
+    shared : folder in which workers that see it write parts; None: all numbers are wanted here
+    """
+
+    def __init__(
+        self,
+        cluster: Cluster,
+        task: Task,
+        blocks: Blocks,
+        left: int,
+        reused: Reused | Precomputed | None,
+        shared: Path | None,
+    ) -> None:
+        self._cluster, self._blocks, self._left, self._reused, self._note = cluster, blocks, left, reused, task.note
+        self._assignment = _assignment(task, blocks, shared if reused is None else None)
+        self._seconds = math.inf
+        self._most = max(1, TASK_BYTES // max(1, self._blocks.partition.cells * self._blocks.row_bytes))
+        self._suspects: list[int] = []
+        self._poison: list[int] = []
+        self._idle = False
+
+    def compute(self, blocks: Iterator[int], receive: Callable[[Computed | None], None]) -> None:
+        """Calls `receive` with every block that is done, and with None now and then. Raises SweepError."""
+        self._receive = receive
+        with self._cluster.introduced(self._assignment), CtrlC() as ctrl_c:
+            self._submit(self._batches(blocks), self._capacity, self._suspect, ctrl_c)
+            for _ in range(MOST_ROUNDS):
+                # nothing else is under way now, so what kills its worker is found out for certain
+                suspects, self._suspects = [(job,) for job in self._suspects], []
+                self._submit(iter(suspects), lambda: 1, self._poison.extend, ctrl_c)
+            self._poison += self._suspects
+        if self._poison:
+            raise SweepError(
+                f"{_listed(self._blocks, self._poison)}: every worker that took them died, alone with them, too; the "
+                "logs of the workers may tell why, too little memory is most common; all other blocks are kept"
+            )
+
+    def _submit(
+        self, batches: Iterator[Batch], capacity: Callable[[], int], killed: Callable[[Batch], None], ctrl_c: CtrlC
+    ) -> None:
+        executor = self._cluster.executor()
+
+        def submit(batch: Batch) -> Future[Answer]:
+            masks = {job: mask for job in batch if (mask := self._mask(job)) is not None}
+            return self._cluster.submit(executor, self._assignment.run, batch, masks)
+
+        def settled(batch: Batch | None, future: Future[Answer] | None) -> None:
+            if batch is not None and future is not None:
+                self._take(batch, future, killed)
+            else:
+                self._look_for_workers()
+                self._receive(None)
+
+        through(batches, submit, capacity, settled, lambda: self._cluster.cancel(executor), ctrl_c)
+
+    def _batches(self, blocks: Iterator[int]) -> Iterator[Batch]:
+        """As many blocks together as take about half a second; fewer towards the end."""
+        while self._left > 0:
+            enough = int(TASK_SECONDS / max(self._seconds, TASK_SECONDS / 1000))
+            share = self._left // (2 * max(1, self._cluster.threads))
+            size = max(1, min(enough, share, self._most))
+            batch = [job for job in islice(blocks, size) if not self._is_reused(job)]
+            self._left -= size
+            if batch:
+                yield tuple(batch)
+
+    def _capacity(self) -> int:
+        return 2 + 2 * self._cluster.threads
+
+    def _take(self, batch: Batch, future: Future[Answer], killed: Callable[[Batch], None]) -> None:
+        try:
+            answer = future.result()
+        except CancelledError as fault:
+            raise self._cluster.lost(fault) from fault
+        except KilledWorker:
+            killed(batch)
+            return
+        except SweepError:
+            raise
+        except Exception as fault:
+            # distributed's executor trips over a task that fails with its worker and is answered at that moment
+            if isinstance(fault, TypeError) and "Answer" in str(fault):
+                self._suspect(batch)
+                return
+            raise SweepError(
+                f"cluster: a worker failed ({type(fault).__name__}: {fault}); what is finished is kept"
+            ) from fault
+        mean = answer.seconds / len(batch)
+        self._seconds = mean if math.isinf(self._seconds) else 0.7 * self._seconds + 0.3 * mean
+        for job, found in answer.found.items():
+            self._receive(Computed(job, found if isinstance(found, str) else self._checked(job, found), mean))
+
+    def _suspect(self, batch: Batch) -> None:
+        self._note(
+            f"workers died again and again while they had {_listed(self._blocks, batch)}; these are tried again at "
+            "the end"
+        )
+        self._suspects += batch
+
+    def _look_for_workers(self) -> None:
+        idle = not self._cluster.threads
+        if idle and not self._idle:
+            self._note("the cluster has no workers left; waiting for new ones")
+        self._idle = idle
+
+    def _mask(self, job: int) -> bytes | None:
+        """Of a block that is known in part: which of its cells are not, a bit each."""
+        reused = self._reused
+        return None if reused is None else np.packbits(reused.missing(*self._blocks.bounds(job))).tobytes()
+
+    def _is_reused(self, job: int) -> bool:
+        """Whether nothing of a block has to be computed; then it is received at once."""
+        bounds = self._blocks.bounds(job)
+        if self._reused is None or self._reused.missing(*bounds).any():
+            return False
+        arrays = self._blocks.empty(bounds[1] - bounds[0])
+        self._reused.fill(*bounds, arrays)
+        self._receive(Computed(job, arrays, 0.0))
+        return True
+
+    def _checked(self, job: int, sent: Sent) -> Mapping[str, Any]:
+        """The numbers of a block, the reused ones filled in. Raises SweepError where they are not what was sent."""
+        start, stop = self._blocks.bounds(job)
+        columns, arrays = self._blocks.columns, {**sent.arrays}
+        fits = all(
+            arrays[c.name].shape == (stop - start, *c.shape) and arrays[c.name].dtype == c.dtype for c in columns
+        )
+        if not fits or digest(columns, arrays) != sent.digest:
+            raise SweepError(f"{self._blocks.label(job)}: damaged on their way from the worker")
+        if self._reused is not None:
+            arrays = {name: column if column.flags.writeable else column.copy() for name, column in arrays.items()}
+            self._reused.fill(start, stop, arrays)
+        return arrays
+
+
+def write_token(shared: Path, token: str) -> None:
+    """Puts the token into the folder: a worker that reads it there sees the same folder. Raises SweepError."""
+    try:
+        disk.publish([token.encode("ascii")], shared / f"{TOKEN}.tmp", shared / TOKEN)
+    except OSError as fault:
+        raise disk.refusal(fault, shared) from fault
+
+
+def _assignment(task: Task, blocks: Blocks, shared: Path | None) -> Assignment:
+    token, study = secrets.token_hex(16), task.study
+    if shared is not None:
+        write_token(shared, token)
+    return Assignment(
+        run=f"foliot-{token[:8]}",
+        study=study.to_json(),
+        fingerprint=task.fingerprint,
+        partition=blocks.partition,
+        shared=str(shared or ""),
+        token=token,
+        paths=_paths(study),
+    )
+
+
+def _paths(study: Study) -> tuple[str, ...]:
+    """Folder of a kernel of the user's own, who has allowed it here by reading the study."""
+    name = study.kernel_name.partition(":")[0]
+    file = getattr(sys.modules.get(name), "__file__", None) if ":" in study.kernel_name else None
+    if file is None:
+        return ()
+    path = Path(file).resolve()
+    above = name.count(".") + (path.name == "__init__.py")
+    return (str(path.parents[above]),)
+
+
+def _listed(blocks: Blocks, jobs: list[int] | Batch) -> str:
+    """The cells of the first few blocks, and how many more there are."""
+    cells = ", ".join("{} to {}".format(*blocks.cells(job)) for job in jobs[:MOST_NAMED])
+    more = f" and {len(jobs) - MOST_NAMED} more blocks" if len(jobs) > MOST_NAMED else ""
+    return f"cells {cells}{more}"
