@@ -61,7 +61,6 @@ def interrupted(study, output):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Solver, "solve", failing)
         patch.setattr("sweep.system.forecast.Forecast.order", lambda self: iter(range(self.blocks)))
-        patch.setattr("sweep.runs.session.order", lambda sample, blocks, first: np.arange(blocks.count))
         with pytest.raises(SweepError, match="stop here"):
             quiet(study, output, block_cells=5, workers=1)
 
