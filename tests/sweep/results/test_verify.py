@@ -15,7 +15,7 @@ import sweep
 from sweep.cells.partition import Partition
 from sweep.cli import main
 from sweep.results.verify import verify
-from sweep.store import digests
+from sweep.store import probe
 from sweep.store.manifest import MANIFEST, read_manifest
 from sweep.store.store import folder_of
 
@@ -181,7 +181,7 @@ def test_a_spec_that_lies_about_its_size_is_refused_at_once(unfinished, blocks):
 
 
 def test_a_result_of_absurd_size_is_refused_before_memory_is_asked_for(tmp_path, monkeypatch):
-    monkeypatch.setattr(digests, "PROBE_SECONDS", 1.0)  # HDF5 comes to no end with it
+    monkeypatch.setattr(probe, "PROBE_SECONDS", 1.0)  # HDF5 comes to no end with it
     path = tmp_path / "out.h5"
     sweep.run(tall(3), path, progress=False).close()
     with h5py.File(path, "r+") as file:
