@@ -61,40 +61,35 @@ class FirstLeg(NamedTuple):
 
 
 class Rise(NamedTuple):
-    """Legs 2 and 3."""
+    """Legs 2 and 3 to rest at -(beta + p), whether the lift is passed, and their share `loss` of J in (2)."""
 
     p: float
-    """How far beyond the lift it comes to rest."""
     v2: float
     v3: float
     t2: float
     t3: float
     comes: bool
-    """Whether the lift is passed."""
     loss: float
-    """Their share of J in (2)."""
     s2: float
     slope3: float
 
 
 class HalfSwing(NamedTuple):
-    """From rest at beta + p to rest at -(beta + p')."""
+    """From rest at beta + p to rest at -(beta + p'), and whether it passes the lift, or the zero.
+
+    `gain` is p' - p, a difference where the swing forgets its start and by (2) where it hardly changes; `noise` what
+    rounding may be worth in it; `kept` da'/da by (3), `lost` 1 minus that; `late` a bound on dT/dp; `blunt` the error
+    of the time, by the speeds at which its pieces end.
+    """
 
     gain: float
-    """p' - p, a difference where the swing forgets its start and by (2) where it hardly changes."""
     noise: float
-    """What rounding may be worth in it."""
     kept: float
-    """da'/da by (3)."""
     lost: float
-    """1 minus that."""
     time: float
     comes: bool
-    """Whether it passes the lift, or the zero."""
     late: float
-    """Bound on dT/dp."""
     blunt: float
-    """Error of the time, by the speeds at which its pieces end."""
 
 
 @jit
@@ -280,7 +275,7 @@ def newton(scene, rtol):
 
 
 @jit_call
-def closed(scene):
+def closed(scene, rtol):
     """As `newton`, from formulas, where there is an impulse and r = 0, or zeta = 0; NO_METHOD elsewhere."""
     zeta, r, m, beta, w = scene
     lifts, free, smooth = beta > 0.0, isnt(zeta > 0.0), isnt(r > 0.0)

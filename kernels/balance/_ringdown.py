@@ -57,28 +57,31 @@ class Decay(NamedTuple):
 
 
 class LastSwing(NamedTuple):
-    """The half swing after which it rests: its number and the turning points, pairs, on both sides of r_s."""
+    """The half swing after which it rests: its number, and the turning points, pairs, on both sides of r_s.
+
+    `kept` is the part a_0 E^k of the turning point at which the search began.
+    """
 
     number: float
     above: tuple
     below: tuple
     kept: float
-    """The part a_0 E^k of the turning point at which the search began."""
     unsure: bool
 
 
 class Rest(NamedTuple):
-    """Where it comes to rest: half swings, a_N, the least abs(a_k - r_s)/r_s, and what is known of them."""
+    """Half swings until rest, a_N, the least abs(a_k - r_s)/r_s, and what is known of them.
+
+    `grazes`: whether the count hangs on the last digits of the inputs; `doubt`: error of a_N; `unsure`: whether the
+    count is not confirmed.
+    """
 
     count: float
     last: float
     margin: float
     grazes: bool
-    """Whether the count hangs on the last digits of the inputs."""
     doubt: float
-    """Error of a_N."""
     unsure: bool
-    """Whether the count is not confirmed."""
 
 
 @jit

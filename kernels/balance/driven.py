@@ -45,9 +45,11 @@ class LimitCycle(NamedTuple):
 
 
 @jit
-def _outputs(cycle, verdict, e, fine, omega_n):
+def _outputs(p, rtol, solve):
     """The cycle in SI units, and the status."""
-    swing, whole = scale(cycle.amplitude, e), 2.0 * cycle.time / omega_n
+    scene, e, fine = _driven_swing.in_units(p)
+    cycle, verdict = solve(scene, rtol)
+    swing, whole = scale(cycle.amplitude, e), 2.0 * cycle.time / p.omega_n
     wide, timed = is_normal(swing), is_normal(whole)
     outputs = LimitCycle(or_none(swing, wide), or_none(whole, timed), cycle.multiplier)
     return outputs, where(fine, partly(wide & timed, verdict), OUT_OF_RANGE)
@@ -56,9 +58,7 @@ def _outputs(cycle, verdict, e, fine, omega_n):
 @jit
 def closed(p, rtol):
     """Formulas for r = 0 under impulses and for zeta = 0; NO_METHOD elsewhere."""
-    scene, e, fine = _driven_swing.in_units(p)
-    cycle, verdict = _driven_swing.closed(scene)
-    return _outputs(cycle, verdict, e, fine, p.omega_n)
+    return _outputs(p, rtol, _driven_swing.closed)
 
 
 @jit
@@ -71,9 +71,7 @@ def closed_bound(p):
 @jit
 def newton(p, rtol):
     """Exact pieces of the half swing and Newton on its map, in 32 digits where conditioning leaves less than rtol."""
-    scene, e, fine = _driven_swing.in_units(p)
-    cycle, verdict = _driven_swing.newton(scene, rtol)
-    return _outputs(cycle, verdict, e, fine, p.omega_n)
+    return _outputs(p, rtol, _driven_swing.newton)
 
 
 @jit

@@ -60,15 +60,12 @@ class RingDown(NamedTuple):
 
 
 class Kind(NamedTuple):
-    """What the balance does, each as a condition."""
+    """Whether it is overdamped, moves at all, swings for ever, and whether its motion has an end, be it the release."""
 
     creeps: bool
-    """It is overdamped."""
     moves: bool
     endless: bool
-    """It swings for ever."""
     lasts: bool
-    """Its motion has an end, be it the release."""
 
 
 @jit
@@ -104,18 +101,16 @@ def _stop_angle(p, scene, e, rest, kind):
 
 @jit
 def _margin(scene, rest, kind):
-    """The margin, NaN where it comes to no turning point at which it might rest."""
-    away = magnitude(scene.start - scene.r_s) / _ringdown.unit(scene.r_s)
-    away = or_none(away, scene.r_s > 0.0)
+    """The margin, NaN where it swings for ever."""
+    away = or_none(magnitude(scene.start - scene.r_s) / _ringdown.unit(scene.r_s), scene.r_s > 0.0)
     return or_none(where(kind.creeps, away, where(scene.r_s > 0.0, rest.margin, 0.0)), isnt(kind.endless))
 
 
 @jit
 def _verdict(scene, rest, kind, rtol, unsettled, faint):
     """The status but for the range; an angle of rest too `faint` for a float64 is not asked for its error."""
-    loose = isnt(faint | (rest.doubt <= rtol * magnitude(rest.last))) | isnt(
-        rest.doubt <= rtol * rest.margin * scene.r_s
-    )
+    loose = isnt(faint | (rest.doubt <= rtol * magnitude(rest.last)))
+    loose = loose | isnt(rest.doubt <= rtol * rest.margin * scene.r_s)
     verdict = where(rest.unsure, unsettled, where(rest.grazes, GRAZING, where(loose, INACCURATE, OK)))
     verdict = where(scene.start > 0.0, verdict, OK)
     return where(kind.creeps, OVERDAMPED, where(kind.endless, NEVER_ENDS, verdict))

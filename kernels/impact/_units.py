@@ -37,16 +37,16 @@ _KAPPA_LIMIT = 900.0
 
 
 class Scene(NamedTuple):
-    """The clock without dimensions; all but e and nu are pairs of `pairs`."""
+    """The clock without dimensions; all but e and nu are pairs of `pairs`.
+
+    wheel = M/(M + m), pallet = m/(M + m); slack = 1 - 4 eta is exactly 0 at h = p/4 (within HALF_PITCH): no drop.
+    """
 
     wheel: tuple
-    """M/(M + m)"""
     pallet: tuple
-    """m/(M + m)"""
     kappa: tuple
     eta: tuple
     slack: tuple
-    """1 - 4 eta; exactly 0 at h = p/4 (within HALF_PITCH): no drop."""
     e: float
     nu: float
 

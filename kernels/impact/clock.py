@@ -57,20 +57,19 @@ class Beat(NamedTuple):
 
 
 @jit
-def _symmetric(units, fine, cycle, held, verdict):
+def _symmetric(p, rtol, solve):
     """The cycle with one impact a half period, in SI units, and the status."""
+    scene, units, fine = _units.without_dimensions(p)
+    cycle, held, verdict = solve(scene, rtol)
     sizes, whole = _units.dimensional(units, cycle)
     one = 0.0 * held + 1.0
-    beat = Beat(sizes, cycle.multiplier, held, one, 0.0 * one)
-    return beat, judged(fine, whole, verdict)
+    return Beat(sizes, cycle.multiplier, held, one, 0.0 * one), judged(fine, whole, verdict)
 
 
 @jit
 def closed(p, rtol):
     """The symmetric cycle by formula, with its existence and its multipliers."""
-    scene, units, fine = _units.without_dimensions(p)
-    cycle, held, verdict = _closed_cycle.closed(scene, rtol)
-    return _symmetric(units, fine, cycle, held, verdict)
+    return _symmetric(p, rtol, _closed_cycle.closed)
 
 
 @jit
@@ -87,9 +86,7 @@ def events(p, rtol, total, work, history):
 @jit
 def half_cycle_map(p, rtol):
     """The symmetric cycle as the fixed point of the half-cycle map, by Newton, and its multipliers."""
-    scene, units, fine = _units.without_dimensions(p)
-    cycle, held, verdict = _return_map.half_cycle(scene, rtol)
-    return _symmetric(units, fine, cycle, held, verdict)
+    return _symmetric(p, rtol, _return_map.half_cycle)
 
 
 @jit
