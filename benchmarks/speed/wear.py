@@ -16,7 +16,7 @@ import time
 
 import numpy as np
 
-from kernels.wear.ring import POLISHER_WEAR, contour
+from kernels.wear.ring import POLISHER_WEAR
 
 try:
     from scipy.integrate import IntegrationWarning, quad
@@ -45,7 +45,7 @@ def ours(case, n, rtol):
     """Wear at RADIUS and its error of n equal cells, and seconds per cell."""
     wear, error, status = np.empty((n, 1)), np.empty((n, 1)), np.empty(n, np.int8)
     start = time.perf_counter()
-    contour(*columns(case, n), np.full(n, rtol), np.array([RADIUS]), wear, error, status)
+    POLISHER_WEAR.method("contour").solve(*columns(case, n), np.full(n, rtol), np.array([RADIUS]), wear, error, status)
     return wear[0, 0], error[0, 0], (time.perf_counter() - start) / n
 
 

@@ -9,67 +9,185 @@ one sign for each stroke. In half angles, with eta_+ and eta_- where the arm tur
 All this is type A, 0 <= eta <= pi. Type B is its mirror image run backward, which wears alike: the work and the arm's
 offset beta are mirrored at the frame. Source: derived here from Cordero-Davila et al., Opticheskii Zhurnal 78(3):55
 (2011), (1)-(9), (21), (22).
+
+Wear is no smooth function of eta where the arm turns, and where v is 0 somewhere on the ring: on that of radius r the
+speeds at psi = 0 and pi (`_speed_integral`) are 0 where
+    alpha' (r +- w) = Omega r                                                                        (4)
+and near by the integral of v along an arc goes like x^2 log x of the distance x from there. What is not found here
+(two roots closer than the samples, where the left side of (4) all but touches the right) costs panels, no digits.
 """
 
 import math
+from typing import NamedTuple
 
-from kernels.lanes.jit import jit_call
+import numpy as np
+
+from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude, sqrt
+from kernels.polisher.linkage import Lengths, Margins
 from kernels.wear._tool import arctan2, sincos
+
+STOP_LIMIT = 14
+"""How many angles at which wear is not smooth are kept."""
 
 _DOUBT = 4.0 * 2.0**-52
 """What rounding comes to in the angle of the arm: where it all but turns, its dwell knows it a million times worse."""
+_ROUNDING = 4.0 * 2.0**-52
+_SAMPLES = 32
+_ROOT_LIMIT = 40
+_NEAR = 1e-10
+
+
+class Arm(NamedTuple):
+    """Its lengths and margins, the constants of (3), its least and largest angle, and whether it turns fully."""
+
+    lengths: Lengths
+    margin: Margins
+    unit: float
+    low: float
+    high: float
+    least: float
+    most: float
+    whirls: bool
+
+
+class Pose(NamedTuple):
+    """The arm's angle eta and its cosine and sine, both gaps of (3) and their rounding, relative, and d eta/du."""
+
+    eta: float
+    c: float
+    s: float
+    top: float
+    bottom: float
+    noise: float
+    growth: float
+
+
+class Strokes(NamedTuple):
+    """alpha' of the stroke back, abs(dtheta/d alpha) there, both of the stroke forth; 0 for no such stroke."""
+
+    back: float
+    back_dwell: float
+    forth: float
+    forth_dwell: float
 
 
 @jit_call
 def arm_of(lengths, margin):
-    """The arm: its lengths, the two constants of (3), its least and largest angle, and whether it turns fully.
-
-    Where the two angles are rounded to one, as for a crank without throw, it stands still.
-    """
+    """The `Arm`. Where its two angles are rounded to one, as for a crank without throw, it stands still."""
     b, d, f, e = lengths
-    stretched, back, front = margin
     unit = 4.0 * b * d
-    low, high = stretched * back, front * ((b + d) + (e + f))
+    low, high = margin.stretched * margin.back, margin.front * ((b + d) + (e + f))
     least = 2.0 * arctan2(sqrt(max(low, 0.0)), sqrt(max(unit - low, 0.0)))
     most = 2.0 * arctan2(sqrt(max(unit - high, 0.0)), sqrt(max(high, 0.0)))
-    return lengths, (unit, low, high), (least, most), e > b
+    return Arm(lengths, margin, unit, low, high, least, most, e > b)
 
 
 @jit_call
 def gaps(arm, c, s):
     """(3): (f+e)^2 - q^2 and q^2 - (f-e)^2 of the arm at (cos eta, sin eta) = (c, s), and their rounding, relative."""
-    unit, low, high = arm[1]
     sine2 = 0.5 * s * s / (1.0 + c) if c > 0.0 else 0.5 * (1.0 - c)
     cosine2 = 0.5 * (1.0 + c) if c > 0.0 else 0.5 * s * s / (1.0 - c)
-    top, bottom = unit * cosine2 - high, unit * sine2 - low
-    return top, bottom, _DOUBT * unit * ((magnitude(s) + cosine2) / top + (magnitude(s) + sine2) / bottom)
+    top, bottom = arm.unit * cosine2 - arm.high, arm.unit * sine2 - arm.low
+    return top, bottom, _DOUBT * arm.unit * ((magnitude(s) + cosine2) / top + (magnitude(s) + sine2) / bottom)
 
 
 @jit_call
-def gaps_at(arm, u):
-    """As `gaps` where eta lies a share (1 + sin u)/2 of the way from least to most, without rounding; d eta/du."""
-    least, most = arm[2]
-    half = 0.5 * (most - least)
+def pose_at(arm, u):
+    """The `Pose` a share (1 + sin u)/2 of the way from least to most, without rounding of the gaps.
+
+    Of an arm that turns fully, u is eta.
+    """
+    if arm.whirls:
+        s, c = sincos(u)
+        top, bottom, noise = gaps(arm, c, s)
+        return Pose(u, c, s, top, bottom, noise, 1.0)
+    half = 0.5 * (arm.most - arm.least)
     up, far = sincos(0.5 * (0.5 * math.pi - u))  # sin^2 and cos^2 of it: the shares that lie ahead and behind
     ahead, behind = 2.0 * half * up * up, 2.0 * half * far * far
-    eta = least + behind if behind < ahead else most - ahead
-    unit = arm[1][0]
-    top = unit * sincos(0.5 * (most + eta))[0] * sincos(0.5 * ahead)[0]
-    bottom = unit * sincos(0.5 * (least + eta))[0] * sincos(0.5 * behind)[0]
-    return eta, top, bottom, 2.0 * half * up * far
+    eta = arm.least + behind if behind < ahead else arm.most - ahead
+    top = arm.unit * sincos(0.5 * (arm.most + eta))[0] * sincos(0.5 * ahead)[0]
+    bottom = arm.unit * sincos(0.5 * (arm.least + eta))[0] * sincos(0.5 * behind)[0]
+    s, c = sincos(eta)
+    return Pose(eta, c, s, top, bottom, _ROUNDING, 2.0 * half * up * far)
 
 
 @jit_call
 def strokes(arm, c, s, top, bottom):
-    """alpha' of the stroke back, abs(dtheta/d alpha) there, both of the stroke forth; (2). 0: no such stroke."""
-    b, d, f, e = arm[0]
+    """The `Strokes` at (cos eta, sin eta) = (c, s) and the gaps there; (2)."""
+    b, d, f, e = arm.lengths
     h = 0.5 * sqrt(top * bottom)
     q2 = (f - e) * (f - e) + bottom
     lean = 0.5 * ((e - f) * (e + f) - q2) * b * d * s
     reach = h * (d * d - b * d * c)
     forth = (reach - lean) / q2
-    if arm[3]:
-        return 0.0, 0.0, h / forth, magnitude(forth) / h
+    if arm.whirls:
+        return Strokes(0.0, 0.0, h / forth, magnitude(forth) / h)
     back = (reach + lean) / q2
-    return h / back, magnitude(back) / h, h / forth, forth / h
+    return Strokes(h / back, magnitude(back) / h, h / forth, forth / h)
+
+
+@jit
+def span(arm):
+    """Ends of u of `pose_at` over all the arm's motion."""
+    return (-math.pi, math.pi) if arm.whirls else (-0.5 * math.pi, 0.5 * math.pi)
+
+
+@jit_call
+def rates_at(arm, u):
+    """The arm's angle at u, and alpha' of the stroke back and forth over the crank's rate."""
+    pose = pose_at(arm, u)
+    found = strokes(arm, pose.c, pose.s, max(pose.top, 0.0), max(pose.bottom, 0.0))
+    return pose.eta, found.back, found.forth
+
+
+@jit
+def _lead(scene, rate, side):
+    """Left less right side of (4)."""
+    ride, r = scene.ride, scene.r
+    return ride.speed * rate * (r + side * ride.w) - ride.spin * r
+
+
+@jit_call
+def _root(scene, forth, side, one, two, f_one, f_two):
+    """The arm's angle where (4) holds, between one and two, by the Illinois rule."""
+    last, eta = math.inf, 0.0
+    for _ in range(_ROOT_LIMIT):
+        u = (one * f_two - two * f_one) / (f_two - f_one)
+        eta, back, rate = rates_at(scene.arm, u)
+        value = _lead(scene, rate if forth else back, side)
+        if magnitude(u - last) <= _NEAR or value == 0.0:
+            break
+        if (value > 0.0) == (f_two > 0.0):
+            f_one *= 0.5
+        else:
+            one, f_one = two, f_two
+        two, f_two, last = u, value, u
+    return eta
+
+
+@jit_call
+def find_stops(scene, still):
+    """Puts the angles at which wear is not smooth into `still`; how many. First those where the arm turns, if it does.
+
+    scene : of `_profile`
+    """
+    arm = scene.arm
+    first, last = span(arm)
+    count = np.int64(0)
+    if not arm.whirls:
+        still[0], still[1] = arm.least, arm.most
+        count += 2
+    before, back, forth = first, 0.0, 0.0
+    for k in range(_SAMPLES + 1):
+        u = first + (last - first) * k / _SAMPLES
+        _, now_back, now_forth = rates_at(arm, u)
+        for j in range(4 if k > 0 else 0):
+            side, ahead = 1.0 if j % 2 else -1.0, j > 1
+            old = _lead(scene, forth if ahead else back, side)
+            new = _lead(scene, now_forth if ahead else now_back, side)
+            if old * new < 0.0 and count < STOP_LIMIT:
+                still[count] = _root(scene, ahead, side, before, u, old, new)
+                count += 1
+        before, back, forth = u, now_back, now_forth
+    return count

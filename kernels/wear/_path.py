@@ -10,12 +10,15 @@ Time goes in steps of a share of the crank's turn; whole turns are taken off wit
 """
 
 import math
+from typing import NamedTuple
 
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import fma, magnitude, nearest, sqrt
 from kernels.maths.pairs import two_product
 from kernels.polisher import linkage
-from kernels.wear._tool import excess, power, sincos
+from kernels.polisher.linkage import Lengths, Margins
+from kernels.wear._pressure import Areas
+from kernels.wear._tool import Tool, excess, power, sincos
 
 STEPS = 24
 """Steps of a turn of the crank or the work, whichever is faster."""
@@ -29,19 +32,63 @@ _MARGIN = 1.5
 _BISECTIONS = 80
 
 
+class Course(NamedTuple):
+    """Of a point about the tool: the linkage, rates of crank and work, L, centre of the work, radius, and the tool."""
+
+    lengths: Lengths
+    margin: Margins
+    side: float
+    b_angle: float
+    speed: float
+    spin: float
+    reach: float
+    x: float
+    y: float
+    beta: float
+    r: float
+    tool: Tool
+
+
+class Step(NamedTuple):
+    """Of time, after the crank had turned by `cranked` and the point was at `turned`; and the areas of contact."""
+
+    course: Course
+    cranked: float
+    turned: float
+    areas: Areas
+
+
+class Place(NamedTuple):
+    """X, Y and their rates."""
+
+    x: float
+    y: float
+    vx: float
+    vy: float
+
+
+@jit
+def _arm(step, s):
+    """The arm's angle from b and its rate over the crank's, at a time s of a step."""
+    course = step.course
+    crank = linkage.crank_at(step.cranked + course.speed * s, course.b_angle)
+    alpha, rate, _ = linkage.motion(course.lengths, course.margin, course.side, crank)
+    return alpha, rate
+
+
 @jit_call
-def position(scene, cranked, turned, s):
-    """X, Y and their rates at a time s after the crank had turned by `cranked` and the point was at `turned`."""
-    (lengths, margin, side, b_angle), (speed, spin, reach, x, y, beta), r, _ = scene
-    alpha, rate, _ = linkage.motion(lengths, margin, side, linkage.crank_at(cranked + speed * s, b_angle))
-    rate = speed * rate
-    sine, cosine = sincos(turned + spin * s)
+def position(step, s):
+    """The `Place` of the point at a time s of a step."""
+    course = step.course
+    alpha, rate = _arm(step, s)
+    rate, r, spin = course.speed * rate, course.r, course.spin
+    sine, cosine = sincos(step.turned + spin * s)
     sine, cosine = r * sine, r * cosine
-    sine_arm, cosine_arm = sincos(alpha + (b_angle + beta))
-    px, py = x + cosine, y + sine
+    sine_arm, cosine_arm = sincos(alpha + (course.b_angle + course.beta))
+    px, py = course.x + cosine, course.y + sine
     vx, vy = rate * py - spin * sine, spin * cosine - rate * px
-    return (
-        px * cosine_arm + py * sine_arm - reach,
+    return Place(
+        px * cosine_arm + py * sine_arm - course.reach,
         py * cosine_arm - px * sine_arm,
         vx * cosine_arm + vy * sine_arm,
         vy * cosine_arm - vx * sine_arm,
@@ -49,11 +96,11 @@ def position(scene, cranked, turned, s):
 
 
 @jit_call
-def facing(scene, cranked, s):
-    """Cosine and sine of the arm's angle from the direction of w at a time s."""
-    (lengths, margin, side, b_angle), (speed, _, _, x, y, beta), _, _ = scene
-    alpha, _, _ = linkage.motion(lengths, margin, side, linkage.crank_at(cranked + speed * s, b_angle))
-    sine_arm, cosine_arm = sincos(alpha + (b_angle + beta))
+def facing(step, s):
+    """Cosine and sine of the arm's angle from the direction of w at a time s of a step."""
+    x, y = step.course.x, step.course.y
+    alpha, _ = _arm(step, s)
+    sine_arm, cosine_arm = sincos(alpha + (step.course.b_angle + step.course.beta))
     w = sqrt(x * x + y * y)
     if not w > 0.0:
         return 1.0, 0.0
@@ -61,19 +108,19 @@ def facing(scene, cranked, s):
 
 
 @jit_call
-def bend(scene):
+def bend(course):
     """(1), from samples of the arm's motion that are dense about the dead points, half as much again."""
-    (lengths, margin, side, _), (speed, spin, _, x, y, _), r, _ = scene
+    speed, spin, r = course.speed, course.spin, course.r
     rate, acceleration = 0.0, 0.0
     for k in range(_SAMPLES + 160):
         theta = _TURN * k / _SAMPLES
         if k >= _SAMPLES:
             j = k - _SAMPLES
             theta = (math.pi if j % 2 else 0.0) + (1.0 if j % 4 < 2 else -1.0) * 2.0 ** (-(j // 4))
-        _, first, second = linkage.motion(lengths, margin, side, linkage.crank_at(theta, 0.0))
+        _, first, second = linkage.motion(course.lengths, course.margin, course.side, linkage.crank_at(theta, 0.0))
         rate, acceleration = max(rate, magnitude(first)), max(acceleration, magnitude(second))
     rate, acceleration = magnitude(speed) * rate, speed * speed * acceleration
-    far = sqrt(x * x + y * y) + r
+    far = sqrt(course.x * course.x + course.y * course.y) + r
     return _MARGIN * (spin * spin * r + 2.0 * rate * magnitude(spin) * r + (acceleration + rate * rate) * far)
 
 
@@ -107,39 +154,43 @@ INSIDE, OUTSIDE, ONCE, UNKNOWN = range(4)
 def judged(tool, one, two, h, curve):
     """Whether a stretch of time h between two positions is INSIDE, OUTSIDE, crossed ONCE at most, or UNKNOWN."""
     spread = 0.125 * curve * h * h
-    x_low, x_high = _range(one[0], two[0], spread)
-    y_low, y_high = _range(one[1], two[1], spread)
+    x_low, x_high = _range(one.x, two.x, spread)
+    y_low, y_high = _range(one.y, two.y, spread)
     if excess(tool, x_high, y_high) < 0.0:
         return INSIDE
     if excess(tool, x_low, y_low) > 0.0:
         return OUTSIDE
-    x_least, x_most = _rate_bounds(tool[0], tool[2], one[0], two[0], spread, one[2], curve * h)
-    y_least, y_most = _rate_bounds(tool[1], tool[3], one[1], two[1], spread, one[3], curve * h)
+    x_least, x_most = _rate_bounds(tool.a, tool.n, one.x, two.x, spread, one.vx, curve * h)
+    y_least, y_most = _rate_bounds(tool.b, tool.m, one.y, two.y, spread, one.vy, curve * h)
     return ONCE if x_least + y_least > 0.0 or x_most + y_most < 0.0 else UNKNOWN
 
 
+@jit
+def within(step, place):
+    """Whether a place is within the tool."""
+    return excess(step.course.tool, place.x, place.y) < 0.0
+
+
 @jit_call
-def crossing(scene, cranked, turned, low, high):
+def crossing(step, low, high):
     """The time between low and high at which the outline is crossed, and what rounding may come to in it."""
-    tool = scene[3]
-    x, y, _, _ = position(scene, cranked, turned, high)
-    rising = excess(tool, x, y) > 0.0
-    first = low
+    tool, first = step.course.tool, low
+    there = position(step, high)
+    rising = excess(tool, there.x, there.y) > 0.0
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        x, y, _, _ = position(scene, cranked, turned, middle)
-        if (excess(tool, x, y) > 0.0) == rising:
+        there = position(step, middle)
+        if (excess(tool, there.x, there.y) > 0.0) == rising:
             high = middle
         else:
             low = middle
         if high - low <= _EPS * (high - first):
             break
     s = 0.5 * (low + high)
-    x, y, vx, vy = position(scene, cranked, turned, s)
-    gx = _slope(tool[0], tool[2], x)
-    gy = _slope(tool[1], tool[3], y)
-    far = scene[1][2] + magnitude(x) + magnitude(y)
-    pace = magnitude(gx * vx + gy * vy)
+    there = position(step, s)
+    gx, gy = _slope(tool.a, tool.n, there.x), _slope(tool.b, tool.m, there.y)
+    far = step.course.reach + magnitude(there.x) + magnitude(there.y)
+    pace = magnitude(gx * there.vx + gy * there.vy)
     return s, 8.0 * _EPS * far * (magnitude(gx) + magnitude(gy)) / pace if pace > 0.0 else math.inf
 
 

@@ -9,6 +9,7 @@ of a workpiece that the tool leaves: this is said by the error. Derived here.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths.elementary import in_unit
 from kernels.wear import _contact, _scene, _tool
-from kernels.wear._tool import arctan2, sincos
+from kernels.wear._tool import Circle, Tool, arctan2, sincos
 
 PANEL_LIMIT = 1024
 LOW, HIGH, DOUBT, SLOPE, FIRST = range(5)
@@ -32,34 +33,70 @@ _SLACK = 1e-6
 _HOPELESS = 1e100
 _TESTS = 2
 _SHARE = 0.02  # of rtol, for the areas
-_NO_MATTER = 5, 11, 16, 17, 18
-"""Parameters on which no area hangs: rates, preston and how hard the tool is pressed; and all from 20 on."""
 _TURN = 2.0 * math.pi
 _COSINES = np.cos(np.pi * np.outer(np.arange(NODES + _TESTS), np.arange(NODES) + 0.5) / NODES)
 _TRIED = 0.83, -0.41
 
 
+class Areas(NamedTuple):
+    """Of contact, for a load: the table and its panels, and the least and largest area; no panels for a pressure."""
+
+    table: np.ndarray
+    panels: int
+    lowest: float
+    largest: float
+
+
+class Memory(NamedTuple):
+    """Space for a table, for the rest of its `Areas`, and for building it."""
+
+    table: np.ndarray
+    rest: np.ndarray
+    stops: np.ndarray
+    values: np.ndarray
+    room: _contact.Room
+
+
+class Footing(NamedTuple):
+    """Parameters on which areas hang."""
+
+    b: float
+    d: float
+    f: float
+    e: float
+    type: float
+    b_angle: float
+    L: float
+    beta: float
+    w_x: float
+    w_y: float
+    shape: tuple[float, float, float, float]
+    workpiece_radius: float
+
+
+class Overhang(NamedTuple):
+    """The tool and its area, L, w and the workpiece's radius."""
+
+    tool: Tool
+    whole: float
+    reach: float
+    w: float
+    radius: float
+
+
 @jit_call
-def room():
-    """Memory for a table, and for building it."""
-    return (
-        np.empty(TABLE), np.empty(_tool.ARC_LIMIT), np.empty(NODES + _TESTS), np.empty(_tool.ARC_LIMIT),
-        np.empty(_contact.POINTS), np.empty(_tool.STACK),
-    )  # fmt: skip
-
-
-@jit
-def unloaded(table):
-    """What stands for a load where the pressure is given: no panels, and the least and largest area."""
-    return table, int(0.0), 1.0, 1.0
+def memory():
+    """A `Memory`."""
+    stops, values = np.empty(_tool.ARC_LIMIT), np.empty(NODES + _TESTS)
+    return Memory(np.empty(TABLE), np.empty(3), stops, values, _contact.room())
 
 
 @jit_call
-def _area_at(phi, scene, spots):
+def _area_at(phi, scene, room):
     """Area of contact with the arm at phi from the direction of w, and what it may be wrong by."""
-    tool, whole, reach, w, radius = scene
     s, c = sincos(phi)
-    return _contact.contact_area(tool, whole, (w * c - reach, -w * s, radius), spots)
+    disc = Circle(scene.w * c - scene.reach, -scene.w * s, scene.radius)
+    return _contact.contact_area(scene.tool, scene.whole, disc, room)
 
 
 @jit
@@ -72,14 +109,14 @@ def _folded(phi):
 @jit_call
 def _stops(scene, stops):
     """Angles between which the table's panels are opened: an even grid, and where the rim passes vertices; how many."""
-    (a, b, _, _, half_x, half_y), _, reach, w, radius = scene
-    count = int(0.0)
+    tool, _, reach, w, radius = scene
+    a, b, near, high = tool.a, tool.b, tool.a * tool.half_x, tool.b * tool.half_y
+    count = np.int64(0)
     for k in range(_STARTS + 1):
         stops[count] = math.pi * k / _STARTS
         count += 1
-    for k in range(5):
-        x = (a, -a, 0.0, a * half_x, -a * half_x)[k] + reach
-        y = (0.0, 0.0, b, b * half_y, b * half_y)[k]
+    for x, y in ((a, 0.0), (-a, 0.0), (0.0, b), (near, high), (-near, high)):
+        x = x + reach
         rho = sqrt(x * x + y * y)
         cosine, unit = w * w + rho * rho - radius * radius, 2.0 * w * rho
         if magnitude(cosine) < unit:
@@ -93,13 +130,12 @@ def _stops(scene, stops):
 @jit_call
 def _passes(arm, turn, low, high):
     """Whether the arm comes to an angle phi between low and high, on either side."""
-    if arm[3]:
+    if arm.whirls:
         return True
-    least, most = arm[2]
     for k in range(-2, 3):
         shift = turn + k * _TURN
-        ahead = shift + low - _SLACK <= most and shift + high + _SLACK >= least
-        if ahead or (shift - high - _SLACK <= most and shift - low + _SLACK >= least):
+        ahead = shift + low - _SLACK <= arm.most and shift + high + _SLACK >= arm.least
+        if ahead or (shift - high - _SLACK <= arm.most and shift - low + _SLACK >= arm.least):
             return True
     return False
 
@@ -114,7 +150,7 @@ def _polynomial(row, t):
 
 
 @jit_call
-def _fit(row, low, high, scene, values, spots):
+def _fit(row, low, high, scene, values, room):
     """Fills a panel; its least and largest area, and the least noise of its values.
 
     The error is four times the last three coefficients, and not less than what is seen at two angles more.
@@ -123,7 +159,7 @@ def _fit(row, low, high, scene, values, spots):
     least, most, noise, calm = math.inf, 0.0, 0.0, math.inf
     for j in range(NODES + _TESTS):
         t = _COSINES[1, j] if j < NODES else _TRIED[j - NODES]
-        values[j], doubt = _area_at(middle + half * t, scene, spots)
+        values[j], doubt = _area_at(middle + half * t, scene, room)
         least, most = min(least, values[j]), max(most, values[j])
         noise, calm = max(noise, doubt), min(calm, doubt)
     slope, last = 0.0, 0.0
@@ -143,23 +179,19 @@ def _fit(row, low, high, scene, values, spots):
 
 @jit_call
 def table_of(arm, tool, ride, radius, tolerance, memory):
-    """The areas of contact of a machine: table, its panels, and the least and largest area that its tool may have.
-
-    radius : of the workpiece; tolerance : of the area, relative, wanted
-    """
-    table, stops, values, found, points, stack = memory
-    _, _, reach, w, c, s = ride
+    """The `Areas` of a machine whose workpiece has that radius, to a relative tolerance."""
+    table, stops = memory.table, memory.stops
     whole = _contact.whole_area(tool)
-    radius = min(radius, 4.0 * (reach + w + tool[0] + tool[1]))
-    scene, turn = (tool, whole, reach, w, radius), arctan2(s, c)
+    radius = min(radius, 4.0 * (ride.reach + ride.w + tool.a + tool.b))
+    scene, turn = Overhang(tool, whole, ride.reach, ride.w, radius), arctan2(ride.turn_s, ride.turn_c)
     largest, lowest = min(whole, math.pi * radius * radius), math.inf
-    todo, count, low = _stops(scene, stops), int(0.0), 0.0
+    todo, count, low = _stops(scene, stops), np.int64(0), 0.0
     for k in range(todo // 2):
         stops[k], stops[todo - 1 - k] = stops[todo - 1 - k], stops[k]
     while todo > 0:
         high = stops[todo - 1]
         if high - low > _EPS and _passes(arm, turn, low, high):
-            least, most, calm = _fit(table[count], low, high, scene, values, (found, points, stack))
+            least, most, calm = _fit(table[count], low, high, scene, memory.values, memory.room)
             fine = table[count, DOUBT] <= max(tolerance * least, 32.0 * calm) or most <= FAINT * largest
             if not (fine or high - low <= _NARROW) and count + todo + 1 < PANEL_LIMIT and todo < stops.size:
                 stops[todo] = 0.5 * (low + high)
@@ -169,38 +201,51 @@ def table_of(arm, tool, ride, radius, tolerance, memory):
             count += 1
         low = high
         todo -= 1
-    return table, count, lowest, largest
+    return Areas(table, count, lowest, largest)
 
 
 @jit_call
-def areas(p, rtol, memory):
-    """The areas of contact of a cell with these parameters, in its unit of length; `unloaded` where none are needed."""
-    arm, _, _, verdict = _scene.arm_without_units(p[0], p[1], p[2], p[3])
-    tool, ride, unit, _, fine = _scene.work_without_units(p)
-    if not (p[18] > 0.0 and fine and _scene.turns_fully(verdict)):
-        return unloaded(memory[0])
-    return table_of(arm, tool, ride, in_unit(p[19], unit), max(_SHARE * rtol, 4.0 * _EPS), memory)
+def _areas(p, rtol, memory):
+    """The areas of contact of a cell with these parameters, in its unit of length; none where none are needed."""
+    setup = _scene.without_units(p)
+    if not (p.load > 0.0 and _scene.turns_fully(setup.verdict)):
+        return Areas(memory.table, np.int64(0), 1.0, 1.0)
+    radius, tolerance = in_unit(p.workpiece_radius, setup.unit), max(_SHARE * rtol, 4.0 * _EPS)
+    return table_of(setup.arm, setup.tool, setup.ride, radius, tolerance, memory)
 
 
-@jit_call
-def shared(p, rtol, q, rtol_q):
+@jit
+def _footing(p):
+    shape = p.tool_a, p.tool_b, p.tool_n, p.tool_m
+    return Footing(p.b, p.d, p.f, p.e, p.type, p.b_angle, p.L, p.beta, p.w_x, p.w_y, shape, p.workpiece_radius)
+
+
+@jit
+def _alike(p, rtol, q, rtol_q):
     """Whether two cells have the same areas of contact, to the same tolerance."""
-    for k in range(20):
-        if p[k] != q[k] and k not in _NO_MATTER:
-            return False
-    return rtol == rtol_q and (p[18] > 0.0) == (q[18] > 0.0)
+    return rtol == rtol_q and (p.load > 0.0) == (q.load > 0.0) and _footing(p) == _footing(q)
 
 
 @jit_call
-def weight(loaded, c, s):
+def areas_of(p, rtol, first, before, rtol_before, memory):
+    """The areas of contact of a cell; those that `memory` has, unless it is the first or unlike the cell before."""
+    rest = memory.rest
+    if first or not _alike(p, rtol, before, rtol_before):
+        areas = _areas(p, rtol, memory)
+        rest[0], rest[1], rest[2] = areas.panels, areas.lowest, areas.largest
+    return Areas(memory.table, np.int64(rest[0]), rest[1], rest[2])
+
+
+@jit_call
+def weight(areas, c, s):
     """1/A at the angle (cos phi, sin phi) = (c, s), what it may be wrong by, and a bound on its slope, both relative.
 
     1 where the pressure is given.
     """
-    table, count, _, largest = loaded
-    if count == 0:
+    table, faintest = areas.table, FAINT * areas.largest
+    if areas.panels == 0:
         return 1.0, 0.0, 0.0
-    phi, low, high = arctan2(magnitude(s), c), 0, count
+    phi, low, high = arctan2(magnitude(s), c), 0, areas.panels
     while high - low > 1:
         k = (low + high) // 2
         if table[k, LOW] <= phi:
@@ -210,13 +255,12 @@ def weight(loaded, c, s):
     row = table[low]
     start, end = row[LOW], row[HIGH]
     area = _polynomial(row, ((phi - start) - (end - phi)) / (end - start))
-    if not (area > 2.0 * row[DOUBT] and area > FAINT * largest):
-        return 1.0 / (FAINT * largest), _HOPELESS, 0.0
+    if not (area > 2.0 * row[DOUBT] and area > faintest):
+        return 1.0 / faintest, _HOPELESS, 0.0
     return 1.0 / area, row[DOUBT] / area * 2.0, 2.0 * row[SLOPE] / area
 
 
 @jit
-def leaves(loaded):
+def leaves(areas):
     """Whether the tool may leave the workpiece wholly."""
-    _, count, lowest, largest = loaded
-    return count > 0 and not lowest > FAINT * largest
+    return areas.panels > 0 and not areas.lowest > FAINT * areas.largest

@@ -1,19 +1,17 @@
-"""What the kernels of wear share: their parameters, the check of them, and the scene without units."""
+"""What the kernels of wear share: their parameters, the check of them, and the machine without units."""
 
 import math
+from typing import NamedTuple
 
-import numpy as np
-
-from kernels.interface import Field
+from kernels.interface import FIRST_REFUSAL, Field
 from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import magnitude, sqrt
+from kernels.lanes.vectors import isnt, magnitude, sqrt
 from kernels.maths.elementary import in_unit, mantissa_exponent, scale
 from kernels.polisher import extremes, linkage
-from kernels.polisher.linkage import EXAMPLE as LINKS
-from kernels.polisher.linkage import PARAMETERS as LINK_PARAMETERS
 from kernels.wear import _dwell, _tool
-from kernels.wear._tool import sincos
+from kernels.wear._dwell import Arm
+from kernels.wear._tool import Tool, sincos
 
 ANGLE_LIMIT = 1e6
 """Angles beyond which no digits are left of their sines."""
@@ -21,37 +19,87 @@ EXPONENT_LIMITS = 0.5, 100.0
 _SPAN = 2.0**-100  # of a length of the work over the longest of them
 
 
+class Machine(NamedTuple):
+    """Parameters."""
+
+    b: float
+    d: float
+    f: float
+    e: float
+    type: float
+    omega: float
+    b_angle: float
+    L: float
+    beta: float
+    w_x: float
+    w_y: float
+    Omega: float
+    tool_a: float
+    tool_b: float
+    tool_n: float
+    tool_m: float
+    preston: float
+    pressure: float
+    load: float
+    workpiece_radius: float
+
+
+class Ride(NamedTuple):
+    """Rates of the crank and of the work, L, w, cosine and sine of the direction of w from b + beta."""
+
+    speed: float
+    spin: float
+    reach: float
+    w: float
+    turn_c: float
+    turn_s: float
+
+
+class Setup(NamedTuple):
+    """A machine without units: lengths of the work are over 2^unit, rates over 2^pace; and the verdict on it."""
+
+    arm: Arm
+    tool: Tool
+    ride: Ride
+    unit: float
+    pace: float
+    verdict: float
+
+
 @jit
-def allowed(b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston):
+def _positive(x):
+    return (x > 0.0) & (x < math.inf)
+
+
+@jit
+def _no_less_than_0(x):
+    return (x >= 0.0) & (x < math.inf)
+
+
+@jit
+def _within(x, low, high):
+    return (x >= low) & (x <= high)
+
+
+@jit
+def allowed(p):
     """Whether the parameters are numbers within their limits; NaN fails."""
-    links = b > 0.0 and d > 0.0 and f > 0.0 and e >= 0.0 and max(max(b, d), max(f, e)) < math.inf
-    kind = type == 0.0 or type == 1.0
-    turns = magnitude(omega) < math.inf and magnitude(Omega) < math.inf and preston > 0.0 and preston < math.inf
-    angles = magnitude(b_angle) <= ANGLE_LIMIT and magnitude(beta) <= ANGLE_LIMIT
-    work = 0.0 <= L < math.inf and magnitude(w_x) < math.inf and magnitude(w_y) < math.inf
-    size = tool_a > 0.0 and tool_a < math.inf and tool_b > 0.0 and tool_b < math.inf
+    turns = (magnitude(p.omega) < math.inf) & (magnitude(p.Omega) < math.inf) & _positive(p.preston)
+    angles = (magnitude(p.b_angle) <= ANGLE_LIMIT) & (magnitude(p.beta) <= ANGLE_LIMIT)
+    work = _no_less_than_0(p.L) & (magnitude(p.w_x) < math.inf) & (magnitude(p.w_y) < math.inf)
+    size = _positive(p.tool_a) & _positive(p.tool_b)
     low, high = EXPONENT_LIMITS
-    shape = tool_n >= low and tool_n <= high and tool_m >= low and tool_m <= high
-    return links and kind and turns and angles and work and size and shape
+    shape = _within(p.tool_n, low, high) & _within(p.tool_m, low, high)
+    return linkage.allowed(p) & turns & angles & work & size & shape & _pressed(p)
 
 
-@jit_call
-def arm_without_units(b, d, f, e):
-    """The arm of `_dwell`, its lengths and margins, and the verdict on the linkage: OK, a remark or a refusal."""
-    lengths, _, fine = linkage.in_units(linkage.Lengths(b, d, f, e))
-    margin = linkage.margins(lengths)
-    verdict = extremes.verdict(lengths, margin)
-    return _dwell.arm_of(lengths, margin), lengths, margin, verdict if fine else OUT_OF_RANGE
-
-
-@jit_call
-def side_by_side(columns):
-    """The parameters of each cell in a row."""
-    rows = np.empty((columns[0].size, len(columns)))
-    for i in range(rows.shape[0]):
-        for k in range(rows.shape[1]):
-            rows[i, k] = columns[k][i]
-    return rows
+@jit
+def _pressed(p):
+    """Whether just one of pressure and load is given, and with a load the workpiece's radius; NaN fails."""
+    numbers = _no_less_than_0(p.pressure) & _no_less_than_0(p.load) & _no_less_than_0(p.workpiece_radius)
+    hard, loaded = p.pressure > 0.0, p.load > 0.0
+    one = (hard & isnt(loaded)) | (loaded & isnt(hard))
+    return numbers & one & (isnt(loaded) | (p.workpiece_radius > 0.0))
 
 
 @jit
@@ -74,39 +122,46 @@ def _unit_of(x):
 
 
 @jit_call
-def work_without_units(p):
-    """The tool, the ride (rates of crank and work, L, w, direction of w), both units, and whether all is in range.
+def _arm(p):
+    """The arm, and the verdict on the linkage: OK, a remark or a refusal."""
+    lengths, _, fine = linkage.in_units(p)
+    margin = linkage.margins(lengths)
+    verdict = extremes.verdict(lengths, margin)
+    return _dwell.arm_of(lengths, margin), verdict if fine else OUT_OF_RANGE
 
-    p: the parameters of a cell. Angles of type B are mirrored at the frame. Lengths are over 2^(first unit), rates over
-    2^(second unit).
-    """
-    omega, b_angle, L, beta = p[5], p[6], p[7], p[8]
-    w_x, w_y, Omega, tool_a, tool_b = p[9], p[10], p[11], p[12], p[13]
-    unit = _unit_of(max(max(L, max(tool_a, tool_b)), max(magnitude(w_x), magnitude(w_y))))
-    x, y, reach = signed_in_unit(w_x, unit), signed_in_unit(w_y, unit), in_unit(L, unit)
-    a, b = in_unit(tool_a, unit), in_unit(tool_b, unit)
+
+@jit_call
+def _ride(p, unit, pace):
+    """The `Ride`. Angles of type B are mirrored at the frame."""
+    x, y = signed_in_unit(p.w_x, unit), signed_in_unit(p.w_y, unit)
     w = max(magnitude(x), magnitude(y))
     if w > 0.0 and min(magnitude(x), magnitude(y)) > 0.0:
         w = sqrt(x * x + y * y)
-    fine = a >= _SPAN and b >= _SPAN and (w == 0.0 or w >= _SPAN) and (reach == 0.0 or reach >= _SPAN)
-    fine = fine and (p[19] == 0.0 or in_unit(p[19], unit) >= _SPAN)
-    s_b, c_b = sincos(b_angle)
-    s, c = sincos(beta)
+    s_b, c_b = sincos(p.b_angle)
+    s, c = sincos(p.beta)
     c, s = c * c_b - s * s_b, s * c_b + c * s_b
     cosine, sine = (x * c + y * s) / w if w > 0.0 else 1.0, (y * c - x * s) / w if w > 0.0 else 0.0
-    pace = _unit_of(max(magnitude(omega), magnitude(Omega)))
-    ride = (
-        signed_in_unit(omega, pace), signed_in_unit(Omega, pace), reach, w,
-        cosine, -sine if p[4] == 1.0 else sine,
-    )  # fmt: skip
-    return _tool.tool_of(a, b, p[14], p[15]), ride, unit, pace, fine
+    speed, spin = signed_in_unit(p.omega, pace), signed_in_unit(p.Omega, pace)
+    return Ride(speed, spin, in_unit(p.L, unit), w, cosine, -sine if p.type == 1.0 else sine)
 
 
 @jit
-def pressed(pressure, load, workpiece_radius):
-    """Whether just one of pressure and load is given, and with a load the workpiece's radius; NaN fails."""
-    numbers = 0.0 <= pressure < math.inf and 0.0 <= load < math.inf and 0.0 <= workpiece_radius < math.inf
-    return numbers and (pressure > 0.0) != (load > 0.0) and (load == 0.0 or workpiece_radius > 0.0)
+def _none_or_seen(x):
+    """Whether a length is 0, or not too small beside the longest."""
+    return x == 0.0 or x >= _SPAN
+
+
+@jit_call
+def without_units(p):
+    """The `Setup` of a machine."""
+    arm, verdict = _arm(p)
+    unit = _unit_of(max(max(p.L, max(p.tool_a, p.tool_b)), max(magnitude(p.w_x), magnitude(p.w_y))))
+    pace = _unit_of(max(magnitude(p.omega), magnitude(p.Omega)))
+    a, b, ride = in_unit(p.tool_a, unit), in_unit(p.tool_b, unit), _ride(p, unit, pace)
+    fine = a >= _SPAN and b >= _SPAN and _none_or_seen(ride.w) and _none_or_seen(ride.reach)
+    fine = fine and (p.workpiece_radius == 0.0 or in_unit(p.workpiece_radius, unit) >= _SPAN)
+    verdict = verdict if fine or verdict >= FIRST_REFUSAL else OUT_OF_RANGE
+    return Setup(arm, _tool.tool_of(a, b, p.tool_n, p.tool_m), ride, unit, pace, verdict)
 
 
 @jit_call
@@ -118,37 +173,57 @@ def with_units(value, preston, pressure, units):
     return scale(m * m_p * m_v, e + e_p + e_v + units) if value > 0.0 else value
 
 
+ANGLE = {"default": 0.0, "lower": -ANGLE_LIMIT, "upper": ANGLE_LIMIT}
+_EXPONENT = {"lower": EXPONENT_LIMITS[0], "upper": EXPONENT_LIMITS[1]}
+
 PARAMETERS = (
-    *LINK_PARAMETERS,
+    *linkage.PARAMETERS,
     Field("omega", "rad/s", "angular rate of the crank"),
-    Field("b_angle", "rad", "direction of b, from the arm's pivot to the motor's shaft", default=0.0,
-          lower=-ANGLE_LIMIT, upper=ANGLE_LIMIT),
+    Field("b_angle", "rad", "direction of b, from the arm's pivot to the motor's shaft", **ANGLE),
     Field("L", "m", "distance of the tool's centre from the arm's pivot", lower=0.0),
-    Field("beta", "rad", "direction of the tool's centre, seen from the pivot, from d on", default=0.0,
-          lower=-ANGLE_LIMIT, upper=ANGLE_LIMIT),
+    Field("beta", "rad", "direction of the tool's centre, seen from the pivot, from d on", **ANGLE),
     Field("w_x", "m", "centre of the work, from the arm's pivot"),
     Field("w_y", "m", "centre of the work, from the arm's pivot", default=0.0),
     Field("Omega", "rad/s", "angular rate of the work"),
     Field("tool_a", "m", "half width of the tool along the arm", lower=0.0, open_lower=True),
     Field("tool_b", "m", "half width of the tool across the arm", default="tool_a", lower=0.0, open_lower=True),
-    Field("tool_n", "1", "exponent of abs(X/a), along the arm; 2: ellipse, 1: rhombus, 100: square", default=2.0,
-          lower=EXPONENT_LIMITS[0], upper=EXPONENT_LIMITS[1]),
-    Field("tool_m", "1", "exponent of abs(Y/b), across the arm", default="tool_n",
-          lower=EXPONENT_LIMITS[0], upper=EXPONENT_LIMITS[1]),
+    Field("tool_n", "1", "exponent of abs(X/a), along the arm; 2: ellipse, 1: rhombus, 100: square", 2.0, **_EXPONENT),
+    Field("tool_m", "1", "exponent of abs(Y/b), across the arm", "tool_n", **_EXPONENT),
     Field("preston", "1/Pa", "wear per way and pressure", lower=0.0, open_lower=True),
-)  # fmt: skip
+    Field(
+        "pressure",
+        "Pa",
+        "pressure under the tool, if constant; or else load and workpiece_radius",
+        default=0.0,
+        lower=0.0,
+        open_lower=True,
+    ),
+    Field(
+        "load", "N", "force on the tool, if constant: pressure is load over the area of contact", default=0.0, lower=0.0
+    ),
+    Field(
+        "workpiece_radius",
+        "m",
+        "radius of the workpiece, beyond which nothing wears; needed with load; 0: no rim",
+        default=0.0,
+        lower=0.0,
+    ),
+)
 
-PRESS = (
-    Field("pressure", "Pa", "pressure under the tool, if constant; or else load and workpiece_radius", default=0.0,
-          lower=0.0, open_lower=True),
-    Field("load", "N", "force on the tool, if constant: pressure is load over the area of contact", default=0.0,
-          lower=0.0),
-    Field("workpiece_radius", "m", "radius of the workpiece, beyond which nothing wears; needed with load; 0: no rim",
-          default=0.0, lower=0.0),
-)  # fmt: skip
-
-EXAMPLE = LINKS | {
-    "omega": 2.0, "b_angle": -0.66, "L": 0.5, "beta": 0.0, "w_x": 0.5, "w_y": 0.0, "Omega": 0.8,
-    "tool_a": 0.06, "tool_b": 0.06, "tool_n": 2.0, "tool_m": 2.0,
-    "preston": 1e-13, "pressure": 7000.0, "load": 0.0, "workpiece_radius": 0.0,
-}  # fmt: skip
+EXAMPLE = linkage.EXAMPLE | {
+    "omega": 2.0,
+    "b_angle": -0.66,
+    "L": 0.5,
+    "beta": 0.0,
+    "w_x": 0.5,
+    "w_y": 0.0,
+    "Omega": 0.8,
+    "tool_a": 0.06,
+    "tool_b": 0.06,
+    "tool_n": 2.0,
+    "tool_m": 2.0,
+    "preston": 1e-13,
+    "pressure": 7000.0,
+    "load": 0.0,
+    "workpiece_radius": 0.0,
+}

@@ -11,6 +11,9 @@ slope are monotone, hence so are bounds on the distance from a point and on its 
 """
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude
@@ -33,6 +36,57 @@ _NEAR = 1e-3
 _ASIDE = 0.38
 """Where on an arc it is tried for contact: not amid it, where a circle about the pivot may touch a vertex."""
 STACK = (_DEPTH, 6)
+"""Shape of a stack of `End`s."""
+
+
+class Tool(NamedTuple):
+    """Half widths, exponents, and 2^(-1/n), 2^(-1/m)."""
+
+    a: float
+    b: float
+    n: float
+    m: float
+    half_x: float
+    half_y: float
+
+
+class Circle(NamedTuple):
+    """Its centre in the frame of the tool, and its radius."""
+
+    x: float
+    y: float
+    radius: float
+
+
+class Along(NamedTuple):
+    """(1) and what makes its slope: small, 1 - large, d small/dx, and two monotone factors of -d large/d small."""
+
+    small: float
+    missing: float
+    growth: float
+    steep: float
+    bent: float
+
+
+class Spot(NamedTuple):
+    """X, Y, dX/dx and dY/dx of an outline, and how far the larger of X and Y is below its vertex."""
+
+    x: float
+    y: float
+    dx: float
+    dy: float
+    missing: float
+
+
+class End(NamedTuple):
+    """Of an interval: x, X and Y from a circle's centre, two factors of the slope, squared distance less radius^2."""
+
+    x: float
+    u: float
+    v: float
+    steep: float
+    bent: float
+    excess: float
 
 
 @jit_call
@@ -49,13 +103,13 @@ def sincos(x):
 
 @jit_call
 def tool_of(a, b, n, m):
-    """The tool: half widths, exponents, and 2^(-1/n), 2^(-1/m)."""
-    return a, b, n, m, power(0.5, 1.0 / n), power(0.5, 1.0 / m)
+    """The `Tool`."""
+    return Tool(a, b, n, m, power(0.5, 1.0 / n), power(0.5, 1.0 / m))
 
 
 @jit_call
 def _along(x, k, j, middle):
-    """(1) and what makes its slope: small, 1 - large, d small/dx, and two monotone factors of -d large/d small."""
+    """`Along` of exponents k and j, `middle` being the largest `small`."""
     if k >= 1.0:
         raised = power(x, k - 1.0)
         share, steep = 0.5 * raised * x, 0.5 * k * raised / middle
@@ -66,19 +120,19 @@ def _along(x, k, j, middle):
         growth = middle / k * stretched
         steep = 0.5 / growth if growth > 0.0 else math.inf
     missing = -expm1(log1p(-share) / j)
-    return small, missing, growth, steep, (1.0 - missing) / (j * (1.0 - share))
+    return Along(small, missing, growth, steep, (1.0 - missing) / (j * (1.0 - share)))
 
 
 @jit_call
 def outline(piece, x, tool):
-    """X, Y, dX/dx and dY/dx of a piece, and how far the larger of X and Y is below its vertex."""
+    """The `Spot` at x of a piece."""
     a, b, n, m, half_x, half_y = tool
-    side = 1.0 if piece < 1.5 else -1.0
+    side = side_of(piece)
     if on_x_axis(piece):
         small, missing, growth, steep, bent = _along(x, m, n, half_y)
-        return side * (a - a * missing), b * small, -side * a * growth * steep * bent, b * growth, a * missing
+        return Spot(side * (a - a * missing), b * small, -side * a * growth * steep * bent, b * growth, a * missing)
     small, missing, growth, steep, bent = _along(x, n, m, half_x)
-    return side * a * small, b - b * missing, side * a * growth, -b * growth * steep * bent, b * missing
+    return Spot(side * a * small, b - b * missing, side * a * growth, -b * growth * steep * bent, b * missing)
 
 
 @jit
@@ -99,31 +153,37 @@ def sense(piece):
     return 1.0 if piece == 0.0 or piece == 3.0 else -1.0
 
 
+@jit
+def mirrored(circle, mirror):
+    """The circle as the half Y >= 0 of the outline sees it, for mirror = 1, or the half Y <= 0, for -1."""
+    return Circle(circle.x, mirror * circle.y, circle.radius)
+
+
 @jit_call
-def vertex_excess(piece, tool, cx, cy, radius):
-    """Squared distance from (cx, cy) of the vertex where a piece begins, less radius^2."""
-    u, v = -cx, -cy
+def vertex_excess(piece, tool, circle):
+    """Squared distance of the vertex where a piece begins from the circle's centre, less radius^2."""
+    u, v = -circle.x, -circle.y
     if on_x_axis(piece):
-        u += side_of(piece) * tool[0]
+        u += side_of(piece) * tool.a
     else:
-        v += tool[1]
-    return (magnitude(u) - radius) * (magnitude(u) + radius) + v * v
+        v += tool.b
+    return (magnitude(u) - circle.radius) * (magnitude(u) + circle.radius) + v * v
 
 
 @jit_call
-def _end(piece, x, tool, cx, cy, start):
-    """x, X - cx, Y - cy, two factors of the slope, and the squared distance less that of the circle."""
+def _end(piece, x, tool, circle, start):
+    """The `End` at x of a piece; start: `vertex_excess`."""
     a, b, n, m, half_x, half_y = tool
-    side = side_of(piece)
+    cx, cy, side = circle.x, circle.y, side_of(piece)
     if on_x_axis(piece):
         small, missing, _, steep, bent = _along(x, m, n, half_y)
         u, v = side * a - cx, b * small
         excess = start + a * missing * (a * missing - 2.0 * side * u) + v * (v - 2.0 * cy)
-        return x, u - side * a * missing, v - cy, steep, bent, excess
+        return End(x, u - side * a * missing, v - cy, steep, bent, excess)
     small, missing, _, steep, bent = _along(x, n, m, half_x)
     u, v = side * a * small, b - cy
     excess = start + b * missing * (b * missing - 2.0 * v) + u * (u - 2.0 * cx)
-    return x, u - cx, v - b * missing, steep, bent, excess
+    return End(x, u - cx, v - b * missing, steep, bent, excess)
 
 
 @jit
@@ -141,13 +201,13 @@ def _slope_bounds(piece, tool, one, two):
     It is p - s q with the slope s between products of its factors, where p belongs to the small coordinate, and q to
     the large one.
     """
-    a, b = side_of(piece) * tool[0], tool[1]
+    a, b = side_of(piece) * tool.a, tool.b
     if on_x_axis(piece):
-        p1, p2, q1, q2 = b * one[2], b * two[2], a * one[1], a * two[1]
+        p1, p2, q1, q2 = b * one.v, b * two.v, a * one.u, a * two.u
     else:
-        p1, p2, q1, q2 = a * one[1], a * two[1], b * one[2], b * two[2]
-    low = min(one[3], two[3]) * min(one[4], two[4])
-    high = max(one[3], two[3]) * max(one[4], two[4])
+        p1, p2, q1, q2 = a * one.u, a * two.u, b * one.v, b * two.v
+    low = min(one.steep, two.steep) * min(one.bent, two.bent)
+    high = max(one.steep, two.steep) * max(one.bent, two.bent)
     if not high < math.inf:
         return -math.inf, math.inf
     q_low, q_high = min(q1, q2), max(q1, q2)
@@ -157,20 +217,20 @@ def _slope_bounds(piece, tool, one, two):
 
 
 @jit_call
-def _excess(piece, x, tool, cx, cy, start):
+def _excess(piece, x, tool, circle, start):
     """Squared distance from the centre, less that of the circle, and its derivative."""
-    _, u, v, _, _, excess = _end(piece, x, tool, cx, cy, start)
-    _, _, dx, dy, _ = outline(piece, x, tool)
-    return excess, 2.0 * (u * dx + v * dy)
+    end, spot = _end(piece, x, tool, circle, start), outline(piece, x, tool)
+    return end.excess, 2.0 * (end.u * spot.dx + end.v * spot.dy)
 
 
 @jit_call
-def _root(piece, low, high, tool, cx, cy, start):
+def _root(piece, low, high, tool, circle, start):
     """The crossing between low and high, where there is just one: Newton within the bracket."""
-    rising = _excess(piece, high, tool, cx, cy, start)[0] > 0.0
+    beyond, _ = _excess(piece, high, tool, circle, start)
+    rising = beyond > 0.0
     x = 0.5 * (low + high)
     for _ in range(_NEWTON_LIMIT):
-        value, slope = _excess(piece, x, tool, cx, cy, start)
+        value, slope = _excess(piece, x, tool, circle, start)
         if (value > 0.0) == rising:
             high = x
         else:
@@ -187,15 +247,15 @@ def _root(piece, low, high, tool, cx, cy, start):
 
 
 @jit_call
-def crossings(piece, tool, cx, cy, radius, start, found, count, stack):
-    """Puts into `found`, from `count` on, all x of a piece at a distance `radius` of (cx, cy); the new count.
+def crossings(piece, tool, circle, start, found, count, stack):
+    """Puts into `found`, from `count` on, all x of a piece that are on a circle; the new count.
 
     `start` is `vertex_excess`. Where the circle touches or all but touches, an x close by is put. -1: too many, as
     where the two coincide.
     """
-    first, top, square = count, int(1.0), radius * radius
-    left = _end(piece, 0.0, tool, cx, cy, start)
-    _put(stack, top - 1, _end(piece, 1.0, tool, cx, cy, start))
+    first, top, square = count, np.int64(1), circle.radius * circle.radius
+    left = _end(piece, 0.0, tool, circle, start)
+    _put(stack, top - 1, _end(piece, 1.0, tool, circle, start))
     for _ in range(_INTERVAL_LIMIT):
         if top == 0:
             return count
@@ -204,14 +264,14 @@ def crossings(piece, tool, cx, cy, radius, start, found, count, stack):
         if _may_cross(left, right, square):
             low, high = _slope_bounds(piece, tool, left, right)
             if low > 0.0 or high < 0.0:
-                if (left[5] > 0.0) != (right[5] > 0.0):
-                    x = _root(piece, left[0], right[0], tool, cx, cy, start)
-            elif right[0] - left[0] > _NARROW and top < _DEPTH:
-                _put(stack, top, _end(piece, 0.5 * (left[0] + right[0]), tool, cx, cy, start))
+                if (left.excess > 0.0) != (right.excess > 0.0):
+                    x = _root(piece, left.x, right.x, tool, circle, start)
+            elif right.x - left.x > _NARROW and top < _DEPTH:
+                _put(stack, top, _end(piece, 0.5 * (left.x + right.x), tool, circle, start))
                 top += 1
                 continue
             else:
-                x = 0.5 * (left[0] + right[0])
+                x = 0.5 * (left.x + right.x)
         if x >= 0.0:
             if count - first >= CROSSING_LIMIT:
                 return -1
@@ -225,28 +285,29 @@ def crossings(piece, tool, cx, cy, radius, start, found, count, stack):
 @jit
 def _may_cross(left, right, square):
     """Whether a circle of that squared radius has points in the rectangle of two ends."""
-    least = _least_square(left[1], right[1]) + _least_square(left[2], right[2])
-    most = max(left[1] * left[1], right[1] * right[1]) + max(left[2] * left[2], right[2] * right[2])
+    least = _least_square(left.u, right.u) + _least_square(left.v, right.v)
+    most = max(left.u * left.u, right.u * right.u) + max(left.v * left.v, right.v * right.v)
     slack = _ROUNDING * (square + most)
     return least <= square + slack and most >= square - slack
 
 
 @jit
 def _put(stack, k, end):
-    for j in range(6):
-        stack[k, j] = end[j]
+    row = stack[k]
+    row[0], row[1], row[2], row[3], row[4], row[5] = end
 
 
 @jit
 def _top(stack, k):
-    return stack[k, 0], stack[k, 1], stack[k, 2], stack[k, 3], stack[k, 4], stack[k, 5]
+    row = stack[k]
+    return End(row[0], row[1], row[2], row[3], row[4], row[5])
 
 
 @jit_call
 def excess(tool, x, y):
     """abs(X/a)^n + abs(Y/b)^m - 1 of a point of the tool's frame, limited; negative where it is in contact."""
-    u, v = min(magnitude(x) / tool[0], 8.0), min(magnitude(y) / tool[1], 8.0)
-    return power(u, tool[2]) + power(v, tool[3]) - 1.0
+    u, v = min(magnitude(x) / tool.a, 8.0), min(magnitude(y) / tool.b, 8.0)
+    return power(u, tool.n) + power(v, tool.m) - 1.0
 
 
 @jit_call
@@ -273,43 +334,43 @@ def sort(values, count):
 
 
 @jit_call
-def arcs(tool, cx, cy, radius, near, far, angles, found, stack):
+def arcs(tool, circle, near, far, angles, found, stack):
     """Arcs of a circle within the tool: their ends in pairs in `angles`, in [-pi, pi]; how many numbers, -1: too many.
 
     And how much of the circle lies on the outline but for rounding, so that it may be in or out; and the angle, on
     either side, that this is about, NaN if it is about several.
 
-    `near`, `far`: `vertex_excess` of the vertices at X = a and X = -a where it is known better than from cx, else NaN.
+    `near`, `far`: `vertex_excess` of the vertices at X = a and -a where that is known better than so, else NaN.
     """
-    count, first = int(1.0), int(0.0)  # literals would have what they are passed to compiled anew
+    count, first = np.int64(1), np.int64(0)  # literals would have what they are passed to compiled anew
     angles[0] = -math.pi
     for k in range(2 * PIECES):
         piece, mirror = float(k // 2), 1.0 if k % 2 else -1.0
-        start = near if k < 2 else far
+        start, seen = near if k < 2 else far, mirrored(circle, mirror)
         if not on_x_axis(piece) or start != start:
-            start = vertex_excess(piece, tool, cx, mirror * cy, radius)
-        number = crossings(piece, tool, cx, mirror * cy, radius, start, found, first, stack)
+            start = vertex_excess(piece, tool, seen)
+        number = crossings(piece, tool, seen, start, found, first, stack)
         if number < 0:
             return -1, 0.0, math.nan
         for j in range(number):
-            x, y, _, _, _ = outline(piece, found[j], tool)
-            angles[count] = arctan2(mirror * y - cy, x - cx)
+            spot = outline(piece, found[j], tool)
+            angles[count] = arctan2(mirror * spot.y - circle.y, spot.x - circle.x)
             count += 1
     angles[count] = math.pi
     sort(angles, count + 1)
-    return _kept(tool, cx, cy, radius, angles, count)
+    return _kept(tool, circle, angles, count)
 
 
 @jit
-def _kept(tool, cx, cy, radius, angles, count):
+def _kept(tool, circle, angles, count):
     """Keeps those of `count` neighbouring arcs that are within the tool; how many numbers, what is unsure, where."""
     kept, unsure, about = 0, 0.0, -1.0
     for j in range(count):
         low, high = angles[j], angles[j + 1]
         if high > low:
             s, c = sincos(low + _ASIDE * (high - low))
-            beyond = excess(tool, cx + radius * c, cy + radius * s)
-            if magnitude(beyond) < _ROUNDING * (tool[2] + tool[3]) * 16.0:
+            beyond = excess(tool, circle.x + circle.radius * c, circle.y + circle.radius * s)
+            if magnitude(beyond) < _ROUNDING * (tool.n + tool.m) * 16.0:
                 unsure += high - low
                 angle = magnitude(0.5 * (low + high))
                 alone = about < 0.0 or magnitude(about - angle) < _NEAR

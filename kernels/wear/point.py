@@ -10,65 +10,98 @@ LOCK_UP: the crank does not turn fully, so there is no wear (NaN). STEP_LIMIT: t
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method
+from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, INACCURATE, OK, OUT_OF_RANGE, STEP_LIMIT
-from kernels.lanes.columns import entry_of_cells, one_by_one
+from kernels.lanes.columns import cell_by_cell
 from kernels.lanes.jit import jit, jit_call, jit_inline
-from kernels.lanes.vectors import magnitude, sqrt
+from kernels.lanes.records import read, write
+from kernels.lanes.vectors import magnitude, sqrt, where
+from kernels.lanes.wiring import kernel, tracing
 from kernels.maths import quadrature
 from kernels.maths.elementary import in_unit, is_normal, mantissa_exponent, scale
 from kernels.polisher import linkage
 from kernels.wear import _path, _pressure, _scene
-from kernels.wear._path import INSIDE, ONCE, OUTSIDE, STEPS
-from kernels.wear._scene import ANGLE_LIMIT, allowed, pressed
+from kernels.wear._path import INSIDE, ONCE, OUTSIDE, STEPS, Course, Step, position
+from kernels.wear._scene import ANGLE_LIMIT, Machine, allowed, signed_in_unit
 
 _EPS = 2.0**-52
 _TURN = 2.0 * math.pi
 _DEPTH = _path.HALVINGS + 2
 
 
+class Point(NamedTuple):
+    """Parameters beside those of the machine."""
+
+    r0: float
+    theta0: float
+    tau: float
+
+
+class Worn(NamedTuple):
+    """Outputs."""
+
+    wear: float
+    wear_error: float
+
+
+class Clock(NamedTuple):
+    """Time of a step, and what the crank and the work turn by in it, in turns, as pairs."""
+
+    h: float
+    crank: float
+    crank_low: float
+    work: float
+    work_low: float
+
+
+class Room(NamedTuple):
+    """Space for panels of integrals, and for the stack of times."""
+
+    pool: np.ndarray
+    stack: np.ndarray
+
+
 @jit_call
-def _speed(kind, s, scene):
+def _speed(kind, s, step):
     """Speed at a time s of a step, over the area of contact where the load is constant, and its rounding."""
-    path, cranked, turned, loaded = scene
-    _, _, vx, vy = _path.position(path, cranked, turned, s)
-    v = sqrt(vx * vx + vy * vy)
-    if loaded[1] == 0:
+    there = position(step, s)
+    v = sqrt(there.vx * there.vx + there.vy * there.vy)
+    if step.areas.panels == 0:
         return v, 4.0 * _EPS * v
-    cosine, sine = _path.facing(path, cranked, s)
-    weight, doubt, slope = _pressure.weight(loaded, cosine, sine)
+    cosine, sine = _path.facing(step, s)
+    weight, doubt, slope = _pressure.weight(step.areas, cosine, sine)
     return weight * v, weight * v * (4.0 * _EPS + doubt + 8.0 * _EPS * slope)
 
 
 @jit_call
-def _polished(scene, low, high, tolerance, pool):
+def _polished(step, low, high, tolerance, pool):
     """The way of polishing between two times within the tool, and its error; to `tolerance` times the way."""
     if not high > low:
         return 0.0, 0.0
-    count = int(0.0)
+    count = np.int64(0)
     quadrature.open_panel(pool, count, 0.0, low, high - low)
-    return quadrature.adapt(_speed, scene, pool, count + 1, tolerance)
+    return quadrature.adapt(_speed, step, pool, count + 1, tolerance)
 
 
 @jit_call
-def _step(scene, h, curve, rtol, stack, pool):
+def _way_in_step(step, h, curve, rtol, room):
     """The way of polishing in one step of time h, and its error."""
-    path, cranked, turned, _ = scene
-    tool = path[3]
-    total, error, low, top = 0.0, 0.0, 0.0, int(1.0)
-    one = _path.position(path, cranked, turned, 0.0)
+    pool, stack = room
+    tool = step.course.tool
+    total, error, low, top = 0.0, 0.0, 0.0, np.int64(1)
+    one = position(step, 0.0)
     stack[0] = h
     least = h * 0.5**_path.HALVINGS
     entered, inside = 0.0, False
     while top > 0:
         high = stack[top - 1]
-        two = _path.position(path, cranked, turned, high)
+        two = position(step, high)
         verdict = _path.judged(tool, one, two, high - low, curve)
-        before = _path.excess(tool, one[0], one[1]) < 0.0
-        after = _path.excess(tool, two[0], two[1]) < 0.0
+        before, after = _path.within(step, one), _path.within(step, two)
         tiny = high - low <= least
         if not (verdict in (INSIDE, OUTSIDE, ONCE) or tiny):
             stack[top] = 0.5 * (low + high)
@@ -76,35 +109,35 @@ def _step(scene, h, curve, rtol, stack, pool):
             continue
         now = before if verdict == ONCE else verdict == INSIDE or (tiny and after)
         if tiny:
-            error += (high - low) * _speed(0.0, high, scene)[0]
+            error += (high - low) * _speed(0.0, high, step)[0]
         if now and not inside:
             entered = low
         if inside and not now:
-            way, doubt = _polished(scene, entered, low, rtol, pool)
+            way, doubt = _polished(step, entered, low, rtol, pool)
             total, error = total + way, error + doubt
         inside = now
         if verdict == ONCE and before != after:
-            s, blur = _path.crossing(path, cranked, turned, low, high)
-            error += min(blur, high - low) * _speed(0.0, high, scene)[0]
+            s, blur = _path.crossing(step, low, high)
+            error += min(blur, high - low) * _speed(0.0, high, step)[0]
             if after:
                 entered = s
             else:
-                way, doubt = _polished(scene, entered, s, rtol, pool)
+                way, doubt = _polished(step, entered, s, rtol, pool)
                 total, error = total + way, error + doubt
             inside = after
         low, one = high, two
         top -= 1
     if inside:
-        way, doubt = _polished(scene, entered, h, rtol, pool)
+        way, doubt = _polished(step, entered, h, rtol, pool)
         total, error = total + way, error + doubt
     return total, error
 
 
 @jit
 def _clock(speed, spin):
-    """Time of a step, and what the crank and the work turn by in it, in turns, the latter as a pair."""
+    """The `Clock`."""
     if speed == 0.0:
-        return _TURN / (STEPS * magnitude(spin)), 0.0, 0.0, (1.0 if spin > 0.0 else -1.0) / STEPS, 0.0
+        return Clock(_TURN / (STEPS * magnitude(spin)), 0.0, 0.0, (1.0 if spin > 0.0 else -1.0) / STEPS, 0.0)
     ratio = spin / speed
     steps = STEPS * math.ceil(max(1.0, min(magnitude(ratio), 1e9)))
     low = linkage.fma(-ratio, speed, spin) / speed
@@ -113,118 +146,94 @@ def _clock(speed, spin):
     rest = linkage.fma(-share, steps, sign * ratio) / steps
     turn = sign / steps
     turn_rest = linkage.fma(-turn, steps, sign) / steps
-    return _TURN / (steps * magnitude(speed)), turn, turn_rest, share, rest + sign * low / steps
+    return Clock(_TURN / (steps * magnitude(speed)), turn, turn_rest, share, rest + sign * low / steps)
 
 
 @jit_call
-def way(path, loaded, theta0, tau, rtol, work):
+def way(course, areas, theta0, tau, rtol, room):
     """The way of polishing over the time tau, its error, and whether there were few enough steps."""
-    pool, stack = work
-    speed, spin = path[1][0], path[1][1]
-    if speed == 0.0 and spin == 0.0:
+    if course.speed == 0.0 and course.spin == 0.0:
         return 0.0, 0.0, True
-    h, cranked, cranked_low, turned, turned_low = _clock(speed, spin)
-    steps = tau / h
+    clock = _clock(course.speed, course.spin)
+    steps = tau / clock.h
     if not steps < _path.STEP_LIMIT:
         return 0.0, 0.0, False
-    curve = _path.bend(path)
+    curve = _path.bend(course)
     total, error = 0.0, 0.0
     for j in range(int(steps) + 1):
-        rest = h * (steps - j)
-        scene = (
-            path, _path.phase(j, cranked, cranked_low), theta0 + _path.phase(j, turned, turned_low), loaded,
-        )  # fmt: skip
+        rest = clock.h * (steps - j)
         if rest > 0.0:
-            more, doubt = _step(scene, min(h, rest), curve, rtol, stack, pool)
+            turned = theta0 + _path.phase(j, clock.work, clock.work_low)
+            step = Step(course, _path.phase(j, clock.crank, clock.crank_low), turned, areas)
+            more, doubt = _way_in_step(step, min(clock.h, rest), curve, rtol, room)
             total, error = total + more, error + doubt
     return total, error + 4.0 * _EPS * (total + tau * 0.0), True
 
 
+@jit
+def _course(p, r0, setup):
+    """The `Course` of the point at that radius."""
+    arm, ride, unit = setup.arm, setup.ride, setup.unit
+    x, y, r = signed_in_unit(p.w_x, unit), signed_in_unit(p.w_y, unit), in_unit(r0, unit)
+    side = linkage.side_of(p.type)
+    return Course(
+        arm.lengths, arm.margin, side, p.b_angle, ride.speed, ride.spin, ride.reach, x, y, p.beta, r, setup.tool
+    )
+
+
 @jit_inline
-def _cell(p, rtol, loaded, work):
-    """Wear, its error and the status of one cell; p: its parameters, loaded: its areas of contact."""
-    _, lengths, margin, verdict = _scene.arm_without_units(p[0], p[1], p[2], p[3])
-    tool, ride, unit, pace, fine = _scene.work_without_units(p)
-    verdict = verdict if fine or verdict >= FIRST_REFUSAL else OUT_OF_RANGE
-    if not _scene.turns_fully(verdict):
-        return math.nan, math.nan, verdict
-    x, y = _scene.signed_in_unit(p[9], unit), _scene.signed_in_unit(p[10], unit)
-    r = in_unit(p[20], unit)
-    motion = (ride[0], ride[1], ride[2], x, y, p[8])
-    path = (lengths, margin, linkage.side_of(p[4]), p[6]), motion, r, tool
-    m, e = mantissa_exponent(p[22] if p[22] > 0.0 else 1.0)
-    tau = scale(m, e + pace) if p[22] > 0.0 else 0.0
-    if p[20] > p[19] > 0.0 or r > 4.0 * (ride[2] + ride[3] + tool[0] + tool[1]):
-        return 0.0, 0.0, verdict
-    value, error, short = way(path, loaded, p[21], tau, 0.25 * rtol, work)
+def _cell(p, point, rtol, areas, room):
+    """`Worn` and the status of one cell."""
+    setup = _scene.without_units(p)
+    if not _scene.turns_fully(setup.verdict):
+        return Worn(math.nan, math.nan), setup.verdict
+    course, ride, tool = _course(p, point.r0, setup), setup.ride, setup.tool
+    m, e = mantissa_exponent(point.tau if point.tau > 0.0 else 1.0)
+    tau = scale(m, e + setup.pace) if point.tau > 0.0 else 0.0
+    if point.r0 > p.workpiece_radius > 0.0 or course.r > 4.0 * (ride.reach + ride.w + tool.a + tool.b):
+        return Worn(0.0, 0.0), setup.verdict
+    value, error, short = way(course, areas, point.theta0, tau, 0.25 * rtol, room)
     if not short:
-        return math.nan, math.nan, STEP_LIMIT
-    hard, units = (p[17], unit) if loaded[1] == 0 else (p[18], -unit)
-    wear = _scene.with_units(value, p[16], hard, units)
-    doubt = _scene.with_units(error, p[16], hard, units)
+        return Worn(math.nan, math.nan), STEP_LIMIT
+    hard, units = (p.pressure, setup.unit) if areas.panels == 0 else (p.load, -setup.unit)
+    wear = _scene.with_units(value, p.preston, hard, units)
+    worn = Worn(wear, _scene.with_units(error, p.preston, hard, units))
     if value > 0.0 and not is_normal(wear):
-        return wear, doubt, OUT_OF_RANGE
-    return wear, doubt, verdict if error <= rtol * value else INACCURATE
-
-
-@entry_of_cells
-def path(
-    b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
-    load, workpiece_radius, r0, theta0, tau, rtol, wear, wear_error, status,
-):  # fmt: skip
-    """(1), split at every entry and exit; one cell at a time, for no two split alike."""
-    cells = _scene.side_by_side((
-        b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
-        load, workpiece_radius, r0, theta0, tau,
-    ))  # fmt: skip
-    work = np.empty(quadrature.POOL), np.empty(_DEPTH)
-    memory = _pressure.room()
-    loaded = _pressure.unloaded(memory[0])
-    for i in range(status.size):
-        if i == 0 or not _pressure.shared(cells[i], rtol[i], cells[i - 1], rtol[i - 1]):
-            loaded = _pressure.areas(cells[i], rtol[i], memory)
-        wear[i], wear_error[i], status[i] = _cell(cells[i], rtol[i], loaded, work)
+        return worn, OUT_OF_RANGE
+    return worn, setup.verdict if error <= rtol * value else INACCURATE
 
 
 @jit
-def _check(
-    i, b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
-    load, workpiece_radius, r0, theta0, tau, status,
-):  # fmt: skip
-    fine = allowed(
-        b[i], d[i], f[i], e[i], type[i], omega[i], b_angle[i], L[i], beta[i], w_x[i], w_y[i], Omega[i],
-        tool_a[i], tool_b[i], tool_n[i], tool_m[i], preston[i],
-    )  # fmt: skip
-    push = pressed(pressure[i], load[i], workpiece_radius[i])
-    point = 0.0 <= r0[i] < math.inf and magnitude(theta0[i]) <= ANGLE_LIMIT and 0.0 <= tau[i] < math.inf
-    status[i] = OK if fine and push and point else BAD_INPUT
+def _follow(i, columns, room, memory):
+    """(1), split at every entry and exit; one cell at a time, for no two split alike."""
+    h = max(i - 1, 0)
+    p, rtol = read(Machine, columns, i), columns.rtol[i]
+    areas = _pressure.areas_of(p, rtol, i == 0, read(Machine, columns, h), columns.rtol[h], memory)
+    worn, status = _cell(p, read(Point, columns, i), rtol, areas, room)
+    write(columns, i, worn)
+    columns.status[i] = status
 
 
-@entry_of_cells
-def check(
-    b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
-    load, workpiece_radius, r0, theta0, tau, status,
-):  # fmt: skip
+@jit
+def _buffers():
+    return Room(np.empty(quadrature.POOL), np.empty(_DEPTH)), _pressure.memory()
+
+
+@jit
+def check(p):
     """BAD_INPUT: NaN, infinite or outside its limits."""
-    one_by_one(
-        _check,
-        (
-            b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston,
-            pressure, load, workpiece_radius, r0, theta0, tau, status,
-        ),
-    )  # fmt: skip
+    point = (p.r0 >= 0.0) & (p.r0 < math.inf) & (magnitude(p.theta0) <= ANGLE_LIMIT)
+    return where(allowed(p) & point & (p.tau >= 0.0) & (p.tau < math.inf), OK, BAD_INPUT)
 
 
-POLISHER_WEAR_POINT = Kernel(
-    name="polisher_wear_point",
+POLISHER_WEAR_POINT = kernel(
+    "polisher_wear_point",
     doc="Preston wear of one point of a turning workpiece under the tool of a polishing machine",
     source="Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), corrected and completed",
     parameters=(
         *_scene.PARAMETERS,
-        *_scene.PRESS,
         Field("r0", "m", "distance of the point from the workpiece's centre", lower=0.0),
-        Field("theta0", "rad", "its direction at the start, from the x axis", default=0.0,
-              lower=-ANGLE_LIMIT, upper=ANGLE_LIMIT),
+        Field("theta0", "rad", "its direction at the start, from the x axis", **_scene.ANGLE),
         Field("tau", "s", "time of polishing", lower=0.0),
     ),
     outputs=(
@@ -232,6 +241,14 @@ POLISHER_WEAR_POINT = Kernel(
         Field("wear_error", "m", "what it may be wrong by"),
     ),
     check=check,
-    methods=(Method("path", "time split at every entry and exit, adaptive to rtol between them", path),),
+    methods=(
+        tracing(
+            "path",
+            "time split at every entry and exit, adaptive to rtol between them",
+            _follow,
+            buffers=_buffers,
+            loop=cell_by_cell,
+        ),
+    ),
     example=_scene.EXAMPLE | {"r0": 0.05, "theta0": 0.0, "tau": 100.0},
-)  # fmt: skip
+)

@@ -20,15 +20,20 @@ under a load leaves wholly wears without bound: NaN with an infinite error, henc
 """
 
 import math
+from typing import NamedTuple
 
-from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method
+from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, INACCURATE, OK, OUT_OF_RANGE
-from kernels.lanes.columns import entry_of_cells, one_by_one
+from kernels.lanes.columns import cell_by_cell
 from kernels.lanes.jit import jit, jit_inline
 from kernels.lanes.ranges import partly
+from kernels.lanes.records import read
+from kernels.lanes.vectors import where
+from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import in_unit, is_normal
 from kernels.wear import _pressure, _profile, _scene
-from kernels.wear._scene import allowed, pressed
+from kernels.wear._profile import Scene
+from kernels.wear._scene import Machine, allowed
 
 _FAINT = 2.0**-100
 _AT_RIM = 1e-8
@@ -36,110 +41,98 @@ _AT_RIM = 1e-8
 _FOUR_PI2 = 4.0 * math.pi * math.pi
 
 
+class Amount(NamedTuple):
+    """What makes wear of an integral: preston, pressure or load, power of two of its units; and the rim's radius."""
+
+    preston: float
+    hard: float
+    units: float
+    rim: float
+
+
 @jit_inline
-def _wear_at(r, scene, unit, amount, rtol, work):
+def _wear_at(radius, setup, areas, amount, rtol, room):
     """Wear and its error at one radius [m], and whether it is a number that float64 can hold."""
-    preston, pressure, units, rim = amount
-    if r > rim > 0.0:
+    rim, units = amount.rim, amount.units
+    if radius > rim > 0.0:
         return 0.0, 0.0, True
-    if _pressure.leaves(scene[3]) and not r < rim * (1.0 - _AT_RIM):
+    if _pressure.leaves(areas) and not radius < rim * (1.0 - _AT_RIM):
         return math.nan, math.inf, True
-    near = in_unit(r, unit)
-    near = near if near > _FAINT or scene[2][3] == 0.0 else 0.0
-    value, error, _ = _profile.profile((scene[0], scene[1], scene[2], near, scene[3]), 0.7 * rtol, work)
-    wear = _scene.with_units(value / _FOUR_PI2, preston, pressure, units)
-    doubt = _scene.with_units(error / _FOUR_PI2, preston, pressure, units)
+    r = in_unit(radius, setup.unit)
+    r = r if r > _FAINT or setup.ride.w == 0.0 else 0.0
+    value, error = _profile.profile(Scene(setup.arm, setup.tool, setup.ride, r, areas), 0.7 * rtol, room)
+    wear = _scene.with_units(value / _FOUR_PI2, amount.preston, amount.hard, units)
+    doubt = _scene.with_units(error / _FOUR_PI2, amount.preston, amount.hard, units)
     return wear, doubt, not value > 0.0 or is_normal(wear)
 
 
 @jit_inline
-def _cell(p, rtol, loaded, radius, wear, wear_error, work):
-    """Fills the profile of one cell and returns its status; p: its parameters, loaded: its areas of contact.
+def _cell(p, rtol, areas, radius, wear, wear_error, room):
+    """Fills the profile of one cell and returns its status.
 
     The status is about errors over the largest wear of the profile: that of every radius is stated beside it.
     """
-    arm, _, _, verdict = _scene.arm_without_units(p[0], p[1], p[2], p[3])
-    tool, ride, unit, pace, fine = _scene.work_without_units(p)
-    verdict = verdict if fine or verdict >= FIRST_REFUSAL else OUT_OF_RANGE
-    turns = _scene.turns_fully(verdict)
+    setup = _scene.without_units(p)
+    turns = _scene.turns_fully(setup.verdict)
+    units = setup.pace + (setup.unit if areas.panels == 0 else -setup.unit)
+    amount = Amount(p.preston, max(p.pressure, p.load), units, p.workpiece_radius)
     most, worst, normal = 0.0, 0.0, True
     for k in range(radius.size):
         wear[k], wear_error[k] = math.nan, math.nan
         if turns:
-            amount = p[16], max(p[17], p[18]), pace + (unit if loaded[1] == 0 else -unit), p[19]
-            value, doubt, held = _wear_at(radius[k], (arm, tool, ride, loaded), unit, amount, rtol, work)
+            value, doubt, held = _wear_at(radius[k], setup, areas, amount, rtol, room)
             if held:
                 wear[k], wear_error[k] = value, doubt
                 most = value if value > most else most
                 worst = worst if doubt <= worst else doubt  # NaN stays
             normal = normal and held
     if not turns:
-        return verdict
+        return setup.verdict
     if not (normal or most > 0.0):
         return OUT_OF_RANGE
-    return partly(normal, verdict) if worst <= rtol * most else INACCURATE
-
-
-@entry_of_cells
-def contour(
-    b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
-    load, workpiece_radius, rtol, radius, wear, wear_error, status,
-):  # fmt: skip
-    """(2) as integrals along the outline, split where contact ends; one cell at a time, for no two split alike."""
-    cells = _scene.side_by_side((
-        b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
-        load, workpiece_radius,
-    ))  # fmt: skip
-    work = _profile.room()
-    memory = _pressure.room()
-    loaded = _pressure.unloaded(memory[0])
-    for i in range(status.size):
-        if i == 0 or not _pressure.shared(cells[i], rtol[i], cells[i - 1], rtol[i - 1]):
-            loaded = _pressure.areas(cells[i], rtol[i], memory)
-        status[i] = _cell(cells[i], rtol[i], loaded, radius, wear[i], wear_error[i], work)
+    return partly(normal, setup.verdict) if worst <= rtol * most else INACCURATE
 
 
 @jit
-def _check(
-    i, b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
-    load, workpiece_radius, status,
-):  # fmt: skip
-    fine = allowed(
-        b[i], d[i], f[i], e[i], type[i], omega[i], b_angle[i], L[i], beta[i], w_x[i], w_y[i], Omega[i],
-        tool_a[i], tool_b[i], tool_n[i], tool_m[i], preston[i],
-    )  # fmt: skip
-    status[i] = OK if fine and pressed(pressure[i], load[i], workpiece_radius[i]) else BAD_INPUT
+def _contour(i, columns, room, memory):
+    """(2) as integrals along the outline, split where contact ends; one cell at a time, for no two split alike."""
+    h = max(i - 1, 0)
+    p, rtol = read(Machine, columns, i), columns.rtol[i]
+    areas = _pressure.areas_of(p, rtol, i == 0, read(Machine, columns, h), columns.rtol[h], memory)
+    columns.status[i] = _cell(p, rtol, areas, columns.radius, columns.wear[i], columns.wear_error[i], room)
 
 
-@entry_of_cells
-def check(
-    b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston, pressure,
-    load, workpiece_radius, status,
-):  # fmt: skip
+@jit
+def _buffers():
+    return _profile.room(), _pressure.memory()
+
+
+@jit
+def check(p):
     """BAD_INPUT: NaN, infinite or outside its limits."""
-    one_by_one(
-        _check,
-        (
-            b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, preston,
-            pressure, load, workpiece_radius, status,
-        ),
-    )  # fmt: skip
+    return where(allowed(p), OK, BAD_INPUT)
 
 
-POLISHER_WEAR = Kernel(
-    name="polisher_wear",
+POLISHER_WEAR = kernel(
+    "polisher_wear",
     doc="Preston wear of a turning workpiece along its radius, under the tool of a polishing machine",
     source="Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), corrected and completed; the integral is ours",
-    parameters=(
-        *_scene.PARAMETERS,
-        *_scene.PRESS,
-    ),
+    parameters=_scene.PARAMETERS,
     outputs=(
         Field("wear", "m/s", "depth worn away per time, mean of the ring", dims=("radius",)),
         Field("wear_error", "m/s", "what it may be wrong by", dims=("radius",)),
     ),
     along=(Field("radius", "m", "distance from the workpiece's centre", lower=0.0),),
+    record=Machine,
     check=check,
-    methods=(Method("contour", "integral along the tool's outline, adaptive to rtol at every radius", contour),),
+    methods=(
+        tracing(
+            "contour",
+            "integral along the tool's outline, adaptive to rtol at every radius",
+            _contour,
+            buffers=_buffers,
+            loop=cell_by_cell,
+        ),
+    ),
     example=_scene.EXAMPLE,
 )

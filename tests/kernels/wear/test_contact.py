@@ -7,9 +7,12 @@ import pytest
 from mpmath import mp, mpf
 
 from kernels.lanes.jit import COMPILED
-from kernels.wear import _contact, _path, _pressure, _tool
+from kernels.wear import _contact, _path, _tool
+from kernels.wear._contact import Point
+from kernels.wear._tool import Circle, Tool
 
 MANY = 4000 if COMPILED else 15
+ROUND = Tool(1.0, 1.0, 2.0, 2.0, math.sqrt(0.5), math.sqrt(0.5))
 
 
 def lens(a, radius, distance):
@@ -39,15 +42,14 @@ def round_tools(kind, n, seed=0):
 
 @pytest.mark.parametrize("kind", ["anywhere", "touching from outside", "touching from inside"])
 def test_an_area_of_contact_is_wrong_by_no_more_than_it_says(kind):
-    room = _pressure.room()[3:]
-    tool = (1.0, 1.0, 2.0, 2.0, math.sqrt(0.5), math.sqrt(0.5))
-    assert len(room[0]) == _tool.ARC_LIMIT
+    room, tool = _contact.room(), ROUND
+    assert len(room.found) == _tool.ARC_LIMIT
     share = []
     with mp.workdps(40):
         for radius, centre in zip(*round_tools(kind, MANY), strict=True):
-            disc = float(centre.real), float(centre.imag), float(radius)
+            disc = Circle(float(centre.real), float(centre.imag), float(radius))
             area, doubt = _contact.contact_area(tool, math.pi, disc, room)
-            true = lens(mpf(1), mpf(disc[2]), mp.hypot(*map(mpf, disc[:2])))
+            true = lens(mpf(1), mpf(disc.radius), mp.hypot(mpf(disc.x), mpf(disc.y)))
             share.append(float(abs(area - true)) / max(doubt, 1e-300))
     assert max(share) <= 1.0
     assert np.mean(np.array(share) > 1e-3) > 0.5
@@ -68,8 +70,8 @@ def test_no_digit_of_the_turns_is_lost_after_a_hundred_million_of_them():
 @pytest.mark.parametrize("ulps", [-200, -60, 0, 60, 200])
 def test_an_arc_along_the_outline_is_in_doubt_as_a_whole(ulps):
     """Rounding decides on which side of the tool's outline it runs."""
-    tool, radius = (1.0, 1.0, 2.0, 2.0, math.sqrt(0.5), math.sqrt(0.5)), 1.0 + ulps * 2.0**-52
-    ends = [(angle, radius * math.cos(angle), radius * math.sin(angle)) for angle in (0.3, 1.4)]
-    share, doubt = _contact._arc_within(tool, (0.0, 0.0, radius), *ends, 1.1)
+    radius = 1.0 + ulps * 2.0**-52
+    ends = [Point(angle, radius * math.cos(angle), radius * math.sin(angle)) for angle in (0.3, 1.4)]
+    share, doubt = _contact._arc_within(ROUND, Circle(0.0, 0.0, radius), *ends, 1.1)
     assert doubt >= 0.5 * 1.1 * (1 - 1e-12)
     assert share == 0.0 or abs(share - 0.5 * 1.1) < 1e-12
