@@ -14,11 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.records import read
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths.elementary import in_unit
 from kernels.wear import _contact, _scene, _tool
-from kernels.wear._scene import Machine
 from kernels.wear._tool import Circle, Tool, arctan2, sincos
 
 PANEL_LIMIT = 1024
@@ -72,10 +70,7 @@ class Footing(NamedTuple):
     beta: float
     w_x: float
     w_y: float
-    tool_a: float
-    tool_b: float
-    tool_n: float
-    tool_m: float
+    shape: tuple[float, float, float, float]
     workpiece_radius: float
 
 
@@ -220,18 +215,23 @@ def _areas(p, rtol, memory):
 
 
 @jit
-def _alike(columns, i, j):
-    """Whether two cells have the same areas of contact, to the same tolerance."""
-    loads = (columns.load[i] > 0.0) == (columns.load[j] > 0.0) and columns.rtol[i] == columns.rtol[j]
-    return loads and read(Footing, columns, i) == read(Footing, columns, j)
+def _footing(p):
+    shape = p.tool_a, p.tool_b, p.tool_n, p.tool_m
+    return Footing(p.b, p.d, p.f, p.e, p.type, p.b_angle, p.L, p.beta, p.w_x, p.w_y, shape, p.workpiece_radius)
 
 
 @jit
-def areas_of(i, columns, memory):
-    """The areas of contact of cell i; those that `memory` has, if they are the same as of the cell before."""
+def _alike(p, rtol, q, rtol_q):
+    """Whether two cells have the same areas of contact, to the same tolerance."""
+    return rtol == rtol_q and (p.load > 0.0) == (q.load > 0.0) and _footing(p) == _footing(q)
+
+
+@jit_call
+def areas_of(p, rtol, first, before, rtol_before, memory):
+    """The areas of contact of a cell; those that `memory` has, unless it is the first or unlike the cell before."""
     rest = memory.rest
-    if i == 0 or not _alike(columns, i, i - 1):
-        areas = _areas(read(Machine, columns, i), columns.rtol[i], memory)
+    if first or not _alike(p, rtol, before, rtol_before):
+        areas = _areas(p, rtol, memory)
         rest[0], rest[1], rest[2] = areas.panels, areas.lowest, areas.largest
     return Areas(memory.table, np.int64(rest[0]), rest[1], rest[2])
 

@@ -206,8 +206,10 @@ def _cell(p, point, rtol, areas, room):
 @jit
 def _follow(i, columns, room, memory):
     """(1), split at every entry and exit; one cell at a time, for no two split alike."""
-    areas = _pressure.areas_of(i, columns, memory)
-    worn, status = _cell(read(Machine, columns, i), read(Point, columns, i), columns.rtol[i], areas, room)
+    h = max(i - 1, 0)
+    p, rtol = read(Machine, columns, i), columns.rtol[i]
+    areas = _pressure.areas_of(p, rtol, i == 0, read(Machine, columns, h), columns.rtol[h], memory)
+    worn, status = _cell(p, read(Point, columns, i), rtol, areas, room)
     write(columns, i, worn)
     columns.status[i] = status
 

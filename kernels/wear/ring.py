@@ -96,9 +96,10 @@ def _cell(p, rtol, areas, radius, wear, wear_error, room):
 @jit
 def _contour(i, columns, room, memory):
     """(2) as integrals along the outline, split where contact ends; one cell at a time, for no two split alike."""
-    areas, p = _pressure.areas_of(i, columns, memory), read(Machine, columns, i)
-    wear, wear_error = columns.wear[i], columns.wear_error[i]
-    columns.status[i] = _cell(p, columns.rtol[i], areas, columns.radius, wear, wear_error, room)
+    h = max(i - 1, 0)
+    p, rtol = read(Machine, columns, i), columns.rtol[i]
+    areas = _pressure.areas_of(p, rtol, i == 0, read(Machine, columns, h), columns.rtol[h], memory)
+    columns.status[i] = _cell(p, rtol, areas, columns.radius, columns.wear[i], columns.wear_error[i], room)
 
 
 @jit
