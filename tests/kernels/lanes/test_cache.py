@@ -125,7 +125,7 @@ def test_what_is_written_for_a_scene_of_ones_own_is_compiled_once(tmp_path):
 @pytest.fixture(scope="module")
 def compiled_again():
     """For each kernel what a second process compiles."""
-    command = [sys.executable, "-W", "error", Path(__file__).with_name("compiling.py"), *KERNELS, "own_scene:KERNEL"]
+    command = [sys.executable, "-W", "error", ROOT / "tests" / "helpers" / "compiling.py", *KERNELS, "own_scene:KERNEL"]
     first, second = (subprocess.run(command, cwd=ROOT, capture_output=True, text=True) for _ in range(2))
     assert first.returncode == second.returncode == 0, first.stderr + second.stderr
     return json.loads(second.stdout)
