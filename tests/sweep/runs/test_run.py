@@ -31,6 +31,8 @@ from running import (
 )
 
 from kernels.interface import Status
+from sweep.cells.fingerprint import fingerprint
+from sweep.cells.output_schema import output_schema
 from sweep.cells.solve import Solver
 from sweep.results.open import open_result
 from sweep.results.verify import verify
@@ -479,8 +481,13 @@ def free(monkeypatch, output, count):
 
 
 def needed(cells, left):
-    """Bytes of the output of `tall` (axis, g, v0; fall time, status and method of every cell) and of parts to come."""
-    return 8 * (cells + 2) + 10 * cells + 10 * left
+    """Bytes of the output of `tall` and of parts to come.
+
+    Axis, g, v0; fall time, error bound, status and method of every cell; what both say in words.
+    """
+    study = tall(cells)
+    words = output_schema(study, fingerprint(study)).attrs.values()
+    return 8 * (cells + 2) + 14 * cells + 14 * left + 2 * sum(len(str(text).encode()) for text in words)
 
 
 def test_space_for_the_output_without_its_parts_is_too_little(output, monkeypatch):
