@@ -54,6 +54,7 @@ class StudyParser:
         fixed, follows = self._complete(axes, given)
         self._check_methods(method, axes, fixed, outputs)
         summary = self._summary(keys, axes, design, outputs)
+        axes = _kept_first(axes, summary)
         self.mistakes.raise_if_any(self.source)
         return Study(
             title=title or f"{self.kernel.name} over {listed(axes, word='and')}",
@@ -64,7 +65,7 @@ class StudyParser:
             rtol=rtol,
             outputs=outputs,
             design=design,
-            axes=_kept_first(axes, summary),
+            axes=axes,
             fixed=fixed,
             follows=follows,
             along=along,

@@ -105,7 +105,7 @@ def test_a_kernel_of_ours_is_told_once_and_then_kept(tmp_path):
     """In two processes, everything that is compiled is told, however quick."""
     (tmp_path / "study.toml").write_text(STUDY)
     code = (
-        "from sweep import cli, compiling\ncompiling.SILENT_SECONDS = 0\n"
+        "from sweep import cli\nfrom sweep.cells import compiling\ncompiling.SILENT_SECONDS = 0\n"
         f"cli.main(['run', r'{tmp_path}/study.toml', '-o', r'{tmp_path}/out.h5', '--force'])"
     )
     env = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "PYTHONPATH": str(ROOT)}

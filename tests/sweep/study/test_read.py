@@ -384,3 +384,10 @@ def test_words_are_checked():
         message_of(lambda: build_rich(axes=axes), "axes.shape")
         == 'shape takes words; write e.g. values = ["round", "square"]'
     )
+
+
+def test_the_title_that_a_summary_gets_names_the_axes_that_stay_first():
+    axes = {"mu": [0.1, 1.0], "R": [0.01, 0.02]}
+    study = sweep.build_study(kernel="foliot", axes=axes, fixed={"phi0": 1.0, "a": 1.0}, summary={"over": ["mu"]})
+    assert study.title == "foliot over R and mu"
+    assert list(study.axes) == ["R", "mu"]
