@@ -14,7 +14,7 @@ from math import factorial
 from typing import NamedTuple
 
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import choose, isnt, magnitude, some, where
+from kernels.lanes.vectors import any_lane, choose, magnitude, not_, where
 from kernels.maths.pairs import (
     add,
     constant,
@@ -181,14 +181,14 @@ def refined(scene, p, guess, wanted):
     none = 0.0 * p
     legs = Legs(shifted(two_sum(beta, -r), p), (t1, none), (t2, none), (t3, none))
     active = wanted & (zeta * (t1 + t2 + t3) < LONGEST)
-    found = active & isnt(active)
+    found = active & not_(active)
     for _ in range(STEPS):
-        if not some(active):
+        if not any_lane(active):
             break
         new, settled, there = _step(scene, legs)
         legs = _chosen(active, new, legs)
         found = found | (active & settled & there)
-        active = active & isnt(settled)
+        active = active & not_(settled)
     time = add(add(legs.t1, legs.t2), legs.t3)
     kept = whole(*exponential(scaled(time, where(found, -2.0 * zeta, 0.0))))[0]
     return shifted(legs.f, r)[0], time[0], kept * legs.f[0] / shifted(legs.f, 2.0 * r)[0], found

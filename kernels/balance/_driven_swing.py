@@ -20,7 +20,7 @@ from kernels.balance import _driven_refined, _ringdown
 from kernels.integrate import linear_flow
 from kernels.lanes.codes import INACCURATE, NO_METHOD, NOT_CONVERGED, OK, OUT_OF_RANGE, STICKS
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import choose, fma, isnt, magnitude, nearest, some, sqrt, where
+from kernels.lanes.vectors import any_lane, choose, fma, magnitude, nearest, not_, sqrt, where
 from kernels.maths import pairs
 from kernels.maths.elementary import arctan, exp, expm1, in_unit, mantissa_exponent
 
@@ -102,7 +102,7 @@ def in_units(p):
     e = where(lifts, e_beta, half)
     energy = where(lifts, 0.0, m_w * where(e_w - 2.0 * half > 0.5, 2.0, 1.0))
     friction, torque = in_unit(p.r, e), in_unit(p.m, e)
-    fine = (isnt(p.r > 0.0) | (friction > 1e-300)) & (friction < 1e300) & (isnt(lifts) | (torque > 1e-300))
+    fine = (not_(p.r > 0.0) | (friction > 1e-300)) & (friction < 1e300) & (not_(lifts) | (torque > 1e-300))
     return Scene(p.zeta, friction, torque, in_unit(p.beta, e), energy), e, fine & (torque < 1e300)
 
 
@@ -121,10 +121,10 @@ def _lift_time(scene, v1):
     """Time of leg 2 from the speed v1, and whether it is passed."""
     lifts = scene.beta > 0.0
     t, comes = 0.0 * v1, v1 >= 0.0
-    if some(lifts):
+    if any_lane(lifts):
         f, way = where(lifts, (scene.beta - scene.r) + scene.m, 1.0), where(lifts, 2.0 * scene.beta, 1.0)
         t = linear_flow.first_crossing(scene.zeta, 1.0, where(lifts, v1, 1.0), f, way)
-        comes = isnt(lifts) | (t < math.inf)
+        comes = not_(lifts) | (t < math.inf)
         t = where(lifts & comes, t, 0.0)
     return t, comes
 
@@ -185,7 +185,7 @@ def _least(scene):
     delta, _ = _ringdown.decrement(where(creeps, 0.5, zeta))
     share = where(creeps, 0.0, exp(-delta[0]))
     short = r > beta
-    return where(short, (r - beta) * (1.0 + 1.0 / where(share > 1e-300, share, 1e-300)), 0.0), short & isnt(
+    return where(short, (r - beta) * (1.0 + 1.0 / where(share > 1e-300, share, 1e-300)), 0.0), short & not_(
         share > 1e-300
     )
 
@@ -214,8 +214,8 @@ def _start(scene):
     """Where Newton starts, the least swing, whether the balance swings at all, and whether it does so in range."""
     least, never = _least(scene)
     first = _rise(scene, 0.0 * least)
-    impulse_creeps = isnt(scene.beta > 0.0) & (scene.zeta >= 1.0)
-    swings = first.comes & (first.p > least) & isnt(never | impulse_creeps)
+    impulse_creeps = not_(scene.beta > 0.0) & (scene.zeta >= 1.0)
+    swings = first.comes & (first.p > least) & not_(never | impulse_creeps)
     guess = _light_losses(scene)
     tame = guess < _LARGEST
     guess = guess - scene.beta
@@ -231,10 +231,10 @@ def _search(scene, p, low, active):
     """
     high = 0.0 * p + 1e300
     for _ in range(NEWTON_LIMIT):
-        if not some(active):
+        if not any_lane(active):
             break
         swing = half_swing(scene, p)
-        up = isnt(swing.comes) | (swing.gain > 0.0)
+        up = not_(swing.comes) | (swing.gain > 0.0)
         low, high = where(up, p, low), where(up, high, p)
         new = p + swing.gain / swing.lost
         change = magnitude(new - p)
@@ -242,7 +242,7 @@ def _search(scene, p, low, active):
         new = where(inside, new, where(high < 1e300, 0.5 * (low + high), 2.0 * p))
         settled = inside & ((change <= 1e-9 * p) | (change * swing.lost <= swing.noise))
         p = where(active, new, p)
-        active = active & isnt(settled)
+        active = active & not_(settled)
     return p, high, active
 
 
@@ -264,10 +264,10 @@ def newton(scene, rtol):
     p, high, active = _search(scene, p, low, swings & tame)
     swing = half_swing(scene, p)
     cycle, right = Cycle(scene.beta + p, swing.time, swing.kept), _right(scene, p, swing, rtol)
-    lost = active | isnt(swing.comes)
+    lost = active | not_(swing.comes)
     verdict = where(lost, NOT_CONVERGED, where(right, OK, INACCURATE))
-    poor = swings & tame & (lost | isnt(right))
-    if some(poor):
+    poor = swings & tame & (lost | not_(right))
+    if any_lane(poor):
         cycle, found = _refined(scene, where(swing.comes, p, high), cycle, poor)
         verdict = where(found, where(rtol >= ROUNDING, OK, INACCURATE), verdict)
     verdict = where(swings, verdict, STICKS)
@@ -278,7 +278,7 @@ def newton(scene, rtol):
 def closed(scene, rtol):
     """As `newton`, from formulas, where there is an impulse and r = 0, or zeta = 0; NO_METHOD elsewhere."""
     zeta, r, m, beta, w = scene
-    lifts, free, smooth = beta > 0.0, isnt(zeta > 0.0), isnt(r > 0.0)
+    lifts, free, smooth = beta > 0.0, not_(zeta > 0.0), not_(r > 0.0)
     some_r = where(smooth, 1.0, r)
     a_kick, t_kick, runs_kick = _kicked(some_r, where(lifts, 1.0, w))
     a_lift, t_lift, runs_lift = _lifted(some_r, where(lifts, m, 1.0), where(lifts, beta, 1.0))
@@ -287,8 +287,8 @@ def closed(scene, rtol):
     a_smooth, t_smooth, kept_smooth = _kicked_smoothly(where(zeta < 1.0, zeta, 0.5), w)
     a, time = where(free, a, a_smooth), where(free, time, t_smooth)
     kept = where(free, kept, kept_smooth)
-    known = free | (smooth & isnt(lifts))
-    runs = (free & runs) | (isnt(free) & (zeta < 1.0))
+    known = free | (smooth & not_(lifts))
+    runs = (free & runs) | (not_(free) & (zeta < 1.0))
     return Cycle(a, time, kept), where(known, where(runs, OK, STICKS), NO_METHOD)
 
 

@@ -17,7 +17,7 @@ import math
 from typing import NamedTuple
 
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import choose, fma, isnt, magnitude, nearest, some, where
+from kernels.lanes.vectors import any_lane, choose, fma, magnitude, nearest, not_, where
 from kernels.maths import pairs
 from kernels.maths.elementary import exp, in_unit, log1p, mantissa_exponent, scale
 
@@ -113,7 +113,7 @@ def decay_of(zeta):
 @jit_call
 def turning_point(scene, decay, k):
     """a_k of (3), as a pair, and its first term a_0 E^k."""
-    smooth = isnt(scene.zeta > FAINT)  # there products of the parts of delta would be no normal numbers
+    smooth = not_(scene.zeta > FAINT)  # there products of the parts of delta would be no normal numbers
     delta = choose(smooth, (0.0, 0.0), decay.delta)
     q, n = pairs.exponential(pairs.negative(pairs.scaled(delta, k)))
     kept = pairs.scaled(pairs.shifted(q, 1.0), scene.start)
@@ -161,13 +161,13 @@ def _last_swing(scene, decay, k, counted):
     active = counted & _exceeds(below, scene.r_s)
     k = k + 1.0
     for _ in range(_CONFIRM_LIMIT):
-        if not some(active):
+        if not any_lane(active):
             break
         above = choose(active, below, above)
         below = choose(active, _next_turning_point(scene, decay, above), below)
         k = where(active, k + 1.0, k)
         active = active & _exceeds(below, scene.r_s)
-    return LastSwing(k, above, below, kept, counted & (active | isnt(sure)))
+    return LastSwing(k, above, below, kept, counted & (active | not_(sure)))
 
 
 @jit_call
@@ -175,9 +175,9 @@ def closed(scene):
     """Its rest: the count by (4), confirmed by the turning points on both sides of it."""
     moves, decay = scene.start > scene.r_s, decay_of(scene.zeta)
     guess = where(moves, count_by_formula(scene, decay), 0.0)
-    countless = isnt(guess < COUNT_LIMIT)
+    countless = not_(guess < COUNT_LIMIT)
     k = _whole(where(countless, 0.0, guess * (1.0 - 4e-15) - 1e-6)) - 1.0
-    swing = _last_swing(scene, decay, where(k > 0.0, k, 0.0), moves & isnt(countless))
+    swing = _last_swing(scene, decay, where(k > 0.0, k, 0.0), moves & not_(countless))
     count = where(moves, where(countless, _whole(guess), swing.number), 0.0)
     last = where(moves, where(countless, math.nan, swing.below[0]), scene.start)
     over = pairs.shifted(swing.above, -scene.r_s)[0]
@@ -198,8 +198,8 @@ def _exceeds(pair, number):
 @jit
 def _margin(over, under, over_error, under_error, r_s, moves):
     """The least distance from r_s, over r_s, and whether one of the distances is no more than its error or 1e-9."""
-    grazes = isnt(under > GRAZING * r_s) | isnt(under > under_error)
-    grazes = grazes | (moves & (isnt(over > GRAZING * r_s) | isnt(over > over_error)))
+    grazes = not_(under > GRAZING * r_s) | not_(under > under_error)
+    grazes = grazes | (moves & (not_(over > GRAZING * r_s) | not_(over > over_error)))
     return where(moves & (over < under), over, under) / unit(r_s), grazes
 
 
@@ -242,7 +242,7 @@ def recursion(scene):
     rounding = 2.3e-16 * (1.0 + delta[0])  # of `share`
     active = (a > r_s) & (r_s > 0.0)  # r_s = 0: it never ends
     for _ in range(RECURSION_LIMIT):
-        if not some(active):
+        if not any_lane(active):
             break
         new = fma(share, a, -loss)
         more = fma(share, error, fma(rounding, share * a, 4e-16 * loss)) + 1.2e-16 * magnitude(new)

@@ -17,7 +17,7 @@ from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, NO_LIMIT_CYCLE, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none, partly
-from kernels.lanes.vectors import isnt, where
+from kernels.lanes.vectors import not_, where
 from kernels.lanes.wiring import kernel, method
 from kernels.maths.elementary import is_normal, scale
 
@@ -64,7 +64,7 @@ def closed(p, rtol):
 @jit
 def closed_bound(p):
     """Rounding where there is a formula, infinite elsewhere."""
-    known = isnt(p.zeta > 0.0) | (isnt(p.r > 0.0) & isnt(p.beta > 0.0))
+    known = not_(p.zeta > 0.0) | (not_(p.r > 0.0) & not_(p.beta > 0.0))
     return where(known, ROUNDING, math.inf)
 
 
@@ -84,10 +84,10 @@ def check(p):
     positive = (p.zeta >= 0.0) & (p.omega_n > 0.0) & (p.r >= 0.0) & (p.w >= 0.0) & (p.m >= 0.0) & (p.beta >= 0.0)
     finite = (p.zeta < math.inf) & (p.omega_n < math.inf) & (p.r < math.inf) & (p.w < math.inf)
     kicks, lifts = p.w > 0.0, (p.m > 0.0) & (p.beta > 0.0)
-    nothing_else = isnt((p.m > 0.0) | (p.beta > 0.0))
-    one = (kicks & nothing_else) | (lifts & isnt(kicks))
+    nothing_else = not_((p.m > 0.0) | (p.beta > 0.0))
+    one = (kicks & nothing_else) | (lifts & not_(kicks))
     fine = positive & finite & (p.m < math.inf) & (p.beta < math.inf) & one
-    lossless = isnt((p.zeta > 0.0) | (p.r > 0.0))
+    lossless = not_((p.zeta > 0.0) | (p.r > 0.0))
     return where(fine, where(lossless, NO_LIMIT_CYCLE, OK), BAD_INPUT)
 
 

@@ -31,7 +31,7 @@ from kernels.lanes.codes import (
 )
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none, partly
-from kernels.lanes.vectors import isnt, magnitude, nearest, where
+from kernels.lanes.vectors import magnitude, nearest, not_, where
 from kernels.lanes.wiring import kernel, method
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW, is_normal, scale
 
@@ -85,17 +85,17 @@ def half_swing_time(zeta, omega_n):
 @jit
 def _kind(scene):
     creeps, moves = scene.zeta >= 1.0, scene.start > scene.r_s
-    endless = moves & isnt(creeps) & isnt((scene.r > 0.0) | (scene.r_s > 0.0))
-    return Kind(creeps, moves, endless, isnt((creeps & moves) | endless))
+    endless = moves & not_(creeps) & not_((scene.r > 0.0) | (scene.r_s > 0.0))
+    return Kind(creeps, moves, endless, not_((creeps & moves) | endless))
 
 
 @jit
 def _stop_angle(p, scene, e, rest, kind):
     """Angle of rest [rad], and whether it is too small for a float64."""
-    swings = where((rest.count < _ringdown.COUNT_LIMIT) & isnt(kind.creeps), rest.count, 0.0)
+    swings = where((rest.count < _ringdown.COUNT_LIMIT) & not_(kind.creeps), rest.count, 0.0)
     angle = where(kind.creeps & kind.moves, scene.r, where(kind.endless, 0.0, rest.last))
     angle = where(kind.moves, scale(side(p.theta0, swings) * angle, e), p.theta0)
-    fades = isnt(scene.r > 0.0) & kind.lasts  # to a positive angle, however small
+    fades = not_(scene.r > 0.0) & kind.lasts  # to a positive angle, however small
     return angle, kind.moves & (magnitude(angle) < NORMAL_LOW) & (fades | (magnitude(angle) > 0.0))
 
 
@@ -103,14 +103,14 @@ def _stop_angle(p, scene, e, rest, kind):
 def _margin(scene, rest, kind):
     """The margin, NaN where it swings for ever."""
     away = or_none(magnitude(scene.start - scene.r_s) / _ringdown.unit(scene.r_s), scene.r_s > 0.0)
-    return or_none(where(kind.creeps, away, where(scene.r_s > 0.0, rest.margin, 0.0)), isnt(kind.endless))
+    return or_none(where(kind.creeps, away, where(scene.r_s > 0.0, rest.margin, 0.0)), not_(kind.endless))
 
 
 @jit
 def _verdict(scene, rest, kind, rtol, unsettled, faint):
     """The status but for the range; an angle of rest too `faint` for a float64 is not asked for its error."""
-    loose = isnt(faint | (rest.doubt <= rtol * magnitude(rest.last)))
-    loose = loose | isnt(rest.doubt <= rtol * rest.margin * scene.r_s)
+    loose = not_(faint | (rest.doubt <= rtol * magnitude(rest.last)))
+    loose = loose | not_(rest.doubt <= rtol * rest.margin * scene.r_s)
     verdict = where(rest.unsure, unsettled, where(rest.grazes, GRAZING, where(loose, INACCURATE, OK)))
     verdict = where(scene.start > 0.0, verdict, OK)
     return where(kind.creeps, OVERDAMPED, where(kind.endless, NEVER_ENDS, verdict))
@@ -125,15 +125,15 @@ def _outputs(p, rtol, follow, unsettled):
     half = half_swing_time(where(kind.creeps, 0.0, p.zeta), p.omega_n)
     time = where(kind.moves, rest.count * half, 0.0)
     timed = is_normal(half) & is_normal(2.0 * half)
-    ends = timed & isnt(time > NORMAL_HIGH)
+    ends = timed & not_(time > NORMAL_HIGH)
     outputs = RingDown(
-        where(kind.creeps, 0.0, or_none(rest.count, isnt(kind.endless) & isnt(rest.count > NORMAL_HIGH))),
-        or_none(angle, isnt(faint)),
-        or_none(time, kind.lasts & (ends | isnt(time > 0.0))),
+        where(kind.creeps, 0.0, or_none(rest.count, not_(kind.endless) & not_(rest.count > NORMAL_HIGH))),
+        or_none(angle, not_(faint)),
+        or_none(time, kind.lasts & (ends | not_(time > 0.0))),
         _margin(scene, rest, kind),
-        or_none(2.0 * half, timed & isnt(kind.creeps)),
+        or_none(2.0 * half, timed & not_(kind.creeps)),
     )
-    whole = isnt(faint) & (kind.creeps | (timed & (ends | isnt(kind.lasts))))
+    whole = not_(faint) & (kind.creeps | (timed & (ends | not_(kind.lasts))))
     verdict = _verdict(scene, rest, kind, rtol, unsettled, faint)
     return outputs, where(fine, partly(whole, verdict), OUT_OF_RANGE)
 
@@ -171,7 +171,7 @@ def check(p):
     BAD_INPUT: NaN, infinite, outside its limits, or stiction below the friction of motion. NO_LIMIT_CYCLE: nothing that
     takes energy from a balance that swings.
     """
-    lossless = isnt((p.zeta > 0.0) | (p.r > 0.0)) & (magnitude(p.theta0) > p.r_s)
+    lossless = not_((p.zeta > 0.0) | (p.r > 0.0)) & (magnitude(p.theta0) > p.r_s)
     return where(allowed(p), where(lossless, NO_LIMIT_CYCLE, OK), BAD_INPUT)
 
 

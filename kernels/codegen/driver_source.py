@@ -41,7 +41,7 @@ def begun(flips, parameters):
     at = where((e <= 0.0) & (e >= 0.0) & away, 1.0, 0.0)
     lost = lost_by_surface(state, side, signs, parameters)
     blur = where(lost > 0.0, lost / e, 0.0)
-    return Start(state, side, signs, time_unit(e, d, dd), (at, {also_on}), isnt(e >= 0.0), blur)
+    return Start(state, side, signs, time_unit(e, d, dd), (at, {also_on}), not_(e >= 0.0), blur)
 '''
 
 EVENT = '''
@@ -51,7 +51,7 @@ def advance_{order}(memory, i):
     {load}
     parameters = ({parameters})
     {begin}
-    done = active & isnt(active)
+    done = active & not_(active)
     for _ in range(EVENTS):
         moving = active & (verdict < REFUSED)
         leg = to_event_{order}(
@@ -60,7 +60,7 @@ def advance_{order}(memory, i):
         verdict = where((leg.hangs | leg.grazing) & (verdict < GRAZING), GRAZING, verdict)
         refused = where(leg.stuck, STICKS, where(leg.broken, OUT_OF_RANGE, verdict))
         verdict = where(leg.lost, STEP_LIMIT_MET, refused)
-        moving = moving & (verdict < REFUSED) & isnt(leg.grazing)
+        moving = moving & (verdict < REFUSED) & not_(leg.grazing)
         {land}
         h = leg.h
         {ons} = leg.on
@@ -69,10 +69,10 @@ def advance_{order}(memory, i):
         switches = moving & (on_0 > 0.5)
         kinks_met = where(switches, 0.0, where(moving, kinks_met + 1.0, kinks_met))
         {turn}
-        if some(switches):
+        if any_lane(switches):
             count = where(switches, count + 1.0, count)
             watched = switches & ((count < 1.5) | (count >= flips))
-            if some(watched):
+            if any_lane(watched):
                 faint = underflows(({states}), side, ({signs}), parameters, unit)
                 verdict = where(watched & faint, OUT_OF_RANGE, verdict)
                 rate = rates(({states}), side, ({signs}), parameters)
@@ -92,13 +92,13 @@ def advance_{order}(memory, i):
         steps, before = where(active, leg.tried, steps), where(active, steps, before)
         verdict = where(moving & (kinks_met > KINK_LIMIT), STEP_LIMIT_MET, verdict)
         done = active & (leg.grazing | (verdict >= REFUSED) | (count >= flips))
-        if some(leg.grazing):
+        if any_lane(leg.grazing):
             {nothing}
-        if some(done):
+        if any_lane(done):
             break
     stage = where(done, 3.0, where(active, 2.0, stage))
     {store}
-    return some(done)
+    return any_lane(done)
 
 
 @kept

@@ -3,10 +3,10 @@
 BEGIN = """\
 fresh = (stage > 0.5) & (stage < 1.5)
 active = fresh | ((stage > 1.5) & (stage < 2.5))
-if some(fresh):
+if any_lane(fresh):
     start = begun(flips, parameters)
     {begin}
-    endless = isnt((flips >= 1.0) & (flips < math.inf))
+    endless = not_((flips >= 1.0) & (flips < math.inf))
     unsure = where(start.blur <= {blur}, 0.0, INACCURATE)
     verdict = where(fresh, where(start.beyond | endless, BAD_INPUT, unsure), verdict)
 """

@@ -18,8 +18,8 @@ def doubted_{order}(trial, unsure, facts, series):
         {judge_all}
         proved = {all_proved}
         {falls_of_unsure}
-        unsure = unsure & isnt(proved)
-        if not some(unsure):
+        unsure = unsure & not_(proved)
+        if not any_lane(unsure):
             break
         trial = where(unsure, 0.5 * trial, trial)
     return trial, unsure, {no_falls}
@@ -43,7 +43,7 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
     {states} = state
     {ons} = on
     moving, t, span, tried = active, 0.0 * h, h, 0.0 * h
-    nothing = active & isnt(active)
+    nothing = active & not_(active)
     {no_passed} = {nothings}
     {no_now} = {nothings}
     {no_margins}
@@ -64,36 +64,36 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
         trial = h
         if step == 0:
             {sum_last}
-            broken = active & isnt(last < math.inf)
+            broken = active & not_(last < math.inf)
             {start}
             stuck = active & ({any_stuck})
             trial = where({any_now}, 0.0, h)
             {margins}
-            moving = moving & isnt(broken | stuck)
+            moving = moving & not_(broken | stuck)
         tried = where(moving, tried + 1.0, tried)
         {look}
         {judge}
-        unsure = moving{and_seen} & isnt({all_sure})
-        if some(unsure):
+        unsure = moving{and_seen} & not_({all_sure})
+        if any_lane(unsure):
             trial, unsure, {no_falls} = doubted_{order}(
                 trial, unsure, ({facts_of_all}), ({series_of_all})
             )
         grazing = grazing | unsure
-        moving = moving & isnt(unsure)
+        moving = moving & not_(unsure)
         steps = moving & fine{and_seen}
         {ends}
         {passed}
         meets = steps & ({any_passed})
         span = where(meets, trial, span)
-        steps = steps & isnt(meets)
+        steps = steps & not_(meets)
         {advance}
         t = where(steps, t + trial, t)
         {off}
-        moving = moving & isnt(meets)
-        if not some(moving):
+        moving = moving & not_(meets)
+        if not any_lane(moving):
             break
     lost = moving
-    met = active & isnt(lost | stuck | broken | grazing)
+    met = active & not_(lost | stuck | broken | grazing)
     end, which, hangs = span, -1.0 - 0.0 * h, nothing
     {roots}
     {with_it}
@@ -133,10 +133,10 @@ falls_0 = (rises(-lead, -dd_0) & clear_{nested}) | now_0"""
 
 ROOT = """\
 first = met & passed_{j}
-if some(first):
+if any_lane(first):
     {among}
     at, only_just = crossing({watched}, (offset_{j}, factor_{j}, {value}), span, tolerance, first)
-    end, which, hangs = where(first, at, end), where(first, {j}.0, which), (hangs & isnt(first)) | only_just"""
+    end, which, hangs = where(first, at, end), where(first, {j}.0, which), (hangs & not_(first)) | only_just"""
 
 
 def look(states, order, hides):
@@ -255,7 +255,7 @@ class LegSource:
             "sum_last": "last = " + " + ".join(f"magnitude(s_{s}[-1])" for s in self.states),
             "start": self._lines(START),
             "margins": self._lines(MARGIN),
-            "any_stuck": " | ".join(self._each("((on_{j} > 0.5) & isnt(away_{j}))")),
+            "any_stuck": " | ".join(self._each("((on_{j} > 0.5) & not_(away_{j}))")),
             "any_now": " | ".join(self._each("now_{j}")),
         }
 
@@ -281,7 +281,7 @@ class LegSource:
         return {
             "judge_all": "\n".join(doubts),
             "all_proved": " & ".join(self._each("(clear_{j} | down_{j})")),
-            "falls_of_unsure": self._lines("falls_{j} = (unsure & down_{j}) | (falls_{j} & isnt(unsure))"),
+            "falls_of_unsure": self._lines("falls_{j} = (unsure & down_{j}) | (falls_{j} & not_(unsure))"),
             "facts_of_all": facts,
             "series_of_all": series,
             "unpack_facts": f"{facts} = facts",

@@ -48,7 +48,7 @@ from kernels.maths.intervals import (
     multiplied, of_exp, of_log, of_power, of_sqrt, of_wave, over, smallest, times, widened,
 )
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import dot, fma, horner, isnt, magnitude, some, sqrt, where
+from kernels.lanes.vectors import dot, fma, horner, not_, magnitude, any_lane, sqrt, where
 from kernels.maths.pairs import two_sum
 from kernels.lanes.refill import each_refilled
 from kernels.codegen.module import kept

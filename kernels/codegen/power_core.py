@@ -45,7 +45,7 @@ def core_{i}(state, side, signs, parameters, unit, tolerance, leaves, t, margin)
     value, nothing = power(base, {n}), 0.0 * side
     {full} = with_power_{i}(state, side, signs, parameters, unit, value)
     core, longest, nears = nothing - 1.0, nothing + FAR, sign_{kink} * full_{u} < 0.0
-    if some(nears):
+    if any_lane(nears):
         {bare} = with_power_{i}(state, side, signs, parameters, unit, nothing)
         over = 1.0 / magnitude(full_{u})
         t_{u}, d = base * over, magnitude(full_{u} - bare_{u}) * over
@@ -58,8 +58,8 @@ def core_{i}(state, side, signs, parameters, unit, tolerance, leaves, t, margin)
         left = t_{u} / (1.0 - {n})
         rests = settles & no_matter(base, left, t, margin)
         core = where(rests, value * (1.0 - {n}), core)
-        longest = where(settles & isnt(rests), SHORT * left, longest)
-    if some(leaves):
+        longest = where(settles & not_(rests), SHORT * left, longest)
+    if any_lane(leaves):
         {bare} = with_power_{i}(state, side, signs, parameters, unit, nothing)
         {most} = with_power_{i}(state, side, signs, parameters, unit, nothing + 1.0)
         capacity = nothing + FAR

@@ -35,7 +35,7 @@ from kernels.integrate.fixed_step import follow
 from kernels.integrate.records import Limits, Motion, Scheme, Tally
 from kernels.lanes.codes import BAD_INPUT, INACCURATE, REFUSED
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import fma, isnt, magnitude, some, where
+from kernels.lanes.vectors import fma, not_, magnitude, any_lane, where
 from kernels.lanes.refill import each_refilled
 from kernels.codegen.module import kept
 
@@ -97,7 +97,7 @@ def advance(memory, i):
     done = active & (ended | (verdict >= REFUSED))
     stage = where(done, 3.0, where(active, 2.0, stage))
     {store}
-    return some(done)
+    return any_lane(done)
 
 
 @kept

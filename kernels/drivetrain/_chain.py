@@ -13,7 +13,7 @@ import numpy as np
 
 from kernels.lanes.codes import BAD_INPUT, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import exponent, isnt, nearest, where
+from kernels.lanes.vectors import exponent, nearest, not_, where
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW
 
 MASS_LIMIT = 64
@@ -54,9 +54,9 @@ def units(n, at, J, k):
     """Exponents e_J, e_k of 2^e near the largest inertia and stiffness, both even; and whether all is in range."""
     low_J, high_J = extremes(n, at, J)
     low_k, high_k = extremes(n, at, k)
-    free = isnt(high_k > 0.0)  # one inertia alone
+    free = not_(high_k > 0.0)  # one inertia alone
     sound = normal_spread(low_J, high_J) & (free | normal_spread(low_k, high_k))
-    e_J, e_k = exponent(where(sound, high_J, 1.0)), exponent(where(sound & isnt(free), high_k, 1.0))
+    e_J, e_k = exponent(where(sound, high_J, 1.0)), exponent(where(sound & not_(free), high_k, 1.0))
     return 2.0 * nearest(0.5 * e_J), 2.0 * nearest(0.5 * e_k), sound
 
 

@@ -28,7 +28,7 @@ from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.columns import entry
 from kernels.lanes.groups import GROUP, cells_at, each_group, room
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
+from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
 from kernels.maths.elementary import is_normal, scale
 
 SWEEP_LIMIT = 200
@@ -80,13 +80,13 @@ def _sweep(m, n, at, rows, shift, active):
     d = old_q - shift
     nothing = 0.0 * d
     row = _Row(old_q, d, nothing, nothing, nothing)
-    lost, sums = isnt(d >= 0.0), (nothing, nothing)
+    lost, sums = not_(d >= 0.0), (nothing, nothing)
     for j in range(m - 2):
         row = _next_row(j, n, at, rows, shift, active, row)
-        sums, lost = (sums[0] + row.u, sums[1] + row.h), lost | isnt(row.d >= 0.0)
+        sums, lost = (sums[0] + row.u, sums[1] + row.h), lost | not_(row.d >= 0.0)
     fewest = sums
     row = _next_row(m - 2, n, at, rows, shift, active, row)
-    sums, lost = (sums[0] + row.u, sums[1] + row.h), lost | isnt(row.d >= 0.0)
+    sums, lost = (sums[0] + row.u, sums[1] + row.h), lost | not_(row.d >= 0.0)
     left = rows[at(n + m - 1)]
     q = row.d + left
     u, h = _next(row.e, 1.0 / q, row.u, row.h)
@@ -163,7 +163,7 @@ def _unfinished(m, n, at, rows, before, found):
     """
     q, e = rows[at(m - 1)], rows[at(n + m - 2)]
     apart = (q * before < 0.5) & (e * (q * before) <= 0.5 * _TINY * (found + q))
-    return _tied(m, n, at, rows, before, found) & isnt(apart)
+    return _tied(m, n, at, rows, before, found) & not_(apart)
 
 
 @jit
@@ -182,7 +182,7 @@ def _split(m, n, at, rows, found):
     for j in range(m - 1, 0, -1):
         limit = found * (found / (found + rows[at(j)]))
         joined = _joined(rows[at(n + j - 1)], rows[at(2 * n + j - 1)], limit)
-        end = where(isnt(joined) & (row < j), j, end)
+        end = where(not_(joined) & (row < j), j, end)
     return end
 
 
@@ -205,7 +205,7 @@ def _rotate(m, n, at, rows, found, active, sums):
     rows[at(n + m - 1)] = 0.0 * found
     for j in range(1, m):
         rows[at(n + j - 1)] = where(magnitude(left - j) < 0.5, 0.0, rows[at(n + j - 1)])
-    while some(left > 0.0):
+    while any_lane(left > 0.0):
         q, e = rows[at(0)], rows[at(n)]
         for j in range(m):
             next_q, next_e = (q, e) if j == m - 1 else (rows[at(j + 1)], rows[at(n + j + 1)])
@@ -227,7 +227,7 @@ def _insert(m, n, at, value, frequency):
     frequency[at(m)] = value
     for j in range(m, n - 1):
         low, high = frequency[at(j)], frequency[at(j + 1)]
-        if not some(low > high):
+        if not any_lane(low > high):
             return
         frequency[at(j)], frequency[at(j + 1)] = where(low > high, high, low), where(low > high, low, high)
 
@@ -235,9 +235,9 @@ def _insert(m, n, at, value, frequency):
 @jit
 def _isolate(m, n, at, rows, sums, found, rest, failed):
     """Steps until the last of m > 1 rows is an eigenvalue: the sums, what was found in all as two numbers, failures."""
-    active = isnt(failed) & ((rows[at(n + m - 1)] > 0.0) | _unfinished(m, n, at, rows, sums[2], found))
+    active = not_(failed) & ((rows[at(n + m - 1)] > 0.0) | _unfinished(m, n, at, rows, sums[2], found))
     steps = 0
-    while some(active) and steps < SWEEP_LIMIT:
+    while any_lane(active) and steps < SWEEP_LIMIT:
         shift = where(active, _shift(m, sums[0], sums[1], found), 0.0)
         lost, new_sums = _sweep(m, n, at, rows, shift, active)
         sums = choose(active, new_sums, sums)
@@ -245,7 +245,7 @@ def _isolate(m, n, at, rows, sums, found, rest, failed):
         rest = rest + (shift - (total - found))
         found = total
         failed = failed | (active & lost)
-        active = active & isnt(lost) & _unfinished(m, n, at, rows, sums[2], found)
+        active = active & not_(lost) & _unfinished(m, n, at, rows, sums[2], found)
         steps += 1
         if steps % PATIENCE == 0:
             sums = _rotate(m, n, at, rows, found, active, sums)
@@ -281,7 +281,7 @@ def frequencies(n, at, J, k, frequency, rows):
     failed = _eigenvalues(n, at, rows, sums, frequency)
     for j in range(n):
         f = scale(sqrt(frequency[at(j)]), 0.5 * (e_k - e_J))
-        sound = sound & (is_normal(f) | (isnt(k[at(n - 1)] > 0.0) & (j == 0)))
+        sound = sound & (is_normal(f) | (not_(k[at(n - 1)] > 0.0) & (j == 0)))
         frequency[at(j)] = f
     return where(sound, where(failed, NOT_CONVERGED, OK), OUT_OF_RANGE)
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from kernels.drivetrain._chain import Scaled, extremes, same, units
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import choose, exponent, fma, magnitude, some, where
+from kernels.lanes.vectors import any_lane, choose, exponent, fma, magnitude, where
 from kernels.maths import complex
 from kernels.maths.elementary import scale
 
@@ -42,7 +42,7 @@ def _renormed(way):
     x, g, e, work = way
     size = magnitude(x[0]) + magnitude(x[1]) + magnitude(g[0]) + magnitude(g[1])
     off = (size > _FAR) | (size < 1.0 / _FAR)
-    if some(off):
+    if any_lane(off):
         own = where(off, exponent(where(size > 0.0, size, 1.0)), 0.0)
         x, g = complex.scaled(x, -own), complex.scaled(g, -own)
         e, work = e + own, scale(work, -2.0 * own)

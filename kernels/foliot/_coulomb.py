@@ -15,7 +15,7 @@ from kernels.foliot._single_loss import dry as dry_cycle
 from kernels.foliot._units import Cycle, errors
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import choose, fma, magnitude, some, sqrt, where
+from kernels.lanes.vectors import any_lane, choose, fma, magnitude, sqrt, where
 from kernels.maths.elementary import cbrt, exp, expm1, log1p, log_remainder, log_remainder3
 
 HALLEY_LIMIT = 40
@@ -59,7 +59,7 @@ def _root(double_k, rho, slack):
     z = _start(double_k, rho, slack)
     active = z > 0.0
     for _ in range(HALLEY_LIMIT):
-        if not some(active):
+        if not any_lane(active):
             break
         u, _, m3, l3 = _parts(z, rho, slack)
         miss = rho * u * u / (slack * (1.0 + rho)) + slack * m3 + (1.0 + rho) * l3 - double_k

@@ -22,7 +22,7 @@ from kernels.foliot._single_loss import without_degree_0
 from kernels.foliot._units import Cycle, errors
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import fma, isnt, magnitude, some, sqrt, where
+from kernels.lanes.vectors import any_lane, fma, magnitude, not_, sqrt, where
 from kernels.maths.elementary import exp, expm1, is_normal, log, log1p
 
 NEWTON_LIMIT = 60
@@ -113,7 +113,7 @@ def _terminal(law):
     u = where(drag, u, 0.0)
     active = drag & (d > 0.0) & (gamma > 0.0)
     for _ in range(NEWTON_LIMIT):
-        if not some(active):
+        if not any_lane(active):
             break
         D, G = exp(u + log_d), exp(fma(n, u, log_gamma))
         step = (log(D + G) - left) * (D + G) / fma(n, G, D)
@@ -226,7 +226,7 @@ def _solve(law, terminal):
     low, high = 0.0 * y - _WIDEST, 0.0 * y + _WIDEST
     active = y > low
     for _ in range(NEWTON_LIMIT):
-        if not some(active):
+        if not any_lane(active):
             break
         excess, slope = _excess(law, terminal, y)
         low, high = where(excess < 0.0, y, low), where(excess < 0.0, high, y)
@@ -235,7 +235,7 @@ def _solve(law, terminal):
         new = y + step
         new = where(settled | ((new > low) & (new < high)), new, 0.5 * (low + high))
         y = where(active, new, y)
-        active = active & isnt(settled)
+        active = active & not_(settled)
     return y, active
 
 
@@ -345,9 +345,9 @@ def solve_quadrature(scene, rtol):
     _, m0, m1, m2 = _leg(law, speeds.a, speeds.b)
     e, near = law.e, speeds.z > _NEAR
     time, rise, s = 0.0 * y, 0.0 * y, 0.0 * y
-    if some(isnt(near)):
+    if any_lane(not_(near)):
         time, rise, s = _strong(law, terminal, y)
-    if some(near):
+    if any_lane(near):
         late, high, weak = _weak(law, terminal, y)
         time, rise, s = where(near, late, time), where(near, high, rise), where(near, weak, s)
     amplitude = 1.0 + where(e > 0.0, v1 * v1 * (e * e) * rise, 0.0)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 from kernels.integrate.nystrom import integrate_until
 from kernels.lanes.jit import jit, jit_call, jit_inline
 from kernels.lanes.records import named
-from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
+from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
 from kernels.maths.elementary import exp, power, sincos
 
 HELP_LIMIT = 1000
@@ -166,10 +166,10 @@ def _drag(speed, gamma, n, floor):
 def _forces(x, v, leg, terms):
     """Force towards the switch with that of friction, tau - 1, and the slopes of the force by x and by v."""
     extra, by_x = 0.0 * x, 0.0 * x
-    if some(terms.ripple.depth > 0.0):
+    if any_lane(terms.ripple.depth > 0.0):
         extra, by_x = _ripple(x, terms.ripple.depth, terms.ripple.wave)
     lost, by_v = 0.0 * x, 0.0 * x
-    if some(terms.power.gamma > 0.0):
+    if any_lane(terms.power.gamma > 0.0):
         lost, by_v = _drag(magnitude(v), terms.power.gamma, terms.power.n, terms.power.floor)
     force = fma(terms.kappa, x, leg.steady + extra) + fma(terms.drag, v, leg.sign * lost)
     return force, extra, terms.kappa + by_x, terms.drag + by_v
@@ -219,7 +219,7 @@ def _ends(state, acceleration, law):
 def pull(x, terms):
     """Force of torque and spring towards the switch, tau + kappa x, less 1."""
     extra = 0.0 * x
-    if some(terms.ripple.depth > 0.0):
+    if any_lane(terms.ripple.depth > 0.0):
         extra, _ = _ripple(x, terms.ripple.depth, terms.ripple.wave)
     return fma(terms.kappa, x, extra)
 
@@ -232,13 +232,13 @@ def _released(x, slack, terms):
     held, free = x, 0.0 * x - 1.0
     searching = depth > 0.0
     for i in range(_SCAN):
-        if not some(searching):
+        if not any_lane(searching):
             break
         there = x - (i + 1.0) * step
         found = searching & (slack + pull(there, terms) > 0.0)
-        held = where(searching & isnt(found), there, held)
+        held = where(searching & not_(found), there, held)
         free = where(found & (there > -1.0), there, free)
-        searching = searching & isnt(found)
+        searching = searching & not_(found)
     for _ in range(_BISECTIONS):
         middle = 0.5 * (held + free)
         wins = slack + pull(middle, terms) > 0.0
@@ -284,7 +284,7 @@ def _to_switch(state, law, inwards):
     """The state of what goes on uniformly inwards, at the switch; and the time from here."""
     uniform = inwards & (named(Swing, state).decay > law.leg.forgotten - 1e-3)
     time = 0.0 * law.leg.sign
-    if some(uniform):
+    if any_lane(uniform):
         rest, coast = _coasted(state, law)
         state, time = choose(uniform, rest, state), where(uniform, coast, 0.0)
     return state, time
@@ -293,7 +293,7 @@ def _to_switch(state, law, inwards):
 @jit
 def _helped(state, leg, stopped, problem, zero):
     """The state and the leg where what has stopped is let go again."""
-    if some(stopped):
+    if any_lane(stopped):
         slack = problem.dry.inwards - problem.dry.held
         free = _released(named(Swing, state).x, slack, problem.terms)
         state = choose(stopped, (free, zero, zero, zero, zero, zero, zero), state)
@@ -310,31 +310,31 @@ def half_swing(start, problem, tolerance, active):
     moving, rising = active, active & (start > 0.0)
     power = problem.terms.power
     rough = (power.gamma > 0.0) & (power.n < 2.0)
-    helped, lost = active & isnt(active), active & isnt(active)
+    helped, lost = active & not_(active), active & not_(active)
     behind, jump = _turned(state, turns, problem)
     outwards = Leg(one, problem.dry.outwards, zero + math.inf, problem.stiffness)
     state, leg = choose(rising, state, (one, start, *behind[2:])), choose(rising, outwards, _inwards(zero, problem))
     time, h, top, top_by_start = zero, problem.first, one, zero
     for _ in range(HELP_LIMIT):
-        if not some(moving):
+        if not any_lane(moving):
             break
         law = Law(leg, problem.terms)
         state, spent, h, late = integrate_until(_ends, accelerations, _scales, state, law, h, tolerance, moving)
-        time, lost, moving = time + spent, lost | late, moving & isnt(late)
+        time, lost, moving = time + spent, lost | late, moving & not_(late)
         turning, swing = moving & rising, named(Swing, state)
         top, top_by_start = where(turning, swing.x, top), where(turning, swing.x_start, top_by_start)
         behind, ratio = _turned(state, turns, problem)
         state, jump = choose(turning, behind, state), where(turning, ratio, jump)
         leg = choose(turning, _inwards(swing.decay, problem), leg)
         h = where(turning & rough, _CAREFUL * h, h)
-        state, coast = _to_switch(state, Law(leg, problem.terms), moving & isnt(rising))
+        state, coast = _to_switch(state, Law(leg, problem.terms), moving & not_(rising))
         time = time + coast
-        stopped = moving & isnt(rising) & (named(Swing, state).x + 1.0 > _ARRIVED + _ROUNDED * top)
-        helped, rising = helped | stopped, rising & isnt(turning)
+        stopped = moving & not_(rising) & (named(Swing, state).x + 1.0 > _ARRIVED + _ROUNDED * top)
+        helped, rising = helped | stopped, rising & not_(turning)
         state, leg = _helped(state, leg, stopped, problem, zero)
         moving = turning | (stopped & (named(Swing, state).x > -1.0))
     swing = named(Swing, state)
-    end = where(moving | (helped & isnt(swing.v < 0.0)), zero, -swing.v)
+    end = where(moving | (helped & not_(swing.v < 0.0)), zero, -swing.v)
     return Half(end, state, leg, top, top_by_start, time, where(helped, 0.0, jump * exp(-swing.decay)), helped, lost)
 
 
@@ -356,12 +356,12 @@ def problem_of(scene, ripple, rtol):
     d, rho, rho_s, gamma, n, kappa, e = scene[:7]
     depth, harmonic = ripple
     slack = _slack(scene)
-    dry, viscous = where(n > 0.0, 0.0, gamma), where((n > 0.0) & isnt(n < 1.0) & isnt(n > 1.0), gamma, 0.0)
+    dry, viscous = where(n > 0.0, 0.0, gamma), where((n > 0.0) & not_(n < 1.0) & not_(n > 1.0), gamma, 0.0)
     rho, slack, d = rho + dry, slack - dry, d + viscous
     other = dry + viscous < gamma
     gamma, n = where(other, gamma, 0.0), where(other, n, 1.0)
     by_drag, by_power = d / slack, 0.0 * d
-    if some(other):
+    if any_lane(other):
         by_power = where(other, power(gamma / slack, 1.0 / n), 0.0)
     pace = by_drag + by_power
     stiffness = d + n * slack * by_power
@@ -379,6 +379,6 @@ def problem_of(scene, ripple, rtol):
 def _held(gamma, n, floor):
     """Power-law friction at rest: what `_drag` gives below `floor`."""
     held = 0.0 * gamma
-    if some(floor > 0.0):
+    if any_lane(floor > 0.0):
         held = where(floor > 0.0, gamma * power(floor, n), 0.0)
     return held

@@ -18,7 +18,7 @@ from kernels.foliot._half_swing import Law, Swing, accelerations, half_swing, pr
 from kernels.lanes.codes import INACCURATE, NOT_CONVERGED, OK, STEP_LIMIT, STICKS
 from kernels.lanes.jit import jit, jit_inline
 from kernels.lanes.records import named
-from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
+from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
 
 NEWTON_LIMIT = 60
 SMOOTH = (0.0, 0.0)
@@ -170,7 +170,7 @@ def _next_tolerance(tolerance, wanted, relative, slope, steady):
 def _too_stiff(problem):
     """Whether a stable step would be so short that a swing takes more than the limit."""
     varied = (problem.terms.kappa > 0.0) | problem.rippled
-    return isnt(problem.stiffness * problem.pace < where(varied, _STIFFEST, _STIFFEST_UNIFORM))
+    return not_(problem.stiffness * problem.pace < where(varied, _STIFFEST, _STIFFEST_UNIFORM))
 
 
 @jit
@@ -200,18 +200,18 @@ def _settled(problem, relative, apart, steep):
 @jit
 def _judged(problem, search, half, step, apart, steep, cancels):
     """The verdict on a swing."""
-    rtol, relative, free = problem.rtol, step.relative, isnt(half.helped)
+    rtol, relative, free = problem.rtol, step.relative, not_(half.helped)
     wanted = search.tighter * _enough(problem, step.slope, named(Swing, half.state).decay)
     last_but_one, last = search.tolerance <= 1.5 * _CHECK * wanted, search.tolerance <= 1.5 * wanted
     at_rest = (half.end <= 0.0) & (search.v <= 0.0)
-    held = (problem.e >= 0.0) & isnt(1.0 + pull(half.top, problem.terms) > problem.rho_s)
+    held = (problem.e >= 0.0) & not_(1.0 + pull(half.top, problem.terms) > problem.rho_s)
     stuck = last_but_one & ((half.helped & (relative <= 0.2 * rtol)) | at_rest)
     settled = last & free & _settled(problem, relative, apart, steep)
     at_floor = (wanted < _FINEST) & (search.tolerance < _FINEST) & free & (relative <= rtol)
     blur = _larger(steep, cancels) * _V_ROUNDING
     right = settled & (wanted >= _FINEST) & (blur <= 0.3 * rtol * (1.0 - step.slope))
     status = where(half.lost, STEP_LIMIT, where(stuck | held, STICKS, where(right, OK, INACCURATE)))
-    loose = last & free & (search.before < 0.5 * rtol) & isnt(apart <= 0.3 * rtol)
+    loose = last & free & (search.before < 0.5 * rtol) & not_(apart <= 0.3 * rtol)
     return Verdict(settled | stuck | at_floor | half.lost, status, wanted, last_but_one, loose, at_rest)
 
 
@@ -264,9 +264,9 @@ def dopri5(scene, ripple, rtol):
     possible, stiff = problem.dry.inwards - problem.dry.held > 0.0, _too_stiff(problem)
     cycle, steep = (zero, zero, zero, zero, zero), zero
     verdict = where(possible, where(stiff, STEP_LIMIT, NOT_CONVERGED), STICKS)
-    active = possible & isnt(stiff)
+    active = possible & not_(stiff)
     for _ in range(NEWTON_LIMIT):
-        if not some(active):
+        if not any_lane(active):
             break
         tolerance = _larger(search.tolerance, _FINEST + zero)
         half = half_swing(problem.e * search.v, problem, tolerance, active)
@@ -277,6 +277,6 @@ def dopri5(scene, ripple, rtol):
         steep = _steepness(problem, search.before, steep, apart)
         judged = _judged(problem, search, half, step, apart, steep, cancels)
         done = active & judged.done
-        verdict, active = where(done, judged.status, verdict), active & isnt(done)
+        verdict, active = where(done, judged.status, verdict), active & not_(done)
         search = _following(problem, search, step, judged, apart, active)
     return cycle, verdict

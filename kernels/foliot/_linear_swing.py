@@ -22,7 +22,7 @@ from kernels.foliot._units import Cycle, Legs, errors
 from kernels.integrate import linear_flow
 from kernels.lanes.codes import NO_METHOD, NOT_CONVERGED, NOT_SELF_STARTING, OK, STICKS
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import fma, isnt, magnitude, some, sqrt, where
+from kernels.lanes.vectors import any_lane, fma, magnitude, not_, sqrt, where
 from kernels.maths.elementary import exp, expm1
 
 NEWTON_LIMIT = 100
@@ -193,10 +193,10 @@ def _search(scene):
     active = energy < 1.0
     comes = active
     for _ in range(NEWTON_LIMIT):
-        if not some(active):
+        if not any_lane(active):
             break
         gain, noise, _, legs = _turn(scene, energy)
-        comes = comes & (legs.comes | isnt(active))
+        comes = comes & (legs.comes | not_(active))
         active = active & legs.comes
         _, rest = _area(scene, legs)
         low, high = where(gain > 0.0, energy, low), where(gain > 0.0, high, energy)
@@ -205,7 +205,7 @@ def _search(scene):
         change = magnitude(guess - energy)
         settled = (change <= 1e-10 * energy) | (change * rest <= noise)
         energy = where(active, guess, energy)
-        active = active & isnt(settled)
+        active = active & not_(settled)
     return energy, comes, active
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from kernels.foliot._units import Cycle, errors
 from kernels.lanes.jit import jit
-from kernels.lanes.vectors import choose, fma, isnt, some, sqrt, where
+from kernels.lanes.vectors import any_lane, choose, fma, not_, sqrt, where
 from kernels.maths.elementary import arctan, exp, expm1, log1p
 
 ROUNDING = 2e-15
@@ -32,7 +32,7 @@ class Law(NamedTuple):
 @jit
 def without_degree_0(scene):
     """The law of friction of a scene."""
-    dry = isnt(scene.n > 0.0)
+    dry = not_(scene.n > 0.0)
     rho, slack = where(dry, scene.rho + scene.gamma, scene.rho), where(dry, scene.slack - scene.gamma, scene.slack)
     gamma = where(dry, 0.0, scene.gamma)
     return Law(scene.d, rho, gamma, where(gamma > 0.0, scene.n, 1.0), scene.e, slack)
@@ -42,12 +42,12 @@ def without_degree_0(scene):
 def pure(scene):
     """The cycle where one loss acts alone, and whether one does."""
     d, rho, gamma, n, e, slack = without_degree_0(scene)
-    smooth, elastic = isnt(d > 0.0) & isnt(scene.kappa > 0.0), e >= 1.0
-    alone = smooth & elastic & (rho > 0.0) & isnt(gamma > 0.0)
-    drag = smooth & elastic & isnt(rho > 0.0) & (gamma > 0.0) & (n >= 2.0) & (n <= 2.0)
-    switch = smooth & isnt(elastic) & isnt(rho > 0.0) & isnt(gamma > 0.0)
+    smooth, elastic = not_(d > 0.0) & not_(scene.kappa > 0.0), e >= 1.0
+    alone = smooth & elastic & (rho > 0.0) & not_(gamma > 0.0)
+    drag = smooth & elastic & not_(rho > 0.0) & (gamma > 0.0) & (n >= 2.0) & (n <= 2.0)
+    switch = smooth & not_(elastic) & not_(rho > 0.0) & not_(gamma > 0.0)
     cycle = choose(alone, dry(where(alone, rho, 0.5), where(alone, slack, 0.5)), _switch(where(switch, e, 0.0)))
-    if some(drag):
+    if any_lane(drag):
         cycle = choose(drag, _drag(where(drag, gamma, 1.0)), cycle)
     return cycle, alone | drag | switch
 

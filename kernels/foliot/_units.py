@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged, or_none
-from kernels.lanes.vectors import isnt, nearest, sqrt, where
+from kernels.lanes.vectors import nearest, not_, sqrt, where
 from kernels.maths.elementary import is_normal, mantissa_exponent, power, scale
 from kernels.maths.pairs import two_sum
 
@@ -175,7 +175,7 @@ def _strength(mu, c, n, speed):
 @jit
 def _kept(x, group):
     """Whether a group is a normal number where its parameter is not zero."""
-    return isnt(x > 0.0) | is_normal(group)
+    return not_(x > 0.0) | is_normal(group)
 
 
 @jit

@@ -15,7 +15,7 @@ from kernels.foliot._units import Outputs, errors
 from kernels.foliot._viscous_fit import AMPLITUDE_STRONG, GAP_WEAK, OVERSHOOT_WEAK, Q_STRONG, SENSITIVITY_STRONG, SPLIT
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged, or_none
-from kernels.lanes.vectors import choose, fma, horner, isnt, magnitude, some, sqrt, where
+from kernels.lanes.vectors import any_lane, choose, fma, horner, magnitude, not_, sqrt, where
 from kernels.maths.elementary import cbrt, exp, exp_remainder, is_normal, log_remainder, mantissa_exponent, scale
 
 ROUNDING = 1e-15
@@ -62,9 +62,9 @@ def without_dimensions(p):
     Scaling by powers of two is exact, so the bits do not depend on whether a neighbouring cell needed it.
     """
     mu, phi0, a = p.mu, p.phi0, p.a
-    wild = isnt(_tame(mu) & _tame(phi0) & _tame(a))
+    wild = not_(_tame(mu) & _tame(phi0) & _tame(a))
     e_mu, e_phi, e_a = 0.0, 0.0, 0.0
-    if some(wild):
+    if any_lane(wild):
         mu, e_mu = mantissa_exponent(mu)
         phi0, e_phi = mantissa_exponent(phi0)
         a, e_a = mantissa_exponent(a)
@@ -73,7 +73,7 @@ def without_dimensions(p):
     top_rest = fma(square, phi0, -top) + fma(a, a, -square) * phi0
     k = top / mu
     rest = (fma(-k, mu, top) + top_rest) / mu
-    if some(wild):
+    if any_lane(wild):
         n = 2.0 * e_a + e_phi - e_mu
         k, rest = scale(k, n), scale(rest, n)
     return k, rest, Scaled(mu, phi0, a, e_mu, e_phi, e_a, wild, is_normal(k))
@@ -92,7 +92,7 @@ def dimensional(units, cycle):
     """
     q, a = cycle.q, units.m_a
     period, swing, speed = q / (0.25 * a), cycle.amplitude * units.m_phi, cycle.lam * units.m_mu / a
-    if some(units.wild):
+    if any_lane(units.wild):
         period = scale(0.0625 * q / a, 6.0 - units.e_a)  # 4 q may be too large where 4 q/a is not
         swing, speed = scale(swing, units.e_phi), scale(speed, units.e_mu - units.e_a)
     timed, wide, fast = is_normal(period), is_normal(swing), is_normal(speed)
@@ -117,11 +117,11 @@ def closed(k, rest):
     strong = k < SPLIT
     none = 0.0 * k
     q, lam, amplitude, sensitivity = none, none, none, none
-    if some(strong):
+    if any_lane(strong):
         q, lam, amplitude, sensitivity = _closed_strong(k)
     decay = exp(-2.0 * where(strong, q, k))
     cycle = ViscousCycle(q, lam, amplitude, sensitivity, decay)
-    if some(isnt(strong)):
+    if any_lane(not_(strong)):
         return choose(strong, cycle, _closed_weak(k, rest, decay))
     return cycle
 
@@ -175,9 +175,9 @@ def asymptotic(k):
     """
     strong, none = k < SPLIT, 0.0 * k
     cycle = ViscousCycle(none, none, none, none, none)
-    if some(strong):
+    if any_lane(strong):
         cycle = _asymptotic_strong(k)
-    if some(isnt(strong)):
+    if any_lane(not_(strong)):
         return choose(strong, cycle, _asymptotic_weak(k))
     return cycle
 
@@ -254,11 +254,11 @@ def event_map(k, rtol):
     u, z = next_speed(k)
     active = u > -1.0
     for _ in range(MAP_LIMIT):
-        if not some(active):
+        if not any_lane(active):
             break
         new, new_z = next_speed(fma(2.0, k, log_remainder(u)))
         room = where(new < 1.0 - new, new / (1.0 - new), 1.0)
-        unsettled = isnt(magnitude(new - u) <= 0.25 * rtol * (u + new) * room)
+        unsettled = not_(magnitude(new - u) <= 0.25 * rtol * (u + new) * room)
         u, z = where(active, new, u), where(active, new_z, z)
         active = active & unsettled
     q = u + k
@@ -271,7 +271,7 @@ def event_map_bound(k):
     """Four times the rounding error of `event_map`: its map forgets only a share 2b of an error, b = cbrt(3k) small."""
     strong = k < SPLIT
     b = 0.0 * k + 1.0
-    if some(strong):
+    if any_lane(strong):
         b = cbrt(3.0 * where(strong, k, 1.0))
     cycle = 8e-15 + 2e-15 / b
     return errors(cycle, cycle, cycle + where(k < 400.0, 4e-15 * k, 0.0))

@@ -25,7 +25,7 @@ from kernels.foliot._units import Foliot
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, NEVER_STARTS, NO_LIMIT_CYCLE, NO_METHOD, NOT_CONVERGED, OK
 from kernels.lanes.jit import jit
-from kernels.lanes.vectors import isnt, where
+from kernels.lanes.vectors import not_, where
 from kernels.lanes.wiring import kernel, method
 
 
@@ -146,7 +146,7 @@ def check(p):
     allowed = known & small & (n < math.inf) & (k < math.inf) & (R_s >= R) & (e > -1.0) & (e <= 1.0)
     friction = where(k > 0.0, R, R_s)  # a spring helps stiction be overcome
     spare = _units.spare_torque(mu, friction, where(n > 0.0, 0.0, c))
-    lossless = isnt((a > 0.0) | (R > 0.0) | (c > 0.0) | (e < 1.0))
+    lossless = not_((a > 0.0) | (R > 0.0) | (c > 0.0) | (e < 1.0))
     verdict = where(spare > 0.0, where(lossless, NO_LIMIT_CYCLE, OK), NEVER_STARTS)
     return where(allowed, verdict, BAD_INPUT)
 

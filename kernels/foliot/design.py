@@ -14,7 +14,7 @@ from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, NOT_CONVERGED, OK
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged, or_none
-from kernels.lanes.vectors import magnitude, some, where
+from kernels.lanes.vectors import any_lane, magnitude, where
 from kernels.lanes.wiring import kernel, method
 from kernels.maths.elementary import is_normal, mantissa_exponent, scale
 
@@ -45,7 +45,7 @@ def _inverse_alpha(overshoot):
     k = 1.125 / (overshoot * (overshoot * overshoot + 3.0 * overshoot + 3.666))
     active = k > 0.0
     for _ in range(_NEWTON_LIMIT):
-        if not some(active):
+        if not any_lane(active):
             break
         gap = _viscous.gap(k)
         now = _viscous.overshoot(k)

@@ -31,7 +31,7 @@ from kernels.lanes.codes import BAD_INPUT, INACCURATE, NOT_SELF_STARTING, OK, OU
 from kernels.lanes.groups import GROUP, cells_at
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.records import read
-from kernels.lanes.vectors import choose, fma, isnt, magnitude, nearest, some, sqrt, where
+from kernels.lanes.vectors import any_lane, choose, fma, magnitude, nearest, not_, sqrt, where
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths import philox
 from kernels.maths.elementary import exp, expm1, is_normal, mantissa_exponent, scale
@@ -100,7 +100,7 @@ def _least_torque(scene):
 @jit_call
 def _correlation(tau_c):
     """r and sqrt(1 - r^2) of (1); white where tau_c = 0."""
-    white = isnt(tau_c > 0.0)
+    white = not_(tau_c > 0.0)
     tau_c = where(white, 1.0, tau_c)
     return where(white, 0.0, exp(-1.0 / tau_c)), where(white, 1.0, sqrt(-expm1(-2.0 / tau_c)))
 
@@ -136,14 +136,14 @@ def _beat(run, averages, z, clock):
     scene = clock.scene
     x = where(run.t > 0.0, fma(clock.remembered, run.x, clock.fresh * z), z)
     torque = fma(clock.sigma, x, 1.0)
-    short = isnt(torque > clock.floor)
+    short = not_(torque > clock.floor)
     torque = where(short, clock.floor, torque)
     start = scene.e * run.speed
     legs = _linear_swing.half_swing(torque, scene, start)
     goes_on = legs.comes & ((start < 0.0) | (fma(scene.kappa, legs.top, torque) > scene.rho_s))
     later = run.t + legs.time
     passes = later >= (averages.closed + 1.0) * clock.tau
-    if some(passes):
+    if any_lane(passes):
         averages = choose(passes, _closed(averages, run, legs.time, clock), averages)
     truncated = where(short, run.truncated + 1.0, run.truncated)
     return Run(x, legs.speed, later, run.gain + (clock.nominal - legs.time), truncated), averages, goes_on
@@ -171,10 +171,10 @@ def _run(first, seed, half_swings, clock, speed, active, radii, turns):
             z_0, z_1 = philox.gaussians(radii[row], turns[row])
             for second in range(2):
                 active = active & (2.0 * (chunk * PAIRS + j) + second < count)
-                if not some(active):
+                if not any_lane(active):
                     break
                 new, newer, goes_on = _beat(run, averages, where(second > 0, z_1, z_0), clock)
-                stopped = stopped | (active & isnt(goes_on))
+                stopped = stopped | (active & not_(goes_on))
                 active = active & goes_on
                 run, averages = choose(active, new, run), choose(active, newer, averages)
     return run, averages, stopped
@@ -228,7 +228,7 @@ def segments(first, columns, radii, turns):
     columns.rate_scatter_s_per_day[i] = where(enough, SECONDS_PER_DAY * deviation, math.nan)
     columns.truncated[i] = run.truncated / p.half_swings
     accurate = _uncertainty(scene, cycle) <= columns.rtol[i]
-    verdict = _verdict(found, enough, accurate, stopped | isnt(least < 1.0))
+    verdict = _verdict(found, enough, accurate, stopped | not_(least < 1.0))
     fine = units.fine & is_normal(clock.tau) & (t < _COUNTABLE * clock.tau)
     columns.status[i] = where(fine | (verdict >= FIRST_REFUSAL), verdict, OUT_OF_RANGE)
 
@@ -244,7 +244,7 @@ def _counts(x, low, high):
     """Whether x is a whole number within limits below 2^51."""
     inside = (x >= low) & (x <= high)
     whole = where(inside, x, 0.5)
-    return inside & isnt(magnitude(whole - nearest(whole)) > 0.0)
+    return inside & not_(magnitude(whole - nearest(whole)) > 0.0)
 
 
 @jit

@@ -26,7 +26,7 @@ from kernels.lanes.groups import GROUP, cells_at, write_row
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.ranges import or_none, partly
 from kernels.lanes.records import read
-from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, where
+from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import is_normal, scale
 
@@ -60,7 +60,7 @@ def _held(scene, x):
     rho_s, kappa = scene.rho_s, scene.kappa
     pull = fma(kappa, x, 1.0)
     unsure = (kappa > 0.0) & (magnitude(pull - rho_s) <= _linear_swing.ROUNDING * (magnitude(kappa * x) + rho_s))
-    return isnt(pull > rho_s), unsure
+    return not_(pull > rho_s), unsure
 
 
 @jit_call
@@ -92,14 +92,14 @@ def _release(scene, x, way):
     wrong = rounded + _linear_swing.ROUNDING * way * magnitude(push * slope) / (speed * speed)
     late = rounded * way / speed + _linear_swing.ROUNDING * time
     near = (push > 0.0) & _near_miss(scene, 0.0 * way, push, 0.0 * way, way)
-    unsure = unsure | _either(through, wrong > UNSURE, near & isnt(held))
-    return Flip(time, 0.0 * time, speed, wrong, late), through & isnt(held), unsure
+    unsure = unsure | _either(through, wrong > UNSURE, near & not_(held))
+    return Flip(time, 0.0 * time, speed, wrong, late), through & not_(held), unsure
 
 
 @jit
 def _either(condition, yes, no):
     """`where` for conditions."""
-    return (condition & yes) | (isnt(condition) & no)
+    return (condition & yes) | (not_(condition) & no)
 
 
 @jit_call
@@ -108,7 +108,7 @@ def _next(scene, flip):
     start = scene.e * flip.speed
     legs = _linear_swing.half_swing(1.0, scene, start)
     held, unsure = _held(scene, legs.top)
-    turns = isnt(start < 0.0)
+    turns = not_(start < 0.0)
     kept, longer = _linear_swing.slopes(scene, start, legs)
     energy_noise, time_noise = _linear_swing.own_noise(scene, start, legs)
     wrong = fma(kept * start * start, flip.wrong, energy_noise) / (legs.speed * legs.speed)
@@ -118,14 +118,14 @@ def _next(scene, flip):
     unsure = (turns & unsure) | _either(legs.comes, wrong > UNSURE, near)
     later = flip.time + legs.time
     low = flip.low + (legs.time - (later - flip.time))
-    return Flip(later, low, legs.speed, wrong, late), legs.comes & isnt(turns & held), unsure
+    return Flip(later, low, legs.speed, wrong, late), legs.comes & not_(turns & held), unsure
 
 
 @jit
 def _onward(scene, now, going, unsure, flips):
     """So many flips on from `now`: the last that came, where all came, and where the last digits decided."""
     for _ in range(flips):
-        if some(going):
+        if any_lane(going):
             new, comes, grazes = _next(scene, now)
             unsure = unsure | (going & grazes)
             going = going & comes
@@ -162,7 +162,7 @@ def _error(flip):
 def _verdict(scene, x, starts, going, accurate, unsure):
     """On a start from rest at x: whether it starts, goes on, and is known well enough."""
     verdict = where(accurate, where(going, OK, COMES_TO_REST), INACCURATE)
-    held = isnt(magnitude(fma(scene.kappa, x, 1.0)) > scene.rho_s)
+    held = not_(magnitude(fma(scene.kappa, x, 1.0)) > scene.rho_s)
     verdict = where(starts, verdict, where(held, NEVER_STARTS, STICKS))
     return where(unsure, GRAZING, verdict)
 
@@ -176,15 +176,15 @@ def _follow(first, columns, row):
     fine = units.fine & is_normal(way)
     released, starts, doubt = _release(scene, x, where(fine, way, 1.0))
     now, going, unsure, here = released, starts, doubt, 1.0
-    whole, accurate, given = fine, fine, isnt(going)
+    whole, accurate, given = fine, fine, not_(going)
     for j in range(flip.size):
         if flip[j] < here:
             now, going, here = released, starts, 1.0
         now, going, unsure = _onward(scene, now, going, unsure, int(flip[j] - here))
         here = flip[j]
         time, speed, some_normal, normal = _in_units(units, now)
-        whole, given = whole & (normal | isnt(going)), given | some_normal
-        accurate = accurate & ((_error(now) <= columns.rtol[i]) | isnt(going))
+        whole, given = whole & (normal | not_(going)), given | some_normal
+        accurate = accurate & ((_error(now) <= columns.rtol[i]) | not_(going))
         write_row(first, j, where(going, time, math.nan), row, columns.flip_time)
         write_row(first, j, where(going, speed, math.nan), row, columns.flip_speed)
     verdict = partly(whole, _verdict(scene, x, starts, going, accurate, unsure))
@@ -209,7 +209,7 @@ def _row():
 def check(p):
     """BAD_INPUT as for `foliot`, and NEVER_STARTS without torque; a clock that loses nothing may start."""
     verdict = check_foliot(_units.terms(p))
-    bad = isnt(magnitude(verdict - BAD_INPUT) > 0.0) | isnt(magnitude(p.phi_start) < math.inf)
+    bad = not_(magnitude(verdict - BAD_INPUT) > 0.0) | not_(magnitude(p.phi_start) < math.inf)
     return where(bad, BAD_INPUT, where(p.mu > 0.0, OK, NEVER_STARTS))
 
 

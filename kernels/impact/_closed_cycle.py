@@ -30,7 +30,7 @@ import math
 from kernels.impact._units import Cycle
 from kernels.lanes.codes import GRAZING, INACCURATE, NO_CYCLE, NO_METHOD, OK, UNSTABLE
 from kernels.lanes.jit import jit
-from kernels.lanes.vectors import choose, fma, isnt, magnitude, sqrt, where
+from kernels.lanes.vectors import choose, fma, magnitude, not_, sqrt, where
 from kernels.maths import pairs
 from kernels.maths.cubic import largest_modulus
 
@@ -175,12 +175,12 @@ def verdict(exists, stable, doubt, rtol):
 @jit
 def closed(scene, rtol):
     """The cycle, the share of time in contact, and the status."""
-    plastic = isnt(scene.e > 0.0)
+    plastic = not_(scene.e > 0.0)
     nu, tame = bent(scene)
     cycle, doubt = impact_cycle(scene, nu)
     pushed, held = plastic_cycle(scene)
     status = where(tame, verdict(existence(scene, nu), stability(scene, nu), doubt, rtol), NO_CYCLE)
-    straight = isnt(magnitude(scene.nu) > 0.0)
+    straight = not_(magnitude(scene.nu) > 0.0)
     status = where(plastic, where(straight, OK, NO_METHOD), status)
     share = where(plastic, held, 0.0)
-    return choose(plastic, pushed, cycle), where(isnt(scene.e < 0.0), share, math.nan), status
+    return choose(plastic, pushed, cycle), where(not_(scene.e < 0.0), share, math.nan), status

@@ -22,7 +22,7 @@ from kernels.impact._closed_cycle import verdict as judged
 from kernels.impact._units import Cycle, Scene
 from kernels.lanes.codes import INACCURATE, NO_CYCLE, NO_METHOD, NOT_CONVERGED, OK
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
+from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
 from kernels.maths.cubic import largest_modulus
 from kernels.maths.pairs import add, negative, over, scaled, shifted, times
 
@@ -186,9 +186,9 @@ def fixed_point(scene):
     none = (0.0 * scene.e, 0.0 * scene.e)
     t = flight(scene, state)
     misses, J = residuals(scene, state, t)
-    active = isnt(scene.e < 0.0)
+    active = not_(scene.e < 0.0)
     for _ in range(NEWTON_LIMIT):
-        if not some(active):
+        if not any_lane(active):
             break
         columns = derivative(scene, none, FixedPoint(state, t, J, active))
         place, wait, push = misses
@@ -199,7 +199,7 @@ def fixed_point(scene):
         misses, pushed = residuals(scene, state, t)
         J = choose(active, pushed, J)
         moved = magnitude(y) + magnitude(v) + magnitude(w)
-        active = active & isnt(moved <= _CONVERGED * (magnitude(state.Y[0]) + magnitude(state.W[0])))
+        active = active & not_(moved <= _CONVERGED * (magnitude(state.Y[0]) + magnitude(state.W[0])))
     return FixedPoint(state, t, J, active)
 
 
@@ -249,7 +249,7 @@ def _stability(scene, coefficients):
 def _told_apart(scene):
     """Whether both masses and the restitution are large enough for 32 digits."""
     masses = (scene.wheel[0] > _LEAST) & (scene.pallet[0] > _LEAST)
-    return masses & ((scene.e > _LEAST) | isnt(scene.e > 0.0))
+    return masses & ((scene.e > _LEAST) | not_(scene.e > 0.0))
 
 
 @jit
@@ -318,9 +318,9 @@ def escape_speed(scene):
     wheel, eta = scene.wheel, scene.eta
     start = sqrt(fma(2.0, eta[0], 0.5 * wheel[0]))
     c = (start, 0.0 * start)
-    active = isnt(start < 0.0)
+    active = not_(start < 0.0)
     for _ in range(NEWTON_LIMIT):
-        if not some(active):
+        if not any_lane(active):
             break
         (t, R, _), (delay, faster, _) = push(scene, c)
         speeds = add(R, _twice(c))
@@ -329,7 +329,7 @@ def escape_speed(scene):
         slope = wheel[0] * fma(delay[0], speeds[0], t[0] * (faster[0] + 2.0)) - 8.0 * c[0]
         step = residual / slope
         c = choose(active, shifted(c, -step), c)
-        active = active & isnt(magnitude(step) <= _CONVERGED * c[0])
+        active = active & not_(magnitude(step) <= _CONVERGED * c[0])
     return c, active
 
 
@@ -356,12 +356,12 @@ def plastic_cycle(scene, rtol):
 def half_cycle(scene, rtol):
     """The cycle, the share of time in contact, and the status."""
     wheel, pallet, kappa, eta, slack, e, curvature = scene
-    plastic, lossy = isnt(e > 0.0), e < MOST_KEPT
+    plastic, lossy = not_(e > 0.0), e < MOST_KEPT
     nu, tame = bent(scene)
     cycle, status = impact_cycle(Scene(wheel, pallet, kappa, eta, slack, where(lossy, e, 0.5), nu), nu, rtol)
     pushed, held, verdict = plastic_cycle(scene, rtol)
     status = where(tame & lossy, status, NO_CYCLE)
-    straight = isnt(magnitude(curvature) > 0.0)
+    straight = not_(magnitude(curvature) > 0.0)
     status = where(plastic, where(straight, verdict, NO_METHOD), status)
-    status = where(_told_apart(scene) | isnt(lossy), status, NO_METHOD)
+    status = where(_told_apart(scene) | not_(lossy), status, NO_METHOD)
     return choose(plastic, pushed, cycle), where(plastic, held, 0.0), status

@@ -22,7 +22,7 @@ from typing import NamedTuple
 from kernels.lanes.codes import BAD_INPUT, NEVER_MEETS, NEVER_STARTS, OK
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none
-from kernels.lanes.vectors import choose, isnt, magnitude, nearest, sqrt, where
+from kernels.lanes.vectors import choose, magnitude, nearest, not_, sqrt, where
 from kernels.maths import pairs as _pairs
 from kernels.maths.elementary import in_unit, is_normal, mantissa_exponent, scale
 
@@ -164,7 +164,7 @@ def length(units, x):
 @jit
 def _normal_or_none(x, result):
     """Whether a result is a normal number where what it comes from is not 0."""
-    return isnt(magnitude(x) > 0.0) | is_normal(magnitude(result))
+    return not_(magnitude(x) > 0.0) | is_normal(magnitude(result))
 
 
 @jit
@@ -181,9 +181,9 @@ def refusal(p):
     small = (p.torque < math.inf) & (p.I_c < math.inf) & (p.I_v < math.inf) & (p.r_c < math.inf) & (p.r_v < math.inf)
     odd = (p.teeth >= 3.0) & (p.teeth <= MOST_TEETH)
     pairs = 0.5 * (where(odd, p.teeth, 3.0) - 1.0)
-    odd = odd & isnt(magnitude(nearest(pairs) - pairs) > 0.0)
+    odd = odd & not_(magnitude(nearest(pairs) - pairs) > 0.0)
     allowed = known & small & odd & (p.h < math.inf) & (p.e >= 0.0) & (p.e < 1.0) & (magnitude(p.nu) < math.inf)
     _, slack = _escape(where(allowed, p.r_c, 1.0), where(allowed, p.teeth, 3.0), where(allowed, p.h, 0.0))
-    meets = (slack[0] > 0.0) | (isnt(slack[0] < 0.0) & isnt(p.e > 0.0))
+    meets = (slack[0] > 0.0) | (not_(slack[0] < 0.0) & not_(p.e > 0.0))
     verdict = where(p.torque > 0.0, where(meets, OK, NEVER_MEETS), NEVER_STARTS)
     return where(allowed, verdict, BAD_INPUT)

@@ -18,7 +18,7 @@ from kernels.integrate.steps import ONE, events
 from kernels.integrate.taylor import COME_UP, next_step
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.tuples import after, boxes, marks, reached, times
-from kernels.lanes.vectors import choose, isnt, magnitude, some, where
+from kernels.lanes.vectors import any_lane, choose, magnitude, not_, where
 
 STEP_LIMIT = 10_000
 SAFETY = 0.25
@@ -111,7 +111,7 @@ def on_dense(m, pair, mode, step, terms, which, first, seeking):
     low, high, part = 0.0 * h, 0.0 * h + 1.0, first
     slope = 0.0 * h
     for _ in range(ROOT_LIMIT):
-        if not some(seeking):
+        if not any_lane(seeking):
             break
         values, slopes = events(m, pair.dense(step.state, terms, h, part), mode)
         value, slope = of_event(values, which), where(seeking, of_event(slopes, which), slope)
@@ -154,10 +154,10 @@ def onto_event(m, pair, mode, step, trial, course, which, tolerance, seeking, en
     other = curved & (part < 0.999999) & (part > 0.0)
     other = other & passed_another(events(m, found.state, mode)[0], which, course.on)
     shorter = where(other, part * course.h, ending.shorter)
-    loose = curved & isnt(other) & (found.vague > tolerance)
+    loose = curved & not_(other) & (found.vague > tolerance)
     shorter = where(loose, course.h * where(part < 0.9, 1.05 * part, 0.5), shorter)
     margin = of_event(margins(course, tolerance), which)
-    hangs = curved & isnt(other | loose) & only_just(step, which, found.rate, margin)
+    hangs = curved & not_(other | loose) & only_just(step, which, found.rate, margin)
     new, taken = choose(seeking, found.state, ending.new), where(seeking, part * course.h, ending.taken)
     again = ending.again | other | loose
     return Ending(new, taken, again, shorter, loose, ending.stuck, ending.grazing, hangs)
@@ -184,26 +184,26 @@ def allowed(m, pair, mode, step, trial, course, tolerance):
     fine = (error <= 1.0) & finite(trial.new)
     longer = next_length(pair, course.h, error)
     seen = hides_nothing(m, step, trial.stages[0], trial.last, mode, tolerance)
-    longer = where(seen | isnt(fine), longer, COME_UP * course.h)
-    again, nothing = course.moving & isnt(fine & seen), course.moving & isnt(course.moving)
+    longer = where(seen | not_(fine), longer, COME_UP * course.h)
+    again, nothing = course.moving & not_(fine & seen), course.moving & not_(course.moving)
     return longer, Ending(trial.new, course.h, again, longer, nothing, nothing, nothing, nothing)
 
 
 @jit
 def searched(m, pair, mode, step, trial, course, which, tolerance, ending):
     """The ending, on the event that the step meets; or again, for it may hide a root of an event."""
-    fine, was_cut = course.moving & isnt(ending.again), isnt(course.cuts < 0.5)
+    fine, was_cut = course.moving & not_(ending.again), not_(course.cuts < 0.5)
     met = fine & (which > -0.5)
     pressed = met & (of_event(course.on, which) > 0.5)
     away = of_event(step.start_rates, which) > 0.0
-    low = where(fine & isnt(met | was_cut), dip(step), 0.0)
+    low = where(fine & not_(met | was_cut), dip(step), 0.0)
     again = ending.again | (pressed & away) | (low > 0.0)
     shorter = where(ending.again, ending.shorter, where(low > 0.0, low * course.h, 0.5 * course.h))
-    close = was_cut & fine & isnt(met) & near_an_event(step.end, course.on, margins(course, tolerance))
-    stuck, nothing = pressed & isnt(away), ending.loose
+    close = was_cut & fine & not_(met) & near_an_event(step.end, course.on, margins(course, tolerance))
+    stuck, nothing = pressed & not_(away), ending.loose
     ending = Ending(ending.new, ending.taken, again, shorter, nothing, stuck, close, nothing)
-    seeking = met & isnt(pressed)
-    if some(seeking):
+    seeking = met & not_(pressed)
+    if any_lane(seeking):
         ending = onto_event(m, pair, mode, step, trial, course, which, tolerance, seeking, ending)
     return ending
 
@@ -215,8 +215,8 @@ def troubled(troubles, course, step, ending, cuts):
     return Troubles(
         troubles.stuck | ending.stuck,
         troubles.lost | (moving & (cuts > CUTS)),
-        troubles.blown | (moving & isnt(finite(step.new))),
-        troubles.broken | (moving & isnt(course.h > 1e-280)),
+        troubles.blown | (moving & not_(finite(step.new))),
+        troubles.broken | (moving & not_(course.h > 1e-280)),
         troubles.grazing | ending.grazing,
         troubles.hangs | ending.hangs,
     )
@@ -225,12 +225,12 @@ def troubled(troubles, course, step, ending, cuts):
 @jit
 def moved_on(course, step, ending, which, longer, cuts, given_up):
     """The course behind a step."""
-    moved = course.moving & isnt(ending.again | given_up)
+    moved = course.moving & not_(ending.again | given_up)
     done, start = moved & (which > -0.5), choose(moved, step.end, course.start)
     return Course(
         choose(moved, ending.new, course.state),
         where(moved, course.t + ending.taken, course.t),
-        where(ending.again, ending.shorter, where(moved & isnt(done), longer, course.h)),
+        where(ending.again, ending.shorter, where(moved & not_(done), longer, course.h)),
         choose(moved, marks(0.0 * course.h - 1.0, course.on), course.on),
         choose(done, marks(which, course.on), course.fired),
         start,
@@ -238,7 +238,7 @@ def moved_on(course, step, ending, which, longer, cuts, given_up):
         reached(course.wide, start),
         cuts,
         where(course.moving, course.tried + 1.0, course.tried),
-        course.moving & isnt(done | given_up),
+        course.moving & not_(done | given_up),
     )
 
 
@@ -253,7 +253,7 @@ def one_step(m, pair, mode, unit, tolerance, course, troubles):
     longer, plain = allowed(m, pair, mode, step, trial, course, tolerance)
     ending = searched(m, pair, mode, step, trial, course, which, tolerance, plain)
     once_more = where(ending.again, course.cuts, 0.0)
-    cuts = where(ending.again & isnt(plain.again | ending.loose), course.cuts + 1.0, once_more)
+    cuts = where(ending.again & not_(plain.again | ending.loose), course.cuts + 1.0, once_more)
     troubles = troubled(troubles, course, step, ending, cuts)
     given_up = troubles.stuck | troubles.grazing | troubles.broken | troubles.lost
     return moved_on(course, step, ending, which, longer, cuts, given_up), troubles
@@ -262,14 +262,14 @@ def one_step(m, pair, mode, unit, tolerance, course, troubles):
 @jit_call
 def to_event(m, pair, state, mode, unit, h, on, tolerance, active):
     """Follow the active lanes until an event falls through 0, and stop there; see `leg_source`."""
-    none, zero, unmarked = active & isnt(active), 0.0 * h, times(0.0, on)
+    none, zero, unmarked = active & not_(active), 0.0 * h, times(0.0, on)
     start, start_rates = events(m, state, mode)
     wide = reached(unmarked, start)
     course = Course(state, zero, h, on, unmarked, start, start_rates, wide, zero, zero, active)
     troubles = Troubles(none, none, none, none, none, none)
     for _ in range(STEP_LIMIT):
         course, troubles = one_step(m, pair, mode, unit, tolerance, course, troubles)
-        if not some(course.moving):
+        if not any_lane(course.moving):
             break
     lost = troubles.lost | course.moving
     return Leg(
@@ -278,7 +278,7 @@ def to_event(m, pair, state, mode, unit, h, on, tolerance, active):
         course.h,
         course.fired,
         troubles.stuck,
-        lost & isnt(troubles.blown),
+        lost & not_(troubles.blown),
         troubles.broken | (lost & troubles.blown),
         troubles.grazing,
         troubles.hangs,

@@ -12,7 +12,7 @@ from kernels.integrate.records import Mode
 from kernels.integrate.steps import dop853, dopri5, euler, events, moreau, rk4, semi_implicit, verlet
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.tuples import but_last, with_last
-from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
+from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
 
 METHODS = ("euler", "semi_implicit", "verlet", "rk4", "dopri5", "dop853", "moreau")
 EULER, SEMI_IMPLICIT, VERLET, RK4, DOPRI5, DOP853, MOREAU = range(7)
@@ -65,7 +65,7 @@ def cubic_root(e0, e1, m0, m1, seeking):
     low, high = 0.0 * e0, 0.0 * e0 + 1.0
     s = e0 / (e0 - e1)
     for _ in range(ROOT_LIMIT):
-        if not some(seeking):
+        if not any_lane(seeking):
             break
         value, slope = cubic(s, e0, e1, m0, m1)
         low, high = where(value > 0.0, s, low), where(value > 0.0, high, s)
@@ -106,11 +106,11 @@ def shortened(m, scheme, mode, step, which, first, seeking):
     low, high, part, trials = 0.0 * h, 0.0 * h + 1.0, first, 0.0 * h
     above, below = of_event(step.start, which), of_event(step.end, which)
     new = leap(m, scheme, step.state, mode, part * h)
-    settled, last = seeking & isnt(seeking), 0.0 * h
+    settled, last = seeking & not_(seeking), 0.0 * h
     for _ in range(ROOT_LIMIT):
         trials = where(seeking, trials + 1.0, trials)
-        seeking = seeking & isnt(settled)
-        if not some(seeking):
+        seeking = seeking & not_(settled)
+        if not any_lane(seeking):
             break
         value = of_event(events(m, new, mode)[0], which)
         before = value > 0.0

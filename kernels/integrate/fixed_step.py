@@ -29,7 +29,7 @@ from kernels.lanes import codes
 from kernels.lanes.codes import GRAZING, INACCURATE, NOT_CONVERGED, OUT_OF_RANGE, REFUSED, STICKS
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.tuples import after, boxes, joined, marks, reached, times, turned
-from kernels.lanes.vectors import choose, isnt, magnitude, some, where
+from kernels.lanes.vectors import any_lane, choose, magnitude, not_, where
 
 STEP_LIMIT = 20_000
 """Steps between two switches after which a cell is given up."""
@@ -55,7 +55,7 @@ def first_event(step, on, natural):
         part = where(start[j] > 0.0, start[j] / (start[j] - end[j]), 0.0)
         passed = (end[j] <= 0.0) & (part < earliest)
         if natural:
-            passed = passed & isnt((on[j] > 0.5) & (step.end_rates[j] > 0.0))
+            passed = passed & not_((on[j] > 0.5) & (step.end_rates[j] > 0.0))
         which, earliest = where(passed, float(j), which), where(passed, part, earliest)
     return which
 
@@ -69,7 +69,7 @@ def dip(step):
         s, low = lowest(start[j], end[j], h * step.start_rates[j], h * step.end_rates[j])
         smaller = where(start[j] < end[j], start[j], end[j])
         deep = turns & (low < LOW * smaller) & (s > 1e-3) & (s < 0.999)
-        at = where(deep & isnt((at > 0.0) & (at < s)), s, at)
+        at = where(deep & not_((at > 0.0) & (at < s)), s, at)
     return at
 
 
@@ -88,7 +88,7 @@ def passed_another(values, which, on):
     other = values[0] < -math.inf
     for j in range(len(values)):
         own = (which > j - 0.5) & (which < j + 0.5)
-        other = other | ((values[j] < 0.0) & isnt(own | (on[j] > 0.5)))
+        other = other | ((values[j] < 0.0) & not_(own | (on[j] > 0.5)))
     return other
 
 
@@ -138,14 +138,14 @@ def located(m, scheme, mode, step, which, seeking):
     """The part of the step at which the event fires, the state there, calls of the rates, and whether it is lost."""
     e0, e1, h = of_event(step.start, which), of_event(step.end, which), step.h
     part = where(e0 > 0.0, e0 / (e0 - e1), 0.0)
-    new, calls, lost = step.new, 0.0 * h, seeking & isnt(seeking)
+    new, calls, lost = step.new, 0.0 * h, seeking & not_(seeking)
     curved = seeking & (e0 > 0.0)
     if scheme.location in (HERMITE, ROOT):
         d0, d1 = of_event(step.start_rates, which), of_event(step.end_rates, which)
         part = where(curved, cubic_root(e0, e1, h * d0, h * d1, curved), part)
     if scheme.location == HENON:
         part, new, there = swapped(m, scheme, mode, step, which, e1)
-        lost = curved & isnt(there)
+        lost = curved & not_(there)
         calls = calls + where(scheme.method > 3.5, 12.0, 4.0) * scheme.substeps
         part, new = where(curved, part, 0.0), choose(curved, new, step.state)
     elif scheme.location == ROOT:
@@ -180,7 +180,7 @@ def hides_something(m, state, new, mode, h):
     seen = h <= math.inf
     for i in range(len(state)):
         seen = seen & (h * of_rates[i] <= HIDDEN * (magnitude(state[i]) + magnitude(new[i])))
-    return isnt(seen)
+    return not_(seen)
 
 
 @jit
@@ -196,7 +196,7 @@ def uncut(m, scheme, mode, motion, h):
 def onto_event(m, scheme, mode, step, which, on, seeking, trial):
     """The trial, ended on its event; to be tried again with that length where another event is behind by then."""
     part, found, calls, lost = located(m, scheme, mode, step, which, seeking)
-    other = seeking & (part < 0.999999) & (part > 0.0) & isnt(lost)
+    other = seeking & (part < 0.999999) & (part > 0.0) & not_(lost)
     other = other & passed_another(events(m, found, mode)[0], which, on)
     return Trial(
         choose(seeking, found, trial.new),
@@ -214,15 +214,15 @@ def searched(m, scheme, mode, step, which, motion, graze, met, missed, trial):
     on, was_cut = motion.on, motion.cuts > 0.5
     pressed = met & (of_event(on, which) > 0.5)
     away = of_event(step.start_rates, which) > 0.0
-    verdict = where(pressed & isnt(away), STICKS, trial.verdict)
-    low = where(missed & isnt(was_cut), dip(step), 0.0)
+    verdict = where(pressed & not_(away), STICKS, trial.verdict)
+    low = where(missed & not_(was_cut), dip(step), 0.0)
     again = (pressed & away) | (low > 0.0)
     shorter = where(low > 0.0, low * step.h, 0.5 * step.h)
     turning = missed & was_cut & near_an_event(step.end, on, times(graze, reached(times(0.0, on), step.start)))
     verdict = where(turning & (verdict < GRAZING), GRAZING, verdict)
     trial = Trial(trial.new, trial.taken, trial.calls, verdict, again, shorter)
-    seeking = met & isnt(pressed)
-    if some(seeking):
+    seeking = met & not_(pressed)
+    if any_lane(seeking):
         trial = onto_event(m, scheme, mode, step, which, on, seeking, trial)
     return trial
 
@@ -230,16 +230,16 @@ def searched(m, scheme, mode, step, which, motion, graze, met, missed, trial):
 @jit
 def tried(m, scheme, mode, step, which, motion, graze, active):
     """The step, judged."""
-    broken = active & isnt(finite(step.new) & finite(step.end))
-    met = active & (which > -0.5) & isnt(broken)
+    broken = active & not_(finite(step.new) & finite(step.end))
+    met = active & (which > -0.5) & not_(broken)
     verdict = where(broken, OUT_OF_RANGE, 0.0)
     if scheme.method == MOREAU:
-        rests = (magnitude(step.state[-1]) <= 0.0) & (magnitude(step.new[-1]) <= 0.0) & isnt(met)
+        rests = (magnitude(step.state[-1]) <= 0.0) & (magnitude(step.new[-1]) <= 0.0) & not_(met)
         verdict = where(active & rests, STICKS, verdict)
     calls = 0.0 * step.h + CALLS[scheme.method] * scheme.substeps
-    trial = Trial(step.new, step.h, calls, verdict, active & isnt(active), step.h)
+    trial = Trial(step.new, step.h, calls, verdict, active & not_(active), step.h)
     if not mode.natural:
-        missed = active & isnt(met | broken)
+        missed = active & not_(met | broken)
         trial = searched(m, scheme, mode, step, which, motion, graze, met, missed, trial)
     return trial
 
@@ -280,12 +280,12 @@ def attempt(m, scheme, parameters, limits, wide, motion, active):
     trial = tried(m, scheme, mode, step, which, motion, limits.graze, active)
     verdict = where(trial.again & (motion.cuts > CUTS), codes.STEP_LIMIT, trial.verdict)
     which = where(trial.again, -2.0, which)
-    moved = active & isnt(trial.again) & (verdict < REFUSED)
+    moved = active & not_(trial.again) & (verdict < REFUSED)
     if m.hides:
         hidden = moved & hides_something(m, motion.state, trial.new, mode, trial.taken)
         verdict = where(hidden & (verdict < INACCURATE), INACCURATE, verdict)
     below = moved & mode.natural & (which < -0.5) & (step.end[0] <= 0.0)  # not yet above where it began
-    on = choose(moved & isnt(below), marks(which, motion.on), motion.on)
+    on = choose(moved & not_(below), marks(which, motion.on), motion.on)
     motion = arrived(motion, trial, which, moved, on)
     return motion, Moved(which, where(moved, trial.taken, 0.0), trial.calls, verdict, wide, behind)
 
@@ -344,13 +344,13 @@ def behind_switch(tally, at, state, behind, switches):
 @jit_call
 def follow(m, scheme, parameters, limits, motion, tally, verdict, active):
     """A few steps of the active lanes: the records `motion` and `tally`, the verdict, and which are done."""
-    done = active & isnt(active)
+    done = active & not_(active)
     for _ in range(TOGETHER):
         motion, moved = attempt(m, scheme, parameters, limits, tally.wide, motion, active)
         verdict = where(active & (moved.verdict > verdict), moved.verdict, verdict)
         tally = counted(tally, motion.state, moved, active)
         switches = active & (moved.which > -0.5) & (moved.which < 0.5) & (verdict < REFUSED)
-        if some(switches):
+        if any_lane(switches):
             at = motion.state
             left = m.events(at, motion.side, motion.signs, parameters)[0][0]
             faint = m.underflows(at, motion.side, motion.signs, parameters, limits.step)
@@ -359,7 +359,7 @@ def follow(m, scheme, parameters, limits, motion, tally, verdict, active):
             tally = behind_switch(tally, at, motion.state, moved.behind, switches)
         verdict = where(active & (tally.trials > STEP_LIMIT) & (verdict < REFUSED), codes.STEP_LIMIT, verdict)
         ended = active & ((verdict >= REFUSED) | (tally.count >= limits.flips))
-        done, active = done | ended, active & isnt(ended)
-        if some(done):
+        done, active = done | ended, active & not_(ended)
+        if any_lane(done):
             break
     return motion, tally, verdict, done

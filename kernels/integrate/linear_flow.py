@@ -13,7 +13,7 @@ Errors: S and C 2e-15, K 6e-15, S' 2e-15 of its largest value (tests/kernels/int
 import math
 
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import fma, isnt, magnitude, some, sqrt, where
+from kernels.lanes.vectors import any_lane, fma, magnitude, not_, sqrt, where
 from kernels.maths.elementary import arctan, exp, log1p, sincos
 
 CROSSING_LIMIT = 200
@@ -98,7 +98,7 @@ def response(beta, kappa, t):
     p, w = beta * t, kappa * t * t
     near = (magnitude(p) <= 1.0) & (w <= 2.0)
     s, c, slope = _series(where(near, p, 0.0), where(near, w, 0.0))
-    if some(isnt(near)):
+    if any_lane(not_(near)):
         s_far, c_far, slope_far = _far(where(near, 2.0, p), where(near, 0.0, w))
         s, c, slope = where(near, s, s_far), where(near, c, c_far), where(near, slope, slope_far)
     return t * s, t * t * c, slope
@@ -125,11 +125,11 @@ def loss(beta, kappa, t):
     """
     p, w = beta * t, kappa * t * t
     damped, slow = magnitude(p) > 0.5, w <= 1.0
-    value = _loss_series(where(damped | isnt(slow), 0.0, p), where(damped | isnt(slow), 0.0, w))
-    if some(damped | isnt(slow)):
+    value = _loss_series(where(damped | not_(slow), 0.0, p), where(damped | not_(slow), 0.0, w))
+    if any_lane(damped | not_(slow)):
         s, c, _ = response(where(damped, p, 1.0), where(damped, w, 0.0), 0.0 * p + 1.0)
         by_energy = fma(c, 2.0 - where(damped, w, 0.0) * c, -s * s) / (4.0 * where(damped, p, 1.0))
-        swings = isnt(damped | slow)
+        swings = not_(damped | slow)
         by_angle = _loss_by_angle(where(swings, p, 0.0), where(swings, w, 2.0))
         value = where(damped, by_energy, where(slow, value, by_angle))
     return t * t * t * value
@@ -160,7 +160,7 @@ def _artanh_ratio(x, gap):
     for j in range(len(_SLOW) - 1, -1, -1):
         near = fma(near, x, _SLOW[j])
     z = sqrt(where(flat, 1.0, magnitude(x)))
-    steep = (x > 0.0) & isnt(flat)
+    steep = (x > 0.0) & not_(flat)
     far = 0.5 * log1p(2.0 * z * (1.0 + z) / where(steep, gap, 1.0))
     return where(flat, near, where(steep, far, arctan(z)) / z)
 
@@ -193,7 +193,7 @@ def reach(beta, kappa, v, f):
     turns = until < math.inf
     turning, _ = motion(beta, kappa, v, f, where(turns, until, 0.0))
     rest = where(kappa > 0.0, f / where(kappa > 0.0, kappa, 1.0), math.inf)
-    coasts = isnt((kappa > 0.0) | (f > 0.0) | isnt(beta > 0.0))
+    coasts = not_((kappa > 0.0) | (f > 0.0) | not_(beta > 0.0))
     return where(turns, turning, where(coasts, 0.5 * v / where(coasts, beta, 1.0), rest))
 
 
@@ -211,7 +211,7 @@ def first_crossing(beta, kappa, v, f, way):
     low = 2.0 * way / where(meets, v + sqrt(fma(v, v, 2.0 * fast * way)), 1.0)
     high, t, active = until, low, meets
     for _ in range(CROSSING_LIMIT):
-        if not some(active):
+        if not any_lane(active):
             break
         y, speed = motion(beta, kappa, v, f, t)
         miss = y - way
@@ -223,5 +223,5 @@ def first_crossing(beta, kappa, v, f, way):
         guess = where(inside, guess, fallback)
         settled = (magnitude(guess - t) <= 1e-11 * t) | (magnitude(miss) <= 4e-16 * way)
         t = where(active, guess, t)
-        active = active & isnt(settled)
+        active = active & not_(settled)
     return where(meets, t, math.inf)

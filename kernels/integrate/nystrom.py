@@ -16,7 +16,7 @@ import numpy as np
 
 from kernels.integrate.tableaux import DOPRI5, DOPRI5_ERROR
 from kernels.lanes.jit import jit, jit_call, jit_inline
-from kernels.lanes.vectors import choose, dot, exponent, fma, isnt, magnitude, pow2, some, where
+from kernels.lanes.vectors import any_lane, choose, dot, exponent, fma, magnitude, not_, pow2, where
 from kernels.maths.elementary import LN2, exp
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
@@ -160,13 +160,13 @@ def integrate_until(event, accelerations, scales, state, scene, h, tolerance, ac
     moving = active
     t = 0.0 * h
     for _ in range(STEP_LIMIT):
-        if not some(moving):
+        if not any_lane(moving):
             break
         new, error = dopri5_step(accelerations, state, scene, h, scales(state, scene))
         ratio = error / tolerance
         accepted = moving & (ratio <= 1.0)
         passed = accepted & (event(new, 0.0, scene)[0] <= 0.0)
-        moving = moving & isnt(passed)
+        moving = moving & not_(passed)
         accepted = accepted & moving
         state = choose(accepted, new, state)
         t = where(accepted, t + h, t)
@@ -187,7 +187,7 @@ def _locate(event, accelerations, scales, state, scene, h, active):
     new, _ = dopri5_step(accelerations, state, scene, shorter, scale)
     searching = active
     for _ in range(ROOT_LIMIT):
-        if not some(searching):
+        if not any_lane(searching):
             break
         value, rate = event(new, accelerations(new, scene)[0], scene)
         low, high = where(value > 0.0, shorter, low), where(value > 0.0, high, shorter)
@@ -197,5 +197,5 @@ def _locate(event, accelerations, scales, state, scene, h, active):
         shorter = where(searching, guess, shorter)
         trial, _ = dopri5_step(accelerations, state, scene, shorter, scale)
         new = choose(searching, trial, new)
-        searching = searching & isnt(settled)
+        searching = searching & not_(settled)
     return choose(active, new, state), where(active, shorter, 0.0)

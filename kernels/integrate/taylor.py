@@ -18,14 +18,14 @@ from kernels.lanes.vectors import (
     _function,
     _items,
     _number,
+    any_lane,
     exponent,
     fma,
     horner,
-    isnt,
     magnitude,
     nearest,
+    not_,
     pow2,
-    some,
     where,
 )
 
@@ -166,7 +166,7 @@ def size(h, series):
 def worse(first, second):
     """Of two pairs (what is left out, size) the one that is worse in its size; a state that stays 0 never is."""
     (x, of_x), (y, of_y) = first, second
-    smaller = (y * of_x <= x * of_y) & isnt(x <= 0.0)
+    smaller = (y * of_x <= x * of_y) & not_(x <= 0.0)
     return where(smaller, x, y), where(smaller, of_x, of_y)
 
 
@@ -224,8 +224,8 @@ _function(stays_apart, 1, lambda x: types.void, _lower_stays_apart)
 def falls(d, dd, ddd, rest, h):
     """Whether an event falls all along a step, by (1): from its coefficients 1 to 3, `rest` is A."""
     b, q = fma(2.0, dd, rest), 3.0 * ddd
-    turns = (q < 0.0) & (b > 0.0) & (fma(2.0 * h, q, b) < 0.0) & isnt(4.0 * (q * d) > b * b)
-    return (d <= 0.0) & (fma(h, fma(h, q, b), d) < 0.0) & isnt(turns)
+    turns = (q < 0.0) & (b > 0.0) & (fma(2.0 * h, q, b) < 0.0) & not_(4.0 * (q * d) > b * b)
+    return (d <= 0.0) & (fma(h, fma(h, q, b), d) < 0.0) & not_(turns)
 
 
 @jit
@@ -280,9 +280,9 @@ def crossing(at, curve, event, h, tolerance, searching):
         new = where((new >= low) & (new <= high), new, 0.5 * (low + high))
         change = magnitude(new - t)
         t = where(left, new, t)
-        left = left & isnt((change * change) * change <= enough * t * (before * before))
-        if not some(left):
+        left = left & not_((change * change) * change <= enough * t * (before * before))
+        if not any_lane(left):
             break
         before = change
     blur = GRAZING * tolerance * (magnitude(offset) + magnitude(factor * start))
-    return t, searching & isnt(magnitude(rate) > blur / magnitude(rate) * (2.0 * magnitude(bend)))
+    return t, searching & not_(magnitude(rate) > blur / magnitude(rate) * (2.0 * magnitude(bend)))

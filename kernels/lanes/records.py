@@ -24,7 +24,7 @@ from numba.core.imputils import impl_ret_borrowed
 from numba.extending import lower_builtin, overload, type_callable
 
 from kernels.lanes.jit import jit
-from kernels.lanes.vectors import isnt, where
+from kernels.lanes.vectors import not_, where
 
 
 def named(record: Any, values: Any) -> Any:
@@ -157,7 +157,7 @@ def _flat_values(builder, record, value):
 @jit
 def _worse(worst, wanted, error):
     """The larger of two errors where the second is wanted; inf for NaN."""
-    return where(wanted & isnt(error <= worst), where(error > worst, error, math.inf), worst)
+    return where(wanted & not_(error <= worst), where(error > worst, error, math.inf), worst)
 
 
 def largest(errors: Any, asked: Any, order: Any, given: Any) -> Any:

@@ -7,8 +7,8 @@ an integer means one cell, `lanes_at(i)` means cells i .. i + WIDTH - 1:
     def body(i, x, y):          # y[i] = x[i]^2 for one cell or WIDTH of them
         y[i] = x[i] * x[i]
 
-Branches become `where(condition, x, y)`; `some(condition)` ends a masked loop. In such a loop a finished lane is frozen
-by `where(active, new, old)`, or its bits would depend on its neighbours.
+Branches become `where(condition, x, y)`; `any_lane(condition)` ends a masked loop. In such a loop a finished lane is
+frozen by `where(active, new, old)`, or its bits would depend on its neighbours.
 Under NUMBA_DISABLE_JIT=1 only the one-cell form exists. `columns` has the loops.
 """
 
@@ -334,7 +334,7 @@ def _lower_where(context, builder, signature, values):
     return builder.select(condition, *operands)
 
 
-def some(condition):
+def any_lane(condition):
     """Whether the condition holds in at least one cell."""
     return bool(condition)
 
@@ -346,7 +346,7 @@ def _lower_some(context, builder, signature, values):
     return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 
 
-def isnt(condition):
+def not_(condition):
     """The opposite of a condition."""
     return not condition
 
@@ -357,8 +357,8 @@ def _lower_isnt(context, builder, signature, values):
 
 _function(where, 3, lambda condition, x, y: _number(condition, x, y), _lower_where)
 _function(choose, 3, _type_choose, _lower_choose)
-_function(some, 1, lambda condition: types.boolean, _lower_some)
-_function(isnt, 1, lambda condition: condition, _lower_isnt)
+_function(any_lane, 1, lambda condition: types.boolean, _lower_some)
+_function(not_, 1, lambda condition: condition, _lower_isnt)
 
 
 def lanes_at(i):

@@ -7,7 +7,7 @@ Source: W. Kahan, "To solve a real cubic equation", Berkeley PAM-352 (1986).
 """
 
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
+from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
 from kernels.maths import pairs
 from kernels.maths.elementary import cbrt, exponent, larger, scale
 
@@ -54,13 +54,13 @@ def _start(a2, a1, a0):
 def _descended(a2, a1, a0):
     """The lonely root, to float64 digits: Newton from outside until a step would turn back."""
     x, side = _start(a2, a1, a0)
-    active = isnt(magnitude(x) < 0.0)
+    active = not_(magnitude(x) < 0.0)
     for _ in range(_FLOAT_STEPS):
         value = fma(fma(x + a2, x, a1), x, a0)
         slope = fma(fma(3.0, x, 2.0 * a2), x, a1)
         new = x - value / where(slope > 0.0, slope, 1.0)
         active = active & (slope > 0.0) & (side * new > side * x)
-        if not some(active):
+        if not any_lane(active):
             break
         x = where(active, new, x)
     return x

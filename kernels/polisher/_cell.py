@@ -6,7 +6,7 @@ from typing import NamedTuple
 from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, LOCK_UP, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none
-from kernels.lanes.vectors import choose, magnitude, pow2, some, where
+from kernels.lanes.vectors import any_lane, choose, magnitude, pow2, where
 from kernels.polisher import extremes
 from kernels.polisher.extremes import Angles, Locks, Slopes
 from kernels.polisher.linkage import Lengths, Margins, in_units, margins, side_of
@@ -86,7 +86,7 @@ def locks(cell):
     """Crank angles at which a linkage locks; computed only where one does."""
     none = _none(cell)
     found, locked = Locks(none, none), said(cell.code, LOCK_UP)
-    if some(locked):
+    if any_lane(locked):
         return choose(locked, extremes.locks(cell.lengths, cell.margin), found)
     return found
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from kernels.lanes.groups import GROUP, cells_at, room
 from kernels.lanes.jit import jit, jit_call, jit_inline
-from kernels.lanes.vectors import choose, fma, isnt, magnitude, some, sqrt, where
+from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
 from kernels.maths.elementary import exp, sincos
 from kernels.polisher.extremes import smaller
 from kernels.polisher.linkage import Crank, acceleration, dead_gaps, direction, larger, opening, squares
@@ -185,11 +185,11 @@ def distortion(lengths, margin, even, turn):
     ratio = e / b
     few = smooth(lengths, margin)
     rest, lost = 0.0 * b, 0.0 * b
-    if some(few):
+    if any_lane(few):
         of_few, terms = few_harmonics(ratio, turn.bends)
         root = sqrt(of_few)
         rest, lost = where(few, root, rest), where(few, terms, lost)
-    if some(isnt(few)):
+    if any_lane(not_(few)):
         root = sqrt(all_harmonics(lengths, ratio, even, turn.openings))
         rest, lost = where(few, rest, root), where(few, lost, 2.0 + even.mean)
     fundamental = sqrt(fma(even.first, even.first, ratio * ratio))
@@ -244,17 +244,17 @@ def _top(lengths, margin, sign, peak):
     settled = (at_low > 0.0) & (at_high < 0.0)
     active, place, side = settled, node, 0.0 * node
     for _ in range(TRIES):
-        if not some(active):
+        if not any_lane(active):
             break
         new = (low * at_high - high * at_low) / (at_high - at_low)
         here = _slope(lengths, margin, sign, new, half)
-        up, down = active & (here > 0.0), active & isnt(here > 0.0)
+        up, down = active & (here > 0.0), active & not_(here > 0.0)
         at_low = where(up, here, where(down & (side < 0.0), 0.5 * at_low, at_low))
         at_high = where(down, here, where(up & (side > 0.0), 0.5 * at_high, at_high))
         low, high = where(up, new, low), where(down, new, high)
         side = where(up, 1.0, where(down, -1.0, side))
         place, done = where(active, new, place), magnitude(new - place) <= 1e-9
-        active = active & isnt(done)
+        active = active & not_(done)
     s, c = at_node(place, half)
     there = pace(lengths, margin, magnitude(s), c)
     top = sign * fma(half, there.opened, there.turn)

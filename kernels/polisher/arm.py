@@ -25,7 +25,7 @@ from kernels.lanes.groups import cells_at
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none
 from kernels.lanes.records import read, write
-from kernels.lanes.vectors import choose, isnt, where
+from kernels.lanes.vectors import choose, not_, where
 from kernels.lanes.wiring import kernel, method, tracing
 from kernels.polisher import _motor_waveform, _sampled_motion, _textbook_angles, extremes
 from kernels.polisher._cell import ROUNDING, Rates, Swing, judged, mirrored, moves, rocks, said, swing, turns
@@ -103,7 +103,7 @@ def _waveform(first, columns, turn):
     most, least, rate_doubt = _motor_waveform.rates(cell.lengths, cell.margin, turn)
     swings, rates = said(cell.code, OK), turns(cell)
     write(columns, i, Rates(or_none(thd, swings), or_none(most, rates), or_none(least, rates)))
-    wide = (rates & isnt(rate_doubt <= rtol)) | (swings & isnt(doubt <= rtol)) | isnt(rtol >= ROUNDING)
+    wide = (rates & not_(rate_doubt <= rtol)) | (swings & not_(doubt <= rtol)) | not_(rtol >= ROUNDING)
     columns.status[i] = where(wide & (cell.code < FIRST_REFUSAL), INACCURATE, cell.code)
 
 

@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, LOCK_UP, NO_ASSEMBLY, OK
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import choose, fma, horner, isnt, magnitude, some, sqrt, where
+from kernels.lanes.vectors import any_lane, choose, fma, horner, magnitude, not_, sqrt, where
 from kernels.maths.pairs import two_product, two_sum
 from kernels.polisher.linkage import Margins, larger, sum4
 
@@ -105,7 +105,7 @@ def verdict(lengths, margin):
     least = smaller(m1, smaller(sense * m2, sense * m3))
     turning = where(least > hair, where(e < b, OK, DOUBLE_CRANK), CHANGE_POINT)
     locked = least < -hair
-    if some(locked):
+    if any_lane(locked):
         return where(locked, where(_spare(b, d, f, e) < 0.0, NO_ASSEMBLY, LOCK_UP), turning)
     return turning
 
@@ -234,8 +234,8 @@ def square_sums(lengths):
     z2, z2_lost = two_sum(coupler, -arm)
     z1, z2 = z1 + (z1_lost + (coupler_lost + arm_lost)), z2 + (z2_lost + (coupler_lost - arm_lost))
     hair = NARROW * ((b2 + d2) + (f2 + e2))
-    narrow = isnt((magnitude(z1) > hair) & (magnitude(z2) > hair))
-    if some(narrow):
+    narrow = not_((magnitude(z1) > hair) & (magnitude(z2) > hair))
+    if any_lane(narrow):
         return choose(narrow, _narrow_square_sums(b, d, f, e), (z1, z2))
     return z1, z2
 

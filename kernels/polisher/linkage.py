@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from kernels.interface import Field
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import fma, isnt, magnitude, nearest, pow2, sqrt, where
+from kernels.lanes.vectors import fma, magnitude, nearest, not_, pow2, sqrt, where
 from kernels.maths.elementary import arctan, mantissa_exponent, sincos
 from kernels.maths.pairs import two_sum
 
@@ -122,7 +122,7 @@ def in_units(p):
     one, other = pow2(-half), pow2(half - unit)
     lengths = Lengths(p.b * one * other, p.d * one * other, p.f * one * other, p.e * one * other)
     fine = (lengths.b > SPAN_LIMIT) & (lengths.d > SPAN_LIMIT) & (lengths.f > SPAN_LIMIT)
-    return lengths, unit, fine & ((lengths.e > SPAN_LIMIT) | isnt(p.e > 0.0))
+    return lengths, unit, fine & ((lengths.e > SPAN_LIMIT) | not_(p.e > 0.0))
 
 
 @jit

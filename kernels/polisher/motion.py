@@ -25,7 +25,7 @@ from kernels.lanes.groups import GROUP, cells_at, write_row
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none, partly
 from kernels.lanes.records import read
-from kernels.lanes.vectors import isnt, magnitude, where
+from kernels.lanes.vectors import magnitude, not_, where
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import arctan, sincos
 from kernels.polisher._cell import ROUNDING, judged, said
@@ -104,7 +104,7 @@ def _state(lengths, margin, side, crank):
 @jit
 def _held(fast, limit):
     """Whether a rate is 0, or within what its power may be."""
-    return ((fast <= limit) & (fast >= 1.0 / limit)) | isnt(fast > 0.0)
+    return ((fast <= limit) & (fast >= 1.0 / limit)) | not_(fast > 0.0)
 
 
 @jit
@@ -125,7 +125,7 @@ def _follow(first, columns, row):
         sine, cosine = sincos(p.b_angle + (arm.alpha + p.beta))
         write_row(first, j, p.L * cosine, row, columns.x)
         write_row(first, j, p.L * sine, row, columns.y)
-    code = where(said(cell.code, LOCK_UP) & isnt(worst <= columns.rtol[i]), INACCURATE, cell.code)
+    code = where(said(cell.code, LOCK_UP) & not_(worst <= columns.rtol[i]), INACCURATE, cell.code)
     columns.status[i] = where(_within(columns.crank_angle), partly(held, code), BAD_INPUT)
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from kernels.interface import FIRST_REFUSAL, Field
 from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import isnt, magnitude, sqrt
+from kernels.lanes.vectors import magnitude, not_, sqrt
 from kernels.maths.elementary import in_unit, mantissa_exponent, scale
 from kernels.polisher import extremes, linkage
 from kernels.wear import _dwell, _tool
@@ -98,8 +98,8 @@ def _pressed(p):
     """Whether just one of pressure and load is given, and with a load the workpiece's radius; NaN fails."""
     numbers = _no_less_than_0(p.pressure) & _no_less_than_0(p.load) & _no_less_than_0(p.workpiece_radius)
     hard, loaded = p.pressure > 0.0, p.load > 0.0
-    one = (hard & isnt(loaded)) | (loaded & isnt(hard))
-    return numbers & one & (isnt(loaded) | (p.workpiece_radius > 0.0))
+    one = (hard & not_(loaded)) | (loaded & not_(hard))
+    return numbers & one & (not_(loaded) | (p.workpiece_radius > 0.0))
 
 
 @jit

@@ -9,7 +9,7 @@ from mpmath import atan, atanh, cbrt, cos, exp, expm1, log, log1p, mp, mpf, sin
 
 from kernels.lanes.columns import each_cell, entry, one_by_one
 from kernels.lanes.jit import COMPILED, jit
-from kernels.lanes.vectors import dot, exponent, fma, isnt, magnitude, nearest, pow2, some, where
+from kernels.lanes.vectors import any_lane, dot, exponent, fma, magnitude, nearest, not_, pow2, where
 from kernels.maths import elementary
 
 mp.dps = 50
@@ -80,12 +80,12 @@ def _halvings(i, x, count, status):
     value, n = x[i], 0.0 * x[i]
     active = value >= 1.0
     for _ in range(2000):
-        if not some(active):
+        if not any_lane(active):
             break
         value, n = where(active, 0.5 * value, value), where(active, n + 1.0, n)
         active = active & (value >= 1.0)
     count[i] = n
-    status[i] = where(isnt(x[i] > 2.0) | (x[i] > 1e9), 7, -3)
+    status[i] = where(not_(x[i] > 2.0) | (x[i] > 1e9), 7, -3)
 
 
 @entry()

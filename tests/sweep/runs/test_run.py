@@ -29,10 +29,10 @@ from running import (
     told_by,
     wait_for,
 )
-from sweep.cells.contents import contents
 
 from kernels.interface import Status
 from sweep.cells.fingerprint import fingerprint
+from sweep.cells.output_schema import output_schema
 from sweep.cells.solve import Solver
 from sweep.results.open import open_result
 from sweep.results.verify import verify
@@ -481,13 +481,13 @@ def free(monkeypatch, output, count):
 
 
 def needed(cells, left):
-    """Bytes of the output of `tall` (axis, g, v0; fall time, error, status and method of every cell) and parts to come.
+    """Bytes of the output of `tall` and of parts to come.
 
-    What the study says is in both.
+    Axis, g, v0; fall time, error bound, status and method of every cell; what both say in words.
     """
-    attrs = contents(tall(cells), fingerprint(tall(cells))).attrs
-    words = 2 * sum(len(str(text).encode()) for text in attrs.values())
-    return words + 8 * (cells + 2) + 14 * cells + 14 * left
+    study = tall(cells)
+    words = output_schema(study, fingerprint(study)).attrs.values()
+    return 8 * (cells + 2) + 14 * cells + 14 * left + 2 * sum(len(str(text).encode()) for text in words)
 
 
 def test_space_for_the_output_without_its_parts_is_too_little(output, monkeypatch):
