@@ -339,7 +339,7 @@ def any_lane(condition):
     return bool(condition)
 
 
-def _lower_some(context, builder, signature, values):
+def _lower_any_lane(context, builder, signature, values):
     if not isinstance(signature.args[0], MaskType):
         return context.cast(builder, values[0], signature.args[0], types.boolean)
     bits = builder.bitcast(values[0], ir.IntType(WIDTH))
@@ -357,7 +357,7 @@ def _lower_isnt(context, builder, signature, values):
 
 _function(where, 3, lambda condition, x, y: _number(condition, x, y), _lower_where)
 _function(choose, 3, _type_choose, _lower_choose)
-_function(any_lane, 1, lambda condition: types.boolean, _lower_some)
+_function(any_lane, 1, lambda condition: types.boolean, _lower_any_lane)
 _function(not_, 1, lambda condition: condition, _lower_isnt)
 
 
