@@ -14,7 +14,7 @@ from mpmath import agm, cos, mp, mpf, pi, sqrt
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"<!-- (file|insert|run)(?:: (\S+)(?: after ([^\n]+?))?)? -->\n```\w+\n(.*?)```", re.DOTALL)
-COPIED = ("kernels", "sweep", "tests/helpers", "tests/conftest.py", "pyproject.toml")
+COPIED = ("kernels", "sweep", "tests/helpers", "tests/conftest.py", "tests/quick.txt", "pyproject.toml")
 
 
 def copied_to(folder):
