@@ -19,6 +19,7 @@ from kernels.lanes.codes import INACCURATE, NOT_CONVERGED, OK, STEP_LIMIT, STICK
 from kernels.lanes.jit import jit, jit_inline
 from kernels.lanes.records import named
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
+from kernels.maths.elementary import larger, smaller
 
 NEWTON_LIMIT = 60
 SMOOTH = (0.0, 0.0)
@@ -85,16 +86,6 @@ class Verdict(NamedTuple):
 
 
 @jit
-def _larger(x, y):
-    return where(x > y, x, y)
-
-
-@jit
-def _smaller(x, y):
-    return where(x < y, x, y)
-
-
-@jit
 def _relative(new, old):
     return magnitude(new - old) / (magnitude(new) + 1e-300)
 
@@ -104,7 +95,7 @@ def _difference(new, old):
     """The largest relative difference between two cycles."""
     worst = _relative(new[0], old[0])
     for j in range(1, 5):
-        worst = _larger(worst, _relative(new[j], old[j]))
+        worst = larger(worst, _relative(new[j], old[j]))
     return worst
 
 
@@ -112,7 +103,7 @@ def _difference(new, old):
 def _enough(problem, slope, decay):
     """Tolerance of a step: an error of the map counts 1/(1 - slope)-fold in v, Y-fold in exp(-Y)."""
     decay = where(decay < 750.0, decay, 0.0)  # beyond, the multiplier is 0 for good
-    return _smaller(problem.share * problem.rtol * (1.0 - slope) / (1.0 + decay), _ORDERLY)
+    return smaller(problem.share * problem.rtol * (1.0 - slope) / (1.0 + decay), _ORDERLY)
 
 
 @jit
@@ -133,10 +124,10 @@ def _bracketed(search, end, tolerance, active):
 def _newton(v, end, slope, low, high):
     """The next speed: Newton's, or where that leaves the bracket, one that narrows it."""
     newton = v + (end - v) / (1.0 - slope)
-    newton = _larger(newton, 0.0 * v)
+    newton = larger(newton, 0.0 * v)
     furthest = 8.0 * v + 8.0
     inside = (newton > low) & (newton < high) & (newton < furthest)
-    other = where(high < math.inf, 0.5 * (_larger(low, 0.0 * v) + high), furthest)
+    other = where(high < math.inf, 0.5 * (larger(low, 0.0 * v) + high), furthest)
     new = where(inside, newton, other)
     return NewtonStep(low, high, new, new - v, _relative(new, v), slope, inside)
 
@@ -162,8 +153,8 @@ def _cycle(problem, half, step):
 @jit
 def _next_tolerance(tolerance, wanted, relative, slope, steady):
     """Of a swing: following the square of Newton's relative step, but not below what is wanted of the last but one."""
-    square = _smaller(0.1 * relative * relative, 0.03 * (1.0 - slope))
-    return _larger(_CHECK * wanted, where(steady, _smaller(tolerance, square), tolerance))
+    square = smaller(0.1 * relative * relative, 0.03 * (1.0 - slope))
+    return larger(_CHECK * wanted, where(steady, smaller(tolerance, square), tolerance))
 
 
 @jit
@@ -187,7 +178,7 @@ def _first(problem):
 def _steepness(problem, before, steep, apart):
     """How steeply the cycle hangs on v1, by all steps so far that tell."""
     telling = problem.rippled & (before > _STEEP_FROM) & (before < _STEEP_TO)
-    return where(telling, _larger(steep, apart / before), steep)
+    return where(telling, larger(steep, apart / before), steep)
 
 
 @jit
@@ -208,7 +199,7 @@ def _judged(problem, search, half, step, apart, steep, cancels):
     stuck = last_but_one & ((half.helped & (relative <= 0.2 * rtol)) | at_rest)
     settled = last & free & _settled(problem, relative, apart, steep)
     at_floor = (wanted < _FINEST) & (search.tolerance < _FINEST) & free & (relative <= rtol)
-    blur = _larger(steep, cancels) * _V_ROUNDING
+    blur = larger(steep, cancels) * _V_ROUNDING
     right = settled & (wanted >= _FINEST) & (blur <= 0.3 * rtol * (1.0 - step.slope))
     status = where(half.lost, STEP_LIMIT, where(stuck | held, STICKS, where(right, OK, INACCURATE)))
     loose = last & free & (search.before < 0.5 * rtol) & not_(apart <= 0.3 * rtol)
@@ -219,7 +210,7 @@ def _judged(problem, search, half, step, apart, steep, cancels):
 def _following(problem, search, step, judged, apart, active):
     """Speed, tolerance and the rest for the next swing of the active lanes."""
     rtol, zero = problem.rtol, 0.0 * problem.e
-    factor = _larger(_smaller(0.2 * rtol / apart, 0.25 + zero), zero + 1e-3)
+    factor = larger(smaller(0.2 * rtol / apart, 0.25 + zero), zero + 1e-3)
     aim = where(judged.loose, 0.25 * judged.wanted, judged.wanted)
     tolerance = _next_tolerance(search.tolerance, aim, step.relative, step.slope, step.own)
     tolerance = where((judged.last_but_one & (step.relative < 0.5 * rtol)) | judged.at_rest, aim, tolerance)
@@ -268,11 +259,11 @@ def dopri5(scene, ripple, rtol):
     for _ in range(NEWTON_LIMIT):
         if not any_lane(active):
             break
-        tolerance = _larger(search.tolerance, _FINEST + zero)
+        tolerance = larger(search.tolerance, _FINEST + zero)
         half = half_swing(problem.e * search.v, problem, tolerance, active)
         step = _stepped(problem, search, half, tolerance, active)
         found, cancels = _cycle(problem, half, step)
-        apart = _larger(_difference(found, cycle), step.relative)
+        apart = larger(_difference(found, cycle), step.relative)
         cycle = choose(active, found, cycle)
         steep = _steepness(problem, search.before, steep, apart)
         judged = _judged(problem, search, half, step, apart, steep, cancels)

@@ -33,6 +33,7 @@ from kernels.lanes.jit import jit
 from kernels.lanes.vectors import choose, fma, magnitude, not_, sqrt, where
 from kernels.maths import pairs
 from kernels.maths.cubic import largest_modulus
+from kernels.maths.elementary import smaller
 
 ROUNDING = 2e-15
 """What the closed forms are right to."""
@@ -44,12 +45,6 @@ MOST_KEPT = 0.875
 
 _MOST_BENT = 24.0
 """abs(nu kappa wheel) of (3): beyond it q is below -5 or above 5, and no cycle exists."""
-
-
-@jit
-def lesser(x, y):
-    """The smaller of two numbers."""
-    return where(x < y, x, y)
 
 
 @jit
@@ -81,7 +76,7 @@ def existence(scene, nu):
     a = 0.5 * (1.0 + reach)
     n = 0.25 * nu * scene.kappa[0] * wheel
     q, size = (1.0 + e) * (pallet - n), (1.0 + e) * (pallet + magnitude(n))
-    return lesser(behind(e, q, size, a), within(1.0, q, size, a, 1.0 - e))
+    return smaller(behind(e, q, size, a), within(1.0, q, size, a, 1.0 - e))
 
 
 @jit
@@ -101,9 +96,9 @@ def stability(scene, nu):
     first = (flat - bend) / (flat + magnitude(bend))
     flat, bend = steep * wheel, curved * fma(2.0, fma(e, e, 1.0), lost)
     second = (flat + bend) / (flat + magnitude(bend))
-    flip = lesser(magnitude(d), magnitude(second)) * where((d > 0.0) & (second > 0.0), 1.0, -1.0)
+    flip = smaller(magnitude(d), magnitude(second)) * where((d > 0.0) & (second > 0.0), 1.0, -1.0)
     flip = where((d < 0.0) & (second < 0.0), -flip, flip)
-    return lesser(first, flip)
+    return smaller(first, flip)
 
 
 @jit

@@ -17,13 +17,14 @@ of teeth know it. For e = 0 the map is that of the speed c of escape: fall, stop
 
 from typing import NamedTuple
 
-from kernels.impact._closed_cycle import MOST_KEPT, ROUNDING, behind, bent, lesser, within
+from kernels.impact._closed_cycle import MOST_KEPT, ROUNDING, behind, bent, within
 from kernels.impact._closed_cycle import verdict as judged
 from kernels.impact._units import Cycle, Scene
 from kernels.lanes.codes import INACCURATE, NO_CYCLE, NO_METHOD, NOT_CONVERGED, OK
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
 from kernels.maths.cubic import largest_modulus
+from kernels.maths.elementary import smaller
 from kernels.maths.pairs import add, negative, over, scaled, shifted, times
 
 NEWTON_LIMIT = 40
@@ -237,7 +238,7 @@ def polynomial(scene, columns, J):
 
 @jit
 def _stability(scene, coefficients):
-    """The lesser of p(1) > 0 and -p(-1) > 0, each over what it is small with; all moduli are below 1 if both hold."""
+    """The smaller of p(1) > 0 and -p(-1) > 0, each over what it is small with; all moduli are below 1 if both hold."""
     a2, a1, a0 = coefficients
     even, odd = shifted(a1, 1.0), add(a2, a0)
     fades = 0.25 * add(even, odd)[0] / (scene.pallet[0] * (1.0 - scene.e) * (1.0 + scene.e))
@@ -267,8 +268,8 @@ def passages(scene, bend, point):
     bent_by = bend[0] * W[0] * speed
     G, size = pallet - bent_by, pallet + magnitude(bent_by)
     high = fma(-wheel[0], Y[0], scene.eta[0]) / speed
-    after = lesser(behind(out, G, size, high), within(out, G, size, high, 1.0))
-    return lesser(after, lesser(behind(home, G, size, high), within(home, G, size, high, 1.0)))
+    after = smaller(behind(out, G, size, high), within(out, G, size, high, 1.0))
+    return smaller(after, smaller(behind(home, G, size, high), within(home, G, size, high, 1.0)))
 
 
 @jit

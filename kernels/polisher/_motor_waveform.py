@@ -20,9 +20,8 @@ import numpy as np
 from kernels.lanes.groups import GROUP, cells_at, room
 from kernels.lanes.jit import jit, jit_call, jit_inline
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
-from kernels.maths.elementary import exp, sincos
-from kernels.polisher.extremes import smaller
-from kernels.polisher.linkage import Crank, acceleration, dead_gaps, direction, larger, opening, squares
+from kernels.maths.elementary import exp, larger, sincos, smaller
+from kernels.polisher.linkage import Crank, acceleration, dead_gaps, direction, opening, squares
 
 STEP = 0.28
 REACH = 133

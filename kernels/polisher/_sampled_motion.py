@@ -12,9 +12,10 @@ import numpy as np
 
 from kernels.lanes.jit import jit, jit_call, jit_inline
 from kernels.lanes.vectors import magnitude, sqrt
+from kernels.maths.elementary import larger, smaller
 from kernels.polisher._cell import Rates
-from kernels.polisher.extremes import Angles, Locks, angle, smaller
-from kernels.polisher.linkage import crank_at, dead_gaps, larger, motion, squares
+from kernels.polisher.extremes import Angles, Locks, angle
+from kernels.polisher.linkage import crank_at, dead_gaps, motion, squares
 
 SAMPLES = 2048
 HALVINGS = 60

@@ -12,9 +12,9 @@ import math
 
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import magnitude, sqrt, where
+from kernels.maths.elementary import larger, smaller
 from kernels.polisher._cell import ROUNDING
-from kernels.polisher.extremes import Angles, Slopes, angle, smaller
-from kernels.polisher.linkage import larger
+from kernels.polisher.extremes import Angles, Slopes, angle
 
 _ROUNDINGS = 2.0**-50
 _ULP = 2.0**-51

@@ -27,10 +27,11 @@ from kernels.lanes.ranges import or_none
 from kernels.lanes.records import read, write
 from kernels.lanes.vectors import choose, not_, where
 from kernels.lanes.wiring import kernel, method, tracing
+from kernels.maths.elementary import larger
 from kernels.polisher import _motor_waveform, _sampled_motion, _textbook_angles, extremes
 from kernels.polisher._cell import ROUNDING, Rates, Swing, judged, mirrored, moves, rocks, said, swing, turns
 from kernels.polisher.extremes import Angles, Locks, Slopes
-from kernels.polisher.linkage import EXAMPLE, PARAMETERS, allowed, larger, side_of
+from kernels.polisher.linkage import EXAMPLE, PARAMETERS, allowed, side_of
 
 
 class Linkage(NamedTuple):

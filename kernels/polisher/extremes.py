@@ -24,8 +24,9 @@ from typing import NamedTuple
 from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, LOCK_UP, NO_ASSEMBLY, OK
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import any_lane, choose, fma, horner, magnitude, not_, sqrt, where
+from kernels.maths.elementary import larger, smaller
 from kernels.maths.pairs import two_product, two_sum
-from kernels.polisher.linkage import Margins, larger, sum4
+from kernels.polisher.linkage import Margins, sum4
 
 ROUNDING = 2.0**-53
 """Share of b+d+f+e that rounding the four lengths may add to a margin: closer to 0 it is a change point."""
@@ -80,12 +81,6 @@ class Slopes(NamedTuple):
     A1_d: float
     A1_f: float
     A1_e: float
-
-
-@jit
-def smaller(x, y):
-    """The smaller of two numbers."""
-    return where(x < y, x, y)
 
 
 @jit_call

@@ -19,7 +19,7 @@ from typing import NamedTuple
 from kernels.interface import Field
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import fma, magnitude, nearest, not_, pow2, sqrt, where
-from kernels.maths.elementary import arctan, mantissa_exponent, sincos
+from kernels.maths.elementary import arctan, larger, mantissa_exponent, sincos
 from kernels.maths.pairs import two_sum
 
 SPAN_LIMIT = 2.0**-120
@@ -106,12 +106,6 @@ def sum3(x, y, z):
     """x + y + z within 2 ulp of the sum itself, for x + y that is large against what it has lost."""
     total, lost = two_sum(x, y)
     return (total + z) + lost
-
-
-@jit
-def larger(x, y):
-    """The larger of two numbers."""
-    return where(x > y, x, y)
 
 
 @jit

@@ -27,21 +27,9 @@ from kernels.lanes.ranges import or_none, partly
 from kernels.lanes.records import read
 from kernels.lanes.vectors import magnitude, not_, where
 from kernels.lanes.wiring import kernel, tracing
-from kernels.maths.elementary import arctan, sincos
+from kernels.maths.elementary import arctan, larger, sincos, smaller
 from kernels.polisher._cell import ROUNDING, judged, said
-from kernels.polisher.extremes import smaller
-from kernels.polisher.linkage import (
-    EXAMPLE,
-    PARAMETERS,
-    Crank,
-    Margins,
-    allowed,
-    crank_at,
-    larger,
-    lock_doubt,
-    motion,
-    side_of,
-)
+from kernels.polisher.linkage import EXAMPLE, PARAMETERS, Crank, Margins, allowed, crank_at, lock_doubt, motion, side_of
 
 FARTHEST = 1e6
 """Crank angle, beyond which a radian has lost its digits."""
