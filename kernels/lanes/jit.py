@@ -38,6 +38,15 @@ def jit_call(function: F) -> F:
     return made
 
 
+def jit_apart(function: F) -> F:
+    """As `jit_call`, but a call below inlined functions, too, on which numba would paste it otherwise.
+
+    For rooms that go cell by cell: wear compiles in 8 s instead of 18. In lanes a call costs more than it saves.
+    """
+    made: F = part(function, forceinline=False, **_OPTIONS)
+    return made
+
+
 def jit_entry(function: Callable[..., Any]) -> Any:
     """As `jit_call`, called from Python."""
     return aligned(function, **_OPTIONS)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.wear import _tool
 from kernels.wear._tool import PIECES, arctan2, mirrored, outline, power, sincos
@@ -44,13 +44,13 @@ class Room(NamedTuple):
     stack: np.ndarray
 
 
-@jit_call
+@jit_apart
 def room():
     """A `Room`."""
     return Room(np.empty(_tool.ARC_LIMIT), np.empty(POINTS), np.empty(_tool.STACK))
 
 
-@jit_call
+@jit_apart
 def _beta(x, k, j):
     """(2) over `small`."""
     z = 0.5 * power(x, max(1.0, k))
@@ -63,7 +63,7 @@ def _beta(x, k, j):
     return total
 
 
-@jit_call
+@jit_apart
 def sector(piece, x, tool):
     """Area between the tool's centre and its outline from 0 to x of a piece, and X and Y there."""
     a, b = tool.a, tool.b
@@ -75,7 +75,7 @@ def sector(piece, x, tool):
     return a * b * share, spot.x, spot.y
 
 
-@jit_call
+@jit_apart
 def whole_area(tool):
     """Area of the tool."""
     low, _, _ = sector(0.0, 1.0, tool)
@@ -83,7 +83,7 @@ def whole_area(tool):
     return 4.0 * (low + high)
 
 
-@jit_call
+@jit_apart
 def _outline_within(piece, mirror, tool, disc, count, room):
     """Adds the points of half a piece on the disc's edge; its share of (1), what it may be wrong by, and the count."""
     seen, found, first = mirrored(disc, mirror), room.found, np.int64(1)
@@ -134,7 +134,7 @@ def _bulge(t):
     return t * y / 6.0 * (1.0 - y / 20.0 * (1.0 - y / 42.0 * (1.0 - y / 72.0 * (1.0 - y / 110.0 * (1.0 - y / 156.0)))))
 
 
-@jit_call
+@jit_apart
 def _arc_within(tool, disc, one, two, turn):
     """Share of (1) of the arc of the disc's edge between two points, by about `turn`, and what it may be wrong by."""
     cx, cy, radius = disc
@@ -174,7 +174,7 @@ def _sort_points(points, count):
         _put(points, j, point)
 
 
-@jit_call
+@jit_apart
 def _edge_within(tool, disc, points, count):
     """Share of (1) of all arcs of the disc's edge within the tool, and what it may be wrong by."""
     if count == 0:
@@ -192,7 +192,7 @@ def _edge_within(tool, disc, points, count):
     return total, noise
 
 
-@jit_call
+@jit_apart
 def contact_area(tool, whole, disc, room):
     """Area of the tool within the disc (a `Circle`), and what it may be wrong by; whole: `whole_area`."""
     x, y, radius = magnitude(disc.x), magnitude(disc.y), disc.radius

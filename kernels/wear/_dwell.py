@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.polisher.linkage import Lengths, Margins
 from kernels.wear._tool import arctan2, sincos
@@ -72,7 +72,7 @@ class Strokes(NamedTuple):
     forth_dwell: float
 
 
-@jit_call
+@jit_apart
 def arm_of(lengths, margin):
     """The `Arm`. Where its two angles are rounded to one, as for a crank without throw, it stands still."""
     b, d, f, e = lengths
@@ -83,7 +83,7 @@ def arm_of(lengths, margin):
     return Arm(lengths, margin, unit, low, high, least, most, e > b)
 
 
-@jit_call
+@jit_apart
 def gaps(arm, c, s):
     """(3): (f+e)^2 - q^2 and q^2 - (f-e)^2 of the arm at (cos eta, sin eta) = (c, s), and their rounding, relative."""
     sine2 = 0.5 * s * s / (1.0 + c) if c > 0.0 else 0.5 * (1.0 - c)
@@ -92,7 +92,7 @@ def gaps(arm, c, s):
     return top, bottom, _DOUBT * arm.unit * ((magnitude(s) + cosine2) / top + (magnitude(s) + sine2) / bottom)
 
 
-@jit_call
+@jit_apart
 def pose_at(arm, u):
     """The `Pose` a share (1 + sin u)/2 of the way from least to most, without rounding of the gaps.
 
@@ -112,7 +112,7 @@ def pose_at(arm, u):
     return Pose(eta, c, s, top, bottom, _ROUNDING, 2.0 * half * up * far)
 
 
-@jit_call
+@jit_apart
 def strokes(arm, c, s, top, bottom):
     """The `Strokes` at (cos eta, sin eta) = (c, s) and the gaps there; (2)."""
     b, d, f, e = arm.lengths
@@ -133,7 +133,7 @@ def span(arm):
     return (-math.pi, math.pi) if arm.whirls else (-0.5 * math.pi, 0.5 * math.pi)
 
 
-@jit_call
+@jit_apart
 def rates_at(arm, u):
     """The arm's angle at u, and alpha' of the stroke back and forth over the crank's rate."""
     pose = pose_at(arm, u)
@@ -148,7 +148,7 @@ def _lead(scene, rate, side):
     return ride.speed * rate * (r + side * ride.w) - ride.spin * r
 
 
-@jit_call
+@jit_apart
 def _root(scene, forth, side, one, two, f_one, f_two):
     """The arm's angle where (4) holds, between one and two, by the Illinois rule."""
     last, eta = math.inf, 0.0
@@ -166,7 +166,7 @@ def _root(scene, forth, side, one, two, f_one, f_two):
     return eta
 
 
-@jit_call
+@jit_apart
 def find_stops(scene, still):
     """Puts the angles at which wear is not smooth into `still`; how many. First those where the arm turns, if it does.
 

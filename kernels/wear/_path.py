@@ -12,7 +12,7 @@ Time goes in steps of a share of the crank's turn; whole turns are taken off wit
 import math
 from typing import NamedTuple
 
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import fma, magnitude, nearest, sqrt
 from kernels.maths.pairs import two_product
 from kernels.polisher import linkage
@@ -76,7 +76,7 @@ def _arm(step, s):
     return alpha, rate
 
 
-@jit_call
+@jit_apart
 def position(step, s):
     """The `Place` of the point at a time s of a step."""
     course = step.course
@@ -95,7 +95,7 @@ def position(step, s):
     )
 
 
-@jit_call
+@jit_apart
 def facing(step, s):
     """Cosine and sine of the arm's angle from the direction of w at a time s of a step."""
     x, y = step.course.x, step.course.y
@@ -107,7 +107,7 @@ def facing(step, s):
     return (x * cosine_arm + y * sine_arm) / w, (x * sine_arm - y * cosine_arm) / w
 
 
-@jit_call
+@jit_apart
 def bend(course):
     """(1), from samples of the arm's motion that are dense about the dead points, half as much again."""
     speed, spin, r = course.speed, course.spin, course.r
@@ -131,7 +131,7 @@ def _range(x, y, spread):
     return (0.0 if low * high <= 0.0 else min(magnitude(low), magnitude(high))), max(magnitude(low), magnitude(high))
 
 
-@jit_call
+@jit_apart
 def _rate_bounds(size, k, x1, x2, spread, v, turn):
     """Bounds on the rate of abs(x/size)^k over a box of x and rates within `turn` of v."""
     least, most = _range(x1, x2, spread)
@@ -150,7 +150,7 @@ def _rate_bounds(size, k, x1, x2, spread, v, turn):
 INSIDE, OUTSIDE, ONCE, UNKNOWN = range(4)
 
 
-@jit_call
+@jit_apart
 def judged(tool, one, two, h, curve):
     """Whether a stretch of time h between two positions is INSIDE, OUTSIDE, crossed ONCE at most, or UNKNOWN."""
     spread = 0.125 * curve * h * h
@@ -171,7 +171,7 @@ def within(step, place):
     return excess(step.course.tool, place.x, place.y) < 0.0
 
 
-@jit_call
+@jit_apart
 def crossing(step, low, high):
     """The time between low and high at which the outline is crossed, and what rounding may come to in it."""
     tool, first = step.course.tool, low

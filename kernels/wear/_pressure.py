@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths.elementary import in_unit
 from kernels.wear import _contact, _scene, _tool
@@ -84,14 +84,14 @@ class Overhang(NamedTuple):
     radius: float
 
 
-@jit_call
+@jit_apart
 def memory():
     """A `Memory`."""
     stops, values = np.empty(_tool.ARC_LIMIT), np.empty(NODES + _TESTS)
     return Memory(np.empty(TABLE), np.empty(3), stops, values, _contact.room())
 
 
-@jit_call
+@jit_apart
 def _area_at(phi, scene, room):
     """Area of contact with the arm at phi from the direction of w, and what it may be wrong by."""
     s, c = sincos(phi)
@@ -106,7 +106,7 @@ def _folded(phi):
     return _TURN - phi if phi > math.pi else phi
 
 
-@jit_call
+@jit_apart
 def _stops(scene, stops):
     """Angles between which the table's panels are opened: an even grid, and where the rim passes vertices; how many."""
     tool, _, reach, w, radius = scene
@@ -127,7 +127,7 @@ def _stops(scene, stops):
     return count
 
 
-@jit_call
+@jit_apart
 def _passes(arm, turn, low, high):
     """Whether the arm comes to an angle phi between low and high, on either side."""
     if arm.whirls:
@@ -140,7 +140,7 @@ def _passes(arm, turn, low, high):
     return False
 
 
-@jit_call
+@jit_apart
 def _polynomial(row, t):
     """Value of a panel at t in [-1, 1], by Clenshaw's recurrence."""
     one, two = 0.0, 0.0
@@ -149,7 +149,7 @@ def _polynomial(row, t):
     return t * one - two + row[FIRST]
 
 
-@jit_call
+@jit_apart
 def _fit(row, low, high, scene, values, room):
     """Fills a panel; its least and largest area, and the least noise of its values.
 
@@ -177,7 +177,7 @@ def _fit(row, low, high, scene, values, room):
     return least, most, calm
 
 
-@jit_call
+@jit_apart
 def table_of(arm, tool, ride, radius, tolerance, memory):
     """The `Areas` of a machine whose workpiece has that radius, to a relative tolerance."""
     table, stops = memory.table, memory.stops
@@ -204,7 +204,7 @@ def table_of(arm, tool, ride, radius, tolerance, memory):
     return Areas(table, count, lowest, largest)
 
 
-@jit_call
+@jit_apart
 def _areas(p, rtol, memory):
     """The areas of contact of a cell with these parameters, in its unit of length; none where none are needed."""
     setup = _scene.without_units(p)
@@ -226,7 +226,7 @@ def _alike(p, rtol, q, rtol_q):
     return rtol == rtol_q and (p.load > 0.0) == (q.load > 0.0) and _footing(p) == _footing(q)
 
 
-@jit_call
+@jit_apart
 def areas_of(p, rtol, first, before, rtol_before, memory):
     """The areas of contact of a cell; those that `memory` has, unless it is the first or unlike the cell before."""
     rest = memory.rest
@@ -236,7 +236,7 @@ def areas_of(p, rtol, first, before, rtol_before, memory):
     return Areas(memory.table, np.int64(rest[0]), rest[1], rest[2])
 
 
-@jit_call
+@jit_apart
 def weight(areas, c, s):
     """1/A at the angle (cos phi, sin phi) = (c, s), what it may be wrong by, and a bound on its slope, both relative.
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths import quadrature
 from kernels.maths.quadrature import adapt, open_panel
@@ -104,14 +104,14 @@ class Room(NamedTuple):
     still: np.ndarray
 
 
-@jit_call
+@jit_apart
 def room():
     """A `Room`."""
     found, angles = np.empty(_tool.ARC_LIMIT), np.empty(_tool.ARC_LIMIT)
     return Room(np.empty(quadrature.POOL), found, angles, np.empty(_tool.STACK), np.empty(_dwell.STOP_LIMIT))
 
 
-@jit_call
+@jit_apart
 def _passage(scene, c, s, top, bottom, arc):
     """Sum over the strokes of E dtheta/dphi at one angle of the arm; `arc`: psi/2 of the arc."""
     strokes, speed = _dwell.strokes(scene.arm, c, s, top, bottom), scene.ride.speed
@@ -135,7 +135,7 @@ def _from_frame(ride, c, s):
     return ride.turn_c * c - ride.turn_s * s, ride.turn_s * c + ride.turn_c * s
 
 
-@jit_call
+@jit_apart
 def _at_angle(scene, c, s, arc, blur):
     """`_passage` with the arm at phi = (c, s) from the direction of w, and its rounding; 0 where it does not come.
 
@@ -150,7 +150,7 @@ def _at_angle(scene, c, s, arc, blur):
     return total, total * (noise * blur + (doubt + 4.0 * _EPS * slope * blur))
 
 
-@jit_call
+@jit_apart
 def vertex_margins(piece, scene):
     """rho^2 - (w-r)^2 and rho^2 - (w+r)^2 of the vertex where a piece begins, without loss.
 
@@ -166,7 +166,7 @@ def vertex_margins(piece, scene):
     return near if magnitude(near) > least else 0.0, wide if magnitude(wide) > least else 0.0
 
 
-@jit_call
+@jit_apart
 def _margins(piece, spot, scene):
     """The `Margins` of a spot of the outline.
 
@@ -210,7 +210,7 @@ def _phi(sight, side):
     return chi.c * gamma.c + side * chi.s * gamma.s, chi.s * gamma.c - side * chi.c * gamma.s
 
 
-@jit_call
+@jit_apart
 def _outline(piece, x, scene):
     """Integrand of the contour: both sides Y of the outline and both halves of psi; and its rounding."""
     sight = _about_pivot(scene, piece, outline(piece, x, scene.tool))
@@ -236,7 +236,7 @@ def _pressed(scene, c, s):
     return weight, doubt + 4.0 * _EPS * slope
 
 
-@jit_call
+@jit_apart
 def _far_side_alone(scene, pose):
     """2 E(theta, pi) dtheta/du."""
     if not (scene.arm.whirls or (pose.top > 0.0 and pose.bottom > 0.0)):
@@ -244,7 +244,7 @@ def _far_side_alone(scene, pose):
     return 2.0 * pose.growth * _passage(scene, pose.c, pose.s, pose.top, pose.bottom, Direction(0.0, 1.0))
 
 
-@jit_call
+@jit_apart
 def _far_side(u, scene):
     """Integrand of the second integral of (2), both halves."""
     pose = _dwell.pose_at(scene.arm, u)
@@ -253,7 +253,7 @@ def _far_side(u, scene):
     return total, total * (pose.noise + doubt)
 
 
-@jit_call
+@jit_apart
 def _on_pivot(u, scene):
     """Integrand of int v dtheta over the strokes for a work on the pivot, where v does not hang on psi."""
     arm, spin, pose = scene.arm, scene.ride.spin, _dwell.pose_at(scene.arm, u)
@@ -298,7 +298,7 @@ def _split(k, scene, piece, still):
     return Split(circle, _tool.vertex_excess(piece, scene.tool, circle))
 
 
-@jit_call
+@jit_apart
 def _settled(x, scene, piece):
     """The same split, if it is where the arm turns, of all of its ways to get there that which is nearest its end.
 
@@ -321,7 +321,7 @@ def _settled(x, scene, piece):
     return x - step if 0.0 < x - step < 1.0 else x
 
 
-@jit_call
+@jit_apart
 def _splits_of(piece, scene, stops, room):
     """Puts the ends of a piece's panels into `room`, split where contact ends or v is 0; how many panels."""
     found, splits = room.found, np.int64(1)
@@ -338,7 +338,7 @@ def _splits_of(piece, scene, stops, room):
     return splits
 
 
-@jit_call
+@jit_apart
 def _open_outline(count, scene, stops, room):
     """Opens the panels of the contour; how many panels there are then."""
     for k in range(PIECES):
@@ -351,14 +351,14 @@ def _open_outline(count, scene, stops, room):
     return count
 
 
-@jit_call
+@jit_apart
 def _phase(arm, eta):
     """u of `pose_at`."""
     ahead, behind = arm.most - eta, eta - arm.least
     return 2.0 * arctan2(sqrt(max(behind, 0.0)), sqrt(max(ahead, 0.0))) - 0.5 * math.pi
 
 
-@jit_call
+@jit_apart
 def _open_split(pool, count, kind, low, high, scene, stops):
     """Opens panels of that kind from arm's angle low to high, split at the stops; how many panels there are then.
 
@@ -380,7 +380,7 @@ def _open_split(pool, count, kind, low, high, scene, stops):
     return count
 
 
-@jit_call
+@jit_apart
 def _open_far_side(pool, scene, angles, number, stops):
     """Opens the panels of the second integral of (2), from the arcs about the pivot; how many there are."""
     arm, ride = scene.arm, scene.ride
@@ -397,7 +397,7 @@ def _open_far_side(pool, scene, angles, number, stops):
     return count
 
 
-@jit_call
+@jit_apart
 def _angle_in_arcs(arm, turn, angles, number):
     """How much of the arm's angle, all strokes, lies within arcs about the pivot."""
     total = 0.0
@@ -489,7 +489,7 @@ def _unsure_error(scene, unsure, about):
     return 8.0 * unsure * _far_side_alone(scene, _dwell.pose_at(arm, 0.0)) / way * _weight_about(scene, about)
 
 
-@jit_call
+@jit_apart
 def _about_the_pivot(scene, number, unsure, about, rtol, room):
     """I(r) of a work whose centre is the pivot: v is the same all along an arc."""
     arm, stops = scene.arm, Stops(room.still, _dwell.find_stops(scene, room.still))
@@ -502,7 +502,7 @@ def _about_the_pivot(scene, number, unsure, about, rtol, room):
     return weight * value * length, weight * (error * length + (64.0 * _EPS + doubt * length) * value)
 
 
-@jit_call
+@jit_apart
 def _by_parts(scene, number, unsure, about, rtol, room):
     """I(r) by (2)."""
     ride, stops = scene.ride, Stops(room.still, _dwell.find_stops(scene, room.still))
@@ -518,7 +518,7 @@ def _by_parts(scene, number, unsure, about, rtol, room):
     return value, error
 
 
-@jit_call
+@jit_apart
 def profile(scene, rtol, room):
     """I(r) of (1), and its error: inf if it could not be had."""
     number, unsure, about = _arcs(scene, room)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from kernels.interface import FIRST_REFUSAL, Field
 from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, OK, OUT_OF_RANGE
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, not_, sqrt
 from kernels.maths.elementary import in_unit, mantissa_exponent, scale
 from kernels.polisher import extremes, linkage
@@ -108,20 +108,20 @@ def turns_fully(verdict):
     return verdict in (OK, CHANGE_POINT, DOUBLE_CRANK)
 
 
-@jit_call
+@jit_apart
 def signed_in_unit(x, unit):
     """x over 2^unit."""
     value = in_unit(magnitude(x), unit)
     return -value if x < 0.0 else value
 
 
-@jit_call
+@jit_apart
 def _unit_of(x):
     """Power of two next below x; of 0: of 1."""
     return mantissa_exponent(x if x > 0.0 else 1.0)[1]
 
 
-@jit_call
+@jit_apart
 def _arm(p):
     """The arm, and the verdict on the linkage: OK, a remark or a refusal."""
     lengths, _, fine = linkage.in_units(p)
@@ -130,7 +130,7 @@ def _arm(p):
     return _dwell.arm_of(lengths, margin), verdict if fine else OUT_OF_RANGE
 
 
-@jit_call
+@jit_apart
 def _ride(p, unit, pace):
     """The `Ride`. Angles of type B are mirrored at the frame."""
     x, y = signed_in_unit(p.w_x, unit), signed_in_unit(p.w_y, unit)
@@ -151,7 +151,7 @@ def _none_or_seen(x):
     return x == 0.0 or x >= _SPAN
 
 
-@jit_call
+@jit_apart
 def without_units(p):
     """The `Setup` of a machine."""
     arm, verdict = _arm(p)
@@ -164,7 +164,7 @@ def without_units(p):
     return Setup(arm, _tool.tool_of(a, b, p.tool_n, p.tool_m), ride, unit, pace, verdict)
 
 
-@jit_call
+@jit_apart
 def with_units(value, preston, pressure, units):
     """`value` times preston, pressure and 2^units, without overflow on the way."""
     m, e = mantissa_exponent(preston)

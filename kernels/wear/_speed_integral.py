@@ -7,7 +7,7 @@ with psi from the direction of w. With P and Q the speeds at psi = 0 and pi, v^2
 Source: B. C. Carlson, DLMF 19.25.9 and 19.36(i).
 """
 
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
 
 _FLAT = 1e-9  # of a speed beside the other, which changes (2) by less than its square
@@ -43,7 +43,7 @@ def _second_series(x, y):
     return low + middle + 45.0 * e2 * e2 * e3 / 272.0 - 9.0 * (e3 * e4 + e2 * e5) / 68.0
 
 
-@jit_call
+@jit_apart
 def along_arc(p, q, s, c):
     """(2), within some ulp; s and c from 0 to 1."""
     largest = max(p, q)
@@ -68,7 +68,7 @@ def along_arc(p, q, s, c):
     return 2.0 * largest * (p * p) * s * (r_f + difference * (s * s) * r_d / 3.0)
 
 
-@jit_call
+@jit_apart
 def half_circle(p, q):
     """(2) up to psi = pi: a quarter of an ellipse's circumference, twice, by the arithmetic-geometric mean."""
     largest = max(p, q)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude
 from kernels.maths.elementary import arctan, expm1, log1p
 from kernels.maths.elementary import power as inlined_power
@@ -89,25 +89,25 @@ class End(NamedTuple):
     excess: float
 
 
-@jit_call
+@jit_apart
 def power(x, y):
     """x^y."""
     return inlined_power(x, y)
 
 
-@jit_call
+@jit_apart
 def sincos(x):
     """Sine and cosine."""
     return inlined_sincos(x)
 
 
-@jit_call
+@jit_apart
 def tool_of(a, b, n, m):
     """The `Tool`."""
     return Tool(a, b, n, m, power(0.5, 1.0 / n), power(0.5, 1.0 / m))
 
 
-@jit_call
+@jit_apart
 def _along(x, k, j, middle):
     """`Along` of exponents k and j, `middle` being the largest `small`."""
     if k >= 1.0:
@@ -123,7 +123,7 @@ def _along(x, k, j, middle):
     return Along(small, missing, growth, steep, (1.0 - missing) / (j * (1.0 - share)))
 
 
-@jit_call
+@jit_apart
 def outline(piece, x, tool):
     """The `Spot` at x of a piece."""
     a, b, n, m, half_x, half_y = tool
@@ -159,7 +159,7 @@ def mirrored(circle, mirror):
     return Circle(circle.x, mirror * circle.y, circle.radius)
 
 
-@jit_call
+@jit_apart
 def vertex_excess(piece, tool, circle):
     """Squared distance of the vertex where a piece begins from the circle's centre, less radius^2."""
     u, v = -circle.x, -circle.y
@@ -170,7 +170,7 @@ def vertex_excess(piece, tool, circle):
     return (magnitude(u) - circle.radius) * (magnitude(u) + circle.radius) + v * v
 
 
-@jit_call
+@jit_apart
 def _end(piece, x, tool, circle, start):
     """The `End` at x of a piece; start: `vertex_excess`."""
     a, b, n, m, half_x, half_y = tool
@@ -194,7 +194,7 @@ def _least_square(x, y):
     return min(x * x, y * y)
 
 
-@jit_call
+@jit_apart
 def _slope_bounds(piece, tool, one, two):
     """Bounds on half the derivative of the squared distance by `small`, over the unit of `small`.
 
@@ -216,14 +216,14 @@ def _slope_bounds(piece, tool, one, two):
     return min(p1, p2) - most, max(p1, p2) - least
 
 
-@jit_call
+@jit_apart
 def _excess(piece, x, tool, circle, start):
     """Squared distance from the centre, less that of the circle, and its derivative."""
     end, spot = _end(piece, x, tool, circle, start), outline(piece, x, tool)
     return end.excess, 2.0 * (end.u * spot.dx + end.v * spot.dy)
 
 
-@jit_call
+@jit_apart
 def _root(piece, low, high, tool, circle, start):
     """The crossing between low and high, where there is just one: Newton within the bracket."""
     beyond, _ = _excess(piece, high, tool, circle, start)
@@ -246,7 +246,7 @@ def _root(piece, low, high, tool, circle, start):
     return x
 
 
-@jit_call
+@jit_apart
 def crossings(piece, tool, circle, start, found, count, stack):
     """Puts into `found`, from `count` on, all x of a piece that are on a circle; the new count.
 
@@ -303,14 +303,14 @@ def _top(stack, k):
     return End(row[0], row[1], row[2], row[3], row[4], row[5])
 
 
-@jit_call
+@jit_apart
 def excess(tool, x, y):
     """abs(X/a)^n + abs(Y/b)^m - 1 of a point of the tool's frame, limited; negative where it is in contact."""
     u, v = min(magnitude(x) / tool.a, 8.0), min(magnitude(y) / tool.b, 8.0)
     return power(u, tool.n) + power(v, tool.m) - 1.0
 
 
-@jit_call
+@jit_apart
 def arctan2(y, x):
     """The angle of the point (x, y), in [-pi, pi]."""
     if magnitude(y) <= magnitude(x):
@@ -322,7 +322,7 @@ def arctan2(y, x):
     return (0.5 * math.pi if y > 0.0 else -0.5 * math.pi) - arctan(x / y)
 
 
-@jit_call
+@jit_apart
 def sort(values, count):
     """Sorts the first `count` values, by insertion."""
     for i in range(1, count):
@@ -333,7 +333,7 @@ def sort(values, count):
         values[j] = value
 
 
-@jit_call
+@jit_apart
 def arcs(tool, circle, near, far, angles, found, stack):
     """Arcs of a circle within the tool: their ends in pairs in `angles`, in [-pi, pi]; how many numbers, -1: too many.
 

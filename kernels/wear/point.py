@@ -17,7 +17,7 @@ import numpy as np
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, INACCURATE, OK, OUT_OF_RANGE, STEP_LIMIT
 from kernels.lanes.columns import cell_by_cell
-from kernels.lanes.jit import jit, jit_call, jit_inline
+from kernels.lanes.jit import jit, jit_apart, jit_inline
 from kernels.lanes.records import read, write
 from kernels.lanes.vectors import magnitude, sqrt, where
 from kernels.lanes.wiring import kernel, tracing
@@ -65,7 +65,7 @@ class Room(NamedTuple):
     stack: np.ndarray
 
 
-@jit_call
+@jit_apart
 def _speed(kind, s, step):
     """Speed at a time s of a step, over the area of contact where the load is constant, and its rounding."""
     there = position(step, s)
@@ -77,7 +77,7 @@ def _speed(kind, s, step):
     return weight * v, weight * v * (4.0 * _EPS + doubt + 8.0 * _EPS * slope)
 
 
-@jit_call
+@jit_apart
 def _polished(step, low, high, tolerance, pool):
     """The way of polishing between two times within the tool, and its error; to `tolerance` times the way."""
     if not high > low:
@@ -87,7 +87,7 @@ def _polished(step, low, high, tolerance, pool):
     return quadrature.adapt(_speed, step, pool, count + 1, tolerance)
 
 
-@jit_call
+@jit_apart
 def _way_in_step(step, h, curve, rtol, room):
     """The way of polishing in one step of time h, and its error."""
     pool, stack = room
@@ -149,7 +149,7 @@ def _clock(speed, spin):
     return Clock(_TURN / (steps * magnitude(speed)), turn, turn_rest, share, rest + sign * low / steps)
 
 
-@jit_call
+@jit_apart
 def way(course, areas, theta0, tau, rtol, room):
     """The way of polishing over the time tau, its error, and whether there were few enough steps."""
     if course.speed == 0.0 and course.spin == 0.0:
