@@ -3,7 +3,7 @@
 from kernels.drivetrain._modal_masses import TURN
 from kernels.drivetrain._modal_receptance import chain_receptance, least_damping, sample_grid, sample_poles
 from kernels.drivetrain._model import CHAIN_ROUNDING, Model, Outcome, Wanted, largest_error
-from kernels.drivetrain._reductions import chain_poles, damped
+from kernels.drivetrain._reductions import EXACT, chain_poles, damped, poles, receptance, reduce
 from kernels.lanes.jit import jit_call
 from kernels.lanes.vectors import fma, sqrt
 from kernels.maths.small_dense import sort_many
@@ -17,7 +17,7 @@ _ROUNDING = 4e-16
 
 
 @jit_call
-def _reduce_enough(wanted, scene, reduce):
+def _reduce_enough(wanted, scene):
     """The model that is wanted.
 
     Its masses are those before the first number, from all of them downwards, with which `largest_error` exceeds tol.
@@ -26,7 +26,7 @@ def _reduce_enough(wanted, scene, reduce):
     p = int(wanted.n_keep) if given else n
     model = Model(p, 0.0, 0.0, 0.0, 0.0)
     for _ in range(2 * n + 1):
-        model = reduce(p, wanted.order, scene)
+        model = reduce(wanted.reduction, p, wanted.order, scene)
         if given:
             break
         holds = model.status == 0.0 and largest_error(scene.full, scene.kept, p, wanted.f_max) <= wanted.tol
@@ -40,47 +40,47 @@ def _reduce_enough(wanted, scene, reduce):
 
 
 @jit_call
-def _value_at(w, of_error, model, scene, receptance):
+def _value_at(w, of_error, model, scene, reduction):
     """abs(dH) or abs(H); 0 where it is no number: exactly on a pole of a partial system."""
     full = scene.full
     value = chain_receptance(w, full.J, full.k, full.h, full.J.size, scene.spare.J_w, scene.spare.K_w)
     if of_error > 0:
-        value -= receptance(w, model, scene)
+        value -= receptance(reduction, w, model, scene)
     size = sqrt(fma(value.real, value.real, value.imag * value.imag))
     return size if size >= 0.0 else 0.0
 
 
 @jit_call
-def _top(low, high, of_error, model, scene, receptance):
+def _top(low, high, of_error, model, scene, reduction):
     """Largest value between two frequencies, by the golden section."""
     a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    at_a = _value_at(a, of_error, model, scene, receptance)
-    at_b = _value_at(b, of_error, model, scene, receptance)
+    at_a = _value_at(a, of_error, model, scene, reduction)
+    at_b = _value_at(b, of_error, model, scene, reduction)
     for _ in range(NARROWINGS):
         if at_a > at_b:
             high, b, at_b = b, a, at_a
             a = high - _GOLDEN * (high - low)
-            at_a = _value_at(a, of_error, model, scene, receptance)
+            at_a = _value_at(a, of_error, model, scene, reduction)
         else:
             low, a, at_a = a, b, at_b
             b = low + _GOLDEN * (high - low)
-            at_b = _value_at(b, of_error, model, scene, receptance)
+            at_b = _value_at(b, of_error, model, scene, reduction)
     return max(at_a, at_b)
 
 
 @jit_call
-def _largest(count, of_error, model, scene, receptance):
+def _largest(count, of_error, model, scene, reduction):
     """Largest value in the band: of those at the samples, and of the tops between them."""
     at, value = scene.spare.at, scene.spare.off
     most = 0.0
     for i in range(count):
-        value[i] = _value_at(at[i], of_error, model, scene, receptance)
+        value[i] = _value_at(at[i], of_error, model, scene, reduction)
         most = max(most, value[i])
     worth = _WORTH * most
     for i in range(count):
         before, after = max(i - 1, 0), min(i + 1, count - 1)
         if value[i] >= worth and value[i] >= value[before] and value[i] >= value[after]:
-            most = max(most, _top(at[before], at[after], of_error, model, scene, receptance))
+            most = max(most, _top(at[before], at[after], of_error, model, scene, reduction))
     return most
 
 
@@ -95,7 +95,7 @@ def _sample(w_max, own_poles, full, kept, at):
 
 
 @jit_call
-def _receptance_error(f_max, own_poles, model, scene, receptance):
+def _receptance_error(f_max, own_poles, model, scene, reduction):
     """Largest abs(dH) up to f_max over the largest abs(H), and a bound on its rounding.
 
     NaN where H is infinite in the band: with a free end, or with a resonance that nothing damps.
@@ -110,35 +110,41 @@ def _receptance_error(f_max, own_poles, model, scene, receptance):
     count = _sample(w_max, own_poles, full, kept, scene.spare.at)
     off, size = 0.0, 0.0
     for of_error in range(2):
-        off, size = size, _largest(count, 1 - of_error, model, scene, receptance)
+        off, size = size, _largest(count, 1 - of_error, model, scene, reduction)
     return off / size, _ROUNDING * n / zeta
 
 
 @jit_call
-def reduced(wanted, scene, reduction):
-    """The reduced model of a chain, and how far it is off."""
-    model = _reduce_enough(wanted, scene, reduction.reduce)
-    p, off, error = model.p, 0.0, model.error
+def _against_chain(wanted, scene):
+    """The reduced model of a chain, how far its receptance is off, and a bound on the relative error of all."""
+    model = _reduce_enough(wanted, scene)
+    off, error = 0.0, model.error
     if model.status == 0.0:
-        blur, own_poles = reduction.poles(p, scene)
+        blur, own_poles = poles(wanted.reduction, model.p, scene)
         off, rounding = float("nan"), float("inf")
         if blur < float("inf"):
-            off, rounding = _receptance_error(wanted.f_max, own_poles, model, scene, reduction.receptance)
+            off, rounding = _receptance_error(wanted.f_max, own_poles, model, scene, wanted.reduction)
         known = error >= 0.0 and rounding >= 0.0 and blur >= 0.0
         error = max(error, rounding, blur) if known else float("inf")
-    return Outcome(p, p, model.slower, off, error, model.status)
+    return model, off, error
 
 
 @jit_call
-def exact(wanted, scene, reduction):
-    """As `reduced`, of a model that has all frequencies however few its masses: where `tol` is to be met, one."""
-    n_keep = wanted.n_keep if wanted.n_keep > 0.0 else 1.0
-    found = reduced(Wanted(n_keep, wanted.tol, wanted.f_max, wanted.order), scene, reduction)
-    return Outcome(found.p, scene.full.J.size, found.slower, found.off, found.error, found.status)
+def reduced(wanted, scene):
+    """The reduced model of a chain, and how far it is off.
+
+    An exact one has all frequencies however few its masses: where `tol` is to be met, one.
+    """
+    is_exact = wanted.reduction == EXACT
+    n_keep = 1.0 if is_exact and not wanted.n_keep > 0.0 else wanted.n_keep
+    wanted = Wanted(wanted.reduction, n_keep, wanted.tol, wanted.f_max, wanted.order)
+    model, off, error = _against_chain(wanted, scene)
+    count = scene.full.J.size if is_exact else model.p
+    return Outcome(model.p, count, model.slower, off, error, model.status)
 
 
 @jit_call
-def whole(wanted, scene, reduction):
+def whole(wanted, scene):
     """As `reduced`, of a chain that stays as it is."""
     n = scene.full.J.size
     blur = chain_poles(scene.full, n, damped(scene.full), scene.spare.work)

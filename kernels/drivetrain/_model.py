@@ -62,16 +62,16 @@ class Dense(NamedTuple):
     s: np.ndarray
 
 
-class ChainScene(NamedTuple):
-    """A chain, and the chain that it is reduced to."""
+class WholeScene(NamedTuple):
+    """A chain that stays as it is: `kept` is `full`."""
 
     full: Chain
     kept: Chain
     spare: Spare
 
 
-class ModalScene(NamedTuple):
-    """A chain, and the modes that it is reduced to, with their frequencies and poles in `kept`."""
+class ReducedScene(NamedTuple):
+    """A chain, and the chain that it is reduced to; or the modes, with their frequencies and poles in `kept`."""
 
     full: Chain
     kept: Chain
@@ -83,6 +83,7 @@ class ModalScene(NamedTuple):
 class Wanted(NamedTuple):
     """What a reduced model is to be: of n_keep masses or, where that is 0, of as many as `tol` needs up to f_max."""
 
+    reduction: float
     n_keep: float
     tol: float
     f_max: float
@@ -141,21 +142,14 @@ def whole_scene(columns):
     """Room for a chain that stays as it is."""
     n = columns.J.shape[1]
     chain = _new_chain(n)
-    return (ChainScene(chain, chain, _new_spare(n)),)
+    return (WholeScene(chain, chain, _new_spare(n)),)
 
 
 @jit
-def chain_scene(columns):
-    """Room for a chain that is reduced to a chain."""
+def reduced_scene(columns):
+    """Room for a chain and what it is reduced to."""
     n = columns.J.shape[1]
-    return (ChainScene(_new_chain(n), _new_chain(n), _new_spare(n)),)
-
-
-@jit
-def modal_scene(columns):
-    """Room for a chain that is reduced to modes."""
-    n = columns.J.shape[1]
-    return (ModalScene(_new_chain(n), _new_chain(n), _new_spare(n), _new_modes(n), _new_dense(n)),)
+    return (ReducedScene(_new_chain(n), _new_chain(n), _new_spare(n), _new_modes(n), _new_dense(n)),)
 
 
 @jit_call

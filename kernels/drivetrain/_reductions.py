@@ -1,12 +1,11 @@
 """The ways in which a chain is reduced, each as how its model is made, its poles found, and its spindle's receptance.
 
-reduce(p, order, scene) -> Model          of p masses, into `scene`
-poles(p, scene) -> error, count           of the chain and of the model, and how many the model has of its own
-receptance(w, model, scene)               of the spindle, by the model
+reduce(reduction, p, order, scene) -> Model   of p masses, into `scene`
+poles(reduction, p, scene) -> error, count    of the chain and of the model, and how many the model has of its own
+receptance(reduction, w, model, scene)        of the spindle, by the model
+The choice is made while a cell is solved: what reductions have in common takes longest to compile, so it is compiled
+once for all of them.
 """
-
-from collections.abc import Callable
-from typing import NamedTuple
 
 from kernels.drivetrain import _guyan_masses, _modal_masses, _rivin_exact, _rivin_merging
 from kernels.drivetrain._chain_frequencies import natural_frequencies
@@ -16,18 +15,17 @@ from kernels.drivetrain._modal_poles import modal_poles
 from kernels.drivetrain._modal_receptance import chain_receptance, damping_matrix, modal_receptance
 from kernels.drivetrain._model import CHAIN_ROUNDING, Model, off_by
 from kernels.drivetrain._ritz import ritz
-from kernels.lanes.jit import jit_call
+from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude, sqrt
 
+NONE, RIVIN, GUYAN, IRS, CRAIG_BAMPTON, MODAL, EXACT = range(7)
 _ROUNDING = 4e-16
 
 
-class Reduction(NamedTuple):
-    """A way to reduce a chain."""
-
-    reduce: Callable
-    poles: Callable
-    receptance: Callable
+@jit
+def leaves_chain(reduction):
+    """Whether what is left is a chain."""
+    return reduction in (NONE, RIVIN, EXACT)
 
 
 @jit_call
@@ -214,9 +212,37 @@ def _modal_receptance(w, model, scene):
     return model.residual + modal_receptance(w, scene.modes, model.p, scene.dense.A, scene.dense.B)
 
 
-RIVIN = Reduction(_reduce_rivin, _poles_of_both, _chain_receptance)
-EXACT = Reduction(_reduce_exactly, _poles_of_full, _exact_receptance)
-GUYAN = Reduction(_reduce_guyan, _poles_of_modes, _modal_receptance)
-IRS = Reduction(_reduce_irs, _poles_of_modes, _modal_receptance)
-CRAIG_BAMPTON = Reduction(_reduce_craig_bampton, _poles_of_modes, _modal_receptance)
-MODAL = Reduction(_reduce_modal, _poles_of_modes, _modal_receptance)
+@jit_call
+def reduce(reduction, p, order, scene):
+    """The model of p masses."""
+    if reduction == RIVIN:
+        return _reduce_rivin(p, order, scene)
+    if reduction == GUYAN:
+        return _reduce_guyan(p, order, scene)
+    if reduction == IRS:
+        return _reduce_irs(p, order, scene)
+    if reduction == CRAIG_BAMPTON:
+        return _reduce_craig_bampton(p, order, scene)
+    if reduction == MODAL:
+        return _reduce_modal(p, order, scene)
+    return _reduce_exactly(p, order, scene)
+
+
+@jit_call
+def poles(reduction, p, scene):
+    """A bound on the relative error of the poles of the chain and of the model, and how many are the model's own."""
+    if reduction == RIVIN:
+        return _poles_of_both(p, scene)
+    if reduction == EXACT:
+        return _poles_of_full(p, scene)
+    return _poles_of_modes(p, scene)
+
+
+@jit_call
+def receptance(reduction, w, model, scene):
+    """The spindle's, by the model."""
+    if reduction == RIVIN:
+        return _chain_receptance(w, model, scene)
+    if reduction == EXACT:
+        return _exact_receptance(w, model, scene)
+    return _modal_receptance(w, model, scene)

@@ -25,13 +25,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.drivetrain import _reductions
 from kernels.drivetrain._chain import MASS_LIMIT, refusal
 from kernels.drivetrain._chain_frequencies import natural_frequencies
 from kernels.drivetrain._chain_poles import modal_damping
-from kernels.drivetrain._error import exact, reduced, whole
+from kernels.drivetrain._error import reduced, whole
 from kernels.drivetrain._modal_masses import TURN
-from kernels.drivetrain._model import Wanted, chain_scene, modal_scene, off_by, take_units, whole_scene
+from kernels.drivetrain._model import Wanted, off_by, reduced_scene, take_units, whole_scene
+from kernels.drivetrain._reductions import CRAIG_BAMPTON, EXACT, GUYAN, IRS, MODAL, NONE, RIVIN, leaves_chain
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, DAMPERS_OUT_OF_RANGE, INACCURATE, OK
 from kernels.lanes.columns import cell_by_cell
@@ -42,7 +42,15 @@ from kernels.lanes.vectors import magnitude, nearest
 from kernels.lanes.wiring import kernel, split, tracing
 from kernels.maths.elementary import in_unit, is_normal, scale
 
-REDUCTIONS = {"none": 0, "rivin": 1, "guyan": 2, "irs": 3, "craig_bampton": 4, "modal": 5, "exact": 6}
+REDUCTIONS = {
+    "none": NONE,
+    "rivin": RIVIN,
+    "guyan": GUYAN,
+    "irs": IRS,
+    "craig_bampton": CRAIG_BAMPTON,
+    "modal": MODAL,
+    "exact": EXACT,
+}
 ORDERS = {"strict": 0, "paper": 1}
 _REDUCTIONS, _ORDERS = float(len(REDUCTIONS)), float(len(ORDERS))
 EVERYTHING = 1e300
@@ -112,8 +120,8 @@ def _verdict(outcome, band, rtol):
     return OK if limit >= band else DAMPERS_OUT_OF_RANGE, limit
 
 
-def _filling(solve, reduction, is_chain):
-    """Fills a cell by `solve(wanted, scene, reduction)`: the choice of what goes and every loop differ by the cell."""
+def _filling(solve):
+    """Fills a cell by `solve(wanted, scene)`: the choice of what goes and every loop differ by the cell."""
 
     @jit
     def fill(i, columns, scene):
@@ -121,17 +129,17 @@ def _filling(solve, reduction, is_chain):
         p, full = read(Drivetrain, columns, i), scene.full
         e_J, e_k = take_units(p.J, p.k, p.h, full)
         e = 0.5 * (e_k - e_J)
-        wanted = Wanted(p.n_keep, p.tol, in_unit(p.f_max, e), p.order)
+        wanted = Wanted(p.reduction, p.n_keep, p.tol, in_unit(p.f_max, e), p.order)
         status = natural_frequencies(p.J.size, full.J, full.k, full.f, scene.spare.work)
         if status > OK:
             columns.status[i] = status
             return
-        found = solve(wanted, scene, reduction)
+        found = solve(wanted, scene)
         if found.status > OK:
             columns.status[i] = found.status
             return
         fine = _write_modes(i, columns, found.count, e, scene)
-        if is_chain:
+        if leaves_chain(p.reduction):
             fine = _write_chain(i, columns, found.p, e_J, e_k, scene.kept) and fine
         verdict, limit = _verdict(found, wanted.f_max, columns.rtol[i])
         columns.n_kept[i], columns.frf_error[i] = found.p, found.off
@@ -141,19 +149,9 @@ def _filling(solve, reduction, is_chain):
     return fill
 
 
-def _solver(name, solve, reduction, scene, is_chain):
-    return tracing(name, "", _filling(solve, reduction, is_chain), buffers=scene, loop=cell_by_cell)
-
-
-SOLVERS = {
-    "none": _solver("none", whole, None, whole_scene, True),
-    "rivin": _solver("rivin", reduced, _reductions.RIVIN, chain_scene, True),
-    "guyan": _solver("guyan", reduced, _reductions.GUYAN, modal_scene, False),
-    "irs": _solver("irs", reduced, _reductions.IRS, modal_scene, False),
-    "craig_bampton": _solver("craig_bampton", reduced, _reductions.CRAIG_BAMPTON, modal_scene, False),
-    "modal": _solver("modal", reduced, _reductions.MODAL, modal_scene, False),
-    "exact": _solver("exact", exact, _reductions.EXACT, chain_scene, True),
-}
+WHOLE = tracing("none", "", _filling(whole), buffers=whole_scene, loop=cell_by_cell)
+REDUCED = tracing("reduced", "", _filling(reduced), buffers=reduced_scene, loop=cell_by_cell)
+"""Apart, because whole chains are compiled in a third of the time."""
 
 
 @jit
@@ -221,7 +219,7 @@ DRIVETRAIN = kernel(
     methods=(
         split(
             "direct", "frequencies by dqds, reduced models as they are defined", "reduction",
-            {float(code): SOLVERS[name] for name, code in REDUCTIONS.items()},
+            {float(code): WHOLE if code == NONE else REDUCED for code in REDUCTIONS.values()},
         ),
     ),
     example={"J": (0.25, 0.012, 0.06, 0.98), "k": (7e4, 1.3e4, 2.7e4, 1.2e4), "h": (1.8, 0.4, 1.8, 60.0),

@@ -33,8 +33,12 @@ def jit_inline(function: F) -> F:
 
 
 def jit_call(function: F) -> F:
-    """As `jit`, but left a call: for what is long and used in several places."""
-    made: F = part(function, **_OPTIONS)
+    """As `jit`, but left a call: for what is long and used in several places.
+
+    `forceinline` must be said: numba hands that of a caller on to all that it calls, whose code is then pasted in
+    everywhere, for several times the compile seconds.
+    """
+    made: F = part(function, forceinline=False, **_OPTIONS)
     return made
 
 

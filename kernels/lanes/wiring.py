@@ -108,7 +108,10 @@ class Split:
 
 
 def split(name: str, doc: str, parameter: str, solvers: dict[float, Solver]) -> Split:
-    """A method by {value of a parameter: `method` or `tracing`}; each is compiled when a cell asks for it first."""
+    """A method by {value of a parameter: `method` or `tracing`}; each is compiled when a cell asks for it first.
+
+    Values with the same solver are one entry: it is compiled once, and their cells are solved together.
+    """
     return Split(name, doc, parameter, solvers)
 
 
@@ -217,16 +220,16 @@ class _Wiring:
         return Method(solver.name, solver.doc, solve, bound, solver.excludes, solver.lacks, solver.estimates)
 
     def _split(self, split: Split) -> OnColumns:
-        solvers = {value: self.method(solver).solve for value, solver in split.solvers.items()}
+        entries = {solver: self.method(solver).solve for solver in dict.fromkeys(split.solvers.values())}
         chosen, first_output = self.parameters.index(split.parameter), len(self.parameters) + 1
 
         def solve(*columns: Any) -> None:
-            for value in np.unique(columns[chosen]):
-                rows = columns[chosen] == value
+            for solver in dict.fromkeys(split.solvers[value] for value in np.unique(columns[chosen])):
+                rows = np.isin(columns[chosen], [value for value, by in split.solvers.items() if by == solver])
                 if rows.all():
-                    return solvers[value](*columns)
+                    return entries[solver](*columns)
                 part = [column[rows] for column in columns]
-                solvers[value](*part)
+                entries[solver](*part)
                 for column, result in zip(columns[first_output:], part[first_output:], strict=True):
                     column[rows] = result
 

@@ -11,11 +11,11 @@ from numba.core.errors import TypingError
 from triangle import FIELDS, TRIANGLE, Area, Sides, Triangle, check, in_order, pythagoras
 
 from kernels.interface import Status
-from kernels.lanes import codes
+from kernels.lanes import codes, wiring
 from kernels.lanes.codes import OK
 from kernels.lanes.jit import COMPILED, jit
 from kernels.lanes.vectors import WIDTH
-from kernels.lanes.wiring import kernel, method
+from kernels.lanes.wiring import kernel, method, split
 
 OUTPUTS = ("longest", "area", "angle")
 WHOLE = ("pythagoras", "in_order", "one_by_one", "estimating", "by_hand")
@@ -232,3 +232,16 @@ def test_functions_of_columns_say_which_they_take():
         assert str(inspect.signature(TRIANGLE.method(name).solve)) == wanted
     for name in ("in_order", "pythagoras"):
         assert str(inspect.signature(TRIANGLE.method(name).bound)) == "(a, b, rtol, asked, out)"
+
+
+def test_values_with_the_same_solver_are_one_entry(monkeypatch):
+    made, entry_of = [], wiring.entry_of
+    monkeypatch.setattr(
+        wiring, "entry_of", lambda f, *rest, **more: made.append(f.__name__) or entry_of(f, *rest, **more)
+    )
+    by = method("records", "", pythagoras)
+    other = method("tuple", "", in_order)
+    both = kernel("triangle", **FIELDS, methods=(split("both", "", "a", {1.0: by, 2.0: by, 3.0: other}),))
+    assert made == ["check", "records", "tuple"]
+    a = np.array([3.0, 1.0, 2.0, 1.0, 3.0])
+    np.testing.assert_allclose(solve(both, "both", a, 2.0 * a)[0]["area"], a * a, rtol=1e-15)
