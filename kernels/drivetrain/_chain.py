@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.lanes.codes import BAD_INPUT, OK, OUT_OF_RANGE
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import exponent, nearest, not_, where
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW
 
@@ -66,7 +66,7 @@ def normal_spread(low, high):
     return (low >= NORMAL_LOW) & (high <= NORMAL_HIGH) & (low >= high / SPREAD)
 
 
-@jit_call
+@jit_apart
 def refusal(n, J, k, h):
     """BAD_INPUT, OUT_OF_RANGE or OK of one chain of n inertias."""
     if not (1 <= n <= MASS_LIMIT):

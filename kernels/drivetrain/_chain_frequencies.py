@@ -27,7 +27,7 @@ from kernels.drivetrain._chain import same, units
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.columns import entry
 from kernels.lanes.groups import GROUP, cells_at, each_group, room
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
 from kernels.maths.elementary import is_normal, scale
 
@@ -193,7 +193,7 @@ def _unknown(like):
     return endless, endless, endless, endless, endless, endless
 
 
-@jit_call
+@jit_apart
 def _rotate(m, n, at, rows, found, active, sums):
     """Brings the part with the smallest eigenvalue to the end, where steps can find it; parts have no order.
 
@@ -286,7 +286,7 @@ def frequencies(n, at, J, k, frequency, rows):
     return where(sound, where(failed, NOT_CONVERGED, OK), OUT_OF_RANGE)
 
 
-@jit_call
+@jit_apart
 def natural_frequencies(n, J, k, frequency, work):
     """`frequencies` of one chain: the first n entries of J [kg m^2], k [N m/rad] and frequency [Hz]."""
     return frequencies(n, same, J, k, frequency, work)

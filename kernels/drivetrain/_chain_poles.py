@@ -13,7 +13,7 @@ Source: first-order perturbation of the quadratic eigenvalue problem, derived he
 from kernels.drivetrain._chain import Scaled, extremes, same, units
 from kernels.drivetrain._chain_roots import approach, start, stiffness
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import exponent, fma, magnitude, sqrt
 from kernels.maths import complex
 from kernels.maths.elementary import is_normal, scale
@@ -29,7 +29,7 @@ _LIGHT = 0.03
 _TURNS = 0.15915494309189535  # 1/(2 pi)
 
 
-@jit_call
+@jit_apart
 def _follow(n, chain, s, step, ways):
     """Rows of x, g before the inertia, the winding of the spring on the right (re, im each) and their exponent."""
     J, k, _, e_J, e_k = chain
@@ -73,7 +73,7 @@ def _joint(n, chain, ways):
     return best
 
 
-@jit_call
+@jit_apart
 def _look(n, chain, s, r, ways):
     """Newton's step (1) of a pole from the joint r, the bound (2) on its relative error; x* J x, x* h x and x* k x."""
     J, k, h, e_J, e_k = chain
@@ -97,7 +97,7 @@ def _look(n, chain, s, r, ways):
     return (-step[0], -step[1]), ROUNDING * worth, solid, viscous, elastic
 
 
-@jit_call
+@jit_apart
 def _best_joint(n, chain, s, ways):
     """The joint whose step is the shortest: the largest inertia may hardly move with what a damper lets creep."""
     r = _joint(n, chain, ways)
@@ -110,7 +110,7 @@ def _best_joint(n, chain, s, ways):
     return r
 
 
-@jit_call
+@jit_apart
 def _refined(n, chain, s, ways):
     """A pole to its last digits, and a bound on its relative error."""
     error, solid, viscous, r = 0.0, 1.0, 0.0, -1
@@ -142,7 +142,7 @@ def _twin(i, count, fixed, pole_re, pole_im):
     return -1
 
 
-@jit_call
+@jit_apart
 def _twins(n, chain, i, j, pole_re, pole_im, ways):
     """Puts two roots near critical damping where the quadratic of the shape between them has its own; their error."""
     middle = 0.5 * (pole_re[i] + pole_re[j]), 0.0
@@ -216,7 +216,7 @@ def _paired(n, fixed, pole_re, pole_im, pairs):
     return found == 2 * n
 
 
-@jit_call
+@jit_apart
 def damped_poles(n, J, k, h, frequency, pole_re, pole_im, work):
     """(error, status): all 2 n poles [rad/s] ascending in size, a pair as +Im, -Im; a bound on their relative errors.
 
@@ -244,7 +244,7 @@ def damped_poles(n, J, k, h, frequency, pole_re, pole_im, work):
     return error, OK if settled and told_apart else NOT_CONVERGED
 
 
-@jit_call
+@jit_apart
 def modal_damping(n, pole_re, pole_im, frequency, damping):
     """Per mode abs(s)/2 pi [Hz] and the damping ratio -Re s/abs(s), from poles as `damped_poles` gives them.
 

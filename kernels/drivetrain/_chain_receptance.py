@@ -15,7 +15,7 @@ import math
 from typing import NamedTuple
 
 from kernels.drivetrain._chain import Scaled, extremes, same, units
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import any_lane, choose, exponent, fma, magnitude, where
 from kernels.maths import complex
 from kernels.maths.elementary import scale
@@ -55,7 +55,7 @@ def _turned(x, g, inertia):
     return fma(-inertia, x[0], g[0]), fma(-inertia, x[1], g[1])
 
 
-@jit_call
+@jit_apart
 def _on(way, inertia, spring):
     """The way across an inertia and a spring."""
     x, g, e, work = way
@@ -73,7 +73,7 @@ def _element(j, chain, w):
     return w * w * scale(J[j], -e_J), (scale(k[j], -e_k) + 0.0 * w, w * scale(h[j], -0.5 * (e_J + e_k)))
 
 
-@jit_call
+@jit_apart
 def _from_left(p, q, chain, w, n, at, rows):
     """The ways as they come to p and to q >= p; abs x and g' and their exponents between are kept in `rows`."""
     zero = 0.0 * w
@@ -91,7 +91,7 @@ def _from_left(p, q, chain, w, n, at, rows):
     return first, way
 
 
-@jit_call
+@jit_apart
 def _from_right(q, chain, w, n):
     """The way as it comes to q."""
     zero = 0.0 * w
@@ -102,7 +102,7 @@ def _from_right(q, chain, w, n):
     return way
 
 
-@jit_call
+@jit_apart
 def _between(p, q, way, e_W, chain, w, n, at, rows):
     """The sum of (3) from p to q, over 2^e_W; and the way as it comes to p from q."""
     total = 0.0 * w
@@ -125,7 +125,7 @@ def _net(left, right, inertia):
     return fma(-inertia, third[0], one[0] + other[0]), fma(-inertia, third[1], one[1] + other[1])
 
 
-@jit_call
+@jit_apart
 def receptance(n, J, k, h, omega, drive, read, at, rows):
     """(re, im, error): angle at `read` per torque at `drive` [rad/(N m)] at omega [rad/s], of one number or lanes.
 

@@ -10,7 +10,7 @@ Source: Aberth, Math. Comp. 27:339 (1973).
 """
 
 from kernels.drivetrain._chain_shapes import follow_mode
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import exponent, fma, sqrt
 from kernels.maths import complex
 from kernels.maths.elementary import scale
@@ -29,7 +29,7 @@ def stiffness(j, chain, s):
     return fma(damper, s[0], scale(k[j], -e_k)), damper * s[1]
 
 
-@jit_call
+@jit_apart
 def _newton(n, chain, s):
     """D/D' of (1), by the same recurrence for the derivatives."""
     J, _, h, e_J, e_k = chain

@@ -10,7 +10,7 @@ Source: Holzer's method; the joint is that of Parlett & Dhillon, Linear Algebra 
 
 from kernels.drivetrain._chain import same, units
 from kernels.lanes.codes import OK, OUT_OF_RANGE
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import exponent, fma, magnitude, sqrt
 from kernels.maths.elementary import is_normal, scale
 
@@ -27,7 +27,7 @@ def _renormed(x, g, e):
     return scale(x, -own), scale(g, -own), e + own
 
 
-@jit_call
+@jit_apart
 def _follow(n, J, k, e_J, e_k, square, step, ways):
     """x, g before the inertia, and the exponent of both, of each inertia, into three rows of n; step is 1 or -1."""
     x, g, e = 1.0, 0.0 if step > 0 else scale(k[n - 1], -e_k), 0.0
@@ -41,7 +41,7 @@ def _follow(n, J, k, e_J, e_k, square, step, ways):
             j += step
 
 
-@jit_call
+@jit_apart
 def _joint(n, J, e_J, ways):
     """The inertia r at which J x(left) x(right) is largest."""
     best, top, power = 0, 0.0, 0.0
@@ -53,7 +53,7 @@ def _joint(n, J, e_J, ways):
     return best
 
 
-@jit_call
+@jit_apart
 def _join(n, J, e_J, ways):
     """The shape into the first n of `ways`, 1 at the joint in size; its sum J x^2."""
     r = _joint(n, J, e_J, ways)
@@ -77,7 +77,7 @@ def follow_mode(n, J, k, e_J, e_k, frequency, work):
     return _join(n, J, e_J, work)
 
 
-@jit_call
+@jit_apart
 def mode_shapes(n, J, k, frequency, shape, work):
     """shape[i, j] of mass i in mode j [1/sqrt(kg m^2)], with sum_i J_i shape[i, j]^2 = 1 and shape[0, j] >= 0.
 

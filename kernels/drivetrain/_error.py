@@ -4,7 +4,7 @@ from kernels.drivetrain._modal_masses import TURN
 from kernels.drivetrain._modal_receptance import chain_receptance, least_damping, sample_grid, sample_poles
 from kernels.drivetrain._model import CHAIN_ROUNDING, Model, Outcome, Wanted, largest_error
 from kernels.drivetrain._reductions import EXACT, chain_poles, damped, poles, receptance, reduce
-from kernels.lanes.jit import jit_call
+from kernels.lanes.jit import jit_apart
 from kernels.lanes.vectors import fma, sqrt
 from kernels.maths.small_dense import sort_many
 
@@ -16,7 +16,7 @@ _BEYOND = 4.0  # times the highest frequency: from there on receptances only fal
 _ROUNDING = 4e-16
 
 
-@jit_call
+@jit_apart
 def _reduce_enough(wanted, scene):
     """The model that is wanted.
 
@@ -39,7 +39,7 @@ def _reduce_enough(wanted, scene):
     return model
 
 
-@jit_call
+@jit_apart
 def _value_at(w, of_error, model, scene, reduction):
     """abs(dH) or abs(H); 0 where it is no number: exactly on a pole of a partial system."""
     full = scene.full
@@ -50,7 +50,7 @@ def _value_at(w, of_error, model, scene, reduction):
     return size if size >= 0.0 else 0.0
 
 
-@jit_call
+@jit_apart
 def _top(low, high, of_error, model, scene, reduction):
     """Largest value between two frequencies, by the golden section."""
     a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
@@ -68,7 +68,7 @@ def _top(low, high, of_error, model, scene, reduction):
     return max(at_a, at_b)
 
 
-@jit_call
+@jit_apart
 def _largest(count, of_error, model, scene, reduction):
     """Largest value in the band: of those at the samples, and of the tops between them."""
     at, value = scene.spare.at, scene.spare.off
@@ -84,7 +84,7 @@ def _largest(count, of_error, model, scene, reduction):
     return most
 
 
-@jit_call
+@jit_apart
 def _sample(w_max, own_poles, full, kept, at):
     """Fills `at` with frequencies of the band, rising, close to one another around the poles; how many there are."""
     count = sample_grid(at, w_max, TURN * full.f[0])
@@ -94,7 +94,7 @@ def _sample(w_max, own_poles, full, kept, at):
     return count
 
 
-@jit_call
+@jit_apart
 def _receptance_error(f_max, own_poles, model, scene, reduction):
     """Largest abs(dH) up to f_max over the largest abs(H), and a bound on its rounding.
 
@@ -114,7 +114,7 @@ def _receptance_error(f_max, own_poles, model, scene, reduction):
     return off / size, _ROUNDING * n / zeta
 
 
-@jit_call
+@jit_apart
 def _against_chain(wanted, scene):
     """The reduced model of a chain, how far its receptance is off, and a bound on the relative error of all."""
     model = _reduce_enough(wanted, scene)
@@ -129,7 +129,7 @@ def _against_chain(wanted, scene):
     return model, off, error
 
 
-@jit_call
+@jit_apart
 def reduced(wanted, scene):
     """The reduced model of a chain, and how far it is off.
 
@@ -143,7 +143,7 @@ def reduced(wanted, scene):
     return Outcome(model.p, count, model.slower, off, error, model.status)
 
 
-@jit_call
+@jit_apart
 def whole(wanted, scene):
     """As `reduced`, of a chain that stays as it is."""
     n = scene.full.J.size

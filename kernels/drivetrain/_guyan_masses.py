@@ -11,11 +11,11 @@ Source: Guyan, AIAA J. 3:380 (1965); O'Callahan, Proc. 7th IMAC (1989) 17.
 """
 
 from kernels.drivetrain._rivin_merging import fastest, remove_mass
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import sqrt
 
 
-@jit_call
+@jit_apart
 def choose_masters(J, k, h, masters, n, p, order):
     """Fills `masters` with the numbers of the p masses to be kept, rising; uses up J, k and h.
 
@@ -47,7 +47,7 @@ def _share(part, whole):
     return part / whole if whole < float("inf") else 0.0
 
 
-@jit_call
+@jit_apart
 def static_shapes(W, G, J, k, masters, n, p):
     """The basis (1): each master turned by 1 while the others stand; with free ends, row 0 is all turned by 1."""
     for i in range(p):
@@ -72,7 +72,7 @@ def static_shapes(W, G, J, k, masters, n, p):
             W[0, j], G[0, j] = sqrt(J[j]), 0.0
 
 
-@jit_call
+@jit_apart
 def add_inertia(W, G, J, k, masters, w, p, n, angle):
     """Adds (2) to the modes W, G of frequencies w; `angle` is a buffer."""
     for mode in range(p):

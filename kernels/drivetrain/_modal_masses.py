@@ -9,7 +9,7 @@ Rows are as in `_ritz`. Source: Craig & Bampton, AIAA J. 6:1313 (1968); O'Callah
 
 from kernels.drivetrain._chain_frequencies import natural_frequencies
 from kernels.drivetrain._chain_shapes import mode_shapes
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import fma, magnitude, sqrt
 
 TURN = 6.283185307179586
@@ -17,7 +17,7 @@ HOLD = 2.0**80
 """Inertia of a held spindle, over the largest one."""
 
 
-@jit_call
+@jit_apart
 def fill_rows(W, G, J, k, angle, square, n):
     """W and G of a mode u of squared frequency w^2.
 
@@ -33,7 +33,7 @@ def fill_rows(W, G, J, k, angle, square, n):
         G[j] = torque / sqrt(k[j]) if by_torque and j + 1 < n else sqrt(k[j]) * (angle[j] - beyond)
 
 
-@jit_call
+@jit_apart
 def modal(modes, chain, p, shapes, angle, work):
     """The lowest p modes as rows; what the others give way at rest [rad/(N m)] and a status.
 
@@ -52,7 +52,7 @@ def modal(modes, chain, p, shapes, angle, work):
     return residual, status
 
 
-@jit_call
+@jit_apart
 def craig_bampton(W, G, J, k, frequency, shapes, angle, p, n, work):
     """Basis of the spindle at rest and p - 1 modes with the spindle held, and a status."""
     at_rest(W[0], G[0], J, k, n)

@@ -5,7 +5,7 @@ and the roots found already kept away,  s -= N/(1 - N sum_j 1/(s - s_j)).
 Starts from the undamped frequencies. Source: Bini & Noferini, Linear Algebra Appl. 439:1130 (2013).
 """
 
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import fma, magnitude, sqrt
 from kernels.maths.small_dense import eliminate, over, size, sort, substitute_back
 
@@ -26,7 +26,7 @@ def _fill(A, B, s, w, C, p):
         B[i, i] += 2.0 * s
 
 
-@jit_call
+@jit_apart
 def _logarithmic_slope(A, B, p):
     """Trace of A^-1 B, by elimination; NaN where A is singular. Uses up A and B."""
     eliminate(A, B, p, p)
@@ -110,7 +110,7 @@ def _write(s, known, p, blur, pole_re, pole_im):
     return filled == 2 * p
 
 
-@jit_call
+@jit_apart
 def modal_poles(w, C, p, free, pole_re, pole_im, s, A, B):
     """All 2 p poles [rad/s], conjugates together; a bound on their relative error, inf where they did not come.
 

@@ -5,7 +5,7 @@ strains d. It moves as x = sum phi_i q_i,
     q_i'' + sum_j c_ij q_j' + w_i^2 q_i = phi_i M.                                                   (1)
 """
 
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import fma, sqrt
 from kernels.maths.elementary import exp, log
 from kernels.maths.small_dense import eliminate, over, substitute_back
@@ -16,7 +16,7 @@ GRID = 96
 """Further frequencies, evenly over the logarithm of the band."""
 
 
-@jit_call
+@jit_apart
 def damping_matrix(C, W, G, chain, p):
     """c_ij of (1) from rows W, G; a damper without a spring, at a free end, is strained by its mass's angle."""
     J, k, h = chain.J, chain.k, chain.h
@@ -31,7 +31,7 @@ def damping_matrix(C, W, G, chain, p):
             C[i, j] = C[j, i] = total
 
 
-@jit_call
+@jit_apart
 def modal_receptance(w, modes, p, A, B):
     """Receptance of the spindle by (1); `A` and `B` are square complex buffers."""
     for i in range(p):
@@ -56,7 +56,7 @@ def spindle_receptance(J, K, w_square, m):
     return over(1.0 + 0.0j, below)
 
 
-@jit_call
+@jit_apart
 def chain_receptance(w, J, k, h, m, J_w, K_w):
     """Receptance of the first of m masses of a chain; `J_w` and `K_w` are complex buffers."""
     for j in range(m):
@@ -64,7 +64,7 @@ def chain_receptance(w, J, k, h, m, J_w, K_w):
     return spindle_receptance(J_w, K_w, w * w, m)
 
 
-@jit_call
+@jit_apart
 def sample_grid(at, w_max, lowest):
     """Fills `at` with 0, w_max and frequencies between, even on a log scale; how many there are."""
     at[0], at[1] = 0.0, w_max
@@ -76,7 +76,7 @@ def sample_grid(at, w_max, lowest):
     return 2 + GRID
 
 
-@jit_call
+@jit_apart
 def sample_poles(at, filled, w_max, pole_re, pole_im, count):
     """Adds frequencies close around each of `count` poles; how many there are then."""
     for i in range(count):

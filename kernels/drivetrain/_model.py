@@ -10,7 +10,7 @@ import numpy as np
 
 from kernels.drivetrain._chain import extremes, same
 from kernels.drivetrain._modal_receptance import AROUND, GRID
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import exponent, magnitude, nearest
 from kernels.maths.elementary import in_unit
 
@@ -115,23 +115,23 @@ class Outcome(NamedTuple):
     status: float
 
 
-@jit_call
+@jit_apart
 def _new_chain(n):
     return Chain(np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(2 * n), np.empty(2 * n))
 
 
-@jit_call
+@jit_apart
 def _new_spare(n):
     points, waves = 2 * len(AROUND) * n + GRID + 2, np.empty((2, n), np.complex128)
     return Spare(np.empty(16 * n), np.empty(n), np.empty(n), waves[0], waves[1], np.empty(points), np.empty(points))
 
 
-@jit_call
+@jit_apart
 def _new_modes(n):
     return Modes(np.empty((n, n)), np.empty((n, n)), np.empty(n), np.empty((n, n)), np.empty(n))
 
 
-@jit_call
+@jit_apart
 def _new_dense(n):
     A, B, s = np.empty((n, n), np.complex128), np.empty((n, n), np.complex128), np.empty(2 * n, np.complex128)
     return Dense(np.empty((n, n)), np.empty(n), np.empty(n), A, B, s)
@@ -152,7 +152,7 @@ def reduced_scene(columns):
     return (ReducedScene(_new_chain(n), _new_chain(n), _new_spare(n), _new_modes(n), _new_dense(n)),)
 
 
-@jit_call
+@jit_apart
 def take_units(J, k, h, full):
     """Fills `full` with a chain in units of 2^e_J and 2^e_k, their difference even. Returns e_J, e_k."""
     e_J, e_k = exponent(extremes(J.size, same, J)[1]), extremes(k.size, same, k)[1]

@@ -15,7 +15,7 @@ from kernels.drivetrain._modal_poles import modal_poles
 from kernels.drivetrain._modal_receptance import chain_receptance, damping_matrix, modal_receptance
 from kernels.drivetrain._model import CHAIN_ROUNDING, Model, off_by
 from kernels.drivetrain._ritz import ritz
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
 
 NONE, RIVIN, GUYAN, IRS, CRAIG_BAMPTON, MODAL, EXACT = range(7)
@@ -28,7 +28,7 @@ def leaves_chain(reduction):
     return reduction in (NONE, RIVIN, EXACT)
 
 
-@jit_call
+@jit_apart
 def damped(chain):
     """Whether a chain has a damper."""
     most = 0.0
@@ -37,7 +37,7 @@ def damped(chain):
     return most > 0.0
 
 
-@jit_call
+@jit_apart
 def _undamped_poles(chain):
     """Poles on the imaginary axis."""
     for i in range(chain.f.size):
@@ -45,7 +45,7 @@ def _undamped_poles(chain):
         chain.im[2 * i], chain.im[2 * i + 1] = TURN * chain.f[i], -TURN * chain.f[i]
 
 
-@jit_call
+@jit_apart
 def chain_poles(chain, m, is_damped, work):
     """Poles of a chain of m masses; a bound on their relative error, inf where they did not come."""
     if not is_damped:
@@ -55,13 +55,13 @@ def chain_poles(chain, m, is_damped, work):
     return error if status == 0.0 else float("inf")
 
 
-@jit_call
+@jit_apart
 def _copy(full, kept):
     for j in range(full.J.size):
         kept.J[j], kept.k[j], kept.h[j] = full.J[j], full.k[j], full.h[j]
 
 
-@jit_call
+@jit_apart
 def _merge(p, order, full, kept, spare):
     """The chain of p masses by Rivin's steps; the largest h e of merged springs."""
     n, slower = full.J.size, 0.0
@@ -72,7 +72,7 @@ def _merge(p, order, full, kept, spare):
     return slower
 
 
-@jit_call
+@jit_apart
 def _reduce_rivin(p, order, scene):
     kept = scene.kept
     slower = _merge(p, order, scene.full, kept, scene.spare)
@@ -80,7 +80,7 @@ def _reduce_rivin(p, order, scene):
     return Model(p, CHAIN_ROUNDING, slower, 0.0, status)
 
 
-@jit_call
+@jit_apart
 def _poles_of_both(p, scene):
     full, kept, work = scene.full, scene.kept, scene.spare.work
     is_damped, error = damped(full), 0.0
@@ -88,13 +88,13 @@ def _poles_of_both(p, scene):
     return max(error, chain_poles(kept, p, is_damped, work)), 2 * p
 
 
-@jit_call
+@jit_apart
 def _chain_receptance(w, model, scene):
     kept, spare = scene.kept, scene.spare
     return chain_receptance(w, kept.J, kept.k, kept.h, model.p, spare.J_w, spare.K_w)
 
 
-@jit_call
+@jit_apart
 def _reduce_exactly(p, order, scene):
     """All frequencies, from p masses that depend on the frequency; how far they are from the full chain's is error."""
     full, kept, spare = scene.full, scene.kept, scene.spare
@@ -107,7 +107,7 @@ def _reduce_exactly(p, order, scene):
     return Model(p, CHAIN_ROUNDING + apart, 0.0, 0.0, 0.0)
 
 
-@jit_call
+@jit_apart
 def _poles_of_full(p, scene):
     full, kept = scene.full, scene.kept
     error = max(0.0, chain_poles(full, full.J.size, damped(full), scene.spare.work))
@@ -116,13 +116,13 @@ def _poles_of_full(p, scene):
     return error, 0
 
 
-@jit_call
+@jit_apart
 def _exact_receptance(w, model, scene):
     full, spare = scene.full, scene.spare
     return _rivin_exact.receptance(w, full.J, full.k, full.h, spare.kinds, spare.places, model.p, spare.J_w, spare.K_w)
 
 
-@jit_call
+@jit_apart
 def _solve_basis(p, scene):
     """Modes of the basis in `modes`; a bound on the error of their frequencies."""
     full, modes, dense = scene.full, scene.modes, scene.dense
@@ -134,7 +134,7 @@ def _solve_basis(p, scene):
     return error
 
 
-@jit_call
+@jit_apart
 def _take_masters(p, order, scene):
     """Guyan's basis; the largest h e of springs that come in series."""
     full, kept, modes, masters = scene.full, scene.kept, scene.modes, scene.dense.masters
@@ -144,13 +144,13 @@ def _take_masters(p, order, scene):
     return slower
 
 
-@jit_call
+@jit_apart
 def _reduce_guyan(p, order, scene):
     slower = _take_masters(p, order, scene)
     return Model(p, _solve_basis(p, scene), slower, 0.0, 0.0)
 
 
-@jit_call
+@jit_apart
 def _reduce_irs(p, order, scene):
     full, modes, dense = scene.full, scene.modes, scene.dense
     slower, error = _take_masters(p, order, scene), 0.0
@@ -163,7 +163,7 @@ def _reduce_irs(p, order, scene):
     return Model(p, error, slower, 0.0, 0.0)
 
 
-@jit_call
+@jit_apart
 def _reduce_craig_bampton(p, order, scene):
     full, modes, dense = scene.full, scene.modes, scene.dense
     status = _modal_masses.craig_bampton(
@@ -172,7 +172,7 @@ def _reduce_craig_bampton(p, order, scene):
     return Model(p, _solve_basis(p, scene), 0.0, 0.0, status)
 
 
-@jit_call
+@jit_apart
 def _reduce_modal(p, order, scene):
     full, dense = scene.full, scene.dense
     for i in range(full.J.size):
@@ -181,7 +181,7 @@ def _reduce_modal(p, order, scene):
     return Model(p, CHAIN_ROUNDING, 0.0, residual, status)
 
 
-@jit_call
+@jit_apart
 def _least_gap(f, p):
     """Smallest relative distance of two of p frequencies: shapes are right to rounding over it."""
     gap = 1.0
@@ -190,7 +190,7 @@ def _least_gap(f, p):
     return gap
 
 
-@jit_call
+@jit_apart
 def _poles_of_modes(p, scene):
     full, kept, modes, dense = scene.full, scene.kept, scene.modes, scene.dense
     n, is_damped, error = full.J.size, damped(full), 0.0
@@ -207,12 +207,12 @@ def _poles_of_modes(p, scene):
     return error, 2 * p
 
 
-@jit_call
+@jit_apart
 def _modal_receptance(w, model, scene):
     return model.residual + modal_receptance(w, scene.modes, model.p, scene.dense.A, scene.dense.B)
 
 
-@jit_call
+@jit_apart
 def reduce(reduction, p, order, scene):
     """The model of p masses."""
     if reduction == RIVIN:
@@ -228,7 +228,7 @@ def reduce(reduction, p, order, scene):
     return _reduce_exactly(p, order, scene)
 
 
-@jit_call
+@jit_apart
 def poles(reduction, p, scene):
     """A bound on the relative error of the poles of the chain and of the model, and how many are the model's own."""
     if reduction == RIVIN:
@@ -238,7 +238,7 @@ def poles(reduction, p, scene):
     return _poles_of_modes(p, scene)
 
 
-@jit_call
+@jit_apart
 def receptance(reduction, w, model, scene):
     """The spindle's, by the model."""
     if reduction == RIVIN:

@@ -7,7 +7,7 @@ ever formed, so graded masses and springs lose no digits but those that the basi
 Source: Demmel & Veselic, SIAM J. Matrix Anal. Appl. 13:1204 (1992).
 """
 
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import fma, magnitude, sqrt
 from kernels.maths.small_dense import sort
 
@@ -31,7 +31,7 @@ def length(x, n):
     return sqrt(product(x, x, n))
 
 
-@jit_call
+@jit_apart
 def scale_row(x, factor, n):
     """x times a number, in place."""
     for j in range(n):
@@ -56,7 +56,7 @@ def _angle(a, b, d):
     return c, c * tangent
 
 
-@jit_call
+@jit_apart
 def orthogonalise(rows, others, first, p, n):
     """Rotates rows first .. p - 1 until they are orthogonal, and `others` alike. Whether that was reached."""
     small = _ORTHOGONAL * sqrt(1.0 * n)
@@ -76,7 +76,7 @@ def orthogonalise(rows, others, first, p, n):
     return False
 
 
-@jit_call
+@jit_apart
 def _make_orthonormal(W, G, first, p, n):
     """W to orthonormal rows, G alike; the condition of W's rows as they were, inf if it failed."""
     for i in range(p):
@@ -112,7 +112,7 @@ def _swap_modes(modes, i, j):
         G[i, c], G[j, c] = G[j, c], G[i, c]
 
 
-@jit_call
+@jit_apart
 def _worst(condition, w, before, sizes, W, first, p, n):
     """Largest relative error of a frequency: rounding of each row G_j, of size |G_j|, by its share in mode i."""
     worst = 0.0
@@ -124,7 +124,7 @@ def _worst(condition, w, before, sizes, W, first, p, n):
     return _ROUNDING * condition * worst * sqrt(1.0 * n)
 
 
-@jit_call
+@jit_apart
 def ritz(W, G, p, n, free, w, before, sizes):
     """Angular frequencies w of p modes, rising; W and G become those of the modes. Returns a bound on their error.
 

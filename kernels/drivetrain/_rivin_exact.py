@@ -25,7 +25,7 @@ Source: Wittrick & Williams, Q. J. Mech. Appl. Math. 24:263 (1971); (2) derived 
 
 from kernels.drivetrain._modal_receptance import spindle_receptance
 from kernels.drivetrain._rivin_merging import TYPE_A
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths import pairs
 from kernels.maths.pairs import add, negative, times, two_product
@@ -49,7 +49,7 @@ def _put(values, j, x):
     values[2 * j], values[2 * j + 1] = x[0], x[1]
 
 
-@jit_call
+@jit_apart
 def _sum(x, y):
     """x + y; in the place of 0, what rounding leaves of it."""
     total = add(x, y)
@@ -67,7 +67,7 @@ def _close_gap(J, K, j, m):
         J[i], K[i] = J[i + 2], K[i + 2]
 
 
-@jit_call
+@jit_apart
 def _without_mass(J, K, square, j, m):
     """Type a at mass j of m; how many of its pivots (1) are negative."""
     own, left, right = _take(J, j), _take(K, j - 1), _take(K, j)
@@ -81,7 +81,7 @@ def _without_mass(J, K, square, j, m):
     return _negatives(pivot)
 
 
-@jit_call
+@jit_apart
 def _without_spring(J, K, square, j, m):
     """Type b at spring j of m; how many of its pivots (2) are negative."""
     own, first, second, beyond = _take(K, j), _take(J, j), _take(J, j + 1), _take(K, j + 1)
@@ -99,7 +99,7 @@ def _without_spring(J, K, square, j, m):
     return _negatives(left) + _negatives(right) - between % 2
 
 
-@jit_call
+@jit_apart
 def count_below(w, J, k, kinds, places, p, J_w, K_w):
     """N at an angular frequency, and the stiffness at the first mass of the p; room for n pairs in J_w and K_w."""
     n, square, count = J.size, two_product(w, w), 0
@@ -138,7 +138,7 @@ def _opposite(x, y):
     return x < 0.0 < y or y < 0.0 < x
 
 
-@jit_call
+@jit_apart
 def _find(i, low, high, J, k, kinds, places, p, J_w, K_w):
     """The i-th angular frequency from 0, between two others, and one below it and all later ones."""
     at_low, at_high, side = float("nan"), float("nan"), 0
@@ -158,7 +158,7 @@ def _find(i, low, high, J, k, kinds, places, p, J_w, K_w):
     return 0.5 * (low + high), low
 
 
-@jit_call
+@jit_apart
 def exact_frequencies(J, k, kinds, places, p, frequency, J_w, K_w):
     """Fills `frequency` [Hz] with all of them, rising; free at both ends the first is exactly 0.
 
@@ -204,7 +204,7 @@ def _remove_spring(J, K, w_square, j, m):
     return over(1.0 + 0.0j, K_left) if j == 0 else 0.0j
 
 
-@jit_call
+@jit_apart
 def receptance(w, J, k, h, kinds, places, n_kept, J_w, K_w):
     """Receptance of the spindle from the chain of n_kept masses at the angular frequency w.
 

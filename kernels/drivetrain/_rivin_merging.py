@@ -15,7 +15,7 @@ Source: Baran & Marchelek, Mechanika Teoretyczna i Stosowana 9 (1971) 201, after
 Only sums, products and quotients of positive numbers: each parameter is right to a few ulp, whatever the chain.
 """
 
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 
 TYPE_A, TYPE_B = 0.0, 1.0
 STRICT, PAPER = 0.0, 1.0
@@ -44,7 +44,7 @@ def slowness(k, h):
     return h / k if h > 0.0 else 0.0
 
 
-@jit_call
+@jit_apart
 def merge(k, h, left, right):
     """Puts the springs `left` and `right` (numbers) in series into `left`; the larger of their h e [s]."""
     slower = max(slowness(k[left], h[left]), slowness(k[right], h[right]))
@@ -60,7 +60,7 @@ def _close_gap(values, gap, m):
         values[i] = values[i + 1]
 
 
-@jit_call
+@jit_apart
 def remove_mass(J, k, h, j, m):
     """Type a at mass j > 0 of m: (29), (32)-(34). Returns the larger h e of the merged springs."""
     total = k[j - 1] + k[j]
@@ -74,7 +74,7 @@ def remove_mass(J, k, h, j, m):
     return slower
 
 
-@jit_call
+@jit_apart
 def remove_spring(J, k, h, j, m):
     """Type b at spring j < m - 1 of m: (35)-(38). Returns the larger h e of the merged springs."""
     total = J[j] + J[j + 1]
@@ -92,7 +92,7 @@ def remove_spring(J, k, h, j, m):
     return slower
 
 
-@jit_call
+@jit_apart
 def fastest(J, k, m, order, springs_too):
     """Type and number of the partial system to be replaced next, of a chain of m > 1 masses; J_1 is never type a."""
     of_mass, mass = -1.0, 1
@@ -111,7 +111,7 @@ def fastest(J, k, m, order, springs_too):
     return TYPE_A, mass
 
 
-@jit_call
+@jit_apart
 def step(J, k, h, m, order):
     """One mass less. Returns type and number of the system replaced, and the larger h e of the merged springs [s]."""
     kind, place = fastest(J, k, m, order, True)

@@ -24,7 +24,7 @@ from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, INACCURATE, OK, OUT_OF_RANGE, PARTLY_OUT_OF_RANGE
 from kernels.lanes.columns import cell_by_cell
 from kernels.lanes.groups import GROUP
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.records import read
 from kernels.lanes.vectors import nearest, where
 from kernels.lanes.wiring import kernel, tracing
@@ -44,7 +44,7 @@ class Drive(NamedTuple):
     read_mass: float
 
 
-@jit_call
+@jit_apart
 def _write(i, j, lanes, sound, values, output, rows):
     """output[i, j ...] = values of the lanes that are frequencies; NaN where they are not `sound`."""
     rows[row_at(0)] = where(sound, values, math.nan)
@@ -60,7 +60,7 @@ def _omega(j, frequency, rows):
     return rows[row_at(0)] * _TWO_PI
 
 
-@jit_call
+@jit_apart
 def _group(i, j, p, columns, rows):
     """Outputs at frequencies j ... j + GROUP - 1 of a cell; their largest error, and at how many there are any."""
     lanes, drive, read = min(GROUP, columns.frequency.size - j), int(p.drive_mass), int(p.read_mass)

@@ -35,7 +35,7 @@ from kernels.drivetrain._reductions import CRAIG_BAMPTON, EXACT, GUYAN, IRS, MOD
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, DAMPERS_OUT_OF_RANGE, INACCURATE, OK
 from kernels.lanes.columns import cell_by_cell
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.ranges import partly
 from kernels.lanes.records import read
 from kernels.lanes.vectors import magnitude, nearest
@@ -79,7 +79,7 @@ def _held(x, e):
     return value if is_normal(value) or x == 0.0 else math.nan
 
 
-@jit_call
+@jit_apart
 def _clear(i, columns):
     """Every output of a cell to NaN."""
     for j in range(columns.J.shape[1]):
@@ -88,7 +88,7 @@ def _clear(i, columns):
     columns.n_kept[i] = columns.frf_error[i] = columns.valid_to[i] = math.nan
 
 
-@jit_call
+@jit_apart
 def _write_modes(i, columns, count, e, scene):
     """Frequencies, their errors and the damping, in Hz. Whether all are in range."""
     fine, full, kept = True, scene.full, scene.kept
@@ -100,7 +100,7 @@ def _write_modes(i, columns, count, e, scene):
     return fine
 
 
-@jit_call
+@jit_apart
 def _write_chain(i, columns, p, e_J, e_k, kept):
     """The reduced chain in SI units. Whether all is in range."""
     fine = True

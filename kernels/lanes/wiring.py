@@ -233,7 +233,7 @@ class _Wiring:
                 for column, result in zip(columns[first_output:], part[first_output:], strict=True):
                     column[rows] = result
 
-        return solve
+        return signed(solve, [*self.parameters, "rtol", *self.along, *self.outputs, "status"])
 
     def _given(self, solver: Solver) -> Record:
         """A record of the outputs that the method gives."""

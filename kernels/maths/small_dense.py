@@ -1,6 +1,6 @@
 """A few complex linear equations, and sorting, of one cell."""
 
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude
 
 
@@ -34,7 +34,7 @@ def _pivot(A, i, p):
     return best
 
 
-@jit_call
+@jit_apart
 def eliminate(A, B, p, q):
     """Brings the (p, p) matrix A to upper triangular form, by the largest pivots, and (p, q) B along."""
     for i in range(p):
@@ -86,7 +86,7 @@ def _swap_values(values, i, j):
     values[i], values[j] = values[j], values[i]
 
 
-@jit_call
+@jit_apart
 def sort_many(values, count):
     """Rising order of `count` numbers; by Shell's gaps, so that a thousand take some ten thousand steps."""
     gap = count // 2
