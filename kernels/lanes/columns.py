@@ -44,35 +44,10 @@ def entry(*shared):
     """
 
     def decorate(function):
-        if not COMPILED:
-            return function
-        compiled = cached(function)
         per_cell = [name not in shared for name in inspect.signature(function).parameters]
-
-        @functools.wraps(function)
-        def call(*columns):
-            if 0 < len(columns[0]) < WIDTH:
-                _filled_up(compiled, columns, per_cell)
-            elif len(columns[0]):
-                compiled(*columns)
-
-        call.compiled = compiled
-        return call
+        return functools.wraps(function)(entry_of(function, per_cell, kept=True)) if COMPILED else function
 
     return decorate
-
-
-def entry_of_cells(function):
-    """As `entry`, for what takes one cell at a time: few cells are not filled up, and columns may be read-only."""
-    ready = entry(*inspect.signature(function).parameters)(
-        function if COMPILED else np.errstate(all="ignore")(function)
-    )
-
-    @functools.wraps(ready)
-    def call(*columns):
-        ready(*(c if c.flags.writeable else c.copy() for c in columns))
-
-    return call
 
 
 def _filled_up(compiled, columns, per_cell):
@@ -112,7 +87,7 @@ def _plain_records(body, columns, buffers):
 
 
 in_lanes = _lanes_of_records if COMPILED else _plain_records
-cell_by_cell = _cells_of_records if COMPILED else functools.partial(_plain_records)
+cell_by_cell = _cells_of_records if COMPILED else _plain_records
 in_groups = _groups_of_records if COMPILED else _plain_records
 
 

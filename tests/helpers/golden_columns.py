@@ -1,6 +1,6 @@
 """Columns of cells for every kernel, the same on every machine, and digests of the bits of all that comes out.
 
-python tests/helpers/golden_columns.py > tests/golden/columns.json
+python tests/helpers/golden_columns.py [KERNEL ...] > before.json
 """
 
 import hashlib

@@ -10,7 +10,7 @@ from columns import printed_both_ways
 from numba import float64
 from numba.core.runtime import _nrt_python, rtsys
 
-from kernels.lanes.columns import each_cell, entry, entry_of_cells
+from kernels.lanes.columns import each_cell, entry, entry_of
 from kernels.lanes.groups import GROUP, room
 from kernels.lanes.inlining import LINE
 from kernels.lanes.jit import COMPILED, jit, jit_call
@@ -101,7 +101,6 @@ def test_garbage_is_collected_after_compiling_as_before(wanted):
         gc.enable()
 
 
-@entry_of_cells
 def seen(count, total):
     """total = how many cells one call is given."""
     for i in range(count.size):
@@ -112,7 +111,7 @@ def seen(count, total):
 def test_what_takes_one_cell_at_a_time_is_not_given_more(n):
     count, total = np.ones(n), np.zeros(n)
     count.flags.writeable = False
-    seen(count, total)
+    entry_of(seen, None, kept=False)(count, total)
     assert (total == n).all()
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from running import fail_on
 
 from sweep.cells.partition import Partition
 from sweep.cells.schema import Column
@@ -302,20 +303,6 @@ def test_a_removal_cut_short_leaves_a_store_that_can_be_taken_up(output, filled,
     monkeypatch.undo()
     with opened(output, COLUMNS) as store:
         assert len(resumed(store).missing()) == 2
-
-
-def fail_on(monkeypatch, name, turn, number):
-    """Lets the call number `turn` of a function of `disk` fail."""
-    real, calls = getattr(disk, name), []
-
-    def failing(*args):
-        calls.append(args)
-        if len(calls) == turn:
-            raise OSError(number, os.strerror(number))
-        return real(*args)
-
-    monkeypatch.setattr(disk, name, failing)
-    return calls
 
 
 @pytest.mark.parametrize("name", ["open_file", "write", "fsync", "rename"])
