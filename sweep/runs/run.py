@@ -18,7 +18,8 @@ from sweep.cells.fingerprint import fingerprint
 from sweep.cells.output_schema import gathered, part_columns
 from sweep.results.open import in_memory, memory, open_result, open_unfinished, stored_fingerprint
 from sweep.runs import resume
-from sweep.runs.extend import Precomputed, Reused, is_of_another_version
+from sweep.runs.extend import Precomputed, Retried, Reused, is_of_another_version
+from sweep.runs.isolate import Limits
 from sweep.runs.session import Session, Solve
 from sweep.runs.task import Task
 from sweep.store.assemble import assemble
@@ -26,8 +27,8 @@ from sweep.store.store import Store, folder_of, opened
 from sweep.study.read import as_study
 from sweep.system.errors import SweepError
 from sweep.system.forecast import Ending
-from sweep.system.pool import BufferPool, CtrlC, Terminated, cores, whole_number
-from sweep.system.progress import TimeUp, deadline, quantity, stream_of
+from sweep.system.pool import BufferPool, Cores, CtrlC, Terminated, cores, whole_number
+from sweep.system.progress import TimeUp, deadline, quantity, seconds_of, stream_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,6 +51,9 @@ def run(
     extend: bool = False,
     until: str | datetime | None = None,
     cluster: Any = None,
+    isolate: bool = False,
+    cell_timeout: float | str | None = None,
+    retry_failed: bool = False,
 ) -> xr.Dataset:
     """Computes every cell of a study. The same study gives the same bits, however it is cut and continued.
 
@@ -76,6 +80,14 @@ def run(
     cluster : str or distributed.Client, optional
         Compute on the workers of this dask scheduler ("tcp://10.0.0.1:8786", or a scheduler file) instead of here.
         Workers that see the folder of the output write there; others send their numbers.
+    isolate : bool
+        Solve cells in processes of their own: a kernel that crashes or never ends costs only the cells it does so at.
+        The command does so for every kernel "module:NAME".
+    cell_timeout : float or str, optional
+        Seconds, or "90 s", "5 min", "1 h", that a cell may take; with it cells are isolated. Default: a minute, or a
+        hundred times the dearest cell of the timed sample, where that is more.
+    retry_failed : bool
+        Where the output is complete, compute the cells that FAILED again.
 
     Raises
     ------
@@ -85,15 +97,37 @@ def run(
     KeyboardInterrupt, SystemExit
         After Ctrl-C or SIGTERM, when the blocks at work have been stored.
     """
-    task = _task(as_study(study), path, workers, force, progress, block_cells, extend, until, cluster)
+    task = _task(
+        as_study(study),
+        path,
+        workers=workers,
+        force=force,
+        progress=progress,
+        block_cells=block_cells,
+        extend=extend,
+        until=until,
+        cluster=cluster,
+        isolate=isolate,
+        cell_timeout=cell_timeout,
+        retry_failed=retry_failed,
+    )
     if path is None:
         return _run_in_memory(task)
-    return open_result(task.output) if _complete(task) else open_unfinished(task.output)
+    if _complete(task):
+        return open_result(task.output)
+    if not is_begun(task.output):
+        raise SweepError("until: the time was up before the first cell could be computed")
+    return open_unfinished(task.output)
 
 
 def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> bool:
     """Runs as `run` does, and opens nothing; False where the time was up before the end."""
     return _complete(_task(study, path, **options))
+
+
+def is_begun(output: Path) -> bool:
+    """Whether there is a sweep that writes an output, and has not ended."""
+    return folder_of(Path(os.path.realpath(output))).exists()
 
 
 def store_cells(
@@ -110,7 +144,7 @@ def store_cells(
     SweepError
         As `run`.
     """
-    task = Task(study, fingerprint(study), _checked(path), 1, force=force)
+    task = Task(study, fingerprint(study), _checked(path), Cores(1), force=force)
     if not resume.is_complete(task):
         _run_to_file(task, Precomputed(arrays))
     return open_result(task.output)
@@ -119,6 +153,7 @@ def store_cells(
 def _task(
     study: Study,
     path: str | os.PathLike[str] | None,
+    *,
     workers: int | None = None,
     force: bool = False,
     progress: bool | TextIO | None = None,
@@ -126,23 +161,31 @@ def _task(
     extend: bool = False,
     until: str | datetime | None = None,
     cluster: Any = None,
+    isolate: bool = False,
+    cell_timeout: float | str | None = None,
+    retry_failed: bool = False,
 ) -> Task:
     """What `run` was asked for. Raises SweepError."""
     if cluster is not None and workers is not None:
         raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
     if path is None and until is not None:
         raise SweepError("until: give a path as well, or what is computed by then would be lost")
+    if extend and retry_failed:
+        raise SweepError("extend, retry_failed: give one of the two; each continues another result")
     return Task(
         study,
         fingerprint(study),
         None if path is None else _checked(path),
-        cores() if workers is None else whole_number("workers", workers),
+        Cores(cores() if workers is None else whole_number("workers", workers)),
         stream_of(progress),
         force,
         None if block_cells is None else whole_number("block_cells", block_cells),
         extend,
         deadline(until),
         cluster,
+        isolate or cell_timeout is not None,
+        Limits(None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout)),
+        retry_failed,
     )
 
 
@@ -185,7 +228,8 @@ def _elsewhere(session: Session, cluster: Cluster, shared: Path | None, receive:
     from sweep.runs.dispatch import Dispatch
 
     left = session.forecast.blocks
-    executor = Dispatch(cluster, session.task, session.blocks, left, session.reused, shared)
+    limits = None if session.processes is None else session.processes.limits
+    executor = Dispatch(cluster, session.task, session.blocks, left, session.reused, shared, limits)
     session.compute_elsewhere(executor, receive)
 
 
@@ -198,7 +242,7 @@ def _run_in_memory(task: Task) -> xr.Dataset:
             _fill(session, arrays, cluster)
             progress.end()
         finally:
-            progress.stop()
+            session.close()
     found = arrays if task.study.summary is None else gathered(task.study, arrays)
     return in_memory(session.dated(session.began), found)
 
@@ -246,14 +290,21 @@ def _run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
         reused = precomputed or _reused(task, stack)
         cluster = stack.enter_context(_joined(task))
         blocks = None if store.manifest is None else store.blocks
-        return _run_session(Session(task, _threads(task, cluster), blocks, reused=reused), store, cluster)
+        try:
+            session = Session(task, _threads(task, cluster), blocks, reused=reused)
+        except TimeUp:
+            task.note("stopped while the kernel was compiled or timed")
+            return False
+        return _run_session(session, store, cluster)
 
 
 def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
     """The cells of the result that is extended. Raises SweepError where that is not possible."""
-    if not task.extend or task.force or not task.output.exists():
+    if not (task.extend or task.retry_failed) or task.force or not task.output.exists():
         return None
     resume.check_whole(task)
+    if task.retry_failed:
+        return stack.enter_context(Retried(task.output, task.study))
     reused = stack.enter_context(Reused(task.output, task.study))
     if is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
         task.note("another version has computed it; a sample of its cells is computed again")
@@ -267,6 +318,7 @@ def _run_session(session: Session, store: Store, cluster: Cluster | None) -> boo
     ending = Ending(blocks.count, task.workers, blocks.rows.count * blocks.row_bytes)
     progress = session.begin(range(blocks.count) if store.manifest is None else store.missing(), ending.seconds)
     _check_space(session)
+    session.log_begin()
     # held back wherever they would leave half a file behind
     with CtrlC():
         if store.manifest is None:
@@ -280,7 +332,7 @@ def _run_session(session: Session, store: Store, cluster: Cluster | None) -> boo
             progress.note(f"stopped, for it is {datetime.now():%H:%M}; {_kept(store)}")
             return False
         finally:
-            progress.stop()
+            session.close()
         store.clear()
     return True
 
