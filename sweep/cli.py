@@ -26,6 +26,13 @@ NOTIFY_SECONDS = 60
 """What the command of --notify may take."""
 
 
+RUN_OPTIONS = (
+    *("workers", "cluster", "without_workers", "force", "extend", "until"),
+    *("isolate", "cell_timeout", "retry_failed"),
+)
+"""Options of `run` that are arguments of the function of that name."""
+
+
 class Outcome(NamedTuple):
     """How a command ended: its exit status, and what is said of it."""
 
@@ -151,8 +158,7 @@ def _computed(arguments: argparse.Namespace, study: Study, output: Path) -> Outc
     from sweep.runs.run import complete, is_begun
 
     before = _identity(output)
-    names = ("workers", "cluster", "force", "extend", "until", "isolate", "cell_timeout", "retry_failed")
-    options = {name: getattr(arguments, name) for name in names}
+    options = {name: getattr(arguments, name) for name in RUN_OPTIONS}
     if options["isolate"] is None:
         options["isolate"] = ":" in study.kernel_name
     whole = complete(study, output, **options)
@@ -419,7 +425,7 @@ class Command(NamedTuple):
 
 STUDY = option("study", metavar="STUDY.toml", type=Path)
 RESULT = option("result", metavar="OUT.h5", type=Path)
-WORKERS = option("--workers", "cores to use; default: all", metavar="N", type=int)
+WORKERS = option("--workers", "cores to use; default: all; SIGUSR1 adds one, SIGUSR2 takes one", metavar="N", type=int)
 ALLOW_IMPORT = switch("--allow-import", 'allow a kernel "module:NAME" of your own')
 FORCE = switch("--force", "overwrite what is there even if it is not from an earlier command of this kind")
 UNFINISHED = switch("--unfinished", "take what there is of a result that is not complete yet")
@@ -462,6 +468,12 @@ COMMANDS = {
             metavar="TIME",
         ),
         switch("--retry-failed", "of a complete result, compute the cells that FAILED again"),
+        option(
+            "--without-workers",
+            "where a cluster has none, or loses all: wait (the default), go on here after ten seconds, or end",
+            choices=("wait", "here", "end"),
+            default="wait",
+        ),
         option("--notify", "run this at the end; $SWEEP_EXIT and $SWEEP_SUMMARY say how it ended", metavar="COMMAND"),
         switch("--log-json", "the log, OUT.h5.log, as JSON, an object a line"),
     ),

@@ -19,10 +19,10 @@ import numpy as np
 from distributed import KilledWorker
 
 from sweep.cells.block import Blocks, Computed
-from sweep.runs.cluster import Cluster
+from sweep.runs.cluster import LOST_SECONDS, Absence, Cluster
 from sweep.runs.extend import Precomputed, Reused
 from sweep.runs.isolate import Limits, kernel_paths
-from sweep.runs.task import Task
+from sweep.runs.task import WAIT, Task
 from sweep.runs.worker import TOKEN, Answer, Assignment, Sent
 from sweep.store.parts import digest
 from sweep.system import disk
@@ -71,10 +71,10 @@ class Dispatch:
         self._most = max(1, TASK_BYTES // max(1, self._blocks.partition.cells * self._blocks.row_bytes))
         self._suspects: list[int] = []
         self._poison: list[int] = []
-        self._idle = False
+        self._absence = Absence(math.inf if task.without_workers == WAIT else LOST_SECONDS)
 
     def compute(self, blocks: Iterator[int], receive: Callable[[Computed | None], None]) -> None:
-        """Calls `receive` with every block that is done, and with None now and then. Raises SweepError."""
+        """Calls `receive` with every block that is done, and with None now and then. Raises SweepError, NoWorkers."""
         self._receive = receive
         with self._cluster.introduced(self._assignment), CtrlC() as ctrl_c:
             self._submit(self._batches(blocks), self._capacity, self._suspect, ctrl_c)
@@ -156,10 +156,8 @@ class Dispatch:
         self._suspects += batch
 
     def _look_for_workers(self) -> None:
-        idle = not self._cluster.threads
-        if idle and not self._idle:
+        if self._absence.check(not self._cluster.threads):
             self._note("the cluster has no workers left; waiting for new ones")
-        self._idle = idle
 
     def _mask(self, job: int) -> bytes | None:
         """Of a block that is known in part: which of its cells are not, a bit each."""

@@ -24,7 +24,7 @@ from sweep.runs.isolate import Processes
 from sweep.runs.task import Task
 from sweep.system.forecast import Forecast
 from sweep.system.log import log
-from sweep.system.pool import BufferPool, Stopper, each
+from sweep.system.pool import BufferPool, Stopper, cores, each
 from sweep.system.progress import Progress, TimeUp, passed
 
 MOST_TOLD = 1000
@@ -69,7 +69,7 @@ class Session:
         self.began = now()
         self.schema: Schema = output_schema(study, task.fingerprint)
         self.bad: list[BadCell] = []
-        self._told = 0
+        self._told, self._cores = 0, task.workers
         self.processes = Processes(study, task.limits, task.cores.count) if task.isolate else None
         self.sample: Sample = self._sampled() if sampled else UNSAMPLED
         if self.processes is not None:
@@ -148,11 +148,14 @@ class Session:
         reused = {TAKEN_OVER: self.reused.taken_over} if self.reused and self.reused.taken_over else {}
         return replace(self.schema, attrs={**self.schema.attrs, **times, **reused})
 
-    def compute(self, threads: int, work: Callable[[int, Solve], None]) -> None:
+    def compute(self, work: Callable[[int, Solve], None]) -> None:
         """Calls `work(job, solve)` for every block that is left, on a pool of threads.
 
-        No more than `workers` threads are inside `solve` at a time. Raises SweepError where `work` fails, TimeUp.
+        No more than `workers` threads are inside `solve` at a time; as many wait for the disk, or for their turn.
+        Raises SweepError where `work` fails, TimeUp.
         """
+        workers = self.task.cores
+        threads = 2 * max(workers.count, cores())
         self.check_time()
         stopper = self._stopper()
         solvers = BufferPool(self._solver)
@@ -169,7 +172,7 @@ class Session:
                 work(job, compute)
             self.forecast.end(job)
 
-        each(self.forecast.order(), guarded, threads, self._count, stopper)
+        each(self.forecast.order(), guarded, threads, self._count, stopper, lambda: 2 * workers.count)
 
     def compute_elsewhere(self, executor: Executor, receive: Callable[[int, Found], None]) -> None:
         """The same by an executor: calls `receive` with every block and its part's name, or its numbers."""
@@ -186,6 +189,9 @@ class Session:
 
     def _count(self, job: int | None) -> None:
         """Counts a block that is done. Raises TimeUp."""
+        if self.task.workers != self._cores:
+            self._cores = self.task.workers
+            self.progress.note(f"on {self._cores} core{'s' * (self._cores > 1)} from now on")
         self._tell_failed()
         if job is None:
             self.progress.tick()
@@ -197,7 +203,7 @@ class Session:
     def check_time(self) -> None:
         """Raises TimeUp when it is time to stop."""
         if passed(self.task.until):
-            raise TimeUp
+            raise TimeUp(f"it is {datetime.now():%H:%M}")
 
     def _solver(self) -> Callable[[int, int, Mapping[str, Any]], None]:
         """Computes the rows start .. stop, for one thread at a time."""

@@ -13,6 +13,9 @@ from sweep.study.model import Study
 from sweep.system.pool import Cores
 from sweep.system.progress import Progress
 
+WAIT, HERE, END = "wait", "here", "end"
+"""What is done where a cluster has no workers."""
+
 
 @dataclass(frozen=True)
 class Task:
@@ -31,6 +34,7 @@ class Task:
     isolate: bool = False
     limits: Limits = field(default_factory=Limits)
     retry_failed: bool = False
+    without_workers: str = WAIT
 
     @property
     def output(self) -> Path:

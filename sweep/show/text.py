@@ -42,7 +42,7 @@ Rows = list[tuple[str, ...]]
 
 def result_text(path: Path, dataset: xr.Dataset) -> str:
     """All about a result."""
-    found = {**sections(dataset), f"{FAILED}, and why": list(_failed(path, dataset))}
+    found = {**sections(dataset), f"{FAILED}, and why": list(_failed(Path(path), dataset))}
     parts = [(title, rows) for title, rows in found.items() if rows]
     return page(
         "\n".join(head(path, dataset)),

@@ -40,9 +40,23 @@ class Cores:
     def __init__(self, count: int) -> None:
         self.count = count
 
-    def change(self, by: int) -> None:
-        """More or fewer from now on, one at the least."""
-        self.count = max(1, self.count + by)
+    @contextlib.contextmanager
+    def told_by_signals(self) -> Iterator[None]:
+        """As long as this lasts, SIGUSR1 means a core more, SIGUSR2 one less; handlers of others are left alone."""
+        signals = {signal.SIGUSR1: 1, signal.SIGUSR2: -1}
+        here = threading.current_thread() is threading.main_thread()
+        ours = [number for number in signals if here and signal.getsignal(number) is signal.SIG_DFL]
+
+        def change(number: int, frame: object) -> None:
+            self.count = max(1, self.count + signals[signal.Signals(number)])
+
+        for number in ours:
+            signal.signal(number, change)
+        try:
+            yield
+        finally:
+            for number in ours:
+                signal.signal(number, signal.SIG_DFL)
 
 
 class Stopper:
@@ -153,6 +167,7 @@ def each(
     threads: int,
     finished: Callable[[int | None], None],
     stopper: Stopper | None = None,
+    capacity: Callable[[], int] | None = None,
 ) -> None:
     """Calls `work` for every job on a pool of threads.
 
@@ -161,6 +176,7 @@ def each(
     Parameters
     ----------
     finished : called in this thread with each job that is done, and with None now and then
+    capacity : how many jobs are given to the threads at a time, at the moment; default: twice as many as there are
     """
     stopper = stopper or Stopper(threads)
     pool = ThreadPoolExecutor(threads)
@@ -179,7 +195,7 @@ def each(
         finished(job)
 
     with CtrlC() as ctrl_c:
-        through(jobs, lambda job: pool.submit(guarded, job), lambda: 2 * threads, settled, stop, ctrl_c)
+        through(jobs, lambda job: pool.submit(guarded, job), capacity or (lambda: 2 * threads), settled, stop, ctrl_c)
         pool.shutdown()
 
 

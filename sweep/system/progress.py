@@ -258,7 +258,7 @@ def quantity(count: float) -> str:
 
 
 class TimeUp(Exception):
-    """The time a run was given is over."""
+    """A run is to end before it is complete; the text says why."""
 
 
 def deadline(text: str | datetime | None, now: datetime | None = None) -> datetime | None:
