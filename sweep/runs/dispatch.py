@@ -145,7 +145,7 @@ class Dispatch:
         bad = answer.bad
         for job, found in answer.found.items():
             numbers = found if isinstance(found, str) else self._checked(job, found)
-            self._receive(Computed(job, numbers, mean, bad))
+            self._receive(Computed(job, numbers, mean, answer.seconds, bad))
             bad = ()
 
     def _suspect(self, batch: Batch) -> None:
