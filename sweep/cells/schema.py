@@ -100,9 +100,8 @@ def columns(study: Study) -> tuple[Column, ...]:
 
 def coordinates(study: Study) -> tuple[Coordinate, ...]:
     """Axes, fixed parameters and shared coordinates."""
-    product = study.design == "product"
     fields = {f.name: f for f in (*study.kernel.parameters, *study.kernel.along)}
-    axes = [_axis(axis, (axis.name,) if product else ("cell",), fields) for axis in study.axes.values()]
+    axes = [_axis(study.axes[name], (dim,), fields) for dim, names in study.dims.items() for name in names]
     fixed = [Coordinate(k, fields[k].dims, np.float64(v), _field_attrs(fields[k])) for k, v in study.fixed.items()]
     used = {d for f in (*study.kernel.parameters, *study.asked) for d in f.dims}
     along = [Coordinate(k, (k,), v, _field_attrs(fields[k])) for k, v in study.along.items() if k in used]
@@ -125,6 +124,7 @@ def attributes(study: Study, fingerprint: Mapping[str, str]) -> dict[str, Any]:
         "kernel": study.kernel_name,
         "source": study.kernel.source,
         "design": study.design,
+        **({"where": study.where} if study.where else {}),
     }
     attrs |= {k: v for k, v in (("method", study.method), ("rtol", study.rtol)) if k not in study.axes}
     return attrs | {

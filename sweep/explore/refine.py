@@ -193,7 +193,7 @@ class _Output:
         return store_cells(whole, self.path, arrays, self.force)
 
     def _study(self, axes: dict[str, Axis]) -> Study:
-        return dataclasses.replace(self.study, design="zip", axes=axes, title=self.title)
+        return dataclasses.replace(self.study, design="zip", blocks=(), axes=axes, title=self.title)
 
     def tidy(self) -> None:
         """Removes what was computed on the way."""

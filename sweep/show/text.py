@@ -108,7 +108,7 @@ def head(path: Path, dataset: xr.Dataset) -> list[str]:
 
 def _settings(dataset: xr.Dataset) -> Iterator[tuple[str, ...]]:
     attrs = dataset.attrs
-    for name in ("kernel", "design", "method", "rtol"):
+    for name in ("kernel", "design", "where", "method", "rtol"):
         if name in attrs:
             yield name, f"{attrs[name]:g}" if name == "rtol" else str(attrs[name])
     if "start" in attrs:
