@@ -224,10 +224,6 @@ def _study(arguments: argparse.Namespace) -> Study:
     from sweep.study.read import read_study
 
     path = arguments.study
-    if path.suffix == ".py":
-        raise SweepError(f"{path} is a study in Python; run it with: python {path}")
-    if path.suffix in (".h5", ".nc"):
-        raise SweepError(f"{path} is a result, not a study; look at it with: sweep show {path}")
     return read_study(path, allow_import=arguments.allow_import)
 
 

@@ -105,4 +105,4 @@ def _some(axis: Axis, count: int) -> Axis:
     """So many of its values, each from the middle of an equal share of them."""
     places = (2 * np.arange(count) + 1) * len(axis) // (2 * count)
     words = tuple(axis.words[i] for i in places) if axis.words else axis.words
-    return replace(axis, values=axis.values[places], words=words)
+    return replace(axis, values=axis.values[places], words=words, entry=None)

@@ -29,6 +29,13 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
     ------
     SweepError
         The condition cannot be read, or names what is not there.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> sweep.where(ds, "status == 'OK' and mu > 0.7").mu.values
+    array([1., 2.])
     """
     if STATUS not in dataset:
         raise _refusal(condition, "a summary keeps no cells to choose from")

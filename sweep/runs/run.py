@@ -8,6 +8,7 @@ import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping
 from datetime import datetime
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -23,7 +24,8 @@ from sweep.runs.session import Session, Solve
 from sweep.runs.task import Task
 from sweep.store.assemble import assemble
 from sweep.store.store import Store, folder_of, opened
-from sweep.study.read import as_study
+from sweep.study.mistakes import did_you_mean, listed
+from sweep.study.read import KEYS, Given, as_study
 from sweep.system.errors import SweepError
 from sweep.system.forecast import Ending
 from sweep.system.pool import BufferPool, CtrlC, Terminated, cores, whole_number
@@ -40,7 +42,7 @@ MOST_ATTEMPTS = 3
 
 
 def run(
-    study: Study | Mapping[str, Any],
+    study: Given | None = None,
     path: str | os.PathLike[str] | None = None,
     *,
     workers: int | None = None,
@@ -50,12 +52,14 @@ def run(
     extend: bool = False,
     until: str | datetime | None = None,
     cluster: Any = None,
+    **keys: Any,
 ) -> xr.Dataset:
     """Computes every cell of a study. The same study gives the same bits, however it is cut and continued.
 
     Parameters
     ----------
-    study : Study, or mapping of the keys of `build_study`
+    study : Study, path of a study file, or mapping of the keys of `build_study`, optional
+        None: these keys stand as keywords.
     path : path, optional
         The output, an HDF5 (netCDF4) file. A run that was stopped or killed is continued; an output that is complete
         for the same study is opened and left alone. None: in memory.
@@ -76,6 +80,8 @@ def run(
     cluster : str or distributed.Client, optional
         Compute on the workers of this dask scheduler ("tcp://10.0.0.1:8786", or a scheduler file) instead of here.
         Workers that see the folder of the output write there; others send their numbers.
+    **keys
+        Of `build_study`, and `allow_import`.
 
     Raises
     ------
@@ -84,11 +90,28 @@ def run(
         What is finished is kept.
     KeyboardInterrupt, SystemExit
         After Ctrl-C or SIGTERM, when the blocks at work have been stored.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> ds = sweep.run(kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0}, rtol=1e-12)
+    >>> ds.period.values.round(6)
+    array([44.      ,  7.844719])
     """
-    task = _task(as_study(study), path, workers, force, progress, block_cells, extend, until, cluster)
+    _check_keywords(keys)
+    task = _task(as_study(study, **keys), path, workers, force, progress, block_cells, extend, until, cluster)
     if path is None:
         return _run_in_memory(task)
     return open_result(task.output) if _complete(task) else open_unfinished(task.output)
+
+
+def _check_keywords(keys: Mapping[str, Any]) -> None:
+    """Raises SweepError for one that neither `run` nor a study has."""
+    options = [name for name in signature(run).parameters if name != "keys"]
+    for key in keys:
+        if key not in (*KEYS, "allow_import"):
+            hint = did_you_mean(key, [*options, *KEYS]) or f"; a study has {listed(KEYS, word='and')}"
+            raise SweepError(f"sweep.run: no such keyword {key}{hint}")
 
 
 def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> bool:

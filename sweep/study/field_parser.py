@@ -299,7 +299,8 @@ class FieldParser:
 
 def _entry(table: Mapping[str, Any]) -> dict[str, Any]:
     """What a study says of an axis that it does not list: words as they are, numbers as float64."""
-    return {key: value if isinstance(value, str) or key == "num" else float(value) for key, value in table.items()}
+    kinds: dict[str, Callable[[Any], Any]] = {"spacing": str, "unit": str, "num": int}
+    return {key: kinds.get(key, float)(value) for key, value in table.items()}
 
 
 def _number(found: Any, field: Field | None) -> float:

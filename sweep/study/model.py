@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -21,6 +21,8 @@ LONGEST_LIST = 1000
 
 AUTO = -1
 """Number of the word "auto" on a method axis."""
+SHOWN: dict[str, Callable[[Any], str]] = {}
+"""How a notebook shows a study, as "html"; put here by a room above this one, which knows what a run takes."""
 SETTINGS = ("method", "rtol")
 """What may be an axis although it is no parameter of the kernel."""
 
@@ -216,6 +218,10 @@ class Study:
         """What is given of an array parameter: its values, or those of all cells."""
         source = self.follows.get(name, name)
         return self.axes[source].values if source in self.axes else np.asarray(self.fixed[name])
+
+    def _repr_html_(self) -> str | None:
+        """What a notebook shows."""
+        return SHOWN["html"](self) if SHOWN else None
 
     def to_json(self) -> str:
         """The study on one line of JSON: floats exactly, also NaN and infinities; the kernel as it declares itself."""
