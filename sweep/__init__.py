@@ -19,13 +19,16 @@ if TYPE_CHECKING:
     from sweep.explore.groups import collapse_quality as collapse_quality
     from sweep.explore.groups import rescaled as rescaled
     from sweep.explore.groups import scaling as scaling
+    from sweep.explore.join import join as join
     from sweep.explore.notebook import kernels as kernels
     from sweep.explore.plan import plan as plan
     from sweep.explore.refine import refine as refine
     from sweep.explore.refine import study_of as study_of
     from sweep.explore.work_precision import work_precision as work_precision
+    from sweep.results.diff import diff as diff
     from sweep.results.export import export as export
     from sweep.results.filter import where as where
+    from sweep.results.listing import list_results as list_results
     from sweep.results.open import open_result as open_result
     from sweep.results.units import in_units as in_units
     from sweep.results.verify import verify as verify
@@ -53,6 +56,9 @@ _PUBLIC = {
     ),
     "analysis.two_laws": ("fit_two_laws",),
     "analysis.maps": ("contours", "exponent_map"),
+    "results.diff": ("diff",),
+    "results.listing": ("list_results",),
+    "explore.join": ("join",),
     "explore.plan": ("plan",),
     "explore.notebook": ("kernels",),
     "explore.groups": ("scaling", "rescaled", "collapse_quality"),

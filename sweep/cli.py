@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from sweep.study.model import Study
 
 OK, FAULT, MISTAKE, INTERRUPTED = 0, 1, 2, 130
+DIFFERENT = 1
+"""As `diff` of files says it."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -31,11 +33,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     -------
     int
         0, also where `--until` ended a run; 2 for a mistake of the user or a fault of the machine; 130 after Ctrl-C,
-        143 after SIGTERM; 1 for a fault of ours.
+        143 after SIGTERM; 1 for a fault of ours, and where `diff` finds a difference.
     """
     arguments = parser().parse_args(argv)
     try:
-        arguments.command(arguments)
+        code = arguments.command(arguments) or OK
         sys.stdout.flush()
     except SweepError as error:
         return _fail(str(error), MISTAKE)
@@ -60,7 +62,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             "Please report it; with SWEEP_TRACEBACK=1 in the environment the same command says where.",
             FAULT,
         )
-    return OK
+    return code
 
 
 def _kernels(arguments: argparse.Namespace) -> None:
@@ -211,6 +213,34 @@ def _export(arguments: argparse.Namespace) -> None:
         _print(export(_in_units(chosen, arguments.unit), arguments.output, force=arguments.force))
 
 
+def _diff(arguments: argparse.Namespace) -> int:
+    from sweep.results.diff import diff
+
+    with _opened(arguments.result) as a, _opened(arguments.other) as b:
+        found = diff(a, b, arguments.rtol)
+    _print(found)
+    return OK if found.same else DIFFERENT
+
+
+def _join(arguments: argparse.Namespace) -> None:
+    from sweep.explore.join import join
+    from sweep.results.statuses import summary_text
+
+    paths = [arguments.result, arguments.other]
+    _check_target(arguments, arguments.output, "result")
+    labels = arguments.labels or [path.stem if len({p.stem for p in paths}) > 1 else str(path) for path in paths]
+    with _opened(paths[0]) as a, _opened(paths[1]) as b:
+        found = join(a, b, arguments.output, axis=arguments.axis, labels=labels, force=arguments.force)
+    with found:
+        _print(f"{arguments.output}: {summary_text(found)}")
+
+
+def _list(arguments: argparse.Namespace) -> None:
+    from sweep.results.listing import list_results
+
+    _print(list_results(arguments.folder))
+
+
 def _in_units(dataset: xr.Dataset, given: Sequence[str]) -> xr.Dataset:
     from sweep.results.units import in_units
 
@@ -228,9 +258,12 @@ def _study(arguments: argparse.Namespace) -> Study:
 
 
 def _result(arguments: argparse.Namespace) -> xr.Dataset:
+    return _opened(arguments.result)
+
+
+def _opened(path: Path) -> xr.Dataset:
     from sweep.results.open import open_result
 
-    path = arguments.result
     if path.suffix == ".toml":
         raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
     if not path.exists() and path.with_name(path.name + ".parts").is_dir():
@@ -329,16 +362,17 @@ class Command(NamedTuple):
     """One command: what it is for, what does it, and what may stand behind its name."""
 
     text: str
-    function: Callable[[argparse.Namespace], None]
+    function: Callable[[argparse.Namespace], int | None]
     options: tuple[Option, ...]
 
     @classmethod
-    def of(cls, text: str, function: Callable[[argparse.Namespace], None], *options: Option) -> Command:
+    def of(cls, text: str, function: Callable[[argparse.Namespace], int | None], *options: Option) -> Command:
         return cls(text, function, options)
 
 
 STUDY = option("study", metavar="STUDY.toml", type=Path)
 RESULT = option("result", metavar="OUT.h5", type=Path)
+OTHER = option("other", metavar="OTHER.h5", type=Path)
 WORKERS = option("--workers", "cores to use; default: all", metavar="N", type=int)
 ALLOW_IMPORT = switch("--allow-import", 'allow a kernel "module:NAME" of your own')
 FORCE = switch("--force", "overwrite what is there even if it is not from an earlier command of this kind")
@@ -436,6 +470,26 @@ COMMANDS = {
         RESULT,
         output("FILE.html", "default: the result's name with .html, here"),
         *(FORCE, UNITS),
+    ),
+    "diff": Command.of(
+        "in what two results differ: cells, statuses, how far; exit status 1 where they do",
+        _diff,
+        *(RESULT, OTHER),
+        option("--rtol", "relative distance that is none; default: 0", metavar="SHARE", type=float, default=0.0),
+    ),
+    "join": Command.of(
+        "two results of one kernel as one, longer along an axis or along a new one",
+        _join,
+        *(RESULT, OTHER),
+        output("JOINED.h5", required=True),
+        FORCE,
+        option("--axis", 'name of a new axis, e.g. "version"', metavar="NAME"),
+        option("--labels", "its values; default: the names of the files", metavar="LABEL", nargs=2),
+    ),
+    "list": Command.of(
+        "the results in a folder: question, cells, how much is done, statuses, when, version",
+        _list,
+        option("folder", "default: here", metavar="FOLDER", type=Path, nargs="?", default=Path()),
     ),
     "export": Command.of(
         "write a result as csv, parquet, netCDF4 or zarr",

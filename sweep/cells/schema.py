@@ -168,13 +168,11 @@ def _error_bound() -> Column:
 
 def _axis(axis: Axis, dims: tuple[str, ...], fields: Mapping[str, Field]) -> Coordinate:
     field = fields.get(axis.name)
-    if field is not None:
-        attrs = _field_attrs(field)
-    else:
-        attrs = {
-            "method": {"long_name": "method asked for"},
-            "rtol": {"units": "1", "long_name": "relative error asked for"},
-        }[axis.name]
+    settings = {
+        "method": {"long_name": "method asked for"},
+        "rtol": {"units": "1", "long_name": "relative error asked for"},
+    }
+    attrs = _field_attrs(field) if field is not None else settings.get(axis.name, {"long_name": axis.name})
     dims = dims if field is None else (*dims, *field.dims)
     return Coordinate(axis.name, dims, axis.values if axis.words is None else np.array(axis.words), attrs)
 

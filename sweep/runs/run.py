@@ -17,6 +17,7 @@ import numpy as np
 from sweep.cells.block import Found
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.output_schema import gathered, part_columns
+from sweep.cells.partition import row_blocks
 from sweep.results.open import in_memory, memory, open_result, open_unfinished, stored_fingerprint
 from sweep.runs import resume
 from sweep.runs.extend import Precomputed, Reused, is_of_another_version
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
     from sweep.runs.cluster import Cluster
     from sweep.study.model import Study
 
+STORED_AT_ONCE = 1 << 16
+"""Cells of a block of those that are solved already."""
 MOST_ATTEMPTS = 3
 """Times that damaged parts are computed again before the disk is given up."""
 
@@ -120,22 +123,32 @@ def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> bool
 
 
 def store_cells(
-    study: Study, path: str | os.PathLike[str], arrays: Mapping[str, Any], force: bool = False
+    study: Study,
+    path: str | os.PathLike[str],
+    arrays: Mapping[str, Any],
+    force: bool = False,
+    mark: Mapping[str, str] | None = None,
+    taken_over: str = "",
 ) -> xr.Dataset:
     """Writes the result of cells that are solved already, a file like that of `run`.
 
     Parameters
     ----------
     arrays : mapping of outputs and of `schema.ANCILLARY` to ndarray, shape (cells, ...)
+    mark : mapping, optional
+        Its fingerprint, where that is not the one of the study and of this program.
+    taken_over : str
+        Which program has computed the cells, where it was another.
 
     Raises
     ------
     SweepError
         As `run`.
     """
-    task = Task(study, fingerprint(study), _checked(path), 1, force=force)
+    block = max(1, min(row_blocks(study).count, STORED_AT_ONCE))
+    task = Task(study, dict(mark or fingerprint(study)), _checked(path), 1, force=force, block_cells=block)
     if not resume.is_complete(task):
-        _run_to_file(task, Precomputed(arrays))
+        _run_to_file(task, Precomputed(arrays, taken_over))
     return open_result(task.output)
 
 
@@ -269,7 +282,8 @@ def _run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
         reused = precomputed or _reused(task, stack)
         cluster = stack.enter_context(_joined(task))
         blocks = None if store.manifest is None else store.blocks
-        return _run_session(Session(task, _threads(task, cluster), blocks, reused=reused), store, cluster)
+        session = Session(task, _threads(task, cluster), blocks, sampled=precomputed is None, reused=reused)
+        return _run_session(session, store, cluster)
 
 
 def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
