@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from sweep.results.stored import Stored
     from sweep.study.model import Study
 
+<<<<<<< HEAD
 NOTIFY_SECONDS = 60
 """What the command of --notify may take."""
 
@@ -38,6 +39,11 @@ class Outcome(NamedTuple):
 
     code: int
     text: str
+=======
+OK, FAULT, MISTAKE, INTERRUPTED = 0, 1, 2, 130
+DIFFERENT = 1
+"""As `diff` of files says it."""
+>>>>>>> python
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -46,6 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
+<<<<<<< HEAD
         One of `EXIT_CODES`.
     """
     arguments = parser().parse_args(argv)
@@ -55,6 +62,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     pool = sys.modules.get("sweep.system.pool")
     if pool is not None and pool.left_behind():
         # a kernel that never ends would keep Python from ending
+=======
+        0, also where `--until` ended a run; 2 for a mistake of the user or a fault of the machine; 130 after Ctrl-C,
+        143 after SIGTERM; 1 for a fault of ours, and where `diff` finds a difference.
+    """
+    arguments = parser().parse_args(argv)
+    try:
+        code = arguments.command(arguments) or OK
+>>>>>>> python
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(ended.code)
@@ -74,6 +89,7 @@ def _ended(arguments: argparse.Namespace) -> Outcome:
     except (Exception, KeyboardInterrupt, SystemExit) as error:
         if os.environ.get("SWEEP_TRACEBACK"):
             raise
+<<<<<<< HEAD
         outcome = _explained(error)
         _print(outcome.text, sys.stderr)
         return outcome
@@ -110,6 +126,14 @@ def _notify(arguments: argparse.Namespace, ended: Outcome) -> None:
         subprocess.run(arguments.notify, shell=True, env={**os.environ, **told}, timeout=NOTIFY_SECONDS, check=True)
     except (OSError, ValueError, subprocess.SubprocessError) as fault:
         _print(f"--notify: {fault}", sys.stderr)
+=======
+        return _fail(
+            f"a fault in foliot: {type(error).__name__}: {error}\n"
+            "Please report it; with SWEEP_TRACEBACK=1 in the environment the same command says where.",
+            FAULT,
+        )
+    return code
+>>>>>>> python
 
 
 def _kernels(arguments: argparse.Namespace) -> None:
@@ -294,6 +318,34 @@ def _export(arguments: argparse.Namespace) -> None:
         _print(export(_in_units(chosen, arguments.unit), arguments.output, force=arguments.force))
 
 
+def _diff(arguments: argparse.Namespace) -> int:
+    from sweep.results.diff import diff
+
+    with _opened(arguments.result) as a, _opened(arguments.other) as b:
+        found = diff(a, b, arguments.rtol)
+    _print(found)
+    return OK if found.same else DIFFERENT
+
+
+def _join(arguments: argparse.Namespace) -> None:
+    from sweep.explore.join import join
+    from sweep.results.statuses import summary_text
+
+    paths = [arguments.result, arguments.other]
+    _check_target(arguments, arguments.output, "result")
+    labels = arguments.labels or [path.stem if len({p.stem for p in paths}) > 1 else str(path) for path in paths]
+    with _opened(paths[0]) as a, _opened(paths[1]) as b:
+        found = join(a, b, arguments.output, axis=arguments.axis, labels=labels, force=arguments.force)
+    with found:
+        _print(f"{arguments.output}: {summary_text(found)}")
+
+
+def _list(arguments: argparse.Namespace) -> None:
+    from sweep.results.listing import list_results
+
+    _print(list_results(arguments.folder))
+
+
 def _in_units(dataset: xr.Dataset, given: Sequence[str]) -> xr.Dataset:
     from sweep.results.units import in_units
 
@@ -307,17 +359,16 @@ def _study(arguments: argparse.Namespace) -> Study:
     from sweep.study.read import read_study
 
     path = arguments.study
-    if path.suffix == ".py":
-        raise SweepError(f"{path} is a study in Python; run it with: python {path}")
-    if path.suffix in (".h5", ".nc"):
-        raise SweepError(f"{path} is a result, not a study; look at it with: sweep show {path}")
     return read_study(path, allow_import=arguments.allow_import)
 
 
 def _result(arguments: argparse.Namespace) -> xr.Dataset:
+    return _opened(arguments.result)
+
+
+def _opened(path: Path) -> xr.Dataset:
     from sweep.results.open import open_result
 
-    path = arguments.result
     if path.suffix == ".toml":
         raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
     if not path.exists() and path.with_name(path.name + ".parts").is_dir():
@@ -415,17 +466,30 @@ class Command(NamedTuple):
     """One command: what it is for, what does it, and what may stand behind its name."""
 
     text: str
+<<<<<<< HEAD
     function: Callable[[argparse.Namespace], Outcome | None]
     options: tuple[Option, ...]
 
     @classmethod
     def of(cls, text: str, function: Callable[[argparse.Namespace], Outcome | None], *options: Option) -> Command:
+=======
+    function: Callable[[argparse.Namespace], int | None]
+    options: tuple[Option, ...]
+
+    @classmethod
+    def of(cls, text: str, function: Callable[[argparse.Namespace], int | None], *options: Option) -> Command:
+>>>>>>> python
         return cls(text, function, options)
 
 
 STUDY = option("study", metavar="STUDY.toml", type=Path)
 RESULT = option("result", metavar="OUT.h5", type=Path)
+<<<<<<< HEAD
 WORKERS = option("--workers", "cores to use; default: all; SIGUSR1 adds one, SIGUSR2 takes one", metavar="N", type=int)
+=======
+OTHER = option("other", metavar="OTHER.h5", type=Path)
+WORKERS = option("--workers", "cores to use; default: all", metavar="N", type=int)
+>>>>>>> python
 ALLOW_IMPORT = switch("--allow-import", 'allow a kernel "module:NAME" of your own')
 FORCE = switch("--force", "overwrite what is there even if it is not from an earlier command of this kind")
 UNFINISHED = switch("--unfinished", "take what there is of a result that is not complete yet")
@@ -546,6 +610,26 @@ COMMANDS = {
         RESULT,
         output("FILE.html", "default: the result's name with .html, here"),
         *(FORCE, UNITS, UNFINISHED),
+    ),
+    "diff": Command.of(
+        "in what two results differ: cells, statuses, how far; exit status 1 where they do",
+        _diff,
+        *(RESULT, OTHER),
+        option("--rtol", "relative distance that is none; default: 0", metavar="SHARE", type=float, default=0.0),
+    ),
+    "join": Command.of(
+        "two results of one kernel as one, longer along an axis or along a new one",
+        _join,
+        *(RESULT, OTHER),
+        output("JOINED.h5", required=True),
+        FORCE,
+        option("--axis", 'name of a new axis, e.g. "version"', metavar="NAME"),
+        option("--labels", "its values; default: the names of the files", metavar="LABEL", nargs=2),
+    ),
+    "list": Command.of(
+        "the results in a folder: question, cells, how much is done, statuses, when, version",
+        _list,
+        option("folder", "default: here", metavar="FOLDER", type=Path, nargs="?", default=Path()),
     ),
     "export": Command.of(
         "write a result as csv, parquet, netCDF4 or zarr",

@@ -11,11 +11,15 @@ import numpy as np
 from sweep.cells.grid import Cells, Grid, empty_cells
 from sweep.study.model import Axis, Study, frozen
 
+MOST_TRIED = 1 << 16
+"""Cells that are looked at to find some that are asked for."""
 ONE: Mapping[str, float] = {}
 
 
 def sampled(study: Study, cells: int, factors: Mapping[str, float] = ONE) -> Study:
     """At most so many cells, spread evenly over the grid, as a zip of the study's axes; methods and rtol are dropped.
+
+    Cells that the study does not ask for are left out, unless it asks for none.
 
     Parameters
     ----------
@@ -23,7 +27,7 @@ def sampled(study: Study, cells: int, factors: Mapping[str, float] = ONE) -> Stu
         What its values are multiplied by.
     """
     grid = Grid(study)
-    chosen = np.unique(np.linspace(0, grid.size - 1, min(cells, grid.size)).astype(np.int64))
+    chosen = _chosen(grid, cells)
     known = {p.name for p in study.kernel.parameters}
     swept = [name for name in study.axes if name in known]
     axes = {name: _axis(name, grid.values(name, chosen), factors) for name in swept}
@@ -34,7 +38,22 @@ def sampled(study: Study, cells: int, factors: Mapping[str, float] = ONE) -> Stu
         del fixed[name]
     along = {name: frozen(values * factors.get(name, 1.0)) for name, values in study.along.items()}
     method = "auto" if "method" in study.axes else study.method
-    return dataclasses.replace(study, design="zip", axes=axes, fixed=fixed, along=along, method=method, summary=None)
+    layout: dict[str, Any] = {"design": "zip", "blocks": (), "axes": axes, "where": "", "summary": None}
+    return dataclasses.replace(study, **layout, fixed=fixed, along=along, method=method)
+
+
+def _chosen(grid: Grid, cells: int) -> Any:
+    """Numbers of at most so many cells that are asked for."""
+    chosen = np.unique(np.linspace(0, grid.size - 1, min(cells, grid.size)).astype(np.int64))
+    if not grid.study.where:
+        return chosen
+    many = np.unique(np.linspace(0, grid.size - 1, min(MOST_TRIED, grid.size)).astype(np.int64))
+    asked = many[grid.asked(many)]
+    return (
+        asked[np.unique(np.linspace(0, len(asked) - 1, min(cells, len(asked))).astype(np.int64))]
+        if len(asked)
+        else chosen
+    )
 
 
 def _axis(name: str, values: Any, factors: Mapping[str, float]) -> Axis:

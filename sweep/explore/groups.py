@@ -104,6 +104,15 @@ def scaling(study: Study) -> Scaling:
     ------
     SweepError
         The kernel fails.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> study = sweep.study(**foliot | {"fixed": {"phi0": 1.0}}, axes={"mu": [0.5, 1.0], "a": [1.0, 2.0]})
+    >>> print(sweep.scaling(study).advice)
+    one-dimensional in mu, a: only mu/(phi0 a^2) matters; 1 of these axes can be left out
     """
     units = _units(study)
     counting = [base for base in _bases(units) if _is_a_matter_of_units(study, units, base)]
@@ -129,6 +138,15 @@ def rescaled(dataset: xr.Dataset, study: Study | None = None) -> xr.Dataset:
     -------
     Dataset
         Outputs whose unit is 1 and whose `long_name` says the product; coordinates `group_1`, `group_2` ..., likewise.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot | {"fixed": {"phi0": 1.0}}, axes={"mu": [0.5, 1.0], "a": [1.0, 2.0]})
+    >>> sorted(set(sweep.rescaled(ds).variables) - set(ds.variables))
+    ['group_1']
     """
     study = study or Study.from_json(str(dataset.attrs["study_json"]))
     found = scaling(study)
@@ -151,6 +169,15 @@ def collapse_quality(x: xr.DataArray, y: xr.DataArray) -> float:
 
     Points that fall on one curve leave what the curve bends between neighbours, which shrinks as the square of their
     distance; others leave the scatter of the curves.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> import xarray as xr
+    >>> x = xr.DataArray(np.geomspace(1.0, 100.0, 21), dims="x")
+    >>> sweep.collapse_quality(x, x**-0.5) < 1e-12
+    True
     """
     import xarray as xr
 

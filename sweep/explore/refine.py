@@ -118,6 +118,15 @@ def refine(
     SweepError
         The dataset is no finished product of number axes, an output is not there or runs along something, or `path` is
         not to be written.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(0.1, 10.0, 5)})
+    >>> sweep.refine(ds, "period", 1e-3).complete
+    True
     """
     study = study or study_of(dataset)
     names = [y] if isinstance(y, str) else list(y)
@@ -193,7 +202,7 @@ class _Output:
         return store_cells(whole, self.path, arrays, self.force)
 
     def _study(self, axes: dict[str, Axis]) -> Study:
-        return dataclasses.replace(self.study, design="zip", axes=axes, title=self.title)
+        return dataclasses.replace(self.study, design="zip", blocks=(), axes=axes, title=self.title)
 
     def tidy(self) -> None:
         """Removes what was computed on the way."""
@@ -202,7 +211,15 @@ class _Output:
 
 
 def study_of(dataset: xr.Dataset, allow_import: bool = False) -> Study:
-    """The study that a result came from. Raises SweepError."""
+    """The study that a result came from. Raises SweepError.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> sweep.study_of(ds)
+    <Study 'foliot over mu': foliot over mu (3)>
+    """
     if "study_json" not in dataset.attrs:
         raise SweepError("the dataset does not say which study it came from; pass the study")
     return Study.from_json(str(dataset.attrs["study_json"]), allow_import=allow_import)
