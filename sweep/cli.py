@@ -129,12 +129,13 @@ def _verify(arguments: argparse.Namespace) -> None:
 
 
 def _fit(arguments: argparse.Namespace) -> None:
+    from sweep.analysis.scattered import on_lines
     from sweep.show.laws import laws, laws_text, pick, write_laws
 
     if arguments.output:
         _check_target(arguments, arguments.output, "laws")
     with _result(arguments) as dataset:
-        part = pick(dataset, arguments.at)
+        part = on_lines(pick(dataset, arguments.at), arguments.x)
         noise = {None: None, "yes": True, "no": False}[arguments.noise]
         found = laws(part, arguments.y, arguments.x, arguments.window or [], arguments.confidence, noise)
     _print(laws_text(found))
@@ -158,7 +159,7 @@ def _chart(arguments: argparse.Namespace) -> None:
     from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
     from sweep.show.charts import plot_precision
 
-    study = _study(arguments)
+    study = _study_of_result(arguments) if arguments.study.suffix == ".h5" else _study(arguments)
     output = arguments.output or Path(f"{arguments.study.stem}_chart.png")
     _check_target(arguments, output)
     found = work_precision(
@@ -229,6 +230,15 @@ def _study(arguments: argparse.Namespace) -> Study:
     if path.suffix in (".h5", ".nc"):
         raise SweepError(f"{path} is a result, not a study; look at it with: sweep show {path}")
     return read_study(path, allow_import=arguments.allow_import)
+
+
+def _study_of_result(arguments: argparse.Namespace) -> Study:
+    from sweep.explore.refine import study_of
+    from sweep.results.open import open_result
+
+    _check_readable(arguments.study)
+    with open_result(arguments.study) as dataset:
+        return study_of(dataset, allow_import=arguments.allow_import)
 
 
 def _result(arguments: argparse.Namespace) -> xr.Dataset:
@@ -412,7 +422,7 @@ COMMANDS = {
         *(AT, UNITS),
     ),
     "chart": Command.of(
-        "error against time of every method of a kernel, on the cells of a study",
+        "error against time of every method of a kernel, on the cells of a study or a result",
         _chart,
         STUDY,
         output("FILE.png", "default: the study's name with _chart.png, here"),
