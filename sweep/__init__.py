@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from sweep.analysis.exponents import where_value as where_value
     from sweep.analysis.maps import contours as contours
     from sweep.analysis.maps import exponent_map as exponent_map
+    from sweep.analysis.scattered import interpolated as interpolated
     from sweep.analysis.two_laws import fit_two_laws as fit_two_laws
     from sweep.explore.groups import collapse_quality as collapse_quality
     from sweep.explore.groups import rescaled as rescaled
@@ -59,6 +60,7 @@ _PUBLIC = {
     "results.diff": ("diff",),
     "results.listing": ("list_results",),
     "explore.join": ("join",),
+    "analysis.scattered": ("interpolated",),
     "explore.plan": ("plan",),
     "explore.notebook": ("kernels",),
     "explore.groups": ("scaling", "rescaled", "collapse_quality"),

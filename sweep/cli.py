@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from sweep.results.stored import Stored
     from sweep.study.model import Study
 
-<<<<<<< HEAD
 NOTIFY_SECONDS = 60
 """What the command of --notify may take."""
-
+DIFFERENT = 1
+"""As `diff` of files says it."""
 
 RUN_OPTIONS = (
     *("workers", "cluster", "without_workers", "force", "extend", "until"),
@@ -39,11 +39,6 @@ class Outcome(NamedTuple):
 
     code: int
     text: str
-=======
-OK, FAULT, MISTAKE, INTERRUPTED = 0, 1, 2, 130
-DIFFERENT = 1
-"""As `diff` of files says it."""
->>>>>>> python
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -52,7 +47,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-<<<<<<< HEAD
         One of `EXIT_CODES`.
     """
     arguments = parser().parse_args(argv)
@@ -62,14 +56,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     pool = sys.modules.get("sweep.system.pool")
     if pool is not None and pool.left_behind():
         # a kernel that never ends would keep Python from ending
-=======
-        0, also where `--until` ended a run; 2 for a mistake of the user or a fault of the machine; 130 after Ctrl-C,
-        143 after SIGTERM; 1 for a fault of ours, and where `diff` finds a difference.
-    """
-    arguments = parser().parse_args(argv)
-    try:
-        code = arguments.command(arguments) or OK
->>>>>>> python
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(ended.code)
@@ -89,7 +75,6 @@ def _ended(arguments: argparse.Namespace) -> Outcome:
     except (Exception, KeyboardInterrupt, SystemExit) as error:
         if os.environ.get("SWEEP_TRACEBACK"):
             raise
-<<<<<<< HEAD
         outcome = _explained(error)
         _print(outcome.text, sys.stderr)
         return outcome
@@ -126,14 +111,6 @@ def _notify(arguments: argparse.Namespace, ended: Outcome) -> None:
         subprocess.run(arguments.notify, shell=True, env={**os.environ, **told}, timeout=NOTIFY_SECONDS, check=True)
     except (OSError, ValueError, subprocess.SubprocessError) as fault:
         _print(f"--notify: {fault}", sys.stderr)
-=======
-        return _fail(
-            f"a fault in foliot: {type(error).__name__}: {error}\n"
-            "Please report it; with SWEEP_TRACEBACK=1 in the environment the same command says where.",
-            FAULT,
-        )
-    return code
->>>>>>> python
 
 
 def _kernels(arguments: argparse.Namespace) -> None:
@@ -236,12 +213,13 @@ def _verify(arguments: argparse.Namespace) -> None:
 
 
 def _fit(arguments: argparse.Namespace) -> None:
+    from sweep.analysis.scattered import on_lines
     from sweep.show.laws import laws, laws_text, pick, write_laws
 
     if arguments.output:
         _check_target(arguments, arguments.output, "laws")
     with _result(arguments) as dataset:
-        part = pick(dataset, arguments.at)
+        part = on_lines(pick(dataset, arguments.at), arguments.x)
         noise = {None: None, "yes": True, "no": False}[arguments.noise]
         found = laws(part, arguments.y, arguments.x, arguments.window or [], arguments.confidence, noise)
     _print(laws_text(found))
@@ -265,7 +243,7 @@ def _chart(arguments: argparse.Namespace) -> None:
     from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
     from sweep.show.charts import plot_precision
 
-    study = _study(arguments)
+    study = _study_of_result(arguments) if arguments.study.suffix == ".h5" else _study(arguments)
     output = arguments.output or Path(f"{arguments.study.stem}_chart.png")
     _check_target(arguments, output)
     found = work_precision(
@@ -318,13 +296,13 @@ def _export(arguments: argparse.Namespace) -> None:
         _print(export(_in_units(chosen, arguments.unit), arguments.output, force=arguments.force))
 
 
-def _diff(arguments: argparse.Namespace) -> int:
+def _diff(arguments: argparse.Namespace) -> Outcome:
     from sweep.results.diff import diff
 
     with _opened(arguments.result) as a, _opened(arguments.other) as b:
         found = diff(a, b, arguments.rtol)
     _print(found)
-    return OK if found.same else DIFFERENT
+    return Outcome(COMPLETE if found.same else DIFFERENT, "")
 
 
 def _join(arguments: argparse.Namespace) -> None:
@@ -362,11 +340,20 @@ def _study(arguments: argparse.Namespace) -> Study:
     return read_study(path, allow_import=arguments.allow_import)
 
 
+def _study_of_result(arguments: argparse.Namespace) -> Study:
+    from sweep.explore.refine import study_of
+    from sweep.results.open import open_result
+
+    _check_readable(arguments.study)
+    with open_result(arguments.study) as dataset:
+        return study_of(dataset, allow_import=arguments.allow_import)
+
+
 def _result(arguments: argparse.Namespace) -> xr.Dataset:
-    return _opened(arguments.result)
+    return _opened(arguments.result, getattr(arguments, "unfinished", True))
 
 
-def _opened(path: Path) -> xr.Dataset:
+def _opened(path: Path, unfinished: bool = True) -> xr.Dataset:
     from sweep.results.open import open_result
 
     if path.suffix == ".toml":
@@ -375,7 +362,7 @@ def _opened(path: Path) -> xr.Dataset:
         _print(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
     _check_readable(path, "xarray")
     found = open_result(path)
-    if "end" not in found.attrs and not getattr(arguments, "unfinished", True):
+    if "end" not in found.attrs and not unfinished:
         found.close()
         raise SweepError(f"{path}: unfinished; continue it with sweep run, or take what there is with --unfinished")
     return found
@@ -466,30 +453,18 @@ class Command(NamedTuple):
     """One command: what it is for, what does it, and what may stand behind its name."""
 
     text: str
-<<<<<<< HEAD
     function: Callable[[argparse.Namespace], Outcome | None]
     options: tuple[Option, ...]
 
     @classmethod
     def of(cls, text: str, function: Callable[[argparse.Namespace], Outcome | None], *options: Option) -> Command:
-=======
-    function: Callable[[argparse.Namespace], int | None]
-    options: tuple[Option, ...]
-
-    @classmethod
-    def of(cls, text: str, function: Callable[[argparse.Namespace], int | None], *options: Option) -> Command:
->>>>>>> python
         return cls(text, function, options)
 
 
 STUDY = option("study", metavar="STUDY.toml", type=Path)
 RESULT = option("result", metavar="OUT.h5", type=Path)
-<<<<<<< HEAD
-WORKERS = option("--workers", "cores to use; default: all; SIGUSR1 adds one, SIGUSR2 takes one", metavar="N", type=int)
-=======
 OTHER = option("other", metavar="OTHER.h5", type=Path)
-WORKERS = option("--workers", "cores to use; default: all", metavar="N", type=int)
->>>>>>> python
+WORKERS = option("--workers", "cores to use; default: all; SIGUSR1 adds one, SIGUSR2 takes one", metavar="N", type=int)
 ALLOW_IMPORT = switch("--allow-import", 'allow a kernel "module:NAME" of your own')
 FORCE = switch("--force", "overwrite what is there even if it is not from an earlier command of this kind")
 UNFINISHED = switch("--unfinished", "take what there is of a result that is not complete yet")
@@ -582,7 +557,7 @@ COMMANDS = {
         *(AT, UNITS),
     ),
     "chart": Command.of(
-        "error against time of every method of a kernel, on the cells of a study",
+        "error against time of every method of a kernel, on the cells of a study or a result",
         _chart,
         STUDY,
         output("FILE.png", "default: the study's name with _chart.png, here"),

@@ -53,13 +53,8 @@ class Account:
 
 def account(dataset: Cells) -> Account:
     """What became of the cells of a result, of a summary too."""
-<<<<<<< HEAD
-    counts = dict.fromkeys(("ok", "remarks", "refused", "failed", "pending"), 0)
-    for name, cells in tally(dataset).items():
-=======
     counts = dict.fromkeys(("ok", "remarks", "refused", "failed", "pending", "not_asked"), 0)
-    for name, cells in _counts(dataset).items():
->>>>>>> python
+    for name, cells in tally(dataset).items():
         counts[_kind(name)] += cells
     return Account(**counts)
 

@@ -57,14 +57,11 @@ def run(
     extend: bool = False,
     until: str | datetime | None = None,
     cluster: Any = None,
-<<<<<<< HEAD
     isolate: bool = False,
     cell_timeout: float | str | None = None,
     retry_failed: bool = False,
     without_workers: str = WAIT,
-=======
     **keys: Any,
->>>>>>> python
 ) -> xr.Dataset:
     """Computes every cell of a study. The same study gives the same bits, however it is cut and continued.
 
@@ -92,7 +89,6 @@ def run(
     cluster : str or distributed.Client, optional
         Compute on the workers of this dask scheduler ("tcp://10.0.0.1:8786", or a scheduler file) instead of here.
         Workers that see the folder of the output write there; others send their numbers.
-<<<<<<< HEAD
     isolate : bool
         Solve cells in processes of their own: a kernel that crashes or never ends costs only the cells it does so at.
         The command does so for every kernel "module:NAME".
@@ -104,10 +100,8 @@ def run(
     without_workers : {"wait", "here", "end"}
         What to do where the cluster has no workers, or loses all: wait for new ones, which those of batch systems may
         be a long time coming; go on here after ten seconds; or end, as `until` does.
-=======
     **keys
         Of `build_study`, and `allow_import`.
->>>>>>> python
 
     Raises
     ------
@@ -124,9 +118,9 @@ def run(
     >>> ds.period.values.round(6)
     array([44.      ,  7.844719])
     """
-<<<<<<< HEAD
+    _check_keywords(keys)
     task = _task(
-        as_study(study),
+        as_study(study, **keys),
         path,
         workers=workers,
         force=force,
@@ -140,10 +134,6 @@ def run(
         retry_failed=retry_failed,
         without_workers=without_workers,
     )
-=======
-    _check_keywords(keys)
-    task = _task(as_study(study, **keys), path, workers, force, progress, block_cells, extend, until, cluster)
->>>>>>> python
     if path is None:
         try:
             return _run_in_memory(task)
@@ -198,12 +188,8 @@ def store_cells(
     SweepError
         As `run`.
     """
-<<<<<<< HEAD
-    task = Task(study, fingerprint(study), _checked(path), Cores(1), force=force)
-=======
     block = max(1, min(row_blocks(study).count, STORED_AT_ONCE))
-    task = Task(study, dict(mark or fingerprint(study)), _checked(path), 1, force=force, block_cells=block)
->>>>>>> python
+    task = Task(study, dict(mark or fingerprint(study)), _checked(path), Cores(1), force=force, block_cells=block)
     if not resume.is_complete(task):
         _run_to_file(task, Precomputed(arrays, taken_over))
     return open_result(task.output)
@@ -319,16 +305,12 @@ def _run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
             return _run_session(Session(task, task.workers, store.blocks, sampled=False), store, None)
         reused = precomputed or _reused(task, stack)
         blocks = None if store.manifest is None else store.blocks
-<<<<<<< HEAD
         try:
             cluster = stack.enter_context(joined(task))
-            session = Session(task, threads(task, cluster), blocks, reused=reused)
+            session = Session(task, threads(task, cluster), blocks, sampled=precomputed is None, reused=reused)
         except TimeUp as reason:
             task.note(f"stopped before the first block, for {reason}")
             return False
-=======
-        session = Session(task, _threads(task, cluster), blocks, sampled=precomputed is None, reused=reused)
->>>>>>> python
         return _run_session(session, store, cluster)
 
 
