@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 NOTIFY_SECONDS = 60
 """What the command of --notify may take."""
-
+DIFFERENT = 1
+"""As `diff` of files says it."""
 
 RUN_OPTIONS = (
     *("workers", "cluster", "without_workers", "force", "extend", "until"),
@@ -212,12 +213,13 @@ def _verify(arguments: argparse.Namespace) -> None:
 
 
 def _fit(arguments: argparse.Namespace) -> None:
+    from sweep.analysis.scattered import on_lines
     from sweep.show.laws import laws, laws_text, pick, write_laws
 
     if arguments.output:
         _check_target(arguments, arguments.output, "laws")
     with _result(arguments) as dataset:
-        part = pick(dataset, arguments.at)
+        part = on_lines(pick(dataset, arguments.at), arguments.x)
         noise = {None: None, "yes": True, "no": False}[arguments.noise]
         found = laws(part, arguments.y, arguments.x, arguments.window or [], arguments.confidence, noise)
     _print(laws_text(found))
@@ -241,7 +243,7 @@ def _chart(arguments: argparse.Namespace) -> None:
     from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
     from sweep.show.charts import plot_precision
 
-    study = _study(arguments)
+    study = _study_of_result(arguments) if arguments.study.suffix == ".h5" else _study(arguments)
     output = arguments.output or Path(f"{arguments.study.stem}_chart.png")
     _check_target(arguments, output)
     found = work_precision(
@@ -294,6 +296,34 @@ def _export(arguments: argparse.Namespace) -> None:
         _print(export(_in_units(chosen, arguments.unit), arguments.output, force=arguments.force))
 
 
+def _diff(arguments: argparse.Namespace) -> Outcome:
+    from sweep.results.diff import diff
+
+    with _opened(arguments.result) as a, _opened(arguments.other) as b:
+        found = diff(a, b, arguments.rtol)
+    _print(found)
+    return Outcome(COMPLETE if found.same else DIFFERENT, "")
+
+
+def _join(arguments: argparse.Namespace) -> None:
+    from sweep.explore.join import join
+    from sweep.results.statuses import summary_text
+
+    paths = [arguments.result, arguments.other]
+    _check_target(arguments, arguments.output, "result")
+    labels = arguments.labels or [path.stem if len({p.stem for p in paths}) > 1 else str(path) for path in paths]
+    with _opened(paths[0]) as a, _opened(paths[1]) as b:
+        found = join(a, b, arguments.output, axis=arguments.axis, labels=labels, force=arguments.force)
+    with found:
+        _print(f"{arguments.output}: {summary_text(found)}")
+
+
+def _list(arguments: argparse.Namespace) -> None:
+    from sweep.results.listing import list_results
+
+    _print(list_results(arguments.folder))
+
+
 def _in_units(dataset: xr.Dataset, given: Sequence[str]) -> xr.Dataset:
     from sweep.results.units import in_units
 
@@ -307,24 +337,32 @@ def _study(arguments: argparse.Namespace) -> Study:
     from sweep.study.read import read_study
 
     path = arguments.study
-    if path.suffix == ".py":
-        raise SweepError(f"{path} is a study in Python; run it with: python {path}")
-    if path.suffix in (".h5", ".nc"):
-        raise SweepError(f"{path} is a result, not a study; look at it with: sweep show {path}")
     return read_study(path, allow_import=arguments.allow_import)
 
 
-def _result(arguments: argparse.Namespace) -> xr.Dataset:
+def _study_of_result(arguments: argparse.Namespace) -> Study:
+    from sweep.explore.refine import study_of
     from sweep.results.open import open_result
 
-    path = arguments.result
+    _check_readable(arguments.study)
+    with open_result(arguments.study) as dataset:
+        return study_of(dataset, allow_import=arguments.allow_import)
+
+
+def _result(arguments: argparse.Namespace) -> xr.Dataset:
+    return _opened(arguments.result, getattr(arguments, "unfinished", True))
+
+
+def _opened(path: Path, unfinished: bool = True) -> xr.Dataset:
+    from sweep.results.open import open_result
+
     if path.suffix == ".toml":
         raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
     if not path.exists() and path.with_name(path.name + ".parts").is_dir():
         _print(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
     _check_readable(path, "xarray")
     found = open_result(path)
-    if "end" not in found.attrs and not getattr(arguments, "unfinished", True):
+    if "end" not in found.attrs and not unfinished:
         found.close()
         raise SweepError(f"{path}: unfinished; continue it with sweep run, or take what there is with --unfinished")
     return found
@@ -425,6 +463,7 @@ class Command(NamedTuple):
 
 STUDY = option("study", metavar="STUDY.toml", type=Path)
 RESULT = option("result", metavar="OUT.h5", type=Path)
+OTHER = option("other", metavar="OTHER.h5", type=Path)
 WORKERS = option("--workers", "cores to use; default: all; SIGUSR1 adds one, SIGUSR2 takes one", metavar="N", type=int)
 ALLOW_IMPORT = switch("--allow-import", 'allow a kernel "module:NAME" of your own')
 FORCE = switch("--force", "overwrite what is there even if it is not from an earlier command of this kind")
@@ -518,7 +557,7 @@ COMMANDS = {
         *(AT, UNITS),
     ),
     "chart": Command.of(
-        "error against time of every method of a kernel, on the cells of a study",
+        "error against time of every method of a kernel, on the cells of a study or a result",
         _chart,
         STUDY,
         output("FILE.png", "default: the study's name with _chart.png, here"),
@@ -546,6 +585,26 @@ COMMANDS = {
         RESULT,
         output("FILE.html", "default: the result's name with .html, here"),
         *(FORCE, UNITS, UNFINISHED),
+    ),
+    "diff": Command.of(
+        "in what two results differ: cells, statuses, how far; exit status 1 where they do",
+        _diff,
+        *(RESULT, OTHER),
+        option("--rtol", "relative distance that is none; default: 0", metavar="SHARE", type=float, default=0.0),
+    ),
+    "join": Command.of(
+        "two results of one kernel as one, longer along an axis or along a new one",
+        _join,
+        *(RESULT, OTHER),
+        output("JOINED.h5", required=True),
+        FORCE,
+        option("--axis", 'name of a new axis, e.g. "version"', metavar="NAME"),
+        option("--labels", "its values; default: the names of the files", metavar="LABEL", nargs=2),
+    ),
+    "list": Command.of(
+        "the results in a folder: question, cells, how much is done, statuses, when, version",
+        _list,
+        option("folder", "default: here", metavar="FOLDER", type=Path, nargs="?", default=Path()),
     ),
     "export": Command.of(
         "write a result as csv, parquet, netCDF4 or zarr",

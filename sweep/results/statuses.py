@@ -30,7 +30,7 @@ class Account:
     """What became of all cells: each is in one of these, and together they are `total`.
 
     `failed` are those for which no method found an answer, or the kernel none at all, and those of a status that this
-    version does not know.
+    version does not know; `not_asked` those that the study's condition leaves out.
     """
 
     ok: int
@@ -38,20 +38,22 @@ class Account:
     refused: int
     failed: int
     pending: int
+    not_asked: int = 0
 
     @property
     def total(self) -> int:
         """All cells."""
-        return self.ok + self.remarks + self.refused + self.failed + self.pending
+        return self.ok + self.remarks + self.refused + self.failed + self.pending + self.not_asked
 
     def __str__(self) -> str:
         parts = ("ok", "remarks", "refused", "failed", "pending")
-        return f"{self.total:,} cells: " + ", ".join(f"{getattr(self, name):,} {name}" for name in parts)
+        text = ", ".join(f"{getattr(self, name):,} {name}" for name in parts)
+        return f"{self.total:,} cells: {text}" + f", {self.not_asked:,} not asked" * bool(self.not_asked)
 
 
 def account(dataset: Cells) -> Account:
     """What became of the cells of a result, of a summary too."""
-    counts = dict.fromkeys(("ok", "remarks", "refused", "failed", "pending"), 0)
+    counts = dict.fromkeys(("ok", "remarks", "refused", "failed", "pending", "not_asked"), 0)
     for name, cells in tally(dataset).items():
         counts[_kind(name)] += cells
     return Account(**counts)
@@ -61,8 +63,8 @@ def _kind(name: str) -> str:
     status = Status.__members__.get(name)
     if status is None or status in FAILED:
         return "failed"
-    if status in (Status.OK, Status.PENDING):
-        return "ok" if status == Status.OK else "pending"
+    if status in (Status.OK, Status.PENDING, Status.NOT_ASKED):
+        return status.name.lower()
     return "refused" if status.refused else "remarks"
 
 

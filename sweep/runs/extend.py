@@ -221,12 +221,12 @@ class Precomputed:
     Parameters
     ----------
     arrays : mapping of outputs and of `schema.ANCILLARY` to ndarray, shape (cells, ...)
+    taken_over : str
+        Which program has computed them, where it was another.
     """
 
-    taken_over = ""
-
-    def __init__(self, arrays: Mapping[str, Any]) -> None:
-        self._arrays = arrays
+    def __init__(self, arrays: Mapping[str, Any], taken_over: str = "") -> None:
+        self._arrays, self.taken_over = arrays, taken_over
 
     def missing(self, start: int, stop: int) -> Any:
         return np.zeros(stop - start, bool)

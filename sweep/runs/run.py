@@ -8,6 +8,7 @@ import shutil
 import time
 from collections.abc import Mapping
 from datetime import datetime
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -16,6 +17,7 @@ import numpy as np
 from sweep.cells.block import Found
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.output_schema import gathered, part_columns
+from sweep.cells.partition import row_blocks
 from sweep.results.open import in_memory, memory, open_result, open_unfinished, stored_fingerprint
 from sweep.runs import resume
 from sweep.runs.elsewhere import compute_elsewhere, joined, threads
@@ -25,7 +27,8 @@ from sweep.runs.session import Session, Solve
 from sweep.runs.task import END, HERE, WAIT, Task
 from sweep.store.assemble import assemble
 from sweep.store.store import Store, folder_of, opened
-from sweep.study.read import as_study
+from sweep.study.mistakes import did_you_mean, listed
+from sweep.study.read import KEYS, Given, as_study
 from sweep.system.errors import SweepError
 from sweep.system.forecast import Ending
 from sweep.system.pool import BufferPool, Cores, CtrlC, Terminated, cores, whole_number
@@ -37,12 +40,14 @@ if TYPE_CHECKING:
     from sweep.runs.cluster import Cluster
     from sweep.study.model import Study
 
+STORED_AT_ONCE = 1 << 16
+"""Cells of a block of those that are solved already."""
 MOST_ATTEMPTS = 3
 """Times that damaged parts are computed again before the disk is given up."""
 
 
 def run(
-    study: Study | Mapping[str, Any],
+    study: Given | None = None,
     path: str | os.PathLike[str] | None = None,
     *,
     workers: int | None = None,
@@ -56,12 +61,14 @@ def run(
     cell_timeout: float | str | None = None,
     retry_failed: bool = False,
     without_workers: str = WAIT,
+    **keys: Any,
 ) -> xr.Dataset:
     """Computes every cell of a study. The same study gives the same bits, however it is cut and continued.
 
     Parameters
     ----------
-    study : Study, or mapping of the keys of `build_study`
+    study : Study, path of a study file, or mapping of the keys of `build_study`, optional
+        None: these keys stand as keywords.
     path : path, optional
         The output, an HDF5 (netCDF4) file. A run that was stopped or killed is continued; an output that is complete
         for the same study is opened and left alone. None: in memory.
@@ -93,6 +100,8 @@ def run(
     without_workers : {"wait", "here", "end"}
         What to do where the cluster has no workers, or loses all: wait for new ones, which those of batch systems may
         be a long time coming; go on here after ten seconds; or end, as `until` does.
+    **keys
+        Of `build_study`, and `allow_import`.
 
     Raises
     ------
@@ -101,9 +110,17 @@ def run(
         What is finished is kept.
     KeyboardInterrupt, SystemExit
         After Ctrl-C or SIGTERM, when the blocks at work have been stored.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> ds = sweep.run(kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0}, rtol=1e-12)
+    >>> ds.period.values.round(6)
+    array([44.      ,  7.844719])
     """
+    _check_keywords(keys)
     task = _task(
-        as_study(study),
+        as_study(study, **keys),
         path,
         workers=workers,
         force=force,
@@ -129,6 +146,15 @@ def run(
     return open_unfinished(task.output)
 
 
+def _check_keywords(keys: Mapping[str, Any]) -> None:
+    """Raises SweepError for one that neither `run` nor a study has."""
+    options = [name for name in signature(run).parameters if name != "keys"]
+    for key in keys:
+        if key not in (*KEYS, "allow_import"):
+            hint = did_you_mean(key, [*options, *KEYS]) or f"; a study has {listed(KEYS, word='and')}"
+            raise SweepError(f"sweep.run: no such keyword {key}{hint}")
+
+
 def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> bool:
     """Runs as `run` does, and opens nothing; False where the time was up before the end."""
     return _complete(_task(study, path, **options))
@@ -140,22 +166,32 @@ def is_begun(output: Path) -> bool:
 
 
 def store_cells(
-    study: Study, path: str | os.PathLike[str], arrays: Mapping[str, Any], force: bool = False
+    study: Study,
+    path: str | os.PathLike[str],
+    arrays: Mapping[str, Any],
+    force: bool = False,
+    mark: Mapping[str, str] | None = None,
+    taken_over: str = "",
 ) -> xr.Dataset:
     """Writes the result of cells that are solved already, a file like that of `run`.
 
     Parameters
     ----------
     arrays : mapping of outputs and of `schema.ANCILLARY` to ndarray, shape (cells, ...)
+    mark : mapping, optional
+        Its fingerprint, where that is not the one of the study and of this program.
+    taken_over : str
+        Which program has computed the cells, where it was another.
 
     Raises
     ------
     SweepError
         As `run`.
     """
-    task = Task(study, fingerprint(study), _checked(path), Cores(1), force=force)
+    block = max(1, min(row_blocks(study).count, STORED_AT_ONCE))
+    task = Task(study, dict(mark or fingerprint(study)), _checked(path), Cores(1), force=force, block_cells=block)
     if not resume.is_complete(task):
-        _run_to_file(task, Precomputed(arrays))
+        _run_to_file(task, Precomputed(arrays, taken_over))
     return open_result(task.output)
 
 
@@ -271,7 +307,7 @@ def _run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
         blocks = None if store.manifest is None else store.blocks
         try:
             cluster = stack.enter_context(joined(task))
-            session = Session(task, threads(task, cluster), blocks, reused=reused)
+            session = Session(task, threads(task, cluster), blocks, sampled=precomputed is None, reused=reused)
         except TimeUp as reason:
             task.note(f"stopped before the first block, for {reason}")
             return False

@@ -86,12 +86,12 @@ def _of_cells(dataset: xr.Dataset) -> dict[str, Rows]:
 def _of_summary(dataset: xr.Dataset) -> dict[str, Rows]:
     over = str(dataset.attrs["over"]).split()
     reduced = {name for name in over for dim in dataset[name].dims if dim in dataset.dims}
-    kept = [str(d) for d in dataset[BY_STATUS].dims[:-1]]
+    kept = {str(d) for d in dataset[BY_STATUS].dims[:-1]}
     along = [n for n in _along_of(dataset, {*kept, *reduced, "cell"}) if n not in ("status_name", "method_name")]
     bins = {str(d) for name, c in dataset.coords.items() if str(name).endswith("_bin_lower") for d in c.dims}
     given = [c for c in dataset.coords.values() if not c.dims or set(map(str, c.dims)) & set(along) - {str(c.name)}]
     return {
-        "axes": [_coordinate(dataset[name]) for name in kept],
+        "axes": [_coordinate(c) for c in dataset.coords.values() if kept & set(map(str, c.dims))],
         "reduced over": [_coordinate(dataset[name]) for name in over],
         "fixed": [_fixed(c) for c in given],
         "along": [_coordinate(dataset[name]) for name in along],
@@ -134,7 +134,7 @@ def head(path: Path, dataset: xr.Dataset) -> list[str]:
 
 def _settings(dataset: xr.Dataset) -> Iterator[tuple[str, ...]]:
     attrs = dataset.attrs
-    for name in ("kernel", "design", "method", "rtol"):
+    for name in ("kernel", "design", "where", "method", "rtol"):
         if name in attrs:
             yield name, f"{attrs[name]:g}" if name == "rtol" else str(attrs[name])
     if "start" in attrs:

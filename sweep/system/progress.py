@@ -11,6 +11,7 @@ from datetime import datetime, timedelta
 from datetime import time as day_time
 from typing import TYPE_CHECKING, Any, TextIO
 
+from sweep.system.bar import notebook_bar
 from sweep.system.errors import SweepError
 from sweep.system.log import log
 from sweep.system.table import printable
@@ -62,7 +63,8 @@ class Progress:
         self.total, self.done, self.computed = total, done, 0
         self._stream, self._name, self._clock = stream, printable(name), clock
         self._forecast, self._ending = forecast, ending
-        self._live = stream is not None and stream.isatty()
+        self._bar = notebook_bar(stream, self._name, total, done)
+        self._live = stream is not None and (stream.isatty() or self._bar is not None)
         self._pause = REDRAW_SECONDS if self._live else LINE_SECONDS
         self._begun = self._logged = clock()
         self._told: float | None = None
@@ -122,6 +124,9 @@ class Progress:
     def tell(self, text: str) -> None:
         """The same, but not in the log."""
         if self._stream is not None:
+            if self._bar is not None:
+                self._bar.note(f"{self._name}: {text}")
+                return
             self._end_line()
             self._write(self._stamp() + f"{self._name}: {text}\n")
 
@@ -134,8 +139,10 @@ class Progress:
         self._end_line()
 
     def stop(self) -> None:
-        """Leaves the terminal's line as it is and begins a new one."""
+        """Leaves the terminal's line, or the bar, as it is and begins a new one."""
         self._end_line()
+        if self._bar is not None:
+            self._bar.close()
 
     def line(self) -> str:
         """What is told now: `12,300/1,000,000 cells (1.2 %), 5,100 cells/s, 3 min left`."""
@@ -184,7 +191,9 @@ class Progress:
 
     def _say(self, text: str) -> None:
         line = f"{self._name}: {text}"
-        if self._live:
+        if self._bar is not None:
+            self._bar.show(self.done, text)
+        elif self._live:
             self._write("\r" + line.ljust(self._width))
             self._width = len(line)
         else:

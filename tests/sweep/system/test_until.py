@@ -171,5 +171,6 @@ def test_every_cell_is_in_the_account_once(codes, summed):
     assert found.total == len(codes)
     assert found.ok == codes.count(0)
     assert found.pending == codes.count(127)
-    assert found.refused == sum(c in map(int, Status) and 64 <= c < 126 and c not in FAILED for c in codes)
+    assert found.refused == sum(c in map(int, Status) and 64 <= c < 125 and c not in FAILED for c in codes)
+    assert found.not_asked == codes.count(125)
     assert found.remarks == sum(c in map(int, Status) and 0 < c < 64 for c in codes)
