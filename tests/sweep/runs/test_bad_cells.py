@@ -142,7 +142,7 @@ def test_processes_that_others_kill_cost_nothing(monkeypatch):
         future = real(pool, *task)
         if task[0] in (isolated.load, isolated.solve):
             victims.append(task)
-            if len(victims) % 2:
+            if len(victims) in (1, 3, 6, 10, 15, 21):
                 solver._process.kill()
         return future
 
@@ -152,4 +152,4 @@ def test_processes_that_others_kill_cost_nothing(monkeypatch):
     Guard(solver, seen.append).solve(0, 30, *arrays)
     processes.end()
     assert [cell.cell for cell in seen] == [10]
-    assert len(victims) > 20
+    assert len(victims) > 10
