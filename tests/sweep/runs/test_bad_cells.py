@@ -15,7 +15,7 @@ from kernels.interface import Status
 from sweep.cells.guard import BadCell, Guard
 from sweep.cells.solve import Solver
 from sweep.results.statuses import account
-from sweep.runs import isolated
+from sweep.runs import isolate, isolated
 from sweep.runs.isolate import Limits, Processes
 from sweep.system.errors import SweepError
 
@@ -153,3 +153,14 @@ def test_processes_that_others_kill_cost_nothing(monkeypatch):
     processes.end()
     assert [cell.cell for cell in seen] == [10]
     assert len(victims) > 10
+
+
+def test_a_process_with_too_much_memory_is_replaced(monkeypatch):
+    begun = []
+    real = isolate.IsolatedSolver._begun
+    monkeypatch.setattr(isolate.IsolatedSolver, "_begun", lambda self: begun.append(1) or real(self))
+    same(quiet(tall(30), isolate=True, workers=1, block_cells=10), quiet(tall(30)))
+    usual = len(begun)
+    monkeypatch.setattr(isolate, "MEMORY_SHARE", 1e-9)
+    same(quiet(tall(30), isolate=True, workers=1, block_cells=10), quiet(tall(30)))
+    assert len(begun) - usual >= usual + 2
