@@ -24,12 +24,14 @@ Indices = NDArray[np.intp]
 AROUND = {1: 4, 2: 12, 3: 20}
 """Cells around a simplex that are taken, beside its corners; with more axes twice the unknowns."""
 SAFETY = 1.6
-"""Times the parabola's error: what a kink between cells can be worse, nearly."""
+"""Times the parabola's error."""
 MISFIT = 2.5
-"""Times what the parabola leaves."""
+"""Times what the parabola leaves: a kink right in the middle between cells of one axis is told a quarter short."""
 LEAST_BASIS = 0.3
 """Of (1) with all c_ij = 1 in a cell around; its inverse is the weight of that cell."""
-RIDGE = 1e-6
+NEARLY = 0.9
+"""Share of the largest bend of an edge."""
+RIDGE = 1e-12
 BATCH = 20_000
 
 
@@ -89,8 +91,16 @@ def _of_batch(points: Array, heights: Array, corners: Indices, tree: cKDTree, pa
     middle = abs(bend) / 4
     inside = abs(bend.sum(axis=1)) / (axes + 1) ** 2
     size = (SAFETY * np.maximum(middle.max(axis=1), inside) + MISFIT * misfit).max(axis=1)
-    worst = middle.max(axis=2).argmax(axis=1)
+    worst = _shortest(middle.max(axis=2), lengths(points, corners, pairs))
     return Errors(size, pairs[worst, 0], pairs[worst, 1])
+
+
+def _shortest(bends: Array, length: Array) -> Indices:
+    """Of the edges that bend nearly as much as any, the shortest: a diagonal bends as its sides do, which lie along
+    the axes that need a cut."""
+    nearly = bends >= NEARLY * bends.max(axis=1, keepdims=True)
+    found: Indices = np.where(nearly, length, np.inf).argmin(axis=1)
+    return found
 
 
 def _shares(place: Array, near: Array) -> Array:
