@@ -1,5 +1,7 @@
 """Errors of straight lines between cells, told from the cells around."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -17,9 +19,9 @@ def test_of_a_parabola_the_error_is_told_exactly(axes):
     heights = np.einsum("ni,ij,nj->n", points, matrix, points) / 2 + points @ rng.normal(size=axes) + 1.0
     corners = simplices(points)
     found = interpolation_errors(points, heights[:, None], corners)
-    rows = np.arange(len(corners))
-    edge = points[corners[rows, found.first]] - points[corners[rows, found.second]]
-    middle = abs(np.einsum("ni,ij,nj->n", edge, matrix, edge)) / 8
+    first, second = np.array(list(itertools.combinations(range(axes + 1), 2))).T
+    edge = points[corners[:, first]] - points[corners[:, second]]
+    middle = abs(np.einsum("nki,ij,nkj->nk", edge, matrix, edge)).max(axis=1) / 8
     place = points[corners]
     inside = abs((heights[corners].mean(axis=1)) - _parabola(place.mean(axis=1), points, heights, matrix))
     usual = np.median(found.size)

@@ -186,19 +186,6 @@ def test_a_fine_grid_is_judged_before_anything_is_computed():
     assert found.error < 5e-5
 
 
-def test_cells_are_added_along_the_axis_that_needs_them():
-    """A power law in phi0 at a fixed mu / (a^2 phi0) needs none: of viscous friction alone P a = f(mu / (a^2 phi0))."""
-    axes = {
-        "mu": {"spacing": "log", "start": 1e-2, "stop": 1e2, "num": 5},
-        "phi0": {"spacing": "linear", "start": 1.0, "stop": 1.01, "num": 3},
-    }
-    ds = sweep.run(sweep.build_study(kernel="foliot", axes=axes, fixed={"a": 1.0}, outputs=["period"]))
-    found = sweep.refine(ds, "period", 1e-3)
-    assert found.complete
-    assert len(np.unique(found.dataset.mu)) > 20
-    assert len(np.unique(found.dataset.phi0)) == 3
-
-
 def test_three_axes_take_no_more_cells_than_an_even_grid_that_is_as_right():
     def even(num):
         axes = {n: {"spacing": "log", "start": 0.1, "stop": 10, "num": num} for n in ("mu", "a", "phi0")}
