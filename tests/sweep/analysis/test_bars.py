@@ -1,7 +1,7 @@
 """Error bars on data that are not shaped like the model's own: each share here was far below 95 % for independent
 noise.
 
-40 to 60 sets a case have a standard error of about 3 %; benchmarks/honesty/coverage.py does 10000.
+40 to 60 sets a case have a standard error of about 3 %; benchmarks/honesty/interval_coverage.py does 10000.
 """
 
 import subprocess
