@@ -4,7 +4,8 @@
     python studies/fula_milling_machine.py fula_milling_machine.h5
 
 Rebuilds tables 2 to 6 and figures 6 to 11 of Baran & Marchelek (1971), draws fula_milling_machine.png and says of every
-printed number whether it is reproduced, rounded or misprinted. Conclusions:
+printed number whether it is reproduced, rounded, carried from a slip or misprinted, and of each of its four conclusions
+whether it holds. Conclusions:
 
 - Rivin's five masses hold the first four frequencies to 0.2 % and put the fifth 17.5 % low; the source prints that.
 - "387.6" in the row of five masses is the seventh frequency of the EIGHT: five masses have no sixth.
