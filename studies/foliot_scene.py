@@ -2,8 +2,8 @@
 
     phi'' = +-mu - a phi' - c phi' abs(phi') - R sign(phi'),  speed times e at each switch               (1)
 
-The kernel `foliot` solves (1) in units of phi0 and sqrt(phi0/mu), so an exponent -1/2 of its period may be built in. Here
-it can only come out.
+The kernel `foliot` solves (1) in units of phi0 and sqrt(phi0/mu), so an exponent -1/2 of its period may be built in.
+Here it can only come out.
 """
 
 from kernels.scene import Field, scene_kernel, sign

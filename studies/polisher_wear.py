@@ -6,8 +6,8 @@
 
 draws polisher_wear.png and prints conclusions. The unevenness of a profile is the standard deviation of the wear over
 the area of the workpiece, over its mean; 0 is even. It weighs by area, so it hardly sees a middle that the tool never
-reaches: the share of the centre, its wear over the mean, is told beside it, and a machine is only called even if that is
-at least a half.
+reaches: the share of the centre, its wear over the mean, is told beside it, and a machine is only called even if that
+is at least a half.
 """
 
 from __future__ import annotations
@@ -101,7 +101,9 @@ def offsets(ds: xr.Dataset) -> list[Statement]:
         aligned = tool.sel(w_x=float(tool.L), method="nearest")
         bored, best = least_uneven(tool, ("w_x",)), least_uneven(without_hole(tool), ("w_x",))
         lines.append(
-            Statement(f"{name}, e = 10 cm: the least uneven has a hole", "", told(bored), None, bool(bored.centre < KEPT))
+            Statement(
+                f"{name}, e = 10 cm: the least uneven has a hole", "", told(bored), None, bool(bored.centre < KEPT)
+            )
         )
         text = f"{told(best)}; no offset {100 * float(aligned.uneven):.0f} %"
         gain = float(best.uneven / aligned.uneven)

@@ -6,12 +6,12 @@
     python studies/three_models.py three_models.h5 three_models_denny.h5 three_models_viscous.h5
 
 draws three_models.png, prints theory beside what comes out, and writes the three models as one dataset,
-three_models_all.nc. Where every loss is a share of the motion (restitution, inertias) and nothing but the drive exerts a
-torque, time has no other unit than the one the torque gives, so P ~ torque^(-1/2) and the amplitude does not depend on
-it; viscous friction brings in a time 1/a, and with it P ~ torque^(-1) at weak and torque^(-1/3) at strong drive. The
+three_models_all.nc. Where every loss is a share of the motion (restitution, inertias) and nothing but the drive exerts
+a torque, time has no other unit than the one the torque gives, so P ~ torque^(-1/2) and the amplitude does not depend
+on it; viscous friction brings in a time 1/a, and with it P ~ torque^(-1) at weak and torque^(-1/3) at strong drive. The
 kernels solve the impacts in units of the torque, so what they say of -1/2 cannot be otherwise: the exponents printed
-are those of the scenes `verge_scene` and `foliot_scene`, followed from rest in SI units. Of Lepschy, Roup and Denny only
-the abstracts were at hand: the models are of their kind, no number is theirs.
+are those of the scenes `verge_scene` and `foliot_scene`, followed from rest in SI units. Of Lepschy, Roup and Denny
+only the abstracts were at hand: the models are of their kind, no number is theirs.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ MODELS = ("two bodies", "kept share", "viscous")
 
 NOTES = """\
 theory: P ~ torque^(-s); deviation: relative, of exponents and spreads the difference. Allowed: 1e-8 for what was
-followed in SI at rtol 1e-10, 1e-12 for formulas, 0.01 for the ends of the viscous grid, the drop for what it leaves out.
-In words: impacts alone give the exponent 1/2 and leave the swing alone. The converse does not hold for the swing: a
-hairspring beside the impacts makes it grow with the torque without any friction, as the last lines show. At 1/2 a torque
-that is 1 % low makes the clock 0.5 % slow, 7.2 minutes a day. Without drop two plastic bodies are one that keeps the
-share (m - M)/(m + M); a wheel heavier than the foliot makes it negative: the same period formula, but the foliot turns
-round at the switch, and its swing is the way to the switch alone"""
+followed in SI at rtol 1e-10, 1e-12 for formulas, 0.01 for the ends of the viscous grid, the drop for what it leaves
+out. In words: impacts alone give the exponent 1/2 and leave the swing alone. The converse does not hold for the swing:
+a hairspring beside the impacts makes it grow with the torque without any friction, as the last lines show. At 1/2 a
+torque that is 1 % low makes the clock 0.5 % slow, 7.2 minutes a day. Without drop two plastic bodies are one that keeps
+the share (m - M)/(m + M); a wheel heavier than the foliot makes it negative: the same period formula, but the foliot
+turns round at the switch, and its swing is the way to the switch alone"""
 
 IN_SI = (1e-5, 1e-3, 0.1, 10.0)
 """Torques [N m] at which the models with impacts are followed in SI units."""
@@ -156,7 +156,14 @@ def identity(ds: xr.Dataset, impact: xr.Dataset) -> list[Statement]:
     period = 4 * math.sqrt(phi0 / mu * (1 + e) / (1 - e))
     return [
         compared("period of one body, formula", "4 sqrt(phi0 (1 + e)/(mu (1 - e)))", float(one.period), period, 1e-12),
-        compared(f"period, two bodies over one, drop {drop:.4f} pitch", "1 without drop", float(two.period / one.period), 1.0, 2 * drop, 6),
+        compared(
+            f"period, two bodies over one, drop {drop:.4f} pitch",
+            "1 without drop",
+            float(two.period / one.period),
+            1.0,
+            2 * drop,
+            6,
+        ),
         differing(f"multiplier, two bodies, e = (m - M)/(m + M) = {e:.4g}", "e^2", float(two.multiplier), e * e, 1e-12),
         differing("multiplier, one body", "e^2", float(one.multiplier), e * e, 1e-12),
     ]

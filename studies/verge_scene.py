@@ -1,12 +1,13 @@
 """Crown wheel and foliot as two bodies with friction: pushed in contact, flying apart through the drop, landing.
 
-    contact:  (I_v + n^2 I_c) angle'' = n tau - (c_v + n^2 c_c) angle' - (R_v + n R_c) sign(angle'), wheel = n angle'   (1)
-    flight:   I_v angle'' = -c_v angle' - R_v sign(angle'),  I_c wheel' = tau - c_c wheel - R_c,  R_c < tau             (2)
-    landing:  both go on in contact, with the speed that keeps I_v angle' + n I_c wheel, e = 0                          (3)
+    contact:  (I_v + n^2 I_c) angle'' = n tau - (c_v + n^2 c_c) angle' - (R_v + n R_c) sign(angle')     (1)
+    flight:   I_v angle'' = -c_v angle' - R_v sign(angle'),  I_c wheel' = tau - c_c wheel - R_c,  R_c < tau         (2)
+    landing:  both go on in contact, with the speed that keeps I_v angle' + n I_c wheel, e = 0                      (3)
 
-Angles count along the push, so they change sign from pallet to pallet. The tooth leaves at phi0; the next one lands when
-wheel and pallet have closed the drop. side is 1 in contact, -1 in flight. Without friction this is `impact` at e = 0,
-without inertia of the wheel `foliot`. Nothing is scaled out. Leaves out: recoil that frees the tooth.
+In contact wheel = n angle'. Angles count along the push, so they change sign from pallet to pallet. The tooth leaves at
+phi0; the next one lands when wheel and pallet have closed the drop. side is 1 in contact, -1 in flight. Without
+friction this is `impact` at e = 0, without inertia of the wheel `foliot`. Nothing is scaled out. Leaves out: recoil
+that frees the tooth.
 """
 
 from kernels.scene import Field, scene_kernel, sign

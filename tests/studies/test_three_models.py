@@ -64,7 +64,7 @@ def test_other_results_make_the_statements_fail(parts, followed):
         steep = followed | {name: one.assign(period=one.period * one.torque**1e-6, speed=one.speed * one.torque**1e-6)}
         assert len(failing(three_models.laws(ds, steep))) == 2
         assert len(failing(three_models.swings(ds, steep))) == 1
-    viscous = parts[2].assign(period=parts[2].period * parts[2].mu**0.05, amplitude=parts[2].amplitude * 1.1**0.5)
+    viscous = parts[2].assign(period=parts[2].period * parts[2].mu ** 0.05, amplitude=parts[2].amplitude * 1.1**0.5)
     other = three_models.together(*parts[:2], viscous.assign(amplitude=viscous.amplitude * viscous.mu**0.01))
     assert len(failing(three_models.laws(other, followed))) == 3
     assert failing(three_models.swings(other, followed)) == ["growth of the swing, viscous"]
