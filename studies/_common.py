@@ -16,18 +16,37 @@ import xarray as xr
 
 import sweep
 
-VERDICT = {None: "", True: "yes", False: "NO"}
-
 
 @dataclass(frozen=True)
 class Statement:
-    """One line of the table; `holds` is None where nothing is said that could be checked."""
+    """One line of the table.
+
+    Parameters
+    ----------
+    what, paper, here : what is compared, what the source or theory says of it, and what comes out
+    off : deviation
+    holds : whether it is as said, by a check that can fail; None: a value, of which nothing is said
+    refuted : it is known not to be as the source says, and would be a mistake here if it were
+    """
 
     what: str
     paper: str
     here: str
     off: float | None = None
     holds: bool | None = None
+    refuted: bool = False
+
+    @property
+    def failed(self) -> bool:
+        """Whether it came out otherwise than it must."""
+        return self.holds is not None and bool(self.holds) == self.refuted
+
+    @property
+    def verdict(self) -> str:
+        """The last column."""
+        if self.holds is None:
+            return ""
+        return "NO" if self.failed else "no, known" if self.refuted else "yes"
 
 
 Groups = dict[str, list[Statement]]
@@ -51,7 +70,7 @@ def table(groups: Groups, source: str = "paper") -> list[str]:
     rows: list[tuple[str, ...]] = [("", source, "here", "deviation", "holds")]
     for heading, lines in groups.items():
         rows += [("",), (heading.upper(),)]
-        rows += [(s.what, s.paper, s.here, _number(s.off), VERDICT[s.holds]) for s in lines]
+        rows += [(s.what, s.paper, s.here, _number(s.off), s.verdict) for s in lines]
     return columns(rows, " | ")
 
 
@@ -109,7 +128,7 @@ def report(
     except sweep.SweepError as error:
         print(error, file=sys.stderr)
         return 2
-    return int(any(s.holds is not None and not s.holds for lines in groups.values() for s in lines))
+    return int(any(s.failed for lines in groups.values() for s in lines))
 
 
 def hatch(axes: Any, x: Any, y: Any, where: Any, pattern: str, colour: str = "0.45") -> None:

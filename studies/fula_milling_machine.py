@@ -27,13 +27,19 @@ from _common import Groups, Statement, differing, read_result, report
 from _fula_source import CARRIED, CHAINS, KGF, TABLE_2_E, TABLE_6, holzer, judged, tables_2_to_4
 
 METHODS = ("rivin", "guyan", "irs", "craig_bampton", "modal", "exact")
+FIVE = {
+    "rivin": (0.2, 17.45), "guyan": (0.914, 2.21), "irs": (0.007, 0.329), "craig_bampton": (0.004, 0.012),
+    "modal": (0, 0), "exact": (0, 0),
+}  # fmt: skip
+"""Largest error of f1 to f4 and error of f5 [%] of five by each method, once in 50 digits; allowed 5 % and 0.001 %."""
 SPAN = 1000 / (2 * math.pi)
 """1000 rad/s in Hz."""
 NOTES = """\
 reproduced: within half a unit of the last digit printed; near: within 0.5 %, what three digits carried along explain;
 slip: within 3 % and not to be had from the source's own numbers (50.2, 9.55, 0.148 and what follows; h2 of Table 5,
-from e* = 0.98 squared); misprinted: farther. A number holds if it is what is expected of it. J8 is 99.44 in Table 1 and
-99.40 in all others. What the scan hides of tables 2 to 4 is left out. Phases are drawn from -180 to 180 degree."""
+from e* = 0.98 squared); misprinted: farther. A number holds if it is what is expected of it; "no, known": the source
+is wrong there. J8 is 99.44 in Table 1 and 99.40 in all others. What the scan hides of tables 2 to 4 is left out.
+Phases are drawn from -180 to 180 degree."""
 
 
 def chain(ds: xr.Dataset, n: int) -> dict[str, np.ndarray]:
@@ -121,7 +127,7 @@ def cause(ds: xr.Dataset) -> list[Statement]:
         real, exact_dampers, mu = (error_at(ds, f, how) for how in ("real", "complex", "mu"))
         lines.append(
             Statement(f"error at {f:g} Hz: dampers exact", "would vanish", f"{real:.4f} -> {exact_dampers:.4f}", None,
-                      abs(exact_dampers / real - 1) < 0.03)
+                      exact_dampers < 0.1 * real, True)
         )  # fmt: skip
         lines.append(Statement("  with mu = 1 - (w/w0)^2", "", f"{mu:.0e}", None, mu < 1e-12))
     return lines
@@ -149,8 +155,8 @@ def conclusions(ds: xr.Dataset) -> list[Statement]:
         Statement("1. below 1000 rad/s: largest error of the receptance", "good", f"{worst:.1%}", None, worst < 0.05),
         Statement("   the same, of f1 to f4", "good", f"{first:.2%}", None, first < 2.5e-3),
         Statement(
-            "   above: the dampers merged, which hold to w h e = 0.1 at", "159 Hz", f"{valid:.0f} Hz: not the cause",
-            None, valid > 400,
+            "   above: the dampers merged, which hold to w h e = 0.1 at", "159 Hz", f"{valid:.0f} Hz", None,
+            valid < 1.5 * SPAN, True,
         ),
         *precision(ds, f, eight, five),
         *peaks(f, eight),
@@ -171,8 +177,8 @@ def precision(ds: xr.Dataset, f: np.ndarray, eight: np.ndarray, five: np.ndarray
     return [
         Statement("2. amplitudes differ more at higher f, by", "grows", texts, None, bool(np.all(np.diff(growth) > 0))),
         Statement(
-            "   that is the computer: eight masses in 24 bits", "the cause", f"off by {lost:.0e}: not the cause", None,
-            lost < 1e-2 * growth[-1],
+            "   that is the computer: eight masses in 24 bits", "the cause", f"off by {lost:.0e}", None,
+            lost > 0.1 * growth[-1], True,
         ),
     ]  # fmt: skip
 
@@ -224,13 +230,12 @@ def small_chain(ds: xr.Dataset) -> dict[str, np.ndarray]:
 def others(ds: xr.Dataset) -> list[Statement]:
     """Five modes by every method."""
     lines = []
-    for code, name in enumerate(METHODS):
+    for code, (name, (first, fifth)) in enumerate(FIVE.items()):
         cell = ds.sel(n_keep=5).isel(reduction=code)
         off = 100 * abs(cell.frequency_error.values[:5])
-        lines.append(
-            Statement(f"{name}: largest error of f1-f4, of f5", "", f"{off[:4].max():.2g} %, {off[4]:.2g} %; "
-                      f"receptance {float(cell.frf_error):.1e}")
-        )  # fmt: skip
+        here = f"{off[:4].max():.2g} %, {off[4]:.2g} %; receptance {float(cell.frf_error):.1e}"
+        close = bool(np.isclose([off[:4].max(), off[4]], [first, fifth], rtol=0.05, atol=1e-3).all())
+        lines.append(Statement(f"{name}: largest error of f1-f4, of f5", f"{first} %, {fifth} %", here, None, close))
     error = abs(ds.frequency_error.sel(n_keep=5).values[:, 4])
     better = bool(error[0] > error[1] > error[2] > error[3] > error[4])
     lines.append(Statement("each method better at f5 than the one before", "", "", None, better))

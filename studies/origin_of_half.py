@@ -1,4 +1,4 @@
-"""Why do Roup and Denny find P ~ mu^(-1/2) at every drive torque, and the viscous foliot not?
+"""Which losses give P ~ mu^(-1/2) at every drive torque, the law that Roup and Denny find?
 
     sweep run studies/origin_of_half.toml
     python studies/origin_of_half.py origin_of_half.h5

@@ -74,7 +74,7 @@ def test_a_false_chain_makes_a_statement_fail(ds):
 
 def test_a_number_half_a_percent_off_is_no_longer_near(ds):
     wrong = ds.assign(frequency=1.006 * ds.frequency)
-    assert sum(s.holds is False for s in study.frequencies(wrong)) >= 8
+    assert sum(s.failed for s in study.frequencies(wrong)) >= 8
 
 
 def test_the_partial_systems_are_those_of_the_chain(ds):
@@ -111,4 +111,11 @@ def test_the_conclusions_have_the_numbers_of_an_own_solution(ds):
 
 def test_a_false_damping_makes_conclusions_fail(ds):
     wrong = ds.assign(damping=ds.damping.where(ds.n_keep != 5, 1.1 * ds.damping), valid_to=0 * ds.valid_to + 160)
-    assert sum(s.holds is False for s in study.conclusions(wrong)) == 2
+    assert not any(s.failed for s in study.conclusions(ds))
+    assert sum(s.failed for s in study.conclusions(wrong)) == 2
+
+
+def test_the_errors_of_the_other_methods_are_those_of_50_digits(ds):
+    assert not any(s.failed for s in study.others(ds))
+    wrong = ds.assign(frequency_error=ds.frequency_error + 0.003)
+    assert all(s.failed for s in study.others(wrong)[1:-1])
