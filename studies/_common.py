@@ -7,6 +7,7 @@ theory says beside what comes out, and draws `<question>.png` beside the dataset
 from __future__ import annotations
 
 import sys
+import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -145,3 +146,14 @@ def direct_label(axes: Any, x: float, y: float, text: str, colour: str = "black"
     """Text in the colour of the line it names, readable where it crosses others."""
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
     axes.text(x, y, text, color=colour, bbox=box, **{"fontsize": 8, "ha": "center", "va": "center", **how})
+
+
+def plain_ticks(axis: Any, values: Sequence[float]) -> None:
+    """Ticks of a logarithmic axis at these values, written out, and no others."""
+    axis.set_ticks(list(values), labels=[f"{x:g}" for x in values])
+    axis.set_ticks([], minor=True)
+
+
+def paragraph(text: str) -> list[str]:
+    """Running text as lines of 118 characters."""
+    return textwrap.wrap(" ".join(text.split()), 118)
