@@ -308,7 +308,7 @@ def caption(ds: xr.Dataset, whole: xr.Dataset) -> list[str]:
     return paragraph(f"""Figure. Exponent s of P ~ torque^(-s) of a foliot. (a) At large swings it depends on the shares
         of the losses alone, s = (N + lambda_e)/(N + 2): 0 where all is dry friction, 1/3 viscous, 1/2 impacts, and
         n/(n + 2) friction of degree n; {count} cells with swings over 100 phi0 agree to {off:.0e}. (b) Over torque and
-        dry friction, with a = 1/s, e = 0.99 and a cubic drag of 1e-6: white lines where another loss becomes the largest,
+        dry friction, with a = 1/s, e = 0.99 and a cubic drag of 1e-6: white lines where another loss is the largest,
         dots where the torque is best; with R = 100 a^2 phi0 the least s is {best}. (c) One friction alone: 1/n at small
         swings, n/(n + 2) at large; they meet at n = 2. (d) Every cell against the law. The middle half of the way from
         1/3 to 1/2 takes {_by_shares(1, None):.1f} decades of torque, that from 1 to 1/3 {_by_q():.1f}.""")
