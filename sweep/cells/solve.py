@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Method, Status
-from sweep.cells.grid import Grid, empty_cells
+from sweep.cells.grid import Grid
 from sweep.study.model import AUTO, Study
 
 STRIP = 16384
@@ -42,7 +42,6 @@ VAGUE = (Status.NO_METHOD, Status.NO_CYCLE)
 """Refusals that tell less than how another method gave up."""
 UNKNOWN = (Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT)
 """A method that ends so has not learnt what the scene does: another's NO_CYCLE, of its own kind alone, is no answer."""
-WARM_UP_CELLS = 3
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -117,12 +116,6 @@ class Solver:
             self._solve_strip(low, high, columns, status[rows], method_used[rows], some)
             if error_bound is not None:
                 _tell_errors(error_bound[rows], self._error[: high - low], status[rows])
-
-    def warm(self) -> None:
-        """Solve a few cells spread over the grid: what they need is compiled before threads start."""
-        cell = empty_cells(self.study, 1)
-        for index in np.unique(np.linspace(0, self.grid.size - 1, WARM_UP_CELLS).astype(np.int64)):
-            self.solve(int(index), int(index) + 1, *cell)
 
     def _solve_strip(
         self,

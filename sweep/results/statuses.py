@@ -54,7 +54,7 @@ class Account:
 def account(dataset: Cells) -> Account:
     """What became of the cells of a result, of a summary too."""
     counts = dict.fromkeys(("ok", "remarks", "refused", "failed", "pending", "not_asked"), 0)
-    for name, cells in _counts(dataset).items():
+    for name, cells in tally(dataset).items():
         counts[_kind(name)] += cells
     return Account(**counts)
 
@@ -68,7 +68,8 @@ def _kind(name: str) -> str:
     return "refused" if status.refused else "remarks"
 
 
-def _counts(dataset: Cells) -> dict[str, int]:
+def tally(dataset: Cells) -> dict[str, int]:
+    """How many cells have each status that occurs."""
     if is_summary(dataset):
         return summed(dataset, BY_STATUS)
     return {count.name: count.cells for count in count_statuses(dataset)}
@@ -120,11 +121,9 @@ def count_statuses(dataset: Cells) -> list[StatusCount]:
     counts, first = _tally(dataset[STATUS])
     total = int(counts.sum())
     return [
-        StatusCount(
-            _name(number), int(counts[number]), total, {} if number == Status.OK else _cell(dataset, first[number])
-        )
-        for number in range(len(counts))
-        if counts[number]
+        StatusCount(_name(n), int(counts[n]), total, {} if n == Status.OK else cell_values(dataset, first[n]))
+        for n in range(len(counts))
+        if counts[n]
     ]
 
 
@@ -180,11 +179,23 @@ def flat_pieces(column: xr.DataArray | StoredColumn, at: tuple[int, ...] = ()) -
             yield np.asarray(column[(*at, slice(start, start + rows))]).reshape(-1)
 
 
+def failed_cells(dataset: Cells, most: int) -> list[int]:
+    """Numbers of the first cells that FAILED."""
+    found: list[int] = []
+    done = 0
+    for piece in flat_pieces(dataset[STATUS]):
+        if len(found) >= most:
+            break
+        found += (done + np.flatnonzero(piece == Status.FAILED)).tolist()
+        done += len(piece)
+    return found[:most]
+
+
 def _name(number: int) -> str:
     return next((status.name for status in Status if status == number), f"status {number}")
 
 
-def _cell(dataset: Cells, index: int) -> dict[str, str]:
+def cell_values(dataset: Cells, index: int) -> dict[str, str]:
     """Coordinates of a cell, as people write them."""
     column = dataset[STATUS]
     at = dict(zip(map(str, column.dims), np.unravel_index(index, column.shape), strict=True))
