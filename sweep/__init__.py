@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from sweep.analysis.exponents import where_value as where_value
     from sweep.analysis.maps import contours as contours
     from sweep.analysis.maps import exponent_map as exponent_map
+    from sweep.analysis.scattered import interpolated as interpolated
     from sweep.analysis.two_laws import fit_two_laws as fit_two_laws
     from sweep.explore.groups import collapse_quality as collapse_quality
     from sweep.explore.groups import rescaled as rescaled
@@ -63,6 +64,7 @@ _PUBLIC = {
     "explore.join": ("join",),
     "explore.solver": ("solver",),
     "explore.sensitivity": ("sensitivity",),
+    "analysis.scattered": ("interpolated",),
     "explore.plan": ("plan",),
     "explore.notebook": ("kernels",),
     "explore.groups": ("scaling", "rescaled", "collapse_quality"),

@@ -22,11 +22,10 @@ if TYPE_CHECKING:
     from sweep.results.stored import Stored
     from sweep.study.model import Study
 
-DIFFERENT = 1
-"""As `diff` of files says it."""
 NOTIFY_SECONDS = 60
 """What the command of --notify may take."""
-
+DIFFERENT = 1
+"""As `diff` of files says it."""
 
 RUN_OPTIONS = (
     *("workers", "cluster", "without_workers", "force", "extend", "until"),
@@ -214,12 +213,13 @@ def _verify(arguments: argparse.Namespace) -> None:
 
 
 def _fit(arguments: argparse.Namespace) -> None:
+    from sweep.analysis.scattered import on_lines
     from sweep.show.laws import laws, laws_text, pick, write_laws
 
     if arguments.output:
         _check_target(arguments, arguments.output, "laws")
     with _result(arguments) as dataset:
-        part = pick(dataset, arguments.at)
+        part = on_lines(pick(dataset, arguments.at), arguments.x)
         noise = {None: None, "yes": True, "no": False}[arguments.noise]
         found = laws(part, arguments.y, arguments.x, arguments.window or [], arguments.confidence, noise)
     _print(laws_text(found))
@@ -243,7 +243,7 @@ def _chart(arguments: argparse.Namespace) -> None:
     from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
     from sweep.show.charts import plot_precision
 
-    study = _study(arguments)
+    study = _study_of_result(arguments) if arguments.study.suffix == ".h5" else _study(arguments)
     output = arguments.output or Path(f"{arguments.study.stem}_chart.png")
     _check_target(arguments, output)
     found = work_precision(
@@ -355,6 +355,15 @@ def _study(arguments: argparse.Namespace) -> Study:
 
     path = arguments.study
     return read_study(path, allow_import=arguments.allow_import)
+
+
+def _study_of_result(arguments: argparse.Namespace) -> Study:
+    from sweep.explore.refine import study_of
+    from sweep.results.open import open_result
+
+    _check_readable(arguments.study)
+    with open_result(arguments.study) as dataset:
+        return study_of(dataset, allow_import=arguments.allow_import)
 
 
 def _result(arguments: argparse.Namespace) -> xr.Dataset:
@@ -565,7 +574,7 @@ COMMANDS = {
         *(AT, UNITS),
     ),
     "chart": Command.of(
-        "error against time of every method of a kernel, on the cells of a study",
+        "error against time of every method of a kernel, on the cells of a study or a result",
         _chart,
         STUDY,
         output("FILE.png", "default: the study's name with _chart.png, here"),

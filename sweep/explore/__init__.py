@@ -10,5 +10,6 @@ Others may use
     `sensitivity`     which parameters decide an output
     `groups`          superfluous axes, outputs free of units
 
-`calibration` (trial runs) is behind `plan`, `reference` (what errors are against) behind `work_precision`.
+`calibration` (trial runs) is behind `plan`, `reference` (what errors are against) behind `work_precision`,
+`symmetries` (powers by which numbers may be multiplied) behind `groups`.
 """

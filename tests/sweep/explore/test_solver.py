@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from toy_studies import build
 
 import sweep
+from kernels.interface import Status
 
 FOLIOT = {"kernel": "foliot", "axes": {"mu": [1.0], "R": [0.1]}, "fixed": {"a": 1.0, "phi0": 0.7}}
 VALUES = st.floats(1e-6, 1e6)
@@ -29,6 +30,15 @@ def test_cells_are_those_of_the_sweep(keys, cells):
         for i in range(len(mu)):
             one = getattr(clock(mu[i], R=R[i]), name)
             assert np.array_equal(one, swept[name].values[i], equal_nan=True)
+
+
+def test_a_bound_beyond_rtol_is_told_as_the_sweep_tells_it():
+    keys = {"kernel": "foliot", "method": "asymptotic", "rtol": 1e-9, "fixed": {"a": 1.0, "phi0": 1.0}}
+    swept = sweep.run({**keys, "axes": {"mu": [1e-3, 1.4]}})
+    clock = sweep.solver({**keys, "axes": {"mu": [1.0]}})
+    assert swept.status.values.tolist() == [Status.OK, Status.INACCURATE]
+    assert [clock(mu).status for mu in (1e-3, 1.4)] == [Status.OK, Status.INACCURATE]
+    assert [clock(mu).period for mu in (1e-3, 1.4)] == swept.period.values.tolist()
 
 
 def test_arrays_are_broadcast_and_traces_come_behind():
