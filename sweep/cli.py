@@ -323,13 +323,30 @@ def _export(arguments: argparse.Namespace) -> None:
         _print(export(_in_units(chosen, arguments.unit), arguments.output, force=arguments.force))
 
 
+def _studies(arguments: argparse.Namespace) -> None:
+    from sweep.show.studies import copy_study, studies_text
+
+    if arguments.name:
+        _print("\n".join(map(str, copy_study(arguments.name))))
+    else:
+        _print(studies_text())
+
+
+def _completion(arguments: argparse.Namespace) -> None:
+    try:
+        import shtab
+    except ImportError:
+        raise SweepError('completion needs shtab; install it with: pip install "foliot[completion]"') from None
+    print(shtab.complete(parser(), arguments.shell))
+
+
 def _diff(arguments: argparse.Namespace) -> Outcome:
     from sweep.results.diff import diff
 
     with _opened(arguments.result) as a, _opened(arguments.other) as b:
         found = diff(a, b, arguments.rtol)
     _print(found)
-    return Outcome(COMPLETE if found.same else DIFFERENT, "")
+    return Outcome(COMPLETE if found.same else DIFFERENT, str(found))
 
 
 def _join(arguments: argparse.Namespace) -> None:
@@ -613,6 +630,16 @@ COMMANDS = {
         RESULT,
         output("FILE.html", "default: the result's name with .html, here"),
         *(FORCE, UNITS, UNFINISHED),
+    ),
+    "studies": Command.of(
+        "the studies that come with foliot; with a name: copy it here to work on",
+        _studies,
+        option("name", "of the study to copy", metavar="NAME", nargs="?"),
+    ),
+    "completion": Command.of(
+        'what makes a shell complete the command, e.g. eval "$(sweep completion bash)"',
+        _completion,
+        option("shell", choices=("bash", "zsh", "tcsh")),
     ),
     "diff": Command.of(
         "in what two results differ: cells, statuses, how far; exit status 1 where they do",
