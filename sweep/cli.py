@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -140,6 +142,10 @@ def _run(arguments: argparse.Namespace) -> Outcome:
     from sweep.system.log import log, log_path, logging_to
 
     output = _output(arguments)
+    for number in (signal.SIGUSR1, signal.SIGUSR2):
+        # they change the number of cores while blocks are computed, and mean nothing before and after
+        if threading.current_thread() is threading.main_thread() and signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, signal.SIG_IGN)
     _check_readable(output)
     with logging_to(log_path(output) if output.parent.is_dir() else None, arguments.log_json):
         try:
