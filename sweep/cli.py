@@ -222,16 +222,43 @@ def _fit(arguments: argparse.Namespace) -> None:
     from sweep.analysis.scattered import on_lines
     from sweep.show.laws import laws, laws_text, pick, write_laws
 
+    if arguments.compare:
+        _compare(arguments)
+        return
     if arguments.output:
         _check_target(arguments, arguments.output, "laws")
     with _result(arguments) as dataset:
         part = on_lines(pick(dataset, arguments.at), arguments.x)
-        noise = {None: None, "yes": True, "no": False}[arguments.noise]
+        noise = {"yes": True, "no": False}.get(arguments.noise, arguments.noise)
         found = laws(part, arguments.y, arguments.x, arguments.window or [], arguments.confidence, noise)
     _print(laws_text(found))
     if arguments.output:
         write_laws(found, arguments.output)
         _print(arguments.output)
+
+
+def _compare(arguments: argparse.Namespace) -> None:
+    """`sweep fit --compare`: a table, and a picture or csv of it."""
+    from sweep.analysis.scattered import on_lines
+    from sweep.show.compare import comparison, comparison_text, write_comparison
+    from sweep.show.laws import pick
+
+    target = arguments.output
+    drawn = target is not None and target.suffix.lower() != ".csv"
+    if target:
+        _check_target(arguments, target, None if drawn else "laws")
+    with _result(arguments) as dataset:
+        part = on_lines(pick(dataset, arguments.at), arguments.x)
+        found = comparison(part, arguments.y, arguments.x, arguments.window or [])
+    _print(comparison_text(found))
+    if drawn:
+        from sweep.show.law_charts import plot_laws
+
+        plot_laws(found, target)
+    elif target:
+        write_comparison(found, target)
+    if target:
+        _print(target)
 
 
 def _plot(arguments: argparse.Namespace) -> None:
@@ -302,13 +329,30 @@ def _export(arguments: argparse.Namespace) -> None:
         _print(export(_in_units(chosen, arguments.unit), arguments.output, force=arguments.force))
 
 
+def _studies(arguments: argparse.Namespace) -> None:
+    from sweep.show.studies import copy_study, studies_text
+
+    if arguments.name:
+        _print("\n".join(map(str, copy_study(arguments.name))))
+    else:
+        _print(studies_text())
+
+
+def _completion(arguments: argparse.Namespace) -> None:
+    try:
+        import shtab
+    except ImportError:
+        raise SweepError('completion needs shtab; install it with: pip install "foliot[completion]"') from None
+    print(shtab.complete(parser(), arguments.shell))
+
+
 def _diff(arguments: argparse.Namespace) -> Outcome:
     from sweep.results.diff import diff
 
     with _opened(arguments.result) as a, _opened(arguments.other) as b:
         found = diff(a, b, arguments.rtol)
     _print(found)
-    return Outcome(COMPLETE if found.same else DIFFERENT, "")
+    return Outcome(COMPLETE if found.same else DIFFERENT, str(found))
 
 
 def _join(arguments: argparse.Namespace) -> None:
@@ -546,10 +590,11 @@ COMMANDS = {
         option("--confidence", "of the intervals; default: 0.95", type=float, default=0.95, metavar="SHARE"),
         option(
             "--noise",
-            "whether the values carry independent noise; default: as their scatter shows",
-            choices=("yes", "no"),
+            "whether the values scatter, or how; default: as tests find",
+            choices=("yes", "no", "independent", "uneven", "correlated", "outliers"),
         ),
-        output("FILE.csv", "also write the table"),
+        switch("--compare", "which law: one, two or three, a logarithm, an offset, a correction to scaling"),
+        output("FILE.csv|.png", "also write the table; with --compare, .png, .svg or .pdf is a picture of all laws"),
         *(FORCE, AT, UNFINISHED),
     ),
     "plot": Command.of(
@@ -591,6 +636,16 @@ COMMANDS = {
         RESULT,
         output("FILE.html", "default: the result's name with .html, here"),
         *(FORCE, UNITS, UNFINISHED),
+    ),
+    "studies": Command.of(
+        "the studies that come with foliot; with a name: copy it here to work on",
+        _studies,
+        option("name", "of the study to copy", metavar="NAME", nargs="?"),
+    ),
+    "completion": Command.of(
+        'what makes a shell complete the command, e.g. eval "$(sweep completion bash)"',
+        _completion,
+        option("shell", choices=("bash", "zsh", "tcsh")),
     ),
     "diff": Command.of(
         "in what two results differ: cells, statuses, how far; exit status 1 where they do",
