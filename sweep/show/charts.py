@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.analysis.loglog import is_logarithmic, spans_decades
-from sweep.show.view import View, coordinate, label, setting, view
+from sweep.show.view import View, coordinate, edges, label, setting, view
 from sweep.system import disk
 from sweep.system.errors import SweepError
 from sweep.system.overwriting import DRAWN
@@ -297,7 +297,7 @@ def _draw_map(axes: Any, shown: View) -> None:
     corners = []
     for scale, grid in ((axes.set_xscale, shown.values(shown.x)), (axes.set_yscale, shown.values(across))):
         scale("log" if is_logarithmic(grid) else "linear")
-        corners.append(_edges(grid.astype(np.float64), is_logarithmic(grid)))
+        corners.append(edges(grid.astype(np.float64)))
     norm = LogNorm() if spans_decades(shown.y) else Normalize()
     mesh = axes.pcolormesh(*corners, np.ma.masked_invalid(shown.y.values), norm=norm, cmap="viridis", rasterized=True)
     axes.figure.colorbar(mesh, ax=axes, label=label(shown.y))
@@ -347,11 +347,3 @@ def _name(axes: Any, corners: list[Any], here: Any, name: str) -> None:
     ]
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}
     axes.text(*at, name.replace("_", " "), ha="center", va="center", fontsize=7, bbox=box, zorder=5)
-
-
-def _edges(grid: Any, logarithmic: bool) -> Any:
-    """Edges of the cells around the points of a grid."""
-    at = np.log(grid) if logarithmic else grid
-    middle = (at[1:] + at[:-1]) / 2
-    edges = np.concatenate([[2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]])
-    return np.exp(edges) if logarithmic else edges

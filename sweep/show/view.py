@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from sweep.analysis.loglog import is_logarithmic
 from sweep.results.statuses import flag_words
 from sweep.study.mistakes import did_you_mean
 from sweep.system.errors import SweepError
@@ -138,6 +139,14 @@ def coordinate(y: xr.DataArray, name: str) -> xr.DataArray:
 
 def is_number_axis(y: xr.DataArray, name: str) -> bool:
     return coordinate(y, name).dtype.kind in "fiu"
+
+
+def edges(grid: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Edges of the cells around the points of a grid, (n + 1,): halfway; of a logarithmic grid in logarithms."""
+    at = np.log(grid) if is_logarithmic(grid) else grid
+    middle = (at[1:] + at[:-1]) / 2 if at.size > 1 else at + 0.5
+    around = np.concatenate([[2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]])
+    return np.exp(around) if is_logarithmic(grid) else around
 
 
 def symbol(name: str) -> str:
