@@ -21,6 +21,7 @@ extensions = ["myst_nb", "numpydoc", "sphinx.ext.autodoc"]
 exclude_patterns = ["_build", "_made/notes"]
 html_theme = "pydata_sphinx_theme"
 html_title = "foliot"
+html_context = {"default_mode": "auto"}
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False
@@ -30,7 +31,7 @@ html_theme_options = {
     "show_prev_next": False,
     "navigation_with_keys": False,
 }
-html_sidebars = {"index": [], "gallery": []}
+html_sidebars = {"index": [], "first_hour": [], "tutorial": [], "accuracy": [], "_made/gallery": []}
 html_math_renderer = "mathml"
 
 myst_enable_extensions = ["dollarmath", "colon_fence"]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import itertools
 import re
 import shutil
 import tempfile
@@ -202,16 +203,11 @@ def _option(option: Option) -> tuple[str, ...]:
 
 def prose(text: str) -> Iterator[str]:
     """A docstring as Markdown: what is indented are equations, as they stand; the rest are paragraphs."""
-    lines = [*text.strip().splitlines(), ""]
-    inside = False
-    for line in lines:
-        indented = line.startswith("    ")
-        if indented != inside and (indented or line.strip()):
-            yield from (["", "```text"] if indented else ["```", ""])
-            inside = indented
-        yield line[4:] if indented else "" if inside and not line else _plain(line)
-    if inside:
-        yield "```"
+    for indented, lines in itertools.groupby(text.strip("\n").splitlines(), lambda line: line.startswith("    ")):
+        if indented:
+            yield from ("", "```text", *(re.sub(r" {5,}\(", "    (", line[4:]) for line in lines), "```", "")
+        else:
+            yield from map(_plain, lines)
 
 
 def _plain(text: str) -> str:

@@ -74,5 +74,5 @@ def test_pages_of_kernels_say_what_the_kernels_declare():
 def test_what_is_indented_in_a_docstring_stands_as_it_is():
     import make_pages
 
-    told = "\n".join(make_pages.prose("A law.\n\n    x_1 = 2*y    (1)\n\nwith x_1 and `y_2`.")).rstrip()
-    assert told == "A law.\n\n\n```text\nx_1 = 2*y    (1)\n\n```\n\nwith x\\_1 and `y_2`."
+    told = "\n".join(make_pages.prose("A law.\n\n    x_1 = 2*y            (1)\n\nwith x_1 and `y_2`."))
+    assert told == "A law.\n\n\n```text\nx_1 = 2*y    (1)\n```\n\n\nwith x\\_1 and `y_2`."
