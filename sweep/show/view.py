@@ -30,6 +30,9 @@ FAMILY = 8
 POINTS, PIXELS = 20_000, 2_000
 """Points along a line and cells along the side of a map that are drawn; beyond, every second, third ... one."""
 
+HARD_SPACE = "\u00a0"
+"""Where no line is broken."""
+
 ANCILLARY = ("status", "method_used", "error_bound")
 
 
@@ -167,18 +170,19 @@ def unit_text(unit: str) -> str:
 
 
 def label(variable: xr.DataArray, width: int = 44) -> str:
-    """Text for an axis: long name, symbol, unit; in lines of so many letters."""
+    """Text for an axis: long name, symbol, unit; in lines of so many letters, none of which begins with the unit."""
     name = str(variable.name)
     sign, unit = symbol(name), unit_text(str(variable.attrs.get("units", "")))
     words = str(variable.attrs.get("long_name", "")) or ("" if sign else name.replace("_", " "))
-    text = ", ".join(part for part in (words, sign) if part) + (f" [{unit}]" if unit else "")
+    text = ", ".join(part for part in (words, sign) if part)
+    text = f"{text}{HARD_SPACE}[{unit.replace(' ', HARD_SPACE)}]" if unit else text
     signs = re.findall(r"\$.*?\$", text)
     for sign in signs:  # a few letters in print, whatever they are in writing
         text = text.replace(sign, "\0\0", 1)
     wrapped = "\n".join(textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False))
     for sign in signs:
         wrapped = wrapped.replace("\0\0", sign, 1)
-    return wrapped
+    return wrapped.replace(HARD_SPACE, " ")
 
 
 def setting(value: xr.DataArray) -> str:
