@@ -15,16 +15,21 @@ if TYPE_CHECKING:
     from sweep.analysis.exponents import where_value as where_value
     from sweep.analysis.maps import contours as contours
     from sweep.analysis.maps import exponent_map as exponent_map
+    from sweep.analysis.scattered import interpolated as interpolated
     from sweep.analysis.two_laws import fit_two_laws as fit_two_laws
     from sweep.explore.groups import collapse_quality as collapse_quality
     from sweep.explore.groups import rescaled as rescaled
     from sweep.explore.groups import scaling as scaling
+    from sweep.explore.join import join as join
+    from sweep.explore.notebook import kernels as kernels
     from sweep.explore.plan import plan as plan
     from sweep.explore.refine import refine as refine
     from sweep.explore.refine import study_of as study_of
     from sweep.explore.work_precision import work_precision as work_precision
+    from sweep.results.diff import diff as diff
     from sweep.results.export import export as export
     from sweep.results.filter import where as where
+    from sweep.results.listing import list_results as list_results
     from sweep.results.open import open_result as open_result
     from sweep.results.units import in_units as in_units
     from sweep.results.verify import verify as verify
@@ -33,11 +38,13 @@ if TYPE_CHECKING:
     from sweep.show.charts import plot_precision as plot_precision
     from sweep.study.read import build_study as build_study
     from sweep.study.read import read_study as read_study
+    from sweep.study.toml import to_toml as to_toml
     from sweep.system.errors import StudyError as StudyError
     from sweep.system.errors import SweepError as SweepError
 
 _PUBLIC = {
-    "study.read": ("read_study", "build_study"),
+    "study.toml": ("to_toml",),
+    "study.read": ("study", "read_study", "build_study"),
     "runs.run": ("run",),
     "results.open": ("open_result",),
     "results.verify": ("verify",),
@@ -50,7 +57,12 @@ _PUBLIC = {
     ),
     "analysis.two_laws": ("fit_two_laws",),
     "analysis.maps": ("contours", "exponent_map"),
+    "results.diff": ("diff",),
+    "results.listing": ("list_results",),
+    "explore.join": ("join",),
+    "analysis.scattered": ("interpolated",),
     "explore.plan": ("plan",),
+    "explore.notebook": ("kernels",),
     "explore.groups": ("scaling", "rescaled", "collapse_quality"),
     "explore.work_precision": ("work_precision",),
     "explore.refine": ("refine", "study_of"),
@@ -61,12 +73,23 @@ _HOMES = {name: home for home, names in _PUBLIC.items() for name in names}
 """Public names and the modules they live in; a module is imported when one of its names is first used."""
 
 __all__ = list(_HOMES)
+STUDIES = ("study", "read_study", "build_study", "study_of")
+"""What gives a study."""
 
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'sweep' has no attribute {name!r}")
-    return getattr(import_module(f"sweep.{_HOMES[name]}"), name)
+    if name in STUDIES:
+        import_module("sweep.study.model").SHOWN["html"] = _study_html
+    # the room of that name is the function as well, and stays what `sweep.study.read` and its like begin with
+    return import_module("sweep.study") if name == "study" else getattr(import_module(f"sweep.{_HOMES[name]}"), name)
+
+
+def _study_html(study: Any) -> str:
+    """How a notebook shows a study; imported when one does."""
+    found: str = import_module("sweep.explore.notebook").study_html(study)
+    return found
 
 
 def __dir__() -> list[str]:

@@ -78,6 +78,15 @@ def local_exponent(y: xr.DataArray, dim: str) -> xr.DataArray:
     ------
     SweepError
         If `dim` is unknown, not positive, not monotone, or shorter than three.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e5, 1e7, 9)})
+    >>> sweep.local_exponent(ds.period, "mu").values[[0, -1]].round(3)
+    array([-0.333, -0.333])
     """
     return _local(y, dim, lambda t, z: slopes(t, z, 5), "exponent", "local exponent")
 
@@ -99,6 +108,15 @@ def local_exponent_error(y: xr.DataArray, dim: str) -> xr.DataArray:
     ------
     SweepError
         As `local_exponent`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e5, 1e7, 9)})
+    >>> bool((sweep.local_exponent_error(ds.period, "mu") < 1e-3).all())
+    True
     """
     return _local(y, dim, slope_errors, "exponent_error", "error of the local exponent")
 
@@ -154,6 +172,16 @@ def fit_exponent(
     ------
     SweepError
         If `dim` is unknown or unfit, if y is not positive somewhere in the window, or if no line has three points.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e5, 1e7, 9)})
+    >>> found = sweep.fit_exponent(ds.period, "mu")
+    >>> print(f"{float(found.exponent):.4f}")
+    -0.3334
     """
     check_confidence(confidence)
     dimension, t, logs = window_logs(y, dim, window)
@@ -190,6 +218,16 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     ------
     SweepError
         If the windows overlap or the two lines are parallel within their errors.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e-3, 1e6, 91)})
+    >>> weak, strong = (sweep.fit_exponent(ds.period, "mu", window) for window in ((1e-3, 1e-2), (1e5, 1e6)))
+    >>> print(f"{float(sweep.crossover(weak, strong).abscissa):.1f}")
+    0.6
     """
     _require_apart(low_fit, high_fit)
     first, second = np.log(low_fit.centre), np.log(high_fit.centre)
@@ -237,6 +275,15 @@ def where_value(curve: xr.DataArray, dim: str, value: float, window: Window | No
     SweepError
         If the curve does not pass the value, or does so more than once. Along further dimensions such lines are
         NaN, and it is raised only if all are.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e-2, 1e4, 61)})
+    >>> print(f"{float(sweep.where_value(ds.period, 'mu', 2.0).abscissa):.2f}")
+    26.40
     """
 
     def find(t: Array, c: Array, bracket: int) -> tuple[float, float]:
@@ -267,6 +314,15 @@ def where_exponent(y: xr.DataArray, dim: str, value: float, window: Window | Non
     ------
     SweepError
         As `where_value`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e-2, 1e4, 61)})
+    >>> print(f"{float(sweep.where_exponent(ds.period, 'mu', -0.5).abscissa):.2f}")
+    1.46
     """
 
     def find(t: Array, z: Array, bracket: int) -> tuple[float, float]:

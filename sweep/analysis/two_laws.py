@@ -94,6 +94,16 @@ def fit_two_laws(
     ------
     SweepError
         If `dim` is unknown or unfit, y is not positive in the window, or no line has eight points.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e-3, 1e6, 91)})
+    >>> found = sweep.fit_two_laws(ds.period, "mu")
+    >>> [f"{e:.2f}" for e in found.exponent.values]
+    ['-1.00', '-0.34']
     """
     check_confidence(confidence)
     dimension, t, logs = window_logs(y, dim, window)

@@ -85,6 +85,8 @@ def _said(study: Study) -> dict[str, str]:
         "design": study.design,
         "axes": ", ".join(study.axes),
     }
+    said |= {"where": study.where} if study.where else {}
+    said |= {"dims": ", ".join(f"{dim} ({', '.join(n)})" for dim, n in study.dims.items())} if study.blocks else {}
     said |= {f"axes.{name}": _values(axis.values) for name, axis in study.axes.items()}
     said |= {f"fixed.{n}": _values(value) if np.ndim(value) else repr(value) for n, value in study.fixed.items()}
     said |= {f"fixed.{name}": f"as {axis}" for name, axis in study.follows.items()}

@@ -4,7 +4,10 @@ Others may use
     `plan`            what a study will take
     `work_precision`  error against time of every method of a kernel
     `refine`          cells where they are needed; study_of
+    `notebook`        kernels; what a notebook shows of them and of a study
+    `join`            two results as one
     `groups`          superfluous axes, outputs free of units
 
-`calibration` (trial runs) is behind `plan`, `reference` (what errors are against) behind `work_precision`.
+`calibration` (trial runs) is behind `plan`, `reference` (what errors are against) behind `work_precision`,
+`symmetries` (powers by which numbers may be multiplied) behind `groups`.
 """

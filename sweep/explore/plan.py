@@ -8,10 +8,10 @@ import shutil
 import tempfile
 import time
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from sweep.store.assemble import chunks, write_structure
 from sweep.store.digests import Digests
 from sweep.store.hdf5_bytes import Hdf5Bytes, PartBytes
 from sweep.store.parts import FLAGS
-from sweep.study.read import as_study
+from sweep.study.read import Given, as_study
 from sweep.system.errors import SweepError
 from sweep.system.pool import cores, whole_number
 from sweep.system.progress import duration, quantity
@@ -134,7 +134,7 @@ class Plan:
 
 
 def plan(
-    study: Study | Mapping[str, Any],
+    study: Given,
     workers: int | None = None,
     path: str | os.PathLike[str] | None = None,
     note: Callable[[str], None] | None = None,
@@ -154,6 +154,13 @@ def plan(
     ------
     SweepError
         The folder of the output is not there.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> study = sweep.study(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> sweep.plan(study).cells
+    2
     """
     from sweep.explore.groups import scaling
 

@@ -121,6 +121,12 @@ def plot(
     ------
     SweepError
         If there is no such output or axis, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> figure = sweep.plot(ds, "period.png")
     """
     shown = view(dataset, y, x)
     with style():
@@ -153,6 +159,13 @@ def plot_precision(found: xr.Dataset, path: str | os.PathLike[str] | None = None
     ------
     SweepError
         The file cannot be written.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> keys = {"kernel": "foliot", "outputs": ["period"], "axes": {"mu": [0.5, 1.0]}, "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> found = sweep.work_precision(keys, methods=["closed", "asymptotic"], tolerances=[1e-6])
+    >>> figure = sweep.plot_precision(found, "precision.png")
     """
     with style():
         lines = _note(found)

@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from sweep.analysis.loglog import is_logarithmic
+from sweep.analysis.scattered import Box, axes_of, interpolated
 from sweep.results.statuses import flag_words
 from sweep.study.mistakes import did_you_mean
 from sweep.system.errors import SweepError
@@ -32,6 +33,9 @@ POINTS, PIXELS = 20_000, 2_000
 
 HARD_SPACE = "\u00a0"
 """Where no line is broken."""
+
+SIDE = 201
+"""Cells along the sides of a map of cells that lie anywhere."""
 
 ANCILLARY = ("status", "method_used", "error_bound")
 
@@ -81,6 +85,8 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
         If there is no such output or axis.
     """
     name = _output(dataset, y)
+    if x is None:
+        dataset = _mapped(dataset)
     x = _x(dataset[name], x, dataset["status"].dims if "status" in dataset else ())
     along = str(coordinate(dataset[name], x).dims[0])
     others = sorted((str(d) for d in dataset[name].dims if d != along), key=lambda d: -dataset.sizes[d])
@@ -100,6 +106,17 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
         x, along, across,
         ", ".join(setting(coordinate(dataset[name], dim)[index]) for dim, index in held.items()),
     )  # fmt: skip
+
+
+def _mapped(dataset: xr.Dataset) -> xr.Dataset:
+    """Cells of a refined result, which lie anywhere, as an even grid of two axes; the others at their middle."""
+    names = axes_of(dataset)
+    if not names:
+        return dataset
+    box = Box.of({name: dataset[name].values for name in names})
+    even = np.linspace(0.0, 1.0, SIDE)
+    at = {name: box.values(k, even if k < 2 else even[SIDE // 2 : SIDE // 2 + 1]) for k, name in enumerate(names)}
+    return interpolated(dataset, at)
 
 
 def _output(dataset: xr.Dataset, y: str | None) -> str:

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import math
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
-from kernels.interface import Field
 from sweep.analysis.loglog import is_logarithmic
 from sweep.results.export import export
-from sweep.study.model import Axis, Study
+from sweep.study.model import SETTINGS, Axis, Study
+from sweep.study.toml import to_toml
 from sweep.system.errors import SweepError
 from sweep.view.slices import PLACE, Choice, Range, along, part, shown
 
@@ -88,45 +87,27 @@ def study_text(dataset: xr.Dataset, choice: Choice, x_range: Range | None, y_ran
     study = Study.from_json(str(dataset.attrs["study_json"]), declared=True)
     if study.design != "product":
         raise SweepError("only a product of axes has regions; this study is a list of cells")
-    wanted = {choice.x: x_range, choice.across: y_range}
-    shown_axes = {name: axis for name, axis in study.axes.items() if name in wanted}
-    tables = [line for name, axis in shown_axes.items() for line in _axis(study, axis, wanted[name])]
-    held = {name: axis for name, axis in study.axes.items() if name not in wanted}
-    place = {name: choice.held.get(name, 0) for name in held}
-    return "\n".join([*_head(study, held, place), *tables, *_fixed(study, held, place), *_along(study)]) + "\n"
+    ranges = {choice.x: x_range, choice.across: y_range}
+    axes = {name: _narrowed(study, axis, ranges[name]) for name, axis in study.axes.items() if name in ranges}
+    held = {name: _held_value(axis, choice.held.get(name, 0)) for name, axis in study.axes.items() if name not in axes}
+    settings = {name: held.pop(name) for name in SETTINGS if name in held}
+    question = f"{study.question or study.title}, in the region shown by sweep view"
+    return to_toml(
+        replace(study, question=question, axes=axes, fixed={**study.fixed, **held}, summary=None, **settings)
+    )
 
 
-def _head(study: Study, held: dict[str, Axis], place: dict[str, int]) -> Iterator[str]:
-    yield f"# {study.question or study.title or study.kernel_name}"
-    yield "# The region shown by sweep view."
-    yield f"title = {_word(study.title)}"
-    yield f"kernel = {_word(study.kernel_name)}"
-    given = {"method": study.method, "rtol": study.rtol}
-    given |= {name: _held_value(axis, place[name]) for name, axis in held.items() if name in given}
-    yield from (f"{name} = {_value(value)}" for name, value in given.items() if name not in study.axes or name in held)
-    yield f"outputs = {_value(list(study.outputs))}"
-
-
-def _axis(study: Study, axis: Axis, wanted: Range | None) -> Iterator[str]:
-    yield from ("", f"[axes.{axis.name}]")
-    if axis.words is not None:
-        yield f"values = {_value(list(axis.words))}"
-        return
+def _narrowed(study: Study, axis: Axis, wanted: Range | None) -> Axis:
+    """The part of an axis within a range, with more points; words, whole numbers and lists of lists as they are."""
+    field = {parameter.name: parameter for parameter in study.kernel.parameters}.get(axis.name)
     low, high = _clipped(axis.values, wanted)
-    integer = axis.name in _fields(study) and _fields(study)[axis.name].integer
-    if axis.values.ndim > 1 or integer or low == high:
-        near = axis.values if axis.values.ndim > 1 or low == high else axis.values[_within(axis.values, low, high)]
-        yield f"values = {_value(near.tolist())}"
-    else:
-        yield f"spacing = {_word('log' if is_logarithmic(axis.values) else 'linear')}"
-        yield f"start = {low!r}"
-        yield f"stop = {high!r}"
-        yield f"num = {max(POINTS, len(axis))}"
-    yield from _unit(study, axis.name)
-
-
-def _within(values: Any, low: float, high: float) -> Any:
-    return (values >= low) & (values <= high)
+    if axis.words is not None or axis.values.ndim > 1 or low == high or (field is not None and field.integer):
+        near = (axis.values >= low) & (axis.values <= high) if axis.words is None and axis.values.ndim == 1 else None
+        return replace(axis, entry=None, values=axis.values if near is None else axis.values[near])
+    spacing = "log" if is_logarithmic(axis.values) else "linear"
+    entry: dict[str, Any] = {"spacing": spacing, "start": low, "stop": high, "num": max(POINTS, len(axis))}
+    entry |= {"unit": field.unit} if field is not None else {}
+    return replace(axis, spacing=spacing, entry=entry)
 
 
 def _clipped(values: Any, wanted: Range | None) -> Range:
@@ -136,49 +117,6 @@ def _clipped(values: Any, wanted: Range | None) -> Range:
     return (max(low, float(first)), min(high, float(last))) if first < high and last > low else (low, high)
 
 
-def _fixed(study: Study, held: dict[str, Axis], place: dict[str, int]) -> Iterator[str]:
-    fields = _fields(study)
-    values: dict[str, Any] = {name: _chosen(fields[name], value) for name, value in study.fixed.items()}
-    values |= {name: _held_value(axis, place[name]) for name, axis in held.items() if name in fields}
-    if values:
-        yield from ("", "[fixed]")
-    for name, value in values.items():
-        unit = "" if isinstance(value, str) else f", unit = {_word(fields[name].unit)}"
-        yield f"{name} = {{ value = {_value(value)}{unit} }}" if unit else f"{name} = {_value(value)}"
-
-
-def _chosen(field: Field, value: Any) -> Any:
-    """The word of a parameter with choices; other values as they are."""
-    return {number: word for word, number in field.choices.items()}[int(value)] if field.choices else value
-
-
-def _along(study: Study) -> Iterator[str]:
-    units = {field.name: field.unit for field in study.kernel.along}
-    for name, values in study.along.items():
-        if len(values):
-            yield from ("", f"[along.{name}]", f"values = {_value(values.tolist())}", f"unit = {_word(units[name])}")
-
-
-def _unit(study: Study, name: str) -> Iterator[str]:
-    if name in _fields(study):
-        yield f"unit = {_word(_fields(study)[name].unit)}"
-
-
-def _fields(study: Study) -> dict[str, Field]:
-    return {field.name: field for field in study.kernel.parameters}
-
-
 def _held_value(axis: Axis, place: int) -> Any:
-    return axis.words[place] if axis.words else axis.values[place].tolist()
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, str):
-        return _word(value)
-    if isinstance(value, (list, np.ndarray)):
-        return f"[{', '.join(_value(entry) for entry in value)}]"
-    return repr(float(value))
-
-
-def _word(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
+    """The value of an axis that is held: of methods the word, of parameters the number."""
+    return axis.words[place] if axis.words and axis.name in SETTINGS else axis.values[place]

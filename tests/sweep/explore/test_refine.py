@@ -6,7 +6,6 @@ from scipy.interpolate import LinearNDInterpolator
 
 import sweep
 from sweep.cli import main
-from sweep.explore.refine import _Refiner
 from sweep.system.errors import SweepError
 
 
@@ -31,9 +30,9 @@ def test_a_curve_is_interpolated_as_right_as_asked():
     mu = np.exp(np.random.default_rng(1).uniform(np.log(1e-3), np.log(1e5), 300))
     truth = sweep.run(sweep.build_study(kernel="foliot", axes={"mu": mu}, fixed={"phi0": 1.0, "a": 1.0})).period
     guess = np.exp(np.interp(np.log(mu), np.log(ds.mu.values), np.log(ds.period.values)))
-    assert float(abs(guess / truth - 1).max()) < 1.2e-4
-    assert found.dataset.sizes["cell"] < found.uniform / 1.5
-    assert found.dataset.sizes["cell"] == 9 + found.added
+    assert float(abs(guess / truth - 1).max()) < 1e-4
+    assert found.dataset.sizes["mu"] < found.uniform / 1.5
+    assert found.dataset.sizes["mu"] == 9 + found.added
 
 
 def test_a_tighter_tolerance_costs_more_cells_as_the_square_root():
@@ -68,33 +67,20 @@ def test_beside_a_border_of_statuses_a_curve_is_interpolated_as_right_as_elsewhe
     axis = {"spacing": "log", "start": 1e-2, "stop": 1e4, "num": 5}
     found = sweep.refine(sweep.run(sweep.build_study(kernel="foliot", axes={"mu": axis}, **keys)), "period", 1e-3)
     assert found.complete
-    ds = found.dataset.isel(cell=np.flatnonzero(found.dataset.status == 0)).sortby("mu")
+    ds = found.dataset.isel(mu=np.flatnonzero(found.dataset.status == 0)).sortby("mu")
     assert 0.1 < float(ds.mu[0]) < 0.1 * 1.1  # the border is followed
     mu = np.exp(np.random.default_rng(1).uniform(np.log(ds.mu.values[0]), np.log(1e4), 500))
     truth = sweep.run(sweep.build_study(kernel="foliot", axes={"mu": mu}, **keys)).period
     guess = np.exp(np.interp(np.log(mu), np.log(ds.mu.values), np.log(ds.period.values)))
-    assert float(abs(guess / truth - 1).max()) < 1.2e-3
-
-
-def test_an_output_that_changes_its_sign_between_two_cells_is_followed():
-    boxes = _Refiner.__new__(_Refiner)
-    boxes.size, boxes.rows = np.array([2.0]), {(0,): 0, (1,): 1, (2,): 2}
-    boxes.values = [np.array([0.0, value]) for value in (2.0, -1.0, 1.0)]
-    assert boxes._off((0,), 1) == pytest.approx(2.5 / 2)  # not a NaN that is passed over
-    boxes.values = [np.array([0.0, value]) for value in (1.0, 2.0, 4.0)]
-    assert boxes._off((0,), 1) < 1e-15
-    boxes.values = [np.array([0.0, value]) for value in (1e-320, 0.0, 1e-320)]
-    assert boxes._off((0,), 1) < 1e-300
-    boxes.values = [np.array([status, 1.0]) for status in (0.0, 65.0, 0.0)]
-    assert boxes._off((0,), 1) == np.inf
+    assert float(abs(guess / truth - 1).max()) < 1e-3
 
 
 def test_a_grid_that_is_fine_enough_stays_as_it_is():
     study = toy([1.0, 2.0, 4.0, 8.0], [1e-9, 2e-9, 4e-9])
     ds = sweep.run(study)
     found = sweep.refine(ds, "fall_time", 1e-3, study=study)
-    assert (found.added, found.tried) == (0, 7 * 5 - 12)
-    assert found.uniform == found.dataset.sizes["cell"] == 12
+    assert found.added == 0
+    assert found.dataset.sizes["cell"] == 12
     np.testing.assert_array_equal(found.dataset.fall_time, ds.fall_time.values.ravel())
     assert found.complete
     assert found.error < 1e-8
@@ -108,22 +94,22 @@ def test_cells_are_added_where_it_bends_alone():
     found = sweep.refine(ds, "fall_time", 3e-2, study=study)
     added = sorted(set(found.dataset.height.values) - set(ds.height.values))
     assert found.complete
-    assert 0 < found.added < found.tried
-    assert 0.5 < added[0] < added[-1] < 5000
+    assert found.added > 0
+    assert 5e-3 < added[0] < added[-1] < 5e5  # the grid reaches from 5e-5 to 5e7
 
 
-def test_joined_cells_are_those_of_a_zip_study_and_can_be_run_again():
+def test_joined_cells_are_those_of_a_study_and_can_be_run_again():
     found = sweep.refine(sweep.run(foliot(mu=(1e-3, 1e3, 5))), "period", 1e-2)
     study = sweep.study_of(found.dataset)
     again = sweep.run(study)
     np.testing.assert_array_equal(again.period, found.dataset.period)
-    assert len(np.unique(found.dataset.mu)) == found.dataset.sizes["cell"]
+    assert (np.diff(found.dataset.mu) > 0).all()
 
 
 def test_too_few_cells_allowed_is_told():
     found = sweep.refine(sweep.run(foliot(mu=(1e-3, 1e3, 5))), "period", 1e-6, most_cells=40)
     assert not found.complete
-    assert found.dataset.sizes["cell"] <= 40
+    assert found.dataset.sizes["mu"] <= 40
     assert "allow more cells" in str(found)
     assert found.error > 1e-6  # what is left is told
 
