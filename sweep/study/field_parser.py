@@ -299,8 +299,8 @@ class FieldParser:
 
 def _entry(table: Mapping[str, Any]) -> dict[str, Any]:
     """What a study says of an axis that it does not list: words as they are, numbers as float64."""
-    kinds: dict[str, Callable[[Any], Any]] = {"spacing": str, "unit": str, "num": int}
-    return {key: kinds.get(key, float)(value) for key, value in table.items()}
+    kinds: dict[str, Callable[[Any], Any]] = {"spacing": str, "unit": str, "num": int, "start": float, "stop": float}
+    return {key: kinds[key](value) for key, value in table.items() if key in kinds}
 
 
 def _number(found: Any, field: Field | None) -> float:
