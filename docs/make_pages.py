@@ -186,7 +186,7 @@ def _entry(name: str, script: Path) -> Iterator[str]:
 
 
 def _commands() -> Iterator[str]:
-    yield from ("# Commands", "", "`sweep COMMAND --help` prints the same.", "")
+    yield from ("# All commands", "", "`sweep COMMAND --help` prints the same.", "")
     for name, command in COMMANDS.items():
         yield from (f"## sweep {name}", "", f"{_plain(command.text[0].upper() + command.text[1:])}.", "")
         yield from _table(("argument", "what it does"), map(_option, command.options))
