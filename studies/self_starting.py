@@ -110,10 +110,11 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
     ds = read_result(path, "foliot_start", ["a", "k", "R_s", "phi_start", "mu"], "self_starting.toml")
     stiff = ds.sel(k=1.5, R_s=0.6)
     ends = [float(least(stiff).isel(phi_start=i)) for i in (0, -1)]
-    words = paragraph(f"""Figure. Where a foliot with Coulomb friction R = 0.2 and stiction R_s = 0.6, in units of phi0 and
-        1/s, starts itself. Without a hairspring stiction alone decides, mu > R_s, wherever it rests. With k = 1.5 the least
-        torque rises with the angle of release from {ends[0]:.2f} to {ends[1]:.2f}, and viscous friction (a = 1/s) costs
-        some of it, but no foliot rests for whom mu > R + k phi0 and the spring at release and stiction are beaten.""")
+    words = paragraph(f"""Figure. Where a foliot with Coulomb friction R = 0.2 and stiction R_s = 0.6, in units of phi0
+        and 1/s, starts itself. Without a hairspring stiction alone decides, mu > R_s, wherever it rests. With k = 1.5
+        the least torque rises with the angle of release from {ends[0]:.2f} to {ends[1]:.2f}, and viscous friction, a =
+        1/s, costs some of it, but no foliot rests for whom mu > R + k phi0 and the spring at release and stiction are
+        beaten.""")
     return statements(ds), [NOTES, *words], figure(ds)
 
 
