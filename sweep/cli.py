@@ -272,6 +272,13 @@ def _plot(arguments: argparse.Namespace) -> None:
     _print(output)
 
 
+def _view(arguments: argparse.Namespace) -> None:
+    from sweep.view.server import serve
+
+    _result(arguments).close()
+    serve(arguments.result, arguments.port, not arguments.no_browser)
+
+
 def _chart(arguments: argparse.Namespace) -> None:
     from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
     from sweep.show.charts import plot_precision
@@ -606,6 +613,13 @@ COMMANDS = {
         option("--y", "default: the first output", metavar="OUTPUT"),
         option("--x", "default: the first axis", metavar="AXIS"),
         *(AT, UNITS),
+    ),
+    "view": Command.of(
+        "look at a result in the browser: any two axes, sliders for the others",
+        _view,
+        RESULT,
+        option("--port", "of this machine; default: a free one", metavar="N", type=int, default=0),
+        switch("--no-browser", "only say where the page is"),
     ),
     "chart": Command.of(
         "error against time of every method of a kernel, on the cells of a study or a result",

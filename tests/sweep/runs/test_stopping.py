@@ -145,8 +145,8 @@ def test_the_exit_status_says_what_became_of_the_run(command):
     assert all(re.search(rf"^ *{code}  {re.escape(text)}$", told, re.MULTILINE) for code, text in EXIT_CODES.items())
 
 
-def test_the_readme_has_the_same_table():
-    text = (Path(__file__).parents[3] / "README.md").read_text()
+def test_the_page_of_exit_statuses_has_the_same_table():
+    text = (Path(__file__).parents[3] / "docs" / "exit_codes.md").read_text()
     assert all(f"| {code} | {meaning} |" in text for code, meaning in EXIT_CODES.items())
 
 
