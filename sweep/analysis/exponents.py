@@ -72,10 +72,10 @@ def local_exponent_error(y: xr.DataArray, dim: str, bound: Any = None) -> xr.Dat
     """Error bar of `local_exponent` [1], which knows the sampling and the stated errors, and finds noise by itself.
 
     Where the values carry independent noise, it is half the interval of 95 % confidence, wider for runs of fewer than
-    20 points (`benchmarks/honesty/coverage.py` measures it). Where they do not, it is more than the error that the
-    spacing leaves, typically 20 times as much: the local exponent by five points is tried by that through seven, and
-    where a bend is within a step, by the slopes of the steps beside it; next to a pole by all steps it is made of. What
-    errors up to `bound` can do is added.
+    20 points (`benchmarks/honesty/interval_coverage.py` measures it). Where they do not, it is more than the error that
+    the spacing leaves, typically 20 times as much: the local exponent by five points is tried by that through seven,
+    and where a bend is within a step, by the slopes of the steps beside it; next to a pole by all steps it is made
+    of. What errors up to `bound` can do is added.
 
     Parameters
     ----------

@@ -28,6 +28,10 @@ FEWEST_POINTS = 8
 TELLING = 16
 """Points from which noise is told from the misfit of a smooth truth."""
 
+OTHER_SHAPES = 20.0
+"""Difference of AICc from which on a bend of another shape is ruled out; more than for a second law, since the truth
+may be between the shapes that are tried."""
+
 LAWS = ("low", "high")
 EXPONENTS = ("exponent", "exponent_low", "exponent_high")
 """Numbers of each law,"""
@@ -69,7 +73,7 @@ def fit_two_laws(
     two, and to where the tangents at the ends meet. What noise there is beneath is added.
 
     Where noise hides how far the truth is from (1), the intervals reach over those of bends of other shapes that the
-    points do not rule out (AICc within 10): hyperbolic, asymmetric, of two widths, stretched. They are wider than 95
+    points do not rule out (AICc within 20): hyperbolic, asymmetric, of two widths, stretched. They are wider than 95
     % for a truth like (1), and no promise for a truth like none of them.
 
     Parameters
@@ -271,7 +275,7 @@ def _of_other_bends(t: Array, z: Array, off: Array, low: Array, high: Array, con
     low, high = low.copy(), high.copy()
     span = t[-1] - t[0]
     for found in tried:
-        if found.aicc > best + BEYOND_DOUBT:
+        if found.aicc > best + OTHER_SHAPES:
             continue
         count = len(found.law.grids)
         q, slopes_there = found.numbers[0], found.numbers[count + 1 : count + 3]

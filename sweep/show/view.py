@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from sweep.analysis.loglog import is_logarithmic
 from sweep.analysis.scattered import Box, axes_of, interpolated
 from sweep.results.statuses import flag_words
 from sweep.study.mistakes import did_you_mean
@@ -29,6 +30,9 @@ FAMILY = 8
 
 POINTS, PIXELS = 20_000, 2_000
 """Points along a line and cells along the side of a map that are drawn; beyond, every second, third ... one."""
+
+HARD_SPACE = "\u00a0"
+"""Where no line is broken."""
 
 SIDE = 201
 """Cells along the sides of a map of cells that lie anywhere."""
@@ -157,6 +161,14 @@ def is_number_axis(y: xr.DataArray, name: str) -> bool:
     return coordinate(y, name).dtype.kind in "fiu"
 
 
+def edges(grid: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Edges of the cells around the points of a grid, (n + 1,): halfway; of a logarithmic grid in logarithms."""
+    at = np.log(grid) if is_logarithmic(grid) else grid
+    middle = (at[1:] + at[:-1]) / 2 if at.size > 1 else at + 0.5
+    around = np.concatenate([[2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]])
+    return np.exp(around) if is_logarithmic(grid) else around
+
+
 def symbol(name: str) -> str:
     """Mathematical form of a parameter's name, "" if it is a word: mu, phi0 and R_s, but not period."""
     letter, _, index = name.partition("_")
@@ -175,18 +187,19 @@ def unit_text(unit: str) -> str:
 
 
 def label(variable: xr.DataArray, width: int = 44) -> str:
-    """Text for an axis: long name, symbol, unit; in lines of so many letters."""
+    """Text for an axis: long name, symbol, unit; in lines of so many letters, none of which begins with the unit."""
     name = str(variable.name)
     sign, unit = symbol(name), unit_text(str(variable.attrs.get("units", "")))
     words = str(variable.attrs.get("long_name", "")) or ("" if sign else name.replace("_", " "))
-    text = ", ".join(part for part in (words, sign) if part) + (f" [{unit}]" if unit else "")
+    text = ", ".join(part for part in (words, sign) if part)
+    text = f"{text}{HARD_SPACE}[{unit.replace(' ', HARD_SPACE)}]" if unit else text
     signs = re.findall(r"\$.*?\$", text)
     for sign in signs:  # a few letters in print, whatever they are in writing
         text = text.replace(sign, "\0\0", 1)
     wrapped = "\n".join(textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False))
     for sign in signs:
         wrapped = wrapped.replace("\0\0", sign, 1)
-    return wrapped
+    return wrapped.replace(HARD_SPACE, " ")
 
 
 def setting(value: xr.DataArray) -> str:

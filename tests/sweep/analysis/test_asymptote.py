@@ -5,6 +5,8 @@ import pytest
 import xarray as xr
 
 import sweep
+from sweep.analysis.asymptote import _outer
+from sweep.analysis.shapes import CORRECTION, fitted
 from sweep.system.errors import SweepError
 
 X = np.geomspace(0.8, 1e4, 41)
@@ -53,6 +55,16 @@ def test_the_profile_is_that_of_lmfit():
     ends = lmfit.conf_interval(fit, fit, p_names=["p"], sigmas=[0.95])["p"]
     assert float(found.exponent_low) == pytest.approx(ends[0][1], abs=2e-3 * abs(ends[2][1] - ends[0][1]) + 2e-4)
     assert float(found.exponent_high) == pytest.approx(ends[2][1], abs=2e-3 * abs(ends[2][1] - ends[0][1]) + 2e-4)
+
+
+def test_it_makes_no_difference_which_of_the_two_powers_the_fit_calls_the_law():
+    """A e^(p s) (1 + B e^(-D (s - 1/2))) is A B e^(D/2) e^((p - D) s) (1 + e^(D (s - 1/2))/B)."""
+    t = np.log(X)
+    found = fitted(CORRECTION, t, np.log(X**-0.5 * (1 + 0.8 * X**-0.4)))
+    strength, fade, level, slope = found.numbers
+    other = found._replace(numbers=np.array([1 / strength, -fade, level, slope - fade]))
+    np.testing.assert_allclose(_outer(other, t), _outer(found, t), rtol=1e-12)
+    np.testing.assert_allclose(_outer(other, t)[:2], [-0.5, 0.4], atol=1e-6)
 
 
 def test_a_plateau_is_found_where_there_is_one():

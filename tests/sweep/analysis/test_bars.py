@@ -1,7 +1,7 @@
 """Error bars on data that are not shaped like the model's own: each share here was far below 95 % for independent
 noise.
 
-40 to 60 sets a case have a standard error of about 3 %; benchmarks/honesty/coverage.py does 10000.
+40 to 60 sets a case have a standard error of about 3 %; benchmarks/honesty/interval_coverage.py does 10000.
 """
 
 import subprocess
@@ -13,6 +13,7 @@ import xarray as xr
 
 import sweep
 from sweep.analysis.lines import KIND_WORDS
+from sweep.analysis.loglog import slope_bounds
 from sweep.system.errors import SweepError
 
 SETS = 60
@@ -134,6 +135,12 @@ def test_the_bar_of_the_local_exponent_knows_what_values_are_right_to():
     assert float(sweep.local_exponent_error(y, "mu", bound=0.0).median()) < float(
         sweep.local_exponent_error(y, "mu").median()
     )
+
+
+def test_what_stated_errors_can_do_to_a_slope_is_all_that_the_textbooks_weights_allow():
+    """(1, -8, 0, 8, -1)/12h: errors of the worst signs move it by 18/12h."""
+    t = np.linspace(0, 1, 11)
+    np.testing.assert_allclose(slope_bounds(t, np.full(11, 1e-3), 5)[2:-2], 1.5e-3 / 0.1, rtol=1e-12)
 
 
 @pytest.mark.parametrize("shift", [0.01, 0.1, 0.3, 0.5, 0.7])

@@ -45,7 +45,7 @@ def test_the_law_it_is_made_of_is_found_to_rounding(low, high, decades):
 
 @pytest.mark.parametrize(("size", "decades"), [(0.01, 0.3), (0.03, 0.1)])
 def test_intervals_hold_the_truth_about_as_often_as_they_say(size, decades):
-    """80 sets: a standard error of 2.4 %; benchmarks/honesty/coverage.py does 10000."""
+    """80 sets: a standard error of 2.4 %; benchmarks/honesty/interval_coverage.py does 10000."""
     found = sweep.fit_two_laws(curve(noisy(broken(decades=decades), size), dims=("set", "mu")), "mu")
     shares = [
         covered(found.sel(law="low"), "exponent", -1.0),

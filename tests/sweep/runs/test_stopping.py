@@ -83,6 +83,20 @@ def test_a_kernel_that_never_ends_does_not_keep_a_run_from_it(begun, number, opt
     assert last == f"ended with {128 + number}: stopped"
 
 
+def test_of_a_run_that_is_killed_no_process_is_left(begun):
+    """Not even one in a kernel that never lets Python run."""
+    psutil = pytest.importorskip("psutil")
+    process, output = begun("bad:HOGGING", 60, "--cell-timeout", "10 min")
+    wait_for(lambda: log_path(output).exists() and "begins" in log_path(output).read_text(), process)
+    time.sleep(3.0)
+    below = psutil.Process(process.pid).children(recursive=True)
+    assert len(below) >= 3
+    process.kill()
+    process.wait()
+    _, left = psutil.wait_procs(below, timeout=20)
+    assert left == []
+
+
 def test_it_ends_at_its_time_although_kernels_never_do(begun):
     at = datetime.now() + timedelta(seconds=8)
     process, _ = begun("bad:ENDLESS", 100, "--cell-timeout", "10 min", "--until", at.isoformat())
@@ -131,8 +145,8 @@ def test_the_exit_status_says_what_became_of_the_run(command):
     assert all(re.search(rf"^ *{code}  {re.escape(text)}$", told, re.MULTILINE) for code, text in EXIT_CODES.items())
 
 
-def test_the_readme_has_the_same_table():
-    text = (Path(__file__).parents[3] / "README.md").read_text()
+def test_the_page_of_exit_statuses_has_the_same_table():
+    text = (Path(__file__).parents[3] / "docs" / "exit_codes.md").read_text()
     assert all(f"| {code} | {meaning} |" in text for code, meaning in EXIT_CODES.items())
 
 

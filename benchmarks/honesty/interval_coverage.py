@@ -1,6 +1,6 @@
 """How often 95 % intervals hold the truth, on data that are not shaped like a model's own, beside other tools.
 
-python benchmarks/honesty/coverage.py [--sets 40] [--only PART]      10000 sets have a standard error of 0.2 %
+python benchmarks/honesty/interval_coverage.py [--sets 40] [--only PART]    10000 sets have a standard error of 0.2 %
 
 Columns: share of intervals that hold the truth, their median width, and the same of what others give by default:
 statsmodels (OLS, and with HAC errors), scipy.stats.linregress, lmfit, piecewise-regression, pwlf. A promise is kept
