@@ -17,6 +17,8 @@ from sweep.analysis.loglog import slope_bounds
 from sweep.system.errors import SweepError
 
 SETS = 60
+MANY = 300
+"""Where a share is asked for within some per cent."""
 
 
 def axis(n, span=7.0):
@@ -78,7 +80,7 @@ def test_noise_that_remembers_is_in_the_bar(phi, n):
 
 def test_outliers_count_less():
     rng, t = np.random.default_rng(3), axis(60)
-    y = curve(t, -0.5 * t + outlying(t, SETS, rng))
+    y = curve(t, -0.5 * t + outlying(t, MANY, rng))
     found, plain = sweep.fit_exponent(y, "mu"), sweep.fit_exponent(y, "mu", noise="independent")
     assert share(found, "exponent", -0.5) > 0.9
     error, before = (float(np.sqrt(((f.exponent + 0.5) ** 2).mean())) for f in (found, plain))
@@ -87,7 +89,7 @@ def test_outliers_count_less():
 
 def test_the_bar_of_even_noise_is_not_much_wider_than_it_need_be():
     rng, t = np.random.default_rng(4), axis(60)
-    y = curve(t, -0.5 * t + 0.02 * rng.standard_normal((SETS, 60)))
+    y = curve(t, -0.5 * t + 0.02 * rng.standard_normal((MANY, 60)))
     found, plain = sweep.fit_exponent(y, "mu"), sweep.fit_exponent(y, "mu", noise="independent")
     wide, narrow = (float((f.exponent_high - f.exponent_low).median()) for f in (found, plain))
     assert 1.0 <= wide / narrow < 1.25
