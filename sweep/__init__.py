@@ -6,13 +6,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sweep.analysis.exponents import crossover as crossover
+    from sweep.analysis.asymptote import exponent_by_window as exponent_by_window
+    from sweep.analysis.asymptote import fit_correction as fit_correction
+    from sweep.analysis.collapse import fit_collapse as fit_collapse
+    from sweep.analysis.collapse import fit_over as fit_over
+    from sweep.analysis.compare import compare_laws as compare_laws
+    from sweep.analysis.curves import stated_error as stated_error
     from sweep.analysis.exponents import exponent as exponent
-    from sweep.analysis.exponents import fit_exponent as fit_exponent
     from sweep.analysis.exponents import local_exponent as local_exponent
     from sweep.analysis.exponents import local_exponent_error as local_exponent_error
     from sweep.analysis.exponents import where_exponent as where_exponent
     from sweep.analysis.exponents import where_value as where_value
+    from sweep.analysis.lines import crossover as crossover
+    from sweep.analysis.lines import fit_exponent as fit_exponent
     from sweep.analysis.maps import contours as contours
     from sweep.analysis.maps import exponent_map as exponent_map
     from sweep.analysis.scattered import interpolated as interpolated
@@ -36,6 +42,7 @@ if TYPE_CHECKING:
     from sweep.runs.run import run as run
     from sweep.show.charts import plot as plot
     from sweep.show.charts import plot_precision as plot_precision
+    from sweep.show.law_charts import plot_laws as plot_laws
     from sweep.study.read import build_study as build_study
     from sweep.study.read import read_study as read_study
     from sweep.study.toml import to_toml as to_toml
@@ -52,9 +59,14 @@ _PUBLIC = {
     "results.units": ("in_units",),
     "results.export": ("export",),
     "analysis.exponents": (
-        *("local_exponent", "local_exponent_error", "exponent", "fit_exponent"),
-        *("crossover", "where_exponent", "where_value"),
+        *("local_exponent", "local_exponent_error", "exponent"),
+        *("where_exponent", "where_value"),
     ),
+    "analysis.lines": ("fit_exponent", "crossover"),
+    "analysis.asymptote": ("fit_correction", "exponent_by_window"),
+    "analysis.compare": ("compare_laws",),
+    "analysis.collapse": ("fit_over", "fit_collapse"),
+    "analysis.curves": ("stated_error",),
     "analysis.two_laws": ("fit_two_laws",),
     "analysis.maps": ("contours", "exponent_map"),
     "results.diff": ("diff",),
@@ -67,6 +79,7 @@ _PUBLIC = {
     "explore.work_precision": ("work_precision",),
     "explore.refine": ("refine", "study_of"),
     "show.charts": ("plot", "plot_precision"),
+    "show.law_charts": ("plot_laws",),
     "system.errors": ("SweepError", "StudyError"),
 }
 _HOMES = {name: home for home, names in _PUBLIC.items() for name in names}

@@ -216,16 +216,43 @@ def _fit(arguments: argparse.Namespace) -> None:
     from sweep.analysis.scattered import on_lines
     from sweep.show.laws import laws, laws_text, pick, write_laws
 
+    if arguments.compare:
+        _compare(arguments)
+        return
     if arguments.output:
         _check_target(arguments, arguments.output, "laws")
     with _result(arguments) as dataset:
         part = on_lines(pick(dataset, arguments.at), arguments.x)
-        noise = {None: None, "yes": True, "no": False}[arguments.noise]
+        noise = {"yes": True, "no": False}.get(arguments.noise, arguments.noise)
         found = laws(part, arguments.y, arguments.x, arguments.window or [], arguments.confidence, noise)
     _print(laws_text(found))
     if arguments.output:
         write_laws(found, arguments.output)
         _print(arguments.output)
+
+
+def _compare(arguments: argparse.Namespace) -> None:
+    """`sweep fit --compare`: a table, and a picture or csv of it."""
+    from sweep.analysis.scattered import on_lines
+    from sweep.show.compare import comparison, comparison_text, write_comparison
+    from sweep.show.laws import pick
+
+    target = arguments.output
+    drawn = target is not None and target.suffix.lower() != ".csv"
+    if target:
+        _check_target(arguments, target, None if drawn else "laws")
+    with _result(arguments) as dataset:
+        part = on_lines(pick(dataset, arguments.at), arguments.x)
+        found = comparison(part, arguments.y, arguments.x, arguments.window or [])
+    _print(comparison_text(found))
+    if drawn:
+        from sweep.show.law_charts import plot_laws
+
+        plot_laws(found, target)
+    elif target:
+        write_comparison(found, target)
+    if target:
+        _print(target)
 
 
 def _plot(arguments: argparse.Namespace) -> None:
@@ -547,10 +574,11 @@ COMMANDS = {
         option("--confidence", "of the intervals; default: 0.95", type=float, default=0.95, metavar="SHARE"),
         option(
             "--noise",
-            "whether the values carry independent noise; default: as their scatter shows",
-            choices=("yes", "no"),
+            "whether the values scatter, or how; default: as tests find",
+            choices=("yes", "no", "independent", "uneven", "correlated", "outliers"),
         ),
-        output("FILE.csv", "also write the table"),
+        switch("--compare", "which law: one, two or three, a logarithm, an offset, a correction to scaling"),
+        output("FILE.csv|.png", "also write the table; with --compare, .png, .svg or .pdf is a picture of all laws"),
         *(FORCE, AT, UNFINISHED),
     ),
     "plot": Command.of(

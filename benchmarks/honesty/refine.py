@@ -83,7 +83,7 @@ def refined(function, axes, tolerance):
 
 
 def true_error(function, points, values):
-    """Largest error of straight lines, over the largest value; of borders the share of places between unlike ones."""
+    """Largest error of straight lines, over the largest value; of borders the share of places beside unlike corners."""
     places = np.random.default_rng(5).random((PLACES[points.shape[1]], points.shape[1]))
     if points.shape[1] == 1:
         right = np.clip(np.searchsorted(np.sort(points[:, 0]), places[:, 0]), 1, len(points) - 1)

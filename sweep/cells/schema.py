@@ -137,6 +137,8 @@ def attributes(study: Study, fingerprint: Mapping[str, str]) -> dict[str, Any]:
 
 def _output(field: Field, study: Study) -> Column:
     attrs = {**_field_attrs(field), "ancillary_variables": " ".join(ANCILLARY)}
+    if "rtol" not in study.axes:
+        attrs["rtol"] = study.rtol  # so that an output taken by itself says what it is right to
     return Column(field.name, "f8", field.dims, study.shape(field), attrs)
 
 

@@ -24,12 +24,14 @@ Indices = NDArray[np.intp]
 AROUND = {1: 4, 2: 12, 3: 20}
 """Cells around a simplex that are taken, beside its corners; with more axes twice the unknowns."""
 SAFETY = 1.6
-"""Times the parabola's error: what a kink between cells can be worse, nearly."""
+"""Times the parabola's error."""
 MISFIT = 2.5
-"""Times what the parabola leaves."""
+"""Times what the parabola leaves: a kink right in the middle between cells of one axis is told a quarter short."""
 LEAST_BASIS = 0.3
 """Of (1) with all c_ij = 1 in a cell around; its inverse is the weight of that cell."""
-RIDGE = 1e-6
+NEARLY = 0.9
+"""Share of the largest bend of an edge."""
+RIDGE = 1e-12
 BATCH = 20_000
 
 
@@ -52,14 +54,30 @@ def interpolation_errors(points: Array, heights: Array, corners: Indices) -> Err
     pairs = edges(points.shape[1])
     if len(points) < points.shape[1] + 1 + len(pairs):
         return _cut_longest(points, corners, pairs)
-    tree = cKDTree(points)
+    tree, beyond = cKDTree(points), _beyond(corners)
     parts = [
-        _of_batch(points, heights, corners[start : start + BATCH], tree, pairs)
+        _of_batch(points, heights, corners[start : start + BATCH], beyond[start : start + BATCH], tree, pairs)
         for start in range(0, len(corners), BATCH)
     ]
     if not parts:
         return Errors(np.empty(0), np.empty(0, np.intp), np.empty(0, np.intp))
     return Errors(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def _beyond(corners: Indices) -> Indices:
+    """Corners that lie beyond the faces of each simplex, and beyond those of its neighbours there; where there are
+    none, its first one. However thin simplices are, some lie to every side."""
+    count, size = corners.shape
+    faces = np.stack([np.delete(corners, k, axis=1) for k in range(size)], axis=1).reshape(-1, size - 1)
+    faces.sort(axis=1)
+    order = np.lexsort(faces.T)
+    same = np.flatnonzero((faces[order[1:]] == faces[order[:-1]]).all(axis=1))
+    other = np.full(count * size, -1)
+    other[order[same]], other[order[same + 1]] = order[same + 1], order[same]
+    other = other.reshape(count, size)
+    opposite = np.where(other < 0, corners[:, :1], corners.ravel()[other])
+    neighbour = np.where(other < 0, np.arange(count)[:, None], other // size)
+    return np.concatenate([opposite, opposite[neighbour].reshape(count, -1)], axis=1)
 
 
 def _cut_longest(points: Array, corners: Indices, pairs: Indices) -> Errors:
@@ -74,12 +92,14 @@ def lengths(points: Array, corners: Indices, pairs: Indices) -> Array:
     return found
 
 
-def _of_batch(points: Array, heights: Array, corners: Indices, tree: cKDTree, pairs: Indices) -> Errors:
+def _of_batch(
+    points: Array, heights: Array, corners: Indices, beyond: Indices, tree: cKDTree, pairs: Indices
+) -> Errors:
     axes = points.shape[1]
     place = points[corners]
     centre = place.mean(axis=1)
     number = min(len(points), axes + 1 + AROUND.get(axes, 2 * len(pairs)))
-    near = tree.query(centre, number)[1]
+    near = np.concatenate([tree.query(centre, number)[1], beyond], axis=1)
     shares = _shares(place, points[near])
     off = heights[near] - np.einsum("sni,sio->sno", shares, heights[corners])
     basis = shares[:, :, pairs[:, 0]] * shares[:, :, pairs[:, 1]]
@@ -89,8 +109,16 @@ def _of_batch(points: Array, heights: Array, corners: Indices, tree: cKDTree, pa
     middle = abs(bend) / 4
     inside = abs(bend.sum(axis=1)) / (axes + 1) ** 2
     size = (SAFETY * np.maximum(middle.max(axis=1), inside) + MISFIT * misfit).max(axis=1)
-    worst = middle.max(axis=2).argmax(axis=1)
+    worst = _shortest(middle.max(axis=2), lengths(points, corners, pairs))
     return Errors(size, pairs[worst, 0], pairs[worst, 1])
+
+
+def _shortest(bends: Array, length: Array) -> Indices:
+    """Of the edges that bend nearly as much as any, the shortest: a diagonal bends as its sides do, which lie along
+    the axes that need a cut."""
+    nearly = bends >= NEARLY * bends.max(axis=1, keepdims=True)
+    found: Indices = np.where(nearly, length, np.inf).argmin(axis=1)
+    return found
 
 
 def _shares(place: Array, near: Array) -> Array:

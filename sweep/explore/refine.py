@@ -85,7 +85,7 @@ class Refinement:
         if self.error > self.tolerance:
             text += "; the tolerance is not met everywhere, allow more cells"
         if self.jumps:
-            text += f"; not in {self.jumps:,} places where it jumps or diverges"
+            text += f"; not in {self.jumps:,} place{'s' * (self.jumps > 1)} where it jumps or diverges"
         apart = ", ".join(f"{width} in {name}" for name, width in self.unseen.items())
         return f"{text}\ncells are up to {apart} apart; a peak narrower than that is not seen"
 

@@ -1,11 +1,18 @@
 """Refined sweeps: interpolation as right as asked, borders followed, fewer cells than an even grid."""
 
+import dataclasses
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.interpolate import LinearNDInterpolator
+from toy import KERNEL as TOY
 
 import sweep
 from sweep.cli import main
+from sweep.explore.refine import _Output
 from sweep.system.errors import SweepError
 
 
@@ -165,3 +172,133 @@ def test_a_refinement_that_was_stopped_takes_up_its_rounds(tmp_path, monkeypatch
     monkeypatch.setattr("sweep.explore.refine.shutil.rmtree", lambda *given, **keys: None)
     sweep.refine(ds, "period", 1e-2, path="fine.h5")
     assert {p: p.stat().st_mtime_ns for p in (tmp_path / "fine.h5.rounds").iterdir()} == before
+
+
+def test_a_fine_grid_is_judged_before_anything_is_computed():
+    """1,401 cells: every second one of them proves 5e-5, by straight lines."""
+    ds = sweep.run(foliot(mu=(1e-3, 1e4, 1401)))
+    coarse = ds.isel(mu=slice(None, None, 2))
+    guess = np.exp(np.interp(np.log(ds.mu), np.log(coarse.mu), np.log(coarse.period)))
+    assert float(abs(guess / ds.period - 1).max()) < 5e-5
+    found = sweep.refine(ds, "period", 1e-4)
+    assert found.added == 0
+    assert found.complete
+    assert found.error < 5e-5
+
+
+def test_the_error_told_of_three_axes_holds():
+    def even(num):
+        axes = {n: {"spacing": "log", "start": 0.1, "stop": 10, "num": num} for n in ("mu", "a", "phi0")}
+        return sweep.run(sweep.build_study(kernel="foliot", axes=axes, outputs=["period"]))
+
+    found = sweep.refine(even(4), "period", 1e-1)
+    places = 10 ** np.random.default_rng(4).uniform(-1, 1, (3, 400))
+    keys = {"axes": dict(zip(("mu", "a", "phi0"), places, strict=True)), "design": "zip", "outputs": ["period"]}
+    truth = sweep.run(sweep.build_study(kernel="foliot", **keys)).period.values
+
+    def off(ds):
+        names = ("mu", "a", "phi0")
+        z = LinearNDInterpolator(np.log(np.stack([ds[n].values.ravel() for n in names], axis=1)), np.log(ds.period))
+        return np.nanmax(abs(np.exp(z(np.log(places.T))) / truth - 1))
+
+    assert found.complete
+    assert off(found.dataset) <= found.error
+
+
+def test_between_two_values_of_an_axis_a_third_is_computed_first():
+    found = sweep.refine(sweep.run(foliot(mu=(1e-2, 1e2, 2))), "period", 1e-2)
+    assert found.complete
+    assert found.added > 5
+    assert 1.0 in found.dataset.mu.values.round(12)
+
+
+def test_what_cannot_be_seen_is_said():
+    found = sweep.refine(sweep.run(foliot(mu=(1e-2, 1e2, 9))), "period", 1e-2)
+    assert "a peak narrower than that is not seen" in str(found)
+    mu = found.dataset.mu.values
+    assert found.unseen == {"mu": f"a factor {(mu[1:] / mu[:-1]).max():.3g}"}
+
+
+def test_a_jump_is_told_from_what_more_cells_would_mend():
+    kernel = dataclasses.replace(TOY, methods=(dataclasses.replace(TOY.methods[1], solve=_stepped),))
+    keys = {"axes": {"height": np.linspace(1.0, 2.0, 9)}, "outputs": ["fall_time"], "allow_import": True}
+    study = dataclasses.replace(sweep.build_study(kernel="toy:KERNEL", **keys), kernel=kernel)
+    found = sweep.refine(sweep.run(study), "fall_time", 1e-3, study=study)
+    assert not found.complete
+    assert 1 <= found.jumps < 10  # those beside it, too
+    assert found.error <= 1e-3
+    assert "where it jumps or diverges" in str(found)
+    height = found.dataset.height.values
+    assert np.diff(height).min() < 1e-6
+
+
+def _stepped(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
+    fall_time[...] = np.where(height < 1.37, 1.0, 2.0) + 0.1 * height**2
+    status[...] = 0
+
+
+def test_a_refined_result_of_two_axes_is_taken_by_every_command(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    sweep.run(foliot(mu=(1e-1, 1e2, 7), R=(1e-2, 10.0, 6)), "coarse.h5").close()
+    command = "refine coarse.h5 --y period --tolerance 5e-2 -o fine.h5 --most-cells 1500"
+    assert main(command.split()) == 0
+    for more in (
+        "verify fine.h5",
+        "show fine.h5",
+        "fit fine.h5 --y period --x mu --window 20 100",
+        "fit fine.h5 --y period --x mu --at R=0.01",
+        "plot fine.h5",
+        "plot fine.h5 --x mu -o points.png",
+        "report fine.h5",
+        "export fine.h5 -o fine.csv",
+        "chart fine.h5 --cells 32 --rtol 1e-6",
+        "refine fine.h5 --y period --tolerance 4e-2 -o finer.h5 --most-cells 2000",
+    ):
+        assert main(more.split()) == 0, more
+    told = capsys.readouterr().out
+    assert "cells are up to a factor" in told
+    fine, finer = sweep.open_result("fine.h5"), sweep.open_result("finer.h5")
+    assert fine.sizes["cell"] <= finer.sizes["cell"] <= 2000
+    both = set(zip(fine.mu.values, fine.R.values, strict=True)) - set(zip(finer.mu.values, finer.R.values, strict=True))
+    assert not both  # nothing is lost
+    lines = [line.split() for line in told.splitlines() if line.startswith("  0.01 ")]
+    assert float(lines[0][4]) == pytest.approx(-0.33, abs=0.05)
+
+
+def test_the_bits_do_not_depend_on_workers_or_where_rounds_are_kept(tmp_path):
+    ds = sweep.run(foliot(mu=(1e-1, 1e2, 5), R=(1e-3, 1e-2, 4)))
+    inside = sweep.refine(ds, "period", 3e-2, workers=1).dataset
+    stored = sweep.refine(ds, "period", 3e-2, workers=3, path=tmp_path / "fine.h5").dataset
+    for name in ("mu", "R", "period", "multiplier", "status"):
+        np.testing.assert_array_equal(inside[name], stored[name])
+
+
+def test_a_refinement_that_was_killed_on_its_way_computes_no_round_again(tmp_path, monkeypatch):
+    ds = sweep.run(foliot(mu=(1e-2, 1e3, 6)))
+    whole = sweep.refine(ds, "period", 1e-3).dataset
+    solved, rounds = _Output.solved, []
+
+    def stopped(self, axes):
+        if len(rounds) == 3:
+            raise KeyboardInterrupt
+        rounds.append(axes)
+        return solved(self, axes)
+
+    monkeypatch.setattr(_Output, "solved", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        sweep.refine(ds, "period", 1e-3, path=tmp_path / "fine.h5")
+    kept = {p: p.stat().st_mtime_ns for p in (tmp_path / "fine.h5.rounds").iterdir()}
+    assert len(kept) == 3
+    monkeypatch.setattr(_Output, "solved", solved)
+    monkeypatch.setattr("sweep.explore.refine.shutil.rmtree", lambda *given, **keys: None)
+    found = sweep.refine(ds, "period", 1e-3, path=tmp_path / "fine.h5").dataset
+    assert {p: p.stat().st_mtime_ns for p in kept} == kept
+    np.testing.assert_array_equal(found.period, whole.period)
+
+
+def test_the_error_told_holds_the_truth(tmp_path):
+    """Of random functions of one and two axes; `--functions 200` measures the share."""
+    script = Path(__file__).parents[3] / "benchmarks/honesty/refine.py"
+    command = [sys.executable, str(script), "--no-adaptive", "--functions", "20", "--axes", "1", "2"]
+    found = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert found.returncode == 0, found.stdout + found.stderr
