@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from sweep.explore.plan import plan as plan
     from sweep.explore.refine import refine as refine
     from sweep.explore.refine import study_of as study_of
+    from sweep.explore.sensitivity import sensitivity as sensitivity
+    from sweep.explore.solver import solver as solver
     from sweep.explore.work_precision import work_precision as work_precision
     from sweep.results.diff import diff as diff
     from sweep.results.export import export as export
@@ -72,6 +74,8 @@ _PUBLIC = {
     "results.diff": ("diff",),
     "results.listing": ("list_results",),
     "explore.join": ("join",),
+    "explore.solver": ("solver",),
+    "explore.sensitivity": ("sensitivity",),
     "analysis.scattered": ("interpolated",),
     "explore.plan": ("plan",),
     "explore.notebook": ("kernels",),

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -140,6 +142,10 @@ def _run(arguments: argparse.Namespace) -> Outcome:
     from sweep.system.log import log, log_path, logging_to
 
     output = _output(arguments)
+    for number in (signal.SIGUSR1, signal.SIGUSR2):
+        # they change the number of cores while blocks are computed, and mean nothing before and after
+        if threading.current_thread() is threading.main_thread() and signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, signal.SIG_IGN)
     _check_readable(output)
     with logging_to(log_path(output) if output.parent.is_dir() else None, arguments.log_json):
         try:
@@ -330,13 +336,30 @@ def _export(arguments: argparse.Namespace) -> None:
         _print(export(_in_units(chosen, arguments.unit), arguments.output, force=arguments.force))
 
 
+def _studies(arguments: argparse.Namespace) -> None:
+    from sweep.show.studies import copy_study, studies_text
+
+    if arguments.name:
+        _print("\n".join(map(str, copy_study(arguments.name))))
+    else:
+        _print(studies_text())
+
+
+def _completion(arguments: argparse.Namespace) -> None:
+    try:
+        import shtab
+    except ImportError:
+        raise SweepError('completion needs shtab; install it with: pip install "foliot[completion]"') from None
+    print(shtab.complete(parser(), arguments.shell))
+
+
 def _diff(arguments: argparse.Namespace) -> Outcome:
     from sweep.results.diff import diff
 
     with _opened(arguments.result) as a, _opened(arguments.other) as b:
         found = diff(a, b, arguments.rtol)
     _print(found)
-    return Outcome(COMPLETE if found.same else DIFFERENT, "")
+    return Outcome(COMPLETE if found.same else DIFFERENT, str(found))
 
 
 def _join(arguments: argparse.Namespace) -> None:
@@ -627,6 +650,16 @@ COMMANDS = {
         RESULT,
         output("FILE.html", "default: the result's name with .html, here"),
         *(FORCE, UNITS, UNFINISHED),
+    ),
+    "studies": Command.of(
+        "the studies that come with foliot; with a name: copy it here to work on",
+        _studies,
+        option("name", "of the study to copy", metavar="NAME", nargs="?"),
+    ),
+    "completion": Command.of(
+        'what makes a shell complete the command, e.g. eval "$(sweep completion bash)"',
+        _completion,
+        option("shell", choices=("bash", "zsh", "tcsh")),
     ),
     "diff": Command.of(
         "in what two results differ: cells, statuses, how far; exit status 1 where they do",

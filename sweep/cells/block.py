@@ -28,11 +28,19 @@ Found = str | Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Computed:
-    """A block that an executor has computed, the seconds it took, and its cells that FAILED."""
+    """A block that an executor has computed.
+
+    Attributes
+    ----------
+    seconds : what it took
+    ago : when it was begun, with those that came together with it
+    bad : its cells that FAILED
+    """
 
     block: int
     found: Found
     seconds: float
+    ago: float = 0.0
     bad: Sequence[BadCell] = ()
 
 

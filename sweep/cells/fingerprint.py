@@ -26,6 +26,9 @@ OURS = ("kernels",)
 ENGINE = ("sweep.cells.solve", "sweep.cells.grid")
 """Modules of the engine that decide values: the method of each cell, and its parameters."""
 
+ASKING = ("sweep.study.condition",)
+"""Those that decide which cells are asked for, where the study has a condition."""
+
 REDUCING = ("sweep.cells.partition", "sweep.cells.reduce", "sweep.cells.output_schema")
 """Those that decide the values of a summary."""
 
@@ -49,7 +52,7 @@ def fingerprint(study: Study) -> dict[str, str]:
     """
     said = _said(study)
     whole = hashlib.sha256(json.dumps(said).encode()).hexdigest()
-    engine = ENGINE if study.summary is None else (*ENGINE, *REDUCING)
+    engine = (*ENGINE, *(REDUCING if study.summary else ()), *(ASKING if study.where else ()))
     return {
         "study": whole,
         **said,

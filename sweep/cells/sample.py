@@ -13,6 +13,8 @@ from sweep.study.model import Axis, Study, differs, frozen
 
 MOST_TRIED = 1 << 16
 """Cells that are looked at to find some that are asked for."""
+TRIES = 32
+"""Cells that are drawn for each that is wanted, where a condition leaves some out."""
 ONE: Mapping[str, float] = {}
 
 
@@ -79,13 +81,15 @@ def with_method(study: Study, method: str, rtol: float) -> Study:
 
 
 def drawn(study: Study, cells: int, rng: np.random.Generator) -> Study:
-    """Cells with values drawn at random from the study's axes, each axis for itself in a product, as a zip."""
-    some = sampled(study, 1)
-    row = rng.integers(0, Grid(study).size, cells)
-    axes = {}
-    for name, axis in some.axes.items():
-        values = study.axes[name].values if name in study.axes else axis.values
-        axes[name] = _axis(name, values[rng.integers(0, len(values), cells) if study.design == "product" else row], ONE)
+    """Cells drawn at random from the study's grid, of those that it asks for as far as there are any, as a zip."""
+    some, grid = sampled(study, 1), Grid(study)
+    row = rng.integers(0, grid.size, cells if not study.where else TRIES * cells)
+    asked = row[grid.asked(row)]
+    row = np.resize(asked if len(asked) else row, cells)
+    axes = {
+        name: _axis(name, grid.values(name, row) if name in study.axes else np.resize(axis.values, cells), ONE)
+        for name, axis in some.axes.items()
+    }
     return dataclasses.replace(some, axes=axes)
 
 

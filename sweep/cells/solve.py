@@ -55,10 +55,12 @@ class Solver:
     Parameters
     ----------
     study : Study
+    grid : Grid, optional
+        Where its cells come from; default: the axes of the study.
     """
 
-    def __init__(self, study: Study) -> None:
-        self.study, self.grid = study, Grid(study)
+    def __init__(self, study: Study, grid: Grid | None = None) -> None:
+        self.study, self.grid = study, grid or Grid(study)
         self.usable = usable_methods(study)
         kernel = study.kernel
         shapes = {field.name: study.shape(field) for field in (*kernel.parameters, *kernel.outputs)}

@@ -122,7 +122,7 @@ def scaling(study: Study) -> Scaling:
     >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
     >>> study = sweep.study(**foliot | {"fixed": {"phi0": 1.0}}, axes={"mu": [0.5, 1.0], "a": [1.0, 2.0]})
     >>> print(sweep.scaling(study).advice)
-    one-dimensional in mu, a: only mu/(phi0 a^2) matters; 1 of these axes can be left out; tried on 24 cells at random
+    one-dimensional in mu, a: only mu/(phi0 a^2) matters; 1 of these axes can be left out; tried on ... cells at random
     """
     found = scalings(study)
     fields = {f.name: f for f in (*study.kernel.parameters, *study.kernel.along)}

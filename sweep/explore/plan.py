@@ -63,7 +63,8 @@ class Plan:
     free_bytes : int
         On the disk of the output.
     cell_seconds, seconds : float
-        On one core; and altogether, from the call of `run` in a program that has called it before.
+        On one core; and altogether, from the call of `run` in a program that has called it before, with what has to
+        be compiled again then.
     compile_seconds : float
         What compiling the methods took just now; 0 where their machine code was kept.
     methods, statuses : dict of str to float
@@ -106,8 +107,7 @@ class Plan:
     def _compile_text(self) -> str:
         if not self.compile_seconds:
             return ""
-        kept = machine_code_folder() is not None and ":" not in self.kernel
-        when = "just now; the machine code is kept" if kept else "before the first cell"
+        when = "just now; the machine code is kept" if _is_kept(self.kernel) else "of it, before the first cell"
         return f"about {duration(self.compile_seconds)} {when}"
 
     def __str__(self) -> str:
@@ -174,7 +174,14 @@ def plan(
     with faults_reported(f"{study.kernel_name}: the kernel failed"):
         advice = scaling(study).advice
     forecast = _forecast(study, sample, crew, folder)
-    return replace(forecast, compile_seconds=sum(compiling.seconds.values()), scaling=advice)
+    compiled = sum(compiling.seconds.values())
+    again = 0.0 if _is_kept(study.kernel_name) else compiled
+    return replace(forecast, seconds=forecast.seconds + again, compile_seconds=compiled, scaling=advice)
+
+
+def _is_kept(kernel: str) -> bool:
+    """Whether the machine code of a kernel is there for the next run."""
+    return machine_code_folder() is not None and ":" not in kernel
 
 
 def _forecast(study: Study, sample: Sample, workers: int, folder: Path) -> Plan:

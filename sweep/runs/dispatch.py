@@ -27,6 +27,7 @@ from sweep.runs.worker import TOKEN, Answer, Assignment, Sent
 from sweep.store.parts import digest
 from sweep.system import disk
 from sweep.system.errors import SweepError
+from sweep.system.log import log
 from sweep.system.pool import CtrlC, through
 
 TASK_SECONDS = 0.5
@@ -71,6 +72,7 @@ class Dispatch:
         self._most = max(1, TASK_BYTES // max(1, self._blocks.partition.cells * self._blocks.row_bytes))
         self._suspects: list[int] = []
         self._poison: list[int] = []
+        self._threads: int | None = None
         self._absence = Absence(math.inf if task.without_workers == WAIT else LOST_SECONDS)
 
     def compute(self, blocks: Iterator[int], receive: Callable[[Computed | None], None]) -> None:
@@ -145,7 +147,7 @@ class Dispatch:
         bad = answer.bad
         for job, found in answer.found.items():
             numbers = found if isinstance(found, str) else self._checked(job, found)
-            self._receive(Computed(job, numbers, mean, bad))
+            self._receive(Computed(job, numbers, mean, answer.seconds, bad))
             bad = ()
 
     def _suspect(self, batch: Batch) -> None:
@@ -156,7 +158,10 @@ class Dispatch:
         self._suspects += batch
 
     def _look_for_workers(self) -> None:
-        if self._absence.check(not self._cluster.threads):
+        threads, self._threads = self._threads, self._cluster.threads
+        if threads not in (None, self._threads):
+            log(f"the cluster has {self._threads} threads, {threads} before", "workers", threads=self._threads)
+        if self._absence.check(not self._threads):
             self._note("the cluster has no workers left; waiting for new ones")
 
     def _mask(self, job: int) -> bytes | None:

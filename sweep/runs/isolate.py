@@ -172,24 +172,26 @@ class IsolatedSolver:
         """The executor; a new one has loaded the kernel, and solved a cell that is known to end."""
         if self._pool is not None and not self._all.over:
             return self._pool
+        for _ in range(TRIALS):
+            pool = self._begun()
+            with contextlib.suppress(RuntimeError, CancelledError, TimeoutError):
+                number = pool.submit(os.getpid).result(LOAD_SECONDS)
+                self._process = next((p for p in multiprocessing.active_children() if p.pid == number), None)
+                pool.submit(isolated.load, self._all.text, self._all.paths, self._all.good).result(LOAD_SECONDS)
+                self._fresh = True
+                return pool
+            self.end()
+        raise SweepError(f"{self._all.study.kernel_name}: no process of its own can load it")
+
+    def _begun(self) -> ProcessPoolExecutor:
+        """A new executor, whose process is being made. Raises Ended."""
         with self._lock:
             if self._all.over:
                 raise Ended("the run is being stopped")
+            self._pool, self._process = ProcessPoolExecutor(1, _context(), isolated.enter), None
             with _apart():
-                self._pool = ProcessPoolExecutor(1, _context(), isolated.enter)
-                begun = self._pool.submit(os.getpid)
-            pool = self._pool
-        try:
-            number = begun.result(LOAD_SECONDS)
-            self._process = next((p for p in multiprocessing.active_children() if p.pid == number), None)
-            pool.submit(isolated.load, self._all.text, self._all.paths, self._all.good).result(LOAD_SECONDS)
-        except (RuntimeError, CancelledError, TimeoutError):
-            self.end()
-            if self._all.over:
-                raise Ended("the run is being stopped") from None
-            raise SweepError(f"{self._all.study.kernel_name}: no process of its own can load it") from None
-        self._fresh = True
-        return pool
+                self._pool.submit(int)
+            return self._pool
 
     def _died(self) -> str:
         """Why the process did."""

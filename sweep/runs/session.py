@@ -182,7 +182,7 @@ class Session:
             if done is not None:
                 receive(done.block, done.found)
                 self.bad.extend(done.bad)
-                self.forecast.end(done.block, done.seconds)
+                self.forecast.end(done.block, done.seconds, done.ago)
             self._count(None if done is None else done.block)
 
         executor.compute(self.forecast.order(), take)

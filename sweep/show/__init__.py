@@ -6,6 +6,7 @@ Others may use
     `text`     result_text
     `follow`   a sweep watched from its log
     `laws`     power laws along an axis, as text and csv; pick
+    `studies`  what comes with foliot, and copies to work on
     `compare`, `law_charts`   which law: as text, csv and picture
     `kernels`  what can be swept, and a study to begin with
 

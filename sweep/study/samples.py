@@ -71,7 +71,7 @@ def _random(axes: int, n: int, seed: int, scramble: bool) -> Any:
 
 
 def _saltelli(axes: int, n: int, seed: int, scramble: bool) -> Any:
-    _require_salib()
+    require_salib()
     from SALib.sample import sobol
 
     given = problem(tuple(map(str, range(axes))))
@@ -79,13 +79,14 @@ def _saltelli(axes: int, n: int, seed: int, scramble: bool) -> Any:
 
 
 def _morris(axes: int, n: int, seed: int, scramble: bool) -> Any:
-    _require_salib()
+    require_salib()
     from SALib.sample import morris
 
     return morris.sample(problem(tuple(map(str, range(axes)))), n, num_levels=LEVELS, seed=seed)
 
 
-def _require_salib() -> None:
+def require_salib() -> None:
+    """Raises SweepError where SALib is missing."""
     try:
         import SALib  # noqa: F401
     except ImportError:

@@ -45,18 +45,19 @@ class Cores:
         """As long as this lasts, SIGUSR1 means a core more, SIGUSR2 one less; handlers of others are left alone."""
         signals = {signal.SIGUSR1: 1, signal.SIGUSR2: -1}
         here = threading.current_thread() is threading.main_thread()
-        ours = [number for number in signals if here and signal.getsignal(number) is signal.SIG_DFL]
+        free = (signal.SIG_DFL, signal.SIG_IGN)
+        before = {number: signal.getsignal(number) for number in signals if here and signal.getsignal(number) in free}
 
         def change(number: int, frame: object) -> None:
             self.count = max(1, self.count + signals[signal.Signals(number)])
 
-        for number in ours:
+        for number in before:
             signal.signal(number, change)
         try:
             yield
         finally:
-            for number in ours:
-                signal.signal(number, signal.SIG_DFL)
+            for number, handler in before.items():
+                signal.signal(number, handler)
 
 
 class Stopper:

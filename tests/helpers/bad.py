@@ -10,6 +10,8 @@ import time
 import numpy as np
 import toy
 
+from kernels.interface import Status
+
 RAISES, CRASHES, EXITS, HANGS, HOGS, HUNGRY = 11.0, 22.0, 33.0, 44.0, 55.0, 66.0
 """Heights at which the kernel misbehaves."""
 
@@ -61,3 +63,34 @@ def nothing_but_bad(height, *rest):
 
 
 HOPELESS = dataclasses.replace(RAISING, methods=(dataclasses.replace(toy.KERNEL.methods[1], solve=nothing_but_bad),))
+
+
+NIGHT_SECONDS, BAD_SHARE, LEAK_BYTES = 0.002, 400, 4 << 20
+DEEDS = ("raises", "crashes", "exits", "hangs", "hogs", "writes NaN", "leaks", "is refused")
+FAILING = DEEDS[:6]
+_leaked = []
+
+
+def deed(height):
+    """What becomes of a cell: one in `BAD_SHARE` of each kind, anywhere; "" of all others."""
+    number = int(height) * 0x9E3779B97F4A7C15 % 2**64 >> 40
+    kind = number % BAD_SHARE
+    return DEEDS[kind] if kind < len(DEEDS) else ""
+
+
+def night(height, *rest):
+    """As `toy.exact`, but for the cells of `deed`."""
+    kinds = [deed(one) for one in height]
+    time.sleep(NIGHT_SECONDS * len(height))
+    misbehave([BY_DEED[kind] for kind in kinds if kind in BY_DEED], BY_DEED.values())
+    _leaked.extend(np.ones(LEAK_BYTES // 8) for kind in kinds if kind == "leaks")
+    toy.exact(height, *rest)
+    fall_time, status = rest[-4], rest[-1]
+    fall_time[[kind == "writes NaN" for kind in kinds]] = np.nan
+    status[[kind == "is refused" for kind in kinds]] = Status.STICKS
+
+
+BY_DEED = {"raises": RAISES, "crashes": CRASHES, "exits": EXITS, "hangs": HANGS, "hogs": HOGS}
+NIGHT = dataclasses.replace(
+    toy.KERNEL, name="night", methods=(dataclasses.replace(toy.KERNEL.methods[1], solve=night),)
+)

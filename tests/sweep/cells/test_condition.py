@@ -8,6 +8,7 @@ from toy_studies import build, message_of
 
 import sweep
 from kernels.interface import Status
+from sweep.cells.fingerprint import fingerprint
 from sweep.results.statuses import account
 from sweep.show.text import result_text
 
@@ -129,3 +130,9 @@ def test_a_summary_counts_them():
     assert int(found.cells_by_status.sel(status_name="NOT_ASKED")) == 3
     assert int(found.fall_time_count) == 9
     assert account(found).not_asked == 3
+
+
+def test_what_reads_a_condition_is_in_the_fingerprint_of_who_has_one():
+    names = [fingerprint(build(axes=AXES, **keys)) for keys in ({}, {"where": WHERE})]
+    assert ["source sweep.study.condition" in found for found in names] == [False, True]
+    assert names[1]["where"] == WHERE

@@ -1,6 +1,7 @@
 """Kernels that raise, crash, or never end cost the cells they do so at, and nothing else."""
 
 import io
+from concurrent.futures import ProcessPoolExecutor
 
 import bad
 import numpy as np
@@ -14,7 +15,8 @@ from kernels.interface import Status
 from sweep.cells.guard import BadCell, Guard
 from sweep.cells.solve import Solver
 from sweep.results.statuses import account
-from sweep.runs.isolate import Limits
+from sweep.runs import isolate, isolated
+from sweep.runs.isolate import Limits, Processes
 from sweep.system.errors import SweepError
 
 SOUND = 100
@@ -40,11 +42,11 @@ def test_bad_cells_fail_by_name_and_all_others_have_the_bits_of_a_run_without_th
         whole = quiet(tall(SOUND, "bad:RAISING"), isolate=True)
         assert kept.fall_time.values.tobytes() == whole.fall_time.sel(height=kept.height).values.tobytes()
         assert account(found).failed == len(BAD[name])
-    told = [line.partition("FAILED: ")[2] for line in log.getvalue().splitlines() if "FAILED" in line]
-    assert sorted(text.partition(":")[0] for text in told) == [f"height={int(height)}" for height in BAD[name]]
+    told = [line.partition("FAILED ")[2] for line in log.getvalue().splitlines() if "FAILED" in line]
+    assert sorted(text.partition(":")[0] for text in told) == [f"(height={int(height)})" for height in BAD[name]]
     reasons = {"11": "ZeroDivisionError: eleven", "22": "SIGSEGV", "33": "ended with 7", "44": "longer than 1.5 s"}
     for height, reason in reasons.items():
-        assert float(height) not in BAD[name] or any(f"height={height}:" in t and reason in t for t in told)
+        assert float(height) not in BAD[name] or any(f"height={height})" in t and reason in t for t in told)
 
 
 def test_a_kernel_of_which_every_cell_is_bad_is_told_at_once():
@@ -128,3 +130,37 @@ def test_several_cells_have_little_more_than_they_should_take_and_one_has_its_ti
     assert Limits(0.5, 0.0).seconds(1000) == 0.5
     assert Limits(None, 2.0).seconds(1) == 200.0
     assert Limits(None, 0.1).seconds(1) == 60.0
+
+
+def test_processes_that_others_kill_cost_nothing(monkeypatch):
+    """Whatever they are at: loading, or a cell alone."""
+    study, victims = tall(30, "bad:RAISING"), []
+    processes = Processes(study, Limits(30.0), 1)
+    solver = processes.solver()
+
+    def killed(pool, *task, real=ProcessPoolExecutor.submit):
+        future = real(pool, *task)
+        if task[0] in (isolated.load, isolated.solve):
+            victims.append(task)
+            if len(victims) in (1, 3, 6, 10, 15, 21):
+                solver._process.kill()
+        return future
+
+    monkeypatch.setattr(ProcessPoolExecutor, "submit", killed)
+    seen = []
+    arrays = {"fall_time": np.empty(30)}, np.empty(30, np.int8), np.empty(30, np.int8)
+    Guard(solver, seen.append).solve(0, 30, *arrays)
+    processes.end()
+    assert [cell.cell for cell in seen] == [10]
+    assert len(victims) > 10
+
+
+def test_a_process_with_too_much_memory_is_replaced(monkeypatch):
+    begun = []
+    real = isolate.IsolatedSolver._begun
+    monkeypatch.setattr(isolate.IsolatedSolver, "_begun", lambda self: begun.append(1) or real(self))
+    same(quiet(tall(30), isolate=True, workers=1, block_cells=10), quiet(tall(30)))
+    usual = len(begun)
+    monkeypatch.setattr(isolate, "MEMORY_SHARE", 1e-9)
+    same(quiet(tall(30), isolate=True, workers=1, block_cells=10), quiet(tall(30)))
+    assert len(begun) - usual >= usual + 2
