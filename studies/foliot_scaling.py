@@ -270,8 +270,8 @@ def shape(ds: xr.Dataset) -> list[Statement]:
         )
         if alpha > 50:
             lines.append(
-                Statement(f"{name} drive: rounder than a sine, time above A/2", "yes", f"{high:.3f} P, sine 0.667",
-                          None, high > 2 / 3 + 0.01)
+                Statement(f"{name} drive: rounder than a sine, time over A/2", "yes", f"{high:.3f} P, sine 0.667", None,
+                          high > 2 / 3 + 0.01)
             )  # fmt: skip
     return lines
 

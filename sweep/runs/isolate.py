@@ -86,8 +86,15 @@ class Processes:
         self.grid, self.text, self.paths = Grid(study), study.to_json(), kernel_paths(study)
         self.most_bytes = MEMORY_SHARE * memory() / count
         self.good: int | None = None
+        self.dearest = 0.0
         self.over = False
         self._solvers: list[IsolatedSolver] = []
+
+    def seconds(self, cells: int) -> float:
+        """What some cells may take. One of a sample is not waited for to its end: it is left out, but never FAILED."""
+        if self.limits.cost or self.good is None:
+            return self.limits.seconds(cells)
+        return min(self.limits.seconds(1), SEVERAL_SECONDS + SLACK * self.dearest * cells)
 
     def solver(self) -> IsolatedSolver:
         """A solver with a process of its own, for one thread at a time."""
@@ -144,7 +151,7 @@ class IsolatedSolver:
         raise Unsolved(reason)
 
     def _result(self, pool: ProcessPoolExecutor, start: int, stop: int, wanted: Any) -> Answer:
-        limit = self._all.limits.seconds(stop - start)
+        limit = self._all.seconds(stop - start)
         # where no cell is known to end, the first one may still have to be compiled
         compiling = LOAD_SECONDS if self._all.good is None else 0.0
         try:
@@ -165,6 +172,7 @@ class IsolatedSolver:
         if answer.reason:
             raise Unsolved(answer.reason)
         self.seconds += answer.seconds
+        self._all.dearest = max(self._all.dearest, answer.seconds / len(answer.arrays[STATUS]))
         self._all.good = start if self._all.good is None else self._all.good
         return answer.arrays
 

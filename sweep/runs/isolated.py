@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from multiprocessing import forkserver
 from pathlib import Path
 from typing import Any
 
@@ -37,8 +38,16 @@ class Answer:
 
 
 def enter() -> None:
-    """First in the process: it dies with the one that asks it, and before that one where the memory is short."""
+    """First in the process: it dies with the one that asks it, and before that one where the memory is short.
+
+    The system kills it with its fork server, also in a kernel that never lets Python run; that one ends with who asks
+    it, if nobody else holds the pipe that tells.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    server: Any = vars(forkserver)["_forkserver"]
+    pipe, server._forkserver_alive_fd = server._forkserver_alive_fd, None
+    if pipe is not None:
+        os.close(pipe)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         with contextlib.suppress(OSError):

@@ -54,6 +54,7 @@ RAISING = kernel("raising", RAISES)
 DYING = kernel("dying", RAISES, CRASHES, EXITS)
 STUCK = kernel("stuck", HANGS, pause=0.002)
 ENDLESS = kernel("endless", HANGS, HOGS)
+HOGGING = kernel("hogging", HOGS)
 WORST = kernel("worst", RAISES, CRASHES, EXITS, HANGS, HOGS, HUNGRY)
 
 

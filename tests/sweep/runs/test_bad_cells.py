@@ -164,3 +164,12 @@ def test_a_process_with_too_much_memory_is_replaced(monkeypatch):
     monkeypatch.setattr(isolate, "MEMORY_SHARE", 1e-9)
     same(quiet(tall(30), isolate=True, workers=1, block_cells=10), quiet(tall(30)))
     assert len(begun) - usual >= usual + 2
+
+
+def test_a_sample_does_not_wait_for_cells_that_never_end():
+    processes = Processes(tall(60, "bad:ENDLESS"), Limits(600.0), 1)
+    assert processes.seconds(1) == 600.0
+    processes.good, processes.dearest = 0, 0.1
+    assert processes.seconds(1) == 2.0
+    processes.limits = Limits(600.0, 0.1)
+    assert processes.seconds(1) == 600.0

@@ -86,9 +86,9 @@ def test_a_kernel_that_never_ends_does_not_keep_a_run_from_it(begun, number, opt
 def test_of_a_run_that_is_killed_no_process_is_left(begun):
     """Not even one in a kernel that never lets Python run."""
     psutil = pytest.importorskip("psutil")
-    process, output = begun("bad:ENDLESS", 60, "--cell-timeout", "10 min")
+    process, output = begun("bad:HOGGING", 60, "--cell-timeout", "10 min")
     wait_for(lambda: log_path(output).exists() and "begins" in log_path(output).read_text(), process)
-    time.sleep(2.0)
+    time.sleep(3.0)
     below = psutil.Process(process.pid).children(recursive=True)
     assert len(below) >= 3
     process.kill()
