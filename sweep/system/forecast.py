@@ -36,6 +36,8 @@ FRAME_SECONDS = 0.1
 """What an output takes besides its numbers."""
 SLOW_DISK = 5e7
 """Bytes a second that any disk writes at a stretch."""
+ENOUGH = 4
+"""So many blocks that are no worker's first tell more than all together."""
 SHORTEST = 1e-9
 """Seconds that a block takes at least."""
 
@@ -127,7 +129,7 @@ class Forecast:
     def _settled(self, measured: Any) -> Any:
         """Those of the measured blocks that tell of others: a worker's first one is left out, in which it loads."""
         later = measured[self._begun[measured] >= self._first_end]
-        return later if later.size >= LEAST_LEAD else measured
+        return later if later.size >= ENOUGH else measured
 
     def _dear_first(self, jobs: Any) -> Any:
         """Sorted by powers of two of what they will take; as they are where all take about as long."""

@@ -21,7 +21,7 @@ from sweep.system.log import log, log_path, logging_to, read_lines
 
 SECONDS = 2.0
 """What a run may take to end;"""
-START = 3.0
+START = 8.0
 """and a machine with much to do to notice."""
 
 STUDY = """
