@@ -168,7 +168,7 @@ def figure(coulomb: xr.Dataset, drag: xr.Dataset, steps: xr.Dataset | None, othe
     from sweep.show import charts
 
     with charts.style():
-        page = charts.new_figure(charts.PAGE, 138.0)
+        page = charts.new_figure(charts.PAGE, 146.0)
         panels = page.subplots(2, 3, sharex="col", sharey=True)
         names = [*coulomb["method"].values.tolist(), *drag["method"].values.tolist()]
         for row, key, what in zip(panels, ("error_median", "error_worst"), ("median", "worst"), strict=True):
@@ -188,7 +188,7 @@ def figure(coulomb: xr.Dataset, drag: xr.Dataset, steps: xr.Dataset | None, othe
         panels[1][2].set_xlabel("calls of the rates")
         keys = {t: h for axes in panels[0][:2] for h, t in zip(*axes.get_legend_handles_labels(), strict=True)}
         keys |= {text: mark for found in (coulomb, drag) for text, mark in charts.precision_marks(found).items()}
-        page.legend(keys.values(), keys.keys(), loc="outside lower left", ncols=4, title="(a), (b), (d), (e)")
+        page.legend(keys.values(), keys.keys(), loc="outside lower left", ncols=3, title="(a), (b), (d), (e)")
         last = panels[0][2].get_legend_handles_labels()
         page.legend(*last, loc="outside lower right", ncols=2, title="(c), (f)")
     return page

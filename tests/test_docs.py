@@ -57,7 +57,8 @@ def test_links_lead_to_files_that_are_there(page):
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
 def test_its_python_parses(page):
     for code in re.findall(r"```(?:\{code-cell\} )?python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
-        ast.parse("\n".join(line for line in code.splitlines() if not line.startswith(("%", ":"))))
+        if not code.startswith(">>>"):  # a doctest is run by a test of its own
+            ast.parse("\n".join(line for line in code.splitlines() if not line.startswith(("%", ":"))))
 
 
 def test_pages_of_kernels_say_what_the_kernels_declare():
@@ -76,3 +77,12 @@ def test_what_is_indented_in_a_docstring_stands_as_it_is():
 
     told = "\n".join(make_pages.prose("A law.\n\n    x_1 = 2*y            (1)\n\nwith x_1 and `y_2`."))
     assert told == "A law.\n\n\n```text\nx_1 = 2*y    (1)\n```\n\n\nwith x\\_1 and `y_2`."
+
+
+def test_the_readme_fits_on_two_screens_and_tests_as_ci_does():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(readme.splitlines()) <= 80
+    (line,) = re.findall(r"^.*-m pytest.*$", readme, re.MULTILINE)
+    assert line in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    for code in re.findall(r"```python\n(.*?)```", readme, re.DOTALL):
+        ast.parse(code)
