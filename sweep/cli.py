@@ -31,7 +31,7 @@ DIFFERENT = 1
 
 RUN_OPTIONS = (
     *("workers", "cluster", "without_workers", "force", "extend", "until"),
-    *("isolate", "cell_timeout", "retry_failed"),
+    *("isolate", "cell_timeout", "retry_failed", "repair"),
 )
 """Options of `run` that are arguments of the function of that name."""
 
@@ -333,7 +333,8 @@ def _export(arguments: argparse.Namespace) -> None:
     _check_target(arguments, arguments.output)
     with _result(arguments) as dataset:
         chosen = dataset if arguments.where is None else where(dataset, arguments.where)
-        _print(export(_in_units(chosen, arguments.unit), arguments.output, force=arguments.force))
+        keys = {name: getattr(arguments, name) for name in ("force", "compress", "float32")}
+        _print(export(_in_units(chosen, arguments.unit), arguments.output, **keys))
 
 
 def _studies(arguments: argparse.Namespace) -> None:
@@ -415,7 +416,7 @@ def _opened(path: Path, unfinished: bool = True) -> xr.Dataset:
 
     if path.suffix == ".toml":
         raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
-    if not path.exists() and path.with_name(path.name + ".parts").is_dir():
+    if not path.exists() and path.with_name(path.name + ".unfinished").exists():
         _print(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
     _check_readable(path, "xarray")
     found = open_result(path)
@@ -546,6 +547,7 @@ COMMANDS = {
         output("OUT.h5", "default: the study's name with .h5, here"),
         switch("--force", "overwrite the result of another study"),
         switch("--extend", "of a result of the same study with fewer values on its axes, compute the new cells only"),
+        switch("--repair", "of a result that is damaged on the disk, compute the damaged cells again and nothing else"),
         option(
             "--cluster",
             "compute on the workers of a dask scheduler, e.g. tcp://10.0.0.1:8786, instead of here",
@@ -688,6 +690,8 @@ COMMANDS = {
         output("FILE.csv|.parquet|.nc|.zarr", required=True),
         FORCE,
         option("--where", "only cells for which this holds, e.g. \"status == 'OK' and R < 0.1\"", metavar="CONDITION"),
+        switch("--compress", "of netCDF4 and zarr: smaller, every bit kept"),
+        switch("--float32", "of netCDF4 and zarr: outputs with 24 bits of precision"),
         *(UNITS, UNFINISHED),
     ),
 }

@@ -1,11 +1,11 @@
-"""How much of the damage to parts and results is missed?
+"""How much of the damage to results, finished or not, is missed, or not repaired?
 
     python benchmarks/soak/damage.py [--tries 10000] [--seed 1]
 
-One try in ten damages the parts of a sweep (a flipped bit, a file cut, emptied, missing, doubled, swapped, foreign, of
-another study; a flipped bit of spec.json): `sweep verify` must name it, and the continued run must end with the same
-bits. The others damage a finished result (a flipped bit, 512 bytes zeroed, cut, lengthened): `sweep verify` must find
-it. Prints the figures, those that count at the end; exit status 1 where anything is missed.
+A flipped bit, 512 bytes zeroed, a file cut, emptied, missing or lengthened, chunks that changed places, with their
+digests too, or are of another study. Of an unfinished result `sweep verify` must tell, and the continued run must end
+with the same bits; a finished one must be found, and repaired where its structure is whole. Prints the figures, those
+that count at the end; exit status 1 where anything is missed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pathlib import Path
 
 sys.path[:0] = [str(Path(__file__).parents[2] / "tests" / "helpers")]
 
-from havoc import damaged_parts, damaged_result, numbers, run, study, unfinished  # noqa: E402
+from havoc import damaged_result, damaged_unfinished, numbers, run, study, unfinished  # noqa: E402
 
 
 def main() -> int:
@@ -33,19 +33,18 @@ def main() -> int:
         folder = Path(name)
         (folder / "scratch").mkdir()
         run(study(), folder / "whole.h5", workers=1, block_cells=300, progress=False).close()
-        whole, parts = numbers(folder / "whole.h5"), unfinished(folder / "out.h5")
+        run(study(fixed={"g": 1.6}), folder / "strange.h5", workers=1, block_cells=300, progress=False).close()
+        strange, bits = (folder / "strange.h5").read_bytes(), numbers(folder / "whole.h5")
+        paths = {"unfinished": unfinished(folder / "out.h5"), "finished": folder / "whole.h5"}
         for number in range(given.tries):
             begun = time.monotonic()
-            of_parts = number % 10 == 0
-            kind, what = (
-                damaged_parts(rng, parts, folder / "scratch", whole)
-                if of_parts
-                else damaged_result(rng, folder / "whole.h5", folder / "scratch")
-            )
-            kinds[f"{'parts' if of_parts else 'result'}: {kind}"] += 1
+            state = "unfinished" if number % 3 == 0 else "finished"
+            damaged = damaged_unfinished if state == "unfinished" else damaged_result
+            kind, what = damaged(rng, paths[state], strange, folder / "scratch", bits)
+            kinds[f"{state}: {kind}"] += 1
             slowest = max(slowest, time.monotonic() - begun)
             if what:
-                wrong.append(f"try {number}, {kind}: {what}")
+                wrong.append(f"try {number}, {state}, {kind}: {what}")
     print("\n".join(f"  {kind}: {count}" for kind, count in sorted(kinds.items())))
     print("\n".join(wrong[:20]))
     print(f"{given.tries} tries, the slowest {slowest:.1f} s; missed or wrong: {len(wrong)}")

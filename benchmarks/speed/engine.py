@@ -1,11 +1,8 @@
-"""What does the engine cost around the kernel, and how close to the disk does it write?
+"""What does the engine cost around the kernel? How close to the disk it writes, `storage.py` tells.
 
 Prints ratios of times measured in one run, on the folder given (default: here):
 
     python benchmarks/speed/engine.py [FOLDER] [--million 8]
-
-The disk's own speed is taken right before and after the run it is compared with, by plain writes of the same bytes in
-one file, with fsync. Disks differ from minute to minute: look at the spread, not at one figure.
 """
 
 from __future__ import annotations
@@ -89,25 +86,6 @@ def disk_seconds(folder: Path, size: int) -> float:
     return taken
 
 
-def stored(folder: Path, cells: int) -> None:
-    """A cheap kernel, every output stored: parts and output are both written, so the disk takes the bytes twice."""
-    study = foliot("closed", cells)
-    warm(Solver(study), study)
-    size = cells * sum(c.cell_bytes for c in columns(study))
-    path = folder / "stored.h5"
-    for workers in (1, os.cpu_count() or 1):
-        ratios = []
-        for _ in range(ROUNDS):
-            kernel, before = kernel_seconds(study, workers), disk_seconds(folder, size)
-            whole, after = run_seconds(study, path, workers), disk_seconds(folder, size)
-            ratios.append(whole / (1.2 * kernel + before + after))
-            print(
-                f"stored, {workers} workers: kernel {kernel:.2f} s, disk {before:.2f} and {after:.2f} s for "
-                f"{size / 1e6:.0f} MB, run {whole:.2f} s"
-            )
-        print(f"  run / (1.2 kernel + parts and output at the disk's speed), median {np.median(ratios):.2f}")
-
-
 def overhead(folder: Path, cells: int) -> None:
     """A kernel of more than a microsecond a cell: what the engine adds beyond 0.2 s, in memory and stored."""
     study = foliot("map", cells)
@@ -164,7 +142,6 @@ def main() -> None:
         small(Path(folder))
         overhead(Path(folder), int(options.million * 2e5))
         two_cores(int(options.million * 2e5))
-        stored(Path(folder), int(options.million * 1e6))
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
-"""Sweeps larger than memory: what a summary of many cells takes, and how soon what is left of many blocks is known.
+"""Sweeps larger than memory: what a summary of many cells takes.
 
-    python benchmarks/speed/summary.py [FOLDER] [--million 100] [--parts 100000]
+    python benchmarks/speed/summary.py [FOLDER] [--million 100]
 
 Prints, all measured in this run and in processes of their own: the peak of resident memory over that of a sweep of a
 million cells; the processor time against that of the kernel alone on buffers that are used again; the
-forecast of `sweep plan` against what came; the time to take up a sweep of many finished blocks, and to show it.
+forecast of `sweep plan` against what came.
 """
 
 from __future__ import annotations
@@ -23,13 +23,8 @@ from engine import kernel_seconds
 
 import sweep
 from sweep.cells.block import warm
-from sweep.cells.fingerprint import fingerprint
-from sweep.cells.output_schema import part_columns
-from sweep.cells.partition import Partition
 from sweep.cells.solve import Solver
 from sweep.results.statuses import account
-from sweep.store.manifest import read_manifest
-from sweep.store.store import folder_of, opened
 from sweep.study.model import Study
 
 REDUCTIONS = {"plain": ["min", "max", "mean", "argmin"], "histogram": ["min", "max", "mean", "argmin", "histogram"]}
@@ -94,42 +89,10 @@ def size(folder: Path, cells: int, kind: str) -> None:
     )
 
 
-def parts(folder: Path, count: int) -> None:
-    """A store of many finished blocks but one: taken up, and shown."""
-    study, path = foliot(1000 * count, "cells"), folder / "many.h5"
-    columns, blocks = part_columns(study), Partition(1000 * count, 1000)
-    arrays = {c.name: np.zeros(1000, c.dtype) for c in columns}
-    with opened(path, columns) as store:
-        store.begin(study.to_json(), fingerprint(study), blocks)
-        from sweep.system import disk
-
-        # the names alone count here: no need to wait for the disk at each
-        real, disk.fsync = disk.fsync, lambda fd: None
-        for index in range(count - 1):
-            store.put(index, arrays)
-        disk.fsync = real
-    begun = time.perf_counter()
-    with opened(path, columns) as store:
-        manifest = read_manifest(store.folder)
-        assert manifest is not None
-        store.resume(manifest)
-        left = store.missing()
-        taken = time.perf_counter() - begun
-    assert left == [count - 1]
-    print(f"{count} parts: what is left is known after {taken:.2f} s")
-    for _ in range(2):
-        begun = time.perf_counter()
-        subprocess.run([sys.executable, "-m", "sweep", "show", str(path)], check=True, capture_output=True)
-        print(f"{count} parts: shown in {time.perf_counter() - begun:.1f} s")
-    for part in folder_of(path).iterdir():
-        part.unlink()
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("folder", nargs="?", type=Path, default=Path())
     parser.add_argument("--million", type=float, default=100.0, help="millions of cells")
-    parser.add_argument("--parts", type=int, default=100_000)
     parser.add_argument("--kind", default="plain")
     parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
     options = parser.parse_args()
@@ -139,8 +102,6 @@ def main() -> None:
     with TemporaryDirectory(dir=options.folder) as folder:
         for kind in REDUCTIONS if options.million else ():
             size(Path(folder), int(options.million * 1e6), kind)
-        if options.parts:
-            parts(Path(folder), options.parts)
 
 
 if __name__ == "__main__":

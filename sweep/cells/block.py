@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from sweep.cells.compiling import Compiling
-from sweep.cells.grid import empty_cells
+from sweep.cells.grid import Grid, empty_cells
 from sweep.cells.guard import told
 from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import Partition, row_blocks
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from sweep.study.model import Study
 
 SolveBlock = Callable[[int, int, Mapping[str, Any], Any], None]
-Found = str | Mapping[str, Any]
-"""A block that was computed elsewhere: the name of its part, or its numbers."""
+Found = bytes | Mapping[str, Any]
+"""A block that was computed elsewhere: the digests of what is written already, or its numbers."""
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,13 @@ class Blocks:
         What a block fills.
     rows : RowBlocks
         The cells of each row.
+    shape : tuple of int
+        In which the rows stand.
     """
 
     def __init__(self, study: Study, partition: Partition) -> None:
         self.partition, self.columns, self.rows = partition, part_columns(study), row_blocks(study)
+        self.shape = row_shape(study)
 
     @property
     def count(self) -> int:
@@ -87,8 +90,13 @@ class Blocks:
         return {column.name: column.empty(count) for column in self.columns}
 
 
+def row_shape(study: Study) -> tuple[int, ...]:
+    """The shape in which the rows of a study stand: that of its grid, or of a summary one line."""
+    return Grid(study).shape if study.summary is None else (row_blocks(study).count,)
+
+
 def block_solver(study: Study, solver: SolveCells | None = None) -> SolveBlock:
-    """Computes rows into the columns of a part; of cells, only those wanted (None: all). For one thread at a time.
+    """Computes rows into the columns of a block; of cells, only those wanted (None: all). For one thread at a time.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """How a grid is cut: into blocks that are computed and kept as a whole, and into rows.
 
-A part holds a line of numbers for each row: a cell; or, of a study with a summary, a row block, whose cells are reduced
-to one. Row blocks depend on the study alone, so that a summary has the same bits for any blocks, workers and
+A block holds a line of numbers for each row: a cell; or, of a study with a summary, a row block, whose cells are
+reduced to one. Row blocks depend on the study alone, so that a summary has the same bits for any blocks, workers and
 interruptions. The axes that are kept come first, so a group (the cells that are reduced to one number in the end) is
 one run of flat cell numbers; it is cut into row blocks of equal length, the last one shorter.
 """
@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 if TYPE_CHECKING:
     from sweep.study.model import Study
 
@@ -21,27 +23,82 @@ FINENESS = 1024
 LARGEST = 1 << 22
 """Cells of a row block, so that a block of dear cells stays short."""
 
+PADDED = 1.1
+"""Cells that the boxes of a grid may hold, for each one that it has."""
+MOST_TRIED = 4096
+"""Lengths of a box that are looked at."""
+UNNOTICED = 1.01
+"""Share of idle lanes below which fewer are not worth a smaller box."""
+
 
 @dataclass(frozen=True)
 class Partition:
-    """Blocks of `cells` flat cells in C order, the last one shorter."""
+    """Blocks of `cells` flat cells in C order, the last one of every `row` cells shorter (0: of all)."""
 
     size: int
     cells: int
+    row: int = 0
 
     @property
     def count(self) -> int:
         """Number of blocks."""
-        return -(-self.size // self.cells)
+        row = self.row or self.size
+        return self.size // row * -(-row // self.cells)
 
     def bounds(self, index: int) -> tuple[int, int]:
         """Flat range `start, stop` of a block."""
-        start = index * self.cells
-        return start, min(start + self.cells, self.size)
+        row = self.row or self.size
+        before, place = divmod(index, -(-row // self.cells))
+        start = before * row + place * self.cells
+        return start, min(start + self.cells, (before + 1) * row)
 
-    def holds(self, start: int, stop: int) -> bool:
-        """Whether there is a block of just these cells."""
-        return 0 <= start < stop and self.bounds(start // self.cells) == (start, stop)
+    def index(self, cell: Any) -> Any:
+        """The block that a cell is in, or each of an array of cells."""
+        row = self.row or self.size
+        return cell // row * -(-row // self.cells) + cell % row // self.cells
+
+    @property
+    def edges(self) -> Any:
+        """Where each block starts, and the last one stops."""
+        row = self.row or self.size
+        before, place = np.divmod(np.arange(self.count, dtype=np.int64), -(-row // self.cells))
+        return np.append(before * row + place * self.cells, self.size)
+
+
+def boxes(shape: tuple[int, ...], wanted: int, unit: int = 1) -> Partition:
+    """Blocks of about so many cells that are boxes of a grid: whole trailing axes, a run of one, single places before.
+
+    The boxes of one grid of equal boxes hold at most a tenth more than the grid. Blocks of less than some hundred
+    cells have few idle lanes where `unit` cells are solved at once.
+    """
+    inner = 1
+    for length in reversed(shape):
+        if inner * length > wanted:
+            return Partition(
+                math.prod(shape), inner * _run(length, inner, max(1, wanted // inner), unit), inner * length
+            )
+        inner *= length
+    return Partition(math.prod(shape), math.prod(shape))
+
+
+def _run(length: int, inner: int, most: int, unit: int) -> int:
+    """How much of an axis a box takes; each place of it has `inner` cells."""
+    fewer = np.arange(most, max(most // 2, most - MOST_TRIED), -1)
+    fewer = fewer[-(-length // fewer) * fewer <= PADDED * length]
+    if not fewer.size:
+        more = np.arange(most + 1, length + 1)
+        return int(more[-(-length // more) * more <= PADDED * length][0])
+    lanes = -(-fewer * inner // unit) * unit / (fewer * inner)
+    return int(fewer[np.argmin(np.maximum(lanes, UNNOTICED))])
+
+
+def box_shape(shape: tuple[int, ...], cells: int) -> tuple[int, ...]:
+    """The lengths of the boxes of so many cells that `boxes` makes of a grid."""
+    found, inner = [], 1
+    for length in reversed(shape):
+        found.append(max(1, min(length, cells // inner)))
+        inner *= length
+    return tuple(reversed(found))
 
 
 class RowStrip(NamedTuple):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.cells.partition import Partition, RowBlocks
+from sweep.cells.partition import Partition, RowBlocks, boxes
 from sweep.cells.schema import ANCILLARY, METHOD_USED, STATUS, Column
 from sweep.system.errors import SweepError
 
@@ -59,7 +59,7 @@ class Sample:
 
     def weights(self, partition: Partition, first: Callable[[Any], Any] | None = None) -> Any:
         """Estimated seconds of every block; `first` tells the first cells of rows where a row is more than a cell."""
-        edges = np.minimum(np.arange(partition.count + 1, dtype=np.int64) * partition.cells, partition.size)
+        edges = partition.edges
         starts, stops = (found := edges if first is None else first(edges))[:-1], found[1:]
         return np.interp((starts + stops) / 2, self.positions, self.costs) * (stops - starts)
 
@@ -125,10 +125,10 @@ def partition(sample: Sample, size: int, cell_bytes: float, workers: int) -> Par
     return Partition(size, min(whole_lanes, size))
 
 
-def row_partition(sample: Sample, rows: RowBlocks, row_bytes: float, workers: int) -> Partition:
-    """The same of rows."""
+def row_partition(sample: Sample, rows: RowBlocks, shape: tuple[int, ...], row_bytes: float, workers: int) -> Partition:
+    """The same of rows, which stand in a box of this shape."""
     blocks = partition(sample, rows.size, row_bytes / rows.mean, workers)
-    return Partition(rows.count, min(rows.count, math.ceil(blocks.cells / rows.mean)))
+    return boxes(shape, math.ceil(blocks.cells / rows.mean), LANES if rows.mean == 1 else 1)
 
 
 def _probe_cells(solver: _Probing, columns: Sequence[Column], size: int) -> tuple[int, bool | None]:

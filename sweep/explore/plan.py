@@ -7,7 +7,6 @@ import os
 import shutil
 import tempfile
 import time
-import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,21 +15,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kernels.interface import Status, machine_code_folder
-from sweep.cells.block import faults_reported, sampled_study
+from sweep.cells.block import faults_reported, row_shape, sampled_study
 from sweep.cells.compiling import Compiling
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.grid import Grid
 from sweep.cells.output_schema import output_schema, part_columns
 from sweep.cells.partition import Partition, row_blocks
 from sweep.cells.reduce import strip_bytes
-from sweep.cells.schema import Column
 from sweep.cells.timing import Sample, row_partition
 from sweep.explore.calibration import Calibration
 from sweep.results.open import memory
-from sweep.store.assemble import chunks, write_structure
-from sweep.store.digests import Digests
-from sweep.store.hdf5_bytes import Hdf5Bytes, PartBytes
-from sweep.store.parts import FLAGS
+from sweep.store.frame import Frame, cuts_of
 from sweep.study.read import Given, as_study
 from sweep.system.errors import SweepError
 from sweep.system.pool import cores, whole_number
@@ -43,8 +38,6 @@ TRIAL = 32 << 20
 """Bytes written to see how fast the disk is,"""
 WORTH_A_TRIAL = 1 << 28
 """where so many are to be written."""
-UNIFORM = 0.0012
-"""Share of their size that statuses take compressed where all are the same."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +49,7 @@ class Plan:
     cells, blocks, cells_per_block, workers : int
     shape : dict of str to int
         Length of every axis ("cell" of a zip).
-    part_bytes, output_bytes : int
-        Parts are removed when the output is complete; for a moment both are there.
+    output_bytes : int
     memory_bytes : int
         While it runs with an output; without one, `output_bytes` come on top.
     free_bytes : int
@@ -81,7 +73,6 @@ class Plan:
     blocks: int
     cells_per_block: int
     workers: int
-    part_bytes: int
     output_bytes: int
     memory_bytes: int
     free_bytes: int
@@ -97,8 +88,8 @@ class Plan:
     def warnings(self) -> list[str]:
         """What should be seen to before the run."""
         found = []
-        if self.part_bytes + self.output_bytes > self.free_bytes:
-            needed = quantity(self.part_bytes + self.output_bytes)
+        if self.output_bytes > self.free_bytes:
+            needed = quantity(self.output_bytes)
             found.append(f"the disk is too small: {needed} needed, {quantity(self.free_bytes)} free in {self.folder}")
         if self.memory_bytes > memory():
             found.append(f"the memory is too small: {quantity(self.memory_bytes)} needed, {quantity(memory())} there")
@@ -117,7 +108,6 @@ class Plan:
             "outputs": ", ".join(self.outputs),
             "cells": f"{self.cells:,} = {shape}" if len(self.shape) > 1 else f"{self.cells:,}",
             "blocks": f"{self.blocks:,} of {self.cells_per_block:,} cells",
-            "parts": f"{quantity(self.part_bytes)}, while it runs",
             "output": quantity(self.output_bytes),
             "disk": f"{quantity(self.free_bytes)} free in {self.folder}",
             "memory": quantity(self.memory_bytes),
@@ -187,9 +177,8 @@ def _is_kept(kernel: str) -> bool:
 def _forecast(study: Study, sample: Sample, workers: int, folder: Path) -> Plan:
     rows, columns = row_blocks(study), part_columns(study)
     row_bytes = sum(c.cell_bytes for c in columns)
-    blocks = row_partition(sample, rows, row_bytes, workers)
-    parts = _part_bytes(columns, blocks)
-    output, frame = _output_bytes(study, sample, blocks)
+    blocks = row_partition(sample, rows, row_shape(study), row_bytes, workers)
+    output = _output_bytes(study, blocks)
     names = [m.name for m in study.kernel.methods]
     return Plan(
         title=study.title,
@@ -200,48 +189,34 @@ def _forecast(study: Study, sample: Sample, workers: int, folder: Path) -> Plan:
         blocks=blocks.count,
         cells_per_block=rows.cells(0, blocks.cells)[1],
         workers=workers,
-        part_bytes=parts,
         output_bytes=output,
-        memory_bytes=2 * workers * (blocks.cells * row_bytes + strip_bytes(study)) + frame,
+        memory_bytes=2 * workers * (blocks.cells * row_bytes + strip_bytes(study)),
         free_bytes=shutil.disk_usage(folder).free,
         folder=str(folder),
         cell_seconds=sample.cost,
-        seconds=_seconds(study, sample, blocks, parts, output, workers, folder),
+        seconds=_seconds(study, sample, blocks, output, workers, folder),
         methods=_counted(sample.method_used, dict(enumerate(names)) | {-1: "none"}),
         statuses=_counted(sample.status, {int(s): s.name for s in Status}),
     )
 
 
-def _seconds(
-    study: Study, sample: Sample, blocks: Partition, parts: int, output: int, workers: int, folder: Path
-) -> float:
+def _seconds(study: Study, sample: Sample, blocks: Partition, output: int, workers: int, folder: Path) -> float:
     """What a run takes, of some of the cells in earnest; or, where that cannot be, from the probes alone."""
     rows = row_blocks(study)
     cells, block = rows.size, rows.cells(0, blocks.cells)[1]
-    found = Calibration(study, cells, block, sample.cost, (parts + output) / cells, workers).seconds(folder)
+    found = Calibration(study, cells, block, sample.cost, output / cells, workers).seconds(folder)
     if not math.isnan(found):
         return found
-    speed = _disk_speed(folder) if parts + output > WORTH_A_TRIAL else math.inf
-    # parts are written while others are computed
-    return max(sample.cost * cells / min(workers, blocks.count), parts / speed) + output / speed
+    speed = _disk_speed(folder) if output > WORTH_A_TRIAL else math.inf
+    # blocks are written while others are computed
+    return max(sample.cost * cells / min(workers, blocks.count), output / speed)
 
 
-def _part_bytes(columns: tuple[Column, ...], blocks: Partition) -> int:
-    """All parts, as files."""
-    part_bytes = PartBytes(columns)
-    last = blocks.bounds(blocks.count - 1)
-    return (blocks.count - 1) * part_bytes.template(blocks.cells).size + part_bytes.template(last[1] - last[0]).size
-
-
-def _output_bytes(study: Study, sample: Sample, blocks: Partition) -> tuple[int, int]:
-    """The output, and all of it but the outputs' numbers; its structure is made for this, in memory."""
-    content, hdf5 = output_schema(study, fingerprint(study)), Hdf5Bytes()
-    write_structure(hdf5, content, Digests(content.columns, chunks(study, blocks)))
-    numbers = sum(c.cell_bytes for c in content.columns if c.name not in FLAGS) * content.grid.size
-    flags = sum(c.name in FLAGS for c in content.columns) * content.grid.size
-    packed = len(zlib.compress(sample.status.tobytes(), 1)) / max(len(sample.status), 1)
-    uniform = len(set(sample.status.tolist())) < 2
-    return hdf5.size + int(flags * (UNIFORM if uniform else packed)), hdf5.size - numbers
+def _output_bytes(study: Study, blocks: Partition) -> int:
+    """The output; its structure is made for this, in memory."""
+    mark = fingerprint(study)
+    schema = output_schema(study, mark)
+    return Frame(schema, cuts_of(study, schema, blocks), mark, "").layout.size
 
 
 def _disk_speed(folder: Path) -> float:

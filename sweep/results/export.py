@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import functools
 import itertools
 import math
 import os
@@ -24,11 +25,20 @@ from sweep.system.table import cell
 ROWS = 65536
 """Rows of csv in memory at a time."""
 
+COMPRESSION = 5
+"""Level of a compression that is asked for."""
 LARGE = 256 * 2**20
 """Bytes from which a Dataset is written to netCDF4 piece by piece."""
 
 
-def export(dataset: xr.Dataset, path: str | os.PathLike[str], *, force: bool = False) -> Path:
+def export(
+    dataset: xr.Dataset,
+    path: str | os.PathLike[str],
+    *,
+    force: bool = False,
+    compress: bool = False,
+    float32: bool = False,
+) -> Path:
     """Write a Dataset to `path`, as its suffix says: .csv, .parquet, .nc or .zarr.
 
     An earlier export of the same kind is replaced once all is written; anything else that is there only by `force`,
@@ -42,12 +52,14 @@ def export(dataset: xr.Dataset, path: str | os.PathLike[str], *, force: bool = F
     parquet: the same table with types; units and meanings are in the metadata of each field, the Dataset's attributes
     in that of the schema.
 
-    nc, zarr: netCDF4, or a folder of zarr, with units, flags and all attributes.
+    nc, zarr: netCDF4, or a folder of zarr, with units, flags and all attributes; with `compress` smaller, every bit
+    kept; with `float32` outputs in 24 bits of precision.
 
     Raises
     ------
     SweepError
-        If the suffix is another, what writes it is not installed, or the file cannot be, or is not to be, written.
+        If the suffix is another, what writes it is not installed, or the file cannot be, or is not to be, written; if
+        float32 cannot hold a value.
 
     Examples
     --------
@@ -63,16 +75,44 @@ def export(dataset: xr.Dataset, path: str | os.PathLike[str], *, force: bool = F
         raise SweepError(f"{target}: found {found}; export writes {listed(WRITERS, word='and')}, as the suffix says")
     if target.is_dir() and kind != ".zarr":
         raise SweepError(f"{target} is a folder; name a file in it")
+    if (compress or float32) and kind not in PACKED:
+        raise SweepError(f"{target}: compress and float32 are for {listed(PACKED, word='and')}")
     source = dataset.encoding.get("source")
     check_target(target, kind, force=force, read=[Path(source)] if source else [])
     try:
         with disk.replacing(target) as part:
-            WRITERS[kind](_marked(dataset), part)
+            whole = _in_float32(dataset) if float32 else dataset
+            writer = functools.partial(PACKED[kind], compress=True) if compress else WRITERS[kind]
+            writer(_marked(whole), part)
     except ImportError as error:
         raise SweepError(f'{target}: needs {error.name}; install it with: pip install "foliot[export]"') from None
     except RuntimeError as error:  # from HDF5
         raise SweepError(f"{target} cannot be written: {error}") from None
     return target
+
+
+def _in_float32(dataset: xr.Dataset) -> xr.Dataset:
+    """The Dataset with its outputs in float32. Raises SweepError, maybe as it is written, where that is too narrow."""
+    whole = _in_pieces(dataset)
+    doubles = {name: v for name, v in whole.data_vars.items() if v.dtype == np.float64}
+    return whole.assign({name: _narrowed(str(name), v) for name, v in doubles.items()})
+
+
+def _narrowed(name: str, variable: xr.DataArray) -> xr.DataArray:
+    found: xr.DataArray = xr.apply_ufunc(
+        functools.partial(_single, name), variable, dask="parallelized", output_dtypes=[np.float32], keep_attrs=True
+    )
+    return found
+
+
+def _single(name: str, values: Any) -> Any:
+    with np.errstate(over="ignore", under="ignore"):
+        found = np.asarray(values).astype(np.float32)
+    limits = np.finfo(np.float32)
+    lost = np.isfinite(values) & (np.isinf(found) | ((abs(found) < limits.smallest_normal) & (values != 0)))
+    if lost.any():
+        raise SweepError(f"{name}: float32 cannot hold {np.asarray(values)[lost].flat[0]!r}; export it in float64")
+    return found
 
 
 def _marked(dataset: xr.Dataset) -> xr.Dataset:
@@ -116,13 +156,15 @@ def _text(attrs: Mapping[Any, Any]) -> dict[str, str]:
     return {str(name): str(value) for name, value in attrs.items() if name not in ("flag_values", "flag_meanings")}
 
 
-def _write_zarr(dataset: xr.Dataset, path: Path) -> None:
-    import zarr  # noqa: F401  xarray would say in other words that it is missing
+def _write_zarr(dataset: xr.Dataset, path: Path, compress: bool = False) -> None:
+    import zarr
 
     path.unlink()
+    blosc = zarr.codecs.BloscCodec(cname="zstd", clevel=COMPRESSION, shuffle="shuffle")
+    encoding = {str(name): {"compressors": (blosc,)} for name, v in dataset.data_vars.items() if v.shape and compress}
     whole = _in_pieces(dataset)
     words = {str(name): whole[name].astype(object) for name in whole.variables if whole[name].dtype.kind == "U"}
-    whole.assign(words).drop_encoding().to_zarr(path, mode="w", consolidated=False)
+    whole.assign(words).drop_encoding().to_zarr(path, mode="w", consolidated=False, encoding=encoding)
 
 
 def _in_pieces(dataset: xr.Dataset) -> xr.Dataset:
@@ -205,11 +247,13 @@ def _flat_columns(variable: xr.DataArray) -> Iterator[tuple[str, xr.DataArray]]:
         yield name, variable
 
 
-def _write_netcdf(dataset: xr.Dataset, path: Path) -> None:
+def _write_netcdf(dataset: xr.Dataset, path: Path, compress: bool = False) -> None:
     whole = _in_pieces(dataset)
     encoding: dict[str, dict[str, Any]] = {str(name): {"_FillValue": None} for name in whole.variables}
     for name, variable in whole.data_vars.items():
-        if variable.dtype.kind in "iu" and math.prod(variable.shape) > 1:
+        if compress and variable.shape:
+            encoding[str(name)] |= {"zlib": True, "shuffle": True, "complevel": COMPRESSION}
+        elif variable.dtype.kind in "iu" and math.prod(variable.shape) > 1:
             encoding[str(name)] |= {"zlib": True, "complevel": 1}
     whole.to_netcdf(path, engine="h5netcdf", encoding=encoding)
 
@@ -221,3 +265,5 @@ WRITERS: dict[str, Callable[[xr.Dataset, Path], None]] = {
     ".zarr": _write_zarr,
 }
 """Kinds of file, by suffix."""
+PACKED: dict[str, Callable[..., None]] = {".nc": _write_netcdf, ".zarr": _write_zarr}
+"""Those that can be compressed."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sweep.cells.output_schema import output_schema
+from sweep.store.reading import StoredFile
 
 if TYPE_CHECKING:
     from sweep.cells.schema import Coordinate
@@ -33,7 +33,7 @@ class StoredColumn:
     @property
     def values(self) -> Any:
         """All its numbers."""
-        return np.asarray(self.numbers[()])
+        return np.asarray(self.numbers[...])
 
     def __getitem__(self, key: Any) -> Any:
         return np.asarray(self.numbers[key])
@@ -50,17 +50,16 @@ class Stored:
     """
 
     def __init__(self, output: Path, study: Study) -> None:
-        import h5py
-
         schema = self._schema = output_schema(study, {})
-        self._file = h5py.File(output, "r")
+        self._file = StoredFile(output)
+        self._numbers = self._file.columns()
         self.coords: dict[str, Coordinate] = {c.name: c for c in schema.coordinates}
         self._columns = {c.name: c for c in schema.columns}
 
     def __enter__(self) -> Stored:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, fault: BaseException | None, at: TracebackType | None) -> None:
+    def __exit__(self, *fault: object) -> None:
         self._file.close()
 
     def __contains__(self, name: str) -> bool:
@@ -71,4 +70,4 @@ class Stored:
             coordinate = self.coords[name]
             return StoredColumn(coordinate.dims, coordinate.attrs, np.asarray(coordinate.values))
         column = self._columns[name]
-        return StoredColumn((*self._schema.grid.dims, *column.dims), column.attrs, self._file[name])
+        return StoredColumn((*self._schema.grid.dims, *column.dims), column.attrs, self._numbers[name])

@@ -12,7 +12,6 @@ import secrets
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError, Future
 from itertools import islice
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,9 +22,8 @@ from sweep.runs.cluster import LOST_SECONDS, Absence, Cluster
 from sweep.runs.extend import Precomputed, Reused
 from sweep.runs.isolate import Limits, kernel_paths
 from sweep.runs.task import WAIT, Task
-from sweep.runs.worker import TOKEN, Answer, Assignment, Sent
-from sweep.store.parts import digest
-from sweep.system import disk
+from sweep.runs.worker import Answer, Assignment, Sent, digest
+from sweep.store.store import Shared
 from sweep.system.errors import SweepError
 from sweep.system.log import log
 from sweep.system.pool import CtrlC, through
@@ -52,7 +50,7 @@ class Dispatch:
     blocks : how the rows are cut
     left : how many blocks there are to compute
     reused : cells that need not be computed; they are filled in here
-    shared : folder in which workers that see it write parts; None: all numbers are wanted here
+    shared : file to which workers that see it write; None: all numbers are wanted here
     limits : what cells may take that are solved in processes of their own; None: in those of the workers
     """
 
@@ -63,7 +61,7 @@ class Dispatch:
         blocks: Blocks,
         left: int,
         reused: Reused | Precomputed | None,
-        shared: Path | None,
+        shared: Shared | None,
         limits: Limits | None = None,
     ) -> None:
         self._cluster, self._blocks, self._left, self._reused, self._note = cluster, blocks, left, reused, task.note
@@ -146,7 +144,7 @@ class Dispatch:
         self._seconds = mean if math.isinf(self._seconds) else 0.7 * self._seconds + 0.3 * mean
         bad = answer.bad
         for job, found in answer.found.items():
-            numbers = found if isinstance(found, str) else self._checked(job, found)
+            numbers = found if isinstance(found, bytes) else self._checked(job, found)
             self._receive(Computed(job, numbers, mean, answer.seconds, bad))
             bad = ()
 
@@ -194,25 +192,13 @@ class Dispatch:
         return arrays
 
 
-def write_token(shared: Path, token: str) -> None:
-    """Puts the token into the folder: a worker that reads it there sees the same folder. Raises SweepError."""
-    try:
-        disk.publish([token.encode("ascii")], shared / f"{TOKEN}.tmp", shared / TOKEN)
-    except OSError as fault:
-        raise disk.refusal(fault, shared) from fault
-
-
-def _assignment(task: Task, blocks: Blocks, shared: Path | None, limits: Limits | None) -> Assignment:
-    token = secrets.token_hex(16)
-    if shared is not None:
-        write_token(shared, token)
+def _assignment(task: Task, blocks: Blocks, shared: Shared | None, limits: Limits | None) -> Assignment:
     return Assignment(
-        run=f"foliot-{token[:8]}",
+        run=f"foliot-{secrets.token_hex(4)}",
         study=task.study.to_json(),
         fingerprint=task.fingerprint,
         partition=blocks.partition,
-        shared=str(shared or ""),
-        token=token,
+        shared=shared,
         paths=kernel_paths(task.study),
         limits=limits,
     )

@@ -5,12 +5,12 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sweep.cells.block import Found
 from sweep.runs.session import Session
 from sweep.runs.task import HERE, WAIT, Task
+from sweep.store.store import Shared
 from sweep.system.errors import SweepError
 from sweep.system.progress import TimeUp
 
@@ -41,7 +41,7 @@ def joined(task: Task) -> Iterator[Cluster | None]:
 
 
 def compute_elsewhere(
-    session: Session, cluster: Cluster, shared: Path | None, receive: Callable[[int, Found], None]
+    session: Session, cluster: Cluster, shared: Shared | None, receive: Callable[[int, Found], None]
 ) -> bool:
     """Has what is left of a session computed by a cluster; False where it lost its workers, and the rest is for here.
 

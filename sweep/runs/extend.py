@@ -17,10 +17,11 @@ from kernels.interface import Status
 from sweep.cells.block import block_solver
 from sweep.cells.fingerprint import COMPILERS, SOURCE
 from sweep.cells.grid import Grid
-from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS, Column, columns
+from sweep.cells.schema import ANCILLARY, ERROR_BOUND, METHOD_USED, STATUS, Column, columns
 from sweep.results.open import unreadable
 from sweep.results.statuses import flat_pieces
-from sweep.store.parts import DAMAGE
+from sweep.store.layout import DAMAGE
+from sweep.store.reading import StoredFile
 from sweep.study.model import Axis, Study
 from sweep.system.errors import SweepError
 
@@ -94,16 +95,23 @@ class Reused:
         self._columns: tuple[Column, ...] = columns(study)
         try:
             self._file = h5py.File(output, "r")
+            self._stored = StoredFile(output)
             old = Study.from_json(str(self._file.attrs["study_json"]), declared=True)
             self.taken_over = str(self._file.attrs.get(TAKEN_OVER, ""))
         except DAMAGE as fault:
             raise unreadable(output, fault) from None
+        # flags of earlier versions are compressed, and left to HDF5
+        self._numbers = {
+            **{name: self._file[name] for name in ANCILLARY if name in self._file},
+            **self._stored.columns(),
+        }
         self._positions = [_positions(old.axes[name], axis) for name, axis in study.axes.items()]
 
     def __enter__(self) -> Reused:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, fault: BaseException | None, at: TracebackType | None) -> None:
+        self._stored.close()
         self._file.close()
 
     @property
@@ -135,16 +143,16 @@ class Reused:
         """Those of a piece of the result. Raises SweepError where the file fails."""
         try:
             # earlier versions did not write the error bounds; none of their cells that are taken over has one
-            return np.nan if self._lacks(name) else self._file[name][slices]
+            return np.nan if self._lacks(name) else self._numbers[name][slices]
         except DAMAGE as fault:
             raise unreadable(self._output, fault) from None
 
     def _lacks(self, name: str) -> bool:
-        return name == ERROR_BOUND and name not in self._file
+        return name == ERROR_BOUND and name not in self._numbers
 
     def check_sample(self) -> None:
         """Computes some cells of every status and method again. Raises SweepError where one has other bits now."""
-        if self._lacks(ERROR_BOUND) and any((p == Status.INACCURATE).any() for p in flat_pieces(self._file[STATUS])):
+        if self._lacks(ERROR_BOUND) and any((p == Status.INACCURATE).any() for p in flat_pieces(self._numbers[STATUS])):
             raise self._refusal("it does not say what its INACCURATE values are right to")
         solve, cells = block_solver(self._study), self._sample()
         for cell in cells:
@@ -167,13 +175,13 @@ class Reused:
         """Some cells of every status and method, by their numbers in the grid of the extended study."""
         kinds: dict[tuple[int, int], list[Any]] = {}
         done = 0
-        for status, used in zip(*(flat_pieces(self._file[name]) for name in (STATUS, METHOD_USED)), strict=True):
+        for status, used in zip(*(flat_pieces(self._numbers[name]) for name in (STATUS, METHOD_USED)), strict=True):
             for kind in np.unique(np.stack([status, used]), axis=1).T.tolist():
                 cells = np.flatnonzero((status == kind[0]) & (used == kind[1]))
                 kinds.setdefault((kind[0], kind[1]), []).append(done + _spread(cells))
             done += len(status)
         chosen = np.concatenate([_spread(np.concatenate(cells)) for cells in kinds.values()])
-        places = np.unravel_index(chosen, self._file[STATUS].shape)
+        places = np.unravel_index(chosen, self._numbers[STATUS].shape)
         # the old values keep their order among the new ones
         new = [np.flatnonzero(p >= 0)[place] for p, place in zip(self._positions, places, strict=True)]
         return list(map(int, np.ravel_multi_index(new, self._grid.shape)))

@@ -1,15 +1,16 @@
-"""What stands at an output's place before a run: a result that is complete, parts to continue, or something else."""
+"""What stands at an output's place before a run: a result that is complete, one to continue, or something else."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from sweep.cells.fingerprint import difference
+from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import row_blocks
-from sweep.results.open import checked_study, stored_fingerprint
+from sweep.results.open import stored_fingerprint
 from sweep.runs.extend import has_failed, obstacle
 from sweep.runs.task import Task
-from sweep.store.manifest import Manifest, read_manifest, restored
+from sweep.store.layout import Layout
 from sweep.store.store import Store
 from sweep.system.errors import SweepError
 
@@ -27,8 +28,7 @@ def is_complete(task: Task) -> bool:
     if task.force:
         return False
     if stored == dict(task.fingerprint):
-        check_whole(task)
-        return not (task.retry_failed and has_failed(task.output))
+        return _is_whole(task) and not (task.retry_failed and has_failed(task.output))
     hindrance = obstacle(stored, task.fingerprint)
     if task.extend and not hindrance:
         return False
@@ -38,6 +38,16 @@ def is_complete(task: Task) -> bool:
     raise SweepError(f"{task.output}: {what}; {cure}{more}\n" + _listed(stored, task.fingerprint))
 
 
+def _is_whole(task: Task) -> bool:
+    """False where the result is damaged and is to be repaired. Raises SweepError where it is not, or cannot be."""
+    from sweep.results.verify import verify
+
+    if task.repair and verify(task.output).blocks is not None:
+        return False
+    check_whole(task)
+    return True
+
+
 def check_whole(task: Task) -> None:
     """Raises SweepError where the result is damaged."""
     from sweep.results import verify
@@ -45,53 +55,63 @@ def check_whole(task: Task) -> None:
     verify.check_whole(task.output)
 
 
-def earlier(store: Store, task: Task) -> Manifest | None:
-    """What an earlier run left, if it can be read. Raises SweepError where it cannot, unless forced."""
-    try:
-        manifest = read_manifest(store.folder)
-        if manifest is not None:
-            checked_study(store.folder, manifest)
-            return manifest
-    except SweepError:
-        manifest = None if task.force else _restored(store, task)
-        if manifest is None and not task.force:
-            raise
-        return manifest
-    return None if task.force else _restored(store, task)
-
-
-def _restored(store: Store, task: Task) -> Manifest | None:
-    """The manifest that is lost or damaged, written anew where the parts are of this study. Raises SweepError."""
-    study = task.study
-    manifest = restored(store.folder, store.columns, study.to_json(), task.fingerprint, row_blocks(study).count)
-    if manifest is not None:
-        store.write(manifest)
-        task.note("its spec.json was lost or damaged; it is written anew")
-    return manifest
-
-
-def take_up(store: Store, manifest: Manifest | None, task: Task) -> None:
+def take_up(store: Store, task: Task) -> None:
     """Continues what an earlier run left. Raises SweepError where that was another study, unless forced."""
-    if manifest is not None and dict(manifest.fingerprint) == dict(task.fingerprint):
-        store.resume(manifest)
-    elif manifest is None and store.orphans() and not task.force:
-        raise SweepError(
-            f"{store.folder}: {store.orphans()} finished blocks, but no spec.json that says of which study; "
-            "put it back, or give the blocks up with --force"
-        )
-    elif manifest is None or task.force:
-        store.clear()
+    _tell_of_parts(task)
+    layout = _found(store, task)
+    if layout is None and task.repair and not task.force and task.output.exists():
+        from sweep.results.verify import verify
+
+        store.reopen(verify(task.output).blocks or ())
+    elif layout is None:
+        store.discard()
+    elif dict(layout.fingerprint) == dict(task.fingerprint) and _fits(layout, task):
+        store.resume(layout)
+    elif task.force:
+        store.discard()
     else:
         raise SweepError(
-            f"{store.folder}: unfinished parts of another study or version; finish that one first, choose another "
-            "name, or give its parts up with --force\n" + _listed(manifest.fingerprint, task.fingerprint)
+            f"{store.path}: the unfinished result of another study or version; finish that one first, choose another "
+            "name, or give it up with --force\n" + _listed(layout.fingerprint, task.fingerprint)
         )
 
 
-def tidy(store: Store, manifest: Manifest | None, task: Task) -> None:
-    """Removes parts that were left over although their output is complete; not those of another study."""
-    if manifest is None or dict(manifest.fingerprint) == dict(task.fingerprint):
-        store.clear()
+def _found(store: Store, task: Task) -> Layout | None:
+    """What an earlier run left; None where that is damaged and given up."""
+    try:
+        return store.found()
+    except SweepError:
+        if not task.force:
+            raise
+        return None
+
+
+def _fits(layout: Layout, task: Task) -> bool:
+    """Whether a file has the columns and rows of a study. Raises SweepError where it has not, unless forced."""
+    columns = [(c.name, c.cell_bytes) for c in part_columns(task.study)]
+    rows = row_blocks(task.study).count
+    work = layout.work
+    if [(p.name, p.cell_bytes) for p in work.places] == columns and work.blocks.size == rows:
+        return True
+    if task.force:
+        return False
+    raise SweepError(f"{task.output}: its unfinished result is not what its study makes; give it up with --force")
+
+
+def _tell_of_parts(task: Task) -> None:
+    parts = task.output.with_name(task.output.name + ".parts")
+    if parts.is_dir():
+        task.note(
+            f"{parts} holds blocks that an earlier version kept; this one cannot continue them and starts anew; remove "
+            "the folder, or finish with the earlier version"
+        )
+
+
+def tidy(store: Store, task: Task) -> None:
+    """Removes what was left over although its output is complete; not that of another study."""
+    layout = _found(store, task)
+    if layout is not None and dict(layout.fingerprint) == dict(task.fingerprint):
+        store.discard()
 
 
 def _listed(old: Mapping[str, str], new: Mapping[str, str]) -> str:

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
-import time
 from collections.abc import Mapping
 from datetime import datetime
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-import numpy as np
-
 from sweep.cells.block import Found
 from sweep.cells.fingerprint import fingerprint
-from sweep.cells.output_schema import gathered, part_columns
+from sweep.cells.output_schema import gathered
 from sweep.cells.partition import row_blocks
 from sweep.results.open import in_memory, memory, open_result, open_unfinished, stored_fingerprint
 from sweep.runs import resume
@@ -25,12 +21,13 @@ from sweep.runs.extend import Precomputed, Retried, Reused, is_of_another_versio
 from sweep.runs.isolate import Limits
 from sweep.runs.session import Session, Solve
 from sweep.runs.task import END, HERE, WAIT, Task
-from sweep.store.assemble import assemble
-from sweep.store.store import Store, folder_of, opened
+from sweep.store.frame import Frame, cuts_of
+from sweep.store.reading import StoredFile
+from sweep.store.store import Gather, Store, opened, unfinished_of
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.study.read import KEYS, Given, as_study
+from sweep.system import disk
 from sweep.system.errors import SweepError
-from sweep.system.forecast import Ending
 from sweep.system.pool import BufferPool, Cores, CtrlC, Terminated, cores, whole_number
 from sweep.system.progress import TimeUp, deadline, quantity, seconds_of, stream_of
 
@@ -43,7 +40,7 @@ if TYPE_CHECKING:
 STORED_AT_ONCE = 1 << 16
 """Cells of a block of those that are solved already."""
 MOST_ATTEMPTS = 3
-"""Times that damaged parts are computed again before the disk is given up."""
+"""Times that damaged blocks are computed again before the disk is given up."""
 
 
 def run(
@@ -57,6 +54,7 @@ def run(
     extend: bool = False,
     until: str | datetime | None = None,
     cluster: Any = None,
+    repair: bool = False,
     isolate: bool = False,
     cell_timeout: float | str | None = None,
     retry_failed: bool = False,
@@ -75,7 +73,7 @@ def run(
     workers : int, optional
         Cells are computed on so many cores at once; default: all this process may use.
     force : bool
-        Overwrite the result of another study, give up its unfinished parts, compute a complete one anew.
+        Overwrite the result of another study, give up one that is not finished, compute a complete one anew.
     progress : bool or text stream, optional
         Where to tell how far it is; None and True: stderr, False: nowhere. A run of less than a second is silent.
     block_cells : int, optional
@@ -89,6 +87,8 @@ def run(
     cluster : str or distributed.Client, optional
         Compute on the workers of this dask scheduler ("tcp://10.0.0.1:8786", or a scheduler file) instead of here.
         Workers that see the folder of the output write there; others send their numbers.
+    repair : bool
+        Where the output is complete for this study, but damaged on the disk, compute the damaged blocks again.
     isolate : bool
         Solve cells in processes of their own: a kernel that crashes or never ends costs only the cells it does so at.
         The command does so for every kernel "module:NAME".
@@ -129,6 +129,7 @@ def run(
         extend=extend,
         until=until,
         cluster=cluster,
+        repair=repair,
         isolate=isolate,
         cell_timeout=cell_timeout,
         retry_failed=retry_failed,
@@ -162,7 +163,7 @@ def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> bool
 
 def is_begun(output: Path) -> bool:
     """Whether there is a sweep that writes an output, and has not ended."""
-    return folder_of(Path(os.path.realpath(output))).exists()
+    return unfinished_of(Path(os.path.realpath(output))).exists()
 
 
 def store_cells(
@@ -206,6 +207,7 @@ def _task(
     extend: bool = False,
     until: str | datetime | None = None,
     cluster: Any = None,
+    repair: bool = False,
     isolate: bool = False,
     cell_timeout: float | str | None = None,
     retry_failed: bool = False,
@@ -231,6 +233,7 @@ def _task(
         extend,
         deadline(until),
         cluster,
+        repair,
         isolate or cell_timeout is not None,
         Limits(None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout)),
         retry_failed,
@@ -247,7 +250,7 @@ def _checked(path: str | os.PathLike[str]) -> Path:
 
 def _complete(task: Task) -> bool:
     """False where the time was up before the end."""
-    return (resume.is_complete(task) and not folder_of(task.output).exists()) or _run_to_file(task)
+    return (resume.is_complete(task) and not unfinished_of(task.output).exists()) or _run_to_file(task)
 
 
 def _run_in_memory(task: Task) -> xr.Dataset:
@@ -274,7 +277,7 @@ def _fill(session: Session, arrays: Mapping[str, Any], cluster: Cluster | None) 
         solve(*session.blocks.bounds(job), place(job))
 
     def receive(job: int, found: Found) -> None:
-        assert not isinstance(found, str)
+        assert not isinstance(found, bytes)
         for name, column in place(job).items():
             column[...] = found[name]
 
@@ -293,18 +296,17 @@ def _arrays(session: Session) -> dict[str, Any]:
 
 def _run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
     """False where the time was up before the end."""
-    with opened(task.output, part_columns(task.study)) as store, contextlib.ExitStack() as stack:
+    with opened(task.output) as store, contextlib.ExitStack() as stack:
         stack.enter_context(task.cores.told_by_signals())
-        manifest = resume.earlier(store, task)
         # looked at again, for another run may have ended before this one had the lock
         if resume.is_complete(task):
-            resume.tidy(store, manifest, task)
+            resume.tidy(store, task)
             return True
-        resume.take_up(store, manifest, task)
-        if store.manifest is not None and not store.missing():
-            return _run_session(Session(task, task.workers, store.blocks, sampled=False), store, None)
+        resume.take_up(store, task)
+        if store.layout is not None and not store.missing():
+            return _run_session(Session(task, task.workers, store.table.blocks, sampled=False), store, None)
         reused = precomputed or _reused(task, stack)
-        blocks = None if store.manifest is None else store.blocks
+        blocks = None if store.layout is None else store.table.blocks
         try:
             cluster = stack.enter_context(joined(task))
             session = Session(task, threads(task, cluster), blocks, sampled=precomputed is None, reused=reused)
@@ -329,18 +331,16 @@ def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
 
 
 def _run_session(session: Session, store: Store, cluster: Cluster | None) -> bool:
-    """Computes and puts together what is missing; False where the time was up before the end."""
-    blocks, task = session.blocks, session.task
-    ending = Ending(blocks.count, task.workers, blocks.rows.count * blocks.row_bytes)
-    progress = session.begin(range(blocks.count) if store.manifest is None else store.missing(), ending.seconds)
-    _check_space(session)
+    """Computes what is missing and ends the result; False where the time was up before."""
+    progress = session.begin(range(session.blocks.count) if store.layout is None else store.missing())
+    session.tick = store.tick
     session.log_begin()
     # held back wherever they would leave half a file behind
     with CtrlC():
-        if store.manifest is None:
-            store.begin(task.study.to_json(), task.fingerprint, blocks.partition)
+        if store.layout is None:
+            _begin(session, store, shared=cluster is not None)
         try:
-            _finish(session, store, cluster, ending)
+            _finish(session, store, cluster)
         except (KeyboardInterrupt, Terminated):
             progress.note(f"stopped; {_kept(store)}")
             raise
@@ -349,58 +349,68 @@ def _run_session(session: Session, store: Store, cluster: Cluster | None) -> boo
             return False
         finally:
             session.close()
-        store.clear()
     return True
 
 
+def _begin(session: Session, store: Store, shared: bool) -> None:
+    """Makes the file. Raises SweepError where it has no room on the disk."""
+    task = session.task
+    cuts = cuts_of(task.study, session.schema, session.blocks.partition)
+    frame = Frame(session.schema, cuts, task.fingerprint, session.began, shared)
+    needed, free = frame.layout.size, disk.free(task.output.parent)
+    if needed > free:
+        raise SweepError(
+            f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, choose "
+            "another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
+        )
+    store.begin(frame)
+
+
 def _kept(store: Store) -> str:
-    kept = f"{len(store.names)} of {store.blocks.count} blocks are kept"
+    store.commit()
+    kept = f"{store.count} of {store.table.blocks.count} blocks are kept"
     return f"{kept}, run the same command again to continue"
 
 
-def _finish(session: Session, store: Store, cluster: Cluster | None, ending: Ending) -> None:
-    """Computes what is missing and puts the result together, again where a part turns out to be damaged."""
+def _finish(session: Session, store: Store, cluster: Cluster | None) -> None:
+    """Computes what is missing and ends the result, again where a block turns out to be damaged."""
+    gather = None if session.study.summary is None else _gather(session.study)
     for _ in range(MOST_ATTEMPTS):
         if store.missing() and cluster is not None and not _store_elsewhere(session, store, cluster):
             cluster = None
         if store.missing() and cluster is None:
-            _store_blocks(session, store, ending)
-        damaged = _assembled(session, store)
+            _store_blocks(session, store)
+        damaged = store.finish(session.endings(), gather)
         if not damaged:
             session.progress.end()
             return
         for index in damaged:
-            path = store.set_aside(index)
             session.again(index)
-            session.progress.note(
-                f"{session.blocks.label(index)} were damaged on the disk and are computed again; see {path}"
-            )
-    raise SweepError(f"{store.folder}: what is written there comes back damaged again and again; the disk is failing")
+            session.progress.note(f"{session.blocks.label(index)} were damaged on the disk and are computed again")
+    raise SweepError(f"{store.path}: what is written there comes back damaged again and again; the disk is failing")
 
 
-def _assembled(session: Session, store: Store) -> list[int]:
-    """Blocks that turn out to be damaged while the result is put together; where there are none, it is there."""
-    assert store.manifest is not None
+def _gather(study: Study) -> Gather:
+    """Makes blocks of a summary's output from its rows."""
+    per_group = row_blocks(study).per_group
 
-    def tell(done: int, total: int) -> None:
-        session.progress.gather(done, total)
-        session.check_time()
+    def gather(file: StoredFile, block: int) -> dict[str, Any]:
+        first, last = file.layout.tables["cells"].blocks.bounds(block)
+        rows = {name: c.run(first * per_group, last * per_group) for name, c in file.columns("rows").items()}
+        return gathered(study, rows)
 
-    schema, task = session.dated(store.manifest.begun), session.task
-    return assemble(store, session.study, schema, task.output, task.workers, tell)
+    return gather
 
 
-def _store_blocks(session: Session, store: Store, ending: Ending) -> None:
+def _store_blocks(session: Session, store: Store) -> None:
     buffers = BufferPool(session.blocks.empty)
 
     def work(job: int, solve: Solve) -> None:
-        start, stop = store.blocks.bounds(job)
+        start, stop = session.blocks.bounds(job)
         with buffers.borrow() as columns:
             arrays = {name: column[: stop - start] for name, column in columns.items()}
             if solve(start, stop, arrays):
-                begun = time.monotonic()
                 store.put(job, arrays)
-                ending.wrote(time.monotonic() - begun)
 
     session.compute(work)
 
@@ -409,27 +419,9 @@ def _store_elsewhere(session: Session, store: Store, cluster: Cluster) -> bool:
     """Blocks that workers of a cluster compute, and write themselves where they can; False where it lost them."""
 
     def receive(job: int, found: Found) -> None:
-        if isinstance(found, str):
+        if isinstance(found, bytes):
             store.take(job, found)
         else:
             store.put(job, found)
 
-    whole = compute_elsewhere(session, cluster, store.open_shared(), receive)
-    store.close_shared()
-    return whole
-
-
-def _check_space(session: Session) -> None:
-    """Raises SweepError where the parts to come and the output have no room on the disk."""
-    schema, blocks, progress, output = session.schema, session.blocks, session.progress, session.task.output
-    missing = blocks.row_bytes * (progress.total - progress.done) / blocks.rows.mean
-    coordinates = sum(np.asarray(coordinate.values).nbytes for coordinate in schema.coordinates)
-    # the study is in the parts' spec.json, too
-    words = 2 * sum(len(str(text).encode()) for text in schema.attrs.values())
-    needed = missing + schema.cell_bytes * schema.grid.size + coordinates + words
-    free = shutil.disk_usage(output.parent).free
-    if needed > free:
-        raise SweepError(
-            f"{output}: needs {quantity(needed)} more, only {quantity(free)} are free here; free some space, choose "
-            "another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
-        )
+    return compute_elsewhere(session, cluster, store.shared(), receive)

@@ -11,11 +11,20 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any, Protocol
 
-from sweep.cells.block import Blocks, Computed, Found, block_solver, faults_reported, sampled_by, sampled_study
+from sweep.cells.block import (
+    Blocks,
+    Computed,
+    Found,
+    block_solver,
+    faults_reported,
+    row_shape,
+    sampled_by,
+    sampled_study,
+)
 from sweep.cells.compiling import Compiling
 from sweep.cells.guard import BadCell, Guard
 from sweep.cells.output_schema import output_schema, part_columns
-from sweep.cells.partition import Partition, row_blocks
+from sweep.cells.partition import Partition, boxes, row_blocks
 from sweep.cells.schema import Schema
 from sweep.cells.solve import Solver
 from sweep.cells.timing import UNSAMPLED, Sample, row_partition
@@ -54,6 +63,11 @@ class Session:
     partition : how the rows are cut, where that is settled already
     sampled : False where nothing is left to compute
     reused : cells that need not be computed
+
+    Attributes
+    ----------
+    tick : callable
+        Called now and then, in the thread of `compute`.
     """
 
     def __init__(
@@ -67,7 +81,9 @@ class Session:
         study = task.study
         self.task, self.study, self.reused = task, study, reused
         self.began = now()
-        self.schema: Schema = output_schema(study, task.fingerprint)
+        schema, taken = output_schema(study, task.fingerprint), reused.taken_over if reused else ""
+        self.schema: Schema = replace(schema, attrs={**schema.attrs, **({TAKEN_OVER: taken} if taken else {})})
+        self.tick: Callable[[], None] = lambda: None
         self.bad: list[BadCell] = []
         self._told, self._cores = 0, task.workers
         self.processes = Processes(study, task.limits, task.cores.count) if task.isolate else None
@@ -116,23 +132,16 @@ class Session:
     def _partition(self, threads: int) -> Partition:
         rows, cells = row_blocks(self.study), self.task.block_cells
         if cells is not None:
-            return Partition(rows.count, min(math.ceil(cells / rows.mean), rows.count))
+            return boxes(row_shape(self.study), math.ceil(cells / rows.mean))
         row_bytes = sum(column.cell_bytes for column in part_columns(self.study))
-        return row_partition(self.sample, rows, row_bytes, threads)
+        return row_partition(self.sample, rows, row_shape(self.study), row_bytes, threads)
 
-    def begin(self, jobs: Sequence[int], ending: Callable[[], float] = float) -> Progress:
-        """Where the run stands when the blocks `jobs` are still to do; they are what is computed.
-
-        Parameters
-        ----------
-        ending : tells the seconds needed when all cells are computed
-        """
+    def begin(self, jobs: Sequence[int]) -> Progress:
+        """Where the run stands when the blocks `jobs` are still to do; they are what is computed."""
         rows = self.blocks.rows
         left = sum(stop - start for start, stop in map(self.blocks.cells, jobs))
         self.forecast = Forecast(self.sample.weights(self.blocks.partition, rows.first), jobs)
-        self.progress = Progress(
-            rows.size, self.task.stream, self.task.name, rows.size - left, self.forecast, ending=ending
-        )
+        self.progress = Progress(rows.size, self.task.stream, self.task.name, rows.size - left, self.forecast)
         return self.progress
 
     def again(self, job: int) -> None:
@@ -142,11 +151,13 @@ class Session:
         self.progress.again(stop - start)
 
     def dated(self, began: str) -> Schema:
-        """The schema with the times of the run, which now is at its end, and what was reused."""
+        """The schema with the times of the run, which now is at its end."""
+        return replace(self.schema, attrs={**self.schema.attrs, "start": began, **self.endings()})
+
+    def endings(self) -> dict[str, str]:
+        """What a result says of its run that is known at the end."""
         end = now()
-        times = {"created": end, "start": began, "end": end, "cells_per_second": self.progress.rate}
-        reused = {TAKEN_OVER: self.reused.taken_over} if self.reused and self.reused.taken_over else {}
-        return replace(self.schema, attrs={**self.schema.attrs, **times, **reused})
+        return {"created": end, "end": end, "cells_per_second": f"{self.progress.rate:.6e}"}
 
     def compute(self, work: Callable[[int, Solve], None]) -> None:
         """Calls `work(job, solve)` for every block that is left, on a pool of threads.
@@ -194,6 +205,7 @@ class Session:
             self.progress.note(f"on {self._cores} core{'s' * (self._cores > 1)} from now on")
         self._tell_failed()
         if job is None:
+            self.tick()
             self.progress.tick()
         else:
             start, stop = self.blocks.cells(job)
@@ -211,7 +223,7 @@ class Session:
         compute, reused = block_solver(self.study, Guard(cells, self.bad.append)), self.reused
 
         def solve(start: int, stop: int, arrays: Mapping[str, Any]) -> None:
-            self.forecast.begin(start // self.blocks.partition.cells)
+            self.forecast.begin(self.blocks.partition.index(start))
             compute(start, stop, arrays, None if reused is None else reused.missing(start, stop))
             if reused is not None:
                 reused.fill(start, stop, arrays)

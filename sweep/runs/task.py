@@ -31,6 +31,7 @@ class Task:
     extend: bool = False
     until: datetime | None = None
     cluster: Any = None
+    repair: bool = False
     isolate: bool = False
     limits: Limits = field(default_factory=Limits)
     retry_failed: bool = False

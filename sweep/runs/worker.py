@@ -1,7 +1,7 @@
 """What a worker of a cluster does: it computes blocks as a thread here would.
 
-Where it sees the folder of the parts it writes them there itself, and tells their names. Elsewhere it sends the numbers
-back, with their digest.
+Where it sees the file of the result it writes them there itself, and tells their digests. Elsewhere it sends the
+numbers back, with one digest of them.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xxhash
 from distributed import WorkerPlugin
 
 from sweep.cells.block import Blocks, SolveBlock, block_solver, faults_reported, warm
 from sweep.cells.fingerprint import difference, fingerprint
 from sweep.cells.guard import BadCell, Guard
 from sweep.cells.partition import Partition
+from sweep.cells.schema import Column
 from sweep.cells.solve import Solver
 from sweep.runs.isolate import Limits, Processes
-from sweep.store.parts import digest
-from sweep.store.store import Store
+from sweep.store.store import Shared
 from sweep.study.model import Study
+from sweep.system import disk
 from sweep.system.errors import SweepError
-
-TOKEN = "token"
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,7 @@ class Assignment:
     study : JSON
     fingerprint : fingerprint of the study where the run was started; a worker with another one refuses
     partition : how the rows are cut
-    shared : folder in which parts are to be written, or "" where they are to be sent
-    token : what stands in the file `TOKEN` of that folder, if it is the same folder as there
+    shared : the file that blocks are to be written to; None where their numbers are to be sent
     paths : where to look for the module of a kernel of the user's own; his study was allowed to run it
     limits : what cells may take that are solved in processes of their own; None: they are solved in the worker's
     """
@@ -53,8 +52,7 @@ class Assignment:
     study: str
     fingerprint: Mapping[str, str]
     partition: Partition
-    shared: str
-    token: str
+    shared: Shared | None
     paths: tuple[str, ...]
     limits: Limits | None = None
 
@@ -69,10 +67,10 @@ class Sent:
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of some blocks: seconds, the name of each one's part or its numbers, and cells that FAILED."""
+    """What became of some blocks: seconds, each one's digests, if it is written, or numbers, and cells that FAILED."""
 
     seconds: float
-    found: Mapping[int, str | Sent]
+    found: Mapping[int, bytes | Sent]
     bad: Sequence[BadCell]
 
 
@@ -109,6 +107,7 @@ def compute(run: str, jobs: Sequence[int], masks: Mapping[int, bytes]) -> Answer
     context = _context(run)
     begun = time.perf_counter()
     found = {job: context.block(job, masks.get(job)) for job in jobs}
+    context.sync()
     return Answer(time.perf_counter() - begun, found, context.bad())
 
 
@@ -127,7 +126,8 @@ class _Context:
     def __init__(self, assignment: Assignment) -> None:
         self._study = _study(assignment)
         self._blocks = Blocks(self._study, assignment.partition)
-        self._store = _store(assignment, self._blocks.columns)
+        self._shared = assignment.shared
+        self._fd = None if self._shared is None else self._shared.opened()
         self._thread = _ThreadState()
         limits = assignment.limits
         self._processes = None if limits is None else Processes(self._study, limits, os.cpu_count() or 1)
@@ -153,18 +153,30 @@ class _Context:
             state.solve = block_solver(self._study, Guard(cells, lambda cell: state.bad.append(cell)))
         return state.solve
 
-    def block(self, job: int, mask: bytes | None) -> str | Sent:
-        """The name of the part that is written, or the numbers."""
+    def __del__(self) -> None:
+        fd = getattr(self, "_fd", None)
+        if fd is not None:
+            os.close(fd)
+
+    def sync(self) -> None:
+        """Returns when all that was written is on the disk. Raises SweepError."""
+        if self._shared is not None and self._fd is not None:
+            try:
+                disk.fsync(self._fd)
+            except OSError as fault:
+                raise disk.refusal(fault, Path(self._shared.path)) from fault
+
+    def block(self, job: int, mask: bytes | None) -> bytes | Sent:
+        """The digests of what is written, or the numbers."""
         with faults_reported(f"{self._blocks.label(job)}: the kernel failed"):
-            if self._store is None or mask is not None:
+            if self._shared is None or self._fd is None or mask is not None:
                 return self._sent(job, mask)
             start, stop = self._blocks.bounds(job)
             buffers = self._thread.buffers or self._blocks.empty()
             self._thread.buffers = buffers
             arrays = {name: buffer[: stop - start] for name, buffer in buffers.items()}
             self._solve()(start, stop, arrays, None)
-            self._store.put(job, arrays)
-            return self._store.names.pop(job)
+            return self._shared.table.write(self._fd, job, arrays)
 
     def _sent(self, job: int, mask: bytes | None) -> Sent:
         start, stop = self._blocks.bounds(job)
@@ -200,13 +212,9 @@ def _study(assignment: Assignment) -> Study:
     return study
 
 
-def _store(assignment: Assignment, columns: Any) -> Store | None:
-    """Where this process writes parts; None where it does not see the folder, or may not write there."""
-    shared = Path(assignment.shared)
-    try:
-        same = bool(assignment.shared) and (shared / TOKEN).read_text("ascii") == assignment.token
-    except (OSError, ValueError):
-        return None
-    if not same or not os.access(shared, os.W_OK) or not os.access(shared.parent, os.W_OK):
-        return None
-    return Store.sharing(shared, columns, assignment.fingerprint, assignment.partition)
+def digest(columns: Sequence[Column], arrays: Mapping[str, Any]) -> str:
+    """32 hex digits of the numbers of a block."""
+    state = xxhash.xxh3_128()
+    for column in columns:
+        state.update(disk.as_bytes(arrays[column.name]))
+    return state.hexdigest()

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from sweep.store.digests import unbroken
+from sweep.store.reading import unbroken
 
 MOST_AT_ONCE = 256 << 20
 """Bytes beside the outputs' numbers up to which they are checked when a result is opened."""
@@ -26,16 +26,18 @@ def look(name, thing):
         if thing.external or thing.is_virtual:
             sys.exit(1)
         thing.id.get_offset(), thing.nbytes
-        if thing.chunks:
+        if thing.compression:
             for piece in thing.iter_chunks():
                 thing[piece]
+        elif thing.chunks:
+            thing.id.get_num_chunks()
         else:
             thing[()] if thing.nbytes < 1 << 20 else thing[(slice(0, 1),) * thing.ndim]
 with h5py.File(sys.argv[1], "r") as file:
     look("/", file)
     file.visititems(look)
 """
-"""Reads what a reader would read, but for numbers that lie in the file as they are."""
+"""Reads what a reader would read, but for numbers that are not read by HDF5."""
 
 _written: set[tuple[int, ...]] = set()
 """Files that this process has written, or has had read, and nobody changed since."""

@@ -1,44 +1,83 @@
 """Every call that changes the disk, in one place, so that a test can make any of them fail.
 
-A file is either there whole or not there at all: written under a temporary name, fsynced, renamed, and the folder
-fsynced. Callers use the functions as attributes of this module (`disk.fsync`).
+Callers use the functions as attributes of this module (`disk.fsync`). What a system lacks is made of what it has:
+without `pwrite` one thread at a time seeks and writes, without `posix_fallocate` a file only gets its length, without
+`fcntl` the library filelock locks.
 """
 
 from __future__ import annotations
 
 import contextlib
 import errno
-import fcntl
 import os
 import shutil
-from collections.abc import Iterable, Iterator
+import threading
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from sweep.system.errors import SweepError
 
-NEW = os.O_CREAT | os.O_EXCL | os.O_WRONLY
+try:
+    import fcntl
+except ImportError:
+    fcntl = None  # type: ignore[assignment]
+
+NO_SUCH_CALL = (errno.EINVAL, errno.EOPNOTSUPP, errno.ENOSYS)
+"""What a file system says that cannot reserve space."""
+MOST_BUFFERS = 1000
+"""Pieces that one call may write or read; systems allow 1024."""
+
+_turn = threading.Lock()
 
 
 def open_file(path: Path | str, flags: int) -> int:
     """A file descriptor; a pipe that is to be read is not waited for. Raises OSError."""
-    waiting = os.O_NONBLOCK if flags == os.O_RDONLY else 0
-    return os.open(path, flags | waiting | getattr(os, "O_CLOEXEC", 0), 0o666)
+    waiting = getattr(os, "O_NONBLOCK", 0) if flags == os.O_RDONLY else 0
+    return os.open(path, flags | waiting | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0), 0o666)
 
 
-def write(fd: int, piece: Any) -> int:
-    """Bytes written, which may be fewer than asked. Raises OSError."""
-    return os.write(fd, piece)
+def write(fd: int, pieces: Sequence[memoryview], offset: int) -> int:
+    """Bytes of the pieces that were written at `offset`, one piece behind the other; maybe not all. Raises OSError."""
+    if hasattr(os, "pwritev"):
+        return os.pwritev(fd, pieces, offset)
+    if hasattr(os, "pwrite"):
+        return os.pwrite(fd, pieces[0], offset)
+    with _turn:
+        os.lseek(fd, offset, os.SEEK_SET)
+        return os.write(fd, pieces[0])
 
 
-def pwrite(fd: int, piece: Any, offset: int) -> int:
-    """Bytes written at `offset`, which may be fewer than asked. Raises OSError."""
-    return os.pwrite(fd, piece, offset)
+def read(fd: int, pieces: Sequence[memoryview], offset: int) -> int:
+    """Bytes that were read from `offset` on into the pieces, maybe not all of them. Raises OSError."""
+    if hasattr(os, "preadv"):
+        return os.preadv(fd, pieces, offset)
+    with _turn:
+        os.lseek(fd, offset, os.SEEK_SET)
+        found = os.read(fd, len(pieces[0]))
+    pieces[0][: len(found)] = found
+    return len(found)
 
 
 def fsync(fd: int) -> None:
     """Returns when the file is on the disk. Raises OSError."""
     os.fsync(fd)
+
+
+def sync_numbers(fd: int) -> None:
+    """Returns when the bytes of a file whose length stays are on the disk. Raises OSError."""
+    getattr(os, "fdatasync", os.fsync)(fd)
+
+
+def reserve(fd: int, size: int) -> None:
+    """Gives a file its length, and room on the disk for all of it where the system can. Raises OSError."""
+    if hasattr(os, "posix_fallocate"):
+        try:
+            os.posix_fallocate(fd, 0, size)
+        except OSError as fault:
+            if fault.errno not in NO_SUCH_CALL:
+                raise
+    os.ftruncate(fd, size)
 
 
 def rename(old: Path, new: Path) -> None:
@@ -51,41 +90,27 @@ def remove(path: Path) -> None:
     path.unlink(missing_ok=True)
 
 
-def make_folder(path: Path) -> None:
-    """Makes a folder; one that is there already is no fault. Raises OSError."""
-    path.mkdir(exist_ok=True)
+def write_all(fd: int, pieces: Sequence[Any], offset: int) -> None:
+    """Writes bytes or C-contiguous arrays at `offset`, one behind the other. Raises OSError."""
+    _through(write, fd, pieces, offset)
 
 
-def write_all(fd: int, pieces: Iterable[Any]) -> None:
-    """Writes bytes or C-contiguous arrays one after the other. Raises OSError."""
-    for piece in pieces:
-        view = as_bytes(piece)
-        while view:
-            view = view[write(fd, view) :]
+def read_all(fd: int, buffers: Sequence[Any], offset: int) -> None:
+    """Fills arrays with the bytes from `offset` on. Raises EOFError where the file ends early, OSError."""
+    _through(read, fd, buffers, offset)
 
 
-def pwrite_all(fd: int, piece: Any, offset: int) -> None:
-    """Writes bytes or a C-contiguous array at `offset`. Raises OSError."""
-    view = as_bytes(piece)
-    while view:
-        count = pwrite(fd, view, offset)
-        view, offset = view[count:], offset + count
-
-
-def read_into(fd: int, buffer: Any, offset: int) -> None:
-    """Fills an array from the bytes at `offset`. Raises EOFError where the file ends early, OSError."""
-    view = as_bytes(buffer)
-    while view:
-        count = os.preadv(fd, [view], offset)
+def _through(call: Any, fd: int, pieces: Sequence[Any], offset: int) -> None:
+    left = [view for piece in pieces if (view := as_bytes(piece))]
+    while left:
+        count = call(fd, left[:MOST_BUFFERS], offset)
         if not count:
-            raise EOFError(f"the file ends {len(view)} bytes early")
-        view, offset = view[count:], offset + count
-
-
-def forget(fd: int) -> None:
-    """Gives the memory that holds the file's bytes back: what is written next takes it, where new memory is dearer."""
-    if hasattr(os, "posix_fadvise"):
-        os.posix_fadvise(fd, 0, 0, os.POSIX_FADV_DONTNEED)
+            raise EOFError("the file ends early")
+        offset += count
+        while left and count >= len(left[0]):
+            count -= len(left.pop(0))
+        if count:
+            left[0] = left[0][count:]
 
 
 def sync_folder(path: Path) -> None:
@@ -102,23 +127,6 @@ def sync_tree(path: Path) -> None:
     for inner in path.iterdir() if path.is_dir() else ():
         sync_tree(inner)
     sync_folder(path)
-
-
-def publish(pieces: Iterable[Any], temporary: Path, final: Path) -> None:
-    """Writes a file that appears under its final name only when it is whole and on the disk. Raises OSError."""
-    try:
-        fd = open_file(temporary, NEW)
-        try:
-            write_all(fd, pieces)
-            fsync(fd)
-        finally:
-            os.close(fd)
-        rename(temporary, final)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
-        raise
-    sync_folder(final.parent)
 
 
 @contextlib.contextmanager
@@ -163,13 +171,63 @@ def _take_place(part: Path, target: Path) -> None:
     _discard(old)
 
 
-def try_lock(fd: int) -> bool:
-    """Whether this process now holds the lock; the system frees it when the process ends, however it ends."""
+@contextlib.contextmanager
+def locked(path: Path) -> Iterator[bool]:
+    """Whether this process holds the lock of a name; the system frees it when the process ends, however it ends.
+
+    The file of that name is removed at the end. Raises OSError.
+    """
+    if fcntl is None:
+        yield from _locked_by_library(path)
+        return
+    fd = _try_lock(path)
     try:
-        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
+        yield fd is not None
+    finally:
+        if fd is not None:
+            with contextlib.suppress(OSError):
+                remove(path)
+            os.close(fd)
+
+
+def _try_lock(path: Path) -> int | None:
+    while True:
+        fd = open_file(path, os.O_CREAT | os.O_RDWR)
+        try:
+            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # who held the lock may have removed the file meanwhile
+            with contextlib.suppress(FileNotFoundError):
+                if path.stat().st_ino == os.fstat(fd).st_ino:
+                    return fd
+        except BlockingIOError:
+            os.close(fd)
+            return None
+        except BaseException:
+            os.close(fd)
+            raise
+        os.close(fd)
+
+
+def _locked_by_library(path: Path) -> Iterator[bool]:
+    import filelock
+
+    lock = filelock.FileLock(path, timeout=0)
+    try:
+        lock.acquire()
+    except filelock.Timeout:
+        yield False
+        return
+    try:
+        yield True
+    finally:
+        lock.release()
+        with contextlib.suppress(OSError):
+            remove(path)
+
+
+def free(path: Path) -> int:
+    """Bytes that are free in a folder. Raises OSError."""
+    return shutil.disk_usage(path).free
 
 
 def refusal(fault: OSError | RuntimeError, path: Path) -> SweepError:

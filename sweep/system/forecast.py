@@ -32,10 +32,6 @@ ALIKE = 6
 """Blocks on either side, in the order of what was thought, whose error tells that of a block."""
 DOUBT = 0.5
 """Share by which a forecast from one block is made longer; from n blocks, its n-th part's root."""
-FRAME_SECONDS = 0.1
-"""What an output takes besides its numbers."""
-SLOW_DISK = 5e7
-"""Bytes a second that any disk writes at a stretch."""
 ENOUGH = 4
 """So many blocks that are no worker's first tell more than all together."""
 SHORTEST = 1e-9
@@ -158,31 +154,6 @@ class Forecast:
         high = np.minimum(low + 2 * ALIKE, rank.size)
         took, guessed = (sums[high] - sums[low]).T
         return took / guessed
-
-
-class Ending:
-    """What is left when all cells are computed: the parts are put together, which takes about as long as writing them.
-
-    Parameters
-    ----------
-    blocks, workers : int
-        Parts that there will be, and threads that put them together.
-    size : float
-        Bytes of all parts. Many small parts take long for each is synced, which one output is not.
-    """
-
-    def __init__(self, blocks: int, workers: int, size: float) -> None:
-        self._blocks, self._workers, self._size = blocks, workers, size
-        self._wrote: list[float] = []
-
-    def wrote(self, seconds: float) -> None:
-        """A part was written in so long."""
-        self._wrote.append(seconds)
-
-    def seconds(self) -> float:
-        """Forecast, from the parts written so far."""
-        each = sum(self._wrote) / max(1, len(self._wrote))
-        return FRAME_SECONDS + min(each * self._blocks / self._workers, self._size / SLOW_DISK)
 
 
 def _between(places: Any, values: Any) -> Any:

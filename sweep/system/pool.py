@@ -43,7 +43,8 @@ class Cores:
     @contextlib.contextmanager
     def told_by_signals(self) -> Iterator[None]:
         """As long as this lasts, SIGUSR1 means a core more, SIGUSR2 one less; handlers of others are left alone."""
-        signals = {signal.SIGUSR1: 1, signal.SIGUSR2: -1}
+        steps = {"SIGUSR1": 1, "SIGUSR2": -1}
+        signals = {getattr(signal, name): step for name, step in steps.items() if hasattr(signal, name)}
         here = threading.current_thread() is threading.main_thread()
         free = (signal.SIG_DFL, signal.SIG_IGN)
         before = {number: signal.getsignal(number) for number in signals if here and signal.getsignal(number) in free}

@@ -44,8 +44,6 @@ class Progress:
         Cells that were there before.
     forecast : Forecast, optional
         Of the blocks to come; None: every cell takes as long.
-    ending : callable, optional
-        Seconds that are needed when all cells are computed.
     clock : callable
         Seconds.
     """
@@ -58,11 +56,10 @@ class Progress:
         done: int = 0,
         forecast: Forecast | None = None,
         clock: Callable[[], float] = time.monotonic,
-        ending: Callable[[], float] = float,
     ) -> None:
         self.total, self.done, self.computed = total, done, 0
         self._stream, self._name, self._clock = stream, printable(name), clock
-        self._forecast, self._ending = forecast, ending
+        self._forecast = forecast
         self._bar = notebook_bar(stream, self._name, total, done)
         self._live = stream is not None and (stream.isatty() or self._bar is not None)
         self._pause = REDRAW_SECONDS if self._live else LINE_SECONDS
@@ -95,26 +92,14 @@ class Progress:
     def left(self) -> float | None:
         """Seconds that are left, rather too many; None where nothing is known yet."""
         if self._forecast is not None:
-            left = self._forecast.left
-        else:
-            left = self.seconds * (self.total - self.done) / self.computed if self.computed else None
-        return None if left is None else left + self._ending()
+            return self._forecast.left
+        return self.seconds * (self.total - self.done) / self.computed if self.computed else None
 
     def tick(self) -> None:
         """Says something if it is time to."""
         self._log_line(self.line)
         if self._stream is not None and self.seconds >= QUIET_SECONDS and self._due():
             self._say(self.line())
-
-    def gather(self, done: int, total: int) -> None:
-        """Tells how many parts are in the output, if it is time to."""
-        self._log_line(lambda: f"all cells computed, output {100 * done // total} % written")
-        if (
-            self._stream is not None
-            and self.seconds >= QUIET_SECONDS
-            and self._clock() - (self._told or 0) >= self._pause
-        ):
-            self._say(f"all cells computed, output {100 * done // total} % written")
 
     def note(self, text: str) -> None:
         """Says something out of turn."""

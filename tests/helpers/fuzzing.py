@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
 import random
 import shutil
-import struct
+from dataclasses import replace
 from pathlib import Path
 
 from havoc import flip, run, study
 
 from sweep.cells.fingerprint import fingerprint
 from sweep.cli import main
-from sweep.store import digests
+from sweep.store.layout import read_layout, structure_digest
 from sweep.study.read import read_study
 from sweep.system.errors import SweepError
 
@@ -110,16 +109,13 @@ def fuzz_result(rng: random.Random, whole: Path, folder: Path) -> list[int]:
 
 
 def forge(path: Path) -> None:
-    """Seals a result anew, as somebody who knows how would; one without a seal stays as it is."""
+    """Seals a result anew, as somebody who knows how would; one without a layout stays as it is."""
     with path.open("r+b") as file:
-        behind = digests.trailer_bytes(file.fileno())
-        if behind:
-            end = path.stat().st_size - behind
-            words = os.pread(file.fileno(), behind - digests.TAIL, end)
-            file.truncate(end)
-            file.seek(end)
-            regions = [(b, e) for b, e in struct.iter_unpack("<qq", words) if 0 <= b <= e <= end]
-            file.write(digests.trailer(regions, file.fileno()))
+        layout = read_layout(file.fileno(), path.stat().st_size)
+        if layout is not None:
+            structure = structure_digest(file.fileno(), [*layout.regions, *layout.endings], layout.end)
+            file.seek(layout.end)
+            file.write(replace(layout, structure=structure).trailer())
 
 
 def quietly(*argv: object) -> int:

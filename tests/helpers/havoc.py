@@ -14,34 +14,62 @@ import time
 from collections import Counter
 from pathlib import Path
 
-import h5py
 import numpy as np
 import xxhash
 
 HERE = Path(__file__)
 sys.path[:0] = [p for p in (str(HERE.parent), str(HERE.parents[2])) if p not in sys.path]
 
-from sweep.cells.output_schema import part_columns  # noqa: E402
+import sweep  # noqa: E402
 from sweep.results.open import open_result  # noqa: E402
 from sweep.results.verify import verify  # noqa: E402
-from sweep.runs import run as runner  # noqa: E402
 from sweep.runs.run import run  # noqa: E402
-from sweep.store.hdf5_bytes import PartBytes  # noqa: E402
-from sweep.store.manifest import MANIFEST  # noqa: E402
-from sweep.store.parts import digest, part_name  # noqa: E402
-from sweep.store.store import Store, folder_of  # noqa: E402
+from sweep.store import store as storing  # noqa: E402
+from sweep.store.reading import StoredFile  # noqa: E402
+from sweep.store.store import Store, unfinished_of  # noqa: E402
 from sweep.study.read import build_study  # noqa: E402
 from sweep.system.errors import SweepError  # noqa: E402
 
 CELLS = 3000
+KINDS = ("plain", "extend", "summary", "refine")
 
 
-def study(cells=CELLS):
+def study(cells=CELLS, every=1, speeds=(0.0, 1.0, -1.0), **keys):
     """A stone thrown from many heights, its way traced."""
-    axes = {"height": np.linspace(1.0, 50.0, cells // 3), "v0": [0.0, 1.0, -1.0]}
-    return build_study(
-        kernel="toy:KERNEL", allow_import=True, axes=axes, outputs=["fall_time", "drop"], along={"phase": [0.0, 0.5]}
-    )
+    axes = {"height": np.linspace(1.0, 50.0, cells // 3)[::every], "v0": list(speeds)}
+    keys = {"outputs": ["fall_time", "drop"], "along": {"phase": [0.0, 0.5]}, **keys}
+    return build_study(kernel="toy:KERNEL", allow_import=True, axes=axes, **keys)
+
+
+def few():
+    """What is refined."""
+    return study(90, speeds=(-1.0, 0.0, 1.0), outputs=["fall_time"], along={})
+
+
+def base_of(output):
+    """The finished result that a run of its kind begins with."""
+    return output.with_name("base.h5")
+
+
+def perform(kind, output, workers, cells):
+    """A run of some kind to its end."""
+    keys = {"workers": workers, "progress": False, "block_cells": cells}
+    if kind == "refine":
+        with open_result(base_of(output)) as found:
+            sweep.refine(found, "fall_time", 1e-3, path=output, study=few(), workers=workers)
+    elif kind == "summary":
+        over = {"over": ["height"], "outputs": {"fall_time": ["min", "mean", "argmax"], "drop": ["mean"]}}
+        run(study(summary=over), output, **keys).close()
+    else:
+        run(study(), output, extend=kind == "extend", **keys).close()
+
+
+def prepare(kind, output):
+    """Makes what a run of some kind begins with."""
+    if kind == "extend":
+        run(study(every=2), output, workers=1, progress=False).close()
+    if kind == "refine" and not base_of(output).exists():
+        run(few(), base_of(output), workers=1, progress=False).close()
 
 
 def numbers(path):
@@ -53,9 +81,10 @@ def numbers(path):
     return state.hexdigest()
 
 
-def parts(output):
-    """Names of the parts that are there."""
-    return {path.name for path in folder_of(output).glob("*-*.h5")}
+def done(output):
+    """Blocks of an unfinished result that are acknowledged."""
+    with StoredFile(unfinished_of(output)) as file:
+        return set(np.flatnonzero(file.done("rows" if "rows" in file.layout.tables else "cells")).tolist())
 
 
 class Victims:
@@ -71,18 +100,18 @@ class Victims:
         self._parent.wait()
         self._parent.stdout.close()
 
-    def run(self, output, workers, cells, seconds):
+    def run(self, kind, output, workers, cells, seconds):
         """Whether the run came to its end before it was killed, after so many seconds; and what it acknowledged."""
         log = output.with_name("acknowledged")
         log.write_text("")
-        self._parent.stdin.write(json.dumps([str(output), workers, cells, str(log), seconds]) + "\n")
+        self._parent.stdin.write(json.dumps([kind, str(output), workers, cells, str(log), seconds]) + "\n")
         self._parent.stdin.flush()
         ended = self._parent.stdout.readline().strip()
-        assert ended in ("0", "9"), ended
-        return ended == "0", set(log.read_text().splitlines())
+        assert ended in ("0", "9"), log.with_name("fault").read_text()
+        return ended == "0", set(map(int, log.read_text().split()))
 
 
-def torture(rng, victims, folder, kills, whole, usual, shapes):
+def torture(rng, victims, folder, kills, shapes, kinds=KINDS):
     """Kills runs at random moments, each continued until it ends.
 
     Returns
@@ -92,146 +121,145 @@ def torture(rng, victims, folder, kills, whole, usual, shapes):
         "different": ends with other bits; "stages": what there was when a run was killed.
     """
     found = {"kills": 0, "runs": 0, "acknowledged": 0, "lost": 0, "different": 0, "stages": Counter()}
+    whole, usual = {}, {}
+    for kind in kinds:
+        output = folder / f"{kind}.h5"
+        prepare(kind, output)
+        begun = time.monotonic()
+        assert victims.run(kind, output, 2, 100, 60.0)[0]
+        whole[kind], usual[kind] = numbers(output), time.monotonic() - begun
+        output.unlink()
     while found["kills"] < kills:
-        output, cells = folder / f"out{found['runs']}.h5", rng.choice(shapes)
-        ended, kept = False, set()
-        while not ended:
-            seconds = 1.1 * usual * rng.random() ** 2
-            ended, acknowledged = victims.run(output, rng.choice([1, 2, 8]), cells, seconds)
-            kept |= acknowledged
-            # once it is put together, the result is what counts; it has the same digest or not
-            lost = set() if output.exists() else kept - parts(output)
-            if not ended:
-                found["kills"] += 1
-                found["acknowledged"] += len(acknowledged)
-                found["lost"] += len(lost)
-                found["stages"][_stage(output)] += 1
+        kind = kinds[found["runs"] % len(kinds)]
+        _tortured(rng, victims, folder / f"out{found['runs']}.h5", kind, rng.choice(shapes), usual[kind], found)
+        output = folder / f"out{found['runs']}.h5"
         found["runs"] += 1
-        found["different"] += numbers(output) != whole or folder_of(output).exists()
+        left = sorted(path.name for path in folder.iterdir() if path.name.startswith(output.name))
+        found["different"] += numbers(output) != whole[kind] or left != [output.name] or not verify(output).whole
         output.unlink()
     return found
 
 
+def _tortured(rng, victims, output, kind, cells, usual, found):
+    """One run, killed again and again until it ends."""
+    prepare(kind, output)
+    ended, kept = False, set()
+    while not ended:
+        # as often near its end, where it is renamed, as before
+        share = rng.random() if rng.random() < 0.5 else rng.uniform(0.8, 1.1)
+        ended, acknowledged = victims.run(kind, output, rng.choice([1, 2, 8]), cells, share * usual)
+        kept |= acknowledged
+        if not ended:
+            found["kills"] += 1
+            found["acknowledged"] += len(acknowledged)
+            found["stages"][f"{kind}, {_stage(output)}"] += 1
+            if unfinished_of(output).exists():
+                found["lost"] += len(kept - done(output))
+            # without it, the result is in its place, and has the right digest or not
+
+
 def _stage(output):
     """How far a killed run had come."""
-    if output.exists():
-        return "put together, parts not removed" if folder_of(output).exists() else "at its very end"
-    if not folder_of(output).exists():
-        return "nothing there yet"
-    names = [path.name for path in folder_of(output).iterdir()]
-    if any(name.startswith("result.h5") for name in names):
-        return "while it was put together"
-    return "block half written" if any(n.endswith(".tmp") for n in names) else "between blocks"
-
-
-DAMAGES = ("flip", "flip", "flip", "cut", "empty", "missing", "doubled", "foreign", "swapped", "strange",
-           "stranger", "spec")  # fmt: skip
+    if unfinished_of(output).exists():
+        with StoredFile(unfinished_of(output)) as file:
+            blocks = len(done(output))
+            if file.finished:
+                return "just before it was renamed"
+            return "at its end" if blocks == file.layout.work.blocks.count else "at work" if blocks else "just begun"
+    if unfinished_of(output).with_name(f"{output.name}.unfinished.tmp").exists():
+        return "while its frame was written"
+    return "before its frame, or at its very end"
 
 
 def unfinished(output):
-    """Stops the study when all is computed and nothing is put together."""
-    real = runner.assemble
-    runner.assemble = _stop
+    """Stops the study when all is computed, and not ended."""
+    real = Store.finish
+    Store.finish = _stop
     try:
         run(study(), output, workers=1, block_cells=300, progress=False)
     except SweepError:
-        return folder_of(output)
+        return unfinished_of(output)
     finally:
-        runner.assemble = real
+        Store.finish = real
 
 
 def _stop(*rest):
     raise SweepError("stopped")
 
 
-def damage(rng, folder):
-    """Damages the parts of a sweep in some way.
+DAMAGES = ("flip",) * 6 + ("zeroed",) * 4 + ("cut", "empty", "longer", "swapped", "swapped whole", "strange", "missing")
 
-    Returns
-    -------
-    kind, found : str
-        What it did, and what `sweep verify` must say of it.
-    """
-    path, other = rng.sample(sorted(folder.glob("*-*.h5")), 2)
-    kind, content = rng.choice(DAMAGES), path.read_bytes()
-    if kind == "missing":
-        path.unlink()
-        return kind, f"missing: cells {int(path.name[:12]):,} to {int(path.name[13:25]):,}"
-    if kind == "doubled":
-        double = path.with_name(f"{path.name[:25]}.{rng.getrandbits(128):032x}.h5")
-        shutil.copy(path, double)
-        return kind, f"twice there: {double.name}"
-    if kind in ("foreign", "strange"):
-        name = "notes.txt" if kind == "foreign" else f"000000000001-000000000002.{'0' * 32}.h5"
-        (folder / name).write_bytes(rng.randbytes(3000))
-        return kind, f"not of this sweep: {name}"
-    if kind == "spec":
-        flip(rng, folder / MANIFEST)
-        return kind, MANIFEST
-    if kind == "stranger":
-        return kind, f"damaged: {stranger(path).name}"
-    if kind == "flip":
-        flip(rng, path)
-    elif kind == "swapped":
-        path.write_bytes(other.read_bytes())
+
+def damage(rng, path, strange):
+    """Damages a result, finished or not, in some way; `strange` is one of another study. Tells what it did."""
+    kind, content = rng.choice(DAMAGES), bytearray(path.read_bytes())
+    with StoredFile(path) as file:
+        table, endings = file.layout.work, file.layout.endings
+        finished = file.finished
+    block, other = rng.sample(range(table.blocks.count), 2)
+    place = rng.choice(table.places)
+    chunk = slice(place.at(block), place.at(block) + table.stored(place, block))
+    if kind in ("flip", "zeroed"):
+        length = 1 if kind == "flip" else 512
+        at = rng.randrange(len(content) - length)
+        if not finished and any(begin - length < at < end for begin, end in endings):
+            return damage(rng, path, strange)  # what is written over at the end
+        content[at : at + length] = bytes(length) if kind == "zeroed" else [content[at] ^ 1 << rng.randrange(8)]
+    elif kind in ("cut", "empty", "missing"):
+        content = content[: rng.randrange(len(content)) if kind == "cut" else 0]
+    elif kind == "longer":
+        content += rng.randbytes(100)
     else:
-        path.write_bytes(content[: rng.randrange(1, len(content)) if kind == "cut" else 0])
-    return kind, f"damaged: {path.name}"
+        rows = [slice(table.digests + b * table.row_bytes, table.digests + (b + 1) * table.row_bytes)
+                for b in (block, other)]  # fmt: skip
+        if kind == "swapped":
+            there = slice(place.at(other), place.at(other) + table.stored(place, other))
+            content[chunk], content[there] = content[there], content[chunk]
+        elif kind == "swapped whole":
+            for p in table.places:
+                one, two = (slice(p.at(b), p.at(b) + table.stored(p, b)) for b in (block, other))
+                content[one], content[two] = content[two], content[one]
+            content[rows[0]], content[rows[1]] = content[rows[1]], content[rows[0]]
+        else:
+            for at in [*(slice(p.at(block), p.at(block) + table.stored(p, block)) for p in table.places), rows[0]]:
+                content[at] = strange[at]
+    path.unlink() if kind == "missing" else path.write_bytes(content)
+    return kind
 
 
-def stranger(path):
-    """Puts a sound part of another study, of the same cells and columns, in the place of a part."""
-    columns, start, stop = part_columns(study()), int(path.name[:12]), int(path.name[13:25])
-    with h5py.File(path) as file:
-        arrays = {column.name: file[column.name][...] for column in columns}
-    arrays["fall_time"] += 1.0
-    path.unlink()
-    other = path.with_name(part_name(start, stop, digest(columns, arrays, b"another")))
-    other.write_bytes(b"".join(map(bytes, PartBytes(columns).pieces(start, stop, arrays))))
-    return other
-
-
-def damaged_parts(rng, folder, scratch, whole):
-    """Damages a copy of a folder of parts; what kind, and what went wrong: "" where nothing did."""
+def damaged_unfinished(rng, path, strange, scratch, whole):
+    """Damages a copy of an unfinished result; what kind, and what went wrong: "" where nothing did."""
     output = scratch / "out.h5"
-    shutil.copytree(folder, folder_of(output))
-    kind, expected = damage(rng, folder_of(output))
+    shutil.copy(path, unfinished_of(output))
+    sound, log = verify(output).findings, io.StringIO()
+    kind = damage(rng, unfinished_of(output), strange)
+    wrong = []
+    if kind != "missing" and unfinished_of(output).read_bytes() != path.read_bytes():
+        wrong += ["not found"] if verify(output).findings == sound else []
     try:
-        told = verify(output).findings
+        run(study(), output, workers=1, progress=log).close()
     except SweepError as fault:
-        # of a manifest whose white space was hit nothing is said
-        told = (MANIFEST,) if f"{MANIFEST}: " in str(fault) else (str(fault),)
-    told = (*told, MANIFEST) if kind == "spec" and "put together yet" in told[0] else told
-    log = io.StringIO()
-    run(study(), output, workers=1, progress=log).close()
-    wrong = [] if expected in told else [f"not told: {expected}"]
+        wrong += [] if "give it up with --force" in str(fault) else [f"told: {fault}"]
+        run(study(), output, workers=1, progress=log, force=True).close()
     wrong += [] if numbers(output) == whole else ["other numbers"]
-    if kind == "foreign":
-        (folder_of(output) / "notes.txt").unlink()
-        (folder_of(output) / "lock").unlink(missing_ok=True)
-        folder_of(output).rmdir()
     wrong += ["something is left"] if list(scratch.iterdir()) != [output] else []
     output.unlink()
     return kind, "; ".join(wrong)
 
 
-def damaged_result(rng, result, scratch):
-    """Damages a copy of a finished result; what kind, and what went wrong: "" where nothing did."""
-    output, kind = scratch / "out.h5", rng.choice(["flip"] * 24 + ["zeroed"] * 24 + ["cut", "longer"])
+def damaged_result(rng, result, strange, scratch, whole):
+    """Damages a copy of a finished result, and repairs it; what kind, and what went wrong: "" where nothing did."""
+    output = scratch / "out.h5"
     shutil.copy(result, output)
-    content = bytearray(output.read_bytes())
-    if kind == "flip":
-        flip(rng, output)
-    elif kind == "zeroed":
-        place = rng.randrange(len(content))
-        content[place : place + 512] = bytes(len(content[place : place + 512]))
-        output.write_bytes(content)
-    else:
-        output.write_bytes(content + rng.randbytes(100) if kind == "longer" else content[: rng.randrange(len(content))])
-    same = output.read_bytes() == result.read_bytes()
-    found = verify(output).whole == same
-    output.unlink()
-    return kind, "" if found else "not found"
+    kind, wrong = damage(rng, output, strange), []
+    if kind != "missing" and output.read_bytes() != result.read_bytes():
+        found = verify(output)
+        wrong += ["not found"] if found.whole else []
+        if found.blocks is not None:
+            run(study(), output, workers=1, progress=False, repair=True).close()
+            wrong += [] if numbers(output) == whole and verify(output).whole else ["not repaired"]
+    output.unlink(missing_ok=True)
+    return kind, "; ".join(wrong)
 
 
 def flip(rng, path):
@@ -248,13 +276,16 @@ def main():
     quiet = os.open(os.devnull, os.O_WRONLY)
     with tempfile.TemporaryDirectory() as folder:
         # once here, so that all is imported
-        run(study(), Path(folder) / "out.h5", workers=1, progress=False).close()
+        for kind in KINDS:
+            output = Path(folder) / f"{kind}.h5"
+            prepare(kind, output)
+            perform(kind, output, 1, 300)
     for line in sys.stdin:
-        output, workers, cells, log, seconds = json.loads(line)
+        kind, output, workers, cells, log, seconds = json.loads(line)
         child = os.fork()
         if child == 0:
             os.dup2(quiet, 2)
-            os._exit(_child(output, workers, cells, log))
+            os._exit(_child(kind, Path(output), workers, cells, log))
         print(_ended(child, time.monotonic() + seconds), flush=True)
 
 
@@ -271,20 +302,31 @@ def _ended(child, deadline):
         time.sleep(1e-3)
 
 
-def _child(output, workers, cells, log):
-    """Runs the study; every part is noted when it is acknowledged."""
-    real, told = Store.put, os.open(log, os.O_WRONLY | os.O_APPEND)
+def _child(kind, output, workers, cells, log):
+    """A run; every block is noted when it is acknowledged."""
+    real, told = storing.write_digests, os.open(log, os.O_WRONLY | os.O_APPEND)
+    storing.SYNC_SECONDS = 0.005
 
-    def put(self, index, arrays):
-        real(self, index, arrays)
-        os.write(told, (self.names[index] + "\n").encode())
+    def noting(fd, table, digests):
+        real(fd, table, digests)
+        if any(map(any, digests.values())) and _is_work(fd, table, unfinished_of(output)):
+            os.write(told, "".join(f"{block}\n" for block in digests).encode())
 
-    Store.put = put
+    storing.write_digests = noting
     try:
-        run(study(), output, workers=workers, block_cells=cells, progress=False).close()
-    except BaseException:
+        perform(kind, output, workers, cells)
+    except BaseException as fault:
+        Path(log).with_name("fault").write_text(f"{kind} {type(fault).__name__}: {fault}")
         return 1
     return 0
+
+
+def _is_work(fd, table, path):
+    """Whether a table is of what the run computes into its file, not of what is made from that, or of another file."""
+    if not path.exists() or path.stat().st_ino != os.fstat(fd).st_ino:
+        return False
+    with StoredFile(path) as file:
+        return file.layout.work.digests == table.digests
 
 
 if __name__ == "__main__":

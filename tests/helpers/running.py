@@ -12,9 +12,9 @@ import pytest
 import xarray as xr
 from hypothesis import strategies as st
 
-from sweep.cells.solve import Solver
 from sweep.runs.run import run
-from sweep.store.store import folder_of
+from sweep.store.reading import StoredFile
+from sweep.store.store import Store, unfinished_of
 from sweep.study.read import build_study
 from sweep.system import disk
 from sweep.system.errors import SweepError
@@ -50,23 +50,36 @@ def quiet(study, path=None, **keys):
 
 
 def interrupted(study, output):
-    """Computes the first cells of a study and fails at the eleventh."""
-    real = Solver.solve
+    """Computes blocks of a study, of about five cells each, and fails at the third."""
+    real = Store.put
 
-    def failing(self, start, stop, *rest):
-        if (start, stop) == (10, 15):
-            raise SweepError("stop here")
-        real(self, start, stop, *rest)
+    def failing(self, index, arrays):
+        if index == 2:
+            raise RuntimeError("stop here")
+        real(self, index, arrays)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Solver, "solve", failing)
+        patch.setattr(Store, "put", failing)
         patch.setattr("sweep.system.forecast.Forecast.order", lambda self: iter(range(self.blocks)))
         with pytest.raises(SweepError, match="stop here"):
             quiet(study, output, block_cells=5, workers=1)
 
 
-def names(output):
-    return sorted(path.name for path in folder_of(output).glob("*.h5"))
+def kept(output):
+    """Blocks of an unfinished result that are acknowledged."""
+    if not unfinished_of(output).exists():
+        return []
+    with StoredFile(unfinished_of(output)) as file:
+        return np.flatnonzero(file.done("rows" if "rows" in file.layout.tables else "cells")).tolist()
+
+
+def place(output, name, cell, table="cells"):
+    """Where a cell of a column stands in a file."""
+    with StoredFile(output) as file:
+        column = file.columns(table)[name]
+        block = column.table.blocks.index(cell)
+        start = column.table.blocks.bounds(block)[0]
+        return column.place.at(block) + (cell - start) * column.place.cell_bytes
 
 
 def fail_on(monkeypatch, name, turn, number):

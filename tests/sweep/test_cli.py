@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from running import kept
 from toy_studies import HEAD
 
 import sweep
@@ -249,8 +250,7 @@ def test_show_tells_what_is_in_a_result(done, call):
 
 def test_show_tells_how_much_of_a_sweep_is_done(here, call):
     process = slow_run()
-    folder = Path("slow.h5.parts")
-    wait_for(lambda: len(list(folder.glob("*-*.h5"))) >= 2)
+    wait_for(lambda: len(kept(Path("slow.h5"))) >= 2)
     code, out, _ = call("show", "slow.h5")
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=20)
@@ -478,14 +478,13 @@ def wait_for(condition):
 
 def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(here):
     process = slow_run()
-    folder = Path("slow.h5.parts")
-    wait_for(lambda: len(list(folder.glob("*-*.h5"))) >= 2)
+    wait_for(lambda: len(kept(Path("slow.h5"))) >= 2)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=30)
     assert process.returncode == 130
     assert "continue" in err
     assert "Traceback" not in err
-    assert len(list(folder.glob("*-*.h5"))) >= 2
+    assert len(kept(Path("slow.h5"))) >= 2
     assert not Path("slow.h5").exists()
 
 

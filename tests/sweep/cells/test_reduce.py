@@ -4,19 +4,20 @@ import itertools
 import math
 from fractions import Fraction
 
-import h5py
 import numpy as np
 import pytest
 import xarray as xr
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from running import flip, kept
 
 import sweep
 from kernels.interface import Status
 from sweep.cells.partition import RowBlocks, row_blocks
 from sweep.cells.reduce import BY_STATUS, Reducer, merge, tree_sum
 from sweep.results.statuses import account
-from sweep.store.store import folder_of
+from sweep.store.reading import StoredFile
+from sweep.store.store import Store, unfinished_of
 from sweep.study.read import build_study
 
 HEIGHTS = np.array([-1.0, 1.0, 2.0, 5.0, math.nan, 13.5, 100.0, 0.3, 0.7, 77.0])
@@ -84,7 +85,7 @@ def agree(found, cells, over):
 @pytest.mark.parametrize("over", [["height", "v0"], ["height"], ["v0"]])
 @pytest.mark.parametrize("at_once", [8 << 20, 2000])
 def test_reductions_are_those_of_the_cells(over, at_once, tmp_path, monkeypatch):
-    monkeypatch.setattr("sweep.store.assemble.CHUNK_BYTES", at_once)
+    monkeypatch.setattr("sweep.store.frame.GATHERED_BYTES", at_once)
     cells = quiet(stone())
     found = quiet(stone(whole(over=over)))
     agree(found, cells, over)
@@ -149,8 +150,7 @@ def test_an_interrupted_summary_tells_of_what_there_is_and_ends_with_the_same_bi
         patch.setattr(Reducer, "solve", failing)
         with pytest.raises(sweep.SweepError, match="stop here"):
             quiet(study, output, block_cells=1000, workers=1)
-    done = len(list(folder_of(output).glob("*.h5")))
-    assert done
+    assert kept(output)
     with sweep.open_result(output) as so_far:
         found = account(so_far)
         assert found.total == 12_000
@@ -161,15 +161,16 @@ def test_an_interrupted_summary_tells_of_what_there_is_and_ends_with_the_same_bi
 
 
 @pytest.mark.parametrize("place", [0, 2])
-def test_a_damaged_part_is_computed_again(tmp_path, long, monkeypatch, place):
+def test_a_damaged_block_of_rows_is_computed_again(tmp_path, long, monkeypatch, place):
     study, output = long_study(12_000), tmp_path / "out.h5"
     with monkeypatch.context() as patch:
-        patch.setattr("sweep.runs.run.assemble", lambda *a: (_ for _ in ()).throw(sweep.SweepError("enough")))
+        patch.setattr(Store, "finish", lambda *a: (_ for _ in ()).throw(sweep.SweepError("enough")))
         with pytest.raises(sweep.SweepError, match="enough"):
             quiet(study, output, block_cells=4000)
-    part = sorted(folder_of(output).glob("*.h5"))[place]
-    with h5py.File(part, "r+") as file:
-        file["fall_time sum"][3] += 1
+    path = unfinished_of(output)
+    with StoredFile(path) as file:
+        at = file.columns("rows")["fall_time sum"].place.at(place) + 3
+    flip(path, at)
     with quiet(study, output) as found:
         same(found, long["height", "v0"])
 

@@ -10,17 +10,18 @@ import toy_studies
 import xarray as xr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from running import flip, interrupted, keys, quiet
+from running import flip, interrupted, keys, place, quiet
 
 import sweep
 from sweep.cli import main
 from sweep.results import open
 from sweep.results.verify import verify
-from sweep.store import parts
-from sweep.store.store import folder_of
+from sweep.store.layout import Table
+from sweep.store.reading import StoredFile
+from sweep.store.store import unfinished_of
 
 SIZES = {"v0": 3, "height": 11, "phase": 3}
-BLOCK = 5
+BLOCK = 11
 CELLS = 33
 
 
@@ -43,12 +44,10 @@ def copy(whole, tmp_path):
 
 def harm(path, name, cell, bit=0):
     """Flips a bit of a number of a cell."""
-    with h5py.File(path) as file:
-        place, cell_bytes = file[name].id.get_offset(), file[name].nbytes // CELLS
-    flip(path, place + cell * cell_bytes + 3, bit)
+    flip(path, place(path, name, cell) + (3 if name != "status" else 0), bit)
 
 
-@pytest.mark.parametrize("name", ["fall_time", "drop"])
+@pytest.mark.parametrize("name", ["fall_time", "drop", "status"])
 @pytest.mark.parametrize("cell", [0, 4, 5, 17, 32])
 def test_damaged_numbers_are_not_handed_out_and_all_others_are(whole, copy, name, cell):
     harm(copy, name, cell)
@@ -94,9 +93,7 @@ def test_a_damaged_summary_is_not_handed_out(tmp_path):
     quiet(study(summary={"over": ["height"], "outputs": {"fall_time": ["mean"], "drop": ["max"]}}), path).close()
     with sweep.open_result(path) as found:
         assert found.load().fall_time_mean.shape == (3,)
-    with h5py.File(path) as file:
-        place = file["fall_time_mean"].id.get_offset()
-    flip(path, place + 9)
+    flip(path, place(path, "fall_time_mean", 1) + 1)
     with sweep.open_result(path) as found, pytest.raises(sweep.SweepError, match="fall_time_mean is damaged between"):
         found.load()
 
@@ -104,46 +101,32 @@ def test_a_damaged_summary_is_not_handed_out(tmp_path):
 def test_a_single_cell_is_checked(tmp_path):
     path = tmp_path / "out.h5"
     quiet(toy_studies.build(axes={"height": [1.0]}, summary={"over": ["height"]}), path).close()
-    with h5py.File(path) as file:
-        place = file["fall_time_mean"].id.get_offset()
-    flip(path, place + 1)
+    flip(path, place(path, "fall_time_mean", 0) + 1)
     with sweep.open_result(path) as found, pytest.raises(sweep.SweepError, match="fall_time_mean is damaged"):
         found.load()
 
 
-@pytest.mark.parametrize("what", ["title", "height", "status"])
+@pytest.mark.parametrize("what", ["title", "height"])
 def test_damage_beside_the_numbers_is_told_at_once(copy, what):
     with h5py.File(copy) as file:
-        if what == "status":
-            place = file["status"].id.get_chunk_info(0).byte_offset
-        elif what == "height":
-            place = file["height"].id.get_offset() + 12
-        else:
-            place = copy.read_bytes().index(b"toy:KERNEL")
-    flip(copy, place)
+        at = file["height"].id.get_offset() + 12
+    flip(copy, at if what == "height" else copy.read_bytes().index(b"toy:KERNEL"))
     with pytest.raises(sweep.SweepError, match="damaged beside the outputs' numbers"):
         sweep.open_result(copy)
 
 
-def test_what_was_changed_on_purpose_is_opened_but_its_numbers_are_checked(copy):
+def test_what_was_changed_on_purpose_is_opened_and_hdf5_checks_it(copy):
     with h5py.File(copy, "r+") as file:
         file.attrs["comment"] = "mine"
         file["fall_time"][1, 2] = 7.0
-        file["status"][2, 10] = 3
     with sweep.open_result(copy) as found:
         assert found.attrs["comment"] == "mine"
-        assert found["drop"].load().shape == (3, 11, 3)
-        with pytest.raises(sweep.SweepError, match="fall_time is damaged between its cells 10 and 15"):
-            found.fall_time.load()
-        with pytest.raises(sweep.SweepError, match="status is damaged between its cells 30 and 33"):
-            found.status.load()
-
-
-def test_a_file_without_digests_is_opened_as_it_is(copy):
-    with h5py.File(copy, "r+") as file:
-        del file["integrity"]
-    with sweep.open_result(copy) as found:
-        assert found.load().fall_time.shape == (3, 11)
+        assert found.fall_time[1, 2] == 7.0
+    with h5py.File(copy) as file:
+        at = file["fall_time"].id.get_chunk_info(0).byte_offset
+    flip(copy, at)
+    with sweep.open_result(copy) as found, pytest.raises(OSError, match="filter"):
+        found.fall_time.load()
 
 
 def test_pieces_of_a_large_result_are_checked(copy, monkeypatch):
@@ -151,7 +134,7 @@ def test_pieces_of_a_large_result_are_checked(copy, monkeypatch):
     monkeypatch.setattr(open, "memory", lambda: 100)
     with sweep.open_result(copy) as found:
         assert found["drop"].chunks is not None
-        with pytest.raises(sweep.SweepError, match="drop is damaged between its cells 20 and 25"):
+        with pytest.raises(sweep.SweepError, match="drop is damaged between its cells 11 and 22"):
             found["drop"].compute()
 
 
@@ -197,16 +180,14 @@ def test_every_command_that_reads_a_damaged_column_names_it(read, tmp_path, monk
 
 
 def test_a_damaged_result_is_shown_as_damaged(copy, capsys):
-    with h5py.File(copy) as file:
-        place = file["status"].id.get_chunk_info(0).byte_offset
-    flip(copy, place)
+    harm(copy, "status", 0)
     assert main(["show", str(copy)]) == 2
-    assert "damaged beside the outputs' numbers" in capsys.readouterr().err
+    assert "status is damaged between its cells 0 and 11" in capsys.readouterr().err
 
 
 def test_a_damaged_result_is_computed_anew_when_forced(copy, whole):
     harm(copy, "fall_time", 17)
-    with pytest.raises(sweep.SweepError, match="fall_time: damaged between its cells 15 and 20"):
+    with pytest.raises(sweep.SweepError, match="fall_time: damaged between its cells 11 and 22"):
         quiet(study(), copy)
     quiet(study(), copy, force=True).close()
     assert verify(copy).whole
@@ -216,42 +197,39 @@ def test_a_damaged_result_is_computed_anew_when_forced(copy, whole):
 
 
 @pytest.fixture
-def large(tmp_path, monkeypatch):
-    """An unfinished sweep, read when it is used."""
+def unfinished(tmp_path):
     path = tmp_path / "out.h5"
     interrupted(study(), path)
-    monkeypatch.setattr(open, "LARGEST_AT_ONCE", 0)
     return path
 
 
 @pytest.mark.parametrize("name", ["status", "method_used", "fall_time"])
-def test_a_part_filled_with_zeros_is_pending_in_a_large_unfinished_result(large, name):
-    part = min(folder_of(large).glob("*.h5"))
-    with h5py.File(part) as file:
-        spans = [(file[n].id.get_offset(), file[n].nbytes) for n in ("fall_time", "drop", "status", "method_used")]
-    content = bytearray(part.read_bytes())
-    for place, length in spans:
-        content[place : place + length] = bytes(length)
-    part.write_bytes(content)
-    with sweep.open_result(large) as found:
+@pytest.mark.parametrize("harmed", ["status", "fall_time", "drop"])
+def test_a_damaged_block_is_pending_in_all_columns_of_an_unfinished_result(unfinished, name, harmed):
+    harm(unfinished_of(unfinished), harmed, 1)
+    with sweep.open_result(unfinished) as found:
         missing = {"status": 127, "method_used": -1, "fall_time": np.nan}[name]
-        np.testing.assert_array_equal(found[name].values.reshape(-1)[:5], [missing] * 5)
+        np.testing.assert_array_equal(found[name].values.reshape(-1)[:4], [missing] * 4)
 
 
-def test_a_flipped_status_is_pending_in_a_large_unfinished_result(large):
-    part = min(folder_of(large).glob("*.h5"))
-    with h5py.File(part) as file:
-        place = file["status"].id.get_offset()
-    flip(part, place + 2)
-    with sweep.open_result(large) as found:
-        assert found.status.values.reshape(-1)[:5].tolist() == [127] * 5
-        assert np.isnan(found.fall_time.values.reshape(-1)[:5]).all()
+def test_a_block_filled_with_zeros_is_pending(unfinished):
+    path = unfinished_of(unfinished)
+    with StoredFile(path) as file:
+        spans = [(p.at(0), file.layout.work.stored(p, 0)) for p in file.layout.work.places]
+    content = bytearray(path.read_bytes())
+    for at, length in spans:
+        content[at : at + length] = bytes(length)
+    path.write_bytes(content)
+    with sweep.open_result(unfinished) as found:
+        assert found.status.values.reshape(-1)[:4].tolist() == [127] * 4
+        assert np.isnan(found.fall_time.values.reshape(-1)[:4]).all()
 
 
-def test_the_parts_of_a_large_unfinished_result_are_checked_once(large, monkeypatch):
-    real, calls = parts.read_part, []
-    monkeypatch.setattr(parts, "read_part", lambda *rest, **keys: (calls.append(rest), real(*rest, **keys))[1])
-    with sweep.open_result(large) as found:
+def test_all_columns_of_a_block_are_checked_once(unfinished, monkeypatch):
+    real, calls = Table.read, []
+    monkeypatch.setattr(Table, "read", lambda self, *rest: (calls.append(rest[1:3]), real(self, *rest))[1])
+    with sweep.open_result(unfinished) as found:
         for name in ("status", "method_used", "fall_time"):
             assert found[name].values.size == CELLS
-    assert len(calls) == len(list(folder_of(large).glob("*.h5")))
+            assert found[name].values.size == CELLS
+    assert max(calls.count(call) for call in calls) == 2  # to check it, and to hand it out

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import toy_studies
 import xarray as xr
 
 import sweep
@@ -313,3 +314,58 @@ def test_zarr_keeps_words_without_a_warning(tmp_path):
     sweep.export(ds, tmp_path / "out.zarr")
     with xr.open_zarr(tmp_path / "out.zarr", consolidated=False) as read:
         assert read["word"].values.tolist() == ["plain", "longer"]
+
+
+@pytest.mark.parametrize("suffix", [".nc", ".zarr"])
+@pytest.mark.parametrize("large", [False, True])
+def test_a_compressed_export_is_smaller_and_keeps_every_bit(tmp_path, monkeypatch, suffix, large):
+    if large:
+        monkeypatch.setattr("sweep.results.export.LARGE", 0)
+    dataset = toy_result(tmp_path)
+    sizes = {}
+    for compress in (False, True):
+        path = sweep.export(dataset, tmp_path / f"{compress}{suffix}", compress=compress)
+        files = [path] if path.is_file() else [p for p in path.rglob("*") if p.is_file()]
+        sizes[compress] = sum(p.stat().st_size for p in files)
+        with opened(path) as found:
+            for name in dataset.data_vars:
+                assert found[name].values.tobytes() == dataset[name].values.tobytes()
+    assert sizes[True] < sizes[False] or suffix == ".zarr"
+
+
+@pytest.mark.parametrize("suffix", [".nc", ".zarr"])
+def test_an_export_in_float32_is_rounded_to_nearest(tmp_path, suffix):
+    dataset = toy_result(tmp_path)
+    path = sweep.export(dataset, tmp_path / f"out{suffix}", float32=True)
+    with opened(path) as found:
+        assert found.fall_time.dtype == np.float32
+        np.testing.assert_array_equal(found.fall_time, dataset.fall_time.values.astype("f4"))
+        assert found.fall_time.attrs["units"] == "s"
+        assert found.status.dtype == np.int8
+        assert found.height.dtype == np.float64
+
+
+@pytest.mark.parametrize("value", [1e39, -1e-39, 1e-310])
+def test_what_float32_cannot_hold_is_told(tmp_path, value):
+    dataset = toy_result(tmp_path)
+    dataset["fall_time"][3] = value
+    with pytest.raises(sweep.SweepError, match="fall_time: float32 cannot hold"):
+        sweep.export(dataset, tmp_path / "out.nc", float32=True)
+    assert not (tmp_path / "out.nc").exists()
+
+
+def test_tables_are_not_compressed(tmp_path):
+    with pytest.raises(sweep.SweepError, match=r"compress and float32 are for \.nc and \.zarr"):
+        sweep.export(toy_result(tmp_path), tmp_path / "out.csv", compress=True)
+
+
+def toy_result(tmp_path):
+    study = toy_studies.build(axes={"height": np.linspace(1.0, 2.0, 5000)}, outputs=["fall_time"])
+    with sweep.run(study, tmp_path / "result.h5", progress=False) as found:
+        return found.load()
+
+
+def opened(path):
+    if path.suffix == ".zarr":
+        return xr.open_dataset(path, engine="zarr", consolidated=False, mask_and_scale=False)
+    return xr.open_dataset(path, engine="h5netcdf", mask_and_scale=False)

@@ -1,5 +1,6 @@
 """Files that nobody vouches for: no traceback, no hang, no foreign code, no path out of its folder."""
 
+import dataclasses
 import os
 import pickle
 import random
@@ -19,7 +20,8 @@ from running import environment, quiet, tall
 import sweep
 from sweep.cli import main
 from sweep.results.verify import verify
-from sweep.store import digests, probe
+from sweep.store import probe
+from sweep.store.layout import read_layout, structure_digest
 from sweep.system.errors import StudyError, SweepError
 
 SHARED = [HealthCheck.function_scoped_fixture]
@@ -141,14 +143,15 @@ def test_a_result_leads_to_no_other_file(whole, tmp_path, kind, sealed):
     path = tmp_path / "out.h5"
     path.write_bytes(whole.read_bytes())
     with path.open("r+b") as file:
-        behind = digests.trailer_bytes(file.fileno())
-        file.truncate(path.stat().st_size - behind)
+        layout = read_layout(file.fileno(), path.stat().st_size)
+        file.truncate(layout.end)
     with h5py.File(path, "r+") as file:
         lead_away(file, kind, secret)
     if sealed:
         with path.open("r+b") as file:
-            file.seek(0, 2)
-            file.write(digests.trailer([], file.fileno()))
+            end = file.seek(0, 2)
+            structure = structure_digest(file.fileno(), layout.endings, end)
+            file.write(dataclasses.replace(layout, regions=(), end=end, structure=structure).trailer())
         assert probe.intact(path)
     with pytest.raises(SweepError, match="not the result of a sweep, or damaged"):
         sweep.open_result(path)

@@ -1,3 +1,4 @@
+import contextlib
 import json
 import shutil
 import warnings
@@ -6,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
+from running import flip, kept, place
 
 from kernels.interface import Status
 from sweep.cells.fingerprint import fingerprint
@@ -14,9 +16,8 @@ from sweep.results import open, statuses
 from sweep.results.open import open_result
 from sweep.results.statuses import count_methods, count_statuses, failures
 from sweep.runs.run import run
-from sweep.store.assemble import CHUNK_CELLS, chunk_shape
-from sweep.store.hdf5_bytes import Hdf5Bytes
-from sweep.store.store import folder_of
+from sweep.store.frame import Sparse
+from sweep.store.store import unfinished_of
 from sweep.study.model import Study
 from sweep.study.read import build_study
 from sweep.system.errors import SweepError
@@ -43,22 +44,21 @@ def stored(tmp_path_factory):
 
 @pytest.fixture
 def unfinished(tmp_path):
-    """An output of 24 cells whose cells 10 to 14 are missing."""
+    """An output of 24 cells whose cells 12 to 17 are missing."""
     path = tmp_path / "out.h5"
     real = Solver.solve
 
     def failing(self, start, stop, *rest):
-        if (start, stop) == (10, 15):
-            raise RuntimeError("stop here")
+        if (start, stop) == (12, 18):
+            raise SweepError("stop here")
         real(self, start, stop, *rest)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Solver, "solve", failing)
-        patch.setattr("sweep.system.forecast.Forecast.order", lambda self: iter([0, 1, 3, 4, 2]))
+        patch.setattr("sweep.system.forecast.Forecast.order", lambda self: iter([0, 1, 3, 2]))
         with pytest.raises(SweepError, match="stop here"):
             run(stone(), path, block_cells=5, workers=1, progress=False)
-    for index in (3, 4):
-        assert list(folder_of(path).glob(f"{5 * index:012d}-*.h5"))
+    assert kept(path) == [0, 1, 3]
     return path
 
 
@@ -88,10 +88,11 @@ def test_the_file_opens_with_the_netcdf_library(stored):
 def test_the_file_opens_with_plain_h5py_and_is_stored_as_promised(stored):
     with h5py.File(stored) as file:
         assert file["fall_time"].shape == (4, 3, 2)
-        assert file["fall_time"].chunks is None
-        assert file["fall_time"].compression is None
-        assert file["status"].compression == "gzip"
-        assert file["method_used"].compression == "gzip"
+        for name in ("fall_time", "drop", "status", "method_used", "error_bound"):
+            assert file[name].fletcher32
+            assert file[name].compression is None
+        assert file["fall_time"].chunks == (1, 3, 2)
+        assert file["drop"].chunks == (1, 3, 2, 3)
         assert [scale[0].name for scale in file["drop"].dims] == ["/height", "/v0", "/method", "/phase"]
 
 
@@ -151,7 +152,7 @@ def test_attributes_longer_than_64_kilobytes_are_kept(tmp_path):
 def test_missing_cells_of_an_unfinished_sweep_are_nan_and_pending(unfinished, stored):
     found, whole = open_result(unfinished), open_result(stored)
     pending = found.status.values.ravel() == Status.PENDING
-    assert np.flatnonzero(pending).tolist() == [10, 11, 12, 13, 14]
+    assert np.flatnonzero(pending).tolist() == [12, 13, 14, 15, 16, 17]
     for name in ("fall_time", "impact_speed"):
         values = found[name].values.ravel()
         assert np.isnan(values[pending]).all()
@@ -161,25 +162,8 @@ def test_missing_cells_of_an_unfinished_sweep_are_nan_and_pending(unfinished, st
     xr.testing.assert_identical(found.height, whole.height.load().drop_vars("g").assign_coords(g=found.g))
 
 
-@pytest.mark.parametrize(
-    "name", [f"000000000001-000000000002.{'0' * 32}.h5", f"000000990000-000000990005.{'0' * 32}.h5", "{}{}.h5"]
-)
-def test_strange_and_doubled_parts_hide_no_sound_one(unfinished, name):
-    with open_result(unfinished) as before:
-        before.load()
-    for part in sorted(folder_of(unfinished).glob("*-*.h5")):
-        for letter in "0f":
-            path = part.with_name(name.format(part.name[:26], letter * 32))
-            path.write_bytes(part.read_bytes())
-    for most in (open.LARGEST_AT_ONCE, 0):
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(open, "LARGEST_AT_ONCE", most)
-            with open_result(unfinished) as found:
-                xr.testing.assert_identical(found.load(), before)
-
-
 def test_an_unfinished_sweep_is_refused_when_strict(unfinished):
-    with pytest.raises(SweepError, match="1 of 5 blocks are missing"):
+    with pytest.raises(SweepError, match="1 of 4 blocks are missing"):
         open_result(unfinished, strict=True)
 
 
@@ -187,10 +171,12 @@ def test_a_finished_sweep_is_opened_when_strict(stored):
     open_result(stored, strict=True).close()
 
 
-def test_a_damaged_part_of_an_unfinished_sweep_is_pending(unfinished):
-    part = min(folder_of(unfinished).glob("*.h5"))
-    part.write_bytes(part.read_bytes()[:3000])
-    assert (open_result(unfinished).status.values.ravel()[:5] == Status.PENDING).all()
+def test_a_damaged_block_of_an_unfinished_sweep_is_pending(unfinished):
+    path = unfinished_of(unfinished)
+    flip(path, place(path, "drop", 1))
+    with open_result(unfinished) as found:
+        assert (found.status.values.ravel()[:6] == Status.PENDING).all()
+        assert np.isnan(found.fall_time.values.ravel()[:6]).all()
 
 
 def test_an_unfinished_sweep_is_read_without_its_kernel(unfinished, monkeypatch):
@@ -210,15 +196,15 @@ def test_large_results_come_in_pieces_and_are_the_same(unfinished, stored, monke
 
 
 def test_a_sweep_that_ends_while_it_is_read_is_opened_finished(unfinished, stored, monkeypatch):
-    real = open.read_part
+    real = open.check_structure
 
-    def ending(*rest, **keys):
-        monkeypatch.setattr(open, "read_part", real)
-        shutil.rmtree(folder_of(unfinished))
+    def ending(*rest):
+        monkeypatch.setattr(open, "check_structure", real)
+        unfinished_of(unfinished).unlink()
         shutil.copy(stored, unfinished)
-        return real(*rest, **keys)
+        return real(*rest)
 
-    monkeypatch.setattr(open, "read_part", ending)
+    monkeypatch.setattr(open, "check_structure", ending)
     assert (open_result(unfinished).status != Status.PENDING).all()
 
 
@@ -243,7 +229,7 @@ def test_a_folder_is_one_clear_line(tmp_path):
 
 def test_a_result_cut_short_is_one_clear_line(stored, tmp_path):
     path = tmp_path / "cut.h5"
-    path.write_bytes(stored.read_bytes()[:-500])
+    path.write_bytes(stored.read_bytes()[:-10_000])
     with pytest.raises(SweepError, match="not the result of a sweep, or damaged"):
         open_result(path)
 
@@ -295,50 +281,43 @@ def test_a_status_of_a_later_version_is_told_by_its_number():
     assert str(count_statuses(flags((2,), later=(42, 1)))[1]) == "1 of 2 cells: status 42, e.g. x=0.25"
 
 
-@pytest.mark.parametrize("shape", [(7,), (10**6,), (1000, 1000), (3, 10**6), (100, 100, 100, 100), (1, 1, 5)])
-def test_chunks_follow_the_order_of_cells(shape):
-    chunks = chunk_shape(shape)
-    assert np.prod(chunks) <= CHUNK_CELLS
-    split = next((d for d in range(len(shape)) if chunks[d] > 1), len(shape) - 1)
-    assert chunks[split + 1 :] == shape[split + 1 :]
-    assert np.prod(chunks) > min(CHUNK_CELLS, np.prod(shape)) / 2
+@pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4", "h5py"])
+def test_a_foreign_reader_of_an_unfinished_sweep_gets_pending_and_no_number(unfinished, stored, engine):
+    path = unfinished_of(unfinished)
+    with open_result(stored) as whole, foreign(path, engine) as read:
+        status = read("status").ravel()
+        assert (status == Status.PENDING).tolist() == [12 <= cell < 18 for cell in range(24)]
+        for name in ("fall_time", "drop", "method_used", "error_bound"):
+            with pytest.raises((OSError, RuntimeError)):
+                read(name)
+            np.testing.assert_array_equal(read(name, 1), whole[name][1])
 
 
-def test_hdf5_never_notices_that_the_disk_fails(tmp_path, monkeypatch):
-    from sweep.system import disk
-
-    real, calls = disk.pwrite, []
-
-    def failing(*args):
-        calls.append(args)
-        if len(calls) == 3:
-            raise OSError(28, "No space left on device")
-        return real(*args)
-
-    monkeypatch.setattr(disk, "pwrite", failing)
-    with (tmp_path / "file").open("w+b") as raw:
-        hdf5 = Hdf5Bytes(raw.fileno())
-        with h5py.File(hdf5, "w") as file:
-            file["x"] = np.arange(1000.0)
-            file.attrs["long"] = "x" * 10_000
-        with h5py.File(hdf5, "r") as file:
-            np.testing.assert_array_equal(file["x"], np.arange(1000.0))
-            assert file.attrs["long"] == "x" * 10_000
-        assert len(calls) == 3
-        with pytest.raises(OSError, match="No space"):
-            hdf5.finish()
+@contextlib.contextmanager
+def foreign(path, engine):
+    """Reads a variable by name, of all or one of the heights."""
+    if engine == "h5py":
+        with h5py.File(path) as file:
+            yield lambda name, *at: file[name][at or ...]
+    else:
+        with xr.open_dataset(path, engine=engine, mask_and_scale=False) as file:
+            yield lambda name, *at: file[name][at or ...].values
 
 
-def test_what_hdf5_never_wrote_is_zero_and_the_file_gets_its_size(tmp_path):
-    with (tmp_path / "file").open("w+b") as raw:
-        hdf5 = Hdf5Bytes(raw.fileno())
-        hdf5.seek(10)
-        hdf5.write(b"abc")
-        hdf5.truncate(100)
-        assert hdf5.piece(0, 20) == bytes(10) + b"abc" + bytes(7)
-        assert (hdf5.seek(-1, 2), hdf5.seek(-9, 1)) == (99, 90)
-        hdf5.finish()
-    assert (tmp_path / "file").stat().st_size == 100
+def test_a_frame_in_memory_holds_what_is_not_zero(tmp_path):
+    sparse = Sparse()
+    sparse.write(bytes(10 * Sparse.PAGE))
+    assert list(sparse.pages()) == []
+    sparse.seek(Sparse.PAGE - 2)
+    sparse.write(b"abcd")
+    assert sparse.piece(Sparse.PAGE - 4, Sparse.PAGE + 4) == b"\0\0abcd\0\0"
+    sparse.seek(-7, 1)
+    sparse.write(bytes(6))
+    assert sparse.piece(Sparse.PAGE - 6, Sparse.PAGE + 4) == bytes(7) + b"d" + bytes(2)
+    assert (sparse.seek(-1, 2), sparse.seek(-9, 1)) == (10 * Sparse.PAGE - 1, 10 * Sparse.PAGE - 10)
+    assert sparse.is_zero(0, Sparse.PAGE)
+    assert not sparse.is_zero(Sparse.PAGE, Sparse.PAGE + 2)
+    assert [at for at, _ in sparse.pages()] == [0, Sparse.PAGE]
 
 
 def test_results_open_without_a_warning(stored):

@@ -1,5 +1,7 @@
 """Runs on a real scheduler with worker processes on this machine; some of these are killed."""
 
+import contextlib
+import dataclasses
 import io
 import os
 import signal
@@ -13,7 +15,7 @@ import numpy as np
 import pytest
 import toy_studies
 from clusters import served
-from running import names, quiet, same, tall
+from running import kept, quiet, same, tall
 
 import sweep
 from sweep.cli import main
@@ -21,7 +23,8 @@ from sweep.results.statuses import account
 from sweep.results.verify import verify
 from sweep.runs import cluster as clusters
 from sweep.runs import dispatch, worker
-from sweep.store.store import folder_of, opened
+from sweep.store import frame
+from sweep.store.store import Store, opened, unfinished_of
 from sweep.system.errors import SweepError
 
 # a lost connection is what some of these tests are about; dask leaves its sockets to the collector
@@ -51,6 +54,18 @@ def elsewhere(study, path=None, **keys):
     return sweep.run(study, path, **{"progress": False, **keys})
 
 
+@pytest.fixture
+def pages(monkeypatch):
+    """Every chunk has a page for itself, however short."""
+    monkeypatch.setattr(frame, "SHARED_WORTH_A_PAGE", 1)
+
+
+def hide(monkeypatch):
+    """Workers do not see the file."""
+    real = Store.shared
+    monkeypatch.setattr(Store, "shared", lambda self: dataclasses.replace(real(self), path="/nowhere/out.h5"))
+
+
 KINDS = {
     "cells": {"outputs": ["fall_time", "drop"], "along": {"phase": [0.0, 0.5, 1.0]}},
     "summary": {"summary": {"over": ["height"], "outputs": {"fall_time": ["min", "mean", "argmax"]}}},
@@ -63,9 +78,9 @@ def stones(kind, count=41):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("place", ["memory", "shared folder", "no shared folder"])
-def test_the_same_bits_wherever_the_cells_are_computed(client, output, monkeypatch, kind, place):
+def test_the_same_bits_wherever_the_cells_are_computed(client, output, monkeypatch, pages, kind, place):
     if place == "no shared folder":
-        monkeypatch.setattr(dispatch, "write_token", lambda shared, token: None)
+        hide(monkeypatch)
     sent = []
     monkeypatch.setattr(
         dispatch.Dispatch,
@@ -80,9 +95,9 @@ def test_the_same_bits_wherever_the_cells_are_computed(client, output, monkeypat
 
 
 @pytest.mark.parametrize("shared", [True, False])
-def test_an_extension_sends_only_new_cells_out(client, output, monkeypatch, shared):
+def test_an_extension_sends_only_new_cells_out(client, output, monkeypatch, pages, shared):
     if not shared:
-        monkeypatch.setattr(dispatch, "write_token", lambda shared, token: None)
+        hide(monkeypatch)
     more = toy_studies.build(axes={"height": np.sort(np.r_[np.arange(1.0, 21), np.arange(10.5, 40)])})
     few = toy_studies.build(axes={"height": np.arange(1.0, 21)})
     quiet(few, output).close()
@@ -141,7 +156,7 @@ def pids(client):
 
 def kill_a_worker(client, path):
     """Kills a worker, once some parts are there."""
-    while len(names(path)) < 3:
+    while len(kept(path)) < 3:
         time.sleep(0.01)
     os.kill(pids(client)[0], signal.SIGKILL)
 
@@ -152,9 +167,9 @@ def soon():
 
 
 @pytest.mark.parametrize("shared", [True, False])
-def test_workers_killed_in_the_middle_cost_nothing_but_time(client, output, monkeypatch, shared):
+def test_workers_killed_in_the_middle_cost_nothing_but_time(client, output, monkeypatch, pages, shared):
     if not shared:
-        monkeypatch.setattr(dispatch, "write_token", lambda shared, token: None)
+        hide(monkeypatch)
     study = tall(400, "slow:SLOW")
     killer = threading.Thread(target=kill_a_worker, args=(client, output))
     killer.start()
@@ -175,8 +190,7 @@ def test_a_block_that_kills_its_workers_is_reported_when_all_others_are_done(cli
     study = tall(60, "slow:LETHAL")
     with pytest.raises(SweepError, match="cells 12 to 13: every worker that took them died"):
         elsewhere(study, output, cluster=client, block_cells=1, progress=log, until=soon())
-    kept = {int(name.split("-")[0]) for name in names(output)}
-    assert kept == set(range(60)) - {12}
+    assert set(kept(output)) == set(range(60)) - {12}
     assert "tried again at the end" in log.getvalue()
     # nobody dies of it here
     same(quiet(study, output), quiet(study))
@@ -187,7 +201,7 @@ def test_a_lost_scheduler_is_one_line_and_the_run_continues(output):
     with served(workers=2) as (address, process):
 
         def kill():
-            while len(names(output)) < 5:
+            while len(kept(output)) < 5:
                 time.sleep(0.01)
             os.killpg(process.pid, signal.SIGKILL)
 
@@ -197,7 +211,7 @@ def test_a_lost_scheduler_is_one_line_and_the_run_continues(output):
             elsewhere(study, output, cluster=address, block_cells=4)
         killer.join()
     assert "\n" not in str(told.value)
-    before = names(output)
+    before = kept(output)
     assert len(before) >= 5
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("slow.CELL_SECONDS", 0.0)
@@ -205,33 +219,47 @@ def test_a_lost_scheduler_is_one_line_and_the_run_continues(output):
     assert list(output.parent.iterdir()) == [output]
 
 
-def test_a_worker_that_comes_too_late_has_no_place_to_write(output):
+def test_a_worker_that_comes_too_late_writes_to_no_other_file(output, pages):
+    """It keeps the file that it was told of, whatever stands in its place by then."""
+    with begun(output) as store:
+        shared = store.shared()
+        fd = shared.opened()
+        store.discard()
+    unfinished_of(output).write_bytes(b"another")
+    shared.table.write(fd, 0, {place.name: place.empty(10) for place in shared.table.places})
+    os.close(fd)
+    assert unfinished_of(output).read_bytes() == b"another"
+    assert shared.opened() is None
+
+
+def test_a_worker_that_answers_nonsense_is_refused(output, pages):
+    with begun(output) as store, pytest.raises(SweepError, match="something else than it was asked for"):
+        store.take(1, b"../../etc/passwd")
+
+
+def test_a_worker_that_finds_another_file_sends_its_numbers(output, pages):
+    with begun(output) as store:
+        shared = store.shared()
+        assert dataclasses.replace(shared, key="0" * 32).opened() is None
+        fd = shared.opened()
+        assert fd is not None
+        os.close(fd)
+
+
+def test_blocks_that_share_a_page_are_sent(output):
+    with begun(output) as store:
+        assert store.shared() is None
+
+
+@contextlib.contextmanager
+def begun(output):
+    """The store of a run that has just begun."""
     study = tall(30)
-    with opened(output, sweep.cells.output_schema.part_columns(study)) as store:
-        store.begin(study.to_json(), {}, sweep.cells.partition.Partition(30, 10))
-        shared = store.open_shared()
-        dispatch.write_token(shared, "token")
-        late = store.sharing(shared, store.columns, {}, store.blocks)
-        arrays = {c.name: c.empty(10) for c in store.columns}
-        late.put(0, arrays)
-        store.take(0, late.names[0])
-        store.close_shared()
-        with pytest.raises(SweepError, match="cannot be written"):
-            late.put(1, arrays)
-        assert len(names(output)) == 1
-        with pytest.raises(SweepError, match="something else than it was asked for"):
-            store.take(1, "../../" + late.names[0])
-        store.clear()
-    assert list(output.parent.iterdir()) == []
-
-
-def test_a_worker_that_does_not_know_the_token_sends_its_numbers(tmp_path):
-    study = tall(3)
-    for text in (None, "other", "token"):
-        if text:
-            (tmp_path / worker.TOKEN).write_text(text)
-        assignment = worker.Assignment("r", study.to_json(), {}, None, str(tmp_path), "token", ())
-        assert (worker._store(assignment, ()) is not None) == (text == "token")
+    schema = sweep.cells.output_schema.output_schema(study, {})
+    cuts = frame.cuts_of(study, schema, sweep.cells.partition.Partition(30, 10))
+    with opened(output) as store:
+        store.begin(frame.Frame(schema, cuts, {}, "now", shared=True))
+        yield store
 
 
 def test_numbers_that_were_damaged_on_their_way_are_refused(client, output, monkeypatch):
@@ -285,7 +313,7 @@ def test_ctrl_c_ends_a_run_on_a_cluster(client, output):
     study = tall(1000, "slow:SLOW")
 
     def press():
-        while len(names(output)) < 3:
+        while len(kept(output)) < 3:
             time.sleep(0.01)
         os.kill(os.getpid(), signal.SIGINT)
 
@@ -294,8 +322,8 @@ def test_ctrl_c_ends_a_run_on_a_cluster(client, output):
     with pytest.raises(KeyboardInterrupt):
         elsewhere(study, output, cluster=client, block_cells=4)
     thread.join()
-    assert names(output)
+    assert kept(output)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("slow.CELL_SECONDS", 0.0)
         same(quiet(study, output), quiet(study))
-    assert not folder_of(output).exists()
+    assert list(output.parent.iterdir()) == [output]

@@ -10,6 +10,7 @@ import pytest
 import toy_studies
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from running import kept as kept_blocks
 from running import quiet, same
 
 import sweep
@@ -17,7 +18,6 @@ from kernels.interface import Status
 from sweep.cells.solve import Solver, _Strip
 from sweep.cli import main
 from sweep.runs import extend as extending
-from sweep.store.store import folder_of
 from sweep.system.errors import SweepError
 
 HEIGHTS = np.round(np.linspace(-1.0, 9.0, 21), 3)
@@ -118,7 +118,7 @@ def test_a_killed_extension_continues(output, monkeypatch):
             quiet(more, output, extend=True, block_cells=5, workers=1)
     with sweep.open_result(output) as before:
         same(before, quiet(few))
-    assert list(folder_of(output).glob("*.h5"))
+    assert kept_blocks(output)
     with pytest.raises(SweepError, match="--extend"):
         quiet(more, output)
     with quiet(more, output, extend=True) as found:
@@ -252,7 +252,7 @@ def test_a_result_without_the_error_bounds_of_its_inaccurate_cells_is_not_extend
     loose = toy_studies.build(axes={"height": HEIGHTS, "v0": [0.5]}, method="rough", rtol=1e-12)
     quiet(loose, output).close()
     with extending.Reused(output, loose) as reused:
-        assert (reused._file["status"][()] == Status.INACCURATE).any()
+        assert (reused._numbers["status"][()] == Status.INACCURATE).any()
         reused.check_sample()
         reused._lacks = lambda name: name == "error_bound"
         with pytest.raises(SweepError, match="does not say what its INACCURATE values are right to"):

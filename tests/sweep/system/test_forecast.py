@@ -8,7 +8,7 @@ import pytest
 
 from sweep.cells.partition import Partition
 from sweep.cells.timing import Sample
-from sweep.system.forecast import FRAME_SECONDS, Ending, Forecast
+from sweep.system.forecast import Forecast
 
 CELLS = 2**18
 
@@ -217,17 +217,3 @@ def test_a_hundred_thousand_blocks_are_ordered_at_once():
     forecast._expected = counted
     assert len(set(forecast.order())) == 100_000
     assert looked < 1000
-
-
-def test_the_parts_are_put_together_in_as_long_as_they_were_written():
-    ending = Ending(100, 4, 1e12)
-    assert ending.seconds() == FRAME_SECONDS
-    for seconds in (1.0, 3.0):
-        ending.wrote(seconds)
-    assert ending.seconds() == pytest.approx(2.0 * 100 / 4 + FRAME_SECONDS)
-
-
-def test_many_small_parts_take_long_for_each_is_synced_but_the_output_does_not():
-    ending = Ending(1000, 2, 1e6)
-    ending.wrote(0.02)
-    assert ending.seconds() < 0.2

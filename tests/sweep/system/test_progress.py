@@ -71,13 +71,6 @@ def test_speed_and_time_left_never_contradict_each_other(clock, left):
     assert 1 / 1.5 < speed * left / 900_000 < 1.5
 
 
-def test_what_comes_after_the_last_cell_is_part_of_the_time_left(clock):
-    progress = Progress(100, None, clock=clock, ending=lambda: 7.0)
-    clock.now += 5
-    progress.add(50)
-    assert progress.line().endswith(" 12 s left")
-
-
 def test_cells_of_an_earlier_run_are_done_but_say_nothing_about_speed(clock):
     progress = Progress(100, None, done=80, clock=clock)
     clock.now += 5
@@ -161,17 +154,6 @@ def test_cells_that_come_again_are_taken_back(clock):
     assert progress.done == 90
     clock.now += 1
     assert progress.line().endswith("left")
-
-
-def test_a_long_time_of_writing_the_output_is_told(clock):
-    log = io.StringIO()
-    progress = Progress(100, log, clock=clock)
-    clock.now += 100
-    progress.add(100)
-    for part in range(100):
-        clock.now += 1
-        progress.gather(part, 100)
-    assert [line.split()[-3] for line in lines(log)[1:]] == ["29", "59", "89"]
 
 
 def test_nothing_done_yet_says_nothing_about_time(clock):

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from running import names, quiet, same, slow_run, tall, wait_for
+from running import kept, quiet, same, slow_run, tall, wait_for
 
 import sweep
 from kernels.interface import Status
 from sweep.cli import main
 from sweep.results.statuses import FAILED, account
-from sweep.store import assemble
-from sweep.store.store import folder_of
+from sweep.store import store
+from sweep.store.frame import Frame
 from sweep.system.errors import SweepError
 from sweep.system.pool import Terminated
 from sweep.system.progress import deadline
@@ -79,12 +79,12 @@ def test_a_run_ends_at_its_time_with_what_there_is_and_continues(tmp_path):
     assert 0 < told.ok < 5000
     assert told.ok + told.pending == told.total == 5000
     assert "run the same command again to continue" in log.getvalue()
-    assert len(names(output)) == told.ok // 10
+    assert len(kept(output)) == told.ok // 10
     fast = tall(5000, "slow:SLOW")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("slow.CELL_SECONDS", 0.0)
         same(quiet(fast, output, until="2999-01-01"), quiet(fast))
-    assert not folder_of(output).exists()
+    assert list(tmp_path.iterdir()) == [output]
 
 
 def test_a_time_that_is_over_computes_next_to_nothing_and_exits_with_3(tmp_path, read, capsys):
@@ -105,31 +105,36 @@ def test_a_time_needs_an_output():
 def test_sigterm_ends_within_a_block_with_143_and_the_next_start_tidies_up(tmp_path):
     output = tmp_path / "out.h5"
     with slow_run(output, 2, 10) as process:
-        wait_for(lambda: len(names(output)) >= 2, process)
+        wait_for(lambda: len(kept(output)) >= 2, process)
         process.send_signal(signal.SIGTERM)
         _, told = process.communicate(timeout=30)
     assert process.returncode == 143
     assert "run the same command again to continue" in told
     assert "Traceback" not in told
-    assert len(names(output)) >= 2
-    (folder_of(output) / "000000000010.abcd.tmp").write_bytes(b"half")
+    assert len(kept(output)) >= 2
+    output.with_name("out.h5.unfinished.tmp").write_bytes(b"half")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("slow.CELL_SECONDS", 0.0)
         same(quiet(tall(400, "slow:SLOW"), output), quiet(tall(400, "slow:SLOW")))
     assert list(tmp_path.iterdir()) == [output]
 
 
-@pytest.mark.parametrize("name", ["write_structure", "trailer", "structure_digest", "_check"])
-def test_sigterm_while_the_output_is_put_together_leaves_no_file_half_written(tmp_path, name):
+@pytest.mark.parametrize("name", ["_pieces", "write_digests", "_end", "_reads_back"])
+def test_sigterm_at_the_beginning_and_the_end_leaves_no_file_half_written(tmp_path, name):
     output, log = tmp_path / "out.h5", io.StringIO()
-    real = getattr(assemble, name)
+    home = Frame if name == "_pieces" else store
+    real = getattr(home, name)
+
+    struck_once = []
 
     def struck(*rest):
-        os.kill(os.getpid(), signal.SIGTERM)
+        if not struck_once:
+            struck_once.append(rest)
+            os.kill(os.getpid(), signal.SIGTERM)
         return real(*rest)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(assemble, name, struck)
+        patch.setattr(home, name, struck)
         with pytest.raises(Terminated):
             quiet(tall(50), output, block_cells=10, progress=log)
     assert not list(tmp_path.rglob("*.tmp"))

@@ -1,0 +1,152 @@
+"""How close to the disk does a run write, and what does it cost to keep what is finished?
+
+    python benchmarks/speed/storage.py [FOLDER] [--million 8] [--blocks 100000] [--rounds 5]
+
+A cheap kernel, every output stored: the run is compared with the kernel alone and one plain write of the same bytes,
+fsync included, taken in turn with it. Then peak disk; dear cells stored against the kernel alone; what is left of many
+blocks; reading with checksums against plain reading. All on the folder given (default: here). Disks differ from
+minute to minute: look at the spread, not at one figure.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import threading
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from engine import disk_seconds, foliot, kernel_seconds, run_seconds, seconds, warm
+
+import sweep
+from sweep.cells.fingerprint import fingerprint
+from sweep.cells.output_schema import output_schema
+from sweep.cells.partition import boxes
+from sweep.cells.schema import columns
+from sweep.cells.solve import Solver
+from sweep.store.frame import Frame, cuts_of
+from sweep.store.store import opened, unfinished_of, write_digests
+from sweep.system import disk
+
+
+def cheap(folder: Path, cells: int, rounds: int) -> None:
+    """Run / (kernel + the bytes written once)."""
+    study = foliot("closed", cells)
+    warm(Solver(study), study)
+    size, path = cells * sum(c.cell_bytes for c in columns(study)), folder / "cheap.h5"
+    for workers in (1, 2):
+        ratios = []
+        for _ in range(rounds):
+            kernel, plain = kernel_seconds(study, workers), disk_seconds(folder, size)
+            whole = run_seconds(study, path, workers)
+            ratios.append(whole / (kernel + plain))
+            print(f"  {workers} workers: kernel {kernel:.2f} s, {size / 1e6:.0f} MB {plain:.2f} s, run {whole:.2f} s")
+        print(f"{cells:.0e} cells, {workers} workers: run / (kernel + write once), median {np.median(ratios):.2f}")
+
+
+def peak(folder: Path, cells: int) -> None:
+    """Bytes that are on the disk at any time, over those of the result."""
+    path, most, over = folder / "peak.h5", [0], threading.Event()
+
+    def look() -> None:
+        while not over.is_set():
+            sizes = []
+            for entry in folder.iterdir():
+                with_blocks = entry.stat() if entry.exists() else None
+                sizes.append(512 * with_blocks.st_blocks if with_blocks else 0)
+            most[0] = max(most[0], sum(sizes))
+            time.sleep(0.005)
+
+    watcher = threading.Thread(target=look)
+    watcher.start()
+    sweep.run(foliot("closed", cells), path, workers=2, progress=False).close()
+    over.set()
+    watcher.join()
+    print(f"peak disk / result: {most[0] / path.stat().st_size:.3f}")
+    path.unlink()
+
+
+def dear(folder: Path, cells: int, rounds: int) -> None:
+    """Processor time of a stored run of dear cells over that of the kernel alone."""
+    study = foliot("map", cells)
+    warm(Solver(study), study)
+    ratios = []
+    for _ in range(rounds):
+        begun = time.process_time()
+        kernel_seconds(study, 1, 4096)
+        middle = time.process_time()
+        run_seconds(study, folder / "dear.h5", 1)
+        ratios.append((time.process_time() - middle) / (middle - begun))
+    print(f"dear cells: stored run / kernel, processor time, median {np.median(ratios):.3f}")
+
+
+def many(folder: Path, count: int) -> None:
+    """What is left of many blocks, all but one of which are done."""
+    study, path = foliot("closed", 100 * count), folder / "many.h5"
+    mark = fingerprint(study)
+    schema = output_schema(study, mark)
+    cuts = cuts_of(study, schema, boxes(schema.grid.shape, 100))
+    begun = time.perf_counter()
+    with opened(path) as store:
+        store.begin(Frame(schema, cuts, mark, "now"))
+        framed, table = time.perf_counter() - begun, store.table
+        fd = disk.open_file(unfinished_of(path), os.O_RDWR)
+        write_digests(fd, table, dict.fromkeys(range(table.blocks.count - 1), b"x" * table.row_bytes))
+        os.close(fd)
+    with opened(path) as store:
+        begun = time.perf_counter()
+        layout = store.found()
+        assert layout is not None
+        store.resume(layout)
+        left = store.missing()
+        taken = time.perf_counter() - begun
+    assert left == [table.blocks.count - 1]
+    print(f"{table.blocks.count} blocks: frame made in {framed:.2f} s, what is left is known after {taken:.3f} s")
+    unfinished_of(path).unlink()
+
+
+def reading(folder: Path, cells: int, rounds: int) -> None:
+    """A result read with its digests compared, by dask in chunks, and by h5py, which checks HDF5's sums."""
+    import h5py
+
+    study, path = foliot("closed", cells), folder / "read.h5"
+    sweep.run(study, path, progress=False).close()
+    size = path.stat().st_size
+    for _ in range(rounds):
+        with sweep.open_result(path) as found:
+            ours = seconds(found.load)
+        with sweep.open_result(path) as found:
+            chunked = found.chunk("auto") if not found.chunks else found
+            in_chunks = seconds(lambda: chunked.sum().compute())  # noqa: B023
+        with h5py.File(path) as file:
+            theirs = seconds(lambda: [file[c.name][...] for c in columns(study)])
+        plain = seconds(lambda: path.read_bytes())
+        print(
+            f"reading {size / 1e6:.0f} MB: checked {ours:.2f} s, in chunks with sums {in_chunks:.2f} s, by h5py "
+            f"{theirs:.2f} s, plain {plain:.2f} s"
+        )
+    path.unlink()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("folder", nargs="?", type=Path, default=Path())
+    parser.add_argument("--million", type=float, default=8.0, help="millions of cells stored")
+    parser.add_argument("--blocks", type=int, default=100_000)
+    parser.add_argument("--rounds", type=int, default=5)
+    options = parser.parse_args()
+    cells = int(options.million * 1e6)
+    with TemporaryDirectory(dir=options.folder) as name:
+        folder = Path(name)
+        cheap(folder, cells, options.rounds)
+        peak(folder, cells)
+        dear(folder, cells // 20, options.rounds)
+        many(folder, options.blocks)
+        reading(folder, cells, 2)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
