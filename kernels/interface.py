@@ -17,9 +17,10 @@ from typing import Any, Protocol
 
 
 class Status(IntEnum):
-    """What became of a cell: OK, a remark (1..63, values given) or a refusal (64..125, every output NaN).
+    """What became of a cell: OK, a remark (1..63, values given) or a refusal (64..124, every output NaN).
 
-    FAILED is the engine's word, for what no kernel may do. Numbers are stored in files and never reused.
+    The last three are the engine's words: FAILED is for what no kernel may do. Numbers are stored in files and never
+    reused.
     """
 
     OK = 0, "right to the wanted rtol"
@@ -50,6 +51,7 @@ class Status(IntEnum):
     NO_CYCLE = 72, "a cycle of this kind does not exist here"
     NEVER_MEETS = 73, "the pallets never meet a tooth"
     NO_ASSEMBLY = 74, "the links are too short or too long to be joined"
+    NOT_ASKED = 125, "the study's condition leaves the cell out"
     FAILED = 126, "the kernel gave no number and no reason"
     PENDING = 127, "not computed yet"
 
@@ -63,7 +65,7 @@ class Status(IntEnum):
 
     @property
     def refused(self) -> bool:
-        return 64 <= self < 126
+        return FIRST_REFUSAL <= self < Status.NOT_ASKED
 
 
 FIRST_REFUSAL = 64

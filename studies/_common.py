@@ -7,6 +7,7 @@ theory says beside what comes out, and draws `<question>.png` beside the dataset
 from __future__ import annotations
 
 import sys
+import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,18 +17,37 @@ import xarray as xr
 
 import sweep
 
-VERDICT = {None: "", True: "yes", False: "NO"}
-
 
 @dataclass(frozen=True)
 class Statement:
-    """One line of the table; `holds` is None where nothing is said that could be checked."""
+    """One line of the table.
+
+    Parameters
+    ----------
+    what, paper, here : what is compared, what the source or theory says of it, and what comes out
+    off : deviation
+    holds : whether it is as said, by a check that can fail; None: a value, of which nothing is said
+    refuted : it is known not to be as the source says, and would be a mistake here if it were
+    """
 
     what: str
     paper: str
     here: str
     off: float | None = None
     holds: bool | None = None
+    refuted: bool = False
+
+    @property
+    def failed(self) -> bool:
+        """Whether it came out otherwise than it must."""
+        return self.holds is not None and bool(self.holds) == self.refuted
+
+    @property
+    def verdict(self) -> str:
+        """The last column."""
+        if self.holds is None:
+            return ""
+        return "NO" if self.failed else "no, known" if self.refuted else "yes"
 
 
 Groups = dict[str, list[Statement]]
@@ -51,7 +71,7 @@ def table(groups: Groups, source: str = "paper") -> list[str]:
     rows: list[tuple[str, ...]] = [("", source, "here", "deviation", "holds")]
     for heading, lines in groups.items():
         rows += [("",), (heading.upper(),)]
-        rows += [(s.what, s.paper, s.here, _number(s.off), VERDICT[s.holds]) for s in lines]
+        rows += [(s.what, s.paper, s.here, _number(s.off), s.verdict) for s in lines]
     return columns(rows, " | ")
 
 
@@ -109,7 +129,7 @@ def report(
     except sweep.SweepError as error:
         print(error, file=sys.stderr)
         return 2
-    return int(any(s.holds is not None and not s.holds for lines in groups.values() for s in lines))
+    return int(any(s.failed for lines in groups.values() for s in lines))
 
 
 def hatch(axes: Any, x: Any, y: Any, where: Any, pattern: str, colour: str = "0.45") -> None:
@@ -126,3 +146,14 @@ def direct_label(axes: Any, x: float, y: float, text: str, colour: str = "black"
     """Text in the colour of the line it names, readable where it crosses others."""
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
     axes.text(x, y, text, color=colour, bbox=box, **{"fontsize": 8, "ha": "center", "va": "center", **how})
+
+
+def plain_ticks(axis: Any, values: Sequence[float]) -> None:
+    """Ticks of a logarithmic axis at these values, written out, and no others."""
+    axis.set_ticks(list(values), labels=[f"{x:g}" for x in values])
+    axis.set_ticks([], minor=True)
+
+
+def paragraph(text: str) -> list[str]:
+    """Running text as lines of 118 characters."""
+    return textwrap.wrap(" ".join(text.split()), 118)

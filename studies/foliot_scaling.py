@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, columns, compared, read_result, report
+from _common import Groups, Statement, columns, compared, differing, read_result, report
 
 import sweep
 from sweep.analysis.exponents import crossover, fit_exponent, local_exponent, where_exponent, where_value
@@ -40,7 +40,9 @@ paper: Hoyng & Nieuwenhuizen, arXiv:1604.06681; A = phi_max/phi0; (...) is exact
 *: masked in the text at hand; here as it follows from the paper's equations
 deviation: relative; of exponents the difference. A limit holds if the next term of its series accounts for it
 ±: of lines the standard error of least squares. Nothing here is noisy, so it measures the curvature of the truth in
-the window, and is no bound on the distance to the limit. Of places it is the estimated error of the interpolation"""
+the window, and is no bound on the distance to the limit. Of places it is the estimated error of the interpolation
+why -1: inertia does not count, v = mu/a all the way, and P = 4 phi0/v; why -1/3: the work 2 mu phi0 of half a swing is
+lost over the way A ~ v^2/mu as a v A, so v^3 ~ mu^2 phi0/a, and P ~ v/mu = (phi0/(a mu))^(1/3)"""
 
 DAY = 24 * 60.0
 """Minutes in a day."""
@@ -155,21 +157,31 @@ def sliding(ds: xr.Dataset, half: HalfPoint) -> list[Statement]:
 
 def general(ds: xr.Dataset, half: HalfPoint) -> list[Statement]:
     """Statements about all drives."""
-    swings = int((ds.status == 0).sum())
     from_rest, cycle = (sweep_of_alpha(ds, SHOWN.values(), method) for method in ("map", "closed"))
     reached = float(abs(from_rest.aP / cycle.aP - 1).max())
     other = sweep_of_alpha(ds.assign_coords(a=3 * ds.a, phi0=ds.phi0 / 7), ds.alpha.values)
     apart = max(float(abs(other[y].values / ds[y].values - 1).max()) for y in ("aP", "A"))
     least, blind = float(ds.A.min() - 1), friction_exponent(ds, half)
     return [
-        Statement(
-            "no least torque", "yes", f"{swings} of {ds.status.size} cells swing", None, swings == ds.status.size
-        ),
+        weakest(ds),
         Statement("self-starting", "yes", "from rest to the cycle", reached, reached < 1e-8),
         Statement("A is always larger than 1", "yes", f"smallest A - 1 = {least:.2g}", None, least > 0),
         Statement("a P and A depend on alpha alone", "yes *", "same with other a, phi0", apart, apart < 1e-12),
         Statement("at exponent -1/2 friction does not count", "yes *", "dlnP/dlna = 0", blind, abs(blind) < 1e-8),
     ]
+
+
+def weakest(ds: xr.Dataset) -> Statement:
+    """A weak drive followed from rest in SI units, swing by swing; weaker ones take steps in proportion to 1/alpha."""
+    weak = ds.isel(mu=int(np.argmin(abs(np.log(ds.alpha.values / 1e-3)))))
+    mu, a, phi0 = float(weak.mu), float(ds.a), float(ds.phi0)
+    study = sweep.build_study(
+        kernel="foliot_scene:KERNEL", axes={"mu": [mu]}, fixed={"a": a, "phi0": phi0, "flips": 4}, rtol=1e-10,
+        allow_import=True,
+    )  # fmt: skip
+    off = float(2 * sweep.run(study).interval[0] / weak.period) - 1
+    what = f"from rest to 4 switches at alpha = {float(weak.alpha):.1e}: P"
+    return Statement("no least torque", "yes", what, off, abs(off) < 1e-8)
 
 
 def friction_exponent(ds: xr.Dataset, half: HalfPoint) -> float:
@@ -236,7 +248,67 @@ def statements(ds: xr.Dataset) -> Groups:
         "In between": sliding(ds, half),
         "At every drive": general(ds, half),
         "Torque": torque(ds),
+        "Shape of the swing": shape(ds),
+        "Energy": energy(ds),
     }
+
+
+def shape(ds: xr.Dataset) -> list[Statement]:
+    """The peaks recline, and at strong drive they are rounder than a sine's."""
+    motion = trajectories(ds)
+    lines = []
+    for i, (name, alpha) in enumerate(SHOWN.items()):
+        angle = motion.angle.isel(mu=i).values / float(ds.phi0)
+        phase = motion.phase.values
+        top = int(angle.argmax())
+        back = float(np.interp(-1.0, -angle[top:401], phase[top:401]))
+        out, home = phase[top], back - phase[top]  # from the switch to the peak, and back to the angle of the switch
+        high = float((abs(angle) > 0.5 * abs(angle).max()).mean())
+        text = f"{out:.3f} P there, {home:.3f} P back"
+        lines.append(
+            Statement(f"{name} drive: from the switch to the peak sooner", "yes", text, None, bool(out < home))
+        )
+        if alpha > 50:
+            lines.append(
+                Statement(f"{name} drive: rounder than a sine, time over A/2", "yes", f"{high:.3f} P, sine 0.667", None,
+                          high > 2 / 3 + 0.01)
+            )  # fmt: skip
+    return lines
+
+
+def energy(ds: xr.Dataset) -> list[Statement]:
+    """The drive's work 2 mu phi0 a half swing is what friction takes, a integral v^2 dt; and what moved weights do."""
+    alpha = list(SHOWN.values())
+    unit = float(ds.a**2 * ds.phi0)
+    a, phi0 = float(ds.a), float(ds.phi0)
+    study = sweep.build_study(
+        kernel="foliot_motion", method="closed", outputs=["speed"], axes={"mu": unit * np.array(alpha)},
+        along={"phase": np.linspace(0, 0.5, 4001)}, fixed={"a": a, "phi0": phi0},
+    )  # fmt: skip
+    cycle = sweep_of_alpha(ds, alpha)
+    squares = (sweep.run(study).speed ** 2).integrate("phase").values * cycle.period.values
+    off = float(abs(a * squares / (2 * cycle.mu.values * phi0) - 1).max())
+    whole = sweep_of_alpha(ds, alpha)
+    kept = float(np.max(whole.multiplier.values[:1]))
+    lines = [
+        Statement("friction takes 2 mu phi0 in half a period", "yes *", "largest deviation", off, off < 1e-5),
+        Statement("all energy is fed anew in each swing", "yes", f"kept, weak drive: {kept:.0e}", None, kept < 1e-8),
+    ]  # fmt: skip
+    for value, s in zip(alpha, whole.s.values, strict=True):
+        heavy = math.exp(0.01)  # moment of inertia: torque and friction over it fall
+        moved = [
+            float(sweep.run(sweep.build_study(
+                kernel="foliot", axes={"mu": [unit * value / inertia]}, fixed={"a": a / inertia, "phi0": phi0},
+                outputs=["period"],
+            )).period[0]) for inertia in (1 / heavy, heavy)
+        ]  # fmt: skip
+        rise = math.log(moved[1] / moved[0]) / 0.02
+        lines.append(
+            differing(
+                f"weights moved out, alpha = {value:g}: dlnP/dlnI", f"(1 - s = {1 - s:.5f})", rise, 1 - s, 1e-4, 5
+            )
+        )
+    return lines
 
 
 def trajectories(ds: xr.Dataset) -> xr.Dataset:

@@ -191,14 +191,14 @@ def figure(laws: xr.Dataset, grid: xr.Dataset, line: xr.Dataset) -> Any:
 
 def draw_exponents(axes: Any, laws: xr.Dataset) -> None:
     """-s against mu for every n."""
-    from sweep.show.charts import COLOURS, DASHES
+    from sweep.show.charts import COLOURS
 
     for i, n in enumerate((0.0, 1.0, 2.0, 3.0, 4.0)):
         law = laws.sel(n=n)
-        axes.semilogx(law.mu, -law.sensitivity, color=COLOURS[i], linestyle=DASHES[n > 2])
+        axes.semilogx(law.mu, -law.sensitivity, color=COLOURS[i])
         heights = {0.0: -0.06, 1.0: -0.94, 2.0: -0.45, 3.0: -0.55, 4.0: -0.72}
         direct_label(axes, 3e-7 if n else 2e6, heights[n], f"$n={n:g}$", COLOURS[i])
-    axes.set(xlim=(1e-9, 1e9), ylim=(-1.05, 0.05), xlabel=r"torque, $\mu\,(c^2\varphi_0^n)^{-1/(2-n)}$")
+    axes.set(xlim=(1e-9, 1e9), ylim=(-1.05, 0.05), xlabel=r"torque, $\mu$, where $c = \varphi_0 = 1$")
     axes.set_ylabel(r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$")
 
 

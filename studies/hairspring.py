@@ -238,7 +238,7 @@ def draw_lines(axes: Any, ds: xr.Dataset, springs: xr.Dataset) -> None:
         few = few[(few > alpha ** (-1 / 3)) & (few < 1.6 * alpha)]
         axes.plot(few, first_order(alpha, few), "x", color="black", markersize=3.5, markeredgewidth=0.7)
         axes.plot(cell.kappa, cell.s, "o", color=colour)
-        direct_label(axes, 3 * cell.kappa, cell.s, rf"$10^{{{power}}}$", colour, ha="left")
+        direct_label(axes, cell.kappa / 3, cell.s / 2.5, rf"$\alpha = 10^{{{power}}}$", colour, ha="right")
     axes.set(xlabel=r"spring, $\kappa = k\varphi_0/\mu$", ylabel=r"sensitivity to torque, $s$")
     axes.set(xlim=(ds.kappa.min(), ds.kappa.max()), ylim=(2e-7, 1.5))
     key(axes)
@@ -250,7 +250,8 @@ def draw_lines(axes: Any, ds: xr.Dataset, springs: xr.Dataset) -> None:
 def key(axes: Any) -> None:
     """What lines and marks mean, whatever their colour."""
     looks = {"self-starting": {}, "not self-starting": {"linestyle": (0, (2.5, 1))}}
-    looks |= {"equation (1)": {"marker": "x", "linestyle": ""}, "best spring": {"marker": "o", "linestyle": ""}}
+    looks |= {"theory of first order": {"marker": "x", "linestyle": ""}}
+    looks |= {"best spring": {"marker": "o", "linestyle": ""}}
     for name, look in looks.items():
         axes.plot([], [], color="black", label=name, **look)
     axes.legend(loc="lower left")
@@ -272,7 +273,7 @@ def draw_map(axes: Any, ds: xr.Dataset) -> None:
     line = alpha[alpha > 9.9]
     axes.plot(9 / math.pi**2 * line, line, color="white", linestyle=(0, (5, 1.5)))
     direct_label(axes, 3e4, 0.3, "sticks: no cycle")
-    direct_label(axes, 1e-3, 3e2, "rate [s/day]\nby 1 % of torque")
+    axes.set_title("rate [s/day] by 1 % of torque", loc="right")
     how = {"fontsize": 8, "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 1}, "ha": "center"}
     arrow = {"arrowstyle": "->", "linewidth": 0.6}
     axes.annotate("not self-starting", (60, 600), (1.5e5, 12), arrowprops=arrow, **how)

@@ -23,11 +23,12 @@ import numpy as np
 import xarray as xr
 from _common import Groups, Statement, direct_label, hatch, read_result, report
 
+import sweep
 from kernels.interface import Status
 
 NOTES = """\
 theory: kappa = M/m, the mass of the wheel over that of the foliot, both at the pallet; deviation: relative, in the
-worst cell"""
+worst cell; allowed 1e-9 of what is followed contact by contact, 1e-8 of what is followed in SI units at rtol 1e-10"""
 
 EXISTS = (Status.OK, Status.UNSTABLE, Status.GRAZING)
 
@@ -64,24 +65,33 @@ def cycle(closed: xr.Dataset) -> list[Statement]:
     here = free.period.notnull() & (free.status != Status.GRAZING) & (abs(free.kappa - 1) > 1e-12)
     loose = count(here & ((free.multiplier < 1) != (free.kappa > 1)))
     thrown = count(here & ((free.recoil > 0) != (free.kappa < 2 * free.e / (1 - free.e))))
-    way = closed.kappa * (1 + closed.e) / (4 * (1 - closed.e) * (1 + closed.kappa))
-    cells = f"{count(free.period.notnull())} cells"
     return [
-        Statement("period = 2T", "all that exist", cells, *_off(free.period, 2 * half_period(closed))),
-        Statement("swing = Y, whatever the torque", "all that exist", cells, *_off(free.Y, way)),
         Statement("stable for kappa > 1 and no other", "no exception", f"{loose} exceptions", None, not loose),
         Statement("recoil for kappa < 2e/(1 - e)", "no exception", f"{thrown} exceptions", None, not thrown),
-        *plastic(closed.sel(e=0.0)),
     ]
 
 
-def plastic(stuck: xr.Dataset) -> list[Statement]:
-    """e = 0: the tooth stays on the pallet until it escapes."""
-    off = float(abs(stuck.multiplier - ((1 - stuck.kappa) / (1 + stuck.kappa)) ** 2).max())
-    steady = bool((stuck.status == Status.OK).all())
+def plastic(closed: xr.Dataset) -> list[Statement]:
+    """e = 0, the tooth on the pallet until it escapes: the kernel beside the scene `verge_scene` in SI units."""
+    stuck = closed.isel(e=0).isel(I_c=slice(None, None, max(1, closed.sizes["I_c"] // 8)))
+    n = float(stuck.r_v / stuck.r_c)
+    axes = {"I_c": stuck.I_c.values}
+    phi0 = float(stuck.h / stuck.r_v)
+    fixed = {"tau": float(stuck.torque), "I_v": float(stuck.I_v), "n": n, "phi0": phi0}
+    fixed["drop"] = math.pi / float(stuck.teeth) - 2 * n * phi0
+    periods = []
+    for flips in (3000, 3002):  # an even number: the last event is a landing
+        study = sweep.build_study(
+            kernel="verge_scene:KERNEL", axes=axes, fixed=fixed | {"flips": flips}, rtol=1e-10, allow_import=True
+        )
+        periods.append(2 * sweep.run(study).clock.values)
+    off = float(abs(stuck.period.values / periods[0] - 1).max())
+    wander = float(abs(periods[1] / periods[0] - 1).max())
     return [
-        Statement("e = 0: exists and is stable at every kappa", "yes", f"{stuck.kappa.size} cells", None, steady),
-        Statement("e = 0: multiplier ((1 - kappa)/(1 + kappa))^2", "yes", "largest difference", off, off < 1e-14),
+        Statement(
+            "e = 0: period of the kernel and in SI units", "the same", f"{stuck.I_c.size} cells", off, off < 1e-8
+        ),
+        Statement("e = 0: from rest to a steady beat at every kappa", "yes", "last change", wander, wander < 1e-10),
     ]
 
 
@@ -109,11 +119,6 @@ def _thrown(ds: xr.Dataset) -> float:
     return float(ds.recoil.max() * ds.teeth / (2 * math.pi))
 
 
-def _off(here: xr.DataArray, theory: xr.DataArray) -> tuple[float, bool]:
-    off = worst(here, theory)
-    return off, off < 1e-13
-
-
 def kinds(motion: xr.Dataset) -> xr.DataArray:
     """What the motion is, as position in `KINDS`."""
     told = motion.status.isin((Status.OK, Status.GRAZING, Status.INACCURATE))
@@ -138,17 +143,19 @@ def motions(closed: xr.Dataset, motion: xr.Dataset) -> list[Statement]:
     same = motion.where(both & (closed.e > 0))
     lost = (closed.status == Status.OK) & (motion.status != Status.OK)
     kind = kinds(motion)
+    twice = 2 * half_period(closed)
+    way = same.kappa * (1 + same.e) / (4 * (1 - same.e) * (1 + same.kappa))
     return [
-        Statement(
-            "where both find it, period by events = by formula", "yes", f"{count(both)} cells", *_near(same, closed)
-        ),
-        Statement("stable cycles that events does not settle on", "", f"{count(lost)} cells"),
+        Statement("period by events = 2T", "1e-9", f"{count(both)} cells", *_near(same.period, twice)),
+        Statement("swing by events = Y, whatever the torque", "1e-9", f"{count(both)} cells", *_near(same.Y, way)),
+        Statement("stable cycles that events does not settle on", "1 %", f"{count(lost)} cells", None,
+                  count(lost) < 0.01 * lost.size),
         *(Statement(f"the clock's motion: {name}", "", f"{count(kind == i)} cells") for i, name in enumerate(KINDS)),
-    ]
+    ]  # fmt: skip
 
 
-def _near(here: xr.Dataset, closed: xr.Dataset) -> tuple[float, bool]:
-    off = worst(here.period, closed.period)
+def _near(here: xr.DataArray, theory: xr.DataArray) -> tuple[float, bool]:
+    off = worst(here, theory)
     return off, off < 1e-9
 
 
@@ -288,7 +295,7 @@ def conclude(path: str, lever_path: str) -> tuple[Groups, list[str], Any]:
     bent = prepared(read_result(lever_path, "impact", ["I_c", "nu"], "impact_map_lever.toml"))
     closed, motion = (ds.sel({"method": name}) for name in ("closed", "events"))
     groups = {
-        "The symmetric cycle": cycle(closed),
+        "The symmetric cycle": [*cycle(closed), *plastic(closed)],
         "What the clock does": motions(closed, motion),
         "A curved lever": lever(bent),
     }

@@ -28,9 +28,12 @@ LAST = 0.15
 B_ANGLE = math.atan2(-38.0, 49.0)
 
 NOTES = """\
-paper: Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011); degrees of the crank count from b, against the clock
-which extreme moves: with the paper's own equations for type A (upper signs) it is the minimum of alpha, and later. Its
-figure 4 has the maxima move to the right: that is the same arm with alpha counted clockwise. In value both move.
+paper: Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011); of figures 6 and 7 the text has the ticks only, 10
+to 30 degree and 0.2, 0.4 rad; where "-" stands it says nothing, and the formula is named in the line. Allowed: 1e-12
+of a formula, 1e-10 rad of an angle, 1.5 degree for "does not move"; "no, known" is a statement of the source that its
+own equations refute; degrees of the crank count from b, against the clock which extreme moves: with the paper's own
+equations for type A (upper signs) it is the minimum of alpha, and later. Its figure 4 has the maxima move to the
+right: that is the same arm with alpha counted clockwise. In value both move.
 """
 
 
@@ -53,19 +56,28 @@ def size(ds: xr.Dataset) -> list[Statement]:
     last, start = at(ds, LAST), ds.isel(e=0)
     b, d, f = float(ds.b), float(ds.d), float(ds.f)
     slope = f / (b * d * math.sin(float(start.A0)))
+    middle = math.acos((b * b + d * d - f * f) / (2 * b * d))
+    half = 0.5 * sum(s * math.acos((b * b + d * d - (f + s * LAST) ** 2) / (2 * b * d)) for s in (1, -1))
     grown = float(last.A1) / (LAST * slope) - 1
     full = turning(ds)
     closure = float(abs(np.sin(full.A0) * np.sin(full.A1) * b * d - full.e * f).max()) / (b * d)
     return [
-        compared("A1/e at e -> 0, rad/cm", f"{slope / 100:.6f}", float(start.A1_e) / 100, slope / 100, 1e-12),
+        compared(
+            f"A1/e at e -> 0 by f/(b d sin A0) = {slope / 100:.6f} rad/cm", "-", float(start.A1_e) / 100, slope / 100,
+            1e-12,
+        ),
         Statement("A1 is proportional to e", "only nearly", f"{grown:+.1%} at 15 cm", None, 0.05 < grown < 0.2),
-        differing("A1 at e = 15 cm, rad", "0.45", float(last.A1), 0.45, 0.01, 5),
+        differing("A1 at e = 15 cm by (40) halved, rad", "-", float(last.A1), half, 1e-10, 5),
+        Statement(
+            "  beyond the last tick, below the next", "0.4", f"whole difference {2 * half:.3f}", None,
+            bool(0.4 < float(last.A1) < 0.6 < 2 * half),
+        ),
         Statement(
             "A0 is constant", "only nearly", f"falls {degrees(start.A0 - last.A0):.2f} degree to 15 cm", None,
             degrees(start.A0 - last.A0) > 1,
         ),
-        differing("A0 at e -> 0, degree", "just below 40", degrees(start.A0), 39.5, 0.5, 6),
-        Statement("sin A0 sin A1 = e f/(b d)", "", f"off by {closure:.0e} at most", None, closure < 1e-14),
+        differing("A0 at e -> 0 by (39), degree", "-", degrees(start.A0), degrees(middle), 1e-8, 6),
+        Statement("sin A0 sin A1 = e f/(b d)", "-", f"off by {closure:.0e} at most", None, closure < 1e-14),
     ]  # fmt: skip
 
 
@@ -76,17 +88,19 @@ def times(ds: xr.Dataset) -> list[Statement]:
     minus = degrees(at(ds, LAST).theta_minus - ds.theta_minus[0])
     later = bool((paper.theta_minus.diff("e") > 0).all())
     value = degrees(ds.eta_minus[0] - at(ds, LAST).eta_minus), degrees(at(ds, LAST).eta_plus - ds.eta_plus[0])
+    maxima = degrees(at(ds, LAST).theta_plus - ds.theta_plus[0])
     return [
-        Statement("one extreme moves to the right as e grows", "maxima", f"minima, by {minus:.1f} degree", None, later),
-        Statement("the other one stays", "minima", f"maxima, within {plus:.2f} degree", None, plus < 1.5 < minus),
         Statement(
-            "in value both extremes move",
-            "not said",
-            f"{value[1]:+.1f} and {-value[0]:+.1f} degree",
-            None,
-            min(value) > 20,
+            "figure 4: maxima move to the right as e grows", "yes", f"by {maxima:.1f} degree", None, maxima > 10, True
         ),
-    ]
+        Statement("figure 4: minima do not move", "yes", f"by {minus:.1f} degree", None, minus < 1.5, True),
+        Statement(
+            "with alpha counted clockwise: maxima, the minima here", "yes", f"{minus:.1f} degree", None,
+            later and minus > 10,
+        ),
+        Statement("  minima, the maxima here, do not move", "yes", f"within {plus:.2f} degree", None, plus < 1.5),
+        Statement("  in value both move", "-", f"{value[1]:+.1f} and {-value[0]:+.1f} degree", None, min(value) > 20),
+    ]  # fmt: skip
 
 
 def border(ds: xr.Dataset) -> list[Statement]:
@@ -98,15 +112,22 @@ def border(ds: xr.Dataset) -> list[Statement]:
     full = turning(ds)
     near = full.isel(e=-1)
     return [
-        compared("largest e of a motor that turns, cm", "not said", 100 * float(flat[0]), 100 * limit, 1e-12, 6),
+        compared("largest e of a motor that turns, cm", "-", 100 * float(flat[0]), 100 * limit, 1e-12, 6),
         Statement(
-            "all smaller turn, all larger lock", "not said", f"locks from {100 * float(locked[0]):.2f} cm on", None,
+            "all smaller turn, all larger lock", "-", f"locks from {100 * float(locked[0]):.2f} cm on", None,
             bool((full.e < limit).all() and (locked > limit).all()) and flat.size == 1,
         ),
-        differing("A0 = A1 there, degree", "not said", degrees(there.A1), degrees(there.A0), 1e-5, 6),
-        Statement("angle of coupler and arm at 15 cm", "", f"{degrees(at(ds, LAST).transmission_angle):.1f} degree"),
-        Statement("the same 0.1 mm before the border", "", f"{degrees(near.transmission_angle):.2f} degree"),
-        Statement("harmonic motion", "assumed", f"distortion {100 * float(at(ds, LAST).thd):.1f} % at 15 cm"),
+        differing("A0 = A1 there, degree", "-", degrees(there.A1), degrees(there.A0), 1e-5, 6),
+        Statement(
+            "angle of coupler and arm falls to 0 at the border", "-",
+            f"{degrees(at(ds, LAST).transmission_angle):.1f} at 15 cm, {degrees(near.transmission_angle):.2f} degree "
+            f"{1e3 * (limit - float(near.e)):.1f} mm before", None,
+            bool(near.transmission_angle < 0.3 * at(ds, LAST).transmission_angle),
+        ),
+        Statement(
+            "harmonic motion", "held so elsewhere", f"distortion {100 * float(at(ds, LAST).thd):.1f} % at 15 cm", None,
+            float(at(ds, LAST).thd) < 0.01, True,
+        ),
     ]  # fmt: skip
 
 

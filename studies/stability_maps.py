@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, direct_label, read_result, report
+from _common import Groups, Statement, read_result, report
 from scipy.integrate import DOP853, RK45
 
 import sweep
@@ -220,8 +220,28 @@ def figure(linear: xr.Dataset, foliot: Sequence[xr.Dataset]) -> Any:
                 mesh = draw_error(row[k], ds, method, LogNorm(1e-8, 1))
         for one in axes[:, 1:].flat:
             one.set(ylabel="", yticklabels=[])
+        for one, text in zip(axes[:, 0], ROWS, strict=False):
+            one.set_title(text, loc="left", fontsize=8)
+        page.legend(handles=keys(), loc="outside lower center", ncols=4)
         page.colorbar(mesh, ax=axes[1:].ravel().tolist(), label="relative error of the period", pad=0.01, aspect=40)
     return page
+
+
+ROWS = ("(a)", "(b) foliot over its drive", "(c) foliot close to sticking", "(d) foliot close to grazing its switch")
+"""Headings; that of the oscillator leaves room for the names of the methods."""
+
+
+def keys() -> list[Any]:
+    """What colours and lines mean."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    return [
+        Patch(color="#b04a3a", label="(a) the amplitude grows"),
+        Line2D([], [], color="black", linestyle="--", linewidth=0.9, label="its border by theory"),
+        Patch(color="0.8", label="(b-d) refused, with the reason"),
+        Line2D([], [], color="#b04a3a", linewidth=0.9, label=f"error of {WRONG:.0%}"),
+    ]
 
 
 def draw_growth(axes: Any, ds: xr.Dataset, method: str) -> None:
@@ -232,12 +252,10 @@ def draw_growth(axes: Any, ds: xr.Dataset, method: str) -> None:
     axes.contour(ds.a, ds.w, theory, levels=[1], colors="black", linewidths=0.9, linestyles="--")
     axes.set(title=method, xlabel="$ah$", ylabel=r"$\omega h$")
     axes.title.set_size(8)
-    if method == "euler":
-        direct_label(axes, 4.4, 6.0, "grows", fontsize=7)
 
 
 MARGIN = {
-    "mu": (r"$\mu$", lambda mu: mu),
+    "mu": (r"$\mu$ [rad/s$^2$]", lambda mu: mu),
     "R": (r"$1 - R/\mu$", lambda R: 1 - R),
     "k": (r"$1 - k\varphi_0/2\mu$", lambda k: 1 - k / 2),
 }
@@ -254,8 +272,6 @@ def draw_error(axes: Any, ds: xr.Dataset, method: str, norm: Any) -> Any:
     mesh = axes.pcolormesh(across, ds.step, off, norm=norm, cmap="cividis_r", shading="nearest", rasterized=True)
     axes.contour(across, ds.step, off.fillna(1.0), levels=[WRONG], colors="#b04a3a", linewidths=0.9)
     axes.set(xscale="log", yscale="log", xlabel=label, ylabel="step $h$ [s]")
-    if (swept(ds), method) == ("k", "rk4"):
-        direct_label(axes, 2e-5, 0.9, "refused", fontsize=7)
     return mesh
 
 

@@ -222,19 +222,30 @@ def figure(ds: xr.Dataset) -> Any:
     from sweep.show import charts
 
     with charts.style():
-        page = charts.new_figure(charts.PAGE, 70.0)
+        page = charts.new_figure(charts.PAGE, 82.0)
         panels = page.subplots(1, 3)
         draw_depths(panels[0], ds)
         draw_harmonics(panels[1], ds, ds.K, first_order, 0)
         draw_harmonics(panels[2], ds, ds.L, first_order_sensitivity, 1)
         panels[1].set(ylim=(2e-5, 2), ylabel=r"$|\mathrm{d}\ln P/\mathrm{d}\,\mathrm{depth}|$ at depth 0")
         panels[2].set(ylim=(2e-3, 20), ylabel=r"$|\mathrm{d}s/\mathrm{d}\,\mathrm{depth}|$ at depth 0")
-        panels[1].legend(loc="lower left", handlelength=1)
+        page.legend(handles=[*panels[1].get_legend_handles_labels()[0], *keys()], loc="outside upper center", ncols=3)
         direct_label(panels[1], 20, 0.25, "$h^{-1/2}$")
         direct_label(panels[2], 3, 2.6, "$h^{1/2}$")
         for axes, text in zip(panels, "abc", strict=True):
             charts.letter(axes, text)
     return page
+
+
+def keys() -> list[Any]:
+    """What marks and lines mean, whatever their colour."""
+    from matplotlib.lines import Line2D
+
+    return [
+        Line2D([], [], color="black", marker=".", markersize=3, linestyle="", label="(b, c) theory of first order"),
+        Line2D([], [], color="0.3", linestyle=(0, (5, 1.5)), linewidth=0.8, label="(b, c) its envelope"),
+        Line2D([], [], color="0.6", linewidth=0.6, label="(a) change of 1 % and of 1 min a day"),
+    ]
 
 
 def draw_depths(axes: Any, ds: xr.Dataset) -> None:

@@ -95,11 +95,25 @@ def figure(parts: Sequence[xr.Dataset]) -> Any:
             charts.letter(axes, text)
             axes.set_title(found.attrs["title"])
         for axes in panels[3:]:
-            axes.set_xlabel("rtol")
+            axes.set_xlabel("relative tolerance, rtol")
+        page.legend(handles=keys(), loc="outside lower center", ncols=4)
         for axes in panels[::3]:
             axes.set_ylabel("time over that of auto")
         panels[0].set_ylim(top=ROOM * panels[0].get_ylim()[1])
     return page
+
+
+def keys() -> list[Any]:
+    """What the marks mean, whatever their colour."""
+    from matplotlib.lines import Line2D
+
+    mark = {"color": "0.3", "marker": "o", "linestyle": ""}
+    return [
+        Line2D([], [], color="black", linewidth=0.8, label="auto"),
+        Line2D([], [], **mark, markersize=3.5, label="gives every cell that auto gives"),
+        Line2D([], [], **mark, markersize=3.5, markerfacecolor="white", label="gives fewer"),
+        Line2D([], [], **mark | {"color": "black"}, markersize=8, markerfacecolor="none", label="best single method"),
+    ]
 
 
 def draw(axes: Any, found: xr.Dataset) -> None:

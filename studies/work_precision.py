@@ -179,7 +179,7 @@ def figure(coulomb: xr.Dataset, drag: xr.Dataset, steps: xr.Dataset | None, othe
             for (name, other), mark in zip(others.items(), "*xP", strict=False):
                 row[0].plot(other.seconds, other[key], "k--", marker=mark, linewidth=0.8, label=name)
             draw_steps(row[2], steps, key)
-        for axes, text in zip(panels[0], "abc", strict=True):
+        for axes, text in zip(panels.flat, "abcdef", strict=True):
             charts.letter(axes, text)
         for axes, text in zip(panels[0], ("viscous and Coulomb", r"drag $|v|^{3/2}$", "fixed steps"), strict=True):
             axes.set_title(text)
@@ -187,8 +187,10 @@ def figure(coulomb: xr.Dataset, drag: xr.Dataset, steps: xr.Dataset | None, othe
             axes.set_xlabel("time per cell on one core [s]")
         panels[1][2].set_xlabel("calls of the rates")
         keys = {t: h for axes in panels[0][:2] for h, t in zip(*axes.get_legend_handles_labels(), strict=True)}
-        page.legend(keys.values(), keys.keys(), loc="outside lower left", ncols=4)
-        page.legend(*panels[0][2].get_legend_handles_labels(), loc="outside lower right", ncols=2)
+        keys |= {text: mark for found in (coulomb, drag) for text, mark in charts.precision_marks(found).items()}
+        page.legend(keys.values(), keys.keys(), loc="outside lower left", ncols=4, title="(a), (b), (d), (e)")
+        last = panels[0][2].get_legend_handles_labels()
+        page.legend(*last, loc="outside lower right", ncols=2, title="(c), (f)")
     return page
 
 

@@ -1,4 +1,4 @@
-"""What README says of many machines: its code parses, its names are there, and what it runs on this machine runs."""
+"""What the page on many machines says: its code parses, its names are there, and what it runs on this machine runs."""
 
 import ast
 import inspect
@@ -15,7 +15,7 @@ import sweep
 from sweep.cli import parser
 
 ROOT = Path(__file__).parents[1]
-SECTION = re.search(r"\n## Many machines\n(.*?)\n## ", (ROOT / "README.md").read_text(), re.DOTALL)[1]
+SECTION = (ROOT / "docs" / "many_machines.md").read_text(encoding="utf-8")
 
 
 def blocks(language):

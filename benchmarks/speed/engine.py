@@ -21,6 +21,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import sweep
+from sweep.cells.block import warm
 from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS, columns
 from sweep.cells.solve import Solver
 from sweep.study.model import Study
@@ -91,7 +92,7 @@ def disk_seconds(folder: Path, size: int) -> float:
 def stored(folder: Path, cells: int) -> None:
     """A cheap kernel, every output stored: parts and output are both written, so the disk takes the bytes twice."""
     study = foliot("closed", cells)
-    Solver(study).warm()
+    warm(Solver(study), study)
     size = cells * sum(c.cell_bytes for c in columns(study))
     path = folder / "stored.h5"
     for workers in (1, os.cpu_count() or 1):
@@ -110,7 +111,7 @@ def stored(folder: Path, cells: int) -> None:
 def overhead(folder: Path, cells: int) -> None:
     """A kernel of more than a microsecond a cell: what the engine adds beyond 0.2 s, in memory and stored."""
     study = foliot("map", cells)
-    Solver(study).warm()
+    warm(Solver(study), study)
     workers = os.cpu_count() or 1
     path = folder / "overhead.h5"
     rows = [
@@ -132,7 +133,7 @@ def overhead(folder: Path, cells: int) -> None:
 def two_cores(cells: int) -> None:
     """One core against all on a grid whose cells cost unevenly, in memory."""
     study = foliot("map", cells)
-    Solver(study).warm()
+    warm(Solver(study), study)
     workers = os.cpu_count() or 1
     ratios = []
     for _ in range(ROUNDS):
@@ -146,7 +147,7 @@ def two_cores(cells: int) -> None:
 def small(folder: Path) -> None:
     """A study of a hundred cells: nearly all of it is the engine."""
     study = foliot("closed", 200)
-    Solver(study).warm()
+    warm(Solver(study), study)
     for turn in range(ROUNDS):
         path = folder / f"small{turn}.h5"
         memory = seconds(lambda: sweep.run(study, progress=False))

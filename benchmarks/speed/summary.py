@@ -22,6 +22,7 @@ import numpy as np
 from engine import kernel_seconds
 
 import sweep
+from sweep.cells.block import warm
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import Partition
@@ -80,7 +81,8 @@ def measured(folder: Path, cells: int, kind: str) -> dict[str, float]:
 def size(folder: Path, cells: int, kind: str) -> None:
     small, large = measured(folder, 10**6, kind), measured(folder, cells, kind)
     sample = min(cells, 2 * 10**7)
-    Solver(foliot(sample, "cells")).warm()
+    cells = foliot(sample, "cells")
+    warm(Solver(cells), cells)
     begun = time.process_time()
     kernel_seconds(foliot(sample, "cells"), 1)
     kernel = (time.process_time() - begun) * cells / sample

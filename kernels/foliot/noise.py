@@ -2,8 +2,9 @@
 
 The torque of half swing i = 0 ... N - 1, per moment of inertia, is
     mu_i = max(mu (1 + sigma x_i), floor),  x_0 = z_0,  x_i = r x_(i-1) + sqrt(1 - r^2) z_i,  r = exp(-1/tau_c)  (1)
-with z standard normal and white, so x is stationary with variance 1. Each half swing lasts T_i by the exact pieces of
-`_linear_swing`; the first begins on the cycle without noise, where it would last T. The clock shows T for each, so
+with z standard normal and white, so x is stationary with variance 1. The same noise may be one of its viscous friction,
+a max(1 + sigma_a x_i, 0.01). Each half swing lasts T_i by the exact pieces of `_linear_swing`; the first begins on the
+cycle without noise, where it would last T. The clock shows T for each, so
     its gain at the n-th switch is D_n = sum of T - T_i over i < n, at the true time t_n = sum of T_i,             (2)
 and between switches D runs straight from D_n to D_(n+1). Over all, it gains 86 400 D_N/t_N seconds a day. With
 y_j = (D(j tau) - D(j tau - tau))/tau for j = 1 ... M, M whole averaging times tau, it scatters by 86 400 times
@@ -40,6 +41,8 @@ HALF_SWING_LIMIT = 1e9
 SECONDS_PER_DAY = 86400.0
 HEADROOM = 0.01
 """How far the floor is above the least torque, as a share of what the drive is above it."""
+LEAST_FRICTION = 0.01
+"""The least viscous friction of a half swing, over a."""
 PAIRS = 64
 """Pairs of random numbers that are made at a time."""
 
@@ -54,6 +57,7 @@ class Noise(NamedTuple):
     half_swings: float
     seed: float
     averaging_time: float
+    sigma_a: float
 
 
 class Clock(NamedTuple):
@@ -61,6 +65,7 @@ class Clock(NamedTuple):
 
     scene: Scene
     sigma: float
+    sigma_a: float
     remembered: float
     fresh: float
     floor: float
@@ -130,6 +135,14 @@ def _closed(averages, run, time, clock):
     return Averages(until, fma(slope, until * tau - run.t, run.gain), where(more, slope, first), squares)
 
 
+@jit
+def _rubbing(scene, friction):
+    """The scene with that many times its viscous friction, not less than the least."""
+    friction = where(friction > LEAST_FRICTION, friction, LEAST_FRICTION)
+    d, rho, rho_s, gamma, n, kappa, e, slack = scene
+    return Scene(d * friction, rho, rho_s, gamma, n, kappa, e, slack)
+
+
 @jit_call
 def _beat(run, averages, z, clock):
     """One half swing with the torque of (1), and whether it comes to the switch."""
@@ -138,6 +151,7 @@ def _beat(run, averages, z, clock):
     torque = fma(clock.sigma, x, 1.0)
     short = not_(torque > clock.floor)
     torque = where(short, clock.floor, torque)
+    scene = _rubbing(scene, fma(clock.sigma_a, x, 1.0))
     start = scene.e * run.speed
     legs = _linear_swing.half_swing(torque, scene, start)
     goes_on = legs.comes & ((start < 0.0) | (fma(scene.kappa, legs.top, torque) > scene.rho_s))
@@ -198,7 +212,7 @@ def _clock(scene, units, nominal, least, p):
     m_tau, e_tau = mantissa_exponent(p.averaging_time)
     tau = scale(m_tau / units.t, e_tau - units.e_t)
     remembered, fresh = _correlation(p.tau_c)
-    return Clock(scene, p.sigma, remembered, fresh, fma(HEADROOM, 1.0 - least, least), nominal, tau)
+    return Clock(scene, p.sigma, p.sigma_a, remembered, fresh, fma(HEADROOM, 1.0 - least, least), nominal, tau)
 
 
 @jit
@@ -250,7 +264,8 @@ def _counts(x, low, high):
 @jit
 def check(p):
     """As for `foliot`; BAD_INPUT, too, for a count or a seed that is no whole number within its limits."""
-    noise = (p.sigma >= 0.0) & (p.sigma < math.inf) & (p.tau_c >= 0.0) & (p.tau_c < math.inf)  # NaN fails
+    spread = (p.sigma >= 0.0) & (p.sigma < math.inf) & (p.sigma_a >= 0.0) & (p.sigma_a < math.inf)
+    noise = spread & (p.tau_c >= 0.0) & (p.tau_c < math.inf)  # NaN fails
     run = _counts(p.half_swings, 1.0, HALF_SWING_LIMIT) & _counts(p.seed, 0.0, philox.SEED_LIMIT)
     time = (p.averaging_time > 0.0) & (p.averaging_time < math.inf)
     return where(noise & run & time, check_foliot(_units.terms(p)), BAD_INPUT)
@@ -263,11 +278,12 @@ PARAMETERS = (
     Field("seed", "1", "names the noise; cells of equal seed share it", default=0.0, lower=0.0,
           upper=philox.SEED_LIMIT, integer=True),
     Field("averaging_time", "s", "averaging time of the scatter", default=SECONDS_PER_DAY, lower=0.0, open_lower=True),
+    Field("sigma_a", "1", "standard deviation of the friction of a half swing over a", default=0.0, lower=0.0),
 )  # fmt: skip
 
 FOLIOT_NOISE = kernel(
     "foliot_noise",
-    doc="rate of a verge and foliot whose torque is noisy",
+    doc="rate of a verge and foliot whose torque and friction are noisy",
     source="derived here; the foliot of Hoyng & Nieuwenhuizen, arXiv:1604.06681",
     parameters=(*FOLIOT.parameters, *PARAMETERS),
     outputs=(

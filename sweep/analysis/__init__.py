@@ -1,10 +1,17 @@
 """Scaling laws: xarray in, xarray out. Knows neither studies nor cells nor files.
 
 Others may use
-    `exponents`  local exponents, straight lines in log-log, where curves pass a value
+    `exponents`  local exponents, where curves pass a value
+    `lines`      straight lines in log-log, where two of them meet
     `two_laws`   two power laws with a bend, fitted at once
+    `compare`    which law: one, two, three, a logarithm, an offset, a correction to scaling
+    `asymptote`  corrections to scaling, exponents against the window
+    `collapse`   exponents over a second parameter, exponents of a collapse
     `maps`       exponents over two parameters, borders as lines
+    `curves`     stated_error: what a result says its values are right to
+    `scattered`  values between cells that lie anywhere in a box, and those of them that lie on lines
     `loglog`     is_logarithmic, spans_decades: what an axis is drawn and interpolated by
 
-`curves` and the rest of `loglog` (slopes, lines and roots of plain arrays) are behind these.
+Behind these: `loglog` (slopes, lines and roots of plain arrays), `scatter` and `correlated` (error bars of lines),
+`shapes` (the laws that are compared). What needs statsmodels or lmfit says so: extra `fit`.
 """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -49,9 +49,15 @@ def _coordinate(y: xr.DataArray, dim: str) -> tuple[str, NDArray[Any]]:
 
 def window_logs(y: xr.DataArray, dim: str, window: Window | None) -> tuple[str, Array, xr.DataArray]:
     """Dimension that `dim` runs along, ln dim inside the window, and ln y there. Raises SweepError."""
+    here = window_of(y, dim, window)
+    ((dimension, inside),) = here.items()
+    return dimension, np.log(positive_axis(y, dim)[1][inside]), logarithm(y.isel(here), dim)
+
+
+def window_of(y: xr.DataArray, dim: str, window: Window | None) -> dict[str, NDArray[np.intp]]:
+    """What `isel` takes for the window."""
     dimension, x = positive_axis(y, dim)
-    inside = np.flatnonzero(inside_window(x, window, dim))
-    return dimension, np.log(x[inside]), logarithm(y.isel({dimension: inside}), dim)
+    return {dimension: np.flatnonzero(inside_window(x, window, dim))}
 
 
 def check_confidence(confidence: float) -> None:
@@ -99,17 +105,85 @@ def log_of(y: xr.DataArray) -> xr.DataArray:
     return logs.rename(y.name)
 
 
-def along(function: Callable[[Array], Array], y: xr.DataArray, dimension: str, to: str | None = None) -> xr.DataArray:
-    """`function` of the last axis, put along `dimension`: in its place, or as a new last dimension `to`."""
+def along(
+    function: Callable[..., Array], y: xr.DataArray, dimension: str, to: str | None = None, *others: xr.DataArray
+) -> xr.DataArray:
+    """`function` of the last axis, put along `dimension`: in its place, or as a new last dimension `to`.
+
+    `others` have the shape of `y`, and are further arguments.
+    """
     found: xr.DataArray = xr.apply_ufunc(
         function,
         y.compute(),
-        input_core_dims=[[dimension]],
+        *(other.compute() for other in others),
+        input_core_dims=[[dimension]] * (1 + len(others)),
         output_core_dims=[[to or dimension]],
         exclude_dims={dimension} if to else set(),
         keep_attrs=True,  # those of the coordinates; the caller writes those of the result
     )
     return found if to else found.transpose(*y.dims)
+
+
+def numbers_along(
+    names: Sequence[str], function: Callable[..., Array], y: xr.DataArray, dimension: str, *others: xr.DataArray
+) -> xr.Dataset:
+    """Numbers that a function puts in place of the points of each line, under these names."""
+    numbers = along(function, y, dimension, "number", *others)
+    return xr.Dataset({name: numbers.isel(number=k, drop=True) for k, name in enumerate(names)})
+
+
+def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:
+    """A number or DataArray as one of the shape of y. Raises SweepError where it is negative or does not fit."""
+    try:
+        found: xr.DataArray = xr.zeros_like(y, dtype=np.float64) + given
+        fits = found.dims == y.dims and found.shape == y.shape
+    except (TypeError, ValueError):
+        fits = False
+    if not fits:
+        raise SweepError(
+            f"{what}: expected a number, or an array along axes of {title(y)}; found {type(given).__name__}"
+        )
+    if bool((found < 0).any()):
+        raise SweepError(f"{what}: errors are not negative; found {float(found.min()):g}")
+    return found
+
+
+def stated_bound(y: xr.DataArray, bound: Any = None) -> xr.DataArray:
+    """Largest relative error of each value: as given, else the `rtol` of the sweep that y says it is of, else 0."""
+    found = like(y.attrs.get("rtol", 0.0) if bound is None else bound, y, "bound")
+    return found.where(np.isfinite(found), 1.0)  # of an error that is not known a value is worth nothing
+
+
+def stated_error(dataset: xr.Dataset, name: str) -> xr.DataArray:
+    """Relative error that a result states for each value of an output: `rtol`, or `error_bound` where it is INACCURATE.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        From `run` or `open_result`.
+    name : str
+        Output.
+
+    Returns
+    -------
+    DataArray
+        Of the output's shape, to be given as `bound`; 0 where nothing is stated, inf where no error is known.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e5, 1e7, 9)}, rtol=1e-6)
+    >>> float(sweep.stated_error(ds, "period").max())
+    1e-06
+    """
+    rtol = dataset["rtol"] if "rtol" in dataset.coords else float(dataset.attrs.get("rtol", 0.0))
+    found = like(rtol, dataset[name], "rtol")
+    if "error_bound" in dataset:
+        stated = dataset["error_bound"].astype(np.float64)
+        found = found.where(stated.isnull(), stated)
+    return found.transpose(*dataset[name].dims)
 
 
 def scatter_is_noise(off: Array, z: Array) -> Any:

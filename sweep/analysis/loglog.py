@@ -39,14 +39,19 @@ def slopes(t: Array, z: Array, points: int) -> Array:
     return _by_runs(t, z, lambda s, y: _derivative(s, y, points))
 
 
-def slope_errors(t: Array, z: Array) -> Array:
+def slope_errors(t: Array, z: Array, bound: Array | None = None) -> Array:
     """Half the 95 % interval of the slope by five points, with noise; without, more than its error.
 
     What the polynomial through seven points says otherwise tells the error. Noise makes it alike everywhere, over the
     weights of both: the median gives its size. Where it is far larger, the curve bends: it counts itself there, and
-    where a bend is within a step, so that more points do not tell more, the slopes of the steps beside the point.
+    where a bend is within a step, so that more points do not tell more, the slopes of the steps beside the point. What
+    errors up to `bound` (..., n) in the values can do is added.
     """
-    return _by_runs(t, z, _derivative_errors)
+    found = _by_runs(t, z, _derivative_errors)
+    if bound is None or not bound.any():
+        return found
+    missing = np.where(np.isfinite(z), np.broadcast_to(bound, z.shape), np.nan)
+    return found + _by_runs(t, missing, lambda s, b: slope_bounds(s, b, 5))
 
 
 def _by_runs(t: Array, z: Array, function: Callable[[Array, Array], Array]) -> Array:
@@ -100,6 +105,36 @@ def _derivative_errors(t: Array, z: Array) -> Array:
     error = np.where(bends, np.maximum(by_noise, by_bend), by_noise)
     rounding = EPSILON * (1.0 + abs(z).max(axis=-1, keepdims=True)) * _norm(weights)
     found: Array = 2.05 * error + rounding  # 1.96 and what the median, of few points, is too small
+    pole = _beside_pole(steps) & (_largest_near(apart_by_noise) > BEYOND_NOISE * noise)
+    return np.where(pole, np.inf, found)
+
+
+def _beside_pole(steps: Array) -> NDArray[np.bool_]:
+    """Points between which, or at which, steps (..., n - 1) change sign, and towards which they grow on both sides.
+
+    Nothing at the points says how near the pole is.
+    """
+    size, sign = abs(steps), np.sign(steps)
+    found = np.zeros((*steps.shape[:-1], steps.shape[-1] + 1), dtype=bool)
+    if steps.shape[-1] < 6:
+        return found
+    up, down = size[..., :-1] < size[..., 1:], size[..., :-1] > size[..., 1:]
+    same = sign[..., :-1] == sign[..., 1:]
+    before = up[..., :-1] & up[..., 1:] & same[..., :-1] & same[..., 1:]  # [i]: steps i to i + 2 grow
+    after = down[..., :-1] & down[..., 1:] & same[..., :-1] & same[..., 1:]  # [i]: steps i to i + 2 shrink
+    last, first = sign[..., 2:], sign[..., :-2]
+    at = before[..., :-3] & after[..., 3:] & (last[..., :-3] == -first[..., 3:])
+    found[..., 3:-3] |= at
+    within = before[..., :-4] & after[..., 4:] & (last[..., :-4] == -first[..., 4:])
+    found[..., 3:-4] |= within
+    found[..., 4:-3] |= within
+    return found
+
+
+def slope_bounds(t: Array, bound: Array, points: int) -> Array:
+    """How far errors up to `bound` (..., n) in the values can move each slope of `slopes`; lines without gaps."""
+    nodes, weights = _stencils(t, points)
+    found: Array = (abs(weights) * bound[..., nodes]).sum(axis=-1) + abs(weights.sum(axis=1)) * bound
     return found
 
 
@@ -136,6 +171,35 @@ def _weights(nodes: Array, home: NDArray[np.intp]) -> Array:
     return weights
 
 
+def interpolation_errors(t: Array, z: Array, count: int) -> Array:
+    """How far each point inside (n - count,) is off the polynomial through `count` neighbours, half on either side.
+
+    In units that give noise of size 1 the size 1.
+    """
+    first = np.arange(t.size - count)
+    nodes = first[:, None] + np.arange(count + 1)
+    at = t[nodes]
+    apart = at[:, :, None] - at[:, None, :]
+    apart[:, np.arange(count + 1), np.arange(count + 1)] = 1.0
+    weights = 1.0 / apart.prod(axis=2)
+    found: Array = (weights * z[nodes]).sum(axis=1) / np.sqrt((weights**2).sum(axis=1))
+    return found
+
+
+def tends(t: Array, local: Array, doubt: float) -> tuple[float, float]:
+    """The exponent at the start of a window, and the limit beyond it, three times over.
+
+    Its change from third to second to first of three points a step apart goes on geometrically, which is a third of the
+    way for a bend that fades as 1/ln^2; where it does not slow down towards the end, ten times the last change stands
+    for an unknown limit. What is within `doubt` is no change.
+    """
+    step = min(np.log(10), (t[-1] - t[0]) / 8)
+    first, second, third = np.interp(t[0] + step * np.arange(3), t, local)
+    last, before = first - second, second - third
+    left = last * last / (before - last) if abs(last) < abs(before) and last * before > 0 else 10 * last
+    return float(first), float(first + 3 * left) if abs(last) > doubt else float(first)
+
+
 class Line(NamedTuple):
     """A straight line in log-log; `low`, `high`: first and last abscissa, `centre`, `level`: geometric means."""
 
@@ -153,7 +217,7 @@ class Line(NamedTuple):
     level_error: Array
 
 
-def line(t: Array, z: Array) -> Line:
+def line(t: Array, z: Array, weights: Array | None = None) -> Line:
     """Least-squares line z = level + exponent (t - centre) of each line (..., n) of `z`.
 
     Sums run over deviations from the means, so a narrow window far from t = 0 costs no digits. `prefactor`,
@@ -161,15 +225,17 @@ def line(t: Array, z: Array) -> Line:
     """
     present = np.isfinite(z)
     n = present.sum(axis=-1)
+    share = present * (np.ones_like(z) if weights is None else np.where(present, weights, 0.0))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
         count = np.where(n >= FEWEST, n, np.nan)
-        centre, level = _sum(present, t) / count, _sum(present, z) / count
+        share = share * (count / share.sum(axis=-1))[..., None]  # one on average
+        centre, level = _sum(share, present, t) / count, _sum(share, present, z) / count
         u = np.where(present, t - centre[..., None], 0.0)
         rise = np.where(present, z - level[..., None], 0.0)
-        spread = (u * u).sum(axis=-1)
-        slope = (u * rise).sum(axis=-1) / spread
+        spread = (share * u * u).sum(axis=-1)
+        slope = (share * u * rise).sum(axis=-1) / spread
         off = rise - slope[..., None] * u
-        variance = (off * off).sum(axis=-1) / (count - 2)
+        variance = (share * off * off).sum(axis=-1) / (count - 2)
         prefactor = np.exp(level - slope * centre)
         low = np.where(present, t, np.inf).min(axis=-1, initial=np.inf)
         high = np.where(present, t, -np.inf).max(axis=-1, initial=-np.inf)
@@ -178,7 +244,7 @@ def line(t: Array, z: Array) -> Line:
             exponent_error=np.sqrt(variance / spread),
             prefactor=prefactor,
             prefactor_error=prefactor * np.sqrt(variance * (1 / count + centre**2 / spread)),
-            drift=_drift(u, off, present, high - low),
+            drift=_drift(u, off, share, high - low),
             residual=np.expm1(abs(off).max(axis=-1, initial=0.0)),
             points=n,
             low=np.exp(low),
@@ -190,18 +256,18 @@ def line(t: Array, z: Array) -> Line:
     return Line(*(np.where(n >= FEWEST, column, np.nan) for column in found))._replace(points=n)
 
 
-def _sum(present: NDArray[np.bool_], values: Array) -> Array:
-    total: Array = np.where(present, values, 0.0).sum(axis=-1)
+def _sum(share: Array, present: NDArray[np.bool_], values: Array) -> Array:
+    total: Array = np.where(present, share * values, 0.0).sum(axis=-1)
     return total
 
 
-def _drift(u: Array, off: Array, present: NDArray[np.bool_], width: Array) -> Array:
+def _drift(u: Array, off: Array, share: Array, width: Array) -> Array:
     """Change of slope over `width` by the parabola that fits best; `u` is centred, `off` the distance to the line."""
-    n = present.sum(axis=-1)[..., None]
     square = u * u
-    spread = square.sum(axis=-1)[..., None]
-    bow = np.where(present, square - spread / n - (square * u).sum(axis=-1)[..., None] / spread * u, 0.0)
-    change: Array = 2.0 * (bow * off).sum(axis=-1) / (bow * bow).sum(axis=-1) * width
+    spread = (share * square).sum(axis=-1)[..., None]
+    skew = (share * square * u).sum(axis=-1)[..., None] / spread
+    bow = np.where(share > 0, square - spread / share.sum(axis=-1)[..., None] - skew * u, 0.0)
+    change: Array = 2.0 * (share * bow * off).sum(axis=-1) / (share * bow * bow).sum(axis=-1) * width
     return change
 
 

@@ -38,6 +38,16 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     ------
     SweepError
         y has not two dimensions, or an axis is unfit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> axes = {"mu": np.geomspace(1e-2, 1e4, 25), "R": [1e-4, 1e-3, 1e-2, 1e-1]}
+    >>> ds = sweep.run(**foliot, axes=axes)
+    >>> sweep.exponent_map(ds.period, "mu").exponent.dims
+    ('mu', 'R')
     """
     field = local_exponent(y, dim)
     lines = contours(field, levels)
@@ -67,6 +77,17 @@ def contours(field: xr.DataArray, levels: Sequence[float]) -> xr.Dataset:
     ------
     SweepError
         The field has not two dimensions, or an axis has no numbers or fewer than two.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> axes = {"mu": np.geomspace(1e-2, 1e4, 25), "R": [1e-4, 1e-3, 1e-2, 1e-1]}
+    >>> ds = sweep.run(**foliot, axes=axes)
+    >>> found = sweep.contours(ds.period, [4.0])
+    >>> bool((found.mu > 0).all())
+    True
     """
     down, across = _axes(field)
     parts = [_lines(field, float(level)) for level in levels]

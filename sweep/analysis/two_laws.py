@@ -15,8 +15,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from sweep.analysis.correlated import corrected, student
 from sweep.analysis.curves import Window, along, check_confidence, noise_of, scatter_is_noise, title, window_logs
-from sweep.analysis.loglog import EPSILON, Array, line, slopes
+from sweep.analysis.loglog import EPSILON, Array, slopes, tends
+from sweep.analysis.scatter import BEYOND_DOUBT, line_deviance
+from sweep.analysis.shapes import BENDS, LOGARITHM, fitted
 from sweep.system.errors import SweepError
 
 FEWEST_POINTS = 8
@@ -24,6 +27,10 @@ FEWEST_POINTS = 8
 
 TELLING = 16
 """Points from which noise is told from the misfit of a smooth truth."""
+
+OTHER_SHAPES = 20.0
+"""Difference of AICc from which on a bend of another shape is ruled out; more than for a second law, since the truth
+may be between the shapes that are tried."""
 
 LAWS = ("low", "high")
 EXPONENTS = ("exponent", "exponent_low", "exponent_high")
@@ -45,8 +52,8 @@ NAMES = {
     "level": "y where the two laws meet",
     "residual": "largest relative distance of a point from the curve",
     "points": "points in the fit",
-    "regimes": "1 where one straight law describes the points as well, by BIC",
-    "evidence": "BIC of one law minus BIC of two; above 10 two laws are beyond doubt",
+    "regimes": "2 where two laws are beyond doubt: evidence above 10",
+    "evidence": "by how much AICc and BIC prefer two laws to one, whatever its noise, and to a logarithm",
     "noisy": "1 where the intervals are of noise, 0 where of the curvature of noise-free values",
 }
 
@@ -65,9 +72,9 @@ def fit_two_laws(
     to the limit to which that tends; that of the crossover to where the local exponent is half-way between the
     two, and to where the tangents at the ends meet. What noise there is beneath is added.
 
-    Where noise hides how far the truth is from (1), the intervals are those of (1) and too narrow for a bend of another
-    shape. Fitted to the period of the viscous foliot with 1 % of noise, 81 points over 8 decades, (1) gives the strong
-    law -0.3387 for -1/3, and its interval never reaches there; straight lines over windows far from the bend do.
+    Where noise hides how far the truth is from (1), the intervals reach over those of bends of other shapes that the
+    points do not rule out (AICc within 20): hyperbolic, asymmetric, of two widths, stretched. They are wider than 95
+    % for a truth like (1), and no promise for a truth like none of them.
 
     Parameters
     ----------
@@ -94,6 +101,16 @@ def fit_two_laws(
     ------
     SweepError
         If `dim` is unknown or unfit, y is not positive in the window, or no line has eight points.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e-3, 1e6, 91)})
+    >>> found = sweep.fit_two_laws(ds.period, "mu")
+    >>> [f"{e:.2f}" for e in found.exponent.values]
+    ['-1.00', '-0.34']
     """
     check_confidence(confidence)
     dimension, t, logs = window_logs(y, dim, window)
@@ -121,6 +138,8 @@ def _one(t: Array, z: Array, confidence: float, noise: bool | None) -> Array:
     low, high = best - reach, best + reach
     if not noisy:
         low, high = _widened(t, z, off, best, low, high)
+    else:
+        low, high = _of_other_bends(t, z, off, low, high, confidence)
     evidence = _evidence(t, z, off)
     _, *exponents, places, _ = np.stack([best, low, high], axis=1)
     with np.errstate(over="ignore"):  # a crossover that is not determined reaches to infinity
@@ -128,7 +147,7 @@ def _one(t: Array, z: Array, confidence: float, noise: bool | None) -> Array:
     bend = [math.exp(best[WIDTH]) / math.log(10), math.exp(best[LEVEL])]
     if evidence <= 0 and not noisy:  # straight to rounding: nothing meets anywhere
         places, bend = np.array([np.nan, 0.0, np.inf]), [np.nan, np.nan]
-    rest = [math.expm1(abs(off).max()), t.size, 2 if evidence > 0 else 1, evidence, noisy]
+    rest = [math.expm1(abs(off).max()), t.size, 2 if evidence > BEYOND_DOUBT else 1, evidence, noisy]
     return np.array([*np.concatenate(exponents), *places, *bend, *rest])
 
 
@@ -227,7 +246,7 @@ def _widened(t: Array, z: Array, off: Array, best: Array, low: Array, high: Arra
     half = np.flatnonzero(np.diff(np.sign(local - (best[LOW] + best[HIGH]) / 2)))
     place = t[half[np.argmin(abs(t[half] - best[PLACE]))]] if half.size else best[PLACE]
     doubt = 2.5 * noise_of(off) * np.array([_amplified(t), _amplified(mirrored)])
-    ends = np.array([_tends(t, local, doubt[0]), _tends(mirrored, local[::-1], doubt[1])])
+    ends = np.array([tends(t, local, doubt[0]), tends(mirrored, local[::-1], doubt[1])])
     low, high = low.copy(), high.copy()
     laws = slice(LOW, HIGH + 1)
     low[laws] = np.minimum(low[laws], ends.min(axis=1) - doubt)
@@ -249,27 +268,47 @@ def _meeting(t: Array, z: Array, pair: tuple[float, ...]) -> float:
     return float((z[-1] - z[0] + pair[0] * t[0] - pair[1] * t[-1]) / (pair[0] - pair[1]))
 
 
-def _tends(t: Array, local: Array, doubt: float) -> tuple[float, float]:
-    """The exponent at the start of a window, and the limit beyond it, three times over.
+def _of_other_bends(t: Array, z: Array, off: Array, low: Array, high: Array, confidence: float) -> tuple[Array, Array]:
+    """Intervals that reach over those of every bend of another shape that the points do not rule out."""
+    tried = [found for law in BENDS[1:] if (found := fitted(law, t, z)) is not None]
+    best = min([_criterion(off), *(found.aicc for found in tried)])
+    low, high = low.copy(), high.copy()
+    span = t[-1] - t[0]
+    for found in tried:
+        if found.aicc > best + OTHER_SHAPES:
+            continue
+        count = len(found.law.grids)
+        q, slopes_there = found.numbers[0], found.numbers[count + 1 : count + 3]
+        reach = student(t.size - found.law.numbers, confidence) * found.errors[[count + 1, count + 2, 0]]
+        middle = np.array([*slopes_there / span, t[0] + q * span])
+        reach = reach * np.array([1 / span, 1 / span, span])
+        which = [LOW, HIGH, PLACE]
+        low[which], high[which] = np.fmin(low[which], middle - reach), np.fmax(high[which], middle + reach)
+    return low, high
 
-    Its change from third to second to first of three points a step apart goes on geometrically, which is a third of the
-    way for a bend that fades as 1/ln^2; where it does not slow down towards the end, ten times the last change stands
-    for an unknown limit. What is within `doubt` is no change.
-    """
-    step = min(math.log(10), (t[-1] - t[0]) / 8)
-    first, second, third = np.interp(t[0] + step * np.arange(3), t, local)
-    last, before = first - second, second - third
-    left = last * last / (before - last) if abs(last) < abs(before) and last * before > 0 else 10 * last
-    return float(first), float(first + 3 * left) if abs(last) > doubt else float(first)
+
+def _criterion(off: Array) -> float:
+    """AICc of (1)."""
+    return corrected(off.size * math.log(float(off @ off) / off.size + 1e-300), off.size, 6)
 
 
 def _evidence(t: Array, z: Array, off: Array) -> float:
-    """BIC of a straight line minus BIC of (1): n ln(S1/S2) - 3 ln n, S the sums of squares."""
-    fit = line(t, z)
-    straight = z - math.log(fit.level) - fit.exponent * (t - math.log(fit.centre))
-    floor = t.size * (4 * EPSILON * (1 + abs(z).max())) ** 2  # what rounding leaves
-    ratio = (straight @ straight + floor) / (off @ off + floor)
-    return float(t.size * math.log(ratio) - 3 * math.log(t.size))
+    """By how much (1) is better than a line and than a logarithm, whatever the noise of the line: AICc, and BIC for
+    many points, of even, uneven, correlated noise and of noise with outliers."""
+    floor = (4 * EPSILON * (1 + abs(z).max())) ** 2  # what rounding leaves
+    bent = off.size * math.log(float(off @ off) / off.size + floor)
+    rivals = [
+        line_deviance(t, z, floor),
+        *((found.deviance, 3) for law in (LOGARITHM,) if (found := fitted(law, t, z))),
+    ]
+    gains = [
+        min(
+            corrected(deviance, t.size, k + 1) - corrected(bent, t.size, 6),
+            deviance - bent + (k - 5) * math.log(t.size),
+        )
+        for deviance, k in rivals
+    ]
+    return float(min(gains))
 
 
 def _described(numbers: xr.DataArray, y: xr.DataArray, dim: str, confidence: float) -> xr.Dataset:

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from sweep.cells.compiling import Compiling
+from sweep.cells.grid import empty_cells
+from sweep.cells.guard import told
 from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import Partition, row_blocks
 from sweep.cells.reduce import Reducer
 from sweep.cells.schema import ANCILLARY, ERROR_BOUND, METHOD_USED, STATUS, columns
-from sweep.cells.timing import Sample, take_sample
+from sweep.cells.timing import Sample, take_sample, tolerated
 from sweep.system.errors import SweepError
 
 if TYPE_CHECKING:
+    from sweep.cells.guard import BadCell, SolveCells
     from sweep.study.model import Study
 
 SolveBlock = Callable[[int, int, Mapping[str, Any], Any], None]
@@ -25,11 +28,20 @@ Found = str | Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Computed:
-    """A block that an executor has computed, and the seconds it took."""
+    """A block that an executor has computed.
+
+    Attributes
+    ----------
+    seconds : what it took
+    ago : when it was begun, with those that came together with it
+    bad : its cells that FAILED
+    """
 
     block: int
     found: Found
     seconds: float
+    ago: float = 0.0
+    bad: Sequence[BadCell] = ()
 
 
 class Blocks:
@@ -75,14 +87,20 @@ class Blocks:
         return {column.name: column.empty(count) for column in self.columns}
 
 
-def block_solver(study: Study) -> SolveBlock:
-    """Computes rows into the columns of a part; of cells, only those wanted (None: all). For one thread at a time."""
-    if study.summary is not None:
-        reducer = Reducer(study)
-        return lambda start, stop, arrays, wanted: reducer.solve(start, stop, arrays)
+def block_solver(study: Study, solver: SolveCells | None = None) -> SolveBlock:
+    """Computes rows into the columns of a part; of cells, only those wanted (None: all). For one thread at a time.
+
+    Parameters
+    ----------
+    solver : SolveCells, optional
+        What solves cells; default: `Solver`.
+    """
     from sweep.cells.solve import Solver
 
-    solver = Solver(study)
+    solver = solver or Solver(study)
+    if study.summary is not None:
+        reducer = Reducer(study, solver)
+        return lambda start, stop, arrays, wanted: reducer.solve(start, stop, arrays)
 
     def solve(start: int, stop: int, arrays: Mapping[str, Any], wanted: Any) -> None:
         outputs = {name: array for name, array in arrays.items() if name not in ANCILLARY}
@@ -92,18 +110,34 @@ def block_solver(study: Study) -> SolveBlock:
 
 
 def sampled_study(study: Study, compiling: Compiling | None = None) -> Sample:
-    """Compiles the kernel and times a sample of the grid. Raises SweepError where the kernel fails."""
+    """Compiles the kernel and times a sample of the grid. Raises SweepError where the kernel always fails."""
     from sweep.cells.solve import Solver
 
     compiling = compiling or Compiling(study.kernel, study.kernel_name)
+    sample = sampled_by(Solver(replace(study, kernel=compiling.kernel)), study)
+    compiling.remember()
+    return sample
+
+
+def sampled_by(solver: SolveCells, study: Study, clock: Callable[[], float] | None = None) -> Sample:
+    """A timed sample of the grid, by the seconds of a clock. Raises SweepError where the kernel always fails."""
     with faults_reported(f"{study.kernel_name}: the kernel failed"):
-        solver = Solver(replace(study, kernel=compiling.kernel))
-        solver.warm()
-        sample = take_sample(solver, columns(study), row_blocks(study).size)
+        warm(solver, study)
+        sample = take_sample(solver, columns(study), row_blocks(study).size, clock)
         if study.summary is not None:
             sample = replace(sample, costs=sample.costs + Reducer(study).seconds())
-        compiling.remember()
         return sample
+
+
+def warm(solver: SolveCells, study: Study) -> None:
+    """Solves a few cells spread over the grid: what they need is compiled before threads start.
+
+    Corners come last, where cells are bad most often.
+    """
+    last = row_blocks(study).size - 1
+    for index in dict.fromkeys((last // 2, 0, last)):
+        with tolerated():
+            solver.solve(index, index + 1, *empty_cells(study, 1))
 
 
 @contextlib.contextmanager
@@ -116,4 +150,4 @@ def faults_reported(what: str) -> Iterator[None]:
     except MemoryError as fault:
         raise SweepError("out of memory; fewer workers need less; what is finished is kept") from fault
     except Exception as fault:
-        raise SweepError(f"{what} ({type(fault).__name__}: {fault}); what is finished is kept") from fault
+        raise SweepError(f"{what} ({told(fault)}); what is finished is kept") from fault

@@ -26,6 +26,9 @@ OURS = ("kernels",)
 ENGINE = ("sweep.cells.solve", "sweep.cells.grid")
 """Modules of the engine that decide values: the method of each cell, and its parameters."""
 
+ASKING = ("sweep.study.condition",)
+"""Those that decide which cells are asked for, where the study has a condition."""
+
 REDUCING = ("sweep.cells.partition", "sweep.cells.reduce", "sweep.cells.output_schema")
 """Those that decide the values of a summary."""
 
@@ -49,7 +52,7 @@ def fingerprint(study: Study) -> dict[str, str]:
     """
     said = _said(study)
     whole = hashlib.sha256(json.dumps(said).encode()).hexdigest()
-    engine = ENGINE if study.summary is None else (*ENGINE, *REDUCING)
+    engine = (*ENGINE, *(REDUCING if study.summary else ()), *(ASKING if study.where else ()))
     return {
         "study": whole,
         **said,
@@ -85,6 +88,8 @@ def _said(study: Study) -> dict[str, str]:
         "design": study.design,
         "axes": ", ".join(study.axes),
     }
+    said |= {"where": study.where} if study.where else {}
+    said |= {"dims": ", ".join(f"{dim} ({', '.join(n)})" for dim, n in study.dims.items())} if study.blocks else {}
     said |= {f"axes.{name}": _values(axis.values) for name, axis in study.axes.items()}
     said |= {f"fixed.{n}": _values(value) if np.ndim(value) else repr(value) for n, value in study.fixed.items()}
     said |= {f"fixed.{name}": f"as {axis}" for name, axis in study.follows.items()}

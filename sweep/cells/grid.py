@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.study.model import AUTO, Axis, Study
+from sweep.study.condition import CellCondition
+from sweep.study.model import AUTO, SETTINGS, Axis, Study
 
 Floats = NDArray[np.float64]
 Piece = tuple[tuple[slice, ...], int, int]
@@ -54,17 +56,12 @@ class Box:
 
 
 class Grid(Box):
-    """The cells of a study; its dims are the axes of a product, ("cell",) of a zip."""
+    """The cells of a study; its dims are the axes of a product, ("cell",) of axes that run together."""
 
     def __init__(self, study: Study) -> None:
-        lengths = tuple(len(axis) for axis in study.axes.values())
-        product = study.design == "product"
-        super().__init__(tuple(study.axes) if product else ("cell",), lengths if product else lengths[:1])
+        super().__init__(tuple(study.grid_shape), tuple(study.grid_shape.values()))
         self.study = study
-        # cells in a row that share one value of the axis
-        self._runs = {
-            name: math.prod(lengths[position + 1 :]) if product else 1 for position, name in enumerate(study.axes)
-        }
+        self._runs = {name: study.run(name) for name in study.axes}
         self._varying = [
             (k, study.axes[source])
             for k, field in enumerate(study.kernel.parameters)
@@ -87,8 +84,8 @@ class Grid(Box):
             One column per parameter of the kernel, in its order; constant ones are left alone.
         """
         for k, axis in self._varying:
-            if axis.values.ndim > 1:  # of a zip
-                out[k][: stop - start] = axis.values[start:stop]
+            if axis.values.ndim > 1:  # an array in each cell
+                out[k][: stop - start] = self.values(axis.name, np.arange(start, stop))
             else:
                 self._fill(axis, start, out[k][: stop - start])
 
@@ -98,15 +95,36 @@ class Grid(Box):
         found: Floats = axis.values[cells // self._runs[name] % len(axis)]
         return found
 
+    @cached_property
+    def _condition(self) -> CellCondition:
+        settings = [name for name in SETTINGS if name in self.study.axes]
+        return CellCondition(self.study.where, self.study.kernel, settings)
+
+    def asked(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Which of some flat cells the study's condition holds for."""
+        if not self.study.where:
+            return np.ones(len(cells), bool)
+        holds: NDArray[np.bool_] = self._condition.holds(
+            {name: self._of(name, cells) for name in self._condition.names}
+        )
+        return holds
+
+    def _of(self, name: str, cells: NDArray[np.int64]) -> Floats:
+        """A parameter's or setting's numbers in some flat cells."""
+        source = self.study.follows.get(name, name)
+        if source in self.study.axes:
+            return self.values(source, cells)
+        return np.full(len(cells), self.study.fixed[name])
+
     def settings(self, start: int, stop: int) -> tuple[int | NDArray[np.int8], float | Floats]:
         """Method number (-1: auto) and rtol of the cells: one for all where they agree, else one per cell."""
         method: int | NDArray[np.int8] = self._fixed_method()
         rtol: float | Floats = self.study.rtol
         if "method" in self.study.axes:
-            codes = self._column("method", start, stop)
+            codes = self.column("method", start, stop)
             method = int(codes[0]) if _all_equal(codes) else codes.astype(np.int8)
         if "rtol" in self.study.axes:
-            column = self._column("rtol", start, stop)
+            column = self.column("rtol", start, stop)
             rtol = float(column[0]) if _all_equal(column) else column
         return method, rtol
 
@@ -118,7 +136,8 @@ class Grid(Box):
         names = [m.name for m in self.study.kernel.methods]
         return AUTO if self.study.method == "auto" else names.index(self.study.method)
 
-    def _column(self, name: str, start: int, stop: int) -> Floats:
+    def column(self, name: str, start: int, stop: int) -> Floats:
+        """An axis' numbers in the cells `start` to `stop`."""
         column = np.empty(stop - start)
         self._fill(self.study.axes[name], start, column)
         return column

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -75,7 +74,7 @@ def _places(study: Study, reduction: str, own: Rows) -> Iterator[tuple[str, Any]
     at, status = own[f"{reduction[3:]} at"], own[f"{reduction[3:]} status"]
     for name in study.summary.over:
         axis = study.axes[name]
-        number = np.maximum(at, 0) // _run(study, name) % len(axis)
+        number = np.maximum(at, 0) // study.run(name) % len(axis)
         if axis.words is None:
             value = axis.values[number]
             value[at == NO_CELL] = np.nan
@@ -85,17 +84,11 @@ def _places(study: Study, reduction: str, own: Rows) -> Iterator[tuple[str, Any]
     yield f"{reduction}_status", np.where(at == NO_CELL, np.int8(Status.PENDING), status).astype("i1")
 
 
-def _run(study: Study, name: str) -> int:
-    """Cells in a row that share one value of an axis."""
-    axes = list(study.axes)
-    behind = axes[axes.index(name) + 1 :] if study.design == "product" else []
-    return math.prod(len(study.axes[other]) for other in behind)
-
-
 def _kept(study: Study) -> Box:
     """The axes that are not reduced."""
     assert study.summary is not None
-    lengths = {name: len(axis) for name, axis in study.axes.items() if name not in study.summary.over}
+    over = study.summary.over
+    lengths = {dim: study.grid_shape[dim] for dim, names in study.dims.items() if names[0] not in over}
     return Box(tuple(lengths), tuple(lengths.values()))
 
 

@@ -119,12 +119,12 @@ class RowBlocks:
 
 def row_blocks(study: Study) -> RowBlocks:
     """How the cells of a study make rows."""
-    lengths = {name: len(axis) for name, axis in study.axes.items()}
-    size = math.prod(lengths.values()) if study.design == "product" else next(iter(lengths.values()))
+    lengths = study.grid_shape
+    size = math.prod(lengths.values())
     if study.summary is None:
         return RowBlocks(size, 1, 1)
     over = study.summary.over
-    groups = math.prod(n for name, n in lengths.items() if name not in over) if study.design == "product" else 1
+    groups = math.prod(lengths[dim] for dim, names in study.dims.items() if names[0] not in over)
     group = size // groups
     wanted = min(1 << max(0, (size // FINENESS).bit_length() - 1), LARGEST)
     return RowBlocks(groups, group, group if group <= 4 * wanted else wanted)

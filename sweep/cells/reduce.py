@@ -22,6 +22,7 @@ from sweep.cells.partition import row_blocks
 from sweep.cells.schema import Column
 
 if TYPE_CHECKING:
+    from sweep.cells.guard import SolveCells
     from sweep.study.model import Study
 
 STRIP = 65536
@@ -115,13 +116,15 @@ class Reducer:
     ----------
     study : Study
         With a summary.
+    solver : SolveCells, optional
+        What solves cells; default: `Solver`.
     """
 
-    def __init__(self, study: Study) -> None:
+    def __init__(self, study: Study, solver: SolveCells | None = None) -> None:
         from sweep.cells.solve import Solver
 
         assert study.summary is not None
-        self.study, self.row_blocks, self.solver = study, row_blocks(study), Solver(study)
+        self.study, self.row_blocks, self.solver = study, row_blocks(study), solver or Solver(study)
         self.strip = _strip_cells(study)
         self._cells = empty_cells(study, min(self.strip, self.row_blocks.size))
 

@@ -9,13 +9,19 @@ from typing import Any
 import numpy as np
 
 from sweep.cells.grid import Cells, Grid, empty_cells
-from sweep.study.model import Axis, Study, frozen
+from sweep.study.model import Axis, Study, differs, frozen
 
+MOST_TRIED = 1 << 16
+"""Cells that are looked at to find some that are asked for."""
+TRIES = 32
+"""Cells that are drawn for each that is wanted, where a condition leaves some out."""
 ONE: Mapping[str, float] = {}
 
 
 def sampled(study: Study, cells: int, factors: Mapping[str, float] = ONE) -> Study:
     """At most so many cells, spread evenly over the grid, as a zip of the study's axes; methods and rtol are dropped.
+
+    Cells that the study does not ask for are left out, unless it asks for none.
 
     Parameters
     ----------
@@ -23,7 +29,7 @@ def sampled(study: Study, cells: int, factors: Mapping[str, float] = ONE) -> Stu
         What its values are multiplied by.
     """
     grid = Grid(study)
-    chosen = np.unique(np.linspace(0, grid.size - 1, min(cells, grid.size)).astype(np.int64))
+    chosen = _chosen(grid, cells)
     known = {p.name for p in study.kernel.parameters}
     swept = [name for name in study.axes if name in known]
     axes = {name: _axis(name, grid.values(name, chosen), factors) for name in swept}
@@ -34,7 +40,22 @@ def sampled(study: Study, cells: int, factors: Mapping[str, float] = ONE) -> Stu
         del fixed[name]
     along = {name: frozen(values * factors.get(name, 1.0)) for name, values in study.along.items()}
     method = "auto" if "method" in study.axes else study.method
-    return dataclasses.replace(study, design="zip", axes=axes, fixed=fixed, along=along, method=method, summary=None)
+    layout: dict[str, Any] = {"design": "zip", "blocks": (), "axes": axes, "where": "", "summary": None}
+    return dataclasses.replace(study, **layout, fixed=fixed, along=along, method=method)
+
+
+def _chosen(grid: Grid, cells: int) -> Any:
+    """Numbers of at most so many cells that are asked for."""
+    chosen = np.unique(np.linspace(0, grid.size - 1, min(cells, grid.size)).astype(np.int64))
+    if not grid.study.where:
+        return chosen
+    many = np.unique(np.linspace(0, grid.size - 1, min(MOST_TRIED, grid.size)).astype(np.int64))
+    asked = many[grid.asked(many)]
+    return (
+        asked[np.unique(np.linspace(0, len(asked) - 1, min(cells, len(asked))).astype(np.int64))]
+        if len(asked)
+        else chosen
+    )
 
 
 def _axis(name: str, values: Any, factors: Mapping[str, float]) -> Axis:
@@ -57,3 +78,42 @@ def solved(study: Study) -> Cells:
 def with_method(study: Study, method: str, rtol: float) -> Study:
     """The study by one method, at one rtol."""
     return dataclasses.replace(study, method=method, rtol=rtol)
+
+
+def drawn(study: Study, cells: int, rng: np.random.Generator) -> Study:
+    """Cells drawn at random from the study's grid, of those that it asks for as far as there are any, as a zip."""
+    some, grid = sampled(study, 1), Grid(study)
+    row = rng.integers(0, grid.size, cells if not study.where else TRIES * cells)
+    asked = row[grid.asked(row)]
+    row = np.resize(asked if len(asked) else row, cells)
+    axes = {
+        name: _axis(name, grid.values(name, row) if name in study.axes else np.resize(axis.values, cells), ONE)
+        for name, axis in some.axes.items()
+    }
+    return dataclasses.replace(some, axes=axes)
+
+
+def multiplied(study: Study, factors: Mapping[str, Any]) -> Study:
+    """The study, a zip, with its numbers times a factor each; factors of an axis may be one a cell."""
+    shared = {**factors} | {name: factors[other] for name, other in _followers(study).items() if other in factors}
+    axes = {
+        name: Axis(name, frozen(_by_cell(axis.values, factors.get(name, 1.0))), "values")
+        for name, axis in study.axes.items()
+    }
+    fixed = {name: _times(value, shared.get(name, 1.0)) for name, value in study.fixed.items()}
+    along = {name: frozen(values * factors.get(name, 1.0)) for name, values in study.along.items()}
+    return dataclasses.replace(study, axes=axes, fixed=fixed, along=along)
+
+
+def _by_cell(values: Any, factor: Any) -> Any:
+    """Values (cells, ...) times one factor, or one a cell."""
+    return values * factor if np.ndim(factor) == 0 else (values.T * factor).T
+
+
+def _followers(study: Study) -> dict[str, str]:
+    """Fixed parameters that equal another one because they are not given, and which."""
+    found: dict[str, str] = {}
+    for p in study.kernel.parameters:
+        if isinstance(p.default, str) and p.name in study.fixed and not differs(p, study.fixed):
+            found[p.name] = found.get(p.default, p.default)
+    return found

@@ -100,9 +100,8 @@ def columns(study: Study) -> tuple[Column, ...]:
 
 def coordinates(study: Study) -> tuple[Coordinate, ...]:
     """Axes, fixed parameters and shared coordinates."""
-    product = study.design == "product"
     fields = {f.name: f for f in (*study.kernel.parameters, *study.kernel.along)}
-    axes = [_axis(axis, (axis.name,) if product else ("cell",), fields) for axis in study.axes.values()]
+    axes = [_axis(study.axes[name], (dim,), fields) for dim, names in study.dims.items() for name in names]
     fixed = [Coordinate(k, fields[k].dims, np.float64(v), _field_attrs(fields[k])) for k, v in study.fixed.items()]
     used = {d for f in (*study.kernel.parameters, *study.asked) for d in f.dims}
     along = [Coordinate(k, (k,), v, _field_attrs(fields[k])) for k, v in study.along.items() if k in used]
@@ -125,6 +124,7 @@ def attributes(study: Study, fingerprint: Mapping[str, str]) -> dict[str, Any]:
         "kernel": study.kernel_name,
         "source": study.kernel.source,
         "design": study.design,
+        **({"where": study.where} if study.where else {}),
     }
     attrs |= {k: v for k, v in (("method", study.method), ("rtol", study.rtol)) if k not in study.axes}
     return attrs | {
@@ -137,6 +137,8 @@ def attributes(study: Study, fingerprint: Mapping[str, str]) -> dict[str, Any]:
 
 def _output(field: Field, study: Study) -> Column:
     attrs = {**_field_attrs(field), "ancillary_variables": " ".join(ANCILLARY)}
+    if "rtol" not in study.axes:
+        attrs["rtol"] = study.rtol  # so that an output taken by itself says what it is right to
     return Column(field.name, "f8", field.dims, study.shape(field), attrs)
 
 
@@ -168,13 +170,11 @@ def _error_bound() -> Column:
 
 def _axis(axis: Axis, dims: tuple[str, ...], fields: Mapping[str, Field]) -> Coordinate:
     field = fields.get(axis.name)
-    if field is not None:
-        attrs = _field_attrs(field)
-    else:
-        attrs = {
-            "method": {"long_name": "method asked for"},
-            "rtol": {"units": "1", "long_name": "relative error asked for"},
-        }[axis.name]
+    settings = {
+        "method": {"long_name": "method asked for"},
+        "rtol": {"units": "1", "long_name": "relative error asked for"},
+    }
+    attrs = _field_attrs(field) if field is not None else settings.get(axis.name, {"long_name": axis.name})
     dims = dims if field is None else (*dims, *field.dims)
     return Coordinate(axis.name, dims, axis.values if axis.words is None else np.array(axis.words), attrs)
 

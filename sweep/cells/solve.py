@@ -1,10 +1,11 @@
 """Solves runs of cells: checks them, chooses their methods, and says what became of each.
 
-A cell that `check` refuses is never solved. With a method given, the cell is solved by it and remarked INACCURATE,
-whatever else is special about it, where the method's bound or estimate exceeds rtol. With `auto` it goes to the first
-method, cheapest first, whose bound meets rtol, and on to the next where that one gives up or says INACCURATE. Where
-none meets rtol, the values of the smallest bound are given, INACCURATE. A later method replaces only what it betters.
-Where a kernel of somebody's own says OK without a number, or a status that a kernel has not got, the cell FAILED.
+A cell that the study's condition leaves out, or that `check` refuses, is never solved. With a method given, the cell
+is solved by it and remarked INACCURATE, whatever else is special about it, where the method's bound or estimate
+exceeds rtol. With `auto` it goes to the first method, cheapest first, whose bound meets rtol, and on to the next where
+that one gives up or says INACCURATE. Where none meets rtol, the values of the smallest bound are given, INACCURATE. A
+later method replaces only what it betters. Where a kernel of somebody's own says OK without a number, or a status that
+a kernel has not got, the cell FAILED.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Method, Status
-from sweep.cells.grid import Grid, empty_cells
+from sweep.cells.grid import Grid
 from sweep.study.model import AUTO, Study
 
 STRIP = 16384
@@ -41,7 +42,6 @@ VAGUE = (Status.NO_METHOD, Status.NO_CYCLE)
 """Refusals that tell less than how another method gave up."""
 UNKNOWN = (Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT)
 """A method that ends so has not learnt what the scene does: another's NO_CYCLE, of its own kind alone, is no answer."""
-WARM_UP_CELLS = 3
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -55,10 +55,12 @@ class Solver:
     Parameters
     ----------
     study : Study
+    grid : Grid, optional
+        Where its cells come from; default: the axes of the study.
     """
 
-    def __init__(self, study: Study) -> None:
-        self.study, self.grid = study, Grid(study)
+    def __init__(self, study: Study, grid: Grid | None = None) -> None:
+        self.study, self.grid = study, grid or Grid(study)
         self.usable = usable_methods(study)
         kernel = study.kernel
         shapes = {field.name: study.shape(field) for field in (*kernel.parameters, *kernel.outputs)}
@@ -115,12 +117,6 @@ class Solver:
             if error_bound is not None:
                 _tell_errors(error_bound[rows], self._error[: high - low], status[rows])
 
-    def warm(self) -> None:
-        """Solve a few cells spread over the grid: what they need is compiled before threads start."""
-        cell = empty_cells(self.study, 1)
-        for index in np.unique(np.linspace(0, self.grid.size - 1, WARM_UP_CELLS).astype(np.int64)):
-            self.solve(int(index), int(index) + 1, *cell)
-
     def _solve_strip(
         self,
         low: int,
@@ -135,6 +131,8 @@ class Solver:
         self.study.kernel.check(*strip.parameters, status)
         if self._promised is not None:
             fail(status, [])
+        if self.study.where:
+            status[~self.grid.asked(np.arange(low, high))] = Status.NOT_ASKED
         used.fill(NONE)
         method, strip.rtol[:] = self.grid.settings(low, high)
         sound = status < FIRST_REFUSAL
@@ -312,8 +310,8 @@ def fail(status: Codes, columns: Sequence[Floats]) -> None:
             whole = finite.reshape(len(status), -1).all(axis=1)
             status[~whole & (status == Status.OK)] = Status.FAILED
     codes = status.view(np.uint8)
-    if codes.size and codes.max() >= Status.PENDING:
-        status[codes >= Status.PENDING] = Status.FAILED
+    if codes.size and codes.max() >= Status.NOT_ASKED:
+        status[codes >= Status.NOT_ASKED] = Status.FAILED
 
 
 def _pick(cells: Cells, condition: NDArray[np.bool_]) -> Cells:

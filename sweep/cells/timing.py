@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,9 +13,10 @@ import numpy as np
 
 from sweep.cells.partition import Partition, RowBlocks
 from sweep.cells.schema import ANCILLARY, METHOD_USED, STATUS, Column
+from sweep.system.errors import SweepError
 
 if TYPE_CHECKING:
-    from sweep.cells.solve import Solver
+    from sweep.cells.guard import SolveCells
 
 POSITIONS = 64
 BUDGET = 0.03
@@ -25,6 +27,10 @@ PROBE_SECONDS = 3e-4
 """A probe as long as this sees past the cost of a call, and 64 of them take a few hundredths of a second."""
 SUSPECT = 0.01
 """Seconds of a probe that may hold the compilation of a method met for the first time."""
+PLACES = 8
+"""Places that are tried in turn where a probe of the middle fails."""
+MOST_FAILED = 16
+"""A kernel that fails in so many probes, and in no other, is given up."""
 LANES = 32
 """Cells that a lane kernel solves at once: it takes as long for one of them."""
 BLOCK_SECONDS = (0.05, 1.0)
@@ -62,9 +68,32 @@ UNSAMPLED = Sample(np.zeros(1), np.ones(1), 1, np.empty(0, np.int8), np.empty(0,
 """Stands in where no cell is left to compute: every block weighs its cells."""
 
 
-def take_sample(solver: Solver, columns: Sequence[Column], size: int) -> Sample:
-    """Times a few cells at up to 64 places of the grid, in a few hundredths of a second or a hundredth of the run."""
-    cells, lanes = _probe_cells(solver, columns, size)
+Clock = Callable[[], float]
+FAILED_PROBE = BUDGET / 16
+"""Seconds that a probe counts for which fails."""
+
+
+def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock: Clock | None = None) -> Sample:
+    """Times a few cells at up to 64 places of the grid, in a few hundredths of a second or a hundredth of the run.
+
+    Probes that fail are left out. Raises what the kernel does where all fail.
+    """
+    probing = _Probing(solver, clock or time.perf_counter)
+    cells, lanes = _probe_cells(probing, columns, size)
+    probes = _probes(probing, columns, size, cells)
+    if not probes and cells > 1:
+        # a bad cell spoils a probe of many
+        cells, lanes = 1, None
+        probes = _probes(probing, columns, size, cells)
+    if not probes:
+        raise probing.fault
+    places = sorted(probes)
+    costs, status, used = zip(*(probes[p] for p in places), strict=True)
+    return Sample(np.array(places), np.array(costs), cells, np.concatenate(status), np.concatenate(used), lanes)
+
+
+def _probes(solver: _Probing, columns: Sequence[Column], size: int, cells: int) -> dict[int, tuple[float, Any, Any]]:
+    """Seconds a cell, statuses and methods of probes of so many cells, by the cell that each begins with."""
     count = max(1, min(POSITIONS, size // (4 * cells)))
     arrays = {column.name: column.empty(cells) for column in columns}
     probes: dict[int, tuple[float, Any, Any]] = {}
@@ -73,13 +102,12 @@ def take_sample(solver: Solver, columns: Sequence[Column], size: int) -> Sample:
         start = _place(index, count, cells, size)
         usual = cells * float(np.median([p[0] for p in probes.values()])) if probes else 0.0
         seconds = _timed(solver, arrays, start, cells, usual)
-        probes[start] = seconds / cells, arrays[STATUS].copy(), arrays[METHOD_USED].copy()
-        spent += seconds
-        if spent > max(BUDGET, SHARE * spent / (len(probes) * cells) * size):
+        if math.isfinite(seconds):
+            probes[start] = seconds / cells, arrays[STATUS].copy(), arrays[METHOD_USED].copy()
+        spent += seconds if math.isfinite(seconds) else FAILED_PROBE
+        if probes and spent > max(BUDGET, SHARE * spent / (len(probes) * cells) * size):
             break
-    places = sorted(probes)
-    costs, status, used = zip(*(probes[p] for p in places), strict=True)
-    return Sample(np.array(places), np.array(costs), cells, np.concatenate(status), np.concatenate(used), lanes)
+    return probes
 
 
 def partition(sample: Sample, size: int, cell_bytes: float, workers: int) -> Partition:
@@ -103,7 +131,7 @@ def row_partition(sample: Sample, rows: RowBlocks, row_bytes: float, workers: in
     return Partition(rows.count, min(rows.count, math.ceil(blocks.cells / rows.mean)))
 
 
-def _probe_cells(solver: Solver, columns: Sequence[Column], size: int) -> tuple[int, bool | None]:
+def _probe_cells(solver: _Probing, columns: Sequence[Column], size: int) -> tuple[int, bool | None]:
     """Cells a probe: few enough for 64 probes in the budget, enough to see past the cost of a call.
 
     Where single cells are dear and few, also whether two take as long as one: then 32 will.
@@ -123,27 +151,57 @@ def _probe_cells(solver: Solver, columns: Sequence[Column], size: int) -> tuple[
         cells = more
 
 
-def _probe(solver: Solver, columns: Sequence[Column], size: int, cells: int) -> float:
-    """Seconds that some cells in the middle of the grid take together."""
+def _probe(solver: _Probing, columns: Sequence[Column], size: int, cells: int) -> float:
+    """Seconds that some cells in the middle of the grid take together, or elsewhere, where these fail."""
     arrays = {column.name: column.empty(cells) for column in columns}
-    start = _place(0, 1, cells, size)
-    return min(_timed(solver, arrays, start, cells) for _ in range(2 if cells == 1 else 1))
+    for start in [_place(0, 1, cells, size), *(_place(index, PLACES, cells, size) for index in _scattered(PLACES))]:
+        seconds = min(_timed(solver, arrays, start, cells) for _ in range(2 if cells == 1 else 1))
+        if math.isfinite(seconds):
+            break
+    return seconds
 
 
-def _timed(solver: Solver, arrays: dict[str, Any], start: int, cells: int, usual: float = 0.0) -> float:
+def _timed(solver: _Probing, arrays: dict[str, Any], start: int, cells: int, usual: float = 0.0) -> float:
     """Seconds to solve the cells; taken again where a method may have been compiled or loaded meanwhile.
 
     `usual`: seconds that other probes took.
     """
-    outputs = {name: array for name, array in arrays.items() if name not in ANCILLARY}
+    seconds = solver.seconds(start, start + cells, arrays)
+    slow = max(SUSPECT, 4 * usual) < seconds < math.inf
+    return min(seconds, solver.seconds(start, start + cells, arrays)) if slow else seconds
 
-    def once() -> float:
-        begun = time.perf_counter()
-        solver.solve(start, start + cells, outputs, arrays[STATUS], arrays[METHOD_USED])
-        return time.perf_counter() - begun
 
-    seconds = once()
-    return min(seconds, once()) if seconds > max(SUSPECT, 4 * usual) else seconds
+class _Probing:
+    """Times cells; infinite where the kernel fails."""
+
+    def __init__(self, solver: SolveCells, clock: Clock) -> None:
+        self._solver, self._clock = solver, clock
+        self._good, self._failed = False, 0
+        self.fault: Exception = RuntimeError("no cell was tried")
+
+    def seconds(self, start: int, stop: int, arrays: Mapping[str, Any]) -> float:
+        outputs = {name: array for name, array in arrays.items() if name not in ANCILLARY}
+        begun = self._clock()
+        with tolerated() as faults:
+            self._solver.solve(start, stop, outputs, arrays[STATUS], arrays[METHOD_USED])
+            self._good = True
+            return self._clock() - begun
+        self.fault, self._failed = faults[0], self._failed + 1
+        if not self._good and self._failed >= MOST_FAILED:
+            raise self.fault
+        return math.inf
+
+
+@contextlib.contextmanager
+def tolerated() -> Iterator[list[Exception]]:
+    """What a kernel raises goes no further, but into the list."""
+    faults: list[Exception] = []
+    try:
+        yield faults
+    except (SweepError, MemoryError):
+        raise
+    except Exception as fault:
+        faults.append(fault)
 
 
 def _place(index: int, count: int, cells: int, size: int) -> int:

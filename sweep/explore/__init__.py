@@ -4,7 +4,12 @@ Others may use
     `plan`            what a study will take
     `work_precision`  error against time of every method of a kernel
     `refine`          cells where they are needed; study_of
+    `notebook`        kernels; what a notebook shows of them and of a study
+    `join`            two results as one
+    `solver`          a study's kernel as a function of its axes
+    `sensitivity`     which parameters decide an output
     `groups`          superfluous axes, outputs free of units
 
-`calibration` (trial runs) is behind `plan`, `reference` (what errors are against) behind `work_precision`.
+`calibration` (trial runs) is behind `plan`, `reference` (what errors are against) behind `work_precision`,
+`symmetries` (powers by which numbers may be multiplied) behind `groups`, `mesh` (errors between cells) behind `refine`.
 """

@@ -81,7 +81,7 @@ class Calibration:
         """A run. Raises SweepError, OSError."""
         from sweep.runs.run import run
 
-        cells = math.prod(_lengths(study).values())
+        cells = math.prod(study.grid_shape.values())
         block = self.block if cells == self.cells else max(1, min(self.block, cells // (2 * self.workers)))
         begun = time.perf_counter()
         run(study, path, workers=self.workers, progress=False, block_cells=block).close()
@@ -90,26 +90,19 @@ class Calibration:
         return Timed(cells, seconds)
 
 
-def _lengths(study: Study) -> dict[str, int]:
-    """Values of every axis; of axes that go together, of the first alone."""
-    lengths = {name: len(axis) for name, axis in study.axes.items()}
-    return lengths if study.design == "product" else dict(list(lengths.items())[:1])
-
-
 def thinned(study: Study, cells: int) -> Study:
     """The study with about so many cells, spread over its axes; at least one, at most all."""
-    lengths = _lengths(study)
+    lengths = study.grid_shape
     for name in sorted(lengths, key=lambda name: -lengths[name]):
         others = math.prod(lengths.values()) // lengths[name]
         least = 1 if others * LEAST_VALUES > cells and others <= 1 else min(LEAST_VALUES, lengths[name])
         lengths[name] = max(least, min(lengths[name], cells // others))
-    if study.design != "product":
-        lengths = dict.fromkeys(study.axes, next(iter(lengths.values())))
-    return replace(study, axes={name: _some(axis, lengths[name]) for name, axis in study.axes.items()})
+    axes = {name: _some(study.axes[name], lengths[dim]) for dim, names in study.dims.items() for name in names}
+    return replace(study, axes={name: axes[name] for name in study.axes})
 
 
 def _some(axis: Axis, count: int) -> Axis:
     """So many of its values, each from the middle of an equal share of them."""
     places = (2 * np.arange(count) + 1) * len(axis) // (2 * count)
     words = tuple(axis.words[i] for i in places) if axis.words else axis.words
-    return replace(axis, values=axis.values[places], words=words)
+    return replace(axis, values=axis.values[places], words=words, entry=None)

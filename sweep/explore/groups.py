@@ -1,13 +1,13 @@
-"""Dimensionless groups: which axes of a sweep matter, found from the units a kernel declares and tried on its cells.
+"""Dimensionless groups: which axes of a sweep matter, by the scalings that `symmetries` finds and tries on its cells.
 
 Measuring lengths, masses, times or angles in another unit changes the numbers and not the scene, so outputs depend on
 products of powers without units alone (Buckingham). Angles count here: an escapement's swing may be measured in any
-unit as long as nothing in it is a sine. Whether that holds is tried, not believed: some cells of the study are solved
-again in other units, and only a unit that changes nothing but the numbers counts as one.
+unit as long as nothing in it is a sine. Scalings that units do not tell count alike.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -15,22 +15,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kernels.interface import FIRST_REFUSAL, Field, Status
-from sweep.cells.sample import sampled, solved
-from sweep.study.model import Study, differs
-from sweep.study.units import exponents
+from sweep.explore.symmetries import Scalings, scalings
+from sweep.study.model import Study
 
 if TYPE_CHECKING:
     import xarray as xr
 
-TRIED_CELLS = 5
-FACTOR = 1.7
-"""By which units are changed to see whether anything else changes."""
-AGREEMENT = 30.0
-"""Times rtol that outputs in other units may differ from the same outputs in the old ones."""
+LARGEST_COMMON = 4
+"""Denominator by which a group is raised to have whole powers."""
 
 Powers = Mapping[str, Fraction]
-Units = dict[str, dict[str, Fraction]]
 
 
 @dataclass(frozen=True)
@@ -66,19 +60,29 @@ class Scaling:
     Attributes
     ----------
     groups : tuple of Group
-        All that its cells depend on, beside parameters that have no unit. None of a kernel with array parameters.
+        All that its cells depend on, beside parameters that do not scale. None of a kernel with array parameters.
     scales : dict of output to Group
         What an output is multiplied by to have no unit.
     axes : tuple of str
-        The axes that have a unit that counts.
+        The axes that scale with others, or with outputs.
     free : int
         How many of the study's axes change nothing but the numbers.
+    others : tuple of str
+        The other axes of parameters.
+    hidden : int
+        Scalings that do not follow from the units a kernel declares.
+    tried : int
+        Cells on which all this was tried.
     """
 
     groups: tuple[Group, ...]
     scales: dict[str, Group]
     axes: tuple[str, ...]
     free: int
+
+    others: tuple[str, ...] = ()
+    hidden: int = 0
+    tried: int = 0
 
     @property
     def advice(self) -> str:
@@ -87,11 +91,17 @@ class Scaling:
             return ""
         left = len(self.axes) - self.free
         names, varied = ", ".join(self.axes), [str(g) for g in self.groups if self._varies(g)]
+        where = f" for each {', '.join(self.others)}" if self.others else ""
         if left == 0:
-            return f"every output is a power of {names} times a constant; a single cell tells all"
+            return f"every output is a power of {names} times a constant; a single cell tells all{where}; {self._basis}"
         matter = f"only {', '.join(varied)} matter{'s' * (len(varied) == 1)}; " if varied else ""
         kind = "one-dimensional" if left == 1 else f"{left}-dimensional"
-        return f"{kind} in {names}: {matter}{self.free} of these axes can be left out"
+        return f"{kind} in {names}{where}: {matter}{self.free} of these axes can be left out; {self._basis}"
+
+    @property
+    def _basis(self) -> str:
+        more = f"; {self.hidden} of the scalings used do not follow from declared units" if self.hidden else ""
+        return f"tried on {self.tried} cells at random{more}"
 
     def _varies(self, group: Group) -> bool:
         return any(name in self.axes for name, _ in group.powers)
@@ -104,15 +114,33 @@ def scaling(study: Study) -> Scaling:
     ------
     SweepError
         The kernel fails.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> study = sweep.study(**foliot | {"fixed": {"phi0": 1.0}}, axes={"mu": [0.5, 1.0], "a": [1.0, 2.0]})
+    >>> print(sweep.scaling(study).advice)
+    one-dimensional in mu, a: only mu/(phi0 a^2) matters; 1 of these axes can be left out; tried on ... cells at random
     """
-    units = _units(study)
-    counting = [base for base in _bases(units) if _is_a_matter_of_units(study, units, base)]
-    units = {name: {b: p for b, p in powers.items() if b in counting} for name, powers in units.items()}
-    present = [f.name for f in study.kernel.parameters if _present(study, f)]
-    repeating, groups = _groups(present if not any(f.dims for f in study.kernel.parameters) else [], units)
-    scales = {o.name: group for o in study.asked if (group := _scale(o.name, repeating, units)) is not None}
-    axes = tuple(name for name in study.axes if units.get(name))
-    return Scaling(tuple(groups), scales, axes, _free(study, units, present, counting))
+    found = scalings(study)
+    fields = {f.name: f for f in (*study.kernel.parameters, *study.kernel.along)}
+    scaled = [name for name in fields if any(found.weights(name))]
+    arrays = any(field.dims for field in study.kernel.parameters)
+    present = [] if arrays else [name for name in scaled if name not in study.along]
+    leading = [name for name in found.leading if name in present]
+    axes = tuple(name for name in study.axes if name in scaled)
+    fixed = [name for name in scaled if name not in axes]
+    return Scaling(
+        groups=tuple(_groups(present, leading, found)),
+        scales={o.name: scale for o in study.asked if (scale := _scale(o.name, leading, found)) is not None},
+        axes=axes,
+        free=found.rank([*fixed, *axes]) - found.rank(fixed),
+        others=tuple(name for name in study.axes if name in fields and name not in axes),
+        hidden=found.hidden,
+        tried=found.cells,
+    )
 
 
 def rescaled(dataset: xr.Dataset, study: Study | None = None) -> xr.Dataset:
@@ -129,6 +157,15 @@ def rescaled(dataset: xr.Dataset, study: Study | None = None) -> xr.Dataset:
     -------
     Dataset
         Outputs whose unit is 1 and whose `long_name` says the product; coordinates `group_1`, `group_2` ..., likewise.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot | {"fixed": {"phi0": 1.0}}, axes={"mu": [0.5, 1.0], "a": [1.0, 2.0]})
+    >>> sorted(set(sweep.rescaled(ds).variables) - set(ds.variables))
+    ['group_1']
     """
     study = study or Study.from_json(str(dataset.attrs["study_json"]))
     found = scaling(study)
@@ -151,6 +188,15 @@ def collapse_quality(x: xr.DataArray, y: xr.DataArray) -> float:
 
     Points that fall on one curve leave what the curve bends between neighbours, which shrinks as the square of their
     distance; others leave the scatter of the curves.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> import xarray as xr
+    >>> x = xr.DataArray(np.geomspace(1.0, 100.0, 21), dims="x")
+    >>> sweep.collapse_quality(x, x**-0.5) < 1e-12
+    True
     """
     import xarray as xr
 
@@ -169,98 +215,42 @@ def _product(name: str, group: Group) -> str:
     return f"{name}{str(group)[1:]}" if str(group).startswith("1/") else f"{name} {group}".strip()
 
 
-def _units(study: Study) -> Units:
-    fields: Sequence[Field] = (*study.kernel.parameters, *study.kernel.outputs, *study.kernel.along)
-    return {f.name: {b: p for b, p in exponents(f.unit).items() if p} for f in fields}
+def _groups(names: Sequence[str], leading: Sequence[str], found: Scalings) -> list[Group]:
+    """A group for each parameter that scales and does not lead.
 
-
-def _bases(units: Units) -> list[str]:
-    return sorted({base for powers in units.values() for base in powers})
-
-
-def _present(study: Study, field: Field) -> bool:
-    """Whether a number takes part in the cells on its own: it is an axis, or neither 0 nor left as another one."""
-    if field.choices or field.dims or field.name in study.follows:
-        return False
-    as_another = isinstance(field.default, str) and not differs(field, study.fixed)
-    return field.name in study.axes or (not as_another and bool(study.fixed[field.name]))
-
-
-def _is_a_matter_of_units(study: Study, units: Units, base: str) -> bool:
-    """Whether solving some cells with another unit of `base` changes nothing but the numbers."""
-    factors = {name: FACTOR ** float(powers.get(base, 0)) for name, powers in units.items()}
-    old, new = solved(sampled(study, TRIED_CELLS)), solved(sampled(study, TRIED_CELLS, factors))
-    fine = (old.status < FIRST_REFUSAL) & (old.status != Status.PENDING)
-    if not fine.any() or (old.status != new.status).any():
-        return False
-    rtol = AGREEMENT * study.rtol
-    return all(
-        np.allclose(new.outputs[name][fine], factors[name] * values[fine], rtol=rtol, atol=0, equal_nan=True)
-        for name, values in old.outputs.items()
-    )
-
-
-def _groups(names: Sequence[str], units: Units) -> tuple[list[str], list[Group]]:
-    """Repeating parameters, the simplest in unit first, and the groups of the others with them.
-
-    A parameter of the same unit as one before it is divided by that: R/mu rather than R/(a^2 phi0).
+    A parameter that scales like one before it is divided by that: R/mu rather than R/(a^2 phi0).
     """
-    with_unit = [name for name in names if units[name]]
-    repeating: list[str] = []
-    for name in sorted(with_unit, key=lambda n: sum(abs(p) for p in units[n].values())):
-        if _solve(repeating, units, name) is None:
-            repeating.append(name)
-    groups: list[Group] = []
-    for i, name in enumerate(with_unit):
-        like = next((n for n in with_unit[:i] if units[n] == units[name]), None)
+    groups = []
+    for i, name in enumerate(names):
+        like = next((n for n in names[:i] if found.weights(n) == found.weights(name)), None)
         if like is not None:
             groups.append(_ordered({name: Fraction(1), like: Fraction(-1)}, names))
-        elif name not in repeating:
-            powers = _solve(repeating, units, name) or {}
-            groups.append(_ordered({name: Fraction(1)} | {n: -p for n, p in powers.items()}, names))
-    return repeating, groups
+        elif name not in leading:
+            groups.append(_ordered(_whole({name: Fraction(1)} | _against(name, leading, found)), names))
+    return groups
+
+
+def _against(name: str, leading: Sequence[str], found: Scalings) -> dict[str, Fraction]:
+    """Powers of the leading parameters whose product scales against a field."""
+    weights = dict(zip(found.leading, found.weights(name), strict=True))
+    return {lead: -weights[lead] for lead in leading}
+
+
+def _whole(powers: Powers) -> Powers:
+    """The same group in whole powers, where these are small."""
+    common = math.lcm(*(power.denominator for power in powers.values()))
+    if common > LARGEST_COMMON:
+        return powers
+    return {name: power * common for name, power in powers.items()}
 
 
 def _ordered(powers: Powers, names: Sequence[str]) -> Group:
     return Group(tuple((name, powers[name]) for name in names if powers.get(name)))
 
 
-def _scale(output: str, repeating: Sequence[str], units: Units) -> Group | None:
-    """Powers of the repeating parameters that free an output of its unit."""
-    powers = _solve(repeating, units, output)
-    return None if powers is None else _ordered({name: -p for name, p in powers.items()}, repeating)
-
-
-def _solve(columns: Sequence[str], units: Units, name: str) -> dict[str, Fraction] | None:
-    """Powers of `columns` whose product has the unit of `name`; None where there are none. Exact elimination."""
-    bases = _bases({n: units[n] for n in (*columns, name)})
-    rows = [[units[c].get(b, Fraction(0)) for c in columns] + [units[name].get(b, Fraction(0))] for b in bases]
-    pivots: list[int] = []
-    for column in range(len(columns)):
-        pivot = next((r for r in range(len(pivots), len(rows)) if rows[r][column]), None)
-        if pivot is None:
-            return None  # columns are kept independent, so this does not happen
-        rows[len(pivots)], rows[pivot] = rows[pivot], rows[len(pivots)]
-        row = rows[len(pivots)] = [v / rows[len(pivots)][column] for v in rows[len(pivots)]]
-        for r in range(len(rows)):
-            if r != len(pivots) and rows[r][column]:
-                factor = rows[r][column]
-                rows[r] = [a - factor * b for a, b in zip(rows[r], row, strict=True)]
-        pivots.append(column)
-    if any(row[-1] for row in rows[len(pivots) :]):
+def _scale(output: str, leading: Sequence[str], found: Scalings) -> Group | None:
+    """Powers of the leading parameters that free an output of what it scales with; None where others take part."""
+    weights = dict(zip(found.leading, found.weights(output), strict=True))
+    if any(weight for lead, weight in weights.items() if lead not in leading):
         return None
-    return {columns[c]: rows[i][-1] for i, c in enumerate(pivots)}
-
-
-def _free(study: Study, units: Units, present: Sequence[str], counting: Sequence[str]) -> int:
-    """Axes less the dimension of what they span once units may be chosen so that fixed parameters keep their values."""
-    swept = [n for n in study.axes if units.get(n)]
-    arrays = [f.name for f in study.kernel.parameters if f.dims and f.name not in study.axes]
-    shared = [name for name, values in study.along.items() if len(values)]
-    fixed = [n for n in (*present, *arrays, *shared) if n not in study.axes]
-
-    def rank(names: Sequence[str]) -> int:
-        matrix = [[float(units[n].get(b, 0)) for b in counting] for n in names]
-        return int(np.linalg.matrix_rank(np.array(matrix))) if matrix and counting else 0
-
-    return rank([*fixed, *swept]) - rank(fixed)
+    return _ordered(_against(output, leading, found), leading)

@@ -8,10 +8,10 @@ import shutil
 import tempfile
 import time
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from sweep.store.assemble import chunks, write_structure
 from sweep.store.digests import Digests
 from sweep.store.hdf5_bytes import Hdf5Bytes, PartBytes
 from sweep.store.parts import FLAGS
-from sweep.study.read import as_study
+from sweep.study.read import Given, as_study
 from sweep.system.errors import SweepError
 from sweep.system.pool import cores, whole_number
 from sweep.system.progress import duration, quantity
@@ -63,7 +63,8 @@ class Plan:
     free_bytes : int
         On the disk of the output.
     cell_seconds, seconds : float
-        On one core; and altogether, from the call of `run` in a program that has called it before.
+        On one core; and altogether, from the call of `run` in a program that has called it before, with what has to
+        be compiled again then.
     compile_seconds : float
         What compiling the methods took just now; 0 where their machine code was kept.
     methods, statuses : dict of str to float
@@ -106,8 +107,7 @@ class Plan:
     def _compile_text(self) -> str:
         if not self.compile_seconds:
             return ""
-        kept = machine_code_folder() is not None and ":" not in self.kernel
-        when = "just now; the machine code is kept" if kept else "before the first cell"
+        when = "just now; the machine code is kept" if _is_kept(self.kernel) else "of it, before the first cell"
         return f"about {duration(self.compile_seconds)} {when}"
 
     def __str__(self) -> str:
@@ -134,7 +134,7 @@ class Plan:
 
 
 def plan(
-    study: Study | Mapping[str, Any],
+    study: Given,
     workers: int | None = None,
     path: str | os.PathLike[str] | None = None,
     note: Callable[[str], None] | None = None,
@@ -154,6 +154,13 @@ def plan(
     ------
     SweepError
         The folder of the output is not there.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> study = sweep.study(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> sweep.plan(study).cells
+    2
     """
     from sweep.explore.groups import scaling
 
@@ -167,7 +174,14 @@ def plan(
     with faults_reported(f"{study.kernel_name}: the kernel failed"):
         advice = scaling(study).advice
     forecast = _forecast(study, sample, crew, folder)
-    return replace(forecast, compile_seconds=sum(compiling.seconds.values()), scaling=advice)
+    compiled = sum(compiling.seconds.values())
+    again = 0.0 if _is_kept(study.kernel_name) else compiled
+    return replace(forecast, seconds=forecast.seconds + again, compile_seconds=compiled, scaling=advice)
+
+
+def _is_kept(kernel: str) -> bool:
+    """Whether the machine code of a kernel is there for the next run."""
+    return machine_code_folder() is not None and ":" not in kernel
 
 
 def _forecast(study: Study, sample: Sample, workers: int, folder: Path) -> Plan:

@@ -1,31 +1,33 @@
 """Cells where they are needed: a finished sweep refined until straight lines between cells are right to a tolerance.
 
-A box of the grid, with a cell in each corner, is tried by solving the middles of its edges, faces and itself. Where one
-of them is off the multilinear interpolation from the corners, or has another status, the box is cut in two along every
-axis, and its parts are tried in turn; middles of boxes that pass are not kept. What is tried is logarithmic where the
-grid is, and in the output where that is positive in all of the box, as a scaling law wants it; elsewhere distances are
-relative to the largest value.
+Cells are joined to simplices, intervals along one axis, by `analysis.scattered`. What is there is judged first: the
+cells around a simplex tell how far straight lines are off in it (`mesh`). Where that is more than the tolerance, the
+edge that bends most is cut in the middle, and the cells around are judged again. So is the edge across a border
+between statuses, down to a fixed share of the first grid's step. What is judged is logarithmic where values are
+positive, as a scaling law wants it; elsewhere errors are relative to the largest value.
+
+Cells of one axis are a sweep over its values like any other. Cells of more axes lie anywhere, as those of a zip design.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import hashlib
-import itertools
 import math
 import os
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels.interface import FIRST_REFUSAL, Status
-from sweep.analysis.loglog import Array, is_logarithmic
+from sweep.analysis.scattered import MOST_AXES, Array, Box, Indices, axes_of, heights, simplices
 from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
+from sweep.explore.mesh import edges, interpolation_errors
 from sweep.study.model import Axis, Study, frozen
 from sweep.system.errors import SweepError
 from sweep.system.overwriting import check_target
@@ -33,14 +35,14 @@ from sweep.system.overwriting import check_target
 if TYPE_CHECKING:
     import xarray as xr
 
-LEVELS = 16
-"""How often a box may be cut."""
-BORDER_LEVELS = 5
-"""How often a box may be cut because a border between statuses passes through it; no value is right inside the last."""
+LEVELS = {1: 20, 2: 10, 3: 6}
+"""How often a step of the first grid may be cut in two, by number of axes; a jump cannot be interpolated."""
+FEWEST_LEVELS = 4
+BORDER_LEVELS = {1: 10, 2: 5, 3: 3}
+"""How often, because a border between statuses passes through it; no value is right inside the last."""
 MOST_CELLS = 1_000_000
-
-Index = tuple[int, ...]
-"""A place in the grid, in units of the finest box: 2^LEVELS to a box of the first grid."""
+SAME = 2.0**-40
+"""Distance of places along an axis, from 0 to 1, that are the same."""
 
 
 @dataclass(frozen=True)
@@ -50,34 +52,42 @@ class Refinement:
     Attributes
     ----------
     dataset : Dataset
-        All cells, the first ones and those added, along `cell`.
+        All cells, the first ones and those added, in rising order: along the axis, or of several along `cell`.
     added : int
-        Cells kept beyond the first grid.
-    tried : int
-        Cells solved beyond the first grid.
+        Cells beyond the first ones.
     uniform : int
-        Cells of an even grid as fine as the finest box.
+        Cells of an even grid as fine as the finest step.
     error : float
-        Largest distance left between an output and its interpolation, relative; at the middles that were tried, of
-        boxes that were cut and not tried since also before the cut.
+        Largest error left of straight lines between cells, relative, as the cells around tell it; not beside borders
+        of statuses, nor in `jumps`.
+    tolerance : float
     complete : bool
-        Whether all boxes meet the tolerance; not so where `most_cells` or the levels ran out.
+        Whether the tolerance is met; not so where `most_cells` ran out or an output jumps.
+    jumps : int
+        Places where the tolerance is not met although edges are cut as often as is allowed.
+    unseen : dict of str to str
+        How far apart cells are along each axis, at most: nothing tells of a peak narrower than that.
     """
 
     dataset: xr.Dataset
     added: int
-    tried: int
     uniform: int
     error: float
+    tolerance: float
     complete: bool
+    jumps: int
+    unseen: dict[str, str]
 
     def __str__(self) -> str:
-        cells = self.dataset.sizes["cell"]
-        text = f"{cells:,} cells, {self.added:,} of them added, {self.tried:,} tried; an even grid as fine has "
-        text += f"{self.uniform:,}\nlargest interpolation error left: {self.error:.2g}"
-        if not self.complete:
-            text += "; not all boxes meet the tolerance, allow more cells, or leave out where it diverges"
-        return text
+        cells = self.dataset[STATUS].size
+        text = f"{cells:,} cells, {self.added:,} of them added; an even grid as fine has {self.uniform:,}"
+        text += f"\ninterpolation error left: {self.error:.2g}, as the cells around tell"
+        if self.error > self.tolerance:
+            text += "; the tolerance is not met everywhere, allow more cells"
+        if self.jumps:
+            text += f"; not in {self.jumps:,} place{'s' * (self.jumps > 1)} where it jumps or diverges"
+        apart = ", ".join(f"{width} in {name}" for name, width in self.unseen.items())
+        return f"{text}\ncells are up to {apart} apart; a peak narrower than that is not seen"
 
 
 def refine(
@@ -96,7 +106,7 @@ def refine(
     Parameters
     ----------
     dataset : Dataset
-        From `run` or `open_result`, of a product of number axes.
+        From `run` or `open_result`, of a product of at most five number axes; or refined before.
     y : str or sequence of str
         Outputs, one value a cell.
     tolerance : float
@@ -107,7 +117,7 @@ def refine(
     study : Study, optional
         That of the dataset; default: the one in its attributes.
     most_cells : int
-        Largest number of cells altogether, with those that are tried and not kept.
+        Largest number of cells altogether.
     workers : int, optional
         As of `run`.
     force : bool
@@ -116,15 +126,24 @@ def refine(
     Raises
     ------
     SweepError
-        The dataset is no finished product of number axes, an output is not there or runs along something, or `path` is
-        not to be written.
+        The dataset is no finished product of one to five number axes, nor refined before; an output is not there or
+        runs along something; `path` is not to be written.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(0.1, 10.0, 5)})
+    >>> sweep.refine(ds, "period", 1e-3).complete
+    True
     """
     study = study or study_of(dataset)
     names = [y] if isinstance(y, str) else list(y)
     _require(dataset, study, names, tolerance)
     output = _Output(study, None if path is None else Path(path), force, workers)
     output.prepare(dataset)
-    found = _Refiner(dataset, output, names, tolerance, most_cells).refined()
+    found = Refiner(dataset, output, names, tolerance, most_cells).refined()
     output.tidy()
     return found
 
@@ -187,13 +206,13 @@ class _Output:
         from sweep.results.open import in_memory
         from sweep.runs.run import store_cells
 
-        whole = self._study(axes)
+        whole = dataclasses.replace(self._study(axes), design="product" if len(axes) == 1 else "zip")
         if self.path is None:
             return in_memory(cell_schema(whole, {}), arrays)
         return store_cells(whole, self.path, arrays, self.force)
 
     def _study(self, axes: dict[str, Axis]) -> Study:
-        return dataclasses.replace(self.study, design="zip", axes=axes, title=self.title)
+        return dataclasses.replace(self.study, design="zip", blocks=(), axes=axes, title=self.title)
 
     def tidy(self) -> None:
         """Removes what was computed on the way."""
@@ -202,7 +221,15 @@ class _Output:
 
 
 def study_of(dataset: xr.Dataset, allow_import: bool = False) -> Study:
-    """The study that a result came from. Raises SweepError."""
+    """The study that a result came from. Raises SweepError.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> sweep.study_of(ds)
+    <Study 'foliot over mu': foliot over mu (3)>
+    """
     if "study_json" not in dataset.attrs:
         raise SweepError("the dataset does not say which study it came from; pass the study")
     return Study.from_json(str(dataset.attrs["study_json"]), allow_import=allow_import)
@@ -213,9 +240,13 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
         raise SweepError(f"tolerance: expected a number between 0 and 1, found {tolerance}")
     if STATUS not in dataset:
         raise SweepError("a summary keeps no cells; refine a result that has them")
-    if study.design != "product" or any(axis.words is not None for axis in study.axes.values()):
-        raise SweepError("only a product of number axes can be refined")
-    if any(len(axis) < 2 or (np.diff(axis.values) <= 0).any() for axis in study.axes.values()):
+    if any(axis.words is not None or axis.values.ndim > 1 for axis in study.axes.values()):
+        raise SweepError("only number axes can be refined")
+    if study.design != "product" and not axes_of(dataset):
+        raise SweepError("only a product of axes can be refined, or what was refined before")
+    if len(study.axes) > MOST_AXES:
+        raise SweepError(f"at most {MOST_AXES} axes can be refined, found {len(study.axes)}; fix the others")
+    if study.design == "product" and any(_unordered(axis.values) for axis in study.axes.values()):
         raise SweepError("an axis to be refined needs at least two values, in rising order")
     for name in names:
         if name not in dataset or dataset[name].dims != dataset[STATUS].dims:
@@ -224,143 +255,169 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
         raise SweepError("the sweep is not finished; run it to its end first")
 
 
-class _Refiner:
-    """Boxes of a grid, tried and cut until outputs can be interpolated in them."""
+def _unordered(values: Array) -> bool:
+    return len(values) < 2 or bool((np.diff(values) <= 0).any())
+
+
+class Refiner:
+    """Cells joined to simplices, whose edges are cut until outputs can be interpolated."""
 
     def __init__(
         self, dataset: xr.Dataset, output: _Output, names: Sequence[str], tolerance: float, most_cells: int
     ) -> None:
         self.output, self.names, self.tolerance, self.most = output, names, tolerance, most_cells
-        self.axes = {name: axis.values for name, axis in output.study.axes.items()}
-        self.logarithmic = {name: is_logarithmic(values) for name, values in self.axes.items()}
-        self.first = dataset.load()
-        self.parts: list[xr.Dataset] = []
-        self.rows: dict[Index, int] = {}
-        """Rows of the cells solved, those of the first grid before the others."""
-        self.kept: set[int] = set()
-        self.values: list[Array] = []
-        self.size = np.array([float(abs(self.first[name]).max()) or 1.0 for name in names])
-        self.error, self.left, self.deepest = 0.0, 0.0, 0
+        self.parts = [_flat(dataset.load())]
+        self.axes = list(output.study.axes)
+        first = {name: self.parts[0][name].values for name in self.axes}
+        self.box = Box.of(first)
+        self.values = np.stack(list(first.values()), axis=1)
+        self.points = self.box.points(first)
+        self.known = [dict(zip(_keys(t), v, strict=True)) for t, v in zip(self.points.T, self.values.T, strict=True)]
+        self.first = len(self.points)
+        product = output.study.design == "product"
+        self.steps = np.array([len(k) - 1 if product else self.first ** (1 / len(self.axes)) for k in self.known])
 
     def refined(self) -> Refinement:
-        """Boxes of one level at a time, coarse ones first."""
-        self._learn(self._corners(0), _flat(self.first))
-        self.kept.update(self.rows.values())
-        boxes = self._corners(1)
-        for level in range(LEVELS):
-            half = 2 ** (LEVELS - level - 1)
-            if not boxes or not self._try(boxes, half):
-                break
-            boxes = self._cut(boxes, half)
-            if level >= BORDER_LEVELS:
-                boxes = [box for box in boxes if self._of_one_status(box, half)]
-            self.deepest = level + bool(boxes)
-        return self._joined(complete=not boxes)
+        """Rounds of cuts, each of edges that share no end."""
+        self._give_every_axis_a_middle()
+        while True:
+            found = self._judged()
+            cuts = self._cuts(found)[: max(0, self.most - len(self.points))]
+            if not len(cuts):
+                return self._joined(found, complete=not (found.size > self.tolerance).any())
+            self._solve(*self._middles(cuts))
 
-    def _corners(self, less: int) -> list[Index]:
-        """Places of the first grid's cells, without the last `less` of every axis."""
-        places = (range(len(values) - less) for values in self.axes.values())
-        return [tuple(i * 2**LEVELS for i in index) for index in itertools.product(*places)]
+    def _give_every_axis_a_middle(self) -> None:
+        """Between two values nothing tells whether an output bends."""
+        for k, known in enumerate(self.known):
+            if len(known) == 2:
+                points = self.points[self.points[:, k] == 0]
+                values = self.values[self.points[:, k] == 0]
+                points[:, k], values[:, k] = 0.5, self.box.values(k, np.array([0.5]))
+                self._solve(points, values)
 
-    def _try(self, boxes: Sequence[Index], half: int) -> bool:
-        """Solves the middles of boxes; False where that would be too many cells."""
-        wanted = {p for box in boxes for p in self._points(box, half)} - self.rows.keys()
-        if len(self.rows) + len(wanted) > self.most:
-            return False
-        self._solve(sorted(wanted))
-        return True
+    def _judged(self) -> _Judged:
+        """Errors over the simplices that have one status, and borders between statuses that are to be cut."""
+        corners = simplices(self.points)
+        kind, heights_ = self._kinds(), self._heights()
+        kinds = kind[corners]
+        alike = (kinds == kinds[:, :1]).all(axis=1)
+        size = np.zeros(len(corners))
+        ends = corners[:, :2].copy()
+        for number in np.unique(kind[kind >= 0]):
+            members, here = np.flatnonzero(kind == number), np.flatnonzero(alike & (kinds[:, 0] == number))
+            renumbered = np.searchsorted(members, corners[here])
+            errors = interpolation_errors(self.points[members], heights_[members], renumbered)
+            size[here] = errors.size
+            ends[here, 0] = corners[here, errors.first]
+            ends[here, 1] = corners[here, errors.second]
+        mixed = np.flatnonzero(~alike & (kinds >= 0).any(axis=1))
+        size[mixed], ends[mixed] = self._borders(corners[mixed], kinds[mixed])
+        finest = self._extent(ends) <= 2.0 ** -LEVELS.get(len(self.axes), FEWEST_LEVELS)
+        return _Judged(corners, size, ends, finest, alike & (kinds[:, 0] >= 0))
 
-    def _cut(self, boxes: Sequence[Index], half: int) -> list[Index]:
-        """The parts of boxes that are off by more than the tolerance."""
-        off = {box: self._off(box, half) for box in boxes}
-        self.error = max([self.error, *(e for e in off.values() if e <= self.tolerance)])
-        self.left = max((e for e in off.values() if math.inf > e > self.tolerance), default=0.0)
-        cut = [box for box in boxes if off[box] > self.tolerance]
-        self.kept.update(self.rows[p] for box in cut for p in self._points(box, half))
-        return [part for box in cut for part in _parts(box, half)]
+    def _borders(self, corners: Indices, kinds: Indices) -> tuple[Array, Indices]:
+        """Infinite where a border between statuses has longer edges than are left there; and these edges."""
+        pairs = edges(len(self.axes))
+        ends = corners[:, pairs]
+        length = np.where(kinds[:, pairs[:, 0]] != kinds[:, pairs[:, 1]], self._extent(ends), -1.0)
+        longest = length.argmax(axis=1)[:, None]
+        wide = np.take_along_axis(length, longest, 1)[:, 0] > 2.0 ** -BORDER_LEVELS.get(len(self.axes), 2)
+        return np.where(wide, math.inf, 0.0), np.take_along_axis(ends, longest[:, :, None], 1)[:, 0]
 
-    def _points(self, corner: Index, half: int) -> list[Index]:
-        """Corners and middles of a box, 3^D of them in C order."""
-        return list(itertools.product(*((i, i + half, i + 2 * half) for i in corner)))
-
-    def _of_one_status(self, corner: Index, side: int) -> bool:
-        """Whether a box has the same status in all its corners; no border is known to pass through it."""
-        corners = itertools.product(*((i, i + side) for i in corner))
-        return len({self.values[self.rows[p]][0] for p in corners}) == 1
-
-    def _off(self, corner: Index, half: int) -> float:
-        """How far a middle of the box is off the interpolation from its corners, infinite if it has another status."""
-        rows = np.array([self.values[self.rows[p]] for p in self._points(corner, half)])
-        rows = rows.reshape(*[3] * len(corner), -1)
-        if (rows[..., 0] != rows[..., 0].flat[0]).any():
-            return math.inf
-        if rows[..., 0].flat[0] >= FIRST_REFUSAL:
-            return 0.0
-        values = rows[..., 1:] / self.size
-        positive = (values > 0).all(axis=tuple(range(len(corner))))
-        values[..., positive] = np.log(rows[..., 1:][..., positive])
-        return float(np.nanmax(abs(values - _multilinear(values)), initial=0.0))
-
-    def _solve(self, points: list[Index]) -> None:
-        if not points:
-            return
-        places = zip(self.axes, np.array(points).T, strict=True)
-        axes = {name: Axis(name, frozen(self._values(name, column)), "values") for name, column in places}
-        found = self.output.solved(axes)
-        self.parts.append(found)
-        self._learn(points, found)
-
-    def _values(self, name: str, places: NDArray[np.int64]) -> Array:
-        """Axis values at places in the grid; those of the first grid exactly."""
-        grid, unit = self.axes[name], 2**LEVELS
-        low = np.minimum(places // unit, len(grid) - 2)
-        share = (places - low * unit) / unit
-        if self.logarithmic[name]:
-            between = np.exp((1 - share) * np.log(grid[low]) + share * np.log(grid[low + 1]))
-        else:
-            between = grid[low] + share * (grid[low + 1] - grid[low])
-        found: Array = np.where(share == 0, grid[low], np.where(share == 1, grid[low + 1], between))
+    def _extent(self, ends: Indices) -> Array:
+        """Of edges (..., 2), in steps of the first grid along the axis where they are longest."""
+        apart = abs(self.points[ends[..., 0]] - self.points[ends[..., 1]]) * self.steps
+        found: Array = apart.max(axis=-1)
         return found
 
-    def _learn(self, points: Sequence[Index], solved: xr.Dataset) -> None:
-        columns = [solved[STATUS].values.ravel().astype(float), *(solved[name].values.ravel() for name in self.names)]
-        rows = np.stack(columns, axis=1)
-        for point, row in zip(points, rows, strict=True):
-            self.rows[point] = len(self.values)
-            self.values.append(row)
+    def _kinds(self) -> Indices:
+        """Statuses, with those that rounding decides alike; -1 without a value."""
+        status = self._column(STATUS).astype(np.intp)
+        finite = np.isfinite(np.stack([self._column(name) for name in self.names])).all(axis=0)
+        kind = np.where(status == Status.INACCURATE, int(Status.OK), status)
+        return np.where((status < FIRST_REFUSAL) & finite, kind, -1)
 
-    def _joined(self, complete: bool) -> Refinement:
-        parts, rows = [_flat(self.first), *self.parts], sorted(self.kept)
+    def _heights(self) -> Array:
+        return np.stack([heights(self._column(name)) for name in self.names], axis=1)
 
-        def joined(name: str) -> Any:
-            return np.concatenate([part[name].values for part in parts])[rows]
+    def _column(self, name: str) -> Any:
+        return np.concatenate([part[name].values for part in self.parts])
 
-        axes = {name: Axis(name, frozen(joined(name)), "values") for name in self.axes}
-        arrays = {name: joined(name) for name in (*self.output.study.outputs, *ANCILLARY)}
-        finest = math.prod(float((len(values) - 1) * 2**self.deepest + 1) for values in self.axes.values())
-        first = self.first[STATUS].size
+    def _cuts(self, found: _Judged) -> Indices:
+        """Edges to cut, worst first; none shares an end with one before, for a cut changes what is known there."""
+        wanted = np.flatnonzero((found.size > self.tolerance) & ~found.finest)
+        used = np.zeros(len(self.points), dtype=bool)
+        cuts = []
+        for first, second in found.ends[wanted[np.argsort(-found.size[wanted], kind="stable")]].tolist():
+            if not (used[first] or used[second]):
+                used[first] = used[second] = True
+                cuts.append((first, second))
+        return np.array(cuts, dtype=np.intp).reshape(-1, 2)
+
+    def _middles(self, cuts: Indices) -> tuple[Array, Array]:
+        """Places and axis values in the middles of edges; a value that an axis has already is taken again."""
+        points = self.points[cuts].mean(axis=1)
+        values = np.empty(points.shape)
+        for k, known in enumerate(self.known):
+            between = self.box.values(k, points[:, k])
+            values[:, k] = [known.setdefault(t, v) for t, v in zip(_keys(points[:, k]), between, strict=True)]
+        return points, values
+
+    def _solve(self, points: Array, values: Array) -> None:
+        axes = {name: Axis(name, frozen(column), "values") for name, column in zip(self.axes, values.T, strict=True)}
+        self.parts.append(_flat(self.output.solved(axes)))
+        self.points, self.values = np.concatenate([self.points, points]), np.concatenate([self.values, values])
+
+    def _joined(self, found: _Judged, complete: bool) -> Refinement:
+        order = np.lexsort(self.values.T[::-1])
+        axes = {
+            name: Axis(name, frozen(column[order]), "values")
+            for name, column in zip(self.axes, self.values.T, strict=True)
+        }
+        arrays = {name: self._column(name)[order] for name in (*self.output.study.outputs, *ANCILLARY)}
+        jumps = found.valued & found.finest & (found.size > self.tolerance)
+        finest = [np.diff(np.unique(t)) for t in self.points.T]
         return Refinement(
             dataset=self.output.written(axes, arrays),
-            added=len(rows) - first,
-            tried=len(self.values) - first,
-            uniform=int(finest),
-            error=self.error if complete else max(self.error, self.left),
+            added=len(self.points) - self.first,
+            uniform=int(math.prod(round(1 / step[step > SAME].min()) + 1 for step in finest)),
+            error=float(found.size[found.valued & ~jumps].max(initial=0.0)),
+            tolerance=self.tolerance,
             complete=complete,
+            jumps=int(jumps.sum()),
+            unseen=self._widest(found.corners[found.valued]),
         )
+
+    def _widest(self, corners: Indices) -> dict[str, str]:
+        """How far cells are apart, at most, along each axis; a factor where it is taken in logarithms."""
+        width = np.ptp(self.points[corners], axis=1).max(axis=0, initial=0.0)
+        ratio, span = (
+            (self.box.high / np.where(self.box.logarithmic, self.box.low, 1.0)) ** width,
+            self.box.high - self.box.low,
+        )
+        return {
+            name: f"a factor {ratio[k]:.3g}" if self.box.logarithmic[k] else f"{width[k] * span[k]:.3g}"
+            for k, name in enumerate(self.axes)
+        }
+
+
+class _Judged(NamedTuple):
+    """Simplices: their corners, errors, the edges (m, 2) to cut, whether these are the finest allowed, whether all
+    corners have values and one status."""
+
+    corners: Indices
+    size: Array
+    ends: Indices
+    finest: NDArray[np.bool_]
+    valued: NDArray[np.bool_]
+
+
+def _keys(places: Array) -> list[float]:
+    """Places along an axis, alike where rounding alone tells them apart."""
+    found: list[float] = np.round(places / SAME).tolist()
+    return found
 
 
 def _flat(dataset: xr.Dataset) -> xr.Dataset:
-    return dataset.stack(cell=list(dataset[STATUS].dims), create_index=False)
-
-
-def _parts(corner: Index, half: int) -> list[Index]:
-    return list(itertools.product(*((i, i + half) for i in corner)))
-
-
-def _multilinear(rows: NDArray[Any]) -> NDArray[Any]:
-    """Corners of a box (3, 3, ..., columns) interpolated to its middles."""
-    found = rows.copy()
-    for axis in range(rows.ndim - 1):
-        along = np.moveaxis(found, axis, 0)
-        along[1] = (along[0] + along[2]) / 2
-    return found
+    return dataset if dataset[STATUS].ndim == 1 else dataset.stack(cell=list(dataset[STATUS].dims), create_index=False)

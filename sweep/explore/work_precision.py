@@ -24,7 +24,7 @@ from sweep.explore.plan import small_duration
 from sweep.explore.reference import Reference, best_reference, errors, given_reference
 from sweep.study.mistakes import did_you_mean
 from sweep.study.model import Study
-from sweep.study.read import as_study
+from sweep.study.read import Given, as_study
 from sweep.system.errors import SweepError
 from sweep.system.table import columns, page
 
@@ -64,7 +64,7 @@ def precision_cells(study: Study, cells: int = CELLS) -> dict[str, Any]:
 
 
 def work_precision(
-    study: Study | Mapping[str, Any],
+    study: Given,
     *,
     methods: Sequence[str] | None = None,
     tolerances: Sequence[float] = TOLERANCES,
@@ -104,6 +104,14 @@ def work_precision(
     SweepError
         There is no such method, or none that can do the study; the reference solves no cell; truth has another shape;
         a tolerance is not above 0.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> keys = {"kernel": "foliot", "outputs": ["period"], "axes": {"mu": [0.5, 1.0]}, "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> found = sweep.work_precision(keys, methods=["closed", "asymptotic"], tolerances=[1e-6])
+    >>> found.method.values.tolist()
+    ['closed', 'asymptotic']
     """
     part = sampled(as_study(study), cells)
     able = _able(part)

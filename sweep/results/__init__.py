@@ -1,1 +1,4 @@
-"""A finished or growing file as a Dataset: `open`, `stored`, `statuses`, `verify`, `filter`, `export`, `units`."""
+"""A finished or growing file as a Dataset.
+
+Others may use `open`, `stored`, `statuses`, `verify`, `filter`, `export`, `units`, `diff`, `listing`.
+"""

@@ -48,6 +48,13 @@ def export(dataset: xr.Dataset, path: str | os.PathLike[str], *, force: bool = F
     ------
     SweepError
         If the suffix is another, what writes it is not installed, or the file cannot be, or is not to be, written.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> print(sweep.export(ds, "period.csv", force=True).read_text().splitlines()[-1])
+    2.0,1.0,1.0,0.0,0.0,0.0,1.0,0.0,1.0,5.524901443102082,nan,OK,closed
     """
     target = Path(path)
     kind = target.suffix.lower()

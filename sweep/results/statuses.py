@@ -30,7 +30,7 @@ class Account:
     """What became of all cells: each is in one of these, and together they are `total`.
 
     `failed` are those for which no method found an answer, or the kernel none at all, and those of a status that this
-    version does not know.
+    version does not know; `not_asked` those that the study's condition leaves out.
     """
 
     ok: int
@@ -38,21 +38,23 @@ class Account:
     refused: int
     failed: int
     pending: int
+    not_asked: int = 0
 
     @property
     def total(self) -> int:
         """All cells."""
-        return self.ok + self.remarks + self.refused + self.failed + self.pending
+        return self.ok + self.remarks + self.refused + self.failed + self.pending + self.not_asked
 
     def __str__(self) -> str:
         parts = ("ok", "remarks", "refused", "failed", "pending")
-        return f"{self.total:,} cells: " + ", ".join(f"{getattr(self, name):,} {name}" for name in parts)
+        text = ", ".join(f"{getattr(self, name):,} {name}" for name in parts)
+        return f"{self.total:,} cells: {text}" + f", {self.not_asked:,} not asked" * bool(self.not_asked)
 
 
 def account(dataset: Cells) -> Account:
     """What became of the cells of a result, of a summary too."""
-    counts = dict.fromkeys(("ok", "remarks", "refused", "failed", "pending"), 0)
-    for name, cells in _counts(dataset).items():
+    counts = dict.fromkeys(("ok", "remarks", "refused", "failed", "pending", "not_asked"), 0)
+    for name, cells in tally(dataset).items():
         counts[_kind(name)] += cells
     return Account(**counts)
 
@@ -61,12 +63,13 @@ def _kind(name: str) -> str:
     status = Status.__members__.get(name)
     if status is None or status in FAILED:
         return "failed"
-    if status in (Status.OK, Status.PENDING):
-        return "ok" if status == Status.OK else "pending"
+    if status in (Status.OK, Status.PENDING, Status.NOT_ASKED):
+        return status.name.lower()
     return "refused" if status.refused else "remarks"
 
 
-def _counts(dataset: Cells) -> dict[str, int]:
+def tally(dataset: Cells) -> dict[str, int]:
+    """How many cells have each status that occurs."""
     if is_summary(dataset):
         return summed(dataset, BY_STATUS)
     return {count.name: count.cells for count in count_statuses(dataset)}
@@ -118,11 +121,9 @@ def count_statuses(dataset: Cells) -> list[StatusCount]:
     counts, first = _tally(dataset[STATUS])
     total = int(counts.sum())
     return [
-        StatusCount(
-            _name(number), int(counts[number]), total, {} if number == Status.OK else _cell(dataset, first[number])
-        )
-        for number in range(len(counts))
-        if counts[number]
+        StatusCount(_name(n), int(counts[n]), total, {} if n == Status.OK else cell_values(dataset, first[n]))
+        for n in range(len(counts))
+        if counts[n]
     ]
 
 
@@ -178,11 +179,23 @@ def flat_pieces(column: xr.DataArray | StoredColumn, at: tuple[int, ...] = ()) -
             yield np.asarray(column[(*at, slice(start, start + rows))]).reshape(-1)
 
 
+def failed_cells(dataset: Cells, most: int) -> list[int]:
+    """Numbers of the first cells that FAILED."""
+    found: list[int] = []
+    done = 0
+    for piece in flat_pieces(dataset[STATUS]):
+        if len(found) >= most:
+            break
+        found += (done + np.flatnonzero(piece == Status.FAILED)).tolist()
+        done += len(piece)
+    return found[:most]
+
+
 def _name(number: int) -> str:
     return next((status.name for status in Status if status == number), f"status {number}")
 
 
-def _cell(dataset: Cells, index: int) -> dict[str, str]:
+def cell_values(dataset: Cells, index: int) -> dict[str, str]:
     """Coordinates of a cell, as people write them."""
     column = dataset[STATUS]
     at = dict(zip(map(str, column.dims), np.unravel_index(index, column.shape), strict=True))

@@ -72,6 +72,14 @@ def verify(path: str | os.PathLike[str]) -> Verdict:
     ------
     SweepError
         There is nothing to verify, it cannot be read, or it was written without digests.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> sweep.run(sweep.study_of(ds), "verified.h5").close()
+    >>> sweep.verify("verified.h5").whole
+    True
     """
     output = Path(path)
     if output.exists():

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import math
+import os
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
@@ -27,6 +28,33 @@ from sweep.system.progress import passed
 CONNECT_SECONDS = 10
 ASK_SECONDS = 2.0
 """How often the scheduler is asked for its workers."""
+
+
+LOST_SECONDS = 8.0
+"""A cluster without workers for so long has lost them, where that is not to be waited for."""
+
+
+TRIALS = 5
+"""Times that workers are told of a run, where some leave meanwhile."""
+
+
+class NoWorkers(Exception):
+    """The cluster has no workers."""
+
+
+class Absence:
+    """How long a cluster has been without workers."""
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds, self._since = seconds, math.inf
+
+    def check(self, none: bool) -> bool:
+        """Whether workers are missing only now. Raises NoWorkers where they have been for long."""
+        now, first = time.monotonic(), none and self._since == math.inf
+        self._since = math.inf if not none else now if first else self._since
+        if now - self._since > self._seconds:
+            raise NoWorkers
+        return first
 
 
 class Cluster:
@@ -69,14 +97,23 @@ class Cluster:
             self._asked = time.monotonic()
         return self._threads
 
-    def wait(self, note: Callable[[str], None], until: datetime | None) -> None:
-        """Returns as soon as there is a worker; those of batch systems may take hours to start."""
+    def wait(self, note: Callable[[str], None], until: datetime | None, seconds: float = math.inf) -> None:
+        """Returns as soon as there is a worker; those of batch systems may take hours to start.
+
+        Raises NoWorkers where there is none after so many seconds.
+        """
+        if self.threads:
+            return
+        note("the cluster has no workers yet; waiting for the first")
+        # a cluster that adapts to what there is to do makes workers only for that
+        call = self._client.submit(os.getpid, pure=False)
+        absence = Absence(seconds)
         with CtrlC() as ctrl_c:
-            if not self.threads:
-                note("the cluster has no workers yet; waiting for the first")
             while not self.threads and not passed(until):
+                absence.check(True)
                 time.sleep(TICK)
                 ctrl_c.check()
+        call.release()
 
     @contextlib.contextmanager
     def introduced(self, assignment: Assignment) -> Iterator[None]:
@@ -91,7 +128,7 @@ class Cluster:
 
     def _introduce(self, assignment: Assignment) -> None:
         try:
-            self._client.register_plugin(Plugin(assignment), name=assignment.run)
+            self._register(Plugin(assignment), assignment.run)
         except OSError as fault:
             raise self.lost(fault) from fault
         except Exception as fault:
@@ -99,6 +136,16 @@ class Cluster:
                 f"cluster: a worker cannot take part ({type(fault).__name__}: {fault}); every machine of the cluster "
                 "needs the same version of foliot"
             ) from fault
+
+    def _register(self, plugin: Plugin, name: str) -> None:
+        """Again where a worker leaves at that moment. Raises what the last trial does."""
+        for _ in range(TRIALS - 1):
+            try:
+                self._client.register_plugin(plugin, name=name)
+                return
+            except OSError:
+                self._client.nthreads()
+        self._client.register_plugin(plugin, name=name)
 
     def executor(self) -> Any:
         """As of concurrent.futures."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import secrets
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError, Future
 from itertools import islice
@@ -20,14 +19,15 @@ import numpy as np
 from distributed import KilledWorker
 
 from sweep.cells.block import Blocks, Computed
-from sweep.runs.cluster import Cluster
+from sweep.runs.cluster import LOST_SECONDS, Absence, Cluster
 from sweep.runs.extend import Precomputed, Reused
-from sweep.runs.task import Task
+from sweep.runs.isolate import Limits, kernel_paths
+from sweep.runs.task import WAIT, Task
 from sweep.runs.worker import TOKEN, Answer, Assignment, Sent
 from sweep.store.parts import digest
-from sweep.study.model import Study
 from sweep.system import disk
 from sweep.system.errors import SweepError
+from sweep.system.log import log
 from sweep.system.pool import CtrlC, through
 
 TASK_SECONDS = 0.5
@@ -53,6 +53,7 @@ class Dispatch:
     left : how many blocks there are to compute
     reused : cells that need not be computed; they are filled in here
     shared : folder in which workers that see it write parts; None: all numbers are wanted here
+    limits : what cells may take that are solved in processes of their own; None: in those of the workers
     """
 
     def __init__(
@@ -63,17 +64,19 @@ class Dispatch:
         left: int,
         reused: Reused | Precomputed | None,
         shared: Path | None,
+        limits: Limits | None = None,
     ) -> None:
         self._cluster, self._blocks, self._left, self._reused, self._note = cluster, blocks, left, reused, task.note
-        self._assignment = _assignment(task, blocks, shared if reused is None else None)
+        self._assignment = _assignment(task, blocks, shared if reused is None else None, limits)
         self._seconds = math.inf
         self._most = max(1, TASK_BYTES // max(1, self._blocks.partition.cells * self._blocks.row_bytes))
         self._suspects: list[int] = []
         self._poison: list[int] = []
-        self._idle = False
+        self._threads: int | None = None
+        self._absence = Absence(math.inf if task.without_workers == WAIT else LOST_SECONDS)
 
     def compute(self, blocks: Iterator[int], receive: Callable[[Computed | None], None]) -> None:
-        """Calls `receive` with every block that is done, and with None now and then. Raises SweepError."""
+        """Calls `receive` with every block that is done, and with None now and then. Raises SweepError, NoWorkers."""
         self._receive = receive
         with self._cluster.introduced(self._assignment), CtrlC() as ctrl_c:
             self._submit(self._batches(blocks), self._capacity, self._suspect, ctrl_c)
@@ -85,7 +88,8 @@ class Dispatch:
         if self._poison:
             raise SweepError(
                 f"{_listed(self._blocks, self._poison)}: every worker that took them died, alone with them, too; the "
-                "logs of the workers may tell why, too little memory is most common; all other blocks are kept"
+                "logs of the workers may tell why, too little memory is most common; all other blocks are kept; "
+                "isolated, a cell of which its process dies is found and FAILED"
             )
 
     def _submit(
@@ -140,8 +144,11 @@ class Dispatch:
             ) from fault
         mean = answer.seconds / len(batch)
         self._seconds = mean if math.isinf(self._seconds) else 0.7 * self._seconds + 0.3 * mean
+        bad = answer.bad
         for job, found in answer.found.items():
-            self._receive(Computed(job, found if isinstance(found, str) else self._checked(job, found), mean))
+            numbers = found if isinstance(found, str) else self._checked(job, found)
+            self._receive(Computed(job, numbers, mean, answer.seconds, bad))
+            bad = ()
 
     def _suspect(self, batch: Batch) -> None:
         self._note(
@@ -151,10 +158,11 @@ class Dispatch:
         self._suspects += batch
 
     def _look_for_workers(self) -> None:
-        idle = not self._cluster.threads
-        if idle and not self._idle:
+        threads, self._threads = self._threads, self._cluster.threads
+        if threads not in (None, self._threads):
+            log(f"the cluster has {self._threads} threads, {threads} before", "workers", threads=self._threads)
+        if self._absence.check(not self._threads):
             self._note("the cluster has no workers left; waiting for new ones")
-        self._idle = idle
 
     def _mask(self, job: int) -> bytes | None:
         """Of a block that is known in part: which of its cells are not, a bit each."""
@@ -194,30 +202,20 @@ def write_token(shared: Path, token: str) -> None:
         raise disk.refusal(fault, shared) from fault
 
 
-def _assignment(task: Task, blocks: Blocks, shared: Path | None) -> Assignment:
-    token, study = secrets.token_hex(16), task.study
+def _assignment(task: Task, blocks: Blocks, shared: Path | None, limits: Limits | None) -> Assignment:
+    token = secrets.token_hex(16)
     if shared is not None:
         write_token(shared, token)
     return Assignment(
         run=f"foliot-{token[:8]}",
-        study=study.to_json(),
+        study=task.study.to_json(),
         fingerprint=task.fingerprint,
         partition=blocks.partition,
         shared=str(shared or ""),
         token=token,
-        paths=_paths(study),
+        paths=kernel_paths(task.study),
+        limits=limits,
     )
-
-
-def _paths(study: Study) -> tuple[str, ...]:
-    """Folder of a kernel of the user's own, who has allowed it here by reading the study."""
-    name = study.kernel_name.partition(":")[0]
-    file = getattr(sys.modules.get(name), "__file__", None) if ":" in study.kernel_name else None
-    if file is None:
-        return ()
-    path = Path(file).resolve()
-    above = name.count(".") + (path.name == "__init__.py")
-    return (str(path.parents[above]),)
 
 
 def _listed(blocks: Blocks, jobs: list[int] | Batch) -> str:

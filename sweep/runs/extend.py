@@ -127,15 +127,15 @@ class Reused:
                 for p, s, k in zip(self._positions, slab.slices, slab.known, strict=True)
             )
             for column in self._columns:
-                values = self._values(column, old)
+                values = self._values(column.name, old)
                 place = arrays[column.name][slab.begin : slab.end].reshape(*slab.shape, *column.shape)
                 place[np.ix_(*slab.known)] = values
 
-    def _values(self, column: Column, slices: tuple[slice, ...]) -> Any:
+    def _values(self, name: str, slices: tuple[slice, ...]) -> Any:
         """Those of a piece of the result. Raises SweepError where the file fails."""
         try:
             # earlier versions did not write the error bounds; none of their cells that are taken over has one
-            return np.nan if self._lacks(column.name) else self._file[column.name][slices]
+            return np.nan if self._lacks(name) else self._file[name][slices]
         except DAMAGE as fault:
             raise unreadable(self._output, fault) from None
 
@@ -186,18 +186,47 @@ class Reused:
                 yield Slab(slices, known, begin, end)
 
 
+class Retried(Reused):
+    """The cells of a finished result of the same study, but for those that FAILED."""
+
+    def missing(self, start: int, stop: int) -> Any:
+        """Of the cells `start` to `stop`, which FAILED."""
+        missing = np.empty(stop - start, bool)
+        for slab in self._slabs(start, stop):
+            missing[slab.begin : slab.end] = (self._values(STATUS, slab.slices) == Status.FAILED).ravel()
+        return missing
+
+    def fill(self, start: int, stop: int, arrays: Mapping[str, Any]) -> None:
+        """Writes the others. Raises SweepError where the file fails."""
+        again = self.missing(start, stop)
+        computed = {column.name: arrays[column.name][again] for column in self._columns}
+        super().fill(start, stop, arrays)
+        for name, values in computed.items():
+            arrays[name][again] = values
+
+
+def has_failed(output: Path) -> bool:
+    """Whether a cell of a finished result FAILED. Raises SweepError where it keeps no cells."""
+    import h5py
+
+    with h5py.File(output, "r") as file:
+        if STATUS not in file:
+            raise SweepError(f"{output}: a summary does not keep the cells that FAILED; compute it anew with --force")
+        return any((piece == Status.FAILED).any() for piece in flat_pieces(file[STATUS]))
+
+
 class Precomputed:
     """All cells of a study, solved before: what `Reused` is, without a file to look them up in.
 
     Parameters
     ----------
     arrays : mapping of outputs and of `schema.ANCILLARY` to ndarray, shape (cells, ...)
+    taken_over : str
+        Which program has computed them, where it was another.
     """
 
-    taken_over = ""
-
-    def __init__(self, arrays: Mapping[str, Any]) -> None:
-        self._arrays = arrays
+    def __init__(self, arrays: Mapping[str, Any], taken_over: str = "") -> None:
+        self._arrays, self.taken_over = arrays, taken_over
 
     def missing(self, start: int, stop: int) -> Any:
         return np.zeros(stop - start, bool)

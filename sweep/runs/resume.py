@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from sweep.cells.fingerprint import difference
 from sweep.cells.partition import row_blocks
 from sweep.results.open import checked_study, stored_fingerprint
-from sweep.runs.extend import obstacle
+from sweep.runs.extend import has_failed, obstacle
 from sweep.runs.task import Task
 from sweep.store.manifest import Manifest, read_manifest, restored
 from sweep.store.store import Store
@@ -28,7 +28,7 @@ def is_complete(task: Task) -> bool:
         return False
     if stored == dict(task.fingerprint):
         check_whole(task)
-        return True
+        return not (task.retry_failed and has_failed(task.output))
     hindrance = obstacle(stored, task.fingerprint)
     if task.extend and not hindrance:
         return False

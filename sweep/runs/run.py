@@ -6,8 +6,9 @@ import contextlib
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from datetime import datetime
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -16,18 +17,22 @@ import numpy as np
 from sweep.cells.block import Found
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.output_schema import gathered, part_columns
+from sweep.cells.partition import row_blocks
 from sweep.results.open import in_memory, memory, open_result, open_unfinished, stored_fingerprint
 from sweep.runs import resume
-from sweep.runs.extend import Precomputed, Reused, is_of_another_version
+from sweep.runs.elsewhere import compute_elsewhere, joined, threads
+from sweep.runs.extend import Precomputed, Retried, Reused, is_of_another_version
+from sweep.runs.isolate import Limits
 from sweep.runs.session import Session, Solve
-from sweep.runs.task import Task
+from sweep.runs.task import END, HERE, WAIT, Task
 from sweep.store.assemble import assemble
 from sweep.store.store import Store, folder_of, opened
-from sweep.study.read import as_study
+from sweep.study.mistakes import did_you_mean, listed
+from sweep.study.read import KEYS, Given, as_study
 from sweep.system.errors import SweepError
 from sweep.system.forecast import Ending
-from sweep.system.pool import BufferPool, CtrlC, Terminated, cores, whole_number
-from sweep.system.progress import TimeUp, deadline, quantity, stream_of
+from sweep.system.pool import BufferPool, Cores, CtrlC, Terminated, cores, whole_number
+from sweep.system.progress import TimeUp, deadline, quantity, seconds_of, stream_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,12 +40,14 @@ if TYPE_CHECKING:
     from sweep.runs.cluster import Cluster
     from sweep.study.model import Study
 
+STORED_AT_ONCE = 1 << 16
+"""Cells of a block of those that are solved already."""
 MOST_ATTEMPTS = 3
 """Times that damaged parts are computed again before the disk is given up."""
 
 
 def run(
-    study: Study | Mapping[str, Any],
+    study: Given | None = None,
     path: str | os.PathLike[str] | None = None,
     *,
     workers: int | None = None,
@@ -50,12 +57,18 @@ def run(
     extend: bool = False,
     until: str | datetime | None = None,
     cluster: Any = None,
+    isolate: bool = False,
+    cell_timeout: float | str | None = None,
+    retry_failed: bool = False,
+    without_workers: str = WAIT,
+    **keys: Any,
 ) -> xr.Dataset:
     """Computes every cell of a study. The same study gives the same bits, however it is cut and continued.
 
     Parameters
     ----------
-    study : Study, or mapping of the keys of `build_study`
+    study : Study, path of a study file, or mapping of the keys of `build_study`, optional
+        None: these keys stand as keywords.
     path : path, optional
         The output, an HDF5 (netCDF4) file. A run that was stopped or killed is continued; an output that is complete
         for the same study is opened and left alone. None: in memory.
@@ -76,6 +89,19 @@ def run(
     cluster : str or distributed.Client, optional
         Compute on the workers of this dask scheduler ("tcp://10.0.0.1:8786", or a scheduler file) instead of here.
         Workers that see the folder of the output write there; others send their numbers.
+    isolate : bool
+        Solve cells in processes of their own: a kernel that crashes or never ends costs only the cells it does so at.
+        The command does so for every kernel "module:NAME".
+    cell_timeout : float or str, optional
+        Seconds, or "90 s", "5 min", "1 h", that a cell may take; with it cells are isolated. Default: a minute, or a
+        hundred times the dearest cell of the timed sample, where that is more.
+    retry_failed : bool
+        Where the output is complete, compute the cells that FAILED again.
+    without_workers : {"wait", "here", "end"}
+        What to do where the cluster has no workers, or loses all: wait for new ones, which those of batch systems may
+        be a long time coming; go on here after ten seconds; or end, as `until` does.
+    **keys
+        Of `build_study`, and `allow_import`.
 
     Raises
     ------
@@ -84,11 +110,49 @@ def run(
         What is finished is kept.
     KeyboardInterrupt, SystemExit
         After Ctrl-C or SIGTERM, when the blocks at work have been stored.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> ds = sweep.run(kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0}, rtol=1e-12)
+    >>> ds.period.values.round(6)
+    array([44.      ,  7.844719])
     """
-    task = _task(as_study(study), path, workers, force, progress, block_cells, extend, until, cluster)
+    _check_keywords(keys)
+    task = _task(
+        as_study(study, **keys),
+        path,
+        workers=workers,
+        force=force,
+        progress=progress,
+        block_cells=block_cells,
+        extend=extend,
+        until=until,
+        cluster=cluster,
+        isolate=isolate,
+        cell_timeout=cell_timeout,
+        retry_failed=retry_failed,
+        without_workers=without_workers,
+    )
     if path is None:
-        return _run_in_memory(task)
-    return open_result(task.output) if _complete(task) else open_unfinished(task.output)
+        try:
+            return _run_in_memory(task)
+        except TimeUp as reason:
+            raise SweepError(f"stopped, for {reason}; give a path to keep what is computed") from None
+    if _complete(task):
+        return open_result(task.output)
+    if not is_begun(task.output):
+        raise SweepError("until: the time was up before the first cell could be computed")
+    return open_unfinished(task.output)
+
+
+def _check_keywords(keys: Mapping[str, Any]) -> None:
+    """Raises SweepError for one that neither `run` nor a study has."""
+    options = [name for name in signature(run).parameters if name != "keys"]
+    for key in keys:
+        if key not in (*KEYS, "allow_import"):
+            hint = did_you_mean(key, [*options, *KEYS]) or f"; a study has {listed(KEYS, word='and')}"
+            raise SweepError(f"sweep.run: no such keyword {key}{hint}")
 
 
 def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> bool:
@@ -96,29 +160,45 @@ def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> bool
     return _complete(_task(study, path, **options))
 
 
+def is_begun(output: Path) -> bool:
+    """Whether there is a sweep that writes an output, and has not ended."""
+    return folder_of(Path(os.path.realpath(output))).exists()
+
+
 def store_cells(
-    study: Study, path: str | os.PathLike[str], arrays: Mapping[str, Any], force: bool = False
+    study: Study,
+    path: str | os.PathLike[str],
+    arrays: Mapping[str, Any],
+    force: bool = False,
+    mark: Mapping[str, str] | None = None,
+    taken_over: str = "",
 ) -> xr.Dataset:
     """Writes the result of cells that are solved already, a file like that of `run`.
 
     Parameters
     ----------
     arrays : mapping of outputs and of `schema.ANCILLARY` to ndarray, shape (cells, ...)
+    mark : mapping, optional
+        Its fingerprint, where that is not the one of the study and of this program.
+    taken_over : str
+        Which program has computed the cells, where it was another.
 
     Raises
     ------
     SweepError
         As `run`.
     """
-    task = Task(study, fingerprint(study), _checked(path), 1, force=force)
+    block = max(1, min(row_blocks(study).count, STORED_AT_ONCE))
+    task = Task(study, dict(mark or fingerprint(study)), _checked(path), Cores(1), force=force, block_cells=block)
     if not resume.is_complete(task):
-        _run_to_file(task, Precomputed(arrays))
+        _run_to_file(task, Precomputed(arrays, taken_over))
     return open_result(task.output)
 
 
 def _task(
     study: Study,
     path: str | os.PathLike[str] | None,
+    *,
     workers: int | None = None,
     force: bool = False,
     progress: bool | TextIO | None = None,
@@ -126,23 +206,35 @@ def _task(
     extend: bool = False,
     until: str | datetime | None = None,
     cluster: Any = None,
+    isolate: bool = False,
+    cell_timeout: float | str | None = None,
+    retry_failed: bool = False,
+    without_workers: str = WAIT,
 ) -> Task:
     """What `run` was asked for. Raises SweepError."""
     if cluster is not None and workers is not None:
         raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
     if path is None and until is not None:
         raise SweepError("until: give a path as well, or what is computed by then would be lost")
+    if extend and retry_failed:
+        raise SweepError("extend, retry_failed: give one of the two; each continues another result")
+    if without_workers not in (WAIT, HERE, END):
+        raise SweepError(f'without_workers: expected "{WAIT}", "{HERE}" or "{END}", found {without_workers!r}')
     return Task(
         study,
         fingerprint(study),
         None if path is None else _checked(path),
-        cores() if workers is None else whole_number("workers", workers),
+        Cores(cores() if workers is None else whole_number("workers", workers)),
         stream_of(progress),
         force,
         None if block_cells is None else whole_number("block_cells", block_cells),
         extend,
         deadline(until),
         cluster,
+        isolate or cell_timeout is not None,
+        Limits(None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout)),
+        retry_failed,
+        without_workers,
     )
 
 
@@ -158,47 +250,16 @@ def _complete(task: Task) -> bool:
     return (resume.is_complete(task) and not folder_of(task.output).exists()) or _run_to_file(task)
 
 
-@contextlib.contextmanager
-def _joined(task: Task) -> Iterator[Cluster | None]:
-    """The cluster, once it has a worker; None where none is asked for. Raises SweepError."""
-    if task.cluster is None:
-        yield None
-        return
-    try:
-        from sweep.runs.cluster import Cluster
-    except ImportError:
-        raise SweepError(
-            'cluster: needs the package distributed; install it with: pip install "foliot[cluster]"'
-        ) from None
-    with Cluster(task.cluster) as cluster:
-        cluster.wait(task.note, task.until)
-        yield cluster
-
-
-def _threads(task: Task, cluster: Cluster | None) -> int:
-    """How many threads compute, here or elsewhere."""
-    return task.workers if cluster is None else cluster.threads or task.workers
-
-
-def _elsewhere(session: Session, cluster: Cluster, shared: Path | None, receive: Callable[[int, Found], None]) -> None:
-    """Has what is left of a session computed by a cluster."""
-    from sweep.runs.dispatch import Dispatch
-
-    left = session.forecast.blocks
-    executor = Dispatch(cluster, session.task, session.blocks, left, session.reused, shared)
-    session.compute_elsewhere(executor, receive)
-
-
 def _run_in_memory(task: Task) -> xr.Dataset:
-    with _joined(task) as cluster:
-        session = Session(task, _threads(task, cluster))
+    with joined(task) as cluster:
+        session = Session(task, threads(task, cluster))
         arrays = _arrays(session)
         progress = session.begin(range(session.blocks.count))
         try:
             _fill(session, arrays, cluster)
             progress.end()
         finally:
-            progress.stop()
+            session.close()
     found = arrays if task.study.summary is None else gathered(task.study, arrays)
     return in_memory(session.dated(session.began), found)
 
@@ -217,10 +278,8 @@ def _fill(session: Session, arrays: Mapping[str, Any], cluster: Cluster | None) 
         for name, column in place(job).items():
             column[...] = found[name]
 
-    if cluster is None:
-        session.compute(min(session.task.workers, session.blocks.count), work)
-    else:
-        _elsewhere(session, cluster, None, receive)
+    if cluster is None or not compute_elsewhere(session, cluster, None, receive):
+        session.compute(work)
 
 
 def _arrays(session: Session) -> dict[str, Any]:
@@ -235,6 +294,7 @@ def _arrays(session: Session) -> dict[str, Any]:
 def _run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
     """False where the time was up before the end."""
     with opened(task.output, part_columns(task.study)) as store, contextlib.ExitStack() as stack:
+        stack.enter_context(task.cores.told_by_signals())
         manifest = resume.earlier(store, task)
         # looked at again, for another run may have ended before this one had the lock
         if resume.is_complete(task):
@@ -244,16 +304,23 @@ def _run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
         if store.manifest is not None and not store.missing():
             return _run_session(Session(task, task.workers, store.blocks, sampled=False), store, None)
         reused = precomputed or _reused(task, stack)
-        cluster = stack.enter_context(_joined(task))
         blocks = None if store.manifest is None else store.blocks
-        return _run_session(Session(task, _threads(task, cluster), blocks, reused=reused), store, cluster)
+        try:
+            cluster = stack.enter_context(joined(task))
+            session = Session(task, threads(task, cluster), blocks, sampled=precomputed is None, reused=reused)
+        except TimeUp as reason:
+            task.note(f"stopped before the first block, for {reason}")
+            return False
+        return _run_session(session, store, cluster)
 
 
 def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
     """The cells of the result that is extended. Raises SweepError where that is not possible."""
-    if not task.extend or task.force or not task.output.exists():
+    if not (task.extend or task.retry_failed) or task.force or not task.output.exists():
         return None
     resume.check_whole(task)
+    if task.retry_failed:
+        return stack.enter_context(Retried(task.output, task.study))
     reused = stack.enter_context(Reused(task.output, task.study))
     if is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
         task.note("another version has computed it; a sample of its cells is computed again")
@@ -267,6 +334,7 @@ def _run_session(session: Session, store: Store, cluster: Cluster | None) -> boo
     ending = Ending(blocks.count, task.workers, blocks.rows.count * blocks.row_bytes)
     progress = session.begin(range(blocks.count) if store.manifest is None else store.missing(), ending.seconds)
     _check_space(session)
+    session.log_begin()
     # held back wherever they would leave half a file behind
     with CtrlC():
         if store.manifest is None:
@@ -276,11 +344,11 @@ def _run_session(session: Session, store: Store, cluster: Cluster | None) -> boo
         except (KeyboardInterrupt, Terminated):
             progress.note(f"stopped; {_kept(store)}")
             raise
-        except TimeUp:
-            progress.note(f"stopped, for it is {datetime.now():%H:%M}; {_kept(store)}")
+        except TimeUp as reason:
+            progress.note(f"stopped, for {reason}; {_kept(store)}")
             return False
         finally:
-            progress.stop()
+            session.close()
         store.clear()
     return True
 
@@ -293,9 +361,9 @@ def _kept(store: Store) -> str:
 def _finish(session: Session, store: Store, cluster: Cluster | None, ending: Ending) -> None:
     """Computes what is missing and puts the result together, again where a part turns out to be damaged."""
     for _ in range(MOST_ATTEMPTS):
-        if store.missing() and cluster is not None:
-            _store_elsewhere(session, store, cluster)
-        elif store.missing():
+        if store.missing() and cluster is not None and not _store_elsewhere(session, store, cluster):
+            cluster = None
+        if store.missing() and cluster is None:
             _store_blocks(session, store, ending)
         damaged = _assembled(session, store)
         if not damaged:
@@ -323,9 +391,7 @@ def _assembled(session: Session, store: Store) -> list[int]:
 
 
 def _store_blocks(session: Session, store: Store, ending: Ending) -> None:
-    # twice as many threads as cores: some wait for the disk while the others compute
-    threads = min(2 * session.task.workers, len(store.missing()))
-    buffers = BufferPool(session.blocks.empty, threads)
+    buffers = BufferPool(session.blocks.empty)
 
     def work(job: int, solve: Solve) -> None:
         start, stop = store.blocks.bounds(job)
@@ -336,11 +402,11 @@ def _store_blocks(session: Session, store: Store, ending: Ending) -> None:
                 store.put(job, arrays)
                 ending.wrote(time.monotonic() - begun)
 
-    session.compute(threads, work)
+    session.compute(work)
 
 
-def _store_elsewhere(session: Session, store: Store, cluster: Cluster) -> None:
-    """Blocks that workers of a cluster compute, and write themselves where they can."""
+def _store_elsewhere(session: Session, store: Store, cluster: Cluster) -> bool:
+    """Blocks that workers of a cluster compute, and write themselves where they can; False where it lost them."""
 
     def receive(job: int, found: Found) -> None:
         if isinstance(found, str):
@@ -348,8 +414,9 @@ def _store_elsewhere(session: Session, store: Store, cluster: Cluster) -> None:
         else:
             store.put(job, found)
 
-    _elsewhere(session, cluster, store.open_shared(), receive)
+    whole = compute_elsewhere(session, cluster, store.open_shared(), receive)
     store.close_shared()
+    return whole
 
 
 def _check_space(session: Session) -> None:

@@ -3,22 +3,35 @@
 from __future__ import annotations
 
 import math
+import os
+import platform
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any, Protocol
 
-from sweep.cells.block import Blocks, Computed, Found, block_solver, faults_reported, sampled_study
+from sweep.cells.block import Blocks, Computed, Found, block_solver, faults_reported, sampled_by, sampled_study
 from sweep.cells.compiling import Compiling
+from sweep.cells.guard import BadCell, Guard
 from sweep.cells.output_schema import output_schema, part_columns
 from sweep.cells.partition import Partition, row_blocks
 from sweep.cells.schema import Schema
+from sweep.cells.solve import Solver
 from sweep.cells.timing import UNSAMPLED, Sample, row_partition
 from sweep.runs.extend import TAKEN_OVER, Precomputed, Reused
+from sweep.runs.isolate import Processes
 from sweep.runs.task import Task
 from sweep.system.forecast import Forecast
-from sweep.system.pool import BufferPool, Stopper, each
+from sweep.system.log import log
+from sweep.system.pool import BufferPool, Stopper, cores, each
 from sweep.system.progress import Progress, TimeUp, passed
+
+MOST_TOLD = 1000
+"""Cells that FAILED which are told one by one."""
+
+SAMPLE_SECONDS = 1.0
+"""What the timed sample may take although the time is up."""
 
 Solve = Callable[[int, int, Mapping[str, Any]], bool]
 """Computes the rows start .. stop into columns of that length; False where the run is being stopped."""
@@ -55,10 +68,50 @@ class Session:
         self.task, self.study, self.reused = task, study, reused
         self.began = now()
         self.schema: Schema = output_schema(study, task.fingerprint)
-        compiling = Compiling(study.kernel, study.kernel_name, task.note)
-        self.sample: Sample = sampled_study(study, compiling) if sampled else UNSAMPLED
+        self.bad: list[BadCell] = []
+        self._told, self._cores = 0, task.workers
+        self.processes = Processes(study, task.limits, task.cores.count) if task.isolate else None
+        self.sample: Sample = self._sampled() if sampled else UNSAMPLED
+        if self.processes is not None:
+            self.processes.limits = replace(task.limits, cost=float(self.sample.costs.max()))
         self.blocks = Blocks(study, partition or self._partition(threads))
         self.begin([])
+
+    def _sampled(self) -> Sample:
+        """The sample, taken in a thread, so that Ctrl-C and the time to stop are seen while a kernel is compiled."""
+        found: list[Sample] = []
+
+        def work(job: int) -> None:
+            if self.processes is None:
+                compiling = Compiling(self.study.kernel, self.study.kernel_name, self.task.note)
+                found.append(sampled_study(self.study, compiling))
+            else:
+                solver = self.processes.solver()
+                found.append(sampled_by(solver, self.study, solver.clock))
+
+        begun = time.monotonic()
+
+        def tick(job: int | None) -> None:
+            # most samples take less, and give blocks a size by which the run is continued
+            if time.monotonic() - begun > SAMPLE_SECONDS:
+                self.check_time()
+
+        try:
+            each([0], work, 1, tick, self._stopper())
+        except BaseException:
+            self.close()
+            raise
+        return found[0]
+
+    def close(self) -> None:
+        """Ends the progress line, and all processes."""
+        if self.processes is not None:
+            self.processes.end()
+        if hasattr(self, "progress"):
+            self.progress.stop()
+
+    def _stopper(self) -> Stopper:
+        return Stopper(self.task.cores, (lambda: None) if self.processes is None else self.processes.end)
 
     def _partition(self, threads: int) -> Partition:
         rows, cells = row_blocks(self.study), self.task.block_cells
@@ -95,21 +148,31 @@ class Session:
         reused = {TAKEN_OVER: self.reused.taken_over} if self.reused and self.reused.taken_over else {}
         return replace(self.schema, attrs={**self.schema.attrs, **times, **reused})
 
-    def compute(self, threads: int, work: Callable[[int, Solve], None]) -> None:
+    def compute(self, work: Callable[[int, Solve], None]) -> None:
         """Calls `work(job, solve)` for every block that is left, on a pool of threads.
 
-        No more than `workers` threads are inside `solve` at a time. Raises SweepError where `work` fails, TimeUp.
+        No more than `workers` threads are inside `solve` at a time; as many wait for the disk, or for their turn.
+        Raises SweepError where `work` fails, TimeUp.
         """
+        workers = self.task.cores
+        threads = 2 * max(workers.count, cores())
         self.check_time()
-        stopper = Stopper(self.task.workers)
-        solvers = BufferPool(lambda: self._solver(stopper), threads)
+        stopper = self._stopper()
+        solvers = BufferPool(self._solver)
+
+        def compute(start: int, stop: int, arrays: Mapping[str, Any]) -> bool:
+            def inside() -> None:
+                with solvers.borrow() as solve:
+                    solve(start, stop, arrays)
+
+            return stopper.compute(inside)
 
         def guarded(job: int) -> None:
-            with faults_reported(f"{self.blocks.label(job)}: the kernel failed"), solvers.borrow() as solve:
-                work(job, solve)
+            with faults_reported(f"{self.blocks.label(job)}: the kernel failed"):
+                work(job, compute)
             self.forecast.end(job)
 
-        each(self.forecast.order(), guarded, threads, self._count, stopper)
+        each(self.forecast.order(), guarded, threads, self._count, stopper, lambda: 2 * workers.count)
 
     def compute_elsewhere(self, executor: Executor, receive: Callable[[int, Found], None]) -> None:
         """The same by an executor: calls `receive` with every block and its part's name, or its numbers."""
@@ -118,13 +181,18 @@ class Session:
         def take(done: Computed | None) -> None:
             if done is not None:
                 receive(done.block, done.found)
-                self.forecast.end(done.block, done.seconds)
+                self.bad.extend(done.bad)
+                self.forecast.end(done.block, done.seconds, done.ago)
             self._count(None if done is None else done.block)
 
         executor.compute(self.forecast.order(), take)
 
     def _count(self, job: int | None) -> None:
         """Counts a block that is done. Raises TimeUp."""
+        if self.task.workers != self._cores:
+            self._cores = self.task.workers
+            self.progress.note(f"on {self._cores} core{'s' * (self._cores > 1)} from now on")
+        self._tell_failed()
         if job is None:
             self.progress.tick()
         else:
@@ -135,10 +203,12 @@ class Session:
     def check_time(self) -> None:
         """Raises TimeUp when it is time to stop."""
         if passed(self.task.until):
-            raise TimeUp
+            raise TimeUp(f"it is {datetime.now():%H:%M}")
 
-    def _solver(self, stopper: Stopper) -> Solve:
-        compute, reused = block_solver(self.study), self.reused
+    def _solver(self) -> Callable[[int, int, Mapping[str, Any]], None]:
+        """Computes the rows start .. stop, for one thread at a time."""
+        cells = Solver(self.study) if self.processes is None else self.processes.solver()
+        compute, reused = block_solver(self.study, Guard(cells, self.bad.append)), self.reused
 
         def solve(start: int, stop: int, arrays: Mapping[str, Any]) -> None:
             self.forecast.begin(start // self.blocks.partition.cells)
@@ -146,7 +216,34 @@ class Session:
             if reused is not None:
                 reused.fill(start, stop, arrays)
 
-        return lambda start, stop, arrays: stopper.compute(lambda: solve(start, stop, arrays))
+        return solve
+
+    def _tell_failed(self) -> None:
+        """Tells of the cells that FAILED since it was called last; of too many only how many they are."""
+        while self._told < len(self.bad):
+            cell, self._told = self.bad[self._told], self._told + 1
+            if self._told <= MOST_TOLD:
+                log(str(cell), "failed", cell=cell.cell, values=dict(cell.values), reason=cell.reason)
+                self.progress.tell(str(cell))
+            elif self._told == MOST_TOLD + 1:
+                self.progress.note("more cells FAILED; from here on they are counted only")
+
+    def log_begin(self) -> None:
+        """The first line of a run in its log: what is computed, where, by which versions."""
+        progress, machine = self.progress, platform.uname()
+        log(
+            f"begins: {self.task.name}, kernel {self.study.kernel_name}, {progress.done:,} of {progress.total:,} cells "
+            f"done before, {self.blocks.count:,} blocks, {self.task.workers} cores, process {os.getpid()} on "
+            f"{machine.node} ({machine.system} {machine.machine}), {self.schema.attrs.get('versions', '')}",
+            "begin",
+            kernel=self.study.kernel_name,
+            cells=progress.done,
+            of=progress.total,
+            cores=self.task.workers,
+            process=os.getpid(),
+            machine=machine.node,
+            versions=self.schema.attrs.get("versions", ""),
+        )
 
 
 def now() -> str:

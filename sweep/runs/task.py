@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import Any, TextIO
 
+from sweep.runs.isolate import Limits
 from sweep.study.model import Study
+from sweep.system.pool import Cores
 from sweep.system.progress import Progress
+
+WAIT, HERE, END = "wait", "here", "end"
+"""What is done where a cluster has no workers."""
 
 
 @dataclass(frozen=True)
@@ -19,19 +24,28 @@ class Task:
     study: Study
     fingerprint: Mapping[str, str]
     path: Path | None
-    workers: int
+    cores: Cores
     stream: TextIO | None = None
     force: bool = False
     block_cells: int | None = None
     extend: bool = False
     until: datetime | None = None
     cluster: Any = None
+    isolate: bool = False
+    limits: Limits = field(default_factory=Limits)
+    retry_failed: bool = False
+    without_workers: str = WAIT
 
     @property
     def output(self) -> Path:
         """Where a run to a file writes."""
         assert self.path is not None, "a run in memory has no output"
         return self.path
+
+    @property
+    def workers(self) -> int:
+        """Cores that compute at once, at the moment."""
+        return self.cores.count
 
     @property
     def name(self) -> str:

@@ -19,9 +19,12 @@ from typing import Any
 import numpy as np
 from distributed import WorkerPlugin
 
-from sweep.cells.block import Blocks, SolveBlock, block_solver, faults_reported
+from sweep.cells.block import Blocks, SolveBlock, block_solver, faults_reported, warm
 from sweep.cells.fingerprint import difference, fingerprint
+from sweep.cells.guard import BadCell, Guard
 from sweep.cells.partition import Partition
+from sweep.cells.solve import Solver
+from sweep.runs.isolate import Limits, Processes
 from sweep.store.parts import digest
 from sweep.store.store import Store
 from sweep.study.model import Study
@@ -43,6 +46,7 @@ class Assignment:
     shared : folder in which parts are to be written, or "" where they are to be sent
     token : what stands in the file `TOKEN` of that folder, if it is the same folder as there
     paths : where to look for the module of a kernel of the user's own; his study was allowed to run it
+    limits : what cells may take that are solved in processes of their own; None: they are solved in the worker's
     """
 
     run: str
@@ -52,6 +56,7 @@ class Assignment:
     shared: str
     token: str
     paths: tuple[str, ...]
+    limits: Limits | None = None
 
 
 @dataclass(frozen=True)
@@ -64,10 +69,11 @@ class Sent:
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of some blocks, in how many seconds: the name of each one's part, or its numbers."""
+    """What became of some blocks: seconds, the name of each one's part or its numbers, and cells that FAILED."""
 
     seconds: float
     found: Mapping[int, str | Sent]
+    bad: Sequence[BadCell]
 
 
 class Plugin(WorkerPlugin):  # type: ignore[misc]
@@ -83,7 +89,8 @@ class Plugin(WorkerPlugin):  # type: ignore[misc]
     def teardown(self, worker: Any) -> None:
         """Called in the worker."""
         _assignments.pop(self.assignment.run, None)
-        _contexts.pop(self.assignment.run, None)
+        if (context := _contexts.pop(self.assignment.run, None)) is not None:
+            context.end()
 
 
 _assignments: dict[str, Assignment] = {}
@@ -102,7 +109,7 @@ def compute(run: str, jobs: Sequence[int], masks: Mapping[int, bytes]) -> Answer
     context = _context(run)
     begun = time.perf_counter()
     found = {job: context.block(job, masks.get(job)) for job in jobs}
-    return Answer(time.perf_counter() - begun, found)
+    return Answer(time.perf_counter() - begun, found, context.bad())
 
 
 def _context(run: str) -> _Context:
@@ -122,11 +129,29 @@ class _Context:
         self._blocks = Blocks(self._study, assignment.partition)
         self._store = _store(assignment, self._blocks.columns)
         self._thread = _ThreadState()
-        from sweep.cells.solve import Solver
-
-        with faults_reported(f"{self._study.kernel_name}: the kernel failed"):
+        limits = assignment.limits
+        self._processes = None if limits is None else Processes(self._study, limits, os.cpu_count() or 1)
+        if self._processes is None:
             # what all threads need is compiled once
-            Solver(self._study).warm()
+            warm(Solver(self._study), self._study)
+
+    def end(self) -> None:
+        """Kills what the run has begun here."""
+        if self._processes is not None:
+            self._processes.end()
+
+    def bad(self) -> Sequence[BadCell]:
+        """Cells that FAILED in this thread since it was asked last."""
+        found, self._thread.bad = self._thread.bad, []
+        return found
+
+    def _solve(self) -> SolveBlock:
+        """Solves blocks in this thread."""
+        state = self._thread
+        if state.solve is None:
+            cells = Solver(self._study) if self._processes is None else self._processes.solver()
+            state.solve = block_solver(self._study, Guard(cells, lambda cell: state.bad.append(cell)))
+        return state.solve
 
     def block(self, job: int, mask: bytes | None) -> str | Sent:
         """The name of the part that is written, or the numbers."""
@@ -137,7 +162,7 @@ class _Context:
             buffers = self._thread.buffers or self._blocks.empty()
             self._thread.buffers = buffers
             arrays = {name: buffer[: stop - start] for name, buffer in buffers.items()}
-            self._thread.solver(self._study)(start, stop, arrays, None)
+            self._solve()(start, stop, arrays, None)
             self._store.put(job, arrays)
             return self._store.names.pop(job)
 
@@ -145,7 +170,7 @@ class _Context:
         start, stop = self._blocks.bounds(job)
         wanted = None if mask is None else np.unpackbits(np.frombuffer(mask, np.uint8), count=stop - start).view(bool)
         arrays = self._blocks.empty(stop - start)
-        self._thread.solver(self._study)(start, stop, arrays, wanted)
+        self._solve()(start, stop, arrays, wanted)
         return Sent(digest(self._blocks.columns, arrays), arrays)
 
 
@@ -155,11 +180,7 @@ class _ThreadState(threading.local):
 
     solve: SolveBlock | None = None
     buffers: Mapping[str, Any] = field(default_factory=dict)
-
-    def solver(self, study: Study) -> SolveBlock:
-        if self.solve is None:
-            self.solve = block_solver(study)
-        return self.solve
+    bad: list[BadCell] = field(default_factory=list)
 
 
 def _study(assignment: Assignment) -> Study:

@@ -4,7 +4,10 @@ Others may use
     `charts`   plot, plot_precision; for figures of one's own: style, new_figure, save and what draws panels
     `page`     write_page: a result as one page of HTML
     `text`     result_text
+    `follow`   a sweep watched from its log
     `laws`     power laws along an axis, as text and csv; pick
+    `studies`  what comes with foliot, and copies to work on
+    `compare`, `law_charts`   which law: as text, csv and picture
     `kernels`  what can be swept, and a study to begin with
 
 `view` chooses and letters what `charts` draws.

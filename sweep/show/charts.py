@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.analysis.loglog import is_logarithmic, spans_decades
-from sweep.show.view import View, coordinate, label, setting, view
+from sweep.show.view import View, coordinate, edges, label, setting, view
 from sweep.system import disk
 from sweep.system.errors import SweepError
 from sweep.system.overwriting import DRAWN
@@ -121,6 +121,12 @@ def plot(
     ------
     SweepError
         If there is no such output or axis, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> figure = sweep.plot(ds, "period.png")
     """
     shown = view(dataset, y, x)
     with style():
@@ -153,6 +159,13 @@ def plot_precision(found: xr.Dataset, path: str | os.PathLike[str] | None = None
     ------
     SweepError
         The file cannot be written.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> keys = {"kernel": "foliot", "outputs": ["period"], "axes": {"mu": [0.5, 1.0]}, "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> found = sweep.work_precision(keys, methods=["closed", "asymptotic"], tolerances=[1e-6])
+    >>> figure = sweep.plot_precision(found, "precision.png")
     """
     with style():
         lines = _note(found)
@@ -161,6 +174,7 @@ def plot_precision(found: xr.Dataset, path: str | os.PathLike[str] | None = None
         for axes, key, text in zip(panels, ("error_median", "error_worst"), ("median cell", "worst cell"), strict=True):
             draw_precision(axes, found, key)
             axes.set_title(text)
+            letter(axes, "a" if key == "error_median" else "b")
         panels[0].set_ylabel("relative error")
         handles, labels = panels[0].get_legend_handles_labels()
         marks = precision_marks(found)
@@ -192,8 +206,8 @@ def precision_marks(found: xr.Dataset) -> dict[str, Any]:
 
 MOST_NOTES = 8
 """Lines below a chart."""
-FLOOR = 1e-17
-"""Where errors of 0 are drawn."""
+FLOOR, CEILING = 1e-17, 3.0
+"""Where errors of 0, and errors beyond all sense, are drawn."""
 
 
 def draw_precision(axes: Any, found: xr.Dataset, key: str, names: Sequence[str] = ()) -> None:
@@ -206,7 +220,7 @@ def draw_precision(axes: Any, found: xr.Dataset, key: str, names: Sequence[str] 
     order = list(dict.fromkeys([*names, *found["method"].values.tolist()]))
     for i, name in ((order.index(name), name) for name in found["method"].values):
         row = found.sel({"method": name})
-        seconds, error = row.seconds.values, np.maximum(row[key].values, FLOOR)
+        seconds, error = row.seconds.values, np.clip(row[key].values, FLOOR, CEILING)
         whole = (row.failed + row.inaccurate).values == 0
         look = {"color": COLOURS[i % len(COLOURS)], "marker": MARKS[i % len(MARKS)], "markersize": 4}
         axes.plot(seconds, error, linewidth=0.8, linestyle=DASHES[i % len(DASHES)], markevery=whole, label=name, **look)
@@ -283,10 +297,11 @@ def _look(i: int, joined: bool) -> dict[str, Any]:
 
 
 def _mark(axes: Any, x: Any, lines: Any, flagged: Any, mark: str, colour: str) -> None:
-    """Cells of one status: on the line where they have a value, at the foot where they have none."""
+    """Cells of one status: on the line where they have a value that is drawn, at the foot where they have none."""
+    drawn = (lambda y: y > 0) if axes.get_yscale() == "log" else np.isfinite
     open_mark = {"linestyle": "", "marker": mark, "color": colour, "markerfacecolor": "none", "clip_on": False}
     for y, here in zip(lines, flagged, strict=True):
-        valued, empty = here & np.isfinite(y), here & ~np.isfinite(y)
+        valued, empty = here & drawn(y), here & ~drawn(y)
         axes.plot(x[valued], y[valued], **open_mark)
         axes.plot(x[empty], np.zeros(empty.sum()), transform=axes.get_xaxis_transform(), **open_mark)
 
@@ -297,28 +312,34 @@ def _draw_map(axes: Any, shown: View) -> None:
     corners = []
     for scale, grid in ((axes.set_xscale, shown.values(shown.x)), (axes.set_yscale, shown.values(across))):
         scale("log" if is_logarithmic(grid) else "linear")
-        corners.append(_edges(grid.astype(np.float64), is_logarithmic(grid)))
+        corners.append(edges(grid.astype(np.float64)))
     norm = LogNorm() if spans_decades(shown.y) else Normalize()
     mesh = axes.pcolormesh(*corners, np.ma.masked_invalid(shown.y.values), norm=norm, cmap="viridis", rasterized=True)
     axes.figure.colorbar(mesh, ax=axes, label=label(shown.y))
     marks = zip(shown.codes(), itertools.cycle(HATCHES), itertools.cycle(FLAGGED), strict=False)
-    keys = [_cover(axes, corners, shown, code, hatch, colour) for code, hatch, colour in marks]
+    drawn = [_cover(axes, corners, shown, code, hatch, colour) for code, hatch, colour in marks]
+    keys = [key for key in drawn if key is not None]
     if keys:
         axes.figure.legend(handles=keys, loc="outside lower center", ncols=3)
 
 
 def _cover(axes: Any, corners: list[Any], shown: View, code: int, hatch: str, colour: str) -> Any:
-    """Cells of one status: hatched where they have no value, outlined where they have one; named if there is room."""
+    """Cells of one status: hatched where they have no value, outlined where they have one.
+
+    Returns what explains it in the legend; None where the region has room for its name.
+    """
     here, name = shown.status == code, shown.meanings.get(code, str(code))
     empty = here & ~np.isfinite(shown.y.values)
-    _name(axes, corners, here, name)
     if (here & ~empty).any():
-        axes.contour(shown.values(shown.x), shown.values(str(shown.across)), here, levels=[0.5], colors=[colour])
-    if not empty.any():
-        return Line2D([], [], color=colour, label=name)
+        centres = (shown.values(shown.x), shown.values(str(shown.across)))
+        around = (np.concatenate([ends[:1], c, ends[-1:]]) for c, ends in zip(centres, corners, strict=True))
+        axes.contour(*around, np.pad(here, 1), levels=[0.5], colors=[colour])
     look: dict[str, Any] = {"facecolor": "0.94", "edgecolor": "0.45", "linewidth": 0.0, "hatch": hatch}
-    axes.add_collection(PolyCollection(list(_runs(corners, empty)), **look))
-    return Patch(label=name, **look)
+    if empty.any():
+        axes.add_collection(PolyCollection(list(_runs(corners, empty)), **look))
+    if _name(axes, corners, here, name):
+        return None
+    return Patch(label=name, **look) if empty.any() else Line2D([], [], color=colour, label=name)
 
 
 def _runs(corners: list[Any], here: Any) -> Iterator[Any]:
@@ -330,8 +351,8 @@ def _runs(corners: list[Any], here: Any) -> Iterator[Any]:
             yield [(left, y[row]), (right, y[row]), (right, y[row + 1]), (left, y[row + 1])]
 
 
-def _name(axes: Any, corners: list[Any], here: Any, name: str) -> None:
-    """The name of a region where it is widest, if it has room there."""
+def _name(axes: Any, corners: list[Any], here: Any, name: str) -> bool:
+    """Writes the name of a region where it is widest, if it has room there; whether it has."""
     from scipy.ndimage import distance_transform_edt
 
     inside = np.pad(here, 1)
@@ -340,18 +361,11 @@ def _name(axes: Any, corners: list[Any], here: Any, name: str) -> None:
     widest = np.argwhere(depth > 0.999 * depth.max())
     row, column = widest[abs(widest - widest.mean(axis=0)).sum(axis=1).argmin()]
     if depth[row, column] < NAME_SPACE * here.shape[0]:
-        return
+        return False
     at = [
         np.sqrt(c[i] * c[i + 1]) if c[0] > 0 else (c[i] + c[i + 1]) / 2
         for c, i in zip(corners, (column, row), strict=True)
     ]
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}
-    axes.text(*at, name.replace("_", " "), ha="center", va="center", fontsize=7, bbox=box, zorder=5)
-
-
-def _edges(grid: Any, logarithmic: bool) -> Any:
-    """Edges of the cells around the points of a grid."""
-    at = np.log(grid) if logarithmic else grid
-    middle = (at[1:] + at[:-1]) / 2
-    edges = np.concatenate([[2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]])
-    return np.exp(edges) if logarithmic else edges
+    axes.text(*at, name, ha="center", va="center", fontsize=7, bbox=box, zorder=5)
+    return True

@@ -38,15 +38,21 @@ def kernel_text(name: str, allow_import: bool = False) -> str:
 
 def write_starter(name: str, path: Path, allow_import: bool = False) -> None:
     """Write a study of a kernel to begin with. Raises SweepError; a file that is there is left alone."""
-    kernel = load_kernel(name, allow_import)
-    text = f"# {kernel.doc[0].upper()}{kernel.doc.splitlines()[0][1:]}: how does it change with its parameters?\n"
+    text = starter(name, allow_import)
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(f"{text}{_example(name, kernel)}\n")
+            file.write(text)
     except FileExistsError:
         raise SweepError(f"{path} is there already; name another file") from None
     except OSError as error:
         raise SweepError(f"{path} cannot be written: {error.strerror}") from None
+
+
+def starter(name: str, allow_import: bool = False) -> str:
+    """A study of a kernel to begin with, in TOML. Raises SweepError."""
+    kernel = load_kernel(name, allow_import)
+    question = f"{kernel.doc[0].upper()}{kernel.doc.splitlines()[0][1:]}: how does it change with its parameters?"
+    return f"# {question}\n{_example(name, kernel)}\n"
 
 
 def _short(name: str) -> str:

@@ -27,10 +27,11 @@ WORST_MISFIT = 0.1
 """Relative distance of a point beyond which a report does not speak of two laws."""
 
 EXPLANATION = (
-    "The interval is of {confidence:g} % confidence where the values scatter; where they do not, it is the range of "
-    "the local exponent in the window (of two laws: also of where that tends). With scatter, two laws are taken to "
-    "meet in a bend of the fitted shape. Drift is how far the exponent changes across the window; residual is the "
-    "largest relative distance of a point from the curve."
+    "The interval is of {confidence:g} % confidence where the values scatter, and never less than for scatter that "
+    "remembers the point before; where they do not, it is what the stated errors can do. Where p runs from one value "
+    "to another, one power law does not fit, and these are the ends of the local exponent in the window. A second law "
+    "is told where AICc and BIC prefer it by more than 10; --compare tries other laws. Drift is how far the exponent "
+    "changes across the window; residual is the largest relative distance of a point from the curve."
 )
 
 
@@ -82,23 +83,30 @@ def laws(
     x: str,
     windows: Sequence[Sequence[float]] = (),
     confidence: float = 0.95,
-    noise: bool | None = None,
+    noise: bool | str | None = None,
 ) -> Laws:
     """What `sweep fit` finds; `noise` as of `fit_exponent`. Raises SweepError."""
-    from sweep.analysis.exponents import crossover, fit_exponent
+    from sweep.analysis.curves import stated_error
+    from sweep.analysis.lines import crossover, fit_exponent
 
-    outputs = [str(name) for name in dataset.data_vars if name not in ANCILLARY]
-    if y not in outputs:
-        hint = did_you_mean(y, outputs) or f"; there are {listed(outputs, word='and')}"
-        raise SweepError(f"--y {y}: no such output{hint}")
+    check_output(dataset, y)
     if len(windows) > 2:
         raise SweepError(f"--window: expected one or two, found {len(windows)}")
     limits: list[tuple[float, float] | None] = [*sorted((low, high) for low, high in windows)] or [None]
-    fits = tuple(fit_exponent(dataset[y], x, window, confidence=confidence, noise=noise) for window in limits)
+    keys: dict[str, Any] = {"confidence": confidence, "noise": noise, "bound": stated_error(dataset, y)}
+    fits = tuple(fit_exponent(dataset[y], x, window, **keys) for window in limits)
     remark = _remark(dataset, y)
     if len(fits) == 2:
         return Laws(y, x, fits, None, crossover(fits[0], fits[1]), confidence, remark)
     return Laws(y, x, fits, _bend(dataset[y], x, limits[0], confidence, noise), None, confidence, remark)
+
+
+def check_output(dataset: xr.Dataset, y: str) -> None:
+    """Raises SweepError where there is no such output."""
+    outputs = [str(name) for name in dataset.data_vars if name not in ANCILLARY]
+    if y not in outputs:
+        hint = did_you_mean(y, outputs) or f"; there are {listed(outputs, word='and')}"
+        raise SweepError(f"--y {y}: no such output{hint}")
 
 
 def _remark(dataset: xr.Dataset, y: str) -> str:
@@ -117,7 +125,7 @@ def _remark(dataset: xr.Dataset, y: str) -> str:
 
 
 def _bend(
-    y: xr.DataArray, x: str, window: tuple[float, float] | None, confidence: float, noise: bool | None
+    y: xr.DataArray, x: str, window: tuple[float, float] | None, confidence: float, noise: bool | str | None
 ) -> xr.Dataset | None:
     """Two laws, where any line has points enough for them and is not straight."""
     from sweep.analysis.two_laws import FEWEST_POINTS, fit_two_laws
@@ -125,7 +133,8 @@ def _bend(
     if y.sizes[str(y[x].dims[0])] < FEWEST_POINTS:
         return None
     try:
-        found = fit_two_laws(y, x, window, confidence=confidence, noise=noise)
+        told = True if isinstance(noise, str) else noise
+        found = fit_two_laws(y, x, window, confidence=confidence, noise=told)
     except SweepError:  # the window leaves too few points
         return None
     return found if bool((found.regimes == 2).any()) else None
@@ -245,7 +254,7 @@ def _fit_cells(fit: xr.Dataset) -> tuple[str, ...]:
     return (
         f"{v['low']:.4g} to {v['high']:.4g}",
         f"{v['exponent']:.8g}",
-        _interval(v["exponent_low"], v["exponent_high"]),
+        ("" if v["fits"] == 1 else "runs from ") + _interval(v["exponent_low"], v["exponent_high"]),
         f"{v['points']}",
         f"{v['drift']:.1e}",
         f"{v['residual']:.1e}",
@@ -264,14 +273,14 @@ def _interval(low: float, high: float) -> str:
 
 
 def _bend_cells(bend: xr.Dataset) -> tuple[str, ...]:
+    if bend.regimes.item() != 2:
+        return *("-",) * 6, "one law does as well"
     cells = []
     for law in ("low", "high"):
         one = bend.sel(law=law)
         cells += [f"{one.exponent.item():.6g}", _interval(one.exponent_low.item(), one.exponent_high.item())]
     place = _interval(bend.crossover_low.item(), bend.crossover_high.item())
     width = f"{bend.width.item():.2g} decades wide, residual {bend.residual.item():.1e}"
-    if bend.regimes.item() == 1:
-        width += "; one law does as well"
     return *cells, f"{bend.crossover.item():.6g}", place, width
 
 

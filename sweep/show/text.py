@@ -12,7 +12,16 @@ import numpy as np
 from kernels.interface import Status
 from sweep.cells.reduce import BY_METHOD, BY_STATUS
 from sweep.cells.schema import ANCILLARY, METHOD_USED, STATUS
-from sweep.results.statuses import account, count_methods, count_statuses, flag_words, is_summary
+from sweep.results.statuses import (
+    account,
+    cell_values,
+    count_methods,
+    count_statuses,
+    failed_cells,
+    flag_words,
+    is_summary,
+)
+from sweep.show.follow import reasons
 from sweep.study.model import short
 from sweep.system.table import columns, page, section
 
@@ -23,6 +32,9 @@ LARGEST_SCAN = 1 << 28
 """Bytes of an output up to which its smallest and largest value are looked up."""
 
 CELLS_AT_ONCE = 1 << 22
+FAILED = Status.FAILED.name
+MOST_FAILED = 20
+"""Cells that FAILED which are told one by one."""
 
 
 Rows = list[tuple[str, ...]]
@@ -30,10 +42,24 @@ Rows = list[tuple[str, ...]]
 
 def result_text(path: Path, dataset: xr.Dataset) -> str:
     """All about a result."""
-    parts = sections(dataset).items()
+    found = {**sections(dataset), f"{FAILED}, and why": list(_failed(Path(path), dataset))}
+    parts = [(title, rows) for title, rows in found.items() if rows]
     return page(
-        "\n".join(head(path, dataset)), *(section(title, rows) if title else columns(rows) for title, rows in parts)
+        "\n".join(head(path, dataset)),
+        *(section(title, rows) if title else columns(rows) for title, rows in parts),
     )
+
+
+def _failed(path: Path, dataset: xr.Dataset) -> Iterator[tuple[str, ...]]:
+    """The first cells that FAILED, and what their kernel did, as the log of the run has it."""
+    if is_summary(dataset):
+        for number, reason in list(reasons(path).items())[:MOST_FAILED]:
+            yield f"cell {number}", reason
+        return
+    known = reasons(path)
+    for number in failed_cells(dataset, MOST_FAILED):
+        values = " ".join(f"{name}={value}" for name, value in cell_values(dataset, number).items())
+        yield f"cell {number}", values, known.get(number, "")
 
 
 def sections(dataset: xr.Dataset) -> dict[str, Rows]:
@@ -60,12 +86,12 @@ def _of_cells(dataset: xr.Dataset) -> dict[str, Rows]:
 def _of_summary(dataset: xr.Dataset) -> dict[str, Rows]:
     over = str(dataset.attrs["over"]).split()
     reduced = {name for name in over for dim in dataset[name].dims if dim in dataset.dims}
-    kept = [str(d) for d in dataset[BY_STATUS].dims[:-1]]
+    kept = {str(d) for d in dataset[BY_STATUS].dims[:-1]}
     along = [n for n in _along_of(dataset, {*kept, *reduced, "cell"}) if n not in ("status_name", "method_name")]
     bins = {str(d) for name, c in dataset.coords.items() if str(name).endswith("_bin_lower") for d in c.dims}
     given = [c for c in dataset.coords.values() if not c.dims or set(map(str, c.dims)) & set(along) - {str(c.name)}]
     return {
-        "axes": [_coordinate(dataset[name]) for name in kept],
+        "axes": [_coordinate(c) for c in dataset.coords.values() if kept & set(map(str, c.dims))],
         "reduced over": [_coordinate(dataset[name]) for name in over],
         "fixed": [_fixed(c) for c in given],
         "along": [_coordinate(dataset[name]) for name in along],
@@ -108,7 +134,7 @@ def head(path: Path, dataset: xr.Dataset) -> list[str]:
 
 def _settings(dataset: xr.Dataset) -> Iterator[tuple[str, ...]]:
     attrs = dataset.attrs
-    for name in ("kernel", "design", "method", "rtol"):
+    for name in ("kernel", "design", "where", "method", "rtol"):
         if name in attrs:
             yield name, f"{attrs[name]:g}" if name == "rtol" else str(attrs[name])
     if "start" in attrs:

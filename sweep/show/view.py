@@ -12,6 +12,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from sweep.analysis.loglog import is_logarithmic
+from sweep.analysis.scattered import Box, axes_of, interpolated
 from sweep.results.statuses import flag_words
 from sweep.study.mistakes import did_you_mean
 from sweep.system.errors import SweepError
@@ -28,6 +30,12 @@ FAMILY = 8
 
 POINTS, PIXELS = 20_000, 2_000
 """Points along a line and cells along the side of a map that are drawn; beyond, every second, third ... one."""
+
+HARD_SPACE = "\u00a0"
+"""Where no line is broken."""
+
+SIDE = 201
+"""Cells along the sides of a map of cells that lie anywhere."""
 
 ANCILLARY = ("status", "method_used", "error_bound")
 
@@ -77,6 +85,8 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
         If there is no such output or axis.
     """
     name = _output(dataset, y)
+    if x is None:
+        dataset = _mapped(dataset)
     x = _x(dataset[name], x, dataset["status"].dims if "status" in dataset else ())
     along = str(coordinate(dataset[name], x).dims[0])
     others = sorted((str(d) for d in dataset[name].dims if d != along), key=lambda d: -dataset.sizes[d])
@@ -96,6 +106,17 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
         x, along, across,
         ", ".join(setting(coordinate(dataset[name], dim)[index]) for dim, index in held.items()),
     )  # fmt: skip
+
+
+def _mapped(dataset: xr.Dataset) -> xr.Dataset:
+    """Cells of a refined result, which lie anywhere, as an even grid of two axes; the others at their middle."""
+    names = axes_of(dataset)
+    if not names:
+        return dataset
+    box = Box.of({name: dataset[name].values for name in names})
+    even = np.linspace(0.0, 1.0, SIDE)
+    at = {name: box.values(k, even if k < 2 else even[SIDE // 2 : SIDE // 2 + 1]) for k, name in enumerate(names)}
+    return interpolated(dataset, at)
 
 
 def _output(dataset: xr.Dataset, y: str | None) -> str:
@@ -140,6 +161,14 @@ def is_number_axis(y: xr.DataArray, name: str) -> bool:
     return coordinate(y, name).dtype.kind in "fiu"
 
 
+def edges(grid: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Edges of the cells around the points of a grid, (n + 1,): halfway; of a logarithmic grid in logarithms."""
+    at = np.log(grid) if is_logarithmic(grid) else grid
+    middle = (at[1:] + at[:-1]) / 2 if at.size > 1 else at + 0.5
+    around = np.concatenate([[2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]])
+    return np.exp(around) if is_logarithmic(grid) else around
+
+
 def symbol(name: str) -> str:
     """Mathematical form of a parameter's name, "" if it is a word: mu, phi0 and R_s, but not period."""
     letter, _, index = name.partition("_")
@@ -158,18 +187,19 @@ def unit_text(unit: str) -> str:
 
 
 def label(variable: xr.DataArray, width: int = 44) -> str:
-    """Text for an axis: long name, symbol, unit; in lines of so many letters."""
+    """Text for an axis: long name, symbol, unit; in lines of so many letters, none of which begins with the unit."""
     name = str(variable.name)
     sign, unit = symbol(name), unit_text(str(variable.attrs.get("units", "")))
     words = str(variable.attrs.get("long_name", "")) or ("" if sign else name.replace("_", " "))
-    text = ", ".join(part for part in (words, sign) if part) + (f" [{unit}]" if unit else "")
+    text = ", ".join(part for part in (words, sign) if part)
+    text = f"{text}{HARD_SPACE}[{unit.replace(' ', HARD_SPACE)}]" if unit else text
     signs = re.findall(r"\$.*?\$", text)
     for sign in signs:  # a few letters in print, whatever they are in writing
         text = text.replace(sign, "\0\0", 1)
     wrapped = "\n".join(textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False))
     for sign in signs:
         wrapped = wrapped.replace("\0\0", sign, 1)
-    return wrapped
+    return wrapped.replace(HARD_SPACE, " ")
 
 
 def setting(value: xr.DataArray) -> str:

@@ -7,5 +7,28 @@ Others may use
     `mistakes`       how found, allowed and meant words are told
     `units`          scale, exponents
 
-`study_parser` (the keys), `field_parser` (their entries), `summary` and `spacing` are behind `read`.
+    `toml`           to_toml: a study as the text of its file
+    `condition`      Condition: read by Python's grammar, never run by it
+    `samples`        what a sampled design is called, and its axes for SALib
+
+`study_parser` (the keys), `field_parser` (their entries), `designs`, `summary` and `spacing` are behind `read`.
+The room itself may be called: `sweep.study(...)` is `sweep.study.read.study`.
 """
+
+from __future__ import annotations
+
+import sys
+from types import ModuleType
+from typing import Any
+
+
+class _Room(ModuleType):
+    """A package and a function by one name."""
+
+    def __call__(self, *given: Any, **keys: Any) -> Any:
+        from sweep.study.read import study
+
+        return study(*given, **keys)
+
+
+sys.modules[__name__].__class__ = _Room

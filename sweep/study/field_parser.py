@@ -26,6 +26,8 @@ FORMS = ("spacing", "values", "file")
 """An axis is given in one of these forms."""
 
 EXAMPLE = '{ spacing = "log", start = 0.1, stop = 10, num = 21 }'
+SAMPLED_KEYS = ("spacing", "start", "stop")
+SAMPLED_EXAMPLE = '{ spacing = "log", start = 0.1, stop = 10 }'
 MOST_BAD_VALUES = 3
 """Bad values reported of one list."""
 
@@ -80,12 +82,12 @@ class FieldParser:
             return float(axes.scaled(np.array([self.mistakes.number(found, at)]), factor)[0])
         return frozen(axes.scaled(self._list(found, field, at), factor))
 
-    def axis(self, name: str, entry: Any, field: Field | None, where: str) -> Axis:
+    def axis(self, name: str, given: Any, field: Field | None, where: str) -> Axis:
         """An axis or coordinate: a list of values, or a table with `spacing`, `values` or `file`.
 
         Of an array parameter a list of lists, or a csv file with a column for each value: J_1, J_2, ...
         """
-        table = entry if isinstance(entry, Mapping) else {"values": entry}
+        table = given if isinstance(given, Mapping) else {"values": given}
         form = self._form(table, where)
         factor = self._factor(table, field, where)
         values, kind = NONE, form
@@ -96,12 +98,13 @@ class FieldParser:
         elif form == "values":
             read = self._rows if field and field.dims else self._list
             values = axes.scaled(
-                read(table["values"], field, where if table is not entry else f"{where}.values"), factor
+                read(table["values"], field, where if table is not given else f"{where}.values"), factor
             )
         elif form == "file":
             from_file = self._row_file if field and field.dims else self._file
             values = axes.scaled(from_file(table["file"], name, field, f"{where}.file"), factor)
-        return Axis(name, frozen(values), kind, _words(values, field))
+        entry = _entry(table) if form == "spacing" and len(values) else None
+        return Axis(name, frozen(values), kind, _words(values, field), entry)
 
     def _form(self, table: Mapping[str, Any], where: str) -> str:
         """Which of the `FORMS` it is; "" where it is none or several."""
@@ -137,32 +140,61 @@ class FieldParser:
 
     def _spaced(self, table: Mapping[str, Any], field: Field | None, where: str, factor: Decimal | None) -> Floats:
         before = len(self.mistakes)
-        if field and field.choices:
-            self.mistakes.add(where, f"{field.name} takes words; write e.g. values = [{quoted(field.choices)}]")
-            return NONE
-        spacing = self.mistakes.word(table["spacing"], f"{where}.spacing", SPACINGS)
-        for key in SPACING_KEYS:
-            if key not in table:
-                self.mistakes.add(f"{where}.{key}", f"missing; write e.g. {EXAMPLE}")
-        start, stop = (
-            self.mistakes.finite(table.get(key, bound), f"{where}.{key}") for key, bound in (("start", 1), ("stop", 2))
-        )
+        spacing = self._spacing(table, field, where)
+        start, stop = self._bounds(table, spacing, where)
         num = self.mistakes.count(table.get("num", 2), f"{where}.num", axes.LARGEST_AXIS)
-        for key, value in (("start", start), ("stop", stop)):
-            if spacing == "log" and value <= 0:
-                self.mistakes.add(f"{where}.{key}", f"a log axis needs {key} > 0, found {value:g}")
+        if "num" not in table:
+            self.mistakes.add(f"{where}.num", f"missing; write e.g. {EXAMPLE}")
         if start == stop and len(self.mistakes) == before:
             self.mistakes.add(f"{where}.stop", f"equals start; for a single value write values = [{start:g}]")
         if spacing is None or num is None or len(self.mistakes) > before:
             return NONE
-        values = SPACINGS[spacing](start, stop, num, factor)
-        ends = np.abs(values[[0, -1]])
-        if not (ends < math.inf).all() or (spacing == "log" and not ends.all()):
-            self.mistakes.add(
-                where, f"{start:g} to {stop:g} leaves the range of float64 once converted to the kernel's unit"
-            )
-            return NONE
-        return values
+        return self._in_range(SPACINGS[spacing](start, stop, num, factor), spacing, start, stop, where)
+
+    def _spacing(self, table: Mapping[str, Any], field: Field | None, where: str) -> str | None:
+        if field and field.choices:
+            self.mistakes.add(where, f"{field.name} takes words; write e.g. values = [{quoted(field.choices)}]")
+            return None
+        return self.mistakes.word(table["spacing"], f"{where}.spacing", SPACINGS)
+
+    def _bounds(self, table: Mapping[str, Any], spacing: str | None, where: str) -> tuple[float, float]:
+        """From where to where an axis runs; mistakes where one is missing or no axis of that spacing has it."""
+        found = []
+        for key, bound in (("start", 1), ("stop", 2)):
+            if key not in table:
+                self.mistakes.add(f"{where}.{key}", f"missing; write e.g. {EXAMPLE}")
+            value = self.mistakes.finite(table.get(key, bound), f"{where}.{key}")
+            if spacing == "log" and value <= 0:
+                self.mistakes.add(f"{where}.{key}", f"a log axis needs {key} > 0, found {value:g}")
+            found.append(value)
+        return found[0], found[1]
+
+    def _in_range(self, values: Floats, spacing: str, start: float, stop: float, where: str) -> Floats:
+        ends = np.abs([values.min(), values.max()])
+        if (ends < math.inf).all() and (spacing != "log" or ends.all()):
+            return values
+        self.mistakes.add(
+            where, f"{start:g} to {stop:g} leaves the range of float64 once converted to the kernel's unit"
+        )
+        return NONE
+
+    def sampled(self, name: str, entry: Any, field: Field | None, where: str, shares: Floats) -> Axis:
+        """An axis of a sampled design: a table with spacing, start and stop; values lie at `shares` of the way."""
+        before = len(self.mistakes)
+        table = self.mistakes.table(entry, where, SAMPLED_EXAMPLE)
+        factor, spacing, bounds = None, None, (math.nan, math.nan)
+        self.mistakes.keys(table, (*SAMPLED_KEYS, "unit"), where)
+        if field and (field.dims or field.integer):
+            kind = "an array" if field.dims else "a whole number"
+            self.mistakes.add(where, f"{name} is {kind}, which is not sampled; sweep it in a block of its own")
+        if len(self.mistakes) == before:
+            factor = self._factor(table, field, where)
+            spacing = self._spacing({"spacing": "", **table}, field, where)
+            bounds = self._bounds(table, spacing, where)
+        if len(self.mistakes) > before or spacing is None:
+            return Axis(name, NONE, "values")
+        values = self._in_range(axes.spread(spacing, *bounds, shares, factor), spacing, *bounds, where)
+        return Axis(name, frozen(values), spacing, entry=_entry(table) if len(values) else None)
 
     def _list(self, found: Any, field: Field | None, where: str) -> Floats:
         if hasattr(found, "__array__"):
@@ -263,6 +295,12 @@ class FieldParser:
         if bad > MOST_BAD_VALUES:
             self.mistakes.add(where, f"and {bad - MOST_BAD_VALUES} more like these")
         return NONE if bad else values
+
+
+def _entry(table: Mapping[str, Any]) -> dict[str, Any]:
+    """What a study says of an axis that it does not list: words as they are, numbers as float64."""
+    kinds: dict[str, Callable[[Any], Any]] = {"spacing": str, "unit": str, "num": int, "start": float, "stop": float}
+    return {key: kinds[key](value) for key, value in table.items() if key in kinds}
 
 
 def _number(found: Any, field: Field | None) -> float:

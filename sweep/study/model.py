@@ -5,8 +5,8 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,10 @@ LONGEST_LIST = 1000
 
 AUTO = -1
 """Number of the word "auto" on a method axis."""
+SHOWN: dict[str, Callable[[Any], str]] = {}
+"""How a notebook shows a study, as "html"; put here by a room above this one, which knows what a run takes."""
+SETTINGS = ("method", "rtol")
+"""What may be an axis although it is no parameter of the kernel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +42,15 @@ class Axis:
         "linear", "log", "values" or "file".
     words : tuple of str, optional
         What the study calls the values of a method axis or of a parameter with choices.
+    entry : mapping, optional
+        How the study says it where it does not list the values: start, stop, num, unit.
     """
 
     name: str
     values: NDArray[np.float64]
     spacing: str
     words: tuple[str, ...] | None = None
+    entry: Mapping[str, Any] | None = None
 
     def __len__(self) -> int:
         return len(self.values)
@@ -51,6 +58,24 @@ class Axis:
     def label(self, index: int) -> str:
         """Value number `index`, as people write it."""
         return self.words[index] if self.words else short(self.values[index])
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Axes that are swept by one design.
+
+    Attributes
+    ----------
+    design : str
+        "product": each axis has a dimension of its own; else they run along one, value by value.
+    axes : tuple of str
+    options : mapping
+        Of a sampled design: n, seed, scramble.
+    """
+
+    design: str
+    axes: tuple[str, ...]
+    options: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +111,8 @@ class Study:
         Used where they are not an axis.
     outputs : tuple of str
         In the kernel's order.
+    design : str
+        "product", "zip", the name of a sampled design, or "blocks".
     axes : dict of str to Axis
         In the study's order, which is the order of the dataset's dimensions.
     fixed : dict of str to float, or to read-only float64 ndarray of an array parameter
@@ -98,6 +125,10 @@ class Study:
         The study file, or "" of a study built in Python.
     summary : Summary, optional
         None: every cell is kept.
+    blocks : tuple of Block
+        The grid is their product; empty of a product or zip of all axes.
+    where : str
+        Condition on the parameters; cells for which it does not hold are NOT_ASKED. "": all are asked.
     """
 
     title: str
@@ -114,6 +145,8 @@ class Study:
     along: dict[str, NDArray[np.float64]]
     text: str = ""
     summary: Summary | None = None
+    blocks: tuple[Block, ...] = ()
+    where: str = ""
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Study) and self.to_json() == other.to_json()
@@ -124,6 +157,32 @@ class Study:
     def __repr__(self) -> str:
         axes = ", ".join(f"{name} ({len(axis)})" for name, axis in self.axes.items())
         return f"<Study {self.title!r}: {self.kernel_name} over {axes}>"
+
+    @property
+    def dims(self) -> dict[str, tuple[str, ...]]:
+        """Dimensions of the grid, slowest first, and the axes along each; those that a summary reduces come last."""
+        blocks = self.blocks or (Block(self.design, tuple(self.axes)),)
+        together = "cell" if len(blocks) == 1 else "point"
+        found: dict[str, tuple[str, ...]] = {}
+        for block in blocks:
+            if block.design == "product":
+                found |= {name: (name,) for name in block.axes}
+            else:
+                before = sum(name.startswith(together) for name in found)
+                found[f"{together}_{before + 1}" if before else together] = block.axes
+        over = () if self.summary is None else self.summary.over
+        return dict(sorted(found.items(), key=lambda item: item[1][0] in over))
+
+    @property
+    def grid_shape(self) -> dict[str, int]:
+        """Length of every dimension of the grid."""
+        return {dim: len(self.axes[names[0]]) for dim, names in self.dims.items()}
+
+    def run(self, name: str) -> int:
+        """Cells in a row that share one value of an axis."""
+        dims = list(self.dims)
+        place = next(place for place, names in enumerate(self.dims.values()) if name in names)
+        return math.prod(self.grid_shape[dim] for dim in dims[place + 1 :])
 
     @property
     def asked(self) -> tuple[Field, ...]:
@@ -160,14 +219,18 @@ class Study:
         source = self.follows.get(name, name)
         return self.axes[source].values if source in self.axes else np.asarray(self.fixed[name])
 
+    def _repr_html_(self) -> str | None:
+        """What a notebook shows."""
+        return SHOWN["html"](self) if SHOWN else None
+
     def to_json(self) -> str:
         """The study on one line of JSON: floats exactly, also NaN and infinities; the kernel as it declares itself."""
         keys = {name: getattr(self, name) for name in PLAIN}
-        axes = [
-            {"name": a.name, "values": a.values, "spacing": a.spacing, "words": a.words} for a in self.axes.values()
-        ]
-        keys |= {"format": FORMAT, "axes": axes, "kernel": _declaration(self.kernel)}
+        keys |= {"format": FORMAT, "axes": [_axis(axis) for axis in self.axes.values()]}
+        keys |= {"kernel": _declaration(self.kernel)}
         keys |= {} if self.summary is None else {"summary": vars(self.summary)}
+        keys |= {"blocks": [vars(block) for block in self.blocks]} if self.blocks else {}
+        keys |= {"where": self.where} if self.where else {}
         return json.dumps(_plain(keys), allow_nan=False, ensure_ascii=False)
 
     @classmethod
@@ -192,13 +255,16 @@ class Study:
             if keys["format"] != FORMAT:
                 raise SweepError(f"study of format {keys['format']}; this version of foliot reads format {FORMAT}")
             axes = {
-                a["name"]: Axis(a["name"], frozen(a["values"]), a["spacing"], _words(a["words"])) for a in keys["axes"]
+                a["name"]: Axis(a["name"], frozen(a["values"]), a["spacing"], _words(a["words"]), a.get("entry"))
+                for a in keys["axes"]
             }
             along = {name: frozen(values) for name, values in keys["along"].items()}
             known = {name: keys[name] for name in PLAIN} | {"axes": axes, "along": along}
             known["outputs"] = tuple(known["outputs"])
             known["fixed"] = {name: _value(value) for name, value in keys["fixed"].items()}
             known["summary"] = _summary(keys["summary"]) if "summary" in keys else None
+            known["blocks"] = tuple(Block(b["design"], tuple(b["axes"]), b["options"]) for b in keys.get("blocks", ()))
+            known["where"] = keys.get("where", "")
             kernel = _kernel_as_declared(keys["kernel"])
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise SweepError(f"not the JSON of a study: {type(error).__name__} {error}") from None
@@ -236,6 +302,11 @@ def frozen(values: Any) -> NDArray[np.float64]:
     array[np.isnan(array)] = math.nan
     array.flags.writeable = False
     return array
+
+
+def _axis(axis: Axis) -> dict[str, Any]:
+    found = {"name": axis.name, "values": axis.values, "spacing": axis.spacing, "words": axis.words}
+    return found if axis.entry is None else found | {"entry": axis.entry}
 
 
 def _value(value: Any) -> float | NDArray[np.float64]:

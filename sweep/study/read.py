@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from sweep.study.mistakes import did_you_mean, show
+from sweep.study.mistakes import did_you_mean, listed, show
 from sweep.study.model import Axis, Study
-from sweep.study.study_parser import StudyParser
+from sweep.study.study_parser import KEYS, StudyParser
 from sweep.system.errors import Mistake, StudyError, SweepError
 
-__all__ = ["Axis", "Study", "as_study", "build_study", "read_study"]
+__all__ = ["KEYS", "Axis", "Given", "Study", "as_study", "build_study", "read_study", "study"]
 
+KEYWORDS = 'keywords, e.g. kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0}'
 LARGEST_TEXT = 50_000_000
 """Bytes of a study file."""
 
@@ -35,8 +37,21 @@ def read_study(path: str | Path, allow_import: bool = False) -> Study:
         The file cannot be read.
     StudyError
         It is no TOML, or has mistakes; all of them are listed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import sweep
+    >>> lines = ["# How fast?", 'kernel = "foliot"', "axes.mu = [0.1, 1.0]", "fixed = { phi0 = 1.0, a = 1.0 }"]
+    >>> _ = Path("how_fast.toml").write_text("\\n".join(lines))
+    >>> sweep.read_study("how_fast.toml").question
+    'How fast?'
     """
     path = Path(path)
+    if path.suffix in (".h5", ".nc"):
+        raise SweepError(f"{path} is a result, not a study; look at it with: sweep show {path}")
+    if path.suffix == ".py":
+        raise SweepError(f"{path} is a study in Python; run it with: python {path}")
     text = _read_text(path)
     keys = _parse(text, str(path))
     first = next((line.strip() for line in text.splitlines() if line.strip()), "")
@@ -62,26 +77,59 @@ def build_study(*, allow_import: bool = False, **keys: Any) -> Study:
 
     Examples
     --------
-    >>> study = build_study(kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> import sweep
+    >>> study = sweep.build_study(kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0})
     >>> study.axes["mu"].values
     array([0.1, 1. ])
     """
     return StudyParser("study", Path(), allow_import).study(keys, "")
 
 
-def as_study(given: Study | Mapping[str, Any]) -> Study:
-    """A study as it is, or made of the keys of `build_study`; a kernel of one's own is not imported for a mapping.
+Given = Study | str | os.PathLike[str] | Mapping[str, Any]
+"""What a study may be given as: itself, its file, or its keys."""
+
+
+def study(given: Given | None = None, /, *, allow_import: bool = False, **keys: Any) -> Study:
+    """The study of a file, of a dict of keys, or of keywords; one that is a study already is given back.
+
+    Parameters
+    ----------
+    given : Study, path or mapping, optional
+        None: keywords say what there is to say.
+    allow_import : bool
+        Allow a kernel named "module:NAME", whose module is imported.
+    **keys
+        As of `build_study`.
 
     Raises
     ------
     SweepError
-        It is neither, or has mistakes.
+        It is nothing of these, or has mistakes; all of them are listed.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> study = sweep.study(kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> study
+    <Study 'foliot over mu': foliot over mu (2)>
     """
+    if given is None and not keys:
+        raise SweepError(f"there is no study: give one, the path of its TOML file, a dict of its keys, or {KEYWORDS}")
+    if given is None:
+        return build_study(allow_import=allow_import, **keys)
+    if keys:
+        raise SweepError(f"{listed(keys, word='and')}: keywords do not go with a study; give one of the two")
     if isinstance(given, Study):
         return given
-    if not isinstance(given, Mapping):
-        raise SweepError(f"expected a study, found {show(given)}; read a file with sweep.read_study")
-    return StudyParser("study", Path(), False).study(given, "")
+    if isinstance(given, Mapping):
+        return StudyParser("study", Path(), allow_import).study(given, "")
+    if not isinstance(given, str | os.PathLike):
+        raise SweepError(f"expected a study, its path, or a dict of its keys, found {show(given)}; or write {KEYWORDS}")
+    return read_study(os.fspath(given), allow_import)
+
+
+as_study = study
+"""The same under a name that no parameter has."""
 
 
 def _read_text(path: Path) -> str:

@@ -47,6 +47,23 @@ def logarithmic(start: float, stop: float, num: int, factor: Decimal | None = No
     return _collect(values(), num)
 
 
+def spread(
+    spacing: str, start: float, stop: float, shares: NDArray[np.float64], factor: Decimal | None = None
+) -> NDArray[np.float64]:
+    """The values at `shares` of the way from `start` to `stop`, "linear" or "log" > 0, times `factor`.
+
+    In decimals like the others, so that a sampled point is the same on every machine.
+    """
+
+    def values() -> Iterator[float]:
+        first, last = _decimal(start) * (factor or 1), _decimal(stop) * (factor or 1)
+        logarithm = (last / first).ln() if spacing == "log" else Decimal(0)
+        for share in map(Decimal, shares.tolist()):
+            yield float(first * (share * logarithm).exp() if spacing == "log" else first + (last - first) * share)
+
+    return _collect(values(), len(shares))
+
+
 def scaled(values: NDArray[np.float64], factor: Decimal | None) -> NDArray[np.float64]:
     """`values` times `factor`, each rounded once."""
     if factor is None:

@@ -12,21 +12,21 @@ from numpy.typing import NDArray
 
 from kernels import catalogue
 from kernels.interface import Field, Kernel
-from sweep.study.field_parser import EXAMPLE, FieldParser
+from sweep.study.condition import CellCondition
+from sweep.study.designs import SMALLEST_RTOL, DesignParser, axes_named
+from sweep.study.field_parser import FieldParser
 from sweep.study.kernel_lookup import load_kernel
 from sweep.study.mistakes import Mistakes, did_you_mean, limits, listed
-from sweep.study.model import AUTO, Axis, Study, Summary, differs, frozen
+from sweep.study.model import AUTO, SETTINGS, Axis, Block, Study, Summary, differs, frozen
 from sweep.study.summary import SummaryParser
 from sweep.system.errors import SweepError
 
-KEYS = ("title", "question", "kernel", "method", "rtol", "outputs", "design", "axes", "fixed", "along", "summary")
-DESIGNS = ("product", "zip")
-SETTINGS = ("method", "rtol")
-"""What may be an axis although it is no parameter of the kernel."""
+KEYS = (
+    "title", "question", "kernel", "method", "rtol", "outputs", "design", "axes", "blocks", "where", "fixed", "along",
+    "summary",
+)  # fmt: skip
 
 DEFAULT_RTOL = 1e-9
-SMALLEST_RTOL = 1e-15
-LARGEST_GRID = 10**12
 UNKNOWN = Kernel("?", "", "", (), (), lambda *columns: None, ())
 """Stands for a kernel that could not be found, so that the rest of a study is checked all the same."""
 
@@ -47,14 +47,14 @@ class StudyParser:
         title, question = (self.mistakes.text(keys.get(key, ""), key) for key in ("title", "question"))
         method, rtol = self._method(keys), self._rtol(keys)
         outputs = self._outputs(keys.get("outputs", self._named(keys.get("summary"))))
-        design = self.mistakes.word(keys.get("design", "product"), "design", DESIGNS) or ""
-        axes = self._axes(keys.get("axes", {}), design)
+        design, axes, blocks = DesignParser(self.fields, self._axis_field).read(keys)
         given = self._fixed(keys.get("fixed", {}), axes)
         along = self._along(keys.get("along", {}), outputs)
         fixed, follows = self._complete(axes, given)
         self._check_methods(method, axes, fixed, outputs)
-        summary = self._summary(keys, axes, design, outputs)
+        summary = self._summary(keys, axes, design, blocks, outputs)
         axes = _kept_first(axes, summary)
+        where = self._where(keys, axes)
         self.mistakes.raise_if_any(self.source)
         return Study(
             title=title or f"{self.kernel.name} over {listed(axes, word='and')}",
@@ -71,15 +71,37 @@ class StudyParser:
             along=along,
             text=text,
             summary=summary,
+            blocks=blocks,
+            where=where,
         )
 
     def _summary(
-        self, keys: Mapping[str, Any], axes: Mapping[str, Axis], design: str, outputs: tuple[str, ...]
+        self,
+        keys: Mapping[str, Any],
+        axes: Mapping[str, Axis],
+        design: str,
+        blocks: Sequence[Block],
+        outputs: tuple[str, ...],
     ) -> Summary | None:
         if "summary" not in keys:
             return None
         asked = [o for o in self.kernel.outputs if o.name in outputs]
-        return SummaryParser(self.fields).read(keys["summary"], axes, design, asked)
+        together = [block.axes for block in blocks or [Block(design, tuple(axes))] if block.design != "product"]
+        return SummaryParser(self.fields).read(keys["summary"], axes, together, asked)
+
+    def _where(self, keys: Mapping[str, Any], axes: Mapping[str, Axis]) -> str:
+        """The condition on the cells, which can be read and compares like with like."""
+        text = self.mistakes.text(keys.get("where", ""), "where").strip()
+        if text and self.kernel is not UNKNOWN:
+            try:
+                CellCondition(text, self.kernel, [name for name in SETTINGS if name in axes])
+            except SweepError as error:
+                self.mistakes.add("where", str(error))
+        return text
+
+    def _axis_field(self, name: str, where: str) -> Field | None:
+        """What may be an axis: a parameter, method or rtol."""
+        return self._setting(name) if name in SETTINGS else self._field(name, where)
 
     def _kernel(self, keys: Mapping[str, Any]) -> Kernel:
         if "kernel" not in keys:
@@ -125,8 +147,7 @@ class StudyParser:
         return rtol
 
     def _only_once(self, name: str, keys: Mapping[str, Any]) -> None:
-        axes = keys.get("axes")
-        if name in keys and isinstance(axes, Mapping) and name in axes:
+        if name in keys and name in axes_named(keys):
             self.mistakes.add(name, f"{name} is an axis as well; keep one of the two")
 
     def _named(self, summary: Any) -> list[str] | None:
@@ -145,47 +166,6 @@ class StudyParser:
         allowed, cure = None if self.kernel is UNKNOWN else names, "; leave it out to get all of them"
         asked = self.mistakes.words(found, "outputs", allowed, "a list of outputs", cure)
         return tuple(name for name in names if name in asked)
-
-    def _axes(self, found: Any, design: str) -> dict[str, Axis]:
-        axes: dict[str, Axis] = {}
-        for name, entry in self.mistakes.table(found, "axes", f"[axes.mu] with {EXAMPLE}").items():
-            where = f"axes.{name}"
-            field = self._setting(name) if name in SETTINGS else self._field(name, where)
-            axes[name] = self.fields.axis(name, entry, field, where)
-        if not found:
-            self.mistakes.add("axes", f"missing; give at least one, e.g. axes.mu = {EXAMPLE}")
-        self._check_axes(axes, design)
-        return axes
-
-    def _check_axes(self, axes: Mapping[str, Axis], design: str) -> None:
-        """What concerns several values or several axes; axes without values have been complained about."""
-        if "rtol" in axes and not all(SMALLEST_RTOL <= value < 1 for value in axes["rtol"].values):
-            self.mistakes.add("axes.rtol", f"expected {SMALLEST_RTOL:g} <= rtol < 1 everywhere")
-        lengths = {name: len(axis) for name, axis in axes.items()}
-        if not all(lengths.values()):
-            return
-        if design == "zip" and len(set(lengths.values())) > 1:
-            found = listed((f"{name} has {n}" for name, n in lengths.items()), word="and")
-            self.mistakes.add("axes", f'design "zip" needs axes of equal length; {found} values')
-        for name, axis in axes.items() if design == "product" else ():
-            if axis.values.ndim > 1:
-                self.mistakes.add(f"axes.{name}", f'{name} is an array; as an axis it needs design = "zip"')
-        if design == "product" and math.prod(lengths.values()) > LARGEST_GRID:
-            product = " x ".join(str(n) for n in lengths.values())
-            self.mistakes.add("axes", f"{product} cells; a study may have at most {LARGEST_GRID:.0e}")
-        for name, axis in axes.items() if design == "product" else ():
-            twice = self._repeated(axis) if axis.values.ndim == 1 else []
-            if len(twice):
-                self.mistakes.add(
-                    f"axes.{name}", f"{axis.label(twice[0])} stands more than once; give every value once"
-                )
-
-    def _repeated(self, axis: Axis) -> list[int]:
-        """Where values first stand that stand again, NaN among them; not the words of a field not known, all NaN."""
-        known = axis.name in (*SETTINGS, *(p.name for p in self.kernel.parameters)) and self.kernel is not UNKNOWN
-        _, first, counts = np.unique(axis.values, return_index=True, return_counts=True)
-        twice: list[int] = first[(counts > 1) & (known | ~np.isnan(axis.values[first]))].tolist()
-        return twice
 
     def _fixed(self, found: Any, axes: Mapping[str, Axis]) -> dict[str, float | NDArray[np.float64]]:
         given = {}

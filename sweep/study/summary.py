@@ -28,6 +28,7 @@ from sweep.study.model import Axis, Summary
 REDUCTIONS = ("min", "max", "mean", "argmin", "argmax", "histogram")
 WITHOUT_EDGES = REDUCTIONS[:-1]
 KEYS = ("over", "outputs", "edges")
+Together = Sequence[Sequence[str]]
 
 
 @dataclass
@@ -41,25 +42,26 @@ class SummaryParser:
         """Where mistakes gather."""
         return self.fields.mistakes
 
-    def read(self, found: Any, axes: Mapping[str, Axis], design: str, asked: Sequence[Field]) -> Summary:
-        """The summary that the table says, of the output fields asked for."""
+    def read(self, found: Any, axes: Mapping[str, Axis], together: Together, asked: Sequence[Field]) -> Summary:
+        """The summary that the table says, of the output fields asked for; `together` are axes that run together."""
         table = self.mistakes.table(found, "summary", 'summary.over = ["mu"]')
         self.mistakes.keys(table, KEYS, "summary")
-        over = self._over(table.get("over"), axes, design)
+        over = self._over(table.get("over"), axes, together)
         outputs = self._outputs(table.get("outputs", {}), [f.name for f in asked])
         edges = self._edges(table.get("edges", {}), outputs, {f.name: f for f in asked})
         self._names(over, outputs, axes)
         return Summary(over, outputs, edges)
 
-    def _over(self, found: Any, axes: Mapping[str, Axis], design: str) -> tuple[str, ...]:
+    def _over(self, found: Any, axes: Mapping[str, Axis], together: Together) -> tuple[str, ...]:
         """Axes that are reduced, in the study's order."""
         if found is None:
             return tuple(axes)
         where = "summary.over"
-        if design == "zip":
-            self.mistakes.add(where, 'axes of a design "zip" are reduced together; leave it out')
-            return tuple(axes)
         names = self.mistakes.words(found, where, axes, 'a list of axes, e.g. ["mu"]; leave it out to reduce all')
+        for block in together:
+            if len({name in names for name in block}) > 1:
+                listing = listed(block, word="and")
+                self.mistakes.add(where, f"{listing} run together and are reduced together; name all of them, or none")
         return tuple(name for name in axes if name in names)
 
     def _outputs(self, found: Any, asked: Sequence[str]) -> dict[str, tuple[str, ...]]:

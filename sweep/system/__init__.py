@@ -5,6 +5,7 @@ Others may use
     `disk`         every call that changes the disk
     `pool`         many jobs through threads or workers; BufferPool, Stopper, CtrlC
     `progress`     how far a sweep has come, in words; when it is to stop
+    `log`          the log of a run beside its output
     `forecast`     which block is next, and how long those to come take
     `overwriting`  what may be overwritten
     `table`        plain text in columns

@@ -7,7 +7,30 @@ from dataclasses import dataclass
 
 
 class SweepError(Exception):
-    """A fault the user can act on; its text is the whole message. The command line prints it and exits with 2."""
+    """A fault the user can act on; its text is the whole message. The command line prints it and exits with 2.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> try:
+    ...     sweep.kernels("folio")
+    ... except sweep.SweepError as error:
+    ...     print(error)
+    no kernel "folio"; did you mean foliot? there are ...
+    """
+
+
+COMPLETE, FAULT, MISTAKE, INCOMPLETE, CELLS_FAILED, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 4, 130, 143
+EXIT_CODES = {
+    COMPLETE: "complete, or what was asked for is done",
+    FAULT: "a fault in foliot",
+    MISTAKE: "a mistake in what was asked, or the machine has no room or no memory for it",
+    INCOMPLETE: "not complete yet (--until, a cluster without workers); the same command continues",
+    CELLS_FAILED: "complete, but some cells FAILED; sweep show names them",
+    INTERRUPTED: "stopped by Ctrl-C; the same command continues",
+    TERMINATED: "stopped by SIGTERM; the same command continues",
+}
+"""What the exit status of `sweep` means."""
 
 
 @dataclass(frozen=True)
@@ -19,7 +42,18 @@ class Mistake:
 
 
 class StudyError(SweepError):
-    """All mistakes of one study at once."""
+    """All mistakes of one study at once.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> try:
+    ...     sweep.study(kernel="foliot", axes={"mu": ["1.0"]}, fixed={"phi0": 1.0, "a": 1.0})
+    ... except sweep.StudyError as error:
+    ...     print(error)
+    study: 1 mistake
+      axes.mu[0]  expected a number, found "1.0"; drop the quotes
+    """
 
     def __init__(self, source: str, mistakes: Sequence[Mistake]) -> None:
         self.source, self.mistakes = source, tuple(mistakes)

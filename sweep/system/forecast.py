@@ -36,6 +36,8 @@ FRAME_SECONDS = 0.1
 """What an output takes besides its numbers."""
 SLOW_DISK = 5e7
 """Bytes a second that any disk writes at a stretch."""
+ENOUGH = 4
+"""So many blocks that are no worker's first tell more than all together."""
 SHORTEST = 1e-9
 """Seconds that a block takes at least."""
 
@@ -59,21 +61,25 @@ class Forecast:
         self._left = np.zeros(self._weights.size, bool)
         self._left[np.fromiter(jobs, np.intp)] = True
         self._start: float | None = None
+        self._first_end = math.inf
 
     def begin(self, job: int) -> None:
         """A core has begun with a block."""
         self._begun[job] = self._clock()
 
-    def end(self, job: int, seconds: float | None = None) -> None:
+    def end(self, job: int, seconds: float | None = None, ago: float = 0.0) -> None:
         """A block is done; it took so long, by default since it was begun.
 
-        Elsewhere, cores are at work only shortly before the first block comes back: until then they load and compile.
+        Elsewhere, it was begun so many seconds `ago`, with those that came together with it. Cores are at work only
+        shortly before the first block comes back: until then they load and compile.
         """
         now = self._clock()
         if seconds is None:
             seconds = now - self._begun[job]
-        elif not self._measured().size:
-            self._start = now - seconds
+        else:
+            self._begun[job] = now - max(ago, seconds)
+            self._start = self._begun[job] if not self._measured().size else self._start
+        self._first_end = min(self._first_end, now)
         self._seconds[job] = max(seconds, SHORTEST)
         self._left[job] = False
 
@@ -96,7 +102,7 @@ class Forecast:
             return 0.0
         running = np.maximum(np.nan_to_num(now - self._begun[left]), 0.0)
         doubt = 1 + DOUBT / math.sqrt(measured.size)
-        to_come = np.maximum(doubt * self._expected(measured)[left] - running, 0.0)
+        to_come = np.maximum(doubt * self._expected(self._settled(measured))[left] - running, 0.0)
         cores = (self._seconds[measured].sum() + running.sum()) / max(now - self._start, SHORTEST)
         return max(float(to_come.sum() / cores), float(to_come.max()))
 
@@ -120,9 +126,14 @@ class Forecast:
         """Numbers of the blocks of which it is known what they took."""
         return np.flatnonzero(~np.isnan(self._seconds))
 
+    def _settled(self, measured: Any) -> Any:
+        """Those of the measured blocks that tell of others: a worker's first one is left out, in which it loads."""
+        later = measured[self._begun[measured] >= self._first_end]
+        return later if later.size >= ENOUGH else measured
+
     def _dear_first(self, jobs: Any) -> Any:
         """Sorted by powers of two of what they will take; as they are where all take about as long."""
-        seconds = self._expected(self._measured())[jobs]
+        seconds = self._expected(self._settled(self._measured()))[jobs]
         if seconds.max() < EVEN * np.median(seconds):
             return jobs
         return jobs[np.argsort(-np.round(np.log2(seconds)), kind="stable")]

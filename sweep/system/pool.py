@@ -17,6 +17,10 @@ from sweep.system.errors import SweepError
 
 TICK = 0.2
 """Seconds after which progress is told even if nothing has finished."""
+GRACE_SECONDS = 1.3
+"""What jobs at work have to end in, when they are told to stop;"""
+KILL_SECONDS = 0.3
+"""and then, when the processes are killed in which they compute."""
 
 T = TypeVar("T")
 J = TypeVar("J")
@@ -30,38 +34,128 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-class Stopper:
-    """Tells the jobs that wait for their turn that they need not start."""
+class Cores:
+    """How many cores compute at once; it may be changed while they do."""
 
-    def __init__(self, slots: int) -> None:
-        self._event = threading.Event()
-        self._slots = threading.Semaphore(slots)
+    def __init__(self, count: int) -> None:
+        self.count = count
+
+    @contextlib.contextmanager
+    def told_by_signals(self) -> Iterator[None]:
+        """As long as this lasts, SIGUSR1 means a core more, SIGUSR2 one less; handlers of others are left alone."""
+        signals = {signal.SIGUSR1: 1, signal.SIGUSR2: -1}
+        here = threading.current_thread() is threading.main_thread()
+        free = (signal.SIG_DFL, signal.SIG_IGN)
+        before = {number: signal.getsignal(number) for number in signals if here and signal.getsignal(number) in free}
+
+        def change(number: int, frame: object) -> None:
+            self.count = max(1, self.count + signals[signal.Signals(number)])
+
+        for number in before:
+            signal.signal(number, change)
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+class Stopper:
+    """Tells the jobs that wait for their turn that they need not start, and gives up those that do not end.
+
+    Parameters
+    ----------
+    cores : Cores or int
+        How many jobs compute at once.
+    kill : callable, optional
+        Ends what jobs compute in processes of their own.
+    """
+
+    def __init__(self, cores: Cores | int, kill: Callable[[], None] = lambda: None) -> None:
+        self._cores = Cores(cores) if isinstance(cores, int) else cores
+        self._kill = kill
+        self._change = threading.Condition()
+        self._jobs = self._inside = 0
+        self._stopped = self._given_up = False
+
+    @contextlib.contextmanager
+    def job(self) -> Iterator[None]:
+        """A job is at work as long as this lasts."""
+        with self._change:
+            self._jobs += 1
+        try:
+            yield
+        finally:
+            with self._change:
+                self._jobs -= 1
+                self._change.notify_all()
 
     def set(self) -> None:
         """No job computes from now on, except those that do already."""
-        self._event.set()
+        with self._change:
+            self._stopped = True
+            self._change.notify_all()
 
     def compute(self, work: Callable[[], None]) -> bool:
         """Does `work` as soon as a core is free; False where it is not wanted any more."""
-        with self._slots:
-            if self._event.is_set():
+        with self._change:
+            # looked at now and then, for the number of cores may have changed
+            while not self._stopped and self._inside >= self._cores.count:
+                self._change.wait(TICK)
+            if self._stopped:
                 return False
+            self._inside += 1
+        try:
             work()
-            return True
+        finally:
+            with self._change:
+                self._inside -= 1
+                wanted = not self._given_up
+                self._change.notify_all()
+        return wanted
+
+    def end(self) -> None:
+        """Lets the jobs at work end; those that compute for longer than `GRACE_SECONDS` are killed, or given up."""
+        self.set()
+        if self._ended(lambda: self._jobs == 0, GRACE_SECONDS):
+            return
+        self._kill()
+        with self._change:
+            self._given_up = not self._change.wait_for(lambda: self._jobs == 0, KILL_SECONDS)
+            # what is not inside a kernel ends by itself
+            self._change.wait_for(lambda: self._jobs <= self._inside)
+        if self._given_up:
+            _endless.set()
+
+    def _ended(self, condition: Callable[[], bool], seconds: float) -> bool:
+        with self._change:
+            return self._change.wait_for(condition, seconds)
+
+
+_endless = threading.Event()
+
+
+def left_behind() -> bool:
+    """Whether a thread was given up whose kernel does not end: Python would wait for it when the program ends."""
+    return _endless.is_set()
 
 
 class BufferPool(Generic[T]):
-    """Things that one thread at a time may use, made once and borrowed again and again."""
+    """Things that one thread at a time may use, made when there are too few, and borrowed again and again."""
 
-    def __init__(self, make: Callable[[], T], count: int) -> None:
+    def __init__(self, make: Callable[[], T], count: int = 0) -> None:
+        self._make = make
         self._free: queue.SimpleQueue[T] = queue.SimpleQueue()
         for _ in range(count):
             self._free.put(make())
 
     @contextlib.contextmanager
     def borrow(self) -> Iterator[T]:
-        """Waits for a free one."""
-        one = self._free.get()
+        """One that is free, or a new one."""
+        try:
+            one = self._free.get_nowait()
+        except queue.Empty:
+            one = self._make()
         try:
             yield one
         finally:
@@ -74,6 +168,7 @@ def each(
     threads: int,
     finished: Callable[[int | None], None],
     stopper: Stopper | None = None,
+    capacity: Callable[[], int] | None = None,
 ) -> None:
     """Calls `work` for every job on a pool of threads.
 
@@ -82,20 +177,27 @@ def each(
     Parameters
     ----------
     finished : called in this thread with each job that is done, and with None now and then
+    capacity : how many jobs are given to the threads at a time, at the moment; default: twice as many as there are
     """
-    with CtrlC() as ctrl_c, ThreadPoolExecutor(threads) as pool:
+    stopper = stopper or Stopper(threads)
+    pool = ThreadPoolExecutor(threads)
 
-        def stop() -> None:
-            if stopper is not None:
-                stopper.set()
-            pool.shutdown(wait=True, cancel_futures=True)
+    def guarded(job: int) -> None:
+        with stopper.job():
+            work(job)
 
-        def settled(job: int | None, future: Future[None] | None) -> None:
-            if future is not None:
-                future.result()
-            finished(job)
+    def stop() -> None:
+        pool.shutdown(wait=False, cancel_futures=True)
+        stopper.end()
 
-        through(jobs, lambda job: pool.submit(work, job), lambda: 2 * threads, settled, stop, ctrl_c)
+    def settled(job: int | None, future: Future[None] | None) -> None:
+        if future is not None:
+            future.result()
+        finished(job)
+
+    with CtrlC() as ctrl_c:
+        through(jobs, lambda job: pool.submit(guarded, job), capacity or (lambda: 2 * threads), settled, stop, ctrl_c)
+        pool.shutdown()
 
 
 def through(

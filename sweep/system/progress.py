@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
+import re
 import sys
 import time
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from datetime import time as day_time
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
+from sweep.system.bar import notebook_bar
 from sweep.system.errors import SweepError
+from sweep.system.log import log
 from sweep.system.table import printable
 
 if TYPE_CHECKING:
@@ -20,6 +24,7 @@ QUIET_SECONDS = 1.0
 LINE_SECONDS = 30.0
 LINE_SHARE = 0.05
 REDRAW_SECONDS = 0.1
+LOG_SECONDS = 60.0
 AGREE = 1.5
 """Speeds so far and to come are both told where one is so many times the other."""
 
@@ -58,9 +63,10 @@ class Progress:
         self.total, self.done, self.computed = total, done, 0
         self._stream, self._name, self._clock = stream, printable(name), clock
         self._forecast, self._ending = forecast, ending
-        self._live = stream is not None and stream.isatty()
+        self._bar = notebook_bar(stream, self._name, total, done)
+        self._live = stream is not None and (stream.isatty() or self._bar is not None)
         self._pause = REDRAW_SECONDS if self._live else LINE_SECONDS
-        self._begun = clock()
+        self._begun = self._logged = clock()
         self._told: float | None = None
         self._told_share = 0.0
         self._width = 0
@@ -96,11 +102,13 @@ class Progress:
 
     def tick(self) -> None:
         """Says something if it is time to."""
+        self._log_line(self.line)
         if self._stream is not None and self.seconds >= QUIET_SECONDS and self._due():
             self._say(self.line())
 
     def gather(self, done: int, total: int) -> None:
         """Tells how many parts are in the output, if it is time to."""
+        self._log_line(lambda: f"all cells computed, output {100 * done // total} % written")
         if (
             self._stream is not None
             and self.seconds >= QUIET_SECONDS
@@ -110,25 +118,52 @@ class Progress:
 
     def note(self, text: str) -> None:
         """Says something out of turn."""
+        log(text)
+        self.tell(text)
+
+    def tell(self, text: str) -> None:
+        """The same, but not in the log."""
         if self._stream is not None:
+            if self._bar is not None:
+                self._bar.note(f"{self._name}: {text}")
+                return
             self._end_line()
             self._write(self._stamp() + f"{self._name}: {text}\n")
 
     def end(self) -> None:
         """Says how it ended, where anything was said before."""
+        text = f"{self._counts()}, {speed(self.rate)}, took {duration(self.seconds)}"
+        log(text, "progress", **self._fields(), seconds=round(self.seconds, 1))
         if self._told is not None:
-            self._say(f"{self._counts()}, {speed(self.rate)}, took {duration(self.seconds)}")
+            self._say(text)
         self._end_line()
 
     def stop(self) -> None:
-        """Leaves the terminal's line as it is and begins a new one."""
+        """Leaves the terminal's line, or the bar, as it is and begins a new one."""
         self._end_line()
+        if self._bar is not None:
+            self._bar.close()
 
     def line(self) -> str:
         """What is told now: `12,300/1,000,000 cells (1.2 %), 5,100 cells/s, 3 min left`."""
         left = self.left
         tail = "" if left is None else f", {self._speed(left)}, {duration(left)} left"
         return self._counts() + tail
+
+    def _fields(self) -> dict[str, Any]:
+        left = self.left
+        return {
+            "cells": self.done,
+            "of": self.total,
+            "cells_per_second": round(self.rate, 3),
+            "seconds_left": None if left is None else round(left, 1),
+        }
+
+    def _log_line(self, line: Callable[[], str]) -> None:
+        """Logs how far it is, once a minute."""
+        if self._clock() - self._logged >= LOG_SECONDS:
+            self._logged = self._clock()
+            log(line(), "progress", **self._fields())
 
     def _speed(self, left: float) -> str:
         """Cells per second; where the cells to come are dearer or cheaper, also theirs, so that it tells the same."""
@@ -156,7 +191,9 @@ class Progress:
 
     def _say(self, text: str) -> None:
         line = f"{self._name}: {text}"
-        if self._live:
+        if self._bar is not None:
+            self._bar.show(self.done, text)
+        elif self._live:
             self._write("\r" + line.ljust(self._width))
             self._width = len(line)
         else:
@@ -208,6 +245,19 @@ def duration(seconds: float) -> str:
     return f"{whole // 86400} d {whole % 86400 // 3600} h"
 
 
+def seconds_of(name: str, text: float | str) -> float:
+    """Seconds, from a number or from words as `duration` says them: "90", "60s", "5 min", "1 h". Raises SweepError."""
+    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([a-z]*)\s*", str(text))
+    units = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
+    try:
+        found = float(match[1]) * units[match[2]] if match else math.nan
+    except (ValueError, KeyError):
+        found = math.nan
+    if not 0.0 < found < math.inf:
+        raise SweepError(f'{name}: expected a time like "60s", "5 min" or "1 h", found {text!r}')
+    return found
+
+
 def quantity(count: float) -> str:
     """Bytes as people say them: `812 B`, `1.3 kB`, `42 MB`."""
     units = ["B", "kB", "MB", "GB", "TB", "PB"]
@@ -217,7 +267,7 @@ def quantity(count: float) -> str:
 
 
 class TimeUp(Exception):
-    """The time a run was given is over."""
+    """A run is to end before it is complete; the text says why."""
 
 
 def deadline(text: str | datetime | None, now: datetime | None = None) -> datetime | None:

@@ -55,7 +55,7 @@ def interrupted(study, output):
 
     def failing(self, start, stop, *rest):
         if (start, stop) == (10, 15):
-            raise RuntimeError("stop here")
+            raise SweepError("stop here")
         real(self, start, stop, *rest)
 
     with pytest.MonkeyPatch.context() as patch:

@@ -25,13 +25,6 @@ def uneven(height, *rest):
     toy.exact(height, *rest)
 
 
-def failing(height, *rest):
-    """As `toy.exact`, but 13 m is more than it can bear."""
-    if (height == 13).any():
-        raise ZeroDivisionError("thirteen")
-    toy.exact(height, *rest)
-
-
 def hungry(height, *rest):
     """As `toy.exact`, but 13 m is more than the memory."""
     if (height == 13).any():
@@ -58,4 +51,4 @@ DAYS = dataclasses.replace(
 )
 """Output in a unit that readers are tempted to turn into dates."""
 
-SLOW, UNEVEN, FAILING, HUNGRY, LETHAL = map(kernel, (slow, uneven, failing, hungry, lethal))
+SLOW, UNEVEN, HUNGRY, LETHAL = map(kernel, (slow, uneven, hungry, lethal))

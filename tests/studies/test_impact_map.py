@@ -84,8 +84,6 @@ def test_heavy_foliots_have_no_stable_cycle_of_one_impact(closed_and_motion):
 @pytest.mark.parametrize(
     ("name", "factor", "statement"),
     [
-        ("period", 1.001, "period = 2T"),
-        ("swing", 0.999, "swing = Y, whatever the torque"),
         ("multiplier", 1.5, "stable for kappa > 1 and no other"),
         ("recoil", -1.0, "recoil for kappa < 2e/(1 - e)"),
     ],
@@ -99,7 +97,16 @@ def test_a_false_result_makes_its_statement_fail(closed_and_motion, name, factor
 
 def test_a_false_period_by_events_makes_the_statement_fail(closed_and_motion):
     closed, motion = closed_and_motion
-    assert failing(impact_map.motions(closed, motion.assign(period=motion.period * 1.001)))
+    assert not failing(impact_map.motions(closed, motion))
+    assert failing(impact_map.motions(closed, motion.assign(period=motion.period * 1.001))) == ["period by events = 2T"]
+    wrong = impact_map.prepared(motion.assign(swing=motion.swing * 0.999))
+    assert failing(impact_map.motions(closed, wrong)) == ["swing by events = Y, whatever the torque"]
+
+
+def test_a_false_plastic_cycle_makes_its_statement_fail(closed_and_motion):
+    closed = closed_and_motion[0]
+    assert not failing(impact_map.plastic(closed))
+    assert len(failing(impact_map.plastic(closed.assign(period=closed.period * 1.001)))) == 1
 
 
 def test_the_levers_borders_are_where_the_multiplier_passes_one(bent):

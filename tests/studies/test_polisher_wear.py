@@ -24,7 +24,7 @@ def result(tmp_path_factory):
     }  # fmt: skip
     axes = {
         "tool_n": [2.0, 1.0], "tool_b": [0.04, 0.08], "e": [0.02, 0.08, 0.1, 0.16],
-        "w_x": [0.5, 0.54, 0.56, 0.58],
+        "w_x": [0.5, 0.53, 0.54, 0.56, 0.58],
     }  # fmt: skip
     along = {"radius": np.linspace(0.0, 0.1, 26)}
     made = sweep.build_study(kernel="polisher_wear", rtol=1e-5, axes=axes, fixed=fixed, along=along)
@@ -73,11 +73,22 @@ def test_a_false_wear_makes_the_statements_fail(ds):
     assert not study.centre(ds.assign(wear=1.02 * ds.wear)).holds
     assert not study.worst_error(ds.assign(wear_error=ds.wear * 1e-3)).holds
     even = ds.assign(uneven=ds.uneven * 0 + 0.3)
-    assert not any(s.holds for s in study.offsets(even))
+    assert not any(s.holds for s in study.offsets(even)[1::2])
     assert not study.eccentricities(even)[0].holds
+    full = ds.assign(centre=ds.centre * 0 + 1.0)
+    assert not any(s.holds for s in study.offsets(full)[::2])
+    assert [s.holds for s in study.eccentricities(full)][1:3] == [False, False]
+
+
+def test_a_middle_that_is_not_worn_is_no_even_wear(ds):
+    """At an offset of the tool's half width the tool never reaches the centre; the area hides it."""
+    disc = ds.sel(tool_n=2).isel(tool_b=0)
+    assert (disc.wear.isel(radius=0).sel(w_x=slice(0.539, None)) == 0).all()
+    assert float(study.least_uneven(disc, ("e", "w_x")).centre) == 0
+    assert (study.without_hole(disc).uneven.sel(w_x=slice(0.539, None)).isnull()).all()
 
 
 def test_a_load_that_spares_the_edge_makes_the_statement_fail(ds, loaded):
     with sweep.open_result(loaded) as load:
-        assert study.edge(ds, load)[0].holds
-        assert not study.edge(ds, load.assign(wear=0.1 * load.wear))[0].holds
+        assert all(s.holds for s in study.edge(ds, load))
+        assert not any(s.holds for s in study.edge(ds, load.assign(wear=0.1 * load.wear)))

@@ -104,7 +104,7 @@ def test_the_study_covers_ten_decades_of_alpha_around_one_finely():
 def test_every_statement_of_the_paper_that_can_be_checked_holds(groups):
     checked = [s for lines in groups.values() for s in lines if s.holds is not None]
     assert [s.what for s in checked if not s.holds] == []
-    assert len(checked) == 18
+    assert len(checked) == 27
 
 
 def test_scaled_values_are_those_of_the_closed_form(ds):
@@ -146,6 +146,17 @@ def test_a_false_value_makes_a_statement_fail(scaling, ds):
     assert [s.holds for s in scaling.limits(wrong)] == [False, True, False, True]
     steep = ds.assign(aP=ds.aP * ds.alpha**-0.001)
     assert [s.holds for s in scaling.straight_lines(steep)] == [False, False, True, True, None]
+
+
+def test_a_swing_that_leans_forward_or_loses_more_is_seen(scaling, ds, monkeypatch):
+    assert all(s.holds for s in scaling.shape(ds) + scaling.energy(ds))
+    motion = scaling.trajectories(ds)
+    turned = motion.assign(angle=(motion.angle.dims, np.roll(motion.angle.values[:, ::-1], 401, axis=1)))
+    monkeypatch.setattr(scaling, "trajectories", lambda _: turned)
+    assert not all(s.holds for s in scaling.shape(ds))
+    kept = scaling.sweep_of_alpha
+    monkeypatch.setattr(scaling, "sweep_of_alpha", lambda *x: kept(*x).pipe(lambda d: d.assign(s=1.01 * d.s)))
+    assert sum(s.holds is False for s in scaling.energy(ds)) == 3
 
 
 def test_torque_stability_is_the_accuracy_over_the_sensitivity(scaling, ds):

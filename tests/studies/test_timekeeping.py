@@ -124,6 +124,7 @@ def test_a_false_power_or_loss_makes_statements_fail(clocks):
     assert not any(verdicts("verge", ds.assign(gain=1.3 * ds.gain))[6:])
 
 
-def test_another_clock_does_not_give_the_papers_figures(clocks):
+def test_another_clock_does_not_give_the_series_of_its_drive(clocks):
+    assert all(s.holds for s in timekeeping.lasting(clocks))
     swapped = {"verge": clocks["Bürgi"], "Bürgi": clocks["verge"]}
-    assert not any(s.holds for s in timekeeping.paper(swapped))
+    assert not any(s.holds for s in timekeeping.lasting(swapped))

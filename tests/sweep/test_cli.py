@@ -286,6 +286,27 @@ def test_fit_takes_the_readers_word_on_noise(done, call):
         assert pd.read_csv("laws.csv").noisy[0] == noisy
 
 
+def test_fit_compares_laws_in_words_a_table_and_a_picture(done, call):
+    options = ("fit", "stones.h5", "--y", "fall_time", "--x", "height", "--at", "v0=1", "--compare")
+    code, out, _ = call(*options)
+    assert code == 0
+    assert "Chosen: " in out
+    assert all(law in out for law in ("one law", "logarithm", "offset", "correction to scaling", "three laws"))
+    assert call(*options, "-o", "laws.csv")[0] == 0
+    table = pd.read_csv("laws.csv")
+    assert table.chosen.sum() == 1
+    assert table.worse.min() == 0
+    assert call(*options, "-o", "laws.png")[0] == 0
+    assert Path("laws.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_laws_are_compared_along_one_line_alone(done, call):
+    code, _, err = call("fit", "stones.h5", "--y", "fall_time", "--x", "height", "--compare")
+    assert (code, "choose with --at v0=value" in err) == (2, True)
+    code, _, err = call("fit", "stones.h5", "--y", "fal", "--x", "height", "--compare")
+    assert (code, "no such output" in err) == (2, True)
+
+
 def test_fit_tells_the_exponent(done, call):
     code, out, err = call("fit", "stones.h5", "--y", "fall_time", "--x", "height", "--at", "v0=0")
     assert (code, err) == (0, "")

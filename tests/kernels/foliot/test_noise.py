@@ -423,5 +423,33 @@ def test_white_noise_is_the_limit_of_a_short_memory():
 
 def test_columns_come_in_the_order_of_the_declaration():
     names = [p.name for p in FOLIOT_NOISE.parameters]
-    assert names[-5:] == ["sigma", "tau_c", "half_swings", "seed", "averaging_time"]
+    assert names[-6:] == ["sigma", "tau_c", "half_swings", "seed", "averaging_time", "sigma_a"]
     assert len(columns_of(FOLIOT_NOISE, (), dict.fromkeys(names, 1.0))) == len(names)
+
+
+def test_lasting_noise_of_the_friction_is_another_friction():
+    """tau_c without end: each half swing has the torque 1 + sigma z or the friction 1 + sigma_a z of one z.
+
+    z is told by the torque's run; at weak drive a half swing of P(mu, a)/2, by q - tanh q = a^2 phi0/mu, forgets the
+    one before to 1e-9.
+    """
+    import sweep
+
+    def rate(**noise):
+        fixed = {"mu": 0.1, "phi0": 1.0, "a": 1.0, "tau_c": 1e15, "half_swings": 4000, "averaging_time": 3600.0}
+        study = sweep.build_study(kernel="foliot_noise", axes={"seed": [1.0, 2.0, 3.0]}, fixed=fixed | noise, rtol=1e-9)
+        return sweep.run(study).rate_error_s_per_day.values
+
+    def period(mu, a):
+        with mp.workdps(50):
+            k = mpf(a) ** 2 / mpf(mu)
+            return 4 * mp.findroot(lambda q: q - mp.tanh(q) - k, k + 1) / a
+
+    mu = mpf("0.1")
+    base = period(mu, 1)
+    for torque, friction in zip(rate(sigma=0.05), rate(sigma=0.0, sigma_a=0.05), strict=True):
+        longer = base / (1 + mpf(float(torque)) / 86400)
+        z = mp.findroot(lambda z, P=longer: period(mu * (1 + z / 20), 1) - P, 0.1)
+        expected = 86400 * (base / period(mu, 1 + z / 20) - 1)
+        assert friction == pytest.approx(float(expected), rel=1e-3, abs=0.5)
+    assert rate(sigma=0.0, sigma_a=0.0) == pytest.approx(0, abs=1e-6)

@@ -16,6 +16,7 @@ from sweep.analysis.exponents import (
     where_exponent,
     where_value,
 )
+from sweep.analysis.lines import KIND_WORDS
 from sweep.system.errors import SweepError
 
 PER_DECADE = 40
@@ -281,7 +282,7 @@ def test_the_fit_agrees_with_polyfit_and_its_covariance():
     rng = np.random.default_rng(3)
     x = grid(-1, 2, 10)
     y = 3 * x**-0.7 * np.exp(0.1 * rng.standard_normal(x.size))
-    fit = fit_exponent(curve(x, y), "mu")
+    fit = fit_exponent(curve(x, y), "mu", noise="independent")
     (slope, intercept), covariance = np.polyfit(np.log(x), np.log(y), 1, cov=True)
     assert float(fit.exponent) == pytest.approx(slope, rel=1e-12)
     assert float(fit.exponent_error) == pytest.approx(covariance[0, 0] ** 0.5, rel=1e-10)
@@ -297,7 +298,7 @@ def test_standard_errors_are_those_of_repeated_noise():
     x, trials = grid(0, 1, 20), 4000
     noisy = x**-0.5 * np.exp(0.05 * rng.standard_normal((trials, x.size)))
     y = xr.DataArray(noisy, dims=("trial", "mu"), coords={"mu": x}, name="period")
-    fit = fit_exponent(y, "mu")
+    fit = fit_exponent(y, "mu", noise="independent")
     # the scatter of a standard deviation over 4000 trials is 1.1 %
     assert float(fit.exponent.std()) == pytest.approx(float(fit.exponent_error.mean()), rel=0.05)
     assert float(np.log(fit.level).std()) == pytest.approx(float(fit.level_error.mean()), rel=0.05)
@@ -321,7 +322,7 @@ def test_without_noise_the_standard_error_shrinks_with_the_points_and_the_drift_
     coarse, fine = (fit_exponent(curve(grid(0, 1, n), bend(grid(0, 1, n))), "mu") for n in (50, 800))
     assert float(fine.exponent_error) < 0.3 * float(coarse.exponent_error)
     assert float(fine.drift) == pytest.approx(float(coarse.drift), rel=0.02)
-    assert "curvature" in fine.attrs["method"]
+    assert KIND_WORDS[int(fine.kind)] == "curved"
 
 
 def test_a_window_holds_both_its_ends_though_they_be_off_by_a_rounding():
@@ -407,7 +408,8 @@ def test_the_standard_error_of_a_crossover_is_that_of_repeated_noise():
     x, trials = grid(-3, 3, 8), 4000
     noise = np.exp(0.05 * rng.standard_normal((trials, x.size)))
     y = xr.DataArray(np.where(x < 1, 1 / x, x ** (-1 / 3)) * noise, dims=("trial", "mu"), coords={"mu": x}, name="P")
-    found = crossover(fit_exponent(y, "mu", (1e-2, 0.1)), fit_exponent(y, "mu", (10, 1e3)))
+    fits = (fit_exponent(y, "mu", window, noise="independent") for window in ((1e-2, 0.1), (10, 1e3)))
+    found = crossover(*fits)
     scatter = np.log(found.abscissa).std()
     assert float(scatter) == pytest.approx(float((found.abscissa_error / found.abscissa).mean()), rel=0.06)
 

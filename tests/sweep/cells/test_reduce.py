@@ -348,7 +348,7 @@ def test_every_mistake_is_told(mistakes, text):
 
 
 def test_a_zip_is_reduced_as_a_whole(mistakes):
-    found = mistakes('design = "zip"\naxes.height = [1.0, 2.0]\n[summary]\nover = ["height"]\n')
+    found = mistakes('design = "zip"\naxes.height = [1.0, 2.0]\naxes.v0 = [1.0, 2.0]\n[summary]\nover = ["height"]\n')
     assert "are reduced together" in found["summary.over"]
 
 

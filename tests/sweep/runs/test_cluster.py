@@ -128,13 +128,6 @@ def test_nothing_is_asked_of_a_cluster_where_nothing_is_left_to_compute(output):
         assert found.sizes["height"] == 3
 
 
-def test_a_kernel_that_raises_on_a_worker_ends_the_run_with_one_line(client, output):
-    study = tall(1000, "slow:FAILING")
-    with pytest.raises(SweepError, match=r"cells 12 to 13: the kernel failed \(ZeroDivisionError: thirteen\)"):
-        elsewhere(study, output, cluster=client, block_cells=1)
-    assert names(output)
-
-
 def test_a_worker_with_another_version_refuses(client, output, monkeypatch):
     real = sweep.runs.run.fingerprint
     monkeypatch.setattr("sweep.runs.run.fingerprint", lambda study: {**real(study), "source toy": "other"})

@@ -48,7 +48,7 @@ def solved(monkeypatch):
     from sweep.cells import block
 
     take = block.take_sample
-    warm = Solver.warm
+    warm = block.warm
 
     def quietly(action):
         def acting(*rest):
@@ -61,7 +61,7 @@ def solved(monkeypatch):
         return acting
 
     monkeypatch.setattr(block, "take_sample", quietly(take))
-    monkeypatch.setattr(Solver, "warm", quietly(warm))
+    monkeypatch.setattr(block, "warm", quietly(warm))
     monkeypatch.setattr(_Strip, "run", run)
     return counts
 
@@ -108,7 +108,7 @@ def test_a_killed_extension_continues(output, monkeypatch):
 
     def failing(self, start, stop, *rest):
         if (start, stop) == (10, 15):
-            raise RuntimeError("stop here")
+            raise SweepError("stop here")
         real(self, start, stop, *rest)
 
     with monkeypatch.context() as patch:

@@ -383,15 +383,6 @@ def test_a_second_run_on_the_same_output_is_told_so_and_leaves(output):
     same(open_result(output), quiet(tall(400, "slow:SLOW")))
 
 
-def test_a_kernel_that_raises_ends_the_run_with_one_line(output):
-    study = tall(1000, "slow:FAILING")
-    with pytest.raises(SweepError, match=r"cells 12 to 13: the kernel failed \(ZeroDivisionError: thirteen\)"):
-        quiet(study, output, block_cells=1, workers=1)
-    assert names(output)
-    with pytest.raises(SweepError, match="ZeroDivisionError"):
-        quiet(study, block_cells=1)
-
-
 def test_too_little_memory_is_one_line():
     with pytest.raises(SweepError, match="out of memory"):
         quiet(tall(1000, "slow:HUNGRY"), block_cells=1)

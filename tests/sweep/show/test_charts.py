@@ -172,7 +172,8 @@ def test_a_map_hatches_refused_cells_and_outlines_remarks():
     assert corner.x0 < ds.mu[0] < ds.mu[2] < corner.x1 < ds.mu[3]
     assert corner.y0 < 1 < corner.y1 < ds.a[1]
     assert outline.get_paths()[0].get_extents().width > 0
-    assert sorted(words(figure)) == ["BAD_INPUT", "INACCURATE"]
+    assert words(figure) == ["BAD_INPUT"]
+    assert [text.get_text() for text in figure.axes[0].texts] == ["INACCURATE"]
 
 
 def test_a_wide_region_is_named_where_it_is_widest():
@@ -180,8 +181,10 @@ def test_a_wide_region_is_named_where_it_is_widest():
     wide = np.arange(ds.sizes["mu"]) < ds.sizes["mu"] // 2
     ds["status"][wide] = 64
     ds["period"][wide] = np.nan
-    text = plot(ds).axes[0].texts[0]
-    assert text.get_text() == "BAD INPUT"
+    figure = plot(ds)
+    text = figure.axes[0].texts[0]
+    assert text.get_text() == "BAD_INPUT"
+    assert words(figure) == []  # what is named in its place needs no legend
     x, y = text.get_position()
     assert ds.mu[0] < x < ds.mu[ds.sizes["mu"] // 2]
     assert y == pytest.approx(1.5, abs=0.1)
@@ -194,7 +197,8 @@ def test_a_result_without_one_value_is_drawn_all_the_same(tmp_path, axes):
     ds = dataset(**axes)
     ds["period"] = ds.period * np.nan
     ds["status"][:] = 64
-    assert "BAD_INPUT" in words(plot(ds, tmp_path / "out.png"))
+    figure = plot(ds, tmp_path / "out.png")
+    assert "BAD_INPUT" in [*words(figure), *(text.get_text() for text in figure.axes[0].texts)]
 
 
 def test_more_points_than_a_picture_can_show_are_thinned():
@@ -359,6 +363,29 @@ def test_a_long_name_is_broken_into_lines_that_fit_the_picture():
     assert " ".join(lines) == text
     assert len(lines) == 2
     assert max(map(len, lines)) <= 44
+
+
+def test_a_line_does_not_begin_with_the_unit():
+    attrs = {"units": "kg m^2", "long_name": "moment of inertia of the balance with its rim and"}
+    lines = label(xr.DataArray(1.0, name="J", attrs=attrs)).split("\n")
+    assert lines == ["moment of inertia of the balance with its", r"rim and, $J$ [kg m$^{2}$]"]
+
+
+def test_a_remark_on_every_cell_is_outlined_at_the_rim():
+    ds = dataset(mu=log(), a=np.linspace(1, 2, 21))
+    ds["status"][:] = 1
+    _, outline = plot(ds).axes[0].collections
+    extent = outline.get_paths()[0].get_extents()
+    assert extent.y0 < 1 < 2 < extent.y1
+
+
+def test_a_remark_on_a_value_that_a_logarithm_cannot_show_is_at_the_foot():
+    ds = dataset(mu=log())
+    ds["period"][:] = np.where(np.arange(ds.sizes["mu"]) == 4, 0.0, 10.0 ** np.arange(ds.sizes["mu"]))
+    ds["status"][4] = 1
+    figure = plot(ds.assign(period=ds.period.where(ds.period > 0)))
+    foot = drawn(figure.axes[0])[-1]
+    np.testing.assert_array_equal(foot.get_xdata(), ds.mu[[4]])
 
 
 def test_a_symbol_takes_the_room_it_has_in_print():

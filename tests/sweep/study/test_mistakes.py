@@ -45,9 +45,9 @@ studies/fall.toml: 14 mistakes
   rtol               expected 1e-15 <= rtol < 1, found 2
   outputs[2]         expected "fall_time", "impact_speed" or "drop", found "fal_time"; did you mean fall_time?
   axes.height.unit   "kg" is a mass; height is a length, e.g. "m" or "mm"
+  axes.height.start  a log axis needs start > 0, found 0
   axes.height.stop   expected a number, found "5e-3"; drop the quotes
   axes.height.num    expected at least 2, found 0; for a single value write values = [...]
-  axes.height.start  a log axis needs start > 0, found 0
   axes.v_0           kernel toy has no such parameter; did you mean v0?
   fixed.g.units      no such key; did you mean unit?
   fixed.g.value      expected a number, found "9.81 m/s^2"; write { value = 9.81, unit = "m/s^2" }
@@ -118,7 +118,8 @@ def axis(spacing, start, stop, num):
         ("axes.height = [1]\naxes.rtol = [1e-3]\nrtol = 1e-3", "rtol", "rtol is an axis as well"),
         ("axes.height = [1]\naxes.method = ['auto']\nmethod = 'auto'", "method", "method is an axis as well"),
         ("axes.height = [1]\nmethod = 3", "method", 'expected "auto", "rough" or "exact", found 3'),
-        ("axes.height = [1]\ndesign = 'sobol'", "design", 'expected "product" or "zip", found "sobol"'),
+        ("axes.height = [1]\ndesign = 'sobo'", "design", "did you mean sobol?"),
+        ("axes.height = { spacing = 'log', start = 1, stop = 2 }\ndesign = 'sobol'", "design", "how many points?"),
         ("axes.height = [1]\ntitle = 3", "title", "expected text in quotes, found 3"),
         ("axes.height = [1]\nfixed = [3]", "fixed", "expected a table, found a list"),
         ("axes.height = [1]\nfixed.height = 1", "fixed.height", "height is an axis as well; keep one of the two"),

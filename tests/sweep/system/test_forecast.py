@@ -43,7 +43,7 @@ COSTS = {
 class Run:
     """Workers that take blocks in the forecast's order; probes of 32 cells at 64 places, each off by up to a half."""
 
-    def __init__(self, costs, blocks, workers, waste=0.0, seed=0):
+    def __init__(self, costs, blocks, workers, waste=0.0, seed=0, slow=1.0):
         partition = Partition(CELLS, CELLS // blocks)
         edges = np.arange(partition.count + 1) * partition.cells
         self.costs = np.add.reduceat(costs, edges[:-1]) + waste
@@ -51,7 +51,7 @@ class Run:
         noise = np.random.default_rng(seed).uniform(0.5, 1.5, 64)
         probed = noise * [costs[p : p + 32].mean() for p in places]
         self.weights = Sample(places, probed, 32, np.zeros(1), np.zeros(1)).weights(partition)
-        self.now, self.workers = 0.0, workers
+        self.now, self.workers, self.slow = 0.0, workers, slow
         self.forecast = Forecast(self.weights, range(partition.count), lambda: self.now)
 
     def ends(self):
@@ -62,7 +62,8 @@ class Run:
             while queue and len(busy) < self.workers:
                 job = queue.pop(0)
                 self.forecast.begin(job)
-                heapq.heappush(busy, (self.now + self.costs[job], job))
+                slow = self.slow if count <= 1 else 1.0
+                heapq.heappush(busy, (self.now + slow * self.costs[job], job))
             self.now, job = heapq.heappop(busy)
             self.forecast.end(job)
             queue += islice(jobs, 1)
@@ -87,6 +88,17 @@ def test_from_a_tenth_on_the_time_left_is_within_30_percent(name, workers, seed)
         share, now, left = next(row for row in told if row[0] >= least)
         assert left >= (1 - off) * (end - now) - 0.03 * end, (share, left, end - now)
         assert left <= max((1 + off) * (end - now), end - now + 0.2 * end), (share, left, end - now)
+
+
+@pytest.mark.parametrize("workers", [1, 2, 8])
+@pytest.mark.parametrize("name", ["even", "dear last", "two methods"])
+def test_workers_that_are_slow_at_first_do_not_make_the_rest_long(name, workers):
+    """The first block of each takes ten times as long as it would later, as where kernels are still loaded."""
+    told = Run(COSTS[name], 512, workers, slow=10.0).forecasts()
+    end = told[-1][1]
+    for least in (0.10, 0.25, 0.50):
+        share, now, left = next(row for row in told if row[0] >= least)
+        assert 0.7 * (end - now) < left < 1.3 * (end - now), (share, left, end - now)
 
 
 @pytest.mark.parametrize("name", sorted(COSTS.keys() - set(NOISE)))

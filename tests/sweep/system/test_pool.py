@@ -5,7 +5,8 @@ import time
 
 import pytest
 
-from sweep.system.pool import CtrlC, Stopper, Terminated, each
+from sweep.system import pool
+from sweep.system.pool import Cores, CtrlC, Stopper, Terminated, each
 
 
 def test_every_job_is_done_once_and_told():
@@ -166,3 +167,58 @@ def test_ctrl_c_ends_a_run_after_the_jobs_at_work():
     with pytest.raises(KeyboardInterrupt):
         each(range(1000), work, 2, lambda job: None)
     assert 4 <= len(ended) < 100
+
+
+def test_signals_change_how_many_compute_at_once():
+    cores, most, inside = Cores(1), [0], []
+
+    def work(job):
+        def compute():
+            inside.append(job)
+            most[-1] = max(most[-1], len(inside))
+            time.sleep(0.01)
+            inside.remove(job)
+
+        stopper.compute(compute)
+
+    def finished(job):
+        if job in (20, 60):
+            os.kill(os.getpid(), signal.SIGUSR1 if job == 20 else signal.SIGUSR2)
+        if job in (40, 100):
+            most.append(0)
+
+    stopper = Stopper(cores)
+    with cores.told_by_signals():
+        each(range(150), work, 6, finished, stopper, lambda: 2 * cores.count)
+        assert cores.count == 1
+        os.kill(os.getpid(), signal.SIGUSR2)
+        assert cores.count == 1
+    assert most[0] <= 2
+    assert most[1:] == [2, 1]
+    assert signal.getsignal(signal.SIGUSR1) is signal.SIG_DFL
+
+
+def test_a_job_that_does_not_end_is_killed_or_given_up(monkeypatch):
+    monkeypatch.setattr(pool, "GRACE_SECONDS", 0.1)
+    monkeypatch.setattr(pool, "KILL_SECONDS", 0.1)
+    monkeypatch.setattr(pool, "_endless", threading.Event())
+    wanted, killed, free = [], [], threading.Event()
+
+    def work(job):
+        wanted.append(stopper.compute(lambda: free.wait(20)))
+
+    def finished(job):
+        raise KeyboardInterrupt
+
+    stopper = Stopper(1, kill=lambda: (killed.append(1), free.set()))
+    with pytest.raises(KeyboardInterrupt):
+        each([0], work, 1, finished, stopper)
+    assert (killed, wanted, pool.left_behind()) == ([1], [True], False)
+    free.clear()
+    stopper = Stopper(1)
+    with pytest.raises(KeyboardInterrupt):
+        each([0], work, 1, finished, stopper)
+    assert pool.left_behind()
+    free.set()
+    time.sleep(0.1)
+    assert wanted == [True, False]

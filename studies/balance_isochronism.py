@@ -1,0 +1,315 @@
+"""At which amplitude does the rate of a driven balance not depend on its drive?
+
+    sweep run studies/balance_isochronism.toml --allow-import
+    sweep run studies/balance_isochronism_lift.toml
+    sweep run studies/balance_isochronism_positions.toml --allow-import
+    python studies/balance_isochronism.py balance_isochronism.h5 balance_isochronism_lift.h5 \\
+        balance_isochronism_positions.h5
+
+draws balance_isochronism.png and prints theory beside what comes out. Theory, derived here: on its way to the right
+solid friction shifts the centre of the swing to -r, and about it the motion is linear. An impulse there changes the
+speed and not the phase (Airy's condition), so the period is 2 pi/omega_d whatever drive, amplitude and friction.
+Elsewhere, the impulse being w = 2 r a + pi zeta a^2 and turning the phase by -(at + r) w/(a^2 v), light losses lose
+
+    dP/P = (r + at)(2 r/(pi a) + zeta)/a,  a the amplitude,                                              (1)
+
+which falls with the amplitude for any other `at`. What is out of poise adds dP/P = -poise cos(hang) J1(a)/a, without
+the sign of `at` or the drive in it, and vanishes where J1 does, at a = 3.832 rad, 220 degree.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from _common import Groups, Statement, compared, differing, direct_label, paragraph, plain_ticks, read_result, report
+
+import sweep
+
+DAY = 86400.0
+LARGE = 20.0
+"""Amplitude over the larger of r and abs(at) from which (1) is held to `FIRST` of the loss."""
+FIRST = 0.02
+FLAT = 1e-3
+"""Loss [s/day] that counts as none; the sweep is right to rtol 1e-11 of a period, 1e-6 s/day."""
+WATCH = {"mu": 0.15, "m": 1e-4, "g": 9.81, "pivot": 5e-5, "end": 3.75e-5, "stiffness": 2.96e-7}
+"""Friction coefficient, mass [kg], gravity [m/s^2], radii of pivot and of its end [m], spring [N m/rad] of a watch."""
+
+NOTES = """\
+loss: how much slower than 2 pi/omega_d, in s a day; deviation: relative, of losses the largest difference in s/day
+allowed: 1e-3 s/day where there is no loss; 2 % of (1) at amplitudes over 20 r and 20 abs(at), 1e-6 between the scene
+and the kernel `balance_driven`; 2 % of the least drive for what grids of m can tell; 0.005 rad of 3.8317\
+"""
+
+
+def pivot_friction(mu: float, m: float, g: float, radius: float) -> float:
+    """R [N m] of a pivot of this radius [m], lying on its side; the contact climbs the hole by arctan(mu).
+
+    The page's R = mu m g r is this to first order in mu.
+    """
+    return m * g * radius * mu / math.sqrt(1 + mu * mu)
+
+
+def end_friction(mu: float, m: float, g: float, radius: float) -> float:
+    """R [N m] of a flat end of this radius [m], upright and evenly pressed: a disc rubs at 2/3 of its radius."""
+    return 2 / 3 * mu * m * g * radius
+
+
+def reach(ds: xr.Dataset) -> xr.DataArray:
+    """Amplitude [rad] behind the last impulse: the peak of a damped swing about -r."""
+    root = np.sqrt(1 - ds.zeta**2)
+    u = -ds.angle + ds.r if "at" not in ds.coords else ds["at"] + ds.r
+    v = np.sqrt(ds.speed**2 + 2 * ds.w * ds.omega_n**2) / ds.omega_n
+    swing, lead = np.hypot(u, (v + ds.zeta * u) / root), np.arctan2((v + ds.zeta * u) / root, u)
+    late = lead - np.arctan(ds.zeta / root)
+    return root * swing * np.exp(-ds.zeta / root * late) - ds.r
+
+
+def lost(ds: xr.Dataset, period: xr.DataArray) -> xr.DataArray:
+    """Loss against 2 pi/omega_d [s/day]."""
+    free = 2 * math.pi / (ds.omega_n * np.sqrt(1 - ds.zeta**2))
+    return (DAY * (period / free - 1)).assign_attrs(units="s/day")
+
+
+def theory(ds: xr.Dataset) -> xr.DataArray:
+    """(1) in s/day."""
+    return DAY * (ds.r + ds["at"]) * (2 * ds.r / (math.pi * ds.a) + ds.zeta) / ds.a
+
+
+def impulses(ds: xr.Dataset) -> list[Statement]:
+    """Where impulses do not touch the rate, and by how much they do elsewhere."""
+    there = ds.loss.where(abs(ds["at"] + ds.r) < 1e-12)
+    still = float(abs(there).max())
+    span = f"{float(ds.a.where(there.notnull()).min()):.2f} to {float(ds.a.where(there.notnull()).max()):.2f} rad"
+    away = ds.where(abs(ds["at"] + ds.r) > 1e-3)
+    light = away.where(away.a > LARGE * np.maximum(abs(away["at"]), away.r))
+    ratio = light.loss / theory(light)
+    turns = int(((away.loss.diff("w") * np.sign(away["at"] + away.r)) > 0).sum())
+    worst = float(abs(away.loss).max())
+    return [
+        Statement(f"at = -r: loss at every drive, a = {span} [s/day]", "0", "at most", still, still < FLAT),
+        Statement(
+            f"elsewhere (1), a > 20 r, 20 abs(at): {int(ratio.notnull().sum())} cells", "1", "largest deviation",
+            float(abs(ratio - 1).max()), float(abs(ratio - 1).max()) < FIRST,
+        ),
+        Statement("  amplitudes at which the loss is stationary", "none", f"{turns} of the grid", None, turns == 0),
+        Statement("  largest loss or gain on the grid [s/day]", "-", f"{worst:.0f}", None, worst > 100),
+        *beside_kernel(ds),
+    ]  # fmt: skip
+
+
+def beside_kernel(ds: xr.Dataset) -> list[Statement]:
+    """Impulses at the centre: the scene beside `balance_driven`, and beside integrations of it by others."""
+    middle = ds.sel(at=0, method="nearest")
+    fixed = {"zeta": float(ds.zeta), "omega_n": float(ds.omega_n)}
+    axes = {"r": ds.r.values, "w": ds.w.values}
+    made = sweep.run(sweep.build_study(kernel="balance_driven", axes=axes, fixed=fixed, rtol=1e-12))
+    off = max(float(abs(middle.clock / made.period - 1).max()), float(abs(middle.a / made.amplitude - 1).max()))
+    other = sweep.build_study(
+        kernel="balance_driven", axes={"r": [0.001, 0.01]}, fixed={"zeta": 0.005, "omega_n": 1.0, "w": 0.01}, rtol=1e-12
+    )
+    known = sweep.run(other)
+    losses = (DAY * (known.period / (2 * math.pi) - 1)).values  # against the balance without any friction
+    return [
+        Statement("at = 0: period and amplitude by `balance_driven`", "the same", "largest", off, off < 1e-6),
+        differing("  zeta = .005, w = .01, r = .001: loss by solve_ivp [s/day]", "1.77", losses[0], 1.77, 0.01, 4),
+        differing("  r = .01", "49.7", losses[1], 49.7, 0.1, 4),
+    ]
+
+
+def lifts(ds: xr.Dataset) -> list[Statement]:
+    """Where the rate of a balance on a lift does not depend on the torque: at its greatest loss."""
+    lines = []
+    for beta in ds.beta.values:
+        line = ds.sel(beta=beta).isel(r=-1)
+        k = int(line.loss.fillna(-1.0).argmax("m"))
+        a, worst = float(line.amplitude[k]), float(line.loss[k])
+        least = float(line.m[int(line.amplitude.notnull().argmax("m"))])
+        ends = bool(0 < k < line.m.size - 1 and 1.1 * beta < a < 2.0 * beta)
+        here = f"{worst:.0f} at {math.degrees(a):.0f} degree = {a / beta:.2f} lifts"
+        what = f"lift +-{math.degrees(beta):.0f} degree: greatest loss [s/day] at amplitude"
+        lines.append(
+            Statement(what, "1 to 2 lifts", f"{here}, m {float(line.m[k]) / least:.2f} times the least", None, ends)
+        )
+    free = ds.sel(r=0).loss
+    gains = bool((free.where(free.notnull(), -1.0) < 0).all())
+    here = f"{float(free.min()):.2f} at most [s/day]"
+    return [*lines, Statement("no solid friction: a lift gains, at every torque", "< 0", here, None, gains)]
+
+
+def positions(ds: xr.Dataset) -> list[Statement]:
+    """The amplitude at which positions agree, and what poise does elsewhere."""
+    from scipy.special import j1, jn_zeros
+
+    spread = ds.loss.isel(hang=0) - ds.loss.isel(hang=2)
+    zero = float(sweep.where_value(spread.swap_dims(w="a0"), "a0", 0.0).abscissa)
+    rate = -2 * DAY * float(ds.poise) * j1(ds.a.isel(hang=0)) / ds.a.isel(hang=0)
+    off = float(abs(spread - rate).max() / abs(spread).max())
+    level = float(abs(ds.loss.isel(hang=1)).max() / abs(spread).max())
+    return [
+        differing(
+            "positions agree at the amplitude [rad]", f"{jn_zeros(1, 1)[0]:.4f}", zero, jn_zeros(1, 1)[0], 5e-3, 5
+        ),
+        Statement("top heavy against bottom heavy, by J1(a)/a", "the same", "of the largest", off, off < 5e-3),
+        Statement("heavy at the side: of that", "0", "", level, level < 5e-3),
+    ]
+
+
+def pivots() -> list[Statement]:
+    """From the page's mu, m, g and radius to r, and what the position does to amplitude and rate of a watch."""
+    mu, m, g, k = (WATCH[name] for name in ("mu", "m", "g", "stiffness"))
+    upright, flat = pivot_friction(mu, m, g, WATCH["pivot"]) / k, end_friction(mu, m, g, WATCH["end"]) / k
+    study = sweep.build_study(
+        kernel="balance_driven", axes={"r": [flat, upright]}, fixed={"zeta": 1 / 600, "omega_n": 15.708, "w": 0.2}
+    )
+    ds = sweep.run(study)
+    loss, a = lost(ds, ds.period).values, np.degrees(ds.amplitude.values)
+    work = (2 * ds.r * ds.amplitude + math.pi / 600 * ds.amplitude**2).values
+    return [
+        compared("R = mu m g r/sqrt(1 + mu^2), r = 50 um [N m]", "mu m g r = 7.36e-09", upright * k, 7.36e-9, 0.02, 4),
+        Statement("r = R/k, hanging and lying [rad]", "0.025, 0.0125", f"{upright:.4f}, {flat:.4f}", None,
+                  bool(abs(upright - 0.025) < 5e-4 and abs(flat - 0.0125) < 5e-4)),
+        Statement("same drive, w = 0.2: amplitude hanging, lying [degree]", "by the work", f"{a[1]:.0f}, {a[0]:.0f}",
+                  float(abs(work / 0.2 - 1).max()), bool(abs(work / 0.2 - 1).max() < 0.02)),
+        Statement("  loss hanging, lying [s/day]", "-", f"{loss[1]:.2f}, {loss[0]:.2f}", None, bool(loss[1] > loss[0])),
+    ]  # fmt: skip
+
+
+def figure(ds: xr.Dataset, lift: xr.Dataset, hung: xr.Dataset) -> Any:
+    """Loss against amplitude for impulses, over their angle, for lifts and in positions; for two columns of print."""
+    from sweep.show import charts
+
+    with charts.style():
+        page = charts.new_figure(charts.PAGE, 125.0)
+        (lines, plane), (lifted, posed) = page.subplots(2, 2)
+        draw_lines(lines, ds.isel(r=1))
+        draw_plane(page, plane, ds.isel(r=1))
+        draw_lifts(lifted, lift.isel(r=-1))
+        draw_positions(posed, hung)
+        for axes, text in zip((lines, plane, lifted, posed), "abcd", strict=True):
+            charts.letter(axes, text)
+    return page
+
+
+def draw_lines(axes: Any, ds: xr.Dataset) -> None:
+    """Loss over amplitude, impulse by impulse, with (1)."""
+    from sweep.show.charts import COLOURS, MARKS
+
+    for k, at in enumerate((-0.05, -0.025, -0.0125, 0.0, 0.05)):
+        line = ds.sel(at=at, method="nearest")
+        first = theory(line)
+        axes.plot(line.a, first, color=COLOURS[k], linewidth=0.9)
+        name = f"{1e3 * at:+.0f}" if at else "0"
+        look = {"linestyle": "", "color": COLOURS[k], "markerfacecolor": "white", "markersize": 3.6}
+        axes.plot(line.a[::2], line.loss[::2], MARKS[k % len(MARKS)], label=name, **look)
+    axes.set_yscale("symlog", linthresh=1.0, linscale=0.6)
+    axes.set_yticks([-1000, -100, -10, -1, 0, 1, 10, 100, 1000])
+    axes.set(xscale="log", xlabel="amplitude, $a$ [rad]", ylabel="loss [s/day]", ylim=(-3e5, 1e4))
+    axes.plot([], [], color="black", linewidth=0.9, label="theory (1)")
+    axes.legend(title="impulse at [mrad]", fontsize=7, title_fontsize=7, loc="lower right", ncols=2)
+    plain_ticks(axes.xaxis, (0.2, 0.5, 1, 2, 5))
+
+
+def draw_plane(page: Any, axes: Any, ds: xr.Dataset) -> None:
+    """Loss over angle of the impulse and drive; it vanishes on the line at = -r."""
+    from matplotlib.colors import SymLogNorm
+
+    at, w = 1e3 * ds["at"].values, ds.w.values
+    loss = ds.loss.transpose("w", "at").values
+    norm = SymLogNorm(1.0, vmin=-1000, vmax=1000)
+    mesh = axes.pcolormesh(at, w, loss, norm=norm, cmap="RdBu_r", shading="nearest", rasterized=True)
+    bar = page.colorbar(mesh, ax=axes, label="loss [s/day]", pad=0.02)
+    bar.set_ticks([-1000, -100, -10, 0, 10, 100, 1000])
+    axes.axvline(-1e3 * float(ds.r), color="black", linestyle=(0, (4, 2)), linewidth=0.9)
+    direct_label(axes, -1e3 * float(ds.r), 0.2, "at $=-r$: isochronous", fontsize=7)
+    axes.set(yscale="log", xlabel="impulse at, from the centre [mrad]", ylabel="drive, $w$ [rad$^2$]")
+    plain_ticks(axes.yaxis, (0.02, 0.05, 0.1, 0.2, 0.4))
+
+
+def draw_lifts(axes: Any, ds: xr.Dataset) -> None:
+    """Loss over amplitude by lift; the mark is where the rate does not depend on the torque."""
+    from sweep.show.charts import COLOURS, DASHES
+
+    for k, beta in enumerate(ds.beta.values):
+        line = ds.sel(beta=beta)
+        axes.loglog(line.amplitude, line.loss, color=COLOURS[k], linestyle=DASHES[k],
+                    label=f"lift ±{math.degrees(beta):.0f} degree")  # fmt: skip
+        top = line.isel(m=int(line.loss.fillna(-1.0).argmax("m")))
+        axes.plot(float(top.amplitude), float(top.loss), "o", color=COLOURS[k])
+    axes.plot([], [], "o", color="black", label="rate independent of $m$")
+    axes.set(xlabel="amplitude, $a$ [rad]", ylabel="loss [s/day]", xlim=(0.15, 8), ylim=(0.1, 1000))
+    axes.legend(fontsize=7, loc="upper right")
+    plain_ticks(axes.xaxis, (0.2, 0.5, 1, 2, 5))
+
+
+def draw_positions(axes: Any, ds: xr.Dataset) -> None:
+    """Rate over amplitude, position by position, with J1."""
+    from scipy.special import j1
+
+    from sweep.show.charts import COLOURS, MARKS
+
+    wide = np.linspace(1.0, 6.5, 200)
+    for k, hang in enumerate(ds.hang.values):
+        line = ds.isel(hang=k)
+        drop = -DAY * float(ds.poise) * math.cos(hang) * j1(wide) / wide
+        axes.plot(wide, drop, color=COLOURS[k], linewidth=0.9)
+        axes.plot(line.a, line.loss, MARKS[k], color=COLOURS[k], markerfacecolor="white", markersize=3.6,
+                  linestyle="", label=f"{math.degrees(hang):.0f} degree")  # fmt: skip
+    axes.axvline(3.8317, color="0.5", linestyle=(0, (4, 2)), linewidth=0.9)
+    direct_label(axes, 3.83, 5.0, "220 degree", fontsize=7)
+    axes.plot([], [], color="black", linewidth=0.9, label=r"$\propto J_1(a)/a$")
+    axes.set(xlabel="amplitude, $a$ [rad]", ylabel="loss [s/day]", xlim=(1.0, 6.5))
+    axes.legend(title="heavy point from the top", fontsize=7, title_fontsize=7, loc="lower right")
+
+
+def caption(ds: xr.Dataset, lift: xr.Dataset, hung: xr.Dataset) -> list[str]:
+    """Two to four sentences with the numbers of the datasets."""
+    one = ds.isel(r=1)
+    still = float(abs(one.loss.sel(at=-float(one.r), method="nearest")).max())
+    centre = one.sel(at=0, method="nearest")
+    near = centre.isel(w=int(abs(centre.a - 2.0).argmin("w")))
+    beta = lift.isel(r=-1).sel(beta=math.radians(26), method="nearest")
+    top = beta.isel(m=int(beta.loss.fillna(-1.0).argmax("m")))
+    most = float((hung.loss.max("hang") - hung.loss.min("hang")).max())
+    r, lowest = 1e3 * float(one.r), float(near.a)
+    return paragraph(f"""Figure. (a), (b) Loss of a balance driven by impulses, r = {r:.0f} mrad, Q = 300: an impulse
+        before the centre by r leaves the rate alone, to {still:.0e} s/day at every drive; at the centre the balance
+        loses {float(near.loss):.1f} s/day at {lowest:.1f} rad, and no amplitude is free of the drive. (c) On a lift of
+        26 degree the loss has a maximum, {float(top.loss):.0f} s/day at {float(top.amplitude):.2f} rad: the one
+        amplitude at which the rate does not depend on the torque. (d) Out of poise by 0.2 mrad, positions differ by up
+        to {most:.0f} s/day and agree at 3.83 rad.""")
+
+
+def read(path: str, lift_path: str, hung_path: str) -> tuple[xr.Dataset, xr.Dataset, xr.Dataset]:
+    """The three sweeps with `loss` and, of the scenes, amplitude `a`. Raises SweepError where one is none of these."""
+    ds = read_result(path, "balance_scene:KERNEL", ["r", "at", "w"], "balance_isochronism.toml")
+    lift = read_result(lift_path, "balance_driven", ["r", "beta", "m"], "balance_isochronism_lift.toml")
+    hung = read_result(hung_path, "balance_scene:KERNEL", ["hang", "w"], "balance_isochronism_positions.toml")
+    ds, hung = (part.assign(a=reach(part), loss=lost(part, part.clock)) for part in (ds, hung))
+    return ds, lift.assign(loss=lost(lift, lift.period)), hung.assign_coords(a0=("w", hung.a.isel(hang=1).values))
+
+
+def conclude(*paths: str) -> tuple[Groups, list[str], Any]:
+    """Statements, the caption and the figure."""
+    ds, lift, hung = read(*paths)
+    groups = {
+        "Impulses before, at and behind the centre": impulses(ds),
+        "A lift": lifts(lift),
+        "Positions, out of poise": positions(hung),
+        "Positions, friction": pivots(),
+    }
+    return groups, [NOTES, "", *caption(ds, lift, hung)], figure(ds, lift, hung)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Table and figure of the results that are named; 1 if a statement does not hold."""
+    inputs = ["balance_isochronism.h5", "balance_isochronism_lift.h5", "balance_isochronism_positions.h5"]
+    return report(__file__, inputs, arguments, conclude)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,75 @@
+"""Which polishing machine swings its arm by a wanted amount, as harmonically as its motor allows?
+
+    python studies/inverse_design.py
+
+A worked example of `sweep.solver`: the kernel as a function of the crank and the coupler, found by scipy's optimisers.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq, minimize_scalar
+
+import sweep
+
+ARM = 0.380
+"""d [m]."""
+MOTOR = 0.620
+"""b, from the arm's pivot to the motor's shaft [m]."""
+AMPLITUDE = math.radians(15.0)
+CRANKS = np.linspace(1e-3, 0.3, 300)
+"""e [m], among which the right one is looked for."""
+
+machine = sweep.solver(
+    {
+        "kernel": "polisher",
+        "rtol": 1e-10,
+        "outputs": ["A1", "thd", "transmission_angle"],
+        "axes": {"f": [0.5], "e": [0.08]},
+        "fixed": {"b": MOTOR, "d": ARM},
+    }
+)
+"""A machine's half amplitude [rad], distortion [1] and transmission angle [rad], of coupler f and crank e [m]."""
+
+
+class Design(NamedTuple):
+    """A coupler and a crank [m], and the distortion of the machine that they make."""
+
+    f: float
+    e: float
+    thd: float
+
+
+def crank(f: float, amplitude: float = AMPLITUDE) -> float:
+    """The crank [m] that swings the arm by the amplitude [rad], for a coupler f [m]; NaN where none does.
+
+    Many cranks at once tell where the amplitude is passed, single ones to the last digit where.
+    """
+    beyond = amplitude < machine(f, CRANKS).A1
+    if not beyond.any() or beyond[0]:
+        return math.nan
+    first = int(beyond.argmax())
+    return float(brentq(lambda e: machine(f, e).A1 - amplitude, CRANKS[first - 1], CRANKS[first], xtol=1e-15))
+
+
+def distortion(f: float, amplitude: float = AMPLITUDE) -> float:
+    """Of the machine with the coupler f; infinite where no crank gives the amplitude."""
+    e = crank(f, amplitude)
+    return float(machine(f, e).thd) if math.isfinite(e) else math.inf
+
+
+def best(amplitude: float = AMPLITUDE, shortest: float = 0.30, longest: float = 0.70) -> Design:
+    """The coupler within bounds whose machine is least distorted, among those of the amplitude."""
+    found = minimize_scalar(
+        lambda f: distortion(f, amplitude), bounds=(shortest, longest), method="bounded", options={"xatol": 1e-9}
+    )
+    f = float(found.x)
+    return Design(f, crank(f, amplitude), float(found.fun))
+
+
+if __name__ == "__main__":
+    design = best()
+    print(f"coupler {1e3 * design.f:.3f} mm, crank {1e3 * design.e:.4f} mm: distortion {100 * design.thd:.4f} %")

@@ -1,0 +1,331 @@
+"""Which law does a foliot's period follow, P ~ torque^(-s), by the shares of its losses?
+
+    sweep run studies/law_map.toml
+    python studies/law_map.py law_map.h5
+
+draws law_map.png and prints theory beside what comes out. The general law, derived here by dominant balance: let
+friction of degree n take the share lambda_n of the energy 2 mu phi0 of half a swing, n = 0 dry, 1 viscous, n drag c
+abs(v)^n, and impacts at the switch the share lambda_e; N = sum of n lambda_n. Large swings (light losses): the way is
+v^2/mu, so friction takes c v^(n + 2)/mu, impacts (1 - e^2) v^2/2, and P ~ v/mu. The differential of the balance, sum
+lambda_n ((n + 2) dlnv - dlnmu) + 2 lambda_e dlnv = dlnmu, gives s = (N + lambda_e)/(N + 2),
+(1) which is n/(n + 2) for one friction, 1/2 for impacts alone. Small swings (heavy losses): the foliot goes at its
+final speed, f(v) = mu, and P ~ phi0/v, so s = 1/N, 1/n for one friction, whatever the impacts.
+(2) The ratio of the shares of two frictions goes as v^(n - n'), that of impacts to a friction as mu/v^n, and
+dlnv = (1 - s) dlnmu: with (1) this says how many decades of torque an exponent takes to turn into another.      (3)
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from _common import Groups, Statement, compared, differing, direct_label, paragraph, read_result, report
+
+import sweep
+
+LARGE, SMALL = 100.0, 1.0003
+"""Amplitudes over phi0 from which, and up to which, losses are called light and heavy."""
+NODES = 200
+PURE = {"dry": (0.0, 0.0), "viscous": (1.0, 1 / 3), "impacts": (2.0, 1 / 2), "drag": (3.0, 3 / 5)}
+"""Degree and exponent, at large swings, of the losses of the map; drag of degree 3."""
+
+NOTES = """\
+s = -dlnP/dlnmu; deviation: the difference of exponents, others relative. Shares by quadrature of the losses over the
+speed. Allowed: 1e-6 of the energy; 0.001 of (1) at swings over 100 phi0, 0.05 of (2) at swings under 1.0003 phi0; 1e-4
+of the best torques, which were once had to 50 digits
+"""
+
+
+def shares(ds: xr.Dataset) -> xr.Dataset:
+    """`ds` with the shares `viscous`, `dry`, `drag` and `impacts` of the energy of half a swing, and its `deficit`."""
+    x, w = np.polynomial.legendre.leggauss(NODES)
+    t, w = (xr.DataArray(v, dims="node") for v in (0.5 * (x + 1), 0.5 * w))
+    rise = t * t * (3 - 2 * t)  # fewer digits lost where the speed nears the final one
+    lost: dict[str, Any] = {"viscous": 0.0, "dry": 0.0, "drag": 0.0}
+    for top, sign in ((ds.e * ds.crossing_speed, 1.0), (ds.crossing_speed, -1.0)):
+        v, dv = top * rise, top * 6 * t * (1 - t) * w
+        parts = {"viscous": ds.a * v, "dry": ds.R + 0 * v, "drag": ds.c * v**ds.n}
+        left = ds.mu + sign * sum(parts.values())
+        for name, f in parts.items():
+            lost[name] = lost[name] + (f * v / left * dv).sum("node")
+    work = 2 * ds.mu * ds.phi0
+    known = {name: value / work for name, value in lost.items()}
+    known["impacts"] = 0.5 * (1 - ds.e**2) * ds.crossing_speed**2 / work
+    there = ds.sensitivity.notnull()
+    whole = sum(known.values())
+    return ds.assign(
+        {name: (value / whole).where(there) for name, value in known.items()} | {"deficit": abs(whole - 1).where(there)}
+    )
+
+
+def prepared(ds: xr.Dataset) -> xr.Dataset:
+    """`ds` with shares, `swing` = amplitude/phi0, N, and the laws (1) and (2)."""
+    order = ds.sensitivity.dims
+    parts = [shares(ds.isel(mu=slice(i, i + 8))) for i in range(0, ds.sizes["mu"], 8)]
+    ds = xr.concat(parts, "mu", data_vars="minimal", coords="minimal", compat="override", join="outer")
+    N = ds.viscous + ds.n * ds.drag
+    ds = ds.assign(swing=ds.amplitude / ds.phi0, N=N, light=(N + ds.impacts) / (N + 2), heavy=1 / N)
+    return ds.transpose(*order)
+
+
+def laws(ds: xr.Dataset) -> list[Statement]:
+    """(1) and (2) against every cell of large and of small swings."""
+    large, small = ds.where(ds.swing > LARGE), ds.where(ds.swing < SMALL)
+    small = small.where(small.impacts < 0.01)
+    light, heavy = abs(large.sensitivity - large.light), abs(small.sensitivity / small.heavy - 1)
+    mixed = large.where(large[["viscous", "dry", "drag", "impacts"]].to_array().max("variable") < 0.7)
+    between_laws = float(abs(mixed.sensitivity - mixed.light).max())
+    gap = float(ds.deficit.where(ds.swing > 2).max())
+    return [
+        Statement("the shares are the work, swings over 2 phi0", "1", "largest deviation", gap, gap < 1e-6),
+        Statement(f"(1), swings over {LARGE:g} phi0", "s", f"{int(light.notnull().sum())} cells", float(light.max()),
+                  bool(light.max() < 1e-3)),
+        Statement("  of these no loss takes over 70 %", "s", f"{int(mixed.sensitivity.notnull().sum())} cells",
+                  between_laws, between_laws < 1e-3),
+        Statement(f"(2), swings under {SMALL:g} phi0", "s", f"{int(heavy.notnull().sum())} cells", float(heavy.max()),
+                  bool(heavy.max() < 0.05)),
+    ]  # fmt: skip
+
+
+def pure_laws() -> list[Statement]:
+    """n/(n + 2) and 1/n of one friction alone, once more at degrees that are not on the grid."""
+    lines = []
+    for n in (0.25, 1.5, 2.0, 4.0):
+        axes = {"mu": np.geomspace(1e-30, 1e30, 3)}
+        study = sweep.build_study(
+            kernel="foliot", axes=axes, fixed={"n": n, "c": 1.0, "phi0": 1.0}, outputs=["sensitivity"]
+        )
+        s = sweep.run(study).sensitivity.values
+        weak, strong = (s[0], s[-1]) if n < 2 else (s[-1], s[0])
+        off = max(abs(weak - 1 / n), abs(strong - n / (n + 2)))
+        lines.append(Statement(f"drag of degree {n:g} alone: 1/n, n/(n + 2)", f"{1 / n:.4f}, {n / (n + 2):.4f}",
+                               f"{weak:.4f}, {strong:.4f}", off, bool(off < 1e-6)))  # fmt: skip
+    return lines
+
+
+def best_torques() -> list[Statement]:
+    """The torque of least s where viscous and dry friction act: known to 50 digits for two."""
+    lines = []
+    for R, least, place in ((10.0, 0.27318, 8.719), (100.0, 0.17768, 6.098)):
+        mu = R * np.geomspace(1.5, 60, 400)
+        study = sweep.build_study(kernel="foliot", axes={"mu": mu}, fixed={"a": 1.0, "R": R, "phi0": 1.0}, rtol=1e-12)
+        s = sweep.run(study).sensitivity.values
+        k = int(s.argmin())
+        fit = np.polyfit(np.log(mu[k - 2 : k + 3]), s[k - 2 : k + 3], 2)
+        top = math.exp(-fit[1] / (2 * fit[0])) / R
+        lines.append(differing(f"R = {R:g} a^2 phi0: least s", f"{least}", float(s.min()), least, 1e-4, 5))
+        lines.append(compared("  at mu/R", f"{place}", top, place, 1e-3, 4))
+    return lines
+
+
+def widths(ds: xr.Dataset) -> list[Statement]:
+    """How many decades of torque the exponent takes for the middle half of its way from law to law, a = 1/s."""
+    smooth = ds.sel(n=3, a=1, R=0)
+    known = (
+        ("1 to 1/3, viscous, small to large swings", smooth.sel(c=0, e=1), (1.0, 1 / 3), _by_q()),
+        ("1/3 to 1/2, viscous to impacts (e = .99)", smooth.sel(c=0, e=0.99), (1 / 3, 1 / 2), _by_shares(1, None)),
+        ("1/3 to 3/5, viscous to drag of degree 3", smooth.sel(c=1e-6, e=1), (1 / 3, 3 / 5), _by_shares(1, 3)),
+    )
+    return [
+        compared(f"{what}: decades", f"{theory:.3f}", width(line, *ends), theory, 0.03, 4)
+        for what, line, ends, theory in known
+    ]
+
+
+def _by_q() -> float:
+    """Of one viscous loss, from s = 5/6 to 1/2, by s and alpha as functions of q = a P/4."""
+    from scipy.optimize import brentq
+
+    def place(s: float) -> float:
+        q = brentq(lambda q: (1 - math.tanh(q) / q) / math.tanh(q) ** 2 - s, 0.1, 500.0)
+        return -math.log10(q - math.tanh(q))
+
+    return abs(place(5 / 6) - place(1 / 2))
+
+
+def _by_shares(n: float, other: float | None) -> float:
+    """(3) from a friction of degree n to one of degree `other`, None: to impacts."""
+    r = np.geomspace(1e-6, 1e6, 200001)  # ratio of the shares
+    share = r / (1 + r)
+    N = n * (1 - share) + (other or 0.0) * share
+    s = (N + (share if other is None else 0.0)) / (N + 2)
+    rate = 1 - n * (1 - s) if other is None else (other - n) * (1 - s)
+    log_mu = np.concatenate([[0.0], np.cumsum(np.diff(np.log10(r)) / (0.5 * (rate[1:] + rate[:-1])))])
+    low, high = (s[0] + part * (s[-1] - s[0]) for part in (0.25, 0.75))
+    return float(np.interp(high, s, log_mu) - np.interp(low, s, log_mu))
+
+
+def width(line: xr.Dataset, start: float, end: float) -> float:
+    """Decades of mu between the last passages of 25 % and 75 % of the way from s = start to end; NaN if not there."""
+    s, x = line.sensitivity.values, np.log10(line.mu.values)
+    places = []
+    for share in (0.25, 0.75):
+        value = start + share * (end - start)
+        way = (s[:-1] - value) * (s[1:] - value) < 0
+        if not way.any():
+            return math.nan
+        i = np.flatnonzero(way)[-1]
+        places.append(x[i] + (value - s[i]) / (s[i + 1] - s[i]) * (x[i + 1] - x[i]))
+    return float(abs(places[1] - places[0]))
+
+
+def statements(ds: xr.Dataset) -> Groups:
+    """Every line of the table, by heading."""
+    return {
+        "The general law": laws(ds),
+        "One loss alone": pure_laws(),
+        "Best torque, viscous and dry": best_torques(),
+        "Width of the crossovers (25 to 75 %)": widths(ds),
+    }
+
+
+PLANE = {"a": 1.0, "e": 0.99, "c": 1e-6, "n": 3.0, "phi0": 1.0}
+"""The clock whose exponent is mapped over torque and dry friction."""
+
+
+def plane() -> xr.Dataset:
+    """s over torque and dry friction of a clock with all four losses, with the shares."""
+    axes = {
+        "R": {"spacing": "log", "start": 1e-3, "stop": 1e4, "num": 85},
+        "mu": {"spacing": "log", "start": 1e-3, "stop": 1e8, "num": 133},
+    }
+    outputs = ["amplitude", "crossing_speed", "sensitivity"]
+    return prepared(sweep.run(sweep.build_study(kernel="foliot", axes=axes, fixed=PLANE, rtol=1e-7, outputs=outputs)))
+
+
+def figure(ds: xr.Dataset, whole: xr.Dataset) -> Any:
+    """The law over shares, over torque and friction, over the degree, and against every cell; for two columns."""
+    from sweep.show import charts
+
+    with charts.style():
+        page = charts.new_figure(charts.PAGE, 140.0)
+        (triangle, region), (degree, check) = page.subplots(2, 2)
+        draw_triangle(page, triangle, ds)
+        draw_region(page, region, whole)
+        draw_degrees(degree)
+        draw_check(check, ds)
+        for axes, text in zip((triangle, region, degree, check), "abcd", strict=True):
+            charts.letter(axes, text)
+    return page
+
+
+def draw_triangle(page: Any, axes: Any, ds: xr.Dataset) -> None:
+    """(1) over the shares of viscous, dry and impact losses; rings are cells of the sweep, filled with their own s."""
+    import matplotlib.tri as tri
+
+    steps = 60
+    corner = np.array([(i / steps, j / steps) for i in range(steps + 1) for j in range(steps + 1 - i)])
+    viscous, struck = corner.T
+    s = (viscous + struck) / (viscous + 2)
+    x, y = struck + 0.5 * viscous, viscous * math.sqrt(3) / 2
+    mesh = tri.Triangulation(x, y)
+    filled = axes.tripcolor(mesh, s, vmin=0, vmax=0.5, cmap="cividis", shading="gouraud", rasterized=True)
+    lines = axes.tricontour(mesh, s, levels=[0.1, 0.2, 0.3, 0.4], colors="white", linewidths=0.7)
+    axes.clabel(lines, fmt="%.1f", fontsize=7)
+    cells = ds.sel(n=3, c=0).where((ds.swing > 20).sel(n=3, c=0))
+    v, e, found = (cells[name].values.ravel() for name in ("viscous", "impacts", "sensitivity"))
+    at = np.isfinite(found) & (np.minimum(np.minimum(v, e), 1 - v - e) > 0.02)
+    look = {"vmin": 0, "vmax": 0.5, "cmap": "cividis", "edgecolors": "black", "linewidths": 0.5, "s": 9}
+    axes.scatter((e + 0.5 * v)[at], (v * math.sqrt(3) / 2)[at], c=found[at], label="cells of the sweep", **look)
+    page.colorbar(filled, ax=axes, label="exponent, $s$ [1]", pad=0.02, shrink=0.85)
+    for where, text in (((0, -0.02), "dry, 0"), ((1, -0.02), "impacts, 1/2"), ((0.5, 0.89), "viscous, 1/3")):
+        axes.text(*where, text, ha="center", va="bottom" if where[1] > 0 else "top", fontsize=8)
+    axes.set(xlim=(-0.08, 1.08), ylim=(-0.12, 1.0), aspect="equal")
+    axes.axis("off")
+    axes.legend(loc="lower center", fontsize=7, borderaxespad=0)
+
+
+def draw_region(page: Any, axes: Any, whole: xr.Dataset) -> None:
+    """s over torque and dry friction; lines where another loss comes to be the largest, dots where s is least."""
+    mu, R, s = whole.mu.values, whole.R.values, whole.sensitivity.transpose("R", "mu").values
+    mesh = axes.pcolormesh(mu, R, s, vmin=0, vmax=1, cmap="cividis", shading="nearest", rasterized=True)
+    page.colorbar(mesh, ax=axes, label="exponent, $s$ [1]", pad=0.02, extend="max")
+    names = ("viscous", "dry", "drag", "impacts")
+    parts = np.stack([whole[name].transpose("R", "mu").values for name in names])
+    largest = np.where(np.isfinite(s), np.argmax(np.nan_to_num(parts), axis=0), np.nan)
+    for k in range(len(names)):
+        axes.contour(mu, R, np.where(largest == k, 1.0, 0.0), levels=[0.5], colors="white", linewidths=0.7)
+    least = [int(np.nanargmin(row)) for row in s]
+    axes.plot(mu[least], R, ".", color="#D55E00", markersize=3, label="least $s$")
+    direct_label(axes, 3e-2, 2e-3, "viscous, 1", fontsize=7)
+    direct_label(axes, 5e2, 2e-2, "viscous, 1/3", fontsize=7)
+    direct_label(axes, 3e6, 2e-2, "drag, 3/5", fontsize=7)
+    direct_label(axes, 1.3e4, 1.5e3, "dry, 0", fontsize=7)
+    direct_label(axes, 3e-2, 1e2, "never starts", fontsize=7)
+    axes.set(xscale="log", yscale="log", xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]")
+    axes.set(ylabel=r"dry friction, $R/(a^2\varphi_0)$ [1]", xlim=(mu[0], mu[-1]), ylim=(R[0], R[-1]))
+    axes.legend(loc="lower right", fontsize=7)
+
+
+def draw_degrees(axes: Any) -> None:
+    """The two exponents of one friction over its degree."""
+    from sweep.show.charts import COLOURS
+
+    n = np.linspace(0.02, 4, 200)
+    axes.plot(n, n / (n + 2), color=COLOURS[0], label="large swings, $n/(n+2)$")
+    axes.plot(n, 1 / n, color=COLOURS[1], linestyle="--", label="small swings, $1/n$")
+    axes.axhline(0.5, color=COLOURS[2], linewidth=0.8, linestyle=":", label="impacts, 1/2")
+    for degree in (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0):
+        axes_mu = {"mu": np.geomspace(1e-30, 1e30, 3)}
+        study = sweep.build_study(
+            kernel="foliot", axes=axes_mu, fixed={"n": degree, "c": 1.0, "phi0": 1.0}, outputs=["sensitivity"]
+        )
+        ends = sweep.run(study).sensitivity.values[[0, -1]]
+        axes.plot([degree] * 2, ends, "o", color="black", markerfacecolor="white", markersize=4)
+    axes.plot([], [], "o", color="black", markerfacecolor="white", markersize=4, label="kernel, $\\mu=10^{\\mp30}$")
+    axes.set(xlabel="degree of the friction, $n$ [1]", ylabel="exponent, $s$ [1]", xlim=(0, 4.2), ylim=(0, 2.2))
+    axes.legend(loc="upper right", fontsize=7)
+
+
+def draw_check(axes: Any, ds: xr.Dataset) -> None:
+    """The exponent of every cell against (1), by the swing."""
+    from sweep.show.charts import COLOURS
+
+    bands = ((1.5, 3, "0.8"), (3, 10, COLOURS[5]), (10, 100, COLOURS[1]), (100, math.inf, COLOURS[0]))
+    for low, high, colour in bands:
+        part = ds.where((ds.swing > low) & (ds.swing <= high))
+        name = f"{low:g} to {high:g}" if math.isfinite(high) else f"over {low:g}"
+        axes.plot(part.light.values.ravel(), part.sensitivity.values.ravel(), ".", color=colour, markersize=1.6,
+                  label=name, rasterized=True)  # fmt: skip
+    axes.plot([0, 0.6], [0, 0.6], color="black", linewidth=0.8, label="theory (1)")
+    axes.set(xlabel=r"$(N+\lambda_e)/(N+2)$ [1]", ylabel="exponent, $s$ [1]", xlim=(0, 0.62), ylim=(0, 1.0))
+    axes.legend(title=r"swing, $A/\varphi_0$", loc="upper left", markerscale=5, fontsize=7)
+
+
+def caption(ds: xr.Dataset, whole: xr.Dataset) -> list[str]:
+    """Two to four sentences with the numbers of the datasets."""
+    large = ds.where(ds.swing > LARGE)
+    off = float(abs(large.sensitivity - large.light).max())
+    count = int(large.sensitivity.notnull().sum())
+    s = whole.sensitivity
+    low = s.isel(R=int(abs(np.log(whole.R / 100)).argmin("R")))
+    k = int(low.argmin("mu"))
+    best = f"{float(low[k]):.3f}, at {float(low.mu[k] / low.R):.1f} R"
+    return paragraph(f"""Figure. Exponent s of P ~ torque^(-s) of a foliot. (a) At large swings it depends on the shares
+        of the losses alone, s = (N + lambda_e)/(N + 2): 0 where all is dry friction, 1/3 viscous, 1/2 impacts, and
+        n/(n + 2) friction of degree n; {count} cells with swings over 100 phi0 agree to {off:.0e}. (b) Over torque and
+        dry friction, with a = 1/s, e = 0.99 and a cubic drag of 1e-6: white lines where another loss is the largest,
+        dots where the torque is best; with R = 100 a^2 phi0 the least s is {best}. (c) One friction alone: 1/n at small
+        swings, n/(n + 2) at large; they meet at n = 2. (d) Every cell against the law. The middle half of the way from
+        1/3 to 1/2 takes {_by_shares(1, None):.1f} decades of torque, that from 1 to 1/3 {_by_q():.1f}.""")
+
+
+def conclude(path: str) -> tuple[Groups, list[str], Any]:
+    """Statements, the caption and the figure."""
+    ds = prepared(read_result(path, "foliot", ["n", "e", "a", "R", "c", "mu"], "law_map.toml"))
+    whole = plane()
+    law = "the law: s = (N + lambda_e)/(N + 2) at large swings, 1/N at small, N = sum of n lambda_n over the frictions"
+    return statements(ds), [law, "", NOTES, *caption(ds, whole)], figure(ds, whole)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Table and figure of the result that is named; 1 if a statement does not hold."""
+    return report(__file__, ["law_map.h5"], arguments, conclude)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

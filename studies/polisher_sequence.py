@@ -1,0 +1,258 @@
+"""Which sequence of settings polishes evenly, and how does a machine keep its middle when its throw changes?
+
+    sweep run studies/polisher_sequence.toml
+    python studies/polisher_sequence.py polisher_sequence.h5
+
+draws polisher_sequence.png and prints what comes out. Wear adds up, so the time t_i >= 0 spent at setting i of the
+sweep wears the sum of t_i h_i(r); the most even sum of given mean is a least-squares problem over the area with t >=
+0.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from _common import Groups, Statement, compared, paragraph, read_result, report
+
+import sweep
+
+TOOLS = (
+    (2, 2, 1, 1), (2, 2, 1, 2), (1, 1, 1, 2), (0.5, 0.5, 1, 2), (100, 100, 1, 2),
+    (2, 1, 1, 2), (2, 0.5, 1, 2), (2, 8, 1, 2),
+)  # fmt: skip
+"""n, m, a, b of the paper's figure 5, abs(X/a)^n + abs(Y/b)^m <= 1: five known tools, three unknown ones."""
+
+NOTES = """\
+unevenness: standard deviation over the area, over the mean; allowed: 1e-6 of the conditions of an optimum, 1e-9 m of a
+length found by roots, 2 % of A0's slopes over 5 cm of throw; 1e-5 between mirrored
+machines, 1e-3 if the work turns the other way, against which the arm goes to and fro alike
+"""
+
+
+def weights(ds: xr.Dataset) -> np.ndarray:
+    """Share of the area at each radius, by trapezoids."""
+    area = ds.radius.values.copy()
+    area[-1] *= 0.5
+    return area / area.sum()
+
+
+def unevenness(profile: np.ndarray, weight: np.ndarray) -> float:
+    """Standard deviation over the area, over the mean."""
+    mean = float((profile * weight).sum())
+    return math.sqrt(float(((profile - mean) ** 2 * weight).sum())) / mean
+
+
+def mixture(ds: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Profiles of mean 1, one a row; the shares of the wear by each; the mixed profile."""
+    from scipy.optimize import nnls
+
+    weight = weights(ds)
+    rows = ds.wear.stack(setting=("e", "w_x")).transpose("setting", "radius").values
+    rows = rows / (rows * weight).sum(axis=1, keepdims=True)
+    root = np.sqrt(weight)
+    shares, _ = nnls((rows * root).T, root)
+    shares = shares / shares.sum()
+    return rows, shares, shares @ rows
+
+
+def optimum(ds: xr.Dataset) -> list[Statement]:
+    """What a sequence gains over one setting, and whether it is the best."""
+    weight = weights(ds)
+    rows, shares, mixed = mixture(ds)
+    singles = np.array([unevenness(row, weight) for row in rows])
+    kept = singles[rows[:, 0] >= 0.5].min()
+    scale = float((mixed * weight).sum() / (mixed**2 * weight).sum())
+    slope = rows @ ((scale * mixed - 1) * weight)  # of the sum of squares, 0 where a share is above 0
+    used = shares > 1e-9
+    worst = max(float(abs(slope[used]).max()), float(-slope[~used].min(initial=0.0)))
+    best, hole = unevenness(mixed, weight), float(rows[singles.argmin(), 0])
+    return [
+        Statement("best single setting", "-", f"{singles.min():.1%}, centre {hole:.2f}", None, hole < 0.5),
+        Statement("best single setting without a hole", "-", f"{kept:.1%}", None, bool(0.2 < kept < 0.4)),
+        Statement("best sequence", "-", f"{best:.1%}, centre {mixed[0]:.2f}, {used.sum()} settings", None,
+                  bool(best < kept / 3 and 0.5 < mixed[0] < 1.5)),
+        Statement("  conditions of an optimum", "0", "largest breach", worst, worst < 1e-6),
+        *[Statement(f"  {s:.0%} of the wear at", "", where) for s, where in steps(ds, shares)],
+    ]  # fmt: skip
+
+
+def steps(ds: xr.Dataset, shares: np.ndarray) -> list[tuple[float, str]]:
+    """Shares above a hundredth with their settings, largest first."""
+    places = [(float(e), float(w)) for e in ds.e.values for w in ds.w_x.values]
+    order = [i for i in np.argsort(-shares) if shares[i] > 0.01]
+    return [(float(shares[i]), f"e = {100 * places[i][0]:g} cm, offset {100 * (places[i][1] - float(ds.L)):.0f} cm")
+            for i in order]  # fmt: skip
+
+
+def middle(d: float, e: float, b: float, f: float) -> float:
+    """A0 [rad] by (39)."""
+    return 0.5 * sum(math.acos((b * b + d * d - (f + s * e) ** 2) / (2 * b * d)) for s in (1, -1))
+
+
+def correction(ds: xr.Dataset) -> list[Statement]:
+    """How far O_DH moves on the arm so that the middle stays when the throw goes from 10 to 15 cm."""
+    from scipy.optimize import brentq
+
+    b, d, f = (float(ds[name]) for name in "bdf")
+    kept = middle(d, 0.10, b, f)
+    exact = brentq(lambda x: middle(x, 0.15, b, f) - kept, 0.37, 0.45, xtol=1e-14)
+    # the kernel's own angles there, and its slopes for small steps
+    study = sweep.build_study(
+        kernel="polisher", design="zip", axes={"d": [d, exact, d], "e": [0.10, 0.15, 0.15]}, fixed={"b": b, "f": f}
+    )
+    cells = sweep.run(study)
+    small = brentq(lambda x: middle(x, 0.101, b, f) - kept, 0.37, 0.45, xtol=1e-15) - d
+    slope = -float(cells.A0_e[0] / cells.A0_d[0]) * 1e-3
+    shift = math.degrees(float(cells.A0[2] - cells.A0[0]))
+    return [
+        Statement("throw 10 to 15 cm, same arm: the middle moves by [degree]", "-", f"{shift:.3f}", None, shift < -1),
+        Statement("  O_DH moved to keep it: arm [cm]", "-", f"{100 * d:g} to {100 * exact:.3f}",
+                  float(cells.A0[1] - cells.A0[0]), bool(abs(cells.A0[1] - cells.A0[0]) < 1e-9)),
+        compared("  for 1 mm of throw, by A0_e/A0_d [um]", f"{1e6 * small:.2f}", 1e6 * slope, 1e6 * small, 0.02, 5),
+    ]  # fmt: skip
+
+
+def mirrored(ds: xr.Dataset) -> list[Statement]:
+    """Type B with b on the other side, and all turning the other way, is type A in a mirror."""
+    fixed = {name: float(ds[name]) for name in
+             ("b", "d", "f", "L", "tool_a", "tool_b", "preston", "pressure", "omega", "Omega", "b_angle")}  # fmt: skip
+    along, axes = {"radius": ds.radius.values[::10]}, {"e": [0.1], "w_x": [0.53]}
+    profiles = []
+    for kind, sign in (("A", 1.0), ("B", -1.0), ("B same way", -1.0)):
+        turned = {"b_angle": sign * fixed["b_angle"]}
+        if kind == "B":
+            turned |= {"omega": -fixed["omega"], "Omega": -fixed["Omega"]}
+        study = sweep.build_study(
+            kernel="polisher_wear", axes=axes, fixed=fixed | turned | {"type": kind[0]}, along=along, rtol=1e-7
+        )
+        profiles.append(sweep.run(study).wear.values.ravel())
+    off = float(abs(profiles[1] / profiles[0] - 1).max())
+    other = float(abs(profiles[2] / profiles[0] - 1).max())
+    return [
+        Statement("type B in the mirror of type A: wear", "the same", "largest deviation", off, off < 1e-5),
+        Statement("type B, motor and work turning as those of A", "the same", "largest deviation", other, other < 1e-3),
+    ]
+
+
+def figure(ds: xr.Dataset) -> Any:
+    """Machines, tools, profiles and shares; for two columns of print."""
+    from sweep.show import charts
+
+    with charts.style():
+        page = charts.new_figure(charts.PAGE, 112.0)
+        (machines, tools), (profiles, shares) = page.subplots(2, 2)
+        draw_machines(machines, ds)
+        draw_tools(tools)
+        draw_profiles(profiles, ds)
+        draw_shares(page, shares, ds)
+        for axes, text in zip((machines, tools, profiles, shares), "abcd", strict=True):
+            charts.letter(axes, text)
+    return page
+
+
+def draw_machines(axes: Any, ds: xr.Dataset) -> None:
+    """Pivot, motor, crank, coupler and arm of both types at e = 10 cm, the paper's figure 3."""
+    from sweep.show.charts import COLOURS
+
+    b, d = float(ds.b), float(ds.d)
+    turn = 1.0
+    study = sweep.build_study(
+        kernel="polisher_motion", axes={"type": ["A", "B"]}, along={"crank_angle": np.array([turn])},
+        fixed={"b": b, "d": d, "f": float(ds.f), "e": 0.1, "omega": 1.0}, outputs=["alpha"],
+    )  # fmt: skip
+    angles = sweep.run(study).alpha.values.ravel()
+    pin = np.array([b + 0.1 * math.cos(turn), 0.1 * math.sin(turn)])
+    ring = np.linspace(0, 2 * np.pi, 100)
+    axes.plot(b + 0.1 * np.cos(ring), 0.1 * np.sin(ring), color="0.7", linewidth=0.8, label="circle of the crank")
+    axes.plot([b, pin[0]], [0, pin[1]], color="black", label="crank, $e$")
+    for k, (kind, alpha) in enumerate(zip("AB", angles, strict=True)):
+        end = d * np.array([math.cos(alpha), math.sin(alpha)])
+        axes.plot([0, end[0]], [0, end[1]], color=COLOURS[k], label=f"arm, type {kind}")
+        axes.plot([end[0], pin[0]], [end[1], pin[1]], "--", color=COLOURS[k], label=f"coupler, type {kind}")
+    axes.plot([0, b], [0, 0], "o", color="black", markersize=4, label="pivot, motor")
+    axes.set(xlabel="$x$ [m]", ylabel="$y$ [m]", xlim=(-0.53, 1.21), ylim=(-0.25, 0.77))
+    axes.set_aspect("equal", "datalim")
+    axes.legend(loc="upper center", fontsize=6.5, ncols=2)
+
+
+def draw_tools(axes: Any) -> None:
+    """Outlines of the paper's figure 5."""
+    from sweep.show.charts import COLOURS
+
+    t = np.linspace(0, 1, 400)
+    for k, (n, m, a, b) in enumerate(TOOLS):
+        x = np.concatenate([t, t[::-1]]) ** (1 if n >= 1 else 2)
+        y = (1 - np.minimum(x**n, 1)) ** (1 / m)
+        y[400:] *= -1
+        centre = np.array([3.2 * (k % 4), -5.2 * (k // 4)])
+        for side in (1, -1):
+            axes.plot(centre[0] + side * a * x, centre[1] + b * y, color=COLOURS[0 if k < 5 else 1], linewidth=1)
+        axes.text(centre[0], centre[1] + 2.25, f"${n:g},{m:g}$", ha="center", fontsize=7)
+    axes.plot([], [], color=COLOURS[0], label="known")
+    axes.plot([], [], color=COLOURS[1], label="unknown")
+    axes.set(xlim=(-8.5, 18), ylim=(-11.5, 4.0), xlabel="across [half widths]", ylabel="along [half widths]")
+    axes.set_aspect("equal", "datalim")
+    axes.legend(loc="lower center", ncols=2, fontsize=7, title="$n, m$ of the paper's tools", title_fontsize=7)
+
+
+def draw_profiles(axes: Any, ds: xr.Dataset) -> None:
+    """The best profiles of one setting, and of the sequence."""
+    from sweep.show.charts import COLOURS
+
+    weight = weights(ds)
+    rows, _, mixed = mixture(ds)
+    singles = np.array([unevenness(row, weight) for row in rows])
+    full = np.where(rows[:, 0] >= 0.5, singles, math.inf)
+    r = 1e3 * ds.radius.values
+    shown = {"one setting": rows[singles.argmin()], "one, without a hole": rows[full.argmin()], "sequence": mixed}
+    for k, (name, row) in enumerate(shown.items()):
+        axes.plot(r, row, color=COLOURS[k], label=f"{name}, {100 * unevenness(row, weight):.1f} %")
+    axes.set(xlabel="radius [mm]", ylabel="wear over its mean [1]", xlim=(0, 100), ylim=(0, 2))
+    axes.legend(loc="upper right", fontsize=7)
+
+
+def draw_shares(page: Any, axes: Any, ds: xr.Dataset) -> None:
+    """Share of the wear at each setting."""
+    _, shares, _ = mixture(ds)
+    grid = 100 * shares.reshape(ds.sizes["e"], ds.sizes["w_x"])
+    offset = 1e3 * (ds.w_x.values - float(ds.L))
+    mesh = axes.pcolormesh(offset, 1e3 * ds.e.values, grid, cmap="cividis", shading="nearest", rasterized=True)
+    page.colorbar(mesh, ax=axes, label="share of the wear [%]", pad=0.02)
+    axes.set(xlabel="offset [mm]", ylabel="eccentricity, $e$ [mm]")
+
+
+def caption(ds: xr.Dataset) -> list[str]:
+    """Two to four sentences with the numbers of the dataset."""
+    weight = weights(ds)
+    rows, shares, mixed = mixture(ds)
+    singles = np.array([unevenness(row, weight) for row in rows])
+    kept = singles[rows[:, 0] >= 0.5].min()
+    best = unevenness(mixed, weight)
+    return paragraph(f"""Figure. (a) Machines of type A and B, (b) the paper's eight tools. (c) The most even wear of
+        one setting, {singles.min():.1%}, leaves the centre alone; of the others the best is uneven by {kept:.1%},
+        and a sequence of {(shares > 1e-9).sum()} settings by {best:.1%}. (d) Its settings.""")
+
+
+def conclude(path: str) -> tuple[Groups, list[str], Any]:
+    """Statements, the caption and the figure."""
+    ds = read_result(path, "polisher_wear", ["e", "w_x"], "polisher_sequence.toml")
+    groups = {
+        "Sequences of settings": optimum(ds),
+        "Another throw about the same middle": correction(ds),
+        "Type B": mirrored(ds),
+    }
+    return groups, [NOTES, *caption(ds)], figure(ds)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Table and figure of the result that is named; 1 if a statement does not hold."""
+    return report(__file__, ["polisher_sequence.h5"], arguments, conclude)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

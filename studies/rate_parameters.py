@@ -1,0 +1,129 @@
+"""Which parameters decide a foliot's rate?
+
+    python studies/rate_parameters.py rate_parameters.h5
+
+prints Sobol' indices and Morris' effects of torque, friction, switching angle and restitution on ln(period), by SALib
+on designs of ours, beside what the exponents say, and draws the indices against the drive: rate_parameters.png.
+
+P = F(alpha)/a with alpha = mu/(a^2 phi0), so with s = -d ln P/d ln mu the exponents are -s for mu, s for phi0 and
+2 s - 1 for a. Where all are known equally well, the shares of the variance are their squares over the sum of these.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from _common import Groups, differing, read_result, report
+
+import sweep
+
+TOML = "studies/rate_parameters.toml"
+ALLOWED = 0.03
+"""Of a share: what 1024 points and a curve over 10 % leave."""
+DRIVES = np.geomspace(1e-2, 1e4, 25)
+RANGES = {name: {"spacing": "log", "start": 0.9048, "stop": 1.1052} for name in ("mu", "a", "phi0")}
+KEPT = {"e": {"spacing": "linear", "start": 0.99, "stop": 1.0}}
+POINTS = 128
+NAMES = {"mu": "torque", "a": "friction", "phi0": "switching angle", "e": "restitution"}
+
+NOTES = """\
+Friction decides nothing where the period falls as mu^(-1/2): what it takes from the speed it gives to the amplitude.
+Who wants a steady rate there looks after the torque and the pallets, not after the oil."""
+
+
+def read(path: str) -> xr.Dataset:
+    """The finished sweep. Raises SweepError where it is none of this study."""
+    return read_result(path, "foliot", ["cell"], TOML)
+
+
+def shares(s: float) -> dict[str, float]:
+    """Shares of the variance of ln(P) by torque, friction and angle, from the exponent of the torque."""
+    squares = {"mu": s**2, "a": (2 * s - 1) ** 2, "phi0": s**2}
+    return {name: square / sum(squares.values()) for name, square in squares.items()}
+
+
+def sampled(drive: float, kind: str, n: int) -> xr.Dataset:
+    """Cells of a design around a drive alpha, for a = phi0 = 1."""
+    torque = {**RANGES["mu"], "start": 0.9048 * drive, "stop": 1.1052 * drive}
+    axes = {**RANGES, "mu": torque, **KEPT}
+    return sweep.run(
+        kernel="foliot", rtol=1e-10, outputs=["period"], design={"kind": kind, "n": n, "seed": 1}, axes=axes
+    )
+
+
+def exponent(drive: float) -> float:
+    """s of the viscous foliot at a drive alpha."""
+    viscous = {"kernel": "foliot", "outputs": ["sensitivity"], "fixed": {"a": 1.0, "phi0": 1.0}}
+    clock = sweep.solver({**viscous, "axes": {"mu": [1.0]}})
+    return float(clock(drive).sensitivity)
+
+
+def against_drive(drives: Any = DRIVES) -> xr.Dataset:
+    """Indices of every parameter along the drive."""
+    found = []
+    for drive in drives:
+        ds = sampled(float(drive), "saltelli", POINTS)
+        found.append(sweep.sensitivity(ds, np.log(ds.period)))
+    return xr.concat(found, dim=xr.DataArray(drives, dims="alpha", name="alpha"))
+
+
+def statements(ds: xr.Dataset) -> Groups:
+    """What the indices are beside what the exponents say."""
+    drive = float(np.sqrt(ds.mu.min() * ds.mu.max()))
+    sobol = sweep.sensitivity(ds, np.log(ds.period)).total.to_series()
+    cells = sampled(drive, "morris", 64)
+    morris = sweep.sensitivity(cells, np.log(cells.period)).effect.to_series()
+    s, width = exponent(drive), float(np.log(1.1052 / 0.9048))
+    theory = shares(s)
+    effects = {"mu": s * width, "a": abs(2 * s - 1) * width, "phi0": s * width}
+    rest = 1 - float(sobol["e"])
+    return {
+        f"Sobol' index, total, at alpha = {drive:.3g}": [
+            differing(NAMES[name], f"{share:.4f}", float(sobol[name]) / rest, share, ALLOWED, 4)
+            for name, share in theory.items()
+        ],
+        "Morris' effect on ln(P), over the range": [
+            differing(NAMES[name], f"{effect:.4f}", float(morris[name]), effect, 0.01, 4)
+            for name, effect in effects.items()
+        ],
+    }
+
+
+def figure(found: xr.Dataset) -> Any:
+    """Total indices against the drive, with the shares that the exponents give."""
+    from sweep.show import charts
+
+    with charts.style():
+        page = charts.new_figure(120.0, 82.0)
+        axes = page.subplots()
+        colours = dict(zip(NAMES, charts.COLOURS, strict=False))
+        for name, colour in colours.items():
+            # torque and angle have the same share: rings around dots
+            ring = {"markersize": 7, "fillstyle": "none"} if name == "mu" else {}
+            axes.plot(found.alpha, found.total.sel(parameter=name), "o", color=colour, label=NAMES[name], **ring)
+        law = [shares(exponent(float(drive))) for drive in found.alpha.values]
+        for name in ("mu", "a", "phi0"):
+            axes.plot(found.alpha, [row[name] for row in law], "-", color=colours[name], zorder=0)
+        axes.set(xscale="log", ylim=(-0.02, 0.82), ylabel="share of the variance of ln(period) [1]")
+        axes.set_xlabel(r"drive, $\alpha = \mu/(a^2 \varphi_0)$ [1]")
+        axes.legend(title="points: total Sobol' index; lines: from the exponents alone", ncols=2, loc="upper center")
+    return page
+
+
+def conclude(path: str) -> tuple[Groups, Sequence[str], Any]:
+    """Table, notes and figure of a result."""
+    ds = read(path)
+    return statements(ds), NOTES.splitlines(), figure(against_drive())
+
+
+def main(arguments: Sequence[str]) -> int:
+    """The script."""
+    return report(__file__, ["rate_parameters.h5"], arguments, conclude)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

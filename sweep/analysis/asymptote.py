@@ -1,0 +1,289 @@
+"""Exponents far out: by a correction to scaling, and against the window.
+
+    y = A x^p (1 + B x^-D)                                                                          (1)
+
+D > 0 where p holds at large x, D < 0 where it holds at small x. Intervals are by profile likelihood (lmfit, extra
+`fit`): those by standard errors are too narrow where B and D are hardly told apart.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from sweep.analysis.correlated import student
+from sweep.analysis.curves import Window, check_confidence, log_of, numbers_along, title, window_logs
+from sweep.analysis.lines import fit_exponent
+from sweep.analysis.loglog import Array, slope_bounds, slopes
+from sweep.analysis.scatter import library, noise_size
+from sweep.analysis.shapes import CORRECTION, Found, fitted
+from sweep.system.errors import SweepError
+
+FEWEST_POINTS = 8
+
+SCATTERS = 0.3
+"""Share of the distances from (1) that is noise between neighbours, from which on they are scatter."""
+
+ENDS = ("low", "high")
+INTERVAL = ("exponent", "exponent_low", "exponent_high")
+NUMBERS = (*INTERVAL, "correction_exponent", "correction", "residual", "noisy", "fits")
+
+NAMES = {
+    "exponent": "exponent far out",
+    "exponent_low": "lower end of its interval",
+    "exponent_high": "upper end of its interval",
+    "correction_exponent": "D: how fast the correction fades",
+    "correction": "B x^-D at the outer end of the window",
+    "residual": "largest relative distance of a point from the curve",
+    "noisy": "1 where the interval is of scatter, 0 where of what a smaller window says otherwise",
+    "fits": "1 where the correction fades towards the end and is less than 1 there",
+}
+
+
+def fit_correction(
+    y: xr.DataArray, dim: str, window: Window | None = None, *, end: str = "high", confidence: float = 0.95
+) -> xr.Dataset:
+    """Asymptotic exponent by a correction to scaling, equation (1).
+
+    Where points scatter, the interval is by profile likelihood, of independent noise of one size; without an end
+    where no exponent can be ruled out. Where they do not, it is three times as far as the fit to the outer half of
+    the window moves the exponent.
+
+    Parameters
+    ----------
+    y : DataArray
+        Any shape; missing points are left out.
+    dim : str
+        Dimension of `y`, or 1-D coordinate along one; positive and strictly monotone.
+    window : (low, high), optional
+        Ends in the unit of `dim`.
+    end : "high" or "low"
+        Where (1) tends to a power law.
+    confidence : float
+        Of the intervals.
+
+    Returns
+    -------
+    Dataset
+        `exponent` with `exponent_low`, `exponent_high`, `correction_exponent` (D) [1]; `correction`, B x^-D at the
+        outer end; `residual`; `noisy`; `fits`. The dimensions are those of `y` but `dim`. NaN of fewer than eight
+        points.
+
+    Raises
+    ------
+    SweepError
+        If `dim` or `end` is unknown or unfit, y is not positive in the window, or lmfit is needed and not installed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(10, 1e5, 41)})
+    >>> print(f"{float(sweep.fit_correction(ds.period, 'mu').exponent):.4f}")
+    -0.3334
+    """
+    check_confidence(confidence)
+    _check_end(end)
+    dimension, t, logs = window_logs(y, dim, window)
+    sign = 1.0 if end == "high" else -1.0
+    found = numbers_along(NUMBERS, lambda z: _each(sign * t, z, sign, confidence), logs, dimension)
+    if not bool(found.exponent.notnull().any()):
+        raise SweepError(
+            f"a correction to scaling needs at least {FEWEST_POINTS} points of {title(y)}; widen the window"
+        )
+    for name, text in NAMES.items():
+        found[name].attrs = {"units": "1", "long_name": text}
+    found.attrs = {"y": title(y), "x": dim, "law": f"{title(y)} = A {dim}^p (1 + B {dim}^-D), {end} end"}
+    return found
+
+
+def _check_end(end: str) -> None:
+    if end not in ENDS:
+        raise SweepError(f'end: expected "low" or "high", found {end!r}')
+
+
+def _each(t: Array, z: Array, sign: float, confidence: float) -> Array:
+    rows = [_one(t, row, sign, confidence) for row in z.reshape(math.prod(z.shape[:-1]), t.size)]
+    return np.array(rows).reshape(*z.shape[:-1], len(NUMBERS))
+
+
+def _one(t: Array, z: Array, sign: float, confidence: float) -> Array:
+    """One line; t runs towards the end where (1) is a power law, and exponents take `sign`."""
+    present = np.flatnonzero(np.isfinite(z))
+    present = present[np.argsort(t[present])]
+    t, z = t[present], z[present]
+    found = fitted(CORRECTION, t, z)
+    if found is None or t.size < FEWEST_POINTS:
+        return np.full(len(NUMBERS), np.nan)
+    exponent, fade, left = _outer(found, t)
+    noisy = _scatters(t, z, found.off)
+    ends = _profile(t, z, found, exponent, confidence) if noisy else _by_half(t, z, exponent)
+    low, high = sorted(sign * end for end in ends)
+    residual = math.expm1(float(abs(found.off).max()))
+    return np.array([sign * exponent, low, high, sign * fade, left, residual, noisy, abs(left) < 1])
+
+
+def _scatters(t: Array, z: Array, off: Array) -> bool:
+    beyond_rounding = abs(off).max() > 1e-12 * (1 + abs(z).max())
+    return bool(beyond_rounding and noise_size(t, off) > SCATTERS * float(np.sqrt(np.mean(off**2))))
+
+
+def _outer(found: Found, t: Array) -> tuple[float, float, float]:
+    """p and D of the law that is left at the last point, and the correction there.
+
+    (1) is a sum of two powers; whichever is larger there is the law, and the other one the correction.
+    """
+    strength, fade, _, exponent = found.numbers
+    span = float(t[-1] - t[0])
+    last = float(strength * math.exp(min(-fade / 2, 300.0)))
+    if fade > 0:
+        return exponent / span, fade / span, last
+    return (exponent - fade) / span, -fade / span, 1 / last if last else math.inf
+
+
+def _by_half(t: Array, z: Array, exponent: float) -> tuple[float, float]:
+    """Ends of an interval three times as far as the outer half of the window moves the exponent."""
+    half = t >= (t[0] + t[-1]) / 2
+    other = fitted(CORRECTION, t[half], z[half])
+    local = slopes(t, z, 5)[-1] if other is None else _outer(other, t[half])[0]
+    rounding = float(slope_bounds(t, np.full(t.size, 1e-15 * (1 + abs(z).max())), 5)[-1])
+    reach = 3 * abs(float(local) - exponent) + rounding
+    return exponent - reach, exponent + reach
+
+
+def _profile(t: Array, z: Array, found: Found, exponent: float, confidence: float) -> tuple[float, float]:
+    """Exponents at which the least sum of squares, all else fitted anew, is as far up as noise takes it.
+
+    The threshold is Student's t squared, which is F's of one and n - 4 degrees of freedom.
+    """
+    lmfit = library("lmfit")
+    span = float(t[-1] - t[0])
+    s = (t - t[0]) / span
+    parameters = lmfit.Parameters()
+    strength, fade, level, slope = found.numbers
+    if fade < 0:  # the other of the two powers is the law
+        level, slope = level + math.log(abs(strength)) if strength else level, slope - fade
+        strength, fade = 1 / strength if strength else 0.0, -fade
+    for name, value in (("strength", strength), ("fade", fade), ("level", level), ("slope", slope)):
+        parameters.add(name, value=float(value))
+    parameters["fade"].set(min=0.3, max=80.0)
+
+    def off(p: Any) -> Array:
+        factor = 1 + p["strength"].value * np.exp(-p["fade"].value * (s - 0.5))
+        line = p["level"].value + p["slope"].value * s
+        return np.where(factor > 0, line + np.log(np.maximum(factor, 1e-300)) - z, 10.0)
+
+    fitter = lmfit.Minimizer(off, parameters, nan_policy="propagate")
+    best = fitter.minimize(method="leastsq")
+    least = float(best.chisqr)
+    size = math.sqrt(least / (t.size - 4))
+    wanted = least * (1 + student(t.size - 4, confidence) ** 2 / (t.size - 4))
+    first = max(abs(float(best.params["slope"].stderr or 0.0)), 0.3 * size)
+    ends = [_edge(fitter, best.params, sign * min(first, 2.0), wanted) for sign in (-1, 1)]
+    return ends[0] / span, ends[1] / span
+
+
+def _edge(fitter: Any, best: Any, step: float, wanted: float) -> float:
+    """Where the profile of the sum of squares passes a value, walking from the best; inf after 40 steps."""
+    inside, here = float(best["slope"].value), best
+    for _ in range(40):
+        outside = inside + step
+        tried = _held(fitter, here, outside)
+        if tried.chisqr > wanted:
+            break
+        inside, here, step = outside, tried.params, 1.4 * step
+    else:
+        return math.copysign(math.inf, step)
+    for _ in range(12):
+        middle = (inside + outside) / 2
+        tried = _held(fitter, here, middle)
+        if tried.chisqr > wanted:
+            outside = middle
+        else:
+            inside, here = middle, tried.params
+    return outside
+
+
+def _held(fitter: Any, near: Any, slope: float) -> Any:
+    parameters = near.copy()
+    parameters["slope"].set(value=slope, vary=False)
+    return fitter.minimize(method="leastsq", params=parameters, max_nfev=400)
+
+
+def exponent_by_window(
+    y: xr.DataArray, dim: str, *, end: str = "high", confidence: float = 0.95, steps: int = 8, bound: Any = None
+) -> xr.Dataset:
+    """The exponent against the window, ever smaller ones towards one end, and whether it comes to rest.
+
+    Windows are 1, 1/1.5, 1/1.5^2 ... of the range of ln dim. The exponent has a *plateau* where, from some window on,
+    one power law describes each of at least three, and their intervals have exponents in common.
+
+    Parameters
+    ----------
+    y : DataArray
+        One dimension.
+    dim : str
+        Its dimension, or 1-D coordinate along it.
+    end : "high" or "low"
+        The end that all windows reach to.
+    confidence, bound
+        As of `fit_exponent`.
+    steps : int
+        Windows at most; those of fewer than eight points are left out.
+
+    Returns
+    -------
+    Dataset
+        Along `window`, the widest first: what `fit_exponent` says. Attributes `plateau` (1 found, 0 denied), and if
+        found `exponent`, `exponent_low`, `exponent_high` of its widest window; `verdict`, a sentence.
+
+    Raises
+    ------
+    SweepError
+        As `fit_exponent`, or y has further dimensions, or no window has eight points.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e-2, 1e2, 41)})
+    >>> sweep.exponent_by_window(ds.period, "mu").attrs["plateau"]
+    0
+    """
+    _check_end(end)
+    if y.ndim != 1:
+        raise SweepError(f"{title(y)} runs along {', '.join(map(str, y.dims))}; take one line, choose with .sel")
+    x = y[dim].values[np.isfinite(log_of(y).values)]
+    if x.size < FEWEST_POINTS:
+        raise SweepError(f"an exponent against the window needs at least {FEWEST_POINTS} points, found {x.size}")
+    low, high = float(x.min()), float(x.max())
+    fits = []
+    for share in 1.5 ** -np.arange(float(steps)):
+        reach = (high / low) ** share
+        window = (high / reach, high) if end == "high" else (low, low * reach)
+        if ((x >= window[0]) & (x <= window[1])).sum() < FEWEST_POINTS:
+            break
+        fits.append(fit_exponent(y, dim, window, confidence=confidence, bound=bound))
+    found = xr.concat(fits, dim="window")
+    found.attrs = {**fits[0].attrs, **_plateau(found, dim, end)}
+    return found
+
+
+def _plateau(found: xr.Dataset, dim: str, end: str) -> dict[str, Any]:
+    p, low, high = (found[name].values for name in ("exponent", "exponent_low", "exponent_high"))
+    for first in range(p.size - 2):
+        one = (found.fits.values[first:] == 1).all()
+        if one and low[first:].max() <= high[first:].min():
+            here = {"exponent": float(p[first]), "exponent_low": float(low[first]), "exponent_high": float(high[first])}
+            place = float((found.low if end == "high" else found.high).values[first])
+            side = "above" if end == "high" else "below"
+            text = f"plateau: {here['exponent_low']:.6g} to {here['exponent_high']:.6g}"
+            text += f" in every window {side} {dim} = {place:.4g}"
+            return {"plateau": 1, **here, "verdict": text}
+    text = f"no plateau: the exponent still goes from {p[0]:.6g} to {p[-1]:.6g} as the window shrinks to the {end} end"
+    return {"plateau": 0, "verdict": text}

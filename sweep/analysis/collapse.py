@@ -1,0 +1,319 @@
+"""Exponents over a second parameter, and the two exponents of a collapse.
+
+    y = L^b f(x / L^a)                                                                              (1)
+
+In logarithms the curves of all L are one, ln y = b ln L + g(ln x - a ln L). With g a spline, b and g are linear for
+given a: a is searched over all of its range, so there is no start to be stuck at.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from sweep.analysis.correlated import student
+from sweep.analysis.curves import check_confidence, log_of, positive_axis, title
+from sweep.analysis.loglog import Array
+from sweep.analysis.scatter import library
+from sweep.system.errors import SweepError
+
+
+def fit_over(
+    fits: xr.Dataset, dim: str, formula: str, start: Mapping[str, float] | None = None, *, confidence: float = 0.95
+) -> xr.Dataset:
+    """Exponents against a second parameter, P ~ mu^p(n), by a formula for p.
+
+    Parameters
+    ----------
+    fits : Dataset
+        From `fit_exponent` of an output over two parameters: its exponents run along `dim`.
+    dim : str
+        The second parameter.
+    formula : str
+        Of `dim` and numbers to be found, e.g. "-1/(a + b*n)"; whatever lmfit's ExpressionModel takes.
+    start : mapping, optional
+        Where to start; default 1.
+
+    Returns
+    -------
+    Dataset
+        Along `number`, its names: `value`, `low`, `high`, by the bars of the exponents; along `dim`: `exponent`,
+        `fitted`. Attributes `fits`, 1 where the formula goes through all bars, or as many as chance has, and
+        `verdict`; where it does not, low and high are NaN.
+
+    Raises
+    ------
+    SweepError
+        There are no such exponents, the formula is none, or lmfit (extra `fit`) is not installed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> import xarray as xr
+    >>> mu, n = np.geomspace(1, 1e3, 30), np.linspace(0.5, 3, 9)
+    >>> y = xr.DataArray(mu[:, None] ** (-1 / (n + 1)), {"mu": mu, "n": n}, ("mu", "n"), name="P")
+    >>> found = sweep.fit_over(sweep.fit_exponent(y, "mu"), "n", "-1/(a + b*n)")
+    >>> print(f"{float(found.value.sel(number='b')):.6f}")
+    1.000000
+    """
+    check_confidence(confidence)
+    p = fits["exponent"]
+    if p.dims != (dim,):
+        raise SweepError(f"exponents run along {', '.join(map(str, p.dims)) or 'nothing'}, expected {dim} alone")
+    lmfit = library("lmfit")
+    fine = (p.notnull() & np.isfinite(fits.exponent_high - fits.exponent_low)).values
+    at, value = p[dim].values[fine].astype(np.float64), p.values[fine]
+    bar = (fits.exponent_high - fits.exponent_low).values[fine] / 2
+    bar = np.maximum(bar, 1e-14 * (1 + abs(value)))
+    model = _model(lmfit, formula, dim)
+    if value.size <= len(model.param_names):
+        raise SweepError(f"{formula}: {len(model.param_names)} numbers need more than {value.size} exponents")
+    parameters = model.make_params(**dict.fromkeys(model.param_names, 1.0) | dict(start or {}))
+    reach = student(10**6, 0.95)
+    found = model.fit(value, parameters, weights=reach / bar, scale_covar=False, **{dim: at})
+    off = abs(value - found.best_fit) / bar
+    fits_all = bool((off > 1).sum() <= max(1, 0.15 * off.size) and off.max() < 2)
+    t = student(10**6, confidence)
+    names = list(model.param_names)
+    best = np.array([found.params[name].value for name in names])
+    error = np.array([found.params[name].stderr or math.inf for name in names]) * (t if fits_all else math.nan)
+    numbers = {"value": best, "low": best - error, "high": best + error}
+    result = xr.Dataset({k: ("number", v) for k, v in numbers.items()}, coords={"number": names, dim: (dim, at)})
+    result["exponent"], result["fitted"] = (dim, value), (dim, np.asarray(found.best_fit))
+    text = "goes through the bars" if fits_all else f"misses the bars, by {off.max():.3g} of them: no intervals"
+    result.attrs = {"formula": formula, "fits": int(fits_all), "verdict": f"p = {formula} {text}"}
+    return result
+
+
+def _model(lmfit: Any, formula: str, dim: str) -> Any:
+    try:
+        return lmfit.models.ExpressionModel(formula, independent_vars=[dim])
+    except (ValueError, SyntaxError, NameError) as error:
+        raise SweepError(f'formula: expected one of {dim}, e.g. "a + b*{dim}"; found {formula!r} ({error})') from None
+
+
+class Points(NamedTuple):
+    """Logarithms of all points."""
+
+    t: Array
+    z: Array
+    size: Array
+    """ln L."""
+    curve: Array
+    """Number of the L that a point is of."""
+
+
+COLLAPSED = {
+    "x_exponent": "a of x / L^a",
+    "y_exponent": "b of y / L^b",
+    "residual": "relative distance of the points from the common curve, root mean square",
+    "points": "points that lie among those of another curve",
+    "dropped": "points that are missing or not positive, or lie where no other curve has any",
+    "fits": "1 where the curves fall on one another within their own scatter",
+}
+
+FEWEST_POINTS = 10
+
+
+def fit_collapse(
+    y: xr.DataArray, dim: str, over: str, *, bootstrap: int = 200, seed: int = 0, confidence: float = 0.95
+) -> xr.Dataset:
+    """Exponents a, b for which all curves y(x; L) fall on one, equation (1), with bootstrap errors.
+
+    Parameters
+    ----------
+    y : DataArray
+        Along `dim` and `over`.
+    dim, over : str
+        Dimensions of x and L; positive.
+    bootstrap : int
+        Times that residuals are drawn anew, for the intervals.
+    seed : int
+        Of these draws.
+    confidence : float
+        Of the intervals.
+
+    Returns
+    -------
+    Dataset
+        `x_exponent` (a), `y_exponent` (b), each with `_low`, `_high`; `residual`; `points`, `dropped`; `fits`. The
+        intervals are of independent scatter about the common curve; without scatter of how well a spline follows
+        that.
+
+    Raises
+    ------
+    SweepError
+        An axis is unknown or unfit, there are fewer than two curves or ten points, or f is a power law or L does not
+        matter, so that a and b are not both determined.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> import xarray as xr
+    >>> x, size = np.geomspace(0.01, 100, 25), np.array([1.0, 2.0, 4.0, 8.0])
+    >>> u = x / size[:, None] ** 1.5
+    >>> y = xr.DataArray(size[:, None] ** 0.7 / (u + u**0.2), {"L": size, "x": x}, ("L", "x"), name="y")
+    >>> print(f"{float(sweep.fit_collapse(y, 'x', 'L', bootstrap=20).x_exponent):.3f}")
+    1.500
+    """
+    check_confidence(confidence)
+    points, count = _points(y, dim, over)
+    a = _best(points, _range(points))
+    inside = _shared(points, a)
+    lost = count - int(inside.sum())
+    if inside.sum() < FEWEST_POINTS:
+        raise SweepError(
+            f"of {count} points {int(inside.sum())} lie among those of another curve; at least 10 are needed"
+        )
+    points = Points(*(column[inside] for column in points))
+    near = (a - 0.3 * (1 + abs(a)), a + 0.3 * (1 + abs(a)))
+    a = _best(points, near)
+    b, fitted, numbers = _spline(points, a)
+    off = points.z - fitted
+    _require_determined(points, a, off, numbers)
+    draws = _bootstrap(points, a, fitted, off * math.sqrt(off.size / (off.size - numbers)), near, bootstrap, seed)
+    reach = student(off.size - numbers, confidence) * draws.std(axis=0, ddof=1)
+    result = xr.Dataset({"x_exponent": a, "y_exponent": b})
+    for name, middle, wide in zip(("x_exponent", "y_exponent"), (a, b), reach, strict=True):
+        result[f"{name}_low"], result[f"{name}_high"] = middle - wide, middle + wide
+    result["residual"], result["points"] = float(np.sqrt(np.mean(off**2))), points.t.size
+    result["dropped"], result["fits"] = lost, int(_one_curve(points, a, off))
+    for key in map(str, result.data_vars):
+        text = COLLAPSED.get(key) or f"{'lower' if key.endswith('low') else 'upper'} end of its interval"
+        result[key].attrs = {"units": "1", "long_name": text}
+    result.attrs = {"y": title(y), "x": dim, "over": over, "law": f"{title(y)} = {over}^b f({dim} / {over}^a)"}
+    return result
+
+
+def _points(y: xr.DataArray, dim: str, over: str) -> tuple[Points, int]:
+    if not isinstance(y, xr.DataArray) or y.ndim != 2 or {dim, over} != {str(d) for d in y.dims}:
+        raise SweepError(f"a collapse takes one output along {dim} and {over}, and nothing else; choose with .sel")
+    t, size = np.log(positive_axis(y, dim)[1]), np.log(_parameter(y, over))
+    z = log_of(y).transpose(over, dim).values
+    fine = np.isfinite(z)
+    which = np.nonzero(fine)
+    found = Points(t[which[1]], z[fine], size[which[0]], which[0].astype(np.float64))
+    if found.t.size < FEWEST_POINTS:
+        raise SweepError(f"a collapse needs at least {FEWEST_POINTS} positive points, found {found.t.size}")
+    return found, z.size
+
+
+def _parameter(y: xr.DataArray, over: str) -> Array:
+    values: Array = y[over].values.astype(np.float64)
+    if values.size < 2 or not (np.isfinite(values) & (values > 0)).all():
+        raise SweepError(f"{over}: a collapse needs at least two values, all positive")
+    return values
+
+
+def _range(points: Points) -> tuple[float, float]:
+    """Exponents a that leave neighbours in L with something in common, and no more than 8."""
+    sizes = np.unique(points.size)
+    most = min(8.0, 0.9 * float(np.ptp(points.t)) / float(np.diff(sizes).min()))
+    return -most, most
+
+
+def _knots(u: Array) -> int:
+    """Pieces of the spline: one for four points, at most 20."""
+    return int(min(20, max(1, u.size // 8)))
+
+
+def _columns(points: Points, a: float) -> Array:
+    """ln L, then a cubic spline of ln x - a ln L."""
+    from scipy.interpolate import BSpline
+
+    u = points.t - a * points.size
+    inner = np.quantile(u, np.linspace(0, 1, _knots(u) + 1))
+    knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
+    knots[-4:] += 1e-9 * (1 + abs(knots[-1]))
+    basis = BSpline.design_matrix(u, knots, 3).toarray()
+    return np.column_stack([points.size - points.size.mean(), basis])
+
+
+def _spline(points: Points, a: float, z: Array | None = None) -> tuple[float, Array, int]:
+    """b, the common curve at the points, and how many numbers it took."""
+    columns = _columns(points, a)
+    numbers, _, rank, _ = np.linalg.lstsq(columns, points.z if z is None else z, rcond=1e-10)
+    return float(numbers[0]), columns @ numbers, int(rank) + 1
+
+
+def _square(points: Points, a: float, z: Array | None = None) -> float:
+    values = points.z if z is None else z
+    return float(((values - _spline(points, a, z)[1]) ** 2).sum())
+
+
+def _best(points: Points, ends: tuple[float, float], z: Array | None = None, tries: int = 81) -> float:
+    from scipy.optimize import minimize_scalar
+
+    grid = np.linspace(*ends, tries)
+    squares = [_square(points, a, z) * _overlap(points, a) for a in grid]
+    k = int(np.argmin(squares))
+    around = float(grid[max(k - 1, 0)]), float(grid[min(k + 1, tries - 1)])
+    return float(
+        minimize_scalar(lambda a: _square(points, a, z), bounds=around, method="bounded", options={"xatol": 1e-9}).x
+    )
+
+
+def _overlap(points: Points, a: float) -> float:
+    """Weight against exponents that pull curves apart until nothing is compared."""
+    share = float(_shared(points, a).mean())
+    return 1.0 / max(share, 1e-3) ** 4
+
+
+def _shared(points: Points, a: float) -> Any:
+    """Which points lie, in x / L^a, between the first and the last of another curve."""
+    u = points.t - a * points.size
+    found = np.zeros(u.size, dtype=bool)
+    for number in np.unique(points.curve):
+        here = points.curve == number
+        found |= ~here & (u >= u[here].min()) & (u <= u[here].max())
+    return found
+
+
+def _require_determined(points: Points, a: float, off: Array, numbers: int) -> None:
+    """Raises SweepError where another a, far off, does as well: of a power law f any does."""
+    least = float(off @ off) + 1e-20 * float(np.ptp(points.z)) ** 2
+    worst = min(_square(points, a + step) for step in (-0.25, 0.25))
+    if worst < least * (1 + 12.0 / max(1, off.size - numbers)):
+        raise SweepError(
+            "the curves collapse for any exponents of x: f is a power law, so a and b are not determined apart"
+        )
+
+
+def _bootstrap(
+    points: Points, a: float, fitted: Array, off: Array, near: tuple[float, float], times: int, seed: int
+) -> Array:
+    """a and b of so many sets with residuals drawn anew."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for _ in range(times):
+        z = fitted + rng.choice(off, off.size)
+        again = _best(points, near, z, tries=9)
+        found.append((again, _spline(points, again, z)[0]))
+    return np.array(found)
+
+
+def _one_curve(points: Points, a: float, off: Array) -> bool:
+    """Whether residuals have no more to do with the curve they are of than chance has: analysis of variance of a
+    cubic along each curve."""
+    from scipy.special import fdtrc
+
+    u = points.t - a * points.size
+    columns = []
+    for number in np.unique(points.curve)[1:]:
+        here = (points.curve == number).astype(np.float64)
+        away = (u - u[here > 0].mean()) / np.ptp(u)
+        columns += [here * away**k for k in range(4)]
+    matrix = np.column_stack(columns)
+    explained = matrix @ np.linalg.lstsq(matrix, off, rcond=None)[0]
+    rest = float(((off - explained) ** 2).sum())
+    left = off.size - matrix.shape[1]
+    if left < 1 or float(off @ off) < 1e-24 * off.size or rest == 0:
+        return True
+    ratio = float(explained @ explained) / matrix.shape[1] / (rest / left)
+    return bool(fdtrc(matrix.shape[1], left, ratio) > 1e-3)

@@ -1,0 +1,343 @@
+"""Straight lines in log-log: exponents whose intervals are of what the points have, scatter, error bounds or a bend."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from sweep.analysis.curves import (
+    Window,
+    check_confidence,
+    ends,
+    like,
+    numbers_along,
+    stated_bound,
+    title,
+    window_logs,
+    window_of,
+)
+from sweep.analysis.loglog import FEWEST, Array, Line, line, slope_bounds, slopes, tends
+from sweep.analysis.scatter import KINDS, bend, is_scatter, rounding, runs_deny, scattered, weighted
+from sweep.system.errors import SweepError
+
+METHOD = (
+    "least squares in log-log, weighted where sigma is given or the scatter is uneven or has outliers; the interval is "
+    "of the kind that `kind` says"
+)
+
+KIND_WORDS = ("exact", "bounded", "curved", "bent", "weighted", "any", *KINDS)
+"""What distances from a line are; `kind` of a fit is a position in this list."""
+
+KIND_MEANINGS = {
+    "exact": "rounding",
+    "bounded": "within the stated error bounds",
+    "curved": "a bend; the interval is the range of the local exponent",
+    "bent": "a bend among scatter; the interval is the range of the local exponent",
+    "weighted": "noise of the given standard errors",
+    "any": "scatter, perhaps correlated",
+    "independent": "independent scatter of one size",
+    "uneven": "scatter that grows or falls along the axis",
+    "correlated": "scatter that remembers the point before",
+    "outliers": "scatter with outliers, which count less",
+}
+
+FIT_NAMES = {
+    "exponent": "exponent of the power law",
+    "exponent_error": "standard error of the exponent",
+    "prefactor": "y at x = 1 on the line",
+    "prefactor_error": "standard error of the prefactor",
+    "exponent_low": "lower end of the interval of the exponent",
+    "exponent_high": "upper end of the interval of the exponent",
+    "noisy": "1 where the interval is of scatter, 0 where of error bounds or a bend",
+    "fits": "1 where one power law describes the points, 0 where the interval is only the range of its slope",
+    "kind": f"what the distances from the line are: {', '.join(f'{i} {w}' for i, w in enumerate(KIND_WORDS))}",
+    "drift": "change of the exponent across the window, by a parabola",
+    "residual": "largest relative distance of a point from the line",
+    "points": "points in the fit",
+    "low": "first abscissa in the fit",
+    "high": "last abscissa in the fit",
+    "centre": "geometric mean of the abscissae",
+    "level": "geometric mean of y, on the line at the centre",
+    "level_error": "relative standard error of the level",
+    "start": "y at the first abscissa",
+    "stop": "y at the last abscissa",
+    "limit_low": "exponent to which the local one tends at the first abscissa; NaN where points scatter",
+    "limit_high": "exponent to which the local one tends at the last abscissa; NaN where points scatter",
+}
+
+JUDGED = (
+    *("error", "exponent_low", "exponent_high", "kind", "fits"),
+    *("start", "stop", "limit_low", "limit_high"),
+)
+
+
+class Given(NamedTuple):
+    """What is known of a fit beforehand."""
+
+    confidence: float
+    noise: bool | str | None
+    sigma: bool
+
+
+def fit_exponent(
+    y: xr.DataArray,
+    dim: str,
+    window: Window | None = None,
+    *,
+    confidence: float = 0.95,
+    noise: bool | str | None = None,
+    sigma: Any = None,
+    bound: Any = None,
+) -> xr.Dataset:
+    """Power law y = prefactor dim^exponent by a straight line in log-log over a window.
+
+    What the interval of the exponent is depends on what the distances of the points from the line are, `kind`:
+
+    - *exact*, *bounded*: rounding, or within stated error bounds; all that such errors can do to the exponent.
+    - *weighted*: `sigma` is given; by the normal distribution, if chi-squared and the runs test allow it.
+    - *any*, *uneven*, *outliers*: scatter, told apart by tests. The interval is then never less than that for noise
+      that remembers the point before, as strongly as the points allow, and than that by heteroscedasticity-consistent
+      errors: wider than that of independent noise, twice as wide for a dozen points. Of outliers it is Tukey's
+      biweight.
+    - *independent*, *correlated*: only if `noise` says so.
+    - *curved*, *bent*: no power law, without and among scatter. `fits` is 0 and the interval is the range of the local
+      exponent in the window, in which the exponent of every window inside lies.
+
+    Parameters
+    ----------
+    y : DataArray
+        Any shape; missing points are left out.
+    dim : str
+        Dimension of `y`, or 1-D coordinate along one; positive and strictly monotone.
+    window : (low, high), optional
+        Ends in the unit of `dim`, both included; None leaves an end open.
+    confidence : float
+        Of the interval, where there is noise.
+    noise : bool or "independent", "uneven", "correlated", "outliers", optional
+        Whether the values scatter, or how. Default: as tests find.
+    sigma : number or DataArray, optional
+        Standard errors of the values, in the unit of y.
+    bound : number or DataArray, optional
+        Largest relative error of the values, which is not noise. Default: the `rtol` in the attributes of y, of a
+        sweep; `stated_error` has that of every cell.
+
+    Returns
+    -------
+    Dataset
+        `exponent`, `exponent_error`, `exponent_low`, `exponent_high` [1]; `kind`, a position in `KIND_WORDS`; `fits`;
+        `noisy`, 1 where points scatter; `prefactor`, `prefactor_error` (y at dim = 1, in the unit of y); `drift`
+        [1], the change of the exponent from one end of the window to the other by a parabola through the same
+        points; `residual` [1], the largest relative distance of a point from the line; `points`; `low`, `high`,
+        the first and last abscissa used, `start`, `stop`, y there; `centre`, `level`, `level_error`, the geometric
+        means of dim and y, where the line is known best, and the relative standard error there; `limit_low`,
+        `limit_high`, to where the local exponent tends at both ends. The dimensions are those of `y` but `dim`.
+
+    Raises
+    ------
+    SweepError
+        If `dim` is unknown or unfit, if y is not positive somewhere in the window, if no line has three points, or if
+        points scatter and statsmodels (extra `fit`) is not installed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e5, 1e7, 9)})
+    >>> found = sweep.fit_exponent(ds.period, "mu")
+    >>> print(f"{float(found.exponent):.4f}")
+    -0.3334
+    """
+    check_confidence(confidence)
+    check_noise(noise)
+    dimension, t, logs = window_logs(y, dim, window)
+    here = window_of(y, dim, window)
+    errors = like(np.nan if sigma is None else sigma / y, y, "sigma").isel(here)
+    bounds = stated_bound(y, bound).isel(here)
+    given = Given(confidence, noise, sigma is not None)
+    names = (*Line._fields, *JUDGED)
+    fit = numbers_along(names, lambda z, s, b: _lines(t, z, s, b, given), logs, dimension, errors, bounds)
+    if not bool(fit.exponent.notnull().any()):
+        raise SweepError(
+            f"a line needs at least {FEWEST} points, found {int(fit.points.max())} of {title(y)} in the window "
+            f"{ends(window, dim)[0]:g} to {ends(window, dim)[1]:g} of {dim}; choose a wider one"
+        )
+    return _describe_fit(fit, y, dim)
+
+
+def check_noise(noise: bool | str | None) -> None:
+    """Raises SweepError where it is none of the words."""
+    if not (noise is None or isinstance(noise, bool) or noise in KINDS):
+        raise SweepError(f"noise: expected True, False or one of {', '.join(KINDS)}; found {noise!r}")
+
+
+class Judged(NamedTuple):
+    """What the distances of points from a line are, and what follows for its slope."""
+
+    kind: str
+    weights: Array
+    error: float
+    low: float
+    high: float
+    fits: bool = True
+    ends: tuple[float, float] = (np.nan, np.nan)
+    """Exponents to which the local one tends."""
+
+
+def _lines(t: Array, z: Array, sigma: Array, bound: Array, given: Given) -> Array:
+    """Numbers of `Line` and `JUDGED` for each line (..., n) of `z`."""
+    count = math.prod(z.shape[:-1])
+    rows = [np.broadcast_to(part, z.shape).reshape(count, t.size) for part in (z, sigma, bound)]
+    judged, weights = np.full((len(rows[0]), len(JUDGED)), np.nan), np.ones(rows[0].shape)
+    for i, (row, s, b) in enumerate(zip(*rows, strict=True)):
+        present = np.flatnonzero(np.isfinite(row))
+        present = present[np.argsort(t[present])]
+        if present.size >= FEWEST:
+            found = judge(t[present], row[present], s[present], b[present], given)
+            weights[i, present] = found.weights
+            start, stop = np.exp(row[present[[0, -1]]])
+            numbers = (found.error, found.low, found.high, KIND_WORDS.index(found.kind), found.fits)
+            judged[i] = *numbers, start, stop, *found.ends
+    fitted = np.stack(line(t, z, weights.reshape(z.shape)), axis=-1)
+    return np.concatenate([fitted, judged.reshape(*z.shape[:-1], len(JUDGED))], axis=-1)
+
+
+def judge(t: Array, z: Array, sigma: Array, bound: Array, given: Given) -> Judged:
+    """One line without gaps, t rising."""
+    if given.sigma:
+        told, fits = weighted(t, z, sigma, given.confidence)
+        return Judged(told.kind, told.weights, told.error, told.low, told.high, fits)
+    fit = line(t, z)
+    off = z - np.log(fit.level) - fit.exponent * (t - np.log(fit.centre))
+    noisy = is_scatter(t, off, z, bound) if given.noise is None else bool(given.noise)
+    if noisy and t.size > FEWEST and abs(off).max() > 8 * rounding(t, z):
+        return _noisy(t, z, off, given)
+    found = _exact(t, z, off, bound, fit)
+    return found._replace(kind="any") if noisy else found
+
+
+def _noisy(t: Array, z: Array, off: Array, given: Given) -> Judged:
+    kind = given.noise if isinstance(given.noise, str) else None
+    found = scattered(t, z, given.confidence, kind)
+    bent = bend(t, z, given.confidence) if kind is None else None
+    if bent is not None:
+        return Judged("bent", np.ones(t.size), found.error, *bent, fits=False)
+    denied = kind == "independent" and runs_deny(off)
+    return Judged(found.kind, found.weights, found.error, found.low, found.high, not denied)
+
+
+def _exact(t: Array, z: Array, off: Array, bound: Array, fit: Line) -> Judged:
+    """Where nothing scatters: bounds for what rounding and stated errors do, or the range of the local exponent."""
+    slope, even = float(fit.exponent), np.ones(t.size)
+    least = rounding(t, z)
+    if (abs(off) <= 2 * bound + 8 * least).all():
+        u = t - t.mean()
+        reach = float((abs(u) * (bound + least)).sum() / (u @ u)) + least / float(np.ptp(t))
+        kind = "bounded" if bound.any() else "exact"
+        return Judged(kind, even, float(fit.exponent_error), slope - reach, slope + reach, True, (slope, slope))
+    local, rough = slopes(t, z, 5), slopes(t, z, 7)
+    doubt = float((abs(local - rough) + slope_bounds(t, bound + least, 5)).max())
+    low, high = min(float(local.min()) - doubt, slope), max(float(local.max()) + doubt, slope)
+    at_ends = slope_bounds(t, bound + least, 5)[[0, -1]]
+    limits = tends(t, local, at_ends[0])[1], tends(-t[::-1], local[::-1], at_ends[1])[1]
+    return Judged("curved", even, float(fit.exponent_error), low, high, False, limits)
+
+
+def _describe_fit(fit: xr.Dataset, y: xr.DataArray, dim: str) -> xr.Dataset:
+    wider = (fit.error / fit.exponent_error).where(fit.exponent_error > 0, 1.0)
+    for name in ("exponent_error", "prefactor_error", "level_error"):
+        fit[name] = fit[name] * wider
+    fit = fit.drop_vars("error")
+    fit["points"], fit["kind"] = fit.points.astype(np.int64), fit.kind.fillna(-1).astype(np.int64)
+    scatters = [word not in ("exact", "bounded", "curved") for word in KIND_WORDS]
+    fit["noisy"] = fit.kind.isin(np.flatnonzero(scatters)).astype(np.float64).where(fit.kind >= 0)
+    units, place = str(y.attrs.get("units", "1")), str(y.coords[dim].attrs.get("units", "1"))
+    of = dict.fromkeys(("prefactor", "prefactor_error", "level", "start", "stop"), units)
+    of |= dict.fromkeys(("low", "high", "centre"), place)
+    for key, variable in fit.data_vars.items():
+        variable.attrs = {"units": of.get(str(key), "1"), "long_name": FIT_NAMES[str(key)]}
+    fit.attrs = {"law": f"{title(y)} = prefactor {dim}^exponent", "y": title(y), "x": dim, "method": METHOD}
+    return fit
+
+
+def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
+    """Where two power laws meet: `abscissa`, `abscissa_error`, `ordinate`.
+
+    Where points scatter, the error follows from the standard errors of the two fits, taken as independent. Where they
+    do not, it is a bound: how far the place moves if a law is not the line through its window but goes through the
+    outer end of it with the exponent to which the local one tends there. It does not shrink with the number of
+    points.
+
+    Parameters
+    ----------
+    low_fit, high_fit : Dataset
+        From `fit_exponent`, over windows that share at most an end point.
+
+    Raises
+    ------
+    SweepError
+        If the windows overlap or the two lines are parallel within their errors.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e-3, 1e6, 91)})
+    >>> weak, strong = (sweep.fit_exponent(ds.period, "mu", window) for window in ((1e-3, 1e-2), (1e5, 1e6)))
+    >>> print(f"{float(sweep.crossover(weak, strong).abscissa):.1f}")
+    0.6
+    """
+    _require_apart(low_fit, high_fit)
+    first, second = np.log(low_fit.centre), np.log(high_fit.centre)
+    middle = (first + second) / 2  # logarithms counted from here keep their digits
+    slope = high_fit.exponent - low_fit.exponent
+    slope_error = np.hypot(low_fit.exponent_error, high_fit.exponent_error)
+    slope = slope.where(abs(slope) > slope_error)
+    if not slope.notnull().any():
+        raise SweepError("the two laws have the same exponent within their errors, so they meet nowhere")
+    lines = [(fit.exponent, np.log(fit.level), np.log(fit.centre) - middle) for fit in (low_fit, high_fit)]
+    place = middle + _meeting(*lines)
+    variance = low_fit.level_error**2 + high_fit.level_error**2
+    variance = variance + ((place - first) * low_fit.exponent_error) ** 2
+    variance = variance + ((place - second) * high_fit.exponent_error) ** 2
+    error = np.sqrt(variance / slope**2 + _systematic(low_fit, high_fit, lines, middle) ** 2)
+    abscissa = np.exp(place)
+    ordinate = np.exp(np.log(low_fit.level) + low_fit.exponent * (place - first))
+    found = xr.Dataset({"abscissa": abscissa, "abscissa_error": abscissa * error, "ordinate": ordinate})
+    for name, as_of in (("abscissa", "centre"), ("abscissa_error", "centre"), ("ordinate", "level")):
+        found[name].attrs = {"units": low_fit[as_of].attrs["units"], "long_name": f"{name} where the two laws meet"}
+    found.attrs = {"y": low_fit.attrs["y"], "x": low_fit.attrs["x"], "method": low_fit.attrs["method"]}
+    return found
+
+
+def _meeting(low: Any, high: Any) -> xr.DataArray:
+    """Where two lines (slope, level, place of that level) meet."""
+    gap: xr.DataArray = low[1] - low[0] * low[2] - high[1] + high[0] * high[2]
+    found: xr.DataArray = gap / (high[0] - low[0])
+    return found
+
+
+def _systematic(low_fit: xr.Dataset, high_fit: xr.Dataset, lines: list[Any], middle: xr.DataArray) -> xr.DataArray:
+    """How far the meeting moves for lines through the outer ends, towards where the exponents tend."""
+    swapped = bool((low_fit.centre > high_fit.centre).all())
+    names = [("limit_low", "start", "low"), ("limit_high", "stop", "high")]
+    outer = []
+    for fit, (limit, value, end) in zip((low_fit, high_fit), names[::-1] if swapped else names, strict=True):
+        outer.append((fit[limit], np.log(fit[value]), np.log(fit[end]) - middle))
+    there = _meeting(*lines)
+    places = [_meeting(a, b) for a in (lines[0], outer[0]) for b in (lines[1], outer[1])]
+    moved = [abs(place - there).fillna(0.0) for place in places[1:]]
+    found: xr.DataArray = xr.concat(moved, dim="which").max("which")
+    return found
+
+
+def _require_apart(low_fit: xr.Dataset, high_fit: xr.Dataset) -> None:
+    for name in ("y", "x"):
+        if low_fit.attrs.get(name) != high_fit.attrs.get(name):
+            raise SweepError(f"the fits are of different {name}: {low_fit.attrs.get(name)}, {high_fit.attrs.get(name)}")
+    if bool(((low_fit.low < high_fit.high) & (high_fit.low < low_fit.high)).any()):
+        raise SweepError("the windows of the two fits overlap, so their errors are not independent; take them apart")

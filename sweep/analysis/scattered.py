@@ -1,0 +1,237 @@
+"""Values between cells that lie anywhere in a box: straight lines between neighbours, as pictures draw them.
+
+Neighbours are the corners of the simplices (intervals, triangles, tetrahedra) of Delaunay's triangulation of the cells,
+in coordinates in which each axis reaches from 0 to 1, in logarithms where it reaches from a positive value to twice
+that. Outputs that are positive everywhere are taken in logarithms too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay
+
+from sweep.system.errors import SweepError
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+LOGARITHMIC = 1.999
+"""Ratio of its ends from which on a positive axis is taken in logarithms; below, it makes no difference."""
+SHEAR = 0.013
+"""By which axes are tilted before cells are joined: corners of a box lie on a sphere, so there are many ways to join
+them; tilted there is one, and it is alike in all boxes."""
+FLAT = 1e-9
+"""Volume, in products of its edges, below which a simplex is none."""
+OUTSIDE = 1e-9
+"""How far out of a simplex a point may be by rounding."""
+FEWEST_ON_A_LINE = 5
+MOST_AXES = 5
+STATUS = "status"
+
+
+@dataclass(frozen=True)
+class Box:
+    """Coordinates in which each axis of some cells reaches from 0 to 1."""
+
+    names: tuple[str, ...]
+    low: Array
+    high: Array
+    logarithmic: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, values: Mapping[str, Array]) -> Box:
+        """The box of cells with these values of their axes."""
+        low = np.array([v.min() for v in values.values()])
+        high = np.array([v.max() for v in values.values()])
+        return cls(tuple(values), low, high, (low > 0) & (high >= LOGARITHMIC * low))
+
+    def points(self, values: Mapping[str, Array]) -> Array:
+        """Places (n, axes) of axis values."""
+        columns = [self._place(k, np.asarray(values[name], dtype=np.float64)) for k, name in enumerate(self.names)]
+        return np.stack(columns, axis=1)
+
+    def _place(self, k: int, values: Array) -> Array:
+        low, high = self.low[k], self.high[k]
+        if self.logarithmic[k]:
+            with np.errstate(invalid="ignore", divide="ignore"):
+                place: Array = np.log(values / low) / math.log(high / low)
+            return place
+        found: Array = (values - low) / (high - low)
+        return found
+
+    def values(self, k: int, places: Array) -> Array:
+        """Values of axis k at places."""
+        low, high = self.low[k], self.high[k]
+        found: Array = low * (high / low) ** places if self.logarithmic[k] else low + places * (high - low)
+        return found
+
+
+def simplices(points: Array) -> Indices:
+    """Numbers (m, axes + 1) of the points at the corners of each simplex; those without a volume are left out."""
+    if points.shape[1] == 1:
+        order = np.argsort(points[:, 0], kind="stable")
+        return np.column_stack([order[:-1], order[1:]])
+    found = Delaunay(_tilted(points)).simplices.astype(np.intp)
+    edges = points[found[:, 1:]] - points[found[:, :1]]
+    lengths = np.linalg.norm(edges, axis=2).prod(axis=1)
+    kept: Indices = found[abs(np.linalg.det(edges)) > FLAT * lengths]
+    return kept
+
+
+def _tilted(points: Array) -> Array:
+    axes = points.shape[1]
+    tilt = np.eye(axes) + SHEAR * np.tril(1.0 + 0.3 * np.arange(axes), -1)
+    found: Array = points @ tilt
+    return found
+
+
+def is_positive(values: Array) -> bool:
+    """Whether all finite values are positive, so that they are interpolated in logarithms."""
+    finite = values[np.isfinite(values)]
+    return bool(finite.size and finite.min() > 0)
+
+
+def heights(values: Array) -> Array:
+    """An output as it is interpolated: in logarithms where it is positive everywhere, else over its largest size."""
+    if is_positive(values):
+        with np.errstate(invalid="ignore"):
+            found: Array = np.log(values)
+        return found
+    return values / _size(values)
+
+
+def _size(values: Array) -> float:
+    return float(abs(values[np.isfinite(values)]).max(initial=0.0)) or 1.0
+
+
+def axes_of(dataset: xr.Dataset) -> list[str]:
+    """Number axes of cells that lie anywhere in a box, all corners of which are cells; [] of any other dataset."""
+    if STATUS not in dataset or dataset[STATUS].ndim != 1 or dataset[STATUS].dims[0] in dataset.coords:
+        return []
+    dim = dataset[STATUS].dims[0]
+    names = [str(n) for n, c in dataset.coords.items() if c.dims == (dim,) and c.dtype.kind == "f"]
+    names = [name for name in names if np.ptp(dataset[name].values) > 0]
+    if not 2 <= len(names) <= MOST_AXES:
+        return []
+    places = Box.of({name: dataset[name].values for name in names}).points({n: dataset[n].values for n in names})
+    corners = np.unique(places[((places == 0) | (places == 1)).all(axis=1)], axis=0)
+    return names if len(corners) == 2 ** len(names) else []
+
+
+def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array]) -> xr.Dataset:
+    """Outputs on an even or uneven grid of values, between the cells of a refined result.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        From `refine`, of two axes and more.
+    at : mapping of axis to values
+        Values of every axis.
+
+    Returns
+    -------
+    Dataset
+        Outputs of one value a cell, and the status of the nearest corner, over the axes in the order of `at`. NaN
+        outside of the cells, and beside cells without a value.
+
+    Raises
+    ------
+    SweepError
+        The cells do not fill a box, or an axis is missing or not there.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": [0.1, 1.0, 10.0], "a": [0.5, 1.0, 2.0]})
+    >>> fine = sweep.refine(ds, "period", 1e-2)
+    >>> sweep.interpolated(fine.dataset, {"mu": [0.3, 3.0], "a": [0.7]}).sizes["mu"]
+    2
+    """
+    names = axes_of(dataset)
+    if not names:
+        raise SweepError("only cells that fill a box of two axes and more, as those of `refine`, can be interpolated")
+    if set(at) != set(names):
+        raise SweepError(f"at: expected values of {', '.join(names)}, found {', '.join(at) or 'none'}")
+    grids = {name: np.asarray(values, dtype=np.float64) for name, values in at.items()}
+    mesh = dict(zip(grids, (m.ravel() for m in np.meshgrid(*grids.values(), indexing="ij")), strict=True))
+    shape = tuple(len(values) for values in grids.values())
+    box = Box.of({name: dataset[name].values for name in names})
+    corners, shares = located(box.points({n: dataset[n].values for n in names}), box.points(mesh))
+    found = xr.Dataset(coords={name: (name, values, dataset[name].attrs) for name, values in grids.items()})
+    for name, variable in dataset.data_vars.items():
+        if variable.dims == dataset[STATUS].dims and variable.dtype.kind == "f":
+            found[name] = (tuple(grids), _between(variable.values, corners, shares).reshape(shape), variable.attrs)
+    status = dataset[STATUS].values[np.take_along_axis(corners, shares.argmax(axis=1)[:, None], 1)[:, 0]]
+    found[STATUS] = (tuple(grids), status.reshape(shape), dataset[STATUS].attrs)
+    return found.assign_attrs(dataset.attrs)
+
+
+def _between(values: Array, corners: Indices, shares: Array) -> Array:
+    # a corner that takes no part need have no value
+    total: Array = np.where(shares == 0, 0.0, shares * heights(values)[corners]).sum(axis=1)
+    return np.exp(total) if is_positive(values) else total * _size(values)
+
+
+def located(points: Array, at: Array) -> tuple[Indices, Array]:
+    """Corners of the simplex in which each place is, and their shares in its value; NaN outside."""
+    mesh = Delaunay(_tilted(points))
+    places = _tilted(at)
+    where = mesh.find_simplex(places, tol=OUTSIDE)
+    inverse = mesh.transform[where]
+    shares = np.einsum("nij,nj->ni", inverse[:, :-1], places - inverse[:, -1])
+    shares = np.column_stack([shares, 1 - shares.sum(axis=1)])
+    shares = np.where(abs(shares) < OUTSIDE, 0.0, shares)
+    shares[where < 0] = np.nan
+    return mesh.simplices[where].astype(np.intp), shares
+
+
+def on_lines(dataset: xr.Dataset, x: str) -> xr.Dataset:
+    """Outputs in cells of a refined result that lie on lines along an axis, each line a row; the rest is NaN.
+
+    Lines are those with five cells and more from one end of the axis to the other, as all of the first grid are. What
+    is computed is taken, nothing is interpolated. A dataset whose cells do not fill a box is returned as it is.
+
+    Returns
+    -------
+    Dataset
+        Over x and the other axis; where there are several others, over x and `line`, which names their values.
+
+    Raises
+    ------
+    SweepError
+        There is no such line.
+    """
+    names = axes_of(dataset)
+    if x not in names:
+        return dataset
+    others = [name for name in names if name != x]
+    values, places = dataset[x].values, np.stack([dataset[name].values for name in others], axis=1)
+    lines, line, count = np.unique(places, axis=0, return_inverse=True, return_counts=True)
+    line = line.ravel()
+    ends = [np.isin(np.arange(len(lines)), line[values == end]) for end in (values.min(), values.max())]
+    long = (count >= FEWEST_ON_A_LINE) & ends[0] & ends[1]
+    if not long.any():
+        raise SweepError(f"{x}: no {FEWEST_ON_A_LINE} cells lie on one line from end to end of it; pick another axis")
+    on = np.flatnonzero(long[line])
+    grid, column = np.unique(values[on], return_inverse=True)
+    row = (np.cumsum(long) - 1)[line[on]]
+    across = others[0] if len(others) == 1 else "line"
+    labels = lines[long, 0] if len(others) == 1 else [_label(others, place) for place in lines[long]]
+    found = xr.Dataset(coords={across: (across, labels), x: (x, grid, dataset[x].attrs)}, attrs=dataset.attrs)
+    for name, variable in dataset.data_vars.items():
+        if variable.dims == dataset[STATUS].dims and variable.dtype == np.float64:
+            filled = np.full((int(long.sum()), len(grid)), np.nan)
+            filled[row, column] = variable.values[on]
+            found[name] = ((across, x), filled, variable.attrs)
+    return found
+
+
+def _label(names: Sequence[str], values: Array) -> str:
+    return ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, values, strict=True))

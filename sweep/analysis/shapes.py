@@ -1,0 +1,284 @@
+"""Laws that data may follow, each a curve ln y(ln x) that is linear in all but a few of its numbers.
+
+    z = shift(q) + columns(q) b                                                                     (1)
+
+For given q, b is a linear least-squares fit (variable projection): a grid over q gives the start, scipy's
+Levenberg-Marquardt the end.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from sweep.analysis.correlated import corrected
+from sweep.analysis.loglog import EPSILON, Array
+
+Parts = tuple[Array | float, Array]
+"""Shift and columns of (1)."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """One of the curves.
+
+    Attributes
+    ----------
+    parts : function of (q, t)
+        With t from 0 to 1 over the window: positions and widths in q are parts of it.
+    grids : sequence of sequences
+        Values of each q to start from.
+    slopes : int
+        How many of the last numbers b are exponents; they are per unit of t.
+    """
+
+    name: str
+    formula: str
+    parts: Callable[[Array, Array], Parts]
+    grids: Sequence[Sequence[float]]
+    numbers: int
+    exponents: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return self.name
+
+
+class Found(NamedTuple):
+    """A law fitted to points; `numbers` are q and then b, their standard errors `errors` for noise of the size of
+    `off`."""
+
+    law: Law
+    numbers: Array
+    errors: Array
+    off: Array
+    deviance: float
+    aicc: float
+    bic: float
+
+
+def _line(q: Array, t: Array) -> Parts:
+    return 0.0, np.stack([np.ones_like(t), t], axis=1)
+
+
+def _logarithm(q: Array, t: Array) -> Parts:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.log(1 + q[0] * (t - 0.5)), np.stack([np.ones_like(t), t], axis=1)
+
+
+def _offset(q: Array, t: Array) -> Parts:
+    """q: exponent per window, and the arc tangent of offset over prefactor at the middle."""
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        return np.log(np.exp(q[0] * (t - 0.5)) + math.tan(q[1])), np.ones((t.size, 1))
+
+
+def _correction(q: Array, t: Array) -> Parts:
+    """q: correction at the middle, and how fast it fades."""
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        return np.log(1 + q[0] * np.exp(-q[1] * (t - 0.5))), np.stack([np.ones_like(t), t], axis=1)
+
+
+def _bent(bend: Callable[[Array, Array], Array]) -> Callable[[Array, Array], Parts]:
+    """Two laws from a bend B(u) that is 0 far below and u far above 0; q: place, logarithm of the width, shape."""
+
+    def parts(q: Array, t: Array) -> Parts:
+        u = t - q[0]
+        b = bend(u, q[1:])
+        return 0.0, np.stack([np.ones_like(t), u - b, b], axis=1)
+
+    return parts
+
+
+def _softplus(u: Array, width: float) -> Array:
+    found: Array = width * np.logaddexp(0, u / width)
+    return found
+
+
+def _width(log_width: float) -> float:
+    return math.exp(min(max(log_width, -7.0), 1.0))
+
+
+def _exponential(u: Array, q: Array) -> Array:
+    return _softplus(u, _width(q[0]))
+
+
+def _hyperbola(u: Array, q: Array) -> Array:
+    return 0.5 * (u + np.hypot(u, _width(q[0])))
+
+
+GRID = np.sinh(np.linspace(-9.0, 9.0, 361))
+"""Where slopes of bends without a closed form are integrated, in widths."""
+
+
+def _integrated(slope: Callable[[Array], Array], u: Array, width: float) -> Array:
+    """Bend of a slope that rises from 0 to 1, moved so that it tends to u."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    steep = slope(GRID)
+    rise = np.concatenate([[0.0], np.cumsum(0.5 * (steep[1:] + steep[:-1]) * np.diff(GRID))])
+    moved = GRID[-1] - rise[-1]
+    v = np.clip(u / width + moved, GRID[0], GRID[-1])
+    found: Array = width * (CubicHermiteSpline(GRID, rise, steep)(v) + u / width + moved - v)
+    return np.where(u / width + moved < GRID[0], 0.0, found)
+
+
+def _logistic(v: Array) -> Array:
+    found: Array = 0.5 * (1 + np.tanh(0.5 * v))
+    return found
+
+
+def _asymmetric(u: Array, q: Array) -> Array:
+    """A logistic slope to the power exp(q1): it fades so many times faster below than above."""
+    power = math.exp(min(max(q[1], -2.5), 2.5))
+    return _integrated(lambda v: np.exp(-power * np.logaddexp(0, -v)), u, _width(q[0]))
+
+
+def _uneven(u: Array, q: Array) -> Array:
+    """Widths exp(q0 + q1) below and exp(q0 - q1) above."""
+    below, above = _width(q[0] + q[1]), _width(q[0] - q[1])
+    v = u + (above - below) * math.log(2)
+    return np.where(v < 0, _softplus(v, below), _softplus(v, above) + (below - above) * math.log(2))
+
+
+def _stretched(u: Array, q: Array) -> Array:
+    """A slope that fades as the exponential of the power exp(q1) of u."""
+    power = math.exp(min(max(q[1], -1.2), 0.8))
+    return _integrated(lambda v: _logistic(np.sign(v) * abs(v) ** power), u, _width(q[0]))
+
+
+def _three(q: Array, t: Array) -> Parts:
+    first, second, width = min(q[0], q[1]), max(q[0], q[1]), _width(q[2])
+    if not (0 < first < second < 1 and second - first > 2 * width):  # the middle law would be seen nowhere
+        return 0.0, np.full((t.size, 4), np.nan)
+    a, b = _softplus(t - first, width), _softplus(t - second, width)
+    return 0.0, np.stack([np.ones_like(t), t - a, a - b, b], axis=1)
+
+
+PLACES, WIDTHS = tuple(np.linspace(0.1, 0.9, 7)), tuple(np.log((0.01, 0.04, 0.12, 0.3)))
+FADES = (-12.0, -6.0, -2.5, 2.5, 6.0, 12.0)
+LOW_HIGH = ("p low", "p high")
+
+ONE = Law("one law", "A x^p", _line, (), 2, ("p",))
+LOGARITHM = Law("logarithm", "A x^p (1 + B ln x)", _logarithm, ((-1.9, -1.5, -0.5, 0.5, 1.5, 1.9),), 3, ("p",))
+OFFSET = Law("offset", "A x^p + C", _offset, (FADES, (-1.2, -0.3, 0.1, 0.8, 1.4)), 3)
+CORRECTION = Law(
+    "correction to scaling", "A x^p (1 + B x^-D)", _correction, ((-0.5, -0.05, 0.05, 0.5, 3.0), FADES), 4, ("p",)
+)
+TWO = Law("two laws", "bend fading exponentially", _bent(_exponential), (PLACES, WIDTHS), 5, LOW_HIGH)
+HYPERBOLA = Law("two laws, hyperbola", "bend fading as 1/ln x", _bent(_hyperbola), (PLACES, WIDTHS), 5, LOW_HIGH)
+ASYMMETRIC = Law(
+    "two laws, asymmetric bend",
+    "fading faster on one side",
+    _bent(_asymmetric),
+    (PLACES, WIDTHS, (-1.0, 1.0)),
+    6,
+    LOW_HIGH,
+)
+UNEVEN = Law(
+    "two laws, two widths", "one width below, another above", _bent(_uneven), (PLACES, WIDTHS, (-0.7, 0.7)), 6, LOW_HIGH
+)
+STRETCHED = Law(
+    "two laws, stretched bend",
+    "fading as exp(-(ln x)^b)",
+    _bent(_stretched),
+    (PLACES, WIDTHS, (-0.5, 0.3)),
+    6,
+    LOW_HIGH,
+)
+THREE = Law(
+    "three laws",
+    "two bends of one width",
+    _three,
+    ((0.2, 0.35, 0.5), (0.5, 0.65, 0.8), WIDTHS),
+    7,
+    ("p low", "p middle", "p high"),
+)
+BENDS = (TWO, HYPERBOLA, ASYMMETRIC, UNEVEN, STRETCHED)
+LAWS = (ONE, LOGARITHM, OFFSET, CORRECTION, *BENDS, THREE)
+
+
+def fitted(law: Law, t: Array, z: Array, weights: Array | None = None, known: bool = False) -> Found | None:
+    """The law that is nearest to the points, t rising; None where there are not more points than numbers, and two.
+
+    `known` weights are one over the variance of each point; others tell only how these compare.
+    """
+    from scipy.optimize import least_squares
+
+    if t.size < law.numbers + 2:
+        return None
+    s = (t - t[0]) / (t[-1] - t[0])
+    root = np.ones_like(z) if weights is None else np.sqrt(weights if known else weights / weights.mean())
+    q = _start(law, s, z, root)
+    if law.grids:
+        q = least_squares(
+            lambda p: _project(law, p, s, z, root)[1], q, method="lm", xtol=1e-8, ftol=1e-10, max_nfev=120
+        ).x
+    b, off = _project(law, q, s, z, root)
+    numbers = np.concatenate([q, b])
+    errors = _errors(law, numbers, s, off, root)
+    if known:
+        errors = errors * math.sqrt((s.size - law.numbers) / max(float(off @ off), 1e-300))
+    floor = (4 * EPSILON * (1 + abs(z).max())) ** 2  # what rounding leaves
+    deviance = z.size * math.log(float(off @ off) / z.size + floor) - 2 * float(np.log(root).sum())
+    deviance = float(off @ off) if known else deviance
+    k = law.numbers + (not known)
+    return Found(
+        law, numbers, errors, off / root, deviance, corrected(deviance, z.size, k), deviance + k * math.log(z.size)
+    )
+
+
+def curve(found: Found, t: Array, first: float, last: float) -> Array:
+    """ln y of a fitted law at ln x = t; first and last are those of the points that it was fitted to."""
+    s = (t - first) / (last - first)
+    q, b = np.split(found.numbers, [len(found.law.grids)])
+    shift, columns = found.law.parts(q, s)
+    value: Array = shift + columns @ b
+    return value
+
+
+def _start(law: Law, s: Array, z: Array, root: Array) -> Array:
+    tries = [np.array(q, dtype=np.float64) for q in itertools.product(*law.grids)]
+    squares = [float((_project(law, q, s, z, root)[1] ** 2).sum()) for q in tries]
+    return tries[int(np.argmin(squares))]
+
+
+FAR = 1e6
+"""Distance of points from a curve that does not exist there."""
+
+
+def _project(law: Law, q: Array, s: Array, z: Array, root: Array) -> tuple[Array, Array]:
+    """Linear numbers and weighted distances for given q."""
+    shift, columns = law.parts(q, s)
+    if not (np.isfinite(shift).all() and np.isfinite(columns).all()):
+        return np.zeros(columns.shape[1]), np.full(s.size, FAR)
+    wanted = (z - shift) * root
+    b: Array = np.linalg.lstsq(columns * root[:, None], wanted, rcond=None)[0].astype(np.float64)
+    return b, wanted - (columns * root[:, None]) @ b
+
+
+def _errors(law: Law, numbers: Array, s: Array, off: Array, root: Array) -> Array:
+    """Standard errors by the Jacobian; inf of what the points do not determine."""
+    count = len(law.grids)
+
+    def values(of: Array) -> Array:
+        shift, columns = law.parts(of[:count], s)
+        found: Array = (shift + columns @ of[count:]) * root
+        return found
+
+    steps = 1e-6 * np.maximum(1e-2, abs(numbers))
+    with np.errstate(invalid="ignore"):
+        jacobian = np.stack(
+            [(values(numbers + step) - values(numbers - step)) / (2 * step.max()) for step in np.diag(steps)], axis=1
+        )
+    if not np.isfinite(jacobian).all():
+        return np.full(numbers.size, np.inf)
+    size = np.sqrt((jacobian**2).sum(axis=0))
+    undetermined = size < 1e-12 * size.max()
+    size[undetermined] = 1.0
+    inverse = np.linalg.pinv(jacobian / size) / size[:, None]
+    found: Array = np.sqrt((inverse**2).sum(axis=1) * float(off @ off) / (s.size - law.numbers))
+    return np.where(undetermined, np.inf, found)

@@ -1,0 +1,208 @@
+"""In what two results differ: which cells, which statuses, and by how much."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from sweep.cells.schema import ANCILLARY, STATUS
+from sweep.results.statuses import flag_words
+from sweep.study.mistakes import listed
+from sweep.system.errors import SweepError
+from sweep.system.table import columns
+
+NUMBERS_AT_ONCE = 1 << 22
+
+
+@dataclass
+class Distance:
+    """How far an output of two results is apart.
+
+    Attributes
+    ----------
+    cells : int
+        Cells that differ by more than the tolerance, or of which one alone has no value.
+    largest : float
+        Largest relative distance, abs(a - b) / max(abs(a), abs(b)); infinite where one alone has no value.
+    example : str
+        The cell of that.
+    """
+
+    cells: int = 0
+    largest: float = 0.0
+    example: str = ""
+
+
+@dataclass
+class Difference:
+    """What two results differ in; `str` of it is what `sweep diff` prints.
+
+    Attributes
+    ----------
+    cells : int
+        Cells that both have.
+    only_a, only_b : int
+        Cells that one of them alone has.
+    missing : tuple of str
+        Outputs that one of them alone has.
+    outputs : dict of str to Distance
+        Of every output that both have.
+    statuses : dict of (str, str) to int
+        Cells of one status here and another there.
+    examples : dict of (str, str) to str
+        A cell of each of these.
+    """
+
+    cells: int
+    only_a: int
+    only_b: int
+    missing: tuple[str, ...]
+    rtol: float
+    outputs: dict[str, Distance] = field(default_factory=dict)
+    statuses: dict[tuple[str, str], int] = field(default_factory=dict)
+    examples: dict[tuple[str, str], str] = field(default_factory=dict)
+
+    @property
+    def same(self) -> bool:
+        """Whether nothing differs by more than the tolerance."""
+        apart = any(distance.cells for distance in self.outputs.values())
+        return not (self.only_a or self.only_b or self.missing or self.statuses or apart)
+
+    def __str__(self) -> str:
+        lines = [
+            f"{self.cells:,} cells in both, {self.only_a:,} in the first alone, {self.only_b:,} in the second alone"
+        ]
+        if self.missing:
+            lines.append(f"outputs of one alone: {listed(self.missing, word='and')}")
+        rows = [(n, f"{d.cells:,} cells differ", f"by up to {d.largest:.2g}", d.example) for n, d in self._apart()]
+        rows += [(f"{a} -> {b}", f"{n:,} cells", "", self.examples[a, b]) for (a, b), n in self.statuses.items()]
+        if self.same:
+            within = f" to {self.rtol:g}" if self.rtol else ", bit for bit but for NaN"
+            lines.append(f"the same{within}")
+        return "\n".join([*lines, columns(rows)] if rows else lines)
+
+    def _apart(self) -> Iterator[tuple[str, Distance]]:
+        return ((name, distance) for name, distance in self.outputs.items() if distance.cells)
+
+
+def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
+    """In what two results of one kernel differ.
+
+    Cells are those of equal parameters; where the cells of both run along `cell` or `point`, those of equal number.
+
+    Parameters
+    ----------
+    a, b : Dataset
+        From `run` or `open_result`, not of a summary.
+    rtol : float
+        Relative distance up to which outputs are the same; NaN is the same as NaN.
+
+    Raises
+    ------
+    SweepError
+        They are of different kernels or axes, or summaries.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> keys = {"kernel": "foliot", "outputs": ["period"], "axes": {"mu": [0.5, 2.0]}, "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> closed, series = (sweep.run({**keys, "method": name, "rtol": 1e-2}) for name in ("closed", "asymptotic"))
+    >>> found = sweep.diff(closed, series, rtol=1e-12)
+    >>> found.same, found.outputs["period"].cells
+    (False, 2)
+    """
+    first, second = _shared(a, b)
+    total = [math.prod(d[STATUS].shape) for d in (a, b, first)]
+    names = [{str(n) for n in d.data_vars} - set(ANCILLARY) for d in (a, b)]
+    found = Difference(total[2], total[0] - total[2], total[1] - total[2], tuple(sorted(names[0] ^ names[1])), rtol)
+    for name in (str(n) for n in a.data_vars if str(n) in names[0] & names[1]):
+        found.outputs[name] = _distance(first, second, name, rtol)
+    _compare_statuses(found, first, second)
+    return found
+
+
+def _shared(a: xr.Dataset, b: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset]:
+    """The cells that both have, in one order. Raises SweepError."""
+    if any(STATUS not in d for d in (a, b)):
+        raise SweepError("a summary keeps no cells to compare")
+    kernels = [str(d.attrs.get("kernel", "")) for d in (a, b)]
+    if kernels[0] != kernels[1]:
+        raise SweepError(f"the results are of different kernels, {kernels[0]} and {kernels[1]}")
+    if set(a[STATUS].dims) != set(b[STATUS].dims):
+        dims = [listed(map(str, d[STATUS].dims), word="and") for d in (a, b)]
+        raise SweepError(f"the cells run along {dims[0]} in one result and along {dims[1]} in the other")
+    for dim in a[STATUS].dims:
+        _require_alike(a, b, str(dim))
+    first, second = xr.align(a, b, join="inner", copy=False)
+    return first, second
+
+
+def _require_alike(a: xr.Dataset, b: xr.Dataset, dim: str) -> None:
+    """Cells without a value of their own are told apart by their number, so they must be the same ones."""
+    if dim in a.coords:
+        return
+    along = [name for name, c in a.coords.items() if c.dims[:1] == (dim,)]
+    if a.sizes[dim] != b.sizes[dim] or not all(name in b.coords and a[name].equals(b[name]) for name in along):
+        raise SweepError(f"the points along {dim} are not the same in both; compare results of one design")
+
+
+def _distance(a: xr.Dataset, b: xr.Dataset, name: str, rtol: float) -> Distance:
+    found = Distance()
+    cells = a[STATUS].dims
+    order = (*cells, *(d for d in a[name].dims if d not in cells))
+    for start, x, y in _pieces(a[name].transpose(*order), b[name].transpose(*order)):
+        apart = _relative(x, y).reshape(*x.shape[: len(cells)], -1).max(axis=-1, initial=0.0)
+        found.cells += int((apart > rtol).sum())
+        if apart.size and apart.max() > found.largest:
+            found.largest = float(apart.max())
+            found.example = _cell(a, start, np.unravel_index(int(apart.argmax()), apart.shape))
+    return found
+
+
+def _relative(x: Any, y: Any) -> Any:
+    """Relative distances; 0 of equal values and of two NaN, infinite where one alone is NaN."""
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        found = np.abs(x - y) / np.maximum(np.abs(x), np.abs(y))
+    found[(x == y) | (np.isnan(x) & np.isnan(y))] = 0.0
+    found[np.isnan(found)] = np.inf
+    return found
+
+
+def _compare_statuses(found: Difference, a: xr.Dataset, b: xr.Dataset) -> None:
+    words = [flag_words(d[STATUS]) for d in (a, b)]
+    for start, x, y in _pieces(a[STATUS], b[STATUS].transpose(*a[STATUS].dims)):
+        pairs, first, counts = np.unique(
+            np.stack([x.ravel(), y.ravel()]), axis=1, return_index=True, return_counts=True
+        )
+        for one, other, place, count in zip(*pairs.tolist(), first.tolist(), counts.tolist(), strict=True):
+            if one == other:
+                continue
+            pair = words[0].get(one, str(one)), words[1].get(other, str(other))
+            found.statuses[pair] = found.statuses.get(pair, 0) + count
+            found.examples.setdefault(pair, _cell(a, start, np.unravel_index(place, x.shape)))
+
+
+def _pieces(a: xr.DataArray, b: xr.DataArray) -> Iterator[tuple[int, Any, Any]]:
+    """Numbers of both, a few million at a time, and where along the first dimension they begin."""
+    if not a.dims:
+        yield 0, a.values.reshape(1), b.values.reshape(1)
+        return
+    rows = max(1, NUMBERS_AT_ONCE // max(1, a.size // max(1, a.shape[0])))
+    for start in range(0, a.shape[0], rows):
+        yield start, a[start : start + rows].values, b[start : start + rows].values
+
+
+def _cell(dataset: xr.Dataset, start: int, place: tuple[Any, ...]) -> str:
+    """The coordinates of a cell, as people write them."""
+    at = dict(zip(map(str, dataset[STATUS].dims), (start + int(place[0]), *map(int, place[1:])), strict=True))
+    texts = []
+    for name, coordinate in dataset.coords.items():
+        if coordinate.dims and set(map(str, coordinate.dims)) <= set(at):
+            value = coordinate.values[tuple(at[str(d)] for d in coordinate.dims)].item()
+            texts.append(f"{name}={value if isinstance(value, str) else f'{value:.6g}'}")
+    return "e.g. " + " ".join(texts)

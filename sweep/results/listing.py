@@ -1,0 +1,109 @@
+"""The results in a folder, a line each: question, cells, how much is done, statuses, when, by which version."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from sweep.results.open import open_result
+from sweep.results.statuses import account, count_statuses
+from sweep.system.errors import SweepError
+from sweep.system.table import columns
+
+UNFINISHED = re.compile(r"(.+\.(?:h5|nc))\.(?:parts|unfinished)")
+"""What a sweep that still runs has beside its output."""
+HEADINGS = ("result", "cells", "done", "statuses", "when", "version", "question")
+
+
+@dataclass(frozen=True)
+class Listed:
+    """One result.
+
+    Attributes
+    ----------
+    path : Path
+    question : str
+        Or the title, where there is none.
+    cells : int
+    done : float
+        Share of the cells that are computed.
+    statuses : dict of str to int
+        Cells of each.
+    when, version : str
+        When it ended, or began where it has not; by which version of foliot.
+    fault : str
+        Why it cannot be read; all else is empty then.
+    """
+
+    path: Path
+    question: str = ""
+    cells: int = 0
+    done: float = 0.0
+    statuses: dict[str, int] | None = None
+    when: str = ""
+    version: str = ""
+    fault: str = ""
+
+    @property
+    def row(self) -> tuple[str, ...]:
+        """Texts below `HEADINGS`."""
+        if self.fault:
+            return str(self.path), "", "", "", "", "", self.fault
+        statuses = ", ".join(f"{name} {n:,}" for name, n in (self.statuses or {}).items())
+        done = f"{int(1000 * self.done) / 10:g} %"
+        return str(self.path), f"{self.cells:,}", done, statuses, self.when[:16], self.version, self.question
+
+
+class Listing(tuple[Listed, ...]):
+    """Results; printed they are a table."""
+
+    def __str__(self) -> str:
+        return columns([HEADINGS, *(found.row for found in self)], indent="") if self else "no results here"
+
+    __repr__ = __str__
+
+
+def list_results(folder: str | os.PathLike[str] = ".") -> Listing:
+    """The results in a folder, finished or not, by name; other HDF5 files are named with why they are none.
+
+    Raises
+    ------
+    SweepError
+        There is no such folder.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> study = sweep.study(kernel="foliot", axes={"mu": [0.5, 2.0]}, fixed={"phi0": 1.0, "a": 1.0}, question="Why?")
+    >>> sweep.run(study, "listed.h5").close()
+    >>> found, = (one for one in sweep.list_results() if one.path.name == "listed.h5")
+    >>> found.question, found.cells, found.done, found.statuses
+    ('Why?', 2, 1.0, {'OK': 2})
+    """
+    place = Path(folder)
+    if not place.is_dir():
+        raise SweepError(f"{place}: there is no such folder")
+    names = {entry.name for entry in place.iterdir()}
+    found = {name for name in names if name.endswith((".h5", ".nc"))}
+    found |= {match[1] for name in names if (match := UNFINISHED.fullmatch(name))}
+    return Listing(_listed(place / name) for name in sorted(found))
+
+
+def _listed(path: Path) -> Listed:
+    try:
+        with open_result(path) as dataset:
+            cells = account(dataset)
+            attrs = {name: str(value) for name, value in dataset.attrs.items()}
+            return Listed(
+                path=path,
+                question=attrs.get("question") or attrs.get("title", ""),
+                cells=cells.total,
+                done=1.0 - cells.pending / cells.total,
+                statuses={count.name: count.cells for count in count_statuses(dataset)},
+                when=attrs.get("end", attrs.get("start", "")),
+                version=attrs.get("versions", "").partition(",")[0].removeprefix("foliot "),
+            )
+    except (SweepError, OSError) as fault:
+        return Listed(path, fault=str(fault).removeprefix(f"{path}: "))

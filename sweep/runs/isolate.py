@@ -1,0 +1,266 @@
+"""Cells solved in processes of their own, which may die of them or be killed: for kernels that crash or never end.
+
+Each solver has an executor of concurrent.futures with one process, so that it is known which cells it died of. What a
+kernel does there comes back as an exception here, and `Guard` finds the cell.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator, Mapping
+from concurrent.futures import CancelledError, ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from sweep.cells.grid import Grid
+from sweep.cells.guard import Unsolved
+from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS
+from sweep.results.open import memory
+from sweep.runs import isolated
+from sweep.runs.isolated import Answer
+from sweep.study.model import Study
+from sweep.system.errors import SweepError
+
+CELL_SECONDS = 60.0
+"""What a cell may take, where nobody says otherwise;"""
+DEARER = 100.0
+"""or so many times what one of the timed sample takes, where that is more."""
+SEVERAL_SECONDS = 1.0
+"""Several cells may take this and `SLACK` times what they should; then they are halved."""
+SLACK = 10.0
+LOAD_SECONDS = 180.0
+"""What loading and compiling a kernel may take."""
+MEMORY_SHARE = 0.5
+"""Share of the memory that all processes may have before they are replaced."""
+TRIALS = 3
+"""Times that a cell is tried alone of which a process dies."""
+
+
+class Died(Unsolved):
+    """The process died, or has no memory left; another one may not."""
+
+
+class Ended(SweepError):
+    """The run is being stopped."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What cells may take.
+
+    Attributes
+    ----------
+    cell : seconds that one cell may take; None: `CELL_SECONDS`, or longer where cells do
+    cost : seconds that one takes, as far as is known
+    """
+
+    cell: float | None = None
+    cost: float = 0.0
+
+    def seconds(self, cells: int) -> float:
+        """What some cells together may take."""
+        one = max(CELL_SECONDS, DEARER * self.cost) if self.cell is None else self.cell
+        return one if cells == 1 else min(one, SEVERAL_SECONDS) + SLACK * self.cost * cells
+
+
+class Processes:
+    """The processes of a run on this machine.
+
+    Parameters
+    ----------
+    study : Study
+    limits : Limits
+    count : int
+        How many there will be.
+    """
+
+    def __init__(self, study: Study, limits: Limits, count: int) -> None:
+        self.study, self.limits = study, limits
+        self.grid, self.text, self.paths = Grid(study), study.to_json(), kernel_paths(study)
+        self.most_bytes = MEMORY_SHARE * memory() / count
+        self.good: int | None = None
+        self.dearest = 0.0
+        self.over = False
+        self._solvers: list[IsolatedSolver] = []
+
+    def seconds(self, cells: int) -> float:
+        """What some cells may take. One of a sample is not waited for to its end: it is left out, but never FAILED."""
+        if self.limits.cost or self.good is None:
+            return self.limits.seconds(cells)
+        return min(self.limits.seconds(1), SEVERAL_SECONDS + SLACK * self.dearest * cells)
+
+    def solver(self) -> IsolatedSolver:
+        """A solver with a process of its own, for one thread at a time."""
+        self._solvers.append(IsolatedSolver(self))
+        return self._solvers[-1]
+
+    def end(self) -> None:
+        """Kills all; solvers raise `Ended` from now on."""
+        self.over = True
+        for solver in list(self._solvers):
+            solver.end()
+
+
+class IsolatedSolver:
+    """Does what `Solver` does in a process of its own, which is begun anew whenever it is needed."""
+
+    def __init__(self, processes: Processes) -> None:
+        self._all, self.grid = processes, processes.grid
+        self._pool: ProcessPoolExecutor | None = None
+        self._process: Any = None
+        self._lock = threading.Lock()
+        self._fresh = True
+        self.seconds = 0.0
+
+    def clock(self) -> float:
+        """Seconds that its process has spent on cells."""
+        return self.seconds
+
+    def solve(
+        self,
+        start: int,
+        stop: int,
+        outputs: Mapping[str, Any],
+        status: Any,
+        method_used: Any,
+        wanted: Any = None,
+        error_bound: Any = None,
+    ) -> None:
+        """As `Solver.solve`. Raises Unsolved where the kernel raises, dies or takes too long; Ended."""
+        found = self._asked(start, stop, wanted)
+        columns = {**outputs, STATUS: status, METHOD_USED: method_used}
+        columns |= {} if error_bound is None else {ERROR_BOUND: error_bound}
+        for name, column in columns.items():
+            column[...] = found[name]
+
+    def _asked(self, start: int, stop: int, wanted: Any) -> Mapping[str, Any]:
+        """One cell alone is tried again, for a process may die of what it did before, or be killed by others."""
+        for _ in range(TRIALS if stop - start == 1 else 1):
+            pool = self._ready()
+            try:
+                return self._taken(self._result(pool, start, stop, wanted), start)
+            except Died as fault:
+                reason = str(fault)
+        raise Unsolved(reason)
+
+    def _result(self, pool: ProcessPoolExecutor, start: int, stop: int, wanted: Any) -> Answer:
+        limit = self._all.seconds(stop - start)
+        # where no cell is known to end, the first one may still have to be compiled
+        compiling = LOAD_SECONDS if self._all.good is None else 0.0
+        try:
+            return pool.submit(isolated.solve, start, stop, wanted).result(limit + compiling)
+        except TimeoutError:
+            self.end()
+            raise Unsolved(f"took longer than {limit:.3g} s") from None
+        except (RuntimeError, CancelledError):
+            raise Died(self._died()) from None
+
+    def _taken(self, answer: Answer, start: int) -> Mapping[str, Any]:
+        fresh, self._fresh = self._fresh, False
+        if answer.memory > self._all.most_bytes:
+            self.end()
+        if answer.reason.startswith(MemoryError.__name__) and not fresh:
+            self.end()
+            raise Died(answer.reason)
+        if answer.reason:
+            raise Unsolved(answer.reason)
+        self.seconds += answer.seconds
+        self._all.dearest = max(self._all.dearest, answer.seconds / len(answer.arrays[STATUS]))
+        self._all.good = start if self._all.good is None else self._all.good
+        return answer.arrays
+
+    def _ready(self) -> ProcessPoolExecutor:
+        """The executor; a new one has loaded the kernel, and solved a cell that is known to end."""
+        if self._pool is not None and not self._all.over:
+            return self._pool
+        for _ in range(TRIALS):
+            pool = self._begun()
+            with contextlib.suppress(RuntimeError, CancelledError, TimeoutError):
+                number = pool.submit(os.getpid).result(LOAD_SECONDS)
+                self._process = next((p for p in multiprocessing.active_children() if p.pid == number), None)
+                pool.submit(isolated.load, self._all.text, self._all.paths, self._all.good).result(LOAD_SECONDS)
+                self._fresh = True
+                return pool
+            self.end()
+        raise SweepError(f"{self._all.study.kernel_name}: no process of its own can load it")
+
+    def _begun(self) -> ProcessPoolExecutor:
+        """A new executor, whose process is being made. Raises Ended."""
+        with self._lock:
+            if self._all.over:
+                raise Ended("the run is being stopped")
+            self._pool, self._process = ProcessPoolExecutor(1, _context(), isolated.enter), None
+            with _apart():
+                self._pool.submit(int)
+            return self._pool
+
+    def _died(self) -> str:
+        """Why the process did."""
+        code = None
+        if self._process is not None:
+            self._process.join(1)
+            code = self._process.exitcode
+        self.end()
+        if self._all.over:
+            raise Ended("the run is being stopped")
+        if code is not None and code < 0:
+            return f"its process died of {signal.Signals(-code).name}"
+        return "its process died" if code is None else f"its process ended with {code}"
+
+    def end(self) -> None:
+        """Kills the process."""
+        with self._lock:
+            pool, self._pool = self._pool, None
+            if pool is None:
+                return
+            if self._process is not None:
+                self._process.kill()
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def kernel_paths(study: Study) -> tuple[str, ...]:
+    """Folder of a kernel of the user's own, who has allowed it here by reading the study."""
+    name = study.kernel_name.partition(":")[0]
+    file = getattr(sys.modules.get(name), "__file__", None) if ":" in study.kernel_name else None
+    if file is None:
+        return ()
+    path = Path(file).resolve()
+    above = name.count(".") + (path.name == "__init__.py")
+    return (str(path.parents[above]),)
+
+
+def _context() -> Any:
+    """A clean process, from which others are made quickly: one with threads cannot be copied."""
+    context = multiprocessing.get_context("forkserver")
+    compiler = ["numba"] if "numba" in sys.modules else []
+    context.set_forkserver_preload(["sweep.runs.isolated", *compiler])
+    return context
+
+
+_starting = threading.Lock()
+
+
+@contextlib.contextmanager
+def _apart() -> Iterator[None]:
+    """A process that is made meanwhile does not run the program again that asks for it, nor has it to be a daemon's.
+
+    Kernels are looked up by name, so nothing of `__main__` is needed there. Workers of dask are daemons, which
+    multiprocessing lets have no processes; ours end when their parent does.
+    """
+    flags = multiprocessing.current_process()._config  # type: ignore[attr-defined]
+    with _starting:
+        daemon, main = flags.pop("daemon", None), sys.modules["__main__"]
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
+            yield
+        finally:
+            sys.modules["__main__"] = main
+            if daemon is not None:
+                flags["daemon"] = daemon

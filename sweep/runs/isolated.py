@@ -1,0 +1,89 @@
+"""What the process does that cells are solved in: for `isolate`, whose other end this is."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import multiprocessing
+import os
+import resource
+import signal
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from multiprocessing import forkserver
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sweep.cells.guard import told
+from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS
+from sweep.cells.solve import Solver
+from sweep.study.model import Study
+
+PR_SET_PDEATHSIG = 1
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What came of cells: their arrays, or why there are none; seconds, and most bytes that the process ever had."""
+
+    arrays: Mapping[str, Any]
+    reason: str
+    seconds: float
+    memory: float
+
+
+def enter() -> None:
+    """First in the process: it dies with the one that asks it, and before that one where the memory is short.
+
+    The system kills it with its fork server, also in a kernel that never lets Python run; that one ends with who asks
+    it, if nobody else holds the pipe that tells.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    server: Any = vars(forkserver)["_forkserver"]
+    pipe, server._forkserver_alive_fd = server._forkserver_alive_fd, None
+    if pipe is not None:
+        os.close(pipe)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+        with contextlib.suppress(OSError):
+            Path("/proc/self/oom_score_adj").write_text("1000")
+    threading.Thread(target=_die_with_parent, daemon=True).start()
+
+
+def _die_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(0)
+
+
+_solvers: dict[str, Any] = {}
+
+
+def load(text: str, paths: tuple[str, ...], good: int | None) -> None:
+    sys.path.extend(path for path in paths if path not in sys.path)
+    study = Study.from_json(text, allow_import=True)
+    _solvers["study"], _solvers["solver"] = study, Solver(study)
+    if good is not None:
+        solve(good, good + 1, None)
+
+
+def solve(start: int, stop: int, wanted: Any) -> Answer:
+    study, solver = _solvers["study"], _solvers["solver"]
+    arrays = {name: np.empty((stop - start, *shape)) for name, shape in study.shapes.items()}
+    flags = {STATUS: np.empty(stop - start, np.int8), METHOD_USED: np.empty(stop - start, np.int8)}
+    bound = np.empty(stop - start, np.float32)
+    begun = time.perf_counter()
+    reason = ""
+    try:
+        solver.solve(start, stop, arrays, flags[STATUS], flags[METHOD_USED], wanted, bound)
+    except BaseException as fault:
+        arrays, reason = {}, told(fault)
+    seconds = time.perf_counter() - begun
+    kilobytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1024 if sys.platform == "darwin" else 1)
+    return Answer({**arrays, **flags, ERROR_BOUND: bound} if arrays else {}, reason, seconds, 1024 * kilobytes)

@@ -1,0 +1,95 @@
+"""A study written as the keys it can be built of again, and as the text of a study file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from sweep.study.model import Axis, Block, Study
+
+BARE = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
+"""Letters of a key that needs no quotes."""
+
+
+def to_toml(study: Study) -> str:
+    """The text of a study file that is this study, in SI units but for axes that are given by start and stop.
+
+    Numbers are exact; values that came from a csv file are listed.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> study = sweep.study(kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> print(sweep.to_toml(study).splitlines()[-6])
+    mu = [0.1, 1.0]
+    """
+    keys = study_keys(study)
+    tables = ("axes", "fixed", "along", "summary")
+    lines = [f"{key} = {_value(value)}" for key, value in keys.items() if key not in (*tables, "blocks")]
+    for block in keys.get("blocks", ()):
+        lines += ["", "[[blocks]]", *(f"{key} = {_value(value)}" for key, value in block.items())]
+    for table in tables:
+        if keys.get(table):
+            lines += ["", f"[{table}]", *(f"{_key(name)} = {_value(entry)}" for name, entry in keys[table].items())]
+    return "\n".join(lines) + "\n"
+
+
+def study_keys(study: Study) -> dict[str, Any]:
+    """The keys that `build_study` makes the study of."""
+    found: dict[str, Any] = {"title": study.title, "question": study.question, "kernel": study.kernel_name}
+    found |= {name: getattr(study, name) for name in ("method", "rtol") if name not in study.axes}
+    found["outputs"] = list(study.outputs)
+    found |= {"where": study.where} if study.where else {}
+    if study.design == "blocks":
+        found["blocks"] = [_block(block, study.axes) for block in study.blocks]
+    else:
+        design = study.blocks[0] if study.blocks else None
+        found["design"] = study.design if design is None else {"kind": design.design, **design.options}
+        found["axes"] = {name: _axis(axis) for name, axis in study.axes.items()}
+    found["fixed"] = dict(_fixed(study))
+    found["along"] = {name: values.tolist() for name, values in study.along.items() if len(values)}
+    if study.summary is not None:
+        edges = {name: values.tolist() for name, values in study.summary.edges.items()}
+        outputs = {name: list(reductions) for name, reductions in study.summary.outputs.items()}
+        found["summary"] = {"over": list(study.summary.over), "outputs": outputs, "edges": edges}
+    return found
+
+
+def _block(block: Block, axes: Mapping[str, Axis]) -> dict[str, Any]:
+    design = {"kind": block.design, **block.options} if block.options else block.design
+    return {"design": design, "axes": {name: _axis(axes[name]) for name in block.axes}}
+
+
+def _axis(axis: Axis) -> Any:
+    if axis.words is not None:
+        return list(axis.words)
+    return axis.values.tolist() if axis.entry is None else dict(axis.entry)
+
+
+def _fixed(study: Study) -> Any:
+    """Parameters that are fixed to something else than their default."""
+    for field in study.kernel.parameters:
+        value = study.fixed.get(field.name)
+        if value is None or (np.ndim(value) == 0 and value == field.default):
+            continue
+        words = {float(number): word for word, number in field.choices.items()}
+        yield field.name, words[float(value)] if words else np.asarray(value).tolist()
+
+
+def _value(value: Any) -> str:
+    """A value of TOML, on one line."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, str):
+        # TOML escapes as JSON does, and one letter more
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return str(value).lower() if isinstance(value, bool) else repr(value)
+
+
+def _key(key: str) -> str:
+    return key if key and BARE.issuperset(key) else _value(key)

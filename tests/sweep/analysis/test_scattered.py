@@ -1,0 +1,100 @@
+"""Cells that lie anywhere in a box: joined, interpolated, found on lines."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.interpolate import LinearNDInterpolator
+
+from sweep.analysis.scattered import Box, axes_of, heights, interpolated, on_lines, simplices
+from sweep.system.errors import SweepError
+
+
+def cells(axes=2, inside=60, seed=0):
+    """A grid of 5 values an axis, from 1 to 100, with more cells anywhere inside."""
+    rng = np.random.default_rng(seed)
+    grid = [m.ravel() for m in np.meshgrid(*[np.geomspace(1, 100, 5)] * axes, indexing="ij")]
+    values = {n: np.concatenate([g, 100 ** rng.random(inside)]) for n, g in zip("abc", grid, strict=False)}
+    y = 2.0 * np.prod([v**p for v, p in zip(values.values(), (0.5, -1, 2), strict=False)], axis=0)
+    columns = {"y": ("cell", y, {"units": "s"}), "status": ("cell", np.zeros(y.size, np.int8))}
+    return xr.Dataset(columns, {n: ("cell", v, {"units": "1"}) for n, v in values.items()})
+
+
+@pytest.mark.parametrize("axes", [1, 2, 3, 4])
+def test_simplices_fill_the_box_and_overlap_nowhere(axes):
+    grid = np.meshgrid(*[np.linspace(0, 1, 4)] * axes)
+    points = np.stack([g.ravel() for g in grid], axis=1)
+    corners = points[simplices(points)]
+    volume = abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / np.prod(np.arange(1, axes + 1))
+    assert volume.sum() == pytest.approx(1.0, rel=1e-9)
+    assert volume.min() > 0.9 * volume.mean()  # no slivers where corners lie on one sphere
+
+
+def test_a_power_law_is_straight_and_so_interpolated_exactly():
+    ds = cells()
+    at = {"a": np.geomspace(1, 100, 7), "b": [2.0, 50.0]}
+    found = interpolated(ds, at)
+    assert found.y.dims == ("a", "b")
+    np.testing.assert_allclose(found.y, 2 * at["a"][:, None] ** 0.5 / np.array(at["b"]), rtol=1e-12)
+    assert found.y.attrs == {"units": "s"}
+
+
+def test_between_cells_values_are_those_of_scipy():
+    ds = cells(inside=200)
+    ds["y"] = ("cell", np.sin(ds.a.values) + 0.1 * ds.b.values * np.cos(ds.b.values))
+    x = {"a": np.geomspace(1.1, 90, 8), "b": np.geomspace(1.2, 95, 9)}
+    found = interpolated(ds, x)
+    places = np.log(np.stack([ds.a, ds.b], axis=1))
+    rows = np.log(np.stack(np.meshgrid(x["a"], x["b"], indexing="ij"), axis=-1))
+    tilt = np.array([[1.0, 0.0], [0.013, 1.0]])
+    truth = LinearNDInterpolator(places @ tilt, ds.y.values)(rows @ tilt)
+    np.testing.assert_allclose(found.y, truth, rtol=1e-9, atol=1e-9)
+
+
+def test_outside_and_beside_missing_cells_there_is_nothing():
+    ds = cells()
+    assert np.isnan(interpolated(ds, {"a": [0.5], "b": [2.0]}).y).all()
+    ds["y"][0] = np.nan  # at 1, 1
+    found = interpolated(ds, {"a": [1.001, 100.0], "b": [1.001, 100.0]})
+    assert np.isnan(found.y[0, 0])
+    assert np.isfinite(found.y[1, 1])
+
+
+def test_only_cells_that_fill_a_box_are_taken_for_such():
+    ds = cells()
+    assert axes_of(ds) == ["a", "b"]
+    assert axes_of(ds.isel(cell=slice(1, None))) == []  # a corner is missing
+    assert axes_of(ds.assign_coords(b=("cell", ds.a.values))) == []  # a curve
+    with pytest.raises(SweepError, match="fill a box"):
+        interpolated(ds.isel(cell=slice(1, None)), {"a": [1.0], "b": [1.0]})
+    with pytest.raises(SweepError, match="expected values of a, b"):
+        interpolated(ds, {"a": [1.0]})
+
+
+def test_lines_hold_what_was_computed_and_nothing_else():
+    ds = cells()
+    found = on_lines(ds, "a")
+    assert found.y.dims == ("b", "a")
+    assert (found.sizes["b"], found.sizes["a"]) == (5, 5)
+    np.testing.assert_array_equal(found.y.values.ravel(), ds.y.values[:25].reshape(5, 5).T.ravel())
+    three = on_lines(cells(3), "c")
+    assert three.y.dims == ("line", "c")
+    assert str(three.line[1].item()) == "a = 1, b = 3.16228"
+    assert on_lines(ds, "y") is ds
+    with pytest.raises(SweepError, match="no 5 cells"):
+        on_lines(ds.isel(cell=np.r_[0, 4, 20, 24, 30:85]), "a")
+
+
+def test_places_and_values_are_each_others_inverse():
+    values = {"a": np.array([1.0, 10.0, 100.0]), "b": np.array([-1.0, 0.0, 1.0]), "c": np.array([2.0, 2.5, 3.0])}
+    box = Box.of(values)
+    assert box.logarithmic.tolist() == [True, False, False]
+    points = box.points(values)
+    np.testing.assert_allclose(points, np.array([[0, 0, 0], [0.5, 0.5, 0.5], [1, 1, 1]]), atol=1e-15)
+    for k, column in enumerate(values.values()):
+        np.testing.assert_allclose(box.values(k, points[:, k]), column, rtol=1e-14, atol=1e-15)
+
+
+def test_heights_are_logarithms_or_shares():
+    np.testing.assert_allclose(heights(np.array([1.0, np.e, np.nan])), [0, 1, np.nan])
+    np.testing.assert_allclose(heights(np.array([-1.0, 4.0, 0.0])), [-0.25, 1, 0])
+    np.testing.assert_allclose(heights(np.zeros(2)), 0)

@@ -1,0 +1,138 @@
+"""Conditions on the cells of a study: those outside are neither computed nor refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from toy_studies import build, message_of
+
+import sweep
+from kernels.interface import Status
+from sweep.cells.fingerprint import fingerprint
+from sweep.results.statuses import account
+from sweep.show.text import result_text
+
+WHERE = "v0**2 < g*height"
+AXES = {"height": [-1.0, 1.0, 2.0, 4.0], "v0": [0.0, 1.0, 3.0]}
+
+
+def test_cells_outside_are_not_asked_and_not_refused():
+    found = sweep.run(build(axes=AXES, where=WHERE))
+    inside = found.v0.values[None, :] ** 2 < 9.81 * found.height.values[:, None]
+    assert (found.status.values[~inside] == Status.NOT_ASKED).all()
+    assert np.isnan(found.fall_time.values[~inside]).all()
+    assert (found.status.values[inside] == Status.OK).all()
+    whole = sweep.run(build(axes=AXES))
+    assert found.fall_time.values[inside].tobytes() == whole.fall_time.values[inside].tobytes()
+
+
+def test_they_are_an_entry_of_their_own_in_the_account(tmp_path):
+    found = sweep.run(build(axes=AXES, where=WHERE), tmp_path / "a.h5")
+    assert (account(found).not_asked, account(found).ok, account(found).refused) == (3, 9, 0)
+    assert "3 not asked" in str(account(found))
+    assert "NOT_ASKED" in result_text(tmp_path / "a.h5", found)
+    assert sweep.verify(tmp_path / "a.h5").whole
+
+
+def test_they_are_not_computed():
+    calls = []
+
+    def counting(*columns, **named):
+        calls.append(len(columns[0]))
+        return exact(*columns, **named)
+
+    study = build(axes={"height": [1.0, 2.0, 3.0, 4.0]}, method="exact", where="height > 3")
+    exact = study.kernel.method("exact").solve
+    methods = tuple(replace(m, solve=counting) if m.name == "exact" else m for m in study.kernel.methods)
+    sweep.run(replace(study, kernel=replace(study.kernel, methods=methods)), block_cells=4)
+    assert calls
+    assert max(calls) == 1
+
+
+@pytest.mark.parametrize(
+    ("where", "holds"),
+    [
+        ("height > 1", lambda h, v: h > 1),
+        ("not height > 1 or v0 == 3", lambda h, v: ~(h > 1) | (v == 3)),
+        ("1 < height <= 2 and v0 != 0", lambda h, v: (h > 1) & (h <= 2) & (v != 0)),
+        ("height > '150 cm'", lambda h, v: h > 1.5),
+        ("'1 km/hour' < v0", lambda h, v: v > 1000 / 3600),
+        ("v0**2 < 2*g*height", lambda h, v: v**2 < 2 * 9.81 * h),
+        ("v0**2/(g*height) < 0.1", lambda h, v: v**2 / (9.81 * h) < 0.1),
+        ("-height < -1", lambda h, v: h > 1),
+        ("height + 1 > 3", lambda h, v: h + 1 > 3),
+        ("method == 'exact' or height > 1", lambda h, v: h > 1),
+    ],
+)
+def test_what_a_condition_says(where, holds):
+    axes = AXES | ({"method": ["auto"]} if "method" in where else {})
+    found = sweep.run(build(axes=axes, where=where)).status.values.reshape(4, 3)
+    height, v0 = np.array(AXES["height"])[:, None], np.array(AXES["v0"])[None, :]
+    assert np.array_equal(found != Status.NOT_ASKED, np.broadcast_to(holds(height, v0), (4, 3)))
+
+
+@pytest.mark.parametrize(
+    ("where", "message"),
+    [
+        ("height < v0", "height is in meter and v0 is in meter second^-1; they cannot be compared"),
+        ("v0**2 < height", "they cannot be compared"),
+        ("height + v0 < 3", "they cannot be compared"),
+        ("height < '3 kg'", '"kg" is a mass; height is a length'),
+        ("2*height < '3 m'", "compare it with a parameter alone"),
+        ("hight > 1", "did you mean height?"),
+        ("height", "is no condition on the cells"),
+        ("height >", "cannot be read"),
+        ("1 < 2", "compares two constants"),
+        ("__import__('os').system('true') == 0", "is not allowed"),
+        ("height.real > 1", "is not allowed"),
+        ("[h for h in height] == 1", "is not allowed"),
+        ("height**0.5 > 1", "a power is a whole number from 1 to 9"),
+        ("height**99 > 1", "a power is a whole number"),
+        ("fall_time > 1", "no parameter of one number is called fall_time"),
+        ("method == 'exact'", "no parameter of one number is called method"),
+        ("height > 'tall'", "compares words with numbers"),
+    ],
+)
+def test_what_is_wrong_with_a_condition_is_told(where, message):
+    assert message in message_of(lambda: build(axes=AXES, where=where), "where")
+
+
+def test_words_of_a_method_axis_may_be_asked_for():
+    axes = {"height": [1.0, 2.0], "method": ["rough", "exact"]}
+    found = sweep.run(build(axes=axes, where="method == 'exact' or height < 2"))
+    assert (found.status.values == Status.NOT_ASKED).tolist() == [[False, False], [True, False]]
+    assert 'method is never "exakt"' in message_of(lambda: build(axes=axes, where="method == 'exakt'"), "where")
+
+
+def test_a_kernel_may_not_say_it():
+    study = build(axes={"height": [1.0]}, method="exact")
+
+    def check(height, v0, g, status):
+        status[...] = Status.NOT_ASKED
+
+    found = sweep.run(replace(study, kernel=replace(study.kernel, check=check)))
+    assert found.status.values.tolist() == [Status.FAILED]
+
+
+def test_a_study_with_a_condition_is_extended(tmp_path):
+    first = build(axes={"height": [1.0, 2.0, 4.0]}, where="height > 1.5")
+    sweep.run(first, tmp_path / "a.h5").close()
+    more = build(axes={"height": [1.0, 1.2, 2.0, 3.0, 4.0]}, where="height > 1.5")
+    found = sweep.run(more, tmp_path / "a.h5", extend=True).load()
+    assert found.status.values.tolist() == [Status.NOT_ASKED, Status.NOT_ASKED, 0, 0, 0]
+    other = build(axes={"height": [1.0, 1.2, 2.0, 3.0, 4.0, 5.0]}, where="height > 1.7")
+    with pytest.raises(sweep.SweepError, match="where"):
+        sweep.run(other, tmp_path / "a.h5", extend=True)
+
+
+def test_a_summary_counts_them():
+    found = sweep.run(build(axes=AXES, where=WHERE, summary={"outputs": {"fall_time": ["min"]}}))
+    assert int(found.cells_by_status.sel(status_name="NOT_ASKED")) == 3
+    assert int(found.fall_time_count) == 9
+    assert account(found).not_asked == 3
+
+
+def test_what_reads_a_condition_is_in_the_fingerprint_of_who_has_one():
+    names = [fingerprint(build(axes=AXES, **keys)) for keys in ({}, {"where": WHERE})]
+    assert ["source sweep.study.condition" in found for found in names] == [False, True]
+    assert names[1]["where"] == WHERE

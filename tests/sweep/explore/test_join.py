@@ -1,0 +1,115 @@
+"""Two results as one, against the sweep of both."""
+
+import numpy as np
+import pytest
+from toy_studies import build
+
+import sweep
+from sweep.cli import main
+
+HEIGHTS = [1.0, 2.0, 4.0, 8.0]
+
+
+def same(found, whole):
+    """Every number and coordinate of cells is the same."""
+    for name in ("fall_time", "status", "method_used", "error_bound"):
+        assert found[name].dims == whole[name].dims
+        assert found[name].values.tobytes() == whole[name].values.tobytes(), name
+    for dim in whole.fall_time.dims:
+        if dim in whole.coords:
+            assert found[dim].values.tolist() == whole[dim].values.tolist()
+
+
+def of(**keys):
+    return sweep.run(build(**{"axes": {"height": HEIGHTS, "v0": [0.0, 1.0]}, **keys}))
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [([1.0, 2.0], [4.0, 8.0]), ([4.0, 8.0], [1.0, 2.0]), ([1.0, 4.0], [2.0, 8.0]), ([1.0, 2.0, 4.0], [2.0, 4.0, 8.0])],
+)
+def test_an_axis_becomes_longer(one, other):
+    parts = [of(axes={"height": values, "v0": [0.0, 1.0]}) for values in (one, other)]
+    same(sweep.join(*parts), of())
+
+
+@pytest.mark.parametrize(
+    ("keys", "name", "values"),
+    [
+        ([{"method": "exact"}, {"method": "rough"}], "method", ["exact", "rough"]),
+        ([{"rtol": 1e-3}, {"rtol": 1e-6}], "rtol", [1e-3, 1e-6]),
+        ([{"fixed": {"g": 9.0}}, {"fixed": {"g": 2.0}}], "g", [9.0, 2.0]),
+    ],
+)
+def test_a_setting_or_a_fixed_parameter_becomes_an_axis(keys, name, values):
+    found = sweep.join(*(of(**each) for each in keys))
+    whole = of(axes={name: values, "height": HEIGHTS, "v0": [0.0, 1.0]})
+    same(found, whole)
+
+
+def test_points_are_put_behind_each_other():
+    halves = [of(design="zip", axes={"height": h, "v0": v}) for h, v in (([1.0, 2.0], [0.0, 1.0]), ([3.0], [2.0]))]
+    same(sweep.join(*halves), of(design="zip", axes={"height": [1.0, 2.0, 3.0], "v0": [0.0, 1.0, 2.0]}))
+
+
+def test_a_new_axis_has_labels_and_a_file_that_opens(tmp_path):
+    a, b = of(), of()
+    found = sweep.join(a, b, tmp_path / "c.h5", axis="version", labels=["0.1", "0.2"])
+    assert found.version.values.tolist() == ["0.1", "0.2"]
+    for label in ("0.1", "0.2"):
+        assert sweep.diff(found.sel(version=label, drop=True), a).same
+    assert "0.1: foliot" in found.attrs["taken_over"]
+    found.close()
+    assert sweep.verify(tmp_path / "c.h5").whole
+    with pytest.raises(sweep.SweepError, match="another study"):
+        sweep.run(build(axes={"height": HEIGHTS, "v0": [0.0, 1.0]}), tmp_path / "c.h5")
+
+
+def test_a_new_axis_of_points():
+    a = of(design="zip", axes={"height": [1.0, 2.0], "v0": [0.0, 1.0]})
+    found = sweep.join(a, a, axis="version")
+    assert found.fall_time.dims == ("version", "point")
+    assert found.height.dims == ("point",)
+    assert np.array_equal(found.fall_time[1], a.fall_time)
+
+
+@pytest.mark.parametrize(
+    ("results", "options", "message"),
+    [
+        (lambda: (of(), of()), {}, "they do not differ; name a new axis"),
+        (lambda: (of(), of(fixed={"g": 2.0}, rtol=1e-3)), {}, "they differ in fixed.g and rtol"),
+        (
+            lambda: (of(), of(fixed={"g": 2.0})),
+            {"axis": "version"},
+            "all else is to be the same; they differ in fixed.g",
+        ),
+        (lambda: (of(), of()), {"axis": "height"}, "cannot be the name of a new axis"),
+        (lambda: (of(), of()), {"axis": "a b"}, "cannot be the name of a new axis"),
+        (lambda: (of(), of()), {"axis": "version", "labels": ["x", "x"]}, "two labels that differ"),
+        (lambda: (of(), of(summary={})), {}, "keep their cells"),
+        (lambda: (of(), of(where="height > 1")), {}, "they differ in where"),
+    ],
+)
+def test_what_does_not_fit_is_refused(results, options, message):
+    with pytest.raises(sweep.SweepError, match=message):
+        sweep.join(*results(), **options)
+
+
+def test_cells_of_both_that_differ_are_refused():
+    a, b = of(axes={"height": [1.0, 2.0]}), of(axes={"height": [2.0, 4.0]})
+    b.fall_time[0] *= 1 + 1e-12
+    with pytest.raises(sweep.SweepError, match="cells that are in both differ"):
+        sweep.join(a, b)
+
+
+def test_the_command(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name, heights in (("a.h5", [1.0, 2.0]), ("b.h5", [4.0, 8.0])):
+        sweep.run(build(axes={"height": heights, "v0": [0.0, 1.0]}), name).close()
+    assert main(["join", "a.h5", "b.h5", "-o", "c.h5"]) == 0
+    assert "8 cells: 8 ok" in capsys.readouterr().out
+    same(sweep.open_result("c.h5"), of())
+    assert main(["join", "a.h5", "a.h5", "-o", "d.h5", "--axis", "version", "--labels", "old", "new"]) == 0
+    assert main(["show", "d.h5"]) == 0
+    assert "version" in capsys.readouterr().out
+    assert main(["join", "a.h5", "b.h5", "-o", "a.h5", "--force"]) == 2

@@ -1,0 +1,62 @@
+"""Indices by SALib on designs of ours, against functions whose indices are known."""
+
+import numpy as np
+import pytest
+from toy_studies import build
+
+import sweep
+
+pytest.importorskip("SALib")
+
+AXES = {
+    "height": {"spacing": "linear", "start": 1.0, "stop": 2.0},
+    "v0": {"spacing": "linear", "start": 0.0, "stop": 1.0},
+    "g": {"spacing": "linear", "start": 5.0, "stop": 15.0},
+}
+
+
+def cells(kind, n, **keys):
+    return sweep.run(build(design={"kind": kind, "n": n, "seed": 5}, axes=AXES, **keys))
+
+
+def test_sobol_indices_of_a_sum_are_shares_of_its_variance():
+    ds = cells("saltelli", 1024)
+    assert ds.sizes["cell"] == 1024 * 5
+    found = sweep.sensitivity(ds, 3 * ds.height + 4 * ds.v0 + 0.0 * ds.g)
+    assert np.allclose(found.first_order, [9 / 25, 16 / 25, 0], atol=0.01)
+    assert np.allclose(found.total, [9 / 25, 16 / 25, 0], atol=0.01)
+    assert list(found.parameter.values) == ["height", "v0", "g"]
+
+
+def test_what_acts_together_is_in_the_total_alone():
+    ds = cells("saltelli", 1024)
+    found = sweep.sensitivity(ds, (ds.v0 - 0.5) * (ds.height - 1.5))
+    assert np.allclose(found.first_order, 0, atol=0.05)
+    assert np.allclose(found.total, [1, 1, 0], atol=0.1)
+
+
+def test_morris_effects_are_slopes_over_the_range():
+    ds = cells("morris", 16)
+    assert ds.sizes["cell"] == 16 * 4
+    found = sweep.sensitivity(ds, 2 * ds.height - 3 * ds.v0 + ds.g)
+    assert np.allclose(found.effect, [2, 3, 10])
+    assert np.allclose(found["mean"], [2, -3, 10])
+    assert np.allclose(found.spread, 0, atol=1e-12)
+
+
+def test_an_output_may_be_named():
+    ds = cells("morris", 8)
+    assert sweep.sensitivity(ds, "fall_time").equals(sweep.sensitivity(ds, ds.fall_time))
+
+
+@pytest.mark.parametrize(
+    ("make", "y", "message"),
+    [
+        (lambda: sweep.run(build(axes={"height": [1.0, 2.0]})), "fall_time", 'neither "saltelli" nor "morris"'),
+        (lambda: cells("morris", 4), "fal_time", "there is no output 'fal_time'"),
+        (lambda: cells("morris", 4, where="v0 > '0.5 m/s'"), "fall_time", "cells have no value"),
+    ],
+)
+def test_what_cannot_be_told_is_refused(make, y, message):
+    with pytest.raises(sweep.SweepError, match=message):
+        sweep.sensitivity(make(), y)

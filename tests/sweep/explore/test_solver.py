@@ -1,0 +1,101 @@
+"""A study's kernel as a function: the numbers of the sweep itself, bit for bit, of one cell and of many."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from toy_studies import build
+
+import sweep
+from kernels.interface import Status
+
+FOLIOT = {"kernel": "foliot", "axes": {"mu": [1.0], "R": [0.1]}, "fixed": {"a": 1.0, "phi0": 0.7}}
+VALUES = st.floats(1e-6, 1e6)
+
+
+@pytest.fixture(scope="module", params=["auto", "coulomb", "dopri5"])
+def keys(request):
+    return {**FOLIOT, "method": request.param, "rtol": 1e-8}
+
+
+@settings(deadline=None, max_examples=25)
+@given(cells=st.lists(st.tuples(VALUES, st.floats(0.0, 10.0)), min_size=1, max_size=3))
+def test_cells_are_those_of_the_sweep(keys, cells):
+    mu, R = np.array(cells).T
+    clock = sweep.solver(keys)
+    swept = sweep.run({**keys, "design": "zip", "axes": {"mu": mu, "R": R}})
+    many = clock(mu, R)
+    for name in clock.fields:
+        assert np.array_equal(getattr(many, name), swept[name].values, equal_nan=True)
+        for i in range(len(mu)):
+            one = getattr(clock(mu[i], R=R[i]), name)
+            assert np.array_equal(one, swept[name].values[i], equal_nan=True)
+
+
+def test_a_bound_beyond_rtol_is_told_as_the_sweep_tells_it():
+    keys = {"kernel": "foliot", "method": "asymptotic", "rtol": 1e-9, "fixed": {"a": 1.0, "phi0": 1.0}}
+    swept = sweep.run({**keys, "axes": {"mu": [1e-3, 1.4]}})
+    clock = sweep.solver({**keys, "axes": {"mu": [1.0]}})
+    assert swept.status.values.tolist() == [Status.OK, Status.INACCURATE]
+    assert [clock(mu).status for mu in (1e-3, 1.4)] == [Status.OK, Status.INACCURATE]
+    assert [clock(mu).period for mu in (1e-3, 1.4)] == swept.period.values.tolist()
+
+
+def test_arrays_are_broadcast_and_traces_come_behind():
+    fall = sweep.solver(build(axes={"height": [1.0], "v0": [0.0]}, outputs=["drop"], along={"phase": [0.0, 1.0]}))
+    found = fall(height=np.array([[1.0], [2.0]]), v0=[0.0, 1.0, 2.0])
+    assert found.drop.shape == (2, 3, 2)
+    assert found.status.shape == (2, 3)
+    assert np.allclose(found.drop[..., 1], [[1.0] * 3, [2.0] * 3])
+    assert fall(3.0, 0.0).drop.shape == (2,)
+    assert fall([], []).status.shape == (0,)
+
+
+def test_a_trace_is_not_overwritten_by_the_next_call():
+    motion = sweep.solver({"kernel": "foliot_motion", "outputs": ["angle"], "axes": {"mu": [1.0]},
+                           "fixed": {"a": 1.0, "phi0": 1.0}, "along": {"phase": {"num": 5}}})  # fmt: skip
+    first = motion(1.0).angle
+    kept = first.copy()
+    motion(5.0)
+    assert np.array_equal(first, kept)
+
+
+def test_what_is_refused_is_nan_and_says_why():
+    fall = sweep.solver(build(axes={"height": [1.0]}))
+    found = fall(-1.0)
+    assert np.isnan(found.fall_time)
+    assert found.status == 64
+    left_out = sweep.solver(build(axes={"height": [1.0]}, where="height > 1"))
+    assert left_out(0.5).status == 125
+    assert left_out(2.0).status == 0
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda f: f(), "expected height and v0, found 0 of 2 values"),
+        (lambda f: f(1.0), "expected height and v0, found 1 of 2 values"),
+        (lambda f: f(1.0, 2.0, 3.0), "found 3 of 2 values"),
+        (lambda f: f(1.0, hight=2.0), "hight: the study has no such axis; did you mean height?"),
+        (lambda f: f(1.0, height=2.0), "height is given twice"),
+        (lambda f: f("x", 1.0), "expected numbers or arrays"),
+        (lambda f: f([1.0, 2.0], [1.0, 2.0, 3.0]), "expected numbers or arrays"),
+    ],
+)
+def test_a_wrong_call_is_told(call, message):
+    with pytest.raises(sweep.SweepError) as caught:
+        call(sweep.solver(build(axes={"height": [1.0], "v0": [0.0]})))
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"axes": {"height": [1.0], "method": ["exact"]}},
+        {"axes": {"height": [1.0], "rtol": [1e-3]}},
+        {"axes": {"height": [1.0]}, "summary": {}},
+    ],
+)
+def test_a_study_that_is_no_function_of_numbers_is_refused(keys):
+    with pytest.raises(sweep.SweepError, match="a solver"):
+        sweep.solver(build(**keys))

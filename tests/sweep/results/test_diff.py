@@ -1,0 +1,112 @@
+"""In what two results differ, checked on results that were made to differ in known cells."""
+
+import numpy as np
+import pytest
+from toy_studies import build
+
+import sweep
+from kernels.interface import Status
+from sweep.cli import main
+from sweep.results import diff as module
+
+AXES = {"height": [1.0, 2.0, 4.0], "v0": [0.0, 1.0]}
+
+
+@pytest.fixture
+def result():
+    return sweep.run(build(axes=AXES, outputs=["fall_time", "drop"], along={"phase": [0.0, 0.5, 1.0]}))
+
+
+def test_a_result_is_the_same_as_itself(result):
+    found = sweep.diff(result, result.copy(deep=True))
+    assert found.same
+    assert "bit for bit" in str(found)
+
+
+def test_the_cell_and_the_distance_are_told(result):
+    other = result.copy(deep=True)
+    other.fall_time[1, 0] *= 1 + 1e-6
+    other.fall_time[2, 1] *= 1 - 1e-3
+    other["drop"][0, 1, 2] *= 1 + 1e-9
+    found = sweep.diff(result, other)
+    assert found.outputs["fall_time"].cells == 2
+    assert found.outputs["fall_time"].largest == pytest.approx(1e-3, rel=1e-9)
+    assert found.outputs["fall_time"].example == "e.g. height=4 v0=1"
+    assert (found.outputs["drop"].cells, found.outputs["drop"].example) == (1, "e.g. height=1 v0=1")
+    assert not found.same
+    assert sweep.diff(result, other, rtol=1e-5).outputs["fall_time"].cells == 1
+    assert sweep.diff(result, other, rtol=1.0001e-3).same
+
+
+def test_a_value_against_none_is_infinitely_far(result):
+    other = result.copy(deep=True)
+    other.fall_time[0, 0] = np.nan
+    found = sweep.diff(result, other, rtol=0.5)
+    assert found.outputs["fall_time"].largest == np.inf
+    both = result.copy(deep=True)
+    both.fall_time[0, 0] = np.nan
+    assert sweep.diff(both, other).same
+
+
+def test_statuses_are_compared(result):
+    other = result.copy(deep=True)
+    other.status[1, 1] = Status.INACCURATE
+    other.status[2, :] = Status.BAD_INPUT
+    found = sweep.diff(result, other, rtol=1.0)
+    assert found.statuses == {("OK", "INACCURATE"): 1, ("OK", "BAD_INPUT"): 2}
+    assert found.examples["OK", "BAD_INPUT"] == "e.g. height=4 v0=0"
+    assert not found.same
+
+
+def test_cells_of_equal_parameters_are_compared(result):
+    more = sweep.run(build(axes={"height": [0.5, 1.0, 2.0, 4.0], "v0": [1.0, 3.0]}))
+    found = sweep.diff(result.drop_vars("drop"), more)
+    assert (found.cells, found.only_a, found.only_b) == (3, 3, 5)
+    assert not found.same
+    assert not found.outputs["fall_time"].cells
+    assert sweep.diff(result, more).missing == ("drop",)
+
+
+def test_dimensions_may_stand_in_another_order(result):
+    assert sweep.diff(result, result.transpose("v0", "phase", "height")).same
+
+
+def test_many_cells_come_in_pieces(result, monkeypatch):
+    monkeypatch.setattr(module, "NUMBERS_AT_ONCE", 2)
+    other = result.copy(deep=True)
+    other.fall_time[2, 0] *= 2
+    other.status[1, 1] = Status.INACCURATE
+    found = sweep.diff(result, other)
+    assert found.outputs["fall_time"].example == "e.g. height=4 v0=0"
+    assert found.examples["OK", "INACCURATE"] == "e.g. height=2 v0=1"
+
+
+def test_points_are_compared_by_number():
+    points = {"design": "zip", "axes": {"height": [1.0, 2.0], "v0": [0.0, 1.0]}}
+    a = sweep.run(build(**points))
+    assert sweep.diff(a, a.copy()).same
+    b = sweep.run(build(design="zip", axes={"height": [1.0, 3.0], "v0": [0.0, 1.0]}))
+    with pytest.raises(sweep.SweepError, match="points along cell are not the same"):
+        sweep.diff(a, b)
+
+
+def test_what_cannot_be_compared_is_refused(result):
+    with pytest.raises(sweep.SweepError, match="summary keeps no cells"):
+        sweep.diff(result, sweep.run(build(axes=AXES, summary={})))
+    with pytest.raises(sweep.SweepError, match="different kernels"):
+        sweep.diff(result, result.assign_attrs(kernel="foliot"))
+    with pytest.raises(sweep.SweepError, match="run along height and v0 in one result and along height in the other"):
+        sweep.diff(result, sweep.run(build(axes={"height": [1.0]})))
+
+
+def test_the_command_exits_with_1_where_results_differ(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    sweep.run(build(axes=AXES), "a.h5").close()
+    sweep.run(build(axes=AXES, method="exact"), "b.h5").close()
+    assert main(["diff", "a.h5", "a.h5"]) == 0
+    assert main(["diff", "a.h5", "b.h5", "--rtol", "1e-6"]) == 0
+    capsys.readouterr()
+    sweep.run(build(axes={"height": [1.0, 2.0], "v0": [0.0]}), "c.h5").close()
+    assert main(["diff", "a.h5", "c.h5"]) == 1
+    assert "4 in the first alone" in capsys.readouterr().out
+    assert main(["diff", "a.h5", "nowhere.h5"]) == 2

@@ -1,0 +1,55 @@
+"""The results of a folder."""
+
+import shutil
+
+import pytest
+from toy_studies import build
+
+import sweep
+from sweep.cli import main
+
+
+def test_results_are_listed_with_what_became_of_them(tmp_path, capsys):
+    sweep.run(build(axes={"height": [1.0, -1.0]}, question="How long does it fall?"), tmp_path / "a.h5").close()
+    sweep.run(build(axes={"height": [1.0, 2.0, 3.0]}, summary={}), tmp_path / "b.h5").close()
+    (tmp_path / "c.h5").write_text("no result")
+    (tmp_path / "notes.txt").write_text("no result")
+    found = sweep.list_results(tmp_path)
+    assert [one.path.name for one in found] == ["a.h5", "b.h5", "c.h5"]
+    a, b, c = found
+    assert (a.question, a.cells, a.done, a.statuses) == ("How long does it fall?", 2, 1.0, {"OK": 1, "BAD_INPUT": 1})
+    assert (b.cells, b.statuses) == (3, {"OK": 3})
+    assert "not the result of a sweep" in c.fault
+    assert a.when.startswith("20")
+    assert main(["list", str(tmp_path)]) == 0
+    told = capsys.readouterr().out
+    assert "OK 1, BAD_INPUT 1" in told
+    assert "How long does it fall?" in told
+
+
+def test_an_unfinished_one_is_listed_with_its_share(tmp_path, monkeypatch):
+    from sweep.runs.session import Session
+
+    done = []
+
+    def stopping(self):
+        done.append(1)
+        if len(done) > 3:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Session, "check_time", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        sweep.run(
+            build(axes={"height": [float(i + 1) for i in range(64)]}), tmp_path / "a.h5", block_cells=8, workers=1
+        )
+    (found,) = sweep.list_results(tmp_path)
+    assert 0 < found.done < 1
+    assert found.cells == 64
+    assert "PENDING" in found.statuses
+
+
+def test_a_folder_without_results_and_none(tmp_path):
+    assert str(sweep.list_results(tmp_path)) == "no results here"
+    shutil.rmtree(tmp_path)
+    with pytest.raises(sweep.SweepError, match="no such folder"):
+        sweep.list_results(tmp_path)

@@ -1,0 +1,175 @@
+"""Kernels that raise, crash, or never end cost the cells they do so at, and nothing else."""
+
+import io
+from concurrent.futures import ProcessPoolExecutor
+
+import bad
+import numpy as np
+import pytest
+import toy_studies
+from clusters import served
+from running import quiet, same, tall
+
+import sweep
+from kernels.interface import Status
+from sweep.cells.guard import BadCell, Guard
+from sweep.cells.solve import Solver
+from sweep.results.statuses import account
+from sweep.runs import isolate, isolated
+from sweep.runs.isolate import Limits, Processes
+from sweep.system.errors import SweepError
+
+SOUND = 100
+BAD = {"bad:RAISING": [11.0], "bad:DYING": [11.0, 22.0, 33.0], "bad:WORST": [11.0, 22.0, 33.0, 44.0, 55.0, 66.0]}
+KEYS = {"bad:RAISING": {}, "bad:DYING": {"isolate": True}, "bad:WORST": {"cell_timeout": 1.5}}
+
+
+def heights_of(found, status):
+    return found.height.values[found.status.values == status].tolist()
+
+
+def good(found):
+    return found.isel(height=found.status.values != Status.FAILED)
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_cells_fail_by_name_and_all_others_have_the_bits_of_a_run_without_them(name, tmp_path):
+    log = io.StringIO()
+    with quiet(tall(SOUND, name), tmp_path / "out.h5", progress=log, **KEYS[name]) as found:
+        assert heights_of(found, Status.FAILED) == BAD[name]
+        assert np.isnan(found.fall_time.values[found.status.values == Status.FAILED]).all()
+        kept = good(found)
+        whole = quiet(tall(SOUND, "bad:RAISING"), isolate=True)
+        assert kept.fall_time.values.tobytes() == whole.fall_time.sel(height=kept.height).values.tobytes()
+        assert account(found).failed == len(BAD[name])
+    told = [line.partition("FAILED ")[2] for line in log.getvalue().splitlines() if "FAILED" in line]
+    assert sorted(text.partition(":")[0] for text in told) == [f"(height={int(height)})" for height in BAD[name]]
+    reasons = {"11": "ZeroDivisionError: eleven", "22": "SIGSEGV", "33": "ended with 7", "44": "longer than 1.5 s"}
+    for height, reason in reasons.items():
+        assert float(height) not in BAD[name] or any(f"height={height})" in t and reason in t for t in told)
+
+
+def test_a_kernel_of_which_every_cell_is_bad_is_told_at_once():
+    with pytest.raises(SweepError, match=r"bad:HOPELESS: the kernel failed \(ZeroDivisionError: at"):
+        quiet(tall(50, "bad:HOPELESS"))
+    with pytest.raises(SweepError, match=r"bad:HOPELESS: the kernel failed \(ZeroDivisionError: at"):
+        quiet(tall(50, "bad:HOPELESS"), isolate=True)
+
+
+@pytest.mark.parametrize("keys", [{}, {"isolate": True}])
+def test_a_summary_counts_bad_cells_and_reduces_the_others(keys):
+    reductions = {"outputs": {"fall_time": ["min", "mean", "argmax"]}}
+    study = toy_studies.build(kernel="bad:RAISING", axes={"height": np.arange(1.0, 41)}, summary=reductions)
+    without = np.delete(np.arange(1.0, 41), 10)
+    found = quiet(study, **keys)
+    expected = quiet(toy_studies.build(kernel="bad:RAISING", axes={"height": without}, summary=reductions))
+    assert account(found).failed == 1
+    assert account(found).ok == 39
+    assert found.fall_time_min.item() == expected.fall_time_min.item()
+    assert found.fall_time_mean.item() == pytest.approx(expected.fall_time_mean.item(), rel=1e-15)
+
+
+def test_only_wanted_cells_are_tried(tmp_path):
+    study, seen = tall(40, "bad:RAISING"), []
+    guard = Guard(Solver(study), seen.append)
+    arrays = {"fall_time": np.empty(40)}, np.empty(40, np.int8), np.empty(40, np.int8)
+    guard.solve(0, 40, *arrays, np.arange(40) != 10)
+    assert seen == []
+    guard.solve(0, 40, *arrays, np.arange(40) == 10, np.empty(40, np.float32))
+    assert seen == [BadCell(10, {"height": "11"}, "ZeroDivisionError: eleven")]
+
+
+def test_what_failed_is_computed_again_when_asked(tmp_path, monkeypatch):
+    output, study = tmp_path / "out.h5", tall(40, "bad:RAISING")
+    quiet(study, output).close()
+    with quiet(study, output, retry_failed=True) as found:
+        assert heights_of(found, Status.FAILED) == [11.0]
+    solved = []
+    monkeypatch.setattr(bad, "misbehave", lambda height, kinds: solved.extend(height))
+    with quiet(study, output) as found:
+        assert heights_of(found, Status.FAILED) == [11.0]
+    assert solved == []
+    with quiet(study, output, retry_failed=True, block_cells=1) as found:
+        same(found, quiet(study))
+    with quiet(study, output, retry_failed=True) as found:
+        assert heights_of(found, Status.FAILED) == []
+
+
+def test_a_summary_has_no_cells_to_compute_again(tmp_path):
+    study = toy_studies.build(
+        kernel="bad:RAISING", axes={"height": np.arange(1.0, 41)}, summary={"outputs": {"fall_time": ["min"]}}
+    )
+    quiet(study, tmp_path / "out.h5").close()
+    with pytest.raises(SweepError, match="a summary does not keep the cells that FAILED"):
+        quiet(study, tmp_path / "out.h5", retry_failed=True)
+    with pytest.raises(SweepError, match="extend, retry_failed"):
+        quiet(study, tmp_path / "out.h5", retry_failed=True, extend=True)
+
+
+def test_a_catalogued_kernel_gives_the_same_bits_in_a_process_of_its_own():
+    study = sweep.build_study(
+        kernel="foliot", axes={"mu": np.geomspace(0.1, 10.0, 65)}, fixed={"a": 1.0, "phi0": 1.0}, rtol=1e-6
+    )
+    same(quiet(study, isolate=True, block_cells=10), quiet(study))
+
+
+def test_a_kernel_that_fails_on_a_cluster_costs_a_cell_too(tmp_path):
+    pytest.importorskip("distributed")
+    with served(workers=2) as (address, _):
+        for name in ("bad:RAISING", "bad:WORST"):
+            keys = {**KEYS[name], "workers": None, "cluster": address}
+            with quiet(tall(SOUND, name), tmp_path / f"{name[4:]}.h5", **keys) as found:
+                assert heights_of(found, Status.FAILED) == BAD[name]
+                assert account(found).ok == SOUND - len(BAD[name])
+
+
+def test_several_cells_have_little_more_than_they_should_take_and_one_has_its_time():
+    limits = Limits(60.0, 0.01)
+    assert limits.seconds(1) == 60.0
+    assert limits.seconds(100) == pytest.approx(11.0)
+    assert Limits(0.5, 0.0).seconds(1000) == 0.5
+    assert Limits(None, 2.0).seconds(1) == 200.0
+    assert Limits(None, 0.1).seconds(1) == 60.0
+
+
+def test_processes_that_others_kill_cost_nothing(monkeypatch):
+    """Whatever they are at: loading, or a cell alone."""
+    study, victims = tall(30, "bad:RAISING"), []
+    processes = Processes(study, Limits(30.0), 1)
+    solver = processes.solver()
+
+    def killed(pool, *task, real=ProcessPoolExecutor.submit):
+        future = real(pool, *task)
+        if task[0] in (isolated.load, isolated.solve):
+            victims.append(task)
+            if len(victims) in (1, 3, 6, 10, 15, 21):
+                solver._process.kill()
+        return future
+
+    monkeypatch.setattr(ProcessPoolExecutor, "submit", killed)
+    seen = []
+    arrays = {"fall_time": np.empty(30)}, np.empty(30, np.int8), np.empty(30, np.int8)
+    Guard(solver, seen.append).solve(0, 30, *arrays)
+    processes.end()
+    assert [cell.cell for cell in seen] == [10]
+    assert len(victims) > 10
+
+
+def test_a_process_with_too_much_memory_is_replaced(monkeypatch):
+    begun = []
+    real = isolate.IsolatedSolver._begun
+    monkeypatch.setattr(isolate.IsolatedSolver, "_begun", lambda self: begun.append(1) or real(self))
+    same(quiet(tall(30), isolate=True, workers=1, block_cells=10), quiet(tall(30)))
+    usual = len(begun)
+    monkeypatch.setattr(isolate, "MEMORY_SHARE", 1e-9)
+    same(quiet(tall(30), isolate=True, workers=1, block_cells=10), quiet(tall(30)))
+    assert len(begun) - usual >= usual + 2
+
+
+def test_a_sample_does_not_wait_for_cells_that_never_end():
+    processes = Processes(tall(60, "bad:ENDLESS"), Limits(600.0), 1)
+    assert processes.seconds(1) == 600.0
+    processes.good, processes.dearest = 0, 0.1
+    assert processes.seconds(1) == 2.0
+    processes.limits = Limits(600.0, 0.1)
+    assert processes.seconds(1) == 600.0

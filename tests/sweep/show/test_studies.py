@@ -1,0 +1,68 @@
+"""The studies that come with the package: listed, and copied to work on."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import sweep
+from sweep.cli import main
+from sweep.show import studies
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_every_study_is_listed_with_its_question(capsys):
+    assert main(["studies"]) == 0
+    said = capsys.readouterr().out
+    for path in (ROOT / "studies").glob("*.py"):
+        if not path.stem.startswith("_"):
+            assert f"  {path.stem} " in said
+    assert "How does the period fall with the drive torque" in said or "drive torque" in said
+    assert "three_models_denny" not in said
+    assert all(studies.question(name).endswith("?") for name in studies.names())
+
+
+@pytest.mark.parametrize("name", studies.names())
+def test_a_copy_is_all_that_the_study_needs(name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["studies", name]) == 0
+    copied = {path.name for path in tmp_path.iterdir()}
+    assert copied == set(capsys.readouterr().out.split())
+    for path in tmp_path.glob("*.toml"):
+        sweep.read_study(path, allow_import=True)
+    for script in tmp_path.glob("*.py"):
+        for other in (ROOT / "studies").glob("*.py"):
+            if f"import {other.stem}\n" in script.read_text() or f"from {other.stem} import" in script.read_text():
+                assert other.name in copied
+
+
+def test_several_grids_of_one_study_are_copied_together(tmp_path):
+    names = {path.name for path in studies.copy_study("three_models", tmp_path)}
+    assert {"three_models_denny.toml", "three_models_viscous.toml", "_common.py"} <= names
+
+
+def test_nobodys_file_is_overwritten(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("foliot_scaling.toml").write_text("mine")
+    assert main(["studies", "foliot_scaling"]) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert Path("foliot_scaling.toml").read_text() == "mine"
+    assert not Path("foliot_scaling.py").exists()
+    assert main(["studies", "foliot_scalling"]) == 2
+    assert "did you mean foliot_scaling?" in capsys.readouterr().err
+
+
+def test_a_shell_learns_the_commands(capsys):
+    pytest.importorskip("shtab")
+    for shell in ("bash", "zsh", "tcsh"):
+        assert main(["completion", shell]) == 0
+        assert "refine" in capsys.readouterr().out
+
+
+def test_what_is_to_be_cited_is_this_version():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    lines = (ROOT / "CITATION.cff").read_text().splitlines()
+    assert f'version: "{project["version"]}"' in lines
+    assert f"license: {project['license']}" in lines
+    assert "cff-version: 1.2.0" in lines

@@ -1,0 +1,43 @@
+"""Every public name of `sweep` has an example in its docstring, which comes out as it stands there."""
+
+import doctest
+
+import pytest
+
+import sweep
+from sweep.study.read import study
+
+OPTIONS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+def documented(name):
+    """The object of a public name; of a room that is called, the function."""
+    return study if name == "study" else getattr(sweep, name)
+
+
+@pytest.mark.parametrize("name", sweep.__all__)
+def test_the_example_of_a_public_name_is_right(name, tmp_path, monkeypatch):
+    if name == "sensitivity":
+        pytest.importorskip("SALib")
+    monkeypatch.chdir(tmp_path)
+    found = documented(name)
+    tests = doctest.DocTestFinder(recurse=False).find(found, name, globs={})
+    assert "Examples\n" in (found.__doc__ or ""), f"{name} has no section Examples"
+    assert tests
+    assert tests[0].examples
+    told = []
+    doctest.DocTestRunner(optionflags=OPTIONS).run(tests[0], out=told.append, clear_globs=True)
+    failed = [text for text in told if text.startswith("*")]
+    assert not failed, "".join(told)
+
+
+def test_the_names_that_sweep_lists_are_the_public_ones():
+    assert dir(sweep) == sorted(sweep.__all__)
+    assert not [name for name in dir(sweep) if name.startswith("_")]
+
+
+def test_a_room_and_a_function_have_one_name():
+    from sweep.study.read import read_study
+
+    assert sweep.study.read.read_study is read_study
+    assert callable(sweep.study)

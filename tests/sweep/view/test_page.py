@@ -1,0 +1,105 @@
+"""What the controls of the page do, without a browser."""
+
+import numpy as np
+import pytest
+
+import sweep
+
+pytest.importorskip("panel", reason="the extra view is not installed")
+from sweep.view.page import ONE_LINE, Page
+from sweep.view.server import serve
+
+
+@pytest.fixture
+def page(dataset):
+    return Page(dataset, "map.h5")
+
+
+def shown_values(page):
+    return page.picture.cells.data["image"][0]
+
+
+def test_a_page_begins_with_the_first_output_over_its_longest_axes(page, dataset):
+    assert (page.choice.output, page.choice.x, page.choice.across) == ("period", "mu", "R")
+    assert list(page.sliders) == ["a"]
+    image = shown_values(page)
+    expected = dataset.period.isel(a=1).values
+    assert image[0, 0] == expected[0, 0]
+    assert image[-1, -1] == expected[-1, -1]
+
+
+def test_a_slider_shows_other_cells_and_keeps_the_figure(page, dataset):
+    figure = page.picture.figure
+    page.sliders["a"].value = 0
+    assert page.picture.figure is figure
+    assert shown_values(page)[0, 0] == float(dataset.period[0, 0, 0])
+
+
+def test_any_two_axes_make_a_map_or_a_line(page, dataset):
+    page.x.value = "R"
+    assert (page.choice.across, list(page.sliders)) == ("mu", ["a"])
+    page.up.value = ONE_LINE
+    assert sorted(page.sliders) == ["a", "mu"]
+    page.sliders["mu"].value = 40
+    assert np.array_equal(page.picture.lines.data["ys"][0], dataset.period.isel(mu=40, a=1).values, equal_nan=True)
+
+
+def test_scales_are_those_asked_for(page):
+    assert page.picture.scales == (scales := page.picture.scales)
+    assert (scales.x, scales.y) == (True, False)
+    page.scales["x"].value = "linear"
+    assert not page.picture.scales.x
+    page.scales["values"].value = "linear"
+    assert not page.picture.scales.colour
+
+
+def test_a_zoom_reads_the_region_and_a_slider_keeps_it(page):
+    page.picture.figure.x_range.update(start=1.0, end=2.0)
+    page.picture.figure.y_range.update(start=0.5, end=0.6)
+    page._redraw()
+    assert page.found.values("mu").min() > 0.4
+    assert page.found.y.sizes["R"] < 8  # and yet a map
+    page.sliders["a"].value = 2
+    assert page.picture.figure.x_range.start == 1.0
+    assert page.found.values("mu").min() > 0.4
+
+
+def test_the_exponent_replaces_the_value(page, dataset):
+    page.up.value = ONE_LINE
+    page.sliders["R"].value = 0
+    page.shows.value = "local exponent"
+    expected = sweep.local_exponent(dataset.period.isel(R=0, a=1).load(), "mu").values
+    assert np.array_equal(page.picture.lines.data["ys"][0], expected)
+
+
+def test_statuses_lie_over_the_picture_and_are_told(page, dataset):
+    flags = page.picture.flags.data["image"][0]
+    assert np.isnan(flags[0, -1])
+    assert np.isfinite(flags[-1, 0])
+    count = int((dataset.status.isel(a=1) != 0).sum())
+    assert f"NEVER_STARTS, {count} shown" in page.legend.object
+    page.statuses.value = False
+    assert page.legend.object == ""
+    assert page.picture.flags.data["image"] == []
+
+
+def test_a_click_shows_the_row_of_the_cell(page, dataset):
+    page._click(float(dataset.mu[30]) * 1.05, float(dataset.R[3]) + 0.02)
+    assert f"<td>{float(dataset.period[30, 3, 1]):.17g}</td>" in page.table.object
+    assert page.picture.chosen.data == {"x": [float(dataset.mu[30])], "y": [float(dataset.R[3])]}
+
+
+def test_a_result_without_an_axis_of_numbers_is_refused(dataset):
+    with pytest.raises(sweep.SweepError, match="nothing to look at"):
+        Page(dataset.isel(mu=0, R=0, a=0).load(), "point.h5")
+
+
+def test_a_port_that_is_taken_is_told(result):
+    import socket
+
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        with pytest.raises(sweep.SweepError, match=f"port {port}"):
+            serve(result, port=port, show=False)

@@ -1,0 +1,69 @@
+"""What is saved of a region: the same numbers, and a study of it that can be run."""
+
+import csv
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.view import region
+from sweep.view.slices import Choice
+
+pytest.importorskip("matplotlib")
+MAP = Choice("period", "mu", "R", {"a": 2})
+
+
+def read(tmp_path, text):
+    path = tmp_path / "region.toml"
+    path.write_text(text)
+    return sweep.read_study(path)
+
+
+def test_the_study_of_a_region_is_the_same_scene_on_a_finer_grid(dataset, tmp_path):
+    study = read(tmp_path, region.study_text(dataset, MAP, (0.1, 1.0), (0.5, 3.0)))
+    mu, R = study.axes["mu"], study.axes["R"]
+    assert (mu.spacing, mu.values[0], mu.values[-1], len(mu)) == ("log", 0.1, 1.0, 101)
+    assert (R.spacing, R.values[0], R.values[-1], len(R)) == ("linear", 0.5, 2.0, 101)
+    assert (study.fixed["a"], study.fixed["phi0"], study.outputs) == (2.0, 1.0, ("period", "amplitude"))
+    assert sweep.run(study, progress=False).status.size == 101 * 101
+
+
+def test_words_and_lists_are_kept(tmp_path):
+    study = sweep.build_study(
+        kernel="drivetrain",
+        axes={"method": ["direct"], "f_max": [100.0, 200.0]},
+        fixed={"J": [1.0, 2.0, 3.0], "k": [1e4, 2e4, 3e4], "reduction": "rivin"},
+    )
+    dataset = sweep.run(study, progress=False)
+    name = next(iter(dataset.data_vars))
+    found = read(tmp_path, region.study_text(dataset, Choice(name, "f_max", None, {}), None, None))
+    assert found.method == "direct"
+    assert found.fixed["reduction"] == study.fixed["reduction"] != 0
+    assert found.fixed["J"].tolist() == [1.0, 2.0, 3.0]
+
+
+def test_a_list_of_cells_has_no_regions():
+    study = sweep.build_study(
+        kernel="foliot", design="zip", axes={"mu": [1.0, 2.0], "a": [1.0, 2.0]}, fixed={"phi0": 1.0}
+    )
+    with pytest.raises(sweep.SweepError, match="list of cells"):
+        region.study_text(sweep.run(study, progress=False), Choice("period", "mu"), None, None)
+
+
+def test_the_table_has_the_cells_in_view_with_all_outputs(dataset):
+    text = region.table(dataset, MAP, None, None).getvalue().decode()
+    rows = list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
+    for name in ("period", "amplitude"):
+        found = np.array([float(r[name]) for r in rows]).reshape(41, 21)
+        assert np.array_equal(found, dataset[name].isel(a=2).values, equal_nan=True)
+
+
+def test_too_many_cells_are_no_table(dataset, monkeypatch):
+    monkeypatch.setattr(region, "MOST_ROWS", 41 * 21 - 1)
+    with pytest.raises(sweep.SweepError, match="861 cells are too many"):
+        region.table(dataset, MAP, None, None)
+
+
+def test_the_picture_is_a_picture(dataset):
+    assert region.picture(dataset, MAP, None, None).getvalue().startswith(b"\x89PNG")
+    assert region.picture(dataset, Choice("period", "mu", "R", {"a": 2}, exponent=True), None, None)
