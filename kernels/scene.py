@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from kernels.codegen import followed_twice
+from kernels.codegen import followed_twice, stated_error
 from kernels.codegen.expression import SceneError, cos, exp, log, maximum, minimum, power, sign, sin, sqrt, where
 from kernels.codegen.module import build, compiling
 from kernels.codegen.record import RESERVED
@@ -157,7 +157,7 @@ def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[M
         return Method(name, doc, _solve((scene.name, name), how, module, parameters, outputs), bound)
 
     return (
-        method("taylor", f"{SERIES}; followed twice", followed_twice.twice),
+        method("taylor", f"{SERIES}; the error carried along, or followed twice", stated_error.by_one(scene)),
         method(
             "taylor_once",
             "the same, each step right to rtol, followed once",

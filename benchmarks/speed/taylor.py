@@ -7,11 +7,11 @@ heyoka.py is in its best form for this: its scalar integrator with fast_math. Fo
 event that is told whether the turning point or the switch comes next. A power has no series at v = 0 and no other
 integrator restarts there; heyoka.py is given v (v^2 + w^2)^((n - 1)/2) instead, with a w so small that its error is not
 of it, and the switch as its event. Ours is `taylor_once` of a scene given as plain Python: every step is proved to pass
-no switch over, and every cell's steps are its own; beside it `taylor`, which follows each cell twice to say how far it
-can be believed. Errors are the worst of time and speed against closed forms in 40 digits, or integrals in 24. Times are
-CPU seconds of the thread, the best of a few runs in turn. The last lines: cells of 4 to 400 switches, refilled and
-dealt, against the same lanes in lockstep; and, through `sweep.run`, all cores against one on an uneven log grid
-(seconds of the clock: to be believed on an idle machine only).
+no switch over, and every cell's steps are its own; beside it `taylor`, which carries its error along to say how far it
+can be believed, at steps as tight. Errors are the worst of time and speed against closed forms in 40 digits, or
+integrals in 24. Times are CPU seconds of the thread, the best of a few runs in turn. The last lines: cells of 4 to 400
+switches, refilled and dealt, against the same lanes in lockstep; and, through `sweep.run`, all cores against one on an
+uneven log grid (seconds of the clock: to be believed on an idle machine only).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 import sweep
-from kernels.codegen import followed_twice
+from kernels.codegen import followed_twice, stated_error
 from kernels.codegen.module import build
 from kernels.scene import Scene, power, sign
 
@@ -144,9 +144,8 @@ def theirs(follow):
     return THEIR_CELLS / (time.thread_time() - begin), found
 
 
-def ours(module, columns, tolerance, twice=False):
+def ours(module, columns, tolerance, follow):
     outputs, status = [np.empty(CELLS) for _ in range(4)], np.empty(CELLS, np.int8)
-    follow = followed_twice.twice if twice else followed_twice.once
     begin = time.thread_time()
     follow(module, columns, np.full(CELLS, tolerance), outputs, status)
     rate = CELLS / (time.thread_time() - begin)
@@ -171,14 +170,16 @@ def uneven(module, together):
     return n / (time.thread_time() - begin)
 
 
-def compare(title, follow, module, columns, tolerance, truth):
+def compare(title, follow, scene, columns, tolerance, truth):
     """Prints cells per second, ratios and errors."""
+    plain, telling, rtol = build(scene), stated_error.telling(scene), tolerance / stated_error.OF_A_STEP
     runs = {
         "heyoka.py": lambda: theirs(follow),
-        "taylor_once": lambda: ours(module, columns, tolerance),
-        "taylor": lambda: ours(module, columns, tolerance, True),
+        "taylor_once": lambda: ours(plain, columns, tolerance, followed_twice.once),
+        "taylor": lambda: ours(telling, columns, rtol, stated_error.solved),
     }
-    runs["taylor_once"]()  # compiled before it is timed
+    for name in ("taylor_once", "taylor"):  # compiled before they are timed
+        runs[name]()
     rounds = [{name: run() for name, run in runs.items()} for _ in range(ROUNDS)]
     best = {name: max((each[name] for each in rounds), key=lambda found: found[0]) for name in runs}
     print(f"{title:24}{'cells/s':>12}{'ratio':>8}{'worst error':>14}")
@@ -209,17 +210,16 @@ def cores():
 
 
 def main():
-    module, general = build(SCENE), build(GENERAL)
     own = cells(CELLS)
     truth = [quadratic_foliot(*cell, FLIPS) for cell in zip(*(c[:JUDGED] for c in own), strict=True)]
     columns = (*own, np.full(CELLS, float(FLIPS)))
     for near, their, our in (("1e-8", 1e-6, 6e-8), ("1e-12", 1e-10, 3e-12)):
-        compare(f"v abs(v), near {near}", peer(their), module, columns, our, truth)
+        compare(f"v abs(v), near {near}", peer(their), SCENE, columns, our, truth)
     truth = [power_foliot(*cell, POWER, POWER_FLIPS) for cell in zip(*(c[:POWER_JUDGED] for c in own), strict=True)]
     columns = (*own, np.full(CELLS, POWER), np.full(CELLS, float(POWER_FLIPS)))
     for near, their, w, our in (("1e-8", 1e-7, 8e-5, 2.5e-9), ("1e-12", 5e-12, 1e-6, 8e-13)):
-        compare(f"abs(v)^{POWER}, near {near}", power_peer(their, w), general, columns, our, truth)
-    dealt, lockstep = (max(uneven(module, together) for _ in range(3)) for together in (False, True))
+        compare(f"abs(v)^{POWER}, near {near}", power_peer(their, w), GENERAL, columns, our, truth)
+    dealt, lockstep = (max(uneven(build(SCENE), together) for _ in range(3)) for together in (False, True))
     print(f"cells of 4 to 400 switches: {dealt:,.0f} cells/s refilled, {lockstep:,.0f} in lockstep;", end=" ")
     print(f"{dealt / lockstep:.1f} times")
     print("uneven log grid, {} cores against one: {:.2f} times".format(*cores()))

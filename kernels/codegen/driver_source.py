@@ -1,7 +1,7 @@
 """Source text of what a lane does from one event to the next: start, switch, turn signs round, count, end."""
 
 from kernels.codegen.lane_source import BEGIN, begun_rows, chosen, loaded_rows, stored_rows
-from kernels.codegen.template import filled, listed
+from kernels.codegen.template import filled, folded, listed
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import exponent, magnitude, pow2, sqrt, where
 
@@ -54,9 +54,10 @@ def advance_{order}(memory, i):
     done = active & not_(active)
     for _ in range(EVENTS):
         moving = active & (verdict < REFUSED)
-        leg = to_event_{order}(
-            ({states}), side, ({signs}), parameters, unit, h, ({ons}), tolerance, moving
+        leg{off_out} = to_event_{order}(
+            ({states}), side, ({signs}), parameters, unit, h, ({ons}), tolerance, moving{off_in}
         )
+        {late}
         verdict = where((leg.hangs | leg.grazing) & (verdict < GRAZING), GRAZING, verdict)
         refused = where(leg.stuck, STICKS, where(leg.broken, OUT_OF_RANGE, verdict))
         verdict = where(leg.lost, STEP_LIMIT_MET, refused)
@@ -71,15 +72,18 @@ def advance_{order}(memory, i):
         {turn}
         if any_lane(switches):
             count = where(switches, count + 1.0, count)
+            {largest}
             watched = switches & ((count < 1.5) | (count >= flips))
             if any_lane(watched):
                 faint = underflows(({states}), side, ({signs}), parameters, unit)
                 verdict = where(watched & faint, OUT_OF_RANGE, verdict)
                 rate = rates(({states}), side, ({signs}), parameters)
                 {keep}
+                {tell}
             since = where(switches, 0.0, since)
             left = surface(({states}), side, ({signs}), parameters)
             gaps = kink_values(({states}), side, ({signs}), parameters)
+            {through}
             jumped = switched(({states}), side, ({signs}), parameters)
             side = where(switches, -side, side)
             gaps_behind = kink_values(jumped, side, ({signs}), parameters)
@@ -138,9 +142,16 @@ def _between_events(states, kinks):
     return [*states, "side", *signs, "unit", "h", *ons, "count", "since", "kinks_met", "steps", "before"]
 
 
-def _rows(states, parameters, kinks):
+def of_error(states):
+    """Names of what a lane that tells its error keeps of it: at the last switch, of times, of each state."""
+    offs = [f"off_{s}" for s in states]
+    return ["told", "error", "late", "lag", *offs, "latest", "lagged", *(f"once_{s}" for s in offs)]
+
+
+def rows_of(states, parameters, kinks, tells=False):
     """Names of all that a lane keeps."""
-    return ["stage", *parameters, "flips", "tolerance", *results_of(states), *_between_events(states, kinks)]
+    moving = [*results_of(states), *_between_events(states, kinks)]
+    return ["stage", *parameters, "flips", "tolerance", *moving, *(of_error(states) if tells else [])]
 
 
 def shared(states, parameters, kinks):
@@ -161,7 +172,7 @@ sign_{j - 1} = where(on_{j} & back, -sign_{j - 1}, sign_{j - 1})"""
     ) + filled(
         BEGUN, states=listed(states), lasting=listed(f"{s} + 0.0 * side" for s in states), unpack=unpack,
         also_on=", ".join(f"on[{j - 1}]" for j in e), zeros=listed("0.0 * side" for _ in e),
-    ) + f"\n\nROWS = {tuple(_rows(states, parameters, kinks))}\n"  # fmt: skip
+    ) + f"\n\nROWS = {tuple(rows_of(states, parameters, kinks))}\n"  # fmt: skip
 
 
 SETTLED_EMPTY = '''
@@ -172,18 +183,54 @@ def settled(state, side, parameters, unit, near):
 '''
 
 
-def advance(states, parameters, kinks, order, offset):
-    """The text of `advance_{order}` and `run_{order}`; `offset` is that of the surface, as text."""
+def advance(states, parameters, kinks, order, offset, tells=False):
+    """The text of `advance_{order}` and `run_{order}`.
+
+    Parameters
+    ----------
+    offset : of the surface, as text
+    tells : whether the error is carried along (`error_source`)
+    """
     signs, ons = [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]
-    rows, changed = _rows(states, parameters, kinks), ["stage", "time", "verdict", *_between_events(states, kinks)]
+    rows = rows_of(states, parameters, kinks, tells)
+    changed = ["stage", "time", "verdict", *_between_events(states, kinks), *(of_error(states)[1:] if tells else [])]
     results = {name: f"memory[{rows.index(name)}][i]" for name in results_of(states)[1:-1]}
-    begin = filled(BEGIN, begin=begun_rows(states, signs, ons, _STARTS), blur="BLUR * tolerance")
+    values = [*_STARTS, *(_first_errors(states) if tells else [])]
+    begin = filled(BEGIN, begin=begun_rows(states, signs, ons, values), blur="BLUR * tolerance")
     return filled(
         EVENT, order=order, load=loaded_rows(rows, [name for name in rows if name not in results]),
         parameters=listed(parameters), begin=begin.rstrip(), states=listed(states), signs=listed(signs),
         ons=listed(ons), offset=offset, store=stored_rows(rows, changed),
         **_landing(states, signs, ons), **_switching(states, signs, ons, results),
+        **(_telling(states, signs) if tells else dict.fromkeys(_TELLING, "")),
     )  # fmt: skip
+
+
+def _first_errors(states):
+    """Of a fresh cell: its start is rounded."""
+    nothing = [(name, "0.0") for name in of_error(states)[1:]]
+    return nothing + [(f"off_{s}", f"ULP * magnitude({s})") for s in states]
+
+
+_TELLING = "off_out", "off_in", "late", "largest", "tell", "through"
+
+
+def _telling(states, signs):
+    """Statements that carry the error along."""
+    offs = [f"off_{s}" for s in states]
+    parts, size = ["latest / time", "lagged / since"], "most(magnitude({s}), PART * magnitude(rate[{j}]) * since)"
+    parts += [f"once_off_{s} / {size.format(s=s, j=j)}" for j, s in enumerate(states)]
+    largest = [("latest", "late"), ("lagged", "lag"), *((f"once_{o}", o) for o in offs)]
+    kept = [f"{name} = where(switches, most(FADES * {name}, magnitude({x})), {name})" for name, x in largest]
+    through = f"through = jump_changes(({listed(states)}), side, ({listed(signs)}), parameters, ({listed(offs)}))"
+    return {
+        "off_out": f", ({listed(offs)}), later",
+        "off_in": f", ({listed(offs)}), told > 0.5",
+        "late": "late, lag = fma(later, unit, late), fma(later, unit, lag)",
+        "largest": "\n".join(kept),
+        "tell": f"error = where(watched, {folded('most({}, {})', parts)}, error)",
+        "through": "\n".join([through, *chosen("switches", offs, "through"), "lag = where(switches, 0.0, lag)"]),
+    }
 
 
 def _landing(states, signs, ons):

@@ -43,25 +43,38 @@ def followed(module, columns, rtol, finer=1.0, together=False):
     finer : by how much the steps are to be better than that
     together : lanes in lockstep, in the order of the cells
     """
-    inputs = [*columns, np.maximum(rtol / finer, FINEST)]
-    results = np.empty((3 + 2 * len(module.STATES), len(rtol)))
+    return _followed(module, columns, rtol, rtol / finer, together)
+
+
+def told(module, columns, rtol, of_a_step):
+    """As `followed`, and besides the error that is carried along, relative to the worst of the results."""
+    found = _followed(module, columns, rtol, of_a_step, tells=True)
+    return found[:-1], found[-1]
+
+
+def _followed(module, columns, rtol, of_a_step, together=False, tells=False):
+    """The results; if the error is to be told, as a last row."""
+    inputs = [*columns, np.maximum(of_a_step, FINEST)]
+    results = np.empty((3 + 2 * len(module.STATES) + tells, len(rtol)))
     high = rtol < HIGH_BELOW
     for run, of_order in ((module.run_12, ~high), (module.run_18, high)):
         cells = np.flatnonzero(of_order)
         for begin in range(0, len(cells), AT_ONCE):
             those = cells[begin : begin + AT_ONCE]
-            results[:, those] = _run(module, run, [column[those] for column in inputs], together)
+            results[:, those] = _run(module, run, [column[those] for column in inputs], together, tells)
     return results
 
 
-def _run(module, run, inputs, together):
+def _run(module, run, inputs, together, tells):
     """The results of cells; those that take as many steps side by side, for so lanes wait less for each other."""
     row = {name: j for j, name in enumerate(module.ROWS)}
-    found = slice(row["time"], row["verdict"] + 1)
+    found = [*range(row["time"], row["verdict"] + 1), *([row["error"]] if tells else [])]
     cells, places = fresh(len(row), inputs), np.arange(len(inputs[0]))
     whole = np.where(inputs[-2] < math.inf, inputs[-2], math.nan)  # NaN is refused, without end not followed
     cells[:, found] = np.nan
-    results = np.empty((found.stop - found.start, len(cells)))
+    if "told" in row:
+        cells[:, row["told"]] = float(tells)
+    results = np.empty((len(found), len(cells)))
     for stop in (math.inf,) if together else STOPS:
         cells[:, row["flips"]] = np.minimum(whole, stop)
         run(cells, together)
@@ -79,7 +92,7 @@ def _run(module, run, inputs, together):
 def once(module, columns, rtol, outputs, status):
     """Fills outputs and status by one run, each step right to `rtol`."""
     results = followed(module, columns, rtol)
-    _write(results, _status(results, len(outputs)), outputs, status)
+    write(results, status_of(results, len(outputs)), outputs, status)
 
 
 def twice(module, columns, rtol, outputs, status, most=APART, finest=0.0):
@@ -94,7 +107,7 @@ def twice(module, columns, rtol, outputs, status, most=APART, finest=0.0):
         better, verdict = _compared(module, [c[again] for c in columns], tighter[again], rtol[again], most)
         right = verdict == Status.OK
         results[:, again[right]], found[again[right]] = better[:, right], Status.OK
-    _write(results, found, outputs, status)
+    write(results, found, outputs, status)
 
 
 def _compared(module, columns, rtol, wanted, most):
@@ -102,7 +115,7 @@ def _compared(module, columns, rtol, wanted, most):
     rough = followed(module, off_by_roundings(columns), rtol, ROUGH)
     fine = followed(module, columns, rtol, ROUGH * FINER)
     states = len(module.STATES)
-    status = _status(fine, 2 + states)
+    status = status_of(fine, 2 + states)
     scale = np.concatenate([abs(fine[:2]), np.maximum(abs(fine[2 : 2 + states]), fine[2 + states : -1])])
     with np.errstate(all="ignore"):
         near = (abs(fine[: len(scale)] - rough[: len(scale)]) <= most * wanted * scale).all(axis=0)
@@ -128,7 +141,7 @@ def off_by_roundings(columns):
     return [*changed, flips]
 
 
-def _status(results, outputs):
+def status_of(results, outputs):
     """What the motion came to; OUT_OF_RANGE where one of so many outputs is no normal number."""
     sizes, status = abs(results[:outputs]), results[-1].astype(np.int8)
     normal = (sizes == 0) | ((sizes >= NORMAL_LOW) & (sizes <= NORMAL_HIGH))
@@ -136,7 +149,7 @@ def _status(results, outputs):
     return status
 
 
-def _write(results, found, outputs, status):
+def write(results, found, outputs, status):
     for column, row in zip(outputs, results, strict=False):
         column[...] = row
     status[...] = found

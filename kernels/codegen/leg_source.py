@@ -5,6 +5,8 @@ The text is of named scalars, one statement per event; what can be said once for
 
 from dataclasses import dataclass
 
+from kernels.codegen.error_source import carried, not_carried
+from kernels.codegen.tangent import short
 from kernels.codegen.template import filled, folded, listed
 
 LEG = '''
@@ -26,7 +28,7 @@ def doubted_{order}(trial, unsure, facts, series):
 
 
 @jit_call
-def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, active):
+def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, active{off_in}):
     """Follow the motion of the active lanes until an event falls through 0, and stop there.
 
     Parameters
@@ -38,7 +40,7 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
 
     Returns
     -------
-    Leg
+    Leg{off_doc}
     """
     {states} = state
     {ons} = on
@@ -50,9 +52,11 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
     stuck, lost, broken, grazing = nothing, nothing, nothing, nothing
     power_h, allowed = natural_power(h, {order} - 1), SLACK * tolerance
     {longest}
+    {off_before}
     for step in range(STEP_LIMIT):
         {cores}
-        {series_and_events} = series_{order}(({states}), side, signs, parameters, unit{all_cores})
+        {series_and_events}{inner} = series_{order}(({states}), side, signs, parameters, unit{all_cores})
+        {off_since}
         {facts}
         left_out, over = {left_out}
         ratio = where(left_out <= 0.0, 0.0, left_out * power_h / (tolerance * over))
@@ -69,6 +73,7 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
             stuck = active & ({any_stuck})
             trial = where({any_now}, 0.0, h)
             {margins}
+            {off_margins}
             moving = moving & not_(broken | stuck)
         tried = where(moving, tried + 1.0, tried)
         {look}
@@ -86,6 +91,7 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
         meets = steps & ({any_passed})
         span = where(meets, trial, span)
         steps = steps & not_(meets)
+        {off_step}
         {advance}
         t = where(steps, t + trial, t)
         {off}
@@ -101,7 +107,8 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
     {on_kink}
     t = where(met, t + end, t)
     h = where(met & (t > 0.0) & (h > LONGEST * t), LONGEST * t, h)
-    return Leg(({final}), t, h, ({fired}), stuck, lost, broken, grazing, hangs, tried)
+    {off_end}
+    return Leg(({final}), t, h, ({fired}), stuck, lost, broken, grazing, hangs, tried){off_out}
 '''
 
 
@@ -159,8 +166,14 @@ def look(states, order, hides):
     return seen and filled(LOOK, states=listed(states), boxes=boxes, power=power, all_seen=" & ".join(seen))
 
 
-def leg(writer, order, hides):
-    """The text of `to_event_{order}`; `hides` says of each rate and of each event whether it can hide anything."""
+def leg(writer, order, hides, tells=False):
+    """The text of `to_event_{order}`.
+
+    Parameters
+    ----------
+    hides : of each rate and of each event, whether it can hide anything
+    tells : whether the error is carried along (`error_source`)
+    """
     source = LegSource(
         writer.states,
         1 + writer.kinks,
@@ -170,6 +183,8 @@ def leg(writer, order, hides):
         writer.seen(),
         writer.kinks_of_powers(),
         hides,
+        tells,
+        short(writer, order),
     )
     return source.text()
 
@@ -185,7 +200,8 @@ class LegSource:
     summed : the states whose rate is another state, and which
     seen : for each event the state that it watches, or None
     kinks_of_powers : for each power its kink
-    hides : see `leg`
+    hides, tells : see `leg`
+    short : order of the changes' series
     """
 
     states: list
@@ -196,6 +212,8 @@ class LegSource:
     seen: list
     kinks_of_powers: list
     hides: tuple
+    tells: bool
+    short: int
 
     def text(self):
         return filled(
@@ -211,6 +229,7 @@ class LegSource:
             **self._cores(),
             **self._step(),
             **self._roots(),
+            **(carried(self) if self.tells else not_carried()),
         )
 
     def _each(self, pattern):
@@ -301,8 +320,9 @@ class LegSource:
     def _cores(self):
         """The cores of powers, and the steps that end with them."""
         n = len(self.kinks_of_powers)
+        also = f", coarse_{{}}, ({listed(f'full_{s}' for s in self.states)})" if self.tells else ""
         cores = [
-            f"at_core_{i}, longest_{i} = "
+            f"at_core_{i}, longest_{i}{also.format(i)} = "
             f"core_{i}(({listed(self.states)}), side, signs, parameters, unit, tolerance,"
             f" (on_{1 + j} > 0.5) & (t <= 0.0), t, margin_{1 + j})"
             for i, j in enumerate(self.kinks_of_powers)
@@ -341,7 +361,7 @@ class LegSource:
             "fired": listed(f"where({self._fires(j)}, 1.0, 0.0)" for j in e),
         }
 
-    def _curve(self, j):
+    def curve(self, j):
         """Of what the event watches: how it is evaluated, its value at the start of the step."""
         s = self.seen[j]
         if s in self.summed:
@@ -350,7 +370,7 @@ class LegSource:
 
     def _root(self, j):
         among = f"first = first & ((which < 0.0) | (fma(factor_{j}, {self._seen_at(j, 'end')}, offset_{j}) <= 0.0))"
-        watched, value = self._curve(j)
+        watched, value = self.curve(j)
         return ROOT.format(
             j=j, among=among if j else "# whatever else passed in this step", watched=watched, value=value
         )
@@ -361,6 +381,9 @@ class LegSource:
             f" <= fma(SAME, tolerance, ROUNDING) * (magnitude(offset_{j}) + magnitude(factor_{j} * event_{j}[0])))"
         )
 
+    def own(self, j):
+        """That the leg ends by this event."""
+        return f"met & (which > {j - 0.5}) & (which < {j + 0.5})"
+
     def _fires(self, j):
-        own = f"met & (which > {j - 0.5}) & (which < {j + 0.5})"
-        return f"beside_{j} | ({own})" if self.events > 1 else own
+        return f"beside_{j} | ({self.own(j)})" if self.events > 1 else self.own(j)

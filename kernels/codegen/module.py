@@ -19,14 +19,16 @@ import numpy as np
 from numba.core.errors import NumbaError
 
 from kernels.codegen.driver_source import BEGUN, EVENT, SETTLED, advance, shared
+from kernels.codegen.error_source import END, STEP
 from kernels.codegen.expression import DIV, FUNCTIONS, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, SceneError, needed
 from kernels.codegen.hidden_source import HIDDEN, hidden
 from kernels.codegen.lane_source import BEGIN
 from kernels.codegen.leg_source import BY_KINK, FACTS, LEG, LOOK, ROOT, START, leg
 from kernels.codegen.power_core import CORE, core
 from kernels.codegen.record import record
-from kernels.codegen.rounding_source import LOST, lost_by_surface
+from kernels.codegen.rounding_source import LOST, SIZES, lost_by_surface
 from kernels.codegen.series_source import Lines
+from kernels.codegen.tangent import TANGENT, Tangents, tangent
 from kernels.codegen.template import filled, listed
 from kernels.lanes import cache
 from kernels.lanes.jit import COMPILED, cached
@@ -90,9 +92,11 @@ def series_{order}(state, side, signs, parameters, unit{also}):
 
 
 _OF_LEG = LEG, LOOK, FACTS, START, BY_KINK, ROOT
-_TEXTS = HEAD, FUNCTION, SERIES, HIDDEN, LOST, CORE, BEGIN, EVENT, BEGUN, SETTLED, *_OF_LEG
+_OF_ERROR = TANGENT, SIZES, STEP, END
+_TEXTS = HEAD, FUNCTION, SERIES, HIDDEN, LOST, CORE, BEGIN, EVENT, BEGUN, SETTLED, *_OF_LEG, *_OF_ERROR
 _TAKEN = set(re.findall(r"\w+", "".join(_TEXTS))) | {"n", "p", "s"}
-_NUMBERED = re.compile(r"\w*_\d+|n\d+|(at|s|end|box|size|bare|full|kink|most|half|over|and_one|half_over)_\w*")
+_PREFIXES = "at|s|end|box|size|bare|full|kink|most|half|over|and_one|half_over|off|due|delta|noise|rate|made|coarse"
+_NUMBERED = re.compile(rf"\w*_\d+|n\d+|({_PREFIXES})_\w*")
 
 
 def _apart(name):
@@ -115,7 +119,13 @@ class Writer:
         self.names = dict(zip((*scene.states, *scene.parameters), (*self.states, *self.parameters), strict=True))
         self.names |= {"side": "side", ".unit": "unit"}
         self.names |= {f".sign_{j}": f"sign_{j}" for j in range(self.kinks)}
+        self.names |= {f".delta_{s}": f"delta_{name}" for s, name in zip(scene.states, self.states, strict=True)}
         self.all_unpacked = self.unpacked("state", "signs", "parameters")
+
+    @functools.cached_property
+    def tangents(self):
+        """Derivatives along changes of the states."""
+        return Tangents(self.recorded.graph, self.scene.states)
 
     def unpacked(self, *which):
         """Statements that give what the tuples hold its names."""
@@ -123,6 +133,7 @@ class Writer:
             "state": self.states,
             "signs": [f"sign_{j}" for j in range(self.kinks)],
             "parameters": self.parameters,
+            "changes": [f"delta_{s}" for s in self.states],
         }
         return "\n".join(f"{listed(held[name])} = {name}" for name in which if held[name])
 
@@ -132,7 +143,7 @@ class Writer:
         values = [_in_every_lane(lines.value(x), x) for x in expressions]
         return filled(
             FUNCTION, name=name, doc=doc, arguments=", ".join(arguments),
-            unpack=self.unpacked(*(a for a in arguments if a in ("state", "signs", "parameters"))),
+            unpack=self.unpacked(*(a for a in arguments if a in ("state", "signs", "parameters", "changes"))),
             lines="\n".join(lines.text), result=values[0] if single else f"({listed(values)})",
         )  # fmt: skip
 
@@ -185,20 +196,23 @@ class Writer:
         """For each power its kink."""
         return [self.recorded.graph.kinks[x.args[0].args[1]] for x in self.recorded.graph.powers]
 
-    def series(self, order, powers=0):
-        """The text of `series_{order}`, with a core for each of so many powers."""
+    def series(self, order, powers=0, tells=False):
+        """The text of `series_{order}`, with a core for each of so many powers; if it tells, of its tangent too."""
         recorded = self.recorded
-        lines = Lines(self.names, dict(zip(self.scene.states, recorded.timed, strict=True)), cores=powers > 0)
+        rates = dict(zip(self.scene.states, recorded.timed, strict=True))
+        rates |= {f".delta_{s}": self.tangents.of(x) for s, x in rates.items()} if tells else {}
+        lines = Lines(self.names, rates, cores=powers > 0)
         states = [lines.coefficients(recorded.graph.series(s), order) for s in self.scene.states]
         events = [
             f"({lines.value(offset)}, {lines.value(factor)}, {lines.coefficients(u, order)})"
             for offset, factor, u in recorded.events
         ]
+        of_tangent, inner = tangent(self, lines, order, powers) if tells else ("", [])
         return filled(
             SERIES, order=order, unpack=self.all_unpacked, lines="\n".join(lines.text),
-            result=f"({listed([*states, *events])})", also=", cores" if powers else "",
+            result=f"({listed([*states, *events, *inner])})", also=", cores" if powers else "",
             cores=listed(f"core_{i}" for i in range(powers)) + " = cores" if powers else "",
-        )  # fmt: skip
+        ) + of_tangent  # fmt: skip
 
     def text(self):
         """The whole module."""

@@ -37,6 +37,7 @@ def with_power_{i}(state, side, signs, parameters, unit, power_{i}):
 def core_{i}(state, side, signs, parameters, unit, tolerance, leaves, t, margin):
     """The mean of power {i} in its core, -1 where the motion is not in it; and the longest step from the kink on.
 
+    {doc}
     `t` is the time since the last event, `margin` what there is of u for next to nothing.
     """
     {unpack}
@@ -45,6 +46,7 @@ def core_{i}(state, side, signs, parameters, unit, tolerance, leaves, t, margin)
     value, nothing = power(base, {n}), 0.0 * side
     {full} = with_power_{i}(state, side, signs, parameters, unit, value)
     core, longest, nears = nothing - 1.0, nothing + FAR, sign_{kink} * full_{u} < 0.0
+    {no_coarse}
     if any_lane(nears):
         {bare} = with_power_{i}(state, side, signs, parameters, unit, nothing)
         over = 1.0 / magnitude(full_{u})
@@ -52,6 +54,7 @@ def core_{i}(state, side, signs, parameters, unit, tolerance, leaves, t, margin)
         uneven = t_{u} * (t_{u} + d)
         inside = nears & (d <= UNEVEN)
         {inside}
+        {coarse}
         core = where(inside, mean_power(value, {n}), -1.0)
         {at_kink} = with_power_{i}(({on_kink}), side, signs, parameters, unit, nothing)
         settles = nears & (kink_{u} <= 0.0) & (kink_{u} >= 0.0) & ({n} < 1.0)
@@ -67,7 +70,8 @@ def core_{i}(state, side, signs, parameters, unit, tolerance, leaves, t, margin)
         reach = core_time(capacity, magnitude(bare_{u}), magnitude(most_{u} - bare_{u}), {n}, tolerance)
         mean = mean_power(power(magnitude(bare_{u}) * reach, {n}), {n})
         core, longest = where(leaves, mean, core), where(leaves, reach, longest)
-    return core, longest
+        {coarse_behind}
+    return core, longest{also}
 '''
 
 
@@ -109,8 +113,8 @@ def _no_more_than_one(x):
     return where(x < 1.0, x, 1.0)
 
 
-def core(writer, i):
-    """The text of `core_{i}` and what it calls."""
+def core(writer, i, tells=False):
+    """The text of `core_{i}` and what it calls; if it tells, that gives also what (1) leaves, and the true rates."""
     node = list(writer.recorded.graph.powers)[i]
     base, exponent = node.args
     kink = writer.kinks_of_powers()[i]
@@ -135,5 +139,24 @@ capacity = where(share < capacity, share, capacity)"""
         value_of_n="\n".join(of_n.text), inside="\n".join(inside), capacity="\n".join(capacity),
         bare=listed(f"bare_{s}" for s in states), full=listed(f"full_{s}" for s in states),
         most=listed(f"most_{s}" for s in states), at_kink=listed(f"kink_{s}" for s in states),
-        on_kink=listed("0.0 * side" if s == u else s for s in states),
+        on_kink=listed("0.0 * side" if s == u else s for s in states), **_told(states, u, n, tells),
     )  # fmt: skip
+
+
+def _told(states, u, n, tells):
+    """Statements for what is left of each state by (1)."""
+    if not tells:
+        return dict.fromkeys(("doc", "no_coarse", "coarse", "coarse_behind", "also"), "")
+    behind = f"""\
+by_power = ({n} + 1.0) * mean
+uneven = reach * fma(magnitude(most_{u} - bare_{u}), by_power / magnitude(bare_{u}), reach)"""
+    left = "coarse_{s} = where(leaves, magnitude(most_{s} - bare_{s}) * by_power * uneven, coarse_{s})"
+    return {
+        "doc": "Also what (1) leaves of each state, and the rates with the power as it is.\n",
+        "no_coarse": "\n".join(f"coarse_{s} = nothing" for s in states),
+        "coarse": "\n".join(
+            f"coarse_{s} = where(inside, magnitude(full_{s} - bare_{s}) * uneven, 0.0)" for s in states
+        ),
+        "coarse_behind": "\n".join([behind, *(left.format(s=s) for s in states)]),
+        "also": f", ({listed(f'coarse_{s}' for s in states)}), ({listed(f'full_{s}' for s in states)})",
+    }

@@ -2,12 +2,12 @@
 
 Of a sum and of a product the loss is known exactly (Knuth's two-sum, a fused multiply-add), so what is computed without
 rounding loses nothing, and a start on the surface lies there for sure. Of a function it is an ulp. To first order
-losses go on as errors do.
+losses go on as errors do. Along a motion it is enough to know them roughly, an ulp of the terms of every sum.
 """
 
 from kernels.codegen.expression import ADD, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED
 from kernels.codegen.series_source import Lines
-from kernels.codegen.template import filled
+from kernels.codegen.template import filled, listed
 
 ULP = 2.0**-52
 SLOPES = {
@@ -22,6 +22,15 @@ def lost_by_surface(state, side, signs, parameters):
     {unpack}
     {lines}
     return {lost}
+'''
+
+SIZES = '''
+@jit
+def {name}(state, side, signs, parameters):
+    """{doc}"""
+    {unpack}
+    {lines}
+    return {sizes}
 '''
 
 
@@ -81,3 +90,60 @@ def lost_by_surface(writer):
     losses = Losses(writer.names, dict(zip(writer.scene.states, recorded.started, strict=True)))
     lost = losses.lost(recorded.surface)
     return filled(LOST, unpack=writer.all_unpacked, lines="\n".join(losses.lines.text), lost=lost or "0.0 * side")
+
+
+class Sizes:
+    """Statements for what an expression is made of, in size: an ulp of it is about what rounding takes."""
+
+    def __init__(self, names):
+        self.lines = Lines(names)
+        self._reused = {}
+
+    def of(self, x):
+        """The size, as text: of a sum that of its terms, of a function also what its argument's changes."""
+        if x.index not in self._reused:
+            text = f"magnitude({self.lines.value(x)})" if _whole(x) else self._made(x)
+            self._reused[x.index] = text
+            if x.kind not in (NUMBER, INPUT):
+                self.lines.text.append(f"made_{x.index} = {text}")
+                self._reused[x.index] = f"made_{x.index}"
+        return self._reused[x.index]
+
+    def _made(self, x):
+        parts = [self.of(u) for u in x.args]
+        if x.kind == ADD:
+            return " + ".join(parts)
+        if x.kind in (MUL, SCALED):
+            return " * ".join(parts)
+        if x.kind == HALF_SQUARE:
+            return f"0.5 * {parts[0]} * {parts[0]}"
+        value, u = self.lines.value(x), self.lines.value(x.args[0])
+        if x.kind == DIV:
+            w = self.lines.value(x.args[1])
+            return f"{parts[0]} * {parts[1]} / ({w} * {w})"
+        slope = SLOPES.get(x.kind, "magnitude({n} * {value} / {u})")
+        n = self.lines.value(x.args[1]) if len(x.args) > 1 else ""
+        slope = slope.format(value=f"magnitude({value})", u=u, n=n)
+        return f"fma({slope}, {parts[0]}, magnitude({value}))"
+
+
+def _whole(x):
+    """Whether an expression has no sum and no function in it: then it is right to some ulps of itself."""
+    if x.kind in (NUMBER, INPUT, "abs", "sign", "power_of_side"):
+        return True
+    return x.kind in (MUL, SCALED, HALF_SQUARE, DIV, "sqrt") and all(_whole(u) for u in x.args)
+
+
+def sizes(writer, name, doc, expressions):
+    """The text of a function of the sizes of what expressions are made of."""
+    made = Sizes(writer.names)
+    of_each = [made.of(x) for x in expressions]
+    each = [text if x.varies else f"0.0 * side + {text}" for text, x in zip(of_each, expressions, strict=True)]
+    return filled(
+        SIZES,
+        name=name,
+        doc=doc,
+        unpack=writer.all_unpacked,
+        lines="\n".join(made.lines.text),
+        sizes=f"({listed(each)})",
+    )

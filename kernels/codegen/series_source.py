@@ -23,7 +23,7 @@ class Lines:
     Parameters
     ----------
     names : dict from the name of an input to its name in the text
-    rates : dict from the name of a state to the expression of its rate, for coefficients above the 0th
+    rates : dict from the name of a state to the expression of its rate, for coefficients above the 0th; None: 0
     cores : whether constants core_0, core_1, ... stand for the powers of a state's abs, where they are not below 0
     precomputed : dict from an expression to the name of its value, where there is one
     """
@@ -32,6 +32,12 @@ class Lines:
         self.text = []
         self._names, self._rates, self._cores = names, rates or {}, cores
         self._reused = {(x.index, 0): name for x, name in (precomputed or {}).items()}
+
+    def branch(self):
+        """Further lines, apart from these, that take from them what they have."""
+        other = Lines(self._names, self._rates, self._cores)
+        other._reused = dict(self._reused)
+        return other
 
     def value(self, x):
         """The name of an expression's value."""
@@ -62,7 +68,8 @@ class Lines:
 
     def _state(self, x, k):
         """1/k goes into the constants of the rate, which are multiplied once for many steps."""
-        rate = self.coefficient(x.graph.timed(self._rates[x.args[0]], x.graph.of(1.0 / k)), k - 1)
+        rate = self._rates[x.args[0]]
+        rate = None if rate is None else self.coefficient(x.graph.timed(rate, x.graph.of(1.0 / k)), k - 1)
         return rate and self._named(f"{self._names[x.args[0]]}_{k}", rate)
 
     def _add(self, x, k):
@@ -149,10 +156,21 @@ class Lines:
         if k == 0:
             plain = f"power({self.value(x.args[0])}, {self.value(x.args[1])})"
             return f"where(core_{i} < 0.0, {plain}, core_{i})" if self._cores else plain
+        return self._times(self._power_times_base(x, u, k), self._over_base(x))
+
+    def _power_over_base(self, x, k):
+        """abs(u)^n/u by the recurrence of a quotient; 0 in its core, and at u = 0."""
+        (power,) = x.args
+        u = power.args[0].args[1]
+        over, top = self._over_base(power), self.coefficient(power, k)
+        rest = self._sum((self.coefficient(u, j), self.coefficient(x, k - j)) for j in _oldest_first(1, k, k))
+        return self._times(self._difference(top, rest), over)
+
+    def _over_base(self, x):
+        """1/u of a power of abs(u), 0 where the power is a constant."""
+        (_, u), i = x.args[0].args, x.graph.powers[x]
         moves = f"core_{i} < 0.0" if self._cores else f"{self.value(x.args[0])} > 0.0"
-        return self._times(
-            self._power_times_base(x, u, k), self._once(u, f"over_{i}", f"where({moves}, 1.0 / {{}}, 0.0)")
-        )
+        return self._once(u, f"over_{i}", f"where({moves}, 1.0 / {{}}, 0.0)")
 
     def _power_times_base(self, x, u, k):
         """u_0 b_k of (1)."""

@@ -7,7 +7,9 @@ import pytest
 from mpmath import mp
 
 from kernels.codegen import expression as E
+from kernels.codegen.rounding_source import Sizes
 from kernels.codegen.series_source import Lines
+from kernels.codegen.tangent import Tangents
 from kernels.lanes.vectors import dot, fma, magnitude, where
 
 ORDER = 9
@@ -128,3 +130,40 @@ def test_a_power_of_abs_keeps_its_constant_apart_and_its_series_is_that_of_both_
         scope = {**PLAIN, "u": side * 0.7, "r": side, "s": -side, "side": side}
         exec("\n".join(lines.text) + f"\nresult = {last}", scope)
         assert max(abs(float(f) - t) for f, t in zip(scope["result"], true, strict=True)) < 3e-14
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_derivative_along_a_change_is_that_of_the_function(name):
+    ours, truth = CASES[name]
+    graph = E.Graph()
+    u = graph.series("u")
+    result = ours(u)
+    change = Tangents(graph, ["u"]).of(result)
+    lines = Lines({"u": "u", ".delta_u": "delta"} | {f".sign_{j}": "1.0" for j in range(len(graph.kinks))})
+    value = lines.value(change)
+    scope = {**PLAIN, "u": 0.7, "delta": 0.3}
+    exec("\n".join(lines.text) + f"\nresult = {value}", scope)
+    with mp.workdps(40):
+        true = mpmath.diff(truth, mp.mpf(0.7)) * 0.3
+    assert abs(scope["result"] - true) < 1e-14 * max(1, abs(true))
+
+
+def test_a_power_of_abs_has_the_derivative_of_both_its_sides():
+    graph = E.Graph()
+    u = graph.series("u")
+    result = E.power(abs(u), 1.5)
+    lines = Lines({"u": "u", ".delta_u": "delta", ".sign_0": "-1.0"})
+    value = lines.value(Tangents(graph, ["u"]).of(result))
+    scope = {**PLAIN, "u": -0.7, "delta": 0.3}
+    exec("\n".join(lines.text) + f"\nresult = {value}", scope)
+    assert scope["result"] == pytest.approx(-1.5 * 0.7**0.5 * 0.3, rel=1e-14)
+
+
+def test_the_size_of_a_sum_is_that_of_its_terms_and_of_a_function_also_what_its_argument_moves():
+    graph = E.Graph()
+    u = graph.series("u")
+    sizes = Sizes({"u": "u"})
+    found = [sizes.of(x) for x in (2.0 - 5.0 * u, (2.0 - 5.0 * u) * u, E.exp(2.0 - 5.0 * u))]
+    scope = {**PLAIN, "u": 0.4}
+    exec("\n".join(sizes.lines.text) + f"\nresult = [{', '.join(found)}]", scope)
+    assert scope["result"] == pytest.approx([4.0, 1.6, 5.0])

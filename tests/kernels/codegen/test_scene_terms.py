@@ -157,7 +157,7 @@ def test_what_numba_cannot_compile_is_told_in_two_lines(monkeypatch, pulse):
     def fails(*arguments):
         raise TypingError("Failed in nopython mode pipeline\n\nNo implementation of function\n" + 99 * "more\n")
 
-    monkeypatch.setattr(followed_twice, "followed", fails)
+    monkeypatch.setattr(followed_twice, "told", fails)
     with pytest.raises(SceneError, match="pulse cannot be compiled for the method taylor: No implem") as refusal:
         solve(pulse, "taylor", np.ones(1), np.ones(1), np.ones(1), np.ones(1))
     assert len(str(refusal.value).splitlines()) == 2

@@ -1,0 +1,90 @@
+"""Columns of cells followed once by the Taylor method of a scene's module, with the error carried along.
+
+The error that a cell states (`error_source`) is signed and of first order; it takes STATED times that to be believed.
+A cell whose error that does not show to be small enough is followed again with a tolerance as much smaller; what then
+is left, and all that is remarked or refused, is followed twice (`followed_twice`), which asks for no derivatives.
+"""
+
+import numpy as np
+
+from kernels.codegen import followed_twice
+from kernels.codegen.driver_source import advance, rows_of
+from kernels.codegen.error_source import of_error
+from kernels.codegen.followed_twice import ROUNDING
+from kernels.codegen.hidden_source import hidden
+from kernels.codegen.leg_source import leg
+from kernels.codegen.module import ORDERS, Writer, build, loaded
+from kernels.codegen.power_core import core
+from kernels.codegen.record import record
+from kernels.codegen.template import filled
+from kernels.interface import Status
+
+TEXT = '''
+"""Motion of {name} with its error carried along: written by kernels; do not change it here."""
+
+from {module} import *
+from kernels.integrate.carried import DOUBT, FADES, ORDERLY, PART, STRAIGHT, ULP, further
+from kernels.integrate.taylor import slope
+
+ROWS = {rows}
+'''
+
+STATED = 1.5
+"""Stated error over the one carried along."""
+OF_A_STEP = 0.25
+"""Tolerance of a step over the one of the whole motion: errors of some steps may add up."""
+SMALLER, SMALLEST = 4.0, 1e-3
+"""By how much less than what would do a second tolerance is, and the least share of the first one that is tried."""
+
+
+def by_one(scene):
+    """The function of columns that follows the scene with its error carried along."""
+
+    def solved_by_one(module, columns, rtol, outputs, status):
+        solved(telling(scene), columns, rtol, outputs, status)
+
+    return solved_by_one
+
+
+def telling(scene):
+    """The module of the scene's motion with its error."""
+    module, writer = build(scene), Writer(scene, record(scene))
+    rows = tuple(rows_of(writer.states, writer.parameters, writer.kinks, True))
+    parts = [filled(TEXT, name=scene.name, module=module.__name__, rows=rows).lstrip(), *of_error(writer)]
+    powers, (_, *hides) = len(writer.recorded.graph.powers), hidden(writer)
+    parts += [core(writer, i, True) for i in range(powers)]
+    for order in ORDERS:
+        parts += [writer.series(order, powers, True), leg(writer, order, hides, True)]
+        parts.append(advance(writer.states, writer.parameters, writer.kinks, order, writer.offset(), True))
+    return loaded("told", scene, "\n".join(parts))
+
+
+def solved(module, columns, rtol, outputs, status):
+    """Fills outputs and status by one run where that states an error below `rtol`, else by two."""
+    results, error = followed_twice.told(module, columns, rtol, rtol * OF_A_STEP)
+    found = judged(results, error, rtol, len(outputs))
+    again = np.flatnonzero((found != Status.OK) & (results[-1] == Status.OK) & (error < np.inf) & (rtol >= ROUNDING))
+    if len(again):
+        share = OF_A_STEP * np.maximum(rtol[again] / (SMALLER * STATED * error[again]), SMALLEST)
+        some, wanted = [c[again] for c in columns], rtol[again]
+        results[:, again], error[again] = followed_twice.told(module, some, wanted, share * wanted)
+        found[again] = judged(results[:, again], error[again], rtol[again], len(outputs))
+    followed_twice.write(results, found, outputs, status)
+    left = np.flatnonzero(found != Status.OK)
+    if len(left):
+        _by_two(module, columns, rtol, outputs, status, left)
+
+
+def judged(results, error, rtol, outputs):
+    """OK where the stated error is at most rtol, else INACCURATE or what the motion came to."""
+    status = followed_twice.status_of(results, outputs)
+    status[~(STATED * error <= rtol) | (rtol < ROUNDING)] = Status.INACCURATE
+    return status
+
+
+def _by_two(module, columns, rtol, outputs, status, cells):
+    """Fills these cells by two runs."""
+    found, verdict = [np.empty(len(cells)) for _ in outputs], np.empty(len(cells), np.int8)
+    followed_twice.twice(module, [c[cells] for c in columns], rtol[cells], found, verdict)
+    for column, values in zip((*outputs, status), (*found, verdict), strict=True):
+        column[cells] = values

@@ -1,0 +1,127 @@
+"""What small changes of a scene's states change: the tangent of its motion.
+
+The derivative of an expression along changes `delta` of the states is an expression again, so that the changes' own
+Taylor series, of delta' = (D rates) delta, come from the recurrences of the motion's (`series_source`). Signs of kinks
+do not change between events.
+"""
+
+import re
+
+from kernels.codegen.expression import INPUT, needed
+from kernels.codegen.template import filled, listed
+
+SHORT, LONG = {12: 4, 18: 6}, {12: 9, 18: 12}
+"""Order of the changes' series on a step of the motion's: terms fall by about a quarter each, so to some 1e-3. Those of
+exp, sin and cos first grow, as x^k/k!."""
+
+TANGENT = '''
+@jit
+def tangent_{order}(state, side, signs, parameters, unit, inner, changes{also}):
+    """Taylor coefficients of a change of each state; `inner` are coefficients that `series_{order}` knows."""
+    {unpack}
+    {deltas} = changes
+    {cores}
+    {inner}
+    {lines}
+    return {result}
+'''
+
+
+def short(writer, order):
+    """Order of the changes' series beside one of the motion of that order."""
+    kinds = {x.kind for x in needed(*writer.recorded.rates)}
+    return (LONG if kinds & {"exp", "sin", "cos"} else SHORT)[order]
+
+
+class Tangents:
+    """Derivatives of a graph's expressions along changes of its states; None where that is 0.
+
+    Parameters
+    ----------
+    graph : to which the derivatives are added
+    states : names; the change of each is an input ".delta_NAME" of the graph
+    """
+
+    def __init__(self, graph, states):
+        self._graph, self._reused = graph, {}
+        self.deltas = {s: graph.series(f".delta_{s}") for s in states}
+
+    def of(self, x):
+        """The derivative of an expression."""
+        if not x.varies:
+            return None
+        if x.index not in self._reused:
+            plain = x.kind == INPUT
+            self._reused[x.index] = self.deltas[x.args[0]] if plain else getattr(self, f"_{x.kind}")(x, *x.args)
+        return self._reused[x.index]
+
+    def _by(self, factor, u):
+        """A factor times the derivative of u."""
+        delta = self.of(u)
+        return None if delta is None else self._graph.multiply(factor, delta)
+
+    def _sum(self, *terms):
+        present = [x for x in terms if x is not None]
+        return self._graph.add(*present) if len(present) == 2 else next(iter(present), None)
+
+    def _over(self, x, divisor):
+        return None if x is None else self._graph.divide(x, divisor)
+
+    def _add(self, x, u, w):
+        return self._sum(self.of(u), self.of(w))
+
+    def _scaled(self, x, constant, u):
+        return self._by(constant, u)
+
+    def _mul(self, x, u, w):
+        return self._sum(self._by(w, u), self._by(u, w))
+
+    def _half_square(self, x, u):
+        return self._by(u, u)
+
+    def _div(self, x, u, w):
+        return self._over(self._sum(self.of(u), self._by(-x, w)), w)
+
+    def _sqrt(self, x, u):
+        return self._over(self.of(u), 2.0 * x)
+
+    def _exp(self, x, u):
+        return self._by(x, u)
+
+    def _log(self, x, u):
+        return self._over(self.of(u), u)
+
+    def _sin(self, x, u):
+        return self._by(self._graph.function("cos", u), u)
+
+    def _cos(self, x, u):
+        return self._by(-self._graph.function("sin", u), u)
+
+    def _power(self, x, u, n):
+        return self._by(n * (x / u), u)
+
+    def _power_of_side(self, x, base, n):
+        return self._by(n * self._graph.over_base(x), base.args[1])
+
+
+def tangent(writer, lines, order, powers):
+    """The text of `tangent_{order}`, and what it takes of `lines`, which are the series', as a list of a text."""
+    changes = lines.branch()
+    result = [changes.coefficients(delta, short(writer, order)) for delta in writer.tangents.deltas.values()]
+    own, given = set(re.findall(r"\w+", "\n".join([*changes.text, *result]))), []
+    for line in lines.text:
+        name = line.split(" = ")[0]
+        if name in own:
+            given.append(name)
+    text = filled(
+        TANGENT, order=order, unpack=writer.all_unpacked, deltas=listed(f"delta_{s}" for s in writer.states),
+        cores=listed(f"core_{i}" for i in range(powers)) + " = cores" if powers else "",
+        also=", cores" if powers else "", inner=f"{listed(given)} = inner" if given else "",
+        lines="\n".join(changes.text), result=f"({listed(in_every_lane(r) for r in result)})",
+    )  # fmt: skip
+    return text, [f"({listed(given)})"]
+
+
+def in_every_lane(coefficients):
+    """A tuple of coefficients, as text, of one type: zeros are repeated in every lane."""
+    return re.sub(r"(?<=[ (])0\.0(?=,)", "0.0 * side", coefficients)

@@ -1,0 +1,95 @@
+"""The error that a motion by Taylor series carries along: against true errors, and what comes of what is not sure."""
+
+import mpmath
+import numpy as np
+import pytest
+import rich_scene
+import scene_oracles as oracles
+from columns import solve
+from mpmath import mp
+
+from kernels.codegen import followed_twice, stated_error
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+from kernels.scene import Scene
+
+FLIPS = 12 if COMPILED else 3
+NAMES = [f.name for f in rich_scene.RICH.parameters if f.name != "flips"]
+SCENE = Scene(
+    "rich", "foliot with every term", ("angle", "speed"), tuple(NAMES),
+    rich_scene.rates, rich_scene.surface, rich_scene.start, rich_scene.switch,
+)  # fmt: skip
+
+
+def told(cells, flips, rtol):
+    """Results and error of one run; `cells` are columns by name."""
+    n = len(next(iter(cells.values())))
+    plain = {"e": 1.0}
+    columns = [np.ascontiguousarray(np.broadcast_to(cells.get(name, plain.get(name, 0.0)), n), float) for name in NAMES]
+    return followed_twice.told(
+        stated_error.telling(SCENE), [*columns, np.full(n, float(flips))], *np.full((2, n), rtol)
+    )
+
+
+def drags(n=40 if COMPILED else 2):
+    random = np.random.default_rng(4)
+    mu, a, c = 10.0 ** random.uniform(-1, 1, n), 10.0 ** random.uniform(-1, 0, n), 10.0 ** random.uniform(-1, 0, n)
+    return {"mu": mu, "phi0": np.ones(n), "a": a, "c": c}
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-8, 1e-11])
+def test_the_error_carried_along_is_the_true_one(rtol):
+    cells = drags()
+    results, error = told(cells, FLIPS, rtol)
+    truths = [oracles.quadratic_foliot(*cell, FLIPS) for cell in zip(*cells.values(), strict=True)]
+    found = abs(results[[0, 3]].T)
+    true = np.array(
+        [[float(r / t - 1) for r, t in zip(*pair, strict=True)] for pair in zip(found, truths, strict=True)]
+    )
+    true = abs(true).max(axis=1)
+    matters = true > 0.1 * rtol  # what is smaller is a difference, by chance
+    assert matters.any()
+    ratio = error[matters] / true[matters]
+    assert ratio.min() > 0.7  # STATED times that is above the true one
+    assert np.median(ratio) < 1.4
+
+
+def test_jumps_and_dry_friction_pass_the_error_on():
+    """Against the same motion at a hundredth of the tolerance."""
+    cells = drags() | {"R": 0.4 * drags()["mu"], "e": 0.3, "k": 0.05 * drags()["mu"]}
+    coarse, error = told(cells, FLIPS, 1e-6)
+    fine, _ = told(cells, FLIPS, 1e-9)
+    assert (coarse[-1] == Status.OK).all()
+    true = abs(coarse[[0, 1, 3]] / fine[[0, 1, 3]] - 1).max(axis=0)
+    matters = true > 1e-7
+    assert matters.any()
+    ratio = error[matters] / true[matters]
+    assert ratio.min() > 0.8
+    assert np.median(ratio) < 1.2
+
+
+def test_what_states_too_large_an_error_is_followed_again_and_then_right():
+    mu, phi0 = np.array([1.0]), np.array([1.0])
+    cells = {"mu": mu, "phi0": phi0, "R": mu * (1 - 1e-4), "a": np.array([1e-3])}
+    outputs, status = solve(rich_scene.RICH, "taylor", **cells, flips=2.0, rtol=1e-9)
+    _, error = told(cells, 2, 1e-15)
+    assert error[0] > 3e-14  # what rounding takes is 1e4 times as much where so little of the drive is left
+    assert status[0] == Status.OK
+    with mp.workdps(40):
+        slack, sum_of, a = mp.mpf(1) - mp.mpf(cells["R"][0]), mp.mpf(1) + mp.mpf(cells["R"][0]), mp.mpf(1e-3)
+
+        def way(t):
+            return slack * (t / a + mpmath.expm1(-a * t) / a**2)
+
+        first = mpmath.findroot(lambda t: way(t) - 1, mpmath.sqrt(2 / slack))
+        v = slack * -mpmath.expm1(-a * first) / a
+        turn = mpmath.log1p(a * v / sum_of) / a
+        beyond = (v + sum_of / a) * -mpmath.expm1(-a * turn) / a - sum_of / a * turn
+        second = mpmath.findroot(lambda t: way(t) - 2 - beyond, mpmath.sqrt(4 / slack))
+        assert abs(outputs["time"][0] / float(first + turn + second) - 1) < 1e-9
+
+
+def test_next_to_a_turning_point_a_switch_states_that_its_error_is_not_known():
+    """A first swing that passes the switch by 1e-7 of itself: when it does hangs on the root of so little."""
+    _, error = told({"mu": np.ones(1), "phi0": np.ones(1), "k": np.array([2.0 * (1 - 1e-7)])}, 1, 1e-6)
+    assert error[0] == np.inf
