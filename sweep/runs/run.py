@@ -23,7 +23,7 @@ from sweep.runs.session import Session, Solve
 from sweep.runs.task import END, HERE, WAIT, Task
 from sweep.store.frame import Frame, cuts_of
 from sweep.store.reading import StoredFile
-from sweep.store.store import Gather, Store, opened, unfinished_of
+from sweep.store.store import Gather, Store, lock_of, opened, unfinished_of
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.study.read import KEYS, Given, as_study
 from sweep.system import disk
@@ -250,7 +250,8 @@ def _checked(path: str | os.PathLike[str]) -> Path:
 
 def _complete(task: Task) -> bool:
     """False where the time was up before the end."""
-    return (resume.is_complete(task) and not unfinished_of(task.output).exists()) or _run_to_file(task)
+    left = unfinished_of(task.output).exists() or lock_of(task.output).exists()
+    return (resume.is_complete(task) and not left) or _run_to_file(task)
 
 
 def _run_in_memory(task: Task) -> xr.Dataset:

@@ -43,6 +43,11 @@ def unfinished_of(output: Path) -> Path:
     return output.with_name(output.name + ".unfinished")
 
 
+def lock_of(output: Path) -> Path:
+    """What is locked while a sweep runs; a killed one leaves it behind."""
+    return output.with_name(output.name + ".lock")
+
+
 @dataclass(frozen=True)
 class Shared:
     """A file that other processes write blocks to.
@@ -414,7 +419,7 @@ def _reads_back(file: StoredFile, block: int) -> bool:
 @contextlib.contextmanager
 def opened(output: Path) -> Iterator[Store]:
     """The store of an output, held by this process alone. Raises SweepError."""
-    lock = output.with_name(output.name + ".lock")
+    lock = lock_of(output)
     store = Store(output)
     try:
         with disk.locked(lock) as ours:

@@ -124,11 +124,13 @@ def torture(rng, victims, folder, kills, shapes, kinds=KINDS):
     whole, usual = {}, {}
     for kind in kinds:
         output = folder / f"{kind}.h5"
-        prepare(kind, output)
-        begun = time.monotonic()
-        assert victims.run(kind, output, 2, 100, 60.0)[0]
-        whole[kind], usual[kind] = numbers(output), time.monotonic() - begun
-        output.unlink()
+        for _ in range(2):  # the first one may wait for its parent
+            prepare(kind, output)
+            begun = time.monotonic()
+            assert victims.run(kind, output, 2, 100, 60.0)[0]
+            usual[kind] = time.monotonic() - begun
+            whole[kind] = numbers(output)
+            output.unlink()
     while found["kills"] < kills:
         kind = kinds[found["runs"] % len(kinds)]
         _tortured(rng, victims, folder / f"out{found['runs']}.h5", kind, rng.choice(shapes), usual[kind], found)
@@ -276,7 +278,8 @@ def main():
     quiet = os.open(os.devnull, os.O_WRONLY)
     with tempfile.TemporaryDirectory() as folder:
         # once here, so that all is imported
-        for kind in KINDS:
+        # but for a refinement, which leaves threads behind that a fork does not survive
+        for kind in KINDS[:-1]:
             output = Path(folder) / f"{kind}.h5"
             prepare(kind, output)
             perform(kind, output, 1, 300)
