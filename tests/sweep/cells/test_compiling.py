@@ -92,8 +92,8 @@ def test_a_plan_tells_what_compiling_took(table):
     ("kernel", "folder", "text"),
     [
         ("foliot", Path(), "about 3.0 s just now; the machine code is kept"),
-        ("foliot", None, "about 3.0 s before the first cell"),
-        ("my:KERNEL", Path(), "about 3.0 s before the first cell"),
+        ("foliot", None, "about 3.0 s of it, before the first cell"),
+        ("my:KERNEL", Path(), "about 3.0 s of it, before the first cell"),
     ],
 )
 def test_a_plan_says_whether_the_run_compiles_again(monkeypatch, kernel, folder, text):

@@ -171,6 +171,7 @@ def test_ctrl_c_ends_a_run_after_the_jobs_at_work():
 
 def test_signals_change_how_many_compute_at_once():
     cores, most, inside = Cores(1), [0], []
+    before = signal.getsignal(signal.SIGUSR1)
 
     def work(job):
         def compute():
@@ -195,7 +196,7 @@ def test_signals_change_how_many_compute_at_once():
         assert cores.count == 1
     assert most[0] <= 2
     assert most[1:] == [2, 1]
-    assert signal.getsignal(signal.SIGUSR1) is signal.SIG_DFL
+    assert signal.getsignal(signal.SIGUSR1) is before
 
 
 def test_a_job_that_does_not_end_is_killed_or_given_up(monkeypatch):
