@@ -73,6 +73,7 @@ def solved(module, method, columns, step, location):
     status = np.where((status < Status.GRAZING) & unsure & reliable, Status.GRAZING, status)
     status = np.where((status == Status.OK) & grows & reliable, Status.INACCURATE, status)
     error = np.where(status < FIRST_REFUSAL, np.where(reliable & (error < np.inf), error, np.inf), np.nan)
+    status = np.where((status == Status.OK) & np.isinf(error), Status.INACCURATE, status)
     return np.delete(first, (-4, -1), axis=0), error, status
 
 

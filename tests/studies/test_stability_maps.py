@@ -8,7 +8,7 @@ import stability_maps as maps
 import xarray as xr
 
 import sweep
-from kernels.interface import FIRST_REFUSAL
+from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.jit import COMPILED
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="thousands of steps; the kernels' own tests run as plain Python")
@@ -80,3 +80,14 @@ def test_a_growing_oscillator_is_told_from_a_decaying_one():
     )
     assert maps.oscillators(ds)[0].holds
     assert not maps.oscillators(ds.assign(angle=2.5 - ds.angle))[0].holds
+
+
+def test_where_the_runs_compared_overflow_the_error_is_not_known():
+    """The finer runs grow beyond all numbers; the first, whose angle is 3e83, is all there is."""
+    fixed = {"a": 4.359125, "w": 4.2095, "end": 63.5, "flips": 1, "step": 1.0, "location": "none"}
+    study = sweep.build_study(
+        kernel="stability_maps:KERNEL", rtol=1e-6, axes={"method": ["semi_implicit"]}, fixed=fixed, allow_import=True
+    )
+    ds = sweep.run(study, progress=False)
+    assert np.isinf(ds.error.item())
+    assert ds.status.item() == Status.INACCURATE
