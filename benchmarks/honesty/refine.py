@@ -20,7 +20,9 @@ import numpy as np
 import xarray as xr
 
 from kernels.interface import Status
-from sweep.analysis.scattered import located, simplices
+from sweep.analysis.mesh import simplices
+from sweep.analysis.metric import stretch
+from sweep.analysis.scattered import heights, located
 from sweep.cells.schema import ANCILLARY
 from sweep.explore.refine import Refiner
 from sweep.study.model import Axis
@@ -92,7 +94,8 @@ def true_error(function, points, values):
         share = (places[:, 0] - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
         shares = np.stack([1 - share, share], axis=1)
     else:
-        corners, shares = located(points, places)
+        stretched = stretch(points, heights(values))
+        corners, shares = located(points @ stretched, places @ stretched)
     if np.isnan(values).any():
         missing = np.isnan(values[corners]).sum(axis=1)
         return float(np.mean((missing > 0) & (missing < corners.shape[1])))

@@ -10,6 +10,8 @@ Others may use
     `maps`       exponents over two parameters, borders as lines
     `curves`     stated_error: what a result says its values are right to
     `scattered`  values between cells that lie anywhere in a box, and those of them that lie on lines
+    `mesh`       cells joined to simplices, how far straight lines between them are off
+    `metric`     a box stretched to where an output bends, before its cells are joined
     `loglog`     is_logarithmic, spans_decades: what an axis is drawn and interpolated by
 
 Behind these: `loglog` (slopes, lines and roots of plain arrays), `scatter` and `correlated` (error bars of lines),

@@ -2,7 +2,8 @@
 
 Neighbours are the corners of the simplices (intervals, triangles, tetrahedra) of Delaunay's triangulation of the cells,
 in coordinates in which each axis reaches from 0 to 1, in logarithms where it reaches from a positive value to twice
-that. Outputs that are positive everywhere are taken in logarithms too.
+that. Outputs that are positive everywhere are taken in logarithms too. For each output the box is first stretched to
+where it bends (`metric`), so that cells are joined along what it does not depend on.
 """
 
 from __future__ import annotations
@@ -16,18 +17,12 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
+from sweep.analysis.mesh import Array, Indices, tilted
+from sweep.analysis.metric import stretch
 from sweep.system.errors import SweepError
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 LOGARITHMIC = 1.999
 """Ratio of its ends from which on a positive axis is taken in logarithms; below, it makes no difference."""
-SHEAR = 0.013
-"""By which axes are tilted before cells are joined: corners of a box lie on a sphere, so there are many ways to join
-them; tilted there is one, and it is alike in all boxes."""
-FLAT = 1e-9
-"""Volume, in products of its edges, below which a simplex is none."""
 OUTSIDE = 1e-9
 """How far out of a simplex a point may be by rounding."""
 FEWEST_ON_A_LINE = 5
@@ -70,25 +65,6 @@ class Box:
         low, high = self.low[k], self.high[k]
         found: Array = low * (high / low) ** places if self.logarithmic[k] else low + places * (high - low)
         return found
-
-
-def simplices(points: Array) -> Indices:
-    """Numbers (m, axes + 1) of the points at the corners of each simplex; those without a volume are left out."""
-    if points.shape[1] == 1:
-        order = np.argsort(points[:, 0], kind="stable")
-        return np.column_stack([order[:-1], order[1:]])
-    found = Delaunay(_tilted(points)).simplices.astype(np.intp)
-    edges = points[found[:, 1:]] - points[found[:, :1]]
-    lengths = np.linalg.norm(edges, axis=2).prod(axis=1)
-    kept: Indices = found[abs(np.linalg.det(edges)) > FLAT * lengths]
-    return kept
-
-
-def _tilted(points: Array) -> Array:
-    axes = points.shape[1]
-    tilt = np.eye(axes) + SHEAR * np.tril(1.0 + 0.3 * np.arange(axes), -1)
-    found: Array = points @ tilt
-    return found
 
 
 def is_positive(values: Array) -> bool:
@@ -137,7 +113,7 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     Returns
     -------
     Dataset
-        Outputs of one value a cell, and the status of the nearest corner, over the axes in the order of `at`. NaN
+        Outputs of one value a cell, and the status of the nearest cell around, over the axes in the order of `at`. NaN
         outside of the cells, and beside cells without a value.
 
     Raises
@@ -163,26 +139,37 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     mesh = dict(zip(grids, (m.ravel() for m in np.meshgrid(*grids.values(), indexing="ij")), strict=True))
     shape = tuple(len(values) for values in grids.values())
     box = Box.of({name: dataset[name].values for name in names})
-    corners, shares = located(box.points({n: dataset[n].values for n in names}), box.points(mesh))
+    points, places = box.points({n: dataset[n].values for n in names}), box.points(mesh)
+    nearest = _nearest(points, places)
     found = xr.Dataset(coords={name: (name, values, dataset[name].attrs) for name, values in grids.items()})
     for name, variable in dataset.data_vars.items():
         if variable.dims == dataset[STATUS].dims and variable.dtype.kind == "f":
-            found[name] = (tuple(grids), _between(variable.values, corners, shares).reshape(shape), variable.attrs)
-    status = dataset[STATUS].values[np.take_along_axis(corners, shares.argmax(axis=1)[:, None], 1)[:, 0]]
-    found[STATUS] = (tuple(grids), status.reshape(shape), dataset[STATUS].attrs)
+            values = np.where(np.isnan(variable.values[nearest]), np.nan, _between(variable.values, points, places))
+            found[name] = (tuple(grids), values.reshape(shape), variable.attrs)
+    found[STATUS] = (tuple(grids), dataset[STATUS].values[nearest].reshape(shape), dataset[STATUS].attrs)
     return found.assign_attrs(dataset.attrs)
 
 
-def _between(values: Array, corners: Indices, shares: Array) -> Array:
+def _nearest(points: Array, places: Array) -> Indices:
+    """The corner with the largest share in each place, of the simplices of the box as it is."""
+    corners, shares = located(points, places)
+    found: Indices = np.take_along_axis(corners, shares.argmax(axis=1)[:, None], 1)[:, 0]
+    return found
+
+
+def _between(values: Array, points: Array, places: Array) -> Array:
+    height = heights(values)
+    stretched = stretch(points, height)
+    corners, shares = located(points @ stretched, places @ stretched)
     # a corner that takes no part need have no value
-    total: Array = np.where(shares == 0, 0.0, shares * heights(values)[corners]).sum(axis=1)
+    total: Array = np.where(shares == 0, 0.0, shares * height[corners]).sum(axis=1)
     return np.exp(total) if is_positive(values) else total * _size(values)
 
 
 def located(points: Array, at: Array) -> tuple[Indices, Array]:
     """Corners of the simplex in which each place is, and their shares in its value; NaN outside."""
-    mesh = Delaunay(_tilted(points))
-    places = _tilted(at)
+    mesh = Delaunay(tilted(points))
+    places = tilted(at)
     where = mesh.find_simplex(places, tol=OUTSIDE)
     inverse = mesh.transform[where]
     shares = np.einsum("nij,nj->ni", inverse[:, :-1], places - inverse[:, -1])

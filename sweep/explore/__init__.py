@@ -11,5 +11,5 @@ Others may use
     `groups`          superfluous axes, outputs free of units
 
 `calibration` (trial runs) is behind `plan`, `reference` (what errors are against) behind `work_precision`,
-`symmetries` (powers by which numbers may be multiplied) behind `groups`, `mesh` (errors between cells) behind `refine`.
+`symmetries` (powers by which numbers may be multiplied) behind `groups`.
 """

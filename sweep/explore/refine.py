@@ -1,10 +1,11 @@
 """Cells where they are needed: a finished sweep refined until straight lines between cells are right to a tolerance.
 
-Cells are joined to simplices, intervals along one axis, by `analysis.scattered`. What is there is judged first: the
-cells around a simplex tell how far straight lines are off in it (`mesh`). Where that is more than the tolerance, the
-edge that bends most is cut in the middle, and the cells around are judged again. So is the edge across a border
-between statuses, down to a fixed share of the first grid's step. What is judged is logarithmic where values are
-positive, as a scaling law wants it; elsewhere errors are relative to the largest value.
+Cells are joined to simplices, intervals along one axis, in a box stretched to where an output bends (see
+`analysis.metric`). What is there is judged first: the cells around a simplex tell how far straight lines are off in it
+(`analysis.mesh`). Where that is more than the tolerance, the edge that bends most is cut in the middle, and the cells
+around are judged again. So is the edge across a border between statuses, down to a fixed share of the first grid's
+step. What is judged is logarithmic where values are positive, as a scaling law wants it; elsewhere errors are relative
+to the largest value.
 
 Cells of one axis are a sweep over its values like any other. Cells of more axes lie anywhere, as those of a zip design.
 """
@@ -25,9 +26,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.interface import FIRST_REFUSAL, Status
-from sweep.analysis.scattered import MOST_AXES, Array, Box, Indices, axes_of, heights, simplices
+from sweep.analysis.mesh import Array, Indices, edges, interpolation_errors, simplices
+from sweep.analysis.metric import stretch
+from sweep.analysis.scattered import MOST_AXES, Box, axes_of, heights
 from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
-from sweep.explore.mesh import edges, interpolation_errors
 from sweep.study.model import Axis, Study, frozen
 from sweep.system.errors import SweepError
 from sweep.system.overwriting import check_target
@@ -297,9 +299,15 @@ class Refiner:
                 self._solve(points, values)
 
     def _judged(self) -> _Judged:
-        """Errors over the simplices that have one status, and borders between statuses that are to be cut."""
-        corners = simplices(self.points)
-        kind, heights_ = self._kinds(), self._heights()
+        """Errors over the simplices of each output, and borders between statuses that are to be cut."""
+        kind = self._kinds()
+        found = [self._judged_output(kind, heights(self._column(name))) for name in self.names]
+        return _Judged(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+
+    def _judged_output(self, kind: Indices, height: Array) -> _Judged:
+        """Errors over the simplices that have one status, in the box stretched to where the output bends."""
+        points = self.points @ stretch(self.points, height)
+        corners = simplices(points)
         kinds = kind[corners]
         alike = (kinds == kinds[:, :1]).all(axis=1)
         size = np.zeros(len(corners))
@@ -307,7 +315,7 @@ class Refiner:
         for number in np.unique(kind[kind >= 0]):
             members, here = np.flatnonzero(kind == number), np.flatnonzero(alike & (kinds[:, 0] == number))
             renumbered = np.searchsorted(members, corners[here])
-            errors = interpolation_errors(self.points[members], heights_[members], renumbered)
+            errors = interpolation_errors(points[members], height[members, None], renumbered)
             size[here] = errors.size
             ends[here, 0] = corners[here, errors.first]
             ends[here, 1] = corners[here, errors.second]
@@ -337,9 +345,6 @@ class Refiner:
         finite = np.isfinite(np.stack([self._column(name) for name in self.names])).all(axis=0)
         kind = np.where(status == Status.INACCURATE, int(Status.OK), status)
         return np.where((status < FIRST_REFUSAL) & finite, kind, -1)
-
-    def _heights(self) -> Array:
-        return np.stack([heights(self._column(name)) for name in self.names], axis=1)
 
     def _column(self, name: str) -> Any:
         return np.concatenate([part[name].values for part in self.parts])

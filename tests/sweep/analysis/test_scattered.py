@@ -5,7 +5,9 @@ import pytest
 import xarray as xr
 from scipy.interpolate import LinearNDInterpolator
 
-from sweep.analysis.scattered import Box, axes_of, heights, interpolated, on_lines, simplices
+from sweep.analysis.mesh import simplices
+from sweep.analysis.metric import stretch
+from sweep.analysis.scattered import Box, axes_of, heights, interpolated, on_lines
 from sweep.system.errors import SweepError
 
 
@@ -45,7 +47,7 @@ def test_between_cells_values_are_those_of_scipy():
     found = interpolated(ds, x)
     places = np.log(np.stack([ds.a, ds.b], axis=1))
     rows = np.log(np.stack(np.meshgrid(x["a"], x["b"], indexing="ij"), axis=-1))
-    tilt = np.array([[1.0, 0.0], [0.013, 1.0]])
+    tilt = stretch(places / np.log(100), heights(ds.y.values)) @ np.array([[1.0, 0.0], [0.013, 1.0]])
     truth = LinearNDInterpolator(places @ tilt, ds.y.values)(rows @ tilt)
     np.testing.assert_allclose(found.y, truth, rtol=1e-9, atol=1e-9)
 

@@ -11,6 +11,8 @@ from scipy.interpolate import LinearNDInterpolator
 from toy import KERNEL as TOY
 
 import sweep
+from sweep.analysis.metric import stretch
+from sweep.analysis.scattered import located
 from sweep.cli import main
 from sweep.explore.refine import _Output
 from sweep.system.errors import SweepError
@@ -186,23 +188,54 @@ def test_a_fine_grid_is_judged_before_anything_is_computed():
     assert found.error < 5e-5
 
 
-def test_the_error_told_of_three_axes_holds():
+def test_three_axes_take_fewer_cells_than_an_even_grid_that_is_as_right():
+    """P depends on mu / (a^2 phi0): along two of three directions there is nothing to cut."""
+
     def even(num):
         axes = {n: {"spacing": "log", "start": 0.1, "stop": 10, "num": num} for n in ("mu", "a", "phi0")}
         return sweep.run(sweep.build_study(kernel="foliot", axes=axes, outputs=["period"]))
 
-    found = sweep.refine(even(4), "period", 1e-1)
+    names = ("mu", "a", "phi0")
     places = 10 ** np.random.default_rng(4).uniform(-1, 1, (3, 400))
-    keys = {"axes": dict(zip(("mu", "a", "phi0"), places, strict=True)), "design": "zip", "outputs": ["period"]}
+    keys = {"axes": dict(zip(names, places, strict=True)), "design": "zip", "outputs": ["period"]}
     truth = sweep.run(sweep.build_study(kernel="foliot", **keys)).period.values
 
-    def off(ds):
-        names = ("mu", "a", "phi0")
-        z = LinearNDInterpolator(np.log(np.stack([ds[n].values.ravel() for n in names], axis=1)), np.log(ds.period))
-        return np.nanmax(abs(np.exp(z(np.log(places.T))) / truth - 1))
+    def off(points, period):
+        corners, shares = located(points, np.log(places.T))
+        return abs(np.exp((shares * np.log(period)[corners]).sum(axis=1)) / truth - 1).max()
 
+    found = sweep.refine(even(4), "period", 2e-2)
+    points = np.log(np.stack([found.dataset[n].values for n in names], axis=1))
+    period = found.dataset.period.values
+    stretched = stretch((points - points.min()) / np.ptp(points), np.log(period))
+    corners, shares = located(points @ stretched, np.log(places.T) @ stretched)
+    true = abs(np.exp((shares * np.log(period)[corners]).sum(axis=1)) / truth - 1).max()
     assert found.complete
-    assert off(found.dataset) <= found.error
+    assert true <= found.error
+    assert len(period) < 200
+    grid = even(8)
+    rows = np.log(np.stack([m.ravel() for m in np.meshgrid(*(grid[n] for n in names), indexing="ij")], axis=1))
+    assert off(rows, grid.period.values.ravel()) > true  # 512 cells
+
+
+def test_an_axis_that_matters_nothing_is_hardly_cut():
+    """A power law in phi0 at a fixed mu / (a^2 phi0): over 1 % of phi0 all that bends is mu.
+
+    Twice the cells of mu alone are the least, for both ends of phi0 need them.
+    """
+
+    def cells(**more):
+        axes = {"mu": {"spacing": "log", "start": 1e-2, "stop": 1e2, "num": 5}, **more}
+        fixed = {"a": 1.0, "phi0": 1.0}
+        fixed = {name: value for name, value in fixed.items() if name not in axes}
+        ds = sweep.run(sweep.build_study(kernel="foliot", axes=axes, fixed=fixed, outputs=["period"]))
+        found = sweep.refine(ds, "period", 1e-3)
+        assert found.complete
+        return found.dataset.sizes
+
+    alone = cells()["mu"]
+    both = cells(phi0={"spacing": "linear", "start": 1.0, "stop": 1.01, "num": 3})["cell"]
+    assert both < 3 * alone
 
 
 def test_between_two_values_of_an_axis_a_third_is_computed_first():
@@ -239,7 +272,7 @@ def _stepped(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
 
 def test_a_refined_result_of_two_axes_is_taken_by_every_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    sweep.run(foliot(mu=(1e-1, 1e2, 7), R=(1e-2, 10.0, 6)), "coarse.h5").close()
+    sweep.run(foliot(mu=(1e-1, 1e2, 13), R=(1e-2, 10.0, 6)), "coarse.h5").close()
     command = "refine coarse.h5 --y period --tolerance 5e-2 -o fine.h5 --most-cells 1500"
     assert main(command.split()) == 0
     for more in (

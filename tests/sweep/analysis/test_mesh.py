@@ -5,8 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from sweep.analysis.scattered import simplices
-from sweep.explore.mesh import SAFETY, interpolation_errors
+from sweep.analysis.mesh import SAFETY, interpolation_errors, simplices
 
 
 @pytest.mark.parametrize("axes", [1, 2, 3])

@@ -1,4 +1,6 @@
-"""How far straight lines between cells are off, told from the cells around, and which edge to cut for it.
+"""Cells joined to simplices; how far straight lines between them are off, and which edge to cut for it.
+
+Simplices (intervals, triangles, tetrahedra) are those of Delaunay's triangulation.
 
 Over a simplex with barycentric coordinates l_i a parabola is off its straight interpolation by
 
@@ -16,11 +18,16 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import Delaunay, cKDTree
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
+SHEAR = 0.013
+"""By which axes are tilted before cells are joined: corners of a box lie on a sphere, so there are many ways to join
+them; tilted there is one, and it is alike in all boxes."""
+FLAT = 1e-9
+"""Volume, in products of its edges, below which a simplex is none."""
 AROUND = {1: 4, 2: 12, 3: 20}
 """Cells around a simplex that are taken, beside its corners; with more axes twice the unknowns."""
 SAFETY = 1.6
@@ -44,6 +51,26 @@ class Errors(NamedTuple):
     second: Indices
 
 
+def simplices(points: Array) -> Indices:
+    """Numbers (m, axes + 1) of the points at the corners of each simplex; those without a volume are left out."""
+    if points.shape[1] == 1:
+        order = np.argsort(points[:, 0], kind="stable")
+        return np.column_stack([order[:-1], order[1:]])
+    found = Delaunay(tilted(points)).simplices.astype(np.intp)
+    sides = points[found[:, 1:]] - points[found[:, :1]]
+    products = np.linalg.norm(sides, axis=2).prod(axis=1)
+    kept: Indices = found[abs(np.linalg.det(sides)) > FLAT * products]
+    return kept
+
+
+def tilted(points: Array) -> Array:
+    """Points as they are joined."""
+    axes = points.shape[1]
+    tilt = np.eye(axes) + SHEAR * np.tril(1.0 + 0.3 * np.arange(axes), -1)
+    found: Array = points @ tilt
+    return found
+
+
 def edges(axes: int) -> Indices:
     """Pairs of corners of a simplex."""
     return np.array(list(itertools.combinations(range(axes + 1), 2)), dtype=np.intp)
@@ -52,16 +79,31 @@ def edges(axes: int) -> Indices:
 def interpolation_errors(points: Array, heights: Array, corners: Indices) -> Errors:
     """Errors of straight lines between points, (n, axes) with heights (n, outputs), over simplices (m, axes + 1)."""
     pairs = edges(points.shape[1])
-    if len(points) < points.shape[1] + 1 + len(pairs):
+    if are_too_few(points):
         return _cut_longest(points, corners, pairs)
+    bend, misfit = parabolas(points, heights, corners)
+    middle = abs(bend) / 4
+    inside = abs(bend.sum(axis=1)) / corners.shape[1] ** 2
+    size = (SAFETY * np.maximum(middle.max(axis=1, initial=0.0), inside) + MISFIT * misfit).max(axis=1)
+    worst = _shortest(middle.max(axis=2), lengths(points, corners, pairs))
+    return Errors(size, pairs[worst, 0], pairs[worst, 1])
+
+
+def are_too_few(points: Array) -> bool:
+    """Whether there are fewer points than tell a parabola over a simplex."""
+    number, axes = points.shape
+    return bool(number < axes + 1 + len(edges(axes)))
+
+
+def parabolas(points: Array, heights: Array, corners: Indices) -> tuple[Array, Array]:
+    """The c_ij (m, pairs, outputs) of (1) over each simplex, and what they leave, a mean square's root (m, outputs)."""
+    pairs, outputs = edges(points.shape[1]), heights.shape[1]
     tree, beyond = cKDTree(points), _beyond(corners)
-    parts = [
-        _of_batch(points, heights, corners[start : start + BATCH], beyond[start : start + BATCH], tree, pairs)
-        for start in range(0, len(corners), BATCH)
-    ]
-    if not parts:
-        return Errors(np.empty(0), np.empty(0, np.intp), np.empty(0, np.intp))
-    return Errors(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    bend, misfit = np.empty((len(corners), len(pairs), outputs)), np.empty((len(corners), outputs))
+    for start in range(0, len(corners), BATCH):
+        some = slice(start, start + BATCH)
+        bend[some], misfit[some] = _of_batch(points, heights, corners[some], beyond[some], tree, pairs)
+    return bend, misfit
 
 
 def _beyond(corners: Indices) -> Indices:
@@ -94,7 +136,7 @@ def lengths(points: Array, corners: Indices, pairs: Indices) -> Array:
 
 def _of_batch(
     points: Array, heights: Array, corners: Indices, beyond: Indices, tree: cKDTree, pairs: Indices
-) -> Errors:
+) -> tuple[Array, Array]:
     axes = points.shape[1]
     place = points[corners]
     centre = place.mean(axis=1)
@@ -105,12 +147,7 @@ def _of_batch(
     basis = shares[:, :, pairs[:, 0]] * shares[:, :, pairs[:, 1]]
     weight = 1 / np.maximum(abs(basis).sum(axis=2), LEAST_BASIS)
     weight[(near[:, :, None] == corners[:, None, :]).any(axis=2)] = 0.0
-    bend, misfit = _parabola(basis, off, weight)
-    middle = abs(bend) / 4
-    inside = abs(bend.sum(axis=1)) / (axes + 1) ** 2
-    size = (SAFETY * np.maximum(middle.max(axis=1), inside) + MISFIT * misfit).max(axis=1)
-    worst = _shortest(middle.max(axis=2), lengths(points, corners, pairs))
-    return Errors(size, pairs[worst, 0], pairs[worst, 1])
+    return _parabola(basis, off, weight)
 
 
 def _shortest(bends: Array, length: Array) -> Indices:
