@@ -427,6 +427,7 @@ def test_columns_come_in_the_order_of_the_declaration():
     assert len(columns_of(FOLIOT_NOISE, (), dict.fromkeys(names, 1.0))) == len(names)
 
 
+@pytest.mark.skipif(not COMPILED, reason="thousands of half swings in plain Python")
 def test_lasting_noise_of_the_friction_is_another_friction():
     """tau_c without end: each half swing has the torque 1 + sigma z or the friction 1 + sigma_a z of one z.
 
