@@ -84,7 +84,7 @@ def numbers(path):
 def done(output):
     """Blocks of an unfinished result that are acknowledged."""
     with StoredFile(unfinished_of(output)) as file:
-        return set(np.flatnonzero(file.done("rows" if "rows" in file.layout.tables else "cells")).tolist())
+        return set(np.flatnonzero(file.done(file.layout.work_name)).tolist())
 
 
 class Victims:
