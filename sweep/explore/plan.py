@@ -25,7 +25,7 @@ from sweep.cells.reduce import strip_bytes
 from sweep.cells.timing import Sample, row_partition
 from sweep.explore.calibration import Calibration
 from sweep.results.open import memory
-from sweep.store.frame import Frame, cuts_of
+from sweep.store.frame import cuts_of, expected_size
 from sweep.study.read import Given, as_study
 from sweep.system.errors import SweepError
 from sweep.system.pool import cores, whole_number
@@ -213,10 +213,8 @@ def _seconds(study: Study, sample: Sample, blocks: Partition, output: int, worke
 
 
 def _output_bytes(study: Study, blocks: Partition) -> int:
-    """The output; its structure is made for this, in memory."""
-    mark = fingerprint(study)
-    schema = output_schema(study, mark)
-    return Frame(schema, cuts_of(study, schema, blocks), mark, "").layout.size
+    schema = output_schema(study, fingerprint(study))
+    return expected_size(schema, cuts_of(study, schema, blocks))
 
 
 def _disk_speed(folder: Path) -> float:

@@ -82,7 +82,7 @@ def open_unfinished(path: str | os.PathLike[str], strict: bool = False) -> xr.Da
     output = unfinished_of(Path(path))
     check_structure(output)
     with _stored(output) as file:
-        left, count = int((~file.done(_work(file))).sum()), file.layout.work.blocks.count
+        left, count = int((~file.done(file.layout.work_name)).sum()), file.layout.work.blocks.count
     if strict:
         missing = f"{left} of {count} blocks are missing" if left else "all is computed but not checked yet"
         raise SweepError(f"{path}: unfinished, {missing}; run its sweep again to continue")
@@ -193,10 +193,6 @@ def _stored(path: Path) -> StoredFile:
         raise
     except DAMAGE as fault:
         raise unreadable(path, fault) from None
-
-
-def _work(file: StoredFile) -> str:
-    return "rows" if "rows" in file.layout.tables else "cells"
 
 
 def check_structure(output: Path) -> None:

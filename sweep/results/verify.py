@@ -93,7 +93,7 @@ def _verdict(output: Path, place: Path) -> Verdict:
             return Verdict(output, False, checked, (*findings, BESIDE))
         if not file.finished:
             return _unfinished(output, file, findings)
-        work = bad["rows" if "rows" in bad else "cells"]
+        work = bad[file.layout.work_name]
         blocks = None if file.earlier or not findings else tuple(sorted({block for block, _ in work}))
         return Verdict(output, not findings, checked, tuple(findings), blocks)
 
@@ -122,7 +122,7 @@ def _structure(place: Path) -> str | None:
 
 def _tables(file: StoredFile) -> Iterable[str]:
     """Those that are there; the columns of a summary are made at its end."""
-    return file.layout.tables if file.finished or len(file.layout.tables) == 1 else ("rows",)
+    return file.layout.tables if file.finished else (file.layout.work_name,)
 
 
 def _wanted(file: StoredFile, name: str) -> list[int]:
@@ -152,7 +152,7 @@ def _runs(name: str, blocks: Partition, bad: list[int]) -> Iterator[str]:
 
 
 def _unfinished(output: Path, file: StoredFile, findings: list[str]) -> Verdict:
-    work, blocks = "rows" if "rows" in file.layout.tables else "cells", file.layout.work.blocks
+    work, blocks = file.layout.work_name, file.layout.work.blocks
     done = file.done(work)
     missing = [blocks.bounds(block) for block in np.flatnonzero(~done).tolist()]
     told = [f"missing: {work} {start:,} to {stop:,}" for start, stop in missing[:MOST_TOLD]]

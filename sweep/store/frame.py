@@ -8,6 +8,8 @@ other chunk stands a checksum that is wrong, so that nobody takes what is not co
 from __future__ import annotations
 
 import io
+import itertools
+import math
 import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,6 +35,10 @@ SHARED_WORTH_A_PAGE = PAGE
 """so do shorter ones, where several machines write."""
 GATHERED_BYTES = 8 << 20
 """Bytes of the rows that are reduced to groups at a time."""
+CHUNK_ENTRY = 16
+"""Bytes that tell where a chunk is;"""
+NAMES = 32 << 10
+"""and those of all names and dimensions, about."""
 AT_ONCE = 64 << 20
 """Bytes of a file that is written in one piece."""
 VERSION = ("v110", "v110")
@@ -58,8 +64,10 @@ class Sparse(io.RawIOBase):
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
         """Moves to a place, which may be past the end."""
-        self._at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self.size}[whence]
-        return self._at
+        if whence != io.SEEK_SET:
+            offset += self._at if whence == io.SEEK_CUR else self.size
+        self._at = offset
+        return offset
 
     def tell(self) -> int:
         """The place."""
@@ -72,15 +80,22 @@ class Sparse(io.RawIOBase):
 
     def write(self, piece: Any) -> int:
         """Takes all of it."""
-        view = memoryview(piece).cast("B")
-        zeros = not np.frombuffer(view, np.uint8).any()
-        for page, begin, end, at in self._cut(self._at, len(view)):
-            if zeros and page not in self._pages:
-                continue
-            self._pages.setdefault(page, bytearray(self.PAGE))[begin:end] = view[at : at + end - begin]
-        self._at += len(view)
+        length = len(piece)
+        zeros = _is_zero(piece)
+        # most of what comes is zeros on new pages
+        if not zeros or not self._pages.keys().isdisjoint(self._numbers(self._at, length)):
+            self._keep(memoryview(piece).cast("B"), zeros)
+        self._at += length
         self.size = max(self.size, self._at)
-        return len(view)
+        return length
+
+    def _keep(self, view: memoryview, zeros: bool) -> None:
+        for page, begin, end, at in self._cut(self._at, len(view)):
+            if page in self._pages or not zeros:
+                self._pages.setdefault(page, bytearray(self.PAGE))[begin:end] = view[at : at + end - begin]
+
+    def _numbers(self, start: int, length: int) -> range:
+        return range(start // self.PAGE, (start + length - 1) // self.PAGE + 1)
 
     def readinto(self, buffer: Any) -> int:
         """Fills all of it; what was never written is zero."""
@@ -130,6 +145,11 @@ class Sparse(io.RawIOBase):
         return True
 
 
+def _is_zero(piece: Any) -> bool:
+    length = len(piece)
+    return bytes(piece) == bytes(length) if length <= PAGE else not np.frombuffer(piece, np.uint8).any()
+
+
 @dataclass(frozen=True)
 class Cut:
     """Columns, the grid in which their cells stand, and how it is cut."""
@@ -153,6 +173,20 @@ def cuts_of(study: Study, schema: Schema, blocks: Partition) -> dict[str, Cut]:
     row_bytes = sum(column.cell_bytes for column in columns)
     groups = boxes(schema.grid.shape, max(1, GATHERED_BYTES // (row_bytes * rows.per_group)))
     return {"rows": Cut(columns, (rows.count,), blocks), "cells": Cut(schema.columns, schema.grid.shape, groups)}
+
+
+def expected_size(schema: Schema, cuts: Mapping[str, Cut]) -> int:
+    """Bytes that a result will take, but for some thousands; a `Frame` knows them all."""
+    texts = sum(len(str(text)) for text in schema.attrs.values())
+    coordinates = sum(np.asarray(coordinate.values).nbytes for coordinate in schema.coordinates)
+    return NAMES + texts + coordinates + sum(_expected(cut) for cut in cuts.values())
+
+
+def _expected(cut: Cut) -> int:
+    cells = math.prod(box_shape(cut.grid, cut.blocks.cells))
+    chunks = np.array([cells * column.cell_bytes for column in cut.columns]) + CHECKSUM_BYTES
+    chunks = np.where(chunks >= WORTH_A_PAGE, -(-chunks // PAGE) * PAGE, chunks)
+    return cut.blocks.count * int((chunks + CHUNK_ENTRY + BYTES).sum())
 
 
 class Frame:
@@ -201,8 +235,7 @@ class Frame:
         yield from self._sparse.pages()
         for name, table in self.layout.tables.items():
             for column, place in zip(self._cuts[name].columns, table.places, strict=True):
-                skip, piece = _pending(column, place)
-                yield from ((int(at) + skip, piece) for at in place.all_at(table.blocks.count))
+                yield from _nothing_yet(column, place, table.blocks.count)
         yield self.layout.end, self.layout.trailer()
 
     def _found(self, fingerprint: Mapping[str, str], begun: str, texts: Mapping[str, str]) -> Layout:
@@ -233,9 +266,11 @@ class Frame:
 def _regions(sparse: Sparse, spans: Any) -> tuple[Region, ...]:
     """Chunks and digests that have zeros alone between them, together."""
     spans = spans[np.argsort(spans[:, 0], kind="stable")]
+    apart = np.flatnonzero(spans[1:, 0] != spans[:-1, 1]) + 1
     found: list[list[int]] = []
-    for begin, end in spans.tolist():
-        if found and (begin == found[-1][1] or sparse.is_zero(found[-1][1], begin)):
+    for first, last in itertools.pairwise((0, *apart.tolist(), len(spans))):
+        begin, end = int(spans[first, 0]), int(spans[last - 1, 1])
+        if found and sparse.is_zero(found[-1][1], begin):
             found[-1][1] = end
         else:
             found.append([begin, end])
@@ -251,21 +286,35 @@ def _table(file: Any, name: str, cut: Cut, mark: bytes) -> Table:
 def _place(dataset: Any, column: Column) -> Place:
     if dataset.chunks is None:
         return Place(column.name, column.dtype, column.shape, 0, ((0, dataset.id.get_offset(), 0),))
-    found: list[tuple[tuple[int, ...], int]] = []
-    dataset.id.chunk_iter(lambda chunk: found.append((chunk.chunk_offset, chunk.byte_offset)))
-    places = [at for _, at in sorted(found)]
+    found: list[tuple[int, ...]] = []
+    dataset.id.chunk_iter(lambda chunk: found.append((*chunk.chunk_offset, chunk.byte_offset)))
+    places = [at for *_, at in sorted(found)]
     chunk_bytes = int(np.prod(dataset.chunks, dtype=np.int64)) * dataset.dtype.itemsize
     return Place(column.name, column.dtype, column.shape, chunk_bytes, tuple(_runs(places)))
 
 
 def _runs(places: Sequence[int]) -> Iterator[tuple[int, int, int]]:
     """The places as (number of the first, place, step) of those that follow each other evenly."""
-    first, steps = 0, np.diff(np.array(places, np.int64)).tolist()
-    for chunk, step in enumerate(steps, 1):
-        if step != steps[first]:
-            yield first, places[first], steps[first]
-            first = chunk
-    yield first, places[first], steps[first] if first < len(steps) else 0
+    first, steps = 0, np.diff(np.array(places, np.int64))
+    for change in (np.flatnonzero(np.diff(steps)) + 1).tolist():
+        if change > first:
+            yield first, places[first], int(steps[first])
+            first = change + 1
+    yield first, places[first], int(steps[first]) if first < len(steps) else 0
+
+
+def _nothing_yet(column: Column, place: Place, count: int) -> Iterator[tuple[int, bytes]]:
+    """What stands in the chunks before they are computed, and where; short ones behind each other are one piece."""
+    skip, piece = _pending(column, place)
+    whole = bytes(skip) + piece
+    ends = [*(first for first, _, _ in place.runs[1:]), count]
+    for (first, at, step), end in zip(place.runs, ends, strict=True):
+        chunks = end - first
+        if step == len(whole) < PAGE:
+            batch = GATHERED_BYTES // step
+            yield from ((at + k * step, whole * min(batch, chunks - k)) for k in range(0, chunks, batch))
+        else:
+            yield from ((at + k * step + skip, piece) for k in range(chunks))
 
 
 def _pending(column: Column, place: Place) -> tuple[int, bytes]:

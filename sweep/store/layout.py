@@ -203,9 +203,14 @@ class Layout:
     end: int
 
     @property
+    def work_name(self) -> str:
+        """Name of the table that is computed."""
+        return "rows" if "rows" in self.tables else "cells"
+
+    @property
     def work(self) -> Table:
         """What is computed."""
-        return self.tables.get("rows", self.tables["cells"])
+        return self.tables[self.work_name]
 
     def trailer(self) -> bytes:
         """What stands behind the end of HDF5's part."""
@@ -217,7 +222,7 @@ class Layout:
         """Bytes of the file."""
         return self.end + len(self.trailer())
 
-    def ending_digest(self, texts: Sequence[bytes]) -> bytes:
+    def ending_digest(self, texts: Sequence[bytes | bytearray]) -> bytes:
         """Digest of the texts at the end."""
         return xxhash.xxh3_128(self.key.encode() + b"".join(texts)).digest()
 

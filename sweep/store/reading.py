@@ -59,15 +59,12 @@ class StoredFile:
                 self._digests, self.finished = {"cells": digests}, True
             else:
                 self._digests = {name: table.read_digests(self.fd) for name, table in layout.tables.items()}
-                self.finished = self._ended(layout)
+                self.finished = has_ended(self.fd, layout)
             self.layout: Layout = layout
         except BaseException:
             self.close()
             raise
         self._sound = {name: np.zeros(table.blocks.count, bool) for name, table in layout.tables.items()}
-
-    def _ended(self, layout: Layout) -> bool:
-        return endings(self.fd, layout)[1]
 
     def __enter__(self) -> StoredFile:
         return self
@@ -220,13 +217,10 @@ def runs(key: Sequence[Any], grid: tuple[int, ...]) -> tuple[Any, int]:
     return starts, length
 
 
-def endings(fd: int, layout: Layout) -> tuple[list[bytes], bool]:
-    """The texts that are written at the end of a run, and whether they are. Raises OSError, EOFError."""
-    found = [bytearray(stop - begin) for begin, stop in layout.endings]
-    for piece, (begin, _) in zip(found, layout.endings, strict=True):
-        disk.read_all(fd, (piece,), begin)
-    texts, digest = [bytes(piece) for piece in found[:-1]], bytes(found[-1])
-    return texts, layout.ending_digest(texts) == digest
+def has_ended(fd: int, layout: Layout) -> bool:
+    """Whether the texts that are written at the end of a run are there. Raises OSError, EOFError."""
+    *texts, digest = (_bytes(fd, begin, end) for begin, end in layout.endings)
+    return layout.ending_digest(texts) == digest
 
 
 def unbroken(fd: int, most: float = math.inf) -> bool | None:

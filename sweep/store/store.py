@@ -334,7 +334,7 @@ class _Checker:
     """Compares blocks with their digests while something else goes on."""
 
     def __init__(self, path: Path, layout: Layout, blocks: Any) -> None:
-        self._name = "rows" if "rows" in layout.tables else "cells"
+        self._name = layout.work_name
         self._stopped, self._found = threading.Event(), set[int]()
         self._thread = threading.Thread(target=self._check, args=(path, blocks.tolist()), daemon=True)
         self._thread.start()

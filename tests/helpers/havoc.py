@@ -84,7 +84,7 @@ def numbers(path):
 def done(output):
     """Blocks of an unfinished result that are acknowledged."""
     with StoredFile(unfinished_of(output)) as file:
-        return set(np.flatnonzero(file.done("rows" if "rows" in file.layout.tables else "cells")).tolist())
+        return set(np.flatnonzero(file.done(file.layout.work_name)).tolist())
 
 
 class Victims:
@@ -133,7 +133,7 @@ def torture(rng, victims, folder, kills, shapes, kinds=KINDS):
             output.unlink()
     while found["kills"] < kills:
         kind = kinds[found["runs"] % len(kinds)]
-        _tortured(rng, victims, folder / f"out{found['runs']}.h5", kind, rng.choice(shapes), usual[kind], found)
+        _tortured(rng, victims, folder / f"out{found['runs']}.h5", kind, rng.choice(shapes), usual, found)
         output = folder / f"out{found['runs']}.h5"
         found["runs"] += 1
         left = sorted(path.name for path in folder.iterdir() if path.name.startswith(output.name))
@@ -143,13 +143,17 @@ def torture(rng, victims, folder, kills, shapes, kinds=KINDS):
 
 
 def _tortured(rng, victims, output, kind, cells, usual, found):
-    """One run, killed again and again until it ends."""
+    """One run, killed again and again until it ends; `usual` seconds of each kind are kept in step with the machine."""
     prepare(kind, output)
-    ended, kept = False, set()
+    ended, kept, seconds = False, set(), usual[kind]
     while not ended:
         # as often near its end, where it is renamed, as before
         share = rng.random() if rng.random() < 0.5 else rng.uniform(0.8, 1.1)
-        ended, acknowledged = victims.run(kind, output, rng.choice([1, 2, 8]), cells, share * usual)
+        begun = time.monotonic()
+        ended, acknowledged = victims.run(kind, output, rng.choice([1, 2, 8]), cells, share * seconds)
+        if ended:
+            usual[kind] = time.monotonic() - begun
+        seconds *= 1.25
         kept |= acknowledged
         if not ended:
             found["kills"] += 1

@@ -70,7 +70,7 @@ def kept(output):
     if not unfinished_of(output).exists():
         return []
     with StoredFile(unfinished_of(output)) as file:
-        return np.flatnonzero(file.done("rows" if "rows" in file.layout.tables else "cells")).tolist()
+        return np.flatnonzero(file.done(file.layout.work_name)).tolist()
 
 
 def place(output, name, cell, table="cells"):

@@ -12,7 +12,7 @@ from running import fail_on, quiet, same, told_by
 import sweep
 from sweep.results.verify import verify
 
-KILLS, DAMAGED = 12, 8
+KILLS, DAMAGED = 8, 8
 FAULTS = [("open_file", errno.EMFILE), ("write", errno.ENOSPC), ("reserve", errno.ENOSPC), ("fsync", errno.EIO),
           ("sync_numbers", errno.EIO), ("rename", errno.EIO), ("remove", errno.EIO)]  # fmt: skip
 STEP = 11

@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 import toy_studies
 
+from kernels.interface import Status
 from sweep.cells.output_schema import output_schema
 from sweep.cells.partition import boxes, row_blocks
 from sweep.store import store as storing
-from sweep.store.frame import Frame, cuts_of
+from sweep.store.frame import Frame, cuts_of, expected_size
 from sweep.store.reading import StoredFile
 from sweep.store.store import opened, unfinished_of
 from sweep.system import disk
@@ -34,6 +35,32 @@ def frame(cells=5, **keys):
     schema = output_schema(study, MARK)
     shape = schema.grid.shape if study.summary is None else (row_blocks(study).count,)
     return Frame(schema, cuts_of(study, schema, boxes(shape, cells)), MARK, "now")
+
+
+@pytest.mark.parametrize("cells", [10, 1000, 50_000])
+def test_the_size_of_a_result_is_known_before_its_structure_is(cells):
+    study = toy_studies.build(axes={"height": np.linspace(1.0, 2.0, 200_000)}, outputs=["fall_time"])
+    schema = output_schema(study, MARK)
+    cuts = cuts_of(study, schema, boxes(schema.grid.shape, cells))
+    assert Frame(schema, cuts, MARK, "now").layout.size == pytest.approx(expected_size(schema, cuts), rel=0.02)
+
+
+@pytest.mark.parametrize("cells", [1, 7, 20_000])
+def test_where_nothing_is_computed_hdf5_finds_pending_statuses_and_no_numbers(output, cells):
+    made = frame(cells=cells, axes={"height": np.linspace(1.0, 2.0, 100_000 if cells > 7 else 500)})
+    with opened(output) as store:
+        store.begin(made)
+    table = made.layout.work
+    with h5py.File(unfinished_of(output)) as file:
+        assert set(file["status"][...].ravel().tolist()) == {Status.PENDING}
+        for block in {0, 1, 2, table.blocks.count // 2, table.blocks.count - 1}:
+            start, _ = table.blocks.bounds(block)
+            for place in table.places:
+                where = file[place.name].id.get_chunk_info_by_coord((start, *(0 for _ in place.shape)))
+                assert where.byte_offset == place.at(block)
+                if place.name != "status":
+                    with pytest.raises(OSError, match="filter"):
+                        file[place.name][start]
 
 
 def numbers(table, block):
