@@ -25,9 +25,9 @@ def folder() -> Path:
 
 
 def names() -> list[str]:
-    """Of all studies: a TOML file, a script, or both."""
+    """Of all studies: a TOML file, or a script whose first line asks something, or both; others are scenes of these."""
     every = {path.stem for path in folder().glob("*") if path.suffix in (".toml", ".py")}
-    own = {name for name in every if not name.startswith("_")}
+    own = {name for name in every if not name.startswith("_") and question(name).endswith("?")}
     # of several grids for one question the first one's name is the study's
     return sorted(name for name in own if not any(name.startswith(f"{other}_") and _is_part(name) for other in own))
 
@@ -75,7 +75,7 @@ def copy_study(name: str, target: Path = Path()) -> list[Path]:
 def _files(name: str) -> list[Path]:
     place, own = folder(), names()
     found = [place / f"{name}.toml", place / f"{name}.csv"]
-    found += sorted(p for p in place.glob(f"{name}_*.toml") if p.stem not in own)
+    found += sorted(p for p in place.glob(f"{name}_*.*") if p.suffix in (".toml", ".csv") and p.stem not in own)
     return [path for path in found if path.exists()] + _scripts(place, name)
 
 

@@ -44,9 +44,11 @@ def test_bad_cells_fail_by_name_and_all_others_have_the_bits_of_a_run_without_th
         assert account(found).failed == len(BAD[name])
     told = [line.partition("FAILED ")[2] for line in log.getvalue().splitlines() if "FAILED" in line]
     assert sorted(text.partition(":")[0] for text in told) == [f"(height={int(height)})" for height in BAD[name]]
-    reasons = {"11": "ZeroDivisionError: eleven", "22": "SIGSEGV", "33": "ended with 7", "44": "longer than 1.5 s"}
-    for height, reason in reasons.items():
-        assert float(height) not in BAD[name] or any(f"height={height})" in t and reason in t for t in told)
+    late = "longer than 1.5 s"  # also of a process that a busy machine takes so long to bury
+    reasons = {"11": ["ZeroDivisionError: eleven"], "22": ["SIGSEGV", late], "33": ["ended with 7", late], "44": [late]}
+    for height, allowed in reasons.items():
+        given = [text for text in told if f"height={height})" in text]
+        assert float(height) not in BAD[name] or any(reason in given[0] for reason in allowed)
 
 
 def test_a_kernel_of_which_every_cell_is_bad_is_told_at_once():
