@@ -13,7 +13,8 @@ from sweep.system.table import columns
 HERE = Path(__file__).parents[1]
 FOLDERS = (HERE / "_studies", HERE.parent / "studies")
 """Of an installed package, and of a checkout."""
-IMPORT = re.compile(r"^\s*(?:from|import)\s+(\w+)", re.MULTILINE)
+NAMED = re.compile(r"^\s*(?:from|import)\s+(\w+)|\"(\w+):\w+\"", re.MULTILINE)
+"""Modules that a script imports, or a kernel is in."""
 
 
 def folder() -> Path:
@@ -76,17 +77,17 @@ def _files(name: str) -> list[Path]:
     place, own = folder(), names()
     found = [place / f"{name}.toml", place / f"{name}.csv"]
     found += sorted(p for p in place.glob(f"{name}_*.*") if p.suffix in (".toml", ".csv") and p.stem not in own)
-    return [path for path in found if path.exists()] + _scripts(place, name)
+    return _with_scripts([*found, place / f"{name}.py"])
 
 
-def _scripts(place: Path, name: str) -> list[Path]:
-    """A script and those beside it that it imports, and so on."""
+def _with_scripts(files: list[Path]) -> list[Path]:
+    """Those of the files that there are, and the scripts beside them that they name, and so on."""
     found: dict[Path, None] = {}
-    waiting = [place / f"{name}.py"]
+    waiting = list(reversed(files))
     while waiting:
         path = waiting.pop()
         if path.exists() and path not in found:
             found[path] = None
-            words = IMPORT.findall(path.read_text(encoding="utf-8"))
-            waiting += [place / f"{word}.py" for word in words]
+            words = NAMED.findall(path.read_text(encoding="utf-8"))
+            waiting += [path.with_name(f"{imported or kernel}.py") for imported, kernel in words]
     return list(found)

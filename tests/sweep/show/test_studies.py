@@ -33,7 +33,8 @@ def test_a_copy_is_all_that_the_study_needs(name, tmp_path, monkeypatch, capsys)
         sweep.read_study(path, allow_import=True)
     for script in tmp_path.glob("*.py"):
         for other in (ROOT / "studies").glob("*.py"):
-            if f"import {other.stem}\n" in script.read_text() or f"from {other.stem} import" in script.read_text():
+            ways = (f"import {other.stem}\n", f"from {other.stem} import", f'"{other.stem}:KERNEL"')
+            if any(way in script.read_text() for way in ways):
                 assert other.name in copied
 
 
