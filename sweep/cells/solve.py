@@ -11,7 +11,7 @@ a kernel has not got, the cell FAILED.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Method, Status
-from sweep.cells.grid import Grid
+from sweep.cells.grid import Cells, Grid
 from sweep.study.model import AUTO, Study
 
 STRIP = 16384
@@ -46,7 +46,7 @@ UNKNOWN = (Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT)
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Codes = NDArray[np.int8]
-Cells = slice | NDArray[np.intp]
+Chosen = slice | NDArray[np.intp]
 
 
 class Solver:
@@ -79,54 +79,29 @@ class Solver:
         self._rtol, self._bound, self._error = np.empty(cells), np.empty(cells), np.empty(cells)
         self._promised = None if study.kernel_name in catalogue.KERNELS else promised(study)
 
-    def solve(
-        self,
-        start: int,
-        stop: int,
-        outputs: Mapping[str, Floats],
-        status: Codes,
-        method_used: Codes,
-        wanted: NDArray[np.bool_] | None = None,
-        error_bound: Singles | None = None,
-    ) -> None:
-        """Fill the rows of every output asked for, and status and method number, of the cells `start` to `stop`.
+    def solve(self, start: int, cells: Cells, wanted: NDArray[np.bool_] | None = None) -> None:
+        """Fill the columns of cells.
 
         Parameters
         ----------
-        start, stop : int
-            Flat cell numbers of the grid.
-        outputs : mapping of output name to ndarray, shape (stop - start, ...)
-        status, method_used : ndarray of int8, shape (stop - start,)
-            A `Status`; the position in `kernel.methods`, or -1 where the cell is refused.
+        start : int
+            Flat number of the first of them in the grid.
+        cells : Cells
+            Columns of every output asked for, of statuses, of method numbers, and maybe of errors.
         wanted : ndarray of bool, optional
             Cells to solve; what comes out for the others means nothing. Default: all.
-        error_bound : ndarray of float32, shape (stop - start,), optional
-            To be filled with what INACCURATE values are right to, infinite where nobody knows; NaN for other cells.
         """
-        for low in range(start, stop, self._strip):
-            high = min(low + self._strip, stop)
-            rows = slice(low - start, high - start)
-            if wanted is not None and not wanted[rows].any():
-                continue
-            columns = [
-                outputs[f.name][rows] if f.name in outputs else self._unasked[f.name][: high - low]
-                for f in self.study.kernel.outputs
-            ]
-            some = None if wanted is None or wanted[rows].all() else wanted[rows]
-            self._solve_strip(low, high, columns, status[rows], method_used[rows], some)
-            if error_bound is not None:
-                _tell_errors(error_bound[rows], self._error[: high - low], status[rows])
+        for begin in range(0, cells.number, self._strip):
+            rows = slice(begin, min(begin + self._strip, cells.number))
+            if wanted is None or wanted[rows].any():
+                some = None if wanted is None or wanted[rows].all() else wanted[rows]
+                self._solve_strip(start + begin, cells.rows(rows), some)
 
-    def _solve_strip(
-        self,
-        low: int,
-        high: int,
-        outputs: Sequence[Floats],
-        status: Codes,
-        used: Codes,
-        wanted: NDArray[np.bool_] | None,
-    ) -> None:
-        strip = _Strip(self, high - low, outputs, status, used)
+    def _solve_strip(self, low: int, cells: Cells, wanted: NDArray[np.bool_] | None) -> None:
+        high, status, used = low + cells.number, cells.status, cells.used
+        spare = {name: column[: cells.number] for name, column in self._unasked.items()}
+        outputs = [{**spare, **cells.outputs}[field.name] for field in self.study.kernel.outputs]
+        strip = _Strip(self, cells.number, outputs, status, used)
         self.grid.columns(low, high, strip.parameters)
         self.study.kernel.check(*strip.parameters, status)
         if self._promised is not None:
@@ -136,16 +111,18 @@ class Solver:
         used.fill(NONE)
         method, strip.rtol[:] = self.grid.settings(low, high)
         sound = status < FIRST_REFUSAL
-        allowed = _pick(slice(0, high - low), sound if wanted is None else sound & wanted)
+        allowed = _pick(slice(0, cells.number), sound if wanted is None else sound & wanted)
         codes = [method] if isinstance(method, int) else np.unique(method)
         for code in codes:
-            cells = allowed if isinstance(method, int) else _pick(allowed, method[allowed] == code)
-            strip.choose(cells) if code == AUTO else strip.take(int(code), cells)
+            chosen = allowed if isinstance(method, int) else _pick(allowed, method[allowed] == code)
+            strip.choose(chosen) if code == AUTO else strip.take(int(code), chosen)
         refused = status >= FIRST_REFUSAL
         if refused.any():
             used[refused] = NONE
             for column in outputs:
                 column[refused] = np.nan
+        if cells.error is not None:
+            _tell_errors(cells.error, strip.error, status)
 
 
 class _Strip:
@@ -158,16 +135,16 @@ class _Strip:
         self.outputs, self.status, self.used = outputs, status, used
         self.usable, self.promised = solver.usable, solver._promised
 
-    def take(self, number: int, cells: Cells) -> None:
+    def take(self, number: int, cells: Chosen) -> None:
         """Solve the cells by one method; remark those for which it promises less than rtol."""
         method = self.kernel.methods[number]
         if _count(cells):
             self.run(number, cells, None if method.bound is None else self.bound(method, cells))
 
-    def choose(self, cells: Cells) -> None:
+    def choose(self, cells: Chosen) -> None:
         """Solve each cell by the first method whose bound meets rtol and which does not give up."""
         self.status[cells] = Status.NO_METHOD
-        missed: list[tuple[int, Cells, Floats]] = []
+        missed: list[tuple[int, Chosen, Floats]] = []
         for number in self.usable:
             if not _count(cells):
                 return
@@ -185,7 +162,7 @@ class _Strip:
         if missed and _count(cells):
             self._settle(cells, missed)
 
-    def _settle(self, cells: Cells, missed: Sequence[tuple[int, Cells, Floats]]) -> None:
+    def _settle(self, cells: Chosen, missed: Sequence[tuple[int, Chosen, Floats]]) -> None:
         """Give cells for which nothing meets rtol the values of the smallest bound.
 
         `missed`: numbers of methods, the cells for which their bounds exceed rtol, and these bounds.
@@ -201,13 +178,13 @@ class _Strip:
                 self._improve(missed[place][0], tried, bounds[place, tried])
                 bounds[place, tried] = np.inf
 
-    def _known(self, cells: Cells) -> Floats:
+    def _known(self, cells: Chosen) -> Floats:
         """What the values of cells are right to at least; infinite where there are none, 0 where rtol is met."""
         status = self.status[cells]
         error = np.where(status == Status.INACCURATE, self.error[cells], 0.0)
         return np.where(status < FIRST_REFUSAL, error, np.inf)
 
-    def _improve(self, number: int, cells: Cells, bound: Floats | None = None) -> None:
+    def _improve(self, number: int, cells: Chosen, bound: Floats | None = None) -> None:
         """Run a method, but keep what an earlier one gave to cells where this one is not better."""
         columns: list[NDArray[Any]] = [*self.outputs, self.used, self.status, self.error]
         held = _pick(cells, self.status[cells] != Status.NO_METHOD)
@@ -219,12 +196,12 @@ class _Strip:
             for column, values in zip(columns, kept, strict=True):
                 column[back] = values[worse]
 
-    def _leave_open(self, cells: Cells, before: Codes) -> None:
+    def _leave_open(self, cells: Chosen, before: Codes) -> None:
         """Give back what an earlier method said where it did not know, and this one knows no cycle of its kind."""
         open_ = np.isin(before, UNKNOWN) & (self.status[cells] == Status.NO_CYCLE)
         self.status[_pick(cells, open_)] = before[open_]
 
-    def bound(self, method: Method, cells: Cells) -> Floats:
+    def bound(self, method: Method, cells: Chosen) -> Floats:
         """The method's error bound for the cells, over the outputs asked for."""
         assert method.bound is not None
         out = self._bound[: _count(cells)]
@@ -232,7 +209,7 @@ class _Strip:
         method.bound(*columns, *self.along, self.asked, out)
         return out
 
-    def run(self, number: int, cells: Cells, bound: Floats | None = None) -> None:
+    def run(self, number: int, cells: Chosen, bound: Floats | None = None) -> None:
         """Solve the cells by one method: in place where they lie side by side, else gathered and put back.
 
         `bound` is the method's where it may exceed rtol.
@@ -253,7 +230,7 @@ class _Strip:
         self.used[cells] = number
         self._judge(method, cells, bound)
 
-    def _judge(self, method: Method, cells: Cells, bound: Floats | None) -> None:
+    def _judge(self, method: Method, cells: Chosen, bound: Floats | None) -> None:
         """Remark values of which less is known than rtol, and note what they are right to; NaN tells nothing."""
         status = self.status[cells]
         said = status == Status.INACCURATE
@@ -314,7 +291,7 @@ def fail(status: Codes, columns: Sequence[Floats]) -> None:
         status[codes >= Status.NOT_ASKED] = Status.FAILED
 
 
-def _pick(cells: Cells, condition: NDArray[np.bool_]) -> Cells:
+def _pick(cells: Chosen, condition: NDArray[np.bool_]) -> Chosen:
     """Those of the cells for which the condition holds; a slice where they lie side by side."""
     hits = np.flatnonzero(condition)
     if hits.size == condition.size:
@@ -328,5 +305,5 @@ def _pick(cells: Cells, condition: NDArray[np.bool_]) -> Cells:
     return shifted
 
 
-def _count(cells: Cells) -> int:
+def _count(cells: Chosen) -> int:
     return cells.stop - cells.start if isinstance(cells, slice) else cells.size

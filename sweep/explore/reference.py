@@ -100,8 +100,8 @@ def reference_by(study: Study, name: str) -> Reference:
     floor, sound, void = np.full(size, np.inf), np.zeros(size, bool), np.zeros(size, bool)
     values: dict[str, Any] = {}
     for rtol in FINE:
-        outputs, status, _ = solved(with_method(study, name, rtol))
-        values = values or outputs
+        outputs, status, *_ = solved(with_method(study, name, rtol))
+        values = values or dict(outputs)
         refused = status >= FIRST_REFUSAL
         void |= refused & ~np.isin(status, GIVEN_UP)
         now = ~refused & (status != Status.INACCURATE) & ~sound

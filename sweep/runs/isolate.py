@@ -19,9 +19,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from sweep.cells.grid import Grid
+from sweep.cells.grid import Cells, Grid
 from sweep.cells.guard import Unsolved
-from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS
+from sweep.cells.schema import STATUS, cells_of
 from sweep.results.open import memory
 from sweep.runs import isolated
 from sweep.runs.isolated import Answer
@@ -123,39 +123,31 @@ class IsolatedSolver:
         """Seconds that its process has spent on cells."""
         return self.seconds
 
-    def solve(
-        self,
-        start: int,
-        stop: int,
-        outputs: Mapping[str, Any],
-        status: Any,
-        method_used: Any,
-        wanted: Any = None,
-        error_bound: Any = None,
-    ) -> None:
+    def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
         """As `Solver.solve`. Raises Unsolved where the kernel raises, dies or takes too long; Ended."""
-        found = self._asked(start, stop, wanted)
-        columns = {**outputs, STATUS: status, METHOD_USED: method_used}
-        columns |= {} if error_bound is None else {ERROR_BOUND: error_bound}
-        for name, column in columns.items():
-            column[...] = found[name]
+        found = cells_of(self._asked(start, cells.number, wanted))
+        for name, column in cells.outputs.items():
+            column[...] = found.outputs[name]
+        cells.status[...], cells.used[...] = found.status, found.used
+        if cells.error is not None:
+            cells.error[...] = found.error
 
-    def _asked(self, start: int, stop: int, wanted: Any) -> Mapping[str, Any]:
+    def _asked(self, start: int, count: int, wanted: Any) -> Mapping[str, Any]:
         """One cell alone is tried again, for a process may die of what it did before, or be killed by others."""
-        for _ in range(TRIALS if stop - start == 1 else 1):
+        for _ in range(TRIALS if count == 1 else 1):
             pool = self._ready()
             try:
-                return self._taken(self._result(pool, start, stop, wanted), start)
+                return self._taken(self._result(pool, start, count, wanted), start)
             except Died as fault:
                 reason = str(fault)
         raise Unsolved(reason)
 
-    def _result(self, pool: ProcessPoolExecutor, start: int, stop: int, wanted: Any) -> Answer:
-        limit = self._all.seconds(stop - start)
+    def _result(self, pool: ProcessPoolExecutor, start: int, count: int, wanted: Any) -> Answer:
+        limit = self._all.seconds(count)
         # where no cell is known to end, the first one may still have to be compiled
         compiling = LOAD_SECONDS if self._all.good is None else 0.0
         try:
-            return pool.submit(isolated.solve, start, stop, wanted).result(limit + compiling)
+            return pool.submit(isolated.solve, start, count, wanted).result(limit + compiling)
         except TimeoutError:
             self.end()
             raise Unsolved(f"took longer than {limit:.3g} s") from None
