@@ -32,6 +32,11 @@ MOST_COMPRESSED = 1100
 """Bytes that gzip makes of one, at most."""
 MEMORY_SHARE = 0.25
 """Results larger than this share of the memory are opened in pieces (dask)."""
+TEXTS = (
+    *("title", "question", "kernel", "design", "where", "method", "study", "study_json", "fingerprint", "versions"),
+    *("start", "created", "end", "over", "units", "long_name", "flag_meanings"),
+)
+"""Attributes that are text wherever they stand."""
 BESIDE = "damaged beside the outputs' numbers: in attributes, coordinates or its structure"
 
 
@@ -159,11 +164,22 @@ def _open(output: Path) -> xr.Dataset:
     large = output.stat().st_size > MEMORY_SHARE * memory()
     try:
         found = open_checked(output, "auto" if large else None)
+        _check_kinds(found)
         if found.attrs.get("end") == "unfinished".ljust(ENDINGS["end"]):
             return _of_unfinished(output, found, attrs)
         return _with_plain_text(found)
     except DAMAGE as fault:
         raise unreadable(output, fault) from None
+
+
+def _check_kinds(dataset: xr.Dataset) -> None:
+    """Raises one of DAMAGE where text or numbers are something else; what does not say its type is forged."""
+    for attrs in (dataset.attrs, *(v.attrs for v in dataset.variables.values())):
+        if not all(isinstance(attrs[name], str) for name in TEXTS if name in attrs):
+            raise TypeError("an attribute is no text")
+        float(attrs.get("rtol", 0.0)), float(attrs.get("cells_per_second", 0.0))
+    if not {v.dtype.kind for v in dataset.data_vars.values()} <= set("fiu"):
+        raise TypeError("an output is no number")
 
 
 def _of_unfinished(output: Path, found: xr.Dataset, attrs: Mapping[str, Any]) -> xr.Dataset:

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 import toy_studies
 from fuzzing import STUDY, forge, fuzz_result, fuzz_study, prepared, quietly
@@ -166,6 +167,20 @@ def test_a_result_that_was_changed_on_purpose_can_still_be_opened(whole, tmp_pat
     with sweep.open_result(path) as found:
         assert found.attrs["comment"] == "mine"
     assert not verify(path).whole
+
+
+ODD = [("/", "rtol", "x"), ("/", "rtol", np.arange(5.0)), ("/", "end", np.zeros(3)), ("/", "cells_per_second", "x"),
+       ("/", "title", 1.0), ("height", "units", 5), ("status", "flag_meanings", 3.0)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("place", "name", "value"), ODD)
+def test_an_attribute_of_another_kind_is_damage(whole, tmp_path, capsys, place, name, value):
+    path = tmp_path / "out.h5"
+    path.write_bytes(whole.read_bytes())
+    with h5py.File(path, "r+") as file:
+        file[place].attrs[name] = value
+    assert main(["show", str(path)]) == 2
+    assert "not the result of a sweep, or damaged" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["../secret.csv", "/etc/passwd", "sub/../../secret.csv", "link.csv", "\0", "a" * 5000])
