@@ -225,7 +225,7 @@ class IsolatedSolver:
 
 
 def awaited(future: Future[R], seconds: float) -> R:
-    """What it gives. Raises TimeoutError after so many seconds in which this program ran: none while a machine sleeps."""
+    """What it gives. Raises TimeoutError after seconds in which this program ran: none while a machine sleeps."""
     spent = 0.0
     while spent < seconds:
         begun = time.monotonic()

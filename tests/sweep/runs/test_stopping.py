@@ -129,7 +129,7 @@ def test_clocks_that_jump_change_nothing_but_the_forecast(tmp_path, monkeypatch)
     leaps = itertools.cycle([0.0, 3600.0, 7200.0, -3600.0])
     leaping = SimpleNamespace(**{name: getattr(time, name) for name in ("sleep", "strftime", "localtime")})
     for name in ("monotonic", "perf_counter", "time"):
-        setattr(leaping, name, lambda real=getattr(time, name): real() + next(leaps))
+        setattr(leaping, name, lambda real=real: real() + next(leaps))
     whole = quiet(tall(60))
     for module in ("runs.session", "runs.isolate", "store.store", "system.forecast", "system.progress", "cells.timing"):
         monkeypatch.setattr(f"sweep.{module}.time", leaping)
