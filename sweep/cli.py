@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
@@ -279,8 +279,8 @@ def _plot(arguments: argparse.Namespace) -> None:
 def _view(arguments: argparse.Namespace) -> None:
     from sweep.view.server import serve
 
-    _result(arguments).close()
-    serve(arguments.result, arguments.port, not arguments.no_browser)
+    with _result(arguments):
+        serve(arguments.result, arguments.port, not arguments.no_browser)
 
 
 def _chart(arguments: argparse.Namespace) -> None:
@@ -404,30 +404,29 @@ def _study(arguments: argparse.Namespace) -> Study:
 
 def _study_of_result(arguments: argparse.Namespace) -> Study:
     from sweep.explore.refine import study_of
-    from sweep.results.open import open_result
 
-    _check_readable(arguments.study)
-    with open_result(arguments.study) as dataset:
+    with _opened(arguments.study) as dataset:
         return study_of(dataset, allow_import=arguments.allow_import)
 
 
-def _result(arguments: argparse.Namespace) -> xr.Dataset:
+def _result(arguments: argparse.Namespace) -> contextlib.AbstractContextManager[xr.Dataset]:
     return _opened(arguments.result, getattr(arguments, "unfinished", True))
 
 
-def _opened(path: Path, unfinished: bool = True) -> xr.Dataset:
-    from sweep.results.open import open_result
+@contextlib.contextmanager
+def _opened(path: Path, unfinished: bool = True) -> Iterator[xr.Dataset]:
+    """A result; where another program has changed it, what goes wrong with it is told as that."""
+    from sweep.results.open import changed, open_result
 
     if path.suffix == ".toml":
         raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
     if not path.exists() and path.with_name(path.name + ".unfinished").exists():
         _print(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
     _check_readable(path, "xarray")
-    found = open_result(path)
-    if "end" not in found.attrs and not unfinished:
-        found.close()
-        raise SweepError(f"{path}: unfinished; continue it with sweep run, or take what there is with --unfinished")
-    return found
+    with open_result(path) as found, changed(path):
+        if "end" not in found.attrs and not unfinished:
+            raise SweepError(f"{path}: unfinished; continue it with sweep run, or take what there is with --unfinished")
+        yield found
 
 
 def _check_target(arguments: argparse.Namespace, target: Path, kind: str | None = None) -> None:
