@@ -136,6 +136,15 @@ def lead_away(file, kind, secret):
         file["integrity/round"] = file["integrity"]
 
 
+def seal(path, layout):
+    """Puts a right trailer behind a file that h5py has changed."""
+    with path.open("r+b") as file:
+        end = file.seek(0, 2)
+        structure = structure_digest(file.fileno(), layout.endings, end)
+        file.write(dataclasses.replace(layout, regions=(), end=end, structure=structure).trailer())
+    assert probe.intact(path)
+
+
 @pytest.mark.parametrize("sealed", [False, True])
 @pytest.mark.parametrize("kind", ["soft link", "external link", "external storage", "virtual", "round"])
 def test_a_result_leads_to_no_other_file(whole, tmp_path, kind, sealed):
@@ -149,11 +158,7 @@ def test_a_result_leads_to_no_other_file(whole, tmp_path, kind, sealed):
     with h5py.File(path, "r+") as file:
         lead_away(file, kind, secret)
     if sealed:
-        with path.open("r+b") as file:
-            end = file.seek(0, 2)
-            structure = structure_digest(file.fileno(), layout.endings, end)
-            file.write(dataclasses.replace(layout, regions=(), end=end, structure=structure).trailer())
-        assert probe.intact(path)
+        seal(path, layout)
     with pytest.raises(SweepError, match="not the result of a sweep, or damaged"):
         sweep.open_result(path)
     assert not verify(path).whole
@@ -181,6 +186,41 @@ def test_an_attribute_of_another_kind_is_damage(whole, tmp_path, capsys, place, 
         file[place].attrs[name] = value
     assert main(["show", str(path)]) == 2
     assert "not the result of a sweep, or damaged" in capsys.readouterr().err
+
+
+def no_dimension(file):
+    """Of the cells' statuses."""
+    del file["status"]
+    file["status"] = np.int8(0)
+
+
+def one_thing_more(file):
+    """Zeros that HDF5 makes of a few bytes."""
+    file.create_dataset("more", (10**7,), "f8", chunks=(10**6,), compression="gzip")[...] = 0.0
+
+
+@pytest.mark.parametrize("change", [no_dimension, one_thing_more])
+@pytest.mark.parametrize("sealed", [False, True])
+def test_a_result_holds_what_its_study_says(whole, tmp_path, capsys, change, sealed):
+    path = tmp_path / "out.h5"
+    path.write_bytes(whole.read_bytes())
+    with path.open("r+b") as file:
+        layout = read_layout(file.fileno(), path.stat().st_size)
+        file.truncate(layout.end)
+    with h5py.File(path, "r+") as file:
+        change(file)
+    if sealed:
+        seal(path, layout)
+    status, told = main(["show", str(path)]), capsys.readouterr().err
+    if sealed:
+        assert status == 2
+        assert "not the result of a sweep, or damaged" in told
+    elif change is no_dimension:
+        assert status == 2
+        assert "was changed by another program, and is no result any more" in told
+    else:
+        assert status == 0
+        assert told == ""
 
 
 @pytest.mark.parametrize("name", ["../secret.csv", "/etc/passwd", "sub/../../secret.csv", "link.csv", "\0", "a" * 5000])
