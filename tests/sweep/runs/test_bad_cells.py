@@ -62,7 +62,7 @@ def test_a_process_that_died_by_itself_was_not_late(monkeypatch):
     monkeypatch.setattr(isolate, "wait", blind)
     processes, seen = Processes(tall(40, "bad:DYING"), Limits(1.5), 1), []
     arrays = {"fall_time": np.empty(40)}, np.empty(40, np.int8), np.empty(40, np.int8)
-    Guard(processes.solver(), seen.append).solve(0, 40, *arrays)
+    Guard(processes.solver(), seen.append).solve(0, Cells(*arrays))
     processes.end()
     assert [cell.reason for cell in seen] == [
         "ZeroDivisionError: eleven",
