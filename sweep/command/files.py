@@ -25,6 +25,11 @@ def study_from(arguments: argparse.Namespace) -> Study:
     return read_study(path, allow_import=arguments.allow_import)
 
 
+def is_isolated(arguments: argparse.Namespace, study: Study) -> bool:
+    """Whether cells are solved in processes of their own: those of a user's own kernel, unless it is said."""
+    return ":" in study.kernel_name if arguments.isolate is None else bool(arguments.isolate)
+
+
 def study_of_result(arguments: argparse.Namespace) -> Study:
     from sweep.explore.refine import study_of
 

@@ -54,6 +54,15 @@ RESULT = option("result", metavar="OUT.h5", type=Path)
 OTHER = option("other", metavar="OTHER.h5", type=Path)
 WORKERS = option("--workers", "cores to use; default: all; SIGUSR1 adds one, SIGUSR2 takes one", metavar="N", type=int)
 ALLOW_IMPORT = switch("--allow-import", 'allow a kernel "module:NAME" of your own')
+ISOLATE = option(
+    "--isolate",
+    "solve cells in processes of their own, so that one that crashes or never ends costs only itself; "
+    'default: for a kernel "module:NAME"',
+    action=argparse.BooleanOptionalAction,
+)
+CELL_TIMEOUT = option(
+    "--cell-timeout", "what a cell may take, e.g. 90s or 1h; default: 60s, longer where cells do", metavar="TIME"
+)
 FORCE = switch("--force", "overwrite what is there even if it is not from an earlier command of this kind")
 UNFINISHED = switch("--unfinished", "take what there is of a result that is not complete yet")
 AT = several("--at", "pick one value of another axis", "AXIS=VALUE")

@@ -11,9 +11,11 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sweep.command.files import check_readable, say, study_from
+from sweep.command.files import check_readable, is_isolated, say, study_from
 from sweep.command.options import (
     ALLOW_IMPORT,
+    CELL_TIMEOUT,
+    ISOLATE,
     STUDY,
     WORKERS,
     Command,
@@ -68,8 +70,7 @@ def _computed(arguments: argparse.Namespace, study: Study, output: Path) -> Outc
 
     before = _identity(output)
     options = {name: getattr(arguments, name) for name in RUN_OPTIONS}
-    if options["isolate"] is None:
-        options["isolate"] = ":" in study.kernel_name
+    options["isolate"] = is_isolated(arguments, study)
     whole = complete(study, output, **options)
     if not whole and not is_begun(output):
         say(text := f"{output}: unfinished; no cell is computed yet")
@@ -136,17 +137,7 @@ COMMANDS = {
             metavar="ADDRESS",
         ),
         option("--until", "stop within seconds of it, with exit status 3; the same command continues", metavar="07:00"),
-        option(
-            "--isolate",
-            "solve cells in processes of their own, so that one that crashes or never ends costs only itself; "
-            'default: for a kernel "module:NAME"',
-            action=argparse.BooleanOptionalAction,
-        ),
-        option(
-            "--cell-timeout",
-            "what a cell may take, e.g. 90s or 1h; default: 60s, longer where cells do",
-            metavar="TIME",
-        ),
+        *(ISOLATE, CELL_TIMEOUT),
         switch("--retry-failed", "of a complete result, compute the cells that FAILED again"),
         option(
             "--without-workers",

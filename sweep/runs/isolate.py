@@ -13,7 +13,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +28,7 @@ from sweep.runs import isolated
 from sweep.runs.isolated import Answer
 from sweep.study.model import Study
 from sweep.system.errors import SweepError
+from sweep.system.progress import seconds_of
 
 CELL_SECONDS = 60.0
 """What a cell may take, where nobody says otherwise;"""
@@ -75,6 +76,11 @@ class Limits:
         """What some cells together may take."""
         one = max(CELL_SECONDS, DEARER * self.cost) if self.cell is None else self.cell
         return one if cells == 1 else min(one, SEVERAL_SECONDS) + SLACK * self.cost * cells
+
+
+def limits_of(cell_timeout: float | str | None) -> Limits:
+    """As they are asked for. Raises SweepError where that is no time."""
+    return Limits(None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout))
 
 
 class Processes:
@@ -142,19 +148,20 @@ class IsolatedSolver:
     def _asked(self, start: int, count: int, wanted: Any) -> Mapping[str, Any]:
         """One cell alone is tried again, for a process may die of what it did before, or be killed by others."""
         for _ in range(TRIALS if count == 1 else 1):
-            pool = self._ready()
             try:
-                return self._taken(self._result(pool, start, count, wanted), start)
+                limit = self._all.seconds(count)
+                return self._taken(self.call(limit, isolated.solve, start, count, wanted), start)
             except Died as fault:
                 reason = str(fault)
         raise Unsolved(reason)
 
-    def _result(self, pool: ProcessPoolExecutor, start: int, count: int, wanted: Any) -> Answer:
-        limit = self._all.seconds(count)
+    def call(self, limit: float, function: Callable[..., R], *words: Any) -> R:
+        """What a function gives in the process, within so many seconds. Raises Unsolved, Died, Ended."""
+        pool = self._ready()
         # where no cell is known to end, the first one may still have to be compiled
         compiling = LOAD_SECONDS if self._all.good is None else 0.0
         try:
-            return awaited(pool.submit(isolated.solve, start, count, wanted), limit + compiling)
+            return awaited(pool.submit(function, *words), limit + compiling)
         except TimeoutError:
             late, code = True, self._bury(BURY_SECONDS)
         except (RuntimeError, CancelledError):
@@ -225,7 +232,7 @@ class IsolatedSolver:
 
 
 def awaited(future: Future[R], seconds: float) -> R:
-    """What it gives. Raises TimeoutError after seconds in which this program ran: none while a machine sleeps."""
+    """What it gives. Raises TimeoutError after so many seconds, of which none count while the machine sleeps."""
     spent = 0.0
     while spent < seconds:
         begun = time.monotonic()

@@ -59,6 +59,15 @@ HOGGING = kernel("hogging", HOGS)
 WORST = kernel("worst", RAISES, CRASHES, EXITS, HANGS, HOGS, HUNGRY)
 
 
+def whole_only(height, *rest):
+    """Crashes at heights that are no whole numbers."""
+    misbehave([CRASHES] * int((height % 1 != 0).any()), [CRASHES])
+    toy.exact(height, *rest)
+
+
+WHOLE = dataclasses.replace(RAISING, methods=(dataclasses.replace(toy.KERNEL.methods[1], solve=whole_only),))
+
+
 def nothing_but_bad(height, *rest):
     """Raises at every height."""
     raise ZeroDivisionError(f"at {np.size(height)} cells")

@@ -1,6 +1,5 @@
 """A run ends when it is told to, whatever its kernel does; what became of it is in its exit status and its log."""
 
-import functools
 import io
 import itertools
 import json
@@ -128,13 +127,12 @@ def test_until_goes_by_the_clock_on_the_wall_however_it_jumps(monkeypatch):
 def test_clocks_that_jump_change_nothing_but_the_forecast(tmp_path, monkeypatch):
     """Those of the run leap by an hour, forth and back, at every look."""
     leaps = itertools.cycle([0.0, 3600.0, 7200.0, -3600.0])
+    steady = time.monotonic
 
-    def leap(real):
-        return real() + next(leaps)
+    def now():
+        return steady() + next(leaps)
 
-    leaping = SimpleNamespace(**{name: getattr(time, name) for name in ("sleep", "strftime", "localtime")})
-    for name in ("monotonic", "perf_counter", "time"):
-        setattr(leaping, name, functools.partial(leap, getattr(time, name)))
+    leaping = SimpleNamespace(monotonic=now, perf_counter=now, sleep=time.sleep, strftime=time.strftime)
     whole = quiet(tall(60))
     for module in ("runs.session", "runs.isolate", "store.store", "system.forecast", "system.progress", "cells.timing"):
         monkeypatch.setattr(f"sweep.{module}.time", leaping)
