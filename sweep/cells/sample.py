@@ -71,7 +71,7 @@ def solved(study: Study) -> Cells:
     from sweep.cells.solve import Solver
 
     cells = empty_cells(study, Grid(study).size)
-    Solver(study).solve(0, cells.number, *cells)
+    Solver(study).solve(0, cells)
     return cells
 
 

@@ -52,6 +52,7 @@ def kernel(name, *kinds, pause=0.0):
 
 RAISING = kernel("raising", RAISES)
 DYING = kernel("dying", RAISES, CRASHES, EXITS)
+SLOW = kernel("slow", pause=0.05)
 STUCK = kernel("stuck", HANGS, pause=0.002)
 ENDLESS = kernel("endless", HANGS, HOGS)
 HOGGING = kernel("hogging", HOGS)

@@ -18,6 +18,7 @@ from toy_studies import HEAD
 
 import sweep
 from sweep import cli
+from sweep.command import running
 from sweep.system.progress import Progress
 
 STUDY = """# How fast does a stone fall?
@@ -433,7 +434,7 @@ def test_a_misused_command_shows_its_usage(argv, capsys):
 
 
 def test_a_fault_of_ours_is_one_message_too(here, call, monkeypatch):
-    monkeypatch.setattr(cli, "_study", lambda arguments: 1 / 0)
+    monkeypatch.setattr(running, "study_from", lambda arguments: 1 / 0)
     code, _, err = call("run", "stones.toml")
     assert code == 1
     assert err.startswith("a fault in foliot: ZeroDivisionError: division by zero\nPlease report it")
@@ -454,7 +455,7 @@ def test_faults_of_the_machine_are_told_in_one_line(here, call, monkeypatch, err
     def fail(arguments):
         raise error
 
-    monkeypatch.setattr(cli, "_study", fail)
+    monkeypatch.setattr(running, "study_from", fail)
     found, _, err = call("run", "stones.toml")
     assert found == code
     assert message in err
