@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from running import environment, quiet, tall
 
 import sweep
+from sweep.cells.partition import Partition
 from sweep.cli import main
 from sweep.results.verify import verify
 from sweep.store import probe
@@ -162,6 +163,21 @@ def test_a_result_leads_to_no_other_file(whole, tmp_path, kind, sealed):
     with pytest.raises(SweepError, match="not the result of a sweep, or damaged"):
         sweep.open_result(path)
     assert not verify(path).whole
+
+
+@pytest.mark.parametrize(("command", "status"), [("show", 0), ("verify", 2)])
+def test_a_layout_of_more_blocks_than_the_file_has_room_for_is_none(whole, tmp_path, capsys, command, status):
+    """The numbers are there all the same, with HDF5's own checksums."""
+    path, count = tmp_path / "out.h5", 2**40
+    path.write_bytes(whole.read_bytes())
+    with path.open("r+b") as file:
+        layout = read_layout(file.fileno(), path.stat().st_size)
+        table = dataclasses.replace(layout.work, grid=(count,), blocks=Partition(count, 1))
+        file.truncate(layout.end)
+        file.seek(layout.end)
+        file.write(dataclasses.replace(layout, tables={"cells": table}).trailer())
+    assert main([command, str(path)]) == status
+    assert "memory" not in capsys.readouterr().err
 
 
 def test_a_result_that_was_changed_on_purpose_can_still_be_opened(whole, tmp_path):
