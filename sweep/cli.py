@@ -6,6 +6,7 @@ Modules are imported by the command that needs them, so that `sweep --help` is q
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
 from collections.abc import Sequence
@@ -33,8 +34,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     pool = sys.modules.get("sweep.system.pool")
     if pool is not None and pool.left_behind():
         # a kernel that never ends would keep Python from ending
-        sys.stdout.flush()
-        sys.stderr.flush()
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, AttributeError):
+                stream.flush()
         os._exit(ended.code)
     return ended.code
 
@@ -43,7 +45,8 @@ def _ended(arguments: argparse.Namespace) -> Outcome:
     """Does what is asked, and says what became of it."""
     try:
         outcome: Outcome = arguments.command(arguments) or Outcome(COMPLETE, "")
-        sys.stdout.flush()
+        if sys.stdout is not None:  # closed by whoever has started us
+            sys.stdout.flush()
         return outcome
     except BrokenPipeError:
         # whoever read our output has had enough; Python would complain again when it closes stdout
@@ -53,7 +56,8 @@ def _ended(arguments: argparse.Namespace) -> Outcome:
         if os.environ.get("SWEEP_TRACEBACK"):
             raise
         outcome = explained(error)
-        say(outcome.text, sys.stderr)
+        with contextlib.suppress(OSError):  # the exit status tells of it where there is no room for words
+            say(outcome.text, sys.stderr)
         return outcome
 
 

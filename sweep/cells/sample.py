@@ -72,7 +72,7 @@ def solved(study: Study) -> Cells:
     from sweep.cells.solve import Solver
 
     cells = empty_cells(study, Grid(study).size)
-    Guard(Solver(study), lambda cell: None).solve(0, cells.number, *cells)
+    Guard(Solver(study), lambda cell: None).solve(0, cells)
     return cells
 
 

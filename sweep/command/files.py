@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -31,30 +32,29 @@ def is_isolated(arguments: argparse.Namespace, study: Study) -> bool:
 
 def study_of_result(arguments: argparse.Namespace) -> Study:
     from sweep.explore.refine import study_of
-    from sweep.results.open import open_result
 
-    check_readable(arguments.study)
-    with open_result(arguments.study) as dataset:
+    with opened(arguments.study) as dataset:
         return study_of(dataset, allow_import=arguments.allow_import)
 
 
-def result_of(arguments: argparse.Namespace) -> xr.Dataset:
+def result_of(arguments: argparse.Namespace) -> contextlib.AbstractContextManager[xr.Dataset]:
     return opened(arguments.result, getattr(arguments, "unfinished", True))
 
 
-def opened(path: Path, unfinished: bool = True) -> xr.Dataset:
-    from sweep.results.open import open_result
+@contextlib.contextmanager
+def opened(path: Path, unfinished: bool = True) -> Iterator[xr.Dataset]:
+    """A result; where another program has changed it, what goes wrong with it is told as that."""
+    from sweep.results.open import changed, open_result
 
     if path.suffix == ".toml":
         raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
     if not path.exists() and path.with_name(path.name + ".unfinished").exists():
         say(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
     check_readable(path, "xarray")
-    found = open_result(path)
-    if "end" not in found.attrs and not unfinished:
-        found.close()
-        raise SweepError(f"{path}: unfinished; continue it with sweep run, or take what there is with --unfinished")
-    return found
+    with open_result(path) as found, changed(path):
+        if "end" not in found.attrs and not unfinished:
+            raise SweepError(f"{path}: unfinished; continue it with sweep run, or take what there is with --unfinished")
+        yield found
 
 
 def check_readable(path: Path, *meanwhile: str) -> None:

@@ -77,8 +77,8 @@ def _plot(arguments: argparse.Namespace) -> None:
 def _view(arguments: argparse.Namespace) -> None:
     from sweep.view.server import serve
 
-    result_of(arguments).close()
-    serve(arguments.result, arguments.port, not arguments.no_browser)
+    with result_of(arguments):
+        serve(arguments.result, arguments.port, not arguments.no_browser)
 
 
 def _report(arguments: argparse.Namespace) -> None:

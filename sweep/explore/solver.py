@@ -79,7 +79,7 @@ class PointSolver:
         if cells is None:
             cells = self._one
             self._grid.given = self._row
-            self._solver.solve(0, 1, *cells)
+            self._solver.solve(0, cells)
         outputs = [cells.outputs[name][0] for name in self._study.outputs]
         return self._solved(*(v.copy() if v.ndim else float(v) for v in outputs), int(cells.status[0]))
 
@@ -91,8 +91,7 @@ class PointSolver:
         shape = arrays[0].shape
         self._grid.given = np.stack([array.reshape(-1) for array in arrays])
         cells = empty_cells(self._study, self._grid.given.shape[1])
-        if cells.number:
-            self._solver.solve(0, cells.number, *cells)
+        self._solver.solve(0, cells)
         outputs = (cells.outputs[name].reshape(shape + cells.outputs[name].shape[1:]) for name in self._study.outputs)
         return self._solved(*outputs, cells.status.reshape(shape))
 
@@ -137,8 +136,8 @@ class _Quick:
             self._parameters[k][:] = value
         self._rtol, self._bound = np.full(rows, study.rtol), np.empty(rows)
         self._cells = empty_cells(study, rows)
-        outputs = {f.name: np.empty((rows, *study.shape(f))) for f in kernel.outputs} | self._cells.outputs
-        self._outputs = [outputs[field.name] for field in kernel.outputs]
+        given = self._cells.outputs
+        self._outputs = [given.get(f.name, np.empty((rows, *study.shape(f)))) for f in kernel.outputs]
 
     def choose(self, row: Any) -> None:
         """Take as many rows as are solved soonest."""

@@ -20,9 +20,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
-from sweep.cells.grid import Grid
+from sweep.cells.grid import Cells, Grid
 from sweep.cells.guard import Unsolved
-from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS
+from sweep.cells.schema import STATUS, cells_of
 from sweep.results.open import memory
 from sweep.runs import isolated
 from sweep.runs.isolated import Answer
@@ -136,29 +136,21 @@ class IsolatedSolver:
         """Seconds that its process has spent on cells."""
         return self.seconds
 
-    def solve(
-        self,
-        start: int,
-        stop: int,
-        outputs: Mapping[str, Any],
-        status: Any,
-        method_used: Any,
-        wanted: Any = None,
-        error_bound: Any = None,
-    ) -> None:
+    def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
         """As `Solver.solve`. Raises Unsolved where the kernel raises, dies or takes too long; Ended."""
-        found = self._asked(start, stop, wanted)
-        columns = {**outputs, STATUS: status, METHOD_USED: method_used}
-        columns |= {} if error_bound is None else {ERROR_BOUND: error_bound}
-        for name, column in columns.items():
-            column[...] = found[name]
+        found = cells_of(self._asked(start, cells.number, wanted))
+        for name, column in cells.outputs.items():
+            column[...] = found.outputs[name]
+        cells.status[...], cells.used[...] = found.status, found.used
+        if cells.error is not None:
+            cells.error[...] = found.error
 
-    def _asked(self, start: int, stop: int, wanted: Any) -> Mapping[str, Any]:
+    def _asked(self, start: int, count: int, wanted: Any) -> Mapping[str, Any]:
         """One cell alone is tried again, for a process may die of what it did before, or be killed by others."""
-        for _ in range(TRIALS if stop - start == 1 else 1):
+        for _ in range(TRIALS if count == 1 else 1):
             try:
-                limit = self._all.seconds(stop - start)
-                return self._taken(self.call(limit, isolated.solve, start, stop, wanted), start)
+                limit = self._all.seconds(count)
+                return self._taken(self.call(limit, isolated.solve, start, count, wanted), start)
             except Died as fault:
                 reason = str(fault)
         raise Unsolved(reason)

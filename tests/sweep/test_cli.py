@@ -64,17 +64,38 @@ def done(here, call):
     return here
 
 
-def in_a_process(*argv, **options):
+def paths():
+    """The environment of a process that finds the package and the helpers."""
     path = os.pathsep.join([str(Path(sweep.__file__).parents[1]), str(Path(__file__).parents[1] / "helpers")])
+    return {**os.environ, "PYTHONPATH": path}
+
+
+def in_a_process(*argv, **options):
     command = [sys.executable, "-m", "sweep", *argv]
     return subprocess.Popen(
         command,
-        env={**os.environ, "PYTHONPATH": path},
+        env=paths(),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         **options,
     )
+
+
+# where nothing can be printed
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no disk that is always full")
+def test_words_that_find_no_room_leave_the_exit_status(here):
+    with Path("/dev/full").open("w") as full:
+        for words, status in ((["show", "nothing.h5"], 2), (["studies"], 2)):
+            command = [sys.executable, "-m", "sweep", *words]
+            assert subprocess.run(command, env=paths(), stdout=full, stderr=full).returncode == status
+
+
+def test_a_closed_stdout_is_no_fault(here):
+    command = [sys.executable, "-m", "sweep", "list"]
+    assert subprocess.run(command, env=paths(), preexec_fn=lambda: os.close(1)).returncode == 0
 
 
 # what is quick
@@ -89,8 +110,7 @@ def test_nothing_heavy_is_imported_before_it_is_needed(statement):
 
 def test_a_study_without_foreign_units_is_read_without_pint(here):
     code = "import sys, sweep; sweep.read_study('stones.toml', True); assert not {'pint', 'xarray'} & set(sys.modules)"
-    path = os.pathsep.join([str(Path(sweep.__file__).parents[1]), str(Path(__file__).parents[1] / "helpers")])
-    subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "PYTHONPATH": path})
+    subprocess.run([sys.executable, "-c", code], check=True, env=paths())
 
 
 # public names

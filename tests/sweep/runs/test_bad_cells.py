@@ -13,6 +13,7 @@ from running import quiet, same, tall
 
 import sweep
 from kernels.interface import Status
+from sweep.cells.grid import Cells
 from sweep.cells.guard import BadCell, Guard
 from sweep.cells.solve import Solver
 from sweep.results.statuses import account
@@ -61,7 +62,7 @@ def test_a_process_that_died_by_itself_was_not_late(monkeypatch):
     monkeypatch.setattr(isolate, "wait", blind)
     processes, seen = Processes(tall(40, "bad:DYING"), Limits(1.5), 1), []
     arrays = {"fall_time": np.empty(40)}, np.empty(40, np.int8), np.empty(40, np.int8)
-    Guard(processes.solver(), seen.append).solve(0, 40, *arrays)
+    Guard(processes.solver(), seen.append).solve(0, Cells(*arrays))
     processes.end()
     assert [cell.reason for cell in seen] == [
         "ZeroDivisionError: eleven",
@@ -112,9 +113,9 @@ def test_only_wanted_cells_are_tried(tmp_path):
     study, seen = tall(40, "bad:RAISING"), []
     guard = Guard(Solver(study), seen.append)
     arrays = {"fall_time": np.empty(40)}, np.empty(40, np.int8), np.empty(40, np.int8)
-    guard.solve(0, 40, *arrays, np.arange(40) != 10)
+    guard.solve(0, Cells(*arrays), np.arange(40) != 10)
     assert seen == []
-    guard.solve(0, 40, *arrays, np.arange(40) == 10, np.empty(40, np.float32))
+    guard.solve(0, Cells(*arrays, np.empty(40, np.float32)), np.arange(40) == 10)
     assert seen == [BadCell(10, {"height": "11"}, "ZeroDivisionError: eleven")]
 
 
@@ -188,7 +189,7 @@ def test_processes_that_others_kill_cost_nothing(monkeypatch):
     monkeypatch.setattr(ProcessPoolExecutor, "submit", killed)
     seen = []
     arrays = {"fall_time": np.empty(30)}, np.empty(30, np.int8), np.empty(30, np.int8)
-    Guard(solver, seen.append).solve(0, 30, *arrays)
+    Guard(solver, seen.append).solve(0, Cells(*arrays))
     processes.end()
     assert [cell.cell for cell in seen] == [10]
     assert len(victims) > 10

@@ -106,10 +106,10 @@ def test_a_killed_extension_continues(output, monkeypatch):
     quiet(few, output).close()
     real = Solver.solve
 
-    def failing(self, start, stop, *rest):
-        if (start, stop) == (10, 15):
+    def failing(self, start, cells, *rest):
+        if (start, cells.number) == (10, 5):
             raise SweepError("stop here")
-        real(self, start, stop, *rest)
+        real(self, start, cells, *rest)
 
     with monkeypatch.context() as patch:
         patch.setattr(Solver, "solve", failing)
