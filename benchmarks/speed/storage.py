@@ -4,8 +4,8 @@
 
 A cheap kernel, every output stored: the run is compared with the kernel alone and one plain write of the same bytes,
 fsync included, taken in turn with it. Then peak disk; dear cells stored against the kernel alone; what is left of many
-blocks; reading with digests compared against reading without, and the memory that lazy sums take. All on the folder given (default: here). Disks differ from
-minute to minute: look at the spread, not at one figure.
+blocks; reading with digests compared, without, by h5py, and summing lazily, with the memory that takes. All on the
+folder given (default: here). Disks differ from minute to minute: look at the spread, not at one figure.
 """
 
 from __future__ import annotations
