@@ -42,6 +42,7 @@ def enter() -> None:
     it, if nobody else holds the pipe that tells.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _leave_no_core()
     server: Any = vars(forkserver)["_forkserver"]
     pipe, server._forkserver_alive_fd = server._forkserver_alive_fd, None
     if pipe is not None:
@@ -51,6 +52,12 @@ def enter() -> None:
         with contextlib.suppress(OSError):
             Path("/proc/self/oom_score_adj").write_text("1000")
     threading.Thread(target=_die_with_parent, daemon=True).start()
+
+
+def _leave_no_core() -> None:
+    """To write all memory to the disk, once for every cell that crashes, takes long. 0 would let programs have it."""
+    hard = resource.getrlimit(resource.RLIMIT_CORE)[1]
+    resource.setrlimit(resource.RLIMIT_CORE, (min(1, hard) if hard >= 0 else 1, hard))
 
 
 def _die_with_parent() -> None:

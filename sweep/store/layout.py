@@ -297,7 +297,8 @@ def _layout(words: dict[str, Any], end: int) -> Layout:
             "regions": tuple((int(a), int(b)) for a, b in words["regions"]),
         }
     )
-    if any(not 0 <= begin <= stop <= end for begin, stop in (*found.regions, *found.endings)):
+    digests = [(t.digests, t.digests + t.blocks.count * t.row_bytes) for t in tables.values()]
+    if any(not 0 <= begin <= stop <= end for begin, stop in (*found.regions, *found.endings, *digests)):
         raise ValueError("places outside of the file")
     return found
 
