@@ -165,10 +165,8 @@ class _Context:
     def sync(self) -> None:
         """Returns when all that was written is on the disk. Raises SweepError."""
         if self._shared is not None and self._fd is not None:
-            try:
+            with disk.refusing(Path(self._shared.path)):
                 disk.fsync(self._fd)
-            except OSError as fault:
-                raise disk.refusal(fault, Path(self._shared.path)) from fault
 
     def block(self, job: int, mask: bytes | None) -> bytes | Sent:
         """The digests of what is written, or the numbers."""
