@@ -308,6 +308,16 @@ def test_what_workers_elsewhere_take_to_start_is_not_taken_for_slowness():
     assert 40.0 <= forecast.left < 50.0
 
 
+def test_what_workers_elsewhere_have_half_done_counts():
+    """Four of them, each of which has just given a block back or is on its way with one: 96 more take 192 seconds."""
+    now, costs = 0.0, np.r_[2.0, 4.0, 6.0, np.full(97, 8.0)]
+    forecast = Forecast(costs, range(100), lambda: now)
+    for job in range(4):
+        now = costs[job]
+        forecast.end(job, costs[job])
+    assert 192.0 <= forecast.left < 1.3 * 192.0
+
+
 def test_one_long_block_is_waited_for_by_all_workers():
     now = 0.0
     forecast = Forecast(np.r_[np.ones(99), 50.0], range(100), lambda: now)
