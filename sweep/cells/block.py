@@ -54,13 +54,10 @@ class Blocks:
         What a block fills.
     rows : RowBlocks
         The cells of each row.
-    shape : tuple of int
-        In which the rows stand.
     """
 
     def __init__(self, study: Study, partition: Partition) -> None:
         self.partition, self.columns, self.rows = partition, part_columns(study), row_blocks(study)
-        self.shape = row_shape(study)
 
     @property
     def count(self) -> int:

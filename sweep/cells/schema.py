@@ -42,11 +42,6 @@ class Column:
         """Bytes of one cell."""
         return np.dtype(self.dtype).itemsize * math.prod(self.shape)
 
-    @property
-    def missing(self) -> float | int:
-        """What stands for a cell that is not computed yet."""
-        return {STATUS: int(Status.PENDING), METHOD_USED: -1}.get(self.name, math.nan)
-
     def empty(self, cells: int) -> Any:
         """An uninitialised array of shape `(cells, *shape)`."""
         return np.empty((cells, *self.shape), self.dtype)

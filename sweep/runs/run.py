@@ -21,9 +21,10 @@ from sweep.runs.extend import Precomputed, Retried, Reused, is_of_another_versio
 from sweep.runs.isolate import limits_of
 from sweep.runs.session import Session, Solve
 from sweep.runs.task import END, HERE, WAIT, Task
+from sweep.store.ending import Gather
 from sweep.store.frame import Frame, cuts_of
 from sweep.store.reading import StoredFile
-from sweep.store.store import Gather, Store, lock_of, opened, unfinished_of
+from sweep.store.store import Store, lock_of, opened, unfinished_of
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.study.read import KEYS, Given, as_study
 from sweep.system import disk

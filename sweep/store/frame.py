@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xxhash
 
+from kernels.interface import Status
 from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import Partition, boxes, row_blocks
 from sweep.cells.schema import STATUS, Column, Schema
@@ -155,9 +156,9 @@ class Frame:
     def _place(self, cut: Cut, column: Column, at: int) -> Place:
         size, step = cut.chunk_bytes(column), 0
         if cut.blocks.count > 1:
-            index, at, step = self._indexes[at], self._end, _step(size, self._worth)
+            index, at, step = self._indexes[at], _paged(self._end), _step(size, self._worth)
             self._spans += index.fill(self._image, at, step, size + CHECKSUM_BYTES)
-            self._end = _paged(at + step * cut.blocks.count)
+            self._end = at + step * (cut.blocks.count - 1) + size + CHECKSUM_BYTES
         return Place(column.name, column.dtype, column.shape, size, ((0, at, step),))
 
     def _regions(self, tables: Iterable[Table]) -> tuple[Region, ...]:
@@ -184,5 +185,5 @@ def _pending(column: Column, place: Place) -> tuple[int, bytes]:
         return 0, np.array(np.nan if np.dtype(place.dtype).kind == "f" else -1, place.dtype).tobytes()
     if column.name != STATUS:
         return place.chunk_bytes, WRONG
-    words = np.full(place.chunk_bytes, column.missing, "i1")
+    words = np.full(place.chunk_bytes, Status.PENDING, "i1")
     return 0, words.tobytes() + checksum(words, place.chunk_bytes)

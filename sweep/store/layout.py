@@ -12,6 +12,7 @@ checksum behind it; `Table.digest` is of all bytes of a chunk, and of whose and 
 
 from __future__ import annotations
 
+import itertools
 import json
 import struct
 from bisect import bisect_right
@@ -225,6 +226,14 @@ class Layout:
     def ending_digest(self, texts: Sequence[bytes | bytearray]) -> bytes:
         """Digest of the texts at the end."""
         return xxhash.xxh3_128(self.key.encode() + b"".join(texts)).digest()
+
+
+def write_digests(fd: int, table: Table, digests: Mapping[int, bytes]) -> None:
+    """Writes those of some blocks, neighbouring ones at once. Raises OSError."""
+    for _, some in itertools.groupby(enumerate(sorted(digests)), lambda pair: pair[1] - pair[0]):
+        blocks = [block for _, block in some]
+        rows = b"".join(digests[block] for block in blocks)
+        disk.write_all(fd, (rows,), table.digests + blocks[0] * table.row_bytes)
 
 
 def gaps(apart: Iterable[Region], size: int) -> Iterator[Region]:

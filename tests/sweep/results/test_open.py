@@ -1,13 +1,15 @@
 import contextlib
 import json
 import shutil
+import subprocess
+import sys
 import warnings
 
 import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from running import flip, kept, place
+from running import environment, flip, kept, place
 
 from kernels.interface import Status
 from sweep.cells.fingerprint import fingerprint
@@ -192,6 +194,36 @@ def test_large_results_come_in_pieces_and_are_the_same(unfinished, stored, monke
         for name in expected.data_vars:
             assert found[name].dtype == expected[name].dtype
             np.testing.assert_array_equal(found[name].compute(), expected[name])
+
+
+REDUCED = """
+import resource, sys
+import dask
+from sweep.results import open as opening
+
+opening.memory = lambda: 100
+dask.config.set({"array.chunk-size": "4MiB", "num_workers": 2})
+found = opening.open_result(sys.argv[1])
+found.isel(height=slice(100)).mean().compute()
+taken = next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("VmData"))
+resource.setrlimit(resource.RLIMIT_DATA, (1024 * taken + found.nbytes // 2, -1))
+print(repr(found.max().compute().fall_time.item()))
+try:
+    found.load()
+except MemoryError:
+    print("too much at once")
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the memory as Linux does")
+def test_a_result_larger_than_the_memory_that_is_allowed_is_reduced_in_pieces(tmp_path):
+    axes, output = {"height": np.arange(1.0, 2001.0), "v0": np.arange(2500.0)}, tmp_path / "out.h5"
+    run(stone(axes=axes, outputs=["fall_time"], along={}), output, progress=False).close()
+    words = [sys.executable, "-c", REDUCED, str(output)]
+    told = subprocess.run(words, env=environment(), capture_output=True, text=True, check=True).stdout.splitlines()
+    with h5py.File(output) as file:
+        assert float(told[0]) == file["fall_time"][...].max()
+    assert told[1] == "too much at once"
 
 
 def test_a_sweep_that_ends_while_it_is_read_is_opened_finished(unfinished, stored, monkeypatch):
