@@ -174,11 +174,6 @@ class _EntryLibrary(_AlignedLibrary):
         self._linking_libraries = []
         super().finalize()
 
-    def _optimize_final_module(self):
-        """Once: numba does so twice, first cheaply for the sake of counted arrays, of which there are few here."""
-        manager, builder = self._codegen._module_pass_manager()
-        manager.run(self._final_module, builder)
-
 
 def _all_below(library):
     """What a library calls, and what that calls."""
