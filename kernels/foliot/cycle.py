@@ -18,6 +18,7 @@ from kernels.foliot import (
     _integrated_swing,
     _linear_swing,
     _single_loss,
+    _taylor_swing,
     _units,
     _viscous,
 )
@@ -228,6 +229,7 @@ FOLIOT = kernel(
             event_map_bound,
             excludes=_VISCOUS_ONLY,
         ),
+        _taylor_swing.by_taylor(Foliot._fields, rippled=False),
         method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", dopri5),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
