@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from kernels.codegen import followed_twice, stated_error
+from kernels.codegen.accumulated import to_rest
 from kernels.codegen.expression import SceneError, cos, exp, log, maximum, minimum, power, sign, sin, sqrt, where
 from kernels.codegen.module import build, compiling
 from kernels.codegen.record import RESERVED
@@ -154,6 +155,7 @@ def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[M
     module = build(scene)
 
     def method(name: str, doc: str, how: Function, bound: OnColumns | None = None) -> Method:
+        how = how if bound else to_rest(how)
         return Method(name, doc, _solve((scene.name, name), how, module, parameters, outputs), bound)
 
     return (
@@ -163,6 +165,11 @@ def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[M
             "the same, each step right to rtol, followed once",
             followed_twice.once,
             _no_bound(parameters),
+        ),
+        method(
+            "rodas5p",
+            f"for what is stiff: Rosenbrock's method Rodas5P, L-stable, {LOCATED}",
+            twice_by("rodas5p", scene),
         ),
         method("dop853", f"Dormand-Prince 8(5,3) {LOCATED}", twice_by("dop853", scene)),
         method("dopri5", f"Dormand-Prince 5(4) {LOCATED}", twice_by("dopri5", scene)),

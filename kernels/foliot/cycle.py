@@ -82,8 +82,7 @@ def pure(p, rtol):
 @jit
 def pure_bound(p):
     """Rounding where one loss acts alone, infinite elsewhere."""
-    scene, _ = _units.without_dimensions(p)
-    return _single_loss.bound(scene)
+    return _single_loss.bound(p)
 
 
 @jit
