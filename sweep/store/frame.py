@@ -163,8 +163,9 @@ class Frame:
 
     def _regions(self, tables: Iterable[Table]) -> tuple[Region, ...]:
         """Chunks and digests within the structure, and what comes behind it."""
-        spans = [(begin, end) for table in tables for begin, end in table.spans().tolist()]
-        return *sorted(span for span in spans if span[0] < len(self._image)), (len(self._image), self._end)
+        spans = np.concatenate([table.spans() for table in tables])
+        inside = sorted(spans[spans[:, 0] < len(self._image)].tolist())
+        return *((begin, end) for begin, end in inside), (len(self._image), self._end)
 
 
 def _nothing_yet(column: Column, place: Place, count: int) -> Iterator[tuple[int, bytes]]:

@@ -16,6 +16,7 @@ import os
 import threading
 import time
 from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -98,7 +99,8 @@ class Store:
         self._waiting: dict[int, bytes] = {}
         self._unsynced, self._synced = 0, time.monotonic()
         self._turn, self._committing = threading.Lock(), threading.Lock()
-        self._checker: _Checker | None = None
+        self._checked: Future[list[int]] | None = None
+        self._closing = threading.Event()
 
     @property
     def table(self) -> Table:
@@ -151,7 +153,16 @@ class Store:
         except (OSError, EOFError) as fault:
             raise SweepError(f"{self.path}: cannot be read ({fault})") from fault
         self._done = digests.any(axis=2).all(axis=1)
-        self._checker = _Checker(self.path, layout, np.flatnonzero(self._done))
+        self._checked = ThreadPoolExecutor(1).submit(self._check, np.flatnonzero(self._done).tolist())
+
+    def _check(self, blocks: list[int]) -> list[int]:
+        """Which of some blocks are not what their digests tell of."""
+        try:
+            with StoredFile(self.path) as file:
+                left = itertools.takewhile(lambda block: not self._closing.is_set(), blocks)
+                return sorted({block for block, _ in damaged(file, file.layout.work_name, left)})
+        except DAMAGE:
+            return blocks
 
     def _open(self, layout: Layout) -> None:
         with disk.refusing(self.path):
@@ -218,8 +229,8 @@ class Store:
 
     def damaged(self) -> list[int]:
         """Blocks of earlier runs that turned out to be damaged; they are not done any more. Raises SweepError."""
-        checker, self._checker = self._checker, None
-        found = checker.result() if checker is not None else []
+        checked, self._checked = self._checked, None
+        found = checked.result() if checked is not None else []
         self.undo(found)
         return found
 
@@ -290,42 +301,15 @@ class Store:
 
     def close(self) -> None:
         """Acknowledges what is written, if that can be, and gives the file back."""
-        if self._checker is not None:
-            self._checker.stop()
+        self._closing.set()
+        if self._checked is not None:
+            self._checked.result()
         if self._fd >= 0:
             with contextlib.suppress(SweepError):
                 if self._waiting:
                     self.commit()
             os.close(self._fd)
             self._fd = -1
-
-
-class _Checker:
-    """Compares blocks with their digests while something else goes on."""
-
-    def __init__(self, path: Path, layout: Layout, blocks: Any) -> None:
-        self._name = layout.work_name
-        self._stopped, self._found = threading.Event(), set[int]()
-        self._thread = threading.Thread(target=self._check, args=(path, blocks.tolist()), daemon=True)
-        self._thread.start()
-
-    def _check(self, path: Path, blocks: list[int]) -> None:
-        try:
-            with StoredFile(path) as file:
-                left = itertools.takewhile(lambda block: not self._stopped.is_set(), blocks)
-                self._found.update(block for block, _ in damaged(file, self._name, left))
-        except DAMAGE:
-            self._found.update(blocks)
-
-    def result(self) -> list[int]:
-        """Blocks that are damaged."""
-        self._thread.join()
-        return sorted(self._found)
-
-    def stop(self) -> None:
-        """Returns when it has ended."""
-        self._stopped.set()
-        self._thread.join()
 
 
 @contextlib.contextmanager

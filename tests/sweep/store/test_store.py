@@ -46,6 +46,20 @@ def test_the_size_of_a_result_is_known_before_its_structure_is(cells):
     assert Frame(schema, cuts, MARK, "now").layout.size == pytest.approx(expected_size(schema, cuts), rel=0.02)
 
 
+@pytest.mark.parametrize(("shared", "worth"), [(False, 40_960), (True, 4096)])
+@pytest.mark.parametrize("cells", [100, 600, 6000, 50_000])
+def test_chunks_that_are_long_enough_begin_on_a_page_and_waste_a_tenth_at_most(cells, shared, worth):
+    study = toy_studies.build(axes={"height": np.linspace(1.0, 2.0, 200_000)}, outputs=["fall_time"])
+    schema = output_schema(study, MARK)
+    cuts = cuts_of(study, schema, boxes(schema.grid.shape, cells))
+    table = Frame(schema, cuts, MARK, "now", shared).layout.work
+    for place in table.places:
+        stored, at = place.chunk_bytes + 4, place.all_at(table.blocks.count)
+        step = int(np.diff(at).max())
+        assert step == stored if stored < worth else not (at % 4096).any()
+        assert step <= max(1.1 * stored, stored + 4095 * shared)
+
+
 @pytest.mark.parametrize("cells", [1, 7, 20_000])
 def test_where_nothing_is_computed_hdf5_finds_pending_statuses_and_no_numbers(output, cells):
     made = frame(cells=cells, axes={"height": np.linspace(1.0, 2.0, 100_000 if cells > 7 else 500)})
