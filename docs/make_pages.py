@@ -19,7 +19,8 @@ from typing import Any
 import sweep
 from kernels import catalogue
 from kernels.interface import Field, Kernel, Method
-from sweep.cli import COMMANDS, Option
+from sweep.cli import COMMANDS
+from sweep.command.options import Option
 from sweep.show.kernels import starter
 from sweep.study.mistakes import limits
 

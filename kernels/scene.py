@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from kernels.codegen import followed_twice, stated_error
+from kernels.codegen.accumulated import to_rest
 from kernels.codegen.expression import SceneError, cos, exp, log, maximum, minimum, power, sign, sin, sqrt, where
 from kernels.codegen.module import build, compiling
 from kernels.codegen.record import RESERVED
@@ -51,6 +52,7 @@ class Scene:
     surface : (states, side, parameters) -> what falls through 0 at the switch
     start : (parameters) -> the states at time 0, where side is 1
     switch : (states, side, parameters) -> the states just behind the switch; None: they do not jump
+    most_kinks : between two switches, after which a cell is given up; None: a thousand
 
     At a switch `side` turns from 1 to -1 or back. Where abs(u) or sign(u) occurs, u = 0 is a *kink*: the motion is
     followed up to it and begun anew behind it. A motion that cannot leave a kink sticks there.
@@ -64,6 +66,7 @@ class Scene:
     surface: Function
     start: Function
     switch: Function | None = None
+    most_kinks: int | None = None
 
     def __post_init__(self) -> None:
         names = [*self.states, *self.parameters]
@@ -154,6 +157,7 @@ def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[M
     module = build(scene)
 
     def method(name: str, doc: str, how: Function, bound: OnColumns | None = None) -> Method:
+        how = how if bound else to_rest(how)
         return Method(name, doc, _solve((scene.name, name), how, module, parameters, outputs), bound)
 
     return (
@@ -163,6 +167,11 @@ def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[M
             "the same, each step right to rtol, followed once",
             followed_twice.once,
             _no_bound(parameters),
+        ),
+        method(
+            "rodas5p",
+            f"for what is stiff: Rosenbrock's method Rodas5P, L-stable, {LOCATED}",
+            twice_by("rodas5p", scene),
         ),
         method("dop853", f"Dormand-Prince 8(5,3) {LOCATED}", twice_by("dop853", scene)),
         method("dopri5", f"Dormand-Prince 5(4) {LOCATED}", twice_by("dopri5", scene)),

@@ -80,12 +80,12 @@ def frequencies(ds: xr.Dataset) -> list[Statement]:
     ]
 
 
-def receptance(J: Any, K: Any, w: float) -> complex:
-    """Of the spindle, from complex stiffnesses."""
+def receptance(J: Any, K: Any, w: Any) -> Any:
+    """Of the spindle, from complex stiffnesses, at one or many angular frequencies."""
     below = K[-1] - w * w * J[-1]
     for j in range(len(J) - 2, -1, -1):
         below = K[j] * below / (K[j] + below) - w * w * J[j]
-    return complex(1 / below)
+    return 1 / below
 
 
 def removed(J: list[complex], K: list[complex], j: int, w: float, keep_mu: bool) -> tuple[list[complex], list[complex]]:

@@ -7,18 +7,18 @@ functions they take. To a tolerance a cell is followed twice, as by the Taylor m
 from types import SimpleNamespace
 
 from kernels.codegen import followed_twice
-from kernels.codegen.driver_source import advance
 from kernels.codegen.expression import INPUT
 from kernels.codegen.lane_source import BEGIN, begun_rows, loaded_rows, stored_rows
 from kernels.codegen.module import Writer, build, loaded
 from kernels.codegen.record import record
+from kernels.codegen.stiff_source import linear
 from kernels.codegen.template import filled, listed
 from kernels.integrate.events import METHODS
 
 BLUR = 1e-14
 """Of the surface's value at the start, what rounding may take from it unremarked."""
 
-APART = {"dopri5": followed_twice.APART, "dop853": 4.0}
+APART = {"dopri5": followed_twice.APART, "dop853": 4.0, "rodas5p": followed_twice.APART}
 """How many rtol the two runs may differ by; DOP853's weights of up to 43 make more of rounding than the others do."""
 
 FINEST = 1e-13
@@ -170,10 +170,17 @@ LEGS = '''
 """Legs of {name} to a tolerance: written by kernels; do not change it here."""
 
 from {module} import *
+from collections import namedtuple
+
 from {steps} import M
 from kernels.integrate.adaptive import to_event
 from kernels.integrate.pairs import DOP853, DOPRI5
 from kernels.integrate.records import Mode
+from kernels.integrate.rosenbrock import RODAS5P_PAIR
+{linear}
+
+Stiff = namedtuple("Stiff", (*M._fields, "factored", "solved"))
+M_STIFF = Stiff(*M, factored, solved)
 
 
 @jit_call
@@ -186,11 +193,18 @@ def to_event_dopri5(state, side, signs, parameters, unit, h, on, tolerance, acti
 def to_event_dop853(state, side, signs, parameters, unit, h, on, tolerance, active):
     """The leg of DOP853."""
     return to_event(M, DOP853, state, Mode(side, signs, parameters, False), unit, h, on, tolerance, active)
+
+
+@jit_call
+def to_event_rodas5p(state, side, signs, parameters, unit, h, on, tolerance, active):
+    """The leg of Rodas5P."""
+    mode = Mode(side, signs, parameters, False)
+    return to_event(M_STIFF, RODAS5P_PAIR, state, mode, unit, h, on, tolerance, active)
 '''
 
 
 def twice_by(method, scene):
-    """The function of columns (`followed_twice.twice`) that follows the scene by "dopri5" or "dop853"."""
+    """The function of columns (`followed_twice.twice`) that follows the scene by a method of `APART`."""
 
     def twice(module, columns, rtol, outputs, status):
         run = getattr(adaptive(scene), f"run_{method}")
@@ -201,12 +215,12 @@ def twice_by(method, scene):
 
 
 def adaptive(scene):
-    """The module of the scene's legs to a tolerance, with `run_dopri5` and `run_dop853`."""
-    module, steps = build(scene), stepped(scene)
-    text = filled(LEGS, name=scene.name, module=module.__name__, steps=steps.__name__).lstrip()
-    writer = Writer(scene, record(scene))
-    for method in ("dopri5", "dop853"):
-        text += advance(writer.states, writer.parameters, module.KINKS, method, writer.offset())
+    """The module of the scene's legs to a tolerance, with a `run_{method}` for each method of `APART`."""
+    module, steps, writer = build(scene), stepped(scene), Writer(scene, record(scene))
+    names = {"name": scene.name, "module": module.__name__, "steps": steps.__name__}
+    text = filled(LEGS, **names, linear=linear(writer)).lstrip()
+    for method in APART:
+        text += writer.advance(method)
     return loaded("legs", scene, text)
 
 

@@ -6,6 +6,7 @@ do not change between events.
 """
 
 import re
+from collections import defaultdict
 
 from kernels.codegen.expression import INPUT, needed
 from kernels.codegen.template import filled, listed
@@ -45,6 +46,13 @@ class Tangents:
     def __init__(self, graph, states):
         self._graph, self._reused = graph, {}
         self.deltas = {s: graph.series(f".delta_{s}") for s in states}
+
+    @classmethod
+    def along(cls, graph, state):
+        """Derivatives with respect to one state."""
+        found = cls(graph, [])
+        found.deltas = defaultdict(lambda: None, {state: graph.of(1.0)})
+        return found
 
     def of(self, x):
         """The derivative of an expression."""

@@ -113,7 +113,7 @@ def on_dense(m, pair, mode, step, terms, which, first, seeking):
     for _ in range(ROOT_LIMIT):
         if not any_lane(seeking):
             break
-        values, slopes = events(m, pair.dense(step.state, terms, h, part), mode)
+        values, slopes = events(m, pair.dense(m, step.state, terms, mode, h, part), mode)
         value, slope = of_event(values, which), where(seeking, of_event(slopes, which), slope)
         low, high = where(value > 0.0, part, low), where(value > 0.0, high, part)
         new = part - value / (slope * h)
@@ -121,7 +121,7 @@ def on_dense(m, pair, mode, step, terms, which, first, seeking):
         change = magnitude(new - part)
         part = where(seeking, new, part)
         seeking = seeking & (change > 4e-16)
-    return part, pair.dense(step.state, terms, h, part), slope
+    return part, pair.dense(m, step.state, terms, mode, h, part), slope
 
 
 @jit

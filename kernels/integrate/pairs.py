@@ -90,7 +90,7 @@ def dop853_series(m, state, trial, mode, h):
 
 
 @jit
-def dop853_dense(state, terms, h, part):
+def dop853_dense(m, state, terms, mode, h, part):
     """The state at that part of the step."""
     f0, f1, f2, f3, f4, f5, f6 = terms
     rest = 1.0 - part
@@ -135,7 +135,7 @@ def dopri5_vague(terms, part):
 
 
 @jit
-def dopri5_dense(state, terms, h, part):
+def dopri5_dense(m, state, terms, mode, h, part):
     """The state at that part of the step."""
     k0, k2, k3, k4, k5, k6 = terms
     weights = (

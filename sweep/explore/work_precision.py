@@ -235,7 +235,7 @@ def _without_work(study: Study) -> Study:
 
 def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[str, Any]:
     part = with_method(study, name, rtol)
-    outputs, status, used = solved(part)
+    outputs, status, used, _ = solved(part)
     error = errors(outputs, against.values)
     # against itself the reference has no error; what can be said is what it is right to, also where auto took it
     error = np.where(_solved_by(study, used, against.source), np.maximum(error, against.floor), error)
@@ -299,7 +299,7 @@ def _timed(study: Study) -> float:
     cells, solver = empty_cells(study, Grid(study).size), Solver(study)
     count, begin = 0, time.thread_time()
     while (spent := time.thread_time() - begin) < LEAST_SECONDS or not count:
-        solver.solve(0, cells.number, *cells)
+        solver.solve(0, cells)
         count += 1
     return spent / count / cells.number
 

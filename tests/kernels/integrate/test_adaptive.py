@@ -11,7 +11,7 @@ from rich_scene import RICH
 from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.jit import COMPILED
 
-METHODS = ["dop853", "dopri5"] if COMPILED else ["dop853"]
+METHODS = ["dop853", "dopri5", "rodas5p"] if COMPILED else ["dop853"]
 SOME = 24 if COMPILED else 1
 FLIPS = 10.0 if COMPILED else 2.0
 

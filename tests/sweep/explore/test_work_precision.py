@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from running import tall
 from toy import KERNEL, exact, rough
 from toy_studies import build
 
@@ -11,6 +12,7 @@ from kernels.interface import Field, Method, Status
 from kernels.lanes.jit import COMPILED
 from sweep import SweepError, cli
 from sweep.cells.sample import sampled, with_method
+from sweep.explore.failing import without_failing
 from sweep.explore.work_precision import precision_cells, precision_text, work_precision
 from sweep.show.charts import draw_precision, new_figure, plot_precision, style
 
@@ -434,3 +436,13 @@ def test_mistakes_on_the_command_line_are_one_message(chart, options):
     assert code == 2
     assert err.strip()
     assert "Traceback" not in err
+
+
+def test_cells_at_which_a_kernel_dies_are_left_out_of_a_chart():
+    told = []
+    part = without_failing(tall(40, "bad:DYING"), 40, note=told.append)
+    assert sorted(set(range(1, 41)) - set(part.axes["height"].values)) == [11, 22, 33]
+    assert told == ["the kernel fails at 3 of 40 cells, e.g. height=11; they are left out"]
+    assert float(work_precision(part, tolerances=[1e-6]).ok.min()) == 1.0
+    with pytest.raises(SweepError, match="the kernel failed"):
+        without_failing(tall(5, "bad:HOPELESS"), 5)

@@ -1,0 +1,109 @@
+"""Switches that accumulate, as the bounces of a ball, carried through to where they come to rest.
+
+Where a motion ends, or what is left of it is less than the method can tell, before the wanted number of switches, the
+last ones that are right are looked at. Their intervals d_n shrink in the limit by the same factor each; two at a time,
+for two surfaces may take turns, the time of rest is by Aitken's formula
+    t = t_n + D q/(1 - q),  D = d_n + d_{n-1},  q = D/(d_{n-2} + d_{n-3}),                                 (1)
+and so is every state. The same from the switch before tells the error.
+"""
+
+import numpy as np
+
+from kernels.codegen import followed_twice
+from kernels.interface import Status
+
+ENDED = Status.STICKS, Status.OUT_OF_RANGE, Status.STEP_LIMIT
+FAINT = Status.GRAZING, Status.INACCURATE
+"""Statuses of what may have come to rest; of the latter, where intervals have become short."""
+SHORT = 0.01
+"""The last interval over the mean one, below which switches may accumulate."""
+LEAST = 6
+"""Switches of which the last five are looked at: the first interval is of another kind."""
+NEAR = 1e-3
+"""Of the time of rest, what may be left to it: then the intervals are believed to go on as they do."""
+TINY = 1e-12
+"""Of the time, an interval that is not worth to be followed: by less, rounding tells on what intervals shrink."""
+FINE = 1e-9
+"""The tolerance at most: a wide one takes bounces for grazing that are still large."""
+AWAY = 0.9
+"""Of the last switches that are right, to be away from those that are so by chance."""
+ROUGHLY = 1e-6
+"""To what rtol the states' sizes are wanted."""
+SLOWEST = 1.0 - 1e-5
+"""The largest q."""
+
+
+def to_rest(how):
+    """The function of columns `how`, followed by (1) where its motion does not reach the wanted number of switches."""
+
+    def solve(module, columns, rtol, outputs, status):
+        how(module, columns, rtol, outputs, status)
+        cells = np.flatnonzero(_may_rest(columns[-1], outputs, status))
+        if not len(cells):
+            return
+
+        def followed(those, flips):
+            """Rows of outputs, and which cells are right to half of the tolerance."""
+            inputs = [*(c[cells[those]] for c in columns[:-1]), flips.astype(float)]
+            rows, verdict = np.full((len(outputs), len(those)), np.nan), np.empty(len(those), np.int8)
+            how(module, inputs, np.minimum(0.5 * rtol[cells[those]], FINE), list(rows), verdict)
+            return rows, verdict == Status.OK
+
+        last = _last_right(followed, columns[-1][cells])
+        last = np.where(last > LEAST, np.maximum(np.floor(AWAY * last), LEAST), last)
+        those = np.flatnonzero(last >= LEAST)
+        if len(those):
+            early = [*(c[cells[those]] for c in columns[:-1]), np.full(len(those), 2.0)]
+            sizes = followed_twice.followed(module, early, np.full(len(those), ROUGHLY))[2 + len(module.STATES) : -1]
+            rests, values, error = _limits(followed, those, last[those], sizes)
+            good = cells[those[rests]]
+            for column, row in zip(outputs, values, strict=True):
+                column[good] = row[rests]
+            status[good] = np.where(error[rests] <= 0.5 * rtol[good], Status.COMES_TO_REST, Status.INACCURATE)
+
+    return solve
+
+
+def _may_rest(flips, outputs, status):
+    time, interval = outputs[:2]
+    faint = np.isin(status, FAINT) & ~(interval * flips > SHORT * time)
+    return (flips >= LEAST) & (np.isin(status, ENDED) | faint)
+
+
+def _last_right(followed, flips):
+    """The last number of switches, or nearly, that are right and move the time; 0 where it is less than `LEAST`."""
+    right, wrong = np.zeros(len(flips)), flips.copy()
+    trial = np.full(len(flips), float(LEAST))
+    while True:
+        going = np.flatnonzero((trial < wrong) & (trial - right >= np.maximum(1.0, 0.01 * right)))
+        if not len(going):
+            return right
+        (time, interval, *_), good = followed(going, trial[going])
+        good &= interval > TINY * time
+        right[going[good]], wrong[going[~good]] = trial[going[good]], trial[going[~good]]
+        middle = np.floor(0.5 * (right + wrong))
+        trial = np.where(right > 0, np.minimum(2.0 * right, middle), wrong)
+
+
+def _limits(followed, those, last, sizes):
+    """Which cells come to rest; their outputs there; their error, of states relative to their sizes at the start."""
+    runs = [followed(those, last - k) for k in (0, 1, 2, 3, 4)]
+    rows, good = (np.array(part) for part in zip(*runs, strict=True))  # (5, outputs, cells), (5, cells)
+    with np.errstate(all="ignore"):
+        (values, q), (before, q_before) = (_limit(rows[k:]) for k in (0, 1))
+        scale = abs(rows).max(axis=0)
+        scale[0], scale[2:] = values[0], np.fmax(scale[2:], sizes)
+        error = (abs(values - before) / np.where(scale > 0, scale, 1.0)).max(axis=0)
+        shrinks = (q < SLOWEST) & (q_before < SLOWEST) & (values[0] - rows[0, 0] <= NEAR * values[0])
+        settles = abs(values - rows[0]) <= abs(before - rows[1]) + 1e-9 * scale
+    return good.all(axis=0) & shrinks & settles.all(axis=0) & np.isfinite(values).all(axis=0), values, error
+
+
+def _limit(rows):
+    """Outputs at rest by (1), from those at four switches, the last one first; and q."""
+    pairs = [rows[k, 1] + rows[k + 1, 1] for k in (0, 2)]
+    q = pairs[0] / pairs[1]
+    values = rows[0] + (rows[0] - rows[2]) * q / (1.0 - q)
+    values[0] = rows[0, 0] + pairs[0] * q / (1.0 - q)
+    values[1] = 0.0
+    return values, q

@@ -1,0 +1,79 @@
+"""The embedded Rosenbrock method Rodas5P, of orders 5 and 4, L-stable: for stiff scenes; generic in one cell or lanes.
+
+With the exact Jacobian J of the rates f at the start u of a step h, every increment solves one linear system,
+    (I - gamma h J) w_i = gamma h f(u + sum_j a_ij w_j) + gamma sum_j c_ij w_j,  j < i                     (1)
+and the result is the last stage's place and its increment, which tells the error. What relaxes within much less than h
+is damped away. `m` and `mode` as in `steps`; m.factored and m.solved (`stiff_source`) solve (1).
+Source: Steinebach, BIT Numer. Math. 63:27 (2023); Hairer & Wanner, Solving ODEs II, section IV.7.
+"""
+
+from kernels.integrate.pairs import CHANCE_5, Pair, Trial, at_least, of_size
+from kernels.integrate.steps import ONE, rate
+from kernels.integrate.tableaux import RODAS5P, RODAS5P_COUPLED, RODAS5P_GAMMA
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.tuples import after, times
+
+
+@jit
+def factored(m, state, mode, h):
+    """The factors of I - gamma h J."""
+    return m.factored(state, mode.side, mode.signs, mode.parameters, RODAS5P_GAMMA * h)
+
+
+@jit
+def increment(m, mode, factors, h, place, weights, before):
+    """An increment by (1), from where the stage is and those before, weighted."""
+    free = times(RODAS5P_GAMMA * h, rate(m, place, mode))
+    return m.solved(factors, after(free, RODAS5P_GAMMA, weights, before))
+
+
+@jit_call
+def stepped(m, state, mode, factors, h):
+    """The state after the step; the first increment, and the last two."""
+    a, c = RODAS5P, RODAS5P_COUPLED
+    w0 = m.solved(factors, times(RODAS5P_GAMMA * h, rate(m, state, mode)))
+    w1 = increment(m, mode, factors, h, after(state, 1.0, a[0], (w0,)), c[0], (w0,))
+    w2 = increment(m, mode, factors, h, after(state, 1.0, a[1], (w0, w1)), c[1], (w0, w1))
+    w3 = increment(m, mode, factors, h, after(state, 1.0, a[2], (w0, w1, w2)), c[2], (w0, w1, w2))
+    w4 = increment(m, mode, factors, h, after(state, 1.0, a[3], (w0, w1, w2, w3)), c[3], (w0, w1, w2, w3))
+    place = after(state, 1.0, a[4], (w0, w1, w2, w3, w4))
+    w5 = increment(m, mode, factors, h, place, c[4], (w0, w1, w2, w3, w4))
+    place = after(place, 1.0, ONE, (w5,))
+    w6 = increment(m, mode, factors, h, place, c[5], (w0, w1, w2, w3, w4, w5))
+    place = after(place, 1.0, ONE, (w6,))
+    w7 = increment(m, mode, factors, h, place, c[6], (w0, w1, w2, w3, w4, w5, w6))
+    return after(place, 1.0, ONE, (w7,)), w0, w6, w7
+
+
+@jit_call
+def tried(m, state, mode, h):
+    """A step with its estimated error.
+
+    The rates at both ends are those that (1) damps: the true ones of what relaxes at once say nothing of a step.
+    """
+    factors, over = factored(m, state, mode, h), 1.0 / (RODAS5P_GAMMA * h)
+    new, w0, w6, w7 = stepped(m, state, mode, factors, h)
+    first, last = times(over, w0), m.solved(factors, rate(m, new, mode))
+    before, error = of_size(state, new, first, h, w6), of_size(state, new, first, h, w7)
+    return Trial(new, (first,), last, at_least(error, CHANCE_5 * before * before / (1.0 + before)))
+
+
+@jit
+def series(m, state, trial, mode, h):
+    """The dense output needs nothing but the state."""
+    return (times(0.0, state),)
+
+
+@jit_call
+def dense(m, state, terms, mode, h, part):
+    """The state at that part of the step: a step that long, which is as right as the whole one."""
+    return stepped(m, state, mode, factored(m, state, mode, part * h), part * h)[0]
+
+
+@jit
+def vague(terms, part):
+    """The dense output is off by what the step is."""
+    return times(0.0 * part, terms[0])
+
+
+RODAS5P_PAIR = Pair(tried, series, dense, vague, 5.0)

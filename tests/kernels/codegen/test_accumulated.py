@@ -1,0 +1,121 @@
+"""Balls whose bounces accumulate: when they come to rest, against closed forms to 50 digits."""
+
+import numpy as np
+import pytest
+from columns import relative_error, solve
+from mpmath import mp, mpf
+from stiff_scene import BALL, RAISED
+
+from kernels.codegen.accumulated import to_rest
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+
+MANY = 1e5
+many = pytest.mark.skipif(not COMPILED, reason="many bounces")
+
+
+def rest(g, e, above):
+    """A fall, and bounces of which each takes e times as long as the one before."""
+    with mp.workdps(50):
+        g, e, above = mpf(float(g)), mpf(float(e)), mpf(float(above))
+        return mp.sqrt(2 * above / g) * (1 + e) / (1 - e)
+
+
+@many
+@pytest.mark.parametrize("kernel", [BALL, RAISED])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-9])
+def test_a_ball_is_at_rest_when_its_bounces_accumulate(kernel, rtol):
+    random = np.random.default_rng(3)
+    g, e = 10.0 ** random.uniform(-2, 2, 40), 1.0 - 10.0 ** random.uniform(-1.5, -0.3, 40)
+    above = 10.0 ** random.uniform(-3, 3, 40) if kernel is BALL else np.ones(40)
+    outputs, status = solve(kernel, "taylor", g, e, above, flips=MANY, rtol=rtol)
+    assert np.isin(status, [Status.COMES_TO_REST, Status.INACCURATE]).all()
+    assert (status == Status.COMES_TO_REST).mean() > 0.9
+    rests = status == Status.COMES_TO_REST
+    truths = [rest(*cell) for cell in zip(g, e, above, strict=True)]
+    assert (relative_error(outputs["time"], truths)[rests] < rtol).all()
+    assert (outputs["interval"][rests] == 0).all()
+    assert (abs(outputs["speed"])[rests] <= rtol * np.sqrt(2 * g * above)[rests]).all()
+    assert (abs(outputs["height"] - (kernel is RAISED))[rests] <= rtol * above[rests]).all()
+
+
+@many
+@pytest.mark.parametrize("method", ["rodas5p", "dop853"])
+def test_every_method_carries_it_there(method):
+    outputs, status = solve(BALL, method, [9.81], 0.3, flips=2000.0, rtol=1e-8)
+    assert status[0] == Status.COMES_TO_REST
+    assert relative_error(outputs["time"], [rest(9.81, 0.3, 1.0)])[0] < 1e-8
+
+
+def braked_ball(g, e, above, d):
+    """The time of rest with drag by the square of the speed: bounces by closed forms, until they no longer matter."""
+    g, e, above, d = (mpf(x) for x in (g, e, above, d))
+    top = mp.sqrt(g / d)
+    time = mp.acosh(mp.exp(d * above)) / (d * top)
+    speed = top * mp.sqrt(-mp.expm1(-2 * d * above))
+    while e * speed / g > time * mpf(10) ** -40:
+        up = e * speed
+        height = mp.log1p((up / top) ** 2) / (2 * d)
+        time += mp.atan(up / top) / (d * top) + mp.asinh(up / top) / (d * top)
+        speed = top * mp.sqrt(-mp.expm1(-2 * d * height))
+    return time
+
+
+@many
+@pytest.mark.parametrize("kernel", [BALL, RAISED])
+def test_where_bounces_shrink_by_a_share_that_differs_it_is_right_too(kernel):
+    e = np.array([0.4, 0.6, 0.8, 0.9])
+    outputs, status = solve(kernel, "taylor", 9.81, e, 1.0, 0.3, flips=MANY, rtol=1e-9)
+    with mp.workdps(50):
+        truths = [braked_ball(9.81, float(one), 1.0, 0.3) for one in e]
+    few = e < 0.5  # so few bounces can be told from their floor that the share is known too badly
+    assert (status == np.where(few & (kernel is RAISED), Status.INACCURATE, Status.COMES_TO_REST)).all()
+    assert (relative_error(outputs["time"], truths)[status == Status.COMES_TO_REST] < 1e-9).all()
+
+
+@many
+def test_a_number_of_bounces_that_can_be_counted_is_as_before():
+    outputs, status = solve(BALL, "taylor", [9.81], 0.5, flips=40.0)
+    first = mp.sqrt(2 / mpf(9.81))
+    assert status[0] == Status.OK
+    assert relative_error(outputs["interval"], [2 * first * mpf(0.5) ** 39])[0] < 1e-9
+
+
+class Impacts:
+    """In place of a method: impacts at given times; what ends before the wanted number of them STICKS."""
+
+    def __init__(self, time, speed=lambda n: 0.5**n, last=60):
+        self.time, self.speed, self.last = time, speed, last
+
+    def __call__(self, module, columns, rtol, outputs, status):
+        n = columns[-1]
+        outputs[0][:], outputs[1][:] = self.time(n), self.time(n) - self.time(n - 1)
+        outputs[2][:], status[:] = self.speed(n), np.where(n > self.last, Status.STICKS, Status.OK)
+
+
+@pytest.mark.parametrize(
+    ("impacts", "comes_to"),
+    [
+        (Impacts(lambda n: 3.0 - 0.5**n), Status.COMES_TO_REST),
+        (Impacts(lambda n: 3.0 - 0.5**n * (1 + 0.1 * (-1.0) ** n)), Status.COMES_TO_REST),  # two surfaces in turn
+        (Impacts(lambda n: 3.0 - 0.5**n, last=5), Status.STICKS),  # too few
+        (Impacts(lambda n: 3.0 - 0.5**n, last=8), Status.STICKS),  # ends too far from where they accumulate
+        (Impacts(lambda n: 3.0 + n), Status.STICKS),
+        (Impacts(lambda n: np.log(n + 1.0)), Status.STICKS),  # shrinks, but not by a factor
+        (Impacts(lambda n: 3.0 - 1.0 / n**4), Status.INACCURATE),  # accumulates, but slower than by a factor
+        (
+            Impacts(lambda n: 3.0 - 0.5**n, speed=lambda n: 2.0 ** np.minimum(n, 900.0)),
+            Status.STICKS,
+        ),  # ever faster: no rest
+    ],
+)
+def test_only_what_goes_on_by_a_factor_is_carried_to_rest(impacts, comes_to, monkeypatch):
+    sizes = np.array([[1.0], [1.0], [1.0], [1.0], [0.0]])
+    monkeypatch.setattr("kernels.codegen.followed_twice.followed", lambda *_: sizes)
+    outputs, status = [np.zeros(1) for _ in range(3)], np.zeros(1, np.int8)
+    module = type("Module", (), {"STATES": ("speed",)})
+    to_rest(impacts)(module, [np.array([1e4])], np.array([1e-9]), outputs, status)
+    assert status[0] == comes_to
+    if comes_to == Status.COMES_TO_REST:
+        assert abs(outputs[0][0] / 3.0 - 1.0) < 1e-9
+        assert abs(outputs[2][0]) < 1e-9

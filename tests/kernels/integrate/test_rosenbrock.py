@@ -1,0 +1,147 @@
+"""Rodas5P of stiff scenes: against closed forms to 50 digits, where explicit methods give up."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+import stiff_oracles
+from columns import relative_error, solve
+from mpmath import mp, mpf
+from rich_scene import RICH
+from scene_oracles import quadratic_foliot
+from stiff_scene import LAG, WAVE
+
+import sweep
+from kernels.codegen.stepped_source import adaptive
+from kernels.integrate import rosenbrock
+from kernels.integrate.records import Mode
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+from kernels.scene import Scene, exp, log, sin, sqrt
+
+many = pytest.mark.skipif(not COMPILED, reason="many steps")
+SOME = 40 if COMPILED else 2
+
+
+@cache
+def lags():
+    """Cells mu, a, eps, flips, and what is true of them."""
+    random = np.random.default_rng(11)
+    mu, a = 10.0 ** random.uniform(-1, 1, SOME), 10.0 ** random.uniform(-2, 1, SOME)
+    cells = mu, a, 10.0 ** random.uniform(-9, 0, SOME), random.integers(1, 5 if COMPILED else 2, SOME).astype(float)
+    with mp.workdps(50):
+        truths = [
+            stiff_oracles.lagging_foliot(*map(float, cell[:3]), int(cell[3])) for cell in zip(*cells, strict=True)
+        ]
+    return cells, truths
+
+
+def off(outputs, truths, names=("time", "angle", "speed", "force")):
+    """The largest relative error of each cell."""
+    columns = zip(names, zip(*truths, strict=True), strict=True)
+    return np.max([relative_error(outputs[name], found) for name, found in columns], axis=0)
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9, 1e-11] if COMPILED else [1e-6])
+def test_a_lag_of_nine_decades_is_right_to_the_tolerance(rtol):
+    (*cells, flips), truths = lags()
+    outputs, status = solve(LAG, "rodas5p", *cells, flips=flips, rtol=rtol)
+    assert not status.any()
+    assert (off(outputs, truths) < rtol).all()
+
+
+@many
+def test_explicit_methods_give_up_where_stability_limits_their_steps_and_auto_goes_on():
+    eps = [1e-1, 1e-6, 1e-9]
+    for method in ("taylor", "dop853", "dopri5"):
+        _, status = solve(LAG, method, 1.0, 0.5, eps, flips=1.0)
+        assert status.tolist() == [Status.OK, Status.STEP_LIMIT, Status.STEP_LIMIT]
+    study = sweep.build_study(
+        kernel="stiff_scene:LAG", axes={"eps": eps}, fixed={"mu": 1.0, "a": 0.5, "flips": 1}, allow_import=True
+    )
+    found = sweep.run(study, progress=False)
+    names = [method.name for method in LAG.methods]
+    assert [names[k] for k in found.method_used.values] == ["taylor", "rodas5p", "rodas5p"]
+    assert not found.status.any()
+    truths = [stiff_oracles.lagging_foliot(1.0, 0.5, one, 1)[0] for one in eps]
+    assert (relative_error(found.time.values, truths) < study.rtol).all()
+
+
+@many
+@pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-10])
+def test_a_stiff_law_that_is_not_linear_keeps_to_the_wave_that_it_follows(rtol):
+    eps, level = 10.0 ** -np.linspace(0.0, 9.0, 19), 0.5
+    outputs, status = solve(WAVE, "rodas5p", eps, level, flips=1.0, rtol=rtol)
+    time = mp.asin(mpf(level))  # force = cos(clock), speed = sin(clock)
+    assert not status.any()
+    assert (off(outputs, [(time, time, mp.cos(time))] * len(eps), ("time", "clock", "force")) < rtol).all()
+
+
+def test_it_is_right_where_nothing_is_stiff():
+    outputs, status = solve(RICH, "rodas5p", [2.0], 1.5, 0.3, 0.4, flips=2.0, rtol=1e-8)
+    time, speed = quadratic_foliot(2.0, 1.5, 0.3, 0.4, 2)
+    assert status[0] == Status.OK
+    assert relative_error([*outputs["time"], *abs(outputs["speed"])], [time, abs(speed)]).max() < 1e-8
+
+
+KNOTTY = Scene(
+    "knotty", "a Jacobian of every operation", ("u", "v", "w", "x"), ("p",),
+    lambda u, v, w, x, p: (p * v * w + sin(u) / x, exp(-u) - v**3 + 1.0, sqrt(u * x) * abs(v), log(x) * p - u),
+    lambda u: u - 5.0, lambda p: (1.0, 2.0, 3.0, 4.0),
+)  # fmt: skip
+
+
+def knotty_rates(u, v, w, x, p):
+    return [p * v * w + mp.sin(u) / x, mp.exp(-u) - v**3 + 1, mp.sqrt(u * x) * v, mp.log(x) * p - u]
+
+
+@pytest.mark.skipif(COMPILED, reason="one more compilation; run with NUMBA_DISABLE_JIT=1")
+def test_the_linear_equations_are_those_of_the_exact_jacobian():
+    m = adaptive(KNOTTY).M_STIFF
+    state, p, h, right = (0.7, 1.3, 2.1, 0.4), 1.7, 0.31, (0.3, -1.1, 0.9, 2.3)
+    for factor in (1.0, 1e9, -1e3):
+        found = m.solved(m.factored(state, 1.0, (1.0,), (p,), h * factor), right)
+        with mp.workdps(50):
+            columns = [mp.diff(lambda z, k=k: mp.matrix(moved(z, k, state, p)), state[k]) for k in range(4)]
+            jacobian = mp.matrix(4, 4)
+            for k in range(4):
+                for r in range(4):
+                    jacobian[r, k] = columns[k][r]
+            true = mp.lu_solve(mp.eye(4) - mpf(h) * mpf(factor) * jacobian, mp.matrix(right))
+            worst = max(abs(mpf(x) - t) for x, t in zip(found, true, strict=True))
+            assert worst < 1e-12 * max(abs(t) for t in true)
+
+
+def moved(z, k, state, p):
+    return knotty_rates(*(z if j == k else mpf(u) for j, u in enumerate(state)), mpf(p))
+
+
+DECAY = Scene("linear", "u' = z u", ("u",), ("z",), lambda u, z: z * u, lambda u: u - 0.5, lambda z: 1.0)
+PENDULUM = Scene(
+    "swing", "pendulum", ("angle", "speed"), (), lambda angle, speed: (speed, -sin(angle)), lambda angle: angle - 9.0,
+    lambda: (1.0, 0.0),
+)  # fmt: skip
+
+
+def one_step(scene, state, h, *parameters):
+    m, mode = adaptive(scene).M_STIFF, Mode(1.0, (), parameters, False)
+    return rosenbrock.tried(m, state, mode, h)
+
+
+@pytest.mark.skipif(COMPILED, reason="a step as plain Python")
+def test_what_is_stiff_is_damped_away_in_one_step():
+    for z in (-1e4, -1e8, -1e12):
+        assert abs(one_step(DECAY, (1.0,), 1.0, z).new[0]) < 3e3 / -z  # R(z) falls as 1/z
+
+
+@pytest.mark.skipif(COMPILED, reason="a step as plain Python")
+def test_the_error_of_a_step_is_of_order_six_and_the_estimate_of_order_five():
+    with mp.workdps(30):
+        true = mp.odefun(lambda t, y: [y[1], -mp.sin(y[0])], 0, [1, 0.25])
+        steps = [0.4, 0.2, 0.1]
+        found = [one_step(PENDULUM, (1.0, 0.25), h) for h in steps]
+        errors = [float(abs(mpf(trial.new[0]) - true(mpf(h))[0])) for trial, h in zip(found, steps, strict=True)]
+    slopes = np.diff(np.log2(errors)) / -1.0
+    assert (abs(slopes - 6.0) < 0.5).all()
+    estimates = np.diff(np.log2([trial.error for trial in found])) / -1.0
+    assert (abs(estimates - 5.0) < 0.7).all()
