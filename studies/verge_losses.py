@@ -260,7 +260,7 @@ def draw_law(axes: Any, ds: xr.Dataset) -> None:
     axes.plot([0, 0.6], [0, 0.6], color="black", linewidth=0.8, label="law of the shares")
     axes.set(xlabel=r"$(\sum n\lambda_n+\lambda_\mathrm{impact})/(2+\sum n\lambda_n)$ [1]", ylabel="exponent, $s$ [1]")
     axes.set(xlim=(0.05, 0.52), ylim=(0.05, 1.4))
-    axes.legend(title=r"$\alpha$", loc="upper left", markerscale=2, fontsize=7, ncols=2)
+    axes.legend(title=r"$\alpha$", loc="upper right", markerscale=2, fontsize=7)
 
 
 def conclude(path: str, wheel_path: str) -> tuple[Groups, list[str], Any]:

@@ -40,6 +40,8 @@ UNSURE = (Status.INACCURATE, Status.GRAZING)
 NAMES = {int(status): status.name for status in Status}
 WORK = ("rate_calls", "steps", "events")
 """Outputs that count a method's work; where a study asks for them, their means are shown beside the time."""
+ESTIMATES = ("error", "wear_error")
+"""Outputs by which a method says how wrong it may be."""
 
 LONG_NAMES = {
     "error_median": "median relative error of a cell, over its outputs",
@@ -227,7 +229,7 @@ def _without_work(study: Study) -> Study:
     """The study without what a method tells of itself, its work and its error, in which none is right or wrong."""
     import dataclasses
 
-    left = tuple(name for name in study.outputs if name not in (*WORK, "error"))
+    left = tuple(name for name in study.outputs if name not in (*WORK, *ESTIMATES))
     return dataclasses.replace(study, outputs=left) if left else study
 
 

@@ -178,7 +178,9 @@ def plot_precision(found: xr.Dataset, path: str | os.PathLike[str] | None = None
             draw_precision(axes, found, key)
             axes.set_title(text)
             letter(axes, "a" if key == "error_median" else "b")
-        panels[0].set_ylabel("relative error [1]")
+        low, high = panels[0].get_xlim()
+        wide = np.sqrt(max(LEAST_SPAN * low / high, 1.0))
+        panels[0].set(ylabel="relative error [1]", xlim=(low / wide, high * wide))
         handles, labels = panels[0].get_legend_handles_labels()
         marks = precision_marks(found)
         figure.legend([*handles, *marks.values()], [*labels, *marks], loc="outside upper center", ncols=4, fontsize=7)
@@ -223,6 +225,8 @@ def precision_marks(found: xr.Dataset) -> dict[str, Any]:
     return marks
 
 
+LEAST_SPAN = 30.0
+"""Of the times in a chart, so that methods alike look alike."""
 FLOOR, CEILING = 1e-17, 3.0
 """Where errors of 0, and errors beyond all sense, are drawn."""
 
