@@ -252,6 +252,21 @@ def _is_tried():
     return not numba.config.DISABLE_JIT and numba.__version__.startswith(TRIED)
 
 
+def _put_off_scipy():
+    """Loads numba's functions of arrays without scipy.linalg, a seventh of a warm run; `dot` loads it when compiled."""
+    from numba.np import linalg
+
+    asked, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+    try:
+        import numba.np.arraymath  # noqa: F401  asks for it only to know that it is there
+    finally:
+        linalg.ensure_blas = asked
+
+
+if _is_tried():
+    _put_off_scipy()
+
+
 def _made(dispatcher, compiler, function, options):
     return dispatcher(function, {}, {"nopython": True, "boundscheck": None, **options}, pipeline_class=compiler)
 

@@ -2,12 +2,14 @@
 
 import gc
 import re
+import subprocess
+import sys
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from columns import printed_both_ways
-from numba import float64
+from numba import float64, njit
 from numba.core.runtime import _nrt_python, rtsys
 
 from kernels.lanes.columns import each_cell, entry, entry_of
@@ -199,3 +201,29 @@ def test_arrays_that_parts_borrow_are_kept_and_those_they_make_are_freed():
         add(lent)
     assert allocated() == held
     assert (lent.b == 39.0).all()
+
+
+@pytest.mark.skipif(not COMPILED, reason="plain Python loads no compiler")
+def test_a_kernel_runs_without_scipys_linear_algebra():
+    lines = (
+        "import sys, numpy as np",
+        "from kernels import catalogue",
+        "kernel = catalogue.get('polisher')",
+        "kernel.check(*(np.ones(40) for _ in kernel.parameters), np.zeros(40, np.int8))",
+        "assert 'numba.np.arraymath' in sys.modules and 'scipy.linalg' not in sys.modules",
+    )
+    subprocess.run([sys.executable, "-c", "\n".join(lines)], check=True)
+
+
+def _numbers_and_arrays(a, x, y):
+    """Sums that numba gives different meanings."""
+    return (1 + 2) + (a[0] + x) + (a + y)[1] + len((1, 2) + (3,))
+
+
+@pytest.mark.skipif(not COMPILED, reason="of the compiler's own")
+def test_operators_keep_their_meaning_for_numbers_arrays_and_tuples():
+    a = np.array([0.5, 1.5])
+    roots(np.ones(40), np.ones(40), np.empty(40))  # from here on what operators make of numbers is remembered
+    compiled = njit(_numbers_and_arrays)
+    for x, y in ((1, 2.0), (1.0, 2), (True, 2.0), (1j, 2.0)):
+        assert compiled(a, x, y) == _numbers_and_arrays(a, x, y)
