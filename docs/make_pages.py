@@ -174,7 +174,7 @@ def _gallery() -> Iterator[str]:
 def _entry(name: str, script: Path) -> Iterator[str]:
     """A study: the first line of its script asks, the caption of its picture answers, and the rest says how."""
     text = ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or name
-    question, _, rest = text.partition("\n")
+    question, _, rest = re.sub(r"\\\n +", "", text).partition("\n")  # a command of two lines is one
     commands = [line for line in rest.splitlines() if COMMAND.match(line)]
     caption = script.with_suffix(".md").read_text(encoding="utf-8").strip()
     told = prose("\n".join(line for line in rest.splitlines() if line not in commands))

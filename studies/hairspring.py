@@ -240,7 +240,7 @@ def draw_lines(axes: Any, ds: xr.Dataset, springs: xr.Dataset) -> None:
         axes.plot(cell.kappa, cell.s, "o", color=colour)
         direct_label(axes, 2.4 * cell.kappa, cell.s, rf"$\alpha = 10^{{{power}}}$", colour, ha="left")
     axes.set(xlabel=r"spring, $\kappa = k\varphi_0/\mu$ [1]", ylabel=r"sensitivity to torque, $s$ [1]")
-    axes.set(xlim=(ds.kappa.min(), ds.kappa.max()), ylim=(2e-7, 1.5))
+    axes.set(xlim=(ds.kappa.min(), 10 * ds.kappa.max()), ylim=(2e-7, 1.5))
     key(axes)
     day = axes.secondary_yaxis("right", functions=(lambda s: 0.01 * DAY * s, lambda rate: rate / (0.01 * DAY)))
     day.set_ylabel("rate [s/day] by 1 % of torque")

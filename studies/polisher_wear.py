@@ -124,7 +124,7 @@ def least_uneven(ds: xr.Dataset, over: Sequence[str]) -> xr.Dataset:
 def told(cell: xr.Dataset) -> str:
     """Unevenness, place and centre of a cell."""
     place = f"{100 * float(cell.uneven):.1f} % at e = {CM * float(cell.e):g} cm, "
-    return f"{place}offset {CM * float(cell.w_x - cell.L):.0f} cm, centre {float(cell.centre):.2f}"
+    return f"{place}offset {CM * float(cell.w_x - cell.L):.3g} cm, centre {float(cell.centre):.2f}"
 
 
 def eccentricities(ds: xr.Dataset) -> list[Statement]:

@@ -1,6 +1,6 @@
 """Does any command fall over, hang, take much memory or read other files, given a result that somebody has forged?
 
-    python benchmarks/soak/forged.py [--results 300] [--seed 1] [--only show ...]
+    python benchmarks/soak/forged.py [--results 300] [--minutes 30] [--seed 1] [--only show ...]
 
 Attributes, types, shapes, chunks, filters, links, object headers, numbers and the layout are forged, and sealed anew
 in most cases. Every command that reads results must end with a message, or do what it is for, within 20 s of a
@@ -11,10 +11,12 @@ Prints the figures; exit status 1 where one does not.
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import random
 import sys
 import tempfile
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -31,6 +33,7 @@ ALWAYS = {"show", "verify"}
 def main() -> int:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--results", type=int, default=300)
+    arguments.add_argument("--minutes", type=float, default=math.inf, help="begin no result after so many")
     arguments.add_argument("--seed", type=int, default=1)
     arguments.add_argument("--first", type=int, default=0, help="number of the first result, to see one again")
     arguments.add_argument("--only", nargs="*", default=[], help="commands")
@@ -44,7 +47,10 @@ def main() -> int:
         scratch.mkdir()
         (scratch / "study.toml").write_text((folder / "study.toml").read_text())
         os.mkfifo(scratch / "secret")  # who opens it waits for ever
+        stop, number = time.monotonic() + 60.0 * given.minutes, given.first
         for number in range(given.first, given.first + given.results):
+            if time.monotonic() > stop:
+                break
             path = scratch / "out.h5"
             kind = forged(random.Random(given.seed * 10**9 + number), whole, path)
             content = path.read_bytes()
@@ -66,7 +72,7 @@ def main() -> int:
                     left.unlink()
     print("\n".join(f"  {end}: {count}" for end, count in sorted(ends.items())))
     print(f"  slowest {slowest[0]:.1f} s ({slowest[1]}), largest {largest[0] >> 20} MB ({largest[1]})")
-    print(f"{given.results} results, {sum(ends.values())} commands; wrong: {len(bad)}")
+    print(f"results {given.first} to {number}, {sum(ends.values())} commands; wrong: {len(bad)}")
     return int(bool(bad))
 
 

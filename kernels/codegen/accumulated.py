@@ -21,7 +21,7 @@ LEAST = 6
 """Switches of which the last five are looked at: the first interval is of another kind."""
 NEAR = 1e-3
 """Of the time of rest, what may be left to it: then the intervals are believed to go on as they do."""
-TINY = 1e-8
+TINY = 1e-12
 """Of the time, an interval that is not worth to be followed: by less, rounding tells on what intervals shrink."""
 FINE = 1e-9
 """The tolerance at most: a wide one takes bounces for grazing that are still large."""

@@ -182,6 +182,8 @@ def _check_kinds(dataset: xr.Dataset) -> None:
     for attrs in (dataset.attrs, *(v.attrs for v in dataset.variables.values())):
         if not all(isinstance(attrs[name], str) for name in TEXTS if name in attrs):
             raise TypeError("an attribute is no text")
+        for text in attrs.values():
+            str(text).encode()  # bytes that are no UTF-8 cannot be printed
         float(attrs.get("rtol", 0.0)), float(attrs.get("cells_per_second", 0.0))
     if not {v.dtype.kind for v in dataset.data_vars.values()} <= set("fiu"):
         raise TypeError("an output is no number")
@@ -192,6 +194,9 @@ def _check_as_declared(dataset: xr.Dataset, study: Study) -> None:
     plan = output_schema(study, {})
     declared = {c.name: ((*plan.grid.dims, *c.dims), plan.shape(c), np.dtype(c.dtype).kind) for c in plan.columns}
     declared |= {c.name: (c.dims, np.shape(c.values), np.asarray(c.values).dtype.kind) for c in plan.coordinates}
+    for c in plan.coordinates:
+        if not _equal(dataset.variables[c.name].values, np.asarray(c.values)):
+            raise ValueError(f"{c.name} has other values than the study")
     if set(dataset.variables) - set(declared):
         raise ValueError("more is there than the study asks for")
     for name, expected in declared.items():
@@ -201,6 +206,12 @@ def _check_as_declared(dataset: xr.Dataset, study: Study) -> None:
         kind = variable.dtype.kind.replace("O", "U").replace("T", "U")
         if (variable.dims, variable.shape, kind) != expected:
             raise ValueError(f"{name} is not as the study says")
+
+
+def _equal(found: Any, expected: Any) -> bool:
+    """Whether numbers or words are the same, NaN included."""
+    text = expected.dtype.kind == "U"
+    return bool(np.array_equal(found.astype(str) if text else found, expected, equal_nan=not text))
 
 
 def _of_unfinished(output: Path, found: xr.Dataset, attrs: Mapping[str, Any]) -> xr.Dataset:

@@ -251,9 +251,10 @@ def damaged(file: StoredFile, name: str, blocks: Iterable[int]) -> Iterator[tupl
 
 
 def padding_is_zero(file: StoredFile) -> bool:
-    """Whether there are zeros alone between the chunks. Raises OSError, EOFError."""
+    """Whether there are zeros alone between the chunks and behind the last one. Raises OSError, EOFError."""
     known = [table.spans() for table in file.layout.tables.values()]
-    spans = np.concatenate([*known, np.array(file.layout.endings, np.int64)])
+    end = file.layout.end
+    spans = np.concatenate([*known, np.array([*file.layout.endings, (end, end)], np.int64)])
     spans = spans[np.argsort(spans[:, 0], kind="stable")]
     between = np.stack([spans[:-1, 1], spans[1:, 0]], axis=1)
     begins, ends = np.array(file.layout.regions, np.int64).T

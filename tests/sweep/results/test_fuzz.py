@@ -1,5 +1,6 @@
 """Files that nobody vouches for: no traceback, no hang, no foreign code, no path out of its folder."""
 
+import contextlib
 import dataclasses
 import os
 import pickle
@@ -215,9 +216,39 @@ def one_thing_more(file):
     file.create_dataset("more", (10**7,), "f8", chunks=(10**6,), compression="gzip")[...] = 0.0
 
 
-@pytest.mark.parametrize("change", [no_dimension, one_thing_more])
+def twice(file):
+    """A value of an axis stands there twice."""
+    file["height"][1] = file["height"][0]
+
+
+def no_text(file):
+    """Bytes that are no UTF-8."""
+    file.attrs.create("title", b"\xc4", dtype=h5py.string_dtype())
+
+
+def no_word(file):
+    """In the study."""
+    file.attrs["study_json"] = file.attrs["study_json"].replace('"method": "auto"', '"method": {}')
+
+
+def another_shape(file):
+    """With the attributes that it had; HDF5 2.0 crashes when h5netcdf looks at its dimensions."""
+    attrs = dict(file["method_used"].attrs)
+    del file["method_used"]
+    made = file.create_dataset("method_used", (1,), "u8")
+    for name, value in attrs.items():
+        with contextlib.suppress(TypeError, ValueError, OSError, RuntimeError):
+            made.attrs[name] = value
+
+
+DAMAGED, CHANGED = "not the result of a sweep, or damaged", "was changed by another program, and is no result any more"
+FORGED = [(no_dimension, CHANGED), (one_thing_more, ""), (twice, ""), (no_text, DAMAGED), (no_word, ""),
+          (another_shape, DAMAGED)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "told"), FORGED)
 @pytest.mark.parametrize("sealed", [False, True])
-def test_a_result_holds_what_its_study_says(whole, tmp_path, capsys, change, sealed):
+def test_a_result_holds_what_its_study_says(whole, tmp_path, capsys, change, told, sealed):
     path = tmp_path / "out.h5"
     path.write_bytes(whole.read_bytes())
     with path.open("r+b") as file:
@@ -227,16 +258,13 @@ def test_a_result_holds_what_its_study_says(whole, tmp_path, capsys, change, sea
         change(file)
     if sealed:
         seal(path, layout)
-    status, told = main(["show", str(path)]), capsys.readouterr().err
-    if sealed:
-        assert status == 2
-        assert "not the result of a sweep, or damaged" in told
-    elif change is no_dimension:
-        assert status == 2
-        assert "was changed by another program, and is no result any more" in told
-    else:
-        assert status == 0
-        assert told == ""
+    expected = DAMAGED if sealed and change is not no_word else told
+    command = ["report", str(path), "-o", str(tmp_path / "out.html")] if change is no_text else ["show", str(path)]
+    status, said = main(command), capsys.readouterr().err
+    if change is no_word and sealed:
+        assert "not the JSON of a study" in said
+    assert expected in said
+    assert status == (2 if sealed or expected else 0)
 
 
 @pytest.mark.parametrize("name", ["../secret.csv", "/etc/passwd", "sub/../../secret.csv", "link.csv", "\0", "a" * 5000])
