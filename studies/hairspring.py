@@ -176,7 +176,7 @@ def improvement(ds: xr.Dataset) -> list[Statement]:
     said = {1e4: True, 1e2: True}
     return [
         Statement(f"best spring, s of alpha = {alpha:g} falls by", "dramatically" if alpha in said else "", f"{x:.4g}",
-                  None, x > 10 if alpha in said else None)
+                  None, x > (10 if alpha in said else 1))
         for alpha, x in gain.items()
     ]  # fmt: skip
 

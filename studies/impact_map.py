@@ -142,7 +142,6 @@ def motions(closed: xr.Dataset, motion: xr.Dataset) -> list[Statement]:
     both = (closed.status == Status.OK) & (motion.status == Status.OK) & (motion.impacts == 1)
     same = motion.where(both & (closed.e > 0))
     lost = (closed.status == Status.OK) & (motion.status != Status.OK)
-    kind = kinds(motion)
     twice = 2 * half_period(closed)
     way = same.kappa * (1 + same.e) / (4 * (1 - same.e) * (1 + same.kappa))
     return [
@@ -150,8 +149,14 @@ def motions(closed: xr.Dataset, motion: xr.Dataset) -> list[Statement]:
         Statement("swing by events = Y, whatever the torque", "1e-9", f"{count(both)} cells", *_near(same.Y, way)),
         Statement("stable cycles that events does not settle on", "1 %", f"{count(lost)} cells", None,
                   count(lost) < 0.01 * lost.size),
-        *(Statement(f"the clock's motion: {name}", "", f"{count(kind == i)} cells") for i, name in enumerate(KINDS)),
     ]  # fmt: skip
+
+
+def census(motion: xr.Dataset) -> str:
+    """How many cells move in what way."""
+    kind = kinds(motion)
+    told = ", ".join(f"{name} {count(kind == i)}" for i, name in enumerate(KINDS))
+    return textwrap.fill(f"The clock's motion, in cells: {told}.", 120)
 
 
 def _near(here: xr.DataArray, theory: xr.DataArray) -> tuple[float, bool]:
@@ -303,7 +308,7 @@ def conclude(path: str, lever_path: str) -> tuple[Groups, list[str], Any]:
         "What the clock does": motions(closed, motion),
         "A curved lever": lever(bent),
     }
-    return groups, [NOTES, "", words(closed)], figure(closed, motion, bent)
+    return groups, [NOTES, "", words(closed), census(motion)], figure(closed, motion, bent)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -33,7 +33,7 @@ def test_every_statement_holds(ds):
     groups = study.statements(ds)
     checked = [s for lines in groups.values() for s in lines if s.holds is not None]
     assert [s.what for s in checked if not s.holds and not s.what.startswith("its amplitude")] == []
-    assert len(checked) == 7
+    assert len(checked) == 10
 
 
 def test_the_machines_found_have_the_amplitude_and_the_distortion_that_is_said(ds):

@@ -110,7 +110,7 @@ def test_the_study_covers_ten_decades_of_alpha_around_one_finely():
 def test_every_statement_of_the_paper_that_can_be_checked_holds(groups):
     checked = [s for lines in groups.values() for s in lines if s.holds is not None]
     assert [s.what for s in checked if not s.holds] == []
-    assert len(checked) == 27
+    assert len(checked) == sum(map(len, groups.values())) == 46
 
 
 def test_scaled_values_are_those_of_the_closed_form(ds):
@@ -151,7 +151,7 @@ def test_a_false_value_makes_a_statement_fail(scaling, ds):
     wrong = ds.assign(aP=ds.aP * 1.001)
     assert [s.holds for s in scaling.limits(wrong)] == [False, True, False, True]
     steep = ds.assign(aP=ds.aP * ds.alpha**-0.001)
-    assert [s.holds for s in scaling.straight_lines(steep)] == [False, False, True, True, None]
+    assert [s.holds for s in scaling.straight_lines(steep)] == [False, False, True, True, True]
 
 
 def test_a_swing_that_leans_forward_or_loses_more_is_seen(scaling, ds, monkeypatch):
@@ -162,7 +162,24 @@ def test_a_swing_that_leans_forward_or_loses_more_is_seen(scaling, ds, monkeypat
     assert not all(s.holds for s in scaling.shape(ds))
     kept = scaling.sweep_of_alpha
     monkeypatch.setattr(scaling, "sweep_of_alpha", lambda *x: kept(*x).pipe(lambda d: d.assign(s=1.01 * d.s)))
-    assert sum(s.holds is False for s in scaling.energy(ds)) == 3
+    # two drives whose turn is elsewhere, and dlnP/dlnI of all three
+    assert sum(s.holds is False for s in scaling.energy(ds)) == 5
+
+
+def test_a_false_speed_period_or_point_of_one_half_is_seen(scaling, ds, monkeypatch):
+    assert not any(s.failed for s in scaling.estimates(ds) + scaling.sliding(ds, scaling.half_point(ds)))
+    fast = ds.assign(crossing_speed=1.001 * ds.crossing_speed)
+    assert [s.failed for s in scaling.estimates(fast)] == [True, True]
+    moved = scaling.HalfPoint(*(1.0001 * x for x in scaling.HALF[:1]), 0.0, *scaling.HALF[1:])
+    assert sum(s.failed for s in scaling.sliding(ds, moved)) == 1
+    assert sum(s.failed for s in scaling.sliding(ds.assign(s=1.01 * ds.s), moved)) == 2
+    kept = scaling.sweep_of_alpha
+    monkeypatch.setattr(scaling, "sweep_of_alpha", lambda *x: kept(*x).pipe(lambda d: d.assign(s=1.01 * d.s)))
+    assert sum(s.failed for s in scaling.torque(ds)) == 6
+    cycle = kept(ds, scaling.SHOWN.values())
+    assert not any(s.failed for s in scaling.taken_out(ds, cycle))
+    slow = cycle.assign(crossing_speed=0.98 * cycle.crossing_speed)
+    assert all(s.failed for s in scaling.taken_out(ds, slow))
 
 
 def test_torque_stability_is_the_accuracy_over_the_sensitivity(scaling, ds):
