@@ -19,7 +19,8 @@ from typing import Any
 import sweep
 from kernels import catalogue
 from kernels.interface import Field, Kernel, Method
-from sweep.cli import COMMANDS, Option
+from sweep.cli import COMMANDS
+from sweep.command.options import Option
 from sweep.show.kernels import starter
 from sweep.study.mistakes import limits
 
@@ -171,15 +172,14 @@ def _gallery() -> Iterator[str]:
 
 
 def _entry(name: str, script: Path) -> Iterator[str]:
-    """A study: the first line of its script asks; its caption, or else the rest of the description, answers."""
+    """A study: the first line of its script asks, the caption of its picture answers, and the rest says how."""
     text = ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or name
-    question, _, rest = text.partition("\n")
+    question, _, rest = re.sub(r"\\\n +", "", text).partition("\n")  # a command of two lines is one
     commands = [line for line in rest.splitlines() if COMMAND.match(line)]
-    caption = script.with_suffix(".md")
+    caption = script.with_suffix(".md").read_text(encoding="utf-8").strip()
     told = prose("\n".join(line for line in rest.splitlines() if line not in commands))
-    words = [caption.read_text(encoding="utf-8").strip()] if caption.exists() else told
     yield from (f"## {name.replace('_', ' ')}", "", f"*{_plain(question)}*", "", f"![{name}](studies/{name}.png)", "")
-    yield from (*words, "", "```sh", *(re.split(r"  +", line.strip())[0] for line in commands), "```", "")
+    yield from (caption, "", *told, "", "```sh", *(re.split(r"  +", line.strip())[0] for line in commands), "```", "")
 
 
 # commands

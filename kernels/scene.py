@@ -52,6 +52,7 @@ class Scene:
     surface : (states, side, parameters) -> what falls through 0 at the switch
     start : (parameters) -> the states at time 0, where side is 1
     switch : (states, side, parameters) -> the states just behind the switch; None: they do not jump
+    most_kinks : between two switches, after which a cell is given up; None: a thousand
 
     At a switch `side` turns from 1 to -1 or back. Where abs(u) or sign(u) occurs, u = 0 is a *kink*: the motion is
     followed up to it and begun anew behind it. A motion that cannot leave a kink sticks there.
@@ -65,6 +66,7 @@ class Scene:
     surface: Function
     start: Function
     switch: Function | None = None
+    most_kinks: int | None = None
 
     def __post_init__(self) -> None:
         names = [*self.states, *self.parameters]

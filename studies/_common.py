@@ -7,7 +7,6 @@ theory says beside what comes out, and draws `<question>.png` beside the dataset
 from __future__ import annotations
 
 import sys
-import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -152,8 +151,3 @@ def plain_ticks(axis: Any, values: Sequence[float]) -> None:
     """Ticks of a logarithmic axis at these values, written out, and no others."""
     axis.set_ticks(list(values), labels=[f"{x:g}" for x in values])
     axis.set_ticks([], minor=True)
-
-
-def paragraph(text: str) -> list[str]:
-    """Running text as lines of 118 characters."""
-    return textwrap.wrap(" ".join(text.split()), 118)

@@ -357,7 +357,7 @@ def draw_scaling(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
         axes.text(*place, text)
     line.set_label("asymptotes")
     axes.plot(half.alpha, half.aP, "o", color="black", label=r"exponent $-1/2$")
-    axes.set(ylabel=r"$aP$ and $\varphi_{\max}/\varphi_0$")
+    axes.set(ylabel=r"$aP$ and $\varphi_{\max}/\varphi_0$ [1]")
     axes.legend(loc="upper right")
 
 
@@ -382,8 +382,8 @@ def draw_exponent(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
     axes.plot(half.alpha, -0.5, "o", color="black")
     axes.annotate(rf"$\alpha = {half.alpha:.6f}$", (half.alpha, -0.5), (8, -12), textcoords="offset points")
     axes.set(
-        xlabel=r"drive torque, $\alpha = \mu/(a^2\varphi_0)$",
-        ylabel=r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$",
+        xlabel=r"drive torque, $\alpha = \mu/(a^2\varphi_0)$ [1]",
+        ylabel=r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$ [1]",
         ylim=(-1.06, -0.27),
     )
     axes.set_yticks([-1, -1 / 2, -1 / 3], labels=["$-1$", r"$-\frac{1}{2}$", r"$-\frac{1}{3}$"])
@@ -404,12 +404,12 @@ def draw_trajectories(panels: Sequence[Any], motion: xr.Dataset, phi0: float) ->
             axes.axhline(switch, color="black", linewidth=0.6, linestyle=(0, (4, 2)))
         axes.plot(phase, np.concatenate([angle, angle[1:]]), color=COLOURS[0])
         top = 1.5 * float(abs(angle).max())
-        axes.set(xlim=(0, 2), ylim=(-top, top), ylabel=r"$\varphi/\varphi_0$")
+        axes.set(xlim=(0, 2), ylim=(-top, top), ylabel=r"$\varphi/\varphi_0$ [1]")
         axes.set_title(rf"{name} drive, $\alpha = {alpha:g}$, $aP = {float(motion.aP[i]):.4g}$", loc="right")
         for k, sign in enumerate(("-", "+", "-", "+")):
             axes.text(0.25 + 0.5 * k, 0.84 * top, rf"${sign}\mu$", ha="center", va="center")
     panels[-1].set_xticks([0, 0.5, 1, 1.5, 2])
-    panels[-1].set_xlabel(r"time, $t/P$")
+    panels[-1].set_xlabel(r"time, $t/P$ [1]")
 
 
 def read(path: str) -> xr.Dataset:

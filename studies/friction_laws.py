@@ -198,8 +198,8 @@ def draw_exponents(axes: Any, laws: xr.Dataset) -> None:
         axes.semilogx(law.mu, -law.sensitivity, color=COLOURS[i])
         heights = {0.0: -0.06, 1.0: -0.94, 2.0: -0.45, 3.0: -0.55, 4.0: -0.72}
         direct_label(axes, 3e-7 if n else 2e6, heights[n], f"$n={n:g}$", COLOURS[i])
-    axes.set(xlim=(1e-9, 1e9), ylim=(-1.05, 0.05), xlabel=r"torque, $\mu$, where $c = \varphi_0 = 1$")
-    axes.set_ylabel(r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$")
+    axes.set(xlim=(1e-9, 1e9), ylim=(-1.05, 0.05), xlabel=r"torque, $\mu$ [rad/s$^2$]")
+    axes.set_ylabel(r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$ [1]")
 
 
 def draw_limits(axes: Any, laws: xr.Dataset) -> None:
@@ -217,7 +217,7 @@ def draw_limits(axes: Any, laws: xr.Dataset) -> None:
     axes.plot(0, -laws.sensitivity.sel(n=0)[-1], "s", color=COLOURS[1], markersize=3, clip_on=False)
     direct_label(axes, 1.45, -1.15, "$-1/n$")
     direct_label(axes, 0.9, -0.1, "$-n/(n+2)$", ha="left")
-    axes.set(xlim=(0, 4.3), ylim=(-2.1, 0.05), xlabel="degree of friction, $n$")
+    axes.set(xlim=(0, 4.3), ylim=(-2.1, 0.05), xlabel="degree of friction, $n$ [1]", ylabel="exponent [1]")
     axes.legend(loc="lower right")
 
 
@@ -225,9 +225,9 @@ def draw_map(axes: Any, grid: xr.Dataset, line: xr.Dataset) -> None:
     """s over torque and Coulomb friction at fixed viscous friction, and the best torque."""
     part = grid.sel(R=slice(1e-2, 1e5), mu=slice(1e-2, 1e7))
     mu, R, s = part.mu.values, part.R.values, part.sensitivity.values
-    axes.set(xscale="log", yscale="log", xlabel=r"torque, $\mu/(a^2\varphi_0)$", xlim=(mu[0], mu[-1]))
+    axes.set(xscale="log", yscale="log", xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]", xlim=(mu[0], mu[-1]))
     axes.set_title(r"$s = -\mathrm{d}\ln P/\mathrm{d}\ln\mu$", loc="right")
-    axes.set(ylabel=r"Coulomb friction, $R/(a^2\varphi_0)$", ylim=(R[0], R[-1]))
+    axes.set(ylabel=r"Coulomb friction, $R/(a^2\varphi_0)$ [1]", ylim=(R[0], R[-1]))
     shown = np.ma.masked_invalid(np.minimum(s, 1.0))
     axes.pcolormesh(mu, R, shown, cmap="viridis", vmin=0, vmax=1, alpha=0.75, rasterized=True)
     levels = (0.1, 0.2, 0.3, 1 / 3, 0.4, 0.5, 0.7, 1)

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, paragraph, read_result, report
+from _common import Groups, Statement, compared, differing, read_result, report
 
 import sweep
 
@@ -181,25 +181,6 @@ def by_noise(noisy: xr.Dataset) -> list[Statement]:
     return lines
 
 
-def caption(ds: xr.Dataset, noisy: xr.Dataset) -> list[str]:
-    """Two to four sentences with the numbers of the datasets."""
-    effect = averages(ds).effect.sel(harmonic=1)
-    weak, half, strong = (float(effect.sel(mu=m, method="nearest")) for m in (0.04, 1.463, 100.0))
-    rates = [np.ptp(seasons(mu, vogel)[1]) for mu in (0.1, 1.4629905875801047, 30.0)]
-    blind = noisy.isel(mu=1)
-    loud, quiet = (
-        float(np.sqrt((blind.rate_scatter_s_per_day.sel(cell) ** 2).mean("seed")))
-        for cell in ({"sigma": 0.05, "sigma_a": 0}, {"sigma": 0, "sigma_a": 0.05})
-    )
-    return paragraph(f"""Figure. (a) Period of a foliot whose friction is a(1 + d cos(pi phi/phi0)): its mean on the way
-        is a at any d, yet it changes, by {weak:+.3f} d at weak drive, {half:+.3f} d where s = 1/2 and
-        {strong:+.3f} d at strong drive. (b) That slope beside what means over angle, time and energy would make of it:
-        none is right at every drive; the energy's is at strong drive. (c) An oil by season changes the rate by
-        {rates[0]:.0f} s/day at weak drive, {rates[2]:.0f} at alpha = 30 and {rates[1]:.0f} at s = 1/2. (d) Noise of the
-        friction scatters a clock of s = 1/2 by {quiet:.1f} s/day from hour to hour where as much of the torque makes
-        {loud:.0f}; elsewhere it is abs(2s - 1)/s of it.""")
-
-
 def figure(ds: xr.Dataset, noisy: xr.Dataset) -> Any:
     """Periods, averages, seasons, noise; for two columns of print."""
     from sweep.show import charts
@@ -269,13 +250,13 @@ def draw_noise(axes: Any, noisy: xr.Dataset) -> None:
         scatter = np.sqrt((noisy.rate_scatter_s_per_day.sel(cell) ** 2).mean("seed"))
         axes.plot(s, law, color=COLOURS[k])
         axes.plot(clock.sensitivity, scatter / unit, MARKS[k], color=COLOURS[k], markerfacecolor="white", label=name)
-    axes.plot([], [], color="black", label="theory (4)")
-    axes.set(xlabel="sensitivity, $s$ [1]", ylabel=r"scatter over $\sigma\sqrt{T/\tau}$ [1]", ylim=(0, 1.6))
-    axes.legend(title="noise of", loc="upper left", fontsize=7)
+    axes.plot([], [], color="black", label="theory")
+    axes.set(xlabel="sensitivity, $s$ [1]", ylabel=r"scatter over $\sigma\sqrt{T/\tau}$ [1]", ylim=(0, 1.7))
+    axes.legend(title="noise of", loc="upper center", fontsize=7, ncols=2)
 
 
 def conclude(path: str, noise_path: str) -> tuple[Groups, list[str], Any]:
-    """Statements, the caption and the figure."""
+    """Statements and the figure."""
     ds = read_result(path, "friction_scene:KERNEL", ["mu", "harmonic", "depth"], "friction_varies.toml")
     noisy = read_result(noise_path, "foliot_noise", ["mu", "sigma", "sigma_a", "seed"], "friction_varies_noise.toml")
     groups = {
@@ -283,7 +264,7 @@ def conclude(path: str, noise_path: str) -> tuple[Groups, list[str], Any]:
         "Friction by season": by_season(ds),
         "Noise of friction and torque": by_noise(noisy),
     }
-    return groups, [NOTES, *caption(ds, noisy)], figure(ds, noisy)
+    return groups, [NOTES], figure(ds, noisy)
 
 
 def main(arguments: Sequence[str]) -> int:

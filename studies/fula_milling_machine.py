@@ -80,12 +80,12 @@ def frequencies(ds: xr.Dataset) -> list[Statement]:
     ]
 
 
-def receptance(J: Any, K: Any, w: float) -> complex:
-    """Of the spindle, from complex stiffnesses."""
+def receptance(J: Any, K: Any, w: Any) -> Any:
+    """Of the spindle, from complex stiffnesses, at one or many angular frequencies."""
     below = K[-1] - w * w * J[-1]
     for j in range(len(J) - 2, -1, -1):
         below = K[j] * below / (K[j] + below) - w * w * J[j]
-    return complex(1 / below)
+    return 1 / below
 
 
 def removed(J: list[complex], K: list[complex], j: int, w: float, keep_mu: bool) -> tuple[list[complex], list[complex]]:
@@ -285,8 +285,8 @@ def draw_sizes(axes: Any, error: xr.DataArray, kept: xr.DataArray, label: str) -
         worst = abs(error.isel(reduction=code, mode=slice(0, 4))).max("mode", skipna=False)
         shown = worst.where((worst > 1e-15) & (kept < 8))
         axes.semilogy(kept, shown, MARKS[code] + "-", color=COLOURS[code], label=name.replace("_", "-"))
-    axes.axhline(0.01, color="0.5", linewidth=0.7)
-    axes.set(xlabel="masses kept", ylabel=label, xlim=(3.7, 7.3), ylim=(1e-9, 1), xticks=range(4, 8))
+    axes.axhline(0.01, color="0.5", linewidth=0.7, label="1 %")
+    axes.set(xlabel="masses kept [1]", ylabel=label, xlim=(3.7, 7.3), ylim=(1e-9, 1), xticks=range(4, 8))
 
 
 def draw_errors(axes: Any, ds: xr.Dataset, f: np.ndarray) -> None:
@@ -295,7 +295,7 @@ def draw_errors(axes: Any, ds: xr.Dataset, f: np.ndarray) -> None:
 
     for how, name, colour, line in (("real", "source", COLOURS[1], "-"), ("complex", "dampers exact", "black", ":")):
         axes.semilogy(f, [error_at(ds, x, how) for x in f], line, color=colour, label=name)
-    axes.axvline(SPAN, color="0.5", linewidth=0.7)
+    axes.axvline(SPAN, color="0.5", linewidth=0.7, label="1000 rad/s")
     axes.set(xlabel="frequency [Hz]", ylabel="$|H_5/H_8 - 1|$ [1]", xlim=(0, 500), ylim=(1e-4, 3))
     axes.legend(loc="lower right")
 

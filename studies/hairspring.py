@@ -238,9 +238,9 @@ def draw_lines(axes: Any, ds: xr.Dataset, springs: xr.Dataset) -> None:
         few = few[(few > alpha ** (-1 / 3)) & (few < 1.6 * alpha)]
         axes.plot(few, first_order(alpha, few), "x", color="black", markersize=3.5, markeredgewidth=0.7)
         axes.plot(cell.kappa, cell.s, "o", color=colour)
-        direct_label(axes, cell.kappa / 3, cell.s / 2.5, rf"$\alpha = 10^{{{power}}}$", colour, ha="right")
-    axes.set(xlabel=r"spring, $\kappa = k\varphi_0/\mu$", ylabel=r"sensitivity to torque, $s$")
-    axes.set(xlim=(ds.kappa.min(), ds.kappa.max()), ylim=(2e-7, 1.5))
+        direct_label(axes, 2.4 * cell.kappa, cell.s, rf"$\alpha = 10^{{{power}}}$", colour, ha="left")
+    axes.set(xlabel=r"spring, $\kappa = k\varphi_0/\mu$ [1]", ylabel=r"sensitivity to torque, $s$ [1]")
+    axes.set(xlim=(ds.kappa.min(), 10 * ds.kappa.max()), ylim=(2e-7, 1.5))
     key(axes)
     day = axes.secondary_yaxis("right", functions=(lambda s: 0.01 * DAY * s, lambda rate: rate / (0.01 * DAY)))
     day.set_ylabel("rate [s/day] by 1 % of torque")
@@ -262,8 +262,8 @@ def draw_map(axes: Any, ds: xr.Dataset) -> None:
     from matplotlib.colors import LogNorm
 
     kappa, alpha, rate = ds.kappa.values, ds.alpha.values, 0.01 * DAY * ds.s.values
-    axes.set(xscale="log", yscale="log", xlabel=r"spring, $\kappa = k\varphi_0/\mu$")
-    axes.set(ylabel=r"drive, $\alpha = \mu/(a^2\varphi_0)$", ylim=(alpha.min(), alpha.max()))
+    axes.set(xscale="log", yscale="log", xlabel=r"spring, $\kappa = k\varphi_0/\mu$ [1]")
+    axes.set(ylabel=r"drive, $\alpha = \mu/(a^2\varphi_0)$ [1]", ylim=(alpha.min(), alpha.max()))
     shown = np.ma.masked_invalid(rate)
     axes.pcolormesh(kappa, alpha, shown, norm=LogNorm(1e-4, 1e3), cmap="viridis", alpha=0.75, rasterized=True)
     levels = (1e-3, 1e-2, 0.1, 1, 10, 100, 400)

@@ -202,8 +202,9 @@ def figure(closed: xr.Dataset, motion: xr.Dataset, bent: xr.Dataset) -> Any:
         axes = page.subplots(2, 2)
         draw_swing(page, axes[0, 0], closed)
         draw_recoil(page, axes[0, 1], closed)
-        draw_kinds(axes[1, 0], motion)
-        draw_lever(page, axes[1, 1], bent)
+        keys = draw_kinds(axes[1, 0], motion)
+        page.legend(handles=keys, title="(c) the clock's motion", loc="outside lower left", ncols=3)
+        page.legend(handles=draw_lever(page, axes[1, 1], bent), title="Borders", loc="outside lower right")
         for panel, text in zip(axes.flat, "abcd", strict=True):
             charts.letter(panel, text)
     return page
@@ -212,7 +213,7 @@ def figure(closed: xr.Dataset, motion: xr.Dataset, bent: xr.Dataset) -> Any:
 def _frame(axes: Any, ds: xr.Dataset) -> tuple[Any, Any]:
     kappa, e = ds.kappa.values, ds.e.values
     axes.set(xscale="log", xlim=(kappa[0], kappa[-1]), ylim=(e[0], e[-1]))
-    axes.set(xlabel=r"mass of the wheel over that of the foliot, $\kappa$", ylabel="restitution, $e$")
+    axes.set(xlabel=r"wheel over foliot, $\kappa$ [1]", ylabel="restitution, $e$ [1]")
     return kappa, e
 
 
@@ -226,10 +227,9 @@ def draw_swing(page: Any, axes: Any, ds: xr.Dataset) -> None:
     values = ds.Y.transpose("e", "I_c").values
     kappa, e = _frame(axes, ds)
     mesh = axes.pcolormesh(kappa, e, values, vmin=0, vmax=0.8, cmap="cividis", shading="nearest", rasterized=True)
-    page.colorbar(mesh, ax=axes, label="swing over tooth pitch, $Y/p$", pad=0.02)
+    page.colorbar(mesh, ax=axes, label="swing over tooth pitch, $Y/p$ [1]", pad=0.02)
     _missing(axes, ds, values)
-    axes.axvline(1.0, color="white", linewidth=1.4)
-    axes.axvline(1.0, color="black", linewidth=0.8, linestyle=(0, (4, 2)))
+    _border(axes, np.ones_like(e), e)
     direct_label(axes, 0.1, 0.85, "no cycle with one impact")
     direct_label(axes, 10.0, 0.3, "stable")
     direct_label(axes, 0.36, 0.5, "unstable", fontsize=7)
@@ -242,17 +242,20 @@ def draw_recoil(page: Any, axes: Any, ds: xr.Dataset) -> None:
     kappa, e = _frame(axes, ds)
     shown = np.ma.masked_invalid(values / pitch)
     mesh = axes.pcolormesh(kappa, e, shown, cmap="cividis", vmin=0, vmax=0.4, shading="nearest", rasterized=True)
-    page.colorbar(mesh, ax=axes, label="recoil over tooth pitch", pad=0.02)
+    page.colorbar(mesh, ax=axes, label="recoil over tooth pitch [1]", pad=0.02)
     _missing(axes, ds, values)
-    border = kappa / (2 + kappa)
-    axes.plot(kappa, border, color="white", linewidth=1.4)
-    axes.plot(kappa, border, color="black", linewidth=0.8, linestyle=(0, (4, 2)))
+    _border(axes, kappa, kappa / (2 + kappa))
     direct_label(axes, 12, 0.3, "no recoil")
-    direct_label(axes, 24, 0.72, r"$\kappa = 2e/(1 - e)$", fontsize=7)
 
 
-def draw_kinds(axes: Any, motion: xr.Dataset) -> None:
-    """What the clock does, contact by contact."""
+def _border(axes: Any, x: Any, y: Any) -> None:
+    """A border by theory, to be seen on any ground."""
+    axes.plot(x, y, color="white", linewidth=1.4)
+    axes.plot(x, y, color="black", linewidth=0.8, linestyle=(0, (4, 2)))
+
+
+def draw_kinds(axes: Any, motion: xr.Dataset) -> list[Any]:
+    """What the clock does, contact by contact; the keys of its colours."""
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
@@ -261,32 +264,33 @@ def draw_kinds(axes: Any, motion: xr.Dataset) -> None:
     palette = ListedColormap(list(KIND_COLOURS))
     axes.pcolormesh(kappa, e, kind, cmap=palette, vmin=-0.5, vmax=len(KINDS) - 0.5, shading="nearest", rasterized=True)
     there = [i for i in range(len(KINDS)) if (kind == i).any()]
-    keys = [Patch(color=KIND_COLOURS[i], label=KINDS[i]) for i in there]
-    axes.legend(
-        handles=keys,
-        loc="upper center",
-        bbox_to_anchor=(0.5, -0.2),
-        ncols=3,
-        fontsize=7,
-        handlelength=1.2,
-        columnspacing=1,
-    )
+    return [Patch(color=KIND_COLOURS[i], label=KINDS[i]) for i in there]
 
 
-def draw_lever(page: Any, axes: Any, bent: xr.Dataset) -> None:
-    """Multiplier over kappa and the lever's curvature, and where theory has the borders of stability."""
+def draw_lever(page: Any, axes: Any, bent: xr.Dataset) -> list[Any]:
+    """Multiplier over kappa and the lever's curvature; the keys of all borders by theory."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
     kappa, nu = bent.kappa.values, bent.nu.values
     values = bent.multiplier.transpose("nu", "I_c").values
     mesh = axes.pcolormesh(kappa, nu, values, vmin=0.5, vmax=1.5, cmap="RdBu_r", shading="nearest", rasterized=True)
-    page.colorbar(mesh, ax=axes, label="multiplier", pad=0.02, extend="max")
+    page.colorbar(mesh, ax=axes, label="multiplier [1]", pad=0.02, extend="max")
     hatch(axes, kappa, nu, np.isnan(values), "////")
     inside = kappa[~np.isnan(values).all(axis=0)]
     axes.plot(inside, flip_border(inside, LEVER_E), color="black", linewidth=0.9)
     axes.axvline(1.0, color="black", linewidth=0.9)
     axes.set(xscale="log", xlim=(kappa[0], kappa[-1]), ylim=(nu[0], nu[-1]))
-    axes.set(xlabel=r"mass of the wheel over that of the foliot, $\kappa$", ylabel=r"curvature of the lever, $\nu$")
+    axes.set(xlabel=r"wheel over foliot, $\kappa$ [1]", ylabel=r"curvature of the lever, $\nu$ [1]")
     direct_label(axes, 0.3, -7, "stable")
     direct_label(axes, 0.22, 3, "unstable")
+    return [
+        Line2D(
+            [], [], color="black", linewidth=0.8, linestyle=(0, (4, 2)), label=r"(a) $\kappa=1$, (b) $\kappa=2e/(1-e)$"
+        ),
+        Line2D([], [], color="black", linewidth=0.9, label="(d) multiplier 1 by theory"),
+        Patch(facecolor="white", edgecolor="0.45", hatch="////", linewidth=0.5, label="no cycle with one impact"),
+    ]
 
 
 def conclude(path: str, lever_path: str) -> tuple[Groups, list[str], Any]:

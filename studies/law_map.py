@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, paragraph, read_result, report
+from _common import Groups, Statement, compared, differing, direct_label, hatch, read_result, report
 
 import sweep
 
@@ -190,8 +190,8 @@ PLANE = {"a": 1.0, "e": 0.99, "c": 1e-6, "n": 3.0, "phi0": 1.0}
 def plane() -> xr.Dataset:
     """s over torque and dry friction of a clock with all four losses, with the shares."""
     axes = {
-        "R": {"spacing": "log", "start": 1e-3, "stop": 1e4, "num": 85},
-        "mu": {"spacing": "log", "start": 1e-3, "stop": 1e8, "num": 133},
+        "R": {"spacing": "log", "start": 1e-3, "stop": 1e4, "num": 421},
+        "mu": {"spacing": "log", "start": 1e-3, "stop": 1e8, "num": 661},
     }
     outputs = ["amplitude", "crossing_speed", "sensitivity"]
     return prepared(sweep.run(sweep.build_study(kernel="foliot", axes=axes, fixed=PLANE, rtol=1e-7, outputs=outputs)))
@@ -225,7 +225,7 @@ def draw_triangle(page: Any, axes: Any, ds: xr.Dataset) -> None:
     mesh = tri.Triangulation(x, y)
     filled = axes.tripcolor(mesh, s, vmin=0, vmax=0.5, cmap="cividis", shading="gouraud", rasterized=True)
     lines = axes.tricontour(mesh, s, levels=[0.1, 0.2, 0.3, 0.4], colors="white", linewidths=0.7)
-    axes.clabel(lines, fmt="%.1f", fontsize=7)
+    axes.clabel(lines, fmt="%.1f", fontsize=7, manual=[(0.17, 0.1), (0.36, 0.1), (0.56, 0.1), (0.76, 0.1)])
     cells = ds.sel(n=3, c=0).where((ds.swing > 20).sel(n=3, c=0))
     v, e, found = (cells[name].values.ravel() for name in ("viscous", "impacts", "sensitivity"))
     at = np.isfinite(found) & (np.minimum(np.minimum(v, e), 1 - v - e) > 0.02)
@@ -249,16 +249,18 @@ def draw_region(page: Any, axes: Any, whole: xr.Dataset) -> None:
     largest = np.where(np.isfinite(s), np.argmax(np.nan_to_num(parts), axis=0), np.nan)
     for k in range(len(names)):
         axes.contour(mu, R, np.where(largest == k, 1.0, 0.0), levels=[0.5], colors="white", linewidths=0.7)
+    hatch(axes, mu, R, np.isnan(s), "////")
     least = [int(np.nanargmin(row)) for row in s]
-    axes.plot(mu[least], R, ".", color="#D55E00", markersize=3, label="least $s$")
+    axes.plot(mu[least], R, color="#D55E00", label="least $s$")
+    axes.plot([], [], color="0.6", linewidth=0.7, label="largest loss (white)")
     direct_label(axes, 3e-2, 2e-3, "viscous, 1", fontsize=7)
-    direct_label(axes, 5e2, 2e-2, "viscous, 1/3", fontsize=7)
-    direct_label(axes, 3e6, 2e-2, "drag, 3/5", fontsize=7)
+    direct_label(axes, 5e2, 8e-2, "viscous, 1/3", fontsize=7)
+    direct_label(axes, 3e6, 8e-2, "drag, 3/5", fontsize=7)
     direct_label(axes, 1.3e4, 1.5e3, "dry, 0", fontsize=7)
     direct_label(axes, 3e-2, 1e2, "never starts", fontsize=7)
     axes.set(xscale="log", yscale="log", xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]")
     axes.set(ylabel=r"dry friction, $R/(a^2\varphi_0)$ [1]", xlim=(mu[0], mu[-1]), ylim=(R[0], R[-1]))
-    axes.legend(loc="lower right", fontsize=7)
+    axes.legend(loc="lower right", fontsize=6.5, frameon=True, framealpha=0.85)
 
 
 def draw_degrees(axes: Any) -> None:
@@ -296,30 +298,12 @@ def draw_check(axes: Any, ds: xr.Dataset) -> None:
     axes.legend(title=r"swing, $A/\varphi_0$", loc="upper left", markerscale=5, fontsize=7)
 
 
-def caption(ds: xr.Dataset, whole: xr.Dataset) -> list[str]:
-    """Two to four sentences with the numbers of the datasets."""
-    large = ds.where(ds.swing > LARGE)
-    off = float(abs(large.sensitivity - large.light).max())
-    count = int(large.sensitivity.notnull().sum())
-    s = whole.sensitivity
-    low = s.isel(R=int(abs(np.log(whole.R / 100)).argmin("R")))
-    k = int(low.argmin("mu"))
-    best = f"{float(low[k]):.3f}, at {float(low.mu[k] / low.R):.1f} R"
-    return paragraph(f"""Figure. Exponent s of P ~ torque^(-s) of a foliot. (a) At large swings it depends on the shares
-        of the losses alone, s = (N + lambda_e)/(N + 2): 0 where all is dry friction, 1/3 viscous, 1/2 impacts, and
-        n/(n + 2) friction of degree n; {count} cells with swings over 100 phi0 agree to {off:.0e}. (b) Over torque and
-        dry friction, with a = 1/s, e = 0.99 and a cubic drag of 1e-6: white lines where another loss is the largest,
-        dots where the torque is best; with R = 100 a^2 phi0 the least s is {best}. (c) One friction alone: 1/n at small
-        swings, n/(n + 2) at large; they meet at n = 2. (d) Every cell against the law. The middle half of the way from
-        1/3 to 1/2 takes {_by_shares(1, None):.1f} decades of torque, that from 1 to 1/3 {_by_q():.1f}.""")
-
-
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
-    """Statements, the caption and the figure."""
+    """Statements and the figure."""
     ds = prepared(read_result(path, "foliot", ["n", "e", "a", "R", "c", "mu"], "law_map.toml"))
     whole = plane()
     law = "the law: s = (N + lambda_e)/(N + 2) at large swings, 1/N at small, N = sum of n lambda_n over the frictions"
-    return statements(ds), [law, "", NOTES, *caption(ds, whole)], figure(ds, whole)
+    return statements(ds), [law, "", NOTES], figure(ds, whole)
 
 
 def main(arguments: Sequence[str]) -> int:

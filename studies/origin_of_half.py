@@ -203,7 +203,7 @@ def figure(ds: xr.Dataset) -> Any:
         draw_exponents(right, ds)
         for axes, text in ((left, "a"), (right, "b")):
             charts.letter(axes, text)
-            axes.set_xlabel(r"torque, $\mu/(a^2\varphi_0)$")
+            axes.set_xlabel(r"torque, $\mu/(a^2\varphi_0)$ [1]")
     return page
 
 
@@ -232,7 +232,7 @@ def draw(axes: Any, ds: xr.Dataset, value: Any) -> None:
 
 def draw_periods(axes: Any, ds: xr.Dataset) -> None:
     """P (mu/phi0)^(1/2): flat where P ~ mu^(-1/2)."""
-    axes.set(yscale="log", ylim=(4, 2e4), ylabel=r"$P\,(\mu/\varphi_0)^{1/2}$")
+    axes.set(yscale="log", ylim=(4, 2e4), ylabel=r"$P\,(\mu/\varphi_0)^{1/2}$ [1]")
     draw(axes, ds, lambda line: line.period * np.sqrt(line.mu / line.phi0))
     for x, y, text in ((6e-4, 1e3, r"$P\sim\mu^{-1}$"), (6e2, 1e3, r"$\mu^0$"), (1e4, 45, r"$\mu^{-1/3}$")):
         direct_label(axes, x, y, text)
@@ -241,7 +241,7 @@ def draw_periods(axes: Any, ds: xr.Dataset) -> None:
 
 def draw_exponents(axes: Any, ds: xr.Dataset) -> None:
     """Local exponents of the period."""
-    axes.set(ylim=(-1.06, 0.06), ylabel=r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$")
+    axes.set(ylim=(-1.06, 0.06), ylabel=r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$ [1]")
     draw(axes, ds, lambda line: line.slope)
     axes.set_yticks([-1, -1 / 2, -1 / 3, 0], labels=["$-1$", r"$-\frac{1}{2}$", r"$-\frac{1}{3}$", "0"])
     axes.set_yticks([], minor=True)

@@ -5,7 +5,8 @@
 
 draws polisher_design.png and prints what is concluded. For each b, d, f the crank e that makes the amplitude A1 is
 found between two cranks of the sweep. A machine of that amplitude exists where A1 passes it before the crank locks; at
-the border eta_minus = 0 or eta_plus = 180 degree, so that sin^2 A1 = e f/(b d) with e = d+f-b, b+f-d or b+d-f.
+the border eta_minus = 0 or eta_plus = 180 degree, so that sin^2 A1 = e f/(b d) with e = d+f-b, b+f-d or b+d-f. For the
+figure the crank is the root of an equation of second degree in e^2, so that no grid of cranks is seen in it.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ ARM = 0.38
 """The arm whose machines are mapped [m]."""
 PAPER = {"b": 0.6201, "f": 0.405}
 """The paper's machine with that arm [m]."""
+FINE = 2e-3
+"""Steps of the figure along motor and coupler [m]."""
 
 NOTES = """\
 distortion: root of the sum of squares of the harmonics from the second on, over the first; best: least over f
@@ -56,6 +59,35 @@ def crank_at_border(b: Any, d: Any, f: Any) -> Any:
 def reaches(b: Any, d: Any, f: Any, wanted: float = WANTED) -> Any:
     """Whether the amplitude is passed before the crank locks."""
     return crank_at_border(b, d, f) * f > b * d * math.sin(wanted) ** 2
+
+
+def crank_of(b: Any, d: Any, f: Any, wanted: float = WANTED) -> Any:
+    """The crank of one amplitude, where one reaches it.
+
+    cos(A0 +- A1) = (b^2 + d^2 - (f +- e)^2)/(2 b d): sum and difference give cos A0 and sin A0, and the sum of their
+    squares an equation of second degree in e^2.
+    """
+    q = b * b + d * d - f * f
+    half = q - 2 * (f / math.tan(wanted)) ** 2
+    rest = (2 * b * d * math.cos(wanted)) ** 2 - q * q
+    return np.sqrt(rest / (np.sqrt(half * half + rest) - half))
+
+
+def machines_on(b: Any, d: float, f: Any) -> xr.Dataset:
+    """The machines of the wanted amplitude over b and f, as `of_amplitude`, with the crank of `crank_of`."""
+    names = ["thd", "transmission_angle"]
+    motor, coupler = np.meshgrid(b, f, indexing="ij")
+    there = reaches(motor, d, coupler) & (crank_at_border(motor, d, coupler) > 0)
+    axes = {"b": motor[there], "f": coupler[there], "e": crank_of(motor[there], d, coupler[there])}
+    found = sweep.run(
+        sweep.build_study(kernel="polisher", design="zip", axes=axes, fixed={"d": d}, outputs=names, rtol=1e-6)
+    )
+    made = xr.Dataset(coords={"b": b, "f": f, "d": d})
+    for name, values in {"crank": axes["e"], **{name: found[name].values for name in names}}.items():
+        whole = np.full(there.shape, math.nan)
+        whole[there] = values
+        made[name] = (("b", "f"), whole)
+    return made
 
 
 def best(machines: xr.Dataset) -> xr.Dataset:
@@ -138,15 +170,17 @@ def figure(ds: xr.Dataset) -> Any:
     """Distortion over motor and coupler, with the border of lock-up; the best coupler; a cut; for a page of print."""
     from sweep.show import charts
 
-    machines = of_amplitude(ds)
+    b, f = (np.arange(float(x[0]), float(x[-1]) + 1e-9, FINE) for x in (ds.b, ds.f))
+    arms = [machines_on(b, float(d), f) for d in ds.d]
+    usual = next(arm for arm in arms if abs(arm.d - ARM) < 1e-9)
     with charts.style():
-        page = charts.new_figure(charts.PAGE, 88.0)
+        page = charts.new_figure(charts.PAGE, 96.0)
         left, right = page.subfigures(1, 2, width_ratios=(1.2, 1))
         whole = left.subplots()
         upper, lower = right.subplots(2, 1)
-        draw_map(left, whole, machines.sel(d=ARM, method="nearest"))
-        draw_best(upper, machines)
-        draw_cut(lower, machines)
+        draw_map(left, whole, usual)
+        draw_best(upper, arms)
+        draw_cut(lower, machines_on(np.array([PAPER["b"]]), ARM, f).isel(b=0))
         for axes, text in ((whole, "a"), (upper, "b"), (lower, "c")):
             charts.letter(axes, text)
     return page
@@ -155,48 +189,51 @@ def figure(ds: xr.Dataset) -> Any:
 def draw_map(page: Any, axes: Any, arm: xr.Dataset) -> None:
     """Distortion over b and f for one arm, the crank it takes, and where the motor locks instead."""
     from matplotlib.colors import LogNorm
+    from matplotlib.lines import Line2D
 
-    b, f, d = 1e3 * arm.b.values, 1e3 * arm.f.values, float(arm.d)
+    b, f = 1e3 * arm.b.values, 1e3 * arm.f.values
     thd = 100 * arm.thd.transpose("f", "b").values
     mesh = axes.pcolormesh(b, f, thd, norm=LogNorm(2, 40), cmap="cividis", shading="nearest", rasterized=True)
-    bar = page.colorbar(mesh, ax=axes, label="distortion, %", pad=0.02, extend="both")
+    bar = page.colorbar(mesh, ax=axes, label="distortion [%]", pad=0.02, extend="both")
     bar.set_ticks([2, 5, 10, 20, 40], labels=["2", "5", "10", "20", "40"])
     bar.minorticks_off()
     lines = axes.contour(b, f, 1e3 * arm.crank.transpose("f", "b").values, [50, 70, 90], colors="white", linewidths=0.6)
-    axes.clabel(lines, fmt="%g", fontsize=7, manual=[(370, 765), (460, 765), (595, 765)])
-    fine_b, fine_f = np.meshgrid(np.linspace(b[0], b[-1], 400), np.linspace(f[0], f[-1], 400))
-    hatch(axes, fine_b, fine_f, ~reaches(1e-3 * fine_b, d, 1e-3 * fine_f), "////")
+    axes.clabel(lines, fmt="%g", fontsize=7, manual=[(470, 740), (560, 740), (690, 740)])
+    hatch(axes, b, f, np.isnan(thd), "////")
     top = best(arm)
-    axes.plot(b, 1e3 * top.f.where(top.thd.notnull()), color="black", linestyle=(0, (4, 2)), linewidth=0.9)
-    axes.plot(1e3 * PAPER["b"], 1e3 * PAPER["f"], "o", color="white", markeredgecolor="black", markersize=5)
+    axes.plot(b, 1e3 * top.f.where(top.thd.notnull()), "k--", linewidth=0.9, label="coupler of least distortion")
+    axes.plot(1e3 * PAPER["b"], 1e3 * PAPER["f"], "o", color="white", markeredgecolor="black", markersize=5,
+              label="the paper's machine")  # fmt: skip
+    keys = [*axes.lines, Line2D([], [], color="0.6", linewidth=0.8, label="crank [mm] (white)")]
+    page.legend(handles=keys, loc="outside lower center", ncols=2, fontsize=7)
     direct_label(axes, 700, 170, "motor locks")
-    axes.set(xlabel="motor from pivot $b$, mm", ylabel="coupler $f$, mm", xlim=(b[0], b[-1]), ylim=(f[0], f[-1]))
+    axes.set(xlabel="motor from pivot, $b$ [mm]", ylabel="coupler, $f$ [mm]", xlim=(b[0], b[-1]), ylim=(f[0], f[-1]))
 
 
-def draw_best(axes: Any, machines: xr.Dataset) -> None:
+def draw_best(axes: Any, arms: Sequence[xr.Dataset]) -> None:
     """The least distortion over all couplers, for each arm."""
-    from sweep.show.charts import COLOURS
+    from sweep.show.charts import COLOURS, DASHES
 
-    for k in range(machines.d.size):
-        top = best(machines.isel(d=k))
-        axes.plot(1e3 * top.b, 100 * top.thd, color=COLOURS[k], label=f"$d={1e3 * float(machines.d[k]):.0f}$ mm")
-    axes.set(xlabel="motor from pivot $b$, mm", ylabel="least distortion, %", yscale="log")
+    for k, arm in enumerate(arms):
+        top = best(arm)
+        look = {"color": COLOURS[k], "linestyle": DASHES[k]}
+        axes.plot(1e3 * top.b, 100 * top.thd, label=f"$d={1e3 * float(arm.d):.0f}$ mm", **look)
+    axes.set(xlabel="motor from pivot, $b$ [mm]", ylabel="least distortion [%]", yscale="log")
     axes.set_yticks([2, 5, 10, 20, 40], labels=["2", "5", "10", "20", "40"])
     axes.minorticks_off()
     axes.legend(loc="upper right")
 
 
-def draw_cut(axes: Any, machines: xr.Dataset) -> None:
+def draw_cut(axes: Any, cut: xr.Dataset) -> None:
     """Distortion and transmission angle over the coupler, with motor and arm of the paper's machine."""
     from sweep.show.charts import COLOURS
 
-    cut = machines.sel(d=ARM, method="nearest").interp(b=PAPER["b"])
     f = 1e3 * cut.f
-    axes.plot(f, 100 * cut.thd, color=COLOURS[0], label="distortion, %")
-    axes.plot(f, np.degrees(cut.transmission_angle), color=COLOURS[1], label="transmission angle, degree")
-    axes.axvline(1e3 * PAPER["f"], color="0.6", linewidth=0.8, linestyle=":")
-    axes.set(xlabel="coupler $f$, mm", ylabel="% or degree", ylim=(0, 75))
-    axes.legend(loc="center right", bbox_to_anchor=(1.0, 0.32))
+    axes.plot(f, 100 * cut.thd, color=COLOURS[0], label="distortion [%]")
+    axes.plot(f, np.degrees(cut.transmission_angle), "--", color=COLOURS[1], label="transmission angle [degree]")
+    axes.axvline(1e3 * PAPER["f"], color="0.5", linewidth=0.8, linestyle=":", label="the paper's coupler")
+    axes.set(xlabel="coupler, $f$ [mm]", ylabel="[%], [degree]", ylim=(0, 75), xlim=(300, 800))
+    axes.legend(loc="center right", bbox_to_anchor=(1.0, 0.36), fontsize=7)
 
 
 def read(path: str) -> xr.Dataset:

@@ -153,7 +153,7 @@ def figure(ds: xr.Dataset) -> Any:
     from sweep.show import charts
 
     with charts.style():
-        page = charts.new_figure(charts.PAGE, 84.0)
+        page = charts.new_figure(charts.PAGE, 88.0)
         left, right = page.subfigures(1, 2, width_ratios=(1.12, 1))
         whole = left.subplots()
         upper, lower = right.subplots(2, 1, sharex=True)
@@ -176,17 +176,18 @@ def draw_motion(axes: Any, ds: xr.Dataset) -> None:
     paper = ds.sel(e=slice(0, LAST + 1e-6))
     for theta, eta in (("theta_plus", "eta_plus"), ("theta_minus", "eta_minus")):
         axes.plot(np.degrees(paper[theta]), paper[eta] + B_ANGLE, color="black", linewidth=0.9, linestyle=(0, (4, 2)))
-    axes.set(xlabel="crank angle from $b$, degree", ylabel=r"angle of the arm $\alpha$, rad", xlim=(-180, 180))
+    axes.set(xlabel="crank angle from $b$ [degree]", ylabel=r"angle of the arm, $\alpha$ [rad]", xlim=(-180, 180))
     axes.set_xticks(range(-180, 181, 90))
-    axes.legend(title="eccentricity $e$", loc="lower right")
+    axes.plot([], [], color="black", linewidth=0.9, linestyle=(0, (4, 2)), label="extremes")
+    axes.legend(title="eccentricity, $e$", loc="lower right")
 
 
 def draw_middle(axes: Any, ds: xr.Dataset) -> None:
     """The paper's figure 6."""
     full = ds.where(ds.A0.notnull(), drop=True)
     axes.plot(100 * full.e, np.degrees(full.A0), color="black")
-    axes.axhline(degrees(ds.A0[0]), color="0.5", linestyle=(0, (4, 2)), linewidth=0.9)
-    axes.set(ylabel="middle $A_0$, degree", ylim=(31, 41))
+    axes.axhline(degrees(ds.A0[0]), color="0.5", linestyle=(0, (4, 2)), linewidth=0.9, label="first order in $e$")
+    axes.set(ylabel="middle, $A_0$ [degree]", ylim=(31, 41))
     _locked(axes, ds)
 
 
@@ -194,8 +195,9 @@ def draw_amplitude(axes: Any, ds: xr.Dataset) -> None:
     """The paper's figure 7, with the tangent at e = 0."""
     full = ds.where(ds.A1.notnull(), drop=True)
     axes.plot(100 * full.e, full.A1, color="black")
-    axes.plot(100 * full.e, float(ds.A1_e[0]) * full.e, color="0.5", linestyle=(0, (4, 2)), linewidth=0.9)
-    axes.set(xlabel="eccentricity $e$, cm", ylabel="amplitude $A_1$, rad", xlim=(0, 18), ylim=(0, 0.62))
+    tangent = {"color": "0.5", "linestyle": (0, (4, 2)), "linewidth": 0.9, "label": "first order in $e$"}
+    axes.plot(100 * full.e, float(ds.A1_e[0]) * full.e, **tangent)
+    axes.set(xlabel="eccentricity, $e$ [cm]", ylabel="amplitude, $A_1$ [rad]", xlim=(0, 18), ylim=(0, 0.62))
     _locked(axes, ds)
 
 
@@ -204,9 +206,10 @@ def _locked(axes: Any, ds: xr.Dataset) -> None:
     limit = 100 * float(ds.d + ds.f - ds.b)
     axes.axvspan(limit, 18, facecolor="none", edgecolor="0.6", hatch="////", linewidth=0)
     axes.axvline(limit, color="0.45", linewidth=0.8)
-    axes.axvline(100 * LAST, color="0.7", linewidth=0.8, linestyle=":")
+    axes.axvline(100 * LAST, color="0.5", linewidth=0.8, linestyle=":", label="the paper ends")
     middle = sum(axes.get_ylim()) / 2
     direct_label(axes, (limit + 18) / 2, middle, "motor locks", fontsize=7.5, rotation=90)
+    axes.legend(fontsize=7, loc="best")
 
 
 def read(path: str) -> xr.Dataset:

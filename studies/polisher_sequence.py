@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, paragraph, read_result, report
+from _common import Groups, Statement, compared, read_result, report
 
 import sweep
 
@@ -175,7 +175,7 @@ def draw_machines(axes: Any, ds: xr.Dataset) -> None:
         axes.plot([0, end[0]], [0, end[1]], color=COLOURS[k], label=f"arm, type {kind}")
         axes.plot([end[0], pin[0]], [end[1], pin[1]], "--", color=COLOURS[k], label=f"coupler, type {kind}")
     axes.plot([0, b], [0, 0], "o", color="black", markersize=4, label="pivot, motor")
-    axes.set(xlabel="$x$ [m]", ylabel="$y$ [m]", xlim=(-0.53, 1.21), ylim=(-0.25, 0.77))
+    axes.set(xlabel="$x$ [m]", ylabel="$y$ [m]", xlim=(-0.25, 0.95), ylim=(-0.19, 0.53))
     axes.set_aspect("equal", "datalim")
     axes.legend(loc="upper center", fontsize=6.5, ncols=2)
 
@@ -189,13 +189,13 @@ def draw_tools(axes: Any) -> None:
         x = np.concatenate([t, t[::-1]]) ** (1 if n >= 1 else 2)
         y = (1 - np.minimum(x**n, 1)) ** (1 / m)
         y[400:] *= -1
-        centre = np.array([3.2 * (k % 4), -5.2 * (k // 4)])
+        centre = np.array([4.4 * (k % 4), -5.4 * (k // 4)])
         for side in (1, -1):
             axes.plot(centre[0] + side * a * x, centre[1] + b * y, color=COLOURS[0 if k < 5 else 1], linewidth=1)
         axes.text(centre[0], centre[1] + 2.25, f"${n:g},{m:g}$", ha="center", fontsize=7)
     axes.plot([], [], color=COLOURS[0], label="known")
     axes.plot([], [], color=COLOURS[1], label="unknown")
-    axes.set(xlim=(-8.5, 18), ylim=(-11.5, 4.0), xlabel="across [half widths]", ylabel="along [half widths]")
+    axes.set(xlim=(-5.6, 18.8), ylim=(-10.7, 3.6), xlabel="across [half widths]", ylabel="along [half widths]")
     axes.set_aspect("equal", "datalim")
     axes.legend(loc="lower center", ncols=2, fontsize=7, title="$n, m$ of the paper's tools", title_fontsize=7)
 
@@ -223,30 +223,21 @@ def draw_shares(page: Any, axes: Any, ds: xr.Dataset) -> None:
     offset = 1e3 * (ds.w_x.values - float(ds.L))
     mesh = axes.pcolormesh(offset, 1e3 * ds.e.values, grid, cmap="cividis", shading="nearest", rasterized=True)
     page.colorbar(mesh, ax=axes, label="share of the wear [%]", pad=0.02)
+    unused = np.argwhere(grid < 1e-7).T
+    axes.plot(offset[unused[1]], 1e3 * ds.e.values[unused[0]], ".", color="0.7", markersize=2, label="setting not used")
+    axes.legend(loc="upper right", fontsize=7, frameon=True, framealpha=0.85)
     axes.set(xlabel="offset [mm]", ylabel="eccentricity, $e$ [mm]")
 
 
-def caption(ds: xr.Dataset) -> list[str]:
-    """Two to four sentences with the numbers of the dataset."""
-    weight = weights(ds)
-    rows, shares, mixed = mixture(ds)
-    singles = np.array([unevenness(row, weight) for row in rows])
-    kept = singles[rows[:, 0] >= 0.5].min()
-    best = unevenness(mixed, weight)
-    return paragraph(f"""Figure. (a) Machines of type A and B, (b) the paper's eight tools. (c) The most even wear of
-        one setting, {singles.min():.1%}, leaves the centre alone; of the others the best is uneven by {kept:.1%},
-        and a sequence of {(shares > 1e-9).sum()} settings by {best:.1%}. (d) Its settings.""")
-
-
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
-    """Statements, the caption and the figure."""
+    """Statements and the figure."""
     ds = read_result(path, "polisher_wear", ["e", "w_x"], "polisher_sequence.toml")
     groups = {
         "Sequences of settings": optimum(ds),
         "Another throw about the same middle": correction(ds),
         "Type B": mirrored(ds),
     }
-    return groups, [NOTES, *caption(ds)], figure(ds)
+    return groups, [NOTES], figure(ds)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, direct_label, hatch, read_result, report
+from _common import Groups, Statement, compared, hatch, read_result, report
 
 UM_PER_HOUR = 3.6e9
 """1 m/s."""
@@ -124,7 +124,7 @@ def least_uneven(ds: xr.Dataset, over: Sequence[str]) -> xr.Dataset:
 def told(cell: xr.Dataset) -> str:
     """Unevenness, place and centre of a cell."""
     place = f"{100 * float(cell.uneven):.1f} % at e = {CM * float(cell.e):g} cm, "
-    return f"{place}offset {CM * float(cell.w_x - cell.L):.0f} cm, centre {float(cell.centre):.2f}"
+    return f"{place}offset {CM * float(cell.w_x - cell.L):.3g} cm, centre {float(cell.centre):.2f}"
 
 
 def eccentricities(ds: xr.Dataset) -> list[Statement]:
@@ -171,10 +171,12 @@ def statements(ds: xr.Dataset, load: xr.Dataset) -> Groups:
 
 def figure(ds: xr.Dataset, load: xr.Dataset) -> Any:
     """Profiles of three tools, and how uneven they are over offset and eccentricity; for two columns of print."""
+    from matplotlib.patches import Patch
+
     from sweep.show import charts
 
     with charts.style():
-        page = charts.new_figure(charts.PAGE, 105.0)
+        page = charts.new_figure(charts.PAGE, 116.0)
         upper, lower = page.subplots(2, 3)
         for k, (name, n, b) in enumerate(SHAPES[:3]):
             tool = ds.sel(tool_n=n).sel(tool_b=b, method="nearest")
@@ -183,6 +185,9 @@ def figure(ds: xr.Dataset, load: xr.Dataset) -> Any:
             charts.letter(upper[k], "abc"[k])
             charts.letter(lower[k], "def"[k])
         page.colorbar(mesh, ax=list(lower), label="unevenness of the wear [1]", pad=0.01)
+        hole = Patch(facecolor="0.4", edgecolor="white", hatch="////", linewidth=0, label="(d-f) a hole in the middle")
+        star = lower[0].get_legend_handles_labels()[0]
+        page.legend(handles=[*upper[2].lines, upper[0].lines[-1], hole, *star], loc="outside lower center", ncols=4)
     return page
 
 
@@ -193,34 +198,29 @@ def draw_profiles(axes: Any, tool: xr.Dataset, name: str, k: int, load: xr.Datas
     for j, place in enumerate(PROFILES):
         line = tool.wear.sel(e=USUAL, method="nearest").sel(w_x=place, method="nearest")
         offset = MM * float(line.w_x - tool.L)
-        axes.plot(MM * line.radius, UM_PER_HOUR * line, color=COLOURS[j], label=f"{offset:.0f} mm")
+        axes.plot(MM * line.radius, UM_PER_HOUR * line, color=COLOURS[j], label=f"(a-c) offset {offset:.0f} mm")
         if load is not None:
             dashed = load.wear.sel(w_x=place, method="nearest")
             axes.plot(MM * dashed.radius, UM_PER_HOUR * dashed, "--", color=COLOURS[j], linewidth=0.9)
     axes.set(xlabel="radius [mm]", title=f"{name}, $e=100$ mm", xlim=(0, 100), ylim=(0, None))
     if load is not None:
         axes.set_ylabel("wear [µm/h]")
-        axes.plot([], [], "k--", linewidth=0.9, label="constant load")
-        axes.legend(handles=axes.lines[-1:], loc="upper center")
-    if k == 2:
-        axes.legend(title="offset", loc="upper right")
+        axes.plot([], [], "k--", linewidth=0.9, label="(a) constant load")
 
 
 def draw_map(axes: Any, tool: xr.Dataset, k: int) -> Any:
     """Unevenness over offset and eccentricity."""
     uneven = tool.uneven.transpose("e", "w_x")
     x, y = MM * (tool.w_x - tool.L).values, MM * tool.e.values
-    mesh = axes.pcolormesh(x, y, uneven, vmin=0, vmax=1.2, cmap="cividis", shading="nearest", rasterized=True)
-    axes.contour(x, y, uneven, levels=[0.2, 0.4], colors="white", linewidths=0.7)
+    mesh = axes.pcolormesh(x, y, uneven, vmin=0, vmax=1.2, cmap="cividis", shading="gouraud", rasterized=True)
+    axes.clabel(axes.contour(x, y, uneven, levels=[0.3, 0.5], colors="white", linewidths=0.7), fmt="%g", fontsize=7)
     hatch(axes, x, y, (tool.centre < KEPT).transpose("e", "w_x").values, "////", "white")
     best = least_uneven(without_hole(tool), ("e", "w_x"))
-    axes.plot(MM * float(best.w_x - tool.L), MM * float(best.e), "*", color="white", markersize=8)
-    if k == 1:
-        direct_label(axes, 70, 40, "star: most even without", fontsize=7)
+    axes.plot(MM * float(best.w_x - tool.L), MM * float(best.e), "*", color="white", markeredgecolor="black",
+              markersize=8, label="(d-f) most even without a hole")  # fmt: skip
     axes.set(xlabel="offset [mm]")
     if k == 0:
         axes.set_ylabel("eccentricity, $e$ [mm]")
-        direct_label(axes, 75, 40, "hole in the middle", fontsize=7)
     return mesh
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, direct_label, paragraph, read_result, report
+from _common import Groups, Statement, read_result, report
 
 import sweep
 
@@ -81,41 +81,32 @@ def figure(ds: xr.Dataset) -> Any:
 
     palette = ("0.85", charts.COLOURS[5], charts.COLOURS[0])
     with charts.style():
-        page = charts.new_figure(charts.PAGE, 72.0)
+        page = charts.new_figure(charts.PAGE, 78.0)
         panels = page.subplots(1, 3, sharey=True)
         for axes, k, letter in zip(panels, ds.k.values, "abc", strict=True):
             part = ds.sel(k=k, R_s=0.6)
             kind = started(part).sel(a=0).astype(int) + started(part).sel(a=1)
             axes.pcolormesh(ds.phi_start, ds.mu, kind.transpose("mu", "phi_start"), cmap=ListedColormap(list(palette)),
                             vmin=-0.5, vmax=2.5, shading="nearest", rasterized=True)  # fmt: skip
-            axes.plot(ds.phi_start, least(part), color="black", linewidth=0.9, label="theory (1)")
-            axes.axhline(float(ds.R + k * ds.phi0), color="black", linewidth=0.8, linestyle=(0, (4, 2)))
+            axes.plot(ds.phi_start, least(part), color="black", linewidth=0.9, label="theory")
+            enough = axes.axhline(float(ds.R + k * ds.phi0), color="black", linewidth=0.8, linestyle=(0, (4, 2)))
+            enough.set_label(r"$\mu=R+k\varphi_0$")
             axes.set(
                 xlabel=r"released at $\varphi_\mathrm{s}/\varphi_0$ [1]", ylim=(0, 2.5), title=f"$k={k:g}$ s$^{{-2}}$"
             )
             charts.letter(axes, letter)
         panels[0].set_ylabel(r"torque, $\mu/\varphi_0$ [s$^{-2}$]")
-        direct_label(panels[2], -0.35, 2.1, r"$\mu=R+k\varphi_0$ (broken)", fontsize=7)
         keys = [
             Patch(color=c, label=t) for c, t in zip(palette, ("rests", "starts if $a=0$ only", "starts"), strict=True)
         ]
-        panels[0].legend(
-            handles=[*keys, *panels[0].lines[:1]], loc="upper left", fontsize=7, frameon=True, framealpha=0.9
-        )
+        page.legend(handles=[*keys, *panels[0].lines], loc="outside lower center", ncols=5)
     return page
 
 
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
-    """Statements, the caption and the figure."""
+    """Statements and the figure."""
     ds = read_result(path, "foliot_start", ["a", "k", "R_s", "phi_start", "mu"], "self_starting.toml")
-    stiff = ds.sel(k=1.5, R_s=0.6)
-    ends = [float(least(stiff).isel(phi_start=i)) for i in (0, -1)]
-    words = paragraph(f"""Figure. Where a foliot with Coulomb friction R = 0.2 and stiction R_s = 0.6, in units of phi0
-        and 1/s, starts itself. Without a hairspring stiction alone decides, mu > R_s, wherever it rests. With k = 1.5
-        the least torque rises with the angle of release from {ends[0]:.2f} to {ends[1]:.2f}, and viscous friction, a =
-        1/s, costs some of it, but no foliot rests for whom mu > R + k phi0 and the spring at release and stiction are
-        beaten.""")
-    return statements(ds), [NOTES, *words], figure(ds)
+    return statements(ds), [NOTES], figure(ds)
 
 
 def main(arguments: Sequence[str]) -> int:

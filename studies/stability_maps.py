@@ -250,7 +250,7 @@ def draw_growth(axes: Any, ds: xr.Dataset, method: str) -> None:
     axes.contourf(ds.a, ds.w, np.minimum(growth, 1e3), levels=[0, 1, 2e3], colors=["#e8eef5", "#b04a3a"])
     theory = eigenvalue(method, ds.a.values[None, :], ds.w.values[:, None])
     axes.contour(ds.a, ds.w, theory, levels=[1], colors="black", linewidths=0.9, linestyles="--")
-    axes.set(title=method, xlabel="$ah$", ylabel=r"$\omega h$")
+    axes.set(title=method, xlabel="$ah$ [1]", ylabel=r"$\omega h$ [1]")
     axes.title.set_size(8)
 
 

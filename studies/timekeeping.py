@@ -33,7 +33,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, columns, compared, differing, direct_label, read_result, report
+from _common import Groups, Statement, columns, compared, differing, read_result, report
 
 import sweep
 
@@ -208,12 +208,13 @@ def figure(clocks: dict[str, xr.Dataset]) -> Any:
     from sweep.show import charts
 
     with charts.style():
-        page = charts.new_figure(charts.PAGE, 70.0)
+        page = charts.new_figure(charts.PAGE, 76.0)
         panels = page.subplots(1, 3)
         for draw, axes, letter in zip((draw_scatter, draw_correlation, draw_losses), panels, "abc", strict=True):
             for i, (name, ds) in enumerate(clocks.items()):
                 draw(axes, ds, name, charts.COLOURS[i], "os^"[i])
             charts.letter(axes, letter)
+        page.legend(*panels[1].get_legend_handles_labels(), loc="outside upper center", ncols=3)
         frame(panels[0])
     return page
 
@@ -225,7 +226,7 @@ def frame(axes: Any) -> None:
         axes.text(1.03, rate, name.removesuffix("/day"), fontsize=7, va="center", transform=axes.get_yaxis_transform())
     axes.plot([], [], "o-", color="black", markerfacecolor="white", label="white")
     axes.plot([], [], "o", color="black", linestyle=(0, (5, 1.5)), label="of a day")
-    axes.legend(loc="lower right", title="torque noise")
+    axes.legend(loc="lower right", title="torque noise", borderaxespad=0.2)
 
 
 def draw_scatter(axes: Any, ds: xr.Dataset, name: str, colour: str, mark: str) -> None:
@@ -234,7 +235,7 @@ def draw_scatter(axes: Any, ds: xr.Dataset, name: str, colour: str, mark: str) -
     for j, dashes, fill in ((0, "-", "white"), (3, (0, (5, 1.5)), colour)):
         axes.loglog(wide, law(ds, ds.tau_c[j]) * wide, color=colour, linestyle=dashes)
         axes.plot(ds.sigma, ds.scatter.isel(tau_c=j), mark, color=colour, markerfacecolor=fill)
-    axes.set(xlim=(1e-3, 0.3), ylim=(1e-4, 1e4), xlabel=r"torque noise, $\sigma$")
+    axes.set(xlim=(1e-3, 0.3), ylim=(1e-4, 1e4), xlabel=r"torque noise, $\sigma$ [1]")
     axes.set_ylabel("scatter of the rate from day to day [s/day]")
 
 
@@ -248,7 +249,6 @@ def draw_correlation(axes: Any, ds: xr.Dataset, name: str, colour: str, mark: st
     axes.loglog(lasts(ds, theta), law(ds, theta) / unit, color=colour, linewidth=0.8)
     axes.set(xlim=(1e-6, 10), ylim=(1e-3, 1.2), xlabel="correlation time of the torque [day]")
     axes.set_ylabel(r"scatter over $s\sigma$ [1]")
-    axes.legend(loc="lower right", handlelength=1)
 
 
 def lasts(ds: xr.Dataset, tau_c: Any) -> Any:
@@ -265,9 +265,9 @@ def draw_losses(axes: Any, ds: xr.Dataset, name: str, colour: str, mark: str) ->
     )
     wide = np.geomspace(1e-3, 0.3, 2)
     axes.loglog(wide, second_order(ds, 0.0) * wide**2, color=colour)
-    away = 0.1 if name == "Bürgi" else 10
-    direct_label(axes, 0.008, second_order(ds, 0.0) * 0.008**2 * away, name, colour)
-    axes.set(xlim=(1e-3, 0.3), ylim=(1e-6, 1e4), xlabel=r"torque noise, $\sigma$, white", ylabel="mean loss [s/day]")
+    axes.set(
+        xlim=(1e-3, 0.3), ylim=(1e-6, 1e4), xlabel=r"torque noise, $\sigma$, white [1]", ylabel="mean loss [s/day]"
+    )
 
 
 def conclude(*paths: str) -> tuple[Groups, list[str], Any]:

@@ -227,8 +227,8 @@ def figure(ds: xr.Dataset) -> Any:
         draw_depths(panels[0], ds)
         draw_harmonics(panels[1], ds, ds.K, first_order, 0)
         draw_harmonics(panels[2], ds, ds.L, first_order_sensitivity, 1)
-        panels[1].set(ylim=(2e-5, 2), ylabel=r"$|\mathrm{d}\ln P/\mathrm{d}\,\mathrm{depth}|$ at depth 0")
-        panels[2].set(ylim=(2e-3, 20), ylabel=r"$|\mathrm{d}s/\mathrm{d}\,\mathrm{depth}|$ at depth 0")
+        panels[1].set(ylim=(2e-5, 2), ylabel=r"$|\mathrm{d}\ln P/\mathrm{d}\,\mathrm{depth}|$ at depth 0 [1]")
+        panels[2].set(ylim=(2e-3, 20), ylabel=r"$|\mathrm{d}s/\mathrm{d}\,\mathrm{depth}|$ at depth 0 [1]")
         page.legend(handles=[*panels[1].get_legend_handles_labels()[0], *keys()], loc="outside upper center", ncols=3)
         direct_label(panels[1], 20, 0.25, "$h^{-1/2}$")
         direct_label(panels[2], 3, 2.6, "$h^{1/2}$")
@@ -261,7 +261,7 @@ def draw_depths(axes: Any, ds: xr.Dataset) -> None:
         axes.axhline(limit, color="0.6", linewidth=0.6)
         axes.text(1.03, limit, name, fontsize=7, va="center", transform=axes.get_yaxis_transform())
     axes.legend(loc="upper left")
-    axes.set(xlim=(2e-3, 1), ylim=(1e-6, 3), xlabel="depth of the ripple", ylabel="$|P/P_0 - 1|$")
+    axes.set(xlim=(2e-3, 1), ylim=(1e-6, 3), xlabel="depth of the ripple [1]", ylabel="$|P/P_0 - 1|$ [1]")
 
 
 def draw_harmonics(axes: Any, ds: xr.Dataset, found: xr.DataArray, theory: Any, which: int) -> None:
@@ -276,7 +276,7 @@ def draw_harmonics(axes: Any, ds: xr.Dataset, found: xr.DataArray, theory: Any, 
         axes.plot(h, abs(theory(alpha, h)), ".", color="black", markersize=1.5)
         if i:
             axes.plot(h, envelopes(alpha, h)[which], color=COLOURS[i], linestyle=(0, (5, 1.5)), linewidth=0.8)
-    axes.set(xlim=(0.9, 72), xlabel="harmonic, $h$")
+    axes.set(xlim=(0.9, 72), xlabel="harmonic, $h$ [1]")
 
 
 def read(path: str) -> xr.Dataset:

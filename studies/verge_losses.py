@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, differing, direct_label, hatch, paragraph, read_result, report
+from _common import Groups, Statement, differing, direct_label, hatch, read_result, report
 
 import sweep
 
@@ -179,24 +179,6 @@ def statements(ds: xr.Dataset, wheel: xr.Dataset) -> Groups:
     }
 
 
-def caption(ds: xr.Dataset) -> list[str]:
-    """Two to four sentences with the numbers of the dataset."""
-    smooth = ds.isel(R_v=0)
-    lower = passages(smooth, 5 / 12)
-    light, middle = (float(lower.sel(kappa=k, method="nearest")) for k in (0.01, 0.03))
-    clock = clock_like(ds)
-    parts = ", ".join(f"{name} {100 * float(clock[name]):.0f} %" for name in ("viscous", "dry", "impact"))
-    fits = smooth.s.where(smooth.pitches < 0.5)
-    least = float(fits.min())
-    s = float(clock.s)
-    return paragraph(f"""Figure. (a) Exponent s of a verge whose wheel and foliot collide, without dry friction:
-        1/(1 + alpha) at weak drive; between, viscous friction takes it towards 1/3; at strong drive the impacts bring
-        it back to 1/2, halfway at alpha = {light:.1e} for kappa = 0.01 and {middle:.1e} for 0.03, as (1 - e^2)^(-3).
-        Hatched: recoil of more than half a tooth pitch, where no wheel follows; below it s is never less than
-        {least:.2f}. (b) The same with dry friction, kappa = 0.01. (c) Shares of the losses: a clock with kappa = 0.01
-        that recoils by a quarter of a pitch loses by {parts}, and has s = {s:.2f}. (d) s against (1).""")
-
-
 def figure(ds: xr.Dataset) -> Any:
     """Maps of the exponent, shares of the losses, and (1); for two columns of print."""
     from sweep.show import charts
@@ -215,15 +197,16 @@ def figure(ds: xr.Dataset) -> Any:
 
 def draw_plane(page: Any, axes: Any, ds: xr.Dataset) -> None:
     """s over alpha and kappa; hatched where the wheel would be thrown back by more than half a pitch."""
+    axes.set(xscale="log", yscale="log")
     alpha, kappa, s = ds.alpha.values, ds.kappa.values, ds.s.values
-    mesh = axes.pcolormesh(alpha, kappa, s, vmin=1 / 3, vmax=1, cmap="cividis", shading="nearest", rasterized=True)
+    mesh = axes.pcolormesh(alpha, kappa, s, vmin=1 / 3, vmax=1, cmap="cividis", shading="gouraud", rasterized=True)
     page.colorbar(mesh, ax=axes, label="exponent, $s$ [1]", pad=0.02, ticks=[1 / 3, 0.5, 0.75, 1]).ax.set_yticklabels(
         ["1/3", "1/2", "3/4", "1"]
     )
     lines = axes.contour(alpha, kappa, s, levels=[0.36, 5 / 12, 0.75], colors="white", linewidths=0.8)
     axes.clabel(lines, fmt={0.36: "0.36", 5 / 12: "5/12", 0.75: "3/4"}, fontsize=7, inline_spacing=2)
     hatch(axes, alpha, kappa, (ds.pitches > 0.5).values, "////", "0.85")
-    axes.set(xscale="log", yscale="log", xlim=(alpha[1], alpha[-2]))
+    axes.set(xlim=(alpha[1], alpha[-2]), ylim=(kappa[0], kappa[-1]))
     axes.set(xlabel=r"drive, $\alpha$ [1]", ylabel=r"wheel over foliot, $\kappa$ [1]")
     direct_label(axes, 2e4, 3e-3, "recoil over 1/2 pitch", fontsize=7)
 
@@ -274,17 +257,17 @@ def draw_law(axes: Any, ds: xr.Dataset) -> None:
             label=name,
             rasterized=True,
         )
-    axes.plot([0, 0.6], [0, 0.6], color="black", linewidth=0.8, label="theory (1)")
+    axes.plot([0, 0.6], [0, 0.6], color="black", linewidth=0.8, label="law of the shares")
     axes.set(xlabel=r"$(\sum n\lambda_n+\lambda_\mathrm{impact})/(2+\sum n\lambda_n)$ [1]", ylabel="exponent, $s$ [1]")
-    axes.set(xlim=(0.05, 0.52), ylim=(0.05, 1.0))
-    axes.legend(title=r"$\alpha$", loc="upper right", markerscale=2, fontsize=7)
+    axes.set(xlim=(0.05, 0.52), ylim=(0.05, 1.4))
+    axes.legend(title=r"$\alpha$", loc="upper left", markerscale=2, fontsize=7, ncols=2)
 
 
 def conclude(path: str, wheel_path: str) -> tuple[Groups, list[str], Any]:
-    """Statements, the caption and the figure."""
+    """Statements and the figure."""
     ds = prepared(read_result(path, "verge_scene:KERNEL", ["R_v", "I_c", "tau"], "verge_losses.toml"))
     wheel = prepared(read_result(wheel_path, "verge_scene:KERNEL", ["R_c", "I_c", "tau"], "verge_losses_wheel.toml"))
-    return statements(ds, wheel), [NOTES, *caption(ds)], figure(ds)
+    return statements(ds, wheel), [NOTES], figure(ds)
 
 
 def main(arguments: Sequence[str]) -> int:

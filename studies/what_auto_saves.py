@@ -95,10 +95,10 @@ def figure(parts: Sequence[xr.Dataset]) -> Any:
             charts.letter(axes, text)
             axes.set_title(found.attrs["title"])
         for axes in panels[3:]:
-            axes.set_xlabel("relative tolerance, rtol")
+            axes.set_xlabel("relative tolerance, rtol [1]")
         page.legend(handles=keys(), loc="outside lower center", ncols=4)
         for axes in panels[::3]:
-            axes.set_ylabel("time over that of auto")
+            axes.set_ylabel("time over that of auto [1]")
         panels[0].set_ylim(top=ROOM * panels[0].get_ylim()[1])
     return page
 

@@ -175,7 +175,7 @@ def figure(coulomb: xr.Dataset, drag: xr.Dataset, steps: xr.Dataset | None, othe
             for axes, found in zip(row, (coulomb, drag), strict=False):
                 charts.draw_precision(axes, found, key, names)
                 axes.set_xlabel("")
-            row[0].set_ylabel(f"relative error, {what} cell")
+            row[0].set_ylabel(f"relative error, {what} cell [1]")
             for (name, other), mark in zip(others.items(), "*xP", strict=False):
                 row[0].plot(other.seconds, other[key], "k--", marker=mark, linewidth=0.8, label=name)
             draw_steps(row[2], steps, key)
@@ -185,7 +185,7 @@ def figure(coulomb: xr.Dataset, drag: xr.Dataset, steps: xr.Dataset | None, othe
             axes.set_title(text)
         for axes in panels[1][:2]:
             axes.set_xlabel("time per cell on one core [s]")
-        panels[1][2].set_xlabel("calls of the rates")
+        panels[1][2].set_xlabel("calls of the rates [1]")
         keys = {t: h for axes in panels[0][:2] for h, t in zip(*axes.get_legend_handles_labels(), strict=True)}
         keys |= {text: mark for found in (coulomb, drag) for text, mark in charts.precision_marks(found).items()}
         page.legend(keys.values(), keys.keys(), loc="outside lower left", ncols=3, title="(a), (b), (d), (e)")

@@ -90,15 +90,12 @@ _HOMES = {name: home for home, names in _PUBLIC.items() for name in names}
 """Public names and the modules they live in; a module is imported when one of its names is first used."""
 
 __all__ = list(_HOMES)
-STUDIES = ("study", "read_study", "build_study", "study_of")
-"""What gives a study."""
 
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'sweep' has no attribute {name!r}")
-    if name in STUDIES:
-        import_module("sweep.study.model").SHOWN["html"] = _study_html
+    import_module("sweep.study.model").SHOWN["html"] = _study_html
     # the room of that name is the function as well, and stays what `sweep.study.read` and its like begin with
     return import_module("sweep.study") if name == "study" else getattr(import_module(f"sweep.{_HOMES[name]}"), name)
 

@@ -25,7 +25,9 @@ def test_every_public_name_has_its_place_in_the_reference():
     assert sorted(named) == sorted(sweep.__all__)
 
 
-def test_octave_reads_a_result_as_the_page_says(tmp_path):
+@pytest.fixture
+def octave(tmp_path):
+    """Runs a script beside result.h5; gives what it prints, and the result."""
     if not shutil.which("octave-cli"):
         pytest.skip("octave is not installed")
     study = sweep.build_study(
@@ -34,17 +36,37 @@ def test_octave_reads_a_result_as_the_page_says(tmp_path):
         fixed={"a": 1.0, "phi0": 1.0},
     )
     sweep.run(study, tmp_path / "result.h5", progress=False).close()
-    script = re.search(r"<!-- octave -->\n```matlab\n(.*?)```", text("file_format.md"), re.DOTALL)[1]
-    (tmp_path / "script.m").write_text(script)
-    done = subprocess.run(
-        ["octave-cli", "--norc", "script.m"], cwd=tmp_path, capture_output=True, text=True, timeout=120
-    )
-    found = [float(number) for number in done.stdout.split()]
+
+    def run(script):
+        (tmp_path / "script.m").write_text(script)
+        command = ["octave-cli", "--norc", "script.m"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+        if "package netcdf" in done.stderr:
+            pytest.skip("octave's package netcdf is not installed")
+        return [float(number) for number in done.stdout.split()]
+
     with sweep.open_result(tmp_path / "result.h5") as dataset:
-        at = dataset.period.argmin(...)
-        best = dataset.period.isel(at)
-        assert found == [float(best), float(best.mu), float(best.R)]
-        assert np.isnan(dataset.period.values).any()
+        yield run, dataset.load()
+
+
+def lines_for(language):
+    """The code of the page for MATLAB or Octave."""
+    return re.search(rf"<!-- {language} -->\n```matlab\n(.*?)```", text("file_format.md"), re.DOTALL)[1]
+
+
+def test_octave_reads_a_result_as_the_page_says(octave):
+    run, dataset = octave
+    best = dataset.period.isel(dataset.period.argmin(...))
+    assert run(lines_for("octave")) == [float(best), float(best.mu), float(best.R)]
+    assert np.isnan(dataset.period.values).any()
+
+
+def test_lines_for_matlab_read_the_numbers(octave):
+    run, dataset = octave
+    lines = [line for line in lines_for("matlab").splitlines() if "h5readatt" not in line and "loglog" not in line]
+    found = run("\n".join(["pkg load netcdf", *lines, 'printf("%.17g ", mu, codes, period);']))
+    codes = dataset.status.attrs["flag_values"]
+    np.testing.assert_array_equal(found, [*dataset.mu.values, *codes, *dataset.period.values.ravel()])
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)

@@ -1,6 +1,6 @@
 """How much of the damage to results, finished or not, is missed, or not repaired?
 
-    python benchmarks/soak/damage.py [--tries 10000] [--seed 1]
+    python benchmarks/soak/damage.py [--tries 10000] [--minutes 15] [--seed 1]
 
 A flipped bit, 512 bytes zeroed, a file cut, emptied, missing or lengthened, chunks that changed places, with their
 digests too, or are of another study. Of an unfinished result `sweep verify` must tell, and the continued run must end
@@ -11,6 +11,7 @@ that count at the end; exit status 1 where anything is missed.
 from __future__ import annotations
 
 import argparse
+import math
 import random
 import sys
 import tempfile
@@ -26,6 +27,7 @@ from havoc import damaged_result, damaged_unfinished, numbers, run, study, unfin
 def main() -> int:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--tries", type=int, default=10_000)
+    arguments.add_argument("--minutes", type=float, default=math.inf, help="begin no try after so many")
     arguments.add_argument("--seed", type=int, default=1)
     given = arguments.parse_args()
     rng, kinds, wrong, slowest = random.Random(given.seed), Counter(), [], 0.0
@@ -36,8 +38,11 @@ def main() -> int:
         run(study(fixed={"g": 1.6}), folder / "strange.h5", workers=1, block_cells=300, progress=False).close()
         strange, bits = (folder / "strange.h5").read_bytes(), numbers(folder / "whole.h5")
         paths = {"unfinished": unfinished(folder / "out.h5"), "finished": folder / "whole.h5"}
+        end = time.monotonic() + 60.0 * given.minutes
         for number in range(given.tries):
             begun = time.monotonic()
+            if begun > end:
+                break
             state = "unfinished" if number % 3 == 0 else "finished"
             damaged = damaged_unfinished if state == "unfinished" else damaged_result
             kind, what = damaged(rng, paths[state], strange, folder / "scratch", bits)
@@ -45,9 +50,10 @@ def main() -> int:
             slowest = max(slowest, time.monotonic() - begun)
             if what:
                 wrong.append(f"try {number}, {state}, {kind}: {what}")
+                print(wrong[-1], flush=True)
     print("\n".join(f"  {kind}: {count}" for kind, count in sorted(kinds.items())))
     print("\n".join(wrong[:20]))
-    print(f"{given.tries} tries, the slowest {slowest:.1f} s; missed or wrong: {len(wrong)}")
+    print(f"{sum(kinds.values())} tries, the slowest {slowest:.1f} s; missed or wrong: {len(wrong)}")
     return int(bool(wrong))
 
 

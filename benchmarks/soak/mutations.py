@@ -74,7 +74,7 @@ def tried(copy, place, timeout):
     spec = MutationSpec(
         module_path=copy / path, operator_name=operator, occurrence=occurrence, start_pos=(0, 0), end_pos=(0, 1)
     )
-    result = mutate_and_test([spec], command(copy, tests_of(copy, path)), timeout)
+    result = mutate_and_test([spec], command(copy, tests_of(copy, path), path.stem), timeout)
     outcome = result.test_outcome.value if result.test_outcome else "incompetent"
     print(f"{outcome:12} {path} {operator} {occurrence}", flush=True)
     if outcome == "survived":
@@ -88,14 +88,16 @@ def tests_of(copy, path):
     return room if room.is_dir() else copy / "tests" / path.parts[0]
 
 
-def command(copy, tests):
-    """Runs tests up to the first fault: of a room of kernels as plain Python, compiled, and those of all rooms as
-    plain Python, which CI runs as well."""
+def command(copy, tests, module=""):
+    """Runs tests up to the first fault, those named like the module first: of a room of kernels as plain Python,
+    compiled, and those of all rooms as plain Python, which CI runs as well."""
     pytest = f"XDG_CACHE_HOME={copy}/cache PYTHONPATH={copy} {sys.executable} -m pytest -q -x"
-    steps = [f"{pytest} {tests}"]
+    own = [str(path) for path in sorted(tests.rglob(f"test_{module.strip('_')}.py"))]
+    tests_in_order = " ".join([*own, str(tests)])
+    steps = [f"{pytest} {tests_in_order}"]
     if "kernels" in tests.relative_to(copy).parts:
         plain = f"NUMBA_DISABLE_JIT=1 {pytest}"
-        steps = [f"{plain} {tests}", *steps, f"{plain} {copy}/tests/kernels"]
+        steps = [f"{plain} {tests_in_order}", *steps, f"{plain} {copy}/tests/kernels"]
     return f"bash -c 'cd {copy} && {' && '.join(steps)}'"
 
 

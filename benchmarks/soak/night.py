@@ -46,6 +46,8 @@ stop = {last}
 num = {cells}
 """
 EXPECTED = {"": Status.OK, "leaks": Status.OK, "is refused": Status.STICKS}
+STOPPED = {3, 130, 143, -signal.SIGKILL, -signal.SIGTERM, -signal.SIGINT}
+"""How a run may end that is to be continued; by the signal itself where that came before anything listened to it."""
 BLOWS = {"the run": signal.SIGKILL, "SIGTERM": signal.SIGTERM, "Ctrl-C": signal.SIGINT, "a process": None}
 
 
@@ -64,8 +66,9 @@ class Night:
     def run(self) -> None:
         """Until it is complete."""
         while (code := self._once()) not in (0, 4):
-            if code not in (3, 130, 143, -signal.SIGKILL):
-                print(log_path(self.output).read_text().splitlines()[-1])
+            if code not in STOPPED:
+                log = log_path(self.output)
+                print(*(log.read_text().splitlines()[-3:] if log.exists() else ["no log"]), sep="\n", flush=True)
                 self.done[f"wrong: ended with {code}"] += 1
                 return
 

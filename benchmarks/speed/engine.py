@@ -19,7 +19,7 @@ import numpy as np
 
 import sweep
 from sweep.cells.block import warm
-from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS, columns
+from sweep.cells.schema import cells_of, columns
 from sweep.cells.solve import Solver
 from sweep.study.model import Study
 
@@ -56,8 +56,7 @@ def kernel_seconds(study: Study, workers: int, block: int = 1 << 16) -> float:
         for start in starts:
             stop = min(start + block, size)
             views = {name: array[: stop - start] for name, array in arrays.items()}
-            status, used, errors = views.pop(STATUS), views.pop(METHOD_USED), views.pop(ERROR_BOUND)
-            solver.solve(start, stop, views, status, used, error_bound=errors)
+            solver.solve(start, cells_of(views))
 
     with ThreadPoolExecutor(workers) as pool:
         return seconds(lambda: [future.result() for future in [pool.submit(pull) for _ in range(workers)]])

@@ -4,20 +4,23 @@
 
 A cheap kernel, every output stored: the run is compared with the kernel alone and one plain write of the same bytes,
 fsync included, taken in turn with it. Then peak disk; dear cells stored against the kernel alone; what is left of many
-blocks; reading with checksums against plain reading. All on the folder given (default: here). Disks differ from
-minute to minute: look at the spread, not at one figure.
+blocks; reading with digests compared, without, by h5py, and summing lazily, with the memory that takes. All on the
+folder given (default: here). Disks differ from minute to minute: look at the spread, not at one figure.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import h5py
 import numpy as np
 from engine import disk_seconds, foliot, kernel_seconds, run_seconds, seconds, warm
 
@@ -28,7 +31,9 @@ from sweep.cells.partition import boxes
 from sweep.cells.schema import columns
 from sweep.cells.solve import Solver
 from sweep.store.frame import Frame, cuts_of
-from sweep.store.store import opened, unfinished_of, write_digests
+from sweep.store.layout import write_digests
+from sweep.store.reading import READERS, StoredFile
+from sweep.store.store import opened, unfinished_of
 from sweep.system import disk
 
 
@@ -113,26 +118,54 @@ def many(folder: Path, count: int) -> None:
 
 
 def reading(folder: Path, cells: int, rounds: int) -> None:
-    """A result read with its digests compared, by dask in chunks, and by h5py, which checks HDF5's sums."""
-    import h5py
-
+    """Processor and wall time of reading a result: with its digests compared, without, in chunks by dask, by h5py."""
     study, path = foliot("closed", cells), folder / "read.h5"
     sweep.run(study, path, progress=False).close()
-    size = path.stat().st_size
-    for _ in range(rounds):
-        with sweep.open_result(path) as found:
-            ours = seconds(found.load)
-        with sweep.open_result(path) as found:
-            chunked = found.chunk("auto") if not found.chunks else found
-            in_chunks = seconds(lambda: chunked.sum().compute())  # noqa: B023
-        with h5py.File(path) as file:
-            theirs = seconds(lambda: [file[c.name][...] for c in columns(study)])
-        plain = seconds(lambda: path.read_bytes())
-        print(
-            f"reading {size / 1e6:.0f} MB: checked {ours:.2f} s, in chunks with sums {in_chunks:.2f} s, by h5py "
-            f"{theirs:.2f} s, plain {plain:.2f} s"
-        )
+    with sweep.open_result(path) as found, StoredFile(path) as stored, h5py.File(path) as plain:
+        ways = {
+            "checked": found.compute,
+            "unchecked": lambda: unchecked(stored),
+            "by h5py": lambda: [plain[name][...] for name in found.data_vars],
+            "lazily summed": found.chunk("auto").sum().compute,
+        }
+        for _ in range(rounds):
+            told = []
+            for name, way in ways.items():
+                begun = time.process_time()
+                wall = seconds(way)
+                told.append(f"{name} {wall:.2f} s (processor {time.process_time() - begun:.2f})")
+            print(f"reading {path.stat().st_size / 1e6:.0f} MB: {', '.join(told)}")
+    peak = int(subprocess.run([sys.executable, "-c", PEAK, path], capture_output=True, check=True).stdout)
+    print(f"summed lazily, of {path.stat().st_size / 1e6:.0f} MB: {peak / 1e6:.0f} MB more memory at most")
     path.unlink()
+
+
+def unchecked(file: StoredFile) -> None:
+    """The same chunks, read into arrays by as many threads, and not looked at."""
+    table = file.layout.tables["cells"]
+    bounds = [table.blocks.bounds(block) for block in range(table.blocks.count)]
+    with ThreadPoolExecutor(READERS) as pool:
+        for place in table.places:
+            numbers = place.empty(table.blocks.size)
+            parts = [((numbers[slice(*found)],), place.at(block)) for block, found in enumerate(bounds)]
+            list(pool.map(lambda part: disk.read_all(file.fd, *part), parts))
+
+
+PEAK = """
+import sys
+import dask
+from sweep.results import open as opening
+
+def most():
+    return next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("VmHWM"))
+
+opening.memory = lambda: 1
+dask.config.set({"array.chunk-size": "16MiB"})
+found = opening.open_result(sys.argv[1])
+before = most()
+found.sum().compute()
+print(1024 * (most() - before))
+"""
 
 
 def main() -> None:

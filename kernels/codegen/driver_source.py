@@ -94,7 +94,7 @@ def advance_{order}(memory, i):
             still = magnitude(after) <= fma(1e-12, size, 2.0 * magnitude(left))
             on_0 = where(switches, where(still, 1.0, 0.0), on_0)
         steps, before = where(active, leg.tried, steps), where(active, steps, before)
-        verdict = where(moving & (kinks_met > KINK_LIMIT), STEP_LIMIT_MET, verdict)
+        verdict = where(moving & (kinks_met > {most_kinks}), STEP_LIMIT_MET, verdict)
         done = active & (leg.grazing | (verdict >= REFUSED) | (count >= flips))
         if any_lane(leg.grazing):
             {nothing}
@@ -183,12 +183,13 @@ def settled(state, side, parameters, unit, near):
 '''
 
 
-def advance(states, parameters, kinks, order, offset, tells=False):
+def advance(states, parameters, kinks, order, offset, most_kinks, tells=False):
     """The text of `advance_{order}` and `run_{order}`.
 
     Parameters
     ----------
     offset : of the surface, as text
+    most_kinks : between two switches, as text
     tells : whether the error is carried along (`error_source`)
     """
     signs, ons = [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]
@@ -200,7 +201,7 @@ def advance(states, parameters, kinks, order, offset, tells=False):
     return filled(
         EVENT, order=order, load=loaded_rows(rows, [name for name in rows if name not in results]),
         parameters=listed(parameters), begin=begin.rstrip(), states=listed(states), signs=listed(signs),
-        ons=listed(ons), offset=offset, store=stored_rows(rows, changed),
+        ons=listed(ons), offset=offset, most_kinks=most_kinks, store=stored_rows(rows, changed),
         **_landing(states, signs, ons), **_switching(states, signs, ons, results),
         **(_telling(states, signs) if tells else dict.fromkeys(_TELLING, "")),
     )  # fmt: skip

@@ -179,6 +179,11 @@ class Writer:
         offset = self.recorded.events[0][0]
         return self.names[offset.args[0]] if offset.kind == INPUT else "0.0"
 
+    def advance(self, order, tells=False):
+        """The text of `advance_{order}` and `run_{order}`."""
+        most = "KINK_LIMIT" if self.scene.most_kinks is None else repr(float(self.scene.most_kinks))
+        return advance(self.states, self.parameters, self.kinks, order, self.offset(), most, tells)
+
     def summed(self):
         """The states whose rate is another state, and which."""
         rates = zip(self.states, self.recorded.rates, strict=True)
@@ -238,7 +243,7 @@ class Writer:
         for order in ORDERS:
             parts.append(self.series(order, len(recorded.graph.powers)))
             parts.append(leg(self, order, hides))
-            parts.append(advance(self.states, self.parameters, self.kinks, order, self.offset()))
+            parts.append(self.advance(order))
         return "\n".join(parts)
 
 

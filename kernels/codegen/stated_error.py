@@ -8,7 +8,7 @@ is left, and all that is remarked or refused, is followed twice (`followed_twice
 import numpy as np
 
 from kernels.codegen import followed_twice
-from kernels.codegen.driver_source import advance, rows_of
+from kernels.codegen.driver_source import rows_of
 from kernels.codegen.error_source import of_error
 from kernels.codegen.followed_twice import ROUNDING
 from kernels.codegen.hidden_source import hidden
@@ -55,7 +55,7 @@ def telling(scene):
     parts += [core(writer, i, True) for i in range(powers)]
     for order in ORDERS:
         parts += [writer.series(order, powers, True), leg(writer, order, hides, True)]
-        parts.append(advance(writer.states, writer.parameters, writer.kinks, order, writer.offset(), True))
+        parts.append(writer.advance(order, True))
     return loaded("told", scene, "\n".join(parts))
 
 

@@ -7,7 +7,6 @@ functions they take. To a tolerance a cell is followed twice, as by the Taylor m
 from types import SimpleNamespace
 
 from kernels.codegen import followed_twice
-from kernels.codegen.driver_source import advance
 from kernels.codegen.expression import INPUT
 from kernels.codegen.lane_source import BEGIN, begun_rows, loaded_rows, stored_rows
 from kernels.codegen.module import Writer, build, loaded
@@ -221,7 +220,7 @@ def adaptive(scene):
     names = {"name": scene.name, "module": module.__name__, "steps": steps.__name__}
     text = filled(LEGS, **names, linear=linear(writer)).lstrip()
     for method in APART:
-        text += advance(writer.states, writer.parameters, module.KINKS, method, writer.offset())
+        text += writer.advance(method)
     return loaded("legs", scene, text)
 
 

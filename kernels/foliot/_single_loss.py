@@ -39,13 +39,23 @@ def without_degree_0(scene):
 
 
 @jit
+def _acting(d, rho, gamma, n, e, kappa):
+    """Whether dry friction, quadratic drag or restitution acts alone: one of three, or none."""
+    smooth, elastic = not_(d > 0.0) & not_(kappa > 0.0), e >= 1.0
+    solid, drag = rho > 0.0, gamma > 0.0
+    square = drag & (n >= 2.0) & (n <= 2.0)
+    return (
+        smooth & elastic & solid & not_(drag),
+        smooth & elastic & not_(solid) & square,
+        smooth & not_(elastic) & not_(solid) & not_(drag),
+    )
+
+
+@jit
 def pure(scene):
     """The cycle where one loss acts alone, and whether one does."""
     d, rho, gamma, n, e, slack = without_degree_0(scene)
-    smooth, elastic = not_(d > 0.0) & not_(scene.kappa > 0.0), e >= 1.0
-    alone = smooth & elastic & (rho > 0.0) & not_(gamma > 0.0)
-    drag = smooth & elastic & not_(rho > 0.0) & (gamma > 0.0) & (n >= 2.0) & (n <= 2.0)
-    switch = smooth & not_(elastic) & not_(rho > 0.0) & not_(gamma > 0.0)
+    alone, drag, switch = _acting(d, rho, gamma, n, e, scene.kappa)
     cycle = choose(alone, dry(where(alone, rho, 0.5), where(alone, slack, 0.5)), _switch(where(switch, e, 0.0)))
     if any_lane(drag):
         cycle = choose(drag, _drag(where(drag, gamma, 1.0)), cycle)
@@ -53,10 +63,11 @@ def pure(scene):
 
 
 @jit
-def bound(scene):
-    """Relative errors of `pure`: rounding, and infinite where no loss acts alone."""
-    _, applies = pure(scene)
-    rounding = where(applies, ROUNDING, math.inf)
+def bound(p):
+    """Relative errors of `pure` for a `Foliot`: rounding, and infinite where no loss acts alone."""
+    degree_0 = not_(p.n > 0.0)
+    alone, drag, switch = _acting(p.a, p.R + where(degree_0, p.c, 0.0), where(degree_0, 0.0, p.c), p.n, p.e, p.k)
+    rounding = where(alone | drag | switch, ROUNDING, math.inf)
     return errors(rounding, rounding, 2.0 * rounding)
 
 

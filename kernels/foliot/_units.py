@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged, or_none
-from kernels.lanes.vectors import nearest, not_, sqrt, where
+from kernels.lanes.vectors import any_lane, nearest, not_, sqrt, where
 from kernels.maths.elementary import is_normal, mantissa_exponent, power, scale
 from kernels.maths.pairs import two_sum
 
@@ -169,7 +169,10 @@ def _in_units(x, unit, e_unit):
 @jit
 def _strength(mu, c, n, speed):
     """gamma of (1); 0 without drag, whatever n."""
-    return where(c > 0.0, c / mu * power(speed, n), 0.0)
+    strength = 0.0 * c
+    if any_lane(c > 0.0):
+        strength = where(c > 0.0, c / mu * power(speed, n), 0.0)
+    return strength
 
 
 @jit

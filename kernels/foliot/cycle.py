@@ -7,7 +7,7 @@ of the crown wheel, the geometry of the pallets, the fine structure of the torqu
 Source: Hoyng & Nieuwenhuizen, arXiv:1604.06681, for friction a phi' alone; the other terms are derived in the modules
 that solve them. What a swing loses grows strictly with the swing, so where a limit cycle exists it is the only one and
 stable; where the foliot does not come to it from rest at phi = 0, `segments` remarks the cell NOT_SELF_STARTING (a
-spring; `dopri5`, which does what `segments` cannot, follows the cycle only and does not say so).
+spring; `taylor` and `dopri5`, which do what `segments` cannot, follow the cycle only and do not say so).
 """
 
 import math
@@ -18,6 +18,7 @@ from kernels.foliot import (
     _integrated_swing,
     _linear_swing,
     _single_loss,
+    _taylor_swing,
     _units,
     _viscous,
 )
@@ -82,8 +83,7 @@ def pure(p, rtol):
 @jit
 def pure_bound(p):
     """Rounding where one loss acts alone, infinite elsewhere."""
-    scene, _ = _units.without_dimensions(p)
-    return _single_loss.bound(scene)
+    return _single_loss.bound(p)
 
 
 @jit
@@ -229,6 +229,7 @@ FOLIOT = kernel(
             event_map_bound,
             excludes=_VISCOUS_ONLY,
         ),
+        _taylor_swing.by_taylor(Foliot._fields, rippled=False),
         method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", dopri5),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},

@@ -12,7 +12,7 @@ Leaves out: the geometry of the pallets that makes the ripple. Source: as `folio
 
 import math
 
-from kernels.foliot import _integrated_swing, _units
+from kernels.foliot import _integrated_swing, _taylor_swing, _units
 from kernels.foliot.cycle import FOLIOT
 from kernels.foliot.cycle import check as check_foliot
 from kernels.interface import Field
@@ -68,6 +68,9 @@ FOLIOT_RIPPLE = kernel(
     ),
     outputs=FOLIOT.outputs,
     check=check,
-    methods=(method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", dopri5),),
+    methods=(
+        _taylor_swing.by_taylor((*_units.Foliot._fields, "depth", "harmonic"), rippled=True),
+        method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", dopri5),
+    ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0, "depth": 0.3, "harmonic": 2.0},
 )

@@ -53,7 +53,7 @@ def entry(*shared):
 def _filled_up(compiled, columns, per_cell):
     n = len(columns[0])
     rows = np.minimum(np.arange(WIDTH), n - 1)
-    full = [c[rows] if cells else c for c, cells in zip(columns, per_cell, strict=True)]
+    full = [c.take(rows, axis=0) if cells else c for c, cells in zip(columns, per_cell, strict=True)]
     compiled(*full)
     for column, result in zip(columns, full, strict=True):
         if column is not result and column.flags.writeable:

@@ -12,12 +12,13 @@ This rests on the inside of numba's compiler, so other versions of numba than th
 """
 
 import gc
+import operator
 
 import numba
 from llvmlite.binding import Linkage
 from numba import njit, types
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from numba.core.compiler import Compiler, Flags
 from numba.core.compiler_machinery import register_pass
 from numba.core.imputils import lower_constant
 from numba.core.registry import CPUDispatcher
@@ -28,6 +29,17 @@ TRIED = ("0.68",)
 """Versions of numba whose compiler is known to work so."""
 LINE = 64
 """Bytes of a cache line, and of the widest register."""
+_OPERATORS = frozenset(getattr(operator, name) for name in operator.__all__)
+
+
+class _Flags(Flags):
+    """numba's, of one function; compared by what was set. numba's own compare all thirty, with every call it types."""
+
+    def __eq__(self, other):
+        return self._values == other._values
+
+    def __hash__(self):
+        return hash((self.forceinline, self.error_model, len(self._values)))
 
 
 class _AlignedLibrary(JITCodeLibrary):
@@ -136,6 +148,7 @@ class _PartCompiler(Compiler):
     def define_pipelines(self):
         pipelines = super().define_pipelines()
         for pipeline in pipelines:
+            pipeline._ENFORCING = False  # or numba looks for dead variables after each pass, a tenth of its time
             pipeline.passes = [
                 (_BorrowingLowering if kind is NativeLowering else kind, text) for kind, text in pipeline.passes
             ]
@@ -144,6 +157,7 @@ class _PartCompiler(Compiler):
     def __init__(self, typing_context, target_context, library, *rest):
         library = library or _PartLibrary(target_context.codegen(), "part")
         super().__init__(typing_context, target_context, library, *rest)
+        self.state.flags = _Flags(self.state.flags)
         self.state.flags.no_cpython_wrapper = True
         self.state.flags.no_cfunc_wrapper = True
 
@@ -152,23 +166,44 @@ class _EntryLibrary(_AlignedLibrary):
     """Code of a function that Python calls, and of all inlined functions below it, each linked in once."""
 
     def finalize(self):
-        self._linking_libraries = _callers_first(self)
+        below = _all_below(self)
+        self._reload_init.update(*(called._reload_init for called in below))
+        if below:
+            self._final_module.link_in(_linked([called._get_module_for_linking().clone() for called in below]))
+            _set_linkage(self._final_module, Linkage.weak_odr, Linkage.linkonce_odr)
+        self._linking_libraries = []
         super().finalize()
 
 
-def _callers_first(library):
-    """What a library calls, and what that calls: nothing before what calls it, for LLVM links only what is called."""
-    seen, order = set(), []
+def _all_below(library):
+    """What a library calls, and what that calls."""
+    found = {}
 
     def visit(caller):
         for called in caller._linking_libraries:
-            if called not in seen:
-                seen.add(called)
+            if called not in found:
+                found[called] = True
                 visit(called)
-                order.append(called)
 
     visit(library)
-    return order[::-1]
+    return list(found)
+
+
+def _linked(modules):
+    """One module of all. By halves: LLVM looks through both of two modules to link them."""
+    if len(modules) == 1:
+        _set_linkage(modules[0], Linkage.linkonce_odr, Linkage.weak_odr)  # or what is not called from here were lost
+        return modules[0]
+    half = len(modules) // 2
+    first = _linked(modules[:half])
+    first.link_in(_linked(modules[half:]))
+    return first
+
+
+def _set_linkage(module, old, new):
+    for function in module.functions:
+        if not function.is_declaration and function.linkage == old:
+            function.linkage = new
 
 
 class _Entry(CPUDispatcher):
@@ -177,11 +212,29 @@ class _Entry(CPUDispatcher):
     def compile(self, sig):
         collecting = gc.isenabled()
         gc.disable()
+        _remember(self.typingctx)
         try:
             return super().compile(sig)
         finally:
             if collecting:
                 gc.enable()
+
+
+def _remember(context):
+    """Has numba ask once what an operator makes of numbers: it looks at lists, sets, text and arrays first."""
+    if "resolve_function_type" in vars(context):
+        return
+    known, ask = {}, context.resolve_function_type
+
+    def resolve(function, args, kws):
+        if function not in _OPERATORS or not all(isinstance(kind, types.Number | types.Boolean) for kind in args):
+            return ask(function, args, kws)
+        key = function, tuple(args)
+        if key not in known:
+            known[key] = ask(function, args, kws)
+        return known[key]
+
+    context.resolve_function_type = resolve
 
 
 class _EntryCompiler(Compiler):
@@ -192,6 +245,7 @@ class _EntryCompiler(Compiler):
             library = _EntryLibrary(target_context.codegen(), "entry")
             library.enable_object_caching()
         super().__init__(typing_context, target_context, library, *rest)
+        self.state.flags = _Flags(self.state.flags)
 
 
 def _is_tried():

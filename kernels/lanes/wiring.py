@@ -123,7 +123,7 @@ def kernel(
     parameters: Sequence[Field],
     outputs: Sequence[Field],
     check: CheckCell,
-    methods: Sequence[Solver | Split],
+    methods: Sequence[Solver | Split | Method],
     along: Sequence[Field] = (),
     example: Mapping[str, float | Sequence[float]] | None = None,
     same_length: Mapping[str, str] | None = None,
@@ -136,7 +136,7 @@ def kernel(
     ----------
     record : NamedTuple class whose fields are the parameters, in their order; None: one is made of their names
     check : `check(p)`, the status of a cell before any method is asked
-    methods : of `method` or `tracing`, the cheapest first
+    methods : of `method` or `tracing`, or whole ones that loop over the columns themselves; the cheapest first
     loop : how `check` and bounds are looped, `in_lanes`; `cell_by_cell` where parameters are arrays
     The others as in `kernels.interface.Kernel`.
 
@@ -206,7 +206,9 @@ class _Wiring:
 
         return self._entry("check", check, body, [*self.parameters, "status"], self.loop)
 
-    def method(self, solver: Solver | Split) -> Method:
+    def method(self, solver: Solver | Split | Method) -> Method:
+        if isinstance(solver, Method):
+            return solver
         if isinstance(solver, Split):
             return Method(solver.name, solver.doc, self._split(solver))
         strange = set(solver.lacks) - set(self.outputs) | set(solver.excludes) - set(self.parameters)

@@ -31,6 +31,8 @@ TELLING = 16
 OTHER_SHAPES = 20.0
 """Difference of AICc from which on a bend of another shape is ruled out; more than for a second law, since the truth
 may be between the shapes that are tried."""
+BEYOND_SHAPES = 0.5
+"""Share of what other shapes add to where the laws meet, added again: the true one may be none of them."""
 
 LAWS = ("low", "high")
 EXPONENTS = ("exponent", "exponent_low", "exponent_high")
@@ -272,7 +274,7 @@ def _of_other_bends(t: Array, z: Array, off: Array, low: Array, high: Array, con
     """Intervals that reach over those of every bend of another shape that the points do not rule out."""
     tried = [found for law in BENDS[1:] if (found := fitted(law, t, z)) is not None]
     best = min([_criterion(off), *(found.aicc for found in tried)])
-    low, high = low.copy(), high.copy()
+    own_low, own_high, low, high = low, high, low.copy(), high.copy()
     span = t[-1] - t[0]
     for found in tried:
         if found.aicc > best + OTHER_SHAPES:
@@ -284,6 +286,8 @@ def _of_other_bends(t: Array, z: Array, off: Array, low: Array, high: Array, con
         reach = reach * np.array([1 / span, 1 / span, span])
         which = [LOW, HIGH, PLACE]
         low[which], high[which] = np.fmin(low[which], middle - reach), np.fmax(high[which], middle + reach)
+    further = BEYOND_SHAPES * np.array([own_low[PLACE] - low[PLACE], high[PLACE] - own_high[PLACE]])
+    low[PLACE], high[PLACE] = low[PLACE] - further.max(), high[PLACE] + further.max()
     return low, high
 
 

@@ -13,7 +13,7 @@ from sweep.cells.guard import told
 from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import Partition, row_blocks
 from sweep.cells.reduce import Reducer
-from sweep.cells.schema import ANCILLARY, ERROR_BOUND, METHOD_USED, STATUS, columns
+from sweep.cells.schema import cells_of, columns
 from sweep.cells.timing import Sample, take_sample, tolerated
 from sweep.system.errors import SweepError
 
@@ -54,13 +54,10 @@ class Blocks:
         What a block fills.
     rows : RowBlocks
         The cells of each row.
-    shape : tuple of int
-        In which the rows stand.
     """
 
     def __init__(self, study: Study, partition: Partition) -> None:
         self.partition, self.columns, self.rows = partition, part_columns(study), row_blocks(study)
-        self.shape = row_shape(study)
 
     @property
     def count(self) -> int:
@@ -110,11 +107,7 @@ def block_solver(study: Study, solver: SolveCells | None = None) -> SolveBlock:
         reducer = Reducer(study, solver)
         return lambda start, stop, arrays, wanted: reducer.solve(start, stop, arrays)
 
-    def solve(start: int, stop: int, arrays: Mapping[str, Any], wanted: Any) -> None:
-        outputs = {name: array for name, array in arrays.items() if name not in ANCILLARY}
-        solver.solve(start, stop, outputs, arrays[STATUS], arrays[METHOD_USED], wanted, arrays[ERROR_BOUND])
-
-    return solve
+    return lambda start, stop, arrays, wanted: solver.solve(start, cells_of(arrays), wanted)
 
 
 def sampled_study(study: Study, compiling: Compiling | None = None) -> Sample:
@@ -145,7 +138,7 @@ def warm(solver: SolveCells, study: Study) -> None:
     last = row_blocks(study).size - 1
     for index in dict.fromkeys((last // 2, 0, last)):
         with tolerated():
-            solver.solve(index, index + 1, *empty_cells(study, 1))
+            solver.solve(index, empty_cells(study, 1))
 
 
 @contextlib.contextmanager

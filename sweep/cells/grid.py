@@ -6,7 +6,7 @@ Cells are numbered in C order: the last axis runs fastest.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -157,21 +157,31 @@ class Grid(Box):
 
 
 class Cells(NamedTuple):
-    """Outputs by name, statuses, and numbers of the methods used."""
+    """The columns of some cells, to be filled or filled.
 
-    outputs: dict[str, Any]
+    Attributes
+    ----------
+    outputs : mapping of output name to ndarray, shape (cells, ...)
+    status, used : ndarray of int8, shape (cells,)
+        A `Status`; the position in `kernel.methods`, or -1 where the cell is refused.
+    error : ndarray of float32, shape (cells,), optional
+        What INACCURATE values are right to, infinite where nobody knows; NaN for other cells.
+    """
+
+    outputs: Mapping[str, Any]
     status: Any
     used: Any
+    error: Any = None
 
     @property
     def number(self) -> int:
         """How many cells."""
         return len(self.status)
 
-    def first(self, cells: int) -> Cells:
-        """Views of the first ones."""
-        outputs = {name: column[:cells] for name, column in self.outputs.items()}
-        return Cells(outputs, self.status[:cells], self.used[:cells])
+    def rows(self, some: slice) -> Cells:
+        """Views of some of them."""
+        outputs = {name: column[some] for name, column in self.outputs.items()}
+        return Cells(outputs, self.status[some], self.used[some], None if self.error is None else self.error[some])
 
 
 def empty_cells(study: Study, cells: int) -> Cells:

@@ -13,7 +13,7 @@ from sweep.cells.solve import NONE
 from sweep.system.errors import SweepError
 
 if TYPE_CHECKING:
-    from sweep.cells.grid import Grid
+    from sweep.cells.grid import Cells, Grid
 
 
 class SolveCells(Protocol):
@@ -21,17 +21,8 @@ class SolveCells(Protocol):
 
     grid: Grid
 
-    def solve(
-        self,
-        start: int,
-        stop: int,
-        outputs: Mapping[str, Any],
-        status: Any,
-        method_used: Any,
-        wanted: Any = None,
-        error_bound: Any = None,
-    ) -> None:
-        """Fills the rows of the cells `start` to `stop`. Raises what the kernel does."""
+    def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
+        """Fills the columns of the cells from number `start` on. Raises what the kernel does."""
 
 
 class Unsolved(Exception):
@@ -64,37 +55,26 @@ class Guard:
     def __init__(self, solver: SolveCells, report: Callable[[BadCell], None]) -> None:
         self._solver, self._report, self.grid = solver, report, solver.grid
 
-    def solve(
-        self,
-        start: int,
-        stop: int,
-        outputs: Mapping[str, Any],
-        status: Any,
-        method_used: Any,
-        wanted: Any = None,
-        error_bound: Any = None,
-    ) -> None:
+    def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
         """As `Solver.solve`; of cells with which it raises, each half is tried. Raises SweepError, MemoryError."""
         if wanted is not None and not wanted.any():
             return
         try:
-            self._solver.solve(start, stop, outputs, status, method_used, wanted, error_bound)
+            self._solver.solve(start, cells, wanted)
             return
         except (SweepError, MemoryError):
             raise
         except Exception as fault:
             reason = told(fault)
-        if stop - start > 1:
-            middle = (stop - start) // 2
-            for rows in (slice(0, middle), slice(middle, stop - start)):
-                some = {name: column[rows] for name, column in outputs.items()}
-                others = [None if column is None else column[rows] for column in (wanted, error_bound)]
-                self.solve(start + rows.start, start + rows.stop, some, status[rows], method_used[rows], *others)
+        if cells.number > 1:
+            middle = cells.number // 2
+            for rows in (slice(0, middle), slice(middle, cells.number)):
+                self.solve(start + rows.start, cells.rows(rows), None if wanted is None else wanted[rows])
             return
-        for column in [*outputs.values(), *([] if error_bound is None else [error_bound])]:
+        for column in [*cells.outputs.values(), *([] if cells.error is None else [cells.error])]:
             column.fill(np.nan)
-        status.fill(Status.FAILED)
-        method_used.fill(NONE)
+        cells.status.fill(Status.FAILED)
+        cells.used.fill(NONE)
         self._report(BadCell(start, self.grid.cell(start), reason))
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.interface import Status
-from sweep.cells.grid import empty_cells
+from sweep.cells.grid import Cells, empty_cells
 from sweep.cells.partition import row_blocks
 from sweep.cells.schema import Column
 
@@ -132,9 +132,9 @@ class Reducer:
         """Fill `rows` with the rows `start` to `stop`."""
         cleared(rows)
         for strip in self.row_blocks.strips(start, stop, self.strip):
-            cells = self._cells.first(strip.rows * strip.cells)
-            self.solver.solve(strip.cell, strip.cell + cells.number, *cells)
-            found = self.reduce(strip.cell, strip.rows, *cells)
+            cells = self._cells.rows(slice(strip.rows * strip.cells))
+            self.solver.solve(strip.cell, cells)
+            found = self.reduce(strip.cell, strip.rows, cells)
             place = slice(strip.row - start, strip.row - start + strip.rows)
             merge({name: column[place] for name, column in rows.items()}, found)
 
@@ -142,31 +142,31 @@ class Reducer:
         """What reducing a cell takes, tried on as many whole row blocks as a strip holds, or on as much of one."""
         length = min(self.row_blocks.length, self._cells.number)
         rows = self._cells.number // length
-        cells = self._cells.first(rows * length)
+        cells = self._cells.rows(slice(rows * length))
         for column in (*cells.outputs.values(), cells.status, cells.used):
             column.fill(0)
         taken = []
         for _ in range(3):
             begun = time.perf_counter()
-            self.reduce(0, rows, *cells)
+            self.reduce(0, rows, cells)
             taken.append(time.perf_counter() - begun)
         return min(taken) / cells.number
 
-    def reduce(self, cell: int, rows: int, outputs: Mapping[str, Floats], status: Any, used: Any) -> Rows:
+    def reduce(self, cell: int, rows: int, cells: Cells) -> Rows:
         """Rows of equally many cells, which lie one behind the other from cell number `cell` on."""
         found: Rows = {
-            BY_STATUS: _counted(status, rows, len(STATUSES), _status_number),
-            BY_METHOD: _counted(used, rows, len(self.study.kernel.methods) + 1, _method_number),
+            BY_STATUS: _counted(cells.status, rows, len(STATUSES), _status_number),
+            BY_METHOD: _counted(cells.used, rows, len(self.study.kernel.methods) + 1, _method_number),
         }
         assert self.study.summary is not None
         for name, reductions in self.study.summary.outputs.items():
-            values = outputs[name].reshape(rows, -1, *outputs[name].shape[1:])
+            values = cells.outputs[name].reshape(rows, -1, *cells.outputs[name].shape[1:])
             found |= {f"{name} {what}": column for what, column in self._reduced(values, name, reductions).items()}
             for end in _ends(reductions):
                 place = found[f"{name} {end} at"]
                 inside = np.arange(rows).reshape(-1, *[1] * (place.ndim - 1)) * values.shape[1] + place
                 none = place == NO_CELL
-                found[f"{name} {end} status"] = np.where(none, 0, status[np.where(none, 0, inside)])
+                found[f"{name} {end} status"] = np.where(none, 0, cells.status[np.where(none, 0, inside)])
                 found[f"{name} {end} at"] = np.where(none, NO_CELL, inside + cell)
         return found
 

@@ -67,11 +67,12 @@ def _times(value: Any, factor: float) -> Any:
 
 
 def solved(study: Study) -> Cells:
-    """All cells of a study, in memory."""
+    """All cells of a study, in memory; those at which the kernel raises FAILED."""
+    from sweep.cells.guard import Guard
     from sweep.cells.solve import Solver
 
     cells = empty_cells(study, Grid(study).size)
-    Solver(study).solve(0, cells.number, *cells)
+    Guard(Solver(study), lambda cell: None).solve(0, cells)
     return cells
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from kernels.interface import Field, Kernel, Status
 from sweep.cells.fingerprint import version
-from sweep.cells.grid import Box, Grid
+from sweep.cells.grid import Box, Cells, Grid
 
 if TYPE_CHECKING:
     from sweep.study.model import Axis, Study
@@ -41,11 +41,6 @@ class Column:
     def cell_bytes(self) -> int:
         """Bytes of one cell."""
         return np.dtype(self.dtype).itemsize * math.prod(self.shape)
-
-    @property
-    def missing(self) -> float | int:
-        """What stands for a cell that is not computed yet."""
-        return {STATUS: int(Status.PENDING), METHOD_USED: -1}.get(self.name, math.nan)
 
     def empty(self, cells: int) -> Any:
         """An uninitialised array of shape `(cells, *shape)`."""
@@ -96,6 +91,12 @@ def cell_schema(study: Study, fingerprint: Mapping[str, str]) -> Schema:
 def columns(study: Study) -> tuple[Column, ...]:
     """The asked outputs in kernel order, then what is said of them."""
     return (*(_output(f, study) for f in study.asked), _error_bound(), _status(), _method_used(study.kernel))
+
+
+def cells_of(arrays: Mapping[str, Any]) -> Cells:
+    """The cells whose columns are given by name."""
+    outputs = {name: array for name, array in arrays.items() if name not in ANCILLARY}
+    return Cells(outputs, arrays[STATUS], arrays[METHOD_USED], arrays.get(ERROR_BOUND))
 
 
 def coordinates(study: Study) -> tuple[Coordinate, ...]:

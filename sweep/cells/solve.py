@@ -11,7 +11,7 @@ a kernel has not got, the cell FAILED.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Method, Status
-from sweep.cells.grid import Grid
+from sweep.cells.grid import Cells, Grid
 from sweep.study.model import AUTO, Study
 
 STRIP = 16384
@@ -28,7 +28,16 @@ STRIP_BYTES = 16 << 20
 """Bytes that the outputs of a strip may take, where they are traces."""
 NONE = -1
 """In place of a method's number: no method solved the cell."""
-GIVEN_UP = (
+
+
+def _these(*statuses: Status) -> NDArray[np.bool_]:
+    """Statuses as `among` takes them: in a table, since `choose` asks it of every cell."""
+    table = np.zeros(256, bool)
+    table[list(statuses)] = True
+    return table
+
+
+GIVEN_UP = _these(
     Status.NO_METHOD,
     Status.NO_CYCLE,
     Status.NOT_CONVERGED,
@@ -38,15 +47,15 @@ GIVEN_UP = (
     Status.FAILED,
 )
 """After these `auto` tries the next method."""
-VAGUE = (Status.NO_METHOD, Status.NO_CYCLE)
+VAGUE = _these(Status.NO_METHOD, Status.NO_CYCLE)
 """Refusals that tell less than how another method gave up."""
-UNKNOWN = (Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT)
+UNKNOWN = _these(Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT)
 """A method that ends so has not learnt what the scene does: another's NO_CYCLE, of its own kind alone, is no answer."""
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Codes = NDArray[np.int8]
-Cells = slice | NDArray[np.intp]
+Chosen = slice | NDArray[np.intp]
 
 
 class Solver:
@@ -67,8 +76,10 @@ class Solver:
         cell_bytes = sum(8 * math.prod(shapes[field.name]) for field in kernel.outputs)
         cells = self._strip = max(1, min(STRIP, self.grid.size, STRIP_BYTES // cell_bytes))
         self._parameters = [np.empty((cells, *shapes[field.name])) for field in kernel.parameters]
-        for k, value in self.grid.constants().items():
+        constants = self.grid.constants()
+        for k, value in constants.items():
             self._parameters[k][:] = value
+        self._shared = [k in constants for k in range(len(kernel.parameters))] + ["rtol" not in study.axes]
         self._along = [np.array(study.along[field.name]) for field in kernel.along]
         self._unasked = {
             field.name: np.empty((cells, *shapes[field.name]))
@@ -79,54 +90,29 @@ class Solver:
         self._rtol, self._bound, self._error = np.empty(cells), np.empty(cells), np.empty(cells)
         self._promised = None if study.kernel_name in catalogue.KERNELS else promised(study)
 
-    def solve(
-        self,
-        start: int,
-        stop: int,
-        outputs: Mapping[str, Floats],
-        status: Codes,
-        method_used: Codes,
-        wanted: NDArray[np.bool_] | None = None,
-        error_bound: Singles | None = None,
-    ) -> None:
-        """Fill the rows of every output asked for, and status and method number, of the cells `start` to `stop`.
+    def solve(self, start: int, cells: Cells, wanted: NDArray[np.bool_] | None = None) -> None:
+        """Fill the columns of cells.
 
         Parameters
         ----------
-        start, stop : int
-            Flat cell numbers of the grid.
-        outputs : mapping of output name to ndarray, shape (stop - start, ...)
-        status, method_used : ndarray of int8, shape (stop - start,)
-            A `Status`; the position in `kernel.methods`, or -1 where the cell is refused.
+        start : int
+            Flat number of the first of them in the grid.
+        cells : Cells
+            Columns of every output asked for, of statuses, of method numbers, and maybe of errors.
         wanted : ndarray of bool, optional
             Cells to solve; what comes out for the others means nothing. Default: all.
-        error_bound : ndarray of float32, shape (stop - start,), optional
-            To be filled with what INACCURATE values are right to, infinite where nobody knows; NaN for other cells.
         """
-        for low in range(start, stop, self._strip):
-            high = min(low + self._strip, stop)
-            rows = slice(low - start, high - start)
-            if wanted is not None and not wanted[rows].any():
-                continue
-            columns = [
-                outputs[f.name][rows] if f.name in outputs else self._unasked[f.name][: high - low]
-                for f in self.study.kernel.outputs
-            ]
-            some = None if wanted is None or wanted[rows].all() else wanted[rows]
-            self._solve_strip(low, high, columns, status[rows], method_used[rows], some)
-            if error_bound is not None:
-                _tell_errors(error_bound[rows], self._error[: high - low], status[rows])
+        for begin in range(0, cells.number, self._strip):
+            rows = slice(begin, min(begin + self._strip, cells.number))
+            if wanted is None or wanted[rows].any():
+                some = None if wanted is None or wanted[rows].all() else wanted[rows]
+                self._solve_strip(start + begin, cells.rows(rows), some)
 
-    def _solve_strip(
-        self,
-        low: int,
-        high: int,
-        outputs: Sequence[Floats],
-        status: Codes,
-        used: Codes,
-        wanted: NDArray[np.bool_] | None,
-    ) -> None:
-        strip = _Strip(self, high - low, outputs, status, used)
+    def _solve_strip(self, low: int, cells: Cells, wanted: NDArray[np.bool_] | None) -> None:
+        high, status, used = low + cells.number, cells.status, cells.used
+        spare = {name: column[: cells.number] for name, column in self._unasked.items()}
+        outputs = [{**spare, **cells.outputs}[field.name] for field in self.study.kernel.outputs]
+        strip = _Strip(self, cells.number, outputs, status, used)
         self.grid.columns(low, high, strip.parameters)
         self.study.kernel.check(*strip.parameters, status)
         if self._promised is not None:
@@ -136,16 +122,18 @@ class Solver:
         used.fill(NONE)
         method, strip.rtol[:] = self.grid.settings(low, high)
         sound = status < FIRST_REFUSAL
-        allowed = _pick(slice(0, high - low), sound if wanted is None else sound & wanted)
+        allowed = _pick(slice(0, cells.number), sound if wanted is None else sound & wanted)
         codes = [method] if isinstance(method, int) else np.unique(method)
         for code in codes:
-            cells = allowed if isinstance(method, int) else _pick(allowed, method[allowed] == code)
-            strip.choose(cells) if code == AUTO else strip.take(int(code), cells)
+            chosen = allowed if isinstance(method, int) else _pick(allowed, method[allowed] == code)
+            strip.choose(chosen) if code == AUTO else strip.take(int(code), chosen)
         refused = status >= FIRST_REFUSAL
         if refused.any():
             used[refused] = NONE
             for column in outputs:
                 column[refused] = np.nan
+        if cells.error is not None:
+            _tell_errors(cells.error, strip.error, status)
 
 
 class _Strip:
@@ -154,45 +142,53 @@ class _Strip:
     def __init__(self, solver: Solver, n: int, outputs: Sequence[Floats], status: Codes, used: Codes) -> None:
         self.kernel, self.along, self.asked = solver.study.kernel, solver._along, solver._asked
         self.parameters = [column[:n] for column in solver._parameters]
+        self._shared = solver._shared
         self.rtol, self._bound, self.error = solver._rtol[:n], solver._bound[:n], solver._error[:n]
         self.outputs, self.status, self.used = outputs, status, used
         self.usable, self.promised = solver.usable, solver._promised
 
-    def take(self, number: int, cells: Cells) -> None:
+    def take(self, number: int, cells: Chosen) -> None:
         """Solve the cells by one method; remark those for which it promises less than rtol."""
         method = self.kernel.methods[number]
         if _count(cells):
             self.run(number, cells, None if method.bound is None else self.bound(method, cells))
 
-    def choose(self, cells: Cells) -> None:
+    def choose(self, cells: Chosen) -> None:
         """Solve each cell by the first method whose bound meets rtol and which does not give up."""
+        if not _count(cells):
+            return
         self.status[cells] = Status.NO_METHOD
-        missed: list[tuple[int, Cells, Floats]] = []
+        missed: list[tuple[int, Chosen, Floats]] = []
         for number in self.usable:
+            able = self._promising(number, cells, missed)
+            if not _count(able):
+                continue
+            self._improve(number, able)
+            cells = _pick(cells, among(self.status[cells], GIVEN_UP))
             if not _count(cells):
                 return
-            method, able = self.kernel.methods[number], cells
-            if method.bound is not None:
-                bound = self.bound(method, cells)
-                meets = bound <= self.rtol[cells]
-                able = _pick(cells, meets)
-                if not meets.all():
-                    missed.append((number, cells, np.where(meets | np.isnan(bound), np.inf, bound)))
-            before = np.where(self.used[able] != NONE, self.status[able], Status.OK)
-            self._improve(number, able)
-            self._leave_open(able, before)
-            cells = _pick(cells, np.isin(self.status[cells], GIVEN_UP))
-        if missed and _count(cells):
+        if missed:
             self._settle(cells, missed)
 
-    def _settle(self, cells: Cells, missed: Sequence[tuple[int, Cells, Floats]]) -> None:
+    def _promising(self, number: int, cells: Chosen, missed: list[tuple[int, Chosen, Floats]]) -> Chosen:
+        """Chosen for which a method's bound, if it has one, meets rtol; where others are left, they go to `missed`."""
+        method = self.kernel.methods[number]
+        if method.bound is None:
+            return cells
+        bound = self.bound(method, cells)
+        able = _pick(cells, bound <= self._of(self.rtol, cells, self._shared[-1]))
+        if _count(able) < _count(cells):
+            missed.append((number, cells, bound.copy()))
+        return able
+
+    def _settle(self, cells: Chosen, missed: Sequence[tuple[int, Chosen, Floats]]) -> None:
         """Give cells for which nothing meets rtol the values of the smallest bound.
 
         `missed`: numbers of methods, the cells for which their bounds exceed rtol, and these bounds.
         """
         bounds = np.full((len(missed), len(self.status)), np.inf)
         for row, (_, some, bound) in zip(bounds, missed, strict=True):
-            row[some] = bound
+            row[some] = np.where((bound <= self.rtol[some]) | np.isnan(bound), np.inf, bound)
         for _ in missed:
             best, least = bounds[:, cells].argmin(axis=0), bounds[:, cells].min(axis=0)
             better = least < self._known(cells)
@@ -201,14 +197,21 @@ class _Strip:
                 self._improve(missed[place][0], tried, bounds[place, tried])
                 bounds[place, tried] = np.inf
 
-    def _known(self, cells: Cells) -> Floats:
+    def _known(self, cells: Chosen) -> Floats:
         """What the values of cells are right to at least; infinite where there are none, 0 where rtol is met."""
         status = self.status[cells]
         error = np.where(status == Status.INACCURATE, self.error[cells], 0.0)
         return np.where(status < FIRST_REFUSAL, error, np.inf)
 
-    def _improve(self, number: int, cells: Cells, bound: Floats | None = None) -> None:
-        """Run a method, but keep what an earlier one gave to cells where this one is not better."""
+    def _improve(self, number: int, cells: Chosen, bound: Floats | None = None) -> None:
+        """Run a method, but keep what an earlier one gave to cells where this one is not better.
+
+        Where an earlier one did not know what the scene does, and this one knows no cycle of its kind, that is open.
+        """
+        tried = self.used[cells] != NONE
+        if not tried.any():
+            return self.run(number, cells, bound)
+        before = np.where(tried, self.status[cells], np.int8(Status.OK))
         columns: list[NDArray[Any]] = [*self.outputs, self.used, self.status, self.error]
         held = _pick(cells, self.status[cells] != Status.NO_METHOD)
         kept = [column[held].copy() for column in columns] if _count(held) else []
@@ -218,42 +221,59 @@ class _Strip:
             back = _pick(held, worse)
             for column, values in zip(columns, kept, strict=True):
                 column[back] = values[worse]
-
-    def _leave_open(self, cells: Cells, before: Codes) -> None:
-        """Give back what an earlier method said where it did not know, and this one knows no cycle of its kind."""
-        open_ = np.isin(before, UNKNOWN) & (self.status[cells] == Status.NO_CYCLE)
+        open_ = among(before, UNKNOWN) & (self.status[cells] == Status.NO_CYCLE)
         self.status[_pick(cells, open_)] = before[open_]
 
-    def bound(self, method: Method, cells: Cells) -> Floats:
+    def bound(self, method: Method, cells: Chosen) -> Floats:
         """The method's error bound for the cells, over the outputs asked for."""
         assert method.bound is not None
         out = self._bound[: _count(cells)]
-        columns = [column[cells] for column in (*self.parameters, self.rtol)]
+        columns = self._inputs(cells)
         method.bound(*columns, *self.along, self.asked, out)
         return out
 
-    def run(self, number: int, cells: Cells, bound: Floats | None = None) -> None:
+    def _inputs(self, cells: Chosen) -> list[Floats]:
+        """Parameters and rtol of the cells."""
+        columns = (*self.parameters, self.rtol)
+        return [self._of(column, cells, shared) for column, shared in zip(columns, self._shared, strict=True)]
+
+    @staticmethod
+    def _of(column: Floats, cells: Chosen, shared: bool) -> Floats:
+        """A column's values in the cells; of one that is the same in all, any as many rows."""
+        if isinstance(cells, slice):
+            return column[cells]
+        return column[: cells.size] if shared else column.take(cells, axis=0)
+
+    @staticmethod
+    def _room(column: NDArray[Any], cells: Chosen) -> NDArray[Any]:
+        """Where results of the cells go: to their places, if these lie side by side."""
+        if isinstance(cells, slice):
+            return column[cells]
+        return np.empty((cells.size, *column.shape[1:]), column.dtype)
+
+    def run(self, number: int, cells: Chosen, bound: Floats | None = None) -> None:
         """Solve the cells by one method: in place where they lie side by side, else gathered and put back.
 
         `bound` is the method's where it may exceed rtol.
         """
         if not _count(cells):
             return
-        method = self.kernel.methods[number]
-        columns = [column[cells] for column in (*self.parameters, self.rtol)]
+        method, columns = self.kernel.methods[number], self._inputs(cells)
         asked, error = ([self.asked], [self.error]) if method.estimates else ([], [])
         targets: list[NDArray[Any]] = [*self.outputs, *error, self.status]
-        results = [column[cells] for column in targets]
+        results = [self._room(column, cells) for column in targets]
         method.solve(*columns, *self.along, *asked, *results)
         if self.promised is not None:
             fail(results[-1], [results[k] for k in self.promised])
         if not isinstance(cells, slice):
-            for column, result in zip(targets, results, strict=True):
-                column[cells] = result
+            asked_for = [*self.asked, *[True] * (len(targets) - len(self.asked))]
+            for column, result, wanted in zip(targets, results, asked_for, strict=True):
+                if wanted:
+                    column[cells] = result
         self.used[cells] = number
         self._judge(method, cells, bound)
 
-    def _judge(self, method: Method, cells: Cells, bound: Floats | None) -> None:
+    def _judge(self, method: Method, cells: Chosen, bound: Floats | None) -> None:
         """Remark values of which less is known than rtol, and note what they are right to; NaN tells nothing."""
         status = self.status[cells]
         said = status == Status.INACCURATE
@@ -278,7 +298,7 @@ def usable_methods(study: Study) -> tuple[int, ...]:
 def _worse(status: Codes, error: Floats, earlier: Codes, earlier_error: Floats) -> NDArray[np.bool_]:
     """Where what a method gave is not better than what an earlier one did."""
     refused, valued = status >= FIRST_REFUSAL, earlier < FIRST_REFUSAL
-    lost = refused & (valued | (np.isin(status, VAGUE) & ~np.isin(earlier, VAGUE)))
+    lost = refused & (valued | (among(status, VAGUE) & ~among(earlier, VAGUE)))
     doubtful = earlier == Status.INACCURATE
     loose = doubtful & (status == Status.INACCURATE) & ~(error < earlier_error)
     worse: NDArray[np.bool_] = lost | loose | (doubtful & (status == Status.UNSTABLE))
@@ -314,19 +334,27 @@ def fail(status: Codes, columns: Sequence[Floats]) -> None:
         status[codes >= Status.NOT_ASKED] = Status.FAILED
 
 
-def _pick(cells: Cells, condition: NDArray[np.bool_]) -> Cells:
+def _pick(cells: Chosen, condition: NDArray[np.bool_]) -> Chosen:
     """Those of the cells for which the condition holds; a slice where they lie side by side."""
-    hits = np.flatnonzero(condition)
-    if hits.size == condition.size:
+    number = np.count_nonzero(condition)
+    if number == condition.size:
         return cells
+    if number == 0:
+        return slice(0, 0)
+    hits = condition.nonzero()[0]
     if not isinstance(cells, slice):
         chosen: NDArray[np.intp] = cells[hits]
         return chosen
-    if hits.size and hits[-1] - hits[0] + 1 == hits.size:
+    if hits[-1] - hits[0] + 1 == number:
         return slice(cells.start + int(hits[0]), cells.start + int(hits[-1]) + 1)
     shifted: NDArray[np.intp] = hits + int(cells.start)
     return shifted
 
 
-def _count(cells: Cells) -> int:
+def among(status: Codes, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Where a status is one of some, which are those with True at their number."""
+    return some[status.view(np.uint8)]
+
+
+def _count(cells: Chosen) -> int:
     return cells.stop - cells.start if isinstance(cells, slice) else cells.size

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sweep.cells.partition import Partition, RowBlocks, boxes
-from sweep.cells.schema import ANCILLARY, METHOD_USED, STATUS, Column
+from sweep.cells.schema import METHOD_USED, STATUS, Column, cells_of
 from sweep.system.errors import SweepError
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ def _probes(solver: _Probing, columns: Sequence[Column], size: int, cells: int) 
     for index in _scattered(count):
         start = _place(index, count, cells, size)
         usual = cells * float(np.median([p[0] for p in probes.values()])) if probes else 0.0
-        seconds = _timed(solver, arrays, start, cells, usual)
+        seconds = _timed(solver, arrays, start, usual)
         if math.isfinite(seconds):
             probes[start] = seconds / cells, arrays[STATUS].copy(), arrays[METHOD_USED].copy()
         spent += seconds if math.isfinite(seconds) else FAILED_PROBE
@@ -155,20 +155,20 @@ def _probe(solver: _Probing, columns: Sequence[Column], size: int, cells: int) -
     """Seconds that some cells in the middle of the grid take together, or elsewhere, where these fail."""
     arrays = {column.name: column.empty(cells) for column in columns}
     for start in [_place(0, 1, cells, size), *(_place(index, PLACES, cells, size) for index in _scattered(PLACES))]:
-        seconds = min(_timed(solver, arrays, start, cells) for _ in range(2 if cells == 1 else 1))
+        seconds = min(_timed(solver, arrays, start) for _ in range(2 if cells == 1 else 1))
         if math.isfinite(seconds):
             break
     return seconds
 
 
-def _timed(solver: _Probing, arrays: dict[str, Any], start: int, cells: int, usual: float = 0.0) -> float:
+def _timed(solver: _Probing, arrays: dict[str, Any], start: int, usual: float = 0.0) -> float:
     """Seconds to solve the cells; taken again where a method may have been compiled or loaded meanwhile.
 
     `usual`: seconds that other probes took.
     """
-    seconds = solver.seconds(start, start + cells, arrays)
+    seconds = solver.seconds(start, arrays)
     slow = max(SUSPECT, 4 * usual) < seconds < math.inf
-    return min(seconds, solver.seconds(start, start + cells, arrays)) if slow else seconds
+    return min(seconds, solver.seconds(start, arrays)) if slow else seconds
 
 
 class _Probing:
@@ -179,11 +179,11 @@ class _Probing:
         self._good, self._failed = False, 0
         self.fault: Exception = RuntimeError("no cell was tried")
 
-    def seconds(self, start: int, stop: int, arrays: Mapping[str, Any]) -> float:
-        outputs = {name: array for name, array in arrays.items() if name not in ANCILLARY}
+    def seconds(self, start: int, arrays: Mapping[str, Any]) -> float:
+        cells = cells_of(arrays)
         begun = self._clock()
         with tolerated() as faults:
-            self._solver.solve(start, stop, outputs, arrays[STATUS], arrays[METHOD_USED])
+            self._solver.solve(start, cells)
             self._good = True
             return self._clock() - begun
         self.fault, self._failed = faults[0], self._failed + 1

@@ -9,6 +9,7 @@ Others may use
     `solver`          a study's kernel as a function of its axes
     `sensitivity`     which parameters decide an output
     `groups`          superfluous axes, outputs free of units
+    `failing`         a study without the cells at which its kernel fails
 
 `calibration` (trial runs) is behind `plan`, `reference` (what errors are against) behind `work_precision`,
 `symmetries` (powers by which numbers may be multiplied) behind `groups`.

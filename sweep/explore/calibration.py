@@ -42,6 +42,7 @@ class Calibration:
     ----------
     cells, block : of the study, and of a block of it
     cell_seconds, cell_bytes : about what one costs on one core, and on the disk
+    cell_timeout : what one may take in a process of its own; None: in this one
     """
 
     study: Study
@@ -50,6 +51,7 @@ class Calibration:
     cell_seconds: float
     cell_bytes: float
     workers: int
+    cell_timeout: float | None = None
 
     @property
     def _guess(self) -> float:
@@ -84,7 +86,8 @@ class Calibration:
         cells = math.prod(study.grid_shape.values())
         block = self.block if cells == self.cells else max(1, min(self.block, cells // (2 * self.workers)))
         begun = time.perf_counter()
-        run(study, path, workers=self.workers, progress=False, block_cells=block).close()
+        limit = self.cell_timeout
+        run(study, path, workers=self.workers, progress=False, block_cells=block, cell_timeout=limit).close()
         seconds = time.perf_counter() - begun
         path.unlink()
         return Timed(cells, seconds)

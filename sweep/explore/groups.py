@@ -143,6 +143,11 @@ def scaling(study: Study) -> Scaling:
     )
 
 
+def advice_on(study: str) -> str:
+    """The advice on a study in JSON."""
+    return scaling(Study.from_json(study, allow_import=True)).advice
+
+
 def rescaled(dataset: xr.Dataset, study: Study | None = None) -> xr.Dataset:
     """The Dataset with its outputs freed of units, and a coordinate for each dimensionless group.
 

@@ -15,16 +15,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kernels.interface import Status, machine_code_folder
-from sweep.cells.block import faults_reported, row_shape, sampled_study
-from sweep.cells.compiling import Compiling
+from sweep.cells.block import faults_reported, row_shape, sampled_by, sampled_study, warm
+from sweep.cells.compiling import SILENT_SECONDS, Compiling
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.grid import Grid
+from sweep.cells.guard import Unsolved
 from sweep.cells.output_schema import output_schema, part_columns
 from sweep.cells.partition import Partition, row_blocks
 from sweep.cells.reduce import strip_bytes
 from sweep.cells.timing import Sample, row_partition
 from sweep.explore.calibration import Calibration
+from sweep.explore.groups import advice_on, scaling
 from sweep.results.open import memory
+from sweep.runs.isolate import SLACK, Limits, Processes, limits_of
 from sweep.store.frame import cuts_of, expected_size
 from sweep.study.read import Given, as_study
 from sweep.system.errors import SweepError
@@ -38,6 +41,10 @@ TRIAL = 32 << 20
 """Bytes written to see how fast the disk is,"""
 WORTH_A_TRIAL = 1 << 28
 """where so many are to be written."""
+ADVICE_SECONDS = 10.0
+"""What looking for superfluous axes may take, of a kernel that may not end."""
+TRIAL_CELL_SECONDS = 1.0
+"""A trial run does not wait longer for a cell that never ends, or ten times as long as for others."""
 
 
 @dataclass(frozen=True)
@@ -128,6 +135,8 @@ def plan(
     workers: int | None = None,
     path: str | os.PathLike[str] | None = None,
     note: Callable[[str], None] | None = None,
+    isolate: bool = False,
+    cell_timeout: float | str | None = None,
 ) -> Plan:
     """Forecast of a run, from runs of some of its cells, spread over the grid, in a folder beside the output.
 
@@ -139,6 +148,8 @@ def plan(
         Where the output would be; default: the current folder.
     note : callable, optional
         Told what is compiled, where that takes long.
+    isolate, cell_timeout
+        As of `run`: the cells that are tried are solved in processes of their own.
 
     Raises
     ------
@@ -152,21 +163,41 @@ def plan(
     >>> sweep.plan(study).cells
     2
     """
-    from sweep.explore.groups import scaling
-
     study = as_study(study)
     crew = cores() if workers is None else whole_number("workers", workers)
     folder = Path(path).absolute().parent if path is not None else Path.cwd()
     if not folder.is_dir():
         raise SweepError(f"{path}: there is no folder {folder}")
+    if isolate or cell_timeout is not None:
+        return _plan_apart(study, crew, folder, limits_of(cell_timeout))
     compiling = Compiling(study.kernel, study.kernel_name, note)
     sample = sampled_study(study, compiling)
     with faults_reported(f"{study.kernel_name}: the kernel failed"):
         advice = scaling(study).advice
-    forecast = _forecast(study, sample, crew, folder)
+    forecast = _forecast(study, sample, crew, folder, None)
     compiled = sum(compiling.seconds.values())
     again = 0.0 if _is_kept(study.kernel_name) else compiled
     return replace(forecast, seconds=forecast.seconds + again, compile_seconds=compiled, scaling=advice)
+
+
+def _plan_apart(study: Study, workers: int, folder: Path, limits: Limits) -> Plan:
+    """The same of a kernel that may crash, or never end; every run begins processes, and compiles it, anew."""
+    processes = Processes(study, limits, 1)
+    solver = processes.solver()
+    try:
+        begun = time.monotonic()
+        warm(solver, study)
+        starting = time.monotonic() - begun
+        sample = sampled_by(solver, study, solver.clock)
+        try:
+            advice = solver.call(ADVICE_SECONDS, advice_on, study.to_json())
+        except Unsolved as fault:
+            advice = f"not known; while cells were tried at random, {fault}"
+    finally:
+        processes.end()
+    most = max(TRIAL_CELL_SECONDS, SLACK * float(sample.costs.max()))
+    found = _forecast(study, sample, workers, folder, min(limits.seconds(1), most), starting)
+    return replace(found, compile_seconds=starting if starting > SILENT_SECONDS else 0.0, scaling=advice)
 
 
 def _is_kept(kernel: str) -> bool:
@@ -174,11 +205,16 @@ def _is_kept(kernel: str) -> bool:
     return machine_code_folder() is not None and ":" not in kernel
 
 
-def _forecast(study: Study, sample: Sample, workers: int, folder: Path) -> Plan:
+def _forecast(
+    study: Study, sample: Sample, workers: int, folder: Path, cell_timeout: float | None, starting: float = 0.0
+) -> Plan:
+    """`cell_timeout`: None: cells are solved in this process. `starting`: seconds before the first cell."""
     rows, columns = row_blocks(study), part_columns(study)
     row_bytes = sum(c.cell_bytes for c in columns)
     blocks = row_partition(sample, rows, row_shape(study), row_bytes, workers)
     output = _output_bytes(study, blocks)
+    block = rows.cells(0, blocks.cells)[1]
+    trial = Calibration(study, rows.size, block, sample.cost, output / rows.size, workers, cell_timeout)
     names = [m.name for m in study.kernel.methods]
     return Plan(
         title=study.title,
@@ -187,29 +223,27 @@ def _forecast(study: Study, sample: Sample, workers: int, folder: Path) -> Plan:
         shape=dict(zip((grid := Grid(study)).dims, grid.shape, strict=True)),
         outputs=study.outputs,
         blocks=blocks.count,
-        cells_per_block=rows.cells(0, blocks.cells)[1],
+        cells_per_block=block,
         workers=workers,
         output_bytes=output,
         memory_bytes=2 * workers * (blocks.cells * row_bytes + strip_bytes(study)),
         free_bytes=shutil.disk_usage(folder).free,
         folder=str(folder),
         cell_seconds=sample.cost,
-        seconds=_seconds(study, sample, blocks, output, workers, folder),
+        seconds=_seconds(trial, output, min(workers, blocks.count), folder, starting),
         methods=_counted(sample.method_used, dict(enumerate(names)) | {-1: "none"}),
         statuses=_counted(sample.status, {int(s): s.name for s in Status}),
     )
 
 
-def _seconds(study: Study, sample: Sample, blocks: Partition, output: int, workers: int, folder: Path) -> float:
+def _seconds(trial: Calibration, output: int, workers: int, folder: Path, starting: float) -> float:
     """What a run takes, of some of the cells in earnest; or, where that cannot be, from the probes alone."""
-    rows = row_blocks(study)
-    cells, block = rows.size, rows.cells(0, blocks.cells)[1]
-    found = Calibration(study, cells, block, sample.cost, output / cells, workers).seconds(folder)
+    found = trial.seconds(folder)
     if not math.isnan(found):
         return found
     speed = _disk_speed(folder) if output > WORTH_A_TRIAL else math.inf
     # blocks are written while others are computed
-    return max(sample.cost * cells / min(workers, blocks.count), output / speed)
+    return starting + max(trial.cell_seconds * trial.cells / workers, output / speed)
 
 
 def _output_bytes(study: Study, blocks: Partition) -> int:

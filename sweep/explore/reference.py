@@ -12,7 +12,7 @@ import numpy as np
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.grid import Grid
 from sweep.cells.sample import solved, with_method
-from sweep.cells.solve import GIVEN_UP
+from sweep.cells.solve import GIVEN_UP, among
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.study.model import Study
 from sweep.system.errors import SweepError
@@ -100,10 +100,10 @@ def reference_by(study: Study, name: str) -> Reference:
     floor, sound, void = np.full(size, np.inf), np.zeros(size, bool), np.zeros(size, bool)
     values: dict[str, Any] = {}
     for rtol in FINE:
-        outputs, status, _ = solved(with_method(study, name, rtol))
-        values = values or outputs
+        outputs, status, *_ = solved(with_method(study, name, rtol))
+        values = values or dict(outputs)
         refused = status >= FIRST_REFUSAL
-        void |= refused & ~np.isin(status, GIVEN_UP)
+        void |= refused & ~among(status, GIVEN_UP)
         now = ~refused & (status != Status.INACCURATE) & ~sound
         for output, column in outputs.items():
             values[output][now] = column[now]

@@ -17,7 +17,7 @@ import hashlib
 import math
 import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -102,6 +102,8 @@ def refine(
     most_cells: int = MOST_CELLS,
     workers: int | None = None,
     force: bool = False,
+    isolate: bool = False,
+    cell_timeout: float | str | None = None,
 ) -> Refinement:
     """Add cells to a finished sweep until outputs can be interpolated to a tolerance.
 
@@ -120,7 +122,7 @@ def refine(
         That of the dataset; default: the one in its attributes.
     most_cells : int
         Largest number of cells altogether.
-    workers : int, optional
+    workers, isolate, cell_timeout
         As of `run`.
     force : bool
         Overwrite the result of another study.
@@ -143,7 +145,8 @@ def refine(
     study = study or study_of(dataset)
     names = [y] if isinstance(y, str) else list(y)
     _require(dataset, study, names, tolerance)
-    output = _Output(study, None if path is None else Path(path), force, workers)
+    options = {"workers": workers, "isolate": isolate, "cell_timeout": cell_timeout}
+    output = _Output(study, None if path is None else Path(path), force, options)
     output.prepare(dataset)
     found = Refiner(dataset, output, names, tolerance, most_cells).refined()
     output.tidy()
@@ -154,13 +157,13 @@ def refine(
 class _Output:
     """Solves further cells of a study, each round into a file in a folder, and writes all cells at the end.
 
-    `path`: None: everything stays in memory.
+    `path`: None: everything stays in memory. `options`: of `run`.
     """
 
     study: Study
     path: Path | None
     force: bool
-    workers: int | None
+    options: Mapping[str, Any]
 
     @property
     def title(self) -> str:
@@ -198,9 +201,9 @@ class _Output:
 
         further = self._study(axes)
         if self.rounds is None:
-            return run(further, workers=self.workers, progress=False)
+            return run(further, progress=False, **self.options)
         name = hashlib.sha256(repr(sorted(fingerprint(further).items())).encode()).hexdigest()[:16]
-        with run(further, self.rounds / f"{name}.h5", workers=self.workers) as found:
+        with run(further, self.rounds / f"{name}.h5", **self.options) as found:
             return found.load()
 
     def written(self, axes: dict[str, Axis], arrays: dict[str, Any]) -> xr.Dataset:

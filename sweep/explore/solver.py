@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import timeit
+import warnings
 from collections import namedtuple
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 from kernels import catalogue
 from kernels.interface import Method, Status
 from sweep.cells.grid import Cells, Grid, empty_cells
+from sweep.cells.guard import BadCell, Guard
 from sweep.cells.solve import Solver, usable_methods
 from sweep.cells.timing import LANES
 from sweep.study.mistakes import did_you_mean, listed
@@ -39,7 +41,7 @@ class PointSolver:
         _require(study)
         self.names, self.fields = tuple(study.axes), (*study.outputs, "status")
         self._study, self._grid = study, _Points(study)
-        self._solver = Solver(study, self._grid)
+        self._solver = Guard(Solver(study, self._grid), _warn)
         solved = namedtuple("solved", self.fields)  # type: ignore[misc]  # as many fields as the study asks for
         self._solved: Callable[..., Any] = solved
         self._one = empty_cells(study, 1)
@@ -60,7 +62,7 @@ class PointSolver:
         -------
         namedtuple
             `fields`: a float and an int of one cell; else arrays of the shape of the parameters, traces behind.
-            NaN where the status is a refusal.
+            NaN where the status is a refusal, or FAILED: there the kernel raises, and a RuntimeWarning says what.
 
         Raises
         ------
@@ -77,7 +79,7 @@ class PointSolver:
         if cells is None:
             cells = self._one
             self._grid.given = self._row
-            self._solver.solve(0, 1, *cells)
+            self._solver.solve(0, cells)
         outputs = [cells.outputs[name][0] for name in self._study.outputs]
         return self._solved(*(v.copy() if v.ndim else float(v) for v in outputs), int(cells.status[0]))
 
@@ -89,8 +91,7 @@ class PointSolver:
         shape = arrays[0].shape
         self._grid.given = np.stack([array.reshape(-1) for array in arrays])
         cells = empty_cells(self._study, self._grid.given.shape[1])
-        if cells.number:
-            self._solver.solve(0, cells.number, *cells)
+        self._solver.solve(0, cells)
         outputs = (cells.outputs[name].reshape(shape + cells.outputs[name].shape[1:]) for name in self._study.outputs)
         return self._solved(*outputs, cells.status.reshape(shape))
 
@@ -108,6 +109,11 @@ class PointSolver:
             count = len(found) if len(values) <= len(self.names) else len(values)
             raise SweepError(f"expected {listed(self.names, word='and')}, found {count} of {len(self.names)} values")
         return [found[name] for name in self.names]
+
+
+def _warn(cell: BadCell) -> None:
+    values = ", ".join(f"{name}={value}" for name, value in cell.values.items())
+    warnings.warn(f"FAILED at {values}: {cell.reason}", RuntimeWarning, stacklevel=2)
 
 
 class _Quick:
@@ -130,8 +136,8 @@ class _Quick:
             self._parameters[k][:] = value
         self._rtol, self._bound = np.full(rows, study.rtol), np.empty(rows)
         self._cells = empty_cells(study, rows)
-        outputs = {f.name: np.empty((rows, *study.shape(f))) for f in kernel.outputs} | self._cells.outputs
-        self._outputs = [outputs[field.name] for field in kernel.outputs]
+        given = self._cells.outputs
+        self._outputs = [given.get(f.name, np.empty((rows, *study.shape(f)))) for f in kernel.outputs]
 
     def choose(self, row: Any) -> None:
         """Take as many rows as are solved soonest."""
@@ -193,6 +199,9 @@ class _Points(Grid):
 
     def settings(self, start: int, stop: int) -> Any:
         return self._setting
+
+    def cell(self, index: int) -> dict[str, str]:
+        return {name: repr(float(row[index])) for name, row in zip(self.study.axes, self.given, strict=True)}
 
     def _of(self, name: str, cells: Any) -> Any:
         place = self._places.get(name)

@@ -43,6 +43,8 @@ WORK = ("rate_calls", "steps", "events")
 
 LONG_NAMES = {
     "error_median": "median relative error of a cell, over its outputs",
+    "error_low": "a tenth of the cells have a smaller relative error",
+    "error_high": "a tenth of the cells have a larger relative error",
     "error_worst": "largest relative error of a cell that the method calls right",
     "seconds": "time per cell on one core",
     "ok": "share of cells that the method calls right",
@@ -93,11 +95,12 @@ def work_precision(
     Returns
     -------
     Dataset
-        Over `method` and `rtol`: `error_median`, `error_worst`, `seconds`; shares of cells `ok`, `remarked`,
-        `inaccurate`, `failed`, `silent`; texts `worst_cell`, `failed_as`, `silent_at`, `methods_used`; and means of the
-        outputs asked for that count work. Attributes `reference`, `reference_error` (the largest error of the truth
-        itself), `cells` (in which methods can be told right or wrong), `open_cells` (in which they cannot) and
-        `omissions`.
+        Over `method` and `rtol`: `error_median`, between `error_low` and `error_high` (a tenth of the cells beyond
+        each), `error_worst`, `seconds`; shares of cells `ok`, `remarked`, `inaccurate`, `failed`, `silent`; texts
+        `worst_cell`, `failed_as`, `silent_at`, `methods_used`; and means of the outputs asked for that count work.
+        Attributes `reference`, `reference_error` (the largest error of the truth itself), `cells` (in which methods can
+        be told right or wrong), `open_cells` (in which they cannot), `missing` (which methods cannot do the study) and
+        `omissions` (these, and what fails where).
 
     Raises
     ------
@@ -120,7 +123,7 @@ def work_precision(
     against = best_reference(_without_work(part), able, reference) if truth is None else given_reference(part, truth)
     found = _table(part, names, tolerances, against)
     missing = _missing(part, able) if methods is None else []
-    return found.assign_attrs(omissions="; ".join([*missing, *omissions(found)]))
+    return found.assign_attrs(missing="; ".join(missing), omissions="; ".join([*missing, *omissions(found)]))
 
 
 def _require(cells: int, tolerances: Sequence[float]) -> None:
@@ -221,16 +224,16 @@ def _chosen(methods: Sequence[str] | None, able: Sequence[str]) -> list[str]:
 
 
 def _without_work(study: Study) -> Study:
-    """The study without its counts of work, of which no method is right or wrong."""
+    """The study without what a method tells of itself, its work and its error, in which none is right or wrong."""
     import dataclasses
 
-    left = tuple(name for name in study.outputs if name not in WORK)
+    left = tuple(name for name in study.outputs if name not in (*WORK, "error"))
     return dataclasses.replace(study, outputs=left) if left else study
 
 
 def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[str, Any]:
     part = with_method(study, name, rtol)
-    outputs, status, used = solved(part)
+    outputs, status, used, _ = solved(part)
     error = errors(outputs, against.values)
     # against itself the reference has no error; what can be said is what it is right to, also where auto took it
     error = np.where(_solved_by(study, used, against.source), np.maximum(error, against.floor), error)
@@ -239,8 +242,11 @@ def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[
     refused = against.sound & ~valued
     wrong = sure & ~(error <= rtol + against.floor) | against.void & (status == Status.OK)
     worst = int(np.where(sure, error, -1.0).argmax())
+    low, median, high = np.quantile(error[valued], (0.1, 0.5, 0.9)) if valued.any() else [math.nan] * 3
     return {
-        "error_median": float(np.median(error[valued])) if valued.any() else math.nan,
+        "error_median": float(median),
+        "error_low": float(low),
+        "error_high": float(high),
         "error_worst": float(error[worst]) if sure.any() else math.nan,
         "ok": float((against.sound & (status == Status.OK)).sum() / total),
         "remarked": float((valued & (status != Status.OK) & (status != Status.INACCURATE)).sum() / total),
@@ -291,7 +297,7 @@ def _timed(study: Study) -> float:
     cells, solver = empty_cells(study, Grid(study).size), Solver(study)
     count, begin = 0, time.thread_time()
     while (spent := time.thread_time() - begin) < LEAST_SECONDS or not count:
-        solver.solve(0, cells.number, *cells)
+        solver.solve(0, cells)
         count += 1
     return spent / count / cells.number
 

@@ -36,7 +36,7 @@ class Result(BackendEntrypoint):
         path = Path(filename_or_obj)
         plain = xr.open_dataset(
             path, engine="h5netcdf", cache=False, decode_times=False, decode_timedelta=False,
-            drop_variables=drop_variables,
+            drop_variables=drop_variables, phony_dims="access",
         )  # fmt: skip
         try:
             file = StoredFile(path)

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from sweep.results.open import open_result
+from sweep.results.open import changed, open_result
 from sweep.results.statuses import account, count_statuses
 from sweep.system.errors import SweepError
 from sweep.system.table import columns
@@ -93,7 +93,7 @@ def list_results(folder: str | os.PathLike[str] = ".") -> Listing:
 
 def _listed(path: Path) -> Listed:
     try:
-        with open_result(path) as dataset:
+        with open_result(path) as dataset, changed(path):
             cells = account(dataset)
             attrs = {name: str(value) for name, value in dataset.attrs.items()}
             return Listed(

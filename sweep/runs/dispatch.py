@@ -25,6 +25,7 @@ from sweep.runs.task import WAIT, Task
 from sweep.runs.worker import Answer, Assignment, Sent, digest
 from sweep.store.store import Shared
 from sweep.system.errors import SweepError
+from sweep.system.forecast import Forecast
 from sweep.system.log import log
 from sweep.system.pool import CtrlC, through
 
@@ -48,7 +49,7 @@ class Dispatch:
     cluster : Cluster
     task : Task
     blocks : how the rows are cut
-    left : how many blocks there are to compute
+    forecast : of the blocks that there are to compute
     reused : cells that need not be computed; they are filled in here
     shared : file to which workers that see it write; None: all numbers are wanted here
     limits : what cells may take that are solved in processes of their own; None: in those of the workers
@@ -59,14 +60,15 @@ class Dispatch:
         cluster: Cluster,
         task: Task,
         blocks: Blocks,
-        left: int,
+        forecast: Forecast,
         reused: Reused | Precomputed | None,
         shared: Shared | None,
         limits: Limits | None = None,
     ) -> None:
-        self._cluster, self._blocks, self._left, self._reused, self._note = cluster, blocks, left, reused, task.note
+        self._cluster, self._blocks, self._forecast, self._reused = cluster, blocks, forecast, reused
+        self._note = task.note
         self._assignment = _assignment(task, blocks, shared if reused is None else None, limits)
-        self._seconds = math.inf
+        self._answers = 0
         self._most = max(1, TASK_BYTES // max(1, self._blocks.partition.cells * self._blocks.row_bytes))
         self._suspects: list[int] = []
         self._poison: list[int] = []
@@ -109,15 +111,23 @@ class Dispatch:
         through(batches, submit, capacity, settled, lambda: self._cluster.cancel(executor), ctrl_c)
 
     def _batches(self, blocks: Iterator[int]) -> Iterator[Batch]:
-        """As many blocks together as take about half a second; fewer towards the end."""
-        while self._left > 0:
-            enough = int(TASK_SECONDS / max(self._seconds, TASK_SECONDS / 1000))
-            share = self._left // (2 * max(1, self._cluster.threads))
-            size = max(1, min(enough, share, self._most))
-            batch = [job for job in islice(blocks, size) if not self._is_reused(job)]
-            self._left -= size
+        """As many blocks together as should take half a second; fewer at the beginning, and towards the end."""
+        left = self._forecast.blocks
+        while left > 0:
+            batch, seconds = [], 0.0
+            for job in islice(blocks, self._longest(left)):
+                left -= 1
+                if not self._is_reused(job):
+                    batch.append(job)
+                    seconds += self._forecast.seconds(job)
+                if seconds >= TASK_SECONDS:
+                    break
             if batch:
                 yield tuple(batch)
+
+    def _longest(self, left: int) -> int:
+        """Blocks that may go to a worker together."""
+        return max(1, min(1 + self._answers, left // (2 * max(1, self._cluster.threads)), self._most))
 
     def _capacity(self) -> int:
         return 2 + 2 * self._cluster.threads
@@ -140,12 +150,11 @@ class Dispatch:
             raise SweepError(
                 f"cluster: a worker failed ({type(fault).__name__}: {fault}); what is finished is kept"
             ) from fault
-        mean = answer.seconds / len(batch)
-        self._seconds = mean if math.isinf(self._seconds) else 0.7 * self._seconds + 0.3 * mean
-        bad = answer.bad
+        self._answers += 1
+        bad, whole = answer.bad, sum(answer.seconds.values())
         for job, found in answer.found.items():
             numbers = found if isinstance(found, bytes) else self._checked(job, found)
-            self._receive(Computed(job, numbers, mean, answer.seconds, bad))
+            self._receive(Computed(job, numbers, answer.seconds[job], whole, bad))
             bad = ()
 
     def _suspect(self, batch: Batch) -> None:

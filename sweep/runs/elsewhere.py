@@ -51,8 +51,7 @@ def compute_elsewhere(
     from sweep.runs.dispatch import Dispatch
 
     limits = None if session.processes is None else session.processes.limits
-    left = session.forecast.blocks
-    executor = Dispatch(cluster, session.task, session.blocks, left, session.reused, shared, limits)
+    executor = Dispatch(cluster, session.task, session.blocks, session.forecast, session.reused, shared, limits)
     try:
         session.compute_elsewhere(executor, receive)
     except NoWorkers:

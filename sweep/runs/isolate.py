@@ -12,21 +12,23 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Mapping
-from concurrent.futures import CancelledError, ProcessPoolExecutor
+import time
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import CancelledError, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
-from sweep.cells.grid import Grid
+from sweep.cells.grid import Cells, Grid
 from sweep.cells.guard import Unsolved
-from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS
+from sweep.cells.schema import STATUS, cells_of
 from sweep.results.open import memory
 from sweep.runs import isolated
 from sweep.runs.isolated import Answer
 from sweep.study.model import Study
 from sweep.system.errors import SweepError
+from sweep.system.progress import seconds_of
 
 CELL_SECONDS = 60.0
 """What a cell may take, where nobody says otherwise;"""
@@ -41,6 +43,12 @@ MEMORY_SHARE = 0.5
 """Share of the memory that all processes may have before they are replaced."""
 TRIALS = 3
 """Times that a cell is tried alone of which a process dies."""
+LOOK_SECONDS = 0.2
+"""How often it is looked whether time goes by, or the machine slept."""
+BURY_SECONDS = 1.0
+"""What the exit status of a process that is dead may be waited for."""
+
+R = TypeVar("R")
 
 
 class Died(Unsolved):
@@ -68,6 +76,11 @@ class Limits:
         """What some cells together may take."""
         one = max(CELL_SECONDS, DEARER * self.cost) if self.cell is None else self.cell
         return one if cells == 1 else min(one, SEVERAL_SECONDS) + SLACK * self.cost * cells
+
+
+def limits_of(cell_timeout: float | str | None) -> Limits:
+    """As they are asked for. Raises SweepError where that is no time."""
+    return Limits(None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout))
 
 
 class Processes:
@@ -123,44 +136,42 @@ class IsolatedSolver:
         """Seconds that its process has spent on cells."""
         return self.seconds
 
-    def solve(
-        self,
-        start: int,
-        stop: int,
-        outputs: Mapping[str, Any],
-        status: Any,
-        method_used: Any,
-        wanted: Any = None,
-        error_bound: Any = None,
-    ) -> None:
+    def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
         """As `Solver.solve`. Raises Unsolved where the kernel raises, dies or takes too long; Ended."""
-        found = self._asked(start, stop, wanted)
-        columns = {**outputs, STATUS: status, METHOD_USED: method_used}
-        columns |= {} if error_bound is None else {ERROR_BOUND: error_bound}
-        for name, column in columns.items():
-            column[...] = found[name]
+        found = cells_of(self._asked(start, cells.number, wanted))
+        for name, column in cells.outputs.items():
+            column[...] = found.outputs[name]
+        cells.status[...], cells.used[...] = found.status, found.used
+        if cells.error is not None:
+            cells.error[...] = found.error
 
-    def _asked(self, start: int, stop: int, wanted: Any) -> Mapping[str, Any]:
+    def _asked(self, start: int, count: int, wanted: Any) -> Mapping[str, Any]:
         """One cell alone is tried again, for a process may die of what it did before, or be killed by others."""
-        for _ in range(TRIALS if stop - start == 1 else 1):
-            pool = self._ready()
+        for _ in range(TRIALS if count == 1 else 1):
             try:
-                return self._taken(self._result(pool, start, stop, wanted), start)
+                limit = self._all.seconds(count)
+                return self._taken(self.call(limit, isolated.solve, start, count, wanted), start)
             except Died as fault:
                 reason = str(fault)
         raise Unsolved(reason)
 
-    def _result(self, pool: ProcessPoolExecutor, start: int, stop: int, wanted: Any) -> Answer:
-        limit = self._all.seconds(stop - start)
+    def call(self, limit: float, function: Callable[..., R], *words: Any) -> R:
+        """What a function gives in the process, within so many seconds. Raises Unsolved, Died, Ended."""
+        pool = self._ready()
         # where no cell is known to end, the first one may still have to be compiled
         compiling = LOAD_SECONDS if self._all.good is None else 0.0
         try:
-            return pool.submit(isolated.solve, start, stop, wanted).result(limit + compiling)
+            return awaited(pool.submit(function, *words), limit + compiling)
         except TimeoutError:
-            self.end()
-            raise Unsolved(f"took longer than {limit:.3g} s") from None
+            late, code = True, self._bury(BURY_SECONDS)
         except (RuntimeError, CancelledError):
-            raise Died(self._died()) from None
+            late, code = False, self._bury(BURY_SECONDS)
+        if self._all.over:
+            raise Ended("the run is being stopped")
+        # one that died by itself, as late as that, is not late
+        if late and code in (None, -signal.SIGKILL):
+            raise Unsolved(f"took longer than {limit:.3g} s")
+        raise Died(_death(code))
 
     def _taken(self, answer: Answer, start: int) -> Mapping[str, Any]:
         fresh, self._fresh = self._fresh, False
@@ -183,9 +194,9 @@ class IsolatedSolver:
         for _ in range(TRIALS):
             pool = self._begun()
             with contextlib.suppress(RuntimeError, CancelledError, TimeoutError):
-                number = pool.submit(os.getpid).result(LOAD_SECONDS)
+                number = awaited(pool.submit(os.getpid), LOAD_SECONDS)
                 self._process = next((p for p in multiprocessing.active_children() if p.pid == number), None)
-                pool.submit(isolated.load, self._all.text, self._all.paths, self._all.good).result(LOAD_SECONDS)
+                awaited(pool.submit(isolated.load, self._all.text, self._all.paths, self._all.good), LOAD_SECONDS)
                 self._fresh = True
                 return pool
             self.end()
@@ -201,28 +212,41 @@ class IsolatedSolver:
                 self._pool.submit(int)
             return self._pool
 
-    def _died(self) -> str:
-        """Why the process did."""
-        code = None
-        if self._process is not None:
-            self._process.join(1)
-            code = self._process.exitcode
-        self.end()
-        if self._all.over:
-            raise Ended("the run is being stopped")
-        if code is not None and code < 0:
-            return f"its process died of {signal.Signals(-code).name}"
-        return "its process died" if code is None else f"its process ended with {code}"
-
     def end(self) -> None:
         """Kills the process."""
+        self._bury(0.0)
+
+    def _bury(self, seconds: float) -> int | None:
+        """Kills the process, if it lives; its exit status, if that is known in so many seconds."""
         with self._lock:
             pool, self._pool = self._pool, None
-            if pool is None:
-                return
-            if self._process is not None:
-                self._process.kill()
-            pool.shutdown(wait=False, cancel_futures=True)
+        if pool is None:
+            return None
+        if self._process is not None:
+            self._process.kill()
+        # the executor asks for the status as well, and who asks meanwhile may find none
+        burial = threading.Thread(target=pool.shutdown, kwargs={"cancel_futures": True}, daemon=True)
+        burial.start()
+        burial.join(seconds)
+        return None if burial.is_alive() or self._process is None else self._process.exitcode
+
+
+def awaited(future: Future[R], seconds: float) -> R:
+    """What it gives. Raises TimeoutError after so many seconds, of which none count while the machine sleeps."""
+    spent = 0.0
+    while spent < seconds:
+        begun = time.monotonic()
+        if wait([future], min(LOOK_SECONDS, seconds - spent)).done:
+            return future.result()
+        spent += min(time.monotonic() - begun, 2 * LOOK_SECONDS)
+    raise TimeoutError
+
+
+def _death(code: int | None) -> str:
+    """What a process died of, by its exit status."""
+    if code is None:
+        return "its process died"
+    return f"its process died of {signal.Signals(-code).name}" if code < 0 else f"its process ended with {code}"
 
 
 def kernel_paths(study: Study) -> tuple[str, ...]:

@@ -17,10 +17,8 @@ from multiprocessing import forkserver
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from sweep.cells.guard import told
-from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS
+from sweep.cells.schema import cells_of, columns
 from sweep.cells.solve import Solver
 from sweep.study.model import Study
 
@@ -44,6 +42,7 @@ def enter() -> None:
     it, if nobody else holds the pipe that tells.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _leave_no_core()
     server: Any = vars(forkserver)["_forkserver"]
     pipe, server._forkserver_alive_fd = server._forkserver_alive_fd, None
     if pipe is not None:
@@ -53,6 +52,12 @@ def enter() -> None:
         with contextlib.suppress(OSError):
             Path("/proc/self/oom_score_adj").write_text("1000")
     threading.Thread(target=_die_with_parent, daemon=True).start()
+
+
+def _leave_no_core() -> None:
+    """To write all memory to the disk, once for every cell that crashes, takes long. 0 would let programs have it."""
+    hard = resource.getrlimit(resource.RLIMIT_CORE)[1]
+    resource.setrlimit(resource.RLIMIT_CORE, (min(1, hard) if hard >= 0 else 1, hard))
 
 
 def _die_with_parent() -> None:
@@ -70,20 +75,18 @@ def load(text: str, paths: tuple[str, ...], good: int | None) -> None:
     study = Study.from_json(text, allow_import=True)
     _solvers["study"], _solvers["solver"] = study, Solver(study)
     if good is not None:
-        solve(good, good + 1, None)
+        solve(good, 1, None)
 
 
-def solve(start: int, stop: int, wanted: Any) -> Answer:
+def solve(start: int, count: int, wanted: Any) -> Answer:
     study, solver = _solvers["study"], _solvers["solver"]
-    arrays = {name: np.empty((stop - start, *shape)) for name, shape in study.shapes.items()}
-    flags = {STATUS: np.empty(stop - start, np.int8), METHOD_USED: np.empty(stop - start, np.int8)}
-    bound = np.empty(stop - start, np.float32)
+    arrays = {column.name: column.empty(count) for column in columns(study)}
     begun = time.perf_counter()
     reason = ""
     try:
-        solver.solve(start, stop, arrays, flags[STATUS], flags[METHOD_USED], wanted, bound)
+        solver.solve(start, cells_of(arrays), wanted)
     except BaseException as fault:
         arrays, reason = {}, told(fault)
     seconds = time.perf_counter() - begun
     kilobytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1024 if sys.platform == "darwin" else 1)
-    return Answer({**arrays, **flags, ERROR_BOUND: bound} if arrays else {}, reason, seconds, 1024 * kilobytes)
+    return Answer(arrays, reason, seconds, 1024 * kilobytes)

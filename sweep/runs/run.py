@@ -18,18 +18,19 @@ from sweep.results.open import in_memory, memory, open_result, open_unfinished, 
 from sweep.runs import resume
 from sweep.runs.elsewhere import compute_elsewhere, joined, threads
 from sweep.runs.extend import Precomputed, Retried, Reused, is_of_another_version
-from sweep.runs.isolate import Limits
+from sweep.runs.isolate import limits_of
 from sweep.runs.session import Session, Solve
 from sweep.runs.task import END, HERE, WAIT, Task
+from sweep.store.ending import Gather
 from sweep.store.frame import Frame, cuts_of
 from sweep.store.reading import StoredFile
-from sweep.store.store import Gather, Store, lock_of, opened, unfinished_of
+from sweep.store.store import Store, lock_of, opened, unfinished_of
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.study.read import KEYS, Given, as_study
 from sweep.system import disk
 from sweep.system.errors import SweepError
 from sweep.system.pool import BufferPool, Cores, CtrlC, Terminated, cores, whole_number
-from sweep.system.progress import TimeUp, deadline, quantity, seconds_of, stream_of
+from sweep.system.progress import TimeUp, deadline, quantity, stream_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -235,7 +236,7 @@ def _task(
         cluster,
         repair,
         isolate or cell_timeout is not None,
-        Limits(None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout)),
+        limits_of(cell_timeout),
         retry_failed,
         without_workers,
     )

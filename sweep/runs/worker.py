@@ -67,9 +67,9 @@ class Sent:
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of some blocks: seconds, each one's digests, if it is written, or numbers, and cells that FAILED."""
+    """What became of some blocks: each one's seconds, its digests, if it is written, or numbers; cells that FAILED."""
 
-    seconds: float
+    seconds: Mapping[int, float]
     found: Mapping[int, bytes | Sent]
     bad: Sequence[BadCell]
 
@@ -105,10 +105,14 @@ def compute(run: str, jobs: Sequence[int], masks: Mapping[int, bytes]) -> Answer
         The run is over, this process has another version of the kernel, the kernel fails, or the disk does.
     """
     context = _context(run)
-    begun = time.perf_counter()
-    found = {job: context.block(job, masks.get(job)) for job in jobs}
+    found, ends = {}, [time.perf_counter()]
+    for job in jobs:
+        found[job] = context.block(job, masks.get(job))
+        ends.append(time.perf_counter())
     context.sync()
-    return Answer(time.perf_counter() - begun, found, context.bad())
+    syncing = (time.perf_counter() - ends[-1]) / len(jobs)
+    seconds = {job: end - begun + syncing for job, begun, end in zip(jobs, ends, ends[1:], strict=False)}
+    return Answer(seconds, found, context.bad())
 
 
 def _context(run: str) -> _Context:
@@ -161,10 +165,8 @@ class _Context:
     def sync(self) -> None:
         """Returns when all that was written is on the disk. Raises SweepError."""
         if self._shared is not None and self._fd is not None:
-            try:
+            with disk.refusing(Path(self._shared.path)):
                 disk.fsync(self._fd)
-            except OSError as fault:
-                raise disk.refusal(fault, Path(self._shared.path)) from fault
 
     def block(self, job: int, mask: bytes | None) -> bytes | Sent:
         """The digests of what is written, or the numbers."""

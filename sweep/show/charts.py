@@ -148,6 +148,9 @@ def plot(
 def plot_precision(found: xr.Dataset, path: str | os.PathLike[str] | None = None) -> Figure:
     """Error against time per cell, median and worst cell, a line for each method through its tolerances.
 
+    Bars are the middle 80 % of the cells; the grey floor is what the reference itself, named below, is right to. A
+    method that solves no cell has no line, but is named below.
+
     Parameters
     ----------
     found : Dataset
@@ -169,26 +172,40 @@ def plot_precision(found: xr.Dataset, path: str | os.PathLike[str] | None = None
     """
     with style():
         lines = _note(found)
-        figure = new_figure(PAGE, 96.0 + 2.6 * len(lines))
+        figure = new_figure(PAGE, 96.0 + 3.2 * len(lines))
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         for axes, key, text in zip(panels, ("error_median", "error_worst"), ("median cell", "worst cell"), strict=True):
             draw_precision(axes, found, key)
             axes.set_title(text)
             letter(axes, "a" if key == "error_median" else "b")
-        panels[0].set_ylabel("relative error")
+        panels[0].set_ylabel("relative error [1]")
         handles, labels = panels[0].get_legend_handles_labels()
         marks = precision_marks(found)
-        figure.legend([*handles, *marks.values()], [*labels, *marks], loc="outside upper center", ncols=5)
-        figure.supxlabel("\n".join(lines), fontsize=6, ha="left", x=0.02)
+        figure.legend([*handles, *marks.values()], [*labels, *marks], loc="outside upper center", ncols=4, fontsize=7)
+        figure.supxlabel("\n".join(lines), fontsize=7, ha="left", x=0.02)
     if path is not None:
         save(figure, path)
     return figure
 
 
 def _note(found: xr.Dataset) -> list[str]:
-    """Lines below the picture."""
-    left_out = found.attrs.get("omissions")
-    return textwrap.wrap(f"Omissions: {left_out}", 170)[:MOST_NOTES] if left_out else []
+    """Lines below the picture: what the errors are against, and which methods have no line."""
+    source, right, cells = (found.attrs[key] for key in ("reference", "reference_error", "cells"))
+    idle = [f"{name} solves no cell" for name in found["method"].values if not _drawn(found, name)]
+    wrong = [f"{name} is silently wrong" for name in found["method"].values if _any(found.silent, name)]
+    parts = [part for part in (found.attrs.get("missing"), *idle, *wrong) if part]
+    basis = f"Errors against {source}, itself right to {right:.1g}, in {cells} cells of: {found.attrs['title']}"
+    parts.insert(0, basis)
+    return textwrap.wrap("; ".join(parts).replace("$", r"\$") + ".", 145)
+
+
+def _any(share: xr.DataArray, name: str) -> bool:
+    return bool((share.sel({"method": name}) > 0).any())
+
+
+def _drawn(found: xr.Dataset, name: str) -> bool:
+    """Whether a method has any mark."""
+    return bool(np.isfinite(found.error_median.sel({"method": name})).any())
 
 
 def precision_marks(found: xr.Dataset) -> dict[str, Any]:
@@ -199,13 +216,13 @@ def precision_marks(found: xr.Dataset) -> dict[str, Any]:
         marks["some refused or inaccurate"] = Line2D([], [], **{**look, "markerfacecolor": "white"})
     if (found.silent > 0).any():
         marks["some silently wrong"] = Line2D([], [], linestyle="", marker="x", color="black", markersize=7)
+    if "error_high" in found:
+        marks["middle 80 % of the cells"] = Line2D([], [], color="0.3", linestyle="", marker="|", markersize=9)
     if np.isfinite(found.attrs.get("reference_error", np.nan)):
         marks["below what the reference is right to"] = Patch(color="0.9", linewidth=0)
     return marks
 
 
-MOST_NOTES = 8
-"""Lines below a chart."""
 FLOOR, CEILING = 1e-17, 3.0
 """Where errors of 0, and errors beyond all sense, are drawn."""
 
@@ -214,17 +231,21 @@ def draw_precision(axes: Any, found: xr.Dataset, key: str, names: Sequence[str] 
     """A line for each method; those in `names` look the same in every picture that gives the same names.
 
     Filled marks where all cells are solved, open ones where some are refused or said to be inaccurate, crosses where
-    some are silently wrong; `precision_marks` says so in a legend.
+    some are silently wrong; bars about a median are the middle 80 % of the cells; `precision_marks` says so in a
+    legend. A method that solves no cell is left out.
     """
     floor = found.attrs.get("reference_error", np.nan)
     order = list(dict.fromkeys([*names, *found["method"].values.tolist()]))
-    for i, name in ((order.index(name), name) for name in found["method"].values):
+    for i, name in ((order.index(name), name) for name in found["method"].values if _drawn(found, name)):
         row = found.sel({"method": name})
         seconds, error = row.seconds.values, np.clip(row[key].values, FLOOR, CEILING)
         whole = (row.failed + row.inaccurate).values == 0
         look = {"color": COLOURS[i % len(COLOURS)], "marker": MARKS[i % len(MARKS)], "markersize": 4}
         axes.plot(seconds, error, linewidth=0.8, linestyle=DASHES[i % len(DASHES)], markevery=whole, label=name, **look)
         axes.plot(seconds[~whole], error[~whole], linestyle="", **{**look, "markerfacecolor": "white"})
+        if key == "error_median" and "error_high" in row:
+            ends = np.clip([row.error_low.values, row.error_high.values], FLOOR, CEILING)
+            axes.vlines(seconds, *ends, color=look["color"], linewidth=0.7, alpha=0.7)
         silent = row.silent.values > 0
         axes.plot(seconds[silent], error[silent], "x", color="black", markersize=7)
     if np.isfinite(floor):

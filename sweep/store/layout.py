@@ -12,6 +12,7 @@ checksum behind it; `Table.digest` is of all bytes of a chunk, and of whose and 
 
 from __future__ import annotations
 
+import itertools
 import json
 import struct
 from bisect import bisect_right
@@ -227,6 +228,14 @@ class Layout:
         return xxhash.xxh3_128(self.key.encode() + b"".join(texts)).digest()
 
 
+def write_digests(fd: int, table: Table, digests: Mapping[int, bytes]) -> None:
+    """Writes those of some blocks, neighbouring ones at once. Raises OSError."""
+    for _, some in itertools.groupby(enumerate(sorted(digests)), lambda pair: pair[1] - pair[0]):
+        blocks = [block for _, block in some]
+        rows = b"".join(digests[block] for block in blocks)
+        disk.write_all(fd, (rows,), table.digests + blocks[0] * table.row_bytes)
+
+
 def gaps(apart: Iterable[Region], size: int) -> Iterator[Region]:
     """What is outside of the regions, up to a place."""
     at = 0
@@ -288,7 +297,8 @@ def _layout(words: dict[str, Any], end: int) -> Layout:
             "regions": tuple((int(a), int(b)) for a, b in words["regions"]),
         }
     )
-    if any(not 0 <= begin <= stop <= end for begin, stop in (*found.regions, *found.endings)):
+    digests = [(t.digests, t.digests + t.blocks.count * t.row_bytes) for t in tables.values()]
+    if any(not 0 <= begin <= stop <= end for begin, stop in (*found.regions, *found.endings, *digests)):
         raise ValueError("places outside of the file")
     return found
 

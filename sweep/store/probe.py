@@ -19,7 +19,7 @@ MOST_AT_ONCE = 256 << 20
 PROBE_SECONDS, PROBE_SPEED = 20.0, 2e8
 """Limit for another process that reads a result; and bytes of the file for each further second."""
 PROBE = """
-import sys, h5py
+import sys, h5netcdf, h5py
 def look(name, thing):
     dict(thing.attrs)
     if isinstance(thing, h5py.Dataset):
@@ -36,8 +36,11 @@ def look(name, thing):
 with h5py.File(sys.argv[1], "r") as file:
     look("/", file)
     file.visititems(look)
+with h5netcdf.File(sys.argv[1], "r", phony_dims="access") as file:
+    for thing in (file, *file.variables.values()):
+        dict(thing.attrs)
 """
-"""Reads what a reader would read, but for numbers that are not read by HDF5."""
+"""Reads what a reader would read, and as it would, but for numbers that are not read by HDF5."""
 
 _written: set[tuple[int, ...]] = set()
 """Files that this process has written, or has had read, and nobody changed since."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -251,24 +251,17 @@ def damaged(file: StoredFile, name: str, blocks: Iterable[int]) -> Iterator[tupl
 
 
 def padding_is_zero(file: StoredFile) -> bool:
-    """Whether there are zeros alone between the chunks. Raises OSError, EOFError."""
+    """Whether there are zeros alone between the chunks and behind the last one. Raises OSError, EOFError."""
     known = [table.spans() for table in file.layout.tables.values()]
-    spans = np.concatenate([*known, np.array(file.layout.endings, np.int64)])
+    end = file.layout.end
+    spans = np.concatenate([*known, np.array([*file.layout.endings, (end, end)], np.int64)])
     spans = spans[np.argsort(spans[:, 0], kind="stable")]
-    between = zip(spans[:-1, 1].tolist(), spans[1:, 0].tolist(), strict=True)
-    inside = _within(file.layout)
-    return not any(any(_bytes(file.fd, begin, end)) for begin, end in between if begin < end and inside(begin))
-
-
-def _within(layout: Layout) -> Callable[[int], bool]:
-    begins, ends = np.array(layout.regions, np.int64).reshape(-1, 2).T
-
-    def inside(at: int) -> bool:
-        """Whether a place is within a region, not at its end."""
-        region = int(np.searchsorted(begins, at, "right")) - 1
-        return region >= 0 and at < int(ends[region])
-
-    return inside
+    between = np.stack([spans[:-1, 1], spans[1:, 0]], axis=1)
+    begins, ends = np.array(file.layout.regions, np.int64).T
+    region = np.searchsorted(begins, between[:, 0], "right") - 1
+    inside = (region >= 0) & (between[:, 0] < ends[region])
+    between = between[inside & (between[:, 0] < between[:, 1])]
+    return not any(any(_bytes(file.fd, begin, end)) for begin, end in between.tolist())
 
 
 def _bytes(fd: int, begin: int, end: int) -> bytearray:

@@ -15,15 +15,16 @@ import itertools
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sweep.store.frame import ENDINGS, PAGE, UNKNOWN, Frame
-from sweep.store.layout import BYTES, DAMAGE, Layout, Table, read_layout
+from sweep.store.ending import Gather, end, gathered, reads_back
+from sweep.store.frame import PAGE, Frame
+from sweep.store.layout import DAMAGE, Layout, Table, read_layout, write_digests
 from sweep.store.probe import written
 from sweep.store.reading import StoredFile, damaged, unbroken
 from sweep.system import disk
@@ -33,9 +34,6 @@ SYNC_BYTES = 64 << 20
 """Bytes after which blocks are brought to the disk,"""
 SYNC_SECONDS = 0.2
 """or time, where that comes first."""
-
-Gather = Callable[[StoredFile, int], Mapping[str, Any]]
-"""Makes a block of the output of a summary from its rows."""
 
 
 def unfinished_of(output: Path) -> Path:
@@ -110,12 +108,10 @@ class Store:
 
     def found(self) -> Layout | None:
         """What an earlier run left; None where there is nothing. Raises SweepError where it is damaged."""
-        try:
-            fd = disk.open_file(self.path, os.O_RDONLY)
-        except FileNotFoundError:
+        if not self.path.exists():
             return None
-        except OSError as fault:
-            raise disk.refusal(fault, self.path) from fault
+        with disk.refusing(self.path):
+            fd = disk.open_file(self.path, os.O_RDONLY)
         try:
             layout = read_layout(fd, os.fstat(fd).st_size)
             if layout is not None and unbroken(fd):
@@ -131,19 +127,20 @@ class Store:
     def begin(self, frame: Frame) -> None:
         """Makes the file, with room on the disk for all of it. Raises SweepError."""
         temporary = self.temporary
-        try:
-            fd = disk.open_file(temporary, os.O_CREAT | os.O_TRUNC | os.O_RDWR)
+        with disk.refusing(self.path):
             try:
-                frame.write(fd)
-                disk.fsync(fd)
-            finally:
-                os.close(fd)
-            disk.rename(temporary, self.path)
-            disk.sync_folder(self.path.parent)
-        except OSError as fault:
-            with contextlib.suppress(OSError):
-                disk.remove(temporary)
-            raise disk.refusal(fault, self.path) from fault
+                fd = disk.open_file(temporary, os.O_CREAT | os.O_TRUNC | os.O_RDWR)
+                try:
+                    frame.write(fd)
+                    disk.fsync(fd)
+                finally:
+                    os.close(fd)
+                disk.rename(temporary, self.path)
+                disk.sync_folder(self.path.parent)
+            except OSError:
+                with contextlib.suppress(OSError):
+                    disk.remove(temporary)
+                raise
         self._open(frame.layout)
 
     def resume(self, layout: Layout) -> None:
@@ -157,10 +154,8 @@ class Store:
         self._checker = _Checker(self.path, layout, np.flatnonzero(self._done))
 
     def _open(self, layout: Layout) -> None:
-        try:
+        with disk.refusing(self.path):
             self._fd = disk.open_file(self.path, os.O_RDWR)
-        except OSError as fault:
-            raise disk.refusal(fault, self.path) from fault
         self.layout, self._done = layout, np.zeros(layout.work.blocks.count, bool)
 
     @property
@@ -179,10 +174,8 @@ class Store:
 
     def put(self, index: int, arrays: Mapping[str, Any]) -> None:
         """Writes a block; it is acknowledged later, with others. Raises SweepError."""
-        try:
+        with disk.refusing(self.path):
             digests = self.table.write(self._fd, index, arrays)
-        except OSError as fault:
-            raise disk.refusal(fault, self.path) from fault
         with self._turn:
             self._waiting[index] = digests
             self._unsynced += sum(array.nbytes for array in arrays.values())
@@ -210,21 +203,17 @@ class Store:
         """Acknowledges all that is written, and brings that to the disk too. Raises SweepError."""
         with self._committing:
             self._commit()
-            try:
+            with disk.refusing(self.path):
                 disk.sync_numbers(self._fd)
-            except OSError as fault:
-                raise disk.refusal(fault, self.path) from fault
 
     def _commit(self) -> None:
         with self._turn:
             waiting, self._waiting, self._unsynced = self._waiting, {}, 0
             self._synced = time.monotonic()
-        try:
+        with disk.refusing(self.path):
             if waiting:
                 disk.sync_numbers(self._fd)
                 write_digests(self._fd, self.table, waiting)
-        except OSError as fault:
-            raise disk.refusal(fault, self.path) from fault
         self._done[list(waiting)] = True
 
     def damaged(self) -> list[int]:
@@ -237,10 +226,8 @@ class Store:
     def undo(self, blocks: Iterable[int]) -> None:
         """Takes blocks out of those that are done. Raises SweepError."""
         nothing = bytes(self.table.row_bytes)
-        try:
+        with disk.refusing(self.path):
             write_digests(self._fd, self.table, dict.fromkeys(blocks, nothing))
-        except OSError as fault:
-            raise disk.refusal(fault, self.path) from fault
         self._done[list(blocks)] = False
 
     def finish(self, texts: Mapping[str, str], gather: Gather | None) -> list[int]:
@@ -257,49 +244,34 @@ class Store:
             Blocks that turned out to be damaged, which have to be computed again first.
         """
         assert self.layout is not None
-        try:
+        with disk.refusing(self.output):
             self.commit()
             found = self.damaged()
             if not found and gather is not None:
-                found = _gathered(self.path, self._fd, self.layout, gather)
+                found = gathered(self.path, self._fd, self.layout, gather)
                 self.undo(found)
             if found:
                 return found
-            _end(
-                self._fd, self.layout, [texts[name].encode().ljust(length)[:length] for name, length in ENDINGS.items()]
-            )
+            end(self._fd, self.layout, texts)
             disk.fsync(self._fd)
-            self._read_back()
+            if not reads_back(self.path):
+                raise SweepError(
+                    f"{self.output}: differs when read back from what was written; the disk may be failing"
+                )
             disk.rename(self.path, self.output)
             disk.sync_folder(self.output.parent)
             written(self.output)
-        except OSError as fault:
-            raise disk.refusal(fault, self.output) from fault
         return []
-
-    def _read_back(self) -> None:
-        """Reads some blocks as any reader would. Raises SweepError where they differ."""
-        try:
-            with StoredFile(self.path) as file:
-                same = file.finished and all(_reads_back(file, block) for block in _some(file))
-        except (*DAMAGE, SweepError) as fault:
-            if getattr(fault, "errno", None):
-                raise
-            same = False
-        if not same:
-            raise SweepError(f"{self.output}: differs when read back from what was written; the disk may be failing")
 
     def reopen(self, damaged: Iterable[int]) -> None:
         """Takes a finished result up again, some blocks of which are to be computed again. Raises SweepError."""
-        try:
+        with disk.refusing(self.output):
             disk.rename(self.output, self.path)
             disk.sync_folder(self.output.parent)
             layout = self.found()
             assert layout is not None
             self._open(layout)
-            _unend(self._fd, layout)
-        except OSError as fault:
-            raise disk.refusal(fault, self.output) from fault
+            end(self._fd, layout, None)
         self.undo(damaged)
         os.close(self._fd)
         self.resume(layout)
@@ -313,10 +285,8 @@ class Store:
 
     def discard(self) -> None:
         """Removes what is there. Raises SweepError."""
-        try:
+        with disk.refusing(self.path):
             disk.remove(self.path)
-        except OSError as fault:
-            raise disk.refusal(fault, self.path) from fault
 
     def close(self) -> None:
         """Acknowledges what is written, if that can be, and gives the file back."""
@@ -358,79 +328,15 @@ class _Checker:
         self._thread.join()
 
 
-def write_digests(fd: int, table: Table, digests: Mapping[int, bytes]) -> None:
-    """Writes those of some blocks, neighbouring ones at once. Raises OSError."""
-    for _, some in itertools.groupby(enumerate(sorted(digests)), lambda pair: pair[1] - pair[0]):
-        blocks = [block for _, block in some]
-        rows = b"".join(digests[block] for block in blocks)
-        disk.write_all(fd, (rows,), table.digests + blocks[0] * table.row_bytes)
-
-
-def _gathered(path: Path, fd: int, layout: Layout, gather: Gather) -> list[int]:
-    """Writes the columns of a summary; gives the blocks of rows that turned out to be damaged, where some did."""
-    table, digests = layout.tables["cells"], {}
-    with StoredFile(path) as file:
-        found = sorted({block for block, _ in damaged(file, "rows", range(layout.work.blocks.count))})
-        if found:
-            return found
-        for block in range(table.blocks.count):
-            digests[block] = table.write(fd, block, gather(file, block))
-    disk.sync_numbers(fd)
-    write_digests(fd, table, digests)
-    return []
-
-
-def _end(fd: int, layout: Layout, texts: list[bytes]) -> None:
-    """Writes what is known at the end. Raises OSError."""
-    for piece, (begin, _) in zip([*texts, layout.ending_digest(texts)], layout.endings, strict=True):
-        disk.write_all(fd, (piece,), begin)
-
-
-def _unend(fd: int, layout: Layout) -> None:
-    """Takes back that the run has ended. Raises OSError."""
-    nothing = [*(UNKNOWN[name] for name in ENDINGS), bytes(BYTES)]
-    for piece, (begin, _) in zip(reversed(nothing), reversed(layout.endings), strict=True):
-        disk.write_all(fd, (piece,), begin)
-
-
-def _some(file: StoredFile) -> set[int]:
-    last = file.layout.tables["cells"].blocks.count - 1
-    return {0, last // 2, last}
-
-
-def _reads_back(file: StoredFile, block: int) -> bool:
-    """Whether HDF5 finds the same numbers in a block as its digests tell of."""
-    import h5py
-
-    table = file.layout.tables["cells"]
-    start, stop = table.blocks.bounds(block)
-    with h5py.File(file.path, "r") as other:
-        for name, column in file.columns().items():
-            cells = column.run(start, stop)
-            dataset = other[name]
-            first = np.unravel_index(start, table.grid) if table.grid else ()
-            last = np.unravel_index(stop - 1, table.grid) if table.grid else ()
-            found = dataset[tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))]
-            if np.asarray(found).tobytes() != cells.tobytes():
-                return False
-    return True
-
-
 @contextlib.contextmanager
 def opened(output: Path) -> Iterator[Store]:
     """The store of an output, held by this process alone. Raises SweepError."""
-    lock = lock_of(output)
-    store = Store(output)
-    try:
-        with disk.locked(lock) as ours:
-            if not ours:
-                raise SweepError(
-                    f"{output}: another run is at work on this output; wait for it, or choose another with -o"
-                )
-            disk.remove(store.temporary)
-            try:
-                yield store
-            finally:
-                store.close()
-    except OSError as fault:
-        raise disk.refusal(fault, lock) from fault
+    lock, store = lock_of(output), Store(output)
+    with disk.refusing(lock), disk.locked(lock) as ours:
+        if not ours:
+            raise SweepError(f"{output}: another run is at work on this output; wait for it, or choose another with -o")
+        disk.remove(store.temporary)
+        try:
+            yield store
+        finally:
+            store.close()

@@ -265,6 +265,7 @@ class Study:
             known["summary"] = _summary(keys["summary"]) if "summary" in keys else None
             known["blocks"] = tuple(Block(b["design"], tuple(b["axes"]), b["options"]) for b in keys.get("blocks", ()))
             known["where"] = keys.get("where", "")
+            _check_words(known)
             kernel = _kernel_as_declared(keys["kernel"])
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise SweepError(f"not the JSON of a study: {type(error).__name__} {error}") from None
@@ -279,6 +280,14 @@ PLAIN = (
     "title", "question", "kernel_name", "method", "rtol", "outputs", "design", "fixed", "follows", "along", "text",
 )  # fmt: skip
 """Attributes that are written as they are."""
+
+
+def _check_words(known: Mapping[str, Any]) -> None:
+    """Raises TypeError, ValueError where something else stands for a word, or for rtol."""
+    words = [known[name] for name in PLAIN if name not in ("rtol", "outputs", "fixed", "follows", "along")]
+    if not all(isinstance(word, str) for word in (*words, *known["outputs"], *known["follows"].values())):
+        raise TypeError("words are expected")
+    float(known["rtol"])
 
 
 def short(value: Any) -> str:

@@ -125,7 +125,9 @@ def study(given: Given | None = None, /, *, allow_import: bool = False, **keys: 
         return StudyParser("study", Path(), allow_import).study(given, "")
     if not isinstance(given, str | os.PathLike):
         raise SweepError(f"expected a study, its path, or a dict of its keys, found {show(given)}; or write {KEYWORDS}")
-    return read_study(os.fspath(given), allow_import)
+    if "\n" in (path := os.fspath(given)):
+        raise SweepError("this is the text of a study, not its path; write sweep.study(tomllib.loads(text))")
+    return read_study(path, allow_import)
 
 
 as_study = study

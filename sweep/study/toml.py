@@ -73,10 +73,15 @@ def _fixed(study: Study) -> Any:
     """Parameters that are fixed to something else than their default."""
     for field in study.kernel.parameters:
         value = study.fixed.get(field.name)
-        if value is None or (np.ndim(value) == 0 and value == field.default):
+        if value is None or (np.ndim(value) == 0 and _is(field.default, value)):
             continue
         words = {float(number): word for word, number in field.choices.items()}
         yield field.name, words[float(value)] if words else np.asarray(value).tolist()
+
+
+def _is(default: float | str | None, value: Any) -> bool:
+    """Whether a number is the default; -0.0 is not 0.0."""
+    return isinstance(default, float | int) and (value, np.signbit(value)) == (default, np.signbit(default))
 
 
 def _value(value: Any) -> str:

@@ -23,16 +23,18 @@ class Bar:
         Makes what tqdm does.
     stream : text stream
         Beside it.
+    name : str
+        Of what is done.
     """
 
-    def __init__(self, make: Callable[[], Any], stream: TextIO) -> None:
-        self._make, self._stream = make, stream
+    def __init__(self, make: Callable[[], Any], stream: TextIO, name: str) -> None:
+        self._make, self._stream, self._name = make, stream, name
         self._bar: Any = None
 
     def show(self, done: int, text: str) -> None:
         """Moves it to so many cells, with a text behind."""
         self._bar = self._bar or self._make()
-        self._bar.set_postfix_str(text, refresh=False)
+        self._bar.set_description_str(f"{self._name}: {text}", refresh=False)
         self._bar.update(done - self._bar.n)
 
     def note(self, text: str) -> None:
@@ -56,6 +58,6 @@ def notebook_bar(stream: TextIO | None, name: str, total: int, done: int) -> Bar
             from tqdm.auto import tqdm
     except ImportError:
         return None
-    form = "{desc}: {percentage:3.0f} %|{bar}| {postfix}"
-    keys = {"desc": name, "total": total, "initial": done, "bar_format": form, "mininterval": 0.1, "file": stream}
-    return Bar(lambda: tqdm(**keys), stream)
+    form = "{percentage:3.0f} %|{bar:20}| {desc}"
+    keys = {"desc": name, "total": total, "initial": done, "bar_format": form, "mininterval": 0.5, "file": stream}
+    return Bar(lambda: tqdm(**keys), stream, name)

@@ -239,6 +239,15 @@ def refusal(fault: OSError | RuntimeError, path: Path) -> SweepError:
     return SweepError(f"{path}: cannot be written ({reason})")
 
 
+@contextlib.contextmanager
+def refusing(path: Path) -> Iterator[None]:
+    """What the system refuses is a SweepError of one line."""
+    try:
+        yield
+    except OSError as fault:
+        raise refusal(fault, path) from fault
+
+
 def as_bytes(piece: Any) -> memoryview:
     """The bytes of bytes or of a C-contiguous array."""
     view = memoryview(piece)

@@ -31,7 +31,13 @@ EVEN = 1.5
 ALIKE = 6
 """Blocks on either side, in the order of what was thought, whose error tells that of a block."""
 DOUBT = 0.5
-"""Share by which a forecast from one block is made longer; from n blocks, its n-th part's root."""
+"""Standard error of a forecast from one block, beside what the spread of blocks tells; of n blocks its n-th's root."""
+FEWEST = 3
+"""Blocks from which a spread can be told."""
+LONGER = 0.75
+"""Standard errors by which a forecast is made longer, for it is to err on the long side;"""
+EITHER_WAY = 2.0
+"""and within which it is told to lie."""
 ENOUGH = 4
 """So many blocks that are no worker's first tell more than all together."""
 SHORTEST = 1e-9
@@ -57,7 +63,9 @@ class Forecast:
         self._left = np.zeros(self._weights.size, bool)
         self._left[np.fromiter(jobs, np.intp)] = True
         self._start: float | None = None
+        self._thought = self._weights
         self._first_end = math.inf
+        self._away = 0.0
 
     def begin(self, job: int) -> None:
         """A core has begun with a block."""
@@ -74,7 +82,8 @@ class Forecast:
             seconds = now - self._begun[job]
         else:
             self._begun[job] = now - max(ago, seconds)
-            self._start = self._begun[job] if not self._measured().size else self._start
+            self._start = self._start if self._away else self._begun[job]
+            self._away = max(ago, seconds) or self._away
         self._first_end = min(self._first_end, now)
         self._seconds[job] = max(seconds, SHORTEST)
         self._left[job] = False
@@ -88,19 +97,56 @@ class Forecast:
         """How many are left."""
         return int(self._left.sum())
 
+    def seconds(self, job: int) -> float:
+        """What a block was thought to take when `order` looked last."""
+        return float(self._thought[job])
+
     @property
     def left(self) -> float | None:
         """Seconds until all blocks are done, rather too many; None before the first one is."""
+        return None if (found := self._told()) is None else found[0]
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """What the seconds that are left may well lie between; None before the first block is done."""
+        if (found := self._told()) is None:
+            return None
+        left, error = found
+        likely = left / (1 + LONGER * error)
+        return likely * max(0.0, 1 - EITHER_WAY * error), likely * (1 + EITHER_WAY * error)
+
+    def _told(self) -> tuple[float, float] | None:
+        """Seconds that are left, and their relative standard error."""
         measured, left, now = self._measured(), np.flatnonzero(self._left), self._clock()
         if self._start is None or not measured.size:
             return None
         if not left.size:
-            return 0.0
+            return 0.0, 0.0
         running = np.maximum(np.nan_to_num(now - self._begun[left]), 0.0)
-        doubt = 1 + DOUBT / math.sqrt(measured.size)
-        to_come = np.maximum(doubt * self._expected(self._settled(measured))[left] - running, 0.0)
-        cores = (self._seconds[measured].sum() + running.sum()) / max(now - self._start, SHORTEST)
-        return max(float(to_come.sum() / cores), float(to_come.max()))
+        settled = self._settled(measured)
+        expected = self._expected(settled)[left]
+        error = self._standard_error(settled, expected)
+        to_come = np.maximum((1 + LONGER * error) * expected - running, 0.0)
+        return max(float(to_come.sum() / self._cores(measured, running, now)), float(to_come.max())), error
+
+    def _cores(self, measured: Any, running: Any, now: float) -> float:
+        """How many blocks are worked on at once."""
+        assert self._start is not None
+        # elsewhere all but the one that came last have half of a block done, of which nothing is told
+        untold = 0.5 * self._away
+        done = self._seconds[measured].sum() + running.sum() - untold
+        return float(max(done, SHORTEST) / max(now - self._start - untold, SHORTEST))
+
+    def _standard_error(self, measured: Any, expected: Any) -> float:
+        """Relative, of the sum of what is expected: by how far off measured blocks would have been expected."""
+        error = DOUBT / math.sqrt(measured.size)
+        if measured.size < FEWEST:
+            return error
+        seconds, without = self._seconds[measured], self._without(measured)
+        without *= seconds.sum() / without.sum()
+        variance = ((seconds - without) ** 2).sum() / (without**2).sum()
+        shares = expected / expected.sum()
+        return min(1.0, math.hypot(error, math.sqrt(variance * (1 / measured.size + (shares**2).sum()))))
 
     def order(self) -> Iterator[int]:
         """The blocks to compute, each chosen when it is asked for."""
@@ -129,7 +175,8 @@ class Forecast:
 
     def _dear_first(self, jobs: Any) -> Any:
         """Sorted by powers of two of what they will take; as they are where all take about as long."""
-        seconds = self._expected(self._settled(self._measured()))[jobs]
+        self._thought = self._expected(self._settled(self._measured()))
+        seconds = self._thought[jobs]
         if seconds.max() < EVEN * np.median(seconds):
             return jobs
         return jobs[np.argsort(-np.round(np.log2(seconds)), kind="stable")]
@@ -142,11 +189,15 @@ class Forecast:
         thought = self._weights * np.interp(np.arange(self._weights.size), measured, ratio)
         if measured.size < LEAST_LEAD:
             return thought
-        return thought * self._error(measured, ratio, thought)
+        return thought * self._error(measured, thought)
 
-    def _error(self, measured: Any, ratio: Any, thought: Any) -> Any:
+    def _without(self, measured: Any) -> Any:
+        """What measured blocks would be thought to take by their neighbours alone."""
+        return self._weights[measured] * _between(measured, self._seconds[measured] / self._weights[measured])
+
+    def _error(self, measured: Any, thought: Any) -> Any:
         """How many times what is thought blocks take: as measured ones, if they were thought of by their neighbours."""
-        without = self._weights[measured] * _between(measured, ratio)
+        without = self._without(measured)
         rank = np.argsort(without)
         sums = np.cumsum(np.vstack([np.zeros(2), np.stack([self._seconds[measured], without], axis=1)[rank]]), axis=0)
         middle = np.searchsorted(without[rank], thought)

@@ -71,7 +71,12 @@ def read_lines(text: str) -> Iterator[Mapping[str, Any]]:
 
 class _Handler(logging.FileHandler):
     def handleError(self, record: logging.LogRecord) -> None:
-        """A log that cannot be written is no reason to stop."""
+        """A log that cannot be written is no reason to stop,"""
+
+    def close(self) -> None:
+        """nor one whose last lines find no room."""
+        with contextlib.suppress(OSError):
+            super().close()
 
 
 class _Plain(logging.Formatter):

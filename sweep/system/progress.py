@@ -25,6 +25,8 @@ LINE_SECONDS = 30.0
 LINE_SHARE = 0.05
 REDRAW_SECONDS = 0.1
 LOG_SECONDS = 60.0
+WIDE = 2.0
+"""A time left is told as an interval where its end is so many times its beginning."""
 AGREE = 1.5
 """Speeds so far and to come are both told where one is so many times the other."""
 
@@ -132,8 +134,12 @@ class Progress:
     def line(self) -> str:
         """What is told now: `12,300/1,000,000 cells (1.2 %), 5,100 cells/s, 3 min left`."""
         left = self.left
-        tail = "" if left is None else f", {self._speed(left)}, {duration(left)} left"
-        return self._counts() + tail
+        return self._counts() + ("" if left is None else f", {self._speed(left)}, {self._time_left(left)} left")
+
+    def _time_left(self, left: float) -> str:
+        """`12 min 05 s`; or, where little can be said, `9 to 20 min`."""
+        low, high = (left, left) if self._forecast is None else self._forecast.interval or (left, left)
+        return duration(left) if high <= WIDE * low else span(low, high)
 
     def _fields(self) -> dict[str, Any]:
         left = self.left
@@ -228,6 +234,14 @@ def duration(seconds: float) -> str:
     if whole < 86400:
         return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
     return f"{whole // 86400} d {whole % 86400 // 3600} h"
+
+
+def span(low: float, high: float) -> str:
+    """Both in one unit, by the larger: `0 to 9 s`, `12 to 20 min`, `3 to 7 h`."""
+    unit, size = next(
+        (u, s) for u, s in (("d", 86400), ("h", 3600), ("min", 60), ("s", 1)) if high >= 1.5 * s or s == 1
+    )
+    return f"{low / size:.0f} to {max(high / size, 1):.0f} {unit}"
 
 
 def seconds_of(name: str, text: float | str) -> float:

@@ -52,10 +52,20 @@ def kernel(name, *kinds, pause=0.0):
 
 RAISING = kernel("raising", RAISES)
 DYING = kernel("dying", RAISES, CRASHES, EXITS)
+SLOW = kernel("slow", pause=0.05)
 STUCK = kernel("stuck", HANGS, pause=0.002)
 ENDLESS = kernel("endless", HANGS, HOGS)
 HOGGING = kernel("hogging", HOGS)
 WORST = kernel("worst", RAISES, CRASHES, EXITS, HANGS, HOGS, HUNGRY)
+
+
+def whole_only(height, *rest):
+    """Crashes at heights that are no whole numbers."""
+    misbehave([CRASHES] * int((height % 1 != 0).any()), [CRASHES])
+    toy.exact(height, *rest)
+
+
+WHOLE = dataclasses.replace(RAISING, methods=(dataclasses.replace(toy.KERNEL.methods[1], solve=whole_only),))
 
 
 def nothing_but_bad(height, *rest):

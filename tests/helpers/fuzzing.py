@@ -5,7 +5,10 @@ from __future__ import annotations
 import contextlib
 import io
 import random
+import re
 import shutil
+import tomllib
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +17,8 @@ from havoc import flip, run, study
 from sweep.cells.fingerprint import fingerprint
 from sweep.cli import main
 from sweep.store.layout import read_layout, structure_digest
-from sweep.study.read import read_study
+from sweep.study.read import as_study, read_study
+from sweep.study.toml import to_toml
 from sweep.system.errors import SweepError
 
 STUDY = """# How fast does a stone fall?
@@ -56,6 +60,11 @@ WORDS = [
 ]  # fmt: skip
 
 
+NUMBERS = ["0", "-0.0", "1", "-1", "2", "3", "0.5", "1e-9", "1e-30", "1e-300", "5e-324", "1e9", "1e30", "1e300",
+           "1e308", "-1e300", "nan", "inf", "-inf", "1000000", "2147483648", "9223372036854775807", "1.5"]  # fmt: skip
+TABLES = ("axes", "fixed", "along", "summary", "summary.outputs", "summary.edges", "axes.mu", "axes.method", "[blocks]")
+
+
 def nonsense(rng: random.Random, text: str) -> str:
     """The text with some pieces cut, doubled, swapped, or replaced by words of the trade."""
     for _ in range(rng.choice([1, 1, 1, 2, 5])):
@@ -69,18 +78,50 @@ def nonsense(rng: random.Random, text: str) -> str:
     return text
 
 
-def fuzz_study(rng: random.Random, folder: Path) -> str:
-    """What came of reading a study of nonsense: "read" or "refused". Anything but a SweepError goes through."""
+def varied(rng: random.Random, texts: Sequence[str]) -> str:
+    """One of the studies with some lines changed, most of them so that TOML can still be read."""
+    lines = rng.choice(texts).splitlines()
+    others = [line for text in texts for line in text.splitlines() if "=" in line]
+    for _ in range(rng.choice([1, 1, 2, 4])):
+        at = rng.choice([k for k, line in enumerate(lines) if line.strip() and not line.startswith("#")] or [0])
+        key, equals, value = lines[at].partition("=")
+        number = re.sub(r"-?\d[\d.e+-]*", lambda _: rng.choice(NUMBERS), lines[at], count=rng.choice([1, 1, 0]))
+        lines[at] = rng.choice([
+            "", f"{lines[at]}\n{lines[at]}", rng.choice(others), number, number, number,
+            f"{key}{equals}{rng.choice(others).partition('=')[2]}", f"{rng.choice(others).partition('=')[0]}={value}",
+            f"{key}= {rng.choice(WORDS)}", f"[{rng.choice(TABLES)}]", f"{lines[at]}\n{rng.choice(others)}",
+            nonsense(rng, lines[at]),
+        ])  # fmt: skip
+    return "\n".join(lines)
+
+
+def fuzz_study(rng: random.Random, folder: Path, texts: Sequence[str] = ()) -> str:
+    """What came of reading a study of nonsense: "read" or "refused". Anything but a SweepError goes through.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        Of studies that are varied; none: `STUDY` with pieces of nonsense.
+    """
     path = folder / "fuzz.toml"
-    path.write_text(nonsense(rng, STUDY), encoding="utf-8", errors="replace")
+    path.write_text(varied(rng, texts) if texts else nonsense(rng, STUDY), encoding="utf-8", errors="replace")
     try:
-        # foreign code would not be run: only "toy:..." can be loaded at all, and that only where it is allowed
+        # foreign code would not be run: only our own modules can be loaded at all, and those only where it is allowed
         found = read_study(path, allow_import=rng.random() < 0.9)
         fingerprint(found)
         assert type(found).from_json(found.to_json(), allow_import=True) == found
     except SweepError:
         return "refused"
+    again = as_study(tomllib.loads(to_toml(found)), allow_import=True)
+    assert fingerprint(again) == fingerprint(found)
     return "read"
+
+
+def fuzz_plan(rng: random.Random, folder: Path, texts: Sequence[str]) -> int:
+    """Exit status of `sweep plan` of a study that was varied and can still be read."""
+    while fuzz_study(rng, folder, texts) != "read":
+        pass
+    return quietly("plan", folder / "fuzz.toml", "--workers", "1", "--allow-import")
 
 
 def prepared(folder: Path) -> Path:

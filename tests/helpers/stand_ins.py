@@ -7,6 +7,7 @@ from toy import KERNEL
 
 import sweep
 from kernels.interface import Kernel
+from sweep.cells.grid import Cells
 from sweep.cells.solve import Solver
 
 
@@ -21,7 +22,7 @@ def solved(study, start=0, stop=None):
     lengths = {"drop": (len(study.along.get("phase", ())),)}
     outputs = {name: np.full((stop - start, *lengths.get(name, ())), -1.0) for name in study.outputs}
     status, used = np.full(stop - start, 99, np.int8), np.full(stop - start, 99, np.int8)
-    solver.solve(start, stop, outputs, status, used)
+    solver.solve(start, Cells(outputs, status, used))
     return outputs, status, used
 
 

@@ -26,7 +26,7 @@ def thinned(name, **steps):
 def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("impact")
     paths = [folder / "impact_map.h5", folder / "impact_map_lever.h5"]
-    for path, steps in zip(paths, ({"I_c": 4, "e": 6}, {"I_c": 4, "nu": 4}), strict=True):
+    for path, steps in zip(paths, ({"I_c": 16, "e": 24}, {"I_c": 16, "nu": 16}), strict=True):
         sweep.run(thinned(path.stem, **steps), path, workers=1).close()
     return paths
 

@@ -48,6 +48,22 @@ def test_the_machines_found_have_the_amplitude_and_the_distortion_that_is_said(d
         assert float(one.thd) == pytest.approx(float(exact.thd[0]), rel=0.03)
 
 
+def test_the_machines_of_the_figure_have_the_amplitude_and_are_those_between_the_cranks(ds):
+    b, f = np.array([0.4, 0.62, 0.8]), np.array([0.3, 0.405, 0.6])
+    made = study.machines_on(b, 0.38, f)
+    some = made.stack(cell=("b", "f")).dropna("cell")
+    assert some.cell.size >= 6
+    lengths = {name: some[name].values for name in "bf"} | {"e": some.crank.values}
+    exact = sweep.run(
+        sweep.build_study(kernel="polisher", design="zip", axes=lengths, fixed={"d": 0.38}, outputs=["A1"])
+    )
+    np.testing.assert_allclose(exact.A1, study.WANTED, rtol=1e-12)
+    between = study.of_amplitude(ds).sel(d=0.38, method="nearest").sel(b=0.4, f=[0.32, 0.5], method="nearest")
+    same = study.machines_on(np.array([float(between.b)]), 0.38, between.f.values).isel(b=0)
+    np.testing.assert_allclose(same.crank, between.crank, rtol=2e-3)
+    np.testing.assert_allclose(same.thd, between.thd, rtol=0.03)
+
+
 def test_a_border_drawn_too_narrow_is_seen(ds, monkeypatch):
     machines, reaches = study.of_amplitude(ds), study.reaches
     monkeypatch.setattr(study, "reaches", lambda b, d, f: reaches(b, d, f, math.radians(25)))

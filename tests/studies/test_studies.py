@@ -92,6 +92,12 @@ def test_a_study_file_opens_with_its_question_and_holds_no_mistake(path):
     assert study.title
 
 
+@pytest.mark.parametrize("picture", sorted(STUDIES.glob("*.png")), ids=lambda path: path.stem)
+def test_a_picture_has_a_caption_of_two_to_four_sentences(picture):
+    text = picture.with_suffix(".md").read_text(encoding="utf-8")
+    assert 2 <= len(re.findall(r"\.(?=\s|$)", text)) <= 4
+
+
 def test_the_study_covers_ten_decades_of_alpha_around_one_finely():
     study = sweep.read_study(STUDIES / "foliot_scaling.toml")
     alpha = study.axes["mu"].values / (study.fixed["a"] ** 2 * study.fixed["phi0"])

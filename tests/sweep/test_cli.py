@@ -18,6 +18,7 @@ from toy_studies import HEAD
 
 import sweep
 from sweep import cli
+from sweep.command import running
 from sweep.system.progress import Progress
 
 STUDY = """# How fast does a stone fall?
@@ -63,17 +64,38 @@ def done(here, call):
     return here
 
 
-def in_a_process(*argv, **options):
+def paths():
+    """The environment of a process that finds the package and the helpers."""
     path = os.pathsep.join([str(Path(sweep.__file__).parents[1]), str(Path(__file__).parents[1] / "helpers")])
+    return {**os.environ, "PYTHONPATH": path}
+
+
+def in_a_process(*argv, **options):
     command = [sys.executable, "-m", "sweep", *argv]
     return subprocess.Popen(
         command,
-        env={**os.environ, "PYTHONPATH": path},
+        env=paths(),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         **options,
     )
+
+
+# where nothing can be printed
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no disk that is always full")
+def test_words_that_find_no_room_leave_the_exit_status(here):
+    with Path("/dev/full").open("w") as full:
+        for words, status in ((["show", "nothing.h5"], 2), (["studies"], 2)):
+            command = [sys.executable, "-m", "sweep", *words]
+            assert subprocess.run(command, env=paths(), stdout=full, stderr=full).returncode == status
+
+
+def test_a_closed_stdout_is_no_fault(here):
+    command = [sys.executable, "-m", "sweep", "list"]
+    assert subprocess.run(command, env=paths(), preexec_fn=lambda: os.close(1)).returncode == 0
 
 
 # what is quick
@@ -88,8 +110,7 @@ def test_nothing_heavy_is_imported_before_it_is_needed(statement):
 
 def test_a_study_without_foreign_units_is_read_without_pint(here):
     code = "import sys, sweep; sweep.read_study('stones.toml', True); assert not {'pint', 'xarray'} & set(sys.modules)"
-    path = os.pathsep.join([str(Path(sweep.__file__).parents[1]), str(Path(__file__).parents[1] / "helpers")])
-    subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "PYTHONPATH": path})
+    subprocess.run([sys.executable, "-c", code], check=True, env=paths())
 
 
 # public names
@@ -413,7 +434,7 @@ def test_a_misused_command_shows_its_usage(argv, capsys):
 
 
 def test_a_fault_of_ours_is_one_message_too(here, call, monkeypatch):
-    monkeypatch.setattr(cli, "_study", lambda arguments: 1 / 0)
+    monkeypatch.setattr(running, "study_from", lambda arguments: 1 / 0)
     code, _, err = call("run", "stones.toml")
     assert code == 1
     assert err.startswith("a fault in foliot: ZeroDivisionError: division by zero\nPlease report it")
@@ -434,7 +455,7 @@ def test_faults_of_the_machine_are_told_in_one_line(here, call, monkeypatch, err
     def fail(arguments):
         raise error
 
-    monkeypatch.setattr(cli, "_study", fail)
+    monkeypatch.setattr(running, "study_from", fail)
     found, _, err = call("run", "stones.toml")
     assert found == code
     assert message in err

@@ -10,6 +10,7 @@ from stand_ins import solved, stand_in, toy_study, with_kernel
 
 import sweep
 from kernels.interface import Status
+from sweep.cells.grid import Cells
 from sweep.cells.solve import NONE, Solver
 from sweep.explore.refine import refine
 from sweep.show.text import outputs_of
@@ -51,7 +52,7 @@ def told(rough, exact, **keys):
     study = with_kernel(toy_study(**{"axes": {"height": [1.0]}, "rtol": 1e-9, **keys}), kernel_of(rough, exact))
     outputs = {name: np.empty(1) for name in study.outputs}
     status, used, error = np.empty(1, np.int8), np.empty(1, np.int8), np.empty(1, np.float32)
-    Solver(study).solve(0, 1, outputs, status, used, error_bound=error)
+    Solver(study).solve(0, Cells(outputs, status, used, error))
     return outputs["impact_speed"][0], Status(int(status[0])).name, used[0], pytest.approx(error[0], 1e-6, nan_ok=True)
 
 

@@ -76,10 +76,11 @@ class Uneven:
         self.seconds, self.ranges, self.now = seconds, [], 0.0
         monkeypatch.setattr("sweep.cells.timing.time", SimpleNamespace(perf_counter=lambda: self.now))
 
-    def solve(self, start, stop, outputs, status, used):
+    def solve(self, start, cells):
+        stop = start + cells.number
         assert 0 <= start < stop
         self.ranges.append((start, stop))
-        status[:], used[:] = 0, 1
+        cells.status[:], cells.used[:] = 0, 1
         self.now += sum(self.seconds(k) for k in range(start, stop))
 
 
@@ -121,9 +122,9 @@ def test_lanes_are_told_from_single_cells(monkeypatch):
     solver = Uneven(lambda k: 0.0, monkeypatch)
     real = solver.solve
 
-    def solve(start, stop, *rest):
-        real(start, stop, *rest)
-        solver.now += 1e-3 * -(-(stop - start) // 32)
+    def solve(start, cells):
+        real(start, cells)
+        solver.now += 1e-3 * -(-cells.number // 32)
 
     solver.solve = solve
     assert take_sample(solver, COLUMNS, 10**5).cost == pytest.approx(1e-3 / 32, rel=0.01)
@@ -134,9 +135,9 @@ def calls(seconds, lanes, monkeypatch):
     made = Uneven(lambda k: 0.0, monkeypatch)
     real = made.solve
 
-    def solve(start, stop, *rest):
-        real(start, stop, *rest)
-        made.now += seconds * (-(-(stop - start) // 32) if lanes else stop - start)
+    def solve(start, cells):
+        real(start, cells)
+        made.now += seconds * (-(-cells.number // 32) if lanes else cells.number)
 
     made.solve = solve
     return made

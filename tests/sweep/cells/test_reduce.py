@@ -13,6 +13,7 @@ from running import flip, kept
 
 import sweep
 from kernels.interface import Status
+from sweep.cells.grid import Cells
 from sweep.cells.partition import RowBlocks, row_blocks
 from sweep.cells.reduce import BY_STATUS, Reducer, merge, tree_sum
 from sweep.results.statuses import account
@@ -261,10 +262,10 @@ def test_infinities_are_values_and_nan_is_none():
         ([math.nan, -0.0, 0.0, math.nan], 1, 1),
     ]:
         zeros = np.zeros(4, np.int8)
-        found = reducer.reduce(10, 1, {"fall_time": np.array(values)}, zeros, zeros)
+        found = reducer.reduce(10, 1, Cells({"fall_time": np.array(values)}, zeros, zeros))
         assert found["fall_time min at"] == (low + 10 if low >= 0 else -1)
         assert found["fall_time max at"] == (high + 10 if high >= 0 else -1)
-        other = reducer.reduce(0, 1, {"fall_time": np.full(4, math.nan)}, zeros, zeros)
+        other = reducer.reduce(0, 1, Cells({"fall_time": np.full(4, math.nan)}, zeros, zeros))
         merge(other, found)
         assert other["fall_time min at"] == found["fall_time min at"]
 

@@ -13,7 +13,7 @@ from toy import KERNEL
 import sweep
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.block import warm
-from sweep.cells.grid import Grid
+from sweep.cells.grid import Cells, Grid
 from sweep.cells.solve import NONE, STRIP, UNKNOWN, Solver, usable_methods
 from sweep.results.statuses import account
 
@@ -254,7 +254,7 @@ def test_warming_up_changes_nothing():
     warm(solver, FOLIOT)
     outputs = {name: np.empty(372) for name in FOLIOT.outputs}
     status, used = np.empty(372, np.int8), np.empty(372, np.int8)
-    solver.solve(0, 372, outputs, status, used)
+    solver.solve(0, Cells(outputs, status, used))
     assert np.array_equal(outputs["period"], WHOLE[0]["period"], equal_nan=True)
 
 
@@ -362,7 +362,7 @@ def test_auto_does_not_deny_what_an_impact_clock_does_where_following_it_leaves_
     _, status, used = solved(sweep.build_study(**keys))
     _, followed, _ = solved(sweep.build_study(**keys, method="events"))
     closed = solved(sweep.build_study(**keys, method="closed"))[1]
-    open_ = np.isin(followed, UNKNOWN)
+    open_ = UNKNOWN[followed]
     assert (closed == Status.NO_CYCLE).all()
     assert open_[1]
     assert open_.sum() > 20

@@ -25,13 +25,14 @@ SOLVE = """
 import json, sys
 import numpy as np
 import sweep
+from sweep.cells.grid import Cells
 from sweep.cells.solve import Solver
 
 for keys in json.load(sys.stdin):
     study = sweep.build_study(**keys, allow_import=True)
     outputs = {f.name: np.empty((1, *(study.lengths[d] for d in f.dims))) for f in study.asked}
     status = np.empty(1, np.int8)
-    Solver(study).solve(0, 1, outputs, status, np.empty(1, np.int8))
+    Solver(study).solve(0, Cells(outputs, status, np.empty(1, np.int8)))
     assert status[0] < 64, (keys, status)
 print(json.dumps({name: getattr(module, "__file__", None) or "" for name, module in sys.modules.items()}))
 """

@@ -1,6 +1,10 @@
 """Tables that a notebook shows."""
 
 import re
+import subprocess
+import sys
+
+import pytest
 
 import sweep
 
@@ -24,6 +28,18 @@ def test_a_study_is_shown_with_units_method_cells_and_forecast():
     assert re.fullmatch(r"about .* on \d+ cores, .*B", shown["forecast"])
     assert "phi0 = 1.0472 [rad]" in shown["fixed"]
     assert "a &lt; b?" in study._repr_html_()
+
+
+def test_a_study_is_shown_whatever_was_used_before():
+    study = 'sweep.study(kernel="foliot", axes={"mu": [1.0]}, fixed={"phi0": 1.0})'
+    code = f"import sweep; sweep.run; print({study}._repr_html_())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert "<table" in done.stdout
+
+
+def test_the_text_of_a_study_is_no_path():
+    with pytest.raises(sweep.SweepError, match=r"the text of a study, not its path; write .*tomllib\.loads"):
+        sweep.study(sweep.to_toml(sweep.study(**FOLIOT, axes={"mu": [0.1, 1.0]})))
 
 
 def test_kernels_and_a_kernel_are_shown():

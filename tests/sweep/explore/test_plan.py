@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from running import fail_on
+from running import fail_on, tall
 
 from sweep.cells.grid import Grid
 from sweep.explore import calibration
@@ -169,3 +169,28 @@ print(sorted({"numba", "xarray", "h5py", "h5netcdf", "pint", "dask", "pandas"} &
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+def test_a_kernel_that_crashes_or_never_ends_is_planned_in_processes_of_its_own(tmp_path):
+    found = plan(tall(200, "bad:WORST"), path=tmp_path / "out.h5", cell_timeout=1.0)
+    assert found.cells == 200
+    assert found.methods == {"exact": 1.0}
+    assert 0 < found.seconds < 600
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_cells_that_are_tried_at_random_may_raise(monkeypatch):
+    """One in three of those that scalings are sought with."""
+
+    def misbehave(height, kinds):
+        if (height % 1 > 2 / 3).any():
+            raise ValueError
+
+    monkeypatch.setattr("bad.misbehave", misbehave)
+    assert plan(tall(60, "bad:RAISING")).cells == 60
+
+
+def test_a_plan_of_a_kernel_that_dies_of_random_cells_says_so(tmp_path):
+    """Whole heights are well; others, at which scalings are tried, are not."""
+    text = plan(tall(50, "bad:WHOLE"), path=tmp_path / "out.h5", isolate=True).scaling
+    assert text == "not known; while cells were tried at random, its process died of SIGSEGV"

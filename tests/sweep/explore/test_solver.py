@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from running import tall
 from toy_studies import build
 
 import sweep
@@ -99,3 +100,13 @@ def test_a_wrong_call_is_told(call, message):
 def test_a_study_that_is_no_function_of_numbers_is_refused(keys):
     with pytest.raises(sweep.SweepError, match="a solver"):
         sweep.solver(build(**keys))
+
+
+def test_where_a_kernel_raises_the_cell_fails_and_others_have_values():
+    clock = sweep.solver(tall(40, "bad:RAISING"))
+    with pytest.warns(RuntimeWarning, match=r"FAILED at height=11.0: ZeroDivisionError: eleven"):
+        found = clock([10.0, 11.0, 12.0])
+    assert found.status.tolist() == [Status.OK, Status.FAILED, Status.OK]
+    assert np.isnan(found.fall_time).tolist() == [False, True, False]
+    with pytest.warns(RuntimeWarning):
+        assert clock(11.0).status == Status.FAILED

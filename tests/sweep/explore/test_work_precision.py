@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from running import tall
 from toy import KERNEL, exact, rough
 from toy_studies import build
 
 from kernels.interface import Field, Method, Status
+from kernels.lanes.jit import COMPILED
 from sweep import SweepError, cli
 from sweep.cells.sample import sampled, with_method
+from sweep.explore.failing import without_failing
 from sweep.explore.work_precision import precision_cells, precision_text, work_precision
 from sweep.show.charts import draw_precision, new_figure, plot_precision, style
 
@@ -321,11 +324,19 @@ def test_cells_that_the_reference_has_solved_itself_are_at_what_it_is_right_to()
         assert worst >= found.attrs["reference_error"] > 0, name
 
 
+def idle(height, v0, g, rtol, phase, fall_time, impact_speed, drop, said):
+    """Refuses every cell."""
+    for column in (fall_time, impact_speed, drop):
+        column[...] = np.nan
+    said[:] = Status.STEP_LIMIT
+
+
 def test_neither_notes_nor_legend_lie_over_anything(tmp_path):
     study = with_methods(
         stones(), *(Method(f"method_{k}", "", bad(1e-5 if k else 0, Status.STEP_LIMIT)) for k in range(9))
     )
-    study = with_methods(study, *study.kernel.methods, Method("liar", "", bad(1e-5)), Method("exact", "", exact))
+    others = Method("liar", "", bad(1e-5)), Method("idle", "", idle), Method("exact", "", exact)
+    study = with_methods(study, *study.kernel.methods, *others)
     figure = plot_precision(measured(study, reference="exact"))
     with style():
         figure.draw_without_rendering()
@@ -334,7 +345,12 @@ def test_neither_notes_nor_legend_lie_over_anything(tmp_path):
     texts = [text.get_text() for text in legend.get_texts()]
     for said in ("all cells solved", "some refused or inaccurate", "some silently wrong", "below what the reference"):
         assert any(text.startswith(said) for text in texts), said
-    note = next(text for text in figure.texts if text.get_text().startswith("Omissions"))
+    note = next(text for text in figure.texts if text.get_text().startswith("Errors against exact, itself right to"))
+    said = note.get_text().replace("\n", " ")
+    assert "idle solves no cell" in said
+    assert "liar is silently wrong" in said
+    assert "liar" in texts
+    assert "idle" not in texts
     boxes = [thing.get_window_extent(renderer) for thing in (legend, note)]
     boxes += [axes.get_tightbbox(renderer) for axes in figure.axes[:1]]
     for i, one in enumerate(boxes):
@@ -350,6 +366,20 @@ def test_a_method_looks_the_same_in_pictures_that_name_the_same_methods():
         draw_precision(right, found.sel({"method": ["exact"]}), "error_worst", ["exact", "rough"])
     looks = [{line.get_label(): (line.get_color(), line.get_marker()) for line in axes.lines} for axes in (left, right)]
     assert looks[0]["exact"] == looks[1]["exact"] != looks[0]["rough"]
+
+
+@pytest.mark.skipif(not COMPILED, reason="hundreds of steps; the kernel's own tests run as plain Python")
+def test_what_a_method_estimates_of_its_own_error_is_not_compared():
+    fixed = {"phi0": 1.0, "a": 0.5, "flips": 2, "step": 0.05}
+    found = work_precision(
+        {"kernel": "foliot_steps", "axes": {"mu": [0.5, 5.0]}, "fixed": fixed},
+        methods=["dopri5", "dop853"],
+        tolerances=[1e-9],
+    )
+    assert not found.silent.any()
+    assert float(found.error_worst.max()) < 1e-9
+    assert (found.error_low <= found.error_median).all()
+    assert (found.error_median <= found.error_high).all()
 
 
 TOML = """# How right is a stone?
@@ -406,3 +436,13 @@ def test_mistakes_on_the_command_line_are_one_message(chart, options):
     assert code == 2
     assert err.strip()
     assert "Traceback" not in err
+
+
+def test_cells_at_which_a_kernel_dies_are_left_out_of_a_chart():
+    told = []
+    part = without_failing(tall(40, "bad:DYING"), 40, note=told.append)
+    assert sorted(set(range(1, 41)) - set(part.axes["height"].values)) == [11, 22, 33]
+    assert told == ["the kernel fails at 3 of 40 cells, e.g. height=11; they are left out"]
+    assert float(work_precision(part, tolerances=[1e-6]).ok.min()) == 1.0
+    with pytest.raises(SweepError, match="the kernel failed"):
+        without_failing(tall(5, "bad:HOPELESS"), 5)

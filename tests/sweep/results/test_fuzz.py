@@ -1,5 +1,6 @@
 """Files that nobody vouches for: no traceback, no hang, no foreign code, no path out of its folder."""
 
+import contextlib
 import dataclasses
 import os
 import pickle
@@ -10,6 +11,7 @@ import time
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 import toy_studies
 from fuzzing import STUDY, forge, fuzz_result, fuzz_study, prepared, quietly
@@ -18,6 +20,7 @@ from hypothesis import strategies as st
 from running import environment, quiet, tall
 
 import sweep
+from sweep.cells.partition import Partition
 from sweep.cli import main
 from sweep.results.verify import verify
 from sweep.store import probe
@@ -135,6 +138,15 @@ def lead_away(file, kind, secret):
         file["integrity/round"] = file["integrity"]
 
 
+def seal(path, layout):
+    """Puts a right trailer behind a file that h5py has changed."""
+    with path.open("r+b") as file:
+        end = file.seek(0, 2)
+        structure = structure_digest(file.fileno(), layout.endings, end)
+        file.write(dataclasses.replace(layout, regions=(), end=end, structure=structure).trailer())
+    assert probe.intact(path)
+
+
 @pytest.mark.parametrize("sealed", [False, True])
 @pytest.mark.parametrize("kind", ["soft link", "external link", "external storage", "virtual", "round"])
 def test_a_result_leads_to_no_other_file(whole, tmp_path, kind, sealed):
@@ -148,14 +160,25 @@ def test_a_result_leads_to_no_other_file(whole, tmp_path, kind, sealed):
     with h5py.File(path, "r+") as file:
         lead_away(file, kind, secret)
     if sealed:
-        with path.open("r+b") as file:
-            end = file.seek(0, 2)
-            structure = structure_digest(file.fileno(), layout.endings, end)
-            file.write(dataclasses.replace(layout, regions=(), end=end, structure=structure).trailer())
-        assert probe.intact(path)
+        seal(path, layout)
     with pytest.raises(SweepError, match="not the result of a sweep, or damaged"):
         sweep.open_result(path)
     assert not verify(path).whole
+
+
+@pytest.mark.parametrize(("command", "status"), [("show", 0), ("verify", 2)])
+def test_a_layout_of_more_blocks_than_the_file_has_room_for_is_none(whole, tmp_path, capsys, command, status):
+    """The numbers are there all the same, with HDF5's own checksums."""
+    path, count = tmp_path / "out.h5", 2**40
+    path.write_bytes(whole.read_bytes())
+    with path.open("r+b") as file:
+        layout = read_layout(file.fileno(), path.stat().st_size)
+        table = dataclasses.replace(layout.work, grid=(count,), blocks=Partition(count, 1))
+        file.truncate(layout.end)
+        file.seek(layout.end)
+        file.write(dataclasses.replace(layout, tables={"cells": table}).trailer())
+    assert main([command, str(path)]) == status
+    assert "memory" not in capsys.readouterr().err
 
 
 def test_a_result_that_was_changed_on_purpose_can_still_be_opened(whole, tmp_path):
@@ -166,6 +189,82 @@ def test_a_result_that_was_changed_on_purpose_can_still_be_opened(whole, tmp_pat
     with sweep.open_result(path) as found:
         assert found.attrs["comment"] == "mine"
     assert not verify(path).whole
+
+
+ODD = [("/", "rtol", "x"), ("/", "rtol", np.arange(5.0)), ("/", "end", np.zeros(3)), ("/", "cells_per_second", "x"),
+       ("/", "title", 1.0), ("height", "units", 5), ("status", "flag_meanings", 3.0)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("place", "name", "value"), ODD)
+def test_an_attribute_of_another_kind_is_damage(whole, tmp_path, capsys, place, name, value):
+    path = tmp_path / "out.h5"
+    path.write_bytes(whole.read_bytes())
+    with h5py.File(path, "r+") as file:
+        file[place].attrs[name] = value
+    assert main(["show", str(path)]) == 2
+    assert "not the result of a sweep, or damaged" in capsys.readouterr().err
+
+
+def no_dimension(file):
+    """Of the cells' statuses."""
+    del file["status"]
+    file["status"] = np.int8(0)
+
+
+def one_thing_more(file):
+    """Zeros that HDF5 makes of a few bytes."""
+    file.create_dataset("more", (10**7,), "f8", chunks=(10**6,), compression="gzip")[...] = 0.0
+
+
+def twice(file):
+    """A value of an axis stands there twice."""
+    file["height"][1] = file["height"][0]
+
+
+def no_text(file):
+    """Bytes that are no UTF-8."""
+    file.attrs.create("title", b"\xc4", dtype=h5py.string_dtype())
+
+
+def no_word(file):
+    """In the study."""
+    file.attrs["study_json"] = file.attrs["study_json"].replace('"method": "auto"', '"method": {}')
+
+
+def another_shape(file):
+    """With the attributes that it had; HDF5 2.0 crashes when h5netcdf looks at its dimensions."""
+    attrs = dict(file["method_used"].attrs)
+    del file["method_used"]
+    made = file.create_dataset("method_used", (1,), "u8")
+    for name, value in attrs.items():
+        with contextlib.suppress(TypeError, ValueError, OSError, RuntimeError):
+            made.attrs[name] = value
+
+
+DAMAGED, CHANGED = "not the result of a sweep, or damaged", "was changed by another program, and is no result any more"
+FORGED = [(no_dimension, CHANGED), (one_thing_more, ""), (twice, ""), (no_text, DAMAGED), (no_word, ""),
+          (another_shape, DAMAGED)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "told"), FORGED)
+@pytest.mark.parametrize("sealed", [False, True])
+def test_a_result_holds_what_its_study_says(whole, tmp_path, capsys, change, told, sealed):
+    path = tmp_path / "out.h5"
+    path.write_bytes(whole.read_bytes())
+    with path.open("r+b") as file:
+        layout = read_layout(file.fileno(), path.stat().st_size)
+        file.truncate(layout.end)
+    with h5py.File(path, "r+") as file:
+        change(file)
+    if sealed:
+        seal(path, layout)
+    expected = DAMAGED if sealed and change is not no_word else told
+    command = ["report", str(path), "-o", str(tmp_path / "out.html")] if change is no_text else ["show", str(path)]
+    status, said = main(command), capsys.readouterr().err
+    if change is no_word and sealed:
+        assert "not the JSON of a study" in said
+    assert expected in said
+    assert status == (2 if sealed or expected else 0)
 
 
 @pytest.mark.parametrize("name", ["../secret.csv", "/etc/passwd", "sub/../../secret.csv", "link.csv", "\0", "a" * 5000])

@@ -1,13 +1,15 @@
 import contextlib
 import json
 import shutil
+import subprocess
+import sys
 import warnings
 
 import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from running import flip, kept, place
+from running import environment, flip, kept, place
 
 from kernels.interface import Status
 from sweep.cells.fingerprint import fingerprint
@@ -16,7 +18,6 @@ from sweep.results import open, statuses
 from sweep.results.open import open_result
 from sweep.results.statuses import count_methods, count_statuses, failures
 from sweep.runs.run import run
-from sweep.store.frame import Sparse
 from sweep.store.store import unfinished_of
 from sweep.study.model import Study
 from sweep.study.read import build_study
@@ -48,10 +49,10 @@ def unfinished(tmp_path):
     path = tmp_path / "out.h5"
     real = Solver.solve
 
-    def failing(self, start, stop, *rest):
-        if (start, stop) == (12, 18):
+    def failing(self, start, cells, *rest):
+        if (start, cells.number) == (12, 6):
             raise SweepError("stop here")
-        real(self, start, stop, *rest)
+        real(self, start, cells, *rest)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Solver, "solve", failing)
@@ -195,6 +196,36 @@ def test_large_results_come_in_pieces_and_are_the_same(unfinished, stored, monke
             np.testing.assert_array_equal(found[name].compute(), expected[name])
 
 
+REDUCED = """
+import resource, sys
+import dask
+from sweep.results import open as opening
+
+opening.memory = lambda: 100
+dask.config.set({"array.chunk-size": "4MiB", "num_workers": 2})
+found = opening.open_result(sys.argv[1])
+found.isel(height=slice(100)).mean().compute()
+taken = next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("VmData"))
+resource.setrlimit(resource.RLIMIT_DATA, (1024 * taken + found.nbytes // 2, -1))
+print(repr(found.max().compute().fall_time.item()))
+try:
+    found.load()
+except MemoryError:
+    print("too much at once")
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the memory as Linux does")
+def test_a_result_larger_than_the_memory_that_is_allowed_is_reduced_in_pieces(tmp_path):
+    axes, output = {"height": np.arange(1.0, 2001.0), "v0": np.arange(2500.0)}, tmp_path / "out.h5"
+    run(stone(axes=axes, outputs=["fall_time"], along={}), output, progress=False).close()
+    words = [sys.executable, "-c", REDUCED, str(output)]
+    told = subprocess.run(words, env=environment(), capture_output=True, text=True, check=True).stdout.splitlines()
+    with h5py.File(output) as file:
+        assert float(told[0]) == file["fall_time"][...].max()
+    assert told[1] == "too much at once"
+
+
 def test_a_sweep_that_ends_while_it_is_read_is_opened_finished(unfinished, stored, monkeypatch):
     real = open.check_structure
 
@@ -302,22 +333,6 @@ def foreign(path, engine):
     else:
         with xr.open_dataset(path, engine=engine, mask_and_scale=False) as file:
             yield lambda name, *at: file[name][at or ...].values
-
-
-def test_a_frame_in_memory_holds_what_is_not_zero(tmp_path):
-    sparse = Sparse()
-    sparse.write(bytes(10 * Sparse.PAGE))
-    assert list(sparse.pages()) == []
-    sparse.seek(Sparse.PAGE - 2)
-    sparse.write(b"abcd")
-    assert sparse.piece(Sparse.PAGE - 4, Sparse.PAGE + 4) == b"\0\0abcd\0\0"
-    sparse.seek(-7, 1)
-    sparse.write(bytes(6))
-    assert sparse.piece(Sparse.PAGE - 6, Sparse.PAGE + 4) == bytes(7) + b"d" + bytes(2)
-    assert (sparse.seek(-1, 2), sparse.seek(-9, 1)) == (10 * Sparse.PAGE - 1, 10 * Sparse.PAGE - 10)
-    assert sparse.is_zero(0, Sparse.PAGE)
-    assert not sparse.is_zero(Sparse.PAGE, Sparse.PAGE + 2)
-    assert [at for at, _ in sparse.pages()] == [0, Sparse.PAGE]
 
 
 def test_results_open_without_a_warning(stored):

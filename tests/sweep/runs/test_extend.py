@@ -106,10 +106,10 @@ def test_a_killed_extension_continues(output, monkeypatch):
     quiet(few, output).close()
     real = Solver.solve
 
-    def failing(self, start, stop, *rest):
-        if (start, stop) == (10, 15):
+    def failing(self, start, cells, *rest):
+        if (start, cells.number) == (10, 5):
             raise SweepError("stop here")
-        real(self, start, stop, *rest)
+        real(self, start, cells, *rest)
 
     with monkeypatch.context() as patch:
         patch.setattr(Solver, "solve", failing)
@@ -257,3 +257,18 @@ def test_a_result_without_the_error_bounds_of_its_inaccurate_cells_is_not_extend
         reused._lacks = lambda name: name == "error_bound"
         with pytest.raises(SweepError, match="does not say what its INACCURATE values are right to"):
             reused.check_sample()
+
+
+@pytest.mark.parametrize("retry", [False, True])
+def test_how_many_cells_are_known_before_each_is_counted_exactly(tmp_path, retry):
+    """As the masks of what is missing have it, for every number of a cell, and the one behind the last."""
+    output = tmp_path / "out.h5"
+    keys = {"kernel": "bad:RAISING", "outputs": ["fall_time"], "along": {}}
+    small = study([2.0, 5.0, 11.0, 13.5], [0.0, 3.0], **keys)
+    large = study([1.0, 2.0, 5.0, 11.0, 12.0, 13.5], [0.0, 0.5, 3.0], **keys)
+    quiet(small, output).close()
+    with extending.Retried(output, small) if retry else extending.Reused(output, large) as reused:
+        size = 8 if retry else 18
+        expected = np.r_[0, np.cumsum(~reused.missing(0, size))]
+        assert reused.known_before(np.arange(size + 1)).tolist() == expected.tolist()
+        assert expected[-1] == (6 if retry else 8)

@@ -1,6 +1,9 @@
 """A run ends when it is told to, whatever its kernel does; what became of it is in its exit status and its log."""
 
+import io
+import itertools
 import json
+import os
 import re
 import signal
 import subprocess
@@ -8,9 +11,10 @@ import sys
 import time
 from datetime import datetime, timedelta
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
-from running import environment, quiet, tall, wait_for
+from running import environment, quiet, same, tall, wait_for
 
 import sweep
 from sweep.cli import main, parser
@@ -18,6 +22,7 @@ from sweep.results.statuses import account
 from sweep.show.follow import follow, reasons
 from sweep.system.errors import EXIT_CODES, SweepError
 from sweep.system.log import log, log_path, logging_to, read_lines
+from sweep.system.progress import passed
 
 SECONDS = 2.0
 """What a run may take to end;"""
@@ -44,7 +49,8 @@ def begun(tmp_path):
     def begin(kernel, count, *options):
         (tmp_path / "stones.toml").write_text(STUDY.format(kernel=kernel, count=count))
         words = [sys.executable, "-m", "sweep", "run", "stones.toml", "--allow-import", *options]
-        process = subprocess.Popen(words, env=environment(), cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+        keys = {"env": environment(), "cwd": tmp_path, "stderr": subprocess.PIPE, "text": True}
+        process = subprocess.Popen(words, start_new_session=True, **keys)
         processes.append(process)
         return process, tmp_path / "stones.h5"
 
@@ -95,6 +101,44 @@ def test_of_a_run_that_is_killed_no_process_is_left(begun):
     process.wait()
     _, left = psutil.wait_procs(below, timeout=20)
     assert left == []
+
+
+def test_a_machine_that_sleeps_costs_no_cell(begun):
+    """All processes of the run are stopped for longer than a cell may take, some of them inside cells."""
+    process, output = begun("bad:SLOW", 200, "--cell-timeout", "1.5 s")
+    wait_for(lambda: solved(output) >= 20, process)
+    os.killpg(process.pid, signal.SIGSTOP)
+    time.sleep(4.0)
+    os.killpg(process.pid, signal.SIGCONT)
+    process.communicate(timeout=120)
+    assert process.returncode == 0
+    assert solved(output) == 200
+
+
+def test_until_goes_by_the_clock_on_the_wall_however_it_jumps(monkeypatch):
+    """Half an hour before its time a laptop is shut for an hour: the run ends when it wakes. Set back, it goes on."""
+    until = datetime(2027, 1, 31, 7, 0).astimezone()
+    for at, over in (((6, 30), False), ((7, 30), True), ((6, 45), False), ((7, 0), True)):
+        clock = SimpleNamespace(now=lambda at=at: datetime(2027, 1, 31, *at))
+        monkeypatch.setattr("sweep.system.progress.datetime", clock)
+        assert passed(until) is over
+
+
+def test_clocks_that_jump_change_nothing_but_the_forecast(tmp_path, monkeypatch):
+    """Those of the run leap by an hour, forth and back, at every look."""
+    leaps = itertools.cycle([0.0, 3600.0, 7200.0, -3600.0])
+    steady = time.monotonic
+
+    def now():
+        return steady() + next(leaps)
+
+    leaping = SimpleNamespace(monotonic=now, perf_counter=now, sleep=time.sleep, strftime=time.strftime)
+    whole = quiet(tall(60))
+    for module in ("runs.session", "runs.isolate", "store.store", "system.forecast", "system.progress", "cells.timing"):
+        monkeypatch.setattr(f"sweep.{module}.time", leaping)
+    for path, keys in (("a.h5", {}), ("b.h5", {"isolate": True})):
+        with quiet(tall(60), tmp_path / path, progress=io.StringIO(), **keys) as found:
+            same(found, whole)
 
 
 def test_it_ends_at_its_time_although_kernels_never_do(begun):

@@ -1,6 +1,7 @@
 """Blocks in their places: what is acknowledged is there, whatever is lost of what was not brought to the disk."""
 
 import contextlib
+import itertools
 import os
 import random
 import signal
@@ -203,20 +204,8 @@ def test_the_frame_is_on_the_disk_before_it_has_its_name(output, monkeypatch):
         monkeypatch.setattr(disk, name, lambda *args, name=name, real=real: (events.append(name), real(*args))[1])
     with opened(output) as store:
         store.begin(frame())
-        assert events == ["reserve", "write", "fsync", "rename", "fsync"]
+        assert [name for name, _ in itertools.groupby(events)] == ["reserve", "write", "fsync", "rename", "fsync"]
         assert unfinished_of(output).stat().st_size == store.layout.size
-
-
-def test_a_large_frame_is_written_in_pieces_and_is_the_same(output, monkeypatch):
-    made = frame()
-    with opened(output) as store:
-        store.begin(made)
-        monkeypatch.setattr("sweep.store.frame.AT_ONCE", 0)
-        other = output.with_name("other")
-        fd = os.open(other, os.O_CREAT | os.O_RDWR)
-        made.write(fd)
-        os.close(fd)
-        assert other.read_bytes() == unfinished_of(output).read_bytes()
 
 
 def test_a_block_is_acknowledged_only_when_it_is_on_the_disk(output, monkeypatch):

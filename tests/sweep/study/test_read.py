@@ -345,7 +345,7 @@ def test_a_method_that_cannot_do_a_term_of_the_study_is_a_mistake():
 def test_every_word_of_a_method_axis_is_asked_whether_it_can_do_the_terms(words):
     keys = {"kernel": "foliot", "axes": {"method": words}, "fixed": {"mu": 1.0, "phi0": 1.0, "c": 0.5}}
     told = message_of(lambda: sweep.build_study(**keys), "axes.method")
-    assert told == "segments cannot do c; use auto, pure, quadrature or dopri5"
+    assert told == "segments cannot do c; use auto, pure, quadrature, taylor or dopri5"
 
 
 @pytest.mark.parametrize("words", [["quick", "whole"], ["whole", "quick"], ["auto", "whole", "quick"]])

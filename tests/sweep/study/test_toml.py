@@ -125,3 +125,10 @@ def test_errors_name_the_way(call, message):
     with pytest.raises(sweep.SweepError) as caught:
         call()
     assert message in str(caught.value)
+
+
+def test_a_zero_below_nothing_is_written_where_the_default_is_zero():
+    study = build(axes={"height": [1.0]}, fixed={"v0": -0.0})
+    again = sweep.study(tomllib.loads(sweep.to_toml(study)), allow_import=True)
+    assert np.signbit(again.fixed["v0"])
+    assert again == study

@@ -1,6 +1,7 @@
 """The bar of a notebook, with a notebook's shell stood in for."""
 
 import io
+import os
 import sys
 from types import SimpleNamespace
 
@@ -61,3 +62,26 @@ def test_a_short_run_says_nothing(monkeypatch):
     notebook = in_a_notebook(monkeypatch)
     sweep.run(build(axes={"height": [1.0]}))
     assert notebook.getvalue() == ""
+
+
+SLOW_RUN = """
+import os, sweep
+os.environ["MPLBACKEND"] = "agg"
+keys = {"kernel": "slow:SLOW", "axes": {"height": [1.0 + k for k in range(3000)]}, "outputs": ["fall_time"]}
+ds = sweep.run(keys, workers=1, allow_import=True)
+"""
+
+
+def test_a_real_notebook_shows_one_line_that_moves_and_a_table(monkeypatch):
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path for path in sys.path if path))
+    cells = [nbformat.v4.new_code_cell(source) for source in (SLOW_RUN, "sweep.study(**keys, allow_import=True)")]
+    nbclient.NotebookClient(nbformat.v4.new_notebook(cells=cells), timeout=120).execute()
+    told = "".join(output.get("text", "") for output in cells[0].outputs)
+    states = [state for state in told.split("\r") if "%|" in state]
+    assert len(states) > 2
+    assert "slow over height" in states[1]
+    assert "3,000/3,000 cells" in states[-1]
+    (shown,) = cells[1].outputs
+    assert "<table" in shown["data"]["text/html"]

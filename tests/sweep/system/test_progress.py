@@ -49,8 +49,8 @@ def test_a_line_says_how_much_how_fast_and_how_long(clock):
 class Left:
     """A forecast that says what it is told to."""
 
-    def __init__(self, left):
-        self.left = left
+    def __init__(self, left, off=0.0):
+        self.left, self.interval = left, (left * (1 - off), left * (1 + off))
 
 
 def test_time_left_is_that_of_the_forecast(clock):
@@ -59,6 +59,25 @@ def test_time_left_is_that_of_the_forecast(clock):
     clock.now += 60
     progress.add(100)
     assert progress.line() == "100/1,000 cells (10.0 %), 1.7 cells/s so far, 15 to come, 1 min 00 s left"
+
+
+@pytest.mark.parametrize(
+    ("left", "off", "text"),
+    [
+        (960.0, 0.25, "16 min 00 s left"),
+        (960.0, 0.4, "10 to 22 min left"),
+        (8.0, 0.9, "1 to 15 s left"),
+        (80.0, 0.9, "0 to 3 min left"),
+        (18_000.0, 0.6, "2 to 8 h left"),
+        (400_000.0, 0.5, "2 to 7 d left"),
+        (0.2, 1.0, "0 to 1 s left"),
+    ],
+)
+def test_where_little_is_known_an_interval_is_told(clock, left, off, text):
+    progress = Progress(1000, None, forecast=Left(left, off), clock=clock)
+    clock.now += 60
+    progress.add(100)
+    assert progress.line().endswith(text)
 
 
 @pytest.mark.parametrize("left", [0.1, 1.0, 30.0, 90.0, 91.0, 1000.0, 1e5])

@@ -119,10 +119,10 @@ def test_sigterm_ends_within_a_block_with_143_and_the_next_start_tidies_up(tmp_p
     assert list(tmp_path.iterdir()) == [output]
 
 
-@pytest.mark.parametrize("name", ["_pieces", "write_digests", "_end", "_reads_back"])
+@pytest.mark.parametrize("name", ["write", "write_digests", "end", "reads_back"])
 def test_sigterm_at_the_beginning_and_the_end_leaves_no_file_half_written(tmp_path, name):
     output, log = tmp_path / "out.h5", io.StringIO()
-    home = Frame if name == "_pieces" else store
+    home = Frame if name == "write" else store
     real = getattr(home, name)
 
     struck_once = []
@@ -160,10 +160,10 @@ def test_an_unfinished_extension_returns_what_there_is_of_the_new_one(tmp_path):
 def test_every_cell_is_in_the_account_once(codes, summed):
     keys = {"outputs": {"fall_time": ["min"]}} if summed else None
 
-    def kernel_status(self, start, stop, outputs, status, used, *rest):
-        status[:] = codes[start:stop]
-        used[:] = -1
-        for column in outputs.values():
+    def kernel_status(self, start, cells, *rest):
+        cells.status[:] = codes[start : start + cells.number]
+        cells.used[:] = -1
+        for column in cells.outputs.values():
             column[:] = np.nan
 
     study = tall(len(codes))

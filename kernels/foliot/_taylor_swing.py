@@ -1,0 +1,339 @@
+"""The general foliot's limit cycle by Taylor series: half swings followed as a scene of one's own, and Newton's method.
+
+The half swing of `_half_swing`, equation (1) there, is written as a `Scene`: from x = 1 with the speed e v1 up to
+x = -1, with a kink at the turning point. The series, the proof that no event is passed over, and the core of abs(v)^n
+are those of `kernels.codegen`. The two tangents go along as states; of them `up_mu` and `up_start` keep the speeds that
+they have at the turning point. There these should jump by J of (3). That they do not is made good for at the end: what
+is wanting is a multiple of the tangent along the motion itself, (v, v'), with the factor
+    beta = (J - 1) v_mu/v'  at the turning point,                                                        (1)
+which is what dry friction's change of sign shifts the time by. The cycle then follows by (4) of `_integrated_swing`.
+
+The error is told by two last half swings, as in `followed_twice`: the finer one has a tolerance FINER times smaller,
+and the other's parameters are some roundings off.
+"""
+
+import functools
+from typing import NamedTuple
+
+import numpy as np
+
+from kernels.codegen.expression import cos, power, sign, sin
+from kernels.codegen.followed_twice import FINER, followed, off_by_roundings
+from kernels.codegen.module import build
+from kernels.foliot import _units
+from kernels.foliot._half_swing import Half, Law, Leg, Swing, accelerations, problem_of, pull
+from kernels.foliot._integrated_swing import NewtonStep, _cycle, _first, _slope
+from kernels.foliot._units import Foliot, Outputs
+from kernels.interface import FIRST_REFUSAL, Field, Method, Status
+from kernels.lanes.codes import OK, STICKS
+from kernels.lanes.jit import jit
+from kernels.lanes.vectors import not_, where
+from kernels.lanes.wiring import kernel, method, signed
+from kernels.maths.elementary import exp
+from kernels.scene import Scene
+
+LIMIT = 40
+"""Half swings of a cell."""
+STUCK = 6
+"""Of them, those that come to rest on their way in, one after the other."""
+_STIFFEST = 100.0
+"""Larger f'(V)/V makes steps that are stable too short."""
+_MILDEST = 1.0
+"""Degree of drag below which its slope has a pole at rest, which series come close to slowly."""
+SEARCH, NEAR, ROUGH, FINE = 0, 1, 2, 3
+"""What a cell's next half swing is for."""
+_COARSE, _CLOSE, _CHECKED = 1e-4, 0.05, 0.01
+"""Tolerance of the search, the relative step below which it ends, and the one below which a rough swing has a twin."""
+_SHARE, _SHARE_ROUGH, _TIGHTER = 0.1, 0.01, 0.01
+"""Of rtol that a half swing may be off by; where the drag is of a degree below 2; how much less where it did not do."""
+_LEAST = 1e-17
+"""Of tolerances: finer ones change nothing but the time that they take."""
+_TOLD, _TOLD_ROUGH = 4.0, 32.0
+"""Error that is stated over what the two last half swings differ by, of which the finer one's should be a fifteenth;
+and where the drag is of a degree below 2: cores of abs(v)^n have a low order."""
+_ROUNDING = 2e-14
+"""Of a half swing's speed and time; a cycle's are off by 1/(1 - multiplier) as much."""
+
+STATES = ("x", "v", "x_mu", "v_mu", "x_start", "v_start", "decay", "top", "up_mu", "up_start")
+_TERMS = ("drag", "outwards", "inwards", "gamma", "degree", "kappa")
+_RIPPLE = ("depth", "wave")
+
+
+def _rates(x, v, x_mu, v_mu, x_start, v_start, drag, outwards, inwards, gamma, degree, kappa, torque=1.0, by_x=0.0):
+    """(1) of `_half_swing` with its tangents; `torque` and its slope where it varies."""
+    side = sign(v)
+    rising, falling = 0.5 * (1.0 + side), 0.5 * (1.0 - side)
+    slope, stiffness = drag + degree * gamma * power(abs(v), degree - 1.0), kappa + by_x
+    steady = rising * outwards + falling * inwards + (torque - 1.0)
+    force = steady + drag * v + side * gamma * power(abs(v), degree) + kappa * x
+    by_mu = -torque - stiffness * x_mu - slope * v_mu
+    by_start = -stiffness * x_start - slope * v_start
+    return v, -force, v_mu, by_mu, v_start, by_start, slope, rising * v, rising * by_mu, rising * by_start
+
+
+def smooth_rates(x, v, x_mu, v_mu, x_start, v_start, drag, outwards, inwards, gamma, degree, kappa):
+    return _rates(x, v, x_mu, v_mu, x_start, v_start, drag, outwards, inwards, gamma, degree, kappa)
+
+
+def rippled_rates(x, v, x_mu, v_mu, x_start, v_start, drag, outwards, inwards, gamma, degree, kappa, depth, wave):
+    angle = wave * (1.0 - x)
+    torque, by_x = 1.0 + depth * cos(angle), depth * wave * sin(angle)
+    return _rates(x, v, x_mu, v_mu, x_start, v_start, drag, outwards, inwards, gamma, degree, kappa, torque, by_x)
+
+
+def surface(x):
+    return x + 1.0
+
+
+def start(v0):
+    return 1.0, v0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0
+
+
+@functools.cache
+def module(rippled):
+    """The compiled half swing."""
+    doc = "half swing of a foliot with its tangents"
+    parameters, rates = ((*_TERMS, *_RIPPLE, "v0"), rippled_rates) if rippled else ((*_TERMS, "v0"), smooth_rates)
+    name = "foliot_ripple_swing" if rippled else "foliot_swing"
+    return build(Scene(name, doc, STATES, parameters, rates, surface, start, most_kinks=1))
+
+
+class Swung(NamedTuple):
+    """What a half swing comes to: states at the switch, and its time."""
+
+    time: float
+    x: float
+    v: float
+    x_mu: float
+    v_mu: float
+    x_start: float
+    v_start: float
+    decay: float
+    top: float
+    up_mu: float
+    up_start: float
+
+
+@jit
+def _problem(p, depth, harmonic):
+    """The cell's terms; friction of any degree as it is, down to rest."""
+    scene, units = _units.without_dimensions(p)
+    return problem_of(scene, (depth, harmonic), 0.0 * p.e), units
+
+
+@jit
+def _half(problem, swung):
+    """The half swing with (1) made good for, as the integration of `_half_swing` has it."""
+    terms, e = problem.terms, problem.e
+    force = pull(swung.top, terms)
+    turns = e > 0.0
+    behind = problem.dry.inwards + force
+    jump = where(turns, behind / (problem.dry.outwards + force), 1.0)
+    leg = Leg(0.0 * e - 1.0, problem.dry.inwards, 0.0 * e, problem.stiffness)
+    shift = (1.0 - jump) / behind
+    by_mu, by_start = shift * swung.up_mu, shift * swung.up_start
+    bare = Swing(swung.x, swung.v, swung.x_mu, swung.v_mu, swung.x_start, swung.v_start, swung.decay)
+    rate = accelerations(bare, Law(leg, terms))[0]
+    x_mu, v_mu = swung.x_mu + by_mu * swung.v, swung.v_mu + by_mu * rate
+    x_start, v_start = swung.x_start + by_start * swung.v, swung.v_start + by_start * rate
+    state = Swing(swung.x, swung.v, x_mu, v_mu, x_start, v_start, swung.decay)
+    never = e > 2.0
+    return Half(-swung.v, state, leg, swung.top, 0.0 * e, swung.time, jump * exp(-swung.decay), never, never)
+
+
+@jit
+def begin(p, rtol):
+    """Terms of `_half_swing`, the speed that Newton's method begins with, and the stiffness."""
+    problem, _ = _problem(_units.terms(p), p.depth, p.harmonic)
+    dry, terms = problem.dry, problem.terms
+    friction = terms.drag, dry.outwards, dry.inwards, terms.power.gamma, terms.power.n
+    return (*friction, terms.kappa, _first(problem).v, problem.stiffness * problem.pace), OK
+
+
+@jit
+def step(p, rtol):
+    """Newton's step from v1, the speed before the half swing, to F; and the cycle by it."""
+    problem, units = _problem(_units.terms(p), p.depth, p.harmonic)
+    swung = Swung(p.time, p.x, p.v, p.x_mu, p.v_mu, p.x_start, p.v_start, p.decay, p.top, p.up_mu, p.up_start)
+    half = _half(problem, swung)
+    slope = _slope(problem.e, p.v1, half)
+    change = (half.end - p.v1) / (1.0 - slope)
+    newton = NewtonStep(p.v1, p.v1, p.v1 + change, change, change, slope, half.lost)
+    cycle, cancels = _cycle(problem, half, newton)
+    held = (problem.e >= 0.0) & not_(1.0 + pull(half.top, problem.terms) > problem.rho_s)
+    (period, amplitude, speed, s, multiplier), status = _units.given(units, cycle, where(held, STICKS, OK))
+    return (half.end, change, slope, cancels, period, amplitude, speed, s, multiplier), status
+
+
+def _columns(function, parameters, outputs):
+    """The function as one of columns: (*parameters, rtol, *outputs, status)."""
+    names = [tuple(Field(name, "1", "") for name in some) for some in (parameters, outputs)]
+    made = kernel(
+        f"foliot_swing_{function.__name__}", doc="", source="", parameters=names[0], outputs=names[1], check=_anything,
+        methods=(method(function.__name__, "", function),),
+    )  # fmt: skip
+    return made.methods[0].solve
+
+
+@jit
+def _anything(p):
+    return OK + 0.0 * p.mu
+
+
+_CELL = (*Foliot._fields, "depth", "harmonic")
+_BEGUN = (*_TERMS, "v1", "stiff")
+_begin = _columns(begin, _CELL, _BEGUN)
+_step = _columns(step, (*_CELL, "v1", *Swung._fields), ("end", "change", "slope", "cancels", *Outputs._fields))
+
+
+def by_taylor(parameters, rippled):
+    """The method of a kernel with these parameters, the last two of which, if `rippled`, are depth and harmonic."""
+    n = len(parameters)
+
+    def solve(*columns):
+        cells, rtol, asked = whole(columns), columns[n], columns[n + 1]
+        if len(rtol):
+            outputs, errors, status = Search(cells, rtol, rippled).cycles()
+            for column, found in zip(columns[n + 2 :], (*outputs, errors[asked > 0].max(axis=0), status), strict=True):
+                column[...] = found
+
+    def bound(*columns):
+        if len(columns[n]):
+            terms, _, stiff = begun(whole(columns), columns[n])
+            columns[-1][...] = np.where(able(terms, stiff, columns[8]), 0.0, np.inf)
+
+    def whole(columns):
+        return columns[:n] if rippled else (*columns[:n], np.zeros(len(columns[n])), np.ones(len(columns[n])))
+
+    names = [*parameters, "rtol", "asked"]
+    return Method(
+        "taylor",
+        "Taylor series over half swings, each followed twice, and Newton on their map",
+        signed(solve, [*names, *Outputs._fields, "error", "status"]),
+        signed(bound, [*names, "out"]),
+        estimates=True,
+    )
+
+
+def begun(cells, rtol):
+    """Terms, first speeds and stiffness of cells."""
+    found = np.empty((len(_BEGUN), len(rtol)))
+    _begin(*cells, rtol, *found, np.empty(len(rtol), np.int8))
+    return list(found[:-2]), found[-2], found[-1]
+
+
+def able(terms, stiff, e):
+    """Where the method is worth while.
+
+    Not where steps are short for stability, nor where the drag is steep at rest; nor where a hairspring holds what
+    creeps inwards, overdamped, before it comes to the switch.
+    """
+    drag, _, inwards, gamma, degree, kappa = terms[:6]
+    held = (kappa > inwards) & (drag * drag >= 4.0 * kappa) & (e >= 0.0)
+    return (stiff < _STIFFEST) & ((degree >= _MILDEST) | ~(gamma > 0.0)) & ~held
+
+
+class Search:
+    """Newton's method on v1 for many cells, each at its own stage.
+
+    Parameters
+    ----------
+    cells : columns of a `Foliot`, depth and harmonic
+    rtol : column
+    """
+
+    def __init__(self, cells, rtol, rippled):
+        n = len(rtol)
+        self.cells, self.rtol, self.module = cells, rtol, module(rippled)
+        self.terms, self.v, stiff = begun(cells, rtol)
+        self.terms += [cells[-2], cells[-1] * (0.5 * np.pi)] if rippled else []
+        self.low, self.high, self.stuck = np.full(n, -1.0), np.full(n, np.inf), np.zeros(n, int)
+        self.stage, self.tolerance = np.full(n, SEARCH), np.full(n, _COARSE)
+        self.outputs, self.errors = (
+            np.full((len(Outputs._fields), n), np.nan),
+            np.full((len(Outputs._fields), n), np.inf),
+        )
+        self.status = np.where(able(self.terms, stiff, cells[8]), Status.NOT_CONVERGED, Status.NO_METHOD).astype(
+            np.int8
+        )
+        rough = (self.terms[3] > 0.0) & (self.terms[4] < 2.0)
+        self.told = np.where(rough, _TOLD_ROUGH, _TOLD)
+        self.share = np.where(rough, _SHARE_ROUGH, _SHARE)
+        self.again = np.zeros(n, bool)
+
+    def cycles(self):
+        """Outputs, their relative errors, and statuses."""
+        active = np.flatnonzero(self.status == Status.NOT_CONVERGED)
+        with np.errstate(all="ignore"):
+            for _ in range(LIMIT):
+                if not len(active):
+                    break
+                active = active[self._advance(active)]
+        return self.outputs, self.errors, self.status
+
+    def _advance(self, i):
+        """One half swing of the cells i; which of them go on."""
+        swung = self._swung(i)
+        newton, found = np.empty((4, len(i))), np.empty((len(Outputs._fields), len(i)))
+        status = np.empty(len(i), np.int8)
+        cells = [column[i] for column in self.cells]
+        _step(*cells, self.v[i], *swung[:-1], self.rtol[i], *newton, *found, status)
+        free = (swung[-1] < FIRST_REFUSAL) & np.isfinite(newton).all(axis=0) & (newton[0] > 0.0)
+        self.stuck[i] = np.where(free, 0, self.stuck[i] + 1)
+        lost = (self.stuck[i] > STUCK) | (
+            (self.stage[i] == SEARCH) & (self.high[i] - self.low[i] <= _COARSE * self.v[i])
+        )
+        done = self._judged(i, free, newton, swung[7], found, status) | lost
+        self._follow(i, free, newton, swung)
+        return ~done
+
+    def _swung(self, i):
+        """The half swings of the cells i, as rows of `Swung`, and their statuses."""
+        columns = [*(column[i] for column in self.terms), self.cells[8][i] * self.v[i], np.ones(len(i))]
+        rough = self.stage[i] == ROUGH
+        shifted = off_by_roundings(columns)
+        columns = [np.where(rough, other, column) for column, other in zip(columns, shifted, strict=True)]
+        rows = followed(self.module, columns, self.tolerance[i])
+        return [rows[0], *rows[2 : 2 + len(STATES)], rows[-1]]
+
+    def _judged(self, i, free, newton, decay, found, status):
+        """Which cells are done: those whose two last half swings agree, or are as fine as can be."""
+        end, change, slope, cancels = newton
+        fine = free & (self.stage[i] == FINE)
+        apart = np.abs(found / self.outputs[:, i] - 1.0)
+        apart[:, ~fine] = np.inf
+        relative = np.abs(change / end)
+        floor = np.tile((_ROUNDING + self.tolerance[i]) / (1.0 - slope), (len(found), 1))
+        floor[3] *= 1.0 + cancels
+        floor[4] *= 1.0 + np.where(decay < 750.0, decay, 0.0)
+        errors = self.told[i] * apart + 2.0 * relative + floor
+        self.outputs[:, i[free]], self.errors[:, i] = found[:, free], errors
+        good = fine & (errors.max(axis=0) <= self.rtol[i])
+        last = fine & (good | self.again[i] | (self.tolerance[i] <= _LEAST))
+        self.status[i[last]] = status[last]
+        again = i[fine & ~last]
+        self.share[again], self.again[again] = _TIGHTER * self.share[again], True
+        return last
+
+    def _follow(self, i, free, newton, swung):
+        """Speed, stage and tolerance of the next half swing."""
+        v, (end, change, slope, _) = self.v[i], newton
+        noise = 100.0 * self.tolerance[i] * v
+        self.low[i] = np.where(~free | (end - v > noise), v, self.low[i])
+        self.high[i] = np.where(free & (v - end > noise), v, self.high[i])
+        low, high, new = self.low[i], self.high[i], v + change
+        inside = free & (new > low) & (new < high) & (new < 8.0 * v + 8.0)
+        between = np.where(high < np.inf, 0.5 * (np.maximum(low, 0.0) + high), 2.0 * v + 1.0)
+        self.v[i] = np.where(inside, new, between)
+        self._set(i, inside, np.abs(change / end), slope, swung[7])
+
+    def _set(self, i, inside, relative, slope, decay):
+        """The stage that follows, and its tolerance: an error of F counts 1/(1 - slope)-fold in v1."""
+        stage, rtol, gap = self.stage[i], self.rtol[i], 1.0 - slope
+        wanted = np.maximum(self.share[i] * rtol * gap / (1.0 + np.where(decay < 750.0, decay, 0.0)), _LEAST)
+        near = np.clip(0.01 * np.sqrt(rtol * gap), FINER * wanted, _COARSE)
+        close = inside & (relative < np.where(stage == SEARCH, _CLOSE, np.sqrt(near)))
+        checked = inside & (stage == ROUGH) & (relative < _CHECKED)
+        onward = np.where(close & (stage < ROUGH), stage + 1, stage)
+        self.stage[i] = stage = np.where(stage == FINE, ROUGH, np.where(checked, FINE, onward))
+        self.tolerance[i] = np.choose(stage, [np.full(len(i), _COARSE), near, FINER * wanted, wanted])

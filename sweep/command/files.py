@@ -1,0 +1,102 @@
+"""What a command reads and writes: opened, checked, and told where it cannot be."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+from collections.abc import Iterator, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+from sweep.system.errors import SweepError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from sweep.study.model import Study
+
+
+def study_from(arguments: argparse.Namespace) -> Study:
+    from sweep.study.read import read_study
+
+    path = arguments.study
+    return read_study(path, allow_import=arguments.allow_import)
+
+
+def is_isolated(arguments: argparse.Namespace, study: Study) -> bool:
+    """Whether cells are solved in processes of their own: those of a user's own kernel, unless it is said."""
+    return ":" in study.kernel_name if arguments.isolate is None else bool(arguments.isolate)
+
+
+def study_of_result(arguments: argparse.Namespace) -> Study:
+    from sweep.explore.refine import study_of
+
+    with opened(arguments.study) as dataset:
+        return study_of(dataset, allow_import=arguments.allow_import)
+
+
+def result_of(arguments: argparse.Namespace) -> contextlib.AbstractContextManager[xr.Dataset]:
+    return opened(arguments.result, getattr(arguments, "unfinished", True))
+
+
+@contextlib.contextmanager
+def opened(path: Path, unfinished: bool = True) -> Iterator[xr.Dataset]:
+    """A result; where another program has changed it, what goes wrong with it is told as that."""
+    from sweep.results.open import changed, open_result
+
+    if path.suffix == ".toml":
+        raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
+    if not path.exists() and path.with_name(path.name + ".unfinished").exists():
+        say(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
+    check_readable(path, "xarray")
+    with open_result(path) as found, changed(path):
+        if "end" not in found.attrs and not unfinished:
+            raise SweepError(f"{path}: unfinished; continue it with sweep run, or take what there is with --unfinished")
+        yield found
+
+
+def check_readable(path: Path, *meanwhile: str) -> None:
+    """Raises SweepError where HDF5 hangs or crashes in a result although its trailer is right: then it is forged.
+
+    A result that is not intact, or not there, is looked at by who opens it.
+
+    Parameters
+    ----------
+    meanwhile : names of modules to import while another process reads the result
+    """
+    from sweep.results.open import unreadable
+    from sweep.store.probe import intact, probing
+
+    if not intact(path):
+        return
+    read = probing(path)
+    for name in meanwhile:
+        import_module(name)
+    if not read():
+        raise unreadable(path, ValueError("HDF5 cannot read it"))
+
+
+def check_target_of(arguments: argparse.Namespace, target: Path, kind: str | None = None) -> None:
+    """Raises SweepError where a command is not to write there; its kind is the suffix unless it has a name."""
+    from sweep.system.overwriting import check_target
+
+    read = [getattr(arguments, name) for name in ("result", "study") if name in arguments]
+    check_target(target, kind or target.suffix.lower(), force=arguments.force, read=read)
+
+
+def in_units_of(dataset: xr.Dataset, given: Sequence[str]) -> xr.Dataset:
+    from sweep.results.units import in_units
+
+    for text in given:
+        if not all(text.partition("=")):
+            raise SweepError(f'--unit: expected NAME=UNIT, found "{text}"; write e.g. --unit A0=degree')
+    return in_units(dataset, {name: unit for name, _, unit in (text.partition("=") for text in given)})
+
+
+def say(text: object, file: TextIO | None = None) -> None:
+    """Prints, to stdout unless said otherwise, what may hold text of other people."""
+    from sweep.system.table import printable
+
+    print(printable(str(text)), file=file)

@@ -1,0 +1,79 @@
+"""The command that finds laws: fit."""
+
+from __future__ import annotations
+
+import argparse
+
+from sweep.command.files import check_target_of, result_of, say
+from sweep.command.options import AT, FORCE, RESULT, UNFINISHED, Command, option, output, switch
+
+
+def _fit(arguments: argparse.Namespace) -> None:
+    from sweep.analysis.scattered import on_lines
+    from sweep.show.laws import laws, laws_text, pick, write_laws
+
+    if arguments.compare:
+        _compare(arguments)
+        return
+    if arguments.output:
+        check_target_of(arguments, arguments.output, "laws")
+    with result_of(arguments) as dataset:
+        part = on_lines(pick(dataset, arguments.at), arguments.x)
+        noise = {"yes": True, "no": False}.get(arguments.noise, arguments.noise)
+        found = laws(part, arguments.y, arguments.x, arguments.window or [], arguments.confidence, noise)
+    say(laws_text(found))
+    if arguments.output:
+        write_laws(found, arguments.output)
+        say(arguments.output)
+
+
+def _compare(arguments: argparse.Namespace) -> None:
+    """`sweep fit --compare`: a table, and a picture or csv of it."""
+    from sweep.analysis.scattered import on_lines
+    from sweep.show.compare import comparison, comparison_text, write_comparison
+    from sweep.show.laws import pick
+
+    target = arguments.output
+    drawn = target is not None and target.suffix.lower() != ".csv"
+    if target:
+        check_target_of(arguments, target, None if drawn else "laws")
+    with result_of(arguments) as dataset:
+        part = on_lines(pick(dataset, arguments.at), arguments.x)
+        found = comparison(part, arguments.y, arguments.x, arguments.window or [])
+    say(comparison_text(found))
+    if drawn:
+        from sweep.show.law_charts import plot_laws
+
+        plot_laws(found, target)
+    elif target:
+        write_comparison(found, target)
+    if target:
+        say(target)
+
+
+COMMANDS = {
+    "fit": Command.of(
+        "exponent of a power law, and where two laws meet",
+        _fit,
+        RESULT,
+        option("--y", metavar="OUTPUT", required=True),
+        option("--x", metavar="AXIS", required=True),
+        option(
+            "--window",
+            "part of the axis to fit over; given twice, also tells where the two laws meet",
+            nargs=2,
+            type=float,
+            metavar=("LO", "HI"),
+            action="append",
+        ),
+        option("--confidence", "of the intervals; default: 0.95", type=float, default=0.95, metavar="SHARE"),
+        option(
+            "--noise",
+            "whether the values scatter, or how; default: as tests find",
+            choices=("yes", "no", "independent", "uneven", "correlated", "outliers"),
+        ),
+        switch("--compare", "which law: one, two or three, a logarithm, an offset, a correction to scaling"),
+        output("FILE.csv|.png", "also write the table; with --compare, .png, .svg or .pdf is a picture of all laws"),
+        *(FORCE, AT, UNFINISHED),
+    ),
+}

@@ -1,0 +1,33 @@
+"""How a command ended: exit status, and what is said of it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sweep.system.errors import FAULT, INTERRUPTED, MISTAKE, SweepError
+
+
+class Outcome(NamedTuple):
+    """How a command ended: its exit status, and what is said of it."""
+
+    code: int
+    text: str
+
+
+def explained(error: BaseException) -> Outcome:
+    """The exit status and the message of a fault."""
+    if isinstance(error, SweepError):
+        return Outcome(MISTAKE, str(error))
+    if isinstance(error, KeyboardInterrupt):
+        return Outcome(INTERRUPTED, "stopped")
+    if isinstance(error, SystemExit):
+        return Outcome(int(str(error.code)), "stopped")
+    if isinstance(error, MemoryError):
+        return Outcome(MISTAKE, "out of memory; choose fewer cells, fewer outputs or fewer workers")
+    if isinstance(error, OSError):
+        return Outcome(MISTAKE, f"{error.filename or 'the system'}: {error.strerror or error}")
+    return Outcome(
+        FAULT,
+        f"a fault in foliot: {type(error).__name__}: {error}\n"
+        "Please report it; with SWEEP_TRACEBACK=1 in the environment the same command says where.",
+    )

@@ -1,0 +1,50 @@
+"""Cells at which a kernel raises, crashes or never ends, found in processes of their own and left out."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from kernels.interface import Status
+from sweep.cells.grid import Grid
+from sweep.cells.sample import sampled, with_method
+from sweep.cells.schema import STATUS
+from sweep.cells.solve import usable_methods
+from sweep.study.model import Study, frozen
+from sweep.system.errors import SweepError
+
+EXTREMES = (1e-3, 1e-14)
+"""Values of rtol at which cells are tried."""
+
+
+def without_failing(
+    study: Study, cells: int, cell_timeout: float | str | None = None, note: Callable[[str], None] = lambda text: None
+) -> Study:
+    """At most so many cells of a study, as `sampled`, at which no method fails. Raises SweepError where there is none.
+
+    Parameters
+    ----------
+    cell_timeout : as of `run`
+    note : callable
+        Told how many are left out, and the first one.
+    """
+    from sweep.runs.run import run
+
+    part = sampled(study, cells)
+    good = np.ones(Grid(part).size, bool)
+    for method in usable_methods(part):
+        for rtol in EXTREMES:
+            trial = with_method(part, part.kernel.methods[method].name, rtol)
+            found = run(trial, progress=False, isolate=True, cell_timeout=cell_timeout)
+            good &= found[STATUS].values.ravel() != Status.FAILED
+    if good.all():
+        return part
+    first = " ".join(f"{name}={value}" for name, value in Grid(part).cell(int(good.argmin())).items())
+    text = f"the kernel fails at {(~good).sum()} of {good.size} cells, e.g. {first}"
+    if not good.any():
+        raise SweepError(text)
+    note(f"{text}; they are left out")
+    axes = {name: dataclasses.replace(a, values=frozen(a.values[good])) for name, a in part.axes.items()}
+    return dataclasses.replace(part, axes=axes)

@@ -1,0 +1,147 @@
+"""A disk that is too small, or that something else fills meanwhile: a file system of its own in memory."""
+
+import contextlib
+import os
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from running import kept, quiet, same, tall
+
+from sweep.cli import main
+from sweep.results.open import open_result
+from sweep.results.verify import verify
+from sweep.store.store import Store, unfinished_of
+from sweep.study.read import build_study
+from sweep.study.toml import to_toml
+from sweep.system import disk
+from sweep.system.errors import COMPLETE, MISTAKE, SweepError
+
+MEGABYTES = 4
+
+
+@pytest.fixture
+def small(tmp_path):
+    """A folder on a disk of a few megabytes."""
+    folder = tmp_path / "small"
+    folder.mkdir()
+    words = ["mount", "-t", "tmpfs", "-o", f"size={MEGABYTES}m", "tmpfs", str(folder)]
+    if not shutil.which("mount") or subprocess.run(words, capture_output=True).returncode:
+        pytest.skip("this process may not mount a file system")
+    yield folder
+    subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+def fill(folder):
+    """Takes all the room that is left, behind the last line of a log too."""
+    for path in (folder / "filler", *folder.glob("*.log")):
+        with contextlib.suppress(OSError), path.open("ab", buffering=0) as file:
+            while True:
+                file.write(b"\n" * 4096)
+    assert disk.free(folder) == 0
+
+
+def filled_after(monkeypatch, folder, blocks):
+    """Something fills the disk when so many blocks have been written."""
+    real = Store.put
+
+    def put(self, index, arrays):
+        real(self, index, arrays)
+        if index == blocks:
+            fill(folder)
+
+    monkeypatch.setattr(Store, "put", put)
+
+
+def written(folder, study):
+    """A file of the study."""
+    path = folder / "study.toml"
+    path.write_text(to_toml(study), encoding="utf-8")
+    return path
+
+
+def swept(path, output, *more):
+    """Exit status of the command."""
+    words = ["run", path, "-o", output, "--workers", "1", "--allow-import", "--no-isolate", *more]
+    return main([str(word) for word in words])
+
+
+def test_too_small_a_disk_is_told_before_the_first_cell(small, monkeypatch):
+    monkeypatch.setattr(Store, "put", lambda *rest: pytest.fail("computed"))
+    with pytest.raises(SweepError, match=r"needs 32\.\d MB, only .* are free here"):
+        quiet(tall(1_000_000), small / "out.h5")
+    assert list(small.iterdir()) == []
+
+
+def test_room_that_is_taken_while_the_file_is_made_is_told_before_the_first_cell(small, monkeypatch):
+    real = disk.reserve
+    monkeypatch.setattr(disk, "reserve", lambda fd, size: [fill(small), real(fd, size)])
+    monkeypatch.setattr(Store, "put", lambda *rest: pytest.fail("computed"))
+    with pytest.raises(SweepError, match="the disk is full"):
+        quiet(tall(1000), small / "out.h5")
+    assert [path.name for path in small.iterdir()] == ["filler"]
+
+
+KINDS = {
+    "cells": {},
+    "summary": {"summary": {"over": ["v0"], "outputs": {"fall_time": ["min", "mean"]}}},
+    "trace": {"along": {"phase": [0.0, 0.5, 1.0]}, "outputs": ["fall_time", "drop"]},
+}
+
+
+def falls(heights, **keys):
+    axes = {"height": np.arange(1.0, heights + 1), "v0": [0.0, 1.0, 2.0]}
+    keys = {"outputs": ["fall_time"], **keys}
+    return build_study(allow_import=True, kernel="toy:KERNEL", axes=axes, **keys)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("log", [[], ["--log-json"]])
+def test_a_disk_that_is_filled_meanwhile_does_not_matter(small, tmp_path, monkeypatch, capsys, kind, log):
+    study, output = falls(2000, **KINDS[kind]), small / "out.h5"
+    monkeypatch.setattr("sweep.cells.timing.BLOCK_SECONDS", (1e-4, 1e-4))
+    filled_after(monkeypatch, small, 0)
+    assert swept(written(tmp_path, study), output, *log) == COMPLETE, capsys.readouterr().err
+    assert disk.free(small) == 0
+    with open_result(output, strict=True) as found:
+        same(found, quiet(study))
+    assert verify(output).whole
+
+
+def test_what_was_interrupted_continues_on_a_full_disk(small, monkeypatch):
+    study, output = falls(2000), small / "out.h5"
+    with monkeypatch.context() as patch:
+        real = Store.put
+        patch.setattr(Store, "put", lambda self, i, a: real(self, i, a) if i < 7 else os.kill(os.getpid(), 2))
+        with pytest.raises(KeyboardInterrupt):
+            quiet(study, output, workers=1, block_cells=300)
+    before = kept(output)
+    assert before
+    fill(small)
+    with quiet(study, output) as found:
+        same(found, quiet(study))
+    assert verify(output).whole
+
+
+def test_an_extension_without_room_leaves_the_result_as_it_was(small, tmp_path, capsys):
+    output = small / "out.h5"
+    quiet(falls(1000), output).close()
+    content = output.read_bytes()
+    fill(small)
+    assert swept(written(tmp_path, falls(2000)), output, "--extend") == MISTAKE
+    assert "only 0 B are free here" in capsys.readouterr().err
+    assert output.read_bytes() == content
+    assert not unfinished_of(output).exists()
+
+
+@pytest.mark.parametrize("name", ["out.csv", "out.nc", "out.zarr", "out.html", "out.png"])
+def test_what_is_made_of_a_result_tells_of_a_full_disk_and_leaves_nothing(small, capsys, name):
+    output, target = small / "out.h5", small / name
+    quiet(falls(2000), output).close()
+    fill(small)
+    command = {".html": "report", ".png": "plot"}.get(target.suffix, "export")
+    assert main([command, str(output), "-o", str(target)]) == MISTAKE
+    told = capsys.readouterr().err
+    assert "No space left on device" in told or "disk is full" in told
+    assert sorted(path.name for path in small.iterdir()) == ["filler", "out.h5"]
