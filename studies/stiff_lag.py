@@ -28,7 +28,7 @@ EPS = 1e-6
 """Lag at which the costs are compared, in seconds."""
 TOLERANCES = 10.0 ** -np.arange(3.0, 11.5, 2.0)
 MU = np.geomspace(0.1, 10.0, 256)
-"""Cells of those who follow them side by side; of the others every 32nd."""
+"""Cells of our own; of the others every 32nd."""
 
 GIVEN_UP = 0.5
 """Error of a run that was broken off."""
@@ -72,11 +72,6 @@ def costs(mu: Any, follow: Callable[[Any, float, float], Any]) -> xr.Dataset:
     keys = ("median", "worst", "seconds")
     columns = zip(keys, zip(*rows, strict=True), strict=True)
     return xr.Dataset({key: ("rtol", list(values)) for key, values in columns}, {"rtol": TOLERANCES})
-
-
-def some_of(name: str) -> Any:
-    """The cells that a follower is given."""
-    return MU[::32] if name.startswith("scipy") else MU
 
 
 def ours(mu: Any, eps: float, rtol: float) -> Any:
@@ -210,7 +205,7 @@ def conclude(path: str, bounces: str, tell: bool = True) -> tuple[Groups, list[s
     lag = lag.assign(off=abs(lag.time / first_switch(lag.mu, lag.eps) - 1.0))
     bounce = read_result(bounces, "bounce_scene:KERNEL", ["d", "flips", "e"], "stiff_lag_bounce.toml")
     found = {"rodas5p": costs(MU, ours)}
-    found |= {name: costs(some_of(name), follow) for name, follow in FOLLOWERS.items()} if tell else {}
+    found |= {name: costs(MU[::32], follow) for name, follow in FOLLOWERS.items()} if tell else {}
     groups = {"Lag": maps(lag), "Bounces": rests(bounce), f"Cost at a lag of {EPS:g} s": cheapest(found)}
     return groups, NOTES.splitlines(), figure(lag, bounce, found)
 
