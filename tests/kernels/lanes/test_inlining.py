@@ -217,7 +217,7 @@ def test_a_kernel_runs_without_scipys_linear_algebra():
 
 def _numbers_and_arrays(a, x, y):
     """Sums that numba gives different meanings."""
-    return (1 + 2) + (a[0] + x) + (a + y)[1] + len((1, 2) + (3,))
+    return (1 + 2) + (a[0] + x) + (a + y)[1] + len((1, 2) + (3,))  # noqa: RUF005
 
 
 @pytest.mark.skipif(not COMPILED, reason="of the compiler's own")
