@@ -361,3 +361,10 @@ def test_a_block_half_of_whose_digests_are_there_is_not_done(output, filled):
     filled.write_bytes(content)
     with opened(output) as store:
         assert taken_up(store).missing() == [1, 4]
+
+
+def test_a_piece_of_an_earlier_block_is_read_after_one_of_a_later_block(filled):
+    with StoredFile(filled) as file:
+        column, table = file.columns()["fall_time"], file.layout.work
+        for block in (3, 0, 2, 1, 0):
+            assert column[5 * block + 1 : 5 * block + 3].tolist() == numbers(table, block)["fall_time"][1:3].tolist()
