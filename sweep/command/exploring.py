@@ -84,12 +84,12 @@ def _chart(arguments: argparse.Namespace) -> None:
 
 
 COMMANDS = {
-    "plan": Command.of(
+    "plan": Command(
         "cells, bytes, memory and a timed forecast, before anything runs",
         _plan,
         *(STUDY, WORKERS, ALLOW_IMPORT, ISOLATE, CELL_TIMEOUT),
     ),
-    "refine": Command.of(
+    "refine": Command(
         "add cells to a result where it bends, until it can be interpolated",
         _refine,
         RESULT,
@@ -100,7 +100,7 @@ COMMANDS = {
         option("--most-cells", "altogether; default: 1000000", metavar="N", type=int, default=1_000_000),
         *(WORKERS, ALLOW_IMPORT, ISOLATE, CELL_TIMEOUT),
     ),
-    "chart": Command.of(
+    "chart": Command(
         "error against time of every method of a kernel, on the cells of a study or a result",
         _chart,
         STUDY,
