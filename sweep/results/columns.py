@@ -38,6 +38,10 @@ class Result(BackendEntrypoint):
             path, engine="h5netcdf", cache=False, decode_times=False, decode_timedelta=False,
             drop_variables=drop_variables, phony_dims="access",
         )  # fmt: skip
+        if any(str(dim).startswith("phony_dim") for dim in plain.sizes):
+            plain.close()
+            # h5netcdf then takes the first axis to be over that dimension, too
+            raise ValueError("something in it is over no dimension of its own")
         try:
             file = StoredFile(path)
         except DAMAGE:

@@ -211,8 +211,14 @@ def no_dimension(file):
     file["status"] = np.int8(0)
 
 
+def one_column_more(file):
+    """Over the axis, as any program may add one."""
+    file["more"] = np.zeros(len(file["height"]))
+    file["more"].dims[0].attach_scale(file["height"])
+
+
 def one_thing_more(file):
-    """Zeros that HDF5 makes of a few bytes."""
+    """Zeros that HDF5 makes of a few bytes, over no dimension: h5netcdf would take the axis to be over them too."""
     file.create_dataset("more", (10**7,), "f8", chunks=(10**6,), compression="gzip")[...] = 0.0
 
 
@@ -242,8 +248,8 @@ def another_shape(file):
 
 
 DAMAGED, CHANGED = "not the result of a sweep, or damaged", "was changed by another program, and is no result any more"
-FORGED = [(no_dimension, CHANGED), (one_thing_more, ""), (twice, ""), (no_text, DAMAGED), (no_word, ""),
-          (another_shape, DAMAGED)]  # fmt: skip
+FORGED = [(no_dimension, CHANGED), (one_column_more, ""), (one_thing_more, DAMAGED), (twice, ""),
+          (no_text, DAMAGED), (no_word, ""), (another_shape, DAMAGED)]  # fmt: skip
 
 
 @pytest.mark.parametrize(("change", "told"), FORGED)
