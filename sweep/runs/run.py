@@ -228,7 +228,7 @@ def _task(
 
 
 def _checked(path: str | os.PathLike[str]) -> Path:
-    output = Path(os.path.realpath(path))
+    output = Path(os.path.realpath(disk.as_path(path)))
     if not output.parent.is_dir():
         raise SweepError(f"{path}: there is no folder {output.parent}")
     return output
