@@ -1,7 +1,7 @@
 """Counts the arithmetic of a kernel: its source run as plain Python, with numbers that count what is done to them.
 
 Only under NUMBA_DISABLE_JIT=1, and `install` comes before the kernel is imported. Every operation that lanes do with
-one instruction for each of their cells counts one: addition and multiplication, alone or together in an `fma`; division;
+one instruction for each of their cells counts one: additions and multiplications, an `fma` too; division;
 square root; and as `other` comparisons, `where`, signs and the shifts of exponents. Elementary functions are the
 kernels' own, so they are counted by what they do. Not counted: integers (indices, random bits), logic of conditions,
 loads, stores and copies, which are not arithmetic.
@@ -12,6 +12,7 @@ chain is forgotten where a number is kept in an array, so that it is a chain tha
 
 from __future__ import annotations
 
+import builtins
 import ctypes
 import ctypes.util
 import math
@@ -26,6 +27,10 @@ DONE: Counter[str] = Counter()
 SLOW = 4
 """Latencies of an addition that a division or a root takes, about."""
 _KINDS = {"add": "plain", "sub": "plain", "mul": "plain", "truediv": "division"}
+_FUNCTIONS = {"add": np.add, "sub": np.subtract, "mul": np.multiply, "truediv": np.divide}
+_COMPLEX = {"add": (2, 0), "sub": (2, 0), "mul": (6, 0), "truediv": (6, 3)}
+"""Plain operations and divisions of complex numbers; quotients are Smith's."""
+_plain_complex = complex
 _fma = ctypes.CDLL(ctypes.util.find_library("m")).fma
 _fma.restype, _fma.argtypes = ctypes.c_double, [ctypes.c_double] * 3
 
@@ -47,14 +52,17 @@ def _new(kind, value, *sources, instructions=1):
 
 
 def _binary(name, turned):
-    function, kind = {"add": np.add, "sub": np.subtract, "mul": np.multiply, "truediv": np.divide}[name], _KINDS[name]
+    function, kind = _FUNCTIONS[name], _KINDS[name]
 
     def operate(self, other):
         if isinstance(other, np.ndarray):
             return NotImplemented
+        if isinstance(other, _plain_complex):
+            return getattr(CountedComplex(self), operate.__name__)(other)
         pair = (float(other), float(self)) if turned else (float(self), float(other))
         return _new(kind, function(*pair), self, other)
 
+    operate.__name__ = f"__{'r' * turned}{name}__"
     return operate
 
 
@@ -73,17 +81,53 @@ for _name in _KINDS:
     setattr(Counted, f"__r{_name}__", _binary(_name, True))
 for _name in ("__lt__", "__le__", "__gt__", "__ge__", "__eq__", "__ne__"):
     setattr(Counted, _name, _comparison(_name))
+Counted.__pow__ = lambda self, n: _new("plain", float(self) ** n, self, instructions=n - 1)
 Counted.__neg__ = lambda self: _new("other", -float(self), self)
 Counted.__abs__ = lambda self: _new("other", abs(float(self)), self)
 Counted.__hash__ = np.float64.__hash__
 
 
+class CountedComplex(np.complex128):
+    """A complex number whose operations are counted as those of its parts; it knows no chain."""
+
+    real = property(lambda self: Counted(_plain_complex(self).real))
+    imag = property(lambda self: Counted(_plain_complex(self).imag))
+
+    def __neg__(self):
+        DONE["other"] += 2
+        return CountedComplex(-_plain_complex(self))
+
+    def __abs__(self):
+        DONE.update({"plain": 3, "division": 1, "root": 1})
+        return Counted(abs(_plain_complex(self)))
+
+
+def _complex_binary(name, turned):
+    function, (plain, divisions) = _FUNCTIONS[name], _COMPLEX[name]
+
+    def operate(self, other):
+        if isinstance(other, np.ndarray):
+            return NotImplemented
+        DONE.update({"plain": plain, "division": divisions})
+        pair = (
+            (_plain_complex(other), _plain_complex(self)) if turned else (_plain_complex(self), _plain_complex(other))
+        )
+        return CountedComplex(function(*pair))
+
+    return operate
+
+
+for _name in _COMPLEX:
+    setattr(CountedComplex, f"__{_name}__", _complex_binary(_name, False))
+    setattr(CountedComplex, f"__r{_name}__", _complex_binary(_name, True))
+
+
 class CountedArray(np.ndarray):
-    """An array of float64 whose numbers count."""
+    """An array of real or complex numbers that count."""
 
     def __getitem__(self, place):
         found = super().__getitem__(place)
-        return Counted(found) if type(found) is np.float64 else found
+        return _SCALARS.get(type(found), lambda same: same)(found)
 
     def __iter__(self):
         return (self[i] for i in range(len(self)))
@@ -97,9 +141,19 @@ class CountedArray(np.ndarray):
         return counted(result) if isinstance(result, np.ndarray) else result
 
 
+_SCALARS = {np.float64: Counted, np.complex128: CountedComplex}
+
+
 def counted(array):
-    """The same array, of numbers that count."""
-    return array.view(CountedArray) if array.dtype == np.float64 else array
+    """The same array, of numbers that count; of other numbers the array itself."""
+    return array.view(CountedArray) if array.dtype.type in _SCALARS else array
+
+
+class _Complex(complex):
+    """`complex(re, im)` in a kernel's source."""
+
+    def __new__(cls, *parts):
+        return CountedComplex(_plain_complex(*parts))
 
 
 @contextmanager
@@ -107,7 +161,7 @@ def counting_arrays():
     """Arrays that kernels make for themselves count meanwhile."""
     makers = {name: getattr(np, name) for name in ("empty", "zeros", "ones", "full")}
     wrapped = {name: lambda *given, make=make, **named: counted(make(*given, **named)) for name, make in makers.items()}
-    with patch.multiple(np, **wrapped):
+    with patch.multiple(np, **wrapped), patch.object(builtins, "complex", _Complex):
         yield
 
 

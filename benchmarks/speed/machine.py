@@ -1,4 +1,4 @@
-"""What one core of this machine can do, measured by loops that do nothing else: `roofline.py` has its rows beside it."""
+"""What one core of this machine can do, measured by loops that do nothing else."""
 
 from __future__ import annotations
 

@@ -2,18 +2,20 @@
 
     python benchmarks/speed/roofline.py [KERNEL ...] [--cells 32] [--methods]
 
-A row for each kernel's starter study, and the method that takes most of its cells by `auto` (`--methods`: for each that
-can solve it). Times are processor time of one core, best of several: on a shared machine others still take clock and cache.
+A row for each kernel's starter study, and the method that takes most of its cells by `auto` (`--methods`: for each
+that can solve it). Times are processor time of one core, best of several; others on the machine still take clock and
+cache. Kernels as `stepping` and `scene` make them of a scene of one's own are not in the catalogue.
 
-- operations, bytes: of a cell, as `counted.py` counts them in the kernel's source run as plain Python, which has to give
-  the same bits; and inputs and outputs as columns;
+- operations: of a cell, as `counted.py` counts them in the kernel's source run as plain Python, which has to give the
+  same bits ("counted other bits" where it does not); a compiler may share what the source does twice;
+- bytes: inputs and outputs of a cell as columns;
 - peak, memory: ns a cell if every operation took as long as one of a vector's multiply-adds, or if bytes were copied;
-- ratio: ns a cell over the larger of both. Where it exceeds 2 the reason follows, in ns a cell by speeds measured here:
-  `single` all operations one number at a time, where a kernel goes cell by cell; `slow` its divisions and roots;
-  `chain` the longest chain of operations that wait for one another, all lanes at once; `uneven` how many times longer
-  cells take beside their neighbours than each beside its equals, in lanes that wait for the last;
-- left: ns a cell over the largest of these, times `uneven`. It holds loads, stores, spilled registers, masks and
-  integers; it is below 1 where additions and comparisons run beside multiplications, or the next cells beside these.
+- ratio: ns a cell over the larger of both. It is below 1 where additions and comparisons run beside multiplications;
+- reason, of a ratio beyond 2, in ns a cell by speeds measured here: `single` all operations one number at a time, where
+  a kernel goes cell by cell; `slow` its divisions and roots; `chain` the longest chain of operations that wait for one
+  another, all lanes at once; `uneven` how many times longer cells take beside their neighbours than each beside its
+  equals, since lanes wait for the last; `rest` where none of these does: loads, stores, spilled registers, masks;
+- left: ns a cell over the largest of these, times `uneven`: what is loads, stores, masks, integers, branches.
 """
 
 from __future__ import annotations
@@ -48,7 +50,7 @@ PASS = 0.02
 """Seconds of a timed pass, about: its number of cells is chosen for that."""
 PASS_BYTES = 1 << 27
 """Bytes of the columns of a pass at most: more than a cache holds."""
-PATIENCE = 20.0
+PATIENCE = 10.0
 """Seconds after which no further cell of a row is counted; those that were are timed."""
 FAR = 2.0
 """A ratio beyond which a row has a reason."""
@@ -125,9 +127,10 @@ def chosen(study: Study) -> tuple[str, list[int]]:
 
 def digest(outputs: Columns) -> str:
     """Of all bits that came out; one NaN is as good as another."""
-    return hashlib.blake2b(
-        b"".join((c if c.dtype == np.int8 else np.where(c != c, np.nan, c)).tobytes() for c in outputs)
-    ).hexdigest()
+    bits = hashlib.blake2b()
+    for column in outputs:
+        bits.update(np.where(column != column, np.nan, column).tobytes())
+    return bits.hexdigest()
 
 
 def count(name: str, size: int, method: str, cells: Sequence[int]) -> Counts:
@@ -198,7 +201,7 @@ def reasons(machine: Machine, counts: Counts, took: Timed, bound: float) -> tupl
     told = [f"{name} {value:.4g}" for name, value in found.items() if value > bound]
     told += [f"uneven x{took.uneven:.2f}"] if took.uneven > 1.1 else []
     explained = max(bound, *found.values()) * max(took.uneven, 1.0)
-    return ", ".join(told) or "loads, stores, masks", took.cell / explained
+    return ", ".join(told) or "rest", took.cell / explained
 
 
 def row(machine: Machine, name: str, size: int, method: str | None) -> str:
