@@ -50,7 +50,7 @@ PASS = 0.02
 """Seconds of a timed pass, about: its number of cells is chosen for that."""
 PASS_BYTES = 1 << 27
 """Bytes of the columns of a pass at most: more than a cache holds."""
-PATIENCE = 10.0
+PATIENCE = 5.0
 """Seconds after which no further cell of a row is counted; those that were are timed."""
 FAR = 2.0
 """A ratio beyond which a row has a reason."""
