@@ -59,7 +59,7 @@ def open_result(path: str | os.PathLike[str], strict: bool = False) -> xr.Datase
     Raises
     ------
     SweepError
-        There is no result, or it cannot be read, or it is unfinished and `strict`.
+        There is no result, or it cannot be read, or it is unfinished and `strict`; `path` is no path.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def open_result(path: str | os.PathLike[str], strict: bool = False) -> xr.Datase
     ...     print(found.period.equals(ds.period), found.period.units)
     True s
     """
-    output = Path(path)
+    output = disk.as_path(path)
     for _ in range(3):
         if output.exists():
             return _open(output)

@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 from running import environment, flip, kept, place
 
+import sweep
 from kernels.interface import Status
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.solve import Solver
@@ -358,3 +359,22 @@ def test_a_result_that_is_open_can_be_opened_and_run_again_and_closing_it_frees_
         dataset.close()
     with h5py.File(path, "r+") as file:
         assert file["period"].shape == (2,)
+
+
+@pytest.mark.parametrize("given", [3, None, b"a.h5", ["a.h5"]])
+@pytest.mark.parametrize("name", ["open_result", "verify", "list_results"])
+def test_what_is_no_path_is_named(name, given):
+    with pytest.raises(SweepError, match=rf'expected a path, e\.g\. "out\.h5"; found .* type {type(given).__name__}$'):
+        getattr(sweep, name)(given)
+
+
+def test_a_path_to_write_that_is_none_is_named():
+    keys = {"kernel": "foliot", "outputs": ["period"], "axes": {"mu": [1.0, 2.0]}, "fixed": {"phi0": 1.0}}
+    found = run(keys)
+    for write in (
+        lambda: run(keys, 3),
+        lambda: sweep.export(found, 3),
+        lambda: sweep.join(found, found, 3, axis="v"),
+    ):
+        with pytest.raises(SweepError, match="expected a path"):
+            write()
