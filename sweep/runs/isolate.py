@@ -162,10 +162,8 @@ class IsolatedSolver:
         compiling = LOAD_SECONDS if self._all.good is None else 0.0
         try:
             return awaited(pool.submit(function, *words), limit + compiling)
-        except TimeoutError:
-            late, code = True, self._bury(BURY_SECONDS)
-        except (RuntimeError, CancelledError):
-            late, code = False, self._bury(BURY_SECONDS)
+        except (RuntimeError, CancelledError, TimeoutError) as fault:
+            late, code = isinstance(fault, TimeoutError), self._bury(BURY_SECONDS)
         if self._all.over:
             raise Ended("the run is being stopped")
         # one that died by itself, as late as that, is not late
