@@ -131,11 +131,6 @@ def speed():
     )
     shuffled = [np.random.default_rng(0).permutation(inputs[0]), *inputs[1:]]
     report("closed, shuffled; the same", *paired(solver("closed"), numpy_newton, shuffled), 64 * BLOCK)
-    report(
-        "asymptotic, in order; closed",
-        *paired(solver("asymptotic"), solver("closed"), inputs),
-        64 * BLOCK,
-    )
     some, _ = columns(1024)
     some[0] = np.geomspace(1e-3, 1e6, 1024) * 0.09 * 0.7
     report(

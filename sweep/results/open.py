@@ -271,7 +271,8 @@ def changed(output: Path) -> Iterator[None]:
     try:
         yield
     except (*DAMAGE, ArithmeticError) as fault:
-        if (isinstance(fault, OSError) and fault.errno) or intact(output):
+        opened = output if output.exists() else unfinished_of(output)
+        if (isinstance(fault, OSError) and fault.errno) or intact(opened):
             raise
         what = f"{type(fault).__name__}: {fault}".splitlines()[0]
         raise SweepError(f"{output}: was changed by another program, and is no result any more ({what})") from None

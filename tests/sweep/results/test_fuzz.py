@@ -119,6 +119,19 @@ def test_the_other_process_reads_all_that_hdf5_has_cut_in_pieces(whole, tmp_path
     assert not probe.probing(path)()
 
 
+@pytest.mark.parametrize("mask", [0, 1, 0xFFFFFFFF])
+def test_a_piece_that_is_shorter_than_it_says_is_not_read(whole, tmp_path, mask):
+    """HDF5 reads beyond its end, and dies of it."""
+    path = tmp_path / "out.h5"
+    path.write_bytes(whole.read_bytes())
+    with h5py.File(path, "r+") as file:
+        data = file["fall_time"].id
+        data.write_direct_chunk(data.get_chunk_info(0).chunk_offset, b"\0", mask)
+    assert not probe.probing(path)()
+    with pytest.raises(SweepError, match="not the result of a sweep, or damaged"):
+        sweep.open_result(path)
+
+
 def lead_away(file, kind, secret):
     """Makes what a result holds lie in another file."""
     if kind == "soft link":

@@ -16,7 +16,7 @@ from kernels.interface import Status
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.solve import Solver
 from sweep.results import open, statuses
-from sweep.results.open import open_result
+from sweep.results.open import changed, open_result
 from sweep.results.statuses import count_methods, count_statuses, failures
 from sweep.runs.run import run
 from sweep.store.store import unfinished_of
@@ -162,6 +162,13 @@ def test_missing_cells_of_an_unfinished_sweep_are_nan_and_pending(unfinished, st
     assert (found.method_used.values.ravel()[pending] == -1).all()
     assert np.isnan(found["drop"].values.reshape(24, 3)[pending]).all()
     xr.testing.assert_identical(found.height, whole.height.load().drop_vars("g").assign_coords(g=found.g))
+
+
+@pytest.mark.parametrize("name", ["unfinished", "stored"])
+def test_a_fault_of_ours_is_not_told_as_a_change_of_the_result(name, request):
+    path = request.getfixturevalue(name)
+    with open_result(path), pytest.raises(TypeError, match="ours"), changed(path):
+        raise TypeError("ours")
 
 
 def test_an_unfinished_sweep_is_refused_when_strict(unfinished):
