@@ -24,6 +24,7 @@ from sweep.runs.to_file import run_to_file
 from sweep.store.store import lock_of, unfinished_of
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.study.read import KEYS, Given, as_study
+from sweep.system import disk
 from sweep.system.errors import SweepError
 from sweep.system.pool import Cores, cores, whole_number
 from sweep.system.progress import TimeUp, deadline, stream_of
