@@ -179,7 +179,7 @@ def _entry(name: str, script: Path) -> Iterator[str]:
     caption = script.with_suffix(".md").read_text(encoding="utf-8").strip()
     told = prose("\n".join(line for line in rest.splitlines() if line not in commands))
     yield from (f"## {name.replace('_', ' ')}", "", f"*{_plain(question)}*", "", f"![{name}](studies/{name}.png)", "")
-    yield from (caption, "", *told, "", "```sh", *(re.split(r"  +", line.strip())[0] for line in commands), "```", "")
+    yield from (caption, "", "```sh", *(re.split(r"  +", line.strip())[0] for line in commands), "```", "", *told, "")
 
 
 # commands

@@ -94,6 +94,13 @@ def test_pages_of_kernels_say_what_the_kernels_declare():
     assert "phi'' + a phi' + (R + c abs(phi')^n) sgn phi' + k phi = +-mu" in page
 
 
+def test_the_gallery_tells_the_commands_before_what_they_draw():
+    import make_pages
+
+    page = "\n".join(make_pages._entry("chatter_lobes", ROOT / "studies" / "chatter_lobes.py"))
+    assert "python studies/chatter_lobes.py chatter_lobes.h5\n```\n\ndraws chatter" in page
+
+
 def test_what_is_indented_in_a_docstring_stands_as_it_is():
     import make_pages
 
