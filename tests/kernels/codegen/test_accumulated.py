@@ -103,6 +103,7 @@ class Impacts:
         (Impacts(lambda n: 3.0 + n), Status.STICKS),
         (Impacts(lambda n: np.log(n + 1.0)), Status.STICKS),  # shrinks, but not by a factor
         (Impacts(lambda n: 3.0 - 1.0 / n**4), Status.INACCURATE),  # accumulates, but slower than by a factor
+        (Impacts(lambda n: 3.0 - 1.0 / n**2, speed=lambda n: n**-3.0, last=9000), Status.INACCURATE),
         (
             Impacts(lambda n: 3.0 - 0.5**n, speed=lambda n: 2.0 ** np.minimum(n, 900.0)),
             Status.STICKS,
