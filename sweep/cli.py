@@ -76,7 +76,7 @@ COMMANDS = {
     **looking.COMMANDS,
     **laws.COMMANDS,
     **writing.COMMANDS,
-    "completion": Command.of(
+    "completion": Command(
         'what makes a shell complete the command, e.g. eval "$(sweep completion bash)"',
         _completion,
         option("shell", choices=("bash", "zsh", "tcsh")),
@@ -95,11 +95,12 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=_version())
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for name, (text, function, options) in COMMANDS.items():
-        command = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
-        command.set_defaults(command=function)
-        for names, keys in options:
-            command.add_argument(*names, **keys)
+    for name, command in COMMANDS.items():
+        text = command.text
+        made = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+        made.set_defaults(command=command.function)
+        for names, keys in command.options:
+            made.add_argument(*names, **keys)
     return top
 
 

@@ -176,7 +176,7 @@ from {steps} import M
 from kernels.integrate.adaptive import to_event
 from kernels.integrate.pairs import DOP853, DOPRI5
 from kernels.integrate.records import Mode
-from kernels.integrate.rosenbrock import RODAS5P_PAIR
+from kernels.integrate.rosenbrock import RODAS5P_PAIR, followable
 {linear}
 
 Stiff = namedtuple("Stiff", (*M._fields, "factored", "solved"))
@@ -199,6 +199,7 @@ def to_event_dop853(state, side, signs, parameters, unit, h, on, tolerance, acti
 def to_event_rodas5p(state, side, signs, parameters, unit, h, on, tolerance, active):
     """The leg of Rodas5P."""
     mode = Mode(side, signs, parameters, False)
+    h = followable(M_STIFF, state, mode, unit, h)
     return to_event(M_STIFF, RODAS5P_PAIR, state, mode, unit, h, on, tolerance, active)
 '''
 

@@ -133,7 +133,8 @@ def located(m, pair, mode, step, trial, which, curved):
     first = where(curved, cubic_root(e0, e1, d0, d1, curved), 0.0)
     part, state, slope = on_dense(m, pair, mode, step, terms, which, first, curved)
     part = where(curved, part, 0.0)
-    vague = of_size(step.state, step.new, trial.stages[0], step.h, pair.vague(terms, part))
+    vague = pair.vague(m, step.state, terms, mode, step.h, part)
+    vague = of_size(step.state, step.new, trial.stages[0], step.h, vague)
     return Found(part, choose(curved, state, step.state), slope, vague)
 
 

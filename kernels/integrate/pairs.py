@@ -104,7 +104,7 @@ def dop853_dense(m, state, terms, mode, h, part):
 
 
 @jit
-def dop853_vague(terms, part):
+def dop853_vague(m, state, terms, mode, h, part):
     """How far the dense output may be off at that part of the step, four times over."""
     rest = 1.0 - part
     square = part * part
@@ -129,7 +129,7 @@ def dopri5_series(m, state, trial, mode, h):
 
 
 @jit
-def dopri5_vague(terms, part):
+def dopri5_vague(m, state, terms, mode, h, part):
     """The dense output is off by no more than 1.3 times what the step is."""
     return times(0.0 * part, terms[0])
 

@@ -12,6 +12,10 @@ from kernels.integrate.steps import ONE, rate
 from kernels.integrate.tableaux import RODAS5P, RODAS5P_COUPLED, RODAS5P_GAMMA
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.tuples import after, times
+from kernels.lanes.vectors import where
+
+FIRST = 2.0
+"""Sizes of a state by which its rates may change it on the first step of a leg."""
 
 
 @jit
@@ -59,6 +63,20 @@ def tried(m, state, mode, h):
 
 
 @jit
+def followable(m, state, mode, unit, h):
+    """The first step of a leg, in units: at most so long that its rates change no state by much more than its size.
+
+    Behind a switch a state may be far from where it relaxes to. A step a billion times as long as that takes would be
+    right at its end, and pass over all that is met on the way.
+    """
+    length = h * unit
+    rates = rate(m, state, mode)
+    damped = m.solved(factored(m, state, mode, length), rates)
+    change = of_size(state, state, damped, length, times(length, rates))
+    return where(change > FIRST, h * FIRST / change, h)
+
+
+@jit
 def series(m, state, trial, mode, h):
     """The dense output needs nothing but the state."""
     return (times(0.0, state),)
@@ -66,14 +84,14 @@ def series(m, state, trial, mode, h):
 
 @jit_call
 def dense(m, state, terms, mode, h, part):
-    """The state at that part of the step: a step that long, which is as right as the whole one."""
+    """The state at that part of the step: by a step that long."""
     return stepped(m, state, mode, factored(m, state, mode, part * h), part * h)[0]
 
 
-@jit
-def vague(terms, part):
-    """The dense output is off by what the step is."""
-    return times(0.0 * part, terms[0])
+@jit_call
+def vague(m, state, terms, mode, h, part):
+    """What the dense output is off by: of what relaxes at once it may be much more than at the step's end."""
+    return stepped(m, state, mode, factored(m, state, mode, part * h), part * h)[3]
 
 
 RODAS5P_PAIR = Pair(tried, series, dense, vague, 5.0)

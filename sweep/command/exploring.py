@@ -61,7 +61,6 @@ def _refine(arguments: argparse.Namespace) -> None:
 
 
 def _chart(arguments: argparse.Namespace) -> None:
-    from sweep.explore.failing import without_failing
     from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
     from sweep.show.charts import plot_precision
     from sweep.system.progress import Progress
@@ -69,15 +68,15 @@ def _chart(arguments: argparse.Namespace) -> None:
     study = study_of_result(arguments) if arguments.study.suffix == ".h5" else study_from(arguments)
     output = arguments.output or Path(f"{arguments.study.stem}_chart.png")
     check_target_of(arguments, output)
-    if is_isolated(arguments, study):
-        note = Progress(1, sys.stderr, "chart").note
-        study = without_failing(study, arguments.cells, arguments.cell_timeout, note)
     found = work_precision(
         study,
         methods=arguments.methods,
         tolerances=arguments.rtol or TOLERANCES,
         cells=arguments.cells,
         reference=arguments.reference,
+        note=Progress(1, sys.stderr, "chart").note,
+        isolate=is_isolated(arguments, study),
+        cell_timeout=arguments.cell_timeout,
     )
     say(precision_text(found))
     plot_precision(found, output)
@@ -85,12 +84,12 @@ def _chart(arguments: argparse.Namespace) -> None:
 
 
 COMMANDS = {
-    "plan": Command.of(
+    "plan": Command(
         "cells, bytes, memory and a timed forecast, before anything runs",
         _plan,
         *(STUDY, WORKERS, ALLOW_IMPORT, ISOLATE, CELL_TIMEOUT),
     ),
-    "refine": Command.of(
+    "refine": Command(
         "add cells to a result where it bends, until it can be interpolated",
         _refine,
         RESULT,
@@ -101,7 +100,7 @@ COMMANDS = {
         option("--most-cells", "altogether; default: 1000000", metavar="N", type=int, default=1_000_000),
         *(WORKERS, ALLOW_IMPORT, ISOLATE, CELL_TIMEOUT),
     ),
-    "chart": Command.of(
+    "chart": Command(
         "error against time of every method of a kernel, on the cells of a study or a result",
         _chart,
         STUDY,

@@ -52,7 +52,7 @@ def _compare(arguments: argparse.Namespace) -> None:
 
 
 COMMANDS = {
-    "fit": Command.of(
+    "fit": Command(
         "exponent of a power law, and where two laws meet",
         _fit,
         RESULT,

@@ -91,25 +91,25 @@ def _report(arguments: argparse.Namespace) -> None:
 
 
 COMMANDS = {
-    "show": Command.of(
+    "show": Command(
         "what is in a result, how much is done, what became of its cells",
         _show,
         RESULT,
         switch("--follow", "then tell how the run goes on until it ends, from its log, on any machine that sees it"),
     ),
-    "verify": Command.of("whether a result, finished or not, is what was written", _verify, RESULT),
-    "list": Command.of(
+    "verify": Command("whether a result, finished or not, is what was written", _verify, RESULT),
+    "list": Command(
         "the results in a folder: question, cells, how much is done, statuses, when, version",
         _list,
         option("folder", "default: here", metavar="FOLDER", type=Path, nargs="?", default=Path()),
     ),
-    "diff": Command.of(
+    "diff": Command(
         "in what two results differ: cells, statuses, how far; exit status 1 where they do",
         _diff,
         *(RESULT, OTHER),
         option("--rtol", "relative distance that is none; default: 0", metavar="SHARE", type=float, default=0.0),
     ),
-    "plot": Command.of(
+    "plot": Command(
         "a figure of one output",
         _plot,
         RESULT,
@@ -119,14 +119,14 @@ COMMANDS = {
         option("--x", "default: the first axis", metavar="AXIS"),
         *(AT, UNITS),
     ),
-    "view": Command.of(
+    "view": Command(
         "look at a result in the browser: any two axes, sliders for the others",
         _view,
         RESULT,
         option("--port", "of this machine; default: a free one", metavar="N", type=int, default=0),
         switch("--no-browser", "only say where the page is"),
     ),
-    "report": Command.of(
+    "report": Command(
         "one self-contained page of HTML: figures, exponents, provenance",
         _report,
         RESULT,

@@ -32,14 +32,14 @@ def _studies(arguments: argparse.Namespace) -> None:
 
 
 COMMANDS = {
-    "kernels": Command.of(
+    "kernels": Command(
         "what can be swept: parameters, units, outputs, methods",
         _kernels,
         option("name", "tell all about this one", metavar="NAME", nargs="?"),
         option("--study", "write a study of it to begin with", metavar="FILE.toml", type=Path),
         ALLOW_IMPORT,
     ),
-    "studies": Command.of(
+    "studies": Command(
         "the studies that come with foliot; with a name: copy it here to work on",
         _studies,
         option("name", "of the study to copy", metavar="NAME", nargs="?"),

@@ -37,16 +37,11 @@ def output(metavar: str, text: str | None = None, required: bool = False) -> Opt
     return option("-o --output", text, metavar=metavar, type=Path, required=required)
 
 
-class Command(NamedTuple):
+class Command:
     """One command: what it is for, what does it, and what may stand behind its name."""
 
-    text: str
-    function: Callable[[argparse.Namespace], Outcome | None]
-    options: tuple[Option, ...]
-
-    @classmethod
-    def of(cls, text: str, function: Callable[[argparse.Namespace], Outcome | None], *options: Option) -> Command:
-        return cls(text, function, options)
+    def __init__(self, text: str, function: Callable[[argparse.Namespace], Outcome | None], *options: Option) -> None:
+        self.text, self.function, self.options = text, function, options
 
 
 STUDY = option("study", metavar="STUDY.toml", type=Path)

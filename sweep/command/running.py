@@ -123,7 +123,7 @@ def notify(arguments: argparse.Namespace, ended: Outcome) -> None:
 
 
 COMMANDS = {
-    "run": Command.of(
+    "run": Command(
         "compute a study, or continue where it stopped",
         _run,
         *(STUDY, WORKERS, ALLOW_IMPORT),

@@ -33,7 +33,7 @@ def _join(arguments: argparse.Namespace) -> None:
 
 
 COMMANDS = {
-    "export": Command.of(
+    "export": Command(
         "write a result as csv, parquet, netCDF4 or zarr",
         _export,
         RESULT,
@@ -44,7 +44,7 @@ COMMANDS = {
         switch("--float32", "of netCDF4 and zarr: outputs with 24 bits of precision"),
         *(UNITS, UNFINISHED),
     ),
-    "join": Command.of(
+    "join": Command(
         "two results of one kernel as one, longer along an axis or along a new one",
         _join,
         *(RESULT, OTHER),

@@ -9,7 +9,7 @@ import numpy as np
 
 from kernels.interface import Status
 from sweep.cells.grid import Grid
-from sweep.cells.sample import sampled, with_method
+from sweep.cells.sample import with_method
 from sweep.cells.schema import STATUS
 from sweep.cells.solve import usable_methods
 from sweep.study.model import Study, frozen
@@ -19,32 +19,30 @@ EXTREMES = (1e-3, 1e-14)
 """Values of rtol at which cells are tried."""
 
 
-def without_failing(
-    study: Study, cells: int, cell_timeout: float | str | None = None, note: Callable[[str], None] = lambda text: None
-) -> Study:
-    """At most so many cells of a study, as `sampled`, at which no method fails. Raises SweepError where there is none.
+def without_failing(study: Study, cell_timeout: float | str | None, note: Callable[[str], None]) -> Study:
+    """The cells of a study at which no method fails. Raises SweepError where there is none.
 
     Parameters
     ----------
+    study : of cells one by one, as `sampled` gives them
     cell_timeout : as of `run`
     note : callable
         Told how many are left out, and the first one.
     """
     from sweep.runs.run import run
 
-    part = sampled(study, cells)
-    good = np.ones(Grid(part).size, bool)
-    for method in usable_methods(part):
+    good = np.ones(Grid(study).size, bool)
+    for method in usable_methods(study):
         for rtol in EXTREMES:
-            trial = with_method(part, part.kernel.methods[method].name, rtol)
+            trial = with_method(study, study.kernel.methods[method].name, rtol)
             found = run(trial, progress=False, isolate=True, cell_timeout=cell_timeout)
             good &= found[STATUS].values.ravel() != Status.FAILED
     if good.all():
-        return part
-    first = " ".join(f"{name}={value}" for name, value in Grid(part).cell(int(good.argmin())).items())
+        return study
+    first = " ".join(f"{name}={value}" for name, value in Grid(study).cell(int(good.argmin())).items())
     text = f"the kernel fails at {(~good).sum()} of {good.size} cells, e.g. {first}"
     if not good.any():
         raise SweepError(text)
     note(f"{text}; they are left out")
-    axes = {name: dataclasses.replace(a, values=frozen(a.values[good])) for name, a in part.axes.items()}
-    return dataclasses.replace(part, axes=axes)
+    axes = {name: dataclasses.replace(a, values=frozen(a.values[good])) for name, a in study.axes.items()}
+    return dataclasses.replace(study, axes=axes)

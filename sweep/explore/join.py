@@ -15,7 +15,7 @@ from kernels.interface import Status
 from sweep.cells.fingerprint import COMPILERS, SOURCE, difference, fingerprint
 from sweep.cells.grid import Grid
 from sweep.cells.schema import ANCILLARY, ERROR_BOUND, STATUS, cell_schema
-from sweep.results.diff import diff
+from sweep.results.diff import diff, two_results
 from sweep.results.open import in_memory, memory
 from sweep.runs.run import store_cells
 from sweep.study.mistakes import listed
@@ -27,7 +27,7 @@ PAIR = ("first", "second")
 
 def join(
     a: xr.Dataset,
-    b: xr.Dataset,
+    b: xr.Dataset | None = None,
     path: str | os.PathLike[str] | None = None,
     *,
     axis: str | None = None,
@@ -56,7 +56,7 @@ def join(
     Raises
     ------
     SweepError
-        They do not fit together, are unfinished, or do not fit into the memory.
+        They are not two results, do not fit together, are unfinished, or do not fit into the memory.
 
     Examples
     --------
@@ -68,12 +68,14 @@ def join(
     >>> sweep.join(low, low, axis="version", labels=["0.1", "0.2"]).period.dims
     ('version', 'mu')
     """
+    a, b = two_results("join", a, b)
+    labels = tuple(labels) if np.iterable(labels) else (labels,)
     for dataset in (a, b):
         _require(dataset)
     if 2 * (a.nbytes + b.nbytes) > memory():
         raise SweepError("the two results together do not fit into the memory")
     studies = [Study.from_json(str(dataset.attrs["study_json"]), declared=True) for dataset in (a, b)]
-    joined, whole = _joined(studies, (a, b), axis, tuple(labels))
+    joined, whole = _joined(studies, (a, b), axis, labels)
     joined = replace(joined, text="", title=studies[0].title)
     arrays = {name: _column(whole, joined, name) for name in (*joined.outputs, *ANCILLARY)}
     mark = _fingerprint(joined, (a, b))
@@ -132,7 +134,8 @@ def _is_program(name: str) -> bool:
 def _require_new(study: Study, dataset: xr.Dataset, axis: str, labels: tuple[str, ...], apart: Sequence[str]) -> None:
     if apart:
         raise SweepError(f"along {axis} all else is to be the same; they differ in {listed(apart, word='and')}")
-    if not axis.isidentifier() or axis in dataset.variables or axis in (*SETTINGS, *dataset.dims):
+    taken = (*dataset.variables, *SETTINGS, *dataset.dims)
+    if not isinstance(axis, str) or not axis.isidentifier() or axis in taken:
         raise SweepError(f'"{axis}" cannot be the name of a new axis; choose another')
     if len(labels) != 2 or len(set(labels)) != 2 or not all(isinstance(label, str) and label for label in labels):
         raise SweepError("a new axis needs two labels that differ")

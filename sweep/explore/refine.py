@@ -31,6 +31,7 @@ from sweep.analysis.metric import stretch
 from sweep.analysis.scattered import MOST_AXES, Box, axes_of, heights
 from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
 from sweep.study.model import Axis, Study, frozen
+from sweep.system import disk
 from sweep.system.errors import SweepError
 from sweep.system.overwriting import check_target
 
@@ -146,7 +147,7 @@ def refine(
     names = [y] if isinstance(y, str) else list(y)
     _require(dataset, study, names, tolerance)
     options = {"workers": workers, "isolate": isolate, "cell_timeout": cell_timeout}
-    output = _Output(study, None if path is None else Path(path), force, options)
+    output = _Output(study, None if path is None else disk.as_path(path), force, options)
     output.prepare(dataset)
     found = Refiner(dataset, output, names, tolerance, most_cells).refined()
     output.tidy()

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.grid import Grid, empty_cells
 from sweep.cells.sample import sampled, solved, with_method
+from sweep.explore.failing import without_failing
 from sweep.explore.plan import small_duration
 from sweep.explore.reference import Reference, best_reference, errors, given_reference
 from sweep.study.mistakes import did_you_mean
@@ -75,6 +76,9 @@ def work_precision(
     cells: int = CELLS,
     reference: str | None = None,
     truth: Mapping[str, Any] | None = None,
+    note: Callable[[str], None] = lambda text: None,
+    isolate: bool = False,
+    cell_timeout: float | str | None = None,
 ) -> xr.Dataset:
     """Error and time per cell of methods at several tolerances, on cells spread over a study's grid.
 
@@ -93,6 +97,10 @@ def work_precision(
     truth : mapping of output to ndarray, optional
         True values in the cells that `precision_cells` names; NaN in all outputs where there is nothing to give. Errors
         are then over these outputs alone.
+    isolate, cell_timeout
+        As of `run`: cells are tried in processes of their own first, and left out where a method fails.
+    note : callable, optional
+        Told how many are left out.
 
     Returns
     -------
@@ -108,7 +116,7 @@ def work_precision(
     ------
     SweepError
         There is no such method, or none that can do the study; the reference solves no cell; truth has another shape;
-        a tolerance is not above 0.
+        a tolerance is not above 0; a method fails in every cell.
 
     Examples
     --------
@@ -118,10 +126,13 @@ def work_precision(
     >>> found.method.values.tolist()
     ['closed', 'asymptotic']
     """
+    tolerances = list(dict.fromkeys(tolerances))
+    _require(cells, tolerances)
     part = sampled(as_study(study), cells)
     able = _able(part)
-    names, tolerances = _chosen(methods, able), list(dict.fromkeys(tolerances))
-    _require(cells, tolerances)
+    names = _chosen(methods, able)
+    if isolate or cell_timeout is not None:
+        part = without_failing(part, cell_timeout, note)
     against = best_reference(_without_work(part), able, reference) if truth is None else given_reference(part, truth)
     found = _table(part, names, tolerances, against)
     missing = _missing(part, able) if methods is None else []
@@ -244,9 +255,10 @@ def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[
     refused = against.sound & ~valued
     wrong = sure & ~(error <= rtol + against.floor) | against.void & (status == Status.OK)
     worst = int(np.where(sure, error, -1.0).argmax())
-    low, median, high = np.quantile(error[valued], (0.1, 0.5, 0.9)) if valued.any() else [math.nan] * 3
+    # no number between two cells: errors may be infinite
+    low, high = np.quantile(error[valued], (0.1, 0.9), method="inverted_cdf") if valued.any() else [math.nan] * 2
     return {
-        "error_median": float(median),
+        "error_median": float(np.median(error[valued])) if valued.any() else math.nan,
         "error_low": float(low),
         "error_high": float(high),
         "error_worst": float(error[worst]) if sure.any() else math.nan,

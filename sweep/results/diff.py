@@ -90,7 +90,7 @@ class Difference:
         return ((name, distance) for name, distance in self.outputs.items() if distance.cells)
 
 
-def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
+def diff(a: xr.Dataset, b: xr.Dataset | None = None, rtol: float = 0.0) -> Difference:
     """In what two results of one kernel differ.
 
     Cells are those of equal parameters; where the cells of both run along `cell` or `point`, those of equal number.
@@ -105,7 +105,7 @@ def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
     Raises
     ------
     SweepError
-        They are of different kernels or axes, or summaries.
+        They are not two results, of different kernels or axes, or summaries.
 
     Examples
     --------
@@ -116,6 +116,7 @@ def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
     >>> found.same, found.outputs["period"].cells
     (False, 2)
     """
+    a, b = two_results("diff", a, b)
     first, second = _shared(a, b)
     total = [math.prod(d[STATUS].shape) for d in (a, b, first)]
     names = [{str(n) for n in d.data_vars} - set(ANCILLARY) for d in (a, b)]
@@ -124,6 +125,17 @@ def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
         found.outputs[name] = _distance(first, second, name, rtol)
     _compare_statuses(found, first, second)
     return found
+
+
+def two_results(name: str, a: Any, b: Any) -> tuple[xr.Dataset, xr.Dataset]:
+    """What a function of two results, `sweep.name`, was given. Raises SweepError."""
+    if isinstance(a, xr.Dataset) and isinstance(b, xr.Dataset):
+        return a, b
+    found = " and ".join(type(each).__name__ for each in (a, b) if each is not None)
+    raise SweepError(
+        f"sweep.{name}: expected two Datasets, found {found or 'none'}; "
+        f'write sweep.{name}(first, second), and open a file first, e.g. first = sweep.open_result("first.h5")'
+    )
 
 
 def _shared(a: xr.Dataset, b: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset]:

@@ -68,7 +68,7 @@ def export(
     >>> print(sweep.export(ds, "period.csv", force=True).read_text().splitlines()[-1])
     2.0,1.0,1.0,0.0,0.0,0.0,1.0,0.0,1.0,5.524901443102082,nan,OK,closed
     """
-    target = Path(path)
+    target = disk.as_path(path)
     kind = target.suffix.lower()
     if kind not in WRITERS:
         found = f'"{target.suffix}"' if target.suffix else "no suffix"

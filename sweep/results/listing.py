@@ -9,6 +9,7 @@ from pathlib import Path
 
 from sweep.results.open import changed, open_result
 from sweep.results.statuses import account, count_statuses
+from sweep.system import disk
 from sweep.system.errors import SweepError
 from sweep.system.table import columns
 
@@ -82,7 +83,7 @@ def list_results(folder: str | os.PathLike[str] = ".") -> Listing:
     >>> found.question, found.cells, found.done, found.statuses
     ('Why?', 2, 1.0, {'OK': 2})
     """
-    place = Path(folder)
+    place = disk.as_path(folder)
     if not place.is_dir():
         raise SweepError(f"{place}: there is no such folder")
     names = {entry.name for entry in place.iterdir()}

@@ -59,7 +59,7 @@ def open_result(path: str | os.PathLike[str], strict: bool = False) -> xr.Datase
     Raises
     ------
     SweepError
-        There is no result, or it cannot be read, or it is unfinished and `strict`.
+        There is no result, or it cannot be read, or it is unfinished and `strict`; `path` is no path.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def open_result(path: str | os.PathLike[str], strict: bool = False) -> xr.Datase
     ...     print(found.period.equals(ds.period), found.period.units)
     True s
     """
-    output = Path(path)
+    output = disk.as_path(path)
     for _ in range(3):
         if output.exists():
             return _open(output)
@@ -271,7 +271,8 @@ def changed(output: Path) -> Iterator[None]:
     try:
         yield
     except (*DAMAGE, ArithmeticError) as fault:
-        if (isinstance(fault, OSError) and fault.errno) or intact(output):
+        opened = output if output.exists() else unfinished_of(output)
+        if (isinstance(fault, OSError) and fault.errno) or intact(opened):
             raise
         what = f"{type(fault).__name__}: {fault}".splitlines()[0]
         raise SweepError(f"{output}: was changed by another program, and is no result any more ({what})") from None

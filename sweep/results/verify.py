@@ -64,7 +64,7 @@ def verify(path: str | os.PathLike[str]) -> Verdict:
     >>> sweep.verify("verified.h5").whole
     True
     """
-    output = Path(path)
+    output = disk.as_path(path)
     place = output if output.exists() else unfinished_of(output)
     if not place.exists():
         raise SweepError(f"{output}: no such file, and no sweep that writes it")

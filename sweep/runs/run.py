@@ -1,8 +1,7 @@
-"""Runs a study: blocks of cells on threads or on a cluster, into memory or into a store that survives a kill."""
+"""Runs a study: what is asked for is checked, and computed into memory or into a file."""
 
 from __future__ import annotations
 
-import contextlib
 import os
 from collections.abc import Mapping
 from datetime import datetime
@@ -14,23 +13,21 @@ from sweep.cells.block import Found
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.output_schema import gathered
 from sweep.cells.partition import row_blocks
-from sweep.results.open import in_memory, memory, open_result, open_unfinished, stored_fingerprint
+from sweep.results.open import in_memory, memory, open_result, open_unfinished
 from sweep.runs import resume
 from sweep.runs.elsewhere import compute_elsewhere, joined, threads
-from sweep.runs.extend import Precomputed, Retried, Reused, is_of_another_version
+from sweep.runs.extend import Precomputed
 from sweep.runs.isolate import limits_of
 from sweep.runs.session import Session, Solve
 from sweep.runs.task import END, HERE, WAIT, Task
-from sweep.store.ending import Gather
-from sweep.store.frame import Frame, cuts_of
-from sweep.store.reading import StoredFile
-from sweep.store.store import Store, lock_of, opened, unfinished_of
+from sweep.runs.to_file import run_to_file
+from sweep.store.store import lock_of, unfinished_of
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.study.read import KEYS, Given, as_study
 from sweep.system import disk
 from sweep.system.errors import SweepError
-from sweep.system.pool import BufferPool, Cores, CtrlC, Terminated, cores, whole_number
-from sweep.system.progress import TimeUp, deadline, quantity, stream_of
+from sweep.system.pool import Cores, cores, whole_number
+from sweep.system.progress import TimeUp, deadline, stream_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,8 +37,6 @@ if TYPE_CHECKING:
 
 STORED_AT_ONCE = 1 << 16
 """Cells of a block of those that are solved already."""
-MOST_ATTEMPTS = 3
-"""Times that damaged blocks are computed again before the disk is given up."""
 
 
 def run(
@@ -193,7 +188,7 @@ def store_cells(
     block = max(1, min(row_blocks(study).count, STORED_AT_ONCE))
     task = Task(study, dict(mark or fingerprint(study)), _checked(path), Cores(1), force=force, block_cells=block)
     if not resume.is_complete(task):
-        _run_to_file(task, Precomputed(arrays, taken_over))
+        run_to_file(task, Precomputed(arrays, taken_over))
     return open_result(task.output)
 
 
@@ -202,48 +197,39 @@ def _task(
     path: str | os.PathLike[str] | None,
     *,
     workers: int | None = None,
-    force: bool = False,
     progress: bool | TextIO | None = None,
     block_cells: int | None = None,
-    extend: bool = False,
     until: str | datetime | None = None,
-    cluster: Any = None,
-    repair: bool = False,
     isolate: bool = False,
     cell_timeout: float | str | None = None,
-    retry_failed: bool = False,
-    without_workers: str = WAIT,
+    **options: Any,
 ) -> Task:
-    """What `run` was asked for. Raises SweepError."""
-    if cluster is not None and workers is not None:
-        raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
-    if path is None and until is not None:
-        raise SweepError("until: give a path as well, or what is computed by then would be lost")
-    if extend and retry_failed:
-        raise SweepError("extend, retry_failed: give one of the two; each continues another result")
-    if without_workers not in (WAIT, HERE, END):
-        raise SweepError(f'without_workers: expected "{WAIT}", "{HERE}" or "{END}", found {without_workers!r}')
-    return Task(
+    """What `run` was asked for; further options are kept as they are. Raises SweepError."""
+    task = Task(
         study,
         fingerprint(study),
         None if path is None else _checked(path),
         Cores(cores() if workers is None else whole_number("workers", workers)),
         stream_of(progress),
-        force,
-        None if block_cells is None else whole_number("block_cells", block_cells),
-        extend,
-        deadline(until),
-        cluster,
-        repair,
-        isolate or cell_timeout is not None,
-        limits_of(cell_timeout),
-        retry_failed,
-        without_workers,
+        block_cells=None if block_cells is None else whole_number("block_cells", block_cells),
+        until=deadline(until),
+        isolate=isolate or cell_timeout is not None,
+        limits=limits_of(cell_timeout),
+        **options,
     )
+    if task.cluster is not None and workers is not None:
+        raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
+    if path is None and until is not None:
+        raise SweepError("until: give a path as well, or what is computed by then would be lost")
+    if task.extend and task.retry_failed:
+        raise SweepError("extend, retry_failed: give one of the two; each continues another result")
+    if task.without_workers not in (WAIT, HERE, END):
+        raise SweepError(f'without_workers: expected "{WAIT}", "{HERE}" or "{END}", found {task.without_workers!r}')
+    return task
 
 
 def _checked(path: str | os.PathLike[str]) -> Path:
-    output = Path(os.path.realpath(path))
+    output = Path(os.path.realpath(disk.as_path(path)))
     if not output.parent.is_dir():
         raise SweepError(f"{path}: there is no folder {output.parent}")
     return output
@@ -252,7 +238,7 @@ def _checked(path: str | os.PathLike[str]) -> Path:
 def _complete(task: Task) -> bool:
     """False where the time was up before the end."""
     left = unfinished_of(task.output).exists() or lock_of(task.output).exists()
-    return (resume.is_complete(task) and not left) or _run_to_file(task)
+    return (resume.is_complete(task) and not left) or run_to_file(task)
 
 
 def _run_in_memory(task: Task) -> xr.Dataset:
@@ -294,136 +280,3 @@ def _arrays(session: Session) -> dict[str, Any]:
     if needed > memory():
         raise SweepError(f"the result takes {needed / 1e9:.1f} GB, more than the memory; give a path to store it")
     return session.blocks.empty(rows)
-
-
-def _run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
-    """False where the time was up before the end."""
-    with opened(task.output) as store, contextlib.ExitStack() as stack:
-        stack.enter_context(task.cores.told_by_signals())
-        # looked at again, for another run may have ended before this one had the lock
-        if resume.is_complete(task):
-            resume.tidy(store, task)
-            return True
-        resume.take_up(store, task)
-        if store.layout is not None and not store.missing():
-            return _run_session(Session(task, task.workers, store.table.blocks, sampled=False), store, None)
-        reused = precomputed or _reused(task, stack)
-        blocks = None if store.layout is None else store.table.blocks
-        try:
-            cluster = stack.enter_context(joined(task))
-            session = Session(task, threads(task, cluster), blocks, sampled=precomputed is None, reused=reused)
-        except TimeUp as reason:
-            task.note(f"stopped before the first block, for {reason}")
-            return False
-        return _run_session(session, store, cluster)
-
-
-def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
-    """The cells of the result that is extended. Raises SweepError where that is not possible."""
-    if not (task.extend or task.retry_failed) or task.force or not task.output.exists():
-        return None
-    resume.check_whole(task)
-    if task.retry_failed:
-        return stack.enter_context(Retried(task.output, task.study))
-    reused = stack.enter_context(Reused(task.output, task.study))
-    if is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
-        task.note("another version has computed it; a sample of its cells is computed again")
-        reused.check_sample()
-    return reused
-
-
-def _run_session(session: Session, store: Store, cluster: Cluster | None) -> bool:
-    """Computes what is missing and ends the result; False where the time was up before."""
-    progress = session.begin(range(session.blocks.count) if store.layout is None else store.missing())
-    session.tick = store.tick
-    session.log_begin()
-    # held back wherever they would leave half a file behind
-    with CtrlC():
-        if store.layout is None:
-            _begin(session, store, shared=cluster is not None)
-        try:
-            _finish(session, store, cluster)
-        except (KeyboardInterrupt, Terminated):
-            progress.note(f"stopped; {_kept(store)}")
-            raise
-        except TimeUp as reason:
-            progress.note(f"stopped, for {reason}; {_kept(store)}")
-            return False
-        finally:
-            session.close()
-    return True
-
-
-def _begin(session: Session, store: Store, shared: bool) -> None:
-    """Makes the file. Raises SweepError where it has no room on the disk."""
-    task = session.task
-    cuts = cuts_of(task.study, session.schema, session.blocks.partition)
-    frame = Frame(session.schema, cuts, task.fingerprint, session.began, shared)
-    needed, free = frame.layout.size, disk.free(task.output.parent)
-    if needed > free:
-        raise SweepError(
-            f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, choose "
-            "another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
-        )
-    store.begin(frame)
-
-
-def _kept(store: Store) -> str:
-    store.commit()
-    kept = f"{store.count} of {store.table.blocks.count} blocks are kept"
-    return f"{kept}, run the same command again to continue"
-
-
-def _finish(session: Session, store: Store, cluster: Cluster | None) -> None:
-    """Computes what is missing and ends the result, again where a block turns out to be damaged."""
-    gather = None if session.study.summary is None else _gather(session.study)
-    for _ in range(MOST_ATTEMPTS):
-        if store.missing() and cluster is not None and not _store_elsewhere(session, store, cluster):
-            cluster = None
-        if store.missing() and cluster is None:
-            _store_blocks(session, store)
-        damaged = store.finish(session.endings(), gather)
-        if not damaged:
-            session.progress.end()
-            return
-        for index in damaged:
-            session.again(index)
-            session.progress.note(f"{session.blocks.label(index)} were damaged on the disk and are computed again")
-    raise SweepError(f"{store.path}: what is written there comes back damaged again and again; the disk is failing")
-
-
-def _gather(study: Study) -> Gather:
-    """Makes blocks of a summary's output from its rows."""
-    per_group = row_blocks(study).per_group
-
-    def gather(file: StoredFile, block: int) -> dict[str, Any]:
-        first, last = file.layout.tables["cells"].blocks.bounds(block)
-        rows = {name: c.run(first * per_group, last * per_group) for name, c in file.columns("rows").items()}
-        return gathered(study, rows)
-
-    return gather
-
-
-def _store_blocks(session: Session, store: Store) -> None:
-    buffers = BufferPool(session.blocks.empty)
-
-    def work(job: int, solve: Solve) -> None:
-        start, stop = session.blocks.bounds(job)
-        with buffers.borrow() as columns:
-            arrays = {name: column[: stop - start] for name, column in columns.items()}
-            if solve(start, stop, arrays):
-                store.put(job, arrays)
-
-    session.compute(work)
-
-
-def _store_elsewhere(session: Session, store: Store, cluster: Cluster) -> bool:
-    """Blocks that workers of a cluster compute, and write themselves where they can; False where it lost them."""
-
-    def receive(job: int, found: Found) -> None:
-        if isinstance(found, bytes):
-            store.take(job, found)
-        else:
-            store.put(job, found)
-
-    return compute_elsewhere(session, cluster, store.shared(), receive)

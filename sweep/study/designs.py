@@ -24,7 +24,7 @@ import numpy as np
 from kernels.interface import Field
 from sweep.study import samples
 from sweep.study.field_parser import EXAMPLE, SAMPLED_EXAMPLE, FieldParser
-from sweep.study.mistakes import Mistakes, listed
+from sweep.study.mistakes import Mistakes, listed, show
 from sweep.study.model import Axis, Block
 from sweep.study.spacing import LARGEST_AXIS
 from sweep.system.errors import SweepError
@@ -164,13 +164,13 @@ class DesignParser:
 
     def _seed(self, found: Any, where: str) -> int | None:
         if isinstance(found, bool) or not isinstance(found, int | np.integer) or not 0 <= found <= LARGEST_SEED:
-            self.mistakes.add(where, f"expected a whole number from 0 to {LARGEST_SEED}")
+            self.mistakes.add(where, f"expected a whole number from 0 to {LARGEST_SEED}, found {show(found)}")
             return None
         return int(found)
 
     def _scramble(self, found: Any, where: str) -> bool:
         if not isinstance(found, bool):
-            self.mistakes.add(where, "expected true or false")
+            self.mistakes.add(where, f"expected true or false, found {show(found)}")
         return bool(found)
 
     def _check_axes(self, axes: Mapping[str, Axis], fields: Mapping[str, Field | None], design: str, at: str) -> None:

@@ -142,7 +142,8 @@ class FieldParser:
         before = len(self.mistakes)
         spacing = self._spacing(table, field, where)
         start, stop = self._bounds(table, spacing, where)
-        num = self.mistakes.count(table.get("num", 2), f"{where}.num", axes.LARGEST_AXIS)
+        cure = "; for a single value write values = [...]"
+        num = self.mistakes.count(table.get("num", 2), f"{where}.num", axes.LARGEST_AXIS, cure)
         if "num" not in table:
             self.mistakes.add(f"{where}.num", f"missing; write e.g. {EXAMPLE}")
         if start == stop and len(self.mistakes) == before:
@@ -154,6 +155,9 @@ class FieldParser:
     def _spacing(self, table: Mapping[str, Any], field: Field | None, where: str) -> str | None:
         if field and field.choices:
             self.mistakes.add(where, f"{field.name} takes words; write e.g. values = [{quoted(field.choices)}]")
+            return None
+        if "spacing" not in table:
+            self.mistakes.add(f"{where}.spacing", 'missing; write spacing = "linear" or "log"')
             return None
         return self.mistakes.word(table["spacing"], f"{where}.spacing", SPACINGS)
 
@@ -189,7 +193,7 @@ class FieldParser:
             self.mistakes.add(where, f"{name} is {kind}, which is not sampled; sweep it in a block of its own")
         if len(self.mistakes) == before:
             factor = self._factor(table, field, where)
-            spacing = self._spacing({"spacing": "", **table}, field, where)
+            spacing = self._spacing(table, field, where)
             bounds = self._bounds(table, spacing, where)
         if len(self.mistakes) > before or spacing is None:
             return Axis(name, NONE, "values")

@@ -45,12 +45,12 @@ class Mistakes:
             self.add(where, f"expected a finite number, found {result}")
         return result
 
-    def count(self, value: Any, where: str, largest: int) -> int | None:
+    def count(self, value: Any, where: str, largest: int, cure: str = "") -> int | None:
         """A whole number of values, from 2 to `largest`."""
         if isinstance(value, bool) or not isinstance(value, numbers.Integral):
             self.add(where, f"expected a whole number, found {show(value)}")
         elif int(value) < 2:
-            self.add(where, f"expected at least 2, found {show(value)}; for a single value write values = [...]")
+            self.add(where, f"expected at least 2, found {show(value)}{cure}")
         elif int(value) > largest:
             self.add(where, f"expected at most {largest}, found {show(value)}")
         else:

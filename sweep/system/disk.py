@@ -31,6 +31,13 @@ MOST_BUFFERS = 1000
 _turn = threading.Lock()
 
 
+def as_path(given: Any) -> Path:
+    """What names a file or a folder. Raises SweepError where it is no name."""
+    if isinstance(given, str | os.PathLike):
+        return Path(given)
+    raise SweepError(f'expected a path, e.g. "out.h5"; found an object of type {type(given).__name__}')
+
+
 def open_file(path: Path | str, flags: int) -> int:
     """A file descriptor; a pipe that is to be read is not waited for. Raises OSError."""
     waiting = getattr(os, "O_NONBLOCK", 0) if flags == os.O_RDONLY else 0

@@ -33,6 +33,17 @@ WAVE = scene_kernel(
     example={"eps": 1e-3, "level": 0.5},
 )
 
+PASSED = scene_kernel(
+    name="passed",
+    doc="a state that relaxes from 1 to -1 behind the first switch, and is met on its way",
+    states=(FORCE, Field("clock", "s", "time by the clock")),
+    parameters=(EPS, Field("level", "rad/s^2", "force at the second switch")),
+    rates=lambda force, side, eps: ((side - force) / eps, 1.0 + 0.0 * force),
+    surface=lambda force, clock, side, level: 0.5 * ((1.0 + side) * (1.0 - clock) + (1.0 - side) * (force - level)),
+    start=lambda: (1.0, 0.0),
+    example={"eps": 1e-3, "level": 0.5},
+)
+
 
 def ball(floor):
     """A ball that bounces on a floor at that height."""

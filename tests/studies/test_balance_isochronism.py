@@ -39,7 +39,7 @@ def test_the_study_draws_its_figure_and_every_statement_holds(results, capsys):
     assert study.main(results) == 0
     text = capsys.readouterr().out
     assert " NO" not in text
-    assert "Figure. (a), (b)" in text
+    assert "figure: " in text
 
 
 def swing(at, r, zeta, w):

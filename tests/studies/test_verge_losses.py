@@ -45,7 +45,7 @@ def test_the_study_draws_its_figure_and_every_statement_holds(results, capsys):
     assert study.main(results) == 0
     text = capsys.readouterr().out
     assert " NO" not in text
-    assert "Figure. (a)" in text
+    assert "figure: " in text
 
 
 def half_periods(p, count):

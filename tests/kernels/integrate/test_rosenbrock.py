@@ -9,7 +9,7 @@ from columns import relative_error, solve
 from mpmath import mp, mpf
 from rich_scene import RICH
 from scene_oracles import quadratic_foliot
-from stiff_scene import LAG, WAVE
+from stiff_scene import LAG, PASSED, WAVE
 
 import sweep
 from kernels.codegen.stepped_source import adaptive
@@ -75,6 +75,17 @@ def test_a_stiff_law_that_is_not_linear_keeps_to_the_wave_that_it_follows(rtol):
     time = mp.asin(mpf(level))  # force = cos(clock), speed = sin(clock)
     assert not status.any()
     assert (off(outputs, [(time, time, mp.cos(time))] * len(eps), ("time", "clock", "force")) < rtol).all()
+
+
+@many
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9, 1e-11])
+@pytest.mark.parametrize("level", [0.5, -0.5])
+def test_a_switch_while_a_state_relaxes_is_met_where_it_is(level, rtol):
+    eps = 10.0 ** -np.arange(0.0, 16.0)
+    outputs, status = solve(PASSED, "rodas5p", eps, level, flips=2.0, rtol=rtol)
+    truths = [-mpf(one) * mp.log((1 + mpf(level)) / 2) for one in eps]
+    assert not status.any()
+    assert (relative_error(outputs["interval"], truths) < rtol).all()
 
 
 def test_it_is_right_where_nothing_is_stiff():

@@ -113,3 +113,19 @@ def test_the_command(tmp_path, monkeypatch, capsys):
     assert main(["show", "d.h5"]) == 0
     assert "version" in capsys.readouterr().out
     assert main(["join", "a.h5", "b.h5", "-o", "a.h5", "--force"]) == 2
+
+
+@pytest.mark.parametrize("name", ["join", "diff"])
+@pytest.mark.parametrize(
+    ("given", "found"),
+    [((["a.h5"],), "found list;"), (("a.h5", "b.h5"), "found str and str;"), ((1, None), "found int;")],
+)
+def test_what_are_not_two_results_is_named_with_what_to_write(name, given, found):
+    with pytest.raises(sweep.SweepError, match=rf"sweep\.{name}: expected two Datasets, {found}.* sweep\.open_result"):
+        getattr(sweep, name)(*given)
+
+
+@pytest.mark.parametrize(("axis", "labels"), [(3, ["0.1", "0.2"]), ("version", 3)])
+def test_an_axis_that_is_no_name_and_labels_that_are_no_list_are_refused(axis, labels):
+    with pytest.raises(sweep.SweepError, match="new axis"):
+        sweep.join(of(), of(), axis=axis, labels=labels)

@@ -12,7 +12,6 @@ from kernels.interface import Field, Method, Status
 from kernels.lanes.jit import COMPILED
 from sweep import SweepError, cli
 from sweep.cells.sample import sampled, with_method
-from sweep.explore.failing import without_failing
 from sweep.explore.work_precision import precision_cells, precision_text, work_precision
 from sweep.show.charts import draw_precision, new_figure, plot_precision, style
 
@@ -212,6 +211,13 @@ def test_given_truth_without_a_value_refuses_the_cell():
     found = measured(stones(), truth={"impact_speed": [*true[:3], np.nan]})
     assert float(at(found, "exact").silent) == 0.25
     assert at(found, "exact").silent_at.item() == "height=10 v0=3"
+
+
+def test_relative_errors_are_infinite_where_the_truth_is_zero():
+    true = np.hypot(SPEEDS, np.sqrt(2 * G * HEIGHTS))
+    found = at(measured(stones(), truth={"impact_speed": true * [1, 0, 0, 0]}), "exact")
+    assert float(found.error_low) < 1e-9
+    assert np.isinf([found.error_median, found.error_high, found.error_worst]).all()
 
 
 def test_traces_are_compared_relative_to_their_largest_value():
@@ -440,9 +446,9 @@ def test_mistakes_on_the_command_line_are_one_message(chart, options):
 
 def test_cells_at_which_a_kernel_dies_are_left_out_of_a_chart():
     told = []
-    part = without_failing(tall(40, "bad:DYING"), 40, note=told.append)
-    assert sorted(set(range(1, 41)) - set(part.axes["height"].values)) == [11, 22, 33]
+    keys = {"tolerances": [1e-6], "isolate": True, "note": told.append}
+    found = work_precision(tall(40, "bad:DYING"), **keys)
     assert told == ["the kernel fails at 3 of 40 cells, e.g. height=11; they are left out"]
-    assert float(work_precision(part, tolerances=[1e-6]).ok.min()) == 1.0
+    assert (found.attrs["cells"], float(found.ok.min())) == (37, 1.0)
     with pytest.raises(SweepError, match="the kernel failed"):
-        without_failing(tall(5, "bad:HOPELESS"), 5)
+        work_precision(tall(5, "bad:HOPELESS"), **keys)

@@ -11,11 +11,12 @@ import pytest
 import xarray as xr
 from running import environment, flip, kept, place
 
+import sweep
 from kernels.interface import Status
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.solve import Solver
 from sweep.results import open, statuses
-from sweep.results.open import open_result
+from sweep.results.open import changed, open_result
 from sweep.results.statuses import count_methods, count_statuses, failures
 from sweep.runs.run import run
 from sweep.store.store import unfinished_of
@@ -161,6 +162,13 @@ def test_missing_cells_of_an_unfinished_sweep_are_nan_and_pending(unfinished, st
     assert (found.method_used.values.ravel()[pending] == -1).all()
     assert np.isnan(found["drop"].values.reshape(24, 3)[pending]).all()
     xr.testing.assert_identical(found.height, whole.height.load().drop_vars("g").assign_coords(g=found.g))
+
+
+@pytest.mark.parametrize("name", ["unfinished", "stored"])
+def test_a_fault_of_ours_is_not_told_as_a_change_of_the_result(name, request):
+    path = request.getfixturevalue(name)
+    with open_result(path), pytest.raises(TypeError, match="ours"), changed(path):
+        raise TypeError("ours")
 
 
 def test_an_unfinished_sweep_is_refused_when_strict(unfinished):
@@ -351,3 +359,22 @@ def test_a_result_that_is_open_can_be_opened_and_run_again_and_closing_it_frees_
         dataset.close()
     with h5py.File(path, "r+") as file:
         assert file["period"].shape == (2,)
+
+
+@pytest.mark.parametrize("given", [3, None, b"a.h5", ["a.h5"]])
+@pytest.mark.parametrize("name", ["open_result", "verify", "list_results"])
+def test_what_is_no_path_is_named(name, given):
+    with pytest.raises(SweepError, match=rf'expected a path, e\.g\. "out\.h5"; found .* type {type(given).__name__}$'):
+        getattr(sweep, name)(given)
+
+
+def test_a_path_to_write_that_is_none_is_named():
+    keys = {"kernel": "foliot", "outputs": ["period"], "axes": {"mu": [1.0, 2.0]}, "fixed": {"phi0": 1.0}}
+    found = run(keys)
+    for write in (
+        lambda: run(keys, 3),
+        lambda: sweep.export(found, 3),
+        lambda: sweep.join(found, found, 3, axis="v"),
+    ):
+        with pytest.raises(SweepError, match="expected a path"):
+            write()

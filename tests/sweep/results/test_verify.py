@@ -221,7 +221,7 @@ def test_a_repair_that_is_stopped_goes_on_like_any_run(tmp_path, monkeypatch):
     quiet(tall(23), path, block_cells=5).close()
     flip(path, place(path, "fall_time", 7))
     with monkeypatch.context() as patch:
-        patch.setattr("sweep.runs.run._finish", lambda *rest: (_ for _ in ()).throw(sweep.SweepError("stopped")))
+        patch.setattr("sweep.runs.to_file._finish", lambda *rest: (_ for _ in ()).throw(sweep.SweepError("stopped")))
         with pytest.raises(sweep.SweepError, match="stopped"):
             quiet(tall(23), path, repair=True)
     assert not path.exists()

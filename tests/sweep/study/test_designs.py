@@ -65,11 +65,11 @@ def test_a_unit_is_that_of_start_and_stop():
         ("sobol", "design", "how many points?"),
         ({"kind": "sobol", "n": 12}, "design.n", "needs a power of 2; write 8 or 16"),
         ({"kind": "latin"}, "design.n", "expected a whole number, found nothing"),
-        ({"kind": "latin", "n": 1}, "design.n", "at least 2"),
-        ({"kind": "latin", "n": 8, "seed": -1}, "design.seed", "from 0"),
+        ({"kind": "latin", "n": 1}, "design.n", "expected at least 2, found 1"),
+        ({"kind": "latin", "n": 8, "seed": -1}, "design.seed", "from 0 to 4294967295, found -1"),
         ({"kind": "latin", "n": 8, "seed": 1.5}, "design.seed", "expected a whole number"),
         ({"kind": "random", "n": 8, "scramble": True}, "design.scramble", "no such key"),
-        ({"kind": "latin", "n": 8, "scramble": 1}, "design.scramble", "expected true or false"),
+        ({"kind": "latin", "n": 8, "scramble": 1}, "design.scramble", "expected true or false, found 1"),
         ({"kind": "latn", "n": 8}, "design.kind", "did you mean latin?"),
         ({"kind": "zip", "n": 8}, "design.n", "no such key"),
         ({"kind": "latin", "n": 10_000_001}, "design.n", "expected at most 10000000"),
@@ -77,6 +77,15 @@ def test_a_unit_is_that_of_start_and_stop():
 )
 def test_what_is_wrong_with_a_design_is_told(design, where, message):
     assert message in message_of(lambda: build(design=design, axes=RANGES), where)
+
+
+def test_a_sampled_axis_without_spacing_is_told_to_have_one():
+    axes = {"v0": {"start": 1.0, "stop": 2.0}, "height": RANGES["height"]}
+    assert 'missing; write spacing = "linear" or "log"' in message_of(lambda: sampled(axes=axes), "axes.v0.spacing")
+
+
+def test_a_design_of_too_few_points_is_not_told_to_be_a_single_value():
+    assert message_of(lambda: sampled(n=1), "design.n") == "expected at least 2, found 1"
 
 
 @pytest.mark.parametrize("entry", [[1.0, 2.0], {"values": [1.0]}, {**RANGES["v0"], "num": 8}])

@@ -1,0 +1,164 @@
+"""A run into a file: blocks go to a store that survives a kill, and damaged ones are computed again."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import TYPE_CHECKING, Any
+
+from sweep.cells.block import Found
+from sweep.cells.output_schema import gathered
+from sweep.cells.partition import row_blocks
+from sweep.results.open import stored_fingerprint
+from sweep.runs import resume
+from sweep.runs.elsewhere import compute_elsewhere, joined, threads
+from sweep.runs.extend import Precomputed, Retried, Reused, is_of_another_version
+from sweep.runs.session import Session, Solve
+from sweep.runs.task import Task
+from sweep.store.ending import Gather
+from sweep.store.frame import Frame, cuts_of
+from sweep.store.reading import StoredFile
+from sweep.store.store import Store, opened
+from sweep.study.model import Study
+from sweep.system import disk
+from sweep.system.errors import SweepError
+from sweep.system.pool import BufferPool, CtrlC, Terminated
+from sweep.system.progress import TimeUp, quantity
+
+if TYPE_CHECKING:
+    from sweep.runs.cluster import Cluster
+
+MOST_ATTEMPTS = 3
+"""Times that damaged blocks are computed again before the disk is given up."""
+
+
+def run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
+    """False where the time was up before the end."""
+    with opened(task.output) as store, contextlib.ExitStack() as stack:
+        stack.enter_context(task.cores.told_by_signals())
+        # looked at again, for another run may have ended before this one had the lock
+        if resume.is_complete(task):
+            resume.tidy(store, task)
+            return True
+        resume.take_up(store, task)
+        if store.layout is not None and not store.missing():
+            return _run_session(Session(task, task.workers, store.table.blocks, sampled=False), store, None)
+        reused = precomputed or _reused(task, stack)
+        blocks = None if store.layout is None else store.table.blocks
+        try:
+            cluster = stack.enter_context(joined(task))
+            session = Session(task, threads(task, cluster), blocks, sampled=precomputed is None, reused=reused)
+        except TimeUp as reason:
+            task.note(f"stopped before the first block, for {reason}")
+            return False
+        return _run_session(session, store, cluster)
+
+
+def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
+    """The cells of the result that is extended. Raises SweepError where that is not possible."""
+    if not (task.extend or task.retry_failed) or task.force or not task.output.exists():
+        return None
+    resume.check_whole(task)
+    if task.retry_failed:
+        return stack.enter_context(Retried(task.output, task.study))
+    reused = stack.enter_context(Reused(task.output, task.study))
+    if is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
+        task.note("another version has computed it; a sample of its cells is computed again")
+        reused.check_sample()
+    return reused
+
+
+def _run_session(session: Session, store: Store, cluster: Cluster | None) -> bool:
+    """Computes what is missing and ends the result; False where the time was up before."""
+    progress = session.begin(range(session.blocks.count) if store.layout is None else store.missing())
+    session.tick = store.tick
+    session.log_begin()
+    # held back wherever they would leave half a file behind
+    with CtrlC():
+        if store.layout is None:
+            _begin(session, store, shared=cluster is not None)
+        try:
+            _finish(session, store, cluster)
+        except (KeyboardInterrupt, Terminated):
+            progress.note(f"stopped; {_kept(store)}")
+            raise
+        except TimeUp as reason:
+            progress.note(f"stopped, for {reason}; {_kept(store)}")
+            return False
+        finally:
+            session.close()
+    return True
+
+
+def _begin(session: Session, store: Store, shared: bool) -> None:
+    """Makes the file. Raises SweepError where it has no room on the disk."""
+    task = session.task
+    cuts = cuts_of(task.study, session.schema, session.blocks.partition)
+    frame = Frame(session.schema, cuts, task.fingerprint, session.began, shared)
+    needed, free = frame.layout.size, disk.free(task.output.parent)
+    if needed > free:
+        raise SweepError(
+            f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, choose "
+            "another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
+        )
+    store.begin(frame)
+
+
+def _kept(store: Store) -> str:
+    store.commit()
+    kept = f"{store.count} of {store.table.blocks.count} blocks are kept"
+    return f"{kept}, run the same command again to continue"
+
+
+def _finish(session: Session, store: Store, cluster: Cluster | None) -> None:
+    """Computes what is missing and ends the result, again where a block turns out to be damaged."""
+    gather = None if session.study.summary is None else _gather(session.study)
+    for _ in range(MOST_ATTEMPTS):
+        if store.missing() and cluster is not None and not _store_elsewhere(session, store, cluster):
+            cluster = None
+        if store.missing() and cluster is None:
+            _store_blocks(session, store)
+        damaged = store.finish(session.endings(), gather)
+        if not damaged:
+            session.progress.end()
+            return
+        for index in damaged:
+            session.again(index)
+            session.progress.note(f"{session.blocks.label(index)} were damaged on the disk and are computed again")
+    raise SweepError(f"{store.path}: what is written there comes back damaged again and again; the disk is failing")
+
+
+def _gather(study: Study) -> Gather:
+    """Makes blocks of a summary's output from its rows."""
+    per_group = row_blocks(study).per_group
+
+    def gather(file: StoredFile, block: int) -> dict[str, Any]:
+        first, last = file.layout.tables["cells"].blocks.bounds(block)
+        rows = {name: c.run(first * per_group, last * per_group) for name, c in file.columns("rows").items()}
+        return gathered(study, rows)
+
+    return gather
+
+
+def _store_blocks(session: Session, store: Store) -> None:
+    buffers = BufferPool(session.blocks.empty)
+
+    def work(job: int, solve: Solve) -> None:
+        start, stop = session.blocks.bounds(job)
+        with buffers.borrow() as columns:
+            arrays = {name: column[: stop - start] for name, column in columns.items()}
+            if solve(start, stop, arrays):
+                store.put(job, arrays)
+
+    session.compute(work)
+
+
+def _store_elsewhere(session: Session, store: Store, cluster: Cluster) -> bool:
+    """Blocks that workers of a cluster compute, and write themselves where they can; False where it lost them."""
+
+    def receive(job: int, found: Found) -> None:
+        if isinstance(found, bytes):
+            store.take(job, found)
+        else:
+            store.put(job, found)
+
+    return compute_elsewhere(session, cluster, store.shared(), receive)
