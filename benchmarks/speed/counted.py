@@ -16,6 +16,7 @@ import builtins
 import ctypes
 import ctypes.util
 import math
+import operator
 from collections import Counter
 from contextlib import contextmanager
 from unittest.mock import patch
@@ -99,20 +100,18 @@ class CountedComplex(np.complex128):
 
     def __abs__(self):
         DONE.update({"plain": 3, "division": 1, "root": 1})
-        return Counted(abs(_plain_complex(self)))
+        return Counted(abs(np.complex128(self)))
 
 
 def _complex_binary(name, turned):
-    function, (plain, divisions) = _FUNCTIONS[name], _COMPLEX[name]
+    function, (plain, divisions) = getattr(operator, name), _COMPLEX[name]
 
     def operate(self, other):
         if isinstance(other, np.ndarray):
             return NotImplemented
         DONE.update({"plain": plain, "division": divisions})
-        pair = (
-            (_plain_complex(other), _plain_complex(self)) if turned else (_plain_complex(self), _plain_complex(other))
-        )
-        return CountedComplex(function(*pair))
+        pair = np.complex128(self), np.complex128(other)  # whose own operators round as compiled code does
+        return CountedComplex(function(*(pair[::-1] if turned else pair)))
 
     return operate
 

@@ -46,8 +46,8 @@ from sweep.show.kernels import starter
 from sweep.study.model import Study
 
 LANES = 32
-PASS = 0.02
-"""Seconds of a timed pass, about: its number of cells is chosen for that."""
+PASS = 0.2
+"""Seconds of a timed pass, about: so many cells that what a call costs once is shared by thousands, as in a sweep."""
 PASS_BYTES = 1 << 27
 """Bytes of the columns of a pass at most: more than a cache holds."""
 PATIENCE = 5.0

@@ -69,11 +69,15 @@ def test_operations_are_those_of_the_formula():
     assert json.loads(python("-c", BY_HAND, plain=True)) == EXPECTED
 
 
-def test_a_row_has_the_bits_and_the_bytes_of_its_kernel():
-    """Of the closed form: nine parameters, rtol, five outputs and a status of 8 and 1 bytes."""
-    *_, row = python(str(SPEED / "roofline.py"), "foliot", "--cells", "6", plain=False).splitlines()
-    name, method, operations, size, took, peak, moved, ratio, *_ = row.split()
-    assert (name, method, size) == ("foliot", "closed", "121")
+@pytest.mark.parametrize(
+    ("kernel", "method", "size", "least", "most"),
+    [("foliot", "closed", 9 + 1 + 5, 100, 300), ("drivetrain", "direct", 45, 1e5, 1e6)],
+)
+def test_a_row_has_the_bits_and_the_bytes_of_its_kernel(kernel, method, size, least, most):
+    """A byte of the status, eight of each number; the drivetrain has complex numbers."""
+    *_, row = python(str(SPEED / "roofline.py"), kernel, "--cells", "6", plain=False).splitlines()
+    found, by, operations, stored, took, peak, moved, ratio, *_ = row.split()
+    assert (found, by, int(stored)) == (kernel, method, 8 * size + 1)
     assert "other bits" not in row
-    assert 100 < float(operations) < 300
+    assert least < float(operations) < most
     assert float(ratio) == pytest.approx(float(took) / max(float(peak), float(moved)), rel=0.1)
