@@ -4,8 +4,8 @@ Where a motion ends, or what is left of it is less than the method can tell, bef
 last ones that are right are looked at. Their intervals d_n shrink in the limit by the same factor each; two at a time,
 for two surfaces may take turns, the time of rest is by Aitken's formula
     t = t_n + D q/(1 - q),  D = d_n + d_{n-1},  q = D/(d_{n-2} + d_{n-3}),                                 (1)
-and so is every state. The same from the switch before tells the error: over some LEFT/(1 - q) switches the limit may go
-on to move by as much, as it does where q tends to 1 and intervals shrink by a power of their number only.
+and so is every state. The same from the switch before tells the error: where q is near 1, the limit may go on to
+move by as much over LEFT/(1 - q) switches, as it does where intervals shrink by a power of their number only.
 """
 
 import numpy as np
@@ -96,7 +96,8 @@ def _limits(followed, those, last, sizes):
         (values, q), (before, q_before) = (_limit(rows[k:]) for k in (0, 1))
         scale = abs(rows).max(axis=0)
         scale[0], scale[2:] = values[0], np.fmax(scale[2:], sizes)
-        error = (abs(values - before) / np.where(scale > 0, scale, 1.0)).max(axis=0) * LEFT / (1.0 - q)
+        moved = (abs(values - before) / np.where(scale > 0, scale, 1.0)).max(axis=0)
+        error = moved * (1.0 + LEFT * q**4 / (1.0 - q))
         shrinks = (q < SLOWEST) & (q_before < SLOWEST) & (values[0] - rows[0, 0] <= NEAR * values[0])
         settles = abs(values - rows[0]) <= abs(before - rows[1]) + 1e-9 * scale
     return good.all(axis=0) & shrinks & settles.all(axis=0) & np.isfinite(values).all(axis=0), values, error
