@@ -181,6 +181,8 @@ def _anything(p):
 
 
 _CELL = (*Foliot._fields, "depth", "harmonic")
+_E, _DECAY = Foliot._fields.index("e"), Swung._fields.index("decay")
+"""Positions of columns."""
 _BEGUN = (*_TERMS, "v1", "stiff")
 _begin = _columns(begin, _CELL, _BEGUN)
 _step = _columns(step, (*_CELL, "v1", *Swung._fields), ("end", "change", "slope", "cancels", *Outputs._fields))
@@ -200,7 +202,7 @@ def by_taylor(parameters, rippled):
     def bound(*columns):
         if len(columns[n]):
             terms, _, stiff = begun(whole(columns), columns[n])
-            columns[-1][...] = np.where(able(terms, stiff, columns[8]), 0.0, np.inf)
+            columns[-1][...] = np.where(able(terms, stiff, columns[_E]), 0.0, np.inf)
 
     def whole(columns):
         return columns[:n] if rippled else (*columns[:n], np.zeros(len(columns[n])), np.ones(len(columns[n])))
@@ -253,7 +255,7 @@ class Search:
             np.full((len(Outputs._fields), n), np.nan),
             np.full((len(Outputs._fields), n), np.inf),
         )
-        self.status = np.where(able(self.terms, stiff, cells[8]), Status.NOT_CONVERGED, Status.NO_METHOD).astype(
+        self.status = np.where(able(self.terms, stiff, cells[_E]), Status.NOT_CONVERGED, Status.NO_METHOD).astype(
             np.int8
         )
         rough = (self.terms[3] > 0.0) & (self.terms[4] < 2.0)
@@ -283,13 +285,13 @@ class Search:
         lost = (self.stuck[i] > STUCK) | (
             (self.stage[i] == SEARCH) & (self.high[i] - self.low[i] <= _COARSE * self.v[i])
         )
-        done = self._judged(i, free, newton, swung[7], found, status) | lost
+        done = self._judged(i, free, newton, swung[_DECAY], found, status) | lost
         self._follow(i, free, newton, swung)
         return ~done
 
     def _swung(self, i):
         """The half swings of the cells i, as rows of `Swung`, and their statuses."""
-        columns = [*(column[i] for column in self.terms), self.cells[8][i] * self.v[i], np.ones(len(i))]
+        columns = [*(column[i] for column in self.terms), self.cells[_E][i] * self.v[i], np.ones(len(i))]
         rough = self.stage[i] == ROUGH
         shifted = off_by_roundings(columns)
         columns = [np.where(rough, other, column) for column, other in zip(columns, shifted, strict=True)]
@@ -325,7 +327,7 @@ class Search:
         inside = free & (new > low) & (new < high) & (new < 8.0 * v + 8.0)
         between = np.where(high < np.inf, 0.5 * (np.maximum(low, 0.0) + high), 2.0 * v + 1.0)
         self.v[i] = np.where(inside, new, between)
-        self._set(i, inside, np.abs(change / end), slope, swung[7])
+        self._set(i, inside, np.abs(change / end), slope, swung[_DECAY])
 
     def _set(self, i, inside, relative, slope, decay):
         """The stage that follows, and its tolerance: an error of F counts 1/(1 - slope)-fold in v1."""

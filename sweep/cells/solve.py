@@ -171,7 +171,7 @@ class _Strip:
             self._settle(cells, missed)
 
     def _promising(self, number: int, cells: Chosen, missed: list[tuple[int, Chosen, Floats]]) -> Chosen:
-        """Chosen for which a method's bound, if it has one, meets rtol; where others are left, they go to `missed`."""
+        """Cells for which a method's bound, if it has one, meets rtol; where others are left, they go to `missed`."""
         method = self.kernel.methods[number]
         if method.bound is None:
             return cells
