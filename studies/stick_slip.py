@@ -229,7 +229,8 @@ def draw_costs(axes: Any, found: dict[str, xr.Dataset]) -> None:
 def conclude(path: str, tell: bool = True) -> tuple[Groups, list[str], Any]:
     """Statements and the figure; costs of ours alone where those of others are not to be told."""
     ds = read_result(path, "belt_scene:KERNEL", ["method", "belt", "fall"], "stick_slip.toml")
-    ds = ds.assign(off=abs(ds.time / last_count(float(ds.flips), 1.0, ds.belt, ds.fall) - 1.0))
+    true = xr.apply_ufunc(last_count, float(ds.flips), 1.0, ds.belt, ds.fall)
+    ds = ds.assign(off=abs(ds.time / true - 1.0))
     unslid, found = others(ds), all_costs(tell)
     groups = {
         "Twenty cycles": maps(ds),
