@@ -2,8 +2,7 @@
 
     ln y = c + p1 u + (p2 - p1) w ln(1 + exp(u/w)),   u = ln(x/x0)                                  (1)
 
-p1 holds far below x0 and p2 far above; w is the width of the bend in ln x. For given x0 and w, (1) is linear in the
-rest: a grid over these two gives the start, scipy's Levenberg-Marquardt the end.
+p1 holds far below x0 and p2 far above; w is the width of the bend in ln x.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from sweep.analysis.correlated import corrected, student
 from sweep.analysis.curves import Window, along, check_confidence, noise_of, scatter_is_noise, title, window_logs
 from sweep.analysis.loglog import EPSILON, Array, slopes, tends
 from sweep.analysis.scatter import BEYOND_DOUBT, line_deviance
-from sweep.analysis.shapes import BENDS, LOGARITHM, fitted
+from sweep.analysis.shapes import BENDS, LOGARITHM, TWO, fitted
 from sweep.system.errors import SweepError
 
 FEWEST_POINTS = 8
@@ -58,10 +57,6 @@ NAMES = {
     "evidence": "by how much AICc and BIC prefer two laws to one, whatever its noise, and to a logarithm",
     "noisy": "1 where the intervals are of noise, 0 where of the curvature of noise-free values",
 }
-
-STARTS = ((0.1, 0.9, 9), (0.01, 0.03, 0.1, 0.25))
-"""Places of x0, and widths, at which a fit may start, in parts of the window."""
-
 
 def fit_two_laws(
     y: xr.DataArray, dim: str, window: Window | None = None, *, confidence: float = 0.95, noise: bool | None = None
@@ -187,45 +182,31 @@ def _slopes_of_curve(numbers: Array, t: Array) -> Array:
 
 def _fit(t: Array, z: Array) -> tuple[Array, Array, Array]:
     """The five numbers, the distances of the points from the curve, and the Jacobian there."""
-    from scipy.optimize import least_squares
+    from scipy.optimize import leastsq
 
     narrowest = math.log(float(np.diff(t).min()) / 30)  # a sharper bend looks the same at these points
 
     def held(q: Array) -> Array:
         return np.array([*q[:WIDTH], min(max(q[WIDTH], narrowest), math.log(t[-1] - t[0]))])
 
-    found = least_squares(
+    found = leastsq(
         lambda q: _curve(held(q), t) - z,
         _start(t, z),
-        jac=lambda q: _slopes_of_curve(held(q), t),
-        x_scale="jac",
-        method="lm",
+        Dfun=lambda q: _slopes_of_curve(held(q), t),
         xtol=1e-12,
         ftol=1e-14,
+        full_output=True,
     )
-    best = held(found.x)
+    best = held(found[0])
     return best, z - _curve(best, t), _slopes_of_curve(best, t)
 
 
 def _start(t: Array, z: Array) -> Array:
-    """The best of a grid of places and widths; the rest is linear."""
-    span = t[-1] - t[0]
-    first, last, count = STARTS[0]
-    tries = [
-        (_linear(t, z, t[0] + part * span, width * span))
-        for part in np.linspace(first, last, count)
-        for width in STARTS[1]
-    ]
-    return min(tries, key=lambda found: found[0])[1]
-
-
-def _linear(t: Array, z: Array, place: float, width: float) -> tuple[float, Array]:
-    u = t - place
-    bend = width * np.logaddexp(0, u / width)
-    columns = np.stack([np.ones_like(t), u - bend, bend], axis=1)
-    numbers = np.linalg.lstsq(columns, z, rcond=None)[0]
-    off = z - columns @ numbers
-    return float(off @ off), np.array([*numbers, place, math.log(width)])
+    """The numbers of (1) by variable projection, turned from parts of the window."""
+    found, span = fitted(TWO, t, z), float(t[-1] - t[0])
+    assert found is not None  # FEWEST_POINTS are enough
+    place, log_width, level, low, high = found.numbers
+    return np.array([level, low / span, high / span, t[0] + place * span, log_width + math.log(span)])
 
 
 def _reach(off: Array, jacobian: Array, confidence: float) -> Array:
