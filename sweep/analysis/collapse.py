@@ -286,9 +286,7 @@ def _require_determined(points: Points, a: float, off: Array, numbers: int) -> N
         )
 
 
-def _bootstrap(
-    points: Points, fitted: Array, off: Array, near: tuple[float, float], times: int, seed: int
-) -> Array:
+def _bootstrap(points: Points, fitted: Array, off: Array, near: tuple[float, float], times: int, seed: int) -> Array:
     """a and b of so many sets with residuals drawn anew.
 
     All sets share the splines of a grid of a, which closes in on what they say.

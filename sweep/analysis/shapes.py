@@ -253,7 +253,8 @@ def _start(law: Law, s: Array, z: Array, root: Array) -> Array:
     tries, shifts, bases = _grid(law, s.tobytes(), root.tobytes())
     wanted = (z - shifts) * root
     off = wanted - np.einsum("gnk,gmk,gm->gn", bases, bases, wanted, optimize=True)
-    return tries[int(np.nanargmin((off**2).sum(axis=1)))]
+    best: Array = tries[int(np.nanargmin((off**2).sum(axis=1)))]
+    return best
 
 
 @functools.lru_cache(maxsize=128)

@@ -36,6 +36,8 @@ OTHER_SHAPES = 20.0
 may be between the shapes that are tried."""
 BEYOND_SHAPES = 0.5
 """Share of what other shapes add to where the laws meet, added again: the true one may be none of them."""
+ALIKE = 1e6
+"""Condition of the five numbers of (1) beyond which points do not tell them apart, as those of a single law."""
 
 LAWS = ("low", "high")
 EXPONENTS = ("exponent", "exponent_low", "exponent_high")
@@ -62,8 +64,14 @@ NAMES = {
     "noisy": "1 where the intervals are of noise, 0 where of the curvature of noise-free values",
 }
 
+
 def fit_two_laws(
-    y: xr.DataArray, dim: str, window: Window | None = None, *, confidence: float = 0.95, noise: bool | str | None = None
+    y: xr.DataArray,
+    dim: str,
+    window: Window | None = None,
+    *,
+    confidence: float = 0.95,
+    noise: bool | str | None = None,
 ) -> xr.Dataset:
     """Two power laws with a smooth crossover, equation (1), and whether one law would do.
 
@@ -262,15 +270,12 @@ def _meeting(t: Array, z: Array, pair: tuple[float, ...]) -> float:
 
 def _by_memory(off: Array, jacobian: Array, confidence: float, reach: Array) -> Array:
     """How many times further each interval reaches where the noise may remember that of the point before."""
-    size = np.sqrt((jacobian**2).sum(axis=0))
-    seen = size > 1e-9 * size.max()
-    found = np.ones(reach.size)
-    try:
-        memory = averaged(jacobian[:, seen] / size[seen], off, confidence, np.ones(off.size))
-    except np.linalg.LinAlgError:  # numbers that the points do not tell apart reach to infinity as it is
-        return found
-    further = np.maximum(memory.high, -memory.low) / size[seen]
-    found[seen] = np.maximum(1.0, further / np.maximum(reach[seen], 1e-300))
+    size = np.maximum(np.sqrt((jacobian**2).sum(axis=0)), 1e-300)
+    columns = jacobian / size
+    if np.linalg.cond(columns) > ALIKE:
+        return np.ones(reach.size)
+    memory = averaged(columns, off, confidence, np.ones(off.size))
+    found: Array = np.maximum(1.0, np.maximum(memory.high, -memory.low) / size / np.maximum(reach, 1e-300))
     return found
 
 
