@@ -39,6 +39,13 @@ def pytest_configure(config):
     config.option.loadscopereorder = False  # xdist would take files with many tests first, not those that take long
 
 
+def pytest_ignore_collect(collection_path, config):
+    """Of `-m quick` alone, files without a quick test are not even read: that takes ten seconds."""
+    path = f"tests/{collection_path.relative_to(TESTS).as_posix()}"
+    unread = config.option.markexpr == "quick" and path.endswith(".py") and not any(q.startswith(path) for q in QUICK)
+    return unread or None
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: next((k for k, name in enumerate(LONG) if item.nodeid.startswith(name)), len(LONG)))
