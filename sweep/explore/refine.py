@@ -33,6 +33,7 @@ from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
 from sweep.study.model import Axis, Study, frozen
 from sweep.system import disk
 from sweep.system.errors import SweepError
+from sweep.system.expected import require_dataset
 from sweep.system.overwriting import check_target
 
 if TYPE_CHECKING:
@@ -236,6 +237,7 @@ def study_of(dataset: xr.Dataset, allow_import: bool = False) -> Study:
     >>> sweep.study_of(ds)
     <Study 'foliot over mu': foliot over mu (3)>
     """
+    require_dataset("study_of", dataset)
     if "study_json" not in dataset.attrs:
         raise SweepError("the dataset does not say which study it came from; pass the study")
     return Study.from_json(str(dataset.attrs["study_json"]), allow_import=allow_import)

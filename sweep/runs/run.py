@@ -13,6 +13,7 @@ from sweep.cells.block import Found
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.output_schema import gathered
 from sweep.cells.partition import row_blocks
+from sweep.cells.sample import require_asked
 from sweep.results.open import in_memory, memory, open_result, open_unfinished
 from sweep.runs import resume
 from sweep.runs.elsewhere import compute_elsewhere, joined, threads
@@ -218,6 +219,7 @@ def _task(
     )
     if task.cluster is not None and workers is not None:
         raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
+    require_asked(study)
     if path is None and until is not None:
         raise SweepError("until: give a path as well, or what is computed by then would be lost")
     if task.extend and task.retry_failed:
