@@ -188,8 +188,7 @@ def store_cells(
     """
     block = max(1, min(row_blocks(study).count, STORED_AT_ONCE))
     task = Task(study, dict(mark or fingerprint(study)), _checked(path), Cores(1), force=force, block_cells=block)
-    if not resume.is_complete(task):
-        run_to_file(task, Precomputed(arrays, taken_over))
+    _complete(task, Precomputed(arrays, taken_over))
     return open_result(task.output)
 
 
@@ -237,10 +236,10 @@ def _checked(path: str | os.PathLike[str]) -> Path:
     return output
 
 
-def _complete(task: Task) -> bool:
+def _complete(task: Task, precomputed: Precomputed | None = None) -> bool:
     """False where the time was up before the end."""
     left = unfinished_of(task.output).exists() or lock_of(task.output).exists()
-    return (resume.is_complete(task) and not left) or run_to_file(task)
+    return (resume.is_complete(task) and not left) or run_to_file(task, precomputed)
 
 
 def _run_in_memory(task: Task) -> xr.Dataset:
