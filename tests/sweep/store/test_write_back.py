@@ -6,7 +6,6 @@ from running import quiet, tall
 from sweep.store.write_back import READ_BACK_SECONDS, WriteBack
 from sweep.system.forecast import Forecast
 
-
 MB = 1 << 20
 
 
