@@ -23,6 +23,7 @@ from kernels.codegen.accumulated import to_rest
 from kernels.codegen.expression import SceneError, cos, exp, log, maximum, minimum, power, sign, sin, sqrt, where
 from kernels.codegen.module import build, compiling
 from kernels.codegen.record import RESERVED
+from kernels.codegen.slid_along import slid_along
 from kernels.codegen.stepped_source import twice_by
 from kernels.interface import Field, Kernel, Method, OnColumns, Status
 from kernels.lanes.wiring import signed
@@ -35,6 +36,8 @@ __all__ = [
 MOST_FLIPS = 1_000_000
 SERIES = "Taylor series of order 12 or 18 in lanes, no switch passed over"
 LOCATED = "in lanes, switches on its dense output; followed twice"
+SLIDERS = {"taylor": ("dop853", "rodas5p")}
+"""Methods by which a method follows what slides along a kink, where that is not itself."""
 Function = Callable[..., Any]
 """Of named scalars, as its author writes it."""
 
@@ -53,9 +56,10 @@ class Scene:
     start : (parameters) -> the states at time 0, where side is 1
     switch : (states, side, parameters) -> the states just behind the switch; None: they do not jump
     most_kinks : between two switches, after which a cell is given up; None: a thousand
+    slides : whether motion goes on along a kink onto which both sides press it (`sliding`), or sticks there
 
     At a switch `side` turns from 1 to -1 or back. Where abs(u) or sign(u) occurs, u = 0 is a *kink*: the motion is
-    followed up to it and begun anew behind it. A motion that cannot leave a kink sticks there.
+    followed up to it and begun anew behind it.
     """
 
     name: str
@@ -67,6 +71,7 @@ class Scene:
     start: Function
     switch: Function | None = None
     most_kinks: int | None = None
+    slides: bool = False
 
     def __post_init__(self) -> None:
         names = [*self.states, *self.parameters]
@@ -157,7 +162,7 @@ def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[M
     module = build(scene)
 
     def method(name: str, doc: str, how: Function, bound: OnColumns | None = None) -> Method:
-        how = how if bound else to_rest(how)
+        how = how if bound else slid_along(to_rest(how), scene, SLIDERS.get(name, (name,)))
         return Method(name, doc, _solve((scene.name, name), how, module, parameters, outputs), bound)
 
     return (

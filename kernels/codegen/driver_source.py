@@ -1,6 +1,9 @@
 """Source text of what a lane does from one event to the next: start, switch, turn signs round, count, end."""
 
+from textwrap import indent
+
 from kernels.codegen.lane_source import BEGIN, begun_rows, chosen, loaded_rows, stored_rows
+from kernels.codegen.sliding_source import endless, press, turned
 from kernels.codegen.template import filled, folded, listed
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import exponent, magnitude, pow2, sqrt, where
@@ -51,6 +54,7 @@ def advance_{order}(memory, i):
     {load}
     parameters = ({parameters})
     {begin}
+    {press_fresh}
     done = active & not_(active)
     for _ in range(EVENTS):
         moving = active & (verdict < REFUSED)
@@ -61,6 +65,7 @@ def advance_{order}(memory, i):
         verdict = where((leg.hangs | leg.grazing) & (verdict < GRAZING), GRAZING, verdict)
         refused = where(leg.stuck, STICKS, where(leg.broken, OUT_OF_RANGE, verdict))
         verdict = where(leg.lost, STEP_LIMIT_MET, refused)
+        {endless}
         moving = moving & (verdict < REFUSED) & not_(leg.grazing)
         {land}
         h = leg.h
@@ -93,6 +98,7 @@ def advance_{order}(memory, i):
             size = magnitude({offset}) + magnitude(after - {offset})
             still = magnitude(after) <= fma(1e-12, size, 2.0 * magnitude(left))
             on_0 = where(switches, where(still, 1.0, 0.0), on_0)
+        {press}
         steps, before = where(active, leg.tried, steps), where(active, steps, before)
         verdict = where(moving & (kinks_met > {most_kinks}), STEP_LIMIT_MET, verdict)
         done = active & (leg.grazing | (verdict >= REFUSED) | (count >= flips))
@@ -183,7 +189,7 @@ def settled(state, side, parameters, unit, near):
 '''
 
 
-def advance(states, parameters, kinks, order, offset, most_kinks, tells=False):
+def advance(states, parameters, kinks, order, offset, most_kinks, tells=False, slides=False):
     """The text of `advance_{order}` and `run_{order}`.
 
     Parameters
@@ -191,6 +197,7 @@ def advance(states, parameters, kinks, order, offset, most_kinks, tells=False):
     offset : of the surface, as text
     most_kinks : between two switches, as text
     tells : whether the error is carried along (`error_source`)
+    slides : whether the motion may slide along a kink (`sliding_source`)
     """
     signs, ons = [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]
     rows = rows_of(states, parameters, kinks, tells)
@@ -202,7 +209,8 @@ def advance(states, parameters, kinks, order, offset, most_kinks, tells=False):
         EVENT, order=order, load=loaded_rows(rows, [name for name in rows if name not in results]),
         parameters=listed(parameters), begin=begin.rstrip(), states=listed(states), signs=listed(signs),
         ons=listed(ons), offset=offset, most_kinks=most_kinks, store=stored_rows(rows, changed),
-        **_landing(states, signs, ons), **_switching(states, signs, ons, results),
+        **(_landing(states, signs, ons) | _sliding(states, signs, ons, slides)),
+        **_switching(states, signs, ons, results),
         **(_telling(states, signs) if tells else dict.fromkeys(_TELLING, "")),
     )  # fmt: skip
 
@@ -239,6 +247,20 @@ def _landing(states, signs, ons):
     return {
         "land": "\n".join(chosen("moving", states, "leg.state")),
         "turn": "\n".join(f"{s} = where(moving & ({o} > 0.5), -{s}, {s})" for s, o in zip(signs, ons[1:], strict=True)),
+    }
+
+
+def _sliding(states, signs, ons, slides):
+    """Statements where a motion may slide: before its first leg, behind one, before the next."""
+    if not slides:
+        return {"press_fresh": "", "endless": "", "press": ""}
+    fresh = press("fresh", states, signs, ons, ["0.0 * side"] * len(signs))
+    left = [f"where(switches, 0.0, left_{j})" for j in range(len(signs))]
+    return {
+        "endless": endless(signs),
+        "turn": turned(signs),
+        "press_fresh": f"if any_lane(fresh):\n{indent(fresh, '    ')}",
+        "press": press("moving", states, signs, ons, left),
     }
 
 

@@ -28,6 +28,7 @@ from kernels.codegen.power_core import CORE, core
 from kernels.codegen.record import record
 from kernels.codegen.rounding_source import LOST, SIZES, lost_by_surface
 from kernels.codegen.series_source import Lines
+from kernels.codegen.sliding_source import ENDLESS, JUDGE, LEAVE, PRESS, PRESSED, of_sliding
 from kernels.codegen.tangent import TANGENT, Tangents, tangent
 from kernels.codegen.template import filled, listed
 from kernels.lanes import cache
@@ -56,7 +57,7 @@ from kernels.lanes.refill import each_refilled
 from kernels.codegen.module import kept
 from kernels.integrate.taylor import (
     COME_UP, HALVINGS, LONGEST, ROUNDING, SAME, SLACK, STEP_LIMIT, box, clear, crossing, falls, keeps, last_term, mean,
-    natural_power, next_step, of_series, of_sum, rises, size, stays_apart, tail, worse,
+    natural_power, next_step, of_series, of_sum, rises, size, stays_apart, tail, tail_of_sum, worse,
 )
 from kernels.codegen.power_core import FAR, SHORT, UNEVEN, core_time, mean_power, no_matter, size_in_unit
 from kernels.codegen.driver_source import BLUR, EVENTS, KINK_LIMIT, time_unit
@@ -93,7 +94,8 @@ def series_{order}(state, side, signs, parameters, unit{also}):
 
 _OF_LEG = LEG, LOOK, FACTS, START, BY_KINK, ROOT
 _OF_ERROR = TANGENT, SIZES, STEP, END
-_TEXTS = HEAD, FUNCTION, SERIES, HIDDEN, LOST, CORE, BEGIN, EVENT, BEGUN, SETTLED, *_OF_LEG, *_OF_ERROR
+_OF_SLIDING = PRESSED, JUDGE, ENDLESS, LEAVE, PRESS
+_TEXTS = HEAD, FUNCTION, SERIES, HIDDEN, LOST, CORE, BEGIN, EVENT, BEGUN, SETTLED, *_OF_LEG, *_OF_ERROR, *_OF_SLIDING
 _TAKEN = set(re.findall(r"\w+", "".join(_TEXTS))) | {"n", "p", "s"}
 _PREFIXES = "at|s|end|box|size|bare|full|kink|most|half|over|and_one|half_over|off|due|delta|noise|rate|made|coarse"
 _NUMBERED = re.compile(rf"\w*_\d+|n\d+|({_PREFIXES})_\w*")
@@ -182,7 +184,7 @@ class Writer:
     def advance(self, order, tells=False):
         """The text of `advance_{order}` and `run_{order}`."""
         most = "KINK_LIMIT" if self.scene.most_kinks is None else repr(float(self.scene.most_kinks))
-        return advance(self.states, self.parameters, self.kinks, order, self.offset(), most, tells)
+        return advance(self.states, self.parameters, self.kinks, order, self.offset(), most, tells, self.scene.slides)
 
     def summed(self):
         """The states whose rate is another state, and which."""
@@ -220,7 +222,7 @@ class Writer:
         ) + of_tangent  # fmt: skip
 
     def text(self):
-        """The whole module."""
+        """The whole module; of a scene that slides without the Taylor method, which does not follow that."""
         scene, recorded = self.scene, self.recorded
         moving = ("state", "side", "signs", "parameters")
         of_hidden, *hides = hidden(self)
@@ -239,6 +241,8 @@ class Writer:
             shared(self.states, self.parameters, self.kinks),
             of_hidden,
         ]  # fmt: skip
+        if scene.slides:
+            return "\n".join([*parts, of_sliding(self)])
         parts += [core(self, i) for i in range(len(recorded.graph.powers))]
         for order in ORDERS:
             parts.append(self.series(order, len(recorded.graph.powers)))

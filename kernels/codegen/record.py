@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kernels.codegen.expression import ADD, FUNCTIONS, SCALED, Expression, Graph, SceneError
+from kernels.codegen.sliding import slid
 
 RESERVED = ("side", "flips", "time", "interval", "rtol", "status")
 """Names that a scene's states and parameters cannot have."""
@@ -16,7 +17,8 @@ class Recorded:
     """The expressions of a scene, in one graph.
 
     `events` are (offset, factor, u): each fires where offset + factor u falls through 0; the first is the switch, the
-    others are the kinks. `timed` are the rates per unit of time, an input ".unit" in seconds.
+    others are the kinks. `timed` are the rates per unit of time, an input ".unit" in seconds. `onto` and `speeds` are
+    those of `sliding.slid`.
     """
 
     graph: Graph
@@ -27,6 +29,8 @@ class Recorded:
     started: tuple[Expression, ...]
     events: tuple[tuple[Expression, Expression, Expression], ...]
     nested: int
+    onto: tuple[Expression, ...] = ()
+    speeds: tuple[tuple[Expression, Expression], ...] = ()
 
 
 def record(scene):
@@ -46,7 +50,7 @@ def record(scene):
     started = _called(graph, scene, "start", constants, len(states))
     kinks = [(graph.of(0.0), graph.constant(f".sign_{j}"), u) for j, u in enumerate(graph.kinks)]
     events = (_affine(graph, surface), *kinks)
-    return Recorded(
+    recorded = Recorded(
         graph,
         rates,
         timed,
@@ -56,6 +60,7 @@ def record(scene):
         events,
         _nested(events, dict(zip(states.values(), rates, strict=True))),
     )
+    return slid(recorded, scene.states) if scene.slides else recorded
 
 
 def _called(graph, scene, role, named, length):

@@ -21,6 +21,8 @@ BLUR = 1e-14
 APART = {"dopri5": followed_twice.APART, "dop853": 4.0, "rodas5p": followed_twice.APART}
 """How many rtol the two runs may differ by; DOP853's weights of up to 43 make more of rounding than the others do."""
 
+PAIRS = "DOPRI5", "DOP853", "RODAS5P_PAIR"
+
 FINEST = 1e-13
 """The tightest tolerance that is tried where a wider one fails: below it rounding stops the steps."""
 
@@ -174,13 +176,14 @@ from collections import namedtuple
 
 from {steps} import M
 from kernels.integrate.adaptive import to_event
-from kernels.integrate.pairs import DOP853, DOPRI5
+from kernels.integrate.pairs import DOP853, DOPRI5, Trial
 from kernels.integrate.records import Mode
 from kernels.integrate.rosenbrock import RODAS5P_PAIR, followable
 {linear}
 
 Stiff = namedtuple("Stiff", (*M._fields, "factored", "solved"))
 M_STIFF = Stiff(*M, factored, solved)
+{kept}
 
 
 @jit_call
@@ -204,6 +207,29 @@ def to_event_rodas5p(state, side, signs, parameters, unit, h, on, tolerance, act
 '''
 
 
+KEPT = '''
+free_{pair}, free_dense_{pair} = {pair}.tried, {pair}.dense
+
+
+@jit_call
+def tried_{pair}(m, state, mode, h):
+    """A step whose end is put back onto the kink that it slides along."""
+    trial = free_{pair}(m, state, mode, h)
+    new = onto(trial.new, mode.side, mode.signs, mode.parameters)
+    return Trial(new, trial.stages, trial.last, trial.error)
+
+
+@jit_call
+def dense_{pair}(m, state, terms, mode, h, part):
+    """The dense output, put back likewise."""
+    found = free_dense_{pair}(m, state, terms, mode, h, part)
+    return onto(found, mode.side, mode.signs, mode.parameters)
+
+
+{pair} = {pair}._replace(tried=tried_{pair}, dense=dense_{pair})
+'''
+
+
 def twice_by(method, scene):
     """The function of columns (`followed_twice.twice`) that follows the scene by a method of `APART`."""
 
@@ -219,7 +245,8 @@ def adaptive(scene):
     """The module of the scene's legs to a tolerance, with a `run_{method}` for each method of `APART`."""
     module, steps, writer = build(scene), stepped(scene), Writer(scene, record(scene))
     names = {"name": scene.name, "module": module.__name__, "steps": steps.__name__}
-    text = filled(LEGS, **names, linear=linear(writer)).lstrip()
+    kept = [KEPT.format(pair=pair) for pair in PAIRS] if scene.slides else []
+    text = filled(LEGS, **names, kept="".join(kept), linear=linear(writer)).lstrip()
     for method in APART:
         text += writer.advance(method)
     return loaded("legs", scene, text)

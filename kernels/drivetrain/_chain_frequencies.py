@@ -12,8 +12,8 @@ Source: as `_dqds`.
 from kernels.drivetrain._chain import same, units
 from kernels.drivetrain._dqds import eigenvalues, next_traces
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
-from kernels.lanes.columns import entry
-from kernels.lanes.groups import GROUP, cells_at, each_group, room
+from kernels.lanes.columns import entry, in_groups
+from kernels.lanes.groups import GROUP, cells_at, room
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import not_, sqrt, where
 from kernels.maths.elementary import is_normal, scale
@@ -65,7 +65,8 @@ def row_at(j):
 
 
 @jit
-def _group(first, J, k, frequency, status, rows):
+def _group(first, columns, rows):
+    J, k, frequency, status = columns
     n = J.shape[1]
     part = GROUP * n
     inertias, springs, found, entries = rows, rows[part:], rows[2 * part :], rows[3 * part :]
@@ -82,4 +83,4 @@ def _group(first, J, k, frequency, status, rows):
 @entry()
 def natural_frequencies_of_all(J, k, frequency, status):
     """`natural_frequencies` of every row of J, k and frequency, of shape (n_cells, n); and every status."""
-    each_group(_group, (J, k, frequency, status, room(6 * J.shape[1] + 2)))
+    in_groups(_group, (J, k, frequency, status), (room(6 * J.shape[1] + 2),))

@@ -11,6 +11,7 @@ nothing in its place that is read.
 """
 
 import contextlib
+import fcntl
 import functools
 import hashlib
 import multiprocessing
@@ -32,6 +33,8 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataC
 PACKAGE = Path(__file__).parents[1]
 OLD_SECONDS = 30 * 24 * 3600
 """Folders of other sources, versions or CPUs that were not used for so long are removed."""
+MOST_COMPILE_SECONDS = 120
+"""What a process waits for another one that compiles the same."""
 
 
 def _digest():
@@ -154,6 +157,14 @@ def _write(path, content):
     Path(draft).replace(path)
 
 
+def _lock(file):
+    """Locks a file until it is closed; gives up where its holder takes longer than anything takes to compile."""
+    for _ in range(round(MOST_COMPILE_SECONDS / 0.05)):
+        with contextlib.suppress(BlockingIOError):
+            return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        time.sleep(0.05)
+
+
 class _Cache(FunctionCache):
     """numba's cache of one function, in FOLDER; a fault of the disk or a damaged file only means to compile."""
 
@@ -162,6 +173,15 @@ class _Cache(FunctionCache):
     def __init__(self, py_func):
         super().__init__(py_func)
         self._cache_file = _Files(self._cache_path, self._impl.filename_base, FOLDER.name)
+
+    @contextlib.contextmanager
+    def alone(self):
+        """Has other processes wait while this one compiles what is not kept yet, for they can load it then."""
+        with contextlib.ExitStack() as open_files:
+            if not Path(self._cache_file._index_path).exists():
+                with contextlib.suppress(OSError):  # a folder without locks: each compiles for itself
+                    _lock(open_files.enter_context(Path(f"{self._cache_file._index_path}.lock").open("wb")))
+            yield
 
     def load_overload(self, sig, target_context):
         try:

@@ -222,9 +222,10 @@ def judge(t: Array, z: Array, sigma: Array, bound: Array, given: Given) -> Judge
 def _noisy(t: Array, z: Array, off: Array, given: Given) -> Judged:
     kind = given.noise if isinstance(given.noise, str) else None
     found = scattered(t, z, given.confidence, kind)
-    bent = bend(t, z, given.confidence) if kind is None else None
+    even = np.ones(t.size)
+    bent = bend(t, z, given.confidence, found.weights if found.kind == "uneven" else even) if kind is None else None
     if bent is not None:
-        return Judged("bent", np.ones(t.size), found.error, *bent, fits=False)
+        return Judged("bent", even, found.error, *bent, fits=False)
     denied = kind == "independent" and runs_deny(off)
     return Judged(found.kind, found.weights, found.error, found.low, found.high, not denied)
 

@@ -9,7 +9,7 @@ import json
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -206,6 +206,7 @@ def _called(node: ast.Call, package: Sequence[str]) -> Iterator[str]:
         yield _absolute(package, len(name) - len(module), module)
 
 
+@cache
 def version(name: str) -> str:
     """Of a package."""
     try:

@@ -133,8 +133,7 @@ def _bend(
     if y.sizes[str(y[x].dims[0])] < FEWEST_POINTS:
         return None
     try:
-        told = True if isinstance(noise, str) else noise
-        found = fit_two_laws(y, x, window, confidence=confidence, noise=told)
+        found = fit_two_laws(y, x, window, confidence=confidence, noise=noise)
     except SweepError:  # the window leaves too few points
         return None
     return found if bool((found.regimes == 2).any()) else None

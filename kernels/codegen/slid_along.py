@@ -1,0 +1,33 @@
+"""Columns of cells that stick on a kink, followed along it (`sliding`); what rests there for ever sticks as before."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from kernels.codegen.record import record
+from kernels.codegen.stepped_source import twice_by
+from kernels.interface import Status
+
+
+def slid_along(how, scene, methods):
+    """The function of columns `how`, whose cells that stick are followed from their start by these methods, that slide.
+
+    A cell goes to the next method where one finds no end of its slide; with none left it STICKS.
+    Powers of abs(u) are followed to u = 0 by the Taylor method alone (`power_core`): scenes with such stay as they are.
+    """
+    graph = record(scene).graph
+    if graph.powers or not graph.kinks:
+        return how
+
+    def solve(module, columns, rtol, outputs, status):
+        how(module, columns, rtol, outputs, status)
+        for method in methods:
+            cells = np.flatnonzero(status == Status.STICKS)
+            if len(cells):
+                found, verdict = np.full((len(outputs), len(cells)), np.nan), np.empty(len(cells), np.int8)
+                slid = twice_by(method, replace(scene, slides=True))
+                slid(module, [c[cells] for c in columns], rtol[cells], list(found), verdict)
+                for column, values in zip((*outputs, status), (*found, verdict), strict=True):
+                    column[cells] = values
+
+    return solve

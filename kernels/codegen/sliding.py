@@ -1,0 +1,116 @@
+"""A scene whose motion goes on along a kink onto which both sides press it, by Filippov's field.
+
+With u = 0 on the kink, f+ and f- the rates above and below it and u'(f) the rate of u along them, where
+    u'(f+) < 0 < u'(f-):  f = f- + a (f+ - f-),  a = u'(f-)/(u'(f-) - u'(f+))                             (1)
+keeps u at 0. The motion leaves to the side whose u' comes to 0: where -u'(f+) u'(f-) falls through 0, which is the
+kink's event while the motion slides. All of this is recorded in the graph of the scene itself: the sign of a kink is
+0 while the motion slides along it, and with signs of 1 and -1 everything is as before. One kink is slid along at once.
+Source: Filippov, Differential Equations with Discontinuous Righthand Sides (1988), section 4.
+"""
+
+from dataclasses import replace
+
+from kernels.codegen.expression import ADD, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED
+from kernels.codegen.tangent import Tangents
+
+
+class Side:
+    """Expressions with the signs of kinks replaced.
+
+    Parameters
+    ----------
+    graph : of the expressions, which takes the new ones too
+    signs : dict from the number of a kink to what stands for its sign
+    """
+
+    def __init__(self, graph, signs):
+        self._graph = graph
+        self._reused = {_sign(graph, j).index: sign for j, sign in signs.items()}
+
+    def of(self, x):
+        """The expression on this side."""
+        if x.index not in self._reused:
+            self._reused[x.index] = self._of(x)
+        return self._reused[x.index]
+
+    def _of(self, x):
+        if x.kind in (INPUT, NUMBER):
+            return x
+        return _made(self._graph, x.kind, [self.of(a) for a in x.args])
+
+
+def _made(graph, kind, args):
+    """The expression of that kind."""
+    made = {ADD: graph.add, MUL: graph.multiply, SCALED: graph.multiply, DIV: graph.divide, "power": graph.power}
+    made |= {"abs": graph.magnitude, "sign": graph.sign, HALF_SQUARE: lambda u: 0.5 * u * u}
+    return made[kind](*args) if kind in made else graph.function(kind, *args)
+
+
+def _sign(graph, j):
+    return graph.constant(f".sign_{j}")
+
+
+def _free(graph, j):
+    """0 while the motion slides along the kink, else 1."""
+    return _sign(graph, j) * _sign(graph, j)
+
+
+def _jump(x, behind, ahead):
+    """What an expression is more on one side than on the other: terms that are the same cancel before any rounding."""
+    before, after = behind.of(x), ahead.of(x)
+    if before is after:
+        return x.graph.of(0.0)
+    if x.kind == ADD:
+        return _jump(x.args[0], behind, ahead) + _jump(x.args[1], behind, ahead)
+    if x.kind in (MUL, SCALED):
+        u, w = x.args
+        return _jump(u, behind, ahead) * ahead.of(w) + behind.of(u) * _jump(w, behind, ahead)
+    return after - before
+
+
+def slid(recorded, states):
+    """The recorded scene with (1), for signs that may be 0.
+
+    Its `onto` are the states put back onto the kink, along f+ - f-: only what the kink's force acts on is changed.
+    `speeds` are for each kink u'(f+) and u'(f-), the other signs as they are.
+    """
+    graph, kinks = recorded.graph, list(recorded.graph.kinks)
+    free = [_free(graph, j) for j in range(len(kinks))]
+    slides = [1.0 - f for f in free]
+    behind, ahead = (
+        Side(graph, {j: _sign(graph, j) + way * slide for j, slide in enumerate(slides)}) for way in (-1.0, 1.0)
+    )
+    below, jumps = [behind.of(r) for r in recorded.rates], [_jump(r, behind, ahead) for r in recorded.rates]
+    gradients = [[Tangents.along(graph, s).of(u) for s in states] for u in kinks]
+    down = sum((w * _along(graph, g, below) for w, g in zip(slides, gradients, strict=True)), graph.of(0.0))
+    rise = sum((w * _along(graph, g, jumps) for w, g in zip(slides, gradients, strict=True)), graph.of(0.0))
+    over = sum(slides, graph.of(0.0))
+    share = down / (1.0 - over - rise)
+    off = sum((w * u for w, u in zip(slides, kinks, strict=True)), graph.of(0.0)) / (1.0 - over - rise)
+    at = [graph.series(s) for s in states]
+    stays = [free[kinks.index(s)] if s in set(kinks) else graph.of(1.0) for s in at]
+    rates = tuple(k * (f + share * jump) for k, f, jump in zip(stays, below, jumps, strict=True))
+    products = [w * (down + rise) * down for w in slides]
+    events = [(graph.of(0.0), graph.of(1.0), _sign(graph, j) * u - products[j]) for j, u in enumerate(kinks)]
+    unit = graph.constant(".unit")
+    return replace(
+        recorded,
+        rates=rates,
+        timed=tuple(graph.timed(rate, unit) for rate in rates),
+        events=(recorded.events[0], *events),
+        nested=0,
+        onto=tuple(k * (s + off * jump) for k, s, jump in zip(stays, at, jumps, strict=True)),
+        speeds=tuple(_speeds(graph, recorded.rates, g, j) for j, g in enumerate(gradients)),
+    )
+
+
+def _along(graph, gradient, rates):
+    """The rate of what has that gradient."""
+    products = [slope * rate for slope, rate in zip(gradient, rates, strict=True) if slope is not None]
+    return sum(products, graph.of(0.0))
+
+
+def _speeds(graph, rates, gradient, j):
+    """u'(f+) and u'(f-) of a kink."""
+    sides = (Side(graph, {j: graph.of(sign)}) for sign in (1.0, -1.0))
+    return tuple(_along(graph, gradient, [side.of(rate) for rate in rates]) for side in sides)
