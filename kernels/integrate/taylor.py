@@ -278,7 +278,8 @@ def of_sum(t, curve):
 @jit
 def foreseen(e, d, dd, ddd, h):
     """About where an event falls through 0 in (0, h], by its coefficients 0 to 3; the middle where they do not tell."""
-    t = 2.0 * e / (sqrt(fma(d, d, -4.0 * (dd * e))) - d)
+    bend = fma(d, d, -4.0 * (dd * e))
+    t = 2.0 * e / (sqrt(where(bend > 0.0, bend, 0.0)) - d)
     t = t - fma(t, fma(t, fma(t, ddd, dd), d), e) / fma(t, fma(3.0 * t, ddd, 2.0 * dd), d)
     return where((t > 0.0) & (t < h), t, 0.5 * h)
 
@@ -296,6 +297,7 @@ def crossing(at, curve, event, facts, h, tolerance, searching):
     event : offset, factor and u(0) of the event offset + factor u
     facts : coefficients 0 to 3 of the event
     """
+    stays_apart(h)
     offset, factor, start = event
     before, enough = 0.0 * h, 0.01 * tolerance + 1e-17
     low, high, t, left = 0.0 * h, h, foreseen(*facts, h), searching
