@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.analysis.correlated import corrected
-from sweep.analysis.curves import Window, like, title, window_logs, window_of
+from sweep.analysis.curves import Window, check_output, like, title, window_logs, window_of
 from sweep.analysis.loglog import EPSILON, Array
 from sweep.analysis.scatter import BEYOND_DOUBT, RARE, line_deviance
 from sweep.analysis.shapes import CORRECTION, LAWS, ONE, Found, curve, fitted
@@ -70,6 +70,7 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     >>> sweep.compare_laws(y, "x").attrs["chosen"]
     'offset'
     """
+    check_output(y)
     if y.ndim != 1:
         raise SweepError(
             f"{title(y)} runs along {', '.join(map(str, y.dims))}; compare laws of one line, choose with .sel"

@@ -11,6 +11,7 @@ import xarray as xr
 from sweep.analysis.curves import (
     Window,
     check_confidence,
+    check_dataset,
     ends,
     like,
     numbers_along,
@@ -292,6 +293,8 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     >>> print(f"{float(sweep.crossover(weak, strong).abscissa):.1f}")
     0.6
     """
+    for fit in (low_fit, high_fit):
+        check_dataset(fit, "fit_exponent", ["exponent", "level", "limit_low"])
     _require_apart(low_fit, high_fit)
     first, second = np.log(low_fit.centre), np.log(high_fit.centre)
     middle = (first + second) / 2  # logarithms counted from here keep their digits

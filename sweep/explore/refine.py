@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels.interface import Status
+from sweep.analysis.curves import check_dataset
 from sweep.analysis.mesh import Array
 from sweep.analysis.scattered import MOST_AXES, axes_of
 from sweep.cells.schema import STATUS, cell_schema
@@ -89,6 +90,7 @@ def refine(
     >>> sweep.refine(ds, "period", 1e-3).complete
     True
     """
+    check_dataset(dataset, "run or open_result")
     study = study or study_of(dataset)
     names = [y] if isinstance(y, str) else list(y)
     _require(dataset, study, names, tolerance)
@@ -182,6 +184,7 @@ def study_of(dataset: xr.Dataset, allow_import: bool = False) -> Study:
     >>> sweep.study_of(ds)
     <Study 'foliot over mu': foliot over mu (3)>
     """
+    check_dataset(dataset, "run or open_result")
     if "study_json" not in dataset.attrs:
         raise SweepError("the dataset does not say which study it came from; pass the study")
     return Study.from_json(str(dataset.attrs["study_json"]), allow_import=allow_import)
