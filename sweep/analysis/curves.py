@@ -165,6 +165,23 @@ def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:
     return found
 
 
+MOST_SIGMA = 1e6
+"""Relative standard error beyond which a logarithm says nothing."""
+
+
+def relative_sigma(y: xr.DataArray, sigma: Any) -> xr.DataArray:
+    """Standard errors over y; NaN where none are given. Raises SweepError where they are not above rounding."""
+    found: xr.DataArray = like(np.nan if sigma is None else sigma, y, "sigma") / abs(y)
+    beyond = found.where((found < EPSILON) | (found > MOST_SIGMA))
+    if bool(beyond.notnull().any()):
+        worst = float(beyond.min())
+        raise SweepError(
+            f"sigma: expected standard errors of {EPSILON:.2g} to {MOST_SIGMA:.2g} times {title(y)}, found {worst:.3g} "
+            "times; leave sigma out where values do not scatter"
+        )
+    return found
+
+
 def stated_bound(y: xr.DataArray, bound: Any = None) -> xr.DataArray:
     """Largest relative error of each value: as given, else the `rtol` of the sweep that y says it is of, else 0."""
     check_output(y)

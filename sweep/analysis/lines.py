@@ -13,8 +13,8 @@ from sweep.analysis.curves import (
     check_confidence,
     check_dataset,
     ends,
-    like,
     numbers_along,
+    relative_sigma,
     stated_bound,
     title,
     window_logs,
@@ -156,7 +156,7 @@ def fit_exponent(
     check_noise(noise)
     dimension, t, logs = window_logs(y, dim, window)
     here = window_of(y, dim, window)
-    errors = like(np.nan if sigma is None else sigma / y, y, "sigma").isel(here)
+    errors = relative_sigma(y, sigma).isel(here)
     bounds = stated_bound(y, bound).isel(here)
     given = Given(confidence, noise, sigma is not None)
     names = (*Line._fields, *JUDGED)

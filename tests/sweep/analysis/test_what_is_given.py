@@ -70,3 +70,10 @@ def test_what_is_no_study_has_no_groups(given):
         SweepError, match=f"expected a study, e.g. sweep.study_of\\(ds\\); found a {type(given).__name__}"
     ):
         sweep.scaling(given)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 1e-20, 1e9, LINE * 0])
+@pytest.mark.parametrize("function", [sweep.fit_exponent, sweep.compare_laws])
+def test_standard_errors_of_nothing_or_beyond_all_sense_are_refused(function, sigma):
+    with pytest.raises(SweepError, match=r"sigma: expected standard errors of 2.2e-16 to 1e\+06 times y, found"):
+        function(LINE, "x", sigma=sigma)
