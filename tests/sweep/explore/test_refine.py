@@ -284,6 +284,9 @@ def test_a_refined_result_of_two_axes_is_taken_by_every_command(tmp_path, monkey
         "show fine.h5",
         "fit fine.h5 --y period --x mu --window 20 100",
         "fit fine.h5 --y period --x mu --at R=0.01",
+        "fit fine.h5 --y period --x mu --at R=0.01 --compare",
+        "diff fine.h5 fine.h5",
+        "list .",
         "plot fine.h5",
         "plot fine.h5 --x mu -o points.png",
         "report fine.h5",
@@ -294,6 +297,9 @@ def test_a_refined_result_of_two_axes_is_taken_by_every_command(tmp_path, monkey
         assert main(more.split()) == 0, more
     told = capsys.readouterr().out
     assert "cells are up to a factor" in told
+    assert "lines from end to end of mu; take one by --at, e.g. --at R=" in told
+    assert main(["fit", "fine.h5", "--y", "period", "--x", "mu", "--compare"]) == 2
+    assert "take one by --at, e.g. --at R=" in capsys.readouterr().err
     fine, finer = sweep.open_result("fine.h5"), sweep.open_result("finer.h5")
     assert fine.sizes["cell"] <= finer.sizes["cell"] <= 2000
     both = set(zip(fine.mu.values, fine.R.values, strict=True)) - set(zip(finer.mu.values, finer.R.values, strict=True))
