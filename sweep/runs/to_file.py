@@ -9,6 +9,7 @@ from sweep.cells.block import Found
 from sweep.cells.output_schema import gathered
 from sweep.cells.partition import row_blocks
 from sweep.results.open import stored_fingerprint
+from sweep.results.verify import check_whole
 from sweep.runs import resume
 from sweep.runs.elsewhere import compute_elsewhere, joined, threads
 from sweep.runs.extend import Precomputed, Retried, Reused, is_of_another_version
@@ -57,7 +58,7 @@ def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
     """The cells of the result that is extended. Raises SweepError where that is not possible."""
     if not (task.extend or task.retry_failed) or task.force or not task.output.exists():
         return None
-    resume.check_whole(task)
+    check_whole(task.output)
     if task.retry_failed:
         return stack.enter_context(Retried(task.output, task.study))
     reused = stack.enter_context(Reused(task.output, task.study))
