@@ -3,7 +3,7 @@
 numba's own cache is stale when a *called* module changes. Ours lives in a folder named by a digest of all kernel
 sources, numba, llvmlite and the CPU, so what is found there was compiled from these very sources. A function from
 elsewhere (a user's kernel) is never cached: what it calls is not known here. A cache that cannot be read or written
-is no fault: the function is compiled again.
+is no fault: the function is compiled again. Of processes that need a function at a time one compiles it.
 
 What is read here runs with the user's rights. So nothing is read that is not the user's alone: neither from a folder
 that belongs to somebody else or that others may write to, nor from such a file. Whoever may rename the folder can put
