@@ -158,7 +158,7 @@ def _write(path, content):
 
 
 def _lock(file):
-    """Locks a file until it is closed; gives up where its holder takes longer than anything takes to compile."""
+    """Locks an open file until it is closed; gives up where its holder takes longer than anything takes to compile."""
     for _ in range(round(MOST_COMPILE_SECONDS / 0.05)):
         with contextlib.suppress(BlockingIOError):
             return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -177,10 +177,13 @@ class _Cache(FunctionCache):
     @contextlib.contextmanager
     def alone(self):
         """Has other processes wait while this one compiles what is not kept yet, for they can load it then."""
-        with contextlib.ExitStack() as open_files:
-            if not Path(self._cache_file._index_path).exists():
+        index = self._cache_file._index_path
+        with contextlib.ExitStack() as held:
+            if not Path(index).exists():
                 with contextlib.suppress(OSError):  # a folder without locks: each compiles for itself
-                    _lock(open_files.enter_context(Path(f"{self._cache_file._index_path}.lock").open("wb")))
+                    file = os.open(f"{index}.lock", os.O_CREAT | os.O_WRONLY, 0o600)
+                    held.callback(os.close, file)
+                    _lock(file)
             yield
 
     def load_overload(self, sig, target_context):
