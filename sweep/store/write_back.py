@@ -6,6 +6,8 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator
 
+ENOUGH_BYTES = 1 << 20
+"""What the disk takes for less is the time of a call, not of the bytes."""
 READ_BACK_SECONDS = 0.1
 """About what it takes to end a file and to read some of it back."""
 
@@ -36,9 +38,10 @@ class WriteBack:
         """What is written comes to the disk within."""
         some, self._begun = self.written, self._clock()
         yield
-        self._seconds += self._clock() - self._begun
-        self._begun, self._bytes = None, self._bytes + some
+        taken, self._begun = self._clock() - self._begun, None
         self.written, self.left = self.written - some, self.left - some
+        if some >= ENOUGH_BYTES:
+            self._seconds, self._bytes = self._seconds + taken, self._bytes + some
 
     def seconds(self) -> tuple[float, float]:
         """What the disk takes for what is written, and for all that is to come.
