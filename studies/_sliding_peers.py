@@ -15,7 +15,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 MU = 1.0
-MOST = 20_000
+MOST = 5_000
 
 
 class TooManyCalls(Exception):

@@ -23,21 +23,21 @@ from _sliding_peers import FOLLOWERS, motion
 
 from kernels.interface import FIRST_REFUSAL, Status
 
-TOLERANCES = 10.0 ** -np.arange(3.0, 11.5, 2.0)
+TOLERANCES = 10.0 ** -np.arange(3.0, 10.5, 3.0)
 FLIPS = 5.0
 """Counts of the mass in the maps and costs of others: two cycles."""
-COARSE = 4
+COARSE = 6
 """Every so many-th cell of the sweep's axes is one of the others' maps."""
 STEP = 0.01
 LOOSE = 1e-6
 """The others' tolerance in their maps."""
 CELLS = 256
-FEW = 32
+FEW = 64
 """Cells of our own in the cost; of the others every so many-th."""
 
 NOTES = f"""\
 error: of the time of the last count, relative to the closed form; of others by where they are at the true time
-Others get the sign as it is and 20 000 calls of the rates a cell; absolute tolerance is a thousandth of the relative
+Others get the sign as it is and 5 000 calls of the rates a cell; absolute tolerance is a thousandth of the relative
 one. Their maps, and the fixed step of {STEP:g}, are of two cycles. Times are of one core, CPU seconds"""
 
 

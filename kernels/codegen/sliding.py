@@ -64,7 +64,9 @@ def _jump(x, behind, ahead):
         return _jump(x.args[0], behind, ahead) + _jump(x.args[1], behind, ahead)
     if x.kind in (MUL, SCALED):
         u, w = x.args
-        return _jump(u, behind, ahead) * ahead.of(w) + behind.of(u) * _jump(w, behind, ahead)
+        by_u = ahead.of(w) * _jump(u, behind, ahead) if behind.of(u) is not ahead.of(u) else 0.0
+        by_w = behind.of(u) * _jump(w, behind, ahead) if behind.of(w) is not ahead.of(w) else 0.0
+        return by_u + by_w
     return after - before
 
 

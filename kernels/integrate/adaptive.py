@@ -31,6 +31,8 @@ CLOSE = 30.0
 
 SUNK, ROUNDED = 0.01, 1e-12
 """How far below an event that it starts on a motion may fall within a step: of the tolerance, and by rounding."""
+HALVED = 30.0
+"""Halvings after which a motion that starts on an event with no rate has not risen from it."""
 
 
 class Course(NamedTuple):
@@ -195,6 +197,14 @@ def allowed(m, pair, mode, step, trial, course, tolerance):
 
 
 @jit
+def leaves(step, which, course, tolerance):
+    """Whether a motion leaves the event that it starts on and has met again: also by its bend alone."""
+    rate, end = of_event(step.start_rates, which), of_event(step.end, which)
+    flat = (end < 0.0) & (-step.h * rate <= -fma(SUNK, tolerance, ROUNDED) * end)
+    return (rate > 0.0) | (flat & (course.cuts < HALVED))
+
+
+@jit
 def sinks(step, on, tolerance):
     """Whether a motion falls below an event that it starts on, and is above it again where the step ends."""
     below = step.h < 0.0
@@ -210,7 +220,7 @@ def searched(m, pair, mode, step, trial, course, which, tolerance, ending):
     fine, was_cut = course.moving & not_(ending.again), not_(course.cuts < 0.5)
     met = fine & (which > -0.5)
     pressed = met & (of_event(course.on, which) > 0.5)
-    away = of_event(step.start_rates, which) > 0.0
+    away = leaves(step, which, course, tolerance)
     low = where(fine & not_(met | was_cut), dip(step), 0.0)
     again = ending.again | (pressed & away) | (low > 0.0) | (fine & not_(pressed) & sinks(step, course.on, tolerance))
     shorter = where(ending.again, ending.shorter, where(low > 0.0, low * course.h, 0.5 * course.h))
