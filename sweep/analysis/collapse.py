@@ -62,7 +62,7 @@ def fit_over(
     1.000000
     """
     check_confidence(confidence)
-    check_dataset(fits, "fit_exponent", ["exponent", "exponent_low", "exponent_high"])
+    check_dataset("fit_over", fits, "fit_exponent", ["exponent", "exponent_low", "exponent_high"])
     p = fits["exponent"]
     if p.dims != (dim,):
         raise SweepError(f"exponents run along {', '.join(map(str, p.dims)) or 'nothing'}, expected {dim} alone")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sweep.analysis.loglog import EPSILON, FEWEST, Array
 from sweep.system.errors import SweepError
+from sweep.system.expected import kind, require_dataset
 
 Window = tuple[float | None, float | None]
 
@@ -20,18 +21,17 @@ Window = tuple[float | None, float | None]
 def check_output(y: Any) -> None:
     """Raises SweepError where y is no DataArray of numbers."""
     if not isinstance(y, xr.DataArray):
-        raise SweepError(f"expected one output, e.g. ds.period; found a {type(y).__name__}")
+        raise SweepError(f"expected one output, e.g. ds.period; found {kind(y)}")
     if y.dtype.kind not in "fiub":
         raise SweepError(f"{title(y)}: expected real numbers, found {y.dtype}")
 
 
-def check_dataset(dataset: Any, whose: str, needs: Sequence[str] = ()) -> None:
-    """Raises SweepError where it is no Dataset with these variables; `whose`: from what it comes."""
-    if not isinstance(dataset, xr.Dataset):
-        raise SweepError(f"expected a Dataset from {whose}; found a {type(dataset).__name__}")
-    missing = [name for name in needs if name not in dataset]
+def check_dataset(name: str, given: Any, maker: str = "", needs: Sequence[str] = ()) -> None:
+    """Raises SweepError where what `sweep.name` was given is no Dataset with these variables; `maker` gives one."""
+    require_dataset(name, given, maker)
+    missing = [variable for variable in needs if variable not in given]
     if missing:
-        raise SweepError(f"expected a Dataset from {whose}; this one has no {', '.join(map(str, missing))}")
+        raise SweepError(f"sweep.{name}: this Dataset has no {', '.join(map(str, missing))}")
 
 
 def positive_axis(y: xr.DataArray, dim: str) -> tuple[str, Array]:
@@ -213,7 +213,7 @@ def stated_error(dataset: xr.Dataset, name: str) -> xr.DataArray:
     >>> float(sweep.stated_error(ds, "period").max())
     1e-06
     """
-    check_dataset(dataset, "run or open_result", [name])
+    check_dataset("stated_error", dataset, needs=[name])
     rtol = dataset["rtol"] if "rtol" in dataset.coords else float(dataset.attrs.get("rtol", 0.0))
     found = like(rtol, dataset[name], "rtol")
     if "error_bound" in dataset:

@@ -294,7 +294,7 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     0.6
     """
     for fit in (low_fit, high_fit):
-        check_dataset(fit, "fit_exponent", ["exponent", "level", "limit_low"])
+        check_dataset("crossover", fit, "fit_exponent", ["exponent", "level", "limit_low"])
     _require_apart(low_fit, high_fit)
     first, second = np.log(low_fit.centre), np.log(high_fit.centre)
     middle = (first + second) / 2  # logarithms counted from here keep their digits

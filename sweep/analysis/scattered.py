@@ -17,10 +17,10 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from sweep.analysis.curves import check_dataset
 from sweep.analysis.mesh import Array, Indices, tilted
 from sweep.analysis.metric import stretch
 from sweep.system.errors import SweepError
+from sweep.system.expected import require_dataset
 
 LOGARITHMIC = 1.999
 """Ratio of its ends from which on a positive axis is taken in logarithms; below, it makes no difference."""
@@ -131,7 +131,7 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     >>> sweep.interpolated(fine.dataset, {"mu": [0.3, 3.0], "a": [0.7]}).sizes["mu"]
     2
     """
-    check_dataset(dataset, "refine")
+    require_dataset("interpolated", dataset, "refine")
     names = axes_of(dataset)
     if not names:
         raise SweepError("only cells that fill a box of two axes and more, as those of `refine`, can be interpolated")

@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sweep.analysis.curves import check_dataset, check_output
+from sweep.analysis.curves import check_output
 from sweep.explore.refine import study_of
 from sweep.explore.symmetries import Scalings, scalings
 from sweep.study.model import Study
 from sweep.system.errors import SweepError
+from sweep.system.expected import kind, require_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -128,7 +129,7 @@ def scaling(study: Study) -> Scaling:
     one-dimensional in mu, a: only mu/(phi0 a^2) matters; 1 of these axes can be left out; tried on ... cells at random
     """
     if not isinstance(study, Study):
-        raise SweepError(f"expected a study, e.g. sweep.study_of(ds); found a {type(study).__name__}")
+        raise SweepError(f"expected a study, e.g. sweep.study_of(ds); found {kind(study)}")
     found = scalings(study)
     fields = {f.name: f for f in (*study.kernel.parameters, *study.kernel.along)}
     scaled = [name for name in fields if any(found.weights(name))]
@@ -177,7 +178,7 @@ def rescaled(dataset: xr.Dataset, study: Study | None = None) -> xr.Dataset:
     >>> sorted(set(sweep.rescaled(ds).variables) - set(ds.variables))
     ['group_1']
     """
-    check_dataset(dataset, "run or open_result")
+    require_dataset("rescaled", dataset)
     study = study or study_of(dataset)
     found = scaling(study)
     values = {str(name): dataset[name] for name in dataset.coords}

@@ -24,7 +24,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels.interface import Status
-from sweep.analysis.curves import check_dataset
 from sweep.analysis.mesh import Array
 from sweep.analysis.scattered import MOST_AXES, axes_of
 from sweep.cells.schema import STATUS, cell_schema
@@ -91,7 +90,7 @@ def refine(
     >>> sweep.refine(ds, "period", 1e-3).complete
     True
     """
-    check_dataset(dataset, "run or open_result")
+    require_dataset("refine", dataset)
     study = study or study_of(dataset)
     names = [y] if isinstance(y, str) else list(y)
     _require(dataset, study, names, tolerance)
