@@ -79,7 +79,7 @@ def _run_session(session: Session, store: Store, cluster: Cluster | None) -> boo
             _begin(session, store, shared=cluster is not None)
         if cluster is None:
             left = sum(stop - start for start, stop in map(session.blocks.bounds, store.missing()))
-            store.write_back.left = left * session.blocks.row_bytes
+            store.write_back.total = left * session.blocks.row_bytes
             session.forecast.ending = store.write_back.seconds
         try:
             _finish(session, store, cluster)

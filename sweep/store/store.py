@@ -192,7 +192,7 @@ class Store:
             digests = self.table.write(self._fd, index, arrays)
         with self._turn:
             self._waiting[index] = digests
-            self.write_back.written += sum(array.nbytes for array in arrays.values())
+            self.write_back.put += sum(array.nbytes for array in arrays.values())
         self.tick()
 
     def take(self, index: int, digests: bytes) -> None:
@@ -206,7 +206,10 @@ class Store:
     def tick(self) -> None:
         """Acknowledges what is written, if it is time to. Raises SweepError."""
         with self._turn:
-            due = self.write_back.written >= SYNC_BYTES or time.monotonic() - self._synced >= SYNC_SECONDS
+            due = (
+                self.write_back.put - self.write_back.synced >= SYNC_BYTES
+                or time.monotonic() - self._synced >= SYNC_SECONDS
+            )
         if due and self._waiting and self._committing.acquire(blocking=False):
             try:
                 self._commit()

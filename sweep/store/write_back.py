@@ -17,29 +17,29 @@ class WriteBack:
 
     Parameters
     ----------
-    left : int
+    total : int
         Bytes that are to come to the disk altogether.
     clock : callable
         Seconds.
 
     Attributes
     ----------
-    written : int
-        Bytes that are written, and not known to be on the disk.
+    put, synced : int
+        Bytes that have been written, and of these, those that are on the disk.
     """
 
-    def __init__(self, left: int = 0, clock: Callable[[], float] = time.monotonic) -> None:
-        self.left, self.written, self._clock = left, 0, clock
+    def __init__(self, total: int = 0, clock: Callable[[], float] = time.monotonic) -> None:
+        self.total, self.put, self.synced, self._clock = total, 0, 0, clock
         self._bytes, self._seconds = 0, 0.0
         self._begun: float | None = None
 
     @contextlib.contextmanager
     def syncing(self) -> Iterator[None]:
         """What is written comes to the disk within."""
-        some, self._begun = self.written, self._clock()
+        put, self._begun = self.put, self._clock()
         yield
         taken, self._begun = self._clock() - self._begun, None
-        self.written, self.left = self.written - some, self.left - some
+        some, self.synced = put - self.synced, put
         if some >= ENOUGH_BYTES:
             self._seconds, self._bytes = self._seconds + taken, self._bytes + some
 
@@ -52,5 +52,5 @@ class WriteBack:
         if not self._bytes:
             return waited + READ_BACK_SECONDS, waited + READ_BACK_SECONDS
         pace = self._seconds / self._bytes
-        written, left = (max(some * pace - waited, 0.0) + READ_BACK_SECONDS for some in (self.written, self.left))
-        return written, left
+        written, left = (max((to - self.synced) * pace - waited, 0.0) for to in (self.put, self.total))
+        return written + READ_BACK_SECONDS, left + READ_BACK_SECONDS
