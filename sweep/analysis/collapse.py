@@ -16,10 +16,11 @@ import numpy as np
 import xarray as xr
 
 from sweep.analysis.correlated import student
-from sweep.analysis.curves import check_confidence, check_dataset, check_output, log_of, positive_axis, title
+from sweep.analysis.curves import check_confidence, check_output, log_of, positive_axis, title
 from sweep.analysis.loglog import Array
 from sweep.analysis.scatter import library
 from sweep.system.errors import SweepError
+from sweep.system.expected import check_dataset
 
 
 def fit_over(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sweep.analysis.loglog import EPSILON, FEWEST, Array
 from sweep.system.errors import SweepError
+from sweep.system.expected import check_dataset
 
 Window = tuple[float | None, float | None]
 
@@ -23,15 +24,6 @@ def check_output(y: Any) -> None:
         raise SweepError(f"expected one output, e.g. ds.period; found a {type(y).__name__}")
     if y.dtype.kind not in "fiub":
         raise SweepError(f"{title(y)}: expected real numbers, found {y.dtype}")
-
-
-def check_dataset(dataset: Any, whose: str, needs: Sequence[str] = ()) -> None:
-    """Raises SweepError where it is no Dataset with these variables; `whose`: from what it comes."""
-    if not isinstance(dataset, xr.Dataset):
-        raise SweepError(f"expected a Dataset from {whose}; found a {type(dataset).__name__}")
-    missing = [name for name in needs if name not in dataset]
-    if missing:
-        raise SweepError(f"expected a Dataset from {whose}; this one has no {', '.join(map(str, missing))}")
 
 
 def positive_axis(y: xr.DataArray, dim: str) -> tuple[str, Array]:
@@ -213,7 +205,7 @@ def stated_error(dataset: xr.Dataset, name: str) -> xr.DataArray:
     >>> float(sweep.stated_error(ds, "period").max())
     1e-06
     """
-    check_dataset(dataset, "run or open_result", [name])
+    check_dataset(dataset, needs=[name])
     rtol = dataset["rtol"] if "rtol" in dataset.coords else float(dataset.attrs.get("rtol", 0.0))
     found = like(rtol, dataset[name], "rtol")
     if "error_bound" in dataset:

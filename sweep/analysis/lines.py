@@ -11,7 +11,6 @@ import xarray as xr
 from sweep.analysis.curves import (
     Window,
     check_confidence,
-    check_dataset,
     ends,
     numbers_along,
     relative_sigma,
@@ -23,6 +22,7 @@ from sweep.analysis.curves import (
 from sweep.analysis.loglog import FEWEST, Array, Line, line, slope_bounds, slopes, tends
 from sweep.analysis.scatter import KINDS, bend, is_scatter, rounding, runs_deny, scattered, weighted
 from sweep.system.errors import SweepError
+from sweep.system.expected import check_dataset
 
 METHOD = (
     "least squares in log-log, weighted where sigma is given or the scatter is uneven or has outliers; the interval is "

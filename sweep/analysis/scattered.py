@@ -17,10 +17,10 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from sweep.analysis.curves import check_dataset
 from sweep.analysis.mesh import Array, Indices, tilted
 from sweep.analysis.metric import stretch
 from sweep.system.errors import SweepError
+from sweep.system.expected import check_dataset
 
 LOGARITHMIC = 1.999
 """Ratio of its ends from which on a positive axis is taken in logarithms; below, it makes no difference."""

@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sweep.analysis.curves import check_dataset, check_output
+from sweep.analysis.curves import check_output
 from sweep.explore.refine import study_of
 from sweep.explore.symmetries import Scalings, scalings
 from sweep.study.model import Study
 from sweep.system.errors import SweepError
+from sweep.system.expected import check_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -177,7 +178,7 @@ def rescaled(dataset: xr.Dataset, study: Study | None = None) -> xr.Dataset:
     >>> sorted(set(sweep.rescaled(ds).variables) - set(ds.variables))
     ['group_1']
     """
-    check_dataset(dataset, "run or open_result")
+    check_dataset(dataset)
     study = study or study_of(dataset)
     found = scaling(study)
     values = {str(name): dataset[name] for name in dataset.coords}

@@ -24,7 +24,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels.interface import Status
-from sweep.analysis.curves import check_dataset
 from sweep.analysis.mesh import Array
 from sweep.analysis.scattered import MOST_AXES, axes_of
 from sweep.cells.schema import STATUS, cell_schema
@@ -32,7 +31,7 @@ from sweep.explore.refiner import Refinement, Refiner
 from sweep.study.model import Axis, Study
 from sweep.system import disk
 from sweep.system.errors import SweepError
-from sweep.system.expected import require_dataset
+from sweep.system.expected import check_dataset
 from sweep.system.overwriting import check_target
 
 if TYPE_CHECKING:
@@ -91,7 +90,7 @@ def refine(
     >>> sweep.refine(ds, "period", 1e-3).complete
     True
     """
-    check_dataset(dataset, "run or open_result")
+    check_dataset(dataset)
     study = study or study_of(dataset)
     names = [y] if isinstance(y, str) else list(y)
     _require(dataset, study, names, tolerance)
@@ -185,7 +184,7 @@ def study_of(dataset: xr.Dataset, allow_import: bool = False) -> Study:
     >>> sweep.study_of(ds)
     <Study 'foliot over mu': foliot over mu (3)>
     """
-    require_dataset("study_of", dataset)
+    check_dataset(dataset)
     if "study_json" not in dataset.attrs:
         raise SweepError("the dataset does not say which study it came from; pass the study")
     return Study.from_json(str(dataset.attrs["study_json"]), allow_import=allow_import)

@@ -31,18 +31,18 @@ def result():
 
 @pytest.mark.parametrize("name", OF_A_DATASET)
 def test_what_is_no_dataset_is_told(name, result):
-    for given, found in {3: "an int", None: "nothing", "a.h5": "a str"}.items():
+    for given in (3, None, "a.h5", result.fall_time):
         message = refusal(getattr(sweep, name), given, *OF_A_DATASET[name])
-        assert message.startswith(f"sweep.{name}: expected a Dataset, found {found};")
-    assert "found a DataArray" in refusal(getattr(sweep, name), result.fall_time, *OF_A_DATASET[name])
+        assert message.startswith("expected a Dataset from ")
+        assert f"; found a {type(given).__name__}" in message
 
 
 def test_the_way_to_a_dataset_is_told(result):
-    assert 'sweep.open_result("a.h5")' in refusal(sweep.plot, Path("a.h5"))
+    assert 'open the file first: sweep.open_result("a.h5")' in refusal(sweep.plot, Path("a.h5"))
     assert "sweep.run(study)" in refusal(sweep.plot, sweep.study_of(result, allow_import=True))
-    assert "sweep.compare_laws gives one" in refusal(sweep.plot_laws, 3)
-    assert "expected a Dataset of sweep.work_precision" in refusal(sweep.plot_precision, result)
-    assert "expected a Dataset of sweep.compare_laws" in refusal(sweep.plot_laws, result)
+    assert "from compare_laws; found a int" in refusal(sweep.plot_laws, 3)
+    assert "from work_precision; this one has no error_median" in refusal(sweep.plot_precision, result)
+    assert "from compare_laws; this one has no worse" in refusal(sweep.plot_laws, result)
 
 
 def test_a_result_is_no_study(result):
@@ -51,8 +51,8 @@ def test_a_result_is_no_study(result):
 
 
 def test_what_is_no_study_has_no_text(result):
-    assert "expected a Study, found a Dataset" in refusal(sweep.to_toml, result)
-    assert "expected a Study, found an int" in refusal(sweep.to_toml, 3)
+    assert "found a Dataset" in refusal(sweep.to_toml, result)
+    assert "expected a study, e.g. sweep.study_of(ds); found a int" in refusal(sweep.to_toml, 3)
 
 
 def test_what_names_no_file_is_told():
