@@ -258,7 +258,7 @@ def _sliding(states, signs, ons, slides):
     left = [f"where(switches, 0.0, left_{j})" for j in range(len(signs))]
     return {
         "endless": endless(signs),
-        "turn": turned(states, signs),
+        "turn": turned(signs),
         "press_fresh": f"if any_lane(fresh):\n{indent(fresh, '    ')}",
         "press": press("moving", states, signs, ons, left),
     }

@@ -28,7 +28,7 @@ from kernels.codegen.power_core import CORE, core
 from kernels.codegen.record import record
 from kernels.codegen.rounding_source import LOST, SIZES, lost_by_surface
 from kernels.codegen.series_source import Lines
-from kernels.codegen.sliding_source import ENDLESS, JUDGE, LEAVE, PRESS, PRESSED, TURN, of_sliding
+from kernels.codegen.sliding_source import ENDLESS, JUDGE, LEAVE, PRESS, PRESSED, of_sliding
 from kernels.codegen.tangent import TANGENT, Tangents, tangent
 from kernels.codegen.template import filled, listed
 from kernels.lanes import cache
@@ -94,7 +94,7 @@ def series_{order}(state, side, signs, parameters, unit{also}):
 
 _OF_LEG = LEG, LOOK, FACTS, START, BY_KINK, ROOT
 _OF_ERROR = TANGENT, SIZES, STEP, END
-_OF_SLIDING = PRESSED, JUDGE, ENDLESS, TURN, LEAVE, PRESS
+_OF_SLIDING = PRESSED, JUDGE, ENDLESS, LEAVE, PRESS
 _TEXTS = HEAD, FUNCTION, SERIES, HIDDEN, LOST, CORE, BEGIN, EVENT, BEGUN, SETTLED, *_OF_LEG, *_OF_ERROR, *_OF_SLIDING
 _TAKEN = set(re.findall(r"\w+", "".join(_TEXTS))) | {"n", "p", "s"}
 _PREFIXES = "at|s|end|box|size|bare|full|kink|most|half|over|and_one|half_over|off|due|delta|noise|rate|made|coarse"

@@ -36,11 +36,6 @@ ENDLESS = """\
 sliding = {among} < {kinks} - 0.5
 verdict = where(active & sliding & (leg.lost | leg.broken), STICKS, verdict)"""
 
-TURN = """\
-kept = onto(({states}), side, ({signs}), parameters)
-{keep}
-{leave}"""
-
 LEAVE = """\
 held = moving & (magnitude(sign_{j}) < 0.5)
 left_{j} = where(held & (on_{k} > 0.5), 1.0, 0.0)
@@ -70,11 +65,9 @@ def of_sliding(writer):
     )  # fmt: skip
 
 
-def turned(states, signs):
-    """Statements at the end of a leg: what slid put back onto its kink; other kinks' signs turned round."""
-    leave = [LEAVE.format(j=j, k=1 + j) for j in range(len(signs))]
-    keep = chosen("moving", states, "kept")
-    return filled(TURN, states=listed(states), signs=listed(signs), keep="\n".join(keep), leave="\n".join(leave))
+def turned(signs):
+    """Statements at the end of a leg: which kinks' signs turn round, along which the motion has slid to its end."""
+    return "\n".join(LEAVE.format(j=j, k=1 + j) for j in range(len(signs)))
 
 
 def endless(signs):

@@ -208,18 +208,25 @@ def to_event_rodas5p(state, side, signs, parameters, unit, h, on, tolerance, act
 
 
 KEPT = '''
-of_{pair} = {pair}.tried
+free_{pair}, free_dense_{pair} = {pair}.tried, {pair}.dense
 
 
 @jit_call
 def tried_{pair}(m, state, mode, h):
     """A step whose end is put back onto the kink that it slides along."""
-    trial = of_{pair}(m, state, mode, h)
+    trial = free_{pair}(m, state, mode, h)
     new = onto(trial.new, mode.side, mode.signs, mode.parameters)
     return Trial(new, trial.stages, trial.last, trial.error)
 
 
-{pair} = {pair}._replace(tried=tried_{pair})
+@jit_call
+def dense_{pair}(m, state, terms, mode, h, part):
+    """The dense output, put back likewise."""
+    found = free_dense_{pair}(m, state, terms, mode, h, part)
+    return onto(found, mode.side, mode.signs, mode.parameters)
+
+
+{pair} = {pair}._replace(tried=tried_{pair}, dense=dense_{pair})
 '''
 
 

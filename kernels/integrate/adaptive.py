@@ -18,7 +18,7 @@ from kernels.integrate.steps import ONE, events
 from kernels.integrate.taylor import COME_UP, next_step
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.tuples import after, boxes, marks, reached, times
-from kernels.lanes.vectors import any_lane, choose, magnitude, not_, where
+from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
 
 STEP_LIMIT = 10_000
 SAFETY = 0.25
@@ -27,6 +27,10 @@ CUTS = 60
 ROOT_LIMIT = 60
 CLOSE = 30.0
 """Tolerances within which a turning point of an event is too close to 0 to be told from a crossing."""
+
+
+SUNK, ROUNDED = 0.01, 1e-12
+"""How far below an event that it starts on a motion may fall within a step: of the tolerance, and by rounding."""
 
 
 class Course(NamedTuple):
@@ -191,6 +195,16 @@ def allowed(m, pair, mode, step, trial, course, tolerance):
 
 
 @jit
+def sinks(step, on, tolerance):
+    """Whether a motion falls below an event that it starts on, and is above it again where the step ends."""
+    below = step.h < 0.0
+    for j in range(len(step.end)):
+        fall = -step.h * step.start_rates[j]
+        below = below | ((on[j] > 0.5) & (step.end[j] > 0.0) & (fall > fma(SUNK, tolerance, ROUNDED) * step.end[j]))
+    return below
+
+
+@jit
 def searched(m, pair, mode, step, trial, course, which, tolerance, ending):
     """The ending, on the event that the step meets; or again, for it may hide a root of an event."""
     fine, was_cut = course.moving & not_(ending.again), not_(course.cuts < 0.5)
@@ -198,12 +212,12 @@ def searched(m, pair, mode, step, trial, course, which, tolerance, ending):
     pressed = met & (of_event(course.on, which) > 0.5)
     away = of_event(step.start_rates, which) > 0.0
     low = where(fine & not_(met | was_cut), dip(step), 0.0)
-    again = ending.again | (pressed & away) | (low > 0.0)
+    again = ending.again | (pressed & away) | (low > 0.0) | (fine & not_(pressed) & sinks(step, course.on, tolerance))
     shorter = where(ending.again, ending.shorter, where(low > 0.0, low * course.h, 0.5 * course.h))
     close = was_cut & fine & not_(met) & near_an_event(step.end, course.on, margins(course, tolerance))
     stuck, nothing = pressed & not_(away), ending.loose
     ending = Ending(ending.new, ending.taken, again, shorter, nothing, stuck, close, nothing)
-    seeking = met & not_(pressed)
+    seeking = met & not_(pressed | again)
     if any_lane(seeking):
         ending = onto_event(m, pair, mode, step, trial, course, which, tolerance, seeking, ending)
     return ending

@@ -117,21 +117,10 @@ def run(
     """
     _check_keywords(keys)
     task = _task(
-        as_study(study, **keys),
-        path,
-        workers=workers,
-        force=force,
-        progress=progress,
-        block_cells=block_cells,
-        extend=extend,
-        until=until,
-        cluster=cluster,
-        repair=repair,
-        isolate=isolate,
-        cell_timeout=cell_timeout,
-        retry_failed=retry_failed,
-        without_workers=without_workers,
-    )
+        as_study(study, **keys), path, workers=workers, force=force, progress=progress, block_cells=block_cells,
+        extend=extend, until=until, cluster=cluster, repair=repair, isolate=isolate, cell_timeout=cell_timeout,
+        retry_failed=retry_failed, without_workers=without_workers,
+    )  # fmt: skip
     if path is None:
         try:
             return _run_in_memory(task)
