@@ -197,11 +197,14 @@ def _kind(t: Array, plain: Any, columns: Array) -> str:
         logs = np.log(np.maximum(plain.resid**2, 1e-6 * float(np.mean(plain.resid**2))))
         if sm.OLS(logs, columns).fit().pvalues[1] < UNEVEN:
             return "uneven"
-    # statsmodels fits anew without each point to externalise; of least squares there is a closed form
-    inside = float(np.nanmax(plain.get_influence().resid_studentized_internal ** 2))
-    far = math.sqrt(inside * (t.size - 3) / max(t.size - 2 - inside, 1e-300))
-    alone = 2 * t.size * stdtr(max(1, t.size - 3), -far) < OUTLYING
+    alone = 2 * t.size * stdtr(max(1, t.size - 3), -_farthest(plain)) < OUTLYING
     return "outliers" if t.size >= 8 and alone else "any"
+
+
+def _farthest(plain: Any) -> float:
+    """Largest externally studentized distance from a line; statsmodels, to find it, fits anew without each point."""
+    left, inside = plain.df_resid, float(np.nanmax(plain.get_influence().resid_studentized_internal ** 2))
+    return math.sqrt(inside * (left - 1) / max(left - inside, 1e-300))
 
 
 def _weighted(sm: Any, columns: Array, z: Array, weights: Array, kind: str, confidence: float, **keys: Any) -> Scatter:
