@@ -142,7 +142,8 @@ ROOT = """\
 first = met & passed_{j}
 if any_lane(first):
     {among}
-    at, only_just = crossing({watched}, (offset_{j}, factor_{j}, {value}), span, tolerance, first)
+    event, facts = (offset_{j}, factor_{j}, {value}), (e_{j}, d_{j}, dd_{j}, ddd_{j})
+    at, only_just = crossing({watched}, event, facts, span, tolerance, first)
     end, which, hangs = where(first, at, end), where(first, {j}.0, which), (hangs & not_(first)) | only_just"""
 
 

@@ -26,6 +26,7 @@ from kernels.lanes.vectors import (
     nearest,
     not_,
     pow2,
+    sqrt,
     where,
 )
 
@@ -274,8 +275,17 @@ def of_sum(t, curve):
     return fma(unit * t, mean(t, w), start), unit * horner(t, w), unit * bend
 
 
+@jit
+def foreseen(e, d, dd, ddd, h):
+    """About where an event falls through 0 in (0, h], by its coefficients 0 to 3; the middle where they do not tell."""
+    bend = fma(d, d, -4.0 * (dd * e))
+    t = 2.0 * e / (sqrt(where(bend > 0.0, bend, 0.0)) - d)
+    t = t - fma(t, fma(t, fma(t, ddd, dd), d), e) / fma(t, fma(3.0 * t, ddd, 2.0 * dd), d)
+    return where((t > 0.0) & (t < h), t, 0.5 * h)
+
+
 @jit_call
-def crossing(at, curve, event, h, tolerance, searching):
+def crossing(at, curve, event, facts, h, tolerance, searching):
     """Where an event falls through 0 in (0, h], given that it falls all along, and whether it only just does.
 
     Halley's steps within a bracket, with the bend by the first terms. What is left after a step is taken for that of
@@ -285,10 +295,12 @@ def crossing(at, curve, event, h, tolerance, searching):
     ----------
     at, curve : u, u' and u''/2 at t are `at(t, curve)`
     event : offset, factor and u(0) of the event offset + factor u
+    facts : coefficients 0 to 3 of the event
     """
+    stays_apart(h)
     offset, factor, start = event
     before, enough = 0.0 * h, 0.01 * tolerance + 1e-17
-    low, high, t, left = 0.0 * h, h, 0.5 * h, searching
+    low, high, t, left = 0.0 * h, h, foreseen(*facts, h), searching
     rate, bend = 0.0 * h, 0.0 * h
     for _ in range(ROOT_LIMIT):
         u, du, ddu = at(t, curve)

@@ -3,7 +3,7 @@
 numba's own cache is stale when a *called* module changes. Ours lives in a folder named by a digest of all kernel
 sources, numba, llvmlite and the CPU, so what is found there was compiled from these very sources. A function from
 elsewhere (a user's kernel) is never cached: what it calls is not known here. A cache that cannot be read or written
-is no fault: the function is compiled again.
+is no fault: the function is compiled again. Of processes that need a function at a time one compiles it.
 
 What is read here runs with the user's rights. So nothing is read that is not the user's alone: neither from a folder
 that belongs to somebody else or that others may write to, nor from such a file. Whoever may rename the folder can put
@@ -158,7 +158,7 @@ def _write(path, content):
 
 
 def _lock(file):
-    """Locks a file until it is closed; gives up where its holder takes longer than anything takes to compile."""
+    """Locks an open file until it is closed; gives up where its holder takes longer than anything takes to compile."""
     for _ in range(round(MOST_COMPILE_SECONDS / 0.05)):
         with contextlib.suppress(BlockingIOError):
             return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -177,10 +177,13 @@ class _Cache(FunctionCache):
     @contextlib.contextmanager
     def alone(self):
         """Has other processes wait while this one compiles what is not kept yet, for they can load it then."""
-        with contextlib.ExitStack() as open_files:
-            if not Path(self._cache_file._index_path).exists():
+        index = self._cache_file._index_path
+        with contextlib.ExitStack() as held:
+            if not Path(index).exists():
                 with contextlib.suppress(OSError):  # a folder without locks: each compiles for itself
-                    _lock(open_files.enter_context(Path(f"{self._cache_file._index_path}.lock").open("wb")))
+                    file = os.open(f"{index}.lock", os.O_CREAT | os.O_WRONLY, 0o600)
+                    held.callback(os.close, file)
+                    _lock(file)
             yield
 
     def load_overload(self, sig, target_context):

@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.analysis.correlated import student
-from sweep.analysis.curves import Window, check_confidence, log_of, numbers_along, title, window_logs
+from sweep.analysis.curves import Window, check_confidence, check_output, log_of, numbers_along, title, window_logs
 from sweep.analysis.lines import fit_exponent
 from sweep.analysis.loglog import Array, slope_bounds, slopes
 from sweep.analysis.scatter import noise_size
@@ -263,6 +263,7 @@ def exponent_by_window(
     0
     """
     _check_end(end)
+    check_output(y)
     if y.ndim != 1:
         raise SweepError(f"{title(y)} runs along {', '.join(map(str, y.dims))}; take one line, choose with .sel")
     x = y[dim].values[np.isfinite(log_of(y).values)]

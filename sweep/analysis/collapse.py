@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.analysis.correlated import student
-from sweep.analysis.curves import check_confidence, log_of, positive_axis, title
+from sweep.analysis.curves import check_confidence, check_dataset, check_output, log_of, positive_axis, title
 from sweep.analysis.loglog import Array
 from sweep.analysis.scatter import library
 from sweep.system.errors import SweepError
@@ -62,6 +62,7 @@ def fit_over(
     1.000000
     """
     check_confidence(confidence)
+    check_dataset(fits, "fit_exponent", ["exponent", "exponent_low", "exponent_high"])
     p = fits["exponent"]
     if p.dims != (dim,):
         raise SweepError(f"exponents run along {', '.join(map(str, p.dims)) or 'nothing'}, expected {dim} alone")
@@ -194,7 +195,8 @@ def fit_collapse(
 
 
 def _points(y: xr.DataArray, dim: str, over: str) -> tuple[Points, int]:
-    if not isinstance(y, xr.DataArray) or y.ndim != 2 or {dim, over} != {str(d) for d in y.dims}:
+    check_output(y)
+    if y.ndim != 2 or {dim, over} != {str(d) for d in y.dims}:
         raise SweepError(f"a collapse takes one output along {dim} and {over}, and nothing else; choose with .sel")
     t, size = np.log(positive_axis(y, dim)[1]), np.log(_parameter(y, over))
     z = log_of(y).transpose(over, dim).values

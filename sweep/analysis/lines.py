@@ -11,9 +11,10 @@ import xarray as xr
 from sweep.analysis.curves import (
     Window,
     check_confidence,
+    check_dataset,
     ends,
-    like,
     numbers_along,
+    relative_sigma,
     stated_bound,
     title,
     window_logs,
@@ -155,7 +156,7 @@ def fit_exponent(
     check_noise(noise)
     dimension, t, logs = window_logs(y, dim, window)
     here = window_of(y, dim, window)
-    errors = like(np.nan if sigma is None else sigma / y, y, "sigma").isel(here)
+    errors = relative_sigma(y, sigma).isel(here)
     bounds = stated_bound(y, bound).isel(here)
     given = Given(confidence, noise, sigma is not None)
     names = (*Line._fields, *JUDGED)
@@ -292,6 +293,8 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     >>> print(f"{float(sweep.crossover(weak, strong).abscissa):.1f}")
     0.6
     """
+    for fit in (low_fit, high_fit):
+        check_dataset(fit, "fit_exponent", ["exponent", "level", "limit_low"])
     _require_apart(low_fit, high_fit)
     first, second = np.log(low_fit.centre), np.log(high_fit.centre)
     middle = (first + second) / 2  # logarithms counted from here keep their digits

@@ -1,0 +1,154 @@
+"""Motion along a kink onto which both sides press it: when it begins and ends, against closed forms to 50 digits."""
+
+import numpy as np
+import pytest
+from columns import relative_error, solve
+from mpmath import mp, mpf
+from sliding_scene import SLIDING
+
+from kernels.codegen.expression import Graph
+from kernels.codegen.sliding import Side, _jump
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+
+METHODS = ["taylor", "dop853", "dopri5", "rodas5p"] if COMPILED else ["dop853"]
+MANY = 24 if COMPILED else 2
+many = pytest.mark.skipif(not COMPILED, reason="many steps")
+
+
+def belt_cycle(mu, belt, c):
+    """Period of x'' = -x - c x' - mu sign(x' - belt), c < 0: it slips from where the belt can no longer hold it."""
+    rest = mp.sqrt(1 - c * c / 4)
+
+    def over_belt(t):
+        return mp.exp(-c * t / 2) * (mp.cos(rest * t) + c / (2 * rest) * mp.sin(rest * t)) - 1
+
+    t = mp.findroot(over_belt, (mpf("3.5"), 2 * mp.pi), solver="anderson")
+    away = mp.exp(-c * t / 2) * (-c * mp.cos(rest * t) + (1 - c * c / 2) / rest * mp.sin(rest * t))
+    return t + (-c - away)
+
+
+@many
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("rtol", [1e-5, 1e-9, 1e-12])
+def test_stick_and_slip_on_a_belt_keep_their_period_for_many_cycles(method, rtol):
+    random = np.random.default_rng(1)
+    mu, share = 10.0 ** random.uniform(-1, 1, MANY), random.uniform(0.05, 0.4, MANY)
+    belt, c = share * mu, -random.uniform(0.02, 0.4, MANY)
+    cycles = 12
+    cells = {"press": mu, "belt": belt, "drag": c, "speed0": belt, "stiffness": 1.0, "mid": mu, "wall": -1e9}
+    outputs, status = solve(SLIDING, method, **cells, flips=2.0 * cycles + 1, rtol=rtol)
+    with mp.workdps(50):
+        truths = [mpf(m) / b + cycles * belt_cycle(m, b, mpf(d)) for m, b, d in zip(mu, belt, c, strict=True)]
+    assert np.isin(status, (Status.OK, Status.INACCURATE)).all()
+    assert (status == Status.OK).mean() > (0.9 if rtol > 1e-12 else 0.5)
+    right = status == Status.OK
+    assert (relative_error(outputs["time"], truths)[right] < rtol).all()
+    assert (abs(outputs["speed"] - belt)[right] <= rtol * belt[right]).all()  # it slides where it is switched
+
+
+def relay_time(m, mid):
+    """Of w' = sin(t) - m sign(w), x' = 1 + w, from rest: when x is `mid`, on its second way with w below 0."""
+    t1 = mp.asin(m)
+
+    def extra(t):
+        return mp.cos(t1) * (t - t1) - (mp.sin(t) - mp.sin(t1)) - m * (t - t1) ** 2 / 2
+
+    t2 = mp.findroot(lambda t: mp.cos(t1) - mp.cos(t) - m * (t - t1), (mp.pi / 2 + 0.5, mp.pi), solver="anderson")
+    assert abs(mp.sin(t2)) < m, "it slides again"
+    t = mp.findroot(lambda t: t + extra(t2) - extra(t - mp.pi) - mid, mid - extra(t2) / 2)
+    assert mp.pi + t1 < t < mp.pi + t2
+    return t
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("rtol", [1e-4, 1e-10])
+def test_a_relay_is_held_until_its_drive_is_stronger(method, rtol):
+    m = np.array([0.9, 0.85, 0.8])
+    cells = {"press": m, "drive": 1.0, "belt": 1.0, "speed0": 1.0, "mid": 5.0, "wall": -1e9}
+    outputs, status = solve(SLIDING, method, **cells, flips=1.0, rtol=rtol)
+    with mp.workdps(50):
+        truths = [relay_time(mpf(float(one)), mpf(5)) for one in m]
+    assert (status == Status.OK).all()
+    assert (relative_error(outputs["time"], truths) < rtol).all()
+
+
+def swaying(mu, belt, sway, wave):
+    """A mass on a belt of the speed belt + sway sin(wave t): when it slips off, and when it is at mu + 0.25 then."""
+
+    def rides(t):
+        return belt * t + sway * (1 - mp.cos(wave * t)) / wave
+
+    def force(t):
+        return mu - rides(t) - sway * wave * mp.cos(wave * t)
+
+    t = mp.findroot(force, (mpf("0.2") * mu / belt, mu / belt), solver="anderson")
+    x, v = rides(t) - mu, belt + sway * mp.sin(wave * t)
+    assert x < 0.25, "it slips before it is met"
+    return t + mp.findroot(lambda s: x * mp.cos(s) + v * mp.sin(s) - mpf(0.25), (0, mp.pi / 2), solver="anderson")
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-11])
+def test_a_belt_whose_speed_varies_takes_the_mass_along(method, rtol):
+    mu, belt, sway, wave = np.array([[2.0, 1.0, 0.3, 0.7], [1.0, 0.5, 0.1, 1.3], [3.0, 1.5, 0.5, 0.4]]).T
+    cells = {"press": mu, "belt": belt, "sway": sway, "wave": wave, "stiffness": 1.0, "speed0": belt}
+    outputs, status = solve(SLIDING, method, **cells, mid=mu, level=0.25, wall=-1e9, flips=1.0, rtol=rtol)
+    with mp.workdps(50):
+        truths = [swaying(*(mpf(float(x)) for x in cell)) for cell in zip(mu, belt, sway, wave, strict=True)]
+    assert (status == Status.OK).all()
+    assert (relative_error(outputs["time"], truths) < rtol).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("rtol", [1e-4, 1e-8, 1e-12])
+def test_a_sliding_mode_decays_by_its_surface(method, rtol):
+    m, slope = np.array([1.0, 3.0, 0.7]), np.array([0.5, 1.2, 0.4])
+    cells = {"press": m, "slope": slope, "place0": -1.0, "mid": -0.01, "wall": -1e9}
+    outputs, status = solve(SLIDING, method, **cells, flips=1.0, rtol=rtol)
+    truths = []
+    with mp.workdps(50):
+        for k, c in zip(map(mpf, m), map(mpf, slope), strict=True):
+            met = (mp.sqrt(1 + 2 * c**2 / k) - 1) / c
+            truths.append(met + mp.log((1 - k * met**2 / 2) / mpf(0.01)) / c)
+    assert (status == Status.OK).all()
+    assert (relative_error(outputs["time"], truths) < rtol).all()
+    assert (relative_error(outputs["speed"], 0.01 * slope) < rtol + 1e-15).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_rests_for_ever_or_is_held_by_two_kinks_sticks(method):
+    rests = {"press": 1.0, "stiffness": 1.0, "place0": 0.5, "mid": 2.0}
+    decays = {"press": 1.0, "slope": 1.0, "place0": -0.5, "mid": 1.0}
+    two = {"press": 2.0, "hold": 2.0, "belt": 1.0, "speed0": 1.0, "wall": [0.5], "mid": 1.0, "stiffness": 1.0}
+    for cell in (rests, decays, two):
+        _, status = solve(SLIDING, method, **({"wall": [-1e9]} | cell), flips=1.0)
+        assert status[0] == Status.STICKS, cell
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_slide_goes_on_across_another_kink(method):
+    cells = {"press": 2.0, "belt": 1.0, "speed0": 1.0, "hold": 0.25, "wall": [0.5], "mid": 1.0, "stiffness": 1.0}
+    outputs, status = solve(SLIDING, method, **cells, flips=1.0)
+    assert status[0] == Status.OK
+    assert relative_error(outputs["time"], [mpf(1) / 2 / mpf(1.25) + mpf(1) / 2 / mpf(0.75)])[0] < 1e-12
+
+
+@many
+@pytest.mark.parametrize("method", ["dop853", "dopri5", "rodas5p"])
+def test_a_slide_shorter_than_a_step_is_seen(method):
+    """The belt holds the mass for a hundredth of the time, less than the first step behind the kink."""
+    belt = np.linspace(0.3, 0.5, 40)
+    cells = {"press": 1.0, "belt": belt, "stiffness": 1.0, "place0": 0.99, "speed0": belt, "mid": 1.1, "wall": -1e9}
+    outputs, status = solve(SLIDING, method, **cells, flips=1.0, rtol=1e-4)
+    with mp.workdps(50):
+        truths = [(1 - mpf(0.99)) / b + mp.asin(mpf(1.1 - 1.0) / b) for b in map(mpf, map(float, belt))]
+    assert (status == Status.OK).all()
+    assert (relative_error(outputs["time"], truths) < 1e-4).all()
+
+
+def test_what_two_sides_differ_by_is_known_before_any_rounding():
+    graph = Graph()
+    x, m, sign = graph.series("x"), graph.constant("m"), graph.constant(".sign_0")
+    behind, ahead = Side(graph, {0: graph.of(-1.0)}), Side(graph, {0: graph.of(1.0)})
+    assert _jump(1e20 * x - m * sign, behind, ahead) is graph.of(-2.0) * m
