@@ -14,13 +14,11 @@ FILES = ("verge_losses", "verge_losses_wheel")
 
 
 def thinned(name):
-    """A study with half of its wheels, except those that the conclusions name, and without the strongest friction."""
+    """A study with half of its wheels and torques, except those that the conclusions name."""
     read = sweep.read_study(study.__file__.replace("verge_losses.py", f"{name}.toml"), allow_import=True)
     axes = {axis: x.values for axis, x in read.axes.items()}
     if axes["I_c"].size > 3:
         axes["I_c"] = axes["I_c"][[0, 4, 5, 6, 8, 12, 16]]
-    if "R_v" in axes:
-        axes["R_v"] = axes["R_v"][:3]
     fixed = dict(read.fixed) | {"flips": 3000}
     return sweep.build_study(kernel=read.kernel_name, rtol=1e-9, axes=axes, fixed=fixed, allow_import=True)
 
