@@ -22,8 +22,33 @@ QUICK = {line for line in (TESTS / "quick.txt").read_text(encoding="utf-8").spli
 """Files, and tests of files, that `pytest -m quick` runs."""
 
 
+LONG = (
+    *("tests/studies/test_verge_losses.py", "tests/sweep/runs/", "tests/kernels/lanes/test_cache.py", "tests/studies/"),
+    *("tests/kernels/drivetrain/", "tests/kernels/test_interface.py", "tests/sweep/explore/", "tests/kernels/"),
+)
+"""What workers begin with, so that none of them is left alone with it in the end."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers():
+    """One more than cores: some tests wait for processes, for clocks, or for what another worker compiles."""
+    return (os.cpu_count() or 1) + 1
+
+
+def pytest_configure(config):
+    config.option.loadscopereorder = False  # xdist would take files with many tests first, not those that take long
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Of `-m quick` alone, files without a quick test are not even read: that takes ten seconds."""
+    path = f"tests/{collection_path.relative_to(TESTS).as_posix()}"
+    unread = config.option.markexpr == "quick" and path.endswith(".py") and not any(q.startswith(path) for q in QUICK)
+    return unread or None
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
+    items.sort(key=lambda item: next((k for k, name in enumerate(LONG) if item.nodeid.startswith(name)), len(LONG)))
     for item in items:
         file, _, test = item.nodeid.partition("::")
         if file in QUICK or f"{file}::{test.partition('[')[0]}" in QUICK:

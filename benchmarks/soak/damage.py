@@ -21,7 +21,9 @@ from pathlib import Path
 
 sys.path[:0] = [str(Path(__file__).parents[2] / "tests" / "helpers")]
 
-from havoc import damaged_result, damaged_unfinished, numbers, run, study, unfinished  # noqa: E402
+from havoc import damaged_result, damaged_unfinished, numbers, study, unfinished  # noqa: E402
+
+from sweep.runs.run import complete  # noqa: E402
 
 
 def main() -> int:
@@ -31,11 +33,11 @@ def main() -> int:
     arguments.add_argument("--seed", type=int, default=1)
     given = arguments.parse_args()
     rng, kinds, wrong, slowest = random.Random(given.seed), Counter(), [], 0.0
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
         (folder / "scratch").mkdir()
-        run(study(), folder / "whole.h5", workers=1, block_cells=300, progress=False).close()
-        run(study(fixed={"g": 1.6}), folder / "strange.h5", workers=1, block_cells=300, progress=False).close()
+        for name, keys in (("whole", {}), ("strange", {"fixed": {"g": 1.6}})):
+            complete(study(**keys), folder / f"{name}.h5", workers=1, block_cells=300, progress=False)
         strange, bits = (folder / "strange.h5").read_bytes(), numbers(folder / "whole.h5")
         paths = {"unfinished": unfinished(folder / "out.h5"), "finished": folder / "whole.h5"}
         end = time.monotonic() + 60.0 * given.minutes

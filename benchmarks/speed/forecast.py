@@ -29,6 +29,7 @@ import psutil
 import sweep
 from sweep.cells.block import sampled_study
 from sweep.explore.plan import plan
+from sweep.runs.run import complete
 from sweep.study.model import Study
 from sweep.system.pool import cores
 from sweep.system.progress import Progress
@@ -207,7 +208,7 @@ def compared(kind: str, seconds: float, path: Path) -> list[list[float]]:
     planned = plan(study, path=path)
     recorder = Recorder()
     with prepared(kind, study, path) as options, recorder.listening():
-        sweep.run(study, path, progress=io.StringIO(), **options).close()
+        complete(study, path, progress=io.StringIO(), **options)
     size = path.stat().st_size
     path.unlink()
     found = [recorder.by_clock(), recorder.by_processors()]

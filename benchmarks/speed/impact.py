@@ -43,7 +43,7 @@ def ours(scenes, starts, half_swings, out):
     """The kernel's own loop, as `attractor` follows a clock between two looks at whether it repeats."""
     history, slopes, tally = np.empty((half_swings + 1, 3)), np.empty((5, 3)), np.empty(_half_swing.TALLIES)
     for i in range(scenes.shape[0]):
-        scene = _contacts.Scene(scenes[i, 0], scenes[i, 1], scenes[i, 2], scenes[i, 3], 0.0, 0.0)
+        scene = _contacts.PlainScene(scenes[i, 0], scenes[i, 1], scenes[i, 2], scenes[i, 3], 0.0, 0.0)
         _half_swing.clear(tally)
         start = _half_swing.Start(starts[i, 0], starts[i, 1], starts[i, 2])
         start, _ = _followed.follow(scene, start, half_swings, history, tally, slopes)
@@ -57,7 +57,7 @@ def beginnings(scenes, starts):
     """Where `events` begins."""
     for i in range(scenes.shape[0]):
         wheel, pallet, e = scenes[i, 0], scenes[i, 1], scenes[i, 3]
-        scene = _contacts.Scene(wheel, pallet, scenes[i, 2], e, 0.0, -0.25 * wheel * (1 + e) / (1 - e))
+        scene = _contacts.PlainScene(wheel, pallet, scenes[i, 2], e, 0.0, -0.25 * wheel * (1 + e) / (1 - e))
         starts[i, 0], starts[i, 1], starts[i, 2] = _followed.beginning(scene, 1e-6)
 
 

@@ -25,17 +25,6 @@ ROUNDING = 4e-15
 """What `closed` is right to."""
 
 
-class Driven(NamedTuple):
-    """Parameters."""
-
-    zeta: float
-    omega_n: float
-    r: float
-    w: float
-    m: float
-    beta: float
-
-
 class LimitCycle(NamedTuple):
     """Outputs."""
 
@@ -119,7 +108,6 @@ BALANCE_DRIVEN = kernel(
             "multiplier of the half-swing map, of the amplitude as of the energy (0 where below 1e-308)",
         ),
     ),
-    record=Driven,
     check=check,
     methods=(
         method("closed", "formulas: impulses without solid friction, or no viscous damping", closed, closed_bound),

@@ -142,7 +142,8 @@ ROOT = """\
 first = met & passed_{j}
 if any_lane(first):
     {among}
-    at, only_just = crossing({watched}, (offset_{j}, factor_{j}, {value}), span, tolerance, first)
+    event, facts = (offset_{j}, factor_{j}, {value}), (e_{j}, d_{j}, dd_{j}, ddd_{j})
+    at, only_just = crossing({watched}, event, facts, span, tolerance, first)
     end, which, hangs = where(first, at, end), where(first, {j}.0, which), (hangs & not_(first)) | only_just"""
 
 
@@ -278,9 +279,15 @@ class LegSource:
             "any_now": " | ".join(self._each("now_{j}")),
         }
 
+    def _series(self, j):
+        """The series that the proof is of: of a state that is the sum of another one, of that one."""
+        summed = self.summed.get(self.seen[j])
+        return f"s_{summed}" if summed else f"event_{j}"
+
     def _tail(self, j):
         """A bound on A of (1) for an event; the factor of one that is a state is 1."""
-        return f"rest_{j} = {'tail' if j else 'magnitude(factor_0) * tail'}(trial, event_{j})"
+        tail = "unit * tail_of_sum" if self.seen[j] in self.summed else "tail"
+        return f"rest_{j} = {'' if j else 'magnitude(factor_0) * '}{tail}(trial, {self._series(j)})"
 
     def _proofs(self):
         """What each event is proved to do in a step; where the surface's rate is a kink's u, by that kink."""
@@ -294,8 +301,8 @@ class LegSource:
     def _doubts(self):
         """The same for lanes whose step is halved until all is proved."""
         names = ("e", "d", "dd", "ddd", "margin", "now", "falls")
-        facts = ", ".join(["factor_0", *(f"{name}_{j}" for j in range(self.events) for name in names)])
-        series = listed(self._each("event_{j}"))
+        facts = ", ".join(["unit", "factor_0", *(f"{name}_{j}" for j in range(self.events) for name in names)])
+        series = listed(dict.fromkeys(self._series(j) for j in range(self.events)))
         doubts = [f"{self._tail(j)}\n{CLEAR}\ndown_{{j}} = {FALLS}".format(j=j) for j in range(self.events)]
         return {
             "judge_all": "\n".join(doubts),

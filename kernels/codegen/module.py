@@ -57,7 +57,7 @@ from kernels.lanes.refill import each_refilled
 from kernels.codegen.module import kept
 from kernels.integrate.taylor import (
     COME_UP, HALVINGS, LONGEST, ROUNDING, SAME, SLACK, STEP_LIMIT, box, clear, crossing, falls, keeps, last_term, mean,
-    natural_power, next_step, of_series, of_sum, rises, size, stays_apart, tail, worse,
+    natural_power, next_step, of_series, of_sum, rises, size, stays_apart, tail, tail_of_sum, worse,
 )
 from kernels.codegen.power_core import FAR, SHORT, UNEVEN, core_time, mean_power, no_matter, size_in_unit
 from kernels.codegen.driver_source import BLUR, EVENTS, KINK_LIMIT, time_unit

@@ -148,7 +148,7 @@ class Lines:
         u, n = x.args
         if k == 0:
             return f"power({self.value(u)}, {self.value(n)})"
-        return self._times(self._power_times_base(x, u, k), self._once(u, "over", "1.0 / {}"))
+        return self._power_by_parts(x, u, k, self._once(u, "over", "1.0 / {}"))
 
     def _power_of_side(self, x, k):
         """abs(u)^n, of which the sign of u leaves the recurrence as it is; constant in its core, and at u = 0."""
@@ -156,7 +156,7 @@ class Lines:
         if k == 0:
             plain = f"power({self.value(x.args[0])}, {self.value(x.args[1])})"
             return f"where(core_{i} < 0.0, {plain}, core_{i})" if self._cores else plain
-        return self._times(self._power_times_base(x, u, k), self._over_base(x))
+        return self._power_by_parts(x, u, k, self._over_base(x))
 
     def _power_over_base(self, x, k):
         """abs(u)^n/u by the recurrence of a quotient; 0 in its core, and at u = 0."""
@@ -172,12 +172,35 @@ class Lines:
         moves = f"core_{i} < 0.0" if self._cores else f"{self.value(x.args[0])} > 0.0"
         return self._once(u, f"over_{i}", f"where({moves}, 1.0 / {{}}, 0.0)")
 
-    def _power_times_base(self, x, u, k):
-        """u_0 b_k of (1)."""
-        rates = self._rate_sum(u, x, k)
-        plain = self._sum((self.coefficient(u, j), self.coefficient(x, k - j)) for j in _oldest_first(1, k, k))
-        more = self._once(x.args[1], "and_one", "{} + 1.0")
-        return rates and f"fma({more} * {1.0 / k!r}, {rates}, -({plain}))"
+    def _power_by_parts(self, x, u, k, over):
+        """b_k of (1): what u_k and b_{k-1} bring is added last, so that the recurrence waits for two sums a step."""
+        parts = [(self._once(x, "per_base", f"{self.value(x.args[1])} * {{}} * {over}"), self.coefficient(u, k))]
+        if k > 1:
+            parts.append((self._of_one_before(x, u, k, over), self.coefficient(x, k - 1)))
+        total = self._times(self._power_between(x, u, k), over)
+        for factor, term in reversed([(f, t) for f, t in parts if f and t]):
+            total = f"fma({factor}, {term}, {total})" if total else f"{factor} * {term}"
+        return total
+
+    def _of_one_before(self, x, u, k, over):
+        """The factor ((n + 1)/k - 1) u_1/u_0 of b_{k-1}; None where u_1 is 0."""
+        first = self.coefficient(u, 1)
+        if not first:
+            return None
+        slope = self._once(x, "slope", f"{first} * {over}")
+        steep = self._once(x, "steep", f"{self._one_more(x)} * {slope}")
+        return self._named(f"before_{x.index}_{k}", f"fma({steep}, {1.0 / k!r}, -{slope})")
+
+    def _power_between(self, x, u, k):
+        """The terms 1 < j < k of u_0 b_k."""
+        between = _oldest_first(2, k - 1, k)
+        rates = self._sum((self._rate(u, j), self.coefficient(x, k - j)) for j in between)
+        plain = self._sum((self.coefficient(u, j), self.coefficient(x, k - j)) for j in between)
+        return rates and f"fma({self._one_more(x)} * {1.0 / k!r}, {rates}, -({plain}))"
+
+    def _one_more(self, x):
+        """n + 1."""
+        return self._once(x.args[1], "and_one", "{} + 1.0")
 
     def _abs(self, x, k):
         return f"magnitude({self.value(x.args[0])})"

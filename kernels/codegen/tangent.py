@@ -11,7 +11,7 @@ from collections import defaultdict
 from kernels.codegen.expression import INPUT, needed
 from kernels.codegen.template import filled, listed
 
-SHORT, LONG = {12: 4, 18: 6}, {12: 9, 18: 12}
+SHORT, LONG = {12: 4, 18: 4}, {12: 9, 18: 12}
 """Order of the changes' series on a step of the motion's: terms fall by about a quarter each, so to some 1e-3. Those of
 exp, sin and cos first grow, as x^k/k!."""
 

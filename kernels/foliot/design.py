@@ -21,14 +21,6 @@ from kernels.maths.elementary import is_normal, mantissa_exponent, scale
 _NEWTON_LIMIT = 20
 
 
-class Wanted(NamedTuple):
-    """Parameters."""
-
-    period: float
-    amplitude: float
-    phi0: float
-
-
 class Clock(NamedTuple):
     """Outputs."""
 
@@ -90,7 +82,6 @@ FOLIOT_DESIGN = kernel(
         Field("a", "1/s", "viscous friction per moment of inertia"),
         Field("mu", "rad/s^2", "drive torque per moment of inertia"),
     ),
-    record=Wanted,
     check=check,
     # amplitude and phi0 are taken as exact
     methods=(method("newton", "Newton's method on the closed-form cycle", newton, 2.0 * _viscous.ROUNDING),),

@@ -10,8 +10,8 @@ of bodies of mass 1 and 1/kappa, at l^2 = 1. Under a flat lever bounces with clo
     t = 2 s1/(1 - e)                                                                                   (3)
 in lasting contact: in that time the common centre, of speed W = wheel V + pallet w, falls freely with `wheel`, the
 share of the torque in both bodies, and the gap is never wider than s1^2/2. In contact both go on with that.
-*Slopes* are an array of 5 rows, the changes of x, y, V, w and of the time, and 3
-columns, by gap, V and w at the beginning of the half swing.
+*Slopes* are an array whose rows, OF_X to OF_T, are the changes of x, y, V, w and the time, by gap, V and w at the
+beginning of the half swing, which are its columns.
 """
 
 import math
@@ -20,9 +20,15 @@ from typing import NamedTuple
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude, sqrt
 
+OF_X, OF_Y, OF_V, OF_W, OF_T = range(5)
+"""Rows of slopes."""
 
-class Scene(NamedTuple):
-    """The clock in float64: shares of mass, height of escape, restitution, and the lever's bend c about y_i."""
+
+class PlainScene(NamedTuple):
+    """The clock in float64, where `_units.Scene` has pairs.
+
+    Shares of mass, height of escape, restitution, and the lever's bend c about y_i.
+    """
 
     wheel: float
     pallet: float
@@ -148,25 +154,25 @@ def slide(scene, motion, side):
 def carry_flight(slopes, t):
     """Changes after a flight of fixed duration."""
     for j in range(3):
-        slopes[0, j] += t * slopes[2, j]
-        slopes[1, j] += t * slopes[3, j]
+        slopes[OF_X, j] += t * slopes[OF_V, j]
+        slopes[OF_Y, j] += t * slopes[OF_W, j]
 
 
 @jit
 def _later(slopes, j, motion, by):
     """Column j of the changes, `by` later in free flight."""
-    slopes[0, j] += motion.V * by
-    slopes[1, j] += motion.w * by
-    slopes[2, j] += by
-    slopes[4, j] += by
+    slopes[OF_X, j] += motion.V * by
+    slopes[OF_Y, j] += motion.w * by
+    slopes[OF_V, j] += by
+    slopes[OF_T, j] += by
 
 
 @jit_call
 def carry_line(slopes, motion):
     """Changes where y crosses a line."""
     for j in range(3):
-        _later(slopes, j, motion, -slopes[1, j] / motion.w)
-        slopes[1, j] = 0.0
+        _later(slopes, j, motion, -slopes[OF_Y, j] / motion.w)
+        slopes[OF_Y, j] = 0.0
 
 
 @jit_call
@@ -178,14 +184,14 @@ def carry_impact(scene, slopes, motion, lever):
     inertia = pallet + wheel * lever * lever
     r = (1.0 + scene.e) / inertia
     for j in range(3):
-        by = -(slopes[0, j] - lever * slopes[1, j]) / closing if magnitude(closing) > 0.0 else 0.0
+        by = -(slopes[OF_X, j] - lever * slopes[OF_Y, j]) / closing if magnitude(closing) > 0.0 else 0.0
         _later(slopes, j, motion, by)
-        turned = scene.c * slopes[1, j]
-        faster = slopes[2, j] - lever * slopes[3, j] - motion.w * turned
+        turned = scene.c * slopes[OF_Y, j]
+        faster = slopes[OF_V, j] - lever * slopes[OF_W, j] - motion.w * turned
         softer = -2.0 * r * wheel * lever * turned / inertia
         push = r * faster + closing * softer
-        slopes[2, j] -= pallet * push
-        slopes[3, j] += wheel * (lever * push + closing * r * turned)
+        slopes[OF_V, j] -= pallet * push
+        slopes[OF_W, j] += wheel * (lever * push + closing * r * turned)
 
 
 @jit_call
@@ -194,13 +200,13 @@ def carry_train(scene, slopes, motion, side, t):
     wheel, pallet = scene.wheel, scene.pallet
     _, W = centre(scene, motion, side)
     for j in range(3):
-        longer = 2.0 * (side * slopes[3, j] - slopes[2, j]) / (1.0 - scene.e)
-        faster = wheel * slopes[2, j] + pallet * side * slopes[3, j]
-        slopes[1, j] += side * (faster * t + (W + wheel * t) * longer)
-        slopes[0, j] = side * slopes[1, j]
-        slopes[2, j] = faster + wheel * longer
-        slopes[3, j] = side * slopes[2, j]
-        slopes[4, j] += longer
+        longer = 2.0 * (side * slopes[OF_W, j] - slopes[OF_V, j]) / (1.0 - scene.e)
+        faster = wheel * slopes[OF_V, j] + pallet * side * slopes[OF_W, j]
+        slopes[OF_Y, j] += side * (faster * t + (W + wheel * t) * longer)
+        slopes[OF_X, j] = side * slopes[OF_Y, j]
+        slopes[OF_V, j] = faster + wheel * longer
+        slopes[OF_W, j] = side * slopes[OF_V, j]
+        slopes[OF_T, j] += longer
 
 
 @jit_call
@@ -208,8 +214,8 @@ def carry_slide(scene, slopes, motion, side, speed):
     """Changes through contact until a line, where both have the signed `speed` along `side`."""
     wheel = scene.wheel
     for j in range(3):
-        away, fast = side * slopes[1, j], side * slopes[3, j]
+        away, fast = side * slopes[OF_Y, j], side * slopes[OF_W, j]
         there = (side * motion.w * fast - wheel * away) / speed
-        slopes[4, j] += (there - fast) / wheel
-        slopes[0, j], slopes[1, j] = 0.0, 0.0
-        slopes[2, j], slopes[3, j] = there, side * there
+        slopes[OF_T, j] += (there - fast) / wheel
+        slopes[OF_X, j], slopes[OF_Y, j] = 0.0, 0.0
+        slopes[OF_V, j], slopes[OF_W, j] = there, side * there

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.impact import _half_swing as swing
-from kernels.impact._contacts import Scene
+from kernels.impact._contacts import PlainScene
 from kernels.impact._half_swing import Start, half_swing
 from kernels.impact._periodic import Work, chain, difference, distance, errors, invert, multiplier, newton
 from kernels.impact._units import Cycle, bend
@@ -65,9 +65,9 @@ class Answer(NamedTuple):
 
 @jit
 def plain_scene(scene):
-    """The scene of `_half_swing`."""
+    """The scene that half swings are followed in."""
     c, y_i = bend(scene)
-    return Scene(scene.wheel[0], scene.pallet[0], min(scene.eta[0], 0.25), scene.e, c, y_i)
+    return PlainScene(scene.wheel[0], scene.pallet[0], min(scene.eta[0], 0.25), scene.e, c, y_i)
 
 
 @jit

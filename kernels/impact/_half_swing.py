@@ -15,6 +15,10 @@ import math
 from typing import NamedTuple
 
 from kernels.impact._contacts import (
+    OF_T,
+    OF_V,
+    OF_W,
+    OF_X,
     Motion,
     carry_flight,
     carry_impact,
@@ -254,8 +258,9 @@ def _begun(scene, start, tally, slopes, follows):
     tally[STRUCK] = 0.0
     if follows:
         for j in range(3):
-            slopes[0, j], slopes[1, j], slopes[2, j], slopes[3, j], slopes[4, j] = 0.0, 0.0, 0.0, 0.0, 0.0
-        slopes[0, 0], slopes[2, 1], slopes[3, 2] = 1.0, 1.0, 1.0
+            for row in range(OF_T + 1):
+                slopes[row, j] = 0.0
+        slopes[OF_X, 0], slopes[OF_V, 1], slopes[OF_W, 2] = 1.0, 1.0, 1.0
     return State(start.gap, 0.0, Motion(-scene.eta, start.V, start.w), False)
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kernels.impact._contacts import OF_T, OF_V, OF_W, OF_X
 from kernels.impact._half_swing import DONE, Start, half_swing, reduced
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude, sqrt
@@ -45,23 +46,29 @@ def difference(image, start):
     return Start(image.gap - start.gap, image.V - start.V, image.w - start.w)
 
 
+@jit
+def _times(matrix, row, z):
+    """A row of a matrix times what a start, or a change of one, is made of."""
+    return matrix[row, 0] * z.gap + matrix[row, 1] * z.V + matrix[row, 2] * z.w
+
+
 @jit_call
 def chain(scene, start, k, work):
     """The start after k half swings; `work.chained` becomes its changes and that of the time by `start`."""
     slopes, chained = work.slopes, work.chained
     for j in range(3):
-        chained[0, j], chained[1, j], chained[2, j], chained[3, j] = 0.0, 0.0, 0.0, 0.0
-        chained[j, j] = 1.0
+        for row in range(4):
+            chained[row, j] = 1.0 if row == j else 0.0
     for _ in range(k):
         start, verdict = half_swing(scene, start, work.tally, slopes, True)
         if verdict != DONE:
             return start, verdict
         for j in range(3):
-            gap, V, w = chained[0, j], chained[1, j], chained[2, j]
-            chained[0, j] = slopes[0, 0] * gap + slopes[0, 1] * V + slopes[0, 2] * w
-            chained[1, j] = slopes[2, 0] * gap + slopes[2, 1] * V + slopes[2, 2] * w
-            chained[2, j] = -(slopes[3, 0] * gap + slopes[3, 1] * V + slopes[3, 2] * w)
-            chained[3, j] += slopes[4, 0] * gap + slopes[4, 1] * V + slopes[4, 2] * w
+            change = Start(chained[0, j], chained[1, j], chained[2, j])
+            chained[0, j] = _times(slopes, OF_X, change)
+            chained[1, j] = _times(slopes, OF_V, change)
+            chained[2, j] = -_times(slopes, OF_W, change)  # the frame of the next half swing is reflected
+            chained[3, j] += _times(slopes, OF_T, change)
     return start, DONE
 
 
@@ -80,11 +87,6 @@ def invert(chained, inverse):
             inverse[row, column] /= determinant
 
 
-@jit
-def _row(inverse, row, z):
-    return inverse[row, 0] * z.gap + inverse[row, 1] * z.V + inverse[row, 2] * z.w
-
-
 @jit_call
 def newton(scene, start, k, work):
     """The start that repeats after k half swings, near the one given, and whether it is found."""
@@ -95,8 +97,8 @@ def newton(scene, start, k, work):
             return start, False
         invert(work.chained, work.inverse)
         rest = difference(image, start)
-        gap, V = start.gap + _row(work.inverse, 0, rest), start.V + _row(work.inverse, 1, rest)
-        new = Start(reduced(gap), V, start.w + _row(work.inverse, 2, rest))
+        gap, V = start.gap + _times(work.inverse, 0, rest), start.V + _times(work.inverse, 1, rest)
+        new = Start(reduced(gap), V, start.w + _times(work.inverse, 2, rest))
         step = distance(start, new)
         if not (new.w < 0.0 and step < 0.5):
             return start, False

@@ -32,20 +32,6 @@ from kernels.lanes.ranges import judged
 from kernels.lanes.wiring import kernel, method
 
 
-class Clock(NamedTuple):
-    """Parameters."""
-
-    torque: float
-    I_c: float
-    I_v: float
-    r_c: float
-    r_v: float
-    teeth: float
-    h: float
-    e: float
-    nu: float
-
-
 class Beat(NamedTuple):
     """Outputs, of which those with a unit are the record `sizes`."""
 
@@ -134,7 +120,6 @@ IMPACT = kernel(
     source="two bodies, free flight and restitution; derived here",
     parameters=PARAMETERS,
     outputs=OUTPUTS,
-    record=Clock,
     check=check,
     methods=(
         # rounding; where two multipliers nearly meet and lose more, the status says so

@@ -26,6 +26,7 @@ from kernels.lanes.vectors import (
     nearest,
     not_,
     pow2,
+    sqrt,
     where,
 )
 
@@ -71,66 +72,84 @@ _function(tail, 2, lambda h, series: _number(h, *series), _lower_tail)
 
 def bend(h, series):
     """Sum over k > 1 of abs(u_k) h^k: how far u may be from its tangent on [0, h]."""
-    total = abs(series[-1])
-    for k in range(len(series) - 2, 1, -1):
-        total = fma(total, h, abs(series[k]))
-    return total * (h * h)
+    return _sizes(h, series[2:]) * (h * h)
 
 
-def _lower_bend(context, builder, signature, values):
-    target = signature.return_type
-    h = context.cast(builder, values[0], signature.args[0], target)
-    sizes = [_called("fabs")(builder, item) for item in _items(context, builder, signature.args[1], values[1], target)]
-    total = sizes[-1]
-    for k in range(len(sizes) - 2, 1, -1):
-        total = _called("fma")(builder, total, h, sizes[k])
-    return builder.fmul(total, builder.fmul(h, h))
+def tail_of_sum(h, series):
+    """A of (1) for the integral of w, from the series of w: the sum over k > 2 of abs(w_k) h^(k-1), as in `mean`."""
+    return _sizes(h, series[3:-1]) * (h * h)
 
 
-_function(bend, 2, lambda h, series: _number(h, *series), _lower_bend)
+def _sizes(h, terms):
+    total = abs(terms[-1])
+    for term in terms[-2::-1]:
+        total = fma(total, h, abs(term))
+    return total
 
 
-def _nested(x, terms, ratios):
-    """terms[0] + x ratios[0] (terms[1] + x ratios[1] (terms[2] + ...)).
-
-    The ratios go to x and not into the terms, or those would be kept from one evaluation for the next, and stored.
-    """
-    value = terms[-1]
-    for term, ratio in zip(terms[-2::-1], ratios[::-1], strict=True):
-        value = fma(value, x * ratio, term)
-    return value
-
-
-def _lower_nested(first, last, ratio):
-    """The compiled form, of the terms from `first` to `last`."""
+def _lower_sizes(terms):
+    """The compiled form, of a slice of the series."""
 
     def lower(context, builder, signature, values):
         target = signature.return_type
-        x = context.cast(builder, values[0], signature.args[0], target)
-        terms = _items(context, builder, signature.args[1], values[1], target)
-        value, k = None, len(terms) + last
-        for term in terms[first : len(terms) + last + 1][::-1]:
-            by = None if value is None else builder.fmul(x, _constant(x.type, ratio(k + 1)))
-            value, k = term if value is None else _called("fma")(builder, value, by, term), k - 1
-        return value
+        h = context.cast(builder, values[0], signature.args[0], target)
+        items = _items(context, builder, signature.args[1], values[1], target)[terms]
+        sizes = [_called("fabs")(builder, item) for item in items]
+        total = sizes[-1]
+        for size_of_term in sizes[-2::-1]:
+            total = _called("fma")(builder, total, h, size_of_term)
+        return builder.fmul(total, builder.fmul(h, h))
 
     return lower
 
 
+_function(bend, 2, lambda h, series: _number(h, *series), _lower_sizes(slice(2, None)))
+_function(tail_of_sum, 2, lambda h, series: _number(h, *series), _lower_sizes(slice(3, -1)))
+
+
 def slope(x, series):
-    """u'(x) = sum k u_k x^(k-1)."""
-    return _nested(x, series[1:], [k / (k - 1) for k in range(2, len(series))])
+    """u'(x) by Horner's scheme, whose values on the way are those of `horner` and cost nothing beside it."""
+    value = rate = series[-1]
+    for term in series[-2:0:-1]:
+        value = fma(value, x, term)
+        rate = fma(rate, x, value)
+    return rate
+
+
+def _lower_slope(context, builder, signature, values):
+    target = signature.return_type
+    x = context.cast(builder, values[0], signature.args[0], target)
+    items = _items(context, builder, signature.args[1], values[1], target)
+    value = rate = items[-1]
+    for item in items[-2:0:-1]:
+        value = _called("fma")(builder, value, x, item)
+        rate = _called("fma")(builder, rate, x, value)
+    return rate
 
 
 def mean(x, series):
-    """The mean of u between 0 and x, but for its last term: sum of u_k x^k/(k + 1)."""
-    return _nested(x, series[:-1], [k / (k + 1) for k in range(1, len(series) - 1)])
+    """The mean of u between 0 and x, but for its last term: sum of u_k x^k/(k + 1).
+
+    Ratios of the factors go to x and not into the terms, or those would be kept from one evaluation for the next, and
+    stored.
+    """
+    value = series[-2]
+    for k in range(len(series) - 2, 0, -1):
+        value = fma(value, x * (k / (k + 1)), series[k - 1])
+    return value
 
 
-for _of_series, _lower in (
-    (slope, _lower_nested(1, -1, lambda k: k / (k - 1))),
-    (mean, _lower_nested(0, -2, lambda k: k / (k + 1))),
-):
+def _lower_mean(context, builder, signature, values):
+    target = signature.return_type
+    x = context.cast(builder, values[0], signature.args[0], target)
+    items = _items(context, builder, signature.args[1], values[1], target)
+    value = items[-2]
+    for k in range(len(items) - 2, 0, -1):
+        value = _called("fma")(builder, value, builder.fmul(x, _constant(x.type, k / (k + 1))), items[k - 1])
+    return value
+
+
+for _of_series, _lower in ((slope, _lower_slope), (mean, _lower_mean)):
     _function(_of_series, 2, lambda x, series: _number(x, *series), _lower)
 
 
@@ -256,8 +275,17 @@ def of_sum(t, curve):
     return fma(unit * t, mean(t, w), start), unit * horner(t, w), unit * bend
 
 
+@jit
+def foreseen(e, d, dd, ddd, h):
+    """About where an event falls through 0 in (0, h], by its coefficients 0 to 3; the middle where they do not tell."""
+    bend = fma(d, d, -4.0 * (dd * e))
+    t = 2.0 * e / (sqrt(where(bend > 0.0, bend, 0.0)) - d)
+    t = t - fma(t, fma(t, fma(t, ddd, dd), d), e) / fma(t, fma(3.0 * t, ddd, 2.0 * dd), d)
+    return where((t > 0.0) & (t < h), t, 0.5 * h)
+
+
 @jit_call
-def crossing(at, curve, event, h, tolerance, searching):
+def crossing(at, curve, event, facts, h, tolerance, searching):
     """Where an event falls through 0 in (0, h], given that it falls all along, and whether it only just does.
 
     Halley's steps within a bracket, with the bend by the first terms. What is left after a step is taken for that of
@@ -267,10 +295,12 @@ def crossing(at, curve, event, h, tolerance, searching):
     ----------
     at, curve : u, u' and u''/2 at t are `at(t, curve)`
     event : offset, factor and u(0) of the event offset + factor u
+    facts : coefficients 0 to 3 of the event
     """
+    stays_apart(h)
     offset, factor, start = event
     before, enough = 0.0 * h, 0.01 * tolerance + 1e-17
-    low, high, t, left = 0.0 * h, h, 0.5 * h, searching
+    low, high, t, left = 0.0 * h, h, foreseen(*facts, h), searching
     rate, bend = 0.0 * h, 0.0 * h
     for _ in range(ROOT_LIMIT):
         u, du, ddu = at(t, curve)

@@ -3,7 +3,7 @@
 numba's own cache is stale when a *called* module changes. Ours lives in a folder named by a digest of all kernel
 sources, numba, llvmlite and the CPU, so what is found there was compiled from these very sources. A function from
 elsewhere (a user's kernel) is never cached: what it calls is not known here. A cache that cannot be read or written
-is no fault: the function is compiled again.
+is no fault: the function is compiled again. Of processes that need a function at a time one compiles it.
 
 What is read here runs with the user's rights. So nothing is read that is not the user's alone: neither from a folder
 that belongs to somebody else or that others may write to, nor from such a file. Whoever may rename the folder can put
@@ -11,6 +11,7 @@ nothing in its place that is read.
 """
 
 import contextlib
+import fcntl
 import functools
 import hashlib
 import multiprocessing
@@ -32,6 +33,8 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataC
 PACKAGE = Path(__file__).parents[1]
 OLD_SECONDS = 30 * 24 * 3600
 """Folders of other sources, versions or CPUs that were not used for so long are removed."""
+MOST_COMPILE_SECONDS = 120
+"""What a process waits for another one that compiles the same."""
 
 
 def _digest():
@@ -154,6 +157,14 @@ def _write(path, content):
     Path(draft).replace(path)
 
 
+def _lock(file):
+    """Locks an open file until it is closed; gives up where its holder takes longer than anything takes to compile."""
+    for _ in range(round(MOST_COMPILE_SECONDS / 0.05)):
+        with contextlib.suppress(BlockingIOError):
+            return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        time.sleep(0.05)
+
+
 class _Cache(FunctionCache):
     """numba's cache of one function, in FOLDER; a fault of the disk or a damaged file only means to compile."""
 
@@ -162,6 +173,18 @@ class _Cache(FunctionCache):
     def __init__(self, py_func):
         super().__init__(py_func)
         self._cache_file = _Files(self._cache_path, self._impl.filename_base, FOLDER.name)
+
+    @contextlib.contextmanager
+    def alone(self):
+        """Has other processes wait while this one compiles what is not kept yet, for they can load it then."""
+        index = self._cache_file._index_path
+        with contextlib.ExitStack() as held:
+            if not Path(index).exists():
+                with contextlib.suppress(OSError):  # a folder without locks: each compiles for itself
+                    file = os.open(f"{index}.lock", os.O_CREAT | os.O_WRONLY, 0o600)
+                    held.callback(os.close, file)
+                    _lock(file)
+            yield
 
     def load_overload(self, sig, target_context):
         try:

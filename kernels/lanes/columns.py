@@ -9,33 +9,6 @@ from kernels.lanes.jit import COMPILED, cached, jit, jit_entry
 from kernels.lanes.vectors import WIDTH, lanes_at
 
 
-@jit
-def _one_by_one(body, columns):
-    for i in range(columns[0].shape[0]):
-        body(i, *columns)
-
-
-def _plain(body, columns):
-    with np.errstate(all="ignore"):
-        for i in range(columns[0].shape[0]):
-            body(i, *columns)
-
-
-@jit
-def _in_lanes(body, columns):
-    """The last group overlaps the one before it: its cells are solved twice, to the same bits."""
-    n = columns[0].shape[0]
-    for i in range(0, n, WIDTH):
-        body(lanes_at(min(i, n - WIDTH)), *columns)
-
-
-each_cell = _in_lanes if COMPILED else _plain
-"""each_cell(body, columns): body(i, *columns) for all cells, WIDTH at a time; called by an `entry`."""
-
-one_by_one = _one_by_one if COMPILED else _plain
-"""The same one cell at a time: the rival that lanes are measured against."""
-
-
 def entry(*shared):
     """Makes a function of columns one that the engine can call; its machine code is kept on the disk.
 
@@ -61,34 +34,34 @@ def _filled_up(compiled, columns, per_cell):
 
 
 @jit
-def _lanes_of_records(body, columns, buffers):
+def _in_lanes(body, columns, buffers):
     n = columns[0].shape[0]
     for i in range(0, n, WIDTH):
         body(lanes_at(min(i, n - WIDTH)), columns, *buffers)
 
 
 @jit
-def _cells_of_records(body, columns, buffers):
+def _one_by_one(body, columns, buffers):
     for i in range(columns[0].shape[0]):
         body(i, columns, *buffers)
 
 
 @jit
-def _groups_of_records(body, columns, buffers):
+def _in_groups(body, columns, buffers):
     n = columns[0].shape[0]
     for i in range(0, n, WIDTH):
         body(min(i, n - WIDTH), columns, *buffers)
 
 
-def _plain_records(body, columns, buffers):
+def _plain(body, columns, buffers):
     with np.errstate(all="ignore"):
         for i in range(columns[0].shape[0]):
             body(i, columns, *buffers)
 
 
-in_lanes = _lanes_of_records if COMPILED else _plain_records
-cell_by_cell = _cells_of_records if COMPILED else _plain_records
-in_groups = _groups_of_records if COMPILED else _plain_records
+in_lanes = _in_lanes if COMPILED else _plain
+cell_by_cell = _one_by_one if COMPILED else _plain
+in_groups = _in_groups if COMPILED else _plain
 
 
 def entry_of(function, per_cell, kept):

@@ -28,24 +28,6 @@ def room(rows):
 
 
 @jit
-def _compiled(body, columns):
-    """The last group overlaps the one before it, as in `columns`."""
-    n = columns[0].shape[0]
-    for i in range(0, n, GROUP):
-        body(min(i, n - GROUP), *columns)
-
-
-def _plain(body, columns):
-    with np.errstate(all="ignore"):
-        for i in range(columns[0].shape[0]):
-            body(i, *columns)
-
-
-each_group = _compiled if COMPILED else _plain
-"""each_group(body, columns): body(first, *columns) for all groups; called by an `entry`."""
-
-
-@jit
 def write_row(first, j, values, row, trace):
     """trace[first + cell, j] = values[cell] for the cells of a group, through `row`, a buffer of one row."""
     row[cells_at(0)] = values

@@ -11,6 +11,7 @@ register all but one in four straddle two lines: up to 1.4 times the time, more 
 This rests on the inside of numba's compiler, so other versions of numba than those tried get plain `njit`.
 """
 
+import contextlib
 import gc
 import operator
 
@@ -214,7 +215,8 @@ class _Entry(CPUDispatcher):
         gc.disable()
         _remember(self.typingctx)
         try:
-            return super().compile(sig)
+            with getattr(self._cache, "alone", contextlib.nullcontext)():
+                return super().compile(sig)
         finally:
             if collecting:
                 gc.enable()

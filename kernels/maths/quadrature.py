@@ -5,20 +5,28 @@ or sets in like a square root at either end. It is halved in y; worst panels fir
 than wanted, but none whose error is within its rounding, which only grows as nodes come closer to its ends. The error
 of a panel is thrice the difference of the 21- and the 10-point rule, which is far more than the 21-point rule is off by
 if the integrand is smooth; if it all but has a kink, the difference alone was seen to be half of that (in 1 of 5000).
+An integrand fills the values at all nodes of a panel at a time, `integrand(kind, nodes, count, scene)`, in lanes if it
+can: there is room for as many.
 Nodes: Piessens et al., QUADPACK (1983).
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
+from kernels.lanes.groups import GROUP
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude
 
 PANEL_LIMIT = 1000
+COUNT = 21
+"""Nodes of a panel."""
 KIND, START, LENGTH, LOW, HIGH, VALUE, ERROR, NOISE = range(8)
 POOL = (2 * PANEL_LIMIT, 8)
 _CAUTION = 3.0
 _JUMP = 0.125  # of a panel's change when it is halved: the least error of its halves, where theirs is small by chance
 _LEAST = 1.25  # of rtol
+ROOM = max(GROUP, COUNT)
 
 _NODES = np.array([
     0.995657163025808080735527280689003, 0.973906528517171720077964012084452, 0.930157491355708226001207180059508,
@@ -39,6 +47,21 @@ _GAUSS = np.array([
 ])  # fmt: skip
 
 
+class Nodes(NamedTuple):
+    """Of a panel: x, dx/dy, values of the integrand and what they may be wrong by."""
+
+    x: np.ndarray
+    growth: np.ndarray
+    value: np.ndarray
+    doubt: np.ndarray
+
+
+@jit_call
+def nodes():
+    """Room for the `Nodes` of a panel, and to the end of its last lane."""
+    return Nodes(np.empty(ROOM), np.empty(ROOM), np.empty(ROOM), np.empty(ROOM))
+
+
 @jit
 def place(pool, k, y):
     """x and dx/dy of a panel at y."""
@@ -46,18 +69,20 @@ def place(pool, k, y):
 
 
 @jit_call
-def integrate(integrand, scene, pool, k):
-    """Value, error and noise of panel k by 21 nodes."""
+def integrate(integrand, scene, pool, k, nodes):
+    """Value, error and noise of panel k by 21 nodes; behind them the last is repeated."""
     middle, half = 0.5 * (pool[k, LOW] + pool[k, HIGH]), 0.5 * (pool[k, HIGH] - pool[k, LOW])
+    for j in range(ROOM):
+        y = middle - half * _NODES[j] if j < 11 else middle + half * _NODES[max(20 - j, 0)]
+        nodes.x[j], nodes.growth[j] = place(pool, k, y)
+    integrand(pool[k, KIND], nodes, COUNT, scene)
     kronrod, gauss, noise, size = 0.0, 0.0, 0.0, 0.0
-    for j in range(21):
+    for j in range(COUNT):
         i = j if j < 11 else 20 - j
-        y = middle - half * _NODES[i] if j < 11 else middle + half * _NODES[i]
-        x, growth = place(pool, k, y)
-        value, doubt = integrand(pool[k, KIND], x, scene)
+        value, growth = nodes.value[j], nodes.growth[j]
         kronrod += _KRONROD[i] * value * growth
         gauss += _GAUSS[i] * value * growth
-        noise += _KRONROD[i] * doubt * growth
+        noise += _KRONROD[i] * nodes.doubt[j] * growth
         size += _KRONROD[i] * magnitude(value * growth)
     error = _CAUTION * magnitude(kronrod - gauss)
     pool[k, VALUE], pool[k, ERROR] = half * kronrod, half * error
@@ -93,22 +118,22 @@ def totals(pool, count):
 
 
 @jit_call
-def adapt(integrand, scene, pool, count, rtol):
+def adapt(integrand, scene, pool, nodes, count, rtol):
     """Value and error of the pool's `count` opened panels, to `rtol` or as near as rounding or PANEL_LIMIT let it.
 
     The error is stated to be no less than rtol: on one panel in some 1e5 two rules agree by chance a hundred times
     better than they are right.
     """
     for k in range(count):
-        integrate(integrand, scene, pool, k)
+        integrate(integrand, scene, pool, k, nodes)
     value, error, noise, worst, excess = totals(pool, count)
     for new in range(count, PANEL_LIMIT):
         if not (error > max(rtol * magnitude(value), noise) and excess > 0.0):
             break
         whole = pool[worst, VALUE]
         halve(pool, worst, new)
-        integrate(integrand, scene, pool, worst)
-        integrate(integrand, scene, pool, new)
+        integrate(integrand, scene, pool, worst, nodes)
+        integrate(integrand, scene, pool, new, nodes)
         jump = _JUMP * magnitude(whole - (pool[worst, VALUE] + pool[new, VALUE]))
         pool[worst, ERROR], pool[new, ERROR] = max(pool[worst, ERROR], jump), max(pool[new, ERROR], jump)
         value, error, noise, worst, excess = totals(pool, new + 1)

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.lanes.jit import jit, jit_apart
-from kernels.lanes.vectors import magnitude, sqrt
+from kernels.lanes.vectors import magnitude, sqrt, where
 from kernels.polisher.linkage import Lengths, Margins
 from kernels.wear._tool import arctan2, sincos
 
@@ -86,8 +86,8 @@ def arm_of(lengths, margin):
 @jit_apart
 def gaps(arm, c, s):
     """(3): (f+e)^2 - q^2 and q^2 - (f-e)^2 of the arm at (cos eta, sin eta) = (c, s), and their rounding, relative."""
-    sine2 = 0.5 * s * s / (1.0 + c) if c > 0.0 else 0.5 * (1.0 - c)
-    cosine2 = 0.5 * (1.0 + c) if c > 0.0 else 0.5 * s * s / (1.0 - c)
+    sine2 = where(c > 0.0, 0.5 * s * s / (1.0 + c), 0.5 * (1.0 - c))
+    cosine2 = where(c > 0.0, 0.5 * (1.0 + c), 0.5 * s * s / (1.0 - c))
     top, bottom = arm.unit * cosine2 - arm.high, arm.unit * sine2 - arm.low
     return top, bottom, _DOUBT * arm.unit * ((magnitude(s) + cosine2) / top + (magnitude(s) + sine2) / bottom)
 
@@ -122,7 +122,7 @@ def strokes(arm, c, s, top, bottom):
     reach = h * (d * d - b * d * c)
     forth = (reach - lean) / q2
     if arm.whirls:
-        return Strokes(0.0, 0.0, h / forth, magnitude(forth) / h)
+        return Strokes(0.0 * h, 0.0 * h, h / forth, magnitude(forth) / h)
     back = (reach + lean) / q2
     return Strokes(h / back, magnitude(back) / h, h / forth, forth / h)
 

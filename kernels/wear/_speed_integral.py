@@ -7,8 +7,9 @@ with psi from the direction of w. With P and Q the speeds at psi = 0 and pi, v^2
 Source: B. C. Carlson, DLMF 19.25.9 and 19.36(i).
 """
 
-from kernels.lanes.jit import jit, jit_apart
-from kernels.lanes.vectors import magnitude, sqrt
+from kernels.lanes.jit import jit, jit_apart, jit_call
+from kernels.lanes.vectors import any_lane, choose, magnitude, sqrt, where
+from kernels.maths.elementary import larger, smaller
 
 _FLAT = 1e-9  # of a speed beside the other, which changes (2) by less than its square
 _CLOSE = 0.01  # the series' first neglected term is below 1e-16 of it
@@ -43,29 +44,31 @@ def _second_series(x, y):
     return low + middle + 45.0 * e2 * e2 * e3 / 272.0 - 9.0 * (e3 * e4 + e2 * e5) / 68.0
 
 
-@jit_apart
+@jit_call
 def along_arc(p, q, s, c):
     """(2), within some ulp; s and c from 0 to 1."""
-    largest = max(p, q)
-    if not largest > 0.0:
-        return 0.0
-    p, q = max(p / largest, _FLAT), max(q / largest, _FLAT)
+    largest = larger(p, q)
+    unit = where(largest > 0.0, largest, 1.0)
+    p, q = larger(p / unit, _FLAT), larger(q / unit, _FLAT)
     z = p * p
     x, difference = z * (c * c), (q - p) * (q + p)
     y = x + q * q * (s * s)
-    share, summed = 1.0, 0.0
+    share, summed = 1.0 + 0.0 * z, 0.0 * z
     for _ in range(_LIMIT):
         first, second = (x + y + z) / 3.0, 0.2 * (x + y + 3.0 * z)
-        if max(magnitude(first - x), max(magnitude(first - y), magnitude(second - z))) <= _CLOSE * min(first, second):
+        apart = larger(magnitude(first - x), larger(magnitude(first - y), magnitude(second - z)))
+        going = apart > _CLOSE * smaller(first, second)
+        if not any_lane(going):
             break
         root_x, root_y, root_z = sqrt(x), sqrt(y), sqrt(z)
         joint = root_x * (root_y + root_z) + root_y * root_z
-        summed += share / (root_z * (z + joint))
-        x, y, z, share = 0.25 * (x + joint), 0.25 * (y + joint), 0.25 * (z + joint), 0.25 * share
+        summed = where(going, summed + share / (root_z * (z + joint)), summed)
+        nearer = 0.25 * (x + joint), 0.25 * (y + joint), 0.25 * (z + joint), 0.25 * share
+        x, y, z, share = choose(going, nearer, (x, y, z, share))
     first, second = (x + y + z) / 3.0, 0.2 * (x + y + 3.0 * z)
     r_f = _first_series((first - x) / first, (first - y) / first) / sqrt(first)
     r_d = share * _second_series((second - x) / second, (second - y) / second) / (second * sqrt(second)) + 3.0 * summed
-    return 2.0 * largest * (p * p) * s * (r_f + difference * (s * s) * r_d / 3.0)
+    return where(largest > 0.0, 2.0 * largest * (p * p) * s * (r_f + difference * (s * s) * r_d / 3.0), 0.0)
 
 
 @jit_apart

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.lanes.jit import jit, jit_apart
-from kernels.lanes.vectors import magnitude
+from kernels.lanes.vectors import magnitude, where
 from kernels.maths.elementary import arctan, expm1, log1p
 from kernels.maths.elementary import power as inlined_power
 from kernels.maths.elementary import sincos as inlined_sincos
@@ -118,7 +118,7 @@ def _along(x, k, j, middle):
         stretched = power(x, 1.0 / k - 1.0)
         share, small = 0.5 * x, middle * stretched * x
         growth = middle / k * stretched
-        steep = 0.5 / growth if growth > 0.0 else math.inf
+        steep = where(growth > 0.0, 0.5 / growth, math.inf)
     missing = -expm1(log1p(-share) / j)
     return Along(small, missing, growth, steep, (1.0 - missing) / (j * (1.0 - share)))
 

@@ -59,14 +59,22 @@ class Clock(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Space for panels of integrals, and for the stack of times."""
+    """Space for panels of integrals and their nodes, and for the stack of times."""
 
     pool: np.ndarray
+    nodes: quadrature.Nodes
     stack: np.ndarray
 
 
 @jit_apart
-def _speed(kind, s, step):
+def _speeds(kind, nodes, count, step):
+    """The integrand: `_speed` at the times of all nodes."""
+    for j in range(count):
+        nodes.value[j], nodes.doubt[j] = _speed(nodes.x[j], step)
+
+
+@jit_apart
+def _speed(s, step):
     """Speed at a time s of a step, over the area of contact where the load is constant, and its rounding."""
     there = position(step, s)
     v = sqrt(there.vx * there.vx + there.vy * there.vy)
@@ -78,20 +86,19 @@ def _speed(kind, s, step):
 
 
 @jit_apart
-def _polished(step, low, high, tolerance, pool):
+def _polished(step, low, high, tolerance, room):
     """The way of polishing between two times within the tool, and its error; to `tolerance` times the way."""
     if not high > low:
         return 0.0, 0.0
     count = np.int64(0)
-    quadrature.open_panel(pool, count, 0.0, low, high - low)
-    return quadrature.adapt(_speed, step, pool, count + 1, tolerance)
+    quadrature.open_panel(room.pool, count, 0.0, low, high - low)
+    return quadrature.adapt(_speeds, step, room.pool, room.nodes, count + 1, tolerance)
 
 
 @jit_apart
 def _way_in_step(step, h, curve, rtol, room):
     """The way of polishing in one step of time h, and its error."""
-    pool, stack = room
-    tool = step.course.tool
+    stack, tool = room.stack, step.course.tool
     total, error, low, top = 0.0, 0.0, 0.0, np.int64(1)
     one = position(step, 0.0)
     stack[0] = h
@@ -109,26 +116,26 @@ def _way_in_step(step, h, curve, rtol, room):
             continue
         now = before if verdict == ONCE else verdict == INSIDE or (tiny and after)
         if tiny:
-            error += (high - low) * _speed(0.0, high, step)[0]
+            error += (high - low) * _speed(high, step)[0]
         if now and not inside:
             entered = low
         if inside and not now:
-            way, doubt = _polished(step, entered, low, rtol, pool)
+            way, doubt = _polished(step, entered, low, rtol, room)
             total, error = total + way, error + doubt
         inside = now
         if verdict == ONCE and before != after:
             s, blur = _path.crossing(step, low, high)
-            error += min(blur, high - low) * _speed(0.0, high, step)[0]
+            error += min(blur, high - low) * _speed(high, step)[0]
             if after:
                 entered = s
             else:
-                way, doubt = _polished(step, entered, s, rtol, pool)
+                way, doubt = _polished(step, entered, s, rtol, room)
                 total, error = total + way, error + doubt
             inside = after
         low, one = high, two
         top -= 1
     if inside:
-        way, doubt = _polished(step, entered, h, rtol, pool)
+        way, doubt = _polished(step, entered, h, rtol, room)
         total, error = total + way, error + doubt
     return total, error
 
@@ -216,7 +223,7 @@ def _follow(i, columns, room, memory):
 
 @jit
 def _buffers():
-    return Room(np.empty(quadrature.POOL), np.empty(_DEPTH)), _pressure.memory()
+    return Room(np.empty(quadrature.POOL), quadrature.nodes(), np.empty(_DEPTH)), _pressure.memory()
 
 
 @jit

@@ -6,7 +6,7 @@ the arm: its centre at L (cos, sin)(alpha + beta), its X axis along the arm, its
 Over many turns every point of a ring of the workpiece wears alike (unless the rates of crank and workpiece are in the
 ratio of small whole numbers: then this is the mean of the ring), and that is what is given:
     wear(r) = preston p/(4 pi^2) int_0^2pi dtheta int_contact v dpsi                                 (2)
-by the exact integral along the tool's outline of `_profile`. p is the pressure given, or
+by the exact integral along the tool's outline of `_contour`. p is the pressure given, or
     p = load/A                                                                                       (3)
 with A the area of contact at that moment, that of the tool within the workpiece's disc (`_pressure`); without contact
 nothing wears, nor does anything beyond workpiece_radius, if that is given. Leaves out: a tool that turns in its socket,
@@ -31,8 +31,8 @@ from kernels.lanes.records import read
 from kernels.lanes.vectors import where
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import in_unit, is_normal
-from kernels.wear import _pressure, _profile, _scene
-from kernels.wear._profile import Scene
+from kernels.wear import _panels, _pressure, _profile, _scene
+from kernels.wear._contour import Scene
 from kernels.wear._scene import Machine, allowed
 
 _FAINT = 2.0**-100
@@ -60,7 +60,7 @@ def _wear_at(radius, setup, areas, amount, rtol, room):
         return math.nan, math.inf, True
     r = in_unit(radius, setup.unit)
     r = r if r > _FAINT or setup.ride.w == 0.0 else 0.0
-    value, error = _profile.profile(Scene(setup.arm, setup.tool, setup.ride, r, areas), 0.7 * rtol, room)
+    value, error = _profile.profile(Scene(setup.arm, setup.tool, setup.ride, r, areas, room.spare), 0.7 * rtol, room)
     wear = _scene.with_units(value / _FOUR_PI2, amount.preston, amount.hard, units)
     doubt = _scene.with_units(error / _FOUR_PI2, amount.preston, amount.hard, units)
     return wear, doubt, not value > 0.0 or is_normal(wear)
@@ -104,7 +104,7 @@ def _contour(i, columns, room, memory):
 
 @jit
 def _buffers():
-    return _profile.room(), _pressure.memory()
+    return _panels.room(), _pressure.memory()
 
 
 @jit

@@ -2,23 +2,24 @@
 
     y = A x^p (1 + B x^-D)                                                                          (1)
 
-D > 0 where p holds at large x, D < 0 where it holds at small x. Intervals are by profile likelihood (lmfit, extra
-`fit`): those by standard errors are too narrow where B and D are hardly told apart.
+D > 0 where p holds at large x, D < 0 where it holds at small x. Intervals are by profile likelihood: those by standard
+errors are too narrow where B and D are hardly told apart.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from sweep.analysis.correlated import student
-from sweep.analysis.curves import Window, check_confidence, log_of, numbers_along, title, window_logs
+from sweep.analysis.curves import Window, check_confidence, check_output, log_of, numbers_along, title, window_logs
 from sweep.analysis.lines import fit_exponent
 from sweep.analysis.loglog import Array, slope_bounds, slopes
-from sweep.analysis.scatter import library, noise_size
+from sweep.analysis.scatter import noise_size
 from sweep.analysis.shapes import CORRECTION, Found, fitted
 from sweep.system.errors import SweepError
 
@@ -75,7 +76,7 @@ def fit_correction(
     Raises
     ------
     SweepError
-        If `dim` or `end` is unknown or unfit, y is not positive in the window, or lmfit is needed and not installed.
+        If `dim` or `end` is unknown or unfit, or y is not positive in the window.
 
     Examples
     --------
@@ -121,7 +122,7 @@ def _one(t: Array, z: Array, sign: float, confidence: float) -> Array:
         return np.full(len(NUMBERS), np.nan)
     exponent, fade, left = _outer(found, t)
     noisy = _scatters(t, z, found.off)
-    ends = _profile(t, z, found, exponent, confidence) if noisy else _by_half(t, z, exponent)
+    ends = _profile(t, z, found, confidence) if noisy else _by_half(t, z, exponent)
     low, high = sorted(sign * end for end in ends)
     residual = math.expm1(float(abs(found.off).max()))
     return np.array([sign * exponent, low, high, sign * fade, left, residual, noisy, abs(left) < 1])
@@ -155,63 +156,69 @@ def _by_half(t: Array, z: Array, exponent: float) -> tuple[float, float]:
     return exponent - reach, exponent + reach
 
 
-def _profile(t: Array, z: Array, found: Found, exponent: float, confidence: float) -> tuple[float, float]:
+def _profile(t: Array, z: Array, found: Found, confidence: float) -> tuple[float, float]:
     """Exponents at which the least sum of squares, all else fitted anew, is as far up as noise takes it.
 
     The threshold is Student's t squared, which is F's of one and n - 4 degrees of freedom.
     """
-    lmfit = library("lmfit")
     span = float(t[-1] - t[0])
     s = (t - t[0]) / span
-    parameters = lmfit.Parameters()
-    strength, fade, level, slope = found.numbers
+    strength, fade, _, slope = found.numbers
     if fade < 0:  # the other of the two powers is the law
-        level, slope = level + math.log(abs(strength)) if strength else level, slope - fade
-        strength, fade = 1 / strength if strength else 0.0, -fade
-    for name, value in (("strength", strength), ("fade", fade), ("level", level), ("slope", slope)):
-        parameters.add(name, value=float(value))
-    parameters["fade"].set(min=0.3, max=80.0)
-
-    def off(p: Any) -> Array:
-        factor = 1 + p["strength"].value * np.exp(-p["fade"].value * (s - 0.5))
-        line = p["level"].value + p["slope"].value * s
-        return np.where(factor > 0, line + np.log(np.maximum(factor, 1e-300)) - z, 10.0)
-
-    fitter = lmfit.Minimizer(off, parameters, nan_policy="propagate")
-    best = fitter.minimize(method="leastsq")
-    least = float(best.chisqr)
-    size = math.sqrt(least / (t.size - 4))
+        strength, fade, slope = 1 / strength if strength else 0.0, -fade, slope - fade
+    share = math.log(min(max(fade, FADES[0]), FADES[1]) / FADES[0]) / math.log(FADES[1] / FADES[0])
+    start = np.array([strength, math.asin(0.999 * (2 * share - 1)), slope])
+    best = _least(lambda p: _beside(s, z, p[:2], p[2]), start)
+    least = float((_beside(s, z, best[:2], best[2]) ** 2).sum())
     wanted = least * (1 + student(t.size - 4, confidence) ** 2 / (t.size - 4))
-    first = max(abs(float(best.params["slope"].stderr or 0.0)), 0.3 * size)
-    ends = [_edge(fitter, best.params, sign * min(first, 2.0), wanted) for sign in (-1, 1)]
+    first = max(float(np.nan_to_num(found.errors[-1], posinf=2.0)), 0.3 * math.sqrt(least / (t.size - 4)))
+    ends = [_edge(s, z, best, sign * min(first, 2.0), wanted) for sign in (-1, 1)]
     return ends[0] / span, ends[1] / span
 
 
-def _edge(fitter: Any, best: Any, step: float, wanted: float) -> float:
+FADES = (0.3, 80.0)
+"""How fast a correction may fade, per window."""
+
+
+def _beside(s: Array, z: Array, bent: Array, slope: float) -> Array:
+    """Distances from (1) at its best level; `bent`: B at the middle, and an angle that keeps D within FADES."""
+    fade = FADES[0] * (FADES[1] / FADES[0]) ** (0.5 + 0.5 * math.sin(bent[1]))
+    factor = 1 + bent[0] * np.exp(-fade * (s - 0.5))
+    off: Array = slope * s + np.log(np.maximum(factor, 1e-300)) - z
+    return np.where(factor > 0, off - off[factor > 0].mean(), 10.0) if (factor > 0).any() else np.full(s.size, 10.0)
+
+
+def _least(off: Callable[[Array], Array], start: Array) -> Array:
+    from scipy.optimize import leastsq
+
+    best: Array = leastsq(off, start, xtol=1e-7, ftol=1e-7, maxfev=400, full_output=True)[0]
+    return best
+
+
+def _edge(s: Array, z: Array, best: Array, step: float, wanted: float) -> float:
     """Where the profile of the sum of squares passes a value, walking from the best; inf after 40 steps."""
-    inside, here = float(best["slope"].value), best
+    inside, here = float(best[2]), best[:2]
+
+    def held(slope: float) -> tuple[float, Array]:
+        bent = _least(lambda q: _beside(s, z, q, slope), here)
+        return float((_beside(s, z, bent, slope) ** 2).sum()), bent
+
     for _ in range(40):
         outside = inside + step
-        tried = _held(fitter, here, outside)
-        if tried.chisqr > wanted:
+        square, bent = held(outside)
+        if square > wanted:
             break
-        inside, here, step = outside, tried.params, 1.4 * step
+        inside, here, step = outside, bent, 1.4 * step
     else:
         return math.copysign(math.inf, step)
     for _ in range(12):
         middle = (inside + outside) / 2
-        tried = _held(fitter, here, middle)
-        if tried.chisqr > wanted:
+        square, bent = held(middle)
+        if square > wanted:
             outside = middle
         else:
-            inside, here = middle, tried.params
+            inside, here = middle, bent
     return outside
-
-
-def _held(fitter: Any, near: Any, slope: float) -> Any:
-    parameters = near.copy()
-    parameters["slope"].set(value=slope, vary=False)
-    return fitter.minimize(method="leastsq", params=parameters, max_nfev=400)
 
 
 def exponent_by_window(
@@ -256,6 +263,7 @@ def exponent_by_window(
     0
     """
     _check_end(end)
+    check_output(y)
     if y.ndim != 1:
         raise SweepError(f"{title(y)} runs along {', '.join(map(str, y.dims))}; take one line, choose with .sel")
     x = y[dim].values[np.isfinite(log_of(y).values)]

@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.analysis.correlated import student
-from sweep.analysis.curves import check_confidence, log_of, positive_axis, title
+from sweep.analysis.curves import check_confidence, check_dataset, check_output, log_of, positive_axis, title
 from sweep.analysis.loglog import Array
 from sweep.analysis.scatter import library
 from sweep.system.errors import SweepError
@@ -62,6 +62,7 @@ def fit_over(
     1.000000
     """
     check_confidence(confidence)
+    check_dataset("fit_over", fits, "fit_exponent", ["exponent", "exponent_low", "exponent_high"])
     p = fits["exponent"]
     if p.dims != (dim,):
         raise SweepError(f"exponents run along {', '.join(map(str, p.dims)) or 'nothing'}, expected {dim} alone")
@@ -118,6 +119,8 @@ COLLAPSED = {
 }
 
 FEWEST_POINTS = 10
+TRIES = 41
+"""Exponents that are tried near the best."""
 
 
 def fit_collapse(
@@ -173,11 +176,11 @@ def fit_collapse(
         )
     points = Points(*(column[inside] for column in points))
     near = (a - 0.3 * (1 + abs(a)), a + 0.3 * (1 + abs(a)))
-    a = _best(points, near)
+    a = _best(points, near, TRIES)
     b, fitted, numbers = _spline(points, a)
     off = points.z - fitted
     _require_determined(points, a, off, numbers)
-    draws = _bootstrap(points, a, fitted, off * math.sqrt(off.size / (off.size - numbers)), near, bootstrap, seed)
+    draws = _bootstrap(points, fitted, off * math.sqrt(off.size / (off.size - numbers)), near, bootstrap, seed)
     reach = student(off.size - numbers, confidence) * draws.std(axis=0, ddof=1)
     result = xr.Dataset({"x_exponent": a, "y_exponent": b})
     for name, middle, wide in zip(("x_exponent", "y_exponent"), (a, b), reach, strict=True):
@@ -192,7 +195,8 @@ def fit_collapse(
 
 
 def _points(y: xr.DataArray, dim: str, over: str) -> tuple[Points, int]:
-    if not isinstance(y, xr.DataArray) or y.ndim != 2 or {dim, over} != {str(d) for d in y.dims}:
+    check_output(y)
+    if y.ndim != 2 or {dim, over} != {str(d) for d in y.dims}:
         raise SweepError(f"a collapse takes one output along {dim} and {over}, and nothing else; choose with .sel")
     t, size = np.log(positive_axis(y, dim)[1]), np.log(_parameter(y, over))
     z = log_of(y).transpose(over, dim).values
@@ -228,34 +232,33 @@ def _columns(points: Points, a: float) -> Array:
     from scipy.interpolate import BSpline
 
     u = points.t - a * points.size
-    inner = np.quantile(u, np.linspace(0, 1, _knots(u) + 1))
+    inner = np.interp(np.linspace(0, u.size - 1, _knots(u) + 1), np.arange(u.size), np.sort(u))  # quantiles
     knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
     knots[-4:] += 1e-9 * (1 + abs(knots[-1]))
     basis = BSpline.design_matrix(u, knots, 3).toarray()
     return np.column_stack([points.size - points.size.mean(), basis])
 
 
-def _spline(points: Points, a: float, z: Array | None = None) -> tuple[float, Array, int]:
+def _spline(points: Points, a: float) -> tuple[float, Array, int]:
     """b, the common curve at the points, and how many numbers it took."""
     columns = _columns(points, a)
-    numbers, _, rank, _ = np.linalg.lstsq(columns, points.z if z is None else z, rcond=1e-10)
+    numbers, _, rank, _ = np.linalg.lstsq(columns, points.z, rcond=1e-10)
     return float(numbers[0]), columns @ numbers, int(rank) + 1
 
 
-def _square(points: Points, a: float, z: Array | None = None) -> float:
-    values = points.z if z is None else z
-    return float(((values - _spline(points, a, z)[1]) ** 2).sum())
+def _square(points: Points, a: float) -> float:
+    return float(((points.z - _spline(points, a)[1]) ** 2).sum())
 
 
-def _best(points: Points, ends: tuple[float, float], z: Array | None = None, tries: int = 81) -> float:
+def _best(points: Points, ends: tuple[float, float], tries: int = 81) -> float:
     from scipy.optimize import minimize_scalar
 
     grid = np.linspace(*ends, tries)
-    squares = [_square(points, a, z) * _overlap(points, a) for a in grid]
+    squares = [_square(points, a) * _overlap(points, a) for a in grid]
     k = int(np.argmin(squares))
     around = float(grid[max(k - 1, 0)]), float(grid[min(k + 1, tries - 1)])
     return float(
-        minimize_scalar(lambda a: _square(points, a, z), bounds=around, method="bounded", options={"xatol": 1e-9}).x
+        minimize_scalar(lambda a: _square(points, a), bounds=around, method="bounded", options={"xatol": 1e-9}).x
     )
 
 
@@ -285,17 +288,37 @@ def _require_determined(points: Points, a: float, off: Array, numbers: int) -> N
         )
 
 
-def _bootstrap(
-    points: Points, a: float, fitted: Array, off: Array, near: tuple[float, float], times: int, seed: int
-) -> Array:
-    """a and b of so many sets with residuals drawn anew."""
-    rng = np.random.default_rng(seed)
-    found = []
-    for _ in range(times):
-        z = fitted + rng.choice(off, off.size)
-        again = _best(points, near, z, tries=9)
-        found.append((again, _spline(points, again, z)[0]))
-    return np.array(found)
+def _bootstrap(points: Points, fitted: Array, off: Array, near: tuple[float, float], times: int, seed: int) -> Array:
+    """a and b of so many sets with residuals drawn anew.
+
+    All sets share the splines of a grid of a, which closes in on what they say.
+    """
+    z = fitted + np.random.default_rng(seed).choice(off, (times, off.size))
+    low, high = near
+    overlap = np.array([_overlap(points, a) for a in np.linspace(low, high, TRIES)])
+    for _ in range(12):
+        grid = np.linspace(low, high, TRIES)
+        step, found = grid[1] - grid[0], _least_on(points, grid, z, overlap)
+        if step < max(found[:, 0].std() / 4, 1e-9 * (1 + abs(low))):
+            break
+        low, high, overlap = found[:, 0].min() - 2 * step, found[:, 0].max() + 2 * step, np.ones(TRIES)
+    return found
+
+
+def _least_on(points: Points, grid: Array, z: Array, overlap: Array) -> Array:
+    """a and b of the least sum of squares of each set (sets, n), by the parabola through three points of a grid."""
+    squares, slopes = np.empty((2, len(z), grid.size))
+    for k, a in enumerate(grid):
+        columns = _columns(points, a)
+        numbers = z @ np.linalg.pinv(columns, rcond=1e-10).T
+        squares[:, k] = ((z - numbers @ columns.T) ** 2).sum(axis=1) * overlap[k]
+        slopes[:, k] = numbers[:, 0]
+    k, row = np.clip(squares.argmin(axis=1), 1, grid.size - 2), np.arange(len(z))
+    before, here, after = (squares[row, k + side] for side in (-1, 0, 1))
+    bow = before - 2 * here + after
+    share = np.clip(np.where(bow > 0, (before - after) / (2 * np.where(bow > 0, bow, 1.0)), 0.0), -1.0, 1.0)
+    rise = (slopes[row, k + 1] - slopes[row, k - 1]) / 2
+    return np.column_stack([grid[k] + share * (grid[1] - grid[0]), slopes[row, k] + share * rise])
 
 
 def _one_curve(points: Points, a: float, off: Array) -> bool:

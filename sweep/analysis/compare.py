@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.analysis.correlated import corrected
-from sweep.analysis.curves import Window, like, title, window_logs, window_of
+from sweep.analysis.curves import Window, check_output, relative_sigma, title, window_logs, window_of
 from sweep.analysis.loglog import EPSILON, Array
 from sweep.analysis.scatter import BEYOND_DOUBT, RARE, line_deviance
 from sweep.analysis.shapes import CORRECTION, LAWS, ONE, Found, curve, fitted
@@ -70,12 +70,13 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     >>> sweep.compare_laws(y, "x").attrs["chosen"]
     'offset'
     """
+    check_output(y)
     if y.ndim != 1:
         raise SweepError(
             f"{title(y)} runs along {', '.join(map(str, y.dims))}; compare laws of one line, choose with .sel"
         )
     _, t, logs = window_logs(y, dim, window)
-    relative = like(np.nan if sigma is None else sigma / y, y, "sigma").isel(window_of(y, dim, window)).values
+    relative = relative_sigma(y, sigma).isel(window_of(y, dim, window)).values
     present = np.flatnonzero(np.isfinite(logs.values))
     if present.size < FEWEST_POINTS:
         raise SweepError(f"laws are told apart by at least {FEWEST_POINTS} points of {title(y)}, found {present.size}")

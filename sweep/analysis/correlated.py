@@ -55,25 +55,46 @@ TOWARDS_ONE = 0.85
 """Power of 1/(1 - correlation) in their prior: 95 % intervals of 12 points at .9 need it."""
 
 
-def correlated(t: Array, z: Array, confidence: float, weights: Array | None = None) -> Scatter:
-    """The line through points whose noise remembers that of the point before, z_i = phi z_(i-1) + new.
+class Averaged(NamedTuple):
+    """Numbers of a least-squares fit (k,), averaged over all correlations: standard errors and intervals."""
 
-    phi is not estimated: the interval is that of Student's t, averaged over all phi by restricted likelihood.
-    """
+    value: Array
+    error: Array
+    low: Array
+    high: Array
+
+
+def correlated(t: Array, z: Array, confidence: float, weights: Array | None = None) -> Scatter:
+    """The line through points whose noise remembers that of the point before."""
     weights = np.ones(t.size) if weights is None else weights
-    logs, slope, error = _by_correlation(np.stack([np.ones(t.size), t - t.mean()], axis=1), z, weights)
+    found = averaged(np.stack([np.ones(t.size), t - t.mean()], axis=1), z, confidence, weights)
+    plain = float(np.polyfit(t - t.mean(), z, 1, w=np.sqrt(weights))[0])
+    low, high = float(found.low[1]), float(found.high[1])
+    return Scatter("correlated", weights, float(found.error[1]), min(low, plain), max(high, plain))
+
+
+def averaged(columns: Array, z: Array, confidence: float, weights: Array) -> Averaged:
+    """Least squares with noise that remembers that of the point before, z_i = phi z_(i-1) + new.
+
+    phi is not estimated: intervals are those of Student's t, averaged over all phi by restricted likelihood.
+    """
+    logs, values, errors = _by_correlation(columns, z, weights)
     logs = logs - TOWARDS_ONE * np.log(1 - CORRELATIONS) + np.log(np.gradient(CORRELATIONS))
     share = np.exp(logs - logs.max())
     share /= share.sum()
-    middle, spread = float(share @ slope), float(np.sqrt(share @ (error**2 + (slope - share @ slope) ** 2)))
-    ends = [_quantile(share, slope, error, t.size - 2, (1 + sign * confidence) / 2) for sign in (-1, 1)]
-    plain = float(np.polyfit(t - t.mean(), z, 1, w=np.sqrt(weights))[0])
-    return Scatter("correlated", weights, spread, min(ends[0], plain, middle), max(ends[1], plain, middle))
+    middle = share @ values
+    spread: Array = np.sqrt(share @ (errors**2 + (values - middle) ** 2))
+    left = z.size - columns.shape[1]
+    low, high = (
+        [_quantile(share, v, e, left, (1 + sign * confidence) / 2) for v, e in zip(values.T, errors.T, strict=True)]
+        for sign in (-1, 1)
+    )
+    return Averaged(middle, spread, np.minimum(low, middle), np.maximum(high, middle))
 
 
 def _by_correlation(columns: Array, z: Array, weights: Array, restricted: bool = True) -> tuple[Array, Array, Array]:
-    """Logarithm of the likelihood for each of CORRELATIONS, the second number and its standard error, by generalised
-    least squares."""
+    """Logarithm of the likelihood for each of CORRELATIONS, the numbers and their standard errors (correlations,
+    numbers), by generalised least squares."""
     n, k, phi = *columns.shape, CORRELATIONS
     both = np.column_stack([columns, z]) * np.sqrt(weights)[:, None]
     before = np.concatenate([np.zeros((1, k + 1)), both[:-1]])
@@ -87,7 +108,7 @@ def _by_correlation(columns: Array, z: Array, weights: Array, restricted: bool =
     logs = 0.5 * np.log(1 - phi**2) - (n - k * restricted) / 2 * np.log(square)
     if restricted:
         logs += 0.5 * np.log(np.linalg.det(inverse))
-    return logs, numbers[:, 1], np.sqrt(square / (n - k) * inverse[:, 1, 1])
+    return logs, numbers, np.sqrt(square[:, None] / (n - k) * np.einsum("gii->gi", inverse))
 
 
 def _quantile(share: Array, middle: Array, error: Array, left: int, chance: float) -> float:

@@ -13,8 +13,25 @@ from numpy.typing import NDArray
 
 from sweep.analysis.loglog import EPSILON, FEWEST, Array
 from sweep.system.errors import SweepError
+from sweep.system.expected import kind, require_dataset
 
 Window = tuple[float | None, float | None]
+
+
+def check_output(y: Any) -> None:
+    """Raises SweepError where y is no DataArray of numbers."""
+    if not isinstance(y, xr.DataArray):
+        raise SweepError(f"expected one output, e.g. ds.period; found {kind(y)}")
+    if y.dtype.kind not in "fiub":
+        raise SweepError(f"{title(y)}: expected real numbers, found {y.dtype}")
+
+
+def check_dataset(name: str, given: Any, maker: str = "", needs: Sequence[str] = ()) -> None:
+    """Raises SweepError where what `sweep.name` was given is no Dataset with these variables; `maker` gives one."""
+    require_dataset(name, given, maker)
+    missing = [variable for variable in needs if variable not in given]
+    if missing:
+        raise SweepError(f"sweep.{name}: this Dataset has no {', '.join(map(str, missing))}")
 
 
 def positive_axis(y: xr.DataArray, dim: str) -> tuple[str, Array]:
@@ -35,8 +52,7 @@ def positive_axis(y: xr.DataArray, dim: str) -> tuple[str, Array]:
 
 
 def _coordinate(y: xr.DataArray, dim: str) -> tuple[str, NDArray[Any]]:
-    if not isinstance(y, xr.DataArray):
-        raise SweepError(f"expected one output, e.g. ds.period; found a {type(y).__name__}")
+    check_output(y)
     known = [str(name) for name, coordinate in y.coords.items() if coordinate.ndim == 1]
     if dim in known:
         return str(y.coords[dim].dims[0]), y.coords[dim].values
@@ -88,6 +104,7 @@ def title(y: xr.DataArray) -> str:
 
 
 def missing_is_nan(y: xr.DataArray) -> xr.DataArray:
+    check_output(y)
     numbers = y.astype(np.float64)
     return numbers.where(np.isfinite(numbers))
 
@@ -148,8 +165,26 @@ def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:
     return found
 
 
+MOST_SIGMA = 1e6
+"""Relative standard error beyond which a logarithm says nothing."""
+
+
+def relative_sigma(y: xr.DataArray, sigma: Any) -> xr.DataArray:
+    """Standard errors over y; NaN where none are given. Raises SweepError where they are not above rounding."""
+    found: xr.DataArray = like(np.nan if sigma is None else sigma, y, "sigma") / abs(y)
+    beyond = found.where((found < EPSILON) | (found > MOST_SIGMA))
+    if bool(beyond.notnull().any()):
+        worst = float(beyond.min())
+        raise SweepError(
+            f"sigma: expected standard errors of {EPSILON:.2g} to {MOST_SIGMA:.2g} times {title(y)}, found {worst:.3g} "
+            "times; leave sigma out where values do not scatter"
+        )
+    return found
+
+
 def stated_bound(y: xr.DataArray, bound: Any = None) -> xr.DataArray:
     """Largest relative error of each value: as given, else the `rtol` of the sweep that y says it is of, else 0."""
+    check_output(y)
     found = like(y.attrs.get("rtol", 0.0) if bound is None else bound, y, "bound")
     return found.where(np.isfinite(found), 1.0)  # of an error that is not known a value is worth nothing
 
@@ -178,6 +213,7 @@ def stated_error(dataset: xr.Dataset, name: str) -> xr.DataArray:
     >>> float(sweep.stated_error(ds, "period").max())
     1e-06
     """
+    check_dataset("stated_error", dataset, needs=[name])
     rtol = dataset["rtol"] if "rtol" in dataset.coords else float(dataset.attrs.get("rtol", 0.0))
     found = like(rtol, dataset[name], "rtol")
     if "error_bound" in dataset:

@@ -11,9 +11,10 @@ import xarray as xr
 from sweep.analysis.curves import (
     Window,
     check_confidence,
+    check_dataset,
     ends,
-    like,
     numbers_along,
+    relative_sigma,
     stated_bound,
     title,
     window_logs,
@@ -155,7 +156,7 @@ def fit_exponent(
     check_noise(noise)
     dimension, t, logs = window_logs(y, dim, window)
     here = window_of(y, dim, window)
-    errors = like(np.nan if sigma is None else sigma / y, y, "sigma").isel(here)
+    errors = relative_sigma(y, sigma).isel(here)
     bounds = stated_bound(y, bound).isel(here)
     given = Given(confidence, noise, sigma is not None)
     names = (*Line._fields, *JUDGED)
@@ -222,9 +223,10 @@ def judge(t: Array, z: Array, sigma: Array, bound: Array, given: Given) -> Judge
 def _noisy(t: Array, z: Array, off: Array, given: Given) -> Judged:
     kind = given.noise if isinstance(given.noise, str) else None
     found = scattered(t, z, given.confidence, kind)
-    bent = bend(t, z, given.confidence) if kind is None else None
+    even = np.ones(t.size)
+    bent = bend(t, z, given.confidence, found.weights if found.kind == "uneven" else even) if kind is None else None
     if bent is not None:
-        return Judged("bent", np.ones(t.size), found.error, *bent, fits=False)
+        return Judged("bent", even, found.error, *bent, fits=False)
     denied = kind == "independent" and runs_deny(off)
     return Judged(found.kind, found.weights, found.error, found.low, found.high, not denied)
 
@@ -291,6 +293,8 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     >>> print(f"{float(sweep.crossover(weak, strong).abscissa):.1f}")
     0.6
     """
+    for fit in (low_fit, high_fit):
+        check_dataset("crossover", fit, "fit_exponent", ["exponent", "level", "limit_low"])
     _require_apart(low_fit, high_fit)
     first, second = np.log(low_fit.centre), np.log(high_fit.centre)
     middle = (first + second) / 2  # logarithms counted from here keep their digits

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import xarray as xr
 
-from sweep.analysis.curves import title
+from sweep.analysis.curves import check_output, title
 from sweep.analysis.exponents import local_exponent, local_exponent_error
 from sweep.analysis.loglog import is_logarithmic
 from sweep.system.errors import SweepError
@@ -115,6 +115,7 @@ def fraction(level: float) -> str:
 
 
 def _axes(field: xr.DataArray) -> tuple[str, str]:
+    check_output(field)
     if field.ndim != 2:
         raise SweepError(f"{title(field)} has {field.ndim} dimensions; a map needs two, choose with .sel or --at")
     for name in field.dims:

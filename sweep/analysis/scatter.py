@@ -71,7 +71,7 @@ def is_scatter(t: Array, off: Array, z: Array, bound: Array) -> bool:
     return noise_size(t, off) > SMOOTH * size
 
 
-def bend(t: Array, z: Array, confidence: float) -> tuple[float, float] | None:
+def bend(t: Array, z: Array, confidence: float, weights: Array) -> tuple[float, float] | None:
     """Least and largest slope of a curve among noise, with its confidence interval; None where a line does as well.
 
     Parabola and cubic are tried against the line, all with noise that may be correlated and uneven, since correlated
@@ -80,7 +80,6 @@ def bend(t: Array, z: Array, confidence: float) -> tuple[float, float] | None:
     if t.size < FEWEST_FOR_BEND:
         return None
     u = 2 * (t - t[0]) / (t[-1] - t[0]) - 1
-    weights = _weights_if_uneven(t, z)
     straight, *bent = (_polynomial_criterion(u, z, degree, weights) for degree in (1, 2, 3))
     if not min(bent) < straight - BEYOND_DOUBT:
         return None
@@ -97,13 +96,6 @@ def bend(t: Array, z: Array, confidence: float) -> tuple[float, float] | None:
 def _polynomial_criterion(u: Array, z: Array, degree: int, weights: Array) -> float:
     columns: Array = np.polynomial.chebyshev.chebvander(u, degree).astype(np.float64)
     return criterion(columns, z, weights)
-
-
-def _weights_if_uneven(t: Array, z: Array) -> Array:
-    sm = library("statsmodels.api")
-    columns = sm.add_constant(t - t.mean())
-    plain = sm.OLS(z, columns).fit()
-    return 1 / _variance(plain.resid, columns) if _kind(t, plain, columns) == "uneven" else np.ones(t.size)
 
 
 def _chebyshev_slope(u: Array, k: int) -> Array:
@@ -205,9 +197,14 @@ def _kind(t: Array, plain: Any, columns: Array) -> str:
         logs = np.log(np.maximum(plain.resid**2, 1e-6 * float(np.mean(plain.resid**2))))
         if sm.OLS(logs, columns).fit().pvalues[1] < UNEVEN:
             return "uneven"
-    far = float(np.nanmax(abs(plain.get_influence().resid_studentized_external)))
-    alone = 2 * t.size * stdtr(max(1, t.size - 3), -far) < OUTLYING
+    alone = 2 * t.size * stdtr(max(1, t.size - 3), -_farthest(plain)) < OUTLYING
     return "outliers" if t.size >= 8 and alone else "any"
+
+
+def _farthest(plain: Any) -> float:
+    """Largest externally studentized distance from a line; statsmodels, to find it, fits anew without each point."""
+    left, inside = plain.df_resid, float(np.nanmax(plain.get_influence().resid_studentized_internal ** 2))
+    return math.sqrt(inside * (left - 1) / max(left - inside, 1e-300))
 
 
 def _weighted(sm: Any, columns: Array, z: Array, weights: Array, kind: str, confidence: float, **keys: Any) -> Scatter:

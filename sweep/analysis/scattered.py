@@ -20,6 +20,7 @@ from scipy.spatial import Delaunay
 from sweep.analysis.mesh import Array, Indices, tilted
 from sweep.analysis.metric import stretch
 from sweep.system.errors import SweepError
+from sweep.system.expected import require_dataset
 
 LOGARITHMIC = 1.999
 """Ratio of its ends from which on a positive axis is taken in logarithms; below, it makes no difference."""
@@ -130,6 +131,7 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     >>> sweep.interpolated(fine.dataset, {"mu": [0.3, 3.0], "a": [0.7]}).sizes["mu"]
     2
     """
+    require_dataset("interpolated", dataset, "refine")
     names = axes_of(dataset)
     if not names:
         raise SweepError("only cells that fill a box of two axes and more, as those of `refine`, can be interpolated")
@@ -188,7 +190,8 @@ def on_lines(dataset: xr.Dataset, x: str) -> xr.Dataset:
     Returns
     -------
     Dataset
-        Over x and the other axis; where there are several others, over x and `line`, which names their values.
+        Over x and the other axis; where there are several others, over x and `line`, which names their values. The
+        attribute `lines` tells how many cells lie on them, and of which other line most do.
 
     Raises
     ------
@@ -205,19 +208,38 @@ def on_lines(dataset: xr.Dataset, x: str) -> xr.Dataset:
     ends = [np.isin(np.arange(len(lines)), line[values == end]) for end in (values.min(), values.max())]
     long = (count >= FEWEST_ON_A_LINE) & ends[0] & ends[1]
     if not long.any():
-        raise SweepError(f"{x}: no {FEWEST_ON_A_LINE} cells lie on one line from end to end of it; pick another axis")
+        raise SweepError(
+            f"{x}: no {FEWEST_ON_A_LINE} cells lie on one line from end to end of it; pick another axis, or "
+            f"{_longest(others, lines, count)}"
+        )
     on = np.flatnonzero(long[line])
     grid, column = np.unique(values[on], return_inverse=True)
     row = (np.cumsum(long) - 1)[line[on]]
     across = others[0] if len(others) == 1 else "line"
     labels = lines[long, 0] if len(others) == 1 else [_label(others, place) for place in lines[long]]
-    found = xr.Dataset(coords={across: (across, labels), x: (x, grid, dataset[x].attrs)}, attrs=dataset.attrs)
+    attrs = {**dataset.attrs, "lines": _lines_told(x, others, lines, count, long)}
+    found = xr.Dataset(coords={across: (across, labels), x: (x, grid, dataset[x].attrs)}, attrs=attrs)
     for name, variable in dataset.data_vars.items():
         if variable.dims == dataset[STATUS].dims and variable.dtype == np.float64:
             filled = np.full((int(long.sum()), len(grid)), np.nan)
             filled[row, column] = variable.values[on]
             found[name] = ((across, x), filled, variable.attrs)
     return found
+
+
+def _lines_told(x: str, others: Sequence[str], lines: Array, count: Indices, long: NDArray[np.bool_]) -> str:
+    text = f"{count[long].sum()} of {count.sum()} cells lie on {long.sum()} lines from end to end of {x}"
+    text += f"; take one by --at, {_longest(others, lines[long], count[long])}"
+    if (count[~long] < FEWEST_ON_A_LINE).all():
+        return f"{text}; no shorter line has {FEWEST_ON_A_LINE}."
+    return f"{text}, or a shorter one, {_longest(others, lines[~long], count[~long])}."
+
+
+def _longest(names: Sequence[str], lines: Array, count: Indices) -> str:
+    """How to ask for the line with most cells."""
+    most = int(count.argmax())
+    at = " ".join(f"--at {name}={float(value)!r}" for name, value in zip(names, lines[most], strict=True))
+    return f"e.g. {at} ({count[most]} cells)"
 
 
 def _label(names: Sequence[str], values: Array) -> str:

@@ -2,8 +2,7 @@
 
     ln y = c + p1 u + (p2 - p1) w ln(1 + exp(u/w)),   u = ln(x/x0)                                  (1)
 
-p1 holds far below x0 and p2 far above; w is the width of the bend in ln x. For given x0 and w, (1) is linear in the
-rest: a grid over these two gives the start, scipy's Levenberg-Marquardt the end.
+p1 holds far below x0 and p2 far above; w is the width of the bend in ln x.
 """
 
 from __future__ import annotations
@@ -15,24 +14,30 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep.analysis.correlated import corrected, student
+from sweep.analysis.correlated import averaged, corrected, student
 from sweep.analysis.curves import Window, along, check_confidence, noise_of, scatter_is_noise, title, window_logs
+from sweep.analysis.lines import check_noise
 from sweep.analysis.loglog import EPSILON, Array, slopes, tends
-from sweep.analysis.scatter import BEYOND_DOUBT, line_deviance
-from sweep.analysis.shapes import BENDS, LOGARITHM, fitted
+from sweep.analysis.scatter import BEYOND_DOUBT, line_deviance, noise_size, rounding
+from sweep.analysis.shapes import BENDS, LOGARITHM, TWO, fitted
 from sweep.system.errors import SweepError
 
 FEWEST_POINTS = 8
 """Points for the five numbers of (1) and an error bar."""
 
 TELLING = 16
-"""Points from which noise is told from the misfit of a smooth truth."""
+"""Points from which independent noise is told from the misfit of a smooth truth,"""
+TELLING_MEMORY, ROUGH = 40, 0.15
+"""and points and share of the distances that neighbours do not tell, from which on noise that remembers is: smooth
+bends have 0.08 at most, correlations of 0.95 at least 0.19."""
 
 OTHER_SHAPES = 20.0
 """Difference of AICc from which on a bend of another shape is ruled out; more than for a second law, since the truth
 may be between the shapes that are tried."""
 BEYOND_SHAPES = 0.5
 """Share of what other shapes add to where the laws meet, added again: the true one may be none of them."""
+ALIKE = 1e6
+"""Condition of the five numbers of (1) beyond which points do not tell them apart, as those of a single law."""
 
 LAWS = ("low", "high")
 EXPONENTS = ("exponent", "exponent_low", "exponent_high")
@@ -59,12 +64,14 @@ NAMES = {
     "noisy": "1 where the intervals are of noise, 0 where of the curvature of noise-free values",
 }
 
-STARTS = ((0.1, 0.9, 9), (0.01, 0.03, 0.1, 0.25))
-"""Places of x0, and widths, at which a fit may start, in parts of the window."""
-
 
 def fit_two_laws(
-    y: xr.DataArray, dim: str, window: Window | None = None, *, confidence: float = 0.95, noise: bool | None = None
+    y: xr.DataArray,
+    dim: str,
+    window: Window | None = None,
+    *,
+    confidence: float = 0.95,
+    noise: bool | str | None = None,
 ) -> xr.Dataset:
     """Two power laws with a smooth crossover, equation (1), and whether one law would do.
 
@@ -88,9 +95,10 @@ def fit_two_laws(
         Ends in the unit of `dim`, both included.
     confidence : float
         Of the intervals.
-    noise : bool, optional
-        Whether the values carry independent noise. Default: as the scatter of neighbours about the curve shows; with
-        fewer than 16 points, where it shows nothing, intervals are wide enough for both. Say which, if you know.
+    noise : bool or "independent", "uneven", "correlated", "outliers", optional
+        Whether the values scatter; intervals then hold for noise that remembers the point before, too, unless it is
+        said to be independent. Default: as the scatter of neighbours about the curve shows; with fewer than 16 points,
+        where it shows nothing, intervals are wide enough for both.
 
     Returns
     -------
@@ -115,6 +123,7 @@ def fit_two_laws(
     ['-1.00', '-0.34']
     """
     check_confidence(confidence)
+    check_noise(noise)
     dimension, t, logs = window_logs(y, dim, window)
     numbers = along(lambda z: _each(t, z, confidence, noise), logs, dimension, "number")
     if not np.isfinite(numbers.isel(number=slice(len(LAWS) * len(EXPONENTS))).values).any():
@@ -122,12 +131,12 @@ def fit_two_laws(
     return _described(numbers, y, dim, confidence)
 
 
-def _each(t: Array, z: Array, confidence: float, noise: bool | None) -> Array:
+def _each(t: Array, z: Array, confidence: float, noise: bool | str | None) -> Array:
     rows = [_one(t, row, confidence, noise) for row in z.reshape(-1, t.size)]
     return np.array(rows).reshape(*z.shape[:-1], -1)
 
 
-def _one(t: Array, z: Array, confidence: float, noise: bool | None) -> Array:
+def _one(t: Array, z: Array, confidence: float, noise: bool | str | None) -> Array:
     present = np.isfinite(z)
     t, z = t[present], z[present]
     if t.size < FEWEST_POINTS:
@@ -135,13 +144,13 @@ def _one(t: Array, z: Array, confidence: float, noise: bool | None) -> Array:
     order = np.argsort(t)
     t, z = t[order], z[order]
     best, off, jacobian = _fit(t, z)
-    noisy = _is_noise(z, off) if noise is None else noise
+    noisy = _is_noise(t, z, off) if noise is None else bool(noise)
     reach = _reach(off, jacobian, confidence)
-    low, high = best - reach, best + reach
     if not noisy:
-        low, high = _widened(t, z, off, best, low, high)
+        low, high = _widened(t, z, off, best, best - reach, best + reach)
     else:
-        low, high = _of_other_bends(t, z, off, low, high, confidence)
+        more = np.ones(reach.size) if noise == "independent" else _by_memory(off, jacobian, confidence, reach)
+        low, high = _of_other_bends(t, z, off, best, more * reach, more, confidence)
     evidence = _evidence(t, z, off)
     _, *exponents, places, _ = np.stack([best, low, high], axis=1)
     with np.errstate(over="ignore"):  # a crossover that is not determined reaches to infinity
@@ -153,14 +162,17 @@ def _one(t: Array, z: Array, confidence: float, noise: bool | None) -> Array:
     return np.array([*np.concatenate(exponents), *places, *bend, *rest])
 
 
-def _is_noise(z: Array, off: Array) -> bool:
-    """Whether the distances are noise: they scatter, and the points themselves are as rough.
+def _is_noise(t: Array, z: Array, off: Array) -> bool:
+    """Whether the distances are noise: they scatter, and the points themselves are as rough; or, of many points,
+    neighbours differ by more than a smooth truth would.
 
     A curve of five numbers swings about few points of a smooth truth in a way that looks like scatter; then nothing is
     told, and the intervals are those of both.
     """
     size = math.sqrt(float(off @ off) / (off.size - 5))
-    return off.size >= TELLING and bool(scatter_is_noise(off, z)) and size < 3 * noise_of(z)
+    if off.size >= TELLING and bool(scatter_is_noise(off, z)) and size < 3 * noise_of(z):
+        return True
+    return off.size >= TELLING_MEMORY and size > 8 * rounding(t, z) and noise_size(t, off) > ROUGH * size
 
 
 LEVEL, LOW, HIGH, PLACE, WIDTH = range(5)
@@ -187,45 +199,31 @@ def _slopes_of_curve(numbers: Array, t: Array) -> Array:
 
 def _fit(t: Array, z: Array) -> tuple[Array, Array, Array]:
     """The five numbers, the distances of the points from the curve, and the Jacobian there."""
-    from scipy.optimize import least_squares
+    from scipy.optimize import leastsq
 
     narrowest = math.log(float(np.diff(t).min()) / 30)  # a sharper bend looks the same at these points
 
     def held(q: Array) -> Array:
         return np.array([*q[:WIDTH], min(max(q[WIDTH], narrowest), math.log(t[-1] - t[0]))])
 
-    found = least_squares(
+    found = leastsq(
         lambda q: _curve(held(q), t) - z,
         _start(t, z),
-        jac=lambda q: _slopes_of_curve(held(q), t),
-        x_scale="jac",
-        method="lm",
+        Dfun=lambda q: _slopes_of_curve(held(q), t),
         xtol=1e-12,
         ftol=1e-14,
+        full_output=True,
     )
-    best = held(found.x)
+    best = held(found[0])
     return best, z - _curve(best, t), _slopes_of_curve(best, t)
 
 
 def _start(t: Array, z: Array) -> Array:
-    """The best of a grid of places and widths; the rest is linear."""
-    span = t[-1] - t[0]
-    first, last, count = STARTS[0]
-    tries = [
-        (_linear(t, z, t[0] + part * span, width * span))
-        for part in np.linspace(first, last, count)
-        for width in STARTS[1]
-    ]
-    return min(tries, key=lambda found: found[0])[1]
-
-
-def _linear(t: Array, z: Array, place: float, width: float) -> tuple[float, Array]:
-    u = t - place
-    bend = width * np.logaddexp(0, u / width)
-    columns = np.stack([np.ones_like(t), u - bend, bend], axis=1)
-    numbers = np.linalg.lstsq(columns, z, rcond=None)[0]
-    off = z - columns @ numbers
-    return float(off @ off), np.array([*numbers, place, math.log(width)])
+    """The numbers of (1) by variable projection, turned from parts of the window."""
+    found, span = fitted(TWO, t, z), float(t[-1] - t[0])
+    assert found is not None  # FEWEST_POINTS are enough
+    place, log_width, level, low, high = found.numbers
+    return np.array([level, low / span, high / span, t[0] + place * span, log_width + math.log(span)])
 
 
 def _reach(off: Array, jacobian: Array, confidence: float) -> Array:
@@ -270,22 +268,39 @@ def _meeting(t: Array, z: Array, pair: tuple[float, ...]) -> float:
     return float((z[-1] - z[0] + pair[0] * t[0] - pair[1] * t[-1]) / (pair[0] - pair[1]))
 
 
-def _of_other_bends(t: Array, z: Array, off: Array, low: Array, high: Array, confidence: float) -> tuple[Array, Array]:
-    """Intervals that reach over those of every bend of another shape that the points do not rule out."""
+def _by_memory(off: Array, jacobian: Array, confidence: float, reach: Array) -> Array:
+    """How many times further each interval reaches where the noise may remember that of the point before."""
+    size = np.maximum(np.sqrt((jacobian**2).sum(axis=0)), 1e-300)
+    columns = jacobian / size
+    if np.linalg.cond(columns) > ALIKE:
+        return np.ones(reach.size)
+    memory = averaged(columns, off, confidence, np.ones(off.size))
+    found: Array = np.maximum(1.0, np.maximum(memory.high, -memory.low) / size / np.maximum(reach, 1e-300))
+    return found
+
+
+def _of_other_bends(
+    t: Array, z: Array, off: Array, numbers: Array, reach: Array, more: Array, confidence: float
+) -> tuple[Array, Array]:
+    """Intervals that reach over those of every bend of another shape that the points do not rule out.
+
+    Where noise remembers, intervals reach `more` times as far, and points rule out less by the square of that.
+    """
     tried = [found for law in BENDS[1:] if (found := fitted(law, t, z)) is not None]
     best = min([_criterion(off), *(found.aicc for found in tried)])
-    own_low, own_high, low, high = low, high, low.copy(), high.copy()
-    span = t[-1] - t[0]
+    low, high = numbers - reach, numbers + reach
+    own_low, own_high, span = low.copy(), high.copy(), t[-1] - t[0]
+    which = [LOW, HIGH, PLACE]
+    allowed = OTHER_SHAPES * float(more[which[:2]].max()) ** 2
     for found in tried:
-        if found.aicc > best + OTHER_SHAPES:
+        if found.aicc > best + allowed:
             continue
         count = len(found.law.grids)
         q, slopes_there = found.numbers[0], found.numbers[count + 1 : count + 3]
-        reach = student(t.size - found.law.numbers, confidence) * found.errors[[count + 1, count + 2, 0]]
+        wide = student(t.size - found.law.numbers, confidence) * found.errors[[count + 1, count + 2, 0]] * more[which]
         middle = np.array([*slopes_there / span, t[0] + q * span])
-        reach = reach * np.array([1 / span, 1 / span, span])
-        which = [LOW, HIGH, PLACE]
-        low[which], high[which] = np.fmin(low[which], middle - reach), np.fmax(high[which], middle + reach)
+        wide = wide * np.array([1 / span, 1 / span, span])
+        low[which], high[which] = np.fmin(low[which], middle - wide), np.fmax(high[which], middle + wide)
     further = BEYOND_SHAPES * np.array([own_low[PLACE] - low[PLACE], high[PLACE] - own_high[PLACE]])
     low[PLACE], high[PLACE] = low[PLACE] - further.max(), high[PLACE] + further.max()
     return low, high

@@ -9,7 +9,7 @@ import json
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -116,11 +116,12 @@ def _sources(kernel_name: str, engine: Sequence[str]) -> dict[str, str]:
     entry = catalogue.KERNELS.get(kernel_name, kernel_name).partition(":")[0]
     packages = {entry.partition(".")[0], *OURS}
     found: dict[str, str] = {}
-    waiting = [entry]
+    waiting, seen = [entry], set[str]()
     while waiting:
         name = waiting.pop()
-        path = _path(name)
-        if name in found or path is None:
+        path = None if name in seen else _path(name)
+        seen.add(name)
+        if path is None:
             continue
         found[name], imported = _read(path, name, path.stat().st_mtime_ns)
         names = [name, *imported]
@@ -206,6 +207,7 @@ def _called(node: ast.Call, package: Sequence[str]) -> Iterator[str]:
         yield _absolute(package, len(name) - len(module), module)
 
 
+@cache
 def version(name: str) -> str:
     """Of a package."""
     try:

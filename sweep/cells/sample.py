@@ -10,9 +10,12 @@ import numpy as np
 
 from sweep.cells.grid import Cells, Grid, empty_cells
 from sweep.study.model import Axis, Study, differs, frozen
+from sweep.system.errors import SweepError
 
 MOST_TRIED = 1 << 16
 """Cells that are looked at to find some that are asked for."""
+MOST_ASKED = 1 << 28
+"""Cells of which it is known, before a run, that one of them is asked for; it takes seconds."""
 TRIES = 32
 """Cells that are drawn for each that is wanted, where a condition leaves some out."""
 ONE: Mapping[str, float] = {}
@@ -56,6 +59,16 @@ def _chosen(grid: Grid, cells: int) -> Any:
         if len(asked)
         else chosen
     )
+
+
+def require_asked(study: Study) -> None:
+    """Raises SweepError where the study's condition holds for none of its cells."""
+    grid = Grid(study)
+    for start in range(0, min(grid.size, MOST_ASKED), MOST_TRIED):
+        if grid.asked(np.arange(start, min(start + MOST_TRIED, grid.size))).any():
+            return
+    if grid.size <= MOST_ASKED:
+        raise SweepError(f'where = "{study.where}": holds for none of the {grid.size} cells; nothing is left to run')
 
 
 def _axis(name: str, values: Any, factors: Mapping[str, float]) -> Axis:

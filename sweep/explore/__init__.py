@@ -11,6 +11,6 @@ Others may use
     `groups`          superfluous axes, outputs free of units
     `failing`         a study without the cells at which its kernel fails
 
-`calibration` (trial runs) is behind `plan`, `reference` (what errors are against) behind `work_precision`,
-`symmetries` (powers by which numbers may be multiplied) behind `groups`.
+Behind `refine` is `refiner` (rounds of cuts), behind `plan` `calibration` (trial runs), behind `work_precision`
+`reference` (what errors are against), behind `groups` `symmetries` (powers by which numbers may be multiplied).
 """

@@ -15,8 +15,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sweep.analysis.curves import check_output
+from sweep.explore.refine import study_of
 from sweep.explore.symmetries import Scalings, scalings
 from sweep.study.model import Study
+from sweep.system.errors import SweepError
+from sweep.system.expected import kind, require_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -124,6 +128,8 @@ def scaling(study: Study) -> Scaling:
     >>> print(sweep.scaling(study).advice)
     one-dimensional in mu, a: only mu/(phi0 a^2) matters; 1 of these axes can be left out; tried on ... cells at random
     """
+    if not isinstance(study, Study):
+        raise SweepError(f"expected a study, e.g. sweep.study_of(ds); found {kind(study)}")
     found = scalings(study)
     fields = {f.name: f for f in (*study.kernel.parameters, *study.kernel.along)}
     scaled = [name for name in fields if any(found.weights(name))]
@@ -172,7 +178,8 @@ def rescaled(dataset: xr.Dataset, study: Study | None = None) -> xr.Dataset:
     >>> sorted(set(sweep.rescaled(ds).variables) - set(ds.variables))
     ['group_1']
     """
-    study = study or Study.from_json(str(dataset.attrs["study_json"]))
+    require_dataset("rescaled", dataset)
+    study = study or study_of(dataset)
     found = scaling(study)
     values = {str(name): dataset[name] for name in dataset.coords}
     values |= {name: values[axis] for name, axis in study.follows.items()}
@@ -205,6 +212,8 @@ def collapse_quality(x: xr.DataArray, y: xr.DataArray) -> float:
     """
     import xarray as xr
 
+    for array in (x, y):
+        check_output(array)
     x, y = xr.broadcast(x, y)
     t, z = np.log(x.values.ravel()), np.log(y.values.ravel())
     fine = np.isfinite(t) & np.isfinite(z)

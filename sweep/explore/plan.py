@@ -23,6 +23,7 @@ from sweep.cells.guard import Unsolved
 from sweep.cells.output_schema import output_schema, part_columns
 from sweep.cells.partition import Partition, row_blocks
 from sweep.cells.reduce import strip_bytes
+from sweep.cells.sample import require_asked
 from sweep.cells.timing import Sample, row_partition
 from sweep.explore.calibration import Calibration
 from sweep.explore.groups import advice_on, scaling
@@ -164,6 +165,7 @@ def plan(
     2
     """
     study = as_study(study)
+    require_asked(study)
     crew = cores() if workers is None else whole_number("workers", workers)
     folder = Path(path).absolute().parent if path is not None else Path.cwd()
     if not folder.is_dir():

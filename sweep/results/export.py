@@ -19,6 +19,7 @@ from sweep.results.statuses import flag_words, is_summary
 from sweep.study.mistakes import listed
 from sweep.system import disk
 from sweep.system.errors import SweepError
+from sweep.system.expected import require_dataset
 from sweep.system.overwriting import EXPORTED, check_target
 from sweep.system.table import cell
 
@@ -68,6 +69,7 @@ def export(
     >>> print(sweep.export(ds, "period.csv", force=True).read_text().splitlines()[-1])
     2.0,1.0,1.0,0.0,0.0,0.0,1.0,0.0,1.0,5.524901443102082,nan,OK,closed
     """
+    require_dataset("export", dataset)
     target = disk.as_path(path)
     kind = target.suffix.lower()
     if kind not in WRITERS:

@@ -12,6 +12,7 @@ from sweep.results.statuses import flag_words
 from sweep.study.condition import Condition
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.system.errors import SweepError
+from sweep.system.expected import require_dataset
 
 
 def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
@@ -37,6 +38,7 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
     >>> sweep.where(ds, "status == 'OK' and mu > 0.7").mu.values
     array([1., 2.])
     """
+    require_dataset("where", dataset)
     if STATUS not in dataset:
         raise _refusal(condition, "a summary keeps no cells to choose from")
     truth = _condition(dataset, condition).truth()

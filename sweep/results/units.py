@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from sweep.study.mistakes import Mistakes, did_you_mean
 from sweep.study.units import UnitMistake, scale
+from sweep.system.expected import require_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,6 +36,7 @@ def in_units(dataset: xr.Dataset, units: Mapping[str, str]) -> xr.Dataset:
     >>> sweep.in_units(sweep.run(study), {"amplitude": "degree"}).amplitude.attrs["units"]
     'degree'
     """
+    require_dataset("in_units", dataset)
     mistakes = Mistakes()
     factors = {name: _factor(dataset, name, unit, mistakes) for name, unit in units.items()}
     mistakes.raise_if_any("units")

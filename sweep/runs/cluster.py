@@ -128,7 +128,15 @@ class Cluster:
 
     def _introduce(self, assignment: Assignment) -> None:
         try:
-            self._register(Plugin(assignment), assignment.run)
+            for trial in range(1, TRIALS + 1):
+                try:
+                    self._client.register_plugin(Plugin(assignment), name=assignment.run)
+                    return
+                except OSError:
+                    # a worker may have left at that moment
+                    if trial == TRIALS:
+                        raise
+                    self._client.nthreads()
         except OSError as fault:
             raise self.lost(fault) from fault
         except Exception as fault:
@@ -136,16 +144,6 @@ class Cluster:
                 f"cluster: a worker cannot take part ({type(fault).__name__}: {fault}); every machine of the cluster "
                 "needs the same version of foliot"
             ) from fault
-
-    def _register(self, plugin: Plugin, name: str) -> None:
-        """Again where a worker leaves at that moment. Raises what the last trial does."""
-        for _ in range(TRIALS - 1):
-            try:
-                self._client.register_plugin(plugin, name=name)
-                return
-            except OSError:
-                self._client.nthreads()
-        self._client.register_plugin(plugin, name=name)
 
     def executor(self) -> Any:
         """As of concurrent.futures."""

@@ -67,7 +67,9 @@ class Dispatch:
     ) -> None:
         self._cluster, self._blocks, self._forecast, self._reused = cluster, blocks, forecast, reused
         self._note = task.note
-        self._assignment = _assignment(task, blocks, shared if reused is None else None, limits)
+        name, seen = f"foliot-{secrets.token_hex(4)}", shared if reused is None else None
+        words = name, task.study.to_json(), task.fingerprint, blocks.partition, seen, kernel_paths(task.study), limits
+        self._assignment = Assignment(*words)
         self._answers = 0
         self._most = max(1, TASK_BYTES // max(1, self._blocks.partition.cells * self._blocks.row_bytes))
         self._suspects: list[int] = []
@@ -199,18 +201,6 @@ class Dispatch:
             arrays = {name: column if column.flags.writeable else column.copy() for name, column in arrays.items()}
             self._reused.fill(start, stop, arrays)
         return arrays
-
-
-def _assignment(task: Task, blocks: Blocks, shared: Shared | None, limits: Limits | None) -> Assignment:
-    return Assignment(
-        run=f"foliot-{secrets.token_hex(4)}",
-        study=task.study.to_json(),
-        fingerprint=task.fingerprint,
-        partition=blocks.partition,
-        shared=shared,
-        paths=kernel_paths(task.study),
-        limits=limits,
-    )
 
 
 def _listed(blocks: Blocks, jobs: list[int] | Batch) -> str:

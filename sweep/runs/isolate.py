@@ -128,6 +128,7 @@ class IsolatedSolver:
         self._all, self.grid = processes, processes.grid
         self._pool: ProcessPoolExecutor | None = None
         self._process: Any = None
+        self._compiling: Any = None
         self._lock = threading.Lock()
         self._fresh = True
         self.seconds = 0.0
@@ -158,10 +159,8 @@ class IsolatedSolver:
     def call(self, limit: float, function: Callable[..., R], *words: Any) -> R:
         """What a function gives in the process, within so many seconds. Raises Unsolved, Died, Ended."""
         pool = self._ready()
-        # where no cell is known to end, the first one may still have to be compiled
-        compiling = LOAD_SECONDS if self._all.good is None else 0.0
         try:
-            return awaited(pool.submit(function, *words), limit + compiling)
+            return awaited(pool.submit(function, *words), limit, lambda: bool(self._compiling.value))
         except (RuntimeError, CancelledError, TimeoutError) as fault:
             late, code = isinstance(fault, TimeoutError), self._bury(BURY_SECONDS)
         if self._all.over:
@@ -205,7 +204,9 @@ class IsolatedSolver:
         with self._lock:
             if self._all.over:
                 raise Ended("the run is being stopped")
-            self._pool, self._process = ProcessPoolExecutor(1, _context(), isolated.enter), None
+            context = _context()
+            self._compiling, self._process = context.RawValue("i"), None
+            self._pool = ProcessPoolExecutor(1, context, isolated.enter, (self._compiling,))
             with _apart():
                 self._pool.submit(int)
             return self._pool
@@ -229,14 +230,14 @@ class IsolatedSolver:
         return None if burial.is_alive() or self._process is None else self._process.exitcode
 
 
-def awaited(future: Future[R], seconds: float) -> R:
-    """What it gives. Raises TimeoutError after so many seconds, of which none count while the machine sleeps."""
-    spent = 0.0
-    while spent < seconds:
+def awaited(future: Future[R], seconds: float, compiling: Callable[[], bool] = lambda: False) -> R:
+    """What it gives. Raises TimeoutError after so many seconds; none count while the machine sleeps or is compiling."""
+    left = {False: seconds, True: LOAD_SECONDS}
+    while min(left.values()) > 0.0:
         begun = time.monotonic()
-        if wait([future], min(LOOK_SECONDS, seconds - spent)).done:
+        if wait([future], min(LOOK_SECONDS, left[False])).done:
             return future.result()
-        spent += min(time.monotonic() - begun, 2 * LOOK_SECONDS)
+        left[compiling()] -= min(time.monotonic() - begun, 2 * LOOK_SECONDS)
     raise TimeoutError
 
 

@@ -8,6 +8,7 @@ from sweep.cells.fingerprint import difference
 from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import row_blocks
 from sweep.results.open import stored_fingerprint
+from sweep.results.verify import check_whole, verify
 from sweep.runs.extend import has_failed, obstacle
 from sweep.runs.task import Task
 from sweep.store.layout import Layout
@@ -28,7 +29,10 @@ def is_complete(task: Task) -> bool:
     if task.force:
         return False
     if stored == dict(task.fingerprint):
-        return _is_whole(task) and not (task.retry_failed and has_failed(task.output))
+        if task.repair and verify(task.output).blocks is not None:
+            return False
+        check_whole(task.output)
+        return not (task.retry_failed and has_failed(task.output))
     hindrance = obstacle(stored, task.fingerprint)
     if task.extend and not hindrance:
         return False
@@ -38,30 +42,16 @@ def is_complete(task: Task) -> bool:
     raise SweepError(f"{task.output}: {what}; {cure}{more}\n" + _listed(stored, task.fingerprint))
 
 
-def _is_whole(task: Task) -> bool:
-    """False where the result is damaged and is to be repaired. Raises SweepError where it is not, or cannot be."""
-    from sweep.results.verify import verify
-
-    if task.repair and verify(task.output).blocks is not None:
-        return False
-    check_whole(task)
-    return True
-
-
-def check_whole(task: Task) -> None:
-    """Raises SweepError where the result is damaged."""
-    from sweep.results import verify
-
-    verify.check_whole(task.output)
-
-
 def take_up(store: Store, task: Task) -> None:
     """Continues what an earlier run left. Raises SweepError where that was another study, unless forced."""
-    _tell_of_parts(task)
+    parts = task.output.with_name(task.output.name + ".parts")
+    if parts.is_dir():
+        task.note(
+            f"{parts} holds blocks that an earlier version kept; this one cannot continue them and starts anew; remove "
+            "the folder, or finish with the earlier version"
+        )
     layout = _found(store, task)
     if layout is None and task.repair and not task.force and task.output.exists():
-        from sweep.results.verify import verify
-
         store.reopen(verify(task.output).blocks or ())
     elif layout is None:
         store.discard()
@@ -96,15 +86,6 @@ def _fits(layout: Layout, task: Task) -> bool:
     if task.force:
         return False
     raise SweepError(f"{task.output}: its unfinished result is not what its study makes; give it up with --force")
-
-
-def _tell_of_parts(task: Task) -> None:
-    parts = task.output.with_name(task.output.name + ".parts")
-    if parts.is_dir():
-        task.note(
-            f"{parts} holds blocks that an earlier version kept; this one cannot continue them and starts anew; remove "
-            "the folder, or finish with the earlier version"
-        )
 
 
 def tidy(store: Store, task: Task) -> None:

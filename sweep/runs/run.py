@@ -13,6 +13,7 @@ from sweep.cells.block import Found
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.output_schema import gathered
 from sweep.cells.partition import row_blocks
+from sweep.cells.sample import require_asked
 from sweep.results.open import in_memory, memory, open_result, open_unfinished
 from sweep.runs import resume
 from sweep.runs.elsewhere import compute_elsewhere, joined, threads
@@ -116,21 +117,10 @@ def run(
     """
     _check_keywords(keys)
     task = _task(
-        as_study(study, **keys),
-        path,
-        workers=workers,
-        force=force,
-        progress=progress,
-        block_cells=block_cells,
-        extend=extend,
-        until=until,
-        cluster=cluster,
-        repair=repair,
-        isolate=isolate,
-        cell_timeout=cell_timeout,
-        retry_failed=retry_failed,
-        without_workers=without_workers,
-    )
+        as_study(study, **keys), path, workers=workers, force=force, progress=progress, block_cells=block_cells,
+        extend=extend, until=until, cluster=cluster, repair=repair, isolate=isolate, cell_timeout=cell_timeout,
+        retry_failed=retry_failed, without_workers=without_workers,
+    )  # fmt: skip
     if path is None:
         try:
             return _run_in_memory(task)
@@ -187,8 +177,7 @@ def store_cells(
     """
     block = max(1, min(row_blocks(study).count, STORED_AT_ONCE))
     task = Task(study, dict(mark or fingerprint(study)), _checked(path), Cores(1), force=force, block_cells=block)
-    if not resume.is_complete(task):
-        run_to_file(task, Precomputed(arrays, taken_over))
+    _complete(task, Precomputed(arrays, taken_over))
     return open_result(task.output)
 
 
@@ -219,6 +208,7 @@ def _task(
     )
     if task.cluster is not None and workers is not None:
         raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
+    require_asked(study)
     if path is None and until is not None:
         raise SweepError("until: give a path as well, or what is computed by then would be lost")
     if task.extend and task.retry_failed:
@@ -235,10 +225,10 @@ def _checked(path: str | os.PathLike[str]) -> Path:
     return output
 
 
-def _complete(task: Task) -> bool:
+def _complete(task: Task, precomputed: Precomputed | None = None) -> bool:
     """False where the time was up before the end."""
     left = unfinished_of(task.output).exists() or lock_of(task.output).exists()
-    return (resume.is_complete(task) and not left) or run_to_file(task)
+    return (resume.is_complete(task) and not left) or run_to_file(task, precomputed)
 
 
 def _run_in_memory(task: Task) -> xr.Dataset:

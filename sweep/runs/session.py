@@ -256,20 +256,14 @@ class Session:
 
     def log_begin(self) -> None:
         """The first line of a run in its log: what is computed, where, by which versions."""
-        progress, machine = self.progress, platform.uname()
+        progress, machine, versions = self.progress, platform.uname(), self.schema.attrs.get("versions", "")
         log(
             f"begins: {self.task.name}, kernel {self.study.kernel_name}, {progress.done:,} of {progress.total:,} cells "
             f"done before, {self.blocks.count:,} blocks, {self.task.workers} cores, process {os.getpid()} on "
-            f"{machine.node} ({machine.system} {machine.machine}), {self.schema.attrs.get('versions', '')}",
-            "begin",
-            kernel=self.study.kernel_name,
-            cells=progress.done,
-            of=progress.total,
-            cores=self.task.workers,
-            process=os.getpid(),
-            machine=machine.node,
-            versions=self.schema.attrs.get("versions", ""),
-        )
+            f"{machine.node} ({machine.system} {machine.machine}), {versions}",
+            "begin", kernel=self.study.kernel_name, cells=progress.done, of=progress.total, cores=self.task.workers,
+            process=os.getpid(), machine=machine.node, versions=versions,
+        )  # fmt: skip
 
 
 def now() -> str:

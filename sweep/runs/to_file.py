@@ -9,6 +9,7 @@ from sweep.cells.block import Found
 from sweep.cells.output_schema import gathered
 from sweep.cells.partition import row_blocks
 from sweep.results.open import stored_fingerprint
+from sweep.results.verify import check_whole
 from sweep.runs import resume
 from sweep.runs.elsewhere import compute_elsewhere, joined, threads
 from sweep.runs.extend import Precomputed, Retried, Reused, is_of_another_version
@@ -57,7 +58,7 @@ def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
     """The cells of the result that is extended. Raises SweepError where that is not possible."""
     if not (task.extend or task.retry_failed) or task.force or not task.output.exists():
         return None
-    resume.check_whole(task)
+    check_whole(task.output)
     if task.retry_failed:
         return stack.enter_context(Retried(task.output, task.study))
     reused = stack.enter_context(Reused(task.output, task.study))
@@ -76,6 +77,10 @@ def _run_session(session: Session, store: Store, cluster: Cluster | None) -> boo
     with CtrlC():
         if store.layout is None:
             _begin(session, store, shared=cluster is not None)
+        if cluster is None:
+            left = sum(stop - start for start, stop in map(session.blocks.bounds, store.missing()))
+            store.write_back.total = left * session.blocks.row_bytes
+            session.forecast.ending = store.write_back.seconds
         try:
             _finish(session, store, cluster)
         except (KeyboardInterrupt, Terminated):

@@ -20,6 +20,7 @@ from sweep.analysis.loglog import is_logarithmic, spans_decades
 from sweep.show.view import View, coordinate, edges, label, setting, view
 from sweep.system import disk
 from sweep.system.errors import SweepError
+from sweep.system.expected import require_dataset
 from sweep.system.overwriting import DRAWN
 
 try:
@@ -128,6 +129,7 @@ def plot(
     >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
     >>> figure = sweep.plot(ds, "period.png")
     """
+    require_dataset("plot", dataset)
     shown = view(dataset, y, x)
     with style():
         figure = new_figure(120.0, 82.0)
@@ -170,6 +172,7 @@ def plot_precision(found: xr.Dataset, path: str | os.PathLike[str] | None = None
     >>> found = sweep.work_precision(keys, methods=["closed", "asymptotic"], tolerances=[1e-6])
     >>> figure = sweep.plot_precision(found, "precision.png")
     """
+    require_dataset("plot_precision", found, "work_precision", "reference")
     with style():
         lines = _note(found)
         figure = new_figure(PAGE, 96.0 + 3.2 * len(lines))

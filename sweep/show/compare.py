@@ -34,7 +34,8 @@ def comparison(dataset: xr.Dataset, y: str, x: str, windows: Sequence[Sequence[f
     rest = [str(dim) for dim in dataset[y].dims if x not in dataset.coords or dim not in dataset[x].dims]
     rest = [dim for dim in rest if dataset.sizes[dim] > 1]
     if rest:
-        raise SweepError(f"--compare: {y} also runs along {', '.join(rest)}; choose with --at {rest[0]}=value")
+        how = dataset.attrs.get("lines") or f"choose with --at {rest[0]}=value"
+        raise SweepError(f"--compare: {y} also runs along {', '.join(rest)}; {how}")
     window = tuple(windows[0]) if windows else None
     return compare_laws(dataset[y].squeeze(), x, window)  # type: ignore[arg-type]
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sweep.show.charts import COLOURS, DASHES, new_figure, save, style
+from sweep.system.expected import require_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,6 +40,7 @@ def plot_laws(found: xr.Dataset, path: str | os.PathLike[str] | None = None) -> 
     >>> found = sweep.compare_laws(xr.DataArray(1 / x + 0.01, {"x": x}, "x", name="y"), "x")
     >>> figure = sweep.plot_laws(found)
     """
+    require_dataset("plot_laws", found, "compare_laws", "chosen")
     order = [str(law) for law in found.law.values]
     shown = list(dict.fromkeys([found.attrs["chosen"], *order]))[:MOST_LAWS]
     with style():

@@ -95,7 +95,7 @@ def laws(
     limits: list[tuple[float, float] | None] = [*sorted((low, high) for low, high in windows)] or [None]
     keys: dict[str, Any] = {"confidence": confidence, "noise": noise, "bound": stated_error(dataset, y)}
     fits = tuple(fit_exponent(dataset[y], x, window, **keys) for window in limits)
-    remark = _remark(dataset, y)
+    remark = " ".join(filter(None, (dataset.attrs.get("lines", ""), _remark(dataset, y))))
     if len(fits) == 2:
         return Laws(y, x, fits, None, crossover(fits[0], fits[1]), confidence, remark)
     return Laws(y, x, fits, _bend(dataset[y], x, limits[0], confidence, noise), None, confidence, remark)
@@ -133,8 +133,7 @@ def _bend(
     if y.sizes[str(y[x].dims[0])] < FEWEST_POINTS:
         return None
     try:
-        told = True if isinstance(noise, str) else noise
-        found = fit_two_laws(y, x, window, confidence=confidence, noise=told)
+        found = fit_two_laws(y, x, window, confidence=confidence, noise=noise)
     except SweepError:  # the window leaves too few points
         return None
     return found if bool((found.regimes == 2).any()) else None

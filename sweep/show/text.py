@@ -207,9 +207,8 @@ def _status_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
     where = _ranges(dataset)
     rows: list[tuple[str, ...]] = []
     for count in counts:
-        status = Status[count.name] if count.name in Status.__members__ else None
-        text = status.doc if status is not None else ""
-        if status != Status.OK:
+        text = _status_doc(count.name)
+        if count.name != Status.OK.name:
             text += f"; {where[count.name]}" if where.get(count.name) else ""
             text += f"; e.g. {' '.join(f'{k}={v}' for k, v in count.example.items())}"
         rows.append((f"{count.cells:,}", count.name, text))

@@ -12,6 +12,7 @@ from typing import Any
 from sweep.study.mistakes import did_you_mean, listed, show
 from sweep.study.model import Axis, Study
 from sweep.study.study_parser import KEYS, StudyParser
+from sweep.system.disk import as_path
 from sweep.system.errors import Mistake, StudyError, SweepError
 
 __all__ = ["KEYS", "Axis", "Given", "Study", "as_study", "build_study", "read_study", "study"]
@@ -47,7 +48,7 @@ def read_study(path: str | Path, allow_import: bool = False) -> Study:
     >>> sweep.read_study("how_fast.toml").question
     'How fast?'
     """
-    path = Path(path)
+    path = as_path(path)
     if path.suffix in (".h5", ".nc"):
         raise SweepError(f"{path} is a result, not a study; look at it with: sweep show {path}")
     if path.suffix == ".py":
@@ -121,6 +122,8 @@ def study(given: Given | None = None, /, *, allow_import: bool = False, **keys: 
         raise SweepError(f"{listed(keys, word='and')}: keywords do not go with a study; give one of the two")
     if isinstance(given, Study):
         return given
+    if hasattr(given, "data_vars"):  # a Dataset is a Mapping
+        raise SweepError("expected a study, found a Dataset; sweep.study_of(dataset) is the study it came from")
     if isinstance(given, Mapping):
         return StudyParser("study", Path(), allow_import).study(given, "")
     if not isinstance(given, str | os.PathLike):

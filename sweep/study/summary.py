@@ -104,10 +104,9 @@ class SummaryParser:
 
     def _names(self, over: Sequence[str], outputs: Mapping[str, Sequence[str]], axes: Mapping[str, Axis]) -> None:
         """Reductions of one output may be called as another output, or as an axis."""
-        taken = {*axes, *(name for output, reductions in outputs.items() for name in names(output, reductions, over))}
         counts = [n for output, reductions in outputs.items() for n in names(output, reductions, over)]
         twice = sorted({n for n in counts if counts.count(n) > 1} | (set(counts) & set(axes)))
-        if twice and taken:
+        if twice:
             self.mistakes.add("summary.outputs", f"two variables would be called {listed(twice)}; ask for one of them")
 
 

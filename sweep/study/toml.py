@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from sweep.study.model import Axis, Block, Study
+from sweep.system.errors import SweepError
+from sweep.system.expected import kind
 
 BARE = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 """Letters of a key that needs no quotes."""
@@ -26,6 +28,8 @@ def to_toml(study: Study) -> str:
     >>> print(sweep.to_toml(study).splitlines()[-6])
     mu = [0.1, 1.0]
     """
+    if not isinstance(study, Study):
+        raise SweepError(f"sweep.to_toml: expected a Study, found {kind(study)}; sweep.study gives one")
     keys = study_keys(study)
     tables = ("axes", "fixed", "along", "summary")
     lines = [f"{key} = {_value(value)}" for key, value in keys.items() if key not in (*tables, "blocks")]

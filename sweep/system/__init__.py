@@ -2,6 +2,7 @@
 
 Others may use
     `errors`       SweepError, and the mistakes of a study
+    `expected`     what a function refuses to be given
     `disk`         every call that changes the disk
     `pool`         many jobs through threads or workers; BufferPool, Stopper, CtrlC
     `progress`     how far a sweep has come, in words; when it is to stop

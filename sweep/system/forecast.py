@@ -32,11 +32,13 @@ ALIKE = 6
 """Blocks on either side, in the order of what was thought, whose error tells that of a block."""
 DOUBT = 0.5
 """Standard error of a forecast from one block, beside what the spread of blocks tells; of n blocks its n-th's root."""
+FEW = 16
+"""Of so many measured blocks, how far each was off its guess counts half for those around it."""
 FEWEST = 3
 """Blocks from which a spread can be told."""
 LONGER = 0.75
 """Standard errors by which a forecast is made longer, for it is to err on the long side;"""
-EITHER_WAY = 2.0
+EITHER_WAY = 3.0
 """and within which it is told to lie."""
 ENOUGH = 4
 """So many blocks that are no worker's first tell more than all together."""
@@ -55,6 +57,12 @@ class Forecast:
         Blocks that are to be computed.
     clock : callable
         Seconds.
+
+    Attributes
+    ----------
+    ending : callable
+        Seconds that the disk still takes for what is written, which come when all is computed, and for all that is to
+        come, which it may take meanwhile.
     """
 
     def __init__(self, weights: Any, jobs: Iterable[int], clock: Callable[[], float] = time.monotonic) -> None:
@@ -66,6 +74,7 @@ class Forecast:
         self._thought = self._weights
         self._first_end = math.inf
         self._away = 0.0
+        self.ending: Callable[[], tuple[float, float]] = lambda: (0.0, 0.0)
 
     def begin(self, job: int) -> None:
         """A core has begun with a block."""
@@ -120,14 +129,16 @@ class Forecast:
         measured, left, now = self._measured(), np.flatnonzero(self._left), self._clock()
         if self._start is None or not measured.size:
             return None
+        written, all_ = self.ending()
         if not left.size:
-            return 0.0, 0.0
+            return written, 0.0
         running = np.maximum(np.nan_to_num(now - self._begun[left]), 0.0)
         settled = self._settled(measured)
         expected = self._expected(settled)[left]
         error = self._standard_error(settled, expected)
         to_come = np.maximum((1 + LONGER * error) * expected - running, 0.0)
-        return max(float(to_come.sum() / self._cores(measured, running, now)), float(to_come.max())), error
+        computing = max(float(to_come.sum() / self._cores(measured, running, now)), float(to_come.max()))
+        return max(computing + written, all_), error
 
     def _cores(self, measured: Any, running: Any, now: float) -> float:
         """How many blocks are worked on at once."""
@@ -142,7 +153,8 @@ class Forecast:
         error = DOUBT / math.sqrt(measured.size)
         if measured.size < FEWEST:
             return error
-        seconds, without = self._seconds[measured], self._without(measured)
+        seconds = self._seconds[measured]
+        without = self._without(measured, seconds / self._weights[measured])
         without *= seconds.sum() / without.sum()
         variance = ((seconds - without) ** 2).sum() / (without**2).sum()
         shares = expected / expected.sum()
@@ -185,19 +197,24 @@ class Forecast:
         """Seconds of every block."""
         if not measured.size:
             return self._weights
-        ratio = self._seconds[measured] / self._weights[measured]
-        thought = self._weights * np.interp(np.arange(self._weights.size), measured, ratio)
+        thought = self._weights * np.interp(np.arange(self._weights.size), measured, self._ratios(measured))
         if measured.size < LEAST_LEAD:
             return thought
         return thought * self._error(measured, thought)
 
-    def _without(self, measured: Any) -> Any:
+    def _without(self, measured: Any, ratios: Any) -> Any:
         """What measured blocks would be thought to take by their neighbours alone."""
-        return self._weights[measured] * _between(measured, self._seconds[measured] / self._weights[measured])
+        return self._weights[measured] * _between(measured, ratios)
+
+    def _ratios(self, measured: Any) -> Any:
+        """How many times its guess each measured block took; of few, rather as many times as all together."""
+        seconds, weights = self._seconds[measured], self._weights[measured]
+        own = measured.size / (measured.size + FEW)
+        return own * seconds / weights + (1 - own) * seconds.sum() / weights.sum()
 
     def _error(self, measured: Any, thought: Any) -> Any:
         """How many times what is thought blocks take: as measured ones, if they were thought of by their neighbours."""
-        without = self._without(measured)
+        without = self._without(measured, self._ratios(measured))
         rank = np.argsort(without)
         sums = np.cumsum(np.vstack([np.zeros(2), np.stack([self._seconds[measured], without], axis=1)[rank]]), axis=0)
         middle = np.searchsorted(without[rank], thought)

@@ -7,6 +7,7 @@ import os
 import signal
 import time
 
+import numba
 import numpy as np
 import toy
 
@@ -57,6 +58,21 @@ STUCK = kernel("stuck", HANGS, pause=0.002)
 ENDLESS = kernel("endless", HANGS, HOGS)
 HOGGING = kernel("hogging", HOGS)
 WORST = kernel("worst", RAISES, CRASHES, EXITS, HANGS, HOGS, HUNGRY)
+
+
+@numba.njit
+def _slowly_compiled(x):
+    """Takes longer to compile than cells are given in the test."""
+    return np.median(x)
+
+
+def late(height, *rest):
+    """As `toy.exact`, what is compiled at the first cell."""
+    _slowly_compiled(height)
+    toy.exact(height, *rest)
+
+
+LATE = dataclasses.replace(RAISING, methods=(dataclasses.replace(toy.KERNEL.methods[1], solve=late),))
 
 
 def whole_only(height, *rest):

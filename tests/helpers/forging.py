@@ -20,9 +20,10 @@ from typing import NamedTuple
 import h5py
 import numpy as np
 import xxhash
-from havoc import run, study
+from havoc import study
 
 from sweep.cli import main
+from sweep.runs.run import run
 from sweep.store.layout import MAGIC, Layout, read_layout, structure_digest
 from sweep.study.toml import to_toml
 

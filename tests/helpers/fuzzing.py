@@ -12,10 +12,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from havoc import flip, run, study
+from havoc import flip, study
 
 from sweep.cells.fingerprint import fingerprint
 from sweep.cli import main
+from sweep.runs.run import run
 from sweep.store.layout import read_layout, structure_digest
 from sweep.study.read import as_study, read_study
 from sweep.study.toml import to_toml

@@ -7,16 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp, mpc, mpf
 
-from kernels.drivetrain._chain import Scaled, refusal, same
-from kernels.drivetrain._chain_frequencies import (
-    _rotate,
-    _shift,
-    _split,
-    natural_frequencies,
-    natural_frequencies_of_all,
-)
+from kernels.drivetrain._chain import Scaled, refusal
+from kernels.drivetrain._chain_frequencies import natural_frequencies, natural_frequencies_of_all
 from kernels.drivetrain._chain_poles import _apart, _refined, damped_poles, modal_damping
 from kernels.drivetrain._chain_shapes import mode_shapes
+from kernels.drivetrain._dqds import _rotate, _shift, _split, _unknown
 from kernels.drivetrain.receptance import MILLING_MACHINE
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
@@ -77,7 +72,7 @@ def frequencies(J, k):
 def one_chain(J, k):
     """Frequencies and status of one chain by itself."""
     found = np.full(len(J), NAN)
-    status = natural_frequencies(len(J), J, k, found, np.empty(4 * len(J)))
+    status = natural_frequencies(len(J), J, k, found, np.empty(3 * len(J) + 2))
     return found, status
 
 
@@ -143,14 +138,18 @@ def test_frequencies_are_those_of_the_dense_problem():
             assert max(abs(mpf(f) / t - 1) for f, t in zip(one_chain(J, k)[0], true, strict=True)) < 1e-15
 
 
-def test_one_chain_by_itself_has_the_bits_that_it_has_among_others():
-    for kind in ("plain", "80 decades", "twins"):
-        J, k = chains(kind, 8, MANY)
-        among, _ = frequencies(J, k)
-        alone = np.array([one_chain(*chain)[0] for chain in zip(J, k, strict=True)])
-        assert (among == alone).all()
-        assert (frequencies(J[::-1].copy(), k[::-1].copy())[0][::-1] == among).all()
-        assert (frequencies(J[:1], k[:1])[0] == among[:1]).all()
+@pytest.mark.parametrize("n", [2, 8, 24])
+def test_one_chain_by_itself_has_the_bits_that_it_has_among_others(n):
+    """Those beside it lose their rows sooner or later, are turned about, or are free."""
+    parts = [pair for kind in KINDS for pair in (chains(kind, n, MANY // 8 + 1), free(*chains(kind, n, 2)))]
+    J, k = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    order = np.random.default_rng(1).permutation(len(J))
+    J, k = J[order], k[order]
+    among, _ = frequencies(J, k)
+    alone = np.array([one_chain(*chain)[0] for chain in zip(J, k, strict=True)])
+    assert (among == alone).all()
+    assert (frequencies(J[::-1].copy(), k[::-1].copy())[0][::-1] == among).all()
+    assert (frequencies(J[:1], k[:1])[0] == among[:1]).all()
 
 
 @settings(deadline=None, max_examples=30 if COMPILED else 4)
@@ -377,22 +376,25 @@ def test_two_roots_that_may_be_one_are_not_told_apart_unless_they_are_twins():
     assert not apart(1e-12, 1e-12, -1e-9, -2e-9)
 
 
-def entries(q, e, sums):
-    """Rows of `_chain_frequencies` for two rows of a chain: q, e, and the sums of the inverse and of its square."""
-    return np.array([*q, *e, 0.0, *sums, *sums])
+def entries(q, e, traces):
+    """Rows of `_dqds` for two rows of a chain: q, e, and T_1 up to each."""
+    return np.array([*q, *e, 0.0, *traces])
 
 
 def test_a_chain_is_not_split_where_what_is_dropped_would_be_felt_beyond_the_last_digit():
     """Without e, next to q, others move by sqrt(q e), which may be no more than 2^-53 of what is found."""
     far = 2.0**20
-    for e, end in ((2.0**-110, 2.0), (2.0**-127, 1.0)):
-        assert _split(2, 2, same, entries([2.0**-40, far], [e], [2.0**40, 2.0**40]), 1.0) == end
-    assert _split(2, 2, same, entries([far, 2.0**-40], [2.0**-127], [1 / far, 2.0**40]), 1.0) == 2.0
+    for e, end in ((2.0**-110, 2), (2.0**-127, 1)):
+        assert _split(0, 2, entries([2.0**-40, far], [e], [2.0**40, 2.0**40]), 1.0) == end
+    assert _split(0, 2, entries([far, 2.0**-40], [2.0**-127], [1 / far, 2.0**40]), 1.0) == 2
 
 
-def test_after_a_rotation_no_shift_is_taken_from_sums_of_the_old_order():
+def test_the_part_with_the_smallest_eigenvalue_is_brought_to_the_end():
     rows = entries([2.0**-40, 2.0**20], [2.0**-190], [2.0**40, 2.0**40])
-    sums = _rotate(2, 2, same, rows, 1.0, True, (2.0**40, 2.0**80, 2.0**40, 2.0**80, 0.0, 0.0))
+    _rotate(0, 2, rows, 1.0)
     assert list(rows[:2]) == [2.0**20, 2.0**-40]
     assert not rows[2]
-    assert _shift(2, sums[0], sums[1], 1.0) == 0.0
+
+
+def test_no_shift_is_taken_from_sums_of_another_order():
+    assert _shift(2, *_unknown(1.0)[:2], 1.0) == 0.0

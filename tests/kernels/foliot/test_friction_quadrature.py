@@ -7,13 +7,14 @@ import pytest
 from columns import relative_error
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loops import each_cell, one_by_one
 from mpmath import atan, atanh, exp, expm1, findroot, hyp2f1, log, log1p, mp, mpf, sqrt
 
 from kernels.foliot import _friction_quadrature as quadrature
 from kernels.foliot import _single_loss
 from kernels.foliot._units import Scene
 from kernels.interface import Status
-from kernels.lanes.columns import each_cell, entry, one_by_one
+from kernels.lanes.columns import entry
 from kernels.lanes.jit import COMPILED, jit
 from kernels.lanes.vectors import where
 

@@ -5,10 +5,11 @@ import numpy as np
 import oracles
 import pytest
 from columns import relative_error
+from loops import each_cell
 
 from kernels.foliot._integrated_swing import SMOOTH, dopri5
 from kernels.interface import Status
-from kernels.lanes.columns import each_cell, entry
+from kernels.lanes.columns import entry
 from kernels.lanes.jit import COMPILED, jit
 
 NAMES = ("half period", "amplitude", "speed", "sensitivity", "multiplier")

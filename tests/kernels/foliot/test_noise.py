@@ -7,13 +7,14 @@ import foliot_oracles
 import numpy as np
 import pytest
 from columns import checked, columns_of, solve
+from loops import each_group
 from mpmath import mp, mpf
 
 from kernels.foliot.cycle import FOLIOT
 from kernels.foliot.noise import FOLIOT_NOISE, HEADROOM
 from kernels.interface import Status
 from kernels.lanes.columns import entry
-from kernels.lanes.groups import GROUP, cells_at, each_group
+from kernels.lanes.groups import GROUP, cells_at
 from kernels.lanes.jit import COMPILED, jit
 from kernels.maths import philox
 

@@ -6,6 +6,7 @@ import pytest
 from columns import checked, relative_error, solve
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loops import one_by_one
 from mpmath import expm1, log1p, mp, mpf
 
 from kernels.foliot import start as foliot_start
@@ -13,7 +14,7 @@ from kernels.foliot._units import Scene
 from kernels.foliot.cycle import FOLIOT
 from kernels.foliot.start import FLIP_LIMIT, FOLIOT_START, Flip
 from kernels.interface import Status
-from kernels.lanes.columns import entry, one_by_one
+from kernels.lanes.columns import entry
 from kernels.lanes.jit import COMPILED, jit
 
 SOME = 300 if COMPILED else 12

@@ -229,7 +229,7 @@ def test_ends_and_middles_of_swings_are_told_pallet_by_pallet():
     assert [tally[name] for name in names] == pytest.approx([0.9, -0.3, -0.3, -0.2])
 
 
-SCENE = _contacts.Scene(wheel=0.75, pallet=0.25, eta=0.1, e=0.3, c=0.0, y_i=0.0)
+SCENE = _contacts.PlainScene(wheel=0.75, pallet=0.25, eta=0.1, e=0.3, c=0.0, y_i=0.0)
 
 
 @pytest.mark.parametrize("lever", [1.0, -1.0, 0.6])
@@ -247,7 +247,7 @@ def test_an_impact_keeps_momentum_and_turns_the_closing_speed_back_by_e(lever):
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("e", [0.0, 0.3, 0.9])
 def test_a_train_of_bounces_is_its_geometric_sum(side, e):
-    scene = _contacts.Scene(0.75, 0.25, 0.1, e, 0.0, 0.0)
+    scene = _contacts.PlainScene(0.75, 0.25, 0.1, e, 0.0, 0.0)
     y, V, w, time, first = -0.2 * side, 0.5, 0.1 * side, 0.0, None
     (y, V, w), _ = plain(_contacts.impact)(scene, _contacts.Motion(y, V, w), side)
     first = _contacts.Motion(y, V, w)
@@ -301,7 +301,7 @@ CARRIED = {
 @pytest.mark.parametrize("kind", CARRIED)
 def test_changes_carried_along_contacts_are_the_differences_of_neighbouring_motions(kind):
     wheel, eta, e, c = CARRIED[kind]
-    scene = _contacts.Scene(wheel, 1 - wheel, eta, e, c, -0.25 * wheel * (1 + e) / (1 - e))
+    scene = _contacts.PlainScene(wheel, 1 - wheel, eta, e, c, -0.25 * wheel * (1 + e) / (1 - e))
     _, work, _ = plain(_followed.workspace)()
 
     def after(start):
@@ -324,7 +324,7 @@ def test_changes_carried_along_contacts_are_the_differences_of_neighbouring_moti
 def followed(scene, half_swings):
     """Tally, first and last start of a clock followed for so many half swings."""
     wheel, _, _, e = scene[:4]
-    scene = _contacts.Scene(*map(float, scene[:4]), 0.0, -0.25 * wheel * (1 + e) / (1 - e))
+    scene = _contacts.PlainScene(*map(float, scene[:4]), 0.0, -0.25 * wheel * (1 + e) / (1 - e))
     tally, slopes, history = np.zeros(_half_swing.TALLIES), np.zeros((5, 3)), np.zeros((half_swings + 1, 3))
     tally[_half_swing.MARGIN] = np.inf
     start = _half_swing.Start(*map(float, plain(_followed.beginning)(scene, 1e-3)))

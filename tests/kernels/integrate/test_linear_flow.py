@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from columns import relative_error
+from loops import each_cell
 from mpmath import cosh, exp, mp, mpf, sinh, sqrt
 
 from kernels.integrate import linear_flow
-from kernels.lanes.columns import each_cell, entry
+from kernels.lanes.columns import entry
 from kernels.lanes.jit import COMPILED, jit
 
 SOME = 300 if COMPILED else 20

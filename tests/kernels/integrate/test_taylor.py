@@ -184,6 +184,9 @@ def test_the_bound_of_a_tail_is_one():
         h = random.uniform(0.1, 1.5)
         exact = mpmath.fsum(k * abs(series[k]) * h ** (k - 2) for k in range(4, 15))
         assert taylor.tail(h, series) >= exact
+        summed = np.polynomial.Polynomial(series[:-1]).integ().coef
+        exact = float(mpmath.fsum(k * abs(summed[k]) * h ** (k - 2) for k in range(4, 15)))
+        assert taylor.tail_of_sum(h, series) == pytest.approx(exact, rel=1e-14)
 
 
 def test_a_cubic_is_proved_to_fall_where_it_does_and_nowhere_else():
@@ -219,9 +222,17 @@ def test_a_crossing_is_found_wherever_it_lies_in_the_step(root):
         u = (series - offset) / factor
         curve = (tuple(np.append(u.coef, [0.0, 0.0])),)
         event = offset, factor, u(0.0)
-        t, only_just = _plain(taylor.crossing, taylor.of_series, curve, event, 1.0, 1e-13, True)
+        t, only_just = _plain(taylor.crossing, taylor.of_series, curve, event, series.coef[:4], 1.0, 1e-13, True)
         assert t == pytest.approx(root, rel=1e-12, abs=4e-16)
         assert not only_just
+
+
+def test_a_cubic_foresees_where_it_falls_through_0():
+    """To 1 % where its terms fall by a quarter each; the middle where it does not fall so far."""
+    for root in (0.05, 0.5, 0.9):
+        series = np.polynomial.Polynomial([root, -1.0]) * np.polynomial.Polynomial([1.0, 0.25, 0.06])
+        assert _plain(taylor.foreseen, *series.coef, 1.0) == pytest.approx(root, rel=1e-2)
+    assert _plain(taylor.foreseen, 1.0, -0.1, 0.1, 0.0, 1.0) == 0.5
 
 
 def falling(random):
@@ -251,7 +262,7 @@ def test_a_crossing_is_found_in_a_few_looks_at_the_series():
     for _ in range(400 if COMPILED else 100):
         series = falling(random)
         looks.append(0)
-        t, _ = _plain(taylor.crossing, counted, (series,), (0.0, 1.0, series[0]), 1.0, 1e-13, True)
+        t, _ = _plain(taylor.crossing, counted, (series,), (0.0, 1.0, series[0]), series[:4], 1.0, 1e-13, True)
         low, high = (np.polynomial.Polynomial(series)(t * (1.0 + by)) for by in (-1e-10, 1e-10))
         assert low > 0.0 > high
     assert np.mean(looks) < 4.8
@@ -267,7 +278,7 @@ def test_what_falls_through_0_just_before_it_turns_hangs(left, hangs):
     """(t - 1/2)^2 - left turns at 1/2, by so much below 0."""
     series = (0.25 - left, -1.0, 1.0, 0.0, 0.0)
     event = 0.0, 1.0, series[0]
-    assert _plain(taylor.crossing, taylor.of_series, (series,), event, 0.5, 1e-9, True)[1] == hangs
+    assert _plain(taylor.crossing, taylor.of_series, (series,), event, series[:4], 0.5, 1e-9, True)[1] == hangs
 
 
 @pytest.mark.parametrize("flips", [1.0, 2.0, 12.0])

@@ -11,12 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loops import each_cell
 from numba import float64
 from numba.core.errors import TypingError
 
 from kernels.catalogue import KERNELS
+from kernels.lanes import cache
 from kernels.lanes.cache import FOLDER
-from kernels.lanes.columns import each_cell, entry
+from kernels.lanes.columns import entry
 from kernels.lanes.jit import COMPILED, jit
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="plain Python has no machine code")
@@ -48,6 +50,22 @@ def run(code, cache, **more):
 def test_a_second_process_finds_what_the_first_compiled(tmp_path):
     assert run(PERIOD, tmp_path)[:2] == ["0", "0"]
     assert run(PERIOD, tmp_path)[:2] == ["0", "1"]
+
+
+def test_of_two_processes_at_a_time_one_compiles_and_the_other_waits(tmp_path):
+    env = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    words = {"env": env, "cwd": ROOT, "stdout": subprocess.PIPE, "text": True}
+    both = [subprocess.Popen([sys.executable, "-c", PERIOD], **words) for _ in range(2)]
+    assert sorted(process.communicate()[0].split()[:2] for process in both) == [["0", "0"], ["0", "1"]]
+
+
+def test_a_process_that_stands_still_is_not_waited_for_without_end(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache, "MOST_COMPILE_SECONDS", 0.1)
+    with (tmp_path / "lock").open("wb") as held, (tmp_path / "lock").open("wb") as waiting:
+        cache._lock(held)
+        begun = time.monotonic()
+        cache._lock(waiting)
+        assert 0.1 <= time.monotonic() - begun < 10
 
 
 def test_a_damaged_cache_is_compiled_again_and_mended(tmp_path):

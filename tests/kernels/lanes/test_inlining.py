@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from columns import printed_both_ways
+from loops import each_cell
 from numba import float64, njit
 from numba.core.runtime import _nrt_python, rtsys
 
-from kernels.lanes.columns import each_cell, entry, entry_of
+from kernels.lanes.columns import entry, entry_of
 from kernels.lanes.groups import GROUP, room
 from kernels.lanes.inlining import LINE
 from kernels.lanes.jit import COMPILED, jit, jit_call

@@ -5,9 +5,10 @@ import pytest
 from columns import relative_error
 from hypothesis import given
 from hypothesis import strategies as st
+from loops import each_cell, one_by_one
 from mpmath import atan, atanh, cbrt, cos, exp, expm1, log, log1p, mp, mpf, sin
 
-from kernels.lanes.columns import each_cell, entry, one_by_one
+from kernels.lanes.columns import entry
 from kernels.lanes.jit import COMPILED, jit
 from kernels.lanes.vectors import any_lane, dot, exponent, fma, magnitude, nearest, not_, pow2, where
 from kernels.maths import elementary

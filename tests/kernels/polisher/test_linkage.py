@@ -4,8 +4,9 @@ import math
 from fractions import Fraction
 
 import numpy as np
+from loops import each_cell
 
-from kernels.lanes.columns import each_cell, entry
+from kernels.lanes.columns import entry
 from kernels.lanes.jit import COMPILED, jit
 from kernels.lanes.vectors import where
 from kernels.polisher.extremes import square_sums

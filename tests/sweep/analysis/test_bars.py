@@ -9,11 +9,15 @@ import sys
 
 import numpy as np
 import pytest
+import statsmodels.api as sm
 import xarray as xr
+from scipy.interpolate import CubicHermiteSpline
 
 import sweep
 from sweep.analysis.lines import KIND_WORDS
 from sweep.analysis.loglog import slope_bounds
+from sweep.analysis.scatter import _farthest
+from sweep.analysis.shapes import GRID, _hermite
 from sweep.system.errors import SweepError
 
 SETS = 60
@@ -142,7 +146,7 @@ def test_the_bar_of_the_local_exponent_knows_what_values_are_right_to():
 def test_what_stated_errors_can_do_to_a_slope_is_all_that_the_textbooks_weights_allow():
     """(1, -8, 0, 8, -1)/12h: errors of the worst signs move it by 18/12h."""
     t = np.linspace(0, 1, 11)
-    np.testing.assert_allclose(slope_bounds(t, np.full(11, 1e-3), 5)[2:-2], 1.5e-3 / 0.1, rtol=1e-12)
+    np.testing.assert_allclose(slope_bounds(t, np.full(11, 1e-3), 5)[2:-2], 1.5e-3 / 0.1, rtol=1e-10, atol=1e-10)
 
 
 @pytest.mark.parametrize("shift", [0.01, 0.1, 0.3, 0.5, 0.7])
@@ -288,3 +292,19 @@ def test_without_statsmodels_the_message_names_the_extra():
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert 'pip install "foliot[fit]"' in done.stdout
+
+
+@pytest.mark.parametrize("n", [5, 12, 40])
+def test_the_farthest_point_is_that_of_fits_without_each(n):
+    t = np.linspace(0, 1, n)
+    fit = sm.OLS(2 * t + np.random.default_rng(n).standard_normal(n), sm.add_constant(t)).fit()
+    wanted = abs(fit.get_influence().resid_studentized_external).max()
+    assert _farthest(fit) == pytest.approx(wanted, rel=1e-9)
+
+
+def test_the_integral_of_a_bend_is_interpolated_as_by_scipy():
+    rise, steep = np.arctan(GRID) + GRID / 50, 1 / (1 + GRID**2)
+    v = np.concatenate([np.random.default_rng(3).uniform(GRID[0], GRID[-1], 500), GRID[[0, 7, -1]]])
+    np.testing.assert_allclose(
+        _hermite(v, rise, steep), CubicHermiteSpline(GRID, rise, steep)(v), rtol=1e-10, atol=1e-10
+    )

@@ -82,8 +82,20 @@ def test_lines_hold_what_was_computed_and_nothing_else():
     assert three.y.dims == ("line", "c")
     assert str(three.line[1].item()) == "a = 1, b = 3.16228"
     assert on_lines(ds, "y") is ds
-    with pytest.raises(SweepError, match="no 5 cells"):
+    with pytest.raises(SweepError, match=r"no 5 cells .* e.g. --at b=1.0 \(2 cells\)"):
         on_lines(ds.isel(cell=np.r_[0, 4, 20, 24, 30:85]), "a")
+
+
+def test_lines_say_how_many_cells_lie_on_them_and_how_to_ask_for_others():
+    ds = cells()
+    assert on_lines(ds, "a").attrs["lines"] == (
+        "25 of 85 cells lie on 5 lines from end to end of a; take one by --at, e.g. --at b=1.0 (5 cells); "
+        "no shorter line has 5."
+    )
+    short = xr.concat(
+        [ds.isel(cell=slice(0, 25)), ds.isel(cell=slice(30, 36)).assign(b=("cell", np.full(6, 7.0)))], "cell"
+    )
+    assert "or a shorter one, e.g. --at b=7.0 (6 cells)." in on_lines(short, "a").attrs["lines"]
 
 
 def test_places_and_values_are_each_others_inverse():

@@ -9,6 +9,7 @@ from toy_studies import build, message_of
 import sweep
 from kernels.interface import Status
 from sweep.cells.fingerprint import fingerprint
+from sweep.cells.sample import MOST_TRIED
 from sweep.results.statuses import account
 from sweep.show.text import result_text
 
@@ -32,6 +33,20 @@ def test_they_are_an_entry_of_their_own_in_the_account(tmp_path):
     assert "3 not asked" in str(account(found))
     assert "NOT_ASKED" in result_text(tmp_path / "a.h5", found)
     assert sweep.verify(tmp_path / "a.h5").whole
+
+
+def test_a_condition_that_holds_nowhere_is_told_before_anything_is_run(tmp_path):
+    study = build(axes=AXES, where="height > 4")
+    for function, *path in ((sweep.run,), (sweep.run, tmp_path / "a.h5"), (sweep.plan,)):
+        with pytest.raises(sweep.SweepError, match='where = "height > 4": holds for none of the 12 cells'):
+            function(study, *path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_last_of_many_cells_is_one_that_is_asked_for():
+    height = {"spacing": "linear", "start": 1.0, "stop": 2.0, "num": 3 * MOST_TRIED + 1}
+    study = build(axes={"height": height}, where="height == 2", outputs=["fall_time"], method="exact")
+    assert sweep.run(study).status.values[-2:].tolist() == [Status.NOT_ASKED, Status.OK]
 
 
 def test_they_are_not_computed():

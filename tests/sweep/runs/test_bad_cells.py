@@ -1,6 +1,7 @@
 """Kernels that raise, crash, or never end cost the cells they do so at, and nothing else."""
 
 import io
+import time
 from concurrent.futures import Future, ProcessPoolExecutor
 from types import SimpleNamespace
 
@@ -213,3 +214,22 @@ def test_a_sample_does_not_wait_for_cells_that_never_end():
     assert processes.seconds(1) == 2.0
     processes.limits = Limits(600.0, 0.1)
     assert processes.seconds(1) == 600.0
+
+
+def test_a_first_cell_that_never_ends_costs_no_more_than_any_other():
+    """The one in the middle of the grid is tried first."""
+    begun = time.monotonic()
+    found = quiet(tall(87, "bad:ENDLESS"), workers=1, cell_timeout=1.0)
+    assert heights_of(found, Status.FAILED) == [bad.HANGS, bad.HOGS]
+    assert time.monotonic() - begun < isolate.LOAD_SECONDS / 2
+
+
+def test_what_compiling_takes_is_not_taken_for_what_a_cell_takes():
+    found = quiet(tall(20, "bad:LATE"), workers=1, cell_timeout=0.3)
+    assert account(found).ok == 20
+
+
+def test_what_compiling_takes_is_bounded_too(monkeypatch):
+    monkeypatch.setattr(isolate, "LOAD_SECONDS", 0.1)
+    with pytest.raises(TimeoutError):
+        isolate.awaited(Future(), 60.0, lambda: True)

@@ -6,11 +6,13 @@ import random
 import numpy as np
 import pytest
 import toy_studies
-from havoc import KINDS, Victims, damaged_result, damaged_unfinished, numbers, study, torture, unfinished
+from havoc import damaged_result, damaged_unfinished, numbers, study, unfinished
+from killing import KINDS, Torture, Victims, perform, prepare
 from running import fail_on, quiet, same, told_by
 
 import sweep
 from sweep.results.verify import verify
+from sweep.store.store import lock_of
 
 KILLS, DAMAGED = 8, 8
 FAULTS = [("open_file", errno.EMFILE), ("write", errno.ENOSPC), ("reserve", errno.ENOSPC), ("fsync", errno.EIO),
@@ -35,10 +37,24 @@ def rng():
 
 def test_killed_at_any_moment_a_run_loses_nothing_and_ends_with_the_same_bits(tmp_path, rng):
     with Victims() as victims:
-        found = torture(rng, victims, tmp_path, KILLS, SHAPES, KINDS)
-    assert found["kills"] >= KILLS
-    assert found["acknowledged"] > 0
-    assert (found["lost"], found["different"]) == (0, 0)
+        found = Torture(rng, victims, tmp_path, SHAPES)
+        for kind in KINDS:
+            found.kill(kind, KILLS // len(KINDS))
+    assert found.kills >= KILLS
+    assert found.acknowledged > 0
+    assert (found.lost, found.different) == (0, 0)
+
+
+def test_a_lock_that_a_run_left_when_it_was_killed_at_its_very_end_is_removed(tmp_path):
+    for kind in KINDS:
+        output = tmp_path / f"{kind}.h5"
+        prepare(kind, output)
+        perform(kind, output, 2, 300)
+        bits = output.read_bytes()
+        lock_of(output).touch()
+        perform(kind, output, 2, 300)
+        assert not lock_of(output).exists()
+        assert output.read_bytes() == bits
 
 
 @pytest.fixture(scope="module")

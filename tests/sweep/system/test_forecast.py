@@ -211,8 +211,8 @@ def test_an_interval_is_wide_only_where_blocks_differ_without_rule():
         found = [run.forecast.interval for count in run.ends() if 60 < count < 400]
         return max(high / low for low, high in found)
 
-    assert widest("even") < 1.4
-    assert widest("dear last") < 1.4
+    assert widest("even") < 1.6
+    assert widest("dear last") < 1.6
     assert widest("few dear cells") > 1.7
 
 
@@ -316,6 +316,32 @@ def test_what_workers_elsewhere_have_half_done_counts():
         now = costs[job]
         forecast.end(job, costs[job])
     assert 192.0 <= forecast.left < 1.3 * 192.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("blocks", [32, 64, 128])
+@pytest.mark.parametrize("name", ["even", "dear last"])
+def test_of_few_blocks_too_the_time_left_is_about_right(name, blocks, seed):
+    """The probes are off by up to a half each: a sum over many is less so than a block's own."""
+    told = Run(COSTS[name], blocks, 2, seed=seed).forecasts()
+    end = told[-1][1]
+    ratios = [next(left / (end - now) for share, now, left in told if share >= least) for least in (0.1, 0.25, 0.5)]
+    assert 0.8 < min(ratios) <= max(ratios) < 1.9
+    assert np.median(ratios) < 1.5
+
+
+def test_what_the_disk_still_takes_is_waited_for():
+    forecast = Forecast(np.ones(2), range(2), lambda: now)
+    now, jobs = 0.0, forecast.order()
+    for job in jobs:
+        forecast.begin(job)
+        now += 1.0
+        forecast.end(job)
+        forecast.ending = lambda: (0.5, 0.5)
+        assert forecast.left == (0.5 if now == 2.0 else pytest.approx(1.5, rel=0.3))
+    forecast.again(1)
+    forecast.ending = lambda: (0.5, 60.0)
+    assert forecast.left == 60.0
 
 
 def test_one_long_block_is_waited_for_by_all_workers():

@@ -147,7 +147,7 @@ def test_refine_says_before_it_computes_that_another_result_is_there(here, capsy
     ).close()
     argv = ["refine", "f.h5", "--y", "period", "--tolerance", "1e-4", "-o", "r.h5"]
     with monkeypatch.context() as nothing:
-        nothing.setattr("sweep.explore.refine.Refiner.refined", lambda self: pytest.fail("computed"))
+        nothing.setattr("sweep.explore.refiner.Refiner.refined", lambda self: pytest.fail("computed"))
         assert cli.main(argv) == 2
         assert "r.h5: holds another result" in capsys.readouterr().err
     assert cli.main([*argv, "--force"]) == 0

@@ -1,0 +1,186 @@
+"""Panels of the integrals of `_contour`: where they are split.
+
+The integrands are smooth but for ends of contact at rho = abs(w +- r), where the arm turns and where v is 0
+(`_dwell`): crossings of circles with the outline, where panels are split. Derived here.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from kernels.lanes.jit import jit, jit_apart
+from kernels.lanes.vectors import magnitude, sqrt
+from kernels.maths import quadrature
+from kernels.maths.quadrature import ROOM, Nodes, open_panel
+from kernels.wear import _dwell, _tool
+from kernels.wear._contour import FAR_SIDE, SPARE, about_pivot, along_outline, from_frame, phi_of, vertex_margins
+from kernels.wear._tool import CROSSING_LIMIT, PIECES, Circle, arctan2, outline, sincos
+
+_AT_TURN = 1e-11  # a gap over its largest, or a step: beyond that a split is none where the arm turns
+_TURN = 2.0 * math.pi
+
+
+class Split(NamedTuple):
+    """A circle about which panels are split, and its vertex excess."""
+
+    circle: Circle
+    start: float
+
+
+class Stops(NamedTuple):
+    """Angles of the arm at which wear is not smooth, and how many."""
+
+    angles: np.ndarray
+    count: int
+
+
+class Room(NamedTuple):
+    """Space for panels, their nodes, splits, angles, the stack of intervals, the stops of the arm; a scene's spare."""
+
+    pool: np.ndarray
+    nodes: Nodes
+    found: np.ndarray
+    angles: np.ndarray
+    stack: np.ndarray
+    still: np.ndarray
+    spare: np.ndarray
+
+
+@jit_apart
+def room():
+    """A `Room`."""
+    found, angles = np.empty(_tool.ARC_LIMIT), np.empty(_tool.ARC_LIMIT)
+    stack, still = np.empty(_tool.STACK), np.empty(_dwell.STOP_LIMIT)
+    return Room(np.empty(quadrature.POOL), quadrature.nodes(), found, angles, stack, still, np.empty(SPARE))
+
+
+@jit
+def work_centre(scene, c, s):
+    """The centre of the work in the tool's frame, with the arm at (c, s) from the frame."""
+    ride = scene.ride
+    x = ride.w * (c * ride.turn_c + s * ride.turn_s) - ride.reach
+    return x, ride.w * (c * ride.turn_s - s * ride.turn_c)
+
+
+@jit
+def _split(k, scene, piece, still):
+    """The circles at which panels are split: two about the pivot, then of radius r.
+
+    These are at the angles in `still`, each on either side of the arm.
+    """
+    ride, r = scene.ride, scene.r
+    if k < 2:
+        near, wide = vertex_margins(piece, scene)
+        radius = ride.w + r if k else magnitude(ride.w - r)
+        return Split(Circle(-ride.reach, 0.0, radius), wide if k else near)
+    s, c = sincos(still[k // 2 - 1])
+    x, y = work_centre(scene, c, s)
+    circle = Circle(x, -y if k % 2 else y, r)
+    return Split(circle, _tool.vertex_excess(piece, scene.tool, circle))
+
+
+@jit_apart
+def _settled(x, scene, piece):
+    """The same split, if it is where the arm turns, of all of its ways to get there that which is nearest its end.
+
+    By Newton's rule on the arm's gap as the integrand has it, which goes there like a square root: where the point is
+    near the line of centres, a split that was found otherwise is off by much more than rounding of the gap.
+    """
+    unit = scene.arm.unit
+    sight = about_pivot(scene, piece, outline(piece, x, scene.tool))
+    least, step = _AT_TURN * unit, 0.0
+    if sight.blur < math.inf:
+        for k in range(4):
+            side, half = 1.0 if k < 2 else -1.0, 1.0 if k % 2 else -1.0
+            c, s = phi_of(sight, side)
+            cosine, sine = from_frame(scene.ride, c, half * s)
+            top, bottom, _ = _dwell.gaps(scene.arm, cosine, sine)
+            gap, growth = (top, -1.0) if magnitude(top) < magnitude(bottom) else (bottom, 1.0)
+            slope = growth * 0.5 * unit * sine * half * (sight.chi_slope - side * sight.gamma_slope)
+            if sine > 0.0 and magnitude(gap) < least and magnitude(gap) < _AT_TURN * magnitude(slope):
+                least, step = magnitude(gap), gap / slope
+    return x - step if 0.0 < x - step < 1.0 else x
+
+
+@jit_apart
+def _splits_of(piece, scene, stops, room):
+    """Puts the ends of a piece's panels into `room`, split where contact ends or v is 0; how many panels."""
+    found, splits = room.found, np.int64(1)
+    found[0] = 0.0
+    for j in range(2 + 2 * stops.count):
+        split = _split(j, scene, piece, stops.angles)
+        if splits + CROSSING_LIMIT < found.size:
+            number = _tool.crossings(piece, scene.tool, split.circle, split.start, found, splits, room.stack)
+            for i in range(splits, number if 1 < j < 6 and not scene.arm.whirls else splits):
+                found[i] = _settled(found[i], scene, piece)
+            splits = number if number >= 0 else splits  # where circle and outline coincide there is none to split
+    found[splits] = 1.0
+    _tool.sort(found, splits + 1)
+    return splits
+
+
+@jit_apart
+def open_outline(count, scene, stops, room):
+    """Opens the panels of the contour that have wear amid them; how many panels there are then."""
+    found, nodes = room.found, room.nodes
+    for k in range(PIECES):
+        piece, splits = float(k), _splits_of(float(k), scene, stops, room)
+        for first in range(0, splits, ROOM):
+            here = min(ROOM, splits - first)
+            for j in range(ROOM):
+                start = found[first + min(j, here - 1)]
+                nodes.x[j] = start + 0.5 * (found[first + min(j, here - 1) + 1] - start)
+            along_outline(piece, nodes, here, scene)
+            for j in range(here):
+                start, length = found[first + j], found[first + j + 1] - found[first + j]
+                if length > 0.0 and nodes.doubt[j] > 0.0:
+                    open_panel(room.pool, count, piece, start, length)
+                    count += 1
+    return count
+
+
+@jit_apart
+def _phase(arm, eta):
+    """u of `pose_at`."""
+    ahead, behind = arm.most - eta, eta - arm.least
+    return 2.0 * arctan2(sqrt(max(behind, 0.0)), sqrt(max(ahead, 0.0))) - 0.5 * math.pi
+
+
+@jit_apart
+def open_split(pool, count, kind, low, high, scene, stops):
+    """Opens panels of that kind from arm's angle low to high, split at the stops; how many panels there are then.
+
+    None is longer than a quarter of a turn, or half of what the arm rocks: 21 nodes may miss a dwell in all of it.
+    """
+    arm = scene.arm
+    longest = 0.25 * _TURN if arm.whirls else 0.5 * (arm.most - arm.least)
+    start = low
+    while start < high:
+        end = min(high, start + longest)
+        for k in range(stops.count):
+            turns = math.floor((stops.angles[k] - start) / _TURN) if arm.whirls else 0.0
+            stop = stops.angles[k] - turns * _TURN
+            end = stop if start < stop < end else end
+        first, last = (start, end) if arm.whirls else (_phase(arm, start), _phase(arm, end))
+        open_panel(pool, count, kind, first, last - first)
+        count += 1
+        start = end
+    return count
+
+
+@jit_apart
+def open_far_side(pool, scene, angles, number, stops):
+    """Opens the panels of the second integral of (2), from the arcs about the pivot; how many there are."""
+    arm, ride = scene.arm, scene.ride
+    turn = arctan2(ride.turn_s, ride.turn_c) + (math.pi if scene.r > ride.w else 0.0)
+    count = np.int64(0)
+    for j in range(0, number, 2):
+        low, high = turn - angles[j + 1], turn - angles[j]
+        if arm.whirls:
+            count = open_split(pool, count, FAR_SIDE, low, high, scene, stops)
+        else:
+            for k in range(-2, 3):
+                first, last = max(low + k * _TURN, arm.least), min(high + k * _TURN, arm.most)
+                count = open_split(pool, count, FAR_SIDE, first, last, scene, stops)
+    return count

@@ -1,0 +1,266 @@
+"""Rounds of cuts of edges between cells, until straight lines between them are right to a tolerance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.interface import FIRST_REFUSAL, Status
+from sweep.analysis.mesh import Array, Indices, edges, interpolation_errors, simplices
+from sweep.analysis.metric import stretch
+from sweep.analysis.scattered import Box, heights
+from sweep.cells.schema import ANCILLARY, STATUS
+from sweep.study.model import Axis, Study, frozen
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LEVELS = {1: 20, 2: 10, 3: 6}
+"""How often a step of the first grid may be cut in two, by number of axes; a jump cannot be interpolated."""
+FEWEST_LEVELS = 4
+BORDER_LEVELS = {1: 10, 2: 5, 3: 3}
+"""How often, because a border between statuses passes through it; no value is right inside the last."""
+BESIDE_LEVELS = {1: 20, 2: 5, 3: 3}
+"""How often beside such a border: values may go to infinity there, which no number of cells follows."""
+SAME = 2.0**-40
+"""Distance of places along an axis, from 0 to 1, that are the same."""
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """What came of it.
+
+    Attributes
+    ----------
+    dataset : Dataset
+        All cells, the first ones and those added, in rising order: along the axis, or of several along `cell`.
+    added : int
+        Cells beyond the first ones.
+    uniform : int
+        Cells of an even grid as fine as the finest step.
+    error : float
+        Largest error left of straight lines between cells, relative, as the cells around tell it; not across borders
+        of statuses, nor in `jumps` and `singular`.
+    tolerance : float
+    complete : bool
+        Whether the tolerance is met; not so where `most_cells` ran out or an output jumps.
+    jumps : int
+        Places where the tolerance is not met although edges are cut as often as is allowed.
+    singular : int
+        Likewise, beside borders of statuses, where values go to infinity or bend without end.
+    unseen : dict of str to str
+        How far apart cells are along each axis, at most: nothing tells of a peak narrower than that.
+    """
+
+    dataset: xr.Dataset
+    added: int
+    uniform: int
+    error: float
+    tolerance: float
+    complete: bool
+    jumps: int
+    singular: int
+    unseen: dict[str, str]
+
+    def __str__(self) -> str:
+        cells = self.dataset[STATUS].size
+        text = f"{cells:,} cells, {self.added:,} of them added; an even grid as fine has {self.uniform:,}"
+        text += f"\ninterpolation error left: {self.error:.2g}, as the cells around tell"
+        if self.error > self.tolerance:
+            text += "; the tolerance is not met everywhere, allow more cells"
+        if self.jumps:
+            text += f"; not in {self.jumps:,} place{'s' * (self.jumps > 1)} where it jumps or diverges"
+        if self.singular:
+            text += f"; not in the {self.singular:,} nearest a border of statuses, where values diverge"
+        apart = ", ".join(f"{width} in {name}" for name, width in self.unseen.items())
+        return f"{text}\ncells are up to {apart} apart; a peak narrower than that is not seen"
+
+
+class Output(Protocol):
+    """Solves further cells of a study, and writes all at the end."""
+
+    @property
+    def study(self) -> Study: ...
+
+    def solved(self, axes: dict[str, Axis]) -> xr.Dataset:
+        """Cells with these values."""
+
+    def written(self, axes: dict[str, Axis], arrays: dict[str, Any]) -> xr.Dataset:
+        """All cells, with these values of the axes, outputs and statuses."""
+
+
+class Refiner:
+    """Cells joined to simplices, whose edges are cut until outputs can be interpolated."""
+
+    def __init__(
+        self, dataset: xr.Dataset, output: Output, names: Sequence[str], tolerance: float, most_cells: int
+    ) -> None:
+        self.output, self.names, self.tolerance, self.most = output, names, tolerance, most_cells
+        self.parts = [_flat(dataset.load())]
+        self.axes = list(output.study.axes)
+        first = {name: self.parts[0][name].values for name in self.axes}
+        self.box = Box.of(first)
+        self.values = np.stack(list(first.values()), axis=1)
+        self.points = self.box.points(first)
+        self.known = [dict(zip(_keys(t), v, strict=True)) for t, v in zip(self.points.T, self.values.T, strict=True)]
+        self.first = len(self.points)
+        product = output.study.design == "product"
+        self.steps = np.array([len(k) - 1 if product else self.first ** (1 / len(self.axes)) for k in self.known])
+
+    def refined(self) -> Refinement:
+        """Rounds of cuts, each of edges that share no end."""
+        self._give_every_axis_a_middle()
+        while True:
+            found = self._judged()
+            cuts = self._cuts(found)[: max(0, self.most - len(self.points))]
+            if not len(cuts):
+                return self._joined(found, complete=not (found.size > self.tolerance).any())
+            self._solve(*self._middles(cuts))
+
+    def _give_every_axis_a_middle(self) -> None:
+        """Between two values nothing tells whether an output bends."""
+        for k, known in enumerate(self.known):
+            if len(known) == 2:
+                points = self.points[self.points[:, k] == 0]
+                values = self.values[self.points[:, k] == 0]
+                points[:, k], values[:, k] = 0.5, self.box.values(k, np.array([0.5]))
+                self._solve(points, values)
+
+    def _judged(self) -> _Judged:
+        """Errors over the simplices of each output, and borders between statuses that are to be cut."""
+        kind = self._kinds()
+        found = [self._judged_output(kind, heights(self._column(name))) for name in self.names]
+        return _Judged(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+
+    def _judged_output(self, kind: Indices, height: Array) -> _Judged:
+        """Errors over the simplices that have one status, in the box stretched to where the output bends."""
+        points = self.points @ stretch(self.points, height)
+        corners = simplices(points)
+        kinds = kind[corners]
+        alike = (kinds == kinds[:, :1]).all(axis=1)
+        size = np.zeros(len(corners))
+        ends = corners[:, :2].copy()
+        for number in np.unique(kind[kind >= 0]):
+            members, here = np.flatnonzero(kind == number), np.flatnonzero(alike & (kinds[:, 0] == number))
+            renumbered = np.searchsorted(members, corners[here])
+            errors = interpolation_errors(points[members], height[members, None], renumbered)
+            size[here] = errors.size
+            ends[here, 0] = corners[here, errors.first]
+            ends[here, 1] = corners[here, errors.second]
+        mixed = np.flatnonzero(~alike & (kinds >= 0).any(axis=1))
+        size[mixed], ends[mixed] = self._borders(corners[mixed], kinds[mixed])
+        beside = alike & np.isin(corners, corners[~alike]).any(axis=1)
+        axes = len(self.axes)
+        levels = np.where(beside, BESIDE_LEVELS.get(axes, 2), LEVELS.get(axes, FEWEST_LEVELS))
+        finest = self._extent(ends) <= 2.0**-levels
+        return _Judged(corners, size, ends, finest, alike & (kinds[:, 0] >= 0), beside)
+
+    def _borders(self, corners: Indices, kinds: Indices) -> tuple[Array, Indices]:
+        """Infinite where a border between statuses has longer edges than are left there; and these edges."""
+        pairs = edges(len(self.axes))
+        ends = corners[:, pairs]
+        length = np.where(kinds[:, pairs[:, 0]] != kinds[:, pairs[:, 1]], self._extent(ends), -1.0)
+        longest = length.argmax(axis=1)[:, None]
+        wide = np.take_along_axis(length, longest, 1)[:, 0] > 2.0 ** -BORDER_LEVELS.get(len(self.axes), 2)
+        return np.where(wide, math.inf, 0.0), np.take_along_axis(ends, longest[:, :, None], 1)[:, 0]
+
+    def _extent(self, ends: Indices) -> Array:
+        """Of edges (..., 2), in steps of the first grid along the axis where they are longest."""
+        apart = abs(self.points[ends[..., 0]] - self.points[ends[..., 1]]) * self.steps
+        found: Array = apart.max(axis=-1)
+        return found
+
+    def _kinds(self) -> Indices:
+        """Statuses, with those that rounding decides alike; -1 without a value."""
+        status = self._column(STATUS).astype(np.intp)
+        finite = np.isfinite(np.stack([self._column(name) for name in self.names])).all(axis=0)
+        kind = np.where(status == Status.INACCURATE, int(Status.OK), status)
+        return np.where((status < FIRST_REFUSAL) & finite, kind, -1)
+
+    def _column(self, name: str) -> Any:
+        return np.concatenate([part[name].values for part in self.parts])
+
+    def _cuts(self, found: _Judged) -> Indices:
+        """Edges to cut, worst first; none shares an end with one before, for a cut changes what is known there."""
+        wanted = np.flatnonzero((found.size > self.tolerance) & ~found.finest)
+        used = np.zeros(len(self.points), dtype=bool)
+        cuts = []
+        for first, second in found.ends[wanted[np.argsort(-found.size[wanted], kind="stable")]].tolist():
+            if not (used[first] or used[second]):
+                used[first] = used[second] = True
+                cuts.append((first, second))
+        return np.array(cuts, dtype=np.intp).reshape(-1, 2)
+
+    def _middles(self, cuts: Indices) -> tuple[Array, Array]:
+        """Places and axis values in the middles of edges; a value that an axis has already is taken again."""
+        points = self.points[cuts].mean(axis=1)
+        values = np.empty(points.shape)
+        for k, known in enumerate(self.known):
+            between = self.box.values(k, points[:, k])
+            values[:, k] = [known.setdefault(t, v) for t, v in zip(_keys(points[:, k]), between, strict=True)]
+        return points, values
+
+    def _solve(self, points: Array, values: Array) -> None:
+        axes = {name: Axis(name, frozen(column), "values") for name, column in zip(self.axes, values.T, strict=True)}
+        self.parts.append(_flat(self.output.solved(axes)))
+        self.points, self.values = np.concatenate([self.points, points]), np.concatenate([self.values, values])
+
+    def _joined(self, found: _Judged, complete: bool) -> Refinement:
+        order = np.lexsort(self.values.T[::-1])
+        axes = {
+            name: Axis(name, frozen(column[order]), "values")
+            for name, column in zip(self.axes, self.values.T, strict=True)
+        }
+        arrays = {name: self._column(name)[order] for name in (*self.output.study.outputs, *ANCILLARY)}
+        left = found.valued & found.finest & (found.size > self.tolerance)
+        finest = [np.diff(np.unique(t)) for t in self.points.T]
+        return Refinement(
+            dataset=self.output.written(axes, arrays),
+            added=len(self.points) - self.first,
+            uniform=int(math.prod(round(1 / step[step > SAME].min()) + 1 for step in finest)),
+            error=float(found.size[found.valued & ~left].max(initial=0.0)),
+            tolerance=self.tolerance,
+            complete=complete,
+            jumps=int((left & ~found.beside).sum()),
+            singular=int((left & found.beside).sum()),
+            unseen=self._widest(found.corners[found.valued]),
+        )
+
+    def _widest(self, corners: Indices) -> dict[str, str]:
+        """How far cells are apart, at most, along each axis; a factor where it is taken in logarithms."""
+        width = np.ptp(self.points[corners], axis=1).max(axis=0, initial=0.0)
+        ratio, span = (
+            (self.box.high / np.where(self.box.logarithmic, self.box.low, 1.0)) ** width,
+            self.box.high - self.box.low,
+        )
+        return {
+            name: f"a factor {ratio[k]:.3g}" if self.box.logarithmic[k] else f"{width[k] * span[k]:.3g}"
+            for k, name in enumerate(self.axes)
+        }
+
+
+class _Judged(NamedTuple):
+    """Simplices: their corners, errors, the edges (m, 2) to cut, whether these are the finest allowed, whether all
+    corners have values and one status, whether they lie beside a border of statuses."""
+
+    corners: Indices
+    size: Array
+    ends: Indices
+    finest: NDArray[np.bool_]
+    valued: NDArray[np.bool_]
+    beside: NDArray[np.bool_]
+
+
+def _keys(places: Array) -> list[float]:
+    """Places along an axis, alike where rounding alone tells them apart."""
+    found: list[float] = np.round(places / SAME).tolist()
+    return found
+
+
+def _flat(dataset: xr.Dataset) -> xr.Dataset:
+    return dataset if dataset[STATUS].ndim == 1 else dataset.stack(cell=list(dataset[STATUS].dims), create_index=False)
