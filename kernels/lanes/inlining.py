@@ -20,6 +20,7 @@ from llvmlite.binding import Linkage
 from numba import njit, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
 from numba.core.imputils import lower_constant
 from numba.core.registry import CPUDispatcher
@@ -215,7 +216,8 @@ class _Entry(CPUDispatcher):
         gc.disable()
         _remember(self.typingctx)
         try:
-            with getattr(self._cache, "alone", contextlib.nullcontext)():
+            # waiting for another process is compiling to who watches numba
+            with global_compiler_lock, getattr(self._cache, "alone", contextlib.nullcontext)():
                 return super().compile(sig)
         finally:
             if collecting:
