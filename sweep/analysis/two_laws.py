@@ -83,9 +83,9 @@ def fit_two_laws(
     to the limit to which that tends; that of the crossover to where the local exponent is half-way between the
     two, and to where the tangents at the ends meet. What noise there is beneath is added.
 
-    Where there is noise, though it be far less than the truth is from (1), the intervals also reach over those of bends of other shapes that the
-    points do not rule out (AICc within 20): hyperbolic, asymmetric, of two widths, stretched. They are wider than 95
-    % for a truth like (1), and no promise for a truth like none of them.
+    Where there is noise, though it be far less than the truth is from (1), the intervals also reach over those of bends
+    of other shapes that the points do not rule out (AICc within 20): hyperbolic, asymmetric, of two widths, stretched.
+    They are wider than 95 % for a truth like (1), and no promise for a truth like none of them.
 
     Parameters
     ----------
