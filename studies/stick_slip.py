@@ -204,7 +204,7 @@ def draw_motion(axes: Any) -> None:
         until = float(last_count(FLIPS, 1.0, 0.3, fall))
         place, speed = motion(0.3, fall, until, 1e-8, SHOWN)
         axes.plot(place, speed, color=COLOURS[i], label=f"fall {fall:g}")
-    axes.set(xlabel="place $x$", ylabel="speed $x'$", ylim=(-0.75, 0.45))
+    axes.set(xlabel="place $x$", ylabel="speed $x'$", ylim=(-0.95, 0.45))
     axes.legend(loc="lower left", fontsize=6)
 
 

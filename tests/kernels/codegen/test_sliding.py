@@ -102,6 +102,18 @@ def test_a_belt_whose_speed_varies_takes_the_mass_along(method, rtol):
     assert (relative_error(outputs["time"], truths) < rtol).all()
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_what_slides_stays_on_its_kink_to_rounding_at_a_wide_tolerance(method):
+    """A mass on a belt of varying speed has the belt's speed, which is not linear in the states."""
+    cells = {"press": 9.0, "belt": 1.0, "sway": 0.5, "wave": 3.0, "stiffness": 1.0, "speed0": 1.0, "mid": [3.0, 6.0]}
+    outputs, status = solve(SLIDING, method, **cells, wall=-1e9, flips=1.0, rtol=1e-4)
+    with mp.workdps(50):
+        truths = [mp.findroot(lambda t, x=x: t + (1 - mp.cos(3 * t)) / 6 - x, x) for x in (3, 6)]
+    assert (status == Status.OK).all()
+    assert (relative_error(outputs["time"], truths) < 1e-4).all()
+    assert (abs(outputs["speed"] - 1.0 - 0.5 * np.sin(3.0 * outputs["clock"])) < 1e-14).all()
+
+
 @many
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("rtol", [1e-4, 1e-8, 1e-12])
