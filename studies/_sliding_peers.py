@@ -48,8 +48,8 @@ def modes(belt: Any, fall: Any, until: Any, rtol: float) -> Any:
     return np.array([motion(*map(float, cell), rtol)[0, -1] for cell in zip(belt, fall, until, strict=True)])
 
 
-def motion(belt: float, fall: float, until: float, rtol: float) -> Any:
-    """Places and speeds of one cell, which starts on the belt and is on it at the time `until`."""
+def motion(belt: float, fall: float, until: float, rtol: float, longest: float = np.inf) -> Any:
+    """Places and speeds of one cell, which starts on the belt and is on it at the time `until`; steps to `longest`."""
 
     def catches(t: float, u: Any) -> float:
         return belt - float(u[1])
@@ -58,7 +58,7 @@ def motion(belt: float, fall: float, until: float, rtol: float) -> Any:
     t, found, last = 0.0, [np.array([[0.0], [belt]])], MU + fall * belt
     while t + (last - found[-1][0, -1]) / belt < until:
         t += (last - found[-1][0, -1]) / belt
-        how = {"events": catches, "rtol": rtol, "atol": 1e-3 * rtol}
+        how = {"events": catches, "rtol": rtol, "atol": 1e-3 * rtol, "max_step": longest}
         slip = solve_ivp(lambda _, u: (u[1], fall * u[1] - u[0] + MU), (t, until), (last, belt), "DOP853", **how)
         t = float(slip.t[-1])
         found.append(slip.y)

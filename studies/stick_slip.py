@@ -26,11 +26,13 @@ from kernels.interface import FIRST_REFUSAL, Status
 TOLERANCES = 10.0 ** -np.arange(3.0, 10.5, 3.0)
 FLIPS = 5.0
 """Counts of the mass in the maps and costs of others: two cycles."""
-COARSE = 6
+COARSE = 3
 """Every so many-th cell of the sweep's axes is one of the others' maps."""
 STEP = 0.01
 LOOSE = 1e-6
 """The others' tolerance in their maps."""
+SHOWN = 0.05
+"""The longest step of a motion that is drawn."""
 CELLS = 256
 FEW = 64
 """Cells of our own in the cost; of the others every so many-th."""
@@ -183,7 +185,7 @@ def figure(ds: xr.Dataset, unslid: xr.Dataset, found: dict[str, xr.Dataset]) -> 
         draw_motion(panels[0, 0])
         slides = ds.sel({"method": "taylor"})
         shown = {"taylor, slides": slides.off.where(slides.status < FIRST_REFUSAL)}
-        shown |= {f"{name}, does not": unslid[name] for name in unslid}
+        shown |= dict(unslid.data_vars)
         for axes, (name, off) in zip(panels.flat[1:], shown.items(), strict=False):
             mesh = draw_map(axes, off, LogNorm(1e-16, 1.0))
             axes.set_title(name, loc="center")
@@ -200,9 +202,9 @@ def draw_motion(axes: Any) -> None:
 
     for i, fall in enumerate((0.02, 0.1, 0.4)):
         until = float(last_count(FLIPS, 1.0, 0.3, fall))
-        place, speed = motion(0.3, fall, until, 1e-8)
+        place, speed = motion(0.3, fall, until, 1e-8, SHOWN)
         axes.plot(place, speed, color=COLOURS[i], label=f"fall {fall:g}")
-    axes.set(xlabel="place $x$", ylabel="speed $x'$", ylim=(-0.75, 0.45))
+    axes.set(xlabel="place $x$", ylabel="speed $x'$", ylim=(-0.95, 0.45))
     axes.legend(loc="lower left", fontsize=6)
 
 
@@ -221,7 +223,9 @@ def draw_costs(axes: Any, found: dict[str, xr.Dataset]) -> None:
 
     for i, (name, row) in enumerate(found.items()):
         look = {"color": COLOURS[i], "marker": MARKS[i], "linestyle": DASHES[i % len(DASHES)], "markersize": 3}
-        axes.plot(row.seconds, row.worst.where(row.worst < np.inf).clip(1e-16), label=name, **look)
+        ends = row.worst < np.inf
+        label = name if bool(ends.any()) else f"{name}: gives up"
+        axes.plot(row.seconds, row.worst.where(ends).clip(1e-16), label=label, **look)
     axes.set(xscale="log", yscale="log", xlabel="time per cell on one core [s]", ylabel="relative error, worst cell")
     axes.legend(loc="best", fontsize=5)
 

@@ -102,6 +102,18 @@ def test_a_belt_whose_speed_varies_takes_the_mass_along(method, rtol):
     assert (relative_error(outputs["time"], truths) < rtol).all()
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_what_slides_stays_on_its_kink_to_rounding_at_a_wide_tolerance(method):
+    """A mass on a belt of varying speed has the belt's speed, which is not linear in the states."""
+    cells = {"press": 9.0, "belt": 1.0, "sway": 0.5, "wave": 3.0, "stiffness": 1.0, "speed0": 1.0, "mid": [3.0, 6.0]}
+    outputs, status = solve(SLIDING, method, **cells, wall=-1e9, flips=1.0, rtol=1e-4)
+    with mp.workdps(50):
+        truths = [mp.findroot(lambda t, x=x: t + (1 - mp.cos(3 * t)) / 6 - x, x) for x in (3, 6)]
+    assert (status == Status.OK).all()
+    assert (relative_error(outputs["time"], truths) < 1e-4).all()
+    assert (abs(outputs["speed"] - 1.0 - 0.5 * np.sin(3.0 * outputs["clock"])) < 1e-14).all()
+
+
 @many
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("rtol", [1e-4, 1e-8, 1e-12])
@@ -149,6 +161,31 @@ def test_a_slide_shorter_than_a_step_is_seen(method):
         truths = [(1 - mpf(0.99)) / b + mp.asin(mpf(1.1 - 1.0) / b) for b in map(mpf, map(float, belt))]
     assert (status == Status.OK).all()
     assert (relative_error(outputs["time"], truths) < 1e-4).all()
+
+
+@many
+def test_taylor_hands_what_slides_to_dop853_and_what_that_cannot_end_to_rodas5p():
+    """The same bits as by the method that does it: a relay, and a place drawn in a microsecond to where its kink is."""
+    slope, wave = 1e6, 1.0
+    relay = {"press": 0.9, "drive": 1.0, "belt": 1.0, "speed0": 1.0, "mid": 5.0}
+    stiff = {"press": 1e7, "slope": slope, "sway": slope, "wave": wave, "mid": 0.5}
+    for cell, method, other in ((relay, "dop853", "rodas5p"), (stiff, "rodas5p", "dop853")):
+        found, away, handed = (
+            solve(SLIDING, m, **({"wall": [-1e9]} | cell), flips=1.0, rtol=1e-6) for m in (method, other, "taylor")
+        )
+        assert handed[1][0] == found[1][0] == Status.OK
+        assert all(handed[0][name][0] == found[0][name][0] for name in found[0])
+        assert away[1][0] == Status.STICKS or away[0]["time"][0] != found[0]["time"][0]
+    with mp.workdps(50):
+        t = mp.findroot(lambda t: slope * (slope * mp.sin(t) - mp.cos(t)) / (mpf(slope) ** 2 + 1) - 0.5, mp.pi / 6)
+    assert relative_error(found[0]["time"], [t])[0] < 1e-6
+
+
+@many
+@pytest.mark.parametrize("method", METHODS)
+def test_stick_and_slip_that_never_comes_to_its_surface_meets_the_limit(method):
+    cell = {"press": 1.0, "belt": 0.2, "speed0": 0.2, "drag": -0.1, "stiffness": 1.0, "mid": 9.0, "wall": [-1e9]}
+    assert solve(SLIDING, method, **cell, flips=1.0)[1][0] == Status.STEP_LIMIT
 
 
 def test_what_two_sides_differ_by_is_known_before_any_rounding():
