@@ -158,11 +158,26 @@ def _write(path, content):
 
 
 def _lock(file):
-    """Locks an open file until it is closed; gives up where its holder takes longer than anything takes to compile."""
-    for _ in range(round(MOST_COMPILE_SECONDS / 0.05)):
+    """Locks an open file until it is closed; gives up where its holder takes longer than anything takes to compile.
+
+    Returns
+    -------
+    bool
+        Whether nobody else had locked it.
+    """
+    for trial in range(round(MOST_COMPILE_SECONDS / 0.05)):
         with contextlib.suppress(BlockingIOError):
-            return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return trial == 0
         time.sleep(0.05)
+    return False
+
+
+def _unlock(file):
+    """Also for processes that were forked meanwhile, which have the file open as well."""
+    with contextlib.suppress(OSError):
+        fcntl.flock(file, fcntl.LOCK_UN)
+    os.close(file)
 
 
 class _Cache(FunctionCache):
@@ -177,13 +192,14 @@ class _Cache(FunctionCache):
     @contextlib.contextmanager
     def alone(self):
         """Has other processes wait while this one compiles what is not kept yet, for they can load it then."""
-        index = self._cache_file._index_path
+        index = Path(self._cache_file._index_path)
         with contextlib.ExitStack() as held:
-            if not Path(index).exists():
+            if not index.exists():
                 with contextlib.suppress(OSError):  # a folder without locks: each compiles for itself
                     file = os.open(f"{index}.lock", os.O_CREAT | os.O_WRONLY, 0o600)
-                    held.callback(os.close, file)
-                    _lock(file)
+                    held.callback(_unlock, file)
+                    if not _lock(file) and not index.exists():
+                        held.close()  # who had it could keep nothing: then none need wait for another
             yield
 
     def load_overload(self, sig, target_context):

@@ -30,6 +30,8 @@ TELLING = 16
 TELLING_MEMORY, ROUGH = 40, 0.15
 """and points and share of the distances that neighbours do not tell, from which on noise that remembers is: smooth
 bends have 0.08 at most, correlations of 0.95 at least 0.19."""
+SMOOTH_TO = 1e-5
+"""Share up to which the points are smooth, and no noise moves the limits to which local exponents tend."""
 
 OTHER_SHAPES = 20.0
 """Difference of AICc from which on a bend of another shape is ruled out; more than for a second law, since the truth
@@ -81,9 +83,9 @@ def fit_two_laws(
     to the limit to which that tends; that of the crossover to where the local exponent is half-way between the
     two, and to where the tangents at the ends meet. What noise there is beneath is added.
 
-    Where noise hides how far the truth is from (1), the intervals reach over those of bends of other shapes that the
-    points do not rule out (AICc within 20): hyperbolic, asymmetric, of two widths, stretched. They are wider than 95
-    % for a truth like (1), and no promise for a truth like none of them.
+    Where there is noise, though it be far less than the truth is from (1), the intervals also reach over those of bends
+    of other shapes that the points do not rule out (AICc within 20): hyperbolic, asymmetric, of two widths, stretched.
+    They are wider than 95 % for a truth like (1), and no promise for a truth like none of them.
 
     Parameters
     ----------
@@ -146,11 +148,13 @@ def _one(t: Array, z: Array, confidence: float, noise: bool | str | None) -> Arr
     best, off, jacobian = _fit(t, z)
     noisy = _is_noise(t, z, off) if noise is None else bool(noise)
     reach = _reach(off, jacobian, confidence)
-    if not noisy:
-        low, high = _widened(t, z, off, best, best - reach, best + reach)
-    else:
-        more = np.ones(reach.size) if noise == "independent" else _by_memory(off, jacobian, confidence, reach)
+    low, high = best - reach, best + reach
+    if noisy or noise_size(t, off) > SMOOTH_TO * math.sqrt(float(off @ off) / off.size):
+        remembers = noisy and noise != "independent"
+        more = _by_memory(off, jacobian, confidence, reach) if remembers else np.ones(reach.size)
         low, high = _of_other_bends(t, z, off, best, more * reach, more, confidence)
+    if not noisy:
+        low, high = _widened(t, z, off, best, low, high)
     evidence = _evidence(t, z, off)
     _, *exponents, places, _ = np.stack([best, low, high], axis=1)
     with np.errstate(over="ignore"):  # a crossover that is not determined reaches to infinity

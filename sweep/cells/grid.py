@@ -96,7 +96,8 @@ class Grid(Box):
         return found
 
     @cached_property
-    def _condition(self) -> CellCondition:
+    def condition(self) -> CellCondition:
+        """The study's, if it has one."""
         settings = [name for name in SETTINGS if name in self.study.axes]
         return CellCondition(self.study.where, self.study.kernel, settings)
 
@@ -104,9 +105,7 @@ class Grid(Box):
         """Which of some flat cells the study's condition holds for."""
         if not self.study.where:
             return np.ones(len(cells), bool)
-        holds: NDArray[np.bool_] = self._condition.holds(
-            {name: self._of(name, cells) for name in self._condition.names}
-        )
+        holds: NDArray[np.bool_] = self.condition.holds({name: self._of(name, cells) for name in self.condition.names})
         return holds
 
     def _of(self, name: str, cells: NDArray[np.int64]) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,8 +15,8 @@ from sweep.system.errors import SweepError
 
 MOST_TRIED = 1 << 16
 """Cells that are looked at to find some that are asked for."""
-MOST_ASKED = 1 << 28
-"""Cells of which it is known, before a run, that one of them is asked for; it takes seconds."""
+MOST_ASKED = 1 << 23
+"""Cells that are looked at, before a run, for one that is asked for; it takes half a second."""
 TRIES = 32
 """Cells that are drawn for each that is wanted, where a condition leaves some out."""
 ONE: Mapping[str, float] = {}
@@ -62,13 +63,26 @@ def _chosen(grid: Grid, cells: int) -> Any:
 
 
 def require_asked(study: Study) -> None:
-    """Raises SweepError where the study's condition holds for none of its cells."""
-    grid = Grid(study)
-    for start in range(0, min(grid.size, MOST_ASKED), MOST_TRIED):
-        if grid.asked(np.arange(start, min(start + MOST_TRIED, grid.size))).any():
-            return
-    if grid.size <= MOST_ASKED:
-        raise SweepError(f'where = "{study.where}": holds for none of the {grid.size} cells; nothing is left to run')
+    """Raises SweepError where the study's condition holds for none of its cells, if they are not too many to tell."""
+    if not study.where:
+        return
+    grid = Grid(_conditioned(study))
+    stride = math.ceil(grid.size / MOST_TRIED)
+    looks = min(stride, MOST_ASKED // MOST_TRIED)
+    # each look is at cells from all over the grid
+    if any(grid.asked(np.arange(first, grid.size, stride)).any() for first in range(looks)):
+        return
+    if looks == stride:
+        size = Grid(study).size
+        raise SweepError(f'where = "{study.where}": holds for none of the {size} cells; nothing is left to run')
+
+
+def _conditioned(study: Study) -> Study:
+    """The study without those axes of a product that its condition does not name."""
+    if study.design != "product":
+        return study
+    named = {study.follows.get(name, name) for name in Grid(study).condition.names}
+    return dataclasses.replace(study, axes={name: axis for name, axis in study.axes.items() if name in named})
 
 
 def _axis(name: str, values: Any, factors: Mapping[str, float]) -> Axis:

@@ -69,7 +69,9 @@ class Refinement:
 
     def __str__(self) -> str:
         cells = self.dataset[STATUS].size
-        text = f"{cells:,} cells, {self.added:,} of them added; an even grid as fine has {self.uniform:,}"
+        text = f"{cells:,} cells, {self.added:,} of them added"
+        if len(self.unseen) == 1:
+            text += f"; an even grid as fine has {self.uniform:,}"
         text += f"\ninterpolation error left: {self.error:.2g}, as the cells around tell"
         if self.error > self.tolerance:
             text += "; the tolerance is not met everywhere, allow more cells"
@@ -234,10 +236,8 @@ class Refiner:
     def _widest(self, corners: Indices) -> dict[str, str]:
         """How far cells are apart, at most, along each axis; a factor where it is taken in logarithms."""
         width = np.ptp(self.points[corners], axis=1).max(axis=0, initial=0.0)
-        ratio, span = (
-            (self.box.high / np.where(self.box.logarithmic, self.box.low, 1.0)) ** width,
-            self.box.high - self.box.low,
-        )
+        ratio = (self.box.high / np.where(self.box.logarithmic, self.box.low, 1.0)) ** width
+        span = self.box.high - self.box.low
         return {
             name: f"a factor {ratio[k]:.3g}" if self.box.logarithmic[k] else f"{width[k] * span[k]:.3g}"
             for k, name in enumerate(self.axes)

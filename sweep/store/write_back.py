@@ -48,7 +48,8 @@ class WriteBack:
 
         Before the first bytes are there, it is as long again as it has been waited for them.
         """
-        waited = 0.0 if self._begun is None else self._clock() - self._begun
+        begun = self._begun  # another thread may end what it has begun
+        waited = 0.0 if begun is None else self._clock() - begun
         if not self._bytes:
             return waited + READ_BACK_SECONDS, waited + READ_BACK_SECONDS
         pace = self._seconds / self._bytes

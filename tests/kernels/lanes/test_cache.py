@@ -4,10 +4,13 @@ import json
 import os
 import pickle
 import shutil
+import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -68,6 +71,36 @@ def test_a_process_that_stands_still_is_not_waited_for_without_end(tmp_path, mon
         assert 0.1 <= time.monotonic() - begun < 10
 
 
+def lockable(tmp_path):
+    """A stand-in for the cache of a function whose files are in a folder."""
+    return SimpleNamespace(_cache_file=SimpleNamespace(_index_path=str(tmp_path / "f.nbi")))
+
+
+def test_a_lock_ends_with_the_compiling_although_a_process_was_forked_meanwhile(tmp_path, monkeypatch):
+    """The fork has the file open for as long as it lives."""
+    monkeypatch.setattr(cache, "MOST_COMPILE_SECONDS", 5)
+    with cache._Cache.alone(lockable(tmp_path)):
+        child = os.fork()
+        if child == 0:
+            time.sleep(60)
+            os._exit(0)
+    try:
+        with (tmp_path / "f.nbi.lock").open("wb") as file:
+            assert cache._lock(file)
+    finally:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+
+
+def test_where_nothing_can_be_kept_processes_compile_side_by_side(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache, "MOST_COMPILE_SECONDS", 5)
+    with (tmp_path / "f.nbi.lock").open("wb") as held:
+        cache._lock(held)
+        threading.Timer(0.2, held.close).start()
+        with cache._Cache.alone(lockable(tmp_path)), (tmp_path / "f.nbi.lock").open("wb") as third:
+            assert cache._lock(third)
+
+
 def test_a_damaged_cache_is_compiled_again_and_mended(tmp_path):
     run(PERIOD, tmp_path)
     for path in tmp_path.rglob("*.nb?"):
@@ -124,6 +157,7 @@ def test_a_kernel_of_the_users_own_is_not_cached():
 
 OWN_SCENE = """
 import sys
+import threading
 sys.path += ["tests/helpers", "studies"]
 from columns import solve
 from numba.core import event

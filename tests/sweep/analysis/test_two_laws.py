@@ -167,6 +167,19 @@ def test_where_the_bend_is_plainly_of_another_shape_its_doubt_and_the_noise_are_
     assert float((found.exponent_high - found.exponent_low).median()) < 0.05
 
 
+@pytest.mark.parametrize("size", [1e-5, 1e-4, 3e-4])
+def test_noise_far_below_what_the_points_are_off_the_curve_is_in_the_intervals(size):
+    """A hyperbola of 41 points; the limits of local exponents alone hold 43 to 87 %."""
+    x, width = np.geomspace(1e-3, 1e3, 41), 0.6 * np.log(10)
+    u = np.log(x / 1.6)
+    y = np.exp(-2 / 3 * u + 1 / 3 * np.hypot(u, width) + size * np.random.default_rng(9).standard_normal((SETS, 41)))
+    found = sweep.fit_two_laws(curve(y, x, ("set", "mu")), "mu")
+    assert (found.noisy == 0).all()
+    for law, truth in (("low", -1.0), ("high", -1 / 3)):
+        assert covered(found.sel(law=law), "exponent", truth) > 0.9
+    assert float((found.exponent_high - found.exponent_low).median()) < 0.05
+
+
 def remembering(phi, shape, rng):
     noise = rng.standard_normal(shape)
     for i in range(1, shape[1]):

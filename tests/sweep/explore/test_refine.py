@@ -297,6 +297,7 @@ def test_a_refined_result_of_two_axes_is_taken_by_every_command(tmp_path, monkey
         assert main(more.split()) == 0, more
     told = capsys.readouterr().out
     assert "cells are up to a factor" in told
+    assert "an even grid" not in told  # of several axes, finest steps of all of them are in no one place
     assert "lines from end to end of mu; take one by --at, e.g. --at R=" in told
     assert main(["fit", "fine.h5", "--y", "period", "--x", "mu", "--compare"]) == 2
     assert "take one by --at, e.g. --at R=" in capsys.readouterr().err

@@ -16,7 +16,7 @@ distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.filterwarnings(
     "ignore::ResourceWarning",
     "ignore::pytest.PytestUnraisableExceptionWarning",
-    "ignore:\\nPort",  # of another cluster on this machine
+    r"ignore:\s*Port",  # of another cluster on this machine
 )
 
 

@@ -1,5 +1,7 @@
 """What the disk takes for what is written, on a simulated clock."""
 
+import contextlib
+
 import pytest
 from running import quiet, tall
 
@@ -29,6 +31,13 @@ def test_what_is_to_come_takes_as_long_as_what_came():
     with found.syncing():
         now += 5.0
     assert found.seconds()[1] == pytest.approx(13.6 + READ_BACK_SECONDS)
+
+
+def test_a_sync_may_end_while_it_is_asked_for_the_time():
+    sync = contextlib.ExitStack()
+    found = WriteBack(MB, lambda: sync.close() or 1.0)
+    sync.enter_context(found.syncing())
+    assert found.seconds() == (READ_BACK_SECONDS, READ_BACK_SECONDS)
 
 
 def test_a_run_into_a_file_counts_every_byte_to_come(tmp_path, monkeypatch):
