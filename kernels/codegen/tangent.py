@@ -8,12 +8,12 @@ do not change between events.
 import re
 from collections import defaultdict
 
-from kernels.codegen.expression import INPUT, needed
+from kernels.codegen.expression import ADD, INPUT, SCALED, needed
 from kernels.codegen.template import filled, listed
 
 SHORT, LONG = {12: 4, 18: 4}, {12: 9, 18: 12}
 """Order of the changes' series on a step of the motion's: terms fall by about a quarter each, so to some 1e-3. Those of
-exp, sin and cos first grow, as x^k/k!."""
+exp, sin and cos, and of linear rates, first grow, as x^k/k!."""
 
 TANGENT = '''
 @jit
@@ -30,8 +30,9 @@ def tangent_{order}(state, side, signs, parameters, unit, inner, changes{also}):
 
 def short(writer, order):
     """Order of the changes' series beside one of the motion of that order."""
-    kinds = {x.kind for x in needed(*writer.recorded.rates)}
-    return (LONG if kinds & {"exp", "sin", "cos"} else SHORT)[order]
+    kinds = {x.kind for x in needed(*writer.recorded.rates) if x.varies}
+    grow_first = kinds & {"exp", "sin", "cos"} or kinds <= {INPUT, ADD, SCALED}
+    return (LONG if grow_first else SHORT)[order]
 
 
 class Tangents:

@@ -11,7 +11,7 @@ from mpmath import mp
 from kernels.codegen import followed_twice, stated_error
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import Scene
+from kernels.scene import Scene, sign
 
 FLIPS = 12 if COMPILED else 3
 NAMES = [f.name for f in rich_scene.RICH.parameters if f.name != "flips"]
@@ -93,3 +93,27 @@ def test_next_to_a_turning_point_a_switch_states_that_its_error_is_not_known():
     """A first swing that passes the switch by 1e-7 of itself: when it does hangs on the root of so little."""
     _, error = told({"mu": np.ones(1), "phi0": np.ones(1), "k": np.array([2.0 * (1 - 1e-7)])}, 1, 1e-6)
     assert error[0] == np.inf
+
+
+def surface(x, side, phi0):
+    return phi0 - side * x
+
+
+def damped(x, v, side, mu, a, R):
+    return v, side * mu - a * v - R * sign(v)
+
+
+@pytest.mark.skipif(not COMPILED, reason="asks for many cells")
+def test_changes_of_linear_rates_die_out_as_they_do():
+    """Their series is that of exp, whose terms first grow; against the same motion at a thousandth of the tolerance."""
+    n = 300
+    random = np.random.default_rng(5)
+    mu, a, near = (10.0 ** random.uniform(*range_, n) for range_ in ((-1, 1), (0, 0.5), (-3, -0.1)))
+    scene = Scene("damped", "linear", ("x", "v"), ("mu", "phi0", "a", "R"), damped, surface, lambda: (0.0, 0.0))
+    columns = [mu, 10.0 ** random.uniform(-1, 1, n), a, mu * (1.0 - near), np.full(n, 8.0)]
+    coarse, error = followed_twice.told(stated_error.telling(scene), columns, *np.full((2, n), 1e-8))
+    fine, _ = followed_twice.told(stated_error.telling(scene), columns, *np.full((2, n), 1e-11))
+    with np.errstate(invalid="ignore"):
+        true = abs(coarse[[0, 1, 3]] / fine[[0, 1, 3]] - 1).max(axis=0)
+    matters = (true > 1e-10) & (error < 1e-6)
+    assert np.quantile(error[matters] / true[matters], 0.75) < 1.5
