@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from sweep.explore.notebook import kernels as kernels
     from sweep.explore.plan import plan as plan
     from sweep.explore.refine import refine as refine
-    from sweep.explore.refine import study_of as study_of
     from sweep.explore.sensitivity import sensitivity as sensitivity
     from sweep.explore.solver import solver as solver
     from sweep.explore.work_precision import work_precision as work_precision
@@ -47,13 +46,14 @@ if TYPE_CHECKING:
     from sweep.show.law_charts import plot_laws as plot_laws
     from sweep.study.read import build_study as build_study
     from sweep.study.read import read_study as read_study
+    from sweep.study.read import study_of as study_of
     from sweep.study.toml import to_toml as to_toml
     from sweep.system.errors import StudyError as StudyError
     from sweep.system.errors import SweepError as SweepError
 
 _PUBLIC = {
     "study.toml": ("to_toml",),
-    "study.read": ("study", "read_study", "build_study"),
+    "study.read": ("study", "read_study", "build_study", "study_of"),
     "runs.run": ("run",),
     "results.open": ("open_result",),
     "results.verify": ("verify",),
@@ -81,7 +81,7 @@ _PUBLIC = {
     "explore.notebook": ("kernels",),
     "explore.groups": ("scaling", "rescaled", "collapse_quality"),
     "explore.work_precision": ("work_precision",),
-    "explore.refine": ("refine", "study_of"),
+    "explore.refine": ("refine",),
     "show.charts": ("plot", "plot_precision"),
     "show.law_charts": ("plot_laws",),
     "system.errors": ("SweepError", "StudyError"),

@@ -40,7 +40,8 @@ def _plan(arguments: argparse.Namespace) -> None:
 
 
 def _refine(arguments: argparse.Namespace) -> None:
-    from sweep.explore.refine import refine, study_of
+    from sweep.explore.refine import refine
+    from sweep.study.read import study_of
 
     check_target_of(arguments, arguments.output, "result")
     with result_of(arguments) as dataset:

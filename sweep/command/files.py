@@ -31,7 +31,7 @@ def is_isolated(arguments: argparse.Namespace, study: Study) -> bool:
 
 
 def study_of_result(arguments: argparse.Namespace) -> Study:
-    from sweep.explore.refine import study_of
+    from sweep.study.read import study_of
 
     with opened(arguments.study) as dataset:
         return study_of(dataset, allow_import=arguments.allow_import)

@@ -3,7 +3,7 @@
 Others may use
     `plan`            what a study will take
     `work_precision`  error against time of every method of a kernel
-    `refine`          cells where they are needed; study_of
+    `refine`          cells where they are needed
     `notebook`        kernels; what a notebook shows of them and of a study
     `join`            two results as one
     `solver`          a study's kernel as a function of its axes

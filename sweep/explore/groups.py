@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sweep.analysis.curves import check_output
-from sweep.explore.refine import study_of
 from sweep.explore.symmetries import Scalings, scalings
 from sweep.study.model import Study
+from sweep.study.read import study_of
 from sweep.system.errors import SweepError
 from sweep.system.expected import kind, require_dataset
 
@@ -211,6 +210,8 @@ def collapse_quality(x: xr.DataArray, y: xr.DataArray) -> float:
     True
     """
     import xarray as xr
+
+    from sweep.analysis.curves import check_output
 
     for array in (x, y):
         check_output(array)

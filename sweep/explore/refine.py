@@ -29,6 +29,7 @@ from sweep.analysis.scattered import MOST_AXES, axes_of
 from sweep.cells.schema import STATUS, cell_schema
 from sweep.explore.refiner import Refinement, Refiner
 from sweep.study.model import Axis, Study
+from sweep.study.read import study_of
 from sweep.system import disk
 from sweep.system.errors import SweepError
 from sweep.system.expected import require_dataset
@@ -172,22 +173,6 @@ class _Output:
         """Removes what was computed on the way."""
         if self.rounds is not None:
             shutil.rmtree(self.rounds, ignore_errors=True)
-
-
-def study_of(dataset: xr.Dataset, allow_import: bool = False) -> Study:
-    """The study that a result came from. Raises SweepError.
-
-    Examples
-    --------
-    >>> import sweep
-    >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
-    >>> sweep.study_of(ds)
-    <Study 'foliot over mu': foliot over mu (3)>
-    """
-    require_dataset("study_of", dataset)
-    if "study_json" not in dataset.attrs:
-        raise SweepError("the dataset does not say which study it came from; pass the study")
-    return Study.from_json(str(dataset.attrs["study_json"]), allow_import=allow_import)
 
 
 def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance: float) -> None:

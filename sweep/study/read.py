@@ -7,15 +7,19 @@ import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sweep.study.mistakes import did_you_mean, listed, show
 from sweep.study.model import Axis, Study
 from sweep.study.study_parser import KEYS, StudyParser
 from sweep.system.disk import as_path
 from sweep.system.errors import Mistake, StudyError, SweepError
+from sweep.system.expected import require_dataset
 
-__all__ = ["KEYS", "Axis", "Given", "Study", "as_study", "build_study", "read_study", "study"]
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["KEYS", "Axis", "Given", "Study", "as_study", "build_study", "read_study", "study", "study_of"]
 
 KEYWORDS = 'keywords, e.g. kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0}'
 LARGEST_TEXT = 50_000_000
@@ -135,6 +139,22 @@ def study(given: Given | None = None, /, *, allow_import: bool = False, **keys: 
 
 as_study = study
 """The same under a name that no parameter has."""
+
+
+def study_of(dataset: xr.Dataset, allow_import: bool = False) -> Study:
+    """The study that a result came from. Raises SweepError.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> sweep.study_of(ds)
+    <Study 'foliot over mu': foliot over mu (3)>
+    """
+    require_dataset("study_of", dataset)
+    if "study_json" not in dataset.attrs:
+        raise SweepError("the dataset does not say which study it came from; pass the study")
+    return Study.from_json(str(dataset.attrs["study_json"]), allow_import=allow_import)
 
 
 def _read_text(path: Path) -> str:
