@@ -11,7 +11,6 @@ nothing in its place that is read.
 """
 
 import contextlib
-import fcntl
 import functools
 import hashlib
 import multiprocessing
@@ -29,6 +28,11 @@ import llvmlite
 import numba
 from llvmlite import binding
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, _CacheLocator
+
+try:
+    import fcntl
+except ImportError:  # Windows: each process compiles for itself
+    fcntl = None
 
 PACKAGE = Path(__file__).parents[1]
 OLD_SECONDS = 30 * 24 * 3600
@@ -194,7 +198,7 @@ class _Cache(FunctionCache):
         """Has other processes wait while this one compiles what is not kept yet, for they can load it then."""
         index = Path(self._cache_file._index_path)
         with contextlib.ExitStack() as held:
-            if not index.exists():
+            if fcntl is not None and not index.exists():
                 with contextlib.suppress(OSError):  # a folder without locks: each compiles for itself
                     file = os.open(f"{index}.lock", os.O_CREAT | os.O_WRONLY, 0o600)
                     held.callback(_unlock, file)

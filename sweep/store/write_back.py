@@ -36,9 +36,10 @@ class WriteBack:
     @contextlib.contextmanager
     def syncing(self) -> Iterator[None]:
         """What is written comes to the disk within."""
-        put, self._begun = self.put, self._clock()
+        put, begun = self.put, self._clock()
+        self._begun = begun
         yield
-        taken, self._begun = self._clock() - self._begun, None
+        taken, self._begun = self._clock() - begun, None
         some, self.synced = put - self.synced, put
         if some >= ENOUGH_BYTES:
             self._seconds, self._bytes = self._seconds + taken, self._bytes + some

@@ -76,6 +76,16 @@ def lockable(tmp_path):
     return SimpleNamespace(_cache_file=SimpleNamespace(_index_path=str(tmp_path / "f.nbi")))
 
 
+def test_where_there_are_no_locks_each_process_compiles_for_itself(tmp_path, monkeypatch):
+    """Windows has no fcntl."""
+    code = "import sys; sys.modules['fcntl'] = None; from kernels.lanes import cache; print(cache.fcntl)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "None\n"
+    monkeypatch.setattr(cache, "fcntl", None)
+    with cache._Cache.alone(lockable(tmp_path)):
+        assert not list(tmp_path.iterdir())
+
+
 def test_a_lock_ends_with_the_compiling_although_a_process_was_forked_meanwhile(tmp_path, monkeypatch):
     """The fork has the file open for as long as it lives."""
     monkeypatch.setattr(cache, "MOST_COMPILE_SECONDS", 5)
