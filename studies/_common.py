@@ -66,6 +66,16 @@ def differing(what: str, theory: str, here: float, value: float, allowed: float,
     return Statement(what, theory, f"{here:.{digits}g}", off, bool(abs(off) <= allowed))
 
 
+def cheapest(found: dict[str, xr.Dataset]) -> list[Statement]:
+    """Time per cell for a worst cell right to 1e-4, 1e-7, 1e-9."""
+    lines = []
+    for name, row in found.items():
+        enough = [row.seconds.where(row.worst <= wanted) for wanted in (1e-4, 1e-7, 1e-9)]
+        texts = ["-" if bool(s.isnull().all()) else f"{1e6 * float(s.min()):.3g}" for s in enough]
+        lines.append(Statement(f"{name}: us a cell, worst right to 1e-4, 1e-7, 1e-9", "", ", ".join(texts)))
+    return lines
+
+
 def table(groups: Groups, source: str = "paper") -> list[str]:
     """Lines of the table "`source` | here"."""
     rows: list[tuple[str, ...]] = [("", source, "here", "deviation", "holds")]

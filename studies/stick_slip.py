@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, read_result, report
+from _common import Groups, Statement, cheapest, read_result, report
 from _sliding_peers import FOLLOWERS, motion
 
 from kernels.interface import FIRST_REFUSAL, Status
@@ -160,16 +160,6 @@ def failures(found: xr.Dataset) -> list[Statement]:
         given, right = float(off.notnull().mean()), float((off <= 1e-4).mean())
         what = f"{name}: cells given up, cells right to 1e-4"
         lines.append(Statement(what, "", f"{1.0 - given:.0%}, {right:.0%}"))
-    return lines
-
-
-def cheapest(found: dict[str, xr.Dataset]) -> list[Statement]:
-    """Time per cell for a worst cell right to 1e-4, 1e-7, 1e-9."""
-    lines = []
-    for name, row in found.items():
-        enough = [row.seconds.where(row.worst <= wanted) for wanted in (1e-4, 1e-7, 1e-9)]
-        texts = ["-" if bool(s.isnull().all()) else f"{1e6 * float(s.min()):.3g}" for s in enough]
-        lines.append(Statement(f"{name}: us a cell, worst right to 1e-4, 1e-7, 1e-9", "", ", ".join(texts)))
     return lines
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, read_result, report
+from _common import Groups, Statement, cheapest, read_result, report
 from _stiff_peers import FOLLOWERS, FRICTION
 
 from kernels.interface import FIRST_REFUSAL, Status
@@ -128,18 +128,6 @@ def rests(ds: xr.Dataset) -> list[Statement]:
 def at_rest(ds: xr.Dataset) -> Any:
     """Time of rest without drag."""
     return np.sqrt(2.0 * ds.above / ds.g) * (1.0 + ds.e) / (1.0 - ds.e)
-
-
-def cheapest(found: dict[str, xr.Dataset]) -> list[Statement]:
-    """Time per cell for a worst cell right to 1e-4, 1e-7, 1e-9."""
-    lines = []
-    for name, row in found.items():
-        texts = []
-        for wanted in (1e-4, 1e-7, 1e-9):
-            enough = row.seconds.where(row.worst <= wanted)
-            texts.append("-" if bool(enough.isnull().all()) else f"{1e6 * float(enough.min()):.3g}")
-        lines.append(Statement(f"{name}: us a cell, worst right to 1e-4, 1e-7, 1e-9", "", ", ".join(texts)))
-    return lines
 
 
 def figure(lag: xr.Dataset, bounce: xr.Dataset, found: dict[str, xr.Dataset]) -> Any:
