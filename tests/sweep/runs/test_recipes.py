@@ -3,6 +3,7 @@
 import getpass
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -55,9 +56,16 @@ def script(path, text):
     path.chmod(0o755)
 
 
-def test_the_job_script_for_slurm_makes_a_worker_that_takes_part(tmp_path, monkeypatch):
+@pytest.fixture
+def jobqueue():
+    """dask-jobqueue; its import makes Ctrl-C exit with status 0, which is taken back for the tests after this one."""
+    before = signal.getsignal(signal.SIGINT)
+    yield pytest.importorskip("dask_jobqueue", reason="needs the package dask-jobqueue")
+    signal.signal(signal.SIGINT, before)
+
+
+def test_the_job_script_for_slurm_makes_a_worker_that_takes_part(jobqueue, tmp_path, monkeypatch):
     """dask-jobqueue renders it; in place of sbatch a shell executes it."""
-    jobqueue = pytest.importorskip("dask_jobqueue", reason="needs the package dask-jobqueue")
     script(tmp_path / "sbatch", SBATCH.format(folder=tmp_path))
     script(tmp_path / "scancel", SCANCEL)
     for name, value in {**environment(), "PATH": f"{tmp_path}:{os.environ['PATH']}"}.items():
