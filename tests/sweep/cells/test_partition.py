@@ -155,5 +155,12 @@ def test_few_dear_cells_are_told_from_lanes_by_two_of_them(monkeypatch, size, la
         assert blocks.cells == min(32, -(-size // 2))
     else:
         assert blocks.cells == max(1, min(20, size // 400))
-        # every probe is taken twice, lest something was compiled meanwhile
-        assert solver.now <= 0.05 * 18
+        assert solver.now < 0.05 * 10.5
+
+
+@pytest.mark.parametrize(("lanes", "probes"), [(True, 2), (False, 1 + 32)])
+def test_dear_cells_are_not_solved_twice_for_the_sample(monkeypatch, lanes, probes):
+    solver = calls(0.15, lanes, monkeypatch)
+    found = take_sample(solver, COLUMNS, 2048)
+    assert solver.now == pytest.approx(0.15 * probes)
+    assert found.cost == pytest.approx(0.15 / (32 if lanes else 1))
