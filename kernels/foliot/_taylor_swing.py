@@ -38,6 +38,8 @@ SEARCH, NEAR, ROUGH, FINE = 0, 1, 2, 3
 """What a cell's next half swing is for."""
 _COARSE, _CLOSE, _CHECKED = 1e-4, 0.05, 0.01
 """Tolerance of the search, the relative step below which it ends, and the one below which a rough swing has a twin."""
+_CALM = 1e-6
+"""Tolerance at which a half swing is right enough for Newton's method to converge, whatever is wanted."""
 _SHARE, _SHARE_ROUGH, _TIGHTER = 0.1, 0.01, 0.01
 """Of rtol that a half swing may be off by; where the drag is of a degree below 2; how much less where it did not do."""
 _LEAST = 1e-17
@@ -116,7 +118,7 @@ def _anything(p):
 
 
 _CELL = (*Foliot._fields, "depth", "harmonic")
-_E, _DECAY = Foliot._fields.index("e"), Swung._fields.index("decay")
+_E, _DECAY, _SENSITIVITY = Foliot._fields.index("e"), Swung._fields.index("decay"), Outputs._fields.index("sensitivity")
 """Positions of columns."""
 _BEGUN = (*TERMS, "v1", "stiff")
 _begin = _columns(begin, _CELL, _BEGUN)
@@ -130,7 +132,7 @@ def by_taylor(parameters, rippled):
     def solve(*columns):
         cells, rtol, asked = whole(columns), columns[n], columns[n + 1]
         if len(rtol):
-            outputs, errors, status = Search(cells, rtol, rippled).cycles()
+            outputs, errors, status = Search(cells, rtol, rippled, asked > 0).cycles()
             for column, found in zip(columns[n + 2 :], (*outputs, errors[asked > 0].max(axis=0), status), strict=True):
                 column[...] = found
 
@@ -177,11 +179,12 @@ class Search:
     ----------
     cells : columns of a `Foliot`, depth and harmonic
     rtol : column
+    asked : which of the outputs must be right; without the sensitivity no tangents are followed where none are needed
     """
 
-    def __init__(self, cells, rtol, rippled):
+    def __init__(self, cells, rtol, rippled, asked):
         n = len(rtol)
-        self.cells, self.rtol, self.general = cells, rtol, RIPPLED if rippled else SMOOTH
+        self.cells, self.rtol, self.asked, self.general = cells, rtol, asked, RIPPLED if rippled else SMOOTH
         terms, self.v, stiff = begun(cells, rtol)
         self.terms = dict(zip((*TERMS, *RIPPLE), (*terms, cells[-2], cells[-1] * (0.5 * np.pi)), strict=True))
         self.low, self.high, self.stuck = np.full(n, -1.0), np.full(n, np.inf), np.zeros(n, int)
@@ -230,10 +233,10 @@ class Search:
         """The half swings of the cells i, as rows of `Swung`, and their statuses; rough ones from other roundings."""
         stage, linear = self.stage[i], self.linear[i]
         found = np.empty((len(Swung._fields) + 1, len(i)))
-        forms = np.where(linear, np.where(stage < ROUGH, 1, 2), 0)
-        for number, form in enumerate((self.general, SEARCHED, LINEAR)):
+        bare = linear & ((stage < ROUGH) | ~self.asked[_SENSITIVITY])
+        for form, cells in ((self.general, ~linear), (SEARCHED, bare), (LINEAR, linear & ~bare)):
             for rough in (False, True):
-                those = np.flatnonzero((forms == number) & ((stage == ROUGH) == rough))
+                those = np.flatnonzero(cells & ((stage == ROUGH) == rough))
                 if len(those):
                     found[:, those] = self._followed(form, i[those], rough)
         return found
@@ -255,7 +258,7 @@ class Search:
         floor[4] *= 1.0 + np.where(decay < 750.0, decay, 0.0)
         errors = self.told[i] * apart + 2.0 * relative + floor
         self.outputs[:, i[free]], self.errors[:, i] = found[:, free], errors
-        good = fine & (errors.max(axis=0) <= self.rtol[i])
+        good = fine & (errors[self.asked].max(axis=0) <= self.rtol[i])
         last = fine & (good | self.again[i] | (self.tolerance[i] <= _LEAST))
         self.status[i[last]] = status[last]
         again = i[fine & ~last]
@@ -285,7 +288,7 @@ class Search:
         converged = relative < np.sqrt(near)
         if linear.any():
             left = relative * relative
-            near = np.where(linear, np.clip(0.01 * left, 4.0 * wanted, _COARSE), near)
+            near = np.where(linear, np.clip(0.01 * left, np.minimum(4.0 * wanted, _CALM), _COARSE), near)
             converged = np.where(linear, (left < wanted) & (self.tolerance[i] <= FINER * wanted), converged)
         close = inside & np.where(stage == SEARCH, relative < _CLOSE, converged)
         checked = inside & (stage == ROUGH) & (relative < _CHECKED)
