@@ -1,9 +1,9 @@
 """The general foliot's limit cycle by Taylor series: half swings followed as a scene of one's own, and Newton's method.
 
-The half swing of `_half_swing`, equation (1) there, is a scene of `_swing_scenes`, with a kink at the turning point. The
-series, the proof that no event is passed over, and the core of abs(v)^n are those of `kernels.codegen`. At the turning
-point the tangents' speeds should jump by J of (3). That they do not is made good for at the end: what is wanting is a
-multiple of the tangent along the motion itself, (v, v'), with the factor
+The half swing of `_half_swing`, equation (1) there, is a scene of `_swing_scenes`, with a kink at the turning point.
+The series, the proof that no event is passed over, and the core of abs(v)^n are those of `kernels.codegen`. At the
+turning point the tangents' speeds should jump by J of (3). That they do not is made good for at the end: what is
+wanting is a multiple of the tangent along the motion itself, (v, v'), with the factor
     beta = (J - 1) v_mu/v'  at the turning point,                                                        (1)
 which is what dry friction's change of sign shifts the time by. The cycle then follows by (4) of `_integrated_swing`.
 
@@ -193,9 +193,7 @@ class Search:
             np.full((len(Outputs._fields), n), np.nan),
             np.full((len(Outputs._fields), n), np.inf),
         )
-        self.status = np.where(able(terms, stiff, cells[_E]), Status.NOT_CONVERGED, Status.NO_METHOD).astype(
-            np.int8
-        )
+        self.status = np.where(able(terms, stiff, cells[_E]), Status.NOT_CONVERGED, Status.NO_METHOD).astype(np.int8)
         dragged = self.terms["gamma"] > 0.0
         rough = dragged & (self.terms["degree"] < 2.0)
         self.linear = ~dragged & rippled

@@ -123,7 +123,7 @@ def refined():
 
 def test_cells_of_a_refinement_are_shown_as_a_map_between_them(refined):
     """P = f(mu / (a^2 phi0)) / a, and what is shown of it is as right as was asked."""
-    page = Page(refined, "fine.h5")
+    page = made(refined, "fine.h5")
     assert (page.choice.x, page.choice.across, list(page.sliders)) == ("mu", "a", ["phi0"])
     assert page.picture.mapped
     assert page.dataset.period.size < 201**2
@@ -136,12 +136,12 @@ def test_cells_of_a_refinement_are_shown_as_a_map_between_them(refined):
 
 
 def test_of_straight_lines_between_cells_no_local_exponent_is_offered(refined, page):
-    assert Page(refined, "fine.h5").shows.options == ["value"]
+    assert made(refined, "fine.h5").shows.options == ["value"]
     assert page.shows.options == ["value", "local exponent"]
 
 
 def test_a_refined_cell_is_clicked_and_its_part_is_kept(refined):
-    page = Page(refined, "fine.h5")
+    page = made(refined, "fine.h5")
     x, y = page.found.values("mu")[3], page.found.values("a")[4]
     page._click(float(x), float(y))
     assert f"{x:.17g}" in page.table.object
