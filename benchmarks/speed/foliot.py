@@ -244,6 +244,7 @@ class Ripple:
     """The limit cycle with a torque that goes up and down by as much as a half."""
 
     title, turns, follow = "cycle of a rippled torque", False, staticmethod(cycle)
+    asked = "period", "crossing_speed"
     tolerances = (1e-7, 1e-7), (1e-13, 1e-13)
 
     def __init__(self):
@@ -252,7 +253,9 @@ class Ripple:
         self.cells = list(zip(mu, a, np.zeros(CELLS), np.zeros(CELLS), depth, strict=True))
 
     def ours(self, rtol):
-        found, status = solve(FOLIOT_RIPPLE, "taylor", phi0=1.0, harmonic=float(HARMONIC), rtol=rtol, **self.own)
+        found, status = solve(
+            FOLIOT_RIPPLE, "taylor", phi0=1.0, harmonic=float(HARMONIC), rtol=rtol, asked=self.asked, **self.own
+        )
         assert (status <= Status.INACCURATE).all()
         return np.stack([found["period"], found["crossing_speed"]], axis=1)
 
