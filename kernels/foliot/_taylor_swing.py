@@ -1,7 +1,8 @@
 """The general foliot's limit cycle by Taylor series: half swings followed as a scene of one's own, and Newton's method.
 
 The half swing of `_half_swing`, equation (1) there, is a scene of `_swing_scenes`, with a kink at the turning point.
-The series, the proof that no event is passed over, and the core of abs(v)^n are those of `kernels.codegen`. At it the tangents' speeds should jump by J of (3). That they do not is made good for at the end: what is wanting is a
+The series, the proof that no event is passed over, and the core of abs(v)^n are those of `kernels.codegen`. At that
+point the tangents' speeds should jump by J of (3). That they do not is made good for at the end: what is wanting is a
 multiple of the tangent along the motion itself, (v, v'), with the factor
     beta = (J - 1) v_mu/v'  at the turning point,                                                        (1)
 which is what dry friction's change of sign shifts the time by. The cycle then follows by (4) of `_integrated_swing`.
