@@ -35,6 +35,7 @@ class Swung(NamedTuple):
 STATES = Swung._fields[1:]
 TERMS = ("drag", "outwards", "inwards", "gamma", "degree", "kappa")
 RIPPLE = ("depth", "wave")
+_UNKNOWN = {"x_mu": np.nan, "v_mu": np.nan, "up_mu": np.nan}
 _FIRST = {"x": 1.0, "v_start": 1.0, "top": 1.0, "up_start": 1.0}
 
 
@@ -108,13 +109,14 @@ def _module(form):
 
 
 def half_swings(form, columns, tolerance):
-    """The half swings of cells as rows of a `Swung`, NaN where the form does not follow it, and a last one of statuses.
+    """The half swings of cells, rows of a `Swung` and of statuses, from columns: the form's terms, v0, and 1.
 
-    `columns` are the form's terms, v0, and 1.
+    Tangents that the form does not follow are NaN by mu, so that the sensitivity is none; by v0 they are 0, which
+    takes from time and amplitude what Newton's last step would better.
     """
     rows = followed(_module(form), columns, tolerance)
     found = dict(zip(("time", "interval", *form.states), rows, strict=False))
     if "decay" not in found:
         found["decay"] = columns[form.terms.index("drag")] * found["time"]
-    nothing = np.full(len(tolerance), np.nan)
-    return np.stack([*(found.get(name, nothing) for name in Swung._fields), rows[-1]])
+    unknown = {name: np.full(len(tolerance), _UNKNOWN.get(name, 0.0)) for name in Swung._fields if name not in found}
+    return np.stack([*((found | unknown)[name] for name in Swung._fields), rows[-1]])

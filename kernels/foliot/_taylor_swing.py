@@ -1,9 +1,9 @@
 """The general foliot's limit cycle by Taylor series: half swings followed as a scene of one's own, and Newton's method.
 
 The half swing of `_half_swing`, equation (1) there, is a scene of `_swing_scenes`, with a kink at the turning point.
-The series, the proof that no event is passed over, and the core of abs(v)^n are those of `kernels.codegen`. At the
-turning point the tangents' speeds should jump by J of (3). That they do not is made good for at the end: what is
-wanting is a multiple of the tangent along the motion itself, (v, v'), with the factor
+The series, the proof that no event is passed over, and the core of abs(v)^n are those of `kernels.codegen`. At that
+point the tangents' speeds should jump by J of (3). That they do not is made good for at the end: what is wanting is a
+multiple of the tangent along the motion itself, (v, v'), with the factor
     beta = (J - 1) v_mu/v'  at the turning point,                                                        (1)
 which is what dry friction's change of sign shifts the time by. The cycle then follows by (4) of `_integrated_swing`.
 
@@ -38,15 +38,19 @@ SEARCH, NEAR, ROUGH, FINE = 0, 1, 2, 3
 """What a cell's next half swing is for."""
 _COARSE, _CLOSE, _CHECKED = 1e-4, 0.05, 0.01
 """Tolerance of the search, the relative step below which it ends, and the one below which a rough swing has a twin."""
+_NOISE, _NOISE_BARE = 100.0, 3000.0
+"""Tolerances within which the sign of F - v may be wrong; where no tangents make steps shorter."""
 _CALM = 1e-6
 """Tolerance at which a half swing is right enough for Newton's method to converge, whatever is wanted."""
 _SHARE, _SHARE_ROUGH, _TIGHTER = 0.1, 0.01, 0.01
-"""Of rtol that a half swing may be off by; where the drag is of a degree below 2; how much less where it did not do."""
+"""Of rtol that a half swing may be off by; where the drag is of a degree below 2 or the torque varies, on which time
+and sensitivity hang steeply; how much less where it did not do."""
 _LEAST = 1e-17
 """Of tolerances: finer ones change nothing but the time that they take."""
-_TOLD, _TOLD_ROUGH = 4.0, 32.0
+_TOLD, _TOLD_STEEP, _TOLD_ROUGH = 4.0, 16.0, 32.0
 """Error that is stated over what the two last half swings differ by, of which the finer one's should be a fifteenth;
-and where the drag is of a degree below 2: cores of abs(v)^n have a low order."""
+where the torque varies, on which the sensitivity hangs steeply; and where the drag is of a degree below 2: cores of
+abs(v)^n have a low order."""
 _ROUNDING = 2e-14
 """Of a half swing's speed and time; a cycle's are off by 1/(1 - multiplier) as much."""
 
@@ -196,9 +200,9 @@ class Search:
         self.status = np.where(able(terms, stiff, cells[_E]), Status.NOT_CONVERGED, Status.NO_METHOD).astype(np.int8)
         dragged = self.terms["gamma"] > 0.0
         rough = dragged & (self.terms["degree"] < 2.0)
-        self.linear = ~dragged & rippled
-        self.told = np.where(rough, _TOLD_ROUGH, _TOLD)
-        self.share = np.where(rough, _SHARE_ROUGH, _SHARE)
+        self.linear, self.tangents = ~dragged & rippled, asked[_SENSITIVITY]
+        self.told = np.where(rough, _TOLD_ROUGH, np.where(self.linear, _TOLD_STEEP, _TOLD))
+        self.share = np.where(rough | self.linear, _SHARE_ROUGH, _SHARE)
         self.again = np.zeros(n, bool)
 
     def cycles(self):
@@ -231,7 +235,7 @@ class Search:
         """The half swings of the cells i, as rows of `Swung`, and their statuses; rough ones from other roundings."""
         stage, linear = self.stage[i], self.linear[i]
         found = np.empty((len(Swung._fields) + 1, len(i)))
-        bare = linear & ((stage < ROUGH) | ~self.asked[_SENSITIVITY])
+        bare = linear & ((stage < ROUGH) | (not self.tangents))
         for form, cells in ((self.general, ~linear), (SEARCHED, bare), (LINEAR, linear & ~bare)):
             for rough in (False, True):
                 those = np.flatnonzero(cells & ((stage == ROUGH) == rough))
@@ -246,27 +250,30 @@ class Search:
 
     def _judged(self, i, free, newton, decay, found, status):
         """Which cells are done: those whose two last half swings agree, or are as fine as can be."""
+        fine = np.flatnonzero(free & (self.stage[i] == FINE))
+        cells, last = i[fine], np.zeros(len(i), bool)
+        errors = self._told(cells, newton[:, fine], decay[fine], found[:, fine])
+        self.outputs[:, i[free]], self.errors[:, i], self.errors[:, cells] = found[:, free], np.inf, errors
+        good = errors[self.asked].max(axis=0) <= self.rtol[cells]
+        last[fine] = good | self.again[cells] | (self.tolerance[cells] <= _LEAST)
+        self.status[i[last]] = status[last]
+        again = cells[~last[fine]]
+        self.share[again], self.again[again] = _TIGHTER * self.share[again], True
+        return last
+
+    def _told(self, i, newton, decay, found):
+        """The error of each output of the cells i, by how far the last half swing is from the one before."""
         end, change, slope, cancels = newton
-        fine = free & (self.stage[i] == FINE)
         apart = np.abs(found / self.outputs[:, i] - 1.0)
-        apart[:, ~fine] = np.inf
-        relative = np.abs(change / end)
         floor = np.tile((_ROUNDING + self.tolerance[i]) / (1.0 - slope), (len(found), 1))
         floor[3] *= 1.0 + cancels
         floor[4] *= 1.0 + np.where(decay < 750.0, decay, 0.0)
-        errors = self.told[i] * apart + 2.0 * relative + floor
-        self.outputs[:, i[free]], self.errors[:, i] = found[:, free], errors
-        good = fine & (errors[self.asked].max(axis=0) <= self.rtol[i])
-        last = fine & (good | self.again[i] | (self.tolerance[i] <= _LEAST))
-        self.status[i[last]] = status[last]
-        again = i[fine & ~last]
-        self.share[again], self.again[again] = _TIGHTER * self.share[again], True
-        return last
+        return self.told[i] * apart + 2.0 * np.abs(change / end) + floor
 
     def _follow(self, i, free, newton, swung):
         """Speed, stage and tolerance of the next half swing."""
         v, (end, change, slope, _) = self.v[i], newton
-        noise = 100.0 * self.tolerance[i] * v
+        noise = np.where(self.linear[i], _NOISE_BARE, _NOISE) * self.tolerance[i] * v
         self.low[i] = np.where(~free | (end - v > noise), v, self.low[i])
         self.high[i] = np.where(free & (v - end > noise), v, self.high[i])
         low, high, new = self.low[i], self.high[i], v + change
