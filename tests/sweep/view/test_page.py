@@ -112,3 +112,40 @@ def test_a_port_that_is_taken_is_told(result):
         port = other.getsockname()[1]
         with pytest.raises(sweep.SweepError, match=f"port {port}"):
             serve(result, port=port, show=False)
+
+
+@pytest.fixture(scope="module")
+def refined():
+    axes = {n: {"spacing": "log", "start": 0.1, "stop": 10.0, "num": 4} for n in ("mu", "a", "phi0")}
+    ds = sweep.run(sweep.build_study(kernel="foliot", axes=axes, outputs=["period", "multiplier"]))
+    return sweep.refine(ds, "period", 5e-2).dataset
+
+
+def test_cells_of_a_refinement_are_shown_as_a_map_between_them(refined):
+    """P = f(mu / (a^2 phi0)) / a, and what is shown of it is as right as was asked."""
+    page = made(refined, "fine.h5")
+    assert (page.choice.x, page.choice.across, list(page.sliders)) == ("mu", "a", ["phi0"])
+    assert page.picture.mapped
+    assert page.dataset.period.size < 201**2
+    assert f"refined: straight lines between its {refined.sizes['cell']} cells" in page.dataset.title
+    page.sliders["phi0"].value = 5
+    at = {name: page.dataset[name].values for name in ("mu", "a")}
+    phi0 = float(page.dataset.phi0[5])
+    truth = sweep.run(sweep.build_study(kernel="foliot", axes=at, fixed={"phi0": phi0}, outputs=["period"])).period
+    np.testing.assert_allclose(page.found.y.values, truth.transpose("a", "mu").values, rtol=5e-2)
+
+
+def test_of_straight_lines_between_cells_no_local_exponent_is_offered(refined, page):
+    assert made(refined, "fine.h5").shows.options == ["value"]
+    assert page.shows.options == ["value", "local exponent"]
+
+
+def test_a_refined_cell_is_clicked_and_its_part_is_kept(refined):
+    page = made(refined, "fine.h5")
+    x, y = page.found.values("mu")[3], page.found.values("a")[4]
+    page._click(float(x), float(y))
+    assert f"{x:.17g}" in page.table.object
+    png, csv = (page.saves[suffix].callback() for suffix in ("png", "csv"))
+    assert png.read(4)[1:] == b"PNG"
+    assert len(csv.read().splitlines()) > 100
+    assert page.saves["toml"].disabled  # cells that lie anywhere are no grid
