@@ -40,16 +40,6 @@ ROUNDING = 2e-15
 """What `closed` is right to; where the differences of (3) in `_ringdown` lose more, the status says so."""
 
 
-class RingDown(NamedTuple):
-    """Outputs."""
-
-    half_swings: float
-    stop_angle: float
-    stop_time: float
-    margin: float
-    period: float
-
-
 class Kind(NamedTuple):
     """Whether it is overdamped, moves at all, swings for ever, and whether its motion has an end, be it the release."""
 
@@ -176,6 +166,16 @@ PARAMETERS = (
 
 Balance = namedtuple("Balance", [field.name for field in PARAMETERS])
 
+OUTPUTS = (
+    Field("half_swings", "1", "half swings until rest", integer=True),
+    Field("stop_angle", "rad", "angle of rest, from the spring's zero"),
+    Field("stop_time", "s", "time from release to rest"),
+    Field("margin", "1", "least distance of abs(theta) at a turning point from r_s, over r_s"),
+    Field("period", "s", "time of two half swings, the same for each"),
+)
+
+RingDown = namedtuple("RingDown", [field.name for field in OUTPUTS])
+
 EXAMPLE = {"zeta": 0.002, "omega_n": 5 * math.pi, "r": 0.01, "theta0": 4.5}
 
 BALANCE = kernel(
@@ -183,13 +183,7 @@ BALANCE = kernel(
     doc="ring-down of a balance with viscous and solid friction",
     source='"Theory of Horology", section 2-3, equations (3) and (10); the count is derived here',
     parameters=PARAMETERS,
-    outputs=(
-        Field("half_swings", "1", "half swings until rest", integer=True),
-        Field("stop_angle", "rad", "angle of rest, from the spring's zero"),
-        Field("stop_time", "s", "time from release to rest"),
-        Field("margin", "1", "least distance of abs(theta) at a turning point from r_s, over r_s"),
-        Field("period", "s", "time of two half swings, the same for each"),
-    ),
+    outputs=OUTPUTS,
     record=Balance,
     check=check,
     methods=(
