@@ -31,7 +31,7 @@ from kernels.foliot.ripple import FOLIOT_RIPPLE
 from kernels.foliot.start import FOLIOT_START
 from kernels.interface import Status
 from kernels.lanes.columns import entry
-from kernels.lanes.groups import GROUP, cells_at, each_group
+from kernels.lanes.groups import GROUP, cells_at
 from kernels.lanes.jit import jit
 from kernels.maths import philox
 
@@ -39,6 +39,7 @@ sys.path += [str(Path(__file__).parents[2] / "tests" / name) for name in ("oracl
 import foliot_oracles
 import ripple_oracles
 from columns import solve
+from loops import each_group
 from mpmath import mp, mpf
 
 try:

@@ -12,6 +12,7 @@ such as the angle of rest near critical damping without friction of motion, is t
 """
 
 import math
+from collections import namedtuple
 from typing import NamedTuple
 
 from kernels.balance import _ringdown
@@ -37,16 +38,6 @@ from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW, is_normal, scale
 
 ROUNDING = 2e-15
 """What `closed` is right to; where the differences of (3) in `_ringdown` lose more, the status says so."""
-
-
-class Balance(NamedTuple):
-    """Parameters."""
-
-    zeta: float
-    omega_n: float
-    r: float
-    r_s: float
-    theta0: float
 
 
 class RingDown(NamedTuple):
@@ -182,6 +173,8 @@ PARAMETERS = (
     Field("r_s", "rad", "stiction over spring stiffness, at least r", default="r", lower=0.0, open_lower=True),
     Field("theta0", "rad", "angle of release, from rest"),
 )
+
+Balance = namedtuple("Balance", [field.name for field in PARAMETERS])
 
 EXAMPLE = {"zeta": 0.002, "omega_n": 5 * math.pi, "r": 0.01, "theta0": 4.5}
 
