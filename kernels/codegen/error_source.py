@@ -111,7 +111,7 @@ def carried(source):
     one, core = _common(source), _off_core(source)
     now, series = "full_{s}" if core else "s_{s}[1]", [(f"delta_{s}", source.short) for s in states]
     series += [(f"sway_{s}", SHORT[source.order]) for s in _spread(source)]
-    no_weight = ["weight = 0.0 * h", *(f"left_{s} = 0.0 * h" for s in source.summed)]
+    no_weight = ["weight = 0.0 * h", *(f"left_{s} = 0.0 * h" for s in _left_later(source))]
     steps = [f"off_{s} = where(steps, {_off_after(source, s, 'trial')}, off_{s})" for s in states]
     steps += [f"spread_{s} = where(steps, {_after(source, s, 'trial', 'spread')}, spread_{s})" for s in _spread(source)]
     return {
@@ -194,9 +194,9 @@ def _left(source, one, at, defects, bends):
     `defects` and `bends` are f - U' and f' - U'' of the states of `_plain`, as text.
     """
     n, plain = source.order + 1, _plain(source)
-    left = [f"left_{s} = weight * ({defect})" for s, defect in zip(plain, defects, strict=True)]
     if not source.spreads:
-        return "\n".join([*left, *(f"off_{s} = off_{s} + left_{s}" for s in source.states)])
+        return "\n".join(f"off_{s} = fma(weight, {d}, off_{s})" for s, d in zip(plain, defects, strict=True))
+    left = [f"left_{s} = weight * ({defect})" for s, defect in zip(plain, defects, strict=True)]
     share, twice = f"weight * {n / (n + 1)!r}", 2 * n / (n + 1)
     closer = [
         f"left_{s} = fma({share}, unit * more_{s} - weight * ({bend}), {twice!r} * left_{s})"
@@ -210,10 +210,16 @@ def _left(source, one, at, defects, bends):
     )  # fmt: skip
 
 
+def _left_later(source):
+    """The states that are the sum of another one, and which, where what that leaves out is of use for others."""
+    return source.summed if source.spreads else {}
+
+
 def _left_of_sums(source, x):
     """What a step to x leaves out of states that are the sum of another one, as statements."""
-    power = f"weight * unit * natural_power({x}, {source.order})"
-    return [f"left_{s} = {power} * s_{w}[-1]" for s, w in source.summed.items()]
+    n = source.order + 1
+    power = f"unit * natural_power({x}, {n}) * {1 / n!r}"
+    return [f"left_{s} = where(weight > 0.0, {power} * s_{w}[-1], 0.0)" for s, w in _left_later(source).items()]
 
 
 def _after(source, s, x, off):
@@ -225,8 +231,12 @@ def _after(source, s, x, off):
 
 
 def _off_after(source, s, x):
-    """The same with what rounding and cores of powers take."""
-    text = f"further({_after(source, s, x, 'off')}, ULP * fma({x} * unit, noise_{s}, magnitude({s})))"
+    """The same with what rounding and cores of powers take, and of a sum all that is not added later."""
+    text = _after(source, s, x, "off")
+    if s in source.summed and s not in _left_later(source):
+        n = source.order + 1
+        text = f"fma(unit * s_{source.summed[s]}[-1], natural_power({x}, {n}) * {1 / n!r}, {text})"
+    text = f"further({text}, ULP * fma({x} * unit, noise_{s}, magnitude({s})))"
     for i in range(len(source.kinks_of_powers)):
         text = f"further({text}, coarse_{i}[{source.states.index(s)}])"
     return text
