@@ -133,3 +133,11 @@ def test_a_curve_between_the_points_is_the_same_law():
 def test_what_cannot_be_compared_is_said(y, message):
     with pytest.raises(SweepError, match=message):
         sweep.compare_laws(y, "x")
+
+
+def test_what_is_one_everywhere_is_one_law():
+    """All logarithms are 0, to rounding of which all laws are right."""
+    y = xr.DataArray(np.ones(21), {"mu": np.geomspace(1.0, 1e3, 21)}, ("mu",), "period")
+    found = sweep.compare_laws(y, "mu")
+    assert np.isfinite(found.aicc).all()
+    assert found.chosen == "one law"

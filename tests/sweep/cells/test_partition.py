@@ -71,6 +71,12 @@ def test_boxes_waste_a_tenth_at_most_whatever_is_wanted(length):
         assert -(-length // cells) * cells <= 1.1 * length
 
 
+def test_short_boxes_fill_whole_lanes():
+    assert boxes((10_007,), 100, 32).cells == 96
+    assert boxes((10_007,), 100, 1).cells == 100
+    assert boxes((10_000, 3), 100, 32).cells == 96
+
+
 def test_the_last_block_weighs_less_for_it_is_shorter():
     weights = sample(2.0, 25).weights(Partition(25, 10))
     assert weights.tolist() == [20.0, 20.0, 10.0]
