@@ -148,16 +148,17 @@ def _between_events(states, kinks):
     return [*states, "side", *signs, "unit", "h", *ons, "count", "since", "kinks_met", "steps", "before"]
 
 
-def of_error(states):
-    """Names of what a lane that tells its error keeps of it: at the last switch, of times, of each state."""
+def of_error(states, spreads):
+    """Names of what a lane that tells its error keeps: of times, of each state, of its spread; at the last switch."""
     offs = [f"off_{s}" for s in states]
-    return ["told", "error", "late", "lag", *offs, "latest", "lagged", *(f"once_{s}" for s in offs)]
+    spread = ["spread_late", "spread_lag", *(f"spread_{s}" for s in states)] if spreads else []
+    return ["told", "error", "late", "lag", *offs, *spread, "latest", "lagged", *(f"once_{s}" for s in offs)]
 
 
-def rows_of(states, parameters, kinks, tells=False):
-    """Names of all that a lane keeps."""
+def rows_of(states, parameters, kinks, also=()):
+    """Names of all that a lane keeps; `also` are those of its error (`of_error`)."""
     moving = [*results_of(states), *_between_events(states, kinks)]
-    return ["stage", *parameters, "flips", "tolerance", *moving, *(of_error(states) if tells else [])]
+    return ["stage", *parameters, "flips", "tolerance", *moving, *also]
 
 
 def shared(states, parameters, kinks):
@@ -189,7 +190,7 @@ def settled(state, side, parameters, unit, near):
 '''
 
 
-def advance(states, parameters, kinks, order, offset, most_kinks, tells=False, slides=False):
+def advance(states, parameters, kinks, order, offset, most_kinks, tells=False, slides=False, spreads=False):
     """The text of `advance_{order}` and `run_{order}`.
 
     Parameters
@@ -198,12 +199,15 @@ def advance(states, parameters, kinks, order, offset, most_kinks, tells=False, s
     most_kinks : between two switches, as text
     tells : whether the error is carried along (`error_source`)
     slides : whether the motion may slide along a kink (`sliding_source`)
+    spreads : whether the error's spread is carried along
     """
     signs, ons = [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]
-    rows = rows_of(states, parameters, kinks, tells)
-    changed = ["stage", "time", "verdict", *_between_events(states, kinks), *(of_error(states)[1:] if tells else [])]
+    errors = of_error(states, spreads) if tells else []
+    rows = rows_of(states, parameters, kinks, errors)
+    changed = ["stage", "time", "verdict", *_between_events(states, kinks), *errors[1:]]
     results = {name: f"memory[{rows.index(name)}][i]" for name in results_of(states)[1:-1]}
-    values = [*_STARTS, *(_first_errors(states) if tells else [])]
+    values = [*_STARTS, *((name, "0.0") for name in errors[1:])]
+    values += [(f"off_{s}", f"ULP * magnitude({s})") for s in states] if tells else []  # a start is rounded
     begin = filled(BEGIN, begin=begun_rows(states, signs, ons, values), blur="BLUR * tolerance")
     return filled(
         EVENT, order=order, load=loaded_rows(rows, [name for name in rows if name not in results]),
@@ -211,35 +215,47 @@ def advance(states, parameters, kinks, order, offset, most_kinks, tells=False, s
         ons=listed(ons), offset=offset, most_kinks=most_kinks, store=stored_rows(rows, changed),
         **(_landing(states, signs, ons) | _sliding(states, signs, ons, slides)),
         **_switching(states, signs, ons, results),
-        **(_telling(states, signs) if tells else dict.fromkeys(_TELLING, "")),
+        **(_telling(states, signs, spreads) if tells else dict.fromkeys(_TELLING, "")),
     )  # fmt: skip
-
-
-def _first_errors(states):
-    """Of a fresh cell: its start is rounded."""
-    nothing = [(name, "0.0") for name in of_error(states)[1:]]
-    return nothing + [(f"off_{s}", f"ULP * magnitude({s})") for s in states]
 
 
 _TELLING = "off_out", "off_in", "late", "largest", "tell", "through"
 
 
-def _telling(states, signs):
-    """Statements that carry the error along."""
-    offs = [f"off_{s}" for s in states]
+def _telling(states, signs, spreads):
+    """Statements that carry the error along, and its spread."""
+    offs, spread = [f"off_{s}" for s in states], [f"spread_{s}" for s in states] if spreads else []
     parts, size = ["latest / time", "lagged / since"], "most(magnitude({s}), PART * magnitude(rate[{j}]) * since)"
     parts += [f"once_off_{s} / {size.format(s=s, j=j)}" for j, s in enumerate(states)]
-    largest = [("latest", "late"), ("lagged", "lag"), *((f"once_{o}", o) for o in offs)]
-    kept = [f"{name} = where(switches, most(FADES * {name}, magnitude({x})), {name})" for name, x in largest]
-    through = f"through = jump_changes(({listed(states)}), side, ({listed(signs)}), parameters, ({listed(offs)}))"
+    largest = {"latest": ["late"], "lagged": ["lag"], **{f"once_{name}": [name] for name in offs}}
+    late, lags, through = (
+        ["late, lag = fma(later, unit, late), fma(later, unit, lag)"],
+        ["lag"],
+        _through(states, signs, offs),
+    )
+    if spreads:
+        for name, its in zip(largest, ["spread_late", "spread_lag", *spread], strict=True):
+            largest[name].append(its)
+        late.append("spread_late = fma(spread_later, unit, spread_late)")
+        late.append("spread_lag = fma(spread_later, unit, spread_lag)")
+        lags, through = [*lags, "spread_lag"], through + _through(states, signs, spread)
+    sums = {name: " + ".join(f"magnitude({x})" for x in xs) for name, xs in largest.items()}
     return {
-        "off_out": f", ({listed(offs)}), later",
-        "off_in": f", ({listed(offs)}), told > 0.5",
-        "late": "late, lag = fma(later, unit, late), fma(later, unit, lag)",
-        "largest": "\n".join(kept),
+        "off_out": f", ({listed(offs)}), later" + f", ({listed(spread)}), spread_later" * spreads,
+        "off_in": f", ({listed(offs)})" + f", ({listed(spread)})" * spreads + ", told > 0.5",
+        "late": "\n".join(late),
+        "largest": "\n".join(
+            f"{name} = where(switches, most(FADES * {name}, {x}), {name})" for name, x in sums.items()
+        ),
         "tell": f"error = where(watched, {folded('most({}, {})', parts)}, error)",
-        "through": "\n".join([through, *chosen("switches", offs, "through"), "lag = where(switches, 0.0, lag)"]),
+        "through": "\n".join([*through, *(f"{lag} = where(switches, 0.0, {lag})" for lag in lags)]),
     }
+
+
+def _through(states, signs, changes):
+    """Statements that give changes of the states what a switch leaves of them."""
+    text = f"through = jump_changes(({listed(states)}), side, ({listed(signs)}), parameters, ({listed(changes)}))"
+    return [text, *chosen("switches", changes, "through")]
 
 
 def _landing(states, signs, ons):

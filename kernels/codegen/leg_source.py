@@ -186,6 +186,7 @@ def leg(writer, order, hides, tells=False):
         hides,
         tells,
         short(writer, order),
+        writer.feeds_back(),
     )
     return source.text()
 
@@ -203,6 +204,7 @@ class LegSource:
     kinks_of_powers : for each power its kink
     hides, tells : see `leg`
     short : order of the changes' series
+    spreads : whether the error's spread is carried along too
     """
 
     states: list
@@ -215,6 +217,7 @@ class LegSource:
     hides: tuple
     tells: bool
     short: int
+    spreads: bool
 
     def text(self):
         return filled(

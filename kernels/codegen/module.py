@@ -19,7 +19,7 @@ import numpy as np
 from numba.core.errors import NumbaError
 
 from kernels.codegen.driver_source import BEGUN, EVENT, SETTLED, advance, shared
-from kernels.codegen.error_source import END, STEP
+from kernels.codegen.error_source import END, LEFT, SPREAD_AT_END, STEP
 from kernels.codegen.expression import DIV, FUNCTIONS, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, SceneError, needed
 from kernels.codegen.hidden_source import HIDDEN, hidden
 from kernels.codegen.lane_source import BEGIN
@@ -29,7 +29,7 @@ from kernels.codegen.record import record
 from kernels.codegen.rounding_source import LOST, SIZES, lost_by_surface
 from kernels.codegen.series_source import Lines
 from kernels.codegen.sliding_source import ENDLESS, JUDGE, LEAVE, PRESS, PRESSED, of_sliding
-from kernels.codegen.tangent import TANGENT, Tangents, tangent
+from kernels.codegen.tangent import SHORT, TANGENT, Tangents, short, tangent
 from kernels.codegen.template import filled, listed
 from kernels.lanes import cache
 from kernels.lanes.jit import COMPILED, cached
@@ -93,11 +93,14 @@ def series_{order}(state, side, signs, parameters, unit{also}):
 
 
 _OF_LEG = LEG, LOOK, FACTS, START, BY_KINK, ROOT
-_OF_ERROR = TANGENT, SIZES, STEP, END
+_OF_ERROR = TANGENT, SIZES, LEFT, STEP, END, SPREAD_AT_END
 _OF_SLIDING = PRESSED, JUDGE, ENDLESS, LEAVE, PRESS
 _TEXTS = HEAD, FUNCTION, SERIES, HIDDEN, LOST, CORE, BEGIN, EVENT, BEGUN, SETTLED, *_OF_LEG, *_OF_ERROR, *_OF_SLIDING
 _TAKEN = set(re.findall(r"\w+", "".join(_TEXTS))) | {"n", "p", "s"}
-_PREFIXES = "at|s|end|box|size|bare|full|kink|most|half|over|and_one|half_over|off|due|delta|noise|rate|made|coarse"
+_PREFIXES = (
+    "at|s|end|box|size|bare|full|kink|most|half|over|and_one|half_over|"
+    "off|due|delta|noise|rate|made|coarse|left|more|bent|spread|sway"
+)
 _NUMBERED = re.compile(rf"\w*_\d+|n\d+|({_PREFIXES})_\w*")
 
 
@@ -184,12 +187,21 @@ class Writer:
     def advance(self, order, tells=False):
         """The text of `advance_{order}` and `run_{order}`."""
         most = "KINK_LIMIT" if self.scene.most_kinks is None else repr(float(self.scene.most_kinks))
-        return advance(self.states, self.parameters, self.kinks, order, self.offset(), most, tells, self.scene.slides)
+        also = (tells, self.scene.slides, self.feeds_back())
+        return advance(self.states, self.parameters, self.kinks, order, self.offset(), most, *also)
 
     def summed(self):
         """The states whose rate is another state, and which."""
         rates = zip(self.states, self.recorded.rates, strict=True)
         return {s: self.names[r.args[0]] for s, r in rates if r.kind == INPUT and r.varies}
+
+    def feeds_back(self):
+        """Whether the rate of a state hangs on another one whose own rate, or that of a further one, hangs on it."""
+        rates = dict(zip(self.scene.states, self.recorded.rates, strict=True))
+        hangs = {s: {x.args[0] for x in needed(r) if x.kind == INPUT and x.args[0] in rates} for s, r in rates.items()}
+        for _ in hangs:
+            hangs = {s: on.union(*(hangs[other] for other in on)) for s, on in hangs.items()}
+        return any(other != s and s in hangs[other] for s, on in hangs.items() for other in on)
 
     def seen(self):
         """For each event the state that it watches; None where it is more than one."""
@@ -214,12 +226,17 @@ class Writer:
             f"({lines.value(offset)}, {lines.value(factor)}, {lines.coefficients(u, order)})"
             for offset, factor, u in recorded.events
         ]
-        of_tangent, inner = tangent(self, lines, order, powers) if tells else ("", [])
+        texts = self._tangents(lines, order, powers) if tells else []
         return filled(
             SERIES, order=order, unpack=self.all_unpacked, lines="\n".join(lines.text),
-            result=f"({listed([*states, *events, *inner])})", also=", cores" if powers else "",
+            result=f"({listed([*states, *events, *(inner for _, inner in texts)])})", also=", cores" if powers else "",
             cores=listed(f"core_{i}" for i in range(powers)) + " = cores" if powers else "",
-        ) + of_tangent  # fmt: skip
+        ) + "".join(text for text, _ in texts)  # fmt: skip
+
+    def _tangents(self, lines, order, powers):
+        """Of changes, and of the spread where there is one, that is wanted roughly (`tangent.tangent`)."""
+        lengths = {"tangent": short(self, order)} | ({"rough_tangent": SHORT[order]} if self.feeds_back() else {})
+        return [tangent(self, lines, order, powers, name, length) for name, length in lengths.items()]
 
     def text(self):
         """The whole module; of a scene that slides without the Taylor method, which does not follow that."""

@@ -8,6 +8,7 @@ is left, and all that is remarked or refused, is followed twice (`followed_twice
 import numpy as np
 
 from kernels.codegen import followed_twice
+from kernels.codegen.driver_source import of_error as names_of_error
 from kernels.codegen.driver_source import rows_of
 from kernels.codegen.error_source import of_error
 from kernels.codegen.followed_twice import ROUNDING
@@ -23,8 +24,8 @@ TEXT = '''
 """Motion of {name} with its error carried along: written by kernels; do not change it here."""
 
 from {module} import *
-from kernels.integrate.carried import DOUBT, FADES, ORDERLY, PART, STRAIGHT, ULP, further
-from kernels.integrate.taylor import slope
+from kernels.integrate.carried import DOUBT, FADES, ORDERLY, PART, STRAIGHT, ULP, VAGUE, further
+from kernels.integrate.taylor import curvature, slope
 
 ROWS = {rows}
 '''
@@ -49,7 +50,8 @@ def by_one(scene):
 def telling(scene):
     """The module of the scene's motion with its error."""
     module, writer = build(scene), Writer(scene, record(scene))
-    rows = tuple(rows_of(writer.states, writer.parameters, writer.kinks, True))
+    errors = names_of_error(writer.states, writer.feeds_back())
+    rows = tuple(rows_of(writer.states, writer.parameters, writer.kinks, errors))
     parts = [filled(TEXT, name=scene.name, module=module.__name__, rows=rows).lstrip(), *of_error(writer)]
     powers, (_, *hides) = len(writer.recorded.graph.powers), hidden(writer)
     parts += [core(writer, i, True) for i in range(powers)]

@@ -11,13 +11,13 @@ from collections import defaultdict
 from kernels.codegen.expression import ADD, INPUT, SCALED, needed
 from kernels.codegen.template import filled, listed
 
-SHORT, LONG = {12: 4, 18: 4}, {12: 9, 18: 12}
+SHORT, FED_BACK, LONG = {12: 4, 18: 4}, {12: 6, 18: 6}, {12: 9, 18: 12}
 """Order of the changes' series on a step of the motion's: terms fall by about a quarter each, so to some 1e-3. Those of
-exp, sin and cos, and of linear rates, first grow, as x^k/k!."""
+exp, sin and cos, and of linear rates, first grow, as x^k/k!; those of states that feed back on one another may too."""
 
 TANGENT = '''
 @jit
-def tangent_{order}(state, side, signs, parameters, unit, inner, changes{also}):
+def {name}_{order}(state, side, signs, parameters, unit, inner, changes{also}):
     """Taylor coefficients of a change of each state; `inner` are coefficients that `series_{order}` knows."""
     {unpack}
     {deltas} = changes
@@ -32,7 +32,7 @@ def short(writer, order):
     """Order of the changes' series beside one of the motion of that order."""
     kinds = {x.kind for x in needed(*writer.recorded.rates) if x.varies}
     grow_first = kinds & {"exp", "sin", "cos"} or kinds <= {INPUT, ADD, SCALED}
-    return (LONG if grow_first else SHORT)[order]
+    return (LONG if grow_first else FED_BACK if writer.feeds_back() else SHORT)[order]
 
 
 class Tangents:
@@ -113,22 +113,19 @@ class Tangents:
         return self._by(n * self._graph.over_base(x), base.args[1])
 
 
-def tangent(writer, lines, order, powers):
-    """The text of `tangent_{order}`, and what it takes of `lines`, which are the series', as a list of a text."""
+def tangent(writer, lines, order, powers, name, length):
+    """The text of a tangent of the order `length`, and what it takes of `lines`, which are the series', as text."""
     changes = lines.branch()
-    result = [changes.coefficients(delta, short(writer, order)) for delta in writer.tangents.deltas.values()]
-    own, given = set(re.findall(r"\w+", "\n".join([*changes.text, *result]))), []
-    for line in lines.text:
-        name = line.split(" = ")[0]
-        if name in own:
-            given.append(name)
+    result = [changes.coefficients(delta, length) for delta in writer.tangents.deltas.values()]
+    own = set(re.findall(r"\w+", "\n".join([*changes.text, *result])))
+    given = [known for known in (line.split(" = ")[0] for line in lines.text) if known in own]
     text = filled(
-        TANGENT, order=order, unpack=writer.all_unpacked, deltas=listed(f"delta_{s}" for s in writer.states),
+        TANGENT, name=name, order=order, unpack=writer.all_unpacked, deltas=listed(f"delta_{s}" for s in writer.states),
         cores=listed(f"core_{i}" for i in range(powers)) + " = cores" if powers else "",
         also=", cores" if powers else "", inner=f"{listed(given)} = inner" if given else "",
         lines="\n".join(changes.text), result=f"({listed(in_every_lane(r) for r in result)})",
     )  # fmt: skip
-    return text, [f"({listed(given)})"]
+    return text, f"({listed(given)})"
 
 
 def in_every_lane(coefficients):

@@ -12,6 +12,8 @@ PART = 0.05
 """Of what a state's last rate comes to since the last switch: its size where it is small at the switch."""
 FADES = 0.8
 """Of an error at a switch, what counts at the next one at least: where it changes its sign it is small by chance."""
+VAGUE = 0.05
+"""Of what a step leaves out, what is not known of it."""
 STRAIGHT = 20.0
 """Of the rate of an event, what it may change by within the time by which it is late: else it is no straight line."""
 

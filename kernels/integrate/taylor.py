@@ -127,6 +127,28 @@ def _lower_slope(context, builder, signature, values):
     return rate
 
 
+def curvature(x, series):
+    """u''(x) by Horner's scheme."""
+    value = rate = bend = series[-1]
+    for term in series[-2:1:-1]:
+        value = fma(value, x, term)
+        rate = fma(rate, x, value)
+        bend = fma(bend, x, rate)
+    return 2.0 * bend
+
+
+def _lower_curvature(context, builder, signature, values):
+    target = signature.return_type
+    x = context.cast(builder, values[0], signature.args[0], target)
+    items = _items(context, builder, signature.args[1], values[1], target)
+    value = rate = bend = items[-1]
+    for item in items[-2:1:-1]:
+        value = _called("fma")(builder, value, x, item)
+        rate = _called("fma")(builder, rate, x, value)
+        bend = _called("fma")(builder, bend, x, rate)
+    return builder.fmul(_constant(bend.type, 2.0), bend)
+
+
 def mean(x, series):
     """The mean of u between 0 and x, but for its last term: sum of u_k x^k/(k + 1).
 
@@ -149,7 +171,7 @@ def _lower_mean(context, builder, signature, values):
     return value
 
 
-for _of_series, _lower in ((slope, _lower_slope), (mean, _lower_mean)):
+for _of_series, _lower in ((slope, _lower_slope), (curvature, _lower_curvature), (mean, _lower_mean)):
     _function(_of_series, 2, lambda x, series: _number(x, *series), _lower)
 
 

@@ -1,5 +1,7 @@
 """The error that a motion by Taylor series carries along: against true errors, and what comes of what is not sure."""
 
+import inspect
+
 import mpmath
 import numpy as np
 import pytest
@@ -7,11 +9,12 @@ import rich_scene
 import scene_oracles as oracles
 from columns import solve
 from mpmath import mp
+from scipy.integrate import solve_ivp
 
 from kernels.codegen import followed_twice, stated_error
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import Scene, sign
+from kernels.scene import Scene, sign, sin
 
 FLIPS = 12 if COMPILED else 3
 NAMES = [f.name for f in rich_scene.RICH.parameters if f.name != "flips"]
@@ -117,3 +120,55 @@ def test_changes_of_linear_rates_die_out_as_they_do():
         true = abs(coarse[[0, 1, 3]] / fine[[0, 1, 3]] - 1).max(axis=0)
     matters = (true > 1e-10) & (error < 1e-6)
     assert np.quantile(error[matters] / true[matters], 0.75) < 1.5
+
+
+def pendulum(x, v, t, side, mu, a, k, depth, omega):
+    return v, side * mu - a * v - k * sin(x) + depth * sin(omega * t), 1.0
+
+
+def relay(x, v, side, mu, eps):
+    return v, eps * (1.0 - x * x) * v - x + side * mu
+
+
+CANCEL = [
+    (pendulum, 1.227828076851401e-09, 11, (0.4455631474004735, 0.9560298988515715, 0.01832808347224001,
+     0.42694587399953216, 0.5502164268744045, 1.7521393673311403)),
+    (pendulum, 1.4403361938954974e-05, 29, (0.7032387079896295, 0.25222528542474204, 0.013552182848106149,
+     0.45628282635710926, 0.09266309859840524, 2.1110756238320407)),
+    (relay, 9.676549867998949e-05, 19, (2.6453053426614175, 0.4157807057180794, 3.6094744684626345)),
+]  # fmt: skip
+"""Rates, rtol, flips and values of parameters where errors of steps cancel, and what is left of them grows."""
+
+
+def by_scipy(motion, phi0, flips):
+    """Time and speed at the last switch, each found by a step of Newton from the end of an integration of its own."""
+    y, begun = [0.0, 0.0], 0.0
+    for flip in range(flips):
+        side = (-1.0) ** flip
+
+        def gap(t, y, side):
+            return phi0 - side * y[0]
+
+        gap.terminal, gap.direction = True, -1.0
+        how = {"method": "DOP853", "rtol": 3e-14, "atol": 1e-15, "args": (side,)}
+        about = solve_ivp(motion, (begun, begun + 200.0), y, events=gap, **how).t_events[0][0]
+        end = solve_ivp(motion, (begun, about), y, **how).y[:, -1]
+        late = gap(about, end, side) / (side * end[1])
+        y, begun = end + late * np.array(motion(about, end, side)), about + late
+    return begun, y[1]
+
+
+@pytest.mark.skipif(not COMPILED, reason="asks for many steps")
+@pytest.mark.parametrize(("rates", "rtol", "flips", "values"), CANCEL)
+def test_errors_that_cancel_and_grow_again_are_told(rates, rtol, flips, values):
+    timed = rates is pendulum
+    states, names = ("x", "v", "t")[: 2 + timed], ("mu", "phi0", *inspect.signature(rates).parameters)
+    names = tuple(dict.fromkeys(name for name in names if name not in (*states, "side")))
+    scene = Scene(rates.__name__, "waits", states, names, rates, surface, lambda: (0.0,) * len(states))
+    columns = [np.array([value]) for value in (*values, float(flips))]
+    results, error = followed_twice.told(stated_error.telling(scene), columns, *np.array([[rtol], [0.25 * rtol]]))
+    others = (values[0], *values[2:])
+    truth = by_scipy(lambda t, y, side: rates(*y, *((t,) if timed else ()), side, *others)[:2], values[1], flips)
+    true = abs(results[[0, 3], 0] / truth - 1).max()
+    assert true > rtol
+    assert stated_error.STATED * error[0] > true
