@@ -195,9 +195,9 @@ def cores(name):
 
 
 def main():
-    compare(PENDULUM, SPEED, ((1e-8, 1e-9), (1e-12, 1e-13)))
-    compare(RELAY, SPEED, ((1e-8, 1e-9), (1e-12, 1e-13)))
-    compare(STICK_SLIP, PLACE, ((1e-8, 1e-9), (1e-12, 1e-13)))
+    compare(PENDULUM, SPEED, ((1e-9, 1e-10), (1e-13, 3e-13)))
+    compare(RELAY, SPEED, ((1e-6, 1e-8), (1e-11, 2e-12)))
+    compare(STICK_SLIP, PLACE, ((1e-7, 2e-9), (3e-12, 1e-13)))
     for name in KERNELS:
         print("{}: {} cores against one: {:.2f} times".format(name, *cores(name)), flush=True)
 

@@ -118,5 +118,8 @@ def half_swings(form, columns, tolerance):
     found = dict(zip(("time", "interval", *form.states), rows, strict=False))
     if "decay" not in found:
         found["decay"] = columns[form.terms.index("drag")] * found["time"]
-    unknown = {name: np.full(len(tolerance), _UNKNOWN.get(name, 0.0)) for name in Swung._fields if name not in found}
-    return np.stack([*((found | unknown)[name] for name in Swung._fields), rows[-1]])
+    swung = np.empty((len(Swung._fields) + 1, len(tolerance)))
+    for row, name in zip(swung, Swung._fields, strict=False):
+        row[:] = found.get(name, _UNKNOWN.get(name, 0.0))
+    swung[-1] = rows[-1]
+    return swung

@@ -193,11 +193,10 @@ class Search:
         self.terms = dict(zip((*TERMS, *RIPPLE), (*terms, cells[-2], cells[-1] * (0.5 * np.pi)), strict=True))
         self.low, self.high, self.stuck = np.full(n, -1.0), np.full(n, np.inf), np.zeros(n, int)
         self.stage, self.tolerance = np.full(n, SEARCH), np.full(n, _COARSE)
-        self.outputs, self.errors = (
-            np.full((len(Outputs._fields), n), np.nan),
-            np.full((len(Outputs._fields), n), np.inf),
-        )
-        self.status = np.where(able(terms, stiff, cells[_E]), Status.NOT_CONVERGED, Status.NO_METHOD).astype(np.int8)
+        self.outputs = np.full((len(Outputs._fields), n), np.nan)
+        self.errors = np.full_like(self.outputs, np.inf)
+        possible = able(terms, stiff, cells[_E])
+        self.status = np.where(possible, Status.NOT_CONVERGED, Status.NO_METHOD).astype(np.int8)
         dragged = self.terms["gamma"] > 0.0
         rough = dragged & (self.terms["degree"] < 2.0)
         self.linear, self.tangents = ~dragged & rippled, asked[_SENSITIVITY]
@@ -224,9 +223,8 @@ class Search:
         _step(*cells, self.v[i], *swung[:-1], self.rtol[i], *newton, *found, status)
         free = (swung[-1] < FIRST_REFUSAL) & np.isfinite(newton[:3]).all(axis=0) & (newton[0] > 0.0)
         self.stuck[i] = np.where(free, 0, self.stuck[i] + 1)
-        lost = (self.stuck[i] > STUCK) | (
-            (self.stage[i] == SEARCH) & (self.high[i] - self.low[i] <= _COARSE * self.v[i])
-        )
+        closed = self.high[i] - self.low[i] <= _COARSE * self.v[i]
+        lost = (self.stuck[i] > STUCK) | ((self.stage[i] == SEARCH) & closed)
         done = self._judged(i, free, newton, swung[_DECAY], found, status) | lost
         self._follow(i, free, newton, swung)
         return ~done
@@ -234,17 +232,20 @@ class Search:
     def _swung(self, i):
         """The half swings of the cells i, as rows of `Swung`, and their statuses; rough ones from other roundings."""
         stage, linear = self.stage[i], self.linear[i]
-        found = np.empty((len(Swung._fields) + 1, len(i)))
         bare = linear & ((stage < ROUGH) | (not self.tangents))
-        for form, cells in ((self.general, ~linear), (SEARCHED, bare), (LINEAR, linear & ~bare)):
-            for rough in (False, True):
-                those = np.flatnonzero(cells & ((stage == ROUGH) == rough))
-                if len(those):
-                    found[:, those] = self._followed(form, i[those], rough)
+        kind = 2 * np.where(bare, 1, np.where(linear, 2, 0)) + (stage == ROUGH)
+        kinds = np.flatnonzero(np.bincount(kind))
+        if len(kinds) == 1:
+            return self._followed(*divmod(kinds[0], 2), i)
+        found = np.empty((len(Swung._fields) + 1, len(i)))
+        for k in kinds:
+            those = np.flatnonzero(kind == k)
+            found[:, those] = self._followed(*divmod(k, 2), i[those])
         return found
 
-    def _followed(self, form, i, rough):
-        """The half swings of the cells i in that form; rough ones with parameters that are some roundings off."""
+    def _followed(self, number, rough, i):
+        """The half swings of the cells i in one of the forms; rough ones with parameters some roundings off."""
+        form = (self.general, SEARCHED, LINEAR)[number]
         columns = [*(self.terms[name][i] for name in form.terms), self.cells[_E][i] * self.v[i], np.ones(len(i))]
         return half_swings(form, off_by_roundings(columns) if rough else columns, self.tolerance[i])
 
