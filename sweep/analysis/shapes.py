@@ -12,7 +12,7 @@ import functools
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -199,6 +199,16 @@ STRETCHED = Law(
     6,
     LOW_HIGH,
 )
+
+
+def _of_power(power: float) -> Law:
+    """That bend with one power alone."""
+    parts = _bent(lambda u, q: _stretched(u, np.array([q[0], power])))
+    return replace(STRETCHED, parts=parts, grids=STRETCHED.grids[:2], numbers=5)
+
+
+POWERS = {float(power): _of_power(power) for power in np.linspace(-1.2, 0.8, 17)}
+"""By the logarithm of the power."""
 THREE = Law(
     "three laws",
     "two bends of one width",

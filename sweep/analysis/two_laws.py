@@ -19,7 +19,7 @@ from sweep.analysis.curves import Window, along, check_confidence, noise_of, sca
 from sweep.analysis.lines import check_noise
 from sweep.analysis.loglog import EPSILON, Array, slopes, tends
 from sweep.analysis.scatter import BEYOND_DOUBT, line_deviance, noise_size, rounding
-from sweep.analysis.shapes import BENDS, LOGARITHM, TWO, fitted
+from sweep.analysis.shapes import BENDS, LOGARITHM, POWERS, STRETCHED, TWO, Found, fitted
 from sweep.system.errors import SweepError
 
 FEWEST_POINTS = 8
@@ -290,24 +290,44 @@ def _of_other_bends(
 
     Where noise remembers, intervals reach `more` times as far, and points rule out less by the square of that.
     """
-    tried = [found for law in BENDS[1:] if (found := fitted(law, t, z)) is not None]
-    best = min([_criterion(off), *(found.aicc for found in tried)])
+    tried = [(found, 1.0) for law in BENDS[1:] if (found := fitted(law, t, z)) is not None]
+    best = min([_criterion(off), *(found.aicc for found, _ in tried)])
+    stretched = [_other_powers(t, z, found, confidence) for found, _ in tried if found.law is STRETCHED]
     low, high = numbers - reach, numbers + reach
     own_low, own_high, span = low.copy(), high.copy(), t[-1] - t[0]
     which = [LOW, HIGH, PLACE]
     allowed = OTHER_SHAPES * float(more[which[:2]].max()) ** 2
-    for found in tried:
+    for found, share in itertools.chain(tried, *stretched):
         if found.aicc > best + allowed:
             continue
         count = len(found.law.grids)
         q, slopes_there = found.numbers[0], found.numbers[count + 1 : count + 3]
         wide = student(t.size - found.law.numbers, confidence) * found.errors[[count + 1, count + 2, 0]] * more[which]
         middle = np.array([*slopes_there / span, t[0] + q * span])
-        wide = wide * np.array([1 / span, 1 / span, span])
+        wide = wide * share * np.array([1 / span, 1 / span, span])
         low[which], high[which] = np.fmin(low[which], middle - wide), np.fmax(high[which], middle + wide)
     further = BEYOND_SHAPES * np.array([own_low[PLACE] - low[PLACE], high[PLACE] - own_high[PLACE]])
     low[PLACE], high[PLACE] = low[PLACE] - further.max(), high[PLACE] + further.max()
     return low, high
+
+
+def _other_powers(t: Array, z: Array, best: Found, confidence: float) -> list[tuple[Found, float]]:
+    """Bends stretched by other powers that the points allow, and the share of its interval that this leaves to each.
+
+    Errors of exponents grow as the power falls, so that those at the best one do not tell how far it may be from there:
+    the profile likelihood does.
+    """
+    left = t.size - STRETCHED.numbers
+    doubt = t.size * math.log1p(student(left, confidence) ** 2 / left)
+    allowed = []
+    for falls in (True, False):
+        powers = [power for power in POWERS if (power < best.numbers[2]) == falls]
+        for power in sorted(powers, reverse=falls):
+            found = fitted(POWERS[power], t, z)
+            if found is None or found.deviance >= best.deviance + doubt:
+                break
+            allowed.append((found, math.sqrt(min(1.0, 1 - (found.deviance - best.deviance) / doubt))))
+    return allowed
 
 
 def _criterion(off: Array) -> float:

@@ -211,6 +211,16 @@ def bend(name, t):
     return -t + 2 / 3 * np.interp(t, fine, rise)
 
 
+def test_how_far_a_bend_may_be_stretched_is_in_the_intervals_of_its_laws():
+    """150 sets: a standard error of 1.8 %; errors at the best power alone hold 93 % of 1200 sets, and less of these."""
+    rng, t = np.random.default_rng(6), axis(25, 6.9)
+    y = curve(t, bend("stretched", t) + 0.01 * rng.standard_normal((150, 25)))
+    found = sweep.fit_two_laws(y, "mu", noise="independent")
+    for law, truth in (("low", -1.0), ("high", -1 / 3)):
+        assert share(found.sel(law=law), "exponent", truth) > 0.935
+    assert float((found.exponent_high - found.exponent_low).median()) < 0.1
+
+
 @pytest.mark.parametrize("name", ["hyperbola", "asymmetric", "stretched", "two widths"])
 @pytest.mark.parametrize("n", [25, 61])
 def test_bends_of_other_shapes_are_in_the_intervals_of_two_laws(name, n):
