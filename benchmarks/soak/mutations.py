@@ -92,12 +92,12 @@ def command(copy, tests, module=""):
     """Runs tests up to the first fault, those named like the module first: of a room of kernels as plain Python,
     compiled, and those of all rooms as plain Python, which CI runs as well."""
     pytest = f"XDG_CACHE_HOME={copy}/cache PYTHONPATH={copy} {sys.executable} -m pytest -q -x"
-    own = [str(path) for path in sorted(tests.rglob(f"test_{module.strip('_')}.py"))]
-    tests_in_order = " ".join([*own, str(tests)])
-    steps = [f"{pytest} {tests_in_order}"]
+    own = " ".join(str(path) for path in sorted(tests.rglob(f"test_{module.strip('_')}.py")))
+    first = [own] if own else []
+    steps = [f"{pytest} {paths}" for paths in (*first, tests)]
     if "kernels" in tests.relative_to(copy).parts:
         plain = f"NUMBA_DISABLE_JIT=1 {pytest}"
-        steps = [f"{plain} {tests_in_order}", *steps, f"{plain} {copy}/tests/kernels"]
+        steps = [*(f"{plain} {paths}" for paths in (*first, tests)), *steps, f"{plain} {copy}/tests/kernels"]
     return f"bash -c 'cd {copy} && {' && '.join(steps)}'"
 
 

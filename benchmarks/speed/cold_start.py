@@ -8,6 +8,7 @@ folder of compiled code is empty before the first of two runs.
 
 from __future__ import annotations
 
+import argparse
 import os
 import resource
 import subprocess
@@ -44,8 +45,13 @@ def cold_and_warm(kernel: str) -> tuple[float, float]:
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("kernels", nargs="*", metavar="KERNEL", help=f"of {', '.join(KERNELS)}; default: all")
+    kernels = parser.parse_args().kernels or KERNELS
+    if unknown := [kernel for kernel in kernels if kernel not in KERNELS]:
+        parser.error(f"no such kernel: {', '.join(unknown)}")
     print(f"{'kernel':20}{'cold':>8}{'warm':>8}  processor seconds")
-    for kernel in sys.argv[1:] or KERNELS:
+    for kernel in kernels:
         cold, warm = cold_and_warm(kernel)
         print(
             f"{kernel:20}{cold:8.1f}{warm:8.1f}{'  above ' + format(WANTED, 'g') if cold > WANTED else ''}", flush=True

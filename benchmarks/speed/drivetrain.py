@@ -22,11 +22,11 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import lapack
 
-from kernels.drivetrain._chain_frequencies import natural_frequencies_of_all
 from kernels.drivetrain.receptance import DRIVETRAIN_FRF
 
-sys.path.append(str(Path(__file__).parents[2] / "tests" / "oracles"))
+sys.path += [str(Path(__file__).parents[2] / "tests" / folder) for folder in ("oracles", "helpers")]
 import chain_oracles as oracles
+from many_chains import natural_frequencies_of_all
 from mpmath import mp, mpc, mpf
 
 CELLS = {2: 65536, 4: 32768, 8: 16384, 16: 8192, 64: 512}

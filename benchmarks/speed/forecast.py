@@ -60,6 +60,9 @@ def tolerances(*values: float) -> dict[str, Any]:
 STEEP = tuple(np.geomspace(1e-3, 1e-12, 32))
 RARE = (*np.geomspace(1e-3, 2e-3, 62), 1e-12, 2e-12)
 
+MOST_CELLS = 64_000_000
+"""Cells of a study at most, lest its output fill the disk."""
+
 KINDS: dict[str, Build] = {
     "even": lambda n: foliot(method="segments", axes={"mu": drives(n), "R": FRICTION}),
     "dear last": lambda n: foliot(method="dopri5", axes={"rtol": tolerances(*STEEP), "mu": drives(n)}),
@@ -154,10 +157,10 @@ def processors() -> float:
 
 def sized(build: Build, seconds: float) -> Study:
     """The study with as many values on its longest axis as take about so many seconds."""
-    trial = build(256)
-    count = 256
-    cost = sampled_study(trial).cost * np.prod([len(axis) for axis in trial.axes.values()])
-    return build(int(np.clip(count * seconds * cores() / cost, 16, 1_000_000)))
+    trial, count = build(256), 256
+    cells = np.prod([len(axis) for axis in trial.axes.values()])
+    cost = sampled_study(trial).cost * cells
+    return build(int(np.clip(count * seconds * cores() / cost, 16, MOST_CELLS * count // cells)))
 
 
 def halfway(study: Study) -> Study:

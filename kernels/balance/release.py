@@ -12,6 +12,7 @@ such as the angle of rest near critical damping without friction of motion, is t
 """
 
 import math
+from collections import namedtuple
 from typing import NamedTuple
 
 from kernels.balance import _ringdown
@@ -37,26 +38,6 @@ from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW, is_normal, scale
 
 ROUNDING = 2e-15
 """What `closed` is right to; where the differences of (3) in `_ringdown` lose more, the status says so."""
-
-
-class Balance(NamedTuple):
-    """Parameters."""
-
-    zeta: float
-    omega_n: float
-    r: float
-    r_s: float
-    theta0: float
-
-
-class RingDown(NamedTuple):
-    """Outputs."""
-
-    half_swings: float
-    stop_angle: float
-    stop_time: float
-    margin: float
-    period: float
 
 
 class Kind(NamedTuple):
@@ -183,6 +164,18 @@ PARAMETERS = (
     Field("theta0", "rad", "angle of release, from rest"),
 )
 
+Balance = namedtuple("Balance", [field.name for field in PARAMETERS])
+
+OUTPUTS = (
+    Field("half_swings", "1", "half swings until rest", integer=True),
+    Field("stop_angle", "rad", "angle of rest, from the spring's zero"),
+    Field("stop_time", "s", "time from release to rest"),
+    Field("margin", "1", "least distance of abs(theta) at a turning point from r_s, over r_s"),
+    Field("period", "s", "time of two half swings, the same for each"),
+)
+
+RingDown = namedtuple("RingDown", [field.name for field in OUTPUTS])
+
 EXAMPLE = {"zeta": 0.002, "omega_n": 5 * math.pi, "r": 0.01, "theta0": 4.5}
 
 BALANCE = kernel(
@@ -190,13 +183,7 @@ BALANCE = kernel(
     doc="ring-down of a balance with viscous and solid friction",
     source='"Theory of Horology", section 2-3, equations (3) and (10); the count is derived here',
     parameters=PARAMETERS,
-    outputs=(
-        Field("half_swings", "1", "half swings until rest", integer=True),
-        Field("stop_angle", "rad", "angle of rest, from the spring's zero"),
-        Field("stop_time", "s", "time from release to rest"),
-        Field("margin", "1", "least distance of abs(theta) at a turning point from r_s, over r_s"),
-        Field("period", "s", "time of two half swings, the same for each"),
-    ),
+    outputs=OUTPUTS,
     record=Balance,
     check=check,
     methods=(

@@ -12,8 +12,7 @@ Source: as `_dqds`.
 from kernels.drivetrain._chain import same, units
 from kernels.drivetrain._dqds import eigenvalues, next_traces
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
-from kernels.lanes.columns import entry, in_groups
-from kernels.lanes.groups import GROUP, cells_at, room
+from kernels.lanes.groups import GROUP, cells_at
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import not_, sqrt, where
 from kernels.maths.elementary import is_normal, scale
@@ -62,25 +61,3 @@ def natural_frequencies(n, J, k, frequency, work):
 def row_at(j):
     """Where the j-th row of a buffer of a group begins."""
     return cells_at(j * GROUP)
-
-
-@jit
-def _group(first, columns, rows):
-    J, k, frequency, status = columns
-    n = J.shape[1]
-    part = GROUP * n
-    inertias, springs, found, entries = rows, rows[part:], rows[2 * part :], rows[3 * part :]
-    for cell in range(GROUP):
-        for j in range(n):
-            inertias[j * GROUP + cell] = J[first + cell, j]
-            springs[j * GROUP + cell] = k[first + cell, j]
-    status[cells_at(first)] = frequencies(n, row_at, GROUP, inertias, springs, found, entries)
-    for cell in range(GROUP):
-        for j in range(n):
-            frequency[first + cell, j] = found[j * GROUP + cell]
-
-
-@entry()
-def natural_frequencies_of_all(J, k, frequency, status):
-    """`natural_frequencies` of every row of J, k and frequency, of shape (n_cells, n); and every status."""
-    in_groups(_group, (J, k, frequency, status), (room(6 * J.shape[1] + 2),))

@@ -13,7 +13,7 @@ PARTLY_OUT_OF_RANGE, or OUT_OF_RANGE where no other frequency is left.
 """
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -32,16 +32,6 @@ from kernels.maths import complex
 from kernels.maths.elementary import is_normal, log
 
 _TWO_PI, _DB = 2.0 * math.pi, 20.0 / math.log(10.0)
-
-
-class Drive(NamedTuple):
-    """Parameters: the chain, and the numbers of the inertias with the torque and with the angle."""
-
-    J: np.ndarray
-    k: np.ndarray
-    h: np.ndarray
-    drive_mass: float
-    read_mass: float
 
 
 @jit_apart
@@ -121,7 +111,12 @@ PARAMETERS = (
         lower=0.0, open_lower=True, dims=("mass",),
     ),
     Field("h", "N m s/rad", "dampers beside the springs", lower=0.0, dims=("mass",)),
+    Field("drive_mass", "1", "number of the inertia with the torque", 1.0, lower=1.0, upper=64.0, integer=True),
+    Field("read_mass", "1", "number of the inertia whose angle is told", "drive_mass", 1.0, 64.0, integer=True),
 )  # fmt: skip
+"""The chain, and the numbers of the inertias with the torque and with the angle."""
+
+Drive = namedtuple("Drive", [field.name for field in PARAMETERS])
 
 MILLING_MACHINE = {
     "J": (0.2520, 0.01226, 0.002785, 0.007541, 0.01422, 0.06374, 0.9414, 0.9752),
@@ -134,11 +129,7 @@ DRIVETRAIN_FRF = kernel(
     "drivetrain_frf",
     doc="angle of one inertia of a drivetrain per torque at another, against frequency",
     source="drivetrain of a milling machine after Rivin; solution and error bound derived in `_chain_receptance`",
-    parameters=(
-        *PARAMETERS,
-        Field("drive_mass", "1", "number of the inertia with the torque", 1.0, lower=1.0, upper=64.0, integer=True),
-        Field("read_mass", "1", "number of the inertia whose angle is told", "drive_mass", 1.0, 64.0, integer=True),
-    ),
+    parameters=PARAMETERS,
     outputs=(
         Field("receptance_re", "rad/(N m)", "receptance, real part", dims=("frequency",)),
         Field("receptance_im", "rad/(N m)", "receptance, imaginary part", dims=("frequency",)),

@@ -21,9 +21,7 @@ frequency_error of 1e-6 is one to 1e-6 +- rtol.
 """
 
 import math
-from typing import NamedTuple
-
-import numpy as np
+from collections import namedtuple
 
 from kernels.drivetrain._chain import MASS_LIMIT, refusal
 from kernels.drivetrain._chain_frequencies import natural_frequencies
@@ -57,19 +55,6 @@ EVERYTHING = 1e300
 """Band [Hz] that holds every frequency."""
 SMALL_PHASE = 0.1
 """w h e up to which (w h e)^2 << 1."""
-
-
-class Drivetrain(NamedTuple):
-    """Parameters: the chain, and what it is to be reduced to."""
-
-    J: np.ndarray
-    k: np.ndarray
-    h: np.ndarray
-    reduction: float
-    n_keep: float
-    tol: float
-    f_max: float
-    order: float
 
 
 @jit
@@ -183,24 +168,25 @@ PARAMETERS = (
     Field("k", "N m/rad", "stiffness of the spring behind each; the last, to ground, may be 0",
           lower=0.0, open_lower=True, dims=("mass",)),
     Field("h", "N m s/rad", "damping beside each spring", default=0.0, lower=0.0, dims=("mass",)),
+    Field("reduction", "1", "how masses are saved", default=0.0, lower=0.0, upper=6.0, choices=REDUCTIONS,
+          integer=True),
+    Field("n_keep", "1", "masses (or modes) that stay; 0: as many as `tol` needs", default=0.0, lower=0.0,
+          upper=float(MASS_LIMIT), integer=True),
+    Field("tol", "1", "relative error that frequencies up to `f_max` may have; 0: `n_keep` is given", default=0.0,
+          lower=0.0),
+    Field("f_max", "Hz", "highest frequency that counts", default=EVERYTHING, lower=0.0, open_lower=True),
+    Field("order", "1", "what goes first: strictly the smallest J e, or as in the source, where type a wins a tie",
+          default=0.0, lower=0.0, upper=1.0, choices=ORDERS, integer=True),
 )  # fmt: skip
+"""The chain, and what it is to be reduced to."""
+
+Drivetrain = namedtuple("Drivetrain", [field.name for field in PARAMETERS])
 
 DRIVETRAIN = kernel(
     "drivetrain",
     doc="drivetrain chain and its reduction to fewer masses",
     source="Baran & Marchelek, Mechanika Teoretyczna i Stosowana 9 (1971) 201; others in their modules",
-    parameters=(
-        *PARAMETERS,
-        Field("reduction", "1", "how masses are saved", default=0.0, lower=0.0, upper=6.0, choices=REDUCTIONS,
-              integer=True),
-        Field("n_keep", "1", "masses (or modes) that stay; 0: as many as `tol` needs", default=0.0, lower=0.0,
-              upper=float(MASS_LIMIT), integer=True),
-        Field("tol", "1", "relative error that frequencies up to `f_max` may have; 0: `n_keep` is given", default=0.0,
-              lower=0.0),
-        Field("f_max", "Hz", "highest frequency that counts", default=EVERYTHING, lower=0.0, open_lower=True),
-        Field("order", "1", "what goes first: strictly the smallest J e, or as in the source, where type a wins a tie",
-              default=0.0, lower=0.0, upper=1.0, choices=ORDERS, integer=True),
-    ),
+    parameters=PARAMETERS,
     outputs=(
         Field("frequency", "Hz", "natural frequencies without damping, rising", dims=("mode",), gaps=True),
         Field("frequency_error", "1", "frequency over that of the full chain, minus 1", dims=("mode",), gaps=True),

@@ -1,10 +1,9 @@
 """The general foliot's limit cycle by Taylor series: half swings followed as a scene of one's own, and Newton's method.
 
-The half swing of `_half_swing`, equation (1) there, is written as a `Scene`: from x = 1 with the speed e v1 up to
-x = -1, with a kink at the turning point. The series, the proof that no event is passed over, and the core of abs(v)^n
-are those of `kernels.codegen`. The two tangents go along as states; of them `up_mu` and `up_start` keep the speeds that
-they have at the turning point. There these should jump by J of (3). That they do not is made good for at the end: what
-is wanting is a multiple of the tangent along the motion itself, (v, v'), with the factor
+The half swing of `_half_swing`, equation (1) there, is a scene of `_swing_scenes`, with a kink at the turning point.
+The series, the proof that no event is passed over, and the core of abs(v)^n are those of `kernels.codegen`. At that
+point the tangents' speeds should jump by J of (3). That they do not is made good for at the end: what is wanting is a
+multiple of the tangent along the motion itself, (v, v'), with the factor
     beta = (J - 1) v_mu/v'  at the turning point,                                                        (1)
 which is what dry friction's change of sign shifts the time by. The cycle then follows by (4) of `_integrated_swing`.
 
@@ -12,17 +11,13 @@ The error is told by two last half swings, as in `followed_twice`: the finer one
 and the other's parameters are some roundings off.
 """
 
-import functools
-from typing import NamedTuple
-
 import numpy as np
 
-from kernels.codegen.expression import cos, power, sign, sin
-from kernels.codegen.followed_twice import FINER, followed, off_by_roundings
-from kernels.codegen.module import build
+from kernels.codegen.followed_twice import FINER, off_by_roundings
 from kernels.foliot import _units
 from kernels.foliot._half_swing import Half, Law, Leg, Swing, accelerations, problem_of, pull
 from kernels.foliot._integrated_swing import NewtonStep, _cycle, _first, _slope
+from kernels.foliot._swing_scenes import LINEAR, RIPPLE, RIPPLED, SEARCHED, SMOOTH, TERMS, Swung, half_swings
 from kernels.foliot._units import Foliot, Outputs
 from kernels.interface import FIRST_REFUSAL, Field, Method, Status
 from kernels.lanes.codes import OK, STICKS
@@ -30,7 +25,6 @@ from kernels.lanes.jit import jit
 from kernels.lanes.vectors import not_, where
 from kernels.lanes.wiring import kernel, method, signed
 from kernels.maths.elementary import exp
-from kernels.scene import Scene
 
 LIMIT = 40
 """Half swings of a cell."""
@@ -44,74 +38,21 @@ SEARCH, NEAR, ROUGH, FINE = 0, 1, 2, 3
 """What a cell's next half swing is for."""
 _COARSE, _CLOSE, _CHECKED = 1e-4, 0.05, 0.01
 """Tolerance of the search, the relative step below which it ends, and the one below which a rough swing has a twin."""
+_NOISE, _NOISE_BARE = 100.0, 3000.0
+"""Tolerances within which the sign of F - v may be wrong; where no tangents make steps shorter."""
+_CALM = 1e-6
+"""Tolerance at which a half swing is right enough for Newton's method to converge, whatever is wanted."""
 _SHARE, _SHARE_ROUGH, _TIGHTER = 0.1, 0.01, 0.01
-"""Of rtol that a half swing may be off by; where the drag is of a degree below 2; how much less where it did not do."""
+"""Of rtol that a half swing may be off by; where the drag is of a degree below 2 or the torque varies, on which time
+and sensitivity hang steeply; how much less where it did not do."""
 _LEAST = 1e-17
 """Of tolerances: finer ones change nothing but the time that they take."""
-_TOLD, _TOLD_ROUGH = 4.0, 32.0
+_TOLD, _TOLD_STEEP, _TOLD_ROUGH = 4.0, 16.0, 32.0
 """Error that is stated over what the two last half swings differ by, of which the finer one's should be a fifteenth;
-and where the drag is of a degree below 2: cores of abs(v)^n have a low order."""
+where the torque varies, on which the sensitivity hangs steeply; and where the drag is of a degree below 2: cores of
+abs(v)^n have a low order."""
 _ROUNDING = 2e-14
 """Of a half swing's speed and time; a cycle's are off by 1/(1 - multiplier) as much."""
-
-STATES = ("x", "v", "x_mu", "v_mu", "x_start", "v_start", "decay", "top", "up_mu", "up_start")
-_TERMS = ("drag", "outwards", "inwards", "gamma", "degree", "kappa")
-_RIPPLE = ("depth", "wave")
-
-
-def _rates(x, v, x_mu, v_mu, x_start, v_start, drag, outwards, inwards, gamma, degree, kappa, torque=1.0, by_x=0.0):
-    """(1) of `_half_swing` with its tangents; `torque` and its slope where it varies."""
-    side = sign(v)
-    rising, falling = 0.5 * (1.0 + side), 0.5 * (1.0 - side)
-    slope, stiffness = drag + degree * gamma * power(abs(v), degree - 1.0), kappa + by_x
-    steady = rising * outwards + falling * inwards + (torque - 1.0)
-    force = steady + drag * v + side * gamma * power(abs(v), degree) + kappa * x
-    by_mu = -torque - stiffness * x_mu - slope * v_mu
-    by_start = -stiffness * x_start - slope * v_start
-    return v, -force, v_mu, by_mu, v_start, by_start, slope, rising * v, rising * by_mu, rising * by_start
-
-
-def smooth_rates(x, v, x_mu, v_mu, x_start, v_start, drag, outwards, inwards, gamma, degree, kappa):
-    return _rates(x, v, x_mu, v_mu, x_start, v_start, drag, outwards, inwards, gamma, degree, kappa)
-
-
-def rippled_rates(x, v, x_mu, v_mu, x_start, v_start, drag, outwards, inwards, gamma, degree, kappa, depth, wave):
-    angle = wave * (1.0 - x)
-    torque, by_x = 1.0 + depth * cos(angle), depth * wave * sin(angle)
-    return _rates(x, v, x_mu, v_mu, x_start, v_start, drag, outwards, inwards, gamma, degree, kappa, torque, by_x)
-
-
-def surface(x):
-    return x + 1.0
-
-
-def start(v0):
-    return 1.0, v0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0
-
-
-@functools.cache
-def module(rippled):
-    """The compiled half swing."""
-    doc = "half swing of a foliot with its tangents"
-    parameters, rates = ((*_TERMS, *_RIPPLE, "v0"), rippled_rates) if rippled else ((*_TERMS, "v0"), smooth_rates)
-    name = "foliot_ripple_swing" if rippled else "foliot_swing"
-    return build(Scene(name, doc, STATES, parameters, rates, surface, start, most_kinks=1))
-
-
-class Swung(NamedTuple):
-    """What a half swing comes to: states at the switch, and its time."""
-
-    time: float
-    x: float
-    v: float
-    x_mu: float
-    v_mu: float
-    x_start: float
-    v_start: float
-    decay: float
-    top: float
-    up_mu: float
-    up_start: float
 
 
 @jit
@@ -181,9 +122,9 @@ def _anything(p):
 
 
 _CELL = (*Foliot._fields, "depth", "harmonic")
-_E, _DECAY = Foliot._fields.index("e"), Swung._fields.index("decay")
+_E, _DECAY, _SENSITIVITY = Foliot._fields.index("e"), Swung._fields.index("decay"), Outputs._fields.index("sensitivity")
 """Positions of columns."""
-_BEGUN = (*_TERMS, "v1", "stiff")
+_BEGUN = (*TERMS, "v1", "stiff")
 _begin = _columns(begin, _CELL, _BEGUN)
 _step = _columns(step, (*_CELL, "v1", *Swung._fields), ("end", "change", "slope", "cancels", *Outputs._fields))
 
@@ -195,7 +136,7 @@ def by_taylor(parameters, rippled):
     def solve(*columns):
         cells, rtol, asked = whole(columns), columns[n], columns[n + 1]
         if len(rtol):
-            outputs, errors, status = Search(cells, rtol, rippled).cycles()
+            outputs, errors, status = Search(cells, rtol, rippled, asked > 0).cycles()
             for column, found in zip(columns[n + 2 :], (*outputs, errors[asked > 0].max(axis=0), status), strict=True):
                 column[...] = found
 
@@ -242,25 +183,26 @@ class Search:
     ----------
     cells : columns of a `Foliot`, depth and harmonic
     rtol : column
+    asked : which of the outputs must be right; without the sensitivity no tangents are followed where none are needed
     """
 
-    def __init__(self, cells, rtol, rippled):
+    def __init__(self, cells, rtol, rippled, asked):
         n = len(rtol)
-        self.cells, self.rtol, self.module = cells, rtol, module(rippled)
-        self.terms, self.v, stiff = begun(cells, rtol)
-        self.terms += [cells[-2], cells[-1] * (0.5 * np.pi)] if rippled else []
+        self.cells, self.rtol, self.asked, self.general = cells, rtol, asked, RIPPLED if rippled else SMOOTH
+        terms, self.v, stiff = begun(cells, rtol)
+        self.terms = dict(zip((*TERMS, *RIPPLE), (*terms, cells[-2], cells[-1] * (0.5 * np.pi)), strict=True))
         self.low, self.high, self.stuck = np.full(n, -1.0), np.full(n, np.inf), np.zeros(n, int)
         self.stage, self.tolerance = np.full(n, SEARCH), np.full(n, _COARSE)
         self.outputs, self.errors = (
             np.full((len(Outputs._fields), n), np.nan),
             np.full((len(Outputs._fields), n), np.inf),
         )
-        self.status = np.where(able(self.terms, stiff, cells[_E]), Status.NOT_CONVERGED, Status.NO_METHOD).astype(
-            np.int8
-        )
-        rough = (self.terms[3] > 0.0) & (self.terms[4] < 2.0)
-        self.told = np.where(rough, _TOLD_ROUGH, _TOLD)
-        self.share = np.where(rough, _SHARE_ROUGH, _SHARE)
+        self.status = np.where(able(terms, stiff, cells[_E]), Status.NOT_CONVERGED, Status.NO_METHOD).astype(np.int8)
+        dragged = self.terms["gamma"] > 0.0
+        rough = dragged & (self.terms["degree"] < 2.0)
+        self.linear, self.tangents = ~dragged & rippled, asked[_SENSITIVITY]
+        self.told = np.where(rough, _TOLD_ROUGH, np.where(self.linear, _TOLD_STEEP, _TOLD))
+        self.share = np.where(rough | self.linear, _SHARE_ROUGH, _SHARE)
         self.again = np.zeros(n, bool)
 
     def cycles(self):
@@ -280,7 +222,7 @@ class Search:
         status = np.empty(len(i), np.int8)
         cells = [column[i] for column in self.cells]
         _step(*cells, self.v[i], *swung[:-1], self.rtol[i], *newton, *found, status)
-        free = (swung[-1] < FIRST_REFUSAL) & np.isfinite(newton).all(axis=0) & (newton[0] > 0.0)
+        free = (swung[-1] < FIRST_REFUSAL) & np.isfinite(newton[:3]).all(axis=0) & (newton[0] > 0.0)
         self.stuck[i] = np.where(free, 0, self.stuck[i] + 1)
         lost = (self.stuck[i] > STUCK) | (
             (self.stage[i] == SEARCH) & (self.high[i] - self.low[i] <= _COARSE * self.v[i])
@@ -290,37 +232,48 @@ class Search:
         return ~done
 
     def _swung(self, i):
-        """The half swings of the cells i, as rows of `Swung`, and their statuses."""
-        columns = [*(column[i] for column in self.terms), self.cells[_E][i] * self.v[i], np.ones(len(i))]
-        rough = self.stage[i] == ROUGH
-        shifted = off_by_roundings(columns)
-        columns = [np.where(rough, other, column) for column, other in zip(columns, shifted, strict=True)]
-        rows = followed(self.module, columns, self.tolerance[i])
-        return [rows[0], *rows[2 : 2 + len(STATES)], rows[-1]]
+        """The half swings of the cells i, as rows of `Swung`, and their statuses; rough ones from other roundings."""
+        stage, linear = self.stage[i], self.linear[i]
+        found = np.empty((len(Swung._fields) + 1, len(i)))
+        bare = linear & ((stage < ROUGH) | (not self.tangents))
+        for form, cells in ((self.general, ~linear), (SEARCHED, bare), (LINEAR, linear & ~bare)):
+            for rough in (False, True):
+                those = np.flatnonzero(cells & ((stage == ROUGH) == rough))
+                if len(those):
+                    found[:, those] = self._followed(form, i[those], rough)
+        return found
+
+    def _followed(self, form, i, rough):
+        """The half swings of the cells i in that form; rough ones with parameters that are some roundings off."""
+        columns = [*(self.terms[name][i] for name in form.terms), self.cells[_E][i] * self.v[i], np.ones(len(i))]
+        return half_swings(form, off_by_roundings(columns) if rough else columns, self.tolerance[i])
 
     def _judged(self, i, free, newton, decay, found, status):
         """Which cells are done: those whose two last half swings agree, or are as fine as can be."""
+        fine = np.flatnonzero(free & (self.stage[i] == FINE))
+        cells, last = i[fine], np.zeros(len(i), bool)
+        errors = self._told(cells, newton[:, fine], decay[fine], found[:, fine])
+        self.outputs[:, i[free]], self.errors[:, i], self.errors[:, cells] = found[:, free], np.inf, errors
+        good = errors[self.asked].max(axis=0) <= self.rtol[cells]
+        last[fine] = good | self.again[cells] | (self.tolerance[cells] <= _LEAST)
+        self.status[i[last]] = status[last]
+        again = cells[~last[fine]]
+        self.share[again], self.again[again] = _TIGHTER * self.share[again], True
+        return last
+
+    def _told(self, i, newton, decay, found):
+        """The error of each output of the cells i, by how far the last half swing is from the one before."""
         end, change, slope, cancels = newton
-        fine = free & (self.stage[i] == FINE)
         apart = np.abs(found / self.outputs[:, i] - 1.0)
-        apart[:, ~fine] = np.inf
-        relative = np.abs(change / end)
         floor = np.tile((_ROUNDING + self.tolerance[i]) / (1.0 - slope), (len(found), 1))
         floor[3] *= 1.0 + cancels
         floor[4] *= 1.0 + np.where(decay < 750.0, decay, 0.0)
-        errors = self.told[i] * apart + 2.0 * relative + floor
-        self.outputs[:, i[free]], self.errors[:, i] = found[:, free], errors
-        good = fine & (errors.max(axis=0) <= self.rtol[i])
-        last = fine & (good | self.again[i] | (self.tolerance[i] <= _LEAST))
-        self.status[i[last]] = status[last]
-        again = i[fine & ~last]
-        self.share[again], self.again[again] = _TIGHTER * self.share[again], True
-        return last
+        return self.told[i] * apart + 2.0 * np.abs(change / end) + floor
 
     def _follow(self, i, free, newton, swung):
         """Speed, stage and tolerance of the next half swing."""
         v, (end, change, slope, _) = self.v[i], newton
-        noise = 100.0 * self.tolerance[i] * v
+        noise = np.where(self.linear[i], _NOISE_BARE, _NOISE) * self.tolerance[i] * v
         self.low[i] = np.where(~free | (end - v > noise), v, self.low[i])
         self.high[i] = np.where(free & (v - end > noise), v, self.high[i])
         low, high, new = self.low[i], self.high[i], v + change
@@ -330,11 +283,19 @@ class Search:
         self._set(i, inside, np.abs(change / end), slope, swung[_DECAY])
 
     def _set(self, i, inside, relative, slope, decay):
-        """The stage that follows, and its tolerance: an error of F counts 1/(1 - slope)-fold in v1."""
-        stage, rtol, gap = self.stage[i], self.rtol[i], 1.0 - slope
+        """The stage that follows, and its tolerance: an error of F counts 1/(1 - slope)-fold in v1.
+
+        Where the search is cheap it goes on until what Newton's method leaves is below what is wanted.
+        """
+        stage, rtol, gap, linear = self.stage[i], self.rtol[i], 1.0 - slope, self.linear[i]
         wanted = np.maximum(self.share[i] * rtol * gap / (1.0 + np.where(decay < 750.0, decay, 0.0)), _LEAST)
         near = np.clip(0.01 * np.sqrt(rtol * gap), FINER * wanted, _COARSE)
-        close = inside & (relative < np.where(stage == SEARCH, _CLOSE, np.sqrt(near)))
+        converged = relative < np.sqrt(near)
+        if linear.any():
+            left = relative * relative
+            near = np.where(linear, np.clip(0.01 * left, np.minimum(4.0 * wanted, _CALM), _COARSE), near)
+            converged = np.where(linear, (left < wanted) & (self.tolerance[i] <= FINER * wanted), converged)
+        close = inside & np.where(stage == SEARCH, relative < _CLOSE, converged)
         checked = inside & (stage == ROUGH) & (relative < _CHECKED)
         onward = np.where(close & (stage < ROUGH), stage + 1, stage)
         self.stage[i] = stage = np.where(stage == FINE, ROUGH, np.where(checked, FINE, onward))

@@ -6,6 +6,7 @@ In units of phi0 and of T0 = sqrt(phi0/mu) the half swing after the switch at x 
 It starts with e times the speed before the switch and ends at x = -1; the other half mirrors it. Drive work is 2.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from kernels.lanes.jit import jit
@@ -29,16 +30,8 @@ class Foliot(NamedTuple):
     e: float
 
 
-class LinearFoliot(NamedTuple):
-    """Parameters without drag."""
-
-    mu: float
-    phi0: float
-    a: float
-    R: float
-    R_s: float
-    k: float
-    e: float
+LinearFoliot = namedtuple("LinearFoliot", [name for name in Foliot._fields if name not in ("c", "n")])
+"""Parameters without drag."""
 
 
 class Outputs(NamedTuple):

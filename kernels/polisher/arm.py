@@ -16,6 +16,7 @@ rates, no derivatives). A crank e = 0 swings nothing; crank angles are those for
 """
 
 import math
+from collections import namedtuple
 from typing import NamedTuple
 
 from kernels.interface import FIRST_REFUSAL, Field
@@ -33,15 +34,7 @@ from kernels.polisher._cell import ROUNDING, Rates, Swing, judged, mirrored, mov
 from kernels.polisher.extremes import Angles, Locks, Slopes
 from kernels.polisher.linkage import EXAMPLE, PARAMETERS, allowed, side_of
 
-
-class Linkage(NamedTuple):
-    """Parameters."""
-
-    b: float
-    d: float
-    f: float
-    e: float
-    type: float
+Linkage = namedtuple("Linkage", [field.name for field in PARAMETERS])
 
 
 class Sampled(NamedTuple):

@@ -15,6 +15,7 @@ count more than once: INACCURATE.
 """
 
 import math
+from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
@@ -28,8 +29,9 @@ from kernels.lanes.records import read
 from kernels.lanes.vectors import magnitude, not_, where
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import arctan, larger, sincos, smaller
+from kernels.polisher import linkage
 from kernels.polisher._cell import ROUNDING, judged, said
-from kernels.polisher.linkage import EXAMPLE, PARAMETERS, Crank, Margins, allowed, crank_at, lock_doubt, motion, side_of
+from kernels.polisher.linkage import EXAMPLE, Crank, Margins, allowed, crank_at, lock_doubt, motion, side_of
 
 FARTHEST = 1e6
 """Crank angle, beyond which a radian has lost its digits."""
@@ -37,18 +39,23 @@ RATE_LIMIT = 1e140
 """omega, beyond which, or below the inverse of which, its square leaves float64."""
 
 
-class Machine(NamedTuple):
-    """Parameters: the linkage, and how it turns and carries the tool."""
+PARAMETERS = (
+    *linkage.PARAMETERS,
+    Field("omega", "rad/s", "angular rate of the crank, either way"),
+    Field(
+        "b_angle",
+        "rad",
+        "direction of b, from the pivot to the motor",
+        default=0.0,
+        lower=-math.tau,
+        upper=math.tau,
+    ),
+    Field("L", "m", "distance of the tool's centre from the pivot", default="d", lower=0.0),
+    Field("beta", "rad", "angle of the tool's centre ahead of the arm", default=0.0, lower=-math.tau, upper=math.tau),
+)
+"""Parameters: the linkage, and how it turns and carries the tool."""
 
-    b: float
-    d: float
-    f: float
-    e: float
-    type: float
-    omega: float
-    b_angle: float
-    L: float
-    beta: float
+Machine = namedtuple("Machine", [field.name for field in PARAMETERS])
 
 
 class State(NamedTuple):
@@ -134,22 +141,7 @@ POLISHER_MOTION = kernel(
     "polisher_motion",
     doc="motion of a polishing machine's arm and tool along the crank's angle",
     source="Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (2)-(19), corrected",
-    parameters=(
-        *PARAMETERS,
-        Field("omega", "rad/s", "angular rate of the crank, either way"),
-        Field(
-            "b_angle",
-            "rad",
-            "direction of b, from the pivot to the motor",
-            default=0.0,
-            lower=-math.tau,
-            upper=math.tau,
-        ),
-        Field("L", "m", "distance of the tool's centre from the pivot", default="d", lower=0.0),
-        Field(
-            "beta", "rad", "angle of the tool's centre ahead of the arm", default=0.0, lower=-math.tau, upper=math.tau
-        ),
-    ),
+    parameters=PARAMETERS,
     outputs=(
         Field("alpha", "rad", "angle of the arm", dims=("crank_angle",)),
         Field("alpha_rate", "rad/s", "angular rate of the arm", dims=("crank_angle",)),

@@ -1,6 +1,7 @@
 """What the kernels of wear share: their parameters, the check of them, and the machine without units."""
 
 import math
+from collections import namedtuple
 from typing import NamedTuple
 
 from kernels.interface import FIRST_REFUSAL, Field
@@ -17,31 +18,6 @@ ANGLE_LIMIT = 1e6
 """Angles beyond which no digits are left of their sines."""
 EXPONENT_LIMITS = 0.5, 100.0
 _SPAN = 2.0**-100  # of a length of the work over the longest of them
-
-
-class Machine(NamedTuple):
-    """Parameters."""
-
-    b: float
-    d: float
-    f: float
-    e: float
-    type: float
-    omega: float
-    b_angle: float
-    L: float
-    beta: float
-    w_x: float
-    w_y: float
-    Omega: float
-    tool_a: float
-    tool_b: float
-    tool_n: float
-    tool_m: float
-    preston: float
-    pressure: float
-    load: float
-    workpiece_radius: float
 
 
 class Ride(NamedTuple):
@@ -209,6 +185,8 @@ PARAMETERS = (
         lower=0.0,
     ),
 )
+
+Machine = namedtuple("Machine", [field.name for field in PARAMETERS])
 
 EXAMPLE = linkage.EXAMPLE | {
     "omega": 2.0,

@@ -32,18 +32,6 @@ METHOD = (
 KIND_WORDS = ("exact", "bounded", "curved", "bent", "weighted", "any", *KINDS)
 """What distances from a line are; `kind` of a fit is a position in this list."""
 
-KIND_MEANINGS = {
-    "exact": "rounding",
-    "bounded": "within the stated error bounds",
-    "curved": "a bend; the interval is the range of the local exponent",
-    "bent": "a bend among scatter; the interval is the range of the local exponent",
-    "weighted": "noise of the given standard errors",
-    "any": "scatter, perhaps correlated",
-    "independent": "independent scatter of one size",
-    "uneven": "scatter that grows or falls along the axis",
-    "correlated": "scatter that remembers the point before",
-    "outliers": "scatter with outliers, which count less",
-}
 
 FIT_NAMES = {
     "exponent": "exponent of the power law",

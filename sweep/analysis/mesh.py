@@ -39,16 +39,20 @@ LEAST_BASIS = 0.3
 NEARLY = 0.9
 """Share of the largest bend of an edge."""
 RIDGE = 1e-12
-BATCH = 20_000
+BATCH = 2_000
+MIX = np.random.default_rng(1).integers(1 << 62, size=256)
+"""Numbers of cells times these, in the ring of 64 bits, are a number of each simplex."""
 
 
-class Errors(NamedTuple):
-    """Of each simplex: how far it may be off in its worst output (infinite where too few cells tell), and the edge
-    that needs a cut most, by the numbers of its corners in the simplex."""
+class Parabolas(NamedTuple):
+    """Over each simplex: its corners and those beyond (m, more), how far off its centre cells around it are, the c_ij
+    (m, pairs) of (1), what these leave, a mean square's root; and how many cells there were."""
 
-    size: Array
-    first: Indices
-    second: Indices
+    around: Indices
+    reach: Array
+    bend: Array
+    misfit: Array
+    cells: int
 
 
 def simplices(points: Array) -> Indices:
@@ -59,7 +63,7 @@ def simplices(points: Array) -> Indices:
     found = Delaunay(tilted(points)).simplices.astype(np.intp)
     sides = points[found[:, 1:]] - points[found[:, :1]]
     products = np.linalg.norm(sides, axis=2).prod(axis=1)
-    kept: Indices = found[abs(np.linalg.det(sides)) > FLAT * products]
+    kept: Indices = np.sort(found[abs(np.linalg.det(sides)) > FLAT * products], axis=1)
     return kept
 
 
@@ -76,17 +80,15 @@ def edges(axes: int) -> Indices:
     return np.array(list(itertools.combinations(range(axes + 1), 2)), dtype=np.intp)
 
 
-def interpolation_errors(points: Array, heights: Array, corners: Indices) -> Errors:
-    """Errors of straight lines between points, (n, axes) with heights (n, outputs), over simplices (m, axes + 1)."""
-    pairs = edges(points.shape[1])
-    if are_too_few(points):
-        return _cut_longest(points, corners, pairs)
-    bend, misfit = parabolas(points, heights, corners)
-    middle = abs(bend) / 4
-    inside = abs(bend.sum(axis=1)) / corners.shape[1] ** 2
-    size = (SAFETY * np.maximum(middle.max(axis=1, initial=0.0), inside) + MISFIT * misfit).max(axis=1)
-    worst = _shortest(middle.max(axis=2), lengths(points, corners, pairs))
-    return Errors(size, pairs[worst, 0], pairs[worst, 1])
+def interpolation_errors(points: Array, corners: Indices, found: Parabolas) -> tuple[Array, Indices]:
+    """How far straight lines between points (n, axes) may be off over simplices (m, axes + 1) with these parabolas, and
+    the edges (m, 2) that need a cut most."""
+    middle = abs(found.bend) / 4
+    inside = abs(found.bend.sum(axis=1)) / corners.shape[1] ** 2
+    size = SAFETY * np.maximum(middle.max(axis=1, initial=0.0), inside) + MISFIT * found.misfit
+    # a diagonal bends as its sides do, which lie along the axes that need a cut, and are shorter
+    nearly = middle >= NEARLY * middle.max(axis=1, keepdims=True)
+    return size, largest(corners, np.where(nearly, -lengths(points, corners), -np.inf))
 
 
 def are_too_few(points: Array) -> bool:
@@ -95,20 +97,49 @@ def are_too_few(points: Array) -> bool:
     return bool(number < axes + 1 + len(edges(axes)))
 
 
-def parabolas(points: Array, heights: Array, corners: Indices) -> tuple[Array, Array]:
-    """The c_ij (m, pairs, outputs) of (1) over each simplex, and what they leave, a mean square's root (m, outputs)."""
-    pairs, outputs = edges(points.shape[1]), heights.shape[1]
-    tree, beyond = cKDTree(points), _beyond(corners)
-    bend, misfit = np.empty((len(corners), len(pairs), outputs)), np.empty((len(corners), outputs))
-    for start in range(0, len(corners), BATCH):
-        some = slice(start, start + BATCH)
-        bend[some], misfit[some] = _of_batch(points, heights, corners[some], beyond[some], tree, pairs)
-    return bend, misfit
+def renewed(before: Parabolas | None, points: Array, heights: Array, corners: Indices) -> Parabolas:
+    """Parabolas over simplices (m, axes + 1) of points (n, axes), fitted anew where cells around are not as before.
+
+    Points and heights (n,) that were there before are the first ones, and the same.
+    """
+    around = with_beyond(corners)
+    if before is None:
+        return parabolas(points, heights, around)
+    here, there = _unchanged(before, points, around)
+    fresh = np.setdiff1d(np.arange(len(around)), here)
+    found = parabolas(points, heights, around[fresh])
+    place = np.argsort(np.concatenate([here, fresh]))
+    reach, bend, misfit = (
+        np.concatenate([old[there], new])[place] for old, new in zip(before[1:4], found[1:4], strict=True)
+    )
+    return Parabolas(around, reach, bend, misfit, len(points))
 
 
-def _beyond(corners: Indices) -> Indices:
-    """Corners that lie beyond the faces of each simplex, and beyond those of its neighbours there; where there are
-    none, its first one. However thin simplices are, some lie to every side."""
+def _unchanged(before: Parabolas, points: Array, around: Indices) -> tuple[Indices, Indices]:
+    """Numbers now, and before, of simplices with the same corners and corners beyond, and no new cell nearer."""
+    mix = MIX[: around.shape[1]]
+    _, here, there = np.intersect1d(around @ mix, before.around @ mix, return_indices=True)
+    same = (around[here] == before.around[there]).all(axis=1)
+    here, there = here[same], there[same]
+    if before.cells < len(points):
+        centres = _centres(points, around[here])
+        far = cKDTree(points[before.cells :]).query(centres)[0] > before.reach[there]
+        here, there = here[far], there[far]
+    return here, there
+
+
+def parabolas(points: Array, heights: Array, around: Indices) -> Parabolas:
+    """Parabolas over simplices with these corners, and those beyond."""
+    tree, pairs = cKDTree(points), edges(points.shape[1])
+    batches = np.split(around, range(BATCH, len(around), BATCH))
+    found = [_of_batch(points, heights, batch, tree, pairs) for batch in batches]
+    reach, bend, misfit = (np.concatenate(column) for column in zip(*found, strict=True))
+    return Parabolas(around, reach, bend, misfit, len(points))
+
+
+def with_beyond(corners: Indices) -> Indices:
+    """Corners of each simplex, those beyond its faces, and those beyond its neighbours' there; where there are none,
+    its first one. However thin simplices are, some lie to every side."""
     count, size = corners.shape
     faces = np.stack([np.delete(corners, k, axis=1) for k in range(size)], axis=1).reshape(-1, size - 1)
     faces.sort(axis=1)
@@ -119,58 +150,57 @@ def _beyond(corners: Indices) -> Indices:
     other = other.reshape(count, size)
     opposite = np.where(other < 0, corners[:, :1], corners.ravel()[other])
     neighbour = np.where(other < 0, np.arange(count)[:, None], other // size)
-    return np.concatenate([opposite, opposite[neighbour].reshape(count, -1)], axis=1)
+    return np.concatenate([corners, opposite, opposite[neighbour].reshape(count, -1)], axis=1)
 
 
-def _cut_longest(points: Array, corners: Indices, pairs: Indices) -> Errors:
-    longest = lengths(points, corners, pairs).argmax(axis=1)
-    return Errors(np.full(len(corners), np.inf), pairs[longest, 0], pairs[longest, 1])
-
-
-def lengths(points: Array, corners: Indices, pairs: Indices) -> Array:
+def lengths(points: Array, corners: Indices) -> Array:
     """Of all edges (m, pairs)."""
-    apart = points[corners[:, pairs[:, 0]]] - points[corners[:, pairs[:, 1]]]
-    found: Array = np.sqrt((apart**2).sum(axis=2))
+    ends = points[corners[:, edges(points.shape[1])]]
+    found: Array = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
     return found
 
 
+def largest(corners: Indices, of_edges: Array) -> Indices:
+    """The edges (m, 2) where something (m, pairs) is largest."""
+    pair = edges(corners.shape[1] - 1)[of_edges.argmax(axis=1)]
+    return np.take_along_axis(corners, pair, 1)
+
+
 def _of_batch(
-    points: Array, heights: Array, corners: Indices, beyond: Indices, tree: cKDTree, pairs: Indices
-) -> tuple[Array, Array]:
+    points: Array, heights: Array, around: Indices, tree: cKDTree, pairs: Indices
+) -> tuple[Array, Array, Array]:
     axes = points.shape[1]
-    place = points[corners]
-    centre = place.mean(axis=1)
+    corners = around[:, : axes + 1]
     number = min(len(points), axes + 1 + AROUND.get(axes, 2 * len(pairs)))
-    near = np.concatenate([tree.query(centre, number)[1], beyond], axis=1)
-    shares = _shares(place, points[near])
-    off = heights[near] - np.einsum("sni,sio->sno", shares, heights[corners])
+    distance, nearest = tree.query(_centres(points, around), number)
+    near = np.concatenate([nearest, around[:, axes + 1 :]], axis=1)
+    shares = _shares(points[corners], points[near])
+    off = heights[near] - (shares @ heights[corners][:, :, None])[:, :, 0]
     basis = shares[:, :, pairs[:, 0]] * shares[:, :, pairs[:, 1]]
     weight = 1 / np.maximum(abs(basis).sum(axis=2), LEAST_BASIS)
     weight[(near[:, :, None] == corners[:, None, :]).any(axis=2)] = 0.0
-    return _parabola(basis, off, weight)
+    reach = distance[:, -1] if number < len(points) else np.full(len(around), np.inf)
+    return reach, *_parabola(basis, off, weight)
 
 
-def _shortest(bends: Array, length: Array) -> Indices:
-    """Of the edges that bend nearly as much as any, the shortest: a diagonal bends as its sides do, which lie along
-    the axes that need a cut."""
-    nearly = bends >= NEARLY * bends.max(axis=1, keepdims=True)
-    found: Indices = np.where(nearly, length, np.inf).argmin(axis=1)
+def _centres(points: Array, around: Indices) -> Array:
+    found: Array = points[around[:, : points.shape[1] + 1]].mean(axis=1)
     return found
 
 
 def _shares(place: Array, near: Array) -> Array:
     """Barycentric coordinates (m, n, axes + 1) of points in simplices."""
-    inverse = np.linalg.inv((place[:, 1:] - place[:, :1]).transpose(0, 2, 1))
-    rest = np.einsum("sij,snj->sni", inverse, near - place[:, :1])
+    rest = (near - place[:, :1]) @ np.linalg.inv(place[:, 1:] - place[:, :1])
     return np.concatenate([1 - rest.sum(axis=2, keepdims=True), rest], axis=2)
 
 
 def _parabola(basis: Array, off: Array, weight: Array) -> tuple[Array, Array]:
-    """The c_ij (m, pairs, outputs) of (1) by weighted least squares, and what they leave, a mean square's root."""
-    left, right = basis * weight[:, :, None], off * weight[:, :, None]
-    square = np.einsum("snp,snq->spq", left, left)
+    """The c_ij (m, pairs) of (1) by weighted least squares, and what they leave, a mean square's root."""
+    left, right = basis * weight[:, :, None], (off * weight)[:, :, None]
+    turned = left.transpose(0, 2, 1)
+    square = turned @ left
     ridge = RIDGE * np.trace(square, axis1=1, axis2=2)[:, None, None] / square.shape[1] + 1e-300
-    bend = np.linalg.solve(square + ridge * np.eye(square.shape[1]), np.einsum("snp,sno->spo", left, right))
-    rest = right - np.einsum("snp,spo->sno", left, bend)
-    misfit: Array = np.sqrt((rest**2).sum(axis=1) / np.maximum((weight > 0).sum(axis=1), 1)[:, None])
-    return bend, misfit
+    bend = np.linalg.solve(square + ridge * np.eye(square.shape[1]), turned @ right)
+    rest = (right - left @ bend)[:, :, 0]
+    misfit: Array = np.sqrt((rest**2).sum(axis=1) / np.maximum((weight > 0).sum(axis=1), 1))
+    return bend[:, :, 0], misfit

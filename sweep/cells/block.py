@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from sweep.cells.compiling import Compiling
+from sweep.cells.compiling import Compiling, work_clock
 from sweep.cells.grid import Grid, empty_cells
 from sweep.cells.guard import told
 from sweep.cells.output_schema import part_columns
@@ -115,12 +115,12 @@ def sampled_study(study: Study, compiling: Compiling | None = None) -> Sample:
     from sweep.cells.solve import Solver
 
     compiling = compiling or Compiling(study.kernel, study.kernel_name)
-    sample = sampled_by(Solver(replace(study, kernel=compiling.kernel)), study)
+    sample = sampled_by(Solver(replace(study, kernel=compiling.kernel)), study, work_clock)
     compiling.remember()
     return sample
 
 
-def sampled_by(solver: SolveCells, study: Study, clock: Callable[[], float] | None = None) -> Sample:
+def sampled_by(solver: SolveCells, study: Study, clock: Callable[[], float]) -> Sample:
     """A timed sample of the grid, by the seconds of a clock. Raises SweepError where the kernel always fails."""
     with faults_reported(f"{study.kernel_name}: the kernel failed"):
         warm(solver, study)
@@ -131,12 +131,13 @@ def sampled_by(solver: SolveCells, study: Study, clock: Callable[[], float] | No
 
 
 def warm(solver: SolveCells, study: Study) -> None:
-    """Solves a few cells spread over the grid: what they need is compiled before threads start.
+    """Solves a cell, or by several methods some spread over the grid: what they need is compiled before threads start.
 
     Corners come last, where cells are bad most often.
     """
     last = row_blocks(study).size - 1
-    for index in dict.fromkeys((last // 2, 0, last)):
+    several = study.method == "auto" or "method" in study.axes
+    for index in dict.fromkeys((last // 2, 0, last) if several else (last // 2,)):
         with tolerated():
             solver.solve(index, empty_cells(study, 1))
 

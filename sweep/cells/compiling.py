@@ -10,11 +10,13 @@ import contextlib
 import functools
 import json
 import os
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from kernels.interface import Kernel, is_kept, machine_code_folder
@@ -26,6 +28,46 @@ TABLE = "compile_seconds.json"
 """File beside the folders of machine code."""
 
 _called: set[int] = set()
+
+
+class WorkClock:
+    """Seconds of this process in which numba neither compiled, nor loaded what it has compiled before.
+
+    Attributes
+    ----------
+    flag : number with a `value`
+        How many compilations, one for another, are going on; others may look at it.
+    """
+
+    def __init__(self, flag: Any = None) -> None:
+        self.flag = SimpleNamespace(value=0) if flag is None else flag
+        self._compiling, self._begun, self._watched = 0.0, 0.0, False
+
+    def __call__(self) -> float:
+        self.watch()
+        return time.perf_counter() - self._compiling
+
+    def watch(self) -> None:
+        """From now on, if numba is loaded."""
+        event: Any = sys.modules.get("numba.core.event")
+        if event is not None and not self._watched:
+            actions = {"on_start": self._start, "on_end": self._end}
+            listener = type("Listener", (event.Listener,), {name: staticmethod(f) for name, f in actions.items()})
+            event.register("numba:compiler_lock", listener())
+            self._watched = True
+
+    def _start(self, event: Any) -> None:
+        self._begun = self._begun if self.flag.value else time.perf_counter()
+        self.flag.value += 1
+
+    def _end(self, event: Any) -> None:
+        self.flag.value -= 1
+        if not self.flag.value:
+            self._compiling += time.perf_counter() - self._begun
+
+
+work_clock = WorkClock()
+"""That of this process."""
 
 
 class Compiling:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -25,8 +25,8 @@ SHARE = 0.005
 """or this share of the run, where that is more."""
 PROBE_SECONDS = 3e-4
 """A probe as long as this sees past the cost of a call, and 64 of them take a few hundredths of a second."""
-SUSPECT = 0.01
-"""Seconds of a probe that may hold the compilation of a method met for the first time."""
+DEAR = 0.01
+"""Seconds of a probe that is not made twice: what is met for the first time matters little in it."""
 PLACES = 8
 """Places that are tried in turn where a probe of the middle fails."""
 MOST_FAILED = 16
@@ -88,25 +88,23 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
     if not probes:
         raise probing.fault
     places = sorted(probes)
-    costs, status, used = zip(*(probes[p] for p in places), strict=True)
-    return Sample(np.array(places), np.array(costs), cells, np.concatenate(status), np.concatenate(used), lanes)
+    costs = np.array([probes[place].seconds / cells for place in places])
+    status, used = (np.concatenate([probes[place].arrays[name] for place in places]) for name in (STATUS, METHOD_USED))
+    return Sample(np.array(places), costs, cells, status, used, lanes)
 
 
-def _probes(solver: _Probing, columns: Sequence[Column], size: int, cells: int) -> dict[int, tuple[float, Any, Any]]:
-    """Seconds a cell, statuses and methods of probes of so many cells, by the cell that each begins with."""
+def _probes(probing: _Probing, columns: Sequence[Column], size: int, cells: int) -> dict[int, Probe]:
+    """Probes of so many cells, by the cell that each begins with; a dear one that was made before is among them."""
     count = max(1, min(POSITIONS, size // (4 * cells)))
-    arrays = {column.name: column.empty(cells) for column in columns}
-    probes: dict[int, tuple[float, Any, Any]] = {}
-    spent = 0.0
-    for index in _scattered(count):
-        start = _place(index, count, cells, size)
-        usual = cells * float(np.median([p[0] for p in probes.values()])) if probes else 0.0
-        seconds = _timed(solver, arrays, start, usual)
-        if math.isfinite(seconds):
-            probes[start] = seconds / cells, arrays[STATUS].copy(), arrays[METHOD_USED].copy()
-        spent += seconds if math.isfinite(seconds) else FAILED_PROBE
+    probes = dict(probing.dear.get(cells, {}))
+    spent = sum(probe.seconds for probe in probes.values())
+    for start in (_place(index, count, cells, size) for index in _scattered(count)):
         if probes and spent > max(BUDGET, SHARE * spent / (len(probes) * cells) * size):
             break
+        probe = probing.probe(start, columns, cells)
+        if probe is not None:
+            probes[start] = probe
+        spent += FAILED_PROBE if probe is None else probe.seconds
     return probes
 
 
@@ -131,65 +129,76 @@ def row_partition(sample: Sample, rows: RowBlocks, shape: tuple[int, ...], row_b
     return boxes(shape, math.ceil(blocks.cells / rows.mean), LANES if rows.mean == 1 else 1)
 
 
-def _probe_cells(solver: _Probing, columns: Sequence[Column], size: int) -> tuple[int, bool | None]:
+def _probe_cells(probing: _Probing, columns: Sequence[Column], size: int) -> tuple[int, bool | None]:
     """Cells a probe: few enough for 64 probes in the budget, enough to see past the cost of a call.
 
     Where single cells are dear and few, also whether two take as long as one: then 32 will.
     """
     cells = 1
     while True:
-        seconds = _probe(solver, columns, size, cells)
+        seconds = _probe(probing, columns, size, cells)
         more = LANES if cells == 1 else 4 * cells
         dear = seconds > PROBE_SECONDS
         worth_a_look = cells == 1 and (seconds < BUDGET / 4 or more * 50 < size)
         few = size < (4 if cells == 1 else POSITIONS) * more
         if cells == 1 and dear and (few or not worth_a_look) and size > 1:
-            lanes = _probe(solver, columns, size, 2) < 1.5 * seconds
+            lanes = _probe(probing, columns, size, 2) < 1.5 * seconds
             return (max(1, min(LANES, size // 4)), True) if lanes else (1, False)
         if few or (dear and not worth_a_look):
             return cells, None
         cells = more
 
 
-def _probe(solver: _Probing, columns: Sequence[Column], size: int, cells: int) -> float:
+def _probe(probing: _Probing, columns: Sequence[Column], size: int, cells: int) -> float:
     """Seconds that some cells in the middle of the grid take together, or elsewhere, where these fail."""
-    arrays = {column.name: column.empty(cells) for column in columns}
     for start in [_place(0, 1, cells, size), *(_place(index, PLACES, cells, size) for index in _scattered(PLACES))]:
-        seconds = min(_timed(solver, arrays, start) for _ in range(2 if cells == 1 else 1))
-        if math.isfinite(seconds):
-            break
-    return seconds
+        probe = probing.probe(start, columns, cells)
+        if probe is not None and cells == 1 and probe.seconds < DEAR:
+            probe = probing.probe(start, columns, cells) or probe
+        if probe is not None:
+            return probe.seconds
+    return math.inf
 
 
-def _timed(solver: _Probing, arrays: dict[str, Any], start: int, usual: float = 0.0) -> float:
-    """Seconds to solve the cells; taken again where a method may have been compiled or loaded meanwhile.
+class Probe(NamedTuple):
+    """Some cells, solved together."""
 
-    `usual`: seconds that other probes took.
-    """
-    seconds = solver.seconds(start, arrays)
-    slow = max(SUSPECT, 4 * usual) < seconds < math.inf
-    return min(seconds, solver.seconds(start, arrays)) if slow else seconds
+    seconds: float
+    arrays: dict[str, Any]
 
 
 class _Probing:
-    """Times cells; infinite where the kernel fails."""
+    """Makes probes.
+
+    Attributes
+    ----------
+    dear : dict
+        The last dear one of so many cells, by the cell that it begins with.
+    fault : Exception
+        Why the last one that failed did.
+    """
 
     def __init__(self, solver: SolveCells, clock: Clock) -> None:
         self._solver, self._clock = solver, clock
         self._good, self._failed = False, 0
+        self.dear: dict[int, dict[int, Probe]] = {}
         self.fault: Exception = RuntimeError("no cell was tried")
 
-    def seconds(self, start: int, arrays: Mapping[str, Any]) -> float:
-        cells = cells_of(arrays)
+    def probe(self, start: int, columns: Sequence[Column], cells: int) -> Probe | None:
+        """So many cells from one on; None where the kernel fails. Raises what it does where it always fails."""
+        arrays = {column.name: column.empty(cells) for column in columns}
         begun = self._clock()
         with tolerated() as faults:
-            self._solver.solve(start, cells)
+            self._solver.solve(start, cells_of(arrays))
+            probe = Probe(self._clock() - begun, arrays)
             self._good = True
-            return self._clock() - begun
+            if probe.seconds >= DEAR:
+                self.dear[cells] = {start: probe}
+            return probe
         self.fault, self._failed = faults[0], self._failed + 1
         if not self._good and self._failed >= MOST_FAILED:
             raise self.fault
-        return math.inf
+        return None
 
 
 @contextlib.contextmanager

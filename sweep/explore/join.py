@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -38,7 +38,7 @@ def join(
 
     They may differ in the values of one axis, which becomes longer; in one fixed parameter, method or rtol, which
     becomes an axis; or, told by `axis`, in nothing that a study says, such as the version that computed them. Cells
-    that are in both are to be the same bit for bit.
+    that are in both, points of a list or of refined results too, are to be the same bit for bit, and are kept once.
 
     Parameters
     ----------
@@ -180,35 +180,52 @@ def _new_axis(a: Study, b: Study, name: str) -> Axis:
 def _longer(a: Study, b: Study, results: Sequence[xr.Dataset], name: str) -> tuple[Study, xr.Dataset]:
     """Both, longer along an axis that both have; what is in both has to be the same."""
     if set(results[0][name].values.tolist()) & set(results[1][name].values.tolist()):
-        found = diff(results[0], results[1])
-        if found.statuses or any(distance.cells for distance in found.outputs.values()):
-            raise SweepError(f"the results do not fit together: cells that are in both differ\n{found}")
+        _require_same(*results)
     one, other = a.axes[name], b.axes[name]
     fresh = [k for k, label in enumerate(_keys(other)) if label not in set(_keys(one))]
     parts = [_numbers(results[0], a), _numbers(results[1], b).isel({name: fresh})]
     whole = xr.concat(parts, dim=name)
-    values = np.concatenate([one.values, other.values[fresh]])
-    words = None if one.words is None else (*one.words, *(str((other.words or ())[k]) for k in fresh))
-    order = np.arange(len(values)) if words else np.argsort(values, kind="stable")
-    axis = Axis(name, frozen(values[order]), "values", words)
+    axis = _appended(one, other, fresh)
+    order = np.arange(len(axis)) if axis.words else np.argsort(axis.values, kind="stable")
+    axis = replace(axis, values=frozen(axis.values[order]))
     return replace(a, axes={**a.axes, name: axis}), whole.isel({name: order})
 
 
+def _require_same(first: xr.Dataset, second: xr.Dataset) -> None:
+    """Raises SweepError where a cell that both have is not the same in both."""
+    found = diff(first, second)
+    if found.statuses or any(distance.cells for distance in found.outputs.values()):
+        raise SweepError(f"the results do not fit together: cells that are in both differ\n{found}")
+
+
 def _keys(axis: Axis) -> list[Any]:
-    return list(axis.words) if axis.words is not None else axis.values.tolist()
+    values = axis.words if axis.words is not None else axis.values.tolist()
+    return [tuple(value) if isinstance(value, list) else value for value in values]
 
 
 def _more_points(a: Study, b: Study, results: Sequence[xr.Dataset]) -> tuple[Study, xr.Dataset]:
-    """The points of one behind those of the other."""
+    """The points of one behind those of the other; what is in both has to be the same."""
     dim = next(iter(a.dims))
-    axes = {name: _appended(axis, b.axes[name]) for name, axis in a.axes.items()}
-    whole = xr.concat([_numbers(dataset, a) for dataset in results], dim=dim)
+    places = {point: place for place, point in enumerate(_cells(a))}
+    both = [(places[point], place) for place, point in enumerate(_cells(b)) if point in places]
+    shared = [dataset.isel({dim: list(of)}) for dataset, of in zip(results, zip(*both, strict=True), strict=False)]
+    if shared:
+        _require_same(*shared)
+    fresh = [place for place, point in enumerate(_cells(b)) if point not in places]
+    whole = xr.concat([_numbers(results[0], a), _numbers(results[1], b).isel({dim: fresh})], dim=dim)
+    axes = {name: _appended(axis, b.axes[name], fresh) for name, axis in a.axes.items()}
     return replace(a, design="zip", blocks=(), axes=axes), whole
 
 
-def _appended(a: Axis, b: Axis) -> Axis:
-    words = None if a.words is None or b.words is None else (*a.words, *b.words)
-    return Axis(a.name, frozen(np.concatenate([a.values, b.values])), "values", words)
+def _cells(study: Study) -> Iterable[tuple[Any, ...]]:
+    """The values of each point of a list."""
+    return zip(*(_keys(axis) for axis in study.axes.values()), strict=True)
+
+
+def _appended(a: Axis, b: Axis, places: Sequence[int]) -> Axis:
+    """An axis, and behind it the values at some places of another."""
+    words = None if a.words is None or b.words is None else (*a.words, *(b.words[k] for k in places))
+    return Axis(a.name, frozen(np.concatenate([a.values, b.values[places]])), "values", words)
 
 
 def _numbers(dataset: xr.Dataset, study: Study) -> xr.Dataset:

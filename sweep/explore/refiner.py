@@ -5,28 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels.interface import FIRST_REFUSAL, Status
-from sweep.analysis.mesh import Array, Indices, edges, interpolation_errors, simplices
-from sweep.analysis.metric import stretch
+from sweep.analysis.mesh import Array, Indices
 from sweep.analysis.scattered import Box, heights
 from sweep.cells.schema import ANCILLARY, STATUS
+from sweep.explore.judge import Judge, Judged
 from sweep.study.model import Axis, Study, frozen
 
 if TYPE_CHECKING:
     import xarray as xr
 
-LEVELS = {1: 20, 2: 10, 3: 6}
-"""How often a step of the first grid may be cut in two, by number of axes; a jump cannot be interpolated."""
-FEWEST_LEVELS = 4
-BORDER_LEVELS = {1: 10, 2: 5, 3: 3}
-"""How often, because a border between statuses passes through it; no value is right inside the last."""
-BESIDE_LEVELS = {1: 20, 2: 5, 3: 3}
-"""How often beside such a border: values may go to infinity there, which no number of cells follows."""
 SAME = 2.0**-40
 """Distance of places along an axis, from 0 to 1, that are the same."""
 
@@ -52,7 +44,7 @@ class Refinement:
     jumps : int
         Places where the tolerance is not met although edges are cut as often as is allowed.
     singular : int
-        Likewise, beside borders of statuses, where values go to infinity or bend without end.
+        Likewise, as near borders of statuses as these are known, where values go to infinity or bend without end.
     unseen : dict of str to str
         How far apart cells are along each axis, at most: nothing tells of a peak narrower than that.
     """
@@ -112,17 +104,21 @@ class Refiner:
         self.known = [dict(zip(_keys(t), v, strict=True)) for t, v in zip(self.points.T, self.values.T, strict=True)]
         self.first = len(self.points)
         product = output.study.design == "product"
-        self.steps = np.array([len(k) - 1 if product else self.first ** (1 / len(self.axes)) for k in self.known])
+        steps = np.array([len(k) - 1 if product else self.first ** (1 / len(self.axes)) for k in self.known])
+        self.judges = [Judge(steps) for _ in names]
 
     def refined(self) -> Refinement:
-        """Rounds of cuts, each of edges that share no end."""
+        """Rounds of cuts, each of edges that share no end, until nothing is to be cut however outputs are judged."""
         self._give_every_axis_a_middle()
         while True:
             found = self._judged()
             cuts = self._cuts(found)[: max(0, self.most - len(self.points))]
-            if not len(cuts):
+            if len(cuts):
+                self._solve(*self._middles(cuts))
+                continue
+            again = [judge.looks_anew(self.points) for judge in self.judges]
+            if not any(again):
                 return self._joined(found, complete=not (found.size > self.tolerance).any())
-            self._solve(*self._middles(cuts))
 
     def _give_every_axis_a_middle(self) -> None:
         """Between two values nothing tells whether an output bends."""
@@ -133,49 +129,14 @@ class Refiner:
                 points[:, k], values[:, k] = 0.5, self.box.values(k, np.array([0.5]))
                 self._solve(points, values)
 
-    def _judged(self) -> _Judged:
+    def _judged(self) -> Judged:
         """Errors over the simplices of each output, and borders between statuses that are to be cut."""
         kind = self._kinds()
-        found = [self._judged_output(kind, heights(self._column(name))) for name in self.names]
-        return _Judged(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
-
-    def _judged_output(self, kind: Indices, height: Array) -> _Judged:
-        """Errors over the simplices that have one status, in the box stretched to where the output bends."""
-        points = self.points @ stretch(self.points, height)
-        corners = simplices(points)
-        kinds = kind[corners]
-        alike = (kinds == kinds[:, :1]).all(axis=1)
-        size = np.zeros(len(corners))
-        ends = corners[:, :2].copy()
-        for number in np.unique(kind[kind >= 0]):
-            members, here = np.flatnonzero(kind == number), np.flatnonzero(alike & (kinds[:, 0] == number))
-            renumbered = np.searchsorted(members, corners[here])
-            errors = interpolation_errors(points[members], height[members, None], renumbered)
-            size[here] = errors.size
-            ends[here, 0] = corners[here, errors.first]
-            ends[here, 1] = corners[here, errors.second]
-        mixed = np.flatnonzero(~alike & (kinds >= 0).any(axis=1))
-        size[mixed], ends[mixed] = self._borders(corners[mixed], kinds[mixed])
-        beside = alike & np.isin(corners, corners[~alike]).any(axis=1)
-        axes = len(self.axes)
-        levels = np.where(beside, BESIDE_LEVELS.get(axes, 2), LEVELS.get(axes, FEWEST_LEVELS))
-        finest = self._extent(ends) <= 2.0**-levels
-        return _Judged(corners, size, ends, finest, alike & (kinds[:, 0] >= 0), beside)
-
-    def _borders(self, corners: Indices, kinds: Indices) -> tuple[Array, Indices]:
-        """Infinite where a border between statuses has longer edges than are left there; and these edges."""
-        pairs = edges(len(self.axes))
-        ends = corners[:, pairs]
-        length = np.where(kinds[:, pairs[:, 0]] != kinds[:, pairs[:, 1]], self._extent(ends), -1.0)
-        longest = length.argmax(axis=1)[:, None]
-        wide = np.take_along_axis(length, longest, 1)[:, 0] > 2.0 ** -BORDER_LEVELS.get(len(self.axes), 2)
-        return np.where(wide, math.inf, 0.0), np.take_along_axis(ends, longest[:, :, None], 1)[:, 0]
-
-    def _extent(self, ends: Indices) -> Array:
-        """Of edges (..., 2), in steps of the first grid along the axis where they are longest."""
-        apart = abs(self.points[ends[..., 0]] - self.points[ends[..., 1]]) * self.steps
-        found: Array = apart.max(axis=-1)
-        return found
+        found = [
+            judge.judged(self.points, heights(self._column(name)), kind)
+            for name, judge in zip(self.names, self.judges, strict=True)
+        ]
+        return Judged(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
 
     def _kinds(self) -> Indices:
         """Statuses, with those that rounding decides alike; -1 without a value."""
@@ -187,7 +148,7 @@ class Refiner:
     def _column(self, name: str) -> Any:
         return np.concatenate([part[name].values for part in self.parts])
 
-    def _cuts(self, found: _Judged) -> Indices:
+    def _cuts(self, found: Judged) -> Indices:
         """Edges to cut, worst first; none shares an end with one before, for a cut changes what is known there."""
         wanted = np.flatnonzero((found.size > self.tolerance) & ~found.finest)
         used = np.zeros(len(self.points), dtype=bool)
@@ -212,7 +173,7 @@ class Refiner:
         self.parts.append(_flat(self.output.solved(axes)))
         self.points, self.values = np.concatenate([self.points, points]), np.concatenate([self.values, values])
 
-    def _joined(self, found: _Judged, complete: bool) -> Refinement:
+    def _joined(self, found: Judged, complete: bool) -> Refinement:
         order = np.lexsort(self.values.T[::-1])
         axes = {
             name: Axis(name, frozen(column[order]), "values")
@@ -242,18 +203,6 @@ class Refiner:
             name: f"a factor {ratio[k]:.3g}" if self.box.logarithmic[k] else f"{width[k] * span[k]:.3g}"
             for k, name in enumerate(self.axes)
         }
-
-
-class _Judged(NamedTuple):
-    """Simplices: their corners, errors, the edges (m, 2) to cut, whether these are the finest allowed, whether all
-    corners have values and one status, whether they lie beside a border of statuses."""
-
-    corners: Indices
-    size: Array
-    ends: Indices
-    finest: NDArray[np.bool_]
-    valued: NDArray[np.bool_]
-    beside: NDArray[np.bool_]
 
 
 def _keys(places: Array) -> list[float]:

@@ -7,6 +7,7 @@ but friends reach it, or use its TLS. Of files, nothing is ever unpickled.
 from __future__ import annotations
 
 import contextlib
+import gc
 import logging
 import math
 import os
@@ -189,4 +190,6 @@ def _connected(address: Any) -> Any:
         return distributed.Client(**keys, timeout=CONNECT_SECONDS, set_as_default=False)
     except Exception as fault:
         reason = (str(fault).splitlines() or [type(fault).__name__])[0]
-        raise SweepError(f"cluster: no dask scheduler answers at {address} ({reason})") from fault
+    # the half-made client ends here and now: if it did while another one begins, each would wait for the other
+    gc.collect()
+    raise SweepError(f"cluster: no dask scheduler answers at {address} ({reason})")

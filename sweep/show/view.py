@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from sweep.analysis.loglog import is_logarithmic
-from sweep.analysis.scattered import Box, axes_of, interpolated
+from sweep.analysis.scattered import MOST_AXES, Box, axes_of, interpolated
 from sweep.results.statuses import flag_words
 from sweep.study.mistakes import did_you_mean
 from sweep.system.errors import SweepError
@@ -35,7 +35,7 @@ HARD_SPACE = "\u00a0"
 """Where no line is broken."""
 
 SIDE = 201
-"""Cells along the sides of a map of cells that lie anywhere."""
+"""Cells along the sides of a map of cells that lie anywhere; of more axes as many cells altogether."""
 
 ANCILLARY = ("status", "method_used", "error_bound")
 
@@ -86,7 +86,7 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
     """
     name = _output(dataset, y)
     if x is None:
-        dataset = _mapped(dataset)
+        dataset = evened(dataset, axes=2)
     x = _x(dataset[name], x, dataset["status"].dims if "status" in dataset else ())
     along = str(coordinate(dataset[name], x).dims[0])
     others = sorted((str(d) for d in dataset[name].dims if d != along), key=lambda d: -dataset.sizes[d])
@@ -108,15 +108,15 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
     )  # fmt: skip
 
 
-def _mapped(dataset: xr.Dataset) -> xr.Dataset:
-    """Cells of a refined result, which lie anywhere, as an even grid of two axes; the others at their middle."""
+def evened(dataset: xr.Dataset, axes: int = MOST_AXES) -> xr.Dataset:
+    """Cells of a refined result, which lie anywhere, as an even grid of its first axes; the others at their middle."""
     names = axes_of(dataset)
     if not names:
         return dataset
     box = Box.of({name: dataset[name].values for name in names})
-    even = np.linspace(0.0, 1.0, SIDE)
-    at = {name: box.values(k, even if k < 2 else even[SIDE // 2 : SIDE // 2 + 1]) for k, name in enumerate(names)}
-    return interpolated(dataset, at)
+    axes = min(axes, len(names))
+    even, middle = np.linspace(0.0, 1.0, round(SIDE ** (2 / axes))), np.array([0.5])
+    return interpolated(dataset, {name: box.values(k, even if k < axes else middle) for k, name in enumerate(names)})
 
 
 def _output(dataset: xr.Dataset, y: str | None) -> str:

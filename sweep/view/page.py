@@ -13,7 +13,8 @@ import xarray as xr
 from bokeh.events import RangesUpdate, Tap
 
 from kernels.interface import Status
-from sweep.show.view import View, coordinate, setting
+from sweep.cells.schema import STATUS
+from sweep.show.view import View, coordinate, evened, setting
 from sweep.system.errors import SweepError
 from sweep.view import region
 from sweep.view.picture import Picture, Scales, status_colour
@@ -38,13 +39,17 @@ class Page:
     """The view of one result in one browser window. `layout` is what panel serves."""
 
     def __init__(self, dataset: xr.Dataset, name: str) -> None:
-        self.dataset, self.name = dataset, name
+        self.dataset, self.name, values = evened(dataset), name, ["value", "local exponent"]
+        if self.dataset is not dataset:
+            title = f"{dataset.attrs.get('title') or name}: straight lines between its {dataset[STATUS].size:,} cells"
+            self.dataset, values = self.dataset.assign_attrs(title=title), ["value"]  # straight lines have no exponent
+        dataset = self.dataset
         names = outputs(dataset)
         if not names:
             raise SweepError(f"{name}: there is nothing to look at: no output runs along an axis of numbers")
         wide = {"sizing_mode": "stretch_width"}
         self.output = pn.widgets.Select(label="output", options=names, **wide)
-        self.shows = pn.widgets.RadioButtonGroup(options=["value", "local exponent"], **wide)
+        self.shows = pn.widgets.RadioButtonGroup(options=values, **wide)
         self.x = pn.widgets.Select(label="across the page", options=number_axes(dataset, names[0]), **wide)
         self.up = pn.widgets.Select(label="up the page", **wide)
         self.scales = {

@@ -1,10 +1,16 @@
 """Worked examples with libraries of the field: an inverse design by scipy, fits by xarray and lmfit."""
 
+import importlib
 import math
 
-import inverse_design
 import numpy as np
 import pytest
+
+
+@pytest.fixture(scope="module")
+def inverse_design():
+    """The study's module, which compiles a kernel where it is read: every worker reads this file, one runs it."""
+    return importlib.import_module("inverse_design")
 
 
 def swing(b, d, f, e):
@@ -13,19 +19,19 @@ def swing(b, d, f, e):
     return (angles[0] - angles[1]) / 2
 
 
-def test_the_machine_found_swings_as_wanted():
+def test_the_machine_found_swings_as_wanted(inverse_design):
     found = inverse_design.best()
     half = swing(inverse_design.MOTOR, inverse_design.ARM, found.f, found.e)
     assert half == pytest.approx(math.radians(15), rel=1e-10)
 
 
-def test_no_machine_of_that_amplitude_nearby_is_less_distorted():
+def test_no_machine_of_that_amplitude_nearby_is_less_distorted(inverse_design):
     found = inverse_design.best()
     grid = [inverse_design.distortion(f) for f in np.linspace(0.30, 0.70, 41)]
     assert found.thd <= min(grid) * (1 + 1e-9)
 
 
-def test_no_crank_swings_the_arm_that_far():
+def test_no_crank_swings_the_arm_that_far(inverse_design):
     assert math.isnan(inverse_design.crank(0.30, math.radians(80)))
     assert inverse_design.distortion(0.30, math.radians(80)) == math.inf
 

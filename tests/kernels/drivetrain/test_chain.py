@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from many_chains import natural_frequencies_of_all
 from mpmath import mp, mpc, mpf
 
 from kernels.drivetrain._chain import Scaled, refusal
-from kernels.drivetrain._chain_frequencies import natural_frequencies, natural_frequencies_of_all
+from kernels.drivetrain._chain_frequencies import natural_frequencies
 from kernels.drivetrain._chain_poles import _apart, _refined, damped_poles, modal_damping
 from kernels.drivetrain._chain_shapes import mode_shapes
 from kernels.drivetrain._dqds import _rotate, _shift, _split, _unknown

@@ -325,3 +325,9 @@ def test_the_promise_ends_where_the_rule_does():
     assert (np.diff(limit) > 0).all()
     assert limit[0] < 2e-14
     assert np.isinf(limit[3])
+
+
+@pytest.mark.parametrize(("n", "most"), [(4.5, 1e-12), (6.0, 1e-11), (8.0, 2e-10), (16.0, 1e-6)])
+def test_the_bound_of_steep_friction_is_no_larger_than_what_the_rule_misses(n, most):
+    _, (for_cycle, _, _), _ = solve(0.1, 0.1, 1.0, n, 0.0)
+    assert 4e-14 * (n / 4) ** 11 < for_cycle[0] < most

@@ -50,9 +50,22 @@ def run(code, cache, **more):
     return done.stdout.split()
 
 
-def test_a_second_process_finds_what_the_first_compiled(tmp_path):
-    assert run(PERIOD, tmp_path)[:2] == ["0", "0"]
-    assert run(PERIOD, tmp_path)[:2] == ["0", "1"]
+@pytest.fixture(scope="module")
+def compiled_once(tmp_path_factory):
+    """A folder in which a first process has kept what it compiled; to be copied by who changes it."""
+    folder = tmp_path_factory.mktemp("kept")
+    assert run(PERIOD, folder)[:2] == ["0", "0"]
+    return folder
+
+
+@pytest.fixture
+def filled(compiled_once, tmp_path):
+    """A copy of it, with the rights of its files."""
+    return shutil.copytree(compiled_once, tmp_path, dirs_exist_ok=True)
+
+
+def test_a_second_process_finds_what_the_first_compiled(filled):
+    assert run(PERIOD, filled)[:2] == ["0", "1"]
 
 
 def test_of_two_processes_at_a_time_one_compiles_and_the_other_waits(tmp_path):
@@ -111,12 +124,11 @@ def test_where_nothing_can_be_kept_processes_compile_side_by_side(tmp_path, monk
             assert cache._lock(third)
 
 
-def test_a_damaged_cache_is_compiled_again_and_mended(tmp_path):
-    run(PERIOD, tmp_path)
-    for path in tmp_path.rglob("*.nb?"):
+def test_a_damaged_cache_is_compiled_again_and_mended(filled):
+    for path in filled.rglob("*.nb?"):
         path.write_bytes(path.read_bytes()[:10])
-    assert run(PERIOD, tmp_path)[:2] == ["0", "0"]
-    assert run(PERIOD, tmp_path)[:2] == ["0", "1"]
+    assert run(PERIOD, filled)[:2] == ["0", "0"]
+    assert run(PERIOD, filled)[:2] == ["0", "1"]
 
 
 def test_where_there_can_be_no_cache_it_works_without(tmp_path):
@@ -179,11 +191,22 @@ print(status[0], sum(one.is_start for _, one in recorder.buffer))
 """Prints the status of a cell, and how many functions were compiled."""
 
 
-def test_what_is_written_for_a_scene_of_ones_own_is_compiled_once(tmp_path):
-    status, compiled = run(OWN_SCENE, tmp_path)
+@pytest.fixture(scope="module")
+def scene_kept(tmp_path_factory):
+    """A folder in which a process that lets everybody write has kept a scene of one's own."""
+    folder = tmp_path_factory.mktemp("scene")
+    before = os.umask(0)
+    try:
+        status, compiled = run(OWN_SCENE, folder)
+    finally:
+        os.umask(before)
     assert status == "0"
     assert int(compiled) > 0
-    assert run(OWN_SCENE, tmp_path) == ["0", "0"]
+    return folder
+
+
+def test_what_is_written_for_a_scene_of_ones_own_is_compiled_once(scene_kept):
+    assert run(OWN_SCENE, scene_kept) == ["0", "0"]
 
 
 @pytest.fixture(scope="module")
@@ -210,11 +233,10 @@ def hits_and_errors(cache, **more):
 
 @pytest.mark.parametrize("others", [0o020, 0o002])
 @pytest.mark.parametrize("which", ["foliot", "foliot/*"])
-def test_a_folder_that_others_may_write_to_is_not_used(tmp_path, which, others):
-    run(PERIOD, tmp_path)
-    (folder,) = tmp_path.glob(which)
+def test_a_folder_that_others_may_write_to_is_not_used(filled, which, others):
+    (folder,) = filled.glob(which)
     folder.chmod(0o700 | others)
-    (status, hits, used), said = hits_and_errors(tmp_path)
+    (status, hits, used), said = hits_and_errors(filled)
     assert (status, hits, used) == ("0", "0", "None")
     assert said.splitlines() == [
         f"foliot compiles without {folder}: it belongs to somebody else, or others may write to it"
@@ -222,16 +244,15 @@ def test_a_folder_that_others_may_write_to_is_not_used(tmp_path, which, others):
 
 
 @pytest.mark.parametrize("kind", ["*.nbi", "*.nbc"])
-def test_a_file_that_others_may_write_to_is_not_read(tmp_path, kind):
-    run(PERIOD, tmp_path)
-    (path,) = tmp_path.rglob(kind)
-    path.write_bytes(pickle.dumps(Trap(tmp_path / "sprung")))
+def test_a_file_that_others_may_write_to_is_not_read(filled, kind):
+    (path,) = filled.rglob(kind)
+    path.write_bytes(pickle.dumps(Trap(filled / "sprung")))
     path.chmod(0o620)
-    (status, hits, _), said = hits_and_errors(tmp_path)
+    (status, hits, _), said = hits_and_errors(filled)
     assert (status, hits) == ("0", "0")
     assert str(path) in said
-    assert not (tmp_path / "sprung").exists()
-    assert run(PERIOD, tmp_path)[:2] == ["0", "1"]
+    assert not (filled / "sprung").exists()
+    assert run(PERIOD, filled)[:2] == ["0", "1"]
 
 
 class Trap:
@@ -258,20 +279,15 @@ def test_a_folder_of_somebody_else_is_not_used(tmp_path, link):
     assert "belongs to somebody else" in said
 
 
-def test_what_is_kept_is_the_users_alone_whatever_the_umask(tmp_path):
-    before = os.umask(0)
-    try:
-        assert run(OWN_SCENE, tmp_path)[0] == "0"
-    finally:
-        os.umask(before)
-    kept = [tmp_path / "foliot", *(tmp_path / "foliot").rglob("*")]
+def test_what_is_kept_is_the_users_alone_whatever_the_umask(scene_kept):
+    kept = [scene_kept / "foliot", *(scene_kept / "foliot").rglob("*")]
+    assert len(kept) > 4
     assert not [path for path in kept if path.stat().st_mode & 0o077]
-    assert run(OWN_SCENE, tmp_path) == ["0", "0"]
 
 
-def test_a_scenes_module_is_never_run_from_its_file(tmp_path):
-    run(OWN_SCENE, tmp_path)
+def test_a_scenes_module_is_never_run_from_its_file(scene_kept, tmp_path):
+    shutil.copytree(scene_kept, tmp_path, dirs_exist_ok=True)
     (path,) = tmp_path.rglob("scene_*.py")
     assert not list(tmp_path.rglob("*.pyc"))
     path.write_text("raise SystemExit")
-    assert run(OWN_SCENE, tmp_path)[0] == "0"
+    assert run(OWN_SCENE, tmp_path) == ["0", "0"]

@@ -9,9 +9,7 @@ import sys
 
 import numpy as np
 import pytest
-import statsmodels.api as sm
 import xarray as xr
-from scipy.interpolate import CubicHermiteSpline
 
 import sweep
 from sweep.analysis.lines import KIND_WORDS
@@ -296,6 +294,8 @@ def test_without_statsmodels_the_message_names_the_extra():
 
 @pytest.mark.parametrize("n", [5, 12, 40])
 def test_the_farthest_point_is_that_of_fits_without_each(n):
+    import statsmodels.api as sm
+
     t = np.linspace(0, 1, n)
     fit = sm.OLS(2 * t + np.random.default_rng(n).standard_normal(n), sm.add_constant(t)).fit()
     wanted = abs(fit.get_influence().resid_studentized_external).max()
@@ -303,6 +303,8 @@ def test_the_farthest_point_is_that_of_fits_without_each(n):
 
 
 def test_the_integral_of_a_bend_is_interpolated_as_by_scipy():
+    from scipy.interpolate import CubicHermiteSpline
+
     rise, steep = np.arctan(GRID) + GRID / 50, 1 / (1 + GRID**2)
     v = np.concatenate([np.random.default_rng(3).uniform(GRID[0], GRID[-1], 500), GRID[[0, 7, -1]]])
     np.testing.assert_allclose(

@@ -66,6 +66,7 @@ def test_only_cells_that_fill_a_box_are_taken_for_such():
     assert axes_of(ds) == ["a", "b"]
     assert axes_of(ds.isel(cell=slice(1, None))) == []  # a corner is missing
     assert axes_of(ds.assign_coords(b=("cell", ds.a.values))) == []  # a curve
+    assert axes_of(ds.assign_coords(cell=np.arange(ds.sizes["cell"]))) == []  # the values of an axis
     with pytest.raises(SweepError, match="fill a box"):
         interpolated(ds.isel(cell=slice(1, None)), {"a": [1.0], "b": [1.0]})
     with pytest.raises(SweepError, match="expected values of a, b"):

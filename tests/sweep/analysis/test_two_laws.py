@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import sweep
-from sweep.analysis.two_laws import _reach
+from sweep.analysis.two_laws import HIGH, LOW, PLACE, _fit, _of_other_bends, _reach
 from sweep.system.errors import SweepError
 
 MU = np.geomspace(1e-3, 1e3, 61)
@@ -265,3 +265,16 @@ def test_missing_points_and_falling_axes_change_nothing():
 def test_what_cannot_be_fitted_is_said(y, keys, message):
     with pytest.raises(SweepError, match=message):
         sweep.fit_two_laws(y, **{"dim": "mu"} | keys)
+
+
+@pytest.mark.parametrize("low", [-1.0, 1.0])
+def test_intervals_over_other_bends_hold_those_of_the_fit(low):
+    t = np.log(MU)
+    z = np.log(broken(low)) + 1e-2 * np.random.default_rng(1).standard_normal(t.size)
+    numbers, off, jacobian = _fit(t, z)
+    reach = _reach(off, jacobian, 0.95)
+    places = [LOW, HIGH, PLACE]
+    for further in (1.0, 1e3):
+        low_end, high_end = _of_other_bends(t, z, off, numbers, further * reach, np.ones(reach.size), 0.95)
+        assert (low_end[places] <= (numbers - further * reach)[places]).all()
+        assert (high_end[places] >= (numbers + further * reach)[places]).all()

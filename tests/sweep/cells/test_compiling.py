@@ -10,13 +10,14 @@ import time
 from pathlib import Path
 from types import SimpleNamespace
 
+import numba
 import pytest
 import toy
 from toy_studies import build
 
 import sweep
 from sweep.cells import compiling
-from sweep.cells.compiling import Compiling
+from sweep.cells.compiling import Compiling, work_clock
 from sweep.explore.plan import Plan, plan
 
 ROOT = Path(__file__).parents[3]
@@ -124,3 +125,17 @@ def test_values_and_names_are_those_of_the_kernel_that_is_watched():
     assert watched.check.__name__ == toy.KERNEL.check.__name__
     assert [m.name for m in watched.methods] == [m.name for m in toy.KERNEL.methods]
     assert [m.bound is None for m in watched.methods] == [m.bound is None for m in toy.KERNEL.methods]
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="plain Python compiles nothing")
+def test_what_numba_compiles_is_no_work():
+    """Nor what is compiled for it; the clock goes on afterwards."""
+    inner = numba.njit(lambda x: x + 1.0)
+    outer = numba.njit(lambda x: inner(x) * 2.0)
+    began, worked = time.perf_counter(), work_clock()
+    assert outer(1.0) == 4.0
+    compiled = time.perf_counter() - began
+    assert work_clock() - worked < 0.2 * compiled
+    worked = work_clock()
+    time.sleep(0.01)
+    assert work_clock() - worked >= 0.01

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from sweep.cells.partition import Partition
+from sweep.cells.partition import Partition, boxes
 from sweep.cells.schema import Column
 from sweep.cells.timing import BLOCK_BYTES, LANES, MOST_BLOCKS, Sample, partition, take_sample
 
@@ -62,6 +62,13 @@ def test_a_dear_single_cell_is_taken_for_one_of_thirty_two_lanes():
     """One cell costs a lane kernel as much as 32; blocks of one cell would cost 32 times too much."""
     assert partition(sample(3.0, 10**5, cells=1), 10**5, 42, 2).cells == LANES
     assert partition(sample(3.0, 80, cells=1), 80, 42, 2).cells == 10
+
+
+@pytest.mark.parametrize("length", range(2, 40))
+def test_boxes_waste_a_tenth_at_most_whatever_is_wanted(length):
+    for wanted in range(1, length + 1):
+        cells = boxes((length,), wanted).cells
+        assert -(-length // cells) * cells <= 1.1 * length
 
 
 def test_the_last_block_weighs_less_for_it_is_shorter():
@@ -155,5 +162,12 @@ def test_few_dear_cells_are_told_from_lanes_by_two_of_them(monkeypatch, size, la
         assert blocks.cells == min(32, -(-size // 2))
     else:
         assert blocks.cells == max(1, min(20, size // 400))
-        # every probe is taken twice, lest something was compiled meanwhile
-        assert solver.now <= 0.05 * 18
+        assert solver.now < 0.05 * 10.5
+
+
+@pytest.mark.parametrize(("lanes", "probes"), [(True, 2), (False, 1 + 32)])
+def test_dear_cells_are_not_solved_twice_for_the_sample(monkeypatch, lanes, probes):
+    solver = calls(0.15, lanes, monkeypatch)
+    found = take_sample(solver, COLUMNS, 2048)
+    assert solver.now == pytest.approx(0.15 * probes)
+    assert found.cost == pytest.approx(0.15 / (32 if lanes else 1))

@@ -195,25 +195,29 @@ FOLIOT = sweep.build_study(
     fixed={"phi0": 0.5},
     rtol=1e-6,
 )
-WHOLE = solved(FOLIOT)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return solved(FOLIOT)
 
 
 @given(st.integers(0, 372), st.integers(0, 372))
-def test_any_range_of_cells_gives_the_same_bits(one, other):
+def test_any_range_of_cells_gives_the_same_bits(whole, one, other):
     start, stop = sorted((one, other))
     outputs, status, used = solved(FOLIOT, start, stop)
     for name, column in outputs.items():
-        assert np.array_equal(column, WHOLE[0][name][start:stop], equal_nan=True)
-    assert np.array_equal(status, WHOLE[1][start:stop])
-    assert np.array_equal(used, WHOLE[2][start:stop])
+        assert np.array_equal(column, whole[0][name][start:stop], equal_nan=True)
+    assert np.array_equal(status, whole[1][start:stop])
+    assert np.array_equal(used, whole[2][start:stop])
 
 
-def test_auto_takes_the_closed_form_of_the_foliot_outright():
+def test_auto_takes_the_closed_form_of_the_foliot_outright(whole):
     names = [m.name for m in FOLIOT.kernel.methods]
-    assert {names[u] for u in WHOLE[2].reshape(93, 4)[:90, 0]} == {"closed"}
-    assert set(WHOLE[1].reshape(93, 4)[90]) == {Status.BAD_INPUT}
-    assert WHOLE[1].reshape(93, 4)[92].tolist() == [Status.NEVER_STARTS] * 4
-    assert WHOLE[1].reshape(93, 4)[0, 1] == Status.NO_LIMIT_CYCLE
+    assert {names[u] for u in whole[2].reshape(93, 4)[:90, 0]} == {"closed"}
+    assert set(whole[1].reshape(93, 4)[90]) == {Status.BAD_INPUT}
+    assert whole[1].reshape(93, 4)[92].tolist() == [Status.NEVER_STARTS] * 4
+    assert whole[1].reshape(93, 4)[0, 1] == Status.NO_LIMIT_CYCLE
 
 
 def test_strips_join_without_a_seam():
@@ -249,13 +253,13 @@ def test_warming_up_reaches_both_ends_of_the_grid():
     assert seen == [50.0, 1.0, 100.0]
 
 
-def test_warming_up_changes_nothing():
+def test_warming_up_changes_nothing(whole):
     solver = Solver(FOLIOT)
     warm(solver, FOLIOT)
     outputs = {name: np.empty(372) for name in FOLIOT.outputs}
     status, used = np.empty(372, np.int8), np.empty(372, np.int8)
     solver.solve(0, Cells(outputs, status, used))
-    assert np.array_equal(outputs["period"], WHOLE[0]["period"], equal_nan=True)
+    assert np.array_equal(outputs["period"], whole[0]["period"], equal_nan=True)
 
 
 def test_auto_does_not_keep_an_inaccurate_value_while_a_method_is_left():

@@ -1,11 +1,14 @@
 """Two results as one, against the sweep of both."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from toy_studies import build
 
 import sweep
 from sweep.cli import main
+from sweep.study.model import Axis
 
 HEIGHTS = [1.0, 2.0, 4.0, 8.0]
 
@@ -50,6 +53,31 @@ def test_a_setting_or_a_fixed_parameter_becomes_an_axis(keys, name, values):
 def test_points_are_put_behind_each_other():
     halves = [of(design="zip", axes={"height": h, "v0": v}) for h, v in (([1.0, 2.0], [0.0, 1.0]), ([3.0], [2.0]))]
     same(sweep.join(*halves), of(design="zip", axes={"height": [1.0, 2.0, 3.0], "v0": [0.0, 1.0, 2.0]}))
+
+
+def test_points_that_are_in_both_are_kept_once():
+    parts = [
+        of(design="zip", axes={"height": h, "v0": v}) for h, v in (([1.0, 2.0], [0.0, 1.0]), ([2.0, 2.0], [2.0, 1.0]))
+    ]
+    same(sweep.join(*parts), of(design="zip", axes={"height": [1.0, 2.0, 2.0], "v0": [0.0, 1.0, 2.0]}))
+    parts[1].fall_time[1] *= 1 + 1e-12
+    with pytest.raises(sweep.SweepError, match=r"(?s)cells that are in both differ.*e\.g\. height=2 v0=1"):
+        sweep.join(*parts)
+
+
+def test_refined_results_that_share_a_border_are_joined_to_one_that_can_be_refined(tmp_path):
+    studies = [build(axes={"height": h, "v0": [1.0, 3.0, 9.0]}) for h in ([1.0, 4.0, 16.0], [16.0, 64.0, 256.0])]
+    parts = [sweep.refine(sweep.run(study), "fall_time", 5e-2, study=study).dataset for study in studies]
+    cells = [set(zip(p.height.values.tolist(), p.v0.values.tolist(), strict=True)) for p in parts]
+    assert len(cells[0] & cells[1]) >= 3
+    joined = sweep.join(*parts, tmp_path / "both.h5")
+    found = list(zip(joined.height.values.tolist(), joined.v0.values.tolist(), strict=True))
+    assert len(found) == len(set(found)) == len(cells[0] | cells[1])
+    own = dataclasses.replace(
+        studies[0], design="zip", axes={n: Axis(n, joined[n].values, "values") for n in studies[0].axes}
+    )
+    assert sweep.refine(joined, "fall_time", 5e-2, study=own).complete
+    assert sweep.join(parts[0], joined).sizes == joined.sizes
 
 
 def test_a_new_axis_has_labels_and_a_file_that_opens(tmp_path):

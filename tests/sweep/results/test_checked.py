@@ -225,6 +225,14 @@ def test_a_block_filled_with_zeros_is_pending(unfinished):
         assert np.isnan(found.fall_time.values.reshape(-1)[:4]).all()
 
 
+def test_single_cells_of_any_block_are_read_first(unfinished):
+    with sweep.open_result(unfinished) as whole:
+        expected = whole.status.values.reshape(-1)
+    for cell in range(0, expected.size, 2):
+        with StoredFile(unfinished_of(unfinished)) as file:
+            assert file.columns()["status"].cells(np.array([cell])) == expected[cell]
+
+
 def test_all_columns_of_a_block_are_checked_once(unfinished, monkeypatch):
     real, calls = Table.read, []
     monkeypatch.setattr(Table, "read", lambda self, *rest: (calls.append(rest[1:3]), real(self, *rest))[1])

@@ -14,7 +14,7 @@ from running import flip, interrupted, kept, place, quiet, same, tall
 import sweep
 from sweep.cli import main
 from sweep.results.verify import verify
-from sweep.store import probe
+from sweep.store import probe, reading
 from sweep.store.reading import StoredFile
 from sweep.store.store import Store, unfinished_of
 
@@ -64,6 +64,20 @@ def test_a_flipped_bit_in_an_output_is_told_with_its_cells(copy):
     flip(copy, place(copy, name, 2) + 1, bit=5)
     (found,) = verify(copy).findings
     assert found == f"{name}: damaged between its cells 0 and {step}"
+
+
+def test_a_file_that_is_cut_while_it_is_looked_at_is_broken(copy, monkeypatch):
+    real = reading.read_layout
+
+    def cut(fd, size):
+        layout = real(fd, size)
+        os.truncate(copy, 100)
+        return layout
+
+    monkeypatch.setattr(reading, "read_layout", cut)
+    fd = os.open(copy, os.O_RDONLY)
+    assert reading.unbroken(fd) is False
+    os.close(fd)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.3, 0.9, 0.999])

@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import gc
 import io
 import os
 import signal
@@ -124,10 +125,17 @@ def test_the_command_line_takes_an_address(address, output, read, capsys):
 @pytest.mark.parametrize("where", ["tcp://127.0.0.1:1", "nonsense", "", "tls://127.0.0.1:1", "missing.json"])
 def test_an_address_where_nobody_answers_is_one_clear_line(output, monkeypatch, where):
     monkeypatch.setattr(clusters, "CONNECT_SECONDS", 0.5)
+    before = clients()
     with pytest.raises(SweepError, match=r"^cluster: ") as told:
         elsewhere(tall(3), output, cluster=where)
     assert "\n" not in str(told.value)
     assert list(output.parent.iterdir()) == []
+    assert clients() == before  # one that is left to be collected later may hang what begins then
+
+
+def clients():
+    """How many clients there are."""
+    return sum(isinstance(found, clusters.distributed.Client) for found in gc.get_objects())
 
 
 def test_a_missing_package_is_told_with_its_cure(monkeypatch):

@@ -122,6 +122,12 @@ def test_mistakes_are_told(keys, message):
     assert message in mistakes(**keys)
 
 
+def test_an_empty_list_among_others_is_told_as_one_mistake():
+    found = mistakes(fixed={}, axes={"mass": [[], MASS]}, design="zip")
+    assert "axes.mass[0]" in found
+    assert "equal length" not in found
+
+
 def test_a_method_is_kept_out_where_it_lacks_an_output():
     assert set(sweep.run(beads()).method_used.values) == {1}
     assert set(sweep.run(beads(outputs=["total"])).method_used.values) == {0}

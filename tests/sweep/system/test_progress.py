@@ -62,6 +62,22 @@ def test_time_left_is_that_of_the_forecast(clock):
 
 
 @pytest.mark.parametrize(
+    ("left", "speeds"),
+    [
+        (12.5, "8 cells/s so far, 16 to come, "),
+        (17.5, "8 cells/s, "),
+        (35.0, "8 cells/s, "),
+        (50.0, "8 cells/s so far, 4 to come, "),
+    ],
+)
+def test_two_speeds_are_told_where_one_is_half_as_fast_again_as_the_other(clock, left, speeds):
+    progress = Progress(280, None, forecast=Left(left), clock=clock)
+    clock.now += 10
+    progress.add(80)
+    assert speeds in progress.line()
+
+
+@pytest.mark.parametrize(
     ("left", "off", "text"),
     [
         (960.0, 0.25, "16 min 00 s left"),

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +16,13 @@ import pytest
 
 import sweep
 
-pytest.importorskip("panel", reason="the extra view is not installed")
-webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
-from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
-
 ROOT = Path(__file__).parents[3]
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
-pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="chromium and chromedriver are not installed")
+pytestmark = [
+    pytest.mark.skipif(not find_spec("panel"), reason="the extra view is not installed"),
+    pytest.mark.skipif(not find_spec("selenium"), reason="selenium is not installed"),
+    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="chromium and chromedriver are not installed"),
+]
 
 FLAGS = (
     *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--window-size=1280,1100"),
@@ -42,6 +43,8 @@ def address(result):
 
 @pytest.fixture(scope="module")
 def page(address, tmp_path_factory):
+    from selenium import webdriver  # every worker reads this file, and one of them needs it
+
     options = webdriver.ChromeOptions()
     options.binary_location = CHROMIUM
     profile, downloads = tmp_path_factory.mktemp("profile"), tmp_path_factory.mktemp("downloads")
@@ -138,6 +141,8 @@ def click(driver, x, y):
         return [box.left + view.frame.x_scale.compute(arguments[0]), box.top + view.frame.y_scale.compute(arguments[1]),
                 window.innerWidth, window.innerHeight];
     """, x, y)  # fmt: skip
+    from selenium.webdriver.common.action_chains import ActionChains
+
     mouse = ActionChains(driver)
     mouse.w3c_actions.pointer_action.move_to_location(round(at[0]), round(at[1]))
     mouse.click().perform()

@@ -1,18 +1,25 @@
 """What the controls of the page do, without a browser."""
 
+from importlib.util import find_spec
+
 import numpy as np
 import pytest
 
 import sweep
 
-pytest.importorskip("panel", reason="the extra view is not installed")
-from sweep.view.page import ONE_LINE, Page
-from sweep.view.server import serve
+pytestmark = pytest.mark.skipif(not find_spec("panel"), reason="the extra view is not installed")
+
+
+def made(dataset, name):
+    """The page; panel is imported here, since every worker reads this file and one of them needs it."""
+    from sweep.view.page import Page
+
+    return Page(dataset, name)
 
 
 @pytest.fixture
 def page(dataset):
-    return Page(dataset, "map.h5")
+    return made(dataset, "map.h5")
 
 
 def shown_values(page):
@@ -38,7 +45,7 @@ def test_a_slider_shows_other_cells_and_keeps_the_figure(page, dataset):
 def test_any_two_axes_make_a_map_or_a_line(page, dataset):
     page.x.value = "R"
     assert (page.choice.across, list(page.sliders)) == ("mu", ["a"])
-    page.up.value = ONE_LINE
+    page.up.value = "(one line)"
     assert sorted(page.sliders) == ["a", "mu"]
     page.sliders["mu"].value = 40
     assert np.array_equal(page.picture.lines.data["ys"][0], dataset.period.isel(mu=40, a=1).values, equal_nan=True)
@@ -65,7 +72,7 @@ def test_a_zoom_reads_the_region_and_a_slider_keeps_it(page):
 
 
 def test_the_exponent_replaces_the_value(page, dataset):
-    page.up.value = ONE_LINE
+    page.up.value = "(one line)"
     page.sliders["R"].value = 0
     page.shows.value = "local exponent"
     expected = sweep.local_exponent(dataset.period.isel(R=0, a=1).load(), "mu").values
@@ -91,11 +98,13 @@ def test_a_click_shows_the_row_of_the_cell(page, dataset):
 
 def test_a_result_without_an_axis_of_numbers_is_refused(dataset):
     with pytest.raises(sweep.SweepError, match="nothing to look at"):
-        Page(dataset.isel(mu=0, R=0, a=0).load(), "point.h5")
+        made(dataset.isel(mu=0, R=0, a=0).load(), "point.h5")
 
 
 def test_a_port_that_is_taken_is_told(result):
     import socket
+
+    from sweep.view.server import serve
 
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
@@ -103,3 +112,40 @@ def test_a_port_that_is_taken_is_told(result):
         port = other.getsockname()[1]
         with pytest.raises(sweep.SweepError, match=f"port {port}"):
             serve(result, port=port, show=False)
+
+
+@pytest.fixture(scope="module")
+def refined():
+    axes = {n: {"spacing": "log", "start": 0.1, "stop": 10.0, "num": 4} for n in ("mu", "a", "phi0")}
+    ds = sweep.run(sweep.build_study(kernel="foliot", axes=axes, outputs=["period", "multiplier"]))
+    return sweep.refine(ds, "period", 5e-2).dataset
+
+
+def test_cells_of_a_refinement_are_shown_as_a_map_between_them(refined):
+    """P = f(mu / (a^2 phi0)) / a, and what is shown of it is as right as was asked."""
+    page = made(refined, "fine.h5")
+    assert (page.choice.x, page.choice.across, list(page.sliders)) == ("mu", "a", ["phi0"])
+    assert page.picture.mapped
+    assert page.dataset.period.size < 201**2
+    assert f"refined: straight lines between its {refined.sizes['cell']} cells" in page.dataset.title
+    page.sliders["phi0"].value = 5
+    at = {name: page.dataset[name].values for name in ("mu", "a")}
+    phi0 = float(page.dataset.phi0[5])
+    truth = sweep.run(sweep.build_study(kernel="foliot", axes=at, fixed={"phi0": phi0}, outputs=["period"])).period
+    np.testing.assert_allclose(page.found.y.values, truth.transpose("a", "mu").values, rtol=5e-2)
+
+
+def test_of_straight_lines_between_cells_no_local_exponent_is_offered(refined, page):
+    assert made(refined, "fine.h5").shows.options == ["value"]
+    assert page.shows.options == ["value", "local exponent"]
+
+
+def test_a_refined_cell_is_clicked_and_its_part_is_kept(refined):
+    page = made(refined, "fine.h5")
+    x, y = page.found.values("mu")[3], page.found.values("a")[4]
+    page._click(float(x), float(y))
+    assert f"{x:.17g}" in page.table.object
+    png, csv = (page.saves[suffix].callback() for suffix in ("png", "csv"))
+    assert png.read(4)[1:] == b"PNG"
+    assert len(csv.read().splitlines()) > 100
+    assert page.saves["toml"].disabled  # cells that lie anywhere are no grid

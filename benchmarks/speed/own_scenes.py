@@ -1,0 +1,206 @@
+# How much faster are three scenes, written as a user would write them, than heyoka.py, and on all cores than on one?
+"""A forced, damped pendulum, a van der Pol relay and a stick-slip oscillator; prints ratios of this run:
+
+python benchmarks/speed/own_scenes.py          (needs the extra `peers`)
+
+Ours is `taylor_once` of each scene. heyoka.py is in its best form, as in `taylor.py`: its scalar integrator with
+fast_math and one terminal event; where the oscillator sticks and where it slips its callback sets by hand. Truth is
+heyoka.py in 80 bits. Errors are the worst of the last switch's time and of a state there. Times are CPU seconds of the
+thread, the best of a few runs in turn. The last lines: whole runs on an uneven grid by `sweep.run`, on all cores
+against one, in seconds of the clock (to be believed on an idle machine only).
+"""
+
+from __future__ import annotations
+
+import os
+import time
+
+import numpy as np
+
+import sweep
+from kernels.codegen import followed_twice
+from kernels.codegen.module import build
+from kernels.scene import Field, cos, scene_kernel, scene_of, sin
+
+CELLS, THEIR_CELLS, JUDGED, FLIPS, ROUNDS = 32_000, 200, 20, 20, 3
+SPEED, PLACE = 1, 0
+
+
+def pendulum(x, v, phase, damping, force, omega):
+    """Counted where it hangs."""
+    return v, force * cos(phase) - damping * v - sin(x), omega
+
+
+def relay(x, v, side, eps, drive):
+    """Driven to the other side wherever x comes to 1 on this one."""
+    return v, eps * (1.0 - x * x) * v - x + side * drive
+
+
+def stick_slip(x, v, side, fall, kinetic):
+    """Side 1: carried along by the belt; side -1: slips, under a friction that falls with the speed."""
+    slips = 0.5 * (1.0 - side)
+    return v, slips * (kinetic + fall * v - x)
+
+
+def let_go_or_caught(x, v, side, belt, static):
+    sticks, slips = 0.5 * (1.0 + side), 0.5 * (1.0 - side)
+    return sticks * (static - x) + slips * (belt - v)
+
+
+def _scene(name, rates, surface, start, states, parameters):
+    fields = [tuple(Field(part, "1", part) for part in parts) for parts in (states, parameters)]
+    return {"name": name, "doc": name, "states": fields[0], "parameters": fields[1], "rates": rates,
+            "surface": surface, "start": start}  # fmt: skip
+
+
+PENDULUM = _scene(
+    "forced_pendulum", pendulum, lambda x, side: side * x, lambda: (1.5, 0.0, 0.0),
+    ("x", "v", "phase"), ("damping", "force", "omega"),
+)  # fmt: skip
+RELAY = _scene(
+    "van_der_pol_relay", relay, lambda x, side: 1.0 - side * x, lambda: (0.0, 0.0), ("x", "v"), ("eps", "drive")
+)
+STICK_SLIP = _scene(
+    "stick_slip_modes", stick_slip, let_go_or_caught, lambda belt: (0.0, belt),
+    ("x", "v"), ("belt", "fall", "kinetic", "static"),
+)  # fmt: skip
+KERNELS = {
+    scene["name"]: scene_kernel(**scene, example=dict.fromkeys((f.name for f in scene["parameters"]), 0.5))
+    for scene in (PENDULUM, RELAY, STICK_SLIP)
+}
+FORCED_PENDULUM, VAN_DER_POL_RELAY, STICK_SLIP_MODES = KERNELS.values()
+
+RANGES = {
+    "forced_pendulum": {"damping": (0.02, 0.1), "force": (0.05, 0.2), "omega": (0.6, 1.2)},
+    "van_der_pol_relay": {"eps": (0.1, 1.0), "drive": (0.2, 1.0)},
+    "stick_slip_modes": {"belt": (0.1, 0.4), "fall": (0.01, 0.1), "kinetic": (0.5, 0.8), "static": (1.0, 1.2)},
+}
+
+
+def cells(scene, n):
+    """Parameters, even within their ranges."""
+    random = np.random.default_rng(1)
+    return [random.uniform(*ends, n) for ends in RANGES[scene["name"]].values()]
+
+
+class Heyoka:
+    """heyoka.py following cells of a scene to their last switch."""
+
+    def __init__(self, scene, tolerance, kind=float):
+        import heyoka as hy
+
+        names = [field.name for field in scene["states"]]
+        u = dict(zip(names, hy.make_vars(*names), strict=True))
+        pars = {"side": hy.par[0]} | {f.name: hy.par[1 + j] for j, f in enumerate(scene["parameters"])}
+
+        def rates():
+            x, v = u["x"], u["v"]
+            if scene is PENDULUM:
+                push = pars["force"] * hy.cos(u["phase"]) - pars["damping"] * v - hy.sin(x)
+                return [(x, v), (v, push), (u["phase"], pars["omega"] + 0.0 * x)]
+            if scene is RELAY:
+                return [(x, v), (v, relay(x, v, **{k: pars[k] for k in ("side", "eps", "drive")})[1])]
+            return [(x, v), (v, stick_slip(x, v, pars["side"], pars["fall"], pars["kinetic"])[1])]
+
+        def surface():
+            if scene is PENDULUM:
+                return pars["side"] * u["x"]
+            if scene is RELAY:
+                return 1.0 - pars["side"] * u["x"]
+            return let_go_or_caught(u["x"], u["v"], pars["side"], pars["belt"], pars["static"])
+
+        self.count, self.kind, self.scene = [0], kind, scene
+        falls = hy.t_event(surface(), callback=self._stop(), direction=hy.event_direction.negative, fp_type=kind)
+        start = np.zeros(len(names), kind)
+        how = {"tol": kind(tolerance), "pars": np.zeros(len(pars), kind), "fast_math": kind is float, "fp_type": kind}
+        self.motion = hy.taylor_adaptive(rates(), start, t_events=[falls], **how)
+
+    def _stop(self):
+        count = self.count
+
+        def stop(motion, _):
+            count[0] += 1
+            motion.pars[0] = -motion.pars[0]
+            return count[0] < FLIPS
+
+        return stop
+
+    def follow(self, cell, judged):
+        named = dict(zip((f.name for f in self.scene["parameters"]), cell, strict=True))
+        start = self.scene["start"](**({"belt": named["belt"]} if "belt" in named else {}))
+        self.count[0], self.motion.time = 0, self.kind(0.0)
+        self.motion.state[:], self.motion.pars[:] = start, (1.0, *cell)
+        self.motion.reset_cooldowns()
+        self.motion.propagate_until(self.kind(1e6))
+        return self.motion.time, self.motion.state[judged]
+
+
+def theirs(follower, columns, judged, n=THEIR_CELLS):
+    """Cells per second, and times and states."""
+    chosen = list(zip(*(column[:n] for column in columns), strict=True))
+    begin = time.thread_time()
+    found = np.array([follower.follow(cell, judged) for cell in chosen])
+    return n / (time.thread_time() - begin), found
+
+
+def ours(module, columns, tolerance, judged):
+    outputs, status = [np.empty(CELLS) for _ in range(4)], np.empty(CELLS, np.int8)
+    begin = time.thread_time()
+    followed_twice.once(module, [*columns, np.full(CELLS, float(FLIPS))], np.full(CELLS, tolerance), outputs, status)
+    rate = CELLS / (time.thread_time() - begin)
+    assert not status[:JUDGED].any()
+    assert (status == 0).mean() > 0.99  # the pendulum may come to rest where it is counted
+    return rate, np.stack([outputs[0], outputs[2 + judged]], axis=1)
+
+
+def worst(found, truth):
+    return float(max(abs(found[: len(truth)] / truth - 1.0).ravel()))
+
+
+def compare(scene, judged, tolerances):
+    """Prints cells per second, ratio and errors."""
+    module, columns = build(scene_of(**scene, switch=None)), cells(scene, CELLS)
+    truth = theirs(Heyoka(scene, 1e-19, np.longdouble), columns, judged, JUDGED)[1]
+    for their, our in tolerances:
+        follower = Heyoka(scene, their)
+        runs = [lambda f=follower: theirs(f, columns, judged), lambda t=our: ours(module, columns, t, judged)]
+        runs[1]()
+        rounds = [[run() for run in runs] for _ in range(ROUNDS)]
+        best = [max((each[k] for each in rounds), key=lambda found: found[0]) for k in range(2)]
+        errors = " and ".join(f"{worst(found, truth):.1e}" for _, found in best)
+        print(
+            f"{scene['name']:20}{best[0][0]:10,.0f} cells/s {best[1][0]:10,.0f} cells/s "
+            f"{best[1][0] / best[0][0]:6.1f} times, errors {errors}",
+            flush=True,
+        )
+
+
+def cores(name):
+    """Seconds of a whole run on one core over those on all, where a cell has 4 to 400 switches; the median of a few."""
+    (first, low), *rest = RANGES[name].items()
+    study = sweep.build_study(
+        kernel=f"own_scenes:{name.upper()}", allow_import=True, method="taylor_once", rtol=1e-8,
+        axes={"flips": np.unique(np.floor(np.geomspace(4, 400, 60))), first: np.linspace(*low, 1200)},
+        fixed={other: 0.5 * sum(ends) for other, ends in rest},
+    )  # fmt: skip
+    workers, ratios = os.cpu_count() or 1, []
+    for k in range(ROUNDS + 1):  # compiled before it is timed
+        seconds = []
+        for number in (1, workers):
+            begin = time.perf_counter()
+            sweep.run(study, workers=number, progress=False)
+            seconds.append(time.perf_counter() - begin)
+        ratios += [seconds[0] / seconds[1]] * (k > 0)
+    return workers, float(np.median(ratios))
+
+
+def main():
+    compare(PENDULUM, SPEED, ((1e-8, 1e-9), (1e-12, 1e-13)))
+    compare(RELAY, SPEED, ((1e-8, 1e-9), (1e-12, 1e-13)))
+    compare(STICK_SLIP, PLACE, ((1e-8, 1e-9), (1e-12, 1e-13)))
+    for name in KERNELS:
+        print("{}: {} cores against one: {:.2f} times".format(name, *cores(name)), flush=True)
+
+
+if __name__ == "__main__":
+    main()
