@@ -172,3 +172,25 @@ def test_errors_that_cancel_and_grow_again_are_told(rates, rtol, flips, values):
     true = abs(results[[0, 3], 0] / truth - 1).max()
     assert true > rtol
     assert stated_error.STATED * error[0] > true
+
+
+@pytest.mark.skipif(not COMPILED, reason="asks for many cells")
+@pytest.mark.parametrize("rtol", [1e-5, 1e-8])
+def test_where_states_feed_back_the_error_is_the_true_one_and_its_spread_covers_what_it_lacks(rtol):
+    """Against the same motion at a thousandth of the tolerance."""
+    n = 400
+    random = np.random.default_rng(6)
+    columns = [
+        10.0 ** random.uniform(*decades, n) for decades in ((-0.5, 0.5), (-1, 0), (-2, -0.3), (-1, 0.3), (-2, 0.3))
+    ]
+    columns += [10.0 ** random.uniform(-1, 1, n), np.full(n, 4.0)]
+    names = ("mu", "phi0", "a", "k", "depth", "omega")
+    telling = stated_error.telling(Scene("p", "", ("x", "v", "t"), names, pendulum, surface, lambda: (0.0, 0.0, 0.0)))
+    coarse, error = followed_twice.told(telling, columns, *np.full((2, n), rtol))
+    fine, _ = followed_twice.told(telling, columns, *np.full((2, n), 1e-3 * rtol))
+    with np.errstate(invalid="ignore"):
+        true = abs(coarse[[0, 1, 3]] / fine[[0, 1, 3]] - 1).max(axis=0)
+    matters = (true > 0.1 * rtol) & (error < 100 * rtol)
+    ratio = error[matters] / true[matters]
+    assert np.quantile(ratio, 0.05) > 1.0
+    assert np.median(ratio) < 1.2
