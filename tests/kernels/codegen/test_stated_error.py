@@ -16,7 +16,7 @@ from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 from kernels.scene import Scene, sign, sin
 
-FLIPS = 12 if COMPILED else 3
+FLIPS = 12
 NAMES = [f.name for f in rich_scene.RICH.parameters if f.name != "flips"]
 SCENE = Scene(
     "rich", "foliot with every term", ("angle", "speed"), tuple(NAMES),
@@ -34,7 +34,7 @@ def told(cells, flips, rtol):
     )
 
 
-def drags(n=40 if COMPILED else 2):
+def drags(n=40 if COMPILED else 16):
     random = np.random.default_rng(4)
     mu, a, c = 10.0 ** random.uniform(-1, 1, n), 10.0 ** random.uniform(-1, 0, n), 10.0 ** random.uniform(-1, 0, n)
     return {"mu": mu, "phi0": np.ones(n), "a": a, "c": c}
