@@ -80,6 +80,16 @@ def test_two_trial_runs_tell_what_any_run_costs_from_what_cells_cost(fixed, each
     assert found == pytest.approx(fixed + 1000 * each if some > 1 else 1000 * (fixed + each))
 
 
+@pytest.mark.parametrize(("cells", "block"), [(40, 7), (12, 3), (2, 1)])
+def test_a_trial_of_the_whole_study_has_its_blocks_and_a_smaller_one_two_a_worker(tmp_path, monkeypatch, cells, block):
+    asked = []
+    monkeypatch.setattr("sweep.runs.run.run", lambda *given, **keys: (asked.append(keys), run(*given, **keys))[1])
+    study = stone(axes={"height": np.arange(1.0, 41)})
+    trial = calibration.Calibration(study, 40, block=7, cell_seconds=0.0, cell_bytes=0.0, workers=2)
+    trial._timed(thinned(study, cells), tmp_path / "trial.h5")
+    assert [keys["block_cells"] for keys in asked] == [block]
+
+
 @pytest.mark.parametrize("design", ["product", "zip"])
 @settings(max_examples=60, deadline=None)
 @given(lengths=st.lists(st.integers(1, 40), min_size=2, max_size=2), cells=st.integers(1, 2000))
