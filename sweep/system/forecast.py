@@ -36,7 +36,7 @@ FEW = 16
 """Of so many measured blocks, how far each was off its guess counts half for those around it."""
 FEWEST = 3
 """Blocks from which a spread can be told."""
-LONGER = 0.75
+LONGER = 0.5
 """Standard errors by which a forecast is made longer, for it is to err on the long side;"""
 EITHER_WAY = 3.0
 """and within which it is told to lie."""
