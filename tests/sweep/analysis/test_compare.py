@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.stats import chi2
 
 import sweep
+from sweep.analysis.correlated import criterion, deviance
 from sweep.analysis.shapes import BENDS, LAWS, curve, fitted
 from sweep.system.errors import SweepError
 
@@ -67,6 +69,19 @@ def test_known_errors_give_chi_squared_its_chance():
     assert float(right.chi_squared.sel(law="one law")) < 1e-6
     assert float(small.chi_squared.sel(law="two laws")) < 1e-6
     assert "none of them" in small.attrs["verdict"]
+    law = line(-0.5 * T + 0.02 * rng.standard_normal(X.size))
+    one = sweep.compare_laws(law, "x", sigma=0.02 * law).sel(law="one law")
+    slope = np.polynomial.Polynomial.fit(T, np.log(law), 1)
+    square = float((((np.log(law) - slope(T)) / 0.02) ** 2).sum())
+    assert float(one.chi_squared) == pytest.approx(chi2.sf(square, X.size - 2), rel=1e-6)
+
+
+def test_the_criterion_of_noise_that_remembers_counts_its_size_and_its_correlation():
+    z = -0.5 * T + 0.02 * np.random.default_rng(6).standard_normal(X.size)
+    columns, even = np.column_stack([np.ones(X.size), T]), np.ones(X.size)
+    k, n = 4, X.size  # level, slope, size of the noise, correlation
+    wanted = deviance(columns, z, even) + 2 * k + 2 * k * (k + 1) / (n - k - 1)
+    assert criterion(columns, z, even) == pytest.approx(wanted)
 
 
 def test_the_criterion_is_that_of_statsmodels():

@@ -349,6 +349,12 @@ def test_every_mistake_is_told(mistakes, text):
     assert what in found[where], found
 
 
+def test_edges_that_are_no_numbers_are_not_said_to_be_too_few_as_well(mistakes):
+    text = 'outputs.fall_time = ["histogram"]\nedges.fall_time = ["a", "b"]'
+    found = mistakes(f"axes.height = [1.0, 2.0]\n[summary]\n{text}\n")
+    assert not any("at least 2 edges" in what for what in found.values())
+
+
 def test_a_zip_is_reduced_as_a_whole(mistakes):
     found = mistakes('design = "zip"\naxes.height = [1.0, 2.0]\naxes.v0 = [1.0, 2.0]\n[summary]\nover = ["height"]\n')
     assert "are reduced together" in found["summary.over"]
