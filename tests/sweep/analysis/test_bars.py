@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 
 import sweep
+from sweep.analysis.correlated import averaged
 from sweep.analysis.lines import KIND_WORDS
 from sweep.analysis.loglog import slope_bounds
 from sweep.analysis.scatter import _farthest
@@ -320,3 +321,21 @@ def test_the_integral_of_a_bend_is_interpolated_as_by_scipy():
     np.testing.assert_allclose(
         _hermite(v, rise, steep), CubicHermiteSpline(GRID, rise, steep)(v), rtol=1e-10, atol=1e-10
     )
+
+
+@pytest.mark.parametrize("size", [1e-3, 10.0])
+def test_errors_of_noise_that_remembers_are_those_of_generalised_least_squares(size):
+    """Many points tell the correlation, .6, well; statsmodels is told it."""
+    import statsmodels.api as sm
+    from scipy.linalg import toeplitz
+
+    n, rng = 600, np.random.default_rng(8)
+    noise = np.zeros(n)
+    for i in range(1, n):
+        noise[i] = 0.6 * noise[i - 1] + rng.standard_normal()
+    columns = np.column_stack([np.ones(n), np.linspace(-1.0, 1.0, n)])
+    z = columns @ [0.5, -0.3] + size * noise
+    found = averaged(columns, z, 0.95, np.ones(n))
+    wanted = sm.GLS(z, columns, sigma=toeplitz(0.6 ** np.arange(n))).fit()
+    np.testing.assert_allclose(found.error, wanted.bse, rtol=0.15)
+    np.testing.assert_allclose(found.value, wanted.params, atol=0.1 * float(wanted.bse.max()))
