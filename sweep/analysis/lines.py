@@ -32,7 +32,6 @@ METHOD = (
 KIND_WORDS = ("exact", "bounded", "curved", "bent", "weighted", "any", *KINDS)
 """What distances from a line are; `kind` of a fit is a position in this list."""
 
-
 FIT_NAMES = {
     "exponent": "exponent of the power law",
     "exponent_error": "standard error of the exponent",

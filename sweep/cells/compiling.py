@@ -31,7 +31,7 @@ _called: set[int] = set()
 
 
 class WorkClock:
-    """Seconds of this process in which numba neither compiled, nor loaded what it has compiled before.
+    """Seconds of this process in which numba neither compiled, nor loaded what it has compiled before, in any thread.
 
     Attributes
     ----------
@@ -42,10 +42,13 @@ class WorkClock:
     def __init__(self, flag: Any = None) -> None:
         self.flag = SimpleNamespace(value=0) if flag is None else flag
         self._compiling, self._begun, self._watched = 0.0, 0.0, False
+        self._lock = threading.Lock()
 
     def __call__(self) -> float:
         self.watch()
-        return time.perf_counter() - self._compiling
+        with self._lock:
+            now = self._begun if self.flag.value else time.perf_counter()
+            return now - self._compiling
 
     def watch(self) -> None:
         """From now on, if numba is loaded."""
@@ -57,13 +60,17 @@ class WorkClock:
             self._watched = True
 
     def _start(self, event: Any) -> None:
-        self._begun = self._begun if self.flag.value else time.perf_counter()
-        self.flag.value += 1
+        with self._lock:
+            self._begun = self._begun if self.flag.value else time.perf_counter()
+            self.flag.value += 1
 
     def _end(self, event: Any) -> None:
-        self.flag.value -= 1
-        if not self.flag.value:
-            self._compiling += time.perf_counter() - self._begun
+        with self._lock:
+            if not self.flag.value:
+                return  # it began before it was watched
+            self.flag.value -= 1
+            if not self.flag.value:
+                self._compiling += time.perf_counter() - self._begun
 
 
 work_clock = WorkClock()

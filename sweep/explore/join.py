@@ -206,13 +206,14 @@ def _keys(axis: Axis) -> list[Any]:
 def _more_points(a: Study, b: Study, results: Sequence[xr.Dataset]) -> tuple[Study, xr.Dataset]:
     """The points of one behind those of the other; what is in both has to be the same."""
     dim = next(iter(a.dims))
+    first, second = results
     places = {point: place for place, point in enumerate(_cells(a))}
-    both = [(places[point], place) for place, point in enumerate(_cells(b)) if point in places]
-    shared = [dataset.isel({dim: list(of)}) for dataset, of in zip(results, zip(*both, strict=True), strict=False)]
+    here = [places.get(point) for point in _cells(b)]
+    shared = [place for place, there in enumerate(here) if there is not None]
     if shared:
-        _require_same(*shared)
-    fresh = [place for place, point in enumerate(_cells(b)) if point not in places]
-    whole = xr.concat([_numbers(results[0], a), _numbers(results[1], b).isel({dim: fresh})], dim=dim)
+        _require_same(first.isel({dim: [here[place] for place in shared]}), second.isel({dim: shared}))
+    fresh = [place for place, there in enumerate(here) if there is None]
+    whole = xr.concat([_numbers(first, a), _numbers(second, b).isel({dim: fresh})], dim=dim)
     axes = {name: _appended(axis, b.axes[name], fresh) for name, axis in a.axes.items()}
     return replace(a, design="zip", blocks=(), axes=axes), whole
 

@@ -39,11 +39,11 @@ class Page:
     """The view of one result in one browser window. `layout` is what panel serves."""
 
     def __init__(self, dataset: xr.Dataset, name: str) -> None:
-        self.dataset, self.name, values = evened(dataset), name, ["value", "local exponent"]
-        if self.dataset is not dataset:
+        self.name, values, even = name, ["value", "local exponent"], evened(dataset)
+        if even is not dataset:
             title = f"{dataset.attrs.get('title') or name}: straight lines between its {dataset[STATUS].size:,} cells"
-            self.dataset, values = self.dataset.assign_attrs(title=title), ["value"]  # straight lines have no exponent
-        dataset = self.dataset
+            even, values = even.assign_attrs(title=title), ["value"]  # straight lines have no exponent
+        self.dataset = dataset = even
         names = outputs(dataset)
         if not names:
             raise SweepError(f"{name}: there is nothing to look at: no output runs along an axis of numbers")

@@ -13,11 +13,12 @@ from types import SimpleNamespace
 import numba
 import pytest
 import toy
+from numba.core import event
 from toy_studies import build
 
 import sweep
 from sweep.cells import compiling
-from sweep.cells.compiling import Compiling, work_clock
+from sweep.cells.compiling import Compiling, WorkClock, work_clock
 from sweep.explore.plan import Plan, plan
 
 ROOT = Path(__file__).parents[3]
@@ -139,3 +140,18 @@ def test_what_numba_compiles_is_no_work():
     worked = work_clock()
     time.sleep(0.01)
     assert work_clock() - worked >= 0.01
+
+
+def test_the_clock_stands_still_while_another_thread_compiles_and_never_runs_back():
+    clock, kind = WorkClock(), "numba:compiler_lock"
+    clock.watch()
+    event.end_event(kind)  # of what began before
+    event.start_event(kind)
+    before = clock()
+    time.sleep(0.01)
+    assert clock() == before
+    event.end_event(kind)
+    after = clock()
+    assert before <= after < before + 0.01
+    time.sleep(0.01)
+    assert clock() >= after + 0.01
