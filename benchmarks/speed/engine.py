@@ -121,6 +121,18 @@ def two_cores(cells: int) -> None:
     print(f"  median {np.median(ratios):.2f}")
 
 
+def speedup(study: Study, rounds: int) -> tuple[int, float]:
+    """The cores, and seconds of a whole run on one of them over those on all; the median of some rounds."""
+    workers, ratios = os.cpu_count() or 1, []
+    sweep.run(study, workers=workers, progress=False)  # compiled before it is timed
+    for _ in range(rounds):
+        one, all_ = (
+            seconds(lambda number=number: sweep.run(study, workers=number, progress=False)) for number in (1, workers)
+        )
+        ratios.append(one / all_)
+    return workers, float(np.median(ratios))
+
+
 def small(folder: Path) -> None:
     """A study of a hundred cells: nearly all of it is the engine."""
     study = foliot("closed", 200)

@@ -12,10 +12,10 @@ against one, in seconds of the clock (to be believed on an idle machine only).
 
 from __future__ import annotations
 
-import os
 import time
 
 import numpy as np
+from engine import speedup
 
 import sweep
 from kernels.codegen import followed_twice
@@ -183,15 +183,7 @@ def cores(name):
         axes={"flips": np.unique(np.floor(np.geomspace(4, 400, 60))), first: np.linspace(*low, 1200)},
         fixed={other: 0.5 * sum(ends) for other, ends in rest},
     )  # fmt: skip
-    workers, ratios = os.cpu_count() or 1, []
-    for k in range(ROUNDS + 1):  # compiled before it is timed
-        seconds = []
-        for number in (1, workers):
-            begin = time.perf_counter()
-            sweep.run(study, workers=number, progress=False)
-            seconds.append(time.perf_counter() - begin)
-        ratios += [seconds[0] / seconds[1]] * (k > 0)
-    return workers, float(np.median(ratios))
+    return speedup(study, ROUNDS)
 
 
 def main():

@@ -16,12 +16,12 @@ uneven log grid (seconds of the clock: to be believed on an idle machine only).
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from pathlib import Path
 
 import numpy as np
+from engine import speedup
 
 import sweep
 from kernels.codegen import followed_twice, stated_error
@@ -198,15 +198,7 @@ def cores():
         axes={"flips": flips, "mu": np.geomspace(0.1, 10, 60), "c": np.geomspace(0.1, 1, 20)},
         fixed={"phi0": 1.0, "a": 0.3},
     )
-    workers, ratios = os.cpu_count() or 1, []
-    for k in range(ROUNDS + 1):  # compiled before it is timed
-        seconds = []
-        for number in (1, workers):
-            begin = time.perf_counter()
-            sweep.run(study, workers=number, progress=False)
-            seconds.append(time.perf_counter() - begin)
-        ratios += [seconds[0] / seconds[1]] * (k > 0)
-    return workers, float(np.median(ratios))
+    return speedup(study, ROUNDS)
 
 
 def main():

@@ -39,8 +39,8 @@ class WorkClock:
         How many compilations, one for another, are going on; others may look at it.
     """
 
-    def __init__(self, flag: Any = None) -> None:
-        self.flag = SimpleNamespace(value=0) if flag is None else flag
+    def __init__(self) -> None:
+        self.flag: Any = SimpleNamespace(value=0)
         self._compiling, self._begun, self._watched = 0.0, 0.0, False
         self._lock = threading.Lock()
 
