@@ -130,12 +130,12 @@ def test_an_address_where_nobody_answers_is_one_clear_line(output, monkeypatch, 
         elsewhere(tall(3), output, cluster=where)
     assert "\n" not in str(told.value)
     assert list(output.parent.iterdir()) == []
-    assert clients() == before  # one that is left to be collected later may hang what begins then
+    assert clients() <= before  # one that is left to be collected later may hang what begins then
 
 
 def clients():
-    """How many clients there are."""
-    return sum(isinstance(found, clusters.distributed.Client) for found in gc.get_objects())
+    """The clients there are; while this set lives, none of them ends."""
+    return {found for found in gc.get_objects() if isinstance(found, clusters.distributed.Client)}
 
 
 def test_a_missing_package_is_told_with_its_cure(monkeypatch):
