@@ -75,6 +75,8 @@ RANGES = {
     "van_der_pol_relay": {"eps": (0.1, 1.0), "drive": (0.2, 1.0)},
     "stick_slip_modes": {"belt": (0.1, 0.4), "fall": (0.01, 0.1), "kinetic": (0.5, 0.8), "static": (1.0, 1.2)},
 }
+WIDTHS = {"forced_pendulum": 14_000, "van_der_pol_relay": 14_000, "stick_slip_modes": 50_000}
+"""Cells along an axis of the runs on one core and on all: some seconds, beside which a run's start is short."""
 
 
 def cells(scene, n):
@@ -180,7 +182,7 @@ def cores(name):
     (first, low), *rest = RANGES[name].items()
     study = sweep.build_study(
         kernel=f"own_scenes:{name.upper()}", allow_import=True, method="taylor_once", rtol=1e-8,
-        axes={"flips": np.unique(np.floor(np.geomspace(4, 400, 60))), first: np.linspace(*low, 1200)},
+        axes={"flips": np.unique(np.floor(np.geomspace(4, 400, 60))), first: np.linspace(*low, WIDTHS[name])},
         fixed={other: 0.5 * sum(ends) for other, ends in rest},
     )  # fmt: skip
     return speedup(study, ROUNDS)

@@ -195,7 +195,7 @@ def cores():
         allow_import=True,
         method="taylor_once",
         rtol=1e-8,
-        axes={"flips": flips, "mu": np.geomspace(0.1, 10, 60), "c": np.geomspace(0.1, 1, 20)},
+        axes={"flips": flips, "mu": np.geomspace(0.1, 10, 60), "c": np.geomspace(0.1, 1, 200)},
         fixed={"phi0": 1.0, "a": 0.3},
     )
     return speedup(study, ROUNDS)
