@@ -41,7 +41,7 @@ def test_bootstrap_intervals_hold_the_truth():
 def test_a_cubic_and_both_exponents_take_six_numbers_of_few_points(monkeypatch):
     asked = []
     monkeypatch.setattr(collapse, "student", lambda freedom, _: asked.append(freedom) or 1.0)
-    found = sweep.fit_collapse(curves(1.5, 0.7, 0.02)[:2, 6:14], "x", "L", bootstrap=4)
+    found = sweep.fit_collapse(curves(1.5, 0.7, 0.02)[:2, ::4], "x", "L", bootstrap=4)
     assert int(found.points) < 16
     assert asked == [int(found.points) - 6]
 
