@@ -4,10 +4,11 @@ import math
 import subprocess
 import sys
 from decimal import Decimal
+from fractions import Fraction
 
 import pytest
 
-from sweep.study.units import KNOWN, UnitMistake, scale
+from sweep.study.units import KNOWN, UnitMistake, exponents, scale
 
 
 @pytest.mark.parametrize(
@@ -93,3 +94,17 @@ def test_malformed_units_are_refused_without_a_traceback(text):
 def test_strange_units_are_refused_too(text):
     with pytest.raises(UnitMistake):
         scale(text, "1", "x")
+
+
+@pytest.mark.parametrize(
+    ("text", "powers"),
+    [
+        ("rad/s^2", {"radian": 1, "second": -2}),
+        ("Hz", {"radian": 1, "second": -1}),
+        ("N m/rad", {"gram": 1, "meter": 2, "second": -2, "radian": -1}),
+        ("m^0.5", {"meter": Fraction(1, 2)}),
+        ("1", {}),
+    ],
+)
+def test_exponents_of_base_units(text, powers):
+    assert exponents(text) == powers
