@@ -101,7 +101,7 @@ def _listed(path: Path) -> Listed:
                 path=path,
                 question=attrs.get("question") or attrs.get("title", ""),
                 cells=cells.total,
-                done=1.0 - cells.pending / cells.total,
+                done=(cells.total - cells.pending) / cells.total,
                 statuses={count.name: count.cells for count in count_statuses(dataset)},
                 when=attrs.get("end", attrs.get("start", "")),
                 version=attrs.get("versions", "").partition(",")[0].removeprefix("foliot "),

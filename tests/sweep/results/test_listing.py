@@ -1,12 +1,15 @@
 """The results of a folder."""
 
 import shutil
+from pathlib import Path
 
 import pytest
 from toy_studies import build
 
 import sweep
 from sweep.cli import main
+from sweep.results.listing import HEADINGS, Listed, Listing
+from sweep.results.statuses import Account
 
 
 def test_results_are_listed_with_what_became_of_them(tmp_path, capsys):
@@ -53,3 +56,28 @@ def test_a_folder_without_results_and_none(tmp_path):
     shutil.rmtree(tmp_path)
     with pytest.raises(sweep.SweepError, match="no such folder"):
         sweep.list_results(tmp_path)
+
+
+def test_a_row_has_tenths_rounded_down_and_minutes():
+    statuses = {"OK": 1233, "PENDING": 1}
+    one = Listed(Path("a.h5"), "Why?", 1234, 1233 / 1234, statuses, "2026-01-02T03:04:05+0000", "0.1.0")
+    assert one.row == ("a.h5", "1,234", "99.9 %", "OK 1,233, PENDING 1", "2026-01-02T03:04", "0.1.0", "Why?")
+    assert Listed(Path("b.h5"), fault="no result").row == ("b.h5", "", "", "", "", "", "no result")
+    assert Listed(Path("c.h5"), done=1.0).row[1:4] == ("0", "100 %", "")
+    first, *rest = str(Listing([one])).splitlines()
+    assert first.split() == list(HEADINGS)
+    assert len(rest) == 1
+
+
+def test_the_share_that_is_done_is_not_told_a_tenth_too_low(tmp_path, monkeypatch):
+    """1 - 0.9 is less than 0.1 in float64."""
+    sweep.run(build(axes={"height": [1.0]}), tmp_path / "a.h5").close()
+    monkeypatch.setattr("sweep.results.listing.account", lambda _: Account(1, 0, 0, 0, 9))
+    (found,) = sweep.list_results(tmp_path)
+    assert (found.done, found.row[1:3]) == (0.1, ("10", "10 %"))
+
+
+def test_what_a_running_sweep_has_beside_its_output_is_listed_as_the_output(tmp_path):
+    for name in ("a.h5.parts", "b.nc.unfinished", "c.h5.parts.old", "d.txt.parts", ".h5.log"):
+        (tmp_path / name).write_text("")
+    assert [one.path.name for one in sweep.list_results(tmp_path)] == ["a.h5", "b.nc"]

@@ -36,6 +36,7 @@ def test_a_region_is_named_where_it_is_widest(axes):
     assert x == 3.5  # the middle of cell 4
     assert here[round(np.log2(y) - 0.5), 4]
     assert (text.get_text(), text.get_ha(), text.get_va()) == ("REFUSED", "center", "center")
+    assert (text.get_fontsize(), text.get_zorder()) == (7, 5)
 
 
 @pytest.mark.parametrize(("width", "named"), [(3, False), (5, True)])
@@ -129,9 +130,9 @@ def precision(**changes):
         "error_worst": [[1e-4, 1e-8], [1e-3, 1e-2], [1e-1, 90.0], [np.nan, np.nan]],
         "error_low": [[1e-6, 0.0], [1e-6, 1e-6], [1e-6, 1e-6], [np.nan, np.nan]],
         "error_high": [[1e-4, 1e-8], [1e-2, 9.0], [1e-1, 80.0], [np.nan, np.nan]],
-        "failed": [[0, 0], [2, 0], [0, 0], [5, 5]],
-        "inaccurate": [[0, 0], [0, 0], [0, 3], [0, 0]],
-        "silent": [[0, 0], [0, 0], [1, 0], [0, 0]],
+        "failed": [[0, 0], [0.2, 0], [0, 0], [1, 1]],
+        "inaccurate": [[0, 0], [0, 0], [0, 0.3], [0, 0]],
+        "silent": [[0, 0], [0, 0], [0.1, 0], [0, 0]],
     }
     attrs = {"reference": "exact", "reference_error": 2e-12, "cells": 9, "title": "A $ stone"}
     names = ["right", "shy", "liar", "idle"]
@@ -153,6 +154,16 @@ def test_filled_open_and_crossed_marks_are_where_cells_are_solved_refused_and_wr
     assert [line.get_color() for line in lines[::3]] == list(COLOURS[:3])
     assert [line.get_marker() for line in lines[::3]] == list(MARKS[:3])
     assert {line.get_markerfacecolor() for line in lines[1::3]} == {"white"}
+
+
+def test_looks_begin_anew_after_the_last(axes):
+    many = precision().isel(method=[0] * 9).assign_coords({"method": [f"m{k}" for k in range(9)]})
+    draw_precision(axes, many, "error_worst")
+    lines = axes.lines[::3]
+    assert [line.get_color() for line in lines] == [*COLOURS, *COLOURS[:2]]
+    assert [line.get_marker() for line in lines] == [*MARKS, MARKS[0]]
+    assert [str(line._dash_pattern) for line in lines[:4]] == [str(line._dash_pattern) for line in lines[4:8]]
+    assert [charts._look(k, False)["marker"] for k in (0, 1, 8, 9)] == [*MARKS[:2]] * 2
 
 
 def test_bars_reach_over_the_middle_of_the_cells_and_stay_in_the_chart(axes):

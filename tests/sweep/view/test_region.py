@@ -67,3 +67,46 @@ def test_too_many_cells_are_no_table(dataset, monkeypatch):
 def test_the_picture_is_a_picture(dataset):
     assert region.picture(dataset, MAP, None, None).getvalue().startswith(b"\x89PNG")
     assert region.picture(dataset, Choice("period", "mu", "R", {"a": 2}, exponent=True), None, None)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "found"),
+    [
+        (None, (1.0, 4.0)), ((2.0, 3.0), (2.0, 3.0)), ((3.0, 2.0), (2.0, 3.0)), ((0.0, 9.0), (1.0, 4.0)),
+        ((4.0, 9.0), (1.0, 4.0)), ((3.9, 9.0), (3.9, 4.0)), ((0.0, 1.0), (1.0, 4.0)), ((0.0, 1.1), (1.0, 1.1)),
+    ],
+)  # fmt: skip
+def test_a_range_beyond_the_cells_is_all_of_them(wanted, found):
+    assert region._clipped(np.array([1.0, 4.0, 2.0]), wanted) == found
+
+
+def test_a_refined_axis_has_a_hundred_and_one_points_or_as_many_as_before(dataset, tmp_path):
+    study = sweep.build_study(
+        kernel="foliot", axes={"mu": np.linspace(1, 2, 102), "a": [1.0, 2.0]}, fixed={"phi0": 1.0}
+    )
+    found = read(tmp_path, region.study_text(sweep.run(study, progress=False), Choice("period", "mu", "a"), None, None))
+    assert (len(found.axes["mu"]), len(found.axes["a"])) == (102, 101)
+    assert found.question.endswith(", in the region shown by sweep view")
+
+
+def test_whole_numbers_in_the_range_are_kept_as_they_are(tmp_path):
+    keys = {"axes": {"flips": [2.0, 4.0, 6.0, 8.0], "mu": [1.0, 2.0]}, "fixed": {"a": 0.5, "phi0": 1.0, "step": 0.05}}
+    dataset = sweep.run(sweep.build_study(kernel="foliot_steps", **keys), progress=False)
+    name = next(iter(dataset.data_vars))
+    found = read(tmp_path, region.study_text(dataset, Choice(name, "flips", None, {"mu": 1}), (4.0, 6.0), None))
+    assert found.axes["flips"].values.tolist() == [4.0, 6.0]
+    assert found.fixed["mu"] == 2.0
+
+
+def test_a_result_of_no_known_study_has_no_regions(dataset):
+    bare = dataset.drop_attrs(deep=False)
+    with pytest.raises(sweep.SweepError, match="does not say which study"):
+        region.study_text(bare, MAP, None, None)
+
+
+def test_lines_of_the_table_are_the_cells_in_view(dataset, monkeypatch):
+    assert region.rows(dataset, MAP, None, None) == 41 * 21
+    assert region.rows(dataset, Choice("period", "mu", None, {"a": 2, "R": 0}), None, None) == 41
+    monkeypatch.setattr(region, "MOST_ROWS", 41 * 21)
+    header = region.table(dataset, MAP, None, None).getvalue().decode().split("\n")
+    assert not any("place along" in line for line in header)

@@ -8,7 +8,9 @@ from xarray.core import indexing
 
 import sweep
 from kernels.interface import Status
-from sweep.view.slices import PLACE, Choice, cell_numbers, nearest, other_axes, outputs, row, shown
+from sweep.show.view import view
+from sweep.view import slices
+from sweep.view.slices import PLACE, Choice, cell_numbers, nearest, number_axes, other_axes, outputs, row, shown
 
 
 class Counting(BackendArray):
@@ -111,3 +113,80 @@ def test_a_row_has_all_of_a_cell(dataset):
     assert entries["phi0"].value == "1"
     assert (entries["period"].value, entries["period"].unit) == ("nan", "s")
     assert entries["status"].value == Status.NEVER_STARTS.name
+
+
+@pytest.mark.parametrize(
+    ("wanted", "cells"),
+    [
+        ((10.0, 12.0), slice(7, 15)),
+        ((12.0, 10.0), slice(7, 15)),
+        ((10.5, 11.5), slice(8, 15)),
+        ((2.0, 18.0), slice(0, 20)),
+        ((-9.0, -8.0), slice(0, 3)),
+        ((90.0, 91.0), slice(17, 20)),
+        (None, slice(None)),
+    ],
+)
+def test_a_range_cuts_an_axis_with_two_cells_more_on_both_sides(wanted, cells):
+    assert slices._cut(np.arange(20.0), wanted) == cells
+
+
+def test_an_axis_that_does_not_rise_is_not_cut():
+    for grid in (np.arange(20.0)[::-1], np.array([1.0, 1.0, 2.0]), np.array(["a", "b"])):
+        assert slices._cut(grid, (1.0, 2.0)) == slice(None)
+
+
+def test_distances_are_shares_of_the_picture():
+    np.testing.assert_allclose(slices._distance(np.array([1.0, 3.0, 5.0]), 2.0, False), [0.25, 0.25, 0.75])
+    np.testing.assert_allclose(slices._distance(np.array([1.0, 10.0, 100.0]), 10.0, True), [0.5, 0.0, 0.5])
+    np.testing.assert_allclose(
+        slices._distance(np.array([[1.0, np.nan], [0.0, 100.0]]), 10.0, True), [[0.5, np.nan], [np.nan, 0.5]]
+    )
+    np.testing.assert_allclose(slices._distance(np.array([2.0, 2.0]), 5.0, False), [3.0, 3.0])
+
+
+def points(x, y):
+    """Points of a zip, along x."""
+    places = {PLACE + "cell": ("cell", np.arange(len(x)))}
+    return view(xr.Dataset({"y": ("cell", y)}, {"x": ("cell", x), **places}), x="x")
+
+
+def test_of_points_the_nearest_as_the_eye_sees_it_is_clicked():
+    found = points([1.0, 2.0, 3.0], [10.0, 30.0, 20.0])
+    assert nearest(found, 2.4, 21.0, False, (False, False)) == {"cell": 2}
+    assert nearest(found, 2.4, 29.0, False, (False, False)) == {"cell": 1}
+    assert nearest(points([1.0, 2.0], [np.nan, np.nan]), 2.0, 1.0, False, (False, False)) == {"cell": 0}
+
+
+def test_of_lines_without_a_value_the_first_is_clicked():
+    found = xr.Dataset({"y": (("a", "x"), np.full((2, 3), np.nan))}, {"a": [1.0, 2.0], "x": [1.0, 2.0, 3.0]})
+    places = {PLACE + d: (d, np.arange(found.sizes[d]) + 5) for d in ("a", "x")}
+    shown_lines = view(found.assign_coords(places), x="x")
+    assert nearest(shown_lines, 2.9, 1.0, False, (False, False)) == {"x": 7, "a": 5}
+
+
+def test_the_outermost_edges_belong_to_the_outermost_cells():
+    grid = np.array([1.0, 2.0, 3.0])
+    at = np.array([0.5, 1.5, 2.5, 3.5, 0.4999, 3.5001])
+    assert cell_numbers(grid, at).tolist() == [0, 1, 2, 2, -1, -1]
+
+
+def test_axes_stand_before_other_coordinates_and_the_longest_first():
+    coords = {"a": [1.0, 2.0], "b": [1.0, 2.0, 3.0], "c": ("b", [3, 2, 1]), "w": ["x", "y", "z", "u"]}
+    ds = xr.Dataset({"y": (("a", "b", "w"), np.zeros((2, 3, 4))), "word": ("a", ["p", "q"]), "one": 1.0}, coords)
+    assert number_axes(ds, "y") == ["b", "a", "c"]
+    assert other_axes(ds, Choice("y", "c")) == ["a", "w"]
+    assert outputs(ds) == ["y"]
+
+
+def test_numbers_of_a_row_have_all_their_digits_and_flags_are_words():
+    attrs = {"flag_values": [0, 1], "flag_meanings": "OK BAD"}
+    columns = {
+        "y": ("x", [0.1], {"units": "s", "long_name": "way"}),
+        "n": ("x", [3], {"units": "1"}),
+        "s": ("x", [1], attrs),
+    }
+    entries = row(xr.Dataset(columns, {"x": [2.0], PLACE + "x": ("x", [0])}), {"x": 0})
+    assert [(e.name, e.value, e.unit, e.meaning) for e in entries] == [
+        ("x", "2", "", ""), ("y", "0.10000000000000001", "s", "way"), ("n", "3", "", ""), ("s", "BAD", "", ""),
+    ]  # fmt: skip
