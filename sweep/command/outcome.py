@@ -21,7 +21,7 @@ def explained(error: BaseException) -> Outcome:
     if isinstance(error, KeyboardInterrupt):
         return Outcome(INTERRUPTED, "stopped")
     if isinstance(error, SystemExit):
-        return Outcome(int(str(error.code)), "stopped")
+        return Outcome(error.code if isinstance(error.code, int) else FAULT, "stopped")
     if isinstance(error, MemoryError):
         return Outcome(MISTAKE, "out of memory; choose fewer cells, fewer outputs or fewer workers")
     if isinstance(error, OSError):

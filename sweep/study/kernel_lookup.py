@@ -42,7 +42,7 @@ def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path
             # for good: a kernel may import modules beside it later
             sys.path.extend(folder for f in folders if (folder := str(f.resolve())) not in sys.path)
         kernel = load(name) if ":" in name else catalogue.get(name)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise SweepError(f"{show(name)} cannot be loaded: {type(error).__name__}: {error}") from error
     if not isinstance(kernel, Kernel):
         raise SweepError(f"{show(name)} is a {type(kernel).__name__}, not a kernels.interface.Kernel")

@@ -194,6 +194,10 @@ def test_a_value_that_is_no_number_is_picked_too():
     assert pick(line_of([5.0, 6.0], np.array([1.0, np.nan])), ["mu=nan"]).period.item() == 6.0
 
 
+def test_a_word_is_picked_alone():
+    assert pick(line_of([5.0, 6.0, 7.0], ["b", "a", "c"]), ["mu=a"]).period.item() == 6.0
+
+
 def test_each_choice_narrows_what_the_one_before_left():
     dataset = xr.Dataset({"y": (("a", "b"), np.arange(6.0).reshape(2, 3))}, {"a": [1.0, 2.0], "b": [1.0, 2.0, 3.0]})
     assert pick(dataset, ["a=2", "b=3"]).y.item() == 5.0

@@ -283,6 +283,15 @@ def test_a_fault_in_a_module_of_ones_own_is_told_in_one_line(mistakes, tmp_path)
     assert found["kernel"] == '"broken_kernel:KERNEL" cannot be loaded: ZeroDivisionError: division by zero'
 
 
+@pytest.mark.parametrize("said", ["", "0", "'no licence'"])
+def test_a_module_of_ones_own_that_ends_python_is_a_mistake(mistakes, tmp_path, said):
+    name = f"ending_kernel_{len(said)}"
+    (tmp_path / f"{name}.py").write_text(f"raise SystemExit({said})")
+    found = mistakes(f'kernel = "{name}:KERNEL"\naxes.height = [1]', head="")
+    told = said.strip("'")
+    assert found["kernel"] == f'"{name}:KERNEL" cannot be loaded: SystemExit: {told}'
+
+
 def test_a_kernel_beside_the_study_is_found(read, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", list(sys.path))
     (tmp_path / "own_kernel.py").write_text("from toy import KERNEL")
