@@ -167,8 +167,8 @@ class _Strip:
             able = self._promising(number, cells, missed)
             if not _count(able):
                 continue
-            self.run(number, able) if untried else self._improve(number, able)
-            left = _pick(cells, among(self.status[cells], GIVEN_UP))
+            status = self.run(number, able) if untried else self._improve(number, able)
+            left = _pick(cells, among(status if able is cells else self.status[cells], GIVEN_UP))
             if not _count(left):
                 return
             untried = untried and _count(left) + _count(able) == _count(cells)
@@ -209,7 +209,7 @@ class _Strip:
         error = np.where(status == INACCURATE, self.error[cells], 0.0)
         return np.where(status < FIRST_REFUSAL, error, np.inf)
 
-    def _improve(self, number: int, cells: Chosen, bound: Floats | None = None) -> None:
+    def _improve(self, number: int, cells: Chosen, bound: Floats | None = None) -> Codes:
         """Run a method, but keep what an earlier one gave to cells where this one is not better.
 
         Where an earlier one did not know what the scene does, and this one knows no cycle of its kind, that is open.
@@ -229,6 +229,7 @@ class _Strip:
                 column[back] = values[worse]
         open_ = among(before, UNKNOWN) & (self.status[cells] == Status.NO_CYCLE)
         self.status[_pick(cells, open_)] = before[open_]
+        return self.status[cells]
 
     def bound(self, method: Method, cells: Chosen) -> Floats:
         """The method's error bound for the cells, over the outputs asked for."""
@@ -239,7 +240,7 @@ class _Strip:
         return out
 
     def _inputs(self, cells: Chosen) -> list[Floats]:
-        """Parameters and rtol of the cells; those of the last ones asked for are there, as a bound's are for the run."""
+        """Parameters and rtol of the cells; those asked for last are kept: the columns of a bound serve its run."""
         if self._gathered[0] is not cells:
             columns = (*self.parameters, self.rtol)
             found = _rows(columns, cells)
@@ -249,39 +250,37 @@ class _Strip:
             self._gathered = cells, found
         return self._gathered[1]
 
-    def run(self, number: int, cells: Chosen, bound: Floats | None = None) -> None:
+    def run(self, number: int, cells: Chosen, bound: Floats | None = None) -> Codes:
         """Solve the cells by one method: in place where they lie side by side, else gathered and put back.
 
-        `bound` is the method's where it may exceed rtol.
+        `bound` is the method's where it may exceed rtol. Returns what became of the cells.
         """
-        if not _count(cells):
-            return
         method, columns = self.kernel.methods[number], self._inputs(cells)
-        asked, error = ([self.asked], [self.error]) if method.estimates else ([], [])
-        targets: list[NDArray[Any]] = [*self.outputs, *error, self.status]
-        wanted = [*self._wanted, *range(len(self.outputs), len(targets))]
-        results = _rows(targets, cells)
+        targets: list[NDArray[Any]] = [*self.outputs, self.status]
+        results, wanted = _rows(targets, cells), [*self._wanted, -1]
         if not isinstance(cells, slice):
             for k in wanted:
                 results[k] = np.empty_like(results[k])
-        method.solve(*columns, *self.along, *asked, *results)
+        *outputs, status = results
+        asked, error = ([self.asked], [np.empty(len(status))]) if method.estimates else ([], [])
+        method.solve(*columns, *self.along, *asked, *outputs, *error, status)
         if self.promised is not None:
-            fail(results[-1], [results[k] for k in self.promised])
+            fail(status, [outputs[k] for k in self.promised])
+        self._judge(cells, status, error[0] if error else None, bound)
         if not isinstance(cells, slice):
             for k in wanted:
                 targets[k][cells] = results[k]
         self.used[cells] = number
-        self._judge(method, cells, results[-1], bound)
+        return status
 
-    def _judge(self, method: Method, cells: Chosen, status: Codes, bound: Floats | None) -> None:
+    def _judge(self, cells: Chosen, status: Codes, error: Floats | None, bound: Floats | None) -> None:
         """Remark values of which less is known than rtol, and note what they are right to; NaN tells nothing."""
-        if bound is None and not method.estimates and not np.count_nonzero(status):
+        if bound is None and error is None and not np.count_nonzero(status):
             return
-        said = status == INACCURATE
-        known = self.error[cells] if method.estimates else np.where(said, np.inf, 0.0)
+        known = np.where(status == INACCURATE, np.inf, 0.0) if error is None else error
         known = known if bound is None else np.maximum(known, bound)
         self.error[cells] = np.where(np.isnan(known), np.inf, known)
-        self.status[_pick(cells, ~(known <= self.rtol[cells]) & (status < FIRST_REFUSAL))] = Status.INACCURATE
+        status[~(known <= self._inputs(cells)[-1]) & (status < FIRST_REFUSAL)] = INACCURATE
 
 
 def usable_methods(study: Study) -> tuple[int, ...]:
