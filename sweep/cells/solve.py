@@ -89,7 +89,7 @@ class Solver:
         }
         self._asked = np.array([field.name in study.outputs for field in kernel.outputs], np.uint8)
         self._wanted = [int(k) for k in self._asked.nonzero()[0]]
-        self._rtol, self._bound, self._error = np.empty(cells), np.empty(cells), np.empty(cells)
+        self._rtol, self._error = np.empty(cells), np.empty(cells)
         self._promised = None if study.kernel_name in catalogue.KERNELS else promised(study)
 
     def solve(self, start: int, cells: Cells, wanted: NDArray[np.bool_] | None = None) -> None:
@@ -145,7 +145,7 @@ class _Strip:
         self.kernel, self.along, self.asked = solver.study.kernel, solver._along, solver._asked
         self.parameters = [column[:n] for column in solver._parameters]
         self._varying, self._wanted = solver._varying, solver._wanted
-        self.rtol, self._bound, self.error = solver._rtol[:n], solver._bound[:n], solver._error[:n]
+        self.rtol, self.error = solver._rtol[:n], solver._error[:n]
         self._gathered: tuple[Chosen | None, list[Floats]] = None, []
         self.outputs, self.status, self.used = outputs, status, used
         self.usable, self.promised = solver.usable, solver._promised
@@ -183,8 +183,8 @@ class _Strip:
             return cells
         bound = self.bound(method, cells)
         able = _pick(cells, bound <= self._inputs(cells)[-1])
-        if _count(able) < _count(cells):
-            missed.append((number, cells, bound.copy()))
+        if able is not cells:
+            missed.append((number, cells, bound))
         return able
 
     def _settle(self, cells: Chosen, missed: Sequence[tuple[int, Chosen, Floats]]) -> None:
@@ -234,9 +234,8 @@ class _Strip:
     def bound(self, method: Method, cells: Chosen) -> Floats:
         """The method's error bound for the cells, over the outputs asked for."""
         assert method.bound is not None
-        out = self._bound[: _count(cells)]
-        columns = self._inputs(cells)
-        method.bound(*columns, *self.along, self.asked, out)
+        out = np.empty(_count(cells))
+        method.bound(*self._inputs(cells), *self.along, self.asked, out)
         return out
 
     def _inputs(self, cells: Chosen) -> list[Floats]:
