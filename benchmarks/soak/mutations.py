@@ -4,11 +4,12 @@
 
 Cosmic Ray (pip install cosmic-ray) makes one small change at a time, in a copy of this checkout: another operator,
 number or comparison, a loop that does not run. The tests of the room are run on it, up to the first that fails. Those
-that live are printed with their diff: each is a missing test, or equivalent, which a person has to say. A place in the
-kernels takes a minute or two, for its room is compiled anew.
+that live are printed with their diff: each is a missing test, or equivalent, which a person has to say; changes of
+mere types are not counted. A place in the kernels takes a minute or two, for its room is compiled anew.
 """
 
 import argparse
+import ast
 import random
 import shutil
 import subprocess
@@ -32,7 +33,8 @@ def main():
             check_sound(copy, room, arguments.timeout)
         outcomes = [tried(copy, place, arguments.timeout) for place in places]
     caught = outcomes.count("killed")
-    print(f"{caught} of {len(places)} caught, {outcomes.count('survived')} live, seed {arguments.seed}")
+    judged = len(places) - outcomes.count("annotates")
+    print(f"{caught} of {judged} caught, {outcomes.count('survived')} live, seed {arguments.seed}")
 
 
 def read_arguments():
@@ -66,7 +68,7 @@ def sampled(places, count, seed):
 
 
 def tried(copy, place, timeout):
-    """What became of one change: "killed", "survived" or "incompetent"."""
+    """What became of one change: "killed", "survived", "annotates" or "incompetent"."""
     from cosmic_ray.mutating import mutate_and_test
     from cosmic_ray.work_item import MutationSpec
 
@@ -76,10 +78,32 @@ def tried(copy, place, timeout):
     )
     result = mutate_and_test([spec], command(copy, tests_of(copy, path), path.stem), timeout)
     outcome = result.test_outcome.value if result.test_outcome else "incompetent"
+    if outcome == "survived" and only_annotates(copy / path, operator, occurrence):
+        outcome = "annotates"
     print(f"{outcome:12} {path} {operator} {occurrence}", flush=True)
     if outcome == "survived":
         print(result.diff, flush=True)
     return outcome
+
+
+def only_annotates(path, operator, occurrence):
+    """Whether a change leaves everything as it is but what is written of types, which nothing reads."""
+    from cosmic_ray import plugins
+    from cosmic_ray.mutating import mutate_code
+
+    code = path.read_text()
+    return without_types(code) == without_types(mutate_code(code, plugins.get_operator(operator)(), occurrence))
+
+
+def without_types(code):
+    """A module's syntax without the types of arguments and of what functions return."""
+    tree = ast.parse(code)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef):
+            node.returns = None
+        elif isinstance(node, ast.arg):
+            node.annotation = None
+    return ast.dump(tree)
 
 
 def tests_of(copy, path):

@@ -155,6 +155,15 @@ def test_dense_sampling_says_where_it_sees_too_little():
     assert (solve(POLISHER, "sampled", *columns, rtol=1e-9)[1] == Status.INACCURATE).all()
 
 
+@pytest.mark.skipif(not COMPILED, reason="2048 samples a machine in plain Python")
+def test_dense_sampling_sees_a_dead_point_whose_effect_is_32_samples_wide():
+    b, f, e = 1.0, 0.8, 0.3
+    gap = 4 * b * e * (32 * np.pi / 2048) ** 2  # (d + f)^2 - (b + e)^2, as far as (b e theta^2) from the dead point
+    d = np.sqrt((b + e) ** 2 + gap * np.array([0.9, 1.1])) - f
+    _, status = solve(POLISHER, "sampled", b, d, f, e, rtol=1e-6)
+    assert status.tolist() == [Status.INACCURATE, Status.OK]
+
+
 def test_a_finer_tolerance_than_any_method_holds_is_inaccurate():
     for method in ("waveform", *(["sampled"] if COMPILED else [])):
         _, status = solve(POLISHER, method, *FIGURE, [15.0], rtol=1e-16)

@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 import sweep
+from sweep.analysis import collapse
 from sweep.system.errors import SweepError
 
 X, L = np.geomspace(0.01, 100, 25), np.array([1.0, 2.0, 4.0, 8.0, 16.0])
@@ -35,6 +36,14 @@ def test_bootstrap_intervals_hold_the_truth():
         assert float(found.x_exponent_high - found.x_exponent_low) < 0.1
         assert int(found.fits) == 1
     assert (held >= 12).all()
+
+
+def test_pieces_of_cubics_and_both_exponents_are_numbers_that_points_pay_for(monkeypatch):
+    asked = []
+    monkeypatch.setattr(collapse, "student", lambda freedom, _: asked.append(freedom) or 1.0)
+    found = sweep.fit_collapse(curves(1.5, 0.7, 0.02)[:, ::3], "x", "L", bootstrap=4)
+    pieces = int(found.points) // 8
+    assert asked == [int(found.points) - (pieces + 3) - 2]
 
 
 def test_points_that_are_missing_or_compared_with_nothing_are_counted():
