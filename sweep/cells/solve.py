@@ -82,11 +82,8 @@ class Solver:
         self._varying = [k for k in range(len(kernel.parameters)) if k not in constants]
         self._varying += [len(kernel.parameters)] if "rtol" in study.axes else []
         self._along = [np.array(study.along[field.name]) for field in kernel.along]
-        self._unasked = {
-            field.name: np.empty((cells, *shapes[field.name]))
-            for field in kernel.outputs
-            if field.name not in study.outputs
-        }
+        self._spare: list[NDArray[Any]] = [np.empty((cells, *shapes[field.name])) for field in kernel.outputs]
+        self._spare.append(np.empty(cells, np.int8))
         self._asked = np.array([field.name in study.outputs for field in kernel.outputs], np.uint8)
         self._wanted = [int(k) for k in self._asked.nonzero()[0]]
         self._rtol, self._error = np.empty(cells), np.empty(cells)
@@ -112,8 +109,8 @@ class Solver:
 
     def _solve_strip(self, low: int, cells: Cells, wanted: NDArray[np.bool_] | None) -> None:
         high, status, used = low + cells.number, cells.status, cells.used
-        spare = {name: column[: cells.number] for name, column in self._unasked.items()}
-        outputs = [{**spare, **cells.outputs}[field.name] for field in self.study.kernel.outputs]
+        fields = zip(self.study.kernel.outputs, self._spare, strict=False)
+        outputs = [cells.outputs.get(field.name, spare[: cells.number]) for field, spare in fields]
         strip = _Strip(self, cells.number, outputs, status, used)
         self.grid.columns(low, high, strip.parameters)
         self.study.kernel.check(*strip.parameters, status)
@@ -144,7 +141,7 @@ class _Strip:
     def __init__(self, solver: Solver, n: int, outputs: Sequence[Floats], status: Codes, used: Codes) -> None:
         self.kernel, self.along, self.asked = solver.study.kernel, solver._along, solver._asked
         self.parameters = [column[:n] for column in solver._parameters]
-        self._varying, self._wanted = solver._varying, solver._wanted
+        self._varying, self._wanted, self._spare = solver._varying, solver._wanted, solver._spare
         self.rtol, self.error = solver._rtol[:n], solver._error[:n]
         self._gathered: tuple[Chosen | None, list[Floats]] = None, []
         self.outputs, self.status, self.used = outputs, status, used
@@ -256,10 +253,7 @@ class _Strip:
         """
         method, columns = self.kernel.methods[number], self._inputs(cells)
         targets: list[NDArray[Any]] = [*self.outputs, self.status]
-        results, wanted = _rows(targets, cells), [*self._wanted, -1]
-        if not isinstance(cells, slice):
-            for k in wanted:
-                results[k] = np.empty_like(results[k])
+        results = _rows(targets if isinstance(cells, slice) else self._spare, cells)
         *outputs, status = results
         asked, error = ([self.asked], [np.empty(len(status))]) if method.estimates else ([], [])
         method.solve(*columns, *self.along, *asked, *outputs, *error, status)
@@ -267,7 +261,7 @@ class _Strip:
             fail(status, [outputs[k] for k in self.promised])
         self._judge(cells, status, error[0] if error else None, bound)
         if not isinstance(cells, slice):
-            for k in wanted:
+            for k in (*self._wanted, -1):
                 targets[k][cells] = results[k]
         self.used[cells] = number
         return status
