@@ -72,6 +72,14 @@ def test_with_more_axes_a_border_is_cut_less_often_and_where_it_is_longest(axes,
     assert not found.valued.any()
 
 
+def test_the_edge_that_is_cut_crosses_the_border_though_another_is_longer():
+    points = np.array([[0.0, 0.0], [-1.0, 0.1], [1.0, 0.2]])
+    for kind in ([64, 0, 0], [3, 7, 7]):
+        _, found = judged(points, np.zeros(3), kind, steps=1.0)
+        assert found.ends.tolist() == [[0, 1]]
+        assert np.isinf(found.size).all()
+
+
 def test_what_has_no_value_anywhere_is_not_cut():
     _, found = judged(line(0, 0.25, 0.5, 0.75, 1), np.full(5, np.nan), [0, 0, -1, -1, -1])
     assert found.size.tolist() == [math.inf, math.inf, 0, 0]  # two cells are too few, a border is to be cut

@@ -7,7 +7,7 @@ import pytest
 from toy import KERNEL, exact, rough
 from toy_studies import build
 
-from kernels.interface import Method, Status
+from kernels.interface import FIRST_REFUSAL, Method, Status
 from sweep.explore.reference import FINE, ROUNDING, best_reference, errors, given_reference, reference_by
 
 HEIGHTS = np.array([1.0, 2.0, 5.0, 10.0])
@@ -80,6 +80,8 @@ def test_a_cell_never_right_is_open_and_one_refused_for_good_is_void():
     assert (never.sound.tolist(), never.void.any(), never.judged) == ([True] * 3 + [False], False, 3)
     given_up = reference_by(with_methods(Method("lazy", "", saying(lambda rtol: Status.STEP_LIMIT))), "lazy")
     assert (given_up.sound.sum(), given_up.void.sum(), given_up.judged) == (3, 0, 3)
+    first = reference_by(with_methods(Method("first", "", saying(lambda rtol: FIRST_REFUSAL))), "first")
+    assert first.sound.tolist() == [True] * 3 + [False]
     void = reference_by(with_methods(Method("sure", "", saying(lambda rtol: Status.NEVER_STARTS))), "sure")
     assert (void.sound.sum(), void.void.tolist(), void.judged) == (3, [False] * 3 + [True], 4)
 
