@@ -1,0 +1,135 @@
+"""Thresholds of a study from both sides: how many points and cells, which seeds, edges and names of a summary."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import toy
+from toy_studies import build
+
+import sweep
+from kernels.interface import Field
+from sweep.study import designs, samples
+from sweep.study.kernel_lookup import load_kernel
+
+RANGES = {
+    "height": {"spacing": "log", "start": 1.0, "stop": 10.0},
+    "v0": {"spacing": "linear", "start": 0.0, "stop": 1.0},
+}
+
+
+def told(**keys):
+    """{where: message} of what is wrong."""
+    try:
+        build(**keys)
+    except sweep.StudyError as error:
+        return {m.where: m.message for m in error.mistakes}
+    return {}
+
+
+@pytest.mark.parametrize(("n", "write"), [(8, ""), (9, "8 or 16"), (15, "8 or 16"), (16, ""), (2, ""), (3, "2 or 4")])
+def test_a_sobol_sequence_has_a_power_of_two(n, write):
+    found = told(design={"kind": "sobol", "n": n}, axes=RANGES)
+    assert found == ({"design.n": f"a Sobol' sequence needs a power of 2; write {write}"} if write else {})
+
+
+def test_a_design_has_at_most_as_many_points_as_an_axis_values(monkeypatch):
+    pytest.importorskip("SALib")
+    monkeypatch.setattr(designs, "LARGEST_AXIS", 32)
+    assert told(design={"kind": "saltelli", "n": 8}, axes=RANGES) == {}
+    found = told(design={"kind": "saltelli", "n": 16}, axes=RANGES)
+    assert found == {"design.n": "makes 64 points; expected at most 32"}
+    monkeypatch.setattr(designs, "LARGEST_AXIS", 31)
+    assert told(design={"kind": "saltelli", "n": 8}, axes=RANGES) == {
+        "design.n": "makes 32 points; expected at most 31"
+    }
+
+
+@pytest.mark.parametrize(("seed", "good"), [(0, True), (2**32 - 1, True), (2**32, False), (-1, False), (True, False)])
+def test_seeds_are_of_32_bits(seed, good):
+    assert (told(design={"kind": "latin", "n": 4, "seed": seed}, axes=RANGES) == {}) is good
+
+
+def test_points_without_a_seed_are_those_of_seed_0():
+    found = build(design={"kind": "random", "n": 4}, axes=RANGES).axes["v0"].values
+    assert found.tolist() == np.random.default_rng(0).random((4, 2))[:, 1].tolist()
+
+
+@pytest.mark.parametrize(("largest", "good"), [(12, True), (11, False)])
+def test_a_grid_has_so_many_cells_at_most(monkeypatch, largest, good):
+    monkeypatch.setattr(designs, "LARGEST_GRID", largest)
+    axes = {"height": [1.0, 2.0, 3.0], "v0": [0.0, 1.0], "g": [1.0, 2.0]}
+    assert told(axes=axes) == ({} if good else {"axes": "3 x 2 x 2 cells; a study may have at most 1e+01"})
+    assert told(design="zip", axes={name: list(np.arange(11) + 1.0) for name in axes}) == {}
+
+
+@pytest.mark.parametrize(
+    ("rtol", "good"), [(1e-15, True), (9e-16, False), (0.999, True), (1.0, False), (np.nan, False)]
+)
+def test_the_wanted_error_is_within_its_limits(rtol, good):
+    assert (told(axes={"height": [1.0]}, rtol=rtol) == {}) is good
+    assert (told(axes={"height": [1.0], "rtol": [1e-3, rtol]}) == {}) is good
+
+
+@pytest.mark.parametrize(
+    ("edges", "message"),
+    [
+        ([1.0, 2.0], None),
+        ([1.0], "expected at least 2 edges, found 1"),
+        ([1.0, 1.0], "expected finite edges, each larger than the one before"),
+        ([2.0, 1.0], "expected finite edges, each larger than the one before"),
+        ([1.0, np.inf], "expected finite edges, each larger than the one before"),
+    ],
+)
+def test_edges_of_a_histogram_rise(edges, message):
+    summary = {"outputs": {"fall_time": ["histogram"]}, "edges": {"fall_time": edges}}
+    found = told(axes={"height": [1.0]}, summary=summary)
+    assert found == ({} if message is None else {"summary.edges.fall_time": message})
+
+
+def test_edges_and_histograms_go_together():
+    axes = {"height": [1.0]}
+    found = told(axes=axes, summary={"outputs": {"fall_time": ["min"]}, "edges": {"fall_time": [1, 2], "drop": [1, 2]}})
+    assert found == {
+        "summary.edges.fall_time": 'there is no histogram of fall_time; ask for it: outputs.fall_time = ["histogram"]',
+        "summary.edges.drop": "there is no histogram of drop",
+    }
+    (message,) = told(axes=axes, summary={"outputs": {"fall_time": ["histogram"]}}).values()
+    assert message.startswith("missing; its histogram needs them, e.g. { spacing")
+
+
+def test_a_summary_reduces_all_axes_and_outputs_in_order_unless_told_otherwise():
+    axes = {"height": [1.0, 2.0], "v0": [0.0, 1.0], "g": [1.0, 2.0]}
+    found = build(axes=axes, summary={}).summary
+    assert found.over == ("height", "v0", "g")
+    assert found.outputs == {"fall_time": ("min", "max", "mean", "argmin", "argmax")}
+    some = build(axes=axes, summary={"over": ["g", "height"], "outputs": {"fall_time": ["argmax", "min"]}}).summary
+    assert (some.over, some.outputs) == (("height", "g"), {"fall_time": ("min", "argmax")})
+    assert told(axes=axes, summary={"outputs": {"fal_time": ["min"]}}) == {
+        "summary.outputs.fal_time": "is none of the outputs asked for; did you mean fall_time?"
+    }
+
+
+def test_blocks_have_values_of_their_own_shape():
+    assert samples.GENERATORS.keys() == {"sobol", "latin", "random", "saltelli", "morris"}
+    found = told(blocks=[{"axes": {"height": [1.0, 1.0]}}, {"axes": {"v0": [0.0, 0.0]}, "design": "zip"}])
+    assert found == {"blocks[0].axes.height": "1 stands more than once; give every value once"}
+
+
+def refused(monkeypatch, **changes):
+    """What is said of a kernel that declares these."""
+    monkeypatch.setattr(toy, "KERNEL", replace(toy.KERNEL, **changes))
+    with pytest.raises(sweep.SweepError) as caught:
+        load_kernel("toy:KERNEL", True)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["status", "method_used", "error_bound", "method", "rtol", "cell", "height", "phase"])
+def test_a_kernel_declares_each_name_once_and_none_of_the_results_own(monkeypatch, name):
+    found = refused(monkeypatch, outputs=(Field(name, "s", ""),))
+    assert found == f"kernel toy:KERNEL declares {name} more than once, or takes a name of the result's own"
+
+
+def test_an_output_runs_along_what_there_is(monkeypatch):
+    found = refused(monkeypatch, outputs=(*toy.KERNEL.outputs, Field("trace", "s", "", dims=("place",))))
+    assert found == "kernel toy:KERNEL has outputs along place, neither in `along` nor a dim of array parameters"
