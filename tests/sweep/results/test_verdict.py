@@ -47,3 +47,24 @@ def test_a_damaged_result_is_told_to_be_repaired_where_it_can_be(monkeypatch, bl
     assert ("sweep run --repair computes damaged cells again" in str(caught.value)) is cure
     monkeypatch.setattr(module, "verify", lambda path: Verdict(path, True, "checked", ()))
     assert module.check_whole(Path("a.h5")) is None
+
+
+@pytest.mark.parametrize(
+    ("bad", "places"),
+    [
+        ([0], [(0, 10)]),
+        ([0, 1, 2, 4], [(0, 30), (40, 50)]),
+        ([3, 5, 6], [(30, 40), (50, 70)]),
+        ([], []),
+    ],
+)
+def test_neighbouring_damaged_blocks_are_told_together(bad, places):
+    blocks = SimpleNamespace(bounds=lambda k: (10 * k, 10 * k + 10))
+    told = [f"y: damaged between its cells {first} and {last}" for first, last in places]
+    assert list(module._runs("y", blocks, bad)) == told
+
+
+@pytest.mark.parametrize(("count", "rest"), [(8, []), (9, ["y: damaged in 1 more places"])])
+def test_eight_damaged_places_are_told_and_the_rest_counted(count, rest):
+    blocks = SimpleNamespace(bounds=lambda k: (k, k + 1))
+    assert list(module._runs("y", blocks, list(range(0, 2 * count, 2))))[8:] == rest

@@ -149,3 +149,68 @@ def test_a_refined_cell_is_clicked_and_its_part_is_kept(refined):
     assert png.read(4)[1:] == b"PNG"
     assert len(csv.read().splitlines()) > 100
     assert page.saves["toml"].disabled  # cells that lie anywhere are no grid
+
+
+def test_a_cell_is_marked_where_it_is_in_the_picture(dataset):
+    from sweep.view.page import _middle
+    from sweep.view.slices import Choice
+
+    places = {"mu": 33, "R": 2}
+    chosen = Choice("period", "mu", "R", {"a": 1})
+    at = float(dataset.mu[33])
+    assert _middle(dataset, chosen, places, True, 9.0) == (at, float(dataset.R[2]))
+    assert _middle(dataset, chosen, places, False, 9.0) == (at, float(dataset.period[33, 2, 1]))
+    exponent = Choice("period", "mu", "R", {"a": 1}, exponent=True)
+    assert _middle(dataset, exponent, places, False, 9.0) == (at, 9.0)
+    assert _middle(dataset, chosen, {"mu": 0, "R": 20}, False, 9.0) == (None, None)  # refused
+
+
+def test_words_of_the_page(dataset):
+    from sweep.show.view import view
+    from sweep.view.page import _legend, _setting, _table
+    from sweep.view.picture import status_colour
+
+    assert [_setting(value) for value in dataset.a] == ["0.5 1/s", "1 1/s", "2 1/s"]
+    assert _setting(dataset.mu[40]) == "100 rad/s^2"
+    found = view(dataset.isel(a=1), "period")
+    lines = _legend(found).split("</div>")[:-1]
+    assert len(lines) == len(found.codes())
+    for line, code in zip(lines, found.codes(), strict=True):
+        count = int((found.status == code).sum())
+        assert f"background:{status_colour(found, code)}" in line
+        assert f"{found.meanings[code]}, {count:,} shown: " in line
+    table = _table(dataset[["period"]].assign_attrs(), {"mu": 40, "R": 0, "a": 1})
+    assert table.startswith('<table class="cell"><tr><td>')
+    assert "<tr><td>phi0</td><td>1</td><td>rad</td><td>switching angle</td></tr>" in table
+    assert table.endswith("</td></tr></table>")
+
+
+def test_a_chosen_axis_stays_and_a_held_one_keeps_its_place(page):
+    page.sliders["a"].value = 2
+    page.output.value = "amplitude"
+    assert (page.x.value, page.up.value, page.sliders["a"].value) == ("mu", "R", 2)
+    page.up.value = "a"
+    assert {name: slider.value for name, slider in page.sliders.items()} == {"R": 10}
+    page.x.value = "a"
+    assert (page.up.value, page.up.options) == ("mu", ["mu", "R", "(one line)"])
+
+
+def test_a_table_too_long_is_greyed_out(page, monkeypatch):
+    from sweep.view import region
+
+    assert not page.saves["csv"].disabled
+    monkeypatch.setattr(region, "MOST_ROWS", 41 * 21 - 1)
+    page._redraw()
+    assert page.saves["csv"].disabled
+    monkeypatch.setattr(region, "MOST_ROWS", 41 * 21)
+    page._redraw()
+    assert not page.saves["csv"].disabled
+    assert [page.saves[kind].filename for kind in ("png", "csv", "toml")] == [
+        "map_shown.png", "map_shown.csv", "map_shown.toml",
+    ]  # fmt: skip
+
+
+def test_a_click_beside_the_map_changes_nothing(page):
+    page._click(None, 1.0)
+    page._click(1e9, 1.0)
+    assert page.table.object == ""
