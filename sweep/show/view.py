@@ -164,7 +164,7 @@ def is_number_axis(y: xr.DataArray, name: str) -> bool:
 def edges(grid: NDArray[np.float64]) -> NDArray[np.float64]:
     """Edges of the cells around the points of a grid, (n + 1,): halfway; of a logarithmic grid in logarithms."""
     if grid.size == 1:
-        return grid + np.array([-0.5, 0.5])
+        return np.array([grid[0] - 0.5, grid[0] + 0.5])
     at = np.log(grid) if is_logarithmic(grid) else grid
     middle = (at[1:] + at[:-1]) / 2
     around = np.concatenate([[2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]])
