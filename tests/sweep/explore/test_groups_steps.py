@@ -118,11 +118,11 @@ def test_advice_word_for_word(changed, advice):
 
 
 def test_the_distance_from_a_curve_by_hand():
-    """In logarithms, points (0, 0), (1, 1), (3, 0), (4, 0), in any order, without those that have no value."""
-    t, z = np.array([3.0, 0.0, 4.0, 1.0, 2.0, np.nan]), np.array([0.0, 0.0, 0.0, 1.0, np.nan, 1.0])
+    """In logarithms, points (0, 0), (1, 1), (3, 0), (4, 0), (8, 4), in any order, without those that have no value."""
+    t, z = np.array([3.0, 0.0, 8.0, 4.0, 1.0, 2.0, np.nan]), np.array([0.0, 0.0, 4.0, 0.0, 1.0, np.nan, 1.0])
     x, y = (xr.DataArray(np.exp(column), dims="i") for column in (t, z))
-    # (1, 1) lies 1 above the line to (3, 0); (3, 0) lies a third below the line from (1, 1) to (4, 0)
-    assert sweep.collapse_quality(x, y) == pytest.approx(np.sqrt((1 + 1 / 9) / 2))
+    # above the line to (3, 0); a third below that from (1, 1) to (4, 0); 4/5 below that from (3, 0) to (8, 4)
+    assert sweep.collapse_quality(x, y) == pytest.approx(np.sqrt((1 + 1 / 9 + 16 / 25) / 3))
 
 
 def test_the_distance_where_places_are_alike_is_from_the_middle_of_the_others():

@@ -9,6 +9,7 @@ import pytest
 from toy_studies import build
 
 from kernels.interface import Status
+from sweep.cells.partition import RowBlocks
 from sweep.cells.timing import Sample
 from sweep.explore import plan as module
 from sweep.explore.plan import Plan, small_duration
@@ -128,3 +129,64 @@ def test_a_forecast_adds_up(tmp_path, monkeypatch):
     assert (output, workers, folder, starting) == (found.output_bytes, min(3, found.blocks), tmp_path, 1.5)
     assert (trial.cells, trial.block, trial.cell_timeout, trial.workers) == (1000, found.cells_per_block, 5.0, 3)
     assert trial.cell_bytes == found.output_bytes / 1000
+
+
+class Apart:
+    """Stands for processes of their own, whose clock is set by hand."""
+
+    def __init__(self, advice):
+        self.advice, self.ended, self.clock, self.asked = advice, False, None, []
+
+    def solver(self):
+        return self
+
+    def end(self):
+        self.ended = True
+
+    def call(self, seconds, function, *words):
+        self.asked.append((seconds, function))
+        if isinstance(self.advice, Exception):
+            raise self.advice
+        return self.advice
+
+
+@pytest.mark.parametrize(("starting", "told"), [(1.9, 0.0), (2.1, 2.1)])
+@pytest.mark.parametrize(("cost", "timeout", "most"), [(0.05, 60.0, 1.0), (0.2, 60.0, 2.0), (0.2, 1.5, 1.5)])
+def test_a_kernel_that_may_never_end_is_not_waited_for(monkeypatch, tmp_path, starting, told, cost, timeout, most):
+    study = build(axes={"height": [1.0, 2.0]})
+    sample = Sample(np.zeros(2), np.array([cost, cost / 2]), 1, None, None)
+    processes, now, asked = Apart("one"), iter([5.0, 5.0 + starting]), []
+    monkeypatch.setattr(module, "SILENT_SECONDS", 2.0)
+    monkeypatch.setattr(module, "Processes", lambda study, limits, count: processes)
+    monkeypatch.setattr(module, "warm", lambda solver, study: None)
+    monkeypatch.setattr(module, "sampled_by", lambda solver, study, clock: sample)
+    monkeypatch.setattr(module.time, "monotonic", lambda: next(now))
+    monkeypatch.setattr(module, "_forecast", lambda *given: (asked.append(given[-2:]), made())[1])
+    found = module._plan_apart(study, 2, tmp_path, module.Limits(timeout))
+    assert (found.compile_seconds, found.scaling) == (pytest.approx(told), "one")
+    assert asked == [(pytest.approx(most), pytest.approx(starting))]
+    assert processes.ended
+    assert processes.asked == [(10.0, module.advice_on)]
+
+
+def test_what_fails_at_random_cells_is_told_in_place_of_advice(monkeypatch, tmp_path):
+    processes = Apart(module.Unsolved("it died"))
+    monkeypatch.setattr(module, "Processes", lambda study, limits, count: processes)
+    monkeypatch.setattr(module, "warm", lambda solver, study: None)
+    monkeypatch.setattr(module, "sampled_by", lambda *given: Sample(np.zeros(1), np.ones(1), 1, None, None))
+    monkeypatch.setattr(module, "_forecast", lambda *given: made())
+    found = module._plan_apart(build(axes={"height": [1.0]}), 2, tmp_path, module.Limits(1.0))
+    assert found.scaling == "not known; while cells were tried at random, it died"
+    assert processes.ended
+
+
+def test_what_a_summary_reduces_at_a_time_takes_memory_too(tmp_path, monkeypatch):
+    summary = {"outputs": {"fall_time": ["min"]}}
+    study = build(axes={"height": np.arange(1.0, 1001.0)}, summary=summary)
+    codes = np.zeros(4, np.int8)
+    monkeypatch.setattr(module, "_seconds", lambda *given: 3.0)
+    monkeypatch.setattr(module, "row_blocks", lambda study: RowBlocks(1, 1000, 1000))
+    found = module._forecast(study, Sample(np.zeros(1), np.ones(1), 32, codes, codes), 3, tmp_path, None)
+    row = sum(column.cell_bytes for column in module.part_columns(study))
+    assert found.memory_bytes == 2 * 3 * (row + 65536 * 10)
+    assert (found.cells, found.cells_per_block) == (1000, 1000)
