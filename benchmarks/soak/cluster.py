@@ -65,8 +65,16 @@ def killing(client: Client, kills: int, rng: random.Random, ended: threading.Eve
                 done.append(1)
 
 
-def tormented(client: Client, path: Path, kills: int, rng: random.Random) -> tuple[int, bool]:
-    """A run of slow blocks whose workers are killed: how many were, and whether it ended with the same bits."""
+def tormented(path: Path, kills: int, rng: random.Random) -> tuple[int, bool]:
+    """A run of slow blocks whose workers are killed: how many were, and whether it ended with the same bits.
+
+    Each has a cluster of its own: a worker that is killed while it starts is not replaced.
+    """
+    with served(workers=2, failures=10) as (address, _), Client(address, set_as_default=False) as client:
+        return _tormented(client, path, kills, rng)
+
+
+def _tormented(client: Client, path: Path, kills: int, rng: random.Random) -> tuple[int, bool]:
     ended, done = threading.Event(), []
     killer = threading.Thread(target=killing, args=(client, kills, rng, ended, done))
     killer.start()
@@ -94,27 +102,30 @@ def main() -> int:
     given = arguments.parse_args()
     tasks: list[int] = []
     counted(tasks)
-    with served(workers=2, failures=10) as (address, _), Client(address, set_as_default=False) as client:
-        with tempfile.TemporaryDirectory() as name:
-            folder = Path(name)
-            timed(falls(10), cluster=client)
-            tasks.clear()
-            seconds = timed(falls(given.blocks), cluster=client)
-            each = 1e6 * seconds / given.blocks
-            here = timed(falls(given.blocks), workers=2)
-            print(f"{given.blocks} blocks in memory: {seconds:.1f} s, {each:.0f} us a block, {len(tasks)} tasks")
-            print(f"  by two threads here: {here:.1f} s; ratio {seconds / here:.2f}")
-            tasks.clear()
-            elsewhere = timed(falls(given.stored), folder / "cluster.h5", cluster=client)
-            print(f"{given.stored} blocks stored by two workers: {elsewhere:.1f} s, {len(tasks)} tasks")
-            here = timed(falls(given.stored), folder / "here.h5", workers=2)
-            print(f"{given.stored} blocks stored by two threads here: {here:.1f} s; ratio {elsewhere / here:.2f}")
-        with tempfile.TemporaryDirectory() as name:
-            runs, killed, different, begun = 0, 0, 0, time.monotonic()
-            rng = random.Random(given.seed)
-            while killed < given.kills:
-                more, same = tormented(client, Path(name) / "out.h5", given.kills - killed, rng)
-                runs, killed, different = runs + 1, killed + more, different + (not same)
+    with (
+        served(workers=2, failures=10) as (address, _),
+        Client(address, set_as_default=False) as client,
+        tempfile.TemporaryDirectory() as name,
+    ):
+        folder = Path(name)
+        timed(falls(10), cluster=client)
+        tasks.clear()
+        seconds = timed(falls(given.blocks), cluster=client)
+        each = 1e6 * seconds / given.blocks
+        here = timed(falls(given.blocks), workers=2)
+        print(f"{given.blocks} blocks in memory: {seconds:.1f} s, {each:.0f} us a block, {len(tasks)} tasks")
+        print(f"  by two threads here: {here:.1f} s; ratio {seconds / here:.2f}")
+        tasks.clear()
+        elsewhere = timed(falls(given.stored), folder / "cluster.h5", cluster=client)
+        print(f"{given.stored} blocks stored by two workers: {elsewhere:.1f} s, {len(tasks)} tasks")
+        here = timed(falls(given.stored), folder / "here.h5", workers=2)
+        print(f"{given.stored} blocks stored by two threads here: {here:.1f} s; ratio {elsewhere / here:.2f}")
+    with tempfile.TemporaryDirectory() as name:
+        runs, killed, different, begun = 0, 0, 0, time.monotonic()
+        rng = random.Random(given.seed)
+        while killed < given.kills:
+            more, same = tormented(Path(name) / "out.h5", given.kills - killed, rng)
+            runs, killed, different = runs + 1, killed + more, different + (not same)
     print(f"{killed} workers killed in {runs} runs, {time.monotonic() - begun:.0f} s; with other bits: {different}")
     return int(different > 0)
 

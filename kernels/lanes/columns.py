@@ -23,12 +23,16 @@ def entry(*shared):
     return decorate
 
 
-def _filled_up(compiled, columns, per_cell):
+_ROWS = np.minimum.outer(np.arange(WIDTH), np.arange(WIDTH))
+"""Of so many cells and one more, the cell in each lane."""
+
+
+def _filled_up(compiled, columns, per_cell, read):
     n = len(columns[0])
-    rows = np.minimum(np.arange(WIDTH), n - 1)
-    full = [c.take(rows, axis=0) if cells else c for c, cells in zip(columns, per_cell, strict=True)]
+    rows = _ROWS[n - 1]
+    full = [c[rows] if cells else c for c, cells in zip(columns, per_cell, strict=True)]
     compiled(*full)
-    for column, result in zip(columns, full, strict=True):
+    for column, result in zip(columns[read:], full[read:], strict=True):
         if column is not result and column.flags.writeable:
             column[...] = result[:n]
 
@@ -64,8 +68,11 @@ cell_by_cell = _one_by_one if COMPILED else _plain
 in_groups = _in_groups if COMPILED else _plain
 
 
-def entry_of(function, per_cell, kept):
-    """An entry of columns. `per_cell` says which hold one cell a row (None: few cells need no filling up)."""
+def entry_of(function, per_cell, kept, read=0):
+    """An entry of columns. `per_cell` says which hold one cell a row (None: few cells need no filling up).
+
+    The first `read` columns are only read.
+    """
     if not COMPILED:
         return function
     compiled = cached(function) if kept else jit_entry(function)
@@ -74,7 +81,7 @@ def entry_of(function, per_cell, kept):
         if per_cell is None:
             compiled(*(c if c.flags.writeable else c.copy() for c in columns))
         elif 0 < len(columns[0]) < WIDTH:
-            _filled_up(compiled, columns, per_cell)
+            _filled_up(compiled, columns, per_cell, read)
         elif len(columns[0]):
             compiled(*columns)
 

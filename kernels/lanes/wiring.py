@@ -291,7 +291,7 @@ class _Wiring:
         made = FunctionType(_all_cells.__code__, scope, name)
         made.__qualname__, made.__module__ = f"{self.name}.{name}", function.__module__
         per_cell = None if loop is loops.cell_by_cell else [n not in self.along and n != "asked" for n in names]
-        return signed(entry_of(made, per_cell, kept=is_ours(function)), names)
+        return signed(entry_of(made, per_cell, is_ours(function), len(self.parameters)), names)
 
 
 def signed(function: Any, names: Sequence[str]) -> OnColumns:

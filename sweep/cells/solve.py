@@ -30,11 +30,9 @@ NONE = -1
 """In place of a method's number: no method solved the cell."""
 
 
-def _these(*statuses: Status) -> NDArray[np.bool_]:
-    """Statuses as `among` takes them: in a table, since `choose` asks it of every cell."""
-    table = np.zeros(256, bool)
-    table[list(statuses)] = True
-    return table
+def _these(*statuses: Status) -> bytes:
+    """Statuses as `among` takes them: a table, since `choose` asks it of every cell."""
+    return bytes(code in statuses for code in range(256))
 
 
 GIVEN_UP = _these(
@@ -47,6 +45,8 @@ GIVEN_UP = _these(
     Status.FAILED,
 )
 """After these `auto` tries the next method."""
+NO_METHOD, INACCURATE = np.int8(Status.NO_METHOD), np.int8(Status.INACCURATE)
+"""Not as a `Status`, which numpy compares ten times as slowly."""
 VAGUE = _these(Status.NO_METHOD, Status.NO_CYCLE)
 """Refusals that tell less than how another method gave up."""
 UNKNOWN = _these(Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT)
@@ -79,15 +79,14 @@ class Solver:
         constants = self.grid.constants()
         for k, value in constants.items():
             self._parameters[k][:] = value
-        self._shared = [k in constants for k in range(len(kernel.parameters))] + ["rtol" not in study.axes]
+        self._varying = [k for k in range(len(kernel.parameters)) if k not in constants]
+        self._varying += [len(kernel.parameters)] if "rtol" in study.axes else []
         self._along = [np.array(study.along[field.name]) for field in kernel.along]
-        self._unasked = {
-            field.name: np.empty((cells, *shapes[field.name]))
-            for field in kernel.outputs
-            if field.name not in study.outputs
-        }
+        self._spare: list[NDArray[Any]] = [np.empty((cells, *shapes[field.name])) for field in kernel.outputs]
+        self._spare.append(np.empty(cells, np.int8))
         self._asked = np.array([field.name in study.outputs for field in kernel.outputs], np.uint8)
-        self._rtol, self._bound, self._error = np.empty(cells), np.empty(cells), np.empty(cells)
+        self._wanted = [int(k) for k in self._asked.nonzero()[0]]
+        self._rtol, self._error = np.empty(cells), np.empty(cells)
         self._promised = None if study.kernel_name in catalogue.KERNELS else promised(study)
 
     def solve(self, start: int, cells: Cells, wanted: NDArray[np.bool_] | None = None) -> None:
@@ -110,8 +109,8 @@ class Solver:
 
     def _solve_strip(self, low: int, cells: Cells, wanted: NDArray[np.bool_] | None) -> None:
         high, status, used = low + cells.number, cells.status, cells.used
-        spare = {name: column[: cells.number] for name, column in self._unasked.items()}
-        outputs = [{**spare, **cells.outputs}[field.name] for field in self.study.kernel.outputs]
+        fields = zip(self.study.kernel.outputs, self._spare, strict=False)
+        outputs = [cells.outputs.get(field.name, spare[: cells.number]) for field, spare in fields]
         strip = _Strip(self, cells.number, outputs, status, used)
         self.grid.columns(low, high, strip.parameters)
         self.study.kernel.check(*strip.parameters, status)
@@ -142,8 +141,9 @@ class _Strip:
     def __init__(self, solver: Solver, n: int, outputs: Sequence[Floats], status: Codes, used: Codes) -> None:
         self.kernel, self.along, self.asked = solver.study.kernel, solver._along, solver._asked
         self.parameters = [column[:n] for column in solver._parameters]
-        self._shared = solver._shared
-        self.rtol, self._bound, self.error = solver._rtol[:n], solver._bound[:n], solver._error[:n]
+        self._varying, self._wanted, self._spare = solver._varying, solver._wanted, solver._spare
+        self.rtol, self.error = solver._rtol[:n], solver._error[:n]
+        self._gathered: tuple[Chosen | None, list[Floats]] = None, []
         self.outputs, self.status, self.used = outputs, status, used
         self.usable, self.promised = solver.usable, solver._promised
 
@@ -157,16 +157,19 @@ class _Strip:
         """Solve each cell by the first method whose bound meets rtol and which does not give up."""
         if not _count(cells):
             return
-        self.status[cells] = Status.NO_METHOD
+        self.status[cells] = NO_METHOD
         missed: list[tuple[int, Chosen, Floats]] = []
+        untried = True
         for number in self.usable:
             able = self._promising(number, cells, missed)
             if not _count(able):
                 continue
-            self._improve(number, able)
-            cells = _pick(cells, among(self.status[cells], GIVEN_UP))
-            if not _count(cells):
+            status = self.run(number, able) if untried else self._improve(number, able)
+            left = _pick(cells, among(status if able is cells else self.status[cells], GIVEN_UP))
+            if not _count(left):
                 return
+            untried = untried and _count(left) + _count(able) == _count(cells)
+            cells = left
         if missed:
             self._settle(cells, missed)
 
@@ -176,9 +179,9 @@ class _Strip:
         if method.bound is None:
             return cells
         bound = self.bound(method, cells)
-        able = _pick(cells, bound <= self._of(self.rtol, cells, self._shared[-1]))
-        if _count(able) < _count(cells):
-            missed.append((number, cells, bound.copy()))
+        able = _pick(cells, bound <= self._inputs(cells)[-1])
+        if able is not cells:
+            missed.append((number, cells, bound))
         return able
 
     def _settle(self, cells: Chosen, missed: Sequence[tuple[int, Chosen, Floats]]) -> None:
@@ -200,10 +203,10 @@ class _Strip:
     def _known(self, cells: Chosen) -> Floats:
         """What the values of cells are right to at least; infinite where there are none, 0 where rtol is met."""
         status = self.status[cells]
-        error = np.where(status == Status.INACCURATE, self.error[cells], 0.0)
+        error = np.where(status == INACCURATE, self.error[cells], 0.0)
         return np.where(status < FIRST_REFUSAL, error, np.inf)
 
-    def _improve(self, number: int, cells: Chosen, bound: Floats | None = None) -> None:
+    def _improve(self, number: int, cells: Chosen, bound: Floats | None = None) -> Codes:
         """Run a method, but keep what an earlier one gave to cells where this one is not better.
 
         Where an earlier one did not know what the scene does, and this one knows no cycle of its kind, that is open.
@@ -223,66 +226,54 @@ class _Strip:
                 column[back] = values[worse]
         open_ = among(before, UNKNOWN) & (self.status[cells] == Status.NO_CYCLE)
         self.status[_pick(cells, open_)] = before[open_]
+        return self.status[cells]
 
     def bound(self, method: Method, cells: Chosen) -> Floats:
         """The method's error bound for the cells, over the outputs asked for."""
         assert method.bound is not None
-        out = self._bound[: _count(cells)]
-        columns = self._inputs(cells)
-        method.bound(*columns, *self.along, self.asked, out)
+        out = np.empty(_count(cells))
+        method.bound(*self._inputs(cells), *self.along, self.asked, out)
         return out
 
     def _inputs(self, cells: Chosen) -> list[Floats]:
-        """Parameters and rtol of the cells."""
-        columns = (*self.parameters, self.rtol)
-        return [self._of(column, cells, shared) for column, shared in zip(columns, self._shared, strict=True)]
+        """Parameters and rtol of the cells; those asked for last are kept: the columns of a bound serve its run."""
+        if self._gathered[0] is not cells:
+            columns = (*self.parameters, self.rtol)
+            found = _rows(columns, cells)
+            if not isinstance(cells, slice):
+                for k in self._varying:
+                    found[k] = columns[k].take(cells, axis=0)
+            self._gathered = cells, found
+        return self._gathered[1]
 
-    @staticmethod
-    def _of(column: Floats, cells: Chosen, shared: bool) -> Floats:
-        """A column's values in the cells; of one that is the same in all, any as many rows."""
-        if isinstance(cells, slice):
-            return column[cells]
-        return column[: cells.size] if shared else column.take(cells, axis=0)
-
-    @staticmethod
-    def _room(column: NDArray[Any], cells: Chosen) -> NDArray[Any]:
-        """Where results of the cells go: to their places, if these lie side by side."""
-        if isinstance(cells, slice):
-            return column[cells]
-        return np.empty((cells.size, *column.shape[1:]), column.dtype)
-
-    def run(self, number: int, cells: Chosen, bound: Floats | None = None) -> None:
+    def run(self, number: int, cells: Chosen, bound: Floats | None = None) -> Codes:
         """Solve the cells by one method: in place where they lie side by side, else gathered and put back.
 
-        `bound` is the method's where it may exceed rtol.
+        `bound` is the method's where it may exceed rtol. Returns what became of the cells.
         """
-        if not _count(cells):
-            return
         method, columns = self.kernel.methods[number], self._inputs(cells)
-        asked, error = ([self.asked], [self.error]) if method.estimates else ([], [])
-        targets: list[NDArray[Any]] = [*self.outputs, *error, self.status]
-        results = [self._room(column, cells) for column in targets]
-        method.solve(*columns, *self.along, *asked, *results)
+        targets: list[NDArray[Any]] = [*self.outputs, self.status]
+        results = _rows(targets if isinstance(cells, slice) else self._spare, cells)
+        *outputs, status = results
+        asked, error = ([self.asked], [np.empty(len(status))]) if method.estimates else ([], [])
+        method.solve(*columns, *self.along, *asked, *outputs, *error, status)
         if self.promised is not None:
-            fail(results[-1], [results[k] for k in self.promised])
+            fail(status, [outputs[k] for k in self.promised])
+        self._judge(cells, status, error[0] if error else None, bound)
         if not isinstance(cells, slice):
-            asked_for = [*self.asked, *[True] * (len(targets) - len(self.asked))]
-            for column, result, wanted in zip(targets, results, asked_for, strict=True):
-                if wanted:
-                    column[cells] = result
+            for k in (*self._wanted, -1):
+                targets[k][cells] = results[k]
         self.used[cells] = number
-        self._judge(method, cells, bound)
+        return status
 
-    def _judge(self, method: Method, cells: Chosen, bound: Floats | None) -> None:
+    def _judge(self, cells: Chosen, status: Codes, error: Floats | None, bound: Floats | None) -> None:
         """Remark values of which less is known than rtol, and note what they are right to; NaN tells nothing."""
-        status = self.status[cells]
-        said = status == Status.INACCURATE
-        if bound is None and not method.estimates and not said.any():
+        if bound is None and error is None and not np.count_nonzero(status):
             return
-        known = self.error[cells] if method.estimates else np.where(said, np.inf, 0.0)
+        known = np.where(status == INACCURATE, np.inf, 0.0) if error is None else error
         known = known if bound is None else np.maximum(known, bound)
         self.error[cells] = np.where(np.isnan(known), np.inf, known)
-        self.status[_pick(cells, ~(known <= self.rtol[cells]) & (status < FIRST_REFUSAL))] = Status.INACCURATE
+        status[~(known <= self._inputs(cells)[-1]) & (status < FIRST_REFUSAL)] = INACCURATE
 
 
 def usable_methods(study: Study) -> tuple[int, ...]:
@@ -299,8 +290,8 @@ def _worse(status: Codes, error: Floats, earlier: Codes, earlier_error: Floats) 
     """Where what a method gave is not better than what an earlier one did."""
     refused, valued = status >= FIRST_REFUSAL, earlier < FIRST_REFUSAL
     lost = refused & (valued | (among(status, VAGUE) & ~among(earlier, VAGUE)))
-    doubtful = earlier == Status.INACCURATE
-    loose = doubtful & (status == Status.INACCURATE) & ~(error < earlier_error)
+    doubtful = earlier == INACCURATE
+    loose = doubtful & (status == INACCURATE) & ~(error < earlier_error)
     worse: NDArray[np.bool_] = lost | loose | (doubtful & (status == Status.UNSTABLE))
     return worse
 
@@ -308,7 +299,7 @@ def _worse(status: Codes, error: Floats, earlier: Codes, earlier_error: Floats) 
 def _tell_errors(column: Singles, error: Floats, status: Codes) -> None:
     """What INACCURATE values are right to, rounded up; NaN elsewhere."""
     column.fill(np.nan)
-    hits = status == Status.INACCURATE
+    hits = status == INACCURATE
     with np.errstate(over="ignore"):
         column[hits] = error[hits] * (1 + 2.0**-23)
 
@@ -351,9 +342,15 @@ def _pick(cells: Chosen, condition: NDArray[np.bool_]) -> Chosen:
     return shifted
 
 
-def among(status: Codes, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Where a status is one of some, which are those with True at their number."""
-    return some[status.view(np.uint8)]
+def among(status: Codes, some: bytes) -> NDArray[np.bool_]:
+    """Where a status is one of some, which are those with 1 at their number."""
+    return np.frombuffer(status.tobytes().translate(some), bool)
+
+
+def _rows(columns: Sequence[NDArray[Any]], cells: Chosen) -> list[NDArray[Any]]:
+    """Views of the cells where these lie side by side; else of as many rows."""
+    rows = cells if isinstance(cells, slice) else slice(cells.size)
+    return [column[rows] for column in columns]
 
 
 def _count(cells: Chosen) -> int:

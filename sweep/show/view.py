@@ -163,8 +163,10 @@ def is_number_axis(y: xr.DataArray, name: str) -> bool:
 
 def edges(grid: NDArray[np.float64]) -> NDArray[np.float64]:
     """Edges of the cells around the points of a grid, (n + 1,): halfway; of a logarithmic grid in logarithms."""
+    if grid.size == 1:
+        return grid + np.array([-0.5, 0.5])
     at = np.log(grid) if is_logarithmic(grid) else grid
-    middle = (at[1:] + at[:-1]) / 2 if at.size > 1 else at + 0.5
+    middle = (at[1:] + at[:-1]) / 2
     around = np.concatenate([[2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]])
     return np.exp(around) if is_logarithmic(grid) else around
 

@@ -388,6 +388,8 @@ def test_a_chain_is_not_split_where_what_is_dropped_would_be_felt_beyond_the_las
     for e, end in ((2.0**-110, 2), (2.0**-127, 1)):
         assert _split(0, 2, entries([2.0**-40, far], [e], [2.0**40, 2.0**40]), 1.0) == end
     assert _split(0, 2, entries([far, 2.0**-40], [2.0**-127], [1 / far, 2.0**40]), 1.0) == 2
+    near = 2.0**-30
+    assert _split(0, 2, entries([2.0**-40, near], [2.0**-100], [2.0**40, 2.0**40 + 1 / near]), 1.0) == 2
 
 
 def test_the_part_with_the_smallest_eigenvalue_is_brought_to_the_end():

@@ -14,7 +14,7 @@ import sweep
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.block import warm
 from sweep.cells.grid import Cells, Grid
-from sweep.cells.solve import NONE, STRIP, UNKNOWN, Solver, usable_methods
+from sweep.cells.solve import NONE, STRIP, UNKNOWN, Solver, among, usable_methods
 from sweep.results.statuses import account
 
 NAMES = [m.name for m in KERNEL.methods]
@@ -75,6 +75,35 @@ def test_auto_goes_on_where_a_method_gives_up(verdict):
     assert used.tolist() == [0, 1, 0, 1]
     assert (status == Status.OK).all()
     assert outputs["impact_speed"] == pytest.approx([1.0, np.sqrt(4 * 9.80665), 1.0, np.sqrt(6 * 9.80665)])
+
+
+def test_auto_goes_on_where_a_method_gives_up_that_is_promised_for_some_cells_alone():
+    def gives_up(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
+        fall_time[...], impact_speed[...], drop[...] = 1.0, 1.0, 1.0
+        status[...] = np.where(height > 2.5, Status.NOT_CONVERGED, Status.OK)
+
+    def odd(height, v0, g, rtol, phase, asked, out):
+        out[...] = np.where(height % 2.0 == 1.0, 0.0, np.inf)
+
+    study = toy_study(axes={"height": np.array([1.0, 2.0, 3.0, 4.0])})
+    outputs, status, used = solved(with_kernel(study, stand_in(rough=(gives_up, odd))))
+    assert used.tolist() == [0, 1, 1, 1]
+    assert (status == Status.OK).all()
+    assert outputs["impact_speed"] == pytest.approx([1.0, *np.sqrt(2 * 9.80665 * np.array([2.0, 3.0, 4.0]))])
+
+
+def test_cells_that_do_not_lie_side_by_side_keep_their_own_rtol():
+    def tells_rtol(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
+        fall_time[...], impact_speed[...], drop[...], status[...] = 1.0, rtol, 1.0, Status.OK
+
+    def coarse(height, v0, g, rtol, phase, asked, out):
+        out[...] = np.where(rtol >= 1e-6, 0.0, np.inf)
+
+    wanted = [1e-3, 1e-12, 1e-6, 1e-9]
+    study = toy_study(axes={"rtol": wanted}, fixed={"v0": 0.0, "height": 1.0})
+    outputs, _, used = solved(with_kernel(study, stand_in(rough=(tells_rtol, coarse), exact=(tells_rtol, None))))
+    assert used.tolist() == [0, 1, 0, 1]
+    assert outputs["impact_speed"].tolist() == wanted
 
 
 def test_auto_keeps_inaccurate_values_that_no_later_method_betters():
@@ -366,7 +395,7 @@ def test_auto_does_not_deny_what_an_impact_clock_does_where_following_it_leaves_
     _, status, used = solved(sweep.build_study(**keys))
     _, followed, _ = solved(sweep.build_study(**keys, method="events"))
     closed = solved(sweep.build_study(**keys, method="closed"))[1]
-    open_ = UNKNOWN[followed]
+    open_ = among(followed, UNKNOWN)
     assert (closed == Status.NO_CYCLE).all()
     assert open_[1]
     assert open_.sum() > 20

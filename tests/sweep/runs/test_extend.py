@@ -43,7 +43,7 @@ def solved(monkeypatch):
     def run(self, number, cells, *bound):
         if not sampling:
             counts.append(len(self.status[cells]))
-        real(self, number, cells, *bound)
+        return real(self, number, cells, *bound)
 
     from sweep.cells import block
 
