@@ -1,6 +1,7 @@
 """What cells in processes of their own may take, and what is said of those that took longer, by hand."""
 
 import sys
+import time
 from concurrent.futures import Future
 from types import SimpleNamespace
 
@@ -164,3 +165,74 @@ def test_the_folder_that_a_kernel_is_imported_from(monkeypatch, name, file, path
     if file is not None:
         monkeypatch.setitem(sys.modules, name.partition(":")[0], SimpleNamespace(__file__=file))
     assert kernel_paths(SimpleNamespace(kernel_name=name)) == path
+
+
+class Pool:
+    """An executor that gives nothing, or is slow to end."""
+
+    def __init__(self, slow=False):
+        self.told, self.slow = [], slow
+
+    def submit(self, *words):
+        self.told.append(words)
+
+    def shutdown(self, cancel_futures):
+        self.told.append(("shutdown", cancel_futures))
+        time.sleep(0.3 * self.slow)
+
+
+def with_pool(pool, code=-9):
+    solver, killed = IsolatedSolver(processes(Limits())), []
+    solver._pool, solver._process = pool, SimpleNamespace(kill=lambda: killed.append(1), exitcode=code)
+    return solver, killed
+
+
+def test_a_process_is_killed_and_its_executor_shut_down_once():
+    pool = Pool()
+    solver, killed = with_pool(pool, -11)
+    assert solver._bury(5.0) == -11
+    assert (killed, pool.told, solver._pool) == ([1], [("shutdown", True)], None)
+    assert solver._bury(5.0) is None
+    assert killed == [1]
+    solver._pool, solver._process = Pool(), None
+    assert solver._bury(5.0) is None
+    slow, _ = with_pool(Pool(slow=True))
+    assert slow._bury(0.0) is None  # nobody waits for its status
+
+
+@pytest.mark.parametrize(
+    ("fault", "code", "kind", "said"),
+    [
+        (TimeoutError(), None, isolate.Unsolved, "took longer than 4.5 s"),
+        (TimeoutError(), -9, isolate.Unsolved, "took longer than 4.5 s"),
+        (TimeoutError(), -11, Died, "its process died of SIGSEGV"),
+        (RuntimeError(), -9, Died, "its process died of SIGKILL"),
+        (isolate.CancelledError(), None, Died, "its process died"),
+    ],
+)
+def test_a_process_that_gives_nothing_was_late_or_died(monkeypatch, fault, code, kind, said):
+    solver, _ = with_pool(Pool(), code)
+    if code is None:
+        solver._process = None
+
+    def awaited(*words):
+        raise fault
+
+    monkeypatch.setattr(isolate, "awaited", awaited)
+    with pytest.raises(isolate.Unsolved) as found:
+        solver.call(4.5, len, "x")
+    assert (type(found.value), str(found.value)) == (kind, said)
+
+
+def test_while_a_run_is_stopped_nothing_is_said_of_cells(monkeypatch):
+    solver, _ = with_pool(Pool())
+
+    def awaited(*words):
+        solver._all.over = True
+        raise TimeoutError
+
+    monkeypatch.setattr(isolate, "awaited", awaited)
+    with pytest.raises(isolate.Ended, match="the run is being stopped"):
+        solver.call(4.5, len, "x")
+    with pytest.raises(isolate.Ended, match="the run is being stopped"):
+        solver._begun()
