@@ -1,5 +1,6 @@
 """Blocks on their way to a cluster: which go together, which come back, and what is said of those that do not."""
 
+import math
 from concurrent.futures import CancelledError, Future
 from types import SimpleNamespace
 
@@ -10,8 +11,10 @@ pytest.importorskip("distributed")
 
 from distributed import KilledWorker
 
+from sweep.cells.schema import Column
 from sweep.runs import dispatch
 from sweep.runs.dispatch import Dispatch
+from sweep.runs.worker import digest
 from sweep.system.errors import SweepError
 
 
@@ -134,3 +137,93 @@ def test_a_change_of_threads_is_in_the_log_and_their_absence_is_told(monkeypatch
         found._look_for_workers()
     assert logged == ["the cluster has 2 threads, 4 before", "the cluster has 0 threads, 2 before"]
     assert found.told == ["the cluster has no workers left; waiting for new ones"]
+
+
+COLUMNS = (Column("x", "<f8", ("k",), (2,), {}), Column("status", "i1", (), (), {}))
+
+
+def sent(**changed):
+    arrays = {"x": np.arange(16.0).reshape(8, 2), "status": np.zeros(8, np.int8), **changed}
+    return SimpleNamespace(arrays=arrays, digest=digest(COLUMNS, arrays))
+
+
+def of_columns():
+    found = made()
+    found._blocks.columns, found._blocks.label = COLUMNS, lambda job: f"block {job}"
+    found._blocks.empty = lambda cells: {c.name: c.empty(cells) for c in COLUMNS}
+    return found
+
+
+def test_numbers_come_as_they_were_sent_or_are_refused():
+    good = sent()
+    assert of_columns()._checked(2, good)["x"] is good.arrays["x"]
+    changed = sent()
+    changed.arrays["x"] = changed.arrays["x"] + 1
+    wrong = [
+        sent(x=np.arange(14.0).reshape(7, 2)),
+        sent(x=np.zeros((8, 3))),
+        sent(x=np.zeros((8, 2), np.float32)),
+        sent(status=np.zeros(8, bool)),
+        changed,
+    ]
+    for one in wrong:
+        with pytest.raises(SweepError, match="block 2: damaged on their way from the worker"):
+            of_columns()._checked(2, one)
+
+
+class Known:
+    """Cells below a number are known, and are 7."""
+
+    def __init__(self, below):
+        self.below = below
+
+    def missing(self, start, stop):
+        return np.arange(start, stop) >= self.below
+
+    def fill(self, start, stop, arrays):
+        for column in arrays.values():
+            column[: max(self.below - start, 0)] = 7
+
+
+def test_known_cells_are_filled_in_where_numbers_cannot_be_written_too():
+    found, answer = of_columns(), sent()
+    found._reused = Known(18)
+    answer.arrays["x"].flags.writeable = False
+    arrays = found._checked(2, answer)
+    assert arrays["x"].tolist() == [[7, 7], [7, 7], *([2.0 * k, 2.0 * k + 1] for k in range(2, 8))]
+    assert arrays["status"].tolist() == [7, 7, 0, 0, 0, 0, 0, 0]
+    assert answer.arrays["x"][0, 0] == 0
+
+
+@pytest.mark.parametrize(("below", "known"), [(24, True), (23, False)])
+def test_a_block_is_received_at_once_where_all_of_it_is_known(below, known):
+    found = of_columns()
+    assert found._is_reused(2) is False
+    found._reused = Known(below)
+    assert found._is_reused(2) is known
+    assert len(found.received) == known
+    if known:
+        one = found.received[0]
+        assert (one.block, one.seconds, one.ago, one.bad) == (2, 0.0, 0.0, ())
+        assert one.found["x"].tolist() == [[7, 7]] * 8
+
+
+@pytest.mark.parametrize(
+    ("without", "cells", "reused", "lost", "most"),
+    [
+        ("wait", 1 << 20, None, math.inf, 4),
+        ("here", (32 << 20) // 8 + 1, 5, dispatch.LOST_SECONDS, 1),
+        ("end", 0, None, dispatch.LOST_SECONDS, 32 << 20),
+    ],
+)
+def test_what_workers_are_told(monkeypatch, without, cells, reused, lost, most):
+    monkeypatch.setattr(dispatch, "Assignment", lambda *words: words)
+    monkeypatch.setattr(dispatch, "Absence", lambda seconds: seconds)
+    study = SimpleNamespace(to_json=lambda: "json", kernel_name="foliot")
+    task = SimpleNamespace(note=print, study=study, fingerprint={"a": "1"}, without_workers=without)
+    blocks = SimpleNamespace(partition=SimpleNamespace(cells=cells), row_bytes=8 if cells else 0)
+    found = Dispatch(None, task, blocks, None, reused, "shared", "limits")
+    name, *words = found._assignment
+    assert len(name) == len("foliot-") + 8
+    assert words == ["json", {"a": "1"}, blocks.partition, None if reused else "shared", (), "limits"]
+    assert (found._absence, found._most) == (lost, most)
