@@ -293,3 +293,24 @@ def test_row_blocks_are_a_thousandth_of_a_study_or_a_group():
     assert row_blocks(summed(["b"], a=5, b=4)) == RowBlocks(5, 4, 4)
     assert row_blocks(summed(["b"], a=2, b=5)) == RowBlocks(2, 5, 1)
     assert row_blocks(SimpleNamespace(grid_shape={"a": 6, "b": 7}, summary=None)) == RowBlocks(42, 1, 1)
+
+
+def strips(blocks, *given):
+    return [tuple(strip) for strip in blocks.strips(*given)]
+
+
+def test_strips_of_rows_by_hand():
+    blocks = RowBlocks(groups=3, group=10, length=4)
+    assert (blocks.per_group, blocks.count, blocks.size) == (3, 9, 30)
+    assert blocks.mean == 30 / 9
+    assert blocks.first(np.arange(10)).tolist() == [0, 4, 8, 10, 14, 18, 20, 24, 28, 30]
+    assert blocks.cells(1, 4) == (4, 14)
+    group = [(0, 2, 0, 4), (2, 1, 8, 2)]  # row, rows, cell, cells
+    assert strips(blocks, 0, 3, 8) == strips(blocks, 0, 3, 100) == group
+    assert strips(blocks, 1, 5, 8) == [(1, 1, 4, 4), (2, 1, 8, 2), (3, 2, 10, 4)]
+    assert strips(blocks, 0, 2, 7) == [(0, 1, 0, 4), (1, 1, 4, 4)]
+    assert strips(blocks, 0, 2, 4) == [(0, 1, 0, 4), (1, 1, 4, 4)]
+    assert strips(blocks, 1, 3, 3) == [(1, 1, 4, 3), (1, 1, 7, 1), (2, 1, 8, 2)]
+    assert strips(RowBlocks(5, 4, 4), 0, 5, 8) == [(0, 2, 0, 4), (2, 2, 8, 4), (4, 1, 16, 4)]
+    assert strips(RowBlocks(5, 4, 4), 1, 3, 100) == [(1, 2, 4, 4)]
+    assert strips(RowBlocks(1, 20, 4), 1, 4, 100) == [(1, 3, 4, 4)]

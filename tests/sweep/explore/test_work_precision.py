@@ -452,3 +452,14 @@ def test_cells_at_which_a_kernel_dies_are_left_out_of_a_chart():
     assert (found.attrs["cells"], float(found.ok.min())) == (37, 1.0)
     with pytest.raises(SweepError, match="the kernel failed"):
         work_precision(tall(5, "bad:HOPELESS"), **keys)
+
+
+def test_every_variable_says_what_it_is_and_the_attributes_what_was_measured():
+    found = measured(stones(title="Stones"), reference="exact", methods=["rough"])
+    assert found.attrs["title"] == "Stones"
+    assert (found.attrs["kernel"], found.attrs["missing"]) == ("toy:KERNEL", "")
+    assert {name for name in found.data_vars if found[name].attrs["units"] == "s"} == {"seconds"}
+    assert found.ok.attrs == {"units": "1", "long_name": "share of cells that the method calls right"}
+    assert all(found[name].attrs["long_name"] for name in found.data_vars)
+    weak = with_methods(stones(), Method("weak", "", bad(0, Status.NOT_CONVERGED)))
+    assert measured(weak).attrs["open_cells"] == 1

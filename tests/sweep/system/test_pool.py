@@ -2,11 +2,14 @@ import os
 import signal
 import threading
 import time
+from concurrent.futures import Future
 
+import numpy as np
 import pytest
 
 from sweep.system import pool
-from sweep.system.pool import Cores, CtrlC, Stopper, Terminated, each
+from sweep.system.errors import SweepError
+from sweep.system.pool import BufferPool, Cores, CtrlC, Stopper, Terminated, each, through, whole_number
 
 
 def test_every_job_is_done_once_and_told():
@@ -223,3 +226,89 @@ def test_a_job_that_does_not_end_is_killed_or_given_up(monkeypatch):
     free.set()
     time.sleep(0.1)
     assert wanted == [True, False]
+
+
+def test_what_is_borrowed_comes_back_and_more_is_made_only_where_there_is_too_little():
+    made = []
+
+    def make():
+        made.append(len(made))
+        return made[-1]
+
+    buffers = BufferPool(make, 1)
+    assert made == [0]
+    with buffers.borrow() as one:
+        assert one == 0
+        with buffers.borrow() as two:
+            assert two == 1
+    with pytest.raises(ValueError, match="lost"), buffers.borrow() as one:
+        raise ValueError("lost")
+    with buffers.borrow() as one, buffers.borrow() as two:
+        assert {one, two} == {0, 1}
+    assert made == [0, 1]
+
+
+@pytest.mark.parametrize("capacity", [1, 3])
+def test_no_more_are_submitted_at_a_time_than_there_is_room_for(capacity):
+    told, ends = [], []
+
+    def submit(job):
+        told.append(("submit", job))
+        future = Future()
+        future.set_result(10 * job)
+        return future
+
+    def settled(job, future):
+        ends.append(None if job is None else (job, future.result()))
+        told.append(("settled", job))
+
+    through(range(4), submit, lambda: capacity, settled, lambda: told.append("stop"), CtrlC())
+    assert sorted(e for e in ends if e is not None) == [(k, 10 * k) for k in range(4)]
+    assert [one for one in told if one[0] == "submit"] == [("submit", k) for k in range(4)]
+    first = told.index(("settled", None))
+    assert sum(one[0] == "submit" for one in told[:first]) == capacity
+    assert "stop" not in told
+
+
+def test_a_fault_stops_before_it_goes_on():
+    told = []
+
+    def submit(job):
+        future = Future()
+        future.set_result(job)
+        return future
+
+    def settled(job, future):
+        told.append(job)
+        raise ValueError("no")
+
+    with pytest.raises(ValueError, match="no"):
+        through(range(4), submit, lambda: 2, settled, lambda: told.append("stop"), CtrlC())
+    assert told[-1] == "stop"
+    assert len(told) == 2
+
+
+def test_a_process_told_to_end_has_the_usual_status():
+    assert Terminated().code == 143
+
+
+@pytest.mark.parametrize("number", [1, 7, np.int64(3)])
+def test_a_whole_number_is_taken(number):
+    found = whole_number("workers", number)
+    assert (found, type(found)) == (number, int)
+
+
+@pytest.mark.parametrize("number", [0, -1, 1.0, True, "2", None, np.int64(0)])
+def test_what_is_no_whole_number_is_told(number):
+    with pytest.raises(SweepError, match="workers: expected a whole number from 1 on, found "):
+        whole_number("workers", number)
+
+
+def test_cores_are_those_this_process_may_use(monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {0: range(3), 1: range(9)}[pid], raising=False)
+    assert pool.cores() == 3
+    monkeypatch.delattr(os, "sched_getaffinity")
+    monkeypatch.setattr(os, "cpu_count", lambda: 5)
+    assert pool.cores() == 5
+    monkeypatch.setattr(os, "cpu_count", lambda: None)
+    assert pool.cores() == 1

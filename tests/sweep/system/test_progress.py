@@ -3,7 +3,8 @@ import re
 
 import pytest
 
-from sweep.system.progress import Progress, duration, stream_of
+from sweep.system.errors import SweepError
+from sweep.system.progress import Progress, duration, quantity, seconds_of, span, speed, stream_of
 
 
 class Clock:
@@ -230,3 +231,111 @@ def test_a_log_that_cannot_be_written_any_more_stops_nothing(clock, fault):
     progress.add(50)
     progress.end()
     assert progress.done == 100
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (9.949, "9.9 s"), (9.951, "10 s"), (60.0, "1 min 00 s"), (3599.6, "1 h 00 min"), (3661, "1 h 01 min"),
+        (86400, "1 d 0 h"), (90000 + 7200, "1 d 3 h"), (200_000, "2 d 7 h"),
+    ],
+)  # fmt: skip
+def test_durations_at_the_borders_of_their_units(seconds, text):
+    assert duration(seconds) == text
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "text"),
+    [
+        (0.4, 0.4, "0 to 1 s"), (3, 89.9, "3 to 90 s"), (30, 90, "0 to 2 min"), (60, 5399, "1 to 90 min"),
+        (3600, 5400, "1 to 2 h"), (3600, 129_599, "1 to 36 h"), (86_400, 129_600, "1 to 2 d"),
+    ],
+)  # fmt: skip
+def test_a_span_is_told_in_one_unit_by_the_larger(low, high, text):
+    assert span(low, high) == text
+
+
+@pytest.mark.parametrize(
+    ("rate", "text"),
+    [
+        (9.6, "10 cells/s"),
+        (9.5, "10 cells/s"),
+        (9.4, "9.4 cells/s"),
+        (0.254, "0.25 cells/s"),
+        (51234.4, "51,234 cells/s"),
+    ],
+)
+def test_speeds_read_as_people_say_them(rate, text):
+    assert speed(rate) == text
+
+
+@pytest.mark.parametrize(
+    ("count", "text"),
+    [(999.4, "999 B"), (999.5, "1 kB"), (1e15, "1 PB"), (1e18, "1e+03 PB"), (1e6, "1 MB"), (2.5e9, "2.5 GB")],
+)
+def test_bytes_at_the_borders_of_their_units(count, text):
+    assert quantity(count) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"), [("90", 90), (2, 2), (" 60s ", 60), ("5 min", 300), ("1.5 h", 5400), ("1e-3s", 1e-3)]
+)
+def test_times_are_read_as_they_are_told(text, seconds):
+    assert seconds_of("cell_timeout", text) == seconds
+
+
+@pytest.mark.parametrize("text", ["", "0", "-1", "5 d", "1e999", "ten", "--5", None])
+def test_what_is_no_time_is_told(text):
+    with pytest.raises(SweepError, match='cell_timeout: expected a time like "60s", "5 min" or "1 h", found'):
+        seconds_of("cell_timeout", text)
+
+
+def told_at(stream, clock, times, total=1000):
+    """After how many seconds a line is told, of a run that does cells (seconds, cells)."""
+    progress, found = Progress(total, stream, clock=clock), []
+    for now, cells in times:
+        clock.now = 100.0 + now
+        before = stream.getvalue()
+        progress.add(cells)
+        found += [now] if stream.getvalue() != before else []
+    return found
+
+
+def test_a_log_has_a_line_every_half_minute_or_after_a_twentieth_and_five_seconds(clock):
+    times = [(0.9, 1), (1.0, 1), (30.9, 1), (31.0, 1), (35.9, 60), (36.0, 1), (42, 48), (45, 3), (75, 0)]
+    assert told_at(io.StringIO(), clock, times) == [1.0, 31.0, 36.0, 45, 75]
+
+
+def test_a_terminal_is_redrawn_ten_times_a_second(clock):
+    times = [(1.0, 1), (1.09, 1), (1.11, 1), (1.2, 1), (1.22, 1)]
+    assert told_at(Terminal(), clock, times) == [1.0, 1.11, 1.22]
+
+
+def test_once_a_minute_it_is_in_the_log_of_a_program(clock, monkeypatch):
+    logged = []
+    monkeypatch.setattr("sweep.system.progress.log", lambda *given, **keys: logged.append((*given, keys)))
+    progress = Progress(1000, None, clock=clock)
+    for now, cells in ((59.9, 10), (60.0, 20), (119.9, 10), (120.0, 10)):
+        clock.now = 100.0 + now
+        progress.add(cells)
+    clock.now += 5
+    progress.end()
+    fields = {"cells": 30, "of": 1000, "cells_per_second": 0.5, "seconds_left": 1940.0}
+    assert logged[0] == ("30/1,000 cells (3.0 %), 0.5 cells/s, 32 min 20 s left", "progress", fields)
+    assert [entry[2]["cells"] for entry in logged] == [30, 50, 50]
+    assert logged[2][0] == "50/1,000 cells (5.0 %), 0.4 cells/s, took 2 min 05 s"
+    assert logged[2][2]["seconds"] == 125.0
+
+
+def test_a_shorter_line_is_filled_with_spaces_and_the_next_is_not(clock):
+    screen = Terminal()
+    progress = Progress(100, screen, clock=clock)
+    for text in ("longer", "no", "yes"):
+        progress._say(text)
+    progress.stop()
+    progress.stop()
+    assert screen.getvalue() == "\rsweep: longer\rsweep: no    \rsweep: yes\n"
+
+
+def test_a_grid_without_cells_is_done(clock):
+    assert Progress(0, None, clock=clock).line() == "0/0 cells (100 %)"

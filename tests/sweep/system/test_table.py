@@ -38,3 +38,28 @@ def test_a_narrow_terminal_leaves_thirty_columns(terminal):
 def test_a_column_that_is_empty_everywhere_takes_no_room(terminal):
     terminal(80)
     assert table.columns([("a", "", "b"), ("c", "", "d")]) == "  a  b\n  c  d"
+
+
+def test_what_a_terminal_would_obey_is_shown():
+    assert table.printable("a\x1b[31m\x7f\x9f\xa0\n\tb\r") == "a\\x1b[31m\\x7f\\x9f\xa0\n\tb\\x0d"
+    assert table.printable("\x00\x1f \udc80") == "\\x00\\x1f \\udc80"
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+x", "-x", "@x", "\tx", "\rx"])
+def test_a_formula_of_a_spreadsheet_begins_with_an_apostrophe(text):
+    assert table.cell(text) == f"'{text}"
+
+
+@pytest.mark.parametrize("value", ["-1.5", "+3e4", "-inf", "x=1", "", 3.0, None])
+def test_numbers_and_plain_texts_are_left_alone(value):
+    assert table.cell(value) == value
+
+
+def test_sections_and_pages(terminal):
+    terminal(80)
+    assert table.section("Title", [("a", "b")]) == "Title\n  a  b"
+    assert table.section("Title", []) == ""
+    assert table.page("one", "", "two") == "one\n\ntwo"
+    assert table.columns([]) == ""
+    assert table.columns([("a", "b")], indent="") == "a  b"
+    assert table.columns([("a", ""), ("bcd", "e")]) == "  a\n  bcd  e"

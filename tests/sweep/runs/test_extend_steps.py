@@ -1,0 +1,123 @@
+"""Which cells of an extended grid are known, by counting; and what keeps a result from being extended."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from sweep.cells.grid import Box
+from sweep.runs import extend
+from sweep.runs.extend import Precomputed, Retried, Reused, is_of_another_version, obstacle
+from sweep.study.model import Axis, frozen
+from sweep.system.errors import SweepError
+
+POSITIONS = ([0, -1, 1], [-1, 0, 1, -1], [0, 1, -1, 2, 3])
+
+
+def reused(kind=Reused):
+    """Of a grid of 3 x 4 x 5, some of whose values are new."""
+    made = object.__new__(kind)
+    made._positions = [np.array(p) for p in POSITIONS]
+    made._grid = Box(("a", "b", "c"), (3, 4, 5))
+    return made
+
+
+def known():
+    """Which of the cells have no new value."""
+    return np.array([all(p >= 0 for p in place) for place in itertools.product(*POSITIONS)])
+
+
+def test_known_cells_are_counted():
+    assert reused().cells == known().sum() == 16
+    before = [int(known()[:cell].sum()) for cell in range(61)]
+    assert reused().known_before(np.arange(61)).tolist() == before
+
+
+@pytest.mark.parametrize(("start", "stop"), [(0, 60), (7, 53), (5, 6), (6, 7), (20, 40), (12, 12)])
+def test_missing_cells_are_those_with_a_new_value(start, stop):
+    assert reused().missing(start, stop).tolist() == (~known()[start:stop]).tolist()
+
+
+def test_known_cells_are_filled_in_and_others_left():
+    old = np.arange(16.0).reshape(2, 2, 4)
+    made = reused()
+    made._columns = (extend.Column("x", "f8", (), (), {}),)
+    made._numbers, made._output = {"x": old}, "out.h5"
+    for start, stop in ((0, 60), (7, 53), (43, 60)):
+        found = {"x": np.full(stop - start, -1.0)}
+        made.fill(start, stop, found)
+        expected = np.full(60, -1.0)
+        expected[known()] = np.arange(16.0)
+        np.testing.assert_array_equal(found["x"], expected[start:stop])
+
+
+def test_cells_that_failed_are_missing_and_not_counted():
+    made = reused(Retried)
+    made.__dict__["_failed"] = np.array([3, 7])
+    assert made.known_before(np.array([0, 3, 4, 7, 8, 60])).tolist() == [0, 3, 3, 6, 6, 58]
+
+
+def test_everything_precomputed_is_known():
+    made = Precomputed({"x": np.arange(10.0)}, "before")
+    found = {"x": np.zeros(3)}
+    made.fill(4, 7, found)
+    assert found["x"].tolist() == [4.0, 5.0, 6.0]
+    assert made.missing(4, 7).tolist() == [False] * 3
+    assert (made.known_before(5), made.taken_over) == (5, "before")
+
+
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        ({}, "nothing differs but words"),
+        ({"study": "x"}, "nothing differs but words"),
+        ({"axes.mu": "2"}, ""),
+        ({"numpy": "2"}, ""),
+        ({"source kernels/a.py": "2"}, ""),
+        ({"axes.mu": "2", "rtol": "2", "kernel": "b"}, "kernel differs, too"),
+        ({"design": "zip"}, "design differs, too"),
+        ({"fixed.g": None}, "fixed.g differs, too"),
+    ],
+)
+def test_what_keeps_a_result_from_being_extended(changed, why):
+    old = {"study": "a", "axes.mu": "1", "numpy": "1", "source kernels/a.py": "1", "rtol": "1", "kernel": "a"}
+    old |= {"design": "product", "fixed.g": "1"}
+    new = {name: value for name, value in (old | changed).items() if value is not None}
+    assert obstacle(old, new) == why
+    assert is_of_another_version(old, new) is bool({"numpy", "source kernels/a.py"} & set(changed))
+
+
+def test_only_cells_of_a_product_are_extended():
+    old = {"design": "zip", "axes.mu": "1"}
+    assert obstacle(old, old | {"axes.mu": "2"}) == 'its design is not "product"'
+    old = {"design": "product", "summary.over": "1", "axes.mu": "1"}
+    assert obstacle(old, old | {"axes.mu": "2"}) == "it holds a summary, not cells"
+
+
+def axis(*values):
+    return Axis("mu", frozen(np.array(values)), "values")
+
+
+def test_places_of_values_that_were_there_before():
+    assert extend._positions(axis(1.0, 3.0), axis(1.0, 2.0, 3.0, 4.0)).tolist() == [0, -1, 1, -1]
+    assert extend._positions(axis(2.0), axis(2.0)).tolist() == [0]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ((1.0, 2.0, 3.0), (1.0, 4.0), "axes.mu: 2 of its 3 values so far are not among the new ones, e.g. 2 is not"),
+        ((1.0, 3.0), (3.0, 1.0), "axes.mu: its values so far stand in another order now"),
+        ((0.0,), (-0.0, 1.0), "axes.mu: 1 of its 1 values so far are not"),
+    ],
+)
+def test_an_axis_keeps_every_value_to_the_last_digit_and_their_order(old, new, said):
+    with pytest.raises(SweepError, match=said):
+        extend._positions(axis(*old), axis(*new))
+
+
+def test_eight_cells_of_a_kind_are_taken_evenly():
+    cells = 10 * np.arange(100)
+    assert extend._spread(cells).tolist() == [0, 140, 280, 420, 560, 700, 840, 990]
+    assert extend._spread(cells[:8]).tolist() == cells[:8].tolist()
+    assert extend._spread(cells[:1]).tolist() == [0]
