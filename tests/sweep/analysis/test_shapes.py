@@ -287,3 +287,14 @@ def test_places_widths_and_fades_to_start_from_span_the_window():
     np.testing.assert_allclose(np.exp(shapes.WIDTHS), [0.01, 0.04, 0.12, 0.3], rtol=1e-12)
     assert tuple(-fade for fade in reversed(shapes.FADES)) == shapes.FADES
     assert all(abs(b) < 2 for b in shapes.LOGARITHM.grids[0])  # 1 + B t is positive in the window
+
+
+def test_windows_read_backwards_start_alike():
+    """Where the shape of a bend has a side, both sides are tried; a stretched one has powers to both sides of one."""
+    for law in (shapes.ASYMMETRIC, shapes.UNEVEN):
+        assert law.grids[2][0] == -law.grids[2][1] < 0
+    low, high = np.exp(shapes.STRETCHED.grids[2])
+    np.testing.assert_allclose([low, high], [0.61, 1.35], rtol=0.01)
+    first, second, _ = shapes.THREE.grids
+    np.testing.assert_allclose(sorted(1 - np.array(second)), first, rtol=1e-12)
+    np.testing.assert_allclose(np.diff(first), 0.15, rtol=1e-12)
