@@ -223,7 +223,7 @@ def _range(points: Points) -> tuple[float, float]:
 
 
 def _knots(u: Array) -> int:
-    """Pieces of the spline: one for four points, at most 20."""
+    """Pieces of the spline: one for eight points, at most 20."""
     return int(min(20, max(1, u.size // 8)))
 
 

@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 import sweep
+from sweep.analysis import maps
 from sweep.analysis.maps import contours, exponent_map, fraction
 from sweep.system.errors import SweepError
 
@@ -74,3 +75,43 @@ def test_a_real_sweep_gives_the_regimes_of_the_foliot_as_a_dataset(tmp_path):
         here = alpha.values[found.level.values == level]
         assert np.ptp(here) / here.mean() < 0.02
     found.to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
+
+
+@pytest.mark.parametrize(
+    ("level", "text"),
+    [(5 / 12, "5/12"), (5 / 13, "0.385"), (0.5 + 0.9e-9, "1/2"), (0.5 + 1.1e-9, "0.5"), (-0.123456, "-0.123")],
+)
+def test_fractions_have_denominators_up_to_twelve(level, text):
+    assert fraction(level) == text
+
+
+def test_two_values_an_axis_are_enough_and_words_are_none():
+    field = xr.DataArray([[0.0, 1.0], [2.0, 3.0]], {"x": [0, 1], "y": [0.0, 3.0]}, ("x", "y"), name="z")
+    found = contours(field, (1.5,))
+    np.testing.assert_allclose(2 * found.x + found.y / 3, 1.5, atol=1e-12)
+    assert found.level.attrs == {"units": "1", "long_name": "z on the line"}
+    with pytest.raises(SweepError, match="y has no two numbers"):
+        contours(field.assign_coords(y=["a", "b"]), (1.5,))
+    with pytest.raises(SweepError, match="x has no two numbers"):
+        contours(field.drop_vars("x"), (1.5,))
+    with pytest.raises(SweepError, match="3 dimensions"):
+        contours(field.expand_dims("t"), (1.5,))
+
+
+def test_one_axis_may_be_logarithmic_and_the_other_not():
+    """ln x - y, straight in both."""
+    x, y = np.geomspace(1, 1e4, 9), np.linspace(0, 9, 10)
+    field = xr.DataArray(np.log(x)[:, None] - y, {"x": x, "y": y}, ("x", "y"), name="z", attrs={"units": "m"})
+    found = contours(field, (0.3, -0.4))
+    for at in (0.3, -0.4):
+        one = found.where(found.level == at, drop=True)
+        np.testing.assert_allclose(np.log(one.x) - one.y, at, atol=1e-12)
+    np.testing.assert_array_equal(np.unique(found.line), [0, 1])
+    np.testing.assert_array_equal(found.line == 0, found.level == 0.3)
+    assert found.level.attrs["units"] == "m"
+
+
+def test_borders_are_those_of_weak_scaled_and_strong_drive():
+    found = exponent_map(period(), "mu")
+    np.testing.assert_allclose(np.unique(found.level), [-0.5], rtol=1e-12)  # -1 and -1/3 are only tended to
+    assert [fraction(border) for border in maps.BORDERS] == ["-1", "-1/2", "-1/3"]

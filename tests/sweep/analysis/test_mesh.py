@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+from sweep.analysis import mesh
 from sweep.analysis.mesh import (
     SAFETY,
     are_too_few,
@@ -108,3 +109,163 @@ def test_simplices_whose_numbers_are_alike_by_chance_are_told_apart(monkeypatch)
 def test_edges_have_lengths():
     points = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 4.0]])
     np.testing.assert_array_equal(lengths(points, np.array([[0, 1, 2]])), [[3.0, 4.0, 5.0]])
+
+
+# the pieces, each against its formula written another way
+
+
+def test_axes_are_tilted_by_little_and_each_by_another_angle():
+    found = mesh.tilted(np.eye(3))
+    np.testing.assert_allclose(found, [[1, 0, 0], [0.013, 1, 0], [0.013, 0.013 * 1.3, 1]], rtol=1e-12)
+
+
+def test_edges_are_all_pairs_of_corners():
+    assert mesh.edges(3).tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
+    assert mesh.edges(1).tolist() == [[0, 1]]
+
+
+@pytest.mark.parametrize(("height", "kept"), [(0.9e-9, False), (1.1e-9, True)])
+def test_a_simplex_without_a_volume_is_none(monkeypatch, height, kept):
+    """Sides of 1 and 1 at nearly no angle."""
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, height]])
+    given = type("Joined", (), {"simplices": np.array([[0, 2, 1]])})
+    monkeypatch.setattr(mesh, "Delaunay", lambda _: given)
+    assert simplices(points).tolist() == ([[0, 1, 2]] if kept else [])
+
+
+def test_cells_of_one_axis_are_joined_in_order():
+    assert simplices(np.array([[3.0], [1.0], [2.0]])).tolist() == [[1, 2], [2, 0]]
+
+
+@pytest.mark.parametrize(("axes", "least"), [(1, 3), (2, 6), (3, 10)])
+def test_a_parabola_over_a_simplex_needs_as_many_points_as_it_has_numbers(axes, least):
+    assert are_too_few(np.zeros((least - 1, axes)))
+    assert not are_too_few(np.zeros((least, axes)))
+
+
+def found_of(bend, misfit):
+    none = np.empty((len(bend), 0))
+    return mesh.Parabolas(none.astype(np.intp), none, np.array(bend, dtype=float), np.array(misfit, dtype=float), 3)
+
+
+@pytest.mark.parametrize(
+    ("bend", "misfit", "size", "edge"),
+    [
+        ([4.0, -8.0, 0.4], 0.0, 1.6 * 2.0, [0, 2]),
+        ([3.0, 3.0, 3.0], 0.0, 1.6 * 1.0, [0, 1]),  # in the middle 9/9, on edges 3/4; of alike edges the shortest
+        ([0.0, 7.21, 8.0], 0.1, 1.6 * 2.0 + 0.25, [0, 2]),
+        ([0.0, 7.19, 8.0], 0.1, 1.6 * 2.0 + 0.25, [1, 2]),
+    ],
+)
+def test_errors_and_cuts_are_those_of_the_largest_bend(bend, misfit, size, edge):
+    """A triangle of sides 1 (corners 0, 1), 1.5 (0, 2) and more (1, 2)."""
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.5]])
+    found, cut = interpolation_errors(points, np.array([[0, 1, 2]]), found_of([bend], [misfit]))
+    assert found[0] == pytest.approx(size, rel=1e-12)
+    assert cut.tolist() == [edge]
+
+
+def test_shares_of_corners_add_up_to_a_place():
+    rng = np.random.default_rng(2)
+    place, near = rng.random((4, 4, 3)), rng.random((4, 6, 3))
+    found = mesh._shares(place, near)
+    for one, corners, at in zip(found, place, near, strict=True):
+        expected = np.linalg.solve(np.vstack([corners.T, np.ones(4)]), np.vstack([at.T, np.ones(6)])).T
+        np.testing.assert_allclose(one, expected, atol=1e-9)
+
+
+def test_a_parabola_and_what_it_leaves_are_those_of_least_squares():
+    """Points of no weight are not counted."""
+    rng = np.random.default_rng(4)
+    basis, off, weight = rng.random((2, 9, 3)), rng.random((2, 9)), rng.uniform(0.5, 3, (2, 9))
+    weight[:, :2] = 0.0
+    bend, misfit = mesh._parabola(basis, off, weight)
+    for k in range(2):
+        columns = basis[k] * weight[k][:, None]
+        best, rest, *_ = np.linalg.lstsq(columns, off[k] * weight[k], rcond=None)
+        np.testing.assert_allclose(bend[k], best, rtol=1e-7)
+        assert misfit[k] == pytest.approx(np.sqrt(rest[0] / 7), rel=1e-7)
+
+
+def test_where_nothing_is_told_no_bend_is():
+    bend, misfit = mesh._parabola(np.zeros((1, 4, 3)), np.ones((1, 4)), np.zeros((1, 4)))
+    np.testing.assert_array_equal(bend, np.zeros((1, 3)))
+    np.testing.assert_array_equal(misfit, [0.0])
+
+
+def test_of_two_columns_that_are_alike_each_takes_half():
+    basis = np.ones((1, 4, 2))
+    bend, misfit = mesh._parabola(basis, np.full((1, 4), 3.0), np.ones((1, 4)))
+    np.testing.assert_allclose(bend, [[1.5, 1.5]], rtol=1e-3)
+    assert misfit[0] == pytest.approx(1.5e-12, abs=1e-11)
+
+
+@pytest.mark.parametrize(("axes", "around"), [(1, 4), (2, 12), (3, 20), (4, 20)])
+def test_cells_around_a_simplex_are_the_nearest_to_its_centre(axes, around):
+    rng = np.random.default_rng(axes)
+    points, height = rng.random((60, axes)), rng.random(60)
+    corners = simplices(points)[:5]
+    found = parabolas(points, height, corners)
+    for one, reach, bend, misfit in zip(corners, found.reach, found.bend, found.misfit, strict=True):
+        centre = points[one].mean(axis=0)
+        apart = np.linalg.norm(points - centre, axis=1)
+        near = np.argsort(apart)[: around + axes + 1]
+        assert reach == pytest.approx(apart[near[-1]], rel=1e-12)
+        shares = np.linalg.solve(
+            np.vstack([points[one].T, np.ones(axes + 1)]), np.vstack([points[near].T, np.ones(near.size)])
+        ).T
+        products = np.stack(
+            [shares[:, i] * shares[:, j] for i, j in itertools.combinations(range(axes + 1), 2)], axis=1
+        )
+        weight = np.where(np.isin(near, one), 0.0, 1 / np.maximum(abs(products).sum(axis=1), 0.3))
+        off = (height[near] - shares @ height[one]) * weight
+        best = np.linalg.lstsq(products * weight[:, None], off, rcond=None)[0]
+        np.testing.assert_allclose(bend, best, rtol=2e-3)
+        rest = off - products * weight[:, None] @ best
+        assert misfit == pytest.approx(np.sqrt((rest**2).sum() / (weight > 0).sum()), rel=1e-4)
+
+
+def test_of_few_cells_all_are_around_and_any_new_one_is_nearer():
+    points = np.random.default_rng(1).random((15, 2))
+    few = parabolas(points, points[:, 0] ** 2, simplices(points))
+    assert np.isinf(few.reach).all()
+    points = np.random.default_rng(1).random((16, 2))
+    assert np.isfinite(parabolas(points, points[:, 0] ** 2, simplices(points)).reach).all()
+
+
+def test_batches_make_no_difference(monkeypatch):
+    points = np.random.default_rng(1).random((50, 2))
+    around = with_beyond(simplices(points))
+    whole = parabolas(points, np.sin(points[:, 0]), around)
+    monkeypatch.setattr(mesh, "BATCH", 7)
+    for one, other in zip(whole, parabolas(points, np.sin(points[:, 0]), around), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9)
+
+
+@pytest.mark.parametrize("axes", [1, 2, 3])
+def test_corners_beyond_are_those_of_neighbours_and_of_theirs(axes):
+    corners = simplices(np.random.default_rng(axes).random((12, axes)))
+
+    def beyond(one, face):
+        """The corner opposite of a face, and its simplex; the simplex itself where there is none."""
+        for number, other in enumerate(corners):
+            if number != one and face <= set(other):
+                return number, (set(other) - face).pop()
+        return one, None
+
+    found = with_beyond(corners)
+    for one, row in enumerate(corners):
+        opposite, further = [], []
+        for corner in row:
+            neighbour, point = beyond(one, set(row) - {corner})
+            opposite.append(row[0] if point is None else point)
+            there = corners[neighbour]
+            across = [(beyond(neighbour, set(there) - {c})[1]) for c in there]
+            further += [there[0] if point is None else point for point in across]
+        np.testing.assert_array_equal(found[one], [*row, *opposite, *further])
+
+
+def test_the_edge_of_the_largest_value_is_picked():
+    corners = np.array([[5, 7, 9], [1, 2, 4]])
+    picked = mesh.largest(corners, np.array([[0.0, 2.0, 1.0], [3.0, 2.0, 9.0]]))
+    assert picked.tolist() == [[5, 9], [2, 4]]

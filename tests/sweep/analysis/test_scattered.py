@@ -1,10 +1,13 @@
 """Cells that lie anywhere in a box: joined, interpolated, found on lines."""
 
+import itertools
+
 import numpy as np
 import pytest
 import xarray as xr
 from scipy.interpolate import LinearNDInterpolator
 
+from sweep.analysis import scattered
 from sweep.analysis.mesh import simplices
 from sweep.analysis.metric import stretch
 from sweep.analysis.scattered import Box, axes_of, heights, interpolated, on_lines
@@ -113,3 +116,100 @@ def test_heights_are_logarithms_or_shares():
     np.testing.assert_allclose(heights(np.array([1.0, np.e, np.nan])), [0, 1, np.nan])
     np.testing.assert_allclose(heights(np.array([-1.0, 4.0, 0.0])), [-0.25, 1, 0])
     np.testing.assert_allclose(heights(np.zeros(2)), 0)
+
+
+# the pieces, each against its formula written another way
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "logarithmic"),
+    [(1.0, 1.999, True), (1.0, 1.9989, False), (0.0, 10.0, False), (1e-9, 1.0, True), (-2.0, -1.0, False)],
+)
+def test_a_positive_axis_to_twice_its_start_is_logarithmic(low, high, logarithmic):
+    box = Box.of({"a": np.array([low, high])})
+    assert box.logarithmic.tolist() == [logarithmic]
+    middle = np.sqrt(low * high) if logarithmic else (low + high) / 2
+    assert box.points({"a": np.array([middle])})[0, 0] == pytest.approx(0.5, rel=1e-9)
+    assert box.values(0, np.array([0.5]))[0] == pytest.approx(middle, rel=1e-9)
+
+
+def test_outputs_are_positive_where_all_that_are_there_are():
+    for values, positive in (([1.0, np.nan], True), ([0.0, 1.0], False), ([-1.0, 2.0], False), ([np.nan], False)):
+        assert scattered.is_positive(np.array(values)) == positive
+    assert scattered._size(np.array([1.0, -3.0, np.inf])) == 3.0
+    assert scattered._size(np.array([0.0, np.nan])) == 1.0
+
+
+def test_shares_of_corners_are_barycentric_coordinates():
+    rng = np.random.default_rng(3)
+    points, at = rng.random((30, 2)), rng.uniform(0.3, 0.7, (20, 2))
+    corners, shares = scattered.located(points, at)
+    np.testing.assert_allclose(shares.sum(axis=1), 1.0, rtol=1e-12)
+    assert (shares >= 0).all()
+    np.testing.assert_allclose(np.einsum("nk,nkd->nd", shares, points[corners]), at, atol=1e-12)
+    assert np.isnan(scattered.located(points, np.array([[2.0, 0.5]]))[1]).all()
+
+
+def test_points_out_of_a_simplex_by_rounding_are_in_it():
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    near, far = scattered.located(square, np.array([[0.5, -0.5e-9], [0.5, -1e-7]]))[1]
+    assert near.tolist() == [share if share == 0 else pytest.approx(0.5, abs=0.01) for share in near]
+    assert (near == 0).sum() == 1  # what is less than rounding is none
+    assert np.isnan(far).all()
+
+
+def test_the_status_is_that_of_the_corner_with_the_largest_share():
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    at = np.array([[0.1, 0.1], [0.9, 0.2], [0.2, 0.9], [0.9, 0.9]])
+    assert scattered._nearest(points, at).tolist() == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_between_corners_values_are_even_or_even_in_logarithms(sign):
+    """A box of four corners: half-way along an edge is a mean."""
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    values = sign * np.array([1.0, 4.0, 9.0, 16.0])
+    found = scattered._between(values, points, np.array([[0.5, 0.0], [0.0, 0.5]]))
+    np.testing.assert_allclose(found, [2.0, 3.0] if sign > 0 else [-2.5, -5.0], rtol=1e-9)
+
+
+@pytest.mark.parametrize(("axes", "taken"), [(1, False), (2, True), (5, True), (6, False)])
+def test_boxes_have_two_to_five_axes(axes, taken):
+    corners = np.array(list(itertools.product([1.0, 3.0], repeat=axes)))
+    names = list("abcdef"[:axes])
+    coords = {name: ("cell", column) for name, column in zip(names, corners.T, strict=True)}
+    ds = xr.Dataset({"status": ("cell", np.zeros(len(corners), np.int8))}, coords)
+    assert axes_of(ds) == (names if taken else [])
+    assert axes_of(ds.assign_coords(fixed=("cell", np.ones(len(corners))))) == (names if taken else [])
+    assert axes_of(ds.drop_vars("status")) == []
+
+
+@pytest.mark.parametrize(("number", "lines"), [(4, 0), (5, 3)])
+def test_lines_have_five_cells_and_reach_from_end_to_end(number, lines):
+    """Three lines of so many cells, one that stops short of each end, and one cell beside."""
+    whole = np.geomspace(1, 100, number)
+    a = np.concatenate([np.tile(whole, 3), np.linspace(1, 99, 6), np.linspace(2, 100, 6), [5.0]])
+    b = np.concatenate([np.repeat([1.0, 3.0, 100.0], number), np.full(6, 5.0), np.full(6, 7.0), [9.0]])
+    ds = xr.Dataset(
+        {"y": ("cell", a * b), "status": ("cell", np.zeros(a.size, np.int8))}, {"a": ("cell", a), "b": ("cell", b)}
+    )
+    if not lines:
+        with pytest.raises(SweepError, match=r"no 5 cells lie on one line from end to end of it; .* \(6 cells\)"):
+            on_lines(ds, "a")
+        return
+    found = on_lines(ds, "a")
+    assert found.b.values.tolist() == [1.0, 3.0, 100.0]
+    np.testing.assert_array_equal(found.y, whole * np.array([[1.0], [3.0], [100.0]]))
+    assert found.attrs["lines"].startswith("15 of 28 cells lie on 3 lines")
+
+
+@pytest.mark.parametrize(("cells_beside", "told"), [(4, False), (5, True)])
+def test_shorter_lines_are_told_of_from_five_cells_on(cells_beside, told):
+    count, long = np.array([6, cells_beside]), np.array([True, False])
+    text = scattered._lines_told("a", ["b"], np.array([[1.0], [2.5]]), count, long)
+    assert text.startswith(f"6 of {6 + cells_beside} cells lie on 1 lines")
+    assert text.endswith("or a shorter one, e.g. --at b=2.5 (5 cells)." if told else "; no shorter line has 5.")
+
+
+def test_lines_are_labelled_by_six_digits():
+    assert scattered._label(["b", "c"], np.array([1 / 3, 1234567.0])) == "b = 0.333333, c = 1.23457e+06"
