@@ -138,3 +138,11 @@ def test_a_cross_marks_a_cell_or_none():
     assert drawn.chosen.data == {"x": [1.0], "y": [2.0]}
     drawn.mark(None, None)
     assert drawn.chosen.data == {"x": [], "y": []}
+
+
+def test_colours_of_lines_begin_anew_after_the_last():
+    found = seen(np.ones((8, 2)), [1.0, 2.0], np.arange(8.0))
+    drawn = Picture(found, Scales(False, False))
+    drawn.show(found, False)
+    assert drawn.lines.data["colour"] == [*COLOURS, COLOURS[0]]
+    assert drawn.points.data["colour"].tolist() == [colour for colour in (*COLOURS, COLOURS[0]) for _ in range(2)]
