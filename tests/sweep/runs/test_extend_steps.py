@@ -121,3 +121,40 @@ def test_eight_cells_of_a_kind_are_taken_evenly():
     assert extend._spread(cells).tolist() == [0, 140, 280, 420, 560, 700, 840, 990]
     assert extend._spread(cells[:8]).tolist() == cells[:8].tolist()
     assert extend._spread(cells[:1]).tolist() == [0]
+
+
+@pytest.fixture
+def pieces(monkeypatch):
+    """Columns are read in three pieces."""
+    monkeypatch.setattr(extend, "flat_pieces", lambda column: np.array_split(column.ravel(), 3))
+
+
+def test_what_failed_is_computed_again_and_the_rest_is_kept(pieces):
+    made = object.__new__(Retried)
+    made._positions, made._grid = [np.arange(4), np.arange(5)], Box(("a", "b"), (4, 5))
+    status = np.zeros((4, 5), np.int8)
+    status.ravel()[[1, 8, 9, 19]] = extend.Status.FAILED
+    made._columns = tuple(extend.Column(name, "f8", (), (), {}) for name in ("x", "status"))
+    made._numbers = {"x": np.arange(20.0).reshape(4, 5), "status": status}
+    assert made._failed.tolist() == [1, 8, 9, 19]
+    for start, stop in ((0, 20), (7, 13)):
+        again = np.isin(np.arange(start, stop), [1, 8, 9, 19])
+        assert made.missing(start, stop).tolist() == again.tolist()
+        arrays = {"x": np.full(stop - start, -1.0), "status": np.full(stop - start, 5.0)}
+        made.fill(start, stop, arrays)
+        assert arrays["x"].tolist() == np.where(again, -1.0, np.arange(start, stop)).tolist()
+        assert arrays["status"].tolist() == np.where(again, 5.0, 0.0).tolist()
+
+
+def test_a_sample_has_cells_of_every_status_and_method(pieces):
+    made = reused()
+    status, used = np.zeros((2, 2, 4), np.int8), np.ones((2, 2, 4), np.int8)
+    status.ravel()[[3, 12]], used.ravel()[[5, 12]] = 64, 0
+    made._numbers = {"status": status, "method_used": used}
+    numbers = {int(cell): old for old, cell in enumerate(np.flatnonzero(known()))}
+    old = [numbers[cell] for cell in made._sample()]
+    assert {3, 5, 12} < set(old)
+    plain = sorted(set(old) - {3, 5, 12})
+    assert len(plain) == 8
+    assert (plain[0], plain[-1]) == (0, 15)
+    assert len(old) == 11
