@@ -1,0 +1,321 @@
+"""Stencils, lines and roots of plain arrays, against numpy's polynomials, statsmodels and hand-made cases."""
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+from scipy.linalg import null_space
+from scipy.ndimage import maximum_filter1d
+from scipy.stats import norm
+
+from sweep.analysis import loglog
+from sweep.analysis.loglog import brackets, interpolation_errors, is_logarithmic, line, root, runs, spans_decades, tends
+
+EPSILON = 2.0**-52
+
+
+def derivative(t, points):
+    """Matrix that takes values to slopes of the polynomials through `points` neighbours, half of them before."""
+    points = min(points, t.size)
+    found = np.zeros((t.size, t.size))
+    for i, here in enumerate(t):
+        first = min(max(i - points // 2, 0), t.size - points)
+        near = slice(first, first + points)
+        powers = (t[near, None] - here) ** np.arange(points)
+        found[i, near] = np.linalg.inv(powers)[1]
+    return found
+
+
+def uneven(n):
+    return np.linspace(-1.0, 1.0, n) + 0.02 * np.sin(5.0 * np.arange(n))
+
+
+def norms(matrix):
+    return np.sqrt((matrix**2).sum(axis=1))
+
+
+def near(values):
+    return maximum_filter1d(values, 5, mode="nearest")
+
+
+# slopes and their errors
+
+
+@pytest.mark.parametrize("points", [2, 3, 4, 5, 7])
+@pytest.mark.parametrize("n", [3, 4, 5, 6, 9])
+def test_slopes_are_those_of_polynomials_through_neighbours(points, n):
+    t = uneven(n)
+    z = np.random.default_rng(n).standard_normal((2, n))
+    np.testing.assert_allclose(loglog.slopes(t, z, points), z @ derivative(t, points).T, rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("n", "orders"), [(3, (3, 2, 2)), (4, (4, 2, 2)), (5, (5, 3, 2)), (6, (7, 5, 3)), (19, (7, 5, 3))]
+)
+def test_the_error_of_a_slope_among_few_points_is_the_most_that_orders_noise_and_steps_say(n, orders):
+    t, rng = uneven(n), np.random.default_rng(n)
+    fine, middle, rough = (derivative(t, points) for points in orders)
+    for z in (rng.standard_normal(n), np.exp(t), np.where(t < 0.1, 0.0, t - 0.1)):
+        apart, coarse = abs((fine - middle) @ z), abs((rough - middle) @ z)
+        steps = np.diff(z) / np.diff(t)
+        beside = np.maximum(abs(np.r_[steps[0], steps] - middle @ z), abs(np.r_[steps, steps[-1]] - middle @ z))
+        sharp = 4 * apart > coarse
+        bend = near(np.maximum(apart, np.where(sharp, beside, coarse)))
+        noise = np.median(apart / norms(fine - middle)) / norm.ppf(0.75) * norms(middle)
+        expected = 2.05 * np.maximum(noise, bend) + EPSILON * (1 + abs(z).max()) * norms(middle)
+        np.testing.assert_allclose(loglog.slope_errors(t, z), expected, rtol=1e-4, atol=1e-11)
+
+
+@pytest.mark.parametrize("n", [20, 41])
+def test_the_error_of_a_slope_among_many_points_is_of_noise_except_near_a_bend(n):
+    t = uneven(n)
+    z = np.sin(17.0 * np.arange(n) ** 2)  # as good as noise
+    for bump in (0.0, 30.0):
+        z = z + bump * (np.arange(n) == n // 2)
+        fine, middle, rough = (derivative(t, points) for points in (7, 5, 3))
+        apart, coarse = abs((fine - middle) @ z), abs((rough - middle) @ z)
+        steps = np.diff(z) / np.diff(t)
+        beside = np.maximum(abs(np.r_[steps[0], steps] - middle @ z), abs(np.r_[steps, steps[-1]] - middle @ z))
+        each = apart / norms(fine - middle)
+        size = np.median(each) / norm.ppf(0.75)
+        bend = near(np.where(4 * apart > coarse, np.maximum(apart, beside), apart))
+        by_noise = size * norms(middle)
+        error = np.where(near(each) > 4 * size, np.maximum(by_noise, bend), by_noise)
+        expected = 2.05 * error + EPSILON * (1 + abs(z).max()) * norms(middle)
+        np.testing.assert_allclose(loglog.slope_errors(t, z), expected, rtol=1e-4)
+        assert (near(each) > 4 * size).any() == (bump > 0)
+
+
+def test_the_slope_of_a_constant_is_known_to_rounding():
+    t = uneven(9)
+    expected = EPSILON * 8.5 * norms(derivative(t, 5))
+    np.testing.assert_allclose(loglog.slope_errors(t, np.full(9, -7.5)), expected, rtol=1e-8)
+
+
+def test_stated_errors_of_the_values_are_added_to_the_error_of_a_slope():
+    t = uneven(9)
+    z, bound = np.exp(t), 1e-3 * (1 + t**2)
+    z[0] = np.nan
+    added = loglog.slope_errors(t, z, bound) - loglog.slope_errors(t, z)
+    np.testing.assert_allclose(added[1:], abs(derivative(t[1:], 5)) @ bound[1:], rtol=1e-8)
+    np.testing.assert_array_equal(loglog.slope_errors(t, z, 0 * bound), loglog.slope_errors(t, z))
+
+
+@pytest.mark.parametrize(
+    ("steps", "points"),
+    [
+        ([1, 2, 3, -3, -2, -1], [3]),  # a point on the pole
+        ([-1, -2, -3, 3, 2, 1], [3]),
+        ([1, 2, 3, 9, -3, -2, -1], [3, 4]),  # within a step
+        ([0.5, 1, 2, 3, -3, -2, -1], [3, 4]),  # or so it may be
+        ([1, 2, 3, -3, -2, -1, -0.5], [3, 4]),
+        ([1, 2, 3, 3, 2, 1], []),  # no change of sign
+        ([1, 2, 2, -3, -2, -1], []),  # grows no more
+        ([2, 1, 3, -3, -2, -1], []),
+        ([1, 2, 3, -3, -2, -2], []),
+        ([1, 2, 3, -3, -1, -2], []),
+        ([-1, 2, 3, -3, -2, -1], []),  # of two signs on one side
+        ([1, -2, 3, -3, -2, -1], []),
+        ([1, 2, 3, -3, 2, -1], []),
+        ([1, 2, 3, -3, -2, 1], []),
+        ([1, 2, 3, 9, 3, 2, 1], []),
+        ([2, 3, -3, -2, -1], []),  # too few
+        ([0.0] * 7, []),
+    ],
+)
+def test_a_pole_is_where_three_steps_grow_towards_three_of_the_other_sign(steps, points):
+    found = loglog._beside_pole(np.array([steps, steps], dtype=float))
+    assert [np.flatnonzero(row).tolist() for row in found] == [points, points]
+    assert found.shape == (2, len(steps) + 1)
+
+
+def test_beside_a_pole_the_slope_is_not_known():
+    t = np.linspace(-1, 1, 41) + 0.01
+    found = loglog.slope_errors(t, np.log(abs(t)))
+    assert np.flatnonzero(np.isinf(found)).tolist() == [19, 20, 21]
+
+
+def test_bounds_of_slopes_are_sums_of_the_sizes_of_all_weights():
+    t, bound = uneven(8), np.random.default_rng(3).random((2, 8))
+    for points in (3, 5):
+        expected = bound @ abs(derivative(t, points)).T
+        np.testing.assert_allclose(loglog.slope_bounds(t, bound, points), expected, rtol=1e-9)
+
+
+def test_the_largest_near_is_of_two_neighbours_on_each_side():
+    values = np.random.default_rng(1).random((2, 9))
+    np.testing.assert_array_equal(loglog._largest_near(values), maximum_filter1d(values, 5, axis=-1, mode="nearest"))
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_points_are_off_their_neighbours_by_what_no_polynomial_has(count):
+    """The one direction of count + 1 values, of size 1, that polynomials of degree below count have nothing of."""
+    t, z = uneven(9), np.random.default_rng(2).standard_normal(9)
+    expected = []
+    for i in range(9 - count):
+        here = slice(i, i + count + 1)
+        expected.append(abs(null_space(np.vander(t[here], count).T)[:, 0] @ z[here]))
+    np.testing.assert_allclose(abs(interpolation_errors(t, z, count)), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("present", "expected"),
+    [
+        ([1, 1, 0, 1, 0, 1, 1, 1], [(0, 2), (3, 4), (5, 8)]),
+        ([0, 1, 0], [(1, 2)]),
+        ([0, 0], []),
+        ([], []),
+    ],
+)
+def test_runs_are_unbroken(present, expected):
+    assert list(runs(np.array(present, dtype=bool))) == expected
+
+
+# where an exponent tends
+
+
+@pytest.mark.parametrize(("span", "step"), [(8.0, 1.0), (80.0, np.log(10))])
+@pytest.mark.parametrize("amplitude", [0.3, -0.3])
+def test_a_change_that_fades_geometrically_is_gone_through_three_times(span, step, amplitude):
+    """Its limit L is amplitude below: three times over it is at L - 2 amplitude."""
+    t = 5.0 + np.concatenate([step * np.arange(3), [span]])
+    local = -1.0 + amplitude * np.array([1.0, 2.0, 4.0, 0.0])
+    assert tends(t, local, 0.0) == pytest.approx((-1.0 + amplitude, -1.0 - 2 * amplitude), abs=1e-12)
+
+
+@pytest.mark.parametrize("local", [[0.0, 1.0, 2.0], [0.0, 2.0, 3.0], [0.0, 1.0, -1.0], [0.0, 1.0, 1.0]])
+def test_a_change_that_does_not_slow_down_goes_on_thirty_times(local):
+    t = np.array([0.0, 1.0, 2.0, 8.0])
+    first, limit = tends(t, np.array([*local, 0.0]), 0.0)
+    assert (first, limit) == pytest.approx((local[0], local[0] + 30 * (local[0] - local[1])))
+
+
+def test_what_is_within_doubt_is_no_change():
+    t, local = np.array([0.0, 1.0, 2.0, 8.0]), np.array([0.0, 0.5, 1.5, 0.0])
+    assert tends(t, local, 0.5) == (0.0, 0.0)
+    assert tends(t, local, 0.49)[1] == pytest.approx(3 * 0.25 / (-1.0 + 0.5))
+    np.testing.assert_allclose(tends(t[::-1] * -1.0 - 3.0, local[::-1], 0.5)[0], 0.0)
+
+
+# a line
+
+
+def test_a_line_of_weights_is_that_of_statsmodels():
+    import statsmodels.api as sm
+
+    rng, t = np.random.default_rng(4), uneven(12) + 3.0
+    z, weights = 0.4 - 0.7 * t + 0.1 * rng.standard_normal(12), rng.uniform(0.2, 4.0, 12)
+    missing = z.copy()
+    missing[[2, 7]] = np.nan
+    here = np.isfinite(missing)
+    fit = sm.WLS(z[here], sm.add_constant(t[here]), weights=weights[here]).fit()
+    found = line(t, np.stack([missing, missing]), np.stack([weights, 3 * weights]))
+    for k in (0, 1):
+        one = {name: float(value[k]) for name, value in found._asdict().items()}
+        level, slope = fit.params
+        assert one["exponent"] == pytest.approx(slope, rel=1e-10)
+        assert one["exponent_error"] == pytest.approx(fit.bse[1], rel=1e-9)
+        assert one["prefactor"] == pytest.approx(np.exp(level), rel=1e-10)
+        assert one["prefactor_error"] == pytest.approx(np.exp(level) * fit.bse[0], rel=1e-9)
+        centre = np.average(t[here], weights=weights[here])
+        assert one["centre"] == pytest.approx(np.exp(centre), rel=1e-12)
+        assert one["level"] == pytest.approx(np.exp(level + slope * centre), rel=1e-10)
+        at_centre = np.array([1.0, centre])
+        assert one["level_error"] == pytest.approx(np.sqrt(at_centre @ fit.cov_params() @ at_centre), rel=1e-9)
+        assert one["residual"] == pytest.approx(np.expm1(abs(fit.resid).max()), rel=1e-9)
+        assert (one["points"], one["low"], one["high"]) == (10, *np.exp(t[here][[0, -1]]))
+        bow = np.polyfit(t[here], z[here], 2, w=np.sqrt(weights[here]))[0]
+        assert one["drift"] == pytest.approx(2 * bow * np.ptp(t[here]), rel=1e-8)
+
+
+def test_two_points_are_no_line_and_three_are():
+    t, z = np.arange(4.0), np.array([[1.0, 2.0, np.nan, np.nan], [1.0, 2.0, np.nan, 5.0], [np.nan] * 4])
+    found = line(t, z)
+    assert found.points.tolist() == [2, 3, 0]
+    assert np.isnan(np.stack(found)[:, [0, 2]]).sum() == 2 * 11
+    assert np.isfinite(np.stack(found)[:, 1]).all()
+
+
+# passages
+
+
+@pytest.mark.parametrize(
+    ("c", "expected"),
+    [
+        ([0, 2], [0]),
+        ([2, 0], [0]),
+        ([0, 1, 2], [0]),  # met at a point: once
+        ([2, 1, 0], [1]),
+        ([1, 2, 3], [0]),  # met at the ends
+        ([1, 0, -1], [0]),
+        ([3, 2, 1], [1]),
+        ([-1, 0, 1], [1]),
+        ([2, 1, 2], []),  # touched from above
+        ([0, 1, 0], [0, 1]),
+        ([np.nan, 1, 2], [1]),
+        ([2, 1, np.nan], [0]),
+        ([0, np.nan, 2], []),
+        ([0, 2, 0, 2], [0, 1, 2]),
+        ([2, 3, 4], []),
+        ([0, 0, 0], []),
+    ],
+)
+def test_a_curve_passes_a_value_between_these_points(c, expected):
+    assert brackets(np.array(c, dtype=float), 1.0) == expected
+
+
+@pytest.mark.parametrize("bracket", range(7))
+@pytest.mark.parametrize("points", [2, 3, 4, 6])
+def test_a_root_is_that_of_the_polynomial_through_neighbours(bracket, points):
+    t = uneven(8)
+    c = np.exp(t)
+    for sign in (1.0, -1.0):
+        value = 0.7 * c[bracket] + 0.3 * c[bracket + 1]
+        first = min(max(bracket - points // 2 + 1, 0), 8 - points)
+        here = slice(first, first + points)
+        roots = (Polynomial.fit(t[here], c[here], points - 1) - value).roots()
+        expected = [r.real for r in roots if abs(r.imag) < 1e-9 and t[bracket] <= r.real <= t[bracket + 1]]
+        assert root(t, sign * c, bracket, sign * value, points) == pytest.approx(expected[0], abs=1e-12)
+
+
+def test_a_root_takes_points_of_its_own_run_alone():
+    t = uneven(9)
+    c = np.array([np.nan, 1e6, np.nan, 1.0, 2.0, 4.0, np.nan, 1e6, 1e6])
+    parabola = Polynomial.fit(t[3:6], c[3:6], 2) - 1.4
+    expected = [r for r in parabola.roots() if t[3] < r < t[4]]
+    assert root(t, c, 3, 1.4, 6) == pytest.approx(expected[0], abs=1e-13)
+
+
+def test_a_root_on_a_point_is_that_point():
+    t, c = np.arange(5.0), np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
+    assert root(t, c, 2, 0.0, 4) == pytest.approx(2.0, abs=1e-300 + 1e-15)
+    assert root(t, c, 1, 0.0, 4) == pytest.approx(2.0, abs=1e-15)
+
+
+# axes in logarithms
+
+
+@pytest.mark.parametrize(
+    ("grid", "expected"),
+    [
+        (np.geomspace(1, 3, 4), True),
+        (np.geomspace(3, 1, 4), True),
+        (np.geomspace(1, 3, 4) * [1, 1, 1 + 1e-7, 1], True),
+        (np.geomspace(1, 3, 4) * [1, 1, 1 + 1e-6, 1], False),
+        (np.linspace(1, 3, 4), False),
+        (np.linspace(1, 99.9, 9), True),
+        (np.linspace(1, 99.8, 9), False),
+        ([1.0, 2.0], False),
+        ([1.0, 100.0], True),
+        ([0.0, 1.0, 1000.0], False),
+        ([1.0, np.inf, 50.0], False),
+        ([1.0, np.nan, 500.0], True),
+        ([], False),
+    ],
+)
+def test_an_axis_is_logarithmic_by_equal_ratios_or_two_decades(grid, expected):
+    assert is_logarithmic(grid) is expected
+
+
+@pytest.mark.parametrize(("values", "expected"), [([0.0, 5e3], False), ([-1.0, 5e3], False), ([2.0, 199.8], True)])
+def test_decades_are_those_of_positive_values(values, expected):
+    assert spans_decades(values) is expected
