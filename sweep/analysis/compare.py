@@ -152,7 +152,7 @@ def _runs(off: Array) -> float:
     runs = 1 + int((np.diff(off > 0) != 0).sum())
     mean = 1 + 2 * above * below / off.size
     size = math.sqrt((mean - 1) * (mean - 2) / (off.size - 1))
-    return float(ndtr((runs + 0.5 - mean) / size)) if size else math.nan
+    return float(ndtr((runs + 0.5 - mean) / size))
 
 
 def _chance(found: Found, weights: Array) -> float:

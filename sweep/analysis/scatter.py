@@ -50,8 +50,6 @@ def noise_size(t: Array, z: Array) -> float:
     A point is tried by the polynomials through two, four, six and eight neighbours: noise leaves the same in all, a
     bend ever less.
     """
-    if t.size < 4:
-        return math.inf
     counts = [count for count in (2, 4, 6, 8) if t.size > count + 2]
     return min((float(np.sqrt(np.mean(interpolation_errors(t, z, count) ** 2))) for count in counts), default=math.inf)
 

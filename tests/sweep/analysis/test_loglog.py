@@ -40,6 +40,18 @@ def near(values):
 # slopes and their errors
 
 
+def test_each_unbroken_run_of_three_and_more_stands_for_itself():
+    t = uneven(14)
+    z = np.random.default_rng(5).standard_normal((3, 14))
+    z[0, [2, 6, 8]], z[2, [2, 6, 8]] = np.nan, np.nan  # runs of 2, 3, 1 and 5
+    expected = z @ derivative(t, 5).T
+    for row in (0, 2):
+        expected[row] = np.nan
+        for here in (slice(3, 6), slice(9, 14)):
+            expected[row, here] = derivative(t[here], 5) @ z[row, here]
+    np.testing.assert_allclose(loglog.slopes(t, z, 5), expected, rtol=1e-8, atol=1e-10)
+
+
 @pytest.mark.parametrize("points", [2, 3, 4, 5, 7])
 @pytest.mark.parametrize("n", [3, 4, 5, 6, 9])
 def test_slopes_are_those_of_polynomials_through_neighbours(points, n):
@@ -116,6 +128,7 @@ def test_stated_errors_of_the_values_are_added_to_the_error_of_a_slope():
         ([-1, 2, 3, -3, -2, -1], []),  # of two signs on one side
         ([1, -2, 3, -3, -2, -1], []),
         ([1, 2, 3, -3, 2, -1], []),
+        ([1, 2, 3, -3, 2, 1], []),
         ([1, 2, 3, -3, -2, 1], []),
         ([1, 2, 3, 9, 3, 2, 1], []),
         ([2, 3, -3, -2, -1], []),  # too few
