@@ -70,7 +70,9 @@ def test_what_is_missing_or_not_positive_has_no_logarithm():
     found = curves.log_of(output(np.array([math.e, np.nan, 0.0, -1.0])))
     np.testing.assert_allclose(found, [1, np.nan, np.nan, np.nan])
     assert found.name == "y"
-    np.testing.assert_array_equal(curves.missing_is_nan(output(np.array([1, -2, np.inf, -np.inf]))), [1, -2, np.nan, np.nan])
+    np.testing.assert_array_equal(
+        curves.missing_is_nan(output(np.array([1, -2, np.inf, -np.inf]))), [1, -2, np.nan, np.nan]
+    )
 
 
 @pytest.mark.parametrize("at", [0, 1, 3])
@@ -86,9 +88,7 @@ def test_every_place_of_an_axis_must_be_in_order(at):
 
 def test_numbers_of_each_line_stand_under_their_names():
     y = xr.DataArray(np.arange(6.0).reshape(2, 3), dims=("x", "set"), coords={"set": [5, 6, 7]})
-    found = curves.numbers_along(
-        ("sum", "first"), lambda z: np.stack([z.sum(axis=-1), z[..., 0]], axis=-1), y, "x"
-    )
+    found = curves.numbers_along(("sum", "first"), lambda z: np.stack([z.sum(axis=-1), z[..., 0]], axis=-1), y, "x")
     assert found["sum"].dims == ("set",)
     assert (found["sum"].values.tolist(), found["first"].values.tolist()) == ([3, 5, 7], [0, 1, 2])
     doubled = curves.along(lambda z, w: z + w, y, "x", None, y)
@@ -102,7 +102,7 @@ def test_errors_may_be_a_number_or_an_array_and_are_not_negative():
     np.testing.assert_array_equal(curves.like(0.0, output(), "bound"), np.zeros(4))
     given = output(np.array([0.0, 0.1, 0.2, 0.3]))
     np.testing.assert_array_equal(curves.like(given, output(), "bound"), given)
-    with pytest.raises(SweepError, match="bound: errors are not negative; found -0.2"):
+    with pytest.raises(SweepError, match=r"bound: errors are not negative; found -0\.2"):
         curves.like(given - 0.2, output(), "bound")
     for wrong in (given[:3], given.rename(x="z"), given.expand_dims(a=2), "much", [0.1, 0.2]):
         with pytest.raises(SweepError, match="bound: expected a number, or an array along axes of y; found"):

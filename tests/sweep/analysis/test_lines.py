@@ -18,7 +18,9 @@ BLIND = Given(0.95, None, False)
 
 
 def curve(z, t=T, **attrs):
-    return xr.DataArray(np.exp(z), {"x": ("x", np.exp(t), {"units": "m"})}, "x", name="y", attrs={"units": "s", **attrs})
+    return xr.DataArray(
+        np.exp(z), {"x": ("x", np.exp(t), {"units": "m"})}, "x", name="y", attrs={"units": "s", **attrs}
+    )
 
 
 def judged(z, t=T, bound=0.0, noise=None, sigma=None):
