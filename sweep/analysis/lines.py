@@ -321,7 +321,7 @@ def _systematic(low_fit: xr.Dataset, high_fit: xr.Dataset, lines: list[Any], mid
         outer.append((fit[limit], np.log(fit[value]), np.log(fit[end]) - middle))
     there = _meeting(*lines)
     places = [_meeting(a, b) for a in (lines[0], outer[0]) for b in (lines[1], outer[1])]
-    moved = [abs(place - there).fillna(0.0) for place in places[1:]]
+    moved = [abs(place - there).fillna(0.0) for place in places]
     found: xr.DataArray = xr.concat(moved, dim="which").max("which")
     return found
 

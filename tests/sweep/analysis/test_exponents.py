@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import sweep
+from sweep.analysis import exponents
 from sweep.analysis.exponents import (
     crossover,
     exponent,
@@ -17,6 +18,7 @@ from sweep.analysis.exponents import (
     where_value,
 )
 from sweep.analysis.lines import KIND_WORDS
+from sweep.analysis.loglog import slopes
 from sweep.system.errors import SweepError
 
 PER_DECADE = 40
@@ -567,6 +569,80 @@ def test_a_value_that_is_never_reached_is_said_so():
         where_value(curve(grid(-1, 1), grid(-1, 1)), "mu", 200)
     with pytest.raises(SweepError, match="period does not pass -2"):
         where_exponent(curve(grid(-1, 1), bend(grid(-1, 1))), "mu", -2)
+
+
+def estimated(found):
+    return float(found.abscissa_error / found.abscissa)
+
+
+def test_the_estimated_error_is_what_two_orders_differ_by():
+    """Roots of the polynomials through six and four neighbours, by numpy."""
+    t = np.linspace(-1, 1, 9)
+    c = np.exp(t) - 1.4
+    places = []
+    for near in (slice(3, 9), slice(4, 8)):
+        roots = np.polynomial.Polynomial.fit(t[near], c[near], near.stop - near.start - 1).roots()
+        places += [r.real for r in roots if abs(r.imag) < 1e-9 and t[5] < r.real < t[6]]
+    found = where_value(curve(np.exp(t), c), "mu", 0.0)
+    assert np.log(float(found.abscissa)) == pytest.approx(places[0], abs=1e-14)
+    assert estimated(found) == pytest.approx(abs(places[0] - places[1]), rel=1e-6, abs=0)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_rounding_of_a_place_is_that_of_the_largest_value_over_the_slope(monkeypatch, sign):
+    monkeypatch.setattr(exponents, "root", lambda *_: 3.3)
+    t = np.array([-5.0, -4.5, 1.0, 3.0, 3.5, 4.0])
+    c = sign * np.array([1e9, np.nan, 0.0, 2.0, 6.0, 7.0])
+    step = 2.0**-52 * 1e9 * 0.5 / 4.0
+    found = where_value(curve(np.exp(t), c), "mu", sign * 3.0)
+    assert estimated(found) == pytest.approx(step, rel=1e-6, abs=0)
+    c[0] = 0.0
+    found = where_value(curve(np.exp(t), c), "mu", sign * 3.0)
+    assert estimated(found) == pytest.approx(2.0**-52 * (7 * 0.5 / 4.0 + 3.0), rel=1e-6, abs=0)
+    exact = curve(np.exp(t), np.exp(sign * t**2 / 2))  # its local exponent is t
+    found = where_exponent(exact, "mu", sign * 3.2)
+    noise = 2.0**-52 * 12.5 / 0.5
+    assert estimated(found) == pytest.approx(noise + 2.0**-52 * 3.0, rel=1e-6, abs=0)
+
+
+@pytest.mark.parametrize(
+    ("fourth", "apart"),
+    [([3], 0.03), ([2], 0.02), ([4], 0.04), ([1], 0.25), ([5], 0.25), ([], 0.25), ([4, 2, 3], 0.02)],
+)
+def test_the_exponent_of_lower_order_is_looked_for_a_step_away_and_no_further(monkeypatch, fourth, apart):
+    t = 0.25 * np.arange(9)
+    orders = iter([[3], fourth])
+    monkeypatch.setattr(exponents, "brackets", lambda *_: next(orders))
+    monkeypatch.setattr(exponents, "root", lambda t, c, i, value, points: 0.9 - (0.01 * i if points == 4 else 0.0))
+    found = where_exponent(curve(np.exp(t), np.exp(t**2)), "mu", 1.9)
+    assert float(found.abscissa) == pytest.approx(np.exp(0.9))
+    assert estimated(found) == pytest.approx(apart, abs=1e-9)
+
+
+def test_the_exponent_is_of_sixth_order_and_its_error_of_fourth(monkeypatch):
+    asked = []
+
+    def noted(t, c, bracket, value, points):
+        asked.append((points, c))
+        return 0.9
+
+    monkeypatch.setattr(exponents, "root", noted)
+    t = 0.25 * np.arange(9)
+    z = np.exp(t)
+    where_exponent(curve(np.exp(t), np.exp(z)), "mu", 2.0)
+    assert [points for points, _ in asked] == [6, 4]
+    for (_, found), order in zip(asked, (7, 5), strict=True):
+        np.testing.assert_allclose(found, slopes(t, z, order), rtol=1e-9)
+
+
+def test_places_say_what_they_are():
+    x = grid(-2, 2)
+    for found, what in (
+        (where_value(curve(x, x, units="s"), "mu", 0.5), "where period is 0.5"),
+        (where_exponent(curve(x, bend(x)), "mu", -0.5), "where the exponent of period is -0.5"),
+    ):
+        assert found.abscissa.attrs == {"units": "rad/s^2", "long_name": what}
+        assert found.abscissa_error.attrs == {"units": "rad/s^2", "long_name": "estimated error of the place"}
 
 
 def test_a_passage_inside_a_gap_is_not_made_up():

@@ -47,7 +47,8 @@ def test_what_errors_can_do_to_a_line_without_scatter(size):
     u = T - T.mean()
     reach = (abs(u) * (bound + least(z))).sum() / (u**2).sum() + least(z) / np.ptp(T)
     assert found.kind == ("bounded" if size else "exact")
-    assert ((found.high - found.low) / 2, (found.high + found.low) / 2) == pytest.approx((reach, -0.7), rel=0.02)
+    assert found.high - found.low == pytest.approx(2 * reach, rel=0.1, abs=0)  # the ends are rounded, too
+    assert found.high + found.low == pytest.approx(-1.4)
     assert found.ends == pytest.approx((-0.7, -0.7))
     assert found.fits
     np.testing.assert_array_equal(found.weights, np.ones(N))
@@ -292,6 +293,15 @@ def test_windows_may_share_an_end_and_no_more(low, high, apart):
         else:
             with pytest.raises(sweep.SweepError, match="the windows of the two fits overlap"):
                 sweep.crossover(*pair)
+
+
+@pytest.mark.parametrize("name", ["x", "y"])
+def test_fits_of_different_curves_do_not_meet(name):
+    for low, high in (("a", "b"), ("b", "a")):
+        pair = fits()
+        pair[0].attrs[name], pair[1].attrs[name] = low, high
+        with pytest.raises(sweep.SweepError, match=f"the fits are of different {name}: {low}, {high}"):
+            sweep.crossover(*pair)
 
 
 @pytest.mark.parametrize("noise", [None, True, False, *lines.KINDS])
