@@ -78,7 +78,7 @@ def derivative(t, points):
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_interval_of_a_curve_is_the_range_of_its_slope(sign):
+def test_the_interval_of_a_curve_is_the_range_of_its_slope(sign, monkeypatch):
     z = sign * np.exp(0.7 * (T - 3))
     bound = np.linspace(1e-4, 2e-4, N)
     found = judged(z, bound=bound)
@@ -90,6 +90,8 @@ def test_the_interval_of_a_curve_is_the_range_of_its_slope(sign):
     assert found.high == pytest.approx((five @ z).max() + doubt, rel=1e-9)
     expected = tends(T, five @ z, moved[0])[1], tends(-T[::-1], (five @ z)[::-1], moved[-1])[1]
     assert found.ends == pytest.approx(expected, rel=1e-9)
+    monkeypatch.setattr(lines, "tends", lambda t, local, doubt: (0.0, doubt))
+    assert judged(z, bound=bound).ends == pytest.approx((moved[0], moved[-1]), rel=1e-9)
     slope = np.polyfit(T, z, 1)[0]
     size = np.sqrt((off_line(z) ** 2).sum() / (N - 2) / ((T - T.mean()) ** 2).sum())
     assert found.error == pytest.approx(size, rel=1e-9)
