@@ -109,16 +109,8 @@ def overhead(folder: Path, cells: int) -> None:
 
 def two_cores(cells: int) -> None:
     """One core against all on a grid whose cells cost unevenly, in memory."""
-    study = foliot("map", cells)
-    warm(Solver(study), study)
-    workers = os.cpu_count() or 1
-    ratios = []
-    for _ in range(ROUNDS):
-        one = seconds(lambda: sweep.run(study, workers=1, progress=False))
-        all_ = seconds(lambda: sweep.run(study, workers=workers, progress=False))
-        ratios.append(one / all_)
-        print(f"uneven grid: one core {one:.2f} s, {workers} cores {all_:.2f} s: {one / all_:.2f} times")
-    print(f"  median {np.median(ratios):.2f}")
+    workers, ratio = speedup(foliot("map", cells), ROUNDS)
+    print(f"uneven grid: {workers} cores against one: {ratio:.2f} times")
 
 
 def speedup(study: Study, rounds: int) -> tuple[int, float]:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from neighbours import derivative
 
 import sweep
 from sweep.analysis import lines
@@ -65,16 +66,6 @@ def test_distances_up_to_twice_the_bound_are_of_it(share, kind):
 def test_distances_up_to_eight_roundings_are_none(share, kind, monkeypatch):
     monkeypatch.setattr(lines, "rounding", lambda t, z: abs(off_line(z)).max() / (8 * share))
     assert judged(-0.5 * T + 1e-3 * WAVE, noise=False).kind == kind
-
-
-def derivative(t, points):
-    points = min(points, t.size)
-    found = np.zeros((t.size, t.size))
-    for i, here in enumerate(t):
-        first = min(max(i - points // 2, 0), t.size - points)
-        near = slice(first, first + points)
-        found[i, near] = np.linalg.inv((t[near, None] - here) ** np.arange(points))[1]
-    return found
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

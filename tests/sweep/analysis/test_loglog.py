@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from neighbours import derivative
 from numpy.polynomial import Polynomial
 from scipy.linalg import null_space
 from scipy.ndimage import maximum_filter1d
@@ -11,18 +12,6 @@ from sweep.analysis import loglog
 from sweep.analysis.loglog import brackets, interpolation_errors, is_logarithmic, line, root, runs, spans_decades, tends
 
 EPSILON = 2.0**-52
-
-
-def derivative(t, points):
-    """Matrix that takes values to slopes of the polynomials through `points` neighbours, half of them before."""
-    points = min(points, t.size)
-    found = np.zeros((t.size, t.size))
-    for i, here in enumerate(t):
-        first = min(max(i - points // 2, 0), t.size - points)
-        near = slice(first, first + points)
-        powers = (t[near, None] - here) ** np.arange(points)
-        found[i, near] = np.linalg.inv(powers)[1]
-    return found
 
 
 def uneven(n):

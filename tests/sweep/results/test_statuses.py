@@ -35,7 +35,10 @@ def cells(status, methods=None):
 def test_each_status_is_of_one_kind():
     found = {status.name: str(account(cells([status]))).partition(": ")[2] for status in Status}
     kinds = {name: text.replace("0 not asked", "") for name, text in found.items()}
-    one = lambda kind: {name for name, text in kinds.items() if f"1 {kind}" in text}  # noqa: E731
+
+    def one(kind):
+        return {name for name, text in kinds.items() if f"1 {kind}" in text}
+
     assert one("ok") == {"OK"}
     assert one("pending") == {"PENDING"}
     assert one("not asked") == {"NOT_ASKED"}

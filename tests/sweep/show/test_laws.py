@@ -161,7 +161,10 @@ def test_a_fit_tells_which_cells_have_no_part_in_it():
 
 
 def test_a_second_law_needs_eight_points_and_no_straight_line():
-    bent = lambda n: line_of((x := np.geomspace(1e-4, 1e4, n)) ** -1 + x**-0.25, x)  # noqa: E731
+    def bent(n):
+        x = np.geomspace(1e-4, 1e4, n)
+        return line_of(x**-1 + x**-0.25, x)
+
     assert laws(bent(8), "period", "mu").bend is not None
     assert laws(bent(7), "period", "mu").bend is None
     x = np.geomspace(1, 100, 21)

@@ -118,7 +118,10 @@ def test_an_output_is_looked_up_until_it_is_too_large(monkeypatch):
 def test_an_unfinished_result_that_is_large_is_not_read_for_its_extent(monkeypatch):
     ended, open_ = result(), result()
     del open_.attrs["end"]
-    extents = lambda ds: sections(ds)["outputs"][0][2]  # noqa: E731
+
+    def extents(dataset):
+        return sections(dataset)["outputs"][0][2]
+
     assert extents(open_) == extents(ended) == "0.333333 to 1.33333"
     monkeypatch.setattr(text, "LARGEST_SCAN", 40)
     assert (extents(open_), extents(ended)) == ("", "0.333333 to 1.33333")

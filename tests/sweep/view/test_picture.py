@@ -42,9 +42,10 @@ def test_scales_are_those_of_the_grids_and_values():
 
 
 def test_a_range_is_from_edge_to_edge_as_far_as_a_logarithm_reaches():
-    ends = lambda grid, log: (  # noqa: E731
-        (found := picture._range(np.array(grid), log)).start, found.end, found.reset_start, found.reset_end
-    )  # fmt: skip
+    def ends(grid, log):
+        found = picture._range(np.array(grid), log)
+        return found.start, found.end, found.reset_start, found.reset_end
+
     assert ends([3.0, 1.0, 2.0], False) == (0.5, 3.5, 0.5, 3.5)
     assert ends([0.0, 1.0, 2.0], True) == (1.0, 2.5, 1.0, 2.5)
     assert ends([0.0, 1.0, 2.0], False)[0] == -0.5
