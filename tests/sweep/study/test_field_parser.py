@@ -153,6 +153,7 @@ def test_a_list_may_be_as_long_as_the_longest_axis(fields, monkeypatch):
     monkeypatch.setattr(module.axes, "LARGEST_AXIS", 3)
     assert len(fields.axis("x", [1, 2, 3], LENGTH, "axes.x")) == 3
     assert len(fields.axis("x", np.ones(3), LENGTH, "axes.x")) == 3
+    assert fields.axis("J", np.ones((3, 2)), ARRAY, "axes.J").values.shape == (3, 2)
     assert told(fields) == {}
     for at, given in enumerate(([1, 2, 3, 4], np.ones(4))):
         fields.axis("x", given, LENGTH, f"axes.x{at}")
