@@ -18,14 +18,16 @@ sys.path += [str(TESTS / "oracles"), str(TESTS / "helpers"), str(TESTS.parent / 
 # a shell ignores Ctrl-C for what it runs in the background, and children inherit that; here it is under test
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-QUICK = {line for line in (TESTS / "quick.txt").read_text(encoding="utf-8").splitlines() if line.startswith("tests/")}
-"""Files, and tests of files, that `pytest -m quick` runs."""
+
+def listed(name):
+    """Files, and tests of files, that a list beside this file names, in its order."""
+    lines = (TESTS / name).read_text(encoding="utf-8").splitlines()
+    return [line for line in lines if line.startswith("tests/")]
 
 
-LONG = (
-    *("tests/studies/test_verge_losses.py", "tests/sweep/runs/", "tests/kernels/lanes/test_cache.py", "tests/studies/"),
-    *("tests/kernels/drivetrain/", "tests/kernels/test_interface.py", "tests/sweep/explore/", "tests/kernels/"),
-)
+QUICK = set(listed("quick.txt"))
+"""What `pytest -m quick` runs."""
+LONG = {file: place for place, file in enumerate(listed("long.txt"))}
 """What workers begin with, so that none of them is left alone with it in the end."""
 
 
@@ -48,7 +50,7 @@ def pytest_ignore_collect(collection_path, config):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    items.sort(key=lambda item: next((k for k, name in enumerate(LONG) if item.nodeid.startswith(name)), len(LONG)))
+    items.sort(key=lambda item: LONG.get(item.nodeid.partition("::")[0], len(LONG)))
     for item in items:
         file, _, test = item.nodeid.partition("::")
         if file in QUICK or f"{file}::{test.partition('[')[0]}" in QUICK:
