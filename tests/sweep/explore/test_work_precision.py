@@ -20,6 +20,12 @@ SPEEDS = np.array([0.0, 1e-3, 0.1, 3.0])
 G = 9.80665
 
 
+@pytest.fixture(autouse=True)
+def _once_is_enough(monkeypatch):
+    """Nothing here asks how long a method takes, so that cells are not solved again and again."""
+    monkeypatch.setattr("sweep.explore.work_precision.LEAST_SECONDS", 1e-4)
+
+
 def stones(**keys):
     """Four stones; those thrown faster are further from `rough`."""
     keys = {"design": "zip", "axes": {"height": HEIGHTS, "v0": SPEEDS}, "outputs": ["impact_speed"], **keys}
