@@ -39,6 +39,12 @@ def test_the_study_draws_its_figure_and_every_statement_holds(result, capsys):
     assert "s = (N + lambda_e)/(N + 2)" in text
 
 
+def test_shares_are_those_of_every_cell(result, ds):
+    with sweep.open_result(result) as found:
+        assert dict(ds.sizes) == dict(found.sizes)
+        np.testing.assert_array_equal(ds.mu, found.mu)
+
+
 def test_shares_are_those_of_an_adaptive_integral(ds):
     cell = ds.sel(n=3, e=0.99, a=1, R=1, c=1e-6).sel(mu=1e4, method="nearest")
     mu, u = float(cell.mu), float(cell.crossing_speed)
