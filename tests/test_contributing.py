@@ -14,7 +14,8 @@ from mpmath import agm, cos, mp, mpf, pi, sqrt
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"<!-- (file|insert|run)(?:: (\S+)(?: after ([^\n]+?))?)? -->\n```\w+\n(.*?)```", re.DOTALL)
-COPIED = ("kernels", "sweep", "tests/helpers", "tests/conftest.py", "tests/quick.txt", "pyproject.toml")
+TESTS = ("helpers", "conftest.py", "quick.txt", "long.txt")
+COPIED = ("kernels", "sweep", *(f"tests/{name}" for name in TESTS), "pyproject.toml")
 
 
 def copied_to(folder):
