@@ -68,7 +68,7 @@ def _line(q: Array, t: Array) -> Parts:
 
 def _logarithm(q: Array, t: Array) -> Parts:
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.log(1 + q[0] * (t - 0.5)), np.stack([np.ones_like(t), t], axis=1)
+        return np.log1p(q[0] * (t - 0.5)), np.stack([np.ones_like(t), t], axis=1)
 
 
 def _offset(q: Array, t: Array) -> Parts:
@@ -80,7 +80,7 @@ def _offset(q: Array, t: Array) -> Parts:
 def _correction(q: Array, t: Array) -> Parts:
     """q: correction at the middle, and how fast it fades."""
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        return np.log(1 + q[0] * np.exp(-q[1] * (t - 0.5))), np.stack([np.ones_like(t), t], axis=1)
+        return np.log1p(q[0] * np.exp(-q[1] * (t - 0.5))), np.stack([np.ones_like(t), t], axis=1)
 
 
 def _bent(bend: Callable[[Array, Array], Array]) -> Callable[[Array, Array], Parts]:
@@ -295,25 +295,56 @@ def _project(law: Law, q: Array, s: Array, z: Array, root: Array) -> tuple[Array
     return b, wanted - (columns * root[:, None]) @ b
 
 
+STEP = 3e-6
+"""Of derivatives by q, which are of a size like one."""
+DOUBT = 3 * EPSILON / STEP
+"""Part of the largest column that no derivative is sure of, by rounding."""
+SEEN = 10.0
+"""Doubts of the Jacobian from which on points are seen to move."""
+
+
 def _errors(law: Law, numbers: Array, s: Array, off: Array, root: Array) -> Array:
-    """Standard errors by the Jacobian; inf of what the points do not determine."""
-    count = len(law.grids)
+    """Standard errors by the Jacobian; inf of what the points do not determine.
 
-    def values(of: Array) -> Array:
-        shift, columns = law.parts(of[:count], s)
-        found: Array = (shift + columns @ of[count:]) * root
-        return found
-
-    steps = 1e-6 * np.maximum(1e-2, abs(numbers))
-    with np.errstate(invalid="ignore"):
-        jacobian = np.stack(
-            [(values(numbers + step) - values(numbers - step)) / (2 * step.max()) for step in np.diag(steps)], axis=1
-        )
-    if not np.isfinite(jacobian).all():
+    Directions of the numbers in which points are not seen to move are lost. Numbers of which they are a part, beyond
+    what the doubt of the Jacobian makes so, are not determined; errors of others are as if those were known.
+    """
+    slopes, doubt, level = _jacobian(law, numbers, s)
+    if not np.isfinite(slopes).all():
         return np.full(numbers.size, np.inf)
-    size = np.sqrt((jacobian**2).sum(axis=0))
-    undetermined = size < 1e-12 * size.max()
-    size[undetermined] = 1.0
-    inverse = np.linalg.pinv(jacobian / size) / size[:, None]
-    found: Array = np.sqrt((inverse**2).sum(axis=1) * float(off @ off) / (s.size - law.numbers))
-    return np.where(undetermined, np.inf, found)
+    least = np.sqrt(((doubt * root[:, None]) ** 2).sum(axis=0)) + 1e-100
+    _, moved, directions = np.linalg.svd(slopes * root[:, None] / least, full_matrices=False)
+    seen = moved > SEEN
+    change = directions.T / least[:, None] / np.where(seen, moved, 1.0)
+    change[len(law.grids)] -= level @ change
+    known, lost = ((change[:, which] ** 2).sum(axis=1) for which in (seen, ~seen))
+    found: Array = np.sqrt(known * float(off @ off) / (s.size - law.numbers))
+    return np.where(lost > SEEN * known, np.inf, found)
+
+
+def _jacobian(law: Law, numbers: Array, s: Array) -> tuple[Array, Array, Array]:
+    """Derivatives of (1), how far they are in doubt by rounding and steps, and the level that each number adds.
+
+    Columns of exponents add up to t less a place. So of the exponent that most points have, q moves the level alone,
+    which is told apart: beside it a bend between exponents that are nearly alike would be lost.
+    """
+    q, b = np.split(numbers, [len(law.grids)])
+    columns = law.parts(q, s)[1]
+    most = b[1:][np.argmax((columns[:, 1:] ** 2).sum(axis=0))] if b.size > 1 else 0.0
+    rest = np.array([0.0, *(b[1:] - most)])
+    slopes = np.concatenate([np.empty((s.size, q.size)), columns], axis=1)
+    doubt, level = np.full(slopes.shape, DOUBT * abs(columns).max()), np.zeros(numbers.size)
+    for j, step in enumerate(STEP * np.maximum(1.0, abs(q))):
+        (shift, by_q), (rough_shift, rough) = (_derivative(law, q, j, times * step, s) for times in (1, 2))
+        slopes[:, j] = shift + by_q @ rest
+        doubt[:, j] = doubt[:, j] * abs(rest).sum() + 3 * abs(rough_shift + rough @ rest - slopes[:, j])
+        level[j] = most * by_q[:, 1:].sum(axis=1).mean() if b.size > 1 else 0.0
+    return slopes, doubt, level
+
+
+def _derivative(law: Law, q: Array, j: int, step: float, s: Array) -> Parts:
+    """Of shift and columns by one q."""
+    by = np.where(np.arange(q.size) == j, step, 0.0)
+    with np.errstate(invalid="ignore"):
+        (shift, columns), (less, below) = law.parts(q + by, s), law.parts(q - by, s)
+        return (shift - less) / (2 * step), (columns - below) / (2 * step)
