@@ -87,9 +87,10 @@ def _bent(bend: Callable[[Array, Array], Array]) -> Callable[[Array, Array], Par
     """Two laws from a bend B(u) that is 0 far below and u far above 0; q: place, logarithm of the width, shape."""
 
     def parts(q: Array, t: Array) -> Parts:
-        u = t - q[0]
-        b = bend(u, q[1:])
-        return 0.0, np.stack([np.ones_like(t), u - b, b], axis=1)
+        u, columns = t - q[0], np.ones((t.size, 3))
+        columns[:, 2] = bend(u, q[1:])
+        columns[:, 1] = u - columns[:, 2]
+        return 0.0, columns
 
     return parts
 
@@ -113,38 +114,57 @@ def _hyperbola(u: Array, q: Array) -> Array:
 
 GRID = np.sinh(np.linspace(-9.0, 9.0, 361))
 """Where slopes of bends without a closed form are integrated, in widths."""
-STEPS = np.diff(GRID)
+STEPS, INNER = np.diff(GRID), GRID[1:-1]
 
 
-def _integrated(slope: Callable[[Array], Array], u: Array, width: float) -> Array:
-    """Bend of a slope that rises from 0 to 1, moved so that it tends to u."""
-    steep = slope(GRID)
-    rise = np.concatenate([[0.0], np.cumsum(0.5 * (steep[1:] + steep[:-1]) * STEPS)])
-    moved = GRID[-1] - rise[-1]
-    v = np.clip(u / width + moved, GRID[0], GRID[-1])
-    found: Array = width * (_hermite(v, rise, steep) + u / width + moved - v)
-    return np.where(u / width + moved < GRID[0], 0.0, found)
-
-
-def _hermite(v: Array, rise: Array, steep: Array) -> Array:
-    """Between points of GRID; scipy's spline takes ten times as long to make as it is used here."""
-    k = np.clip(np.searchsorted(GRID, v) - 1, 0, STEPS.size - 1)
-    share = (v - GRID[k]) / STEPS[k]
-    rest = 1 - share
-    ends = rise[k] * rest**2 * (1 + 2 * share) + rise[k + 1] * share**2 * (1 + 2 * rest)
-    found: Array = ends + STEPS[k] * share * rest * (steep[k] * rest - steep[k + 1] * share)
+def _integrated(slope: Callable[[Array, float], Array], power: float, u: Array, width: float) -> Array:
+    """Bend of a slope of that power that rises from 0 to 1, moved so that it tends to u."""
+    cubics, moved = _cubics(slope, power)
+    wanted = u / width + moved
+    v = np.minimum(np.maximum(wanted, GRID[0]), GRID[-1])
+    found: Array = width * (_on_grid(cubics, v) + (wanted - v))
+    found[wanted < GRID[0]] = 0.0
     return found
 
 
-def _logistic(v: Array) -> Array:
-    found: Array = 0.5 * (1 + np.tanh(0.5 * v))
+@functools.lru_cache(maxsize=256)
+def _cubics(slope: Callable[[Array, float], Array], power: float) -> tuple[Array, float]:
+    """Integral of a slope over GRID, as `_hermite` has it, and how far it is moved. Fits ask for one power many
+    times."""
+    steep = slope(GRID, power)
+    rise = np.concatenate([[0.0], np.cumsum(0.5 * (steep[1:] + steep[:-1]) * STEPS)])
+    return _hermite(rise, steep), float(GRID[-1] - rise[-1])
+
+
+def _hermite(rise: Array, steep: Array) -> Array:
+    """Cubics (4, steps) between points of GRID, the highest power first; scipy's spline takes ten times as long to make
+    as it is used here."""
+    mean, first, last = np.diff(rise) / STEPS, steep[:-1], steep[1:]
+    return np.stack([(first + last - 2 * mean) / STEPS**2, (3 * mean - 2 * first - last) / STEPS, first, rise[:-1]])
+
+
+def _on_grid(cubics: Array, v: Array) -> Array:
+    k = INNER.searchsorted(v)
+    third, second, first, level = cubics[:, k]
+    x = v - GRID[k]
+    found: Array = ((third * x + second) * x + first) * x + level
+    return found
+
+
+def _powered(v: Array, power: float) -> Array:
+    found: Array = np.exp(-power * np.logaddexp(0, -v))
+    return found
+
+
+def _stretched_slope(v: Array, power: float) -> Array:
+    found: Array = 0.5 * (1 + np.tanh(0.5 * np.sign(v) * abs(v) ** power))
     return found
 
 
 def _asymmetric(u: Array, q: Array) -> Array:
     """A logistic slope to the power exp(q1): it fades so many times faster below than above."""
     power = math.exp(min(max(q[1], -2.5), 2.5))
-    return _integrated(lambda v: np.exp(-power * np.logaddexp(0, -v)), u, _width(q[0]))
+    return _integrated(_powered, power, u, _width(q[0]))
 
 
 def _uneven(u: Array, q: Array) -> Array:
@@ -157,7 +177,7 @@ def _uneven(u: Array, q: Array) -> Array:
 def _stretched(u: Array, q: Array) -> Array:
     """A slope that fades as the exponential of the power exp(q1) of u."""
     power = math.exp(min(max(q[1], -1.2), 0.8))
-    return _integrated(lambda v: _logistic(np.sign(v) * abs(v) ** power), u, _width(q[0]))
+    return _integrated(_stretched_slope, power, u, _width(q[0]))
 
 
 def _three(q: Array, t: Array) -> Parts:
@@ -287,12 +307,23 @@ FAR = 1e6
 
 def _project(law: Law, q: Array, s: Array, z: Array, root: Array) -> tuple[Array, Array]:
     """Linear numbers and weighted distances for given q."""
+    from scipy.linalg.lapack import dgelsd
+
     shift, columns = law.parts(q, s)
-    if not (np.isfinite(shift).all() and np.isfinite(columns).all()):
+    if not math.isfinite(columns.sum() + np.sum(shift)):
         return np.zeros(columns.shape[1]), np.full(s.size, FAR)
-    wanted = (z - shift) * root
-    b: Array = np.linalg.lstsq(columns * root[:, None], wanted, rcond=None)[0].astype(np.float64)
-    return b, wanted - (columns * root[:, None]) @ b
+    wanted, columns = (z - shift) * root, columns * root[:, None]
+    b = dgelsd(columns, wanted, *_workspace(*columns.shape), EPSILON * s.size)[0][: columns.shape[1]]
+    return b, wanted - columns @ b
+
+
+@functools.lru_cache(maxsize=128)
+def _workspace(points: int, columns: int) -> tuple[int, int]:
+    """What dgelsd is to be given; numpy asks for it in each of its thousands of calls."""
+    from scipy.linalg.lapack import dgelsd_lwork
+
+    most, whole, _ = dgelsd_lwork(points, columns, 1)
+    return int(most), int(whole)
 
 
 STEP = 3e-6
