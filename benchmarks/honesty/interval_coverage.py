@@ -24,6 +24,8 @@ import statsmodels.api as sm
 import xarray as xr
 
 import sweep
+from sweep.analysis.scatter import BEYOND_DOUBT
+from sweep.analysis.two_laws import _evidence, _fit
 
 LOW, HIGH, MEETING = -1.0, -1 / 3, 0.47
 LEAST, MOST = 0.935, 0.965
@@ -243,10 +245,17 @@ def verdicts(sets: int, rng: np.random.Generator) -> Iterator[str]:
     for n in (12, 40):
         t = np.linspace(-7, 7, n)
         for name, noise in noises(t, sets, rng).items():
-            found = sweep.fit_two_laws(curve(t, -0.5 * t + noise), "x")
-            called = float((found.regimes == 2).mean())
+            called = float((evidence_of_two(curve(t, -0.5 * t + noise)) > BEYOND_DOUBT).mean())
             doubt = np.sqrt(max(called, 1 / sets) / sets)
             yield f"{f'one law, {name}, n={n}':38}{called:7.4f} +- {doubt:.4f}"
+
+
+def evidence_of_two(y: xr.DataArray) -> np.ndarray:
+    """As `fit_two_laws` has it, without the intervals, which take twenty times as long; FEW_SETS by both."""
+    t = np.log(y.x.values)
+    found = np.array([_evidence(t, z, _fit(t, z)[1]) for z in np.log(y.values)])
+    np.testing.assert_allclose(found[:FEW_SETS], sweep.fit_two_laws(y[:FEW_SETS], "x").evidence)
+    return found
 
 
 def bounds(sets: int, rng: np.random.Generator) -> Iterator[str]:
