@@ -1,6 +1,8 @@
 """How often 95 % intervals hold the truth, on data that are not shaped like a model's own, beside other tools.
 
-python benchmarks/honesty/interval_coverage.py [--sets 40] [--only PART]    10000 sets have a standard error of 0.2 %
+python benchmarks/honesty/interval_coverage.py [--sets 40] [--only PART] [--points N]
+
+10000 sets have a standard error of 0.2 %.
 
 Columns: share of intervals that hold the truth and its standard error, their median width, and the same share of what
 others give by default, of 1,000 sets at most: statsmodels (OLS, and with HAC errors), scipy.stats.linregress, lmfit; of
@@ -31,6 +33,8 @@ LOW, HIGH, MEETING = -1.0, -1 / 3, 0.47
 LEAST, MOST = 0.935, 0.965
 RIVAL_SETS, FEW_SETS = 1000, 20
 """Sets at most that rivals are given, and slow ones (piecewise-regression, pwlf)."""
+POINTS = [25, 61]
+"""Of two laws; `--points`."""
 
 Ends = tuple[float, float]
 NONE: Ends = (np.nan, np.nan)
@@ -190,7 +194,7 @@ def one_law(sets: int, rng: np.random.Generator) -> Iterator[str]:
 
 def two_laws(sets: int, rng: np.random.Generator) -> Iterator[str]:
     """Noise that is said to be independent."""
-    for n in (25, 61):
+    for n in POINTS:
         t = np.linspace(-6.9, 6.9, n)
         for name, (z, meeting) in bends(t).items():
             yield from _two(f"{name}, n={n}", t, z, meeting, rng.standard_normal((sets, n)), "independent")
@@ -201,7 +205,7 @@ def two_laws(sets: int, rng: np.random.Generator) -> Iterator[str]:
 
 def two_laws_unsaid(sets: int, rng: np.random.Generator) -> Iterator[str]:
     """Noise of which nothing is said, independent or not."""
-    for n in (25, 61):
+    for n in POINTS:
         t = np.linspace(-6.9, 6.9, n)
         for phi in (0.0, 0.6, 0.9):
             noise = remembering(phi, (sets, n), rng)
@@ -301,7 +305,9 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--sets", type=int, default=40)
     options.add_argument("--only", choices=PARTS, nargs="+", default=list(PARTS))
+    options.add_argument("--points", type=int, nargs="+", default=POINTS)
     chosen = options.parse_args()
+    POINTS[:] = chosen.points
     rng = np.random.default_rng(20)
     print(f"{chosen.sets} sets a case; nominal 0.95")
     print(f"{'case':38}{'held':>7}    {'error':6} {'':7}{'width':>10}   others hold")

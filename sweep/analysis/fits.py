@@ -146,20 +146,19 @@ def _errors(law: Law, numbers: Array, s: Array, off: Array, root: Array) -> Arra
 def _jacobian(law: Law, numbers: Array, s: Array) -> tuple[Array, Array, Array]:
     """Derivatives of the curve, how far they are in doubt by rounding and steps, and the level that each number adds.
 
-    Columns of exponents add up to t less a place. So of the exponent that most points have, q moves the level alone,
-    which is told apart: beside it a bend between exponents that are nearly alike would be lost.
+    Columns of exponents add up to t less a place. So if all exponents were the first, q would move the level alone;
+    that is told apart, since beside it a bend between exponents that are nearly alike would be lost.
     """
     q, b = np.split(numbers, [len(law.grids)])
-    columns = law.parts(q, s)[1]
-    most = b[1:][np.argmax((columns[:, 1:] ** 2).sum(axis=0))] if b.size > 1 else 0.0
-    rest = np.array([0.0, *(b[1:] - most)])
+    columns, first = law.parts(q, s)[1], b[1] if b.size > 1 else 0.0
+    rest = np.array([0.0, *(b[1:] - first)])
     slopes = np.concatenate([np.empty((s.size, q.size)), columns], axis=1)
     doubt, level = np.full(slopes.shape, DOUBT * abs(columns).max()), np.zeros(numbers.size)
     for j, step in enumerate(STEP * np.maximum(1.0, abs(q))):
         (shift, by_q), (rough_shift, rough) = (_derivative(law, q, j, times * step, s) for times in (1, 2))
         slopes[:, j] = shift + by_q @ rest
         doubt[:, j] = doubt[:, j] * abs(rest).sum() + 3 * abs(rough_shift + rough @ rest - slopes[:, j])
-        level[j] = most * by_q[:, 1:].sum(axis=1).mean() if b.size > 1 else 0.0
+        level[j] = first * by_q[:, 1:].sum(axis=1).mean()
     return slopes, doubt, level
 
 
