@@ -2,7 +2,7 @@
 
     z = shift(q) + columns(q) b                                                                     (1)
 
-q are the few.
+q are those few.
 """
 
 from __future__ import annotations
