@@ -1,6 +1,7 @@
-"""Where everything stands in a result of which nothing is computed: in pages, behind the structure, and known to HDF5."""
+"""Where everything stands in a result of which nothing is computed: from a page on, and where HDF5 looks for it."""
 
 import os
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -38,18 +39,25 @@ def test_columns_stand_behind_each_other_each_from_a_page_on():
 
 
 @pytest.mark.parametrize(("values", "shared", "step"), [
-    (509, False, 4076), (511, False, 4092), (512, False, 4100), (512, True, 8192), (511, True, 4092), (5119, False, 40956),
-    (5120, False, 45056),
+    (509, False, 4076), (511, False, 4092), (512, False, 4100), (512, True, 8192), (511, True, 4092),
+    (5119, False, 40956), (5120, False, 45056),
 ])  # fmt: skip
 def test_chunks_worth_it_begin_on_a_page(values, shared, step):
     one = Cut((Column("x", "<f8", ("m",), (values,), {}),), (3,), Partition(3, 1, 3))
     schema = output_schema(toy_studies.build(axes={"height": [1.0, 2.0, 3.0]}), MARK)
-    schema = type(schema)(schema.grid, one.columns, (), {})
+    schema = replace(schema, columns=one.columns, coordinates=(), attrs={})
     made = Frame(schema, {"cells": one}, MARK, "now", shared)
     (place,) = made.layout.work.places
     assert place.runs[0][2] == step
     assert place.chunk_bytes == 8 * values
     assert made.layout.end == place.runs[0][1] + 2 * step + 8 * values + 4
+
+
+def test_the_digest_of_the_end_takes_sixteen_bytes_wherever_it_stands():
+    for length in range(0, 64, 8):
+        schema = replace(SCHEMA, attrs={"title": "x" * length})
+        begin, end = Frame(schema, {"cells": cut()}, MARK, "now").layout.endings[-1]
+        assert end == begin + 16
 
 
 def test_what_is_one_chunk_stands_in_the_structure():

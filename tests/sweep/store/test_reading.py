@@ -1,5 +1,6 @@
 """Numbers out of a result, against plain numpy: whatever is asked for, checked, and missing where it is not there."""
 
+import gc
 import os
 import pickle
 
@@ -86,9 +87,10 @@ def test_cells_are_looked_up_in_any_order(path):
 
 
 @pytest.mark.parametrize("most", [0, 1 << 30])
-def test_a_run_of_cells_is_read_by_one_thread_or_several(path, monkeypatch, most):
+@pytest.mark.parametrize("cells", [2, 4])
+def test_a_run_of_cells_is_read_by_one_thread_or_several(path, monkeypatch, most, cells):
     monkeypatch.setattr(reading, "LONG_RUN", most)
-    layout = finished(path, frame(2))
+    layout = finished(path, frame(cells))
     with StoredFile(path) as file:
         for place, column in zip(layout.work.places, file.columns().values(), strict=True):
             oracle = whole(layout.work, place)
@@ -96,15 +98,29 @@ def test_a_run_of_cells_is_read_by_one_thread_or_several(path, monkeypatch, most
                 np.testing.assert_array_equal(column.run(start, stop), oracle[start:stop])
 
 
-@pytest.mark.parametrize(("bytes_", "stop", "threads"), [(64, 4, 1), (65, 4, 0), (1, 2, 0), (64, 5, 1)])
+@pytest.mark.parametrize(("bytes_", "stop", "threads"), [(64, 4, 1), (65, 4, 0), (1, 2, 0), (64, 5, 1), (None, 12, 0)])
 def test_threads_are_for_long_runs_of_several_blocks(path, monkeypatch, bytes_, stop, threads):
     finished(path, frame(2))
     pools, real = [], reading.ThreadPoolExecutor
-    monkeypatch.setattr(reading, "LONG_RUN", bytes_)
+    monkeypatch.setattr(reading, "LONG_RUN", bytes_ or reading.LONG_RUN)
     monkeypatch.setattr(reading, "ThreadPoolExecutor", lambda n: pools.append(n) or real(n))
     with StoredFile(path) as file:
         file.columns()["x"].run(0, stop)
     assert pools == threads * [4]
+
+
+@pytest.mark.parametrize(
+    ("key", "short", "looked_up"),
+    [((1,), 64, 0), ((slice(None), 1), 64, 1), ((slice(0, 3, 2),), 4, 0), ((slice(0, 3, 2),), 5, 1)],
+)
+def test_only_cells_of_several_short_runs_are_looked_up_one_by_one(path, monkeypatch, key, short, looked_up):
+    finished(path)
+    asked, real = [], reading.Numbers.cells
+    monkeypatch.setattr(reading, "SHORT_RUN", short)
+    monkeypatch.setattr(reading.Numbers, "cells", lambda *args: asked.append(1) or real(*args))
+    with StoredFile(path) as file:
+        assert file.columns()["status"][key].size
+    assert len(asked) == looked_up
 
 
 def test_of_a_block_a_part_of_which_is_read_the_rest_is_kept(path, monkeypatch):
@@ -180,6 +196,15 @@ def test_a_file_is_given_back_once_and_can_be_sent(path):
     assert column[0, 1].tolist() == [3.0, 4.0]
     assert column.file.path == path
     column.file.close()
+
+
+def test_what_was_never_open_is_not_closed(tmp_path, monkeypatch):
+    closed = []
+    monkeypatch.setattr(os, "close", closed.append)
+    with pytest.raises(FileNotFoundError):
+        StoredFile(tmp_path / "none")
+    gc.collect()
+    assert closed == []
 
 
 def test_what_is_no_result_is_closed_and_refused(path, monkeypatch):
