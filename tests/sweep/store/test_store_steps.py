@@ -82,7 +82,7 @@ def test_numbers_are_synced_before_their_digests_and_these_with_the_next(store, 
     assert events[3:] == ["sync_numbers"]
 
 
-@pytest.mark.parametrize(("limit", "done"), [(136, 2), (137, 0), (68, 2)])
+@pytest.mark.parametrize(("limit", "done"), [(136, 2), (100, 2), (137, 0), (68, 2)])
 def test_blocks_are_acknowledged_after_so_many_bytes(store, monkeypatch, limit, done):
     """A block holds 68 bytes, and what is acknowledged counts no more."""
     monkeypatch.setattr(storing, "SYNC_SECONDS", 1e9)
