@@ -61,6 +61,7 @@ def test_a_box_of_no_cell_wanted_is_one_of_one_cell():
     assert boxes((), 5) == Partition(1, 1)
     assert box_shape((), 1) == ()
     assert box_shape((5, 7), 35) == (5, 7)
+    assert {type(length) for length in box_shape((5, 7), 14)} == {int}
 
 
 def test_only_so_many_lengths_of_a_box_are_looked_at(monkeypatch):
@@ -159,6 +160,12 @@ def test_rows_of_dear_cells_are_not_longer_than_the_longest(monkeypatch):
     assert row_blocks(study_of(1, 9 * 1024)).length == 2
     monkeypatch.setattr(partition, "LARGEST", 1 << 22)
     assert row_blocks(study_of(1, 9 * 1024)).length == 8
+
+
+def test_a_row_of_a_huge_study_has_four_million_cells():
+    axes = {"v0": np.linspace(0.0, 1.0, 100_000), "height": np.linspace(1.0, 2.0, 100_000)}
+    study = build(axes=axes, summary={"over": ["v0", "height"], "outputs": {"fall_time": ["min"]}})
+    assert row_blocks(study).length == 4_194_304
 
 
 def test_of_a_study_without_a_summary_every_cell_is_a_row():

@@ -187,6 +187,18 @@ def test_a_structure_that_is_damaged_is_refused_and_a_whole_one_taken_up(output,
     )
 
 
+@pytest.mark.parametrize("fault", [OSError(errno.EIO, "no"), EOFError()])
+def test_a_structure_that_cannot_be_read_is_refused(output, monkeypatch, fault):
+    written(unfinished_of(output))
+
+    def refused(fd):
+        raise fault
+
+    monkeypatch.setattr(storing, "unbroken", refused)
+    with pytest.raises(SweepError, match="damaged beside its numbers, or not of this version"):
+        Store(output).found()
+
+
 def test_descriptors_are_given_back(output, left_open):
     written(unfinished_of(output))
     with opened(output) as store:
@@ -336,7 +348,7 @@ def test_a_finished_result_is_taken_up_without_its_damaged_blocks(output, events
         assert file.finished
 
 
-@pytest.mark.parametrize(("steps", "shared"), [((4096, 8192), True), ((4096, 8193), False), ((1, 8192), False)])
+@pytest.mark.parametrize(("steps", "shared"), [((4096, 8192), True), ((4096, 8194), False), ((2, 8192), False)])
 def test_only_blocks_that_begin_on_pages_are_written_by_others(store, steps, shared):
     places = tuple(Place(name, "i1", (), 4, ((0, 4096, step),)) for name, step in zip("xy", steps, strict=True))
     table = replace(store.table, places=places)
