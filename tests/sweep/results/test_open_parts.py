@@ -281,7 +281,8 @@ def test_a_refusal_of_the_system_is_no_change(output):
         (lambda file: file.create_dataset("huge", (1 << 20,), "f8", chunks=(1 << 10,)), False),
     ],
 )
-def test_attributes_are_read_of_what_is_a_result(output, change, whole):
+def test_attributes_are_read_of_what_is_a_result(output, monkeypatch, change, whole):
+    monkeypatch.setattr(opening, "readable", lambda path, fd: True)
     with h5py.File(output, "w") as file:
         file.attrs.update(study_json="{}", fingerprint='{"study": "abc"}')
         file["status"] = np.zeros(3, "i1")
@@ -292,6 +293,12 @@ def test_attributes_are_read_of_what_is_a_result(output, change, whole):
         assert opening.stored_fingerprint(output) == found["fingerprint"]
     else:
         assert "not the result of a sweep, or damaged" in refused(lambda: opening.stored_attrs(output))
+
+
+def test_attributes_are_not_asked_for_where_hdf5_cannot_read(output, monkeypatch):
+    written(output)
+    monkeypatch.setattr(opening, "readable", lambda path, fd: False)
+    assert "not the result of a sweep, or damaged" in refused(lambda: opening.stored_attrs(output))
 
 
 def test_of_rows_that_are_there_an_unfinished_summary_is_made(output):
