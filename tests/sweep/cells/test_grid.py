@@ -166,3 +166,14 @@ def test_rows_of_cells_are_views_of_them():
     assert cells.status[1:3].tolist() == [7, 7]
     assert cells.outputs["drop"][1:3].tolist() == [[9.0, 9.0]] * 2
     assert cells.rows(slice(0, 1)).error is None
+
+
+def test_an_axis_of_arrays_gives_each_cell_its_own():
+    masses = np.arange(1.0, 7.0).reshape(3, 2)
+    grid = Grid(
+        build(kernel="beads:KERNEL", outputs=["total"], axes={"mass": masses, "g": [1.0, 2.0, 3.0]}, design="zip")
+    )
+    out = [np.full((4, 2), -1.0), np.full((4, 2), -1.0), np.full(4, -1.0)]
+    grid.columns(1, 3, out)
+    assert out[0].tolist() == [[3.0, 4.0], [5.0, 6.0], [-1.0, -1.0], [-1.0, -1.0]]
+    assert out[2].tolist() == [2.0, 3.0, -1.0, -1.0]
