@@ -116,6 +116,13 @@ def test_several_methods_are_tried_in_the_middle_and_in_corners(keys, cells):
     assert [call[:2] for call in solver.calls] == [(cell, 1) for cell in cells]
 
 
+@pytest.mark.parametrize("method", ["a", "z"])
+def test_one_method_is_tried_in_the_middle_whatever_its_name(method):
+    solver = Recorded()
+    warm(solver, replace(build(axes=AXES), method=method))
+    assert [call[:2] for call in solver.calls] == [(4, 1)]
+
+
 def test_a_sample_is_of_all_cells_and_that_of_a_summary_costs_its_reduction(monkeypatch):
     asked = []
 

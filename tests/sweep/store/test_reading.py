@@ -198,6 +198,19 @@ def test_a_file_is_given_back_once_and_can_be_sent(path):
     column.file.close()
 
 
+@pytest.mark.parametrize("blocks", [None, (0,)])
+def test_of_a_file_that_is_closed_nothing_is_told_to_be_damaged_or_pending(path, blocks):
+    if blocks is None:
+        finished(path)
+    else:
+        written(path, blocks=blocks)
+    with StoredFile(path) as file:
+        column = file.columns()["x"]
+    with pytest.raises(SweepError) as caught:
+        column[0]
+    assert str(caught.value) == f"{path}: is closed; open it again to read x"
+
+
 def test_what_was_never_open_is_not_closed(tmp_path, monkeypatch):
     closed = []
     monkeypatch.setattr(os, "close", closed.append)
