@@ -10,8 +10,8 @@ from toy_studies import build
 
 from sweep.cells.output_schema import part_columns
 from sweep.runs import resume
-from sweep.runs.run import _task
 from sweep.runs.resume import EXTENDABLE, is_complete, take_up, tidy
+from sweep.runs.run import _task
 from sweep.system.errors import SweepError
 
 SAME = {"axes.height": "1", "design": "product", "rtol": "1e-06"}
@@ -186,7 +186,7 @@ def test_what_does_not_fit_its_study_is_kept_unless_forced(output, wrong):
 
 def test_what_is_damaged_beside_its_numbers_is_given_up_only_when_forced(output):
     store = Kept(fault=SweepError("damaged"))
-    with pytest.raises(SweepError, match="^damaged$"):
+    with pytest.raises(SweepError, match=r"^damaged$"):
         take_up(store, task_of(output))
     take_up(store, task_of(output, force=True))
     assert store.done == ["discard"]

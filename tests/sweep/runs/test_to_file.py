@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from running import interrupted, kept, quiet, stone, tall
-from toy_studies import build
 
 from sweep.cells.fingerprint import fingerprint
 from sweep.results.open import open_result
@@ -318,14 +317,13 @@ def test_a_cluster_computes_until_it_is_lost(monkeypatch, lost, computed):
     assert both.computed == computed
 
 
-def test_groups_are_made_of_their_own_rows(output):
-    # two rows of cells for each speed; a block of the output is one speed
-    summary = {"over": ["height"], "outputs": {"fall_time": ["min", "max"]}}
-    study = build(axes={"height": np.arange(1.0, 9.0), "v0": [0.0, 1.0, 2.0]}, summary=summary)
-    whole = quiet(study)
-    found = quiet(study, output, block_cells=1)
-    for name in whole.data_vars:
-        np.testing.assert_array_equal(whole[name], found[name])
+def test_groups_are_made_of_their_own_rows(monkeypatch):
+    monkeypatch.setattr(to_file, "row_blocks", lambda study: SimpleNamespace(per_group=3))
+    monkeypatch.setattr(to_file, "gathered", lambda study, rows: (study, rows))
+    groups = SimpleNamespace(blocks=SimpleNamespace(bounds=lambda block: (5 * block, 5 * block + 4)))
+    columns = {"x": SimpleNamespace(run=lambda start, stop: range(start, stop))}
+    file = SimpleNamespace(layout=SimpleNamespace(tables={"cells": groups}), columns={"rows": columns}.get)
+    assert to_file._gather("study")(file, 1) == ("study", {"x": range(15, 27)})
 
 
 @pytest.mark.parametrize("wanted", [True, False])
@@ -362,6 +360,20 @@ def test_what_workers_have_written_is_taken_and_what_they_send_is_put(monkeypatc
     )
     assert to_file._store_elsewhere("session", store, "cluster") == ("session", "cluster", "shared")
     assert done == [("take", 3, b"digests"), ("put", 4, {"x": 1})]
+
+
+@pytest.mark.parametrize("cluster", [None, "cluster"])
+def test_only_blocks_that_are_written_here_are_on_their_way_to_the_disk(output, monkeypatch, cluster):
+    begun, seen = [], []
+    real = to_file._begin
+    monkeypatch.setattr(to_file, "_begin", lambda *words, shared: (begun.append(shared), real(*words, shared)))
+    monkeypatch.setattr(to_file, "_finish", lambda session, store, cluster: seen.append((store, cluster)))
+    session = Session(task_of(output), 1)
+    with opened(output) as store:
+        assert to_file._run_session(session, store, cluster) is True
+        assert seen == [(store, cluster)]
+        assert store.write_back.total == (0 if cluster else 10 * 14)
+    assert begun == [cluster is not None]
 
 
 @pytest.mark.parametrize("shared", [True, False])
