@@ -237,7 +237,10 @@ def test_cells_that_failed_are_told_up_to_a_number(told, monkeypatch):
     session._count(None)
     session._count(None)
     assert told == [("tell", "cell 3 FAILED (height=4): odd")]
-    session.bad += [BadCell(cell, {}, "odd") for cell in (5, 6, 7)]
+    session.bad += [BadCell(cell, {}, "odd") for cell in (5, 6)]
+    session._count(None)
+    assert len(told) == 3
+    session.bad += [BadCell(cell, {}, "odd") for cell in (7, 8)]
     session._count(None)
     assert told[1:] == [
         ("tell", "cell 5 FAILED (): odd"),
