@@ -177,6 +177,16 @@ def test_a_thread_uses_its_buffers_again(told, file, monkeypatch):
     assert made == [()]
 
 
+def test_a_block_that_is_written_is_as_long_as_it_is(told, file):
+    told(shared=file.shared())
+    context, solved = worker._context("r"), []
+    context._thread.solve = lambda start, stop, arrays, wanted: solved.append(
+        (start, stop, wanted, *{len(column) for column in arrays.values()})
+    )
+    worker.compute("r", [1, 2], {})
+    assert solved == [(4, 8, None, 4), (8, 10, None, 2)]
+
+
 def test_a_worker_that_sees_another_file_sends_numbers(told, file):
     told(shared=replace(file.shared(), key="another"))
     assert isinstance(worker.compute("r", [1], {}).found[1], Sent)
