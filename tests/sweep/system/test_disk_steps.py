@@ -4,6 +4,7 @@ import errno
 import os
 from types import SimpleNamespace
 
+import filelock
 import numpy as np
 import pytest
 
@@ -276,10 +277,14 @@ def test_a_lock_whose_file_is_another_meanwhile_is_taken_anew(tmp_path, monkeypa
 
 
 def test_the_library_locks_where_the_system_cannot(tmp_path, monkeypatch):
+    asked, real = [], filelock.FileLock
+    monkeypatch.setattr(filelock, "FileLock", lambda path, **keys: asked.append(keys) or real(path, **keys))
     monkeypatch.setattr(disk, "fcntl", None)
     with disk.locked(tmp_path / "lock") as ours, disk.locked(tmp_path / "lock") as other:
         assert (ours, other) == (True, False)
     assert not (tmp_path / "lock").exists()
+    # nobody is waited for
+    assert asked == [{"timeout": 0}] * 2
 
 
 @pytest.mark.parametrize(
