@@ -68,6 +68,51 @@ def test_what_compiling_took_and_whether_it_will_again(monkeypatch, folder, kern
     assert made(kernel=kernel)._compile_text() == ""
 
 
+@pytest.mark.parametrize(("kept", "again"), [(True, 0.0), (False, 2.5)])
+def test_a_forecast_has_what_is_to_be_compiled_again(monkeypatch, tmp_path, kept, again):
+    asked = []
+
+    def compiling(kernel, name, note):
+        asked.append((name, note))
+        return SimpleNamespace(seconds={"exact": 2.0, "rough": 0.5})
+
+    monkeypatch.setattr(module, "Compiling", compiling)
+    monkeypatch.setattr(module, "sampled_study", lambda study, compiling: "sample")
+    monkeypatch.setattr(module, "scaling", lambda study: SimpleNamespace(advice="one"))
+    monkeypatch.setattr(module, "_is_kept", lambda name: kept)
+    monkeypatch.setattr(module, "_forecast", lambda *words: (asked.append(words[1:]), made(seconds=7.0))[1])
+    study = build(axes={"height": [1.0, 2.0]})
+    found = module.plan(study, 3, tmp_path / "out.h5", note="note")
+    assert (found.seconds, found.compile_seconds, found.scaling) == (7.0 + again, 2.5, "one")
+    assert asked == [("toy:KERNEL", "note"), ("sample", 3, tmp_path, None)]
+    monkeypatch.setattr(module, "cores", lambda: 5)
+    monkeypatch.chdir(tmp_path)
+    module.plan(study)
+    assert asked[-1] == ("sample", 5, tmp_path, None)
+
+
+def test_a_plan_for_no_folder_is_refused(tmp_path):
+    path = tmp_path / "none" / "out.h5"
+    with pytest.raises(module.SweepError) as fault:
+        module.plan(build(axes={"height": [1.0]}), path=path)
+    assert str(fault.value) == f"{path}: there is no folder {path.parent}"
+
+
+@pytest.mark.parametrize(
+    ("keys", "limits"),
+    [({"isolate": True}, module.Limits()), ({"cell_timeout": 0.5}, module.Limits(0.5)), ({}, None)],
+)
+def test_a_plan_is_made_apart_where_that_is_asked_for(monkeypatch, tmp_path, keys, limits):
+    asked = []
+    monkeypatch.setattr(module, "_plan_apart", lambda *words: (asked.append(words[1:]), "apart")[1])
+    monkeypatch.setattr(module, "sampled_study", lambda *words: pytest.skip("here") if limits else "sample")
+    monkeypatch.setattr(module, "scaling", lambda study: SimpleNamespace(advice=""))
+    monkeypatch.setattr(module, "_forecast", lambda *words: made())
+    found = module.plan(build(axes={"height": [1.0]}), 2, tmp_path / "out.h5", **keys)
+    assert asked == ([(2, tmp_path, limits)] if limits else [])
+    assert (found == "apart") is (limits is not None)
+
+
 @pytest.mark.parametrize(
     ("output", "seconds"),
     [(1 << 28, 2.0 + 50.0), ((1 << 28) + 1, 2.0 + ((1 << 28) + 1) / 1e6), ((1 << 29), 2.0 + (1 << 29) / 1e6)],
@@ -81,11 +126,11 @@ def test_without_a_trial_the_slower_of_cells_and_disk_tells_the_time(monkeypatch
 
 
 def test_the_speed_of_the_disk_is_that_of_bytes_written_and_synced(tmp_path, monkeypatch):
-    now, synced = iter([10.0, 12.0]), []
+    now, synced = iter([10.0, 32.0]), []
     monkeypatch.setattr(module, "TRIAL", 4096)
     monkeypatch.setattr(module.time, "perf_counter", lambda: next(now))
     monkeypatch.setattr(module.os, "fsync", lambda fd: synced.append(module.os.fstat(fd).st_size))
-    assert module._disk_speed(tmp_path) == 2048
+    assert module._disk_speed(tmp_path) == 4096 / 22
     assert synced == [4096]
     assert module._disk_speed(tmp_path / "nowhere") == math.inf
     assert module.WORTH_A_TRIAL == 1 << 28
@@ -106,6 +151,8 @@ def test_shares_are_counted_by_name():
         (0.0009995, "999 us"),
         (1e-6, "1 us"),
         (0.0, "0 ns"),
+        (3e-9, "3 ns"),
+        (0.51e-6, "510 ns"),
         (70.0, "70 s"),
     ],
 )

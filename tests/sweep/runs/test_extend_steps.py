@@ -1,13 +1,19 @@
 """Which cells of an extended grid are known, by counting; and what keeps a result from being extended."""
 
 import itertools
+import math
+import re
+from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
+from running import quiet
+from toy_studies import build
 
 from sweep.cells.grid import Box
 from sweep.runs import extend
-from sweep.runs.extend import Precomputed, Retried, Reused, is_of_another_version, obstacle
+from sweep.runs.extend import Precomputed, Retried, Reused, has_failed, is_of_another_version, obstacle
 from sweep.study.model import Axis, frozen
 from sweep.system.errors import SweepError
 
@@ -158,3 +164,101 @@ def test_a_sample_has_cells_of_every_status_and_method(pieces):
     assert len(plain) == 8
     assert (plain[0], plain[-1]) == (0, 15)
     assert len(old) == 11
+
+
+def sampled(monkeypatch, old, new, **numbers):
+    """Of a result of four cells with values `old`, that come out as `new` now."""
+    made = object.__new__(Reused)
+    made._positions, made._grid, made._output = [np.arange(4)], Box(("a",), (4,)), Path("out.h5")
+    status = np.array([0, 0, 0, extend.Status.INACCURATE], np.int8)
+    columns = {"x": np.array(old), "status": status, "method_used": np.zeros(4, np.int8), **numbers}
+    made._numbers, made.taken_over = columns, ""
+    made._columns = tuple(extend.Column(name, values.dtype.str, (), (), {}) for name, values in columns.items())
+
+    def solve(start, stop, arrays, wanted):
+        assert (stop, wanted) == (start + 1, None)
+        for name, values in {**columns, "x": np.array(new)}.items():
+            arrays[name][...] = values[start:stop]
+
+    monkeypatch.setattr(extend, "block_solver", lambda study: solve)
+    made._study = None
+    return made
+
+
+BOUND = np.zeros(4, np.float32)
+
+
+def test_what_another_version_has_computed_is_taken_over_where_its_bits_come_out_again(monkeypatch):
+    values = [1.0, math.nan, 3.0, 4.0]
+    made = sampled(monkeypatch, values, values, error_bound=BOUND)
+    made.check_sample()
+    said = "4 cells of another version, 4 of which came out with the same bits again"
+    assert made.taken_over == said
+    made.taken_over = "0.1"
+    made.check_sample()
+    assert made.taken_over == f"0.1\n{said}"
+
+
+@pytest.mark.parametrize(
+    ("now", "said"), [(2.5, "was 2.0, and comes out as 2.5"), (1.5, "was 2.0, and comes out as 1.5")]
+)
+def test_what_comes_out_with_other_bits_is_refused(monkeypatch, now, said):
+    made = sampled(monkeypatch, [1.0, 2.0, 3.0, 4.0], [1.0, now, 3.0, 4.0], error_bound=BOUND)
+    with pytest.raises(SweepError) as fault:
+        made.check_sample()
+    assert str(fault.value) == (
+        "out.h5: cannot be extended, for another version has computed it: x of a cell was 2.0, and comes out as "
+        f"{now} now; choose another name, or overwrite it with --force"
+    )
+    assert made.taken_over == ""
+
+
+def test_inaccurate_cells_without_error_bounds_are_refused(monkeypatch):
+    made = sampled(monkeypatch, [1.0] * 4, [1.0] * 4)
+    with pytest.raises(SweepError, match="it does not say what its INACCURATE values are right to"):
+        made.check_sample()
+    made._numbers["status"] = np.zeros(4, np.int8)
+    made.check_sample()
+    assert made.taken_over.startswith("4 cells of another version")
+
+
+def test_error_bounds_that_are_not_there_are_nan_and_other_columns_are_a_fault(monkeypatch):
+    made = sampled(monkeypatch, [1.0] * 4, [1.0] * 4)
+    assert math.isnan(made._values("error_bound", (slice(1, 3),)))
+    with pytest.raises(SweepError, match=r"^out\.h5"):
+        made._values("y", (slice(1, 3),))
+
+
+def test_a_result_is_taken_up_with_its_places_and_who_has_computed_it(tmp_path):
+    path = tmp_path / "out.h5"
+    quiet(build(axes={"height": [1.0, 3.0], "v0": [0.0, 1.0]}), path)
+    study = build(axes={"height": [1.0, 2.0, 3.0], "v0": [0.0, 1.0]})
+    with Reused(path, study) as found:
+        assert (found.taken_over, found.cells) == ("", 4)
+        assert found.missing(0, 6).tolist() == [False, False, True, True, False, False]
+        assert set(found._numbers) == {"fall_time", "status", "method_used", "error_bound"}
+        arrays = {column.name: column.empty(1) for column in found._columns}
+        found.fill(5, 6, arrays)
+    # 3 = t + g t^2 / 2
+    assert arrays["fall_time"] == pytest.approx([(math.sqrt(1 + 6 * 9.80665) - 1) / 9.80665], rel=1e-14)
+    assert not found._file
+    path.write_bytes(b"no HDF5")
+    with pytest.raises(SweepError, match=r"out\.h5"):
+        Reused(path, study)
+
+
+@pytest.mark.parametrize(("stored", "failed"), [([0, 127, 65], False), ([0, 126, 0], True), ([126, 0, 0], True)])
+def test_whether_a_cell_of_a_result_failed(tmp_path, monkeypatch, stored, failed):
+    monkeypatch.setattr(extend, "flat_pieces", lambda column: np.array_split(column[:], 3))
+    path = tmp_path / "out.h5"
+    with h5py.File(path, "w") as file:
+        file["status"] = np.array(stored, np.int8)
+    assert has_failed(path) is failed
+
+
+def test_a_summary_keeps_no_cells_that_failed(tmp_path):
+    path = tmp_path / "out.h5"
+    h5py.File(path, "w").close()
+    said = f"{path}: a summary does not keep the cells that FAILED; compute it anew with --force"
+    with pytest.raises(SweepError, match=f"^{re.escape(said)}$"):
+        has_failed(path)

@@ -1,12 +1,14 @@
 """What cells in processes of their own may take, and what is said of those that took longer, by hand."""
 
+import os
 import sys
 import time
 from concurrent.futures import Future
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
+from running import tall
 
 from sweep.runs import isolate
 from sweep.runs.isolate import Died, IsolatedSolver, Limits, Processes, awaited, kernel_paths, limits_of
@@ -236,3 +238,139 @@ def test_while_a_run_is_stopped_nothing_is_said_of_cells(monkeypatch):
         solver.call(4.5, len, "x")
     with pytest.raises(isolate.Ended, match="the run is being stopped"):
         solver._begun()
+
+
+def test_processes_have_half_of_the_memory_between_them(monkeypatch):
+    monkeypatch.setattr(isolate, "memory", lambda: 1000)
+    made = Processes(tall(3), Limits(2.0), 4)
+    assert (made.most_bytes, made.good, made.dearest, made.over) == (125.0, None, 0.0, False)
+    solver = made.solver()
+    assert made._solvers == [solver]
+    assert solver.clock() == 0.0
+    ended = []
+    monkeypatch.setattr(solver, "end", lambda: ended.append(1))
+    made.end()
+    assert (ended, made.over) == ([1], True)
+
+
+@pytest.mark.parametrize("bounds", [True, False])
+def test_what_a_process_answers_is_put_in_its_place(monkeypatch, bounds):
+    solver, asked = IsolatedSolver(processes(Limits())), []
+    column = np.arange(2.0)
+    found = {"fall_time": column, "status": column + 1, "method_used": column + 2, "error_bound": column + 3}
+    monkeypatch.setattr(solver, "_asked", lambda *words: (asked.append(words), found)[1])
+    error = np.zeros(2, np.float32) if bounds else None
+    cells = isolate.Cells({"fall_time": np.zeros(2)}, np.zeros(2, np.int8), np.zeros(2, np.int8), error)
+    solver.solve(7, cells, "wanted")
+    assert asked == [(7, 2, "wanted")]
+    assert (cells.outputs["fall_time"].tolist(), cells.status.tolist(), cells.used.tolist()) == ([0, 1], [1, 2], [2, 3])
+    assert not bounds or error.tolist() == [3, 4]
+
+
+class Loading(Pool):
+    """An executor whose process is number 7; it cannot load the kernel so many times."""
+
+    def submit(self, *words):
+        super().submit(*words)
+        return words[0]
+
+
+def loading(monkeypatch, faults):
+    """A solver whose processes fail in these ways, one after another, and then load; what is awaited of them."""
+    solver, awaits, pools, faults = IsolatedSolver(processes(Limits(), good=5)), [], [], list(faults)
+    solver._all.text, solver._all.paths, solver._all.study = "text", ("path",), SimpleNamespace(kernel_name="toy")
+    others = [SimpleNamespace(pid=6), SimpleNamespace(pid=7, kill=lambda: None, exitcode=-9)]
+    monkeypatch.setattr(isolate.multiprocessing, "active_children", lambda: others)
+
+    def begun():
+        pools.append(Loading())
+        solver._pool = pools[-1]
+        return pools[-1]
+
+    def awaited(function, seconds):
+        awaits.append((function, seconds))
+        if function is isolate.isolated.load and faults and (fault := faults.pop(0)):
+            raise fault
+        return 7
+
+    monkeypatch.setattr(solver, "_begun", begun)
+    monkeypatch.setattr(isolate, "awaited", awaited)
+    return solver, awaits, pools
+
+
+def test_a_new_process_has_loaded_the_kernel_and_an_old_one_is_used_again(monkeypatch):
+    solver, awaits, pools = loading(monkeypatch, [])
+    solver._fresh = False
+    pool = solver._ready()
+    assert pool.told == [(os.getpid,), (isolate.isolated.load, "text", ("path",), 5)]
+    assert awaits == [(os.getpid, 180.0), (isolate.isolated.load, 180.0)]
+    assert (solver._process.pid, solver._fresh) == (7, True)
+    solver._fresh = False
+    assert solver._ready() is pool
+    assert (len(pools), solver._fresh) == (1, False)
+    solver._all.over = True
+    assert solver._ready() is not pool
+
+
+@pytest.mark.parametrize("fault", [RuntimeError(), TimeoutError(), isolate.CancelledError()])
+def test_a_process_that_cannot_load_the_kernel_is_begun_three_times(monkeypatch, fault):
+    solver, _, pools = loading(monkeypatch, [fault, fault])
+    assert solver._ready() is pools[2]
+    assert [("shutdown", True) in pool.told for pool in pools] == [True, True, False]
+    solver, _, pools = loading(monkeypatch, [fault] * 3)
+    with pytest.raises(isolate.SweepError, match=r"^toy: no process of its own can load it$"):
+        solver._ready()
+    assert len(pools) == 3
+
+
+def test_a_call_is_awaited_while_its_process_compiles(monkeypatch):
+    solver, _ = with_pool(Pool())
+    solver._compiling, told = SimpleNamespace(value=0), []
+    monkeypatch.setattr(isolate, "awaited", lambda future, seconds, compiling: (told.append(compiling), seconds)[1])
+    assert solver.call(4.5, len, "x") == 4.5
+    assert solver._pool.told == [(len, "x")]
+    assert told[0]() is False
+    solver._compiling.value = 1
+    assert told[0]() is True
+
+
+@pytest.mark.parametrize("compiler", [True, False])
+def test_processes_are_made_of_a_clean_one_that_has_the_compiler_if_this_one_has(monkeypatch, compiler):
+    preloaded = []
+    context = SimpleNamespace(set_forkserver_preload=preloaded.append)
+    monkeypatch.setattr(isolate.multiprocessing, "get_context", {"forkserver": context}.get)
+    monkeypatch.setattr(isolate, "sys", SimpleNamespace(modules={"numba": 1} if compiler else {}))
+    assert isolate._context() is context
+    assert preloaded == [["sweep.runs.isolated", "numba"] if compiler else ["sweep.runs.isolated"]]
+
+
+@pytest.mark.parametrize("before", [{}, {"daemon": True}, {"daemon": False}])
+def test_a_process_is_made_apart_from_this_program(monkeypatch, before):
+    flags, main = {"semprefix": "x", **before}, sys.modules["__main__"]
+    monkeypatch.setattr(isolate.multiprocessing, "current_process", lambda: SimpleNamespace(_config=flags))
+    made = []
+    with isolate._apart():
+        made.append((dict(flags), vars(sys.modules["__main__"]).keys()))
+    assert made == [({"semprefix": "x"}, vars(ModuleType("__main__")).keys())]
+    assert flags == {"semprefix": "x", **before}
+    assert sys.modules["__main__"] is main
+    assert not isolate._starting.locked()
+
+
+def test_a_process_is_begun_with_its_flag(monkeypatch):
+    made = []
+
+    class Executor(Pool):
+        def __init__(self, *words):
+            super().__init__()
+            made.append(words)
+
+    context = SimpleNamespace(RawValue=lambda kind: ("flag", kind))
+    monkeypatch.setattr(isolate, "_context", lambda: context)
+    monkeypatch.setattr(isolate, "ProcessPoolExecutor", Executor)
+    solver = IsolatedSolver(processes(Limits()))
+    solver._process = "old"
+    pool = solver._begun()
+    assert made == [(1, context, isolate.isolated.enter, (("flag", "i"),))]
+    assert (solver._pool, solver._process, solver._compiling) == (pool, None, ("flag", "i"))
+    assert pool.told == [(int,)]
