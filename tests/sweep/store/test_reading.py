@@ -133,6 +133,14 @@ def test_of_a_block_a_part_of_which_is_read_the_rest_is_kept(path, monkeypatch):
         assert asked == [0, 1, 0]
 
 
+@pytest.mark.parametrize("cell", range(12))
+def test_a_part_of_any_block_may_be_read_first(path, cell):
+    finished(path)
+    with StoredFile(path) as file:
+        assert file.columns()["status"].run(cell, cell + 1).tolist() == [cell + 1]
+        assert file.columns()["status"].cells(np.array([cell])).tolist() == [cell + 1]
+
+
 def test_what_is_missing_of_an_unfinished_result_is_nan_and_pending(path):
     layout = written(path, blocks=(0, 2))
     harm(path, layout.work.places[0].at(2))
