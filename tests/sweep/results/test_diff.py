@@ -24,6 +24,7 @@ def test_a_result_is_the_same_as_itself(result):
     found = sweep.diff(result, result.copy(deep=True))
     assert found.same
     assert "bit for bit" in str(found)
+    assert all(distance == module.Distance(0, 0.0, "") for distance in found.outputs.values())
 
 
 def test_the_cell_and_the_distance_are_told(result):

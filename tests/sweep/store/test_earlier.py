@@ -9,6 +9,7 @@ import xxhash
 
 from sweep.store import earlier
 from sweep.store.earlier import read, read_seal, unbroken
+from sweep.store.reading import StoredFile
 
 MAGIC = b"foliot seal\n"
 
@@ -126,6 +127,13 @@ def test_columns_that_stand_in_the_file_as_they_are_have_their_places(path):
     for block, (start, stop) in enumerate([(0, 4), (4, 6)]):
         assert np.frombuffer(content, "f8", 2 * (stop - start), x.at(block)).tolist() == [*range(2 * start, 2 * stop)]
         assert np.frombuffer(content, "i1", stop - start, status.at(block)).tolist() == [*range(start, stop)]
+
+
+def test_a_file_of_an_earlier_format_has_ended(path):
+    made(path)
+    with StoredFile(path) as file:
+        assert (file.finished, file.earlier) == (True, True)
+        assert file.done("cells").tolist() == [True, True]
 
 
 @pytest.mark.parametrize(
