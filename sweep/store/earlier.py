@@ -29,8 +29,10 @@ GROUP, DIGESTS = "integrity", "digests"
 
 def read_seal(fd: int, size: int) -> tuple[bytes, list[Region], int] | None:
     """The trailer: its digest and regions, and where it begins; None where there is none. Raises OSError, EOFError."""
-    tail = bytearray(min(TAIL, size))
-    disk.read_all(fd, (tail,), size - len(tail))
+    if size < TAIL:
+        return None
+    tail = bytearray(TAIL)
+    disk.read_all(fd, (tail,), size - TAIL)
     if not tail.endswith(MAGIC):
         return None
     (count,) = struct.unpack_from("<I", tail, BYTES)

@@ -41,7 +41,7 @@ def as_path(given: Any) -> Path:
 def open_file(path: Path | str, flags: int) -> int:
     """A file descriptor; a pipe that is to be read is not waited for. Raises OSError."""
     waiting = getattr(os, "O_NONBLOCK", 0) if flags == os.O_RDONLY else 0
-    return os.open(path, flags | waiting | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0), 0o666)
+    return os.open(path, flags | waiting | getattr(os, "O_BINARY", 0), 0o666)
 
 
 def write(fd: int, pieces: Sequence[memoryview], offset: int) -> int:

@@ -153,6 +153,7 @@ def study_of(groups, group):
 def test_a_study_is_cut_into_about_a_thousand_rows_and_short_groups_are_not_cut(groups, group, length):
     found = row_blocks(study_of(groups, group))
     assert (found.groups, found.group, found.length) == (groups, group, length)
+    assert {type(number) for number in (found.groups, found.group, found.length)} == {int}
 
 
 def test_rows_of_dear_cells_are_not_longer_than_the_longest(monkeypatch):

@@ -24,6 +24,7 @@ def test_a_result_is_the_same_as_itself(result):
     found = sweep.diff(result, result.copy(deep=True))
     assert found.same
     assert "bit for bit" in str(found)
+    assert all(distance == module.Distance(0, 0.0, "") for distance in found.outputs.values())
 
 
 def test_the_cell_and_the_distance_are_told(result):
@@ -177,3 +178,13 @@ def test_pieces_hold_as_many_numbers_as_is_said(monkeypatch, at_once, rows):
 def test_one_number_is_a_piece():
     one = xr.DataArray(2.0)
     assert [(start, x.tolist(), y.tolist()) for start, x, y in module._pieces(one, one + 1)] == [(0, [2.0], [3.0])]
+
+
+@pytest.mark.parametrize("at_once", [1, 2, 5, 1 << 22])
+def test_statuses_are_counted_over_all_pieces_with_the_first_cell(result, monkeypatch, at_once):
+    monkeypatch.setattr(module, "NUMBERS_AT_ONCE", at_once)
+    other = result.copy(deep=True)
+    other.status[:, 1] = int(Status.INACCURATE)
+    found = sweep.diff(result, other)
+    assert found.statuses == {("OK", "INACCURATE"): 3}
+    assert found.examples == {("OK", "INACCURATE"): "e.g. height=1 v0=1"}

@@ -97,7 +97,7 @@ def test_memory_is_that_of_the_machine_or_eight_gibibytes(monkeypatch):
     assert memory() == 8_589_934_592
 
 
-@pytest.mark.parametrize(("bytes_", "chunked"), [(4003, True), (4004, False)])
+@pytest.mark.parametrize(("bytes_", "chunked"), [(4003, True), (4004, False), (8000, False)])
 def test_what_is_larger_than_a_quarter_of_the_memory_is_opened_in_pieces(output, monkeypatch, bytes_, chunked):
     asked = []
     output.write_bytes(bytes(1001))
@@ -109,13 +109,13 @@ def test_what_is_larger_than_a_quarter_of_the_memory_is_opened_in_pieces(output,
     assert asked == ["auto" if chunked else None]
 
 
-@pytest.mark.parametrize(("number", "size", "compressed", "found"), [
-    (100, 800, None, True), (100, 799, None, False), (137, 1, "gzip", True),
-    (138, 1, "gzip", False), (0, 0, None, True),
+@pytest.mark.parametrize(("nbytes", "size", "compressed", "found"), [
+    (800, 800, None, True), (800, 799, None, False), (7, 7, None, True), (1096, 1, "gzip", True),
+    (1104, 1, "gzip", False), (0, 0, None, True),
 ])  # fmt: skip
-def test_a_dataset_larger_than_its_file_cannot_be(number, size, compressed, found):
-    """Of a byte gzip makes 1100 at most: 137.5 numbers."""
-    file = {"x": SimpleNamespace(nbytes=8 * number, compression=compressed), "group": SimpleNamespace()}
+def test_a_dataset_larger_than_its_file_cannot_be(nbytes, size, compressed, found):
+    """Of a byte gzip makes 1100 at most."""
+    file = {"x": SimpleNamespace(nbytes=nbytes, compression=compressed), "group": SimpleNamespace()}
     assert opening._can_be(file, "x", size) is found
     assert opening._can_be(file, "group", 0)
 
@@ -230,6 +230,24 @@ def test_a_file_that_may_not_be_read_is_told_and_one_that_is_gone_goes_on(output
             check_structure(output)
     else:
         assert refused(lambda: check_structure(output)) == f"{output}: cannot be read (Permission denied)"
+
+
+@pytest.mark.parametrize("fault", [ValueError("odd"), EOFError(), KeyError("x")])
+def test_what_the_file_itself_or_xarray_cannot_read_is_told(output, monkeypatch, fault):
+    def failing(*args):
+        raise fault
+
+    written(output)
+    monkeypatch.setattr(opening, "StoredFile", failing)
+    monkeypatch.setattr(opening, "stored_attrs", lambda path: {})
+    monkeypatch.setattr("sweep.results.columns.open_checked", failing)
+    told = f"{output}: not the result of a sweep, or damaged; move it away or choose another name"
+    assert refused(lambda: opening._stored(output)) == refused(lambda: opening._open(output)) == told
+
+
+def test_a_file_that_is_gone_meanwhile_goes_on(output):
+    with pytest.raises(FileNotFoundError):
+        opening._stored(output)
 
 
 def test_what_is_unreadable_is_told_by_its_kind(output, tmp_path):

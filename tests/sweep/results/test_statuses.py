@@ -92,6 +92,13 @@ def test_methods_are_counted_and_none_is_left_out():
 def test_words_of_flags():
     assert flag_words(cells([0]).method_used) == {-1: "none", 0: "map", 1: "closed"}
     assert flag_words(cells([0]).status) == {}
+    # of a result that another program made -1 is none, too
+    flags = {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "map closed"}
+    assert flag_words(xr.DataArray(0, attrs=flags)) == {-1: "none", 0: "map", 1: "closed"}
+
+
+def test_pieces_of_no_cells_are_none():
+    assert [piece.size for piece in flat_pieces(xr.DataArray(np.zeros((3, 0))))] == [0]
 
 
 def test_a_summary_is_summed_over_all_it_keeps():

@@ -9,6 +9,7 @@ import xxhash
 
 from sweep.store import earlier
 from sweep.store.earlier import read, read_seal, unbroken
+from sweep.store.reading import StoredFile
 
 MAGIC = b"foliot seal\n"
 
@@ -54,10 +55,11 @@ def test_every_byte_but_those_of_regions_is_looked_at(path):
 
 
 def test_no_trailer_is_none(path):
-    for content in (b"", b"x", CONTENT, CONTENT[:31], MAGIC, sealed(CONTENT, [(1, 2)])[:-1] + b"x"):
-        if len(content) >= 32 or not content.endswith(MAGIC):
-            assert asked(path, content, read_seal) is None
-            assert asked(path, content, unbroken, 1e9) is None
+    for content in (b"", b"x", CONTENT, MAGIC, bytes(19) + MAGIC, sealed(CONTENT, [(1, 2)])[:-1] + b"x"):
+        assert asked(path, content, read_seal) is None
+        assert asked(path, content, unbroken, 1e9) is None
+    # nothing but a trailer of no region
+    assert asked(path, bytes(20) + MAGIC, read_seal) == (bytes(16), [], 0)
 
 
 @pytest.mark.parametrize(("count", "begin"), [(6, 16), (7, 0), (8, None)])
@@ -125,6 +127,13 @@ def test_columns_that_stand_in_the_file_as_they_are_have_their_places(path):
     for block, (start, stop) in enumerate([(0, 4), (4, 6)]):
         assert np.frombuffer(content, "f8", 2 * (stop - start), x.at(block)).tolist() == [*range(2 * start, 2 * stop)]
         assert np.frombuffer(content, "i1", stop - start, status.at(block)).tolist() == [*range(start, stop)]
+
+
+def test_a_file_of_an_earlier_format_has_ended(path):
+    made(path)
+    with StoredFile(path) as file:
+        assert (file.finished, file.earlier) == (True, True)
+        assert file.done("cells").tolist() == [True, True]
 
 
 @pytest.mark.parametrize(

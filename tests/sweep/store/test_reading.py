@@ -111,7 +111,13 @@ def test_threads_are_for_long_runs_of_several_blocks(path, monkeypatch, bytes_, 
 
 @pytest.mark.parametrize(
     ("key", "short", "looked_up"),
-    [((1,), 64, 0), ((slice(None), 1), 64, 1), ((slice(0, 3, 2),), 4, 0), ((slice(0, 3, 2),), 5, 1)],
+    [
+        ((1,), 64, 0),
+        ((slice(None), 1), 64, 1),
+        ((slice(0, 3, 2),), 3, 0),
+        ((slice(0, 3, 2),), 4, 0),
+        ((slice(0, 3, 2),), 5, 1),
+    ],
 )
 def test_only_cells_of_several_short_runs_are_looked_up_one_by_one(path, monkeypatch, key, short, looked_up):
     finished(path)
@@ -131,6 +137,14 @@ def test_of_a_block_a_part_of_which_is_read_the_rest_is_kept(path, monkeypatch):
         for cell in (1, 2, 3, 5, 6, 1):
             assert column.run(cell, cell + 1).tolist() == [[2 * cell + 1, 2 * cell + 2]]
         assert asked == [0, 1, 0]
+
+
+@pytest.mark.parametrize("cell", range(12))
+def test_a_part_of_any_block_may_be_read_first(path, cell):
+    finished(path)
+    with StoredFile(path) as file:
+        assert file.columns()["status"].run(cell, cell + 1).tolist() == [cell + 1]
+        assert file.columns()["status"].cells(np.array([cell])).tolist() == [cell + 1]
 
 
 def test_what_is_missing_of_an_unfinished_result_is_nan_and_pending(path):

@@ -222,6 +222,16 @@ def test_what_was_acknowledged_is_taken_up_and_what_is_damaged_undone(output):
         assert file.done("cells").tolist() == [True, False, False]
 
 
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_block_that_lacks_a_digest_of_a_column_is_not_done(output, number):
+    layout = written(unfinished_of(output))
+    with unfinished_of(output).open("r+b") as file:
+        os.pwrite(file.fileno(), bytes(16), layout.work.digests + 32 + 16 * number)
+    with opened(output) as store:
+        store.resume(store.found())
+        assert store.missing() == [1]
+
+
 def test_all_blocks_are_damaged_where_the_file_cannot_be_read(output, monkeypatch):
     written(unfinished_of(output), blocks=(0, 2))
     with opened(output) as store:

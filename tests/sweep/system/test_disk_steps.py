@@ -4,6 +4,7 @@ import errno
 import os
 from types import SimpleNamespace
 
+import filelock
 import numpy as np
 import pytest
 
@@ -35,13 +36,19 @@ def test_what_names_no_file_is_told():
 
 
 @pytest.mark.parametrize(("flags", "waits"), [(os.O_RDONLY, False), (os.O_RDWR, True), (os.O_CREAT | os.O_RDWR, True)])
-def test_a_pipe_is_not_waited_for_and_children_inherit_nothing(monkeypatch, flags, waits):
+def test_a_pipe_is_not_waited_for(monkeypatch, flags, waits):
     asked = []
     monkeypatch.setattr(os, "open", lambda *args: asked.append(args) or 7)
     assert disk.open_file("x", flags) == 7
     ((path, given, mode),) = asked
     assert (path, mode) == ("x", 0o666)
-    assert given == flags | os.O_CLOEXEC | (0 if waits else os.O_NONBLOCK)
+    assert given == flags | (0 if waits else os.O_NONBLOCK)
+
+
+def test_children_inherit_no_descriptor(tmp_path):
+    fd = disk.open_file(tmp_path / "file", os.O_CREAT | os.O_RDWR)
+    assert not os.get_inheritable(fd)
+    os.close(fd)
 
 
 @pytest.mark.parametrize("names", [[], ["pwritev"], ["pwritev", "pwrite"]])
@@ -276,10 +283,14 @@ def test_a_lock_whose_file_is_another_meanwhile_is_taken_anew(tmp_path, monkeypa
 
 
 def test_the_library_locks_where_the_system_cannot(tmp_path, monkeypatch):
+    asked, real = [], filelock.FileLock
+    monkeypatch.setattr(filelock, "FileLock", lambda path, **keys: asked.append(keys) or real(path, **keys))
     monkeypatch.setattr(disk, "fcntl", None)
     with disk.locked(tmp_path / "lock") as ours, disk.locked(tmp_path / "lock") as other:
         assert (ours, other) == (True, False)
     assert not (tmp_path / "lock").exists()
+    # nobody is waited for
+    assert asked == [{"timeout": 0}] * 2
 
 
 @pytest.mark.parametrize(

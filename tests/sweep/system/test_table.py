@@ -40,6 +40,12 @@ def test_a_column_that_is_empty_everywhere_takes_no_room(terminal):
     assert table.columns([("a", "", "b"), ("c", "", "d")]) == "  a  b\n  c  d"
 
 
+@pytest.mark.parametrize("wide", range(40, 60))
+def test_text_beside_an_empty_column_is_wrapped_where_it_would_be_without(terminal, wide):
+    terminal(wide)
+    assert table.columns([("a", "", WORDS)]) == table.columns([("a", WORDS)])
+
+
 def test_what_a_terminal_would_obey_is_shown():
     assert table.printable("a\x1b[31m\x7f\x9f\xa0\n\tb\r") == "a\\x1b[31m\\x7f\\x9f\xa0\n\tb\\x0d"
     assert table.printable("\x00\x1f \udc80") == "\\x00\\x1f \\udc80"
