@@ -16,6 +16,7 @@ dlnv = (1 - s) dlnmu: with (1) this says how many decades of torque an exponent 
 
 from __future__ import annotations
 
+import functools
 import math
 import sys
 from collections.abc import Sequence
@@ -30,6 +31,8 @@ import sweep
 LARGE, SMALL = 100.0, 1.0003
 """Amplitudes over phi0 from which, and up to which, losses are called light and heavy."""
 NODES = 200
+AT_ONCE = 4000
+"""Cells whose losses are summed up together: 6 MB an array."""
 PURE = {"dry": (0.0, 0.0), "viscous": (1.0, 1 / 3), "impacts": (2.0, 1 / 2), "drag": (3.0, 3 / 5)}
 """Degree and exponent, at large swings, of the losses of the map; drag of degree 3."""
 
@@ -40,9 +43,12 @@ of the best torques, which were once had to 50 digits
 """
 
 
+legendre = functools.cache(np.polynomial.legendre.leggauss)
+
+
 def shares(ds: xr.Dataset) -> xr.Dataset:
     """`ds` with the shares `viscous`, `dry`, `drag` and `impacts` of the energy of half a swing, and its `deficit`."""
-    x, w = np.polynomial.legendre.leggauss(NODES)
+    x, w = legendre(NODES)
     t, w = (xr.DataArray(v, dims="node") for v in (0.5 * (x + 1), 0.5 * w))
     rise = t * t * (3 - 2 * t)  # fewer digits lost where the speed nears the final one
     lost: dict[str, Any] = {"viscous": 0.0, "dry": 0.0, "drag": 0.0}
@@ -65,7 +71,8 @@ def shares(ds: xr.Dataset) -> xr.Dataset:
 def prepared(ds: xr.Dataset) -> xr.Dataset:
     """`ds` with shares, `swing` = amplitude/phi0, N, and the laws (1) and (2)."""
     order = ds.sensitivity.dims
-    parts = [shares(ds.isel(mu=slice(i, i + 8))) for i in range(0, ds.sizes["mu"], 8)]
+    width = max(1, AT_ONCE * ds.sizes["mu"] // ds.sensitivity.size)
+    parts = [shares(ds.isel(mu=slice(i, i + width))) for i in range(0, ds.sizes["mu"], width)]
     ds = xr.concat(parts, "mu", data_vars="minimal", coords="minimal", compat="override", join="outer")
     N = ds.viscous + ds.n * ds.drag
     ds = ds.assign(swing=ds.amplitude / ds.phi0, N=N, light=(N + ds.impacts) / (N + 2), heavy=1 / N)

@@ -17,10 +17,11 @@ import xarray as xr
 
 from sweep.analysis.correlated import student
 from sweep.analysis.curves import Window, check_confidence, check_output, log_of, numbers_along, title, window_logs
+from sweep.analysis.fits import Found, fitted
 from sweep.analysis.lines import fit_exponent
 from sweep.analysis.loglog import Array, slope_bounds, slopes
 from sweep.analysis.scatter import noise_size
-from sweep.analysis.shapes import CORRECTION, Found, fitted
+from sweep.analysis.shapes import CORRECTION
 from sweep.system.errors import SweepError
 
 FEWEST_POINTS = 8

@@ -10,9 +10,10 @@ import xarray as xr
 
 from sweep.analysis.correlated import corrected
 from sweep.analysis.curves import Window, check_output, relative_sigma, title, window_logs, window_of
+from sweep.analysis.fits import Found, curve, fitted
 from sweep.analysis.loglog import EPSILON, Array
 from sweep.analysis.scatter import BEYOND_DOUBT, RARE, line_deviance
-from sweep.analysis.shapes import CORRECTION, LAWS, ONE, Found, curve, fitted
+from sweep.analysis.shapes import CORRECTION, LAWS, ONE
 from sweep.system.errors import SweepError
 
 FEWEST_POINTS = 8

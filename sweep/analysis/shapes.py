@@ -2,23 +2,19 @@
 
     z = shift(q) + columns(q) b                                                                     (1)
 
-For given q, b is a linear least-squares fit (variable projection): a grid over q gives the start, scipy's
-Levenberg-Marquardt the end.
+q are those few.
 """
 
 from __future__ import annotations
 
 import functools
-import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
 
 import numpy as np
 
-from sweep.analysis.correlated import corrected
-from sweep.analysis.loglog import EPSILON, Array
+from sweep.analysis.loglog import Array
 
 Parts = tuple[Array | float, Array]
 """Shift and columns of (1)."""
@@ -49,26 +45,13 @@ class Law:
         return self.name
 
 
-class Found(NamedTuple):
-    """A law fitted to points; `numbers` are q and then b, their standard errors `errors` for noise of the size of
-    `off`."""
-
-    law: Law
-    numbers: Array
-    errors: Array
-    off: Array
-    deviance: float
-    aicc: float
-    bic: float
-
-
 def _line(q: Array, t: Array) -> Parts:
     return 0.0, np.stack([np.ones_like(t), t], axis=1)
 
 
 def _logarithm(q: Array, t: Array) -> Parts:
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.log(1 + q[0] * (t - 0.5)), np.stack([np.ones_like(t), t], axis=1)
+        return np.log1p(q[0] * (t - 0.5)), np.stack([np.ones_like(t), t], axis=1)
 
 
 def _offset(q: Array, t: Array) -> Parts:
@@ -80,16 +63,17 @@ def _offset(q: Array, t: Array) -> Parts:
 def _correction(q: Array, t: Array) -> Parts:
     """q: correction at the middle, and how fast it fades."""
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        return np.log(1 + q[0] * np.exp(-q[1] * (t - 0.5))), np.stack([np.ones_like(t), t], axis=1)
+        return np.log1p(q[0] * np.exp(-q[1] * (t - 0.5))), np.stack([np.ones_like(t), t], axis=1)
 
 
 def _bent(bend: Callable[[Array, Array], Array]) -> Callable[[Array, Array], Parts]:
     """Two laws from a bend B(u) that is 0 far below and u far above 0; q: place, logarithm of the width, shape."""
 
     def parts(q: Array, t: Array) -> Parts:
-        u = t - q[0]
-        b = bend(u, q[1:])
-        return 0.0, np.stack([np.ones_like(t), u - b, b], axis=1)
+        u, columns = t - q[0], np.ones((t.size, 3))
+        columns[:, 2] = bend(u, q[1:])
+        columns[:, 1] = u - columns[:, 2]
+        return 0.0, columns
 
     return parts
 
@@ -113,38 +97,57 @@ def _hyperbola(u: Array, q: Array) -> Array:
 
 GRID = np.sinh(np.linspace(-9.0, 9.0, 361))
 """Where slopes of bends without a closed form are integrated, in widths."""
-STEPS = np.diff(GRID)
+STEPS, INNER = np.diff(GRID), GRID[1:-1]
 
 
-def _integrated(slope: Callable[[Array], Array], u: Array, width: float) -> Array:
-    """Bend of a slope that rises from 0 to 1, moved so that it tends to u."""
-    steep = slope(GRID)
-    rise = np.concatenate([[0.0], np.cumsum(0.5 * (steep[1:] + steep[:-1]) * STEPS)])
-    moved = GRID[-1] - rise[-1]
-    v = np.clip(u / width + moved, GRID[0], GRID[-1])
-    found: Array = width * (_hermite(v, rise, steep) + u / width + moved - v)
-    return np.where(u / width + moved < GRID[0], 0.0, found)
-
-
-def _hermite(v: Array, rise: Array, steep: Array) -> Array:
-    """Between points of GRID; scipy's spline takes ten times as long to make as it is used here."""
-    k = np.clip(np.searchsorted(GRID, v) - 1, 0, STEPS.size - 1)
-    share = (v - GRID[k]) / STEPS[k]
-    rest = 1 - share
-    ends = rise[k] * rest**2 * (1 + 2 * share) + rise[k + 1] * share**2 * (1 + 2 * rest)
-    found: Array = ends + STEPS[k] * share * rest * (steep[k] * rest - steep[k + 1] * share)
+def _integrated(slope: Callable[[Array, float], Array], power: float, u: Array, width: float) -> Array:
+    """Bend of a slope of that power that rises from 0 to 1, moved so that it tends to u."""
+    cubics, moved = _cubics(slope, power)
+    wanted = u / width + moved
+    v = np.minimum(np.maximum(wanted, GRID[0]), GRID[-1])
+    found: Array = width * (_on_grid(cubics, v) + (wanted - v))
+    found[wanted < GRID[0]] = 0.0
     return found
 
 
-def _logistic(v: Array) -> Array:
-    found: Array = 0.5 * (1 + np.tanh(0.5 * v))
+@functools.lru_cache(maxsize=256)
+def _cubics(slope: Callable[[Array, float], Array], power: float) -> tuple[Array, float]:
+    """Integral of a slope over GRID, as `_hermite` has it, and how far it is moved. Fits ask for one power many
+    times."""
+    steep = slope(GRID, power)
+    rise = np.concatenate([[0.0], np.cumsum(0.5 * (steep[1:] + steep[:-1]) * STEPS)])
+    return _hermite(rise, steep), float(GRID[-1] - rise[-1])
+
+
+def _hermite(rise: Array, steep: Array) -> Array:
+    """Cubics (4, steps) between points of GRID, the highest power first; scipy's spline takes ten times as long to make
+    as it is used here."""
+    mean, first, last = np.diff(rise) / STEPS, steep[:-1], steep[1:]
+    return np.stack([(first + last - 2 * mean) / STEPS**2, (3 * mean - 2 * first - last) / STEPS, first, rise[:-1]])
+
+
+def _on_grid(cubics: Array, v: Array) -> Array:
+    k = INNER.searchsorted(v)
+    third, second, first, level = cubics[:, k]
+    x = v - GRID[k]
+    found: Array = ((third * x + second) * x + first) * x + level
+    return found
+
+
+def _powered(v: Array, power: float) -> Array:
+    found: Array = np.exp(-power * np.logaddexp(0, -v))
+    return found
+
+
+def _stretched_slope(v: Array, power: float) -> Array:
+    found: Array = 0.5 * (1 + np.tanh(0.5 * np.sign(v) * abs(v) ** power))
     return found
 
 
 def _asymmetric(u: Array, q: Array) -> Array:
     """A logistic slope to the power exp(q1): it fades so many times faster below than above."""
     power = math.exp(min(max(q[1], -2.5), 2.5))
-    return _integrated(lambda v: np.exp(-power * np.logaddexp(0, -v)), u, _width(q[0]))
+    return _integrated(_powered, power, u, _width(q[0]))
 
 
 def _uneven(u: Array, q: Array) -> Array:
@@ -157,7 +160,7 @@ def _uneven(u: Array, q: Array) -> Array:
 def _stretched(u: Array, q: Array) -> Array:
     """A slope that fades as the exponential of the power exp(q1) of u."""
     power = math.exp(min(max(q[1], -1.2), 0.8))
-    return _integrated(lambda v: _logistic(np.sign(v) * abs(v) ** power), u, _width(q[0]))
+    return _integrated(_stretched_slope, power, u, _width(q[0]))
 
 
 def _three(q: Array, t: Array) -> Parts:
@@ -219,101 +222,3 @@ THREE = Law(
 )
 BENDS = (TWO, HYPERBOLA, ASYMMETRIC, UNEVEN, STRETCHED)
 LAWS = (ONE, LOGARITHM, OFFSET, CORRECTION, *BENDS, THREE)
-
-
-def fitted(law: Law, t: Array, z: Array, weights: Array | None = None, known: bool = False) -> Found | None:
-    """The law that is nearest to the points, t rising; None where there are not more points than numbers, and two.
-
-    `known` weights are one over the variance of each point; others tell only how these compare.
-    """
-    from scipy.optimize import leastsq
-
-    if t.size < law.numbers + 2:
-        return None
-    s = (t - t[0]) / (t[-1] - t[0])
-    root = np.ones_like(z) if weights is None else np.sqrt(weights if known else weights / weights.mean())
-    q = _start(law, s, z, root)
-    if law.grids:
-        options: dict[str, Any] = {"xtol": 1e-8, "ftol": 1e-10, "maxfev": 200, "full_output": True}
-        q = leastsq(lambda p: _project(law, p, s, z, root)[1], q, diag=np.ones(q.size), **options)[0]
-    b, off = _project(law, q, s, z, root)
-    numbers = np.concatenate([q, b])
-    errors = _errors(law, numbers, s, off, root)
-    if known:
-        errors = errors * math.sqrt((s.size - law.numbers) / max(float(off @ off), 1e-300))
-    floor = (4 * EPSILON * (1 + abs(z).max())) ** 2  # what rounding leaves
-    deviance = z.size * math.log(float(off @ off) / z.size + floor) - 2 * float(np.log(root).sum())
-    deviance = float(off @ off) if known else deviance
-    k = law.numbers + (not known)
-    return Found(
-        law, numbers, errors, off / root, deviance, corrected(deviance, z.size, k), deviance + k * math.log(z.size)
-    )
-
-
-def curve(found: Found, t: Array, first: float, last: float) -> Array:
-    """ln y of a fitted law at ln x = t; first and last are those of the points that it was fitted to."""
-    s = (t - first) / (last - first)
-    q, b = np.split(found.numbers, [len(found.law.grids)])
-    shift, columns = found.law.parts(q, s)
-    value: Array = shift + columns @ b
-    return value
-
-
-def _start(law: Law, s: Array, z: Array, root: Array) -> Array:
-    tries, shifts, bases = _grid(law, s.tobytes(), root.tobytes())
-    wanted = (z - shifts) * root
-    off = wanted - np.einsum("gnk,gmk,gm->gn", bases, bases, wanted, optimize=True)
-    best: Array = tries[int(np.nanargmin((off**2).sum(axis=1)))]
-    return best
-
-
-@functools.lru_cache(maxsize=128)
-def _grid(law: Law, places: bytes, roots: bytes) -> tuple[Array, Array, Array]:
-    """All q to start from (g, q), their shifts (g, n), and orthonormal bases (g, n, columns); NaN where there is no
-    such curve. Lines of one array share them."""
-    s, root = np.frombuffer(places), np.frombuffer(roots)
-    tries = np.array(list(itertools.product(*law.grids)), dtype=np.float64)
-    parts = [law.parts(q, s) for q in tries]
-    shifts = np.stack([np.broadcast_to(shift, s.shape) for shift, _ in parts])
-    columns = np.stack([columns for _, columns in parts])
-    exist = np.isfinite(columns).all(axis=(1, 2)) & np.isfinite(shifts).all(axis=1)
-    bases = np.linalg.qr(np.where(exist[:, None, None], columns, 0.0) * root[:, None])[0]
-    return tries, np.where(exist[:, None], shifts, np.nan), bases
-
-
-FAR = 1e6
-"""Distance of points from a curve that does not exist there."""
-
-
-def _project(law: Law, q: Array, s: Array, z: Array, root: Array) -> tuple[Array, Array]:
-    """Linear numbers and weighted distances for given q."""
-    shift, columns = law.parts(q, s)
-    if not (np.isfinite(shift).all() and np.isfinite(columns).all()):
-        return np.zeros(columns.shape[1]), np.full(s.size, FAR)
-    wanted = (z - shift) * root
-    b: Array = np.linalg.lstsq(columns * root[:, None], wanted, rcond=None)[0].astype(np.float64)
-    return b, wanted - (columns * root[:, None]) @ b
-
-
-def _errors(law: Law, numbers: Array, s: Array, off: Array, root: Array) -> Array:
-    """Standard errors by the Jacobian; inf of what the points do not determine."""
-    count = len(law.grids)
-
-    def values(of: Array) -> Array:
-        shift, columns = law.parts(of[:count], s)
-        found: Array = (shift + columns @ of[count:]) * root
-        return found
-
-    steps = 1e-6 * np.maximum(1e-2, abs(numbers))
-    with np.errstate(invalid="ignore"):
-        jacobian = np.stack(
-            [(values(numbers + step) - values(numbers - step)) / (2 * step.max()) for step in np.diag(steps)], axis=1
-        )
-    if not np.isfinite(jacobian).all():
-        return np.full(numbers.size, np.inf)
-    size = np.sqrt((jacobian**2).sum(axis=0))
-    undetermined = size < 1e-12 * size.max()
-    size[undetermined] = 1.0
-    inverse = np.linalg.pinv(jacobian / size) / size[:, None]
-    found: Array = np.sqrt((inverse**2).sum(axis=1) * float(off @ off) / (s.size - law.numbers))
-    return np.where(undetermined, np.inf, found)

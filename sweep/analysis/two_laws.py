@@ -16,10 +16,11 @@ import xarray as xr
 
 from sweep.analysis.correlated import averaged, corrected, student
 from sweep.analysis.curves import Window, along, check_confidence, noise_of, scatter_is_noise, title, window_logs
+from sweep.analysis.fits import Found, fitted
 from sweep.analysis.lines import check_noise
 from sweep.analysis.loglog import EPSILON, Array, slopes, tends
 from sweep.analysis.scatter import BEYOND_DOUBT, line_deviance, noise_size, rounding
-from sweep.analysis.shapes import BENDS, LOGARITHM, POWERS, STRETCHED, TWO, Found, fitted
+from sweep.analysis.shapes import BENDS, LOGARITHM, POWERS, STRETCHED, TWO
 from sweep.system.errors import SweepError
 
 FEWEST_POINTS = 8

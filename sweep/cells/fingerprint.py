@@ -40,6 +40,11 @@ IMPORT_FROM = re.compile(r"^[ \t]*from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)
 IMPORT = re.compile(r"^[ \t]*import[ \t]+([\w., \t]+)", re.MULTILINE)
 
 
+def is_of_program(name: str) -> bool:
+    """Whether an entry of a fingerprint tells of the program, not of the study."""
+    return name.startswith(SOURCE) or name in COMPILERS
+
+
 def fingerprint(study: Study) -> dict[str, str]:
     """Everything that decides the numbers of a result, as texts: equal fingerprints, equal bits.
 

@@ -161,7 +161,7 @@ class RowBlocks:
                     yield RowStrip(row, 1, first, min(capacity, end - first))
                 row += 1
                 continue
-            rows = min(stop - row, max(1, capacity // cells), self._alike(row))
+            rows = min(stop - row, capacity // cells, self._alike(row))
             yield RowStrip(row, rows, cell, cells)
             row += rows
 

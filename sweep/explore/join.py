@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from kernels.interface import Status
-from sweep.cells.fingerprint import COMPILERS, SOURCE, difference, fingerprint
+from sweep.cells.fingerprint import difference, fingerprint, is_of_program
 from sweep.cells.grid import Grid
 from sweep.cells.schema import ANCILLARY, ERROR_BOUND, STATUS, cell_schema
 from sweep.results.diff import diff, two_results
@@ -124,11 +124,7 @@ def _apart(a: Study, b: Study) -> list[str]:
 
 def _said(study: Study) -> dict[str, str]:
     """What a fingerprint has of the study itself."""
-    return {name: text for name, text in fingerprint(study).items() if name != "study" and not _is_program(name)}
-
-
-def _is_program(name: str) -> bool:
-    return name.startswith(SOURCE) or name in COMPILERS
+    return {name: text for name, text in fingerprint(study).items() if name != "study" and not is_of_program(name)}
 
 
 def _require_new(study: Study, dataset: xr.Dataset, axis: str, labels: tuple[str, ...], apart: Sequence[str]) -> None:
@@ -246,8 +242,8 @@ def _column(whole: xr.Dataset, study: Study, name: str) -> Any:
 def _fingerprint(joined: Study, results: Sequence[xr.Dataset]) -> dict[str, str]:
     """That of the study, with the program that both were computed by, and that they were joined."""
     old, new = (json.loads(str(dataset.attrs["fingerprint"])) for dataset in results)
-    program = {name: text for name, text in old.items() if _is_program(name) and new.get(name) == text}
-    apart = "; ".join(line for line in difference(old, new) if _is_program(line.partition(":")[0]))
+    program = {name: text for name, text in old.items() if is_of_program(name) and new.get(name) == text}
+    apart = "; ".join(line for line in difference(old, new) if is_of_program(line.partition(":")[0]))
     return {
         "study": fingerprint(joined)["study"],
         **_said(joined),

@@ -277,7 +277,8 @@ def _shares(shares: dict[str, float]) -> str:
 
 def small_duration(seconds: float) -> str:
     """Seconds as people say them where there may be few: `5.1 ns`, `20 us`, `3.4 ms`, `2.0 s`."""
+    seconds = float(f"{seconds:.3g}")
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
-        if seconds >= 0.9995 * size:
+        if seconds >= size:
             return f"{seconds / size:.3g} {unit}"
     return f"{seconds / 1e-9:.3g} ns"

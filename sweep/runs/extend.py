@@ -16,7 +16,7 @@ import numpy as np
 
 from kernels.interface import Status
 from sweep.cells.block import block_solver
-from sweep.cells.fingerprint import COMPILERS, SOURCE
+from sweep.cells.fingerprint import is_of_program
 from sweep.cells.grid import Grid
 from sweep.cells.schema import ANCILLARY, ERROR_BOUND, METHOD_USED, STATUS, Column, columns
 from sweep.results.open import unreadable
@@ -50,7 +50,7 @@ class Slab(NamedTuple):
 def obstacle(old: Mapping[str, str], new: Mapping[str, str]) -> str:
     """Why a result of one fingerprint cannot be extended to that of another, in a word; "" where it may be."""
     changed = _changed(old, new)
-    others = sorted(name for name in changed if not name.startswith("axes.") and not _is_program(name))
+    others = sorted(name for name in changed if not name.startswith("axes.") and not is_of_program(name))
     if others:
         return f"{others[0]} differs, too"
     if new.get("design") != "product":
@@ -62,15 +62,11 @@ def obstacle(old: Mapping[str, str], new: Mapping[str, str]) -> str:
 
 def is_of_another_version(old: Mapping[str, str], new: Mapping[str, str]) -> bool:
     """Whether the program differs that two fingerprints tell of."""
-    return any(map(_is_program, _changed(old, new)))
+    return any(map(is_of_program, _changed(old, new)))
 
 
 def _changed(old: Mapping[str, str], new: Mapping[str, str]) -> set[str]:
     return {name for name in {*old, *new} if old.get(name) != new.get(name)} - {"study"}
-
-
-def _is_program(name: str) -> bool:
-    return name.startswith(SOURCE) or name in COMPILERS
 
 
 class Reused:

@@ -22,7 +22,7 @@ def follow(output: Path, sleep: Callable[[float], None] = time.sleep) -> Iterato
     """The last lines of the log of a run, and those to come until it ends. Raises SweepError."""
     path = log_path(output)
     silent, told, size = 0.0, 0, -1
-    while silent < SILENT_SECONDS:
+    while True:
         if (now := _size(path)) != size:
             lines = list(read_lines(path.read_text("utf-8")))
             for line in lines[max(told, len(lines) - LAST) if told == 0 else told :]:
@@ -30,6 +30,8 @@ def follow(output: Path, sleep: Callable[[float], None] = time.sleep) -> Iterato
             silent, told, size = 0.0, len(lines), now
             if lines and lines[-1]["text"].startswith(ENDED):
                 return
+        if silent >= SILENT_SECONDS:
+            break
         sleep(LOOK_SECONDS)
         silent += LOOK_SECONDS
     raise SweepError(f"{path}: nothing new for {SILENT_SECONDS:.0f} s; its run was killed, or the machine is away")

@@ -181,7 +181,9 @@ class Numbers:
         return cells
 
     def _read(self, block: int, out: Any) -> None:
-        """Fills in the cells of a block."""
+        """Fills in the cells of a block. Raises SweepError where it is damaged, or the file is closed."""
+        if self.file.fd < 0:
+            raise SweepError(f"{self.file.path}: is closed; open it again to read {self.place.name}")
         digest = self.file.digest(self.name, block, self.number)
         wanted = self.file.finished or self.file.is_sound(self.name, block)
         if wanted and self.table.read(self.file.fd, self.number, block, digest, out) is not None:

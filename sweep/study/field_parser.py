@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -317,12 +318,12 @@ def _number(found: Any, field: Field | None) -> float:
 def _csv_number(found: str, field: Field | None) -> float:
     if field and field.choices:
         return _choice(found, field)
-    try:
-        return float(found)
-    except ValueError:
-        if field is None:
-            return math.nan
-        raise ValueError(f"expected a number, found {show(found)}") from None
+    if "_" not in found:  # 1_0 is 10 in Python alone
+        with contextlib.suppress(ValueError):
+            return float(found)
+    if field is None:
+        return math.nan
+    raise ValueError(f"expected a number, found {show(found)}")
 
 
 def _choice(found: Any, field: Field) -> float:

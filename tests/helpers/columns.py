@@ -1,5 +1,7 @@
 """Columns for tests of kernels."""
 
+import contextlib
+import io
 import os
 import subprocess
 import sys
@@ -9,6 +11,9 @@ import numpy as np
 from mpmath import mp, mpf
 
 from kernels.interface import FIRST_REFUSAL, Kernel, Status
+from kernels.lanes.jit import COMPILED
+
+ROOT = Path(__file__).parents[2]
 
 
 def columns_of(kernel: Kernel, parameters, named):
@@ -78,15 +83,23 @@ def relative_error(values, truths):
 
 
 def printed_both_ways(program):
-    """What a program prints compiled, and as plain Python; it runs in the project's folder."""
-    return tuple(
-        subprocess.run(
-            [sys.executable, "-c", program],
-            env={**os.environ, "NUMBA_DISABLE_JIT": switch},
-            cwd=Path(__file__).parents[2],
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
-        for switch in ("0", "1")
+    """What a program prints here, in the project's folder, and in a process that runs kernels the other way.
+
+    Returns
+    -------
+    tuple of str
+        Compiled and as plain Python, where tests run compiled; else the other way round.
+    """
+    other = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, "NUMBA_DISABLE_JIT": str(int(COMPILED))},
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
     )
+    here, paths = io.StringIO(), sys.path.copy()
+    with contextlib.chdir(ROOT), contextlib.redirect_stdout(here):
+        exec(program, {})
+    sys.path[:] = paths
+    return here.getvalue(), other.stdout

@@ -15,7 +15,7 @@ Arguments are float64 and taken as exact. Inside, angles are in phi0 and times i
 
 from dataclasses import dataclass
 
-from mpmath import atan2, atanh, cos, cosh, exp, expm1, fdot, log, log1p, mp, mpf, pi, quad, sin, sinh, sqrt
+from mpmath import atan2, atanh, cos_sin, cosh, exp, expm1, fdot, log, log1p, mp, mpf, pi, quad, sinh, sqrt
 
 DIGITS = 40
 LIMIT = 5000
@@ -226,13 +226,17 @@ class Flows(_Mapped):
 
 
 def _sinc(law, t):
-    """exp(-d t/2) times cos(sigma t) and sin(sigma t)/sigma."""
+    """exp(-d t/2) times cos(sigma t) and sin(sigma t)/sigma; without a spring by one exponential, as sigma = i d/2."""
+    if law.d and not law.kappa:
+        fall = -expm1(-law.d * t)
+        return 1 - fall / 2, fall / law.d
     square, decay = law.kappa - law.d**2 / 4, exp(-law.d * t / 2)
     sigma = sqrt(abs(square))
     if sigma * t < mpf(10) ** -mp.dps:
         return decay, decay * t
     if square > 0:
-        return decay * cos(sigma * t), decay * sin(sigma * t) / sigma
+        cosine, sine = cos_sin(sigma * t)
+        return decay * cosine, decay * sine / sigma
     return decay * cosh(sigma * t), decay * sinh(sigma * t) / sigma
 
 
@@ -243,7 +247,7 @@ def _forced(law, force, v, t):
     if law.kappa:
         way = (1 - c - b * s) / law.kappa
     elif law.d:
-        way = (t + expm1(-law.d * t) / law.d) / law.d
+        way = (t - s) / law.d
     return force * way + v * s, v * c + (force - b * v) * s
 
 

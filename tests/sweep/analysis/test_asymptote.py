@@ -8,7 +8,8 @@ from scipy import stats
 import sweep
 from sweep.analysis import asymptote
 from sweep.analysis.asymptote import _outer
-from sweep.analysis.shapes import CORRECTION, Found, fitted
+from sweep.analysis.fits import Found, fitted
+from sweep.analysis.shapes import CORRECTION
 from sweep.system.errors import SweepError
 
 X = np.geomspace(0.8, 1e4, 41)

@@ -320,6 +320,13 @@ def test_one_curve_is_denied_by_an_analysis_of_variance(monkeypatch, chance, one
     assert ratio == pytest.approx(((off**2).sum() - rest) / 12 / (rest / 28), rel=1e-8)
 
 
+@pytest.mark.parametrize(("beside", "one"), [(3, True), (4, False)])
+def test_a_cubic_that_leaves_no_point_to_spare_denies_no_curve(monkeypatch, beside, one):
+    points = collapse.Points(np.arange(beside + 1.0), *np.zeros((2, beside + 1)), np.array([0.0] + beside * [1.0]))
+    monkeypatch.setattr("scipy.special.fdtrc", lambda *_: 0.0)
+    assert collapse._one_curve(points, 0.7, np.ones(beside + 1)) == one
+
+
 def test_distances_of_the_size_of_rounding_deny_no_curve(monkeypatch):
     points = scattered()
     monkeypatch.setattr("scipy.special.fdtrc", lambda *_: 0.0)

@@ -10,7 +10,8 @@ from scipy.stats import chi2, norm
 import sweep
 from sweep.analysis import compare
 from sweep.analysis.correlated import criterion, deviance
-from sweep.analysis.shapes import BENDS, LAWS, Found, curve, fitted
+from sweep.analysis.fits import Found, curve, fitted
+from sweep.analysis.shapes import BENDS, LAWS
 from sweep.system.errors import SweepError
 
 X = np.geomspace(2, 2e4, 61)

@@ -1,4 +1,4 @@
-"""Curves that data may follow, against integrals of their slopes, and their fits, against those of scipy and numpy."""
+"""Curves that data may follow, against integrals of their slopes."""
 
 import itertools
 import math
@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.optimize import curve_fit
 from scipy.special import expit
 
 from sweep.analysis import shapes
@@ -96,7 +95,7 @@ def test_between_points_a_cubic_with_its_slopes_is_exact():
         return 0.9 * v**2 - 0.4 * v + 1
 
     v = np.concatenate([np.linspace(-5, 5, 41), shapes.GRID[[0, 7, 180, -1]]])
-    found = shapes._hermite(v, cubic(shapes.GRID), steep(shapes.GRID))
+    found = shapes._on_grid(shapes._hermite(cubic(shapes.GRID), steep(shapes.GRID)), v)
     np.testing.assert_allclose(found, cubic(v), rtol=1e-12, atol=1e-10)
 
 
@@ -169,116 +168,6 @@ def test_single_powers_are_those_of_a_stretched_bend_over_its_whole_range():
             shapes.STRETCHED.parts(np.array([0.4, -2.0, power]), S)[1],
         )
         np.testing.assert_array_equal(alone, whole)
-
-
-# fits
-
-
-def noisy(seed=1, points=30):
-    rng = np.random.default_rng(seed)
-    t = np.sort(rng.uniform(2.0, 7.0, points))
-    return t, 1.3 - 0.4 * t + 0.05 * rng.standard_normal(points), rng.uniform(0.3, 3.0, points)
-
-
-@pytest.mark.parametrize("known", [False, True])
-def test_a_line_and_what_it_costs_are_those_of_textbooks(known):
-    t, z, weights = noisy()
-    weights = weights / 0.05**2
-    found = shapes.fitted(shapes.ONE, t, z, weights, known)
-    span, n = np.ptp(t), t.size
-    (slope, level), covariance = np.polyfit(t, z, 1, w=np.sqrt(weights), cov="unscaled")
-    off = z - level - slope * t
-    square = float((weights * off**2).sum())
-    error = np.sqrt(np.diag(covariance)[0] * (1 if known else square / (n - 2)))
-    np.testing.assert_allclose(found.numbers, [level + slope * t[0], slope * span], rtol=1e-10)
-    np.testing.assert_allclose(found.errors[1], error * span, rtol=1e-6)
-    np.testing.assert_allclose(found.off, off, atol=1e-12)
-    # -2 ln L but for n (1 + ln 2 pi), with the size of the noise at its best where it is not known
-    relative = weights / weights.mean()
-    unknown = n * math.log((relative * off**2).sum() / n) - np.log(relative).sum()
-    deviance, k = (square, 2) if known else (unknown, 3)
-    assert found.deviance == pytest.approx(deviance, rel=1e-9)
-    assert found.bic == pytest.approx(deviance + k * math.log(n), rel=1e-9)
-    assert found.aicc == pytest.approx(deviance + 2 * k + 2 * k * (k + 1) / (n - k - 1), rel=1e-9)
-
-
-def test_without_weights_all_points_weigh_alike():
-    t, z, _ = noisy()
-    plain, even = shapes.fitted(shapes.ONE, t, z), shapes.fitted(shapes.ONE, t, z, np.full(t.size, 7.0))
-    np.testing.assert_allclose(plain.numbers, even.numbers, rtol=1e-12)
-    assert plain.deviance == pytest.approx(even.deviance, rel=1e-12)
-
-
-@pytest.mark.parametrize("law", [shapes.ONE, shapes.CORRECTION, shapes.TWO], ids=str)
-def test_a_law_needs_two_points_more_than_numbers(law):
-    t, z, _ = noisy(points=law.numbers + 2)
-    assert shapes.fitted(law, t, z) is not None
-    assert shapes.fitted(law, t[1:], z[1:]) is None
-
-
-def test_what_rounding_leaves_of_an_exact_line_is_in_its_deviance():
-    t = np.linspace(0.0, 4.0, 9)
-    found = shapes.fitted(shapes.ONE, t, np.full(9, 3.0))
-    assert found.deviance == pytest.approx(2 * 9 * math.log(4 * 2.0**-52 * 4), abs=1.0)
-
-
-def test_two_laws_and_their_errors_are_those_of_scipy():
-    t = np.linspace(-3.0, 5.0, 41)
-
-    def curve(t, place, log_width, level, low, high):
-        w = math.exp(log_width)
-        return level + low * (t - place) + (high - low) * w * np.logaddexp(0, (t - place) / w)
-
-    truth = (0.8, -0.2, 1.5, -1.0, -0.3)
-    z = curve(t, *truth) + 0.01 * np.random.default_rng(3).standard_normal(t.size)
-    found = shapes.fitted(shapes.TWO, t, z)
-    best, covariance = curve_fit(curve, t, z, truth, xtol=1e-12, ftol=1e-12)
-    scale = np.array([1 / 8, 1, 1, 8, 8])
-    start = np.array([-t[0] / 8, -math.log(8), 0, 0, 0])
-    np.testing.assert_allclose(found.numbers, best * scale + start, rtol=1e-4)
-    np.testing.assert_allclose(found.errors, np.sqrt(np.diag(covariance)) * scale, rtol=1e-2)
-    at = np.array([-4.0, 0.3, 9.0])
-    np.testing.assert_allclose(shapes.curve(found, at, t[0], t[-1]), curve(at, *best), rtol=1e-5)
-
-
-def test_numbers_that_move_no_point_have_no_end_of_error():
-    """Of two laws of one exponent neither place nor width means anything."""
-    off = np.full(S.size, 0.1)
-
-    def errors(apart):
-        return shapes._errors(shapes.TWO, np.array([0.4, -2.0, 0.0, 0.0, apart]), S, off, np.ones(S.size))
-
-    columns = shapes.TWO.parts(np.array([0.4, -2.0]), S)[1]
-    expected = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * (off @ off) / (S.size - 5))
-    for apart in (0.0, 1e-14):
-        assert np.isinf(errors(apart)[:2]).all()
-    np.testing.assert_allclose(errors(0.0)[2:], expected, rtol=1e-6)
-    assert np.isfinite(errors(5e-11)).all()
-
-
-def test_where_there_is_no_curve_points_are_far_and_errors_without_end():
-    q = np.array([1.0, -1.5])  # an offset of -14 beneath powers of about one
-    b, off = shapes._project(shapes.OFFSET, q, S, S, np.ones(S.size))
-    np.testing.assert_array_equal(b, np.zeros(1))
-    np.testing.assert_array_equal(off, np.full(S.size, 1e6))
-    assert np.isinf(shapes._errors(shapes.OFFSET, np.array([1.0, -1.5, 0.0]), S, off, np.ones(S.size))).all()
-
-
-@pytest.mark.parametrize("law", [shapes.LOGARITHM, shapes.OFFSET, shapes.TWO, shapes.THREE], ids=str)
-def test_a_fit_starts_at_the_best_of_its_grid(law):
-    rng = np.random.default_rng(5)
-    z, root = -0.4 * S + 0.3 * np.tanh(5 * (S - 0.6)) + 0.01 * rng.standard_normal(S.size), rng.uniform(0.5, 2, S.size)
-
-    def square(q):
-        shift, columns = law.parts(np.array(q), S)
-        if not (np.isfinite(shift).all() and np.isfinite(columns).all()):
-            return np.inf
-        w = root**2
-        b = np.linalg.pinv(columns * root[:, None]) @ ((z - shift) * root)
-        return (w * (z - shift - columns @ b) ** 2).sum()
-
-    best = min(itertools.product(*law.grids), key=square)
-    np.testing.assert_array_equal(shapes._start(law, S, z, root), best)
 
 
 def test_places_widths_and_fades_to_start_from_span_the_window():

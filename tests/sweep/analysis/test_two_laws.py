@@ -10,7 +10,8 @@ from scipy import stats
 import sweep
 from sweep.analysis import shapes, two_laws
 from sweep.analysis.correlated import Averaged
-from sweep.analysis.shapes import TWO, Found, fitted
+from sweep.analysis.fits import Found, fitted
+from sweep.analysis.shapes import TWO
 from sweep.analysis.two_laws import HIGH, LOW, PLACE, _fit, _of_other_bends, _reach
 from sweep.system.errors import SweepError
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from toy_studies import build
+from toy_studies import build, build_rich
 
-from sweep.cells.grid import Grid
+from sweep.cells.grid import Grid, empty_cells
 
 
 def grid_of(lengths, design="product"):
@@ -135,3 +135,45 @@ def test_a_far_range_of_a_huge_grid_is_found_without_making_the_grid(lengths):
     index = np.unravel_index(np.arange(start, grid.size), grid.shape)
     for name, positions in zip(grid.study.axes, index, strict=True):
         np.testing.assert_array_equal(found[name], grid.study.axes[name].values[positions])
+
+
+def test_cells_are_asked_for_where_the_condition_holds():
+    axes, some = {"height": [1.0, 2.0, 3.0], "v0": [0.0, 1.0]}, np.array([5, 0, 3, 2])
+    assert Grid(build(axes=axes)).asked(some).tolist() == [True] * 4
+    assert Grid(build(axes=axes, where="height > 1.5 and v0 < 0.5")).asked(some).tolist() == [False, False, False, True]
+    # of a parameter that is the same in all cells, and of a setting
+    assert Grid(build(axes=axes, where="g > 9")).asked(some).tolist() == [True] * 4
+    assert Grid(build(axes=axes, where="g < 9")).asked(some).tolist() == [False] * 4
+
+
+def test_a_parameter_that_follows_an_axis_has_its_values():
+    grid = Grid(build_rich(axes={"load": [1.0, 2.0, 3.0]}))
+    out = [np.full(3, -1.0) for _ in grid.study.kernel.parameters]
+    grid.columns(0, 3, out)
+    names = [p.name for p in grid.study.kernel.parameters]
+    for name in ("load", "grip", "hold"):
+        assert out[names.index(name)].tolist() == [1.0, 2.0, 3.0]
+    assert grid.constants() == {names.index("shape"): 0.0, names.index("drag"): 0.0}
+    assert grid.values("load", np.array([2, 0])).tolist() == [3.0, 1.0]
+
+
+def test_rows_of_cells_are_views_of_them():
+    cells = empty_cells(build(axes={"height": [1.0]}, outputs=["drop"], along={"phase": [0.0, 1.0]}), 5)
+    assert (cells.number, cells.outputs["drop"].shape, cells.status.dtype, cells.used.dtype) == (5, (5, 2), "i1", "i1")
+    some = cells._replace(error=np.zeros(5, "f4")).rows(slice(1, 3))
+    some.status[:], some.used[:], some.outputs["drop"][:] = 7, 8, 9.0
+    assert (some.number, some.error.shape) == (2, (2,))
+    assert cells.status[1:3].tolist() == [7, 7]
+    assert cells.outputs["drop"][1:3].tolist() == [[9.0, 9.0]] * 2
+    assert cells.rows(slice(0, 1)).error is None
+
+
+def test_an_axis_of_arrays_gives_each_cell_its_own():
+    masses = np.arange(1.0, 7.0).reshape(3, 2)
+    grid = Grid(
+        build(kernel="beads:KERNEL", outputs=["total"], axes={"mass": masses, "g": [1.0, 2.0, 3.0]}, design="zip")
+    )
+    out = [np.full((4, 2), -1.0), np.full((4, 2), -1.0), np.full(4, -1.0)]
+    grid.columns(1, 3, out)
+    assert out[0].tolist() == [[3.0, 4.0], [5.0, 6.0], [-1.0, -1.0], [-1.0, -1.0]]
+    assert out[2].tolist() == [2.0, 3.0, -1.0, -1.0]

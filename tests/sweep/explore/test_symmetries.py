@@ -43,6 +43,7 @@ def test_the_echelon_form_by_hand():
         (2 + 1.9e-5, F(2)),
         (1 / 199, F(1, 199)),
         (1 / 200, F(1, 200)),
+        (1 / 201, None),
         (2 + 2.1e-5, None),
     ],
 )

@@ -57,8 +57,9 @@ def test_a_process_that_died_by_itself_was_not_late(monkeypatch):
     """Although it is found out only when its time is up, as where an image of its memory is written meanwhile."""
 
     def blind(futures, seconds, real=isolate.wait):
-        done = real(futures, max(seconds, 2.0)).done
-        return SimpleNamespace(done={f for f in done if f.exception() is None})
+        done = {f for f in real(futures, max(seconds, 2.0)).done if f.exception() is None}
+        time.sleep(0.0 if done else seconds)
+        return SimpleNamespace(done=done)
 
     monkeypatch.setattr(isolate, "wait", blind)
     processes, seen = Processes(tall(40, "bad:DYING"), Limits(1.5), 1), []

@@ -56,9 +56,10 @@ def test_a_log_that_is_silent_for_ten_minutes_is_given_up(log):
 
 
 def test_a_line_begins_the_wait_anew(log):
+    """Even one of the last half second."""
     log.write_text(line(0))
-    said, pauses = told(log, *[""] * 1198, line(1), *[""] * 1198, line(2, "ended with 1 cells"))
-    assert (len(said), len(pauses)) == (3, 2398)
+    said, pauses = told(log, *[""] * 1199, line(1), *[""] * 1199, line(2, "ended with 1 cells"))
+    assert (len(said), len(pauses)) == (3, 2400)
 
 
 def test_without_a_log_there_is_nothing_to_follow(log):

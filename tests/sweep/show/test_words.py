@@ -196,3 +196,16 @@ def test_a_summary_is_told_by_its_reductions(tmp_path):
     (tmp_path / "x.h5.log").write_text(lines)
     told = result_text(tmp_path / "x.h5", summary()).split("\n\nFAILED, and why\n")[1].splitlines()
     assert told == [f"  cell {k:<4}  worn out".replace(f"{k:<4}", f"{k:<2}") for k in range(20)]
+
+
+@pytest.mark.parametrize(("at_once", "sizes"), [(1 << 22, [24]), (12, [12, 12]), (17, [12, 12]), (5, [6] * 4)])
+def test_places_of_statuses_are_looked_up_so_many_cells_at_a_time(monkeypatch, at_once, sizes):
+    status = np.zeros((4, 3, 2), np.int8)
+    status[2, 1, 0] = status[3, 0, 0] = Status.INACCURATE
+    seen, real = [], np.unique
+    monkeypatch.setattr(text, "CELLS_AT_ONCE", at_once)
+    monkeypatch.setattr(text.np, "unique", lambda piece: seen.append(piece.size) or real(piece))
+    (hits,) = text._hits(xr.DataArray(status, dims=("a", "b", "c"))).values()
+    assert seen == sizes
+    found = {name: np.flatnonzero(hit).tolist() for name, hit in hits.items()}
+    assert found == {"a": [2, 3], "b": [0, 1], "c": [0]}

@@ -71,6 +71,16 @@ def test_what_is_written_of_the_last_block_is_filled_with_zeros(fd):
     assert table().read(fd, 0, 2, digests[:16]) is None
 
 
+def test_a_last_block_of_one_cell_is_filled_up_and_read_again(fd):
+    some = Table((10,), Partition(10, 3), (FAR, NEAR), 2000, b"mark")
+    assert some.spans().tolist()[-3:] == [[1000, 1052], [1070, 1122], [2000, 2128]]
+    assert some.spans().tolist()[2:6] == [[400, 403], [403, 406], [406, 409], [409, 410]]
+    digests = some.write(fd, 3, {"x": np.array([[3.0, 4.0]]), "s": np.array([5])})
+    assert os.pread(fd, 48, 1070) == np.array([3.0, 4.0]).tobytes() + bytes(32)
+    assert some.read(fd, 0, 3, digests[:16]).tolist() == [[3.0, 4.0]]
+    assert some.read(fd, 1, 3, digests[16:]).tolist() == [5]
+
+
 def test_digests_of_neighbours_are_written_at_once(fd, monkeypatch):
     wrote = []
     write_all = layout.disk.write_all
@@ -151,6 +161,11 @@ def test_a_layout_is_read_as_it_was_written(fd):
 )
 def test_a_layout_that_cannot_be_is_none(fd, wrong):
     assert stored(fd, made(**wrong)) is None
+
+
+def test_a_layout_of_a_single_cell_can_be(fd):
+    single = {"cells": replace(table(), grid=(1,), blocks=Partition(1, 1))}
+    assert stored(fd, made(tables=single)) == made(tables=single)
 
 
 def test_places_up_to_the_end_are_in_the_file(fd):

@@ -153,6 +153,7 @@ def test_a_list_may_be_as_long_as_the_longest_axis(fields, monkeypatch):
     monkeypatch.setattr(module.axes, "LARGEST_AXIS", 3)
     assert len(fields.axis("x", [1, 2, 3], LENGTH, "axes.x")) == 3
     assert len(fields.axis("x", np.ones(3), LENGTH, "axes.x")) == 3
+    assert fields.axis("J", np.ones((3, 2)), ARRAY, "axes.J").values.shape == (3, 2)
     assert told(fields) == {}
     for at, given in enumerate(([1, 2, 3, 4], np.ones(4))):
         fields.axis("x", given, LENGTH, f"axes.x{at}")
@@ -185,10 +186,14 @@ def test_words_and_numbers_of_a_file(fields, write):
     assert fields.axis("shape", {"file": "a.csv"}, WORD, "axes.shape").words == ("square", "round")
     write("b.csv", "x\n1e3\n nan\n")
     np.testing.assert_array_equal(fields.axis("x", {"file": "b.csv"}, LENGTH, "axes.x").values, [1e3, np.nan])
-    write("c.csv", "x\n1\none\n")
+
+
+@pytest.mark.parametrize("word", ["one", "1_0"])
+def test_a_word_among_numbers_of_a_file_is_told_with_its_line(fields, write, word):
+    write("c.csv", f"x\n1\n{word}\n")
     fields.axis("x", {"file": "c.csv"}, LENGTH, "axes.x")
     (message,) = told(fields).values()
-    assert message.endswith('c.csv, line 3: expected a number, found "one"')
+    assert message.endswith(f'c.csv, line 3: expected a number, found "{word}"')
 
 
 SHARES = np.array([0.0, 0.5])
