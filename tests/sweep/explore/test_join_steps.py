@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -147,6 +148,17 @@ def test_points_under_a_new_axis_are_a_block_of_their_own():
     assert found.design == "blocks"
     assert [(block.design, block.axes) for block in found.blocks] == [("product", ("v",)), ("zip", ("height", "v0"))]
     assert list(whole.fall_time.dims) == ["v", *(dim for dim in found.dims if dim != "v")]
+
+
+def test_a_new_axis_has_two_numbers_behind_its_labels(results):
+    study, _ = module._joined((LOW, LOW), (results[0], results[0]), "v", ("a", "b"))
+    assert (study.axes["v"].values.tolist(), study.axes["v"].words) == ([0.0, 1.0], ("a", "b"))
+
+
+def test_points_are_called_as_in_a_study_of_blocks():
+    old = SimpleNamespace(dims={"p": ("a", "b"), "c": ("c",), "z": ("d",)})
+    new = SimpleNamespace(dims={"v": ("v",), "q": ("a", "b"), "c": ("c",), "k": ("d",)})
+    assert module._points(old, new) == {"p": "q", "z": "k"}
 
 
 @pytest.mark.parametrize("order", [1, -1])
