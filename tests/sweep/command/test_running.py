@@ -196,3 +196,10 @@ def test_a_target_is_checked_against_what_is_read(monkeypatch, line, target, kin
 def test_what_is_said_has_nothing_that_moves_the_terminal(capsys):
     files.say("a\x1b[2Jb")
     assert "\x1b" not in capsys.readouterr().out
+
+
+def test_what_a_command_says_nothing_of_may_be_unfinished(monkeypatch):
+    monkeypatch.setattr(files, "opened", lambda *words: words)
+    found = [files.result_of(parsed(line)) for line in ("show a.h5", "export a.h5 -o b.csv")]
+    assert found == [(Path("a.h5"), True), (Path("a.h5"), False)]
+    assert files.result_of(parsed("export a.h5 -o b.csv --unfinished")) == (Path("a.h5"), True)
