@@ -171,6 +171,21 @@ def test_values_of_both_are_kept_once_and_ascend(results, order):
     assert whole.fall_time.values.tolist() == expected.tolist()
 
 
+def test_words_that_only_one_of_them_has_stand_behind_the_others():
+    parts = [build(axes={"height": [1.0, 2.0], "method": [name]}) for name in ("exact", "rough")]
+    found = join(*map(quiet, parts))
+    assert found.method.values.tolist() == ["exact", "rough"]
+    assert found.sizes == {"height": 2, "method": 2}
+
+
+def test_fixed_parameters_and_settings_that_differ_become_axes(results):
+    for other in (replace(LOW, fixed={**LOW.fixed, "g": 2.0}), replace(LOW, rtol=1e-3)):
+        study, whole = module._joined((LOW, other), (results[0], results[0]), None, ())
+        assert len(study.axes) == whole.fall_time.ndim == 3
+    with pytest.raises(SweepError, match=r"they differ in where$"):
+        module._joined((LOW, replace(LOW, where="height > 1")), results, None, ())
+
+
 def test_words_of_both_keep_their_order():
     found = module._appended(axis(1.0, 0.0, words=("b", "a")), axis(2.0, 1.0, 3.0, words=("c", "b", "d")), [0, 2])
     assert (found.values.tolist(), found.words) == ([1.0, 0.0, 2.0, 3.0], ("b", "a", "c", "d"))
@@ -212,10 +227,13 @@ def test_columns_have_the_order_of_the_grid_and_their_own_dimensions_last(result
 
 
 def test_the_fingerprint_has_the_program_of_both_and_tells_where_they_differ():
-    marks = [{"numpy": "1", "numba": "2", "source a": "x", "study": "s"}, {"numpy": "1", "numba": "3", "rtol": "1"}]
+    marks = [
+        {"numpy": "1.26", "numba": "2", "source a": "x", "study": "s"},
+        {"numpy": "1.26", "numba": "3", "rtol": "1"},
+    ]
     found = module._fingerprint(LOW, [xr.Dataset(attrs={"fingerprint": json.dumps(mark)}) for mark in marks])
     own = module.fingerprint(LOW)
-    assert (found["study"], found["axes.height"], found["numpy"]) == (own["study"], own["axes.height"], "1")
+    assert (found["study"], found["axes.height"], found["numpy"]) == (own["study"], own["axes.height"], "1.26")
     assert "numba" not in found
     assert "source a" not in found
     assert found["joined"].startswith("of two results. numba")
