@@ -183,3 +183,21 @@ def test_a_keyword_that_is_like_no_other_is_told_with_all_of_a_study():
     with pytest.raises(SweepError, match=r"^sweep\.run: no such keyword zzz; a study has title, .* and "):
         run._check_keywords({"zzz": 2})
     run._check_keywords(dict.fromkeys(run.KEYS))
+
+
+@pytest.mark.parametrize(("summary", "found"), [(None, "rows"), ("summary", "groups of rows")])
+def test_rows_of_a_summary_are_gathered_into_groups(monkeypatch, summary, found):
+    progress = SimpleNamespace(end=lambda: None)
+    session = SimpleNamespace(blocks=SimpleNamespace(count=3), began="then", close=lambda: None)
+    session.begin, session.dated = lambda jobs: progress, lambda began: ("schema", began)
+
+    @contextmanager
+    def joined(task):
+        yield None
+
+    stands = {"Session": lambda *words: session, "joined": joined, "_arrays": lambda session: "rows"}
+    stands |= {"_fill": lambda *words: None, "gathered": lambda study, rows: f"groups of {rows}"}
+    for name, stand in {**stands, "in_memory": lambda *words: words}.items():
+        monkeypatch.setattr(run, name, stand)
+    task = SimpleNamespace(study=SimpleNamespace(summary=summary), workers=1)
+    assert run._run_in_memory(task) == (("schema", "then"), found)

@@ -171,3 +171,8 @@ def test_single_numbers_are_repeated_along_their_own_dimension():
 def test_lengths_along_a_dimension_that_differ_are_told():
     _, mistakes = of_lengths({"m": np.array([1.0, 2.0]), "k": np.arange(3.0), "c": np.arange(4.0)})
     assert mistakes == [("fixed", "arrays along mass need equal length; m has 2 and k has 3 values")]
+
+
+def test_a_table_where_a_list_belongs_is_a_mistake():
+    with pytest.raises(StudyError, match=r"axes\.g\[0\] +expected a number, found"):
+        beads(axes={"g": np.ones((2, 2))})
