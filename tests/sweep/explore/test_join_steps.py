@@ -52,6 +52,12 @@ def test_the_title_is_the_first_ones(results):
     assert join(quiet(first), quiet(second)).attrs["title"] == "First"
 
 
+def test_results_may_be_given_by_name_and_a_new_axis_only_so(results):
+    assert join(a=results[0], b=results[1], path=None).sizes == {"height": 3, "v0": 2}
+    with pytest.raises(TypeError, match="positional"):
+        join(*results, None, "v")
+
+
 def test_only_finished_cells_are_joined(results):
     found = results[0].copy(deep=True)
     only = "only results that keep their cells can be joined"
@@ -106,6 +112,7 @@ def test_axes_that_run_together_are_one_thing_that_differs():
     one, other = build(**keys), build(**{**keys, "axes": {"height": [3.0], "v0": [4.0]}})
     assert module._apart(one, other) == ["points"]
     assert module._apart(one, replace(one, rtol=1e-3)) == ["rtol"]
+    assert "points" not in module._apart(one, build(design="zip", axes={"height": [3.0]}))
     assert module._apart(LOW, HIGH) == ["axes.height"]
     assert module._apart(LOW, replace(HIGH, rtol=1e-3)) == ["axes.height", "rtol"]
 
