@@ -167,10 +167,9 @@ class Cluster:
     def lost(self, fault: BaseException) -> SweepError:
         """What is reported where the scheduler does not answer any more; it is not asked again."""
         self._gone = True
-        reason = (str(fault).splitlines() or [""])[0] or type(fault).__name__
         return SweepError(
-            f"cluster: the scheduler is lost ({reason}); what is finished is kept, run the same command again to "
-            "continue"
+            f"cluster: the scheduler is lost ({_reason(fault)}); what is finished is kept, run the same command again "
+            "to continue"
         )
 
 
@@ -189,7 +188,12 @@ def _connected(address: Any) -> Any:
     try:
         return distributed.Client(**keys, timeout=CONNECT_SECONDS, set_as_default=False)
     except Exception as fault:
-        reason = (str(fault).splitlines() or [type(fault).__name__])[0]
+        reason = _reason(fault)
     # the half-made client ends here and now: if it did while another one begins, each would wait for the other
     gc.collect()
     raise SweepError(f"cluster: no dask scheduler answers at {address} ({reason})")
+
+
+def _reason(fault: BaseException) -> str:
+    """The first line of what a fault says; its kind where that is empty."""
+    return str(fault).partition("\n")[0] or type(fault).__name__

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -49,6 +50,12 @@ def test_the_title_is_the_first_ones(results):
     first = build(axes={"height": [1.0]}, title="First")
     second = build(axes={"height": [2.0]}, title="Second")
     assert join(quiet(first), quiet(second)).attrs["title"] == "First"
+
+
+def test_results_may_be_given_by_name_and_a_new_axis_only_so(results):
+    assert join(a=results[0], b=results[1], path=None).sizes == {"height": 3, "v0": 2}
+    with pytest.raises(TypeError, match="positional"):
+        join(*results, None, "v")
 
 
 def test_only_finished_cells_are_joined(results):
@@ -105,6 +112,7 @@ def test_axes_that_run_together_are_one_thing_that_differs():
     one, other = build(**keys), build(**{**keys, "axes": {"height": [3.0], "v0": [4.0]}})
     assert module._apart(one, other) == ["points"]
     assert module._apart(one, replace(one, rtol=1e-3)) == ["rtol"]
+    assert "points" not in module._apart(one, build(design="zip", axes={"height": [3.0]}))
     assert module._apart(LOW, HIGH) == ["axes.height"]
     assert module._apart(LOW, replace(HIGH, rtol=1e-3)) == ["axes.height", "rtol"]
 
@@ -149,6 +157,17 @@ def test_points_under_a_new_axis_are_a_block_of_their_own():
     assert list(whole.fall_time.dims) == ["v", *(dim for dim in found.dims if dim != "v")]
 
 
+def test_a_new_axis_has_two_numbers_behind_its_labels(results):
+    study, _ = module._joined((LOW, LOW), (results[0], results[0]), "v", ("a", "b"))
+    assert (study.axes["v"].values.tolist(), study.axes["v"].words) == ([0.0, 1.0], ("a", "b"))
+
+
+def test_points_are_called_as_in_a_study_of_blocks():
+    old = SimpleNamespace(dims={"p": ("a", "b"), "c": ("c",), "z": ("d",)})
+    new = SimpleNamespace(dims={"v": ("v",), "q": ("a", "b"), "c": ("c",), "k": ("d",)})
+    assert module._points(old, new) == {"p": "q", "z": "k"}
+
+
 @pytest.mark.parametrize("order", [1, -1])
 def test_values_of_both_are_kept_once_and_ascend(results, order):
     pair = list(zip((LOW, HIGH), results, strict=True))[::order]
@@ -157,6 +176,21 @@ def test_values_of_both_are_kept_once_and_ascend(results, order):
     assert study.axes["height"].values.tolist() == [1.0, 2.0, 4.0]
     expected = np.concatenate([results[0].fall_time.values, results[1].fall_time.values[1:]])
     assert whole.fall_time.values.tolist() == expected.tolist()
+
+
+def test_words_that_only_one_of_them_has_stand_behind_the_others():
+    parts = [build(axes={"height": [1.0, 2.0], "method": [name]}) for name in ("exact", "rough")]
+    found = join(*map(quiet, parts))
+    assert found.method.values.tolist() == ["exact", "rough"]
+    assert found.sizes == {"height": 2, "method": 2}
+
+
+def test_fixed_parameters_and_settings_that_differ_become_axes(results):
+    for other in (replace(LOW, fixed={**LOW.fixed, "g": 2.0}), replace(LOW, rtol=1e-3)):
+        study, whole = module._joined((LOW, other), (results[0], results[0]), None, ())
+        assert len(study.axes) == whole.fall_time.ndim == 3
+    with pytest.raises(SweepError, match=r"they differ in where$"):
+        module._joined((LOW, replace(LOW, where="height > 1")), results, None, ())
 
 
 def test_words_of_both_keep_their_order():
@@ -200,10 +234,13 @@ def test_columns_have_the_order_of_the_grid_and_their_own_dimensions_last(result
 
 
 def test_the_fingerprint_has_the_program_of_both_and_tells_where_they_differ():
-    marks = [{"numpy": "1", "numba": "2", "source a": "x", "study": "s"}, {"numpy": "1", "numba": "3", "rtol": "1"}]
+    marks = [
+        {"numpy": "1.26", "numba": "2", "source a": "x", "study": "s"},
+        {"numpy": "1.26", "numba": "3", "rtol": "1"},
+    ]
     found = module._fingerprint(LOW, [xr.Dataset(attrs={"fingerprint": json.dumps(mark)}) for mark in marks])
     own = module.fingerprint(LOW)
-    assert (found["study"], found["axes.height"], found["numpy"]) == (own["study"], own["axes.height"], "1")
+    assert (found["study"], found["axes.height"], found["numpy"]) == (own["study"], own["axes.height"], "1.26")
     assert "numba" not in found
     assert "source a" not in found
     assert found["joined"].startswith("of two results. numba")

@@ -1,5 +1,6 @@
 """Designs: sampled points by scipy's generators, blocks, and what comes of them in a result."""
 
+import math
 import warnings
 from dataclasses import replace
 
@@ -8,10 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import qmc
+from toy import KERNEL
 from toy_studies import build, message_of
 
 import sweep
-from sweep.study.model import Study
+from sweep.study import designs
+from sweep.study.model import Axis, Study, frozen
+from sweep.system.errors import StudyError, SweepError
 
 RANGES = {
     "height": {"spacing": "log", "start": 1.0, "stop": 1e4},
@@ -190,3 +194,44 @@ def test_no_warning_is_raised_on_the_way():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         sampled("sobol", 16)
+
+
+def of_values(*values, words=None):
+    return Axis("height", frozen(values), "values", words)
+
+
+def test_values_that_stand_again_are_found_and_nan_where_the_field_is_known():
+    field = KERNEL.parameter("height")
+    assert designs._repeated(of_values(2.0, 1.0, 3.0, 1.0, 2.0), field) == [1, 0]
+    assert designs._repeated(of_values(1.0, math.nan, math.nan), field) == [1]
+    assert designs._repeated(of_values(1.0, math.nan, math.nan), None) == []
+    assert designs._repeated(of_values(1.0, 1.0), None) == [0]
+    assert designs._repeated(of_values(), field) == []
+
+
+@pytest.mark.parametrize(("points", "told"), [(designs.LARGEST_AXIS, False), (designs.LARGEST_AXIS + 1, True)])
+def test_a_design_has_no_more_points_than_an_axis_may(monkeypatch, points, told):
+    monkeypatch.setattr(designs.samples, "count", lambda *words: points)
+    design = {"kind": "latin", "n": 4, "seed": 0}
+    mistakes = mistakes_of(design=design, axes={"height": {"spacing": "linear", "start": 1.0, "stop": 2.0}})
+    said = f"makes {points:,} points; expected at most {designs.LARGEST_AXIS:,}"
+    assert mistakes == ({"design.n": said} if told else {})
+
+
+def test_points_that_cannot_be_made_are_a_mistake_of_the_design(monkeypatch):
+    def unit_points(*words):
+        raise SweepError("needs scipy")
+
+    monkeypatch.setattr(designs.samples, "unit_points", unit_points)
+    design = {"kind": "latin", "n": 4, "seed": 0}
+    mistakes = mistakes_of(design=design, axes={"height": {"spacing": "linear", "start": 1.0, "stop": 2.0}})
+    assert mistakes == {"design": "needs scipy"}
+
+
+def mistakes_of(**keys):
+    """What is said of a study."""
+    try:
+        build(**keys)
+    except StudyError as fault:
+        return {mistake.where: mistake.message for mistake in fault.mistakes}
+    return {}
