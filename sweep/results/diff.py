@@ -168,7 +168,7 @@ def _distance(a: xr.Dataset, b: xr.Dataset, name: str, rtol: float) -> Distance:
     cells = a[STATUS].dims
     order = (*cells, *(d for d in a[name].dims if d not in cells))
     for start, x, y in _pieces(a[name].transpose(*order), b[name].transpose(*order)):
-        apart = _relative(x, y).reshape(*x.shape[: len(cells)], -1).max(axis=-1, initial=0.0)
+        apart = _relative(x, y).max(axis=tuple(range(len(cells), x.ndim)), initial=0.0)
         found.cells += int((apart > rtol).sum())
         if apart.size and apart.max() > found.largest:
             found.largest = float(apart.max())
