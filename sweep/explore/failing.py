@@ -33,7 +33,7 @@ def without_failing(study: Study, cell_timeout: float | str | None, note: Callab
 
     good = np.ones(Grid(study).size, bool)
     able = [study.kernel.methods[number].name for number in usable_methods(study)]
-    for method in ("auto", *able):
+    for method in ("auto", *able):  # auto also tries, on cells, methods that cannot do the whole study
         for rtol in EXTREMES:
             trial = with_method(study, method, rtol)
             found = run(trial, progress=False, isolate=True, cell_timeout=cell_timeout)
