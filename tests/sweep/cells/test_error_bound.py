@@ -100,6 +100,11 @@ def test_a_method_that_was_asked_for_gives_its_values_and_their_bound():
     )  # fmt: skip
 
 
+@pytest.mark.parametrize("refusal", [Status.BAD_INPUT, Status.NEVER_STARTS])
+def test_a_cell_that_a_method_refuses_is_refused_whatever_its_estimate(refusal):
+    assert told((estimates(1, (1e-3,) * 3, refusal), None), (gives(2), None), method="rough")[1] == refusal.name
+
+
 @pytest.mark.parametrize(
     ("first", "then", "expected"),
     [("STEP_LIMIT", "NO_CYCLE", "STEP_LIMIT"), ("NO_CYCLE", "STEP_LIMIT", "STEP_LIMIT"),
