@@ -163,7 +163,7 @@ def test_a_study_in_place_of_a_result_is_told_how_to_become_one():
 
 @pytest.mark.parametrize("name", ["x.h5", "x.zarr"])
 def test_a_result_that_is_not_there_is_told_as_such(tmp_path, name):
-    with pytest.raises(SweepError, match="no such file, and no sweep that writes it$"), files.opened(tmp_path / name):
+    with pytest.raises(SweepError, match=r"no such file, and no sweep that writes it$"), files.opened(tmp_path / name):
         pass
 
 
