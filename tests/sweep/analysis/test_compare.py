@@ -102,6 +102,17 @@ def test_the_criterion_is_that_of_statsmodels():
     assert found.aicc == pytest.approx(found.deviance + 2 * k + 2 * k * (k + 1) / (n - k - 1))
 
 
+def test_one_law_alone_may_have_noise_of_any_kind(monkeypatch):
+    """Where its size is not known."""
+    tried = []
+    monkeypatch.setattr(compare, "_with_any_noise", lambda t, z, fit: tried.append(fit.law.name) or fit)
+    y = line(-0.5 * T + 0.01 * np.random.default_rng(3).standard_normal(T.size))
+    sweep.compare_laws(y, "x", sigma=0.01)
+    assert not tried
+    sweep.compare_laws(y, "x")
+    assert tried == ["one law"]
+
+
 @pytest.mark.parametrize("law", BENDS, ids=str)
 def test_every_bend_is_zero_far_below_and_its_own_line_far_above(law):
     """So that x0 is where the asymptotes meet, whatever the shape."""
