@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -190,7 +191,7 @@ class _Strip:
         """Cells whose terms the method can do, and whose turn it is."""
         if turn.absent:
             if turn.absent not in self._able:
-                self._able[turn.absent] = np.logical_and.reduce([term.holds(self.parameters) for term in turn.absent])
+                self._able[turn.absent] = reduce(np.logical_and, (term.holds(self.parameters) for term in turn.absent))
             cells = _pick(cells, self._able[turn.absent][cells])
         if turn.sooner is None or not _count(cells):
             return cells
