@@ -146,8 +146,8 @@ class Method:
     not to be had for a study that sets one, away from its default or as an axis. `lacks` are outputs it does not give:
     it cannot be had where one of them is asked for, and fills them with NaN.
 
-    `sooner(*parameters, rtol)` is True in cells that `auto` tries it on ahead of the method declared before it: there,
-    at that rtol, it takes less time.
+    `sooner(*parameters, rtol)`, an array of bool, is True in cells that `auto` tries it on ahead of the method declared
+    before it: there, at that rtol, it takes less time.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """Which methods are tried on which cells, and in which order.
 
 A method that is named must do every term of its study. `auto` asks it of each cell alone: what becomes of a cell does
-not hang on the others of its study.
+not hang on the others of its study. Only where every method lacks some term of a study is the study refused whole.
 """
 
 from __future__ import annotations

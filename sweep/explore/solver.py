@@ -48,8 +48,8 @@ class PointSolver:
         self._one = empty_cells(study, 1)
         self._row = np.array([axis.values[:1] for axis in study.axes.values()])
         self._quick = _Quick(study, self._grid) if _is_simple(study) else None
-        if self._quick is not None and not self._quick.choose(self._row):
-            self._quick = None
+        if self._quick is not None:
+            self._quick.choose(self._row)
 
     def __call__(self, *values: Any, **named: Any) -> Any:
         """Outputs and status of cells.
@@ -141,8 +141,8 @@ class _Quick:
         given = self._cells.outputs
         self._outputs = [given.get(f.name, np.empty((rows, *study.shape(f)))) for f in kernel.outputs]
 
-    def choose(self, row: Any) -> bool:
-        """Take as many rows as are solved soonest; whether this cell can be solved at all without the engine."""
+    def choose(self, row: Any) -> None:
+        """Take as many rows as are solved soonest."""
         seconds = {}
         for rows in (1, LANES):
             self._use(rows)
@@ -151,7 +151,6 @@ class _Quick:
             if seconds[rows] > DEAR:
                 break
         self._use(min(seconds, key=lambda rows: seconds[rows]))
-        return self.solve(row) is not None
 
     def solve(self, row: Any) -> Cells | None:
         """The cell, first of some that are the same; None where the engine has more to say of it."""
@@ -184,7 +183,8 @@ def _turns(study: Study, grid: Grid) -> tuple[Turn, ...]:
 
 def _is_simple(study: Study) -> bool:
     """Whether what one method says of a cell can be all there is to say."""
-    return study.kernel_name in catalogue.KERNELS and not study.where
+    methods = [m for m in study.kernel.methods if study.method in ("auto", m.name)]
+    return study.kernel_name in catalogue.KERNELS and not study.where and not all(m.estimates for m in methods)
 
 
 class _Points(Grid):

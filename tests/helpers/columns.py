@@ -99,7 +99,9 @@ def printed_both_ways(program):
         check=True,
     )
     here, paths = io.StringIO(), sys.path.copy()
-    with contextlib.chdir(ROOT), contextlib.redirect_stdout(here):
-        exec(program, {})
-    sys.path[:] = paths
+    try:
+        with contextlib.chdir(ROOT), contextlib.redirect_stdout(here):
+            exec(program, {})
+    finally:
+        sys.path[:] = paths
     return here.getvalue(), other.stdout
