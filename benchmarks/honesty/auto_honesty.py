@@ -82,7 +82,7 @@ def solve(case, columns, rtol, outputs):
     study = sweep.build_study(
         kernel=case.kernel, design="zip", method="auto", axes=axes, fixed=dict(case.fixed), along=along, outputs=outputs
     )
-    values, status, used = solved(study)
+    values, status, used, _ = solved(study)
     names = [study.kernel.methods[i].name if i >= 0 else "" for i in used]
     return values, status, names
 
