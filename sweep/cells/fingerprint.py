@@ -23,7 +23,7 @@ COMPILERS = ("numba", "llvmlite", "numpy")
 OURS = ("kernels",)
 """Packages whose modules count even where a kernel of another package imports them."""
 
-ENGINE = ("sweep.cells.solve", "sweep.cells.turns", "sweep.cells.grid")
+ENGINE = ("sweep.cells.solve", "sweep.cells.grid")
 """Modules of the engine that decide values: the method of each cell, and its parameters."""
 
 ASKING = ("sweep.study.condition",)

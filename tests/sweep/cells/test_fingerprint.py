@@ -175,7 +175,7 @@ def of_the_engine(study):
 
 
 def test_what_chooses_methods_and_what_reduces_cells_counts_too():
-    cells = {"sweep.cells.solve", "sweep.cells.turns", "sweep.cells.grid"}
+    cells = {"sweep.cells.solve", "sweep.cells.grid"}
     assert of_the_engine(build(**BASE)) == cells
     assert of_the_engine(build(**BASE, summary={})) == cells | {
         "sweep.cells.partition",
@@ -184,7 +184,7 @@ def test_what_chooses_methods_and_what_reduces_cells_counts_too():
     }
 
 
-@pytest.mark.parametrize("name", ["solve", "turns", "grid", "partition", "reduce", "output_schema"])
+@pytest.mark.parametrize("name", ["solve", "grid", "partition", "reduce", "output_schema"])
 def test_an_edit_of_what_reduces_cells_is_named(monkeypatch, tmp_path, name):
     study = build(**BASE, summary={})
     old, real = fingerprint(study), module._path
