@@ -23,7 +23,7 @@ COMPILERS = ("numba", "llvmlite", "numpy")
 OURS = ("kernels",)
 """Packages whose modules count even where a kernel of another package imports them."""
 
-ENGINE = ("sweep.cells.solve", "sweep.cells.grid")
+ENGINE = ("sweep.cells.solve", "sweep.cells.turns", "sweep.cells.grid")
 """Modules of the engine that decide values: the method of each cell, and its parameters."""
 
 ASKING = ("sweep.study.condition",)
@@ -33,6 +33,8 @@ REDUCING = ("sweep.cells.partition", "sweep.cells.reduce", "sweep.cells.output_s
 """Those that decide the values of a summary."""
 
 SOURCE = "source "
+CHOICE = "auto"
+"""How `auto` chooses."""
 
 IMPORTERS = ("import_module", "__import__", "load")
 NAME = re.compile(r"[\w.]+")
@@ -42,7 +44,7 @@ IMPORT = re.compile(r"^[ \t]*import[ \t]+([\w., \t]+)", re.MULTILINE)
 
 def is_of_program(name: str) -> bool:
     """Whether an entry of a fingerprint tells of the program, not of the study."""
-    return name.startswith(SOURCE) or name in COMPILERS
+    return name.startswith(SOURCE) or name in (*COMPILERS, CHOICE)
 
 
 def fingerprint(study: Study) -> dict[str, str]:
@@ -52,8 +54,9 @@ def fingerprint(study: Study) -> dict[str, str]:
     -------
     dict of str to str
         "study" is one digest of all that the study says but for its words; what it says follows in short, under its
-        names in a study file. Then a digest per source file of the kernel ("source kernels.foliot.cycle"), and the
-        versions of compiler and arrays. The processor is not in it: kernels give the same bits on each.
+        names in a study file. Then a digest per source file of the kernel ("source kernels.foliot.cycle"), how `auto`
+        chooses, and the versions of compiler and arrays. The processor is not in it: kernels give the same bits on
+        each.
     """
     said = _said(study)
     whole = hashlib.sha256(json.dumps(said).encode()).hexdigest()
@@ -62,6 +65,7 @@ def fingerprint(study: Study) -> dict[str, str]:
         "study": whole,
         **said,
         **_sources(study.kernel_name, engine),
+        **({CHOICE: "cell by cell"} if study.by_cell else {}),
         **{name: version(name) for name in COMPILERS},
     }
 

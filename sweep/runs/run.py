@@ -227,6 +227,7 @@ def _checked(path: str | os.PathLike[str]) -> Path:
 
 def _complete(task: Task, precomputed: Precomputed | None = None) -> bool:
     """False where the time was up before the end."""
+    task = task if precomputed else resume.as_begun(task)
     left = unfinished_of(task.output).exists() or lock_of(task.output).exists()
     return (resume.is_complete(task) and not left) or run_to_file(task, precomputed)
 
