@@ -147,7 +147,7 @@ def charted(path: Path, cells: int, tolerances: Sequence[float]) -> list[xr.Data
     return [work_precision(sweep.read_study(file), cells=cells, tolerances=tolerances) for file in files]
 
 
-def conclude(path: str, cells: int = 2048, tolerances: Sequence[float] = TOLERANCES) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, cells: int = 4096, tolerances: Sequence[float] = TOLERANCES) -> tuple[Groups, list[str], Any]:
     """Statements, tables and the figure."""
     parts = charted(Path(path), cells, tolerances)
     groups = {found.attrs["title"]: statements(found) for found in parts}

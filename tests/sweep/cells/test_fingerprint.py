@@ -222,6 +222,17 @@ def test_a_source_that_came_or_went_is_told_without_digests():
     ]
 
 
+def test_many_sources_are_told_in_one_line():
+    many = {f"source {k}": "1" for k in range(9)}
+    eight = {name: many[name] for name in list(many)[:8]}
+    assert difference({}, eight) == [f"{name}: new" for name in eight]
+    assert difference({}, many) == ["source of 9 modules: 9 new"]
+    others = {**dict.fromkeys(eight, "2"), "source b": "1", "source c": "1", "rtol": "3"}
+    assert difference({"rtol": "2", **many}, others) == [
+        "rtol: was 2, now 3", "source of 11 modules: 2 new, 8 changed, 1 gone",
+    ]  # fmt: skip
+
+
 def test_the_digest_of_the_study_is_told_only_where_nothing_else_differs():
     assert difference({"study": "1", "rtol": "a"}, {"study": "2", "rtol": "b"}) == ["rtol: was a, now b"]
     assert difference({"study": "1"}, {"study": "2"}) == ["study: changed"]
