@@ -20,13 +20,13 @@ import numpy as np
 
 from kernels.codegen import followed_twice, stated_error
 from kernels.codegen.accumulated import to_rest
-from kernels.codegen.expression import SceneError, cos, exp, log, maximum, minimum, power, sign, sin, sqrt, where
 from kernels.codegen.module import build, compiling
 from kernels.codegen.record import RESERVED
 from kernels.codegen.slid_along import slid_along
-from kernels.codegen.stepped_source import twice_by
+from kernels.codegen.stepped import twice_by
 from kernels.interface import Field, Kernel, Method, OnColumns, Status
 from kernels.lanes.wiring import signed
+from kernels.source_text.expression import SceneError, cos, exp, log, maximum, minimum, power, sign, sin, sqrt, where
 
 __all__ = [
     "Field", "Scene", "SceneError", "cos", "exp", "log", "maximum", "minimum", "power", "scene_kernel", "sign", "sin",

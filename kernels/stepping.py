@@ -14,7 +14,7 @@ import numpy as np
 
 from kernels.codegen import three_steps
 from kernels.codegen.module import compiling
-from kernels.codegen.stepped_source import methods_of, stepped
+from kernels.codegen.stepped import methods_of, stepped
 from kernels.integrate.events import LOCATIONS, METHODS
 from kernels.interface import Field, Kernel, Method, Status
 from kernels.lanes.wiring import signed

@@ -1,5 +1,5 @@
 """A scene of one's own written out as compiled functions: recorded, turned into series or steps, saved, imported.
 
-Faces: `module` (the written file), `stated_error`, `followed_twice` (to a tolerance), `stepped_source`, `three_steps`
-(fixed steps), `expression` (what a right-hand side may use). Users come in by `kernels.scene` and `kernels.stepping`.
+Faces: `module` (the written file), `stated_error`, `followed_twice` (to a tolerance), `stepped`, `three_steps`
+(fixed steps). Users come in by `kernels.scene` and `kernels.stepping`.
 """

@@ -18,21 +18,21 @@ from types import ModuleType
 import numpy as np
 from numba.core.errors import NumbaError
 
-from kernels.codegen.driver_source import BEGUN, EVENT, SETTLED, advance, shared
-from kernels.codegen.error_source import END, LEFT, SPREAD_AT_END, STEP
-from kernels.codegen.expression import DIV, FUNCTIONS, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, SceneError, needed
-from kernels.codegen.hidden_source import HIDDEN, hidden
-from kernels.codegen.lane_source import BEGIN
-from kernels.codegen.leg_source import BY_KINK, FACTS, LEG, LOOK, ROOT, START, leg
 from kernels.codegen.power_core import CORE, core
 from kernels.codegen.record import record
-from kernels.codegen.rounding_source import LOST, SIZES, lost_by_surface
-from kernels.codegen.series_source import Lines
-from kernels.codegen.sliding_source import ENDLESS, JUDGE, LEAVE, PRESS, PRESSED, of_sliding
-from kernels.codegen.tangent import SHORT, TANGENT, Tangents, short, tangent
-from kernels.codegen.template import filled, listed
 from kernels.lanes import cache
 from kernels.lanes.jit import COMPILED, cached
+from kernels.source_text.driver import BEGUN, EVENT, SETTLED, advance, shared
+from kernels.source_text.error import END, LEFT, SPREAD_AT_END, STEP
+from kernels.source_text.expression import DIV, FUNCTIONS, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, SceneError, needed
+from kernels.source_text.hidden import HIDDEN, hidden
+from kernels.source_text.lane import BEGIN
+from kernels.source_text.leg import BY_KINK, FACTS, LEG, LOOK, ROOT, START, leg
+from kernels.source_text.rounding import LOST, SIZES, lost_by_surface
+from kernels.source_text.series import Lines
+from kernels.source_text.sliding import ENDLESS, JUDGE, LEAVE, PRESS, PRESSED, of_sliding
+from kernels.source_text.tangent import SHORT, TANGENT, Tangents, short, tangent
+from kernels.source_text.template import filled, listed
 
 ORDERS = (12, 18)
 _BUILDING = threading.RLock()
@@ -60,7 +60,7 @@ from kernels.integrate.taylor import (
     natural_power, next_step, of_series, of_sum, rises, size, stays_apart, tail, tail_of_sum, worse,
 )
 from kernels.codegen.power_core import FAR, SHORT, UNEVEN, core_time, mean_power, no_matter, size_in_unit
-from kernels.codegen.driver_source import BLUR, EVENTS, KINK_LIMIT, time_unit
+from kernels.source_text.driver import BLUR, EVENTS, KINK_LIMIT, time_unit
 from kernels.maths.elementary import exp, log, power, sincos
 from kernels.integrate.records import Leg, Start
 from kernels.lanes.codes import BAD_INPUT, GRAZING, INACCURATE, OUT_OF_RANGE, REFUSED, STICKS

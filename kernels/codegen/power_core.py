@@ -12,11 +12,11 @@ every state's rate changes by the power as u's does: with (1 - n) u^n in the pow
 are right, and what hangs on u is off by less than u times that time.
 """
 
-from kernels.codegen.template import filled, listed
 from kernels.integrate.taylor import SLACK
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import magnitude, where
 from kernels.maths.elementary import power
+from kernels.source_text.template import filled, listed
 
 UNEVEN = 0.25
 """d of (1), at most."""

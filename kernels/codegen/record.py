@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kernels.codegen.expression import ADD, FUNCTIONS, SCALED, Expression, Graph, SceneError
 from kernels.codegen.sliding import slid
+from kernels.source_text.expression import ADD, FUNCTIONS, SCALED, Expression, Graph, SceneError
 
 RESERVED = ("side", "flips", "time", "interval", "rtol", "status")
 """Names that a scene's states and parameters cannot have."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from kernels.codegen.record import record
-from kernels.codegen.stepped_source import twice_by
+from kernels.codegen.stepped import twice_by
 from kernels.interface import Status
 
 

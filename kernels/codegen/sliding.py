@@ -10,8 +10,8 @@ Source: Filippov, Differential Equations with Discontinuous Righthand Sides (198
 
 from dataclasses import replace
 
-from kernels.codegen.expression import ADD, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED
-from kernels.codegen.tangent import Tangents
+from kernels.source_text.expression import ADD, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED
+from kernels.source_text.tangent import Tangents
 
 
 class Side:

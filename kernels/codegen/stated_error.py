@@ -1,24 +1,24 @@
 """Columns of cells followed once by the Taylor method of a scene's module, with the error carried along.
 
-The error that a cell states (`error_source`) is signed and of first order; it takes STATED times that to be believed.
-A cell whose error that does not show to be small enough is followed again with a tolerance as much smaller; what then
-is left, and all that is remarked or refused, is followed twice (`followed_twice`), which asks for no derivatives.
+The error that a cell states (`source_text.error`) is signed and of first order; STATED times that is to be believed. A
+cell whose error that does not show to be small enough is followed again with a tolerance as much smaller; what then is
+left, and all that is remarked or refused, is followed twice (`followed_twice`), which asks for no derivatives.
 """
 
 import numpy as np
 
 from kernels.codegen import followed_twice
-from kernels.codegen.driver_source import of_error as names_of_error
-from kernels.codegen.driver_source import rows_of
-from kernels.codegen.error_source import of_error
 from kernels.codegen.followed_twice import ROUNDING
-from kernels.codegen.hidden_source import hidden
-from kernels.codegen.leg_source import leg
 from kernels.codegen.module import ORDERS, Writer, build, loaded
 from kernels.codegen.power_core import core
 from kernels.codegen.record import record
-from kernels.codegen.template import filled
 from kernels.interface import Status
+from kernels.source_text.driver import of_error as names_of_error
+from kernels.source_text.driver import rows_of
+from kernels.source_text.error import of_error
+from kernels.source_text.hidden import hidden
+from kernels.source_text.leg import leg
+from kernels.source_text.template import filled
 
 TEXT = '''
 """Motion of {name} with its error carried along: written by kernels; do not change it here."""

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.codegen.expression import cos, power, sign, sin
 from kernels.codegen.followed_twice import followed
 from kernels.codegen.module import build
 from kernels.scene import Scene
+from kernels.source_text.expression import cos, power, sign, sin
 
 
 class Swung(NamedTuple):

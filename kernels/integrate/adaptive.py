@@ -1,10 +1,10 @@
 """Legs from event to event by an embedded pair of methods (`pairs`) to a tolerance; generic in one cell or lanes.
 
-A leg has the signature of the Taylor method's (`leg_source`) and drops into the same driver. Of each step the events
-are known at both ends by value and rate. One that ends below 0 is located on the dense output by Newton's method in a
-bracket; one that falls at the start and rises at the end is looked at where the cubic between is lowest, and a turning
-point closer to 0 than the tolerance tells is called grazing. A step within which the rates may hide more than the
-tolerance (`hidden_source`) is not taken: the points that an error is estimated from may miss it.
+A leg has the signature of the Taylor method's (`source_text.leg`) and drops into the same driver. Of each step the
+events are known at both ends by value and rate. One that ends below 0 is located on the dense output by Newton's
+method in a bracket; one that falls at the start and rises at the end is looked at where the cubic between is lowest,
+and a turning point closer to 0 than the tolerance tells is called grazing. A step within which the rates may hide more
+than the tolerance (`source_text.hidden`) is not taken: the points that an error is estimated from may miss it.
 """
 
 from typing import NamedTuple
@@ -286,7 +286,7 @@ def one_step(m, pair, mode, unit, tolerance, course, troubles):
 
 @jit_call
 def to_event(m, pair, state, mode, unit, h, on, tolerance, active):
-    """Follow the active lanes until an event falls through 0, and stop there; see `leg_source`."""
+    """Follow the active lanes until an event falls through 0, and stop there; see `source_text.leg`."""
     none, zero, unmarked = active & not_(active), 0.0 * h, times(0.0, on)
     start, start_rates = events(m, state, mode)
     wide = reached(unmarked, start)

@@ -1,6 +1,6 @@
 """One step of each method, of any scene; generic in one cell or lanes.
 
-`m` has the written functions of a scene (`stepped_source`); `mode` is a record (`records.Mode`).
+`m` has the written functions of a scene (`stepped`); `mode` is a record (`records.Mode`).
 """
 
 from kernels.integrate.tableaux import DOP853, DOPRI5, RK4

@@ -41,7 +41,7 @@ LARGEST = 5.0
 LONGEST = 8.0
 """First guess of a step, at most, over the time of the last motion between events."""
 COME_UP = 0.25
-"""Of a step within which something is hidden (`hidden_source`): the next trial. The longest one grows back as fast."""
+"""Of a step within which something is hidden (`source_text.hidden`): the next trial. The longest grows back as fast."""
 WIDER = 5.0 / 4.0
 GRAZING = 16.0
 SAME, ROUNDING = 0.04, 1e-15

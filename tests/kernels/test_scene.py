@@ -13,12 +13,12 @@ from columns import bounds, checked, solve
 from mpmath import mp, mpf
 from rich_scene import RICH
 
-from kernels.codegen.expression import SceneError
 from kernels.codegen.module import Writer, build
 from kernels.codegen.record import record
 from kernels.interface import Kernel, Status
 from kernels.lanes.jit import COMPILED
 from kernels.scene import Field, Scene, exp, scene_kernel
+from kernels.source_text.expression import SceneError
 
 ROOT = Path(__file__).parents[2]
 NAN, INF = np.nan, np.inf

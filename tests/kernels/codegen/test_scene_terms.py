@@ -9,12 +9,12 @@ from mpmath import mp, mpf
 from numba.core.errors import TypingError
 
 from kernels.codegen import followed_twice
-from kernels.codegen.expression import Graph, SceneError
 from kernels.codegen.module import compiling
 from kernels.codegen.record import record
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 from kernels.scene import Field, Scene, maximum, minimum, scene_kernel, sign, sin, where
+from kernels.source_text.expression import Graph, SceneError
 from kernels.stepping import stepped_kernel
 
 METHODS = ["taylor", "taylor_once", "dop853", "dopri5"]

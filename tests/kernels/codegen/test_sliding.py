@@ -6,10 +6,10 @@ from columns import relative_error, solve
 from mpmath import mp, mpf
 from sliding_scene import SLIDING
 
-from kernels.codegen.expression import Graph
 from kernels.codegen.sliding import Side, _jump
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
+from kernels.source_text.expression import Graph
 
 METHODS = ["taylor", "dop853", "dopri5", "rodas5p"] if COMPILED else ["dop853"]
 MANY = 24

@@ -12,7 +12,7 @@ from scene_oracles import quadratic_foliot
 from stiff_scene import LAG, PASSED, WAVE
 
 import sweep
-from kernels.codegen.stepped_source import adaptive
+from kernels.codegen.stepped import adaptive
 from kernels.integrate import rosenbrock
 from kernels.integrate.records import Mode
 from kernels.interface import Status

@@ -2,11 +2,11 @@
 
 from textwrap import indent
 
-from kernels.codegen.lane_source import BEGIN, begun_rows, chosen, loaded_rows, stored_rows
-from kernels.codegen.sliding_source import endless, press, turned
-from kernels.codegen.template import filled, folded, listed
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import exponent, magnitude, pow2, sqrt, where
+from kernels.source_text.lane import BEGIN, begun_rows, chosen, loaded_rows, stored_rows
+from kernels.source_text.sliding import endless, press, turned
+from kernels.source_text.template import filled, folded, listed
 
 KINK_LIMIT = 1000
 """Kinks between two switches after which a cell is given up."""
@@ -197,8 +197,8 @@ def advance(states, parameters, kinks, order, offset, most_kinks, tells=False, s
     ----------
     offset : of the surface, as text
     most_kinks : between two switches, as text
-    tells : whether the error is carried along (`error_source`)
-    slides : whether the motion may slide along a kink (`sliding_source`)
+    tells : whether the error is carried along (`source_text.error`)
+    slides : whether the motion may slide along a kink (`source_text.sliding`)
     spreads : whether the error's spread is carried along
     """
     signs, ons = [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]

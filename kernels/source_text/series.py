@@ -12,7 +12,7 @@ and of a state, whose rate is r: u_{k+1} = r_k/(k + 1).
 Source: Jorba & Zou, Exp. Math. 14:99 (2005), proposition 2.1. Sums are chains of multiply-adds (`dot`).
 """
 
-from kernels.codegen.expression import INPUT, NUMBER, SCALED
+from kernels.source_text.expression import INPUT, NUMBER, SCALED
 
 
 class Lines:

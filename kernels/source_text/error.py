@@ -16,9 +16,9 @@ l'' = f'(U) - U'' at the end, l = h (2 l'/(p + 2) - h l''/((p + 1) (p + 2))). An
 error is: VAGUE of what each step leaves out, added so that it grows.
 """
 
-from kernels.codegen.rounding_source import sizes
-from kernels.codegen.tangent import SHORT
-from kernels.codegen.template import filled, listed
+from kernels.source_text.rounding import sizes
+from kernels.source_text.tangent import SHORT
+from kernels.source_text.template import filled, listed
 
 NONE_YET = """\
 {offs} = off

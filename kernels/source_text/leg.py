@@ -5,9 +5,9 @@ The text is of named scalars, one statement per event; what can be said once for
 
 from dataclasses import dataclass
 
-from kernels.codegen.error_source import carried, not_carried
-from kernels.codegen.tangent import short
-from kernels.codegen.template import filled, folded, listed
+from kernels.source_text.error import carried, not_carried
+from kernels.source_text.tangent import short
+from kernels.source_text.template import filled, folded, listed
 
 LEG = '''
 @jit_call
@@ -173,7 +173,7 @@ def leg(writer, order, hides, tells=False):
     Parameters
     ----------
     hides : of each rate and of each event, whether it can hide anything
-    tells : whether the error is carried along (`error_source`)
+    tells : whether the error is carried along (`source_text.error`)
     """
     source = LegSource(
         writer.states,

@@ -6,9 +6,9 @@ pivoting), so that no factor exceeds 1.
 Source of the pivoting: Sorensen, IEEE Trans. Comput. C-34:274 (1985).
 """
 
-from kernels.codegen.series_source import Lines
-from kernels.codegen.tangent import Tangents
-from kernels.codegen.template import filled, listed
+from kernels.source_text.series import Lines
+from kernels.source_text.tangent import Tangents
+from kernels.source_text.template import filled, listed
 
 LINEAR = '''
 @jit_call

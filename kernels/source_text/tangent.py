@@ -1,15 +1,15 @@
 """What small changes of a scene's states change: the tangent of its motion.
 
 The derivative of an expression along changes `delta` of the states is an expression again, so that the changes' own
-Taylor series, of delta' = (D rates) delta, come from the recurrences of the motion's (`series_source`). Signs of kinks
-do not change between events.
+Taylor series, of delta' = (D rates) delta, come from the recurrences of the motion's (`series`). Signs of kinks do not
+change between events.
 """
 
 import re
 from collections import defaultdict
 
-from kernels.codegen.expression import ADD, INPUT, SCALED, needed
-from kernels.codegen.template import filled, listed
+from kernels.source_text.expression import ADD, INPUT, SCALED, needed
+from kernels.source_text.template import filled, listed
 
 SHORT, FED_BACK, LONG = {12: 4, 18: 4}, {12: 6, 18: 6}, {12: 9, 18: 12}
 """Order of the changes' series on a step of the motion's: terms fall by about a quarter each, so to some 1e-3. Those of

@@ -7,13 +7,13 @@ functions they take. To a tolerance a cell is followed twice, as by the Taylor m
 from types import SimpleNamespace
 
 from kernels.codegen import followed_twice
-from kernels.codegen.expression import INPUT
-from kernels.codegen.lane_source import BEGIN, begun_rows, loaded_rows, stored_rows
 from kernels.codegen.module import Writer, build, loaded
 from kernels.codegen.record import record
-from kernels.codegen.stiff_source import linear
-from kernels.codegen.template import filled, listed
 from kernels.integrate.events import METHODS
+from kernels.source_text.expression import INPUT
+from kernels.source_text.lane import BEGIN, begun_rows, loaded_rows, stored_rows
+from kernels.source_text.stiff import linear
+from kernels.source_text.template import filled, listed
 
 BLUR = 1e-14
 """Of the surface's value at the start, what rounding may take from it unremarked."""

@@ -1,8 +1,8 @@
 """Source text of what a driver does of motion that slides along a kink (`sliding`): when it begins, and how it ends."""
 
-from kernels.codegen.lane_source import chosen
-from kernels.codegen.series_source import Lines
-from kernels.codegen.template import filled, listed
+from kernels.source_text.lane import chosen
+from kernels.source_text.series import Lines
+from kernels.source_text.template import filled, listed
 
 PRESSED = '''
 @jit_call

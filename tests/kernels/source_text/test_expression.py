@@ -6,11 +6,11 @@ import mpmath
 import pytest
 from mpmath import mp
 
-from kernels.codegen import expression as E
-from kernels.codegen.rounding_source import Sizes
-from kernels.codegen.series_source import Lines
-from kernels.codegen.tangent import Tangents
 from kernels.lanes.vectors import dot, fma, magnitude, where
+from kernels.source_text import expression as E
+from kernels.source_text.rounding import Sizes
+from kernels.source_text.series import Lines
+from kernels.source_text.tangent import Tangents
 
 ORDER = 9
 PLAIN = {

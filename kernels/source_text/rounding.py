@@ -5,9 +5,9 @@ rounding loses nothing, and a start on the surface lies there for sure. Of a fun
 losses go on as errors do. Along a motion it is enough to know them roughly, an ulp of the terms of every sum.
 """
 
-from kernels.codegen.expression import ADD, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED
-from kernels.codegen.series_source import Lines
-from kernels.codegen.template import filled, listed
+from kernels.source_text.expression import ADD, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED
+from kernels.source_text.series import Lines
+from kernels.source_text.template import filled, listed
 
 ULP = 2.0**-52
 SLOPES = {

@@ -8,9 +8,9 @@ step (`CHANGE`); where it may change by more, all of it counts as hidden. By the
 over the box. So what is small enough may stay hidden, and what is large is come up to by shorter steps.
 """
 
-from kernels.codegen.expression import INPUT
-from kernels.codegen.series_source import Lines
-from kernels.codegen.template import filled, listed
+from kernels.source_text.expression import INPUT
+from kernels.source_text.series import Lines
+from kernels.source_text.template import filled, listed
 
 HIDDEN = '''
 @jit_call
