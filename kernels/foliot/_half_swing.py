@@ -154,11 +154,12 @@ def _helped(state, leg, stopped, terms, problem):
 
 
 @jit
-def _lowered(terms, start):
-    """The terms, with a floor of power-law friction that the half swing does not begin below."""
+def _lowered(terms, slow, start):
+    """The terms, with a floor of power-law friction below the slow speed and that with which the half swing begins."""
     drag, friction, kappa, ripple, scales = terms
-    floor = where(start > 0.0, smaller(friction.floor, 0.25 * start), friction.floor)
-    return Terms(drag, Power(friction.gamma, friction.n, floor), kappa, ripple, scales)
+    least = 0.25 * where(start > 0.0, smaller(slow, start), slow)
+    power = Power(friction.gamma, friction.n, smaller(friction.floor, least))
+    return Terms(drag, power, kappa, ripple, scales)
 
 
 @jit_inline
@@ -168,7 +169,8 @@ def half_swing(start, problem, tolerance, active):
     one = zero + 1.0
     state = (one, start, zero, zero, zero, one, zero)
     moving, rising = active, active & (start > 0.0)
-    terms, slow = _lowered(problem.terms, start), slow_speed(tolerance, problem)
+    slow = slow_speed(tolerance, problem)
+    terms = _lowered(problem.terms, slow, start)
     helped, lost = active & not_(active), active & not_(active)
     behind, jump, top, top_by_start, time = turned(state, turns, slow, problem)
     stop = smaller(slow, 0.5 * start)

@@ -9,11 +9,12 @@ from kernels.maths.elementary import power, sincos
 
 _SHARE = 0.3
 """Of rtol that a single step may take; the rest is left to their sum."""
-_ROUGH_SHARE = 0.03
-"""The same for friction whose slope is not smooth at rest, and for torque that varies: errors of v count more there."""
+_ROUGH_SHARE, _SHARP_SHARE = 0.1, 0.03
+"""The same for friction whose slope is not smooth at rest, near which estimates of the error are too low; and where its
+degree is below 2 or torque varies: errors of v count more there."""
 _SMOOTHER = 4.0
 """Degree of drag from which a step that begins or ends at rest has an error below its estimate."""
-_FLOOR = 1e-9
+_FLOOR = 1e-4
 """Of rtol and the clock's speed: the speed below which drag of a degree below 1 is constant."""
 
 
@@ -194,7 +195,7 @@ def problem_of(scene, ripple, rtol):
     rippled = depth > 0.0
     whole = not_(nearest(n) > n) & not_(nearest(n) < n)
     rough = (gamma > 0.0) & (n < _SMOOTHER) & not_(whole)
-    share = where(rippled | ((gamma > 0.0) & (n < 2.0)), _ROUGH_SHARE, _SHARE)
+    share = where(rippled | ((gamma > 0.0) & (n < 2.0)), _SHARP_SHARE, where(rough, _ROUGH_SHARE, _SHARE))
     first = 0.1 / (1.0 + stiffness + sqrt(kappa))
     return Problem(e, rho_s, rtol, share, rough, rippled, Dry(1.0 + rho, slack), terms, stiffness, pace, first)
 
