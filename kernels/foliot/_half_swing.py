@@ -157,7 +157,8 @@ def _helped(state, leg, stopped, terms, problem):
 def _lowered(terms, slow, start):
     """The terms, with a floor of power-law friction below the slow speed and that with which the half swing begins."""
     drag, friction, kappa, ripple, scales = terms
-    least = 0.25 * where(start > 0.0, smaller(slow, start), slow)
+    speed = magnitude(start)
+    least = 0.25 * where(speed > 0.0, smaller(slow, speed), slow)
     power = Power(friction.gamma, friction.n, smaller(friction.floor, least))
     return Terms(drag, power, kappa, ripple, scales)
 
