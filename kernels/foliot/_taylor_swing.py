@@ -15,8 +15,9 @@ import numpy as np
 
 from kernels.codegen.followed_twice import FINER, off_by_roundings
 from kernels.foliot import _units
-from kernels.foliot._half_swing import Half, Law, Leg, Swing, accelerations, problem_of, pull
+from kernels.foliot._half_swing import Half
 from kernels.foliot._integrated_swing import NewtonStep, _cycle, _first, _slope
+from kernels.foliot._swing_law import Law, Leg, Swing, accelerations, problem_of, pull
 from kernels.foliot._swing_scenes import LINEAR, RIPPLE, RIPPLED, SEARCHED, SMOOTH, TERMS, Swung, half_swings
 from kernels.foliot._units import Foliot, Outputs
 from kernels.interface import FIRST_REFUSAL, Field, Method, Status
@@ -70,7 +71,7 @@ def _half(problem, swung):
     turns = e > 0.0
     behind = problem.dry.inwards + force
     jump = where(turns, behind / (problem.dry.outwards + force), 1.0)
-    leg = Leg(0.0 * e - 1.0, problem.dry.inwards, 0.0 * e, problem.stiffness)
+    leg = Leg(0.0 * e - 1.0, problem.dry.inwards, 0.0 * e, problem.stiffness, 0.0 * e, 0.0 * e)
     shift = (1.0 - jump) / behind
     by_mu, by_start = shift * swung.up_mu, shift * swung.up_start
     bare = Swing(swung.x, swung.v, swung.x_mu, swung.v_mu, swung.x_start, swung.v_start, swung.decay)

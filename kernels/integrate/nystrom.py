@@ -17,7 +17,7 @@ import numpy as np
 from kernels.integrate.tableaux import DOPRI5, DOPRI5_ERROR
 from kernels.lanes.jit import jit, jit_call, jit_inline
 from kernels.lanes.vectors import any_lane, choose, dot, exponent, fma, magnitude, not_, pow2, where
-from kernels.maths.elementary import LN2, exp
+from kernels.maths.elementary import LN2, exp, smaller
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 STEP_LIMIT = 10_000
@@ -108,6 +108,8 @@ def dopri5_step(accelerations, state, scene, h, scale):
         After the step, fifth order.
     error : float64 or Lanes
         The largest estimated error of a component over its entry in `scale`.
+    acceleration : float64 or Lanes
+        Of the motion, after the step.
     """
     a0, a1, a2, a3 = _rates(accelerations, state, scene)
     f0, f1, f2, f3 = (a0,), (a1,), (a2,), (a3,)
@@ -123,7 +125,7 @@ def dopri5_step(accelerations, state, scene, h, scale):
     f0, f1, f2, f3 = (*f0, g0), (*f1, g1), (*f2, g2), (*f3, g3)
     new = _at(state, h, _RESULT, f0, f1, f2, f3)
     z0, z1, z2, z3 = _rates(accelerations, new, scene)
-    return new, _worst(h, (*f0, z0), (*f1, z1), (*f2, z2), (*f3, z3), scale)
+    return new, _worst(h, (*f0, z0), (*f1, z1), (*f2, z2), (*f3, z3), scale), z0
 
 
 @jit
@@ -140,7 +142,7 @@ def _step_factor(ratio):
 
 
 @jit_inline
-def integrate_until(event, accelerations, scales, state, scene, h, tolerance, active):
+def integrate_until(event, accelerations, scales, longest, state, scene, h, tolerance, active):
     """Follow the motion of the active cells until `event` falls through 0, and stop there.
 
     Parameters
@@ -148,6 +150,7 @@ def integrate_until(event, accelerations, scales, state, scene, h, tolerance, ac
     event(state, acceleration, scene) -> (value, rate) : positive at the start, falling monotonically through 0
     accelerations(state, scene) : tuple of the three second derivatives
     scales(state, scene) : tuple of six, what `tolerance` is relative to
+    longest(state, acceleration, scene) : what a step may be long at most
     h : first step
 
     Returns
@@ -159,10 +162,11 @@ def integrate_until(event, accelerations, scales, state, scene, h, tolerance, ac
     """
     moving = active
     t = 0.0 * h
+    h = smaller(h, longest(state, accelerations(state, scene)[0], scene))
     for _ in range(STEP_LIMIT):
         if not any_lane(moving):
             break
-        new, error = dopri5_step(accelerations, state, scene, h, scales(state, scene))
+        new, error, acceleration = dopri5_step(accelerations, state, scene, h, scales(state, scene))
         ratio = error / tolerance
         accepted = moving & (ratio <= 1.0)
         passed = accepted & (event(new, 0.0, scene)[0] <= 0.0)
@@ -170,7 +174,8 @@ def integrate_until(event, accelerations, scales, state, scene, h, tolerance, ac
         accepted = accepted & moving
         state = choose(accepted, new, state)
         t = where(accepted, t + h, t)
-        h = where(moving, h * _step_factor(ratio), h)
+        most = where(accepted, longest(new, acceleration, scene), h)
+        h = where(moving, smaller(h * _step_factor(ratio), most), h)
     state, last = _locate(event, accelerations, scales, state, scene, h, active)
     return state, t + last, h, moving
 
@@ -184,7 +189,7 @@ def _locate(event, accelerations, scales, state, scene, h, active):
     scale = scales(state, scene)
     low, high = 0.0 * h, h
     shorter = 0.5 * h
-    new, _ = dopri5_step(accelerations, state, scene, shorter, scale)
+    new, _, _ = dopri5_step(accelerations, state, scene, shorter, scale)
     searching = active
     for _ in range(ROOT_LIMIT):
         if not any_lane(searching):
@@ -195,7 +200,7 @@ def _locate(event, accelerations, scales, state, scene, h, active):
         settled = magnitude(guess - shorter) <= SETTLED * h
         guess = where(settled | ((guess > low) & (guess < high)), guess, 0.5 * (low + high))
         shorter = where(searching, guess, shorter)
-        trial, _ = dopri5_step(accelerations, state, scene, shorter, scale)
+        trial, _, _ = dopri5_step(accelerations, state, scene, shorter, scale)
         new = choose(searching, trial, new)
         searching = searching & not_(settled)
     return choose(active, new, state), where(active, shorter, 0.0)

@@ -6,7 +6,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from kernels.foliot._half_swing import Ripple, Terms, _released
+from kernels.foliot._half_swing import _released
+from kernels.foliot._swing_law import Ripple, Terms
 
 DEPTH, KAPPA = 0.6, 0.05
 
