@@ -9,7 +9,6 @@ if TYPE_CHECKING:
     from sweep.analysis.asymptote import exponent_by_window as exponent_by_window
     from sweep.analysis.asymptote import fit_correction as fit_correction
     from sweep.analysis.collapse import fit_collapse as fit_collapse
-    from sweep.analysis.collapse import fit_over as fit_over
     from sweep.analysis.compare import compare_laws as compare_laws
     from sweep.analysis.curves import stated_error as stated_error
     from sweep.analysis.exponents import exponent as exponent
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
     from sweep.analysis.exponents import local_exponent_error as local_exponent_error
     from sweep.analysis.exponents import where_exponent as where_exponent
     from sweep.analysis.exponents import where_value as where_value
+    from sweep.analysis.formula import fit_over as fit_over
     from sweep.analysis.lines import crossover as crossover
     from sweep.analysis.lines import fit_exponent as fit_exponent
     from sweep.analysis.maps import contours as contours
@@ -67,7 +67,8 @@ _PUBLIC = {
     "analysis.lines": ("fit_exponent", "crossover"),
     "analysis.asymptote": ("fit_correction", "exponent_by_window"),
     "analysis.compare": ("compare_laws",),
-    "analysis.collapse": ("fit_over", "fit_collapse"),
+    "analysis.collapse": ("fit_collapse",),
+    "analysis.formula": ("fit_over",),
     "analysis.curves": ("stated_error",),
     "analysis.two_laws": ("fit_two_laws",),
     "analysis.maps": ("contours", "exponent_map"),

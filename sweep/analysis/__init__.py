@@ -6,7 +6,8 @@ Others may use
     `two_laws`   two power laws with a bend, fitted at once
     `compare`    which law: one, two, three, a logarithm, an offset, a correction to scaling
     `asymptote`  corrections to scaling, exponents against the window
-    `collapse`   exponents over a second parameter, exponents of a collapse
+    `formula`    exponents over a second parameter
+    `collapse`   exponents of a collapse
     `maps`       exponents over two parameters, borders as lines
     `curves`     stated_error: what a result says its values are right to
     `scattered`  values between cells that lie anywhere in a box, and those of them that lie on lines

@@ -1,4 +1,4 @@
-"""Exponents over a second parameter, and the two exponents of a collapse.
+"""The two exponents of a collapse, by which curves of a second parameter are one.
 
     y = L^b f(x / L^a)                                                                              (1)
 
@@ -9,93 +9,15 @@ given a: a is searched over all of its range, so there is no start to be stuck a
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from sweep.analysis.correlated import student
-from sweep.analysis.curves import check_confidence, check_dataset, check_output, log_of, positive_axis, title
+from sweep.analysis.curves import check_confidence, check_output, log_of, positive_axis, title
 from sweep.analysis.loglog import Array
-from sweep.analysis.scatter import library
 from sweep.system.errors import SweepError
-
-
-def fit_over(
-    fits: xr.Dataset, dim: str, formula: str, start: Mapping[str, float] | None = None, *, confidence: float = 0.95
-) -> xr.Dataset:
-    """Exponents against a second parameter, P ~ mu^p(n), by a formula for p.
-
-    Parameters
-    ----------
-    fits : Dataset
-        From `fit_exponent` of an output over two parameters: its exponents run along `dim`.
-    dim : str
-        The second parameter.
-    formula : str
-        Of `dim` and numbers to be found, e.g. "-1/(a + b*n)"; whatever lmfit's ExpressionModel takes.
-    start : mapping, optional
-        Where to start; default 1.
-
-    Returns
-    -------
-    Dataset
-        Along `number`, its names: `value`, `low`, `high`, by the bars of the exponents; along `dim`: `exponent`,
-        `fitted`. Attributes `fits`, 1 where the formula goes through all bars, or as many as chance has, and
-        `verdict`; where it does not, low and high are NaN.
-
-    Raises
-    ------
-    SweepError
-        There are no such exponents, the formula is none, or lmfit (extra `fit`) is not installed.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import sweep
-    >>> import xarray as xr
-    >>> mu, n = np.geomspace(1, 1e3, 30), np.linspace(0.5, 3, 9)
-    >>> y = xr.DataArray(mu[:, None] ** (-1 / (n + 1)), {"mu": mu, "n": n}, ("mu", "n"), name="P")
-    >>> found = sweep.fit_over(sweep.fit_exponent(y, "mu"), "n", "-1/(a + b*n)")
-    >>> print(f"{float(found.value.sel(number='b')):.6f}")
-    1.000000
-    """
-    check_confidence(confidence)
-    check_dataset("fit_over", fits, "fit_exponent", ["exponent", "exponent_low", "exponent_high"])
-    p = fits["exponent"]
-    if p.dims != (dim,):
-        raise SweepError(f"exponents run along {', '.join(map(str, p.dims)) or 'nothing'}, expected {dim} alone")
-    lmfit = library("lmfit")
-    fine = (p.notnull() & np.isfinite(fits.exponent_high - fits.exponent_low)).values
-    at, value = p[dim].values[fine].astype(np.float64), p.values[fine]
-    bar = (fits.exponent_high - fits.exponent_low).values[fine] / 2
-    bar = np.maximum(bar, 1e-14 * (1 + abs(value)))
-    model = _model(lmfit, formula, dim)
-    if value.size <= len(model.param_names):
-        raise SweepError(f"{formula}: {len(model.param_names)} numbers need more than {value.size} exponents")
-    parameters = model.make_params(**dict.fromkeys(model.param_names, 1.0) | dict(start or {}))
-    reach = student(10**6, 0.95)
-    found = model.fit(value, parameters, weights=reach / bar, scale_covar=False, **{dim: at})
-    off = abs(value - found.best_fit) / bar
-    fits_all = bool((off > 1).sum() <= max(1, 0.15 * off.size) and off.max() < 2)
-    t = student(10**6, confidence)
-    names = list(model.param_names)
-    best = np.array([found.params[name].value for name in names])
-    error = np.array([found.params[name].stderr or math.inf for name in names]) * (t if fits_all else math.nan)
-    numbers = {"value": best, "low": best - error, "high": best + error}
-    result = xr.Dataset({k: ("number", v) for k, v in numbers.items()}, coords={"number": names, dim: (dim, at)})
-    result["exponent"], result["fitted"] = (dim, value), (dim, np.asarray(found.best_fit))
-    text = "goes through the bars" if fits_all else f"misses the bars, by {off.max():.3g} of them: no intervals"
-    result.attrs = {"formula": formula, "fits": int(fits_all), "verdict": f"p = {formula} {text}"}
-    return result
-
-
-def _model(lmfit: Any, formula: str, dim: str) -> Any:
-    try:
-        return lmfit.models.ExpressionModel(formula, independent_vars=[dim])
-    except (ValueError, SyntaxError, NameError) as error:
-        raise SweepError(f'formula: expected one of {dim}, e.g. "a + b*{dim}"; found {formula!r} ({error})') from None
 
 
 class Points(NamedTuple):
@@ -168,13 +90,7 @@ def fit_collapse(
     check_confidence(confidence)
     points, count = _points(y, dim, over)
     a = _best(points, _range(points))
-    inside = _shared(points, a)
-    lost = count - int(inside.sum())
-    if inside.sum() < FEWEST_POINTS:
-        raise SweepError(
-            f"of {count} points {int(inside.sum())} lie among those of another curve; at least 10 are needed"
-        )
-    points = Points(*(column[inside] for column in points))
+    points = _overlapping(points, a, count)
     near = (a - 0.3 * (1 + abs(a)), a + 0.3 * (1 + abs(a)))
     a = _best(points, near, TRIES)
     b, fitted, numbers = _spline(points, a)
@@ -186,11 +102,26 @@ def fit_collapse(
     for name, middle, wide in zip(("x_exponent", "y_exponent"), (a, b), reach, strict=True):
         result[f"{name}_low"], result[f"{name}_high"] = middle - wide, middle + wide
     result["residual"], result["points"] = float(np.sqrt(np.mean(off**2))), points.t.size
-    result["dropped"], result["fits"] = lost, int(_one_curve(points, a, off))
+    result["dropped"], result["fits"] = count - points.t.size, int(_one_curve(points, a, off))
+    law = f"{title(y)} = {over}^b f({dim} / {over}^a)"
+    return _described(result).assign_attrs(y=title(y), x=dim, over=over, law=law)
+
+
+def _overlapping(points: Points, a: float, count: int) -> Points:
+    """Points that lie among those of another curve, of `count` given ones."""
+    inside = _shared(points, a)
+    found = int(inside.sum())
+    if found < FEWEST_POINTS:
+        raise SweepError(
+            f"of {count} points {found} lie among those of another curve; at least {FEWEST_POINTS} are needed"
+        )
+    return Points(*(column[inside] for column in points))
+
+
+def _described(result: xr.Dataset) -> xr.Dataset:
     for key in map(str, result.data_vars):
         text = COLLAPSED.get(key) or f"{'lower' if key.endswith('low') else 'upper'} end of its interval"
         result[key].attrs = {"units": "1", "long_name": text}
-    result.attrs = {"y": title(y), "x": dim, "over": over, "law": f"{title(y)} = {over}^b f({dim} / {over}^a)"}
     return result
 
 

@@ -135,7 +135,7 @@ def multiplied(study: Study, factors: Mapping[str, Any]) -> Study:
 
 def _by_cell(values: Any, factor: Any) -> Any:
     """Values (cells, ...) times one factor, or one a cell."""
-    return values * factor if np.ndim(factor) == 0 else (values.T * factor).T
+    return (values.T * factor).T
 
 
 def _followers(study: Study) -> dict[str, str]:

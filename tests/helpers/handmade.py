@@ -7,6 +7,7 @@ import numpy as np
 from sweep.cells.grid import Box
 from sweep.cells.partition import Partition
 from sweep.cells.schema import Column, Coordinate, Schema
+from sweep.store.ending import end
 from sweep.store.frame import ENDINGS, Frame
 from sweep.store.layout import write_digests
 from sweep.store.structure import Cut
@@ -66,6 +67,15 @@ def written(path, made=None, blocks=None, name="cells"):
     fill(fd, made.layout.tables[name], blocks)
     os.close(fd)
     return made.layout
+
+
+def finished(path, made=None, ended=True):
+    """Writes a frame, all of its blocks, and what ends it."""
+    layout = written(path, made)
+    with path.open("r+b") as file:
+        if ended:
+            end(file.fileno(), layout, TEXTS)
+    return layout
 
 
 def fill(fd, table, blocks=None):

@@ -5,14 +5,13 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from handmade import TEXTS, frame, harm, whole, written
+from handmade import finished, frame, harm, whole
 from toy_studies import build
 
 from sweep.cells.output_schema import output_schema
 from sweep.cells.partition import Partition
 from sweep.results.columns import open_checked
 from sweep.results.stored import Stored
-from sweep.store.ending import end
 from sweep.store.frame import Frame, cuts_of
 from sweep.system.errors import SweepError
 
@@ -20,13 +19,6 @@ from sweep.system.errors import SweepError
 @pytest.fixture
 def path(tmp_path):
     return tmp_path / "out.h5"
-
-
-def finished(path, made=None):
-    layout = written(path, made)
-    with path.open("r+b") as file:
-        end(file.fileno(), layout, TEXTS)
-    return layout
 
 
 @pytest.mark.parametrize("cells", [2, 4, 12])

@@ -5,12 +5,11 @@ import os
 
 import h5py
 import pytest
-from handmade import TEXTS, fill, frame, harm, rows_cut, written
+from handmade import fill, finished, frame, harm, rows_cut, written
 
 from sweep.results import verify as module
 from sweep.results.open import BESIDE
 from sweep.results.verify import verify
-from sweep.store.ending import end
 from sweep.store.layout import write_digests
 from sweep.store.store import unfinished_of
 from sweep.system.errors import SweepError
@@ -19,14 +18,6 @@ from sweep.system.errors import SweepError
 @pytest.fixture
 def output(tmp_path):
     return tmp_path / "out.h5"
-
-
-def finished(path, made=None, ended=True):
-    layout = written(path, made)
-    with path.open("r+b") as file:
-        if ended:
-            end(file.fileno(), layout, TEXTS)
-    return layout
 
 
 def judged(output):
