@@ -142,9 +142,12 @@ class Method:
     `solve(*parameters, rtol, *along, asked, *outputs, error, status)`, fills `error` as a bound would, and leaves it to
     the engine to call INACCURATE where that exceeds `rtol`.
 
-    `excludes` are parameters it cannot do: where a study sets one, away from its default or as an axis, the method is
-    not to be had in the whole study. `lacks` are outputs it does not give: it cannot be had where one of them is asked
-    for, and fills them with NaN.
+    `excludes` are parameters it cannot do: `auto` gives it no cell where one is away from its default; by name it is
+    not to be had for a study that sets one, away from its default or as an axis. `lacks` are outputs it does not give:
+    it cannot be had where one of them is asked for, and fills them with NaN.
+
+    `sooner(*parameters, rtol)`, an array of bool, is True in cells that `auto` tries it on ahead of the method declared
+    before it: there, at that rtol, it takes less time.
     """
 
     name: str
@@ -154,6 +157,7 @@ class Method:
     excludes: tuple[str, ...] = ()
     lacks: tuple[str, ...] = ()
     estimates: bool = False
+    sooner: Callable[..., Any] | None = None
 
 
 @dataclass(frozen=True)

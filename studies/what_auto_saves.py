@@ -21,7 +21,7 @@ from _common import Groups, Statement, report
 import sweep
 from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
 
-PARTS = ("", "_viscous", "_drag", "_balance", "_impact", "_polisher")
+PARTS = ("", "_viscous", "_drag", "_terms", "_balance", "_impact", "_polisher")
 """Ends of the names of the study files."""
 AS_MANY = 1e-12
 """Shares of cells that differ by less are the same."""
@@ -88,16 +88,18 @@ def figure(parts: Sequence[xr.Dataset]) -> Any:
     from sweep.show import charts
 
     with charts.style():
-        page = charts.new_figure(charts.PAGE, 128.0)
-        panels = page.subplots(2, 3, sharex=True, sharey=True).ravel()
-        for axes, found, text in zip(panels, parts, "abcdef", strict=False):
+        page = charts.new_figure(charts.PAGE, 210.0)
+        *panels, rest = page.subplots(4, 2, sharex=True, sharey=True).ravel()
+        for axes, found, text in zip(panels, parts, "abcdefg", strict=False):
             draw(axes, found)
             charts.letter(axes, text)
             axes.set_title(found.attrs["title"])
-        for axes in panels[3:]:
+        for axes in panels[-2:]:
             axes.set_xlabel("relative tolerance, rtol [1]")
-        page.legend(handles=keys(), loc="outside lower center", ncols=4)
-        for axes in panels[::3]:
+            axes.tick_params(labelbottom=True)
+        rest.axis("off")
+        rest.legend(handles=keys(), loc="center")
+        for axes in panels[::2]:
             axes.set_ylabel("time over that of auto [1]")
         panels[0].set_ylim(top=ROOM * panels[0].get_ylim()[1])
     return page
@@ -145,7 +147,7 @@ def charted(path: Path, cells: int, tolerances: Sequence[float]) -> list[xr.Data
     return [work_precision(sweep.read_study(file), cells=cells, tolerances=tolerances) for file in files]
 
 
-def conclude(path: str, cells: int = 2048, tolerances: Sequence[float] = TOLERANCES) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, cells: int = 4096, tolerances: Sequence[float] = TOLERANCES) -> tuple[Groups, list[str], Any]:
     """Statements, tables and the figure."""
     parts = charted(Path(path), cells, tolerances)
     groups = {found.attrs["title"]: statements(found) for found in parts}

@@ -133,6 +133,15 @@ def dopri5(p, rtol):
     return _units.given(units, cycle, verdict)
 
 
+def dopri5_is_cheaper(p, rtol):
+    """Where `dopri5` takes half of the time of `taylor` and is off by less than rtol/2, in 450 000 cells at random.
+
+    Elsewhere some cells are off by 1 to 4 rtol: at other tolerances, and where drag is rough at rest (n < 2) or steep
+    (n > 4).
+    """
+    return (rtol >= 1e-3) & (rtol <= 1e-2) & (p.n >= 2.0) & (p.n <= 4.0)
+
+
 @jit
 def check(p):
     """What no method is asked.
@@ -230,7 +239,12 @@ FOLIOT = kernel(
             excludes=_VISCOUS_ONLY,
         ),
         _taylor_swing.by_taylor(Foliot._fields, rippled=False),
-        method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", dopri5),
+        method(
+            "dopri5",
+            "adaptive Runge-Kutta of order 5, Newton on the half-swing map",
+            dopri5,
+            sooner=dopri5_is_cheaper,
+        ),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
 )

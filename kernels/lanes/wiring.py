@@ -39,6 +39,8 @@ Buffers = Callable[[], tuple[Any, ...]]
 Loop = Callable[..., None]
 Record = Callable[..., Any]
 """A NamedTuple class."""
+Sooner = Callable[[Any, Any], Any]
+"""Of a record of columns and rtol, in numpy."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ class Solver:
     loop: Loop
     fills: bool
     estimates: bool
+    sooner: Sooner | None = None
 
 
 def method(
@@ -68,6 +71,7 @@ def method(
     buffers: Buffers | None = None,
     loop: Loop = loops.in_lanes,
     estimates: bool = False,
+    sooner: Sooner | None = None,
 ) -> Solver:
     """A method by `solve(p, rtol, *buffers())`.
 
@@ -77,8 +81,9 @@ def method(
     excludes, lacks, estimates : as in `kernels.interface.Method`
     buffers : makes a tuple of arrays that a thread's cells use one after the other: `buffers()`, or `buffers(columns)`
     loop : `in_lanes`; `cell_by_cell`, where every search goes its own way
+    sooner : `sooner(p, rtol)` of columns, uncompiled: True where `auto` tries it ahead of the method before it
     """
-    return Solver(name, doc, solve, bound, excludes, lacks, buffers, loop, False, estimates)
+    return Solver(name, doc, solve, bound, excludes, lacks, buffers, loop, False, estimates, sooner)
 
 
 def tracing(
@@ -218,8 +223,11 @@ class _Wiring:
         asked, error = (["asked"], ["error"]) if solver.estimates else ([], [])
         names = [*self.parameters, "rtol", *self.along, *asked, *self.outputs, *error, "status"]
         solve = self._entry(solver.name, solver.function, body, names, solver.loop, solver.buffers or nothing)
-        bound = self._bound(solver)
-        return Method(solver.name, solver.doc, solve, bound, solver.excludes, solver.lacks, solver.estimates)
+        bound, sooner = self._bound(solver), self._sooner(solver.sooner)
+        return Method(solver.name, solver.doc, solve, bound, solver.excludes, solver.lacks, solver.estimates, sooner)
+
+    def _sooner(self, sooner: Sooner | None) -> Callable[..., Any] | None:
+        return None if sooner is None else lambda *columns: sooner(self.record(*columns[:-1]), columns[-1])
 
     def _split(self, split: Split) -> OnColumns:
         entries = {solver: self.method(solver).solve for solver in dict.fromkeys(split.solvers.values())}

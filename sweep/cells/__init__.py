@@ -9,6 +9,7 @@ Others may use
     `output_schema`  what any result holds, of cells or a summary, and what a part of it does
     `block`          a study cut into blocks, and how one of them is computed
     `solve`          Solver: one cell, by the method asked for or by the cheapest
+    `turns`          the methods that may solve a study, and in which order cells are tried by them
     `guard`          Guard: a bad cell costs one cell
     `reduce`         Reducer: cells to rows, rows to one
     `compiling`      tells what is compiled

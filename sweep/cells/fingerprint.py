@@ -8,6 +8,7 @@ import importlib.util
 import json
 import re
 import sys
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache, lru_cache
 from importlib import metadata
@@ -23,7 +24,7 @@ COMPILERS = ("numba", "llvmlite", "numpy")
 OURS = ("kernels",)
 """Packages whose modules count even where a kernel of another package imports them."""
 
-ENGINE = ("sweep.cells.solve", "sweep.cells.grid")
+ENGINE = ("sweep.cells.solve", "sweep.cells.turns", "sweep.cells.grid")
 """Modules of the engine that decide values: the method of each cell, and its parameters."""
 
 ASKING = ("sweep.study.condition",)
@@ -33,6 +34,10 @@ REDUCING = ("sweep.cells.partition", "sweep.cells.reduce", "sweep.cells.output_s
 """Those that decide the values of a summary."""
 
 SOURCE = "source "
+MOST_SOURCES = 8
+"""Source files that are named one by one where two fingerprints differ in them."""
+CHOICE = "auto"
+"""How `auto` chooses."""
 
 IMPORTERS = ("import_module", "__import__", "load")
 NAME = re.compile(r"[\w.]+")
@@ -42,7 +47,7 @@ IMPORT = re.compile(r"^[ \t]*import[ \t]+([\w., \t]+)", re.MULTILINE)
 
 def is_of_program(name: str) -> bool:
     """Whether an entry of a fingerprint tells of the program, not of the study."""
-    return name.startswith(SOURCE) or name in COMPILERS
+    return name.startswith(SOURCE) or name in (*COMPILERS, CHOICE)
 
 
 def fingerprint(study: Study) -> dict[str, str]:
@@ -52,8 +57,9 @@ def fingerprint(study: Study) -> dict[str, str]:
     -------
     dict of str to str
         "study" is one digest of all that the study says but for its words; what it says follows in short, under its
-        names in a study file. Then a digest per source file of the kernel ("source kernels.foliot.cycle"), and the
-        versions of compiler and arrays. The processor is not in it: kernels give the same bits on each.
+        names in a study file. Then a digest per source file of the kernel ("source kernels.foliot.cycle"), how `auto`
+        chooses, and the versions of compiler and arrays. The processor is not in it: kernels give the same bits on
+        each.
     """
     said = _said(study)
     whole = hashlib.sha256(json.dumps(said).encode()).hexdigest()
@@ -62,17 +68,31 @@ def fingerprint(study: Study) -> dict[str, str]:
         "study": whole,
         **said,
         **_sources(study.kernel_name, engine),
+        **({CHOICE: "cell by cell"} if study.by_cell else {}),
         **{name: version(name) for name in COMPILERS},
     }
 
 
 def difference(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
-    """What two fingerprints differ in, a line each: 'axes.mu: was 401 values ..., now 101 values ...'."""
+    """What two fingerprints differ in, a line each: 'axes.mu: was 401 values ..., now 101 values ...'.
+
+    Of more than `MOST_SOURCES` source files there is one line, 'source of 78 modules: 57 new, 2 changed, 19 gone'.
+    """
     names = [*new, *(name for name in old if name not in new)]
     changed = [name for name in names if old.get(name) != new.get(name)]
     # the digest of the whole study tells nothing where its parts do
     changed = [name for name in changed if name != "study"] or changed
-    return [_change(name, old.get(name), new.get(name)) for name in changed]
+    sources = [name for name in changed if name.startswith(SOURCE)]
+    together = sources if len(sources) > MOST_SOURCES else []
+    lines = [_change(name, old.get(name), new.get(name)) for name in changed if name not in together]
+    return lines + ([_together(sources, old, new)] if together else [])
+
+
+def _together(sources: Sequence[str], old: Mapping[str, str], new: Mapping[str, str]) -> str:
+    """One line of many source files."""
+    words = Counter("new" if name not in old else "changed" if name in new else "gone" for name in sources)
+    parts = [f"{words[word]} {word}" for word in ("new", "changed", "gone") if words[word]]
+    return f"{SOURCE}of {len(sources)} modules: {', '.join(parts)}"
 
 
 def _change(name: str, old: str | None, new: str | None) -> str:

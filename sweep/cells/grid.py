@@ -73,6 +73,11 @@ class Grid(Box):
         fixed = self.study.fixed
         return {k: fixed[field.name] for k, field in enumerate(self.study.kernel.parameters) if field.name in fixed}
 
+    def spread(self, place: int) -> Floats | None:
+        """All values that the parameter at that position takes, shape (values, ...); None where that is not known."""
+        axes = dict(self._varying)
+        return axes[place].values if place in axes else np.asarray(self.constants()[place])[None]
+
     def columns(self, start: int, stop: int, out: Sequence[Floats]) -> None:
         """Write the varying parameters of the cells `start` to `stop`.
 

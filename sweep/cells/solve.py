@@ -2,16 +2,17 @@
 
 A cell that the study's condition leaves out, or that `check` refuses, is never solved. With a method given, the cell
 is solved by it and remarked INACCURATE, whatever else is special about it, where the method's bound or estimate
-exceeds rtol. With `auto` it goes to the first method, cheapest first, whose bound meets rtol, and on to the next where
-that one gives up or says INACCURATE. Where none meets rtol, the values of the smallest bound are given, INACCURATE. A
-later method replaces only what it betters. Where a kernel of somebody's own says OK without a number, or a status that
-a kernel has not got, the cell FAILED.
+exceeds rtol. With `auto` it goes to the first method, cheapest first, that can do its terms and whose bound meets rtol,
+and on to the next where that one gives up or says INACCURATE. Where none meets rtol, the values of the smallest bound
+are given, INACCURATE. A later method replaces only what it betters. Where a kernel of somebody's own says OK without a
+number, or a status that a kernel has not got, the cell FAILED.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Method, Status
 from sweep.cells.grid import Cells, Grid
+from sweep.cells.turns import Absent, Turn, turns
 from sweep.study.model import AUTO, Study
 
 STRIP = 16384
@@ -70,7 +72,7 @@ class Solver:
 
     def __init__(self, study: Study, grid: Grid | None = None) -> None:
         self.study, self.grid = study, grid or Grid(study)
-        self.usable = usable_methods(study)
+        self._turns = turns(study, self.grid)
         kernel = study.kernel
         shapes = {field.name: study.shape(field) for field in (*kernel.parameters, *kernel.outputs)}
         cell_bytes = sum(8 * math.prod(shapes[field.name]) for field in kernel.outputs)
@@ -145,7 +147,8 @@ class _Strip:
         self.rtol, self.error = solver._rtol[:n], solver._error[:n]
         self._gathered: tuple[Chosen | None, list[Floats]] = None, []
         self.outputs, self.status, self.used = outputs, status, used
-        self.usable, self.promised = solver.usable, solver._promised
+        self._turns, self.promised = solver._turns, solver._promised
+        self._able: dict[tuple[Absent, ...], NDArray[np.bool_]] = {}
 
     def take(self, number: int, cells: Chosen) -> None:
         """Solve the cells by one method; remark those for which it promises less than rtol."""
@@ -154,17 +157,17 @@ class _Strip:
             self.run(number, cells, None if method.bound is None else self.bound(method, cells))
 
     def choose(self, cells: Chosen) -> None:
-        """Solve each cell by the first method whose bound meets rtol and which does not give up."""
+        """Solve each cell by the first method that can do it, whose bound meets rtol and which does not give up."""
         if not _count(cells):
             return
         self.status[cells] = NO_METHOD
         missed: list[tuple[int, Chosen, Floats]] = []
         untried = True
-        for number in self.usable:
-            able = self._promising(number, cells, missed)
+        for turn in self._turns:
+            able = self._promising(turn, cells, missed)
             if not _count(able):
                 continue
-            status = self.run(number, able) if untried else self._improve(number, able)
+            status = self.run(turn.number, able) if untried else self._improve(turn.number, able)
             left = _pick(cells, among(status if able is cells else self.status[cells], GIVEN_UP))
             if not _count(left):
                 return
@@ -173,16 +176,26 @@ class _Strip:
         if missed:
             self._settle(cells, missed)
 
-    def _promising(self, number: int, cells: Chosen, missed: list[tuple[int, Chosen, Floats]]) -> Chosen:
-        """Cells for which a method's bound, if it has one, meets rtol; where others are left, they go to `missed`."""
-        method = self.kernel.methods[number]
-        if method.bound is None:
+    def _promising(self, turn: Turn, cells: Chosen, missed: list[tuple[int, Chosen, Floats]]) -> Chosen:
+        """Cells whose turn it is and for which the method's bound, if it has one, meets rtol; others go to `missed`."""
+        method, cells = self.kernel.methods[turn.number], self._fitting(turn, cells)
+        if method.bound is None or not _count(cells):
             return cells
         bound = self.bound(method, cells)
         able = _pick(cells, bound <= self._inputs(cells)[-1])
         if able is not cells:
-            missed.append((number, cells, bound))
+            missed.append((turn.number, cells, bound))
         return able
+
+    def _fitting(self, turn: Turn, cells: Chosen) -> Chosen:
+        """Cells whose terms the method can do, and whose turn it is."""
+        if turn.absent:
+            if turn.absent not in self._able:
+                self._able[turn.absent] = reduce(np.logical_and, (term.holds(self.parameters) for term in turn.absent))
+            cells = _pick(cells, self._able[turn.absent][cells])
+        if turn.sooner is None or not _count(cells):
+            return cells
+        return _pick(cells, turn.sooner(*self._inputs(cells)) == turn.early)
 
     def _settle(self, cells: Chosen, missed: Sequence[tuple[int, Chosen, Floats]]) -> None:
         """Give cells for which nothing meets rtol the values of the smallest bound.
@@ -274,16 +287,6 @@ class _Strip:
         known = known if bound is None else np.maximum(known, bound)
         self.error[cells] = np.where(np.isnan(known), np.inf, known)
         status[~(known <= self._inputs(cells)[-1]) & (status < FIRST_REFUSAL)] = INACCURATE
-
-
-def usable_methods(study: Study) -> tuple[int, ...]:
-    """Numbers of the methods that can do every term the study sets and give every output it asks for."""
-    methods = enumerate(study.kernel.methods)
-    return tuple(
-        number
-        for number, method in methods
-        if study.terms.isdisjoint(method.excludes) and set(study.outputs).isdisjoint(method.lacks)
-    )
 
 
 def _worse(status: Codes, error: Floats, earlier: Codes, earlier_error: Floats) -> NDArray[np.bool_]:

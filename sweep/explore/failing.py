@@ -11,7 +11,7 @@ from kernels.interface import Status
 from sweep.cells.grid import Grid
 from sweep.cells.sample import with_method
 from sweep.cells.schema import STATUS
-from sweep.cells.solve import usable_methods
+from sweep.cells.turns import usable_methods
 from sweep.study.model import Study, frozen
 from sweep.system.errors import SweepError
 
@@ -32,9 +32,10 @@ def without_failing(study: Study, cell_timeout: float | str | None, note: Callab
     from sweep.runs.run import run
 
     good = np.ones(Grid(study).size, bool)
-    for method in usable_methods(study):
+    able = [study.kernel.methods[number].name for number in usable_methods(study)]
+    for method in ("auto", *able):  # auto also tries, on cells, methods that cannot do the whole study
         for rtol in EXTREMES:
-            trial = with_method(study, study.kernel.methods[method].name, rtol)
+            trial = with_method(study, method, rtol)
             found = run(trial, progress=False, isolate=True, cell_timeout=cell_timeout)
             good &= found[STATUS].values.ravel() != Status.FAILED
     if good.all():

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 from kernels import catalogue
 from kernels.interface import Field, Kernel, is_kept
 from sweep.cells.block import sampled_study
+from sweep.cells.grid import Grid
 from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import row_blocks
-from sweep.cells.solve import usable_methods
+from sweep.cells.turns import turns
 from sweep.explore.plan import small_duration
 from sweep.show.kernels import catalogue_text, kernel_text
 from sweep.study.kernel_lookup import load_kernel
@@ -150,9 +151,9 @@ def forecast(study: Study) -> str:
 
 def _is_compiled(study: Study) -> bool:
     """Whether a sample of cells will hardly have to compile: of `auto`, the method that is tried first is kept."""
-    usable = [study.kernel.methods[number] for number in usable_methods(study)]
+    tried = [study.kernel.methods[turn.number] for turn in turns(study, Grid(study))]
     named = [method for method in study.kernel.methods if method.name == study.method]
-    return all(is_kept(method.solve) for method in (named or usable)[:1])
+    return all(is_kept(method.solve) for method in (named or tried)[:1])
 
 
 def table(headings: Sequence[str], rows: Rows) -> str:

@@ -14,8 +14,9 @@ from kernels import catalogue
 from kernels.interface import Method, Status
 from sweep.cells.grid import Cells, Grid, empty_cells
 from sweep.cells.guard import BadCell, Guard
-from sweep.cells.solve import Solver, usable_methods
+from sweep.cells.solve import Solver
 from sweep.cells.timing import LANES
+from sweep.cells.turns import Turn, turns
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.study.model import SETTINGS, Study
 from sweep.study.read import Given, as_study
@@ -123,7 +124,8 @@ class _Quick:
     """
 
     def __init__(self, study: Study, grid: _Points) -> None:
-        self._study, self._grid, self._method, self._check = study, grid, _first_method(study), study.kernel.check
+        self._study, self._grid, self._check = study, grid, study.kernel.check
+        self._turns = _turns(study, grid)
         self._along = [np.array(study.along[field.name]) for field in study.kernel.along]
         self._asked = np.array([field.name in study.outputs for field in study.kernel.outputs], np.uint8)
         self._use(1)
@@ -157,23 +159,32 @@ class _Quick:
         self._check(*parameters, status)
         if status[0] != Status.OK:
             return None
-        if self._method.bound is not None:
-            self._method.bound(*parameters, self._rtol, *self._along, self._asked, self._bound)
+        method = self._method()
+        if method is None or method.estimates:
+            return None
+        if method.bound is not None:
+            method.bound(*parameters, self._rtol, *self._along, self._asked, self._bound)
             if not self._bound[0] <= self._rtol[0]:
                 return None
-        self._method.solve(*parameters, self._rtol, *self._along, *self._outputs, status)
+        method.solve(*parameters, self._rtol, *self._along, *self._outputs, status)
         return self._cells if status[0] == Status.OK else None
 
+    def _method(self) -> Method | None:
+        """The method that is tried first."""
+        inputs = (*self._parameters, self._rtol)
+        return next((self._study.kernel.methods[turn.number] for turn in self._turns if turn.comes(inputs)), None)
 
-def _first_method(study: Study) -> Method:
-    """The method that is named, or that `auto` tries first."""
-    named = [method for method in study.kernel.methods if method.name == study.method]
-    return (named or [study.kernel.methods[number] for number in usable_methods(study)])[0]
+
+def _turns(study: Study, grid: Grid) -> tuple[Turn, ...]:
+    """Turns of the method that is named, or of those that `auto` tries."""
+    names = [method.name for method in study.kernel.methods]
+    return turns(study, grid) if study.method == "auto" else (Turn(names.index(study.method)),)
 
 
 def _is_simple(study: Study) -> bool:
     """Whether what one method says of a cell can be all there is to say."""
-    return study.kernel_name in catalogue.KERNELS and not study.where and not _first_method(study).estimates
+    methods = [m for m in study.kernel.methods if study.method in ("auto", m.name)]
+    return study.kernel_name in catalogue.KERNELS and not study.where and not all(m.estimates for m in methods)
 
 
 class _Points(Grid):
@@ -187,6 +198,9 @@ class _Points(Grid):
         self._places = {f.name: places.get(study.follows.get(f.name, f.name)) for f in study.kernel.parameters}
         self._filled = [(k, p) for k, p in enumerate(self._places.values()) if p is not None]
         self._setting = super().settings(0, 1)
+
+    def spread(self, place: int) -> Any:
+        return None if place in dict(self._filled) else super().spread(place)
 
     def columns(self, start: int, stop: int, out: Sequence[Any]) -> None:
         for k, place in self._filled:

@@ -220,7 +220,7 @@ def _missing(study: Study, able: Sequence[str]) -> list[str]:
 
 
 def _able(study: Study) -> list[str]:
-    from sweep.cells.solve import usable_methods
+    from sweep.cells.turns import usable_methods
 
     return [study.kernel.methods[i].name for i in usable_methods(study)]
 

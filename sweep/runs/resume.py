@@ -3,22 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
-from sweep.cells.fingerprint import difference
+from sweep.cells.fingerprint import difference, fingerprint
 from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import row_blocks
-from sweep.results.open import stored_fingerprint
+from sweep.results.open import stored_attrs, stored_fingerprint
 from sweep.results.verify import check_whole, verify
 from sweep.runs.extend import has_failed, obstacle
 from sweep.runs.task import Task
 from sweep.store.layout import Layout
 from sweep.store.store import Store
+from sweep.study.model import Study
 from sweep.system.errors import SweepError
 
 EXTENDABLE = (
     "where its axes have only got more values, --extend computes the new cells alone; those of another version it "
     "keeps if a sample of them still has the same bits"
 )
+
+
+def as_begun(task: Task) -> Task:
+    """The task, its methods chosen as in the result that stands there. Raises SweepError of what is no result."""
+    if task.force or not task.output.exists():
+        return task
+    stored = Study.from_json(stored_attrs(task.output)["study_json"], declared=True)
+    if stored.by_cell == task.study.by_cell:
+        return task
+    study = replace(task.study, by_cell=stored.by_cell)
+    return replace(task, study=study, fingerprint=fingerprint(study))
 
 
 def is_complete(task: Task) -> bool:

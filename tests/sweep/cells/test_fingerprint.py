@@ -1,6 +1,7 @@
 """The fingerprint changes with everything that decides a number of a result, and with nothing else."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -175,7 +176,7 @@ def of_the_engine(study):
 
 
 def test_what_chooses_methods_and_what_reduces_cells_counts_too():
-    cells = {"sweep.cells.solve", "sweep.cells.grid"}
+    cells = {"sweep.cells.solve", "sweep.cells.turns", "sweep.cells.grid"}
     assert of_the_engine(build(**BASE)) == cells
     assert of_the_engine(build(**BASE, summary={})) == cells | {
         "sweep.cells.partition",
@@ -184,7 +185,14 @@ def test_what_chooses_methods_and_what_reduces_cells_counts_too():
     }
 
 
-@pytest.mark.parametrize("name", ["solve", "grid", "partition", "reduce", "output_schema"])
+def test_how_methods_are_chosen_counts_as_the_program_not_as_the_study():
+    new, old = (fingerprint(replace(build(**BASE), by_cell=by_cell)) for by_cell in (True, False))
+    assert difference(old, new) == ["auto: new, cell by cell"]
+    assert new["study"] == old["study"]
+    assert module.is_of_program("auto")
+
+
+@pytest.mark.parametrize("name", ["solve", "turns", "grid", "partition", "reduce", "output_schema"])
 def test_an_edit_of_what_reduces_cells_is_named(monkeypatch, tmp_path, name):
     study = build(**BASE, summary={})
     old, real = fingerprint(study), module._path
@@ -212,6 +220,17 @@ def test_a_source_that_came_or_went_is_told_without_digests():
         "source c: new",
         "source a: gone",
     ]
+
+
+def test_many_sources_are_told_in_one_line():
+    many = {f"source {k}": "1" for k in range(9)}
+    eight = {name: many[name] for name in list(many)[:8]}
+    assert difference({}, eight) == [f"{name}: new" for name in eight]
+    assert difference({}, many) == ["source of 9 modules: 9 new"]
+    others = {**dict.fromkeys(eight, "2"), "source b": "1", "source c": "1", "rtol": "3"}
+    assert difference({"rtol": "2", **many}, others) == [
+        "rtol: was 2, now 3", "source of 11 modules: 2 new, 8 changed, 1 gone",
+    ]  # fmt: skip
 
 
 def test_the_digest_of_the_study_is_told_only_where_nothing_else_differs():

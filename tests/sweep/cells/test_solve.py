@@ -14,7 +14,8 @@ import sweep
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.block import warm
 from sweep.cells.grid import Cells, Grid
-from sweep.cells.solve import NONE, STRIP, UNKNOWN, Solver, among, usable_methods
+from sweep.cells.solve import NONE, STRIP, UNKNOWN, Solver, among
+from sweep.cells.turns import usable_methods
 from sweep.results.statuses import account
 
 NAMES = [m.name for m in KERNEL.methods]

@@ -39,7 +39,7 @@ def test_what_any_method_fails_at_is_left_out_and_told(failing):
     found = without_failing(heights(), 2.0, told.append)
     assert found.axes["height"].values.tolist() == [1.0, 2.0, 4.0]
     assert told == ["the kernel fails at 2 of 5 cells, e.g. height=3; they are left out"]
-    trials = [(method, rtol) for method in ("rough", "exact") for rtol in (1e-3, 1e-14)]
+    trials = [(method, rtol) for method in ("auto", "rough", "exact") for rtol in (1e-3, 1e-14)]
     assert sorted(asked) == sorted((*trial, False, True, 2.0) for trial in trials)
 
 

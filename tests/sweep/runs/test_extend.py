@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -188,6 +189,11 @@ def kept_study(torques=TORQUES):
     return sweep.build_study(kernel="foliot", outputs=["period", "amplitude"], rtol=1e-9, axes=axes, fixed=fixed)
 
 
+def as_then(torques=TORQUES):
+    """The study, its methods chosen as in the version that computed the result."""
+    return replace(kept_study(torques), by_cell=False)
+
+
 @pytest.fixture
 def kept(output):
     return Path(shutil.copy(GOLDEN, output))
@@ -195,18 +201,19 @@ def kept(output):
 
 def test_a_result_of_an_earlier_version_opens_verifies_and_fits(kept, capsys):
     with sweep.open_result(kept) as found:
-        same(found, quiet(kept_study()).drop_vars("error_bound"))  # which came later
+        same(found, quiet(as_then()).drop_vars("error_bound"))  # which came later
     assert main(["verify", str(kept)]) == 0
     assert main(["fit", str(kept), "--y", "period", "--x", "mu"]) == 0
     assert "whole" in capsys.readouterr().out
 
 
 def test_a_result_of_an_earlier_version_is_extended_where_its_bits_are_still_the_same(kept, solved):
-    more = kept_study([1e-5, *TORQUES[:3], 0.7, *TORQUES[3:]])
+    torques = [1e-5, *TORQUES[:3], 0.7, *TORQUES[3:]]
+    more = kept_study(torques)
     with pytest.raises(SweepError, match="those of another version it keeps if a sample"):
         quiet(more, kept)
     with quiet(more, kept, extend=True) as found:
-        same(found, quiet(more))
+        same(found, quiet(as_then(torques)))
         assert found.attrs["taken_over"].startswith("45 cells of another version, ")
         assert "source kernels.foliot.cycle" in json.loads(found.attrs["fingerprint"])
     assert main(["verify", str(kept)]) == 0
@@ -214,10 +221,24 @@ def test_a_result_of_an_earlier_version_is_extended_where_its_bits_are_still_the
 
 def test_a_result_of_an_earlier_version_becomes_one_of_this_version(kept):
     with quiet(kept_study(), kept, extend=True) as found:
-        same(found, quiet(kept_study()))
+        same(found, quiet(as_then()))
     before = kept.read_bytes()
     quiet(kept_study(), kept).close()
     assert kept.read_bytes() == before
+
+
+def test_a_result_goes_on_with_methods_chosen_as_it_was_begun_and_is_chosen_anew_by_force(kept):
+    """Cells without Coulomb friction have a method of their own, which `auto` took only where all cells were such."""
+    more = kept_study([*TORQUES, 50.0])
+    for torques in (TORQUES, [*TORQUES, 50.0]):
+        with quiet(kept_study(torques), kept, extend=True) as found:
+            same(found, quiet(as_then(torques)))
+            assert sweep.study_of(found).by_cell is False
+    with quiet(kept_study([*TORQUES, 50.0]), kept, force=True) as found:
+        same(found, quiet(more))
+        assert sweep.study_of(found).by_cell
+        assert set(found.method_used[0, :, 0].values) == {0}
+        assert not np.array_equal(found.method_used, quiet(as_then([*TORQUES, 50.0])).method_used)
 
 
 @pytest.mark.parametrize("name", ["period", "status", "method_used", "error_bound"])

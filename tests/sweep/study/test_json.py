@@ -47,6 +47,19 @@ def test_json_holds_long_arrays_exactly_too(length):
     assert hash(again) == hash(study)
 
 
+@pytest.mark.parametrize(
+    ("said", "expected"),
+    [({"by_cell": True}, True), ({"by_cell": False}, False), ({}, False), ({"by_cell": 1}, False)],
+)
+def test_methods_are_chosen_cell_by_cell_where_a_study_says_so_as_all_new_ones_do(said, expected):
+    keys = json.loads(build(axes={"height": [1.0]}).to_json())
+    assert keys.pop("by_cell") is True
+    study = Study.from_json(json.dumps(keys | said), allow_import=True)
+    assert study.by_cell is expected
+    assert Study.from_json(study.to_json(), allow_import=True).by_cell is expected
+    assert (study == build(axes={"height": [1.0]})) is expected
+
+
 def test_json_suffices_to_read_a_study_whose_kernel_is_gone(monkeypatch):
     text = build_rich(fixed={"shape": "square"}, axes={"load": [1.0], "method": ["auto", "slow"]}).to_json()
     monkeypatch.delattr(toy, "RICH")
