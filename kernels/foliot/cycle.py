@@ -134,11 +134,7 @@ def dopri5(p, rtol):
 
 
 def dopri5_is_cheaper(p, rtol):
-    """Where `dopri5` takes half of the time of `taylor` and is off by less than rtol/2, in 450 000 cells at random.
-
-    Elsewhere some cells are off by 1 to 4 rtol: at other tolerances, and where drag is rough at rest (n < 2) or steep
-    (n > 4).
-    """
+    """Where `dopri5` takes half of the time of `taylor`: not where drag is rough at rest (n < 2) or steep (n > 4)."""
     return (rtol >= 1e-3) & (rtol <= 1e-2) & (p.n >= 2.0) & (p.n <= 4.0)
 
 
