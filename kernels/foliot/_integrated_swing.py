@@ -247,7 +247,7 @@ def dopri5(scene, ripple, rtol):
 
     Parameters
     ----------
-    scene : (d, rho, rho_s, gamma, n, kappa, e) and, if wanted, 1 - rho, as `_units` gives it
+    scene : `_units.Scene`
     ripple : (depth, harmonic) of (2), or SMOOTH
 
     Returns

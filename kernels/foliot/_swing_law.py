@@ -177,9 +177,8 @@ def problem_of(scene, ripple, rtol):
     Friction of degree 0 is dry, of degree 1 viscous. Of a degree between, the slope at rest is infinite: below the
     floor friction is held constant.
     """
-    d, rho, rho_s, gamma, n, kappa, e = scene[:7]
+    d, rho, rho_s, gamma, n, kappa, e, slack = scene
     depth, harmonic = ripple
-    slack = _slack(scene)
     dry, viscous = where(n > 0.0, 0.0, gamma), where((n > 0.0) & not_(n < 1.0) & not_(n > 1.0), gamma, 0.0)
     rho, slack, d = rho + dry, slack - dry, d + viscous
     other = dry + viscous < gamma
@@ -198,11 +197,3 @@ def problem_of(scene, ripple, rtol):
     share = where(rippled | ((gamma > 0.0) & (n < 2.0)), _SHARP_SHARE, where(rough, _ROUGH_SHARE, _SHARE))
     first = 0.1 / (1.0 + stiffness + sqrt(kappa))
     return Problem(e, rho_s, rtol, share, rough, rippled, Dry(1.0 + rho, slack), terms, stiffness, pace, first)
-
-
-@jit
-def _slack(scene):
-    """1 - rho, where the scene brings it along without the rounding of rho."""
-    if len(scene) > 7:
-        return scene[7]
-    return 1.0 - scene[1]

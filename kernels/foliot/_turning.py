@@ -10,8 +10,9 @@ f(0) + f(w) for f(0) is what J exp(-Y) is with the slope followed to rest.
 import math
 from typing import NamedTuple
 
-from kernels.foliot._swing_law import Law, Leg, Power, Terms, accelerations, held_at, pull
+from kernels.foliot._swing_law import Law, Leg, Power, Swing, Terms, accelerations, held_at, pull
 from kernels.lanes.jit import jit
+from kernels.lanes.records import named
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
 from kernels.maths.elementary import larger, power, smaller
 
@@ -35,7 +36,7 @@ class Turned(NamedTuple):
 @jit
 def longest(state, acceleration, law):
     """The longest step, where friction is not smooth at rest: by the time to rest, or since."""
-    v, slow = state[1], law.leg.slow
+    v, slow = named(Swing, state).v, law.leg.slow
     most = 0.0 * v + math.inf
     if any_lane(slow > 0.0):
         speed, leaving = magnitude(v), v * acceleration > 0.0
@@ -84,21 +85,21 @@ def turned(state, turns, slow, problem):
     Power-law friction that is not smooth at rest is constant from the speed of the state to rest, and from there to
     the speed `slow`: J takes both, and with the integral Y outside is what it is without a step through rest.
     """
-    zero, v, dry, friction = 0.0 * slow, state[1], problem.dry, problem.terms.power
+    zero, v, dry, friction = 0.0 * slow, named(Swing, state).v, problem.dry, problem.terms.power
     still = turns | not_(v < 0.0)
     speed = where(slow > 0.0, larger(v, zero), zero)
     held = held_at(friction, speed)
-    braking = dry.outwards + held + pull(state[0], problem.terms) + problem.terms.drag * speed
+    braking = dry.outwards + held + pull(named(Swing, state).x, problem.terms) + problem.terms.drag * speed
     before = speed / braking
     top = _moved(state, zero + 1.0, dry.outwards + held, before, problem)
-    force = pull(top[0], problem.terms)
+    x, _, x_mu, v_mu, x_start, v_start, decay = top
+    force = pull(x, problem.terms)
     free = dry.inwards + force
     speed = where(still & (free > 0.0), slow * smaller(free / dry.inwards, zero + 1.0), zero)
     held_in = held_at(friction, speed)
     goes = free > held_in
     jump = where(turns, (dry.inwards - held_in + force) / (dry.outwards + held + force), 1.0)
     after = where(goes, speed / (free - held_in), 0.0)
-    x, _, x_mu, v_mu, x_start, v_start, decay = top
     rest = (x, 0.0 * x, x_mu, jump * v_mu, x_start, jump * v_start, decay)
     behind = _moved(rest, zero - 1.0, dry.inwards - held_in, after, problem)
     return Turned(choose(still, behind, state), jump, x, x_start, before + after)
