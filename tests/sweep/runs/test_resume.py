@@ -8,9 +8,10 @@ import pytest
 from running import tall
 from toy_studies import build
 
+from sweep.cells.fingerprint import fingerprint
 from sweep.cells.output_schema import part_columns
 from sweep.runs import resume
-from sweep.runs.resume import EXTENDABLE, is_complete, take_up, tidy
+from sweep.runs.resume import EXTENDABLE, as_begun, is_complete, take_up, tidy
 from sweep.runs.run import _task
 from sweep.system.errors import SweepError
 
@@ -47,6 +48,19 @@ def stands(monkeypatch):
         return looked
 
     return put
+
+
+@pytest.mark.parametrize("stored", [False, True])
+@pytest.mark.parametrize("asked", [False, True])
+def test_methods_are_chosen_as_in_the_result_that_stands_there(output, monkeypatch, asked, stored):
+    text = replace(tall(3), by_cell=stored).to_json()
+    monkeypatch.setattr(resume, "stored_attrs", lambda path: {"study_json": text})
+    task = _task(replace(tall(10), by_cell=asked), output)
+    found = as_begun(task)
+    assert found.study == replace(task.study, by_cell=stored)
+    assert found.fingerprint == fingerprint(found.study)
+    for untouched in (replace(task, force=True), replace(task, path=output.with_name("none.h5"))):
+        assert as_begun(untouched) is untouched
 
 
 def test_where_nothing_stands_nothing_is_complete(tmp_path):

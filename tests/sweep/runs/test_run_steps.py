@@ -53,7 +53,7 @@ def test_a_result_that_is_complete_and_alone_is_left_alone(tmp_path, monkeypatch
         (tmp_path / left).write_text("")
     monkeypatch.setattr(run.resume, "is_complete", lambda task: complete)
     monkeypatch.setattr(run, "run_to_file", lambda task, precomputed: "ran")
-    assert run._complete(SimpleNamespace(output=tmp_path / "x.h5")) == found
+    assert run._complete(SimpleNamespace(output=tmp_path / "x.h5", force=False)) == found
 
 
 @pytest.mark.parametrize(("memory", "fits"), [(2000, True), (1999, False)])
