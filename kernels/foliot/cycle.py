@@ -134,7 +134,7 @@ def dopri5(p, rtol):
 
 
 def dopri5_is_cheaper(p, rtol):
-    """Where `dopri5` takes half of the time of `taylor`: not where drag is rough at rest (n < 2) or steep (n > 4)."""
+    """Where `taylor` takes 1.1 to 1.5 times as long as `dopri5`."""
     return (rtol >= 1e-3) & (rtol <= 1e-2) & (p.n >= 2.0) & (p.n <= 4.0)
 
 
