@@ -8,6 +8,7 @@ from columns import relative_error
 from loops import each_cell
 
 from kernels.foliot._integrated_swing import SMOOTH, dopri5
+from kernels.foliot._units import Scene
 from kernels.interface import Status
 from kernels.lanes.columns import entry
 from kernels.lanes.jit import COMPILED, jit
@@ -18,7 +19,8 @@ TERMS = {"d": 0.0, "rho": 0.0, "rho_s": None, "gamma": 0.0, "n": 1.0, "kappa": 0
 
 @jit
 def _cell(i, d, rho, rho_s, gamma, n, kappa, e, rtol, half_period, amplitude, speed, sensitivity, multiplier, status):
-    cycle, verdict = dopri5((d[i], rho[i], rho_s[i], gamma[i], n[i], kappa[i], e[i]), SMOOTH, rtol[i])
+    scene = Scene(d[i], rho[i], rho_s[i], gamma[i], n[i], kappa[i], e[i], 1.0 - rho[i])
+    cycle, verdict = dopri5(scene, SMOOTH, rtol[i])
     half_period[i], amplitude[i], speed[i], sensitivity[i], multiplier[i] = cycle
     status[i] = verdict
 
