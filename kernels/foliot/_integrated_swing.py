@@ -39,7 +39,7 @@ _FINEST = 3e-15
 """Tolerance of a step that rounding leaves possible."""
 _V_ROUNDING = 1e-14
 """Of the speed after a half swing."""
-_CANCELS = 0.1
+_CANCELS = 0.3
 """Of how many times the terms of s are larger than s, by which tolerances are finer where friction is not smooth: steps
 are then bounded by the time to rest, and two tolerances may differ by less than either is off."""
 _STEEP_FROM, _STEEP_TO = 1e-8, 0.03

@@ -236,7 +236,7 @@ class Study:
         keys |= {"blocks": [vars(block) for block in self.blocks]} if self.blocks else {}
         keys |= {"where": self.where} if self.where else {}
         keys |= {"by_cell": True} if self.by_cell else {}
-        return json.dumps(_plain(keys), allow_nan=False, ensure_ascii=False)
+        return json.dumps(_plain(keys), allow_nan=False, ensure_ascii=False, separators=(",", ":"))
 
     @classmethod
     def from_json(cls, text: str, *, allow_import: bool = False, declared: bool = False) -> Study:
