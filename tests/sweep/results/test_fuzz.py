@@ -247,7 +247,7 @@ def no_text(file):
 
 def no_word(file):
     """In the study."""
-    file.attrs["study_json"] = file.attrs["study_json"].replace('"method": "auto"', '"method": {}')
+    file.attrs["study_json"] = file.attrs["study_json"].replace('"method":"auto"', '"method":{}')
 
 
 def another_shape(file):
