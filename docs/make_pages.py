@@ -141,7 +141,7 @@ def _chart(name: str, folder: Path) -> Path | None:
         except sweep.SweepError as reason:
             print(f"no picture of {name}: {reason}")
             return None
-        sweep.plot_precision(found, path)
+        sweep.plot(found, path)
     return path
 
 
@@ -149,7 +149,7 @@ def _study(name: str) -> Any:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, f"{name}.toml")
         path.write_text(starter(name), encoding="utf-8")
-        return sweep.read_study(path)
+        return sweep.study(path)
 
 
 def _digest() -> str:

@@ -107,9 +107,9 @@ def beside_kernel(ds: xr.Dataset) -> list[Statement]:
     middle = ds.sel(at=0, method="nearest")
     fixed = {"zeta": float(ds.zeta), "omega_n": float(ds.omega_n)}
     axes = {"r": ds.r.values, "w": ds.w.values}
-    made = sweep.run(sweep.build_study(kernel="balance_driven", axes=axes, fixed=fixed, rtol=1e-12))
+    made = sweep.run(sweep.study(kernel="balance_driven", axes=axes, fixed=fixed, rtol=1e-12))
     off = max(float(abs(middle.clock / made.period - 1).max()), float(abs(middle.a / made.amplitude - 1).max()))
-    other = sweep.build_study(
+    other = sweep.study(
         kernel="balance_driven", axes={"r": [0.001, 0.01]}, fixed={"zeta": 0.005, "omega_n": 1.0, "w": 0.01}, rtol=1e-12
     )
     known = sweep.run(other)
@@ -146,7 +146,7 @@ def positions(ds: xr.Dataset) -> list[Statement]:
     from scipy.special import j1, jn_zeros
 
     spread = ds.loss.isel(hang=0) - ds.loss.isel(hang=2)
-    zero = float(sweep.where_value(spread.swap_dims(w="a0"), "a0", 0.0).abscissa)
+    zero = float(sweep.where_exponent(spread.swap_dims(w="a0"), "a0", 0.0, values=True).abscissa)
     rate = -2 * DAY * float(ds.poise) * j1(ds.a.isel(hang=0)) / ds.a.isel(hang=0)
     off = float(abs(spread - rate).max() / abs(spread).max())
     level = float(abs(ds.loss.isel(hang=1)).max() / abs(spread).max())
@@ -163,7 +163,7 @@ def pivots() -> list[Statement]:
     """From the page's mu, m, g and radius to r, and what the position does to amplitude and rate of a watch."""
     mu, m, g, k = (WATCH[name] for name in ("mu", "m", "g", "stiffness"))
     upright, flat = pivot_friction(mu, m, g, WATCH["pivot"]) / k, end_friction(mu, m, g, WATCH["end"]) / k
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="balance_driven", axes={"r": [flat, upright]}, fixed={"zeta": 1 / 600, "omega_n": 15.708, "w": 0.2}
     )
     ds = sweep.run(study)

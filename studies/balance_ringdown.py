@@ -21,8 +21,8 @@ import numpy as np
 import xarray as xr
 from _common import Groups, Statement, compared, differing, direct_label, hatch, read_result, report
 
+import sweep
 from kernels.interface import Status
-from sweep.analysis.exponents import fit_exponent
 
 LIGHT = 0.01
 """Damping up to which delta = pi zeta to 5e-5."""
@@ -132,9 +132,9 @@ def counts(ds: xr.Dataset) -> list[Statement]:
     worst = float((abs(light.N - light.law) / allowed).max())
     off = float(abs(light.N - light.law).max())
     solid, viscous = ds.isel(zeta=0), ds.isel(r=0)
-    few = fit_exponent(solid.N.where(solid.x < 0.1, drop=True), "r")
+    few = sweep.fit_exponent(solid.N.where(solid.x < 0.1, drop=True), "r")
     many = viscous.where((viscous.zeta < 0.1) & (viscous.x > 100), drop=True)
-    steep = fit_exponent(many.N, "zeta")
+    steep = sweep.fit_exponent(many.N, "zeta")
     slope = float((1 / np.log1p(many.x) - 1).mean())  # dln(ln(1 + x)/zeta)/dlnzeta for x >> 1
     return [
         Statement(

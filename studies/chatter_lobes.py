@@ -60,7 +60,7 @@ def chains(ds: xr.Dataset) -> dict[int, dict[str, np.ndarray]]:
 
 def spindle(chain: dict[str, np.ndarray]) -> np.ndarray:
     """Receptance of the spindle at `FREQUENCIES` [rad/(N m)]."""
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="drivetrain_frf", axes={"drive_mass": [1]}, fixed={name: list(v) for name, v in chain.items()},
         along={"frequency": FREQUENCIES}, outputs=["receptance_re", "receptance_im"], rtol=1e-12,
     )  # fmt: skip

@@ -51,7 +51,7 @@ scatter for equal ones, whose gear gives way a little\
 
 def single(tau: Any, inertia: float, c: float, phi0: float, R: float = 0.0) -> xr.Dataset:
     """`foliot` with this moment of inertia and frictions c and R."""
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot", axes={"mu": (np.atleast_1d(tau) / inertia).tolist()}, rtol=1e-12,
         fixed={"a": c / inertia, "phi0": phi0, "R": R / inertia}, outputs=["period", "sensitivity"],
     )  # fmt: skip
@@ -76,7 +76,7 @@ def pair(ds: xr.Dataset, **changed: Any) -> xr.Dataset:
     known |= changed
     axes = {name: value for name, value in known.items() if isinstance(value, list)}
     fixed = {name: value for name, value in known.items() if name not in axes}
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="cross_beat_scene:KERNEL", design="zip", axes=axes, fixed=fixed, rtol=1e-8, outputs=["interval"],
         allow_import=True,
     )  # fmt: skip

@@ -51,7 +51,7 @@ def swept(chains: dict[str, np.ndarray], outputs: list[str], reduction: str = "n
     """One cell a chain; what else differs from cell to cell, or is the same of all, is in `more`."""
     fixed = {"reduction": reduction, "h": DAMPER} | {name: v for name, v in more.items() if np.ndim(v) == 0}
     axes = {name: v.tolist() for name, v in (chains | more).items() if np.ndim(v) > 0}
-    study = sweep.build_study(kernel="drivetrain", design="zip", rtol=1e-7, outputs=outputs, axes=axes, fixed=fixed)
+    study = sweep.study(kernel="drivetrain", design="zip", rtol=1e-7, outputs=outputs, axes=axes, fixed=fixed)
     return sweep.run(study, workers=1)
 
 

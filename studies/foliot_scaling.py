@@ -20,7 +20,6 @@ import xarray as xr
 from _common import Groups, Statement, columns, compared, differing, read_result, report
 
 import sweep
-from sweep.analysis.exponents import crossover, fit_exponent, local_exponent, where_exponent, where_value
 
 WEAK: tuple[float | None, float | None] = (None, 1e-5)
 STRONG: tuple[float | None, float | None] = (1e5, None)
@@ -71,7 +70,7 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
 def sweep_of_alpha(ds: xr.Dataset, alpha: Iterable[float], method: str = "closed") -> xr.Dataset:
     """`foliot` at other alpha, with the friction and the switching angle of `ds`."""
     unit = float(ds.a**2 * ds.phi0)
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot",
         method=method,
         axes={"mu": unit * np.asarray(list(alpha))},
@@ -82,9 +81,9 @@ def sweep_of_alpha(ds: xr.Dataset, alpha: Iterable[float], method: str = "closed
 
 def half_point(ds: xr.Dataset) -> HalfPoint:
     """Where s = 1/2, bracketed on the sweep and refined by a sweep of its neighbourhood."""
-    near = float(where_value(ds.s, "alpha", 0.5).abscissa)
+    near = float(sweep.where_exponent(ds.s, "alpha", 0.5, values=True).abscissa)
     close = sweep_of_alpha(ds, near * np.geomspace(0.99, 1.01, 21))
-    found = where_value(close.s, "alpha", 0.5)
+    found = sweep.where_exponent(close.s, "alpha", 0.5, values=True)
     there = sweep_of_alpha(ds, [float(found.abscissa)]).isel(mu=0)
     return HalfPoint(float(there.alpha), float(found.abscissa_error), float(there.aP), float(there.A))
 
@@ -121,15 +120,15 @@ def straight_lines(ds: xr.Dataset) -> list[Statement]:
     laws += [("A", ds.A, WEAK, "0 *", 0.0), ("A", ds.A, STRONG, "1/3 *", 1 / 3)]
     lines = []
     for name, y, window, paper, limit in laws:
-        fit = fit_exponent(y, "alpha", window)
+        fit = sweep.fit_exponent(y, "alpha", window)
         off = float(fit.exponent) - limit
         span = f"{float(fit.low):.1e} to {float(fit.high):.1e}"
         here = f"{float(fit.exponent):.7f} ± {float(fit.exponent_error):.1g}, prefactor {float(fit.prefactor):.5f}"
         what = f"exponent of {name}, alpha = {span} ({int(fit.points)} points)"
         lines.append(Statement(what, paper, here, off, abs(off) <= _curvature(fit, limit)))
-    meet = crossover(fit_exponent(ds.aP, "alpha", WEAK), fit_exponent(ds.aP, "alpha", STRONG))
-    here = f"alpha = {float(meet.abscissa):.5f} ± {float(meet.abscissa_error):.1g}, a P = {float(meet.ordinate):.4f}"
-    exact, off = "(3^(-1/2) = 0.57735, 6.9282)", float(meet.abscissa) * math.sqrt(3) - 1
+    meet = sweep.fit_two_laws(ds.aP, "alpha", windows=(WEAK, STRONG))
+    here = f"alpha = {float(meet.crossover):.5f} ± {float(meet.crossover_error):.1g}, a P = {float(meet.level):.4f}"
+    exact, off = "(3^(-1/2) = 0.57735, 6.9282)", float(meet.crossover) * math.sqrt(3) - 1
     lines.append(Statement("the two laws of a P meet at", exact, here, off, abs(off) < 0.01))
     return lines
 
@@ -141,11 +140,11 @@ def _curvature(fit: xr.Dataset, limit: float) -> float:
 
 def sliding(ds: xr.Dataset, half: HalfPoint) -> list[Statement]:
     """What becomes of the exponent in between."""
-    slope = local_exponent(ds.aP, "alpha")
+    slope = sweep.local_exponent(ds.aP, "alpha")
     rough = float(np.diff(np.log(ds.alpha)).max() ** 4)  # differences are of fourth order
     ends = float(slope.min()), float(slope.max())
     slides = bool((slope.diff("mu") > -rough).all()) and abs(ends[0] + 1) < 0.01 and abs(ends[1] + 1 / 3) < 0.01
-    by_period = where_exponent(ds.aP, "alpha", -0.5)
+    by_period = sweep.where_exponent(ds.aP, "alpha", -0.5)
     place, error = float(by_period.abscissa), float(by_period.abscissa_error)
     apart, near = float(abs(slope + ds.s).max()), float((abs(slope + 0.5) < 0.01).mean())
     off, found = place / HALF[0] - 1, (half.alpha, half.aP, half.A)
@@ -184,7 +183,7 @@ def weakest(ds: xr.Dataset) -> Statement:
     """A weak drive followed from rest in SI units, swing by swing; weaker ones take steps in proportion to 1/alpha."""
     weak = ds.isel(mu=int(np.argmin(abs(np.log(ds.alpha.values / 1e-3)))))
     mu, a, phi0 = float(weak.mu), float(ds.a), float(ds.phi0)
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot_scene:KERNEL", axes={"mu": [mu]}, fixed={"a": a, "phi0": phi0, "flips": 4}, rtol=1e-10,
         allow_import=True,
     )  # fmt: skip
@@ -196,11 +195,11 @@ def weakest(ds: xr.Dataset) -> Statement:
 def friction_exponent(ds: xr.Dataset, half: HalfPoint) -> float:
     """dlnP/dlna at the drive of exponent -1/2, by differences over a sweep of the friction alone."""
     a = float(ds.a) * np.exp(np.linspace(-0.02, 0.02, 9))
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot", method="closed", outputs=["period"], axes={"a": a},
         fixed={"mu": half.alpha * float(ds.a**2 * ds.phi0), "phi0": float(ds.phi0)},
     )  # fmt: skip
-    return float(local_exponent(sweep.run(study).period, "a")[4])
+    return float(sweep.local_exponent(sweep.run(study).period, "a")[4])
 
 
 def torque(ds: xr.Dataset) -> list[Statement]:
@@ -232,9 +231,9 @@ def inverse_design(ds: xr.Dataset) -> list[tuple[str, ...]]:
     period, degrees = (np.array(column) for column in zip(*WANTED, strict=True))
     wanted = {"period": period, "amplitude": np.radians(degrees)}
     fixed = {"phi0": float(ds.phi0)}
-    found = sweep.run(sweep.build_study(kernel="foliot_design", design="zip", axes=wanted, fixed=fixed, rtol=1e-13))
+    found = sweep.run(sweep.study(kernel="foliot_design", design="zip", axes=wanted, fixed=fixed, rtol=1e-13))
     axes = {"mu": found.mu.values, "a": found.a.values}
-    back = sweep.run(sweep.build_study(kernel="foliot", method="closed", design="zip", axes=axes, fixed=fixed))
+    back = sweep.run(sweep.study(kernel="foliot", method="closed", design="zip", axes=axes, fixed=fixed))
     rows = [("wanted P [s]", "phi_max [degree]", "a [1/s]", "mu [rad/s^2]", "P back, off by", "phi_max back, off by")]
     for i, (p, degree) in enumerate(WANTED):
         off = float(back.period[i]) / p - 1, float(back.amplitude[i]) / math.radians(degree) - 1
@@ -297,7 +296,7 @@ def energy(ds: xr.Dataset) -> list[Statement]:
     alpha = list(SHOWN.values())
     unit = float(ds.a**2 * ds.phi0)
     a, phi0 = float(ds.a), float(ds.phi0)
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot_motion", method="closed", outputs=["speed"], axes={"mu": unit * np.array(alpha)},
         along={"phase": np.linspace(0, 0.5, 4001)}, fixed={"a": a, "phi0": phi0},
     )  # fmt: skip
@@ -315,7 +314,7 @@ def energy(ds: xr.Dataset) -> list[Statement]:
     for value, s in zip(alpha, whole.s.values, strict=True):
         heavy = math.exp(0.01)  # moment of inertia: torque and friction over it fall
         moved = [
-            float(sweep.run(sweep.build_study(
+            float(sweep.run(sweep.study(
                 kernel="foliot", axes={"mu": [unit * value / inertia]}, fixed={"a": a / inertia, "phi0": phi0},
                 outputs=["period"],
             )).period[0]) for inertia in (1 / heavy, heavy)
@@ -362,7 +361,7 @@ def estimates(ds: xr.Dataset) -> list[Statement]:
 def trajectories(ds: xr.Dataset) -> xr.Dataset:
     """Motion over one period at the drives of `SHOWN`, and the period `aP` there."""
     unit = float(ds.a**2 * ds.phi0)
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot_motion", method="closed", outputs=["angle", "speed"],
         axes={"mu": unit * np.array(list(SHOWN.values()))}, along={"phase": np.linspace(0, 1, 801)},
         fixed={"a": float(ds.a), "phi0": float(ds.phi0)},
@@ -413,7 +412,7 @@ def draw_exponent(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
     """Local exponent by differences of ln P, the exact -s, and the drive at which it is -1/2."""
     from sweep.show.charts import COLOURS
 
-    slope = local_exponent(ds.aP, "alpha")
+    slope = sweep.local_exponent(ds.aP, "alpha")
     few = slice(None, None, max(1, slope.size // 56))
     for value in (-1, -1 / 2, -1 / 3):
         axes.axhline(value, color="0.6", linewidth=0.6, linestyle=(0, (4, 2)))

@@ -25,7 +25,6 @@ from _common import Groups, Statement, compared, differing, direct_label, hatch,
 
 import sweep
 from kernels.interface import Status
-from sweep.analysis.exponents import fit_exponent, local_exponent, where_exponent, where_value
 
 KNOWN = {10.0: (8.719, 0.27318), 100.0: (6.098, 0.17768)}
 """mu/R and s in the valley at R/(a^2 phi0), in 50-digit arithmetic."""
@@ -51,7 +50,7 @@ def ends(laws: xr.Dataset) -> list[Statement]:
         for name, value, window, edge in zip(
             "sl", limits(n), ((None, 1e-21), (1e21, None)), (1e-21, 1e21), strict=True
         ):
-            fit = fit_exponent(law.period, "mu", window)
+            fit = sweep.fit_exponent(law.period, "mu", window)
             what = f"n = {n:g}: exponent of P, {'small' if name == 's' else 'large'} mu"
             found.append(differing(what, f"-{_fraction(n, value)}", fit.exponent.item(), -value, next_term(n, edge), 9))
     return found
@@ -88,7 +87,7 @@ def exact(laws: xr.Dataset) -> list[Statement]:
 def viscous(law: xr.Dataset) -> Statement:
     """n = 1 by the integrals of any n, against the closed form of viscous friction."""
     fixed = {"a": float(law.c), "phi0": float(law.phi0)}
-    closed = sweep.run(sweep.build_study(kernel="foliot", method="closed", axes={"mu": law.mu.values}, fixed=fixed))
+    closed = sweep.run(sweep.study(kernel="foliot", method="closed", axes={"mu": law.mu.values}, fixed=fixed))
     off = max(float(abs(law[y] / closed[y] - 1).max()) for y in ("period", "amplitude", "sensitivity"))
     return Statement(
         "n = 1: P, amplitude, s against the viscous closed form", "0", "largest deviation", off, off < 1e-11
@@ -98,7 +97,7 @@ def viscous(law: xr.Dataset) -> Statement:
 def differences(laws: xr.Dataset) -> Statement:
     """The exact s against differences of ln P, for n >= 1; steps in ln alpha_n are 2/n - 1 times those in ln mu."""
     some = laws.sel(n=laws.n[laws.n >= 1])
-    off = float(abs(local_exponent(some.period, "mu") + some.sensitivity).max())
+    off = float(abs(sweep.local_exponent(some.period, "mu") + some.sensitivity).max())
     rough = float(np.diff(np.log(laws.mu)).max()) ** 4 / 4
     return Statement("differences of ln P against the exact s", "0", "largest distance", off, off < rough)
 
@@ -106,9 +105,9 @@ def differences(laws: xr.Dataset) -> Statement:
 def by_friction() -> list[Statement]:
     """dlnP/dlnc, by differences over a sweep of the friction alone."""
     axes = {"n": [0.5, 1.0, 3.0], "c": np.geomspace(0.9, 1.1, 9)}
-    study = sweep.build_study(kernel="foliot", rtol=1e-11, axes=axes, fixed={"mu": 1.5, "phi0": 1.0})
+    study = sweep.study(kernel="foliot", rtol=1e-11, axes=axes, fixed={"mu": 1.5, "phi0": 1.0})
     ds = sweep.run(study)
-    slope = local_exponent(ds.period, "c").isel(c=4)
+    slope = sweep.local_exponent(ds.period, "c").isel(c=4)
     theory = ((2 * ds.sensitivity - 1) / (2 - ds.n)).isel(c=4)
     found = []
     for n in ds.n.values:
@@ -121,19 +120,20 @@ def foliot(mu: Any, R: Any, design: str = "product") -> xr.Dataset:
     """Viscous and Coulomb friction at other mu and R."""
     axes = {"mu": np.atleast_1d(mu), "R": np.atleast_1d(R)}
     fixed = {"a": 1.0, "phi0": 1.0}
-    return sweep.run(sweep.build_study(kernel="foliot", design=design, axes=axes, fixed=fixed))
+    return sweep.run(sweep.study(kernel="foliot", design=design, axes=axes, fixed=fixed))
 
 
 def valley(grid: xr.Dataset) -> xr.Dataset:
     """The best torque at every R of the map above the threshold: `mu`, `R`, `sensitivity` along `cell`."""
-    place = where_exponent(grid.sensitivity.where(grid.R > 1, drop=True), "mu", 0.0).abscissa
+    place = sweep.where_exponent(grid.sensitivity.where(grid.R > 1, drop=True), "mu", 0.0).abscissa
     place = place.where(place.notnull(), drop=True)
     return foliot(place.values, place.R.values, "zip")
 
 
 def threshold() -> float:
     """R at which s leaves 1/3 upwards and downwards alike as mu grows without end."""
-    return where_value(foliot(1e8, np.linspace(0.7, 0.9, 9)).isel(mu=0).sensitivity, "R", 1 / 3).abscissa.item()
+    s = foliot(1e8, np.linspace(0.7, 0.9, 9)).isel(mu=0).sensitivity
+    return sweep.where_exponent(s, "R", 1 / 3, values=True).abscissa.item()
 
 
 def best(grid: xr.Dataset, line: xr.Dataset) -> list[Statement]:
@@ -166,7 +166,7 @@ def far(line: xr.Dataset) -> list[Statement]:
         ("s", s, "-1/3, (3/2)^(1/3) = 1.1447", -1 / 3, 1.5 ** (1 / 3)),
         ("mu/R", drive, "1/6, 18^(1/6) = 1.6189", 1 / 6, 18 ** (1 / 6)),
     ):
-        fit = fit_exponent(y, "R", (1e7, None))
+        fit = sweep.fit_exponent(y, "R", (1e7, None))
         off, last = fit.exponent.item() - power, float(y[-1] / R[-1] ** power)
         here = f"{fit.exponent.item():.4f}, {last:.4f}"
         fits = abs(off) < 0.01 and abs(last / prefactor - 1) < 0.01

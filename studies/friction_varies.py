@@ -96,7 +96,7 @@ def averages(ds: xr.Dataset) -> xr.Dataset:
     """dlnP/ddepth, `effect`, and what means of the friction over angle, time or energy would make of it."""
     up, down = (ds.interval.sel(depth=sign * SMALL, method="nearest") for sign in (1, -1))
     effect = (up - down) / (2 * SMALL * ds.interval.sel(depth=0, method="nearest"))
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot_motion", axes={"mu": ds.mu.values}, fixed={"a": 1.0, "phi0": 1.0},
         along={"phase": np.linspace(0.0, 0.5, 4001)},
     )  # fmt: skip
@@ -111,15 +111,13 @@ def averages(ds: xr.Dataset) -> xr.Dataset:
 
 def cycles(mu: Any, a: float = 1.0) -> xr.Dataset:
     """The foliot with even friction."""
-    return sweep.run(sweep.build_study(kernel="foliot", axes={"mu": list(mu)}, fixed={"a": a, "phi0": 1.0}, rtol=1e-12))
+    return sweep.run(sweep.study(kernel="foliot", axes={"mu": list(mu)}, fixed={"a": a, "phi0": 1.0}, rtol=1e-12))
 
 
 def gain(mu: float, viscosity: Any) -> np.ndarray:
     """Rate [s/day] against the clock at viscosity 1, by the friction of each."""
     a = np.atleast_1d(viscosity)
-    study = sweep.build_study(
-        kernel="foliot", axes={"a": a}, fixed={"mu": mu, "phi0": 1.0}, rtol=1e-12, outputs=["period"]
-    )
+    study = sweep.study(kernel="foliot", axes={"a": a}, fixed={"mu": mu, "phi0": 1.0}, rtol=1e-12, outputs=["period"])
     periods = sweep.run(study).period.values
     return DAY * (float(cycles([mu]).period[0]) / periods - 1)
 

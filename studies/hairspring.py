@@ -26,7 +26,6 @@ from _common import Groups, Statement, columns, compared, differing, direct_labe
 
 import sweep
 from kernels.interface import Status
-from sweep.analysis.exponents import fit_exponent, local_exponent, where_exponent, where_value
 
 SHOWN = (1e6, 1e4, 1e2, 1.0)
 """alpha of the lines in the figure."""
@@ -53,7 +52,7 @@ def at(alpha: Any, kappa: Any, design: str = "product") -> xr.Dataset:
     """The same foliot at other alpha and kappa, by one method: near the last spring with a cycle it is INACCURATE."""
     axes = {"a": np.atleast_1d(alpha) ** -0.5, "k": np.atleast_1d(kappa)}
     keys = {"kernel": "foliot", "method": "segments", "rtol": 1e-7, "design": design}
-    study = sweep.build_study(**keys, axes=axes, fixed={"mu": 1.0, "phi0": 1.0})
+    study = sweep.study(**keys, axes=axes, fixed={"mu": 1.0, "phi0": 1.0})
     return scaled(sweep.run(study))
 
 
@@ -73,8 +72,8 @@ def laws(ds: xr.Dataset) -> list[Statement]:
     strong = lines(ds, ds.alpha.max())
     alpha, bare = float(strong.alpha), at(strong.alpha.values, 0.0).s.item()
     window = 10.0, 1000.0
-    fall = fit_exponent(strong.s, "kappa", window)
-    by_drive = fit_exponent(ds.s.sel(k=100.0, method="nearest"), "alpha", (1e5, None))
+    fall = sweep.fit_exponent(strong.s, "kappa", window)
+    by_drive = sweep.fit_exponent(ds.s.sel(k=100.0, method="nearest"), "alpha", (1e5, None))
     middle = strong.sel(k=100.0, method="nearest")
     theory = float(first_order(alpha, middle.kappa.item()))
     slack = (math.pi / 16) * math.sqrt(window[1] / alpha) + 1 / window[0] ** 1.75  # of (1), and of the next order
@@ -94,7 +93,7 @@ def laws(ds: xr.Dataset) -> list[Statement]:
 def agreement(ds: xr.Dataset) -> Statement:
     """The exact s against differences of ln P: P sqrt(mu/phi0) is a function of a sqrt(phi0/mu) and kappa."""
     inner = ds.where((ds.alpha > 99) & (ds.kappa < 10), drop=True)
-    by_a, by_k = local_exponent(inner.period, "a"), local_exponent(inner.period, "k")
+    by_a, by_k = sweep.local_exponent(inner.period, "a"), sweep.local_exponent(inner.period, "k")
     off = float(abs(0.5 + by_a / 2 + by_k - inner.s).max())
     rough = float(np.diff(np.log(ds.k)).max() ** 4) / 4  # differences are of fourth order
     return Statement("differences of ln P against the exact s", "0", "largest distance", off, off < rough)
@@ -103,7 +102,7 @@ def agreement(ds: xr.Dataset) -> Statement:
 def best_springs(ds: xr.Dataset) -> xr.Dataset:
     """The springs of least sensitivity at the drives of the grid from alpha = 10 on; `blur`: error of interpolation."""
     strong = ds.where(ds.alpha > 9.99, drop=True)
-    place = where_exponent(strong.s, "kappa", 0.0)
+    place = sweep.where_exponent(strong.s, "kappa", 0.0)
     found = at(strong.alpha.values, place.abscissa.values, "zip")
     return found.assign(blur=("cell", (place.abscissa_error / place.abscissa).values))
 
@@ -151,7 +150,7 @@ def envelope(Q: float) -> Statement:
     """The least sensitivity at given Q."""
     kappa = np.geomspace(Q / 10, Q, 61)
     ds = at(Q**2 / kappa, kappa, "zip")
-    place = where_exponent(ds.s, "kappa", 0.0).abscissa.item()
+    place = sweep.where_exponent(ds.s, "kappa", 0.0).abscissa.item()
     cell = at(Q**2 / place, place).isel(a=0, k=0)
     return compared(
         f"least s Q at Q = {Q:g}, there kappa/Q = {place / Q:.4f}", "1/2", float(cell.s * cell.Q), 0.5, 3 / Q, 6
@@ -190,7 +189,7 @@ def wanted(line: xr.Dataset, least: xr.Dataset, s: float) -> str:
     """The spring for a sensitivity at one drive: kappa and Q; * where it is not self-starting."""
     if not s > float(least.s):
         return "out of reach"
-    kappa = where_value(line.s, "kappa", s, (None, float(least.kappa))).abscissa.item()
+    kappa = sweep.where_exponent(line.s, "kappa", s, (None, float(least.kappa)), values=True).abscissa.item()
     cell = at(line.alpha.item(), kappa).isel(a=0, k=0)
     return f"{kappa:.3g}, {float(cell.Q):.3g}" + "*" * int(cell.status == Status.NOT_SELF_STARTING)
 

@@ -81,7 +81,7 @@ def plastic(closed: xr.Dataset) -> list[Statement]:
     fixed["drop"] = math.pi / float(stuck.teeth) - 2 * n * phi0
     periods = []
     for flips in (3000, 3002):  # an even number: the last event is a landing
-        study = sweep.build_study(
+        study = sweep.study(
             kernel="verge_scene:KERNEL", axes=axes, fixed=fixed | {"flips": flips}, rtol=1e-10, allow_import=True
         )
         periods.append(2 * sweep.run(study).clock.values)

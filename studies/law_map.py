@@ -103,9 +103,7 @@ def pure_laws() -> list[Statement]:
     lines = []
     for n in (0.25, 1.5, 2.0, 4.0):
         axes = {"mu": np.geomspace(1e-30, 1e30, 3)}
-        study = sweep.build_study(
-            kernel="foliot", axes=axes, fixed={"n": n, "c": 1.0, "phi0": 1.0}, outputs=["sensitivity"]
-        )
+        study = sweep.study(kernel="foliot", axes=axes, fixed={"n": n, "c": 1.0, "phi0": 1.0}, outputs=["sensitivity"])
         s = sweep.run(study).sensitivity.values
         weak, strong = (s[0], s[-1]) if n < 2 else (s[-1], s[0])
         off = max(abs(weak - 1 / n), abs(strong - n / (n + 2)))
@@ -119,7 +117,7 @@ def best_torques() -> list[Statement]:
     lines = []
     for R, least, place in ((10.0, 0.27318, 8.719), (100.0, 0.17768, 6.098)):
         mu = R * np.geomspace(1.5, 60, 400)
-        study = sweep.build_study(kernel="foliot", axes={"mu": mu}, fixed={"a": 1.0, "R": R, "phi0": 1.0}, rtol=1e-12)
+        study = sweep.study(kernel="foliot", axes={"mu": mu}, fixed={"a": 1.0, "R": R, "phi0": 1.0}, rtol=1e-12)
         s = sweep.run(study).sensitivity.values
         k = int(s.argmin())
         fit = np.polyfit(np.log(mu[k - 2 : k + 3]), s[k - 2 : k + 3], 2)
@@ -201,7 +199,7 @@ def plane() -> xr.Dataset:
         "mu": {"spacing": "log", "start": 1e-3, "stop": 1e8, "num": 661},
     }
     outputs = ["amplitude", "crossing_speed", "sensitivity"]
-    return prepared(sweep.run(sweep.build_study(kernel="foliot", axes=axes, fixed=PLANE, rtol=1e-7, outputs=outputs)))
+    return prepared(sweep.run(sweep.study(kernel="foliot", axes=axes, fixed=PLANE, rtol=1e-7, outputs=outputs)))
 
 
 def figure(ds: xr.Dataset, whole: xr.Dataset) -> Any:
@@ -280,7 +278,7 @@ def draw_degrees(axes: Any) -> None:
     axes.axhline(0.5, color=COLOURS[2], linewidth=0.8, linestyle=":", label="impacts, 1/2")
     for degree in (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0):
         axes_mu = {"mu": np.geomspace(1e-30, 1e30, 3)}
-        study = sweep.build_study(
+        study = sweep.study(
             kernel="foliot", axes=axes_mu, fixed={"n": degree, "c": 1.0, "phi0": 1.0}, outputs=["sensitivity"]
         )
         ends = sweep.run(study).sensitivity.values[[0, -1]]

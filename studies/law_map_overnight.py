@@ -113,7 +113,7 @@ def borders(fine: xr.Dataset) -> list[Statement]:
     }
     here = sweep.interpolated(fine, at).sensitivity
     fixed = {name: float(fine[name]) for name in ("a", "e", "n", "phi0")}
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot", axes={k: sorted(v) for k, v in at.items()}, fixed=fixed, rtol=1e-8, outputs=["sensitivity"]
     )
     true = sweep.run(study).sensitivity

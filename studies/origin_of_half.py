@@ -28,7 +28,6 @@ import xarray as xr
 from _common import Groups, Statement, compared, differing, direct_label, read_result, report
 
 import sweep
-from sweep.analysis.exponents import fit_exponent, local_exponent, where_value
 
 E = 0.8
 """Restitution of impacts."""
@@ -87,7 +86,7 @@ def part(ds: xr.Dataset, mixture: Mixture) -> xr.Dataset:
     if mixture.coulomb == "proportional":
         along = xr.DataArray(line.R.values[1:], dims="mu")
         line = line.sel(R=along, mu=along / RHO, method="nearest")
-        return line.assign(slope=local_exponent(line.period, "mu"))
+        return line.assign(slope=sweep.local_exponent(line.period, "mu"))
     line = line.sel(R=FIXED if mixture.coulomb == "fixed" else 0.0)
     line = line.isel(mu=line.sensitivity.notnull().values)
     return line.assign(slope=-line.sensitivity)
@@ -104,7 +103,7 @@ def followed(torques: Sequence[float] = TORQUES) -> dict[Mixture, xr.Dataset]:
     }
     axes = {"mu": mu} | {name: np.repeat(values, len(torques)) for name, values in of.items()}
     axes["R"] = axes["R"] * mu
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot_scene:KERNEL", design="zip", axes=axes, fixed={"phi0": 1.0, "flips": 120}, rtol=1e-10,
         allow_import=True,
     )  # fmt: skip
@@ -155,7 +154,7 @@ def never_half(ds: xr.Dataset) -> list[Statement]:
 def agreement(ds: xr.Dataset) -> Statement:
     """The exact s against differences of ln P."""
     lines = [part(ds, m) for m in MIXTURES if m.coulomb == "none"]
-    off = max(float(abs(local_exponent(line.period, "mu") - line.slope).max()) for line in lines)
+    off = max(float(abs(sweep.local_exponent(line.period, "mu") - line.slope).max()) for line in lines)
     rough = float(np.diff(np.log(ds.mu)).max() ** 4) / 4
     return Statement("differences of ln P against the exact s", "0", "largest distance", off, off < rough)
 
@@ -184,10 +183,10 @@ def prefactors(found: dict[Mixture, xr.Dataset]) -> list[Statement]:
 def slight_impacts() -> Statement:
     """The drive at which slight impacts take the viscous foliot from -1/3 on to -1/2, by their loss 1 - e^2."""
     e, mu = 1 - np.array([0.01, 0.003, 0.001]), np.geomspace(1e2, 1e14, 241)
-    study = sweep.build_study(kernel="foliot", rtol=1e-9, axes={"e": e, "mu": mu}, fixed={"a": 1.0, "phi0": 1.0})
-    place = where_value(sweep.run(study).sensitivity, "mu", 5 / 12).abscissa
+    study = sweep.study(kernel="foliot", rtol=1e-9, axes={"e": e, "mu": mu}, fixed={"a": 1.0, "phi0": 1.0})
+    place = sweep.where_exponent(sweep.run(study).sensitivity, "mu", 5 / 12, values=True).abscissa
     place = xr.DataArray(place.values, {"loss": 1 - e**2}, ("loss",), "alpha")
-    fit = fit_exponent(place, "loss")
+    fit = sweep.fit_exponent(place, "loss")
     what = f"viscous + impact: s = 5/12 at alpha = {float(place[0]):.3g} (e = 0.99), {float(place[-1]):.3g} (0.999)"
     return differing(f"{what}: ~ (1 - e^2)^x", "-3", fit.exponent.item(), -3, 0.02, 5)
 

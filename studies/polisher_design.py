@@ -80,9 +80,7 @@ def machines_on(b: Any, d: float, f: Any) -> xr.Dataset:
     motor, coupler = np.meshgrid(b, f, indexing="ij")
     there = reaches(motor, d, coupler) & (crank_at_border(motor, d, coupler) > 0)
     axes = {"b": motor[there], "f": coupler[there], "e": crank_of(motor[there], d, coupler[there])}
-    found = sweep.run(
-        sweep.build_study(kernel="polisher", design="zip", axes=axes, fixed={"d": d}, outputs=names, rtol=1e-6)
-    )
+    found = sweep.run(sweep.study(kernel="polisher", design="zip", axes=axes, fixed={"d": d}, outputs=names, rtol=1e-6))
     made = xr.Dataset(coords={"b": b, "f": f, "d": d})
     for name, values in {"crank": axes["e"], **{name: found[name].values for name in names}}.items():
         whole = np.full(there.shape, math.nan)
@@ -142,7 +140,7 @@ def quality(machines: xr.Dataset) -> list[Statement]:
 
 def exactly(machine: xr.Dataset, d: float) -> xr.Dataset:
     """The machine solved itself, not interpolated between cranks."""
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="polisher", axes={"e": [float(machine.crank)]}, outputs=["A1", "thd"], rtol=1e-10,
         fixed={"b": float(machine.b), "d": d, "f": float(machine.f)},
     )  # fmt: skip
@@ -153,7 +151,7 @@ def similar(machine: xr.Dataset, d: float) -> Statement:
     """Only ratios of lengths count: a shorter arm is better as a farther motor is, and by no more."""
     lengths = {"b": float(machine.b), "d": d, "f": float(machine.f), "e": float(machine.crank)}
     axes = {name: [value, 0.789 * value] for name, value in lengths.items()}
-    one, other = sweep.run(sweep.build_study(kernel="polisher", design="zip", axes=axes, rtol=1e-12)).thd.values
+    one, other = sweep.run(sweep.study(kernel="polisher", design="zip", axes=axes, rtol=1e-12)).thd.values
     return differing("distortion of a machine 0.789 times as large", f"{one:.6f}", float(other), float(one), 1e-12, 6)
 
 

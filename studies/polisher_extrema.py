@@ -138,7 +138,7 @@ def statements(ds: xr.Dataset) -> Groups:
 
 def motions(ds: xr.Dataset) -> xr.Dataset:
     """The arm's angle from the x axis over a turn, for the eccentricities shown."""
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="polisher_motion",
         axes={"e": list(SHOWN)},
         fixed={name: float(ds[name]) for name in "bdf"} | {"omega": 1.0, "b_angle": B_ANGLE},

@@ -102,7 +102,7 @@ def correction(ds: xr.Dataset) -> list[Statement]:
     kept = middle(d, 0.10, b, f)
     exact = brentq(lambda x: middle(x, 0.15, b, f) - kept, 0.37, 0.45, xtol=1e-14)
     # the kernel's own angles there, and its slopes for small steps
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="polisher", design="zip", axes={"d": [d, exact, d], "e": [0.10, 0.15, 0.15]}, fixed={"b": b, "f": f}
     )
     cells = sweep.run(study)
@@ -127,7 +127,7 @@ def mirrored(ds: xr.Dataset) -> list[Statement]:
         turned = {"b_angle": sign * fixed["b_angle"]}
         if kind == "B":
             turned |= {"omega": -fixed["omega"], "Omega": -fixed["Omega"]}
-        study = sweep.build_study(
+        study = sweep.study(
             kernel="polisher_wear", axes=axes, fixed=fixed | turned | {"type": kind[0]}, along=along, rtol=1e-7
         )
         profiles.append(sweep.run(study).wear.values.ravel())
@@ -161,7 +161,7 @@ def draw_machines(axes: Any, ds: xr.Dataset) -> None:
 
     b, d = float(ds.b), float(ds.d)
     turn = 1.0
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="polisher_motion", axes={"type": ["A", "B"]}, along={"crank_angle": np.array([turn])},
         fixed={"b": b, "d": d, "f": float(ds.f), "e": 0.1, "omega": 1.0}, outputs=["alpha"],
     )  # fmt: skip

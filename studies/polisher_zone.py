@@ -47,7 +47,7 @@ allowed: no exception to (1), beside which no cell lies; 2e-3 of (2), what trape
 def swings(ds: xr.Dataset) -> xr.Dataset:
     """alpha [rad] and its rate [rad/s] over a turn of the crank, by throw."""
     fixed = {name: float(ds[name]) for name in ("b", "d", "f", "omega", "b_angle")}
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="polisher_motion", axes={"e": ds.e.values.tolist()}, fixed=fixed, outputs=["alpha", "alpha_rate"],
         along={"crank_angle": np.linspace(0, 2 * np.pi, TURN, endpoint=False)}, rtol=1e-12,
     )  # fmt: skip
@@ -105,10 +105,10 @@ def zones(ds: xr.Dataset) -> list[Statement]:
 def corrected(ds: xr.Dataset) -> list[Statement]:
     """O_DH turned so that the middle stays when the throw goes from 10 to 15 cm."""
     fixed = {name: float(ds[name]) for name in ("b", "d", "f")}
-    study = sweep.build_study(kernel="polisher", axes={"e": [0.10, 0.15]}, fixed=fixed, outputs=["A0"], rtol=1e-12)
+    study = sweep.study(kernel="polisher", axes={"e": [0.10, 0.15]}, fixed=fixed, outputs=["A0"], rtol=1e-12)
     first, second = np.degrees(sweep.run(study).A0.values)
     beta = first - second
-    put = sweep.build_study(
+    put = sweep.study(
         kernel="polisher_motion", axes={"e": [0.10, 0.15]}, outputs=["alpha"],
         fixed=fixed | {"omega": 1.0, "b_angle": float(ds.b_angle)},
         along={"crank_angle": np.linspace(0, 2 * np.pi, TURN, endpoint=False)},

@@ -48,7 +48,7 @@ def statements(ds: xr.Dataset) -> Groups:
     gained = int((rough & ~smooth).sum())
     within = lost.where(ds.mu > np.maximum(ds.R + ds.k * ds.phi0, ds.R_s + ds.k * ds.phi_start), False)
     bare = sweep.run(
-        sweep.build_study(
+        sweep.study(
             kernel="foliot_start", axes={"mu": np.geomspace(1e-6, 1e2, 9), "phi_start": [-0.9, 0.0, 0.9]},
             fixed={"phi0": 1.0, "a": 1.0}, along={"flip": [1, 2]}, rtol=1e-9,
         )

@@ -133,7 +133,7 @@ def with_truth(ds: xr.Dataset) -> xr.Dataset:
     A period here is twice the time between the last two flips.
     """
     axis = swept(ds)
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot_start",
         rtol=1e-11,
         outputs=["flip_time"],
@@ -195,7 +195,7 @@ def hard(method: str, step: float = 0.02) -> list[str]:
     axes = {name: [cell.get(name, 0.0) for cell in CASES.values()] for name in names}
     fixed = {"phi0": 1.0, "step": step, "flips": 60.0}
     ds = sweep.run(
-        sweep.build_study(kernel="foliot_steps", method=method, rtol=1e-6, design="zip", axes=axes, fixed=fixed),
+        sweep.study(kernel="foliot_steps", method=method, rtol=1e-6, design="zip", axes=axes, fixed=fixed),
         progress=False,
     )
     return [

@@ -27,7 +27,6 @@ import xarray as xr
 from _common import Groups, Statement, compared, differing, direct_label, read_result, report
 
 import sweep
-from sweep.analysis.exponents import fit_exponent, local_exponent
 
 MODELS = ("two bodies", "kept share", "viscous")
 
@@ -57,7 +56,7 @@ def together(impact: xr.Dataset, denny: xr.Dataset, viscous: xr.Dataset) -> xr.D
         part = one[["period", "amplitude", "multiplier"]].reset_coords(drop=True).rename(mu="torque")
         parts.append(part.assign_coords(torque=impact.torque))
     ds = xr.concat(parts, xr.DataArray(list(MODELS), dims="model", name="model"), combine_attrs="drop_conflicts")
-    ds = ds.assign(exponent=local_exponent(ds.period, "torque"))
+    ds = ds.assign(exponent=sweep.local_exponent(ds.period, "torque"))
     ds.attrs = {"title": "Period against torque in three models of a verge and foliot"}
     unit = float(viscous.a**2 * viscous.phi0) / _drive(impact)
     return ds.assign(viscous_unit=xr.DataArray(unit, attrs={"units": "N m", "long_name": "torque of alpha = 1"}))
@@ -90,7 +89,7 @@ def in_si(impact: xr.Dataset, denny: xr.Dataset) -> dict[str, xr.Dataset]:
 
 
 def _followed(scene: str, axes: dict[str, list[float]], fixed: dict[str, float]) -> xr.Dataset:
-    study = sweep.build_study(kernel=f"{scene}:KERNEL", rtol=1e-10, axes=axes, fixed=fixed, allow_import=True)
+    study = sweep.study(kernel=f"{scene}:KERNEL", rtol=1e-10, axes=axes, fixed=fixed, allow_import=True)
     return sweep.run(study)
 
 
@@ -98,7 +97,7 @@ def laws(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> list[Statement]:
     """Exponents of the three models; the kernels beside what was followed."""
     found = []
     for name, one in followed.items():
-        fit = fit_exponent(one.period, "torque")
+        fit = sweep.fit_exponent(one.period, "torque")
         found.append(differing(f"exponent, {name}, in SI units", "-1/2", float(fit.exponent), -0.5, 1e-8))
         kernel = np.exp(np.interp(np.log(IN_SI), np.log(ds.torque), np.log(ds.period.sel(model=name))))
         off = float(abs(one.period / kernel - 1).max())
@@ -136,7 +135,7 @@ def swings(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> list[Statement]:
 def with_spring() -> list[Statement]:
     """Restitution and a hairspring, no friction: the swing by energy, and by the kernel."""
     mu = np.array([0.6, 6.0, 60.0])
-    study = sweep.build_study(kernel="foliot", rtol=1e-10, axes={"mu": mu}, fixed={"phi0": 1, "e": KEPT, "k": SPRING})
+    study = sweep.study(kernel="foliot", rtol=1e-10, axes={"mu": mu}, fixed={"phi0": 1, "e": KEPT, "k": SPRING})
     kernel = sweep.run(study).amplitude
     kept = KEPT**2 * 4 * mu / (1 - KEPT**2)  # square of the speed behind the switch
     theory = (-mu + np.sqrt(mu**2 + 2 * SPRING * (mu + SPRING / 2 + kept / 2))) / SPRING

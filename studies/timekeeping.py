@@ -49,7 +49,7 @@ LINEAR = 0.3
 def without_noise(ds: xr.Dataset) -> xr.Dataset:
     """The clock's cycle on steady torque."""
     fixed = {name: float(ds[name]) for name in ("phi0", "a", "k")}
-    return sweep.run(sweep.build_study(kernel="foliot", rtol=1e-9, axes={"mu": [float(ds.mu)]}, fixed=fixed)).isel(mu=0)
+    return sweep.run(sweep.study(kernel="foliot", rtol=1e-9, axes={"mu": [float(ds.mu)]}, fixed=fixed)).isel(mu=0)
 
 
 def read(path: str, toml: str) -> xr.Dataset:

@@ -94,7 +94,7 @@ def one_body(ds: xr.Dataset) -> list[Statement]:
         a = float(line.c_v / line.I_v) / (1 + kappa)
         fixed = {"a": a, "phi0": float(line.phi0), "e": (1 - kappa) / (1 + kappa)}
         mu = (line.n * line.tau / (line.I_v * (1 + line.kappa))).values
-        one = sweep.run(sweep.build_study(kernel="foliot", axes={"mu": mu}, fixed=fixed, outputs=["period"]))
+        one = sweep.run(sweep.study(kernel="foliot", axes={"mu": mu}, fixed=fixed, outputs=["period"]))
         off = max(off, float(abs(line.period.values / one.period.values - 1).max()))
     share = float(ds["drop"] / (2 * ds.n * ds.phi0))
     what = "one body that keeps (1 - kappa)/(1 + kappa): period"

@@ -144,7 +144,7 @@ def draw(axes: Any, found: xr.Dataset) -> None:
 def charted(path: Path, cells: int, tolerances: Sequence[float]) -> list[xr.Dataset]:
     """Every method on the cells of each study file that stands beside the first."""
     files = [path.with_name(f"{path.stem}{part}.toml") for part in PARTS]
-    return [work_precision(sweep.read_study(file), cells=cells, tolerances=tolerances) for file in files]
+    return [work_precision(sweep.study(file), cells=cells, tolerances=tolerances) for file in files]
 
 
 def conclude(path: str, cells: int = 4096, tolerances: Sequence[float] = TOLERANCES) -> tuple[Groups, list[str], Any]:

@@ -65,7 +65,7 @@ def _oracle(name: str) -> Any:
 
 def charted(path: Path, cells: int, tolerances: Sequence[float]) -> xr.Dataset:
     """Every method at every tolerance on the cells of a study file."""
-    study = sweep.read_study(path)
+    study = sweep.study(path)
     return work_precision(study, cells=cells, tolerances=tolerances, truth=cycles(study, cells))
 
 
@@ -73,7 +73,7 @@ def peers(path: Path, tolerances: Sequence[float]) -> dict[str, xr.Dataset]:
     """Others on some cells of the study with Coulomb friction, by name; none where truth is not at hand."""
     from _peers import FOLLOWERS
 
-    study = sweep.read_study(path)
+    study = sweep.study(path)
     cells, true = precision_cells(study, PEER_CELLS), cycles(study, PEER_CELLS)
     if true is None:
         return {}
@@ -112,7 +112,7 @@ def stepped(path: Path) -> xr.Dataset | None:
     oracle = _oracle("scene_oracles")
     if oracle is None:
         return None
-    ds = sweep.run(sweep.read_study(path))
+    ds = sweep.run(sweep.study(path))
     fixed = [float(ds[name]) for name in ("phi0", "a", "c")]
     true = [float(oracle.quadratic_foliot(float(mu), *fixed, int(ds.flips))[0]) for mu in ds.mu]
     error = abs(ds.time / xr.DataArray(true, dims="mu") - 1)

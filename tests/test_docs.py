@@ -30,7 +30,7 @@ def octave(tmp_path):
     """Runs a script beside result.h5; gives what it prints, and the result."""
     if not shutil.which("octave-cli"):
         pytest.skip("octave is not installed")
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot",
         axes={"mu": {"spacing": "log", "start": 0.1, "stop": 10.0, "num": 7}, "R": [0.0, 0.5, 2.0]},
         fixed={"a": 1.0, "phi0": 1.0},

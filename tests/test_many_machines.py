@@ -52,7 +52,7 @@ def test_a_client_of_two_processes_here_gives_the_same_result(tmp_path):
         text=True, timeout=300,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    study = sweep.read_study(ROOT / "studies" / "foliot_scaling.toml")
+    study = sweep.study(ROOT / "studies" / "foliot_scaling.toml")
     with sweep.open_result(tmp_path / "foliot_scaling.h5", strict=True) as found:
         here = sweep.run(study, progress=False)
         for name in here.data_vars:

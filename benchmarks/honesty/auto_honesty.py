@@ -79,7 +79,7 @@ def solve(case, columns, rtol, outputs):
     """Outputs and statuses of `auto`."""
     along = {name: {"values": list(values)} for name, values in case.along.items()}
     axes = {**{name: column.tolist() for name, column in columns.items()}, "rtol": rtol}
-    study = sweep.build_study(
+    study = sweep.study(
         kernel=case.kernel, design="zip", method="auto", axes=axes, fixed=dict(case.fixed), along=along, outputs=outputs
     )
     values, status, used, _ = solved(study)

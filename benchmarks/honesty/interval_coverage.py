@@ -87,7 +87,7 @@ def bends(t: np.ndarray) -> dict[str, tuple[np.ndarray, float]]:
 def foliot(points: int) -> tuple[np.ndarray, np.ndarray]:
     """ln of drive and period; laws -1 and -1/3."""
     axis = {"spacing": "log", "start": 1e-4, "stop": 1e4, "num": points}
-    study = sweep.build_study(kernel="foliot", axes={"mu": axis}, fixed={"a": 1.0, "phi0": 1.0}, outputs=["period"])
+    study = sweep.study(kernel="foliot", axes={"mu": axis}, fixed={"a": 1.0, "phi0": 1.0}, outputs=["period"])
     found = sweep.run(study, progress=False)
     return np.log(found.mu.values), np.log(found.period.values)
 
@@ -267,13 +267,14 @@ def bounds(sets: int, rng: np.random.Generator) -> Iterator[str]:
     z = LOW * t + (HIGH - LOW) * np.logaddexp(0, t) + 1e-3 * rng.uniform(-1, 1, (sets, t.size))
     y = curve(t, z, rtol=1e-3)
     off = abs(sweep.local_exponent(y, "x") - (LOW + (HIGH - LOW) / (1 + np.exp(-t))))
-    told = sweep.local_exponent_error(y, "x")
+    told = sweep.local_exponent(y, "x", error=True).exponent_error
     yield line("local exponent, right to 1e-3", (off <= told).values, float(2 * told.median()))
     straight = curve(t, -0.5 * t + 1e-3 * rng.uniform(-1, 1, (sets, t.size)), rtol=1e-3)
     found = sweep.fit_exponent(straight, "x")
     yield line("one law, right to 1e-3", holds(found, -0.5), width(found))
     noisy = curve(t, -0.5 * t + 0.01 * rng.standard_normal((sets, t.size)))
-    off, told = abs(sweep.local_exponent(noisy, "x") + 0.5), sweep.local_exponent_error(noisy, "x")
+    local = sweep.local_exponent(noisy, "x", error=True)
+    off, told = abs(local.exponent + 0.5), local.exponent_error
     yield line("local exponent, noise", (off <= told).values, float(2 * told.median()))
 
 

@@ -30,7 +30,7 @@ ROUNDS = 5
 def foliot(method: str, cells: int, **keys: object) -> Study:
     """A foliot with viscous friction, from weak to strong drive; the cost of a cell grows along the axis for `map`."""
     drives = np.geomspace(1e-4, 1e6, max(cells // 100, 2))
-    return sweep.build_study(
+    return sweep.study(
         kernel="foliot",
         method=method,
         axes={"mu": drives, "a": np.geomspace(0.1, 10, 100)},

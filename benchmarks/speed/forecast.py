@@ -44,7 +44,7 @@ Build = Callable[[int], Study]
 def foliot(**keys: Any) -> Study:
     """A study of the foliot's period."""
     rtol = {} if "rtol" in keys["axes"] else {"rtol": 1e-6}
-    return sweep.build_study(**{"kernel": "foliot", "outputs": ["period"], "fixed": FIXED, **rtol, **keys})
+    return sweep.study(**{"kernel": "foliot", "outputs": ["period"], "fixed": FIXED, **rtol, **keys})
 
 
 def drives(count: int) -> Any:
@@ -78,7 +78,7 @@ KINDS: dict[str, Build] = {
         axes={"mu": drives(n), "R": FRICTION},
         summary={"outputs": {"period": ["min", "max", "mean"]}},
     ),
-    "own scene": lambda n: sweep.build_study(
+    "own scene": lambda n: sweep.study(
         kernel="own_scene:KERNEL",
         allow_import=True,
         axes={"mu": drives(n), "b": np.geomspace(0.1, 10.0, 8)},

@@ -180,7 +180,7 @@ def compare(scene, judged, tolerances):
 def cores(name):
     """Seconds of a whole run on one core over those on all, where a cell has 4 to 400 switches; the median of a few."""
     (first, low), *rest = RANGES[name].items()
-    study = sweep.build_study(
+    study = sweep.study(
         kernel=f"own_scenes:{name.upper()}", allow_import=True, method="taylor_once", rtol=1e-8,
         axes={"flips": np.unique(np.floor(np.geomspace(4, 400, 60))), first: np.linspace(*low, WIDTHS[name])},
         fixed={other: 0.5 * sum(ends) for other, ends in rest},

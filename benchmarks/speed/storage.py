@@ -105,7 +105,7 @@ def dear(folder: Path, whole: float, rounds: int) -> None:
 
     def study(cells: int) -> Study:
         axes = {"mu": np.geomspace(1.0, 10.0, cells)}
-        return sweep.build_study(kernel="foliot_steps", method="rk4", axes=axes, fixed=DEAR)
+        return sweep.study(kernel="foliot_steps", method="rk4", axes=axes, fixed=DEAR)
 
     trial = study(64)
     sweep.run(trial, folder / "dear.h5", progress=False).close()  # compiles and imports

@@ -36,7 +36,7 @@ def foliot(cells: int, kind: str = "plain") -> Study:
     if kind == "histogram":
         summary["edges"] = {"period": {"spacing": "log", "start": 1e-3, "stop": 1e6, "num": 91}}
     keys: dict[str, object] = {} if kind == "cells" else {"summary": summary}
-    return sweep.build_study(
+    return sweep.study(
         kernel="foliot",
         method="closed",
         outputs=["period"],

@@ -190,7 +190,7 @@ def compare(title, follow, scene, columns, tolerance, truth):
 def cores():
     """Seconds of a whole run on one core over those on all, where a cell has 4 to 400 switches; the median of a few."""
     flips = np.unique(np.floor(np.geomspace(4, 400, 60)))
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="rich_scene:RICH",
         allow_import=True,
         method="taylor_once",

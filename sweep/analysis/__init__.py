@@ -2,11 +2,10 @@
 
 Others may use
     `exponents`  local exponents, where curves pass a value
-    `lines`      straight lines in log-log, where two of them meet
+    `lines`      straight lines in log-log, in one window or ever smaller ones; where two of them meet
     `two_laws`   two power laws with a bend, fitted at once
     `compare`    which law: one, two, three, a logarithm, an offset, a correction to scaling
-    `asymptote`  corrections to scaling, exponents against the window
-    `formula`    exponents over a second parameter
+    `asymptote`  corrections to scaling
     `collapse`   exponents of a collapse
     `maps`       exponents over two parameters, borders as lines
     `curves`     stated_error: what a result says its values are right to

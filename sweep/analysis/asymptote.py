@@ -1,4 +1,4 @@
-"""Exponents far out: by a correction to scaling, and against the window.
+"""The exponent far out, by a correction to scaling.
 
     y = A x^p (1 + B x^-D)                                                                          (1)
 
@@ -10,15 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from sweep.analysis.correlated import student
-from sweep.analysis.curves import Window, check_confidence, check_output, log_of, numbers_along, title, window_logs
+from sweep.analysis.curves import Window, check_confidence, check_end, numbers_along, title, window_logs
 from sweep.analysis.fits import Found, fitted
-from sweep.analysis.lines import fit_exponent
 from sweep.analysis.loglog import Array, slope_bounds, slopes
 from sweep.analysis.scatter import noise_size
 from sweep.analysis.shapes import CORRECTION
@@ -29,7 +27,6 @@ FEWEST_POINTS = 8
 SCATTERS = 0.3
 """Share of the distances from (1) that is noise between neighbours, from which on they are scatter."""
 
-ENDS = ("low", "high")
 INTERVAL = ("exponent", "exponent_low", "exponent_high")
 NUMBERS = (*INTERVAL, "correction_exponent", "correction", "residual", "noisy", "fits")
 
@@ -89,7 +86,7 @@ def fit_correction(
     -0.3334
     """
     check_confidence(confidence)
-    _check_end(end)
+    check_end("end", end)
     dimension, t, logs = window_logs(y, dim, window)
     sign = 1.0 if end == "high" else -1.0
     found = numbers_along(NUMBERS, lambda z: _each(sign * t, z, sign, confidence), logs, dimension)
@@ -101,11 +98,6 @@ def fit_correction(
         found[name].attrs = {"units": "1", "long_name": text}
     found.attrs = {"y": title(y), "x": dim, "law": f"{title(y)} = A {dim}^p (1 + B {dim}^-D), {end} end"}
     return found
-
-
-def _check_end(end: str) -> None:
-    if end not in ENDS:
-        raise SweepError(f'end: expected "low" or "high", found {end!r}')
 
 
 def _each(t: Array, z: Array, sign: float, confidence: float) -> Array:
@@ -220,79 +212,3 @@ def _edge(s: Array, z: Array, best: Array, step: float, wanted: float) -> float:
         else:
             inside, here = middle, bent
     return outside
-
-
-def exponent_by_window(
-    y: xr.DataArray, dim: str, *, end: str = "high", confidence: float = 0.95, steps: int = 8, bound: Any = None
-) -> xr.Dataset:
-    """The exponent against the window, ever smaller ones towards one end, and whether it comes to rest.
-
-    Windows are 1, 1/1.5, 1/1.5^2 ... of the range of ln dim. The exponent has a *plateau* where, from some window on,
-    one power law describes each of at least three, and their intervals have exponents in common.
-
-    Parameters
-    ----------
-    y : DataArray
-        One dimension.
-    dim : str
-        Its dimension, or 1-D coordinate along it.
-    end : "high" or "low"
-        The end that all windows reach to.
-    confidence, bound
-        As of `fit_exponent`.
-    steps : int
-        Windows at most; those of fewer than eight points are left out.
-
-    Returns
-    -------
-    Dataset
-        Along `window`, the widest first: what `fit_exponent` says. Attributes `plateau` (1 found, 0 denied), and if
-        found `exponent`, `exponent_low`, `exponent_high` of its widest window; `verdict`, a sentence.
-
-    Raises
-    ------
-    SweepError
-        As `fit_exponent`, or y has further dimensions, or no window has eight points.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import sweep
-    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
-    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e-2, 1e2, 41)})
-    >>> sweep.exponent_by_window(ds.period, "mu").attrs["plateau"]
-    0
-    """
-    _check_end(end)
-    check_output(y)
-    if y.ndim != 1:
-        raise SweepError(f"{title(y)} runs along {', '.join(map(str, y.dims))}; take one line, choose with .sel")
-    x = y[dim].values[np.isfinite(log_of(y).values)]
-    if x.size < FEWEST_POINTS:
-        raise SweepError(f"an exponent against the window needs at least {FEWEST_POINTS} points, found {x.size}")
-    low, high = float(x.min()), float(x.max())
-    fits = []
-    for share in 1.5 ** -np.arange(float(steps)):
-        reach = (high / low) ** share
-        window = (high / reach, high) if end == "high" else (low, low * reach)
-        if ((x >= window[0]) & (x <= window[1])).sum() < FEWEST_POINTS:
-            break
-        fits.append(fit_exponent(y, dim, window, confidence=confidence, bound=bound))
-    found = xr.concat(fits, dim="window")
-    found.attrs = {**fits[0].attrs, **_plateau(found, dim, end)}
-    return found
-
-
-def _plateau(found: xr.Dataset, dim: str, end: str) -> dict[str, Any]:
-    p, low, high = (found[name].values for name in ("exponent", "exponent_low", "exponent_high"))
-    for first in range(p.size - 2):
-        one = (found.fits.values[first:] == 1).all()
-        if one and low[first:].max() <= high[first:].min():
-            here = {"exponent": float(p[first]), "exponent_low": float(low[first]), "exponent_high": float(high[first])}
-            place = float((found.low if end == "high" else found.high).values[first])
-            side = "above" if end == "high" else "below"
-            text = f"plateau: {here['exponent_low']:.6g} to {here['exponent_high']:.6g}"
-            text += f" in every window {side} {dim} = {place:.4g}"
-            return {"plateau": 1, **here, "verdict": text}
-    text = f"no plateau: the exponent still goes from {p[0]:.6g} to {p[-1]:.6g} as the window shrinks to the {end} end"
-    return {"plateau": 0, "verdict": text}

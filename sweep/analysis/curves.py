@@ -82,6 +82,12 @@ def check_confidence(confidence: float) -> None:
         raise SweepError(f"confidence: expected a number between 0 and 1, found {confidence}")
 
 
+def check_end(name: str, end: str) -> None:
+    """Raises SweepError where it is neither end of a window."""
+    if end not in ("low", "high"):
+        raise SweepError(f'{name}: expected "low" or "high", found {end!r}')
+
+
 def inside_window(x: Array, window: Window | None, dim: str) -> NDArray[np.bool_]:
     low, high = ends(window, dim)
     # an end that is a grid point up to rounding is meant to be in
@@ -183,8 +189,10 @@ def relative_sigma(y: xr.DataArray, sigma: Any) -> xr.DataArray:
 
 
 def stated_bound(y: xr.DataArray, bound: Any = None) -> xr.DataArray:
-    """Largest relative error of each value: as given, else the `rtol` of the sweep that y says it is of, else 0."""
+    """Largest relative error of each value: as given, or as a result states it for y; else y's `rtol`, else 0."""
     check_output(y)
+    if isinstance(bound, xr.Dataset):
+        bound = stated_error(bound, title(y))
     found = like(y.attrs.get("rtol", 0.0) if bound is None else bound, y, "bound")
     return found.where(np.isfinite(found), 1.0)  # of an error that is not known a value is worth nothing
 
@@ -202,18 +210,9 @@ def stated_error(dataset: xr.Dataset, name: str) -> xr.DataArray:
     Returns
     -------
     DataArray
-        Of the output's shape, to be given as `bound`; 0 where nothing is stated, inf where no error is known.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import sweep
-    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
-    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e5, 1e7, 9)}, rtol=1e-6)
-    >>> float(sweep.stated_error(ds, "period").max())
-    1e-06
+        Of the output's shape; 0 where nothing is stated, inf where no error is known.
     """
-    check_dataset("stated_error", dataset, needs=[name])
+    check_dataset("fit_exponent", dataset, needs=[name])
     rtol = dataset["rtol"] if "rtol" in dataset.coords else float(dataset.attrs.get("rtol", 0.0))
     found = like(rtol, dataset[name], "rtol")
     if "error_bound" in dataset:

@@ -7,7 +7,7 @@ coordinate along a dimension, such as an axis of a zip design: `local_exponent(d
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 import xarray as xr
@@ -31,7 +31,11 @@ from sweep.system.errors import SweepError
 Finder = Callable[[Array, Array, int], tuple[float, float]]
 
 
-def local_exponent(y: xr.DataArray, dim: str) -> xr.DataArray:
+@overload
+def local_exponent(y: xr.DataArray, dim: str) -> xr.DataArray: ...
+@overload
+def local_exponent(y: xr.DataArray, dim: str, *, error: Literal[True], bound: Any = None) -> xr.Dataset: ...
+def local_exponent(y: xr.DataArray, dim: str, *, error: bool = False, bound: Any = None) -> xr.DataArray | xr.Dataset:
     """Local exponent d ln y / d ln dim [1], of fourth order in the spacing on any grid, ends included.
 
     Each value is the slope at a grid point of the polynomial through five neighbours in log-log (centred inside,
@@ -45,16 +49,22 @@ def local_exponent(y: xr.DataArray, dim: str) -> xr.DataArray:
         so are runs of fewer than three points.
     dim : str
         Dimension of `y`, or 1-D coordinate along one; positive and strictly monotone.
+    error : bool
+        Whether to add an error bar, which takes longer. Where the values carry independent noise, it is half the
+        interval of 95 % confidence, wider for runs of fewer than 20 points; where they do not, it is more than the
+        error that the spacing leaves, typically 20 times as much. What errors up to `bound` can do is added.
+    bound : number, DataArray or Dataset, optional
+        Largest relative error of the values, for the error bar. Default: as of `fit_exponent`.
 
     Returns
     -------
-    DataArray
-        Shape, dimensions and coordinates of `y`.
+    DataArray, or with `error` a Dataset
+        Shape, dimensions and coordinates of `y`; the Dataset has `exponent` and `exponent_error`.
 
     Raises
     ------
     SweepError
-        If `dim` is unknown, not positive, not monotone, or shorter than three.
+        If `dim` is unknown, not positive, not monotone, or shorter than three; `bound` is negative or does not fit.
 
     Examples
     --------
@@ -64,12 +74,17 @@ def local_exponent(y: xr.DataArray, dim: str) -> xr.DataArray:
     >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e5, 1e7, 9)})
     >>> sweep.local_exponent(ds.period, "mu").values[[0, -1]].round(3)
     array([-0.333, -0.333])
+    >>> bool((sweep.local_exponent(ds.period, "mu", error=True).exponent_error < 1e-3).all())
+    True
     """
-    return _local(y, dim, lambda t, z: slopes(t, z, 5), "exponent", "local exponent")
+    found = _local(y, dim, lambda t, z: slopes(t, z, 5), "exponent", "local exponent")
+    if not error:
+        return found
+    return xr.Dataset({"exponent": found, "exponent_error": local_exponent_error(y, dim, bound)})
 
 
 def local_exponent_error(y: xr.DataArray, dim: str, bound: Any = None) -> xr.DataArray:
-    """Error bar of `local_exponent` [1], which knows the sampling and the stated errors, and finds noise by itself.
+    """Error bar of the local exponent [1], which knows the sampling and the stated errors, and finds noise by itself.
 
     Where the values carry independent noise, it is half the interval of 95 % confidence, wider for runs of fewer than
     20 points (`benchmarks/honesty/interval_coverage.py` measures it). Where they do not, it is more than the error that
@@ -88,15 +103,6 @@ def local_exponent_error(y: xr.DataArray, dim: str, bound: Any = None) -> xr.Dat
     ------
     SweepError
         As `local_exponent`, or `bound` is negative or of another shape.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import sweep
-    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
-    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e5, 1e7, 9)})
-    >>> bool((sweep.local_exponent_error(ds.period, "mu") < 1e-3).all())
-    True
     """
     bounds = stated_bound(y, bound)
     return _local(y, dim, slope_errors, "exponent_error", "error of the local exponent", bounds)
@@ -110,9 +116,6 @@ def _local(
     found.name = name if y.name is None else f"{y.name}_{name}"
     found.attrs = {"units": "1", "long_name": f"{words} of {title(y)} in {dim}"}
     return found
-
-
-exponent = local_exponent
 
 
 def where_value(curve: xr.DataArray, dim: str, value: float, window: Window | None = None) -> xr.Dataset:
@@ -137,15 +140,6 @@ def where_value(curve: xr.DataArray, dim: str, value: float, window: Window | No
     SweepError
         If the curve does not pass the value, or does so more than once. Along further dimensions such lines are
         NaN, and it is raised only if all are.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import sweep
-    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
-    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e-2, 1e4, 61)})
-    >>> print(f"{float(sweep.where_value(ds.period, 'mu', 2.0).abscissa):.2f}")
-    26.40
     """
 
     def find(t: Array, c: Array, bracket: int) -> tuple[float, float]:
@@ -155,8 +149,10 @@ def where_value(curve: xr.DataArray, dim: str, value: float, window: Window | No
     return _where(missing_is_nan(curve), dim, value, window, lambda t, c: c, find)
 
 
-def where_exponent(y: xr.DataArray, dim: str, value: float, window: Window | None = None) -> xr.Dataset:
-    """Where the local exponent of y passes a value: `abscissa` and `abscissa_error`.
+def where_exponent(
+    y: xr.DataArray, dim: str, value: float, window: Window | None = None, *, values: bool = False
+) -> xr.Dataset:
+    """Where the local exponent of y, or y itself, passes a value: `abscissa` and `abscissa_error`.
 
     The exponent is taken by differences of sixth order and interpolated through six points. The error is the
     distance to the same by fourth order and four points, plus rounding: an estimate, not a bound.
@@ -171,11 +167,16 @@ def where_exponent(y: xr.DataArray, dim: str, value: float, window: Window | Non
         The exponent looked for, with its sign: -0.5 for y ~ dim^(-1/2).
     window : (low, high), optional
         Part of `dim` to look in; differences at its ends still use the points beyond.
+    values : bool
+        Whether the values of y themselves are to pass `value`, as for an output that is an exponent already
+        (`sensitivity`). The place is then the root of the polynomial through six neighbours, and its error the
+        distance to that through four.
 
     Raises
     ------
     SweepError
-        As `where_value`.
+        If the exponent does not pass the value, or does so more than once. Along further dimensions such lines are
+        NaN, and it is raised only if all are.
 
     Examples
     --------
@@ -185,7 +186,11 @@ def where_exponent(y: xr.DataArray, dim: str, value: float, window: Window | Non
     >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e-2, 1e4, 61)})
     >>> print(f"{float(sweep.where_exponent(ds.period, 'mu', -0.5).abscissa):.2f}")
     1.46
+    >>> print(f"{float(sweep.where_exponent(ds.period, 'mu', 2.0, values=True).abscissa):.2f}")
+    26.40
     """
+    if values:
+        return where_value(y, dim, value, window)
 
     def find(t: Array, z: Array, bracket: int) -> tuple[float, float]:
         sixth, fourth = slopes(t, z, 7), slopes(t, z, 5)

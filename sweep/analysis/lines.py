@@ -12,7 +12,10 @@ from sweep.analysis.curves import (
     Window,
     check_confidence,
     check_dataset,
+    check_end,
+    check_output,
     ends,
+    log_of,
     numbers_along,
     relative_sigma,
     stated_bound,
@@ -79,6 +82,7 @@ def fit_exponent(
     noise: bool | str | None = None,
     sigma: Any = None,
     bound: Any = None,
+    towards: str | None = None,
 ) -> xr.Dataset:
     """Power law y = prefactor dim^exponent by a straight line in log-log over a window.
 
@@ -108,9 +112,13 @@ def fit_exponent(
         Whether the values scatter, or how. Default: as tests find.
     sigma : number or DataArray, optional
         Standard errors of the values, in the unit of y.
-    bound : number or DataArray, optional
-        Largest relative error of the values, which is not noise. Default: the `rtol` in the attributes of y, of a
-        sweep; `stated_error` has that of every cell.
+    bound : number, DataArray or Dataset, optional
+        Largest relative error of the values, which is not noise; of a Dataset, the result that y is an output of, what
+        it states for each cell: `rtol`, or `error_bound` where that is INACCURATE. Default: the `rtol` in the
+        attributes of y.
+    towards : "high" or "low", optional
+        Fit ever smaller windows that all reach to this end, 1, 1/1.5, 1/1.5^2 ... of the range of ln dim, to see
+        whether the exponent comes to rest: y has one dimension, `window` is not given.
 
     Returns
     -------
@@ -122,6 +130,11 @@ def fit_exponent(
         the first and last abscissa used, `start`, `stop`, y there; `centre`, `level`, `level_error`, the geometric
         means of dim and y, where the line is known best, and the relative standard error there; `limit_low`,
         `limit_high`, to where the local exponent tends at both ends. The dimensions are those of `y` but `dim`.
+
+        With `towards` all of these run along `window`, the widest first. The exponent has a *plateau* where, from some
+        window on, one power law describes each of at least three, and their intervals have exponents in common: the
+        attributes are `plateau` (1 found, 0 denied), if found `exponent`, `exponent_low`, `exponent_high` of its widest
+        window, and `verdict`, a sentence.
 
     Raises
     ------
@@ -139,6 +152,8 @@ def fit_exponent(
     >>> print(f"{float(found.exponent):.4f}")
     -0.3334
     """
+    if towards is not None:
+        return _by_window(y, dim, window, towards, confidence=confidence, noise=noise, sigma=sigma, bound=bound)
     check_confidence(confidence)
     check_noise(noise)
     dimension, t, logs = window_logs(y, dim, window)
@@ -154,6 +169,48 @@ def fit_exponent(
             f"{ends(window, dim)[0]:g} to {ends(window, dim)[1]:g} of {dim}; choose a wider one"
         )
     return _describe_fit(fit, y, dim)
+
+
+FEWEST_IN_WINDOW, MOST_WINDOWS = 8, 8
+
+
+def _by_window(y: xr.DataArray, dim: str, window: Window | None, end: str, **keys: Any) -> xr.Dataset:
+    """Fits over ever smaller windows that reach to one end, and whether their exponents come to rest."""
+    check_end("towards", end)
+    check_output(y)
+    if window is not None:
+        raise SweepError("window does not go with towards, which chooses the windows")
+    if y.ndim != 1:
+        raise SweepError(f"{title(y)} runs along {', '.join(map(str, y.dims))}; take one line, choose with .sel")
+    x = y[dim].values[np.isfinite(log_of(y).values)]
+    if x.size < FEWEST_IN_WINDOW:
+        raise SweepError(f"an exponent against the window needs at least {FEWEST_IN_WINDOW} points, found {x.size}")
+    low, high = float(x.min()), float(x.max())
+    fits = []
+    for share in 1.5 ** -np.arange(float(MOST_WINDOWS)):
+        reach = (high / low) ** share
+        smaller = (high / reach, high) if end == "high" else (low, low * reach)
+        if ((x >= smaller[0]) & (x <= smaller[1])).sum() < FEWEST_IN_WINDOW:
+            break
+        fits.append(fit_exponent(y, dim, smaller, **keys))
+    found = xr.concat(fits, dim="window")
+    found.attrs = {**fits[0].attrs, **_plateau(found, dim, end)}
+    return found
+
+
+def _plateau(found: xr.Dataset, dim: str, end: str) -> dict[str, Any]:
+    p, low, high = (found[name].values for name in ("exponent", "exponent_low", "exponent_high"))
+    for first in range(p.size - 2):
+        one = (found.fits.values[first:] == 1).all()
+        if one and low[first:].max() <= high[first:].min():
+            here = {"exponent": float(p[first]), "exponent_low": float(low[first]), "exponent_high": float(high[first])}
+            place = float((found.low if end == "high" else found.high).values[first])
+            side = "above" if end == "high" else "below"
+            text = f"plateau: {here['exponent_low']:.6g} to {here['exponent_high']:.6g}"
+            text += f" in every window {side} {dim} = {place:.4g}"
+            return {"plateau": 1, **here, "verdict": text}
+    text = f"no plateau: the exponent still goes from {p[0]:.6g} to {p[-1]:.6g} as the window shrinks to the {end} end"
+    return {"plateau": 0, "verdict": text}
 
 
 def check_noise(noise: bool | str | None) -> None:
@@ -269,16 +326,6 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     ------
     SweepError
         If the windows overlap or the two lines are parallel within their errors.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import sweep
-    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
-    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e-3, 1e6, 91)})
-    >>> weak, strong = (sweep.fit_exponent(ds.period, "mu", window) for window in ((1e-3, 1e-2), (1e5, 1e6)))
-    >>> print(f"{float(sweep.crossover(weak, strong).abscissa):.1f}")
-    0.6
     """
     for fit in (low_fit, high_fit):
         check_dataset("crossover", fit, "fit_exponent", ["exponent", "level", "limit_low"])

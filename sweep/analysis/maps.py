@@ -32,7 +32,9 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     Returns
     -------
     Dataset
-        `exponent` and its `exponent_error`, of the shape of y, and what `contours` gives of it along `point`.
+        `exponent` and its `exponent_error`, of the shape of y, and the lines along `point`: both
+        coordinates under the names of the dimensions with `_on_border` behind, `level`, and `line`, the number of the
+        line that the point belongs to, from 0 on.
 
     Raises
     ------
@@ -77,17 +79,6 @@ def contours(field: xr.DataArray, levels: Sequence[float]) -> xr.Dataset:
     ------
     SweepError
         The field has not two dimensions, or an axis has no numbers or fewer than two.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import sweep
-    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
-    >>> axes = {"mu": np.geomspace(1e-2, 1e4, 25), "R": [1e-4, 1e-3, 1e-2, 1e-1]}
-    >>> ds = sweep.run(**foliot, axes=axes)
-    >>> found = sweep.contours(ds.period, [4.0])
-    >>> bool((found.mu > 0).all())
-    True
     """
     down, across = _axes(field)
     parts = [_lines(field, float(level)) for level in levels]

@@ -17,7 +17,7 @@ import xarray as xr
 from sweep.analysis.correlated import averaged, corrected, student
 from sweep.analysis.curves import Window, along, check_confidence, noise_of, scatter_is_noise, title, window_logs
 from sweep.analysis.fits import Found, fitted
-from sweep.analysis.lines import check_noise
+from sweep.analysis.lines import check_noise, crossover, fit_exponent
 from sweep.analysis.loglog import EPSILON, Array, slopes, tends
 from sweep.analysis.scatter import BEYOND_DOUBT, line_deviance, noise_size, rounding
 from sweep.analysis.shapes import BENDS, LOGARITHM, POWERS, STRETCHED, TWO
@@ -75,6 +75,7 @@ def fit_two_laws(
     *,
     confidence: float = 0.95,
     noise: bool | str | None = None,
+    windows: tuple[Window, Window] | None = None,
 ) -> xr.Dataset:
     """Two power laws with a smooth crossover, equation (1), and whether one law would do.
 
@@ -102,6 +103,9 @@ def fit_two_laws(
         Whether the values scatter; intervals then hold for noise that remembers the point before, too, unless it is
         said to be independent. Default: as the scatter of neighbours about the curve shows; with fewer than 16 points,
         where it shows nothing, intervals are wide enough for both.
+    windows : pair of (low, high), optional
+        Fit a straight line in each of two windows, which share at most an end point, and say where the two lines
+        meet; nothing is fitted between them.
 
     Returns
     -------
@@ -109,6 +113,11 @@ def fit_two_laws(
         `exponent`, `exponent_low`, `exponent_high` along `law` ("low", "high"); `crossover` with its interval, in
         the unit of `dim`; `width` [decades], `level` (y where the laws meet), `residual`, `points`, `regimes` (1 or
         2), `evidence` (difference of BIC), `noisy`. NaN where fewer than eight points are left.
+
+        With `windows`: `exponent`, `exponent_low`, `exponent_high` along `law`; `crossover`, `crossover_error`,
+        `level`. Where points scatter, the error is a standard error, from those of the two lines. Where they do not, it
+        is a bound: how far the place moves if a law is not the line through its window but goes through the outer end
+        of it with the exponent to which the local one tends there.
 
     Raises
     ------
@@ -124,14 +133,38 @@ def fit_two_laws(
     >>> found = sweep.fit_two_laws(ds.period, "mu")
     >>> [f"{e:.2f}" for e in found.exponent.values]
     ['-1.00', '-0.34']
+    >>> met = sweep.fit_two_laws(ds.period, "mu", windows=((1e-3, 1e-2), (1e5, 1e6)))
+    >>> print(f"{float(met.crossover):.1f}")
+    0.6
     """
     check_confidence(confidence)
     check_noise(noise)
+    if windows is not None:
+        if window is not None:
+            raise SweepError("window does not go with windows, which say where the two lines are")
+        return _in_windows(y, dim, windows, confidence, noise)
     dimension, t, logs = window_logs(y, dim, window)
     numbers = along(lambda z: _each(t, z, confidence, noise), logs, dimension, "number")
     if not np.isfinite(numbers.isel(number=slice(len(LAWS) * len(EXPONENTS))).values).any():
         raise SweepError(f"two laws need at least {FEWEST_POINTS} points of {title(y)}, found fewer; widen the window")
     return _described(numbers, y, dim, confidence)
+
+
+def _in_windows(
+    y: xr.DataArray, dim: str, windows: tuple[Window, Window], confidence: float, noise: bool | str | None
+) -> xr.Dataset:
+    """Two straight lines, and where they meet."""
+    try:
+        low, high = windows
+    except (TypeError, ValueError):
+        raise SweepError(f"windows: expected two, ((low, high), (low, high)); found {windows!r}") from None
+    fits = [fit_exponent(y, dim, one, confidence=confidence, noise=noise) for one in (low, high)]
+    met = crossover(*fits)
+    law = xr.DataArray(list(LAWS), dims="law", name="law")
+    found = xr.concat([fit[list(EXPONENTS)] for fit in fits], dim=law, combine_attrs="override")
+    found["crossover"], found["crossover_error"], found["level"] = met.abscissa, met.abscissa_error, met.ordinate
+    found.attrs = {**met.attrs, "confidence": confidence}
+    return found
 
 
 def _each(t: Array, z: Array, confidence: float, noise: bool | str | None) -> Array:

@@ -41,11 +41,11 @@ def _plan(arguments: argparse.Namespace) -> None:
 
 def _refine(arguments: argparse.Namespace) -> None:
     from sweep.explore.refine import refine
-    from sweep.study.read import study_of
+    from sweep.study.read import study as as_study
 
     check_target_of(arguments, arguments.output, "result")
     with result_of(arguments) as dataset:
-        study = study_of(dataset, allow_import=arguments.allow_import)
+        study = as_study(dataset, allow_import=arguments.allow_import)
         found = refine(
             dataset,
             arguments.y,
@@ -63,7 +63,7 @@ def _refine(arguments: argparse.Namespace) -> None:
 
 def _chart(arguments: argparse.Namespace) -> None:
     from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
-    from sweep.show.charts import plot_precision
+    from sweep.show.plot import plot
     from sweep.system.progress import Progress
 
     study = study_of_result(arguments) if arguments.study.suffix == ".h5" else study_from(arguments)
@@ -80,7 +80,7 @@ def _chart(arguments: argparse.Namespace) -> None:
         cell_timeout=arguments.cell_timeout,
     )
     say(precision_text(found))
-    plot_precision(found, output)
+    plot(found, output)
     say(output)
 
 

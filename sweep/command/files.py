@@ -19,10 +19,9 @@ if TYPE_CHECKING:
 
 
 def study_from(arguments: argparse.Namespace) -> Study:
-    from sweep.study.read import read_study
+    from sweep.study.read import study
 
-    path = arguments.study
-    return read_study(path, allow_import=arguments.allow_import)
+    return study(arguments.study, allow_import=arguments.allow_import)
 
 
 def is_isolated(arguments: argparse.Namespace, study: Study) -> bool:
@@ -31,10 +30,10 @@ def is_isolated(arguments: argparse.Namespace, study: Study) -> bool:
 
 
 def study_of_result(arguments: argparse.Namespace) -> Study:
-    from sweep.study.read import study_of
+    from sweep.study.read import study
 
     with opened(arguments.study) as dataset:
-        return study_of(dataset, allow_import=arguments.allow_import)
+        return study(dataset, allow_import=arguments.allow_import)
 
 
 def result_of(arguments: argparse.Namespace) -> contextlib.AbstractContextManager[xr.Dataset]:

@@ -42,9 +42,9 @@ def _compare(arguments: argparse.Namespace) -> None:
         found = comparison(part, arguments.y, arguments.x, arguments.window or [])
     say(comparison_text(found))
     if drawn:
-        from sweep.show.law_charts import plot_laws
+        from sweep.show.plot import plot
 
-        plot_laws(found, target)
+        plot(found, target)
     elif target:
         write_comparison(found, target)
     if target:

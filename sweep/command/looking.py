@@ -64,8 +64,8 @@ def _diff(arguments: argparse.Namespace) -> Outcome:
 
 
 def _plot(arguments: argparse.Namespace) -> None:
-    from sweep.show.charts import plot
     from sweep.show.laws import pick
+    from sweep.show.plot import plot
 
     output = arguments.output or Path(f"{arguments.result.stem}.png")
     check_target_of(arguments, output)

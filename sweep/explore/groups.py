@@ -9,17 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from sweep.explore.symmetries import Scalings, scalings
 from sweep.study.model import Study
-from sweep.study.read import study_of
-from sweep.system.errors import SweepError
-from sweep.system.expected import kind, require_dataset
+from sweep.study.read import Given
+from sweep.study.read import study as as_study
+from sweep.system.expected import require_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -76,6 +74,8 @@ class Scaling:
         Scalings that do not follow from the units a kernel declares.
     tried : int
         Cells on which all this was tried.
+    follows : dict of parameter to axis
+        Parameters that take the values of an axis of another name.
     """
 
     groups: tuple[Group, ...]
@@ -86,6 +86,7 @@ class Scaling:
     others: tuple[str, ...] = ()
     hidden: int = 0
     tried: int = 0
+    follows: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def advice(self) -> str:
@@ -109,9 +110,48 @@ class Scaling:
     def _varies(self, group: Group) -> bool:
         return any(name in self.axes for name, _ in group.powers)
 
+    def rescaled(self, dataset: xr.Dataset) -> xr.Dataset:
+        """A result of the study with its outputs freed of units, and a coordinate for each dimensionless group.
 
-def scaling(study: Study) -> Scaling:
+        Parameters
+        ----------
+        dataset : Dataset
+            From `run` or `open_result`.
+
+        Returns
+        -------
+        Dataset
+            Outputs whose unit is 1 and whose `long_name` says the product; coordinates `group_1`, `group_2` ...,
+            likewise.
+
+        Examples
+        --------
+        >>> import sweep
+        >>> axes = {"mu": [0.5, 1.0], "a": [1.0, 2.0]}
+        >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes=axes, fixed={"phi0": 1.0})
+        >>> sorted(set(sweep.scaling(ds).rescaled(ds).variables) - set(ds.variables))
+        ['group_1']
+        """
+        require_dataset("scaling(...).rescaled", dataset)
+        values = {str(name): dataset[name] for name in dataset.coords}
+        values |= {name: values[axis] for name, axis in self.follows.items()}
+        for number, group in enumerate(self.groups, 1):
+            coordinate = group.of(values)
+            coordinate.attrs = {"units": "1", "long_name": str(group)}
+            dataset = dataset.assign_coords({f"group_{number}": coordinate})
+        for name, group in self.scales.items():
+            output = dataset[name] * group.of(values)
+            output.attrs = {**dataset[name].attrs, "units": "1", "long_name": _product(name, group)}
+            dataset[name] = output
+        return dataset
+
+
+def scaling(study: Given) -> Scaling:
     """Groups of a study's parameters, and how many of its axes are superfluous.
+
+    Parameters
+    ----------
+    study : Study, path, mapping of its keys, or Dataset that came from it
 
     Raises
     ------
@@ -127,8 +167,7 @@ def scaling(study: Study) -> Scaling:
     >>> print(sweep.scaling(study).advice)
     one-dimensional in mu, a: only mu/(phi0 a^2) matters; 1 of these axes can be left out; tried on ... cells at random
     """
-    if not isinstance(study, Study):
-        raise SweepError(f"expected a study, e.g. sweep.study_of(ds); found {kind(study)}")
+    study = as_study(study)
     found = scalings(study)
     fields = {f.name: f for f in (*study.kernel.parameters, *study.kernel.along)}
     scaled = [name for name in fields if any(found.weights(name))]
@@ -145,85 +184,13 @@ def scaling(study: Study) -> Scaling:
         others=tuple(name for name in study.axes if name in fields and name not in axes),
         hidden=found.hidden,
         tried=found.cells,
+        follows=study.follows,
     )
 
 
 def advice_on(study: str) -> str:
     """The advice on a study in JSON."""
     return scaling(Study.from_json(study, allow_import=True)).advice
-
-
-def rescaled(dataset: xr.Dataset, study: Study | None = None) -> xr.Dataset:
-    """The Dataset with its outputs freed of units, and a coordinate for each dimensionless group.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        From `run` or `open_result`.
-    study : Study, optional
-        Default: the one in the Dataset's attributes, of a kernel in the catalogue.
-
-    Returns
-    -------
-    Dataset
-        Outputs whose unit is 1 and whose `long_name` says the product; coordinates `group_1`, `group_2` ..., likewise.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import sweep
-    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
-    >>> ds = sweep.run(**foliot | {"fixed": {"phi0": 1.0}}, axes={"mu": [0.5, 1.0], "a": [1.0, 2.0]})
-    >>> sorted(set(sweep.rescaled(ds).variables) - set(ds.variables))
-    ['group_1']
-    """
-    require_dataset("rescaled", dataset)
-    study = study or study_of(dataset)
-    found = scaling(study)
-    values = {str(name): dataset[name] for name in dataset.coords}
-    values |= {name: values[axis] for name, axis in study.follows.items()}
-    for number, group in enumerate(found.groups, 1):
-        coordinate = group.of(values)
-        coordinate.attrs = {"units": "1", "long_name": str(group)}
-        dataset = dataset.assign_coords({f"group_{number}": coordinate})
-    for name, group in found.scales.items():
-        output = dataset[name] * group.of(values)
-        output.attrs = {**dataset[name].attrs, "units": "1", "long_name": _product(name, group)}
-        dataset[name] = output
-    return dataset
-
-
-def collapse_quality(x: xr.DataArray, y: xr.DataArray) -> float:
-    """How far points lie off one common curve y(x): root mean square of the relative distance of each from the straight
-    line, in logarithms, between its two neighbours in x.
-
-    Points that fall on one curve leave what the curve bends between neighbours, which shrinks as the square of their
-    distance; others leave the scatter of the curves.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import sweep
-    >>> import xarray as xr
-    >>> x = xr.DataArray(np.geomspace(1.0, 100.0, 21), dims="x")
-    >>> sweep.collapse_quality(x, x**-0.5) < 1e-12
-    True
-    """
-    import xarray as xr
-
-    from sweep.analysis.curves import check_output
-
-    for array in (x, y):
-        check_output(array)
-    x, y = xr.broadcast(x, y)
-    t, z = np.log(x.values.ravel()), np.log(y.values.ravel())
-    fine = np.isfinite(t) & np.isfinite(z)
-    order = np.argsort(t[fine], kind="stable")
-    t, z = t[fine][order], z[fine][order]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.where(t[2:] > t[:-2], (t[1:-1] - t[:-2]) / (t[2:] - t[:-2]), 0.5)
-    off = z[1:-1] - (1 - share) * z[:-2] - share * z[2:]
-    return float(np.sqrt(np.mean(off**2)))
 
 
 def _product(name: str, group: Group) -> str:

@@ -30,7 +30,8 @@ from sweep.explore.groups import advice_on, scaling
 from sweep.results.open import memory
 from sweep.runs.isolate import SLACK, Limits, Processes, limits_of
 from sweep.store.frame import cuts_of, expected_size
-from sweep.study.read import Given, as_study
+from sweep.study.read import Given
+from sweep.study.read import study as as_study
 from sweep.system.errors import SweepError
 from sweep.system.pool import cores, whole_number
 from sweep.system.progress import duration, quantity

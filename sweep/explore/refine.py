@@ -29,7 +29,7 @@ from sweep.analysis.scattered import MOST_AXES, axes_of
 from sweep.cells.schema import STATUS, cell_schema
 from sweep.explore.refiner import Refinement, Refiner
 from sweep.study.model import Axis, Study
-from sweep.study.read import study_of
+from sweep.study.read import study as as_study
 from sweep.system import disk
 from sweep.system.errors import SweepError
 from sweep.system.expected import require_dataset
@@ -92,7 +92,7 @@ def refine(
     True
     """
     require_dataset("refine", dataset)
-    study = study or study_of(dataset)
+    study = study or as_study(dataset)
     names = [y] if isinstance(y, str) else list(y)
     _require(dataset, study, names, tolerance)
     options = {"workers": workers, "isolate": isolate, "cell_timeout": cell_timeout}

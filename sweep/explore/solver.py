@@ -19,7 +19,8 @@ from sweep.cells.timing import LANES
 from sweep.cells.turns import Turn, turns
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.study.model import SETTINGS, Study
-from sweep.study.read import Given, as_study
+from sweep.study.read import Given
+from sweep.study.read import study as as_study
 from sweep.system.errors import SweepError
 
 TRIES = 5

@@ -25,7 +25,8 @@ from sweep.explore.plan import small_duration
 from sweep.explore.reference import Reference, best_reference, errors, given_reference
 from sweep.study.mistakes import did_you_mean
 from sweep.study.model import Study
-from sweep.study.read import Given, as_study
+from sweep.study.read import Given
+from sweep.study.read import study as as_study
 from sweep.system.errors import SweepError
 from sweep.system.table import columns, page
 

@@ -65,7 +65,7 @@ def open_result(path: str | os.PathLike[str], strict: bool = False) -> xr.Datase
     --------
     >>> import sweep
     >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
-    >>> with sweep.run(sweep.study_of(ds), "opened.h5") as written, sweep.open_result("opened.h5") as found:
+    >>> with sweep.run(sweep.study(ds), "opened.h5") as written, sweep.open_result("opened.h5") as found:
     ...     print(found.period.equals(ds.period), found.period.units)
     True s
     """

@@ -32,7 +32,7 @@ def in_units(dataset: xr.Dataset, units: Mapping[str, str]) -> xr.Dataset:
     Examples
     --------
     >>> import sweep
-    >>> study = sweep.build_study(kernel="foliot", axes={"mu": [0.1]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> study = sweep.study(kernel="foliot", axes={"mu": [0.1]}, fixed={"phi0": 1.0, "a": 1.0})
     >>> sweep.in_units(sweep.run(study), {"amplitude": "degree"}).amplitude.attrs["units"]
     'degree'
     """

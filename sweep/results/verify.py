@@ -60,7 +60,7 @@ def verify(path: str | os.PathLike[str]) -> Verdict:
     --------
     >>> import sweep
     >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
-    >>> sweep.run(sweep.study_of(ds), "verified.h5").close()
+    >>> sweep.run(sweep.study(ds), "verified.h5").close()
     >>> sweep.verify("verified.h5").whole
     True
     """

@@ -24,7 +24,8 @@ from sweep.runs.task import END, HERE, WAIT, Task
 from sweep.runs.to_file import run_to_file
 from sweep.store.store import lock_of, unfinished_of
 from sweep.study.mistakes import did_you_mean, listed
-from sweep.study.read import KEYS, Given, as_study
+from sweep.study.read import KEYS, Given
+from sweep.study.read import study as as_study
 from sweep.system import disk
 from sweep.system.errors import SweepError
 from sweep.system.pool import Cores, cores, whole_number
@@ -62,7 +63,7 @@ def run(
 
     Parameters
     ----------
-    study : Study, path of a study file, or mapping of the keys of `build_study`, optional
+    study : Study, path of a study file, mapping of its keys, or Dataset of an earlier run, optional
         None: these keys stand as keywords.
     path : path, optional
         The output, an HDF5 (netCDF4) file. A run that was stopped or killed is continued; an output that is complete
@@ -98,7 +99,7 @@ def run(
         What to do where the cluster has no workers, or loses all: wait for new ones, which those of batch systems may
         be a long time coming; go on here after ten seconds; or end, as `until` does.
     **keys
-        Of `build_study`, and `allow_import`.
+        Of `sweep.study`.
 
     Raises
     ------

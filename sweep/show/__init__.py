@@ -1,7 +1,8 @@
 """Results for people: pictures, pages and words. Runs nothing; the only room that imports matplotlib.
 
 Others may use
-    `charts`   plot, plot_precision; for figures of one's own: style, new_figure, save and what draws panels
+    `plot`     plot, of whatever it is given
+    `charts`   for figures of one's own: style, new_figure, save and what draws panels
     `page`     write_page: a result as one page of HTML
     `text`     result_text
     `follow`   a sweep watched from its log

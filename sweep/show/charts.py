@@ -20,7 +20,6 @@ from sweep.analysis.loglog import is_logarithmic, spans_decades
 from sweep.show.view import View, coordinate, edges, label, setting, view
 from sweep.system import disk
 from sweep.system.errors import SweepError
-from sweep.system.expected import require_dataset
 from sweep.system.overwriting import DRAWN
 
 try:
@@ -98,38 +97,8 @@ METADATA: dict[str, dict[str, Any]] = {
 """Kinds of file, what each says of its origin, and what is left out so that the same picture has the same bytes."""
 
 
-def plot(
-    dataset: xr.Dataset, path: str | os.PathLike[str] | None = None, *, y: str | None = None, x: str | None = None
-) -> Figure:
-    """Picture of one output: a line, a family of lines, or a map where there are two long axes.
-
-    An axis is logarithmic where its grid is, or where the values span decades. Cells whose status is not OK are
-    marked: on the line where they have a value, at the foot of the picture where they have none. Further axes are
-    held at their middle value, which the title says.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        From `run` or `open_result`.
-    path : path, optional
-        Where to save it; .png, .svg or .pdf.
-    y : str, optional
-        Output; the first by default.
-    x : str, optional
-        Axis, or coordinate along the cells of a zip design. Default: what a trace runs along, else the longest.
-
-    Raises
-    ------
-    SweepError
-        If there is no such output or axis, or the file cannot be written.
-
-    Examples
-    --------
-    >>> import sweep
-    >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
-    >>> figure = sweep.plot(ds, "period.png")
-    """
-    require_dataset("plot", dataset)
+def result_figure(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Figure:
+    """One output of a result: a line, a family of lines, or a map where there are two long axes."""
     shown = view(dataset, y, x)
     with style():
         figure = new_figure(120.0, 82.0)
@@ -142,37 +111,15 @@ def plot(
         text = str(dataset.attrs.get("title", "")).replace("$", r"\$")
         title = "\n".join(part for part in (text, shown.held) if part)
         axes.set_title(title, wrap=True)
-    if path is not None:
-        save(figure, path)
     return figure
 
 
-def plot_precision(found: xr.Dataset, path: str | os.PathLike[str] | None = None) -> Figure:
+def precision_figure(found: xr.Dataset) -> Figure:
     """Error against time per cell, median and worst cell, a line for each method through its tolerances.
 
     Bars are the middle 80 % of the cells; the grey floor is what the reference itself, named below, is right to. A
     method that solves no cell has no line, but is named below.
-
-    Parameters
-    ----------
-    found : Dataset
-        From `work_precision`.
-    path : path, optional
-        Where to save it; .png, .svg or .pdf.
-
-    Raises
-    ------
-    SweepError
-        The file cannot be written.
-
-    Examples
-    --------
-    >>> import sweep
-    >>> keys = {"kernel": "foliot", "outputs": ["period"], "axes": {"mu": [0.5, 1.0]}, "fixed": {"phi0": 1.0, "a": 1.0}}
-    >>> found = sweep.work_precision(keys, methods=["closed", "asymptotic"], tolerances=[1e-6])
-    >>> figure = sweep.plot_precision(found, "precision.png")
     """
-    require_dataset("plot_precision", found, "work_precision", "reference")
     with style():
         lines = _note(found)
         figure = new_figure(PAGE, 96.0 + 3.2 * len(lines))
@@ -188,8 +135,6 @@ def plot_precision(found: xr.Dataset, path: str | os.PathLike[str] | None = None
         marks = precision_marks(found)
         figure.legend([*handles, *marks.values()], [*labels, *marks], loc="outside upper center", ncols=4, fontsize=7)
         figure.supxlabel("\n".join(lines), fontsize=7, ha="left", x=0.02)
-    if path is not None:
-        save(figure, path)
     return figure
 
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.show.charts import COLOURS, DASHES, new_figure, save, style
-from sweep.system.expected import require_dataset
+from sweep.show.charts import COLOURS, DASHES, new_figure, style
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -16,31 +14,8 @@ if TYPE_CHECKING:
 MOST_LAWS = 6
 
 
-def plot_laws(found: xr.Dataset, path: str | os.PathLike[str] | None = None) -> Any:
-    """Picture of what `compare_laws` found: the best six laws.
-
-    Parameters
-    ----------
-    found : Dataset
-        From `compare_laws`.
-    path : path, optional
-        Where to save it; .png, .svg or .pdf.
-
-    Raises
-    ------
-    SweepError
-        If the file cannot be written.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import sweep
-    >>> import xarray as xr
-    >>> x = np.geomspace(1, 1e4, 41)
-    >>> found = sweep.compare_laws(xr.DataArray(1 / x + 0.01, {"x": x}, "x", name="y"), "x")
-    >>> figure = sweep.plot_laws(found)
-    """
-    require_dataset("plot_laws", found, "compare_laws", "chosen")
+def laws_figure(found: xr.Dataset) -> Any:
+    """What `compare_laws` found: the best six laws."""
     order = [str(law) for law in found.law.values]
     shown = list(dict.fromkeys([found.attrs["chosen"], *order]))[:MOST_LAWS]
     with style():
@@ -57,8 +32,6 @@ def plot_laws(found: xr.Dataset, path: str | os.PathLike[str] | None = None) -> 
         below.axhline(0.0, color="0.6", linewidth=0.5)
         figure.legend(*above.get_legend_handles_labels(), loc="outside lower center", ncols=2)
         above.set_title(found.attrs["verdict"], wrap=True, fontsize=8)
-    if path is not None:
-        save(figure, path)
     return figure
 
 

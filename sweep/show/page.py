@@ -130,7 +130,8 @@ def _figures(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _picture(dataset: xr.Dataset, name: str) -> str:
-    from sweep.show.charts import plot, style
+    from sweep.show.charts import style
+    from sweep.show.plot import plot
 
     try:
         figure = plot(dataset.assign_attrs(title=""), y=name)

@@ -1,7 +1,7 @@
 """A study: TOML (or a dict) in, a checked `Study` out, all mistakes at once. The only room that imports pint.
 
 Others may use
-    `read`           read_study, build_study, as_study, study_of
+    `read`           study: of a file, of keys, or of a result
     `model`          Study, Axis, Summary
     `kernel_lookup`  load_kernel: a kernel by the name that a study gives it
     `mistakes`       how found, allowed and meant words are told

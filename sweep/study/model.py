@@ -99,7 +99,7 @@ class Summary:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """One sweep, complete and free of mistakes. Made by `read_study` or `build_study`.
+    """One sweep, complete and free of mistakes. Made by `sweep.study`.
 
     Attributes
     ----------

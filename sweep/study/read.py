@@ -7,68 +7,33 @@ import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sweep.study.mistakes import did_you_mean, listed, show
 from sweep.study.model import Axis, Study
 from sweep.study.study_parser import KEYS, StudyParser
 from sweep.system.disk import as_path
 from sweep.system.errors import Mistake, StudyError, SweepError
-from sweep.system.expected import require_dataset
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-__all__ = ["KEYS", "Axis", "Given", "Study", "as_study", "build_study", "read_study", "study", "study_of"]
+__all__ = ["KEYS", "Axis", "Given", "Study", "study"]
 
 KEYWORDS = 'keywords, e.g. kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0}'
 LARGEST_TEXT = 50_000_000
 """Bytes of a study file."""
 
 
-def read_study(path: str | Path, allow_import: bool = False) -> Study:
-    """The study in a TOML file.
+Given = Study | str | os.PathLike[str] | Mapping[str, Any]
+"""What a study may be given as: itself, its file, its keys, or a result that came from it (a Dataset is a Mapping)."""
+
+
+def study(given: Given | None = None, /, *, allow_import: bool = False, **keys: Any) -> Study:
+    """The checked study of a TOML file, of a dict of its keys, of keywords, or of a result.
 
     Parameters
     ----------
-    path : path
-        Files named in the study are relative to its folder.
-    allow_import : bool
-        Allow a kernel named "module:NAME", whose module is imported.
-
-    Raises
-    ------
-    SweepError
-        The file cannot be read.
-    StudyError
-        It is no TOML, or has mistakes; all of them are listed.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> import sweep
-    >>> lines = ["# How fast?", 'kernel = "foliot"', "axes.mu = [0.1, 1.0]", "fixed = { phi0 = 1.0, a = 1.0 }"]
-    >>> _ = Path("how_fast.toml").write_text("\\n".join(lines))
-    >>> sweep.read_study("how_fast.toml").question
-    'How fast?'
-    """
-    path = as_path(path)
-    if path.suffix in (".h5", ".nc"):
-        raise SweepError(f"{path} is a result, not a study; look at it with: sweep show {path}")
-    if path.suffix == ".py":
-        raise SweepError(f"{path} is a study in Python; run it with: python {path}")
-    text = _read_text(path)
-    keys = _parse(text, str(path))
-    first = next((line.strip() for line in text.splitlines() if line.strip()), "")
-    question = {"question": first.lstrip("# ").rstrip()} if first.startswith("#") else {}
-    return StudyParser(str(path), path.parent, allow_import).study({**question, **keys}, text)
-
-
-def build_study(*, allow_import: bool = False, **keys: Any) -> Study:
-    """The study made of the same keys as a TOML file has.
-
-    Parameters
-    ----------
+    given : path, mapping, Dataset or Study, optional
+        A study file (files named in it are relative to its folder), a dict of the same keys, or a Dataset of `run` or
+        `open_result`, which says what study it came from; a Study is returned as it is. None: the keys are keywords.
     allow_import : bool
         Allow a kernel named "module:NAME", whose module is imported.
     **keys
@@ -77,81 +42,53 @@ def build_study(*, allow_import: bool = False, **keys: Any) -> Study:
 
     Raises
     ------
-    StudyError
-        There are mistakes; all of them are listed.
-
-    Examples
-    --------
-    >>> import sweep
-    >>> study = sweep.build_study(kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0})
-    >>> study.axes["mu"].values
-    array([0.1, 1. ])
-    """
-    return StudyParser("study", Path(), allow_import).study(keys, "")
-
-
-Given = Study | str | os.PathLike[str] | Mapping[str, Any]
-"""What a study may be given as: itself, its file, or its keys."""
-
-
-def study(given: Given | None = None, /, *, allow_import: bool = False, **keys: Any) -> Study:
-    """The study of a file, of a dict of keys, or of keywords; one that is a study already is given back.
-
-    Parameters
-    ----------
-    given : Study, path or mapping, optional
-        None: keywords say what there is to say.
-    allow_import : bool
-        Allow a kernel named "module:NAME", whose module is imported.
-    **keys
-        As of `build_study`.
-
-    Raises
-    ------
     SweepError
-        It is nothing of these, or has mistakes; all of them are listed.
+        It is none of these, or the file cannot be read.
+    StudyError
+        It is no TOML, or has mistakes; all of them are listed.
 
     Examples
     --------
+    >>> from pathlib import Path
     >>> import sweep
     >>> study = sweep.study(kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0})
     >>> study
     <Study 'foliot over mu': foliot over mu (2)>
+    >>> study.axes["mu"].values
+    array([0.1, 1. ])
+    >>> lines = ["# How fast?", 'kernel = "foliot"', "axes.mu = [0.1, 1.0]", "fixed = { phi0 = 1.0, a = 1.0 }"]
+    >>> _ = Path("how_fast.toml").write_text("\\n".join(lines))
+    >>> sweep.study("how_fast.toml").question
+    'How fast?'
+    >>> sweep.study(sweep.run(study))
+    <Study 'foliot over mu': foliot over mu (2)>
     """
     if given is None and not keys:
         raise SweepError(f"there is no study: give one, the path of its TOML file, a dict of its keys, or {KEYWORDS}")
-    if given is None:
-        return build_study(allow_import=allow_import, **keys)
-    if keys:
+    if given is not None and keys:
         raise SweepError(f"{listed(keys, word='and')}: keywords do not go with a study; give one of the two")
     if isinstance(given, Study):
         return given
-    if hasattr(given, "data_vars"):  # a Dataset is a Mapping
-        raise SweepError("expected a study, found a Dataset; sweep.study_of(dataset) is the study it came from")
-    if isinstance(given, Mapping):
-        return StudyParser("study", Path(), allow_import).study(given, "")
+    if hasattr(given, "data_vars"):
+        return _study_of_result(given, allow_import)
+    if given is None or isinstance(given, Mapping):
+        return StudyParser("study", Path(), allow_import).study(keys if given is None else given, "")
     if not isinstance(given, str | os.PathLike):
         raise SweepError(f"expected a study, its path, or a dict of its keys, found {show(given)}; or write {KEYWORDS}")
-    if "\n" in (path := os.fspath(given)):
+    if "\n" in os.fspath(given):
         raise SweepError("this is the text of a study, not its path; write sweep.study(tomllib.loads(text))")
-    return read_study(path, allow_import)
+    path = as_path(given)
+    if path.suffix in (".h5", ".nc"):
+        raise SweepError(f"{path} is a result, not a study; look at it with: sweep show {path}")
+    if path.suffix == ".py":
+        raise SweepError(f"{path} is a study in Python; run it with: python {path}")
+    text = _read_text(path)
+    first = next((line.strip() for line in text.splitlines() if line.strip()), "")
+    question = {"question": first.lstrip("# ").rstrip()} if first.startswith("#") else {}
+    return StudyParser(str(path), path.parent, allow_import).study({**question, **_parse(text, str(path))}, text)
 
 
-as_study = study
-"""The same under a name that no parameter has."""
-
-
-def study_of(dataset: xr.Dataset, allow_import: bool = False) -> Study:
-    """The study that a result came from. Raises SweepError.
-
-    Examples
-    --------
-    >>> import sweep
-    >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
-    >>> sweep.study_of(ds)
-    <Study 'foliot over mu': foliot over mu (3)>
-    """
-    require_dataset("study_of", dataset)
+def _study_of_result(dataset: Any, allow_import: bool) -> Study:
     if "study_json" not in dataset.attrs:
         raise SweepError("the dataset does not say which study it came from; pass the study")
     return Study.from_json(str(dataset.attrs["study_json"]), allow_import=allow_import)

@@ -42,7 +42,7 @@ def to_toml(study: Study) -> str:
 
 
 def study_keys(study: Study) -> dict[str, Any]:
-    """The keys that `build_study` makes the study of."""
+    """The keys that `sweep.study` makes the study of."""
     found: dict[str, Any] = {"title": study.title, "question": study.question, "kernel": study.kernel_name}
     found |= {name: getattr(study, name) for name in ("method", "rtol") if name not in study.axes}
     found["outputs"] = list(study.outputs)

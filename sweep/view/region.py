@@ -28,7 +28,7 @@ POINTS = 101
 
 def picture(dataset: xr.Dataset, choice: Choice, x_range: Range | None, y_range: Range | None) -> BytesIO:
     """The shown slice as a PNG fit for print. Raises SweepError, also where matplotlib is missing."""
-    from sweep.show.charts import plot
+    from sweep.show.plot import plot
 
     found = shown(dataset, choice, x_range, y_range)
     name = str(found.y.name or choice.output)

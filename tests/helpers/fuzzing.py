@@ -18,7 +18,7 @@ from sweep.cells.fingerprint import fingerprint
 from sweep.cli import main
 from sweep.runs.run import run
 from sweep.store.layout import read_layout, structure_digest
-from sweep.study.read import as_study, read_study
+from sweep.study.read import study as as_study
 from sweep.study.toml import to_toml
 from sweep.system.errors import SweepError
 
@@ -108,7 +108,7 @@ def fuzz_study(rng: random.Random, folder: Path, texts: Sequence[str] = ()) -> s
     path.write_text(varied(rng, texts) if texts else nonsense(rng, STUDY), encoding="utf-8", errors="replace")
     try:
         # foreign code would not be run: only our own modules can be loaded at all, and those only where it is allowed
-        found = read_study(path, allow_import=rng.random() < 0.9)
+        found = as_study(path, allow_import=rng.random() < 0.9)
         fingerprint(found)
         assert type(found).from_json(found.to_json(), allow_import=True) == found
     except SweepError:

@@ -14,11 +14,11 @@ import xxhash
 HERE = Path(__file__)
 sys.path[:0] = [p for p in (str(HERE.parent), str(HERE.parents[2])) if p not in sys.path]
 
+import sweep  # noqa: E402
 from sweep.results.verify import verify  # noqa: E402
 from sweep.runs.run import complete  # noqa: E402
 from sweep.store.reading import StoredFile  # noqa: E402
 from sweep.store.store import Store, unfinished_of  # noqa: E402
-from sweep.study.read import build_study  # noqa: E402
 from sweep.system.errors import SweepError  # noqa: E402
 
 CELLS = 3000
@@ -28,7 +28,7 @@ def study(cells=CELLS, every=1, speeds=(0.0, 1.0, -1.0), **keys):
     """A stone thrown from many heights, its way traced."""
     axes = {"height": np.linspace(1.0, 50.0, cells // 3)[::every], "v0": list(speeds)}
     keys = {"outputs": ["fall_time", "drop"], "along": {"phase": [0.0, 0.5]}, **keys}
-    return build_study(kernel="toy:KERNEL", allow_import=True, axes=axes, **keys)
+    return sweep.study(kernel="toy:KERNEL", allow_import=True, axes=axes, **keys)
 
 
 STUDY = study()

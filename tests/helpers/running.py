@@ -12,10 +12,10 @@ import pytest
 import xarray as xr
 from hypothesis import strategies as st
 
+import sweep
 from sweep.runs.run import run
 from sweep.store.reading import StoredFile
 from sweep.store.store import Store, unfinished_of
-from sweep.study.read import build_study
 from sweep.system import disk
 from sweep.system.errors import SweepError
 
@@ -27,7 +27,7 @@ SPEEDS = [0.0, 0.5, 3.0, 1e-9, 1e4]
 
 def stone(kernel="toy:KERNEL", **keys):
     keys = {"axes": {"height": HEIGHTS, "v0": SPEEDS}, "along": {"phase": [0.0, 0.25, 1.0]}, **keys}
-    return build_study(allow_import=True, kernel=kernel, title="A stone", **keys)
+    return sweep.study(allow_import=True, kernel=kernel, title="A stone", **keys)
 
 
 def tall(count, kernel="toy:KERNEL"):
@@ -113,8 +113,8 @@ def environment():
 RUN_SLOWLY = """
     import sys
     from sweep.runs.run import run
-    from sweep.study.read import build_study
-    study = build_study(allow_import=True, kernel="slow:SLOW", title="A stone", outputs=["fall_time"],
+    import sweep
+    study = sweep.study(allow_import=True, kernel="slow:SLOW", title="A stone", outputs=["fall_time"],
                         axes=dict(height=[float(h) for h in range(1, 401)]))
     run(study, sys.argv[1], workers=int(sys.argv[2]), block_cells=int(sys.argv[3]))
 """

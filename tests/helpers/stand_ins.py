@@ -13,7 +13,7 @@ from sweep.cells.solve import Solver
 
 def toy_study(**keys):
     keys = {"outputs": ["impact_speed"], "fixed": {"v0": 0.0}, **keys}
-    return sweep.build_study(kernel="toy:KERNEL", allow_import=True, **keys)
+    return sweep.study(kernel="toy:KERNEL", allow_import=True, **keys)
 
 
 def solved(study, start=0, stop=None):

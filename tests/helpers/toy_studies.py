@@ -10,12 +10,12 @@ HEAD = 'kernel = "toy:KERNEL"\noutputs = ["fall_time"]\n'
 
 def build(**keys):
     """A study of the toy, which gives its fall time unless the keys say more."""
-    return sweep.build_study(**{"kernel": "toy:KERNEL", "allow_import": True, "outputs": ["fall_time"], **keys})
+    return sweep.study(**{"kernel": "toy:KERNEL", "allow_import": True, "outputs": ["fall_time"], **keys})
 
 
 def build_rich(**keys):
     """A study of the rich kernel over two loads, unless the keys say more."""
-    return sweep.build_study(**{"kernel": "toy:RICH", "allow_import": True, "axes": {"load": [1.0, 2.0]}, **keys})
+    return sweep.study(**{"kernel": "toy:RICH", "allow_import": True, "axes": {"load": [1.0, 2.0]}, **keys})
 
 
 def message_of(action, where):

@@ -15,11 +15,11 @@ FILES = ("balance_isochronism", "balance_isochronism_lift", "balance_isochronism
 
 def thinned(name):
     """A study with every second value of the long axes, and every fourth angle of the impulse."""
-    read = sweep.read_study(study.__file__.replace("balance_isochronism.py", f"{name}.toml"), allow_import=True)
+    read = sweep.study(study.__file__.replace("balance_isochronism.py", f"{name}.toml"), allow_import=True)
     steps = {"w": 2, "m": 2, "at": 4}
     axes = {axis: x.values[:: steps.get(axis, 1)] for axis, x in read.axes.items()}
     keys = {"kernel": read.kernel_name, "rtol": 1e-11, "axes": axes, "fixed": dict(read.fixed)}
-    return sweep.build_study(**keys, allow_import=True)
+    return sweep.study(**keys, allow_import=True)
 
 
 @pytest.fixture(scope="module")
@@ -71,9 +71,7 @@ def swing(at, r, zeta, w):
 def test_amplitude_and_period_are_those_of_50_digits(at):
     zeta, r, w = 1 / 600, 0.025, 0.05
     fixed = {"zeta": zeta, "omega_n": 1.0, "r": r, "w": w, "flips": 2001}
-    made = sweep.build_study(
-        kernel="balance_scene:KERNEL", axes={"at": [at]}, fixed=fixed, rtol=1e-12, allow_import=True
-    )
+    made = sweep.study(kernel="balance_scene:KERNEL", axes={"at": [at]}, fixed=fixed, rtol=1e-12, allow_import=True)
     ds = sweep.run(made)
     a, half = swing(at, r, zeta, w)
     assert float(ds.clock[0]) == pytest.approx(float(2 * half), rel=1e-11)

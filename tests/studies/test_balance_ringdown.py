@@ -16,7 +16,7 @@ def result(tmp_path_factory):
         "zeta": {"spacing": "log", "start": 1e-4, "stop": 2, "num": 31},
         "r": {"spacing": "log", "start": 1e-4, "stop": 0.9, "num": 37},
     }
-    coarse = sweep.build_study(kernel="balance", rtol=1e-12, axes=axes, fixed={"omega_n": 15.0, "theta0": -1.0})
+    coarse = sweep.study(kernel="balance", rtol=1e-12, axes=axes, fixed={"omega_n": 15.0, "theta0": -1.0})
     sweep.run(coarse, path, workers=1).close()
     return path
 

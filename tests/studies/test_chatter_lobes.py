@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(not COMPILED, reason="90 000 receptances; the ke
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
     path = tmp_path_factory.mktemp("lobes") / "chatter_lobes.h5"
-    sweep.run(sweep.read_study(study.__file__.replace(".py", ".toml")), path, workers=1).close()
+    sweep.run(sweep.study(study.__file__.replace(".py", ".toml")), path, workers=1).close()
     return path
 
 

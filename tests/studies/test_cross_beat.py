@@ -14,7 +14,7 @@ pytestmark = pytest.mark.skipif(not COMPILED, reason="thousands of swings; the i
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
     path = tmp_path_factory.mktemp("cross") / "cross_beat.h5"
-    read = sweep.read_study(study.__file__.replace(".py", ".toml"), allow_import=True)
+    read = sweep.study(study.__file__.replace(".py", ".toml"), allow_import=True)
     sweep.run(read, path, workers=1).close()
     return path
 
@@ -72,7 +72,7 @@ def switches(tau, I_l, I_r, c, R, k, d, phi0, sway, nu, count):
 def test_the_swings_are_those_of_an_own_integration(ds, share, R, sway):
     tau, c, phi0, nu = 9.56541e-4, float(ds.c_l), float(ds.phi0), 1.3
     fixed = {"I_l": 1e-4 * share, "I_r": 1e-4 * (1 - share), "c_l": c, "c_r": c, "R_l": R, "R_r": R, "tau": tau}
-    made = sweep.build_study(
+    made = sweep.study(
         kernel="cross_beat_scene:KERNEL", axes={"flips": [1, 2, 5, 6]}, rtol=1e-9, allow_import=True,
         outputs=["interval"], fixed=fixed | {"phi0": phi0, "stiffness": 0.3, "damper": 2e-3, "sway": sway, "nu": nu},
     )  # fmt: skip

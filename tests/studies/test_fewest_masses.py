@@ -60,7 +60,7 @@ def test_more_masses_for_modal_reduction_make_a_statement_fail(ds):
 def test_the_file_holds_the_drivetrains_and_bands_of_the_script(tmp_path):
     study.write_points(tmp_path / "points.csv")
     assert (tmp_path / "points.csv").read_text() == POINTS.read_text()
-    first = sweep.read_study(POINTS.with_suffix(".toml"))
+    first = sweep.study(POINTS.with_suffix(".toml"))
     chains = study.drivetrains(study.DRIVETRAINS)
     assert first.axes["J"].values.shape == (study.DRIVETRAINS, study.MASSES)
     assert (first.axes["J"].values == chains["J"]).all()
@@ -70,10 +70,10 @@ def test_the_file_holds_the_drivetrains_and_bands_of_the_script(tmp_path):
 
 
 def test_the_file_can_be_run_on_its_first_drivetrains():
-    whole = sweep.read_study(POINTS.with_suffix(".toml"))
+    whole = sweep.study(POINTS.with_suffix(".toml"))
     some = {name: whole.axes[name].values[:16].tolist() for name in ("J", "k", "f_max")}
     fixed = {"h": study.DAMPER, "tol": study.TOLERANCE, "reduction": "rivin"}
-    ds = sweep.run(sweep.build_study(kernel="drivetrain", design="zip", axes=some, fixed=fixed), progress=False)
+    ds = sweep.run(sweep.study(kernel="drivetrain", design="zip", axes=some, fixed=fixed), progress=False)
     inside = np.arange(16) % len(study.INSIDE) + 1
     assert (ds.n_kept.values >= inside).all()
     assert ((ds.frequency.values <= ds.f_max.values[:, None]).sum(axis=1) == inside).all()

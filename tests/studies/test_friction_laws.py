@@ -15,16 +15,16 @@ pytestmark = pytest.mark.skipif(not COMPILED, reason="thousands of cells; the ke
 
 def coarse(name, axes):
     """The study in a file on other axes."""
-    full = sweep.read_study(study.__file__.replace("friction_laws.py", f"{name}.toml"))
+    full = sweep.study(study.__file__.replace("friction_laws.py", f"{name}.toml"))
     fixed = {p: full.fixed[p] for p in full.fixed if p in ("a", "c", "phi0")}
-    return sweep.build_study(kernel="foliot", rtol=full.rtol, axes=axes, fixed=fixed)
+    return sweep.study(kernel="foliot", rtol=full.rtol, axes=axes, fixed=fixed)
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     """Both studies with 8 and 10 torques a decade instead of 20 and 40, and a tenth of the Coulomb frictions."""
     folder = tmp_path_factory.mktemp("friction")
-    n = sweep.read_study(study.__file__.replace(".py", ".toml")).axes["n"].values
+    n = sweep.study(study.__file__.replace(".py", ".toml")).axes["n"].values
     mu = {"spacing": "log", "start": 1e-24, "stop": 1e24, "num": 48 * 8 + 1}
     laws = coarse("friction_laws", {"n": n, "mu": mu})
     mu = {"spacing": "log", "start": 1e-3, "stop": 1e11, "num": 141}

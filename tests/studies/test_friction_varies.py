@@ -18,7 +18,7 @@ def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("friction")
     for name in FILES:
         path = study.__file__.replace("friction_varies.py", f"{name}.toml")
-        sweep.run(sweep.read_study(path, allow_import=True), folder / f"{name}.h5", workers=1).close()
+        sweep.run(sweep.study(path, allow_import=True), folder / f"{name}.h5", workers=1).close()
     return [str(folder / f"{name}.h5") for name in FILES]
 
 

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.skipif(not COMPILED, reason="fifty reduced models; the 
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
     path = tmp_path_factory.mktemp("fula") / "fula_milling_machine.h5"
-    sweep.run(sweep.read_study(study.__file__.replace(".py", ".toml")), path, workers=1).close()
+    sweep.run(sweep.study(study.__file__.replace(".py", ".toml")), path, workers=1).close()
     return path
 
 

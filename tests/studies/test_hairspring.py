@@ -21,7 +21,7 @@ def result(tmp_path_factory):
         "a": {"spacing": "log", "start": 1e-3, "stop": 10, "num": 33},
         "k": {"spacing": "log", "start": 3e-6, "stop": 3e7, "num": 105},
     }
-    study = sweep.build_study(kernel="foliot", rtol=1e-7, axes=axes, fixed={"mu": 1.0, "phi0": 1.0})
+    study = sweep.study(kernel="foliot", rtol=1e-7, axes=axes, fixed={"mu": 1.0, "phi0": 1.0})
     sweep.run(study, path, workers=1).close()
     return path
 
@@ -41,7 +41,7 @@ def verdicts(statements):
 
 
 def test_the_study_file_has_the_grid_the_conclusions_need():
-    study = sweep.read_study(hairspring.__file__.replace(".py", ".toml"))
+    study = sweep.study(hairspring.__file__.replace(".py", ".toml"))
     assert list(study.axes) == ["a", "k"]
     assert (study.fixed["mu"], study.fixed["phi0"]) == (1.0, 1.0)
     assert (

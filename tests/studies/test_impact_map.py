@@ -15,7 +15,7 @@ pytestmark = pytest.mark.skipif(not COMPILED, reason="hundreds of cells; the ker
 
 def thinned(name, **steps):
     """A study with every n-th value of some axes."""
-    study = sweep.read_study(impact_map.__file__.replace("impact_map.py", f"{name}.toml"))
+    study = sweep.study(impact_map.__file__.replace("impact_map.py", f"{name}.toml"))
     axes = dict(study.axes)
     for axis, step in steps.items():
         axes[axis] = dataclasses.replace(axes[axis], values=axes[axis].values[::step], words=None)

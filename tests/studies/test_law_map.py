@@ -17,10 +17,10 @@ pytestmark = pytest.mark.skipif(not COMPILED, reason="thousands of cells; the ke
 def result(tmp_path_factory):
     """The study with all of its torques and fewer clocks."""
     path = tmp_path_factory.mktemp("law") / "law_map.h5"
-    full = sweep.read_study(study.__file__.replace(".py", ".toml"))
+    full = sweep.study(study.__file__.replace(".py", ".toml"))
     axes = {name: axis.values for name, axis in full.axes.items()}
     axes |= {"e": [1, 0.99, 0.5], "R": [0, 1, 100], "c": [0, 1e-6, 1]}
-    made = sweep.build_study(
+    made = sweep.study(
         kernel="foliot", rtol=1e-8, axes=axes, fixed={"phi0": 1}, outputs=["amplitude", "crossing_speed", "sensitivity"]
     )
     sweep.run(made, path, workers=1).close()
@@ -70,7 +70,7 @@ def test_the_law_holds_for_mixtures_and_a_false_degree_is_seen(ds):
 
 
 def test_the_large_grid_keeps_the_least_exponent_of_each_clock():
-    full = sweep.read_study(study.__file__.replace("law_map.py", "law_map_overnight.toml"))
+    full = sweep.study(study.__file__.replace("law_map.py", "law_map_overnight.toml"))
     assert np.prod([len(axis.values) for axis in full.axes.values()]) > 9.9e7
     axes = {
         name: dataclasses.replace(axis, values=axis.values[::step], words=None)
@@ -79,7 +79,7 @@ def test_the_large_grid_keeps_the_least_exponent_of_each_clock():
     small = dataclasses.replace(full, axes=axes)
     kept = sweep.run(small)
     cells = {name: axis.values for name, axis in axes.items()}
-    whole = sweep.run(sweep.build_study(
+    whole = sweep.run(sweep.study(
         kernel="foliot", rtol=1e-6, axes=cells, fixed=dict(full.fixed), outputs=["sensitivity"]
     ))  # fmt: skip
     least = whole.sensitivity.min("mu")

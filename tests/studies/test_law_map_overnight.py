@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(not COMPILED, reason="a million cells; the kerne
 def results(tmp_path_factory):
     """Every third degree, few restitutions and every ninth friction; and the borders as they stand."""
     folder = tmp_path_factory.mktemp("overnight")
-    full = sweep.read_study(study.__file__.replace(".py", ".toml"))
+    full = sweep.study(study.__file__.replace(".py", ".toml"))
     cuts = {"n": slice(1, None, 3), "e": [0, 5, 8, 10], "R": slice(0, None, 3), "c": slice(0, None, 10)}
     axes = {
         name: dataclasses.replace(axis, values=axis.values[cuts.get(name, slice(None))], words=None)
@@ -28,7 +28,7 @@ def results(tmp_path_factory):
     axes["R"] = dataclasses.replace(axes["R"], values=np.append(axes["R"].values[:-1], 1e4))
     paths = [folder / "law_map_overnight.h5", folder / "law_map_borders_fine.h5"]
     sweep.run(dataclasses.replace(full, axes=axes), paths[0], workers=1).close()
-    coarse = sweep.run(sweep.read_study(study.__file__.replace("overnight.py", "borders.toml")), workers=1)
+    coarse = sweep.run(sweep.study(study.__file__.replace("overnight.py", "borders.toml")), workers=1)
     assert sweep.refine(coarse, "sensitivity", 0.02, path=paths[1], workers=1).complete
     return [str(path) for path in paths]
 

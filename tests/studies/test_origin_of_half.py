@@ -22,10 +22,10 @@ DEGREE_TWO = {
 def result(tmp_path_factory):
     """The study with 5 torques a decade instead of 10."""
     path = tmp_path_factory.mktemp("origin") / "origin_of_half.h5"
-    full = sweep.read_study(study.__file__.replace(".py", ".toml"))
+    full = sweep.study(study.__file__.replace(".py", ".toml"))
     axes = {name: full.axes[name].values for name in ("e", "c", "a", "R")}
     axes["mu"] = {"spacing": "log", "start": 1e-6, "stop": 1e6, "num": 61}
-    coarse = sweep.build_study(kernel="foliot", rtol=1e-9, axes=axes, fixed={"n": 2, "phi0": 1})
+    coarse = sweep.study(kernel="foliot", rtol=1e-9, axes=axes, fixed={"n": 2, "phi0": 1})
     sweep.run(coarse, path, workers=1).close()
     return path
 
@@ -45,7 +45,7 @@ def held(statements):
 
 
 def test_coulomb_friction_of_the_study_file_is_half_of_torques_on_its_grid():
-    axes = sweep.read_study(study.__file__.replace(".py", ".toml")).axes
+    axes = sweep.study(study.__file__.replace(".py", ".toml")).axes
     R, mu = axes["R"].values[1:], axes["mu"].values
     nearest = mu[np.abs(np.log(mu / (R[:, None] / study.RHO))).argmin(axis=1)]
     np.testing.assert_allclose(R / nearest, study.RHO, rtol=1e-14)
@@ -106,7 +106,7 @@ def test_viscous_friction_would_not_pass_as_minus_one_half():
     """The scene that measures -1/2 is not bound to it: with a = 1/s it falls by 1/3 at strong drive."""
     axes = {"mu": [1e7, 2e7]}
     fixed = {"phi0": 1, "a": 1, "flips": 3000}
-    made = sweep.build_study(kernel="foliot_scene:KERNEL", axes=axes, fixed=fixed, rtol=1e-9, allow_import=True)
+    made = sweep.study(kernel="foliot_scene:KERNEL", axes=axes, fixed=fixed, rtol=1e-9, allow_import=True)
     interval = sweep.run(made).interval.values
     assert np.log2(interval[1] / interval[0]) == pytest.approx(-1 / 3, abs=2e-3)
 

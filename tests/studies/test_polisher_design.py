@@ -19,7 +19,7 @@ def result(tmp_path_factory):
         "f": {"spacing": "linear", "start": 200, "stop": 800, "num": 21, "unit": "mm"},
         "e": {"spacing": "linear", "start": 20, "stop": 130, "num": 23, "unit": "mm"},
     }
-    coarse = sweep.build_study(kernel="polisher", rtol=1e-10, axes=axes, fixed={"type": "A"})
+    coarse = sweep.study(kernel="polisher", rtol=1e-10, axes=axes, fixed={"type": "A"})
     sweep.run(coarse, path, workers=1).close()
     return path
 
@@ -43,7 +43,7 @@ def test_the_machines_found_have_the_amplitude_and_the_distortion_that_is_said(d
     for cell in range(some.cell.size):
         one = some.isel(cell=cell)
         lengths = {"b": float(one.b), "d": float(one.d), "f": float(one.f)}
-        exact = sweep.run(sweep.build_study(kernel="polisher", axes={"e": [float(one.crank)]}, fixed=lengths))
+        exact = sweep.run(sweep.study(kernel="polisher", axes={"e": [float(one.crank)]}, fixed=lengths))
         assert math.degrees(exact.A1[0]) == pytest.approx(15, rel=2e-3)
         assert float(one.thd) == pytest.approx(float(exact.thd[0]), rel=0.03)
 
@@ -54,9 +54,7 @@ def test_the_machines_of_the_figure_have_the_amplitude_and_are_those_between_the
     some = made.stack(cell=("b", "f")).dropna("cell")
     assert some.cell.size >= 6
     lengths = {name: some[name].values for name in "bf"} | {"e": some.crank.values}
-    exact = sweep.run(
-        sweep.build_study(kernel="polisher", design="zip", axes=lengths, fixed={"d": 0.38}, outputs=["A1"])
-    )
+    exact = sweep.run(sweep.study(kernel="polisher", design="zip", axes=lengths, fixed={"d": 0.38}, outputs=["A1"]))
     np.testing.assert_allclose(exact.A1, study.WANTED, rtol=1e-12)
     between = study.of_amplitude(ds).sel(d=0.38, method="nearest").sel(b=0.4, f=[0.32, 0.5], method="nearest")
     same = study.machines_on(np.array([float(between.b)]), 0.38, between.f.values).isel(b=0)
@@ -76,7 +74,7 @@ def test_at_the_border_the_amplitude_is_just_reached():
     turns = longest > 0
     study_of = {"b": b, "d": d}
     for coupler, crank in zip(f[turns], longest[turns], strict=True):
-        just = sweep.build_study(
+        just = sweep.study(
             kernel="polisher", axes={"e": [crank * (1 - 1e-9)]}, fixed=study_of | {"f": coupler}, outputs=["A1"]
         )
         amplitude = float(sweep.run(just).A1[0])

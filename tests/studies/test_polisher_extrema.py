@@ -14,7 +14,7 @@ def result(tmp_path_factory):
     path = tmp_path_factory.mktemp("extrema") / "polisher_extrema.h5"
     e = {"values": [0, 1, 2, 5, 8, 10, 12, 14, 15, 16, 16.48, 16.49, 16.5, 17, 18], "unit": "cm"}
     fixed = {"b": 0.6201, "d": 0.38, "f": 0.405, "type": "A"}
-    coarse = sweep.build_study(kernel="polisher", rtol=1e-12, axes={"e": e}, fixed=fixed)
+    coarse = sweep.study(kernel="polisher", rtol=1e-12, axes={"e": e}, fixed=fixed)
     sweep.run(coarse, path, workers=1).close()
     return path
 

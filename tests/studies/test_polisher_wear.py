@@ -27,7 +27,7 @@ def result(tmp_path_factory):
         "w_x": [0.5, 0.53, 0.54, 0.56, 0.58],
     }  # fmt: skip
     along = {"radius": np.linspace(0.0, 0.1, 26)}
-    made = sweep.build_study(kernel="polisher_wear", rtol=1e-5, axes=axes, fixed=fixed, along=along)
+    made = sweep.study(kernel="polisher_wear", rtol=1e-5, axes=axes, fixed=fixed, along=along)
     sweep.run(made, path, workers=1).close()
     return path
 
@@ -36,7 +36,7 @@ def result(tmp_path_factory):
 def loaded(result):
     """The study of a constant load, at three radii."""
     path = result.with_name("polisher_wear_load.h5")
-    made = sweep.read_study(study.__file__.replace(".py", "_load.toml"))
+    made = sweep.study(study.__file__.replace(".py", "_load.toml"))
     made = replace(made, along={"radius": np.array([0.0, 0.05, 0.098])}, rtol=1e-4)
     sweep.run(made, path, workers=1).close()
     return path
@@ -48,7 +48,7 @@ def ds(result):
 
 
 def test_the_study_file_has_the_grid_the_conclusions_need():
-    read = sweep.read_study(study.__file__.replace(".py", ".toml"))
+    read = sweep.study(study.__file__.replace(".py", ".toml"))
     assert list(read.axes) == ["tool_n", "tool_b", "e", "w_x"]
     assert read.along["radius"][0] == 0
     assert {round(100 * x) for x in read.axes["w_x"].values} >= {50, 54, 56, 58}

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.skipif(not COMPILED, reason="thousands of cells; the ke
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
     path = tmp_path_factory.mktemp("start") / "self_starting.h5"
-    sweep.run(sweep.read_study(study.__file__.replace(".py", ".toml")), path, workers=1).close()
+    sweep.run(sweep.study(study.__file__.replace(".py", ".toml")), path, workers=1).close()
     return path
 
 
@@ -42,7 +42,7 @@ def test_a_release_ends_as_its_integration(a, mu, start):
         lambda t, y: (y[1], mu - k * y[0] - R - a * y[1]), (0, 1e3), (start + push * 5e-9, push * 1e-4),
         events=(stop, switch), method="DOP853", rtol=1e-10, atol=1e-12,
     )  # fmt: skip
-    made = sweep.build_study(
+    made = sweep.study(
         kernel="foliot_start", axes={"mu": [mu]}, along={"flip": [1]}, rtol=1e-9,
         fixed={"phi0": 1, "k": k, "R": R, "a": a, "phi_start": start},
     )  # fmt: skip

@@ -21,16 +21,16 @@ def ds():
     """The study with a few of its steps and drives."""
     axes = {"method": METHODS, "mu": np.geomspace(1e-2, 1e4, 7).tolist(), "step": [0.05, 0.5, 5.0, 20.0]}
     fixed = {"a": 1.0, "phi0": 1.0, "flips": 6, "location": "root"}
-    study = sweep.build_study(kernel="foliot_steps", rtol=1e-6, axes=axes, fixed=fixed)
+    study = sweep.study(kernel="foliot_steps", rtol=1e-6, axes=axes, fixed=fixed)
     return maps.with_truth(sweep.run(study, progress=False))
 
 
 def test_the_study_files_have_the_grid_the_conclusions_need():
-    study = sweep.read_study(maps.__file__.replace(".py", ".toml"))
+    study = sweep.study(maps.__file__.replace(".py", ".toml"))
     assert list(study.axes) == ["method", "mu", "step"]
     assert (study.fixed["a"], study.fixed["phi0"], study.fixed["location"]) == (1.0, 1.0, 3.0)
     for name, axis in maps.GRIDS.items():
-        study = sweep.read_study(Path(maps.__file__).with_name(f"{name}.toml"))
+        study = sweep.study(Path(maps.__file__).with_name(f"{name}.toml"))
         assert list(study.axes) == ["method", axis, "step"]
         assert (study.fixed["phi0"], study.fixed["location"]) == (1.0, 3.0)
 
@@ -39,7 +39,7 @@ def test_the_study_files_have_the_grid_the_conclusions_need():
 def test_neither_friction_nor_a_spring_makes_a_value_wrong_in_silence(fixed, axes):
     axes = {"method": METHODS, **axes, "step": [0.1, 1.0, 10.0]}
     fixed = {"mu": 1.0, "phi0": 1.0, "flips": 6, "location": "root", **fixed}
-    study = sweep.build_study(kernel="foliot_steps", rtol=1e-6, axes=axes, fixed=fixed)
+    study = sweep.study(kernel="foliot_steps", rtol=1e-6, axes=axes, fixed=fixed)
     ds = maps.with_truth(sweep.run(study, progress=False))
     assert maps.foliots(ds)[0].holds
     assert np.isfinite(ds.off.where(ds.status < FIRST_REFUSAL, 0.0)).all()
@@ -85,7 +85,7 @@ def test_a_growing_oscillator_is_told_from_a_decaying_one():
 def test_where_the_runs_compared_overflow_the_error_is_not_known():
     """The finer runs grow beyond all numbers; the first, whose angle is 3e83, is all there is."""
     fixed = {"a": 4.359125, "w": 4.2095, "end": 63.5, "flips": 1, "step": 1.0, "location": "none"}
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="stability_maps:KERNEL", rtol=1e-6, axes={"method": ["semi_implicit"]}, fixed=fixed, allow_import=True
     )
     ds = sweep.run(study, progress=False)

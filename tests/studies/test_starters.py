@@ -14,7 +14,7 @@ pytestmark = pytest.mark.skipif(not COMPILED, reason="every kernel; their own te
 @pytest.mark.parametrize("name", sorted(KERNELS))
 def test_the_study_to_begin_with_runs(name, tmp_path):
     write_starter(name, tmp_path / "study.toml")
-    study = sweep.read_study(tmp_path / "study.toml")
+    study = sweep.study(tmp_path / "study.toml")
     assert study.question
     ds = sweep.run(study, progress=False, workers=1)
     valued = ds.status < 64
@@ -25,7 +25,7 @@ def test_the_study_to_begin_with_runs(name, tmp_path):
 @pytest.mark.parametrize("name", sorted(KERNELS))
 def test_what_the_study_to_begin_with_varies_grows_about_the_example(name, tmp_path):
     write_starter(name, tmp_path / "study.toml")
-    study = sweep.read_study(tmp_path / "study.toml")
+    study = sweep.study(tmp_path / "study.toml")
     for values in (*study.along.values(), *(axis.values for axis in study.axes.values())):
         assert (np.diff(values) > 0).all()
     for axis, values in ((a, study.axes[a].values) for a in study.axes if a in study.kernel.example):

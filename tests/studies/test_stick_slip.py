@@ -14,10 +14,8 @@ many = pytest.mark.skipif(not COMPILED, reason="many steps")
 
 def swept(path, **axes):
     """Some cells of the study's grid."""
-    whole = sweep.read_study(study.__file__.replace(".py", ".toml"), allow_import=True)
-    some = sweep.build_study(
-        kernel=whole.kernel_name, rtol=whole.rtol, axes=axes, fixed=dict(whole.fixed), allow_import=True
-    )
+    whole = sweep.study(study.__file__.replace(".py", ".toml"), allow_import=True)
+    some = sweep.study(kernel=whole.kernel_name, rtol=whole.rtol, axes=axes, fixed=dict(whole.fixed), allow_import=True)
     sweep.run(some, path, workers=1, progress=False).close()
     return str(path)
 

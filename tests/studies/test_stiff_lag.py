@@ -13,9 +13,9 @@ many = pytest.mark.skipif(not COMPILED, reason="many steps")
 
 def swept(path, toml, **axes):
     """Some cells of a study's grid."""
-    whole = sweep.read_study(study.__file__.replace("stiff_lag.py", toml), allow_import=True)
+    whole = sweep.study(study.__file__.replace("stiff_lag.py", toml), allow_import=True)
     methods = {} if "e" in axes else {"method": ["taylor", "rodas5p"]}
-    some = sweep.build_study(
+    some = sweep.study(
         kernel=whole.kernel_name, rtol=whole.rtol, axes={**methods, **axes}, fixed=dict(whole.fixed), allow_import=True
     )
     sweep.run(some, path, workers=1, progress=False).close()

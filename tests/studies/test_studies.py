@@ -48,7 +48,7 @@ def scaling():
 @pytest.fixture(scope="module")
 def coarse():
     """The study with 12 points a decade instead of 100, and clock-like constants that are not one."""
-    return sweep.build_study(
+    return sweep.study(
         kernel="foliot",
         rtol=1e-14,
         axes={"mu": {"spacing": "log", "start": 1e-7, "stop": 1e7, "num": 14 * 12 + 1}},
@@ -86,7 +86,7 @@ def q_of(alpha):
 
 @pytest.mark.parametrize("path", sorted(STUDIES.glob("*.toml")), ids=lambda path: path.stem)
 def test_a_study_file_opens_with_its_question_and_holds_no_mistake(path):
-    study = sweep.read_study(path, allow_import=True)
+    study = sweep.study(path, allow_import=True)
     assert path.read_text().startswith("# ")
     assert study.question.endswith("?")
     assert study.title
@@ -99,7 +99,7 @@ def test_a_picture_has_a_caption_of_two_to_four_sentences(picture):
 
 
 def test_the_study_covers_ten_decades_of_alpha_around_one_finely():
-    study = sweep.read_study(STUDIES / "foliot_scaling.toml")
+    study = sweep.study(STUDIES / "foliot_scaling.toml")
     alpha = study.axes["mu"].values / (study.fixed["a"] ** 2 * study.fixed["phi0"])
     assert alpha[0] < 1e-6
     assert alpha[-1] > 1e6
@@ -278,7 +278,7 @@ def test_the_study_says_how_it_is_used(scaling, capsys, arguments):
 
 def test_a_result_that_is_not_there_or_of_another_study_is_one_clear_line(scaling, tmp_path, capsys):
     assert scaling.main([str(tmp_path / "nothing.h5")]) == 2
-    other = sweep.build_study(kernel="foliot", axes={"mu": [1.0, 2.0], "a": [1.0, 2.0]}, fixed={"phi0": 1.0})
+    other = sweep.study(kernel="foliot", axes={"mu": [1.0, 2.0], "a": [1.0, 2.0]}, fixed={"phi0": 1.0})
     sweep.run(other, tmp_path / "other.h5", workers=1).close()
     assert scaling.main([str(tmp_path / "other.h5")]) == 2
     said = capsys.readouterr().err.splitlines()
@@ -293,7 +293,7 @@ def test_a_statement_that_fails_is_seen_in_the_exit_status(scaling, result, caps
 
 
 def test_too_short_a_sweep_is_a_clear_message_and_no_traceback(scaling, tmp_path, capsys):
-    study = sweep.build_study(kernel="foliot", axes={"mu": [1.0, 2.0, 3.0, 4.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    study = sweep.study(kernel="foliot", axes={"mu": [1.0, 2.0, 3.0, 4.0]}, fixed={"phi0": 1.0, "a": 1.0})
     sweep.run(study, tmp_path / "short.h5", workers=1).close()
     assert scaling.main([str(tmp_path / "short.h5")]) == 2
     assert "window" in capsys.readouterr().err

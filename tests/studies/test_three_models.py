@@ -19,7 +19,7 @@ NAMES = ("three_models", "three_models_denny", "three_models_viscous")
 def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("models")
     for name in NAMES:
-        study = sweep.read_study(three_models.__file__.replace("three_models.py", f"{name}.toml"))
+        study = sweep.study(three_models.__file__.replace("three_models.py", f"{name}.toml"))
         (axis,) = study.axes.values()
         short = dataclasses.replace(axis, values=axis.values[::4])
         sweep.run(dataclasses.replace(study, axes={axis.name: short}), folder / f"{name}.h5", workers=1).close()

@@ -15,7 +15,7 @@ SEEDS, HOURS = 32, 8
 
 
 def study_file(toml):
-    return sweep.read_study(timekeeping.__file__.replace("timekeeping.py", toml))
+    return sweep.study(timekeeping.__file__.replace("timekeeping.py", toml))
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def results(tmp_path_factory):
         fixed = {name: whole.fixed[name] for name in ("mu", "phi0", "a", "k") if name in whole.fixed}
         fixed |= {"averaging_time": 3600.0, "half_swings": float(round((HOURS + 0.5) * 3600 / half_swing))}
         axes = {"sigma": [0.003, 0.01, 0.1], "tau_c": whole.axes["tau_c"].values / 24, "seed": np.arange(SEEDS) + 1.0}
-        study = sweep.build_study(kernel="foliot_noise", rtol=1e-9, axes=axes, fixed=fixed)
+        study = sweep.study(kernel="foliot_noise", rtol=1e-9, axes=axes, fixed=fixed)
         paths.append(folder / toml.replace(".toml", ".h5"))
         sweep.run(study, paths[-1], progress=False).close()
     return [str(path) for path in paths]

@@ -20,7 +20,7 @@ def result(tmp_path_factory):
     """The study with some of its harmonics and depths."""
     path = tmp_path_factory.mktemp("ripple") / "torque_ripple.h5"
     axes = {"a": [5.0, 0.826752996, 0.1], "harmonic": [float(h) for h in HARMONICS], "depth": DEPTHS}
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot_ripple", rtol=1e-7, outputs=["period", "sensitivity"], axes=axes, fixed={"mu": 1.0, "phi0": 1.0}
     )
     sweep.run(study, path, workers=1).close()
@@ -37,7 +37,7 @@ def verdicts(statements):
 
 
 def test_the_study_file_has_the_grid_the_conclusions_need():
-    study = sweep.read_study(ripple.__file__.replace(".py", ".toml"))
+    study = sweep.study(ripple.__file__.replace(".py", ".toml"))
     assert list(study.axes) == ["a", "harmonic", "depth"]
     assert (study.fixed["mu"], study.fixed["phi0"]) == (1.0, 1.0)
     assert study.axes["depth"].values[0] == 0

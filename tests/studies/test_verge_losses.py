@@ -15,12 +15,12 @@ FILES = ("verge_losses", "verge_losses_wheel")
 
 def thinned(name):
     """A study with half of its wheels and torques, except those that the conclusions name."""
-    read = sweep.read_study(study.__file__.replace("verge_losses.py", f"{name}.toml"), allow_import=True)
+    read = sweep.study(study.__file__.replace("verge_losses.py", f"{name}.toml"), allow_import=True)
     axes = {axis: x.values for axis, x in read.axes.items()}
     if axes["I_c"].size > 3:
         axes["I_c"] = axes["I_c"][[0, 4, 5, 6, 8, 12, 16]]
     fixed = dict(read.fixed) | {"flips": 3000}
-    return sweep.build_study(kernel=read.kernel_name, rtol=1e-9, axes=axes, fixed=fixed, allow_import=True)
+    return sweep.study(kernel=read.kernel_name, rtol=1e-9, axes=axes, fixed=fixed, allow_import=True)
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +89,7 @@ def half_periods(p, count):
 
 def test_the_cycle_is_that_of_an_own_integration():
     p = {"tau": 0.02, "I_v": 1e-4, "I_c": 2.5e-4, "n": 0.2, "phi0": 0.35, "drop": 0.01, "c_v": 1e-4, "R_v": 3.5e-4}
-    made = sweep.build_study(
+    made = sweep.study(
         kernel="verge_scene:KERNEL", axes={"tau": [p["tau"]]}, fixed={k: v for k, v in p.items() if k != "tau"}
         | {"flips": 120}, rtol=1e-11, allow_import=True,
     )  # fmt: skip

@@ -18,7 +18,7 @@ SMALL = 12
 def parts():
     """The kernel that compiles soonest."""
     files = [STUDIES / f"what_auto_saves{part}.toml" for part in ("_balance",)]
-    return [study.work_precision(sweep.read_study(f), cells=SMALL, tolerances=TOLERANCES) for f in files]
+    return [study.work_precision(sweep.study(f), cells=SMALL, tolerances=TOLERANCES) for f in files]
 
 
 def made(seconds, ok, silent=None):

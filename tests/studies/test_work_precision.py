@@ -21,7 +21,7 @@ METHODS = ("auto", "coulomb", "quadrature")
 
 @pytest.fixture(scope="module")
 def coulomb():
-    few = sweep.read_study(FILE)
+    few = sweep.study(FILE)
     return work_precision(few, methods=METHODS, cells=CELLS, tolerances=TOLERANCES, truth=study.cycles(few, CELLS))
 
 
@@ -37,7 +37,7 @@ def steps():
 
 
 def test_truth_is_that_of_the_cells_in_their_order():
-    few = sweep.read_study(FILE)
+    few = sweep.study(FILE)
     true, cells = study.cycles(few, 3), precision_cells(few, 3)
     assert list(true) == ["period", "amplitude", "crossing_speed"]
     for i, (a, R) in enumerate(zip(cells["a"], cells["R"], strict=True)):

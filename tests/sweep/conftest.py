@@ -13,7 +13,7 @@ def read(tmp_path):
     def read(text, head=HEAD, allow_import=True):
         path = tmp_path / "fall.toml"
         path.write_text(head + text, encoding="utf-8")
-        return sweep.read_study(path, allow_import=allow_import)
+        return sweep.study(path, allow_import=allow_import)
 
     return read
 

@@ -109,7 +109,7 @@ def test_nothing_heavy_is_imported_before_it_is_needed(statement):
 
 
 def test_a_study_without_foreign_units_is_read_without_pint(here):
-    code = "import sys, sweep; sweep.read_study('stones.toml', True); assert not {'pint', 'xarray'} & set(sys.modules)"
+    code = "import sys, sweep; sweep.study('stones.toml', True); assert not {'pint', 'xarray'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True, env=paths())
 
 
@@ -157,7 +157,7 @@ def test_the_study_to_begin_with_is_sound(call, here, kernel):
     _, out, _ = call("kernels", kernel, "--allow-import")
     text = out.split("a study to begin with\n")[1]
     Path("begin.toml").write_text(text)
-    assert sweep.read_study("begin.toml", allow_import=True).kernel_name == kernel
+    assert sweep.study("begin.toml", allow_import=True).kernel_name == kernel
 
 
 def test_words_and_what_a_method_cannot_do_are_told(call):
@@ -381,7 +381,7 @@ def test_export_writes_csv(done, call):
 def test_an_exported_column_is_an_axis_of_the_next_study(done, call):
     call("export", "stones.h5", "-o", "stones.csv")
     Path("again.toml").write_text(HEAD + 'design = "zip"\naxes.height.file = "stones.csv"\naxes.v0.file = "stones.csv"')
-    study = sweep.read_study("again.toml", allow_import=True)
+    study = sweep.study("again.toml", allow_import=True)
     assert set(study.axes["height"].values) == set(sweep.open_result("stones.h5").height.values)
 
 

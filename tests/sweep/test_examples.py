@@ -37,7 +37,5 @@ def test_the_names_that_sweep_lists_are_the_public_ones():
 
 
 def test_a_room_and_a_function_have_one_name():
-    from sweep.study.read import read_study
-
-    assert sweep.study.read.read_study is read_study
+    assert sweep.study.read.study is study
     assert callable(sweep.study)

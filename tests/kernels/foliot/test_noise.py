@@ -439,7 +439,7 @@ def test_lasting_noise_of_the_friction_is_another_friction():
 
     def rate(**noise):
         fixed = {"mu": 0.1, "phi0": 1.0, "a": 1.0, "tau_c": 1e15, "half_swings": 4000, "averaging_time": 3600.0}
-        study = sweep.build_study(kernel="foliot_noise", axes={"seed": [1.0, 2.0, 3.0]}, fixed=fixed | noise, rtol=1e-9)
+        study = sweep.study(kernel="foliot_noise", axes={"seed": [1.0, 2.0, 3.0]}, fixed=fixed | noise, rtol=1e-9)
         return sweep.run(study).rate_error_s_per_day.values
 
     def period(mu, a):

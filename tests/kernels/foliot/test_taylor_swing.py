@@ -113,7 +113,7 @@ def test_what_is_not_asked_for_is_not_followed_and_the_rest_is_right_all_the_sam
 def test_auto_takes_it_where_drag_meets_a_hairspring_and_leaves_what_sticks_to_others():
     axes = {"k": [0.5, 0.5, 3.0], "c": [0.3, 0.3, 0.3], "n": [2.0, 0.5, 2.0], "R": [0.1, 0.1, 0.9]}
     fixed = {"mu": 1.0, "phi0": 1.0}
-    study = sweep.build_study(kernel="foliot", design="zip", axes=axes, fixed=fixed, rtol=1e-8)
+    study = sweep.study(kernel="foliot", design="zip", axes=axes, fixed=fixed, rtol=1e-8)
     cells = solved(study)
     names = [FOLIOT.methods[number].name if number >= 0 else "" for number in cells.used]
     assert names == ["taylor", "dopri5", ""]

@@ -56,7 +56,7 @@ def test_explicit_methods_give_up_where_stability_limits_their_steps_and_auto_go
     for method in ("taylor", "dop853", "dopri5"):
         _, status = solve(LAG, method, 1.0, 0.5, eps, flips=1.0)
         assert status.tolist() == [Status.OK, Status.STEP_LIMIT, Status.STEP_LIMIT]
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="stiff_scene:LAG", axes={"eps": eps}, fixed={"mu": 1.0, "a": 0.5, "flips": 1}, allow_import=True
     )
     found = sweep.run(study, progress=False)

@@ -74,7 +74,7 @@ def test_a_plateau_is_found_where_there_is_one():
     rng = np.random.default_rng(3)
     x = np.geomspace(1e-3, 1e5, 161)
     bent = xr.DataArray((1 / x + x**-0.5 * 1e-6) * np.exp(0.01 * rng.standard_normal(161)), {"x": x}, "x", name="y")
-    low = sweep.exponent_by_window(bent, "x", end="low")
+    low = sweep.fit_exponent(bent, "x", towards="low")
     assert low.attrs["plateau"] == 1
     assert low.attrs["exponent_low"] <= -1 <= low.attrs["exponent_high"]
     assert "plateau" in low.attrs["verdict"]
@@ -83,7 +83,7 @@ def test_a_plateau_is_found_where_there_is_one():
 
 def test_a_plateau_is_denied_where_the_exponent_goes_on():
     y = curve(X**-0.5 * np.log(2 * X))
-    found = sweep.exponent_by_window(y, "x")
+    found = sweep.fit_exponent(y, "x", towards="high")
     assert found.attrs["plateau"] == 0
     assert found.attrs["verdict"].startswith("no plateau: the exponent still goes from")
 
@@ -93,8 +93,8 @@ def test_a_plateau_is_denied_where_the_exponent_goes_on():
     [
         (lambda: sweep.fit_correction(curve(X), "x", end="top"), 'end: expected "low" or "high"'),
         (lambda: sweep.fit_correction(curve(X), "x", (1, 2)), "at least 8 points"),
-        (lambda: sweep.exponent_by_window(curve(np.stack([X, X])), "x"), "take one line"),
-        (lambda: sweep.exponent_by_window(curve(X)[:5], "x"), "at least 8 points"),
+        (lambda: sweep.fit_exponent(curve(np.stack([X, X])), "x", towards="high"), "take one line"),
+        (lambda: sweep.fit_exponent(curve(X)[:5], "x", towards="high"), "at least 8 points"),
     ],
 )
 def test_what_cannot_be_fitted_is_said(call, message):
@@ -247,7 +247,7 @@ def test_seven_points_are_too_few_for_a_correction_and_eight_are_not():
 def test_windows_shrink_by_half_as_much_again_to_one_end(end):
     """Of 41 points over four decades, eight are in 10^(0.7) and more."""
     x = np.geomspace(1, 1e4, 41)
-    found = sweep.exponent_by_window(curve(x**-0.5, x), "x", end=end)
+    found = sweep.fit_exponent(curve(x**-0.5, x), "x", towards=end)
     shares = 4 * 1.5 ** -np.arange(8.0)
     shares = shares[np.floor(10 * shares + 1e-9) + 1 >= 8]
     assert found.sizes["window"] == shares.size == 5
@@ -256,8 +256,8 @@ def test_windows_shrink_by_half_as_much_again_to_one_end(end):
     np.testing.assert_allclose(found.points, 10 * steps + 1)
     assert (found.low <= lows * (1 + 1e-9)).all()
     assert (found.high >= highs * (1 - 1e-9)).all()
-    assert sweep.exponent_by_window(curve(x**-0.5, x), "x", end=end, steps=3).sizes["window"] == 3
-    assert sweep.exponent_by_window(curve(x[:8] ** -0.5, x[:8]), "x", end=end).sizes["window"] == 1
+    assert sweep.fit_exponent(curve(x**-0.5, x), "x", towards=end).sizes["window"] == 3
+    assert sweep.fit_exponent(curve(x[:8] ** -0.5, x[:8]), "x", towards=end).sizes["window"] == 1
 
 
 @pytest.mark.parametrize(

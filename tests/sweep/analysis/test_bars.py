@@ -13,7 +13,8 @@ import xarray as xr
 
 import sweep
 from sweep.analysis.correlated import averaged
-from sweep.analysis.lines import KIND_WORDS
+from sweep.analysis.curves import stated_error
+from sweep.analysis.lines import KIND_WORDS, crossover
 from sweep.analysis.loglog import slope_bounds
 from sweep.analysis.scatter import _farthest
 from sweep.analysis.shapes import GRID, _hermite, _on_grid
@@ -136,9 +137,9 @@ def test_the_bar_of_the_local_exponent_knows_what_values_are_right_to():
     z = -t + (2 / 3) * np.logaddexp(0, t) + 1e-3 * rng.uniform(-1, 1, t.size)
     y = curve(t, z, rtol=1e-3)
     off = abs(sweep.local_exponent(y, "mu") - truth)
-    assert (off <= sweep.local_exponent_error(y, "mu")).all()
-    assert float(sweep.local_exponent_error(y, "mu", bound=0.0).median()) < float(
-        sweep.local_exponent_error(y, "mu").median()
+    assert (off <= sweep.local_exponent(y, "mu", error=True).exponent_error).all()
+    assert float(sweep.local_exponent(y, "mu", bound=0.0, error=True).exponent_error.median()) < float(
+        sweep.local_exponent(y, "mu", error=True).exponent_error.median()
     )
 
 
@@ -156,20 +157,20 @@ def test_the_bar_at_a_pole_is_honest(points, power, shift):
     x = 10 ** (np.linspace(-1, 1, 2 * points + 1) + shift / points)
     y = xr.DataArray(abs(x - 1) ** power, {"x": x}, "x", name="y")
     off = abs(sweep.local_exponent(y, "x") - power * x / (x - 1))
-    told = sweep.local_exponent_error(y, "x")
+    told = sweep.local_exponent(y, "x", error=True).exponent_error
     assert (off <= told).all()
     assert np.isinf(told).sum() <= 3
 
 
 def test_a_result_states_the_errors_of_its_cells():
     axes = {"mu": {"spacing": "log", "start": 1e-3, "stop": 1e3, "num": 13}}
-    ds = sweep.run(sweep.build_study(kernel="foliot", axes=axes, fixed={"a": 1.0, "phi0": 1.0}, rtol=1e-7))
-    stated = sweep.stated_error(ds, "period")
+    ds = sweep.run(sweep.study(kernel="foliot", axes=axes, fixed={"a": 1.0, "phi0": 1.0}, rtol=1e-7))
+    stated = stated_error(ds, "period")
     assert stated.dims == ("mu",)
     assert (stated == 1e-7).all()
     worse = ds.assign(error_bound=ds.error_bound.copy(data=np.where(np.arange(13) == 4, 1e-3, np.nan)))
-    assert float(sweep.stated_error(worse, "period")[4]) == pytest.approx(1e-3)
-    wide = sweep.fit_exponent(ds.period, "mu", bound=sweep.stated_error(worse, "period"))
+    assert float(stated_error(worse, "period")[4]) == pytest.approx(1e-3)
+    wide = sweep.fit_exponent(ds.period, "mu", bound=worse)
     narrow = sweep.fit_exponent(ds.period, "mu", bound=stated)
     assert float(wide.exponent_high - wide.exponent_low) > float(narrow.exponent_high - narrow.exponent_low)
 
@@ -181,7 +182,7 @@ def test_a_result_states_the_errors_of_its_cells():
 def periods():
     def line(points):
         axes = {"mu": {"spacing": "log", "start": 1e-7, "stop": 1e7, "num": points}}
-        return sweep.run(sweep.build_study(kernel="foliot", axes=axes, fixed={"a": 1.0, "phi0": np.pi / 6})).period
+        return sweep.run(sweep.study(kernel="foliot", axes=axes, fixed={"a": 1.0, "phi0": np.pi / 6})).period
 
     return line
 
@@ -191,7 +192,7 @@ def test_the_meeting_of_two_windows_holds_the_exact_place_however_many_points(pe
     """Asymptotes aP = 4/alpha and 4 (3/alpha)^(1/3) meet at alpha = mu/(a^2 phi0) = 3^(-1/2); it was 21 bars off."""
     y = periods(points)
     fits = (sweep.fit_exponent(y, "mu", window) for window in ((1e-7, 1e-4), (1e4, 1e7)))
-    found = sweep.crossover(*fits)
+    found = crossover(*fits)
     off = abs(float(found.abscissa) - 3**-0.5 * np.pi / 6)
     assert off <= float(found.abscissa_error) < 3e-3
     assert float(found.abscissa_error) > 1e-4

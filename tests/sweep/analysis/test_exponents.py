@@ -6,7 +6,6 @@ import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
-import sweep
 from sweep.analysis import exponents
 from sweep.analysis.exponents import (
     crossover,
@@ -147,7 +146,6 @@ def test_the_exponent_says_what_it_is():
     assert found.name == "period_exponent"
     assert found.mu.attrs["units"] == "rad/s^2"
     assert exponent is local_exponent
-    assert sweep.exponent is local_exponent
 
 
 def test_a_coordinate_along_the_cells_of_a_zip_design_will_do():
@@ -263,7 +261,6 @@ def test_the_error_bar_of_a_constant_is_of_rounding_and_gaps_stay_gaps():
     found = local_exponent_error(curve(x, y), "mu")
     assert np.flatnonzero(np.isnan(found)).tolist() == [4, 9, 10, 11]
     assert found.attrs["units"] == "1"
-    assert sweep.local_exponent_error is local_exponent_error
 
 
 # straight lines

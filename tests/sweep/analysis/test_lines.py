@@ -7,7 +7,7 @@ from neighbours import derivative
 
 import sweep
 from sweep.analysis import lines
-from sweep.analysis.lines import KIND_WORDS, Given, judge
+from sweep.analysis.lines import KIND_WORDS, Given, crossover, judge
 from sweep.analysis.loglog import line, tends
 from sweep.analysis.scatter import Scatter
 
@@ -240,7 +240,7 @@ def meeting(low, high):
 @pytest.mark.parametrize("limits", [(-1.1, -0.2), (-0.9, -0.4), (np.nan, -0.2), (-1.1, np.nan)])
 def test_the_place_moves_as_far_as_lines_through_the_outer_ends_do(limits, swapped):
     low, high = fits(limit_low=(limits[0], 77.0), limit_high=(77.0, limits[1]))
-    found = sweep.crossover(high, low) if swapped else sweep.crossover(low, high)
+    found = crossover(high, low) if swapped else crossover(low, high)
     inner = (-1.0, 1e-3, 8 / 1e-3), (-1 / 3, 1e3, 5 * 1e3 ** (-1 / 3))
     outer = (limits[0], 1e-4, 8 / 1e-4), (limits[1], 1e4, 5 * 1e4 ** (-1 / 3))
     place = meeting(*inner)
@@ -256,9 +256,7 @@ def test_the_place_moves_as_far_as_lines_through_the_outer_ends_do(limits, swapp
 def test_errors_of_both_kinds_add_in_squares():
     errors = {"exponent_error": (0.01, 0.02), "level_error": (0.03, 0.04)}
     bend = {"limit_low": (-1.1, 77.0), "limit_high": (77.0, -0.2)}
-    noise, system, both = (
-        float(sweep.crossover(*fits(**keys)).abscissa_error) for keys in (errors, bend, errors | bend)
-    )
+    noise, system, both = (float(crossover(*fits(**keys)).abscissa_error) for keys in (errors, bend, errors | bend))
     assert both == pytest.approx(np.hypot(noise, system))
     place = 1.5 * np.log(1.6)
     away = np.array([place - np.log(1e-3), place - np.log(1e3)])
@@ -271,10 +269,10 @@ def test_exponents_differ_by_more_than_both_their_errors(share, meet):
     size = 2 / 3 * share
     pair = fits(exponent_error=(0.6 * size, 0.8 * size))
     if meet:
-        assert np.isfinite(sweep.crossover(*pair).abscissa)
+        assert np.isfinite(crossover(*pair).abscissa)
     else:
         with pytest.raises(sweep.SweepError, match="the same exponent within their errors"):
-            sweep.crossover(*pair)
+            crossover(*pair)
 
 
 @pytest.mark.parametrize(("low", "high", "apart"), [(1e-2, 1e3, True), (1e-3, 1e3, False), (1e-5, 1e-4, True)])
@@ -282,10 +280,10 @@ def test_windows_may_share_an_end_and_no_more(low, high, apart):
     first, second = fits(low=(1e-4, low), high=(1e-2, high))
     for pair in ((first, second), (second, first)):
         if apart:
-            sweep.crossover(*pair)
+            crossover(*pair)
         else:
             with pytest.raises(sweep.SweepError, match="the windows of the two fits overlap"):
-                sweep.crossover(*pair)
+                crossover(*pair)
 
 
 @pytest.mark.parametrize("name", ["x", "y"])
@@ -294,7 +292,7 @@ def test_fits_of_different_curves_do_not_meet(name):
         pair = fits()
         pair[0].attrs[name], pair[1].attrs[name] = low, high
         with pytest.raises(sweep.SweepError, match=f"the fits are of different {name}: {low}, {high}"):
-            sweep.crossover(*pair)
+            crossover(*pair)
 
 
 @pytest.mark.parametrize("noise", [None, True, False, *lines.KINDS])

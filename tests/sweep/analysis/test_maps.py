@@ -68,7 +68,7 @@ def test_what_is_no_map_is_told():
 
 def test_a_real_sweep_gives_the_regimes_of_the_foliot_as_a_dataset(tmp_path):
     axes = {"mu": {"spacing": "log", "start": 1e-3, "stop": 1e3, "num": 61}, "a": np.geomspace(0.5, 2.0, 13)}
-    ds = sweep.run(sweep.build_study(kernel="foliot", axes=axes, fixed={"phi0": 1.0}, outputs=["period"]))
+    ds = sweep.run(sweep.study(kernel="foliot", axes=axes, fixed={"phi0": 1.0}, outputs=["period"]))
     found = sweep.exponent_map(ds.period, "mu", (-0.9, -0.5))
     alpha = found.mu_on_border / found.a_on_border**2
     for level in (-0.9, -0.5):

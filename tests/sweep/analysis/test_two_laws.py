@@ -115,7 +115,7 @@ def test_a_pure_law_without_noise_is_known_to_rounding():
 
 
 def test_the_laws_of_a_foliot_lie_in_the_intervals_of_its_noise_free_periods():
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot",
         axes={"mu": {"spacing": "log", "start": 1e-3, "stop": 1e5, "num": 161}},
         fixed={"a": 1.0, "phi0": 1.0},
@@ -218,7 +218,7 @@ def test_a_word_that_is_no_kind_of_noise_is_refused():
 @pytest.fixture(scope="module")
 def periods():
     axis = {"spacing": "log", "start": 1e-4, "stop": 1e4, "num": 81}
-    return sweep.run(sweep.build_study(kernel="foliot", axes={"mu": axis}, fixed={"a": 1.0, "phi0": 1.0})).period
+    return sweep.run(sweep.study(kernel="foliot", axes={"mu": axis}, fixed={"a": 1.0, "phi0": 1.0})).period
 
 
 @pytest.mark.parametrize("step", [1, 2, 3])

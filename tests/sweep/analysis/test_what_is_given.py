@@ -16,24 +16,17 @@ OF_AN_OUTPUT = {
     "fit_exponent": lambda y: sweep.fit_exponent(y, "x"),
     "fit_two_laws": lambda y: sweep.fit_two_laws(y, "x"),
     "fit_correction": lambda y: sweep.fit_correction(y, "x"),
-    "exponent_by_window": lambda y: sweep.exponent_by_window(y, "x"),
+    "exponent_by_window": lambda y: sweep.fit_exponent(y, "x", towards="high"),
     "compare_laws": lambda y: sweep.compare_laws(y, "x"),
     "local_exponent": lambda y: sweep.local_exponent(y, "x"),
-    "local_exponent_error": lambda y: sweep.local_exponent_error(y, "x"),
-    "where_value": lambda y: sweep.where_value(y, "x", 1.0),
+    "local_exponent_error": lambda y: sweep.local_exponent(y, "x", error=True).exponent_error,
+    "where_value": lambda y: sweep.where_exponent(y, "x", 1.0, values=True),
     "where_exponent": lambda y: sweep.where_exponent(y, "x", -0.5),
     "exponent_map": lambda y: sweep.exponent_map(y, "x"),
-    "contours": lambda y: sweep.contours(y, [1.0]),
     "fit_collapse": lambda y: sweep.fit_collapse(y, "x", "L"),
-    "collapse_quality": lambda y: sweep.collapse_quality(y, y),
 }
 OF_A_DATASET = {
-    "stated_error": lambda ds: sweep.stated_error(ds, "y"),
-    "crossover": lambda ds: sweep.crossover(ds, ds),
-    "fit_over": lambda ds: sweep.fit_over(ds, "n", "a + b*n"),
     "interpolated": lambda ds: sweep.interpolated(ds, {"x": [1.0]}),
-    "rescaled": sweep.rescaled,
-    "study_of": sweep.study_of,
     "refine": lambda ds: sweep.refine(ds, "y", 0.1),
 }
 
@@ -59,15 +52,14 @@ def test_what_is_no_dataset_is_refused(name, given):
         OF_A_DATASET[name](given)
 
 
-@pytest.mark.parametrize("name", ["stated_error", "crossover", "fit_over"])
-def test_a_dataset_without_what_is_needed_is_refused(name):
+def test_a_bound_of_a_result_without_the_output_is_refused():
     with pytest.raises(SweepError, match="this Dataset has no "):
-        OF_A_DATASET[name](LINE.rename("other").to_dataset())
+        sweep.fit_exponent(LINE, "x", bound=LINE.rename("other").to_dataset())
 
 
 @pytest.mark.parametrize("given", [None, 3, "study.toml", LINE.to_dataset()])
 def test_what_is_no_study_has_no_groups(given):
-    with pytest.raises(SweepError, match=f"expected a study, e.g. sweep.study_of\\(ds\\); found {kind(given)}"):
+    with pytest.raises(SweepError, match="study"):
         sweep.scaling(given)
 
 

@@ -126,7 +126,7 @@ def test_each_cell_gets_its_own_best():
 
 
 def run(**keys):
-    return sweep.run(sweep.build_study(**keys), progress=False).isel(dict.fromkeys(keys["axes"], 0))
+    return sweep.run(sweep.study(**keys), progress=False).isel(dict.fromkeys(keys["axes"], 0))
 
 
 def test_foliots_at_too_tight_an_rtol_get_their_closed_form():
@@ -149,12 +149,12 @@ def test_a_balance_at_too_tight_an_rtol_gets_its_count():
 
 def test_multipliers_without_the_sensitivity_are_right_to_1e_13_in_all_of_601_cells():
     keys = {"axes": {"mu": np.geomspace(0.02, 1e4, 601)}, "fixed": {"phi0": 1.0, "a": 1e-3, "R": 1e-9}}
-    found = sweep.run(sweep.build_study(kernel="foliot", outputs=["multiplier"], rtol=1e-13, **keys), progress=False)
+    found = sweep.run(sweep.study(kernel="foliot", outputs=["multiplier"], rtol=1e-13, **keys), progress=False)
     assert (found.status == Status.OK).all()
 
 
 def test_a_file_holds_the_bounds_and_says_so(tmp_path):
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot", axes={"mu": [1.0, 2.0, -1.0]}, fixed={"phi0": 1.0, "a": 1.0}, rtol=1e-9, method="asymptotic"
     )
     path = tmp_path / "out.h5"
@@ -168,6 +168,6 @@ def test_a_file_holds_the_bounds_and_says_so(tmp_path):
 
 def test_a_refined_grid_keeps_the_bounds():
     keys = {"kernel": "foliot", "axes": {"mu": np.geomspace(0.1, 10, 5)}, "fixed": {"phi0": 1.0, "a": 1.0}}
-    study = sweep.build_study(**keys, rtol=1e-12, method="asymptotic")
+    study = sweep.study(**keys, rtol=1e-12, method="asymptotic")
     found = refine(sweep.run(study, progress=False), ["period"], 1e-2).dataset
     assert ((found.status == Status.INACCURATE) == found.error_bound.notnull()).all()

@@ -165,7 +165,7 @@ def test_our_own_modules_count_for_a_kernel_of_another_package():
 
 
 def test_the_foliot_counts_all_it_is_made_of_and_nothing_of_numpy():
-    study = sweep.build_study(kernel="foliot", axes={"mu": [1.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    study = sweep.study(kernel="foliot", axes={"mu": [1.0]}, fixed={"phi0": 1.0, "a": 1.0})
     found = sources(fingerprint(study))
     assert {"kernels.foliot.cycle", "kernels.lanes.vectors", "kernels.maths.elementary", "kernels.interface"} <= found
     assert all(name.partition(".")[0] in ("kernels", "sweep") for name in found)

@@ -19,7 +19,6 @@ from sweep.cells.reduce import BY_STATUS, Reducer, merge, tree_sum
 from sweep.results.statuses import account
 from sweep.store.reading import StoredFile
 from sweep.store.store import Store, unfinished_of
-from sweep.study.read import build_study
 
 HEIGHTS = np.array([-1.0, 1.0, 2.0, 5.0, math.nan, 13.5, 100.0, 0.3, 0.7, 77.0])
 SPEEDS = np.array([0.0, 0.5, 3.0, 1e-9, 1e4, 2.0])
@@ -30,7 +29,7 @@ EVERYTHING = ["min", "max", "mean", "argmin", "argmax", "histogram"]
 def stone(summary=None, **keys):
     keys = {"axes": {"height": HEIGHTS, "v0": SPEEDS}, "outputs": ["fall_time"], **keys}
     keys |= {} if summary is None else {"summary": summary}
-    return build_study(allow_import=True, kernel="toy:KERNEL", title="A stone", **keys)
+    return sweep.study(allow_import=True, kernel="toy:KERNEL", title="A stone", **keys)
 
 
 def whole(**keys):
@@ -130,7 +129,7 @@ def test_the_same_bits_for_any_block_shape_and_thread_count(tmp_path_factory, lo
 
 
 def test_many_row_blocks_agree_with_the_cells(long):
-    cells = quiet(build_study(allow_import=True, kernel="toy:KERNEL", outputs=["fall_time"],
+    cells = quiet(sweep.study(allow_import=True, kernel="toy:KERNEL", outputs=["fall_time"],
                               axes={n: a.values for n, a in long_study(12_000).axes.items()}))  # fmt: skip
     assert row_blocks(long_study(12_000)).per_group > 1000
     agree(long["height", "v0"], cells, ["height", "v0"])
@@ -193,7 +192,7 @@ def test_traces_are_reduced_point_by_point():
 
 def test_arrays_and_words_are_told_at_an_extreme():
     masses = [[1.0, 2.0], [5.0, 1.0], [0.1, 0.1]]
-    study = build_study(allow_import=True, kernel="beads:KERNEL", design="zip", outputs=["total"], summary={},
+    study = sweep.study(allow_import=True, kernel="beads:KERNEL", design="zip", outputs=["total"], summary={},
                         axes={"mass": masses, "method": ["quick", "whole", "quick"]})  # fmt: skip
     found = quiet(study)
     assert found.total_argmax_mass.values.tolist() == [5.0, 1.0]
@@ -366,7 +365,7 @@ def test_the_summary_is_part_of_the_study():
     assert again == study
     assert study != stone(whole())
     assert list(stone(whole(over=["height"])).axes) == ["v0", "height"]
-    assert sweep.build_study(kernel="toy:KERNEL", allow_import=True, axes={"height": [1.0]},
+    assert sweep.study(kernel="toy:KERNEL", allow_import=True, axes={"height": [1.0]},
                              summary={"outputs": {"fall_time": ["min"]}}).outputs == ("fall_time",)  # fmt: skip
 
 

@@ -219,7 +219,7 @@ def test_a_term_that_a_method_excludes_keeps_auto_from_it():
     assert solved(thrown)[2].tolist() == [1]
 
 
-FOLIOT = sweep.build_study(
+FOLIOT = sweep.study(
     kernel="foliot",
     axes={"mu": np.concatenate([np.geomspace(1e-6, 1e6, 90), [-1.0, np.nan, 0.0]]), "a": [1.0, 0.0, 1e-3, 30.0]},
     fixed={"phi0": 0.5},
@@ -252,7 +252,7 @@ def test_auto_takes_the_closed_form_of_the_foliot_outright(whole):
 
 def test_strips_join_without_a_seam():
     mu = np.geomspace(1e-3, 1e3, STRIP + 100)
-    study = sweep.build_study(kernel="foliot", axes={"mu": mu}, fixed={"a": 1.0, "phi0": 1.0}, method="closed")
+    study = sweep.study(kernel="foliot", axes={"mu": mu}, fixed={"a": 1.0, "phi0": 1.0}, method="closed")
     outputs, status, _ = solved(study)
     seam, _, _ = solved(study, STRIP - 50, STRIP + 50)
     assert (status < FIRST_REFUSAL).all()
@@ -393,9 +393,9 @@ def test_auto_does_not_deny_what_an_impact_clock_does_where_following_it_leaves_
     axes = {"I_c": 1e-5 * np.append(1 + 1e-9, near), "e": [0.6, 0.77]}
     fixed = {"torque": 0.01, "I_v": 1e-5, "r_c": 0.03, "r_v": 0.03, "teeth": 31, "h": 0.001}
     keys = {"kernel": "impact", "axes": axes, "fixed": fixed, "outputs": ["period"]}
-    _, status, used = solved(sweep.build_study(**keys))
-    _, followed, _ = solved(sweep.build_study(**keys, method="events"))
-    closed = solved(sweep.build_study(**keys, method="closed"))[1]
+    _, status, used = solved(sweep.study(**keys))
+    _, followed, _ = solved(sweep.study(**keys, method="events"))
+    closed = solved(sweep.study(**keys, method="closed"))[1]
     open_ = among(followed, UNKNOWN)
     assert (closed == Status.NO_CYCLE).all()
     assert open_[1]

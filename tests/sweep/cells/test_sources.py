@@ -32,7 +32,7 @@ from sweep.cells.grid import Cells
 from sweep.cells.solve import Solver
 
 def solve(keys):
-    study = sweep.build_study(**keys, allow_import=True)
+    study = sweep.study(**keys, allow_import=True)
     outputs = {f.name: np.empty((1, *(study.lengths[d] for d in f.dims))) for f in study.asked}
     status = np.empty(1, np.int8)
     Solver(study).solve(0, Cells(outputs, status, np.empty(1, np.int8)))
@@ -96,7 +96,7 @@ def executed():
 def test_what_solves_a_cell_is_in_the_fingerprint(name, executed):
     found = executed(name) - {"kernels.catalogue"}
     assert {"kernels.interface", KERNELS.get(name, name).partition(":")[0]} <= found
-    study = sweep.build_study(**next(studies(name)), allow_import=True)
+    study = sweep.study(**next(studies(name)), allow_import=True)
     assert found <= {n.removeprefix(SOURCE) for n in fingerprint(study) if n.startswith(SOURCE)}
 
 

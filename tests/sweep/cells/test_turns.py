@@ -21,7 +21,7 @@ NAMES = ["none", *(m.name for m in FOLIOT.methods)]
 
 def foliot(rtol, **keys):
     keys = {"axes": TERMS, "fixed": FIXED, **keys}
-    return sweep.build_study(kernel="foliot", **keys, **({} if rtol is None else {"rtol": rtol}))
+    return sweep.study(kernel="foliot", **keys, **({} if rtol is None else {"rtol": rtol}))
 
 
 def names_of(study):

@@ -126,7 +126,7 @@ def test_a_chart_is_written_where_it_is_told_or_beside_the_caller(result, calls,
     monkeypatch.setattr(exploring, "study_from", lambda _: SimpleNamespace(kernel_name="foliot"))
     monkeypatch.setattr("sweep.explore.work_precision.precision_text", lambda _: "told")
     calls("sweep.explore.work_precision.work_precision", "found")
-    made = calls("sweep.show.charts.plot_precision")
+    made = calls("sweep.show.plot.plot")
     run("chart deep/x.toml --cells 7")
     run("chart deep/x.toml -o y.svg --rtol 1e-4 --reference exact")
     assert [given for given, _ in made[1::2]] == [("found", Path("x_chart.png")), ("found", Path("y.svg"))]
@@ -154,7 +154,7 @@ def test_a_comparison_is_a_picture_unless_it_is_csv(result, calls, monkeypatch, 
     monkeypatch.setattr("sweep.show.compare.comparison_text", lambda _: "told")
     tables, pictures = [], []
     monkeypatch.setattr("sweep.show.compare.write_comparison", lambda *given: tables.append(given))
-    monkeypatch.setattr("sweep.show.law_charts.plot_laws", lambda *given: pictures.append(given))
+    monkeypatch.setattr("sweep.show.plot.plot", lambda *given: pictures.append(given))
     for target in ("", " -o b.CSV", " -o b.png"):
         run(f"fit a.h5 --y y --x a --compare{target}")
     assert tables == [("found", Path("b.CSV"))]

@@ -3,14 +3,10 @@
 from dataclasses import replace
 from fractions import Fraction as F
 
-import numpy as np
 import pytest
-import xarray as xr
 
-import sweep
 from sweep.explore import groups
 from sweep.explore.groups import Group, Scaling
-from sweep.system.errors import SweepError
 
 
 class Weights:
@@ -115,21 +111,3 @@ C_D = Group((("c", F(1)), ("d", F(-1))))
 def test_advice_word_for_word(changed, advice):
     plain = Scaling(groups=(MU_A,), scales={}, axes=("mu", "a"), free=1, tried=9)
     assert replace(plain, **changed).advice == advice
-
-
-def test_the_distance_from_a_curve_by_hand():
-    """In logarithms, points (0, 0), (1, 1), (3, 0), (4, 0), (8, 4), in any order, without those that have no value."""
-    t, z = np.array([3.0, 0.0, 8.0, 4.0, 1.0, 2.0, np.nan]), np.array([0.0, 0.0, 4.0, 0.0, 1.0, np.nan, 1.0])
-    x, y = (xr.DataArray(np.exp(column), dims="i") for column in (t, z))
-    # above the line to (3, 0); a third below that from (1, 1) to (4, 0); 4/5 below that from (3, 0) to (8, 4)
-    assert sweep.collapse_quality(x, y) == pytest.approx(np.sqrt((1 + 1 / 9 + 16 / 25) / 3))
-
-
-def test_the_distance_where_places_are_alike_is_from_the_middle_of_the_others():
-    x = xr.DataArray(np.ones(3), dims="i")
-    assert sweep.collapse_quality(x, np.exp(xr.DataArray([0.0, 3.0, 2.0], dims="i"))) == pytest.approx(2.0)
-
-
-def test_what_is_no_study_is_told():
-    with pytest.raises(SweepError, match=r"expected a study, e.g. sweep.study_of\(ds\); found"):
-        groups.scaling("study.toml")

@@ -11,19 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from running import fail_on, tall
 
+import sweep
 from sweep.cells.grid import Grid
 from sweep.explore import calibration
 from sweep.explore.calibration import thinned
 from sweep.explore.plan import plan, small_duration
 from sweep.runs.run import run
-from sweep.study.read import build_study
 from sweep.system.errors import SweepError
 from sweep.system.progress import quantity
 
 
 def stone(**keys):
     keys = {"axes": {"height": np.linspace(-1.0, 9.0, 500), "v0": [0.0, 0.5]}, "outputs": ["fall_time"], **keys}
-    return build_study(allow_import=True, kernel="toy:KERNEL", title="A stone", **keys)
+    return sweep.study(allow_import=True, kernel="toy:KERNEL", title="A stone", **keys)
 
 
 def test_a_plan_forecasts_bytes_that_a_run_then_takes(tmp_path):
@@ -43,7 +43,7 @@ def test_traces_count_with_their_length():
 
 def slow(count):
     keys = {"axes": {"height": np.arange(1.0, count + 1)}, "outputs": ["fall_time"]}
-    return build_study(allow_import=True, kernel="slow:SLOW", **keys)
+    return sweep.study(allow_import=True, kernel="slow:SLOW", **keys)
 
 
 @pytest.mark.parametrize("count", [60, 1000])

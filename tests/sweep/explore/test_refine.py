@@ -20,14 +20,12 @@ from sweep.system.errors import SweepError
 
 def foliot(**axes):
     keys = {name: {"spacing": "log", "start": a, "stop": b, "num": n} for name, (a, b, n) in axes.items()}
-    return sweep.build_study(
-        kernel="foliot", axes=keys, fixed={"phi0": 1.0, "a": 1.0}, outputs=["period", "multiplier"]
-    )
+    return sweep.study(kernel="foliot", axes=keys, fixed={"phi0": 1.0, "a": 1.0}, outputs=["period", "multiplier"])
 
 
 def toy(heights, v0):
     keys = {"axes": {"height": heights, "v0": v0}, "outputs": ["fall_time"]}
-    return sweep.build_study(kernel="toy:KERNEL", allow_import=True, **keys)
+    return sweep.study(kernel="toy:KERNEL", allow_import=True, **keys)
 
 
 def test_a_curve_is_interpolated_as_right_as_asked():
@@ -37,7 +35,7 @@ def test_a_curve_is_interpolated_as_right_as_asked():
     assert found.error <= 1e-4
     ds = found.dataset.sortby("mu")
     mu = np.exp(np.random.default_rng(1).uniform(np.log(1e-3), np.log(1e5), 300))
-    truth = sweep.run(sweep.build_study(kernel="foliot", axes={"mu": mu}, fixed={"phi0": 1.0, "a": 1.0})).period
+    truth = sweep.run(sweep.study(kernel="foliot", axes={"mu": mu}, fixed={"phi0": 1.0, "a": 1.0})).period
     guess = np.exp(np.interp(np.log(mu), np.log(ds.mu.values), np.log(ds.period.values)))
     assert float(abs(guess / truth - 1).max()) < 1e-4
     assert found.dataset.sizes["mu"] < found.uniform / 1.5
@@ -69,7 +67,7 @@ def test_a_surface_with_a_border_of_statuses():
     mu = np.exp(rng.uniform(np.log(1.0), np.log(90.0), 200))
     R = mu * np.exp(rng.uniform(np.log(0.02), np.log(0.1), 200))
     keys = {"fixed": {"phi0": 1.0, "a": 1.0}, "design": "zip"}
-    truth = sweep.run(sweep.build_study(kernel="foliot", axes={"mu": mu, "R": R}, **keys)).period.values
+    truth = sweep.run(sweep.study(kernel="foliot", axes={"mu": mu, "R": R}, **keys)).period.values
     off = abs(np.exp(guess(np.log(mu), np.log(R))) / truth - 1)
     assert np.nanmax(off) < 2e-2
 
@@ -78,12 +76,12 @@ def test_beside_a_border_of_statuses_a_curve_is_interpolated_as_right_as_elsewhe
     """No start where mu <= R = 0.1; above, the period diverges."""
     keys = {"fixed": {"phi0": 1.0, "a": 1.0, "R": 0.1}, "outputs": ["period"]}
     axis = {"spacing": "log", "start": 1e-2, "stop": 1e4, "num": 5}
-    found = sweep.refine(sweep.run(sweep.build_study(kernel="foliot", axes={"mu": axis}, **keys)), "period", 1e-3)
+    found = sweep.refine(sweep.run(sweep.study(kernel="foliot", axes={"mu": axis}, **keys)), "period", 1e-3)
     assert found.complete
     ds = found.dataset.isel(mu=np.flatnonzero(found.dataset.status == 0)).sortby("mu")
     assert 0.1 < float(ds.mu[0]) < 0.1 * 1.1  # the border is followed
     mu = np.exp(np.random.default_rng(1).uniform(np.log(ds.mu.values[0]), np.log(1e4), 500))
-    truth = sweep.run(sweep.build_study(kernel="foliot", axes={"mu": mu}, **keys)).period
+    truth = sweep.run(sweep.study(kernel="foliot", axes={"mu": mu}, **keys)).period
     guess = np.exp(np.interp(np.log(mu), np.log(ds.mu.values), np.log(ds.period.values)))
     assert float(abs(guess / truth - 1).max()) < 1e-3
 
@@ -102,7 +100,7 @@ def test_a_grid_that_is_fine_enough_stays_as_it_is():
 def test_cells_are_added_where_it_bends_alone():
     """height / v0 turns into sqrt(2 height / g) about height = v0^2 / 2 g = 51 m."""
     keys = {"kernel": "toy:KERNEL", "allow_import": True, "outputs": ["fall_time"], "fixed": {"v0": 31.6}}
-    study = sweep.build_study(axes={"height": 50 * 10.0 ** np.arange(-6, 7)}, **keys)
+    study = sweep.study(axes={"height": 50 * 10.0 ** np.arange(-6, 7)}, **keys)
     ds = sweep.run(study)
     found = sweep.refine(ds, "fall_time", 3e-2, study=study)
     added = sorted(set(found.dataset.height.values) - set(ds.height.values))
@@ -113,7 +111,7 @@ def test_cells_are_added_where_it_bends_alone():
 
 def test_joined_cells_are_those_of_a_study_and_can_be_run_again():
     found = sweep.refine(sweep.run(foliot(mu=(1e-3, 1e3, 5))), "period", 1e-2)
-    study = sweep.study_of(found.dataset)
+    study = sweep.study(found.dataset)
     again = sweep.run(study)
     np.testing.assert_array_equal(again.period, found.dataset.period)
     assert (np.diff(found.dataset.mu) > 0).all()
@@ -140,7 +138,7 @@ def test_too_few_cells_allowed_is_told():
 def test_what_cannot_be_refined_is_told(change, message):
     axes = {"mu": [1.0, 2.0], **change.get("axes", {})}
     keys = {"fixed": {"phi0": 1.0, "a": 1.0}, "design": change.get("design", "product")}
-    ds = sweep.run(sweep.build_study(kernel="foliot", axes=axes, **keys))
+    ds = sweep.run(sweep.study(kernel="foliot", axes=axes, **keys))
     with pytest.raises(SweepError, match=message):
         sweep.refine(ds, change.get("y", "period"), change.get("tolerance", 0.1))
 
@@ -158,7 +156,7 @@ def test_the_command_writes_a_result_like_any_other(tmp_path, monkeypatch, capsy
     np.testing.assert_array_equal(ds.period, inside.period)
     np.testing.assert_array_equal(ds.mu, inside.mu)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["coarse.h5", "fine.h5"]
-    again = sweep.run(sweep.study_of(ds), "again.h5")
+    again = sweep.run(sweep.study(ds), "again.h5")
     np.testing.assert_array_equal(again.period, ds.period)
     assert main(command) == 0  # done before; nothing is lost by asking twice
 
@@ -197,12 +195,12 @@ def test_three_axes_take_fewer_cells_than_an_even_grid_that_is_as_right():
 
     def even(num):
         axes = {n: {"spacing": "log", "start": 0.1, "stop": 10, "num": num} for n in ("mu", "a", "phi0")}
-        return sweep.run(sweep.build_study(kernel="foliot", axes=axes, outputs=["period"]))
+        return sweep.run(sweep.study(kernel="foliot", axes=axes, outputs=["period"]))
 
     names = ("mu", "a", "phi0")
     places = 10 ** np.random.default_rng(4).uniform(-1, 1, (3, 400))
     keys = {"axes": dict(zip(names, places, strict=True)), "design": "zip", "outputs": ["period"]}
-    truth = sweep.run(sweep.build_study(kernel="foliot", **keys)).period.values
+    truth = sweep.run(sweep.study(kernel="foliot", **keys)).period.values
 
     def off(points, period):
         corners, shares = located(points, np.log(places.T))
@@ -232,7 +230,7 @@ def test_an_axis_that_matters_nothing_is_hardly_cut():
         axes = {"mu": {"spacing": "log", "start": 1e-2, "stop": 1e2, "num": 5}, **more}
         fixed = {"a": 1.0, "phi0": 1.0}
         fixed = {name: value for name, value in fixed.items() if name not in axes}
-        ds = sweep.run(sweep.build_study(kernel="foliot", axes=axes, fixed=fixed, outputs=["period"]))
+        ds = sweep.run(sweep.study(kernel="foliot", axes=axes, fixed=fixed, outputs=["period"]))
         found = sweep.refine(ds, "period", 1e-3)
         assert found.complete
         return found.dataset.sizes
@@ -259,7 +257,7 @@ def test_what_cannot_be_seen_is_said():
 def test_a_jump_is_told_from_what_more_cells_would_mend():
     kernel = dataclasses.replace(TOY, methods=(dataclasses.replace(TOY.methods[1], solve=_stepped),))
     keys = {"axes": {"height": np.linspace(1.0, 2.0, 9)}, "outputs": ["fall_time"], "allow_import": True}
-    study = dataclasses.replace(sweep.build_study(kernel="toy:KERNEL", **keys), kernel=kernel)
+    study = dataclasses.replace(sweep.study(kernel="toy:KERNEL", **keys), kernel=kernel)
     found = sweep.refine(sweep.run(study), "fall_time", 1e-3, study=study)
     assert not found.complete
     assert 1 <= found.jumps < 10  # those beside it, too

@@ -17,7 +17,7 @@ class Noted:
     """Solves cells of a toy, and notes at which values."""
 
     def __init__(self, **axes):
-        self.study = sweep.build_study(
+        self.study = sweep.study(
             kernel="toy:KERNEL", allow_import=True, axes=axes, outputs=["fall_time"], fixed={"g": 10.0}
         )
         self.asked = []
@@ -169,7 +169,7 @@ def test_steps_are_those_of_the_first_grid():
     assert len(one.judges) == 1
     output = Noted(height=[1.0, 2.0])
     values = {"height": np.arange(1.0, 10), "v0": np.arange(9.0) ** 2 % 7}
-    study = sweep.build_study(kernel="toy:KERNEL", allow_import=True, axes=values, outputs=["fall_time"], design="zip")
+    study = sweep.study(kernel="toy:KERNEL", allow_import=True, axes=values, outputs=["fall_time"], design="zip")
     output.study = study
     np.testing.assert_allclose(Refiner(dataset(values), output, ["fall_time"], 0.1, 99).judges[0].steps, [3, 3])
 

@@ -8,12 +8,13 @@ from running import tall
 from toy import KERNEL, exact, rough
 from toy_studies import build
 
+import sweep
 from kernels.interface import Field, Method, Status
 from kernels.lanes.jit import COMPILED
 from sweep import SweepError, cli
 from sweep.cells.sample import sampled, with_method
 from sweep.explore.work_precision import precision_cells, precision_text, work_precision
-from sweep.show.charts import draw_precision, new_figure, plot_precision, style
+from sweep.show.charts import draw_precision, new_figure, style
 
 HEIGHTS = np.array([1.0, 2.0, 5.0, 10.0])
 SPEEDS = np.array([0.0, 1e-3, 0.1, 3.0])
@@ -313,7 +314,7 @@ def test_the_picture_has_a_line_for_each_method_open_marks_where_cells_fail_and_
         Method("exact", "", exact),
     )
     found = measured(study, reference="exact")
-    figure = plot_precision(found, tmp_path / "chart.png")
+    figure = sweep.plot(found, tmp_path / "chart.png")
     median, worst = figure.axes
     assert (median.get_xscale(), worst.get_yscale()) == ("log", "log")
     lines = {line.get_label(): line for line in worst.lines}
@@ -349,7 +350,7 @@ def test_neither_notes_nor_legend_lie_over_anything(tmp_path):
     )
     others = Method("liar", "", bad(1e-5)), Method("idle", "", idle), Method("exact", "", exact)
     study = with_methods(study, *study.kernel.methods, *others)
-    figure = plot_precision(measured(study, reference="exact"))
+    figure = sweep.plot(measured(study, reference="exact"))
     with style():
         figure.draw_without_rendering()
     renderer = figure.canvas.get_renderer()

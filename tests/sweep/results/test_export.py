@@ -123,7 +123,7 @@ def test_csv_reads_back_with_pandas(tmp_path):
 
 def test_csv_is_a_file_axis_of_a_study(tmp_path):
     path = sweep.export(result().drop_vars("angle").drop_vars("phase").isel(a=0), tmp_path / "points.csv")
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot", design="zip", fixed={"phi0": 1.0},
         axes={"mu": {"file": path, "unit": "rad/s^2"}, "a": {"file": path, "unit": "1/s"}},
     )  # fmt: skip

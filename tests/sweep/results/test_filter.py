@@ -16,7 +16,7 @@ from sweep.system.errors import SweepError
 def result():
     """Heights by initial speeds, one row refused."""
     keys = {"axes": {"height": [-1.0, 1.0, 2.0, 3.0], "v0": [0.0, 1.0]}, "along": {"phase": {"num": 3}}}
-    return sweep.run(sweep.build_study(kernel="toy:KERNEL", allow_import=True, **keys))
+    return sweep.run(sweep.study(kernel="toy:KERNEL", allow_import=True, **keys))
 
 
 RESULT = result()
@@ -100,7 +100,7 @@ def test_any_text_is_a_condition_or_told(text):
 
 def test_export_takes_a_condition(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    sweep.run(sweep.build_study(kernel="foliot", axes={"mu": [-1.0, 1.0, 4.0]}, fixed={"phi0": 1.0, "a": 1.0}), "f.h5")
+    sweep.run(sweep.study(kernel="foliot", axes={"mu": [-1.0, 1.0, 4.0]}, fixed={"phi0": 1.0, "a": 1.0}), "f.h5")
     assert main(["export", "f.h5", "-o", "f.csv", "--where", "status == 'OK' and mu < 2"]) == 0
     table = pd.read_csv("f.csv", comment="#")
     assert table.mu.tolist() == [1.0]
@@ -119,4 +119,4 @@ def test_a_summary_has_no_cells_to_choose_from_or_to_refine():
     with pytest.raises(SweepError, match="a summary keeps no cells"):
         sweep.where(summary, "height > 1")
     with pytest.raises(SweepError, match="a summary keeps no cells"):
-        sweep.refine(summary, "fall_time", 0.1, study=sweep.study_of(RESULT, allow_import=True))
+        sweep.refine(summary, "fall_time", 0.1, study=sweep.study(RESULT, allow_import=True))

@@ -43,7 +43,7 @@ def test_any_bytes_as_a_study_are_refused(tmp_path, content):
     path = tmp_path / "study.toml"
     path.write_bytes(content)
     with pytest.raises(SweepError):
-        sweep.read_study(path)
+        sweep.study(path)
 
 
 @pytest.fixture(scope="module")
@@ -295,7 +295,7 @@ def test_a_study_names_no_file_outside_of_its_folder(tmp_path, name):
     text = name.replace("\0", "\\u0000")
     (folder / "study.toml").write_text(f'kernel = "toy:KERNEL"\noutputs = ["fall_time"]\naxes.height.file = "{text}"\n')
     with pytest.raises(StudyError) as told:
-        sweep.read_study(folder / "study.toml", allow_import=True)
+        sweep.study(folder / "study.toml", allow_import=True)
     assert [m.where for m in told.value.mistakes] == ["axes.height.file"]
 
 

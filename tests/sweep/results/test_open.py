@@ -22,7 +22,6 @@ from sweep.results.statuses import count_methods, count_statuses, failures
 from sweep.runs.run import run
 from sweep.store.store import unfinished_of
 from sweep.study.model import Study
-from sweep.study.read import build_study
 from sweep.system.errors import SweepError
 
 
@@ -35,7 +34,7 @@ def stone(**keys):
         **keys,
     }
     keys = {name: value for name, value in keys.items() if value is not None}
-    return build_study(allow_import=True, kernel="toy:KERNEL", **keys)
+    return sweep.study(allow_import=True, kernel="toy:KERNEL", **keys)
 
 
 @pytest.fixture(scope="module")
@@ -281,7 +280,7 @@ def test_a_result_cut_short_is_one_clear_line(stored, tmp_path):
 
 
 def test_times_stay_numbers(tmp_path):
-    study = build_study(allow_import=True, kernel="slow:DAYS", axes={"height": [1.0]}, outputs=["fall_time"])
+    study = sweep.study(allow_import=True, kernel="slow:DAYS", axes={"height": [1.0]}, outputs=["fall_time"])
     with run(study, tmp_path / "days.h5", progress=False) as found:
         assert found.fall_time.dtype == np.float64
         assert found.fall_time.attrs["units"] == "days"
@@ -357,7 +356,7 @@ def test_results_open_without_a_warning(stored):
 
 
 def test_a_result_that_is_open_can_be_opened_and_run_again_and_closing_it_frees_the_file(tmp_path):
-    study = build_study(kernel="foliot", axes={"mu": [1.0, 2.0]}, fixed={"a": 1.0, "phi0": 1.0})
+    study = sweep.study(kernel="foliot", axes={"mu": [1.0, 2.0]}, fixed={"a": 1.0, "phi0": 1.0})
     path = tmp_path / "out.h5"
     first = run(study, path, progress=False)
     second, third = run(study, path, progress=False), open_result(path)

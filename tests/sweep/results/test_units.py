@@ -13,7 +13,7 @@ from sweep.system.errors import StudyError
 @pytest.fixture
 def stones():
     keys = {"axes": {"height": [1.0, 2.0]}, "along": {"phase": {"num": 3}}}
-    return sweep.run(sweep.build_study(kernel="toy:KERNEL", allow_import=True, **keys))
+    return sweep.run(sweep.study(kernel="toy:KERNEL", allow_import=True, **keys))
 
 
 def test_outputs_axes_and_fixed_parameters_change_their_unit(stones):
@@ -41,7 +41,7 @@ def test_all_mistakes_are_told_at_once(stones):
 
 def test_exports_and_plots_take_units(stones, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    sweep.run(sweep.build_study(kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0}), "f.h5")
+    sweep.run(sweep.study(kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0}), "f.h5")
     assert main(["export", "f.h5", "-o", "f.csv", "--unit", "amplitude=degree", "period=minute"]) == 0
     table = pd.read_csv("f.csv", comment="#")
     ds = sweep.open_result("f.h5")

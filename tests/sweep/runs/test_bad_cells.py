@@ -149,7 +149,7 @@ def test_a_summary_has_no_cells_to_compute_again(tmp_path):
 
 
 def test_a_catalogued_kernel_gives_the_same_bits_in_a_process_of_its_own():
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot", axes={"mu": np.geomspace(0.1, 10.0, 65)}, fixed={"a": 1.0, "phi0": 1.0}, rtol=1e-6
     )
     same(quiet(study, isolate=True, block_cells=10), quiet(study))

@@ -186,7 +186,7 @@ TORQUES = [1e-4, 0.1, 0.5, 1.0, 30.0]
 def kept_study(torques=TORQUES):
     axes = {"method": ["auto", "segments", "quadrature"], "mu": torques, "R": [0.0, 1e-3, np.nan]}
     fixed = {"phi0": {"value": 60, "unit": "degree"}, "a": 1.0}
-    return sweep.build_study(kernel="foliot", outputs=["period", "amplitude"], rtol=1e-9, axes=axes, fixed=fixed)
+    return sweep.study(kernel="foliot", outputs=["period", "amplitude"], rtol=1e-9, axes=axes, fixed=fixed)
 
 
 def as_then(torques=TORQUES):
@@ -233,10 +233,10 @@ def test_a_result_goes_on_with_methods_chosen_as_it_was_begun_and_is_chosen_anew
     for torques in (TORQUES, [*TORQUES, 50.0]):
         with quiet(kept_study(torques), kept, extend=True) as found:
             same(found, quiet(as_then(torques)))
-            assert sweep.study_of(found).by_cell is False
+            assert sweep.study(found).by_cell is False
     with quiet(kept_study([*TORQUES, 50.0]), kept, force=True) as found:
         same(found, quiet(more))
-        assert sweep.study_of(found).by_cell
+        assert sweep.study(found).by_cell
         assert set(found.method_used[0, :, 0].values) == {0}
         assert not np.array_equal(found.method_used, quiet(as_then([*TORQUES, 50.0])).method_used)
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from running import kept, quiet, same, tall
 
+import sweep
 from sweep.cli import main
 from sweep.results.open import open_result
 from sweep.results.verify import verify
 from sweep.store.store import Store, unfinished_of
-from sweep.study.read import build_study
 from sweep.study.toml import to_toml
 from sweep.system import disk
 from sweep.system.errors import COMPLETE, MISTAKE, SweepError
@@ -93,7 +93,7 @@ KINDS = {
 def falls(heights, **keys):
     axes = {"height": np.arange(1.0, heights + 1), "v0": [0.0, 1.0, 2.0]}
     keys = {"outputs": ["fall_time"], **keys}
-    return build_study(allow_import=True, kernel="toy:KERNEL", axes=axes, **keys)
+    return sweep.study(allow_import=True, kernel="toy:KERNEL", axes=axes, **keys)
 
 
 @pytest.mark.parametrize("kind", KINDS)

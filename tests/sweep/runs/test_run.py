@@ -32,6 +32,7 @@ from running import (
     wait_for,
 )
 
+import sweep
 from kernels.interface import Status
 from sweep.cells.solve import Solver
 from sweep.results.open import open_result
@@ -40,7 +41,6 @@ from sweep.runs.run import run
 from sweep.store import reading
 from sweep.store.reading import StoredFile
 from sweep.store.store import Store, unfinished_of
-from sweep.study.read import build_study
 from sweep.system import disk
 from sweep.system.errors import SweepError
 
@@ -352,8 +352,8 @@ def test_a_file_too_large_for_hdf5_itself_is_one_clear_line(output):
         import toy
         from sweep.system.errors import SweepError
         from sweep.runs.run import run
-        from sweep.study.read import build_study
-        study = build_study(allow_import=True, kernel="toy:KERNEL", axes=dict(height=np.arange(1.0, 20001)),
+        import sweep
+        study = sweep.study(allow_import=True, kernel="toy:KERNEL", axes=dict(height=np.arange(1.0, 20001)),
                             outputs=["fall_time"])
         for limit in (20_000, 60_000, 168_000, 230_000, 330_000, 345_000):
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, -1))
@@ -538,7 +538,7 @@ def test_the_output_and_its_name_are_brought_to_the_disk(output, monkeypatch):
 
 def test_a_study_may_be_a_mapping_of_its_keys():
     keys = {"kernel": "foliot", "outputs": ["period"], "axes": {"mu": [1.0, 2.0]}, "fixed": {"a": 1.0, "phi0": 1.0}}
-    same(quiet(keys), quiet(build_study(**keys)))
+    same(quiet(keys), quiet(sweep.study(**keys)))
     with pytest.raises(SweepError, match="1 mistake\n  allow_import  no such key"):
         quiet(keys | {"allow_import": True})
     with pytest.raises(SweepError, match="runs code of your own"):

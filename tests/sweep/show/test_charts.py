@@ -11,7 +11,8 @@ import xarray as xr
 from matplotlib.colors import LogNorm
 
 from sweep.analysis.loglog import is_logarithmic, spans_decades
-from sweep.show.charts import new_figure, plot, save, style
+from sweep.show.charts import new_figure, save, style
+from sweep.show.plot import plot
 from sweep.show.view import label, setting, symbol, unit_text, view
 from sweep.system.errors import SweepError
 

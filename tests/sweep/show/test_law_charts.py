@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 from sweep.show.charts import COLOURS, DASHES
-from sweep.show.law_charts import plot_laws
+from sweep.show.plot import plot
 
 X = np.array([1.0, 10.0, 100.0])
 Y = np.array([2.0, 3.0, 5.0])
@@ -28,7 +28,7 @@ def compared(n=3, chosen="law1", residual=0.125, **attrs):
 
 @pytest.fixture
 def axes():
-    return plot_laws(compared(units="s")).axes
+    return plot(compared(units="s")).axes
 
 
 def test_points_and_laws_are_drawn_the_chosen_first_and_wide(axes):
@@ -83,18 +83,18 @@ def test_scales_labels_and_the_verdict(axes):
 
 @pytest.mark.parametrize("attrs", [{}, {"units": "1"}, {"units": ""}])
 def test_a_pure_number_has_no_unit(attrs):
-    assert plot_laws(compared(**attrs)).axes[0].get_ylabel() == "period"
+    assert plot(compared(**attrs)).axes[0].get_ylabel() == "period"
 
 
 def test_six_laws_are_drawn_and_the_chosen_is_among_them():
-    labels = [line.get_label() for line in plot_laws(compared(9, "law8")).axes[0].lines[1:]]
+    labels = [line.get_label() for line in plot(compared(9, "law8")).axes[0].lines[1:]]
     assert [label.partition(",")[0] for label in labels] == ["law8", "law0", "law1", "law2", "law3", "law4"]
 
 
 def test_a_law_without_any_misfit_has_an_axis_all_the_same():
-    assert plot_laws(compared(residual=0.0)).axes[1].get_ylim() == (-4e-15, 4e-15)
+    assert plot(compared(residual=0.0)).axes[1].get_ylim() == (-4e-15, 4e-15)
 
 
 def test_the_picture_is_saved_where_it_is_said(tmp_path):
-    plot_laws(compared(), tmp_path / "laws.svg")
+    plot(compared(), tmp_path / "laws.svg")
     assert (tmp_path / "laws.svg").read_text().startswith("<?xml")

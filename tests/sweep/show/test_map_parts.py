@@ -6,7 +6,8 @@ import pytest
 import xarray as xr
 
 from sweep.show import charts
-from sweep.show.charts import COLOURS, FLAGGED, MARKS, draw_precision, new_figure, plot, plot_precision, precision_marks
+from sweep.show.charts import COLOURS, FLAGGED, MARKS, draw_precision, new_figure, precision_marks
+from sweep.show.plot import plot
 
 
 @pytest.fixture
@@ -227,7 +228,7 @@ def test_the_note_says_what_errors_are_against_and_who_is_idle_or_wrong():
 
 
 def test_both_panels_share_a_width_of_at_least_thirty_times():
-    figure = plot_precision(precision())
+    figure = plot(precision())
     median, worst = figure.axes
     low, high = median.get_xlim()
     assert high / low == pytest.approx(30)
@@ -237,6 +238,6 @@ def test_both_panels_share_a_width_of_at_least_thirty_times():
     assert (median.get_title("left"), worst.get_title("left")) == ("(a)", "(b)")
     assert (median.get_ylabel(), worst.get_ylabel()) == ("relative error [1]", "")
     long = precision(seconds=precision().seconds * [[1.0], [1.0], [100.0], [1.0]])
-    low, high = plot_precision(long).axes[0].get_xlim()
+    low, high = plot(long).axes[0].get_xlim()
     assert low < 1e-6 < 6e-4 < high < 2e-3
     assert figure.get_size_inches().tolist() == pytest.approx([178 / 25.4, (96 + 3.2) / 25.4])

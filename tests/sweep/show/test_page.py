@@ -45,7 +45,7 @@ class Tree(HTMLParser):
 
 def foliot(**keys):
     axes = {"mu": {"spacing": "log", "start": 1e-3, "stop": 1e4, "num": 43}}
-    return sweep.build_study(kernel="foliot", **{"axes": axes, "fixed": {"a": 1.0, "phi0": 1.0}} | keys)
+    return sweep.study(kernel="foliot", **{"axes": axes, "fixed": {"a": 1.0, "phi0": 1.0}} | keys)
 
 
 @pytest.fixture(scope="module")

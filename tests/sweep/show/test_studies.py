@@ -30,7 +30,7 @@ def test_a_copy_is_all_that_the_study_needs(name, tmp_path, monkeypatch, capsys)
     copied = {path.name for path in tmp_path.iterdir()}
     assert copied == set(capsys.readouterr().out.split())
     for path in tmp_path.glob("*.toml"):
-        sweep.read_study(path, allow_import=True)
+        sweep.study(path, allow_import=True)
     for script in tmp_path.glob("*.py"):
         for other in (ROOT / "studies").glob("*.py"):
             ways = (f"import {other.stem}\n", f"from {other.stem} import", f'"{other.stem}:KERNEL"')

@@ -22,7 +22,7 @@ MASS = [0.1, 0.2, 0.7]
 
 def beads(fixed=None, **keys):
     given = {"fixed": {"mass": MASS} if fixed is None else fixed, "axes": {"g": [1.0, 2.0]}} | keys
-    return sweep.build_study(kernel="beads:KERNEL", allow_import=True, **given)
+    return sweep.study(kernel="beads:KERNEL", allow_import=True, **given)
 
 
 def mistakes(**keys):
@@ -53,7 +53,7 @@ def test_arrays_from_columns_of_a_csv_file(tmp_path):
         'kernel = "beads:KERNEL"\n[axes]\ng = [1.0]\n[fixed]\n'
         'mass = { file = "rod.csv", unit = "g" }\nplace = { file = "rod.csv" }\n'
     )
-    study = sweep.read_study(tmp_path / "study.toml", allow_import=True)
+    study = sweep.study(tmp_path / "study.toml", allow_import=True)
     assert study.fixed["mass"].tolist() == MASS
     assert study.fixed["place"].tolist() == [1.0, 2.0, 3.0]
 
@@ -69,7 +69,7 @@ def test_rows_of_a_zip_axis_and_numbered_columns_of_a_file(tmp_path):
     (tmp_path / "study.toml").write_text(
         'kernel = "beads:KERNEL"\ndesign = "zip"\n[axes.mass]\nfile = "rows.csv"\n[axes]\ng = [1.0, 2.0, 3.0]\n'
     )
-    read = sweep.read_study(tmp_path / "study.toml", allow_import=True)
+    read = sweep.study(tmp_path / "study.toml", allow_import=True)
     np.testing.assert_array_equal(read.axes["mass"].values, rows)
 
 
@@ -146,7 +146,7 @@ def test_the_example_of_the_description_is_a_study(tmp_path):
     assert "one for each bead" in text
     example = text.partition("a study to begin with\n")[2]
     (tmp_path / "study.toml").write_text(example)
-    assert sweep.read_study(tmp_path / "study.toml", allow_import=True).fixed["mass"].tolist() == [0.1, 0.2, 0.3]
+    assert sweep.study(tmp_path / "study.toml", allow_import=True).fixed["mass"].tolist() == [0.1, 0.2, 0.3]
     assert KERNEL.same_length
 
 

@@ -132,8 +132,8 @@ def test_a_sampled_block_is_repeated_over_another():
 def test_arrays_go_into_a_block_of_their_own():
     arrays = {"design": "zip", "axes": {"J": [[1.0, 2.0], [3.0, 4.0]], "k": [[1.0, 1.0], [2.0, 2.0]]}}
     keys = {"kernel": "drivetrain", "outputs": ["frequency"], "fixed": {"f_max": 1.0}}
-    found = sweep.run(sweep.build_study(**keys, blocks=[{"axes": {"tol": [0.0, 0.01]}}, arrays]))
-    alone = sweep.run(sweep.build_study(**keys, **arrays))
+    found = sweep.run(sweep.study(**keys, blocks=[{"axes": {"tol": [0.0, 0.01]}}, arrays]))
+    alone = sweep.run(sweep.study(**keys, **arrays))
     assert found.J.dims == ("point", "mass")
     assert np.array_equal(found.frequency.isel(tol=0), alone.frequency.rename(cell="point"), equal_nan=True)
 

@@ -20,7 +20,7 @@ def test_every_float_gets_through_toml_python_and_json_unchanged(tmp_path_factor
     axis = ", ".join(map(repr, values))
     path = tmp_path_factory.mktemp("study") / "s.toml"
     path.write_text(f'{HEAD}design = "zip"\naxes.height = [{axis}]\nfixed.g = {fixed!r}\n')
-    toml = sweep.read_study(path, allow_import=True)
+    toml = sweep.study(path, allow_import=True)
     python = build(axes={"height": values}, fixed={"g": fixed}, design="zip")
     again = Study.from_json(toml.to_json(), allow_import=True)
     assert dataclasses.replace(toml, text="") == python

@@ -334,7 +334,7 @@ def test_a_file_that_is_no_text_is_refused(tmp_path, content, message):
     path = tmp_path / "s.toml"
     path.write_bytes(content)
     with pytest.raises(sweep.SweepError) as caught:
-        sweep.read_study(path)
+        sweep.study(path)
     assert message in str(caught.value)
     assert str(caught.value).startswith(str(path))
 
@@ -344,27 +344,27 @@ def test_a_missing_file_is_told_with_the_nearest_name(tmp_path):
     with pytest.raises(
         sweep.SweepError, match=r"foliot_scalling.toml: no such file; did you mean foliot_scaling.toml\?"
     ):
-        sweep.read_study(tmp_path / "foliot_scalling.toml")
+        sweep.study(tmp_path / "foliot_scalling.toml")
 
 
 def test_a_folder_is_no_study(tmp_path):
     with pytest.raises(sweep.SweepError, match="is a folder; name a study file in it"):
-        sweep.read_study(tmp_path)
+        sweep.study(tmp_path)
 
 
 def test_an_endless_file_is_refused(tmp_path):
     with pytest.raises(sweep.SweepError, match="is no regular file"):
-        sweep.read_study("/dev/zero")
+        sweep.study("/dev/zero")
     long = tmp_path / "long.toml"
     long.write_bytes(b"#" * 50_000_001)
     with pytest.raises(sweep.SweepError, match="is larger than 50000000 bytes"):
-        sweep.read_study(long)
+        sweep.study(long)
 
 
 def test_windows_line_ends_and_a_byte_order_mark_do_no_harm(tmp_path):
     path = tmp_path / "s.toml"
     path.write_bytes(b"\xef\xbb\xbf# Why?\r\n" + HEAD.replace("\n", "\r\n").encode() + b"axes.height = [1]\r\n")
-    assert sweep.read_study(path, allow_import=True).question == "Why?"
+    assert sweep.study(path, allow_import=True).question == "Why?"
 
 
 def test_no_byte_salad_ends_in_a_traceback(tmp_path):
@@ -379,6 +379,6 @@ def test_no_byte_salad_ends_in_a_traceback(tmp_path):
         path = tmp_path / "s.toml"
         path.write_bytes(text)
         try:
-            sweep.read_study(path, allow_import=True)
+            sweep.study(path, allow_import=True)
         except sweep.SweepError:
             continue

@@ -93,10 +93,10 @@ along.flip = {}
 def test_a_coordinate_that_counts_takes_the_first_whole_numbers(tmp_path):
     path = tmp_path / "flips.toml"
     path.write_text(FLIPS.format("{ num = 4 }"))
-    assert sweep.read_study(path).along["flip"].tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert sweep.study(path).along["flip"].tolist() == [1.0, 2.0, 3.0, 4.0]
     path.write_text(FLIPS.format("[1, 2.5]"))
     with pytest.raises(sweep.SweepError, match=r"expected whole numbers from 1 to 1e\+06, found 2.5"):
-        sweep.read_study(path)
+        sweep.study(path)
 
 
 def test_python_and_toml_give_the_same_study(read):
@@ -344,14 +344,14 @@ def test_a_method_that_cannot_do_a_term_of_the_study_is_a_mistake():
 @pytest.mark.parametrize("words", [["segments", "dopri5"], ["dopri5", "segments"], ["dopri5", "auto", "segments"]])
 def test_every_word_of_a_method_axis_is_asked_whether_it_can_do_the_terms(words):
     keys = {"kernel": "foliot", "axes": {"method": words}, "fixed": {"mu": 1.0, "phi0": 1.0, "c": 0.5}}
-    told = message_of(lambda: sweep.build_study(**keys), "axes.method")
+    told = message_of(lambda: sweep.study(**keys), "axes.method")
     assert told == "segments cannot do c; use auto, pure, quadrature, taylor or dopri5"
 
 
 @pytest.mark.parametrize("words", [["quick", "whole"], ["whole", "quick"], ["auto", "whole", "quick"]])
 def test_every_word_of_a_method_axis_is_asked_whether_it_gives_the_outputs(words):
     keys = {"kernel": "beads:KERNEL", "allow_import": True, "outputs": ["share"], "fixed": {"mass": [1.0, 2.0]}}
-    told = message_of(lambda: sweep.build_study(**keys, axes={"method": words}), "axes.method")
+    told = message_of(lambda: sweep.study(**keys, axes={"method": words}), "axes.method")
     assert told == "quick does not give share; use auto or whole, or name the outputs you want"
 
 
@@ -388,6 +388,6 @@ def test_words_are_checked():
 
 def test_the_title_that_a_summary_gets_names_the_axes_that_stay_first():
     axes = {"mu": [0.1, 1.0], "R": [0.01, 0.02]}
-    study = sweep.build_study(kernel="foliot", axes=axes, fixed={"phi0": 1.0, "a": 1.0}, summary={"over": ["mu"]})
+    study = sweep.study(kernel="foliot", axes=axes, fixed={"phi0": 1.0, "a": 1.0}, summary={"over": ["mu"]})
     assert study.title == "foliot over R and mu"
     assert list(study.axes) == ["R", "mu"]

@@ -91,7 +91,7 @@ def test_words_and_arrays_come_back(tmp_path):
 
 def test_a_study_from_a_result_comes_back():
     study = build(axes={"height": {"spacing": "log", "start": 1.0, "stop": 7.0, "num": 5, "unit": "ft"}})
-    found = sweep.study_of(sweep.run(study), allow_import=True)
+    found = sweep.study(sweep.run(study), allow_import=True)
     assert sweep.study(tomllib.loads(sweep.to_toml(found)), allow_import=True) == study
 
 

@@ -11,10 +11,7 @@ OF_A_DATASET = {
     "export": ("a.csv",),
     "where": ("height > 1",),
     "in_units": ({"height": "mm"},),
-    "study_of": (),
     "plot": (),
-    "plot_precision": (),
-    "plot_laws": (),
 }
 
 
@@ -39,15 +36,12 @@ def test_what_is_no_dataset_is_told(name, result):
 
 def test_the_way_to_a_dataset_is_told(result):
     assert 'sweep.open_result("a.h5")' in refusal(sweep.plot, Path("a.h5"))
-    assert "sweep.run(study)" in refusal(sweep.plot, sweep.study_of(result, allow_import=True))
-    assert "sweep.compare_laws gives one" in refusal(sweep.plot_laws, 3)
-    assert "expected a Dataset of sweep.work_precision" in refusal(sweep.plot_precision, result)
-    assert "expected a Dataset of sweep.compare_laws" in refusal(sweep.plot_laws, result)
+    assert "sweep.run(study)" in refusal(sweep.plot, sweep.study(result, allow_import=True))
 
 
-def test_a_result_is_no_study(result):
-    for function in (sweep.run, sweep.study, sweep.plan):
-        assert "found a Dataset; sweep.study_of(dataset)" in refusal(function, result)
+def test_a_result_says_which_study_it_came_from(result):
+    assert sweep.study(result, allow_import=True).title == result.attrs["title"]
+    assert "pass the study" in refusal(sweep.study, result.drop_attrs())
 
 
 def test_what_is_no_study_has_no_text(result):
@@ -56,4 +50,4 @@ def test_what_is_no_study_has_no_text(result):
 
 
 def test_what_names_no_file_is_told():
-    assert "expected a path" in refusal(sweep.read_study, 3)
+    assert "expected a path" in refusal(sweep.study, 3)

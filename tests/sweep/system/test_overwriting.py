@@ -31,7 +31,7 @@ KINDS = {
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("s.toml").write_text(STUDY)
-    sweep.run(sweep.read_study("s.toml", allow_import=True), "r.h5", progress=False).close()
+    sweep.run(sweep.study("s.toml", allow_import=True), "r.h5", progress=False).close()
     return tmp_path
 
 
@@ -142,9 +142,7 @@ def test_a_folder_that_cannot_be_replaced_is_kept(here, monkeypatch):
 
 
 def test_refine_says_before_it_computes_that_another_result_is_there(here, capsys, monkeypatch):
-    sweep.run(
-        sweep.build_study(kernel="foliot", axes={"mu": [1.0, 2.0]}, fixed={"a": 1.0, "phi0": 1.0}), "f.h5"
-    ).close()
+    sweep.run(sweep.study(kernel="foliot", axes={"mu": [1.0, 2.0]}, fixed={"a": 1.0, "phi0": 1.0}), "f.h5").close()
     argv = ["refine", "f.h5", "--y", "period", "--tolerance", "1e-4", "-o", "r.h5"]
     with monkeypatch.context() as nothing:
         nothing.setattr("sweep.explore.refiner.Refiner.refined", lambda self: pytest.fail("computed"))

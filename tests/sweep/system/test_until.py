@@ -168,7 +168,7 @@ def test_every_cell_is_in_the_account_once(codes, summed):
 
     study = tall(len(codes))
     if summed:
-        study = sweep.build_study(kernel="toy:KERNEL", allow_import=True, summary=keys,
+        study = sweep.study(kernel="toy:KERNEL", allow_import=True, summary=keys,
                                   axes={"height": np.arange(1.0, len(codes) + 1)})  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sweep.cells.solve.Solver.solve", kernel_status)

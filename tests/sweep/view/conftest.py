@@ -8,7 +8,7 @@ import sweep
 @pytest.fixture(scope="session")
 def result(tmp_path_factory):
     path = tmp_path_factory.mktemp("view") / "map.h5"
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot",
         outputs=["period", "amplitude"],
         axes={

@@ -181,6 +181,6 @@ def test_what_is_shown_can_be_saved_as_a_table_a_picture_and_a_study(page, resul
     found = np.array([float(r["period"]) for r in rows]).reshape(41, 21)
     assert np.array_equal(found, period, equal_nan=True)
     assert download(page, "PNG", "png").read_bytes().startswith(b"\x89PNG")
-    study = sweep.read_study(download(page, "TOML", "toml"))
+    study = sweep.study(download(page, "TOML", "toml"))
     assert study.fixed["a"] == 1.0
     assert list(study.axes) == ["mu", "R"]

@@ -117,7 +117,7 @@ def test_a_port_that_is_taken_is_told(result):
 @pytest.fixture(scope="module")
 def refined():
     axes = {n: {"spacing": "log", "start": 0.1, "stop": 10.0, "num": 4} for n in ("mu", "a", "phi0")}
-    ds = sweep.run(sweep.build_study(kernel="foliot", axes=axes, outputs=["period", "multiplier"]))
+    ds = sweep.run(sweep.study(kernel="foliot", axes=axes, outputs=["period", "multiplier"]))
     return sweep.refine(ds, "period", 5e-2).dataset
 
 
@@ -131,7 +131,7 @@ def test_cells_of_a_refinement_are_shown_as_a_map_between_them(refined):
     page.sliders["phi0"].value = 5
     at = {name: page.dataset[name].values for name in ("mu", "a")}
     phi0 = float(page.dataset.phi0[5])
-    truth = sweep.run(sweep.build_study(kernel="foliot", axes=at, fixed={"phi0": phi0}, outputs=["period"])).period
+    truth = sweep.run(sweep.study(kernel="foliot", axes=at, fixed={"phi0": phi0}, outputs=["period"])).period
     np.testing.assert_allclose(page.found.y.values, truth.transpose("a", "mu").values, rtol=5e-2)
 
 

@@ -16,7 +16,7 @@ MAP = Choice("period", "mu", "R", {"a": 2})
 def read(tmp_path, text):
     path = tmp_path / "region.toml"
     path.write_text(text)
-    return sweep.read_study(path)
+    return sweep.study(path)
 
 
 def test_the_study_of_a_region_is_the_same_scene_on_a_finer_grid(dataset, tmp_path):
@@ -29,7 +29,7 @@ def test_the_study_of_a_region_is_the_same_scene_on_a_finer_grid(dataset, tmp_pa
 
 
 def test_words_and_lists_are_kept(tmp_path):
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="drivetrain",
         axes={"method": ["direct"], "f_max": [100.0, 200.0]},
         fixed={"J": [1.0, 2.0, 3.0], "k": [1e4, 2e4, 3e4], "reduction": "rivin"},
@@ -43,9 +43,7 @@ def test_words_and_lists_are_kept(tmp_path):
 
 
 def test_a_list_of_cells_has_no_regions():
-    study = sweep.build_study(
-        kernel="foliot", design="zip", axes={"mu": [1.0, 2.0], "a": [1.0, 2.0]}, fixed={"phi0": 1.0}
-    )
+    study = sweep.study(kernel="foliot", design="zip", axes={"mu": [1.0, 2.0], "a": [1.0, 2.0]}, fixed={"phi0": 1.0})
     with pytest.raises(sweep.SweepError, match="list of cells"):
         region.study_text(sweep.run(study, progress=False), Choice("period", "mu"), None, None)
 
@@ -81,9 +79,7 @@ def test_a_range_beyond_the_cells_is_all_of_them(wanted, found):
 
 
 def test_a_refined_axis_has_a_hundred_and_one_points_or_as_many_as_before(dataset, tmp_path):
-    study = sweep.build_study(
-        kernel="foliot", axes={"mu": np.linspace(1, 2, 102), "a": [1.0, 2.0]}, fixed={"phi0": 1.0}
-    )
+    study = sweep.study(kernel="foliot", axes={"mu": np.linspace(1, 2, 102), "a": [1.0, 2.0]}, fixed={"phi0": 1.0})
     found = read(tmp_path, region.study_text(sweep.run(study, progress=False), Choice("period", "mu", "a"), None, None))
     assert (len(found.axes["mu"]), len(found.axes["a"])) == (102, 101)
     assert found.question.endswith(", in the region shown by sweep view")
@@ -91,7 +87,7 @@ def test_a_refined_axis_has_a_hundred_and_one_points_or_as_many_as_before(datase
 
 def test_whole_numbers_in_the_range_are_kept_as_they_are(tmp_path):
     keys = {"axes": {"flips": [2.0, 4.0, 6.0, 8.0], "mu": [1.0, 2.0]}, "fixed": {"a": 0.5, "phi0": 1.0, "step": 0.05}}
-    dataset = sweep.run(sweep.build_study(kernel="foliot_steps", **keys), progress=False)
+    dataset = sweep.run(sweep.study(kernel="foliot_steps", **keys), progress=False)
     name = next(iter(dataset.data_vars))
     found = read(tmp_path, region.study_text(dataset, Choice(name, "flips", None, {"mu": 1}), (4.0, 6.0), None))
     assert found.axes["flips"].values.tolist() == [4.0, 6.0]

@@ -67,7 +67,7 @@ def test_the_exponent_is_that_of_the_analysis(dataset):
 
 
 def test_what_is_no_axis_has_no_exponent():
-    study = sweep.build_study(
+    study = sweep.study(
         kernel="foliot", design="zip", axes={"mu": [1.0, 3.0, 2.0], "a": [1.0, 2.0, 3.0]}, fixed={"phi0": 1.0}
     )
     dataset = sweep.run(study, progress=False)
