@@ -256,33 +256,4 @@ def test_windows_shrink_by_half_as_much_again_to_one_end(end):
     np.testing.assert_allclose(found.points, 10 * steps + 1)
     assert (found.low <= lows * (1 + 1e-9)).all()
     assert (found.high >= highs * (1 - 1e-9)).all()
-    assert sweep.fit_exponent(curve(x**-0.5, x), "x", towards=end).sizes["window"] == 3
     assert sweep.fit_exponent(curve(x[:8] ** -0.5, x[:8]), "x", towards=end).sizes["window"] == 1
-
-
-@pytest.mark.parametrize(
-    ("fits", "lows", "highs", "first"),
-    [
-        ([1, 1, 1], [0, 1, 2], [2, 3, 4], 0),
-        ([1, 1, 1], [0, 1, 2], [1.9, 3, 4], None),
-        ([1, 1, 1, 1], [0, 1, 2, 2], [1.9, 3, 4, 2], 1),
-        ([0, 1, 1, 1], [0, 0, 0, 0], [1, 1, 1, 1], 1),
-        ([1, 1, 0, 1], [0, 0, 0, 0], [1, 1, 1, 1], None),
-        ([1, 1], [0, 0], [1, 1], None),
-    ],
-)
-@pytest.mark.parametrize(("end", "place"), [("high", "above x = 1{}"), ("low", "below x = 2{}")])
-def test_a_plateau_is_of_three_windows_with_exponents_in_common(fits, lows, highs, first, end, place):
-    count = np.arange(len(fits))
-    columns = {"exponent": count + 0.5, "exponent_low": lows, "exponent_high": highs, "fits": fits}
-    columns |= {"low": 10.0 + count, "high": 20.0 + count}
-    found = asymptote._plateau(xr.Dataset({name: ("window", column) for name, column in columns.items()}), "x", end)
-    assert found["plateau"] == (first is not None)
-    if first is None:
-        return
-    assert [found[name] for name in ("exponent", "exponent_low", "exponent_high")] == [
-        first + 0.5,
-        lows[first],
-        highs[first],
-    ]
-    assert found["verdict"].endswith("in every window " + place.format(first))

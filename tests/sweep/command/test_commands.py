@@ -136,7 +136,7 @@ def test_a_chart_is_written_where_it_is_told_or_beside_the_caller(result, calls,
 
 
 def test_a_plot_and_a_report_are_called_as_the_result(result, calls, capsys):
-    made = calls("sweep.show.charts.plot")
+    made = calls("sweep.show.plot.plot")
     run("plot deep/a.h5 --at a=2 --y y")
     run("plot deep/a.h5 -o b.pdf")
     assert [given[1] for given, _ in made] == [Path("a.png"), Path("b.pdf")]

@@ -147,7 +147,7 @@ def test_outputs_rescaled_fall_on_one_curve_and_say_what_they_are():
     assert free.group_1.attrs["long_name"] == "mu/(phi0 a^2)"
     np.testing.assert_allclose(free.period, ds.period * ds.a, rtol=1e-15)
     np.testing.assert_allclose(free.group_1, ds.mu / ds.phi0 / ds.a**2, rtol=1e-14)
-    alpha, period = (free[name].values.ravel() for name in ("group_1", "period"))
+    alpha, period = (v.values.ravel() for v in xr.broadcast(free.group_1, free.period))
     order = np.argsort(alpha)
     same = np.diff(np.log(alpha[order])) < 1e-12
     assert same.sum() > 3

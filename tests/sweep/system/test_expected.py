@@ -50,4 +50,4 @@ def test_what_is_no_study_has_no_text(result):
 
 
 def test_what_names_no_file_is_told():
-    assert "expected a path" in refusal(sweep.study, 3)
+    assert "its path" in refusal(sweep.study, 3)
