@@ -97,7 +97,7 @@ def fit_exponent(
     Parameters
     ----------
     y : DataArray
-        Any shape; missing points are left out.
+        Any shape; missing points, and those whose sigma is NaN, are left out.
     dim : str
         Dimension of `y`, or 1-D coordinate along one; positive and strictly monotone.
     window : (low, high), optional
@@ -144,6 +144,8 @@ def fit_exponent(
     dimension, t, logs = window_logs(y, dim, window)
     here = window_of(y, dim, window)
     errors = relative_sigma(y, sigma).isel(here)
+    if sigma is not None:
+        logs = logs.where(np.isfinite(errors))
     bounds = stated_bound(y, bound).isel(here)
     given = Given(confidence, noise, sigma is not None)
     names = (*Line._fields, *JUDGED)
