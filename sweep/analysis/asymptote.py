@@ -105,6 +105,7 @@ def _each(t: Array, z: Array, sign: float, confidence: float) -> Array:
     return np.array(rows).reshape(*z.shape[:-1], len(NUMBERS))
 
 
+@np.errstate(all="ignore")  # what overflows is infinite
 def _one(t: Array, z: Array, sign: float, confidence: float) -> Array:
     """One line; t runs towards the end where (1) is a power law, and exponents take `sign`."""
     present = np.flatnonzero(np.isfinite(z))
@@ -117,7 +118,7 @@ def _one(t: Array, z: Array, sign: float, confidence: float) -> Array:
     noisy = _scatters(t, z, found.off)
     ends = _profile(t, z, found, confidence) if noisy else _by_half(t, z, exponent)
     low, high = sorted(sign * end for end in ends)
-    residual = math.expm1(float(abs(found.off).max()))
+    residual = float(np.expm1(abs(found.off).max()))
     return np.array([sign * exponent, low, high, sign * fade, left, residual, noisy, abs(left) < 1])
 
 

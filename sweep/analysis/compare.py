@@ -40,7 +40,7 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     Parameters
     ----------
     y : DataArray
-        One dimension; missing points are left out.
+        One dimension; missing points, and those whose sigma is NaN, are left out.
     dim : str
         Its dimension, or 1-D coordinate along it; positive and strictly monotone.
     window : (low, high), optional
@@ -78,7 +78,7 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
         )
     _, t, logs = window_logs(y, dim, window)
     relative = relative_sigma(y, sigma).isel(window_of(y, dim, window)).values
-    present = np.flatnonzero(np.isfinite(logs.values))
+    present = np.flatnonzero(np.isfinite(logs.values) & (np.isfinite(relative) | (sigma is None)))
     if present.size < FEWEST_POINTS:
         raise SweepError(f"laws are told apart by at least {FEWEST_POINTS} points of {title(y)}, found {present.size}")
     present = present[np.argsort(t[present])]
@@ -118,6 +118,7 @@ def _with_any_noise(t: Array, z: Array, found: Found) -> Found:
     )
 
 
+@np.errstate(over="ignore")
 def _table(t: Array, z: Array, tried: list[Found], weights: Array | None) -> xr.Dataset:
     span = t[-1] - t[0]
     columns: dict[str, list[Any]] = {
@@ -126,7 +127,7 @@ def _table(t: Array, z: Array, tried: list[Found], weights: Array | None) -> xr.
         "worse": [f.aicc - tried[0].aicc for f in tried],
         "numbers": [f.law.numbers for f in tried],
         "scatter": [math.sqrt(float(np.mean(f.off**2))) for f in tried],
-        "residual": [math.expm1(min(float(abs(f.off).max()), 700.0)) for f in tried],
+        "residual": [float(np.expm1(abs(f.off).max())) for f in tried],
         "runs": [_runs(f.off) for f in tried],
         "chi_squared": [math.nan if weights is None else _chance(f, weights) for f in tried],
         "formula": [f.law.formula for f in tried],

@@ -31,6 +31,7 @@ class Found(NamedTuple):
     bic: float
 
 
+@np.errstate(all="ignore")  # what overflows is infinite, and no curve, or not determined
 def fitted(law: Law, t: Array, z: Array, weights: Array | None = None, known: bool = False) -> Found | None:
     """The law that is nearest to the points, t rising; None where there are not more points than numbers, and two.
 
@@ -131,7 +132,7 @@ def _errors(law: Law, numbers: Array, s: Array, off: Array, root: Array) -> Arra
     what the doubt of the Jacobian makes so, are not determined; errors of others are as if those were known.
     """
     slopes, doubt, level = _jacobian(law, numbers, s)
-    if not np.isfinite(slopes).all():
+    if not (np.isfinite(slopes).all() and np.isfinite(doubt).all()):  # some derivative leaves where the curve exists
         return np.full(numbers.size, np.inf)
     least = np.sqrt(((doubt * root[:, None]) ** 2).sum(axis=0)) + 1e-100  # some may be zeros
     _, moved, directions = np.linalg.svd(slopes * root[:, None] / least, full_matrices=False)
@@ -165,6 +166,5 @@ def _jacobian(law: Law, numbers: Array, s: Array) -> tuple[Array, Array, Array]:
 def _derivative(law: Law, q: Array, j: int, step: float, s: Array) -> Parts:
     """Of shift and columns by one q."""
     by = np.where(np.arange(q.size) == j, step, 0.0)
-    with np.errstate(invalid="ignore"):
-        (shift, columns), (less, below) = law.parts(q + by, s), law.parts(q - by, s)
-        return (shift - less) / (2 * step), (columns - below) / (2 * step)
+    (shift, columns), (less, below) = law.parts(q + by, s), law.parts(q - by, s)
+    return (shift - less) / (2 * step), (columns - below) / (2 * step)

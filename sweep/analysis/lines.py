@@ -55,8 +55,8 @@ FIT_NAMES = {
     "level_error": "relative standard error of the level",
     "start": "y at the first abscissa",
     "stop": "y at the last abscissa",
-    "limit_low": "exponent to which the local one tends at the first abscissa; NaN where points scatter",
-    "limit_high": "exponent to which the local one tends at the last abscissa; NaN where points scatter",
+    "limit_low": "to where the local exponent tends below the window; no end of an interval; NaN where points scatter",
+    "limit_high": "to where the local exponent tends above the window; no end of an interval; NaN where points scatter",
 }
 
 JUDGED = (
@@ -92,8 +92,8 @@ def fit_exponent(
     - *weighted*: `sigma` is given; by the normal distribution, if chi-squared and the runs test allow it.
     - *any*, *uneven*, *outliers*: scatter, told apart by tests. The interval is then never less than that for noise
       that remembers the point before, as strongly as the points allow, and than that by heteroscedasticity-consistent
-      errors: wider than that of independent noise, twice as wide for a dozen points. Of outliers it is Tukey's
-      biweight.
+      errors: wider than that of independent noise, twice as wide for a dozen points. Of outliers the exponent is that
+      of Tukey's biweight, whose interval is two to six times as narrow: `noise="outliers"` where that is known.
     - *independent*, *correlated*: only if `noise` says so.
     - *curved*, *bent*: no power law, without and among scatter. `fits` is 0 and the interval is the range of the local
       exponent in the window, in which the exponent of every window inside lies.
@@ -101,7 +101,7 @@ def fit_exponent(
     Parameters
     ----------
     y : DataArray
-        Any shape; missing points are left out.
+        Any shape; missing points, and those whose sigma is NaN, are left out.
     dim : str
         Dimension of `y`, or 1-D coordinate along one; positive and strictly monotone.
     window : (low, high), optional
@@ -129,7 +129,8 @@ def fit_exponent(
         points; `residual` [1], the largest relative distance of a point from the line; `points`; `low`, `high`,
         the first and last abscissa used, `start`, `stop`, y there; `centre`, `level`, `level_error`, the geometric
         means of dim and y, where the line is known best, and the relative standard error there; `limit_low`,
-        `limit_high`, to where the local exponent tends at both ends. The dimensions are those of `y` but `dim`.
+        `limit_high`, to where the local exponent tends below and above the window, as far as `crossover` allows for:
+        they are no interval of the exponent. The dimensions are those of `y` but `dim`.
 
         With `towards` all of these run along `window`, the widest first. The exponent has a *plateau* where, from some
         window on, one power law describes each of at least three, and their intervals have exponents in common: the
@@ -159,6 +160,8 @@ def fit_exponent(
     dimension, t, logs = window_logs(y, dim, window)
     here = window_of(y, dim, window)
     errors = relative_sigma(y, sigma).isel(here)
+    if sigma is not None:
+        logs = logs.where(np.isfinite(errors))
     bounds = stated_bound(y, bound).isel(here)
     given = Given(confidence, noise, sigma is not None)
     names = (*Line._fields, *JUDGED)

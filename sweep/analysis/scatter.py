@@ -6,6 +6,7 @@ statsmodels does the regressions (extra `fit`).
 from __future__ import annotations
 
 import math
+import warnings
 from importlib import import_module
 from typing import Any
 
@@ -109,13 +110,13 @@ def scattered(t: Array, z: Array, confidence: float, kind: str | None = None) ->
     ----------
     kind : one of KINDS, optional
         Default: what tests find. An interval is then never less than that for correlated noise of any size that the
-        points allow.
+        points allow, nor than that by heteroscedasticity-consistent errors: tests take uneven noise for outliers.
     """
     sm = library("statsmodels.api")
     columns = sm.add_constant(t - t.mean())
     plain = sm.OLS(z, columns).fit()
     found = kind or _kind(t, plain, columns)
-    if found == "outliers":
+    if kind == "outliers":
         return _robust(sm, columns, z, confidence)
     if found == "independent":
         return _weighted(sm, columns, z, np.ones(t.size), found, confidence)
@@ -125,9 +126,11 @@ def scattered(t: Array, z: Array, confidence: float, kind: str | None = None) ->
     sandwich = _weighted(sm, columns, z, weights, found, confidence, cov_type="HC3")
     if kind == "uneven":
         return sandwich
-    memory = correlated(t, z, confidence, weights)
-    error, low, high = max(sandwich.error, memory.error), min(sandwich.low, memory.low), max(sandwich.high, memory.high)
-    return Scatter(found, weights, error, low, high)
+    tried = [sandwich, correlated(t, z, confidence, weights)]
+    if found == "outliers":
+        tried.append(_robust(sm, columns, z, confidence))
+    error, low, high = max(s.error for s in tried), min(s.low for s in tried), max(s.high for s in tried)
+    return Scatter(found, tried[-1].weights, error, low, high)
 
 
 def weighted(t: Array, z: Array, sigma: Array, confidence: float) -> tuple[Scatter, bool]:
@@ -221,7 +224,9 @@ def _variance(off: Array, columns: Array) -> Array:
 
 def _robust(sm: Any, columns: Array, z: Array, confidence: float) -> Scatter:
     """Tukey's biweight, from Huber's start."""
-    fit = sm.RLM(z, columns, M=sm.robust.norms.TukeyBiweight()).fit()
+    with warnings.catch_warnings(), np.errstate(all="ignore"):  # points that are on one line leave a scale of 0
+        warnings.simplefilter("ignore")
+        fit = sm.RLM(z, columns, M=sm.robust.norms.TukeyBiweight()).fit()
     slope, error = float(fit.params[1]), float(fit.bse[1])
     reach = student(z.size - 2, confidence) * error
     return Scatter("outliers", fit.weights, error, slope - reach, slope + reach)

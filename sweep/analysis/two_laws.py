@@ -172,6 +172,7 @@ def _each(t: Array, z: Array, confidence: float, noise: bool | str | None) -> Ar
     return np.array(rows).reshape(*z.shape[:-1], -1)
 
 
+@np.errstate(all="ignore")  # what overflows is infinite; a crossover that is not determined reaches there
 def _one(t: Array, z: Array, confidence: float, noise: bool | str | None) -> Array:
     present = np.isfinite(z)
     t, z = t[present], z[present]
@@ -191,12 +192,10 @@ def _one(t: Array, z: Array, confidence: float, noise: bool | str | None) -> Arr
         low, high = _widened(t, z, off, best, low, high)
     evidence = _evidence(t, z, off)
     _, *exponents, places, _ = np.stack([best, low, high], axis=1)
-    with np.errstate(over="ignore"):  # a crossover that is not determined reaches to infinity
-        places = np.exp(places)
-    bend = [math.exp(best[WIDTH]) / math.log(10), math.exp(best[LEVEL])]
+    places, bend = np.exp(places), [math.exp(best[WIDTH]) / math.log(10), float(np.exp(best[LEVEL]))]
     if evidence <= 0 and not noisy:  # straight to rounding: nothing meets anywhere
         places, bend = np.array([np.nan, 0.0, np.inf]), [np.nan, np.nan]
-    rest = [math.expm1(abs(off).max()), t.size, 2 if evidence > BEYOND_DOUBT else 1, evidence, noisy]
+    rest = [float(np.expm1(abs(off).max())), t.size, 2 if evidence > BEYOND_DOUBT else 1, evidence, noisy]
     return np.array([*np.concatenate(exponents), *places, *bend, *rest])
 
 

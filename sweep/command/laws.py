@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from sweep.command.files import check_target_of, result_of, say
-from sweep.command.options import AT, FORCE, RESULT, UNFINISHED, Command, option, output, switch
+from sweep.command.options import AT, FORCE, OUTPUT_Y, RESULT, UNFINISHED, Command, option, output, switch
 
 
 def _fit(arguments: argparse.Namespace) -> None:
@@ -56,7 +56,7 @@ COMMANDS = {
         "exponent of a power law, and where two laws meet",
         _fit,
         RESULT,
-        option("--y", metavar="OUTPUT", required=True),
+        OUTPUT_Y,
         option("--x", metavar="AXIS", required=True),
         option(
             "--window",

@@ -13,8 +13,8 @@ from sweep.study import samples
 from sweep.study.model import Study
 from sweep.system.errors import SweepError
 
-SEED = 0
-"""Of the resampling that tells the errors."""
+SEED = 1
+"""Of the resampling that tells the errors; SALib takes 0 for none."""
 SOBOL = {
     "S1": ("first_order", "share of the variance by the parameter alone"),
     "S1_conf": ("first_order_error", "half of the interval of the share, 95 %"),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sweep.show.laws import check_output
+from sweep.show.laws import output_of
 from sweep.system import disk
 from sweep.system.errors import SweepError
 from sweep.system.table import cell, columns, page
@@ -24,11 +24,11 @@ NOTE = (
 )
 
 
-def comparison(dataset: xr.Dataset, y: str, x: str, windows: Sequence[Sequence[float]] = ()) -> xr.Dataset:
+def comparison(dataset: xr.Dataset, y: str | None, x: str, windows: Sequence[Sequence[float]] = ()) -> xr.Dataset:
     """`compare_laws` of one line of a result. Raises SweepError, also where other axes are left."""
     from sweep.analysis.compare import compare_laws
 
-    check_output(dataset, y)
+    y = output_of(dataset, y)
     if len(windows) > 1:
         raise SweepError(f"--window: with --compare expected one, found {len(windows)}")
     rest = [str(dim) for dim in dataset[y].dims if x not in dataset.coords or dim not in dataset[x].dims]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sweep.cells.schema import ANCILLARY, STATUS
+from sweep.show.view import preferred
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.system import disk
 from sweep.system.errors import SweepError
@@ -79,17 +80,17 @@ class Laws:
 
 def laws(
     dataset: xr.Dataset,
-    y: str,
+    y: str | None,
     x: str,
     windows: Sequence[Sequence[float]] = (),
     confidence: float = 0.95,
     noise: bool | str | None = None,
 ) -> Laws:
-    """What `sweep fit` finds; `noise` as of `fit_exponent`. Raises SweepError."""
+    """What `sweep fit` finds; `y` and `noise` as of `output_of` and `fit_exponent`. Raises SweepError."""
     from sweep.analysis.curves import stated_error
     from sweep.analysis.lines import crossover, fit_exponent
 
-    check_output(dataset, y)
+    y = output_of(dataset, y)
     if len(windows) > 2:
         raise SweepError(f"--window: expected one or two, found {len(windows)}")
     limits: list[tuple[float, float] | None] = [*sorted((low, high) for low, high in windows)] or [None]
@@ -101,12 +102,15 @@ def laws(
     return Laws(y, x, fits, _bend(dataset[y], x, limits[0], confidence, noise), None, confidence, remark)
 
 
-def check_output(dataset: xr.Dataset, y: str) -> None:
-    """Raises SweepError where there is no such output."""
+def output_of(dataset: xr.Dataset, y: str | None) -> str:
+    """The output `y`, by default the one that is drawn. Raises SweepError where there is no such output."""
     outputs = [str(name) for name in dataset.data_vars if name not in ANCILLARY]
+    if y is None:
+        return preferred(outputs)
     if y not in outputs:
         hint = did_you_mean(y, outputs) or f"; there are {listed(outputs, word='and')}"
         raise SweepError(f"--y {y}: no such output{hint}")
+    return y
 
 
 def _remark(dataset: xr.Dataset, y: str) -> str:
@@ -252,13 +256,18 @@ def _fit_cells(fit: xr.Dataset) -> tuple[str, ...]:
     v = {str(name): variable.item() for name, variable in fit.data_vars.items()}
     return (
         f"{v['low']:.4g} to {v['high']:.4g}",
-        f"{v['exponent']:.8g}",
+        f"{v['exponent']:.{8 if v['fits'] == 1 else _digits(**v)}g}",
         ("" if v["fits"] == 1 else "runs from ") + _interval(v["exponent_low"], v["exponent_high"]),
         f"{v['points']}",
         f"{v['drift']:.1e}",
         f"{v['residual']:.1e}",
         f"{v['prefactor']:.6g}",
     )
+
+
+def _digits(exponent: float, exponent_low: float, exponent_high: float, **_: float) -> int:
+    """Of an exponent that does not fit: as many as the range of the local one has in common, two or three."""
+    return 3 if abs(exponent_high - exponent_low) < 0.1 * abs(exponent) else 2
 
 
 def _interval(low: float, high: float) -> str:

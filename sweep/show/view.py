@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -77,7 +77,7 @@ class View:
 
 
 def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> View:
-    """Choose what is drawn: `y` (the first output) along `x` (what a trace runs along, else the longest axis).
+    """Choose what is drawn: `y` (the `preferred` output) along `x` (what a trace runs along, else the longest axis).
 
     Raises
     ------
@@ -125,7 +125,13 @@ def _output(dataset: xr.Dataset, y: str | None) -> str:
         raise SweepError("there is nothing to draw: no output runs along an axis")
     if y is not None and y not in known:
         raise SweepError(f"there is no output {y!r} to draw{_hint(y, known)}")
-    return known[0] if y is None else y
+    return preferred(known) if y is None else y
+
+
+def preferred(outputs: Sequence[str]) -> str:
+    """The output that is shown where none is asked for: the first; of a scene, whose `time` is that of its last switch,
+    the `interval` behind it."""
+    return outputs[1] if [*outputs[:2]] == ["time", "interval"] else outputs[0]
 
 
 def _x(output: xr.DataArray, x: str | None, cell_dims: tuple[Any, ...]) -> str:

@@ -14,7 +14,7 @@ from bokeh.events import RangesUpdate, Tap
 
 from kernels.interface import Status
 from sweep.cells.schema import STATUS
-from sweep.show.view import View, coordinate, evened, setting
+from sweep.show.view import View, coordinate, evened, preferred, setting
 from sweep.system.errors import SweepError
 from sweep.view import region
 from sweep.view.picture import Picture, Scales, status_colour
@@ -48,9 +48,9 @@ class Page:
         if not names:
             raise SweepError(f"{name}: there is nothing to look at: no output runs along an axis of numbers")
         wide = {"sizing_mode": "stretch_width"}
-        self.output = pn.widgets.Select(label="output", options=names, **wide)
+        self.output = pn.widgets.Select(label="output", options=names, value=preferred(names), **wide)
         self.shows = pn.widgets.RadioButtonGroup(options=values, **wide)
-        self.x = pn.widgets.Select(label="across the page", options=number_axes(dataset, names[0]), **wide)
+        self.x = pn.widgets.Select(label="across the page", options=number_axes(dataset, self.output.value), **wide)
         self.up = pn.widgets.Select(label="up the page", **wide)
         self.scales = {
             key: _scale(text) for key, text in (("x", "scale across"), ("y", "scale up"), ("values", "values"))
