@@ -26,7 +26,7 @@ from sweep.runs import cluster as clusters
 from sweep.runs import dispatch, worker
 from sweep.store import frame
 from sweep.store.store import Store, opened, unfinished_of
-from sweep.system.errors import SweepError
+from sweep.system.errors import INCOMPLETE, SweepError
 
 # a lost connection is what some of these tests are about; dask leaves its sockets to the collector
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
@@ -219,6 +219,7 @@ def test_a_lost_scheduler_is_one_line_and_the_run_continues(output):
             elsewhere(study, output, cluster=address, block_cells=4)
         killer.join()
     assert "\n" not in str(told.value)
+    assert explained(told.value).code == INCOMPLETE
     before = kept(output)
     assert len(before) >= 5
     with pytest.MonkeyPatch.context() as patch:
