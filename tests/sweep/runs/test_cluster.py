@@ -20,6 +20,7 @@ from running import kept, quiet, same, tall
 
 import sweep
 from sweep.cli import main
+from sweep.command.outcome import explained
 from sweep.results.statuses import account
 from sweep.results.verify import verify
 from sweep.runs import cluster as clusters

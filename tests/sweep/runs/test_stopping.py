@@ -122,7 +122,7 @@ AWAY = {
 @pytest.mark.parametrize("deed", AWAY)
 def test_an_output_that_is_moved_or_spoilt_ends_the_run_within_seconds_and_keeps_what_is_left(begun, tmp_path, deed):
     (tmp_path / "here").mkdir()
-    process, _ = begun("slow:SLOW", 3000, "-o", "here/stones.h5", "--no-isolate", "--workers", "1")
+    process, _ = begun("slow:SLOW", 20000, "-o", "here/stones.h5", "--no-isolate", "--workers", "1")
     output = tmp_path / "here" / "stones.h5"
     wait_for(lambda: solved(output) >= 100, process)
     kept, at = solved(output), time.monotonic()
