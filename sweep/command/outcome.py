@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sweep.system.errors import FAULT, INTERRUPTED, MISTAKE, SweepError
+from sweep.system.errors import FAULT, INCOMPLETE, INTERRUPTED, MISTAKE, Incomplete, SweepError
 
 
 class Outcome(NamedTuple):
@@ -17,7 +17,7 @@ class Outcome(NamedTuple):
 def explained(error: BaseException) -> Outcome:
     """The exit status and the message of a fault."""
     if isinstance(error, SweepError):
-        return Outcome(MISTAKE, str(error))
+        return Outcome(INCOMPLETE if isinstance(error, Incomplete) else MISTAKE, str(error))
     if isinstance(error, KeyboardInterrupt):
         return Outcome(INTERRUPTED, "stopped")
     if isinstance(error, SystemExit):

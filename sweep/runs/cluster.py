@@ -22,7 +22,7 @@ import distributed
 
 from sweep.runs import worker
 from sweep.runs.worker import Answer, Assignment, Plugin
-from sweep.system.errors import SweepError
+from sweep.system.errors import Incomplete, SweepError
 from sweep.system.pool import TICK, CtrlC
 from sweep.system.progress import passed
 
@@ -164,10 +164,10 @@ class Cluster:
             with contextlib.suppress(Exception):
                 executor.shutdown(wait=False)
 
-    def lost(self, fault: BaseException) -> SweepError:
+    def lost(self, fault: BaseException) -> Incomplete:
         """What is reported where the scheduler does not answer any more; it is not asked again."""
         self._gone = True
-        return SweepError(
+        return Incomplete(
             f"cluster: the scheduler is lost ({_reason(fault)}); what is finished is kept, run the same command again "
             "to continue"
         )

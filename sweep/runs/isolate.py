@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import os
 import signal
 import sys
 import threading
@@ -21,7 +20,7 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 from sweep.cells.grid import Cells, Grid
-from sweep.cells.guard import Unsolved
+from sweep.cells.guard import Unsolved, told
 from sweep.cells.schema import STATUS, cells_of
 from sweep.results.open import memory
 from sweep.runs import isolated
@@ -43,6 +42,8 @@ MEMORY_SHARE = 0.5
 """Share of the memory that all processes may have before they are replaced."""
 TRIALS = 3
 """Times that a cell is tried alone of which a process dies."""
+STARTS, START_SECONDS = 5, 0.5
+"""Times that a process is started anew which dies before it has loaded the kernel, and the pause before that."""
 LOOK_SECONDS = 0.2
 """How often it is looked whether time goes by, or the machine slept."""
 BURY_SECONDS = 1.0
@@ -188,16 +189,26 @@ class IsolatedSolver:
         """The executor; a new one has loaded the kernel, and solved a cell that is known to end."""
         if self._pool is not None and not self._all.over:
             return self._pool
-        for _ in range(TRIALS):
-            pool = self._begun()
-            with contextlib.suppress(RuntimeError, CancelledError, TimeoutError):
-                number = awaited(pool.submit(os.getpid), LOAD_SECONDS)
+        for _ in range(STARTS):
+            try:
+                pool = self._begun()
+                number = awaited(pool.submit(isolated.known), LOAD_SECONDS)
                 self._process = next((p for p in multiprocessing.active_children() if p.pid == number), None)
                 awaited(pool.submit(isolated.load, self._all.text, self._all.paths, self._all.good), LOAD_SECONDS)
                 self._fresh = True
                 return pool
-            self.end()
-        raise SweepError(f"{self._all.study.kernel_name}: no process of its own can load it")
+            except SweepError:
+                self.end()
+                raise
+            except Exception as fault:
+                # a process that has not loaded the kernel is never asked for cells: they would be blamed for it
+                reason = told(fault)
+                self.end()
+                time.sleep(START_SECONDS)
+        raise SweepError(
+            f"{self._all.study.kernel_name}: no process of its own can be started and load it ({reason}); what is "
+            "finished is kept. The name of the folder TMPDIR must be short, and ulimit -n and -u large enough"
+        )
 
     def _begun(self) -> ProcessPoolExecutor:
         """A new executor, whose process is being made. Raises Ended."""

@@ -24,6 +24,8 @@ from sweep.study.model import Study
 
 PR_SET_PDEATHSIG = 1
 
+_here: dict[str, Any] = {}
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -38,8 +40,8 @@ class Answer:
 def enter(flag: Any) -> None:
     """First in the process: it dies with the one that asks it, and before that one where the memory is short.
 
-    The system kills it with its fork server, also in a kernel that never lets Python run; that one ends with who asks
-    it, if nobody else holds the pipe that tells.
+    Linux kills it with its fork server, also in a kernel that never lets Python run; that one ends with who asks it,
+    if nobody else holds the pipe that tells.
     """
     work_clock.flag = flag
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -49,10 +51,39 @@ def enter(flag: Any) -> None:
     if pipe is not None:
         os.close(pipe)
     if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         with contextlib.suppress(OSError):
             Path("/proc/self/oom_score_adj").write_text("1000")
+        _begin_apart()
     threading.Thread(target=_die_with_parent, daemon=True).start()
+
+
+def _begin_apart() -> None:
+    """Goes on in a child process, so that a kernel that kills its parent kills none of the other processes.
+
+    The parent, which the executor knows, waits for its child and then ends in the same way.
+    """
+    _die_with_its_parent()
+    _here["known"] = number = os.getpid()
+    child = os.fork()
+    if child:
+        code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        if code < 0:
+            with contextlib.suppress(OSError):
+                signal.signal(-code, signal.SIG_DFL)
+            os.kill(number, -code)
+        os._exit(code & 255)
+    _die_with_its_parent()
+    if os.getppid() != number:
+        os._exit(1)
+
+
+def _die_with_its_parent() -> None:
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def known() -> int:
+    """Number of the process that the executor knows."""
+    return int(_here.get("known", os.getpid()))
 
 
 def _leave_no_core() -> None:
@@ -66,9 +97,6 @@ def _die_with_parent() -> None:
     if parent is not None:
         parent.join()
         os._exit(0)
-
-
-_here: dict[str, Any] = {}
 
 
 def load(text: str, paths: tuple[str, ...], good: int | None) -> None:

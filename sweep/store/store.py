@@ -25,17 +25,19 @@ import numpy as np
 
 from sweep.store.ending import Gather, end, gathered, reads_back
 from sweep.store.frame import PAGE, Frame
-from sweep.store.layout import DAMAGE, Layout, Table, read_layout, write_digests
+from sweep.store.layout import DAMAGE, TAIL, Layout, Table, read_layout, write_digests
 from sweep.store.probe import written
 from sweep.store.reading import StoredFile, damaged, unbroken
 from sweep.store.write_back import WriteBack
 from sweep.system import disk
-from sweep.system.errors import SweepError
+from sweep.system.errors import Incomplete, SweepError
 
 SYNC_BYTES = 64 << 20
 """Bytes after which blocks are brought to the disk,"""
 SYNC_SECONDS = 0.2
 """or time, where that comes first."""
+LOOK_SECONDS = 1.0
+"""How often it is looked whether the file is still in its place."""
 
 
 def unfinished_of(output: Path) -> Path:
@@ -97,7 +99,7 @@ class Store:
     def __init__(self, output: Path) -> None:
         self.output, self.path = output, unfinished_of(output)
         self.layout: Layout | None = None
-        self._fd = -1
+        self._fd, self._size, self._tail, self._looked = -1, 0, b"", 0.0
         self._done = np.zeros(0, bool)
         self._waiting: dict[int, bytes] = {}
         self.write_back, self._synced = WriteBack(), time.monotonic()
@@ -170,7 +172,48 @@ class Store:
     def _open(self, layout: Layout) -> None:
         with disk.refusing(self.path):
             self._fd = disk.open_file(self.path, os.O_RDWR)
+            self._size = os.fstat(self._fd).st_size
+            self._tail = self._read_tail()
         self.layout, self._done = layout, np.zeros(layout.work.blocks.count, bool)
+
+    def _read_tail(self) -> bytes:
+        """The last bytes of the file, which are of it alone and are not written again; none where it was cut."""
+        tail = bytearray(TAIL)
+        try:
+            disk.read_all(self._fd, (tail,), self._size - TAIL)
+        except EOFError:
+            return b""
+        return bytes(tail)
+
+    def _check_own(self) -> None:
+        """Raises Incomplete where another program has cut the file or written to it: not a byte of ours goes there."""
+        with disk.refusing(self.path):
+            if self._read_tail() == self._tail:
+                return
+        self._waiting = {}
+        raise Incomplete(
+            f"{self.path}: was cut or overwritten by another program while the run wrote to it, and cannot be "
+            "continued; remove it and run the same command again"
+        )
+
+    def _check_there(self) -> None:
+        """Raises Incomplete where the file is not what it was, or not where it was."""
+        self._looked = time.monotonic()
+        self._check_own()
+        ours = os.fstat(self._fd)
+        try:
+            if os.path.samestat(self.path.stat(), ours):
+                return
+        except (FileNotFoundError, NotADirectoryError):
+            pass
+        except OSError:
+            return  # a network may be slow to answer
+        if not ours.st_nlink:
+            raise Incomplete(f"{self.path}: was removed while the run wrote to it; what was computed is lost")
+        raise Incomplete(
+            f"{self.path}: was moved while the run wrote to it, to {disk.place_of(self._fd) or 'another place'}; all "
+            "blocks that were computed are kept there; move it back, and the same command continues"
+        )
 
     @property
     def temporary(self) -> Path:
@@ -205,6 +248,8 @@ class Store:
 
     def tick(self) -> None:
         """Acknowledges what is written, if it is time to. Raises SweepError."""
+        if time.monotonic() - self._looked >= LOOK_SECONDS:
+            self._check_there()
         with self._turn:
             due = (
                 self.write_back.put - self.write_back.synced >= SYNC_BYTES
@@ -224,6 +269,7 @@ class Store:
                 disk.sync_numbers(self._fd)
 
     def _commit(self) -> None:
+        self._check_own()
         with self._turn:
             waiting, self._waiting, self._synced = self._waiting, {}, time.monotonic()
         with disk.refusing(self.path):
@@ -262,6 +308,7 @@ class Store:
         """
         assert self.layout is not None
         with disk.refusing(self.output):
+            self._check_there()
             self.commit()
             found = self.damaged()
             if not found and gather is not None:

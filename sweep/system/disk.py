@@ -120,6 +120,14 @@ def _through(call: Any, fd: int, pieces: Sequence[Any], offset: int) -> None:
             left[0] = left[0][count:]
 
 
+def place_of(fd: int) -> str:
+    """Where the file of a descriptor is now, as far as the system tells; else nothing."""
+    try:
+        return str(Path(f"/proc/self/fd/{fd}").readlink())
+    except OSError:
+        return ""
+
+
 def sync_folder(path: Path) -> None:
     """Returns when the names in a folder, or the bytes of a file, are on the disk. Raises OSError."""
     fd = open_file(path, os.O_RDONLY)

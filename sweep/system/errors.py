@@ -20,12 +20,16 @@ class SweepError(Exception):
     """
 
 
+class Incomplete(SweepError):
+    """A run had to end early through no mistake of the user's; the command line exits with 3."""
+
+
 COMPLETE, FAULT, MISTAKE, INCOMPLETE, CELLS_FAILED, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 4, 130, 143
 EXIT_CODES = {
     COMPLETE: "complete, or what was asked for is done",
     FAULT: "a fault in foliot",
     MISTAKE: "a mistake in what was asked, or the machine has no room or no memory for it",
-    INCOMPLETE: "not complete yet (--until, a cluster without workers); the same command continues",
+    INCOMPLETE: "not complete yet (--until, a cluster or output that is lost); the same command continues",
     CELLS_FAILED: "complete, but some cells FAILED; sweep show names them",
     INTERRUPTED: "stopped by Ctrl-C; the same command continues",
     TERMINATED: "stopped by SIGTERM; the same command continues",

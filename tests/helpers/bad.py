@@ -13,7 +13,7 @@ import toy
 
 from kernels.interface import Status
 
-RAISES, CRASHES, EXITS, HANGS, HOGS, HUNGRY = 11.0, 22.0, 33.0, 44.0, 55.0, 66.0
+RAISES, CRASHES, EXITS, HANGS, HOGS, HUNGRY, ORPHANS = 11.0, 22.0, 33.0, 44.0, 55.0, 66.0, 77.0
 """Heights at which the kernel misbehaves."""
 
 
@@ -33,6 +33,7 @@ def misbehave(height, kinds):
         HANGS: lambda: time.sleep(1 << 20),
         HOGS: spin,
         HUNGRY: lambda: (_ for _ in ()).throw(MemoryError()),
+        ORPHANS: lambda: (os.kill(os.getppid(), signal.SIGKILL), time.sleep(60)),
     }
     for one in height:
         if one in kinds:
@@ -54,6 +55,8 @@ def kernel(name, *kinds, pause=0.0):
 RAISING = kernel("raising", RAISES)
 DYING = kernel("dying", RAISES, CRASHES, EXITS)
 SLOW = kernel("slow", pause=0.05)
+ORPHANED = kernel("orphaned", ORPHANS, pause=0.01)
+DEADLY = kernel("deadly", CRASHES, EXITS, pause=0.01)
 STUCK = kernel("stuck", HANGS, pause=0.002)
 ENDLESS = kernel("endless", HANGS, HOGS)
 HOGGING = kernel("hogging", HOGS)

@@ -1,16 +1,20 @@
 """Kernels that raise, crash, or never end cost the cells they do so at, and nothing else."""
 
 import io
+import resource
+import subprocess
+import sys
 import time
 from concurrent.futures import Future, ProcessPoolExecutor
 from types import SimpleNamespace
 
 import bad
 import numpy as np
+import psutil
 import pytest
 import toy_studies
 from clusters import served
-from running import quiet, same, tall
+from running import environment, quiet, same, tall, wait_for
 
 import sweep
 from kernels.interface import Status
@@ -20,10 +24,20 @@ from sweep.cells.solve import Solver
 from sweep.results.statuses import account
 from sweep.runs import isolate, isolated
 from sweep.runs.isolate import Limits, Processes
-from sweep.system.errors import SweepError
+from sweep.store.store import unfinished_of
+from sweep.system.errors import CELLS_FAILED, MISTAKE, SweepError
 
 SOUND = 100
 BAD = {"bad:RAISING": [11.0], "bad:DYING": [11.0, 22.0, 33.0], "bad:WORST": [11.0, 22.0, 33.0, 44.0, 55.0, 66.0]}
+DEADLY = """
+kernel = "bad:DEADLY"
+outputs = ["fall_time"]
+[axes.height]
+spacing = "linear"
+start = 1
+stop = 600
+num = 600
+"""
 KEYS = {"bad:RAISING": {}, "bad:DYING": {"isolate": True}, "bad:WORST": {"cell_timeout": 1.5}}
 
 
@@ -71,6 +85,63 @@ def test_a_process_that_died_by_itself_was_not_late(monkeypatch):
         "its process died of SIGSEGV",
         "its process ended with 7",
     ]
+
+
+def test_a_kernel_that_kills_its_parent_costs_the_cell_and_none_of_those_that_other_processes_are_at():
+    found = quiet(tall(120, "bad:ORPHANED"), isolate=True, block_cells=30)
+    assert heights_of(found, Status.FAILED) == [bad.ORPHANS]
+
+
+def fork_servers(process):
+    return [child for child in psutil.Process(process.pid).children() if "forkserver" in " ".join(child.cmdline())]
+
+
+@pytest.fixture
+def run_of_deadly(tmp_path):
+    """Begins a run by the command whose kernel needs new processes again and again; its process and its output."""
+    (tmp_path / "stones.toml").write_text(DEADLY)
+    words = [sys.executable, "-m", "sweep", "run", "stones.toml", "--allow-import", "--workers", "2"]
+    begun = []
+
+    def begin(**environ):
+        keys = {"env": {**environment(), **environ}, "cwd": tmp_path, "stderr": subprocess.PIPE, "text": True}
+        begun.append(subprocess.Popen(words, **keys))
+        return begun[-1], tmp_path / "stones.h5"
+
+    yield begin
+    for process in begun:
+        process.kill()
+        process.communicate()
+
+
+def test_a_fork_server_that_is_killed_is_started_anew_and_costs_no_cell(run_of_deadly):
+    process, output = run_of_deadly()
+    wait_for(unfinished_of(output).exists, process)
+    for _ in range(4):
+        for server in fork_servers(process):
+            server.kill()
+        time.sleep(1.0)
+    assert process.wait(60) == CELLS_FAILED, process.stderr.read()
+    with sweep.open_result(output) as found:
+        assert heights_of(found, Status.FAILED) == [bad.CRASHES, bad.EXITS]
+
+
+@pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="the limit of another process is set on Linux only")
+def test_where_no_process_can_be_started_the_run_ends_and_no_cell_is_blamed(run_of_deadly, tmp_path):
+    process, output = run_of_deadly(TMPDIR=str(tmp_path))
+    wait_for(unfinished_of(output).exists, process)
+    resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (6, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+    assert process.wait(60) == MISTAKE
+    assert "process" in process.stderr.read()
+    long = tmp_path / ("x" * 100)
+    long.mkdir()
+    process, output = run_of_deadly(TMPDIR=str(long))  # sockets have names of at most 108 characters
+    assert process.wait(60) == MISTAKE
+    assert "TMPDIR" in process.stderr.read()
+    process, output = run_of_deadly()
+    assert process.wait(60) == CELLS_FAILED
+    with sweep.open_result(output) as found:
+        assert heights_of(found, Status.FAILED) == [bad.CRASHES, bad.EXITS]
 
 
 def test_time_in_which_the_machine_slept_does_not_count(monkeypatch):

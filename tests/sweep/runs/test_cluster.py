@@ -20,13 +20,14 @@ from running import kept, quiet, same, tall
 
 import sweep
 from sweep.cli import main
+from sweep.command.outcome import explained
 from sweep.results.statuses import account
 from sweep.results.verify import verify
 from sweep.runs import cluster as clusters
 from sweep.runs import dispatch, worker
 from sweep.store import frame
 from sweep.store.store import Store, opened, unfinished_of
-from sweep.system.errors import SweepError
+from sweep.system.errors import INCOMPLETE, SweepError
 
 # a lost connection is what some of these tests are about; dask leaves its sockets to the collector
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
@@ -219,6 +220,7 @@ def test_a_lost_scheduler_is_one_line_and_the_run_continues(output):
             elsewhere(study, output, cluster=address, block_cells=4)
         killer.join()
     assert "\n" not in str(told.value)
+    assert explained(told.value).code == INCOMPLETE
     before = kept(output)
     assert len(before) >= 5
     with pytest.MonkeyPatch.context() as patch:

@@ -1,6 +1,5 @@
 """What cells in processes of their own may take, and what is said of those that took longer, by hand."""
 
-import os
 import sys
 import time
 from concurrent.futures import Future
@@ -265,62 +264,6 @@ def test_what_a_process_answers_is_put_in_its_place(monkeypatch, bounds):
     assert asked == [(7, 2, "wanted")]
     assert (cells.outputs["fall_time"].tolist(), cells.status.tolist(), cells.used.tolist()) == ([0, 1], [1, 2], [2, 3])
     assert not bounds or error.tolist() == [3, 4]
-
-
-class Loading(Pool):
-    """An executor whose process is number 7; it cannot load the kernel so many times."""
-
-    def submit(self, *words):
-        super().submit(*words)
-        return words[0]
-
-
-def loading(monkeypatch, faults):
-    """A solver whose processes fail in these ways, one after another, and then load; what is awaited of them."""
-    solver, awaits, pools, faults = IsolatedSolver(processes(Limits(), good=5)), [], [], list(faults)
-    solver._all.text, solver._all.paths, solver._all.study = "text", ("path",), SimpleNamespace(kernel_name="toy")
-    others = [SimpleNamespace(pid=6), SimpleNamespace(pid=7, kill=lambda: None, exitcode=-9)]
-    monkeypatch.setattr(isolate.multiprocessing, "active_children", lambda: others)
-
-    def begun():
-        pools.append(Loading())
-        solver._pool = pools[-1]
-        return pools[-1]
-
-    def awaited(function, seconds):
-        awaits.append((function, seconds))
-        if function is isolate.isolated.load and faults and (fault := faults.pop(0)):
-            raise fault
-        return 7
-
-    monkeypatch.setattr(solver, "_begun", begun)
-    monkeypatch.setattr(isolate, "awaited", awaited)
-    return solver, awaits, pools
-
-
-def test_a_new_process_has_loaded_the_kernel_and_an_old_one_is_used_again(monkeypatch):
-    solver, awaits, pools = loading(monkeypatch, [])
-    solver._fresh = False
-    pool = solver._ready()
-    assert pool.told == [(os.getpid,), (isolate.isolated.load, "text", ("path",), 5)]
-    assert awaits == [(os.getpid, 180.0), (isolate.isolated.load, 180.0)]
-    assert (solver._process.pid, solver._fresh) == (7, True)
-    solver._fresh = False
-    assert solver._ready() is pool
-    assert (len(pools), solver._fresh) == (1, False)
-    solver._all.over = True
-    assert solver._ready() is not pool
-
-
-@pytest.mark.parametrize("fault", [RuntimeError(), TimeoutError(), isolate.CancelledError()])
-def test_a_process_that_cannot_load_the_kernel_is_begun_three_times(monkeypatch, fault):
-    solver, _, pools = loading(monkeypatch, [fault, fault])
-    assert solver._ready() is pools[2]
-    assert [("shutdown", True) in pool.told for pool in pools] == [True, True, False]
-    solver, _, pools = loading(monkeypatch, [fault] * 3)
-    with pytest.raises(isolate.SweepError, match=r"^toy: no process of its own can load it$"):
-        solver._ready()
-    assert len(pools) == 3
 
 
 def test_a_call_is_awaited_while_its_process_compiles(monkeypatch):

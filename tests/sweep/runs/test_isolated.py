@@ -2,7 +2,6 @@
 
 import math
 import resource
-import signal
 import sys
 from types import SimpleNamespace
 
@@ -109,34 +108,3 @@ def test_a_process_ends_with_its_parent(monkeypatch, parent):
     monkeypatch.setattr(isolated.os, "_exit", told.append)
     isolated._die_with_parent()
     assert told == (["joined", 0] if parent else [])
-
-
-@pytest.mark.parametrize(("platform", "pipe"), [("linux", 33), ("linux", None), ("darwin", 33)])
-def test_a_process_is_made_ready_to_die(monkeypatch, platform, pipe):
-    told = []
-    server = SimpleNamespace(_forkserver_alive_fd=pipe)
-    monkeypatch.setattr(isolated, "forkserver", SimpleNamespace(_forkserver=server))
-    monkeypatch.setattr(isolated.signal, "signal", lambda *words: told.append(words))
-    monkeypatch.setattr(isolated, "_leave_no_core", lambda: told.append("no core"))
-    monkeypatch.setattr(isolated.os, "close", lambda fd: told.append(("close", fd)))
-    monkeypatch.setattr(isolated.sys, "platform", platform)
-    library = SimpleNamespace(prctl=lambda *words: told.append(("prctl", *words)))
-    monkeypatch.setattr(isolated, "ctypes", SimpleNamespace(CDLL=lambda name: library))
-    monkeypatch.setattr(isolated.Path, "write_text", lambda self, text: told.append((str(self), text)))
-    started = []
-
-    class Thread:
-        def __init__(self, target, daemon):
-            started.append((target, daemon))
-
-        def start(self):
-            started.append("started")
-
-    monkeypatch.setattr(isolated, "threading", SimpleNamespace(Thread=Thread))
-    isolated.enter("flag")
-    assert isolated.work_clock.flag == "flag"
-    assert server._forkserver_alive_fd is None
-    expected = [(signal.SIGINT, signal.SIG_IGN), "no core", *([("close", pipe)] if pipe else [])]
-    dying = [("prctl", 1, signal.SIGKILL), ("/proc/self/oom_score_adj", "1000")] if platform == "linux" else []
-    assert told == expected + dying
-    assert started == [(isolated._die_with_parent, True), "started"]

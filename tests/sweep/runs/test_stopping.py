@@ -20,6 +20,7 @@ import sweep
 from sweep.cli import main, parser
 from sweep.results.statuses import account
 from sweep.show.follow import follow, reasons
+from sweep.store.store import unfinished_of
 from sweep.system.errors import EXIT_CODES, SweepError
 from sweep.system.log import log, log_path, logging_to, read_lines
 from sweep.system.progress import passed
@@ -101,6 +102,39 @@ def test_of_a_run_that_is_killed_no_process_is_left(begun):
     process.wait()
     _, left = psutil.wait_procs(below, timeout=20)
     assert left == []
+
+
+def replace(path):
+    path.with_name("copy").write_bytes(path.read_bytes())
+    path.with_name("copy").replace(path)
+
+
+AWAY = {
+    "renamed": lambda path: path.rename(path.with_name("other")),
+    "folder moved": lambda path: path.parent.rename(path.parent.with_name("moved")),
+    "replaced": replace,
+    "removed": lambda path: path.unlink(),
+    "truncated": lambda path: os.truncate(path, path.stat().st_size // 2),
+    "overwritten": lambda path: path.write_bytes(bytes(path.stat().st_size)),
+}
+
+
+@pytest.mark.parametrize("deed", AWAY)
+def test_an_output_that_is_moved_or_spoilt_ends_the_run_within_seconds_and_keeps_what_is_left(begun, tmp_path, deed):
+    (tmp_path / "here").mkdir()
+    process, _ = begun("slow:SLOW", 20000, "-o", "here/stones.h5", "--no-isolate", "--workers", "1")
+    output = tmp_path / "here" / "stones.h5"
+    wait_for(lambda: solved(output) >= 100, process)
+    kept, at = solved(output), time.monotonic()
+    AWAY[deed](unfinished_of(output))
+    _, said = process.communicate(timeout=60)
+    assert time.monotonic() - at < SECONDS + START
+    assert (process.returncode, str(unfinished_of(output)) in said) == (3, True)
+    moved = {"renamed": tmp_path / "here" / "other", "folder moved": unfinished_of(tmp_path / "moved" / "stones.h5")}
+    if deed in moved:
+        assert str(moved[deed]) in said
+        moved[deed].rename(unfinished_of(tmp_path / "back.h5"))
+        assert solved(tmp_path / "back.h5") >= kept
 
 
 def test_a_machine_that_sleeps_costs_no_cell(begun):
