@@ -233,23 +233,6 @@ def test_columns_have_the_order_of_the_grid_and_their_own_dimensions_last(result
     assert column[1].tolist() == turned.x.isel(height=0, v0=1).values.tolist()
 
 
-def test_the_fingerprint_has_the_program_of_both_and_tells_where_they_differ():
-    marks = [
-        {"numpy": "1.26", "numba": "2", "source a": "x", "study": "s"},
-        {"numpy": "1.26", "numba": "3", "rtol": "1"},
-    ]
-    found = module._fingerprint(LOW, [xr.Dataset(attrs={"fingerprint": json.dumps(mark)}) for mark in marks])
-    own = module.fingerprint(LOW)
-    assert (found["study"], found["axes.height"], found["numpy"]) == (own["study"], own["axes.height"], "1.26")
-    assert "numba" not in found
-    assert "source a" not in found
-    assert found["joined"].startswith("of two results. numba")
-    assert "rtol" not in found["joined"]
-    assert "; source a" in found["joined"]
-    same = module._fingerprint(LOW, [xr.Dataset(attrs={"fingerprint": json.dumps(marks[0])})] * 2)
-    assert (same["joined"], same["source a"]) == ("of two results.", "x")
-
-
 def test_each_result_tells_its_versions():
     found = module._versions([xr.Dataset(attrs={"versions": "v 1"}), xr.Dataset()], ["a", "b"])
     assert found == "a: v 1\nb: "
