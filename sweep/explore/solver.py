@@ -63,7 +63,7 @@ class PointSolver:
         -------
         namedtuple
             `fields`: a float and an int of one cell; else arrays of the shape of the parameters, traces behind.
-            NaN where the status is a refusal, or FAILED: there the kernel raises, and a RuntimeWarning says what.
+            NaN where the status is refused, unsolved or FAILED: at the last the kernel raises, and a RuntimeWarning says what.
 
         Raises
         ------

@@ -58,7 +58,8 @@ def test_the_share_that_is_done_is_told_and_never_rounded_up(product):
 
 def test_a_result_without_trouble_is_summed_up_in_one_line(zipped):
     assert (
-        summary_text(zipped) == "6 cells: 6 ok, 0 remarks, 0 refused, 0 failed, 0 pending; solved by rough 3, exact 3"
+        summary_text(zipped)
+        == "6 cells: 6 ok, 0 remarked, 0 refused, 0 unsolved, 0 FAILED, 0 pending; solved by rough 3, exact 3"
     )
 
 

@@ -35,7 +35,7 @@ def result(mu=(1.0, 2.0, 3.0, 4.0), status=(0, 0, 1, 0), **attrs):
 EXPECTED = f"""x.h5: complete, 4 cells
 Foliot
 Why?
-4 cells: 3 ok, 1 remarks, 0 refused, 0 failed, 0 pending
+4 cells: 3 ok, 1 remarked, 0 refused, 0 unsolved, 0 FAILED, 0 pending
 
   kernel    foliot
   design    product
