@@ -1,6 +1,5 @@
 """How two results are put together, step by step, and what is said of those that do not fit."""
 
-import json
 from dataclasses import replace
 from types import SimpleNamespace
 

@@ -292,7 +292,7 @@ def test_a_study_that_no_method_can_do_is_told():
 def test_the_table_tells_errors_shares_and_what_they_are_measured_against():
     text = precision_text(measured(stones()))
     lines = text.splitlines()
-    assert lines[0].split()[3:9] == ["worst", "time", "ok", "inaccurate", "refused", "silent"]
+    assert lines[0].split()[3:9] == ["worst", "time", "ok", "inaccurate", "unsolved", "silent"]
     assert any(line.split()[:2] == ["rough", "1e-06"] and "50 %" in line for line in lines)
     assert "errors against exact, in 4 cells, itself right to 1.0e-14" in text
     assert all("reference" in line for line in lines if line.split()[:1] == ["exact"])

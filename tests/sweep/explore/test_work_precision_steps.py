@@ -102,7 +102,7 @@ def table(**changed):
 def test_the_table_by_hand():
     text = module.precision_text(table(rate_calls=12345.6))
     assert [" ".join(line.split()) for line in text.splitlines()[:2]] == [
-        "method rtol median worst time rate calls ok inaccurate refused silent worst cell",
+        "method rtol median worst time rate calls ok inaccurate unsolved silent worst cell",
         "rough 1e-06 1.0e-08 2.0e-07 3 us 1.235e+04 50 % 25 % 12.5 % 0 % height=1",
     ]
     assert text.endswith("\n\nerrors against exact, in 8 cells, itself right to 1.0e-09")
