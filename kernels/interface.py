@@ -17,10 +17,10 @@ from typing import Any, Protocol
 
 
 class Status(IntEnum):
-    """What became of a cell: OK, a remark (1..63, values given) or a refusal (64..124, every output NaN).
+    """What became of a cell: OK, a remark (1..63, values are given) or none of these (64..124, every output is NaN).
 
-    The last three are the engine's words: FAILED is for what no kernel may do. Numbers are stored in files and never
-    reused.
+    The last three are the engine's words: FAILED is for what no kernel may do. `kind` says it in one of a few words.
+    Numbers are stored in files and never reused.
     """
 
     OK = 0, "right to the wanted rtol"
@@ -64,12 +64,32 @@ class Status(IntEnum):
         return member
 
     @property
-    def refused(self) -> bool:
-        return FIRST_REFUSAL <= self < Status.NOT_ASKED
+    def kind(self) -> str:
+        """One of `KINDS`."""
+        if self in (Status.OK, Status.NOT_ASKED, Status.PENDING):
+            return self.name.lower().replace("_", " ")
+        if self == Status.FAILED:
+            return self.name
+        return "unsolved" if self in UNSOLVED else "refused" if self >= FIRST_REFUSAL else "remarked"
 
 
 FIRST_REFUSAL = 64
 """Every status from here on means NaN in every output."""
+UNSOLVED = (Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.NO_METHOD)
+"""Nothing is known of the scene then: another method, a looser rtol or more steps may find an answer.
+
+The others from `FIRST_REFUSAL` on are findings: by any method the scene has no such answer, or none in float64.
+"""
+KINDS = {
+    "ok": "accurate to the wanted rtol",
+    "remarked": "values are given, and the status says what is special about them",
+    "refused": "the scene has no such answer, or none in float64; every output is NaN",
+    "unsolved": "no method got there, though there may be an answer; every output is NaN",
+    "FAILED": "the kernel raised, died, took too long, or gave no number or no status; every output is NaN",
+    "pending": "not computed yet",
+    "not asked": "left out by the study's condition",
+}
+"""Words for what became of a cell, in the order of an account, in which each cell is counted under one of them."""
 
 
 class OnColumns(Protocol):

@@ -124,12 +124,12 @@ def honesty(title: str, found: xr.Dataset) -> list[Statement]:
     """What is checked of a chart: no method is silently wrong, and `auto` is right wherever it says so."""
     auto = found.sel({"method": "auto"})
     over = float((auto.error_worst / (auto.rtol + found.attrs["reference_error"])).max())
-    silent, failed = float(found.silent.max()), float(auto.failed.max())
+    silent, unsolved = float(found.silent.max()), float(auto.unsolved.max())
     cells = f"{found.attrs['cells']} cells, {len(found.rtol)} tolerances"
     return [
         Statement(f"{title}: silently wrong", "none", f"{100 * silent:g} % of {cells}", None, silent == 0),
         Statement(f"{title}: auto, worst error over rtol", "<= 1", f"{over:.2g}", None, over <= 1),
-        Statement(f"{title}: auto refuses", "none", f"{100 * failed:g} %", None, failed == 0),
+        Statement(f"{title}: auto leaves unsolved", "none", f"{100 * unsolved:g} %", None, unsolved == 0),
     ]
 
 
@@ -140,7 +140,7 @@ def costs(found: xr.Dataset) -> list[Statement]:
         row = found.sel({"method": name})
         texts = []
         for wanted in (1e-3, 1e-7, 1e-11):
-            enough = row.seconds.where((row.error_worst <= wanted) & (row.failed + row.silent == 0))
+            enough = row.seconds.where((row.error_worst <= wanted) & (row.unsolved + row.silent == 0))
             texts.append("-" if bool(enough.isnull().all()) else f"{1e6 * float(enough.min()):.3g}")
         lines.append(Statement(f"{name}: us a cell, worst right to 1e-3, 1e-7, 1e-11", "", ", ".join(texts)))
     return lines

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import catalogue
-from kernels.interface import FIRST_REFUSAL, Method, Status
+from kernels.interface import FIRST_REFUSAL, UNSOLVED, Method, Status
 from sweep.cells.grid import Cells, Grid
 from sweep.cells.turns import Absent, Turn, turns
 from sweep.study.model import AUTO, Study
@@ -38,20 +38,20 @@ def _these(*statuses: Status) -> bytes:
 
 
 GIVEN_UP = _these(
-    Status.NO_METHOD,
+    *UNSOLVED,
     Status.NO_CYCLE,
-    Status.NOT_CONVERGED,
-    Status.STEP_LIMIT,
     Status.INACCURATE,
     Status.UNSTABLE,
     Status.FAILED,
 )
 """After these `auto` tries the next method."""
+NO_STATUS = bytes(code not in map(int, Status) or code >= Status.NOT_ASKED for code in range(256))
+"""What a kernel must not say."""
 NO_METHOD, INACCURATE = np.int8(Status.NO_METHOD), np.int8(Status.INACCURATE)
 """Not as a `Status`, which numpy compares ten times as slowly."""
 VAGUE = _these(Status.NO_METHOD, Status.NO_CYCLE)
 """Refusals that tell less than how another method gave up."""
-UNKNOWN = _these(Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT)
+UNKNOWN = _these(*UNSOLVED)
 """A method that ends so has not learnt what the scene does: another's NO_CYCLE, of its own kind alone, is no answer."""
 
 Floats = NDArray[np.float64]
@@ -323,9 +323,8 @@ def fail(status: Codes, columns: Sequence[Floats]) -> None:
         if not finite.all():
             whole = finite.reshape(len(status), -1).all(axis=1)
             status[~whole & (status == Status.OK)] = Status.FAILED
-    codes = status.view(np.uint8)
-    if codes.size and codes.max() >= Status.NOT_ASKED:
-        status[codes >= Status.NOT_ASKED] = Status.FAILED
+    if status.any():
+        status[among(status, NO_STATUS)] = Status.FAILED
 
 
 def _pick(cells: Chosen, condition: NDArray[np.bool_]) -> Chosen:

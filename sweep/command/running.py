@@ -64,8 +64,7 @@ def _run(arguments: argparse.Namespace) -> Outcome:
 
 def _computed(arguments: argparse.Namespace, study: Study, output: Path) -> Outcome:
     """Runs, and says what became of all cells."""
-    from kernels.interface import Status
-    from sweep.results.statuses import summary_text, tally
+    from sweep.results.statuses import account, summary_text
     from sweep.runs.run import complete, is_begun
 
     before = _identity(output)
@@ -78,7 +77,7 @@ def _computed(arguments: argparse.Namespace, study: Study, output: Path) -> Outc
     state = "unfinished; " if not whole else "done before; " if before and _identity(output) == before else ""
     with _after(study, output, state) as found:
         text = f"{output}: {state}{summary_text(found)}"
-        failed = tally(found).get(Status.FAILED.name, 0)
+        failed = account(found).failed
     say(text)
     return Outcome(INCOMPLETE if not whole else CELLS_FAILED if failed else COMPLETE, text)
 

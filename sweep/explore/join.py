@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+import xxhash
 
 from kernels.interface import Status
 from sweep.cells.fingerprint import difference, fingerprint, is_of_program
@@ -56,7 +57,8 @@ def join(
     Raises
     ------
     SweepError
-        They are not two results, do not fit together, are unfinished, or do not fit into the memory.
+        They are not two results, do not fit together, are unfinished, or do not fit into the memory; or `path` holds
+        another result, which a join of other cells or labels is too.
 
     Examples
     --------
@@ -78,10 +80,11 @@ def join(
     joined, whole = _joined(studies, (a, b), axis, labels)
     joined = replace(joined, text="", title=studies[0].title)
     arrays = {name: _column(whole, joined, name) for name in (*joined.outputs, *ANCILLARY)}
-    mark = _fingerprint(joined, (a, b))
+    versions = _versions((a, b), labels)
+    mark = _fingerprint(joined, (a, b), (versions.encode(), *arrays.values()))
     if path is None:
         return in_memory(cell_schema(joined, mark), arrays)
-    return store_cells(joined, path, arrays, force, mark, _versions((a, b), labels))
+    return store_cells(joined, path, arrays, force, mark, versions)
 
 
 def _require(dataset: xr.Dataset) -> None:
@@ -239,8 +242,11 @@ def _column(whole: xr.Dataset, study: Study, name: str) -> Any:
     return np.ascontiguousarray(values.reshape(grid.size, *values.shape[len(grid.dims) :]))
 
 
-def _fingerprint(joined: Study, results: Sequence[xr.Dataset]) -> dict[str, str]:
-    """That of the study, with the program that both were computed by, and that they were joined."""
+def _fingerprint(joined: Study, results: Sequence[xr.Dataset], content: Iterable[Any]) -> dict[str, str]:
+    """That of the study, with the program that both were computed by, and a digest of all cells and labels."""
+    state = xxhash.xxh3_128()
+    for piece in content:
+        state.update(piece)
     old, new = (json.loads(str(dataset.attrs["fingerprint"])) for dataset in results)
     program = {name: text for name, text in old.items() if is_of_program(name) and new.get(name) == text}
     apart = "; ".join(line for line in difference(old, new) if is_of_program(line.partition(":")[0]))
@@ -248,7 +254,7 @@ def _fingerprint(joined: Study, results: Sequence[xr.Dataset]) -> dict[str, str]
         "study": fingerprint(joined)["study"],
         **_said(joined),
         **program,
-        "joined": f"of two results. {apart}".strip(),
+        "joined": f"of two results (digest {state.hexdigest()}). {apart}".strip(),
     }
 
 

@@ -64,7 +64,8 @@ class PointSolver:
         -------
         namedtuple
             `fields`: a float and an int of one cell; else arrays of the shape of the parameters, traces behind.
-            NaN where the status is a refusal, or FAILED: there the kernel raises, and a RuntimeWarning says what.
+            NaN in cells that are refused, unsolved or FAILED; at these last ones the kernel raises, and a
+            RuntimeWarning says what.
 
         Raises
         ------

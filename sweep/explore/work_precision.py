@@ -54,10 +54,10 @@ LONG_NAMES = {
     "ok": "share of cells that the method calls right",
     "remarked": "share of cells with another remark",
     "inaccurate": "share of cells that it says are not right to rtol",
-    "failed": "share of cells that it refuses though there are values",
+    "unsolved": "share of cells that it gives no values for though there are some",
     "silent": "share of cells wrong by more than rtol, and what the truth is right to, without a status that says so",
     "worst_cell": "where the largest error is",
-    "failed_as": "the status of the first cell refused, and where it is",
+    "unsolved_as": "the status of the first of these cells, and where it is",
     "silent_at": "the first cell that is silently wrong",
     "methods_used": "which methods solved how many cells",
     **{name: f"{name.replace('_', ' ')} per cell, mean" for name in WORK},
@@ -107,8 +107,8 @@ def work_precision(
     -------
     Dataset
         Over `method` and `rtol`: `error_median`, between `error_low` and `error_high` (a tenth of the cells beyond
-        each), `error_worst`, `seconds`; shares of cells `ok`, `remarked`, `inaccurate`, `failed`, `silent`; texts
-        `worst_cell`, `failed_as`, `silent_at`, `methods_used`; and means of the outputs asked for that count work.
+        each), `error_worst`, `seconds`; shares of cells `ok`, `remarked`, `inaccurate`, `unsolved`, `silent`; texts
+        `worst_cell`, `unsolved_as`, `silent_at`, `methods_used`; and means of the outputs asked for that count work.
         Attributes `reference`, `reference_error` (the largest error of the truth itself), `cells` (in which methods can
         be told right or wrong), `open_cells` (in which they cannot), `missing` (which methods cannot do the study) and
         `omissions` (these, and what fails where).
@@ -170,13 +170,13 @@ def precision_text(found: xr.Dataset) -> str:
     """The table that `sweep chart` prints."""
     work = [name for name in WORK if name in found]
     head = ("method", "rtol", "median", "worst", "time", *(name.replace("_", " ") for name in work))
-    rows = [(*head, "ok", "inaccurate", "refused", "silent", "worst cell")]
+    rows = [(*head, "ok", "inaccurate", "unsolved", "silent", "worst cell")]
     for name in found["method"].values:
         for rtol in found["rtol"].values:
             cell = found.sel({"method": name, "rtol": rtol})
             off = (_error(float(cell[key]), found.attrs, name) for key in ("error_median", "error_worst"))
             counts = (f"{float(cell[key]):.4g}" for key in work)
-            shares = (f"{100 * float(cell[key]):.3g} %" for key in ("ok", "inaccurate", "failed", "silent"))
+            shares = (f"{100 * float(cell[key]):.3g} %" for key in ("ok", "inaccurate", "unsolved", "silent"))
             taken = small_duration(float(cell.seconds))
             rows.append((str(name), f"{rtol:.0e}", *off, taken, *counts, *shares, str(cell.worst_cell.item())))
     basis = f"errors against {found.attrs['reference']}, in {found.attrs['cells']} cells"
@@ -200,7 +200,10 @@ def omissions(found: xr.Dataset) -> list[str]:
     lines = []
     for name in found["method"].values:
         row = found.sel({"method": name})
-        for key, verb, where in (("failed", "refuses", "failed_as"), ("silent", "is silently wrong in", "silent_at")):
+        for key, verb, where in (
+            ("unsolved", "does not solve", "unsolved_as"),
+            ("silent", "is silently wrong in", "silent_at"),
+        ):
             shares, places = row[key].values, row[where].values
             if shares.any():
                 at = ", ".join(f"{100 * s:.3g} % at {r:.0e}" for s, r in zip(shares, row.rtol.values, strict=True) if s)
@@ -253,7 +256,7 @@ def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[
     error = np.where(_solved_by(study, used, against.source), np.maximum(error, against.floor), error)
     valued, total = against.sound & (status < FIRST_REFUSAL), against.judged
     sure = valued & ~np.isin(status, UNSURE)
-    refused = against.sound & ~valued
+    unsolved = against.sound & ~valued
     wrong = sure & ~(error <= rtol + against.floor) | against.void & (status == Status.OK)
     worst = int(np.where(sure, error, -1.0).argmax())
     # no number between two cells: errors may be infinite
@@ -266,10 +269,10 @@ def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[
         "ok": float((against.sound & (status == Status.OK)).sum() / total),
         "remarked": float((valued & (status != Status.OK) & (status != Status.INACCURATE)).sum() / total),
         "inaccurate": float((valued & (status == Status.INACCURATE)).sum() / total),
-        "failed": float(refused.sum() / total),
+        "unsolved": float(unsolved.sum() / total),
         "silent": float(wrong.sum() / total),
         "worst_cell": _cell(study, worst) if sure.any() else "",
-        "failed_as": _first(study, refused, status),
+        "unsolved_as": _first(study, unsolved, status),
         "silent_at": _first(study, wrong),
         "methods_used": _shares(study, used),
         **{key: float(outputs[key][valued].mean()) if valued.any() else math.nan for key in WORK if key in outputs},

@@ -7,15 +7,16 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from kernels.interface import KINDS
 from sweep.results.open import changed, open_result
-from sweep.results.statuses import account, count_statuses
+from sweep.results.statuses import account, kind_of, tally
 from sweep.system import disk
 from sweep.system.errors import SweepError
 from sweep.system.table import columns
 
 UNFINISHED = re.compile(r"(.+\.(?:h5|nc))\.(?:parts|unfinished)")
 """What a sweep that still runs has beside its output."""
-HEADINGS = ("result", "cells", "done", "statuses", "when", "version", "question")
+HEADINGS = ("result", "cells", "done", "account", "when", "version", "question")
 
 
 @dataclass(frozen=True)
@@ -52,9 +53,11 @@ class Listed:
         """Texts below `HEADINGS`."""
         if self.fault:
             return str(self.path), "", "", "", "", "", self.fault
-        statuses = ", ".join(f"{name} {n:,}" for name, n in (self.statuses or {}).items())
+        found = self.statuses or {}
+        counts = {kind: sum(n for name, n in found.items() if kind_of(name) == kind) for kind in KINDS}
+        cells = ", ".join(f"{n:,} {kind}" for kind, n in counts.items() if n)
         done = f"{int(1000 * self.done) / 10:g} %"
-        return str(self.path), f"{self.cells:,}", done, statuses, self.when[:16], self.version, self.question
+        return str(self.path), f"{self.cells:,}", done, cells, self.when[:16], self.version, self.question
 
 
 class Listing(tuple[Listed, ...]):
@@ -102,7 +105,7 @@ def _listed(path: Path) -> Listed:
                 question=attrs.get("question") or attrs.get("title", ""),
                 cells=cells.total,
                 done=(cells.total - cells.pending) / cells.total,
-                statuses={count.name: count.cells for count in count_statuses(dataset)},
+                statuses=tally(dataset),
                 when=attrs.get("end", attrs.get("start", "")),
                 version=attrs.get("versions", "").partition(",")[0].removeprefix("foliot "),
             )

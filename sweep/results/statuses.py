@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from kernels.interface import Status
+from kernels.interface import KINDS, Status
 from sweep.cells.reduce import BY_METHOD, BY_STATUS
 from sweep.cells.schema import METHOD_USED, STATUS
 
@@ -21,51 +21,51 @@ if TYPE_CHECKING:
     Cells: TypeAlias = xr.Dataset | Stored
 
 CELLS_AT_ONCE = 1 << 22
-FAILED = (Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.NO_METHOD, Status.FAILED)
-"""For these the method or the kernel is to blame, not the scene."""
 
 
 @dataclass(frozen=True)
 class Account:
-    """What became of all cells: each is in one of these, and together they are `total`.
+    """What became of all cells: each is counted under one of the words of `kernels.interface.KINDS`.
 
-    `failed` are those for which no method found an answer, or the kernel none at all, and those of a status that this
-    version does not know; `not_asked` those that the study's condition leaves out.
+    `failed` are those that FAILED, and those of a status that this version does not know.
     """
 
-    ok: int
-    remarks: int
-    refused: int
-    failed: int
-    pending: int
+    ok: int = 0
+    remarked: int = 0
+    refused: int = 0
+    unsolved: int = 0
+    failed: int = 0
+    pending: int = 0
     not_asked: int = 0
 
     @property
     def total(self) -> int:
         """All cells."""
-        return self.ok + self.remarks + self.refused + self.failed + self.pending + self.not_asked
+        return sum(self.by_kind.values())
+
+    @property
+    def by_kind(self) -> dict[str, int]:
+        """Cells under each of the words."""
+        return dict(zip(KINDS, astuple(self), strict=True))
 
     def __str__(self) -> str:
-        parts = ("ok", "remarks", "refused", "failed", "pending")
-        text = ", ".join(f"{getattr(self, name):,} {name}" for name in parts)
-        return f"{self.total:,} cells: {text}" + f", {self.not_asked:,} not asked" * bool(self.not_asked)
+        counts = self.by_kind
+        if not self.not_asked:
+            del counts["not asked"]
+        return f"{self.total:,} cells: " + ", ".join(f"{cells:,} {kind}" for kind, cells in counts.items())
 
 
 def account(dataset: Cells) -> Account:
     """What became of the cells of a result, of a summary too."""
-    counts = dict.fromkeys(("ok", "remarks", "refused", "failed", "pending", "not_asked"), 0)
+    counts = dict.fromkeys(KINDS, 0)
     for name, cells in tally(dataset).items():
-        counts[_kind(name)] += cells
-    return Account(**counts)
+        counts[kind_of(name)] += cells
+    return Account(*counts.values())
 
 
-def _kind(name: str) -> str:
-    status = Status.__members__.get(name)
-    if status is None or status in FAILED:
-        return "failed"
-    if status in (Status.OK, Status.PENDING, Status.NOT_ASKED):
-        return status.name.lower()
-    return "refused" if status.refused else "remarks"
+def kind_of(name: str) -> str:
+    """The word under which a status is counted."""
+    return (Status[name] if name in Status.__members__ else Status.FAILED).kind
 
 
 def tally(dataset: Cells) -> dict[str, int]:

@@ -162,8 +162,8 @@ def precision_marks(found: xr.Dataset) -> dict[str, Any]:
     """What the marks of `draw_precision` that occur mean."""
     look: dict[str, Any] = {"linestyle": "", "marker": "o", "color": "0.3", "markersize": 4}
     marks: dict[str, Any] = {"all cells solved": Line2D([], [], **look)}
-    if (found.failed + found.inaccurate > 0).any():
-        marks["some refused or inaccurate"] = Line2D([], [], **{**look, "markerfacecolor": "white"})
+    if (found.unsolved + found.inaccurate > 0).any():
+        marks["some unsolved or inaccurate"] = Line2D([], [], **{**look, "markerfacecolor": "white"})
     if (found.silent > 0).any():
         marks["some silently wrong"] = Line2D([], [], linestyle="", marker="x", color="black", markersize=7)
     if "error_high" in found:
@@ -182,7 +182,7 @@ FLOOR, CEILING = 1e-17, 3.0
 def draw_precision(axes: Any, found: xr.Dataset, key: str, names: Sequence[str] = ()) -> None:
     """A line for each method; those in `names` look the same in every picture that gives the same names.
 
-    Filled marks where all cells are solved, open ones where some are refused or said to be inaccurate, crosses where
+    Filled marks where all cells are solved, open ones where some are unsolved or said to be inaccurate, crosses where
     some are silently wrong; bars about a median are the middle 80 % of the cells; `precision_marks` says so in a
     legend. A method that solves no cell is left out.
     """
@@ -191,7 +191,7 @@ def draw_precision(axes: Any, found: xr.Dataset, key: str, names: Sequence[str] 
     for i, name in ((order.index(name), name) for name in found["method"].values if _drawn(found, name)):
         row = found.sel({"method": name})
         seconds, error = row.seconds.values, np.clip(row[key].values, FLOOR, CEILING)
-        whole = (row.failed + row.inaccurate).values == 0
+        whole = (row.unsolved + row.inaccurate).values == 0
         look = {"color": COLOURS[i % len(COLOURS)], "marker": MARKS[i % len(MARKS)], "markersize": 4}
         axes.plot(seconds, error, linewidth=0.8, linestyle=DASHES[i % len(DASHES)], markevery=whole, label=name, **look)
         axes.plot(seconds[~whole], error[~whole], linestyle="", **{**look, "markerfacecolor": "white"})

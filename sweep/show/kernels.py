@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from kernels import catalogue
-from kernels.interface import Field, Kernel, Method
+from kernels.interface import KINDS, Field, Kernel, Method, Status
 from sweep.study.kernel_lookup import load_kernel
 from sweep.study.mistakes import limits, listed, quoted
 from sweep.system.errors import SweepError
@@ -17,7 +17,11 @@ from sweep.system.table import columns, page, section
 
 def catalogue_text() -> str:
     """Every kernel of the catalogue in a few lines."""
-    return page(*(_short(name) for name in catalogue.KERNELS), "`sweep kernels NAME` tells more of one of them.")
+    return page(
+        *(_short(name) for name in catalogue.KERNELS),
+        section("what becomes of a cell, in one word, and the statuses that say so", map(_kind, KINDS)),
+        "`sweep kernels NAME` tells more of one of them.",
+    )
 
 
 def kernel_text(name: str, allow_import: bool = False) -> str:
@@ -66,6 +70,10 @@ def _short(name: str) -> str:
         ("methods", ", ".join(m.name for m in kernel.methods)),
     ]
     return f"{name}: {kernel.doc.splitlines()[0]}\n{columns(rows)}"
+
+
+def _kind(kind: str) -> tuple[str, ...]:
+    return kind, f"{KINDS[kind]}: {', '.join(status.name for status in Status if status.kind == kind)}"
 
 
 def _name_and_default(field: Field) -> str:

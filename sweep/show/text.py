@@ -20,6 +20,7 @@ from sweep.results.statuses import (
     failed_cells,
     flag_words,
     is_summary,
+    kind_of,
 )
 from sweep.show.follow import reasons
 from sweep.study.model import short
@@ -96,7 +97,7 @@ def _of_summary(dataset: xr.Dataset) -> dict[str, Rows]:
         "fixed": [_fixed(c) for c in given],
         "along": [_coordinate(dataset[name]) for name in along],
         "reductions": [_reduction(dataset[name], bins) for name in _reductions(dataset)],
-        "status": [(f"{c.cells:,}", c.name, _status_doc(c.name)) for c in count_statuses(dataset)],
+        "status": [(f"{c.cells:,}", c.name, kind_of(c.name), _status_doc(c.name)) for c in count_statuses(dataset)],
         "methods used": _method_rows(dataset),
     }
 
@@ -202,7 +203,7 @@ def _extent(output: xr.DataArray) -> str:
 
 
 def _status_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
-    """Every status that occurs: cells, meaning; but for OK also an example, and where on the axes it occurs."""
+    """Every status that occurs: cells, kind, meaning; but for OK also an example, and where on the axes it occurs."""
     counts = count_statuses(dataset)
     where = _ranges(dataset)
     rows: list[tuple[str, ...]] = []
@@ -211,7 +212,7 @@ def _status_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
         if count.name != Status.OK.name:
             text += f"; {where[count.name]}" if where.get(count.name) else ""
             text += f"; e.g. {' '.join(f'{k}={v}' for k, v in count.example.items())}"
-        rows.append((f"{count.cells:,}", count.name, text))
+        rows.append((f"{count.cells:,}", count.name, kind_of(count.name), text))
     return rows
 
 

@@ -17,10 +17,13 @@ import numpy as np
 from kernels.interface import Status
 from sweep.cells.schema import METHOD_USED, STATUS
 from sweep.store import earlier
+from sweep.store.chunk_index import FILE_END
 from sweep.store.layout import Layout, Table, read_layout, structure_digest
 from sweep.system import disk
 from sweep.system.errors import SweepError
 
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+"""How files of HDF5 begin."""
 READERS = 4
 """Threads that read a long run of cells."""
 LONG_RUN = 32 << 20
@@ -228,12 +231,14 @@ def has_ended(fd: int, layout: Layout) -> bool:
 def unbroken(fd: int, most: float = math.inf) -> bool | None:
     """Whether all but the numbers is as it was written; None where no trailer tells, or where it is too much.
 
-    Reads no more than `most` bytes. Raises OSError.
+    Reads no more than `most` bytes. Raises OSError, also where neither a trailer nor HDF5 tells of the last bytes.
     """
     size = os.fstat(fd).st_size
     try:
         layout = read_layout(fd, size)
         if layout is None:
+            if earlier.read_seal(fd, size) is None:
+                _require_whole(fd, size)
             return earlier.unbroken(fd, size, most)
         if layout.end - sum(stop - begin for begin, stop in layout.regions) > most:
             return None
@@ -241,6 +246,17 @@ def unbroken(fd: int, most: float = math.inf) -> bool | None:
         return structure_digest(fd, [*layout.regions, *layout.endings], layout.end) == layout.structure
     except EOFError:
         return False
+
+
+def _require_whole(fd: int, size: int) -> None:
+    """Raises OSError where a file without a trailer does not end where HDF5 left it: it is not another program's work.
+
+    The bytes that a copy was still to write may all be the same, as in a chunk of zeros with a checksum of zeros,
+    which HDF5 takes for sound. What is not of HDF5's newer kinds, one of which ours are, is left to HDF5.
+    """
+    start = _bytes(fd, 0, min(size, FILE_END.stop))
+    if start[:8] == SIGNATURE and start[8:9] >= b"\2" and int.from_bytes(start[FILE_END], "little") != size:
+        raise OSError("its end is not what was written, as in a copy that was interrupted")
 
 
 def damaged(file: StoredFile, name: str, blocks: Iterable[int]) -> Iterator[tuple[int, int]]:

@@ -30,7 +30,7 @@ def test_the_study_draws_its_figure_and_every_statement_holds(tmp_path):
     lines = [line for group in groups.values() for line in group]
     assert not [line.what for line in lines if line.failed]
     assert sum(line.holds is True for line in lines) == 4
-    assert "refused 67%" in groups["Lag"][0].here  # taylor
+    assert "unsolved 67%" in groups["Lag"][0].here  # taylor
     assert len(page.axes) == 7
     assert notes
 

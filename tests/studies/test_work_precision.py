@@ -56,7 +56,7 @@ def test_no_method_is_silently_wrong_and_auto_is_right(coulomb):
 
 
 def test_a_method_that_lies_is_seen(coulomb):
-    lying = coulomb.assign(silent=coulomb.silent + 0.1, failed=coulomb.failed + 0.1)
+    lying = coulomb.assign(silent=coulomb.silent + 0.1, unsolved=coulomb.unsolved + 0.1)
     lying = lying.assign(error_worst=coulomb.error_worst + 2e-4)
     lying.attrs = coulomb.attrs
     assert [s.holds for s in study.honesty("x", lying)] == [False, False, False]

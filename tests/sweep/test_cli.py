@@ -196,7 +196,7 @@ def test_run_writes_beside_the_caller_and_counts_what_failed(here, call):
     assert (code, err) == (0, "")
     lines = out.splitlines()
     assert lines[0].startswith(
-        "stones.h5: 124 cells: 62 ok, 0 remarks, 62 refused, 0 failed, 0 pending; solved by rough "
+        "stones.h5: 124 cells: 62 ok, 0 remarked, 62 refused, 0 unsolved, 0 FAILED, 0 pending; solved by rough "
     )
     assert lines[1].startswith("62 of 124 cells: BAD_INPUT, e.g. height=1.0 v0=-1.0")
     with sweep.open_result("stones.h5") as dataset:

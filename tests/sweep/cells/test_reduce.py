@@ -219,7 +219,7 @@ unit = "ms"
 
     output = str(tmp_path / "out.h5")
     assert main(["run", str(tmp_path / "fall.toml"), "-o", output, "--allow-import"]) == 0
-    assert "3 cells: 2 ok, 0 remarks, 1 refused, 0 failed, 0 pending" in capsys.readouterr().out
+    assert "3 cells: 2 ok, 0 remarked, 1 refused, 0 unsolved, 0 FAILED, 0 pending" in capsys.readouterr().out
     assert main(["show", output]) == 0
     told = capsys.readouterr().out
     assert "reduced over\n  height" in told

@@ -500,4 +500,4 @@ def test_auto_goes_on_where_a_method_fails():
 def test_failures_are_in_the_account():
     study = toy_study(axes={"height": [1.0, 2.0, -1.0]}, method="rough")
     dataset = sweep.run(with_kernel(study, stand_in(rough=without_a_number(math.nan))), progress=False)
-    assert str(account(dataset)) == "3 cells: 1 ok, 0 remarks, 1 refused, 1 failed, 0 pending"
+    assert str(account(dataset)) == "3 cells: 1 ok, 0 remarked, 1 refused, 0 unsolved, 1 FAILED, 0 pending"

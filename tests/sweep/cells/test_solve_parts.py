@@ -38,14 +38,14 @@ def test_statuses_among_some():
 
 
 def test_ok_without_a_number_and_what_is_no_status_of_a_kernel_failed():
-    status = np.array([0, 0, 1, 0, Status.NOT_ASKED, Status.PENDING, -1, Status.NOT_ASKED - 1], np.int8)
+    status = np.array([0, 0, 1, 0, Status.NOT_ASKED, Status.PENDING, -1, Status.NO_ASSEMBLY], np.int8)
     numbers = np.zeros(8)
     numbers[[0, 2]] = np.nan
     traces = np.zeros((8, 2))
     traces[3, 1] = np.inf
     fail(status, [numbers, traces])
     failed = int(Status.FAILED)
-    assert status.tolist() == [failed, 0, 1, failed, failed, failed, failed, int(Status.NOT_ASKED) - 1]
+    assert status.tolist() == [failed, 0, 1, failed, failed, failed, failed, int(Status.NO_ASSEMBLY)]
     fail(status[:0], [numbers[:0]])
 
 

@@ -157,3 +157,44 @@ def test_what_are_not_two_results_is_named_with_what_to_write(name, given, found
 def test_an_axis_that_is_no_name_and_labels_that_are_no_list_are_refused(axis, labels):
     with pytest.raises(sweep.SweepError, match="new axis"):
         sweep.join(of(), of(), axis=axis, labels=labels)
+
+
+def test_a_join_of_other_cells_or_labels_is_never_taken_for_the_one_that_is_there(tmp_path):
+    """The studies of all three are the same, and so is what differs in the programs: some source has changed."""
+    a, b, c = of(), of(), of()
+    b.fall_time[0] += 1.0
+    c.fall_time[0] += 2.0
+    path, begun = tmp_path / "j.h5", tmp_path / "k.h5"
+
+    def joined(other, labels=("old", "new"), path=path, **options):
+        with sweep.join(a, other, path, axis="version", labels=labels, **options) as found:
+            assert found.version.values.tolist() == list(labels)
+            assert np.array_equal(found.fall_time[1], other.fall_time)
+        return path.read_bytes()
+
+    for other, labels in ((c, ("old", "new")), (b, ("1", "2"))):
+        whole = joined(b, force=True)
+        assert joined(b) == whole  # the same one, which is there
+        with pytest.raises(sweep.SweepError, match="--force"):
+            joined(other, labels)
+        assert path.read_bytes() == whole
+        joined(other, labels, force=True)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("sweep.system.disk.rename", killed_at(begun))
+            with pytest.raises(KeyboardInterrupt):
+                joined(b, path=begun)
+        with pytest.raises(sweep.SweepError, match="--force"):
+            joined(other, labels, path=begun)
+        joined(b, path=begun)
+        begun.unlink()
+
+
+def killed_at(target):
+    """Renames, but is killed before a result gets its name."""
+
+    def rename(old, new):
+        if new == target:
+            raise KeyboardInterrupt
+        old.replace(new)
+
+    return rename

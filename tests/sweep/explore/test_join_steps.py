@@ -1,6 +1,5 @@
 """How two results are put together, step by step, and what is said of those that do not fit."""
 
-import json
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -231,23 +230,6 @@ def test_columns_have_the_order_of_the_grid_and_their_own_dimensions_last(result
     assert column.shape == (4, 3)
     assert column.flags.c_contiguous
     assert column[1].tolist() == turned.x.isel(height=0, v0=1).values.tolist()
-
-
-def test_the_fingerprint_has_the_program_of_both_and_tells_where_they_differ():
-    marks = [
-        {"numpy": "1.26", "numba": "2", "source a": "x", "study": "s"},
-        {"numpy": "1.26", "numba": "3", "rtol": "1"},
-    ]
-    found = module._fingerprint(LOW, [xr.Dataset(attrs={"fingerprint": json.dumps(mark)}) for mark in marks])
-    own = module.fingerprint(LOW)
-    assert (found["study"], found["axes.height"], found["numpy"]) == (own["study"], own["axes.height"], "1.26")
-    assert "numba" not in found
-    assert "source a" not in found
-    assert found["joined"].startswith("of two results. numba")
-    assert "rtol" not in found["joined"]
-    assert "; source a" in found["joined"]
-    same = module._fingerprint(LOW, [xr.Dataset(attrs={"fingerprint": json.dumps(marks[0])})] * 2)
-    assert (same["joined"], same["source a"]) == ("of two results.", "x")
 
 
 def test_each_result_tells_its_versions():

@@ -69,7 +69,7 @@ def test_errors_are_those_against_the_truth():
     assert float(cell.error_worst) == pytest.approx(off_by_rough()[1], rel=1e-6)
     assert float(cell.error_median) == pytest.approx(np.median(off_by_rough()), rel=1e-9)
     assert cell.worst_cell.item() == "height=2 v0=0.001"
-    assert [float(cell[key]) for key in ("ok", "inaccurate", "failed", "silent")] == [0.5, 0.5, 0.0, 0.0]
+    assert [float(cell[key]) for key in ("ok", "inaccurate", "unsolved", "silent")] == [0.5, 0.5, 0.0, 0.0]
     assert float(at(found, "exact").error_worst) == found.attrs["reference_error"]
 
 
@@ -109,7 +109,7 @@ def test_no_value_in_a_cell_called_right_has_failed_and_is_told():
     study = with_methods(stones(), Method("liar", "", bad(np.nan)), Method("exact", "", exact))
     found = measured(study, reference="exact")
     assert float(at(found, "liar").silent) == 0
-    assert "liar refuses 25 % at 1e-03, 25 % at 1e-06, first FAILED" in found.attrs["omissions"]
+    assert "liar does not solve 25 % at 1e-03, 25 % at 1e-06, first FAILED" in found.attrs["omissions"]
 
 
 def test_what_a_method_says_of_itself_is_not_silent():
@@ -122,13 +122,16 @@ def test_what_a_method_says_of_itself_is_not_silent():
         assert float(cell.remarked) == (0.25 if status == Status.GRAZING else 0)
 
 
-def test_failed_cells_are_counted_and_named():
+def test_unsolved_cells_are_counted_and_named():
     study = with_methods(stones(), Method("weak", "", bad(0, Status.STEP_LIMIT)), Method("exact", "", exact))
     found = measured(study, reference="exact")
-    assert float(at(found, "weak").failed) == 0.25
-    assert at(found, "weak").failed_as.item() == "STEP_LIMIT at height=10 v0=3"
-    assert "weak refuses 25 % at 1e-03, 25 % at 1e-06, first STEP_LIMIT at height=10 v0=3" in found.attrs["omissions"]
-    assert float(at(found, "auto").failed) == 0  # it went on to exact
+    assert float(at(found, "weak").unsolved) == 0.25
+    assert at(found, "weak").unsolved_as.item() == "STEP_LIMIT at height=10 v0=3"
+    assert (
+        "weak does not solve 25 % at 1e-03, 25 % at 1e-06, first STEP_LIMIT at height=10 v0=3"
+        in found.attrs["omissions"]
+    )
+    assert float(at(found, "auto").unsolved) == 0  # it went on to exact
 
 
 def test_a_value_where_there_is_nothing_to_give_is_silently_wrong():
@@ -290,7 +293,7 @@ def test_a_study_that_no_method_can_do_is_told():
 def test_the_table_tells_errors_shares_and_what_they_are_measured_against():
     text = precision_text(measured(stones()))
     lines = text.splitlines()
-    assert lines[0].split()[3:9] == ["worst", "time", "ok", "inaccurate", "refused", "silent"]
+    assert lines[0].split()[3:9] == ["worst", "time", "ok", "inaccurate", "unsolved", "silent"]
     assert any(line.split()[:2] == ["rough", "1e-06"] and "50 %" in line for line in lines)
     assert "errors against exact, in 4 cells, itself right to 1.0e-14" in text
     assert all("reference" in line for line in lines if line.split()[:1] == ["exact"])
@@ -356,7 +359,7 @@ def test_neither_notes_nor_legend_lie_over_anything(tmp_path):
     renderer = figure.canvas.get_renderer()
     (legend,) = figure.legends
     texts = [text.get_text() for text in legend.get_texts()]
-    for said in ("all cells solved", "some refused or inaccurate", "some silently wrong", "below what the reference"):
+    for said in ("all cells solved", "some unsolved or inaccurate", "some silently wrong", "below what the reference"):
         assert any(text.startswith(said) for text in texts), said
     note = next(text for text in figure.texts if text.get_text().startswith("Errors against exact, itself right to"))
     said = note.get_text().replace("\n", " ")

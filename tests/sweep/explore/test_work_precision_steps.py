@@ -33,11 +33,11 @@ def measured(monkeypatch, error, status, *, void=None, floor=1e-12, rtol=1e-6, u
 def test_shares_of_cells_by_hand(monkeypatch):
     status = [OK, OK, OK, INACCURATE, GRAZING, REFUSED, GIVEN_UP, REFUSED]
     found = measured(monkeypatch, [0.25, 0.5, 0, 1, 2, 9, 9, 9], status)
-    shares = {key: found[key] for key in ("ok", "remarked", "inaccurate", "failed", "silent")}
-    assert shares == {"ok": 3 / 8, "remarked": 1 / 8, "inaccurate": 1 / 8, "failed": 3 / 8, "silent": 2 / 8}
+    shares = {key: found[key] for key in ("ok", "remarked", "inaccurate", "unsolved", "silent")}
+    assert shares == {"ok": 3 / 8, "remarked": 1 / 8, "inaccurate": 1 / 8, "unsolved": 3 / 8, "silent": 2 / 8}
     assert (found["error_median"], found["error_worst"]) == (0.5, 0.5)
     assert (found["worst_cell"], found["silent_at"]) == ("height=2", "height=1")
-    assert found["failed_as"] == "BAD_INPUT at height=6"
+    assert found["unsolved_as"] == "BAD_INPUT at height=6"
     assert found["steps"] == 2.0  # of the cells with values
     assert found["methods_used"] == "rough 100 %"
 
@@ -52,7 +52,7 @@ def test_nothing_known_of_a_method_that_solves_nothing(monkeypatch):
     found = measured(monkeypatch, [1.0, 1.0], [REFUSED, GIVEN_UP])
     assert all(math.isnan(found[f"error_{key}"]) for key in ("median", "low", "high", "worst"))
     assert math.isnan(found["steps"])
-    assert (found["failed"], found["worst_cell"], found["silent_at"]) == (1.0, "", "")
+    assert (found["unsolved"], found["worst_cell"], found["silent_at"]) == (1.0, "", "")
     unsure = measured(monkeypatch, [1.0, 1.0], [INACCURATE, GRAZING])
     assert (unsure["error_median"], unsure["worst_cell"]) == (1.0, "")
     assert math.isnan(unsure["error_worst"])
@@ -67,7 +67,7 @@ def test_wrong_is_more_than_rtol_and_what_the_truth_is_right_to(monkeypatch, err
 def test_in_a_void_cell_only_ok_is_wrong(monkeypatch):
     status = [OK, INACCURATE, GRAZING, REFUSED]
     found = measured(monkeypatch, [0.0] * 4, status, void=[True] * 4)
-    assert (found["silent"], found["silent_at"], found["ok"], found["failed"]) == (0.25, "height=1", 0.0, 0.0)
+    assert (found["silent"], found["silent_at"], found["ok"], found["unsolved"]) == (0.25, "height=1", 0.0, 0.0)
 
 
 def test_what_the_reference_solved_itself_is_off_by_what_it_is_right_to(monkeypatch):
@@ -84,7 +84,14 @@ def test_methods_of_no_cell_are_not_named():
 
 
 def table(**changed):
-    cell = {"error_median": 1e-8, "error_worst": 2e-7, "seconds": 3e-6, "ok": 0.5, "inaccurate": 0.25, "failed": 0.125}
+    cell = {
+        "error_median": 1e-8,
+        "error_worst": 2e-7,
+        "seconds": 3e-6,
+        "ok": 0.5,
+        "inaccurate": 0.25,
+        "unsolved": 0.125,
+    }
     cell |= {"silent": 0.0, "worst_cell": "height=1", **changed}
     shape = ("method", "rtol")
     attrs = {"reference": "exact", "reference_error": 1e-9, "cells": 8, "open_cells": 0, "omissions": ""}
@@ -95,7 +102,7 @@ def table(**changed):
 def test_the_table_by_hand():
     text = module.precision_text(table(rate_calls=12345.6))
     assert [" ".join(line.split()) for line in text.splitlines()[:2]] == [
-        "method rtol median worst time rate calls ok inaccurate refused silent worst cell",
+        "method rtol median worst time rate calls ok inaccurate unsolved silent worst cell",
         "rough 1e-06 1.0e-08 2.0e-07 3 us 1.235e+04 50 % 25 % 12.5 % 0 % height=1",
     ]
     assert text.endswith("\n\nerrors against exact, in 8 cells, itself right to 1.0e-09")
@@ -115,15 +122,15 @@ def test_an_error_of_the_reference_itself_is_told_only_above_its_floor():
 def test_omissions_name_each_tolerance_and_the_first_place():
     found = xr.Dataset(
         {
-            "failed": (("method", "rtol"), [[0.0, 0.25, 0.5]]),
+            "unsolved": (("method", "rtol"), [[0.0, 0.25, 0.5]]),
             "silent": (("method", "rtol"), [[0.125, 0.0, 0.0]]),
-            "failed_as": (("method", "rtol"), [["", "FAILED at a", "FAILED at b"]]),
+            "unsolved_as": (("method", "rtol"), [["", "FAILED at a", "FAILED at b"]]),
             "silent_at": (("method", "rtol"), [["c", "", ""]]),
         },
         {"method": ["m"], "rtol": [1e-3, 1e-4, 1e-5]},
     )
     assert module.omissions(found) == [
-        "m refuses 25 % at 1e-04, 50 % at 1e-05, first FAILED at a",
+        "m does not solve 25 % at 1e-04, 50 % at 1e-05, first FAILED at a",
         "m is silently wrong in 12.5 % at 1e-03, first c",
     ]
 

@@ -179,9 +179,8 @@ def test_a_result_leads_to_no_other_file(whole, tmp_path, kind, sealed):
     assert not verify(path).whole
 
 
-@pytest.mark.parametrize(("command", "status"), [("show", 0), ("verify", 2)])
-def test_a_layout_of_more_blocks_than_the_file_has_room_for_is_none(whole, tmp_path, capsys, command, status):
-    """The numbers are there all the same, with HDF5's own checksums."""
+@pytest.mark.parametrize("command", ["show", "verify"])
+def test_a_layout_of_more_blocks_than_the_file_has_room_for_is_none(whole, tmp_path, capsys, command):
     path, count = tmp_path / "out.h5", 2**40
     path.write_bytes(whole.read_bytes())
     with path.open("r+b") as file:
@@ -190,7 +189,7 @@ def test_a_layout_of_more_blocks_than_the_file_has_room_for_is_none(whole, tmp_p
         file.truncate(layout.end)
         file.seek(layout.end)
         file.write(dataclasses.replace(layout, tables={"cells": table}).trailer())
-    assert main([command, str(path)]) == status
+    assert main([command, str(path)]) == 2
     assert "memory" not in capsys.readouterr().err
 
 

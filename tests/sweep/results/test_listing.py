@@ -26,7 +26,7 @@ def test_results_are_listed_with_what_became_of_them(tmp_path, capsys):
     assert a.when.startswith("20")
     assert main(["list", str(tmp_path)]) == 0
     told = capsys.readouterr().out
-    assert "OK 1, BAD_INPUT 1" in told
+    assert "1 ok, 1 refused" in told
     assert "How long does it fall?" in told
 
 
@@ -61,7 +61,7 @@ def test_a_folder_without_results_and_none(tmp_path):
 def test_a_row_has_tenths_rounded_down_and_minutes():
     statuses = {"OK": 1233, "PENDING": 1}
     one = Listed(Path("a.h5"), "Why?", 1234, 1233 / 1234, statuses, "2026-01-02T03:04:05+0000", "0.1.0")
-    assert one.row == ("a.h5", "1,234", "99.9 %", "OK 1,233, PENDING 1", "2026-01-02T03:04", "0.1.0", "Why?")
+    assert one.row == ("a.h5", "1,234", "99.9 %", "1,233 ok, 1 pending", "2026-01-02T03:04", "0.1.0", "Why?")
     assert Listed(Path("b.h5"), fault="no result").row == ("b.h5", "", "", "", "", "", "no result")
     assert Listed(Path("c.h5"), done=1.0).row[1:4] == ("0", "100 %", "")
     first, *rest = str(Listing([one])).splitlines()
@@ -72,7 +72,7 @@ def test_a_row_has_tenths_rounded_down_and_minutes():
 def test_the_share_that_is_done_is_not_told_a_tenth_too_low(tmp_path, monkeypatch):
     """1 - 0.9 is less than 0.1 in float64."""
     sweep.run(build(axes={"height": [1.0]}), tmp_path / "a.h5").close()
-    monkeypatch.setattr("sweep.results.listing.account", lambda _: Account(1, 0, 0, 0, 9))
+    monkeypatch.setattr("sweep.results.listing.account", lambda _: Account(1, pending=9))
     (found,) = sweep.list_results(tmp_path)
     assert (found.done, found.row[1:3]) == (0.1, ("10", "10 %"))
 

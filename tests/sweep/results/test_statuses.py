@@ -1,10 +1,14 @@
 """Accounts of cells: which status counts as what, sums of summaries, and the words of it all."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
 
+import sweep
 from kernels.interface import Status
+from sweep.cli import main
 from sweep.results import statuses as module
 from sweep.results.statuses import (
     Account,
@@ -19,6 +23,7 @@ from sweep.results.statuses import (
     flat_pieces,
     summary_text,
 )
+from sweep.study.toml import to_toml
 
 FLAGS = {"flag_values": np.array([-1, 0, 1], np.int8), "flag_meanings": "none map closed"}
 
@@ -32,28 +37,51 @@ def cells(status, methods=None):
     return xr.Dataset({"status": (dims, status), "method_used": (dims, used, FLAGS)}, coords)
 
 
-def test_each_status_is_of_one_kind():
-    found = {status.name: str(account(cells([status]))).partition(": ")[2] for status in Status}
-    kinds = {name: text.replace("0 not asked", "") for name, text in found.items()}
+KINDS = {
+    "ok": "OK",
+    "remarked": "INACCURATE NOT_SELF_STARTING COMES_TO_REST GRAZING OVERDAMPED TOO_SHORT NEVER_ENDS UNSTABLE PERIOD_2 "
+    "NOT_PERIODIC TOOTH_JUMPED LOCK_UP CHANGE_POINT DOUBLE_CRANK DAMPERS_OUT_OF_RANGE PARTLY_OUT_OF_RANGE",
+    "refused": "BAD_INPUT NEVER_STARTS NO_LIMIT_CYCLE OUT_OF_RANGE STICKS NO_CYCLE NEVER_MEETS NO_ASSEMBLY",
+    "unsolved": "NOT_CONVERGED STEP_LIMIT NO_METHOD",
+    "FAILED": "FAILED",
+    "pending": "PENDING",
+    "not asked": "NOT_ASKED",
+}
 
-    def one(kind):
-        return {name for name, text in kinds.items() if f"1 {kind}" in text}
 
-    assert one("ok") == {"OK"}
-    assert one("pending") == {"PENDING"}
-    assert one("not asked") == {"NOT_ASKED"}
-    assert one("failed") == {"NOT_CONVERGED", "STEP_LIMIT", "NO_METHOD", "FAILED"}
-    assert one("refused") == {s.name for s in Status if s.refused} - one("failed") - one("pending") - one("not asked")
-    assert "BAD_INPUT" in one("refused")
-    assert "INACCURATE" in one("remarks")
+def test_each_status_is_of_one_kind(capsys):
+    found = {status.name: account(cells([status])).by_kind for status in Status}
+    assert found == {name: {k: int(k == kind) for k in KINDS} for kind in KINDS for name in KINDS[kind].split()}
     assert account(cells([99])).failed == 1  # of a later version
+    assert main(["kernels"]) == 0
+    told = capsys.readouterr().out
+    for kind, names in KINDS.items():
+        line = next(line for line in told.splitlines() if line.startswith(f"  {kind} "))
+        assert names.split()[0] in line or kind == "remarked"
+
+
+@pytest.mark.parametrize("number", [55, 60, 100, 200, 255])
+def test_a_status_that_is_none_is_failed_with_the_exit_status_of_that(number, tmp_path, monkeypatch, capsys):
+    """And those that a kernel may give are kept, and of them none is called FAILED."""
+    monkeypatch.chdir(tmp_path)
+    given = [1.0 * status for status in Status if status < Status.NOT_ASKED]
+    study = {"kernel": "bad:SAYING", "outputs": ["fall_time"], "allow_import": True}
+    for heights, code in ((given[1:], 0), (sorted([*given[1:], number]), 4)):
+        Path("s.toml").write_text(to_toml(sweep.study(**study, axes={"height": heights})))
+        assert main(["run", "s.toml", "--allow-import", "--no-isolate", "--force"]) == code
+        assert f"16 remarked, 8 refused, 3 unsolved, {code // 4} FAILED, 0 pending" in capsys.readouterr().out
+        with sweep.open_result("s.h5") as found:
+            assert found.status.values.tolist() == [Status.FAILED if h == number else h for h in heights]
+            assert np.isnan(found.fall_time).values.tolist() == [h >= 64 or h == number for h in heights]
+        assert main(["list"]) == 0
+        assert "3 unsolved" in capsys.readouterr().out
 
 
 def test_an_account_adds_up_and_tells_of_cells_not_asked_where_there_are():
-    found = Account(1000, 20, 3, 4, 5, 6)
-    assert found.total == 1038
-    assert str(found) == "1,038 cells: 1,000 ok, 20 remarks, 3 refused, 4 failed, 5 pending, 6 not asked"
-    assert str(Account(1, 0, 0, 0, 0)) == "1 cells: 1 ok, 0 remarks, 0 refused, 0 failed, 0 pending"
+    found = Account(1000, 20, 3, 7, 4, 5, 6)
+    assert found.total == 1045
+    assert str(found) == "1,045 cells: 1,000 ok, 20 remarked, 3 refused, 7 unsolved, 4 FAILED, 5 pending, 6 not asked"
+    assert str(Account(1)) == "1 cells: 1 ok, 0 remarked, 0 refused, 0 unsolved, 0 FAILED, 0 pending"
 
 
 def test_the_first_cell_of_each_status_is_its_example():
@@ -83,10 +111,12 @@ def test_pieces_are_all_cells_in_their_order_and_no_larger_than_said(monkeypatch
 
 def test_methods_are_counted_and_none_is_left_out():
     assert count_methods(cells([0, 0, 0, 64], [1, 0, 1, -1])) == {"map": 1, "closed": 2}
-    text = "4 cells: 3 ok, 0 remarks, 1 refused, 0 failed, 0 pending; solved by map 1, closed 2"
+    text = "4 cells: 3 ok, 0 remarked, 1 refused, 0 unsolved, 0 FAILED, 0 pending; solved by map 1, closed 2"
     found = summary_text(cells([0, 0, 0, 64], [1, 0, 1, -1]))
     assert found == f"{text}\n1 of 4 cells: BAD_INPUT, e.g. a=3.1"
-    assert summary_text(cells([64], [-1])).startswith("1 cells: 0 ok, 0 remarks, 1 refused, 0 failed, 0 pending\n")
+    assert summary_text(cells([64], [-1])).startswith(
+        "1 cells: 0 ok, 0 remarked, 1 refused, 0 unsolved, 0 FAILED, 0 pending\n"
+    )
 
 
 def test_words_of_flags():

@@ -131,7 +131,7 @@ def precision(**changes):
         "error_worst": [[1e-4, 1e-8], [1e-3, 1e-2], [1e-1, 90.0], [np.nan, np.nan]],
         "error_low": [[1e-6, 0.0], [1e-6, 1e-6], [1e-6, 1e-6], [np.nan, np.nan]],
         "error_high": [[1e-4, 1e-8], [1e-2, 9.0], [1e-1, 80.0], [np.nan, np.nan]],
-        "failed": [[0, 0], [0.2, 0], [0, 0], [1, 1]],
+        "unsolved": [[0, 0], [0.2, 0], [0, 0], [1, 1]],
         "inaccurate": [[0, 0], [0, 0], [0, 0.3], [0, 0]],
         "silent": [[0, 0], [0, 0], [0.1, 0], [0, 0]],
     }
@@ -204,7 +204,7 @@ def test_a_reference_of_unknown_error_has_no_floor(axes):
 
 def test_the_legend_names_the_marks_that_occur():
     solved, some, silent, middle, below = (
-        "all cells solved", "some refused or inaccurate", "some silently wrong", "middle 80 % of the cells",
+        "all cells solved", "some unsolved or inaccurate", "some silently wrong", "middle 80 % of the cells",
         "below what the reference is right to",
     )  # fmt: skip
     found = precision()
@@ -213,10 +213,10 @@ def test_the_legend_names_the_marks_that_occur():
     assert marks[some].get_markerfacecolor() == "white"
     assert marks[solved].get_markerfacecolor() == "0.3"
     assert (marks[silent].get_marker(), marks[middle].get_marker()) == ("x", "|")
-    none = found.failed * 0
+    none = found.unsolved * 0
     assert some in precision_marks(found.assign(inaccurate=none))
-    assert some in precision_marks(found.assign(failed=none))
-    bare = found.assign(failed=none, inaccurate=none, silent=none).drop_vars("error_high")
+    assert some in precision_marks(found.assign(unsolved=none))
+    bare = found.assign(unsolved=none, inaccurate=none, silent=none).drop_vars("error_high")
     assert list(precision_marks(bare)) == [solved, below]
 
 

@@ -35,7 +35,7 @@ def result(mu=(1.0, 2.0, 3.0, 4.0), status=(0, 0, 1, 0), **attrs):
 EXPECTED = f"""x.h5: complete, 4 cells
 Foliot
 Why?
-4 cells: 3 ok, 1 remarks, 0 refused, 0 failed, 0 pending
+4 cells: 3 ok, 1 remarked, 0 refused, 0 unsolved, 0 FAILED, 0 pending
 
   kernel    foliot
   design    product
@@ -59,8 +59,8 @@ outputs
   period  [s]  0.333333 to 1.33333  period of the cycle
 
 status
-  3  OK          {Status.OK.doc}
-  1  INACCURATE  {Status.INACCURATE.doc}; mu 3; e.g. mu=3.0
+  3  OK          ok        {Status.OK.doc}
+  1  INACCURATE  remarked  {Status.INACCURATE.doc}; mu 3; e.g. mu=3.0
 
 methods used
   map     1  25.0 %
@@ -188,7 +188,8 @@ def test_a_summary_is_told_by_its_reductions(tmp_path):
         ("histogram", "", "4 bins", ""),
     ]
     assert found["status"] == [
-        ("4", "OK", Status.OK.doc), ("1", "BAD_INPUT", Status.BAD_INPUT.doc), ("1", "strange", ""),
+        ("4", "OK", "ok", Status.OK.doc), ("1", "BAD_INPUT", "refused", Status.BAD_INPUT.doc),
+        ("1", "strange", "FAILED", ""),
     ]  # fmt: skip
     assert found["methods used"] == [("map", "4", "66.7 %")]
     assert found[""] == [("kernel", "toy")]
