@@ -37,8 +37,11 @@ def kernel_text(name: str, allow_import: bool = False) -> str:
 
 
 def write_starter(name: str, path: Path, allow_import: bool = False) -> None:
-    """Write a study of a kernel to begin with. Raises SweepError; a file that is there is left alone."""
-    text = starter(name, allow_import)
+    """Write a study of a kernel to begin with. Raises SweepError; a file that is there is left alone.
+
+    A kernel of one's own is looked up in the folder of the study, as it is when the study is run.
+    """
+    text = starter(name, allow_import, path.parent)
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
@@ -48,9 +51,9 @@ def write_starter(name: str, path: Path, allow_import: bool = False) -> None:
         raise SweepError(f"{path} cannot be written: {error.strerror}") from None
 
 
-def starter(name: str, allow_import: bool = False) -> str:
+def starter(name: str, allow_import: bool = False, folder: Path = Path()) -> str:
     """A study of a kernel to begin with, in TOML. Raises SweepError."""
-    kernel = load_kernel(name, allow_import)
+    kernel = load_kernel(name, allow_import, [folder])
     question = f"{kernel.doc[0].upper()}{kernel.doc.splitlines()[0][1:]}: how does it change with its parameters?"
     return f"# {question}\n{_example(name, kernel)}\n"
 

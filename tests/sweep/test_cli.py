@@ -522,3 +522,17 @@ def test_a_study_to_begin_with_is_written_and_runs(call, tmp_path, monkeypatch):
     code, _, err = call("kernels", "foliot_motion", "--study", "motion.toml")
     assert (code, "is there already" in err) == (2, True)
     assert call("kernels", "--study", "x.toml")[0] == 2
+
+
+def test_a_kernel_in_the_current_folder_is_described_as_it_is_run(here, call, monkeypatch):
+    """Its module is not on the path of Python: the installed command has its own folder there, not the current one."""
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    Path("beside_me.py").write_text("from toy import KERNEL\n")
+    name = "beside_me:KERNEL"
+    code, out, err = call("kernels", name, "--allow-import")
+    assert (code, err) == (0, "")
+    assert "fall_time" in out
+    Path("deep").mkdir()
+    Path("deep/below.py").write_text("from toy import KERNEL\n")
+    assert call("kernels", "below:KERNEL", "--allow-import", "--study", "deep/below.toml")[0] == 0
+    assert call("plan", "deep/below.toml", "--allow-import", "--no-isolate")[0] == 0
