@@ -536,3 +536,17 @@ def test_a_kernel_in_the_current_folder_is_described_as_it_is_run(here, call, mo
     Path("deep/below.py").write_text("from toy import KERNEL\n")
     assert call("kernels", "below:KERNEL", "--allow-import", "--study", "deep/below.toml")[0] == 0
     assert call("plan", "deep/below.toml", "--allow-import", "--no-isolate")[0] == 0
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no folder in which nobody may write")
+def test_an_output_that_cannot_be_written_is_named_itself(done, call):
+    """And not the log, the lock or the folder beside it, of which the user has never heard."""
+    fits = ("--y", "fall_time", "--tolerance", "0.1", "--allow-import", "--no-isolate")
+    Path("one.toml").write_text(STUDY.replace("[0.0, 1.0, -1.0, nan]", "[0.0, 1.0]"))
+    assert call("run", "one.toml", "--allow-import")[0] == 0
+    for argv in (("run", "one.toml", "--allow-import"), ("refine", "one.h5", *fits)):
+        code, _, err = call(*argv, "-o", "/proc/x.h5")
+        assert code == 2
+        assert re.match(r"/proc/x\.h5\b(?!\.)", err), err
+    with pytest.raises(sweep.SweepError, match=r"^/proc/x\.h5\b(?!\.)"):
+        sweep.run("one.toml", "/proc/x.h5", allow_import=True)
