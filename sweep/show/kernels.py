@@ -12,7 +12,7 @@ from kernels.interface import Field, Kernel, Method
 from sweep.study.kernel_lookup import load_kernel
 from sweep.study.mistakes import limits, listed, quoted
 from sweep.system.errors import SweepError
-from sweep.system.table import columns, page, section
+from sweep.system.table import columns, page, paragraph, section
 
 
 def catalogue_text() -> str:
@@ -24,8 +24,8 @@ def kernel_text(name: str, allow_import: bool = False) -> str:
     """All about one kernel, and a study to begin with. Raises SweepError."""
     kernel = load_kernel(name, allow_import)
     return page(
-        f"{name}: {kernel.doc}",
-        f"Source: {kernel.source}" if kernel.source else "",
+        paragraph(f"{name}: {kernel.doc}"),
+        paragraph(f"Source: {kernel.source}" if kernel.source else ""),
         section("parameters", map(_parameter, kernel.parameters)),
         section("outputs", map(_output, kernel.outputs)),
         section("coordinates that all cells share", map(_coordinate, kernel.along)),
@@ -68,7 +68,7 @@ def _short(name: str) -> str:
         ("outputs", ", ".join(f"{o.name} [{o.unit}]{_along(o)}" for o in kernel.outputs)),
         ("methods", ", ".join(m.name for m in kernel.methods)),
     ]
-    return f"{name}: {kernel.doc.splitlines()[0]}\n{columns(rows)}"
+    return paragraph(f"{name}: {kernel.doc.splitlines()[0]}") + f"\n{columns(rows)}"
 
 
 def _name_and_default(field: Field) -> str:

@@ -550,3 +550,23 @@ def test_an_output_that_cannot_be_written_is_named_itself(done, call):
         assert re.match(r"/proc/x\.h5\b(?!\.)", err), err
     with pytest.raises(sweep.SweepError, match=r"^/proc/x\.h5\b(?!\.)"):
         sweep.run("one.toml", "/proc/x.h5", allow_import=True)
+
+
+def test_tables_have_80_columns(done, call, monkeypatch):
+    """Of results whose names, questions and statuses are long."""
+    monkeypatch.setenv("COLUMNS", "80")
+    title = "Falling stones of all heights, thrown up and down, or not at all, on a planet without an atmosphere"
+    long = STUDY.replace("Falling stones", title).replace("# How fast", f"# {title}: how fast")
+    Path("long.toml").write_text(long)
+    assert call("run", "long.toml", "--allow-import", "-o", "a_result_with_a_long_name.h5")[0] == 0
+    trial = ("--allow-import", "--no-isolate")
+    chart = ("chart", "stones.toml", *trial, "--cells", "4", "--rtol", "1e-3")
+    fit = ("fit", "stones.h5", "--y", "fall_time", "--x", "height", "--at", "v0=0")
+    looks = [("list",), ("kernels",), ("kernels", "polisher"), ("studies",), ("show", "a_result_with_a_long_name.h5")]
+    trials = [("diff", "stones.h5", "a_result_with_a_long_name.h5"), chart, ("plan", "long.toml", *trial)]
+    for command in (*looks, *trials, fit, (*fit, "--compare")):
+        code, out, err = call(*command)
+        assert code == 0, err
+        assert max(map(len, out.splitlines())) <= 80, out
+    for command, column in ((("list",), "version"), (chart, "worst cell")):
+        assert column in call(*command, "--all")[1]
