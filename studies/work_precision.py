@@ -218,7 +218,7 @@ def conclude(path: str, cells: int = 1000, tolerances: Sequence[float] = TOLERAN
         "Cost, drag": costs(drag),
     }
     groups |= {} if steps is None else {"Fixed steps": orders(steps)}
-    tables = [f"{found.attrs['title']}\n{precision_text(found)}\n" for found in (coulomb, drag)]
+    tables = [f"{found.attrs['title']}\n{precision_text(found, complete=True)}\n" for found in (coulomb, drag)]
     return groups, [NOTES, "", *tables], figure(coulomb, drag, steps, others)
 
 

@@ -16,7 +16,7 @@ from sweep.command.files import say
 from sweep.command.options import Command, option
 from sweep.command.outcome import Outcome, explained
 from sweep.command.running import notify
-from sweep.system.errors import COMPLETE, EXIT_CODES, SweepError
+from sweep.system.errors import COMPLETE, EXIT_CODES, missing
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -65,7 +65,7 @@ def _completion(arguments: argparse.Namespace) -> None:
     try:
         import shtab
     except ImportError:
-        raise SweepError('completion needs shtab; install it with: pip install "foliot[completion]"') from None
+        raise missing("completion needs shtab", "completion") from None
     print(shtab.complete(parser(), arguments.shell))
 
 

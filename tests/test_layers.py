@@ -46,7 +46,7 @@ def test_the_contract_needs_no_compiler():
 
 def test_a_study_without_foreign_units_does_without_pint():
     assert "pint" not in loaded(
-        "import sweep\nsweep.build_study(kernel='foliot', axes={'mu': [1.0]}, fixed={'a': 1.0, 'phi0': 1.0})"
+        "import sweep\nsweep.study(kernel='foliot', axes={'mu': [1.0]}, fixed={'a': 1.0, 'phi0': 1.0})"
     )
 
 

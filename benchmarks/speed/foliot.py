@@ -56,7 +56,7 @@ try:
         together,
     )  # fmt: skip
 except ImportError:
-    sys.exit("heyoka.py or diffrax is not here; install them with: pip install 'foliot[peers]'")
+    sys.exit("heyoka.py or diffrax is not here; install the extra: pip install -e '.[peers]'")
 
 CELLS, JUDGED, ROUNDS, SIGMA = 16384, 6, 3, 0.1
 FOLLOWED = {"heyoka.py": 60, "diffrax": 60, "DOP853": 6, "LSODA": 6}

@@ -34,7 +34,7 @@ from scene_oracles import power_foliot, quadratic_foliot
 try:
     import heyoka as hy
 except ImportError:
-    sys.exit("heyoka.py is not here; install it with: pip install 'foliot[peers]'")
+    sys.exit("heyoka.py is not here; install the extra: pip install -e '.[peers]'")
 
 CELLS, THEIR_CELLS, ROUNDS = 64_000, 400, 5
 FLIPS, JUDGED = 40, 60

@@ -11,7 +11,7 @@ import xarray as xr
 from sweep.analysis.curves import check_output, title
 from sweep.analysis.exponents import local_exponent, local_exponent_error
 from sweep.analysis.loglog import is_logarithmic
-from sweep.system.errors import SweepError
+from sweep.system.errors import SweepError, missing
 
 BORDERS = (-1.0, -0.5, -1 / 3)
 """Exponents of a period in the drive: weak drive, losses that scale with it, strong drive."""
@@ -120,7 +120,7 @@ def _lines(field: xr.DataArray, level: float) -> list[np.ndarray]:
     try:
         import contourpy
     except ImportError:
-        raise SweepError('lines on maps need contourpy; install it with: pip install "foliot[plot]"') from None
+        raise missing("lines on maps need contourpy", "plot") from None
     down, across = _axes(field)
     logarithmic = [is_logarithmic(field[name].values) for name in (across, down)]
     x, y = (

@@ -14,7 +14,7 @@ import numpy as np
 
 from sweep.analysis.correlated import Scatter, corrected, correlated, criterion, deviance, student
 from sweep.analysis.loglog import EPSILON, Array, interpolation_errors
-from sweep.system.errors import SweepError
+from sweep.system.errors import missing
 
 KINDS = ("independent", "uneven", "correlated", "outliers")
 """Kinds of scatter that may be asked for by name."""
@@ -40,9 +40,7 @@ def library(name: str) -> Any:
     try:
         return import_module(name)
     except ImportError:
-        what = name.partition(".")[0]
-        text = f'error bars of values that scatter need {what}; install it with: pip install "foliot[fit]"'
-        raise SweepError(text) from None
+        raise missing(f"error bars of values that scatter need {name.partition('.')[0]}", "fit") from None
 
 
 def noise_size(t: Array, z: Array) -> float:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from sweep.command.files import check_target_of, is_isolated, result_of, say, study_from, study_of_result
 from sweep.command.options import (
+    ALL,
     ALLOW_IMPORT,
     CELL_TIMEOUT,
     FORCE,
@@ -79,7 +80,7 @@ def _chart(arguments: argparse.Namespace) -> None:
         isolate=is_isolated(arguments, study),
         cell_timeout=arguments.cell_timeout,
     )
-    say(precision_text(found))
+    say(precision_text(found, arguments.all))
     plot(found, output)
     say(output)
 
@@ -111,6 +112,6 @@ COMMANDS = {
         option("--rtol", "default: 1e-3 to 1e-13", metavar="RTOL", nargs="+", type=float),
         option("--cells", "of the study at most; default: 1024", metavar="N", type=int, default=1024),
         option("--reference", "taken for the truth; default: the one with the best bound", metavar="METHOD"),
-        *(ALLOW_IMPORT, ISOLATE, CELL_TIMEOUT),
+        *(ALL, ALLOW_IMPORT, ISOLATE, CELL_TIMEOUT),
     ),
 }

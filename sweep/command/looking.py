@@ -8,6 +8,7 @@ from pathlib import Path
 
 from sweep.command.files import check_readable, check_target_of, in_units_of, opened, result_of, say
 from sweep.command.options import (
+    ALL,
     AT,
     FORCE,
     OTHER,
@@ -52,7 +53,7 @@ def _verify(arguments: argparse.Namespace) -> None:
 def _list(arguments: argparse.Namespace) -> None:
     from sweep.results.listing import list_results
 
-    say(list_results(arguments.folder))
+    say(list_results(arguments.folder).table(arguments.all))
 
 
 def _diff(arguments: argparse.Namespace) -> Outcome:
@@ -100,9 +101,10 @@ COMMANDS = {
     ),
     "verify": Command("whether a result, finished or not, is what was written", _verify, RESULT),
     "list": Command(
-        "the results in a folder: question, cells, how much is done, statuses, when, version",
+        "the results in a folder: cells, how much is done, statuses, question",
         _list,
         option("folder", "default: here", metavar="FOLDER", type=Path, nargs="?", default=Path()),
+        ALL,
     ),
     "diff": Command(
         "in what two results differ: cells, statuses, how far; exit status 1 where they do",

@@ -61,5 +61,6 @@ CELL_TIMEOUT = option(
 )
 FORCE = switch("--force", "overwrite what is there even if it is not from an earlier command of this kind")
 UNFINISHED = switch("--unfinished", "take what there is of a result that is not complete yet")
+ALL = switch("--all", "all columns of the table")
 AT = several("--at", "pick one value of another axis", "AXIS=VALUE")
 UNITS = several("--unit", "give a variable in another unit, e.g. A0=degree e=mm wear=mm/hour", "NAME=UNIT")

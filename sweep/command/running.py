@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import signal
 import subprocess
@@ -24,7 +25,7 @@ from sweep.command.options import (
     switch,
 )
 from sweep.command.outcome import Outcome, explained
-from sweep.system.errors import CELLS_FAILED, COMPLETE, EXIT_CODES, INCOMPLETE
+from sweep.system.errors import CELLS_FAILED, COMPLETE, EXIT_CODES, INCOMPLETE, SweepError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,7 +52,12 @@ def _run(arguments: argparse.Namespace) -> Outcome:
         if threading.current_thread() is threading.main_thread() and signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, signal.SIG_IGN)
     check_readable(output)
-    with logging_to(log_path(output) if output.parent.is_dir() else None, arguments.log_json):
+    path = log_path(output) if output.parent.is_dir() else None
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(logging_to(path, arguments.log_json))
+        except OSError as fault:
+            raise SweepError(f"{output} cannot be written with its log beside it, {path}: {fault.strerror}") from None
         try:
             outcome = _computed(arguments, study, output)
         except BaseException as error:

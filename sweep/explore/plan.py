@@ -35,6 +35,7 @@ from sweep.study.read import study as as_study
 from sweep.system.errors import SweepError
 from sweep.system.pool import cores, whole_number
 from sweep.system.progress import duration, quantity
+from sweep.system.table import columns, paragraph
 
 if TYPE_CHECKING:
     from sweep.study.model import Study
@@ -127,9 +128,9 @@ class Plan:
             "statuses": _shares(self.statuses),
             "scaling": self.scaling,
         }
-        lines = [self.title] if self.title else []
-        lines += [f"  {name:9} {text}" for name, text in rows.items() if text]
-        return "\n".join([*lines, *(f"  warning   {text}" for text in self.warnings)])
+        told = [(name, text) for name, text in rows.items() if text]
+        table = columns([*told, *(("warning", text) for text in self.warnings)])
+        return f"{paragraph(self.title)}\n{table}" if self.title else table
 
 
 def plan(

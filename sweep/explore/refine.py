@@ -134,7 +134,7 @@ class _Output:
         try:
             self.rounds.mkdir(exist_ok=True)
         except OSError as error:
-            raise SweepError(f"{self.rounds} cannot be made: {error.strerror}") from None
+            raise disk.refusal(error, self.path) from None
 
     def _check_earlier(self, path: Path) -> None:
         from sweep.results.open import open_result

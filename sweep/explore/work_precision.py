@@ -28,7 +28,7 @@ from sweep.study.model import Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
 from sweep.system.errors import SweepError
-from sweep.system.table import columns, page
+from sweep.system.table import columns, page, paragraph
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -166,26 +166,32 @@ def _table(study: Study, names: Sequence[str], tolerances: Sequence[float], agai
     return found
 
 
-def precision_text(found: xr.Dataset) -> str:
-    """The table that `sweep chart` prints."""
+def precision_text(found: xr.Dataset, complete: bool = False) -> str:
+    """The table that `sweep chart` prints, by wish with all columns.
+
+    Without them, cells that are neither OK nor unsolved carry a remark, INACCURATE among them.
+    """
     work = [name for name in WORK if name in found]
     head = ("method", "rtol", "median", "worst", "time", *(name.replace("_", " ") for name in work))
-    rows = [(*head, "ok", "inaccurate", "unsolved", "silent", "worst cell")]
+    rows = [(*head, "ok", "unsolved", "silent", "inaccurate", "worst cell")]
     for name in found["method"].values:
         for rtol in found["rtol"].values:
             cell = found.sel({"method": name, "rtol": rtol})
             off = (_error(float(cell[key]), found.attrs, name) for key in ("error_median", "error_worst"))
             counts = (f"{float(cell[key]):.4g}" for key in work)
-            shares = (f"{100 * float(cell[key]):.3g} %" for key in ("ok", "inaccurate", "unsolved", "silent"))
+            shares = (f"{100 * float(cell[key]):.3g} %" for key in ("ok", "unsolved", "silent", "inaccurate"))
             taken = small_duration(float(cell.seconds))
             rows.append((str(name), f"{rtol:.0e}", *off, taken, *counts, *shares, str(cell.worst_cell.item())))
+    if not complete:
+        rows = [(*row[:5], *row[-5:-2]) for row in rows]
     basis = f"errors against {found.attrs['reference']}, in {found.attrs['cells']} cells"
     basis += f", itself right to {found.attrs['reference_error']:.1e}"
     basis += f"; {found.attrs['open_cells']} cells left aside, of which it is not sure" * (
         found.attrs["open_cells"] > 0
     )
     left_out = found.attrs["omissions"]
-    return page(columns(rows), basis, f"Omissions: {left_out}" if left_out else "")
+    notes = (basis, f"Omissions: {left_out}" if left_out else "")
+    return page(columns(rows, wide=complete), *map(paragraph, notes))
 
 
 def _error(value: float, attributes: Mapping[str, Any], name: str) -> str:

@@ -18,7 +18,7 @@ from sweep.cells.reduce import BY_METHOD, BY_STATUS
 from sweep.results.statuses import flag_words, is_summary
 from sweep.study.mistakes import listed
 from sweep.system import disk
-from sweep.system.errors import SweepError
+from sweep.system.errors import SweepError, missing
 from sweep.system.expected import require_dataset
 from sweep.system.overwriting import EXPORTED, check_target
 from sweep.system.table import cell
@@ -87,7 +87,7 @@ def export(
             writer = functools.partial(PACKED[kind], compress=True) if compress else WRITERS[kind]
             writer(_marked(whole), part)
     except ImportError as error:
-        raise SweepError(f'{target}: needs {error.name}; install it with: pip install "foliot[export]"') from None
+        raise missing(f"{target}: needs {error.name}", "export") from None
     except RuntimeError as error:  # from HDF5
         raise SweepError(f"{target} cannot be written: {error}") from None
     return target

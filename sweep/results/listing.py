@@ -17,6 +17,8 @@ from sweep.system.table import columns
 UNFINISHED = re.compile(r"(.+\.(?:h5|nc))\.(?:parts|unfinished)")
 """What a sweep that still runs has beside its output."""
 HEADINGS = ("result", "cells", "done", "account", "when", "version", "question")
+LATER = ("when", "version")
+"""Of these, what is printed by `sweep list --all` only."""
 
 
 @dataclass(frozen=True)
@@ -52,19 +54,26 @@ class Listed:
     def row(self) -> tuple[str, ...]:
         """Texts below `HEADINGS`."""
         if self.fault:
-            return str(self.path), "", "", "", "", "", self.fault
+            return self.path.name, "", "", "", "", "", self.fault
         found = self.statuses or {}
         counts = {kind: sum(n for name, n in found.items() if kind_of(name) == kind) for kind in KINDS}
         cells = ", ".join(f"{n:,} {kind}" for kind, n in counts.items() if n)
         done = f"{int(1000 * self.done) / 10:g} %"
-        return str(self.path), f"{self.cells:,}", done, cells, self.when[:16], self.version, self.question
+        return self.path.name, f"{self.cells:,}", done, cells, self.when[:16], self.version, self.question
 
 
 class Listing(tuple[Listed, ...]):
-    """Results; printed they are a table."""
+    """Results; printed they are a table, without the columns `LATER`."""
 
     def __str__(self) -> str:
-        return columns([HEADINGS, *(found.row for found in self)], indent="") if self else "no results here"
+        return self.table()
+
+    def table(self, complete: bool = False) -> str:
+        """The table, by wish with all columns."""
+        if not self:
+            return "no results here"
+        shown = [i for i, name in enumerate(HEADINGS) if complete or name not in LATER]
+        return columns([[row[i] for i in shown] for row in (HEADINGS, *(found.row for found in self))], "", complete)
 
     __repr__ = __str__
 

@@ -11,7 +11,7 @@ from sweep.cells.block import Found
 from sweep.runs.session import Session
 from sweep.runs.task import HERE, WAIT, Task
 from sweep.store.store import Shared
-from sweep.system.errors import SweepError
+from sweep.system.errors import missing
 from sweep.system.progress import TimeUp
 
 if TYPE_CHECKING:
@@ -27,9 +27,7 @@ def joined(task: Task) -> Iterator[Cluster | None]:
     try:
         from sweep.runs.cluster import LOST_SECONDS, Cluster, NoWorkers
     except ImportError:
-        raise SweepError(
-            'cluster: needs the package distributed; install it with: pip install "foliot[cluster]"'
-        ) from None
+        raise missing("a cluster needs distributed", "cluster") from None
     with Cluster(task.cluster) as cluster:
         found: Cluster | None = cluster
         try:

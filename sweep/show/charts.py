@@ -19,7 +19,7 @@ import xarray as xr
 from sweep.analysis.loglog import is_logarithmic, spans_decades
 from sweep.show.view import View, coordinate, edges, label, setting, view
 from sweep.system import disk
-from sweep.system.errors import SweepError
+from sweep.system.errors import SweepError, missing
 from sweep.system.overwriting import DRAWN
 
 try:
@@ -31,7 +31,7 @@ try:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 except ImportError:
-    raise SweepError('pictures need matplotlib; install it with: pip install "foliot[plot]"') from None
+    raise missing("pictures need matplotlib", "plot") from None
 
 MILLIMETRE = 1 / 25.4
 """One millimetre in the inches of matplotlib."""

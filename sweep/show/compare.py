@@ -12,7 +12,7 @@ import numpy as np
 from sweep.show.laws import output_of
 from sweep.system import disk
 from sweep.system.errors import SweepError
-from sweep.system.table import cell, columns, page
+from sweep.system.table import cell, columns, page, paragraph
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,7 +59,7 @@ def comparison_text(found: xr.Dataset) -> str:
             )
         )
     heading = f"{found.attrs['y']} over {found.attrs['x']}, {found.sizes['point']} points"
-    return page(f"{heading}\n{columns(rows)}", f"Chosen: {found.attrs['verdict']}.", columns([(NOTE,)], indent=""))
+    return page(f"{heading}\n{columns(rows)}", paragraph(f"Chosen: {found.attrs['verdict']}."), paragraph(NOTE))
 
 
 def _chance(value: float) -> str:

@@ -12,7 +12,7 @@ from kernels.interface import KINDS, Field, Kernel, Method, Status
 from sweep.study.kernel_lookup import load_kernel
 from sweep.study.mistakes import limits, listed, quoted
 from sweep.system.errors import SweepError
-from sweep.system.table import columns, page, section
+from sweep.system.table import columns, page, paragraph, section
 
 
 def catalogue_text() -> str:
@@ -28,8 +28,8 @@ def kernel_text(name: str, allow_import: bool = False) -> str:
     """All about one kernel, and a study to begin with. Raises SweepError."""
     kernel = load_kernel(name, allow_import)
     return page(
-        f"{name}: {kernel.doc}",
-        f"Source: {kernel.source}" if kernel.source else "",
+        paragraph(f"{name}: {kernel.doc}"),
+        paragraph(f"Source: {kernel.source}" if kernel.source else ""),
         section("parameters", map(_parameter, kernel.parameters)),
         section("outputs", map(_output, kernel.outputs)),
         section("coordinates that all cells share", map(_coordinate, kernel.along)),
@@ -41,8 +41,11 @@ def kernel_text(name: str, allow_import: bool = False) -> str:
 
 
 def write_starter(name: str, path: Path, allow_import: bool = False) -> None:
-    """Write a study of a kernel to begin with. Raises SweepError; a file that is there is left alone."""
-    text = starter(name, allow_import)
+    """Write a study of a kernel to begin with. Raises SweepError; a file that is there is left alone.
+
+    A kernel of one's own is looked up in the folder of the study, as it is when the study is run.
+    """
+    text = starter(name, allow_import, path.parent)
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
@@ -52,9 +55,9 @@ def write_starter(name: str, path: Path, allow_import: bool = False) -> None:
         raise SweepError(f"{path} cannot be written: {error.strerror}") from None
 
 
-def starter(name: str, allow_import: bool = False) -> str:
+def starter(name: str, allow_import: bool = False, folder: Path = Path()) -> str:
     """A study of a kernel to begin with, in TOML. Raises SweepError."""
-    kernel = load_kernel(name, allow_import)
+    kernel = load_kernel(name, allow_import, [folder])
     question = f"{kernel.doc[0].upper()}{kernel.doc.splitlines()[0][1:]}: how does it change with its parameters?"
     return f"# {question}\n{_example(name, kernel)}\n"
 
@@ -69,7 +72,7 @@ def _short(name: str) -> str:
         ("outputs", ", ".join(f"{o.name} [{o.unit}]{_along(o)}" for o in kernel.outputs)),
         ("methods", ", ".join(m.name for m in kernel.methods)),
     ]
-    return f"{name}: {kernel.doc.splitlines()[0]}\n{columns(rows)}"
+    return paragraph(f"{name}: {kernel.doc.splitlines()[0]}") + f"\n{columns(rows)}"
 
 
 def _kind(kind: str) -> tuple[str, ...]:

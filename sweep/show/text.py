@@ -24,7 +24,7 @@ from sweep.results.statuses import (
 )
 from sweep.show.follow import reasons
 from sweep.study.model import short
-from sweep.system.table import columns, page, section
+from sweep.system.table import columns, page, paragraph, section
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,7 +46,7 @@ def result_text(path: Path, dataset: xr.Dataset) -> str:
     found = {**sections(dataset), f"{FAILED}, and why": list(_failed(Path(path), dataset))}
     parts = [(title, rows) for title, rows in found.items() if rows]
     return page(
-        "\n".join(head(path, dataset)),
+        paragraph("\n".join(head(path, dataset))),
         *(section(title, rows) if title else columns(rows) for title, rows in parts),
     )
 

@@ -369,7 +369,7 @@ class Store:
 def opened(output: Path) -> Iterator[Store]:
     """The store of an output, held by this process alone. Raises SweepError."""
     lock, store = lock_of(output), Store(output)
-    with disk.refusing(lock), disk.locked(lock) as ours:
+    with disk.refusing(output), disk.locked(lock) as ours:
         if not ours:
             raise SweepError(f"{output}: another run is at work on this output; wait for it, or choose another with -o")
         disk.remove(store.temporary)

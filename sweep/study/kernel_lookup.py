@@ -15,13 +15,13 @@ RESERVED = ("status", "method_used", "error_bound", "method", "rtol", "cell")
 """Names that a result has in any case."""
 
 
-def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path] = ()) -> Kernel:
+def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path] = (Path(),)) -> Kernel:
     """The kernel called `name` in the catalogue, or, where allowed, found at "module:NAME".
 
     Parameters
     ----------
     folders : iterable of Path
-        Where to look for the module after Python's own path.
+        Where to look for the module after Python's own path; default: the current one.
 
     Raises
     ------

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.system.errors import SweepError
+from sweep.system.errors import missing
 
 Points = NDArray[np.float64]
 
@@ -90,7 +90,7 @@ def require_salib() -> None:
     try:
         import SALib  # noqa: F401
     except ImportError:
-        raise SweepError('needs the package SALib; install it with: pip install "foliot[sensitivity]"') from None
+        raise missing("needs the package SALib", "sensitivity") from None
 
 
 GENERATORS: Mapping[str, Callable[[int, int, int, bool], Any]] = {

@@ -24,6 +24,12 @@ class Incomplete(SweepError):
     """A run had to end early through no mistake of the user's; the command line exits with 3."""
 
 
+def missing(what: str, extra: str) -> SweepError:
+    """The fault that a library is not installed: what needs which, and the extra that brings it."""
+    commands = f"in a checkout pip install -e '.[{extra}]', elsewhere pip install 'foliot[{extra}]'"
+    return SweepError(f'{what}, of the extra "{extra}"; install it: {commands}')
+
+
 COMPLETE, FAULT, MISTAKE, INCOMPLETE, CELLS_FAILED, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 4, 130, 143
 EXIT_CODES = {
     COMPLETE: "complete, or what was asked for is done",

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from sweep.results.open import open_result
-from sweep.system.errors import SweepError
+from sweep.system.errors import SweepError, missing
 
 ADDRESS = "127.0.0.1"
 """Nobody on another machine can reach it."""
@@ -36,7 +36,7 @@ def serve(path: str | os.PathLike[str], port: int = 0, show: bool = True) -> Non
 
         from sweep.view.page import Page
     except ImportError:
-        raise SweepError('the viewer needs panel; install it with: pip install "foliot[view]"') from None
+        raise missing("the viewer needs panel", "view") from None
     result = Path(path)
     _check_free(port)
     with open_result(result) as dataset:

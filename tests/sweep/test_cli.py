@@ -522,3 +522,51 @@ def test_a_study_to_begin_with_is_written_and_runs(call, tmp_path, monkeypatch):
     code, _, err = call("kernels", "foliot_motion", "--study", "motion.toml")
     assert (code, "is there already" in err) == (2, True)
     assert call("kernels", "--study", "x.toml")[0] == 2
+
+
+def test_a_kernel_in_the_current_folder_is_described_as_it_is_run(here, call, monkeypatch):
+    """Its module is not on the path of Python: the installed command has its own folder there, not the current one."""
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    Path("beside_me.py").write_text("from toy import KERNEL\n")
+    name = "beside_me:KERNEL"
+    code, out, err = call("kernels", name, "--allow-import")
+    assert (code, err) == (0, "")
+    assert "fall_time" in out
+    Path("deep").mkdir()
+    Path("deep/below.py").write_text("from toy import KERNEL\n")
+    assert call("kernels", "below:KERNEL", "--allow-import", "--study", "deep/below.toml")[0] == 0
+    assert call("plan", "deep/below.toml", "--allow-import", "--no-isolate")[0] == 0
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no folder in which nobody may write")
+def test_an_output_that_cannot_be_written_is_named_itself(done, call):
+    """And not the log, the lock or the folder beside it, of which the user has never heard."""
+    fits = ("--y", "fall_time", "--tolerance", "0.1", "--allow-import", "--no-isolate")
+    Path("one.toml").write_text(STUDY.replace("[0.0, 1.0, -1.0, nan]", "[0.0, 1.0]"))
+    assert call("run", "one.toml", "--allow-import")[0] == 0
+    for argv in (("run", "one.toml", "--allow-import"), ("refine", "one.h5", *fits)):
+        code, _, err = call(*argv, "-o", "/proc/x.h5")
+        assert code == 2
+        assert re.match(r"/proc/x\.h5\b(?!\.)", err), err
+    with pytest.raises(sweep.SweepError, match=r"^/proc/x\.h5\b(?!\.)"):
+        sweep.run("one.toml", "/proc/x.h5", allow_import=True)
+
+
+def test_tables_have_80_columns(done, call, monkeypatch):
+    """Of results whose names, questions and statuses are long."""
+    monkeypatch.setenv("COLUMNS", "80")
+    title = "Falling stones of all heights, thrown up and down, or not at all, on a planet without an atmosphere"
+    long = STUDY.replace("Falling stones", title).replace("# How fast", f"# {title}: how fast")
+    Path("long.toml").write_text(long)
+    assert call("run", "long.toml", "--allow-import", "-o", "a_result_with_a_long_name.h5")[0] == 0
+    trial = ("--allow-import", "--no-isolate")
+    chart = ("chart", "stones.toml", *trial, "--cells", "4", "--rtol", "1e-3")
+    fit = ("fit", "stones.h5", "--y", "fall_time", "--x", "height", "--at", "v0=0")
+    looks = [("list",), ("kernels",), ("kernels", "polisher"), ("studies",), ("show", "a_result_with_a_long_name.h5")]
+    trials = [("diff", "stones.h5", "a_result_with_a_long_name.h5"), chart, ("plan", "long.toml", *trial)]
+    for command in (*looks, *trials, fit, (*fit, "--compare")):
+        code, out, err = call(*command)
+        assert code == 0, err
+        assert max(map(len, out.splitlines())) <= 80, out
+    for command, column in ((("list",), "version"), (chart, "worst cell")):
+        assert column in call(*command, "--all")[1]

@@ -10,7 +10,6 @@ from scipy.optimize import minimize
 
 from sweep.analysis import scatter
 from sweep.analysis.correlated import correlated, criterion, deviance
-from sweep.system.errors import SweepError
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -283,13 +282,6 @@ def denied(off):
     size = np.sqrt((mean - 1) * (mean - 2) / (n - 1))
     away = count - mean + (0.5 if n < 50 and count < mean else 0.0)
     return count < mean and 2 * stats.norm.sf(abs(away) / size) < 1e-3
-
-
-def test_a_library_that_is_not_there_is_named_with_its_extra():
-    expected = 'error bars of values that scatter need absent_library; install it with: pip install "foliot[fit]"'
-    with pytest.raises(SweepError) as told:
-        scatter.library("absent_library.regression.linear_model")
-    assert str(told.value) == expected
 
 
 @pytest.mark.parametrize("n", [12, 16, 20, 24, 60])

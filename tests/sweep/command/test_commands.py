@@ -22,7 +22,7 @@ DEFAULTS = {
         "workers": None, "allow_import": False, "isolate": None, "cell_timeout": None,
     },
     "chart x.toml": {
-        "output": None, "force": False, "methods": None, "rtol": None, "cells": 1024, "reference": None,
+        "all": False, "output": None, "force": False, "methods": None, "rtol": None, "cells": 1024, "reference": None,
         "allow_import": False, "isolate": None, "cell_timeout": None,
     },
     "run x.toml": {
@@ -32,7 +32,7 @@ DEFAULTS = {
     },
     "show a.h5": {"follow": False},
     "verify a.h5": {},
-    "list": {},
+    "list": {"all": False},
     "diff a.h5 b.h5": {"rtol": 0.0},
     "fit a.h5 --y p --x mu": {
         "y": "p", "x": "mu", "window": None, "confidence": 0.95, "noise": None, "compare": False, "output": None,
@@ -120,46 +120,6 @@ def calls(monkeypatch):
 def run(line):
     arguments = parsed(*line.split())
     return arguments.command(arguments)
-
-
-def test_a_chart_is_written_where_it_is_told_or_beside_the_caller(result, calls, monkeypatch, capsys):
-    monkeypatch.setattr(exploring, "study_from", lambda _: SimpleNamespace(kernel_name="foliot"))
-    monkeypatch.setattr("sweep.explore.work_precision.precision_text", lambda _: "told")
-    calls("sweep.explore.work_precision.work_precision", "found")
-    made = calls("sweep.show.plot.plot")
-    run("chart deep/x.toml --cells 7")
-    run("chart deep/x.toml -o y.svg --rtol 1e-4 --reference exact")
-    assert [given for given, _ in made[1::2]] == [("found", Path("x_chart.png")), ("found", Path("y.svg"))]
-    assert (made[0][1]["cells"], len(made[0][1]["tolerances"]) > 3, made[0][1]["isolate"]) == (7, True, False)
-    assert (made[2][1]["tolerances"], made[2][1]["reference"]) == ([1e-4], "exact")
-    assert capsys.readouterr().out.splitlines() == ["told", "x_chart.png", "told", "y.svg"]
-
-
-def test_a_plot_and_a_report_are_called_as_the_result(result, calls, capsys):
-    made = calls("sweep.show.plot.plot")
-    run("plot deep/a.h5 --at a=2 --y y")
-    run("plot deep/a.h5 -o b.pdf")
-    assert [given[1] for given, _ in made] == [Path("a.png"), Path("b.pdf")]
-    assert made[0][0][0].y.item() == 2.0
-    assert made[0][1] == {"y": "y", "x": None}
-    made = calls("sweep.show.page.write_page", "done")
-    run("report deep/a.h5")
-    assert made[-1][0][1:] == (Path("deep/a.h5"), Path("a.html"))
-    assert capsys.readouterr().out.splitlines() == ["a.png", "b.pdf", "done"]
-
-
-def test_a_comparison_is_a_picture_unless_it_is_csv(result, calls, monkeypatch, capsys):
-    monkeypatch.setattr("sweep.analysis.scattered.on_lines", lambda part, x: part)
-    monkeypatch.setattr("sweep.show.compare.comparison", lambda *_: "found")
-    monkeypatch.setattr("sweep.show.compare.comparison_text", lambda _: "told")
-    tables, pictures = [], []
-    monkeypatch.setattr("sweep.show.compare.write_comparison", lambda *given: tables.append(given))
-    monkeypatch.setattr("sweep.show.plot.plot", lambda *given: pictures.append(given))
-    for target in ("", " -o b.CSV", " -o b.png"):
-        run(f"fit a.h5 --y y --x a --compare{target}")
-    assert tables == [("found", Path("b.CSV"))]
-    assert pictures == [("found", Path("b.png"))]
-    assert capsys.readouterr().out.split() == ["told", "told", "b.CSV", "told", "b.png"]
 
 
 @pytest.mark.parametrize(("word", "noise"), [("yes", True), ("no", False), ("uneven", "uneven"), (None, None)])

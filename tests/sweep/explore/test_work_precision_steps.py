@@ -83,35 +83,6 @@ def test_methods_of_no_cell_are_not_named():
     assert module._shares(study, np.array([-1, 1])) == "exact 100 %"
 
 
-def table(**changed):
-    cell = {
-        "error_median": 1e-8,
-        "error_worst": 2e-7,
-        "seconds": 3e-6,
-        "ok": 0.5,
-        "inaccurate": 0.25,
-        "unsolved": 0.125,
-    }
-    cell |= {"silent": 0.0, "worst_cell": "height=1", **changed}
-    shape = ("method", "rtol")
-    attrs = {"reference": "exact", "reference_error": 1e-9, "cells": 8, "open_cells": 0, "omissions": ""}
-    data = {key: (shape, np.full((2, 1), value)) for key, value in cell.items()}
-    return xr.Dataset(data, {"method": ["rough", "exact"], "rtol": [1e-6]}, attrs=attrs)
-
-
-def test_the_table_by_hand():
-    text = module.precision_text(table(rate_calls=12345.6))
-    assert [" ".join(line.split()) for line in text.splitlines()[:2]] == [
-        "method rtol median worst time rate calls ok inaccurate unsolved silent worst cell",
-        "rough 1e-06 1.0e-08 2.0e-07 3 us 1.235e+04 50 % 25 % 12.5 % 0 % height=1",
-    ]
-    assert text.endswith("\n\nerrors against exact, in 8 cells, itself right to 1.0e-09")
-    left = table()
-    left.attrs |= {"open_cells": 1, "omissions": "nothing"}
-    end = "; 1 cells left aside, of which it is not sure\n\nOmissions: nothing"
-    assert module.precision_text(left).endswith(end)
-
-
 def test_an_error_of_the_reference_itself_is_told_only_above_its_floor():
     attributes = {"reference": "exact", "reference_error": 1e-9}
     assert module._error(1e-9, attributes, "exact") == "reference"

@@ -49,20 +49,13 @@ def test_what_cannot_be_written_is_told(tmp_path):
     assert refused(read, tmp_path / "d.csv", force=True) == f"{tmp_path}/d.csv is what is read; name another file"
 
 
-@pytest.mark.parametrize(
-    ("fault", "text"),
-    [
-        (ImportError("no", name="pyarrow"), 'needs pyarrow; install it with: pip install "foliot[export]"'),
-        (RuntimeError("of HDF5"), "cannot be written: of HDF5"),
-    ],
-)
-def test_what_stops_a_writer_is_told_and_leaves_nothing(tmp_path, monkeypatch, fault, text):
+def test_what_stops_a_writer_is_told_and_leaves_nothing(tmp_path, monkeypatch):
     def failing(dataset, path):
-        raise fault
+        raise RuntimeError("of HDF5")
 
     monkeypatch.setitem(module.WRITERS, ".csv", failing)
     found = refused(stones(), tmp_path / "a.csv")
-    assert found.removeprefix(f"{tmp_path}/a.csv").removeprefix(":").strip() == text
+    assert found == f"{tmp_path}/a.csv cannot be written: of HDF5"
     assert list(tmp_path.iterdir()) == []
 
 

@@ -29,10 +29,20 @@ def test_the_last_cell_is_wrapped_at_the_width_of_the_terminal(terminal, wide):
     assert " ".join(word for line in lines[:-1] for word in line.split()).endswith(WORDS)
 
 
-def test_a_narrow_terminal_leaves_thirty_columns(terminal):
+@pytest.mark.parametrize("wide", [20, 30, 40, 60, 80, 200])
+def test_cells_are_wrapped_until_the_table_is_no_wider_than_the_terminal(terminal, wide):
+    terminal(wide)
+    told = table.columns([("name", WORDS[:30], WORDS), (WORDS[10:40], "n", "short")])
+    assert max(map(len, told.splitlines())) <= max(wide, len("  three  three  fourteen"))
+    assert sorted(told.split()) == sorted(f"name {WORDS[:30]} {WORDS} {WORDS[10:40]} n short".split())
+    assert len(table.columns([(WORDS, WORDS)], wide=True).splitlines()[0]) > len(WORDS) + 10
+
+
+def test_a_word_is_never_torn(terminal):
     terminal(20)
-    first = table.columns([("name", WORDS)]).splitlines()[0]
-    assert first == "  name  one two three four five six"
+    path = "/a/path/that/is/longer/than/the/terminal"
+    assert path in table.columns([("name", path)])
+    assert path in table.paragraph(f"in {path}")
 
 
 def test_a_column_that_is_empty_everywhere_takes_no_room(terminal):
