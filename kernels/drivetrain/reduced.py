@@ -166,8 +166,8 @@ def check(p):
 
 PARAMETERS = (
     Field("J", "kg m^2", "moments of inertia, from the spindle on", lower=0.0, open_lower=True, dims=("mass",)),
-    Field("k", "N m/rad", "stiffness of the spring behind each; the last, to ground, may be 0",
-          lower=0.0, open_lower=True, dims=("mass",)),
+    Field("k", "N m/rad", "stiffness of the spring behind each; only the last, to ground, may be 0", lower=0.0,
+          dims=("mass",)),
     Field("h", "N m s/rad", "damping beside each spring", default=0.0, lower=0.0, dims=("mass",)),
     Field("reduction", "1", "how masses are saved", default=0.0, lower=0.0, upper=6.0, choices=REDUCTIONS,
           integer=True),
