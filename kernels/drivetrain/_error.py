@@ -4,7 +4,7 @@ from kernels.drivetrain._modal_masses import TURN
 from kernels.drivetrain._modal_receptance import chain_receptance, least_damping, sample_grid, sample_poles
 from kernels.drivetrain._model import CHAIN_ROUNDING, Model, Outcome, Wanted, largest_error
 from kernels.drivetrain._reductions import EXACT, chain_poles, damped, poles, receptance, reduce
-from kernels.lanes.jit import jit_apart
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import fma, sqrt
 from kernels.maths.small_dense import sort_many
 
@@ -114,19 +114,10 @@ def _receptance_error(f_max, own_poles, model, scene, reduction):
     return off / size, _ROUNDING * n / zeta
 
 
-@jit_apart
-def _against_chain(wanted, scene):
-    """The reduced model of a chain, how far its receptance is off, and a bound on the relative error of all."""
-    model = _reduce_enough(wanted, scene)
-    off, error = 0.0, model.error
-    if model.status == 0.0:
-        blur, own_poles = poles(wanted.reduction, model.p, scene)
-        off, rounding = float("nan"), float("inf")
-        if blur < float("inf"):
-            off, rounding = _receptance_error(wanted.f_max, own_poles, model, scene, wanted.reduction)
-        known = error >= 0.0 and rounding >= 0.0 and blur >= 0.0
-        error = max(error, rounding, blur) if known else float("inf")
-    return model, off, error
+@jit
+def _known(error):
+    """A bound on an error; inf for NaN."""
+    return error if error >= 0.0 else float("inf")
 
 
 @jit_apart
@@ -138,9 +129,16 @@ def reduced(wanted, scene):
     is_exact = wanted.reduction == EXACT
     n_keep = 1.0 if is_exact and not wanted.n_keep > 0.0 else wanted.n_keep
     wanted = Wanted(wanted.reduction, n_keep, wanted.tol, wanted.f_max, wanted.order)
-    model, off, error = _against_chain(wanted, scene)
-    count = scene.full.J.size if is_exact else model.p
-    return Outcome(model.p, count, model.slower, off, error, model.status)
+    model = _reduce_enough(wanted, scene)
+    off, error, blur, rounding = float("nan"), _known(model.error), float("inf"), float("inf")
+    if model.status == 0.0:
+        blur, own_poles = poles(wanted.reduction, model.p, scene)
+        blur = max(error, _known(blur))
+        if blur < float("inf"):
+            off, rounding = _receptance_error(wanted.f_max, own_poles, model, scene, wanted.reduction)
+            rounding = max(blur, _known(rounding))
+    count, choice = scene.full.J.size if is_exact else model.p, 0.0 if n_keep > 0.0 else error
+    return Outcome(model.p, count, model.slower, off, error, blur, rounding, choice, model.status)
 
 
 @jit_apart
@@ -148,6 +146,6 @@ def whole(wanted, scene):
     """As `reduced`, of a chain that stays as it is."""
     n = scene.full.J.size
     blur = chain_poles(scene.full, n, damped(scene.full), scene.spare.work)
-    known = blur < float("inf")
-    off, error = 0.0 if known else float("nan"), max(CHAIN_ROUNDING, blur) if known else float("inf")
-    return Outcome(n, n, 0.0, off, error, 0.0)
+    blur = max(CHAIN_ROUNDING, _known(blur))
+    off = 0.0 if blur < float("inf") else float("nan")
+    return Outcome(n, n, 0.0, off, CHAIN_ROUNDING, blur, blur, 0.0, 0.0)

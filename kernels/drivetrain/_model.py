@@ -103,8 +103,10 @@ class Model(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What a cell tells: masses, how many frequencies, the largest h e, the error of the receptance, a bound on the
-    relative error of all that is told, and a status.
+    """What a cell tells: masses, how many frequencies, the largest h e, the error of the receptance, and a status.
+
+    Bounds on relative errors: `error` of frequencies, `blur` of damping, `rounding` of the receptance's error, `choice`
+    of the number of masses.
     """
 
     p: int
@@ -112,6 +114,9 @@ class Outcome(NamedTuple):
     slower: float
     off: float
     error: float
+    blur: float
+    rounding: float
+    choice: float
     status: float
 
 

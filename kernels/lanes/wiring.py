@@ -115,7 +115,8 @@ class Split:
 def split(name: str, doc: str, parameter: str, solvers: dict[float, Solver]) -> Split:
     """A method by {value of a parameter: `method` or `tracing`}; each is compiled when a cell asks for it first.
 
-    Values with the same solver are one entry: it is compiled once, and their cells are solved together.
+    Values with the same solver are one entry: it is compiled once, and their cells are solved together. Either all
+    of them estimate or none does.
     """
     return Split(name, doc, parameter, solvers)
 
@@ -215,13 +216,13 @@ class _Wiring:
         if isinstance(solver, Method):
             return solver
         if isinstance(solver, Split):
-            return Method(solver.name, solver.doc, self._split(solver))
+            estimates = any(each.estimates for each in solver.solvers.values())
+            return Method(solver.name, solver.doc, self._split(solver, estimates), estimates=estimates)
         strange = set(solver.lacks) - set(self.outputs) | set(solver.excludes) - set(self.parameters)
         if strange:
             raise TypeError(f"{self.name}.{solver.name} lacks or excludes what there is not: {sorted(strange)}")
         body = solver.function if solver.fills else self._body(solver)
-        asked, error = (["asked"], ["error"]) if solver.estimates else ([], [])
-        names = [*self.parameters, "rtol", *self.along, *asked, *self.outputs, *error, "status"]
+        names = self._names(solver.estimates)
         solve = self._entry(solver.name, solver.function, body, names, solver.loop, solver.buffers or nothing)
         bound, sooner = self._bound(solver), self._sooner(solver.sooner)
         return Method(solver.name, solver.doc, solve, bound, solver.excludes, solver.lacks, solver.estimates, sooner)
@@ -229,21 +230,27 @@ class _Wiring:
     def _sooner(self, sooner: Sooner | None) -> Callable[..., Any] | None:
         return None if sooner is None else lambda *columns: sooner(self.record(*columns[:-1]), columns[-1])
 
-    def _split(self, split: Split) -> OnColumns:
+    def _names(self, estimates: bool) -> list[str]:
+        """Of the columns that a method is called with."""
+        asked, error = (["asked"], ["error"]) if estimates else ([], [])
+        return [*self.parameters, "rtol", *self.along, *asked, *self.outputs, *error, "status"]
+
+    def _split(self, split: Split, estimates: bool) -> OnColumns:
         entries = {solver: self.method(solver).solve for solver in dict.fromkeys(split.solvers.values())}
-        chosen, first_output = self.parameters.index(split.parameter), len(self.parameters) + 1
+        chosen, names = self.parameters.index(split.parameter), self._names(estimates)
+        shared, first_output = {*self.along, "asked"}, names.index(self.outputs[0])
 
         def solve(*columns: Any) -> None:
             for solver in dict.fromkeys(split.solvers[value] for value in np.unique(columns[chosen])):
                 rows = np.isin(columns[chosen], [value for value, by in split.solvers.items() if by == solver])
                 if rows.all():
                     return entries[solver](*columns)
-                part = [column[rows] for column in columns]
+                part = [c if name in shared else c[rows] for name, c in zip(names, columns, strict=True)]
                 entries[solver](*part)
                 for column, result in zip(columns[first_output:], part[first_output:], strict=True):
                     column[rows] = result
 
-        return signed(solve, [*self.parameters, "rtol", *self.along, *self.outputs, "status"])
+        return signed(solve, names)
 
     def _given(self, solver: Solver) -> Record:
         """A record of the outputs that the method gives."""
