@@ -42,9 +42,9 @@ Function = Callable[..., Any]
 """Of named scalars, as its author writes it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scene:
-    """What a scene is made of.
+    """What a scene is made of; it is recorded and written out once, whatever its functions would say later.
 
     Parameters
     ----------

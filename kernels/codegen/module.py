@@ -297,8 +297,9 @@ def _quiet(function):
     return call
 
 
+@functools.cache
 def build(scene):
-    """The module of the scene."""
+    """The module of the scene, which is recorded and written once."""
     text = Writer(scene, record(scene)).text()
     return loaded("scene", scene, text)
 

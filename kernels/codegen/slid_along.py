@@ -18,14 +18,15 @@ def slid_along(how, scene, methods):
     graph = record(scene).graph
     if graph.powers or not graph.kinks:
         return how
+    sliding = replace(scene, slides=True)
+    ways = [twice_by(method, sliding) for method in methods]
 
     def solve(module, columns, rtol, outputs, status):
         how(module, columns, rtol, outputs, status)
-        for method in methods:
+        for slid in ways:
             cells = np.flatnonzero(status == Status.STICKS)
             if len(cells):
                 found, verdict = np.full((len(outputs), len(cells)), np.nan), np.empty(len(cells), np.int8)
-                slid = twice_by(method, replace(scene, slides=True))
                 slid(module, [c[cells] for c in columns], rtol[cells], list(found), verdict)
                 for column, values in zip((*outputs, status), (*found, verdict), strict=True):
                     column[cells] = values

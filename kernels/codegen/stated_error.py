@@ -5,6 +5,8 @@ cell whose error that does not show to be small enough is followed again with a 
 left, and all that is remarked or refused, is followed twice (`followed_twice`), which asks for no derivatives.
 """
 
+import functools
+
 import numpy as np
 
 from kernels.codegen import followed_twice
@@ -47,8 +49,9 @@ def by_one(scene):
     return solved_by_one
 
 
+@functools.cache
 def telling(scene):
-    """The module of the scene's motion with its error."""
+    """The module of the scene's motion with its error, written once."""
     module, writer = build(scene), Writer(scene, record(scene))
     errors = names_of_error(writer.states, writer.feeds_back())
     rows = tuple(rows_of(writer.states, writer.parameters, writer.kinks, errors))

@@ -4,6 +4,7 @@ They have what does not fit in one function for all scenes, and lie beside the s
 functions they take. To a tolerance a cell is followed twice, as by the Taylor method.
 """
 
+import functools
 from types import SimpleNamespace
 
 from kernels.codegen import followed_twice
@@ -241,8 +242,9 @@ def twice_by(method, scene):
     return twice
 
 
+@functools.cache
 def adaptive(scene):
-    """The module of the scene's legs to a tolerance, with a `run_{method}` for each method of `APART`."""
+    """The module of the scene's legs to a tolerance, written once, with a `run_{method}` for each method of `APART`."""
     module, steps, writer = build(scene), stepped(scene), Writer(scene, record(scene))
     names = {"name": scene.name, "module": module.__name__, "steps": steps.__name__}
     kept = [KEPT.format(pair=pair) for pair in PAIRS] if scene.slides else []
@@ -252,7 +254,8 @@ def adaptive(scene):
     return loaded("legs", scene, text)
 
 
+@functools.cache
 def stepped(scene):
-    """The module of the scene's fixed-step methods, with `run` and `STATES`."""
+    """The module of the scene's fixed-step methods, written once, with `run` and `STATES`."""
     text = _text(scene, build(scene)).lstrip()
     return loaded("steps", scene, text)

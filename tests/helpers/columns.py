@@ -1,6 +1,7 @@
 """Columns for tests of kernels."""
 
 import contextlib
+import functools
 import io
 import os
 import subprocess
@@ -74,6 +75,18 @@ def checked(kernel: Kernel, *parameters, **named):
     status = np.full(len(columns[0]), 99, np.int8)
     kernel.check(*columns, status)
     return status
+
+
+def counted(function):
+    """The function with an attribute `calls`: how often it has been called."""
+
+    @functools.wraps(function)
+    def call(*values, **named):
+        call.calls += 1
+        return function(*values, **named)
+
+    call.calls = 0
+    return call
 
 
 def relative_error(values, truths):

@@ -11,6 +11,14 @@ def rates(place, speed, clock, slope, belt, sway, wave, press, drag, hold, stiff
     return speed - held, drive * sin(clock) - stiffness * place - drag * speed - pressed, 1.0 + 0.0 * clock
 
 
+def surface(place, side, mid, level):
+    return level - side * (place - mid)
+
+
+def start(place0, speed0):
+    return place0, speed0, 0.0
+
+
 SLIDING = scene_kernel(
     name="sliding",
     doc="a relay or a mass on a belt, that slides along its kink",
@@ -21,7 +29,7 @@ SLIDING = scene_kernel(
         Field("speed0", "m/s", "speed at the start", default=0.0),
     ),
     rates=rates,
-    surface=lambda place, side, mid, level: level - side * (place - mid),
-    start=lambda place0, speed0: (place0, speed0, 0.0),
+    surface=surface,
+    start=start,
     example={"press": 1.0, "belt": 1.0, "speed0": 1.0, "stiffness": 1.0, "mid": 1.0},
 )

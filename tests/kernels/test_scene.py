@@ -9,9 +9,12 @@ import mpmath
 import numpy as np
 import own_scene
 import pytest
-from columns import bounds, checked, solve
+import rich_scene
+import sliding_scene
+from columns import bounds, checked, counted, solve
 from mpmath import mp, mpf
 from rich_scene import RICH
+from sliding_scene import SLIDING
 
 from kernels.codegen.module import Writer, build
 from kernels.codegen.record import record
@@ -97,6 +100,30 @@ def test_the_written_module_can_be_read_and_is_the_same_for_the_same_scene():
     assert text == Writer(scene(), record(scene())).text()
     assert "def rates(state, side, signs, parameters):" in text
     assert max(map(len, text.splitlines())) < 4000
+
+
+def own_rates(known, rates, surface, start, switch=None):
+    """The scene of another kernel once more, with rates of its own."""
+    return scene_kernel(
+        name=known.name, doc=known.doc, states=known.outputs[2:], parameters=known.parameters[:-1],
+        rates=rates, surface=surface, start=start, switch=switch,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("known", [RICH, SLIDING])
+def test_a_scenes_functions_are_not_asked_again_at_every_call(known):
+    if known is RICH:
+        rates = counted(rich_scene.rates)
+        kernel = own_rates(RICH, rates, rich_scene.surface, rich_scene.start, rich_scene.switch)
+    else:
+        rates = counted(sliding_scene.rates)
+        kernel = own_rates(SLIDING, rates, sliding_scene.surface, sliding_scene.start)
+    for method in kernel.methods:
+        asked = []
+        for _ in range(2):
+            solve(kernel, method.name, flips=[2.0], **known.example)
+            asked.append(rates.calls)
+        assert asked[1] == asked[0], method.name
 
 
 def test_names_do_not_clash_with_those_of_the_written_text():
