@@ -30,6 +30,7 @@ from kernels.lanes.codes import (
 )
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude, nearest, sqrt
+from kernels.maths.elementary import power
 
 HALF_SWINGS = 2048
 """Half swings after which a motion that does not repeat is called so; means are over the second half of them."""
@@ -214,7 +215,8 @@ def _judged(scene, start, k, work, rtol):
     invert(work.chained, work.inverse)
     half_swings, teeth, cycles = _cycles(k, tally[swing.WAY])
     modulus, blur = multiplier(work.chained)
-    answer = _answer(tally, _ends(tally, k), 2.0 * cycles * k / half_swings, modulus ** (1.0 / k), scene.e)
+    per_half_swing = modulus if k == 1 else power(modulus, 1.0 / k)
+    answer = _answer(tally, _ends(tally, k), 2.0 * cycles * k / half_swings, per_half_swing, scene.e)
     rounding = _ROUNDING * (2.0 + tally[swing.EVENTS] / k) * (1.0 + answer.cycle.travel)
     gap, V, w, late = errors(start, difference(image, start), work, rounding, tally[swing.TIME])
     noise = _CHAINED * blur * (rounding * k + gap)

@@ -13,6 +13,7 @@ root of alpha'' between its neighbours.
 """
 
 import math
+from decimal import Decimal
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ import numpy as np
 from kernels.lanes.groups import GROUP, cells_at, room
 from kernels.lanes.jit import jit, jit_call, jit_inline
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
+from kernels.maths.decimals import PI, cosine, multiples, precise
 from kernels.maths.elementary import exp, larger, sincos, smaller
 from kernels.polisher.linkage import Crank, acceleration, dead_gaps, direction, opening, squares
 
@@ -78,30 +80,28 @@ def buffers():
 
 
 def _table():
-    """Sine and cosine of theta/2 and dtheta of each node."""
-    u = STEP * np.arange(-REACH, REACH + 1)
-    short = 0.5 * math.pi / (1.0 + np.exp(np.abs(u)))
-    sine, cosine = np.where(u > 0.0, np.cos(short), np.sin(short)), np.where(u > 0.0, np.sin(short), np.cos(short))
-    return sine, cosine, STEP * math.pi / ((1.0 + np.exp(-u)) * (1.0 + np.exp(u)))
+    """Of each node: sine and cosine of theta/2, dtheta, and (2/pi) kernel_k dtheta for k from 2 on.
+
+    kernel_k is what twice integrating cos(k theta) by x comes to; next to theta = 0 and pi it is a small difference.
+    """
+    rows = []
+    with precise():
+        for j in range(-REACH, REACH + 1):
+            growth = (Decimal(str(STEP)) * j).exp()  # e^u
+            weight = Decimal(str(STEP)) * PI * growth / (1 + growth) ** 2
+            half = cosine(PI / 2 * growth / (1 + growth))
+            cosines = multiples(2 * half * half - 1, HARMONICS + 3)
+            bends = [
+                ((cosines[k - 2] - cosines[k]) / (k - 1) - (cosines[k] - cosines[k + 2]) / (k + 1)) / (4 * k)
+                for k in range(2, HARMONICS + 1)
+            ]
+            numbers = ((1 - half) * (1 + half)).sqrt(), half, weight, *(2 / PI * weight * bend for bend in bends)
+            rows.append([float(number) for number in numbers])
+    table = np.array(rows).T.copy()
+    return table[0], table[1], table[2], table[3:]
 
 
-def _kernels(sine, cosine, weight):
-    """(2/pi) kernel_k dtheta of each node, k from 2 on: what twice integrating cos(k theta) by x comes to."""
-    theta = 2.0 * np.arctan2(sine, cosine)
-    rows = [
-        (
-            (np.cos((k - 2) * theta) - np.cos(k * theta)) / (k - 1)
-            - (np.cos(k * theta) - np.cos((k + 2) * theta)) / (k + 1)
-        )
-        / (4 * k)
-        for k in range(2, HARMONICS + 1)
-    ]
-    rows[0] = (2.0 * sine * cosine) ** 4 / 3.0
-    return np.array(rows) * (2.0 / math.pi * weight)
-
-
-SINE, COSINE, WEIGHT = _table()
-KERNELS = _kernels(SINE, COSINE, WEIGHT)
+SINE, COSINE, WEIGHT, KERNELS = _table()
 
 
 @jit_call

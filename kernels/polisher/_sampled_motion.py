@@ -12,7 +12,7 @@ import numpy as np
 
 from kernels.lanes.jit import jit, jit_call, jit_inline
 from kernels.lanes.vectors import magnitude, sqrt
-from kernels.maths.elementary import larger, smaller
+from kernels.maths.elementary import larger, sincos, smaller
 from kernels.polisher._cell import Rates
 from kernels.polisher.extremes import Angles, Locks, angle
 from kernels.polisher.linkage import crank_at, dead_gaps, motion, squares
@@ -131,10 +131,12 @@ def distortion(alphas, stride):
     mean, even, odd, rest = 0.0, 0.0, 0.0, 0.0
     for j in range(0, SAMPLES, stride):
         mean += alphas[j] / n
-        even += 2.0 * alphas[j] * math.cos(step(j)) / n
-        odd += 2.0 * alphas[j] * math.sin(step(j)) / n
+        sine, cosine = sincos(step(j))
+        even += 2.0 * alphas[j] * cosine / n
+        odd += 2.0 * alphas[j] * sine / n
     for j in range(0, SAMPLES, stride):
-        left = alphas[j] - mean - even * math.cos(step(j)) - odd * math.sin(step(j))
+        sine, cosine = sincos(step(j))
+        left = alphas[j] - mean - even * cosine - odd * sine
         rest += 2.0 * left * left / n
     first = math.sqrt(even * even + odd * odd)
     return math.sqrt(rest) / first, first

@@ -15,6 +15,7 @@ import numpy as np
 
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
+from kernels.maths.decimals import PI, cosine, multiples, precise
 from kernels.maths.elementary import in_unit
 from kernels.wear import _contact, _scene, _tool
 from kernels.wear._tool import Circle, Tool, arctan2, sincos
@@ -34,8 +35,17 @@ _HOPELESS = 1e100
 _TESTS = 2
 _SHARE = 0.02  # of rtol, for the areas
 _TURN = 2.0 * math.pi
-_COSINES = np.cos(np.pi * np.outer(np.arange(NODES + _TESTS), np.arange(NODES) + 0.5) / NODES)
 _TRIED = 0.83, -0.41
+
+
+def _cosines():
+    """cos(k x_j) of Chebyshev's nodes x_j = (2 j + 1) pi/2 NODES: a row for each k."""
+    with precise():
+        columns = [multiples(cosine(PI * (2 * j + 1) / (2 * NODES)), NODES) for j in range(NODES)]
+        return np.array(columns, np.float64).T.copy()
+
+
+_COSINES = _cosines()
 
 
 class Areas(NamedTuple):
