@@ -82,4 +82,8 @@ def told(fault: BaseException) -> str:
     """What a fault says, in one line."""
     if isinstance(fault, Unsolved):
         return str(fault)
-    return " ".join(f"{type(fault).__name__}: {fault}".split()).removesuffix(":")
+    try:
+        text = str(fault)
+    except Exception:  # a kernel's own exception may fail in its __str__
+        text = ""
+    return " ".join(f"{type(fault).__name__}: {text}".split()).removesuffix(":")

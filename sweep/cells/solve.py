@@ -11,6 +11,7 @@ number, or a status that a kernel has not got, the cell FAILED.
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Sequence
 from functools import reduce
 from typing import Any
@@ -102,12 +103,23 @@ class Solver:
             Columns of every output asked for, of statuses, of method numbers, and maybe of errors.
         wanted : ndarray of bool, optional
             Cells to solve; what comes out for the others means nothing. Default: all.
+
+        Raises
+        ------
+        Exception
+            What the kernel raises; a RuntimeError where it ends Python.
         """
-        for begin in range(0, cells.number, self._strip):
-            rows = slice(begin, min(begin + self._strip, cells.number))
-            if wanted is None or wanted[rows].any():
-                some = None if wanted is None or wanted[rows].all() else wanted[rows]
-                self._solve_strip(start + begin, cells.rows(rows), some)
+        try:
+            for begin in range(0, cells.number, self._strip):
+                rows = slice(begin, min(begin + self._strip, cells.number))
+                if wanted is None or wanted[rows].any():
+                    some = None if wanted is None or wanted[rows].all() else wanted[rows]
+                    self._solve_strip(start + begin, cells.rows(rows), some)
+        except (SystemExit, KeyboardInterrupt) as fault:
+            # only in the main thread may it be Ctrl-C, or what a program does at a signal
+            if threading.current_thread() is threading.main_thread():
+                raise
+            raise RuntimeError(f"it raised {type(fault).__name__}, which would have ended Python") from fault
 
     def _solve_strip(self, low: int, cells: Cells, wanted: NDArray[np.bool_] | None) -> None:
         high, status, used = low + cells.number, cells.status, cells.used

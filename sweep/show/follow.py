@@ -50,6 +50,8 @@ def reasons(output: Path) -> dict[int, str]:
 
 
 def _size(path: Path) -> int:
+    if path.is_fifo():
+        raise SweepError(f"{path} is a pipe, and no log of a run")
     try:
         return path.stat().st_size
     except OSError:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import glob
 import os
 import shutil
 import threading
@@ -150,8 +151,10 @@ def replacing(target: Path) -> Iterator[Path]:
 
     Raises SweepError where the system refuses; what was there before then stays.
     """
-    part = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    mark = f".{target.name}.{os.uname().nodename}."
+    part = target.with_name(f"{mark}{os.getpid()}.tmp")
     try:
+        _discard_left(target, mark)
         part.touch()  # says in plain words that there is no such folder, or no permission
         yield part
         sync_tree(part)
@@ -161,6 +164,19 @@ def replacing(target: Path) -> Iterator[Path]:
         raise SweepError(f"{target} cannot be written: {fault.strerror or fault}") from None
     finally:
         _discard(part)
+
+
+def _discard_left(target: Path, mark: str) -> None:
+    """Removes what processes of this machine left that were killed while they wrote to the same name."""
+    for path in target.parent.glob(f"{glob.escape(mark)}*"):
+        number, _, suffix = path.name.removeprefix(mark).partition(".")
+        if number.isdecimal() and (suffix == "tmp" or (suffix == "old" and target.exists())):
+            try:
+                os.kill(int(number), 0)
+            except ProcessLookupError:
+                _discard(path)
+            except (OSError, OverflowError):
+                continue  # it lives, and is somebody else's; or no process has that number
 
 
 def _discard(path: Path) -> None:

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from sweep.system.errors import SweepError
 from sweep.system.table import printable
 
 LOG = logging.getLogger("sweep")
@@ -41,11 +42,13 @@ def log(text: str, event: str = "note", **fields: Any) -> None:
 def logging_to(path: Path | None, as_json: bool = False) -> Iterator[None]:
     """All that is logged within goes to the end of a file, too; None: to none.
 
-    Raises OSError where the file cannot be written; a disk that is full later does not end the run.
+    Raises OSError, SweepError where the file cannot be written; a disk that is full later does not end the run.
     """
     if path is None:
         yield
         return
+    if path.is_fifo():  # to open it would wait for a reader
+        raise SweepError(f"{path} is a pipe, where the log of the run is to be written; remove it")
     handler = _Handler(path, encoding="utf-8")
     handler.setFormatter(_Json() if as_json else _Plain())
     level = LOG.level

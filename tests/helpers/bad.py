@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import signal
+import sys
 import time
 
 import numba
@@ -13,8 +14,15 @@ import toy
 
 from kernels.interface import Status
 
-RAISES, CRASHES, EXITS, HANGS, HOGS, HUNGRY, ORPHANS = 11.0, 22.0, 33.0, 44.0, 55.0, 66.0, 77.0
+RAISES, CRASHES, EXITS, HANGS, HOGS, HUNGRY, ORPHANS, QUITS, MUMBLES = (11.0 * k for k in range(1, 10))
 """Heights at which the kernel misbehaves."""
+
+
+class Mumbling(Exception):
+    """Cannot say what it is."""
+
+    def __str__(self):
+        raise ValueError("no words")
 
 
 def spin():
@@ -33,6 +41,8 @@ def misbehave(height, kinds):
         HANGS: lambda: time.sleep(1 << 20),
         HOGS: spin,
         HUNGRY: lambda: (_ for _ in ()).throw(MemoryError()),
+        QUITS: lambda: sys.exit(0),
+        MUMBLES: lambda: (_ for _ in ()).throw(Mumbling()),
         ORPHANS: lambda: (os.kill(os.getppid(), signal.SIGKILL), time.sleep(60)),
     }
     for one in height:
@@ -55,6 +65,7 @@ def kernel(name, *kinds, pause=0.0):
 RAISING = kernel("raising", RAISES)
 DYING = kernel("dying", RAISES, CRASHES, EXITS)
 SLOW = kernel("slow", pause=0.05)
+QUITTING = kernel("quitting", QUITS, MUMBLES)
 ORPHANED = kernel("orphaned", ORPHANS, pause=0.01)
 DEADLY = kernel("deadly", CRASHES, EXITS, pause=0.01)
 STUCK = kernel("stuck", HANGS, pause=0.002)

@@ -1,7 +1,11 @@
 """csv and netCDF4: what is written reads back, to the last bit, and nothing half-written stays."""
 
 import csv
+import os
+import signal
+import subprocess
 import sys
+import textwrap
 import tracemalloc
 from pathlib import Path
 
@@ -9,6 +13,7 @@ import numpy as np
 import pytest
 import toy_studies
 import xarray as xr
+from running import environment
 
 import sweep
 from sweep.show.laws import laws, write_laws
@@ -369,3 +374,30 @@ def opened(path):
     if path.suffix == ".zarr":
         return xr.open_dataset(path, engine="zarr", consolidated=False, mask_and_scale=False)
     return xr.open_dataset(path, engine="h5netcdf", mask_and_scale=False)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc", ".zarr"])
+def test_what_an_export_left_that_was_killed_goes_with_the_next_one(tmp_path, suffix):
+    """One that lives, here or on another machine that sees the folder, keeps what is its own."""
+    target, made = (
+        tmp_path / f"out{suffix}",
+        """
+        import os, signal, sys
+        import numpy as np
+        import xarray as xr
+        import sweep
+        from sweep.system import disk
+        disk.sync_tree = lambda path: os.kill(os.getpid(), signal.SIGKILL)
+        sweep.export(xr.Dataset({"y": ("x", np.arange(3.0))}, {"x": np.arange(3.0)}), sys.argv[1])
+    """,
+    )
+    killed = subprocess.run([sys.executable, "-c", textwrap.dedent(made), target], env=environment())
+    left = list(tmp_path.iterdir())
+    assert (killed.returncode, len(left)) == (-signal.SIGKILL, 1)
+    name = left[0].name
+    lives = name.replace(f".{name.split('.')[-2]}.", f".{os.getppid()}.")
+    others = [tmp_path / lives, tmp_path / f".out{suffix}.far.9.tmp"]
+    for other in others:
+        other.touch()
+    sweep.export(xr.Dataset({"y": ("x", np.arange(3.0))}, {"x": np.arange(3.0)}), target)
+    assert sorted(tmp_path.iterdir()) == sorted([target, *others])

@@ -92,6 +92,14 @@ def test_a_kernel_that_kills_its_parent_costs_the_cell_and_none_of_those_that_ot
     assert heights_of(found, Status.FAILED) == [bad.ORPHANS]
 
 
+@pytest.mark.parametrize("isolate", [False, True])
+def test_a_kernel_that_ends_python_or_raises_what_cannot_be_told_costs_those_cells(isolate, tmp_path):
+    log = io.StringIO()
+    with quiet(tall(SOUND, "bad:QUITTING"), tmp_path / "out.h5", isolate=isolate, progress=log) as found:
+        assert heights_of(found, Status.FAILED) == [bad.QUITS, bad.MUMBLES]
+    assert all(word in log.getvalue() for word in ("SystemExit", "Mumbling"))
+
+
 def fork_servers(process):
     return [child for child in psutil.Process(process.pid).children() if "forkserver" in " ".join(child.cmdline())]
 

@@ -104,6 +104,13 @@ def test_of_a_run_that_is_killed_no_process_is_left(begun):
     assert left == []
 
 
+def test_a_pipe_in_the_place_of_the_log_is_told_and_not_waited_for(begun, tmp_path):
+    os.mkfifo(log_path(tmp_path / "stones.h5"))
+    process, _ = begun("slow:SLOW", 10)
+    assert "stones.h5.log" in process.communicate(timeout=60)[1]
+    assert process.returncode == 2
+
+
 def replace(path):
     path.with_name("copy").write_bytes(path.read_bytes())
     path.with_name("copy").replace(path)

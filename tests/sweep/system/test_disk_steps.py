@@ -162,7 +162,7 @@ def test_a_file_takes_the_place_of_another_once_it_is_on_the_disk(tmp_path, monk
     real = disk.rename
     monkeypatch.setattr(disk, "rename", lambda old, new: (events.append("rename"), real(old, new)))
     with disk.replacing(target) as part:
-        assert part == tmp_path / f".out.{os.getpid()}.tmp"
+        assert part.parent == tmp_path
         part.write_text("new")
         assert target.read_text() == "old"
     assert target.read_text() == "new"
