@@ -25,7 +25,6 @@ def test_which_byte_breaks_a_result(path):
         (True, True): (layout.work.digests, layout.work.places[0].at(1)),
         (True, False): (text, layout.endings[0][1] - 1, layout.endings[-1][0], digest),
         (False, True): (0, 500, text - 1, digest + 1, layout.regions[0][0] - 1, layout.regions[0][1]),
-        (None, True): (layout.end, layout.size - 1),
     }
     for found, some in places.items():
         for at in some:
@@ -33,6 +32,11 @@ def test_which_byte_breaks_a_result(path):
             harm(path, at)
             assert judged(path, layout) == found, at
             harm(path, at)
+    for at in (layout.end, layout.size - 1):
+        harm(path, at)
+        with pytest.raises(OSError, match="end"):
+            judged(path, layout)
+        harm(path, at)
 
 
 @pytest.mark.parametrize(("less", "found"), [(0, True), (1, None)])
