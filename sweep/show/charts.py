@@ -114,7 +114,7 @@ def plot(
     path : path, optional
         Where to save it; .png, .svg or .pdf.
     y : str, optional
-        Output; the first by default.
+        Output; by default the first, of a scene of one's own its `interval`.
     x : str, optional
         Axis, or coordinate along the cells of a zip design. Default: what a trace runs along, else the longest.
 
