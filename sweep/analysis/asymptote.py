@@ -117,9 +117,10 @@ def _one(t: Array, z: Array, sign: float, confidence: float) -> Array:
     exponent, fade, left = _outer(found, t)
     noisy = _scatters(t, z, found.off)
     ends = _profile(t, z, found, confidence) if noisy else _by_half(t, z, exponent)
-    low, high = sorted(sign * end for end in ends)
+    # of a D that is not within FADES the profile does not know
+    reached = [sign * end for end in (*ends, exponent)]
     residual = float(np.expm1(abs(found.off).max()))
-    return np.array([sign * exponent, low, high, sign * fade, left, residual, noisy, abs(left) < 1])
+    return np.array([sign * exponent, min(reached), max(reached), sign * fade, left, residual, noisy, abs(left) < 1])
 
 
 def _scatters(t: Array, z: Array, off: Array) -> bool:

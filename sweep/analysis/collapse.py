@@ -135,7 +135,8 @@ def _points(y: xr.DataArray, dim: str, over: str) -> tuple[Points, int]:
     which = np.nonzero(fine)
     found = Points(t[which[1]], z[fine], size[which[0]], which[0].astype(np.float64))
     if found.t.size < FEWEST_POINTS:
-        raise SweepError(f"a collapse needs at least {FEWEST_POINTS} positive points, found {found.t.size}")
+        few = f"a collapse needs at least {FEWEST_POINTS} positive points of {title(y)}, found {found.t.size}"
+        raise SweepError(few)
     return found, z.size
 
 

@@ -93,7 +93,7 @@ def fit_exponent(
     - *any*, *uneven*, *outliers*: scatter, told apart by tests. The interval is then never less than that for noise
       that remembers the point before, as strongly as the points allow, and than that by heteroscedasticity-consistent
       errors: wider than that of independent noise, twice as wide for a dozen points. Of outliers the exponent is that
-      of Tukey's biweight, whose interval is two to six times as narrow: `noise="outliers"` where that is known.
+      of Tukey's biweight; its own interval, which `noise="outliers"` asks for, is far narrower beside few points.
     - *independent*, *correlated*: only if `noise` says so.
     - *curved*, *bent*: no power law, without and among scatter. `fits` is 0 and the interval is the range of the local
       exponent in the window, in which the exponent of every window inside lies.

@@ -31,7 +31,7 @@ def plot(
     path : path, optional
         Where to save it; .png, .svg or .pdf.
     y : str, optional
-        Output of a result; the first by default.
+        Output of a result; by default the first, of a scene of one's own its `interval`.
     x : str, optional
         Axis of a result, or coordinate along the cells of a zip design. Default: what a trace runs along, else the
         longest.

@@ -293,6 +293,19 @@ def test_fit_writes_its_table(done, call):
     assert call("fit", "stones.h5", "--y", "fall_time", "--x", "height", "--confidence", "95")[0] == 2
 
 
+def test_of_a_scene_the_interval_is_fitted_and_drawn_with_the_digits_that_it_has(here, call):
+    study = {"kernel": "rich_scene:RICH", "allow_import": True, "fixed": {"phi0": 1.0, "a": 1.0, "flips": 6}}
+    ds = sweep.run(**study, axes={"mu": np.geomspace(0.1, 10.0, 12)}, path="scene.h5", progress=False)
+    code, out, _ = call("fit", "scene.h5", "--x", "mu")
+    assert code == 0
+    title, _, row, *_ = out.splitlines()
+    assert title == "interval ~ mu^p"
+    (exponent,) = re.findall(r" (-0\.\d+)  +runs from", row)
+    assert exponent == f"{float(sweep.fit_exponent(ds.interval, 'mu').exponent):.2g}"
+    assert call("fit", "scene.h5", "--x", "mu", "--compare")[0] == 0
+    assert "time between the last two switches" in sweep.plot(ds).axes[0].get_ylabel()
+
+
 def test_fit_tells_of_cells_that_are_not_ok(done, call):
     code, out, _ = call("fit", "stones.h5", "--y", "fall_time", "--x", "height")
     assert code == 0

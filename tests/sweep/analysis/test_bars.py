@@ -91,6 +91,14 @@ def test_outliers_count_less():
     assert error < 0.7 * before
 
 
+def test_noise_that_is_loud_at_both_ends_is_in_the_bar_though_it_look_like_outliers():
+    """It held 79 % of these."""
+    rng, t = np.random.default_rng(12), axis(61)
+    noise = 0.02 * 25 ** abs(np.linspace(-1.0, 1.0, t.size)) * rng.standard_normal((150, t.size))
+    found = sweep.fit_exponent(curve(t, -0.5 * t + noise), "mu")
+    assert share(found, "exponent", -0.5) > 0.93
+
+
 def test_the_bar_of_even_noise_is_not_much_wider_than_it_need_be():
     rng, t = np.random.default_rng(4), axis(60)
     y = curve(t, -0.5 * t + 0.02 * rng.standard_normal((MANY, 60)))

@@ -43,7 +43,7 @@ def test_one_law_is_told_with_its_window_interval_and_misfit():
     row = "1 to 1.235e+04 -0.33333333 -0.35 to -0.31 31 1.2e-02 4.6e-05 2.71828"
     assert lines(laws_text(found())) == ["period ~ mu^p", heading, row]
     (row,) = lines(laws_text(found(fit(fits=0.0))))[2:]
-    assert row.startswith("1 to 1.235e+04 -0.33333333 runs from -0.35 to -0.31 31")
+    assert row.startswith("1 to 1.235e+04 -0.33 runs from -0.35 to -0.31 31")
 
 
 def test_what_the_columns_mean_and_the_remark_follow():
