@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import socket
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ from sweep.system.errors import SweepError, missing
 
 ADDRESS = "127.0.0.1"
 """Nobody on another machine can reach it."""
+OTHER_HOSTS = rf"(?!({re.escape(ADDRESS)}|localhost|\[::1\])$).*"
+"""Names of this server that no browser of its user knows: a page from elsewhere asks for it by one of its own."""
 
 
 def serve(path: str | os.PathLike[str], port: int = 0, show: bool = True) -> None:
@@ -33,6 +36,7 @@ def serve(path: str | os.PathLike[str], port: int = 0, show: bool = True) -> Non
     """
     try:
         import panel as pn
+        from tornado.web import ErrorHandler
 
         from sweep.view.page import Page
     except ImportError:
@@ -48,6 +52,8 @@ def serve(path: str | os.PathLike[str], port: int = 0, show: bool = True) -> Non
         return Page(dataset, result.name).layout
 
     server = pn.serve(session, port=port, address=ADDRESS, show=show, start=False, title=result.name, verbose=False)
+    # pages and websockets alike, for tornado accepts any name in which Host and Origin agree
+    server._tornado.add_handlers(OTHER_HOSTS, [(".*", ErrorHandler, {"status_code": 403})])
     print(f"http://{ADDRESS}:{server.port}/ shows {result}; Ctrl-C ends it", flush=True)
     server.run_until_shutdown()
 

@@ -1,8 +1,16 @@
 """A result of three axes, with cells that are refused."""
 
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
 import sweep
+
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(scope="session")
@@ -27,3 +35,14 @@ def result(tmp_path_factory):
 def dataset(result):
     with sweep.open_result(result) as found:
         yield found
+
+
+@pytest.fixture(scope="module")
+def address(result):
+    """Where the page of the result is served."""
+    command = [sys.executable, "-m", "sweep", "view", str(result), "--no-browser"]
+    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": path}) as server:
+        yield re.match(r"(http://127\.0\.0\.1:\d+/) ", server.stdout.readline())[1]
+        server.send_signal(2)
+        assert server.wait(20) == 0

@@ -2,21 +2,15 @@
 
 import csv
 import json
-import os
-import re
 import shutil
-import subprocess
-import sys
 import time
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import sweep
 
-ROOT = Path(__file__).parents[3]
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 pytestmark = [
     pytest.mark.skipif(not find_spec("panel"), reason="the extra view is not installed"),
@@ -29,16 +23,6 @@ FLAGS = (
     *("--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage"),
 )
 SECONDS = 60
-
-
-@pytest.fixture(scope="module")
-def address(result):
-    command = [sys.executable, "-m", "sweep", "view", str(result), "--no-browser"]
-    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": path}) as server:
-        yield re.match(r"(http://127\.0\.0\.1:\d+/) ", server.stdout.readline())[1]
-        server.send_signal(2)
-        assert server.wait(20) == 0
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,9 @@
 """What the controls of the page do, without a browser."""
 
+import http.client
+import re
 from importlib.util import find_spec
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -8,6 +11,10 @@ import pytest
 import sweep
 
 pytestmark = pytest.mark.skipif(not find_spec("panel"), reason="the extra view is not installed")
+
+
+SWITCHED = 101
+"""Protocols: to a websocket."""
 
 
 def made(dataset, name):
@@ -214,3 +221,32 @@ def test_a_click_beside_the_map_changes_nothing(page):
     page._click(None, 1.0)
     page._click(1e9, 1.0)
     assert page.table.object == ""
+
+
+def test_only_pages_of_this_machine_reach_the_server(address):
+    """A page from elsewhere whose name comes to mean this machine (DNS rebinding) reads nothing, by no protocol."""
+    here = urlsplit(address)
+
+    def asked(host, path="/", **headers):
+        connection = http.client.HTTPConnection(here.hostname, here.port, timeout=60)
+        connection.request("GET", path, headers={"Host": host, **headers})
+        answer = connection.getresponse()
+        text = answer.read().decode() if answer.status != SWITCHED else ""
+        connection.close()
+        return answer.status, text
+
+    status, page = asked(here.netloc)
+    token = re.search(r'"token":"([^"]+)"', page)[1]
+    keys = {"Sec-WebSocket-Key": "AQIDBAUGBwgJCgsMDQ4PEC==", "Sec-WebSocket-Version": "13"}
+    keys |= {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Protocol": f"bokeh, {token}"}
+
+    def answers(name):
+        host, script = f"{name}:{here.port}", "/static/js/bokeh.min.js"
+        return [asked(host, "/ws", Origin=f"http://{host}", **keys)[0], asked(host, script)[0]]
+
+    assert status == 200
+    for name in ("127.0.0.1", "localhost", "LOCALHOST", "[::1]"):
+        assert answers(name) == [SWITCHED, 200], name
+    for name in ("evil.example", "localhost.evil.example", "127.0.0.1.evil.example", "127.0.0.2", "127x0.0.1", "my"):
+        assert answers(name) == [403, 403], name
+        assert asked(f"{name}:{here.port}")[0] == 403
