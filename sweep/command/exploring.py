@@ -64,7 +64,7 @@ def _refine(arguments: argparse.Namespace) -> None:
 
 def _chart(arguments: argparse.Namespace) -> None:
     from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
-    from sweep.show.charts import plot_precision
+    from sweep.show.charts import plot_precision, save
     from sweep.system.progress import Progress
 
     study = study_of_result(arguments) if arguments.study.suffix == ".h5" else study_from(arguments)
@@ -81,7 +81,7 @@ def _chart(arguments: argparse.Namespace) -> None:
         cell_timeout=arguments.cell_timeout,
     )
     say(precision_text(found, arguments.all))
-    plot_precision(found, output)
+    save(plot_precision(found), output, arguments.by)
     say(output)
 
 

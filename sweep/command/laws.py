@@ -42,9 +42,10 @@ def _compare(arguments: argparse.Namespace) -> None:
         found = comparison(part, arguments.y, arguments.x, arguments.window or [])
     say(comparison_text(found))
     if drawn:
+        from sweep.show.charts import save
         from sweep.show.law_charts import plot_laws
 
-        plot_laws(found, target)
+        save(plot_laws(found), target, arguments.by)
     elif target:
         write_comparison(found, target)
     if target:
