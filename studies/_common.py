@@ -115,6 +115,8 @@ def report(
 ) -> int:
     """Prints what a study concludes from the results named, and saves its figure beside the first of them.
 
+    A figure that is there is replaced where a script has drawn it, and left alone otherwise.
+
     Parameters
     ----------
     script : path of the script, for the line on its use
@@ -132,10 +134,13 @@ def report(
         return 2
     try:
         from sweep.show import charts
+        from sweep.system.overwriting import check_target
 
+        target = Path(arguments[0]).with_suffix(".png")
+        check_target(target, ".png")
         groups, notes, page = conclude(*arguments)
         print("\n".join([*table(groups, source), "", *notes, ""]))
-        print(f"figure: {charts.save(page, Path(arguments[0]).with_suffix('.png'))}")
+        print(f"figure: {charts.save(page, target)}")
     except sweep.SweepError as error:
         print(error, file=sys.stderr)
         return 2

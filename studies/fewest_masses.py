@@ -208,6 +208,7 @@ def figure(ds: xr.Dataset, times: xr.Dataset) -> Any:
 def main(arguments: Sequence[str]) -> int:
     """Table and figure; 1 if a statement does not hold."""
     from sweep.show import charts
+    from sweep.system.overwriting import check_target
 
     if list(arguments) == ["points"]:
         write_points(Path(__file__).with_suffix(".csv"))
@@ -215,11 +216,17 @@ def main(arguments: Sequence[str]) -> int:
     if len(arguments) > 1 or not all(a.isdigit() and int(a) > 0 for a in arguments):
         print("use: python fewest_masses.py [drivetrains]", file=sys.stderr)
         return 2
+    target = Path("fewest_masses.png")
+    try:
+        check_target(target, ".png")
+    except sweep.SweepError as error:
+        print(error, file=sys.stderr)
+        return 2
     chains = drivetrains(int(arguments[0]) if arguments else DRIVETRAINS)
     ds, times = needed(chains), cost(chains)
     groups = statements(ds)
     print("\n".join([*table(groups, "expected"), "", *notes(ds, times), ""]))
-    print(f"figure: {charts.save(figure(ds, times), 'fewest_masses.png')}")
+    print(f"figure: {charts.save(figure(ds, times), target)}")
     return int(any(s.holds is False for lines in groups.values() for s in lines))
 
 

@@ -64,6 +64,7 @@ def _refine(arguments: argparse.Namespace) -> None:
 
 def _chart(arguments: argparse.Namespace) -> None:
     from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
+    from sweep.show.charts import save
     from sweep.show.plot import plot
     from sweep.system.progress import Progress
 
@@ -81,7 +82,7 @@ def _chart(arguments: argparse.Namespace) -> None:
         cell_timeout=arguments.cell_timeout,
     )
     say(precision_text(found, arguments.all))
-    plot(found, output)
+    save(plot(found), output, arguments.by)
     say(output)
 
 

@@ -82,7 +82,7 @@ def check_target_of(arguments: argparse.Namespace, target: Path, kind: str | Non
     from sweep.system.overwriting import check_target
 
     read = [getattr(arguments, name) for name in ("result", "study") if name in arguments]
-    check_target(target, kind or target.suffix.lower(), force=arguments.force, read=read)
+    check_target(target, kind or target.suffix.lower(), force=arguments.force, read=read, by=arguments.by)
 
 
 def in_units_of(dataset: xr.Dataset, given: Sequence[str]) -> xr.Dataset:

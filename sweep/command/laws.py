@@ -42,9 +42,10 @@ def _compare(arguments: argparse.Namespace) -> None:
         found = comparison(part, arguments.y, arguments.x, arguments.window or [])
     say(comparison_text(found))
     if drawn:
+        from sweep.show.charts import save
         from sweep.show.plot import plot
 
-        plot(found, target)
+        save(plot(found), target, arguments.by)
     elif target:
         write_comparison(found, target)
     if target:

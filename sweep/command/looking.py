@@ -66,13 +66,15 @@ def _diff(arguments: argparse.Namespace) -> Outcome:
 
 
 def _plot(arguments: argparse.Namespace) -> None:
+    from sweep.show.charts import save
     from sweep.show.laws import pick
     from sweep.show.plot import plot
 
-    output = arguments.output or Path(f"{arguments.result.stem}.png")
+    output = arguments.output or Path(f"{arguments.result.stem}_plot.png")
     check_target_of(arguments, output)
     with result_of(arguments) as dataset:
-        plot(in_units_of(pick(dataset, arguments.at), arguments.unit), output, y=arguments.y, x=arguments.x)
+        figure = plot(in_units_of(pick(dataset, arguments.at), arguments.unit), y=arguments.y, x=arguments.x)
+    save(figure, output, arguments.by)
     say(output)
 
 
@@ -116,7 +118,7 @@ COMMANDS = {
         "a figure of one output",
         _plot,
         RESULT,
-        output("FILE.png", "default: the result's name with .png, here"),
+        output("FILE.png", "default: the result's name with _plot.png, here"),
         FORCE,
         OUTPUT_Y,
         option("--x", "default: the first axis", metavar="AXIS"),

@@ -18,13 +18,14 @@ from kernels.interface import Status, machine_code_folder
 from sweep.cells.block import faults_reported, row_shape, sampled_by, sampled_study, warm
 from sweep.cells.compiling import SILENT_SECONDS, Compiling
 from sweep.cells.fingerprint import fingerprint
-from sweep.cells.grid import Grid
+from sweep.cells.grid import Grid, empty_cells
 from sweep.cells.guard import Unsolved
 from sweep.cells.output_schema import output_schema, part_columns
 from sweep.cells.partition import Partition, row_blocks
 from sweep.cells.reduce import strip_bytes
 from sweep.cells.sample import require_asked
-from sweep.cells.timing import Sample, row_partition
+from sweep.cells.solve import Solver
+from sweep.cells.timing import Sample, row_partition, tolerated
 from sweep.explore.calibration import Calibration
 from sweep.explore.groups import advice_on, scaling
 from sweep.results.open import memory
@@ -38,6 +39,7 @@ from sweep.system.progress import duration, quantity
 from sweep.system.table import columns, paragraph
 
 if TYPE_CHECKING:
+    from sweep.cells.guard import SolveCells
     from sweep.study.model import Study
 
 TRIAL = 32 << 20
@@ -70,7 +72,9 @@ class Plan:
     compile_seconds : float
         What compiling the methods took just now; 0 where their machine code was kept.
     methods, statuses : dict of str to float
-        Shares of the sampled cells.
+        Shares of the sampled cells. PENDING are those at the ends of axes that gave no answer in the time of a trial.
+    sampled : int
+        How many these are; the ends of all axes are among them.
     scaling : str
         Which axes are superfluous, since they change nothing but the units; "" where none is.
     """
@@ -92,6 +96,7 @@ class Plan:
     compile_seconds: float = 0.0
     methods: dict[str, float] = field(default_factory=dict)
     statuses: dict[str, float] = field(default_factory=dict)
+    sampled: int = 0
     scaling: str = ""
 
     @property
@@ -111,6 +116,10 @@ class Plan:
         when = "just now; the machine code is kept" if _is_kept(self.kernel) else "of it, before the first cell"
         return f"about {duration(self.compile_seconds)} {when}"
 
+    def _shares(self, shares: dict[str, float]) -> str:
+        found = ", ".join(f"{name} {_percent(share)}" for name, share in shares.items())
+        return found and f"{found} of a sample of {self.sampled:,} cell{'s' * (self.sampled > 1)}"
+
     def __str__(self) -> str:
         shape = " x ".join(f"{name} {n:,}" for name, n in self.shape.items())
         rows = {
@@ -124,8 +133,8 @@ class Plan:
             "time": f"{duration(self.seconds)} on {self.workers} core{'s' * (self.workers > 1)}, "
             f"{small_duration(self.cell_seconds)} a cell",
             "compile": self._compile_text(),
-            "methods": _shares(self.methods),
-            "statuses": _shares(self.statuses),
+            "methods": self._shares(self.methods),
+            "statuses": self._shares(self.statuses),
             "scaling": self.scaling,
         }
         told = [(name, text) for name, text in rows.items() if text]
@@ -175,7 +184,7 @@ def plan(
     if isolate or cell_timeout is not None:
         return _plan_apart(study, crew, folder, limits_of(cell_timeout))
     compiling = Compiling(study.kernel, study.kernel_name, note)
-    sample = sampled_study(study, compiling)
+    sample = with_ends(sampled_study(study, compiling), Solver(replace(study, kernel=compiling.kernel)), study)
     with faults_reported(f"{study.kernel_name}: the kernel failed"):
         advice = scaling(study).advice
     forecast = _forecast(study, sample, crew, folder, None)
@@ -192,7 +201,7 @@ def _plan_apart(study: Study, workers: int, folder: Path, limits: Limits) -> Pla
         begun = time.monotonic()
         warm(solver, study)
         starting = time.monotonic() - begun
-        sample = sampled_by(solver, study, solver.clock)
+        sample = with_ends(sampled_by(solver, study, solver.clock), solver, study)
         try:
             advice = solver.call(ADVICE_SECONDS, advice_on, study.to_json())
         except Unsolved as fault:
@@ -237,7 +246,31 @@ def _forecast(
         seconds=_seconds(trial, output, min(workers, blocks.count), folder, starting),
         methods=_counted(sample.method_used, dict(enumerate(names)) | {-1: "none"}),
         statuses=_counted(sample.status, {int(s): s.name for s in Status}),
+        sampled=len(sample.status),
     )
+
+
+def with_ends(sample: Sample, solver: SolveCells, study: Study) -> Sample:
+    """The sample with the cells at both ends of every axis, in the middle of the others, and of all axes at once.
+
+    There a scene is most often another one, and so is the method. The times of the sample stay.
+    """
+    shape = Grid(study).shape
+    middle, last = np.array(shape) // 2, np.array(shape) - 1
+    places = [np.zeros_like(last), last]
+    for axis in range(len(shape)):
+        places += [np.where(np.arange(len(shape)) == axis, end, middle) for end in (0 * last, last)]
+    numbers = np.unique([np.ravel_multi_index(tuple(place), shape) for place in places])
+    inside = ((sample.positions[:, None] <= numbers) & (numbers < sample.positions[:, None] + sample.cells)).any(axis=0)
+    status, used = [sample.status], [sample.method_used]
+    for number in numbers[~inside]:
+        cell = empty_cells(study, 1)
+        cell.status[:], cell.used[:] = Status.PENDING, -1
+        with tolerated():
+            solver.solve(int(number), cell)
+        status.append(cell.status)
+        used.append(cell.used)
+    return replace(sample, status=np.concatenate(status), method_used=np.concatenate(used))
 
 
 def _seconds(trial: Calibration, output: int, workers: int, folder: Path, starting: float) -> float:
@@ -273,8 +306,9 @@ def _counted(numbers: np.ndarray, names: dict[int, str]) -> dict[str, float]:
     return {names[int(n)]: float(c / len(numbers)) for n, c in zip(found, counts, strict=True)}
 
 
-def _shares(shares: dict[str, float]) -> str:
-    return ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares.items()) + " of a sample" * bool(shares)
+def _percent(share: float) -> str:
+    """Neither none nor all, where it is not."""
+    return "< 1 %" if share < 0.005 else "> 99 %" if 0.995 < share < 1 else f"{100 * share:.0f} %"
 
 
 def small_duration(seconds: float) -> str:

@@ -89,12 +89,8 @@ HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "----")
 NAME_SPACE = 0.11
 """Part of a map's height that a region must reach from the place of its name in all directions."""
 
-METADATA: dict[str, dict[str, Any]] = {
-    ".png": {"Software": DRAWN},
-    ".svg": {"Date": None, "Creator": DRAWN},
-    ".pdf": {"CreationDate": None, "Creator": DRAWN},
-}
-"""Kinds of file, what each says of its origin, and what is left out so that the same picture has the same bytes."""
+KINDS = (".png", ".svg", ".pdf")
+"""Suffixes of pictures."""
 
 
 def result_figure(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Figure:
@@ -221,8 +217,13 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
+def save(figure: Figure, path: str | os.PathLike[str], by: str = DRAWN) -> Path:
     """Save as .png, .svg or .pdf; a file that is there is replaced once all is written.
+
+    Parameters
+    ----------
+    by : str
+        What has drawn it, for its metadata.
 
     Raises
     ------
@@ -231,13 +232,15 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
     """
     target = Path(path)
     kind = target.suffix.lower()
-    if kind not in METADATA:
+    if kind not in KINDS:
         found = f'"{target.suffix}"' if target.suffix else "no suffix"
-        raise SweepError(f"{target}: found {found}; a picture is one of {', '.join(METADATA)}")
+        raise SweepError(f"{target}: found {found}; a picture is one of {', '.join(KINDS)}")
     if target.is_dir():
         raise SweepError(f"{target} is a folder; name a file in it")
     with disk.replacing(target) as part, style():
-        figure.savefig(part, format=kind[1:], metadata=METADATA[kind])
+        # without a date: the same picture has the same bytes
+        metadata = {".png": {"Software": by}, ".svg": {"Date": None, "Creator": by}}
+        figure.savefig(part, format=kind[1:], metadata=metadata.get(kind, {"CreationDate": None, "Creator": by}))
     return target
 
 

@@ -37,9 +37,7 @@ FEW = 16
 FEWEST = 3
 """Blocks from which a spread can be told."""
 LONGER = 0.5
-"""Standard errors by which a forecast is made longer, for it is to err on the long side;"""
-EITHER_WAY = 3.0
-"""and within which it is told to lie."""
+"""Standard errors by which a forecast is made longer, for it is to err on the long side."""
 ENOUGH = 4
 """So many blocks that are no worker's first tell more than all together."""
 SHORTEST = 1e-9
@@ -113,32 +111,20 @@ class Forecast:
     @property
     def left(self) -> float | None:
         """Seconds until all blocks are done, rather too many; None before the first one is."""
-        return None if (found := self._told()) is None else found[0]
-
-    @property
-    def interval(self) -> tuple[float, float] | None:
-        """What the seconds that are left may well lie between; None before the first block is done."""
-        if (found := self._told()) is None:
-            return None
-        left, error = found
-        likely = left / (1 + LONGER * error)
-        return likely * max(0.0, 1 - EITHER_WAY * error), likely * (1 + EITHER_WAY * error)
-
-    def _told(self) -> tuple[float, float] | None:
-        """Seconds that are left, and their relative standard error."""
         measured, left, now = self._measured(), np.flatnonzero(self._left), self._clock()
         if self._start is None or not measured.size:
             return None
         written, all_ = self.ending()
         if not left.size:
-            return written, 0.0
+            return written
         running = np.maximum(np.nan_to_num(now - self._begun[left]), 0.0)
         settled = self._settled(measured)
         expected = self._expected(settled)[left]
-        error = self._standard_error(settled, expected)
-        to_come = np.maximum((1 + LONGER * error) * expected - running, 0.0)
+        longer = (1 + LONGER * self._standard_error(settled, expected)) * expected
+        # one that has taken longer than that takes as long again: what it was thought to take says nothing any more
+        to_come = np.where(running < longer, longer - running, running)
         computing = max(float(to_come.sum() / self._cores(measured, running, now)), float(to_come.max()))
-        return max(computing + written, all_), error
+        return max(computing + written, all_)
 
     def _cores(self, measured: Any, running: Any, now: float) -> float:
         """How many blocks are worked on at once."""

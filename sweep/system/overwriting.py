@@ -14,7 +14,7 @@ from sweep.system.errors import SweepError
 EXPORTED = "exported by foliot"
 """In every table or Dataset that is exported."""
 DRAWN = "foliot"
-"""What made a picture, as its metadata say."""
+"""What made a picture, as its metadata say: a script or a program with foliot; commands have names of their own."""
 PAGE = '<meta name="generator" content="foliot">'
 LAWS = "y,x,law,"
 
@@ -24,14 +24,14 @@ MARKS = {
     ".nc": ("\x89HDF", EXPORTED),
     "laws": (LAWS, ""),
     "page": ("<!DOCTYPE html>", PAGE),
-    ".png": ("\x89PNG", f"Software\0{DRAWN}"),
-    ".svg": ("<?xml", f"<dc:title>{DRAWN}</dc:title>"),
-    ".pdf": ("%PDF", f"/Creator ({DRAWN})"),
+    ".png": ("\x89PNG", "Software\0{by}"),
+    ".svg": ("<?xml", "<dc:title>{by}</dc:title>"),
+    ".pdf": ("%PDF", "/Creator ({by})"),
 }
-"""Kinds of file: their first characters, and what stands somewhere behind them."""
+"""Kinds of file: their first characters, and what stands somewhere behind them; of a picture, what drew it."""
 
 
-def check_target(target: Path, kind: str, *, force: bool = False, read: Sequence[Path] = ()) -> None:
+def check_target(target: Path, kind: str, *, force: bool = False, read: Sequence[Path] = (), by: str = DRAWN) -> None:
     """Raises SweepError where a file of some kind is not to be written to `target`.
 
     Parameters
@@ -42,15 +42,17 @@ def check_target(target: Path, kind: str, *, force: bool = False, read: Sequence
         Whatever is there may be overwritten,
     read : paths
         but for these.
+    by : str
+        What draws a picture: those of others are not overwritten.
     """
     if any(_same(target, one) for one in read):
         raise SweepError(f"{target} is what is read; name another file")
     known = kind in MARKS or kind == ".zarr"
-    if force or not known or not target.exists() or _earlier(target, kind):
+    if force or not known or not target.exists() or _earlier(target, kind, by):
         return
     raise SweepError(
         f"{target} is there already, and not from an earlier command of this kind; "
-        "name another file, or overwrite it with --force (Python: force=True)"
+        "move it, name another file, or overwrite it with --force (Python: force=True)"
     )
 
 
@@ -61,10 +63,11 @@ def _same(one: Path, other: Path) -> bool:
         return one.resolve() == other.resolve()
 
 
-def _earlier(target: Path, kind: str) -> bool:
+def _earlier(target: Path, kind: str, by: str) -> bool:
     if kind == ".zarr":
         return target.is_dir() and _holds(target / "zarr.json", ("{", EXPORTED))
-    return _holds(target, MARKS[kind])
+    begin, words = MARKS[kind]
+    return _holds(target, (begin, words.format(by=by)))
 
 
 def _holds(path: Path, mark: tuple[str, str]) -> bool:

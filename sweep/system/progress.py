@@ -25,10 +25,8 @@ LINE_SECONDS = 30.0
 LINE_SHARE = 0.05
 REDRAW_SECONDS = 0.1
 LOG_SECONDS = 60.0
-WIDE = 2.0
-"""A time left is told as an interval where its end is so many times its beginning."""
-AGREE = 1.5
-"""Speeds so far and to come are both told where one is so many times the other."""
+SHORTEST_LEFT = 0.1
+"""Seconds that a run has left at least while cells remain, so that no line says 0."""
 
 
 class Progress:
@@ -93,9 +91,12 @@ class Progress:
     @property
     def left(self) -> float | None:
         """Seconds that are left, rather too many; None where nothing is known yet."""
+        cells = self.total - self.done
         if self._forecast is not None:
-            return self._forecast.left
-        return self.seconds * (self.total - self.done) / self.computed if self.computed else None
+            left = self._forecast.left
+        else:
+            left = self.seconds * cells / self.computed if self.computed else None
+        return max(left, SHORTEST_LEFT) if left is not None and cells else left
 
     def tick(self) -> None:
         """Says something if it is time to."""
@@ -134,12 +135,7 @@ class Progress:
     def line(self) -> str:
         """What is told now: `12,300/1,000,000 cells (1.2 %), 5,100 cells/s, 3 min left`."""
         left = self.left
-        return self._counts() + ("" if left is None else f", {self._speed(left)}, {self._time_left(left)} left")
-
-    def _time_left(self, left: float) -> str:
-        """`12 min 05 s`; or, where little can be said, `9 to 20 min`."""
-        low, high = (left, left) if self._forecast is None else self._forecast.interval or (left, left)
-        return duration(left) if high <= WIDE * low else span(low, high)
+        return self._counts() + ("" if left is None else f", {speed(self.rate)}, {duration(left)} left")
 
     def _fields(self) -> dict[str, Any]:
         left = self.left
@@ -155,13 +151,6 @@ class Progress:
         if self._clock() - self._logged >= LOG_SECONDS:
             self._logged = self._clock()
             log(line(), "progress", **self._fields())
-
-    def _speed(self, left: float) -> str:
-        """Cells per second; where the cells to come are dearer or cheaper, also theirs, so that it tells the same."""
-        to_come = (self.total - self.done) / max(left, 1e-9)
-        if self.done == self.total or 1 / AGREE < to_come / max(self.rate, 1e-9) < AGREE:
-            return speed(self.rate)
-        return f"{speed(self.rate)} so far, {speed(to_come).removesuffix(' cells/s')} to come"
 
     def _counts(self) -> str:
         share = 100 * self.done / self.total if self.total else 100.0
@@ -234,14 +223,6 @@ def duration(seconds: float) -> str:
     if whole < 86400:
         return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
     return f"{whole // 86400} d {whole % 86400 // 3600} h"
-
-
-def span(low: float, high: float) -> str:
-    """Both in one unit, by the larger: `0 to 9 s`, `12 to 20 min`, `3 to 7 h`."""
-    unit, size = next(
-        (u, s) for u, s in (("d", 86400), ("h", 3600), ("min", 60), ("s", 1)) if high >= 1.5 * s or s == 1
-    )
-    return f"{low / size:.0f} to {max(high / size, 1):.0f} {unit}"
 
 
 def seconds_of(name: str, text: float | str) -> float:

@@ -400,8 +400,8 @@ def test_an_exported_column_is_an_axis_of_the_next_study(done, call):
 
 def test_plot_writes_a_picture(done, call):
     code, out, err = call("plot", "stones.h5", "--y", "fall_time", "--x", "height", "--at", "v0=1")
-    assert (code, out, err) == (0, "stones.png\n", "")
-    assert Path("stones.png").read_bytes().startswith(b"\x89PNG")
+    assert (code, out, err) == (0, "stones_plot.png\n", "")
+    assert Path("stones_plot.png").read_bytes().startswith(b"\x89PNG")
 
 
 # mistakes and faults

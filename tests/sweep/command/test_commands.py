@@ -12,7 +12,7 @@ from sweep import cli
 from sweep.command import exploring, files, laws, looking, running, writing
 from sweep.system.errors import SweepError
 
-PLAIN = {"command", "study", "result", "other", "folder", "name"}
+PLAIN = {"command", "by", "study", "result", "other", "folder", "name"}
 DEFAULTS = {
     "kernels": {"allow_import": False},
     "studies": {},

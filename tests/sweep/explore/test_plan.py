@@ -116,6 +116,20 @@ def test_a_plan_tells_what_auto_would_choose_and_what_becomes_of_cells():
     assert found.statuses["BAD_INPUT"] == pytest.approx(0.1, abs=0.05)
 
 
+@pytest.mark.parametrize("isolate", [False, True])
+@pytest.mark.parametrize("end", [0, -1])
+def test_the_ends_of_axes_are_in_the_sample_whose_size_is_told(tmp_path, end, isolate):
+    """One cell at the end of a long axis is refused, and by another method than the others: the plan says so."""
+    heights, speeds = np.linspace(1.0, 9.0, 5000), np.linspace(0.0, 0.1, 5)
+    heights[end] = -1.0
+    for axes in ({"height": heights}, {"v0": speeds, "height": heights}):
+        found = plan(stone(axes=axes, rtol=0.5), path=tmp_path / "out.h5", isolate=isolate)
+        assert 0 < found.statuses["BAD_INPUT"] < 0.3
+        assert found.methods.keys() == {"none", "rough"}
+        assert f"of a sample of {found.sampled:,} cells" in str(found)
+        assert " 0 %" not in str(found)
+
+
 def test_a_plan_reads_well():
     text = str(plan(stone(), workers=2))
     assert text.startswith(

@@ -33,28 +33,17 @@ def test_what_is_left_by_hand():
     told.forecast.begin(0)
     told.now = 2.0
     assert told.forecast.left is None
-    assert told.forecast.interval is None
     told.forecast.end(0)
     told.forecast.begin(1)
     told.now = 3.0
     assert told.forecast.left == pytest.approx(1.5 + 2.5 + 2.5)
-    assert told.forecast.interval == pytest.approx((0.0, 6.5 / 1.25 * 2.5))
     told.forecast.ending = lambda: (1.0, 7.0)
     assert told.forecast.left == pytest.approx(7.5)
     told.forecast.ending = lambda: (1.0, 8.0)
     assert told.forecast.left == 8.0
     assert told.forecast.blocks == 3
-    told.now = 7.0  # the block at work is late; it takes no less than nothing
-    assert told.forecast.left == pytest.approx(max(5.0 * 7 / 7 + 1.0, 8.0))
-
-
-def test_an_interval_is_three_standard_errors_to_either_side_of_what_is_likely():
-    told = Told([1.0])
-    told.forecast._told = lambda: (11.0, 0.2)
-    assert told.forecast.interval == pytest.approx((4.0, 16.0))
-    told.forecast._told = lambda: (12.0, 0.4)
-    assert told.forecast.interval == pytest.approx((0.0, 22.0))
-    assert told.forecast.left == 12.0
+    told.now = 7.0  # the block at work is late; it takes as long again
+    assert told.forecast.left == pytest.approx(5.0 + 2.5 + 2.5 + 1.0)
 
 
 def test_when_all_is_computed_only_the_disk_is_waited_for():
@@ -62,7 +51,7 @@ def test_when_all_is_computed_only_the_disk_is_waited_for():
     list(told.forecast.order())
     told.done(1.0, 1.0)
     told.forecast.ending = lambda: (3.0, 9.0)
-    assert told.forecast._told() == (3.0, 0.0)
+    assert told.forecast.left == 3.0
 
 
 def test_cores_are_what_is_done_over_what_has_passed():

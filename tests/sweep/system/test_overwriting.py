@@ -1,6 +1,8 @@
 """What is overwritten without a word, what by force, and what never."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -45,7 +47,7 @@ def test_what_a_command_has_written_it_writes_again(here, name, capsys):
 def test_what_is_foreign_is_overwritten_by_force_alone(here, name, capsys):
     (here / name).write_text("# notes of a whole year\n1.0\n")
     assert cli.main(list(KINDS[name])) == 2
-    assert "name another file, or overwrite it with --force" in capsys.readouterr().err
+    assert "--force" in capsys.readouterr().err
     assert (here / name).read_text() == "# notes of a whole year\n1.0\n"
     assert cli.main([*KINDS[name], "--force"]) == 0
     assert cli.main(list(KINDS[name])) == 0
@@ -150,3 +152,36 @@ def test_refine_says_before_it_computes_that_another_result_is_there(here, capsy
         assert "r.h5: holds another result" in capsys.readouterr().err
     assert cli.main([*argv, "--force"]) == 0
     assert cli.main(argv) == 0  # the same again
+
+
+def test_no_figure_is_overwritten_by_another_program(here, capsys):
+    """Of three commands and a program that imports the package."""
+    fit = ("fit", "r.h5", "--y", "fall_time", "--x", "height", "--compare", "-o")
+    for kind in (".png", ".svg", ".pdf"):
+        commands = [(*KINDS["a.png"][:-1], f"a{kind}"), (*KINDS["chart.png"][:-1], f"b{kind}"), (*fit, f"c{kind}")]
+        for command in commands:
+            assert cli.main(list(command)) == 0, capsys.readouterr().err
+        sweep.plot(sweep.open_result("r.h5"), f"d{kind}")
+        for command in commands:
+            for other in (f"{letter}{kind}" for letter in "abcd" if f"{letter}{kind}" != command[-1]):
+                before = Path(other).read_bytes()
+                assert cli.main([*command[:-1], other]) == 2
+                assert Path(other).read_bytes() == before
+
+
+def test_a_plot_and_the_figure_of_the_studys_script_stand_beside_each_other(here, capsys):
+    """The script leaves a picture alone that it has not drawn, and replaces its own."""
+    studies = Path(sweep.__file__).parents[1] / "studies"
+    sweep.run(studies / "foliot_scaling.toml", "foliot_scaling.h5", progress=False).close()
+    script = [sys.executable, str(studies / "foliot_scaling.py"), "foliot_scaling.h5"]
+    assert cli.main(["plot", "foliot_scaling.h5"]) == 0
+    plotted = Path(capsys.readouterr().out.strip())
+    before = plotted.read_bytes()
+    for _ in range(2):
+        assert subprocess.run(script, capture_output=True).returncode == 0
+    assert plotted.read_bytes() == before
+    assert cli.main(["plot", "foliot_scaling.h5", "-o", "foliot_scaling.png"]) == 2
+    assert cli.main(["plot", "foliot_scaling.h5", "-o", "foliot_scaling.png", "--force"]) == 0
+    refused = subprocess.run(script, capture_output=True, text=True)
+    assert refused.returncode == 2
+    assert "foliot_scaling.png" in refused.stderr

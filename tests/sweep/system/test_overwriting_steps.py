@@ -35,10 +35,6 @@ def test_a_file_is_ours_by_its_beginning_and_by_words_in_it(target, kind):
     assert refused(target, kind) == ""
     target.write_bytes(OURS[kind])
     assert refused(target, kind) == ""
-    told = (
-        f"{target} is there already, and not from an earlier command of this kind; name another file, or overwrite "
-        "it with --force (Python: force=True)"
-    )
     for other in (
         b"x" + OURS[kind],
         OURS[kind].replace(b"foliot", b"others").replace(b"law", b"lax"),
@@ -46,7 +42,7 @@ def test_a_file_is_ours_by_its_beginning_and_by_words_in_it(target, kind):
         OURS[kind][:2],
     ):
         target.write_bytes(other)
-        assert refused(target, kind) == told
+        assert refused(target, kind).startswith(f"{target} is there already")
         assert refused(target, kind, force=True) == ""
         assert refused(target, "other kind") == ""
 
