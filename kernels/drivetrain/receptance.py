@@ -107,7 +107,7 @@ def check(p):
 PARAMETERS = (
     Field("J", "kg m^2", "inertias, from the free end on", lower=0.0, open_lower=True, dims=("mass",)),
     Field(
-        "k", "N m/rad", "springs behind each inertia; only the last one, to ground, may be 0", lower=0.0, dims=("mass",),
+        "k", "N m/rad", "springs behind each inertia; only the last, to ground, may be 0", lower=0.0, dims=("mass",),
     ),
     Field("h", "N m s/rad", "dampers beside the springs", lower=0.0, dims=("mass",)),
     Field("drive_mass", "1", "number of the inertia with the torque", 1.0, lower=1.0, upper=64.0, integer=True),
