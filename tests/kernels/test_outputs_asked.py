@@ -9,11 +9,12 @@ from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.jit import COMPILED
 
-CELLS = 24
+CELLS = 12
 
 
 def _run(kernel, outputs, rtol):
-    columns = {name: values[:CELLS] for name, values in inputs(kernel).items()}
+    refused = set.intersection(*(set(method.excludes) for method in kernel.methods))
+    columns = {name: values[:CELLS] for name, values in inputs(kernel).items() if name not in refused}
     for field in kernel.parameters:
         if field.choices:
             words = {float(number): word for word, number in field.choices.items()}
@@ -30,9 +31,8 @@ def _rank(status):
 
 
 @pytest.mark.skipif(not COMPILED, reason="through the engine")
-@pytest.mark.parametrize("rtol", [1e-9, 1e-13])
 @pytest.mark.parametrize("name", sorted(catalogue.KERNELS))
-def test_an_output_asked_for_alone_is_never_worse_off_than_with_others(name, rtol):
+def test_an_output_asked_for_alone_is_never_worse_off_than_with_others(name, rtol=1e-13):
     kernel = catalogue.get(name)
     names = [field.name for field in kernel.outputs]
     together = _run(kernel, names, rtol)

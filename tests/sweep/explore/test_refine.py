@@ -170,7 +170,7 @@ def test_a_refinement_that_was_stopped_takes_up_its_rounds(tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     ds = sweep.run(foliot(mu=(1e-2, 1e3, 6)))
     stored = sweep.runs.run.store_cells
-    monkeypatch.setattr("sweep.runs.run.store_cells", lambda *given: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr("sweep.runs.run.store_cells", lambda *given, **named: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         sweep.refine(ds, "period", 1e-2, path="fine.h5")
     before = {p: p.stat().st_mtime_ns for p in (tmp_path / "fine.h5.rounds").iterdir()}
