@@ -8,7 +8,9 @@ where it bends (`metric`), so that cells are joined along what it does not depen
 
 from __future__ import annotations
 
+import json
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -17,7 +19,17 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from sweep.analysis.mesh import Array, Indices, tilted
+from kernels.interface import FIRST_REFUSAL, Status
+from sweep.analysis.mesh import (
+    Array,
+    Indices,
+    are_too_few,
+    interpolation_errors,
+    parabolas,
+    simplices,
+    tilted,
+    with_beyond,
+)
 from sweep.analysis.metric import stretch
 from sweep.system.errors import SweepError
 from sweep.system.expected import require_dataset
@@ -28,7 +40,9 @@ OUTSIDE = 1e-9
 """How far out of a simplex a point may be by rounding."""
 FEWEST_ON_A_LINE = 5
 MOST_AXES = 5
-STATUS = "status"
+STATUS, ERROR_BOUND = "status", "error_bound"
+REFINED_TO = "refined_to"
+"""Attribute of a refined result: JSON, the tolerance of each output that was refined."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +129,9 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     -------
     Dataset
         Outputs of one value a cell, and the status of the nearest cell around, over the axes in the order of `at`. NaN
-        outside of the cells, and beside cells without a value.
+        outside of the cells, and beside cells without a value. INACCURATE, with `error_bound`, where straight lines
+        miss the tolerance of the refinement as far as the cells around tell, and across borders of statuses, where
+        nothing tells how far they are off.
 
     Raises
     ------
@@ -144,11 +160,23 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     points, places = box.points({n: dataset[n].values for n in names}), box.points(mesh)
     nearest = _nearest(points, places)
     found = xr.Dataset(coords={name: (name, values, dataset[name].attrs) for name, values in grids.items()})
+    status, error = dataset[STATUS].values, np.zeros(len(places))
+    refined, inaccurate = json.loads(dataset.attrs.get(REFINED_TO, "{}")), np.zeros(len(places), bool)
     for name, variable in dataset.data_vars.items():
-        if variable.dims == dataset[STATUS].dims and variable.dtype.kind == "f":
-            values = np.where(np.isnan(variable.values[nearest]), np.nan, _between(variable.values, points, places))
+        if variable.dims == dataset[STATUS].dims and variable.dtype.kind == "f" and name != ERROR_BOUND:
+            between, off = _between(variable.values, points, places, status)
+            values = np.where(np.isnan(variable.values[nearest]), np.nan, between)
             found[name] = (tuple(grids), values.reshape(shape), variable.attrs)
-    found[STATUS] = (tuple(grids), dataset[STATUS].values[nearest].reshape(shape), dataset[STATUS].attrs)
+            if name in refined or not refined:
+                error = np.maximum(error, off)
+                inaccurate |= ~(off <= refined.get(name, sys.float_info.max))
+    inaccurate |= status[nearest] == Status.INACCURATE
+    inaccurate &= status[nearest] < FIRST_REFUSAL
+    told = np.where(inaccurate, np.int8(Status.INACCURATE), status[nearest])
+    found[STATUS] = (tuple(grids), told.reshape(shape), dataset[STATUS].attrs)
+    if ERROR_BOUND in dataset:
+        bound = np.where(inaccurate, np.fmax(error, dataset[ERROR_BOUND].values[nearest]), np.nan)
+        found[ERROR_BOUND] = (tuple(grids), bound.reshape(shape), dataset[ERROR_BOUND].attrs)
     return found.assign_attrs(dataset.attrs)
 
 
@@ -159,13 +187,40 @@ def _nearest(points: Array, places: Array) -> Indices:
     return found
 
 
-def _between(values: Array, points: Array, places: Array) -> Array:
+def kinds(status: Indices, valued: NDArray[np.bool_]) -> Indices:
+    """Statuses, with those that rounding decides alike; -1 without a value."""
+    kind = np.where(status == Status.INACCURATE, int(Status.OK), status.astype(np.intp))
+    return np.where((status < FIRST_REFUSAL) & valued, kind, -1)
+
+
+def _between(values: Array, points: Array, places: Array, status: Indices) -> tuple[Array, Array]:
+    """An output's values at places, and how far they are off."""
     height = heights(values)
     stretched = stretch(points, height)
     corners, shares = located(points @ stretched, places @ stretched)
     # a corner that takes no part need have no value
     total: Array = np.where(shares == 0, 0.0, shares * height[corners]).sum(axis=1)
-    return np.exp(total) if is_positive(values) else total * _size(values)
+    between = np.exp(total) if is_positive(values) else total * _size(values)
+    off = _errors(points @ stretched, height, kinds(status, np.isfinite(values)), np.sort(corners, axis=1))
+    return between, np.where(shares.max(axis=1) == 1, 0.0, off)
+
+
+def _errors(points: Array, height: Array, kind: Indices, corners: Indices) -> Array:
+    """How far straight lines are off in simplices (m, axes + 1), as the cells around tell; inf across borders."""
+    mesh, found = simplices(points), np.full(len(corners), np.inf)
+    for number in np.unique(kind[kind >= 0]):
+        members = np.flatnonzero(kind == number)
+        own = np.searchsorted(members, mesh[(kind[mesh] == number).all(axis=1)])
+        here = np.flatnonzero((kind[corners] == number).all(axis=1))
+        if len(own) and len(here) and not are_too_few(points[members]):
+            rows = np.concatenate([own, np.searchsorted(members, corners[here])])
+            _, names = np.unique(rows, axis=0, return_inverse=True)
+            asked = np.isin(names[: len(own)], names[len(own) :])
+            bends = parabolas(points[members], height[members], with_beyond(own)[asked])
+            size = np.full(names.max() + 1, np.inf)
+            size[names[: len(own)][asked]] = interpolation_errors(points[members], own[asked], bends)[0]
+            found[here] = size[names[len(own) :]]
+    return found
 
 
 def located(points: Array, at: Array) -> tuple[Indices, Array]:

@@ -156,15 +156,15 @@ class _Output:
         with run(further, self.rounds / f"{name}.h5", **self.options) as found:
             return found.load()
 
-    def written(self, axes: dict[str, Axis], arrays: dict[str, Any]) -> xr.Dataset:
-        """All cells, with these values of the axes, outputs and statuses."""
+    def written(self, axes: dict[str, Axis], arrays: dict[str, Any], attrs: dict[str, str]) -> xr.Dataset:
+        """All cells, with these values of the axes, outputs and statuses, and further attributes."""
         from sweep.results.open import in_memory
         from sweep.runs.run import store_cells
 
         whole = dataclasses.replace(self._study(axes), design="product" if len(axes) == 1 else "zip")
         if self.path is None:
-            return in_memory(cell_schema(whole, {}), arrays)
-        return store_cells(whole, self.path, arrays, self.force)
+            return in_memory(cell_schema(whole, {}), arrays).assign_attrs(attrs)
+        return store_cells(whole, self.path, arrays, self.force, attrs=attrs)
 
     def _study(self, axes: dict[str, Axis]) -> Study:
         return dataclasses.replace(self.study, design="zip", blocks=(), axes=axes, title=self.title)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,9 +10,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from kernels.interface import FIRST_REFUSAL, Status
 from sweep.analysis.mesh import Array, Indices
-from sweep.analysis.scattered import Box, heights
+from sweep.analysis.scattered import REFINED_TO, Box, heights, kinds
 from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.explore.judge import Judge, Judged
 from sweep.study.model import Axis, Study, frozen
@@ -84,8 +84,8 @@ class Output(Protocol):
     def solved(self, axes: dict[str, Axis]) -> xr.Dataset:
         """Cells with these values."""
 
-    def written(self, axes: dict[str, Axis], arrays: dict[str, Any]) -> xr.Dataset:
-        """All cells, with these values of the axes, outputs and statuses."""
+    def written(self, axes: dict[str, Axis], arrays: dict[str, Any], attrs: dict[str, str]) -> xr.Dataset:
+        """All cells, with these values of the axes, outputs and statuses, and further attributes."""
 
 
 class Refiner:
@@ -139,11 +139,8 @@ class Refiner:
         return Judged(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
 
     def _kinds(self) -> Indices:
-        """Statuses, with those that rounding decides alike; -1 without a value."""
-        status = self._column(STATUS).astype(np.intp)
         finite = np.isfinite(np.stack([self._column(name) for name in self.names])).all(axis=0)
-        kind = np.where(status == Status.INACCURATE, int(Status.OK), status)
-        return np.where((status < FIRST_REFUSAL) & finite, kind, -1)
+        return kinds(self._column(STATUS), finite)
 
     def _column(self, name: str) -> Any:
         return np.concatenate([part[name].values for part in self.parts])
@@ -181,9 +178,10 @@ class Refiner:
         }
         arrays = {name: self._column(name)[order] for name in (*self.output.study.outputs, *ANCILLARY)}
         left = found.valued & found.finest & (found.size > self.tolerance)
+        told = {REFINED_TO: json.dumps(dict.fromkeys(self.names, self.tolerance))}
         finest = [np.diff(np.unique(t)) for t in self.points.T]
         return Refinement(
-            dataset=self.output.written(axes, arrays),
+            dataset=self.output.written(axes, arrays, told),
             added=len(self.points) - self.first,
             uniform=int(math.prod(round(1 / step[step > SAME].min()) + 1 for step in finest)),
             error=float(found.size[found.valued & ~left].max(initial=0.0)),

@@ -104,6 +104,11 @@ class Reused:
         }
         self._positions = [_positions(old.axes[name], axis) for name, axis in study.axes.items()]
 
+    @property
+    def attrs(self) -> dict[str, str]:
+        """Further attributes of what is extended."""
+        return {TAKEN_OVER: self.taken_over} if self.taken_over else {}
+
     def __enter__(self) -> Reused:
         return self
 
@@ -250,12 +255,12 @@ class Precomputed:
     Parameters
     ----------
     arrays : mapping of outputs and of `schema.ANCILLARY` to ndarray, shape (cells, ...)
-    taken_over : str
-        Which program has computed them, where it was another.
+    attrs : mapping
+        Further attributes of the file.
     """
 
-    def __init__(self, arrays: Mapping[str, Any], taken_over: str = "") -> None:
-        self._arrays, self.taken_over = arrays, taken_over
+    def __init__(self, arrays: Mapping[str, Any], attrs: Mapping[str, str]) -> None:
+        self._arrays, self.attrs = arrays, attrs
 
     def known_before(self, cells: Any) -> Any:
         return cells

@@ -17,7 +17,7 @@ from sweep.cells.sample import require_asked
 from sweep.results.open import in_memory, memory, open_result, open_unfinished
 from sweep.runs import resume
 from sweep.runs.elsewhere import compute_elsewhere, joined, threads
-from sweep.runs.extend import Precomputed
+from sweep.runs.extend import TAKEN_OVER, Precomputed
 from sweep.runs.isolate import limits_of
 from sweep.runs.session import Session, Solve
 from sweep.runs.task import END, HERE, WAIT, Task
@@ -160,6 +160,7 @@ def store_cells(
     force: bool = False,
     mark: Mapping[str, str] | None = None,
     taken_over: str = "",
+    attrs: Mapping[str, str] | None = None,
 ) -> xr.Dataset:
     """Writes the result of cells that are solved already, a file like that of `run`.
 
@@ -170,6 +171,8 @@ def store_cells(
         Its fingerprint, where that is not the one of the study and of this program.
     taken_over : str
         Which program has computed the cells, where it was another.
+    attrs : mapping, optional
+        Further attributes of the file.
 
     Raises
     ------
@@ -178,7 +181,7 @@ def store_cells(
     """
     block = max(1, min(row_blocks(study).count, STORED_AT_ONCE))
     task = Task(study, dict(mark or fingerprint(study)), _checked(path), Cores(1), force=force, block_cells=block)
-    _complete(task, Precomputed(arrays, taken_over))
+    _complete(task, Precomputed(arrays, {**(attrs or {}), **({TAKEN_OVER: taken_over} if taken_over else {})}))
     return open_result(task.output)
 
 

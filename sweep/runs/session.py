@@ -30,7 +30,7 @@ from sweep.cells.partition import Partition, boxes, row_blocks
 from sweep.cells.schema import Schema
 from sweep.cells.solve import Solver
 from sweep.cells.timing import UNSAMPLED, Sample, row_partition
-from sweep.runs.extend import TAKEN_OVER, Precomputed, Reused
+from sweep.runs.extend import Precomputed, Reused
 from sweep.runs.isolate import Processes
 from sweep.runs.task import Task
 from sweep.system.forecast import Forecast
@@ -85,8 +85,8 @@ class Session:
         study = task.study
         self.task, self.study, self.reused = task, study, reused
         self.began = now()
-        schema, taken = output_schema(study, task.fingerprint), reused.taken_over if reused else ""
-        self.schema: Schema = replace(schema, attrs={**schema.attrs, **({TAKEN_OVER: taken} if taken else {})})
+        schema = output_schema(study, task.fingerprint)
+        self.schema: Schema = replace(schema, attrs={**schema.attrs, **(reused.attrs if reused else {})})
         self.tick: Callable[[], None] = lambda: None
         self.bad: list[BadCell] = []
         self._told, self._cores = 0, task.workers

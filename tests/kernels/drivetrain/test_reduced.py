@@ -7,6 +7,7 @@ from columns import checked, printed_both_ways, relative_error, solve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import sweep
 from kernels.drivetrain.reduced import DRIVETRAIN, ORDERS, REDUCTIONS
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
@@ -365,6 +366,7 @@ PLAIN = """
 import sys
 sys.path += ["tests/oracles", "tests/helpers"]
 from columns import solve
+import sweep
 from kernels.drivetrain.reduced import DRIVETRAIN
 J, k, h = [[1.0, 0.2, 0.05, 3.0]], [[40.0, 90.0, 30.0, 20.0]], [[0.1, 0.05, 0.02, 0.3]]
 for code in range(7):
@@ -377,3 +379,35 @@ for code in range(7):
 def test_plain_python_gives_the_bits_of_compiled_code():
     compiled, plain = printed_both_ways(PLAIN)
     assert compiled == plain != ""
+
+
+LIGHT = {
+    "J": np.array([0.017343, 3.4028, 11.26, 0.027926]),
+    "k": np.array([45.494, 0.017566, 0.036006, 3.7284]),
+    "h": np.array([1.78e-6, 6.9e-10, 1.4e-9, 1.46e-7]),
+}
+"""Damped by 1e-9 of critical."""
+
+
+@pytest.mark.skipif(not COMPILED, reason="through the engine")
+@pytest.mark.parametrize("reduction", ["rivin", *BASES, "exact"])
+def test_a_lightly_damped_chain_is_accurate_in_what_is_asked_for(reduction):
+    def run(*outputs):
+        fixed = {**LIGHT, "reduction": reduction, "n_keep": 2, "f_max": 1.0}
+        return sweep.run(
+            kernel="drivetrain", fixed=fixed, outputs=outputs, axes={"rtol": [1e-12]}, progress=False
+        ).isel(rtol=0)
+
+    if reduction == "exact":
+        model = oracles.full(*LIGHT.values())
+    elif reduction == "rivin":
+        model = oracles.full(*oracles.rivin(*LIGHT.values(), oracles.strict_steps(*LIGHT.values(), 2)))
+    else:
+        model = oracles.Reduced(reduction, *LIGHT.values(), 2, oracles.masters(*LIGHT.values(), 2))
+    for name, truth in {"frequency": model.frequencies(), "damping": oracles.dampings(model.poles())}.items():
+        alone = run(name)
+        assert alone.status == Status.OK, name
+        assert relative_error(alone[name].values[: len(truth)], truth).max() < 1e-12, name
+    asked = run("frf_error", "frequency")
+    assert asked.status == Status.INACCURATE
+    assert asked.error_bound < 1e-4  # known, if not to 1e-12

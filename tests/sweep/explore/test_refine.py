@@ -11,6 +11,7 @@ from scipy.interpolate import LinearNDInterpolator
 from toy import KERNEL as TOY
 
 import sweep
+from kernels.interface import Status
 from sweep.analysis.metric import stretch
 from sweep.analysis.scattered import located
 from sweep.cli import main
@@ -167,7 +168,7 @@ def test_a_refinement_that_was_stopped_takes_up_its_rounds(tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     ds = sweep.run(foliot(mu=(1e-2, 1e3, 6)))
     stored = sweep.runs.run.store_cells
-    monkeypatch.setattr("sweep.runs.run.store_cells", lambda *given: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr("sweep.runs.run.store_cells", lambda *given, **named: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         sweep.refine(ds, "period", 1e-2, path="fine.h5")
     before = {p: p.stat().st_mtime_ns for p in (tmp_path / "fine.h5.rounds").iterdir()}
@@ -344,3 +345,21 @@ def test_the_error_told_holds_the_truth(tmp_path):
     command = [sys.executable, str(script), "--no-adaptive", "--functions", "20", "--axes", "1", "2"]
     found = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert found.returncode == 0, found.stdout + found.stderr
+
+
+def test_where_a_refined_output_diverges_what_is_read_between_cells_is_marked(tmp_path):
+    """No cycle beyond a border in k, towards which the sensitivity grows as the inverse root of the distance."""
+    keys = {"kernel": "foliot", "outputs": ["sensitivity"], "fixed": {"mu": 1.0, "phi0": 1.0, "R": 0.2}}
+    ds = sweep.run(**keys, axes={"a": np.linspace(0.1, 2.0, 5), "k": np.linspace(0.1, 3.0, 5)})
+    found = sweep.refine(ds, "sensitivity", 5e-2, path=tmp_path / "refined.h5")
+    at = {"a": np.append(np.linspace(0.1, 2.0, 40), 0.76169), "k": np.append(np.linspace(0.1, 3.0, 40), 1.83571)}
+    with sweep.open_result(tmp_path / "refined.h5") as refined:
+        between, truth = sweep.interpolated(refined, at), sweep.run(**keys, axes=at)
+    off = abs(between.sensitivity / truth.sensitivity - 1).values
+    marked = (between.status == Status.INACCURATE).values
+    valued = np.isfinite(between.sensitivity.values)
+    assert found.singular > 0
+    assert marked[-1, -1]
+    assert (off[valued & ~marked] < 5e-2).all()  # where there is no truth it is NaN, which fails
+    assert (off <= between.error_bound.values)[marked & np.isfinite(off)].all()
+    assert marked.sum() < 0.05 * marked.size

@@ -105,7 +105,12 @@ def test_cells_that_are_solved_already_are_stored_some_at_once(tmp_path, monkeyp
     arrays = {"fall_time": np.arange(5.0)}
     assert run.store_cells(tall(3), tmp_path / "x.h5", arrays, True, {"a": "1"}, "0.1") == tmp_path / "x.h5"
     task, known = asked[0]
-    assert (task.block_cells, task.fingerprint, task.force, known.taken_over) == (block, {"a": "1"}, True, "0.1")
+    assert (task.block_cells, task.fingerprint, task.force, known.attrs) == (
+        block,
+        {"a": "1"},
+        True,
+        {"taken_over": "0.1"},
+    )
     found = {"fall_time": np.zeros(2)}
     known.fill(3, 5, found)
     assert found["fall_time"].tolist() == [3.0, 4.0]
