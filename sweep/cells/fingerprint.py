@@ -149,10 +149,8 @@ def _sources(kernel_name: str, engine: Sequence[str]) -> dict[str, str]:
         if path is None:
             continue
         found[name], imported = _read(path, name, path.stat().st_mtime_ns)
-        names = [name, *imported]
-        # with a.b.c Python also runs a and a.b
-        parents = (n.rsplit(".", k)[0] for n in names for k in range(n.count(".") + 1))
-        waiting += [n for n in parents if n.partition(".")[0] in packages or _is_own(n.partition(".")[0])]
+        own = {package for package in imported if package in packages or _is_own(package)}
+        waiting += [n for package in own for n in imported[package] if n not in seen]
     for name in engine:
         path = _path(name)
         if path is not None:
@@ -170,10 +168,14 @@ def _is_own(package: str) -> bool:
 
 
 @lru_cache(maxsize=1000)
-def _read(path: Path, name: str, modified: int) -> tuple[str, tuple[str, ...]]:
-    """Digest of a source file, and what it imports; kept while the file's time of modification stays."""
-    text = path.read_bytes()
-    return hashlib.sha256(text).hexdigest(), tuple(_imported(text, name, path)) if path.suffix == ".py" else ()
+def _read(path: Path, name: str, modified: int) -> tuple[str, dict[str, list[str]]]:
+    """Digest of a source file, and what it imports by package; kept while the file's time of modification stays."""
+    text, found = path.read_bytes(), dict[str, list[str]]()
+    names = [name, *(_imported(text, name, path) if path.suffix == ".py" else ())]
+    # with a.b.c Python also runs a and a.b
+    for module in dict.fromkeys(n.rsplit(".", k)[0] for n in names for k in range(n.count(".") + 1)):
+        found.setdefault(module.partition(".")[0], []).append(module)
+    return hashlib.sha256(text).hexdigest(), found
 
 
 def _path(name: str) -> Path | None:

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from sweep.cells.guard import SolveCells
 
 POSITIONS = 64
-BUDGET = 0.03
-"""Seconds a sample may take, unless one call takes longer;"""
+BUDGET = 0.003, 0.03
+"""Seconds a sample may take in any run, unless one call takes longer; and in one that takes 100 times as long;"""
 SHARE = 0.005
 """or this share of the run, where that is more."""
 PROBE_SECONDS = 3e-4
@@ -34,6 +34,10 @@ MOST_FAILED = 16
 LANES = 32
 """Cells that a lane kernel solves at once: it takes as long for one of them."""
 BLOCK_SECONDS = (0.05, 1.0)
+CALLS = 100
+"""Times that a block's cells cost what a call does beside them: then calls take less than 2 % of a run,"""
+LEAST_BLOCKS = 8
+"""where so many blocks are left for each of several workers."""
 BLOCK_BYTES = 8 << 20
 MOST_BLOCKS = 100_000
 
@@ -42,7 +46,9 @@ MOST_BLOCKS = 100_000
 class Sample:
     """Timed probes: cell each starts at (ascending), its seconds per cell, and what the probed cells gave.
 
-    `lanes`: whether one cell takes as long as 32; None where that was not asked.
+    `lanes`: whether one cell takes as long as 32; None where that was not asked. `call`: what a call costs beside the
+    share of its cells, in seconds: what one cell alone takes beyond it. Where cells are solved in lanes, that is also
+    about what the last ones of a call wait for each other.
     """
 
     positions: Any
@@ -51,6 +57,7 @@ class Sample:
     status: Any
     method_used: Any
     lanes: bool | None = None
+    call: float = 0.0
 
     @property
     def cost(self) -> float:
@@ -69,7 +76,7 @@ UNSAMPLED = Sample(np.zeros(1), np.ones(1), 1, np.empty(0, np.int8), np.empty(0,
 
 
 Clock = Callable[[], float]
-FAILED_PROBE = BUDGET / 16
+FAILED_PROBE = max(BUDGET) / 16
 """Seconds that a probe counts for which fails."""
 
 
@@ -90,7 +97,8 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
     places = sorted(probes)
     costs = np.array([probes[place].seconds / cells for place in places])
     status, used = (np.concatenate([probes[place].arrays[name] for place in places]) for name in (STATUS, METHOD_USED))
-    return Sample(np.array(places), costs, cells, status, used, lanes)
+    call = max(0.0, probing.alone - float(np.min(costs)))
+    return Sample(np.array(places), costs, cells, status, used, lanes, call)
 
 
 def _probes(probing: _Probing, columns: Sequence[Column], size: int, cells: int) -> dict[int, Probe]:
@@ -99,7 +107,7 @@ def _probes(probing: _Probing, columns: Sequence[Column], size: int, cells: int)
     probes = dict(probing.dear.get(cells, {}))
     spent = sum(probe.seconds for probe in probes.values())
     for start in (_place(index, count, cells, size) for index in _scattered(count)):
-        if probes and spent > max(BUDGET, SHARE * spent / (len(probes) * cells) * size):
+        if probes and spent > _affordable(spent / (len(probes) * cells) * size):
             break
         probe = probing.probe(start, columns, cells)
         if probe is not None:
@@ -108,12 +116,21 @@ def _probes(probing: _Probing, columns: Sequence[Column], size: int, cells: int)
     return probes
 
 
+def _affordable(seconds: float) -> float:
+    """Seconds that the sample of a run of so many may take."""
+    least, most = BUDGET
+    return max(least, min(most, seconds / 100), SHARE * seconds)
+
+
 def partition(sample: Sample, size: int, cell_bytes: float, workers: int) -> Partition:
     """Blocks of about 1/200 of each worker's share, within bounds of time, bytes and number."""
     cost = max(sample.cost, 1e-12)
     shortest, longest = BLOCK_SECONDS
-    seconds = min(max(cost * size / (200 * workers), shortest), longest)
-    cells = min(seconds / cost, BLOCK_BYTES / cell_bytes, size)
+    seconds = max(cost * size / (200 * workers), shortest)
+    # by the cheapest probe: on a busy machine some take ten times as long as they should, and blocks would be short
+    worth_a_call = CALLS * sample.call / max(float(np.min(sample.costs)), 1e-12)
+    share = size / (1 if workers == 1 else LEAST_BLOCKS * workers)
+    cells = min(max(seconds / cost, min(worth_a_call, share)), longest / cost, BLOCK_BYTES / cell_bytes, size)
     if sample.lanes:
         cells = max(cells, min(LANES, math.ceil(size / workers)))
     elif sample.cells < LANES and sample.lanes is None:
@@ -139,7 +156,7 @@ def _probe_cells(probing: _Probing, columns: Sequence[Column], size: int) -> tup
         seconds = _probe(probing, columns, size, cells)
         more = LANES if cells == 1 else 4 * cells
         dear = seconds > PROBE_SECONDS
-        worth_a_look = cells == 1 and (seconds < BUDGET / 4 or more * 50 < size)
+        worth_a_look = cells == 1 and (seconds < max(BUDGET) / 4 or more * 50 < size)
         few = size < (4 if cells == 1 else POSITIONS) * more
         if cells == 1 and dear and (few or not worth_a_look) and size > 1:
             lanes = _probe(probing, columns, size, 2) < 1.5 * seconds
@@ -174,13 +191,15 @@ class _Probing:
     ----------
     dear : dict
         The last dear one of so many cells, by the cell that it begins with.
+    alone : float
+        The least that a probe of one cell took.
     fault : Exception
         Why the last one that failed did.
     """
 
     def __init__(self, solver: SolveCells, clock: Clock) -> None:
         self._solver, self._clock = solver, clock
-        self._good, self._failed = False, 0
+        self._good, self._failed, self.alone = False, 0, math.inf
         self.dear: dict[int, dict[int, Probe]] = {}
         self.fault: Exception = RuntimeError("no cell was tried")
 
@@ -192,6 +211,8 @@ class _Probing:
             self._solver.solve(start, cells_of(arrays))
             probe = Probe(self._clock() - begun, arrays)
             self._good = True
+            if cells == 1:
+                self.alone = min(self.alone, probe.seconds)
             if probe.seconds >= DEAR:
                 self.dear[cells] = {start: probe}
             return probe

@@ -25,6 +25,17 @@ def uneven(height, *rest):
     toy.exact(height, *rest)
 
 
+calls = []
+"""Cells of each call of `called`."""
+
+
+def called(height, *rest):
+    """As `toy.exact`; a call takes two milliseconds, however many cells it has."""
+    calls.append(len(height))
+    time.sleep(CELL_SECONDS)
+    toy.exact(height, *rest)
+
+
 def hungry(height, *rest):
     """As `toy.exact`, but 13 m is more than the memory."""
     if (height == 13).any():
@@ -51,4 +62,4 @@ DAYS = dataclasses.replace(
 )
 """Output in a unit that readers are tempted to turn into dates."""
 
-SLOW, UNEVEN, HUNGRY, LETHAL = map(kernel, (slow, uneven, hungry, lethal))
+SLOW, UNEVEN, CALLED, HUNGRY, LETHAL = map(kernel, (slow, uneven, called, hungry, lethal))

@@ -159,8 +159,10 @@ def test_where_the_middle_fails_eight_other_places_are_tried():
         (1e-9, 10**6, 1, 64),
         (1e-9, 400, 10, 10),
         (1e-9, 7, 1, 1),
-        (0.0101, 100, 1, 3),  # 0.03 s are over
-        (0.0099, 100, 1, 4),
+        (0.0101, 400, 1, 3),  # 0.03 s are over
+        (0.0099, 400, 1, 4),
+        (0.0101, 100, 1, 2),  # a hundredth of the run
+        (0.0011, 40, 1, 3),  # 0.003 s are over
     ],
 )
 def test_probes_end_with_the_budget_or_a_share_of_the_run(seconds, size, cells, number):

@@ -13,6 +13,7 @@ import time
 import h5py
 import numpy as np
 import pytest
+import slow
 import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -572,3 +573,13 @@ def test_nothing_is_solved_where_all_is_there_but_the_end(tmp_path, monkeypatch)
             quiet(study, output, block_cells=1)
     monkeypatch.setattr("sweep.cells.solve.Solver.solve", None)
     assert quiet(study, output).fall_time.shape == (3,)
+
+
+@pytest.mark.parametrize("name", [None, "fall.h5"])
+def test_cells_that_are_cheap_beside_a_call_are_solved_by_few_calls(tmp_path, name):
+    slow.calls.clear()
+    study = stone(kernel="slow:CALLED", axes={"height": np.linspace(1.0, 9.0, 32_000)})
+    with quiet(study, name and tmp_path / name, workers=1) as ds:
+        assert (ds.status == Status.OK).all()
+    assert len(slow.calls) < 40
+    assert max(slow.calls) > 1000
