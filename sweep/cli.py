@@ -32,8 +32,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if getattr(arguments, "notify", None):
         notify(arguments, ended)
     pool = sys.modules.get("sweep.system.pool")
-    if pool is not None and pool.left_behind():
-        # a kernel that never ends would keep Python from ending
+    if argv is None and pool is not None and pool.left_behind():
+        # a kernel that never ends would keep Python from ending; a program that calls this is not ours to end
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, AttributeError):
                 stream.flush()
