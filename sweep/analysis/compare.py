@@ -127,7 +127,7 @@ def _table(t: Array, z: Array, tried: list[Found], weights: Array | None) -> xr.
         "worse": [f.aicc - tried[0].aicc for f in tried],
         "numbers": [f.law.numbers for f in tried],
         "scatter": [math.sqrt(float(np.mean(f.off**2))) for f in tried],
-        "residual": [float(np.expm1(abs(f.off).max())) for f in tried],
+        "residual": [math.expm1(min(float(abs(f.off).max()), 700.0)) for f in tried],
         "runs": [_runs(f.off) for f in tried],
         "chi_squared": [math.nan if weights is None else _chance(f, weights) for f in tried],
         "formula": [f.law.formula for f in tried],

@@ -92,7 +92,7 @@ def test_outliers_count_less():
 
 
 def test_noise_that_is_loud_at_both_ends_is_in_the_bar_though_it_look_like_outliers():
-    """It held 79 % of these."""
+    """It held 75 % of these."""
     rng, t = np.random.default_rng(12), axis(61)
     noise = 0.02 * 25 ** abs(np.linspace(-1.0, 1.0, t.size)) * rng.standard_normal((150, t.size))
     found = sweep.fit_exponent(curve(t, -0.5 * t + noise), "mu")
