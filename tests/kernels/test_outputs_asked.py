@@ -9,7 +9,7 @@ from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.jit import COMPILED
 
-CELLS = 12
+CELLS, RTOL = 12, 1e-13
 
 
 RTOL = 1e-13
