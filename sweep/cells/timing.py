@@ -34,8 +34,9 @@ MOST_FAILED = 16
 LANES = 32
 """Cells that a lane kernel solves at once: it takes as long for one of them."""
 BLOCK_SECONDS = (0.05, 1.0)
-CALLS = 100
-"""Times that a block's cells cost what a call does beside them: then calls take less than 2 % of a run,"""
+CALLS = 400
+"""Times that a block's cells cost what a call does beside them, by probes of few cells; of many, which cost less each
+and wait less for the last ones, it is enough for calls to take less than 2 % of a run,"""
 LEAST_BLOCKS = 8
 """where so many blocks are left for each of several workers."""
 BLOCK_BYTES = 8 << 20
