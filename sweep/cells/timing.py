@@ -107,8 +107,10 @@ def _probes(probing: _Probing, columns: Sequence[Column], size: int, cells: int)
     count = max(1, min(POSITIONS, size // (4 * cells)))
     probes = dict(probing.dear.get(cells, {}))
     spent = sum(probe.seconds for probe in probes.values())
-    for start in (_place(index, count, cells, size) for index in _scattered(count)):
-        if probes and spent > _affordable(spent / (len(probes) * cells) * size):
+    # where all of these fail, others are looked at until one does not
+    places = [_place(index, number, cells, size) for number in (count, PLACES) for index in _scattered(number)]
+    for turn, start in enumerate(places):
+        if probes and (turn >= count or spent > _affordable(spent / (len(probes) * cells) * size)):
             break
         probe = probing.probe(start, columns, cells)
         if probe is not None:

@@ -1,0 +1,187 @@
+"""What a study means, one cell after the other: the slow and plain way to what the engine gives.
+
+Reads the keys of a study, `docs/study.md`, and a kernel, `kernels/interface.py`; it imports nothing of `sweep`.
+"""
+
+from fractions import Fraction
+from itertools import pairwise, product
+from math import inf, isfinite, isnan, nan
+
+import numpy as np
+
+from kernels.interface import Status
+
+GIVES_UP = {"NO_METHOD", "NO_CYCLE", "NOT_CONVERGED", "STEP_LIMIT", "INACCURATE", "UNSTABLE", "FAILED"}
+
+
+def interpreted(kernel, keys):
+    """Every column of the result, as {name: (dims, values)}; of a summary, its reductions."""
+    blocks, dims = keys.get("blocks", [keys]), {}
+    for block in blocks:
+        word, number = "cell" if len(blocks) == 1 else "point", sum("point" in d for d in dims)
+        together = {f"{word}_{number + 1}" if number else word: list(block["axes"])}
+        dims |= {n: [n] for n in block["axes"]} if block.get("design", "product") == "product" else together
+    axes = {name: values for block in blocks for name, values in block["axes"].items()}
+    summary = keys.get("summary", {"over": []})
+    dims = dict(sorted(dims.items(), key=lambda item: item[1][0] in summary.get("over", axes)))
+    shape = [len(axes[names[0]]) for names in dims.values()]
+    places = product(*map(range, shape))
+    here = [{n: axes[n][k] for k, names in zip(p, dims.values(), strict=True) for n in names} for p in places]
+    cells = [Cell(kernel, keys, values).found() for values in here]
+    fields = [f for f in kernel.outputs if f.name in keys["outputs"]]
+    columns = {f.name: (f.dims, np.array([c[f.name] for c in cells])) for f in fields}
+    for name, dtype in (("status", "i1"), ("method_used", "i1"), ("error_bound", "f8")):
+        columns[name] = (), np.array([c[name] for c in cells], dtype)
+    if "summary" in keys:
+        dims = [d for d, names in dims.items() if names[0] not in summary.get("over", axes)]
+        shape = shape[: len(dims)]
+        columns = summed_up(kernel, fields, summary, columns, here, int(np.prod(shape, dtype=int)))
+    return {name: ((*dims, *own), v.reshape((*shape, *v.shape[1:]))) for name, (own, v) in columns.items()}
+
+
+class Cell:
+    """The cell of a study whose axes have some values."""
+
+    def __init__(self, kernel, keys, here):
+        given, fields = {**keys.get("fixed", {}), **here}, {f.name: f for f in kernel.parameters}
+        self.kernel, self.keys, self.words, self.p = kernel, keys, {}, {}
+        for name in fields:
+            source = name
+            while source not in given and isinstance(fields[source].default, str):
+                source = fields[source].default
+            word = given.get(source, fields[source].default)
+            self.p[name] = fields[name].choices[word] if isinstance(word, str) else word
+            names = {number: word for word, number in fields[name].choices.items()}
+            self.words[name] = names[self.p[name]] if names else self.p[name]
+        self.words |= here
+        length = max((len(v) for v in self.p.values() if np.ndim(v)), default=0)
+        self.p = {n: np.broadcast_to(v, length if fields[n].dims else ()).astype(float) for n, v in self.p.items()}
+        self.rtol, self.method = float(here.get("rtol", keys.get("rtol", 1e-9))), here.get("method", keys.get("method"))
+        self.along = [np.array(keys.get("along", {}).get(f.name, ()), float) for f in kernel.along]
+        self.inputs = [np.array([v]) for v in (*self.p.values(), self.rtol)]
+        sizes = {f.name: len(v) for f, v in zip(kernel.along, self.along, strict=True)}
+        sizes |= {d: length for f in kernel.parameters for d in f.dims}
+        sizes |= {new: sizes[old] for new, old in kernel.same_length.items()}
+        self.asked = np.array([f.name in keys["outputs"] for f in kernel.outputs], np.uint8)
+        self.nothing = [np.full((1, *(sizes[d] for d in f.dims)), nan) for f in kernel.outputs]
+
+    def found(self):
+        """Outputs, status, method and error bound, by name."""
+        number, status, error, outputs = self.solved()
+        if status >= 64:  # a refusal
+            outputs, number = self.nothing, -1
+        columns = {f.name: o[0] for f, o in zip(self.kernel.outputs, outputs, strict=True)}
+        return columns | {"status": status, "method_used": number, "error_bound": error if status == 1 else nan}
+
+    def solved(self):
+        """(number of the method, status, error, outputs)."""
+        numbers = {m.name: k for k, m in enumerate(self.kernel.methods)}
+        with np.errstate(all="ignore"):
+            if not eval(self.keys.get("where", "True"), {}, self.words):
+                return -1, Status.NOT_ASKED, nan, self.nothing
+            try:
+                status = np.zeros(1, "i1")
+                self.kernel.check(*self.inputs[:-1], status)
+                if (status := allowed(status[0])) >= 64:
+                    return -1, status, nan, self.nothing
+                return self.ran(numbers[self.method]) if self.method in numbers else self.auto()
+            except ZeroDivisionError:  # what our kernels raise
+                return -1, Status.FAILED, nan, self.nothing
+
+    def bound(self, number):
+        """What a method promises: 0 where it holds rtol by itself, inf where nothing is known."""
+        out, bound = np.zeros(1), self.kernel.methods[number].bound
+        if bound is not None:
+            bound(*self.inputs, *self.along, self.asked, out)
+        return inf if isnan(out[0]) else out[0]
+
+    def ran(self, number):
+        """The same by one method: INACCURATE where it is known to be worse than rtol, FAILED where OK has no number."""
+        method, status, error = self.kernel.methods[number], np.zeros(1, "i1"), np.zeros(1)
+        outputs, says = [o.copy() for o in self.nothing], method.estimates
+        extra = ([self.asked], [error]) if says else ([], [])
+        method.solve(*self.inputs, *self.along, *extra[0], *outputs, *extra[1], status)
+        there = zip(self.kernel.outputs, outputs, strict=True)
+        whole = all(np.isfinite(o).all() for f, o in there if f.name in self.keys["outputs"] and not f.gaps)
+        status = Status.FAILED if status[0] == Status.OK and not whole else allowed(status[0])
+        known = error[0] if says else inf if status == Status.INACCURATE else 0.0
+        known = max(inf if isnan(known) else known, self.bound(number))
+        return number, Status.INACCURATE if status < 64 and known > self.rtol else status, known, outputs
+
+    def auto(self):
+        """The first method that can do the cell, promises rtol and does not give up; else the best of what there is."""
+        default = {f.name: self.p.get(f.default, f.default) for f in self.kernel.parameters}
+        turns = []
+        for number, method in enumerate(self.kernel.methods):
+            unable = any((self.p[n] != default[n]).any() for n in method.excludes)
+            if not unable and not set(method.lacks) & set(self.keys["outputs"]):
+                early = method.sooner is not None and method.sooner(*self.inputs)[0]
+                turns.append((number - 1.5 if early else number, number))
+        promises = [(self.bound(number), number) for _, number in sorted(turns)]
+        best = -1, Status.NO_METHOD, inf, self.nothing
+        for _, number in (promise for promise in promises if promise[0] <= self.rtol):
+            best = better(best, self.ran(number))
+            if best[1].name not in GIVES_UP:
+                return best
+        for bound, number in sorted((p for p in promises if p[0] > self.rtol), key=lambda promise: promise[0]):
+            if bound < (inf if best[1] >= 64 else best[2] if best[1] == Status.INACCURATE else 0.0):
+                best = better(best, self.ran(number))
+        return best
+
+
+def allowed(status):
+    """What a kernel may say; else FAILED."""
+    return Status(status) if 0 <= status < Status.NOT_ASKED else Status.FAILED
+
+
+def better(old, new):
+    """Which of two is handed out: values before refusals, the smaller error, the refusal that tells more, the later."""
+    tried, (_, was, error, _), (_, is_, less, _) = old[0] >= 0, old, new
+    if was < 64:
+        looser = is_ == Status.UNSTABLE or (is_ == Status.INACCURATE and not less < error)
+        return old if is_ >= 64 or (was == Status.INACCURATE and looser) else new
+    vague = Status.NO_METHOD, Status.NO_CYCLE
+    if tried and is_ == Status.NO_CYCLE and was in (Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT):
+        return old
+    return old if is_ in vague and was not in vague else new
+
+
+def summed_up(kernel, fields, summary, columns, here, count):
+    """The reductions that a summary asks for, of so many groups of cells."""
+    groups, found = np.arange(len(here)).reshape(count, -1), {}
+    for f in fields:
+        own, values = columns[f.name]
+        for name in ("count", *summary["outputs"][f.name]):
+            numbers = [[(values[(k, *i)], k) for k in g] for g in groups for i in np.ndindex(values.shape[1:])]
+            there = [[(number, k) for number, k in some if not isnan(number)] for some in numbers]
+            parts = [reduced(name, some, here, columns, summary, f) for some in there]
+            for part in parts[0]:
+                column, bins = np.array([p[part] for p in parts]), [f"{f.name}_bin"] * (part == "histogram")
+                found[f"{f.name}_{part}"] = (*own, *bins), column.reshape((count, *values.shape[1:], *column.shape[1:]))
+    for name, kinds in (("status", [*Status, 128]), ("method_used", range(-1, len(kernel.methods)))):
+        counts = np.array([[(columns[name][1][g] == kind).sum() for kind in kinds] for g in groups])
+        found[f"cells_by_{name.partition('_')[0]}"] = (f"{name.partition('_')[0]}_name",), counts
+    return found
+
+
+def reduced(name, cells, here, columns, summary, field):
+    """One reduction of numbers, each with its cell."""
+    numbers = [float(number) for number, _ in cells]
+    if name == "count":
+        return {name: len(cells)}
+    if name in ("min", "max"):
+        return {name: (min if name == "min" else max)(numbers, default=nan)}
+    if name == "mean":
+        total = float(sum(map(Fraction, numbers))) if all(map(isfinite, numbers)) else sum(numbers)
+        return {name: total / len(numbers) if numbers else nan}
+    if name == "histogram":
+        edges = summary["edges"][field.name]
+        bins = np.array([sum(lo <= v < hi for v in numbers) for lo, hi in pairwise(edges)])
+        bins[-1] += numbers.count(edges[-1])
+        return {"below": sum(v < edges[0] for v in numbers), name: bins, "above": sum(v > edges[-1] for v in numbers)}
+    best = (min if name == "argmin" else max)(cells, key=lambda c: c[0], default=(nan, None))[1]
+    found = {f"{name}_status": Status.PENDING if best is None else columns["status"][1][best]}
+    for axis in summary["over"]:
+        none = "none" if isinstance(here[0][axis], str) else nan
+        found[f"{name}_{axis}"] = none if best is None else here[best][axis]
+    return found
