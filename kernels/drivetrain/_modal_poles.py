@@ -95,7 +95,7 @@ def _swap(s, i, j):
 
 @jit
 def _write(s, known, p, blur, pole_re, pole_im):
-    """Pairs and real poles by rising modulus, from the upper half plane; whether they are 2 p."""
+    """Pairs and real poles by rising modulus, from the upper half plane, NaN after the last; whether they are 2 p."""
     filled = known
     for k in range(known):
         pole_re[k], pole_im[k] = 0.0, 0.0
@@ -107,6 +107,8 @@ def _write(s, known, p, blur, pole_re, pole_im):
             if not real:
                 pole_re[filled + 1], pole_im[filled + 1] = s[k].real, -s[k].imag
             filled += needed
+    for k in range(filled, 2 * p):
+        pole_re[k], pole_im[k] = float("nan"), float("nan")
     return filled == 2 * p
 
 

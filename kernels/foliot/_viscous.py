@@ -272,6 +272,6 @@ def event_map_bound(k):
     strong = k < SPLIT
     b = 0.0 * k + 1.0
     if any_lane(strong):
-        b = cbrt(3.0 * where(strong, k, 1.0))
+        b = where(strong, cbrt(3.0 * where(strong, k, 1.0)), b)
     cycle = 8e-15 + 2e-15 / b
     return errors(cycle, cycle, cycle + where(k < 400.0, 4e-15 * k, 0.0))

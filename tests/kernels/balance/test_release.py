@@ -3,7 +3,7 @@
 import balance_oracles as oracles
 import numpy as np
 import pytest
-from columns import bounds, checked, printed_both_ways, relative_error, solve
+from columns import bounds, checked, relative_error, solve
 from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
@@ -287,14 +287,6 @@ def test_rest_exactly_at_the_zero_of_the_spring_is_no_loss_of_digits(method):
     assert status[0] == (Status.OK if method == "closed" else Status.INACCURATE)
 
 
-@given(st.floats(0, 0.9), st.floats(-4, -0.5), st.integers(-200, 200), st.integers(-200, 200))
-def test_units_of_angle_and_time_scale_out_exactly(zeta, log_r, angle, time):
-    r, x, t = 10.0**log_r, 2.0**angle, 2.0**time
-    outputs, _ = solve(BALANCE, "closed", [zeta] * 2, [1.3, 1.3 * t], [r, r * x], [r, r * x], [0.9, 0.9 * x])
-    for name, factor in zip(NAMES, (1.0, x, 1 / t, 1.0, 1 / t), strict=True):
-        assert outputs[name][1] == outputs[name][0] * factor, name
-
-
 @given(st.floats(0, 0.99), st.floats(-6, 0), st.floats(1.0, 3.0))
 def test_it_rests_within_stiction_and_more_friction_never_makes_more_swings(zeta, log_r, more):
     r = 10.0**log_r * np.array([1.0, more])
@@ -305,18 +297,6 @@ def test_it_rests_within_stiction_and_more_friction_never_makes_more_swings(zeta
     assert outputs["period"][0] == outputs["period"][1]  # isochronous
     halves = outputs["half_swings"] * outputs["period"] / 2
     np.testing.assert_allclose(outputs["stop_time"], halves, rtol=1e-15)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_the_same_bits_alone_in_lanes_and_in_tails(method):
-    columns = [c.copy() for c in scenes("light", -2, 0, 75 if COMPILED else 4, units=3)]
-    columns[0][::5], columns[0][1::7], columns[2][::6], columns[4][::9] = 0.0, 1.5, 0.0, 0.0
-    together, status = solve(BALANCE, method, *columns)
-    for i in range(len(status)):
-        alone, verdict = solve(BALANCE, method, *(c[i : i + 1] for c in columns))
-        assert verdict[0] == status[i]
-        for name in NAMES:
-            assert np.array_equal(alone[name][:1], together[name][i : i + 1], equal_nan=True), (name, i)
 
 
 def trace(*columns, half_swing):
@@ -387,30 +367,6 @@ def test_a_trace_is_refused_as_the_ring_down_is_but_for_what_never_ends():
     columns = [0.0, -0.1, 0.1, NAN], [1.0], [0.0, 0.1, 0.1, 0.1], [0.0, 0.1, 0.01, 0.1], [1.0]
     expected = [Status.OK, Status.BAD_INPUT, Status.BAD_INPUT, Status.BAD_INPUT]
     assert checked(BALANCE_TRACE, *columns).tolist() == expected
-
-
-PLAIN = """
-import sys
-sys.path += ["tests/oracles", "tests/helpers"]
-import numpy as np
-from columns import solve
-from kernels.balance.release import BALANCE
-from kernels.balance.trace import BALANCE_TRACE
-for method in ("closed", "recursion"):
-    outputs, status = solve(
-        BALANCE, method, [0.0, 1e-9, 0.01, 0.5, 0.999, 2.0], [3.0], [0.01] * 6, [0.011] * 6, [1.0, -1, 2, 1, 1, 1]
-    )
-    print(*(float(v).hex() for column in outputs.values() for v in column), *status)
-along = [np.array([0.0, 1, 2, 5])]
-outputs, status = solve(BALANCE_TRACE, "closed", [0.0, 0.1, 0.9], [3.0], [0.05], [0.06], [1.0], along=along)
-print(*(float(v).hex() for v in outputs["turning_point"].ravel()), *status)
-"""
-
-
-@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
-def test_plain_python_gives_the_bits_of_compiled_code():
-    compiled, plain = printed_both_ways(PLAIN)
-    assert compiled == plain != ""
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import reduction_oracles as oracles
-from columns import checked, printed_both_ways, relative_error, solve
+from columns import checked, relative_error, solve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -286,36 +286,6 @@ def test_without_dampers_nothing_is_damped():
         assert np.isnan(reduced(reduction, chain, n_keep=5, f_max=20.0)[0]["frf_error"][0])
 
 
-@pytest.mark.parametrize("reduction", ["rivin", "irs", "exact"] if COMPILED else ["rivin"])
-@pytest.mark.parametrize(
-    ("mass", "spring"), [(200, 100), (-900, -960), (700, 740), (0, -400)] if COMPILED else [(700, 740)]
-)
-def test_units_scale_out_exactly(reduction, mass, spring):
-    here = reduced(reduction, n_keep=4, f_max=100.0)[0]
-    time = 2.0 ** ((mass - spring) // 2)
-    scaled = {"J": FULA["J"] * 2.0**mass, "k": FULA["k"] * 2.0**spring}
-    scaled["h"] = FULA["h"] * 2.0 ** ((mass + spring) // 2)
-    outputs, status = reduced(reduction, scaled, n_keep=4, f_max=100.0 / time)
-    assert status[0] == Status.OK
-    for name, factor in {"frequency": 1 / time, "damping": 1, "frf_error": 1, "J_kept": 2.0**mass}.items():
-        assert np.array_equal(outputs[name], here[name] * factor, equal_nan=True), name
-
-
-def test_the_company_of_a_cell_does_not_matter():
-    n = 35 if COMPILED else 3
-    cells = [random_chain(seed, 4) for seed in range(n)]
-    chain = {name: np.array([c[name] for c in cells]) for name in "Jkh"}
-    codes = np.resize([1.0, 4.0, 0.0, 3.0, 5.0, 6.0, 2.0], n)
-    together, status = solve(DRIVETRAIN, "direct", **chain, reduction=codes, n_keep=2.0, f_max=1.0)
-    for i in range(0, n, 4 if COMPILED else 2):
-        alone, verdict = solve(
-            DRIVETRAIN, "direct", **{name: v[i : i + 1] for name, v in chain.items()}, reduction=codes[i : i + 1],
-            n_keep=2.0, f_max=1.0,
-        )  # fmt: skip
-        assert verdict[0] == status[i]
-        assert all(np.array_equal(alone[name][0], together[name][i], equal_nan=True) for name in alone)
-
-
 def verdict(J=(1.0, 2.0), k=(1.0, 1.0), h=0.0, **named):
     return checked(DRIVETRAIN, [J], [k], [np.broadcast_to(h, len(J))], **{n: [v] for n, v in named.items()})[0]
 
@@ -360,25 +330,6 @@ def test_a_result_that_no_float64_can_hold_is_left_out():
 def test_more_digits_than_there_are_is_inaccurate():
     for reduction in ("rivin", "irs"):
         assert reduced(reduction, n_keep=4, rtol=1e-16)[1][0] == Status.INACCURATE
-
-
-PLAIN = """
-import sys
-sys.path += ["tests/oracles", "tests/helpers"]
-from columns import solve
-import sweep
-from kernels.drivetrain.reduced import DRIVETRAIN
-J, k, h = [[1.0, 0.2, 0.05, 3.0]], [[40.0, 90.0, 30.0, 20.0]], [[0.1, 0.05, 0.02, 0.3]]
-for code in range(7):
-    outputs, status = solve(DRIVETRAIN, "direct", J, k, h, reduction=[code], n_keep=[2], f_max=[1.5])
-    print(*(float(v).hex() for column in outputs.values() for v in column.ravel()), *status)
-"""
-
-
-@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
-def test_plain_python_gives_the_bits_of_compiled_code():
-    compiled, plain = printed_both_ways(PLAIN)
-    assert compiled == plain != ""
 
 
 LIGHT = {

@@ -3,7 +3,7 @@
 import numpy as np
 import oracles
 import pytest
-from columns import bounds, checked, printed_both_ways, relative_error, solve
+from columns import bounds, checked, relative_error, solve
 from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mpf
@@ -89,44 +89,6 @@ def test_nothing_overflows_or_loses_digits_on_the_way(mu, phi0, a):
             assert relative_error(outputs[name], [t])[0] < 1e-15 if there else np.isnan(outputs[name][0]), name
     else:
         assert status[0] == Status.OUT_OF_RANGE
-
-
-def test_a_wild_neighbour_does_not_change_a_bit():
-    columns = [c.copy() for c in scenes(-3, 3, n=64)]
-    alone, _ = solve(FOLIOT, "closed", *columns)
-    columns[2][5], columns[0][5] = 1e-150, 1e-200
-    beside, _ = solve(FOLIOT, "closed", *columns)
-    others = np.arange(64) != 5
-    for name in NAMES:
-        assert np.array_equal(alone[name][others], beside[name][others]), name
-
-
-@pytest.mark.parametrize("method", [m.name for m in FOLIOT.methods])
-def test_the_same_bits_alone_in_lanes_and_in_tails(method):
-    columns = scenes(-2, 3, n=75 if COMPILED else 3)
-    together, status = solve(FOLIOT, method, *columns, rtol=1e-6)
-    for i in range(len(status)):
-        alone, verdict = solve(FOLIOT, method, *(c[i : i + 1] for c in columns), rtol=1e-6)
-        assert verdict[0] == status[i]
-        for name in NAMES:
-            assert alone[name][0] == together[name][i], (name, i)
-
-
-PLAIN = """
-import sys
-sys.path += ["tests/oracles", "tests/helpers"]
-import numpy as np
-from columns import solve
-from kernels.foliot.cycle import FOLIOT
-outputs, _ = solve(FOLIOT, "closed", np.geomspace(1e-9, 1e9, 19), np.full(19, 0.7), np.full(19, 1.1))
-print(*(float(v).hex() for column in outputs.values() for v in column))
-"""
-
-
-@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
-def test_plain_python_gives_the_bits_of_compiled_code():
-    compiled, plain = printed_both_ways(PLAIN)
-    assert compiled == plain != ""
 
 
 @pytest.mark.parametrize("alpha", [0.02, 1.0, 1.46299058758010465706, 30.0])
@@ -223,17 +185,6 @@ def test_dopri5_refuses_what_is_too_stiff_and_remarks_what_rounding_spoils():
     assert status[0] == Status.STEP_LIMIT
     assert status[1] in (Status.INACCURATE, Status.NOT_CONVERGED)
     assert status[2] == Status.OK
-
-
-@given(
-    st.floats(-5, 5), st.floats(-2, 2), st.floats(-2, 2), st.integers(-40, 40), st.integers(-40, 40),
-)  # fmt: skip
-def test_units_of_time_and_angle_scale_out_exactly(log_mu, log_phi0, log_a, time, angle):
-    mu, phi0, a = 10.0**log_mu, 10.0**log_phi0, 10.0**log_a
-    t, x = 2.0**time, 2.0**angle
-    outputs, _ = solve(FOLIOT, "closed", [mu, mu * x * t * t], [phi0, phi0 * x], [a, a * t])
-    for name, factor in zip(NAMES, (1 / t, x, x * t, 1.0, 1.0), strict=True):
-        assert outputs[name][1] == outputs[name][0] * factor, name
 
 
 @given(st.floats(-10, 10), st.floats(1e-4, 1.0))

@@ -37,15 +37,6 @@ def test_the_overshoot_keeps_its_digits_where_the_amplitude_loses_them():
     assert relative_error(period, [t[0] for t in truths]).max() < 1e-15
 
 
-def test_a_design_has_the_same_bits_alone_and_beside_others():
-    columns = designs(75)
-    together, status = solve(FOLIOT_DESIGN, "newton", *columns)
-    for i in range(75):
-        alone, verdict = solve(FOLIOT_DESIGN, "newton", *(c[i : i + 1] for c in columns))
-        assert verdict[0] == status[i]
-        assert (alone["a"][0], alone["mu"][0]) == (together["a"][i], together["mu"][i])
-
-
 def test_it_finds_the_foliot_that_was_there_to_what_the_overshoot_allows():
     alpha = np.geomspace(1e-6, 1e12, 200)
     made, _ = solve(FOLIOT, "closed", alpha, np.ones(200), np.ones(200))

@@ -7,7 +7,7 @@ import pytest
 from columns import relative_error
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from loops import each_cell, one_by_one
+from loops import each_cell
 from mpmath import atan, atanh, exp, expm1, findroot, hyp2f1, log, log1p, mp, mpf, sqrt
 
 from kernels.foliot import _friction_quadrature as quadrature
@@ -35,11 +35,6 @@ def _solved(i, d, rho, slack, gamma, n, e, half, amplitude, speed, s, m, for_cyc
 @entry()
 def solved(d, rho, slack, gamma, n, e, half, amplitude, speed, s, m, for_cycle, for_s, for_m, status):
     each_cell(_solved, (d, rho, slack, gamma, n, e, half, amplitude, speed, s, m, for_cycle, for_s, for_m, status))
-
-
-@entry()
-def solved_one_by_one(d, rho, slack, gamma, n, e, half, amplitude, speed, s, m, for_cycle, for_s, for_m, status):
-    one_by_one(_solved, (d, rho, slack, gamma, n, e, half, amplitude, speed, s, m, for_cycle, for_s, for_m, status))
 
 
 @jit
@@ -293,21 +288,6 @@ def test_the_closed_forms_are_where_one_loss_acts_alone_and_agree_with_the_integ
     integrals, _, _ = solve(d[alone], rho[alone], gamma[alone], n[alone], e[alone])
     for name, closed, integral in zip(NAMES, outputs, integrals, strict=True):
         np.testing.assert_allclose(closed[alone], integral, rtol=2e-14, err_msg=name)
-
-
-def test_the_same_bits_alone_in_lanes_and_beside_other_cells():
-    random = np.random.default_rng(6)
-    count = 75 if COMPILED else 5
-    d, gamma = 10 ** random.uniform(-5, 5, count), 10 ** random.uniform(-5, 5, count)
-    cells = columns(
-        d, random.uniform(0, 0.99, count), gamma, random.uniform(0, 4, count), random.uniform(-0.9, 1, count)
-    )
-    together = solve(*cells)
-    narrow = solve(*cells, function=solved_one_by_one)
-    backwards = solve(*(c[::-1] for c in cells))
-    for wide, one, back in zip(*(sum(map(list, r[:2]), [r[2]]) for r in (together, narrow, backwards)), strict=True):
-        np.testing.assert_array_equal(wide, one)
-        np.testing.assert_array_equal(wide, back[::-1])
 
 
 def test_what_cannot_be_solved_is_said():

@@ -166,24 +166,6 @@ def test_what_rounding_spoils_is_remarked():
     assert status[0] == Status.INACCURATE
 
 
-def test_the_same_bits_alone_and_among_others():
-    random = np.random.default_rng(5)
-    n = 50 if COMPILED else 3
-    terms = {
-        "d": random.uniform(0, 5, n),
-        "rho": random.uniform(0, 0.8, n),
-        "gamma": random.uniform(0, 1, n) * (random.uniform(size=n) < 0.5),
-        "n": random.choice([0.5, 1.0, 1.7, 2.0, 3.0], n),
-        "kappa": random.uniform(0, 5, n) * (random.uniform(size=n) < 0.5),
-        "e": random.uniform(-0.9, 1, n),
-    }
-    together, status = run(1e-4, **terms)
-    for i in range(0, n, 7):
-        alone, verdict = run(1e-4, **{name: column[i : i + 1] for name, column in terms.items()})
-        assert verdict[0] == status[i]
-        assert all(np.array_equal(alone[name][0], together[name][i], equal_nan=True) for name in NAMES), i
-
-
 @pytest.mark.skipif(not COMPILED, reason="sixty half swings at the finest tolerance in plain Python")
 @pytest.mark.parametrize("rtol", [np.nan, -1.0])
 def test_a_senseless_rtol_is_never_met(rtol):

@@ -6,7 +6,7 @@ from itertools import pairwise
 import foliot_oracles
 import numpy as np
 import pytest
-from columns import checked, columns_of, solve
+from columns import checked, solve
 from loops import each_group
 from mpmath import mp, mpf
 
@@ -354,34 +354,6 @@ def test_equal_seeds_have_equal_noise_whatever_else_a_cell_has():
     assert abs(rate[2] / rate[0] - 1) > 0.1
 
 
-def test_the_same_bits_alone_in_lanes_and_in_tails():
-    n = 75 if COMPILED else 3
-    random = np.random.default_rng(2)
-    columns = {
-        "a": 10 ** random.uniform(-1, 1, n), "R": random.choice([0.0, 0.2], n), "k": random.choice([0.0, 0.3], n),
-        "e": random.choice([1.0, 0.7], n), "sigma": random.uniform(0, 1, n), "tau_c": random.choice([0.0, 4.0], n),
-        "seed": random.choice([0.0, 1.0, 2.0], n), "half_swings": random.integers(1, 400 if COMPILED else 9, n),
-        "averaging_time": 10 ** random.uniform(0, 2 if COMPILED else 1, n),
-    }  # fmt: skip
-    together, status = run(**columns)
-    assert len(set(status)) > 1 or not COMPILED
-    for i in range(n):
-        alone, verdict = run(**{name: c[i : i + 1] for name, c in columns.items()})
-        assert verdict[0] == status[i]
-        for name, column in together.items():
-            assert np.array_equal(alone[name][0], column[i], equal_nan=True), (i, name)
-
-
-def test_units_of_time_and_angle_scale_out_exactly():
-    t, x = np.array([1.0, 2.0**20]), np.array([1.0, 2.0**-9])
-    found, _ = run(
-        mu=1.3 * x * t * t, phi0=0.7 * x, a=0.4 * t, R=0.1 * x * t * t, k=0.1 * t * t, sigma=0.1,
-        averaging_time=30.0 / t, half_swings=40,
-    )  # fmt: skip
-    for column in found.values():
-        assert column[1] == column[0]
-
-
 @pytest.mark.parametrize(
     ("named", "status"),
     [
@@ -420,12 +392,6 @@ def test_a_tolerance_below_rounding_is_remarked():
 def test_white_noise_is_the_limit_of_a_short_memory():
     found, _ = run(a=[1.0, 1.0], tau_c=[0.0, 1e-3], sigma=0.1, averaging_time=10.0)
     assert found["rate_error_s_per_day"][0] == found["rate_error_s_per_day"][1]
-
-
-def test_columns_come_in_the_order_of_the_declaration():
-    names = [p.name for p in FOLIOT_NOISE.parameters]
-    assert names[-6:] == ["sigma", "tau_c", "half_swings", "seed", "averaging_time", "sigma_a"]
-    assert len(columns_of(FOLIOT_NOISE, (), dict.fromkeys(names, 1.0))) == len(names)
 
 
 @pytest.mark.skipif(not COMPILED, reason="thousands of half swings in plain Python")

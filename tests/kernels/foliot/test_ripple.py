@@ -91,38 +91,6 @@ def test_sticking_agrees_with_energy_over_a_grid():
     assert not COMPILED or 0 < sum(exists) < len(exists)
 
 
-def test_units_of_time_and_angle_scale_out():
-    cell = {"a": 0.3, "R": 0.2, "depth": 0.4, "harmonic": 2.0, "rtol": 1e-4}
-    one, _ = solve(FOLIOT_RIPPLE, "dopri5", [1.0], [1.0], **cell)
-    other, _ = solve(FOLIOT_RIPPLE, "dopri5", [16.0 * 8.0], [8.0], **(cell | {"a": 1.2, "R": 0.2 * 128.0}))
-    for name, factor in zip(NAMES, (0.25, 8.0, 32.0, 1.0, 1.0), strict=True):
-        assert other[name][0] == one[name][0] * factor, name
-
-
-def test_the_same_bits_alone_and_among_others_that_have_no_ripple():
-    n = 40 if COMPILED else 3
-    depth = np.where(np.arange(n) % 2, 0.0, np.linspace(0.1, 0.8, n))
-    cells = {"a": np.linspace(0.2, 3.0, n), "depth": depth, "harmonic": 1.0 + np.arange(n) % 3, "rtol": 1e-4}
-    together, status = solve(FOLIOT_RIPPLE, "dopri5", np.ones(n), np.ones(n), **cells)
-    assert (status == Status.OK).all()
-    for i in range(0, n, 9):
-        one = {name: np.broadcast_to(values, n)[i : i + 1] for name, values in cells.items()}
-        alone, _ = solve(FOLIOT_RIPPLE, "dopri5", [1.0], [1.0], **one)
-        assert all(alone[name][0] == together[name][i] for name in NAMES), i
-
-
-@pytest.mark.parametrize(
-    ("depth", "harmonic", "status"),
-    [
-        (0.0, 1.0, Status.OK), (0.999, 3.0, Status.OK), (1.0, 1.0, Status.BAD_INPUT), (-0.1, 1.0, Status.BAD_INPUT),
-        (np.nan, 1.0, Status.BAD_INPUT), (0.5, 0.0, Status.BAD_INPUT), (0.5, 1.5, Status.BAD_INPUT),
-        (0.5, np.nan, Status.BAD_INPUT), (0.5, np.inf, Status.BAD_INPUT), (0.5, -1.0, Status.BAD_INPUT),
-    ],
-)  # fmt: skip
-def test_depth_and_harmonic_outside_their_limits_are_refused(depth, harmonic, status):
-    assert checked(FOLIOT_RIPPLE, [1.0], [1.0], a=1.0, depth=depth, harmonic=harmonic)[0] == status
-
-
 def test_what_foliot_refuses_is_refused():
     assert checked(FOLIOT_RIPPLE, [0.0], [1.0], a=1.0)[0] == Status.NEVER_STARTS
     assert checked(FOLIOT_RIPPLE, [1.0], [1.0])[0] == Status.NO_LIMIT_CYCLE

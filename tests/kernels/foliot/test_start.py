@@ -4,8 +4,6 @@ import foliot_oracles
 import numpy as np
 import pytest
 from columns import checked, relative_error, solve
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from loops import one_by_one
 from mpmath import expm1, log1p, mp, mpf
 
@@ -306,27 +304,6 @@ def test_flips_may_be_asked_for_in_any_order():
 @pytest.mark.parametrize("asked", [[0.0], [1.5], [1.0, NAN], [INF], [-1.0], [2 * FLIP_LIMIT]])
 def test_a_coordinate_that_does_not_count_is_refused(asked):
     assert (start(np.ones(40), np.ones(40), flips=asked)[2] == Status.BAD_INPUT).all()
-
-
-def test_the_same_bits_alone_in_lanes_and_in_tails():
-    columns = scenes(75 if COMPILED else 3, seed=7)
-    together = start(**columns)
-    for i in range(len(together[2])):
-        alone = start(**{name: c[i : i + 1] for name, c in columns.items()})
-        for one, all_ in zip(alone, together, strict=True):
-            assert np.array_equal(one[0], all_[i], equal_nan=True), i
-
-
-@settings(max_examples=100 if COMPILED else 3)
-@given(st.floats(-3, 3), st.floats(-5, 5), st.integers(-40, 40), st.integers(-40, 40))
-def test_units_of_time_and_angle_scale_out_exactly(log_mu, release, time, angle):
-    t, x = np.array([1.0, 2.0**time]), np.array([1.0, 2.0**angle])
-    times, speeds, _ = start(
-        10.0**log_mu * x * t * t, 0.7 * x, a=0.4 * t, R=0.03 * 10.0**log_mu * x * t * t, k=0.05 * t * t,
-        phi_start=release * x, flips=3,
-    )  # fmt: skip
-    assert np.array_equal(times[1], times[0] / t[1], equal_nan=True)
-    assert np.array_equal(speeds[1], speeds[0] * x[1] * t[1], equal_nan=True)
 
 
 @pytest.mark.parametrize(

@@ -185,26 +185,6 @@ def test_what_a_cell_comes_to_is_named(cell, method, location, statuses):
         assert np.isfinite([outputs[name][0] for name in ("time", "period", "amplitude")]).all()
 
 
-@pytest.mark.skipif(not COMPILED, reason="lanes")
-def test_the_bits_hang_neither_on_neighbours_nor_on_how_many_there_are():
-    random = np.random.default_rng(5)
-    n = 75
-    cells = {name: 10.0 ** random.uniform(-1, 1, n) for name in ("mu", "phi0", "a", "c")}
-    cells |= {
-        "R": random.choice([0.0, 0.05], n),
-        "step": random.choice([0.3, 0.01], n),
-        "flips": random.choice([1.0, 9.0], n),
-    }
-    cells["location"] = random.choice([0.0, 1.0, 2.0, 3.0, 4.0], n)
-    for method in ("verlet", "dop853"):
-        outputs, status = solve(KERNEL, method, **cells)
-        for some in (slice(0, 1), slice(30, 34), slice(None, None, -1)):
-            again, state = solve(KERNEL, method, **{k: np.ascontiguousarray(v[some]) for k, v in cells.items()})
-            np.testing.assert_array_equal(state, status[some])
-            for name in outputs:
-                np.testing.assert_array_equal(again[name], outputs[name][some])
-
-
 def test_a_drive_below_the_friction_never_starts():
     assert checked(KERNEL, [1.0], phi0=1.0, R=1.0, step=0.1)[0] == Status.NEVER_STARTS
     assert checked(KERNEL, [1.0], phi0=1.0, step=0.1, flips=1.5)[0] == Status.BAD_INPUT

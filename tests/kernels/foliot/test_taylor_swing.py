@@ -131,12 +131,3 @@ def test_what_is_stiff_steep_at_rest_or_creeps_is_not_promised_and_not_begun():
 def test_stiction_holds_a_turning_point():
     _, status = solve(FOLIOT, "taylor", 1.0, 1.0, R=0.1, R_s=[0.1, 5.0], c=0.1, n=2.0, k=0.2)
     assert status.tolist() == [Status.OK, Status.STICKS]
-
-
-def test_the_same_bits_alone_and_among_others():
-    random = np.random.default_rng(7)
-    c, k = random.uniform(0.01, 1.0, 40), random.uniform(0.01, 1.0, 40)
-    together, _ = solve(FOLIOT, "taylor", 1.0, 1.0, c=c, n=2.0, k=k, rtol=1e-8)
-    for i in (0, 17, 39):
-        alone, _ = solve(FOLIOT, "taylor", 1.0, 1.0, c=c[[i]], n=2.0, k=k[[i]], rtol=1e-8)
-        assert all(alone[name][0] == together[name][i] for name in NAMES)

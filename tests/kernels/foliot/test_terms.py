@@ -4,8 +4,6 @@ import foliot_oracles
 import numpy as np
 import pytest
 from columns import bounds, checked, estimated, relative_error, solve
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from mpmath import mp, mpf, sqrt
 
 from kernels.foliot.cycle import FOLIOT
@@ -286,31 +284,6 @@ def test_near_a_threshold_lost_digits_are_remarked():
         error = max(relative_error(outputs[name][i : i + 1], truth[j : j + 1])[0] for j, name in enumerate(NAMES[:4]))
         assert error < 1e-9 or status[i] in (Status.INACCURATE, Status.STICKS), (mu[i], error)
     assert status[-1] == Status.OK
-
-
-@pytest.mark.parametrize("method", ["coulomb", "segments"])
-def test_the_same_bits_alone_and_in_lanes(method):
-    n = 70 if COMPILED else 3
-    cells = random_cells("aR" if method == "coulomb" else "aRke", seed=9, n=n)
-    together, status = solve(FOLIOT, method, **cells)
-    for i in range(n):
-        alone, verdict = solve(FOLIOT, method, **{name: column[i : i + 1] for name, column in cells.items()})
-        assert verdict[0] == status[i]
-        if verdict[0] < FIRST_REFUSAL:
-            assert [alone[name][0] for name in NAMES] == [together[name][i] for name in NAMES], i
-
-
-@settings(max_examples=100 if COMPILED else 15)
-@given(st.integers(-40, 40), st.integers(-40, 40), st.floats(0.01, 0.99), st.floats(1e-3, 3.0), st.floats(0.1, 1.0))
-def test_units_of_time_and_angle_scale_out(time, angle, rho, k, e):
-    t, x = 4.0**time, 2.0**angle
-    cells = {"mu": [1.7, 1.7 * x * t * t], "phi0": [0.9, 0.9 * x], "a": [0.4, 0.4 * t]}
-    cells |= {"R": [1.7 * rho, 1.7 * rho * x * t * t], "k": [k, k * t * t], "e": [e, e]}
-    outputs, status = solve(FOLIOT, "segments", **{name: np.array(c) for name, c in cells.items()})
-    assert status[0] == status[1]
-    if status[0] < FIRST_REFUSAL:
-        for name, factor in zip(NAMES, (1 / t, x, x * t, 1.0, 1.0), strict=True):
-            assert outputs[name][1] == pytest.approx(outputs[name][0] * factor, rel=1e-12), name
 
 
 def test_nothing_is_wrong_in_silence_in_the_wildest_units():

@@ -8,7 +8,6 @@ from columns import estimated, relative_error, solve
 from kernels.foliot._swing_law import Law, Leg, Power, Ripple, Scales, Terms
 from kernels.foliot._turning import longest
 from kernels.foliot.cycle import FOLIOT
-from kernels.foliot.ripple import FOLIOT_RIPPLE
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 
@@ -71,18 +70,6 @@ def test_no_cell_of_many_is_called_ok_and_off_by_more_than_rtol(degrees):
         there = judged & (true[name] > 1e-300)
         error = np.abs(found[name][there] / true[name][there] - 1.0) / rtol[there]
         assert error.max() <= 1.0, (name, error.max())
-
-
-@pytest.mark.skipif(not COMPILED, reason="hundreds of cells")
-def test_lanes_beside_keep_the_bits_of_smooth_cells():
-    n = 96
-    smooth = {"a": np.linspace(0.1, 3.0, n), "c": 0.3, "n": 2.0, "k": np.linspace(0.0, 2.0, n), "depth": 0.2}
-    mixed = smooth | {"n": np.where(np.arange(n) % 3, 2.0, 1.3)}
-    alone, _ = solve(FOLIOT_RIPPLE, "dopri5", 1.0, 1.0, rtol=1e-6, **smooth)
-    among, _ = solve(FOLIOT_RIPPLE, "dopri5", 1.0, 1.0, rtol=1e-6, **mixed)
-    kept = mixed["n"] > 1.5
-    assert all(np.array_equal(alone[name][kept], among[name][kept], equal_nan=True) for name in NAMES)
-    assert not np.array_equal(alone["period"], among["period"], equal_nan=True)
 
 
 @pytest.mark.parametrize(("v", "acceleration", "most"), [(2.0, -4.0, 0.4), (-2.0, -4.0, 1.5), (1e-9, -4.0, 2.5e-4)])

@@ -6,7 +6,7 @@ import itertools
 import impact_oracles as oracles
 import numpy as np
 import pytest
-from columns import bounds, checked, printed_both_ways, solve
+from columns import bounds, checked, solve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp, mpf
@@ -350,38 +350,6 @@ def test_results_that_no_float64_can_hold_are_out_of_range():
     assert missing == ["swing"]
     assert np.isfinite([outputs[name][1:5] for name in NAMES]).all()
     np.testing.assert_allclose(outputs["period"][0], outputs["period"][1] * 1e150, rtol=1e-14)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_the_same_bits_alone_in_lanes_and_in_tails(method):
-    columns = [c.copy() for c in clocks(75 if COMPILED else 4, seed=6, kappa=(-2, 2), nu=0.1, units=3)]
-    columns[7][::4], columns[8][::3], columns[7][1::9] = 0.0, 0.0, 0.99
-    together, status = solve(IMPACT, method, *columns)
-    for i in range(len(status)):
-        alone, verdict = solve(IMPACT, method, *(c[i : i + 1] for c in columns))
-        assert verdict[0] == status[i]
-        for name in NAMES:
-            assert np.array_equal(alone[name][:1], together[name][i : i + 1], equal_nan=True), (name, i)
-
-
-PLAIN = """
-import sys
-sys.path += ["tests/oracles", "tests/helpers"]
-from columns import solve
-from kernels.impact.clock import IMPACT
-e, nu = [0.0, 0.2, 0.4, 0.3, 0.35, 0.0], [0.0, 0.0, 0.1, 0.0, -2.8, 0.0]
-for method in ("closed", "map"):
-    outputs, status = solve(
-        IMPACT, method, [1e-3] * 6, [1e-5], [1e-5, 3e-6, 1e-6, 1e-7, 2e-5, 1e-3], [0.03], [0.03], [31], [5e-4], e, nu
-    )
-    print(*(float(v).hex() for column in outputs.values() for v in column), *status)
-"""
-
-
-@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
-def test_plain_python_gives_the_bits_of_compiled_code():
-    compiled, plain = printed_both_ways(PLAIN)
-    assert compiled == plain != ""
 
 
 GOOD = (1.0, 1.0, 1.0, 1.0, 1.0, 3.0, 0.1, 0.2, 0.0)

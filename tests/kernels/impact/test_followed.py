@@ -4,7 +4,7 @@ import impact_event_oracles as oracles
 import impact_simulation as simulation
 import numpy as np
 import pytest
-from columns import printed_both_ways, solve
+from columns import solve
 from mpmath import mpf
 
 from kernels.impact import _contacts, _followed, _half_swing, _periodic
@@ -434,31 +434,3 @@ def test_lasting_contact_under_a_bent_lever_is_not_followed():
 def test_what_cannot_be_right_says_so(scene, rtol, status):
     if COMPILED or status[0] in (Status.INACCURATE, Status.NO_METHOD):
         assert events(*scene, rtol=rtol)[1][0] in status
-
-
-def test_bits_do_not_depend_on_neighbours():
-    scenes = random_clocks(70, seed=9, high=0.7) if COMPILED else orderly_clocks(4, seed=9)
-    whole, status = events(*scenes)
-    order = np.random.default_rng(1).permutation(len(status))
-    shuffled, shuffled_status = events(*(c[order] for c in scenes))
-    alone, alone_status = events(*(c[3:4] for c in scenes))
-    assert (status[order] == shuffled_status).all()
-    assert status[3] == alone_status[0]
-    for name, column in whole.items():
-        assert column[order].tobytes() == shuffled[name].tobytes()
-        assert column[3:4].tobytes() == alone[name].tobytes()
-
-
-PLAIN = """
-import sys
-sys.path += ["tests/oracles", "tests/helpers", "tests/kernels/impact"]
-from test_followed import events
-outputs, status = events([4.0, 2.0, 0.5], [0.05, 0.1, 0.1274], [0.2, 0.0, 0.05])
-print(status.tolist(), [[v.hex() for v in column.tolist()] for column in outputs.values()])
-"""
-
-
-@pytest.mark.skipif(not COMPILED, reason="runs both ways by itself")
-def test_plain_python_gives_the_bits_of_compiled_code():
-    compiled, plain = printed_both_ways(PLAIN)
-    assert compiled == plain != ""

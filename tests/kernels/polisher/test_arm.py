@@ -1,30 +1,21 @@
 """The polisher's arm against 50 digits, next to dead points, in tiny and lopsided machines, and beyond the domain."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import polisher_oracles as oracles
 import pytest
-from columns import bounds, checked, solve
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from columns import bounds, solve
 from mpmath import mp, mpf, pi
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 from kernels.polisher.arm import POLISHER
 
-ROOT = Path(__file__).parents[3]
 SOME = 60 if COMPILED else 12
 FEW = 1
 FIGURE = (62.01, 38.0, 40.5)
 """b, d, f of the paper's figures."""
 RATES = ("thd", "rate_max", "rate_min")
 CLOSED = tuple(oracles.closed(*FIGURE, 10.0))
-INF, NAN = np.inf, np.nan
 
 
 def swings(b, d, f, e):
@@ -264,18 +255,6 @@ def test_an_arm_that_turns_fully_has_rates_but_no_extremes():
     assert outputs["transmission_angle"][0] == pytest.approx(float(least), rel=1e-14)
 
 
-@settings(deadline=None, max_examples=20)
-@given(st.integers(-600, 600), st.integers(0, 10**6))
-def test_angles_do_not_depend_on_the_unit_of_length(power, seed):
-    cell = machines("usual", 1, seed)
-    one, _ = solve(POLISHER, "stable", *cell)
-    other, status = solve(POLISHER, "stable", *(cell * 2.0**power))
-    assert status[0] == Status.OK
-    for name, column in one.items():
-        per_length = "_" in name and name[:2] in ("A0", "A1")
-        np.testing.assert_array_equal(other[name] * (2.0**power if per_length else 1.0), column, err_msg=name)
-
-
 @pytest.mark.parametrize(
     ("cell", "status"),
     [
@@ -293,55 +272,3 @@ def test_over_the_range_of_float64_a_machine_is_right_or_refused(cell, status):
     if status == Status.OK:
         for name, error in errors(outputs, columns).items():
             assert error[0] < 2e-15, name
-
-
-@pytest.mark.parametrize("k", range(5))
-@pytest.mark.parametrize("value", [NAN, INF, -INF, -1.0, 0.0, 0.5, 2.0])
-def test_what_is_no_machine_is_bad_input(k, value):
-    cell = [0.62, 0.38, 0.405, 0.1, 0.0]
-    cell[k] = value
-    allowed = value >= 0.0 and value < INF if k == 3 else value == 0.0 if k == 4 else value in (0.5, 2.0)
-    for n in (1, 40):
-        status = checked(POLISHER, *(np.full(n, float(c)) for c in cell))
-        assert (status == (Status.OK if allowed else Status.BAD_INPUT)).all()
-
-
-@pytest.mark.skipif(not COMPILED, reason="cells go one by one in plain Python")
-def test_neighbours_do_not_change_a_cell():
-    mixed = np.concatenate(
-        [machines(kind, 20) for kind in KINDS] + [10 ** np.random.default_rng(6).uniform(-1, 0, (4, 30))], 1
-    )
-    for method in ("stable", "waveform"):
-        together, _ = solve(POLISHER, method, *mixed, rtol=1e-12)
-        for j in range(0, mixed.shape[1], 9):
-            alone, _ = solve(POLISHER, method, *mixed[:, j : j + 1], rtol=1e-12)
-            for name, column in together.items():
-                np.testing.assert_array_equal(column[j : j + 1], alone[name])
-
-
-PLAIN = """
-import sys
-sys.path += ["tests/oracles", "tests/helpers", "tests/kernels/polisher"]
-import test_arm
-print(test_arm.bits())
-"""
-
-
-def bits():
-    """Every bit of some machines of each verdict, by every method that goes in lanes."""
-    d, f = [38.0] * 4 + [60.0, 38.0, 100.0], [40.5] * 4 + [5.0, 40.5, 150.0]
-    cells = np.array([[62.01] * 7, d, f, [0.0, 1e-3, 15.0, 16.49, 10.0, 20.0, 99.0]])
-    found = bounds(POLISHER, "textbook", *cells).tolist()
-    for method, some in (("stable", cells), ("textbook", cells), ("waveform", cells[:, [1, 2]])):
-        outputs, status = solve(POLISHER, method, *some, type=1.0, rtol=1e-12)
-        found += [*np.ravel(list(outputs.values())).tolist(), *status.tolist()]
-    return " ".join(float(v).hex() for v in found)
-
-
-@pytest.mark.skipif(not COMPILED, reason="nothing to compare with")
-def test_plain_python_gives_the_bits_of_compiled_code():
-    printed = subprocess.run(
-        [sys.executable, "-c", PLAIN],
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, cwd=ROOT, capture_output=True, text=True, check=True,
-    ).stdout  # fmt: skip
-    assert printed.strip() == bits() != ""
