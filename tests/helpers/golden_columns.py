@@ -46,6 +46,8 @@ SMALL = {
     "rich": {"flips": 6.0},
 }
 """Examples that take less time."""
+FAR = {"radius": 0.3, "frequency": 20.0}
+"""How far coordinates without a limit are looked at."""
 PITCH = 0.0060805
 CLOCKS = (
     (4.0, 0.05, 0.2), (2.0, 0.1, 0.0), (0.21, 0.048, 0.277), (20.4555, 0.1277, 0.5778), (12.7859, 0.1057, 0.5342),
@@ -178,7 +180,7 @@ def along_of(kernel):
     return [
         np.arange(max(f.lower, 0.0), max(f.lower, 0.0) + 5.0)
         if f.integer
-        else np.linspace(max(f.lower, 0.0), f.upper if np.isfinite(f.upper) else 20.0, 7)
+        else np.linspace(max(f.lower, 0.0), f.upper if np.isfinite(f.upper) else FAR[f.name], 7)
         for f in kernel.along
     ]
 
