@@ -133,7 +133,6 @@ def test_what_lies_outside_the_declared_limits_is_bad_input(name):
     assert (golden.check_of(kernel, columns)[outside(kernel, columns)] == Status.BAD_INPUT).all()
 
 
-@pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")
 @pytest.mark.parametrize("name", NAMES)
 def test_over_the_whole_of_float64_a_cell_is_right_or_refused(name):
     """What is OK is finite, and what several methods call right is the same within what they promise."""
