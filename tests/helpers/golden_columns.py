@@ -83,7 +83,15 @@ TARGETS = {
     "AVX-512": ("skylake-avx512", "+avx,+avx2,+fma,+bmi,+bmi2,+avx512f,+avx512dq,+avx512vl,+avx512bw,+avx512cd"),
 }
 """numba's names of processors, and what they can."""
-PLAIN = {"polisher_wear": 1, "polisher_wear_point": 2, "foliot_ripple": 2, "foliot_steps": 3, "foliot_noise": 4}
+PLAIN = {
+    "polisher": 3,
+    "drivetrain": 3,
+    "polisher_wear": 1,
+    "polisher_wear_point": 2,
+    "foliot_ripple": 2,
+    "foliot_steps": 3,
+    "foliot_noise": 4,
+}
 """Cells of each method that are computed in plain Python; 8 of other kernels, one of scenes of one's own."""
 
 
