@@ -170,7 +170,7 @@ def by_run(scene, columns, tolerance, method):
     fixed = {name: column[0] for name, column in named.items() if name not in axes}
     kernel = "taylor:DRAG" if scene is SCENE else "taylor:POWER_DRAG"
     keys = {"kernel": kernel, "allow_import": True, "design": "zip", "method": method, "rtol": tolerance}
-    study = sweep.build_study(**keys, axes=axes, fixed=fixed)
+    study = sweep.study(**keys, axes=axes, fixed=fixed)
     begin = time.process_time()
     found = sweep.run(study, workers=1, progress=False)
     rate = CELLS / (time.process_time() - begin)
