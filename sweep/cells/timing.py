@@ -23,7 +23,7 @@ BUDGET = 0.003, 0.03
 """Seconds a sample may take in any run, unless one call takes longer; and in one that takes 100 times as long;"""
 SHARE = 0.005
 """or this share of the run, where that is more."""
-PROBE_SECONDS = 3e-4
+PROBE_SECONDS = 5e-4
 """A probe as long as this sees past the cost of a call, and 64 of them take a few hundredths of a second."""
 TWICE = 1e-3
 """Seconds of a probe that is made once: what is met for the first time matters little in it."""

@@ -107,8 +107,8 @@ def lanes_of(one):
     [
         (lambda n: 1e-5 * n, 127, (1, None)),
         (lambda n: 1e-5 * n, 128, (32, None)),
-        (lambda n: 1e-5 * n, 10**6, (32, None)),
-        (lambda n: 9e-6 * n, 10**6, (128, None)),  # 2.9e-4 s do not see past the cost of a call
+        (lambda n: 2e-5 * n, 10**6, (32, None)),
+        (lambda n: 1e-5 * n, 10**6, (128, None)),  # 3.2e-4 s do not see past the cost of a call
         (lambda n: 1e-9 * n, 2**21 - 1, (8192, None)),
         (lambda n: 1e-9 * n, 2**21, (32768, None)),
         (lanes_of(5e-3), 10**5, (32, None)),
@@ -118,8 +118,8 @@ def lanes_of(one):
         (lanes_of(0.1), 100, (25, True)),
         (lanes_of(0.1), 2, (1, True)),
         (lanes_of(0.1), 1, (1, None)),
-        (lanes_of(3e-4), 100, (1, None)),
-        (lanes_of(3.1e-4), 100, (25, True)),
+        (lanes_of(4.9e-4), 100, (1, None)),
+        (lanes_of(5.1e-4), 100, (25, True)),
         (lanes_of(7.4e-3), 1000, (32, None)),
         (lanes_of(7.5e-3), 1000, (32, True)),
         (lambda n: 0.1 if n == 1 else 0.149, 100, (25, True)),
