@@ -173,7 +173,8 @@ def able(terms, stiff, e):
     creeps inwards, overdamped, before it comes to the switch.
     """
     drag, _, inwards, gamma, degree, kappa = terms[:6]
-    held = (kappa > inwards) & (drag * drag >= 4.0 * kappa) & (e >= 0.0)
+    with np.errstate(over="ignore"):  # an infinite square compares as the square itself would
+        held = (kappa > inwards) & (drag * drag >= 4.0 * kappa) & (e >= 0.0)
     return (stiff < _STIFFEST) & ((degree >= _MILDEST) | ~(gamma > 0.0)) & ~held
 
 

@@ -215,8 +215,7 @@ def solved(kernel, method, columns, rtol, along=None):
     status, asked = np.full(rtol.size, 99, np.int8), np.ones(len(found), np.uint8)
     if method.estimates:
         found["error"] = np.zeros(rtol.size)
-    with np.errstate(over="ignore"):
-        method.solve(*columns.values(), rtol, *along, *([asked] if method.estimates else []), *found.values(), status)
+    method.solve(*columns.values(), rtol, *along, *([asked] if method.estimates else []), *found.values(), status)
     for values in found.values():
         values[status >= FIRST_REFUSAL] = np.nan
     found["status"] = status
