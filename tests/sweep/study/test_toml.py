@@ -11,6 +11,7 @@ from toy_studies import build, build_rich
 
 import sweep
 from sweep.study import toml
+from sweep.study.model import Study
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False, min_value=1e-300, max_value=1e300)
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
@@ -18,7 +19,8 @@ TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 
 @st.composite
 def spaced(draw, more=()):
-    start, stop = sorted(draw(st.lists(st.floats(1e-3, 1e3), min_size=2, max_size=2, unique=True)))
+    start = draw(st.floats(1e-3, 1e3))
+    stop = start * draw(st.floats(1.001, 1e3))
     entry = {"spacing": draw(st.sampled_from(["linear", "log"])), "start": start, "stop": stop, **dict(more)}
     return entry | draw(st.sampled_from([{}, {"unit": "cm"}, {"unit": "km"}]))
 
@@ -66,6 +68,7 @@ def test_a_study_comes_back_exactly(layout, keys):
     again = sweep.study(tomllib.loads(sweep.to_toml(study)), allow_import=True)
     assert again == study
     assert sweep.to_toml(again) == sweep.to_toml(study)
+    assert Study.from_json(study.to_json(), allow_import=True) == study
 
 
 def test_words_and_arrays_come_back(tmp_path):
