@@ -22,7 +22,7 @@ MASS = [0.1, 0.2, 0.7]
 
 STUDIES = {
     "product": {
-        "title": "Stones", "question": "How fast?", "kernel": "toy:KERNEL", "method": "exact", "rtol": 1e-6,
+        "title": "Stones", "question": "How fast?", "kernel": "toy:KERNEL", "method": "exact", "rtol": 1e-15,
         "outputs": ["fall_time", "drop"], "design": "product", "where": "height > '3 cm' and v0**2 < g*height",
         "axes": {"height": LOG, "v0": {"spacing": "linear", "start": 0, "stop": 2, "num": 5, "unit": "km/hour"}},
         "fixed": {"g": {"value": 981, "unit": "cm/s^2"}}, "along": {"phase": {"num": 3}},
@@ -40,7 +40,7 @@ STUDIES = {
         "along": {"phase": {"spacing": "linear", "start": 0.0, "stop": 100.0, "num": 3, "unit": "percent"}},
     },
     "sobol": {
-        **TOY, "design": {"kind": "sobol", "n": 8, "seed": 3, "scramble": False},
+        **TOY, "design": {"kind": "sobol", "n": 8, "seed": 2**32 - 1, "scramble": False},
         "axes": {"height": {**RANGE, "unit": "m"}, "v0": RANGE},
     },
     "blocks": {
@@ -246,7 +246,7 @@ APART = ("title", "question", "method", "rtol", "where")
 def test_of_several_mistakes_each_is_told_and_no_more(folder, data):
     """In different entries: within one a mistake may stand in the way of another (a log axis from 0, no spacing)."""
     name = data.draw(st.sampled_from(sorted(STUDIES)))
-    inner = [m for m in EACH[name] if m[0] not in (("axes",), ("fixed",), ("kernel",))]
+    inner = [m for m in EACH[name] if m[0] not in (("axes",), ("fixed",), ("kernel",)) and m[0][0] != "design"]
     chosen = data.draw(st.lists(st.sampled_from(inner), min_size=2, max_size=4, unique_by=lambda m: entry(m[0])))
     study = STUDIES[name]
     for path, change, *_ in chosen:
