@@ -244,3 +244,16 @@ def test_what_an_export_left_that_was_killed_goes_with_the_next_one(tmp_path, su
         other.touch()
     sweep.export(xr.Dataset({"y": ("x", np.arange(3.0))}, {"x": np.arange(3.0)}), target)
     assert sorted(tmp_path.iterdir()) == sorted([target, *others])
+
+
+def test_a_summary_is_a_table_with_a_column_for_each_bin_and_status(tmp_path):
+    edges = [0.1, 0.5, 1.0]
+    summary = {"over": ["height"], "outputs": {"fall_time": ["min", "histogram"]}, "edges": {"fall_time": edges}}
+    keys = {"axes": {"v0": [0.0, 1.0], "height": [0.2, 1.0, 3.0]}}
+    ds, cells = sweep.run(toy_studies.build(**keys, summary=summary)), sweep.run(toy_studies.build(**keys)).fall_time
+    heading, rows = read(sweep.export(ds, tmp_path / "out.csv"))
+    table = {name: np.array([row[k] for row in rows], float) for k, name in enumerate(heading)}
+    np.testing.assert_array_equal(table["cells_OK"], [3.0, 3.0])
+    np.testing.assert_array_equal(table["fall_time_min"], cells.min("height"))
+    counts = np.stack([np.histogram(line, edges)[0] for line in cells.transpose("v0", "height").values])
+    np.testing.assert_array_equal(np.stack([table["fall_time_histogram_1"], table["fall_time_histogram_2"]], 1), counts)
