@@ -74,13 +74,16 @@ class DesignParser:
         found = keys["blocks"]
         if not isinstance(found, list | tuple) or not found:
             self.mistakes.add("blocks", "expected a list of tables, e.g. [[blocks]] with axes.mu = [1.0, 2.0]")
+            self.mistakes.unread = True
             found = []
         axes: dict[str, Axis] = {}
         blocks = []
         for i, entry in enumerate(found):
             where = f"blocks[{i}]"
             table = self.mistakes.table(entry, where, "[[blocks]] with axes.mu = [1.0, 2.0]")
-            self.mistakes.keys(table, ("design", "axes"), where)
+            table = self.mistakes.keys(table, ("design", "axes"), where)
+            if not isinstance(entry, Mapping):
+                continue
             own, block = self._block(table, f"{where}.")
             for name in own.keys() & axes.keys():
                 self.mistakes.add(f"{where}.axes.{name}", "is an axis of another block as well; keep one of the two")
@@ -108,13 +111,14 @@ class DesignParser:
     ) -> Iterator[Axis]:
         """Every axis; its field is put into `fields`."""
         sampled = design in samples.GENERATORS
-        shares = self._shares(design, options, len(entries)) if sampled else ()
+        shares = self._shares(design, options, len(entries))
         for i, (name, entry) in enumerate(entries.items()):
             where = f"{at}.{name}"
             fields[name] = self.field_of(name, where)
-            if not sampled:
+            without = isinstance(entry, Mapping) and {"values", "file", "num"}.isdisjoint(entry)
+            if not sampled and (design or not without or {"start", "stop"}.isdisjoint(entry)):
                 yield self.fields.axis(name, entry, fields[name], where)
-            elif isinstance(entry, Mapping) and {"values", "file", "num"}.isdisjoint(entry):
+            elif without:
                 yield self.fields.sampled(name, entry, fields[name], where, shares[i])
             else:
                 self.mistakes.add(where, f"the design chooses the values; write e.g. {SAMPLED_EXAMPLE}")
@@ -138,10 +142,11 @@ class DesignParser:
                 cure = f'{{ kind = "{design}", n = 1024, seed = 0 }}'
                 self.mistakes.add(where, f"how many points? Write design = {cure}")
             return design, {}
+        before, kind = len(self.mistakes), found.get("kind")
+        others = [name for name in DESIGNS if name not in samples.SCRAMBLED]
+        scrambled = () if kind in others else ("scramble",)
+        found = self.mistakes.keys(found, ("kind", *(() if kind in PLAIN else ("n", "seed", *scrambled))), where)
         design = self.mistakes.word(found.get("kind"), f"{where}.kind", DESIGNS) or ""
-        before = len(self.mistakes)
-        scrambled = ("scramble",) if design in samples.SCRAMBLED else ()
-        self.mistakes.keys(found, ("kind", *(("n", "seed", *scrambled) if design not in PLAIN else ())), where)
         if design in PLAIN or not design:
             return design, {}
         options = {"n": self._count(found.get("n"), design, f"{where}.n", axes)}

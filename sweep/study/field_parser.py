@@ -57,26 +57,28 @@ class FieldParser:
             return self._array(entry, field, where)
         factor = None
         if isinstance(entry, Mapping):
-            self.mistakes.keys(entry, ("value", "unit"), where)
+            entry = self.mistakes.keys(entry, ("value", *(("file",) if field is None else ()), "unit"), where)
+            if field is None and "file" in entry:
+                return math.nan
             factor = self._factor(entry, field, where)
             entry, where = entry.get("value"), f"{where}.value"
         if isinstance(entry, list | tuple):
-            self.mistakes.add(
-                where, f"expected a number, found a list; to sweep it, write it under [axes.{where.split('.')[1]}]"
-            )
+            if field is not None:
+                name = where.split(".")[1]
+                self.mistakes.add(where, f"expected a number, found a list; to sweep it, write it under [axes.{name}]")
             return math.nan
         values = self._numbers([entry], lambda item: _number(item, field), lambda _: (where, ""))
         return float(axes.scaled(values, factor)[0]) if len(values) else math.nan
 
     def _array(self, entry: Any, field: Field, where: str) -> float | Floats:
         table = entry if isinstance(entry, Mapping) else {"value": entry}
-        self.mistakes.keys(table, ("value", "file", "unit"), where)
+        table = self.mistakes.keys(table, ("value", "file", "unit"), where)
         factor = self._factor(table, field, where)
         if "file" in table:
             if "value" in table:
                 self.mistakes.add(where, "value and file exclude each other; keep one")
             return frozen(axes.scaled(self._file(table["file"], field.name, field, f"{where}.file"), factor))
-        found, at = table.get("value"), where if table is not entry else f"{where}.value"
+        found, at = table.get("value"), f"{where}.value" if isinstance(entry, Mapping) else where
         if hasattr(found, "__array__"):
             found = np.asarray(found).tolist()
         if not isinstance(found, list | tuple):
@@ -88,8 +90,7 @@ class FieldParser:
 
         Of an array parameter a list of lists, or a csv file with a column for each value: J_1, J_2, ...
         """
-        table = given if isinstance(given, Mapping) else {"values": given}
-        form = self._form(table, where)
+        table, form = self._form(given if isinstance(given, Mapping) else {"values": given}, where)
         factor = self._factor(table, field, where)
         values, kind = NONE, form
         if form == "spacing" and field and field.dims:
@@ -99,30 +100,30 @@ class FieldParser:
         elif form == "values":
             read = self._rows if field and field.dims else self._list
             values = axes.scaled(
-                read(table["values"], field, where if table is not given else f"{where}.values"), factor
+                read(table["values"], field, f"{where}.values" if isinstance(given, Mapping) else where), factor
             )
-        elif form == "file":
+        elif form == "file" and field is not None:
             from_file = self._row_file if field and field.dims else self._file
             values = axes.scaled(from_file(table["file"], name, field, f"{where}.file"), factor)
         entry = _entry(table) if form == "spacing" and len(values) else None
         return Axis(name, frozen(values), kind, _words(values, field), entry)
 
-    def _form(self, table: Mapping[str, Any], where: str) -> str:
-        """Which of the `FORMS` it is; "" where it is none or several."""
+    def _form(self, given: Mapping[str, Any], where: str) -> tuple[Mapping[str, Any], str]:
+        """The table, and which of the `FORMS` it is; "" where it is none or several."""
         before = len(self.mistakes)
-        self.mistakes.keys(table, (*FORMS, *SPACING_KEYS, "unit"), where)
-        given = [form for form in FORMS if form in table]
-        if len(given) > 1:
-            self.mistakes.add(where, f"{listed(given, word='and')} exclude each other; keep one")
-        elif not given and len(self.mistakes) == before:
+        table = self.mistakes.keys(given, (*FORMS, *SPACING_KEYS, "unit"), where)
+        forms = [form for form in FORMS if form in table]
+        if len(forms) > 1:
+            self.mistakes.add(where, f"{listed(forms, word='and')} exclude each other; keep one")
+        elif not forms and len(self.mistakes) == before:
             cure = 'spacing = "linear" or "log"' if set(table) & set(SPACING_KEYS) else EXAMPLE
             self.mistakes.add(where, f"has neither spacing, values nor file; write {cure}")
-        if len(given) != 1:
-            return ""
+        if len(forms) != 1:
+            return table, ""
         for key in SPACING_KEYS:
-            if (key in table) and given != ["spacing"]:
-                self.mistakes.add(f"{where}.{key}", f"does not go with {given[0]}; leave it out")
-        return given[0]
+            if (key in table) and forms != ["spacing"]:
+                self.mistakes.add(f"{where}.{key}", f"does not go with {forms[0]}; leave it out")
+        return table, forms[0]
 
     def _factor(self, table: Mapping[str, Any], field: Field | None, where: str) -> Decimal | None:
         """What the numbers of an entry are multiplied by, to be in the field's unit."""
@@ -188,7 +189,7 @@ class FieldParser:
         before = len(self.mistakes)
         table = self.mistakes.table(entry, where, SAMPLED_EXAMPLE)
         factor, spacing, bounds = None, None, (math.nan, math.nan)
-        self.mistakes.keys(table, (*SAMPLED_KEYS, "unit"), where)
+        table = self.mistakes.keys(table, (*SAMPLED_KEYS, "unit"), where)
         if field and (field.dims or field.integer):
             kind = "an array" if field.dims else "a whole number"
             self.mistakes.add(where, f"{name} is {kind}, which is not sampled; sweep it in a block of its own")
@@ -310,7 +311,7 @@ def _entry(table: Mapping[str, Any]) -> dict[str, Any]:
 
 def _number(found: Any, field: Field | None) -> float:
     """Number of a word or of a TOML value. Raises ValueError with the text for the user."""
-    if field is None and isinstance(found, str):
+    if field is None and isinstance(found, str | list | tuple):
         return math.nan
     return _choice(found, field) if field and field.choices else exact_float(found)
 

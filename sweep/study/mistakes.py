@@ -14,13 +14,28 @@ from sweep.system.errors import Mistake, StudyError
 
 
 class Mistakes:
-    """All that is wrong with one study."""
+    """All that is wrong with one study.
+
+    Attributes
+    ----------
+    unread : bool
+        Whether something that holds others was no table, so that what stands in it is not known to be missing.
+    meant : set of str
+        Parameters and coordinates that misspelt names are taken for.
+    """
 
     def __init__(self) -> None:
         self.found: list[Mistake] = []
+        self.unread = False
+        self.meant: set[str] = set()
 
     def __len__(self) -> int:
         return len(self.found)
+
+    def good(self, *places: str) -> bool:
+        """Whether nothing is wrong at these places and in what stands below them, so that they can be compared."""
+        below = tuple(f"{place}{sign}" for place in places for sign in ".[")
+        return not any(m.where in places or m.where.startswith(below) for m in self.found)
 
     def add(self, where: str, message: str) -> None:
         self.found.append(Mistake(where, message))
@@ -87,16 +102,23 @@ class Mistakes:
     def table(self, value: Any, where: str, example: str) -> Mapping[str, Any]:
         if isinstance(value, Mapping):
             return value
+        self.unread = True
         self.add(where, f"expected a table, found {show(value)}; write e.g. {example}")
         return {}
 
-    def keys(self, table: Mapping[str, Any], allowed: Iterable[str], where: str = "") -> None:
-        """A mistake for every key that is not `allowed`."""
-        words = list(allowed)
+    def keys(
+        self, table: Mapping[str, Any], allowed: Iterable[str], where: str = "", says: str = "no such key"
+    ) -> dict[str, Any]:
+        """The table; a mistake for every key that is not `allowed`, and it stands for the one that is meant."""
+        words, found = list(allowed), dict(table)
         for key in table:
             if key not in words:
+                meant = nearest(key, words)
                 hint = did_you_mean(key, words) or f"; allowed are {listed(words)}"
-                self.add(f"{where}.{key}" if where else str(key), f"no such key{hint}")
+                self.add(f"{where}.{key}" if where else str(key), f"{says}{hint}")
+                if meant:
+                    found.setdefault(meant, found.pop(key))
+        return found
 
 
 def exact_float(value: Any) -> float:
@@ -171,8 +193,14 @@ def limits(field: Field) -> str:
 
 def did_you_mean(found: Any, words: Iterable[str]) -> str:
     """'; did you mean x?', or nothing where no word is near."""
+    near = nearest(found, words)
+    return f"; did you mean {near}?" if near else ""
+
+
+def nearest(found: Any, words: Iterable[str]) -> str:
+    """The word that is most like what was found; "" where none is."""
     if not isinstance(found, str):
         return ""
     by_lower = {w.lower(): w for w in words}
     near = difflib.get_close_matches(found.lower(), by_lower, n=1, cutoff=0.5)
-    return f"; did you mean {by_lower[near[0]]}?" if near else ""
+    return by_lower[near[0]] if near else ""

@@ -16,7 +16,7 @@ from sweep.study.condition import CellCondition
 from sweep.study.designs import SMALLEST_RTOL, DesignParser, axes_named
 from sweep.study.field_parser import FieldParser
 from sweep.study.kernel_lookup import load_kernel
-from sweep.study.mistakes import Mistakes, did_you_mean, limits, listed
+from sweep.study.mistakes import Mistakes, did_you_mean, limits, listed, nearest
 from sweep.study.model import AUTO, SETTINGS, Axis, Block, Study, Summary, differs, frozen
 from sweep.study.summary import SummaryParser
 from sweep.system.errors import SweepError
@@ -42,7 +42,7 @@ class StudyParser:
 
     def study(self, keys: Mapping[str, Any], text: str) -> Study:
         """The study. Raises StudyError with all that is wrong with it."""
-        self.mistakes.keys(keys, KEYS)
+        keys = self.mistakes.keys(keys, KEYS)
         self.kernel = self._kernel(keys)
         title, question = (self.mistakes.text(keys.get(key, ""), key) for key in ("title", "question"))
         method, rtol = self._method(keys), self._rtol(keys)
@@ -118,8 +118,9 @@ class StudyParser:
         found = next((p for p in self.kernel.parameters if p.name == name), None)
         if found is None and self.kernel is not UNKNOWN:
             names = [p.name for p in self.kernel.parameters]
-            hint = did_you_mean(name, names) or f"; it has {listed(names, word='and')}"
+            hint = did_you_mean(name, [*names, *SETTINGS]) or f"; it has {listed(names, word='and')}"
             self.mistakes.add(where, f"kernel {self.kernel.name} has no such parameter{hint}")
+            self.mistakes.meant.add(nearest(name, names))
         return found
 
     def _setting(self, name: str) -> Field | None:
@@ -208,7 +209,7 @@ class StudyParser:
                 fixed[field.name] = given[source.name]
             elif isinstance(source.default, float | int):
                 fixed[field.name] = float(source.default)
-            elif source is field:
+            elif source is field and field.name not in self.mistakes.meant and not self.mistakes.unread:
                 what = f"{field.name} ({field.doc}, {field.unit}) has no default"
                 self.mistakes.add(f"fixed.{field.name}", f"missing; {what}: give it here or as an axis")
         return self._filled(axes, fixed), follows
@@ -227,7 +228,7 @@ class StudyParser:
             if len(set(found.values())) > 1:
                 counts = listed((f"{name} has {n}" for name, n in found.items()), word="and")
                 self.mistakes.add("fixed", f"arrays along {dim} need equal length; {counts} values")
-            elif not found and not any(name in axes for name in arrays):
+            elif not found and self.mistakes.good("fixed") and not any(name in axes for name in arrays):
                 self.mistakes.add("fixed", f"how many of {dim}? Give at least one of {listed(arrays)} as a list")
             for name in arrays:
                 if arrays[name] == dim and name in fixed and not np.ndim(fixed[name]):
@@ -250,6 +251,7 @@ class StudyParser:
                     f"; it has {listed(names, word='and')}" if names else "; leave it out"
                 )
                 self.mistakes.add(f"along.{name}", f"kernel {self.kernel.name} has no such coordinate{hint}")
+                self.mistakes.meant.add(nearest(name, names))
         needed = {dim: o.name for o in self.kernel.outputs if o.name in outputs for dim in o.dims}
         along = {}
         for field in self.kernel.along:
@@ -258,7 +260,7 @@ class StudyParser:
             if field.name in given:
                 values = self._coordinate(field, given[field.name], where)
                 along[field.name] = values if field.name in needed else frozen([])
-            elif field.name in needed:
+            elif field.name in needed and field.name not in self.mistakes.meant and not self.mistakes.unread:
                 self.mistakes.add(where, f"missing; output {needed[field.name]} needs it, e.g. num = 200")
         return along
 
@@ -268,10 +270,11 @@ class StudyParser:
             counted = field.integer and isinstance(entry["num"], int)
             last = min(field.upper, field.lower + entry["num"] - 1) if counted else field.upper
             entry = {"spacing": "linear", "start": field.lower, "stop": last, **entry}
+        before = len(self.mistakes)
         values = self.fields.axis(field.name, entry, field, where).values
         inside = (values >= field.lower) & (values <= field.upper) & np.isfinite(values)
         bad = values[~(inside & (values == np.round(values)) if field.integer else inside)]
-        if len(bad):
+        if len(bad) and len(self.mistakes) == before:
             kind = "whole numbers" if field.integer else "values"
             self.mistakes.add(where, f"expected {kind} from {field.lower:g} to {field.upper:g}, found {bad[0]:g}")
         return values
@@ -280,6 +283,8 @@ class StudyParser:
         self, method: str, axes: Mapping[str, Axis], fixed: Mapping[str, Any], outputs: tuple[str, ...]
     ) -> None:
         """Methods named that cannot do a term which the study has, or do not give an output asked for."""
+        if not self.mistakes.good("fixed"):
+            return
         terms = [p.name for p in self.kernel.parameters if p.name in axes or differs(p, fixed)]
         excluded = {m.name: [term for term in m.excludes if term in terms] for m in self.kernel.methods}
         lacking = {m.name: [name for name in m.lacks if name in outputs] for m in self.kernel.methods}

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from kernels.interface import Field
 from sweep.study.field_parser import FieldParser
-from sweep.study.mistakes import Mistakes, did_you_mean, listed
+from sweep.study.mistakes import Mistakes, did_you_mean, listed, nearest
 from sweep.study.model import Axis, Summary
 
 REDUCTIONS = ("min", "max", "mean", "argmin", "argmax", "histogram")
@@ -45,7 +45,7 @@ class SummaryParser:
     def read(self, found: Any, axes: Mapping[str, Axis], together: Together, asked: Sequence[Field]) -> Summary:
         """The summary that the table says, of the output fields asked for; `together` are axes that run together."""
         table = self.mistakes.table(found, "summary", 'summary.over = ["mu"]')
-        self.mistakes.keys(table, KEYS, "summary")
+        table = self.mistakes.keys(table, KEYS, "summary")
         over = self._over(table.get("over"), axes, together)
         outputs = self._outputs(table.get("outputs", {}), [f.name for f in asked])
         edges = self._edges(table.get("edges", {}), outputs, {f.name: f for f in asked})
@@ -57,7 +57,10 @@ class SummaryParser:
         if found is None:
             return tuple(axes)
         where = "summary.over"
-        names = self.mistakes.words(found, where, axes, 'a list of axes, e.g. ["mu"]; leave it out to reduce all')
+        if not axes:
+            return ()
+        known = [*axes, *self.mistakes.meant]
+        names = self.mistakes.words(found, where, known, 'a list of axes, e.g. ["mu"]; leave it out to reduce all')
         for block in together:
             if len({name in names for name in block}) > 1:
                 listing = listed(block, word="and")
@@ -81,11 +84,16 @@ class SummaryParser:
         given = self.mistakes.table(found, "summary.edges", "[summary.edges.period] with num = 61")
         wanted = [name for name, reductions in outputs.items() if "histogram" in reductions]
         edges = {}
+        if not self.mistakes.good("kernel", "outputs", "summary.outputs", "summary.edges"):
+            return {}
         for name, entry in given.items():
             where = f"summary.edges.{name}"
             if name not in wanted:
-                cure = f'; ask for it: outputs.{name} = ["histogram"]' if name in outputs else ""
+                cure = (
+                    f'; ask for it: outputs.{name} = ["histogram"]' if name in outputs else did_you_mean(name, wanted)
+                )
                 self.mistakes.add(where, f"there is no histogram of {name}{cure}")
+                wanted = [meant for meant in wanted if meant != nearest(name, wanted)]
                 continue
             edges[name] = self.fields.axis(name, entry, _plain(fields[name]), where).values
             self._rising(edges[name], where)

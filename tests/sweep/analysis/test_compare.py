@@ -1,16 +1,14 @@
 """Which law: the one that data were made of is chosen, and what cannot be told apart is not."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import xarray as xr
-from scipy.stats import chi2, norm
+from scipy.stats import chi2
 
 import sweep
 from sweep.analysis import compare
 from sweep.analysis.correlated import criterion, deviance
-from sweep.analysis.fits import Found, curve, fitted
+from sweep.analysis.fits import curve, fitted
 from sweep.analysis.shapes import BENDS, LAWS
 from sweep.system.errors import SweepError
 
@@ -102,17 +100,6 @@ def test_the_criterion_is_that_of_statsmodels():
     assert found.aicc == pytest.approx(found.deviance + 2 * k + 2 * k * (k + 1) / (n - k - 1))
 
 
-def test_one_law_alone_may_have_noise_of_any_kind(monkeypatch):
-    """Where its size is not known."""
-    tried = []
-    monkeypatch.setattr(compare, "_with_any_noise", lambda t, z, fit: tried.append(fit.law.name) or fit)
-    y = line(-0.5 * T + 0.01 * np.random.default_rng(3).standard_normal(T.size))
-    sweep.compare_laws(y, "x", sigma=0.01)
-    assert not tried
-    sweep.compare_laws(y, "x")
-    assert tried == ["one law"]
-
-
 @pytest.mark.parametrize("law", BENDS, ids=str)
 def test_every_bend_is_zero_far_below_and_its_own_line_far_above(law):
     """So that x0 is where the asymptotes meet, whatever the shape."""
@@ -175,108 +162,7 @@ def test_what_is_one_everywhere_is_one_law():
 
 # the parts of a comparison
 
-SHORT = np.linspace(0.0, 2.0, 20)
 WAVE = np.sin(17.0 * np.arange(20) ** 2 + 0.3)
-
-
-def made_up(name, numbers, aicc, off=WAVE):
-    return Found(replace(LAWS[0], name=name, numbers=numbers), np.zeros(2), np.zeros(2), off, 0.0, aicc, 0.0)
-
-
-def chance_of_runs(off):
-    """Wald's and Wolfowitz's normal distribution, half a run further for the step between whole numbers."""
-    n, above = off.size, int((off > 0).sum())
-    both = 2 * above * (n - above)
-    runs = 1 + np.count_nonzero(np.diff(np.sign(off)))
-    return norm.cdf((runs + 0.5 - both / n - 1) / np.sqrt(both * (both - n) / n**2 / (n - 1)))
-
-
-@pytest.mark.parametrize("n", [12, 13, 30])
-def test_the_chance_of_so_few_runs_is_that_of_the_normal_distribution(n):
-    for length in (1, 2, 3, 5, n - 1):
-        off = np.where(np.arange(n) // length % 2, 1.0, -2.0)
-        assert compare._runs(off) == pytest.approx(chance_of_runs(off), rel=1e-9)
-
-
-def test_runs_of_few_points_or_of_one_sign_have_no_chance():
-    assert np.isnan(compare._runs(WAVE[:11]))
-    assert np.isfinite(compare._runs(WAVE[:12]))
-    for off in (abs(WAVE), -abs(WAVE), np.zeros(20)):
-        assert np.isnan(compare._runs(off))
-
-
-@pytest.mark.parametrize(("other", "numbers", "deviance"), [(-200.0, 3, -200.0), (1e3, 2, None)])
-def test_one_law_is_judged_with_the_noise_that_suits_it_best(monkeypatch, other, numbers, deviance):
-    z = -0.5 * SHORT + 0.1 * WAVE
-    found, floors = fitted(LAWS[0], SHORT, z), []
-    monkeypatch.setattr(compare, "line_deviance", lambda t, z, floor: floors.append(floor) or (other, 3))
-    told = compare._with_any_noise(SHORT, z, found)
-    deviance = found.deviance if deviance is None else deviance
-    k = numbers + 1  # with the size of the noise
-    assert told.deviance == pytest.approx(deviance)
-    assert told.aicc == pytest.approx(deviance + 2 * k + 2 * k * (k + 1) / (20 - k - 1))
-    assert told.bic == pytest.approx(deviance + k * np.log(20))
-    assert floors == [pytest.approx((4 * 2.0**-52 * (1 + abs(z).max())) ** 2, abs=0)]
-
-
-@pytest.mark.parametrize(("worse", "chosen", "margin"), [(10.0, "simple", -10.0), (10.1, "rich", 7.0)])
-def test_a_law_of_more_numbers_is_believed_where_it_is_better_by_more_than_ten(worse, chosen, margin):
-    tried = [made_up("rich", 5, 1.0), made_up("richer", 5, 8.0), made_up("simple", 2, 1.0 + worse)]
-    found = compare._verdict(tried)
-    assert (found["chosen"], found["margin"]) == (chosen, pytest.approx(margin))
-    assert found["verdict"].startswith(f"{chosen} (A x^p): not ruled out beside it: ")
-    others = found["verdict"].partition("beside it: ")[2]
-    assert others == ("rich, richer" if chosen == "simple" else "richer")
-
-
-def test_of_laws_with_as_many_numbers_the_nearer_is_chosen():
-    found = compare._verdict([made_up("rich", 5, 0.0), made_up("near", 3, 1.0), made_up("far", 3, 2.0)])
-    assert (found["chosen"], found["margin"]) == ("near", -1.0)
-    alone = compare._verdict([made_up("near", 5, 0.0), made_up("far", 2, 12.345)])
-    assert alone["verdict"] == "near (A x^p): all others are worse by 12.3 and more in AICc"
-    assert compare._verdict([made_up("only", 2, 3.0)])["margin"] == np.inf
-
-
-@pytest.mark.parametrize("known", [False, True])
-def test_the_table_has_what_follows_from_the_distances(known):
-    z = -0.5 * SHORT + 0.1 * WAVE
-    weights = np.linspace(50.0, 200.0, 20)
-    tried = [fitted(law, SHORT, z, weights if known else None, known=known) for law in LAWS[:2]]
-    tried.append(made_up("far", 2, 99.0, WAVE * 1e3)._replace(numbers=np.array([0.2, -1.0])))
-    found = compare._table(SHORT, z, tried, weights if known else None)
-    assert found.law.values.tolist() == ["one law", "logarithm", "far"]
-    slope, level = np.polyfit(SHORT, z, 1, w=np.sqrt(weights) if known else None)
-    off = z - level - slope * SHORT
-    one = found.sel(law="one law")
-    assert float(one.scatter) == pytest.approx(np.sqrt((off**2).mean()), rel=1e-6)
-    assert float(one.residual) == pytest.approx(np.exp(abs(off).max()) - 1, rel=1e-6)
-    assert float(one.runs) == pytest.approx(chance_of_runs(off), rel=1e-9)
-    np.testing.assert_allclose(one.fitted, np.exp(level + slope * SHORT), rtol=1e-6)
-    np.testing.assert_allclose(found.sel(law="far").fitted, np.exp(0.2 - SHORT / 2.0))
-    assert float(found.residual.sel(law="far")) == pytest.approx(np.expm1(700.0))
-    np.testing.assert_allclose(found.worse, [0, tried[1].aicc - tried[0].aicc, 99 - tried[0].aicc])
-    np.testing.assert_allclose(found.bic, [f.bic for f in tried])
-    assert found.numbers.values.tolist() == [2, 3, 2]
-    np.testing.assert_allclose(found.x, np.exp(SHORT))
-    np.testing.assert_allclose(found.y, np.exp(z))
-    if known:
-        assert float(one.chi_squared) == pytest.approx(chi2.sf((weights * off**2).sum(), 18), rel=1e-6)
-    else:
-        assert np.isnan(found.chi_squared).all()
-    assert found.scatter.attrs["units"] == "1"
-
-
-def test_exponents_are_written_with_their_errors_over_the_width_of_the_window():
-    numbers, errors = np.array([8.0, 2.0, 4.0, -1.0, -0.5]), np.array([0.9, 0.8, 0.7, 0.02, 0.04])
-
-    def text(law):
-        return compare._exponents(Found(law, numbers, errors, WAVE, 0.0, 0.0, 0.0), 2.0)
-
-    by_name = {law.name: law for law in LAWS}
-    assert text(by_name["one law"]) == "p = -0.25 +- 0.02"
-    assert text(by_name["two laws"]) == "p low = -0.5 +- 0.01, p high = -0.25 +- 0.02"
-    assert text(by_name["correction to scaling"]) == "p = -0.25 +- 0.02, D = 1"
-    assert text(by_name["offset"]) == "p = 4 +- 0.5"
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 from scipy.linalg import toeplitz
-from scipy.optimize import brentq
 
-from sweep.analysis import correlated as module
-from sweep.analysis.correlated import averaged, corrected, correlated, criterion, deviance, student
+from sweep.analysis.correlated import averaged, criterion, deviance, student
 
 PHI = [-0.4, -0.3, -0.2, -0.1, 0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.93, 0.96, 0.98, 0.99, 0.995]
 
@@ -32,20 +30,9 @@ def squares(columns, z, weights, phi):
     return numbers, normal, off @ inverse @ off, covariance
 
 
-def test_the_correlations_that_are_tried():
-    np.testing.assert_allclose(module.CORRELATIONS, PHI, atol=1e-15)
-
-
 @pytest.mark.parametrize(("left", "freedom"), [(5, 5), (1, 1), (0, 1), (-3, 1)])
 def test_the_reach_is_students(left, freedom):
     assert student(left, 0.9) == pytest.approx(stats.t.ppf(0.95, freedom), rel=1e-10)
-
-
-def test_the_correction_for_few_points_ends_where_there_are_too_few():
-    assert corrected(3.0, 10, 4) == pytest.approx(3 + 8 + 2 * 4 * 5 / 5)
-    assert corrected(3.0, 6, 4) == pytest.approx(3 + 8 + 40)
-    assert corrected(3.0, 5, 4) == math.inf
-    assert corrected(3.0, 4, 4) == math.inf
 
 
 @pytest.mark.parametrize("even", [True, False])
@@ -94,42 +81,6 @@ def test_numbers_are_averaged_over_all_correlations(even):
         for end, chance in ((found.low[k], 0.05), (found.high[k], 0.95)):
             below = (share * stats.t.cdf((end - values[:, k]) / errors[:, k], z.size - 2)).sum()
             assert below == pytest.approx(chance, abs=1e-9)
-
-
-def test_a_line_lies_in_its_interval_as_plain_least_squares_has_it(monkeypatch):
-    columns, z, weights = example()
-    t = columns[:, 1]
-    found, wanted = correlated(t, z, 0.9, weights), averaged(columns - [0, t.mean()], z, 0.9, weights)
-    assert (found.kind, found.error) == ("correlated", wanted.error[1])
-    np.testing.assert_allclose([found.low, found.high], [wanted.low[1], wanted.high[1]])
-    np.testing.assert_array_equal(found.weights, weights)
-    np.testing.assert_array_equal(correlated(t, z, 0.9).weights, np.ones(t.size))
-    plain = np.polyfit(t, z, 1, w=np.sqrt(weights))[0]
-    for shift in (1.0, -1.0):
-        moved = wanted._replace(low=wanted.low + shift, high=wanted.high + shift)
-        monkeypatch.setattr(module, "averaged", lambda *_, moved=moved: moved)
-        found = correlated(t, z, 0.9, weights)
-        inner, outer = (found.low, found.high) if shift > 0 else (found.high, found.low)
-        assert inner == pytest.approx(plain, rel=1e-9)
-        assert outer == pytest.approx(moved.high[1] if shift > 0 else moved.low[1])
-
-
-def test_an_interval_holds_the_value_in_its_middle(monkeypatch):
-    columns, z, weights = example()
-    for end, bound in ((-9.0, "high"), (9.0, "low")):
-        monkeypatch.setattr(module, "_quantile", lambda *_, end=end: end)
-        found = averaged(columns, z, 0.9, weights)
-        np.testing.assert_array_equal(getattr(found, bound), found.value)
-
-
-def test_a_quantile_is_that_of_the_mixture():
-    share, middle, error = np.array([0.2, 0.5, 0.3]), np.array([0.0, 1.0, 5.0]), np.array([1.0, 0.1, 2.0])
-
-    def below(x):
-        return share @ stats.t.cdf((x - middle) / error, 4) - 0.8
-
-    assert module._quantile(share, middle, error, 4, 0.8) == pytest.approx(brentq(below, -50, 50), abs=1e-9)
-    assert module._quantile(share, np.full(3, 2.0), np.zeros(3), 4, 0.8) == 2.0
 
 
 def test_points_that_leave_nothing_have_no_error():

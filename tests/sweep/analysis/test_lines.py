@@ -3,19 +3,14 @@
 import numpy as np
 import pytest
 import xarray as xr
-from neighbours import derivative
 
 import sweep
-from sweep.analysis import lines
-from sweep.analysis.lines import KIND_WORDS, Given, crossover, judge
-from sweep.analysis.loglog import line, tends
-from sweep.analysis.scatter import Scatter
+from sweep.analysis.lines import Given, crossover, judge
 
 EPSILON = 2.0**-52
 N = 12
 T = np.linspace(-1.0, 1.0, N) + 0.02 * np.sin(5.0 * np.arange(N)) + 3.0
 WAVE = np.resize([1.0, -1.0], N)
-BLIND = Given(0.95, None, False)
 
 
 def curve(z, t=T, **attrs):
@@ -62,94 +57,11 @@ def test_distances_up_to_twice_the_bound_are_of_it(share, kind):
     assert judged(z, bound=bound, noise=False).kind == kind
 
 
-@pytest.mark.parametrize(("share", "kind"), [(0.99, "exact"), (1.01, "curved")])
-def test_distances_up_to_eight_roundings_are_none(share, kind, monkeypatch):
-    monkeypatch.setattr(lines, "rounding", lambda t, z: abs(off_line(z)).max() / (8 * share))
-    assert judged(-0.5 * T + 1e-3 * WAVE, noise=False).kind == kind
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_interval_of_a_curve_is_the_range_of_its_slope(sign, monkeypatch):
-    z = sign * np.exp(0.7 * (T - 3))
-    bound = np.linspace(1e-4, 2e-4, N)
-    found = judged(z, bound=bound)
-    five, seven = derivative(T, 5), derivative(T, 7)
-    moved = abs(five) @ (bound + least(z))
-    doubt = (abs((five - seven) @ z) + moved).max()
-    assert (found.kind, found.fits) == ("curved", False)
-    assert found.low == pytest.approx((five @ z).min() - doubt, rel=1e-9)
-    assert found.high == pytest.approx((five @ z).max() + doubt, rel=1e-9)
-    expected = tends(T, five @ z, moved[0])[1], tends(-T[::-1], (five @ z)[::-1], moved[-1])[1]
-    assert found.ends == pytest.approx(expected, rel=1e-9)
-    monkeypatch.setattr(lines, "tends", lambda t, local, doubt: (0.0, doubt))
-    assert judged(z, bound=bound).ends == pytest.approx((moved[0], moved[-1]), rel=1e-9)
-    slope = np.polyfit(T, z, 1)[0]
-    size = np.sqrt((off_line(z) ** 2).sum() / (N - 2) / ((T - T.mean()) ** 2).sum())
-    assert found.error == pytest.approx(size, rel=1e-9)
-    assert found.low < slope < found.high
-
-
-def test_the_slope_of_the_line_is_in_the_range_of_a_curve(monkeypatch):
-    z = np.exp(0.7 * (T - 3))
-    slope = np.polyfit(T, z, 1)[0]
-    for far, bounds in ((9.0, (slope, 9.0)), (-9.0, (-9.0, slope))):
-        monkeypatch.setattr(lines, "slopes", lambda t, z, points, far=far: np.full(t.size, far))
-        found = judged(z)
-        assert (found.low, found.high) == pytest.approx(bounds, abs=1e-10)
-
-
-def test_three_points_or_distances_of_rounding_show_no_kind_of_noise(monkeypatch):
-    monkeypatch.setattr(lines, "scattered", None)  # is not asked
-    three = judged(np.array([0.0, 1.3, 1.9]), np.arange(3.0), noise=True)
-    assert (three.kind, three.fits) == ("any", False)
-    exact = judged(0.3 - 0.7 * T, noise=True)
-    assert (exact.kind, exact.fits) == ("any", True)
-    assert judged(0.3 - 0.7 * T, noise="uneven").kind == "any"
-
-
 def test_known_errors_are_taken_before_anything_is_asked():
     found = judged(-0.5 * T + 0.1 * WAVE, noise="outliers", sigma=0.1)
     assert (found.kind, found.fits, np.isnan(found.ends).all()) == ("weighted", True, True)
     assert found.error == pytest.approx(0.1 / np.sqrt(((T - T.mean()) ** 2).sum()))
     assert not judged(-0.5 * T + 0.1 * WAVE, sigma=0.01).fits
-
-
-@pytest.mark.parametrize(
-    ("noise", "kind", "bent", "runs", "expected"),
-    [
-        (None, "any", None, True, ("any", True, (1.0, 2.0))),
-        (None, "any", (-3.0, 3.0), False, ("bent", False, (-3.0, 3.0))),
-        (True, "uneven", (-3.0, 3.0), False, ("bent", False, (-3.0, 3.0))),
-        ("uneven", "uneven", (-3.0, 3.0), True, ("uneven", True, (1.0, 2.0))),
-        ("independent", "independent", (-3.0, 3.0), True, ("independent", False, (1.0, 2.0))),
-        ("independent", "independent", (-3.0, 3.0), False, ("independent", True, (1.0, 2.0))),
-    ],
-)
-def test_a_bend_is_looked_for_unless_the_kind_of_noise_is_said(monkeypatch, noise, kind, bent, runs, expected):
-    weights, asked = np.linspace(1, 2, N), []
-    monkeypatch.setattr(lines, "is_scatter", lambda *_: True)
-    monkeypatch.setattr(lines, "scattered", lambda *_: Scatter(kind, weights, 0.25, 1.0, 2.0))
-    monkeypatch.setattr(lines, "bend", lambda t, z, c, w: asked.append(w) or bent)
-    monkeypatch.setattr(lines, "runs_deny", lambda _: runs)
-    found = judged(-0.5 * T + 0.1 * WAVE, noise=noise)
-    assert (found.kind, found.fits, (found.low, found.high)) == expected
-    assert found.error == 0.25
-    np.testing.assert_array_equal(found.weights, np.ones(N) if found.kind == "bent" else weights)
-    assert len(asked) == (not isinstance(noise, str))
-    for given in asked:
-        np.testing.assert_array_equal(given, weights if kind == "uneven" else np.ones(N))
-
-
-def test_where_nothing_is_said_scatter_is_what_a_test_finds(monkeypatch):
-    asked = []
-    monkeypatch.setattr(lines, "is_scatter", lambda t, off, z, bound: asked.append((off, bound)) or False)
-    z = -0.5 * T + 0.1 * WAVE
-    assert judged(z, bound=1e-3).kind == "curved"
-    np.testing.assert_allclose(asked[0][0], off_line(z), atol=1e-12)
-    assert asked[0][1].tolist() == [1e-3] * N
-    judged(z, noise=False)
-    judged(z, noise="independent")
-    assert len(asked) == 1
 
 
 # the numbers of a fit
@@ -170,46 +82,6 @@ def test_known_errors_make_all_errors_of_a_fit():
     assert float(found.level_error) == pytest.approx(weights.sum() ** -0.5)
     assert float(found.centre) == pytest.approx(np.exp(np.average(T, weights=weights)))
     assert (float(found.start), float(found.stop)) == pytest.approx(tuple(np.exp(z[[0, -1]])))
-
-
-def test_a_fit_says_of_each_kind_whether_it_is_noise():
-    kinds = np.arange(-1.0, len(KIND_WORDS))
-    kinds[0] = np.nan
-    names = [*lines.Line._fields, *lines.JUDGED]
-    fit = xr.Dataset({name: ("set", np.ones(kinds.size)) for name in names})
-    fit["kind"], fit["error"] = ("set", kinds), ("set", np.full(kinds.size, 3.0))
-    fit["exponent_error"] = ("set", np.r_[0.0, np.full(kinds.size - 1, 2.0)])
-    found = lines._describe_fit(fit, curve(T), "x")
-    noisy = dict(zip(KIND_WORDS, found.noisy.values[1:].tolist(), strict=True))
-    assert noisy == {word: float(word not in ("exact", "bounded", "curved")) for word in KIND_WORDS}
-    assert np.isnan(found.noisy[0])
-    assert found.kind.values.tolist() == list(range(-1, len(KIND_WORDS)))
-    assert found.level_error.values.tolist() == [1.0] + [1.5] * len(KIND_WORDS)
-    assert found.prefactor_error.values.tolist() == [1.0] + [1.5] * len(KIND_WORDS)
-    assert found.exponent_error.values.tolist() == [0.0] + [3.0] * len(KIND_WORDS)
-    units = {name: variable.attrs["units"] for name, variable in found.data_vars.items()}
-    seconds = {name for name, unit in units.items() if unit == "s"}
-    assert seconds == {"prefactor", "prefactor_error", "level", "start", "stop"}
-    assert {name for name, unit in units.items() if unit == "m"} == {"low", "high", "centre"}
-
-
-def test_lines_of_an_array_each_have_their_points_and_their_errors():
-    t = T[::-1]
-    z = np.stack([0.3 - 0.7 * t, np.exp(0.5 * t), 0.2 + t])
-    z[0, [0, 5]], z[2, 2:] = np.nan, np.nan
-    bound = np.zeros((3, N))
-    bound[0] = 1e-3
-    rows = lines._lines(t, z, np.full((3, N), np.nan), bound, BLIND)
-    names = [*lines.Line._fields, *lines.JUDGED]
-    found = {name: rows[:, k] for k, name in enumerate(names)}
-    words = [KIND_WORDS[int(k)] for k in found["kind"][:2]]
-    assert words == ["bounded", "curved"]
-    assert np.isnan(found["kind"][2])
-    assert found["points"].tolist() == [10, N, 2]
-    np.testing.assert_allclose(found["start"][:2], np.exp([z[0, -1], z[1, -1]]))
-    np.testing.assert_allclose(found["stop"][:2], np.exp([z[0, 1], z[1, 0]]))
-    np.testing.assert_allclose(found["exponent"][:2], line(t, z[:2]).exponent)
-    np.testing.assert_array_equal(found["fits"][:2], [1, 0])
 
 
 # where two laws meet
@@ -293,8 +165,3 @@ def test_fits_of_different_curves_do_not_meet(name):
         pair[0].attrs[name], pair[1].attrs[name] = low, high
         with pytest.raises(sweep.SweepError, match=f"the fits are of different {name}: {low}, {high}"):
             crossover(*pair)
-
-
-@pytest.mark.parametrize("noise", [None, True, False, *lines.KINDS])
-def test_words_for_noise(noise):
-    lines.check_noise(noise)

@@ -9,7 +9,7 @@ from scipy.ndimage import maximum_filter1d
 from scipy.stats import norm
 
 from sweep.analysis import loglog
-from sweep.analysis.loglog import brackets, interpolation_errors, is_logarithmic, line, root, runs, spans_decades, tends
+from sweep.analysis.loglog import brackets, interpolation_errors, is_logarithmic, root, spans_decades, tends
 
 EPSILON = 2.0**-52
 
@@ -102,38 +102,6 @@ def test_stated_errors_of_the_values_are_added_to_the_error_of_a_slope():
     np.testing.assert_array_equal(loglog.slope_errors(t, z, 0 * bound), loglog.slope_errors(t, z))
 
 
-@pytest.mark.parametrize(
-    ("steps", "points"),
-    [
-        ([1, 2, 3, -3, -2, -1], [3]),  # a point on the pole
-        ([-1, -2, -3, 3, 2, 1], [3]),
-        ([1, 2, 3, 9, -3, -2, -1], [3, 4]),  # within a step
-        ([0.5, 1, 2, 3, -3, -2, -1], [3, 4]),  # or so it may be
-        ([1, 2, 3, -3, -2, -1, -0.5], [3, 4]),
-        ([1, 2, 3, 3, 2, 1], []),  # no change of sign
-        ([1, 2, 2, -3, -2, -1], []),  # grows no more
-        ([2, 1, 3, -3, -2, -1], []),
-        ([1, 2, 3, -3, -2, -2], []),
-        ([1, 2, 3, -3, -1, -2], []),
-        ([-1, 2, 3, -3, -2, -1], []),  # of two signs on one side
-        ([1, -2, 3, -3, -2, -1], []),
-        ([1, 2, 3, -3, 2, -1], []),
-        ([1, 2, 3, -3, 2, 1], []),
-        ([1, 3, 2, 4, -3, -2, -1], []),  # what is so of other steps does not help
-        ([2, 1, 2, 3, -2, -3, -1], []),
-        ([1, 2, -3, -4, 3, 2, 1], []),
-        ([1, 2, 3, -3, -2, 1], []),
-        ([1, 2, 3, 9, 3, 2, 1], []),
-        ([2, 3, -3, -2, -1], []),  # too few
-        ([0.0] * 7, []),
-    ],
-)
-def test_a_pole_is_where_three_steps_grow_towards_three_of_the_other_sign(steps, points):
-    found = loglog._beside_pole(np.array([steps, steps], dtype=float))
-    assert [np.flatnonzero(row).tolist() for row in found] == [points, points]
-    assert found.shape == (2, len(steps) + 1)
-
-
 def test_beside_a_pole_the_slope_is_not_known():
     t = np.linspace(-1, 1, 41) + 0.01
     found = loglog.slope_errors(t, np.log(abs(t)))
@@ -147,11 +115,6 @@ def test_bounds_of_slopes_are_sums_of_the_sizes_of_all_weights():
         np.testing.assert_allclose(loglog.slope_bounds(t, bound, points), expected, rtol=1e-9)
 
 
-def test_the_largest_near_is_of_two_neighbours_on_each_side():
-    values = np.random.default_rng(1).random((2, 9))
-    np.testing.assert_array_equal(loglog._largest_near(values), maximum_filter1d(values, 5, axis=-1, mode="nearest"))
-
-
 @pytest.mark.parametrize("count", [1, 2, 4])
 def test_points_are_off_their_neighbours_by_what_no_polynomial_has(count):
     """The one direction of count + 1 values, of size 1, that polynomials of degree below count have nothing of."""
@@ -161,19 +124,6 @@ def test_points_are_off_their_neighbours_by_what_no_polynomial_has(count):
         here = slice(i, i + count + 1)
         expected.append(abs(null_space(np.vander(t[here], count).T)[:, 0] @ z[here]))
     np.testing.assert_allclose(abs(interpolation_errors(t, z, count)), expected, rtol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("present", "expected"),
-    [
-        ([1, 1, 0, 1, 0, 1, 1, 1], [(0, 2), (3, 4), (5, 8)]),
-        ([0, 1, 0], [(1, 2)]),
-        ([0, 0], []),
-        ([], []),
-    ],
-)
-def test_runs_are_unbroken(present, expected):
-    assert list(runs(np.array(present, dtype=bool))) == expected
 
 
 # where an exponent tends
@@ -203,42 +153,6 @@ def test_what_is_within_doubt_is_no_change():
 
 
 # a line
-
-
-def test_a_line_of_weights_is_that_of_statsmodels():
-    import statsmodels.api as sm
-
-    rng, t = np.random.default_rng(4), uneven(12) + 3.0
-    z, weights = 0.4 - 0.7 * t + 0.1 * rng.standard_normal(12), rng.uniform(0.2, 4.0, 12)
-    missing = z.copy()
-    missing[[2, 7]] = np.nan
-    here = np.isfinite(missing)
-    fit = sm.WLS(z[here], sm.add_constant(t[here]), weights=weights[here]).fit()
-    found = line(t, np.stack([missing, missing]), np.stack([weights, 3 * weights]))
-    for k in (0, 1):
-        one = {name: float(value[k]) for name, value in found._asdict().items()}
-        level, slope = fit.params
-        assert one["exponent"] == pytest.approx(slope, rel=1e-10)
-        assert one["exponent_error"] == pytest.approx(fit.bse[1], rel=1e-9)
-        assert one["prefactor"] == pytest.approx(np.exp(level), rel=1e-10)
-        assert one["prefactor_error"] == pytest.approx(np.exp(level) * fit.bse[0], rel=1e-9)
-        centre = np.average(t[here], weights=weights[here])
-        assert one["centre"] == pytest.approx(np.exp(centre), rel=1e-12)
-        assert one["level"] == pytest.approx(np.exp(level + slope * centre), rel=1e-10)
-        at_centre = np.array([1.0, centre])
-        assert one["level_error"] == pytest.approx(np.sqrt(at_centre @ fit.cov_params() @ at_centre), rel=1e-9)
-        assert one["residual"] == pytest.approx(np.expm1(abs(fit.resid).max()), rel=1e-9)
-        assert (one["points"], one["low"], one["high"]) == (10, *np.exp(t[here][[0, -1]]))
-        bow = np.polyfit(t[here], z[here], 2, w=np.sqrt(weights[here]))[0]
-        assert one["drift"] == pytest.approx(2 * bow * np.ptp(t[here]), rel=1e-8)
-
-
-def test_two_points_are_no_line_and_three_are():
-    t, z = np.arange(4.0), np.array([[1.0, 2.0, np.nan, np.nan], [1.0, 2.0, np.nan, 5.0], [np.nan] * 4])
-    found = line(t, z)
-    assert found.points.tolist() == [2, 3, 0]
-    assert np.isnan(np.stack(found)[:, [0, 2]]).sum() == 2 * 11
-    assert np.isfinite(np.stack(found)[:, 1]).all()
 
 
 # passages
@@ -289,12 +203,6 @@ def test_a_root_takes_points_of_its_own_run_alone():
     parabola = Polynomial.fit(t[3:6], c[3:6], 2) - 1.4
     expected = [r for r in parabola.roots() if t[3] < r < t[4]]
     assert root(t, c, 3, 1.4, 6) == pytest.approx(expected[0], abs=1e-13)
-
-
-def test_a_root_on_a_point_is_that_point():
-    t, c = np.arange(5.0), np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
-    assert root(t, c, 2, 0.0, 4) == pytest.approx(2.0, abs=1e-15)
-    assert root(t, c, 1, 0.0, 4) == pytest.approx(2.0, abs=1e-15)
 
 
 # axes in logarithms

@@ -10,9 +10,7 @@ from sweep.analysis.mesh import (
     SAFETY,
     are_too_few,
     interpolation_errors,
-    lengths,
     parabolas,
-    renewed,
     simplices,
     with_beyond,
 )
@@ -71,66 +69,12 @@ def test_too_few_cells_tell_nothing():
     assert are_too_few(np.zeros((9, 3)))
 
 
-@pytest.mark.parametrize("axes", [1, 2, 3])
-def test_what_was_found_before_is_what_is_found_anew(axes, monkeypatch):
-    """Cells are added in one corner of the box, and one far from them."""
-    fitted = []
-
-    def counted(points, heights, around):
-        fitted.append(len(around))
-        return parabolas(points, heights, around)
-
-    monkeypatch.setattr("sweep.analysis.mesh.parabolas", counted)
-    rng = np.random.default_rng(axes)
-    points, before = rng.random((30 * 4**axes, axes)), None
-    for more in (0.2 * rng.random((8, axes)), np.full((1, axes), 0.9), np.empty((0, axes))):
-        points = np.concatenate([points, more])
-        heights = np.sin(3 * points.sum(axis=1))
-        corners = simplices(points)
-        before = renewed(before, points, heights, corners)
-        anew = parabolas(points, heights, with_beyond(corners))
-        assert before.cells == len(points)
-        for name in ("around", "reach", "bend", "misfit"):
-            np.testing.assert_array_equal(getattr(before, name), getattr(anew, name), err_msg=name)
-    whole, few, none = fitted
-    assert 0 < few < whole / 2
-    assert none == 0
-
-
-def test_simplices_whose_numbers_are_alike_by_chance_are_told_apart(monkeypatch):
-    monkeypatch.setattr("sweep.analysis.mesh.MIX", np.zeros(256, dtype=np.int64))
-    points = np.random.default_rng(1).random((200, 2))
-    corners = simplices(points)
-    first = parabolas(points, points[:, 0] ** 2, with_beyond(corners))
-    found = renewed(first, points, points[:, 0] ** 2, corners[::-1].copy())
-    np.testing.assert_allclose(found.bend, first.bend[::-1], rtol=0, atol=1e-9)
-
-
-def test_edges_have_lengths():
-    points = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 4.0]])
-    np.testing.assert_array_equal(lengths(points, np.array([[0, 1, 2]])), [[3.0, 4.0, 5.0]])
-
-
 # the pieces, each against its formula written another way
 
 
 def test_axes_are_tilted_by_little_and_each_by_another_angle():
     found = mesh.tilted(np.eye(3))
     np.testing.assert_allclose(found, [[1, 0, 0], [0.013, 1, 0], [0.013, 0.013 * 1.3, 1]], rtol=1e-12)
-
-
-def test_edges_are_all_pairs_of_corners():
-    assert mesh.edges(3).tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
-    assert mesh.edges(1).tolist() == [[0, 1]]
-
-
-@pytest.mark.parametrize(("height", "kept"), [(0.9e-9, False), (1.1e-9, True)])
-def test_a_simplex_without_a_volume_is_none(monkeypatch, height, kept):
-    """Sides of 1 and 1 at nearly no angle."""
-    points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, height]])
-    given = type("Joined", (), {"simplices": np.array([[0, 2, 1]])})
-    monkeypatch.setattr(mesh, "Delaunay", lambda _: given)
-    assert simplices(points).tolist() == ([[0, 1, 2]] if kept else [])
 
 
 def test_cells_of_one_axis_are_joined_in_order():
@@ -165,41 +109,6 @@ def test_errors_and_cuts_are_those_of_the_largest_bend(bend, misfit, size, edge)
     assert cut.tolist() == [edge]
 
 
-def test_shares_of_corners_add_up_to_a_place():
-    rng = np.random.default_rng(2)
-    place, near = rng.random((4, 4, 3)), rng.random((4, 6, 3))
-    found = mesh._shares(place, near)
-    for one, corners, at in zip(found, place, near, strict=True):
-        expected = np.linalg.solve(np.vstack([corners.T, np.ones(4)]), np.vstack([at.T, np.ones(6)])).T
-        np.testing.assert_allclose(one, expected, atol=1e-9)
-
-
-def test_a_parabola_and_what_it_leaves_are_those_of_least_squares():
-    """Points of no weight are not counted."""
-    rng = np.random.default_rng(4)
-    basis, off, weight = rng.random((2, 9, 3)), rng.random((2, 9)), rng.uniform(0.5, 3, (2, 9))
-    weight[:, :2] = 0.0
-    bend, misfit = mesh._parabola(basis, off, weight)
-    for k in range(2):
-        columns = basis[k] * weight[k][:, None]
-        best, rest, *_ = np.linalg.lstsq(columns, off[k] * weight[k], rcond=None)
-        np.testing.assert_allclose(bend[k], best, rtol=1e-7)
-        assert misfit[k] == pytest.approx(np.sqrt(rest[0] / 7), rel=1e-7)
-
-
-def test_where_nothing_is_told_no_bend_is():
-    bend, misfit = mesh._parabola(np.zeros((1, 4, 3)), np.ones((1, 4)), np.zeros((1, 4)))
-    np.testing.assert_array_equal(bend, np.zeros((1, 3)))
-    np.testing.assert_array_equal(misfit, [0.0])
-
-
-def test_of_two_columns_that_are_alike_each_takes_half():
-    basis = np.ones((1, 4, 2))
-    bend, misfit = mesh._parabola(basis, np.full((1, 4), 3.0), np.ones((1, 4)))
-    np.testing.assert_allclose(bend, [[1.5, 1.5]], rtol=1e-3)
-    assert misfit[0] == pytest.approx(1.5e-12, abs=1e-11)
-
-
 @pytest.mark.parametrize(("axes", "around"), [(1, 4), (2, 12), (3, 20), (4, 20)])
 def test_cells_around_a_simplex_are_the_nearest_to_its_centre(axes, around):
     rng = np.random.default_rng(axes)
@@ -231,15 +140,6 @@ def test_of_few_cells_all_are_around_and_any_new_one_is_nearer():
     assert np.isinf(few.reach).all()
     points = np.random.default_rng(1).random((16, 2))
     assert np.isfinite(parabolas(points, points[:, 0] ** 2, simplices(points)).reach).all()
-
-
-def test_batches_make_no_difference(monkeypatch):
-    points = np.random.default_rng(1).random((50, 2))
-    around = with_beyond(simplices(points))
-    whole = parabolas(points, np.sin(points[:, 0]), around)
-    monkeypatch.setattr(mesh, "BATCH", 7)
-    for one, other in zip(whole, parabolas(points, np.sin(points[:, 0]), around), strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-9)
 
 
 @pytest.mark.parametrize("axes", [1, 2, 3])

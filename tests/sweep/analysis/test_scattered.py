@@ -133,13 +133,6 @@ def test_a_positive_axis_to_twice_its_start_is_logarithmic(low, high, logarithmi
     assert box.values(0, np.array([0.5]))[0] == pytest.approx(middle, rel=1e-9)
 
 
-def test_outputs_are_positive_where_all_that_are_there_are():
-    for values, positive in (([1.0, np.nan], True), ([0.0, 1.0], False), ([-1.0, 2.0], False), ([np.nan], False)):
-        assert scattered.is_positive(np.array(values)) == positive
-    assert scattered._size(np.array([1.0, -3.0, np.inf])) == 3.0
-    assert scattered._size(np.array([0.0, np.nan])) == 1.0
-
-
 def test_shares_of_corners_are_barycentric_coordinates():
     rng = np.random.default_rng(3)
     points, at = rng.random((30, 2)), rng.uniform(0.3, 0.7, (20, 2))
@@ -156,21 +149,6 @@ def test_points_out_of_a_simplex_by_rounding_are_in_it():
     assert near.tolist() == [share if share == 0 else pytest.approx(0.5, abs=0.01) for share in near]
     assert (near == 0).sum() == 1  # what is less than rounding is none
     assert np.isnan(far).all()
-
-
-def test_the_status_is_that_of_the_corner_with_the_largest_share():
-    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
-    at = np.array([[0.1, 0.1], [0.9, 0.2], [0.2, 0.9], [0.9, 0.9]])
-    assert scattered._nearest(points, at).tolist() == [0, 1, 2, 3]
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_between_corners_values_are_even_or_even_in_logarithms(sign):
-    """A box of four corners: half-way along an edge is a mean."""
-    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
-    values = sign * np.array([1.0, 4.0, 9.0, 16.0])
-    found = scattered._between(values, points, np.array([[0.5, 0.0], [0.0, 0.5]]))
-    np.testing.assert_allclose(found, [2.0, 3.0] if sign > 0 else [-2.5, -5.0], rtol=1e-9)
 
 
 @pytest.mark.parametrize(("axes", "taken"), [(1, False), (2, True), (5, True), (6, False)])
@@ -201,15 +179,3 @@ def test_lines_have_five_cells_and_reach_from_end_to_end(number, lines):
     assert found.b.values.tolist() == [1.0, 3.0, 100.0]
     np.testing.assert_array_equal(found.y, whole * np.array([[1.0], [3.0], [100.0]]))
     assert found.attrs["lines"].startswith("15 of 28 cells lie on 3 lines")
-
-
-@pytest.mark.parametrize(("cells_beside", "told"), [(4, False), (5, True)])
-def test_shorter_lines_are_told_of_from_five_cells_on(cells_beside, told):
-    count, long = np.array([6, cells_beside]), np.array([True, False])
-    text = scattered._lines_told("a", ["b"], np.array([[1.0], [2.5]]), count, long)
-    assert text.startswith(f"6 of {6 + cells_beside} cells lie on 1 lines")
-    assert text.endswith("or a shorter one, e.g. --at b=2.5 (5 cells)." if told else "; no shorter line has 5.")
-
-
-def test_lines_are_labelled_by_six_digits():
-    assert scattered._label(["b", "c"], np.array([1 / 3, 1234567.0])) == "b = 0.333333, c = 1.23457e+06"

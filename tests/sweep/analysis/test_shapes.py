@@ -87,24 +87,6 @@ def test_an_integrated_bend_is_nothing_far_below_and_u_far_above():
         np.testing.assert_allclose(bend_of(law, far, 0.0, power), [0.0, 0.0, 5e3, 1e9], rtol=1e-12, atol=1e-9)
 
 
-def test_between_points_a_cubic_with_its_slopes_is_exact():
-    def cubic(v):
-        return 0.3 * v**3 - 0.2 * v**2 + v - 4
-
-    def steep(v):
-        return 0.9 * v**2 - 0.4 * v + 1
-
-    v = np.concatenate([np.linspace(-5, 5, 41), shapes.GRID[[0, 7, 180, -1]]])
-    found = shapes._on_grid(shapes._hermite(cubic(shapes.GRID), steep(shapes.GRID)), v)
-    np.testing.assert_allclose(found, cubic(v), rtol=1e-12, atol=1e-10)
-
-
-def test_the_grid_of_slopes_is_fine_in_the_middle_and_reaches_far():
-    assert shapes.GRID[-1] == -shapes.GRID[0] == math.sinh(9)
-    assert shapes.STEPS.min() == pytest.approx(0.05, rel=1e-3)
-    assert shapes.GRID.size == shapes.STEPS.size + 1
-
-
 def test_three_laws_have_two_bends_with_the_middle_law_between_them():
     first, second, width = 0.25, 0.8, 0.05
     shift, columns = shapes.THREE.parts(np.array([second, first, math.log(width)]), S)  # in either order
@@ -147,14 +129,6 @@ def test_curves_of_one_law_are_their_formulas():
         np.testing.assert_array_equal(columns, straight if law is not shapes.OFFSET else straight[:, :1])
 
 
-@pytest.mark.parametrize("law", shapes.LAWS, ids=str)
-def test_numbers_of_a_law_are_those_that_it_has(law):
-    q = np.array([grid[-1] for grid in law.grids])
-    columns = law.parts(q, S)[1]
-    assert law.numbers == len(law.grids) + columns.shape[1]
-    assert len(law.exponents) <= columns.shape[1]
-
-
 def test_single_powers_are_those_of_a_stretched_bend_over_its_whole_range():
     assert len(shapes.POWERS) == 17
     assert min(shapes.POWERS) == pytest.approx(-1.2)
@@ -176,14 +150,3 @@ def test_places_widths_and_fades_to_start_from_span_the_window():
     np.testing.assert_allclose(np.exp(shapes.WIDTHS), [0.01, 0.04, 0.12, 0.3], rtol=1e-12)
     assert tuple(-fade for fade in reversed(shapes.FADES)) == shapes.FADES
     assert all(abs(b) < 2 for b in shapes.LOGARITHM.grids[0])  # 1 + B t is positive in the window
-
-
-def test_windows_read_backwards_start_alike():
-    """Where the shape of a bend has a side, both sides are tried; a stretched one has powers to both sides of one."""
-    for law in (shapes.ASYMMETRIC, shapes.UNEVEN):
-        assert law.grids[2][0] == -law.grids[2][1] < 0
-    low, high = np.exp(shapes.STRETCHED.grids[2])
-    np.testing.assert_allclose([low, high], [0.61, 1.35], rtol=0.01)
-    first, second, _ = shapes.THREE.grids
-    np.testing.assert_allclose(sorted(1 - np.array(second)), first, rtol=1e-12)
-    np.testing.assert_allclose(np.diff(first), 0.15, rtol=1e-12)

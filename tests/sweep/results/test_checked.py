@@ -16,7 +16,6 @@ import sweep
 from sweep.cli import main
 from sweep.results import open
 from sweep.results.verify import verify
-from sweep.store.layout import Table
 from sweep.store.reading import StoredFile
 from sweep.store.store import unfinished_of
 
@@ -98,14 +97,6 @@ def test_a_damaged_summary_is_not_handed_out(tmp_path):
         found.load()
 
 
-def test_a_single_cell_is_checked(tmp_path):
-    path = tmp_path / "out.h5"
-    quiet(toy_studies.build(axes={"height": [1.0]}, summary={"over": ["height"]}), path).close()
-    flip(path, place(path, "fall_time_mean", 0) + 1)
-    with sweep.open_result(path) as found, pytest.raises(sweep.SweepError, match="fall_time_mean is damaged"):
-        found.load()
-
-
 @pytest.mark.parametrize("what", ["title", "height"])
 def test_damage_beside_the_numbers_is_told_at_once(copy, what):
     with h5py.File(copy) as file:
@@ -138,45 +129,11 @@ def test_pieces_of_a_large_result_are_checked(copy, monkeypatch):
             found["drop"].compute()
 
 
-def test_a_column_is_read_once_and_kept(copy):
-    with sweep.open_result(copy) as found:
-        before = found.fall_time.values
-        harm(copy, "fall_time", 0)
-        assert found.fall_time.values.tobytes() == before.tobytes()
-
-
 def test_a_checked_dataset_can_be_sent_to_another_process(copy):
     harm(copy, "fall_time", 0)
     with sweep.open_result(copy) as found:
         sent = pickle.loads(pickle.dumps(found["drop"]))
         assert sent.values.tobytes() == found["drop"].values.tobytes()
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        ("export", "OUT", "-o", "new.csv"),
-        ("export", "OUT", "-o", "new.nc"),
-        ("fit", "OUT", "--y", "fall_time", "--x", "height"),
-        ("plot", "OUT", "-o", "new.png"),
-        ("report", "OUT", "-o", "new.html"),
-        ("run", "fall.toml", "-o", "OUT", "--allow-import"),
-        ("refine", "OUT", "--y", "fall_time", "--tolerance", "1e-3", "-o", "new.h5", "--allow-import"),
-    ],
-    ids=lambda command: "-".join(command[:4]),
-)
-def test_every_command_that_reads_a_damaged_column_names_it(read, tmp_path, monkeypatch, capsys, command):
-    monkeypatch.chdir(tmp_path)
-    read("[axes]\nv0 = [0.0, 2.0, 3.0]\nheight = { num = 11, start = 1, stop = 11, spacing = 'linear' }\n")
-    assert main(["run", "fall.toml", "-o", "out.h5", "--allow-import"]) == 0
-    words = ["out.h5" if word == "OUT" else word for word in command]
-    harm(tmp_path / "out.h5", "fall_time", 17)
-    capsys.readouterr()
-    assert main(words) == 2
-    told = capsys.readouterr().err
-    assert "fall_time" in told
-    assert "damaged between its cells 0 and 33" in told
-    assert not [name for name in command if name.startswith("new") and (tmp_path / name).exists()]
 
 
 def test_a_damaged_result_is_shown_as_damaged(copy, capsys):
@@ -223,21 +180,3 @@ def test_a_block_filled_with_zeros_is_pending(unfinished):
     with sweep.open_result(unfinished) as found:
         assert found.status.values.reshape(-1)[:4].tolist() == [127] * 4
         assert np.isnan(found.fall_time.values.reshape(-1)[:4]).all()
-
-
-def test_single_cells_of_any_block_are_read_first(unfinished):
-    with sweep.open_result(unfinished) as whole:
-        expected = whole.status.values.reshape(-1)
-    for cell in range(0, expected.size, 2):
-        with StoredFile(unfinished_of(unfinished)) as file:
-            assert file.columns()["status"].cells(np.array([cell])) == expected[cell]
-
-
-def test_all_columns_of_a_block_are_checked_once(unfinished, monkeypatch):
-    real, calls = Table.read, []
-    monkeypatch.setattr(Table, "read", lambda self, *rest: (calls.append(rest[1:3]), real(self, *rest))[1])
-    with sweep.open_result(unfinished) as found:
-        for name in ("status", "method_used", "fall_time"):
-            assert found[name].values.size == CELLS
-            assert found[name].values.size == CELLS
-    assert max(calls.count(call) for call in calls) == 2  # to check it, and to hand it out

@@ -1,8 +1,5 @@
 """Any piece of a result, finished or not, is the piece of all of it, however its blocks are cut."""
 
-import math
-import random
-
 import numpy as np
 import pytest
 import toy_studies
@@ -12,7 +9,6 @@ from running import interrupted, keys, quiet
 
 import sweep
 from sweep.store import reading
-from sweep.store.reading import runs
 
 SIZES = {"v0": 3, "height": 11, "phase": 3}
 
@@ -54,25 +50,3 @@ def test_several_threads_read_the_same(both, monkeypatch):
     whole, lazily = both
     for name in whole.data_vars:
         assert lazily[name][1:].values.tobytes() == whole[name][1:].values.tobytes()
-
-
-def test_runs_are_the_cells_of_a_key_in_their_order():
-    rng = random.Random(5)
-    for _ in range(300):
-        grid = tuple(rng.randint(1, 5) for _ in range(rng.randint(0, 4)))
-        key = tuple(rng.choice([rng.randrange(n), slice(None), slice(rng.randrange(n), n), slice(None, None, 2),
-                                slice(None, None, -1)]) for n in grid)  # fmt: skip
-        starts, length = runs(key, grid)
-        found = (starts[:, None] + np.arange(length)).ravel()
-        assert found.tolist() == np.arange(math.prod(grid)).reshape(grid)[key].ravel().tolist()
-
-
-def test_a_block_is_read_once_for_many_runs_in_it(tmp_path, monkeypatch):
-    path = tmp_path / "out.h5"
-    quiet(study(), path, block_cells=33).close()
-    real, calls = reading.Table.read, []
-    monkeypatch.setattr(reading.Table, "read", lambda self, *rest: (calls.append(rest), real(self, *rest))[1])
-    monkeypatch.setattr(reading, "SHORT_RUN", 1)
-    with sweep.open_result(path) as found:
-        assert found.fall_time[:, 2:5].values.shape == (3, 3)
-    assert len(calls) == 1

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 from toy_studies import build
 
 import sweep
@@ -124,25 +123,6 @@ def test_the_command_exits_with_1_where_results_differ(tmp_path, monkeypatch, ca
     assert main(["diff", "a.h5", "nowhere.h5"]) == 2
 
 
-@pytest.mark.parametrize(
-    ("x", "y", "apart"),
-    [
-        (1.0, 1.0, 0.0),
-        (1.0, 2.0, 0.5),
-        (-4.0, 1.0, 1.25),
-        (0.0, -0.0, 0.0),
-        (np.nan, np.nan, 0.0),
-        (np.nan, 1.0, np.inf),
-        (np.inf, np.inf, 0.0),
-        (np.inf, 1.0, np.inf),
-        (1.5e308, -1.5e308, np.inf),
-    ],
-)
-def test_relative_distances(x, y, apart):
-    assert module._relative(np.array([x]), np.array([y])).tolist() == [apart]
-    assert module._relative(np.array([y]), np.array([x])).tolist() == [apart]
-
-
 def test_a_distance_of_just_the_tolerance_is_none(result):
     other = result.copy(deep=True)
     other.fall_time[0, 0] *= 2
@@ -157,42 +137,3 @@ def test_each_part_alone_makes_a_difference():
         assert not replace(same, **keys, examples={("OK", "FAILED"): ""}).same
     assert not replace(same, outputs={"y": module.Distance(1, 0.5)}).same
     assert replace(same, outputs={"y": module.Distance(0, 0.5)}).same
-
-
-def test_a_difference_is_told_line_by_line():
-    assert str(module.Difference(3, 0, 0, (), 1e-3)).splitlines()[1:] == ["the same to 0.001"]
-    found = module.Difference(
-        1234, 1, 2, ("u", "v"), 0.0, {"y": module.Distance(1000, 0.12345, "e.g. a=1"), "z": module.Distance()},
-        {("OK", "FAILED"): 2000}, {("OK", "FAILED"): "e.g. a=2"},
-    )  # fmt: skip
-    assert str(found).splitlines() == [
-        "1,234 cells in both, 1 in the first alone, 2 in the second alone",
-        "outputs of one alone: u and v",
-        "  y             1,000 cells differ  by up to 0.12  e.g. a=1",
-        "  OK -> FAILED  2,000 cells                        e.g. a=2",
-    ]
-
-
-@pytest.mark.parametrize(("at_once", "rows"), [(1, 1), (3, 1), (7, 2), (8, 2), (9, 3), (99, 5)])
-def test_pieces_hold_as_many_numbers_as_is_said(monkeypatch, at_once, rows):
-    monkeypatch.setattr(module, "NUMBERS_AT_ONCE", at_once)
-    column = xr.DataArray(np.arange(15.0).reshape(5, 3), dims=("a", "b"))
-    pieces = list(module._pieces(column, -column))
-    assert [start for start, _, _ in pieces] == list(range(0, 5, rows))
-    np.testing.assert_array_equal(np.concatenate([x for _, x, _ in pieces]), column)
-    np.testing.assert_array_equal(np.concatenate([y for _, _, y in pieces]), -column)
-
-
-def test_one_number_is_a_piece():
-    one = xr.DataArray(2.0)
-    assert [(start, x.tolist(), y.tolist()) for start, x, y in module._pieces(one, one + 1)] == [(0, [2.0], [3.0])]
-
-
-@pytest.mark.parametrize("at_once", [1, 2, 5, 1 << 22])
-def test_statuses_are_counted_over_all_pieces_with_the_first_cell(result, monkeypatch, at_once):
-    monkeypatch.setattr(module, "NUMBERS_AT_ONCE", at_once)
-    other = result.copy(deep=True)
-    other.status[:, 1] = int(Status.INACCURATE)
-    found = sweep.diff(result, other)
-    assert found.statuses == {("OK", "INACCURATE"): 3}
-    assert found.examples == {("OK", "INACCURATE"): "e.g. height=1 v0=1"}

@@ -55,41 +55,12 @@ def read(path):
     return lines[0], lines[1:]
 
 
-def test_csv_has_one_row_per_cell_and_one_column_per_coordinate_and_output(tmp_path):
-    ds = result().drop_vars("angle").drop_vars("phase")
-    heading, rows = read(sweep.export(ds, tmp_path / "out.csv"))
-    assert heading == ["mu", "a", "phi0", "period", "status", "method_used"]
-    cells = [(m, a) for m in ds.mu.values for a in ds.a.values]
-    assert [(float(r[0]), float(r[1])) for r in rows] == cells
-    assert [float(r[2]) for r in rows] == [0.5] * 6
-    np.testing.assert_array_equal([float(r[3]) for r in rows], ds.period.values.ravel())
-    assert [r[4] for r in rows] == ["OK", "OK", "OK", "BAD_INPUT", "OK", "OK"]
-    assert [r[5] for r in rows] == ["closed", "closed", "closed", "none", "closed", "closed"]
-
-
-def test_csv_of_traces_has_one_row_per_cell_and_phase(tmp_path):
-    ds = result()
-    heading, rows = read(sweep.export(ds, tmp_path / "out.csv"))
-    table = {name: [row[k] for row in rows] for k, name in enumerate(heading)}
-    np.testing.assert_array_equal(np.array(table["angle"], float), ds.angle.values.ravel())
-    np.testing.assert_array_equal(np.array(table["phase"], float), np.tile(ds.phase.values, 6))
-    np.testing.assert_array_equal(np.array(table["period"], float), np.repeat(ds.period.values.ravel(), 4))
-    assert table["status"][12:16] == ["BAD_INPUT"] * 4
-
-
 def test_csv_columns_do_not_depend_on_the_order_of_an_outputs_dimensions(tmp_path):
     turned = result()
     turned["period"] = turned.period.transpose("a", "mu")
     turned["angle"] = turned.angle.transpose("phase", "mu", "a")
     plain, other = sweep.export(result(), tmp_path / "plain.csv"), sweep.export(turned, tmp_path / "other.csv")
     assert plain.read_text() == other.read_text()
-
-
-def test_csv_says_the_unit_of_each_column_in_lines_that_readers_skip(tmp_path):
-    text = sweep.export(result(), tmp_path / "out.csv").read_text()
-    assert text.splitlines()[1:3] == ["# mu [rad/s^2]: drive torque per inertia", "# a [1/s]"]
-    assert "# period [s]: the 'period', of the cycle" in text
-    assert "# status\n" in text
 
 
 def test_no_text_of_a_csv_is_a_formula(tmp_path):
@@ -115,17 +86,6 @@ def test_no_text_of_a_table_of_laws_is_a_formula(tmp_path):
     assert ",'=1+1," in (tmp_path / "laws.csv").read_text()
 
 
-def test_csv_reads_back_with_pandas(tmp_path):
-    import pandas
-
-    ds = result()
-    frame = pandas.read_csv(sweep.export(ds, tmp_path / "out.csv"), comment="#")
-    back = frame.set_index(["mu", "a", "phase"]).to_xarray()
-    # its parser of numbers is not exact in all versions
-    np.testing.assert_allclose(back.angle, ds.angle, rtol=1e-15)
-    np.testing.assert_allclose(back.period[:, :, 0], ds.period, rtol=1e-15)
-
-
 def test_csv_is_a_file_axis_of_a_study(tmp_path):
     path = sweep.export(result().drop_vars("angle").drop_vars("phase").isel(a=0), tmp_path / "points.csv")
     study = sweep.study(
@@ -136,30 +96,11 @@ def test_csv_is_a_file_axis_of_a_study(tmp_path):
     np.testing.assert_array_equal(study.axes["a"].values, [1.0, 1.0, 1.0])
 
 
-def test_csv_of_a_zip_design_has_its_axes_as_columns(tmp_path):
-    ds = xr.Dataset(
-        {"period": ("cell", [1.0, 2.0]), "status": ("cell", np.array([0, 127], np.int8), FLAGS)},
-        coords={"mu": ("cell", [3.0, 4.0]), "method": ("cell", ["map", "a, b"])},
-    )
-    heading, rows = read(sweep.export(ds, tmp_path / "out.csv"))
-    assert heading == ["mu", "method", "period", "status"]
-    assert rows == [["3.0", "map", "1.0", "OK"], ["4.0", "a, b", "2.0", "PENDING"]]
-
-
 def test_a_status_without_a_name_is_written_as_its_number(tmp_path):
     ds = result()
     ds.status[0, 0] = 33
     heading, rows = read(sweep.export(ds, tmp_path / "out.csv"))
     assert rows[0][heading.index("status")] == "33"
-
-
-def test_csv_of_one_cell_and_of_none(tmp_path):
-    one = result().isel(mu=0, a=0, phase=0)
-    heading, rows = read(sweep.export(one, tmp_path / "one.csv"))
-    assert len(rows) == 1
-    assert float(rows[0][heading.index("period")]) == float(one.period)
-    heading, rows = read(sweep.export(result().isel(mu=slice(0)), tmp_path / "none.csv"))
-    assert rows == []
 
 
 @pytest.mark.parametrize("rows", [1, 3, 5, 8, 9, 100])
@@ -186,35 +127,11 @@ def test_csv_needs_no_more_memory_for_more_cells(tmp_path, monkeypatch):
     assert peaks[1] < 1.5 * peaks[0]
 
 
-@pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
-def test_netcdf_reads_back_bit_for_bit_with_units_and_flags(tmp_path, engine):
-    ds = result()
-    with xr.open_dataset(sweep.export(ds, tmp_path / "out.nc"), engine=engine) as back:
-        xr.testing.assert_identical(back.load(), ds.assign_attrs(history="exported by foliot"))
-        assert back.status.dtype == np.int8
-        assert back.status.attrs["flag_values"].tolist() == [0, 1, 64, 127]
-        assert "_FillValue" not in back.status.encoding
-        assert "_FillValue" not in back.mu.encoding
-
-
-def test_netcdf_of_a_result_larger_than_memory_is_written_piece_by_piece(tmp_path, monkeypatch):
-    monkeypatch.setattr(sys.modules["sweep.results.export"], "LARGE", 0)
-    ds = result()
-    with xr.open_dataset(sweep.export(ds, tmp_path / "out.nc"), engine="h5netcdf") as back:
-        xr.testing.assert_identical(back.load(), ds.assign_attrs(history="exported by foliot"))
-
-
 def test_netcdf_keeps_full_precision_however_the_source_was_packed(tmp_path):
     ds = result()
     ds.period.encoding = {"dtype": "float32", "scale_factor": 2.0}
     with xr.open_dataset(sweep.export(ds, tmp_path / "out.nc"), engine="h5netcdf") as back:
         np.testing.assert_array_equal(back.period, ds.period)
-
-
-def test_netcdf_holds_an_axis_of_words(tmp_path):
-    ds = xr.Dataset({"period": ("method", [1.0, 2.0])}, coords={"method": ["map", "closed"]})
-    with xr.open_dataset(sweep.export(ds, tmp_path / "out.nc"), engine="h5netcdf") as back:
-        assert back.method.values.tolist() == ["map", "closed"]
 
 
 @pytest.mark.parametrize(("name", "found"), [("out.h5", '".h5"'), ("out.xlsx", '".xlsx"'), ("out", "no suffix")])
@@ -266,59 +183,11 @@ def test_a_fault_of_the_netcdf_library_is_one_clear_line(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_interruption_leaves_no_half_written_file(tmp_path, monkeypatch):
-    def stop(*args):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(sys.modules["sweep.results.export"], "_column", stop)
-    with pytest.raises(KeyboardInterrupt):
-        sweep.export(result(), tmp_path / "out.csv")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_parquet_reads_back_to_the_last_bit_with_units(tmp_path):
-    import pyarrow.parquet as pq
-
-    ds = result()
-    path = sweep.export(ds, tmp_path / "out.parquet")
-    table, frame = (
-        pq.read_table(path),
-        ds.drop_vars(["status", "method_used"]).to_dataframe(dim_order=["mu", "a", "phase"]),
-    )
-    np.testing.assert_array_equal(table["angle"].to_numpy(), frame.angle)
-    np.testing.assert_array_equal(table["period"].to_numpy(), frame.period)
-    assert table["status"].to_pylist()[12:16] == ["BAD_INPUT"] * 4
-    assert table["method_used"].to_pylist()[12:16] == ["none"] * 4
-    assert table.schema.field("mu").metadata[b"units"] == b"rad/s^2"
-    assert table.schema.metadata[b"study"] == ds.attrs["study"].encode()
-    assert table.schema.field("angle").type == "double"
-
-
-def test_zarr_opens_as_the_same_dataset_and_replaces_an_older_one(tmp_path):
-    path = tmp_path / "out.zarr"
-    for factor in (1.0, 2.0):
-        ds = result()
-        ds["period"] = factor * ds.period.assign_attrs()
-        sweep.export(ds, path)
-        with xr.open_zarr(path, consolidated=False) as read:
-            xr.testing.assert_equal(read.load(), ds)
-            assert read.status.attrs["flag_meanings"] == FLAGS["flag_meanings"]
-    assert [p.name for p in tmp_path.iterdir()] == ["out.zarr"]
-
-
 def test_a_kind_of_file_whose_library_is_missing_is_told(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(SweepError, match=r"pyarrow.* -e '\.\[export\]'"):
         sweep.export(result(), tmp_path / "out.parquet")
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.filterwarnings("error")
-def test_zarr_keeps_words_without_a_warning(tmp_path):
-    ds = result().expand_dims({"word": ["plain", "longer"]})
-    sweep.export(ds, tmp_path / "out.zarr")
-    with xr.open_zarr(tmp_path / "out.zarr", consolidated=False) as read:
-        assert read["word"].values.tolist() == ["plain", "longer"]
 
 
 @pytest.mark.parametrize("suffix", [".nc", ".zarr"])
@@ -336,32 +205,6 @@ def test_a_compressed_export_is_smaller_and_keeps_every_bit(tmp_path, monkeypatc
             for name in dataset.data_vars:
                 assert found[name].values.tobytes() == dataset[name].values.tobytes()
     assert sizes[True] < sizes[False] or suffix == ".zarr"
-
-
-@pytest.mark.parametrize("suffix", [".nc", ".zarr"])
-def test_an_export_in_float32_is_rounded_to_nearest(tmp_path, suffix):
-    dataset = toy_result(tmp_path)
-    path = sweep.export(dataset, tmp_path / f"out{suffix}", float32=True)
-    with opened(path) as found:
-        assert found.fall_time.dtype == np.float32
-        np.testing.assert_array_equal(found.fall_time, dataset.fall_time.values.astype("f4"))
-        assert found.fall_time.attrs["units"] == "s"
-        assert found.status.dtype == np.int8
-        assert found.height.dtype == np.float64
-
-
-@pytest.mark.parametrize("value", [1e39, -1e-39, 1e-310])
-def test_what_float32_cannot_hold_is_told(tmp_path, value):
-    dataset = toy_result(tmp_path)
-    dataset["fall_time"][3] = value
-    with pytest.raises(sweep.SweepError, match="fall_time: float32 cannot hold"):
-        sweep.export(dataset, tmp_path / "out.nc", float32=True)
-    assert not (tmp_path / "out.nc").exists()
-
-
-def test_tables_are_not_compressed(tmp_path):
-    with pytest.raises(sweep.SweepError, match=r"compress and float32 are for \.nc and \.zarr"):
-        sweep.export(toy_result(tmp_path), tmp_path / "out.csv", compress=True)
 
 
 def toy_result(tmp_path):
@@ -401,3 +244,16 @@ def test_what_an_export_left_that_was_killed_goes_with_the_next_one(tmp_path, su
         other.touch()
     sweep.export(xr.Dataset({"y": ("x", np.arange(3.0))}, {"x": np.arange(3.0)}), target)
     assert sorted(tmp_path.iterdir()) == sorted([target, *others])
+
+
+def test_a_summary_is_a_table_with_a_column_for_each_bin_and_status(tmp_path):
+    edges = [0.1, 0.5, 1.0]
+    summary = {"over": ["height"], "outputs": {"fall_time": ["min", "histogram"]}, "edges": {"fall_time": edges}}
+    keys = {"axes": {"v0": [0.0, 1.0], "height": [0.2, 1.0, 3.0]}}
+    ds, cells = sweep.run(toy_studies.build(**keys, summary=summary)), sweep.run(toy_studies.build(**keys)).fall_time
+    heading, rows = read(sweep.export(ds, tmp_path / "out.csv"))
+    table = {name: np.array([row[k] for row in rows], float) for k, name in enumerate(heading)}
+    np.testing.assert_array_equal(table["cells_OK"], [3.0, 3.0])
+    np.testing.assert_array_equal(table["fall_time_min"], cells.min("height"))
+    counts = np.stack([np.histogram(line, edges)[0] for line in cells.transpose("v0", "height").values])
+    np.testing.assert_array_equal(np.stack([table["fall_time_histogram_1"], table["fall_time_histogram_2"]], 1), counts)

@@ -5,19 +5,16 @@ import dataclasses
 import os
 import pickle
 import random
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-import toy_studies
 from fuzzing import STUDY, forge, fuzz_result, fuzz_study, prepared, quietly
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from running import environment, quiet, tall
+from running import quiet, tall
 
 import sweep
 from sweep.cells.partition import Partition
@@ -94,42 +91,6 @@ def test_a_forged_seal_does_not_make_a_command_hang(whole, tmp_path, monkeypatch
     monkeypatch.setattr("h5py.File", lambda *args: pytest.fail("opened here"))
     assert main([command, "out.h5", *COMMANDS[command]]) == 2
     assert "not the result of a sweep, or damaged" in capfd.readouterr().err
-
-
-def test_what_this_process_has_written_is_not_read_by_another_one(tmp_path, monkeypatch):
-    path = prepared(tmp_path)
-    monkeypatch.setattr(probe, "PROBE", "while True: pass")
-    monkeypatch.setattr(probe, "PROBE_SECONDS", 0.3)
-    assert quietly("show", path) == 0
-    path.write_bytes(path.read_bytes())
-    assert quietly("show", path) == 2  # somebody else's by now
-
-
-def test_the_other_process_reads_all_that_hdf5_has_cut_in_pieces(whole, tmp_path):
-    """A piece that is not what gzip makes is behind the first one, where no look at a beginning finds it."""
-    path = tmp_path / "out.h5"
-    with h5py.File(path, "w") as file:
-        data = file.create_dataset("status", (4, 100), "i1", chunks=(1, 100), compression="gzip")
-        data[...] = 0
-        place = data.id.get_chunk_info(3).byte_offset
-    assert probe.probing(path)()
-    content = bytearray(path.read_bytes())
-    content[place : place + 8] = b"\xff" * 8
-    path.write_bytes(content)
-    assert not probe.probing(path)()
-
-
-@pytest.mark.parametrize("mask", [0, 1, 0xFFFFFFFF])
-def test_a_piece_that_is_shorter_than_it_says_is_not_read(whole, tmp_path, mask):
-    """HDF5 reads beyond its end, and dies of it."""
-    path = tmp_path / "out.h5"
-    path.write_bytes(whole.read_bytes())
-    with h5py.File(path, "r+") as file:
-        data = file["fall_time"].id
-        data.write_direct_chunk(data.get_chunk_info(0).chunk_offset, b"\0", mask)
-    assert not probe.probing(path)()
-    with pytest.raises(SweepError, match="not the result of a sweep, or damaged"):
-        sweep.open_result(path)
 
 
 def lead_away(file, kind, secret):
@@ -298,12 +259,6 @@ def test_a_study_names_no_file_outside_of_its_folder(tmp_path, name):
     assert [m.where for m in told.value.mistakes] == ["axes.height.file"]
 
 
-def test_a_path_of_python_may_be_anywhere(tmp_path):
-    (tmp_path / "points.csv").write_text("height\n1\n2\n")
-    found = toy_studies.build(axes={"height": {"file": tmp_path / "points.csv"}})
-    assert found.axes["height"].values.tolist() == [1.0, 2.0]
-
-
 @pytest.mark.parametrize("command", ["run", "plan"])
 def test_foreign_code_runs_only_where_it_is_allowed(tmp_path, command):
     (tmp_path / "evil.py").write_text("raise SystemExit('run')\n")
@@ -322,23 +277,6 @@ def test_no_result_or_part_is_unpickled(whole, tmp_path, monkeypatch):
     quiet(tall(30), tmp_path / "out.h5", block_cells=10).close()
 
 
-READERS = {
-    "h5py": "import h5py; f = h5py.File(path); print(f['fall_time'][1, 2])",
-    "h5netcdf": "import xarray; print(xarray.open_dataset(path, engine='h5netcdf').fall_time.values[1, 2])",
-    "netcdf4": "import xarray; print(xarray.open_dataset(path, engine='netcdf4').fall_time.values[1, 2])",
-    "netCDF4": "import netCDF4; print(netCDF4.Dataset(path)['fall_time'][1, 2])",
-}
-
-
-@pytest.mark.parametrize("reader", READERS)
-def test_the_golden_file_of_format_1_opens_with_every_reader(reader):
-    pytest.importorskip({"netcdf4": "netCDF4"}.get(reader, reader))
-    code = f"path = {str(GOLDEN)!r}\n{READERS[reader]}"
-    done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True, text=True)
-    # 2 h / (v0 + sqrt(v0^2 + 2 g h)) of h = 3, v0 = 2
-    assert float(done.stdout) == pytest.approx(6 / (2 + (4 + 6 * 9.80665) ** 0.5), rel=1e-15), done.stderr
-
-
 def test_the_golden_file_of_format_1_is_read_and_whole():
     with sweep.open_result(GOLDEN, strict=True) as found:
         assert found.sizes == {"v0": 2, "height": 3, "phase": 3}
@@ -347,15 +285,6 @@ def test_the_golden_file_of_format_1_is_read_and_whole():
         assert found.fall_time.attrs["units"] == "s"
     assert verify(GOLDEN).whole
     assert quietly("show", GOLDEN) == 0
-
-
-def test_ncdump_lists_the_golden_file():
-    import shutil
-
-    if shutil.which("ncdump") is None:
-        pytest.skip("ncdump is not installed")
-    done = subprocess.run(["ncdump", "-h", str(GOLDEN)], capture_output=True, text=True)
-    assert "double fall_time(v0, height)" in done.stdout
 
 
 def test_the_study_that_nonsense_is_made_of_is_a_sound_one(read):

@@ -1,14 +1,12 @@
 """The results of a folder."""
 
 import shutil
-from pathlib import Path
 
 import pytest
 from toy_studies import build
 
 import sweep
 from sweep.cli import main
-from sweep.results.listing import HEADINGS, Listed, Listing
 from sweep.results.statuses import Account
 
 
@@ -59,17 +57,6 @@ def test_a_folder_without_results_and_none(tmp_path):
     shutil.rmtree(tmp_path)
     with pytest.raises(sweep.SweepError, match="no such folder"):
         sweep.list_results(tmp_path)
-
-
-def test_a_row_has_tenths_rounded_down_and_minutes():
-    statuses = {"OK": 1233, "PENDING": 1}
-    one = Listed(Path("a.h5"), "Why?", 1234, 1233 / 1234, statuses, "2026-01-02T03:04:05+0000", "0.1.0")
-    assert one.row == ("a.h5", "1,234", "99.9 %", "1,233 ok, 1 pending", "2026-01-02T03:04", "0.1.0", "Why?")
-    assert Listed(Path("b.h5"), fault="no result").row == ("b.h5", "", "", "", "", "", "no result")
-    assert Listed(Path("c.h5"), done=1.0).row[1:4] == ("0", "100 %", "")
-    first, *rest = str(Listing([one])).splitlines()
-    assert set(first.split()) <= set(HEADINGS)
-    assert len(rest) == 1
 
 
 def test_the_share_that_is_done_is_not_told_a_tenth_too_low(tmp_path, monkeypatch):

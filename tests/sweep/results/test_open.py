@@ -4,7 +4,6 @@ import shutil
 import subprocess
 import sys
 import time
-import warnings
 
 import h5py
 import numpy as np
@@ -16,8 +15,8 @@ import sweep
 from kernels.interface import Status
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.solve import Solver
-from sweep.results import open, statuses
-from sweep.results.open import changed, open_result
+from sweep.results import open
+from sweep.results.open import open_result
 from sweep.results.statuses import count_methods, count_statuses, failures
 from sweep.runs.run import run
 from sweep.store.store import unfinished_of
@@ -130,16 +129,6 @@ def test_attributes_follow_cf(stored):
         }  # fmt: skip
 
 
-def test_what_is_an_axis_is_no_attribute(stored):
-    with open_result(stored) as found:
-        assert "method" not in found.attrs
-        assert found.attrs["rtol"] == 0.01
-    found = run(stone(axes={"height": [1.0], "rtol": [1e-3, 1e-9]}, rtol=None), progress=False)
-    assert "rtol" not in found.attrs
-    assert found.attrs["method"] == "auto"
-    assert found.rtol.attrs["units"] == "1"
-
-
 def test_the_file_alone_suffices_to_run_it_again(stored, tmp_path):
     with open_result(stored) as found:
         study = Study.from_json(found.attrs["study_json"], allow_import=True)
@@ -148,13 +137,6 @@ def test_the_file_alone_suffices_to_run_it_again(stored, tmp_path):
             for name in found.data_vars:
                 assert again[name].values.tobytes() == found[name].values.tobytes()
             assert again.attrs["study_json"] == found.attrs["study_json"]
-
-
-def test_attributes_longer_than_64_kilobytes_are_kept(tmp_path):
-    study = stone(axes={"height": np.linspace(1, 2, 20_000)}, outputs=["fall_time"], along={})
-    assert len(study.to_json()) > 65536
-    with run(study, tmp_path / "long.h5", progress=False) as found:
-        assert found.attrs["study_json"] == study.to_json()
 
 
 def test_missing_cells_of_an_unfinished_sweep_are_nan_and_pending(unfinished, stored):
@@ -168,13 +150,6 @@ def test_missing_cells_of_an_unfinished_sweep_are_nan_and_pending(unfinished, st
     assert (found.method_used.values.ravel()[pending] == -1).all()
     assert np.isnan(found["drop"].values.reshape(24, 3)[pending]).all()
     xr.testing.assert_identical(found.height, whole.height.load().drop_vars("g").assign_coords(g=found.g))
-
-
-@pytest.mark.parametrize("name", ["unfinished", "stored"])
-def test_a_fault_of_ours_is_not_told_as_a_change_of_the_result(name, request):
-    path = request.getfixturevalue(name)
-    with open_result(path), pytest.raises(TypeError, match="ours"), changed(path):
-        raise TypeError("ours")
 
 
 def test_an_unfinished_sweep_is_refused_when_strict(unfinished):
@@ -279,13 +254,6 @@ def test_a_result_cut_short_is_one_clear_line(stored, tmp_path):
         open_result(path)
 
 
-def test_times_stay_numbers(tmp_path):
-    study = sweep.study(allow_import=True, kernel="slow:DAYS", axes={"height": [1.0]}, outputs=["fall_time"])
-    with run(study, tmp_path / "days.h5", progress=False) as found:
-        assert found.fall_time.dtype == np.float64
-        assert found.fall_time.attrs["units"] == "days"
-
-
 def test_statuses_are_counted_with_an_example(stored):
     with open_result(stored) as found:
         told = [str(count) for count in count_statuses(found)]
@@ -304,17 +272,6 @@ def flags(shape, **special):
     dims = ("x", "y", "z")[: len(shape)]
     coords = {d: np.arange(n) / 4 for d, n in zip(dims, shape, strict=True)}
     return xr.Dataset({"status": (dims, values)}, coords)
-
-
-@pytest.mark.parametrize("at_once", [1, 3, 7, 1000])
-def test_statuses_are_counted_the_same_in_any_pieces(monkeypatch, at_once):
-    monkeypatch.setattr(statuses, "CELLS_AT_ONCE", at_once)
-    found = flags((3, 4, 5), first=(65, (1, 2, 3)), second=(65, (2, 0, 0)), third=(127, (2, 3, 4)))
-    assert [str(count) for count in count_statuses(found)] == [
-        "57 of 60 cells: OK",
-        "2 of 60 cells: NEVER_STARTS, e.g. x=0.25 y=0.5 z=0.75",
-        "1 of 60 cells: PENDING, e.g. x=0.5 y=0.75 z=1.0",
-    ]
 
 
 def test_examples_of_a_zip_name_its_axes_only():
@@ -347,12 +304,6 @@ def foreign(path, engine):
     else:
         with xr.open_dataset(path, engine=engine, mask_and_scale=False) as file:
             yield lambda name, *at: file[name][at or ...].values
-
-
-def test_results_open_without_a_warning(stored):
-    with warnings.catch_warnings(), open_result(stored) as found:
-        warnings.simplefilter("error")
-        assert found.load() is found
 
 
 def test_a_result_that_is_open_can_be_opened_and_run_again_and_closing_it_frees_the_file(tmp_path):

@@ -17,11 +17,7 @@ from sweep.results.statuses import (
     cell_values,
     count_methods,
     count_statuses,
-    failed_cells,
     failures,
-    flag_words,
-    flat_pieces,
-    summary_text,
 )
 from sweep.study.toml import to_toml
 
@@ -93,42 +89,6 @@ def test_the_first_cell_of_each_status_is_its_example():
     assert str(counts[1]) == "2 of 6 cells: INACCURATE, e.g. a=1.1 b=0.1"
     assert str(StatusCount("OK", 2, 6)) == "2 of 6 cells: OK"
     assert cell_values(found, 5) == {"a": "1.1", "b": "2.1"}
-
-
-@pytest.mark.parametrize("at_once", [1, 2, 3, 5, 6, 7])
-def test_pieces_are_all_cells_in_their_order_and_no_larger_than_said(monkeypatch, at_once):
-    monkeypatch.setattr(module, "CELLS_AT_ONCE", at_once)
-    column = cells(np.arange(12).reshape(4, 3)).status
-    pieces = list(flat_pieces(column))
-    assert np.concatenate(pieces).tolist() == list(range(12))
-    assert max(map(len, pieces)) == {1: 1, 2: 2, 3: 3, 5: 3, 6: 6, 7: 6}[at_once]
-    assert np.concatenate(list(flat_pieces(cells([7])["status"].isel(a=0)))).tolist() == [7]
-    failed = cells([[int(Status.FAILED)] * 3, [0, 0, int(Status.FAILED)]])
-    assert failed_cells(failed, 9) == [0, 1, 2, 5]
-    assert failed_cells(failed, 2) == [0, 1]
-    assert failed_cells(failed, 0) == []
-
-
-def test_methods_are_counted_and_none_is_left_out():
-    assert count_methods(cells([0, 0, 0, 64], [1, 0, 1, -1])) == {"map": 1, "closed": 2}
-    text = "4 cells: 3 ok, 0 remarked, 1 refused, 0 unsolved, 0 FAILED, 0 pending; solved by map 1, closed 2"
-    found = summary_text(cells([0, 0, 0, 64], [1, 0, 1, -1]))
-    assert found == f"{text}\n1 of 4 cells: BAD_INPUT, e.g. a=3.1"
-    assert summary_text(cells([64], [-1])).startswith(
-        "1 cells: 0 ok, 0 remarked, 1 refused, 0 unsolved, 0 FAILED, 0 pending\n"
-    )
-
-
-def test_words_of_flags():
-    assert flag_words(cells([0]).method_used) == {-1: "none", 0: "map", 1: "closed"}
-    assert flag_words(cells([0]).status) == {}
-    # of a result that another program made -1 is none, too
-    flags = {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "map closed"}
-    assert flag_words(xr.DataArray(0, attrs=flags)) == {-1: "none", 0: "map", 1: "closed"}
-
-
-def test_pieces_of_no_cells_are_none():
-    assert [piece.size for piece in flat_pieces(xr.DataArray(np.zeros((3, 0))))] == [0]
 
 
 def test_a_summary_is_summed_over_all_it_keeps():

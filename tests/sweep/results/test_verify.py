@@ -14,7 +14,7 @@ from running import flip, interrupted, kept, place, quiet, same, tall
 import sweep
 from sweep.cli import main
 from sweep.results.verify import verify
-from sweep.store import probe, reading
+from sweep.store import probe
 from sweep.store.reading import StoredFile
 from sweep.store.store import Store, unfinished_of
 
@@ -64,20 +64,6 @@ def test_a_flipped_bit_in_an_output_is_told_with_its_cells(copy):
     flip(copy, place(copy, name, 2) + 1, bit=5)
     (found,) = verify(copy).findings
     assert found == f"{name}: damaged between its cells 0 and {step}"
-
-
-def test_a_file_that_is_cut_while_it_is_looked_at_is_broken(copy, monkeypatch):
-    real = reading.read_layout
-
-    def cut(fd, size):
-        layout = real(fd, size)
-        os.truncate(copy, 100)
-        return layout
-
-    monkeypatch.setattr(reading, "read_layout", cut)
-    fd = os.open(copy, os.O_RDONLY)
-    assert reading.unbroken(fd) is False
-    os.close(fd)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.3, 0.9, 0.999])
@@ -185,16 +171,6 @@ def test_damaged_blocks_of_an_unfinished_result_are_named(unfinished):
     path = unfinished_of(unfinished)
     flip(path, place(path, "fall_time", 1) + 2)
     assert verify(unfinished).findings[0] == "fall_time: damaged between its cells 0 and 5"
-
-
-def test_all_blocks_but_no_end_is_not_whole(tmp_path, monkeypatch):
-    monkeypatch.setattr(Store, "finish", lambda self, *rest: self.commit() or [0] / 0)
-    with pytest.raises(TypeError):
-        sweep.run(tall(23), tmp_path / "out.h5", progress=False, block_cells=5)
-    monkeypatch.undo()
-    assert verify(tmp_path / "out.h5").findings == (
-        "all blocks are there, but it has not ended; run the sweep again to finish",
-    )
 
 
 @pytest.mark.parametrize("kind", ["cells", "summary"])

@@ -1,20 +1,14 @@
 """Array parameters: lists in [fixed], csv files, axes of a zip, and what becomes of them in a result."""
 
-from pathlib import Path
-from types import SimpleNamespace
-
 import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from beads import KERNEL
 
 import sweep
-from kernels.interface import Field
 from sweep.cells.fingerprint import difference, fingerprint
 from sweep.show.text import result_text
 from sweep.study.model import Study
-from sweep.study.study_parser import StudyParser
 from sweep.system.errors import StudyError
 
 MASS = [0.1, 0.2, 0.7]
@@ -127,52 +121,7 @@ def test_mistakes_are_told(keys, message):
     assert message in mistakes(**keys)
 
 
-def test_an_empty_list_among_others_is_told_as_one_mistake():
-    found = mistakes(fixed={}, axes={"mass": [[], MASS]}, design="zip")
-    assert "axes.mass[0]" in found
-    assert "equal length" not in found
-
-
 def test_a_method_is_kept_out_where_it_lacks_an_output():
     assert set(sweep.run(beads()).method_used.values) == {1}
     assert set(sweep.run(beads(outputs=["total"])).method_used.values) == {0}
     assert sweep.run(beads(outputs=["total"], method="quick")).total[0] == sum(MASS)
-
-
-def test_the_example_of_the_description_is_a_study(tmp_path):
-    from sweep.show.kernels import kernel_text
-
-    text = kernel_text("beads:KERNEL", allow_import=True)
-    assert "one for each bead" in text
-    example = text.partition("a study to begin with\n")[2]
-    (tmp_path / "study.toml").write_text(example)
-    assert sweep.study(tmp_path / "study.toml", allow_import=True).fixed["mass"].tolist() == [0.1, 0.2, 0.3]
-    assert KERNEL.same_length
-
-
-def of_lengths(fixed, axes=None):
-    """What becomes of array parameters along two dimensions, and what is said of them."""
-    parser = StudyParser("study", Path(), False)
-    dims = {"m": ("mass",), "k": ("mass",), "c": ("gear",)}
-    parser.kernel = SimpleNamespace(parameters=[Field(name, "1", name, dims=dim) for name, dim in dims.items()])
-    found = parser._filled(axes or {}, dict(fixed))
-    return {name: np.asarray(value).tolist() for name, value in found.items()}, [
-        (mistake.where, mistake.message) for mistake in parser.mistakes.found
-    ]
-
-
-def test_single_numbers_are_repeated_along_their_own_dimension():
-    found, mistakes = of_lengths({"m": np.array([1.0, 2.0, 3.0]), "k": 5.0, "c": np.array([7.0])})
-    assert (found, mistakes) == ({"m": [1, 2, 3], "k": [5, 5, 5], "c": [7]}, [])
-    found, _ = of_lengths({"m": 4.0, "k": 5.0, "c": np.array([7.0, 8.0])})
-    assert found == {"m": [4], "k": [5], "c": [7, 8]}
-
-
-def test_lengths_along_a_dimension_that_differ_are_told():
-    _, mistakes = of_lengths({"m": np.array([1.0, 2.0]), "k": np.arange(3.0), "c": np.arange(4.0)})
-    assert mistakes == [("fixed", "arrays along mass need equal length; m has 2 and k has 3 values")]
-
-
-def test_a_table_where_a_list_belongs_is_a_mistake():
-    with pytest.raises(StudyError, match=r"axes\.g\[0\] +expected a number, found"):
-        beads(axes={"g": np.ones((2, 2))})

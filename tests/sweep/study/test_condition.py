@@ -1,12 +1,10 @@
 """A condition part by part: what it computes, what units it has, and what it refuses."""
 
-from fractions import Fraction
-
 import numpy as np
 import pytest
 from toy import KERNEL
 
-from sweep.study.condition import LONGEST, CellCondition, Condition, _product, _unit
+from sweep.study.condition import CellCondition, Condition
 from sweep.system.errors import SweepError
 
 COLUMNS = {"x": np.array([1.0, 2.0, 3.0]), "y": np.array([3.0, 2.0, 1.0]), "w": np.array(["a", "b", "a"])}
@@ -59,45 +57,6 @@ def test_what_is_no_condition_is_told(text, what):
     assert f"{text}: {what}" in str(caught.value)
 
 
-LONG = "1 * " * 40 + "x"
-
-
-@pytest.mark.parametrize(
-    ("text", "what"),
-    [
-        (f"x < [{LONG}]", f'"{f"[{LONG}]"[:60]}" is not allowed; it may hold'),
-        (f"not ({LONG})", f'"{LONG[:60]}" is no condition'),
-        (f"1 + (x < {LONG}) < 2", f'"{f"x < {LONG}"[:60]}" is no number'),
-    ],
-)
-def test_of_what_is_refused_sixty_letters_are_told(text, what):
-    with pytest.raises(SweepError) as caught:
-        truth(text)
-    assert f": {what}" in str(caught.value)
-
-
-def test_a_condition_has_a_thousand_letters_at_most():
-    longest = f"x < {'0' * (LONGEST - 5)}2".replace("00", "0.", 1)
-    assert len(longest) == LONGEST
-    truth(longest)
-    with pytest.raises(SweepError, match=f"^{longest[:40]}" + r"\.\.\.: is longer than 1000 letters$"):
-        truth(longest + " ")
-
-
-@pytest.mark.parametrize("power", [1, 2, 3, 9])
-def test_powers_of_a_cell_are_products(power):
-    x = np.array([1.1, 2.3, 0.7])
-    product = x.copy()
-    for _ in range(power - 1):
-        product = product * x
-    found = CellCondition(f"v0**{power} == v0**{power}", KERNEL).holds({"v0": x})
-    assert found.all()
-    parts = CellCondition(f"v0**{power} > 1", KERNEL)
-    node = parts.tree.left
-    parts._columns = {"v0": x}
-    assert parts.value(node).tolist() == product.tolist()
-
-
 @pytest.mark.parametrize("power", ["0", "10", "2.0", "v0", "-1"])
 def test_other_powers_are_refused(power):
     with pytest.raises(SweepError, match="a power is a whole number from 1 to 9"):
@@ -135,13 +94,3 @@ def test_a_number_with_a_unit_is_brought_to_that_of_its_parameter():
     condition = CellCondition("'1.5e1 cm' < height <= '.3 m'", KERNEL)
     assert condition.holds({"height": np.array([0.15, 0.16, 0.3, 0.31])}).tolist() == [False, True, True, False]
     assert condition._factors == {"1.5e1 cm": 0.15, ".3 m": 0.3}
-
-
-def test_dimensions_of_products():
-    m, s = {"m": Fraction(1)}, {"s": Fraction(2)}
-    assert _product(m, s, 3, -1) == {"m": 3, "s": -2}
-    assert _product(m, m, 1, -1) == {}
-    assert _product(None, s, 1, 1) == {"s": 2}
-    assert _product(None, None, 2) is None
-    assert _unit({"m": Fraction(1), "s": Fraction(-1, 2)}) == "m s^-1/2"
-    assert _unit({}) == "1"

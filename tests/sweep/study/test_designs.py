@@ -1,7 +1,5 @@
 """Designs: sampled points by scipy's generators, blocks, and what comes of them in a result."""
 
-import math
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -9,13 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import qmc
-from toy import KERNEL
 from toy_studies import build, message_of
 
 import sweep
-from sweep.study import designs
-from sweep.study.model import Axis, Study, frozen
-from sweep.system.errors import StudyError, SweepError
+from sweep.study.model import Study
 
 RANGES = {
     "height": {"spacing": "log", "start": 1.0, "stop": 1e4},
@@ -57,12 +52,6 @@ def test_points_are_coordinates_of_the_result():
     assert np.allclose(found.height, found.v0 * found.fall_time + found.g * found.fall_time**2 / 2, rtol=1e-8)
 
 
-def test_a_unit_is_that_of_start_and_stop():
-    axes = {**RANGES, "height": {"spacing": "linear", "start": 100.0, "stop": 200.0, "unit": "cm"}}
-    height = sampled(axes=axes).axes["height"].values
-    assert ((height >= 1) & (height <= 2)).all()
-
-
 @pytest.mark.parametrize(
     ("design", "where", "message"),
     [
@@ -81,15 +70,6 @@ def test_a_unit_is_that_of_start_and_stop():
 )
 def test_what_is_wrong_with_a_design_is_told(design, where, message):
     assert message in message_of(lambda: build(design=design, axes=RANGES), where)
-
-
-def test_a_sampled_axis_without_spacing_is_told_to_have_one():
-    axes = {"v0": {"start": 1.0, "stop": 2.0}, "height": RANGES["height"]}
-    assert 'missing; write spacing = "linear" or "log"' in message_of(lambda: sampled(axes=axes), "axes.v0.spacing")
-
-
-def test_a_design_of_too_few_points_is_not_told_to_be_a_single_value():
-    assert message_of(lambda: sampled(n=1), "design.n") == "expected at least 2, found 1"
 
 
 @pytest.mark.parametrize("entry", [[1.0, 2.0], {"values": [1.0]}, {**RANGES["v0"], "num": 8}])
@@ -111,15 +91,6 @@ def test_blocks_are_a_product_of_designs():
     assert found.height.dims == found.v0.dims == ("point",)
     time = found.fall_time
     assert np.allclose((found.v0 * time + found.g * time**2 / 2).T, found.height, rtol=1e-8)
-
-
-def test_blocks_may_stand_in_any_order_and_number():
-    zips = [{"design": "zip", "axes": {name: values}} for name, values in (("height", [1.0, 2.0]), ("v0", [0.0, 1.0]))]
-    study = build(blocks=[BLOCKS[1], *zips])
-    assert study.dims == {"g": ("g",), "point": ("height",), "point_2": ("v0",)}
-    found = sweep.run(study)
-    alone = sweep.run(build(axes={"g": [9.81, 1.62], "height": [1.0, 2.0], "v0": [0.0, 1.0]}))
-    assert np.array_equal(found.fall_time, alone.fall_time)
 
 
 def test_a_sampled_block_is_repeated_over_another():
@@ -188,50 +159,3 @@ def test_a_design_is_kept_in_json(study):
     assert again == study
     assert again.dims == study.dims
     assert again != replace(study, where="g > 3")
-
-
-def test_no_warning_is_raised_on_the_way():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        sampled("sobol", 16)
-
-
-def of_values(*values, words=None):
-    return Axis("height", frozen(values), "values", words)
-
-
-def test_values_that_stand_again_are_found_and_nan_where_the_field_is_known():
-    field = KERNEL.parameter("height")
-    assert designs._repeated(of_values(2.0, 1.0, 3.0, 1.0, 2.0), field) == [1, 0]
-    assert designs._repeated(of_values(1.0, math.nan, math.nan), field) == [1]
-    assert designs._repeated(of_values(1.0, math.nan, math.nan), None) == []
-    assert designs._repeated(of_values(1.0, 1.0), None) == [0]
-    assert designs._repeated(of_values(), field) == []
-
-
-@pytest.mark.parametrize(("points", "told"), [(designs.LARGEST_AXIS, False), (designs.LARGEST_AXIS + 1, True)])
-def test_a_design_has_no_more_points_than_an_axis_may(monkeypatch, points, told):
-    monkeypatch.setattr(designs.samples, "count", lambda *words: points)
-    design = {"kind": "latin", "n": 4, "seed": 0}
-    mistakes = mistakes_of(design=design, axes={"height": {"spacing": "linear", "start": 1.0, "stop": 2.0}})
-    said = f"makes {points:,} points; expected at most {designs.LARGEST_AXIS:,}"
-    assert mistakes == ({"design.n": said} if told else {})
-
-
-def test_points_that_cannot_be_made_are_a_mistake_of_the_design(monkeypatch):
-    def unit_points(*words):
-        raise SweepError("needs scipy")
-
-    monkeypatch.setattr(designs.samples, "unit_points", unit_points)
-    design = {"kind": "latin", "n": 4, "seed": 0}
-    mistakes = mistakes_of(design=design, axes={"height": {"spacing": "linear", "start": 1.0, "stop": 2.0}})
-    assert mistakes == {"design": "needs scipy"}
-
-
-def mistakes_of(**keys):
-    """What is said of a study."""
-    try:
-        build(**keys)
-    except StudyError as fault:
-        return {mistake.where: mistake.message for mistake in fault.mistakes}
-    return {}

@@ -47,19 +47,6 @@ def test_json_holds_long_arrays_exactly_too(length):
     assert hash(again) == hash(study)
 
 
-@pytest.mark.parametrize(
-    ("said", "expected"),
-    [({"by_cell": True}, True), ({"by_cell": False}, False), ({}, False), ({"by_cell": 1}, False)],
-)
-def test_methods_are_chosen_cell_by_cell_where_a_study_says_so_as_all_new_ones_do(said, expected):
-    keys = json.loads(build(axes={"height": [1.0]}).to_json())
-    assert keys.pop("by_cell") is True
-    study = Study.from_json(json.dumps(keys | said), allow_import=True)
-    assert study.by_cell is expected
-    assert Study.from_json(study.to_json(), allow_import=True).by_cell is expected
-    assert (study == build(axes={"height": [1.0]})) is expected
-
-
 def test_json_suffices_to_read_a_study_whose_kernel_is_gone(monkeypatch):
     text = build_rich(fixed={"shape": "square"}, axes={"load": [1.0], "method": ["auto", "slow"]}).to_json()
     monkeypatch.delattr(toy, "RICH")
@@ -82,11 +69,6 @@ def test_json_suffices_to_read_a_study_whose_kernel_is_gone(monkeypatch):
 def test_other_json_is_refused(text):
     with pytest.raises(sweep.SweepError, match="not the JSON of a study"):
         Study.from_json(text)
-
-
-def test_json_of_a_later_format_is_refused():
-    with pytest.raises(sweep.SweepError, match="format 99; this version of foliot reads format 1"):
-        Study.from_json('{"format": 99}')
 
 
 def test_studies_differ_where_one_bit_does():

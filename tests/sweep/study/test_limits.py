@@ -11,13 +11,8 @@ from toy_studies import build
 import sweep
 from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Field, Status
-from sweep.study import designs, samples
+from sweep.study import samples
 from sweep.study.kernel_lookup import load_kernel
-
-RANGES = {
-    "height": {"spacing": "log", "start": 1.0, "stop": 10.0},
-    "v0": {"spacing": "linear", "start": 0.0, "stop": 1.0},
-}
 
 
 def told(**keys):
@@ -27,50 +22,6 @@ def told(**keys):
     except sweep.StudyError as error:
         return {m.where: m.message for m in error.mistakes}
     return {}
-
-
-@pytest.mark.parametrize(("n", "write"), [(8, ""), (9, "8 or 16"), (15, "8 or 16"), (16, ""), (2, ""), (3, "2 or 4")])
-def test_a_sobol_sequence_has_a_power_of_two(n, write):
-    found = told(design={"kind": "sobol", "n": n}, axes=RANGES)
-    assert found == ({"design.n": f"a Sobol' sequence needs a power of 2; write {write}"} if write else {})
-
-
-def test_a_design_has_at_most_as_many_points_as_an_axis_values(monkeypatch):
-    pytest.importorskip("SALib")
-    monkeypatch.setattr(designs, "LARGEST_AXIS", 32)
-    assert told(design={"kind": "saltelli", "n": 8}, axes=RANGES) == {}
-    found = told(design={"kind": "saltelli", "n": 16}, axes=RANGES)
-    assert found == {"design.n": "makes 64 points; expected at most 32"}
-    monkeypatch.setattr(designs, "LARGEST_AXIS", 31)
-    assert told(design={"kind": "saltelli", "n": 8}, axes=RANGES) == {
-        "design.n": "makes 32 points; expected at most 31"
-    }
-
-
-@pytest.mark.parametrize(("seed", "good"), [(0, True), (2**32 - 1, True), (2**32, False), (-1, False), (True, False)])
-def test_seeds_are_of_32_bits(seed, good):
-    assert (told(design={"kind": "latin", "n": 4, "seed": seed}, axes=RANGES) == {}) is good
-
-
-def test_points_without_a_seed_are_those_of_seed_0():
-    found = build(design={"kind": "random", "n": 4}, axes=RANGES).axes["v0"].values
-    assert found.tolist() == np.random.default_rng(0).random((4, 2))[:, 1].tolist()
-
-
-@pytest.mark.parametrize(("largest", "good"), [(12, True), (11, False)])
-def test_a_grid_has_so_many_cells_at_most(monkeypatch, largest, good):
-    monkeypatch.setattr(designs, "LARGEST_GRID", largest)
-    axes = {"height": [1.0, 2.0, 3.0], "v0": [0.0, 1.0], "g": [1.0, 2.0]}
-    assert told(axes=axes) == ({} if good else {"axes": "3 x 2 x 2 cells; a study may have at most 1e+01"})
-    assert told(design="zip", axes={name: list(np.arange(11) + 1.0) for name in axes}) == {}
-
-
-@pytest.mark.parametrize(
-    ("rtol", "good"), [(1e-15, True), (9e-16, False), (0.999, True), (1.0, False), (np.nan, False)]
-)
-def test_the_wanted_error_is_within_its_limits(rtol, good):
-    assert (told(axes={"height": [1.0]}, rtol=rtol) == {}) is good
-    assert (told(axes={"height": [1.0], "rtol": [1e-3, rtol]}) == {}) is good
 
 
 @pytest.mark.parametrize(
@@ -87,17 +38,6 @@ def test_edges_of_a_histogram_rise(edges, message):
     summary = {"outputs": {"fall_time": ["histogram"]}, "edges": {"fall_time": edges}}
     found = told(axes={"height": [1.0]}, summary=summary)
     assert found == ({} if message is None else {"summary.edges.fall_time": message})
-
-
-def test_edges_and_histograms_go_together():
-    axes = {"height": [1.0]}
-    found = told(axes=axes, summary={"outputs": {"fall_time": ["min"]}, "edges": {"fall_time": [1, 2], "drop": [1, 2]}})
-    assert found == {
-        "summary.edges.fall_time": 'there is no histogram of fall_time; ask for it: outputs.fall_time = ["histogram"]',
-        "summary.edges.drop": "there is no histogram of drop",
-    }
-    (message,) = told(axes=axes, summary={"outputs": {"fall_time": ["histogram"]}}).values()
-    assert message.startswith("missing; its histogram needs them, e.g. { spacing")
 
 
 def test_a_summary_reduces_all_axes_and_outputs_in_order_unless_told_otherwise():

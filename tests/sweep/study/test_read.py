@@ -51,35 +51,11 @@ def test_a_whole_study_is_read(read):
     assert "spacing" in study.text
 
 
-def test_a_study_shows_itself_in_one_line():
-    study = build(axes={"height": [1.0, 2.0], "v0": [0.5]}, title="Falling stones")
-    assert repr(study) == "<Study 'Falling stones': toy:KERNEL over height (2), v0 (1)>"
-
-
-def test_terms_are_what_a_method_must_be_able_to_do():
-    assert build_rich().terms == {"load"}
-    assert build_rich(fixed={"drag": 0, "grip": 3}).terms == {"load", "grip"}
-    assert build_rich(axes={"drag": [0.0]}, fixed={"load": 1, "grip": 1, "shape": "square"}).terms == {"drag", "shape"}
-
-
 def test_defaults_are_filled_in(read):
     study = read("axes.height = [1.0]")
     assert (study.method, study.rtol, study.design, study.question) == ("auto", 1e-9, "product", "")
     assert study.title == "toy over height"
     assert study.fixed == {"v0": 0.0, "g": 9.80665}
-
-
-def test_all_outputs_are_taken_where_none_is_named():
-    assert build(outputs=None, axes={"height": [1.0]}, along={"phase": {"num": 2}}).outputs == (
-        "fall_time",
-        "impact_speed",
-        "drop",
-    )
-
-
-def test_a_coordinate_that_no_output_needs_is_empty():
-    assert build(axes={"height": [1.0]}).along["phase"].size == 0
-    assert build(axes={"height": [1.0]}, along={"phase": {"num": 5}}).along["phase"].size == 0
 
 
 FLIPS = """
@@ -176,16 +152,6 @@ def test_log_values_are_the_nearest_floats_to_the_true_geometric_ones(start, sto
     assert values[1:-1].tolist() == expected
 
 
-def test_decades_of_a_log_axis_are_exact():
-    values = build(axes={"height": {"spacing": "log", "start": 1e-4, "stop": 1e6, "num": 401}}).axes["height"].values
-    assert values[::40].tolist() == [1e-4, 1e-3, 1e-2, 0.1, 1, 10, 100, 1e3, 1e4, 1e5, 1e6]
-
-
-def test_tenths_of_a_linear_axis_are_exact():
-    values = build(axes={"height": {"spacing": "linear", "start": -1, "stop": 1, "num": 21}}).axes["height"].values
-    assert values.tolist() == [k / 10 for k in range(-10, 11)]
-
-
 @pytest.mark.parametrize("spacing", ["log", "linear"])
 def test_an_axis_with_a_unit_is_what_its_values_are_one_by_one(spacing):
     axis = {"spacing": spacing, "start": 1, "stop": 1000, "num": 4, "unit": "ms"}
@@ -217,17 +183,6 @@ def test_an_axis_may_be_a_column_of_a_csv_file(read, tmp_path, text):
     assert study.axes["height"].spacing == "file"
 
 
-def test_a_unit_holds_for_a_whole_column(read, tmp_path):
-    (tmp_path / "points.csv").write_text("height\n1\n7\n")
-    assert read('axes.height = { file = "points.csv", unit = "mm" }').axes["height"].values.tolist() == [0.001, 0.007]
-
-
-def test_a_result_in_csv_is_the_points_of_the_next_study(read, tmp_path):
-    (tmp_path / "points.csv").write_text("height,method_used\n1,exact\n2,rough\n")
-    study = read('design = "zip"\naxes.height.file = "points.csv"\n')
-    assert study.axes["height"].values.tolist() == [1.0, 2.0]
-
-
 def test_words_may_come_from_a_file(read, tmp_path):
     (tmp_path / "points.csv").write_text("height,method\n1,exact\n2,auto\n")
     study = read('design = "zip"\naxes.height.file = "points.csv"\naxes.method.file = "points.csv"')
@@ -255,25 +210,6 @@ def test_a_bad_csv_file_is_told_by_line(mistakes, tmp_path, text, message):
     assert message in found
 
 
-def test_of_many_bad_cells_the_first_are_told_and_the_rest_counted(read, tmp_path):
-    (tmp_path / "points.csv").write_text("height\n" + "x\n" * 10)
-    with pytest.raises(sweep.StudyError) as caught:
-        read('axes.height.file = "points.csv"')
-    assert [m.message.split("points.csv")[-1] for m in caught.value.mistakes] == [
-        ', line 2: expected a number, found "x"',
-        ', line 3: expected a number, found "x"',
-        ', line 4: expected a number, found "x"',
-        "and 7 more like these",
-    ]
-
-
-def test_a_csv_file_with_too_many_lines_is_refused(mistakes, tmp_path, monkeypatch):
-    monkeypatch.setattr("sweep.study.spacing.LARGEST_AXIS", 10)
-    (tmp_path / "points.csv").write_text("height\n" + "".join(f"{k}\n" for k in range(1, 1000)))
-    found = mistakes('axes.height.file = "points.csv"')
-    assert found["axes.height.file"] == "expected at most 10 values, found more"
-
-
 def test_a_csv_file_without_ends_of_lines_does_not_fill_the_memory(tmp_path):
     with (tmp_path / "points.csv").open("wb") as file:
         file.truncate(100_000_000)
@@ -282,21 +218,6 @@ def test_a_csv_file_without_ends_of_lines_does_not_fill_the_memory(tmp_path):
         axes.read_column(tmp_path / "points.csv", "height")
     assert tracemalloc.get_traced_memory()[1] < 10e6
     tracemalloc.stop()
-
-
-def test_of_a_csv_file_only_the_column_that_is_wanted_is_kept(tmp_path):
-    with (tmp_path / "points.csv").open("w") as file:
-        file.write("height," + ",".join(f"c{k}" for k in range(500)) + "\n")
-        file.writelines(f"{k}," + "0.125," * 499 + "1\n" for k in range(2000))
-    tracemalloc.start()
-    assert len(axes.read_column(tmp_path / "points.csv", "height")) == 2000
-    assert tracemalloc.get_traced_memory()[1] < 5e6
-    tracemalloc.stop()
-
-
-@pytest.mark.parametrize("name", ["nowhere.csv", ".", "/dev/zero"])
-def test_a_csv_file_that_cannot_be_read_is_a_mistake(mistakes, name):
-    assert "cannot be read" in mistakes(f'axes.height.file = "{name}"')["axes.height.file"]
 
 
 # words, followers, methods
@@ -341,48 +262,11 @@ def test_a_method_that_cannot_do_a_term_of_the_study_is_a_mistake():
     )
 
 
-@pytest.mark.parametrize("words", [["segments", "dopri5"], ["dopri5", "segments"], ["dopri5", "auto", "segments"]])
-def test_every_word_of_a_method_axis_is_asked_whether_it_can_do_the_terms(words):
-    keys = {"kernel": "foliot", "axes": {"method": words}, "fixed": {"mu": 1.0, "phi0": 1.0, "c": 0.5}}
-    told = message_of(lambda: sweep.study(**keys), "axes.method")
-    assert told == "segments cannot do c; use auto, pure, quadrature, taylor or dopri5"
-
-
-@pytest.mark.parametrize("words", [["quick", "whole"], ["whole", "quick"], ["auto", "whole", "quick"]])
-def test_every_word_of_a_method_axis_is_asked_whether_it_gives_the_outputs(words):
-    keys = {"kernel": "beads:KERNEL", "allow_import": True, "outputs": ["share"], "fixed": {"mass": [1.0, 2.0]}}
-    told = message_of(lambda: sweep.study(**keys, axes={"method": words}), "axes.method")
-    assert told == "quick does not give share; use auto or whole, or name the outputs you want"
-
-
-@pytest.mark.parametrize("words", [["slow", "quick"], ["quick", "slow"]])
-def test_every_term_of_a_method_axis_counts_be_it_an_axis_or_fixed(words):
-    for keys in ({"fixed": {"drag": 0.1}}, {"axes": {"drag": [0.0, 0.1]}}):
-        axes = {"load": [1.0], **keys.pop("axes", {}), "method": words}
-        told = message_of(lambda axes=axes, keys=keys: build_rich(axes=axes, **keys), "axes.method")
-        assert told == "quick cannot do drag; use auto or slow"
-
-
 def test_a_term_at_its_default_is_no_hindrance():
     assert build_rich(method="quick", fixed={"drag": 0}).method == "quick"
     assert build_rich(axes={"drag": [0.0]}, fixed={"load": 5, "grip": 5}, method="slow").method == "slow"
     assert (
         build_rich(axes={"shape": ["round"]}, fixed={"load": 5, "grip": 5, "hold": 5}, method="quick").method == "quick"
-    )
-
-
-def test_words_are_checked():
-    assert message_of(lambda: build_rich(fixed={"shape": "sqare"}), "fixed.shape") == (
-        'expected "round" or "square", found "sqare"; did you mean square?'
-    )
-    assert message_of(lambda: build_rich(fixed={"shape": 3}), "fixed.shape") == 'expected "round" or "square", found 3'
-    assert message_of(lambda: build_rich(fixed={"shape": {"value": "round", "unit": "1"}}), "fixed.shape.unit") == (
-        "shape takes words, which have no unit; leave it out"
-    )
-    axes = {"load": [1.0], "shape": {"spacing": "linear", "start": 0, "stop": 3, "num": 2}}
-    assert (
-        message_of(lambda: build_rich(axes=axes), "axes.shape")
-        == 'shape takes words; write e.g. values = ["round", "square"]'
     )
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from toy_studies import build, build_rich
 
 import sweep
-from sweep.study import toml
+from sweep.study.model import Study
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False, min_value=1e-300, max_value=1e300)
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
@@ -18,7 +18,8 @@ TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 
 @st.composite
 def spaced(draw, more=()):
-    start, stop = sorted(draw(st.lists(st.floats(1e-3, 1e3), min_size=2, max_size=2, unique=True)))
+    start = draw(st.floats(1e-3, 1e3))
+    stop = start * draw(st.floats(1.001, 1e3))
     entry = {"spacing": draw(st.sampled_from(["linear", "log"])), "start": start, "stop": stop, **dict(more)}
     return entry | draw(st.sampled_from([{}, {"unit": "cm"}, {"unit": "km"}]))
 
@@ -66,6 +67,7 @@ def test_a_study_comes_back_exactly(layout, keys):
     again = sweep.study(tomllib.loads(sweep.to_toml(study)), allow_import=True)
     assert again == study
     assert sweep.to_toml(again) == sweep.to_toml(study)
+    assert Study.from_json(study.to_json(), allow_import=True) == study
 
 
 def test_words_and_arrays_come_back(tmp_path):
@@ -87,12 +89,6 @@ def test_words_and_arrays_come_back(tmp_path):
         path.write_text(sweep.to_toml(study), encoding="utf-8")
         again = sweep.study(path, allow_import=True)
         assert sweep.study(tomllib.loads(again.text), allow_import=True) == study
-
-
-def test_a_study_from_a_result_comes_back():
-    study = build(axes={"height": {"spacing": "log", "start": 1.0, "stop": 7.0, "num": 5, "unit": "ft"}})
-    found = sweep.study(sweep.run(study), allow_import=True)
-    assert sweep.study(tomllib.loads(sweep.to_toml(found)), allow_import=True) == study
 
 
 def test_what_a_study_may_be_given_as(tmp_path):
@@ -136,77 +132,7 @@ def test_a_zero_below_nothing_is_written_where_the_default_is_zero():
     assert again == study
 
 
-def test_a_study_word_for_word():
-    study = build(
-        axes={"height": {"spacing": "log", "start": 1.0, "stop": 7.0, "num": 5, "unit": "ft"}, "v0": [0.5, -0.0]},
-        title='A "stone"',
-        question="How fast?\x7f\n",
-        fixed={"g": 2.0},
-        outputs=["drop"],
-        along={"phase": [0.0, 0.5]},
-        where="height > 1",
-        rtol=1e-3,
-    )
-    assert sweep.to_toml(study).splitlines() == [
-        'title = "A \\"stone\\""',
-        'question = "How fast?\\u007f\\n"',
-        'kernel = "toy:KERNEL"',
-        'method = "auto"',
-        "rtol = 0.001",
-        'outputs = ["drop"]',
-        'where = "height > 1"',
-        'design = "product"',
-        "",
-        "[axes]",
-        'height = { spacing = "log", start = 1.0, stop = 7.0, num = 5, unit = "ft" }',
-        "v0 = [0.5, -0.0]",
-        "",
-        "[fixed]",
-        "g = 2.0",
-        "",
-        "[along]",
-        "phase = [0.0, 0.5]",
-    ]
-
-
-def test_blocks_and_what_is_kept_of_cells_word_for_word():
-    design = {"kind": "sobol", "n": 4, "seed": 3, "scramble": False}
-    block = {"design": design, "axes": {"height": {"spacing": "linear", "start": 1.0, "stop": 3.0}}}
-    keys = {"summary": {"outputs": {"fall_time": ["min", "histogram"]}, "edges": {"fall_time": [0.5, 1.0]}}}
-    study = build(blocks=[block, {"axes": {"v0": [1.0]}}], title="", **keys)
-    lines = sweep.to_toml(study).splitlines()
-    assert not any(line.startswith(("design", "where", "[axes]", "[fixed]", "[along]")) for line in lines[:6])
-    assert lines[lines.index("[[blocks]]") - 1 :] == [
-        "",
-        "[[blocks]]",
-        'design = { kind = "sobol", n = 4, seed = 3, scramble = false }',
-        'axes = { height = { spacing = "linear", start = 1.0, stop = 3.0 } }',
-        "",
-        "[[blocks]]",
-        'design = "product"',
-        "axes = { v0 = [1.0] }",
-        "",
-        "[summary]",
-        'over = ["height", "v0"]',
-        'outputs = { fall_time = ["min", "histogram"] }',
-        "edges = { fall_time = [0.5, 1.0] }",
-    ]
-
-
-@pytest.mark.parametrize(
-    ("key", "text"), [("aZ0_-", "aZ0_-"), ("", '""'), ("a b", '"a b"'), ("\u00e9", '"\u00e9"'), ('"', '"\\""')]
-)
-def test_keys_are_quoted_where_they_have_to_be(key, text):
-    assert toml._key(key) == text
-
-
 def test_only_a_study_is_written():
     said = "sweep.to_toml: expected a Study, found a dict; sweep.study gives one"
     with pytest.raises(sweep.SweepError, match=f"^{re.escape(said)}$"):
         sweep.to_toml({})
-
-
-def test_parameters_at_their_defaults_are_not_written():
-    assert "fixed" not in sweep.to_toml(build(axes={"height": [1.0]}, fixed={"v0": 0.0, "g": 9.80665}))
-    assert 'fixed]\nshape = "square"\n' in sweep.to_toml(build_rich(fixed={"shape": "square"}))
-    assert "shape" not in sweep.to_toml(build_rich(fixed={"shape": "round"}))
