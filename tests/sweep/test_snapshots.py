@@ -1,4 +1,4 @@
-"""What each command prints: its help, a good run, a mistake, each with its exit status, in `tests/snapshots/COMMAND.txt`.
+"""What each command prints: help, a good run, a mistake, with exit statuses, in `tests/snapshots/COMMAND.txt`.
 
 `python tests/sweep/test_snapshots.py` writes those files anew; read in `git diff` what users will read.
 """
