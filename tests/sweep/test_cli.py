@@ -78,12 +78,8 @@ def call(capsys):
 
 def in_a_process(*argv, **options):
     path = os.pathsep.join([str(Path(sweep.__file__).parents[1]), str(Path(__file__).parents[1] / "helpers")])
-    options = {
-        "env": {**os.environ, "PYTHONPATH": path},
-        "stdout": subprocess.PIPE,
-        "stderr": subprocess.PIPE,
-    } | options
-    return subprocess.Popen([sys.executable, *argv], text=True, **options)
+    pipes = {"env": {**os.environ, "PYTHONPATH": path}, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen([sys.executable, *argv], text=True, **{**pipes, **options})
 
 
 # processes
@@ -259,14 +255,8 @@ def test_fit_writes_its_table_by_what_the_reader_says(done, call):
         assert pd.read_csv("laws.csv").noisy[0] == noisy
     widths = []
     for share in ("0.5", "0.99"):
-        assert (
-            call(
-                *FIT,
-                *["--at", "v0=1", "--window", "300", "1000", "--noise", "yes", "-o", "laws.csv", "--confidence"],
-                share,
-            )[0]
-            == 0
-        )
+        line = f"--at v0=1 --window 300 1000 --noise yes -o laws.csv --confidence {share}"
+        assert call(*FIT, *line.split())[0] == 0
         widths.append(np.ptp(pd.read_csv("laws.csv")[["exponent_low", "exponent_high"]].values))
     assert widths[0] < widths[1]
 
