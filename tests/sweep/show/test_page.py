@@ -119,7 +119,7 @@ def test_exponents_are_told_of_few_lines_with_a_unit_over_a_logarithmic_axis(tmp
     def told(n=2, x=(1.0, 10.0, 100.0, 1000.0), sign=1.0, units="s"):
         y = sign * np.outer(np.ones(n), np.array(x) ** -2.0)
         columns = {"y": (("a", "x"), y, {"units": units}), "status": (("a", "x"), np.zeros(y.shape, np.int8))}
-        columns["method_used"] = columns["status"]
+        columns["method_used"] = (*columns["status"], {"flag_values": [0], "flag_meanings": "map"})
         found = xr.Dataset(columns, {"a": np.arange(n) + 0.5, "x": list(x)}, ds_attrs)
         return Tree(page(found, tmp_path / "x.h5")).text.partition("exponents in x")[2]
 

@@ -288,6 +288,7 @@ def test_reductions_and_cells_that_failed_are_shown(tmp_path):
     words = result_text("x.h5", sweep.run(build(**keys), progress=False)).split()
     assert {"reduced", "fall_time_min", "fall_time_mean", "BAD_INPUT"} <= set(words)
     axes = {"height": [1.0, 11.0, *np.arange(20.0, 50.0)]}
+    (tmp_path / "x.h5.log").write_text("2026-01-01 00:00:00  cell 1 FAILED (height=11): eleven\n")
     with sweep.run(build(kernel="bad:RAISING", axes=axes), tmp_path / "x.h5", progress=False) as found:
         text = result_text(tmp_path / "x.h5", found)
     assert text.split("FAILED, and why\n")[1].split()[:3] == ["cell", "1", "height=11.0"]
