@@ -168,3 +168,16 @@ def test_a_plot_and_the_figure_of_the_studys_script_stand_beside_each_other(here
     refused = subprocess.run(script, capture_output=True, text=True)
     assert refused.returncode == 2
     assert "foliot_scaling.png" in refused.stderr
+
+
+def test_what_killed_exports_have_left_is_tidied_up_and_nothing_else(here):
+    with subprocess.Popen([sys.executable, "-c", ""]) as ended:
+        pass
+    mark = f".a.csv.{os.uname().nodename}."
+    left = [f"{mark}{ended.pid}.tmp"]
+    others = [f"{mark}{os.getppid()}.tmp", f"{mark}{ended.pid}.txt", f"{mark}x.tmp", f".b.csv.elsewhere.{ended.pid}.tmp"]
+    for name in left + others:
+        Path(name).write_text("half")
+    with sweep.open_result("r.h5") as ds:
+        sweep.export(ds, "a.csv")
+    assert {path.name for path in here.iterdir() if path.name.startswith(".")} == set(others)
