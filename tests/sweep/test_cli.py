@@ -231,6 +231,13 @@ def test_cells_that_failed_are_an_exit_status(here, call, axis, status):
     assert (code, f"{status // 4} FAILED" in out) == (status, True)
 
 
+def test_a_cell_of_a_kernel_of_ones_own_that_dies_costs_only_itself(here):
+    Path("bad.toml").write_text('kernel = "bad:DYING"\noutputs = ["fall_time"]\naxes.height.values = [1.0, 22.0]\n')
+    with in_a_process("-m", "sweep", "run", "bad.toml", "--allow-import") as process:
+        assert "1 FAILED" in process.communicate(timeout=60)[0]
+    assert process.returncode == 4
+
+
 def test_what_others_have_written_does_not_command_the_terminal(here, call):
     title = "\\u001b]0;owned\\u0007\\u009b2JStones"
     Path("stones.toml").write_text(STUDY.replace("Falling stones", title) + "\n")

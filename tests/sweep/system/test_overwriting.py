@@ -175,7 +175,12 @@ def test_what_killed_exports_have_left_is_tidied_up_and_nothing_else(here):
         pass
     mark = f".a.csv.{os.uname().nodename}."
     left = [f"{mark}{ended.pid}.tmp"]
-    others = [f"{mark}{os.getppid()}.tmp", f"{mark}{ended.pid}.txt", f"{mark}x.tmp", f".b.csv.elsewhere.{ended.pid}.tmp"]
+    others = [
+        f"{mark}{os.getppid()}.tmp",
+        f"{mark}{ended.pid}.txt",
+        f"{mark}x.tmp",
+        f".b.csv.elsewhere.{ended.pid}.tmp",
+    ]
     for name in left + others:
         Path(name).write_text("half")
     with sweep.open_result("r.h5") as ds:
