@@ -1,7 +1,6 @@
 """The page of a result: all of it in one file, nothing from elsewhere, nothing of the result's text run."""
 
 import base64
-import hashlib
 import re
 from html.parser import HTMLParser
 
@@ -11,7 +10,6 @@ import xarray as xr
 
 import sweep
 from sweep.cli import main
-from sweep.show import page as inner
 from sweep.show.page import page, write_page
 
 VOID = {"meta", "img", "br"}
@@ -117,85 +115,15 @@ def test_outputs_without_a_value_have_no_picture(tmp_path):
     assert "NEVER_STARTS" in tree.text
 
 
-def pictured(monkeypatch):
-    """Pictures are their names."""
-    monkeypatch.setattr(inner, "_picture", lambda dataset, name: f"[{name}]" if name != "y3" else "")
+def test_exponents_are_told_of_few_lines_with_a_unit_over_a_logarithmic_axis(tmp_path):
+    def told(n=2, x=(1.0, 10.0, 100.0, 1000.0), sign=1.0, units="s"):
+        y = sign * np.outer(np.ones(n), np.array(x) ** -2.0)
+        columns = {"y": (("a", "x"), y, {"units": units}), "status": (("a", "x"), np.zeros(y.shape, np.int8))}
+        columns["method_used"] = (*columns["status"], {"flag_values": [0], "flag_meanings": "map"})
+        found = xr.Dataset(columns, {"a": np.arange(n) + 0.5, "x": list(x)}, ds_attrs)
+        return Tree(page(found, tmp_path / "x.h5")).text.partition("exponents in x")[2]
 
-
-def test_the_first_six_outputs_that_have_a_value_are_drawn(monkeypatch):
-    pictured(monkeypatch)
-    columns = {f"y{k}": ("x", [float(k), np.nan]) for k in range(9)}
-    columns["y1"] = ("x", [np.nan, np.nan])
-    (found,) = inner._figures(xr.Dataset(columns | {"status": ("x", [0, 0])}))
-    assert found == '<h2>figures</h2>\n<div class="figures">[y0]\n[y2]\n[y4]\n[y5]\n[y6]</div>'
-    assert list(inner._figures(xr.Dataset({"y3": ("x", [1.0]), "status": ("x", [0])}))) == []
-
-
-def laws_of(n, x=(1.0, 10.0, 100.0, 1000.0), **attrs):
-    """y = x^-2 on n lines."""
-    y = np.outer(np.ones(n), np.array(x) ** -2.0)
-    columns = {"y": (("a", "x"), y, attrs), "status": (("a", "x"), np.zeros(y.shape, np.int8))}
-    return xr.Dataset(columns, {"a": np.arange(n) + 0.5, "x": list(x)})
-
-
-def test_exponents_of_up_to_eight_lines_are_told():
-    (found,) = inner._exponents(laws_of(8, units="s"))
-    tree = Tree(found)
-    assert tree.text.startswith(
-        "exponents in x output over exponent interval largest misfit y (a = 0.5) x 1 to 1000 -2 "
-    )
-    assert tree.text.count("y (a = ") == 8
-    assert "of 95 % confidence" in tree.text
-    assert list(inner._exponents(laws_of(9, units="s"))) == []
-
-
-@pytest.mark.parametrize("attrs", [{}, {"units": "1"}])
-def test_pure_numbers_have_no_exponents(attrs):
-    assert list(inner._exponents(laws_of(1, **attrs))) == []
-
-
-def test_exponents_need_a_logarithmic_axis_and_positive_values():
-    assert list(inner._exponents(laws_of(1, (1.0, 2.0, 3.0, 4.0), units="s"))) == []
-    assert list(inner._exponents(-laws_of(1, units="s"))) == []
-    some = laws_of(1, (1.0, 10.0, 100.0, 1000.0, 1e4), units="s")
-    some.y[0, 2] = -7.0
-    (found,) = inner._exponents(some)
-    assert "x 1 to 1e+04 -2 " in Tree(found).text
-
-
-def test_a_table_has_its_heading_and_rows():
-    table = inner._table(("a", "<b>"), [("1", "&"), ("2", "x")])
-    rows = "<tr><td>1</td><td>&amp;</td></tr><tr><td>2</td><td>x</td></tr>"
-    head = "<thead><tr><th>a</th><th>&lt;b&gt;</th></tr></thead>"
-    assert table == f'<div class="wide"><table>{head}<tbody>{rows}</tbody></table></div>'
-    assert "thead" not in inner._table((), [("1",)])
-    assert (
-        Tree(inner._section("methods used", [("map", "1", "100 %")])).text
-        == "methods used method cells share map 1 100 %"
-    )
-
-
-def test_the_fingerprint_is_sixteen_digits_of_a_hash():
-    digits = hashlib.sha256(b"study and sources").hexdigest()[:16]
-    assert inner._fingerprint({"fingerprint": "study and sources"}) == digits
-    assert inner._fingerprint({}) == "e3b0c44298fc1c14"  # of nothing
-
-
-def test_the_page_is_in_order_and_its_title_and_study_are_told(ds, tmp_path, monkeypatch):
-    pictured(monkeypatch)
-    text = page(ds.assign_attrs(study="kernel = <foliot>"), tmp_path / "foliot.h5")
-    assert text.startswith('<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n')
-    heads = re.findall(r"<h[12]>(.*?)</h[12]>", text)
-    assert heads == [
-        "Period &amp; drive", "figures", "exponents in mu", "axes", "fixed", "outputs", "status", "methods used",
-        "provenance", "study",
-    ]  # fmt: skip
-    assert (
-        '<p class="question">How does &lt;b&gt;it&lt;/b&gt; fall?</p>\n<p class="account">foliot.h5: complete, 43'
-        in text
-    )
-    assert text.count('class="question"') == 1
-    assert "<pre>kernel = &lt;foliot&gt;</pre>" in text
-    untitled = page(ds.assign_attrs(title="", study=""), tmp_path / "foliot.h5")
-    assert "<h1>foliot</h1>" in untitled
-    assert "<h2>study</h2>" not in untitled
+    ds_attrs = {"title": "made", "kernel": "toy"}
+    assert "y (a = 0.5) x 1 to 1000 -2 " in told()
+    assert told(8).count("y (a = ") == 8
+    assert told(9) == told(x=(1.0, 2.0, 3.0, 4.0)) == told(sign=-1.0) == told(units="1") == ""

@@ -79,11 +79,11 @@ NOISE = ("few dear cells", "every other known")
 """Blocks that tell nothing of their neighbours."""
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("workers", [1, 2, 8])
-@pytest.mark.parametrize("name", COSTS)
-def test_from_a_tenth_on_the_time_left_is_within_30_percent(name, workers, seed):
-    told = Run(COSTS[name], 512, workers, seed=seed).forecasts()
+@pytest.mark.parametrize("workers", [1, 8])
+@pytest.mark.parametrize(("name", "slow"), [*((name, 1.0) for name in COSTS), ("even", 10.0), ("two methods", 10.0)])
+def test_from_a_tenth_on_the_time_left_is_within_30_percent(name, slow, workers):
+    """Also where the first block takes ten times as long as it would later, as where kernels are still loaded."""
+    told = Run(COSTS[name], 512, workers, seed=workers, slow=slow).forecasts()
     end, off = told[-1][1], 0.6 if name in NOISE else 0.3
     for least in (0.10, 0.25, 0.50):
         share, now, left = next(row for row in told if row[0] >= least)
@@ -192,39 +192,13 @@ def test_ten_kinds_of_grids_are_forecast_within_30_percent_from_a_tenth_on(kind)
     assert np.mean(np.array(ratios) < 0.9) < 0.1
 
 
-@pytest.mark.parametrize("workers", [1, 2, 8])
-@pytest.mark.parametrize("name", ["even", "dear last", "two methods"])
-def test_workers_that_are_slow_at_first_do_not_make_the_rest_long(name, workers):
-    """The first block of each takes ten times as long as it would later, as where kernels are still loaded."""
-    told = Run(COSTS[name], 512, workers, slow=10.0).forecasts()
-    end = told[-1][1]
-    for least in (0.10, 0.25, 0.50):
-        share, now, left = next(row for row in told if row[0] >= least)
-        assert 0.7 * (end - now) < left < 1.3 * (end - now), (share, left, end - now)
-
-
-@pytest.mark.parametrize("name", sorted(COSTS.keys() - set(NOISE)))
-def test_a_forecast_errs_on_the_long_side(name):
-    """Of all blocks from the tenth part to the last, over three samples of the grid: nine in ten are not too short."""
-    short = []
-    for seed in range(3):
-        told = Run(COSTS[name], 512, 2, seed=seed).forecasts()
-        end = told[-1][1]
-        short += [left < 0.97 * (end - now) for share, now, left in told if 0.1 <= share < 1]
-    assert np.mean(short) < 0.1
-
-
-@pytest.mark.parametrize("name", COSTS)
-def test_every_block_comes_once_whatever_they_take(name):
-    run = Run(COSTS[name], 100, 3)
+def test_every_block_comes_once_also_one_that_comes_again():
+    run = Run(COSTS["dear last"], 100, 3)
     assert len(list(run.ends())) == len(run.costs)
-    assert run.forecast.left == 0.0
-    assert run.forecast.blocks == 0
-
-
-def test_the_lead_is_spread_over_the_grid():
-    lead = np.sort(list(islice(Forecast(np.ones(4096), range(4096)).order(), 256)))
-    assert np.diff(np.r_[0, lead, 4096]).max() <= 4 * 16
+    assert (run.forecast.left, run.forecast.blocks) == (0.0, 0)
+    run.forecast.again(2)
+    assert run.forecast.left > 0
+    assert list(run.forecast.order()) == [2]
 
 
 def test_dear_blocks_come_first_once_some_from_all_over_are_known():
@@ -245,21 +219,8 @@ def test_what_was_measured_counts_and_not_what_was_thought():
     assert np.mean(list(islice(jobs, 12))) > 200
 
 
-def test_only_blocks_that_are_left_are_computed_and_forecast():
-    now = 0.0
-    forecast = Forecast(np.ones(100), range(90, 100), lambda: now)
-    jobs = forecast.order()
-    assert forecast.left is None
-    for _ in range(5):
-        job = next(jobs)
-        forecast.begin(job)
-        now += 2.0
-        forecast.end(job)
-    assert 10.0 <= forecast.left <= 13.0
-    assert sorted([job, *jobs])[0] >= 90
-
-
-def test_a_block_at_work_counts_for_the_part_of_it_that_is_left():
+def test_a_block_that_takes_far_longer_than_thought_is_not_done_at_any_moment():
+    """The last one of a hundred takes a minute, not the second that the others did: it was never 0 s to its end."""
     now = 0.0
     forecast = Forecast(np.ones(100), range(100), lambda: now)
     for job in sorted(forecast.order())[:99]:
@@ -270,32 +231,9 @@ def test_a_block_at_work_counts_for_the_part_of_it_that_is_left():
     before = forecast.left
     now += 0.75
     assert forecast.left == pytest.approx(before - 0.75)
-
-
-def test_a_block_that_takes_far_longer_than_thought_is_not_done_at_any_moment():
-    """The last one of a hundred takes a minute, not the second that the others did: it was never 0 s to its end."""
-    now = 0.0
-    forecast = Forecast(np.ones(100), range(100), lambda: now)
-    for job in sorted(forecast.order())[:99]:
-        forecast.begin(job)
-        now += 1.0
-        forecast.end(job)
-    forecast.begin(99)
     for waited in (2.0, 10.0, 30.0, 50.0):
         now = 99.0 + waited
         assert forecast.left > 0.5 * min(waited, 60.0 - waited)
-
-
-def test_what_workers_elsewhere_take_to_start_is_not_taken_for_slowness():
-    now = 0.0
-    forecast = Forecast(np.ones(100), range(100), lambda: now)
-    jobs = forecast.order()
-    next(jobs)
-    now = 60.0
-    for job in range(20):
-        now += 0.5
-        forecast.end(job, 0.5)
-    assert 40.0 <= forecast.left < 50.0
 
 
 def test_what_workers_elsewhere_have_half_done_counts():
@@ -306,18 +244,6 @@ def test_what_workers_elsewhere_have_half_done_counts():
         now = costs[job]
         forecast.end(job, costs[job])
     assert 192.0 <= forecast.left < 1.3 * 192.0
-
-
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("blocks", [32, 64, 128])
-@pytest.mark.parametrize("name", ["even", "dear last"])
-def test_of_few_blocks_too_the_time_left_is_about_right(name, blocks, seed):
-    """The probes are off by up to a half each: a sum over many is less so than a block's own."""
-    told = Run(COSTS[name], blocks, 2, seed=seed).forecasts()
-    end = told[-1][1]
-    ratios = [next(left / (end - now) for share, now, left in told if share >= least) for least in (0.1, 0.25, 0.5)]
-    assert 0.8 < min(ratios) <= max(ratios) < 1.9
-    assert np.median(ratios) < 1.5
 
 
 def test_what_the_disk_still_takes_is_waited_for():
@@ -334,40 +260,3 @@ def test_what_the_disk_still_takes_is_waited_for():
     forecast.again(1)
     forecast.ending = lambda: (0.5, 60.0)
     assert forecast.left == 60.0
-
-
-def test_one_long_block_is_waited_for_by_all_workers():
-    now = 0.0
-    forecast = Forecast(np.r_[np.ones(99), 50.0], range(100), lambda: now)
-    for job in sorted(forecast.order())[:99]:
-        forecast.begin(job)
-    now += 9.9
-    for job in range(99):
-        forecast.end(job)
-    assert forecast.left >= 50.0
-
-
-def test_a_block_that_comes_again_is_left_again():
-    forecast = Forecast(np.ones(4), range(4))
-    assert len(list(forecast.order())) == 4
-    for job in range(4):
-        forecast.begin(job)
-        forecast.end(job)
-    forecast.again(2)
-    assert forecast.left > 0
-    assert list(forecast.order()) == [2]
-
-
-def test_a_hundred_thousand_blocks_are_ordered_at_once():
-    """For a cluster takes thousands of blocks before the first is done: all are looked at anew a few hundred times."""
-    forecast = Forecast(np.geomspace(1.0, 10.0, 100_000), range(100_000))
-    looked, real = 0, forecast._expected
-
-    def counted(measured):
-        nonlocal looked
-        looked += 1
-        return real(measured)
-
-    forecast._expected = counted
-    assert len(set(forecast.order())) == 100_000
-    assert looked < 1000

@@ -3,12 +3,10 @@
 import json
 import logging
 import time
-from pathlib import Path
 
 import pytest
 
-from sweep.system import log as module
-from sweep.system.log import LOG, log, log_path, logging_to, read_lines
+from sweep.system.log import LOG, log, logging_to, read_lines
 
 
 @pytest.fixture
@@ -27,10 +25,6 @@ def clock(monkeypatch):
     yield
     monkeypatch.undo()
     time.tzset()
-
-
-def test_the_log_stands_beside_the_output():
-    assert log_path(Path("a/out.h5")) == Path("a/out.h5.log")
 
 
 def test_lines_for_people_are_one_line_each_and_shown_not_obeyed(path):
@@ -80,19 +74,6 @@ def test_both_kinds_of_lines_are_read_and_broken_ones_left_out():
     assert list(read_lines(text)) == [
         {"time": "2001-09-09 03:46:40", "text": "begun {"}, {"time": "t", "text": "x", "cells": 3}, {}
     ]  # fmt: skip
-
-
-def test_a_full_disk_does_not_end_a_run(path, monkeypatch, capsys):
-    def full(*args):
-        raise OSError(28, "No space left on device")
-
-    with logging_to(path):
-        (handler,) = [h for h in LOG.handlers if isinstance(h, module._Handler)]
-        real = handler.stream
-        handler.stream = type("Full", (), {"write": full, "flush": full, "close": full})()
-        log("lost")
-    real.close()
-    assert capsys.readouterr().err == ""
 
 
 def test_a_log_that_cannot_be_written_at_all_is_told(tmp_path):

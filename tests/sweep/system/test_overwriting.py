@@ -38,12 +38,6 @@ def here(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_what_a_command_has_written_it_writes_again(here, name, capsys):
-    for _ in range(2):
-        assert cli.main(list(KINDS[name])) == 0, capsys.readouterr().err
-
-
-@pytest.mark.parametrize("name", KINDS)
 def test_what_is_foreign_is_overwritten_by_force_alone(here, name, capsys):
     (here / name).write_text("# notes of a whole year\n1.0\n")
     assert cli.main(list(KINDS[name])) == 2
@@ -143,17 +137,6 @@ def test_a_folder_that_cannot_be_replaced_is_kept(here, monkeypatch):
     assert not [p for p in here.iterdir() if p.name.startswith(".")]
 
 
-def test_refine_says_before_it_computes_that_another_result_is_there(here, capsys, monkeypatch):
-    sweep.run(sweep.study(kernel="foliot", axes={"mu": [1.0, 2.0]}, fixed={"a": 1.0, "phi0": 1.0}), "f.h5").close()
-    argv = ["refine", "f.h5", "--y", "period", "--tolerance", "1e-4", "-o", "r.h5"]
-    with monkeypatch.context() as nothing:
-        nothing.setattr("sweep.explore.refiner.Refiner.refined", lambda self: pytest.fail("computed"))
-        assert cli.main(argv) == 2
-        assert "r.h5: holds another result" in capsys.readouterr().err
-    assert cli.main([*argv, "--force"]) == 0
-    assert cli.main(argv) == 0  # the same again
-
-
 def test_no_figure_is_overwritten_by_another_program(here, capsys):
     """Of three commands and a program that imports the package."""
     fit = ("fit", "r.h5", "--y", "fall_time", "--x", "height", "--compare", "-o")
@@ -185,3 +168,21 @@ def test_a_plot_and_the_figure_of_the_studys_script_stand_beside_each_other(here
     refused = subprocess.run(script, capture_output=True, text=True)
     assert refused.returncode == 2
     assert "foliot_scaling.png" in refused.stderr
+
+
+def test_what_killed_exports_have_left_is_tidied_up_and_nothing_else(here):
+    with subprocess.Popen([sys.executable, "-c", ""]) as ended:
+        pass
+    mark = f".a.csv.{os.uname().nodename}."
+    left = [f"{mark}{ended.pid}.tmp"]
+    others = [
+        f"{mark}{os.getppid()}.tmp",
+        f"{mark}{ended.pid}.txt",
+        f"{mark}x.tmp",
+        f".b.csv.elsewhere.{ended.pid}.tmp",
+    ]
+    for name in left + others:
+        Path(name).write_text("half")
+    with sweep.open_result("r.h5") as ds:
+        sweep.export(ds, "a.csv")
+    assert {path.name for path in here.iterdir() if path.name.startswith(".")} == set(others)

@@ -2,37 +2,17 @@ import os
 import signal
 import threading
 import time
-from concurrent.futures import Future
 
-import numpy as np
 import pytest
 
 from sweep.system import pool
-from sweep.system.errors import SweepError
-from sweep.system.pool import BufferPool, Cores, CtrlC, Stopper, Terminated, each, through, whole_number
+from sweep.system.pool import BufferPool, Cores, CtrlC, Stopper, Terminated, each
 
 
 def test_every_job_is_done_once_and_told():
     done, told = [], []
     each(range(100), done.append, 4, told.append)
     assert sorted(done) == sorted(j for j in told if j is not None) == list(range(100))
-
-
-def test_jobs_are_submitted_a_few_at_a_time():
-    taken, told = [], []
-
-    def jobs():
-        for job in range(1000):
-            taken.append(job)
-            yield job
-
-    def finished(job):
-        if job is not None:
-            told.append(job)
-        assert len(taken) - len(told) <= 2 * 3
-
-    each(jobs(), lambda job: None, 3, finished)
-    assert len(told) == 1000
 
 
 def test_after_a_fault_no_job_is_begun():
@@ -46,28 +26,6 @@ def test_after_a_fault_no_job_is_begun():
     with pytest.raises(ValueError, match="five"):
         each(range(1000), work, 2, lambda job: None)
     assert len(begun) < 30
-
-
-def test_a_halt_lets_in_no_more_than_its_slots_and_nobody_afterwards():
-    stopper = Stopper(2)
-    inside, most = [], []
-
-    def enter():
-        inside.append(1)
-        most.append(len(inside))
-        time.sleep(0.005)
-        inside.pop()
-
-    threads = [threading.Thread(target=stopper.compute, args=(enter,)) for _ in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(most) == 8
-    assert max(most) == 2
-    stopper.set()
-    assert not stopper.compute(enter)
-    assert len(most) == 8
 
 
 def press():
@@ -246,62 +204,6 @@ def test_what_is_borrowed_comes_back_and_more_is_made_only_where_there_is_too_li
     with buffers.borrow() as one, buffers.borrow() as two:
         assert {one, two} == {0, 1}
     assert made == [0, 1]
-
-
-@pytest.mark.parametrize("capacity", [1, 3])
-def test_no_more_are_submitted_at_a_time_than_there_is_room_for(capacity):
-    told, ends = [], []
-
-    def submit(job):
-        told.append(("submit", job))
-        future = Future()
-        future.set_result(10 * job)
-        return future
-
-    def settled(job, future):
-        ends.append(None if job is None else (job, future.result()))
-        told.append(("settled", job))
-
-    through(range(4), submit, lambda: capacity, settled, lambda: told.append("stop"), CtrlC())
-    assert sorted(e for e in ends if e is not None) == [(k, 10 * k) for k in range(4)]
-    assert [one for one in told if one[0] == "submit"] == [("submit", k) for k in range(4)]
-    first = told.index(("settled", None))
-    assert sum(one[0] == "submit" for one in told[:first]) == capacity
-    assert "stop" not in told
-
-
-def test_a_fault_stops_before_it_goes_on():
-    told = []
-
-    def submit(job):
-        future = Future()
-        future.set_result(job)
-        return future
-
-    def settled(job, future):
-        told.append(job)
-        raise ValueError("no")
-
-    with pytest.raises(ValueError, match="no"):
-        through(range(4), submit, lambda: 2, settled, lambda: told.append("stop"), CtrlC())
-    assert told[-1] == "stop"
-    assert len(told) == 2
-
-
-def test_a_process_told_to_end_has_the_usual_status():
-    assert Terminated().code == 143
-
-
-@pytest.mark.parametrize("number", [1, 7, np.int64(3)])
-def test_a_whole_number_is_taken(number):
-    found = whole_number("workers", number)
-    assert (found, type(found)) == (number, int)
-
-
-@pytest.mark.parametrize("number", [0, -1, 1.0, True, "2", None, np.int64(0)])
-def test_what_is_no_whole_number_is_told(number):
-    with pytest.raises(SweepError, match="workers: expected a whole number from 1 on, found "):
-        whole_number("workers", number)
 
 
 def test_cores_are_those_this_process_may_use(monkeypatch):

@@ -1,15 +1,23 @@
+"""What a run says of itself while it goes on: how often, how far, how long still."""
+
 import io
+import itertools
+import logging
+import os
 import re
+import sys
+from types import SimpleNamespace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from sweep.system.errors import SweepError
 from sweep.system.progress import Progress, duration, quantity, seconds_of, speed, stream_of
 
 
 class Clock:
-    def __init__(self):
-        self.now = 100.0
+    now = 100.0
 
     def __call__(self):
         return self.now
@@ -20,33 +28,6 @@ class Terminal(io.StringIO):
         return True
 
 
-@pytest.fixture
-def clock():
-    return Clock()
-
-
-def lines(stream):
-    """Lines of a log, without their times."""
-    return [re.sub(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d  ", "", line) for line in stream.getvalue().splitlines()]
-
-
-def test_a_run_of_less_than_a_second_is_silent(clock):
-    log = io.StringIO()
-    progress = Progress(100, log, clock=clock)
-    clock.now += 0.99
-    progress.add(100)
-    progress.end()
-    assert log.getvalue() == ""
-
-
-def test_a_line_says_how_much_how_fast_and_how_long(clock):
-    log = io.StringIO()
-    progress = Progress(1_000_000, log, "out.h5", clock=clock)
-    clock.now += 10
-    progress.add(250_000)
-    assert lines(log) == ["out.h5: 250,000/1,000,000 cells (25.0 %), 25,000 cells/s, 30 s left"]
-
-
 class Left:
     """A forecast that says what it is told to."""
 
@@ -54,132 +35,128 @@ class Left:
         self.left = left
 
 
-def test_time_left_is_that_of_the_forecast(clock):
-    """A tenth of the cells that took half of the work: as long again, not nine times as long."""
-    progress = Progress(1000, None, forecast=Left(60.0), clock=clock)
-    clock.now += 60
-    progress.add(100)
-    assert progress.line() == "100/1,000 cells (10.0 %), 1.7 cells/s, 1 min 00 s left"
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+def run(stream, clock, times, total=1000, **keys):
+    """A run that does cells (after seconds, cells), and after how many seconds a line is told."""
+    progress, told = Progress(total, stream, clock=clock, **keys), []
+    for now, cells in times:
+        clock.now = 100.0 + now
+        before = stream.getvalue()
+        progress.add(cells)
+        told += [now] if stream.getvalue() != before else []
+    progress.end()
+    return told
+
+
+def seconds_in(text):
+    """A time in words as a number, and how large its last unit is."""
+    units = {"d": 86400.0, "h": 3600.0, "min": 60.0, "s": 1.0}
+    parts = re.findall(r"([\d.]+) (d|h|min|s)\b", text)
+    last = 0.1 if "." in text else units[parts[-1][1]]
+    return sum(float(number) * units[unit] for number, unit in parts), last
+
+
+@given(st.floats(0.0, 1e7))
+def test_times_are_told_to_the_last_digit_of_their_words(seconds):
+    found, last = seconds_in(duration(seconds))
+    assert abs(found - seconds) <= (0.5 if last <= 1 else 1.0) * last + 0.5
+    assert not re.search(r"\b60 |\b24 h", duration(seconds))
+
+
+@given(st.floats(1e-3, 1e12))
+def test_speeds_and_bytes_have_two_or_three_digits(number):
+    assert float(speed(number).split()[0].replace(",", "")) == pytest.approx(number, rel=0.06)
+    size = max(number, 1.0)
+    count, unit = quantity(size).split()
+    factor = 1000.0 ** ["B", "kB", "MB", "GB", "TB", "PB"].index(unit)
+    assert float(count) * factor == pytest.approx(size, rel=6e-3)
+    assert 0.99 <= float(count) < 1000
+
+
+def test_times_are_read_as_they_are_told():
+    for text, seconds in (("90", 90), (2, 2), (" 60s ", 60), ("5 min", 300), ("1.5 h", 5400), ("1e-3s", 1e-3)):
+        assert seconds_of("cell_timeout", text) == seconds
+    for text in ("", "0", "-1", "5 d", "1e999", "ten", "--5", None):
+        with pytest.raises(SweepError, match="cell_timeout"):
+            seconds_of("cell_timeout", text)
+
+
+def test_a_line_says_how_much_how_fast_and_how_long(clock):
+    """By the cells so far; of an earlier run they say nothing of the speed; a forecast knows better."""
+    for keys, cells, wanted in (
+        ({}, 250, (250, 25.0, 30.0)),
+        ({"done": 800}, 50, (850, 5.0, 30.0)),
+        ({"forecast": Left(95.0)}, 100, (100, 10.0, 95.0)),
+    ):
+        log = io.StringIO()
+        run(log, clock, [(0, 0), (10, cells)], name="out.h5", **keys)
+        line = log.getvalue().splitlines()[0]
+        assert re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d  out.h5: ", line)
+        done, total, share, rate = re.search(
+            r"([\d,]+)/([\d,]+) cells \(([\d.]+) %\), ([\d.,]+) cells/s", line
+        ).groups()
+        assert (int(done), total, float(share)) == (wanted[0], "1,000", wanted[0] / 10)
+        assert float(rate) == pytest.approx(wanted[1], rel=0.03)
+        assert seconds_in(line.split("cells/s, ")[1])[0] == wanted[2]
+        clock.now = 100.0
 
 
 @pytest.mark.parametrize("forecast", [None, Left(0.0), Left(1e-9)])
-def test_while_cells_remain_some_time_is_left(clock, forecast):
+def test_while_cells_remain_some_time_is_left_and_it_is_not_all_done(clock, forecast):
     progress = Progress(10**9, None, forecast=forecast, clock=clock)
     clock.now += 60
     progress.add(10**9 - 1)
-    assert not re.search(r" 0(\.0)? s left", progress.line())
-    assert progress.left > 0
-
-
-def test_cells_of_an_earlier_run_are_done_but_say_nothing_about_speed(clock):
-    progress = Progress(100, None, done=80, clock=clock)
-    clock.now += 5
-    progress.add(10)
-    assert progress.line() == "90/100 cells (90.0 %), 2 cells/s, 5.0 s left"
-
-
-def test_a_night_makes_a_readable_log(clock):
-    """Ten hours in steps of a second: the first line, one every 30 s or 5 %, the last."""
-    log = io.StringIO()
-    progress = Progress(36_000, log, clock=clock)
-    for _ in range(36_000):
-        clock.now += 1
-        progress.add(1)
-    progress.end()
-    told = lines(log)
-    assert 1200 <= len(told) <= 1203
-    assert told[0].startswith("sweep: 1/36,000 cells (0.0 %)")
-    assert told[-1] == "sweep: 36,000/36,000 cells (100 %), 1 cells/s, took 10 h 00 min"
-
-
-def test_a_run_of_a_minute_makes_a_dozen_lines(clock):
-    log = io.StringIO()
-    progress = Progress(6000, log, clock=clock)
-    for _ in range(6000):
-        clock.now += 0.01
-        progress.add(1)
-    progress.end()
-    assert 8 <= len(lines(log)) <= 16
-
-
-def test_every_line_of_a_log_bears_its_time(clock):
-    log = io.StringIO()
-    Progress(10, log, clock=clock).note("hello")
-    assert re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d  sweep: hello\n", log.getvalue())
-
-
-def test_a_terminal_has_one_line_that_is_redrawn(clock):
-    screen = Terminal()
-    progress = Progress(100, screen, clock=clock)
-    for _ in range(100):
-        clock.now += 0.2
-        progress.add(1)
-    progress.end()
-    text = screen.getvalue()
-    assert text.count("\n") == 1
-    assert text.endswith("took 20 s" + " " * (len(text) - len(text.rstrip(" \n")) - 1) + "\n")
-    assert text.count("\r") > 50
-
-
-def test_a_shorter_line_leaves_nothing_of_the_longer_one(clock):
-    screen = Terminal()
-    progress = Progress(10**9, screen, clock=clock)
-    clock.now += 2
-    progress.add(1)
-    before = len(screen.getvalue().split("\r")[-1])
-    clock.now += 2
-    progress.add(10**9 - 1)
-    assert len(screen.getvalue().split("\r")[-1]) >= before
-
-
-def test_a_note_on_a_terminal_begins_a_new_line(clock):
-    screen = Terminal()
-    progress = Progress(10, screen, clock=clock)
-    clock.now += 2
-    progress.add(1)
-    progress.note("careful")
-    assert "left\nsweep: careful\n" in screen.getvalue()
-
-
-def test_hundred_percent_is_said_only_when_all_is_done(clock):
-    progress = Progress(10**6, None, clock=clock)
-    progress.add(10**6 - 1)
     assert "(99.9 %)" in progress.line()
-
-
-def test_cells_that_come_again_are_taken_back(clock):
-    progress = Progress(100, None, clock=clock)
-    progress.add(100)
+    assert seconds_in(progress.line().split("cells/s, ")[1])[0] > 0
+    progress.add(1)
+    assert "(100 %)" in progress.line()
     progress.again(10)
-    assert progress.done == 90
-    clock.now += 1
-    assert progress.line().endswith("left")
-
-
-def test_nothing_done_yet_says_nothing_about_time(clock):
-    progress = Progress(100, None, clock=clock)
-    clock.now += 5
-    assert progress.line() == "0/100 cells (0.0 %)"
+    assert progress.done == 10**9 - 10
+    assert "(100 %)" in Progress(0, None, clock=clock).line()
+    assert "left" not in Progress(100, None, clock=clock).line()
 
 
 @pytest.mark.parametrize(
-    ("seconds", "text"),
+    ("stream", "times", "told"),
     [
-        (0.04, "0.0 s"), (9.94, "9.9 s"), (9.96, "10 s"), (59.4, "59 s"), (59.6, "1 min 00 s"), (185, "3 min 05 s"),
-        (3599.4, "59 min 59 s"), (3600, "1 h 00 min"), (26000, "7 h 13 min"),
-        (86399, "23 h 59 min"), (90000, "1 d 1 h"),
+        (io.StringIO(), [(0.5, 900), (0.99, 100)], []),
+        (io.StringIO(), [(0.9, 1), (1.0, 1), (30.9, 1), (31.0, 1), (35.9, 60), (36.0, 1), (42, 48), (45, 3), (75, 0)],
+         [1.0, 31.0, 36.0, 45, 75]),
+        (Terminal(), [(1.0, 1), (1.09, 1), (1.11, 1), (1.2, 1), (1.22, 1)], [1.0, 1.11, 1.22]),
     ],
 )  # fmt: skip
-def test_durations_read_as_people_say_them(seconds, text):
-    assert duration(seconds) == text
+def test_a_line_comes_every_half_minute_or_twentieth_and_a_terminal_is_redrawn_ten_times_a_second(
+    clock, stream, times, told
+):
+    assert run(stream, clock, times) == told
 
 
-def test_progress_goes_to_stderr_unless_told_otherwise(capsys):
-    print("here", file=stream_of(None))
-    assert capsys.readouterr().err == "here\n"
-    assert stream_of(False) is None
+def test_a_night_makes_a_readable_log(clock):
     log = io.StringIO()
-    assert stream_of(log) is log
+    run(log, clock, [(k, 1) for k in range(1, 36_001)], total=36_000)
+    told = log.getvalue().splitlines()
+    assert 1200 <= len(told) <= 1203
+    assert told[-1].endswith("took 10 h 00 min")
+
+
+def test_a_terminal_has_one_line_of_which_nothing_is_left_over_and_notes_have_their_own(clock):
+    screen = Terminal()
+    progress = Progress(10**9, screen, "\x1b[2Jstones", clock=clock)
+    for cells in (1, 10**8, 1, 8 * 10**8):
+        clock.now += 2
+        progress.add(cells)
+    progress.note("careful")
+    progress.stop()
+    first, *_, last = screen.getvalue().split("\n")
+    assert (screen.getvalue().count("\n"), last) == (2, "")
+    drawn = first.split("\r")[1:]
+    assert all(len(after) >= len(before.rstrip()) for before, after in itertools.pairwise(drawn))
+    assert "careful" in screen.getvalue().split("\n")[1]
+    assert "\x1b" not in screen.getvalue()
 
 
 @pytest.mark.parametrize("fault", [BrokenPipeError(), OSError(28, "No space left on device"), ValueError("closed")])
@@ -188,107 +165,67 @@ def test_a_log_that_cannot_be_written_any_more_stops_nothing(clock, fault):
         def write(self, text):
             raise fault
 
-    progress = Progress(100, Gone(), clock=clock)
-    clock.now += 60
-    progress.add(50)
-    progress.note("something")
-    progress.add(50)
+    run(Gone(), clock, [(60, 500), (90, 500)])
+
+
+def test_progress_goes_to_stderr_unless_told_otherwise(capsys):
+    print("here", file=stream_of(None))
+    assert capsys.readouterr().err == "here\n"
+    log = io.StringIO()
+    assert (stream_of(False), stream_of(log)) == (None, log)
+
+
+def test_once_a_minute_it_is_in_the_log_of_a_program(clock, caplog):
+    caplog.set_level(logging.INFO, logger="sweep")
+    run(io.StringIO(), clock, [(59.9, 10), (60.0, 20), (119.9, 10), (120.0, 10)])
+    counts = [re.match(r"\d+/1,000 cells", record.getMessage())[0] for record in caplog.records]
+    assert counts == ["30/1,000 cells", "50/1,000 cells", "50/1,000 cells"]
+
+
+# notebooks
+
+
+class ZMQInteractiveShell:
+    """What IPython calls the shell of a notebook."""
+
+
+def test_a_notebook_shows_a_bar_of_cells(monkeypatch, clock):
+    pytest.importorskip("tqdm")
+    import tqdm.auto
+
+    notebook = io.StringIO()
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=ZMQInteractiveShell, version_info=(9,)))
+    monkeypatch.setattr(sys, "stderr", notebook)
+    monkeypatch.setattr(tqdm.auto, "tqdm", tqdm.tqdm)  # without widgets
+    progress = Progress(100, sys.stderr, clock=clock)
+    for _ in range(4):
+        clock.now += 2.0
+        progress.add(20)
+    progress.note("a word")
     progress.end()
-    assert progress.done == 100
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [
-        (9.949, "9.9 s"), (9.951, "10 s"), (60.0, "1 min 00 s"), (3599.6, "1 h 00 min"), (3661, "1 h 01 min"),
-        (86400, "1 d 0 h"), (90000 + 7200, "1 d 3 h"), (200_000, "2 d 7 h"),
-    ],
-)  # fmt: skip
-def test_durations_at_the_borders_of_their_units(seconds, text):
-    assert duration(seconds) == text
-
-
-@pytest.mark.parametrize(
-    ("rate", "text"),
-    [
-        (9.6, "10 cells/s"),
-        (9.5, "10 cells/s"),
-        (9.4, "9.4 cells/s"),
-        (0.254, "0.25 cells/s"),
-        (51234.4, "51,234 cells/s"),
-    ],
-)
-def test_speeds_read_as_people_say_them(rate, text):
-    assert speed(rate) == text
-
-
-@pytest.mark.parametrize(
-    ("count", "text"),
-    [(999.4, "999 B"), (999.5, "1 kB"), (1e15, "1 PB"), (1e18, "1e+03 PB"), (1e6, "1 MB"), (2.5e9, "2.5 GB")],
-)
-def test_bytes_at_the_borders_of_their_units(count, text):
-    assert quantity(count) == text
-
-
-@pytest.mark.parametrize(
-    ("text", "seconds"), [("90", 90), (2, 2), (" 60s ", 60), ("5 min", 300), ("1.5 h", 5400), ("1e-3s", 1e-3)]
-)
-def test_times_are_read_as_they_are_told(text, seconds):
-    assert seconds_of("cell_timeout", text) == seconds
-
-
-@pytest.mark.parametrize("text", ["", "0", "-1", "5 d", "1e999", "ten", "--5", None])
-def test_what_is_no_time_is_told(text):
-    with pytest.raises(SweepError, match='cell_timeout: expected a time like "60s", "5 min" or "1 h", found'):
-        seconds_of("cell_timeout", text)
-
-
-def told_at(stream, clock, times, total=1000):
-    """After how many seconds a line is told, of a run that does cells (seconds, cells)."""
-    progress, found = Progress(total, stream, clock=clock), []
-    for now, cells in times:
-        clock.now = 100.0 + now
-        before = stream.getvalue()
-        progress.add(cells)
-        found += [now] if stream.getvalue() != before else []
-    return found
-
-
-def test_a_log_has_a_line_every_half_minute_or_after_a_twentieth_and_five_seconds(clock):
-    times = [(0.9, 1), (1.0, 1), (30.9, 1), (31.0, 1), (35.9, 60), (36.0, 1), (42, 48), (45, 3), (75, 0)]
-    assert told_at(io.StringIO(), clock, times) == [1.0, 31.0, 36.0, 45, 75]
-
-
-def test_a_terminal_is_redrawn_ten_times_a_second(clock):
-    times = [(1.0, 1), (1.09, 1), (1.11, 1), (1.2, 1), (1.22, 1)]
-    assert told_at(Terminal(), clock, times) == [1.0, 1.11, 1.22]
-
-
-def test_once_a_minute_it_is_in_the_log_of_a_program(clock, monkeypatch):
-    logged = []
-    monkeypatch.setattr("sweep.system.progress.log", lambda *given, **keys: logged.append((*given, keys)))
-    progress = Progress(1000, None, clock=clock)
-    for now, cells in ((59.9, 10), (60.0, 20), (119.9, 10), (120.0, 10)):
-        clock.now = 100.0 + now
-        progress.add(cells)
-    clock.now += 5
-    progress.end()
-    fields = {"cells": 30, "of": 1000, "cells_per_second": 0.5, "seconds_left": 1940.0}
-    assert logged[0] == ("30/1,000 cells (3.0 %), 0.5 cells/s, 32 min 20 s left", "progress", fields)
-    assert [entry[2]["cells"] for entry in logged] == [30, 50, 50]
-    assert logged[2][0] == "50/1,000 cells (5.0 %), 0.4 cells/s, took 2 min 05 s"
-    assert logged[2][2]["seconds"] == 125.0
-
-
-def test_a_shorter_line_is_filled_with_spaces_and_the_next_is_not(clock):
-    screen = Terminal()
-    progress = Progress(100, screen, clock=clock)
-    for text in ("longer", "no", "yes"):
-        progress._say(text)
     progress.stop()
-    progress.stop()
-    assert screen.getvalue() == "\rsweep: longer\rsweep: no    \rsweep: yes\n"
+    assert all(words in notebook.getvalue() for words in ("80 %|", "80/100 cells", "a word"))
+    run(lines := io.StringIO(), clock, [(2, 10)])
+    assert "%|" not in lines.getvalue()
 
 
-def test_a_grid_without_cells_is_done(clock):
-    assert Progress(0, None, clock=clock).line() == "0/0 cells (100 %)"
+SLOW_RUN = """
+import os, sweep
+os.environ["MPLBACKEND"] = "agg"
+keys = {"kernel": "slow:SLOW", "axes": {"height": [1.0 + k for k in range(3000)]}, "outputs": ["fall_time"]}
+ds = sweep.run(keys, workers=1, allow_import=True)
+"""
+
+
+def test_a_real_notebook_shows_one_line_that_moves_and_a_table(monkeypatch):
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path for path in sys.path if path))
+    cells = [nbformat.v4.new_code_cell(source) for source in (SLOW_RUN, "sweep.study(**keys, allow_import=True)")]
+    nbclient.NotebookClient(nbformat.v4.new_notebook(cells=cells), timeout=120).execute()
+    told = "".join(output.get("text", "") for output in cells[0].outputs)
+    states = [state for state in told.split("\r") if "%|" in state]
+    assert len(states) > 2
+    assert "3,000/3,000 cells" in states[-1]
+    (shown,) = cells[1].outputs
+    assert "<table" in shown["data"]["text/html"]

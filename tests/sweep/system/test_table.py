@@ -17,18 +17,6 @@ def terminal(monkeypatch):
     )
 
 
-@pytest.mark.parametrize("wide", [50, 61, 80])
-def test_the_last_cell_is_wrapped_at_the_width_of_the_terminal(terminal, wide):
-    terminal(wide)
-    lines = table.columns([("name", "unit", WORDS), ("n", "m", "short")]).splitlines()
-    beside = len("  name  unit  ")
-    assert max(map(len, lines)) <= wide
-    assert len(lines[0]) + 1 + len(lines[1].split()[0]) > wide  # no word that still had room is below
-    assert all(line.startswith(" " * beside) for line in lines[1:-1])
-    assert lines[-1] == "  n     m     short"
-    assert " ".join(word for line in lines[:-1] for word in line.split()).endswith(WORDS)
-
-
 @pytest.mark.parametrize("wide", [20, 30, 40, 60, 80, 200])
 def test_cells_are_wrapped_until_the_table_is_no_wider_than_the_terminal(terminal, wide):
     terminal(wide)
@@ -50,12 +38,6 @@ def test_a_column_that_is_empty_everywhere_takes_no_room(terminal):
     assert table.columns([("a", "", "b"), ("c", "", "d")]) == "  a  b\n  c  d"
 
 
-@pytest.mark.parametrize("wide", range(40, 60))
-def test_text_beside_an_empty_column_is_wrapped_where_it_would_be_without(terminal, wide):
-    terminal(wide)
-    assert table.columns([("a", "", WORDS)]) == table.columns([("a", WORDS)])
-
-
 def test_what_a_terminal_would_obey_is_shown():
     assert table.printable("a\x1b[31m\x7f\x9f\xa0\n\tb\r") == "a\\x1b[31m\\x7f\\x9f\xa0\n\tb\\x0d"
     assert table.printable("\x00\x1f \udc80") == "\\x00\\x1f \\udc80"
@@ -69,13 +51,3 @@ def test_a_formula_of_a_spreadsheet_begins_with_an_apostrophe(text):
 @pytest.mark.parametrize("value", ["-1.5", "+3e4", "-inf", "x=1", "", 3.0, None])
 def test_numbers_and_plain_texts_are_left_alone(value):
     assert table.cell(value) == value
-
-
-def test_sections_and_pages(terminal):
-    terminal(80)
-    assert table.section("Title", [("a", "b")]) == "Title\n  a  b"
-    assert table.section("Title", []) == ""
-    assert table.page("one", "", "two") == "one\n\ntwo"
-    assert table.columns([]) == ""
-    assert table.columns([("a", "b")], indent="") == "a  b"
-    assert table.columns([("a", ""), ("bcd", "e")]) == "  a\n  bcd  e"

@@ -1,10 +1,13 @@
-"""The page in a real browser without a window: it loads, a slider changes the picture, a click gives the right cell."""
+"""The page in a real browser without a window, and who may ask for it."""
 
 import csv
+import http.client
 import json
+import re
 import shutil
 import time
 from importlib.util import find_spec
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -83,30 +86,11 @@ def everything(driver):
     """)
 
 
-def test_the_page_loads_without_an_error_and_asks_nothing_of_other_machines(page, address):
-    severe = [entry for entry in page.get_log("browser") if entry["level"] == "SEVERE"]
-    assert severe == []
-    events = (json.loads(entry["message"])["message"] for entry in page.get_log("performance"))
-    sent = [e["params"] for e in events if e["method"] == "Network.requestWillBeSent"]
-    asked = {e["request"]["url"] for e in sent if e["documentURL"].startswith(address)}
-    assert len(asked) > 3
-    assert [url for url in asked if not url.startswith((address, "data:", "blob:"))] == []
-
-
 def set_slider(driver, place):
     driver.execute_script("""
         for (const model of Bokeh.documents[0]._all_models.values())
             if (model.type.includes('Slider')) model.value = arguments[0];
     """, place)  # fmt: skip
-
-
-def test_a_slider_changes_the_picture(page):
-    before = image(page)
-    set_slider(page, 0)
-    after = until(lambda: (now := image(page)) != before and now)
-    assert sum(a != b for a, b in zip(before, after, strict=True)) > 50
-    set_slider(page, 1)
-    until(lambda: image(page) == before)
 
 
 def table(driver):
@@ -132,16 +116,6 @@ def click(driver, x, y):
     mouse.click().perform()
 
 
-def test_a_click_gives_the_row_of_its_cell(page, result):
-    with sweep.open_result(result) as dataset:
-        cell = dataset.isel(mu=30, R=3, a=1).load()
-        click(page, float(cell.mu) * 1.05, float(cell.R) + 0.02)
-    found = until(lambda: {"period"} <= (rows := table(page)).keys() and rows)
-    for name in ("mu", "R", "a", "period", "amplitude"):
-        assert float(found[name]) == float(cell[name])
-    assert found["status"] == "OK"
-
-
 def download(driver, label, suffix):
     button = driver.execute_script("""
         const walk = node => {
@@ -156,15 +130,67 @@ def download(driver, label, suffix):
     return until(lambda: next(iter(driver.downloads.glob(f"*.{suffix}")), None))
 
 
-def test_what_is_shown_can_be_saved_as_a_table_a_picture_and_a_study(page, result):
+def test_a_result_in_the_browser(page, address, result):
+    """It loads without an error and asks no other machine; a slider, a click and the downloads give its numbers."""
+    assert [entry for entry in page.get_log("browser") if entry["level"] == "SEVERE"] == []
+    events = (json.loads(entry["message"])["message"] for entry in page.get_log("performance"))
+    sent = [e["params"] for e in events if e["method"] == "Network.requestWillBeSent"]
+    asked = {e["request"]["url"] for e in sent if e["documentURL"].startswith(address)}
+    assert len(asked) > 3
+    assert [url for url in asked if not url.startswith((address, "data:", "blob:"))] == []
+
+    before = image(page)
+    set_slider(page, 0)
+    after = until(lambda: (now := image(page)) != before and now)
+    assert sum(a != b for a, b in zip(before, after, strict=True)) > 50
+    set_slider(page, 1)
+    until(lambda: image(page) == before)
+
     with sweep.open_result(result) as dataset:
-        period = dataset.period.isel(a=1).values
+        dataset = dataset.isel(a=1).load()
+    cell = dataset.isel(mu=30, R=3)
+    click(page, float(cell.mu) * 1.05, float(cell.R) + 0.02)
+    found = until(lambda: {"period"} <= (rows := table(page)).keys() and rows)
+    for name in ("mu", "R", "a", "period", "amplitude"):
+        assert float(found[name]) == float(cell[name])
+    assert found["status"] == "OK"
+
     lines = [line for line in download(page, "CSV", "csv").read_text().splitlines() if not line.startswith("#")]
-    rows = list(csv.DictReader(lines))
-    assert len(rows) == 41 * 21
-    found = np.array([float(r["period"]) for r in rows]).reshape(41, 21)
-    assert np.array_equal(found, period, equal_nan=True)
+    rows = np.array([float(row["period"]) for row in csv.DictReader(lines)])
+    assert np.array_equal(rows.reshape(41, 21), dataset.period, equal_nan=True)
     assert download(page, "PNG", "png").read_bytes().startswith(b"\x89PNG")
     study = sweep.study(download(page, "TOML", "toml"))
-    assert study.fixed["a"] == 1.0
-    assert list(study.axes) == ["mu", "R"]
+    assert (study.fixed["a"], list(study.axes)) == (1.0, ["mu", "R"])
+
+
+SWITCHED = 101
+"""Protocols: to a websocket."""
+
+
+def test_only_pages_of_this_machine_reach_the_server(address):
+    """A page from elsewhere whose name comes to mean this machine (DNS rebinding) reads nothing, by no protocol."""
+    here = urlsplit(address)
+
+    def asked(host, path="/", **headers):
+        connection = http.client.HTTPConnection(here.hostname, here.port, timeout=60)
+        connection.request("GET", path, headers={"Host": host, **headers})
+        answer = connection.getresponse()
+        text = answer.read().decode() if answer.status != SWITCHED else ""
+        connection.close()
+        return answer.status, text
+
+    status, page = asked(here.netloc)
+    token = re.search(r'"token":"([^"]+)"', page)[1]
+    keys = {"Sec-WebSocket-Key": "AQIDBAUGBwgJCgsMDQ4PEC==", "Sec-WebSocket-Version": "13"}
+    keys |= {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Protocol": f"bokeh, {token}"}
+
+    def answers(name):
+        host, script = f"{name}:{here.port}", "/static/js/bokeh.min.js"
+        return [asked(host, "/ws", Origin=f"http://{host}", **keys)[0], asked(host, script)[0]]
+
+    assert status == 200
+    for name in ("127.0.0.1", "localhost", "LOCALHOST", "[::1]"):
+        assert answers(name) == [SWITCHED, 200], name
+    for name in ("evil.example", "localhost.evil.example", "127.0.0.1.evil.example", "127.0.0.2", "127x0.0.1", "my"):
+        assert answers(name) == [403, 403], name
+        assert asked(f"{name}:{here.port}")[0] == 403

@@ -1,9 +1,6 @@
 """What the controls of the page do, without a browser."""
 
-import http.client
-import re
 from importlib.util import find_spec
-from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -13,15 +10,27 @@ import sweep
 pytestmark = pytest.mark.skipif(not find_spec("panel"), reason="the extra view is not installed")
 
 
-SWITCHED = 101
-"""Protocols: to a websocket."""
-
-
 def made(dataset, name):
     """The page; panel is imported here, since every worker reads this file and one of them needs it."""
     from sweep.view.page import Page
 
     return Page(dataset, name)
+
+
+def touch(page, x, y):
+    """A click, as it comes from a browser."""
+    from bokeh.events import Tap
+
+    page.picture.figure._trigger_event(Tap(page.picture.figure, x=x, y=y))
+
+
+def zoom(page, x, y):
+    """The wheel, as it comes from a browser."""
+    from bokeh.events import RangesUpdate
+
+    for axis, ends in zip((page.picture.figure.x_range, page.picture.figure.y_range), (x, y), strict=True):
+        axis.update(start=ends[0], end=ends[1])
+    page.picture.figure._trigger_event(RangesUpdate(page.picture.figure))
 
 
 @pytest.fixture
@@ -68,9 +77,7 @@ def test_scales_are_those_asked_for(page):
 
 
 def test_a_zoom_reads_the_region_and_a_slider_keeps_it(page):
-    page.picture.figure.x_range.update(start=1.0, end=2.0)
-    page.picture.figure.y_range.update(start=0.5, end=0.6)
-    page._redraw()
+    zoom(page, (1.0, 2.0), (0.5, 0.6))
     assert page.found.values("mu").min() > 0.4
     assert page.found.y.sizes["R"] < 8  # and yet a map
     page.sliders["a"].value = 2
@@ -98,9 +105,13 @@ def test_statuses_lie_over_the_picture_and_are_told(page, dataset):
 
 
 def test_a_click_shows_the_row_of_the_cell(page, dataset):
-    page._click(float(dataset.mu[30]) * 1.05, float(dataset.R[3]) + 0.02)
+    touch(page, float(dataset.mu[30]) * 1.05, float(dataset.R[3]) + 0.02)
     assert f"<td>{float(dataset.period[30, 3, 1]):.17g}</td>" in page.table.object
-    assert page.picture.chosen.data == {"x": [float(dataset.mu[30])], "y": [float(dataset.R[3])]}
+    chosen = {"x": [float(dataset.mu[30])], "y": [float(dataset.R[3])]}
+    assert page.picture.chosen.data == chosen
+    touch(page, None, 1.0)
+    touch(page, 1e9, 1.0)
+    assert page.picture.chosen.data == chosen
 
 
 def test_a_result_without_an_axis_of_numbers_is_refused(dataset):
@@ -150,26 +161,12 @@ def test_of_straight_lines_between_cells_no_local_exponent_is_offered(refined, p
 def test_a_refined_cell_is_clicked_and_its_part_is_kept(refined):
     page = made(refined, "fine.h5")
     x, y = page.found.values("mu")[3], page.found.values("a")[4]
-    page._click(float(x), float(y))
+    touch(page, float(x), float(y))
     assert f"{x:.17g}" in page.table.object
     png, csv = (page.saves[suffix].callback() for suffix in ("png", "csv"))
     assert png.read(4)[1:] == b"PNG"
     assert len(csv.read().splitlines()) > 100
     assert page.saves["toml"].disabled  # cells that lie anywhere are no grid
-
-
-def test_a_cell_is_marked_where_it_is_in_the_picture(dataset):
-    from sweep.view.page import _middle
-    from sweep.view.slices import Choice
-
-    places = {"mu": 33, "R": 2}
-    chosen = Choice("period", "mu", "R", {"a": 1})
-    at = float(dataset.mu[33])
-    assert _middle(dataset, chosen, places, True, 9.0) == (at, float(dataset.R[2]))
-    assert _middle(dataset, chosen, places, False, 9.0) == (at, float(dataset.period[33, 2, 1]))
-    exponent = Choice("period", "mu", "R", {"a": 1}, exponent=True)
-    assert _middle(dataset, exponent, places, False, 9.0) == (at, 9.0)
-    assert _middle(dataset, chosen, {"mu": 0, "R": 20}, False, 9.0) == (None, None)  # refused
 
 
 def test_words_of_the_page(dataset):
@@ -200,53 +197,3 @@ def test_a_chosen_axis_stays_and_a_held_one_keeps_its_place(page):
     assert {name: slider.value for name, slider in page.sliders.items()} == {"R": 10}
     page.x.value = "a"
     assert (page.up.value, page.up.options) == ("mu", ["mu", "R", "(one line)"])
-
-
-def test_a_table_too_long_is_greyed_out(page, monkeypatch):
-    from sweep.view import region
-
-    assert not page.saves["csv"].disabled
-    monkeypatch.setattr(region, "MOST_ROWS", 41 * 21 - 1)
-    page._redraw()
-    assert page.saves["csv"].disabled
-    monkeypatch.setattr(region, "MOST_ROWS", 41 * 21)
-    page._redraw()
-    assert not page.saves["csv"].disabled
-    assert [page.saves[kind].filename for kind in ("png", "csv", "toml")] == [
-        "map_shown.png", "map_shown.csv", "map_shown.toml",
-    ]  # fmt: skip
-
-
-def test_a_click_beside_the_map_changes_nothing(page):
-    page._click(None, 1.0)
-    page._click(1e9, 1.0)
-    assert page.table.object == ""
-
-
-def test_only_pages_of_this_machine_reach_the_server(address):
-    """A page from elsewhere whose name comes to mean this machine (DNS rebinding) reads nothing, by no protocol."""
-    here = urlsplit(address)
-
-    def asked(host, path="/", **headers):
-        connection = http.client.HTTPConnection(here.hostname, here.port, timeout=60)
-        connection.request("GET", path, headers={"Host": host, **headers})
-        answer = connection.getresponse()
-        text = answer.read().decode() if answer.status != SWITCHED else ""
-        connection.close()
-        return answer.status, text
-
-    status, page = asked(here.netloc)
-    token = re.search(r'"token":"([^"]+)"', page)[1]
-    keys = {"Sec-WebSocket-Key": "AQIDBAUGBwgJCgsMDQ4PEC==", "Sec-WebSocket-Version": "13"}
-    keys |= {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Protocol": f"bokeh, {token}"}
-
-    def answers(name):
-        host, script = f"{name}:{here.port}", "/static/js/bokeh.min.js"
-        return [asked(host, "/ws", Origin=f"http://{host}", **keys)[0], asked(host, script)[0]]
-
-    assert status == 200
-    for name in ("127.0.0.1", "localhost", "LOCALHOST", "[::1]"):
-        assert answers(name) == [SWITCHED, 200], name
-    for name in ("evil.example", "localhost.evil.example", "127.0.0.1.evil.example", "127.0.0.2", "127x0.0.1", "my"):
-        assert answers(name) == [403, 403], name
-        assert asked(f"{name}:{here.port}")[0] == 403

@@ -1,19 +1,19 @@
-"""Default pictures: what is drawn, on which scale, with which words; and files that are the same each time."""
+"""Default pictures by what is in them: lines, marks, scales, words; and files that are the same each time."""
 
 import subprocess
 import sys
-from pathlib import Path
 
 import matplotlib
+import matplotlib.colors
 import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.colors import LogNorm
 
-from sweep.analysis.loglog import is_logarithmic, spans_decades
-from sweep.show.charts import new_figure, save, style
+from sweep.analysis.loglog import is_logarithmic
+from sweep.show.charts import COLOURS, DASHES
 from sweep.show.plot import plot
-from sweep.show.view import label, setting, symbol, unit_text, view
+from sweep.show.view import SIDE, edges, evened, view
 from sweep.system.errors import SweepError
 
 FLAGS = {"flag_values": np.array([0, 1, 64, 127], np.int8), "flag_meanings": "OK INACCURATE BAD_INPUT PENDING"}
@@ -62,17 +62,6 @@ def test_one_axis_makes_one_line_on_logarithmic_scales_with_names_and_units():
     assert axes.get_legend() is None
 
 
-def test_a_linear_axis_and_a_narrow_range_stay_linear():
-    (axes,) = plot(dataset(mu=np.linspace(1, 2, 11))).axes
-    assert (axes.get_xscale(), axes.get_yscale()) == ("linear", "linear")
-
-
-def test_the_output_and_the_axis_may_be_named():
-    (axes,) = plot(dataset(mu=log(5), a=[1.0, 2.0, 4.0]), y="amplitude", x="a").axes
-    assert axes.get_ylabel() == "largest angle [rad]"
-    assert axes.get_xlabel() == "$a$ [1/s]"
-
-
 def test_few_values_of_a_second_axis_make_a_family_told_apart_without_colour():
     ds = dataset(mu=log(), a=[1.0, 2.0, 4.0])
     figure = plot(ds)
@@ -81,13 +70,6 @@ def test_few_values_of_a_second_axis_make_a_family_told_apart_without_colour():
     for i, line in enumerate(lines):
         np.testing.assert_array_equal(line.get_ydata(), ds.period[:, i])
     assert len({line.get_color() for line in lines}) == len({str(line._dash_pattern) for line in lines}) == 3
-
-
-def test_an_axis_of_words_makes_a_family_however_long():
-    names = [f"method{i}" for i in range(12)]
-    figure = plot(dataset(mu=log(), method=names))
-    assert words(figure) == [f"method = {name}" for name in names]
-    assert len(drawn(figure.axes[0])) == 12
 
 
 def test_two_long_axes_make_a_map_with_a_logarithmic_colour_scale():
@@ -107,15 +89,6 @@ def test_the_cells_of_a_map_lie_around_their_grid_points():
     corners = figure.axes[0].collections[0].get_coordinates()
     np.testing.assert_allclose(corners[0, :, 0], np.geomspace(10**-3.5, 10**3.5, 8))
     np.testing.assert_allclose(corners[:, 0, 1], np.linspace(0.95, 2.05, 12))
-
-
-def test_a_falling_or_unordered_axis_is_drawn_in_order():
-    ds = dataset(mu=log(31), a=np.linspace(1, 2, 11))
-    shuffled = ds.isel(mu=np.random.default_rng(0).permutation(31), a=slice(None, None, -1))
-    for one in ({}, {"a": 0}):
-        left, right = view(shuffled.isel(one), x="mu"), view(ds.isel(dict.fromkeys(one, -1)), x="mu")
-        np.testing.assert_array_equal(left.y.values, right.y.values)
-        np.testing.assert_array_equal(left.values("mu"), right.values("mu"))
 
 
 def test_further_axes_are_held_at_their_middle_and_the_title_says_so():
@@ -202,13 +175,6 @@ def test_a_result_without_one_value_is_drawn_all_the_same(tmp_path, axes):
     assert "BAD_INPUT" in [*words(figure), *(text.get_text() for text in figure.axes[0].texts)]
 
 
-def test_more_points_than_a_picture_can_show_are_thinned():
-    ds = dataset(mu=log(50_001))
-    assert view(ds).y.size == 16_667
-    wide = xr.Dataset({"period": (("mu", "a"), np.ones((4001, 9)))}, coords={"mu": log(4001), "a": np.arange(1.0, 10)})
-    assert view(wide).y.sizes == {"a": 9, "mu": 1334}
-
-
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
@@ -223,13 +189,6 @@ def test_an_unknown_output_or_axis_is_refused_with_those_there_are(keys, message
         plot(dataset(mu=log(5), method=["map", "closed"]), **keys)
 
 
-def test_a_result_that_runs_along_nothing_is_refused():
-    with pytest.raises(SweepError, match="there is nothing to draw"):
-        plot(dataset(mu=log(5)).isel(mu=0))
-    with pytest.raises(SweepError, match="no number axis"):
-        plot(dataset(mu=log(5), method=["map", "closed"]).isel(mu=0))
-
-
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_the_same_result_gives_the_same_bytes_whatever_the_readers_settings(tmp_path, suffix):
     ds = dataset(mu=log(), a=np.linspace(1, 2, 21))
@@ -239,17 +198,6 @@ def test_the_same_result_gives_the_same_bytes_whatever_the_readers_settings(tmp_
     one, two = ((tmp_path / f"{name}.{suffix}").read_bytes() for name in ("one", "two"))
     assert one == two
     assert one.startswith({"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[suffix])
-
-
-def test_the_readers_settings_are_left_as_they_were():
-    before = dict(matplotlib.rcParams)
-    plot(dataset(mu=log()))
-    assert dict(matplotlib.rcParams) == before
-
-
-def test_pyplot_and_its_windows_are_never_touched():
-    code = "import sys, sweep.show.charts; print('matplotlib.pyplot' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
 
 
 def test_without_matplotlib_the_user_is_told_what_to_install():
@@ -284,25 +232,6 @@ def test_a_title_is_plain_text(tmp_path, title):
     assert figure.axes[0].get_title() == title.replace("$", "\\$")
 
 
-def test_a_fault_half_way_leaves_the_old_picture_and_nothing_else(tmp_path, monkeypatch):
-    (tmp_path / "out.png").write_text("old")
-
-    def full(self, target):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Path, "replace", full)
-    with style():
-        figure = new_figure(50, 50)
-    with pytest.raises(SweepError, match="No space left on device"):
-        save(figure, tmp_path / "out.png")
-    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("out.png", "old")]
-
-
-def test_a_figure_is_as_large_as_asked():
-    with style():
-        assert new_figure(86, 50).get_size_inches().tolist() == pytest.approx([86 / 25.4, 50 / 25.4])
-
-
 @pytest.mark.parametrize(
     ("grid", "logarithmic"),
     [
@@ -323,64 +252,6 @@ def test_an_axis_is_logarithmic_where_its_grid_is(grid, logarithmic):
     assert is_logarithmic(grid) is logarithmic
 
 
-def test_values_span_decades_from_two_on():
-    assert spans_decades([1.0, 100.0, np.nan])
-    assert not spans_decades([1.0, 99.0])
-    assert not spans_decades([0.0, 100.0])
-    assert not spans_decades([np.nan])
-
-
-@pytest.mark.parametrize(
-    ("name", "sign"),
-    [
-        ("mu", r"$\mu$"),
-        ("phi0", r"$\varphi_{\mathrm{0}}$"),
-        ("R_s", r"$R_{\mathrm{s}}$"),
-        ("a", "$a$"),
-        ("omega_n", r"$\omega_{\mathrm{n}}$"),
-        ("period", ""),
-        ("crossing_speed", ""),
-        ("b_angle", r"$b_{\mathrm{angle}}$"),
-    ],
-)
-def test_letters_are_set_as_symbols_and_words_are_not(name, sign):
-    assert symbol(name) == sign
-
-
-def test_labels_and_units():
-    assert unit_text("rad/s^2") == "rad/s$^{2}$"
-    assert unit_text("kg m^-1") == "kg m$^{-1}$"
-    assert unit_text("1") == ""
-    speed = xr.DataArray(1.0, name="crossing_speed", attrs={"units": "rad/s"})
-    assert label(speed) == "crossing speed [rad/s]"
-    mu = xr.DataArray(0.5, name="mu", attrs={"units": "rad/s^2", "long_name": "drive torque"})
-    assert label(mu) == r"drive torque, $\mu$ [rad/s$^{2}$]"
-    assert setting(mu) == r"$\mu$ = 0.5 rad/s$^{2}$"
-    assert setting(xr.DataArray("map", name="method")) == "method = map"
-
-
-def test_a_long_name_is_broken_into_lines_that_fit_the_picture():
-    text = "s = -dlnP/dlnmu, the share of a torque error that reaches the period"
-    lines = label(xr.DataArray(1.0, name="sensitivity", attrs={"units": "1", "long_name": text})).split("\n")
-    assert " ".join(lines) == text
-    assert len(lines) == 2
-    assert max(map(len, lines)) <= 44
-
-
-def test_a_line_does_not_begin_with_the_unit():
-    attrs = {"units": "kg m^2", "long_name": "moment of inertia of the balance with its rim and"}
-    lines = label(xr.DataArray(1.0, name="J", attrs=attrs)).split("\n")
-    assert lines == ["moment of inertia of the balance with its", r"rim and, $J$ [kg m$^{2}$]"]
-
-
-def test_a_remark_on_every_cell_is_outlined_at_the_rim():
-    ds = dataset(mu=log(), a=np.linspace(1, 2, 21))
-    ds["status"][:] = 1
-    _, outline = plot(ds).axes[0].collections
-    extent = outline.get_paths()[0].get_extents()
-    assert extent.y0 < 1 < 2 < extent.y1
-
-
 def test_a_remark_on_a_value_that_a_logarithm_cannot_show_is_at_the_foot():
     ds = dataset(mu=log())
     ds["period"][:] = np.where(np.arange(ds.sizes["mu"]) == 4, 0.0, 10.0 ** np.arange(ds.sizes["mu"]))
@@ -390,7 +261,199 @@ def test_a_remark_on_a_value_that_a_logarithm_cannot_show_is_at_the_foot():
     np.testing.assert_array_equal(foot.get_xdata(), ds.mu[[4]])
 
 
-def test_a_symbol_takes_the_room_it_has_in_print():
-    text = "middle between the arm's extremes, from b; negative for type B"
-    lines = label(xr.DataArray(1.0, name="A0", attrs={"units": "rad", "long_name": text})).split("\n")
-    assert lines == ["middle between the arm's extremes, from b;", r"negative for type B, $A_{\mathrm{0}}$ [rad]"]
+# which cells are shown
+
+
+def numbered(sizes, kind=float):
+    """Cell number over axes of so many values."""
+    dims = tuple(sizes)
+    values = np.arange(np.prod(list(sizes.values())), dtype=kind).reshape(tuple(sizes.values()))
+    return xr.Dataset({"y": (dims, values)}, {n: np.arange(1.0, m + 1) for n, m in sizes.items()})
+
+
+@pytest.mark.parametrize(
+    ("grid", "around"),
+    [
+        ([1.0, 2.0, 4.0, 5.0], [0.5, 1.5, 3.0, 4.5, 5.5]),
+        ([1.0, 10.0, 100.0], 10.0 ** np.array([-0.5, 0.5, 1.5, 2.5])),
+        ([3.0], [2.5, 3.5]),
+        ([4.0, 1.0], [5.5, 2.5, -0.5]),
+    ],
+)
+def test_edges_are_halfway_and_as_far_outside(grid, around):
+    np.testing.assert_allclose(edges(np.array(grid)), around, rtol=1e-14)
+
+
+@pytest.mark.parametrize(("cells", "drawn"), [(20_000, 20_000), (20_001, 10_001), (40_001, 13_334)])
+def test_a_line_has_at_most_twenty_thousand_points(cells, drawn):
+    shown = view(numbered({"mu": cells}))
+    assert shown.y.size == drawn
+    assert shown.y.values[1] == -(-cells // 20_000)
+
+
+@pytest.mark.parametrize(("cells", "drawn"), [(2000, 2000), (2001, 1001)])
+def test_a_map_has_at_most_two_thousand_cells_a_side(cells, drawn):
+    assert view(numbered({"mu": cells, "a": 9})).y.shape == (9, drawn)
+    assert view(numbered({"mu": cells, "a": 8})).y.shape == (8, cells)
+
+
+def test_the_longest_axis_is_along_the_next_across_and_the_rest_held_in_the_middle():
+    shown = view(numbered({"c": 4, "b": 5, "a": 6, "d": 3}))
+    assert (shown.x, shown.along, shown.across) == ("a", "a", "b")
+    assert shown.held == "$c$ = 3, $d$ = 2"
+    assert shown.y.values.tolist() == [[90 * 2 + 18 * b + 3 * a + 1 for a in range(6)] for b in range(5)]
+    assert (shown.status.shape, shown.status.any(), shown.meanings, shown.codes()) == ((5, 6), False, {}, [])
+
+
+@pytest.mark.parametrize(("axes", "shape"), [(2, (SIDE, SIDE)), (3, (34, 34, 34))])
+def test_cells_that_lie_anywhere_become_an_even_grid(axes, shape):
+    """A plane is the same plane between its cells; of three axes and more the grid is coarser."""
+    rng = np.random.default_rng(0)
+    corners = np.array(np.meshgrid(*[[0.0, 1.0]] * axes)).reshape(axes, -1).T
+    places = np.concatenate([corners, rng.random((20, axes))]) + 1
+    names = ["a", "b", "c"][:axes]
+    columns = {"y": ("cell", places @ np.arange(1.0, axes + 1)), "status": ("cell", np.zeros(len(places), np.int8))}
+    scattered = xr.Dataset(columns, {name: ("cell", places[:, k]) for k, name in enumerate(names)})
+    even = evened(scattered)
+    assert tuple(even.sizes[name] for name in names) == shape
+    np.testing.assert_allclose((even.a[0], even.a[-1]), (1.0, 2.0))
+    expected = sum((k + 1) * even[name] for k, name in enumerate(names))
+    np.testing.assert_allclose(even.y, expected.transpose(*even.y.dims), rtol=0.02)
+    first = evened(scattered, 1)
+    assert [first.sizes[name] for name in names] == [SIDE**2, *[1] * (axes - 1)]
+    assert first.b.values.tolist() == pytest.approx([np.sqrt(2.0)])
+
+
+# charts of precision
+
+
+def precision(**changes):
+    """Three methods at two tolerances: right, with refused cells, silent; the last solves nothing."""
+    columns = {
+        "seconds": [[1e-6, 2e-6], [3e-6, 4e-6], [5e-6, 6e-6], [1e-6, 1e-6]],
+        "error_median": [[1e-5, 1e-9], [0.0, 1e-3], [1e-2, 50.0], [np.nan, np.nan]],
+        "error_worst": [[1e-4, 1e-8], [1e-3, 1e-2], [1e-1, 90.0], [np.nan, np.nan]],
+        "error_low": [[1e-6, 0.0], [1e-6, 1e-6], [1e-6, 1e-6], [np.nan, np.nan]],
+        "error_high": [[1e-4, 1e-8], [1e-2, 9.0], [1e-1, 80.0], [np.nan, np.nan]],
+        "unsolved": [[0, 0], [0.2, 0], [0, 0], [1, 1]],
+        "inaccurate": [[0, 0], [0, 0], [0, 0.3], [0, 0]],
+        "silent": [[0, 0], [0, 0], [0.1, 0], [0, 0]],
+    }
+    attrs = {"reference": "exact", "reference_error": 2e-12, "cells": 9, "title": "A $ stone"}
+    names = ["right", "shy", "liar", "idle"]
+    found = xr.Dataset(
+        {n: (("method", "rtol"), np.array(c, float)) for n, c in columns.items()}, {"method": names}, attrs
+    )
+    return found.assign(**changes)
+
+
+def test_a_chart_of_precision_has_every_method_where_it_is_and_says_where_cells_are_wrong():
+    """Errors of 0 and beyond all sense lie on the rims; open marks are cells refused, crosses silently wrong ones."""
+    figure = plot(precision().assign_attrs(missing="ida is not installed"))
+    median, worst = figure.axes
+    for axes, errors in (
+        (median, [[1e-5, 1e-9], [1e-17, 1e-3], [1e-2, 3.0]]),
+        (worst, [[1e-4, 1e-8], [1e-3, 1e-2], [1e-1, 3.0]]),
+    ):
+        whole, refused, silent = (axes.lines[k::3] for k in range(3))
+        assert [line.get_label() for line in whole] == ["right", "shy", "liar"]
+        assert [line.get_ydata().tolist() for line in whole] == errors
+        assert [line.get_xdata().tolist() for line in whole] == [[1e-6, 2e-6], [3e-6, 4e-6], [5e-6, 6e-6]]
+        assert [line.get_markevery().tolist() for line in whole] == [[True, True], [False, True], [True, False]]
+        assert [line.get_xdata().tolist() for line in refused] == [[], [3e-6], [6e-6]]
+        assert [line.get_ydata().tolist() for line in silent] == [[], [], [errors[2][0]]]
+        assert len({line.get_color() for line in whole}) == len({line.get_marker() for line in whole}) == 3
+        (grey,) = axes.patches
+        assert grey.get_y() + grey.get_height() == pytest.approx(2e-12)
+        assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    bars = [[segment[:, 1].tolist() for segment in bar.get_segments()] for bar in median.collections]
+    assert bars[:2] == [[[1e-6, 1e-4], [1e-17, 1e-8]], [[1e-6, 1e-2], [1e-6, 3.0]]]
+    assert len(worst.collections) == 0
+    low, high = median.get_xlim()
+    assert (worst.get_xlim(), high / low) == ((low, high), pytest.approx(30))
+    assert low * high == pytest.approx(6e-12, rel=1e-6)  # 1 to 6 microseconds are in its middle
+    said = " ".join(figure.get_supxlabel().split())
+    for part in ("exact", "2e-12", "9 cells", r"A \$ stone", "ida is not installed", "idle solves", "liar is silently"):
+        assert part in said
+    assert len(words(figure)) == 3 + 5
+
+
+def test_the_legend_of_a_chart_of_precision_names_the_marks_that_occur():
+    found = precision()
+    none = found.unsolved * 0
+    bare = found.assign(unsolved=none, inaccurate=none, silent=none).drop_vars("error_high")
+    assert len(words(plot(bare))) == 3 + 2
+    assert len(words(plot(found.assign(inaccurate=none)))) == len(words(plot(found.assign(unsolved=none)))) == 3 + 5
+    assert len(plot(bare.assign_attrs(reference_error=np.nan)).axes[0].patches) == 0
+    many = found.isel(method=[0] * 9).assign_coords({"method": [f"m{k}" for k in range(9)]})
+    looks = [(line.get_color(), line.get_marker()) for line in plot(many).axes[0].lines[::3]]
+    assert len(set(looks)) == 9
+
+
+# laws beside each other
+
+X = np.array([1.0, 10.0, 100.0])
+Y = np.array([2.0, 3.0, 5.0])
+SCATTER = 0.25
+
+
+def compared(n=3, chosen="law1", residual=0.125, **attrs):
+    """Law k lies (k + 1) % above the points, and is worse by k."""
+    names = [f"law{k}" for k in range(n)]
+    fitted = np.array([Y * (1 + 0.01 * (k + 1)) for k in range(n)])
+    columns = {
+        "fitted": (("law", "point"), fitted), "worse": ("law", np.arange(float(n)) * 1.2345),
+        "scatter": ("law", np.full(n, SCATTER)), "residual": ("law", [residual if k == 1 else 9.0 for k in range(n)]),
+        "x": ("point", X, {"units": "rad/s^2"}), "y": ("point", Y, attrs),
+    }  # fmt: skip
+    names_of = {"y": "period", "x": "mu", "chosen": chosen, "verdict": "one law by 10"}
+    return xr.Dataset(columns, {"law": names}, names_of)
+
+
+def test_points_and_laws_are_drawn_the_chosen_first_and_wide():
+    axes = plot(compared(units="s")).axes
+    above, below = axes
+    points, *laws = above.lines
+    assert (points.get_marker(), points.get_linestyle(), points.get_label()) == ("o", "None", "points")
+    np.testing.assert_array_equal(points.get_xydata(), np.column_stack([X, Y]))
+    assert [line.get_label() for line in laws] == ["law1, AICc +1.23, chosen", "law0, AICc best", "law2, AICc +2.47"]
+    assert [line.get_linewidth() for line in laws] == [1.4, 0.8, 0.8]
+    for i, (line, off) in enumerate(zip(laws, (1.02, 1.01, 1.03), strict=True)):
+        np.testing.assert_allclose(line.get_xydata(), np.column_stack([X, Y * off]), rtol=1e-15)
+        assert line.get_color() == COLOURS[i]
+    assert laws[0].get_linestyle() == DASHES[0]
+    assert laws[1].get_linestyle() == "--"
+    assert len(below.lines) == 4  # and the zero
+
+
+def test_the_band_is_two_scatters_to_either_side_of_the_chosen_law():
+    axes = plot(compared(units="s")).axes
+    above, below = axes
+    (band,) = above.collections
+    corners = band.get_paths()[0].vertices
+    low, high = (sorted(corners[corners[:, 0] == X[0]][:, 1])[k] for k in (0, -1))
+    assert (low, high) == pytest.approx((Y[0] * 1.02 * np.exp(-0.5), Y[0] * 1.02 * np.exp(0.5)), rel=1e-14)
+    (span,) = below.patches
+    assert span.get_y() == pytest.approx(-np.expm1(0.5))
+    assert span.get_height() == pytest.approx(2 * np.expm1(0.5))
+    assert matplotlib.colors.to_hex(band.get_facecolor()[0]) == COLOURS[0].lower()
+
+
+def test_scales_labels_and_the_verdict():
+    axes = plot(compared(units="s")).axes
+    above, below = axes
+    assert {above.get_xscale(), above.get_yscale(), below.get_xscale()} == {"log"}
+    assert below.get_yscale() == "linear"
+    assert (above.get_ylabel(), below.get_xlabel(), below.get_ylabel()) == (
+        "period [s]",
+        "mu [rad/s^2]",
+        "point / law - 1",
+    )
+    assert above.get_title() == "one law by 10"
+    (legend,) = above.figure.legends
+    assert [text.get_text() for text in legend.get_texts()][:2] == ["points", "law1, AICc +1.23, chosen"]
+
+
+def test_six_laws_are_drawn_and_the_chosen_is_among_them():
+    labels = [line.get_label() for line in plot(compared(9, "law8")).axes[0].lines[1:]]
+    assert [label.partition(",")[0] for label in labels] == ["law8", "law0", "law1", "law2", "law3", "law4"]

@@ -1,0 +1,276 @@
+"""What is shown, drawn and saved of a result: its own numbers, and no more of them read than that takes."""
+
+import csv
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+import xarray as xr
+from xarray.backends import BackendArray
+from xarray.core import indexing
+
+import sweep
+from kernels.interface import Status
+from sweep.show.charts import COLOURS
+from sweep.show.view import view
+from sweep.view import region
+from sweep.view.slices import PLACE, Choice, nearest, row, shown
+
+pytestmark = pytest.mark.skipif(not find_spec("panel"), reason="the extra view is not installed")
+if find_spec("panel"):
+    from sweep.view.picture import HEIGHT, STATUS_COLOURS, WIDTH, Picture, Scales
+
+MAP = Choice("period", "mu", "R", {"a": 2})
+
+
+class Counting(BackendArray):
+    """Zeros of any shape that count how many numbers are read."""
+
+    def __init__(self, shape, dtype):
+        self.shape, self.dtype, self.read = shape, np.dtype(dtype), 0
+
+    def __getitem__(self, key):
+        return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.BASIC, self._zeros)
+
+    def _zeros(self, key):
+        lengths = [len(range(n)[k]) for n, k in zip(self.shape, key, strict=True) if isinstance(k, slice)]
+        self.read += int(np.prod(lengths))
+        return np.zeros(lengths, self.dtype)
+
+
+def large():
+    """1e9 cells that nobody could read, and what counts."""
+    shape, dims = (4000, 2500, 100), ("u", "v", "w")
+    columns = {"y": Counting(shape, np.float64), "z": Counting(shape, np.float64), "status": Counting(shape, np.int8)}
+    coords = {d: np.arange(1.0, n + 1) for d, n in zip(dims, shape, strict=True)}
+    lazy = {name: (dims, indexing.LazilyIndexedArray(c)) for name, c in columns.items()}
+    return xr.Dataset(lazy, coords), columns
+
+
+def test_of_a_billion_cells_the_slice_alone_is_read():
+    dataset, columns = large()
+    shown(dataset, Choice("y", "u", None, {"v": 7, "w": 3}))
+    assert (columns["y"].read, columns["status"].read, columns["z"].read) == (4000, 4000, 0)
+
+
+def test_of_a_long_map_as_many_cells_as_a_picture_can_show_are_read_and_in_a_region_all():
+    dataset, columns = large()
+    found = shown(dataset, Choice("y", "u", "v", {"w": 3}))
+    assert found.y.shape == (1250, 2000)
+    assert columns["y"].read == 1250 * 2000
+    near = shown(dataset, Choice("y", "u", "v", {"w": 3}), (1000.0, 1099.0), (500.0, 519.0))
+    assert near.values("u").tolist() == list(range(997, 1102))
+    assert near.values("v").tolist() == list(range(497, 522))
+
+
+def test_a_slice_has_the_numbers_of_the_result(dataset):
+    found = shown(dataset, Choice("period", "mu", "R", {"a": 2}))
+    assert found.mapped
+    assert np.array_equal(found.y.values, dataset.period.isel(a=2).values.T, equal_nan=True)
+    assert np.array_equal(found.status, dataset.status.isel(a=2).values.T)
+    assert found.y[PLACE + "R"].values.tolist() == list(range(21))
+
+
+def test_the_exponent_is_that_of_the_analysis(dataset):
+    found = shown(dataset, Choice("period", "mu", None, {"a": 1, "R": 0}, exponent=True))
+    assert np.array_equal(found.y.values, sweep.local_exponent(dataset.period.isel(a=1, R=0).load(), "mu").values)
+
+
+def test_what_is_no_axis_has_no_exponent():
+    study = sweep.study(
+        kernel="foliot", design="zip", axes={"mu": [1.0, 3.0, 2.0], "a": [1.0, 2.0, 3.0]}, fixed={"phi0": 1.0}
+    )
+    dataset = sweep.run(study, progress=False)
+    assert shown(dataset, Choice("period", "mu")).y.size == 3
+    with pytest.raises(sweep.SweepError, match="mu is no axis"):
+        shown(dataset, Choice("period", "mu", exponent=True))
+
+
+@pytest.mark.parametrize("cell", [(0, 0), (40, 20), (17, 5)])
+def test_the_cell_of_a_point_is_the_one_whose_edges_surround_it(dataset, cell):
+    found = shown(dataset, Choice("period", "mu", "R", {"a": 1}))
+    mu, R = float(dataset.mu[cell[0]]), float(dataset.R[cell[1]])
+    for step in (0.99, 1.01):  # of 1.122 to the next edge
+        assert nearest(found, mu * step**10, R + 0.049 * np.sign(step - 1), True, (True, False)) == {
+            "mu": cell[0],
+            "R": cell[1],
+        }
+    assert nearest(found, 1e3, R, True, (True, False)) is None
+
+
+def test_the_cell_of_a_point_beside_a_line_is_the_one_below_it(dataset):
+    found = shown(dataset, Choice("period", "mu", "a", {"R": 0}))
+    assert not found.mapped
+    values = dataset.period.isel(R=0).load()
+    assert nearest(found, float(dataset.mu[9]) * 1.05, float(values[9, 2]), False, (True, True)) == {"mu": 9, "a": 2}
+    assert nearest(found, float(dataset.mu[9]) * 0.95, float(values[9, 0]), False, (True, True)) == {"mu": 9, "a": 0}
+
+
+def test_a_row_has_all_of_a_cell(dataset):
+    entries = {entry.name: entry for entry in row(dataset, {"mu": 3, "R": 20, "a": 0})}
+    assert float(entries["mu"].value) == float(dataset.mu[3])
+    assert entries["phi0"].value == "1"
+    assert (entries["period"].value, entries["period"].unit) == ("nan", "s")
+    assert entries["status"].value == Status.NEVER_STARTS.name
+
+
+def points(x, y):
+    """Points of a zip, along x."""
+    places = {PLACE + "cell": ("cell", np.arange(len(x)))}
+    return view(xr.Dataset({"y": ("cell", y)}, {"x": ("cell", x), **places}), x="x")
+
+
+def test_of_points_the_nearest_as_the_eye_sees_it_is_clicked():
+    found = points([1.0, 2.0, 3.0], [10.0, 30.0, 20.0])
+    assert nearest(found, 2.4, 21.0, False, (False, False)) == {"cell": 2}
+    assert nearest(found, 2.4, 29.0, False, (False, False)) == {"cell": 1}
+    assert nearest(points([1.0, 2.0], [np.nan, np.nan]), 2.0, 1.0, False, (False, False)) == {"cell": 0}
+
+
+def test_numbers_of_a_row_have_all_their_digits_and_flags_are_words():
+    attrs = {"flag_values": [0, 1], "flag_meanings": "OK BAD"}
+    columns = {
+        "y": ("x", [0.1], {"units": "s", "long_name": "way"}),
+        "n": ("x", [3], {"units": "1"}),
+        "s": ("x", [1], attrs),
+    }
+    entries = row(xr.Dataset(columns, {"x": [2.0], PLACE + "x": ("x", [0])}), {"x": 0})
+    assert [(e.name, e.value, e.unit, e.meaning) for e in entries] == [
+        ("x", "2", "", ""), ("y", "0.10000000000000001", "s", "way"), ("n", "3", "", ""), ("s", "BAD", "", ""),
+    ]  # fmt: skip
+
+
+# what is drawn
+
+FLAGS = {"flag_values": np.array([0, 1, 64], np.int8), "flag_meanings": "OK INACCURATE BAD_INPUT"}
+AUTO = {"x": "auto", "y": "auto", "values": "auto"}
+
+
+def seen(values, x, a=None, status=None):
+    """A line, or lines or a map over a second axis."""
+    dims = ("x",) if a is None else ("a", "x")
+    values = np.asarray(values, float)
+    status = np.zeros(values.shape) if status is None else np.asarray(status)
+    columns = {"y": (dims, values, {"units": "s"}), "status": (dims, status.astype(np.int8), FLAGS)}
+    return view(xr.Dataset(columns, {"x": x} | ({} if a is None else {"a": a})), x="x")
+
+
+def a_map(low=1.0, high=3.0):
+    return seen(np.linspace(low, high, 36).reshape(9, 4), [1.0, 10.0, 100.0, 1000.0], np.arange(9.0))
+
+
+def test_scales_are_those_of_the_grids_and_values():
+    assert Scales.of(a_map(), AUTO) == Scales(True, False, False)
+    assert Scales.of(a_map(1, 1e3), AUTO) == Scales(True, False, True)
+    assert Scales.of(seen([1.0, 1e3], [1.0, 2.0]), AUTO) == Scales(False, True)
+    wanted = {"x": "linear", "y": "log", "values": "log"}
+    assert Scales.of(a_map(), wanted) == Scales(False, True, True)
+    assert Scales.of(seen([-1.0, 0.0], [1.0, 1000.0]), {**AUTO, "values": "log"}) == Scales(True, False)
+    assert Scales.of(seen([-1.0, 1.0], [1.0, 1000.0]), {**AUTO, "x": "linear", "values": "log"}) == Scales(False, True)
+
+
+def test_lines_are_drawn_with_their_statuses_at_the_foot_where_they_have_no_value():
+    found = seen([[1.0, 2.0, np.nan], [4.0, -5.0, 6.0]], [1.0, 2.0, 3.0], [0.5, 0.7], [[0, 1, 64], [0, 0, 0]])
+    drawn = Picture(found, Scales(False, False))
+    drawn.show(found, True)
+    lines = drawn.lines.data
+    np.testing.assert_array_equal(lines["ys"], [[1.0, 2.0, np.nan], [4.0, -5.0, 6.0]])
+    assert [xs.tolist() for xs in lines["xs"]] == [[1.0, 2.0, 3.0]] * 2
+    assert (lines["colour"], lines["name"]) == (list(COLOURS[:2]), ["a = 0.5", "a = 0.7"])
+    assert drawn.marks.data["x"].tolist() == [2.0, 3.0]
+    assert drawn.marks.data["y"].tolist() == [2.0, -5.0]
+    assert drawn.marks.data["colour"] == list(STATUS_COLOURS[2:4])
+    drawn.show(found, False)
+    assert len(drawn.marks.data["x"]) == 0
+    logarithmic = Picture(found, Scales(False, True))
+    logarithmic.show(found, True)
+    np.testing.assert_array_equal(logarithmic.lines.data["ys"], [[1.0, 2.0, np.nan], [4.0, np.nan, 6.0]])
+    assert logarithmic.marks.data["y"].tolist() == [2.0, 1.0]
+
+
+def test_a_map_is_drawn_from_edge_to_edge_in_the_colours_of_its_values():
+    found = a_map()
+    drawn = Picture(found, Scales.of(found, AUTO))
+    drawn.show(found, True)
+    cells = drawn.cells.data
+    assert cells["x"] == pytest.approx([10**-0.5])
+    assert cells["dw"] == pytest.approx([10**3.5 - 10**-0.5])
+    assert (cells["y"], cells["dh"]) == ([-0.5], [9.0])
+    image = cells["image"][0]
+    assert image.shape == (HEIGHT, WIDTH)
+    assert (image[0, 0], image[-1, -1]) == (1.0, 3.0)
+    assert (drawn.mapper.low, drawn.mapper.high) == (1.0, 3.0)
+    # a quarter of the width is a cell, a ninth of the height
+    assert (np.diff(image[0]) != 0).nonzero()[0].tolist() == [224, 449, 674]
+    assert image[560 // 9 - 1, 0] == found.y.values[0, 0]
+    assert image[560 // 9 + 1, 0] == found.y.values[1, 0]
+
+
+def test_logarithmic_colours_leave_out_what_is_not_positive():
+    found = a_map(-1.0, 3.0)
+    drawn = Picture(found, Scales(True, False, True))
+    drawn.show(found, False)
+    assert drawn.mapper.low == found.y.values[found.y.values > 0].min()
+    assert np.isnan(drawn.cells.data["image"][0][0, 0])
+    assert drawn.flags.data["image"] == []
+
+
+# what is saved
+
+
+def read(tmp_path, text):
+    path = tmp_path / "region.toml"
+    path.write_text(text)
+    return sweep.study(path)
+
+
+def test_the_study_of_a_region_is_the_same_scene_on_a_finer_grid(dataset, tmp_path):
+    study = read(tmp_path, region.study_text(dataset, MAP, (0.1, 1.0), (0.5, 3.0)))
+    mu, R = study.axes["mu"], study.axes["R"]
+    assert (mu.spacing, mu.values[0], mu.values[-1], len(mu)) == ("log", 0.1, 1.0, 101)
+    assert (R.spacing, R.values[0], R.values[-1], len(R)) == ("linear", 0.5, 2.0, 101)
+    assert (study.fixed["a"], study.fixed["phi0"], study.outputs) == (2.0, 1.0, ("period", "amplitude"))
+    assert sweep.run(study, progress=False).status.size == 101 * 101
+
+
+def test_words_and_lists_are_kept(tmp_path):
+    study = sweep.study(
+        kernel="drivetrain",
+        axes={"method": ["direct"], "f_max": [100.0, 200.0]},
+        fixed={"J": [1.0, 2.0, 3.0], "k": [1e4, 2e4, 3e4], "reduction": "rivin"},
+    )
+    dataset = sweep.run(study, progress=False)
+    name = next(iter(dataset.data_vars))
+    found = read(tmp_path, region.study_text(dataset, Choice(name, "f_max", None, {}), None, None))
+    assert found.method == "direct"
+    assert found.fixed["reduction"] == study.fixed["reduction"] != 0
+    assert found.fixed["J"].tolist() == [1.0, 2.0, 3.0]
+
+
+def test_a_list_of_cells_has_no_regions():
+    study = sweep.study(kernel="foliot", design="zip", axes={"mu": [1.0, 2.0], "a": [1.0, 2.0]}, fixed={"phi0": 1.0})
+    with pytest.raises(sweep.SweepError, match="list of cells"):
+        region.study_text(sweep.run(study, progress=False), Choice("period", "mu"), None, None)
+
+
+def test_the_table_has_the_cells_in_view_with_all_outputs(dataset):
+    text = region.table(dataset, MAP, None, None).getvalue().decode()
+    rows = list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
+    for name in ("period", "amplitude"):
+        found = np.array([float(r[name]) for r in rows]).reshape(41, 21)
+        assert np.array_equal(found, dataset[name].isel(a=2).values, equal_nan=True)
+
+
+def test_whole_numbers_in_the_range_are_kept_as_they_are(tmp_path):
+    keys = {"axes": {"flips": [2.0, 4.0, 6.0, 8.0], "mu": [1.0, 2.0]}, "fixed": {"a": 0.5, "phi0": 1.0, "step": 0.05}}
+    dataset = sweep.run(sweep.study(kernel="foliot_steps", **keys), progress=False)
+    name = next(iter(dataset.data_vars))
+    found = read(tmp_path, region.study_text(dataset, Choice(name, "flips", None, {"mu": 1}), (4.0, 6.0), None))
+    assert found.axes["flips"].values.tolist() == [4.0, 6.0]
+    assert found.fixed["mu"] == 2.0
+
+
+def test_a_result_of_no_known_study_has_no_regions(dataset):
+    bare = dataset.drop_attrs(deep=False)
+    with pytest.raises(sweep.SweepError, match="does not say which study"):
+        region.study_text(bare, MAP, None, None)
