@@ -29,13 +29,13 @@ class Claims(NamedTuple):
     silent : outputs, or those of one study, that no statement is made from; every other has a lie that is noticed
     still : of the statements that are checked, how many no lie about a result makes fail: those that the script
         concludes from motions that it follows itself, or from constants
-    options : of `conclude`
+    tell : False where the script can leave out what others cost
     """
 
     files: dict
     silent: str = ""
     still: int = 0
-    options: dict = {}
+    tell: bool = True
 
 
 # fmt: off
@@ -82,7 +82,7 @@ TABLE = {
     }}),
     "polisher_sequence": Claims({"polisher_sequence": {}}),
     "polisher_wear": Claims({
-        "polisher_wear": {"e": [0.02, 0.08, 0.1, 0.16], "w_x": [0.5, 0.53, 0.54, 0.56, 0.58], "radius": 2, "rtol": 1e-5},
+        "polisher_wear": {"e": [0.02, 0.08, 0.1, 0.16], "w_x": [0.5, 0.53, 0.54, 0.56, 0.58], "radius": 2},
         "polisher_wear_load": {"radius": [0.0, 0.05, 0.098], "rtol": 1e-4},
     }),
     "polisher_zone": Claims({"polisher_zone": {}}),
@@ -95,11 +95,11 @@ TABLE = {
     }),
     "stick_slip": Claims({
         "stick_slip": {"method": ["taylor", "dop853"], "belt": [0.02, 0.3], "fall": [0.02, 0.3]},
-    }, options={"tell": False}),
+    }, tell=False),
     "stiff_lag": Claims({
         "stiff_lag": {"method": ["taylor", "rodas5p"], "mu": [0.1, 10.0], "eps": [1e-9, 1e-5, 1e-1]},
         "stiff_lag_bounce": {"flips": [20, 100, 3000], "e": [0.1, 0.5]},
-    }, options={"tell": False}),
+    }, tell=False),
     "three_models": Claims({
         "three_models": {"torque": 4}, "three_models_denny": {"mu": 4}, "three_models_viscous": {"mu": 4},
     }),
@@ -158,6 +158,7 @@ class Told:
         self.paths = [swept(file, cut, folder) for file, cut in claims.files.items()]
         self.results = {path: sweep.open_result(path).load() for path in self.paths}
         self.inner, self.run, self.lie = {}, sweep.run, {}
+        self.options = {} if claims.tell else {"tell": False}
 
     def open(self, path, **_):
         """Instead of `sweep.open_result`: the result, or what is to be believed instead."""
@@ -166,13 +167,14 @@ class Told:
     def again(self, study=None, *, progress=False, workers=None, **keys):
         """Instead of `sweep.run` in memory: the same study is run once."""
         study = sweep.study(**keys) if study is None else study
-        found = self.inner.setdefault(sweep.to_toml(study), None) or self.run(study, progress=False)
-        self.inner[sweep.to_toml(study)] = found
-        return self.lie.get("inner", lambda ds: ds.copy())(found)
+        text = sweep.to_toml(study)
+        if text not in self.inner:
+            self.inner[text] = self.run(study, progress=False)
+        return self.lie.get("inner", xr.Dataset.copy)(self.inner[text])
 
     def conclude(self):
         """All that `conclude` of the script gives."""
-        return self.script.conclude(*self.paths, **self.claims.options)
+        return self.script.conclude(*self.paths, **self.options)
 
     def failing(self, **lie):
         """Numbers of the checked statements that fail, all of them where the script ends with one clear line."""
@@ -199,9 +201,9 @@ def told(request, tmp_path_factory):
 
 
 def test_the_script_draws_its_figure_and_every_statement_holds(told, capsys):
-    conclude = partial(told.script.conclude, **told.claims.options)
+    conclude = partial(told.script.conclude, **told.options)
     short = partial(report, told.script.__file__, told.paths, conclude=conclude)
-    assert (short if told.claims.options else told.script.main)(told.paths) == 0
+    assert (short if told.options else told.script.main)(told.paths) == 0
     assert re.search(r"\| (yes|no, known)$", printed := capsys.readouterr().out, re.MULTILINE)
     picture = Path(told.paths[0]).with_suffix(".png")
     assert printed.rstrip().endswith(f"figure: {picture}")

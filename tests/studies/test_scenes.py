@@ -13,14 +13,12 @@ import stability_maps
 import stick_slip
 import stiff_lag
 import timekeeping
-import torque_ripple
 import xarray as xr
 from chain_oracles import receptance
 from mpmath import mp, mpf
 from scipy.integrate import quad, solve_ivp
 
 import sweep
-from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="thousands of swings; the integrator's tests run as plain Python")
@@ -237,13 +235,6 @@ def test_the_law_of_correlated_noise_is_that_of_a_sum_of_products():
     assert float(timekeeping.law(xr.Dataset(coords=coords), 7.0)) == pytest.approx(expected, rel=1e-12)
 
 
-def test_the_weight_of_a_uniform_force_gives_the_foliots_own_sensitivity():
-    for alpha in (0.04, 1.463, 1e4):
-        q = torque_ripple.switch_time(alpha)
-        s = (1 - math.tanh(q) / q) / math.tanh(q) ** 2
-        assert -torque_ripple.first_order(alpha, [0.0])[0] == pytest.approx(2 * s, rel=1e-9)  # over angle: s
-
-
 def test_the_borders_of_stability_are_the_textbooks():
     zero = np.array([0.0])
     for method, end in (("euler", 2.0), ("rk4", 2.785293563), ("dopri5", 3.306567893), ("verlet", 2.0)):
@@ -252,11 +243,3 @@ def test_the_borders_of_stability_are_the_textbooks():
     z = np.array([-0.1, 0.3j])
     for method, order in (("euler", 1), ("rk4", 4), ("dopri5", 5), ("dop853", 8)):
         assert (abs(stability_maps.stability_function(z, method) - np.exp(z)) < abs(z) ** (order + 1)).all()
-
-
-def test_where_the_runs_compared_overflow_the_error_is_not_known():
-    """The finer runs grow beyond all numbers; the first, whose angle is 3e83, is all there is."""
-    fixed = {"w": 4.2095, "end": 63.5, "flips": 1, "step": 1.0, "location": "none", "a": 4.359125}
-    ds = scene("stability_maps", 1e-6, method=["semi_implicit"], **fixed)
-    assert np.isinf(ds.error.item())
-    assert ds.status.item() == Status.INACCURATE
