@@ -52,7 +52,7 @@ TABLE = {
     "balance_ringdown": Claims({
         "balance_ringdown": {"zeta": np.geomspace(1e-4, 2, 31), "r": np.geomspace(1e-4, 0.9, 37)},
     }, "margin status stop_time", 5),
-    "chatter_lobes": Claims({"chatter_lobes": {}}),
+    "chatter_lobes": Claims({"chatter_lobes": {}}, "damping frequency frequency_error", 2),
     "cross_beat": Claims({"cross_beat": {}}, ""),
     "foliot_scaling": Claims({
         "foliot_scaling": {"mu": np.geomspace(1e-7, 1e7, 169), "a": 1.3, "phi0": 0.4},
@@ -60,7 +60,7 @@ TABLE = {
     "friction_laws": Claims({
         "friction_laws": {"mu": np.geomspace(1e-24, 1e24, 385)},
         "friction_laws_map": {"R": np.geomspace(1e-3, 1e9, 61), "mu": np.geomspace(1e-3, 1e11, 141)},
-    }),
+    }, "friction_laws_map.amplitude friction_laws_map.period friction_laws_map.status", 3),
     "friction_varies": Claims({"friction_varies": {}, "friction_varies_noise": {}},
         "friction_varies.angle friction_varies.speed friction_varies.time "
         "friction_varies_noise.rate_error_s_per_day friction_varies_noise.truncated", 8),
@@ -78,7 +78,7 @@ TABLE = {
         "law_map_overnight": {"n": [0.25, 1.5, 3.0], "e": [1, 0.99, 0.97, 0.5], "R": 3, "c": 10},
         "law_map_borders": {},
     }),
-    "origin_of_half": Claims({"origin_of_half": {"mu": 2}}),
+    "origin_of_half": Claims({"origin_of_half": {"mu": 2}}, "amplitude status", 3),
     "polisher_design": Claims({
         "polisher_design": {"d": [0.3, 0.38], "b": 3, "f": 2, "e": 2},
     }),
