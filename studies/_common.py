@@ -110,7 +110,7 @@ def report(
     script: str,
     inputs: Sequence[str],
     arguments: Sequence[str],
-    conclude: Callable[..., tuple[Groups, Sequence[str], Any]],
+    conclude: Callable[..., tuple[Groups, Sequence[str], Callable[[], Any]]],
     source: str = "theory",
 ) -> int:
     """Prints what a study concludes from the results named, and saves its figure beside the first of them.
@@ -121,7 +121,7 @@ def report(
     ----------
     script : path of the script, for the line on its use
     inputs : what its arguments are called there
-    conclude : gives the statements, further lines of text, and the figure, from the paths
+    conclude : gives the statements, further lines of text, and a function that draws the figure, from the paths
     source : heading of what the numbers are compared with
 
     Returns
@@ -138,7 +138,8 @@ def report(
 
         target = Path(arguments[0]).with_suffix(".png")
         check_target(target, ".png")
-        groups, notes, page = conclude(*arguments)
+        groups, notes, draw = conclude(*arguments)
+        page = draw()
         print("\n".join([*table(groups, source), "", *notes, ""]))
         print(f"figure: {charts.save(page, target)}")
     except sweep.SweepError as error:

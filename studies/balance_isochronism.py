@@ -283,7 +283,7 @@ def conclude(*paths: str) -> tuple[Groups, list[str], Any]:
         "Positions, out of poise": positions(hung),
         "Positions, friction": pivots(),
     }
-    return groups, [NOTES], figure(ds, lift, hung)
+    return groups, [NOTES], lambda: figure(ds, lift, hung)
 
 
 def main(arguments: Sequence[str]) -> int:

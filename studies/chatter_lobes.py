@@ -316,7 +316,7 @@ def read(path: str) -> xr.Dataset:
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
     ds = read(path)
-    return statements(ds), [NOTES, "", *answer(ds)], figure(ds)
+    return statements(ds), [NOTES, "", *answer(ds)], lambda: figure(ds)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -245,7 +245,7 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements, the answer and the figure."""
     ds = prepared(read_result(path, "cross_beat_scene:KERNEL", ["stiffness", "tau"], "cross_beat.toml"))
     halves = shaken(ds)
-    return statements(ds, halves), [NOTES, "", *answer(ds, halves)], figure(ds, halves)
+    return statements(ds, halves), [NOTES, "", *answer(ds, halves)], lambda: figure(ds, halves)
 
 
 def main(arguments: Sequence[str]) -> int:

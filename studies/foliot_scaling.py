@@ -468,7 +468,7 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements of the paper, inverse design, and the figure."""
     ds = read(path)
     heading = f"INVERSE DESIGN, phi0 = {math.degrees(float(ds.phi0)):g} degree (not in the paper)"
-    return statements(ds), [NOTES, "", heading, *columns(inverse_design(ds), "   ")], figure(ds)
+    return statements(ds), [NOTES, "", heading, *columns(inverse_design(ds), "   ")], lambda: figure(ds)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -254,7 +254,7 @@ def conclude(laws_path: str, map_path: str) -> tuple[Groups, list[str], Any]:
     laws, grid = read(laws_path, map_path)
     line = valley(grid)
     groups = {"Far out": ends(laws), "At every drive": exact(laws), "Viscous and Coulomb friction": best(grid, line)}
-    return groups, [NOTES], figure(laws, grid, line)
+    return groups, [NOTES], lambda: figure(laws, grid, line)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -262,7 +262,7 @@ def conclude(path: str, noise_path: str) -> tuple[Groups, list[str], Any]:
         "Friction by season": by_season(ds),
         "Noise of friction and torque": by_noise(noisy),
     }
-    return groups, [NOTES], figure(ds, noisy)
+    return groups, [NOTES], lambda: figure(ds, noisy)
 
 
 def main(arguments: Sequence[str]) -> int:

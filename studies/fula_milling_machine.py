@@ -313,7 +313,7 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
         "Table 6": frequencies(ds), "The cause": cause(ds), "Conclusions": conclusions(ds),
         "Five by other methods": others(ds),
     }  # fmt: skip
-    return groups, [NOTES], figure(ds)
+    return groups, [NOTES], lambda: figure(ds)
 
 
 def main(arguments: Sequence[str]) -> int:

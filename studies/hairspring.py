@@ -289,7 +289,7 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
     ds = read(path)
     springs = best_springs(ds)
     groups = {"The law": laws(ds), "How far it goes": optimum(ds, springs), "The paper's spring": improvement(ds)}
-    return groups, [NOTES, "", *clock(ds, springs)], figure(ds, springs)
+    return groups, [NOTES, "", *clock(ds, springs)], lambda: figure(ds, springs)
 
 
 def main(arguments: Sequence[str]) -> int:

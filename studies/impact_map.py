@@ -308,7 +308,7 @@ def conclude(path: str, lever_path: str) -> tuple[Groups, list[str], Any]:
         "What the clock does": motions(closed, motion),
         "A curved lever": lever(bent),
     }
-    return groups, [NOTES, "", words(closed), census(motion)], figure(closed, motion, bent)
+    return groups, [NOTES, "", words(closed), census(motion)], lambda: figure(closed, motion, bent)
 
 
 def main(arguments: Sequence[str]) -> int:

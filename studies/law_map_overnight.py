@@ -223,7 +223,7 @@ def conclude(path: str, borders_path: str) -> tuple[Groups, list[str], Any]:
     if "sensitivity_argmin_mu" not in ds or set(ds.sensitivity_min.dims) != {"n", "e", "R", "c"}:
         raise sweep.SweepError(f"{path} is not of this study; make it from law_map_overnight.toml")
     groups = {"The best torque": best_torques(ds), "Along the borders": borders(fine)}
-    return groups, [NOTES, "", *answer(ds)], figure(ds, fine)
+    return groups, [NOTES, "", *answer(ds)], lambda: figure(ds, fine)
 
 
 def main(arguments: Sequence[str]) -> int:

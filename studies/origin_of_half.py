@@ -258,7 +258,7 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
     found = followed()
     groups = {"Exponent -1/2 at every torque": always_half(found), "Prefactors": prefactors(found)}
     groups["Other exponents"] = [*never_half(ds), slight_impacts()]
-    return groups, [NOTES], figure(ds)
+    return groups, [NOTES], lambda: figure(ds)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -237,7 +237,7 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
         "Another throw about the same middle": correction(ds),
         "Type B": mirrored(ds),
     }
-    return groups, [NOTES], figure(ds)
+    return groups, [NOTES], lambda: figure(ds)
 
 
 def main(arguments: Sequence[str]) -> int:

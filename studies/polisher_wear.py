@@ -233,7 +233,7 @@ def conclude(path: str, loaded: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
     ds = read(path)
     load = read_result(loaded, "polisher_wear", ["w_x"], "polisher_wear_load.toml")
-    return statements(ds, load), [NOTES], figure(ds, load)
+    return statements(ds, load), [NOTES], lambda: figure(ds, load)
 
 
 def main(arguments: Sequence[str]) -> int:

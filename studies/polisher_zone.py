@@ -221,7 +221,7 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
     ds = prepared(read_result(path, "polisher_wear", ["e", "beta"], "polisher_zone.toml"))
     groups = {"The zone by O_DH": zones(ds), "Wear of the tool": tools(ds)}
-    return groups, [NOTES, "", *answer(ds)], figure(ds)
+    return groups, [NOTES, "", *answer(ds)], lambda: figure(ds)
 
 
 def main(arguments: Sequence[str]) -> int:

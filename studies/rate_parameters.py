@@ -117,7 +117,7 @@ def figure(found: xr.Dataset) -> Any:
 def conclude(path: str) -> tuple[Groups, Sequence[str], Any]:
     """Table, notes and figure of a result."""
     ds = read(path)
-    return statements(ds), NOTES.splitlines(), figure(against_drive())
+    return statements(ds), NOTES.splitlines(), lambda: figure(against_drive())
 
 
 def main(arguments: Sequence[str]) -> int:

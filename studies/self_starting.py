@@ -106,7 +106,7 @@ def figure(ds: xr.Dataset) -> Any:
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
     ds = read_result(path, "foliot_start", ["a", "k", "R_s", "phi_start", "mu"], "self_starting.toml")
-    return statements(ds), [NOTES], figure(ds)
+    return statements(ds), [NOTES], lambda: figure(ds)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -285,7 +285,7 @@ def conclude(path: str, oscillator: str, *paths: str) -> tuple[Groups, list[str]
     groups = {"Oscillator": oscillators(linear)}
     groups |= {name: foliots(ds) for name, ds in zip(("Drive", "Near sticking", "Spring"), grids, strict=True)}
     notes = [NOTES, "", *(line for m in ("euler", "verlet", "rk4", "dop853", "moreau") for line in hard(m))]
-    return groups, notes, figure(linear, grids)
+    return groups, notes, lambda: figure(linear, grids)
 
 
 GRIDS = {"stability_maps": "mu", "stability_maps_sticking": "R", "stability_maps_spring": "k"}

@@ -231,7 +231,7 @@ def conclude(path: str, tell: bool = True) -> tuple[Groups, list[str], Any]:
         f"Two cycles without sliding, rtol {LOOSE:g}": failures(unslid),
         "Cost of two cycles": cheapest(found),
     }
-    return groups, NOTES.splitlines(), figure(ds, unslid, found)
+    return groups, NOTES.splitlines(), lambda: figure(ds, unslid, found)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -194,7 +194,7 @@ def conclude(path: str, bounces: str, tell: bool = True) -> tuple[Groups, list[s
     found = {"rodas5p": costs(MU, ours)}
     found |= {name: costs(MU[::32], follow) for name, follow in FOLLOWERS.items()} if tell else {}
     groups = {"Lag": maps(lag), "Bounces": rests(bounce), f"Cost at a lag of {EPS:g} s": cheapest(found)}
-    return groups, NOTES.splitlines(), figure(lag, bounce, found)
+    return groups, NOTES.splitlines(), lambda: figure(lag, bounce, found)
 
 
 def main(arguments: Sequence[str]) -> int:

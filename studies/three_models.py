@@ -220,7 +220,7 @@ def conclude(path: str, denny_path: str, viscous_path: str) -> tuple[Groups, lis
         "Swing against torque": swings(ds, followed),
         "Two bodies as one that keeps a share": identity(ds, impact),
     }
-    return groups, [NOTES, "", f"all three models: {target}"], figure(ds)
+    return groups, [NOTES, "", f"all three models: {target}"], lambda: figure(ds)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -275,7 +275,7 @@ def conclude(*paths: str) -> tuple[Groups, list[str], Any]:
     clocks = {name: read(path, toml) for (name, toml), path in zip(CLOCKS.items(), paths, strict=True)}
     groups: Groups = {name: clock_statements(name, ds) for name, ds in clocks.items()}
     groups["Lasting changes, eps/s"] = lasting(clocks)
-    return groups, [*table(clocks), "", *in_words(clocks)], figure(clocks)
+    return groups, [*table(clocks), "", *in_words(clocks)], lambda: figure(clocks)
 
 
 def main(arguments: Sequence[str]) -> int:

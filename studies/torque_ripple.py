@@ -288,7 +288,7 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements, tables and the figure."""
     ds = read(path)
     groups = {"First order in the depth": linear(ds), "High harmonics": falls(ds), "Weak drive": weak(ds)}
-    return groups, [*permitted(ds), "", *in_words(ds)], figure(ds)
+    return groups, [*permitted(ds), "", *in_words(ds)], lambda: figure(ds)
 
 
 def main(arguments: Sequence[str]) -> int:

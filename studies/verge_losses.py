@@ -267,7 +267,7 @@ def conclude(path: str, wheel_path: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
     ds = prepared(read_result(path, "verge_scene:KERNEL", ["R_v", "I_c", "tau"], "verge_losses.toml"))
     wheel = prepared(read_result(wheel_path, "verge_scene:KERNEL", ["R_c", "I_c", "tau"], "verge_losses_wheel.toml"))
-    return statements(ds, wheel), [NOTES], figure(ds)
+    return statements(ds, wheel), [NOTES], lambda: figure(ds)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -152,7 +152,7 @@ def conclude(path: str, cells: int = 4096, tolerances: Sequence[float] = TOLERAN
     parts = charted(Path(path), cells, tolerances)
     groups = {found.attrs["title"]: statements(found) for found in parts}
     tables = [f"{found.attrs['title']}\n{precision_text(found, complete=True)}\n" for found in parts]
-    return groups, [NOTES, "", *tables], figure(parts)
+    return groups, [NOTES, "", *tables], lambda: figure(parts)
 
 
 def main(arguments: Sequence[str]) -> int:

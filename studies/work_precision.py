@@ -219,7 +219,7 @@ def conclude(path: str, cells: int = 1000, tolerances: Sequence[float] = TOLERAN
     }
     groups |= {} if steps is None else {"Fixed steps": orders(steps)}
     tables = [f"{found.attrs['title']}\n{precision_text(found, complete=True)}\n" for found in (coulomb, drag)]
-    return groups, [NOTES, "", *tables], figure(coulomb, drag, steps, others)
+    return groups, [NOTES, "", *tables], lambda: figure(coulomb, drag, steps, others)
 
 
 def beside(others: dict[str, xr.Dataset]) -> list[Statement]:
