@@ -1,4 +1,4 @@
-"""Hypothesis profiles; the helpers of the tests (`oracles`, `columns`, `toy`), studies and docs as modules."""
+"""Hypothesis profiles; the helpers of the tests (`oracles`, `columns`, `toy`, `havoc`), studies and docs as modules."""
 
 import os
 import signal
@@ -13,7 +13,8 @@ settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True
 settings.load_profile("ci" if os.environ.get("CI") else "local")
 
 TESTS = Path(__file__).parent
-sys.path += [str(TESTS / "oracles"), str(TESTS / "helpers"), str(TESTS.parent / "studies"), str(TESTS.parent / "docs")]
+PLACES = ("tests/oracles", "tests/helpers", "benchmarks/soak", "studies", "docs")
+sys.path += [str(TESTS.parent / place) for place in PLACES]
 
 # a shell ignores Ctrl-C for what it runs in the background, and children inherit that; here it is under test
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -41,7 +41,7 @@ def study(kernel: str, method: str, cells: int) -> Study:
     _, ranges, fixed = CASES[kernel]
     side = max(2, round(cells**0.5))
     axes = {name: np.geomspace(*ends, side) for name, ends in ranges.items()}
-    return sweep.build_study(kernel=kernel, allow_import=True, method=method, rtol=1e-8, axes=axes, fixed=fixed)
+    return sweep.study(kernel=kernel, allow_import=True, method=method, rtol=1e-8, axes=axes, fixed=fixed)
 
 
 def seconds(action: Callable[[], object]) -> float:
@@ -120,7 +120,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--methods", nargs="*", help="only these")
     options = parser.parse_args()
-    scene = sweep.build_study(kernel=SCENE, allow_import=True, axes={"eps": [0.5]}, fixed={"drive": 0.5})
+    scene = sweep.study(kernel=SCENE, allow_import=True, axes={"eps": [0.5]}, fixed={"drive": 0.5})
     methods = [(name, case[0]) for name, case in CASES.items() if case[0]]
     methods += [(SCENE, method.name) for method in scene.kernel.methods]
     chosen = [pair for pair in methods if not options.methods or pair[1] in options.methods]

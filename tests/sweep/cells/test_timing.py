@@ -130,20 +130,6 @@ def test_a_probe_has_cells_enough_to_see_past_the_cost_of_a_call_and_few_enough_
     assert timing._probe_cells(Made(seconds), COLUMNS, size) == found
 
 
-@pytest.mark.parametrize(("seconds", "cells", "times"), [(0.0099, 1, 2), (0.01, 1, 1), (0.001, 2, 1)])
-def test_a_cheap_cell_is_probed_twice_for_what_the_first_time_costs(seconds, cells, times):
-    made = Made(lambda cells: seconds)
-    assert timing._probe(made, COLUMNS, 100, cells) == seconds
-    assert made.made == [(50 - cells // 2, cells)] * times
-
-
-def test_the_second_probe_counts_unless_it_fails():
-    told = iter([1e-3, 1e-4])
-    assert timing._probe(Made(lambda cells: next(told)), COLUMNS, 100, 1) == 1e-4
-    told = iter([1e-3, None])
-    assert timing._probe(Made(lambda cells: next(told)), COLUMNS, 100, 1) == 1e-3
-
-
 def test_where_the_middle_fails_eight_other_places_are_tried():
     made = Made(lambda cells: None)
     assert timing._probe(made, COLUMNS, 160, 1) == math.inf
@@ -170,16 +156,6 @@ def test_probes_end_with_the_budget_or_a_share_of_the_run(seconds, size, cells, 
     found = timing._probes(made, COLUMNS, size, cells)
     assert len(found) == len(made.made) == number
     assert {cells for _, cells in made.made} == {cells}
-
-
-def test_a_probe_that_fails_counts_for_a_sixteenth_of_the_budget():
-    told = iter([1e-6, *[None] * 100])
-    made = Made(lambda cells: next(told))
-    assert len(timing._probes(made, COLUMNS, 6336, 32)) == 1
-    assert len(made.made) == 17
-    none = Made(lambda cells: None)
-    assert timing._probes(none, COLUMNS, 6336, 32) == {}
-    assert len(none.made) == 49
 
 
 def test_a_dear_probe_of_as_many_cells_that_was_made_before_is_among_them():

@@ -12,7 +12,8 @@ import numpy as np
 import xxhash
 
 HERE = Path(__file__)
-sys.path[:0] = [p for p in (str(HERE.parent), str(HERE.parents[2])) if p not in sys.path]
+PATHS = (str(HERE.parent), str(HERE.parents[2]), str(HERE.parents[2] / "tests" / "helpers"))
+sys.path[:0] = [p for p in PATHS if p not in sys.path]
 
 import sweep  # noqa: E402
 from sweep.results.verify import verify  # noqa: E402
