@@ -72,7 +72,7 @@ TABLE = {
         "impact_map": {"I_c": 16, "e": 24}, "impact_map_lever": {"I_c": 16, "nu": 16},
     },
         "impact_map.contact_share impact_map.offset impact_map.status impact_map_lever.period "
-        "impact_map_lever.swing", 3),
+        "impact_map_lever.swing", 4),
     "law_map": Claims({"law_map": {"e": [1, 0.99, 0.5], "R": [0, 1, 100], "c": [0, 1e-6, 1]}}),
     "law_map_overnight": Claims({
         "law_map_overnight": {"n": [0.25, 1.5, 3.0], "e": [1, 0.99, 0.97, 0.5], "R": 3, "c": 10},
@@ -253,7 +253,7 @@ def noticed(told):
         silent = {name.removeprefix(f"{study}.") for name in (told.claims.silent or "").split()}
         for name in sorted(set(numbers(ds)) - silent):
             found[f"{study}.{name}"] = set().union(*(told.failing(**{path: off(ds, [name], how)}) for how in OFF))
-        if bool((ds.status != 0).any()) and "status" not in silent:
+        if "status" in ds and bool((ds.status != 0).any()) and "status" not in silent:
             found[f"{study}.status"] = told.failing(**{path: ds.assign(status=xr.zeros_like(ds.status))})
     return found
 
