@@ -80,9 +80,9 @@ def refined(function, axes, tolerance):
     def solved(values):
         return dataset_of(function, [axis.values for axis in values.values()], ("cell",))
 
-    def written(values, arrays):
+    def written(values, arrays, attributes):
         columns = {name: ("cell", array) for name, array in arrays.items()}
-        return xr.Dataset(columns, {name: ("cell", axis.values) for name, axis in values.items()})
+        return xr.Dataset(columns, {name: ("cell", axis.values) for name, axis in values.items()}, attributes)
 
     study = SimpleNamespace(
         axes={n: Axis(n, g, "values") for n, g in zip(names, grid, strict=True)}, design="product", outputs=("value",)

@@ -116,7 +116,7 @@ TABLE = {
             ("", [0, 1.25, 75, 1800], 15300), ("_buergi", [0, 2.5, 150, 3600], 30600),
             ("_spring", [0, 10, 600, 14400], 122400),
         )
-    }, "truncated truncated rate_error_s_per_day status truncated"),
+    }, "truncated rate_error_s_per_day status", 3),
     "torque_ripple": Claims({"torque_ripple": {
         "harmonic": [*range(1, 9), *range(16, 33, 2), 33, 35, 40, 41, 50, 51, 64],
         "depth": [0.0, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5],
