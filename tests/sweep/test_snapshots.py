@@ -61,6 +61,8 @@ VOLATILE = {
     r"[\d,.]+ cells/s": "SPEED",
     r"(?<=versions  )foliot .*(\n {12}.*)*": "...",
     r"(?<=(disk  |blocks)    ).*(\n {12}.*)*": "...",
+    r"\d+ %(?=.* of a sample)": "SHARE",  # of as many cells as the machine tries in time
+    r"(?<=a sample of )\d+|(?<=on )\d+(?= cells)|(?<=tried\n {12}on )\d+": "N",
     r"between its cells .*": "...",  # of a block, which is as large as the machine is fast
     r"\d+\.\d+\.\d+": "VERSION",
     r"-o (\S+), --output ": "-o, --output ",  # as Python 3.13 writes it
