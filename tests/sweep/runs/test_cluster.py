@@ -142,7 +142,7 @@ def clients():
 def test_a_missing_package_is_told_with_its_cure(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     monkeypatch.delitem(sys.modules, "sweep.runs.cluster")
-    with pytest.raises(SweepError, match=r"pip install \"foliot\[cluster\]\""):
+    with pytest.raises(SweepError, match=r"foliot\[cluster\]"):
         elsewhere(tall(3), cluster="tcp://127.0.0.1:1")
 
 
