@@ -49,7 +49,7 @@ def told(folder, monkeypatch, capsys):
         (("show", "fall.h5"), "not asked"),
         (("show", "fall.h5"), "where     v0**2 < g*height"),
         (("verify", "fall.h5"), "whole"),
-        (("plot", "fall.h5", "--x", "height", "--force"), "fall.png"),
+        (("plot", "fall.h5", "--x", "height", "--force"), "fall_plot.png"),
         (("report", "fall.h5", "--force"), "fall.html"),
         (("export", "fall.h5", "-o", "fall.csv", "--force"), "fall.csv"),
         (("export", "fall.h5", "-o", "ok.csv", "--where", "status == 'OK' and g > 5", "--force"), "ok.csv"),

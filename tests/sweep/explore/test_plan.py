@@ -113,7 +113,7 @@ def test_a_plan_tells_what_auto_would_choose_and_what_becomes_of_cells():
     found = plan(stone(rtol=0.5))
     assert found.methods.keys() == {"none", "rough"}
     assert sum(found.methods.values()) == pytest.approx(1)
-    assert found.statuses["BAD_INPUT"] == pytest.approx(0.1, abs=0.05)
+    assert 0.05 < found.statuses["BAD_INPUT"] < 0.25  # a tenth of the cells, and both ends of a small sample
 
 
 @pytest.mark.parametrize("isolate", [False, True])

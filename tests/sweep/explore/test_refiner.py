@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import sweep
-from kernels.interface import Status
+from kernels.interface import FIRST_REFUSAL, Status
 from sweep.analysis.scattered import Box
 from sweep.explore.judge import Judged
 from sweep.explore.refiner import Refinement, Refiner, _keys
@@ -27,7 +27,7 @@ class Noted:
         self.asked.append({name: column.tolist() for name, column in values.items()})
         return dataset(values)
 
-    def written(self, axes, arrays):
+    def written(self, axes, arrays, attributes):
         return xr.Dataset(
             {name: ("cell", v) for name, v in arrays.items()} | {n: ("cell", a.values) for n, a in axes.items()}
         )
@@ -122,7 +122,7 @@ def test_statuses_that_say_less_right_are_the_same_kind_and_refusals_have_no_val
     part["status"] = ("cell", np.array(status, np.int8))
     part["fall_time"] = ("cell", np.array([1.0, 2.0, 3.0, 4.0, np.inf]))
     assert one._kinds().tolist() == [0, 0, int(Status.GRAZING), -1, -1]
-    part["status"] = ("cell", np.full(5, sweep.explore.refiner.FIRST_REFUSAL, np.int8))
+    part["status"] = ("cell", np.full(5, FIRST_REFUSAL, np.int8))
     assert one._kinds().tolist() == [-1] * 5
 
 

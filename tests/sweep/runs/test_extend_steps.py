@@ -13,7 +13,7 @@ from toy_studies import build
 
 from sweep.cells.grid import Box
 from sweep.runs import extend
-from sweep.runs.extend import Precomputed, Retried, Reused, has_failed, is_of_another_version, obstacle
+from sweep.runs.extend import Retried, Reused, has_failed, is_of_another_version, obstacle
 from sweep.study.model import Axis, frozen
 from sweep.system.errors import SweepError
 
@@ -61,15 +61,6 @@ def test_cells_that_failed_are_missing_and_not_counted():
     made = reused(Retried)
     made.__dict__["_failed"] = np.array([3, 7])
     assert made.known_before(np.array([0, 3, 4, 7, 8, 60])).tolist() == [0, 3, 3, 6, 6, 58]
-
-
-def test_everything_precomputed_is_known():
-    made = Precomputed({"x": np.arange(10.0)}, "before")
-    found = {"x": np.zeros(3)}
-    made.fill(4, 7, found)
-    assert found["x"].tolist() == [4.0, 5.0, 6.0]
-    assert made.missing(4, 7).tolist() == [False] * 3
-    assert (made.known_before(5), made.taken_over) == (5, "before")
 
 
 @pytest.mark.parametrize(

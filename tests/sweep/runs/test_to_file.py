@@ -63,7 +63,7 @@ def test_what_is_complete_is_tidied_and_nothing_else(output, monkeypatch):
 def test_cells_are_sampled_unless_they_are_solved_already(output, sessions):
     assert run_to_file(task_of(output)) is True
     rest = {"status": np.zeros(10, np.int8), "method_used": np.ones(10, np.int8), "error_bound": np.zeros(10)}
-    known = to_file.Precomputed({"fall_time": np.arange(10.0), **rest})
+    known = to_file.Precomputed({"fall_time": np.arange(10.0), **rest}, {})
     assert run_to_file(task_of(output, force=True), known) is True
     with open_result(output) as found:
         assert found.fall_time.values.tolist() == list(range(10))
