@@ -187,7 +187,7 @@ def agree(kernel, found):
     told = {m.name: promised(kernel, m, found) for m in kernel.methods}
     for field in kernel.outputs:
         able = [m.name for m in kernel.methods if field.name not in m.lacks]
-        if len(able) < 2 or field.name in LOOSE:
+        if len(able) < 2 or field.name in LOOSE or not told[able[0]].size:
             continue
         best = np.argmin([told[name] for name in able], axis=0)
         values = np.array([found.by[name][field.name] for name in able])
