@@ -257,7 +257,7 @@ def difference(found, kept):
     if len(kept) < len(found) or found.shape[1:] != kept.shape[1:]:
         return f"{len(found)} cells, where {len(kept)} are kept"
     here, there = _bits(found), _bits(kept)
-    cells = (here != there).reshape(len(here), -1).any(axis=1)
+    cells = (here != there).any(axis=tuple(range(1, here.ndim)))
     if not cells.any():
         return None
     first = int(np.flatnonzero(cells)[0])
@@ -267,7 +267,7 @@ def difference(found, kept):
     numbers = np.isfinite(found) & np.isfinite(kept) & (here != there)
     ulps = np.abs(here - there)[numbers].max(initial=0)
     place = (first, *(np.argwhere(here[first] != there[first])[0] if found.ndim > 1 else ()))
-    lost = (np.isfinite(found) != np.isfinite(kept)).reshape(len(here), -1).any(axis=1).sum()
+    lost = (np.isfinite(found) != np.isfinite(kept)).any(axis=tuple(range(1, found.ndim))).sum()
     return text + f"{found[place]!r} instead of {kept[place]!r}; at most {ulps} ulp; a number in one alone: {lost}"
 
 

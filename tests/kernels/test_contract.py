@@ -239,6 +239,7 @@ def test_units_scale_as_the_fields_declare(name):
     for field in kernel.parameters:
         column = np.abs(found.cells[field.name]).reshape(rows.size, -1)
         rows = rows & ((column == 0.0) | ((column > 1e-40) & (column < 1e40)) | (column == field.default)).all(axis=1)
+    assert rows.any() or not COMPILED  # of the few cells in plain Python there may be none
     cells, rtol = golden.taken(found.cells, rows), found.rtol[rows]
     for units in ((-6, 0, 0, 0), (4, 10, -8, 6)):
         powers = np.array(units) * (1, 1, 1, name in FREE_ANGLES)
