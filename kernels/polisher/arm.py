@@ -26,11 +26,11 @@ from kernels.lanes.groups import cells_at
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none
 from kernels.lanes.records import read, write
-from kernels.lanes.vectors import choose, not_, where
+from kernels.lanes.vectors import not_, where
 from kernels.lanes.wiring import kernel, method, tracing
 from kernels.maths.elementary import larger
-from kernels.polisher import _motor_waveform, _sampled_motion, _textbook_angles, extremes
-from kernels.polisher._cell import ROUNDING, Rates, Swing, judged, mirrored, moves, rocks, said, swing, turns
+from kernels.polisher import _motor_waveform, _sampled_motion, extremes
+from kernels.polisher._cell import ROUNDING, Rates, judged, mirrored, said, swing, turns
 from kernels.polisher.extremes import Angles, Locks, Slopes
 from kernels.polisher.linkage import EXAMPLE, PARAMETERS, allowed, side_of
 
@@ -60,29 +60,6 @@ def stable(p, rtol):
     """Half-angle forms of sums without error."""
     cell = judged(p)
     return _stable(p.type, cell), cell.code
-
-
-@jit
-def textbook(p, rtol):
-    """The paper's arccos; what that loses is the bound."""
-    cell = judged(p)
-    angles = _textbook_angles.extremes(cell.lengths)
-    transmission = _textbook_angles.transmission(cell.lengths)
-    return swing(p.type, cell, angles, transmission, _textbook_angles.tolerances(cell.lengths)), cell.code
-
-
-@jit
-def textbook_bound(p):
-    """What rounding comes to in an arccos and in differences of two of them; the locks are those of `stable`."""
-    cell, least = judged(p), ROUNDING
-    of_angles = Angles(least, least, least, least, least, least)
-    of_slopes = Slopes(least, least, least, least, least, least, least, least)
-    return Swing(
-        choose(rocks(cell), _textbook_angles.angle_errors(cell.lengths), of_angles),
-        Locks(least, least),
-        where(moves(cell), _textbook_angles.transmission_error(cell.lengths), least),
-        choose(said(cell.code, OK), _textbook_angles.slope_errors(cell.lengths), of_slopes),
-    )
 
 
 @jit
@@ -162,13 +139,6 @@ POLISHER = kernel(
     check=check,
     methods=(
         method("stable", "half-angle forms of sums without error", stable, ROUNDING, lacks=Rates._fields),
-        method(
-            "textbook",
-            "the paper's arccos, which loses digits next to dead points",
-            textbook,
-            textbook_bound,
-            lacks=Rates._fields,
-        ),
         tracing(
             "waveform",
             "stable, and integrals and extremes of the rate over a turn",

@@ -3,7 +3,7 @@
 import numpy as np
 import polisher_oracles as oracles
 import pytest
-from columns import bounds, solve
+from columns import solve
 from mpmath import mp, mpf, pi
 
 from kernels.interface import Status
@@ -98,20 +98,6 @@ def test_derivatives_are_those_of_the_angles():
             beside = oracles.closed(*(x + step * (j == k) for j, x in enumerate(cell)))
             for name in ("A0", "A1"):
                 assert abs((beside[name] - exact[name]) / step - exact[f"{name}_{length}"]) < mpf(10) ** -18
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_papers_arccos_is_within_its_bound_and_loses_digits_next_to_a_dead_point(kind):
-    columns = machines(kind)
-    outputs, status = solve(POLISHER, "textbook", *columns)
-    assert (status == Status.OK).all()
-    for name, error in errors(outputs, columns).items():
-        promised = bounds(POLISHER, "textbook", *columns, asked=[name])
-        assert (error <= promised).all(), name
-        if COMPILED:  # of many machines
-            assert np.median(promised) < 300 * max(np.median(error), 1e-15), name
-    if kind == "near dead":
-        assert bounds(POLISHER, "textbook", *columns, asked=["A1"]).max() > 1e-9
 
 
 @pytest.mark.parametrize("kind", KINDS)
