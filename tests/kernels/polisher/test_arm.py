@@ -111,36 +111,6 @@ def test_distortion_and_fastest_rates_are_right_to_1e_14(kind):
             assert abs(float(mpf(float(outputs[name][j])) / true - 1)) < 1e-14, (name, cell)
 
 
-@pytest.mark.skipif(not COMPILED, reason="2048 samples a machine in plain Python")
-@pytest.mark.parametrize("kind", ["usual", "any"])
-def test_dense_sampling_finds_what_the_other_methods_say(kind):
-    columns = machines("usual") if kind == "usual" else 10 ** np.random.default_rng(3).uniform(-1, 0, (4, 300))
-    expected, verdict = solve(POLISHER, "waveform", *columns, type=1.0, rtol=1e-12)
-    outputs, status = solve(POLISHER, "sampled", *columns, type=1.0, rtol=1e-9)
-    sure = status != Status.INACCURATE
-    assert sure.mean() > 0.8
-    assert (status[sure] == verdict[sure]).all()
-    given = [name for name in outputs if name not in POLISHER.method("sampled").lacks]
-    assert set(given) > {*RATES, "A0", "A1", "eta_minus", "theta_plus", "theta_lock", "transmission_angle"}
-    for name in given:
-        np.testing.assert_allclose(outputs[name][sure], expected[name][sure], rtol=1e-9, err_msg=name)
-
-
-@pytest.mark.skipif(not COMPILED, reason="2048 samples a machine in plain Python")
-def test_dense_sampling_says_where_it_sees_too_little():
-    columns = machines("near dead", 3)
-    assert (solve(POLISHER, "sampled", *columns, rtol=1e-9)[1] == Status.INACCURATE).all()
-
-
-@pytest.mark.skipif(not COMPILED, reason="2048 samples a machine in plain Python")
-def test_dense_sampling_sees_a_dead_point_whose_effect_is_32_samples_wide():
-    b, f, e = 1.0, 0.8, 0.3
-    gap = 4 * b * e * (32 * np.pi / 2048) ** 2  # (d + f)^2 - (b + e)^2, as far as (b e theta^2) from the dead point
-    d = np.sqrt((b + e) ** 2 + gap * np.array([0.9, 1.1])) - f
-    _, status = solve(POLISHER, "sampled", b, d, f, e, rtol=1e-6)
-    assert status.tolist() == [Status.INACCURATE, Status.OK]
-
-
 def test_a_finer_tolerance_than_any_method_holds_is_inaccurate():
     for method in ("waveform", *(["sampled"] if COMPILED else [])):
         _, status = solve(POLISHER, method, *FIGURE, [15.0], rtol=1e-16)
