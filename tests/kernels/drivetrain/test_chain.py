@@ -136,7 +136,9 @@ def test_damping_is_that_of_the_poles_to_rtol_or_the_cell_says_that_it_is_not(ki
     J, k = chains(kind, n, 2 * FEW)
     h = damping * np.sqrt(J.mean() * k.mean()) * 10 ** np.random.default_rng(7).uniform(-1, 1, J.shape)
     h[::4, -1] *= n == 1
-    truths = [sorted(reduction_oracles.dampings(sorted(oracles.poles(*cell), key=abs))) for cell in zip(J, k, h, strict=True)]
+    truths = [
+        sorted(reduction_oracles.dampings(sorted(oracles.poles(*cell), key=abs))) for cell in zip(J, k, h, strict=True)
+    ]
     for rtol in (1e-9, 1e-13):
         _, found, status = solved(J, k, h, rtol)
         right = status == Status.OK
