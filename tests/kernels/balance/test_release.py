@@ -154,35 +154,6 @@ def test_a_count_that_no_digits_can_tell_is_grazing_and_has_no_stop_angle(zeta):
     assert outputs["margin"][0] == 0
 
 
-@pytest.mark.parametrize("kind", ["light", "moderate", "nearly critical", "none"])
-@pytest.mark.parametrize("rtol", [1e-13, 1e-9])
-def test_the_recursion_is_right_to_rtol_or_says_that_it_is_not(kind, rtol):
-    columns = scenes(kind, -4 if COMPILED else -2)
-    outputs, status = solve(BALANCE, "recursion", *columns, rtol=rtol)
-    assert set(status) <= {Status.OK, Status.INACCURATE, Status.GRAZING}
-    assert (status == Status.OK).mean() > 0.1
-    expected = truths(columns)
-    found = errors(outputs, expected)
-    assert (found["half_swings"][status != Status.GRAZING] == 0).all()
-    for name in NAMES:
-        assert found[name][status == Status.OK].max() <= max(rtol, 1e-15), name
-
-
-def test_the_recursion_counts_the_rounding_of_its_factor():
-    """Without solid friction nothing else is there to be rounded but the product: half of the error."""
-    n = 1000 if COMPILED else 40
-    zeta = np.random.default_rng(8).uniform(0.05, 0.9, n)
-    columns = zeta, np.ones(n), np.zeros(n), np.full(n, 1e-60), np.ones(n)
-    exact = truths(columns)
-    seen = 0.0
-    for rtol in np.geomspace(1e-15, 1e-12, 31 if COMPILED else 7):
-        outputs, status = solve(BALANCE, "recursion", *columns, rtol=rtol)
-        error = errors(outputs, exact, ["stop_angle"])["stop_angle"][status == Status.OK]
-        assert (error <= rtol).all()
-        seen = max(seen, error.max(initial=0.0) / rtol)
-    assert seen > 0.1
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_a_turning_point_exactly_at_the_stiction_is_rest(method):
     outputs, status = solve(BALANCE, method, [0.0], [2.0], [0.125], [0.25], [1.0])
@@ -190,13 +161,6 @@ def test_a_turning_point_exactly_at_the_stiction_is_rest(method):
     assert outputs["half_swings"][0] == 3
     assert outputs["stop_angle"][0] == -0.25
     assert outputs["margin"][0] == 0
-
-
-@pytest.mark.skipif(not COMPILED, reason="a hundred thousand half swings in plain Python")
-def test_the_recursion_gives_up_beyond_its_limit():
-    r = np.array([4.9e-6, 5.1e-6])
-    _, status = solve(BALANCE, "recursion", [0.0, 0.0], [1.0], r, r, [1.0], rtol=1.0)
-    assert status.tolist() == [Status.STEP_LIMIT, Status.OK]
 
 
 @pytest.mark.parametrize("method", METHODS)
