@@ -1,4 +1,4 @@
-"""The foliot's half swing integrated: every term of the losses, drag that is not smooth at rest, and what is refused."""
+"""The foliot's half swing integrated: every term of the losses, drag not smooth at rest, and what is refused."""
 
 import foliot_oracles
 import numpy as np
