@@ -153,7 +153,8 @@ def test_over_the_whole_range_of_float64_a_cell_is_right_or_refused(method):
         assert not 2.3e-308 < mpf(cell[2]) ** 2 * mpf(cell[1]) / mpf(cell[0]) < mpf("1.79e308"), cell
     for i in np.flatnonzero(status == Status.PARTLY_OUT_OF_RANGE)[-50:]:
         truth = oracles.foliot(*columns[:, i])
+        promise = max(1e-9, bounds(FOLIOT, method, *columns[:, i : i + 1], asked=NAMES[:3])[0])
         for name, true in zip(NAMES[:3], truth, strict=False):
             missing = not 2.3e-308 < true < mpf("1.79e308")
             assert np.isnan(outputs[name][i]) == missing, (name, columns[:, i])
-            assert missing or relative_error(outputs[name][i : i + 1], [true])[0] < 1e-9
+            assert missing or relative_error(outputs[name][i : i + 1], [true])[0] <= promise

@@ -119,18 +119,19 @@ def test_what_is_called_ok_is_right_to_rtol_against_50_digits(kind):
     cell = (RADIUS**3, RADIUS**4, I_v, RADIUS, RADIUS, 3.0, h, e)
     rtols = RTOLS if COMPILED else RTOLS[-2:]
     outputs, status = solve(IMPACT, "events", *([v] * rtols.size for v in cell), rtol=rtols)
-    fine = Status.PERIOD_2 if "two teeth" in kind else Status.OK
-    assert set(status) <= {fine, Status.INACCURATE}
-    assert status[-1] == fine
+    assert set(status) <= {Status.OK, Status.PERIOD_2, Status.INACCURATE}
+    assert status[-1] != Status.INACCURATE
     for name, true in oracles.outputs(*cell).items():
         for value, rtol, verdict in zip(outputs[name], rtols, status, strict=True):
             error = abs(mpf(float(value)) - true) / (abs(true) or 1)
             assert error < 1e-8, name
             assert error <= rtol or verdict == Status.INACCURATE, (name, rtol, float(error))
-    assert (outputs["offset"][-1] > 0.01 * outputs["swing"][-1]) == ("off the middle" in kind)
-    assert np.isinf(outputs["impacts"][-1]) == ("bounce" in kind)
-    for word, count in (("one", 1), ("three impacts", 3), ("five", 5)):
-        assert word not in kind or outputs["impacts"][-1] == count
+    if kind in FOLLOWED:
+        assert (status[-1] == Status.PERIOD_2) == ("two teeth" in kind)
+        assert (outputs["offset"][-1] > 0.01 * outputs["swing"][-1]) == ("off the middle" in kind)
+        assert np.isinf(outputs["impacts"][-1]) == ("bounces" in kind)
+        for words, count in (("one impact", 1), ("three impacts", 3), ("five impacts", 5)):
+            assert words not in kind or outputs["impacts"][-1] == count
 
 
 @pytest.mark.skipif(not COMPILED, reason="many clocks")
