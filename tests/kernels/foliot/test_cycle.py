@@ -64,14 +64,6 @@ def test_asymptotic_errors_stay_below_their_bounds(low, high):
         assert limit.max() < 0.2
 
 
-def test_the_bounds_of_the_series_are_not_idle():
-    columns = (np.array([1e4, 0.5]), np.ones(2), np.ones(2))
-    outputs, _ = solve(FOLIOT, "asymptotic", *columns)
-    limit = bounds(FOLIOT, "asymptotic", *columns, asked=["sensitivity"])
-    found = errors(outputs, columns, ["sensitivity"])["sensitivity"]
-    assert (found > limit / 30).all()
-
-
 @pytest.mark.parametrize("rtol", [1e-4, 1e-9, 1e-12])
 def test_the_iterated_map_is_right_to_rtol_or_says_that_it_has_not_settled(rtol):
     columns = scenes(-6, 9 if COMPILED else 2, n=SOME // 2)

@@ -246,12 +246,6 @@ def test_a_tolerance_below_rounding_is_remarked():
 
 
 @pytest.mark.skipif(not COMPILED, reason="thousands of half swings in plain Python")
-def test_white_noise_is_the_limit_of_a_short_memory():
-    found, _ = run(a=[1.0, 1.0], tau_c=[0.0, 1e-3], sigma=0.1, averaging_time=10.0)
-    assert found["rate_error_s_per_day"][0] == found["rate_error_s_per_day"][1]
-
-
-@pytest.mark.skipif(not COMPILED, reason="thousands of half swings in plain Python")
 def test_lasting_noise_of_the_friction_is_another_friction():
     """tau_c without end: each half swing has the torque 1 + sigma z or the friction 1 + sigma_a z of one z.
 

@@ -175,19 +175,6 @@ def test_above_the_switch_the_torque_has_switched_already(phi_start):
         assert np.array_equal(one, other, equal_nan=True)
 
 
-def test_just_below_the_switch_the_first_flip_is_at_hand():
-    gap = 2.0**-52
-    times, speeds, status = start([1.0], [1.0], a=[1.0], phi_start=[1 - gap], flips=1)
-    assert status[0] == Status.OK
-    with mp.workdps(40):
-        z = mpf(gap)  # a t + exp(-a t) - 1 = gap
-        t = (2 * z) ** mpf("0.5")
-        for _ in range(50):
-            t -= (t + expm1(-t) - z) / -expm1(-t)
-        assert relative_error(times[0], [t])[0] < 1e-15
-        assert relative_error(speeds[0], [-expm1(-t)])[0] < 1e-15
-
-
 @pytest.mark.parametrize(
     ("named", "status", "come"),
     [

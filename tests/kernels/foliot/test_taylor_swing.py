@@ -5,12 +5,10 @@ import pytest
 import ripple_oracles
 from columns import bounds, estimated, relative_error, solve
 
-import sweep
 from kernels.foliot.cycle import FOLIOT
 from kernels.foliot.ripple import FOLIOT_RIPPLE
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from sweep.cells.sample import solved
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="a swing takes a second in plain Python")
 NAMES = ("period", "amplitude", "crossing_speed", "sensitivity", "multiplier")
@@ -99,16 +97,6 @@ def test_what_is_not_asked_for_is_not_followed_and_the_rest_is_right_all_the_sam
         assert np.isnan(outputs["sensitivity"]).all()
         off = np.max([np.abs(outputs[name] / truths[name] - 1.0) for name in asked], axis=0)
         assert (off[good] <= rtol + EXACT).all()
-
-
-def test_auto_takes_it_where_drag_meets_a_hairspring_and_leaves_what_sticks_to_others():
-    axes = {"k": [0.5, 0.5, 3.0], "c": [0.3, 0.3, 0.3], "n": [2.0, 0.5, 2.0], "R": [0.1, 0.1, 0.9]}
-    fixed = {"mu": 1.0, "phi0": 1.0}
-    study = sweep.study(kernel="foliot", design="zip", axes=axes, fixed=fixed, rtol=1e-8)
-    cells = solved(study)
-    names = [FOLIOT.methods[number].name if number >= 0 else "" for number in cells.used]
-    assert names == ["taylor", "dopri5", ""]
-    assert cells.status.tolist() == [Status.OK, Status.OK, Status.STICKS]
 
 
 def test_what_is_stiff_steep_at_rest_or_creeps_is_not_promised_and_not_begun():
