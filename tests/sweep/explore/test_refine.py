@@ -229,9 +229,9 @@ def test_the_bits_do_not_depend_on_workers_or_on_a_file(tmp_path):
             np.testing.assert_array_equal(inside[name], stored[name])
     assert [path.name for path in tmp_path.iterdir()] == ["fine.h5"]
     assert sweep.verify(tmp_path / "fine.h5").whole
+    another = sweep.study(kernel="foliot", axes={"mu": [1.0, 1.5, 2.0]}, fixed=FIXED, outputs=["period"], title="Else")
     with pytest.raises(sweep.SweepError, match="--force"):
-        sweep.refine(foliot(mu=(1.0, 2.0, 3)), "period", 0.1, path=tmp_path / "fine.h5", study=sweep.study(
-            kernel="foliot", title="Another", axes={"mu": [1.0, 1.5, 2.0]}, fixed=FIXED, outputs=["period"]))  # fmt: skip
+        sweep.refine(sweep.run(another), "period", 0.1, path=tmp_path / "fine.h5")
 
 
 def test_a_refinement_that_was_stopped_computes_no_round_again(tmp_path):
