@@ -2,10 +2,10 @@
 
 import contextlib
 import json
-import shutil
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import h5py
 import numpy as np
@@ -186,17 +186,24 @@ def test_a_result_larger_than_the_memory_that_is_allowed_is_reduced_in_pieces(tm
     assert told[1] == "too much at once"
 
 
-def test_a_sweep_that_ends_while_it_is_read_is_opened_finished(unfinished, stored, monkeypatch):
-    real = open.check_structure
+def test_a_sweep_can_be_opened_at_any_moment_of_its_end(tmp_path):
+    path, study, states = tmp_path / "out.h5", stone(), set()
 
-    def ending(*rest):
-        monkeypatch.setattr(open, "check_structure", real)
-        unfinished_of(unfinished).unlink()
-        shutil.copy(stored, unfinished)
-        return real(*rest)
+    def compute():
+        for _ in range(5):
+            run(study, path, block_cells=5, progress=False, force=True).close()
 
-    monkeypatch.setattr(open, "check_structure", ending)
-    assert (open_result(unfinished).status != Status.PENDING).all()
+    with ThreadPoolExecutor(1) as other:
+        running = other.submit(compute)
+        while not running.done():
+            try:
+                with open_result(path) as found:
+                    states.add(bool((found.status == Status.PENDING).any()))
+            except SweepError as error:
+                states.add(str(error).partition("no such file")[1])
+    running.result()
+    assert False in states
+    assert states <= {False, True, "no such file"}
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4", "h5py"])
