@@ -1,6 +1,5 @@
 """Default pictures by what is in them: lines, marks, scales, words; and files that are the same each time."""
 
-
 import matplotlib
 import matplotlib.colors
 import numpy as np
@@ -225,7 +224,7 @@ def test_a_line_has_at_most_twenty_thousand_points_and_a_map_two_thousand_cells_
     (line,) = drawn(plot(dataset(mu=log(cells))).axes[0])
     assert line.get_xdata().size == shown
     mesh = plot(dataset(mu=log(cells // 10), a=np.arange(1.0, 10))).axes[0].collections[0]
-    assert mesh.get_array().shape == (9, {20_000: 2000, 20_001: 2000, 40_001: 2000}[cells])
+    assert mesh.get_array().shape == (9, 2000)
 
 
 @pytest.mark.parametrize(("axes", "shape"), [(2, (SIDE, SIDE)), (3, (34, 34, 34))])
@@ -350,8 +349,3 @@ def test_scales_labels_and_the_verdict():
     assert above.get_title() == "one law by 10"
     (legend,) = above.figure.legends
     assert [text.get_text() for text in legend.get_texts()][:2] == ["points", "law1, AICc +1.23, chosen"]
-
-
-def test_six_laws_are_drawn_and_the_chosen_is_among_them():
-    labels = [line.get_label() for line in plot(compared(9, "law8")).axes[0].lines[1:]]
-    assert [label.partition(",")[0] for label in labels] == ["law8", "law0", "law1", "law2", "law3", "law4"]
