@@ -1,7 +1,6 @@
 """What a plan forecasts, against the run; what it says of methods, statuses, small disks and bad kernels."""
 
 import re
-import shutil
 import time
 
 import numpy as np
@@ -78,13 +77,9 @@ def test_a_plan_prints_all_that_it_knows():
     assert "warning" not in text
 
 
-def test_a_plan_warns_of_a_disk_or_a_memory_that_is_too_small(monkeypatch):
-    needed = sweep.plan(stone(), workers=1)
-    usage = shutil.disk_usage(".")
-    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage._replace(free=needed.output_bytes - 1))
-    assert re.search(r"warning +the disk is too small", str(sweep.plan(stone(), workers=1)))
+def test_a_plan_warns_of_a_memory_that_is_too_small(monkeypatch):
     monkeypatch.setattr("sweep.explore.plan.memory", lambda: 1000)
-    assert len(sweep.plan(stone(), workers=1).warnings) == 2
+    assert "the memory is too small" in str(sweep.plan(stone(), workers=1))
 
 
 def test_a_plan_of_a_folder_that_is_not_there_is_refused(tmp_path):

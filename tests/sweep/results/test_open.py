@@ -2,21 +2,17 @@
 
 import contextlib
 import json
-import subprocess
-import sys
-import time
 from concurrent.futures import ThreadPoolExecutor
 
 import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from running import environment, interrupted, kept
+from running import interrupted
 
 import sweep
 from kernels.interface import Status
 from sweep.cells.fingerprint import fingerprint
-from sweep.cells.solve import Solver
 from sweep.cli import main
 from sweep.results import open
 from sweep.results.open import open_result
@@ -48,27 +44,8 @@ def stored(tmp_path_factory):
 @pytest.fixture
 def unfinished(tmp_path):
     """An output of 24 cells whose cells 12 to 17 are missing."""
-    path, solved, real = tmp_path / "out.h5", set(), Solver.solve
-
-    def failing(self, start, cells, *rest):
-        if (start, cells.number) == (12, 6):
-            raise SweepError("stop here")
-        real(self, start, cells, *rest)
-        solved.add((start, cells.number))
-
-    def order(forecast):
-        yield from (0, 1, 3)
-        while not {(0, 6), (6, 6), (18, 6)} <= solved:  # nothing promises that threads take their turns in order
-            time.sleep(0.01)
-        yield 2
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Solver, "solve", failing)
-        patch.setattr("sweep.system.forecast.Forecast.order", order)
-        with pytest.raises(SweepError, match="stop here"):
-            run(stone(), path, block_cells=5, workers=1, progress=False)
-    assert kept(path) == [0, 1, 3]
-    return path
+    interrupted(stone(), tmp_path / "out.h5")
+    return tmp_path / "out.h5"
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
@@ -154,36 +131,6 @@ def test_large_results_come_in_pieces_and_are_the_same(unfinished, stored, monke
         for name in expected.data_vars:
             assert found[name].dtype == expected[name].dtype
             np.testing.assert_array_equal(found[name].compute(), expected[name])
-
-
-REDUCED = """
-import resource, sys
-import dask
-from sweep.results import open as opening
-
-opening.memory = lambda: 100
-dask.config.set({"array.chunk-size": "4MiB", "num_workers": 2})
-found = opening.open_result(sys.argv[1])
-found.isel(height=slice(100)).mean().compute()
-taken = next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("VmData"))
-resource.setrlimit(resource.RLIMIT_DATA, (1024 * taken + found.nbytes // 2, -1))
-print(repr(found.max().compute().fall_time.item()))
-try:
-    found.load()
-except MemoryError:
-    print("too much at once")
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="limits the memory as Linux does")
-def test_a_result_larger_than_the_memory_that_is_allowed_is_reduced_in_pieces(tmp_path):
-    axes, output = {"height": np.arange(1.0, 2001.0), "v0": np.arange(2500.0)}, tmp_path / "out.h5"
-    run(stone(axes=axes, outputs=["fall_time"], along={}), output, progress=False).close()
-    words = [sys.executable, "-c", REDUCED, str(output)]
-    told = subprocess.run(words, env=environment(), capture_output=True, text=True, check=True).stdout.splitlines()
-    with h5py.File(output) as file:
-        assert float(told[0]) == file["fall_time"][...].max()
-    assert told[1] == "too much at once"
 
 
 def test_a_sweep_can_be_opened_at_any_moment_of_its_end(tmp_path):

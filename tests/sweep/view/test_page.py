@@ -17,20 +17,15 @@ def made(dataset, name):
     return Page(dataset, name)
 
 
-def touch(page, x, y):
-    """A click, as it comes from a browser."""
-    from bokeh.events import Tap
+def touch(page, x=None, y=None, zoom=False):
+    """A click, or the wheel that makes these the ends of the axes, as they come from a browser."""
+    from bokeh.events import RangesUpdate, Tap
 
-    page.picture.figure._trigger_event(Tap(page.picture.figure, x=x, y=y))
-
-
-def zoom(page, x, y):
-    """The wheel, as it comes from a browser."""
-    from bokeh.events import RangesUpdate
-
-    for axis, ends in zip((page.picture.figure.x_range, page.picture.figure.y_range), (x, y), strict=True):
-        axis.update(start=ends[0], end=ends[1])
-    page.picture.figure._trigger_event(RangesUpdate(page.picture.figure))
+    figure = page.picture.figure
+    if zoom:
+        figure.x_range.update(start=x[0], end=x[1])
+        figure.y_range.update(start=y[0], end=y[1])
+    figure._trigger_event(RangesUpdate(figure) if zoom else Tap(figure, x=x, y=y))
 
 
 @pytest.fixture
@@ -76,7 +71,7 @@ def test_scales_are_those_asked_for(page):
 
 
 def test_a_zoom_reads_the_region_and_a_slider_keeps_it(page):
-    zoom(page, (1.0, 2.0), (0.5, 0.6))
+    touch(page, (1.0, 2.0), (0.5, 0.6), zoom=True)
     assert page.found.values("mu").min() > 0.4
     assert page.found.y.sizes["R"] < 8  # and yet a map
     page.sliders["a"].value = 2
