@@ -116,7 +116,7 @@ def test_missing_cells_of_an_unfinished_sweep_are_nan_and_pending(unfinished, st
         np.testing.assert_array_equal(values[~pending], whole[name].values.ravel()[~pending])
     assert (found.method_used.values.ravel()[pending] == -1).all()
     assert np.isnan(found["drop"].values.reshape(24, 3)[pending]).all()
-    with pytest.raises(SweepError, match="[12] of 4 blocks"):
+    with pytest.raises(SweepError, match=r"[12] of 4 blocks"):
         open_result(unfinished, strict=True)
     open_result(stored, strict=True).close()
     xr.testing.assert_identical(found.height, whole.height.load().drop_vars("g").assign_coords(g=found.g))
