@@ -180,7 +180,7 @@ def test_any_piece_is_right_or_refused(whole, tmp_path, key, cell):
         assert found["drop"].isel(key).values.tobytes() == plain["drop"].isel(key).values.tobytes()
         key.pop("phase", None)
         numbers = plain.fall_time.copy(data=np.arange(CELLS).reshape(3, 11)).isel(key).values
-        if cell // BLOCK in numbers // BLOCK:
+        if cell // BLOCK in np.ravel(numbers) // BLOCK:
             with pytest.raises(sweep.SweepError, match="fall_time is damaged between"):
                 found.fall_time.isel(key).load()
         else:
