@@ -5,10 +5,8 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
-import signal
 import subprocess
 import sys
-import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,10 +45,6 @@ def _run(arguments: argparse.Namespace) -> Outcome:
     from sweep.system.log import log, log_path, logging_to
 
     output = _output(arguments)
-    for number in (signal.SIGUSR1, signal.SIGUSR2):
-        # they change the number of cores while blocks are computed, and mean nothing before and after
-        if threading.current_thread() is threading.main_thread() and signal.getsignal(number) is signal.SIG_DFL:
-            signal.signal(number, signal.SIG_IGN)
     check_readable(output)
     path = log_path(output) if output.parent.is_dir() else None
     with contextlib.ExitStack() as stack:

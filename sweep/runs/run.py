@@ -28,7 +28,7 @@ from sweep.study.read import KEYS, Given
 from sweep.study.read import study as as_study
 from sweep.system import disk
 from sweep.system.errors import SweepError
-from sweep.system.pool import Cores, cores, whole_number
+from sweep.system.pool import cores, whole_number
 from sweep.system.progress import TimeUp, deadline, stream_of
 
 if TYPE_CHECKING:
@@ -180,7 +180,7 @@ def store_cells(
         As `run`.
     """
     block = max(1, min(row_blocks(study).count, STORED_AT_ONCE))
-    task = Task(study, dict(mark or fingerprint(study)), _checked(path), Cores(1), force=force, block_cells=block)
+    task = Task(study, dict(mark or fingerprint(study)), _checked(path), 1, force=force, block_cells=block)
     _complete(task, Precomputed(arrays, {**(attrs or {}), **({TAKEN_OVER: taken_over} if taken_over else {})}))
     return open_result(task.output)
 
@@ -202,7 +202,7 @@ def _task(
         study,
         fingerprint(study),
         None if path is None else _checked(path),
-        Cores(cores() if workers is None else whole_number("workers", workers)),
+        cores() if workers is None else whole_number("workers", workers),
         stream_of(progress),
         block_cells=None if block_cells is None else whole_number("block_cells", block_cells),
         until=deadline(until),

@@ -89,8 +89,8 @@ class Session:
         self.schema: Schema = replace(schema, attrs={**schema.attrs, **(reused.attrs if reused else {})})
         self.tick: Callable[[], None] = lambda: None
         self.bad: list[BadCell] = []
-        self._told, self._cores = 0, task.workers
-        self.processes = Processes(study, task.limits, task.cores.count) if task.isolate else None
+        self._told = 0
+        self.processes = Processes(study, task.limits, task.workers) if task.isolate else None
         self.sample: Sample = self._sampled() if sampled else UNSAMPLED
         if self.processes is not None:
             self.processes.limits = replace(task.limits, cost=float(self.sample.costs.max()))
@@ -131,7 +131,7 @@ class Session:
             self.progress.stop()
 
     def _stopper(self) -> Stopper:
-        return Stopper(self.task.cores, (lambda: None) if self.processes is None else self.processes.end)
+        return Stopper(self.task.workers, (lambda: None) if self.processes is None else self.processes.end)
 
     def _partition(self, threads: int) -> Partition:
         rows, cells = row_blocks(self.study), self.task.block_cells
@@ -179,8 +179,8 @@ class Session:
         No more than `workers` threads are inside `solve` at a time; as many wait for the disk, or for their turn.
         Raises SweepError where `work` fails, TimeUp.
         """
-        workers = self.task.cores
-        threads = 2 * max(workers.count, cores())
+        workers = self.task.workers
+        threads = 2 * max(workers, cores())
         self.check_time()
         stopper = self._stopper()
         solvers = BufferPool(self._solver)
@@ -197,7 +197,7 @@ class Session:
                 work(job, compute)
             self.forecast.end(job)
 
-        each(self.forecast.order(), guarded, threads, self._count, stopper, lambda: 2 * workers.count)
+        each(self.forecast.order(), guarded, threads, self._count, stopper, 2 * workers)
 
     def compute_elsewhere(self, executor: Executor, receive: Callable[[int, Found], None]) -> None:
         """The same by an executor: calls `receive` with every block and its part's name, or its numbers."""
@@ -214,9 +214,6 @@ class Session:
 
     def _count(self, job: int | None) -> None:
         """Counts a block that is done. Raises TimeUp."""
-        if self.task.workers != self._cores:
-            self._cores = self.task.workers
-            self.progress.note(f"on {self._cores} core{'s' * (self._cores > 1)} from now on")
         self._tell_failed()
         if job is None:
             self.tick()

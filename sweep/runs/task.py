@@ -10,7 +10,6 @@ from typing import Any, TextIO
 
 from sweep.runs.isolate import Limits
 from sweep.study.model import Study
-from sweep.system.pool import Cores
 from sweep.system.progress import Progress
 
 WAIT, HERE, END = "wait", "here", "end"
@@ -24,7 +23,7 @@ class Task:
     study: Study
     fingerprint: Mapping[str, str]
     path: Path | None
-    cores: Cores
+    workers: int
     stream: TextIO | None = None
     force: bool = False
     block_cells: int | None = None
@@ -42,11 +41,6 @@ class Task:
         """Where a run to a file writes."""
         assert self.path is not None, "a run in memory has no output"
         return self.path
-
-    @property
-    def workers(self) -> int:
-        """Cores that compute at once, at the moment."""
-        return self.cores.count
 
     @property
     def name(self) -> str:

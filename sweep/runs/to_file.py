@@ -35,7 +35,6 @@ MOST_ATTEMPTS = 3
 def run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
     """False where the time was up before the end."""
     with opened(task.output) as store, contextlib.ExitStack() as stack:
-        stack.enter_context(task.cores.told_by_signals())
         # looked at again, for another run may have ended before this one had the lock
         if resume.is_complete(task):
             resume.tidy(store, task)
