@@ -7,7 +7,6 @@ its task are tried one by one, alone, to find the poison among them; it is repor
 
 from __future__ import annotations
 
-import math
 import secrets
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError, Future
@@ -18,10 +17,10 @@ import numpy as np
 from distributed import KilledWorker
 
 from sweep.cells.block import Blocks, Computed
-from sweep.runs.cluster import LOST_SECONDS, Absence, Cluster
+from sweep.runs.cluster import Cluster
 from sweep.runs.extend import Precomputed, Reused
 from sweep.runs.isolate import Limits, kernel_paths
-from sweep.runs.task import WAIT, Task
+from sweep.runs.task import Task
 from sweep.runs.worker import Answer, Assignment, Sent, digest
 from sweep.store.store import Shared
 from sweep.system.errors import SweepError
@@ -75,10 +74,9 @@ class Dispatch:
         self._suspects: list[int] = []
         self._poison: list[int] = []
         self._threads: int | None = None
-        self._absence = Absence(math.inf if task.without_workers == WAIT else LOST_SECONDS)
 
     def compute(self, blocks: Iterator[int], receive: Callable[[Computed | None], None]) -> None:
-        """Calls `receive` with every block that is done, and with None now and then. Raises SweepError, NoWorkers."""
+        """Calls `receive` with every block that is done, and with None now and then. Raises SweepError."""
         self._receive = receive
         with self._cluster.introduced(self._assignment), CtrlC() as ctrl_c:
             self._submit(self._batches(blocks), self._capacity, self._suspect, ctrl_c)
@@ -170,7 +168,7 @@ class Dispatch:
         threads, self._threads = self._threads, self._cluster.threads
         if threads not in (None, self._threads):
             log(f"the cluster has {self._threads} threads, {threads} before", "workers", threads=self._threads)
-        if self._absence.check(not self._threads):
+        if not self._threads and threads != 0:
             self._note("the cluster has no workers left; waiting for new ones")
 
     def _mask(self, job: int) -> bytes | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import platform
@@ -9,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,10 +34,15 @@ from sweep.cells.timing import UNSAMPLED, Sample, row_partition
 from sweep.runs.extend import Precomputed, Reused
 from sweep.runs.isolate import Processes
 from sweep.runs.task import Task
+from sweep.store.store import Shared
+from sweep.system.errors import missing
 from sweep.system.forecast import Forecast
 from sweep.system.log import log
 from sweep.system.pool import BufferPool, Stopper, cores, each
 from sweep.system.progress import Progress, TimeUp, passed
+
+if TYPE_CHECKING:
+    from sweep.runs.cluster import Cluster
 
 MOST_TOLD = 1000
 """Cells that FAILED which are told one by one."""
@@ -50,20 +56,13 @@ Solve = Callable[[int, int, Mapping[str, Any]], bool]
 """Computes the rows start .. stop into columns of that length; False where the run is being stopped."""
 
 
-class Executor(Protocol):
-    """What computes blocks elsewhere."""
-
-    def compute(self, blocks: Iterator[int], receive: Callable[[Computed | None], None]) -> None:
-        """Calls `receive` with every block that is done, and with None now and then. Raises SweepError."""
-
-
 class Session:
     """Compiles the kernel, times a sample of the grid, and cuts it.
 
     Parameters
     ----------
     task : what is asked for
-    threads : how many there are to compute, here or elsewhere
+    cluster : whose workers are to compute; None: threads here
     partition : how the rows are cut, where that is settled already
     sampled : False where nothing is left to compute
     reused : cells that need not be computed
@@ -77,7 +76,7 @@ class Session:
     def __init__(
         self,
         task: Task,
-        threads: int,
+        cluster: Cluster | None = None,
         partition: Partition | None = None,
         sampled: bool = True,
         reused: Reused | Precomputed | None = None,
@@ -94,6 +93,7 @@ class Session:
         self.sample: Sample = self._sampled() if sampled else UNSAMPLED
         if self.processes is not None:
             self.processes.limits = replace(task.limits, cost=float(self.sample.costs.max()))
+        threads = task.workers if cluster is None else cluster.threads or task.workers
         self.blocks = Blocks(study, partition or self._partition(threads))
         self.begin([])
 
@@ -199,9 +199,16 @@ class Session:
 
         each(self.forecast.order(), guarded, threads, self._count, stopper, 2 * workers)
 
-    def compute_elsewhere(self, executor: Executor, receive: Callable[[int, Found], None]) -> None:
-        """The same by an executor: calls `receive` with every block and its part's name, or its numbers."""
+    def compute_elsewhere(self, cluster: Cluster, shared: Shared | None, receive: Callable[[int, Found], None]) -> None:
+        """The same by the workers of a cluster, which write to the file `shared` where they see it.
+
+        Calls `receive` with every block and its digests, where it is written already, or its numbers.
+        """
+        from sweep.runs.dispatch import Dispatch
+
         self.check_time()
+        limits = None if self.processes is None else self.processes.limits
+        dispatch = Dispatch(cluster, self.task, self.blocks, self.forecast, self.reused, shared, limits)
 
         def take(done: Computed | None) -> None:
             if done is not None:
@@ -210,7 +217,7 @@ class Session:
                 self.forecast.end(done.block, done.seconds, done.ago)
             self._count(None if done is None else done.block)
 
-        executor.compute(self.forecast.order(), take)
+        dispatch.compute(self.forecast.order(), take)
 
     def _count(self, job: int | None) -> None:
         """Counts a block that is done. Raises TimeUp."""
@@ -261,6 +268,21 @@ class Session:
             "begin", kernel=self.study.kernel_name, cells=progress.done, of=progress.total, cores=self.task.workers,
             process=os.getpid(), machine=machine.node, versions=versions,
         )  # fmt: skip
+
+
+@contextlib.contextmanager
+def joined(task: Task) -> Iterator[Cluster | None]:
+    """The cluster of a task, once it has a worker; None where none is asked for. Raises SweepError."""
+    if task.cluster is None:
+        yield None
+        return
+    try:
+        from sweep.runs.cluster import Cluster
+    except ImportError:
+        raise missing("a cluster needs distributed", "cluster") from None
+    with Cluster(task.cluster) as cluster:
+        cluster.wait(task.note, task.until)
+        yield cluster
 
 
 def now() -> str:

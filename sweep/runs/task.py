@@ -12,9 +12,6 @@ from sweep.runs.isolate import Limits
 from sweep.study.model import Study
 from sweep.system.progress import Progress
 
-WAIT, HERE, END = "wait", "here", "end"
-"""What is done where a cluster has no workers."""
-
 
 @dataclass(frozen=True)
 class Task:
@@ -34,7 +31,6 @@ class Task:
     isolate: bool = False
     limits: Limits = field(default_factory=Limits)
     retry_failed: bool = False
-    without_workers: str = WAIT
 
     @property
     def output(self) -> Path:
