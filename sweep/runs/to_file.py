@@ -75,10 +75,6 @@ def _run_session(session: Session, store: Store, cluster: Cluster | None) -> boo
     with CtrlC():
         if store.layout is None:
             _begin(session, store, shared=cluster is not None)
-        if cluster is None:
-            left = sum(stop - start for start, stop in map(session.blocks.bounds, store.missing()))
-            store.write_back.total = left * session.blocks.row_bytes
-            session.forecast.ending = store.write_back.seconds
         try:
             _finish(session, store, cluster)
         except (KeyboardInterrupt, Terminated):
