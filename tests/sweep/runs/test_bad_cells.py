@@ -9,11 +9,9 @@ from types import SimpleNamespace
 
 import bad
 import numpy as np
-import psutil
 import pytest
-import toy_studies
 from clusters import served
-from running import environment, quiet, same, tall, wait_for
+from running import environment, quiet, tall, wait_for
 
 import sweep
 from kernels.interface import Status
@@ -98,10 +96,6 @@ def test_a_kernel_that_ends_python_or_raises_what_cannot_be_told_costs_those_cel
     assert all(word in log.getvalue() for word in ("SystemExit", "Mumbling"))
 
 
-def fork_servers(process):
-    return [child for child in psutil.Process(process.pid).children() if "forkserver" in " ".join(child.cmdline())]
-
-
 @pytest.fixture
 def run_of_deadly(tmp_path):
     """Begins a run by the command whose kernel needs new processes again and again; its process and its output."""
@@ -118,18 +112,6 @@ def run_of_deadly(tmp_path):
     for process in begun:
         process.kill()
         process.communicate()
-
-
-def test_a_fork_server_that_is_killed_is_started_anew_and_costs_no_cell(run_of_deadly):
-    process, output = run_of_deadly()
-    wait_for(unfinished_of(output).exists, process)
-    for _ in range(4):
-        for server in fork_servers(process):
-            server.kill()
-        time.sleep(1.0)
-    assert process.wait(60) == CELLS_FAILED, process.stderr.read()
-    with sweep.open_result(output) as found:
-        assert heights_of(found, Status.FAILED) == [bad.CRASHES, bad.EXITS]
 
 
 @pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="the limit of another process is set on Linux only")
@@ -157,42 +139,6 @@ def test_a_kernel_of_which_every_cell_is_bad_is_told_at_once():
         quiet(tall(50, "bad:HOPELESS"), isolate=True)
 
 
-@pytest.mark.parametrize("keys", [{}, {"isolate": True}])
-def test_a_summary_counts_bad_cells_and_reduces_the_others(keys):
-    reductions = {"outputs": {"fall_time": ["min", "mean", "argmax"]}}
-    study = toy_studies.build(kernel="bad:RAISING", axes={"height": np.arange(1.0, 41)}, summary=reductions)
-    without = np.delete(np.arange(1.0, 41), 10)
-    found = quiet(study, **keys)
-    expected = quiet(toy_studies.build(kernel="bad:RAISING", axes={"height": without}, summary=reductions))
-    assert account(found).failed == 1
-    assert account(found).ok == 39
-    assert found.fall_time_min.item() == expected.fall_time_min.item()
-    assert found.fall_time_mean.item() == pytest.approx(expected.fall_time_mean.item(), rel=1e-15)
-
-
-def test_what_failed_is_computed_again_when_asked(tmp_path, monkeypatch):
-    output, study = tmp_path / "out.h5", tall(40, "bad:RAISING")
-    quiet(study, output).close()
-    with quiet(study, output, retry_failed=True) as found:
-        assert heights_of(found, Status.FAILED) == [11.0]
-    solved = []
-    monkeypatch.setattr(bad, "misbehave", lambda height, kinds: solved.extend(height))
-    with quiet(study, output) as found:
-        assert heights_of(found, Status.FAILED) == [11.0]
-    assert solved == []
-    with quiet(study, output, retry_failed=True, block_cells=1) as found:
-        same(found, quiet(study))
-    with quiet(study, output, retry_failed=True) as found:
-        assert heights_of(found, Status.FAILED) == []
-
-
-def test_a_catalogued_kernel_gives_the_same_bits_in_a_process_of_its_own():
-    study = sweep.study(
-        kernel="foliot", axes={"mu": np.geomspace(0.1, 10.0, 65)}, fixed={"a": 1.0, "phi0": 1.0}, rtol=1e-6
-    )
-    same(quiet(study, isolate=True, block_cells=10), quiet(study))
-
-
 def test_a_kernel_that_fails_on_a_cluster_costs_a_cell_too(tmp_path):
     pytest.importorskip("distributed")
     with served(workers=2) as (address, _):
@@ -201,14 +147,6 @@ def test_a_kernel_that_fails_on_a_cluster_costs_a_cell_too(tmp_path):
             with quiet(tall(SOUND, name), tmp_path / f"{name[4:]}.h5", **keys) as found:
                 assert heights_of(found, Status.FAILED) == BAD[name]
                 assert account(found).ok == SOUND - len(BAD[name])
-
-
-def test_a_first_cell_that_never_ends_costs_no_more_than_any_other():
-    """The one in the middle of the grid is tried first."""
-    begun = time.monotonic()
-    found = quiet(tall(87, "bad:ENDLESS"), workers=1, cell_timeout=1.0)
-    assert heights_of(found, Status.FAILED) == [bad.HANGS, bad.HOGS]
-    assert time.monotonic() - begun < isolate.LOAD_SECONDS / 2
 
 
 def test_what_compiling_takes_is_not_taken_for_what_a_cell_takes():

@@ -4,7 +4,6 @@ import errno
 import io
 import os
 import random
-import signal
 import subprocess
 import sys
 import textwrap
@@ -309,6 +308,9 @@ def test_a_summary_a_zip_and_a_damaged_result_are_not_extended(tmp_path):
             flip(output, place(output, "fall_time", 1))
         with pytest.raises(SweepError, match=word):
             quiet(more, output, extend=True)
+        if word == "summary":
+            with pytest.raises(SweepError, match="summary"):
+                quiet(few, output, retry_failed=True)
 
 
 def test_extend_on_the_command_line(tmp_path, read, capsys):
@@ -388,13 +390,3 @@ def test_no_more_threads_compute_than_there_are_workers(tmp_path):
     begun = time.monotonic()
     quiet(tall(40, "bad:SLOW"), tmp_path / "out.h5", workers=2, block_cells=2).close()
     assert time.monotonic() - begun >= 40 * 0.05 / 2
-
-
-def test_ctrl_c_keeps_what_is_finished_and_says_how_to_go_on(output):
-    with slow_run(output, 2, 10) as process:
-        wait_for(lambda: len(kept(output)) >= 2, process)
-        process.send_signal(signal.SIGINT)
-        _, told = process.communicate(timeout=30)
-    assert process.returncode == -signal.SIGINT
-    assert "continue" in told
-    assert len(kept(output)) >= 2

@@ -134,14 +134,6 @@ def test_a_line_comes_every_half_minute_or_twentieth_and_a_terminal_is_redrawn_t
     assert run(stream, clock, times) == told
 
 
-def test_a_night_makes_a_readable_log(clock):
-    log = io.StringIO()
-    run(log, clock, [(k, 1) for k in range(1, 36_001)], total=36_000)
-    told = log.getvalue().splitlines()
-    assert 1200 <= len(told) <= 1203
-    assert told[-1].endswith("took 10 h 00 min")
-
-
 def test_a_terminal_has_one_line_of_which_nothing_is_left_over_and_notes_have_their_own(clock):
     screen = Terminal()
     progress = Progress(10**9, screen, "\x1b[2Jstones", clock=clock)
