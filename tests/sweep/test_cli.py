@@ -336,7 +336,7 @@ def test_a_mistake_ends_in_one_message_and_status_2(here, call, argv, message):
 
 
 @pytest.mark.parametrize(
-    "line", ["", "rum x", "list a b", "fit x.h5", "fit x.h5 --y a --x b --window 1 b", "run x --without-workers no"]
+    "line", ["", "rum x", "list a b", "fit x.h5", "fit x.h5 --y a --x b --window 1 b", "run x --workers no"]
 )
 def test_a_misused_command_shows_its_usage(line, capsys):
     with pytest.raises(SystemExit) as caught:

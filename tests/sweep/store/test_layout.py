@@ -14,7 +14,6 @@ from sweep.cells.schema import Column
 from sweep.store import frame, layout
 from sweep.store.fletcher import checksum
 from sweep.store.layout import Layout, Place, Table, gaps, mark_of, read_layout, structure_digest, write_digests
-from sweep.store.write_back import READ_BACK_SECONDS, WriteBack
 
 FAR = Place("x", "<f8", (2,), 48, ((0, 100, 60), (2, 1000, 70)))
 NEAR = Place("s", "i1", (), 0, ((0, 400, 3),))
@@ -225,13 +224,3 @@ def test_short_chunks_behind_each_other_are_written_some_at_a_time(monkeypatch):
     close = list(frame._nothing_yet(number, Place("x", "<f8", (), 32, ((0, 50, 36),)), 3))
     assert [(at, len(piece)) for at, piece in close] == [(50, 72), (122, 36)]
     assert close[1][1] == bytes(32) + frame.WRONG
-
-
-@pytest.mark.parametrize(("less", "known"), [(0, True), (1, False)])
-def test_a_sync_of_a_mebibyte_tells_the_pace_of_the_disk(less, known):
-    now = 0.0
-    found = WriteBack(3 << 20, lambda: now)
-    found.put = (1 << 20) - less
-    with found.syncing():
-        now += 1.0
-    assert found.seconds() == (READ_BACK_SECONDS, READ_BACK_SECONDS + 2.0 * known)
