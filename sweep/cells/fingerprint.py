@@ -36,8 +36,6 @@ REDUCING = ("sweep.cells.partition", "sweep.cells.reduce", "sweep.cells.output_s
 SOURCE = "source "
 MOST_SOURCES = 8
 """Source files that are named one by one where two fingerprints differ in them."""
-CHOICE = "auto"
-"""How `auto` chooses."""
 
 IMPORTERS = ("import_module", "__import__", "load")
 NAME = re.compile(r"[\w.]+")
@@ -47,7 +45,7 @@ IMPORT = re.compile(r"^[ \t]*import[ \t]+([\w., \t]+)", re.MULTILINE)
 
 def is_of_program(name: str) -> bool:
     """Whether an entry of a fingerprint tells of the program, not of the study."""
-    return name.startswith(SOURCE) or name in (*COMPILERS, CHOICE)
+    return name.startswith(SOURCE) or name in COMPILERS
 
 
 def fingerprint(study: Study) -> dict[str, str]:
@@ -57,9 +55,8 @@ def fingerprint(study: Study) -> dict[str, str]:
     -------
     dict of str to str
         "study" is one digest of all that the study says but for its words; what it says follows in short, under its
-        names in a study file. Then a digest per source file of the kernel ("source kernels.foliot.cycle"), how `auto`
-        chooses, and the versions of compiler and arrays. The processor is not in it: kernels give the same bits on
-        each.
+        names in a study file. Then a digest per source file of the kernel ("source kernels.foliot.cycle"), and the
+        versions of compiler and arrays. The processor is not in it: kernels give the same bits on each.
     """
     said = _said(study)
     whole = hashlib.sha256(json.dumps(said).encode()).hexdigest()
@@ -68,7 +65,6 @@ def fingerprint(study: Study) -> dict[str, str]:
         "study": whole,
         **said,
         **_sources(study.kernel_name, engine),
-        **({CHOICE: "cell by cell"} if study.by_cell else {}),
         **{name: version(name) for name in COMPILERS},
     }
 

@@ -1,7 +1,6 @@
 """The fingerprint changes with everything that decides a number of a result, and with nothing else."""
 
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -183,13 +182,6 @@ def test_what_chooses_methods_and_what_reduces_cells_counts_too():
         "sweep.cells.reduce",
         "sweep.cells.output_schema",
     }
-
-
-def test_how_methods_are_chosen_counts_as_the_program_not_as_the_study():
-    new, old = (fingerprint(replace(build(**BASE), by_cell=by_cell)) for by_cell in (True, False))
-    assert difference(old, new) == ["auto: new, cell by cell"]
-    assert new["study"] == old["study"]
-    assert module.is_of_program("auto")
 
 
 @pytest.mark.parametrize("name", ["solve", "turns", "grid", "partition", "reduce", "output_schema"])

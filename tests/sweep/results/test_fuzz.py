@@ -6,7 +6,6 @@ import os
 import pickle
 import random
 import time
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -25,7 +24,6 @@ from sweep.store.layout import read_layout, structure_digest
 from sweep.system.errors import StudyError, SweepError
 
 SHARED = [HealthCheck.function_scoped_fixture]
-GOLDEN = Path(__file__).parents[2] / "golden" / "format_1.h5"
 
 
 @settings(max_examples=200, deadline=2000, suppress_health_check=SHARED)
@@ -275,16 +273,6 @@ def test_no_result_or_part_is_unpickled(whole, tmp_path, monkeypatch):
         found.load()
     assert verify(whole).whole
     quiet(tall(30), tmp_path / "out.h5", block_cells=10).close()
-
-
-def test_the_golden_file_of_format_1_is_read_and_whole():
-    with sweep.open_result(GOLDEN, strict=True) as found:
-        assert found.sizes == {"v0": 2, "height": 3, "phase": 3}
-        assert found.height.values.tolist() == [-1.0, 1.0, 3.0]
-        assert found.status.values[0].tolist() == [64, 0, 0]
-        assert found.fall_time.attrs["units"] == "s"
-    assert verify(GOLDEN).whole
-    assert quietly("show", GOLDEN) == 0
 
 
 def test_the_study_that_nonsense_is_made_of_is_a_sound_one(read):

@@ -1,10 +1,5 @@
 """A finished result grows by the new cells only, and ends as one run would have made it."""
 
-import json
-import shutil
-from dataclasses import replace
-from pathlib import Path
-
 import h5py
 import numpy as np
 import pytest
@@ -15,7 +10,6 @@ from running import kept as kept_blocks
 from running import quiet, same
 
 import sweep
-from kernels.interface import Status
 from sweep.cells.solve import Solver, _Strip
 from sweep.cli import main
 from sweep.runs import extend as extending
@@ -176,108 +170,6 @@ def test_extend_on_the_command_line(tmp_path, read, capsys):
     assert main(["run", path, "-o", output, "--allow-import", "--extend"]) == 0
     assert "21 cells: 21 ok" in capsys.readouterr().out
     assert main(["verify", output]) == 0
-
-
-GOLDEN = Path(__file__).parents[2] / "golden" / "format_2.h5"
-"""Of foliot, by three methods, with cells that are refused; its version named its modules otherwise."""
-TORQUES = [1e-4, 0.1, 0.5, 1.0, 30.0]
-
-
-def kept_study(torques=TORQUES):
-    axes = {"method": ["auto", "segments", "quadrature"], "mu": torques, "R": [0.0, 1e-3, np.nan]}
-    fixed = {"phi0": {"value": 60, "unit": "degree"}, "a": 1.0}
-    return sweep.study(kernel="foliot", outputs=["period", "amplitude"], rtol=1e-9, axes=axes, fixed=fixed)
-
-
-def as_then(torques=TORQUES):
-    """The study, its methods chosen as in the version that computed the result."""
-    return replace(kept_study(torques), by_cell=False)
-
-
-@pytest.fixture
-def kept(output):
-    return Path(shutil.copy(GOLDEN, output))
-
-
-def test_a_result_of_an_earlier_version_opens_verifies_and_fits(kept, capsys):
-    with sweep.open_result(kept) as found:
-        same(found, quiet(as_then()).drop_vars("error_bound"))  # which came later
-    assert main(["verify", str(kept)]) == 0
-    assert main(["fit", str(kept), "--y", "period", "--x", "mu"]) == 0
-    assert "whole" in capsys.readouterr().out
-
-
-def test_a_result_of_an_earlier_version_is_extended_where_its_bits_are_still_the_same(kept, solved):
-    torques = [1e-5, *TORQUES[:3], 0.7, *TORQUES[3:]]
-    more = kept_study(torques)
-    with pytest.raises(SweepError, match="those of another version it keeps if a sample"):
-        quiet(more, kept)
-    with quiet(more, kept, extend=True) as found:
-        same(found, quiet(as_then(torques)))
-        assert found.attrs["taken_over"].startswith("45 cells of another version, ")
-        assert "source kernels.foliot.cycle" in json.loads(found.attrs["fingerprint"])
-    assert main(["verify", str(kept)]) == 0
-
-
-def test_a_result_of_an_earlier_version_becomes_one_of_this_version(kept):
-    with quiet(kept_study(), kept, extend=True) as found:
-        same(found, quiet(as_then()))
-    before = kept.read_bytes()
-    quiet(kept_study(), kept).close()
-    assert kept.read_bytes() == before
-
-
-def test_a_result_goes_on_with_methods_chosen_as_it_was_begun_and_is_chosen_anew_by_force(kept):
-    """Cells without Coulomb friction have a method of their own, which `auto` took only where all cells were such."""
-    more = kept_study([*TORQUES, 50.0])
-    for torques in (TORQUES, [*TORQUES, 50.0]):
-        with quiet(kept_study(torques), kept, extend=True) as found:
-            same(found, quiet(as_then(torques)))
-            assert sweep.study(found).by_cell is False
-    with quiet(kept_study([*TORQUES, 50.0]), kept, force=True) as found:
-        same(found, quiet(more))
-        assert sweep.study(found).by_cell
-        assert set(found.method_used[0, :, 0].values) == {0}
-        assert not np.array_equal(found.method_used, quiet(as_then([*TORQUES, 50.0])).method_used)
-
-
-@pytest.mark.parametrize("name", ["period", "status", "method_used", "error_bound"])
-def test_a_result_of_an_earlier_version_with_other_bits_is_refused_and_kept(kept, monkeypatch, name):
-    real = extending.Reused.fill
-
-    def other(self, start, stop, arrays):
-        real(self, start, stop, arrays)
-        arrays[name].view("u1")[:1] ^= 1
-
-    monkeypatch.setattr(extending.Reused, "fill", other)
-    before = kept.read_bytes()
-    with pytest.raises(SweepError, match=f"cannot be extended, for another version .* {name} of a cell was "):
-        quiet(kept_study(), kept, extend=True)
-    assert kept.read_bytes() == before
-    assert list(kept.parent.iterdir()) == [kept]
-
-
-def test_the_sample_has_old_cells_of_every_status_and_method(kept):
-    with extending.Reused(kept, kept_study([1e-5, *TORQUES])) as reused:
-        cells = {c.name: c.empty(54) for c in reused._columns}
-        reused.fill(0, 54, cells)
-        known = np.flatnonzero(~reused.missing(0, 54))
-        kinds = list(zip(cells["status"].tolist(), cells["method_used"].tolist(), strict=True))
-        sample = reused._sample()
-    assert set(sample) <= set(known.tolist())
-    assert {kinds[cell] for cell in sample} == {kinds[cell] for cell in known}
-    assert len(sample) <= extending.SAMPLE * len({kinds[cell] for cell in known})
-
-
-def test_a_result_without_the_error_bounds_of_its_inaccurate_cells_is_not_extended(output):
-    loose = toy_studies.build(axes={"height": HEIGHTS, "v0": [0.5]}, method="rough", rtol=1e-12)
-    quiet(loose, output).close()
-    with extending.Reused(output, loose) as reused:
-        assert (reused._numbers["status"][()] == Status.INACCURATE).any()
-        reused.check_sample()
-        reused._lacks = lambda name: name == "error_bound"
-        with pytest.raises(SweepError, match="does not say what its INACCURATE values are right to"):
-            reused.check_sample()
 
 
 @pytest.mark.parametrize("retry", [False, True])

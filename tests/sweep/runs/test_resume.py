@@ -8,10 +8,9 @@ import pytest
 from running import tall
 from toy_studies import build
 
-from sweep.cells.fingerprint import fingerprint
 from sweep.cells.output_schema import part_columns
 from sweep.runs import resume
-from sweep.runs.resume import EXTENDABLE, as_begun, is_complete, take_up, tidy
+from sweep.runs.resume import EXTENDABLE, is_complete, take_up, tidy
 from sweep.runs.run import _task
 from sweep.system.errors import SweepError
 
@@ -48,19 +47,6 @@ def stands(monkeypatch):
         return looked
 
     return put
-
-
-@pytest.mark.parametrize("stored", [False, True])
-@pytest.mark.parametrize("asked", [False, True])
-def test_methods_are_chosen_as_in_the_result_that_stands_there(output, monkeypatch, asked, stored):
-    text = replace(tall(3), by_cell=stored).to_json()
-    monkeypatch.setattr(resume, "stored_attrs", lambda path: {"study_json": text})
-    task = _task(replace(tall(10), by_cell=asked), output)
-    found = as_begun(task)
-    assert found.study == replace(task.study, by_cell=stored)
-    assert found.fingerprint == fingerprint(found.study)
-    for untouched in (replace(task, force=True), replace(task, path=output.with_name("none.h5"))):
-        assert as_begun(untouched) is untouched
 
 
 def test_where_nothing_stands_nothing_is_complete(tmp_path):
@@ -204,21 +190,6 @@ def test_what_is_damaged_beside_its_numbers_is_given_up_only_when_forced(output)
         take_up(store, task_of(output))
     take_up(store, task_of(output, force=True))
     assert store.done == ["discard"]
-
-
-def test_what_an_earlier_version_left_in_a_folder_is_told(output):
-    task = task_of(output)
-    parts = output.with_name("out.h5.parts")
-    parts.write_text("a file is none")
-    take_up(Kept(), task)
-    assert task.notes == []
-    parts.unlink()
-    parts.mkdir()
-    take_up(Kept(), task)
-    assert task.notes == [
-        f"{parts} holds blocks that an earlier version kept; this one cannot continue them and starts anew; remove "
-        "the folder, or finish with the earlier version"
-    ]
 
 
 @pytest.mark.parametrize(("layout", "done"), [(left(), ["discard"]), (left(OTHER), []), (None, [])])
