@@ -5,31 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from stand_ins import solved, stand_in, toy_study, with_kernel
 from toy import KERNEL
 
 import sweep
 from kernels.interface import FIRST_REFUSAL, Status
-from sweep.cells.block import warm
-from sweep.cells.grid import Cells
 from sweep.cells.solve import NONE, STRIP, UNKNOWN, Solver, among
 from sweep.results.statuses import account
-
-NAMES = [m.name for m in KERNEL.methods]
-
-
-def test_a_cell_that_no_method_promises_is_refused():
-    def never(height, v0, g, rtol, phase, asked, out):
-        out[...] = np.inf
-
-    kernel = stand_in(rough=(KERNEL.methods[0].solve, never), exact=(KERNEL.methods[1].solve, never))
-    outputs, status, used = solved(with_kernel(toy_study(axes={"height": [1.0, 2.0]}), kernel))
-    assert (status == Status.NO_METHOD).all()
-    assert (used == NONE).all()
-    assert np.isnan(outputs["impact_speed"]).all()
-
 
 FOLIOT = sweep.study(
     kernel="foliot",
@@ -42,16 +24,6 @@ FOLIOT = sweep.study(
 @pytest.fixture(scope="module")
 def whole():
     return solved(FOLIOT)
-
-
-@given(st.integers(0, 372), st.integers(0, 372))
-def test_any_range_of_cells_gives_the_same_bits(whole, one, other):
-    start, stop = sorted((one, other))
-    outputs, status, used = solved(FOLIOT, start, stop)
-    for name, column in outputs.items():
-        assert np.array_equal(column, whole[0][name][start:stop], equal_nan=True)
-    assert np.array_equal(status, whole[1][start:stop])
-    assert np.array_equal(used, whole[2][start:stop])
 
 
 def test_auto_takes_the_closed_form_of_the_foliot_outright(whole):
@@ -70,38 +42,6 @@ def test_strips_join_without_a_seam():
     assert (status < FIRST_REFUSAL).all()
     assert np.array_equal(outputs["period"][STRIP - 50 : STRIP + 50], seam["period"])
     assert np.all(np.diff(outputs["period"]) < 0)
-
-
-@pytest.mark.parametrize("strip", [1, 7, 8, 20, 21, 22])
-def test_strips_of_any_length_give_the_same_cells(monkeypatch, strip):
-    monkeypatch.setattr("sweep.cells.solve.STRIP", strip)
-    heights = np.arange(1.0, 22.0)
-    outputs, status, used = solved(toy_study(axes={"height": heights}), 1, 21)
-    assert outputs["impact_speed"].tolist() == np.sqrt(2 * 9.80665 * heights[1:]).tolist()
-    assert (status == Status.OK).all()
-    assert (used == 0).all()
-
-
-def test_warming_up_reaches_both_ends_of_the_grid():
-    seen = []
-
-    def watched(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
-        seen.extend(height.tolist())
-        status[...] = Status.OK
-
-    study = toy_study(axes={"height": np.arange(1.0, 101.0)})
-    watched_study = with_kernel(study, stand_in(rough=(watched, None)))
-    warm(Solver(watched_study), watched_study)
-    assert seen == [50.0, 1.0, 100.0]
-
-
-def test_warming_up_changes_nothing(whole):
-    solver = Solver(FOLIOT)
-    warm(solver, FOLIOT)
-    outputs = {name: np.empty(372) for name in FOLIOT.outputs}
-    status, used = np.empty(372, np.int8), np.empty(372, np.int8)
-    solver.solve(0, Cells(outputs, status, used))
-    assert np.array_equal(outputs["period"], whole[0]["period"], equal_nan=True)
 
 
 def test_traces_are_solved_a_few_cells_at_a_time():
@@ -131,20 +71,6 @@ def test_a_kernel_that_no_result_could_hold_is_refused_at_once(monkeypatch, chan
         toy_study(axes={"height": [1.0]})
 
 
-def said_in_turn(*statuses):
-    """What `auto` says of one cell whose methods, cheapest first, say these."""
-
-    def method(number, says):
-        def solve(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
-            fall_time[...], impact_speed[...], drop[...], status[...] = number, number, number, says
-
-        return replace(KERNEL.methods[1], name=f"method_{number}", solve=solve)
-
-    kernel = replace(KERNEL, methods=tuple(method(number, says) for number, says in enumerate(statuses)))
-    outputs, status, used = solved(with_kernel(toy_study(axes={"height": [1.0]}), kernel))
-    return status[0], used[0], outputs["impact_speed"][0]
-
-
 def test_auto_does_not_deny_what_an_impact_clock_does_where_following_it_leaves_that_open():
     random = np.random.default_rng(11)
     near = 1 + 10.0 ** random.uniform(-12, -3, 60) * random.choice([-1, 1], 60)
@@ -160,9 +86,6 @@ def test_auto_does_not_deny_what_an_impact_clock_does_where_following_it_leaves_
     assert open_.sum() > 20
     assert (status == followed).all()
     assert (used == np.where(open_, NONE, 1)).all()
-
-
-MISSING = [math.nan, math.inf, -math.inf]
 
 
 def without_a_number(number, verdict=Status.OK):
