@@ -161,20 +161,38 @@ def test_a_fixed_array_counts_whole():
     assert one["study"] != two["study"]
 
 
-@pytest.mark.parametrize("factor", ["1.0", "1.0 + 1e-15"])
-def test_cells_of_another_version_are_taken_over_where_a_sample_has_the_same_bits(tmp_path, monkeypatch, factor):
-    """Another version is other source text of the kernel, whose numbers are the same or are not."""
-    source = tmp_path / f"edited_{len(factor)}.py"
-    text = "import toy\nfrom dataclasses import replace\n\n\ndef check(height, v0, g, status):\n"
-    text += "    toy.KERNEL.check(height, v0, g, status)\n\n\nFACTOR = {}\nKERNEL = replace(toy.KERNEL, check=check)\n"
-    source.write_text(text.format("1.0"))
+EDITED = """
+from dataclasses import replace
+import toy
+
+FACTOR = 1.0
+EXACT = toy.KERNEL.method("exact")
+
+def solve(*columns):
+    EXACT.solve(*columns)
+    columns[-4][...] *= FACTOR
+
+KERNEL = replace(toy.KERNEL, methods=(replace(EXACT, solve=solve, bound=None),))
+"""
+
+
+def test_cells_of_another_version_are_taken_over_where_a_sample_of_them_has_the_same_bits(tmp_path, monkeypatch):
+    """Another version has another source text; whether its numbers are the same, a sample of cells tells."""
+    (tmp_path / "edited_scene.py").write_text(EDITED)
     monkeypatch.syspath_prepend(tmp_path)
-    output, keys = tmp_path / "out.h5", {"kernel": f"{source.stem}:KERNEL", "allow_import": True}
-    sweep.run(output_of(keys, [1.0, 2.0]), output, progress=False).close()
-    source.write_text(text.format(factor) + "# edited\n")
-    with sweep.run(output_of(keys, [1.0, 1.5, 2.0]), output, progress=False, extend=True) as found:
+    output = tmp_path / "out.h5"
+
+    def run(heights, **options):
+        study = build(kernel="edited_scene:KERNEL", axes={"height": heights})
+        return sweep.run(study, output, progress=False, **options)
+
+    run([1.0, 2.0]).close()
+    (tmp_path / "edited_scene.py").write_text(EDITED + "# edited\n")
+    with run([1.0, 1.5, 2.0], extend=True) as found:
         assert found.attrs["taken_over"].startswith("2 cells of another version")
-
-
-def output_of(keys, heights):
-    return sweep.study(**keys, axes={"height": heights}, outputs=["fall_time"])
+    (tmp_path / "edited_scene.py").write_text(EDITED + "# edited again\n")
+    monkeypatch.setattr(sys.modules["edited_scene"], "FACTOR", 1.0 + 1e-15)
+    before = output.read_bytes()
+    with pytest.raises(sweep.SweepError, match="cannot be extended"):
+        run([1.0, 1.5, 2.0, 3.0], extend=True)
+    assert output.read_bytes() == before
