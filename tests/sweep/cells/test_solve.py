@@ -10,7 +10,7 @@ from toy import KERNEL
 
 import sweep
 from kernels.interface import FIRST_REFUSAL, Status
-from sweep.cells.solve import NONE, STRIP, UNKNOWN, Solver, among
+from sweep.cells.solve import NONE, STRIP, UNKNOWN, among
 from sweep.results.statuses import account
 
 FOLIOT = sweep.study(
@@ -49,11 +49,8 @@ def test_traces_are_solved_a_few_cells_at_a_time():
     study = toy_study(
         axes={"height": np.linspace(1, 2, 50)}, outputs=["drop", "fall_time"], along={"phase": phase}, method="exact"
     )
-    assert Solver(study)._strip == 20
     outputs, _, _ = solved(study, 0, 45)
     assert outputs["drop"][44, -1] == pytest.approx(1 + 44 / 49, rel=1e-15)
-    only = Solver(toy_study(axes={"height": [1.0, 2.0]}, outputs=["fall_time"]))
-    assert only._strip == 2
 
 
 @pytest.mark.parametrize(
