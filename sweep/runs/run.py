@@ -77,7 +77,7 @@ def run(
     extend : bool
         Where the output is complete for a study of which this one has all values on every axis, and more, compute the
         new cells only; the output is replaced when all are there. One of an earlier version of foliot is taken over
-        if a sample of its cells, computed again, has the same bits; `auto` chooses then as that version did.
+        if a sample of its cells, computed again, has the same bits.
     until : str or datetime, optional
         Stop within a block's time of "07:00" or "2027-01-31 07:00"; what there is by then is returned.
     cluster : str or distributed.Client, optional
@@ -225,7 +225,6 @@ def _checked(path: str | os.PathLike[str]) -> Path:
 
 def _complete(task: Task, precomputed: Precomputed | None = None) -> bool:
     """False where the time was up before the end."""
-    task = task if precomputed else resume.as_begun(task)
     left = unfinished_of(task.output).exists() or lock_of(task.output).exists()
     return (resume.is_complete(task) and not left) or run_to_file(task, precomputed)
 

@@ -117,7 +117,7 @@ class Store:
         with disk.refusing(self.path):
             fd = disk.open_file(self.path, os.O_RDONLY)
         try:
-            layout = read_layout(fd, os.fstat(fd).st_size)
+            layout = read_layout(fd, os.fstat(fd).st_size, self.path)
             if layout is not None and unbroken(fd):
                 return layout
         except (OSError, EOFError):
