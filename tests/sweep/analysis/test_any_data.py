@@ -124,3 +124,43 @@ def test_curves_of_any_data_collapse_or_are_refused():
         curves = xr.DataArray(y, {"size": size, "speed": np.exp(t)}, ("size", "speed"), name="torque")
         fitted = found(lambda y: sweep.fit_collapse(y, "speed", "size", bootstrap=4), curves)
         assert fitted is None or fitted.x_exponent_low <= fitted.x_exponent <= fitted.x_exponent_high, seed
+
+
+# what is no output, no result and no study
+
+X = np.geomspace(1, 100, 12)
+LINE = xr.DataArray(X**-0.5, {"x": X}, "x", name="y")
+OF_AN_OUTPUT = (
+    lambda y: sweep.fit_exponent(y, "x"), lambda y: sweep.fit_two_laws(y, "x"), lambda y: sweep.fit_correction(y, "x"),
+    lambda y: sweep.fit_exponent(y, "x", towards="high"), lambda y: sweep.compare_laws(y, "x"),
+    lambda y: sweep.local_exponent(y, "x", error=True), lambda y: sweep.where_exponent(y, "x", -0.5),
+    lambda y: sweep.where_exponent(y, "x", 1.0, values=True), lambda y: sweep.exponent_map(y, "x"),
+    lambda y: sweep.fit_collapse(y, "x", "L"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "given", [3, None, "period", X, LINE.to_dataset(), [1.0], LINE.astype(str), LINE.astype(complex)]
+)
+def test_what_is_no_output_no_dataset_or_no_study_is_refused(given):
+    for fit in OF_AN_OUTPUT:
+        with pytest.raises(sweep.SweepError, match="expected one output|expected real numbers"):
+            fit(given)
+    if not isinstance(given, xr.Dataset):
+        for use in (lambda ds: sweep.interpolated(ds, {"x": [1.0]}), lambda ds: sweep.refine(ds, "y", 0.1)):
+            with pytest.raises(sweep.SweepError, match="expected a Dataset"):
+                use(given)
+    with pytest.raises(sweep.SweepError, match="study|no such file"):
+        sweep.scaling(given)
+
+
+def test_a_bound_of_a_result_without_the_output_is_refused():
+    with pytest.raises(sweep.SweepError, match="this Dataset has no "):
+        sweep.fit_exponent(LINE, "x", bound=LINE.rename("other").to_dataset())
+
+
+@pytest.mark.parametrize("sigma", [0.0, 1e-20, 1e9, LINE * 0])
+def test_standard_errors_of_nothing_or_beyond_all_sense_are_refused(sigma):
+    for fit in (sweep.fit_exponent, sweep.compare_laws):
+        with pytest.raises(sweep.SweepError, match="sigma: expected standard errors"):
+            fit(LINE, "x", sigma=sigma)
