@@ -144,13 +144,13 @@ OF_AN_OUTPUT = (
 )
 def test_what_is_no_output_no_dataset_or_no_study_is_refused(given):
     for fit in OF_AN_OUTPUT:
-        with pytest.raises(sweep.SweepError, match="expected one output|expected real numbers"):
+        with pytest.raises(sweep.SweepError, match=r"expected one output|expected real numbers"):
             fit(given)
     if not isinstance(given, xr.Dataset):
         for use in (lambda ds: sweep.interpolated(ds, {"x": [1.0]}), lambda ds: sweep.refine(ds, "y", 0.1)):
             with pytest.raises(sweep.SweepError, match="expected a Dataset"):
                 use(given)
-    with pytest.raises(sweep.SweepError, match="study|no such file"):
+    with pytest.raises(sweep.SweepError, match=r"study|no such file"):
         sweep.scaling(given)
 
 

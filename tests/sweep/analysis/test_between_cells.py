@@ -1,4 +1,4 @@
-"""What lies between cells: borders on maps, values inside a box of scattered cells and on its lines, and their errors."""
+"""What lies between cells: borders on maps, values inside a box of scattered cells, lines in it, and their errors."""
 
 import itertools
 
@@ -59,7 +59,14 @@ def test_no_line_crosses_what_has_no_value():
 
 @pytest.mark.parametrize(
     ("level", "text"),
-    [(-1 / 3, "-1/3"), (0.5 + 0.9e-9, "1/2"), (0.5 + 1.1e-9, "0.5"), (-1.0, "-1"), (0.27318, "0.273"), (5 / 13, "0.385")],
+    [
+        (-1 / 3, "-1/3"),
+        (0.5 + 0.9e-9, "1/2"),
+        (0.5 + 1.1e-9, "0.5"),
+        (-1.0, "-1"),
+        (0.27318, "0.273"),
+        (5 / 13, "0.385"),
+    ],
 )
 def test_levels_are_written_as_people_do(level, text):
     assert fraction(level) == text
@@ -274,7 +281,7 @@ def test_a_direction_that_matters_nothing_shrinks_and_what_is_straight_or_missin
     corners = points[simplices(points @ found)]
     along, level = np.ptp(corners.sum(axis=2), axis=1), np.ptp(corners[:, :, 0] - corners[:, :, 1], axis=1)
     assert along.mean() < 0.3 * level.mean()
-    for heights in (np.zeros(50), points @ [1.0, 2.0], np.full(50, np.nan)):
-        np.testing.assert_array_equal(stretch(points, heights), np.eye(2))
+    for straight in (np.zeros(50), points @ [1.0, 2.0], np.full(50, np.nan)):
+        np.testing.assert_array_equal(stretch(points, straight), np.eye(2))
     np.testing.assert_array_equal(stretch(points[:5], points[:5, 0] ** 2), np.eye(2))
     np.testing.assert_array_equal(stretch(points[:, :1], points[:, 0] ** 2), np.eye(1))

@@ -98,7 +98,11 @@ def test_a_coordinate_along_the_cells_of_a_zip_design_and_an_array_in_pieces_wil
 )
 def test_an_axis_that_has_no_logarithms_is_refused_with_the_reason(x, dim, message):
     y = curve(x, np.arange(1.0, len(x) + 1))
-    for fit in (sweep.local_exponent, sweep.fit_exponent, lambda y, dim: sweep.where_exponent(y, dim, 1.5, values=True)):
+    for fit in (
+        sweep.local_exponent,
+        sweep.fit_exponent,
+        lambda y, dim: sweep.where_exponent(y, dim, 1.5, values=True),
+    ):
         with pytest.raises(sweep.SweepError, match=message.replace("?", r"\?")):
             fit(y, dim)
 

@@ -154,7 +154,9 @@ def test_each_kind_of_scatter_that_is_asked_for_has_its_interval():
     found = sweep.fit_exponent(curve(z), "x", noise="correlated", confidence=0.9)
     error, below = by_correlation(columns, z)
     assert float(found.exponent_error) == pytest.approx(error, rel=1e-6)
-    assert (below(float(found.exponent_low)), below(float(found.exponent_high))) == pytest.approx((0.05, 0.95), abs=1e-6)
+    assert (below(float(found.exponent_low)), below(float(found.exponent_high))) == pytest.approx(
+        (0.05, 0.95), abs=1e-6
+    )
 
 
 def test_the_kind_of_scatter_is_found_and_its_interval_is_no_less_than_that_of_correlated_noise():
@@ -284,7 +286,7 @@ def test_a_plateau_is_found_where_there_is_one_and_denied_where_the_exponent_goe
     assert goes_on.attrs["plateau"] == 0
     assert "no plateau" in goes_on.attrs["verdict"]
     for y in (curve(np.zeros((2, N))), curve(T)[:5]):
-        with pytest.raises(sweep.SweepError, match="one line|at least 8 points"):
+        with pytest.raises(sweep.SweepError, match=r"one line|at least 8 points"):
             sweep.fit_exponent(y, "x", towards="high")
 
 
@@ -321,9 +323,12 @@ def test_without_noise_the_error_is_how_far_the_place_moves_with_the_limits_of_t
     ]
     place = meeting(*inner)
     moved = [abs(meeting(a, b) - place) for a in (inner[0], outer[0]) for b in (inner[1], outer[1])]
-    noise = sum(
-        float(f.level_error) ** 2 + ((place - np.log(float(f.centre))) * float(f.exponent_error)) ** 2 for f in fits
-    ) / (inner[1][0] - inner[0][0]) ** 2
+    noise = (
+        sum(
+            float(f.level_error) ** 2 + ((place - np.log(float(f.centre))) * float(f.exponent_error)) ** 2 for f in fits
+        )
+        / (inner[1][0] - inner[0][0]) ** 2
+    )
     met = sweep.fit_two_laws(y, "x", windows=windows)
     assert np.log(float(met.crossover)) == pytest.approx(place)
     assert float(met.crossover_error / met.crossover) == pytest.approx(np.hypot(max(moved), noise**0.5))
