@@ -1,17 +1,17 @@
-"""What decides the numbers of a result: the study, the sources of its kernel, and the compiler."""
+"""What decides the numbers of a result: the study, the sources of its kernel and of this engine, and the compiler."""
 
 from __future__ import annotations
 
-import ast
+import contextlib
 import hashlib
 import importlib.util
 import json
-import re
+import os
 import sys
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import cache, lru_cache
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from importlib import metadata
+from modulefinder import ModuleFinder
 from pathlib import Path
 from typing import Any
 
@@ -21,28 +21,12 @@ from kernels import catalogue
 from sweep.study.model import Study, Summary, short
 
 COMPILERS = ("numba", "llvmlite", "numpy")
-OURS = ("kernels",)
-"""Packages whose modules count even where a kernel of another package imports them."""
-
-ENGINE = ("sweep.cells.solve", "sweep.cells.turns", "sweep.cells.grid")
-"""Modules of the engine that decide values: the method of each cell, and its parameters."""
-
-ASKING = ("sweep.study.condition",)
-"""Those that decide which cells are asked for, where the study has a condition."""
-
-REDUCING = ("sweep.cells.partition", "sweep.cells.reduce", "sweep.cells.output_schema")
-"""Those that decide the values of a summary."""
-
+OURS = ("kernels", "sweep.cells", "sweep.study")
+"""Packages of which every source counts: the kernels, and what chooses methods, makes cells and reduces them."""
+INSTALLED = frozenset(("site-packages", "dist-packages"))
 SOURCE = "source "
-MOST_SOURCES = 8
-"""Source files that are named one by one where two fingerprints differ in them."""
 CHOICE = "auto"
 """How `auto` chooses."""
-
-IMPORTERS = ("import_module", "__import__", "load")
-NAME = re.compile(r"[\w.]+")
-IMPORT_FROM = re.compile(r"^[ \t]*from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n(]*)", re.MULTILINE)
-IMPORT = re.compile(r"^[ \t]*import[ \t]+([\w., \t]+)", re.MULTILINE)
 
 
 def is_of_program(name: str) -> bool:
@@ -57,50 +41,37 @@ def fingerprint(study: Study) -> dict[str, str]:
     -------
     dict of str to str
         "study" is one digest of all that the study says but for its words; what it says follows in short, under its
-        names in a study file. Then a digest per source file of the kernel ("source kernels.foliot.cycle"), how `auto`
-        chooses, and the versions of compiler and arrays. The processor is not in it: kernels give the same bits on
-        each.
+        names in a study file. Then a digest of the sources of each package ("source kernels"), how `auto` chooses, and
+        the versions of compiler and arrays. The processor is not in it: kernels give the same bits on each.
     """
     said = _said(study)
     whole = hashlib.sha256(json.dumps(said).encode()).hexdigest()
-    engine = (*ENGINE, *(REDUCING if study.summary else ()), *(ASKING if study.where else ()))
     return {
         "study": whole,
         **said,
-        **_sources(study.kernel_name, engine),
+        **{SOURCE + name: _of_package(name) for name in OURS},
+        **_own_sources(study.kernel_name),
         **({CHOICE: "cell by cell"} if study.by_cell else {}),
         **{name: version(name) for name in COMPILERS},
     }
 
 
 def difference(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
-    """What two fingerprints differ in, a line each: 'axes.mu: was 401 values ..., now 101 values ...'.
-
-    Of more than `MOST_SOURCES` source files there is one line, 'source of 78 modules: 57 new, 2 changed, 19 gone'.
-    """
+    """What two fingerprints differ in, a line each: 'axes.mu: was 401 values ..., now 101 values ...'."""
     names = [*new, *(name for name in old if name not in new)]
     changed = [name for name in names if old.get(name) != new.get(name)]
     # the digest of the whole study tells nothing where its parts do
     changed = [name for name in changed if name != "study"] or changed
-    sources = [name for name in changed if name.startswith(SOURCE)]
-    together = sources if len(sources) > MOST_SOURCES else []
-    lines = [_change(name, old.get(name), new.get(name)) for name in changed if name not in together]
-    return lines + ([_together(sources, old, new)] if together else [])
-
-
-def _together(sources: Sequence[str], old: Mapping[str, str], new: Mapping[str, str]) -> str:
-    """One line of many source files."""
-    words = Counter("new" if name not in old else "changed" if name in new else "gone" for name in sources)
-    parts = [f"{words[word]} {word}" for word in ("new", "changed", "gone") if words[word]]
-    return f"{SOURCE}of {len(sources)} modules: {', '.join(parts)}"
+    return [_change(name, old.get(name), new.get(name)) for name in changed]
 
 
 def _change(name: str, old: str | None, new: str | None) -> str:
+    digest = name.startswith(SOURCE) or name == "study"  # it tells a reader nothing
     if old is None:
-        return f"{name}: new" if name.startswith(SOURCE) else f"{name}: new, {new}"
+        return f"{name}: new" if digest else f"{name}: new, {new}"
     if new is None:
-        return f"{name}: gone" if name.startswith(SOURCE) else f"{name}: gone, was {old}"
-    return f"{name}: changed" if name.startswith(SOURCE) or name == "study" else f"{name}: was {old}, now {new}"
+        return f"{name}: gone" if digest else f"{name}: gone, was {old}"
+    return f"{name}: changed" if digest else f"{name}: was {old}, now {new}"
 
 
 def _said(study: Study) -> dict[str, str]:
@@ -136,108 +107,70 @@ def _values(values: Any) -> str:
     return f"{len(values)} value{'s' * (len(values) > 1)}, {ends} (digest {digest})"
 
 
-def _sources(kernel_name: str, engine: Sequence[str]) -> dict[str, str]:
-    """A digest of every source file that takes part in solving a cell."""
-    entry = catalogue.KERNELS.get(kernel_name, kernel_name).partition(":")[0]
-    packages = {entry.partition(".")[0], *OURS}
-    found: dict[str, str] = {}
-    waiting, seen = [entry], set[str]()
-    while waiting:
-        name = waiting.pop()
-        path = None if name in seen else _path(name)
-        seen.add(name)
-        if path is None:
-            continue
-        found[name], imported = _read(path, name, path.stat().st_mtime_ns)
-        own = {package for package in imported if package in packages or _is_own(package)}
-        waiting += [n for package in own for n in imported[package] if n not in seen]
-    for name in engine:
-        path = _path(name)
-        if path is not None:
-            found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
-    return {SOURCE + name: found[name] for name in sorted(found)}
+def _own_sources(kernel_name: str) -> dict[str, str]:
+    """A digest of each package or module of a user's own that a kernel's module imports, and of that module's own."""
+    if kernel_name in catalogue.KERNELS:
+        return {}
+    module = kernel_name.partition(":")[0]
+    known = _known.get((module, *sys.path))
+    if known is None or known[0] != _stamps(known[0]):
+        found = {name: files for name in _own_modules(module) if (files := _files(name))}
+        digests = {SOURCE + name: _digest(files) for name, files in found.items()}
+        known = _known[module, *sys.path] = _stamps(path for files in found.values() for path in files), digests
+    return known[1]
 
 
-@lru_cache(maxsize=1000)
-def _is_own(package: str) -> bool:
-    """Whether a package is source of somebody's own: neither Python's nor installed from a distribution."""
-    if package in sys.stdlib_module_names or package == "sweep":
-        return False
-    path = _path(package)
-    return path is not None and not {"site-packages", "dist-packages"}.intersection(path.parts)
+_known: dict[tuple[str, ...], tuple[dict[Path, int], dict[str, str]]] = {}
+"""By module and places to look for others: times at which the files were changed, and digests."""
 
 
-@lru_cache(maxsize=1000)
-def _read(path: Path, name: str, modified: int) -> tuple[str, dict[str, list[str]]]:
-    """Digest of a source file, and what it imports by package; kept while the file's time of modification stays."""
-    text, found = path.read_bytes(), dict[str, list[str]]()
-    names = [name, *(_imported(text, name, path) if path.suffix == ".py" else ())]
-    # with a.b.c Python also runs a and a.b
-    for module in dict.fromkeys(n.rsplit(".", k)[0] for n in names for k in range(n.count(".") + 1)):
-        found.setdefault(module.partition(".")[0], []).append(module)
-    return hashlib.sha256(text).hexdigest(), found
+def _stamps(files: Iterable[Path]) -> dict[Path, int]:
+    """When files were changed."""
+    return {path: path.stat().st_mtime_ns for path in files if path.exists()}
 
 
-def _path(name: str) -> Path | None:
-    """File of a module, which is not imported; None of what has no file, or is no module."""
-    path = _found(name, tuple(sys.path))
-    return path if path is not None and path.is_file() else None
+def _own_modules(module: str) -> list[str]:
+    """Top-level names of a module and of what it imports of a user's own, directly or not; none of it is run."""
+    finder = ModuleFinder([*_own_places()], excludes=["kernels", "sweep"])
+    with contextlib.suppress(ImportError):  # where it is installed, or typed at the prompt
+        finder.import_hook(module)
+    return sorted({name.partition(".")[0] for name in (module, *finder.modules)} - {"kernels", "sweep"})
 
 
-@lru_cache(maxsize=4000)
-def _found(name: str, places: tuple[str, ...]) -> Path | None:
-    """The same, looked for once while `sys.path` is as it was."""
+def _own_places() -> Iterator[str]:
+    """Places of modules that are neither Python's nor installed from a distribution."""
+    python = Path(os.__file__).parent
+    for place in sys.path:
+        path = Path(place).resolve()
+        if path.is_dir() and not INSTALLED.intersection(path.parts) and not {path, *path.parents} & {python}:
+            yield place
+
+
+@cache
+def _of_package(name: str) -> str:
+    """Digest of the sources of one of our packages, as this process began with them."""
+    return _digest(_files(name))
+
+
+def _files(name: str) -> list[Path]:
+    """All source files of a package, or the file of a module; none of what has no file."""
     try:
         spec = importlib.util.find_spec(name)
-    except (ImportError, ValueError, AttributeError):
-        file = getattr(sys.modules.get(name), "__file__", None)
-        return Path(file) if file else None
-    return Path(spec.origin) if spec is not None and spec.origin else None
+    except (ImportError, ValueError):
+        return []
+    if spec is None or spec.origin in ("built-in", "frozen"):
+        return []
+    if spec.submodule_search_locations is not None:
+        return sorted(path for place in spec.submodule_search_locations for path in Path(place).rglob("*.py"))
+    return [Path(spec.origin)] if spec.origin else []
 
 
-def _imported(text: bytes, name: str, path: Path) -> Iterator[str]:
-    """Names of modules that a source may import: in statements, in calls, or in a text that modules are written from.
-
-    A call whose argument is no text in the source tells nothing here.
-    """
-    package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            yield from _members(_absolute(package, node.level, node.module), [alias.name for alias in node.names])
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            yield from _written(node.value)
-        elif isinstance(node, ast.Call):
-            yield from _called(node, package)
-
-
-def _members(base: str, names: Iterable[str]) -> Iterator[str]:
-    """Of `from a import b` both a and a.b, as b may be a module."""
-    yield base
-    yield from (f"{base}.{name}" for name in names)
-
-
-def _absolute(package: Sequence[str], level: int, module: str | None) -> str:
-    above = package[: len(package) - level + 1] if level else []
-    return ".".join([*above, *filter(None, [module])])
-
-
-def _written(text: str) -> Iterator[str]:
-    """What the lines of a text import; names in braces are filled in later and are not followed."""
-    for base, names in IMPORT_FROM.findall(text):
-        yield from _members(base, NAME.findall(names))
-    for names in IMPORT.findall(text):
-        yield from NAME.findall(names)
-
-
-def _called(node: ast.Call, package: Sequence[str]) -> Iterator[str]:
-    """The module of `import_module("a.b")` and its like."""
-    function = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-    if function in IMPORTERS and node.args and isinstance(node.args[0], ast.Constant):
-        name = str(node.args[0].value).partition(":")[0]
-        module = name.lstrip(".")
-        yield _absolute(package, len(name) - len(module), module)
+def _digest(files: Iterable[Path]) -> str:
+    """Of sources, in their order."""
+    whole = hashlib.sha256()
+    for path in files:
+        whole.update(hashlib.sha256(path.read_bytes()).digest())
+    return whole.hexdigest()
 
 
 @cache

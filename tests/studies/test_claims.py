@@ -169,9 +169,11 @@ class Told:
         """Instead of `sweep.open_result`: the result, or what is to be believed instead."""
         return self.lie.get(str(path), self.results[str(path)]).copy()
 
-    def again(self, study=None, *, progress=False, workers=None, **keys):
-        """Instead of `sweep.run` in memory: the same study is run once."""
+    def again(self, study=None, path=None, *, progress=False, workers=None, **keys):
+        """Instead of `sweep.run`: in memory the same study is run once."""
         study = sweep.study(**keys) if study is None else study
+        if path is not None:
+            return self.run(study, path, progress=False)
         text = sweep.to_toml(study)
         if text not in self.inner:
             self.inner[text] = self.run(study, progress=False)

@@ -1,17 +1,20 @@
 """The fingerprint changes with everything that decides a number of a result, and with nothing else."""
 
+import os
+import shutil
+import subprocess
 import sys
-from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from toy_studies import build, build_rich
 
 import sweep
-from sweep.cells import fingerprint as module
 from sweep.cells.fingerprint import difference, fingerprint
 from sweep.study.model import Study
 
+ROOT = Path(__file__).parents[3]
 BASE = {"axes": {"height": [1.0, 2.0], "v0": [0.0, 1.0]}}
 
 
@@ -63,186 +66,97 @@ def test_the_versions_of_compiler_and_arrays_are_in_it():
     found = fingerprint(build(**BASE))
     assert found["numpy"] == np.__version__
     assert {"numba", "llvmlite"} < found.keys()
-
-
-# sources
-
-WRITER = '''
-from importlib import import_module
-
-TEXT = """
-import math, ownscenes.listed
-from ownscenes import (
-    inlaid,
-)
-from {module} import *
-"""
-
-
-def deep():
-    return import_module("ownscenes.called"), import_module(".beside", __package__)
-'''
+    assert difference({"numba": "0.67"}, {"numba": "0.68"}) == ["numba: was 0.67, now 0.68"]
 
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
-    """A kernel in a package of its own, with modules it imports in several ways, and one it does not."""
+    """A kernel in a package of its own, which imports a module beside it, and that another one."""
     folder = tmp_path / "ownscenes"
     (folder / "deep").mkdir(parents=True)
     texts = {
-        "__init__.py": "",
-        "scene.py": "from . import waves\nfrom .deep.far import far\nimport ownscenes.plain\nfrom toy import KERNEL\n"
-        "from . import writer\n",
-        "writer.py": WRITER,
-        "called.py": "",
-        "beside.py": "",
-        "listed.py": "",
-        "inlaid.py": "",
-        "waves.py": "def lazy():\n    from ownscenes import late\n",
-        "late.py": "import math, numpy, json\n",
-        "plain.py": "",
-        "unused.py": "",
-        "deep/__init__.py": "from . import near\n",
-        "deep/far.py": "from .. import upper\nfar = 1\n",
-        "deep/near.py": "",
-        "upper.py": "from ownscenes.scene import KERNEL\n",
+        "ownscenes/__init__.py": "",
+        "ownscenes/scene.py": "from .deep import far\nfrom toy import KERNEL\nimport json, numpy, ownhelper\n",
+        "ownscenes/deep/__init__.py": "",
+        "ownscenes/deep/far.py": "",
+        "ownscenes/late.py": "",
+        "ownhelper.py": "def late():\n    import ownother\n",
+        "ownother.py": "",
+        "unrelated.py": "",
     }
     for name, text in texts.items():
-        (folder / name).write_text(text)
-    (folder / "upper.py").write_text("")
+        (tmp_path / name).write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
-    yield folder
-    for name in [name for name in sys.modules if name.partition(".")[0] == "ownscenes"]:
+    yield tmp_path
+    for name in [name for name in sys.modules if name.partition(".")[0] in ("ownscenes", "ownhelper")]:
         del sys.modules[name]
 
 
-def sources(found):
-    return {name.removeprefix("source ") for name in found if name.startswith("source ")}
-
-
-def test_every_module_of_the_package_that_the_kernel_imports_counts(package):
-    found = fingerprint(build(kernel="ownscenes.scene:KERNEL", axes={"height": [1.0]}))
-    own = {name for name in sources(found) if name.startswith("ownscenes")}
-    assert own == {
-        "ownscenes",
-        "ownscenes.scene",
-        "ownscenes.waves",
-        "ownscenes.late",
-        "ownscenes.plain",
-        "ownscenes.deep.far",
-        "ownscenes.deep",
-        "ownscenes.deep.near",
-        "ownscenes.upper",
-        "ownscenes.writer",
-        "ownscenes.called",
-        "ownscenes.beside",
-        "ownscenes.listed",
-        "ownscenes.inlaid",
-    }
-
-
 @pytest.mark.parametrize(
-    "name", ["scene", "waves", "late", "plain", "deep.far", "deep.near", "upper", "called", "inlaid"]
+    ("file", "told"),
+    [
+        ("ownscenes/scene.py", ["source ownscenes: changed"]),
+        ("ownscenes/deep/far.py", ["source ownscenes: changed"]),
+        ("ownscenes/late.py", ["source ownscenes: changed"]),
+        ("ownhelper.py", ["source ownhelper: changed"]),
+        ("ownother.py", ["source ownother: changed"]),
+        ("unrelated.py", []),
+    ],
 )
-def test_an_edit_of_any_of_them_is_named(package, name):
+def test_an_edit_of_what_a_kernel_of_ones_own_is_made_of_is_named(package, file, told):
     study = build(kernel="ownscenes.scene:KERNEL", axes={"height": [1.0]})
     old = fingerprint(study)
-    path = package / (name.replace(".", "/") + ".py")
+    path = package / file
     path.write_text(path.read_text() + "# edited\n")
-    new = fingerprint(study)
-    assert difference(old, new) == [f"source ownscenes.{name}: changed"]
+    assert difference(old, fingerprint(study)) == told
 
 
-def test_an_edit_of_a_module_that_is_not_imported_changes_nothing(package):
-    study = build(kernel="ownscenes.scene:KERNEL", axes={"height": [1.0]})
-    old = fingerprint(study)
-    (package / "unused.py").write_text("edited = True\n")
-    assert fingerprint(study) == old
+def sources(study):
+    return {name.removeprefix("source ") for name in fingerprint(study) if name.startswith("source ")}
 
 
-def test_our_own_modules_count_for_a_kernel_of_another_package():
-    assert {"toy", "kernels.interface"} < sources(fingerprint(build(**BASE)))
+def test_the_packages_that_decide_values_are_in_it_and_nothing_that_is_installed(package):
+    ours = {"kernels", "sweep.cells", "sweep.study"}
+    assert sources(sweep.study(kernel="foliot", axes={"mu": [1.0]}, fixed={"phi0": 1.0, "a": 1.0})) == ours
+    own = build(kernel="ownscenes.scene:KERNEL", axes={"height": [1.0]})
+    assert sources(own) == ours | {"ownscenes", "ownhelper", "ownother", "toy"}
 
 
-def test_the_foliot_counts_all_it_is_made_of_and_nothing_of_numpy():
-    study = sweep.study(kernel="foliot", axes={"mu": [1.0]}, fixed={"phi0": 1.0, "a": 1.0})
-    found = sources(fingerprint(study))
-    assert {"kernels.foliot.cycle", "kernels.lanes.vectors", "kernels.maths.elementary", "kernels.interface"} <= found
-    assert all(name.partition(".")[0] in ("kernels", "sweep") for name in found)
+EDITED = """
+import sys
+import sweep
+from sweep.cells.fingerprint import fingerprint
+study = sweep.study(kernel="foliot", axes={"mu": [1.0]}, fixed={"phi0": 1.0, "a": 1.0})
+print(sorted(fingerprint(study).items()))
+"""
 
 
-def of_the_engine(study):
-    return {name for name in sources(fingerprint(study)) if name.startswith("sweep.")}
+@pytest.mark.parametrize("file", ["kernels/foliot/_viscous.py", "sweep/cells/turns.py", "sweep/study/condition.py"])
+def test_another_version_of_foliot_is_another_program(tmp_path, file):
+    """Sources are read by another process, as a user's next run does."""
 
+    def told():
+        done = subprocess.run([sys.executable, "-c", EDITED], cwd=tmp_path, env=environment, capture_output=True)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
 
-def test_what_chooses_methods_and_what_reduces_cells_counts_too():
-    cells = {"sweep.cells.solve", "sweep.cells.turns", "sweep.cells.grid"}
-    assert of_the_engine(build(**BASE)) == cells
-    assert of_the_engine(build(**BASE, summary={})) == cells | {
-        "sweep.cells.partition",
-        "sweep.cells.reduce",
-        "sweep.cells.output_schema",
-    }
-
-
-def test_how_methods_are_chosen_counts_as_the_program_not_as_the_study():
-    new, old = (fingerprint(replace(build(**BASE), by_cell=by_cell)) for by_cell in (True, False))
-    assert difference(old, new) == ["auto: new, cell by cell"]
-    assert new["study"] == old["study"]
-    assert module.is_of_program("auto")
-
-
-@pytest.mark.parametrize("name", ["solve", "turns", "grid", "partition", "reduce", "output_schema"])
-def test_an_edit_of_what_reduces_cells_is_named(monkeypatch, tmp_path, name):
-    study = build(**BASE, summary={})
-    old, real = fingerprint(study), module._path
-    edited = tmp_path / f"{name}.py"
-    edited.write_bytes(real(f"sweep.cells.{name}").read_bytes() + b"# edited\n")
-    monkeypatch.setattr(module, "_path", lambda asked: edited if asked == f"sweep.cells.{name}" else real(asked))
-    assert difference(old, fingerprint(study)) == [f"source sweep.cells.{name}: changed"]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    for package in ("kernels", "sweep"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    old = told()
+    with (tmp_path / file).open("a") as source:
+        source.write("# edited\n")
+    assert told() != old
 
 
 def test_a_kernel_typed_at_the_prompt_has_no_source_and_is_no_fault(monkeypatch):
     monkeypatch.setattr(sys.modules["__main__"], "OWN", build(**BASE).kernel, raising=False)
-    assert fingerprint(build(kernel="__main__:OWN", axes={"height": [1.0]}))["kernel"] == "__main__:OWN"
-
-
-# differences
-
-
-def test_a_new_version_is_told_with_both():
-    assert difference({"numba": "0.67"}, {"numba": "0.68"}) == ["numba: was 0.67, now 0.68"]
-
-
-def test_a_source_that_came_or_went_is_told_without_digests():
-    assert difference({"source a": "1", "source b": "2"}, {"source b": "3", "source c": "4"}) == [
-        "source b: changed",
-        "source c: new",
-        "source a: gone",
-    ]
-
-
-def test_many_sources_are_told_in_one_line():
-    many = {f"source {k}": "1" for k in range(9)}
-    eight = {name: many[name] for name in list(many)[:8]}
-    assert difference({}, eight) == [f"{name}: new" for name in eight]
-    assert difference({}, many) == ["source of 9 modules: 9 new"]
-    others = {**dict.fromkeys(eight, "2"), "source b": "1", "source c": "1", "rtol": "3"}
-    assert difference({"rtol": "2", **many}, others) == [
-        "rtol: was 2, now 3", "source of 11 modules: 2 new, 8 changed, 1 gone",
-    ]  # fmt: skip
+    found = fingerprint(build(kernel="__main__:OWN", axes={"height": [1.0]}))
+    assert found["kernel"] == "__main__:OWN"
 
 
 def test_the_digest_of_the_study_is_told_only_where_nothing_else_differs():
     assert difference({"study": "1", "rtol": "a"}, {"study": "2", "rtol": "b"}) == ["rtol: was a, now b"]
     assert difference({"study": "1"}, {"study": "2"}) == ["study: changed"]
-
-
-def test_a_module_beside_the_kernel_counts(tmp_path, monkeypatch):
-    (tmp_path / "lonely_scene.py").write_text("import lonely_helper\nfrom toy import KERNEL\n")
-    (tmp_path / "lonely_helper.py").write_text("FACTOR = 1\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    study = build(kernel="lonely_scene:KERNEL", axes={"height": [1.0]})
-    old = fingerprint(study)
-    (tmp_path / "lonely_helper.py").write_text("FACTOR = 2 \n")
-    assert difference(old, fingerprint(study)) == ["source lonely_helper: changed"]
+    told = difference({"source a": "1", "source b": "2"}, {"source b": "3", "source c": "4"})
+    assert told == ["source b: changed", "source c: new", "source a: gone"]
