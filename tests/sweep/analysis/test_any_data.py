@@ -88,24 +88,6 @@ def test_lines_of_any_data_are_fitted_or_refused_and_none_has_to_do_with_others(
                 xr.testing.assert_identical(alone, group.isel(size=k))
 
 
-def test_a_power_law_with_noise_on_which_singular_values_did_not_converge_is_one_among_others():
-    speed, noise = np.geomspace(1.0, 1e3, 25), [np.random.default_rng(seed).standard_normal(25) for seed in (1, 226)]
-    y = xr.DataArray(speed**-0.5 * np.exp(0.02 * np.array(noise)), {"speed": speed}, ("size", "speed"), name="torque")
-    assert sweep.fit_correction(y, "speed").exponent.notnull().all()
-    assert sweep.compare_laws(y[1], "speed").attrs["chosen"] == "one law"
-
-
-def test_a_point_whose_standard_error_is_not_known_is_left_out():
-    speed = np.geomspace(1.0, 1e3, 25)
-    y = xr.DataArray(speed**-0.5, {"speed": speed}, "speed", name="torque")
-    y = y * np.exp(0.02 * np.random.default_rng(1).standard_normal(25))
-    known = y.speed != speed[7]
-    for fit in (sweep.fit_exponent, sweep.compare_laws):
-        xr.testing.assert_identical(
-            fit(y, "speed", sigma=(0.02 * y).where(known)), fit(y.where(known), "speed", sigma=0.02 * y)
-        )
-
-
 def test_laws_of_any_line_are_compared_or_refused():
     for seed in range(40):
         y, sigma = lines(seed)

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given
-from hypothesis import strategies as st
 from neighbours import derivative
 from numpy.polynomial import Polynomial
 
@@ -33,11 +31,6 @@ def grid(low=-6, high=6, per_decade=40):
 
 
 @given(st.floats(-5, 5), st.floats(1e-5, 1e5), st.integers(3, 30))
-def test_a_power_law_has_its_exponent_everywhere(power, prefactor, points):
-    x = np.geomspace(1e-3, 1e3, points)
-    np.testing.assert_allclose(sweep.local_exponent(curve(x, prefactor * x**power), "mu"), power, atol=1e-11)
-
-
 def test_the_sliding_exponent_is_right_at_the_study_spacing_ends_included():
     off = abs(sweep.local_exponent(curve(grid(), bend(grid())), "mu") - bend_exponent(grid()))
     assert off.max() < 2e-7

@@ -95,14 +95,6 @@ def test_errors_of_lines_and_of_where_two_meet_are_those_of_repeated_noise():
     assert float(np.log(fit.level).std()) == pytest.approx(float(fit.level_error.mean()), rel=0.1)
 
 
-@pytest.mark.parametrize("points", [101, 401])
-def test_drift_is_the_change_of_a_parabolas_slope_whatever_the_number_of_points(points):
-    t = np.linspace(1, 3, points) ** 1.3
-    fit = sweep.fit_exponent(curve(0.5 - t + 0.07 * t**2, t), "x")
-    assert float(fit.drift) == pytest.approx(2 * 0.07 * (t[-1] - t[0]), rel=1e-9)
-    assert kind(fit) == "curved"
-
-
 @pytest.mark.parametrize("size", [0.0, 1e-3])
 def test_the_interval_within_error_bounds_is_all_that_they_can_do_to_a_slope(size):
     bound = size * np.linspace(0.5, 1.0, N)
@@ -303,36 +295,6 @@ def test_two_power_laws_meet_where_they_are_equal_in_either_order():
         assert float(met.crossover_error) < 1e-10
         slopes = [-1, -1 / 3] if windows[0][0] is None else [-1 / 3, -1]
         np.testing.assert_allclose(met.exponent, slopes, rtol=1e-12)
-
-
-def test_without_noise_the_error_is_how_far_the_place_moves_with_the_limits_of_the_exponents():
-    """Lines through the outer ends of the windows, with the exponents that the local ones tend to."""
-    x = np.geomspace(1e-3, 1e3, 241)
-    y, windows = curve(np.log(1 / x + x ** (-1 / 3)), np.log(x)), ((1e-3, 1e-1), (1e1, 1e3))
-    fits = [sweep.fit_exponent(y, "x", window) for window in windows]
-
-    def meeting(low, high):
-        """ln x where lines (slope, x, y) meet."""
-        rows = [[1.0, -slope] for slope, _, _ in (low, high)]
-        return np.linalg.solve(rows, [np.log(y) - slope * np.log(x) for slope, x, y in (low, high)])[1]
-
-    inner = [(float(f.exponent), float(f.centre), float(f.level)) for f in fits]
-    outer = [
-        (float(fits[0].limit_low), float(fits[0].low), float(fits[0].start)),
-        (float(fits[1].limit_high), float(fits[1].high), float(fits[1].stop)),
-    ]
-    place = meeting(*inner)
-    moved = [abs(meeting(a, b) - place) for a in (inner[0], outer[0]) for b in (inner[1], outer[1])]
-    noise = (
-        sum(
-            float(f.level_error) ** 2 + ((place - np.log(float(f.centre))) * float(f.exponent_error)) ** 2 for f in fits
-        )
-        / (inner[1][0] - inner[0][0]) ** 2
-    )
-    met = sweep.fit_two_laws(y, "x", windows=windows)
-    assert np.log(float(met.crossover)) == pytest.approx(place)
-    assert float(met.crossover_error / met.crossover) == pytest.approx(np.hypot(max(moved), noise**0.5))
-    assert abs(place) < float(met.crossover_error)
 
 
 @pytest.mark.parametrize(
