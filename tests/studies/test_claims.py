@@ -97,7 +97,8 @@ TABLE = {
         "stability_maps": {"mu": 16, "step": 12}, "stability_maps_oscillator": {"a": 8, "w": 8},
         "stability_maps_sticking": {"R": [0.9, 0.999], "step": 12},
         "stability_maps_spring": {"k": [1.5, 1.999], "step": 12},
-    }),
+    }, "amplitude crossing_speed rate_calls steps time status stability_maps_oscillator.clock "
+        "stability_maps_oscillator.error stability_maps_oscillator.interval stability_maps_oscillator.pace", 1),
     "stick_slip": Claims({
         "stick_slip": {"method": ["taylor", "dop853"], "belt": [0.02, 0.3], "fall": [0.02, 0.3]},
     }, tell=False),
