@@ -1,15 +1,20 @@
-"""The site is built by its own command; here is what can be told without building it."""
+"""Pages say what is so, as far as can be told without building the site; what they run is run."""
 
 import ast
+import inspect
+import os
 import re
+import shlex
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import sweep
+from sweep.cli import parser
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -94,20 +99,6 @@ def test_pages_of_kernels_say_what_the_kernels_declare():
     assert "phi'' + a phi' + (R + c abs(phi')^n) sgn phi' + k phi = +-mu" in page
 
 
-def test_the_gallery_tells_the_commands_before_what_they_draw():
-    import make_pages
-
-    page = "\n".join(make_pages._entry("chatter_lobes", ROOT / "studies" / "chatter_lobes.py"))
-    assert "python studies/chatter_lobes.py chatter_lobes.h5\n```\n\ndraws chatter" in page
-
-
-def test_what_is_indented_in_a_docstring_stands_as_it_is():
-    import make_pages
-
-    told = "\n".join(make_pages.prose("A law.\n\n    x_1 = 2*y            (1)\n\nwith x_1 and `y_2`."))
-    assert told == "A law.\n\n\n```text\nx_1 = 2*y    (1)\n```\n\n\nwith x\\_1 and `y_2`."
-
-
 def test_the_readme_fits_on_two_screens_and_tests_as_ci_does():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     assert len(readme.splitlines()) <= 80
@@ -115,3 +106,47 @@ def test_the_readme_fits_on_two_screens_and_tests_as_ci_does():
     assert line in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     for code in re.findall(r"```python\n(.*?)```", readme, re.DOTALL):
         ast.parse(code)
+
+
+# the page on many machines
+
+
+def blocks(language):
+    """Code of the page on many machines."""
+    return re.findall(rf"```{language}\n(.*?)```", text("many_machines.md"), re.DOTALL)
+
+
+def test_commands_on_many_machines_are_those_of_the_command_line():
+    lines = [line for block in blocks("sh") for line in block.splitlines()]
+    (ours,) = (shlex.split(line, comments=True)[1:] for line in lines if line.startswith("sweep "))
+    found = parser().parse_args(ours)
+    assert found.cluster.startswith("tcp://")
+    assert (ROOT / found.study).is_file()
+
+
+def test_code_for_many_machines_passes_what_dask_takes():
+    distributed = pytest.importorskip("distributed")
+    calls = [node for block in blocks("python") for node in ast.walk(ast.parse(block)) if isinstance(node, ast.Call)]
+    named = {call.func.id: call for call in calls if isinstance(call.func, ast.Name)}
+    assert {"Client", "SSHCluster", "SLURMCluster"} <= named.keys()
+    taken = inspect.signature(distributed.SSHCluster).parameters
+    assert {word.arg for word in named["SSHCluster"].keywords} <= taken.keys()
+
+
+def test_a_client_of_two_processes_here_gives_the_same_result(tmp_path):
+    pytest.importorskip("distributed")
+    (code,) = (block for block in blocks("python") if "sweep.run" in block)
+    (tmp_path / "studies").symlink_to(ROOT / "studies")
+    script = tmp_path / "script.py"
+    script.write_text(code)
+    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
+    done = subprocess.run(
+        [sys.executable, str(script)], cwd=tmp_path, env={**os.environ, "PYTHONPATH": path}, capture_output=True,
+        text=True, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    study = sweep.study(ROOT / "studies" / "foliot_scaling.toml")
+    with sweep.open_result(tmp_path / "foliot_scaling.h5", strict=True) as found:
+        here = sweep.run(study, progress=False)
+        for name in here.data_vars:
+            assert found[name].values.tobytes() == here[name].values.tobytes()

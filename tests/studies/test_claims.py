@@ -73,23 +73,23 @@ TABLE = {
     },
         "impact_map.contact_share impact_map.offset impact_map.status impact_map_lever.period "
         "impact_map_lever.swing", 4),
-    "law_map": Claims({"law_map": {"e": [1, 0.99, 0.5], "R": [0, 1, 100], "c": [0, 1e-6, 1]}}),
+    "law_map": Claims({"law_map": {"e": [1, 0.99, 0.5], "R": [0, 1, 100], "c": [0, 1e-6, 1]}}, "status"),
     "law_map_overnight": Claims({
         "law_map_overnight": {"n": [0.25, 1.5, 3.0], "e": [1, 0.99, 0.97, 0.5], "R": 3, "c": 10},
         "law_map_borders": {},
-    }),
+    }, "sensitivity_max law_map_borders.amplitude law_map_borders.crossing_speed", 2),
     "origin_of_half": Claims({"origin_of_half": {"mu": 2}}, "amplitude status", 3),
     "polisher_design": Claims({
         "polisher_design": {"d": [0.3, 0.38], "b": 3, "f": 2, "e": 2},
-    }),
+    }, "rate_max rate_min status"),
     "polisher_extrema": Claims({"polisher_extrema": {
         "e": [0, 0.01, 0.02, 0.05, 0.08, 0.1, 0.12, 0.14, 0.15, 0.16, 0.1648, 0.1649, 0.165, 0.17, 0.18],
-    }}),
-    "polisher_sequence": Claims({"polisher_sequence": {}}),
+    }}, "A0_e rate_max rate_min theta_lock", 2),
+    "polisher_sequence": Claims({"polisher_sequence": {}}, "wear_error", 5),
     "polisher_wear": Claims({
         "polisher_wear": {"e": [0.02, 0.08, 0.1, 0.16], "w_x": [0.5, 0.53, 0.54, 0.56, 0.58], "radius": 2},
         "polisher_wear_load": {"radius": [0.0, 0.05, 0.098], "rtol": 1e-4},
-    }),
+    }, "wear_error", 4),
     "polisher_zone": Claims({"polisher_zone": {}}, "wear_error", 3),
     "rate_parameters": Claims({"rate_parameters": {}}, "", 4),
     "self_starting": Claims({"self_starting": {}}, "flip_speed status", 6),
@@ -97,7 +97,8 @@ TABLE = {
         "stability_maps": {"mu": 16, "step": 12}, "stability_maps_oscillator": {"a": 8, "w": 8},
         "stability_maps_sticking": {"R": [0.9, 0.999], "step": 12},
         "stability_maps_spring": {"k": [1.5, 1.999], "step": 12},
-    }),
+    }, "amplitude crossing_speed rate_calls steps time status stability_maps_oscillator.clock "
+        "stability_maps_oscillator.error stability_maps_oscillator.interval stability_maps_oscillator.pace", 1),
     "stick_slip": Claims({
         "stick_slip": {"method": ["taylor", "dop853"], "belt": [0.02, 0.3], "fall": [0.02, 0.3]},
     }, tell=False),

@@ -88,24 +88,6 @@ def test_lines_of_any_data_are_fitted_or_refused_and_none_has_to_do_with_others(
                 xr.testing.assert_identical(alone, group.isel(size=k))
 
 
-def test_a_power_law_with_noise_on_which_singular_values_did_not_converge_is_one_among_others():
-    speed, noise = np.geomspace(1.0, 1e3, 25), [np.random.default_rng(seed).standard_normal(25) for seed in (1, 226)]
-    y = xr.DataArray(speed**-0.5 * np.exp(0.02 * np.array(noise)), {"speed": speed}, ("size", "speed"), name="torque")
-    assert sweep.fit_correction(y, "speed").exponent.notnull().all()
-    assert sweep.compare_laws(y[1], "speed").attrs["chosen"] == "one law"
-
-
-def test_a_point_whose_standard_error_is_not_known_is_left_out():
-    speed = np.geomspace(1.0, 1e3, 25)
-    y = xr.DataArray(speed**-0.5, {"speed": speed}, "speed", name="torque")
-    y = y * np.exp(0.02 * np.random.default_rng(1).standard_normal(25))
-    known = y.speed != speed[7]
-    for fit in (sweep.fit_exponent, sweep.compare_laws):
-        xr.testing.assert_identical(
-            fit(y, "speed", sigma=(0.02 * y).where(known)), fit(y.where(known), "speed", sigma=0.02 * y)
-        )
-
-
 def test_laws_of_any_line_are_compared_or_refused():
     for seed in range(40):
         y, sigma = lines(seed)
@@ -124,3 +106,43 @@ def test_curves_of_any_data_collapse_or_are_refused():
         curves = xr.DataArray(y, {"size": size, "speed": np.exp(t)}, ("size", "speed"), name="torque")
         fitted = found(lambda y: sweep.fit_collapse(y, "speed", "size", bootstrap=4), curves)
         assert fitted is None or fitted.x_exponent_low <= fitted.x_exponent <= fitted.x_exponent_high, seed
+
+
+# what is no output, no result and no study
+
+X = np.geomspace(1, 100, 12)
+LINE = xr.DataArray(X**-0.5, {"x": X}, "x", name="y")
+OF_AN_OUTPUT = (
+    lambda y: sweep.fit_exponent(y, "x"), lambda y: sweep.fit_two_laws(y, "x"), lambda y: sweep.fit_correction(y, "x"),
+    lambda y: sweep.fit_exponent(y, "x", towards="high"), lambda y: sweep.compare_laws(y, "x"),
+    lambda y: sweep.local_exponent(y, "x", error=True), lambda y: sweep.where_exponent(y, "x", -0.5),
+    lambda y: sweep.where_exponent(y, "x", 1.0, values=True), lambda y: sweep.exponent_map(y, "x"),
+    lambda y: sweep.fit_collapse(y, "x", "L"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "given", [3, None, "period", X, LINE.to_dataset(), [1.0], LINE.astype(str), LINE.astype(complex)]
+)
+def test_what_is_no_output_no_dataset_or_no_study_is_refused(given):
+    for fit in OF_AN_OUTPUT:
+        with pytest.raises(sweep.SweepError, match=r"expected one output|expected real numbers"):
+            fit(given)
+    if not isinstance(given, xr.Dataset):
+        for use in (lambda ds: sweep.interpolated(ds, {"x": [1.0]}), lambda ds: sweep.refine(ds, "y", 0.1)):
+            with pytest.raises(sweep.SweepError, match="expected a Dataset"):
+                use(given)
+    with pytest.raises(sweep.SweepError, match=r"study|no such file"):
+        sweep.scaling(given)
+
+
+def test_a_bound_of_a_result_without_the_output_is_refused():
+    with pytest.raises(sweep.SweepError, match="this Dataset has no "):
+        sweep.fit_exponent(LINE, "x", bound=LINE.rename("other").to_dataset())
+
+
+@pytest.mark.parametrize("sigma", [0.0, 1e-20, 1e9, LINE * 0])
+def test_standard_errors_of_nothing_or_beyond_all_sense_are_refused(sigma):
+    for fit in (sweep.fit_exponent, sweep.compare_laws):
+        with pytest.raises(sweep.SweepError, match="sigma: expected standard errors"):
+            fit(LINE, "x", sigma=sigma)

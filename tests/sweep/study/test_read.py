@@ -1,19 +1,28 @@
-"""What studies in TOML and Python become."""
+"""What studies in TOML and Python become: axes, csv files, words, followers, array parameters, summaries, kernels."""
 
 import dataclasses
-import tracemalloc
+import math
+import sys
 
-import mpmath
 import numpy as np
 import pytest
 import toy
-from hypothesis import given
-from hypothesis import strategies as st
+import xarray as xr
+from columns import columns_of
 from toy_studies import build, build_rich, message_of
 
 import sweep
-from sweep.cells.grid import Grid
-from sweep.study import spacing as axes
+from kernels import catalogue
+from kernels.interface import FIRST_REFUSAL, Field
+from sweep.study.kernel_lookup import load_kernel
+from sweep.study.samples import GENERATORS
+
+MASS = [0.1, 0.2, 0.7]
+
+
+def beads(fixed=None, **keys):
+    given = {"fixed": {"mass": MASS} if fixed is None else fixed, "axes": {"g": [1.0, 2.0]}} | keys
+    return sweep.study(kernel="beads:KERNEL", allow_import=True, **given)
 
 
 def test_a_whole_study_is_read(read):
@@ -40,39 +49,19 @@ def test_a_whole_study_is_read(read):
     )
     assert (study.title, study.question) == ("Falling stones", "How fast does a stone fall?")
     assert (study.kernel_name, study.kernel, study.method, study.rtol) == ("toy:KERNEL", toy.KERNEL, "exact", 1e-6)
-    assert study.outputs == ("fall_time", "drop")  # the kernel's order
-    assert [f.name for f in study.asked] == ["fall_time", "drop"]
-    assert list(study.axes) == ["v0", "height"]
-    assert study.axes["height"].values.tolist() == [0.001, 0.01, 0.1]
-    assert study.axes["height"].spacing == "log"
-    assert study.axes["v0"].spacing == "values"
-    assert study.fixed == {"g": 9.81}
-    assert study.along["phase"].tolist() == [0.0, 0.5, 1.0]
+    assert study.outputs == tuple(f.name for f in study.asked) == ("fall_time", "drop")  # the kernel's order
+    assert {name: axis.values.tolist() for name, axis in study.axes.items()} == {
+        "v0": [0.0, 0.5], "height": [0.001, 0.01, 0.1],
+    }  # fmt: skip
+    assert [axis.spacing for axis in study.axes.values()] == ["values", "log"]
+    assert (study.fixed, study.along["phase"].tolist()) == ({"g": 9.81}, [0.0, 0.5, 1.0])
     assert "spacing" in study.text
 
 
 def test_defaults_are_filled_in(read):
     study = read("axes.height = [1.0]")
     assert (study.method, study.rtol, study.design, study.question) == ("auto", 1e-9, "product", "")
-    assert study.title == "toy over height"
-    assert study.fixed == {"v0": 0.0, "g": 9.80665}
-
-
-FLIPS = """
-kernel = "foliot_start"
-axes.mu = [1.0]
-fixed = {{ phi0 = 1, a = 1 }}
-along.flip = {}
-"""
-
-
-def test_a_coordinate_that_counts_takes_the_first_whole_numbers(tmp_path):
-    path = tmp_path / "flips.toml"
-    path.write_text(FLIPS.format("{ num = 4 }"))
-    assert sweep.study(path).along["flip"].tolist() == [1.0, 2.0, 3.0, 4.0]
-    path.write_text(FLIPS.format("[1, 2.5]"))
-    with pytest.raises(sweep.SweepError, match=r"expected whole numbers from 1 to 1e\+06, found 2.5"):
-        sweep.study(path)
+    assert (study.title, study.fixed) == ("toy over height", {"v0": 0.0, "g": 9.80665})
 
 
 def test_python_and_toml_give_the_same_study(read):
@@ -80,91 +69,39 @@ def test_python_and_toml_give_the_same_study(read):
         """
         title = "t"
         method = "exact"
-        [axes.height]
-        spacing = "log"
-        start = 0.3
-        stop = 1e5
-        num = 57
-        unit = "ft"
-        [axes.v0]
-        spacing = "linear"
-        start = -1
-        stop = 1.7
-        num = 28
-        unit = "km/hour"
-        [axes.rtol]
-        values = [1e-3, 1e-6]
-        [fixed]
-        g = { value = 32.174, unit = "ft/s^2" }
+        axes.height = { spacing = "log", start = 0.3, stop = 1e5, num = 57, unit = "ft" }
+        axes.v0 = { spacing = "linear", start = -1, stop = 1.7, num = 28, unit = "km/hour" }
+        axes.rtol.values = [1e-3, 1e-6]
+        fixed.g = { value = 32.174, unit = "ft/s^2" }
         """
     )
+    speeds = np.array([1e-3, 1e-6])
     python = build(
         title="t",
         method="exact",
         axes={
             "height": {"spacing": "log", "start": 0.3, "stop": 1e5, "num": 57, "unit": "ft"},
             "v0": {"spacing": "linear", "start": -1, "stop": 1.7, "num": 28, "unit": "km/hour"},
-            "rtol": np.array([1e-3, 1e-6]),
+            "rtol": speeds,
         },
         fixed={"g": {"value": 32.174, "unit": "ft/s^2"}},
     )
+    speeds[0] = 5  # the study has numbers of its own, which cannot be written to
     assert dataclasses.replace(toml, text="") == python
-    for name, axis in toml.axes.items():
-        assert axis.values.tobytes() == python.axes[name].values.tobytes()
-
-
-def test_axes_cannot_be_written_to():
-    study = build(axes={"height": [1.0]})
+    assert all(axis.values.tobytes() == python.axes[name].values.tobytes() for name, axis in toml.axes.items())
     with pytest.raises(ValueError, match="read-only"):
-        study.axes["height"].values[0] = 2
+        python.axes["height"].values[0] = 2
+    assert python != build(axes={"height": [1.0]}) != build(axes={"height": [np.nextafter(1.0, 2)]})
 
 
-def test_an_axis_does_not_share_memory_with_the_array_it_came_from():
-    values = np.array([1.0, 2.0])
-    study = build(axes={"height": values})
-    values[0] = 5
-    assert study.axes["height"].values[0] == 1.0
+def test_a_coordinate_that_counts_takes_the_first_whole_numbers():
+    keys = {"kernel": "foliot_start", "axes": {"mu": [1.0]}, "fixed": {"phi0": 1, "a": 1}}
+    assert sweep.study(**keys, along={"flip": {"num": 4}}).along["flip"].tolist() == [1.0, 2.0, 3.0, 4.0]
+    with pytest.raises(sweep.StudyError, match="whole numbers"):
+        sweep.study(**keys, along={"flip": [1, 2.5]})
 
 
-# spacings
-
-
-@given(st.floats(1e-300, 1e300), st.floats(1e-300, 1e300), st.integers(2, 40), st.sampled_from(["log", "linear"]))
-def test_the_first_and_last_values_are_exactly_start_and_stop(start, stop, num, spacing):
-    if start == stop or abs(start - stop) < 1e-6 * start:
-        return
-    values = (
-        build(axes={"height": {"spacing": spacing, "start": start, "stop": stop, "num": num}}).axes["height"].values
-    )
-    assert (values[0], values[-1], len(values)) == (start, stop, num)
-    assert (np.diff(values) > 0).all() if stop > start else (np.diff(values) < 0).all()
-
-
-@given(st.floats(1e-20, 1e20), st.floats(1e-20, 1e20), st.integers(3, 30))
-def test_log_values_are_the_nearest_floats_to_the_true_geometric_ones(start, stop, num):
-    if abs(start - stop) < 1e-6 * start:
-        return
-    values = build(axes={"height": {"spacing": "log", "start": start, "stop": stop, "num": num}}).axes["height"].values
-    with mpmath.workdps(60):
-        # the decimals that the user wrote, not the floats they became
-        first, last = mpmath.mpf(repr(start)), mpmath.mpf(repr(stop))
-        expected = [float(first * (last / first) ** (mpmath.mpf(i) / (num - 1))) for i in range(1, num - 1)]
-    assert values[1:-1].tolist() == expected
-
-
-@pytest.mark.parametrize("spacing", ["log", "linear"])
-def test_an_axis_with_a_unit_is_what_its_values_are_one_by_one(spacing):
-    axis = {"spacing": spacing, "start": 1, "stop": 1000, "num": 4, "unit": "ms"}
-    numbers = build(axes={"height": {**axis, "unit": "mm"}}).axes["height"].values
-    listed = [1, 10, 100, 1000] if spacing == "log" else [1, 334, 667, 1000]
-    assert numbers.tolist() == build(axes={"height": {"values": listed, "unit": "mm"}}).axes["height"].values.tolist()
-    assert numbers.tolist() == [n / 1000 for n in listed]
-    assert [build(axes={"height": [1.0]}, fixed={"v0": {"value": n, "unit": "mm/s"}}).fixed["v0"] for n in listed] == [
-        n / 1000 for n in listed
-    ]
-
-
-# files
+# csv files
 
 
 @pytest.mark.parametrize(
@@ -183,95 +120,154 @@ def test_an_axis_may_be_a_column_of_a_csv_file(read, tmp_path, text):
     assert study.axes["height"].spacing == "file"
 
 
-def test_words_may_come_from_a_file(read, tmp_path):
-    (tmp_path / "points.csv").write_text("height,method\n1,exact\n2,auto\n")
-    study = read('design = "zip"\naxes.height.file = "points.csv"\naxes.method.file = "points.csv"')
-    assert study.axes["method"].words == ("exact", "auto")
-    assert study.axes["method"].values.tolist() == [1.0, -1.0]
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("height\n1\nabc\n", 'points.csv, line 3: expected a number, found "abc"'),
-        ("height\n1\n\n# x\n''\n", "points.csv, line 5: expected a number, found \"''\""),
-        ("height,v0\n1,2\n3\n", "points.csv, line 3: expected 2 columns, found 1"),
-        ("v0,g\n1,2\n", 'points.csv has no column "height"; its first line is v0,g'),
-        ("v0\n1\n", 'points.csv, line 1: expected a number, found "v0"'),
-        ("height\n", "points.csv holds no values"),
-        ("", "points.csv holds no values"),
-        (b"height\n\xff\n", "points.csv is not a csv file"),
+        ("height\n1\nabc\n", 'line 3: expected a number, found "abc"'),
+        ("height\n1\n\n# x\n''\n", "line 5: expected a number"),
+        ("height,v0\n1,2\n3\n", "line 3: expected 2 columns, found 1"),
+        ("height,v0\n1,2\n3,4,5\n", "line 3: expected 2 columns, found 3"),
+        ("v0,g\n1,2\n", 'no column "height"'),
+        ("v0\n1\n", 'line 1: expected a number, found "v0"'),
+        ("height\n", "holds no values"),
+        ("", "holds no values"),
+        (b"height\n\xff\n", "is not a csv file"),
         (b"height\n\x00\n", "points.csv"),
+        (bytes(30_000_000), "longer than"),  # without ends of lines, which does not fill the memory
     ],
+    ids=range(11),
 )
 def test_a_bad_csv_file_is_told_by_line(mistakes, tmp_path, text, message):
     (tmp_path / "points.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
-    found = mistakes('axes.height.file = "points.csv"')["axes.height.file"]
-    assert message in found
-
-
-def test_a_csv_file_without_ends_of_lines_does_not_fill_the_memory(tmp_path):
-    with (tmp_path / "points.csv").open("wb") as file:
-        file.truncate(100_000_000)
-    tracemalloc.start()
-    with pytest.raises(ValueError, match=r"points\.csv is not a csv file: a line is longer than 1,000,000 characters"):
-        axes.read_column(tmp_path / "points.csv", "height")
-    assert tracemalloc.get_traced_memory()[1] < 10e6
-    tracemalloc.stop()
+    assert message in mistakes('axes.height.file = "points.csv"')["axes.height.file"]
 
 
 # words, followers, methods
 
 
-def test_words_become_the_numbers_of_the_kernel():
+def test_words_become_the_numbers_of_the_kernel(read, tmp_path):
     study = build_rich(axes={"load": [1.0], "shape": ["square", "round"], "method": ["slow", "auto"]})
-    assert study.axes["shape"].values.tolist() == [3.0, 0.0]
-    assert study.axes["shape"].words == ("square", "round")
+    assert (study.axes["shape"].values.tolist(), study.axes["shape"].words) == ([3.0, 0.0], ("square", "round"))
     assert study.axes["method"].values.tolist() == [1.0, -1.0]
     assert build_rich(fixed={"shape": "square"}).fixed["shape"] == 3.0
+    (tmp_path / "points.csv").write_text("height,method\n1,exact\n2,auto\n")
+    study = read('design = "zip"\naxes.height.file = "points.csv"\naxes.method.file = "points.csv"')
+    assert (study.axes["method"].words, study.axes["method"].values.tolist()) == (("exact", "auto"), [1.0, -1.0])
 
 
-def test_a_parameter_that_follows_an_axis_is_not_fixed():
+def test_a_parameter_follows_an_axis_or_has_the_value_of_a_fixed_one():
     study = build_rich()
-    assert study.follows == {"grip": "load", "hold": "load"}
-    assert study.fixed == {"shape": 0.0, "drag": 0.0}
-
-
-def test_a_parameter_that_follows_a_fixed_one_has_its_value():
+    assert (study.follows, study.fixed) == ({"grip": "load", "hold": "load"}, {"shape": 0.0, "drag": 0.0})
     study = build_rich(axes={"drag": [0.0, 1.0]}, fixed={"load": 5, "grip": 7}, method="auto")
-    assert study.follows == {}
-    assert study.fixed == {"load": 5.0, "shape": 0.0, "grip": 7.0, "hold": 7.0}
-
-
-def test_a_follower_takes_the_column_of_its_axis():
-    study = build_rich()
-    out = [np.zeros(2) for _ in study.kernel.parameters]
-    Grid(study).columns(0, 2, out)
-    assert [column.tolist() for column in out] == [[1, 2], [0, 0], [0, 0], [1, 2], [1, 2]]
+    assert (study.follows, study.fixed) == ({}, {"load": 5.0, "shape": 0.0, "grip": 7.0, "hold": 7.0})
 
 
 def test_a_method_that_cannot_do_a_term_of_the_study_is_a_mistake():
-    assert message_of(lambda: build_rich(method="quick", fixed={"drag": 0.1}), "method") == (
-        "quick cannot do drag; use auto or slow"
-    )
-    axes = {"load": [1.0], "drag": [0.0, 1.0], "method": ["quick", "slow"]}
-    assert message_of(lambda: build_rich(axes=axes), "axes.method") == "quick cannot do drag; use auto or slow"
-    both = {"drag": 0.1, "grip": 3, "hold": 2}
-    assert (
-        message_of(lambda: build_rich(fixed=both), "method") == "no method of rich can do drag, grip and hold together"
-    )
+    drag = {"load": [1.0], "drag": [0.0, 1.0], "method": ["quick", "slow"]}
+    for keys, where in (({"method": "quick", "fixed": {"drag": 0.1}}, "method"), ({"axes": drag}, "axes.method")):
+        assert "quick cannot do drag" in message_of(lambda keys=keys: build_rich(**keys), where)
+    all_terms = {"drag": 0.1, "grip": 3, "hold": 2}
+    assert "no method of rich" in message_of(lambda: build_rich(fixed=all_terms), "method")
+    for keys in (  # a term at its default is no hindrance
+        {"method": "quick", "fixed": {"drag": 0}},
+        {"axes": {"drag": [0.0]}, "fixed": {"load": 5, "grip": 5}, "method": "slow"},
+        {"axes": {"shape": ["round"]}, "fixed": {"load": 5, "grip": 5, "hold": 5}, "method": "quick"},
+    ):
+        assert build_rich(**keys).method == keys["method"]
 
 
-def test_a_term_at_its_default_is_no_hindrance():
-    assert build_rich(method="quick", fixed={"drag": 0}).method == "quick"
-    assert build_rich(axes={"drag": [0.0]}, fixed={"load": 5, "grip": 5}, method="slow").method == "slow"
-    assert (
-        build_rich(axes={"shape": ["round"]}, fixed={"load": 5, "grip": 5, "hold": 5}, method="quick").method == "quick"
-    )
+# array parameters
 
 
-def test_the_title_that_a_summary_gets_names_the_axes_that_stay_first():
+def test_a_list_and_one_number_for_all_run_with_dimensions_of_their_own(tmp_path):
+    rows = [[1.0, 2.0], [3.0, 4.0]]
+    ds, zipped = sweep.run(beads(), tmp_path / "a.h5"), sweep.run(beads({}, axes={"mass": rows}, design="zip"))
+    assert (ds.moment.dims, ds.share.dims, ds.place.dims) == (("g", "bead"), ("g", "turned"), ("bead",))
+    np.testing.assert_allclose(ds.moment, np.outer([1.0, 2.0], MASS) * 0.5)
+    np.testing.assert_allclose(ds.share[0], MASS[::-1])
+    assert ds.bead.values.tolist() == [1, 2, 3]
+    assert (zipped.mass.dims, zipped.total.values.tolist()) == (("cell", "bead"), [3.0, 7.0])
+    for engine in ("h5netcdf", "netcdf4"):
+        with xr.open_dataset(tmp_path / "a.h5", engine=engine) as plain:
+            assert {"mass", "place", "bead", "turned"} <= set(plain.coords)
+            np.testing.assert_array_equal(plain.moment, ds.moment)
+    quick = sweep.run(beads(outputs=["total"], method="quick"))
+    assert float(quick.total[0]) == sum(MASS)
+    # a method is kept out where it lacks an output
+    assert [set(sweep.run(beads(**keys)).method_used.values) for keys in ({}, {"outputs": ["total"]})] == [{1}, {0}]
+
+
+def test_arrays_come_from_lists_of_any_unit_columns_of_files_and_rows(tmp_path):
+    (tmp_path / "rod.csv").write_text("mass,place\n100,1\n200,2\n700,3\n")
+    (tmp_path / "rows.csv").write_text("mass_1,mass_2\n1,2\n3,4\n")
+    file = tmp_path / "rod.csv"
+    fixed = beads({"mass": {"value": [100, 200, 700], "unit": "g"}, "place": {"value": 30, "unit": "mm"}}).fixed
+    columns = beads({"mass": {"file": file, "unit": "g"}, "place": {"file": file}}).fixed
+    assert (fixed["mass"].tolist(), fixed["place"].tolist()) == (MASS, [0.03] * 3)
+    assert (columns["mass"].tolist(), columns["place"].tolist()) == (MASS, [1.0, 2.0, 3.0])
+    rows = np.array([[1.0, 2.0], [3.0, 4.0]])
+    for given in (rows, rows.tolist(), {"file": tmp_path / "rows.csv"}, {"values": 1000 * rows, "unit": "g"}):
+        found = beads({}, axes={"mass": given, "g": [1.0, 2.0]}, design="zip").axes["mass"].values
+        np.testing.assert_array_equal(found, rows)
+
+
+# what a summary, and a kernel's declaration, hold
+
+
+def test_a_summary_reduces_all_axes_and_outputs_in_order_unless_told_otherwise():
+    axes = {"height": [1.0, 2.0], "v0": [0.0, 1.0], "g": [1.0, 2.0]}
+    found = build(axes=axes, summary={}).summary
+    assert found.over == ("height", "v0", "g")
+    assert found.outputs == {"fall_time": ("min", "max", "mean", "argmin", "argmax")}
+    some = build(axes=axes, summary={"over": ["g", "height"], "outputs": {"fall_time": ["argmax", "min"]}}).summary
+    assert (some.over, some.outputs) == (("height", "g"), {"fall_time": ("min", "argmax")})
     axes = {"mu": [0.1, 1.0], "R": [0.01, 0.02]}
     study = sweep.study(kernel="foliot", axes=axes, fixed={"phi0": 1.0, "a": 1.0}, summary={"over": ["mu"]})
-    assert study.title == "foliot over R and mu"
-    assert list(study.axes) == ["R", "mu"]
+    assert (study.title, list(study.axes)) == ("foliot over R and mu", ["R", "mu"])  # those that stay first
+
+
+@pytest.mark.parametrize("name", ["status", "method_used", "error_bound", "method", "rtol", "cell", "height", "phase"])
+def test_a_kernel_declares_each_name_once_and_none_of_the_results_own(name):
+    wrong = {name: (Field(name, "s", ""),), "place": (*toy.KERNEL.outputs, Field("trace", "s", "", dims=("place",)))}
+    for said, outputs in wrong.items():
+        toy.OWN = dataclasses.replace(toy.KERNEL, outputs=outputs)
+        with pytest.raises(sweep.SweepError, match=said):
+            load_kernel("toy:OWN", True)
+    del toy.OWN
+
+
+@pytest.mark.parametrize("name", sorted(catalogue.KERNELS))
+def test_what_runs_as_an_axis_is_not_refused_under_fixed(name):
+    """As the free end of a drivetrain was: its last spring may be 0."""
+    kernel = catalogue.get(name)
+    columns = dict(zip([p.name for p in kernel.parameters], columns_of(kernel, (), dict(kernel.example)), strict=True))
+    columns = {p: v.reshape(1, -1) for p, v in columns.items()}
+    for field in (p for p in kernel.parameters if not p.choices):
+        low, high = field.lower, field.upper
+        ends = {low, high, 0.0, -1.0, 1.0, 2.5, -np.inf, np.nextafter(low, -np.inf), np.nextafter(high, np.inf)}
+        for value, place in ((v, j) for v in ends for j in range(columns[field.name].shape[-1])):
+            cell = {p: column.copy() for p, column in columns.items()}
+            cell[field.name][..., place] = value
+            given = [v if p.dims else v[0] for p, v in zip(kernel.parameters, cell.values(), strict=True)]
+            kernel.check(*given, status := np.zeros(1, np.int8))
+            if status[0] < FIRST_REFUSAL:
+                one = cell[field.name][0].tolist()
+                with pytest.raises(sweep.StudyError) as caught:  # no axis is given
+                    sweep.study(kernel=name, fixed={field.name: one if field.dims else one[0]})
+                assert f"fixed.{field.name}" not in {m.where for m in caught.value.mistakes}
+
+
+@pytest.mark.parametrize("values", [[1.0, math.nan], [math.inf], [-1.0], [0]])
+def test_values_outside_the_limits_are_no_mistake_of_the_study(values):
+    assert build(axes={"height": values}).axes["height"].values.shape == (len(values),)
+    assert set(GENERATORS) == {"sobol", "latin", "random", "saltelli", "morris"}
+
+
+def test_a_kernel_beside_the_study_is_found(read, tmp_path):
+    path = list(sys.path)
+    try:
+        (tmp_path / "own_kernel.py").write_text("from toy import KERNEL")
+        study = read('kernel = "own_kernel:KERNEL"\naxes.height = [1]\noutputs = ["fall_time"]', head="")
+        assert study.kernel is toy.KERNEL
+    finally:
+        sys.path[:] = path

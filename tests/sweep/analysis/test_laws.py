@@ -1,0 +1,228 @@
+"""Two laws, corrections, collapses and the comparison of laws: what data were made of is found, with its numbers."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.optimize import curve_fit
+from scipy.stats import chi2
+
+import sweep
+
+X = np.geomspace(2, 2e4, 61)
+T = np.log(X / 200)
+
+
+def line(z, x=X):
+    return xr.DataArray(np.exp(z), {"x": ("x", x, {"units": "m"})}, "x", name="y", attrs={"units": "s"})
+
+
+def two(t, level, low, high, place, log_width):
+    w = np.exp(log_width)
+    return level + low * (t - place) + (high - low) * w * np.logaddexp(0, (t - place) / w)
+
+
+# two laws, corrections, collapses
+
+
+@pytest.mark.parametrize("decades", [0.05, 0.3, 0.8])
+@pytest.mark.parametrize(("low", "high"), [(-1.0, -1 / 3), (0.5, 2.0), (0.0, -0.25)])
+def test_the_law_it_is_made_of_is_found_to_rounding(low, high, decades):
+    w = decades * np.log(10)
+    found = sweep.fit_two_laws(line(two(T, 0.4, low, high, 0.5, np.log(w))), "x")
+    np.testing.assert_allclose(found.exponent, [low, high], atol=1e-7)
+    expected = (200 * np.exp(0.5), decades, np.exp(0.4))
+    assert (float(found.crossover), float(found.width), float(found.level)) == pytest.approx(expected, rel=1e-5)
+    assert float(found.residual) < 1e-8
+    assert (int(found.regimes), int(found.points)) == (2, 61)
+    units = {"crossover": "m", "crossover_low": "m", "level": "s", "exponent": "1", "width": "1"}
+    assert {name: found[name].attrs["units"] for name in units} == units
+
+
+@pytest.mark.parametrize("power", [0.0, -0.5])
+def test_where_one_law_holds_to_rounding_nothing_meets_anywhere(power):
+    found = sweep.fit_two_laws(line(power * T + 2.0), "x")
+    assert int(found.regimes) == 1
+    assert all(np.isnan(float(found[name])) for name in ("crossover", "width", "level"))
+    assert (float(found.crossover_low), float(found.crossover_high)) == (0.0, np.inf)
+    assert ((found.exponent_low <= power + 1e-12) & (found.exponent_high >= power - 1e-12)).all()
+
+
+def test_two_laws_with_noise_are_those_of_scipys_least_squares():
+    z = two(T, 0.4, -1.0, -1 / 3, 0.5, -0.3) + 0.01 * np.random.default_rng(3).standard_normal(T.size)
+    best, _ = curve_fit(two, T, z, (0.4, -1.0, -0.3, 0.5, -0.3), xtol=1e-12, ftol=1e-12)
+    found = sweep.fit_two_laws(line(z), "x", noise="independent")
+    np.testing.assert_allclose(found.exponent, best[1:3], rtol=1e-5)
+    assert np.log(float(found.crossover) / 200) == pytest.approx(best[3], rel=1e-4)
+    compared = sweep.compare_laws(line(z), "x").sel(law="two laws")
+    np.testing.assert_allclose(np.log(compared.fitted), two(T, *best), atol=1e-6)
+    assert float(compared.scatter) == pytest.approx(np.sqrt(np.mean((z - two(T, *best)) ** 2)))
+    y = line(z)
+    y[[5, 30]] = np.nan
+    assert int(sweep.fit_two_laws(y, "x").points) == 59
+
+
+@pytest.mark.parametrize(("p", "strength", "fade"), [(-0.5, 0.8, 0.4), (0.3, -0.4, 0.7), (-1 / 3, 2.0, 2 / 3)])
+@pytest.mark.parametrize("end", ["high", "low"])
+def test_the_exponent_far_out_is_found_at_either_end(p, strength, fade, end):
+    """x to 1/x turns one end into the other, and the sign of the exponent."""
+    x = np.geomspace(0.8, 1e4, 41)
+    z = np.log(x**p * (1 + strength * x**-fade))
+    found = sweep.fit_correction(line(z, x) if end == "high" else line(z[::-1], 1 / x[::-1]), "x", end=end)
+    sign = 1 if end == "high" else -1
+    assert float(found.exponent) == pytest.approx(sign * p, abs=1e-6)
+    assert float(found.correction_exponent) == pytest.approx(sign * fade, abs=1e-5)
+    assert float(found.exponent_low) - 1e-9 <= sign * p <= float(found.exponent_high) + 1e-9
+    assert float(found.correction) == pytest.approx(strength * x[-1] ** -fade, rel=1e-3)
+    assert int(found.fits) == 1
+
+
+def test_the_profile_of_a_correction_is_that_of_lmfit():
+    """lmfit's own walk, on the same sum of squares."""
+    import lmfit
+
+    x = np.geomspace(0.8, 1e4, 41)
+    z = np.log(x**-0.5 * (1 + 0.8 * x**-0.4)) + 0.01 * np.random.default_rng(2).standard_normal(41)
+    found = sweep.fit_correction(line(z, x), "x", confidence=0.95)
+    model = lmfit.Model(lambda x, c, p, b, d: c + p * np.log(x) + np.log(1 + b * x**-d), independent_vars=["x"])
+    fit = model.fit(z, model.make_params(c=0.0, p=-0.5, b=0.8, d=0.4), x=x)
+    ends = lmfit.conf_interval(fit, fit, p_names=["p"], sigmas=[0.95])["p"]
+    near = 2e-3 * abs(ends[2][1] - ends[0][1]) + 2e-4
+    assert (float(found.exponent_low), float(found.exponent_high)) == pytest.approx((ends[0][1], ends[2][1]), abs=near)
+
+
+SIZES, PLACES = np.array([1.0, 2.0, 4.0, 8.0, 16.0]), np.geomspace(0.01, 100, 25)
+
+
+def curves(a, b, f=lambda u: 1 / (u + u**0.2)):
+    u = PLACES / SIZES[:, None] ** a
+    return xr.DataArray(SIZES[:, None] ** b * f(u), {"L": SIZES, "x": PLACES}, ("L", "x"), name="y")
+
+
+@pytest.mark.parametrize(("a", "b"), [(1.5, 0.7), (-0.6, 1.2), (0.0, 0.5)])
+def test_the_exponents_of_a_collapse_are_found_without_a_start_and_points_without_a_partner_are_counted(a, b):
+    y = curves(a, b)
+    found = sweep.fit_collapse(y, "x", "L", bootstrap=10)
+    assert (float(found.x_exponent), float(found.y_exponent)) == pytest.approx((a, b), abs=1e-4)
+    assert int(found.points + found.dropped) == 125
+    y[0, :3], y[1, 4] = np.nan, -1.0
+    gappy = sweep.fit_collapse(y, "x", "L", bootstrap=10)
+    assert int(gappy.points + gappy.dropped) == 125
+    assert int(gappy.dropped) >= int(found.dropped) + 4
+    assert float(gappy.x_exponent) == pytest.approx(a, abs=1e-3)
+
+
+# which law
+
+
+def bent(slope):
+    """ln y from slope -1 to -1/3 about T = 0, by a share of it that rises from 0 to 1."""
+    fine = np.linspace(-60, 60, 240_001)
+    share = slope(fine / 0.6)
+    return -T + 2 / 3 * np.interp(T, fine, np.r_[0.0, np.cumsum(0.5 * (share[1:] + share[:-1]))] * (fine[1] - fine[0]))
+
+
+def logistic(v):
+    return 0.5 * (1 + np.tanh(0.5 * v))
+
+
+TRUTHS = {
+    "one law": -0.5 * T,
+    "logarithm": -0.5 * T + np.log(np.log(X)),
+    "offset": np.log(1 / X + 0.01),
+    "correction to scaling": np.log(X**-0.3 * (1 + 5 * X**-0.8)),
+    "two laws": two(T, 0.0, -1.0, -1 / 3, 0.0, np.log(0.4)),
+    "two laws, hyperbola": -T + 1 / 3 * (T + np.hypot(T, 1.4)),
+    "two laws, asymmetric bend": bent(lambda v: logistic(v) ** 3),
+    "two laws, two widths": bent(lambda v: logistic(np.where(v < 0, 2 * v, 0.5 * v))),
+    "two laws, stretched bend": bent(lambda v: logistic(np.sign(v) * abs(v) ** 0.6)),
+    "three laws": -T + 0.6 * np.logaddexp(0, (T + 2) / 0.3) * 0.3 + 0.9 * np.logaddexp(0, (T - 2) / 0.3) * 0.3,
+}
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("name", TRUTHS)
+def test_the_law_that_data_were_made_of_is_not_ruled_out_and_no_simpler_one_is_left(name, noise):
+    rng = np.random.default_rng(1)
+    found = sweep.compare_laws(line(TRUTHS[name] + noise * rng.standard_normal(X.size)), "x")
+    integrated = name in ("two laws, asymmetric bend", "two laws, stretched bend")  # in the fit, by coarser sums
+    if noise:
+        assert float(found.worse.sel(law=name)) <= 10
+    else:
+        assert found.attrs["chosen"] == name
+        assert float(found.residual.sel(law=name)) < (1e-3 if integrated else 1e-5)
+    alive = found.isel(law=np.flatnonzero(found.worse <= 10))
+    assert int(found.numbers.sel(law=found.attrs["chosen"])) == int(alive.numbers.min())
+    assert ("not ruled out beside it" in found.attrs["verdict"]) == (alive.sizes["law"] > 1)
+    # AICc of least squares, with the size of the noise as one number more; one law may have a better kind of noise
+    n, k = X.size, found.numbers + 1
+    aicc = n * np.log(found.scatter**2) + 2 * k + 2 * k * (k + 1) / (n - k - 1)
+    if noise:
+        others = found.law != "one law"
+        np.testing.assert_allclose(found.aicc[others], aicc[others])
+        np.testing.assert_allclose(found.bic[others], (n * np.log(found.scatter**2) + k * np.log(n))[others])
+
+
+@pytest.mark.parametrize("kind", ["even", "correlated", "outliers", "uneven"])
+def test_noise_about_one_law_leaves_one_law(kind):
+    for seed in range(5):
+        noise = np.random.default_rng(seed).standard_normal(X.size)
+        if kind == "correlated":
+            for i in range(1, X.size):
+                noise[i] = 0.8 * noise[i - 1] + 0.6 * noise[i]
+        noise *= {"outliers": np.where(np.arange(X.size) % 20 == 7, 15, 1), "uneven": np.exp(0.3 * T)}.get(kind, 1.0)
+        assert sweep.compare_laws(line(-0.5 * T + 0.02 * noise), "x").attrs["chosen"] == "one law"
+
+
+def test_known_errors_give_chi_squared_its_chance_and_weigh_the_points():
+    z = TRUTHS["two laws"] + 0.02 * np.random.default_rng(4).standard_normal(X.size)
+    right, small = (sweep.compare_laws(line(z), "x", sigma=size * line(z)) for size in (0.02, 0.005))
+    assert float(right.chi_squared.sel(law="two laws")) > 1e-3
+    assert float(right.chi_squared.sel(law="one law")) < 1e-6
+    assert float(small.chi_squared.sel(law="two laws")) < 1e-6
+    assert "none of them" in small.attrs["verdict"]
+    assert "none of them" in sweep.compare_laws(line(-0.5 * T + 0.1 * np.sin(2 * T)), "x").attrs["verdict"]
+    sigma = np.geomspace(0.01, 1.0, X.size)
+    y = line(-0.5 * T + sigma * np.sin(17.0 * np.arange(X.size) ** 2))
+    one = sweep.compare_laws(y, "x", (3.0, None), sigma=sigma * y).sel(law="one law")
+    t, z, weights = T[X >= 3.0], np.log(y.values)[X >= 3.0], 1 / sigma[X >= 3.0]
+    fit = np.polyval(np.polyfit(t, z, 1, w=weights), t)
+    np.testing.assert_allclose(np.log(one.fitted), fit, atol=1e-6)
+    square = float((((z - fit) * weights) ** 2).sum())
+    assert float(one.chi_squared) == pytest.approx(chi2.sf(square, t.size - 2), rel=1e-6)
+    assert float(one.bic) == pytest.approx(square + 2 * np.log(t.size))
+
+
+def test_eight_points_are_enough_and_may_fall_or_have_gaps():
+    y = line(-0.5 * T[:10] + 0.01 * np.sin(17.0 * np.arange(10) ** 2), X[:10])
+    y[[2, 6]] = np.nan
+    found = sweep.compare_laws(y[::-1], "x")
+    np.testing.assert_allclose(found.x, np.delete(X[:10], [2, 6]))
+    assert (found.x.attrs["units"], found.y.attrs["units"], found.fitted.attrs["units"]) == ("m", "s", "s")
+    constant = sweep.compare_laws(line(0.0 * T), "x")  # all logarithms are 0, to rounding of which all laws are right
+    assert np.isfinite(constant.aicc).all()
+    assert constant.chosen == "one law"
+
+
+@pytest.mark.parametrize(
+    ("fit", "message"),
+    [
+        (lambda y: sweep.compare_laws(y[:7], "x"), "at least 8 points of y, found 7"),
+        (lambda y: sweep.compare_laws(y.expand_dims(a=[1.0, 2.0]), "x"), "one line"),
+        (lambda y: sweep.compare_laws(-y, "x"), "positive values"),
+        (lambda y: sweep.fit_two_laws(y, "nu"), "no axis 'nu'"),
+        (lambda y: sweep.fit_two_laws(y, "x", (1.0, 5.0)), "at least 8 points"),
+        (lambda y: sweep.fit_two_laws(-y, "x"), "positive values"),
+        (lambda y: sweep.fit_two_laws(y, "x", confidence=95), "between 0 and 1"),
+        (lambda y: sweep.fit_two_laws(y, "x", noise="white"), "noise"),
+        (lambda y: sweep.fit_two_laws(y, "x", (2, 20), windows=((1, 2), (3, 4))), "windows"),
+        (lambda y: sweep.fit_correction(y, "x", end="top"), "end"),
+        (lambda y: sweep.fit_correction(y, "x", (1, 2)), "at least 8 points"),
+        (lambda y: sweep.fit_collapse(curves(1.5, 0.7, lambda u: u**-0.5), "x", "L"), "is a power law"),
+        (lambda y: sweep.fit_collapse(y, "x", "L"), "L"),
+        (lambda y: sweep.fit_collapse(curves(1.5, 0.7)[:1], "x", "L"), "two values"),
+        (lambda y: sweep.fit_collapse(curves(1.5, 0.7).where(PLACES < 0.012), "x", "L"), "at least 10"),
+    ],
+)
+def test_what_cannot_be_fitted_is_said(fit, message):
+    with pytest.raises(sweep.SweepError, match=message):
+        fit(line(TRUTHS["offset"]))

@@ -1,0 +1,199 @@
+"""Numbers of a study: spacings against 60 digits, units, sampled designs against scipy's generators, blocks."""
+
+import math
+import subprocess
+import sys
+from decimal import Decimal
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import qmc
+from toy_studies import build, message_of
+
+import sweep
+from sweep.study.units import UnitMistake, scale
+
+RANGES = {
+    "height": {"spacing": "log", "start": 1.0, "stop": 1e4},
+    "v0": {"spacing": "linear", "start": 2.0, "stop": 5.0},
+}
+BLOCKS = [
+    {"design": "zip", "axes": {"height": [1.0, 2.0, 3.0], "v0": [0.0, 1.0, 0.5]}},
+    {"axes": {"g": [9.81, 1.62]}},
+]
+
+
+def sampled(kind="sobol", n=8, seed=3, axes=RANGES, **options):
+    return build(design={"kind": kind, "n": n, "seed": seed, **options}, axes=axes)
+
+
+def heights(**axis):
+    return build(axes={"height": axis}).axes["height"].values
+
+
+# spacings and units
+
+
+@given(
+    st.floats(1e-20, 1e20), st.floats(1e-20, 1e20), st.integers(2, 30),
+    st.sampled_from(["log", "linear"]), st.sampled_from([("m", 1), ("mm", Decimal("0.001")), ("km", 1000)]),
+)  # fmt: skip
+def test_values_are_the_nearest_floats_to_the_true_ones_and_end_exactly(start, stop, num, spacing, unit):
+    if abs(start - stop) < 1e-6 * start:
+        return
+    values = heights(spacing=spacing, start=start, stop=stop, num=num, unit=unit[0])
+    with mpmath.workdps(60):
+        # the decimals that the user wrote, not the floats they became
+        first, last, factor = mpmath.mpf(repr(start)), mpmath.mpf(repr(stop)), mpmath.mpf(str(unit[1]))
+        shares = [mpmath.mpf(i) / (num - 1) for i in range(num)]
+        way = (lambda s: first * (last / first) ** s) if spacing == "log" else (lambda s: first + (last - first) * s)
+        assert values[1:-1].tolist() == [float(factor * way(s)) for s in shares[1:-1]]
+        assert values[[0, -1]].tolist() == [float(factor * first), float(factor * last)]
+    assert (np.diff(values) * (stop - start) > 0).all()
+
+
+def test_a_unit_does_to_a_spacing_what_it_does_to_values_one_by_one():
+    for spacing, listed in (("log", [1, 10, 100, 1000]), ("linear", [1, 334, 667, 1000])):
+        spaced = heights(spacing=spacing, start=1, stop=1000, num=4, unit="mm").tolist()
+        fixed = [build(axes={"height": [1.0]}, fixed={"v0": {"value": n, "unit": "mm/s"}}).fixed["v0"] for n in listed]
+        assert spaced == heights(values=listed, unit="mm").tolist() == fixed == [n / 1000 for n in listed]
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted", "factor"),
+    [
+        ("degree", "rad", math.pi / 180), ("ms", "s", 0.001), ("g cm^2", "kg m^2", 1e-7),
+        ("rpm", "rad/s", 2 * math.pi / 60), ("rpm", "Hz", 1 / 60), ("percent", "1", 0.01), ("", "1", 1),
+        ("degree/s^2", "rad/s^2", math.pi / 180), ("N m/degree", "N m/rad", 180 / math.pi),
+        ("Hz", "rad/s", 2 * math.pi), ("kHz", "rad/s", 2000 * math.pi), ("rad/s", "Hz", 1 / (2 * math.pi)),
+        # rad may be left out
+        ("1/s", "rad/s", 1), ("1/s", "Hz", 1), ("1", "rad", 1), ("N m", "N m/rad", 1), ("N m/(kg m^2)", "rad/s^2", 1),
+    ],
+)  # fmt: skip
+def test_a_unit_becomes_the_factor_to_the_field(given, wanted, factor):
+    assert float(scale(given, wanted, "x")) == pytest.approx(factor, rel=2.3e-16)  # an ulp: factor is rounded too
+
+
+def test_the_unit_of_the_field_needs_no_pint_and_malformed_ones_are_refused():
+    code = (
+        "import sys; from sweep.study.units import scale; scale('rad/s', 'rad/s', 'x'); sys.exit('pint' in sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+    for text in ("m/", "(((", "m*", "rad s-2", "3 m", "m**m", "m^", "\n", "m;m", "__import__('os')", "💥"):
+        with pytest.raises(UnitMistake):
+            scale(text, "m", "x")
+
+
+# sampled designs
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "points"),
+    [
+        ("sobol", {}, lambda rng: qmc.Sobol(2, rng=rng).random(8)),
+        ("sobol", {"scramble": False}, lambda rng: qmc.Sobol(2, scramble=False).random(8)),
+        ("latin", {}, lambda rng: qmc.LatinHypercube(2, rng=rng).random(8)),
+        ("random", {}, lambda rng: rng.random((8, 2))),
+    ],
+)
+def test_points_are_those_of_scipy_within_the_ranges(kind, options, points):
+    study = sampled(kind, **options)
+    height, v0 = points(np.random.default_rng(3)).T
+    np.testing.assert_allclose(np.log10(study.axes["height"].values) / 4, height, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(study.axes["v0"].values, 2 + 3 * v0, rtol=1e-15)
+    found = sweep.run(study)
+    assert (found.fall_time.dims, found.attrs["design"]) == (("cell",), kind)
+    np.testing.assert_array_equal(found.height, study.axes["height"].values)
+
+
+def test_the_designs_of_sensitivity_change_one_axis_at_a_time():
+    pytest.importorskip("SALib")
+    axes = {name: {"spacing": "linear", "start": 0.0, "stop": 1.0} for name in ("height", "v0")}
+    morris, saltelli = (
+        np.stack([a.values for a in sampled(kind, 4, 2, axes).axes.values()], axis=1) for kind in ("morris", "saltelli")
+    )
+    assert set(np.round(np.unique(morris) * 3, 12)) <= {0.0, 1.0, 2.0, 3.0}
+    assert ((np.diff(morris.reshape(4, 3, 2), axis=1) != 0).sum(axis=2) == 1).all()
+    first, *changed, other = saltelli.reshape(4, 4, 2).transpose(1, 0, 2)
+    for k, points in enumerate(changed):
+        np.testing.assert_array_equal(points[:, k], other[:, k])
+        np.testing.assert_array_equal(points[:, 1 - k], first[:, 1 - k])
+
+
+@pytest.mark.parametrize(
+    ("design", "where", "message"),
+    [
+        ("sobol", "design", "how many points?"),
+        ({"kind": "sobol", "n": 12}, "design.n", "write 8 or 16"),
+        ({"kind": "latin"}, "design.n", "found nothing"),
+        ({"kind": "latin", "n": 8, "seed": 1.5}, "design.seed", "whole number"),
+        ({"kind": "random", "n": 8, "scramble": True}, "design.scramble", "no such key"),
+        ({"kind": "latin", "n": 8, "scramble": 1}, "design.scramble", "true or false"),
+        ({"kind": "zip", "n": 8}, "design.n", "no such key"),
+        ({"kind": "saltelli", "n": 2**23}, "design.n", "at most"),
+    ],
+)
+def test_what_is_wrong_with_a_design_is_told(design, where, message):
+    assert message in message_of(lambda: build(design=design, axes=RANGES), where)
+
+
+@pytest.mark.parametrize("entry", [[1.0, 2.0], {"values": [1.0]}, {**RANGES["v0"], "num": 8}])
+def test_a_sampled_axis_has_no_values_of_its_own(entry):
+    found = message_of(lambda: sampled(axes={"v0": entry, "height": RANGES["height"]}), "axes.v0")
+    assert "the design chooses the values" in found
+
+
+# blocks
+
+
+def test_blocks_are_a_product_of_designs():
+    found = sweep.run(build(blocks=BLOCKS))
+    assert dict(found.sizes) == {"point": 3, "g": 2}
+    assert found.height.dims == found.v0.dims == ("point",)
+    time = found.fall_time
+    np.testing.assert_allclose((found.v0 * time + found.g * time**2 / 2).transpose(..., "point"), [found.height] * 2)
+    least = sweep.run(build(blocks=BLOCKS, summary={"over": ["height", "v0"], "outputs": {"fall_time": ["argmin"]}}))
+    first = time.isel(point=time.argmin("point"))
+    np.testing.assert_array_equal(least.fall_time_argmin_height, first.height)
+    wrong = {"over": ["height"], "outputs": {"fall_time": ["min"]}}
+    assert "run together" in message_of(lambda: build(blocks=BLOCKS, summary=wrong), "summary.over")
+
+
+def test_arrays_go_into_a_block_of_their_own():
+    arrays = {"design": "zip", "axes": {"J": [[1.0, 2.0], [3.0, 4.0]], "k": [[1.0, 1.0], [2.0, 2.0]]}}
+    keys = {"kernel": "drivetrain", "outputs": ["frequency"], "fixed": {"f_max": 1.0}}
+    found, alone = sweep.run(**keys, blocks=[{"axes": {"tol": [0.0, 0.01]}}, arrays]), sweep.run(**keys, **arrays)
+    assert found.J.dims == ("point", "mass")
+    np.testing.assert_array_equal(found.frequency.isel(tol=0), alone.frequency)
+
+
+@settings(deadline=None, max_examples=10)
+@given(block=st.integers(1, 40), kind=st.sampled_from(["sobol", "latin", "random"]))
+def test_the_bits_are_the_same_for_any_blocks_of_cells(block, kind):
+    keys = {"blocks": [{"design": {"kind": kind, "n": 8, "seed": 1}, "axes": RANGES}, {"axes": {"g": [9.81, 1.62]}}]}
+    study = build(**keys, where="v0**2 < 2*g*height")
+    whole, cut = sweep.run(study), sweep.run(study, block_cells=block, workers=1)
+    assert whole.fall_time.values.tobytes() == cut.fall_time.values.tobytes()
+    assert np.array_equal(whole.status, cut.status)
+
+
+@pytest.mark.parametrize(
+    ("keys", "where"),
+    [
+        ({"blocks": BLOCKS, "axes": {"g": [1.0]}}, "axes"),
+        ({"blocks": BLOCKS, "design": "zip"}, "design"),
+        ({"blocks": {}}, "blocks"),
+        ({"blocks": []}, "blocks"),
+        ({"blocks": [3]}, "blocks[0]"),
+        ({"blocks": [*BLOCKS, {"axes": {"g": [1.0]}}]}, "blocks[2].axes.g"),
+        ({"blocks": [*BLOCKS, {"axes": {"h": [1.0]}}]}, "blocks[2].axes.h"),
+        ({"blocks": [{"design": "zip", "axes": {"g": [1.0], "v0": [1.0, 2.0]}}]}, "blocks[0].axes"),
+        ({"blocks": [{"axes": {"height": [1.0, 1.0]}}, {"axes": {"v0": [0.0, 0.0]}, "design": "zip"}]},
+         "blocks[0].axes.height"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_blocks_is_told_where_it_stands(keys, where):
+    assert message_of(lambda: build(**keys), where)
