@@ -57,16 +57,6 @@ def balance(zeta, omega_n, r, r_s, theta0):
         return mpf(n), side * last, n * half, margin, 2 * half
 
 
-def swing_followed(zeta, r, theta0, share):
-    """(angle, speed/omega_n) at a share of the first half swing: th'' + 2 zeta th' + th = r from rest at theta0 > r."""
-    with mp.workdps(DIGITS):
-        zeta, r, theta0 = mpf(zeta), mpf(r), mpf(theta0)
-        s = sqrt(1 - zeta * zeta)
-        t = mpf(share) * pi / s
-        fade = (theta0 - r) * exp(-zeta * t)
-        return r + fade * (cos(s * t) + zeta / s * sin(s * t)), -fade * sin(s * t) / s
-
-
 def driven(zeta, omega_n, r, w, m, beta, digits=40):
     """(amplitude, period, multiplier) of the driven balance's cycle, or None where there is none.
 

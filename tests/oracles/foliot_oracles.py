@@ -1,12 +1,11 @@
-"""Truth about the foliot with any losses, by mpmath; imports nothing of ours.
+"""Truth about the foliot with any losses, but for drag beside a spring, by mpmath; imports nothing of ours.
 
     phi'' = -mu - (a v + R sgn v + c |v|^n sgn v) - k phi,  v = phi'                                (1)
 
 from phi = +phi0, just after a switch, to phi = -phi0, where the next one follows; a switch changes the speed to e times
-what it was. Three ways, each to its own half swing, and one search for the cycle above them:
+what it was. Two ways, each to its own half swing, and one search for the cycle above them:
 - c = 0 (or n = 0, 1): the closed flow of a linear piece;
-- k = 0: integrals over the speed, dphi = v dv/accel and dt = dv/accel;
-- k > 0 and c > 0: Taylor series, in time and, near a turning point, in ln |v|, where |v|^n is smooth.
+- k = 0: integrals over the speed, dphi = v dv/accel and dt = dv/accel.
 Period's sensitivity is a difference of solved cycles; the multiplier is one of the map, or, at k = 0, the ratio of the
 accelerations at the ends, which differentiating the integrals at their limits gives.
 
@@ -15,7 +14,7 @@ Arguments are float64 and taken as exact. Inside, angles are in phi0 and times i
 
 from dataclasses import dataclass
 
-from mpmath import atan2, atanh, cos_sin, cosh, exp, expm1, fdot, log, log1p, mp, mpf, pi, quad, sinh, sqrt
+from mpmath import atan2, atanh, cos_sin, cosh, exp, expm1, log, log1p, mp, mpf, pi, quad, sinh, sqrt
 
 DIGITS = 40
 LIMIT = 5000
@@ -46,10 +45,10 @@ class HalfSwing:
     speed: mpf
 
 
-def cycle(mu, phi0, a=0, R=0, c=0, n=0, k=0, e=1, digits=None):
+def cycle(mu, phi0, a=0, R=0, c=0, n=0, k=0, e=1, digits=DIGITS):
     """(period, amplitude, crossing speed, sensitivity, multiplier) of the limit cycle.
 
-    To at least `digits` digits: 40, and 16 (in fact 25, in some ten seconds) where spring and power law act together.
+    To at least `digits` digits.
 
     Raises
     ------
@@ -57,14 +56,9 @@ def cycle(mu, phi0, a=0, R=0, c=0, n=0, k=0, e=1, digits=None):
         Nothing is lost, the drive never wins over dry friction, or the half swing from rest does not reach -phi0.
     """
     cell = (mu, phi0, a, R, c, n, k, e)
-    method = _method(*cell)
-    return cycle_by(cell, method, digits or (16 if method is Series else DIGITS))
-
-
-def _method(mu, phi0, a, R, c, n, k, e):
-    if c == 0 or n in (0, 1):
-        return Flows
-    return Integrals if k == 0 else Series
+    linear = c == 0 or n in (0, 1)
+    assert linear or k == 0, "of drag beside a spring: ripple_oracles.by_taylor"
+    return cycle_by(cell, Flows if linear else Integrals, digits)
 
 
 def law_of(mu, phi0, a, R, c, n, k, e):
@@ -89,7 +83,7 @@ def _lost(*groups):
 
 
 def cycle_by(cell, method, digits):
-    """The cycle by `Flows`, `Integrals` or `Series`."""
+    """The cycle by `Flows` or `Integrals`."""
     mp_digits = mp.dps
     try:
         mp.dps = 60
@@ -163,18 +157,18 @@ def _chord(miss, x, slope):
     raise AssertionError("no root")
 
 
-class _Mapped:
-    """The search for v1 as the fixed point of a half swing; what Flows and Series share."""
+class Flows:
+    """Linear pieces in closed form, with sigma^2 = kappa - d^2/4 of either sign; v1 is the map's fixed point."""
 
     @staticmethod
     def lost(law):
         return _lost(law.d, law.kappa, 1 - law.rho, law.rho, law.gamma, 1 - law.e * abs(law.e))
 
-    @classmethod
-    def search(cls, law):
+    @staticmethod
+    def search(law):
         """v1 of the cycle, roughly. The loss grows with the swing: it exists if the half swing from rest arrives."""
-        low = cls.half_swing(law, mpf(0)).speed
-        high, miss = 2 * low, cls.miss(law)
+        low = Flows.half_swing(law, mpf(0)).speed
+        high, miss = 2 * low, Flows.miss(law)
         at_low = miss(low)
         if at_low <= 0 or law.e == 0:
             return low
@@ -182,29 +176,25 @@ class _Mapped:
             low, at_low, high = high, at_high, 4 * high
         return _bracketed(miss, low, high, at_low, at_high)
 
-    @classmethod
-    def miss(cls, law):
-        return lambda v: cls.half_swing(law, v).speed - v
+    @staticmethod
+    def miss(law):
+        return lambda v: Flows.half_swing(law, v).speed - v
 
-    @classmethod
-    def swing(cls, law, v1):
-        return cls.half_swing(law, v1)
+    @staticmethod
+    def swing(law, v1):
+        return Flows.half_swing(law, v1)
 
     @staticmethod
     def speed(law, v1):
         return v1
 
-    @classmethod
-    def multiplier(cls, law, v1, step):
+    @staticmethod
+    def multiplier(law, v1, step):
         """Of the map; 0 where exp(-d time) is below any float64."""
-        if law.d * cls.half_swing(law, v1).time > 800:
+        if law.d * Flows.half_swing(law, v1).time > 800:
             return mpf(0)
-        high, low = (cls.half_swing(law, v1 * (1 + h)).speed for h in (step, -step))
+        high, low = (Flows.half_swing(law, v1 * (1 + h)).speed for h in (step, -step))
         return (high - low) / (2 * step * v1)
-
-
-class Flows(_Mapped):
-    """Linear pieces: v and x in closed form, with sigma^2 = kappa - d^2/4 of either sign."""
 
     @staticmethod
     def working(law, v1, digits):
@@ -416,120 +406,6 @@ def _energy(law, top, z):
     if law.e > 0:
         return _drive_integral(law, top, z, lambda v: v) - _brake_integral(law, v0, lambda v: v)
     return _drive_integral(law, top, z, lambda v: v, -log1p(v0 / top))
-
-
-class Series(_Mapped):
-    """Spring and power law together: Taylor series. From u = |v| follow u^n in time, and x, t in ln u near u = 0."""
-
-    @staticmethod
-    def working(law, v1, digits):
-        return digits + 2 * (digits // 2 + 5) + 5
-
-    @staticmethod
-    def half_swing(law, v1):
-        if law.e > 0 and v1 > 0:
-            out, top = _series_in_speed(law, 1, mpf(1), law.e * v1, _tiny())
-        else:
-            out, top = mpf(0), mpf(1)
-        u = -law.e * v1
-        back = mpf(0)
-        x = top
-        if u <= 0:
-            if 1 + law.kappa * x <= law.rho:
-                raise NoCycle("the spring holds it")
-            u = _small_speed(law)
-            back, x = _series_in_speed(law, -1, top, _tiny(), u)
-        time, speed = _series_in_time(law, x, u)
-        return HalfSwing(out + back + time, top, speed)
-
-
-def _tiny():
-    return mpf(10) ** -mp.dps
-
-
-def _small_speed(law):
-    """A speed at which the drive still rules and the way from rest is short."""
-    left = 1 - law.rho
-    u = sqrt(left) / 2
-    while _loss(law, u) - law.rho > left / 4:
-        u /= 2
-    return u
-
-
-def _step_of(*series):
-    """A step within which the last terms are below the last digit of the largest."""
-    steps = []
-    for p in series:
-        largest = max(abs(p[0]), _tiny())
-        steps += [(_tiny() * largest / abs(c)) ** (mpf(1) / k) for k, c in list(enumerate(p))[-2:] if c]
-    return min(steps) if steps else mpf(1)
-
-
-def _sum(p, h):
-    total = mpf(0)
-    for c in reversed(p):
-        total = total * h + c
-    return total
-
-
-def _series_in_speed(law, side, x, u, u_end):
-    """(time, x) when the speed has gone from u to u_end: dx/dtau = side u^2/D, dt/dtau = u/D, tau = ln u.
-
-    D = -side (1 + kappa x) - f(u) is du/dt; side is +1 on the way out and -1 on the way back.
-    """
-    t, tau, end = mpf(0), log(u), log(u_end)
-    order = int(mp.dps * 1.3) + 10
-    for _ in range(LIMIT):
-        u, power = exp(tau), law.gamma * exp(law.n * tau)
-        xs, ts = [x], [t]
-        fall, dt, dx = [], [], []  # D, u/D and side u^2/D
-        us, ps, squares = u, power, u * u
-        for k in range(order):
-            fall.append(-side * (law.kappa * xs[k] + (1 if k == 0 else 0)) - (law.rho if k == 0 else 0))
-            fall[k] -= law.d * us + ps
-            earlier = fall[:0:-1]
-            dt.append((us - fdot(earlier, dt)) / fall[0])
-            dx.append((side * squares - fdot(earlier, dx)) / fall[0])
-            ts.append(dt[k] / (k + 1))
-            xs.append(dx[k] / (k + 1))
-            us, ps, squares = us / (k + 1), ps * law.n / (k + 1), squares * 2 / (k + 1)
-        h = _step_of(xs, [u, *dt[1:]])
-        last = abs(end - tau) <= h
-        h = end - tau if last else (h if end > tau else -h)
-        x, t, tau = _sum(xs, h), _sum(ts, h), tau + h
-        if last:
-            return t, x
-    raise AssertionError("too many steps")
-
-
-def _series_in_time(law, x, u):
-    """(time, speed) at x = -1 of the way back: x' = -u, u' = 1 + kappa x - f(u)."""
-    t = mpf(0)
-    order = int(mp.dps * 1.3) + 10
-    for _ in range(LIMIT):
-        xs, us, ps, rates = [x], [u], [law.gamma * u**law.n], [mpf(0)]
-        for k in range(order):
-            rate = law.kappa * xs[k] - law.d * us[k] - ps[k] + (1 - law.rho if k == 0 else 0)
-            xs.append(-us[k] / (k + 1))
-            us.append(rate / (k + 1))
-            m = k + 1
-            rates.append(us[m] * m)
-            falls = [(m - j) * ps[m - j] for j in range(1, m + 1)]
-            ps.append((law.n * fdot(rates[1:], ps[::-1]) - fdot(us[1:], falls)) / (m * u))
-        h = _step_of(us, xs)
-        h = min(h, *((u / abs(c)) ** (mpf(1) / i) / 3 for i, c in enumerate(us[1:], 1) if c))  # so that u > u/2 stays
-        new_x, new_u = _sum(xs, h), _sum(us, h)
-        if new_x <= -1:
-            part = h * (x + 1) / (x - new_x)
-            for _ in range(LIMIT):
-                step = (_sum(xs, part) + 1) / _sum(us, part)
-                part += step
-                if abs(step) < abs(h) * mpf(10) ** (5 - mp.dps):
-                    return t + part, _sum(us, part)
-        if new_u < mpf(10) ** -12 or h < mpf(10) ** -12:
-            raise NoCycle("it turns before -phi0")
-        t, x, u = t + h, new_x, new_u
-    raise NoCycle("it creeps to a point before -phi0")
 
 
 def flips(mu, phi0, phi_start, count, a=0, R=0, k=0, e=1, digits=DIGITS):

@@ -3,7 +3,8 @@
 import foliot_oracles
 import oracles
 import pytest
-from foliot_oracles import Flows, Integrals, NoCycle, Series
+import ripple_oracles
+from foliot_oracles import Flows, Integrals, NoCycle
 from mpmath import atan, atanh, exp, expm1, log1p, mp, mpf, sqrt
 
 
@@ -43,7 +44,7 @@ def test_one_loss_alone_gives_its_closed_law(loss, law, values):
     for value in values:
         with mp.workdps(120):
             truth = law(mpf(value))
-        found = foliot_oracles.cycle(1.0, 1.0, **{loss: value, "n": 2}, digits=20 if loss == "c" else None)
+        found = foliot_oracles.cycle(1.0, 1.0, **{loss: value, "n": 2}, digits=20 if loss == "c" else 40)
         assert digits(found, truth) >= (20 if loss == "c" else 40)
 
 
@@ -62,14 +63,10 @@ def test_flows_and_integrals_agree(cell):
     assert digits(flows, integrals) >= 20
 
 
-def test_flows_and_series_agree():
-    cell = (1.0, 0.8, 0.3, 0.2, 0, 0, 1.4, -0.7)
-    assert digits(foliot_oracles.cycle_by(cell, Flows, 20), foliot_oracles.cycle_by(cell, Series, 16)) >= 25
-
-
-def test_integrals_and_series_agree():
-    cell = (1.0, 0.8, 0.3, 0.2, 0.4, 2.3, 0, -0.7)
-    assert digits(foliot_oracles.cycle_by(cell, Integrals, 10), foliot_oracles.cycle_by(cell, Series, 10)) >= 16
+def test_flows_and_a_taylor_series_agree():
+    """Of a spring; the series takes its slopes from differences over 1e-8."""
+    cell = {"a": 0.3, "R": 0.2, "k": 1.4, "e": -0.7}
+    assert digits(foliot_oracles.cycle(1.0, 0.8, **cell), ripple_oracles.by_taylor(1.0, 0.8, **cell)) >= 14
 
 
 @pytest.mark.parametrize("zeta", [1.0, 1 - 1e-13, 1 + 1e-13])
@@ -86,7 +83,7 @@ def test_nothing_is_lost_where_the_damping_is_critical(zeta):
     "cell",
     [
         {"R": 1.0}, {"R": 0.5, "c": 0.5}, {}, {"k": 0.5}, {"k": 2.0, "a": 1.0}, {"k": 1.0, "a": 10.0},
-        {"k": 2.0, "a": 2.0, "e": -0.5}, {"k": 2.0, "c": 1.0, "n": 1.5},
+        {"k": 2.0, "a": 2.0, "e": -0.5},
     ],
 )  # fmt: skip
 def test_where_there_is_no_cycle_it_is_said(cell):

@@ -199,59 +199,15 @@ def lens(one, two, apart):
     return one**2 * (first - np.sin(2 * first) / 2) + two**2 * (second - np.sin(2 * second) / 2)
 
 
-def contact_area(machine, theta, rim):
-    """Area of the tool within the disc of radius `rim` at one instant: its widths, added up along X.
-
-    In the tool's frame it is the common width of two shapes that have one width each at every X; it is split where the
-    edges of the two cross, and at the tool's corners.
-    """
-    a, width, n, m = machine.tool
-    z = machine.centre * np.exp(-1j * (machine.arm(np.array([theta]))[0][0] + machine.beta)) - machine.reach
-    if machine.tool == (a, a, 2.0, 2.0):
-        return float(lens(a, rim, abs(z)))
-    low, high = max(-a, z.real - rim), min(a, z.real + rim)
-    if not high > low:
-        return 0.0
-
-    def tool(x):
-        return width * np.maximum(0.0, 1 - np.abs(x / a) ** n) ** (1 / m)
-
-    def disc(x):
-        return np.sqrt(np.maximum(0.0, rim**2 - (x - z.real) ** 2))
-
-    edges = [lambda x, s=s, t=t: tool(x) + s * (z.imag + t * disc(x)) for s in (-1, 1) for t in (-1, 1)]
-    cuts = [low, high, *(x for x in (0.0, a * 0.5 ** (1 / n), -a * 0.5 ** (1 / n)) if low < x < high)]
-    grid = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.linspace(0, np.pi, 2001))
-    for edge in edges:
-        value = edge(grid)
-        j = np.nonzero((value[1:] > 0) != (value[:-1] > 0))[0]
-        cuts += list(bisected(edge, grid[j], grid[j + 1]))
-    cuts = np.unique(cuts)
-    t = np.linspace(-3.6, 3.6, 109)
-    u, growth = np.tanh(np.pi / 2 * np.sinh(t)), np.pi / 2 * np.cosh(t) / np.cosh(np.pi / 2 * np.sinh(t)) ** 2
-    one, two = cuts[:-1, None], cuts[1:, None]
-    x = 0.5 * (one + two) + 0.5 * (two - one) * u
-    common = np.minimum(tool(x), z.imag + disc(x)) - np.maximum(-tool(x), z.imag - disc(x))
-    return float((0.5 * (two - one) * growth * np.maximum(0.0, common)).sum() * (t[1] - t[0]))
-
-
-def ring_wear(machine, r, rtol=1e-12, rim=None):
-    """int dtheta int_contact v dpsi over the crank's turn and the ring of radius r.
-
-    With `rim` over the area of contact at each instant with a workpiece of that radius: wear by a constant load.
-    """
+def ring_wear(machine, r, rtol=1e-12):
+    """int dtheta int_contact v dpsi over the crank's turn and the ring of radius r."""
     cuts = splits(machine, r)
-    if rim is not None:
-        cuts = np.union1d(cuts, splits(machine, rim))
     y, weight = 0.5 * (_GAUSS[0] + 1), 0.5 * _GAUSS[1]
 
     def panel(low, high, first, last):
         s = first + (last - first) * y
         theta = low + (high - low) * s * s * (3 - 2 * s)
         inner = at_instants(machine, r, theta)
-        if rim is not None:
-            for k in np.nonzero(inner)[0]:
-                inner[k] /= contact_area(machine, theta[k], rim)
         return float((weight * inner * 6 * s * (1 - s)).sum() * (high - low) * (last - first))
 
     total, todo = 0.0, []

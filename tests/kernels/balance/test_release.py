@@ -149,21 +149,6 @@ def test_without_solid_friction_the_swing_fades_and_never_ends():
     assert outputs["period"][0] == pytest.approx(2 * np.pi / (3 * np.sqrt(0.99)), rel=1e-15)
 
 
-def test_an_angle_of_rest_that_no_float64_can_hold_is_left_out_and_the_rest_given():
-    zeta = [0.9999, 0.999999999, 0.99, 1 - 2.0**-53]
-    columns = [np.array(np.broadcast_to(c, (4,))) for c in (zeta, 1.3, 0.0, 1e-3, [1.0, 1.0, 1.0, -7.0])]
-    outputs, status = solve(BALANCE, "closed", *columns, rtol=1e-10)
-    assert status.tolist() == [Status.OK, Status.PARTLY_OUT_OF_RANGE] * 2
-    assert np.isnan(outputs["stop_angle"]).tolist() == [False, True] * 2
-    exist = tuple(name for name in NAMES if name != "stop_angle")
-    for name, error in errors(outputs, truths(columns), exist).items():
-        assert error.max() < 2e-15, name
-    outputs, status = solve(BALANCE, "closed", zeta, [1.0], [0.0], [1e-3], [1.0], rtol=1e-10)
-    for i in (0, 2):
-        true = oracles.balance(zeta[i], 1.0, 0.0, 1e-3, 1.0)[1]
-        assert relative_error(outputs["stop_angle"][i : i + 1], [true])[0] < 1e-15
-
-
 def test_released_within_stiction_it_stays_where_it_is():
     theta0 = [0.05, -0.05, 0.0, -0.1, 0.1]
     outputs, status = solve(BALANCE, "closed", [0.3] * 5, [2.0], [0.1], [0.1], theta0)

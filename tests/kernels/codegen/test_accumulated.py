@@ -73,14 +73,6 @@ def test_where_bounces_shrink_by_a_share_that_differs_it_is_right_too(kernel):
 
 
 @many
-def test_a_number_of_bounces_that_can_be_counted_is_as_before():
-    outputs, status = solve(BALL, "taylor", [9.81], 0.5, flips=40.0)
-    first = mp.sqrt(2 / mpf(9.81))
-    assert status[0] == Status.OK
-    assert relative_error(outputs["interval"], [2 * first * mpf(0.5) ** 39])[0] < 1e-9
-
-
-@many
 def test_what_does_not_slow_down_by_a_factor_is_not_carried_to_rest():
     """A ball that loses nothing bounces for ever; one thrown back faster is never at rest."""
     _, status = solve(BALL, "taylor", [9.81], [1.0, 1.2], flips=500.0)

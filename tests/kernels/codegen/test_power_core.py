@@ -7,7 +7,7 @@ from columns import relative_error
 from columns import solve as solve_columns
 from mpmath import mp, mpf
 
-from kernels.interface import FIRST_REFUSAL, Status
+from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 from kernels.scene import Field, power, scene_kernel, sign
 
@@ -69,21 +69,6 @@ def test_the_power_0_is_dry_friction_and_the_power_2_is_quadratic_drag():
     assert relative_error(outputs["time"], [dry, drag]).max() < 1e-9
 
 
-@pytest.mark.parametrize(
-    ("cell", "status"),
-    [
-        ((0.0, 1.0, 0.1, 0.1, 1.5), Status.STICKS),
-        ((1.0, 1.0, 0.1, 2.0, 0.0), Status.STICKS),
-        ((1.0, 1.0, 0.1, 0.1, -2.0), Status.OUT_OF_RANGE),
-        ((1e-140, 1e-140, 0.5, 0.0, 1.5), Status.OK),
-    ],
-)
-def test_what_a_cell_comes_to_is_named(cell, status):
-    outputs, verdict = solve(*cell, flips=2.0)
-    assert verdict[0] == status
-    assert status >= FIRST_REFUSAL or np.isfinite(outputs["time"][0])
-
-
 def test_over_decades_what_is_not_remarked_is_right():
     if not COMPILED:
         pytest.skip("thousands of steps")
@@ -96,15 +81,3 @@ def test_over_decades_what_is_not_remarked_is_right():
     assert fine.mean() > 0.5
     np.testing.assert_allclose(outputs["time"][fine], finer["time"][fine], rtol=1e-6)
     np.testing.assert_allclose(outputs["speed"][fine], finer["speed"][fine], rtol=1e-6)
-
-
-@pytest.mark.skipif(not COMPILED, reason="a thousand steps")
-def test_a_first_step_from_the_kink_that_was_too_long_is_tried_again_in_the_core():
-    """Of what friction brings to an end in a hundredth of the first guess: two steps are refused."""
-    mu, phi0, a, c, n = cell = 1.0, 1.0, 100.0, 1e-7, 0.5
-    outputs, status = solve(*cell, flips=1.0, rtol=1e-9)
-    speed = mu / a
-    for _ in range(5):
-        speed = (mu - c * speed**n) / a
-    assert status[0] == Status.OK
-    assert outputs["time"][0] == pytest.approx(phi0 / speed + 1.0 / a, rel=1e-9)  # c leaves 1e-12 of the last

@@ -5,8 +5,6 @@ import numpy as np
 import pytest
 import reduction_oracles
 from columns import checked, relative_error, solve
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from mpmath import mp, mpf
 
 from kernels.drivetrain.receptance import MILLING_MACHINE
@@ -89,21 +87,6 @@ def test_a_smallest_frequency_that_is_shut_in_amid_the_chain_is_found(seed):
     assert not off(J[0], k[0], solved(J, k)[0][0], 4e-15)
 
 
-def test_frequencies_are_those_of_the_dense_problem_and_the_count_tells_wrong_ones():
-    for J, k in zip(*chains("12 decades", 6, 2), strict=True):
-        found = solved(J, k)[0][0]
-        assert relative_error(found, oracles.modes(J, k)[0]).max() < 1e-15
-        assert off(J, k, found * (1 + 1e-12), 5e-13)
-        assert off(J, k, found * (1 - 1e-12), 5e-13)
-
-
-@settings(deadline=None, max_examples=30 if COMPILED else 4)
-@given(st.integers(-150, 150), st.integers(-150, 150), st.integers(1, 7))
-def test_other_units_by_powers_of_four_change_no_digit(inertia, stiffness, n):
-    J, k = chains("plain", n, 1)
-    assert (solved(J * 4.0**inertia, k * 4.0**stiffness)[0] == solved(J, k)[0] * 2.0 ** (stiffness - inertia)).all()
-
-
 def test_the_sum_of_inverse_squares_is_dunkerleys():
     """sum 1/w^2 = sum of J_i times its flexibility to ground."""
     J, k = chains("12 decades", 8, 500 if COMPILED else 3)
@@ -145,23 +128,6 @@ def test_damping_is_that_of_the_poles_to_rtol_or_the_cell_says_that_it_is_not(ki
         assert rtol < 1e-9 or right.mean() >= (0.6 if damping > 1 else 0.9)  # poles may lie over 19 decades
         for row, truth in zip(found[right], np.array(truths)[right], strict=True):
             assert relative_error(np.sort(row), truth).max() <= rtol
-
-
-def test_light_damping_keeps_its_digits():
-    J, k = (values[0] for values in chains("plain", 4, 1, 3))
-    h = 1e-12 * np.array([1.0, 3.0, 2.0, 0.5])
-    _, damping, _ = solved(J, k, h)
-    true = reduction_oracles.dampings(oracles.poles(J, k, h))
-    assert relative_error(np.sort(damping[0]), sorted(true)).max() < 1e-14
-    assert not solved(J, k, 0.0)[1].any()
-
-
-@pytest.mark.parametrize("damping", [3e-3, 0.9, 3.0, 1e8])
-def test_one_damped_inertia_has_the_damping_of_the_quadratic(damping):
-    frequency, found, status = solved([2.0], [3.0], [damping * 2 * np.sqrt(6.0)])
-    assert status[0] == Status.OK
-    assert frequency[0, 0] == pytest.approx(np.sqrt(1.5) / (2 * np.pi), rel=1e-15)
-    assert found[0, 0] == pytest.approx(damping, rel=1e-14)
 
 
 @pytest.mark.parametrize("share", [0.0, 1e-14, -1e-14, 1e-9, -1e-9, 1e-6, -1e-6])

@@ -42,14 +42,6 @@ def test_all_frequencies_are_those_of_the_full_chain_to_a_few_ulp(seed, n, decad
             assert abs(outputs["frequency_error"][0]).max() < 5e-15
 
 
-@pytest.mark.skipif(not COMPILED, reason="long in plain Python")
-def test_sixty_four_masses_have_their_frequencies_from_one():
-    J, k = chain(5, 64, 4.0)
-    outputs, status = exact(J, k, 1, 1e-12)
-    assert status == Status.OK
-    assert 0 < abs(outputs["frequency_error"][0]).max() < 1e-14  # found in another way than those of the full chain
-
-
 def test_where_a_partial_system_stands_still_in_a_mode_twelve_digits_are_left_or_the_cell_says_so():
     """Equal masses and springs, free: mass 4 rests in a mode of its own partial frequency."""
     n = 8

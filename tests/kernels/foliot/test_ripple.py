@@ -77,32 +77,3 @@ def test_sticking_agrees_with_energy_over_a_grid():
     found = [s in (Status.OK, Status.INACCURATE) for s in status]
     assert found == exists, [c for c, f, x in zip(cells, found, exists, strict=True) if f != x]
     assert 0 < sum(exists) < len(exists)
-
-
-STEEP = (
-    (2.183475312299929, 16.348777644888933, 0.3532330000497271, 0.0, 0.25423910777232167, 2.0, 8.3e-12),
-    (1.432290375227723, 21.221347580046988, 0.05613272209898147, 0.0, 0.8317911077867322, 1.0, 3.2e-8),
-    (0.537833989184306, 9.716066073800102, 0.0750440878486072, 0.0005989911811167501, 0.429563156182185, 4.0, 2.6e-12),
-    (
-        0.12622874354475647,
-        3.5010722719100165,
-        0.02024564613697914,
-        0.00256207660014646,
-        0.2430482683711905,
-        2.0,
-        4.3e-4,
-    ),
-    (3.7417608068745136, 0.1749063230831624, 1.4468364501086028, 0.0, 0.3151386992621531, 4.0, 5.4e-13),
-)
-"""mu, phi0, R, k, depth, harmonic and rtol where s hangs on the speed at the switch a hundredfold and more."""
-
-
-@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
-@pytest.mark.parametrize("cell", STEEP)
-def test_a_sensitivity_that_hangs_steeply_on_the_speed_is_right_or_said_not_to_be(cell):
-    *values, rtol = cell
-    names = ("mu", "phi0", "R", "k", "depth", "harmonic")
-    found, status = solve(FOLIOT_RIPPLE, "dopri5", rtol=rtol, **{n: [v] for n, v in zip(names, values, strict=True)})
-    true = ripple_oracles.by_energy(**dict(zip(names, values, strict=True)))[3]
-    assert status[0] == Status.INACCURATE or abs(found["sensitivity"][0] / float(true) - 1) < rtol
-    assert rtol < 1e-11 or status[0] == Status.OK

@@ -4,7 +4,6 @@ import foliot_oracles
 import numpy as np
 import pytest
 from columns import bounds, checked, estimated, relative_error, solve
-from mpmath import mp, mpf, sqrt
 
 from kernels.foliot.cycle import FOLIOT
 from kernels.interface import FIRST_REFUSAL, Status
@@ -15,7 +14,7 @@ SOME = 16 if COMPILED else 4
 
 
 def random_cells(terms, seed, n=SOME):
-    """Foliots with alpha over 24 decades (a = 1 or 0), R/mu to 1 - 1e-9 or down to 1e-12, zeta from 1e-4 to 10."""
+    """alpha over 24 decades (a = 1 or 0), R/mu to 1 - 1e-9 or down to 1e-12, zeta from 1e-4 to 10, often near 1."""
     random = np.random.default_rng(seed)
     reach = 12 if terms in ("a", "aR") else 5
     mu, one = 10.0 ** random.uniform(-reach, reach, n), np.ones(n)
@@ -24,7 +23,8 @@ def random_cells(terms, seed, n=SOME):
         close, small = 1.0 - 10.0 ** random.uniform(-9, -0.1, n), 10.0 ** random.uniform(-12, -0.1, n)
         cells["R"] = mu * np.where(random.random(n) < 0.5, close, small)
     if "k" in terms:
-        zeta = np.where(random.random(n) < 0.15, 1.0, 10.0 ** random.uniform(-4, 1, n))
+        near = 1.0 + random.choice([-1.0, 0.0, 1.0], n) * 10.0 ** random.uniform(-15, -1, n)
+        zeta = np.where(random.random(n) < 0.3, near, 10.0 ** random.uniform(-4, 1, n))
         cells["k"] = 0.25 / zeta**2
         cells["mu"] = np.maximum(mu, 2.0 * cells["k"])  # few that come to rest
     if "e" in terms:
@@ -207,32 +207,6 @@ def test_from_rest_at_the_centre_a_weak_drive_does_not_throw_a_spring_over():
 def test_stiction_holds_a_foliot_at_its_turning_point():
     stuck = solve(FOLIOT, "segments", [1.0, 1.0], 1.0, 0.5, R=0.1, R_s=[1.5, 1.05], k=0.1)[1]
     assert stuck.tolist() == [Status.STICKS, Status.NOT_SELF_STARTING]
-
-
-def test_near_a_threshold_lost_digits_are_remarked():
-    k = 2.0
-    mu = k * (1.0 + np.array([1e-13, 1e-10, 1e-6, 1e-2]))  # overdamped: the drive just throws the spring over
-    cells = {"mu": mu, "phi0": np.ones(4), "a": np.full(4, 4.0), "k": np.full(4, k)}
-    outputs, status = solve(FOLIOT, "segments", **cells, rtol=1e-9)
-    for i, truth in enumerate(truths(cells)):
-        error = max(relative_error(outputs[name][i : i + 1], truth[j : j + 1])[0] for j, name in enumerate(NAMES[:4]))
-        assert error < 1e-9 or status[i] in (Status.INACCURATE, Status.STICKS), (mu[i], error)
-    assert status[-1] == Status.OK
-
-
-@pytest.mark.parametrize("method", ["pure", "quadrature", "dopri5"] if COMPILED else ["pure"])
-@pytest.mark.parametrize(("mu", "R", "c"), [(3.0, 1.1, 1.9 - 1e-12), (0.8, 0.1, 0.7 - 1e-9), (2.0, 0.5, 0.25)])
-def test_drag_of_degree_0_is_coulomb_friction_to_the_last_digit_of_what_is_left(method, mu, R, c):
-    """P = 4 sqrt(2 phi0/F)/sqrt(1 - (F/mu)^2), F = R + c, in exact arithmetic on the floats."""
-    with mp.workdps(50):
-        friction = mpf(R) + mpf(c)
-        rho = friction / mpf(mu)
-        period, s = 4 * sqrt(2 / friction) / sqrt(1 - rho**2), rho**2 / (1 - rho**2)
-    rtol = 1e-6 if method == "dopri5" else 1e-12
-    outputs, status = solve(FOLIOT, method, [mu], 1.0, R=R, c=c, n=0.0, rtol=rtol)
-    assert relative_error(outputs["period"], [period])[0] < rtol or status[0] != Status.OK
-    assert relative_error(outputs["sensitivity"], [s])[0] < rtol or status[0] != Status.OK
-    assert status[0] == Status.OK or method == "dopri5"
 
 
 def test_nothing_rests_at_a_switch_that_throws_back():

@@ -1,7 +1,6 @@
 """The impact clock's own cycle against 50 digits, its borders, and its laws."""
 
 import functools
-import itertools
 
 import impact_oracles as oracles
 import numpy as np
@@ -90,45 +89,6 @@ def test_the_impact_cycle_its_existence_and_its_multiplier_are_those_of_50_digit
 
 def test_the_plastic_cycle_is_that_of_50_digits_for_every_escape_height():
     assert (assert_cycle(clocks(seed=3, e=0.0)) == Status.OK).all()
-
-
-def meeting(kappa):
-    """The restitution at which two multipliers of the flat lever's cycle are the same, in 60 digits; and its cubic."""
-    with mp.workdps(60):
-        k = mpf(kappa)
-
-        def cubic(e):
-            plus = 4 * (1 - e * e) / (1 + k)
-            minus = -2 * k * (k - 1) * (1 + e) ** 2 / (1 + k) ** 2
-            return (plus + minus) / 2 + e * e, (plus - minus) / 2 - 1, -e * e
-
-        def discriminant(e):
-            a, b, c = cubic(e)
-            return a * a * b * b - 4 * b**3 - 4 * a**3 * c + 18 * a * b * c - 27 * c * c
-
-        grid = [mpf(j) / 400 for j in range(2, 200)]
-        pairs = [(x, y) for x, y in itertools.pairwise(grid) if discriminant(x) * discriminant(y) < 0]
-        return [mp.findroot(discriminant, pair, solver="anderson", tol=1e-50) for pair in pairs]
-
-
-MEETING = [(k, e) for k in (2.0, 6.0, 40.0) for e in meeting(k)]
-
-
-def test_a_multiplier_that_two_roots_share_keeps_its_digits():
-    shifts = (0.0, 1e-15, -1e-13, 1e-11, -1e-9, 1e-6) if COMPILED else (1e-13,)
-    assert len(MEETING) >= 3
-    columns = joined(*(cell_of(k, float(e * (1 + mpf(s)))) for k, e in MEETING for s in shifts))
-    status = assert_cycle(columns, rtol=1e-13)
-    assert (status != Status.NO_CYCLE).mean() > 0.6
-
-
-def test_a_wheel_that_an_impact_nearly_stops_keeps_the_digits_of_its_speed():
-    """V is proportional to kappa (1 - e) - 2 e; the recoil to its square."""
-    e = 0.3 * (1 + np.array([-1e-15, 1e-15, -1e-12, 1e-9, -1e-5, 1e-5]))
-    columns = joined(*(cell_of(0.6 / 0.7, float(v)) for v in e))
-    assert (assert_cycle(columns) == Status.UNSTABLE).all()
-    speeds = solve(IMPACT, "closed", *columns)[0]["wheel_speed"]
-    assert abs(speeds).min() < 1e-13
 
 
 EDGES = [(2.0, 0.3, 0.0), (30.0, 0.4, 0.0), (1.5, 0.55, 0.0), (0.05, 0.45, 0.0), (3.0, 0.2, 0.5), (0.5, 0.35, -2.8)]
@@ -233,24 +193,6 @@ def test_over_the_range_of_float64_a_cell_is_right_or_refused():
         if there:
             assert status[i] == (Status.UNSTABLE if values[4] > 1 else Status.OK), WIDE[i]
             assert max(errors({k: v[i : i + 1] for k, v in outputs.items()}, [values]).values()) < WORST, WIDE[i]
-
-
-def test_results_that_no_float64_can_hold_are_out_of_range():
-    columns = joined(*[cell_of(2.0, 0.2)] * 6)
-    for column, values in (
-        (0, (1.0, 1e300, 1e-300, 1e-300, 1e300, 1.0)), (1, (1.0, 1.0, 1e300, 1e308, 1e-308, 1e308)),
-        (2, (0.5, 0.5, 5e299, 5e307, 5e-309, 1e-308)),
-    ):  # fmt: skip
-        columns[column] = np.array(values)
-    _, status = solve(IMPACT, "closed", *columns)
-    assert status.tolist() == [0, 0, 0, 0, 0, Status.OUT_OF_RANGE]
-    columns[3][:], columns[4][:] = [1e-308, 1e-300, 1.0, 1e300, 1e308, 1.0], [1e-308, 1e-300, 1.0, 1e300, 1e308, 1e155]
-    outputs, status = solve(IMPACT, "closed", *columns)
-    assert status.tolist() == [Status.PARTLY_OUT_OF_RANGE, 0, 0, 0, 0, Status.OUT_OF_RANGE]
-    missing = [name for name in NAMES if np.isnan(outputs[name][0])]
-    assert missing == ["swing"]
-    assert np.isfinite([outputs[name][1:5] for name in NAMES]).all()
-    np.testing.assert_allclose(outputs["period"][0], outputs["period"][1] * 1e150, rtol=1e-14)
 
 
 @pytest.mark.parametrize("method", ["closed", "events"] if COMPILED else ["closed"])

@@ -35,7 +35,7 @@ def test_a_foliot_with_quadratic_drag_is_right_to_the_tolerance_or_says_that_it_
     assert (error[status == Status.OK] < rtol).all()
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", [*METHODS, "taylor"])
 def test_dry_friction_alone_gives_parabolas(method):
     mu, R, phi0 = mpf(3), mpf(1), mpf(2)
     outputs, status = solve(method, 3.0, 2.0, R=1.0, flips=2.0)
@@ -111,36 +111,21 @@ def braked(mu, phi0, a):
     return time, -mu / a * mp.expm1(-a * time)
 
 
-def pushed(mu, phi0, R, c):
-    """Time of the second switch, and the speed there, where each throws the foliot back at half its speed."""
-    force, c, way, time, speed = mpf(mu) - mpf(R), mpf(c), mpf(phi0), mpf(0), mpf(0)
-    top = mp.sqrt(force / c)
-    for _ in range(2):
-        phase = mp.atanh(speed / 2 / top)
-        leg = (mp.acosh(mp.cosh(phase) * mp.exp(c * way)) - phase) / (c * top)
-        time, speed, way = time + leg, top * mp.tanh(c * top * leg + phase), 2 * mpf(phi0)
-    return time, speed
-
-
 @pytest.mark.skipif(not COMPILED, reason="many steps")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(
     ("cell", "truth"),
     [
         ({"mu": 7.976388341733172, "phi0": 42.544689721278594, "a": 2.6615561142988726}, braked),
-        (
-            {"mu": 36.69507080205295, "phi0": 0.033253287293221835, "R": 36.648807687053555, "c": 706.6564827529846},
-            pushed,
-        ),
         ({"mu": 1.425165612376569, "phi0": 695.6938993935804, "a": 0.0044199843571, "c": 0.0021731995910895}, None),
     ],
 )
 def test_where_friction_limits_the_steps_every_tolerance_is_met(method, cell, truth):
-    flips = {braked: 1, pushed: 2, None: 3}[truth]  # the dense output is poor, or a step too long looks good by chance
+    flips = 1 if truth else 3  # the dense output is poor, or a step too long looks good by chance
     time, speed = truth(**cell) if truth else oracles.quadratic_foliot(*cell.values(), flips)
     rtol = np.geomspace(1e-6, 1e-3, 600)
     cells = {name: np.full(len(rtol), value) for name, value in cell.items()}
-    outputs, status = solve(method, **cells, e=-0.5 if truth is pushed else 1.0, flips=float(flips), rtol=rtol)
+    outputs, status = solve(method, **cells, flips=float(flips), rtol=rtol)
     assert not status.any()
     assert (relative_error(outputs["time"], [time] * len(rtol)) < rtol).all()
     assert (relative_error(abs(outputs["speed"]), [speed] * len(rtol)) < rtol).all()

@@ -7,8 +7,6 @@ import pytest
 import stiff_oracles
 from columns import relative_error, solve
 from mpmath import mp, mpf
-from rich_scene import RICH
-from scene_oracles import quadratic_foliot
 from stiff_scene import LAG, PASSED, WAVE
 
 import sweep
@@ -86,13 +84,6 @@ def test_a_switch_while_a_state_relaxes_is_met_where_it_is(level, rtol):
     truths = [-mpf(one) * mp.log((1 + mpf(level)) / 2) for one in eps]
     assert not status.any()
     assert (relative_error(outputs["interval"], truths) < rtol).all()
-
-
-def test_it_is_right_where_nothing_is_stiff():
-    outputs, status = solve(RICH, "rodas5p", [2.0], 1.5, 0.3, 0.4, flips=2.0, rtol=1e-8)
-    time, speed = quadratic_foliot(2.0, 1.5, 0.3, 0.4, 2)
-    assert status[0] == Status.OK
-    assert relative_error([*outputs["time"], *abs(outputs["speed"])], [time, abs(speed)]).max() < 1e-8
 
 
 PENDULUM = Scene(

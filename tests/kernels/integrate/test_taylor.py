@@ -5,12 +5,10 @@ import pytest
 import scene_oracles as oracles
 from columns import columns_of, relative_error
 from columns import solve as solve_columns
-from mpmath import mp, mpf
 from rich_scene import RICH
 
-from kernels.integrate import taylor
 from kernels.interface import FIRST_REFUSAL, Status
-from kernels.lanes.jit import COMPILED, jit_entry
+from kernels.lanes.jit import COMPILED
 
 SOME = 24 if COMPILED else 2
 FLIPS = 40.0 if COMPILED else 4.0
@@ -55,30 +53,6 @@ def test_followed_once_it_is_right_to_some_tolerances_and_follows_the_tolerance(
         assert errors[-1] < 20 * rtol
     if COMPILED:
         assert errors[2] < 1e-3 * errors[0]
-
-
-def test_free_of_drag_and_dry_friction_alone_are_exact_parabolas():
-    mu, R, flips = 3.0, 1.0, 5.0
-    outputs, status = solve(RICH, "taylor", mu, 2.0, R=R, flips=flips, rtol=1e-12)
-    v, time = mp.sqrt(2 * (mpf(mu) - R) * 2), mpf(0)
-    time += v / (mu - R)
-    for _ in range(4):  # up against mu + R, down with mu - R, to the switch 4 below
-        top = v * v / (2 * (mpf(mu) + R))
-        down = mp.sqrt(2 * (top + 4) / (mpf(mu) - R))
-        interval, v = v / (mpf(mu) + R) + down, down * (mu - R)
-        time += interval
-    assert status[0] == Status.OK
-    assert relative_error(outputs["time"], [time])[0] < 1e-14
-    assert relative_error(outputs["interval"], [interval])[0] < 1e-14
-    assert relative_error(abs(outputs["speed"]), [v])[0] < 1e-14
-
-
-def test_an_oscillator_switched_within_its_swing():
-    k, mu, phi0 = 4.0, 1.0, 0.3
-    outputs, status = solve(RICH, "taylor", mu, phi0, k=k, flips=1, rtol=1e-12)
-    true = mp.acos(1 - mpf(phi0) * k / mu) / 2
-    assert status[0] == Status.OK
-    assert relative_error(outputs["time"], [true])[0] < 1e-13
 
 
 @pytest.mark.parametrize(
@@ -144,30 +118,6 @@ def test_over_decades_of_cells_what_is_not_remarked_is_right():
         time, speed = oracles.quadratic_foliot(mu[i], phi0[i], a[i], c[i], 5, digits=70)
         assert relative_error(outputs["time"][[i]], [time])[0] < 1e-8
         assert relative_error(abs(outputs["speed"][[i]]), [speed])[0] < 1e-8
-
-
-@jit_entry
-def proved(series, h):
-    """Whether a series is proved not to pass 0, and to fall, over a step."""
-    rest = taylor.tail(h, series)
-    clear = taylor.clear(series[0], series[1], series[2], series[3], rest, h, 0.0)
-    return clear, taylor.falls(series[1], series[2], series[3], rest, h)
-
-
-def test_what_is_proved_of_a_polynomial_over_a_step_holds():
-    """Of any terms, and of two roots that are close together."""
-    random, t = np.random.default_rng(9), np.linspace(0.0, 1.0, 400)[1:]
-    clear, falls = 0, 0
-    for trial in range(3000 if COMPILED else 200):
-        series, h = random.normal(size=8) * 0.6 ** np.arange(8.0) * (0.5, *[1.0] * 7), random.uniform(0.05, 1.2)
-        if trial % 4 == 0:  # (t - 1/2)^2 - gap^2
-            series = np.array([0.25 - 10 ** random.uniform(-6, -1), -1.0, 1.0, *[0.0] * 5])
-        values, slopes = (np.polynomial.Polynomial(p)(h * t) for p in (series, series[1:] * np.arange(1.0, 8.0)))
-        is_clear, is_falling = proved(tuple(series), h)
-        clear, falls = clear + (is_clear and series[0] >= 0.0), falls + is_falling
-        assert not (is_clear and series[0] >= 0.0) or values.min() > 0.0
-        assert not is_falling or slopes.max() < 0.0
-    assert min(clear, falls) > 8
 
 
 def test_what_rounding_leaves_less_than_wanted_is_said_to_be_inaccurate():

@@ -5,37 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from columns import printed_both_ways
 
 from kernels.lanes.jit import COMPILED, jit_call
-
-DEEP = """
-from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import fma, sqrt
-
-@jit
-def squared(x):
-    return fma(x, x, 1.0)
-
-@jit
-def root(x):
-    return sqrt(squared(x))
-
-@jit_call
-def both(x):
-    return root(x) + squared(x)
-
-@jit
-def whole(x):
-    return both(x)
-
-print(whole(0.0), both(0.0), root(0.0), squared(0.0))
-"""
-
-
-def test_what_is_meant_to_be_inlined_can_be_called_from_python_however_deep_it_calls():
-    """In a process of its own, since code that is not linked in is a fault of the whole process."""
-    assert printed_both_ways(DEEP) == ("2.0 2.0 1.0 1.0\n",) * 2
 
 
 class Pair(NamedTuple):

@@ -37,17 +37,6 @@ def test_a_cell_has_the_same_bits_alone_and_in_any_company():
             assert np.array_equal(alone[name], together[name][i : i + 1], equal_nan=True), (name, i)
 
 
-def test_every_cell_is_solved_and_the_tolerance_of_one_does_not_touch_another():
-    columns = uneven()
-    rtol = np.where(np.arange(CELLS) % 2, 1e-7, 1e-9)
-    mixed, status = solve(RICH, "taylor_once", rtol=rtol, **columns)
-    assert (status < 99).all()
-    for each in (1e-7, 1e-9):
-        alone, _ = solve(RICH, "taylor_once", rtol=each, **columns)
-        for name in NAMES:
-            assert np.array_equal(alone[name][rtol == each], mixed[name][rtol == each], equal_nan=True)
-
-
 @pytest.mark.parametrize("method", ["taylor_once", "dop853"])
 def test_a_number_of_switches_that_is_none_is_refused_and_ends(method):
     flips = np.array([np.nan, np.inf, 0.0, -3.0, 2.0])

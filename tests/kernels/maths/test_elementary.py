@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 from columns import relative_error
-from hypothesis import given
-from hypothesis import strategies as st
 from loops import each_cell
 from mpmath import atan, atanh, cbrt, cos, exp, expm1, log, log1p, mp, mpf, sin
 
 from kernels.lanes.columns import entry
 from kernels.lanes.jit import COMPILED, jit
-from kernels.lanes.vectors import dot, exponent, fma, magnitude, nearest, pow2, where
+from kernels.lanes.vectors import magnitude
 from kernels.maths import elementary
 
 mp.dps = 50
@@ -54,76 +52,6 @@ def test_remainders_keep_their_digits_where_the_plain_forms_cancel(top):
     _, _, late, lost = evaluate(np.zeros_like(u), u)
     assert relative_error(late, [mpf(v) + expm1(-mpf(v)) for v in u]).max() < 6e-16
     assert top > 1 or relative_error(lost, [mpf(v) - log1p(mpf(v)) for v in u]).max() < 6e-16
-
-
-@jit
-def _compared(i, x, y, z, below, within, above, beyond, signed, chain):
-    below[i], within[i] = where(x[i] < y[i], 1, 0), where(x[i] <= y[i], 1, 0)
-    above[i], beyond[i] = where(x[i] > y[i], 1, 0), where(x[i] >= y[i], 1, 0)
-    signed[i] = where(x[i] < y[i], 1.0 * z[i], -(1.0 * z[i]))
-    chain[i] = dot((x[i], y[i], 0.1), (0.3, x[i], y[i]))
-
-
-@entry()
-def compared(x, y, z, below, within, above, beyond, signed, chain):
-    each_cell(_compared, (x, y, z, below, within, above, beyond, signed, chain))
-
-
-def test_comparisons_signs_and_chains_are_those_of_numpy():
-    values = np.array([-np.inf, -1.5, -0.0, 0.0, 0.7, 1e100, np.inf, np.nan])
-    x, y = (np.ascontiguousarray(v.ravel()) for v in np.meshgrid(values, values))
-    z = np.random.default_rng(6).integers(-128, 128, 64).astype(np.int8)
-    z[:8] = 0
-    *verdicts, signed, chain = [np.full(64, 99, np.int8) for _ in range(4)] + [np.empty(64), np.empty(64)]
-    compared(x, y, z, *verdicts, signed, chain)
-    for verdict, expected in zip(verdicts, (x < y, x <= y, x > y, x >= y), strict=True):
-        assert np.array_equal(verdict, expected)
-    assert np.array_equal(signed.view(np.int64), np.where(x < y, 1.0 * z, -(1.0 * z)).view(np.int64))
-    with np.errstate(all="ignore"):
-        truth = [fma(0.1, b, fma(b, a, a * 0.3)) for a, b in zip(x, y, strict=True)]
-    assert np.array_equal(chain, truth, equal_nan=True)
-
-
-@jit
-def _scaled(i, x, n, result):
-    result[i] = elementary.scale(x[i], n[i])
-
-
-@entry()
-def scaled(x, n, result):
-    each_cell(_scaled, (x, n, result))
-
-
-def test_scaling_by_any_power_of_two_is_exact_or_ends_in_zero_and_infinity():
-    n = np.array([-1e9, -5000.0, -2100.0, -1022.0, -1.0, 0.0, 7.0, 1023.0, 1024.0, 2100.0, 5000.0, 1e9])
-    result = np.empty(12)
-    scaled(np.full(12, 1.5), n, result)
-    exact = [1.5 * 2.0**-1022, 0.75, 1.5, 192.0, 1.5 * 2.0**1023]
-    assert result.tolist() == [0.0, 0.0, 0.0, *exact, np.inf, np.inf, np.inf, np.inf]
-
-
-@jit
-def _parts(i, x, e, m, r, product):
-    e[i] = exponent(-x[i])
-    m[i] = x[i] * pow2(-exponent(x[i]))
-    r[i] = nearest(x[i])
-    product[i] = fma(x[i], x[i], -x[i])
-
-
-@entry()
-def parts(x, e, m, r, product):
-    each_cell(_parts, (x, e, m, r, product))
-
-
-@given(st.floats(2.0**-500, 2.0**50))
-def test_exponent_mantissa_rounding_and_multiply_add_are_exact(x):
-    out = [np.empty(1) for _ in range(4)]
-    parts(np.array([x]), *out)
-    e, m, r, product = (column[0] for column in out)
-    assert m * 2.0**e == x
-    assert 1 <= m < 2
-    assert r == round(x)
-    assert product == float(mpf(x) * mpf(x) - mpf(x))
 
 
 @jit
@@ -189,23 +117,3 @@ def test_elementary_functions_at_the_ends_of_their_ranges():
     assert sines[0] == 0.0
     assert angles[2:4].tolist() == [np.pi / 2, -np.pi / 2]
     assert powers[:2].tolist() == [1.0, 1e-310]  # 0^0 = 1
-
-
-@jit
-def _of_two(i, x, y, high, low):
-    high[i], low[i] = elementary.larger(x[i], y[i]), elementary.smaller(x[i], y[i])
-
-
-@entry()
-def of_two(x, y, high, low):
-    each_cell(_of_two, (x, y, high, low))
-
-
-def test_of_two_numbers_the_larger_and_the_smaller_and_of_what_is_none_the_second():
-    x = np.array([1.0, 2.0, -np.inf, np.inf, np.nan, 3.0, -0.0])
-    y = np.array([2.0, 1.0, 0.0, 0.0, 4.0, np.nan, 0.0])
-    high, low = np.empty(7), np.empty(7)
-    of_two(x, y, high, low)
-    np.testing.assert_array_equal(high, [2.0, 2.0, 0.0, np.inf, 4.0, np.nan, 0.0])
-    np.testing.assert_array_equal(low, [1.0, 1.0, -np.inf, 0.0, 4.0, np.nan, 0.0])
-    assert not np.signbit([high[-1], low[-1]]).any()

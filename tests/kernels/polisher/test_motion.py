@@ -122,15 +122,6 @@ def test_close_to_a_lock_the_rate_is_inaccurate_and_says_so():
         assert status == Status.INACCURATE or error < 1e-10
 
 
-def test_at_a_change_point_the_arm_stays_on_its_branch():
-    angles = np.linspace(-1, 1, 9)
-    traces, status = motion(62.01, 38, 40.5, 16.49, angles=angles)
-    beside, _ = motion(62.01, 38, 40.5, 16.49 * (1 - 1e-13), angles=angles)
-    assert status == Status.CHANGE_POINT
-    np.testing.assert_allclose(traces["alpha"], beside["alpha"], atol=1e-5)
-    assert np.isfinite(traces["alpha_rate"][[0, 3, 5, 8]]).all()
-
-
 @pytest.mark.parametrize(
     ("lengths", "terms", "status"),
     [
