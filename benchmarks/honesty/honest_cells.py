@@ -290,7 +290,7 @@ def chains(random, n):
 
 
 def modes_truth(J, k):
-    return {"frequency": chain_oracles.modes(J, k, digits=60)[0]}
+    return {"frequency": chain_oracles.frequencies(J, k, digits=60)}
 
 
 def damped_chains(random, n):

@@ -90,7 +90,7 @@ def worst(found, J, k):
     """The largest relative error of a frequency over the first chains; below 0 in the square counts as 0 Hz."""
     largest = 0.0
     for i in range(CHECKED if J.shape[1] < 64 else 1):
-        true, _ = oracles.modes(J[i], k[i], 100)
+        true = oracles.frequencies(J[i], k[i], 100)
         with mp.workdps(50):
             largest = max(largest, *(float(abs(mpf(float(f)) / t - 1)) for f, t in zip(found[i], true, strict=True)))
     return largest

@@ -1,20 +1,11 @@
 """Columns for tests of kernels."""
 
-import contextlib
 import functools
-import io
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 from mpmath import mp, mpf
 
 from kernels.interface import FIRST_REFUSAL, Kernel, Status
-from kernels.lanes.jit import COMPILED
-
-ROOT = Path(__file__).parents[2]
 
 
 def columns_of(kernel: Kernel, parameters, named):
@@ -93,28 +84,3 @@ def relative_error(values, truths):
     """abs(value/truth - 1), each taken in high precision."""
     with mp.workdps(60):
         return np.array([float(abs(mpf(float(v)) / t - 1)) for v, t in zip(values, truths, strict=True)])
-
-
-def printed_both_ways(program):
-    """What a program prints here, in the project's folder, and in a process that runs kernels the other way.
-
-    Returns
-    -------
-    tuple of str
-        Compiled and as plain Python, where tests run compiled; else the other way round.
-    """
-    other = subprocess.run(
-        [sys.executable, "-c", program],
-        env={**os.environ, "NUMBA_DISABLE_JIT": str(int(COMPILED))},
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    here, paths = io.StringIO(), sys.path.copy()
-    try:
-        with contextlib.chdir(ROOT), contextlib.redirect_stdout(here):
-            exec(program, {})
-    finally:
-        sys.path[:] = paths
-    return here.getvalue(), other.stdout

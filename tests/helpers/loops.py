@@ -1,6 +1,6 @@
 """Loops of a function of one cell over columns, each given by itself: `entry` makes such a loop one for Python."""
 
-from kernels.lanes.columns import cell_by_cell, in_groups, in_lanes
+from kernels.lanes.columns import in_lanes
 from kernels.lanes.jit import jit
 
 
@@ -13,15 +13,3 @@ def _taken_apart(i, columns, body):
 def each_cell(body, columns):
     """body(i, *columns) for all cells, in lanes."""
     in_lanes(_taken_apart, columns, (body,))
-
-
-@jit
-def one_by_one(body, columns):
-    """The same one cell at a time."""
-    cell_by_cell(_taken_apart, columns, (body,))
-
-
-@jit
-def each_group(body, columns):
-    """The same of groups that share buffers, by the number of their first cell."""
-    in_groups(_taken_apart, columns, (body,))

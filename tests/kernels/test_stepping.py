@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from columns import counted, solve
+from columns import solve
 
 from kernels.interface import Field, Status
 from kernels.lanes.jit import COMPILED
@@ -41,16 +41,6 @@ def start():
 
 
 FILLING = kernel("filling", ["level"], filling, start)
-
-
-def test_a_scenes_functions_are_not_asked_again_at_every_call():
-    rates = counted(filling)
-    again = kernel("filling", ["level"], rates, start)
-    asked = []
-    for _ in range(2):
-        solve(again, "rk4", flips=[2.0], step=[0.1])
-        asked.append(rates.calls)
-    assert asked[1] == asked[0]
 
 
 def test_methods_of_pairs_are_kept_from_scenes_that_are_none():

@@ -26,8 +26,8 @@ def numbers(values):
     return [mpf(float(v)) for v in values]
 
 
-def modes(J, k, digits=160):
-    """(frequencies, shapes): shapes[i, j] is mass i in mode j, sum_i J_i shapes[i, j]^2 = 1, shapes[0, j] > 0."""
+def frequencies(J, k, digits=160):
+    """Natural frequencies, rising."""
     with mp.workdps(digits):
         J = numbers(J)
         n = len(J)
@@ -36,14 +36,7 @@ def modes(J, k, digits=160):
         for i in range(n):
             for j in range(n):
                 symmetric[i, j] = K[i, j] / sqrt(J[i] * J[j])
-        values, vectors = eigsy(symmetric)
-        order = sorted(range(n), key=lambda j: values[j])
-        shapes = matrix(n, n)
-        for column, j in enumerate(order):
-            side = 1 if vectors[0, j] > 0 else -1
-            for i in range(n):
-                shapes[i, column] = side * vectors[i, j] / sqrt(J[i])
-        return [sqrt(abs(values[j])) / (2 * pi) for j in order], shapes
+        return [sqrt(abs(value)) / (2 * pi) for value in sorted(eigsy(symmetric, eigvals_only=True))]
 
 
 def count_below(J, k, frequency):

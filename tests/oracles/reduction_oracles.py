@@ -6,27 +6,10 @@ Rivin's, levers on a line of flexibility x. Masses are numbered from 0, the spin
 
 from itertools import pairwise
 
-from mpmath import diag, eig, eigsy, eye, lu_solve, matrix, mp, mpc, mpf, pi, sqrt, zeros
+from chain_oracles import numbers, stiffness
+from mpmath import diag, eig, eigsy, eye, matrix, mp, mpf, pi, sqrt, zeros
 
 DIGITS = 50
-
-
-def exact(values):
-    """Numbers as mpf."""
-    return [mpf(float(v)) for v in values]
-
-
-def chain_matrix(k):
-    """B^T diag(k) B of a chain that is free on the left and held on the right."""
-    n = len(k)
-    K = zeros(n)
-    for j in range(n):
-        K[j, j] += k[j]
-        if j + 1 < n:
-            K[j + 1, j + 1] += k[j]
-            K[j, j + 1] -= k[j]
-            K[j + 1, j] -= k[j]
-    return K
 
 
 def modes(K, M):
@@ -46,14 +29,14 @@ def hertz(squares):
 def chain_frequencies(J, k):
     """Natural frequencies [Hz] of a chain."""
     with mp.workdps(DIGITS):
-        return hertz(modes(chain_matrix(exact(k)), diag(exact(J)))[0])
+        return hertz(modes(stiffness(numbers(k)), diag(numbers(J)))[0])
 
 
 def _places(k):
     """Flexibility from each mass to ground, and 0 for the ground."""
     x = [mpf(0)]
-    for stiffness in reversed(k):
-        x.append(x[-1] + 1 / stiffness)
+    for spring in reversed(k):
+        x.append(x[-1] + 1 / spring)
     return x[::-1]
 
 
@@ -63,7 +46,7 @@ def rivin(J, k, h, steps):
     Dampers by their work: the strain of a spring is its share of the flexibility between masses.
     """
     with mp.workdps(DIGITS):
-        J, k, h = exact(J), exact(k), exact(h)
+        J, k, h = numbers(J), numbers(k), numbers(h)
         for kind, j in steps:
             x = _places(k)
             pieces = [(x[i], x[i + 1], h[i]) for i in range(len(J))]
@@ -149,7 +132,7 @@ class Reduced:
 
     def __init__(self, kind, J, k, h, n_kept, masters=()):
         with mp.workdps(DIGITS):
-            K, C, M = chain_matrix(exact(k)), chain_matrix(exact(h)), diag(exact(J))
+            K, C, M = stiffness(numbers(k)), stiffness(numbers(h)), diag(numbers(J))
             T = basis(kind, K, M, n_kept, list(masters))
             self.K, self.C, self.M, self.here = T.T * K * T, T.T * C * T, T.T * M * T, T[0, :]
             self.rest = mpf(0)
@@ -161,13 +144,6 @@ class Reduced:
         """Without damping [Hz]."""
         with mp.workdps(DIGITS):
             return hertz(modes(self.K, self.M)[0])
-
-    def receptance(self, w):
-        """Of the spindle at w [rad/s]."""
-        with mp.workdps(DIGITS):
-            w = mpf(float(w))
-            Z = self.K + mpc(0, w) * self.C - w * w * self.M
-            return (self.here * lu_solve(Z, self.here.T))[0] + self.rest
 
     def poles(self):
         """All of them, by rising modulus."""

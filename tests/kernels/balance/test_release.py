@@ -219,34 +219,6 @@ def test_a_coordinate_that_does_not_count_half_swings_is_bad_input(coordinate):
 @pytest.mark.parametrize(
     ("cell", "status"),
     [
-        ((0.1, 1e-308, 0.1, 0.1, 1), Status.PARTLY_OUT_OF_RANGE),  # period
-        ((0.1, 3e-308, 0.1, 0.1, 1), Status.PARTLY_OUT_OF_RANGE),  # period, not its half
-        ((0.1, 1e-307, 1e-3, 1e-3, 1), Status.PARTLY_OUT_OF_RANGE),  # stop_time
-        ((0.0, 1.0, 1e-300, 1e-300, 1e10), Status.OUT_OF_RANGE),  # theta0/r
-        ((0.1, 1e-300, 1e-10, 1e-10, 1), Status.OK),
-        ((0.2, 1.0, 1e-255, 1e-255, 1e10), Status.OK),  # exp(-k delta) is about 1e-265
-        ((0.9, 1.0, 1e-255, 1e-255, 1e10), Status.OK),
-        ((0.2, 1.0, 1e290, 1e290, 1e300), Status.OK),
-        ((0.2, 1.0, 1e-307, 1e-307, 1e-300), Status.OK),
-        ((0.2, 1.0, 3e-310, 3e-310, 1e-300), Status.PARTLY_OUT_OF_RANGE),  # stop_angle
-        ((0.9999999999999999, 1.0, 0.1, 0.1, 1e269), Status.OK),
-    ],
-)
-def test_over_the_range_of_float64_a_cell_is_right_or_refused(cell, status):
-    columns = [np.array([float(c)]) for c in cell]
-    outputs, verdict = solve(BALANCE, "closed", *columns)
-    assert verdict[0] == status
-    if status in (Status.OK, Status.PARTLY_OUT_OF_RANGE):
-        exist = [name for name in NAMES if not np.isnan(outputs[name][0])]
-        assert (len(exist) == len(NAMES)) == (status == Status.OK)
-        assert len(exist) >= 3
-        for name, error in errors(outputs, truths(columns), exist).items():
-            assert error[0] < 1e-15, name
-
-
-@pytest.mark.parametrize(
-    ("cell", "status"),
-    [
         ((0.0, 1, 0.0, 0.0, 1), Status.NO_LIMIT_CYCLE),
         ((0.0, 1, 0.0, 0.5, 1), Status.NO_LIMIT_CYCLE),
         ((0.0, 1, 0.0, 0.5, 0.4), Status.OK),

@@ -5,7 +5,6 @@ import pytest
 from columns import relative_error, solve
 from mpmath import mp, mpf
 from rich_scene import RICH
-from scipy.integrate import solve_ivp
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
@@ -32,51 +31,6 @@ def pendulum(x, v, t, side, mu, a, k, depth, omega):
 
 
 PENDULUM = scene(pendulum, "xvt", ("mu", "phi0", "a", "k", "depth", "omega"))
-
-
-def relay(x, v, side, mu, eps):
-    return v, eps * (1.0 - x * x) * v - x + side * mu
-
-
-CANCEL = [
-    (pendulum, 1.227828076851401e-09, 11, (0.4455631474004735, 0.9560298988515715, 0.01832808347224001,
-     0.42694587399953216, 0.5502164268744045, 1.7521393673311403)),
-    (pendulum, 1.4403361938954974e-05, 29, (0.7032387079896295, 0.25222528542474204, 0.013552182848106149,
-     0.45628282635710926, 0.09266309859840524, 2.1110756238320407)),
-    (relay, 9.676549867998949e-05, 19, (2.6453053426614175, 0.4157807057180794, 3.6094744684626345)),
-]  # fmt: skip
-"""Rates, rtol, flips and values of parameters where errors of steps cancel, and what is left of them grows."""
-
-
-def by_scipy(motion, phi0, flips):
-    """Time and speed at the last switch, each found by a step of Newton from the end of an integration of its own."""
-    y, begun = [0.0, 0.0], 0.0
-    for flip in range(flips):
-        side = (-1.0) ** flip
-
-        def gap(t, y, side):
-            return phi0 - side * y[0]
-
-        gap.terminal, gap.direction = True, -1.0
-        how = {"method": "DOP853", "rtol": 3e-14, "atol": 1e-15, "args": (side,)}
-        about = solve_ivp(motion, (begun, begun + 200.0), y, events=gap, **how).t_events[0][0]
-        end = solve_ivp(motion, (begun, about), y, **how).y[:, -1]
-        late = gap(about, end, side) / (side * end[1])
-        y, begun = end + late * np.array(motion(about, end, side)), about + late
-    return begun, y[1]
-
-
-@many
-@pytest.mark.parametrize(("rates", "rtol", "flips", "values"), CANCEL)
-def test_a_cell_whose_errors_cancel_and_grow_again_is_right_or_not_called_ok(rates, rtol, flips, values):
-    timed = rates is pendulum
-    kernel = PENDULUM if timed else scene(relay, "xv", ("mu", "phi0", "eps"))
-    others = (values[0], *values[2:])
-    time, speed = by_scipy(lambda t, y, side: rates(*y, *((t,) if timed else ()), side, *others)[:2], values[1], flips)
-    for wanted in (rtol, 0.1 * rtol):
-        outputs, status = solve(kernel, "taylor", *values, flips=[float(flips)], rtol=wanted)
-        off = max(abs(outputs["time"][0] / time - 1), abs(outputs["v"][0] / speed - 1))
-        assert status[0] != Status.OK or off <= wanted + 1e-12
 
 
 @many

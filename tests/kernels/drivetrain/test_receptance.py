@@ -152,3 +152,13 @@ def test_without_damping_the_response_is_in_phase_below_a_resonance_and_at_minus
     one = np.ones((1, 1))
     outputs, _ = receptances(one, one, 0.0 * one, 1, 1, [0.1, 0.2])  # the resonance is at 1/2 pi = 0.159 Hz
     assert outputs["phase"].tolist() == [[0.0, -np.pi]]
+
+
+def test_nothing_is_written_beyond_the_last_frequency_and_cell():
+    J, k, h = chains(3, 2, 0.1, cells=35)
+    frequency = np.geomspace(0.01, 1.0, 5)
+    outputs, status = [np.full((36, 5), 99.0) for _ in DRIVETRAIN_FRF.outputs], np.full(36, 99, np.int8)
+    columns = J, k, h, np.ones(35), np.ones(35), np.full(35, 1e-9), frequency
+    DRIVETRAIN_FRF.method("continued").solve(*columns, *(o[:35] for o in outputs), status[:35])
+    assert all((o[35] == 99.0).all() and (o[:35] != 99.0).all() for o in outputs)
+    assert status[35] == 99

@@ -171,23 +171,6 @@ def test_one_loss_alone_follows_its_closed_law(loss):
         assert error.max() < (3e-15 if (loss, name) == ("c", "multiplier") else 1e-15), name
 
 
-def test_the_closed_forms_are_where_one_loss_acts_alone_and_agree_with_the_integrals():
-    random = np.random.default_rng(5)
-    count = 400 if COMPILED else 80
-    R, c = (10 ** random.uniform(-6, -0.31, count) * (random.random(count) < 0.4) for _ in range(2))
-    n = random.choice([0.0, 1.0, 2.0, 2.5], count)
-    e = np.where(random.random(count) < 0.5, 1.0, random.uniform(-0.9, 1, count))
-    dry, drag = (R > 0.0) | ((c > 0.0) & (n == 0.0)), (c > 0.0) & (n == 2.0)
-    alone = (1 * dry + drag + (e < 1.0) == 1) & ~((c > 0.0) & ((n == 1.0) | (n == 2.5)))
-    assert all((kind & alone).any() for kind in (dry, drag, e < 0.0))
-    outputs, status = cycles("pure", R=R, c=c, n=n, e=e)
-    assert np.array_equal(status == Status.OK, alone)
-    assert (status[~alone] == Status.NO_METHOD).all()
-    integrals, _ = cycles(R=R, c=c, n=n, e=e)
-    for name in NAMES:
-        np.testing.assert_allclose(outputs[name][alone], integrals[name][alone], rtol=2e-14, err_msg=name)
-
-
 def test_degree_0_is_dry_friction_and_degree_1_is_viscous():
     R, a, more = np.array([0.1, 0.5, 0.0]), np.array([0.3, 0.0, 2.0]), np.array([0.25, 0.125, 0.5])
     for n, same in ((0.0, {"a": a, "R": R + more}), (1.0, {"a": a + more, "R": R})):

@@ -182,19 +182,6 @@ def test_two_roots_within_a_step_are_both_seen(method, excess):
 
 
 @pytest.mark.skipif(not COMPILED, reason="thousands of steps")
-def test_moreau_and_a_located_method_agree_under_dry_friction():
-    cell = {"phi0": 1.0, "R": np.array([0.3, 0.9]), "a": 0.2, "flips": 2.0}
-    moreau, rough = solve(KERNEL, "moreau", [1.0, 1.0], **cell, step=2e-3, location=0.0)
-    located, status = solve(KERNEL, "dop853", [1.0, 1.0], **cell, step=0.05)
-    assert not rough.any()
-    assert not status.any()
-    assert (moreau["error"] < 0.01).all()
-    for name in ("time", "period", "amplitude", "crossing_speed"):
-        np.testing.assert_allclose(moreau[name], located[name], rtol=3e-3)
-        assert (abs(moreau[name] / located[name] - 1) < 2 * moreau["error"]).all()
-
-
-@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
 def test_a_motion_that_comes_to_rest_in_the_switch_sticks_for_every_method_that_can_tell():
     cell = {"phi0": 1.0, "R": 0.9, "k": 0.5, "flips": 1.0, "step": 0.02}  # the spring stops it before the switch
     for method, location in (("moreau", "none"), ("rk4", "root"), ("dop853", "henon")):

@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from columns import asked_for, bounds, checked, printed_both_ways, solve
+from columns import asked_for, bounds, checked, solve
 from numba.core.errors import TypingError
 from triangle import FIELDS, TRIANGLE, Area, check, in_order, pythagoras
 
 from kernels.interface import Status
 from kernels.lanes.codes import OK
-from kernels.lanes.jit import COMPILED, jit
+from kernels.lanes.jit import jit
 from kernels.lanes.vectors import WIDTH
 from kernels.lanes.wiring import kernel, method
 
@@ -42,25 +42,6 @@ def test_each_output_goes_to_the_column_of_its_name(name):
     for n in (1, 3, WIDTH - 1, WIDTH, WIDTH + 1, MANY):
         few = solve(TRIANGLE, name, a[-n:], b[-n:], rtol=math.inf)[0]
         assert all((few[output] == plain[output][-n:]).all() for output in OUTPUTS)
-
-
-PROGRAM = """
-import sys
-sys.path.append("tests/helpers")
-from columns import bounds, solve
-from triangle import TRIANGLE
-for name in ("pythagoras", "in_order", "one_by_one", "estimating", "by_hand", "area_only"):
-    found, status = solve(TRIANGLE, name, [0.3, 1.7, 4.1], [2.2, 0.9, 4.0])
-    print(name, [[x.hex() for x in column.tolist()] for column in found.values()], status.tolist())
-print(bounds(TRIANGLE, "pythagoras", [0.3, 1.7], [2.2, 0.9]).tolist())
-"""
-
-
-@pytest.mark.skipif(not COMPILED, reason="both ways are tried from the compiled run")
-def test_compiled_and_as_plain_python_the_bits_are_the_same():
-    compiled, plain = printed_both_ways(PROGRAM)
-    assert compiled == plain
-    assert "0x1." in compiled
 
 
 def test_no_cells_are_no_fault():

@@ -145,20 +145,6 @@ def test_the_centre_of_the_workpiece_wears_by_the_arm_alone_and_beside_it_hardly
     assert abs(near[1] / near[0] - 1) < 1e-7
 
 
-def test_a_workpiece_on_the_pivot_wears_by_the_difference_of_rates():
-    """All of the ring at r: the arc of the disc about (L, 0), times the mean of abs(alpha' - Omega)."""
-    changed = {"w_x": 0.0, "w_y": 0.0, "L": 6.0, "e": 10.0, "Omega": 0.1}
-    value, _, status = wear(7.0, **changed)
-    machine = oracles.Machine(62.01, 38.0, 40.5, 10.0, 1, 1.0, -0.66, 6.0, 0.0, 0.0, 0.0, 0.1, 5.0, 5.0, 2.0, 2.0)
-    theta = (np.arange(400_000) + 0.5) / 400_000 * 2 * math.pi
-    pace = np.mean(abs(machine.arm(theta)[1] - 0.1))
-    half = math.acos((7.0**2 + 6.0**2 - 5.0**2) / (2 * 7.0 * 6.0))
-    assert status == Status.OK
-    assert value[0] == pytest.approx(7.0 * pace * half / math.pi, rel=1e-9)
-    close, _, _ = wear(7.0, rtol=1e-6, **(changed | {"w_x": 1e-5}))
-    assert close[0] == pytest.approx(value[0], rel=1e-5)
-
-
 @pytest.mark.skipif(not COMPILED, reason="hundreds of radii")
 def test_what_the_rings_lose_is_what_the_tool_takes():
     """int wear 2 pi r dr = mean over the turn of the integral of the speed over the tool."""
