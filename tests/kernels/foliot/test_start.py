@@ -226,10 +226,3 @@ def test_flips_may_be_asked_for_in_any_order():
 @pytest.mark.parametrize("asked", [[0.0], [1.5], [1.0, NAN], [INF], [-1.0], [2 * FLIP_LIMIT]])
 def test_a_coordinate_that_does_not_count_is_refused(asked):
     assert (start(np.ones(40), np.ones(40), flips=asked)[2] == Status.BAD_INPUT).all()
-
-
-def test_where_only_a_speed_is_beyond_float64_its_time_is_given():
-    times, speeds, status = start([1.7e308, 1.0], [1.7e308, 1.0], a=[1e-3, 1e-3])
-    assert status.tolist() == [Status.PARTLY_OUT_OF_RANGE, Status.OK]
-    assert np.isnan(speeds[0]).all()
-    assert np.array_equal(times[0], times[1])

@@ -169,18 +169,6 @@ def test_what_a_cell_comes_to_is_named(cell, method, location, statuses):
         assert np.isfinite([outputs[name][0] for name in ("time", "period", "amplitude")]).all()
 
 
-@pytest.mark.parametrize("method", ["rk4", "dop853"])
-@pytest.mark.parametrize("excess", [1e-2, 1e-3])
-def test_two_roots_within_a_step_are_both_seen(method, excess):
-    k = 2.0 / (1.0 + excess)  # passes the switch by so little that it is back within the step
-    cell = {"phi0": 1.0, "k": k, "flips": 1.0, "step": 0.21, "location": float(LOCATIONS["root"])}
-    outputs, status = solve(KERNEL, method, [1.0], **cell)
-    true = mp.acos(1 - mpf(k)) / mp.sqrt(mpf(k))
-    assert status[0] == Status.OK
-    assert abs(outputs["time"][0] / float(true) - 1) < 2 * outputs["error"][0] + 1e-14
-    assert outputs["error"][0] < 0.01
-
-
 @pytest.mark.skipif(not COMPILED, reason="thousands of steps")
 def test_a_motion_that_comes_to_rest_in_the_switch_sticks_for_every_method_that_can_tell():
     cell = {"phi0": 1.0, "R": 0.9, "k": 0.5, "flips": 1.0, "step": 0.02}  # the spring stops it before the switch

@@ -86,24 +86,6 @@ def test_what_a_cell_comes_to_is_named(method, cell, status):
         assert np.isfinite([outputs[name][0] for name in outputs]).all()
 
 
-@pytest.mark.skipif(not COMPILED, reason="many steps")
-@pytest.mark.parametrize("method", [*METHODS, "taylor"])
-def test_torque_that_is_a_small_difference_is_right_or_said_to_be_inaccurate(method):
-    mu, a, phi0 = 0.0031058082885818596, 0.019839584042776772, 1.1587734504700546
-    R = mu * (1.0 - 10.0 ** -np.linspace(2.0, 8.0, 24))  # the rates lose what mu and R have in common
-    outputs, status = solve(method, mu, phi0, a, R=R, flips=1.0, rtol=1e-10)
-    truths = []
-    for friction in R:
-        left, drag = mpf(mu) - mpf(float(friction)), mpf(a)
-        time = mp.findroot(lambda t, f=left, d=drag: f / d * (t + mp.expm1(-d * t) / d) - mpf(phi0), phi0 * a / left)
-        truths.append(-left / drag * mp.expm1(-drag * time))
-    error = relative_error(outputs["speed"], truths)
-    assert (error[status == Status.OK] <= 1e-10).all()
-    assert (status == Status.OK).any()
-    assert (status[error > 1e-10] == Status.INACCURATE).all()
-    assert np.nanmax(error) > 1e-10
-
-
 def braked(mu, phi0, a):
     """Time and speed at the first switch of a foliot with viscous friction."""
     mu, phi0, a = mpf(mu), mpf(phi0), mpf(a)
