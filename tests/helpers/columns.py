@@ -30,21 +30,31 @@ def solve(kernel: Kernel, method: str, *parameters, rtol=1e-9, along=(), asked=N
 def estimated(kernel: Kernel, method: str, *parameters, rtol=1e-9, along=(), asked=None, **named):
     """The same, and the error that the method estimates for the outputs asked for (None: all), NaN if it does not."""
     columns = columns_of(kernel, parameters, named)
-    n = len(columns[0])
+    tolerances = np.ascontiguousarray(np.broadcast_to(np.asarray(rtol, float), (len(columns[0]),)))
+    outputs, status, error = called(kernel, method, columns, tolerances, along, asked)
+    if kernel.method(method).estimates:
+        status[~(error <= tolerances) & (status < FIRST_REFUSAL)] = Status.INACCURATE
+    return outputs, status, error
+
+
+def called(kernel: Kernel, method: str, columns, rtol, along, asked):
+    """Outputs by name, status and error as the method writes them."""
+    outputs, status, error = (
+        unwritten(kernel, columns, along),
+        np.full(rtol.size, 99, np.int8),
+        np.full(rtol.size, np.nan),
+    )
+    before, after = ([asked_for(kernel, asked)], [error]) if kernel.method(method).estimates else ([], [])
+    kernel.method(method).solve(*columns, rtol, *along, *before, *outputs.values(), *after, status)
+    return outputs, status, error
+
+
+def unwritten(kernel: Kernel, columns, along):
+    """Outputs by name, NaN, of cells with these columns."""
     lengths = {field.name: len(values) for field, values in zip(kernel.along, along, strict=True)}
     lengths |= {d: c.shape[1] for p, c in zip(kernel.parameters, columns, strict=True) for d in p.dims}
     lengths |= {dim: lengths[other] for dim, other in kernel.same_length.items()}
-    outputs = {f.name: np.full((n, *(lengths[d] for d in f.dims)), np.nan) for f in kernel.outputs}
-    status = np.full(n, 99, np.int8)
-    tolerances = np.ascontiguousarray(np.broadcast_to(np.asarray(rtol, float), (n,)))
-    error = np.full(n, np.nan)
-    if kernel.method(method).estimates:
-        wanted = asked_for(kernel, asked)
-        kernel.method(method).solve(*columns, tolerances, *along, wanted, *outputs.values(), error, status)
-        status[~(error <= tolerances) & (status < FIRST_REFUSAL)] = Status.INACCURATE
-    else:
-        kernel.method(method).solve(*columns, tolerances, *along, *outputs.values(), status)
-    return outputs, status, error
+    return {f.name: np.full((len(columns[0]), *(lengths[d] for d in f.dims)), np.nan) for f in kernel.outputs}
 
 
 def asked_for(kernel: Kernel, names):

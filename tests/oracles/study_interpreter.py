@@ -4,10 +4,11 @@ Reads the keys of a study, `docs/study.md`, and a kernel, `kernels/interface.py`
 """
 
 from fractions import Fraction
-from itertools import pairwise, product
+from itertools import product
 from math import inf, isfinite, isnan, nan
 
 import numpy as np
+from columns import bounds, called, checked, columns_of, unwritten
 
 from kernels.interface import Status
 
@@ -43,70 +44,55 @@ class Cell:
     """The cell of a study whose axes have some values."""
 
     def __init__(self, kernel, keys, here):
-        given, fields = {**keys.get("fixed", {}), **here}, {f.name: f for f in kernel.parameters}
-        self.kernel, self.keys, self.words, self.p = kernel, keys, {}, {}
-        for name in fields:
-            source = name
-            while source not in given and isinstance(fields[source].default, str):
-                source = fields[source].default
-            word = given.get(source, fields[source].default)
-            self.p[name] = fields[name].choices[word] if isinstance(word, str) else word
-            names = {number: word for word, number in fields[name].choices.items()}
-            self.words[name] = names[self.p[name]] if names else self.p[name]
-        self.words |= here
-        length = max((len(v) for v in self.p.values() if np.ndim(v)), default=0)
-        self.p = {n: np.broadcast_to(v, length if fields[n].dims else ()).astype(float) for n, v in self.p.items()}
-        self.rtol, self.method = float(here.get("rtol", keys.get("rtol", 1e-9))), here.get("method", keys.get("method"))
+        given, self.kernel, self.keys = keys.get("fixed", {}) | here, kernel, keys | here
+        numbers = {f.name: [f.choices[given[f.name]] if f.choices else given[f.name]] for f in kernel.parameters
+                   if f.name in given}  # fmt: skip
+        self.columns = columns_of(kernel, (), numbers)
+        self.p = {f.name: column for f, column in zip(kernel.parameters, self.columns, strict=True)}
+        self.words = {name: column[0] for name, column in self.p.items()}
+        choices = [(f.name, *choice) for f in kernel.parameters for choice in f.choices.items()]
+        self.words |= {name: word for name, word, number in choices if number == self.words[name]}
+        self.rtol = np.array([self.keys.get("rtol", 1e-9)], float)
         self.along = [np.array(keys.get("along", {}).get(f.name, ()), float) for f in kernel.along]
-        self.inputs = [np.array([v]) for v in (*self.p.values(), self.rtol)]
-        sizes = {f.name: len(v) for f, v in zip(kernel.along, self.along, strict=True)}
-        sizes |= {d: length for f in kernel.parameters for d in f.dims}
-        sizes |= {new: sizes[old] for new, old in kernel.same_length.items()}
-        self.asked = np.array([f.name in keys["outputs"] for f in kernel.outputs], np.uint8)
-        self.nothing = [np.full((1, *(sizes[d] for d in f.dims)), nan) for f in kernel.outputs]
 
     def found(self):
         """Outputs, status, method and error bound, by name."""
         number, status, error, outputs = self.solved()
         if status >= 64:  # a refusal
-            outputs, number = self.nothing, -1
-        columns = {f.name: o[0] for f, o in zip(self.kernel.outputs, outputs, strict=True)}
+            outputs, number = unwritten(self.kernel, self.columns, self.along), -1
+        columns = {name: values[0] for name, values in outputs.items()}
         return columns | {"status": status, "method_used": number, "error_bound": error if status == 1 else nan}
 
     def solved(self):
         """(number of the method, status, error, outputs)."""
-        numbers = {m.name: k for k, m in enumerate(self.kernel.methods)}
+        numbers, method = {m.name: k for k, m in enumerate(self.kernel.methods)}, self.keys.get("method")
         with np.errstate(all="ignore"):
             if not eval(self.keys.get("where", "True"), {}, self.words):
-                return -1, Status.NOT_ASKED, nan, self.nothing
+                return -1, Status.NOT_ASKED, nan, None
             try:
-                status = np.zeros(1, "i1")
-                self.kernel.check(*self.inputs[:-1], status)
-                if (status := allowed(status[0])) >= 64:
-                    return -1, status, nan, self.nothing
-                return self.ran(numbers[self.method]) if self.method in numbers else self.auto()
+                status = allowed(checked(self.kernel, **self.p)[0])
+                if status >= 64:
+                    return -1, status, nan, None
+                return self.ran(numbers[method]) if method in numbers else self.auto()
             except ZeroDivisionError:  # what our kernels raise
-                return -1, Status.FAILED, nan, self.nothing
+                return -1, Status.FAILED, nan, None
 
-    def bound(self, number):
+    def bound(self, method):
         """What a method promises: 0 where it holds rtol by itself, inf where nothing is known."""
-        out, bound = np.zeros(1), self.kernel.methods[number].bound
-        if bound is not None:
-            bound(*self.inputs, *self.along, self.asked, out)
-        return inf if isnan(out[0]) else out[0]
+        if method.bound is None:
+            return 0.0
+        words = {"asked": self.keys["outputs"], "rtol": self.rtol, "along": self.along}
+        return known(bounds(self.kernel, method.name, **self.p, **words)[0])
 
     def ran(self, number):
         """The same by one method: INACCURATE where it is known to be worse than rtol, FAILED where OK has no number."""
-        method, status, error = self.kernel.methods[number], np.zeros(1, "i1"), np.zeros(1)
-        outputs, says = [o.copy() for o in self.nothing], method.estimates
-        extra = ([self.asked], [error]) if says else ([], [])
-        method.solve(*self.inputs, *self.along, *extra[0], *outputs, *extra[1], status)
-        there = zip(self.kernel.outputs, outputs, strict=True)
-        whole = all(np.isfinite(o).all() for f, o in there if f.name in self.keys["outputs"] and not f.gaps)
-        status = Status.FAILED if status[0] == Status.OK and not whole else allowed(status[0])
-        known = error[0] if says else inf if status == Status.INACCURATE else 0.0
-        known = max(inf if isnan(known) else known, self.bound(number))
-        return number, Status.INACCURATE if status < 64 and known > self.rtol else status, known, outputs
+        method, asked = self.kernel.methods[number], self.keys["outputs"]
+        outputs, (status,), (told,) = called(self.kernel, method.name, self.columns, self.rtol, self.along, asked)
+        whole = all(np.isfinite(outputs[f.name]).all() for f in self.kernel.outputs if f.name in asked and not f.gaps)
+        status = Status.FAILED if status == Status.OK and not whole else allowed(status)
+        error = known(told) if method.estimates else inf if status == Status.INACCURATE else 0.0
+        error = max(error, self.bound(method))
+        return number, Status.INACCURATE if status < 64 and error > self.rtol else status, error, outputs
 
     def auto(self):
         """The first method that can do the cell, promises rtol and does not give up; else the best of what there is."""
@@ -115,10 +101,10 @@ class Cell:
         for number, method in enumerate(self.kernel.methods):
             unable = any((self.p[n] != default[n]).any() for n in method.excludes)
             if not unable and not set(method.lacks) & set(self.keys["outputs"]):
-                early = method.sooner is not None and method.sooner(*self.inputs)[0]
+                early = method.sooner is not None and method.sooner(*self.columns, self.rtol)[0]
                 turns.append((number - 1.5 if early else number, number))
-        promises = [(self.bound(number), number) for _, number in sorted(turns)]
-        best = -1, Status.NO_METHOD, inf, self.nothing
+        promises = [(self.bound(self.kernel.methods[number]), number) for _, number in sorted(turns)]
+        best = -1, Status.NO_METHOD, inf, None
         for _, number in (promise for promise in promises if promise[0] <= self.rtol):
             best = better(best, self.ran(number))
             if best[1].name not in GIVES_UP:
@@ -132,6 +118,11 @@ class Cell:
 def allowed(status):
     """What a kernel may say; else FAILED."""
     return Status(status) if 0 <= status < Status.NOT_ASKED else Status.FAILED
+
+
+def known(error):
+    """inf where an error is no number."""
+    return inf if isnan(error) else error
 
 
 def better(old, new):
@@ -176,9 +167,8 @@ def reduced(name, cells, here, columns, summary, field):
         return {name: total / len(numbers) if numbers else nan}
     if name == "histogram":
         edges = summary["edges"][field.name]
-        bins = np.array([sum(lo <= v < hi for v in numbers) for lo, hi in pairwise(edges)])
-        bins[-1] += numbers.count(edges[-1])
-        return {"below": sum(v < edges[0] for v in numbers), name: bins, "above": sum(v > edges[-1] for v in numbers)}
+        below, above = sum(v < edges[0] for v in numbers), sum(v > edges[-1] for v in numbers)
+        return {"below": below, name: np.histogram(numbers, edges)[0], "above": above}
     best = (min if name == "argmin" else max)(cells, key=lambda c: c[0], default=(nan, None))[1]
     found = {f"{name}_status": Status.PENDING if best is None else columns["status"][1][best]}
     for axis in summary["over"]:
