@@ -70,7 +70,7 @@ class Cell:
             if not eval(self.keys.get("where", "True"), {}, self.words):
                 return -1, Status.NOT_ASKED, nan, None
             try:
-                status = allowed(checked(self.kernel, **self.p)[0])
+                status = allowed(checked(self.kernel, *self.columns)[0])
                 if status >= 64:
                     return -1, status, nan, None
                 return self.ran(numbers[method]) if method in numbers else self.auto()
@@ -82,7 +82,8 @@ class Cell:
         if method.bound is None:
             return 0.0
         words = {"asked": self.keys["outputs"], "rtol": self.rtol, "along": self.along}
-        return known(bounds(self.kernel, method.name, **self.p, **words)[0])
+        (bound,) = bounds(self.kernel, method.name, *self.columns, **words)
+        return inf if isnan(bound) else bound
 
     def ran(self, number):
         """The same by one method: INACCURATE where it is known to be worse than rtol, FAILED where OK has no number."""
@@ -90,39 +91,31 @@ class Cell:
         outputs, (status,), (told,) = called(self.kernel, method.name, self.columns, self.rtol, self.along, asked)
         whole = all(np.isfinite(outputs[f.name]).all() for f in self.kernel.outputs if f.name in asked and not f.gaps)
         status = Status.FAILED if status == Status.OK and not whole else allowed(status)
-        error = known(told) if method.estimates else inf if status == Status.INACCURATE else 0.0
-        error = max(error, self.bound(method))
+        error = told if method.estimates else inf if status == Status.INACCURATE else 0.0
+        error = inf if isnan(error) else max(error, self.bound(method))
         return number, Status.INACCURATE if status < 64 and error > self.rtol else status, error, outputs
 
     def auto(self):
         """The first method that can do the cell, promises rtol and does not give up; else the best of what there is."""
         default = {f.name: self.p.get(f.default, f.default) for f in self.kernel.parameters}
-        turns = []
+        turns, best = [], (-1, Status.NO_METHOD, inf, None)
         for number, method in enumerate(self.kernel.methods):
             unable = any((self.p[n] != default[n]).any() for n in method.excludes)
             if not unable and not set(method.lacks) & set(self.keys["outputs"]):
                 early = method.sooner is not None and method.sooner(*self.columns, self.rtol)[0]
-                turns.append((number - 1.5 if early else number, number))
-        promises = [(self.bound(self.kernel.methods[number]), number) for _, number in sorted(turns)]
-        best = -1, Status.NO_METHOD, inf, None
-        for _, number in (promise for promise in promises if promise[0] <= self.rtol):
-            best = better(best, self.ran(number))
-            if best[1].name not in GIVES_UP:
-                return best
-        for bound, number in sorted((p for p in promises if p[0] > self.rtol), key=lambda promise: promise[0]):
-            if bound < (inf if best[1] >= 64 else best[2] if best[1] == Status.INACCURATE else 0.0):
+                turns.append((max(self.bound(method), self.rtol[0]), number - 1.5 if early else number, number))
+        for bound, _, number in sorted(turns):
+            least = inf if best[1] >= 64 else best[2] if best[1] == Status.INACCURATE else 0.0
+            if bound <= self.rtol or bound < least:
                 best = better(best, self.ran(number))
+            if bound <= self.rtol and best[1].name not in GIVES_UP:
+                return best
         return best
 
 
 def allowed(status):
     """What a kernel may say; else FAILED."""
     return Status(status) if 0 <= status < Status.NOT_ASKED else Status.FAILED
-
-
-def known(error):
-    """inf where an error is no number."""
-    return inf if isnan(error) else error
 
 
 def better(old, new):
