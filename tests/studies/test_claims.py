@@ -101,7 +101,7 @@ TABLE = {
         "stability_maps_oscillator.error stability_maps_oscillator.interval stability_maps_oscillator.pace", 1),
     "stick_slip": Claims({
         "stick_slip": {"method": ["taylor", "dop853"], "belt": [0.02, 0.3], "fall": [0.02, 0.3]},
-    }, tell=False),
+    }, "interval place speed", 2, tell=False),
     "stiff_lag": Claims({
         "stiff_lag": {"method": ["taylor", "rodas5p"], "mu": [0.1, 10.0], "eps": [1e-9, 1e-5, 1e-1]},
         "stiff_lag_bounce": {"flips": [20, 100, 3000], "e": [0.1, 0.5]},
