@@ -1,4 +1,4 @@
-"""Sixty wrong behaviours, each a small patch of its own: which of them do the tests catch?
+"""Some sixty wrong behaviours, each a small patch of its own: which of them do the tests catch?
 
     python benchmarks/soak/power.py [--room kernels/foliot ...] [--only NAME ...] [--plain] [--limit 600]
     python benchmarks/soak/power.py --check

@@ -22,11 +22,15 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import lapack
 
+from kernels.drivetrain._chain_frequencies import frequencies as frequencies_of_group
+from kernels.drivetrain._chain_frequencies import row_at
 from kernels.drivetrain.receptance import DRIVETRAIN_FRF
+from kernels.lanes.columns import entry, in_groups
+from kernels.lanes.groups import GROUP, cells_at, room
+from kernels.lanes.jit import jit
 
 sys.path += [str(Path(__file__).parents[2] / "tests" / folder) for folder in ("oracles", "helpers")]
 import chain_oracles as oracles
-from many_chains import natural_frequencies_of_all
 from mpmath import mp, mpc, mpf
 
 CELLS = {2: 65536, 4: 32768, 8: 16384, 16: 8192, 64: 512}
@@ -34,6 +38,28 @@ CELLS = {2: 65536, 4: 32768, 8: 16384, 16: 8192, 64: 512}
 REPEATS = 7
 CHECKED = 6
 """Chains whose error is measured."""
+
+
+@jit
+def _group(first, columns, rows):
+    J, k, frequency, status = columns
+    n = J.shape[1]
+    part = GROUP * n
+    inertias, springs, found, entries = rows, rows[part:], rows[2 * part :], rows[3 * part :]
+    for cell in range(GROUP):
+        for j in range(n):
+            inertias[j * GROUP + cell] = J[first + cell, j]
+            springs[j * GROUP + cell] = k[first + cell, j]
+    status[cells_at(first)] = frequencies_of_group(n, row_at, GROUP, inertias, springs, found, entries)
+    for cell in range(GROUP):
+        for j in range(n):
+            frequency[first + cell, j] = found[j * GROUP + cell]
+
+
+@entry()
+def natural_frequencies_of_all(J, k, frequency, status):
+    """Natural frequencies of every row of J and k, of shape (n_cells, n), a group of them at a time; and statuses."""
+    in_groups(_group, (J, k, frequency, status), (room(6 * J.shape[1] + 2),))
 
 
 def chains(n, decades, cells, seed=1):

@@ -19,12 +19,10 @@ from typing import NamedTuple
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, nearest, not_, where
 from kernels.maths import pairs
-from kernels.maths.elementary import exp, in_unit, log1p, mantissa_exponent, scale
+from kernels.maths.elementary import in_unit, log1p, mantissa_exponent, scale
 
 COUNT_LIMIT = 2.0**50
 """Half swings from which on they are only known to 1e-15: 32 digits do not tell two turning points apart."""
-RECURSION_LIMIT = 100_000
-"""Half swings after which `recursion` gives up."""
 GRAZING = 1e-9
 """Margin below which one more swing hangs on the last digits of the input, whatever the count."""
 FAINT = 1e-100
@@ -229,28 +227,3 @@ def _blurs(scene, decay, swing):
 def _blur(first, second, a, kept):
     """Two units in the last place of the terms of (3), each so many times."""
     return _TWO_ULP * (kept * first + magnitude(kept - a) * second)
-
-
-@jit_call
-def recursion(scene):
-    """As `closed`, by following (2) in float64, with the error that its rounding has come to."""
-    r_s, start = scene.r_s, scene.start
-    delta, _ = decrement(scene.zeta)
-    share = exp(-delta[0])
-    loss = scene.r * (1.0 + share)
-    a, before, count, error, error_before = start, start, 0.0 * start, 0.0 * start, 0.0 * start
-    rounding = 2.3e-16 * (1.0 + delta[0])  # of `share`
-    active = (a > r_s) & (r_s > 0.0)  # r_s = 0: it never ends
-    for _ in range(RECURSION_LIMIT):
-        if not any_lane(active):
-            break
-        new = fma(share, a, -loss)
-        more = fma(share, error, fma(rounding, share * a, 4e-16 * loss)) + 1.2e-16 * magnitude(new)
-        more = more + _LOST
-        before, error_before = where(active, a, before), where(active, error, error_before)
-        a, error = where(active, new, a), where(active, more, error)
-        count = where(active, count + 1.0, count)
-        active = active & (a > r_s)
-    moved = count > 0.0
-    margin, grazes = _margin(before - r_s, r_s - a, error_before + 2.3e-16 * r_s, error + 2.3e-16 * r_s, r_s, moved)
-    return Rest(count, a, margin, grazes, where(moved, error, 0.0), active)

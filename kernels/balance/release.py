@@ -16,7 +16,6 @@ from collections import namedtuple
 from typing import NamedTuple
 
 from kernels.balance import _ringdown
-from kernels.balance._ringdown import RECURSION_LIMIT
 from kernels.interface import Field
 from kernels.lanes.codes import (
     BAD_INPUT,
@@ -28,7 +27,6 @@ from kernels.lanes.codes import (
     OK,
     OUT_OF_RANGE,
     OVERDAMPED,
-    STEP_LIMIT,
 )
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none, partly
@@ -88,20 +86,23 @@ def _margin(scene, rest, kind):
 
 
 @jit
-def _verdict(scene, rest, kind, rtol, unsettled, faint):
+def _verdict(scene, rest, kind, rtol, faint):
     """The status but for the range; an angle of rest too `faint` for a float64 is not asked for its error."""
     loose = not_(faint | (rest.doubt <= rtol * magnitude(rest.last)))
     loose = loose | not_(rest.doubt <= rtol * rest.margin * scene.r_s)
-    verdict = where(rest.unsure, unsettled, where(rest.grazes, GRAZING, where(loose, INACCURATE, OK)))
+    verdict = where(rest.unsure, NOT_CONVERGED, where(rest.grazes, GRAZING, where(loose, INACCURATE, OK)))
     verdict = where(scene.start > 0.0, verdict, OK)
     return where(kind.creeps, OVERDAMPED, where(kind.endless, NEVER_ENDS, verdict))
 
 
 @jit
-def _outputs(p, rtol, follow, unsettled):
-    """In SI units, by one way to follow the ring-down; overdamped and endless motions get what exists of them."""
+def closed(p, rtol):
+    """The count by formula, confirmed by the turning points on both sides of it in 32 digits, in SI units.
+
+    Overdamped and endless motions get what exists of them.
+    """
     scene, e, fine = _ringdown.in_units(p.zeta, p.r, p.r_s, p.theta0)
-    rest, kind = follow(swinging(scene)), _kind(scene)
+    rest, kind = _ringdown.closed(swinging(scene)), _kind(scene)
     angle, faint = _stop_angle(p, scene, e, rest, kind)
     half = half_swing_time(where(kind.creeps, 0.0, p.zeta), p.omega_n)
     time = where(kind.moves, rest.count * half, 0.0)
@@ -115,7 +116,7 @@ def _outputs(p, rtol, follow, unsettled):
         or_none(2.0 * half, timed & not_(kind.creeps)),
     )
     whole = not_(faint) & (kind.creeps | (timed & (ends | not_(kind.lasts))))
-    verdict = _verdict(scene, rest, kind, rtol, unsettled, faint)
+    verdict = _verdict(scene, rest, kind, rtol, faint)
     return outputs, where(fine, partly(whole, verdict), OUT_OF_RANGE)
 
 
@@ -123,18 +124,6 @@ def _outputs(p, rtol, follow, unsettled):
 def swinging(scene):
     """The scene with a tame damping where it is overdamped and nothing is counted."""
     return _ringdown.Scene(where(scene.zeta < 1.0, scene.zeta, 0.5), scene.r, scene.r_s, scene.start)
-
-
-@jit
-def closed(p, rtol):
-    """The count by formula, confirmed by the turning points on both sides of it in 32 digits."""
-    return _outputs(p, rtol, _ringdown.closed, NOT_CONVERGED)
-
-
-@jit
-def recursion(p, rtol):
-    """Half swing by half swing; what rounding may have come to is added up beside it."""
-    return _outputs(p, rtol, _ringdown.recursion, STEP_LIMIT)
 
 
 @jit
@@ -186,9 +175,6 @@ BALANCE = kernel(
     outputs=OUTPUTS,
     record=Balance,
     check=check,
-    methods=(
-        method("closed", "formula of the count, confirmed in 32 digits", closed, ROUNDING),
-        method("recursion", f"half swing by half swing, up to {RECURSION_LIMIT}", recursion),
-    ),
+    methods=(method("closed", "formula of the count, confirmed in 32 digits", closed, ROUNDING),),
     example=EXAMPLE,
 )

@@ -1,4 +1,4 @@
 """The verge clock as two bodies in inelastic impact; face `clock` (kernel impact).
 
-Methods: `_closed_cycle` (formula), `_return_map` (fixed point), `_followed` (contact by contact).
+Methods: `_closed_cycle` (formula), `_followed` (contact by contact).
 """

@@ -39,10 +39,6 @@ ROUNDING = 2e-15
 """What the closed forms are right to."""
 GRAZE = 4e-15
 """A difference below this share of its terms hangs on the last digits of the input."""
-MOST_KEPT = 0.875
-"""Restitution from which on no cycle exists."""
-
-
 _MOST_BENT = 24.0
 """abs(nu kappa wheel) of (3): beyond it q is below -5 or above 5, and no cycle exists."""
 

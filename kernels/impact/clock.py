@@ -9,22 +9,22 @@ depend on the torque at all. Leaves out friction, the width of teeth and pallets
 Source: derived here. Works on such clocks by Roup et al. (2003), Lepschy et al. and Denny (2002) are known to us by
 their abstracts only; no number here is theirs.
 
-`closed` and `map` know the symmetric cycle with one impact a half period (one push in contact for e = 0): NO_CYCLE
-where it does not exist, UNSTABLE where it exists and disturbances grow, GRAZING where the last digits of the input
-decide on either (kappa = 1 with a flat lever: they neither grow nor fade).
+`closed` knows the symmetric cycle with one impact a half period (one push in contact for e = 0): NO_CYCLE where it
+does not exist, UNSTABLE where it exists and disturbances grow, GRAZING where the last digits of the input decide on
+either (kappa = 1 with a flat lever: they neither grow nor fade).
 
 `events` tells what the clock comes to from a start a millionth off the symmetric cycle; other motions may be stable
 too, and so near a border of existence the clock may leave the cycle for one of them. OK: one tooth a cycle, be it off
 the middle (`offset`), with several impacts or with several swings to and fro. PERIOD_2: two or more teeth until it
 repeats; of those the period and the speeds are means. NOT_PERIODIC: means over 1024 half swings, no multiplier.
 STEP_LIMIT: bounces without end, as e towards 1 makes them, or a lever so bent that both pallets wedge the wheel.
-NO_METHOD: lasting contact under a bent lever, and masses more unequal than 1e12 (1e24 for `map`). TOOTH_JUMPED is
-watched for; a flat lever lets no tooth pass alone (`_half_swing`), and no bent one was found to.
+NO_METHOD: lasting contact under a bent lever, and masses more unequal than 1e12. TOOTH_JUMPED is watched for; a
+flat lever lets no tooth pass alone (`_half_swing`), and no bent one was found to.
 """
 
 from typing import NamedTuple
 
-from kernels.impact import _closed_cycle, _followed, _return_map, _units
+from kernels.impact import _closed_cycle, _followed, _units
 from kernels.interface import Field
 from kernels.lanes.columns import cell_by_cell
 from kernels.lanes.jit import jit
@@ -43,19 +43,13 @@ class Beat(NamedTuple):
 
 
 @jit
-def _symmetric(p, rtol, solve):
-    """The cycle with one impact a half period, in SI units, and the status."""
+def closed(p, rtol):
+    """The symmetric cycle by formula, with its existence and its multipliers, in SI units."""
     scene, units, fine = _units.without_dimensions(p)
-    cycle, held, verdict = solve(scene, rtol)
+    cycle, held, verdict = _closed_cycle.closed(scene, rtol)
     sizes, whole = _units.dimensional(units, cycle)
     one = 0.0 * held + 1.0
     return Beat(sizes, cycle.multiplier, held, one, 0.0 * one), judged(fine, whole, verdict)
-
-
-@jit
-def closed(p, rtol):
-    """The symmetric cycle by formula, with its existence and its multipliers."""
-    return _symmetric(p, rtol, _closed_cycle.closed)
 
 
 @jit
@@ -67,12 +61,6 @@ def events(p, rtol, total, work, history):
     offset = _units.length(units, answer.offset)
     beat = Beat(sizes, answer.cycle.multiplier, answer.held, answer.impacts, offset)
     return beat, judged(fine, whole, verdict)
-
-
-@jit
-def half_cycle_map(p, rtol):
-    """The symmetric cycle as the fixed point of the half-cycle map, by Newton, and its multipliers."""
-    return _symmetric(p, rtol, _return_map.half_cycle)
 
 
 @jit
@@ -132,10 +120,6 @@ IMPACT = kernel(
             events,
             buffers=_followed.workspace,
             loop=cell_by_cell,
-        ),
-        # last: it knows no cycle that "closed" does not
-        method(
-            "map", "the cycle of `closed` as fixed point of the half-cycle map, by Newton in 32 digits", half_cycle_map
         ),
     ),
     example={

@@ -15,35 +15,21 @@ rates, no derivatives). A crank e = 0 swings nothing; crank angles are those for
 (1e36) are OUT_OF_RANGE.
 """
 
-import math
 from collections import namedtuple
-from typing import NamedTuple
 
 from kernels.interface import FIRST_REFUSAL, Field
-from kernels.lanes.codes import BAD_INPUT, INACCURATE, LOCK_UP, OK
-from kernels.lanes.columns import cell_by_cell
+from kernels.lanes.codes import BAD_INPUT, INACCURATE, OK
 from kernels.lanes.groups import cells_at
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none
 from kernels.lanes.records import read, write
-from kernels.lanes.vectors import choose, not_, where
+from kernels.lanes.vectors import not_, where
 from kernels.lanes.wiring import kernel, method, tracing
-from kernels.maths.elementary import larger
-from kernels.polisher import _motor_waveform, _sampled_motion, _textbook_angles, extremes
-from kernels.polisher._cell import ROUNDING, Rates, Swing, judged, mirrored, moves, rocks, said, swing, turns
-from kernels.polisher.extremes import Angles, Locks, Slopes
-from kernels.polisher.linkage import EXAMPLE, PARAMETERS, allowed, side_of
+from kernels.polisher import _motor_waveform, extremes
+from kernels.polisher._cell import ROUNDING, Rates, judged, said, swing, turns
+from kernels.polisher.linkage import EXAMPLE, PARAMETERS, allowed
 
 Linkage = namedtuple("Linkage", [field.name for field in PARAMETERS])
-
-
-class Sampled(NamedTuple):
-    """Outputs of `sampled`."""
-
-    angles: Angles
-    locks: Locks
-    transmission_angle: float
-    rates: Rates
 
 
 @jit
@@ -63,29 +49,6 @@ def stable(p, rtol):
 
 
 @jit
-def textbook(p, rtol):
-    """The paper's arccos; what that loses is the bound."""
-    cell = judged(p)
-    angles = _textbook_angles.extremes(cell.lengths)
-    transmission = _textbook_angles.transmission(cell.lengths)
-    return swing(p.type, cell, angles, transmission, _textbook_angles.tolerances(cell.lengths)), cell.code
-
-
-@jit
-def textbook_bound(p):
-    """What rounding comes to in an arccos and in differences of two of them; the locks are those of `stable`."""
-    cell, least = judged(p), ROUNDING
-    of_angles = Angles(least, least, least, least, least, least)
-    of_slopes = Slopes(least, least, least, least, least, least, least, least)
-    return Swing(
-        choose(rocks(cell), _textbook_angles.angle_errors(cell.lengths), of_angles),
-        Locks(least, least),
-        where(moves(cell), _textbook_angles.transmission_error(cell.lengths), least),
-        choose(said(cell.code, OK), _textbook_angles.slope_errors(cell.lengths), of_slopes),
-    )
-
-
-@jit
 def _waveform(first, columns, turn):
     """As `stable`, and then the motion over a turn; `_motor_waveform` estimates the rounding of that."""
     i = cells_at(first)
@@ -99,28 +62,6 @@ def _waveform(first, columns, turn):
     write(columns, i, Rates(or_none(thd, swings), or_none(most, rates), or_none(least, rates)))
     wide = (rates & not_(rate_doubt <= rtol)) | (swings & not_(doubt <= rtol)) | not_(rtol >= ROUNDING)
     columns.status[i] = where(wide & (cell.code < FIRST_REFUSAL), INACCURATE, cell.code)
-
-
-@jit
-def sampled(p, rtol, samples):
-    """The verdict of `stable`, and all its values anew from samples of a turn."""
-    cell, none = judged(p), math.nan
-    angles, locks, rates = Angles(none, none, none, none, none, none), Locks(none, none), Rates(none, none, none)
-    transmission, doubt = none, math.inf
-    if said(cell.code, LOCK_UP):
-        locks, doubt = _sampled_motion.locks(cell)
-        transmission = 0.0
-    elif turns(cell):
-        blind = _sampled_motion.sample(cell, samples)
-        transmission = _sampled_motion.transmission(cell)
-        rates, doubt = _sampled_motion.rates(cell, samples)
-        if said(cell.code, OK):
-            angles, lost = _sampled_motion.extremes(cell, samples.alphas)
-            doubt = larger(doubt, lost)
-        doubt = larger(blind, doubt)  # NaN stays
-    doubtful = not doubt <= rtol and cell.code < FIRST_REFUSAL
-    outputs = Sampled(mirrored(angles, side_of(p.type)), locks, transmission, rates)
-    return outputs, INACCURATE if doubtful else cell.code
 
 
 @jit
@@ -162,26 +103,11 @@ POLISHER = kernel(
     check=check,
     methods=(
         method("stable", "half-angle forms of sums without error", stable, ROUNDING, lacks=Rates._fields),
-        method(
-            "textbook",
-            "the paper's arccos, which loses digits next to dead points",
-            textbook,
-            textbook_bound,
-            lacks=Rates._fields,
-        ),
         tracing(
             "waveform",
             "stable, and integrals and extremes of the rate over a turn",
             _waveform,
             buffers=_motor_waveform.buffers,
-        ),
-        method(
-            "sampled",
-            "2048 samples of the motion over a turn, followed up",
-            sampled,
-            lacks=Slopes._fields,
-            buffers=_sampled_motion.buffers,
-            loop=cell_by_cell,
         ),
     ),
     example=EXAMPLE,

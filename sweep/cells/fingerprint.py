@@ -25,13 +25,11 @@ OURS = ("kernels", "sweep.cells", "sweep.study")
 """Packages of which every source counts: the kernels, and what chooses methods, makes cells and reduces them."""
 INSTALLED = frozenset(("site-packages", "dist-packages"))
 SOURCE = "source "
-CHOICE = "auto"
-"""How `auto` chooses."""
 
 
 def is_of_program(name: str) -> bool:
     """Whether an entry of a fingerprint tells of the program, not of the study."""
-    return name.startswith(SOURCE) or name in (*COMPILERS, CHOICE)
+    return name.startswith(SOURCE) or name in COMPILERS
 
 
 def fingerprint(study: Study) -> dict[str, str]:
@@ -41,8 +39,8 @@ def fingerprint(study: Study) -> dict[str, str]:
     -------
     dict of str to str
         "study" is one digest of all that the study says but for its words; what it says follows in short, under its
-        names in a study file. Then a digest of the sources of each package ("source kernels"), how `auto` chooses, and
-        the versions of compiler and arrays. The processor is not in it: kernels give the same bits on each.
+        names in a study file. Then a digest of the sources of each package ("source kernels"), and the versions of
+        compiler and arrays. The processor is not in it: kernels give the same bits on each.
     """
     said = _said(study)
     whole = hashlib.sha256(json.dumps(said).encode()).hexdigest()
@@ -51,7 +49,6 @@ def fingerprint(study: Study) -> dict[str, str]:
         **said,
         **{SOURCE + name: _of_package(name) for name in OURS},
         **_own_sources(study.kernel_name),
-        **({CHOICE: "cell by cell"} if study.by_cell else {}),
         **{name: version(name) for name in COMPILERS},
     }
 

@@ -2,7 +2,6 @@
 
 A method that is named must do every term of its study. `auto` asks it of each cell alone: what becomes of a cell does
 not hang on the others of its study. Only where every method lacks some term of a study is the study refused whole.
-Where a result is continued whose cells were not chosen for one by one, the methods that can do every term take turns.
 """
 
 from __future__ import annotations
@@ -79,8 +78,6 @@ class Turn(NamedTuple):
 
 def turns(study: Study, grid: Grid) -> tuple[Turn, ...]:
     """Turns of the methods that give every output asked for and can do some cell of the grid."""
-    if not study.by_cell:
-        return tuple(map(Turn, usable_methods(study)))
     found: dict[float, Turn] = {}
     for number, method in enumerate(study.kernel.methods):
         terms = [_absent(study.kernel, name) for name in method.excludes]

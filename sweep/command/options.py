@@ -48,7 +48,7 @@ STUDY = option("study", metavar="STUDY.toml", type=Path)
 RESULT = option("result", metavar="OUT.h5", type=Path)
 OUTPUT_Y = option("--y", "default: the first output; of a scene of one's own its interval", metavar="OUTPUT")
 OTHER = option("other", metavar="OTHER.h5", type=Path)
-WORKERS = option("--workers", "cores to use; default: all; SIGUSR1 adds one, SIGUSR2 takes one", metavar="N", type=int)
+WORKERS = option("--workers", "cores to use; default: all", metavar="N", type=int)
 ALLOW_IMPORT = switch("--allow-import", 'allow a kernel "module:NAME" of your own')
 ISOLATE = option(
     "--isolate",

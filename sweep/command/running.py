@@ -5,10 +5,8 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
-import signal
 import subprocess
 import sys
-import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,7 +34,7 @@ if TYPE_CHECKING:
 NOTIFY_SECONDS = 60
 """What the command of --notify may take."""
 RUN_OPTIONS = (
-    *("workers", "cluster", "without_workers", "force", "extend", "until"),
+    *("workers", "cluster", "force", "extend", "until"),
     *("isolate", "cell_timeout", "retry_failed", "repair"),
 )
 """Options of `run` that are arguments of the function of that name."""
@@ -47,10 +45,6 @@ def _run(arguments: argparse.Namespace) -> Outcome:
     from sweep.system.log import log, log_path, logging_to
 
     output = _output(arguments)
-    for number in (signal.SIGUSR1, signal.SIGUSR2):
-        # they change the number of cores while blocks are computed, and mean nothing before and after
-        if threading.current_thread() is threading.main_thread() and signal.getsignal(number) is signal.SIG_DFL:
-            signal.signal(number, signal.SIG_IGN)
     check_readable(output)
     path = log_path(output) if output.parent.is_dir() else None
     with contextlib.ExitStack() as stack:
@@ -144,12 +138,6 @@ COMMANDS = {
         option("--until", "stop within seconds of it, with exit status 3; the same command continues", metavar="07:00"),
         *(ISOLATE, CELL_TIMEOUT),
         switch("--retry-failed", "of a complete result, compute the cells that FAILED again"),
-        option(
-            "--without-workers",
-            "where a cluster has none, or loses all: wait (the default), go on here after ten seconds, or end",
-            choices=("wait", "here", "end"),
-            default="wait",
-        ),
         option("--notify", "run this at the end; $SWEEP_EXIT and $SWEEP_SUMMARY say how it ended", metavar="COMMAND"),
         switch("--log-json", "the log, OUT.h5.log, as JSON, an object a line"),
     ),

@@ -210,4 +210,7 @@ def _keys(places: Array) -> list[float]:
 
 
 def _flat(dataset: xr.Dataset) -> xr.Dataset:
-    return dataset if dataset[STATUS].ndim == 1 else dataset.stack(cell=list(dataset[STATUS].dims), create_index=False)
+    """With all its cells along one dimension, which is the first one of traces too."""
+    if dataset[STATUS].ndim == 1:
+        return dataset
+    return dataset.stack(cell=list(dataset[STATUS].dims), create_index=False).transpose("cell", ...)

@@ -16,7 +16,7 @@ import numpy as np
 from sweep.cells.output_schema import gathered, output_schema
 from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import BY_STATUS, pending
-from sweep.cells.schema import ERROR_BOUND, STATUS, Schema
+from sweep.cells.schema import STATUS, Schema
 from sweep.store.frame import ENDINGS
 from sweep.store.layout import DAMAGE
 from sweep.store.probe import MOST_AT_ONCE, check_own, intact, readable
@@ -200,8 +200,6 @@ def _check_as_declared(dataset: xr.Dataset, study: Study) -> None:
     if set(dataset.variables) - set(declared):
         raise ValueError("more is there than the study asks for")
     for name, expected in declared.items():
-        if name not in dataset.variables and name == ERROR_BOUND:
-            continue  # earlier versions did not keep it
         variable = dataset.variables[name]
         kind = variable.dtype.kind.replace("O", "U").replace("T", "U")
         if (variable.dims, variable.shape, kind) != expected:
@@ -253,7 +251,7 @@ def check_structure(output: Path) -> bool:
     try:
         fd = disk.open_file(output, os.O_RDONLY)
         try:
-            sound = unbroken(fd, MOST_AT_ONCE)
+            sound = unbroken(fd, MOST_AT_ONCE, output)
         finally:
             os.close(fd)
     except FileNotFoundError:

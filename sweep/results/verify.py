@@ -89,12 +89,12 @@ def _verdict(output: Path, place: Path) -> Verdict:
             return Verdict(output, False, checked, (BESIDE,))
         bad = {name: list(damaged(file, name, _wanted(file, name))) for name in _tables(file)}
         findings = [line for name, chunks in bad.items() for line in _told(file, name, chunks)]
-        if not file.earlier and not padding_is_zero(file):
+        if not padding_is_zero(file):
             return Verdict(output, False, checked, (*findings, BESIDE))
         if not file.finished:
             return _unfinished(output, file, findings)
         work = bad[file.layout.work_name]
-        blocks = None if file.earlier or not findings else tuple(sorted({block for block, _ in work}))
+        blocks = tuple(sorted({block for block, _ in work})) if findings else None
         return Verdict(output, not findings, checked, tuple(findings), blocks)
 
 
@@ -102,7 +102,7 @@ def _structure(place: Path) -> str | None:
     """What is wrong with all but the numbers. Raises OSError, SweepError."""
     fd = disk.open_file(place, os.O_RDONLY)
     try:
-        sound = unbroken(fd)
+        sound = unbroken(fd, path=place)
     finally:
         os.close(fd)
     if sound is None:

@@ -30,32 +30,8 @@ CONNECT_SECONDS = 10
 ASK_SECONDS = 2.0
 """How often the scheduler is asked for its workers."""
 
-
-LOST_SECONDS = 8.0
-"""A cluster without workers for so long has lost them, where that is not to be waited for."""
-
-
 TRIALS = 5
 """Times that workers are told of a run, where some leave meanwhile."""
-
-
-class NoWorkers(Exception):
-    """The cluster has no workers."""
-
-
-class Absence:
-    """How long a cluster has been without workers."""
-
-    def __init__(self, seconds: float) -> None:
-        self._seconds, self._since = seconds, math.inf
-
-    def check(self, none: bool) -> bool:
-        """Whether workers are missing only now. Raises NoWorkers where they have been for long."""
-        now, first = time.monotonic(), none and self._since == math.inf
-        self._since = math.inf if not none else now if first else self._since
-        if now - self._since > self._seconds:
-            raise NoWorkers
-        return first
 
 
 class Cluster:
@@ -98,20 +74,15 @@ class Cluster:
             self._asked = time.monotonic()
         return self._threads
 
-    def wait(self, note: Callable[[str], None], until: datetime | None, seconds: float = math.inf) -> None:
-        """Returns as soon as there is a worker; those of batch systems may take hours to start.
-
-        Raises NoWorkers where there is none after so many seconds.
-        """
+    def wait(self, note: Callable[[str], None], until: datetime | None) -> None:
+        """Returns as soon as there is a worker, or it is time to stop; those of batch systems may take hours."""
         if self.threads:
             return
         note("the cluster has no workers yet; waiting for the first")
         # a cluster that adapts to what there is to do makes workers only for that
         call = self._client.submit(os.getpid, pure=False)
-        absence = Absence(seconds)
         with CtrlC() as ctrl_c:
             while not self.threads and not passed(until):
-                absence.check(True)
                 time.sleep(TICK)
                 ctrl_c.check()
         call.release()

@@ -1,13 +1,12 @@
 """The blocks of a run on their way to the workers of a cluster and back.
 
 Tasks hold several short blocks, so that the scheduler has some tasks a second to place, not thousands. A worker that
-dies costs the blocks it had at hand, which go to others. Where workers died of a block again and again, the blocks of
-its task are tried one by one, alone, to find the poison among them; it is reported when all others are done.
+dies costs the blocks it had at hand, which go to others; where workers die of a task again and again, dask gives it up,
+and the run ends.
 """
 
 from __future__ import annotations
 
-import math
 import secrets
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError, Future
@@ -18,10 +17,10 @@ import numpy as np
 from distributed import KilledWorker
 
 from sweep.cells.block import Blocks, Computed
-from sweep.runs.cluster import LOST_SECONDS, Absence, Cluster
+from sweep.runs.cluster import Cluster
 from sweep.runs.extend import Precomputed, Reused
 from sweep.runs.isolate import Limits, kernel_paths
-from sweep.runs.task import WAIT, Task
+from sweep.runs.task import Task
 from sweep.runs.worker import Answer, Assignment, Sent, digest
 from sweep.store.store import Shared
 from sweep.system.errors import SweepError
@@ -34,9 +33,7 @@ TASK_SECONDS = 0.5
 TASK_BYTES = 32 << 20
 """but no more than this, where their numbers are sent back."""
 MOST_ROUNDS = 3
-"""Times that a block is tried alone where nothing could be made of its answer."""
-MOST_NAMED = 8
-"""Blocks that are named one by one in a message."""
+"""Times that blocks are tried again whose answer got lost."""
 
 Batch = tuple[int, ...]
 
@@ -72,31 +69,21 @@ class Dispatch:
         self._assignment = Assignment(*words)
         self._answers = 0
         self._most = max(1, TASK_BYTES // max(1, self._blocks.partition.cells * self._blocks.row_bytes))
-        self._suspects: list[int] = []
-        self._poison: list[int] = []
+        self._lost: list[int] = []
         self._threads: int | None = None
-        self._absence = Absence(math.inf if task.without_workers == WAIT else LOST_SECONDS)
 
     def compute(self, blocks: Iterator[int], receive: Callable[[Computed | None], None]) -> None:
-        """Calls `receive` with every block that is done, and with None now and then. Raises SweepError, NoWorkers."""
+        """Calls `receive` with every block that is done, and with None now and then. Raises SweepError."""
         self._receive = receive
         with self._cluster.introduced(self._assignment), CtrlC() as ctrl_c:
-            self._submit(self._batches(blocks), self._capacity, self._suspect, ctrl_c)
+            self._submit(self._batches(blocks), ctrl_c)
             for _ in range(MOST_ROUNDS):
-                # nothing else is under way now, so what kills its worker is found out for certain
-                suspects, self._suspects = [(job,) for job in self._suspects], []
-                self._submit(iter(suspects), lambda: 1, self._poison.extend, ctrl_c)
-            self._poison += self._suspects
-        if self._poison:
-            raise SweepError(
-                f"{_listed(self._blocks, self._poison)}: every worker that took them died, alone with them, too; the "
-                "logs of the workers may tell why, too little memory is most common; all other blocks are kept; "
-                "isolated, a cell of which its process dies is found and FAILED"
-            )
+                again, self._lost = [(job,) for job in self._lost], []
+                self._submit(iter(again), ctrl_c)
+        if self._lost:
+            raise self._died(tuple(self._lost))
 
-    def _submit(
-        self, batches: Iterator[Batch], capacity: Callable[[], int], killed: Callable[[Batch], None], ctrl_c: CtrlC
-    ) -> None:
+    def _submit(self, batches: Iterator[Batch], ctrl_c: CtrlC) -> None:
         executor = self._cluster.executor()
 
         def submit(batch: Batch) -> Future[Answer]:
@@ -105,10 +92,13 @@ class Dispatch:
 
         def settled(batch: Batch | None, future: Future[Answer] | None) -> None:
             if batch is not None and future is not None:
-                self._take(batch, future, killed)
+                self._take(batch, future)
             else:
                 self._look_for_workers()
                 self._receive(None)
+
+        def capacity() -> int:
+            return 2 + 2 * self._cluster.threads
 
         through(batches, submit, capacity, settled, lambda: self._cluster.cancel(executor), ctrl_c)
 
@@ -131,23 +121,19 @@ class Dispatch:
         """Blocks that may go to a worker together."""
         return max(1, min(1 + self._answers, left // (2 * max(1, self._cluster.threads)), self._most))
 
-    def _capacity(self) -> int:
-        return 2 + 2 * self._cluster.threads
-
-    def _take(self, batch: Batch, future: Future[Answer], killed: Callable[[Batch], None]) -> None:
+    def _take(self, batch: Batch, future: Future[Answer]) -> None:
         try:
             answer = future.result()
         except CancelledError as fault:
             raise self._cluster.lost(fault) from fault
-        except KilledWorker:
-            killed(batch)
-            return
+        except KilledWorker as fault:
+            raise self._died(batch) from fault
         except SweepError:
             raise
         except Exception as fault:
             # distributed's executor trips over a task that fails with its worker and is answered at that moment
             if isinstance(fault, TypeError) and "Answer" in str(fault):
-                self._suspect(batch)
+                self._lost += batch
                 return
             raise SweepError(
                 f"cluster: a worker failed ({type(fault).__name__}: {fault}); what is finished is kept"
@@ -159,18 +145,19 @@ class Dispatch:
             self._receive(Computed(job, numbers, answer.seconds[job], whole, bad))
             bad = ()
 
-    def _suspect(self, batch: Batch) -> None:
-        self._note(
-            f"workers died again and again while they had {_listed(self._blocks, batch)}; these are tried again at "
-            "the end"
+    def _died(self, batch: Batch) -> SweepError:
+        """The fault that workers died again and again of some blocks."""
+        cells = ", ".join("{} to {}".format(*self._blocks.cells(job)) for job in batch)
+        return SweepError(
+            f"cells {cells}: every worker that took them died; the logs of the workers may tell why, too little memory "
+            "is most common; what is finished is kept; isolated, a cell of which its process dies is found and FAILED"
         )
-        self._suspects += batch
 
     def _look_for_workers(self) -> None:
         threads, self._threads = self._threads, self._cluster.threads
         if threads not in (None, self._threads):
             log(f"the cluster has {self._threads} threads, {threads} before", "workers", threads=self._threads)
-        if self._absence.check(not self._threads):
+        if not self._threads and threads != 0:
             self._note("the cluster has no workers left; waiting for new ones")
 
     def _mask(self, job: int) -> bytes | None:
@@ -201,10 +188,3 @@ class Dispatch:
             arrays = {name: column if column.flags.writeable else column.copy() for name, column in arrays.items()}
             self._reused.fill(start, stop, arrays)
         return arrays
-
-
-def _listed(blocks: Blocks, jobs: list[int] | Batch) -> str:
-    """The cells of the first few blocks, and how many more there are."""
-    cells = ", ".join("{} to {}".format(*blocks.cells(job)) for job in jobs[:MOST_NAMED])
-    more = f" and {len(jobs) - MOST_NAMED} more blocks" if len(jobs) > MOST_NAMED else ""
-    return f"cells {cells}{more}"

@@ -18,7 +18,7 @@ from kernels.interface import Status
 from sweep.cells.block import block_solver
 from sweep.cells.fingerprint import is_of_program
 from sweep.cells.grid import Grid
-from sweep.cells.schema import ANCILLARY, ERROR_BOUND, METHOD_USED, STATUS, Column, columns
+from sweep.cells.schema import METHOD_USED, STATUS, Column, columns
 from sweep.results.open import unreadable
 from sweep.results.statuses import flat_pieces
 from sweep.store.layout import DAMAGE
@@ -97,11 +97,7 @@ class Reused:
             self.taken_over = str(self._file.attrs.get(TAKEN_OVER, ""))
         except DAMAGE as fault:
             raise unreadable(output, fault) from None
-        # flags of earlier versions are compressed, and left to HDF5
-        self._numbers = {
-            **{name: self._file[name] for name in ANCILLARY if name in self._file},
-            **self._stored.columns(),
-        }
+        self._numbers: dict[str, Any] = dict(self._stored.columns())
         self._positions = [_positions(old.axes[name], axis) for name, axis in study.axes.items()]
 
     @property
@@ -155,18 +151,12 @@ class Reused:
     def _values(self, name: str, slices: tuple[slice, ...]) -> Any:
         """Those of a piece of the result. Raises SweepError where the file fails."""
         try:
-            # earlier versions did not write the error bounds; none of their cells that are taken over has one
-            return np.nan if self._lacks(name) else self._numbers[name][slices]
+            return self._numbers[name][slices]
         except DAMAGE as fault:
             raise unreadable(self._output, fault) from None
 
-    def _lacks(self, name: str) -> bool:
-        return name == ERROR_BOUND and name not in self._numbers
-
     def check_sample(self) -> None:
         """Computes some cells of every status and method again. Raises SweepError where one has other bits now."""
-        if self._lacks(ERROR_BOUND) and any((p == Status.INACCURATE).any() for p in flat_pieces(self._numbers[STATUS])):
-            raise self._refusal("it does not say what its INACCURATE values are right to")
         solve, cells = block_solver(self._study), self._sample()
         for cell in cells:
             old, new = ({c.name: c.empty(1) for c in self._columns} for _ in range(2))

@@ -3,35 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
-from sweep.cells.fingerprint import difference, fingerprint
+from sweep.cells.fingerprint import difference
 from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import row_blocks
-from sweep.results.open import stored_attrs, stored_fingerprint
+from sweep.results.open import stored_fingerprint
 from sweep.results.verify import check_whole, verify
 from sweep.runs.extend import has_failed, obstacle
 from sweep.runs.task import Task
 from sweep.store.layout import Layout
 from sweep.store.store import Store
-from sweep.study.model import Study
 from sweep.system.errors import SweepError
 
 EXTENDABLE = (
     "where its axes have only got more values, --extend computes the new cells alone; those of another version it "
     "keeps if a sample of them still has the same bits"
 )
-
-
-def as_begun(task: Task) -> Task:
-    """The task, its methods chosen as in the result that stands there. Raises SweepError of what is no result."""
-    if task.force or not task.output.exists():
-        return task
-    stored = Study.from_json(stored_attrs(task.output)["study_json"], declared=True)
-    if stored.by_cell == task.study.by_cell:
-        return task
-    study = replace(task.study, by_cell=stored.by_cell)
-    return replace(task, study=study, fingerprint=fingerprint(study))
 
 
 def is_complete(task: Task) -> bool:
@@ -57,12 +44,6 @@ def is_complete(task: Task) -> bool:
 
 def take_up(store: Store, task: Task) -> None:
     """Continues what an earlier run left. Raises SweepError where that was another study, unless forced."""
-    parts = task.output.with_name(task.output.name + ".parts")
-    if parts.is_dir():
-        task.note(
-            f"{parts} holds blocks that an earlier version kept; this one cannot continue them and starts anew; remove "
-            "the folder, or finish with the earlier version"
-        )
     layout = _found(store, task)
     if layout is None and task.repair and not task.force and task.output.exists():
         store.reopen(verify(task.output).blocks or ())

@@ -16,11 +16,10 @@ from sweep.cells.partition import row_blocks
 from sweep.cells.sample import require_asked
 from sweep.results.open import in_memory, memory, open_result, open_unfinished
 from sweep.runs import resume
-from sweep.runs.elsewhere import compute_elsewhere, joined, threads
 from sweep.runs.extend import TAKEN_OVER, Precomputed
 from sweep.runs.isolate import limits_of
-from sweep.runs.session import Session, Solve
-from sweep.runs.task import END, HERE, WAIT, Task
+from sweep.runs.session import Session, Solve, joined
+from sweep.runs.task import Task
 from sweep.runs.to_file import run_to_file
 from sweep.store.store import lock_of, unfinished_of
 from sweep.study.mistakes import did_you_mean, listed
@@ -28,7 +27,7 @@ from sweep.study.read import KEYS, Given
 from sweep.study.read import study as as_study
 from sweep.system import disk
 from sweep.system.errors import SweepError
-from sweep.system.pool import Cores, cores, whole_number
+from sweep.system.pool import cores, whole_number
 from sweep.system.progress import TimeUp, deadline, stream_of
 
 if TYPE_CHECKING:
@@ -56,7 +55,6 @@ def run(
     isolate: bool = False,
     cell_timeout: float | str | None = None,
     retry_failed: bool = False,
-    without_workers: str = WAIT,
     **keys: Any,
 ) -> xr.Dataset:
     """Computes every cell of a study. The same study gives the same bits, however it is cut and continued.
@@ -79,12 +77,13 @@ def run(
     extend : bool
         Where the output is complete for a study of which this one has all values on every axis, and more, compute the
         new cells only; the output is replaced when all are there. One of an earlier version of foliot is taken over
-        if a sample of its cells, computed again, has the same bits; `auto` chooses then as that version did.
+        if a sample of its cells, computed again, has the same bits.
     until : str or datetime, optional
         Stop within a block's time of "07:00" or "2027-01-31 07:00"; what there is by then is returned.
     cluster : str or distributed.Client, optional
         Compute on the workers of this dask scheduler ("tcp://10.0.0.1:8786", or a scheduler file) instead of here.
-        Workers that see the folder of the output write there; others send their numbers.
+        Workers that see the folder of the output write there; others send their numbers. Where there are none, or all
+        are lost, new ones are waited for; those of batch systems may be a long time coming.
     repair : bool
         Where the output is complete for this study, but damaged on the disk, compute the damaged blocks again.
     isolate : bool
@@ -95,9 +94,6 @@ def run(
         hundred times the dearest cell of the timed sample, where that is more.
     retry_failed : bool
         Where the output is complete, compute the cells that FAILED again.
-    without_workers : {"wait", "here", "end"}
-        What to do where the cluster has no workers, or loses all: wait for new ones, which those of batch systems may
-        be a long time coming; go on here after ten seconds; or end, as `until` does.
     **keys
         Of `sweep.study`.
 
@@ -120,7 +116,7 @@ def run(
     task = _task(
         as_study(study, **keys), path, workers=workers, force=force, progress=progress, block_cells=block_cells,
         extend=extend, until=until, cluster=cluster, repair=repair, isolate=isolate, cell_timeout=cell_timeout,
-        retry_failed=retry_failed, without_workers=without_workers,
+        retry_failed=retry_failed,
     )  # fmt: skip
     if path is None:
         try:
@@ -180,7 +176,7 @@ def store_cells(
         As `run`.
     """
     block = max(1, min(row_blocks(study).count, STORED_AT_ONCE))
-    task = Task(study, dict(mark or fingerprint(study)), _checked(path), Cores(1), force=force, block_cells=block)
+    task = Task(study, dict(mark or fingerprint(study)), _checked(path), 1, force=force, block_cells=block)
     _complete(task, Precomputed(arrays, {**(attrs or {}), **({TAKEN_OVER: taken_over} if taken_over else {})}))
     return open_result(task.output)
 
@@ -202,7 +198,7 @@ def _task(
         study,
         fingerprint(study),
         None if path is None else _checked(path),
-        Cores(cores() if workers is None else whole_number("workers", workers)),
+        cores() if workers is None else whole_number("workers", workers),
         stream_of(progress),
         block_cells=None if block_cells is None else whole_number("block_cells", block_cells),
         until=deadline(until),
@@ -217,8 +213,6 @@ def _task(
         raise SweepError("until: give a path as well, or what is computed by then would be lost")
     if task.extend and task.retry_failed:
         raise SweepError("extend, retry_failed: give one of the two; each continues another result")
-    if task.without_workers not in (WAIT, HERE, END):
-        raise SweepError(f'without_workers: expected "{WAIT}", "{HERE}" or "{END}", found {task.without_workers!r}')
     return task
 
 
@@ -231,14 +225,13 @@ def _checked(path: str | os.PathLike[str]) -> Path:
 
 def _complete(task: Task, precomputed: Precomputed | None = None) -> bool:
     """False where the time was up before the end."""
-    task = task if precomputed else resume.as_begun(task)
     left = unfinished_of(task.output).exists() or lock_of(task.output).exists()
     return (resume.is_complete(task) and not left) or run_to_file(task, precomputed)
 
 
 def _run_in_memory(task: Task) -> xr.Dataset:
     with joined(task) as cluster:
-        session = Session(task, threads(task, cluster))
+        session = Session(task, cluster)
         arrays = _arrays(session)
         progress = session.begin(range(session.blocks.count))
         try:
@@ -264,8 +257,10 @@ def _fill(session: Session, arrays: Mapping[str, Any], cluster: Cluster | None) 
         for name, column in place(job).items():
             column[...] = found[name]
 
-    if cluster is None or not compute_elsewhere(session, cluster, None, receive):
+    if cluster is None:
         session.compute(work)
+    else:
+        session.compute_elsewhere(cluster, None, receive)
 
 
 def _arrays(session: Session) -> dict[str, Any]:

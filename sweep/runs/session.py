@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import platform
@@ -9,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,10 +34,15 @@ from sweep.cells.timing import UNSAMPLED, Sample, row_partition
 from sweep.runs.extend import Precomputed, Reused
 from sweep.runs.isolate import Processes
 from sweep.runs.task import Task
+from sweep.store.store import Shared
+from sweep.system.errors import missing
 from sweep.system.forecast import Forecast
 from sweep.system.log import log
 from sweep.system.pool import BufferPool, Stopper, cores, each
 from sweep.system.progress import Progress, TimeUp, passed
+
+if TYPE_CHECKING:
+    from sweep.runs.cluster import Cluster
 
 MOST_TOLD = 1000
 """Cells that FAILED which are told one by one."""
@@ -50,20 +56,13 @@ Solve = Callable[[int, int, Mapping[str, Any]], bool]
 """Computes the rows start .. stop into columns of that length; False where the run is being stopped."""
 
 
-class Executor(Protocol):
-    """What computes blocks elsewhere."""
-
-    def compute(self, blocks: Iterator[int], receive: Callable[[Computed | None], None]) -> None:
-        """Calls `receive` with every block that is done, and with None now and then. Raises SweepError."""
-
-
 class Session:
     """Compiles the kernel, times a sample of the grid, and cuts it.
 
     Parameters
     ----------
     task : what is asked for
-    threads : how many there are to compute, here or elsewhere
+    cluster : whose workers are to compute; None: threads here
     partition : how the rows are cut, where that is settled already
     sampled : False where nothing is left to compute
     reused : cells that need not be computed
@@ -77,7 +76,7 @@ class Session:
     def __init__(
         self,
         task: Task,
-        threads: int,
+        cluster: Cluster | None = None,
         partition: Partition | None = None,
         sampled: bool = True,
         reused: Reused | Precomputed | None = None,
@@ -89,11 +88,12 @@ class Session:
         self.schema: Schema = replace(schema, attrs={**schema.attrs, **(reused.attrs if reused else {})})
         self.tick: Callable[[], None] = lambda: None
         self.bad: list[BadCell] = []
-        self._told, self._cores = 0, task.workers
-        self.processes = Processes(study, task.limits, task.cores.count) if task.isolate else None
+        self._told = 0
+        self.processes = Processes(study, task.limits, task.workers) if task.isolate else None
         self.sample: Sample = self._sampled() if sampled else UNSAMPLED
         if self.processes is not None:
             self.processes.limits = replace(task.limits, cost=float(self.sample.costs.max()))
+        threads = task.workers if cluster is None else cluster.threads or task.workers
         self.blocks = Blocks(study, partition or self._partition(threads))
         self.begin([])
 
@@ -131,7 +131,7 @@ class Session:
             self.progress.stop()
 
     def _stopper(self) -> Stopper:
-        return Stopper(self.task.cores, (lambda: None) if self.processes is None else self.processes.end)
+        return Stopper(self.task.workers, (lambda: None) if self.processes is None else self.processes.end)
 
     def _partition(self, threads: int) -> Partition:
         rows, cells = row_blocks(self.study), self.task.block_cells
@@ -179,8 +179,8 @@ class Session:
         No more than `workers` threads are inside `solve` at a time; as many wait for the disk, or for their turn.
         Raises SweepError where `work` fails, TimeUp.
         """
-        workers = self.task.cores
-        threads = 2 * max(workers.count, cores())
+        workers = self.task.workers
+        threads = 2 * max(workers, cores())
         self.check_time()
         stopper = self._stopper()
         solvers = BufferPool(self._solver)
@@ -197,11 +197,18 @@ class Session:
                 work(job, compute)
             self.forecast.end(job)
 
-        each(self.forecast.order(), guarded, threads, self._count, stopper, lambda: 2 * workers.count)
+        each(self.forecast.order(), guarded, threads, self._count, stopper, 2 * workers)
 
-    def compute_elsewhere(self, executor: Executor, receive: Callable[[int, Found], None]) -> None:
-        """The same by an executor: calls `receive` with every block and its part's name, or its numbers."""
+    def compute_elsewhere(self, cluster: Cluster, shared: Shared | None, receive: Callable[[int, Found], None]) -> None:
+        """The same by the workers of a cluster, which write to the file `shared` where they see it.
+
+        Calls `receive` with every block and its digests, where it is written already, or its numbers.
+        """
+        from sweep.runs.dispatch import Dispatch
+
         self.check_time()
+        limits = None if self.processes is None else self.processes.limits
+        dispatch = Dispatch(cluster, self.task, self.blocks, self.forecast, self.reused, shared, limits)
 
         def take(done: Computed | None) -> None:
             if done is not None:
@@ -210,13 +217,10 @@ class Session:
                 self.forecast.end(done.block, done.seconds, done.ago)
             self._count(None if done is None else done.block)
 
-        executor.compute(self.forecast.order(), take)
+        dispatch.compute(self.forecast.order(), take)
 
     def _count(self, job: int | None) -> None:
         """Counts a block that is done. Raises TimeUp."""
-        if self.task.workers != self._cores:
-            self._cores = self.task.workers
-            self.progress.note(f"on {self._cores} core{'s' * (self._cores > 1)} from now on")
         self._tell_failed()
         if job is None:
             self.tick()
@@ -264,6 +268,21 @@ class Session:
             "begin", kernel=self.study.kernel_name, cells=progress.done, of=progress.total, cores=self.task.workers,
             process=os.getpid(), machine=machine.node, versions=versions,
         )  # fmt: skip
+
+
+@contextlib.contextmanager
+def joined(task: Task) -> Iterator[Cluster | None]:
+    """The cluster of a task, once it has a worker; None where none is asked for. Raises SweepError."""
+    if task.cluster is None:
+        yield None
+        return
+    try:
+        from sweep.runs.cluster import Cluster
+    except ImportError:
+        raise missing("a cluster needs distributed", "cluster") from None
+    with Cluster(task.cluster) as cluster:
+        cluster.wait(task.note, task.until)
+        yield cluster
 
 
 def now() -> str:

@@ -10,11 +10,7 @@ from typing import Any, TextIO
 
 from sweep.runs.isolate import Limits
 from sweep.study.model import Study
-from sweep.system.pool import Cores
 from sweep.system.progress import Progress
-
-WAIT, HERE, END = "wait", "here", "end"
-"""What is done where a cluster has no workers."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +20,7 @@ class Task:
     study: Study
     fingerprint: Mapping[str, str]
     path: Path | None
-    cores: Cores
+    workers: int
     stream: TextIO | None = None
     force: bool = False
     block_cells: int | None = None
@@ -35,18 +31,12 @@ class Task:
     isolate: bool = False
     limits: Limits = field(default_factory=Limits)
     retry_failed: bool = False
-    without_workers: str = WAIT
 
     @property
     def output(self) -> Path:
         """Where a run to a file writes."""
         assert self.path is not None, "a run in memory has no output"
         return self.path
-
-    @property
-    def workers(self) -> int:
-        """Cores that compute at once, at the moment."""
-        return self.cores.count
 
     @property
     def name(self) -> str:

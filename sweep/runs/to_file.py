@@ -11,9 +11,8 @@ from sweep.cells.partition import row_blocks
 from sweep.results.open import stored_fingerprint
 from sweep.results.verify import check_whole
 from sweep.runs import resume
-from sweep.runs.elsewhere import compute_elsewhere, joined, threads
 from sweep.runs.extend import Precomputed, Retried, Reused, is_of_another_version
-from sweep.runs.session import Session, Solve
+from sweep.runs.session import Session, Solve, joined
 from sweep.runs.task import Task
 from sweep.store.ending import Gather
 from sweep.store.frame import Frame, cuts_of
@@ -35,19 +34,18 @@ MOST_ATTEMPTS = 3
 def run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
     """False where the time was up before the end."""
     with opened(task.output) as store, contextlib.ExitStack() as stack:
-        stack.enter_context(task.cores.told_by_signals())
         # looked at again, for another run may have ended before this one had the lock
         if resume.is_complete(task):
             resume.tidy(store, task)
             return True
         resume.take_up(store, task)
         if store.layout is not None and not store.missing():
-            return _run_session(Session(task, task.workers, store.table.blocks, sampled=False), store, None)
+            return _run_session(Session(task, None, store.table.blocks, sampled=False), store, None)
         reused = precomputed or _reused(task, stack)
         blocks = None if store.layout is None else store.table.blocks
         try:
             cluster = stack.enter_context(joined(task))
-            session = Session(task, threads(task, cluster), blocks, sampled=precomputed is None, reused=reused)
+            session = Session(task, cluster, blocks, sampled=precomputed is None, reused=reused)
         except TimeUp as reason:
             task.note(f"stopped before the first block, for {reason}")
             return False
@@ -77,10 +75,6 @@ def _run_session(session: Session, store: Store, cluster: Cluster | None) -> boo
     with CtrlC():
         if store.layout is None:
             _begin(session, store, shared=cluster is not None)
-        if cluster is None:
-            left = sum(stop - start for start, stop in map(session.blocks.bounds, store.missing()))
-            store.write_back.total = left * session.blocks.row_bytes
-            session.forecast.ending = store.write_back.seconds
         try:
             _finish(session, store, cluster)
         except (KeyboardInterrupt, Terminated):
@@ -118,10 +112,8 @@ def _finish(session: Session, store: Store, cluster: Cluster | None) -> None:
     """Computes what is missing and ends the result, again where a block turns out to be damaged."""
     gather = None if session.study.summary is None else _gather(session.study)
     for _ in range(MOST_ATTEMPTS):
-        if store.missing() and cluster is not None and not _store_elsewhere(session, store, cluster):
-            cluster = None
-        if store.missing() and cluster is None:
-            _store_blocks(session, store)
+        if store.missing():
+            _store_blocks(session, store, cluster)
         damaged = store.finish(session.endings(), gather)
         if not damaged:
             session.progress.end()
@@ -144,7 +136,8 @@ def _gather(study: Study) -> Gather:
     return gather
 
 
-def _store_blocks(session: Session, store: Store) -> None:
+def _store_blocks(session: Session, store: Store, cluster: Cluster | None) -> None:
+    """Blocks that threads here compute, or workers of a cluster, which write them themselves where they can."""
     buffers = BufferPool(session.blocks.empty)
 
     def work(job: int, solve: Solve) -> None:
@@ -154,16 +147,13 @@ def _store_blocks(session: Session, store: Store) -> None:
             if solve(start, stop, arrays):
                 store.put(job, arrays)
 
-    session.compute(work)
-
-
-def _store_elsewhere(session: Session, store: Store, cluster: Cluster) -> bool:
-    """Blocks that workers of a cluster compute, and write themselves where they can; False where it lost them."""
-
     def receive(job: int, found: Found) -> None:
         if isinstance(found, bytes):
             store.take(job, found)
         else:
             store.put(job, found)
 
-    return compute_elsewhere(session, cluster, store.shared(), receive)
+    if cluster is None:
+        session.compute(work)
+    else:
+        session.compute_elsewhere(cluster, store.shared(), receive)

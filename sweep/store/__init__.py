@@ -10,6 +10,5 @@ the file, many blocks at a time: what has its digests is there, whatever happens
 compared with their digests while new ones are computed, and damaged ones computed again. Of a summary, rows of
 reductions are kept in the same way, and its columns made from them at the end (`ending`). What is not computed yet is
 PENDING, and an error to whoever asks HDF5 for its numbers. All that reads a result compares it with its digests
-(`reading`); results of earlier versions are read as they are (`earlier`), and `probe` tells whether HDF5 can be let
-loose on a file.
+(`reading`), and `probe` tells whether HDF5 can be let loose on a file.
 """

@@ -18,6 +18,7 @@ import struct
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,11 @@ import xxhash
 from sweep.cells.partition import Partition
 from sweep.store.fletcher import CHECKSUM_BYTES, checksum
 from sweep.system import disk
+from sweep.system.errors import SweepError
 
 MAGIC = b"foliot file\n"
+OLD_MAGIC = b"foliot seal\n"
+"""What results of formats 1 and 2 end with."""
 FORMAT = 3
 BYTES = 16
 """Of a digest."""
@@ -264,12 +268,17 @@ def structure_digest(fd: int, apart: Iterable[Region], end: int) -> bytes:
     return state.digest()
 
 
-def read_layout(fd: int, size: int) -> Layout | None:
-    """The layout at the end of a file; None where there is none that can be. Raises OSError, EOFError."""
+def read_layout(fd: int, size: int, path: Path | None = None) -> Layout | None:
+    """The layout at the end of a file; None where there is none that can be.
+
+    Raises OSError, EOFError; and SweepError where the file of this name is of another format.
+    """
     tail = bytearray(TAIL)
     if size < TAIL:
         return None
     disk.read_all(fd, (tail,), size - TAIL)
+    if path is not None and tail.endswith(OLD_MAGIC):
+        raise _of_another_format(path, "an earlier format")
     (length,) = struct.unpack_from("<I", tail, BYTES)
     if not tail.endswith(MAGIC) or length > size - TAIL:
         return None
@@ -278,15 +287,27 @@ def read_layout(fd: int, size: int) -> Layout | None:
     if xxhash.xxh3_128(text).digest() != tail[:BYTES]:
         return None
     try:
-        return _layout(json.loads(text), size - TAIL - length)
+        words = json.loads(text)
+        if words["format"] == FORMAT:
+            return _layout(words, size - TAIL - length)
     except DAMAGE:
         return None
+    if path is not None:
+        raise _of_another_format(path, f"format {words['format']}")
+    return None
+
+
+def _of_another_format(path: Path, what: str) -> SweepError:
+    return SweepError(
+        f"{path}: a result of {what}; this version of foliot reads format {FORMAT} alone; open it with the version "
+        "that wrote it, or compute it again under another name"
+    )
 
 
 def _layout(words: dict[str, Any], end: int) -> Layout:
     """Raises one of DAMAGE where it cannot be."""
     if words.pop("format") != FORMAT or words["end"] != end:
-        raise ValueError("of another version")
+        raise ValueError("of another file")
     tables = {name: _table(table) for name, table in words.pop("tables").items()}
     found = Layout(
         **{

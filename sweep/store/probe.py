@@ -63,7 +63,7 @@ def intact(path: Path) -> bool:
 def readable(path: Path, fd: int) -> bool:
     """Whether HDF5 can be let loose on a result. Raises OSError."""
     # it may have no trailer, or have been changed on purpose, or by the disk
-    return bool(unbroken(fd, MOST_AT_ONCE)) or probing(path)()
+    return bool(unbroken(fd, MOST_AT_ONCE, path)) or probing(path)()
 
 
 def probing(path: Path) -> Callable[[], bool]:

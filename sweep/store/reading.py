@@ -16,7 +16,6 @@ import numpy as np
 
 from kernels.interface import Status
 from sweep.cells.schema import METHOD_USED, STATUS
-from sweep.store import earlier
 from sweep.store.chunk_index import FILE_END
 from sweep.store.layout import Layout, Table, read_layout, structure_digest
 from sweep.system import disk
@@ -55,14 +54,11 @@ class StoredFile:
         self.fd = disk.open_file(path, os.O_RDONLY)
         try:
             size = os.fstat(self.fd).st_size
-            layout = read_layout(self.fd, size)
-            self.earlier = layout is None
+            layout = read_layout(self.fd, size, path)
             if layout is None:
-                layout, digests = earlier.read(path, self.fd, size)
-                self._digests, self.finished = {"cells": digests}, True
-            else:
-                self._digests = {name: table.read_digests(self.fd) for name, table in layout.tables.items()}
-                self.finished = has_ended(self.fd, layout)
+                raise ValueError("it is no result, or was changed")
+            self._digests = {name: table.read_digests(self.fd) for name, table in layout.tables.items()}
+            self.finished = has_ended(self.fd, layout)
             self.layout: Layout = layout
         except BaseException:
             self.close()
@@ -228,18 +224,18 @@ def has_ended(fd: int, layout: Layout) -> bool:
     return layout.ending_digest(texts) == digest
 
 
-def unbroken(fd: int, most: float = math.inf) -> bool | None:
+def unbroken(fd: int, most: float = math.inf, path: Path | None = None) -> bool | None:
     """Whether all but the numbers is as it was written; None where no trailer tells, or where it is too much.
 
-    Reads no more than `most` bytes. Raises OSError, also where neither a trailer nor HDF5 tells of the last bytes.
+    Reads no more than `most` bytes. Raises OSError, also where neither a trailer nor HDF5 tells of the last bytes; and
+    SweepError where the file of this name is of another format.
     """
     size = os.fstat(fd).st_size
     try:
-        layout = read_layout(fd, size)
+        layout = read_layout(fd, size, path)
         if layout is None:
-            if earlier.read_seal(fd, size) is None:
-                _require_whole(fd, size)
-            return earlier.unbroken(fd, size, most)
+            _require_whole(fd, size)
+            return None
         if layout.end - sum(stop - begin for begin, stop in layout.regions) > most:
             return None
         # the texts of the end may be half written when a run is killed

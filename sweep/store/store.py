@@ -28,7 +28,6 @@ from sweep.store.frame import PAGE, Frame
 from sweep.store.layout import DAMAGE, TAIL, Layout, Table, read_layout, write_digests
 from sweep.store.probe import written
 from sweep.store.reading import StoredFile, damaged, unbroken
-from sweep.store.write_back import WriteBack
 from sweep.system import disk
 from sweep.system.errors import Incomplete, SweepError
 
@@ -92,8 +91,6 @@ class Store:
         Where the result will be, and where it is.
     layout : Layout or None
         None until `begin` or `resume`.
-    write_back : WriteBack
-        Of the blocks that are written here.
     """
 
     def __init__(self, output: Path) -> None:
@@ -102,7 +99,7 @@ class Store:
         self._fd, self._size, self._tail, self._looked = -1, 0, b"", 0.0
         self._done = np.zeros(0, bool)
         self._waiting: dict[int, bytes] = {}
-        self.write_back, self._synced = WriteBack(), time.monotonic()
+        self._unsynced, self._synced = 0, time.monotonic()
         self._turn, self._committing = threading.Lock(), threading.Lock()
         self._checked: Future[list[int]] | None = None
         self._closing = threading.Event()
@@ -120,7 +117,7 @@ class Store:
         with disk.refusing(self.path):
             fd = disk.open_file(self.path, os.O_RDONLY)
         try:
-            layout = read_layout(fd, os.fstat(fd).st_size)
+            layout = read_layout(fd, os.fstat(fd).st_size, self.path)
             if layout is not None and unbroken(fd):
                 return layout
         except (OSError, EOFError):
@@ -235,7 +232,7 @@ class Store:
             digests = self.table.write(self._fd, index, arrays)
         with self._turn:
             self._waiting[index] = digests
-            self.write_back.put += sum(array.nbytes for array in arrays.values())
+            self._unsynced += sum(array.nbytes for array in arrays.values())
         self.tick()
 
     def take(self, index: int, digests: bytes) -> None:
@@ -251,10 +248,7 @@ class Store:
         if time.monotonic() - self._looked >= LOOK_SECONDS:
             self._check_there()
         with self._turn:
-            due = (
-                self.write_back.put - self.write_back.synced >= SYNC_BYTES
-                or time.monotonic() - self._synced >= SYNC_SECONDS
-            )
+            due = self._unsynced >= SYNC_BYTES or time.monotonic() - self._synced >= SYNC_SECONDS
         if due and self._waiting and self._committing.acquire(blocking=False):
             try:
                 self._commit()
@@ -271,11 +265,11 @@ class Store:
     def _commit(self) -> None:
         self._check_own()
         with self._turn:
-            waiting, self._waiting, self._synced = self._waiting, {}, time.monotonic()
+            waiting, self._waiting = self._waiting, {}
+            self._unsynced, self._synced = 0, time.monotonic()
         with disk.refusing(self.path):
             if waiting:
-                with self.write_back.syncing():
-                    disk.sync_numbers(self._fd)
+                disk.sync_numbers(self._fd)
                 write_digests(self._fd, self.table, waiting)
         self._done[list(waiting)] = True
 

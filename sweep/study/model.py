@@ -129,9 +129,6 @@ class Study:
         The grid is their product; empty of a product or zip of all axes.
     where : str
         Condition on the parameters; cells for which it does not hold are NOT_ASKED. "": all are asked.
-    by_cell : bool
-        Whether `auto` chooses among the methods that can do a cell. Else among those that can do every cell of the
-        study: so it was in results that do not say, which are read, continued and extended as they were begun.
     """
 
     title: str
@@ -150,7 +147,6 @@ class Study:
     summary: Summary | None = None
     blocks: tuple[Block, ...] = ()
     where: str = ""
-    by_cell: bool = True
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Study) and self.to_json() == other.to_json()
@@ -235,7 +231,6 @@ class Study:
         keys |= {} if self.summary is None else {"summary": vars(self.summary)}
         keys |= {"blocks": [vars(block) for block in self.blocks]} if self.blocks else {}
         keys |= {"where": self.where} if self.where else {}
-        keys |= {"by_cell": True} if self.by_cell else {}
         return json.dumps(_plain(keys), allow_nan=False, ensure_ascii=False, separators=(",", ":"))
 
     @classmethod
@@ -270,7 +265,6 @@ class Study:
             known["summary"] = _summary(keys["summary"]) if "summary" in keys else None
             known["blocks"] = tuple(Block(b["design"], tuple(b["axes"]), b["options"]) for b in keys.get("blocks", ()))
             known["where"] = keys.get("where", "")
-            known["by_cell"] = keys.get("by_cell", False) is True
             _check_words(known)
             kernel = _kernel_as_declared(keys["kernel"])
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:

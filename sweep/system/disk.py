@@ -1,35 +1,27 @@
 """Every call that changes the disk, in one place, so that a test can make any of them fail.
 
-Callers use the functions as attributes of this module (`disk.fsync`). What a system lacks is made of what it has:
-without `pwrite` one thread at a time seeks and writes, without `posix_fallocate` a file only gets its length, without
-`fcntl` the library filelock locks.
+Callers use the functions as attributes of this module (`disk.fsync`). For Linux and macOS, which has neither
+`posix_fallocate`, so that a file only gets its length there, nor `fdatasync`.
 """
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import glob
 import os
 import shutil
-import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from sweep.system.errors import SweepError
 
-try:
-    import fcntl
-except ImportError:
-    fcntl = None  # type: ignore[assignment]
-
 NO_SUCH_CALL = (errno.EINVAL, errno.EOPNOTSUPP, errno.ENOSYS)
 """What a file system says that cannot reserve space."""
 MOST_BUFFERS = 1000
 """Pieces that one call may write or read; systems allow 1024."""
-
-_turn = threading.Lock()
 
 
 def as_path(given: Any) -> Path:
@@ -41,30 +33,17 @@ def as_path(given: Any) -> Path:
 
 def open_file(path: Path | str, flags: int) -> int:
     """A file descriptor; a pipe that is to be read is not waited for. Raises OSError."""
-    waiting = getattr(os, "O_NONBLOCK", 0) if flags == os.O_RDONLY else 0
-    return os.open(path, flags | waiting | getattr(os, "O_BINARY", 0), 0o666)
+    return os.open(path, flags | (os.O_NONBLOCK if flags == os.O_RDONLY else 0), 0o666)
 
 
 def write(fd: int, pieces: Sequence[memoryview], offset: int) -> int:
     """Bytes of the pieces that were written at `offset`, one piece behind the other; maybe not all. Raises OSError."""
-    if hasattr(os, "pwritev"):
-        return os.pwritev(fd, pieces, offset)
-    if hasattr(os, "pwrite"):
-        return os.pwrite(fd, pieces[0], offset)
-    with _turn:
-        os.lseek(fd, offset, os.SEEK_SET)
-        return os.write(fd, pieces[0])
+    return os.pwritev(fd, pieces, offset)
 
 
 def read(fd: int, pieces: Sequence[memoryview], offset: int) -> int:
     """Bytes that were read from `offset` on into the pieces, maybe not all of them. Raises OSError."""
-    if hasattr(os, "preadv"):
-        return os.preadv(fd, pieces, offset)
-    with _turn:
-        os.lseek(fd, offset, os.SEEK_SET)
-        found = os.read(fd, len(pieces[0]))
-    pieces[0][: len(found)] = found
-    return len(found)
+    return os.preadv(fd, pieces, offset)
 
 
 def fsync(fd: int) -> None:
@@ -208,9 +187,6 @@ def locked(path: Path) -> Iterator[bool]:
 
     The file of that name is removed at the end. Raises OSError.
     """
-    if fcntl is None:
-        yield from _locked_by_library(path)
-        return
     fd = _try_lock(path)
     try:
         yield fd is not None
@@ -237,23 +213,6 @@ def _try_lock(path: Path) -> int | None:
             os.close(fd)
             raise
         os.close(fd)
-
-
-def _locked_by_library(path: Path) -> Iterator[bool]:
-    import filelock
-
-    lock = filelock.FileLock(path, timeout=0)
-    try:
-        lock.acquire()
-    except filelock.Timeout:
-        yield False
-        return
-    try:
-        yield True
-    finally:
-        lock.release()
-        with contextlib.suppress(OSError):
-            remove(path)
 
 
 def free(path: Path) -> int:

@@ -30,14 +30,8 @@ EVEN = 1.5
 """Blocks of which the dearest is not so many times the median come in no order of cost."""
 ALIKE = 6
 """Blocks on either side, in the order of what was thought, whose error tells that of a block."""
-DOUBT = 0.5
-"""Standard error of a forecast from one block, beside what the spread of blocks tells; of n blocks its n-th's root."""
 FEW = 16
 """Of so many measured blocks, how far each was off its guess counts half for those around it."""
-FEWEST = 3
-"""Blocks from which a spread can be told."""
-LONGER = 0.5
-"""Standard errors by which a forecast is made longer, for it is to err on the long side."""
 ENOUGH = 4
 """So many blocks that are no worker's first tell more than all together."""
 SHORTEST = 1e-9
@@ -55,12 +49,6 @@ class Forecast:
         Blocks that are to be computed.
     clock : callable
         Seconds.
-
-    Attributes
-    ----------
-    ending : callable
-        Seconds that the disk still takes for what is written, which come when all is computed, and for all that is to
-        come, which it may take meanwhile.
     """
 
     def __init__(self, weights: Any, jobs: Iterable[int], clock: Callable[[], float] = time.monotonic) -> None:
@@ -72,7 +60,6 @@ class Forecast:
         self._thought = self._weights
         self._first_end = math.inf
         self._away = 0.0
-        self.ending: Callable[[], tuple[float, float]] = lambda: (0.0, 0.0)
 
     def begin(self, job: int) -> None:
         """A core has begun with a block."""
@@ -110,21 +97,17 @@ class Forecast:
 
     @property
     def left(self) -> float | None:
-        """Seconds until all blocks are done, rather too many; None before the first one is."""
+        """Seconds until all blocks are done, None before the first one is."""
         measured, left, now = self._measured(), np.flatnonzero(self._left), self._clock()
         if self._start is None or not measured.size:
             return None
-        written, all_ = self.ending()
         if not left.size:
-            return written
+            return 0.0
         running = np.maximum(np.nan_to_num(now - self._begun[left]), 0.0)
-        settled = self._settled(measured)
-        expected = self._expected(settled)[left]
-        longer = (1 + LONGER * self._standard_error(settled, expected)) * expected
+        expected = self._expected(self._settled(measured))[left]
         # one that has taken longer than that takes as long again: what it was thought to take says nothing any more
-        to_come = np.where(running < longer, longer - running, running)
-        computing = max(float(to_come.sum() / self._cores(measured, running, now)), float(to_come.max()))
-        return max(computing + written, all_)
+        to_come = np.where(running < expected, expected - running, running)
+        return max(float(to_come.sum() / self._cores(measured, running, now)), float(to_come.max()))
 
     def _cores(self, measured: Any, running: Any, now: float) -> float:
         """How many blocks are worked on at once."""
@@ -133,18 +116,6 @@ class Forecast:
         untold = 0.5 * self._away
         done = self._seconds[measured].sum() + running.sum() - untold
         return float(max(done, SHORTEST) / max(now - self._start - untold, SHORTEST))
-
-    def _standard_error(self, measured: Any, expected: Any) -> float:
-        """Relative, of the sum of what is expected: by how far off measured blocks would have been expected."""
-        error = DOUBT / math.sqrt(measured.size)
-        if measured.size < FEWEST:
-            return error
-        seconds = self._seconds[measured]
-        without = self._without(measured, seconds / self._weights[measured])
-        without *= seconds.sum() / without.sum()
-        variance = ((seconds - without) ** 2).sum() / (without**2).sum()
-        shares = expected / expected.sum()
-        return min(1.0, math.hypot(error, math.sqrt(variance * (1 / measured.size + (shares**2).sum()))))
 
     def order(self) -> Iterator[int]:
         """The blocks to compute, each chosen when it is asked for."""

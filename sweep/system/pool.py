@@ -34,47 +34,19 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-class Cores:
-    """How many cores compute at once; it may be changed while they do."""
-
-    def __init__(self, count: int) -> None:
-        self.count = count
-
-    @contextlib.contextmanager
-    def told_by_signals(self) -> Iterator[None]:
-        """As long as this lasts, SIGUSR1 means a core more, SIGUSR2 one less; handlers of others are left alone."""
-        steps = {"SIGUSR1": 1, "SIGUSR2": -1}
-        signals = {getattr(signal, name): step for name, step in steps.items() if hasattr(signal, name)}
-        here = threading.current_thread() is threading.main_thread()
-        free = (signal.SIG_DFL, signal.SIG_IGN)
-        before = {number: signal.getsignal(number) for number in signals if here and signal.getsignal(number) in free}
-
-        def change(number: int, frame: object) -> None:
-            self.count = max(1, self.count + signals[signal.Signals(number)])
-
-        for number in before:
-            signal.signal(number, change)
-        try:
-            yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
-
-
 class Stopper:
     """Tells the jobs that wait for their turn that they need not start, and gives up those that do not end.
 
     Parameters
     ----------
-    cores : Cores or int
+    cores : int
         How many jobs compute at once.
     kill : callable, optional
         Ends what jobs compute in processes of their own.
     """
 
-    def __init__(self, cores: Cores | int, kill: Callable[[], None] = lambda: None) -> None:
-        self._cores = Cores(cores) if isinstance(cores, int) else cores
-        self._kill = kill
+    def __init__(self, cores: int, kill: Callable[[], None] = lambda: None) -> None:
+        self._cores, self._kill = cores, kill
         self._change = threading.Condition()
         self._jobs = self._inside = 0
         self._stopped = self._given_up = False
@@ -100,9 +72,7 @@ class Stopper:
     def compute(self, work: Callable[[], None]) -> bool:
         """Does `work` as soon as a core is free; False where it is not wanted any more."""
         with self._change:
-            # looked at now and then, for the number of cores may have changed
-            while not self._stopped and self._inside >= self._cores.count:
-                self._change.wait(TICK)
+            self._change.wait_for(lambda: self._stopped or self._inside < self._cores)
             if self._stopped:
                 return False
             self._inside += 1
@@ -169,7 +139,7 @@ def each(
     threads: int,
     finished: Callable[[int | None], None],
     stopper: Stopper | None = None,
-    capacity: Callable[[], int] | None = None,
+    capacity: int | None = None,
 ) -> None:
     """Calls `work` for every job on a pool of threads.
 
@@ -178,7 +148,7 @@ def each(
     Parameters
     ----------
     finished : called in this thread with each job that is done, and with None now and then
-    capacity : how many jobs are given to the threads at a time, at the moment; default: twice as many as there are
+    capacity : how many jobs are given to the threads at a time; default: twice as many as there are
     """
     stopper = stopper or Stopper(threads)
     pool = ThreadPoolExecutor(threads)
@@ -197,7 +167,7 @@ def each(
         finished(job)
 
     with CtrlC() as ctrl_c:
-        through(jobs, lambda job: pool.submit(guarded, job), capacity or (lambda: 2 * threads), settled, stop, ctrl_c)
+        through(jobs, lambda job: pool.submit(guarded, job), lambda: capacity or 2 * threads, settled, stop, ctrl_c)
         pool.shutdown()
 
 

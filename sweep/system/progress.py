@@ -90,7 +90,7 @@ class Progress:
 
     @property
     def left(self) -> float | None:
-        """Seconds that are left, rather too many; None where nothing is known yet."""
+        """Seconds that are left; None where nothing is known yet."""
         cells = self.total - self.done
         if self._forecast is not None:
             left = self._forecast.left

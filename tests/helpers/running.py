@@ -96,15 +96,6 @@ def fail_on(monkeypatch, name, turn, number):
     return calls
 
 
-def told_by(action):
-    """What the user is told where the action fails."""
-    try:
-        action()
-    except SweepError as fault:
-        return str(fault)
-    return ""
-
-
 def environment():
     root = Path(__file__).parents[2]
     return {**os.environ, "PYTHONPATH": os.pathsep.join([str(root), str(root / "tests" / "helpers")])}

@@ -57,9 +57,4 @@ def kernel(solve):
     )
 
 
-DAYS = dataclasses.replace(
-    toy.KERNEL, outputs=tuple(dataclasses.replace(output, unit="days") for output in toy.KERNEL.outputs)
-)
-"""Output in a unit that readers are tempted to turn into dates."""
-
 SLOW, UNEVEN, CALLED, HUNGRY, LETHAL = map(kernel, (slow, uneven, called, hungry, lethal))

@@ -219,6 +219,10 @@ FREE_ANGLES = {
 but for that of `omega_n`, which is one of phase."""
 
 
+CHANGES = ((-6, 0, 0, 0), (4, 10, -8, 6)) if COMPILED else ((4, 10, -8, 6),)
+"""Powers of two by which the units of time, length, mass and angle are changed."""
+
+
 def dimension(unit):
     """Exponents of time, length, mass and angle."""
     total = np.zeros(4)
@@ -240,8 +244,10 @@ def test_units_scale_as_the_fields_declare(name):
         column = np.abs(found.cells[field.name]).reshape(rows.size, -1)
         rows = rows & ((column == 0.0) | ((column > 1e-40) & (column < 1e40)) | (column == field.default)).all(axis=1)
     assert rows.any() or not COMPILED  # of the few cells in plain Python there may be none
+    if not COMPILED:  # two cells: the digests hold plain Python to the bits of the rest
+        rows &= np.cumsum(rows) <= 2
     cells, rtol = golden.taken(found.cells, rows), found.rtol[rows]
-    for units in ((-6, 0, 0, 0), (4, 10, -8, 6)):
+    for units in CHANGES:
         powers = np.array(units) * (1, 1, 1, name in FREE_ANGLES)
 
         def factor(field, powers=powers):

@@ -71,7 +71,7 @@ def driven(zeta, omega_n, r, w, m, beta, digits=40):
     """(amplitude, period, multiplier) of the driven balance's cycle, or None where there is none.
 
     The cycle is where the speed after the drive, followed forward from rest at a, is the speed that a rise to -a needs,
-    followed backward from rest there. The multiplier is the slope of the map, by its difference over 1e-15 of a.
+    followed backward from rest there. The multiplier is the slope of the map, by a difference.
     """
     with mp.workdps(digits + 20):
         scene = tuple(map(mpf, (zeta, r, w, m, beta)))
@@ -79,7 +79,7 @@ def driven(zeta, omega_n, r, w, m, beta, digits=40):
         if a is None:
             return None
         before, after = _given(*scene, a)[1], _needed(*scene, a)[1]
-        step = a * mpf(10) ** -15
+        step = a * mpf(10) ** -(digits // 2 + 5)
         slope_given = (_given(*scene, a + step)[0] - _given(*scene, a - step)[0]) / (2 * step)
         slope_need = (_needed(*scene, a + step)[0] - _needed(*scene, a - step)[0]) / (2 * step)
         return a, 2 * (before + after) / mpf(omega_n), slope_given / slope_need

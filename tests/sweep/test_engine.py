@@ -345,7 +345,7 @@ def test_joined_studies_are_the_study_of_both(seed, tmp_path):
         coordinates_agree(found, whole)
 
 
-def test_cells_that_raised_are_computed_again_and_no_others(tmp_path, monkeypatch):
+def test_cells_that_raised_are_computed_again(tmp_path, monkeypatch):
     keys = {"kernel": "dice:KERNEL", "axes": {"x": [3.0, dice.RAISES, 8.0], "y": VALUES["y"]}, "outputs": ["a"]}
     output = tmp_path / "out.h5"
     run(keys, output, block_cells=2).close()

@@ -18,7 +18,7 @@ from pathlib import Path
 import dice
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
     RuleBasedStateMachine,
@@ -253,8 +253,12 @@ class File(RuleBasedStateMachine):
             assert not self.run(extend=False)
             if sweep.verify(self.output).blocks is not None:
                 assert self.run(repair=True, extend=False)
-        if not self.run(block_cells=size):
-            assert self.run(force=True, extend=False, block_cells=size)
+        if not self.run(block_cells=size) and not self.run(force=True, extend=False, block_cells=size):
+            # what is no result any more might be somebody else's, and is not even overwritten by force
+            with pytest.raises(sweep.SweepError):
+                sweep.open_result(self.output)
+            self.output.unlink()
+            assert self.run(extend=False, block_cells=size)
         self.hurt, self.old = False, None
         self.finished()
 
@@ -320,11 +324,11 @@ def truth(xs, summary):
     return interpreted(dice.KERNEL, keys_of(xs, summary))
 
 
-@pytest.mark.skipif("EXAMPLES" not in os.environ, reason="takes minutes: EXAMPLES=12 python -m pytest, by night")
 def test_whatever_happens_nothing_acknowledged_is_lost_and_no_number_is_wrong():
-    examples = int(os.environ["EXAMPLES"])
+    """A few files here; more of them by night: EXAMPLES=500 python -m pytest tests/sweep/test_file_machine.py"""
+    examples = int(os.environ.get("EXAMPLES", "8"))
     how = settings(max_examples=examples, stateful_step_count=8, derandomize=True, deadline=None, database=None,
-                   suppress_health_check=list(HealthCheck))  # fmt: skip
+                   phases=[Phase.generate], suppress_health_check=list(HealthCheck))  # fmt: skip
     run_state_machine_as_test(File, settings=how)
 
 

@@ -6,7 +6,7 @@ import pytest
 from columns import bounds, checked, relative_error, solve
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mpmath import mp, mpf
+from mpmath import mpf
 
 from kernels.balance.driven import BALANCE_DRIVEN
 from kernels.interface import FIRST_REFUSAL, Status
@@ -15,9 +15,7 @@ from kernels.lanes.jit import COMPILED
 NAMES = ("amplitude", "period", "multiplier")
 METHODS = tuple(m.name for m in BALANCE_DRIVEN.methods)
 SOME = 14 if COMPILED else 3
-MANY = 600 if COMPILED else 6
 POINTS = 29 if COMPILED else 8
-INF, NAN = np.inf, np.nan
 
 
 def scenes(drive, zeta, friction, n=SOME, seed=1, torque=(-1.0, 1.0)):
@@ -75,27 +73,6 @@ def test_newton_finds_the_cycle_to_1e_13_in_all_regimes_and_none_where_there_is_
     compare(outputs, status, columns, 1e-13)
 
 
-@pytest.mark.parametrize("rtol", [1e-13, 1e-11])
-@pytest.mark.parametrize(
-    ("drive", "zeta", "friction"),
-    [("impulse", (-12, -0.002), None), ("impulse", None, (-12, 0)), ("lift", None, (-12, 0.3))],
-)
-def test_newton_agrees_with_the_formulas_to_rtol_or_says_that_it_does_not(drive, zeta, friction, rtol):
-    columns = scenes(drive, zeta, friction, MANY)
-    outputs, status = solve(BALANCE_DRIVEN, "newton", *columns, rtol=rtol)
-    formulas, verdict = solve(BALANCE_DRIVEN, "closed", *columns)
-    assert np.array_equal(status >= FIRST_REFUSAL, verdict >= FIRST_REFUSAL)
-    good = status == Status.OK
-    assert good.sum() > 0.8 * (verdict == Status.OK).sum()
-    for name in NAMES:
-        np.testing.assert_allclose(outputs[name][good], formulas[name][good], rtol=rtol, atol=1e-300, err_msg=name)
-
-
-def test_newton_promises_no_more_than_rounding_leaves():
-    _, status = solve(BALANCE_DRIVEN, "newton", *scenes("impulse", (-6, -1), None, MANY), rtol=1e-15)
-    assert (status == Status.INACCURATE).all()
-
-
 def close_to_sticking():
     """Impulses just above w = 4 r^2, and lifts just above m = r and just above a + beta = 2 r."""
     near = 10.0 ** np.linspace(-14, -1, POINTS)
@@ -142,35 +119,22 @@ def just_kept_up(n, seed, zeta=(-6.0, -0.3)):
     return [c[kept_up] for c in columns(np.exp(high) * (1 + 10 ** random.uniform(-11, 0, n)))]
 
 
+@pytest.mark.skipif(not COMPILED, reason="sixty bisections of many cells")
 @pytest.mark.parametrize("zeta", [(-6.0, -0.3), (-0.3, 0.2)])
 def test_just_above_the_least_drive_every_cycle_is_right_to_14_digits(zeta):
-    columns = just_kept_up(200 if COMPILED else 2, 4, zeta)
-    assert len(columns[0]) > 100 or not COMPILED
+    columns = just_kept_up(200, 4, zeta)
+    assert len(columns[0]) > 100
     outputs, status = solve(BALANCE_DRIVEN, "newton", *columns, rtol=1e-14)
     usual, verdict = solve(BALANCE_DRIVEN, "newton", *columns, rtol=1e-12)
     assert (status == Status.OK).mean() > 0.98
     assert (verdict == Status.OK).mean() > 0.98
-    for i in np.flatnonzero(status == Status.OK)[:: 5 if COMPILED else 1]:
-        scene = tuple(mpf(float(columns[k][i])) for k in (0, 2, 3, 4, 5))
-        with mp.workdps(60):
-            a = oracles._cycle(*scene)
-            time = oracles._given(*scene, a)[1] + oracles._needed(*scene, a)[1]
-            kept = mp.exp(-2 * scene[0] * time) * (a - scene[1]) / (a + scene[1])
-        for name, true in zip(NAMES, (a, 2 * time, kept), strict=True):
-            assert relative_error(outputs[name][i : i + 1], [true])[0] < 1e-14, (name, i)
-            assert relative_error(usual[name][i : i + 1], [true])[0] < 1e-12 or verdict[i], (name, i)
-
-
-def test_the_formulas_of_the_source_with_one_kind_of_friction():
-    zeta, r, w = 0.1, 0.05, 0.3
-    s = np.sqrt(1 - zeta**2)
-    outputs, _ = solve(BALANCE_DRIVEN, "newton", [zeta, 0.0], [2.0], [0.0, r], [w], rtol=1e-12)
-    square = w * np.exp(2 * zeta * np.arcsin(zeta) / s) / np.sinh(np.pi * zeta / s)
-    np.testing.assert_allclose(outputs["amplitude"], [np.sqrt(square), w / (2 * r)], rtol=1e-13)
-    np.testing.assert_allclose(outputs["period"][0], 2 * np.pi / (2.0 * s), rtol=1e-13)
-    a = w / (2 * r)
-    expected = [np.exp(-2 * np.pi * zeta / s), (a - r) / (a + r)]
-    np.testing.assert_allclose(outputs["multiplier"], expected, rtol=1e-13)
+    for i in np.flatnonzero(status == Status.OK)[::5]:
+        cell = [column[i] for column in columns]
+        for name, true in zip(NAMES, oracles.driven(*cell, digits=60), strict=True):
+            if name == "multiplier" and true < mpf(10) ** -20:
+                continue  # what differences of the oracle cannot tell
+            assert relative_error(outputs[name][i : i + 1], [true])[0] < 1e-14, (name, cell)
+            assert relative_error(usual[name][i : i + 1], [true])[0] < 1e-12 or verdict[i], (name, cell)
 
 
 def test_just_below_the_least_drive_the_balance_sticks():
@@ -204,19 +168,6 @@ def test_nothing_happens_at_critical_damping(side):
         assert (abs(near[name] / at[name] - 1) < 50 * abs(zeta - 1) + 1e-13).all()
 
 
-def test_the_map_has_the_slope_that_the_multiplier_says():
-    """Two half swings from a little more than the cycle's amplitude, followed in 40 digits."""
-    zeta, r, m, beta = 0.05, 0.02, 0.3, 0.4
-    outputs, _ = solve(BALANCE_DRIVEN, "newton", [zeta], [1.0], [r], [0.0], [m], [beta], rtol=1e-13)
-    with mp.workdps(40):
-        scene = tuple(map(mpf, (zeta, r, 0.0, m, beta)))
-        a, step = mpf(float(outputs["amplitude"][0])), mpf(10) ** -8
-        energy = [oracles._given(*scene, a + k * step)[0] for k in (-1, 1)]
-        risen = [oracles._needed(*scene, a + k * step)[0] for k in (-1, 1)]
-        slope = (energy[1] - energy[0]) / (risen[1] - risen[0])
-    assert relative_error(outputs["multiplier"], [slope])[0] < 1e-12
-
-
 @settings(max_examples=40 if COMPILED else 5)
 @given(st.floats(0.001, 0.5), st.floats(-3, -1.5), st.floats(0.01, 1.0))
 def test_a_stronger_drive_swings_wider_and_is_less_stable(zeta, log_r, more):
@@ -227,53 +178,25 @@ def test_a_stronger_drive_swings_wider_and_is_less_stable(zeta, log_r, more):
         assert outputs["multiplier"][1] > outputs["multiplier"][0]
 
 
-@pytest.mark.parametrize(
-    ("cell", "status"),
-    [
-        ((0.1, 1, 0.1, 0.1, 0, 0), Status.OK), ((0.1, 1, 0.1, 0, 0.1, 0.1), Status.OK),
-        ((0.1, 1, 0.1, 0, 0, 0), Status.BAD_INPUT), ((0.1, 1, 0.1, 0.1, 0.1, 0.1), Status.BAD_INPUT),
-        ((0.1, 1, 0.1, 0, 0.1, 0), Status.BAD_INPUT), ((0.1, 1, 0.1, 0, 0, 0.1), Status.BAD_INPUT),
-        ((0.1, 1, 0.1, 0.1, 0.1, 0), Status.BAD_INPUT), ((0.1, 1, 0.1, 0.1, 0, 0.1), Status.BAD_INPUT),
-        ((0.0, 1, 0.0, 0.1, 0, 0), Status.NO_LIMIT_CYCLE), ((0.0, 1, 0.0, 0, 0.1, 0.1), Status.NO_LIMIT_CYCLE),
-        ((-0.1, 1, 0.1, 0.1, 0, 0), Status.BAD_INPUT), ((0.1, 0, 0.1, 0.1, 0, 0), Status.BAD_INPUT),
-        *(
-            ((*(x if k == bad else 0.1 if k < 4 else 0.0 for k in range(6)),), Status.BAD_INPUT)
-            for bad in range(6) for x in (NAN, INF, -INF)
-        ),
-    ],
-)  # fmt: skip
-def test_what_cannot_run_is_refused_by_name(cell, status):
-    assert (checked(BALANCE_DRIVEN, *(np.full(2, float(c)) for c in cell)) == status).all()
-
-
 def test_where_there_is_no_formula_none_is_taken():
     columns = [0.1, 0.1], [1.0], [0.1, 0.0], [0.1, 0.0], [0.0, 0.1], [0.0, 0.1]
     _, status = solve(BALANCE_DRIVEN, "closed", *columns)
     assert (status == Status.NO_METHOD).all()
-    assert (bounds(BALANCE_DRIVEN, "closed", *columns) == INF).all()
+    assert (bounds(BALANCE_DRIVEN, "closed", *columns) == np.inf).all()
 
 
 @pytest.mark.parametrize(
     ("cell", "status"),
     [
-        ((0.0, 1.0, 1e-200, 1.0, 0, 0), (Status.OK, Status.OUT_OF_RANGE)),  # a = 5e199: its square is too large
-        ((0.0, 1.0, 1e-305, 1.0, 0, 0), (Status.OUT_OF_RANGE,) * 2),
-        ((0.0, 1.0, 1e-100, 1e-60, 0, 0), (Status.OK, Status.OK)),
-        ((0.1, 1e-308, 0.0, 1.0, 0, 0), (Status.PARTLY_OUT_OF_RANGE,) * 2),  # period
-        ((1e-30, 1.0, 0.0, 1e-60, 0, 0), (Status.OK, Status.OK)),
-        ((1e-300, 1.0, 0.0, 1.0, 0, 0), (Status.OK, Status.OUT_OF_RANGE)),
-        ((0.3, 1.0, 0.0, 5e-324, 0, 0), (Status.OK, Status.OK)),
-        ((0.3, 1.0, 0.0, 1.7e308, 0, 0), (Status.OK, Status.OK)),
+        ((0.1, 1, 0.1, 0.1, 0, 0), Status.OK),
+        ((0.1, 1, 0.1, 0, 0.1, 0.1), Status.OK),
+        ((0.1, 1, 0.1, 0, 0, 0), Status.BAD_INPUT),
+        ((0.1, 1, 0.1, 0.1, 0.1, 0.1), Status.BAD_INPUT),
+        ((0.1, 1, 0.1, 0, 0.1, 0), Status.BAD_INPUT),
+        ((0.1, 1, 0.1, 0.1, 0, 0.1), Status.BAD_INPUT),
+        ((0.0, 1, 0.0, 0.1, 0, 0), Status.NO_LIMIT_CYCLE),
+        ((0.0, 1, 0.0, 0, 0.1, 0.1), Status.NO_LIMIT_CYCLE),
     ],
-)  # fmt: skip
-def test_over_the_range_of_float64_a_cell_is_right_or_refused(cell, status):
-    columns = [np.array([float(c)]) for c in cell]
-    for method, expected in zip(METHODS, status, strict=True):
-        outputs, verdict = solve(BALANCE_DRIVEN, method, *columns)
-        assert verdict[0] == expected, method
-        assert np.isnan(outputs["period"][0]) == (expected == Status.PARTLY_OUT_OF_RANGE) or expected >= FIRST_REFUSAL
-        if expected < FIRST_REFUSAL:
-            zeta, _, r, w, _, _ = map(mpf, cell)
-            s = mp.sqrt(1 - zeta**2)
-            by_damping = mp.sqrt(w * mp.exp(2 * zeta * mp.asin(zeta) / s) / mp.sinh(mp.pi * zeta / s)) if zeta else 0
-            assert relative_error(outputs["amplitude"], [by_damping or w / (2 * r)])[0] < 1e-13
+)
+def test_a_drive_is_either_an_impulse_or_a_lift(cell, status):
+    assert checked(BALANCE_DRIVEN, *([float(c)] for c in cell))[0] == status

@@ -1,6 +1,5 @@
 """A general power of the speed, which has no Taylor series where the foliot turns: against integrals in 24 digits."""
 
-import mpmath
 import numpy as np
 import pytest
 import scene_oracles as oracles
@@ -8,7 +7,6 @@ from columns import relative_error
 from columns import solve as solve_columns
 from mpmath import mp, mpf
 
-from kernels.codegen import power_core
 from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.jit import COMPILED
 from kernels.scene import Field, power, scene_kernel, sign
@@ -98,27 +96,6 @@ def test_over_decades_what_is_not_remarked_is_right():
     assert fine.mean() > 0.5
     np.testing.assert_allclose(outputs["time"][fine], finer["time"][fine], rtol=1e-6)
     np.testing.assert_allclose(outputs["speed"][fine], finer["speed"][fine], rtol=1e-6)
-
-
-def _plain(function, *numbers):
-    return getattr(function, "py_func", function)(*numbers)
-
-
-@pytest.mark.parametrize("n", [0.3, 1.5, 4.0])
-@pytest.mark.parametrize("c", [0.05, 3.0, 200.0])
-def test_within_the_core_the_mean_does_for_the_power(n, c):
-    rate, tolerance = 2.0, 1e-6
-    t = float(_plain(power_core.core_time, rate / c, rate, c, n, tolerance))
-    mean = (rate * t) ** n / (n + 1)
-    with mp.workdps(25):  # the true time to the speed that the mean leads to
-        speed = (rate - c * mpf(mean)) * t
-        inverse = lambda v: 1 / (rate - c * v ** mpf(n))  # noqa: E731
-        true = mpmath.quad(inverse, [0, speed / 1000, speed / 30, speed])
-        way = mpmath.quad(lambda v: v * inverse(v), [0, speed / 1000, speed / 30, speed])
-    assert abs(true - t) * rate < tolerance * rate
-    assert abs(way - speed * t / 2) < tolerance * rate
-    assert c * (rate * t) ** n <= 0.2501 * rate
-    assert t == 1.0 or 100 * abs(true - t) + 100 * abs(way - speed * t / 2) / rate > 1e-3 * tolerance
 
 
 @pytest.mark.skipif(not COMPILED, reason="a thousand steps")

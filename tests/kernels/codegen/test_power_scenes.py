@@ -5,7 +5,6 @@ import pytest
 from columns import relative_error, solve
 from mpmath import mp, mpf
 
-from kernels.codegen import followed_twice
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 from kernels.scene import Field, power, scene_kernel, sign
@@ -43,20 +42,6 @@ def test_what_a_power_below_1_brings_to_rest_sticks(slide, rtol, a):
     assert (status == Status.STICKS).all()
 
 
-@pytest.mark.parametrize("n", [0.5, 0.3, 0.05, 0.8])
-def test_the_way_to_rest_takes_the_time_that_it_should(slide, n):
-    """The time of the leg to the kink, 1/(1 - n), which a refused cell still holds."""
-    inputs = [np.array([value]) for value in (n, 0.0, 1.0)]
-    for finer in (1.0, 16.0):
-        results = followed_twice.followed(_module(slide), inputs, np.array([1e-9]), finer)
-        assert results[-1][0] == Status.STICKS
-        assert results[0][0] == pytest.approx(1.0 / (1.0 - n), rel=1e-8 / finer)
-
-
-def _module(kernel):
-    return next(c.cell_contents for c in kernel.methods[0].solve.__closure__ if hasattr(c.cell_contents, "STATES"))
-
-
 def quarter(n, x0, v0):
     """A quarter of the period of x'' = -abs(x)^n sign x: v^2/2 + x^(n + 1)/(n + 1) is kept."""
     p = mpf(n) + 1
@@ -88,30 +73,3 @@ def test_what_a_tighter_tolerance_can_do_a_wider_one_does_not_refuse():
         outputs, status = solve(lag, "dop853", np.array([1e-5]), np.ones(1), rtol=rtol)
         assert status[0] == Status.OK
         assert relative_error(outputs["time"], [1 + mpf(10) ** -5])[0] < max(rtol, 1e-13)
-
-
-def test_what_is_refused_is_tried_again_and_taken_only_where_that_is_right(monkeypatch):
-    """Cells: right at once; right when tried again; still too far apart; refused both times."""
-    tried = []
-
-    class Module:
-        STATES = ("u",)
-
-    def followed(module, columns, rtol, finer=1.0):
-        cells = columns[0].astype(int)
-        tried.append((cells.tolist(), finer, rtol.tolist()))
-        first = rtol > 1e-8
-        off = np.where(finer < 4.0, [0.0, 1e-4, 1e-4, 0.0], 0.0)[cells] * np.where(first | (cells == 2), 1.0, 0.0)
-        verdict = np.where(cells == 3, float(Status.STEP_LIMIT), 0.0)
-        return np.array([1.0 + off, 1.0 + off, 1.0 + off, 1.0 + off, verdict])
-
-    monkeypatch.setattr(followed_twice, "followed", followed)
-    monkeypatch.setattr(followed_twice, "off_by_roundings", lambda columns: columns)
-    outputs, status = [np.empty(4) for _ in range(3)], np.empty(4, np.int8)
-    followed_twice.twice(Module, [np.arange(4.0), np.ones(4)], np.full(4, 1e-6), outputs, status)
-    assert status.tolist() == [Status.OK, Status.OK, Status.INACCURATE, Status.STEP_LIMIT]
-    assert [cells for cells, *_ in tried] == [[0, 1, 2, 3]] * 2 + [[1, 2, 3]] * 2
-    assert tried[-1][2] == [1e-13] * 3
-    tried.clear()
-    followed_twice.twice(Module, [np.arange(4.0), np.ones(4)], np.full(4, 1e-13), outputs, status, 8.0, 1e-13)
-    assert len(tried) == 2

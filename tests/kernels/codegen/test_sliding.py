@@ -6,10 +6,8 @@ from columns import relative_error, solve
 from mpmath import mp, mpf
 from sliding_scene import SLIDING
 
-from kernels.codegen.sliding import Side, _jump
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.source_text.expression import Graph
 
 METHODS = ["taylor", "dop853", "dopri5", "rodas5p"] if COMPILED else ["dop853"]
 MANY = 24
@@ -186,10 +184,3 @@ def test_taylor_hands_what_slides_to_dop853_and_what_that_cannot_end_to_rodas5p(
 def test_stick_and_slip_that_never_comes_to_its_surface_meets_the_limit(method):
     cell = {"press": 1.0, "belt": 0.2, "speed0": 0.2, "drag": -0.1, "stiffness": 1.0, "mid": 9.0, "wall": [-1e9]}
     assert solve(SLIDING, method, **cell, flips=1.0)[1][0] == Status.STEP_LIMIT
-
-
-def test_what_two_sides_differ_by_is_known_before_any_rounding():
-    graph = Graph()
-    x, sign = graph.series("x"), graph.constant(".sign_0")
-    behind, ahead = Side(graph, {0: graph.of(-1.0)}), Side(graph, {0: graph.of(1.0)})
-    assert _jump(1e20 * x - 0.5 * sign, behind, ahead) is graph.of(-1.0)

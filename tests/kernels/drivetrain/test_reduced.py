@@ -20,7 +20,6 @@ FULA = {
     "h": np.array([0.18, 0.042, 0.019, 0.037, 0.0975, 0.187, 0.72, 13.0]),
 }
 """Main drive of the Fu-la milling machine, Table 1, in units of kgf, m and s."""
-INF, NAN = np.inf, np.nan
 
 
 def reduced(reduction, chain=FULA, rtol=1e-9, order="strict", **named):
@@ -37,6 +36,16 @@ def random_chain(seed, n, decades=2.0, damping=-2.0):
     random = np.random.default_rng(seed)
     J, k = 10 ** random.uniform(0, decades, n), 10 ** random.uniform(0, decades, n)
     return {"J": J, "k": k, "h": np.sqrt(J * k) * 10 ** (damping + random.uniform(-1, 0, n))}
+
+
+def model_of(reduction, chain, n_keep):
+    """The reduced model by the oracle."""
+    values = list(chain.values())
+    if reduction == "exact":
+        return oracles.full(*values)
+    if reduction == "rivin":
+        return oracles.full(*oracles.rivin(*values, oracles.strict_steps(*values, n_keep)))
+    return oracles.Reduced(reduction, *values, n_keep, oracles.masters(*values, n_keep))
 
 
 SIZES = [(1, 6, 2.0), (2, 7, 6.0), (3, 8, 12.0), (4, 2, 3.0), (5, 12, 4.0)] if COMPILED else [(1, 4, 3.0)]
@@ -60,8 +69,7 @@ def test_the_reduced_chain_is_that_of_the_levers_to_a_few_ulp(seed, n, decades):
 def test_frequencies_in_a_basis_are_right_or_said_not_to_be(reduction, seed, n, decades):
     chain = random_chain(seed, n, decades)
     for n_keep in {1, (n + 1) // 2, n - 1}:
-        masters = oracles.masters(*chain.values(), n_keep)
-        truth = oracles.Reduced(reduction, *chain.values(), n_keep, masters).frequencies()
+        truth = model_of(reduction, chain, n_keep).frequencies()
         outputs, status = reduced(reduction, chain, n_keep=n_keep, rtol=1e-10)
         error = relative_error(outputs["frequency"][0, :n_keep], truth).max()
         assert status[0] in (Status.OK, Status.INACCURATE, Status.DAMPERS_OUT_OF_RANGE)
@@ -70,28 +78,16 @@ def test_frequencies_in_a_basis_are_right_or_said_not_to_be(reduction, seed, n, 
             assert error < 1e-12
 
 
+@pytest.mark.parametrize("seed_n_damping", [(11, 5, -0.7), (12, 4, 0.8)])
 @pytest.mark.parametrize("reduction", ["rivin", *BASES])
-def test_damping_is_that_of_the_poles_in_30_digits(reduction):
-    chain = random_chain(11, 5, 2.0, -0.7)
-    n_keep = 3
-    outputs, status = reduced(reduction, chain, n_keep=n_keep)
-    if reduction == "rivin":
-        truth = oracles.full(*oracles.rivin(*chain.values(), oracles.strict_steps(*chain.values(), n_keep)))
-    else:
-        truth = oracles.Reduced(reduction, *chain.values(), n_keep, oracles.masters(*chain.values(), n_keep))
+def test_damping_is_that_of_the_poles_in_30_digits(reduction, seed_n_damping):
+    """The second chain has modes that are overdamped."""
+    seed, n, damping = seed_n_damping
+    chain = random_chain(seed, n, 2.0, damping)
+    outputs, status = reduced(reduction, chain, n_keep=n - 2)
+    expected = oracles.dampings(model_of(reduction, chain, n - 2).poles())
     assert status[0] in (Status.OK, Status.DAMPERS_OUT_OF_RANGE)
-    expected = oracles.dampings(truth.poles())
-    assert relative_error(outputs["damping"][0, :n_keep], expected).max() < 1e-11
-
-
-@pytest.mark.parametrize("reduction", BASES)
-def test_overdamped_modes_have_a_damping_above_one(reduction):
-    chain = random_chain(12, 4, 1.0, 0.8)
-    outputs, _ = reduced(reduction, chain, n_keep=2)
-    truth = oracles.Reduced(reduction, *chain.values(), 2, oracles.masters(*chain.values(), 2))
-    expected = oracles.dampings(truth.poles())
-    assert max(expected) > 1
-    assert relative_error(np.sort(outputs["damping"][0, :2]), sorted(expected)).max() < 1e-11
+    assert relative_error(np.sort(outputs["damping"][0, : n - 2]), sorted(expected)).max() < 1e-11
 
 
 def spindle(model):
@@ -117,10 +113,7 @@ def scanned(function, f_max):
 @pytest.mark.parametrize("reduction", ["rivin", *BASES])
 def test_the_error_of_the_receptance_is_the_largest_that_a_fine_scan_finds(reduction, f_max):
     outputs, _ = reduced(reduction, n_keep=5, f_max=f_max)
-    if reduction == "rivin":
-        model = oracles.full(*oracles.rivin(*FULA.values(), oracles.strict_steps(*FULA.values(), 5)))
-    else:
-        model = oracles.Reduced(reduction, *FULA.values(), 5, [0, 3, 5, 6, 7])
+    model = model_of(reduction, FULA, 5)
     here, true = spindle(model), spindle(oracles.full(*FULA.values()))
     found = scanned(lambda f: here(f) - true(f), f_max) / scanned(true, f_max)
     assert outputs["frf_error"][0] == pytest.approx(found, rel=1e-8)
@@ -175,18 +168,6 @@ def test_five_masses_put_the_fifth_frequency_17_percent_low_as_the_source_prints
     assert status[0] == Status.OK
 
 
-@pytest.mark.parametrize(
-    ("reduction", "percent"),
-    [
-        ("guyan", [0.001, 0.005, 0.011, 0.914, 2.21]), ("irs", [0, 0, 0, 0.007, 0.329]),
-        ("craig_bampton", [0, 0.004, 0, 0.002, 0.012]), ("modal", [0, 0, 0, 0, 0]),
-    ],
-)  # fmt: skip
-def test_other_reductions_to_five_have_the_errors_found_before(reduction, percent):
-    outputs, _ = reduced(reduction, n_keep=5)
-    np.testing.assert_allclose(100 * outputs["frequency_error"][0, :5], percent, atol=6e-4, rtol=1e-3)
-
-
 def test_merging_the_motor_spring_holds_to_one_and_a_half_hertz():
     outputs, status = reduced("rivin", n_keep=2, f_max=1.4)
     assert outputs["k_kept"][0, 1] != FULA["k"][7]
@@ -218,15 +199,6 @@ def test_every_step_keeps_sum_j_sum_j_x_and_dunkerleys_sum(seed, n, decades):
         assert J.sum() <= chain["J"].sum() * (1 + 1e-15 * n)  # what a last mass gives the ground is gone
 
 
-def test_sum_j_stays_where_the_last_mass_does():
-    chain = random_chain(5, 6, 1.0)
-    chain["J"][-1] *= 1e6
-    for n_keep in range(1, 6):
-        J = reduced("rivin", chain, n_keep=n_keep)[0]["J_kept"][0, :n_keep]
-        if J[-1] >= chain["J"][-1]:
-            assert J.sum() == pytest.approx(chain["J"].sum(), rel=1e-15)
-
-
 @settings(max_examples=30 if COMPILED else 1)
 @given(st.integers(0, 2**32 - 1), st.floats(0, 3))
 def test_a_basis_only_raises_frequencies(seed, decades):
@@ -255,11 +227,6 @@ def test_the_fewest_masses_hold_the_tolerance_and_one_less_does_not(reduction, t
         assert kept == 4
 
 
-def test_a_missing_mode_breaks_the_tolerance_however_large():
-    for reduction in ("rivin", "guyan", "modal")[: None if COMPILED else 1]:
-        assert reduced(reduction, tol=1e3, f_max=150.0)[0]["n_kept"][0] == 4
-
-
 @pytest.mark.parametrize("reduction", ["none", *REDUCING] if COMPILED else ["rivin", "irs", "craig_bampton"])
 def test_a_chain_with_free_ends_keeps_its_free_motion(reduction):
     chain = FULA | {"k": np.append(FULA["k"][:-1], 0.0)}
@@ -267,13 +234,10 @@ def test_a_chain_with_free_ends_keeps_its_free_motion(reduction):
     assert outputs["frequency"][0, 0] == 0
     assert outputs["frequency_error"][0, 0] == 0
     assert np.isnan(outputs["frf_error"][0]) or reduction == "none"
-    masters = [0, 3, 5, 6, 7]
-    if reduction in BASES:
+    if reduction in ("guyan", "irs", "craig_bampton"):
         with oracles.mp.workdps(50):
-            truth = oracles.Reduced(reduction if reduction != "modal" else "irs", *chain.values(), 5, masters)
-            if reduction != "modal":
-                expected = truth.frequencies()[1:]
-                assert relative_error(outputs["frequency"][0, 1:5], expected).max() < 1e-12
+            expected = oracles.Reduced(reduction, *chain.values(), 5, [0, 3, 5, 6, 7]).frequencies()[1:]
+        assert relative_error(outputs["frequency"][0, 1:5], expected).max() < 1e-12
 
 
 def test_without_dampers_nothing_is_damped():
@@ -286,38 +250,20 @@ def test_without_dampers_nothing_is_damped():
         assert np.isnan(reduced(reduction, chain, n_keep=5, f_max=20.0)[0]["frf_error"][0])
 
 
-def verdict(J=(1.0, 2.0), k=(1.0, 1.0), h=0.0, **named):
-    return checked(DRIVETRAIN, [J], [k], [np.broadcast_to(h, len(J))], **{n: [v] for n, v in named.items()})[0]
-
-
 @pytest.mark.parametrize(
-    ("cell", "status"),
+    "cell",
     [
-        ({}, Status.OK), ({"k": (1.0, 0.0)}, Status.OK), ({"k": (0.0, 1.0)}, Status.BAD_INPUT),
-        ({"J": (1.0, 0.0)}, Status.BAD_INPUT), ({"J": (1.0, -1.0)}, Status.BAD_INPUT),
-        ({"k": (1.0, -1.0)}, Status.BAD_INPUT), ({"h": (0.0, -1.0)}, Status.BAD_INPUT),
-        ({"J": (1.0, NAN)}, Status.BAD_INPUT), ({"k": (1.0, INF)}, Status.BAD_INPUT), ({"h": NAN}, Status.BAD_INPUT),
-        ({"reduction": 1.0}, Status.BAD_INPUT), ({"reduction": 1.0, "n_keep": 1.0}, Status.OK),
-        ({"reduction": 1.0, "n_keep": 3.0}, Status.BAD_INPUT), ({"reduction": 1.0, "n_keep": 1.5}, Status.BAD_INPUT),
-        ({"reduction": 1.0, "n_keep": -1.0}, Status.BAD_INPUT), ({"reduction": 1.0, "tol": 0.1}, Status.OK),
-        ({"reduction": 1.0, "n_keep": 1.0, "tol": 0.1}, Status.BAD_INPUT), ({"tol": -0.1}, Status.BAD_INPUT),
-        ({"reduction": 6.5, "n_keep": 1.0}, Status.BAD_INPUT), ({"reduction": 7.0, "n_keep": 1.0}, Status.BAD_INPUT),
-        ({"f_max": 0.0}, Status.BAD_INPUT), ({"f_max": -1.0}, Status.BAD_INPUT), ({"f_max": NAN}, Status.BAD_INPUT),
-        ({"order": 2.0}, Status.BAD_INPUT), ({"order": NAN}, Status.BAD_INPUT),
-        ({"J": np.ones(65), "k": np.ones(65)}, Status.BAD_INPUT), ({"J": np.ones(64), "k": np.ones(64)}, Status.OK),
-        ({"J": (1e-300, 1.0)}, Status.OUT_OF_RANGE), ({"J": (1e-300, 1e-299)}, Status.OK),
+        {"k": (0.0, 1.0)}, {"J": np.ones(65), "k": np.ones(65)}, {"reduction": 1.0},
+        {"reduction": 1.0, "n_keep": 3.0}, {"reduction": 1.0, "n_keep": 1.0, "tol": 0.1},
     ],
 )  # fmt: skip
-def test_what_cannot_run_is_refused_by_name(cell, status):
-    assert verdict(**cell) == status
+def test_a_chain_with_a_gap_and_a_reduction_without_its_size_or_with_two_are_bad_input(cell):
+    J, k = (np.atleast_2d(cell.pop(name, (1.0, 2.0))) for name in "Jk")
+    assert checked(DRIVETRAIN, J, k, **cell)[0] == Status.BAD_INPUT
+    assert checked(DRIVETRAIN, [[1.0, 2.0]], [[1.0, 0.0]], reduction=1.0, n_keep=1.0)[0] == Status.OK
 
 
 def test_a_result_that_no_float64_can_hold_is_left_out():
-    chain = {"J": np.array([1e300, 1e300]), "k": np.array([1e-300, 1e-300]), "h": np.zeros(2)}
-    outputs, status = reduced("rivin", chain, n_keep=1, f_max=1.0)
-    assert status[0] == Status.OK
-    truth = oracles.rivin(*chain.values(), oracles.strict_steps(*chain.values(), 1))
-    assert relative_error(outputs["frequency"][0, :1], oracles.chain_frequencies(*truth[:2]))[0] < 1e-14
     huge = {"J": np.full(3, 1.7e308), "k": np.ones(3), "h": np.zeros(3)}
     outputs, status = reduced("rivin", huge, n_keep=1)
     assert status[0] == Status.PARTLY_OUT_OF_RANGE
@@ -325,11 +271,6 @@ def test_a_result_that_no_float64_can_hold_is_left_out():
     small, _ = reduced("rivin", huge | {"J": np.full(3, 1.7)}, n_keep=1)
     for name, scale in (("frequency", 10.0**-154), ("k_kept", 1.0), ("damping", 1.0)):
         np.testing.assert_allclose(outputs[name][0, 0], small[name][0, 0] * scale, rtol=1e-13)
-
-
-def test_more_digits_than_there_are_is_inaccurate():
-    for reduction in ("rivin", "irs"):
-        assert reduced(reduction, n_keep=4, rtol=1e-16)[1][0] == Status.INACCURATE
 
 
 LIGHT = {
@@ -349,12 +290,7 @@ def test_a_lightly_damped_chain_is_accurate_in_what_is_asked_for(reduction):
             kernel="drivetrain", fixed=fixed, outputs=outputs, axes={"rtol": [1e-12]}, progress=False
         ).isel(rtol=0)
 
-    if reduction == "exact":
-        model = oracles.full(*LIGHT.values())
-    elif reduction == "rivin":
-        model = oracles.full(*oracles.rivin(*LIGHT.values(), oracles.strict_steps(*LIGHT.values(), 2)))
-    else:
-        model = oracles.Reduced(reduction, *LIGHT.values(), 2, oracles.masters(*LIGHT.values(), 2))
+    model = model_of(reduction, LIGHT, 2)
     for name, truth in {"frequency": model.frequencies(), "damping": oracles.dampings(model.poles())}.items():
         alone = run(name)
         assert alone.status == Status.OK, name

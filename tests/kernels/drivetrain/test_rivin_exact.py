@@ -5,18 +5,9 @@ import pytest
 import reduction_oracles as oracles
 from columns import relative_error, solve
 
-from kernels.drivetrain._rivin_exact import count_below
-from kernels.drivetrain._rivin_merging import TYPE_A, TYPE_B
 from kernels.drivetrain.reduced import DRIVETRAIN, REDUCTIONS
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-
-
-@pytest.fixture(autouse=True)
-def as_in_a_kernel():
-    """Compiled code says nothing of infinities on its way."""
-    with np.errstate(all="ignore"):
-        yield
 
 
 def chain(seed, n, decades, free=False):
@@ -33,33 +24,6 @@ def exact(J, k, n_keep, rtol=1e-9):
         DRIVETRAIN, "direct", [J], [k], [0.0 * k], rtol=rtol, reduction=[REDUCTIONS["exact"]], n_keep=[n_keep]
     )
     return outputs, Status(status[0])
-
-
-def counted(J, k, steps, frequency):
-    """How many frequencies are below one [Hz], by the chain that those steps leave."""
-    n, kinds, places = len(J), np.full(len(J), np.nan), np.full(len(J), np.nan)
-    for i, (kind, place) in enumerate(steps):
-        kinds[i], places[i] = {"a": TYPE_A, "b": TYPE_B}[kind], place
-    w, rooms = 2 * np.pi * frequency, (np.full(2 * n, np.nan), np.full(2 * n, np.nan))
-    return count_below(w, J, k, kinds, places, n - len(steps), *rooms)[0]
-
-
-@pytest.mark.parametrize("free", [False, True])
-@pytest.mark.parametrize("seed", [0, 1, 2, 3] if COMPILED else [0])
-def test_the_masses_that_are_left_know_how_many_frequencies_are_below_any(seed, free):
-    n = 6 if COMPILED else 4
-    J, k = chain(seed, n, 2.0, free)
-    around, counts = [], []
-    for j, f in enumerate(oracles.chain_frequencies(J, k)):
-        if j > 0 or not free:
-            around += [float(f) * (1 - 1e-9), float(f) * (1 + 1e-9)]
-            counts += [j, j + 1]
-    for way in ("ab", "ba", "aaa", "bbb"):
-        at = {"a": [1, 2, 1], "b": [0, 1, 0]}
-        steps = [(kind, at[kind][i]) for i, kind in enumerate(way)]
-        assert [counted(J, k, steps, f) for f in around] == counts
-    steps = [("a", n - 1), ("b", n - 3)]  # at the ground
-    assert [counted(J, k, steps, f) for f in around] == counts
 
 
 @pytest.mark.parametrize(

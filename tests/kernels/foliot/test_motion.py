@@ -3,7 +3,7 @@
 import numpy as np
 import oracles
 import pytest
-from columns import bounds, checked, solve
+from columns import bounds, solve
 from mpmath import mpf
 
 from kernels.foliot.cycle import FOLIOT
@@ -51,30 +51,6 @@ def test_it_starts_at_the_switch_rises_to_the_amplitude_and_turns_over_at_half_t
     assert angle.max() == pytest.approx(cycle["amplitude"][0], rel=10 / half**2)
     assert np.allclose(angle[:half], -angle[half:-1], atol=1e-14)
     assert np.allclose(np.gradient(angle, phase * cycle["period"][0])[1:-1], speed[1:-1], atol=10 / half)
-
-
-@pytest.mark.parametrize(
-    ("mu", "phi0", "a"), [(1e-200, 1e100, 1e-150), (1e-150, 1e-250, 1e60), (1e90, 1e90, 1e90), (1e-90, 1e-90, 1e-90)]
-)
-def test_units_beyond_the_usual_lose_no_digits(mu, phi0, a):
-    phase = np.array([0.1, 0.3, 0.7])
-    outputs, status = solve(FOLIOT_MOTION, "closed", [mu], [phi0], [a], along=[phase])
-    assert status[0] == Status.OK
-    _, amplitude, speed, _, _ = oracles.foliot(mu, phi0, a)
-    for j in range(3):
-        x, v = oracles.foliot_angle(mu, phi0, a, phase[j])
-        assert abs(mpf(outputs["angle"][0, j]) - x) < 4e-15 * amplitude
-        assert abs(mpf(outputs["speed"][0, j]) - v) < 4e-15 * speed
-
-
-def test_it_refuses_what_the_cycle_refuses():
-    status = checked(FOLIOT_MOTION, [0.0, 1.0, 1.0], [1.0, 1.0, -1.0], [1.0, 0.0, 1.0])
-    assert status.tolist() == [Status.NEVER_STARTS, Status.NO_LIMIT_CYCLE, Status.BAD_INPUT]
-
-
-def test_what_no_float_can_hold_is_out_of_range():
-    _, status = solve(FOLIOT_MOTION, "closed", [1.7e308], [1.7e308], [1e-3], along=[np.array([0.25])])
-    assert status[0] == Status.OUT_OF_RANGE
 
 
 @pytest.mark.parametrize("method", ["closed", "segments"])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import ripple_oracles
-from columns import checked, relative_error, solve
+from columns import relative_error, solve
 
 from kernels.foliot.ripple import FOLIOT_RIPPLE
 from kernels.interface import Status
@@ -39,15 +39,11 @@ def compare(cells, truths, rtol):
         assert error.max() <= 0.5 * rtol, (name, cells[error.argmax()], error.max() / rtol)
 
 
-@pytest.fixture(scope="module")
-def energy_truths():
-    cells = BY_ENERGY if COMPILED else BY_ENERGY[:3]
-    return cells, [ripple_oracles.by_energy(**({"mu": 1.0, "phi0": 1.0} | cell)) for cell in cells]
-
-
-@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9] if COMPILED else [1e-3])
-def test_ripple_is_right_to_half_of_rtol_where_energy_gives_the_speed(rtol, energy_truths):
-    compare(*energy_truths, rtol)
+def test_ripple_is_right_to_half_of_rtol_where_energy_gives_the_speed():
+    cells = BY_ENERGY if COMPILED else BY_ENERGY[:1]
+    truths = [ripple_oracles.by_energy(**({"mu": 1.0, "phi0": 1.0} | cell)) for cell in cells]
+    for rtol in (1e-3, 1e-6, 1e-9) if COMPILED else (1e-3,):
+        compare(cells, truths, rtol)
 
 
 @pytest.mark.skipif(not COMPILED, reason="the oracle alone takes ten seconds")
@@ -59,24 +55,16 @@ def test_ripple_with_drag_is_right_to_half_of_rtol():
 
 def test_under_dry_friction_alone_the_amplitude_knows_nothing_of_the_ripple():
     depth = np.array([0.0, 0.3, 0.6] if COMPILED else [0.6])
+    rtol = 1e-6 if COMPILED else 1e-3
     for harmonic in (1.0, 2.0, 5.0) if COMPILED else (2.0,):
-        outputs, status = solve(FOLIOT_RIPPLE, "dopri5", 1.0, 1.0, R=0.25, depth=depth, harmonic=harmonic, rtol=1e-6)
+        outputs, status = solve(FOLIOT_RIPPLE, "dopri5", 1.0, 1.0, R=0.25, depth=depth, harmonic=harmonic, rtol=rtol)
         assert (status == Status.OK).all()
-        assert np.allclose(outputs["amplitude"], 4.0, rtol=1e-6)
+        assert np.allclose(outputs["amplitude"], 4.0, rtol=rtol)
 
 
-def test_a_cycle_that_would_stop_where_torque_is_low_sticks():
-    cells = [{"R": 0.95, "depth": 0.9, "harmonic": 4}, {"mu": 1.0, "R": 0.97, "depth": 0.5, "harmonic": 6}]
-    for cell in cells:
-        with pytest.raises(ripple_oracles.NoCycle):
-            ripple_oracles.by_energy(**({"mu": 1.0, "phi0": 1.0} | cell))
-    _, status = solve(FOLIOT_RIPPLE, "dopri5", rtol=1e-6 if COMPILED else 1e-3, **as_columns(cells))
-    assert (status == Status.STICKS).all()
-
-
+@pytest.mark.skipif(not COMPILED, reason="the oracle alone takes ten seconds")
 def test_sticking_agrees_with_energy_over_a_grid():
-    grid = [(R, depth, h) for R in (0.7, 0.95) for depth in (0.3, 0.8) for h in (1, 2, 3)]
-    grid = grid if COMPILED else grid[::5]
+    grid = [(R, depth, h) for R in (0.7, 0.95) for depth in (0.3, 0.8) for h in (1, 2, 3, 6)]
     cells = [{"R": R, "depth": depth, "harmonic": h} for R, depth, h in grid]
     exists = []
     for cell in cells:
@@ -88,12 +76,7 @@ def test_sticking_agrees_with_energy_over_a_grid():
     _, status = solve(FOLIOT_RIPPLE, "dopri5", rtol=1e-4, **as_columns(cells))
     found = [s in (Status.OK, Status.INACCURATE) for s in status]
     assert found == exists, [c for c, f, x in zip(cells, found, exists, strict=True) if f != x]
-    assert not COMPILED or 0 < sum(exists) < len(exists)
-
-
-def test_what_foliot_refuses_is_refused():
-    assert checked(FOLIOT_RIPPLE, [0.0], [1.0], a=1.0)[0] == Status.NEVER_STARTS
-    assert checked(FOLIOT_RIPPLE, [1.0], [1.0])[0] == Status.NO_LIMIT_CYCLE
+    assert 0 < sum(exists) < len(exists)
 
 
 STEEP = (

@@ -4,16 +4,12 @@ import foliot_oracles
 import numpy as np
 import pytest
 from columns import checked, relative_error, solve
-from loops import one_by_one
-from mpmath import expm1, log1p, mp, mpf
+from mpmath import expm1, mp, mpf
 
-from kernels.foliot import start as foliot_start
-from kernels.foliot._units import Scene
 from kernels.foliot.cycle import FOLIOT
-from kernels.foliot.start import FLIP_LIMIT, FOLIOT_START, Flip
+from kernels.foliot.start import FLIP_LIMIT, FOLIOT_START
 from kernels.interface import Status
-from kernels.lanes.columns import entry
-from kernels.lanes.jit import COMPILED, jit
+from kernels.lanes.jit import COMPILED
 
 SOME = 300 if COMPILED else 12
 LOSSES = ("a", "R", "k", "e")
@@ -78,6 +74,7 @@ def test_flips_are_right_to_1e_13_or_say_that_they_are_not():
     assert worst[right].max() < 2e-14
 
 
+@pytest.mark.skipif(not COMPILED, reason="fifty bisections of many cells")
 @pytest.mark.parametrize("rtol", [1e-14, 1e-9])
 def test_a_promise_is_kept_where_the_swing_just_comes_or_just_fails_to_come(rtol):
     """Releases at which one more flip just comes, found by bisection, and others near them."""
@@ -95,7 +92,7 @@ def test_a_promise_is_kept_where_the_swing_just_comes_or_just_fails_to_come(rtol
         return np.isfinite(start(**columns, phi_start=release, flips=5)[0]).sum(axis=1)
 
     few, many = count(low), count(high)
-    for _ in range(55 if COMPILED else 8):
+    for _ in range(55):
         middle = 0.5 * (low + high)
         same = count(middle) == few
         low, high = np.where(same, middle, low), np.where(same, high, middle)
@@ -106,8 +103,7 @@ def test_a_promise_is_kept_where_the_swing_just_comes_or_just_fails_to_come(rtol
     assert sure.mean() > 0.2
     worst = compare({name: c[sure] for name, c in columns.items()}, times[sure], speeds[sure])
     assert worst.max() < rtol
-    if COMPILED:
-        assert {Status.INACCURATE, Status.GRAZING} <= set(status)
+    assert {Status.INACCURATE, Status.GRAZING} <= set(status)
 
 
 def by_hand(mu, phi0, a, count):
@@ -146,37 +142,6 @@ def test_errors_of_a_thousand_flips_stay_within_what_is_promised(alpha):
     assert tight[0] == Status.INACCURATE
 
 
-@jit
-def _pass_on(i, d, rho, kappa, e, before, wrong, late, time, speed, now_wrong, now_late):
-    scene = Scene(d[i], rho[i], rho[i], 0.0 * d[i], 1.0, kappa[i], e[i], 1.0 - rho[i])
-    flip, _, _ = foliot_start._next(scene, Flip(0.0 * d[i], 0.0 * d[i], before[i], wrong[i], late[i]))
-    time[i], _, speed[i], now_wrong[i], now_late[i] = flip
-
-
-@entry()
-def pass_on(d, rho, kappa, e, before, wrong, late, time, speed, now_wrong, now_late):
-    one_by_one(_pass_on, (d, rho, kappa, e, before, wrong, late, time, speed, now_wrong, now_late))
-
-
-@pytest.mark.parametrize("e", [1.0, 0.6, -0.7])
-@pytest.mark.parametrize(("d", "rho", "kappa"), [(0.3, 0.1, 0.2), (2.0, 0.0, 0.0), (0.0, 0.4, 0.3), (0.05, 0.0, 0.0)])
-def test_an_error_of_the_speed_is_passed_on_as_two_swings_show(d, rho, kappa, e):
-    share, h = 1e-3, 1e-6
-    columns = [np.full(3, x) for x in (d, rho, kappa, e)]
-    before = 1.7 * np.array([1.0, 1.0 + h, 1.0 - h])
-    time, speed, wrong, late = (np.empty(3) for _ in range(4))
-    pass_on(*columns, before, np.full(3, share), np.full(3, 0.25), time, speed, wrong, late)
-    assert wrong[0] == pytest.approx(share * (speed[1] - speed[2]) / (2 * h * speed[0]), rel=1e-6)
-    assert late[0] - 0.25 == pytest.approx(share * abs(time[1] - time[2]) / (2 * h), rel=1e-6)
-
-
-def test_at_strong_drive_forty_flips_are_still_far_from_the_cycle():
-    """At alpha = 1e4 a half swing forgets exp(-2 b), b = (3/alpha)^(1/3) = 0.067: after forty 0.5 % is left."""
-    times, _, _ = start([1e4], [1.0], a=[1.0], flips=[39, 40, 41])
-    cycle, _ = solve(FOLIOT, "closed", [1e4], [1.0], a=[1.0])
-    assert 0.003 < 1 - (times[0, 2] - times[0, 0]) / cycle["period"][0] < 0.006
-
-
 def test_the_flips_come_to_the_limit_cycle_by_its_multiplier():
     cell = {"mu": [1.3], "phi0": [0.9], "a": [0.4], "R": [0.1], "k": [0.2], "e": [0.8]}
     cycle, _ = solve(FOLIOT, "segments", **cell)
@@ -197,13 +162,9 @@ def test_a_clock_that_loses_nothing_swings_ever_wider():
     assert np.allclose(speeds[0], v, rtol=1e-14)
     assert np.allclose(times[0], np.cumsum(np.r_[v[0], v[1:] + v[:-1]]) / 2.0, rtol=1e-14)
     assert status[0] == Status.OK
-    assert checked(FOLIOT_START, [2.0], [0.5])[0] == Status.OK
-
-
-def test_restitution_takes_its_share_at_every_switch():
-    _, speeds, _ = start([1.0], [1.0], e=[-0.6], flips=3)
-    expected = np.sqrt([2.0, 4 + 0.36 * 2, 4 + 0.36 * (4 + 0.36 * 2)])
-    assert np.allclose(speeds[0], expected, rtol=1e-14)
+    assert checked(FOLIOT_START, [2.0], [0.5])[0] == Status.OK  # no cycle is asked for
+    assert checked(FOLIOT_START, [0.0], [0.5])[0] == Status.NEVER_STARTS
+    assert checked(FOLIOT_START, [2.0], [0.5], R=1.0, R_s=0.5)[0] == Status.BAD_INPUT
 
 
 @pytest.mark.parametrize("phi_start", [1.0, 1.5, 30.0])
@@ -212,22 +173,6 @@ def test_above_the_switch_the_torque_has_switched_already(phi_start):
     above, below = start(**scene, phi_start=[phi_start]), start(**scene, phi_start=[-phi_start])
     for one, other in zip(above, below, strict=True):
         assert np.array_equal(one, other, equal_nan=True)
-
-
-def test_just_below_the_switch_the_first_flip_is_at_hand():
-    gap = 2.0**-52
-    times, speeds, status = start([1.0], [1.0], a=[1.0], phi_start=[1 - gap], flips=1)
-    assert times[0, 0] == pytest.approx(np.sqrt(2 * gap), rel=1e-7)
-    assert speeds[0, 0] == pytest.approx(np.sqrt(2 * gap), rel=1e-7)
-    assert status[0] == Status.OK
-    with mp.workdps(40):
-        z = mpf(gap)  # a t + exp(-a t) - 1 = gap
-        t = (2 * z) ** mpf("0.5")
-        for _ in range(50):
-            t -= (t + expm1(-t) - z) / -expm1(-t)
-        assert relative_error(times[0], [t])[0] < 1e-15
-        assert relative_error(speeds[0], [-expm1(-t)])[0] < 1e-15
-        assert abs(log1p(-speeds[0, 0]) + t) < mpf(10) ** -20
 
 
 @pytest.mark.parametrize(
@@ -304,25 +249,6 @@ def test_flips_may_be_asked_for_in_any_order():
 @pytest.mark.parametrize("asked", [[0.0], [1.5], [1.0, NAN], [INF], [-1.0], [2 * FLIP_LIMIT]])
 def test_a_coordinate_that_does_not_count_is_refused(asked):
     assert (start(np.ones(40), np.ones(40), flips=asked)[2] == Status.BAD_INPUT).all()
-
-
-@pytest.mark.parametrize(
-    ("named", "status"),
-    [
-        ({}, Status.OK), ({"mu": 0.0}, Status.NEVER_STARTS), ({"phi_start": -1e300}, Status.OK),
-        ({"R": 2.0}, Status.OK), ({"R": 2.0, "R_s": 1.0}, Status.BAD_INPUT),
-        ({"phi_start": NAN}, Status.BAD_INPUT), ({"phi_start": -INF}, Status.BAD_INPUT),
-        ({"a": NAN}, Status.BAD_INPUT), ({"mu": NAN}, Status.BAD_INPUT), ({"e": -1.0}, Status.BAD_INPUT),
-    ],
-)  # fmt: skip
-def test_what_cannot_run_is_refused_by_name(named, status):
-    cell = {"mu": 1.0, "phi0": 1.0} | named
-    assert (checked(FOLIOT_START, **{name: np.full(40, v) for name, v in cell.items()}) == status).all()
-
-
-def test_what_no_float_can_hold_is_out_of_range():
-    _, _, status = start([1.7e308, 1e-300], [1e-10, 1e300], a=[1e-3, 1.0], phi_start=[-1e308, 0.0])
-    assert (status == Status.OUT_OF_RANGE).all()
 
 
 def test_where_only_a_speed_is_beyond_float64_its_time_is_given():

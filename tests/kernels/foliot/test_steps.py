@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scene_oracles as oracles
-from columns import bounds, checked, solve
+from columns import bounds, solve
 from mpmath import mp, mpf
 
 from kernels.catalogue import get
@@ -77,43 +77,27 @@ def test_the_estimated_error_is_no_smaller_than_the_true_one(method, location):
     assert (error.ravel() <= 1.3 * outputs["error"] + 1e-15).all()
 
 
-def test_the_stated_bound_is_the_estimated_error():
-    outputs, _ = solve(KERNEL, "rk4", [1.0], flips=1.0, step=0.1, phi0=1.0, a=0.5)
-    assert bounds(KERNEL, "rk4", [1.0], flips=1.0, step=0.1, phi0=1.0, a=0.5)[0] == outputs["error"][0] > 0
-
-
-def test_a_grid_that_meets_the_same_points_again_does_not_make_two_runs_believed():
-    cell = {"phi0": 0.09737491865214114, "k": 640.955635182617, "flips": 1.0}  # grazes; halves of the step agree
-    how = {"step": 0.012529584097168095, "location": float(LOCATIONS["linear"])}
-    mu = 31.253343950955195
-    outputs, status = solve(KERNEL, "dopri5", [mu], **cell, **how)
-    k = mpf(cell["k"])
-    off = abs(outputs["time"][0] / float(mp.acos(1 - k * mpf(cell["phi0"]) / mpf(mu)) / mp.sqrt(k)) - 1)
-    assert off > 0.01
-    assert off < outputs["error"][0]
-    assert status[0] == Status.GRAZING
-
-
-def test_a_switch_that_goes_as_the_step_shrinks_is_no_switch():
-    mu, phi0, a, k = 0.001266349113732273, 1.402429638167423, 0.000266272676099387, 0.0017970706542706216
-    cell = {"phi0": phi0, "a": a, "k": k, "flips": 1.0}
-    how = {"step": 53.94530913252986, "location": float(LOCATIONS["hermite"])}  # more energy than there is
-    _, status = solve(KERNEL, "semi_implicit", [mu], **cell, **how)
-    drag, stiffness = mpf(a) / 2, mpf(k)
-    turn = mpf(mu) / stiffness * (1 + mp.exp(-mp.pi * drag / mp.sqrt(stiffness - drag**2)))
-    assert turn < phi0
-    assert status[0] == Status.GRAZING
+BELIEVED = [
+    # grazes, and halves of the step meet the same points again
+    ("dopri5", {"mu": 31.253343950955195, "phi0": 0.09737491865214114, "k": 640.955635182617}, 0.012529584097168095,
+     "linear", {Status.GRAZING}),
+    # turns below the switch, which a step with more energy than there is passes
+    ("semi_implicit", {"mu": 0.001266349113732273, "phi0": 1.402429638167423, "a": 0.000266272676099387,
+                       "k": 0.0017970706542706216}, 53.94530913252986, "hermite", {Status.GRAZING}),
+    # steps of a half and of a quarter are as wrong, by a fifth
+    ("semi_implicit", {"mu": 0.3728952659438824, "R": 0.36853454347820896, "phi0": 167.44256859441495, "flips": 8.0},
+     3.238507460064415, "none", set()),
+    # the run at a finer step does not end
+    ("moreau", {"mu": 1.0, "phi0": 1.0, "R": 0.9, "a": 0.2, "flips": 2.0}, 6e-4, "none", {Status.INACCURATE}),
+]  # fmt: skip
 
 
 @pytest.mark.skipif(not COMPILED, reason="thousands of steps")
-def test_steps_of_a_half_and_a_quarter_that_are_as_wrong_are_not_believed():
-    mu, R, phi0 = 0.3728952659438824, 0.36853454347820896, 167.44256859441495
-    outputs, status = solve(
-        KERNEL, "semi_implicit", [mu], R=R, phi0=phi0, flips=8.0, step=3.238507460064415, location=0.0
-    )
-    off = abs(outputs["period"][0] / float(2 * parabolas(mu, R, phi0, 8)[0][-1]) - 1)
-    assert off > 0.2
-    assert status[0] != Status.OK or off < outputs["error"][0]
+@pytest.mark.parametrize(("method", "cell", "step", "location", "statuses"), BELIEVED)
+def test_where_runs_agree_by_chance_a_status_or_a_large_error_says_so(method, cell, step, location, statuses):
+    values = {"flips": 1.0, "step": step, "location": float(LOCATIONS[location]), **cell}
+    outputs, status = solve(KERNEL, method, **{name: [value] for name, value in values.items()})
+    assert status[0] in statuses or outputs["error"][0] > 0.2, Status(status[0])
 
 
 def test_where_differences_grow_as_the_step_shrinks_nothing_is_promised():
@@ -185,11 +169,6 @@ def test_what_a_cell_comes_to_is_named(cell, method, location, statuses):
         assert np.isfinite([outputs[name][0] for name in ("time", "period", "amplitude")]).all()
 
 
-def test_a_drive_below_the_friction_never_starts():
-    assert checked(KERNEL, [1.0], phi0=1.0, R=1.0, step=0.1)[0] == Status.NEVER_STARTS
-    assert checked(KERNEL, [1.0], phi0=1.0, step=0.1, flips=1.5)[0] == Status.BAD_INPUT
-
-
 @pytest.mark.parametrize("method", ["rk4", "dop853"])
 @pytest.mark.parametrize("excess", [1e-2, 1e-3])
 def test_two_roots_within_a_step_are_both_seen(method, excess):
@@ -200,14 +179,6 @@ def test_two_roots_within_a_step_are_both_seen(method, excess):
     assert status[0] == Status.OK
     assert abs(outputs["time"][0] / float(true) - 1) < 2 * outputs["error"][0] + 1e-14
     assert outputs["error"][0] < 0.01
-
-
-@pytest.mark.skipif(not COMPILED, reason="many steps")
-def test_without_location_a_switch_is_passed_over_and_the_error_tells():
-    k = 2.0 / 1.001
-    outputs, status = solve(KERNEL, "rk4", [1.0], phi0=1.0, k=k, flips=1.0, step=0.21, location=0.0)
-    true = mp.acos(1 - mpf(k)) / mp.sqrt(mpf(k))
-    assert status[0] >= FIRST_REFUSAL or abs(outputs["time"][0] / float(true) - 1) < 2 * outputs["error"][0]
 
 
 @pytest.mark.skipif(not COMPILED, reason="thousands of steps")
@@ -224,12 +195,6 @@ def test_moreau_and_a_located_method_agree_under_dry_friction():
 
 
 @pytest.mark.skipif(not COMPILED, reason="thousands of steps")
-def test_where_the_run_at_a_finer_step_does_not_end_the_error_is_unknown():
-    outputs, status = solve(KERNEL, "moreau", [1.0], phi0=1.0, R=0.9, a=0.2, flips=2.0, step=6e-4)
-    assert status[0] == Status.INACCURATE
-    assert outputs["error"][0] == np.inf
-
-
 def test_a_motion_that_comes_to_rest_in_the_switch_sticks_for_every_method_that_can_tell():
     cell = {"phi0": 1.0, "R": 0.9, "k": 0.5, "flips": 1.0, "step": 0.02}  # the spring stops it before the switch
     for method, location in (("moreau", "none"), ("rk4", "root"), ("dop853", "henon")):

@@ -7,21 +7,16 @@ import impact_oracles as oracles
 import numpy as np
 import pytest
 from columns import bounds, checked, solve
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from mpmath import mp, mpf
 
 from kernels.impact.clock import IMPACT
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.maths.cubic import largest_modulus
 
 NAMES = tuple(f.name for f in IMPACT.outputs)
-METHODS = ("closed", "map")
 WORST = 1.2e-15
 """Of any output; the recoil and the plastic swing come to 1.1e-15."""
 SOME = 60 if COMPILED else 8
-INF, NAN = np.inf, np.nan
 
 
 def pitch(r_c, teeth):
@@ -73,9 +68,9 @@ def truth(*cell, digits=oracles.DIGITS):
     return oracles.plastic_cycle(*cell, digits=digits), True
 
 
-def assert_cycle(method, columns, rtol=1e-13):
-    """The verdicts and values of a method against the oracle; returns the statuses."""
-    outputs, status = solve(IMPACT, method, *columns, rtol=rtol)
+def assert_cycle(columns, rtol=1e-13):
+    """The verdicts and values of the closed form against the oracle; returns the statuses."""
+    outputs, status = solve(IMPACT, "closed", *columns, rtol=rtol)
     truths = [truth(*cell) for cell in zip(*columns, strict=True)]
     exist = np.array([t[1] for t in truths])
     grows = np.array([t[0][4] > 1 for t in truths])
@@ -87,16 +82,14 @@ def assert_cycle(method, columns, rtol=1e-13):
     return status
 
 
-@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(("nu", "seed"), [(0.0, 1), (1.0, 2)])
-def test_the_impact_cycle_its_existence_and_its_multiplier_are_those_of_50_digits(method, nu, seed):
-    status = assert_cycle(method, clocks(seed=seed, nu=nu))
+def test_the_impact_cycle_its_existence_and_its_multiplier_are_those_of_50_digits(nu, seed):
+    status = assert_cycle(clocks(seed=seed, nu=nu))
     assert not COMPILED or set(status) == {Status.OK, Status.UNSTABLE, Status.NO_CYCLE}
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_the_plastic_cycle_is_that_of_50_digits_for_every_escape_height(method):
-    assert (assert_cycle(method, clocks(seed=3, e=0.0)) == Status.OK).all()
+def test_the_plastic_cycle_is_that_of_50_digits_for_every_escape_height():
+    assert (assert_cycle(clocks(seed=3, e=0.0)) == Status.OK).all()
 
 
 def meeting(kappa):
@@ -121,112 +114,69 @@ def meeting(kappa):
 MEETING = [(k, e) for k in (2.0, 6.0, 40.0) for e in meeting(k)]
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_a_multiplier_that_two_roots_share_keeps_its_digits(method):
+def test_a_multiplier_that_two_roots_share_keeps_its_digits():
     shifts = (0.0, 1e-15, -1e-13, 1e-11, -1e-9, 1e-6) if COMPILED else (1e-13,)
     assert len(MEETING) >= 3
     columns = joined(*(cell_of(k, float(e * (1 + mpf(s)))) for k, e in MEETING for s in shifts))
-    status = assert_cycle(method, columns, rtol=1e-13)
+    status = assert_cycle(columns, rtol=1e-13)
     assert (status != Status.NO_CYCLE).mean() > 0.6
 
 
-ROOTS = [
-    (1e-24, 0.5, 0.6),
-    (1e-24, 0.5, -0.4),
-    (-1e-22, 0.3 + 0.4j, 0.3 - 0.4j),
-    (1.0, 1e-20, -1e-21),
-    (0.9, 0.8, -0.7),
-    (3e5, 2e5, 1e-9),
-]
-
-
-def cubic(roots):
-    """The coefficients, as pairs of float64, and the largest modulus of (x - r)(x - s)(x - t) with those."""
-    with mp.workdps(80):
-        r, s, t = (mp.mpmathify(x) for x in roots)
-        pairs = []
-        for a in (-(r + s + t), r * s + s * t + t * r, -r * s * t):
-            high = float(mp.re(a))
-            pairs.append((high, float(mp.re(a) - high)))
-        return pairs, float(max(abs(r), abs(s), abs(t)))
-
-
-@pytest.mark.parametrize("roots", ROOTS)
-def test_the_largest_modulus_of_three_roots_is_right_however_far_they_lie_apart(roots):
-    pairs, true = cubic(roots)
-    modulus, doubt = largest_modulus(*pairs)
-    assert abs(modulus / true - 1) < 4e-16
-    assert doubt < 1e-22
-
-
-def test_where_two_roots_meet_the_largest_modulus_is_in_doubt_by_half_the_digits():
-    pairs, true = cubic((0.75, 0.75, 0.1))
-    modulus, doubt = largest_modulus(*pairs)
-    assert abs(modulus / true - 1) <= doubt
-    assert 1e-16 < doubt < 1e-13
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_a_wheel_that_an_impact_nearly_stops_keeps_the_digits_of_its_speed(method):
+def test_a_wheel_that_an_impact_nearly_stops_keeps_the_digits_of_its_speed():
     """V is proportional to kappa (1 - e) - 2 e; the recoil to its square."""
     e = 0.3 * (1 + np.array([-1e-15, 1e-15, -1e-12, 1e-9, -1e-5, 1e-5]))
     columns = joined(*(cell_of(0.6 / 0.7, float(v)) for v in e))
-    assert (assert_cycle(method, columns) == Status.UNSTABLE).all()
-    speeds = solve(IMPACT, method, *columns)[0]["wheel_speed"]
+    assert (assert_cycle(columns) == Status.UNSTABLE).all()
+    speeds = solve(IMPACT, "closed", *columns)[0]["wheel_speed"]
     assert abs(speeds).min() < 1e-13
 
 
 EDGES = [(2.0, 0.3, 0.0), (30.0, 0.4, 0.0), (1.5, 0.55, 0.0), (0.05, 0.45, 0.0), (3.0, 0.2, 0.5), (0.5, 0.35, -2.8)]
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_the_border_of_existence_is_exact_and_said_to_be_grazing(method):
+def test_the_border_of_existence_is_exact_and_said_to_be_grazing():
     for kappa, e, nu in EDGES if COMPILED else EDGES[:3]:
         border = oracles.highest_escape(*(c[0] for c in cell_of(kappa, e, nu=nu)))
         shifts = (-1e-9, -1e-12, -1e-16, 1e-16, 1e-12, 1e-9)
         columns = joined(*(cell_of(kappa, e, float(border * (1 + mpf(s))), nu) for s in shifts))
-        _, status = solve(IMPACT, method, *columns, rtol=1e-13)
+        _, status = solve(IMPACT, "closed", *columns, rtol=1e-13)
         there = Status.UNSTABLE if status[0] == Status.UNSTABLE else Status.OK
         middle = Status.GRAZING if there == Status.OK else Status.UNSTABLE
         assert status.tolist() == [there] * 2 + [middle] * 2 + [Status.NO_CYCLE] * 2, (kappa, e, nu)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_the_border_where_the_tooth_turns_before_it_meets_the_pallet_again_is_exact(method):
+def test_the_border_where_the_tooth_turns_before_it_meets_the_pallet_again_is_exact():
     """There 1/(2 q) = 1 - e with q = (1 + e)/(1 + kappa), whatever the escape height: e^2 = (1 - kappa)/2."""
     border = mp.sqrt((1 - mpf(0.375)) / 2)
     columns = joined(*(cell_of(0.375, float(border * (1 + mpf(s))), 0.22) for s in (-1e-9, -1e-12, 1e-12, 1e-9)))
-    assert assert_cycle(method, columns).tolist() == [Status.UNSTABLE] * 2 + [Status.NO_CYCLE] * 2
+    assert assert_cycle(columns).tolist() == [Status.UNSTABLE] * 2 + [Status.NO_CYCLE] * 2
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_a_flat_lever_is_stable_just_for_a_wheel_heavier_than_the_pallets(method):
+def test_a_flat_lever_is_stable_just_for_a_wheel_heavier_than_the_pallets():
     kappa = 1 + np.array([-1e-6, -1e-12, 0.0, 1e-12, 1e-6])
     columns = joined(*(cell_of(k, 0.4) for k in kappa))
     columns[1], columns[2], columns[3], columns[4] = kappa, np.ones(5), np.full(5, 1.5), np.full(5, 1.5)
-    outputs, status = solve(IMPACT, method, *columns)
+    outputs, status = solve(IMPACT, "closed", *columns)
     expected = [Status.UNSTABLE] * 2 + [Status.GRAZING] + [Status.OK] * 2
     assert status.tolist() == expected
     assert outputs["multiplier"][2] == 1.0
     assert (np.sign(outputs["multiplier"] - 1) == [1, 1, 0, -1, -1]).all()
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_a_lever_that_shrinks_as_the_pallet_is_pushed_makes_a_heavy_foliot_stable(method):
+def test_a_lever_that_shrinks_as_the_pallet_is_pushed_makes_a_heavy_foliot_stable():
     kappa, e = 0.5, 0.35
     first = -4 * (1 + kappa) / (kappa * (1 - kappa))
     last = -4 * (1 + e) ** 2 / ((1 - e) ** 2 * kappa + 2 * (1 + e * e))
     nu = np.array([last * (1 - 1e-9), last * (1 + 1e-9), 0.5 * (last + max(first, -4.0))])
     columns = joined(*(cell_of(kappa, e, 0.0, v) for v in nu))
-    assert assert_cycle(method, columns).tolist() == [Status.UNSTABLE, Status.OK, Status.OK]
+    assert assert_cycle(columns).tolist() == [Status.UNSTABLE, Status.OK, Status.OK]
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_the_loss_of_each_impact_is_the_work_of_the_torque_over_half_a_pitch(method):
+def test_the_loss_of_each_impact_is_the_work_of_the_torque_over_half_a_pitch():
     columns = clocks(SOME, seed=5, kappa=(-1, 2), e=0.3, units=3.0)
     columns[6][:] = 0.0
     torque, I_c, I_v, r_c, r_v, teeth = columns[:6]
-    outputs, status = solve(IMPACT, method, *columns)
+    outputs, status = solve(IMPACT, "closed", *columns)
     there = status != Status.NO_CYCLE
     apart = outputs["pallet_speed"] * r_v - outputs["wheel_speed"] * r_c
     M, m = I_c / r_c**2, I_v / r_v**2
@@ -237,59 +187,22 @@ def test_the_loss_of_each_impact_is_the_work_of_the_torque_over_half_a_pitch(met
     assert there.sum() > len(there) / 4
 
 
-@given(st.floats(-2, 4), st.floats(0, 0.8), st.floats(0, 0.24), st.integers(-150, 150))
-@settings(deadline=None)
-def test_the_period_falls_as_the_root_of_the_torque_and_the_swing_knows_no_torque(log_kappa, e, h, power):
-    cells = joined(*[cell_of(10.0**log_kappa, e, h)] * 2)
-    cells[0] = cells[0] * np.array([1.0, 4.0**power])
-    outputs, status = solve(IMPACT, "closed", *cells)
-    assert status[0] == status[1]
-    for name, factor in zip(NAMES, (0.5**power, 1.0, 2.0**power, 2.0**power, 1, 1, 1, 1, 1), strict=True):
-        assert outputs[name][1] == outputs[name][0] * factor, name
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_the_exponent_of_the_torque_is_exact_over_24_decades(method):
-    n = 49 if COMPILED else 5
-    torque = 10 ** np.linspace(-12, 12, n)
-    columns = joined(*[cell_of(3.0, 0.2, 0.01)] * n)
-    columns[0] = torque
-    outputs, _ = solve(IMPACT, method, *columns)
-    steady = outputs["period"] * np.sqrt(torque)
-    assert abs(steady / steady[0] - 1).max() < 1e-15
-    assert (outputs["swing"] == outputs["swing"][0]).all()
-
-
-@given(st.floats(-3, 5), st.floats(0.875, 1, exclude_max=True), st.floats(0, 0.24), st.floats(-20, 20))
-@settings(deadline=None)
-def test_no_impact_cycle_keeps_more_than_seven_eighths_of_the_speed(log_kappa, e, h, nu):
-    _, status = solve(IMPACT, "closed", *cell_of(10.0**log_kappa, e, h, nu))
-    assert status[0] == Status.NO_CYCLE
-
-
 QUARTERS = [(0.03, 31), (0.1, 3), (1 / 3, 101), (0.0127, 15)]
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_an_escape_height_of_a_quarter_pitch_is_the_clock_without_drop_however_it_was_rounded(method):
+def test_an_escape_height_of_a_quarter_pitch_is_the_clock_without_drop_however_it_was_rounded():
     for r_c, teeth in QUARTERS:
         h = 2 * np.pi * r_c / teeth / 4
         heights = np.array([np.nextafter(h, 0), h, np.nextafter(h, 1), h * (1 + 4e-15), h * (1 - 4e-15)])
         columns = [np.full(5, v) for v in (1e-3, 1e-5, 3e-5, r_c, 0.02, float(teeth))] + [heights]
         assert checked(IMPACT, *columns, e=0.0).tolist() == [0, 0, 0, Status.NEVER_MEETS, 0]
         assert checked(IMPACT, *columns, e=0.1).tolist() == [Status.NEVER_MEETS] * 4 + [0]
-        outputs, status = solve(IMPACT, method, *columns, e=0.0)
+        outputs, status = solve(IMPACT, "closed", *columns, e=0.0)
         assert (status[:3] == Status.OK).all()
         assert (outputs["contact_share"][:3] == 1).all()
         kappa = 1e-5 * 0.02**2 / (3e-5 * r_c**2)
         half = 2 / kappa * np.sqrt(h * (1 + kappa) * 1e-5 / (1e-3 * r_c))  # g = torque r_c/I_c
         np.testing.assert_allclose(outputs["period"][:3], 2 * half, rtol=3e-15)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_a_bent_lever_with_plastic_impacts_has_no_closed_cycle(method):
-    _, status = solve(IMPACT, method, *cell_of(2.0, 0.0, 0.1, 0.3))
-    assert status[0] == Status.NO_METHOD
 
 
 WIDE = [
@@ -322,18 +235,6 @@ def test_over_the_range_of_float64_a_cell_is_right_or_refused():
             assert max(errors({k: v[i : i + 1] for k, v in outputs.items()}, [values]).values()) < WORST, WIDE[i]
 
 
-def test_the_map_says_where_its_32_digits_end():
-    columns = wide()
-    outputs, status = solve(IMPACT, "map", *columns)
-    assert set(status) <= {Status.NO_METHOD, Status.NO_CYCLE, Status.OK}
-    exact, verdict = solve(IMPACT, "closed", *columns)
-    for name in NAMES:
-        same = status == Status.OK
-        np.testing.assert_allclose(outputs[name][same], exact[name][same], rtol=2 * WORST)
-    assert (verdict[status != Status.NO_METHOD] == status[status != Status.NO_METHOD]).all()
-    assert (status == Status.NO_METHOD).sum() == 11
-
-
 def test_results_that_no_float64_can_hold_are_out_of_range():
     columns = joined(*[cell_of(2.0, 0.2)] * 6)
     for column, values in (
@@ -352,30 +253,47 @@ def test_results_that_no_float64_can_hold_are_out_of_range():
     np.testing.assert_allclose(outputs["period"][0], outputs["period"][1] * 1e150, rtol=1e-14)
 
 
+@pytest.mark.parametrize("method", ["closed", "events"] if COMPILED else ["closed"])
+@pytest.mark.parametrize("clock", [(4.0, 0.2, 0.05), (2.0, 0.0, 0.1)])
+def test_the_period_goes_as_torque_to_minus_one_half_and_the_swing_knows_no_torque(method, clock):
+    n = 49 if COMPILED else 5
+    columns = joined(*[cell_of(*clock)] * n)
+    columns[0] = 10 ** np.linspace(-12, 12, n)
+    outputs, status = solve(IMPACT, method, *columns)
+    steady = outputs["period"] * np.sqrt(columns[0])
+    assert (status == Status.OK).all()
+    assert abs(steady / steady[0] - 1).max() < 1e-14
+    assert abs(outputs["swing"] / outputs["swing"][0] - 1).max() < 1e-14
+
+
+def test_no_impact_cycle_keeps_more_than_seven_eighths_of_the_speed():
+    random, n = np.random.default_rng(9), 10_000 if COMPILED else 20
+    bent = clocks(n, seed=9, kappa=(-3, 5), e=random.uniform(0.875, 1.0 - 2.0**-53, n), nu=1.0)
+    assert (solve(IMPACT, "closed", *bent)[1] == Status.NO_CYCLE).all()
+
+
 GOOD = (1.0, 1.0, 1.0, 1.0, 1.0, 3.0, 0.1, 0.2, 0.0)
 
 
-def with_value(place, value):
-    return (*GOOD[:place], value, *GOOD[place + 1 :])
+@pytest.mark.parametrize(
+    ("place", "value", "status"),
+    [
+        (0, 0.0, Status.NEVER_STARTS),
+        (6, 0.53, Status.NEVER_MEETS),
+        (6, 1e308, Status.NEVER_MEETS),
+        (5, 4.0, Status.BAD_INPUT),
+        (5, 30.0, Status.BAD_INPUT),
+        (5, 13.0, Status.OK),
+        (7, 0.9999999999999999, Status.OK),
+    ],
+)
+def test_what_cannot_run_is_refused_by_name(place, value, status):
+    assert checked(IMPACT, *([v] for v in (*GOOD[:place], value, *GOOD[place + 1 :])))[0] == status
 
 
-def test_what_cannot_run_is_refused_by_name():
-    cells = [(GOOD, Status.OK), (with_value(0, 0.0), Status.NEVER_STARTS), (with_value(6, 0.53), Status.NEVER_MEETS)]
-    cells += [(with_value(k, x), Status.BAD_INPUT) for k in range(9) for x in (NAN, INF, -INF)]
-    cells += [(with_value(k, -0.1), Status.BAD_INPUT) for k in range(8)]
-    cells += [(with_value(k, 0.0), Status.BAD_INPUT) for k in range(1, 6)]
-    cells += [(with_value(5, x), Status.BAD_INPUT) for x in (1.0, 2.0, 4.0, 3.5, 30.0, 2.0**31, 1e300)]
-    cells += [(with_value(5, x), Status.OK) for x in (3.0, 5.0, 13.0)]
-    cells += [(with_value(7, x), Status.BAD_INPUT) for x in (1.0, 1.5)]
-    cells += [(with_value(7, 0.9999999999999999), Status.OK), (with_value(6, 1e308), Status.NEVER_MEETS)]
-    found = checked(IMPACT, *(np.array(c) for c in zip(*(cell for cell, _ in cells), strict=True)))
-    assert found.tolist() == [status for _, status in cells]
-
-
-def test_the_closed_form_promises_what_it_keeps():
+def test_the_closed_form_promises_what_it_keeps_and_knows_no_bent_lever_with_plastic_impacts():
     assert (bounds(IMPACT, "closed", *clocks(40)) == 2e-15).all()
     assert WORST < 2e-15
-    for method in METHODS:
-        for rtol, verdict in ((2e-15, Status.OK), (1e-15, Status.INACCURATE)):
-            _, status = solve(IMPACT, method, *cell_of(2.0, 0.2), rtol=rtol)
-            assert status[0] == verdict
+    for rtol, verdict in ((2e-15, Status.OK), (1e-15, Status.INACCURATE)):
+        assert solve(IMPACT, "closed", *cell_of(2.0, 0.2), rtol=rtol)[1][0] == verdict
+    assert solve(IMPACT, "closed", *cell_of(2.0, 0.0, 0.1, 0.3))[1][0] == Status.NO_METHOD

@@ -53,48 +53,6 @@ def truth(w, t):
     return np.array([c, -w * s, c, -w * s, -t * s, -s - w * t * c])
 
 
-ROWS = (
-    (),
-    (1 / 5,),
-    (3 / 40, 9 / 40),
-    (44 / 45, -56 / 15, 32 / 9),
-    (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729),
-    (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
-    (35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
-)
-FOURTH = (5179 / 57600, 0, 7571 / 16695, 393 / 640, -92097 / 339200, 187 / 2100, 1 / 40)
-
-
-def by_the_table(state, w, h):
-    """Fifth-order result and its difference from the fourth, by Dormand and Prince's table for first-order systems."""
-
-    def rates(y):
-        x, v, x1, v1, x2, v2 = y
-        return np.array([v, -w * w * x, v1, -w * w * x1, v2, -w * w * x2 - 2 * w * x])
-
-    stages, point = [], np.array(state)
-    for row in ROWS:
-        point = np.array(state) + h * sum((a * k for a, k in zip(row, stages, strict=True)), np.zeros(6))
-        stages.append(rates(point))
-    fourth = np.array(state) + h * sum(b * k for b, k in zip(FOURTH, stages, strict=True))
-    return point, np.abs(point - fourth)
-
-
-@jit_entry
-def one_step(state, w, h, scale):
-    return dopri5_step(oscillation, state, (w,), h, scale)[:2]
-
-
-def test_a_step_and_the_error_of_each_component_are_those_of_the_table():
-    start = (1.0, 0.3, -0.7, 0.2, 0.5, -0.4)
-    result, error = by_the_table(start, 1.3, 0.5)
-    for i in range(6):
-        scale = tuple(1.0 if i == j else 1e300 for j in range(6))
-        state, found = one_step(start, 1.3, 0.5, scale)
-        assert state == pytest.approx(result, rel=1e-14)
-        assert found == pytest.approx(error[i], rel=1e-8), i
-
-
 def test_error_falls_as_the_fifth_power_of_the_step():
     worst = [np.abs(np.array(march(1.3, 2.0, n)[0]) - truth(1.3, 2.0)) for n in (16, 32)]
     order = np.log2(worst[0] / worst[1])

@@ -4,13 +4,10 @@ import json
 import os
 import pickle
 import shutil
-import signal
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +16,6 @@ from numba import float64
 from numba.core.errors import TypingError
 
 from kernels.catalogue import KERNELS
-from kernels.lanes import cache
 from kernels.lanes.cache import FOLDER
 from kernels.lanes.columns import entry
 from kernels.lanes.jit import COMPILED, jit
@@ -39,15 +35,20 @@ print(status[0], sum(FOLIOT.check.compiled.stats.cache_hits.values()), _cache.FO
 """
 
 
-def run(code, cache, **more):
-    """Status of a good cell, cache hits and folder, in a fresh interpreter."""
+def said(code, cache, **more):
+    """What a fresh interpreter prints, and what it says on stderr."""
     env = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
     env |= {"XDG_CACHE_HOME": str(cache), **more}
     done = subprocess.run(
         [sys.executable, "-c", code], env=env, capture_output=True, text=True, cwd=more.get("PWD", ROOT)
     )
     assert done.returncode == 0, done.stderr
-    return done.stdout.split()
+    return done.stdout.split(), done.stderr
+
+
+def run(code, cache, **more):
+    """Status of a good cell, cache hits and folder, in a fresh interpreter."""
+    return said(code, cache, **more)[0]
 
 
 @pytest.fixture(scope="module")
@@ -73,55 +74,6 @@ def test_of_two_processes_at_a_time_one_compiles_and_the_other_waits(tmp_path):
     words = {"env": env, "cwd": ROOT, "stdout": subprocess.PIPE, "text": True}
     both = [subprocess.Popen([sys.executable, "-c", PERIOD], **words) for _ in range(2)]
     assert sorted(process.communicate()[0].split()[:2] for process in both) == [["0", "0"], ["0", "1"]]
-
-
-def test_a_process_that_stands_still_is_not_waited_for_without_end(tmp_path, monkeypatch):
-    monkeypatch.setattr(cache, "MOST_COMPILE_SECONDS", 0.1)
-    with (tmp_path / "lock").open("wb") as held, (tmp_path / "lock").open("wb") as waiting:
-        cache._lock(held)
-        begun = time.monotonic()
-        cache._lock(waiting)
-        assert 0.1 <= time.monotonic() - begun < 10
-
-
-def lockable(tmp_path):
-    """A stand-in for the cache of a function whose files are in a folder."""
-    return SimpleNamespace(_cache_file=SimpleNamespace(_index_path=str(tmp_path / "f.nbi")))
-
-
-def test_where_there_are_no_locks_each_process_compiles_for_itself(tmp_path, monkeypatch):
-    """Windows has no fcntl."""
-    code = "import sys; sys.modules['fcntl'] = None; from kernels.lanes import cache; print(cache.fcntl)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "None\n"
-    monkeypatch.setattr(cache, "fcntl", None)
-    with cache._Cache.alone(lockable(tmp_path)):
-        assert not list(tmp_path.iterdir())
-
-
-def test_a_lock_ends_with_the_compiling_although_a_process_was_forked_meanwhile(tmp_path, monkeypatch):
-    """The fork has the file open for as long as it lives."""
-    monkeypatch.setattr(cache, "MOST_COMPILE_SECONDS", 5)
-    with cache._Cache.alone(lockable(tmp_path)):
-        child = os.fork()
-        if child == 0:
-            time.sleep(60)
-            os._exit(0)
-    try:
-        with (tmp_path / "f.nbi.lock").open("wb") as file:
-            assert cache._lock(file)
-    finally:
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-
-
-def test_where_nothing_can_be_kept_processes_compile_side_by_side(tmp_path, monkeypatch):
-    monkeypatch.setattr(cache, "MOST_COMPILE_SECONDS", 5)
-    with (tmp_path / "f.nbi.lock").open("wb") as held:
-        cache._lock(held)
-        threading.Timer(0.2, held.close).start()
-        with cache._Cache.alone(lockable(tmp_path)), (tmp_path / "f.nbi.lock").open("wb") as third:
-            assert cache._lock(third)
 
 
 def test_a_damaged_cache_is_compiled_again_and_mended(filled):
@@ -224,23 +176,15 @@ def test_a_second_process_compiles_nothing_of_any_kernel_and_method(name, compil
     assert compiled_again[name] == []
 
 
-def hits_and_errors(cache, **more):
-    """As `run`, with what is said on stderr."""
-    env = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"} | {"XDG_CACHE_HOME": str(cache), **more}
-    done = subprocess.run([sys.executable, "-c", PERIOD], env=env, capture_output=True, text=True, cwd=ROOT)
-    return done.stdout.split(), done.stderr
-
-
 @pytest.mark.parametrize("others", [0o020, 0o002])
 @pytest.mark.parametrize("which", ["foliot", "foliot/*"])
 def test_a_folder_that_others_may_write_to_is_not_used(filled, which, others):
     (folder,) = filled.glob(which)
     folder.chmod(0o700 | others)
-    (status, hits, used), said = hits_and_errors(filled)
+    (status, hits, used), told = said(PERIOD, filled)
     assert (status, hits, used) == ("0", "0", "None")
-    assert said.splitlines() == [
-        f"foliot compiles without {folder}: it belongs to somebody else, or others may write to it"
-    ]
+    assert str(folder) in told
+    assert len(told.splitlines()) == 1
 
 
 @pytest.mark.parametrize("kind", ["*.nbi", "*.nbc"])
@@ -248,9 +192,9 @@ def test_a_file_that_others_may_write_to_is_not_read(filled, kind):
     (path,) = filled.rglob(kind)
     path.write_bytes(pickle.dumps(Trap(filled / "sprung")))
     path.chmod(0o620)
-    (status, hits, _), said = hits_and_errors(filled)
+    (status, hits, _), told = said(PERIOD, filled)
     assert (status, hits) == ("0", "0")
-    assert str(path) in said
+    assert str(path) in told
     assert not (filled / "sprung").exists()
     assert run(PERIOD, filled)[:2] == ["0", "1"]
 
@@ -274,9 +218,9 @@ def test_a_folder_of_somebody_else_is_not_used(tmp_path, link):
     else:
         (tmp_path / "foliot").mkdir(mode=0o700)
     os.chown(tmp_path / "foliot", 65534, 65534, follow_symlinks=False)
-    (status, _, used), said = hits_and_errors(tmp_path)
+    (status, _, used), told = said(PERIOD, tmp_path)
     assert (status, used) == ("0", "None")
-    assert "belongs to somebody else" in said
+    assert str(tmp_path / "foliot") in told
 
 
 def test_what_is_kept_is_the_users_alone_whatever_the_umask(scene_kept):

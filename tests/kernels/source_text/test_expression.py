@@ -8,7 +8,6 @@ from mpmath import mp
 
 from kernels.lanes.vectors import dot, fma, magnitude, where
 from kernels.source_text import expression as E
-from kernels.source_text.rounding import Sizes
 from kernels.source_text.series import Lines
 from kernels.source_text.tangent import Tangents
 
@@ -69,49 +68,6 @@ def test_recurrences_give_the_taylor_coefficients_of_every_operation(name):
         assert abs(found - true) < 3e-14 * max(1, abs(true)), k
 
 
-def test_constants_enter_a_recurrence_by_name():
-    found = coefficients(lambda u, n, c: c * E.power(u, n), n=2.4, c=3.0)
-    true = true_coefficients(lambda u: 3 * u ** mp.mpf(2.4))
-    assert max(abs(f - t) for f, t in zip(found, true, strict=True)) < 3e-14
-
-
-def test_what_is_written_twice_is_computed_once():
-    graph = E.Graph()
-    u, c = graph.series("u"), graph.constant("c")
-    assert E.sqrt(u * c + 1.0) is E.sqrt(1.0 + c * u)
-    assert c * u * abs(u) is (u * c) * abs(u)
-    assert abs(2.0 * u) is not abs(u)
-    assert len(graph.kinks) == 1
-
-
-def test_a_kink_at_every_series_within_abs_or_sign():
-    graph = E.Graph()
-    u, w = graph.series("u"), graph.series("w")
-    _ = abs(u) + E.sign(u) * abs(w - 1.0) - abs(graph.constant("c"))
-    assert [k.kind for k in graph.kinks] == ["input", "add"]
-
-
-@pytest.mark.parametrize(
-    ("function", "says"),
-    [
-        (lambda u: u if u > 0.0 else -u, "compare"),
-        (lambda u: u or 1.0, "branch"),
-        (lambda u: math.sin(u), "kernels.scene"),
-        (lambda u: u**u, "exponent"),
-        (lambda u: u + "1", "expected a number"),
-    ],
-)
-def test_what_cannot_be_recorded_is_refused_with_a_reason(function, says):
-    with pytest.raises(E.SceneError, match=says):
-        function(E.Graph().series("u"))
-
-
-def test_functions_of_plain_numbers_are_plain():
-    assert E.sqrt(4.0) == 2.0
-    assert E.power(2.0, 3) == 8.0
-    assert [E.sign(x) for x in (-2.0, 0.0, 3.0)] == [-1.0, 0.0, 1.0]
-
-
 def test_a_power_of_abs_keeps_its_constant_apart_and_its_series_is_that_of_both_signs():
     graph = E.Graph()
     u, n = graph.series("u"), graph.constant("n")
@@ -157,13 +113,3 @@ def test_a_power_of_abs_has_the_derivative_of_both_its_sides():
     scope = {**PLAIN, "u": -0.7, "delta": 0.3}
     exec("\n".join(lines.text) + f"\nresult = {value}", scope)
     assert scope["result"] == pytest.approx(-1.5 * 0.7**0.5 * 0.3, rel=1e-14)
-
-
-def test_the_size_of_a_sum_is_that_of_its_terms_and_of_a_function_also_what_its_argument_moves():
-    graph = E.Graph()
-    u = graph.series("u")
-    sizes = Sizes({"u": "u"})
-    found = [sizes.of(x) for x in (2.0 - 5.0 * u, (2.0 - 5.0 * u) * u, E.exp(2.0 - 5.0 * u))]
-    scope = {**PLAIN, "u": 0.4}
-    exec("\n".join(sizes.lines.text) + f"\nresult = [{', '.join(found)}]", scope)
-    assert scope["result"] == pytest.approx([4.0, 1.6, 5.0])

@@ -7,7 +7,6 @@ from mpmath import mp, mpf
 
 from kernels.interface import FIRST_REFUSAL, Field, Status
 from kernels.lanes.jit import COMPILED
-from kernels.maths import intervals
 from kernels.scene import exp, power, scene_kernel, sin, sqrt
 from kernels.stepping import stepped_kernel
 
@@ -155,20 +154,3 @@ def test_a_start_that_rounding_puts_on_the_switch_is_not_quiet(method):
     if COMPILED:
         assert status[0] == Status.OK
         assert outputs["time"][0] == pytest.approx(10.0, rel=1e-12)
-
-
-def test_intervals_hold_what_they_enclose():
-    random = np.random.default_rng(1)
-    for _ in range(200):
-        u, w = np.sort(random.normal(size=(2, 2)))
-        x, y = (random.uniform(*side) for side in (u, w))
-        e, f = abs(u), random.uniform(*np.sort(abs(u)))
-        e.sort()
-        cases = [
-            (intervals.added(u, w), x + y), (intervals.multiplied(u, w), x * y), (intervals.over(w), 1 / y),
-            (intervals.half_squared(u), x * x / 2), (intervals.of_exp(u), np.exp(x)),
-            (intervals.of_wave(np.sin(u[0]), u), np.sin(x)), (intervals.of_sqrt(e), np.sqrt(f)),
-            (intervals.of_log(e), np.log(f)), (intervals.of_power(e, -1.5), f**-1.5),
-        ]  # fmt: skip
-        for (low, high), value in cases:
-            assert low - 1e-14 * abs(low) <= value <= high + 1e-14 * abs(high)

@@ -8,18 +8,16 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import numba
 import pytest
 import toy
-from numba.core import event
 from toy_studies import build
 
 import sweep
 from sweep.cells import compiling
-from sweep.cells.compiling import Compiling, WorkClock, work_clock
-from sweep.explore.plan import Plan, plan
+from sweep.cells.compiling import work_clock
+from sweep.explore.plan import plan
 
 ROOT = Path(__file__).parents[3]
 STUDY = 'kernel = "foliot"\nmethod = "closed"\n[axes]\nmu = [1.0, 2.0]\n[fixed]\na = 1.0\nphi0 = 1.0\n'
@@ -65,13 +63,6 @@ def test_compiling_is_told_with_the_name_of_the_method_while_it_lasts(table):
     assert "compiling toy:KERNEL.exact ... (about 0.2 s when last done)" in log.getvalue()
 
 
-def test_of_what_is_compiled_in_a_moment_nothing_is_told(table):
-    log = io.StringIO()
-    sweep.run(slow_to_compile(0.0), progress=log)
-    assert log.getvalue() == ""
-    assert not table.exists()
-
-
 @pytest.mark.parametrize("damage", ["", "[]", '{"toy:KERNEL.exact": "long"}', '{"toy:KERNEL.exact": -1}', "\xff"])
 def test_a_damaged_table_is_as_good_as_none(table, damage):
     table.write_text(damage, "latin-1")
@@ -88,19 +79,6 @@ def test_a_plan_tells_what_compiling_took(table):
     assert "  compile   about 0." in str(found)
     assert plan(slow_to_compile(0.0)).compile_seconds == 0
     assert "compile " not in str(plan(slow_to_compile(0.0)))
-
-
-@pytest.mark.parametrize(
-    ("kernel", "folder", "text"),
-    [
-        ("foliot", Path(), "about 3.0 s just now; the machine code is kept"),
-        ("foliot", None, "about 3.0 s of it, before the first cell"),
-        ("my:KERNEL", Path(), "about 3.0 s of it, before the first cell"),
-    ],
-)
-def test_a_plan_says_whether_the_run_compiles_again(monkeypatch, kernel, folder, text):
-    monkeypatch.setattr("sweep.explore.plan.machine_code_folder", lambda: folder)
-    assert Plan._compile_text(SimpleNamespace(kernel=kernel, compile_seconds=3.0)) == text
 
 
 def test_a_kernel_of_ours_is_told_once_and_then_kept(tmp_path):
@@ -121,13 +99,6 @@ def test_a_kernel_of_ours_is_told_once_and_then_kept(tmp_path):
     assert "foliot.closed" in json.loads((tmp_path / "foliot" / compiling.TABLE).read_text())
 
 
-def test_values_and_names_are_those_of_the_kernel_that_is_watched():
-    watched = Compiling(toy.KERNEL, "toy:KERNEL").kernel
-    assert watched.check.__name__ == toy.KERNEL.check.__name__
-    assert [m.name for m in watched.methods] == [m.name for m in toy.KERNEL.methods]
-    assert [m.bound is None for m in watched.methods] == [m.bound is None for m in toy.KERNEL.methods]
-
-
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="plain Python compiles nothing")
 def test_what_numba_compiles_is_no_work():
     """Nor what is compiled for it; the clock goes on afterwards."""
@@ -140,18 +111,3 @@ def test_what_numba_compiles_is_no_work():
     worked = work_clock()
     time.sleep(0.01)
     assert work_clock() - worked >= 0.01
-
-
-def test_the_clock_stands_still_while_another_thread_compiles_and_never_runs_back():
-    clock, kind = WorkClock(), "numba:compiler_lock"
-    clock.watch()
-    event.end_event(kind)  # of what began before
-    event.start_event(kind)
-    before = clock()
-    time.sleep(0.01)
-    assert clock() == before
-    event.end_event(kind)
-    after = clock()
-    assert before <= after < before + 0.01
-    time.sleep(0.01)
-    assert clock() >= after + 0.01

@@ -9,8 +9,6 @@ from toy_studies import build, message_of
 import sweep
 from kernels.interface import Status
 from sweep.cells.fingerprint import fingerprint
-from sweep.cells.grid import Grid
-from sweep.cells.sample import MOST_ASKED, MOST_TRIED, require_asked
 from sweep.results.statuses import account
 from sweep.show.text import result_text
 
@@ -42,52 +40,6 @@ def test_a_condition_that_holds_nowhere_is_told_before_anything_is_run(tmp_path)
         with pytest.raises(sweep.SweepError, match='where = "height > 4": holds for none of the 12 cells'):
             function(study, *path)
     assert not list(tmp_path.iterdir())
-
-
-def test_the_last_of_many_cells_is_one_that_is_asked_for():
-    height = {"spacing": "linear", "start": 1.0, "stop": 2.0, "num": 3 * MOST_TRIED + 1}
-    study = build(axes={"height": height}, where="height == 2", outputs=["fall_time"], method="exact")
-    assert sweep.run(study).status.values[-2:].tolist() == [Status.NOT_ASKED, Status.OK]
-
-
-AXIS = {"spacing": "linear", "start": 1.0, "stop": 2.0, "num": 1000}
-
-
-@pytest.fixture
-def looked(monkeypatch):
-    """Numbers of cells that a condition is tried on."""
-    found, asked = [], Grid.asked
-    monkeypatch.setattr(Grid, "asked", lambda grid, cells: found.append(len(cells)) or asked(grid, cells))
-    return found
-
-
-@pytest.mark.parametrize(("where", "cells"), [("height > 2", 1000), ("height*v0 > 4", 10**6), ("g < 0", 1)])
-def test_only_axes_that_a_condition_names_are_looked_at(where, cells, looked):
-    study = build(axes={"height": AXIS, "v0": AXIS}, where=where)
-    with pytest.raises(sweep.SweepError, match="holds for none of the 1000000 cells"):
-        require_asked(study)
-    assert sum(looked) == cells
-
-
-@pytest.mark.parametrize(("where", "cells"), [("height*v0*g > 8", MOST_ASKED), ("height*v0*g > 7", MOST_TRIED)])
-def test_cells_too_many_to_be_looked_at_are_not_refused(where, cells, looked):
-    require_asked(build(axes={"height": AXIS, "v0": AXIS, "g": AXIS}, where=where))
-    assert 0.9 * cells < sum(looked) <= cells
-
-
-def test_they_are_not_computed():
-    calls = []
-
-    def counting(*columns, **named):
-        calls.append(len(columns[0]))
-        return exact(*columns, **named)
-
-    study = build(axes={"height": [1.0, 2.0, 3.0, 4.0]}, method="exact", where="height > 3")
-    exact = study.kernel.method("exact").solve
-    methods = tuple(replace(m, solve=counting) if m.name == "exact" else m for m in study.kernel.methods)
-    sweep.run(replace(study, kernel=replace(study.kernel, methods=methods)), block_cells=4)
-    assert calls
-    assert max(calls) == 1
 
 
 @pytest.mark.parametrize(

@@ -160,3 +160,49 @@ def test_the_digest_of_the_study_is_told_only_where_nothing_else_differs():
     assert difference({"study": "1"}, {"study": "2"}) == ["study: changed"]
     told = difference({"source a": "1", "source b": "2"}, {"source b": "3", "source c": "4"})
     assert told == ["source b: changed", "source c: new", "source a: gone"]
+
+
+def test_a_fixed_array_counts_whole():
+    masses = np.arange(1.0, 3001.0)
+    other = masses.copy()
+    other[1500] += 1.0
+    keys = {"kernel": "beads:KERNEL", "outputs": ["total"], "axes": {"g": [1.0]}}
+    one, two = (fingerprint(build(**keys, fixed={"mass": values})) for values in (masses, other))
+    assert one["study"] != two["study"]
+
+
+OF_MINE = """
+from dataclasses import replace
+import toy
+
+FACTOR = 1.0
+EXACT = toy.KERNEL.method("exact")
+
+def solve(*columns):
+    EXACT.solve(*columns)
+    columns[-4][...] *= FACTOR
+
+KERNEL = replace(toy.KERNEL, methods=(replace(EXACT, solve=solve, bound=None),))
+"""
+
+
+def test_cells_of_another_version_are_taken_over_where_a_sample_of_them_has_the_same_bits(tmp_path, monkeypatch):
+    """Another version has another source text; whether its numbers are the same, a sample of cells tells."""
+    (tmp_path / "edited_scene.py").write_text(OF_MINE)
+    monkeypatch.syspath_prepend(tmp_path)
+    output = tmp_path / "out.h5"
+
+    def run(heights, **options):
+        study = build(kernel="edited_scene:KERNEL", axes={"height": heights})
+        return sweep.run(study, output, progress=False, **options)
+
+    run([1.0, 2.0]).close()
+    (tmp_path / "edited_scene.py").write_text(OF_MINE + "# edited\n")
+    with run([1.0, 1.5, 2.0], extend=True) as found:
+        assert found.attrs["taken_over"].startswith("2 cells of another version")
+    (tmp_path / "edited_scene.py").write_text(OF_MINE + "# edited again\n")
+    monkeypatch.setattr(sys.modules["edited_scene"], "FACTOR", 1.0 + 1e-15)
+    before = output.read_bytes()
+    with pytest.raises(sweep.SweepError, match="cannot be extended"):
+        run([1.0, 1.5, 2.0, 3.0], extend=True)
+    assert output.read_bytes() == before

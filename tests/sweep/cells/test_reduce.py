@@ -7,18 +7,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from running import flip, kept
 
 import sweep
 from kernels.interface import Status
-from sweep.cells.grid import Cells
 from sweep.cells.partition import RowBlocks, row_blocks
-from sweep.cells.reduce import BY_STATUS, Reducer, merge, tree_sum
-from sweep.results.statuses import account
-from sweep.store.reading import StoredFile
-from sweep.store.store import Store, unfinished_of
+from sweep.cells.reduce import BY_STATUS, tree_sum
 
 HEIGHTS = np.array([-1.0, 1.0, 2.0, 5.0, math.nan, 13.5, 100.0, 0.3, 0.7, 77.0])
 SPEEDS = np.array([0.0, 0.5, 3.0, 1e-9, 1e4, 2.0])
@@ -95,13 +90,6 @@ def test_reductions_are_those_of_the_cells(over, at_once, tmp_path, monkeypatch)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["out.h5"]
 
 
-def test_without_a_word_everything_is_reduced_to_all_that_needs_no_edges():
-    found = quiet(stone({}))
-    assert found.fall_time_min.dims == ()
-    assert not [name for name in found if "histogram" in name]
-    assert found.fall_time_max == quiet(stone()).fall_time.max()
-
-
 def long_study(cells, **keys):
     """Many cells, so that row blocks are shorter than groups."""
     rng = np.random.default_rng(5)
@@ -137,44 +125,6 @@ def test_many_row_blocks_agree_with_the_cells(long):
     agree(long["height",], cells, ["height"])
 
 
-def test_an_interrupted_summary_tells_of_what_there_is_and_ends_with_the_same_bits(tmp_path, long, monkeypatch):
-    study, output = long_study(12_000), tmp_path / "out.h5"
-    real = Reducer.solve
-
-    def failing(self, start, stop, rows):
-        if start > 300:
-            raise RuntimeError("stop here")
-        real(self, start, stop, rows)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Reducer, "solve", failing)
-        with pytest.raises(sweep.SweepError, match="stop here"):
-            quiet(study, output, block_cells=1000, workers=1)
-    assert kept(output)
-    with sweep.open_result(output) as so_far:
-        found = account(so_far)
-        assert found.total == 12_000
-        assert 0 < found.pending < 12_000
-        assert so_far.fall_time_count == found.ok
-    with quiet(study, output, workers=3) as found:
-        same(found, long["height", "v0"])
-
-
-@pytest.mark.parametrize("place", [0, 2])
-def test_a_damaged_block_of_rows_is_computed_again(tmp_path, long, monkeypatch, place):
-    study, output = long_study(12_000), tmp_path / "out.h5"
-    with monkeypatch.context() as patch:
-        patch.setattr(Store, "finish", lambda *a: (_ for _ in ()).throw(sweep.SweepError("enough")))
-        with pytest.raises(sweep.SweepError, match="enough"):
-            quiet(study, output, block_cells=4000)
-    path = unfinished_of(output)
-    with StoredFile(path) as file:
-        at = file.columns("rows")["fall_time sum"].place.at(place) + 3
-    flip(path, at)
-    with quiet(study, output) as found:
-        same(found, long["height", "v0"])
-
-
 def test_traces_are_reduced_point_by_point():
     keys = {"outputs": ["drop"], "along": {"phase": [0.0, 0.25, 1.0]}}
     cells = quiet(stone(**keys))["drop"]
@@ -188,18 +138,6 @@ def test_traces_are_reduced_point_by_point():
         good = cells.values[:, v, p][~np.isnan(cells.values[:, v, p])]
         assert found.drop_histogram[v, p].values.tolist() == np.histogram(good, [0, 1, 5])[0].tolist()
         assert found.drop_argmax_height[v, p] == cells.height[np.nanargmax(cells.values[:, v, p])]
-
-
-def test_arrays_and_words_are_told_at_an_extreme():
-    masses = [[1.0, 2.0], [5.0, 1.0], [0.1, 0.1]]
-    study = sweep.study(allow_import=True, kernel="beads:KERNEL", design="zip", outputs=["total"], summary={},
-                        axes={"mass": masses, "method": ["quick", "whole", "quick"]})  # fmt: skip
-    found = quiet(study)
-    assert found.total_argmax_mass.values.tolist() == [5.0, 1.0]
-    words = found.total_argmax_method.attrs["flag_meanings"].split()
-    assert (
-        words[list(found.total_argmax_method.attrs["flag_values"]).index(found.total_argmax_method.item())] == "whole"
-    )
 
 
 def test_a_result_of_a_summary_can_be_shown_and_run_again(tmp_path, capsys, read):
@@ -242,33 +180,6 @@ def test_the_tree_sum_is_right_to_twice_the_digits(numbers):
     assert total[0] + rest[0] == pytest.approx(float(exact), abs=float(size) * 1e-29, rel=2.3e-16)
 
 
-@pytest.mark.parametrize(
-    ("numbers", "expected"),
-    [([math.inf, 1.0], math.inf), ([-math.inf, 1.0, 2.0], -math.inf), ([1e308, 1e308, 5.0], math.inf)],
-)
-def test_an_infinite_sum_stays_infinite(numbers, expected):
-    total, rest = tree_sum(np.array([numbers]))
-    assert (total[0], rest[0]) == (expected, 0.0)
-
-
-def test_infinities_are_values_and_nan_is_none():
-    study = stone({"outputs": {"fall_time": ["min", "max", "argmin", "argmax"]}}, axes={"height": np.arange(1.0, 5)})
-    reducer = Reducer(study)
-    for values, low, high in [
-        ([math.nan, math.inf, math.inf, math.nan], 1, 1),
-        ([-math.inf, math.nan, math.inf, 3.0], 0, 2),
-        ([math.nan, math.nan, math.nan, math.nan], -1, -1),
-        ([math.nan, -0.0, 0.0, math.nan], 1, 1),
-    ]:
-        zeros = np.zeros(4, np.int8)
-        found = reducer.reduce(10, 1, Cells({"fall_time": np.array(values)}, zeros, zeros))
-        assert found["fall_time min at"] == (low + 10 if low >= 0 else -1)
-        assert found["fall_time max at"] == (high + 10 if high >= 0 else -1)
-        other = reducer.reduce(0, 1, Cells({"fall_time": np.full(4, math.nan)}, zeros, zeros))
-        merge(other, found)
-        assert other["fall_time min at"] == found["fall_time min at"]
-
-
 @given(
     groups=st.integers(1, 9),
     group=st.integers(1, 60),
@@ -294,79 +205,6 @@ def test_strips_cover_the_rows_and_are_cut_at_the_same_places(groups, group, len
         assert (cell - edges[row]) % room == 0
         at += rows * cells
     assert at == edges[stop]
-
-
-@settings(max_examples=25, deadline=None)
-@given(heights=st.integers(1, 70_000), speeds=st.integers(1, 3), over=st.sampled_from(["height", "v0", None]))
-@example(heights=2049, speeds=1, over=None)
-@example(heights=4099, speeds=1, over=None)
-@example(heights=10_001, speeds=1, over=None)
-@example(heights=65_535, speeds=1, over=None)
-@example(heights=4101, speeds=2, over="height")
-def test_what_reducing_takes_is_known_for_any_number_of_cells(heights, speeds, over):
-    axes = {"height": np.arange(1.0, heights + 1), "v0": SPEEDS[:speeds]}
-    summary = {} if over is None else {"over": [over]}
-    assert 0.0 < Reducer(stone(summary, axes=axes)).seconds() < math.inf
-
-
-def test_row_blocks_depend_on_the_study_alone_and_stay_few():
-    def of(n, **keys):
-        axes = {"height": np.arange(1.0, n + 1), "v0": np.arange(1000.0)}
-        return row_blocks(stone(whole(**keys), axes=axes))
-
-    assert of(10**6).length == 524288
-    assert of(10**6).count < 2048
-    assert of(10**6, over=["v0"]) == RowBlocks(10**6, 1000, 1000)
-    assert of(1).length == 1
-
-
-MISTAKES = {
-    'over = "height"': ("summary.over", 'a list of axes, e.g. ["mu"]'),
-    "over = []": ("summary.over", "found an empty list"),
-    'over = ["hight"]': ("summary.over[0]", "did you mean height?"),
-    'over = ["height", "height"]': ("summary.over[1]", "stands twice"),
-    'outputs.fall_tim = ["min"]': ("summary.outputs.fall_tim", "did you mean fall_time?"),
-    'outputs.fall_time = ["mni"]': ("summary.outputs.fall_time[0]", "did you mean min?"),
-    "outputs.fall_time = []": ("summary.outputs.fall_time", "found an empty list"),
-    'outputs.fall_time = "min"': (
-        "summary.outputs.fall_time",
-        'a list of reductions, e.g. ["min", "max"], found "min"',
-    ),
-    'outputs.fall_time = ["histogram"]': ("summary.edges.fall_time", "missing; its histogram needs them"),
-    "edges.fall_time = [1, 2]": ("summary.edges.fall_time", 'ask for it: outputs.fall_time = ["histogram"]'),
-    'outputs.fall_time = ["histogram"]\nedges.fall_time = [1]': ("summary.edges.fall_time", "at least 2 edges"),
-    'outputs.fall_time = ["histogram"]\nedges.fall_time = [2, 1]': ("summary.edges.fall_time", "each larger"),
-    'outputs.fall_time = ["histogram"]\nedges.fall_time = [1, inf]': ("summary.edges.fall_time", "finite"),
-    "bins = 3": ("summary.bins", "no such key"),
-}
-
-
-@pytest.mark.parametrize("text", MISTAKES)
-def test_every_mistake_is_told(mistakes, text):
-    where, what = MISTAKES[text]
-    found = mistakes(f"axes.height = [1.0, 2.0]\n[summary]\n{text}\n")
-    assert what in found[where], found
-
-
-def test_edges_that_are_no_numbers_are_not_said_to_be_too_few_as_well(mistakes):
-    text = 'outputs.fall_time = ["histogram"]\nedges.fall_time = ["a", "b"]'
-    found = mistakes(f"axes.height = [1.0, 2.0]\n[summary]\n{text}\n")
-    assert not any("at least 2 edges" in what for what in found.values())
-
-
-def test_a_zip_is_reduced_as_a_whole(mistakes):
-    found = mistakes('design = "zip"\naxes.height = [1.0, 2.0]\naxes.v0 = [1.0, 2.0]\n[summary]\nover = ["height"]\n')
-    assert "are reduced together" in found["summary.over"]
-
-
-def test_the_summary_is_part_of_the_study():
-    study = stone(whole(over=["v0"]))
-    again = sweep.study.read.Study.from_json(study.to_json(), allow_import=True)
-    assert again == study
-    assert study != stone(whole())
-    assert list(stone(whole(over=["height"])).axes) == ["v0", "height"]
-    assert sweep.study(kernel="toy:KERNEL", allow_import=True, axes={"height": [1.0]},
-                             summary={"outputs": {"fall_time": ["min"]}}).outputs == ("fall_time",)  # fmt: skip
 
 
 def test_of_equal_extremes_the_first_cell_is_told():

@@ -90,7 +90,7 @@ def test_an_exponent_that_is_swept_leaves_the_scaling_that_holds_at_every_expone
     found = scaling(sweep.study(kernel="foliot", axes=axes, rtol=rtol))
     assert [str(g) for g in found.groups] == ["mu phi0", "c/mu"]
     assert (found.free, found.others) == (1, ("n",))
-    assert "for each n" in found.advice
+    assert "2-dimensional in mu, c, phi0 for each n: " in found.advice
 
 
 def test_a_law_that_holds_nearly_is_not_taken_for_a_scaling():

@@ -11,23 +11,24 @@ import sweep
 FOLIOT = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": {"value": 60, "unit": "degree"}, "a": 1.0}}
 
 
-def cells(html):
-    """Texts of the cells of all tables."""
-    return re.findall(r"<td[^>]*>([^<]*)</td>", html)
+def shown(thing):
+    """What a notebook shows of it, and the texts of the cells of all tables in that."""
+    html = thing._repr_html_()
+    return html, re.findall(r"<td[^>]*>([^<]*)</td>", html)
 
 
 def test_a_study_is_shown_with_units_method_cells_and_forecast():
     study = sweep.study(**FOLIOT, axes={"mu": [0.1, 1.0, 10.0], "R": [0.0, 0.01]}, where="R < mu", question="a < b?")
     sweep.run(study)
-    found = cells(study._repr_html_())
+    html, found = shown(study)
     assert found[:5] == ["mu", "rad/s^2", "3", "0.1 to 10", "mu"]
-    shown = dict(zip(found[10::2], found[11::2], strict=True))
-    assert shown["method"] == "auto"
-    assert shown["cells"] == "6 = 3 x 2"
-    assert shown["where"] == "R &lt; mu"
-    assert re.fullmatch(r"about .* on \d+ cores, .*B", shown["forecast"])
-    assert "phi0 = 1.0472 [rad]" in shown["fixed"]
-    assert "a &lt; b?" in study._repr_html_()
+    rows = dict(zip(found[10::2], found[11::2], strict=True))
+    assert rows["method"] == "auto"
+    assert rows["cells"] == "6 = 3 x 2"
+    assert rows["where"] == "R &lt; mu"
+    assert re.fullmatch(r"about .* on \d+ cores, .*B", rows["forecast"])
+    assert "phi0 = 1.0472 [rad]" in rows["fixed"]
+    assert "a &lt; b?" in html
 
 
 def test_a_study_is_shown_whatever_was_used_before():
@@ -44,9 +45,9 @@ def test_the_text_of_a_study_is_no_path():
 
 def test_kernels_and_a_kernel_are_shown():
     every = sweep.kernels()
-    assert "foliot" in cells(every._repr_html_())
+    assert "foliot" in shown(every)[1]
     assert "polisher_wear_point: " in repr(every)
     one = every["foliot"]
-    assert {"mu", "rad/s^2", "period", "closed", "required"} <= set(cells(one._repr_html_()))
+    assert {"mu", "rad/s^2", "period", "closed", "required"} <= set(shown(one)[1])
     assert repr(one).startswith("foliot: ")
     assert len(every) == len(list(every))

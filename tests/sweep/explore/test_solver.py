@@ -42,69 +42,52 @@ def test_a_bound_beyond_rtol_is_told_as_the_sweep_tells_it():
     assert [clock(mu).period for mu in (1e-3, 1.4)] == swept.period.values.tolist()
 
 
-def test_arrays_are_broadcast_and_traces_come_behind():
+def test_arrays_are_broadcast_traces_come_behind_and_no_call_changes_what_an_earlier_one_gave():
     fall = sweep.solver(build(axes={"height": [1.0], "v0": [0.0]}, outputs=["drop"], along={"phase": [0.0, 1.0]}))
     found = fall(height=np.array([[1.0], [2.0]]), v0=[0.0, 1.0, 2.0])
     assert found.drop.shape == (2, 3, 2)
     assert found.status.shape == (2, 3)
     assert np.allclose(found.drop[..., 1], [[1.0] * 3, [2.0] * 3])
-    assert fall(3.0, 0.0).drop.shape == (2,)
     assert fall([], []).status.shape == (0,)
-
-
-def test_a_trace_is_not_overwritten_by_the_next_call():
-    motion = sweep.solver({"kernel": "foliot_motion", "outputs": ["angle"], "axes": {"mu": [1.0]},
-                           "fixed": {"a": 1.0, "phi0": 1.0}, "along": {"phase": {"num": 5}}})  # fmt: skip
-    first = motion(1.0).angle
-    kept = first.copy()
-    motion(5.0)
-    assert np.array_equal(first, kept)
+    one = fall(3.0, 0.0).drop
+    fall(5.0, 0.0)
+    assert one.tolist() == [0.0, 3.0]
 
 
 def test_what_is_refused_is_nan_and_says_why():
-    fall = sweep.solver(build(axes={"height": [1.0]}))
-    found = fall(-1.0)
-    assert np.isnan(found.fall_time)
-    assert found.status == 64
-    left_out = sweep.solver(build(axes={"height": [1.0]}, where="height > 1"))
-    assert left_out(0.5).status == 125
-    assert left_out(2.0).status == 0
+    fall = sweep.solver(build(axes={"height": [1.0]}, where="height != 0.5"))
+    assert np.isnan(fall(-1.0).fall_time)
+    assert [fall(height).status for height in (-1.0, 0.5, 2.0)] == [Status.BAD_INPUT, Status.NOT_ASKED, Status.OK]
 
 
 @pytest.mark.parametrize(
-    ("call", "message"),
+    ("values", "named", "word"),
     [
-        (lambda f: f(), "expected height and v0, found 0 of 2 values"),
-        (lambda f: f(1.0), "expected height and v0, found 1 of 2 values"),
-        (lambda f: f(1.0, 2.0, 3.0), "found 3 of 2 values"),
-        (lambda f: f(1.0, hight=2.0), "hight: the study has no such axis; did you mean height?"),
-        (lambda f: f(1.0, height=2.0), "height is given twice"),
-        (lambda f: f("x", 1.0), "expected numbers or arrays"),
-        (lambda f: f([1.0, 2.0], [1.0, 2.0, 3.0]), "expected numbers or arrays"),
+        ((), {}, "0 of 2"),
+        ((1.0,), {}, "1 of 2"),
+        ((1.0, 2.0, 3.0), {}, "3 of 2"),
+        ((1.0,), {"hight": 2.0}, "did you mean height"),
+        ((1.0,), {"height": 2.0}, "twice"),
+        (("x", 1.0), {}, "numbers"),
+        (([1.0, 2.0], [1.0, 2.0, 3.0]), {}, "numbers"),
     ],
 )
-def test_a_wrong_call_is_told(call, message):
-    with pytest.raises(sweep.SweepError) as caught:
-        call(sweep.solver(build(axes={"height": [1.0], "v0": [0.0]})))
-    assert message in str(caught.value)
+def test_a_wrong_call_is_told(values, named, word):
+    fall = sweep.solver(build(axes={"height": [1.0], "v0": [0.0]}))
+    with pytest.raises(sweep.SweepError, match=word):
+        fall(*values, **named)
 
 
-@pytest.mark.parametrize(
-    "keys",
-    [
-        {"axes": {"height": [1.0], "method": ["exact"]}},
-        {"axes": {"height": [1.0], "rtol": [1e-3]}},
-        {"axes": {"height": [1.0]}, "summary": {}},
-    ],
-)
+@pytest.mark.parametrize("keys", [{"method": ["exact"]}, {"rtol": [1e-3]}, {}])
 def test_a_study_that_is_no_function_of_numbers_is_refused(keys):
+    study = build(axes={"height": [1.0], **keys}, **({} if keys else {"summary": {}}))
     with pytest.raises(sweep.SweepError, match="a solver"):
-        sweep.solver(build(**keys))
+        sweep.solver(study)
 
 
 def test_where_a_kernel_raises_the_cell_fails_and_others_have_values():
     clock = sweep.solver(tall(40, "bad:RAISING"))
-    with pytest.warns(RuntimeWarning, match=r"FAILED at height=11.0: ZeroDivisionError: eleven"):
+    with pytest.warns(RuntimeWarning, match=r"height=11\.0"):
         found = clock([10.0, 11.0, 12.0])
     assert found.status.tolist() == [Status.OK, Status.FAILED, Status.OK]
     assert np.isnan(found.fall_time).tolist() == [False, True, False]

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 import toy_studies
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from running import interrupted, keys, quiet
 
 import sweep
-from sweep.store import reading
 
 SIZES = {"v0": 3, "height": 11, "phase": 3}
 
@@ -32,21 +31,10 @@ def both(request, tmp_path_factory):
         yield whole, lazily
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    key=st.fixed_dictionaries({}, optional={name: keys(size) for name, size in SIZES.items()}),
-    short=st.sampled_from([1, 3, 64]),
-)
-def test_any_piece_of_it_is_the_same(both, monkeypatch, key, short):
-    monkeypatch.setattr(reading, "SHORT_RUN", short)
+@settings(max_examples=60, deadline=None)
+@given(key=st.fixed_dictionaries({}, optional={name: keys(size) for name, size in SIZES.items()}))
+def test_any_piece_of_it_is_the_same(both, key):
     at_once, lazily = (found.isel(key) for found in both)
     for name in at_once.data_vars:
         assert lazily[name].dims == at_once[name].dims
         assert lazily[name].values.tobytes() == at_once[name].values.tobytes()
-
-
-def test_several_threads_read_the_same(both, monkeypatch):
-    monkeypatch.setattr(reading, "LONG_RUN", 1)
-    whole, lazily = both
-    for name in whole.data_vars:
-        assert lazily[name][1:].values.tobytes() == whole[name][1:].values.tobytes()

@@ -1,31 +1,26 @@
 """Files that nobody vouches for: no traceback, no hang, no foreign code, no path out of its folder."""
 
 import contextlib
-import dataclasses
 import os
 import pickle
 import random
+import shutil
 import time
-from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-from fuzzing import STUDY, forge, fuzz_result, fuzz_study, prepared, quietly
+from fuzzing import fuzz_result, fuzz_study, prepared, quietly
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from running import quiet, tall
 
 import sweep
-from sweep.cells.partition import Partition
 from sweep.cli import main
-from sweep.results.verify import verify
 from sweep.store import probe
-from sweep.store.layout import read_layout, structure_digest
 from sweep.system.errors import StudyError, SweepError
 
 SHARED = [HealthCheck.function_scoped_fixture]
-GOLDEN = Path(__file__).parents[2] / "golden" / "format_1.h5"
 
 
 @settings(max_examples=200, deadline=2000, suppress_health_check=SHARED)
@@ -62,35 +57,8 @@ def test_a_file_that_hdf5_cannot_come_to_an_end_with_is_given_up(whole, tmp_path
     begun = time.monotonic()
     with pytest.raises(SweepError, match="damaged"):
         sweep.open_result(path)
-    assert not verify(path).whole
+    assert not sweep.verify(path).whole
     assert time.monotonic() - begun < 20
-
-
-COMMANDS = {
-    "show": (), "verify": (), "plot": (), "report": (), "export": ("-o", "out.csv"),
-    "fit": ("--y", "fall_time", "--x", "height"),
-    "refine": ("--y", "fall_time", "--tolerance", "0.1", "-o", "fine.h5", "--allow-import"),
-}  # fmt: skip
-
-
-def forged(whole, path):
-    """A result that has another byte, and a seal as if it always had."""
-    content = bytearray(whole.read_bytes())
-    content[content.index(b"Stone" if b"Stone" in content else b"toy:KERNEL")] ^= 1
-    path.write_bytes(content)
-    forge(path)
-    assert probe.intact(path)
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_a_forged_seal_does_not_make_a_command_hang(whole, tmp_path, monkeypatch, capfd, command):
-    monkeypatch.chdir(tmp_path)
-    forged(whole, tmp_path / "out.h5")
-    monkeypatch.setattr(probe, "PROBE", "while True: pass")
-    monkeypatch.setattr(probe, "PROBE_SECONDS", 0.3)
-    monkeypatch.setattr("h5py.File", lambda *args: pytest.fail("opened here"))
-    assert main([command, "out.h5", *COMMANDS[command]]) == 2
-    assert "not the result of a sweep, or damaged" in capfd.readouterr().err
 
 
 def lead_away(file, kind, secret):
@@ -112,76 +80,17 @@ def lead_away(file, kind, secret):
         file["integrity/round"] = file["integrity"]
 
 
-def seal(path, layout):
-    """Puts a right trailer behind a file that h5py has changed."""
-    with path.open("r+b") as file:
-        end = file.seek(0, 2)
-        structure = structure_digest(file.fileno(), layout.endings, end)
-        file.write(dataclasses.replace(layout, regions=(), end=end, structure=structure).trailer())
-    assert probe.intact(path)
-
-
-@pytest.mark.parametrize("sealed", [False, True])
 @pytest.mark.parametrize("kind", ["soft link", "external link", "external storage", "virtual", "round"])
-def test_a_result_leads_to_no_other_file(whole, tmp_path, kind, sealed):
+def test_a_result_leads_to_no_other_file(whole, tmp_path, kind):
     secret = tmp_path / "secret"
     os.mkfifo(secret)  # who opened it would wait for ever
-    path = tmp_path / "out.h5"
-    path.write_bytes(whole.read_bytes())
-    with path.open("r+b") as file:
-        layout = read_layout(file.fileno(), path.stat().st_size)
-        file.truncate(layout.end)
+    path = shutil.copy(whole, tmp_path / "out.h5")
     with h5py.File(path, "r+") as file:
         lead_away(file, kind, secret)
-    if sealed:
-        seal(path, layout)
-    with pytest.raises(SweepError, match="not the result of a sweep, or damaged"):
+    with pytest.raises(SweepError, match="damaged"):
         sweep.open_result(path)
-    assert not verify(path).whole
-
-
-@pytest.mark.parametrize("command", ["show", "verify"])
-def test_a_layout_of_more_blocks_than_the_file_has_room_for_is_none(whole, tmp_path, capsys, command):
-    path, count = tmp_path / "out.h5", 2**40
-    path.write_bytes(whole.read_bytes())
-    with path.open("r+b") as file:
-        layout = read_layout(file.fileno(), path.stat().st_size)
-        table = dataclasses.replace(layout.work, grid=(count,), blocks=Partition(count, 1))
-        file.truncate(layout.end)
-        file.seek(layout.end)
-        file.write(dataclasses.replace(layout, tables={"cells": table}).trailer())
-    assert main([command, str(path)]) == 2
-    assert "memory" not in capsys.readouterr().err
-
-
-def test_a_result_that_was_changed_on_purpose_can_still_be_opened(whole, tmp_path):
-    path = tmp_path / "out.h5"
-    path.write_bytes(whole.read_bytes())
-    with h5py.File(path, "r+") as file:
-        file.attrs["comment"] = "mine"
-    with sweep.open_result(path) as found:
-        assert found.attrs["comment"] == "mine"
-    assert not verify(path).whole
-
-
-ODD = [("/", "rtol", "x"), ("/", "rtol", np.arange(5.0)), ("/", "end", np.zeros(3)), ("/", "cells_per_second", "x"),
-       ("/", "title", 1.0), ("height", "units", 5), ("status", "flag_meanings", 3.0)]  # fmt: skip
-
-
-@pytest.mark.parametrize(("place", "name", "value"), ODD)
-def test_an_attribute_of_another_kind_is_damage(whole, tmp_path, capsys, place, name, value):
-    path = tmp_path / "out.h5"
-    path.write_bytes(whole.read_bytes())
-    with h5py.File(path, "r+") as file:
-        file[place].attrs[name] = value
-    assert main(["show", str(path)]) == 2
-    assert "not the result of a sweep, or damaged" in capsys.readouterr().err
-
-
-def no_dimension(file):
-    """Of the cells' statuses."""
-    del file["status"]
-    file["status"] = np.int8(0)
+    if kind != "external link":  # which HDF5 follows as far as the pipe, until it is given up
+        assert not sweep.verify(path).whole
 
 
 def one_column_more(file):
@@ -195,22 +104,19 @@ def one_thing_more(file):
     file.create_dataset("more", (10**7,), "f8", chunks=(10**6,), compression="gzip")[...] = 0.0
 
 
-def twice(file):
-    """A value of an axis stands there twice."""
-    file["height"][1] = file["height"][0]
+def of_absurd_size(file):
+    """No memory has room for it."""
+    del file["fall_time"]
+    file.create_dataset("fall_time", (1 << 44,), "f8", chunks=(1 << 20,))
 
 
-def no_text(file):
-    """Bytes that are no UTF-8."""
-    file.attrs.create("title", b"\xc4", dtype=h5py.string_dtype())
+def without_dimension(file):
+    """The cells' statuses."""
+    del file["status"]
+    file["status"] = np.int8(0)
 
 
-def no_word(file):
-    """In the study."""
-    file.attrs["study_json"] = file.attrs["study_json"].replace('"method":"auto"', '"method":{}')
-
-
-def another_shape(file):
+def of_another_shape(file):
     """With the attributes that it had; HDF5 2.0 crashes when h5netcdf looks at its dimensions."""
     attrs = dict(file["method_used"].attrs)
     del file["method_used"]
@@ -220,30 +126,29 @@ def another_shape(file):
             made.attrs[name] = value
 
 
-DAMAGED, CHANGED = "not the result of a sweep, or damaged", "was changed by another program, and is no result any more"
-FORGED = [(no_dimension, CHANGED), (one_column_more, ""), (one_thing_more, DAMAGED), (twice, ""),
-          (no_text, DAMAGED), (no_word, ""), (another_shape, DAMAGED)]  # fmt: skip
+def with_attribute(place, name, value):
+    """Of another kind than it was."""
+    return lambda file: file[place].attrs.create(name, value)
 
 
-@pytest.mark.parametrize(("change", "told"), FORGED)
-@pytest.mark.parametrize("sealed", [False, True])
-def test_a_result_holds_what_its_study_says(whole, tmp_path, capsys, change, told, sealed):
-    path = tmp_path / "out.h5"
-    path.write_bytes(whole.read_bytes())
-    with path.open("r+b") as file:
-        layout = read_layout(file.fileno(), path.stat().st_size)
-        file.truncate(layout.end)
+CHANGES = [
+    (one_column_more, 0), (one_thing_more, 2), (of_absurd_size, 2), (without_dimension, 2), (of_another_shape, 2),
+    (with_attribute("/", "rtol", "x"), 2), (with_attribute("/", "rtol", np.arange(5.0)), 2),
+    (with_attribute("/", "end", np.zeros(3)), 2), (with_attribute("/", "cells_per_second", "x"), 2),
+    (with_attribute("/", "title", 1.0), 2), (with_attribute("height", "units", 5), 2),
+    (with_attribute("status", "flag_meanings", 3.0), 2),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "status"), CHANGES)
+def test_a_result_that_another_program_changed_is_shown_or_refused(whole, tmp_path, capsys, change, status):
+    path = shutil.copy(whole, tmp_path / "out.h5")
     with h5py.File(path, "r+") as file:
         change(file)
-    if sealed:
-        seal(path, layout)
-    expected = DAMAGED if sealed and change is not no_word else told
-    command = ["report", str(path), "-o", str(tmp_path / "out.html")] if change is no_text else ["show", str(path)]
-    status, said = main(command), capsys.readouterr().err
-    if change is no_word and sealed:
-        assert "not the JSON of a study" in said
-    assert expected in said
-    assert status == (2 if sealed or expected else 0)
+    assert main(["show", str(path)]) == status
+    error = capsys.readouterr().err
+    assert bool(error) is bool(status)
+    assert "Traceback" not in error
 
 
 @pytest.mark.parametrize("name", ["../secret.csv", "/etc/passwd", "sub/../../secret.csv", "link.csv", "\0", "a" * 5000])
@@ -268,24 +173,9 @@ def test_foreign_code_runs_only_where_it_is_allowed(tmp_path, command):
 
 
 def test_no_result_or_part_is_unpickled(whole, tmp_path, monkeypatch):
-    monkeypatch.setattr(pickle, "loads", None)
-    monkeypatch.setattr(pickle, "load", None)
-    monkeypatch.setattr(pickle, "Unpickler", None)
+    for name in ("loads", "load", "Unpickler"):
+        monkeypatch.setattr(pickle, name, None)
     with sweep.open_result(whole) as found:
         found.load()
-    assert verify(whole).whole
+    assert sweep.verify(whole).whole
     quiet(tall(30), tmp_path / "out.h5", block_cells=10).close()
-
-
-def test_the_golden_file_of_format_1_is_read_and_whole():
-    with sweep.open_result(GOLDEN, strict=True) as found:
-        assert found.sizes == {"v0": 2, "height": 3, "phase": 3}
-        assert found.height.values.tolist() == [-1.0, 1.0, 3.0]
-        assert found.status.values[0].tolist() == [64, 0, 0]
-        assert found.fall_time.attrs["units"] == "s"
-    assert verify(GOLDEN).whole
-    assert quietly("show", GOLDEN) == 0
-
-
-def test_the_study_that_nonsense_is_made_of_is_a_sound_one(read):
-    assert read(STUDY, head="").kernel_name == "toy:KERNEL"

@@ -3,11 +3,11 @@
 import shutil
 
 import pytest
+from running import interrupted, tall
 from toy_studies import build
 
 import sweep
 from sweep.cli import main
-from sweep.results.statuses import Account
 
 
 def test_results_are_listed_with_what_became_of_them(tmp_path, capsys):
@@ -31,24 +31,11 @@ def test_results_are_listed_with_what_became_of_them(tmp_path, capsys):
     assert a.when[:10] in capsys.readouterr().out
 
 
-def test_an_unfinished_one_is_listed_with_its_share(tmp_path, monkeypatch):
-    from sweep.runs.session import Session
-
-    done = []
-
-    def stopping(self):
-        done.append(1)
-        if len(done) > 3:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(Session, "check_time", stopping)
-    with pytest.raises(KeyboardInterrupt):
-        sweep.run(
-            build(axes={"height": [float(i + 1) for i in range(64)]}), tmp_path / "a.h5", block_cells=8, workers=1
-        )
+def test_an_unfinished_one_is_listed_with_its_share(tmp_path):
+    interrupted(tall(23), tmp_path / "a.h5")
     (found,) = sweep.list_results(tmp_path)
     assert 0 < found.done < 1
-    assert found.cells == 64
+    assert found.cells == 23
     assert "PENDING" in found.statuses
 
 
@@ -57,14 +44,6 @@ def test_a_folder_without_results_and_none(tmp_path):
     shutil.rmtree(tmp_path)
     with pytest.raises(sweep.SweepError, match="no such folder"):
         sweep.list_results(tmp_path)
-
-
-def test_the_share_that_is_done_is_not_told_a_tenth_too_low(tmp_path, monkeypatch):
-    """1 - 0.9 is less than 0.1 in float64."""
-    sweep.run(build(axes={"height": [1.0]}), tmp_path / "a.h5").close()
-    monkeypatch.setattr("sweep.results.listing.account", lambda _: Account(1, pending=9))
-    (found,) = sweep.list_results(tmp_path)
-    assert (found.done, found.row[1:3]) == (0.1, ("10", "10 %"))
 
 
 def test_what_a_running_sweep_has_beside_its_output_is_listed_as_the_output(tmp_path):

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from toy_studies import build
 
 import sweep
 from kernels.interface import Status
@@ -18,7 +19,9 @@ from sweep.results.statuses import (
     count_methods,
     count_statuses,
     failures,
+    summary_text,
 )
+from sweep.results.stored import Stored
 from sweep.study.toml import to_toml
 
 FLAGS = {"flag_values": np.array([-1, 0, 1], np.int8), "flag_meanings": "none map closed"}
@@ -101,3 +104,27 @@ def test_a_summary_is_summed_over_all_it_keeps():
     assert count_methods(found) == {"map": 5}
     assert (account(found).total, account(found).refused) == (6, 1)
     assert [(c.name, c.cells, c.total) for c in count_statuses(found)] == [("OK", 5, 6), ("BAD_INPUT", 1, 6)]
+
+
+HEIGHTS = [1.0, -1.0, np.nan, 4.0, 9.0, 16.0]
+STUDIES = {
+    "product": {"axes": {"height": HEIGHTS, "v0": [0.0, 1.0, np.nan]}},
+    "words": {"axes": {"height": HEIGHTS, "method": ["rough", "exact", "auto"]}},
+    "zip": {"axes": {"height": HEIGHTS, "v0": [1.0, 0.0, 1.0, 0.0, 1.0, 0.0]}, "design": "zip"},
+    "one cell": {"axes": {"height": [-1.0]}},
+    "summary": {"axes": {"height": HEIGHTS, "v0": [0.0, 1.0, np.nan]}, "summary": {"outputs": {"fall_time": ["min"]}}},
+    "summary of one axis": {
+        "axes": {"height": HEIGHTS, "v0": [0.0, 1.0]},
+        "summary": {"outputs": {"fall_time": ["mean"]}, "over": ["v0"]},
+    },
+}
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_run_counts_the_cells_of_its_file_as_their_reader_does(tmp_path, name):
+    study, output = build(**STUDIES[name]), tmp_path / "out.h5"
+    sweep.run(study, output, progress=False).close()
+    with Stored(output, study) as found, sweep.open_result(output) as dataset:
+        assert summary_text(found) == summary_text(dataset)
+        assert count_statuses(found) == count_statuses(dataset)
+        assert account(found).refused > 0

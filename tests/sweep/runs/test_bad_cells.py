@@ -5,24 +5,20 @@ import resource
 import subprocess
 import sys
 import time
-from concurrent.futures import Future, ProcessPoolExecutor
 from types import SimpleNamespace
 
 import bad
 import numpy as np
-import psutil
 import pytest
-import toy_studies
 from clusters import served
-from running import environment, quiet, same, tall, wait_for
+from running import environment, quiet, tall, wait_for
 
 import sweep
 from kernels.interface import Status
 from sweep.cells.grid import Cells
-from sweep.cells.guard import BadCell, Guard
-from sweep.cells.solve import Solver
+from sweep.cells.guard import Guard
 from sweep.results.statuses import account
-from sweep.runs import isolate, isolated
+from sweep.runs import isolate
 from sweep.runs.isolate import Limits, Processes
 from sweep.store.store import unfinished_of
 from sweep.system.errors import CELLS_FAILED, MISTAKE, SweepError
@@ -100,10 +96,6 @@ def test_a_kernel_that_ends_python_or_raises_what_cannot_be_told_costs_those_cel
     assert all(word in log.getvalue() for word in ("SystemExit", "Mumbling"))
 
 
-def fork_servers(process):
-    return [child for child in psutil.Process(process.pid).children() if "forkserver" in " ".join(child.cmdline())]
-
-
 @pytest.fixture
 def run_of_deadly(tmp_path):
     """Begins a run by the command whose kernel needs new processes again and again; its process and its output."""
@@ -120,18 +112,6 @@ def run_of_deadly(tmp_path):
     for process in begun:
         process.kill()
         process.communicate()
-
-
-def test_a_fork_server_that_is_killed_is_started_anew_and_costs_no_cell(run_of_deadly):
-    process, output = run_of_deadly()
-    wait_for(unfinished_of(output).exists, process)
-    for _ in range(4):
-        for server in fork_servers(process):
-            server.kill()
-        time.sleep(1.0)
-    assert process.wait(60) == CELLS_FAILED, process.stderr.read()
-    with sweep.open_result(output) as found:
-        assert heights_of(found, Status.FAILED) == [bad.CRASHES, bad.EXITS]
 
 
 @pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="the limit of another process is set on Linux only")
@@ -152,86 +132,11 @@ def test_where_no_process_can_be_started_the_run_ends_and_no_cell_is_blamed(run_
         assert heights_of(found, Status.FAILED) == [bad.CRASHES, bad.EXITS]
 
 
-def test_time_in_which_the_machine_slept_does_not_count(monkeypatch):
-    """A look at the clock every fifth of a second; an hour between two of them is no hour of work."""
-    now, looks = 0.0, []
-
-    def asleep(futures, seconds):
-        nonlocal now
-        looks.append(seconds)
-        now += 3600.0 if len(looks) % 5 == 0 else seconds
-        return SimpleNamespace(done=set())
-
-    monkeypatch.setattr(isolate, "wait", asleep)
-    monkeypatch.setattr(isolate, "time", SimpleNamespace(monotonic=lambda: now))
-    with pytest.raises(TimeoutError):
-        isolate.awaited(Future(), 10.0)
-    assert 40 <= len(looks) <= 50
-    assert now > 8 * 3600.0
-
-
 def test_a_kernel_of_which_every_cell_is_bad_is_told_at_once():
     with pytest.raises(SweepError, match=r"bad:HOPELESS: the kernel failed \(ZeroDivisionError: at"):
         quiet(tall(50, "bad:HOPELESS"))
     with pytest.raises(SweepError, match=r"bad:HOPELESS: the kernel failed \(ZeroDivisionError: at"):
         quiet(tall(50, "bad:HOPELESS"), isolate=True)
-
-
-@pytest.mark.parametrize("keys", [{}, {"isolate": True}])
-def test_a_summary_counts_bad_cells_and_reduces_the_others(keys):
-    reductions = {"outputs": {"fall_time": ["min", "mean", "argmax"]}}
-    study = toy_studies.build(kernel="bad:RAISING", axes={"height": np.arange(1.0, 41)}, summary=reductions)
-    without = np.delete(np.arange(1.0, 41), 10)
-    found = quiet(study, **keys)
-    expected = quiet(toy_studies.build(kernel="bad:RAISING", axes={"height": without}, summary=reductions))
-    assert account(found).failed == 1
-    assert account(found).ok == 39
-    assert found.fall_time_min.item() == expected.fall_time_min.item()
-    assert found.fall_time_mean.item() == pytest.approx(expected.fall_time_mean.item(), rel=1e-15)
-
-
-def test_only_wanted_cells_are_tried(tmp_path):
-    study, seen = tall(40, "bad:RAISING"), []
-    guard = Guard(Solver(study), seen.append)
-    arrays = {"fall_time": np.empty(40)}, np.empty(40, np.int8), np.empty(40, np.int8)
-    guard.solve(0, Cells(*arrays), np.arange(40) != 10)
-    assert seen == []
-    guard.solve(0, Cells(*arrays, np.empty(40, np.float32)), np.arange(40) == 10)
-    assert seen == [BadCell(10, {"height": "11"}, "ZeroDivisionError: eleven")]
-
-
-def test_what_failed_is_computed_again_when_asked(tmp_path, monkeypatch):
-    output, study = tmp_path / "out.h5", tall(40, "bad:RAISING")
-    quiet(study, output).close()
-    with quiet(study, output, retry_failed=True) as found:
-        assert heights_of(found, Status.FAILED) == [11.0]
-    solved = []
-    monkeypatch.setattr(bad, "misbehave", lambda height, kinds: solved.extend(height))
-    with quiet(study, output) as found:
-        assert heights_of(found, Status.FAILED) == [11.0]
-    assert solved == []
-    with quiet(study, output, retry_failed=True, block_cells=1) as found:
-        same(found, quiet(study))
-    with quiet(study, output, retry_failed=True) as found:
-        assert heights_of(found, Status.FAILED) == []
-
-
-def test_a_summary_has_no_cells_to_compute_again(tmp_path):
-    study = toy_studies.build(
-        kernel="bad:RAISING", axes={"height": np.arange(1.0, 41)}, summary={"outputs": {"fall_time": ["min"]}}
-    )
-    quiet(study, tmp_path / "out.h5").close()
-    with pytest.raises(SweepError, match="a summary does not keep the cells that FAILED"):
-        quiet(study, tmp_path / "out.h5", retry_failed=True)
-    with pytest.raises(SweepError, match="extend, retry_failed"):
-        quiet(study, tmp_path / "out.h5", retry_failed=True, extend=True)
-
-
-def test_a_catalogued_kernel_gives_the_same_bits_in_a_process_of_its_own():
-    study = sweep.study(
-        kernel="foliot", axes={"mu": np.geomspace(0.1, 10.0, 65)}, fixed={"a": 1.0, "phi0": 1.0}, rtol=1e-6
-    )
-    same(quiet(study, isolate=True, block_cells=10), quiet(study))
 
 
 def test_a_kernel_that_fails_on_a_cluster_costs_a_cell_too(tmp_path):
@@ -244,72 +149,6 @@ def test_a_kernel_that_fails_on_a_cluster_costs_a_cell_too(tmp_path):
                 assert account(found).ok == SOUND - len(BAD[name])
 
 
-def test_several_cells_have_little_more_than_they_should_take_and_one_has_its_time():
-    limits = Limits(60.0, 0.01)
-    assert limits.seconds(1) == 60.0
-    assert limits.seconds(100) == pytest.approx(11.0)
-    assert Limits(0.5, 0.0).seconds(1000) == 0.5
-    assert Limits(None, 2.0).seconds(1) == 200.0
-    assert Limits(None, 0.1).seconds(1) == 60.0
-
-
-def test_processes_that_others_kill_cost_nothing(monkeypatch):
-    """Whatever they are at: loading, or a cell alone."""
-    study, victims = tall(30, "bad:RAISING"), []
-    processes = Processes(study, Limits(30.0), 1)
-    solver = processes.solver()
-
-    def killed(pool, *task, real=ProcessPoolExecutor.submit):
-        future = real(pool, *task)
-        if task[0] in (isolated.load, isolated.solve):
-            victims.append(task)
-            if len(victims) in (1, 3, 6, 10, 15, 21):
-                solver._process.kill()
-        return future
-
-    monkeypatch.setattr(ProcessPoolExecutor, "submit", killed)
-    seen = []
-    arrays = {"fall_time": np.empty(30)}, np.empty(30, np.int8), np.empty(30, np.int8)
-    Guard(solver, seen.append).solve(0, Cells(*arrays))
-    processes.end()
-    assert [cell.cell for cell in seen] == [10]
-    assert len(victims) > 10
-
-
-def test_a_process_with_too_much_memory_is_replaced(monkeypatch):
-    begun = []
-    real = isolate.IsolatedSolver._begun
-    monkeypatch.setattr(isolate.IsolatedSolver, "_begun", lambda self: begun.append(1) or real(self))
-    same(quiet(tall(30), isolate=True, workers=1, block_cells=10), quiet(tall(30)))
-    usual = len(begun)
-    monkeypatch.setattr(isolate, "MEMORY_SHARE", 1e-9)
-    same(quiet(tall(30), isolate=True, workers=1, block_cells=10), quiet(tall(30)))
-    assert len(begun) - usual >= usual + 2
-
-
-def test_a_sample_does_not_wait_for_cells_that_never_end():
-    processes = Processes(tall(60, "bad:ENDLESS"), Limits(600.0), 1)
-    assert processes.seconds(1) == 600.0
-    processes.good, processes.dearest = 0, 0.1
-    assert processes.seconds(1) == 2.0
-    processes.limits = Limits(600.0, 0.1)
-    assert processes.seconds(1) == 600.0
-
-
-def test_a_first_cell_that_never_ends_costs_no_more_than_any_other():
-    """The one in the middle of the grid is tried first."""
-    begun = time.monotonic()
-    found = quiet(tall(87, "bad:ENDLESS"), workers=1, cell_timeout=1.0)
-    assert heights_of(found, Status.FAILED) == [bad.HANGS, bad.HOGS]
-    assert time.monotonic() - begun < isolate.LOAD_SECONDS / 2
-
-
 def test_what_compiling_takes_is_not_taken_for_what_a_cell_takes():
     found = quiet(tall(20, "bad:LATE"), workers=1, cell_timeout=0.3)
     assert account(found).ok == 20
-
-
-def test_what_compiling_takes_is_bounded_too(monkeypatch):
-    monkeypatch.setattr(isolate, "LOAD_SECONDS", 0.1)
-    with pytest.raises(TimeoutError):
-        isolate.awaited(Future(), 60.0, lambda: True)

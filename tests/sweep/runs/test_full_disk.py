@@ -7,7 +7,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from running import kept, quiet, same, tall
+from running import kept, quiet, same
 
 import sweep
 from sweep.cli import main
@@ -16,7 +16,7 @@ from sweep.results.verify import verify
 from sweep.store.store import Store, unfinished_of
 from sweep.study.toml import to_toml
 from sweep.system import disk
-from sweep.system.errors import COMPLETE, MISTAKE, SweepError
+from sweep.system.errors import COMPLETE, MISTAKE
 
 MEGABYTES = 4
 
@@ -65,22 +65,6 @@ def swept(path, output, *more):
     """Exit status of the command."""
     words = ["run", path, "-o", output, "--workers", "1", "--allow-import", "--no-isolate", *more]
     return main([str(word) for word in words])
-
-
-def test_too_small_a_disk_is_told_before_the_first_cell(small, monkeypatch):
-    monkeypatch.setattr(Store, "put", lambda *rest: pytest.fail("computed"))
-    with pytest.raises(SweepError, match=r"needs 32\.\d MB, only .* are free here"):
-        quiet(tall(1_000_000), small / "out.h5")
-    assert list(small.iterdir()) == []
-
-
-def test_room_that_is_taken_while_the_file_is_made_is_told_before_the_first_cell(small, monkeypatch):
-    real = disk.reserve
-    monkeypatch.setattr(disk, "reserve", lambda fd, size: [fill(small), real(fd, size)])
-    monkeypatch.setattr(Store, "put", lambda *rest: pytest.fail("computed"))
-    with pytest.raises(SweepError, match="the disk is full"):
-        quiet(tall(1000), small / "out.h5")
-    assert [path.name for path in small.iterdir()] == ["filler"]
 
 
 KINDS = {

@@ -89,12 +89,6 @@ def test_a_folder_that_is_no_zarr_is_left_alone(here):
         assert not Path("a.zarr/thesis.txt").exists()
 
 
-def test_python_does_not_export_over_what_it_reads(here):
-    Path("r.h5").rename("r.nc")
-    with sweep.open_result("r.nc") as ds, pytest.raises(SweepError, match="is what is read"):
-        sweep.export(ds, "r.nc", force=True)
-
-
 def test_a_pipe_is_not_waited_for(here):
     os.mkfifo("a.csv")
     assert cli.main(["export", "r.h5", "-o", "a.csv"]) == 2
@@ -118,25 +112,6 @@ def test_an_export_on_the_disk_is_whole(here, monkeypatch):
     assert order[-2:] == ["rename", ""]
 
 
-def test_a_folder_that_cannot_be_replaced_is_kept(here, monkeypatch):
-    rename, count = disk.rename, []
-
-    def second_fails(old, new):
-        count.append(1)
-        if len(count) == 2:
-            raise OSError(28, "No space left on device")
-        rename(old, new)
-
-    with sweep.open_result("r.h5") as ds:
-        sweep.export(ds, "a.zarr")
-        before = sorted(Path("a.zarr").rglob("*"))
-        monkeypatch.setattr(disk, "rename", second_fails)
-        with pytest.raises(SweepError, match="No space left"):
-            sweep.export(ds, "a.zarr")
-    assert sorted(Path("a.zarr").rglob("*")) == before
-    assert not [p for p in here.iterdir() if p.name.startswith(".")]
-
-
 def test_no_figure_is_overwritten_by_another_program(here, capsys):
     """Of three commands and a program that imports the package."""
     fit = ("fit", "r.h5", "--y", "fall_time", "--x", "height", "--compare", "-o")
@@ -150,24 +125,6 @@ def test_no_figure_is_overwritten_by_another_program(here, capsys):
                 before = Path(other).read_bytes()
                 assert cli.main([*command[:-1], other]) == 2
                 assert Path(other).read_bytes() == before
-
-
-def test_a_plot_and_the_figure_of_the_studys_script_stand_beside_each_other(here, capsys):
-    """The script leaves a picture alone that it has not drawn, and replaces its own."""
-    studies = Path(sweep.__file__).parents[1] / "studies"
-    sweep.run(studies / "foliot_scaling.toml", "foliot_scaling.h5", progress=False).close()
-    script = [sys.executable, str(studies / "foliot_scaling.py"), "foliot_scaling.h5"]
-    assert cli.main(["plot", "foliot_scaling.h5"]) == 0
-    plotted = Path(capsys.readouterr().out.strip())
-    before = plotted.read_bytes()
-    for _ in range(2):
-        assert subprocess.run(script, capture_output=True).returncode == 0
-    assert plotted.read_bytes() == before
-    assert cli.main(["plot", "foliot_scaling.h5", "-o", "foliot_scaling.png"]) == 2
-    assert cli.main(["plot", "foliot_scaling.h5", "-o", "foliot_scaling.png", "--force"]) == 0
-    refused = subprocess.run(script, capture_output=True, text=True)
-    assert refused.returncode == 2
-    assert "foliot_scaling.png" in refused.stderr
 
 
 def test_what_killed_exports_have_left_is_tidied_up_and_nothing_else(here):

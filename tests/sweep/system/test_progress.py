@@ -3,7 +3,6 @@
 import io
 import itertools
 import logging
-import os
 import re
 import sys
 from types import SimpleNamespace
@@ -13,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sweep.system.errors import SweepError
-from sweep.system.progress import Progress, duration, quantity, seconds_of, speed, stream_of
+from sweep.system.progress import Progress, duration, quantity, seconds_of, speed
 
 
 class Clock:
@@ -135,14 +134,6 @@ def test_a_line_comes_every_half_minute_or_twentieth_and_a_terminal_is_redrawn_t
     assert run(stream, clock, times) == told
 
 
-def test_a_night_makes_a_readable_log(clock):
-    log = io.StringIO()
-    run(log, clock, [(k, 1) for k in range(1, 36_001)], total=36_000)
-    told = log.getvalue().splitlines()
-    assert 1200 <= len(told) <= 1203
-    assert told[-1].endswith("took 10 h 00 min")
-
-
 def test_a_terminal_has_one_line_of_which_nothing_is_left_over_and_notes_have_their_own(clock):
     screen = Terminal()
     progress = Progress(10**9, screen, "\x1b[2Jstones", clock=clock)
@@ -166,13 +157,6 @@ def test_a_log_that_cannot_be_written_any_more_stops_nothing(clock, fault):
             raise fault
 
     run(Gone(), clock, [(60, 500), (90, 500)])
-
-
-def test_progress_goes_to_stderr_unless_told_otherwise(capsys):
-    print("here", file=stream_of(None))
-    assert capsys.readouterr().err == "here\n"
-    log = io.StringIO()
-    assert (stream_of(False), stream_of(log)) == (None, log)
 
 
 def test_once_a_minute_it_is_in_the_log_of_a_program(clock, caplog):
@@ -207,25 +191,3 @@ def test_a_notebook_shows_a_bar_of_cells(monkeypatch, clock):
     assert all(words in notebook.getvalue() for words in ("80 %|", "80/100 cells", "a word"))
     run(lines := io.StringIO(), clock, [(2, 10)])
     assert "%|" not in lines.getvalue()
-
-
-SLOW_RUN = """
-import os, sweep
-os.environ["MPLBACKEND"] = "agg"
-keys = {"kernel": "slow:SLOW", "axes": {"height": [1.0 + k for k in range(3000)]}, "outputs": ["fall_time"]}
-ds = sweep.run(keys, workers=1, allow_import=True)
-"""
-
-
-def test_a_real_notebook_shows_one_line_that_moves_and_a_table(monkeypatch):
-    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
-    pytest.importorskip("ipykernel")
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path for path in sys.path if path))
-    cells = [nbformat.v4.new_code_cell(source) for source in (SLOW_RUN, "sweep.study(**keys, allow_import=True)")]
-    nbclient.NotebookClient(nbformat.v4.new_notebook(cells=cells), timeout=120).execute()
-    told = "".join(output.get("text", "") for output in cells[0].outputs)
-    states = [state for state in told.split("\r") if "%|" in state]
-    assert len(states) > 2
-    assert "3,000/3,000 cells" in states[-1]
-    (shown,) = cells[1].outputs
-    assert "<table" in shown["data"]["text/html"]

@@ -17,20 +17,15 @@ def made(dataset, name):
     return Page(dataset, name)
 
 
-def touch(page, x, y):
-    """A click, as it comes from a browser."""
-    from bokeh.events import Tap
+def touch(page, x=None, y=None, zoom=False):
+    """A click, or the wheel that makes these the ends of the axes, as they come from a browser."""
+    from bokeh.events import RangesUpdate, Tap
 
-    page.picture.figure._trigger_event(Tap(page.picture.figure, x=x, y=y))
-
-
-def zoom(page, x, y):
-    """The wheel, as it comes from a browser."""
-    from bokeh.events import RangesUpdate
-
-    for axis, ends in zip((page.picture.figure.x_range, page.picture.figure.y_range), (x, y), strict=True):
-        axis.update(start=ends[0], end=ends[1])
-    page.picture.figure._trigger_event(RangesUpdate(page.picture.figure))
+    figure = page.picture.figure
+    if zoom:
+        figure.x_range.update(start=x[0], end=x[1])
+        figure.y_range.update(start=y[0], end=y[1])
+    figure._trigger_event(RangesUpdate(figure) if zoom else Tap(figure, x=x, y=y))
 
 
 @pytest.fixture
@@ -68,8 +63,7 @@ def test_any_two_axes_make_a_map_or_a_line(page, dataset):
 
 
 def test_scales_are_those_asked_for(page):
-    assert page.picture.scales == (scales := page.picture.scales)
-    assert (scales.x, scales.y) == (True, False)
+    assert (page.picture.scales.x, page.picture.scales.y) == (True, False)
     page.scales["x"].value = "linear"
     assert not page.picture.scales.x
     page.scales["values"].value = "linear"
@@ -77,7 +71,7 @@ def test_scales_are_those_asked_for(page):
 
 
 def test_a_zoom_reads_the_region_and_a_slider_keeps_it(page):
-    zoom(page, (1.0, 2.0), (0.5, 0.6))
+    touch(page, (1.0, 2.0), (0.5, 0.6), zoom=True)
     assert page.found.values("mu").min() > 0.4
     assert page.found.y.sizes["R"] < 8  # and yet a map
     page.sliders["a"].value = 2
@@ -106,6 +100,7 @@ def test_statuses_lie_over_the_picture_and_are_told(page, dataset):
 
 def test_a_click_shows_the_row_of_the_cell(page, dataset):
     touch(page, float(dataset.mu[30]) * 1.05, float(dataset.R[3]) + 0.02)
+    assert "<td>phi0</td><td>1</td><td>rad</td>" in page.table.object
     assert f"<td>{float(dataset.period[30, 3, 1]):.17g}</td>" in page.table.object
     chosen = {"x": [float(dataset.mu[30])], "y": [float(dataset.R[3])]}
     assert page.picture.chosen.data == chosen
@@ -119,19 +114,6 @@ def test_a_result_without_an_axis_of_numbers_is_refused(dataset):
         made(dataset.isel(mu=0, R=0, a=0).load(), "point.h5")
 
 
-def test_a_port_that_is_taken_is_told(result):
-    import socket
-
-    from sweep.view.server import serve
-
-    with socket.socket() as other:
-        other.bind(("127.0.0.1", 0))
-        other.listen()
-        port = other.getsockname()[1]
-        with pytest.raises(sweep.SweepError, match=f"port {port}"):
-            serve(result, port=port, show=False)
-
-
 @pytest.fixture(scope="module")
 def refined():
     axes = {n: {"spacing": "log", "start": 0.1, "stop": 10.0, "num": 4} for n in ("mu", "a", "phi0")}
@@ -143,6 +125,7 @@ def test_cells_of_a_refinement_are_shown_as_a_map_between_them(refined):
     """P = f(mu / (a^2 phi0)) / a, and what is shown of it is as right as was asked."""
     page = made(refined, "fine.h5")
     assert (page.choice.x, page.choice.across, list(page.sliders)) == ("mu", "a", ["phi0"])
+    assert page.shows.options == ["value"]  # no local exponent of straight lines between cells
     assert page.picture.mapped
     assert page.dataset.period.size < 201**2
     assert f"refined: straight lines between its {refined.sizes['cell']} cells" in page.dataset.title
@@ -151,11 +134,6 @@ def test_cells_of_a_refinement_are_shown_as_a_map_between_them(refined):
     phi0 = float(page.dataset.phi0[5])
     truth = sweep.run(sweep.study(kernel="foliot", axes=at, fixed={"phi0": phi0}, outputs=["period"])).period
     np.testing.assert_allclose(page.found.y.values, truth.transpose("a", "mu").values, rtol=5e-2)
-
-
-def test_of_straight_lines_between_cells_no_local_exponent_is_offered(refined, page):
-    assert made(refined, "fine.h5").shows.options == ["value"]
-    assert page.shows.options == ["value", "local exponent"]
 
 
 def test_a_refined_cell_is_clicked_and_its_part_is_kept(refined):
@@ -167,26 +145,6 @@ def test_a_refined_cell_is_clicked_and_its_part_is_kept(refined):
     assert png.read(4)[1:] == b"PNG"
     assert len(csv.read().splitlines()) > 100
     assert page.saves["toml"].disabled  # cells that lie anywhere are no grid
-
-
-def test_words_of_the_page(dataset):
-    from sweep.show.view import view
-    from sweep.view.page import _legend, _setting, _table
-    from sweep.view.picture import status_colour
-
-    assert [_setting(value) for value in dataset.a] == ["0.5 1/s", "1 1/s", "2 1/s"]
-    assert _setting(dataset.mu[40]) == "100 rad/s^2"
-    found = view(dataset.isel(a=1), "period")
-    lines = _legend(found).split("</div>")[:-1]
-    assert len(lines) == len(found.codes())
-    for line, code in zip(lines, found.codes(), strict=True):
-        count = int((found.status == code).sum())
-        assert f"background:{status_colour(found, code)}" in line
-        assert f"{found.meanings[code]}, {count:,} shown: " in line
-    table = _table(dataset[["period"]].assign_attrs(), {"mu": 40, "R": 0, "a": 1})
-    assert table.startswith('<table class="cell"><tr><td>')
-    assert "<tr><td>phi0</td><td>1</td><td>rad</td><td>switching angle</td></tr>" in table
-    assert table.endswith("</td></tr></table>")
 
 
 def test_a_chosen_axis_stays_and_a_held_one_keeps_its_place(page):

@@ -1,6 +1,5 @@
 """What is shown, drawn and saved of a result: its own numbers, and no more of them read than that takes."""
 
-import csv
 from importlib.util import find_spec
 
 import numpy as np
@@ -63,19 +62,6 @@ def test_of_a_long_map_as_many_cells_as_a_picture_can_show_are_read_and_in_a_reg
     assert near.values("v").tolist() == list(range(497, 522))
 
 
-def test_a_slice_has_the_numbers_of_the_result(dataset):
-    found = shown(dataset, Choice("period", "mu", "R", {"a": 2}))
-    assert found.mapped
-    assert np.array_equal(found.y.values, dataset.period.isel(a=2).values.T, equal_nan=True)
-    assert np.array_equal(found.status, dataset.status.isel(a=2).values.T)
-    assert found.y[PLACE + "R"].values.tolist() == list(range(21))
-
-
-def test_the_exponent_is_that_of_the_analysis(dataset):
-    found = shown(dataset, Choice("period", "mu", None, {"a": 1, "R": 0}, exponent=True))
-    assert np.array_equal(found.y.values, sweep.local_exponent(dataset.period.isel(a=1, R=0).load(), "mu").values)
-
-
 def test_what_is_no_axis_has_no_exponent():
     study = sweep.study(
         kernel="foliot", design="zip", axes={"mu": [1.0, 3.0, 2.0], "a": [1.0, 2.0, 3.0]}, fixed={"phi0": 1.0}
@@ -125,19 +111,6 @@ def test_of_points_the_nearest_as_the_eye_sees_it_is_clicked():
     assert nearest(found, 2.4, 21.0, False, (False, False)) == {"cell": 2}
     assert nearest(found, 2.4, 29.0, False, (False, False)) == {"cell": 1}
     assert nearest(points([1.0, 2.0], [np.nan, np.nan]), 2.0, 1.0, False, (False, False)) == {"cell": 0}
-
-
-def test_numbers_of_a_row_have_all_their_digits_and_flags_are_words():
-    attrs = {"flag_values": [0, 1], "flag_meanings": "OK BAD"}
-    columns = {
-        "y": ("x", [0.1], {"units": "s", "long_name": "way"}),
-        "n": ("x", [3], {"units": "1"}),
-        "s": ("x", [1], attrs),
-    }
-    entries = row(xr.Dataset(columns, {"x": [2.0], PLACE + "x": ("x", [0])}), {"x": 0})
-    assert [(e.name, e.value, e.unit, e.meaning) for e in entries] == [
-        ("x", "2", "", ""), ("y", "0.10000000000000001", "s", "way"), ("n", "3", "", ""), ("s", "BAD", "", ""),
-    ]  # fmt: skip
 
 
 # what is drawn
@@ -206,15 +179,6 @@ def test_a_map_is_drawn_from_edge_to_edge_in_the_colours_of_its_values():
     assert image[560 // 9 + 1, 0] == found.y.values[1, 0]
 
 
-def test_logarithmic_colours_leave_out_what_is_not_positive():
-    found = a_map(-1.0, 3.0)
-    drawn = Picture(found, Scales(True, False, True))
-    drawn.show(found, False)
-    assert drawn.mapper.low == found.y.values[found.y.values > 0].min()
-    assert np.isnan(drawn.cells.data["image"][0][0, 0])
-    assert drawn.flags.data["image"] == []
-
-
 # what is saved
 
 
@@ -247,20 +211,6 @@ def test_words_and_lists_are_kept(tmp_path):
     assert found.fixed["J"].tolist() == [1.0, 2.0, 3.0]
 
 
-def test_a_list_of_cells_has_no_regions():
-    study = sweep.study(kernel="foliot", design="zip", axes={"mu": [1.0, 2.0], "a": [1.0, 2.0]}, fixed={"phi0": 1.0})
-    with pytest.raises(sweep.SweepError, match="list of cells"):
-        region.study_text(sweep.run(study, progress=False), Choice("period", "mu"), None, None)
-
-
-def test_the_table_has_the_cells_in_view_with_all_outputs(dataset):
-    text = region.table(dataset, MAP, None, None).getvalue().decode()
-    rows = list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
-    for name in ("period", "amplitude"):
-        found = np.array([float(r[name]) for r in rows]).reshape(41, 21)
-        assert np.array_equal(found, dataset[name].isel(a=2).values, equal_nan=True)
-
-
 def test_whole_numbers_in_the_range_are_kept_as_they_are(tmp_path):
     keys = {"axes": {"flips": [2.0, 4.0, 6.0, 8.0], "mu": [1.0, 2.0]}, "fixed": {"a": 0.5, "phi0": 1.0, "step": 0.05}}
     dataset = sweep.run(sweep.study(kernel="foliot_steps", **keys), progress=False)
@@ -270,7 +220,12 @@ def test_whole_numbers_in_the_range_are_kept_as_they_are(tmp_path):
     assert found.fixed["mu"] == 2.0
 
 
-def test_a_result_of_no_known_study_has_no_regions(dataset):
+def test_a_list_of_cells_and_a_result_of_no_known_study_have_no_regions(dataset):
+    study = sweep.study(kernel="foliot", design="zip", axes={"mu": [1.0, 2.0], "a": [1.0, 2.0]}, fixed={"phi0": 1.0})
     bare = dataset.drop_attrs(deep=False)
-    with pytest.raises(sweep.SweepError, match="does not say which study"):
-        region.study_text(bare, MAP, None, None)
+    for found, choice, word in (
+        (sweep.run(study), Choice("period", "mu"), "list of cells"),
+        (bare, MAP, "which study"),
+    ):
+        with pytest.raises(sweep.SweepError, match=word):
+            region.study_text(found, choice, None, None)

@@ -1,0 +1,173 @@
+"""The foliot's half swing integrated: every term of the losses, drag not smooth at rest, and what is refused."""
+
+import foliot_oracles
+import numpy as np
+import oracles
+import pytest
+from columns import estimated, relative_error, solve
+
+from kernels.foliot.cycle import FOLIOT
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+
+NAMES = ("period", "amplitude", "crossing_speed", "sensitivity", "multiplier")
+UNIT = {"mu": 1.0, "phi0": 1.0}
+TERMS = [
+    {"a": 0.01},
+    {"a": 3.0, "R": 0.9},
+    {"a": 50.0, "R": 0.3},
+    {"R": 0.999},
+    {"R": 0.1, "e": 0.3},
+    {"c": 0.3, "n": 0.0},
+    {"c": 1.5, "n": 0.5},
+    {"c": 0.4, "n": 0.5, "a": 6.0, "R": 0.7, "e": -0.9},
+    {"c": 4.0, "n": 1.5},
+    {"c": 2.0, "n": 1.0, "a": 1.0, "R": 0.2},
+    {"c": 5.0, "n": 2.0, "e": 0.5},
+    {"c": 0.1, "n": 2.5, "a": 0.1},
+    {"c": 0.01, "n": 3.0, "R": 0.1},
+    {"c": 8.0, "n": 4.0, "e": 0.0},
+    {"a": 0.3, "k": 5.0},
+    {"a": 0.01, "k": 300.0, "R": 0.3},
+    {"R": 0.8, "k": 1000.0},
+    {"k": 50.0, "e": 0.9},
+    {"k": 50.0, "e": -0.5},
+    {"a": 0.1, "k": 2.0, "R": 0.2, "e": 0.0},
+    {"c": 0.5, "n": 0.1, "e": 1e-13},
+    {"c": 0.5, "n": 0.1, "e": -1e-13},
+]
+NEAR_REST = [
+    (1.32e-4, {"mu": 0.334, "phi0": 0.111, "c": 0.000814, "n": 0.162, "R": 0.14}),
+    (6e-4, {"mu": 3.892, "phi0": 0.3829, "c": 0.00961, "n": 0.1096, "R": 0.3929, "a": 0.009747}),
+    (3.5e-4, {"mu": 7.461, "phi0": 1.643, "c": 0.008332, "n": 0.1329, "R": 1.23}),
+    (1.52e-5, {"mu": 2.91, "phi0": 2.5, "c": 0.00295, "n": 0.344, "e": 0.0974}),
+    (4.9e-4, {"mu": 6.342, "phi0": 0.2295, "c": 0.008921, "n": 1.099, "R": 0.5546}),
+    (5.85e-5, {"mu": 0.247, "phi0": 9.13, "c": 0.000303, "n": 2.13, "R": 0.0332}),
+    (1.31e-8, {"mu": 1.47, "phi0": 0.759, "c": 0.00175, "n": 2.51, "a": 0.072}),
+    (5.89e-8, {"mu": 0.38, "phi0": 0.459, "c": 0.00803, "n": 3.28, "R": 0.113, "a": 0.00501}),
+]
+"""rtol and terms; unless rest is passed without a step, errors are 1 to 1000 rtol."""
+
+
+def as_columns(cells):
+    """One column of each term, at its default where a cell has none."""
+    defaults = {"R": 0.0, "a": 0.0, "c": 0.0, "n": 2.0, "k": 0.0, "e": 1.0}
+    full = [UNIT | defaults | cell for cell in cells]
+    return {name: np.array([cell[name] for cell in full]) for name in full[0]}
+
+
+def compare(cells, truths, rtol):
+    """Every output of every cell is right to half of its rtol; a multiplier may be 0 for good."""
+    outputs, status = solve(FOLIOT, "dopri5", rtol=rtol, **as_columns(cells))
+    assert (status == Status.OK).all(), [c for c, s in zip(cells, status, strict=True) if s]
+    for position, name in enumerate(NAMES):
+        there = [i for i, truth in enumerate(truths) if abs(truth[position]) > 1e-300]
+        error = relative_error(outputs[name][there], [truths[i][position] for i in there])
+        share = error / np.broadcast_to(rtol, len(cells))[there]
+        assert share.max() <= 0.5, (name, cells[there[share.argmax()]], share.max())
+
+
+def test_every_term_and_their_mixtures_are_right_to_half_of_rtol():
+    cells = TERMS if COMPILED else [TERMS[i] for i in (5, 10, 12, 14)]
+    truths = [foliot_oracles.cycle(**UNIT | cell, digits=18) for cell in cells]
+    for rtol in (1e-3, 1e-6, 1e-9) if COMPILED else (1e-3,):
+        compare(cells, truths, rtol)
+
+
+def test_viscous_friction_over_twelve_decades_is_right_to_half_of_rtol():
+    cells = [{"a": d} for d in np.sqrt(np.geomspace(1e-9, 1e3, 300 if COMPILED else 3))]
+    truths = [oracles.foliot(1.0, 1.0, cell["a"]) for cell in cells]
+    for rtol in (1e-3, 1e-6, 1e-9) if COMPILED else (1e-3,):
+        compare(cells, truths, rtol)
+
+
+def test_drag_that_is_not_smooth_at_rest_is_right_to_half_of_rtol():
+    rtol, cells = zip(*(NEAR_REST if COMPILED else NEAR_REST[:1]), strict=True)
+    compare(cells, [foliot_oracles.cycle(**cell, digits=20) for cell in cells], np.array(rtol))
+
+
+SPRUNG = (
+    (8.84e-8, {"mu": 3.02, "phi0": 2.24, "c": 0.00125, "n": 1.07, "R": 1.24, "k": 0.00234, "e": 0.922}),
+    (9.12e-7, {"mu": 0.118, "phi0": 0.167, "c": 0.00741, "n": 2.05, "R": 0.0206, "k": 0.0205}),
+    (6.29e-9, {"mu": 0.736, "phi0": 0.385, "c": 0.00645, "n": 3.11, "R": 0.0993, "a": 0.0729, "k": 0.0135}),
+)
+
+
+@pytest.mark.skipif(not COMPILED, reason="the finest tolerances in plain Python")
+@pytest.mark.parametrize(("rtol", "cell"), SPRUNG)
+def test_with_a_hairspring_it_is_what_taylor_gives(rtol, cell):
+    columns = as_columns([cell])
+    true, _, error = estimated(FOLIOT, "taylor", rtol=1e-13, **columns)
+    assert error[0] < 0.01 * rtol
+    found, status = solve(FOLIOT, "dopri5", rtol=rtol, **columns)
+    assert status[0] == Status.OK
+    assert max(abs(found[name][0] / true[name][0] - 1.0) for name in NAMES) <= 0.5 * rtol
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of cells")
+@pytest.mark.parametrize("degrees", [(0.1, 1.0), (1.0, 2.0), (2.0, 4.0)])
+def test_no_cell_of_many_is_called_ok_and_off_by_more_than_rtol(degrees):
+    random, n = np.random.default_rng(3), 4000
+    cells = {
+        "mu": 1.0, "phi0": 1.0, "c": 10.0 ** random.uniform(-3, 1, n), "n": random.uniform(*degrees, n),
+        "R": random.uniform(0.0, 0.9, n) * (random.random(n) < 0.5), "e": np.where(random.random(n) < 0.5, 1.0, 0.5),
+    }  # fmt: skip
+    rtol = 10.0 ** random.uniform(-8, -3, n)
+    true, sure = solve(FOLIOT, "quadrature", rtol=1e-13, **cells)
+    found, status = solve(FOLIOT, "dopri5", rtol=rtol, **cells)
+    judged = (status == Status.OK) & (sure == Status.OK)
+    assert judged.mean() > 0.8
+    for name in NAMES:
+        there = judged & (true[name] > 1e-300)
+        error = np.abs(found[name][there] / true[name][there] - 1.0) / rtol[there]
+        assert error.max() <= 1.0, (name, error.max())
+
+
+def test_from_a_wide_swing_it_arrives_at_the_switch():
+    e = np.array([0.999, 0.9999])
+    outputs, status = solve(FOLIOT, "dopri5", np.ones(2), 1.0, e=e, rtol=1e-6)
+    assert (status == Status.OK).all()
+    np.testing.assert_allclose(outputs["period"], 4 * np.sqrt((1 + e) / (1 - e)), rtol=1e-6)
+
+
+STICKING = [
+    {"a": 3.0, "k": 10.0},  # overdamped: creeps to the spring's rest
+    {"a": 0.5, "k": 100.0},  # falls short by energy
+    {"a": 0.5, "k": 6.6},  # the first that falls short: with 6.0 there is a cycle
+    {"c": 3.0, "n": 2.0, "k": 50.0},
+    {"R": 1.0},
+    {"R": 0.5, "c": 0.5, "n": 0.0},
+    {"a": 0.1, "R": 0.9, "k": 30.0},
+]
+
+
+def test_where_a_swing_from_rest_cannot_reach_the_switch_it_sticks():
+    for cell in STICKING:
+        with pytest.raises(foliot_oracles.NoCycle):
+            foliot_oracles.cycle(**UNIT | cell, digits=15)
+    rtol = 1e-6 if COMPILED else 1e-3
+    assert (solve(FOLIOT, "dopri5", rtol=rtol, **as_columns(STICKING))[1] == Status.STICKS).all()
+    assert solve(FOLIOT, "dopri5", rtol=rtol, **as_columns([{"a": 0.5, "k": 6.0}]))[1][0] == Status.OK
+
+
+def test_stiction_holds_a_turning_point_that_the_spring_does_not_free():
+    cells = {"R": 0.5, "R_s": [0.9, 1.5, 1.5, 1.5], "k": [0.0, 0.0, 10.0, 0.0], "e": [1.0, 1.0, 1.0, -0.5]}
+    _, status = solve(FOLIOT, "dopri5", **UNIT, **cells, rtol=1e-6)
+    assert status.tolist() == [Status.OK, Status.STICKS, Status.OK, Status.OK]  # the last does not turn
+
+
+@pytest.mark.skipif(not COMPILED, reason="the finest tolerances in plain Python")
+@pytest.mark.parametrize(
+    ("cell", "rtol", "statuses"),
+    [
+        ({"mu": 1e-8, "a": 1.0}, 1e-3, {Status.STEP_LIMIT}),  # too stiff
+        ({"a": 101.0, "k": 1e-3}, 1e-3, {Status.STEP_LIMIT}),
+        ({"R": 0.1492, "k": 77.15}, 1e-9, {Status.INACCURATE}),  # rounding spoils it
+        ({"mu": 1e11, "a": 1.0}, 1e-12, {Status.INACCURATE, Status.NOT_CONVERGED}),
+        ({"mu": 1e6, "a": 1.0}, 1e-15, {Status.INACCURATE, Status.NOT_CONVERGED}),
+        ({"a": 1.0}, np.nan, set(Status) - {Status.OK}),
+        ({"a": 1.0}, -1.0, set(Status) - {Status.OK}),
+    ],
+)
+def test_what_cannot_be_right_to_rtol_says_so(cell, rtol, statuses):
+    assert solve(FOLIOT, "dopri5", rtol=rtol, **as_columns([cell]))[1][0] in statuses

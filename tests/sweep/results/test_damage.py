@@ -1,0 +1,283 @@
+"""Damage of every kind is found, told with its cells, and mended; no damaged number is handed out, all others are."""
+
+import itertools
+import os
+import pickle
+import random
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+import toy_studies
+import xarray as xr
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from running import flip, interrupted, kept, keys, place, quiet, same, tall
+
+import sweep
+from sweep.cli import main
+from sweep.store.reading import StoredFile
+from sweep.store.store import unfinished_of
+
+BLOCK, CELLS = 11, 33
+SIZES = {"v0": 3, "height": 11, "phase": 3}
+SUMMARY = {"over": ["height"], "outputs": {"fall_time": ["min", "mean", "argmin"]}}
+
+
+def study(**more):
+    axes = {"v0": [0.0, 2.0, 3.0], "height": np.arange(1.0, 12)}
+    return toy_studies.build(axes=axes, outputs=["fall_time", "drop"], along={"phase": [0.0, 0.5, 1.0]}, **more)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    path = tmp_path_factory.mktemp("whole") / "out.h5"
+    quiet(study(), path, block_cells=BLOCK).close()
+    return path
+
+
+@pytest.fixture(scope="module")
+def summary(tmp_path_factory):
+    path = tmp_path_factory.mktemp("summary") / "out.h5"
+    quiet(study(summary=SUMMARY), path).close()
+    return path
+
+
+@pytest.fixture
+def copy(whole, tmp_path):
+    return shutil.copy(whole, tmp_path / "out.h5")
+
+
+@pytest.fixture(params=["cells", "summary", "unfinished"])
+def any_result(request, whole, summary, tmp_path):
+    """A result and the file that holds it."""
+    path = tmp_path / "out.h5"
+    if request.param == "unfinished":
+        interrupted(study(), path)
+        return path, unfinished_of(path)
+    shutil.copy({"cells": whole, "summary": summary}[request.param], path)
+    return path, path
+
+
+def harm(path, name, cell, bit=0):
+    """Flips a bit of a number of a cell."""
+    flip(path, place(path, name, cell) + (3 if name != "status" else 0), bit)
+
+
+# what verify finds
+
+
+def test_a_flipped_bit_anywhere_is_found_and_a_whole_result_is_whole(any_result):
+    path, file = any_result
+    before = sweep.verify(path)
+    assert before.whole is (path == file)
+    content = file.read_bytes()
+    for at in random.Random(3).sample(range(len(content)), 100):
+        flip(file, at, at % 8)
+        assert not sweep.verify(path).whole, at
+        file.write_bytes(content)
+    assert sweep.verify(path) == before
+
+
+@pytest.mark.parametrize("what", ["digests", "ending", "between"])
+def test_damage_of_digests_and_between_numbers_is_found(any_result, what):
+    path, file = any_result
+    with StoredFile(file) as found:
+        layout, table = found.layout, found.layout.work
+    holes = [int(end) for (_, end), (begin, _) in itertools.pairwise(table.spans()) if begin > end]
+    at = {"digests": [table.digests + 3], "ending": [layout.endings[-1][0]], "between": holes[:1]}[what]
+    for byte in at:
+        flip(file, byte)
+        assert not sweep.verify(path).whole
+
+
+@pytest.mark.parametrize("name", ["fall_time", "drop", "status"])
+def test_damaged_cells_are_named(copy, capsys, name):
+    harm(copy, name, 17)
+    found = sweep.verify(copy)
+    assert found.findings == (f"{name}: damaged between its cells 11 and 22",)
+    assert found.blocks == (1,)
+    assert main(["verify", str(copy)]) == 2
+    assert "between its cells 11 and 22" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("what", ["attribute", "comment", "coordinate", "status", "units"])
+def test_what_another_program_changed_is_told_and_can_be_read(copy, what):
+    with h5py.File(copy, "r+") as file:
+        if what in ("attribute", "comment"):
+            file.attrs["title" if what == "attribute" else "comment"] = "mine"
+        elif what == "units":
+            file["fall_time"].attrs["units"] = "minute"
+        else:
+            file["height" if what == "coordinate" else "status"][0] = 0.5 if what == "coordinate" else 64
+    found = sweep.verify(copy)
+    assert not found.whole
+    assert any("another program" in text for text in found.findings)
+    with sweep.open_result(copy) as changed:
+        assert changed.load().attrs.get("comment") == ("mine" if what == "comment" else None)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.3, 0.9, 0.999, 1.001])
+def test_a_file_of_another_length_is_found(whole, any_result, share):
+    path, file = any_result
+    size = file.stat().st_size
+    os.truncate(file, round(share * size))
+    assert not sweep.verify(path).whole
+    if share < 1:
+        with pytest.raises(sweep.SweepError, match="damaged"):
+            sweep.open_result(path).load()
+
+
+@pytest.mark.parametrize("digests_too", [False, True])
+def test_chunks_that_changed_places_are_found(copy, digests_too):
+    """HDF5's own checksum sees nothing of it; neither would digests that do not say of which chunk they are."""
+    with StoredFile(copy) as file:
+        table = file.layout.work
+    spans = [(table.places[0].at(block), table.stored(table.places[0], block)) for block in (0, 1)]
+    digests = [(table.digests + block * table.row_bytes, 16) for block in (0, 1)]
+    content = bytearray(copy.read_bytes())
+    for (a, n), (b, m) in (spans, digests) if digests_too else (spans,):
+        content[a : a + n], content[b : b + m] = content[b : b + m], content[a : a + n]
+    copy.write_bytes(content)
+    assert sweep.verify(copy).blocks == (0, 1)
+
+
+@pytest.mark.parametrize("ended", [True, False])
+def test_a_result_whose_last_bytes_never_came_is_refused_whoever_reads_it(whole, tmp_path, monkeypatch, ended, capsys):
+    """As of a copy that was interrupted; its length may be right."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(whole, "whole.h5")
+    path, content = tmp_path / "out.h5", whole.read_bytes()
+    file = path if ended else unfinished_of(path)
+    for lost in sorted({1, 2, 11, 12, 13, 28, 29, *np.geomspace(40, len(content) - 100, 9).astype(int).tolist()}):
+        for fill in (b"\0", b"\xff", b""):
+            file.write_bytes(content[:-lost] + fill * lost)
+            if file.read_bytes() == content:
+                continue
+            with pytest.raises(sweep.SweepError, match="damaged"):
+                sweep.open_result(path).load()
+            assert not sweep.verify(path).whole
+    for command in (["show"], ["verify"], ["export", "-o", "out.csv"], ["diff", "whole.h5"]):
+        assert main([*command, str(path)]) == 2
+        printed = capsys.readouterr()
+        assert "damaged" in printed.err + printed.out
+
+
+# what readers get
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    key=st.fixed_dictionaries({}, optional={name: keys(size) for name, size in SIZES.items()}),
+    cell=st.integers(0, CELLS - 1),
+)
+def test_any_piece_is_right_or_refused(whole, tmp_path, key, cell):
+    """A cell that is damaged takes its block along, and nothing else."""
+    path = shutil.copy(whole, tmp_path / "out.h5")
+    harm(path, "fall_time", cell)
+    with xr.open_dataset(whole, engine="h5netcdf") as plain, sweep.open_result(path) as found:
+        assert found["drop"].isel(key).values.tobytes() == plain["drop"].isel(key).values.tobytes()
+        key.pop("phase", None)
+        numbers = plain.fall_time.copy(data=np.arange(CELLS).reshape(3, 11)).isel(key).values
+        if cell // BLOCK in np.ravel(numbers) // BLOCK:
+            with pytest.raises(sweep.SweepError, match="fall_time is damaged between"):
+                found.fall_time.isel(key).load()
+        else:
+            assert found.fall_time.isel(key).values.tobytes() == plain.fall_time.isel(key).values.tobytes()
+
+
+def test_a_damaged_summary_is_not_handed_out(summary, tmp_path):
+    path = shutil.copy(summary, tmp_path / "out.h5")
+    flip(path, place(path, "fall_time_mean", 1) + 1)
+    with sweep.open_result(path) as found, pytest.raises(sweep.SweepError, match="fall_time_mean is damaged"):
+        found.load()
+
+
+@pytest.mark.parametrize("what", ["title", "height"])
+def test_damage_beside_the_numbers_is_told_at_once_and_cannot_be_repaired(copy, what):
+    with h5py.File(copy) as file:
+        at = file["height"].id.get_offset() + 12
+    flip(copy, at if what == "height" else copy.read_bytes().index(b"toy:KERNEL"))
+    for action in (sweep.open_result, lambda path: quiet(study(), path, repair=True)):
+        with pytest.raises(sweep.SweepError, match="damaged"):
+            action(copy)
+    assert copy.exists()
+
+
+def test_hdf5_checks_what_another_program_changed(copy):
+    with h5py.File(copy, "r+") as file:
+        file["fall_time"][1, 2] = 7.0
+        at = file["fall_time"].id.get_chunk_info(0).byte_offset
+    with sweep.open_result(copy) as found:
+        assert found.fall_time[1, 2] == 7.0
+    flip(copy, at)
+    with sweep.open_result(copy) as found, pytest.raises(OSError, match="filter"):
+        found.fall_time.load()
+
+
+def test_a_dataset_that_was_sent_to_another_process_is_checked_there(copy):
+    harm(copy, "fall_time", 0)
+    with sweep.open_result(copy) as found:
+        drop, fall_time = pickle.loads(pickle.dumps((found["drop"], found.fall_time)))
+        assert drop.values.tobytes() == found["drop"].values.tobytes()
+        with pytest.raises(sweep.SweepError, match="damaged"):
+            fall_time.load()
+
+
+@pytest.mark.parametrize("harmed", ["status", "fall_time", "drop", "all"])
+def test_a_damaged_block_is_pending_in_all_columns_of_an_unfinished_result(tmp_path, harmed):
+    interrupted(study(), tmp_path / "out.h5")
+    path = unfinished_of(tmp_path / "out.h5")
+    if harmed == "all":  # filled with zeros, which is valid to HDF5
+        with StoredFile(path) as file:
+            spans = [(p.at(0), file.layout.work.stored(p, 0)) for p in file.layout.work.places]
+        content = bytearray(path.read_bytes())
+        for at, length in spans:
+            content[at : at + length] = bytes(length)
+        path.write_bytes(content)
+    else:
+        harm(path, harmed, 1)
+    with sweep.open_result(tmp_path / "out.h5") as found:
+        for name, missing in (("status", 127), ("method_used", -1), ("fall_time", np.nan)):
+            np.testing.assert_array_equal(found[name].values.reshape(-1)[:4], [missing] * 4)
+
+
+def test_what_is_there_of_an_unfinished_result_is_told_with_what_is_missing(tmp_path):
+    interrupted(tall(23), tmp_path / "out.h5")
+    found = sweep.verify(tmp_path / "out.h5")
+    assert not found.whole
+    assert found.findings[0].startswith("missing: cells 10 to 15")
+    assert f"{len(kept(tmp_path / 'out.h5'))} of 5 blocks" in found.checked
+
+
+# what mends it
+
+
+@pytest.mark.parametrize("kind", ["cells", "summary"])
+@pytest.mark.parametrize("what", [[1], [0, 3], range(99), "digests", []])
+def test_a_damaged_result_is_repaired_to_the_same_bytes(tmp_path, kind, what):
+    made, path = study(**({"summary": SUMMARY} if kind == "summary" else {})), tmp_path / "out.h5"
+    quiet(made, path, block_cells=10).close()
+    before = path.read_bytes()
+    with StoredFile(path) as file:
+        table = file.layout.work
+    count = table.blocks.count
+    for block in [2 % count] if what == "digests" else [block for block in what if block < max(count, 2)]:
+        flip(path, table.digests + block % count * table.row_bytes + 1 if what == "digests" else
+             table.places[0].at(block % count) + 1)  # fmt: skip
+    if what:
+        with pytest.raises(sweep.SweepError, match="--repair"):
+            quiet(made, path)
+    quiet(made, path, repair=True).close()
+    assert sweep.verify(path).whole
+    assert list(tmp_path.iterdir()) == [path]
+    after = path.read_bytes()
+    assert sum(a != b for a, b in zip(before, after, strict=True)) <= (25 + 25 + 12 + 16) * bool(what)  # times, digest
+
+
+def test_a_damaged_result_is_computed_anew_when_forced(copy):
+    harm(copy, "fall_time", 17)
+    with quiet(study(), copy, force=True) as found:
+        same(found, quiet(study()))
+    assert sweep.verify(copy).whole
