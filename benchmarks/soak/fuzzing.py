@@ -9,7 +9,6 @@ import re
 import shutil
 import tomllib
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from havoc import flip, study
@@ -17,7 +16,6 @@ from havoc import flip, study
 from sweep.cells.fingerprint import fingerprint
 from sweep.cli import main
 from sweep.runs.run import run
-from sweep.store.layout import read_layout, structure_digest
 from sweep.study.read import study as as_study
 from sweep.study.toml import to_toml
 from sweep.system.errors import SweepError
@@ -140,24 +138,12 @@ def fuzz_result(rng: random.Random, whole: Path, folder: Path) -> list[int]:
         flip(rng, path)
     if rng.random() < 0.1:
         path.write_bytes(path.read_bytes()[: rng.randrange(path.stat().st_size)])
-    if rng.random() < 0.5:
-        forge(path)
     return [
         quietly("show", path),
         quietly("verify", path),
         quietly("fit", path, "--y", "fall_time", "--x", "height"),
         quietly("export", path, "-o", folder / "damaged.csv", "--force"),
     ]
-
-
-def forge(path: Path) -> None:
-    """Seals a result anew, as somebody who knows how would; one without a layout stays as it is."""
-    with path.open("r+b") as file:
-        layout = read_layout(file.fileno(), path.stat().st_size)
-        if layout is not None:
-            structure = structure_digest(file.fileno(), [*layout.regions, *layout.endings], layout.end)
-            file.seek(layout.end)
-            file.write(replace(layout, structure=structure).trailer())
 
 
 def quietly(*argv: object) -> int:

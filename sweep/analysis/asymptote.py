@@ -89,7 +89,12 @@ def fit_correction(
     check_end("end", end)
     dimension, t, logs = window_logs(y, dim, window)
     sign = 1.0 if end == "high" else -1.0
-    found = numbers_along(NUMBERS, lambda z: _each(sign * t, z, sign, confidence), logs, dimension)
+
+    def each(z: Array) -> Array:
+        rows = [_one(sign * t, row, sign, confidence) for row in z.reshape(math.prod(z.shape[:-1]), t.size)]
+        return np.array(rows).reshape(*z.shape[:-1], len(NUMBERS))
+
+    found = numbers_along(NUMBERS, each, logs, dimension)
     if not bool(found.exponent.notnull().any()):
         raise SweepError(
             f"a correction to scaling needs at least {FEWEST_POINTS} points of {title(y)}; widen the window"
@@ -98,11 +103,6 @@ def fit_correction(
         found[name].attrs = {"units": "1", "long_name": text}
     found.attrs = {"y": title(y), "x": dim, "law": f"{title(y)} = A {dim}^p (1 + B {dim}^-D), {end} end"}
     return found
-
-
-def _each(t: Array, z: Array, sign: float, confidence: float) -> Array:
-    rows = [_one(t, row, sign, confidence) for row in z.reshape(math.prod(z.shape[:-1]), t.size)]
-    return np.array(rows).reshape(*z.shape[:-1], len(NUMBERS))
 
 
 @np.errstate(all="ignore")  # what overflows is infinite
@@ -115,17 +115,13 @@ def _one(t: Array, z: Array, sign: float, confidence: float) -> Array:
     if found is None or t.size < FEWEST_POINTS:
         return np.full(len(NUMBERS), np.nan)
     exponent, fade, left = _outer(found, t)
-    noisy = _scatters(t, z, found.off)
+    beyond_rounding = abs(found.off).max() > 1e-12 * (1 + abs(z).max())
+    noisy = bool(beyond_rounding and noise_size(t, found.off) > SCATTERS * float(np.sqrt(np.mean(found.off**2))))
     ends = _profile(t, z, found, confidence) if noisy else _by_half(t, z, exponent)
     # of a D that is not within FADES the profile does not know
     reached = [sign * end for end in (*ends, exponent)]
     residual = float(np.expm1(abs(found.off).max()))
     return np.array([sign * exponent, min(reached), max(reached), sign * fade, left, residual, noisy, abs(left) < 1])
-
-
-def _scatters(t: Array, z: Array, off: Array) -> bool:
-    beyond_rounding = abs(off).max() > 1e-12 * (1 + abs(z).max())
-    return bool(beyond_rounding and noise_size(t, off) > SCATTERS * float(np.sqrt(np.mean(off**2))))
 
 
 def _outer(found: Found, t: Array) -> tuple[float, float, float]:

@@ -89,8 +89,15 @@ def fit_collapse(
     """
     check_confidence(confidence)
     points, count = _points(y, dim, over)
-    a = _best(points, _range(points))
-    points = _overlapping(points, a, count)
+    # exponents that leave neighbours in L with something in common, and no more than 8
+    most = min(8.0, 0.9 * float(np.ptp(points.t)) / float(np.diff(np.unique(points.size)).min()))
+    a = _best(points, (-most, most))
+    inside = _shared(points, a)
+    if (among := int(inside.sum())) < FEWEST_POINTS:
+        raise SweepError(
+            f"of {count} points {among} lie among those of another curve; at least {FEWEST_POINTS} are needed"
+        )
+    points = Points(*(column[inside] for column in points))
     near = (a - 0.3 * (1 + abs(a)), a + 0.3 * (1 + abs(a)))
     a = _best(points, near, TRIES)
     b, fitted, numbers = _spline(points, a)
@@ -104,59 +111,27 @@ def fit_collapse(
     result["residual"], result["points"] = float(np.sqrt(np.mean(off**2))), points.t.size
     result["dropped"], result["fits"] = count - points.t.size, int(_one_curve(points, a, off))
     law = f"{title(y)} = {over}^b f({dim} / {over}^a)"
-    return _described(result).assign_attrs(y=title(y), x=dim, over=over, law=law)
-
-
-def _overlapping(points: Points, a: float, count: int) -> Points:
-    """Points that lie among those of another curve, of `count` given ones."""
-    inside = _shared(points, a)
-    found = int(inside.sum())
-    if found < FEWEST_POINTS:
-        raise SweepError(
-            f"of {count} points {found} lie among those of another curve; at least {FEWEST_POINTS} are needed"
-        )
-    return Points(*(column[inside] for column in points))
-
-
-def _described(result: xr.Dataset) -> xr.Dataset:
     for key in map(str, result.data_vars):
         text = COLLAPSED.get(key) or f"{'lower' if key.endswith('low') else 'upper'} end of its interval"
         result[key].attrs = {"units": "1", "long_name": text}
-    return result
+    return result.assign_attrs(y=title(y), x=dim, over=over, law=law)
 
 
 def _points(y: xr.DataArray, dim: str, over: str) -> tuple[Points, int]:
     check_output(y)
     if y.ndim != 2 or {dim, over} != {str(d) for d in y.dims}:
         raise SweepError(f"a collapse takes one output along {dim} and {over}, and nothing else; choose with .sel")
-    t, size = np.log(positive_axis(y, dim)[1]), np.log(_parameter(y, over))
+    t, sizes = np.log(positive_axis(y, dim)[1]), y[over].values.astype(np.float64)
+    if sizes.size < 2 or not (np.isfinite(sizes) & (sizes > 0)).all():
+        raise SweepError(f"{over}: a collapse needs at least two values, all positive")
     z = log_of(y).transpose(over, dim).values
     fine = np.isfinite(z)
     which = np.nonzero(fine)
-    found = Points(t[which[1]], z[fine], size[which[0]], which[0].astype(np.float64))
+    found = Points(t[which[1]], z[fine], np.log(sizes)[which[0]], which[0].astype(np.float64))
     if found.t.size < FEWEST_POINTS:
         few = f"a collapse needs at least {FEWEST_POINTS} positive points of {title(y)}, found {found.t.size}"
         raise SweepError(few)
     return found, z.size
-
-
-def _parameter(y: xr.DataArray, over: str) -> Array:
-    values: Array = y[over].values.astype(np.float64)
-    if values.size < 2 or not (np.isfinite(values) & (values > 0)).all():
-        raise SweepError(f"{over}: a collapse needs at least two values, all positive")
-    return values
-
-
-def _range(points: Points) -> tuple[float, float]:
-    """Exponents a that leave neighbours in L with something in common, and no more than 8."""
-    sizes = np.unique(points.size)
-    most = min(8.0, 0.9 * float(np.ptp(points.t)) / float(np.diff(sizes).min()))
-    return -most, most
-
-
-def _knots(u: Array) -> int:
-    """Pieces of the spline: one for eight points, at most 20."""
-    return int(min(20, max(1, u.size // 8)))
 
 
 def _columns(points: Points, a: float) -> Array:
@@ -164,7 +139,8 @@ def _columns(points: Points, a: float) -> Array:
     from scipy.interpolate import BSpline
 
     u = points.t - a * points.size
-    inner = np.interp(np.linspace(0, u.size - 1, _knots(u) + 1), np.arange(u.size), np.sort(u))  # quantiles
+    pieces = int(min(20, max(1, u.size // 8)))
+    inner = np.interp(np.linspace(0, u.size - 1, pieces + 1), np.arange(u.size), np.sort(u))  # quantiles
     knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
     knots[-4:] += 1e-9 * (1 + abs(knots[-1]))
     basis = BSpline.design_matrix(u, knots, 3).toarray()

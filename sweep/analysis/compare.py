@@ -84,27 +84,17 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     present = present[np.argsort(t[present])]
     t, z = t[present], logs.values[present]
     weights = None if sigma is None else relative[present] ** -2.0
-    tried = _tried(t, z, weights)
-    found = _table(t, z, tried, weights)
-    found.attrs = {"y": title(y), "x": dim, **_judged(found, _verdict(tried))}
-    for name, of in (("x", y[dim]), ("y", y), ("fitted", y)):
-        found[name].attrs = {"units": str(of.attrs.get("units", "1"))}
-    return found
-
-
-def _judged(found: xr.Dataset, verdict: dict[str, Any]) -> dict[str, Any]:
-    """The verdict, which also says where even the chosen law is not the law."""
-    if not fits(found, verdict["chosen"]):
-        verdict["verdict"] += "; but what it leaves has a shape, so that none of them is the law"
-    return verdict
-
-
-def _tried(t: Array, z: Array, weights: Array | None) -> list[Found]:
-    """All laws that can be fitted, the best first; `weights` are None where the errors are not known."""
     tried = [fit for law in LAWS if (fit := fitted(law, t, z, weights, known=weights is not None)) is not None]
     if weights is None:
         tried = [_with_any_noise(t, z, fit) if fit.law is ONE else fit for fit in tried]
-    return sorted(tried, key=lambda fit: fit.aicc)
+    tried.sort(key=lambda fit: fit.aicc)
+    found = _table(t, z, tried, weights)
+    found.attrs = {"y": title(y), "x": dim, **_verdict(tried)}
+    if not fits(found, found.attrs["chosen"]):
+        found.attrs["verdict"] += "; but what it leaves has a shape, so that none of them is the law"
+    for name, of in (("x", y[dim]), ("y", y), ("fitted", y)):
+        found[name].attrs = {"units": str(of.attrs.get("units", "1"))}
+    return found
 
 
 def _with_any_noise(t: Array, z: Array, found: Found) -> Found:

@@ -117,7 +117,13 @@ def missing_is_nan(y: xr.DataArray) -> xr.DataArray:
 
 def logarithm(part: xr.DataArray, dim: str) -> xr.DataArray:
     """Natural logarithm, NaN where a point is missing. Raises SweepError where a point is not positive."""
-    _require_fit_for_logarithms(part, dim)
+    cells = np.argwhere(np.asarray(part.values <= 0))
+    if count := len(cells):
+        first = part[tuple(cells[0])]
+        raise SweepError(
+            f"a power law needs positive values; {count} of {part.size} of {title(part)} in the window are not, "
+            f"e.g. {float(first):g} at {dim} = {float(first.coords[dim]):g}; choose a window without them"
+        )
     return log_of(part)
 
 
@@ -243,14 +249,3 @@ def noise_of(off: Array) -> float:
     orders = range(2, min(10, off.size - 4) + 1)
     sizes = [float(np.sqrt(np.mean(np.diff(off, k) ** 2) / math.comb(2 * k, k))) for k in orders]
     return min(sizes, default=math.inf)
-
-
-def _require_fit_for_logarithms(part: xr.DataArray, dim: str) -> None:
-    cells = np.argwhere(np.asarray(part.values <= 0))
-    count = len(cells)
-    if count:
-        first = part[tuple(cells[0])]
-        raise SweepError(
-            f"a power law needs positive values; {count} of {part.size} of {title(part)} in the window are not, "
-            f"e.g. {float(first):g} at {dim} = {float(first.coords[dim]):g}; choose a window without them"
-        )

@@ -232,13 +232,6 @@ def _where(
         count = int(error.max())
         said = f"passes {value:g} {count} times" if count else f"does not pass {value:g}"
         raise SweepError(f"{title(curve)} {said} along {dim} in the window; choose another window")
-    return _describe_place(curve, dim, value, place, error)
-
-
-def _describe_place(
-    curve: xr.DataArray, dim: str, value: float, place: xr.DataArray, error: xr.DataArray
-) -> xr.Dataset:
-    """From `place` and `error` in ln dim."""
     abscissa: xr.DataArray = xr.apply_ufunc(np.exp, place, keep_attrs=True)
     found = xr.Dataset({"abscissa": abscissa, "abscissa_error": (abscissa * error).where(place.notnull())})
     units = str(curve.coords[dim].attrs.get("units", "1"))

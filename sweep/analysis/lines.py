@@ -261,16 +261,11 @@ def judge(t: Array, z: Array, sigma: Array, bound: Array, given: Given) -> Judge
     fit = line(t, z)
     off = z - np.log(fit.level) - fit.exponent * (t - np.log(fit.centre))
     noisy = is_scatter(t, off, z, bound) if given.noise is None else bool(given.noise)
-    if noisy and t.size > FEWEST and abs(off).max() > 8 * rounding(t, z):
-        return _noisy(t, z, off, given)
-    found = _exact(t, z, off, bound, fit)
-    return found._replace(kind="any") if noisy else found
-
-
-def _noisy(t: Array, z: Array, off: Array, given: Given) -> Judged:
-    kind = given.noise if isinstance(given.noise, str) else None
+    if not noisy or t.size <= FEWEST or abs(off).max() <= 8 * rounding(t, z):
+        exact = _exact(t, z, off, bound, fit)
+        return exact._replace(kind="any") if noisy else exact
+    kind, even = given.noise if isinstance(given.noise, str) else None, np.ones(t.size)
     found = scattered(t, z, given.confidence, kind)
-    even = np.ones(t.size)
     bent = bend(t, z, given.confidence, found.weights if found.kind == "uneven" else even) if kind is None else None
     if bent is not None:
         return Judged("bent", even, found.error, *bent, fits=False)
@@ -332,7 +327,11 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     """
     for fit in (low_fit, high_fit):
         check_dataset("crossover", fit, "fit_exponent", ["exponent", "level", "limit_low"])
-    _require_apart(low_fit, high_fit)
+    for name in ("y", "x"):
+        if low_fit.attrs.get(name) != high_fit.attrs.get(name):
+            raise SweepError(f"the fits are of different {name}: {low_fit.attrs.get(name)}, {high_fit.attrs.get(name)}")
+    if bool(((low_fit.low < high_fit.high) & (high_fit.low < low_fit.high)).any()):
+        raise SweepError("the windows of the two fits overlap, so their errors are not independent; take them apart")
     first, second = np.log(low_fit.centre), np.log(high_fit.centre)
     middle = (first + second) / 2  # logarithms counted from here keep their digits
     slope = high_fit.exponent - low_fit.exponent
@@ -374,11 +373,3 @@ def _systematic(low_fit: xr.Dataset, high_fit: xr.Dataset, lines: list[Any], mid
     moved = [abs(place - there).fillna(0.0) for place in places]
     found: xr.DataArray = xr.concat(moved, dim="which").max("which")
     return found
-
-
-def _require_apart(low_fit: xr.Dataset, high_fit: xr.Dataset) -> None:
-    for name in ("y", "x"):
-        if low_fit.attrs.get(name) != high_fit.attrs.get(name):
-            raise SweepError(f"the fits are of different {name}: {low_fit.attrs.get(name)}, {high_fit.attrs.get(name)}")
-    if bool(((low_fit.low < high_fit.high) & (high_fit.low < low_fit.high)).any()):
-        raise SweepError("the windows of the two fits overlap, so their errors are not independent; take them apart")

@@ -80,10 +80,24 @@ def contours(field: xr.DataArray, levels: Sequence[float]) -> xr.Dataset:
     SweepError
         The field has not two dimensions, or an axis has no numbers or fewer than two.
     """
-    down, across = _axes(field)
-    parts = [_lines(field, float(level)) for level in levels]
-    lines = [(level, line) for level, found in zip(levels, parts, strict=True) for line in found]
+    check_output(field)
+    if field.ndim != 2:
+        raise SweepError(f"{title(field)} has {field.ndim} dimensions; a map needs two, choose with .sel or --at")
+    for name in field.dims:
+        if name not in field.coords or field[name].dtype.kind not in "fiu" or field.sizes[name] < 2:
+            raise SweepError(f"{name} has no two numbers to draw a map over")
+    try:
+        import contourpy
+    except ImportError:
+        raise missing("lines on maps need contourpy", "plot") from None
+    down, across = map(str, field.dims)
+    values = [field[name].values for name in (across, down)]
+    logarithmic = [is_logarithmic(grid) for grid in values]
+    x, y = (np.log(g) if take else g.astype(np.float64) for g, take in zip(values, logarithmic, strict=True))
+    generator = contourpy.contour_generator(x, y, np.ma.masked_invalid(field.values.astype(np.float64)))
+    lines = [(level, np.array(line)) for level in levels for line in generator.lines(float(level))]
     points = np.concatenate([line for _, line in lines]) if lines else np.empty((0, 2))
+    points[:, logarithmic] = np.exp(points[:, logarithmic])
     count = [len(line) for _, line in lines]
     columns = {
         across: points[:, 0],
@@ -103,33 +117,3 @@ def fraction(level: float) -> str:
     """An exponent as people write it: -1/3, 1/2, 0.27."""
     near = Fraction(level).limit_denominator(12)
     return str(near) if abs(float(near) - level) < 1e-9 else f"{level:.3g}"
-
-
-def _axes(field: xr.DataArray) -> tuple[str, str]:
-    check_output(field)
-    if field.ndim != 2:
-        raise SweepError(f"{title(field)} has {field.ndim} dimensions; a map needs two, choose with .sel or --at")
-    for name in field.dims:
-        if name not in field.coords or field[name].dtype.kind not in "fiu" or field.sizes[name] < 2:
-            raise SweepError(f"{name} has no two numbers to draw a map over")
-    return str(field.dims[0]), str(field.dims[1])
-
-
-def _lines(field: xr.DataArray, level: float) -> list[np.ndarray]:
-    """Lines of (x, y) points of one level."""
-    try:
-        import contourpy
-    except ImportError:
-        raise missing("lines on maps need contourpy", "plot") from None
-    down, across = _axes(field)
-    logarithmic = [is_logarithmic(field[name].values) for name in (across, down)]
-    x, y = (
-        np.log(field[n].values) if take else field[n].values.astype(np.float64)
-        for n, take in zip((across, down), logarithmic, strict=True)
-    )
-    generator = contourpy.contour_generator(x, y, np.ma.masked_invalid(field.values.astype(np.float64)))
-    lines = [np.array(line) for line in generator.lines(level)]
-    for line in lines:
-        for column, take in enumerate(logarithmic):
-            line[:, column] = np.exp(line[:, column]) if take else line[:, column]
-    return lines

@@ -174,7 +174,9 @@ def _of_batch(
     number = min(len(points), axes + 1 + AROUND.get(axes, 2 * len(pairs)))
     distance, nearest = tree.query(_centres(points, around), number)
     near = np.concatenate([nearest, around[:, axes + 1 :]], axis=1)
-    shares = _shares(points[corners], points[near])
+    place = points[corners]
+    rest = (points[near] - place[:, :1]) @ np.linalg.inv(place[:, 1:] - place[:, :1])
+    shares = np.concatenate([1 - rest.sum(axis=2, keepdims=True), rest], axis=2)  # barycentric coordinates
     off = heights[near] - (shares @ heights[corners][:, :, None])[:, :, 0]
     basis = shares[:, :, pairs[:, 0]] * shares[:, :, pairs[:, 1]]
     weight = 1 / np.maximum(abs(basis).sum(axis=2), LEAST_BASIS)
@@ -186,12 +188,6 @@ def _of_batch(
 def _centres(points: Array, around: Indices) -> Array:
     found: Array = points[around[:, : points.shape[1] + 1]].mean(axis=1)
     return found
-
-
-def _shares(place: Array, near: Array) -> Array:
-    """Barycentric coordinates (m, n, axes + 1) of points in simplices."""
-    rest = (near - place[:, :1]) @ np.linalg.inv(place[:, 1:] - place[:, :1])
-    return np.concatenate([1 - rest.sum(axis=2, keepdims=True), rest], axis=2)
 
 
 def _parabola(basis: Array, off: Array, weight: Array) -> tuple[Array, Array]:

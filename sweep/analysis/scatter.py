@@ -77,28 +77,20 @@ def bend(t: Array, z: Array, confidence: float, weights: Array) -> tuple[float, 
     if t.size < FEWEST_FOR_BEND:
         return None
     u = 2 * (t - t[0]) / (t[-1] - t[0]) - 1
-    straight, *bent = (_polynomial_criterion(u, z, degree, weights) for degree in (1, 2, 3))
+    columns = [np.polynomial.chebyshev.chebvander(u, degree).astype(np.float64) for degree in (1, 2, 3)]
+    straight, *bent = (criterion(of_degree, z, weights) for of_degree in columns)
     if not min(bent) < straight - BEYOND_DOUBT:
         return None
     sm, degrees = library("statsmodels.api"), range(2, min(6, t.size - 3) + 1)
     tries = [sm.WLS(z, np.polynomial.chebyshev.chebvander(u, d), weights=weights).fit() for d in degrees]
     found = min(tries, key=lambda fit: corrected(-2 * fit.llf, t.size, fit.params.size + 1))
     degree = found.params.size - 1
-    slope_columns = np.stack([_chebyshev_slope(u, k) for k in range(degree + 1)], axis=1) * 2 / (t[-1] - t[0])
+    derivatives = [np.polynomial.chebyshev.chebder(one) for one in np.eye(degree + 1)]
+    slope_columns = np.stack([np.polynomial.chebyshev.chebval(u, d) * np.ones_like(u) for d in derivatives], axis=1)
+    slope_columns = slope_columns * 2 / (t[-1] - t[0])
     error = np.sqrt(np.einsum("ni,ij,nj->n", slope_columns, found.cov_params(), slope_columns))
     reach, slope = student(t.size - degree - 1, confidence) * error, slope_columns @ found.params
     return float((slope - reach).min()), float((slope + reach).max())
-
-
-def _polynomial_criterion(u: Array, z: Array, degree: int, weights: Array) -> float:
-    columns: Array = np.polynomial.chebyshev.chebvander(u, degree).astype(np.float64)
-    return criterion(columns, z, weights)
-
-
-def _chebyshev_slope(u: Array, k: int) -> Array:
-    slope = np.polynomial.chebyshev.chebder(np.eye(k + 1)[k])
-    found: Array = (np.polynomial.chebyshev.chebval(u, slope) * np.ones_like(u)).astype(np.float64)
-    return found
 
 
 def scattered(t: Array, z: Array, confidence: float, kind: str | None = None) -> Scatter:
@@ -196,14 +188,11 @@ def _kind(t: Array, plain: Any, columns: Array) -> str:
         logs = np.log(np.maximum(plain.resid**2, 1e-6 * float(np.mean(plain.resid**2))))
         if sm.OLS(logs, columns).fit().pvalues[1] < UNEVEN:
             return "uneven"
-    alone = 2 * t.size * stdtr(max(1, t.size - 3), -_farthest(plain)) < OUTLYING
-    return "outliers" if t.size >= 8 and alone else "any"
-
-
-def _farthest(plain: Any) -> float:
-    """Largest externally studentized distance from a line; statsmodels, to find it, fits anew without each point."""
+    # the largest externally studentized distance; statsmodels, to find it, fits anew without each point
     left, inside = plain.df_resid, float(np.nanmax(plain.get_influence().resid_studentized_internal ** 2))
-    return math.sqrt(inside * (left - 1) / max(left - inside, 1e-300))
+    farthest = math.sqrt(inside * (left - 1) / max(left - inside, 1e-300))
+    alone = 2 * t.size * stdtr(max(1, t.size - 3), -farthest) < OUTLYING
+    return "outliers" if t.size >= 8 and alone else "any"
 
 
 def _weighted(sm: Any, columns: Array, z: Array, weights: Array, kind: str, confidence: float, **keys: Any) -> Scatter:

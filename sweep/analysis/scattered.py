@@ -158,7 +158,8 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     shape = tuple(len(values) for values in grids.values())
     box = Box.of({name: dataset[name].values for name in names})
     points, places = box.points({n: dataset[n].values for n in names}), box.points(mesh)
-    nearest = _nearest(points, places)
+    corners, shares = located(points, places)
+    nearest = np.take_along_axis(corners, shares.argmax(axis=1)[:, None], 1)[:, 0]  # with the largest share
     found = xr.Dataset(coords={name: (name, values, dataset[name].attrs) for name, values in grids.items()})
     status, error = dataset[STATUS].values, np.zeros(len(places))
     refined, inaccurate = json.loads(dataset.attrs.get(REFINED_TO, "{}")), np.zeros(len(places), bool)
@@ -178,13 +179,6 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
         bound = np.where(inaccurate, np.fmax(error, dataset[ERROR_BOUND].values[nearest]), np.nan)
         found[ERROR_BOUND] = (tuple(grids), bound.reshape(shape), dataset[ERROR_BOUND].attrs)
     return found.assign_attrs(dataset.attrs)
-
-
-def _nearest(points: Array, places: Array) -> Indices:
-    """The corner with the largest share in each place, of the simplices of the box as it is."""
-    corners, shares = located(points, places)
-    found: Indices = np.take_along_axis(corners, shares.argmax(axis=1)[:, None], 1)[:, 0]
-    return found
 
 
 def kinds(status: Indices, valued: NDArray[np.bool_]) -> Indices:
@@ -271,7 +265,8 @@ def on_lines(dataset: xr.Dataset, x: str) -> xr.Dataset:
     grid, column = np.unique(values[on], return_inverse=True)
     row = (np.cumsum(long) - 1)[line[on]]
     across = others[0] if len(others) == 1 else "line"
-    labels = lines[long, 0] if len(others) == 1 else [_label(others, place) for place in lines[long]]
+    texts = [", ".join(f"{name} = {v:.6g}" for name, v in zip(others, place, strict=True)) for place in lines[long]]
+    labels = lines[long, 0] if len(others) == 1 else texts
     attrs = {**dataset.attrs, "lines": _lines_told(x, others, lines, count, long)}
     found = xr.Dataset(coords={across: (across, labels), x: (x, grid, dataset[x].attrs)}, attrs=attrs)
     for name, variable in dataset.data_vars.items():
@@ -295,7 +290,3 @@ def _longest(names: Sequence[str], lines: Array, count: Indices) -> str:
     most = int(count.argmax())
     at = " ".join(f"--at {name}={float(value)!r}" for name, value in zip(names, lines[most], strict=True))
     return f"e.g. {at} ({count[most]} cells)"
-
-
-def _label(names: Sequence[str], values: Array) -> str:
-    return ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, values, strict=True))

@@ -144,7 +144,12 @@ def fit_two_laws(
             raise SweepError("window does not go with windows, which say where the two lines are")
         return _in_windows(y, dim, windows, confidence, noise)
     dimension, t, logs = window_logs(y, dim, window)
-    numbers = along(lambda z: _each(t, z, confidence, noise), logs, dimension, "number")
+
+    def each(z: Array) -> Array:
+        rows = [_one(t, row, confidence, noise) for row in z.reshape(-1, t.size)]
+        return np.array(rows).reshape(*z.shape[:-1], -1)
+
+    numbers = along(each, logs, dimension, "number")
     if not np.isfinite(numbers.isel(number=slice(len(LAWS) * len(EXPONENTS))).values).any():
         raise SweepError(f"two laws need at least {FEWEST_POINTS} points of {title(y)}, found fewer; widen the window")
     return _described(numbers, y, dim, confidence)
@@ -165,11 +170,6 @@ def _in_windows(
     found["crossover"], found["crossover_error"], found["level"] = met.abscissa, met.abscissa_error, met.ordinate
     found.attrs = {**met.attrs, "confidence": confidence}
     return found
-
-
-def _each(t: Array, z: Array, confidence: float, noise: bool | str | None) -> Array:
-    rows = [_one(t, row, confidence, noise) for row in z.reshape(-1, t.size)]
-    return np.array(rows).reshape(*z.shape[:-1], -1)
 
 
 @np.errstate(all="ignore")  # what overflows is infinite; a crossover that is not determined reaches there
@@ -289,7 +289,9 @@ def _widened(t: Array, z: Array, off: Array, best: Array, low: Array, high: Arra
     low[laws] = np.minimum(low[laws], ends.min(axis=1) - doubt)
     high[laws] = np.maximum(high[laws], ends.max(axis=1) + doubt)
     steep = np.concatenate([ends, (ends[:, 0] - doubt)[:, None], (ends[:, 0] + doubt)[:, None]], axis=1)
-    meetings = [_meeting(t, z, pair) for pair in itertools.product(*steep) if pair[0] != pair[1]]
+    # where lines of these slopes through the first and the last point meet
+    pairs = [pair for pair in itertools.product(*steep) if pair[0] != pair[1]]
+    meetings = [float((z[-1] - z[0] + p * t[0] - q * t[-1]) / (p - q)) for p, q in pairs]
     low[PLACE], high[PLACE] = min(low[PLACE], place, *meetings), max(high[PLACE], place, *meetings)
     return low, high
 
@@ -298,11 +300,6 @@ def _amplified(t: Array) -> float:
     """Standard error of the local exponent at the start of a window, for values with errors of size 1."""
     near = t[:5]
     return float(np.sqrt((slopes(near, np.eye(near.size), 5)[:, 0] ** 2).sum()))
-
-
-def _meeting(t: Array, z: Array, pair: tuple[float, ...]) -> float:
-    """Where lines of these slopes through the first and the last point meet."""
-    return float((z[-1] - z[0] + pair[0] * t[0] - pair[1] * t[-1]) / (pair[0] - pair[1]))
 
 
 def _by_memory(off: Array, jacobian: Array, confidence: float, reach: Array) -> Array:
@@ -324,7 +321,8 @@ def _of_other_bends(
     Where noise remembers, intervals reach `more` times as far, and points rule out less by the square of that.
     """
     tried = [(found, 1.0) for law in BENDS[1:] if (found := fitted(law, t, z)) is not None]
-    best = min([_criterion(off), *(found.aicc for found, _ in tried)])
+    own = corrected(off.size * math.log(float(off @ off) / off.size + 1e-300), off.size, 6)
+    best = min([own, *(found.aicc for found, _ in tried)])
     stretched = [_other_powers(t, z, found, confidence) for found, _ in tried if found.law is STRETCHED]
     low, high = numbers - reach, numbers + reach
     own_low, own_high, span = low.copy(), high.copy(), t[-1] - t[0]
@@ -361,11 +359,6 @@ def _other_powers(t: Array, z: Array, best: Found, confidence: float) -> list[tu
                 break
             allowed.append((found, math.sqrt(min(1.0, 1 - (found.deviance - best.deviance) / doubt))))
     return allowed
-
-
-def _criterion(off: Array) -> float:
-    """AICc of (1)."""
-    return corrected(off.size * math.log(float(off @ off) / off.size + 1e-300), off.size, 6)
 
 
 def _evidence(t: Array, z: Array, off: Array) -> float:

@@ -6,7 +6,6 @@ import argparse
 import contextlib
 import sys
 from collections.abc import Iterator, Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
@@ -49,32 +48,10 @@ def opened(path: Path, unfinished: bool = True) -> Iterator[xr.Dataset]:
         raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
     if not path.exists() and path.with_name(path.name + ".unfinished").exists():
         say(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
-    check_readable(path, "xarray")
     with open_result(path) as found, changed(path):
         if "end" not in found.attrs and not unfinished:
             raise SweepError(f"{path}: unfinished; continue it with sweep run, or take what there is with --unfinished")
         yield found
-
-
-def check_readable(path: Path, *meanwhile: str) -> None:
-    """Raises SweepError where HDF5 hangs or crashes in a result although its trailer is right: then it is forged.
-
-    A result that is not intact, or not there, is looked at by who opens it.
-
-    Parameters
-    ----------
-    meanwhile : names of modules to import while another process reads the result
-    """
-    from sweep.results.open import unreadable
-    from sweep.store.probe import intact, probing
-
-    if not intact(path):
-        return
-    read = probing(path)
-    for name in meanwhile:
-        import_module(name)
-    if not read():
-        raise unreadable(path, ValueError("HDF5 cannot read it"))
 
 
 def check_target_of(arguments: argparse.Namespace, target: Path, kind: str | None = None) -> None:

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from sweep.command.files import check_readable, check_target_of, in_units_of, opened, result_of, say
+from sweep.command.files import check_target_of, in_units_of, opened, result_of, say
 from sweep.command.options import (
     ALL,
     AT,
@@ -43,7 +43,6 @@ def _show(arguments: argparse.Namespace) -> None:
 def _verify(arguments: argparse.Namespace) -> None:
     from sweep.results.verify import verify
 
-    check_readable(arguments.result)
     verdict = verify(arguments.result)
     if not verdict.whole:
         raise SweepError(str(verdict))

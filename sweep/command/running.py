@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sweep.command.files import check_readable, is_isolated, say, study_from
+from sweep.command.files import is_isolated, say, study_from
 from sweep.command.options import (
     ALLOW_IMPORT,
     CELL_TIMEOUT,
@@ -45,7 +45,6 @@ def _run(arguments: argparse.Namespace) -> Outcome:
     from sweep.system.log import log, log_path, logging_to
 
     output = _output(arguments)
-    check_readable(output)
     path = log_path(output) if output.parent.is_dir() else None
     with contextlib.ExitStack() as stack:
         try:

@@ -11,8 +11,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from sweep.cells.output_schema import gathered, output_schema
 from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import BY_STATUS, pending
@@ -162,14 +160,12 @@ def _open(output: Path) -> xr.Dataset:
     """A file, whether it is finished or not. Raises SweepError, FileNotFoundError."""
     from sweep.results.columns import open_checked
 
-    sealed = check_structure(output)
+    check_structure(output)
     attrs = stored_attrs(output)
     large = output.stat().st_size > MEMORY_SHARE * memory()
     try:
         found = open_checked(output, "auto" if large else None)
         _check_kinds(found)
-        if sealed:
-            _check_as_declared(found, Study.from_json(attrs["study_json"], declared=True))
         if found.attrs.get("end") == "unfinished".ljust(ENDINGS["end"]):
             return _of_unfinished(output, found, attrs)
         return _with_plain_text(found)
@@ -178,7 +174,7 @@ def _open(output: Path) -> xr.Dataset:
 
 
 def _check_kinds(dataset: xr.Dataset) -> None:
-    """Raises one of DAMAGE where text or numbers are something else; what does not say its type is forged."""
+    """Raises one of DAMAGE where text or numbers are something else; what does not say its type was changed."""
     for attrs in (dataset.attrs, *(v.attrs for v in dataset.variables.values())):
         if not all(isinstance(attrs[name], str) for name in TEXTS if name in attrs):
             raise TypeError("an attribute is no text")
@@ -187,29 +183,6 @@ def _check_kinds(dataset: xr.Dataset) -> None:
         float(attrs.get("rtol", 0.0)), float(attrs.get("cells_per_second", 0.0))
     if not {v.dtype.kind for v in dataset.data_vars.values()} <= set("fiu"):
         raise TypeError("an output is no number")
-
-
-def _check_as_declared(dataset: xr.Dataset, study: Study) -> None:
-    """Raises one of DAMAGE where variables have other shapes or types than those of a result of the study."""
-    plan = output_schema(study, {})
-    declared = {c.name: ((*plan.grid.dims, *c.dims), plan.shape(c), np.dtype(c.dtype).kind) for c in plan.columns}
-    declared |= {c.name: (c.dims, np.shape(c.values), np.asarray(c.values).dtype.kind) for c in plan.coordinates}
-    for c in plan.coordinates:
-        if not _equal(dataset.variables[c.name].values, np.asarray(c.values)):
-            raise ValueError(f"{c.name} has other values than the study")
-    if set(dataset.variables) - set(declared):
-        raise ValueError("more is there than the study asks for")
-    for name, expected in declared.items():
-        variable = dataset.variables[name]
-        kind = variable.dtype.kind.replace("O", "U").replace("T", "U")
-        if (variable.dims, variable.shape, kind) != expected:
-            raise ValueError(f"{name} is not as the study says")
-
-
-def _equal(found: Any, expected: Any) -> bool:
-    """Whether numbers or words are the same, NaN included."""
-    text = expected.dtype.kind == "U"
-    return bool(np.array_equal(found.astype(str) if text else found, expected, equal_nan=not text))
 
 
 def _of_unfinished(output: Path, found: xr.Dataset, attrs: Mapping[str, Any]) -> xr.Dataset:
@@ -241,13 +214,13 @@ def _stored(path: Path) -> StoredFile:
         raise unreadable(path, fault) from None
 
 
-def check_structure(output: Path) -> bool:
-    """Whether all but the outputs' numbers is known to be as written. Raises SweepError where it is damaged.
+def check_structure(output: Path) -> None:
+    """Raises SweepError where anything but the outputs' numbers is known not to be as it was written.
 
     A program that changes a file by HDF5 cuts the trailer off; what it changed on purpose is opened.
     """
     if not output.is_file():
-        return False
+        return
     try:
         fd = disk.open_file(output, os.O_RDONLY)
         try:
@@ -260,7 +233,6 @@ def check_structure(output: Path) -> bool:
         raise unreadable(output, fault) from None
     if sound is False:
         raise SweepError(f"{output}: {BESIDE}; sweep verify tells of all damage")
-    return bool(sound)
 
 
 @contextlib.contextmanager

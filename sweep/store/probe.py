@@ -1,14 +1,13 @@
 """Whether HDF5 can be let loose on a result: it may loop for ever, or crash, in a damaged one.
 
 A result that carries no trailer of digests, or was changed since, is first read by another process, which may hang or
-crash. A trailer can be forged, so the command line has each result read so that this process has not written itself.
+crash.
 """
 
 from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -45,9 +44,6 @@ with h5netcdf.File(sys.argv[1], "r", phony_dims="access") as file:
 """
 """Reads what a reader would read, and as it would, but for numbers that are not read by HDF5."""
 
-_written: set[tuple[int, ...]] = set()
-"""Files that this process has written, or has had read, and nobody changed since."""
-
 
 def intact(path: Path) -> bool:
     """Whether a file is there, can be read, and is unbroken by what its trailer says."""
@@ -62,41 +58,18 @@ def intact(path: Path) -> bool:
 
 def readable(path: Path, fd: int) -> bool:
     """Whether HDF5 can be let loose on a result. Raises OSError."""
-    # it may have no trailer, or have been changed on purpose, or by the disk
-    return bool(unbroken(fd, MOST_AT_ONCE, path)) or probing(path)()
+    # without a trailer it was changed, on purpose or by the disk
+    return bool(unbroken(fd, MOST_AT_ONCE, path)) or _read_elsewhere(path)
 
 
-def probing(path: Path) -> Callable[[], bool]:
-    """Has another process read a result; what comes back waits for it, and says whether it could. Raises OSError."""
-    mark = _mark(path)
-    if mark in _written:
-        return lambda: True
+def _read_elsewhere(path: Path) -> bool:
+    """Whether another process can read a result. Raises OSError."""
     words = [sys.executable, "-I", "-c", PROBE, str(path)]
-    process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-
-    def read() -> bool:
-        try:
-            found = process.wait(PROBE_SECONDS + path.stat().st_size / PROBE_SPEED) == 0
-        except subprocess.TimeoutExpired:
-            found = False
-        finally:
-            process.kill()
-            process.wait()
-        if found:
-            _written.add(mark)
-        return found
-
-    return read
-
-
-def written(path: Path) -> None:
-    """Notes that this process has written a file. Raises OSError."""
-    _written.add(_mark(path))
-
-
-def _mark(path: Path) -> tuple[int, ...]:
-    found = path.stat()
-    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
+    limit = PROBE_SECONDS + path.stat().st_size / PROBE_SPEED
+    try:
+        return subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, timeout=limit).returncode == 0
+    except subprocess.TimeoutExpired:
+        return False
 
 
 def check_own(group: Any, inner: bool = False) -> None:

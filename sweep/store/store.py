@@ -26,7 +26,6 @@ import numpy as np
 from sweep.store.ending import Gather, end, gathered, reads_back
 from sweep.store.frame import PAGE, Frame
 from sweep.store.layout import DAMAGE, TAIL, Layout, Table, read_layout, write_digests
-from sweep.store.probe import written
 from sweep.store.reading import StoredFile, damaged, unbroken
 from sweep.system import disk
 from sweep.system.errors import Incomplete, SweepError
@@ -318,7 +317,6 @@ class Store:
                 )
             disk.rename(self.path, self.output)
             disk.sync_folder(self.output.parent)
-            written(self.output)
         return []
 
     def reopen(self, damaged: Iterable[int]) -> None:

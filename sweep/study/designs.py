@@ -150,9 +150,16 @@ class DesignParser:
         if design in PLAIN or not design:
             return design, {}
         options = {"n": self._count(found.get("n"), design, f"{where}.n", axes)}
-        options["seed"] = self._seed(found.get("seed", 0), f"{where}.seed")
+        options["seed"] = seed = found.get("seed", 0)
+        if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 0 <= seed <= LARGEST_SEED:
+            self.mistakes.add(f"{where}.seed", f"expected a whole number from 0 to {LARGEST_SEED}, found {show(seed)}")
+        else:
+            options["seed"] = int(seed)
         if scrambled:
-            options["scramble"] = self._scramble(found.get("scramble", True), f"{where}.scramble")
+            options["scramble"] = found.get("scramble", True)
+            if not isinstance(options["scramble"], bool):
+                text = f"expected true or false, found {show(options['scramble'])}"
+                self.mistakes.add(f"{where}.scramble", text)
         return design, options if len(self.mistakes) == before else {}
 
     def _count(self, found: Any, design: str, where: str, axes: int) -> int | None:
@@ -167,17 +174,6 @@ class DesignParser:
             self.mistakes.add(where, f"makes {points:,} points; expected at most {LARGEST_AXIS:,}")
         return n
 
-    def _seed(self, found: Any, where: str) -> int | None:
-        if isinstance(found, bool) or not isinstance(found, int | np.integer) or not 0 <= found <= LARGEST_SEED:
-            self.mistakes.add(where, f"expected a whole number from 0 to {LARGEST_SEED}, found {show(found)}")
-            return None
-        return int(found)
-
-    def _scramble(self, found: Any, where: str) -> bool:
-        if not isinstance(found, bool):
-            self.mistakes.add(where, f"expected true or false, found {show(found)}")
-        return bool(found)
-
     def _check_axes(self, axes: Mapping[str, Axis], fields: Mapping[str, Field | None], design: str, at: str) -> None:
         """What concerns several values or several axes; axes without values have been complained about."""
         if "rtol" in axes and not all(SMALLEST_RTOL <= value < 1 for value in axes["rtol"].values):
@@ -188,15 +184,16 @@ class DesignParser:
         if design == "zip" and len(set(lengths.values())) > 1:
             found = listed((f"{name} has {n}" for name, n in lengths.items()), word="and")
             self.mistakes.add(at, f'design "zip" needs axes of equal length; {found} values')
-        if design == "product":
-            for name, axis in axes.items():
-                self._check_product_axis(axis, fields[name], f"{at}.{name}")
-
-    def _check_product_axis(self, axis: Axis, field: Field | None, where: str) -> None:
-        if axis.values.ndim > 1:
-            self.mistakes.add(where, f'{axis.name} is an array; as an axis it needs design = "zip"')
-        elif len(twice := _repeated(axis, field)):
-            self.mistakes.add(where, f"{axis.label(twice[0])} stands more than once; give every value once")
+        for name, axis in axes.items() if design == "product" else ():
+            if axis.values.ndim > 1:
+                self.mistakes.add(f"{at}.{name}", f'{name} is an array; as an axis it needs design = "zip"')
+                continue
+            _, first, counts = np.unique(axis.values, return_index=True, return_counts=True)
+            # NaN may stand once, too; but the words of a field that is not known are all NaN
+            twice = first[(counts > 1) & ((fields[name] is not None) | ~np.isnan(axis.values[first]))]
+            if len(twice):
+                text = f"{axis.label(int(twice[0]))} stands more than once; give every value once"
+                self.mistakes.add(f"{at}.{name}", text)
 
     def _check_size(self, axes: Mapping[str, Axis], blocks: Sequence[Block]) -> None:
         lengths = []
@@ -214,10 +211,3 @@ def axes_named(keys: Mapping[str, Any]) -> set[str]:
     tables = [keys, *(blocks if isinstance(blocks, list | tuple) else ())]
     found = (table.get("axes") for table in tables if isinstance(table, Mapping))
     return {str(name) for axes in found if isinstance(axes, Mapping) for name in axes}
-
-
-def _repeated(axis: Axis, field: Field | None) -> list[int]:
-    """Where values first stand that stand again, NaN among them; not the words of a field not known, all NaN."""
-    _, first, counts = np.unique(axis.values, return_index=True, return_counts=True)
-    twice: list[int] = first[(counts > 1) & ((field is not None) | ~np.isnan(axis.values[first]))].tolist()
-    return twice

@@ -261,8 +261,13 @@ class Study:
             along = {name: frozen(values) for name, values in keys["along"].items()}
             known = {name: keys[name] for name in PLAIN} | {"axes": axes, "along": along}
             known["outputs"] = tuple(known["outputs"])
-            known["fixed"] = {name: _value(value) for name, value in keys["fixed"].items()}
-            known["summary"] = _summary(keys["summary"]) if "summary" in keys else None
+            known["fixed"] = {n: frozen(value) if np.ndim(value) else value for n, value in keys["fixed"].items()}
+            known["summary"] = None
+            if "summary" in keys:
+                given = keys["summary"]
+                outputs = {name: tuple(reductions) for name, reductions in given["outputs"].items()}
+                edges = {name: frozen(values) for name, values in given["edges"].items()}
+                known["summary"] = Summary(tuple(given["over"]), outputs, edges)
             known["blocks"] = tuple(Block(b["design"], tuple(b["axes"]), b["options"]) for b in keys.get("blocks", ()))
             known["where"] = keys.get("where", "")
             _check_words(known)
@@ -316,15 +321,6 @@ def frozen(values: Any) -> NDArray[np.float64]:
 def _axis(axis: Axis) -> dict[str, Any]:
     found = {"name": axis.name, "values": axis.values, "spacing": axis.spacing, "words": axis.words}
     return found if axis.entry is None else found | {"entry": axis.entry}
-
-
-def _value(value: Any) -> float | NDArray[np.float64]:
-    return frozen(value) if np.ndim(value) else value
-
-
-def _summary(keys: dict[str, Any]) -> Summary:
-    outputs = {name: tuple(reductions) for name, reductions in keys["outputs"].items()}
-    return Summary(tuple(keys["over"]), outputs, {name: frozen(edges) for name, edges in keys["edges"].items()})
 
 
 def _words(words: list[str] | None) -> tuple[str, ...] | None:

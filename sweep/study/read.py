@@ -122,13 +122,12 @@ def _parse(text: str, source: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise StudyError(source, [_syntax_mistake(str(error), text)]) from None
+        mistake = _syntax_mistake(str(error), text)
     except ValueError:
-        raise StudyError(
-            source, [Mistake("file", "an integer has thousands of digits; no float64 is that large")]
-        ) from None
+        mistake = Mistake("file", "an integer has thousands of digits; no float64 is that large")
     except RecursionError:
-        raise StudyError(source, [Mistake("file", "lists or tables are nested too deeply")]) from None
+        mistake = Mistake("file", "lists or tables are nested too deeply")
+    raise StudyError(source, [mistake])
 
 
 def _syntax_mistake(error: str, text: str) -> Mistake:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.study.model import Axis, Block, Study
+from sweep.study.model import Axis, Study
 from sweep.system.errors import SweepError
 from sweep.system.expected import kind
 
@@ -48,7 +48,13 @@ def study_keys(study: Study) -> dict[str, Any]:
     found["outputs"] = list(study.outputs)
     found |= {"where": study.where} if study.where else {}
     if study.design == "blocks":
-        found["blocks"] = [_block(block, study.axes) for block in study.blocks]
+        found["blocks"] = [
+            {
+                "design": {"kind": block.design, **block.options} if block.options else block.design,
+                "axes": {name: _axis(study.axes[name]) for name in block.axes},
+            }
+            for block in study.blocks
+        ]
     else:
         design = study.blocks[0] if study.blocks else None
         found["design"] = study.design if design is None else {"kind": design.design, **design.options}
@@ -60,11 +66,6 @@ def study_keys(study: Study) -> dict[str, Any]:
         outputs = {name: list(reductions) for name, reductions in study.summary.outputs.items()}
         found["summary"] = {"over": list(study.summary.over), "outputs": outputs, "edges": edges}
     return found
-
-
-def _block(block: Block, axes: Mapping[str, Axis]) -> dict[str, Any]:
-    design = {"kind": block.design, **block.options} if block.options else block.design
-    return {"design": design, "axes": {name: _axis(axes[name]) for name in block.axes}}
 
 
 def _axis(axis: Axis) -> Any:

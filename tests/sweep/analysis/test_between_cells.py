@@ -180,7 +180,10 @@ def test_lines_hold_what_was_computed_and_say_how_to_ask_for_others():
     short = xr.concat(
         [ds.isel(cell=slice(0, 25)), ds.isel(cell=slice(30, 36)).assign(b=("cell", np.full(6, 7.0)))], "cell"
     )
-    assert "--at b=7.0 (6 cells)" in on_lines(short, "a").attrs["lines"]  # which stops short of an end
+    assert "--at b=7.0 (6 cells)" in on_lines(short, "a").attrs["lines"]
+    for ends in ((1.0, 99.0), (2.0, 100.0)):  # a line that stops short of an end
+        one_end = short.assign(a=("cell", np.r_[short.a[:25], np.linspace(*ends, 6)]))
+        assert on_lines(one_end, "a").sizes["b"] == 5
     with pytest.raises(sweep.SweepError, match=r"--at b=1.0 \(2 cells\)"):
         on_lines(ds.isel(cell=np.r_[0, 4, 20, 24, 30:85]), "a")
 

@@ -160,6 +160,9 @@ def test_the_law_that_data_were_made_of_is_not_ruled_out_and_no_simpler_one_is_l
         others = found.law != "one law"
         np.testing.assert_allclose(found.aicc[others], aicc[others])
         np.testing.assert_allclose(found.bic[others], (n * np.log(found.scatter**2) + k * np.log(n))[others])
+        one = found.sel(law="one law")
+        apart = [k * np.log(n) - 2 * k - 2 * k * (k + 1) / (n - k - 1) for k in (3, 4)]
+        assert min(abs(float(one.bic - one.aicc) - apart[0]), abs(float(one.bic - one.aicc) - apart[1])) < 1e-9
 
 
 @pytest.mark.parametrize("kind", ["even", "correlated", "outliers", "uneven"])

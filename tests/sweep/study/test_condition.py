@@ -43,7 +43,8 @@ def test_cells_are_those_that_plain_numpy_chooses(text, mask):
         ("height <", "cannot be read"), ("heigth < 1", "did you mean height?"),
         *((f"v0**{power} > 1", "power") for power in ("0", "10", "2.0", "v0", "-1")),
         ("v0**2 < height", "m"), ("height - v0 > 1", "meter"), ("height*g < v0", "meter"), ("v0/v0 < height", "meter"),
-        ("v0 > 1 or height > v0", "meter"), ("height < '3 s'", ""), ("g > " + "1 + " * 300 + "1", "longer"),
+        ("v0 > 1 or height > v0", "meter"),
+        ("height + height < v0", "meter"), ("height < '3 s'", ""), ("g > " + "1 + " * 300 + "1", "longer"),
     ],
 )  # fmt: skip
 def test_what_is_no_condition_and_unlike_quantities_are_refused(text, what):
