@@ -199,13 +199,6 @@ def test_run_writes_where_it_is_told_and_leaves_a_finished_result_alone_unless_f
         np.testing.assert_allclose(dataset.fall_time.sel(height=1.0, v0=0.0), np.sqrt(2 / 9.80665), rtol=1e-15)
 
 
-def test_a_cell_of_a_kernel_of_ones_own_that_dies_costs_only_itself(here):
-    Path("bad.toml").write_text('kernel = "bad:DYING"\noutputs = ["fall_time"]\naxes.height.values = [1.0, 22.0]\n')
-    with in_a_process("-m", "sweep", "run", "bad.toml", "--allow-import") as process:
-        assert "1 FAILED" in process.communicate(timeout=60)[0]
-    assert process.returncode == 4
-
-
 def test_what_others_have_written_does_not_command_the_terminal(here, call):
     title = "\\u001b]0;owned\\u0007\\u009b2JStones"
     Path("stones.toml").write_text(STUDY.replace("Falling stones", title) + "\n")
@@ -234,16 +227,6 @@ def test_fit_writes_its_table_by_what_the_reader_says(done, call):
         assert call(*FIT, *line.split())[0] == 0
         widths.append(np.ptp(pd.read_csv("laws.csv")[["exponent_low", "exponent_high"]].values))
     assert widths[0] < widths[1]
-
-
-def test_fit_compares_laws_in_a_table_and_a_picture_and_tells_the_cells_left_out(done, call):
-    assert "62 BAD_INPUT (left out)" in call(*FIT)[1]
-    options = (*FIT, "--at", "v0=1", "--compare")
-    assert call(*options, "-o", "laws.csv")[0] == 0
-    table = pd.read_csv("laws.csv")
-    assert (table.chosen.sum(), table.worse.min()) == (1, 0)
-    assert call(*options, "-o", "laws.png")[0] == 0
-    assert Path("laws.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(
@@ -361,28 +344,3 @@ def test_a_misused_command_shows_its_usage(line, capsys):
 def test_a_fault_has_its_status_and_its_words(error, code, word):
     found = explained(error)
     assert (found.code, word in found.text) == (code, True)
-
-
-def test_a_shell_learns_the_commands(call):
-    pytest.importorskip("shtab")
-    for shell in ("bash", "zsh", "tcsh"):
-        code, out, _ = call("completion", shell)
-        assert (code, "refine" in out) == (0, True)
-
-
-def test_tables_have_80_columns(done, call, monkeypatch):
-    """Of results whose names, questions and statuses are long."""
-    monkeypatch.setenv("COLUMNS", "80")
-    title = "Falling stones of all heights, thrown up and down, or not at all, on a planet without an atmosphere"
-    long = STUDY.replace("Falling stones", title).replace("# How fast", f"# {title}: how fast")
-    Path("long.toml").write_text(long)
-    assert call("run", "long.toml", *OWN, "-o", "a_result_with_a_long_name.h5")[0] == 0
-    chart = ("chart", "stones.toml", *OWN, "--cells", "4", "--rtol", "1e-3")
-    looks = [("list",), ("kernels",), ("kernels", "polisher"), ("studies",), ("show", "a_result_with_a_long_name.h5")]
-    trials = [("diff", "stones.h5", "a_result_with_a_long_name.h5"), chart]
-    for command in (*looks, *trials, (*FIT, "--at", "v0=0"), (*FIT, "--at", "v0=0", "--compare")):
-        code, out, err = call(*command)
-        assert code == 0, err
-        assert max(map(len, out.splitlines())) <= 80, out
-    for command, column in ((("list",), "version"), (chart, "worst cell")):
-        assert column in call(*command, "--all")[1]

@@ -16,16 +16,6 @@ WHERE = "v0**2 < g*height"
 AXES = {"height": [-1.0, 1.0, 2.0, 4.0], "v0": [0.0, 1.0, 3.0]}
 
 
-def test_cells_outside_are_not_asked_and_not_refused():
-    found = sweep.run(build(axes=AXES, where=WHERE))
-    inside = found.v0.values[None, :] ** 2 < 9.81 * found.height.values[:, None]
-    assert (found.status.values[~inside] == Status.NOT_ASKED).all()
-    assert np.isnan(found.fall_time.values[~inside]).all()
-    assert (found.status.values[inside] == Status.OK).all()
-    whole = sweep.run(build(axes=AXES))
-    assert found.fall_time.values[inside].tobytes() == whole.fall_time.values[inside].tobytes()
-
-
 def test_they_are_an_entry_of_their_own_in_the_account(tmp_path):
     found = sweep.run(build(axes=AXES, where=WHERE), tmp_path / "a.h5")
     assert (account(found).not_asked, account(found).ok, account(found).refused) == (3, 9, 0)
@@ -116,13 +106,6 @@ def test_a_study_with_a_condition_is_extended(tmp_path):
     other = build(axes={"height": [1.0, 1.2, 2.0, 3.0, 4.0, 5.0]}, where="height > 1.7")
     with pytest.raises(sweep.SweepError, match="where"):
         sweep.run(other, tmp_path / "a.h5", extend=True)
-
-
-def test_a_summary_counts_them():
-    found = sweep.run(build(axes=AXES, where=WHERE, summary={"outputs": {"fall_time": ["min"]}}))
-    assert int(found.cells_by_status.sel(status_name="NOT_ASKED")) == 3
-    assert int(found.fall_time_count) == 9
-    assert account(found).not_asked == 3
 
 
 def test_the_condition_is_in_the_fingerprint():

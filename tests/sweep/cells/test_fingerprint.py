@@ -155,13 +155,6 @@ def test_a_kernel_typed_at_the_prompt_has_no_source_and_is_no_fault(monkeypatch)
     assert found["kernel"] == "__main__:OWN"
 
 
-def test_the_digest_of_the_study_is_told_only_where_nothing_else_differs():
-    assert difference({"study": "1", "rtol": "a"}, {"study": "2", "rtol": "b"}) == ["rtol: was a, now b"]
-    assert difference({"study": "1"}, {"study": "2"}) == ["study: changed"]
-    told = difference({"source a": "1", "source b": "2"}, {"source b": "3", "source c": "4"})
-    assert told == ["source b: changed", "source c: new", "source a: gone"]
-
-
 def test_a_fixed_array_counts_whole():
     masses = np.arange(1.0, 3001.0)
     other = masses.copy()

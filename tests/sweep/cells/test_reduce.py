@@ -6,14 +6,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import sweep
-from kernels.interface import Status
 from sweep.cells.partition import RowBlocks, row_blocks
-from sweep.cells.reduce import BY_STATUS, tree_sum
+from sweep.cells.reduce import tree_sum
 
 HEIGHTS = np.array([-1.0, 1.0, 2.0, 5.0, math.nan, 13.5, 100.0, 0.3, 0.7, 77.0])
 SPEEDS = np.array([0.0, 0.5, 3.0, 1e-9, 1e4, 2.0])
@@ -43,53 +41,6 @@ def same(left, right):
         assert left[name].values.tobytes() == right[name].values.tobytes(), name
 
 
-def exact_mean(values):
-    """The mean as a fraction, rounded once."""
-    return float(sum(map(Fraction, values.tolist())) / len(values))
-
-
-def agree(found, cells, over):
-    """The reductions of fall_time in `found` are those of the cells."""
-    kept = [d for d in cells.fall_time.dims if d not in over]
-    rows = cells.transpose(*kept, *over)
-    for at in np.ndindex(*(rows.sizes[d] for d in kept)):
-        one, got = rows.isel(dict(zip(kept, at, strict=True))), found.isel(dict(zip(kept, at, strict=True)))
-        values = one.fall_time.values.ravel()
-        good = values[~np.isnan(values)]
-        assert got.fall_time_count == len(good)
-        assert got[BY_STATUS].sum() == values.size
-        for status in Status:
-            assert got[BY_STATUS].sel(status_name=status.name) == (one.status == status).sum()
-        if not len(good):
-            assert np.isnan([got.fall_time_min, got.fall_time_mean, got[f"fall_time_argmin_{over[0]}"]]).all()
-            assert got.fall_time_argmax_status == Status.PENDING
-            continue
-        assert (got.fall_time_min.item(), got.fall_time_max.item()) == (good.min(), good.max())
-        assert got.fall_time_mean.item() == pytest.approx(exact_mean(good), rel=3e-16)
-        for end, place in (("argmin", np.nanargmin(values)), ("argmax", np.nanargmax(values))):
-            where = np.unravel_index(place, one.fall_time.shape)
-            for axis, index in zip(over, where, strict=True):
-                assert got[f"fall_time_{end}_{axis}"] == one[axis][index]
-            assert got[f"fall_time_{end}_status"] == one.status.values[where]
-        expected, _ = np.histogram(good, EDGES)
-        assert got.fall_time_histogram.values.tolist() == expected.tolist()
-        assert got.fall_time_below == (good < EDGES[0]).sum()
-        assert got.fall_time_above == (good > EDGES[-1]).sum()
-
-
-@pytest.mark.parametrize("over", [["height", "v0"], ["height"], ["v0"]])
-@pytest.mark.parametrize("at_once", [8 << 20, 2000])
-def test_reductions_are_those_of_the_cells(over, at_once, tmp_path, monkeypatch):
-    monkeypatch.setattr("sweep.store.frame.GATHERED_BYTES", at_once)
-    cells = quiet(stone())
-    found = quiet(stone(whole(over=over)))
-    agree(found, cells, over)
-    with quiet(stone(whole(over=over)), tmp_path / "out.h5", block_cells=4) as stored:
-        same(stored, found)
-        xr.testing.assert_identical(stored.drop_attrs(), found.drop_attrs())
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["out.h5"]
-
-
 def long_study(cells, **keys):
     """Many cells, so that row blocks are shorter than groups."""
     rng = np.random.default_rng(5)
@@ -114,30 +65,6 @@ def test_the_same_bits_for_any_block_shape_and_thread_count(tmp_path_factory, lo
     study = long_study(12_000, over=list(over))
     with quiet(study, path, workers=workers, block_cells=cells) as found:
         same(found, long[over])
-
-
-def test_many_row_blocks_agree_with_the_cells(long):
-    cells = quiet(sweep.study(allow_import=True, kernel="toy:KERNEL", outputs=["fall_time"],
-                              axes={n: a.values for n, a in long_study(12_000).axes.items()}))  # fmt: skip
-    assert row_blocks(long_study(12_000)).per_group > 1000
-    agree(long["height", "v0"], cells, ["height", "v0"])
-    assert row_blocks(long_study(12_000, over=["height"])).per_group > 100
-    agree(long["height",], cells, ["height"])
-
-
-def test_traces_are_reduced_point_by_point():
-    keys = {"outputs": ["drop"], "along": {"phase": [0.0, 0.25, 1.0]}}
-    cells = quiet(stone(**keys))["drop"]
-    found = quiet(
-        stone({"over": ["height"], "outputs": {"drop": EVERYTHING}, "edges": {"drop": [0.0, 1.0, 5.0]}}, **keys)
-    )
-    assert found.drop_max.dims == ("v0", "phase")
-    np.testing.assert_array_equal(found.drop_max, cells.max("height"))
-    assert found.drop_histogram.dims == ("v0", "phase", "drop_bin")
-    for v, p in np.ndindex(6, 3):
-        good = cells.values[:, v, p][~np.isnan(cells.values[:, v, p])]
-        assert found.drop_histogram[v, p].values.tolist() == np.histogram(good, [0, 1, 5])[0].tolist()
-        assert found.drop_argmax_height[v, p] == cells.height[np.nanargmax(cells.values[:, v, p])]
 
 
 def test_a_result_of_a_summary_can_be_shown_and_run_again(tmp_path, capsys, read):
@@ -213,17 +140,3 @@ def test_of_equal_extremes_the_first_cell_is_told():
     found = quiet(stone({}, axes={"height": [2.0], "v0": speeds}, method="rough", rtol=0.9))
     assert row_blocks(stone({}, axes={"height": [2.0], "v0": speeds})).per_group > 1
     assert (found.fall_time_argmin_v0, found.fall_time_argmax_v0) == (3000.0, 3000.0)
-
-
-def test_a_summary_exports_as_a_table_of_the_kept_axes(tmp_path):
-    found = quiet(stone(whole(over=["v0"])))
-    lines = sweep.export(found, tmp_path / "out.csv").read_text().splitlines()
-    about = {line[2:].partition(":")[0]: line for line in lines if line.startswith("#")}
-    assert "0.1 to 1: cells in each bin" in about["fall_time_histogram_2 [1]"]
-    heading, *rows = [line.split(",") for line in lines if not line.startswith("#")]
-    assert len(rows) == len(HEIGHTS)
-    table = {name: [row[i] for row in rows] for i, name in enumerate(heading)}
-    assert table["cells_OK"] == ["0", "6", "6", "6", "0", "6", "6", "6", "6", "6"]
-    assert [float(x) for x in table["fall_time_min"]] == pytest.approx(found.fall_time_min.values, nan_ok=True)
-    assert table["fall_time_argmin_status"][:2] == ["PENDING", "OK"]
-    assert "cells_NEVER_STARTS" not in table

@@ -1,17 +1,15 @@
 """Which method a cell gets, and what is said of it."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from stand_ins import solved, stand_in, toy_study, with_kernel
+from stand_ins import solved, toy_study
 from toy import KERNEL
 
 import sweep
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.solve import NONE, STRIP, UNKNOWN, among
-from sweep.results.statuses import account
 
 FOLIOT = sweep.study(
     kernel="foliot",
@@ -83,20 +81,3 @@ def test_auto_does_not_deny_what_an_impact_clock_does_where_following_it_leaves_
     assert open_.sum() > 20
     assert (status == followed).all()
     assert (used == np.where(open_, NONE, 1)).all()
-
-
-def without_a_number(number, verdict=Status.OK):
-    """A method that gives a cell of height 2 this in place of its speed, and this verdict."""
-
-    def solve(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
-        fall_time[...], drop[...], status[...] = 1.0, 1.0, Status.OK
-        impact_speed[...] = np.where(height == 2.0, number, height)
-        status[height == 2.0] = verdict
-
-    return solve, None
-
-
-def test_failures_are_in_the_account():
-    study = toy_study(axes={"height": [1.0, 2.0, -1.0]}, method="rough")
-    dataset = sweep.run(with_kernel(study, stand_in(rough=without_a_number(math.nan))), progress=False)
-    assert str(account(dataset)) == "3 cells: 1 ok, 0 remarked, 1 refused, 0 unsolved, 1 FAILED, 0 pending"

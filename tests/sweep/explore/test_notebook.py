@@ -1,8 +1,6 @@
 """Tables that a notebook shows."""
 
 import re
-import subprocess
-import sys
 
 import pytest
 
@@ -29,13 +27,6 @@ def test_a_study_is_shown_with_units_method_cells_and_forecast():
     assert re.fullmatch(r"about .* on \d+ cores, .*B", rows["forecast"])
     assert "phi0 = 1.0472 [rad]" in rows["fixed"]
     assert "a &lt; b?" in html
-
-
-def test_a_study_is_shown_whatever_was_used_before():
-    study = 'sweep.study(kernel="foliot", axes={"mu": [1.0]}, fixed={"phi0": 1.0})'
-    code = f"import sweep; sweep.run; print({study}._repr_html_())"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
-    assert "<table" in done.stdout
 
 
 def test_the_text_of_a_study_is_no_path():

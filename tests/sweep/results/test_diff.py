@@ -6,7 +6,6 @@ from toy_studies import build
 
 import sweep
 from kernels.interface import Status
-from sweep.cli import main
 
 AXES = {"height": [1.0, 2.0, 4.0], "v0": [0.0, 1.0]}
 
@@ -95,16 +94,3 @@ def test_what_cannot_be_compared_is_refused(result):
         sweep.diff(result, result.assign_attrs(kernel="foliot"))
     with pytest.raises(sweep.SweepError, match="run along height and v0 in one result and along height in the other"):
         sweep.diff(result, sweep.run(build(axes={"height": [1.0]})))
-
-
-def test_the_command_exits_with_1_where_results_differ(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    sweep.run(build(axes=AXES), "a.h5").close()
-    sweep.run(build(axes=AXES, method="exact"), "b.h5").close()
-    assert main(["diff", "a.h5", "a.h5"]) == 0
-    assert main(["diff", "a.h5", "b.h5", "--rtol", "1e-6"]) == 0
-    capsys.readouterr()
-    sweep.run(build(axes={"height": [1.0, 2.0], "v0": [0.0]}), "c.h5").close()
-    assert main(["diff", "a.h5", "c.h5"]) == 1
-    assert "4 in the first alone" in capsys.readouterr().out
-    assert main(["diff", "a.h5", "nowhere.h5"]) == 2

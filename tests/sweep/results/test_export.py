@@ -2,7 +2,6 @@
 
 import csv
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -16,7 +15,6 @@ import xarray as xr
 from running import environment
 
 import sweep
-from sweep.show.laws import laws, write_laws
 from sweep.system.errors import SweepError
 
 FLAGS = {"flag_values": np.array([0, 1, 64, 127], np.int8), "flag_meanings": "OK INACCURATE BAD_INPUT PENDING"}
@@ -61,29 +59,6 @@ def test_csv_columns_do_not_depend_on_the_order_of_an_outputs_dimensions(tmp_pat
     turned["angle"] = turned.angle.transpose("phase", "mu", "a")
     plain, other = sweep.export(result(), tmp_path / "plain.csv"), sweep.export(turned, tmp_path / "other.csv")
     assert plain.read_text() == other.read_text()
-
-
-def test_no_text_of_a_csv_is_a_formula(tmp_path):
-    words = ["=cmd|'/C calc'!A0", "+1+1", "-x", "@SUM(A1)", "-1.5", "plain"]
-    ds = xr.Dataset({"=y": ("word", -np.arange(6.0))}, {"word": words})
-    ds["=y"].attrs = {"units": "m\n=1", "long_name": "a\n=2"}
-    lines = sweep.export(ds, tmp_path / "out.csv").read_text().splitlines()
-    assert lines[1:4] == ["# word", "# =y [m =1]: a =2", "word,'=y"]
-    assert lines[4:] == [
-        "'=cmd|'/C calc'!A0,-0.0",
-        "'+1+1,-1.0",
-        "'-x,-2.0",
-        "'@SUM(A1),-3.0",
-        "-1.5,-4.0",
-        "plain,-5.0",
-    ]
-
-
-def test_no_text_of_a_table_of_laws_is_a_formula(tmp_path):
-    x = np.geomspace(1, 10, 5)
-    ds = xr.Dataset({"y": (("word", "x"), [x, x])}, {"x": x, "word": ["=1+1", "plain"]})
-    write_laws(laws(ds, "y", "x"), tmp_path / "laws.csv")
-    assert ",'=1+1," in (tmp_path / "laws.csv").read_text()
 
 
 def test_a_status_without_a_name_is_written_as_its_number(tmp_path):
@@ -131,29 +106,6 @@ def test_a_fault_half_way_leaves_the_old_file_and_nothing_else(tmp_path, monkeyp
         sweep.export(result(), target, force=True)
     assert target.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == [target.name]
-
-
-def test_a_kind_of_file_whose_library_is_missing_is_told(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(SweepError, match="pyarrow"):
-        sweep.export(result(), tmp_path / "out.parquet")
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_compressed_export_is_smaller(tmp_path):
-    ds = sweep.run(toy_studies.build(axes={"height": np.linspace(1.0, 2.0, 5000)}))
-    plain, small = (sweep.export(ds, tmp_path / f"{k}.nc", compress=k).stat().st_size for k in (False, True))
-    assert small < plain
-
-
-def test_an_export_never_replaces_its_source(tmp_path):
-    path = tmp_path / "stones.nc"
-    sweep.run(toy_studies.build(axes={"height": [1.0, 2.0]}), tmp_path / "out.h5").close()
-    shutil.copy(tmp_path / "out.h5", path)
-    before = path.read_bytes()
-    with sweep.open_result(path) as ds, pytest.raises(SweepError, match=r"stones\.nc"):
-        sweep.export(ds, path, force=True)
-    assert path.read_bytes() == before
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".nc", ".zarr"])

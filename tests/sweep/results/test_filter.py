@@ -3,13 +3,11 @@
 import contextlib
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import sweep
-from sweep.cli import main
 from sweep.system.errors import SweepError
 
 AXES = {"height": [-1.0, 1.0, 2.0, 3.0], "v0": [0.0, 1.0]}
@@ -86,20 +84,3 @@ def test_what_is_no_condition_is_told(condition, message):
 def test_any_text_is_a_condition_or_told(text):
     with contextlib.suppress(SweepError):
         assert sweep.where(RESULT, text).sizes["cell"] <= 8
-
-
-def test_export_takes_a_condition(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    sweep.run(sweep.study(kernel="foliot", axes={"mu": [-1.0, 1.0, 4.0]}, fixed={"phi0": 1.0, "a": 1.0}), "f.h5")
-    assert main(["export", "f.h5", "-o", "f.csv", "--where", "status == 'OK' and mu < 2"]) == 0
-    table = pd.read_csv("f.csv", comment="#")
-    assert table.mu.tolist() == [1.0]
-    for mistake in ("mu < ", ""):
-        assert main(["export", "f.h5", "-o", "g.csv", "--where", mistake]) == 2
-        assert "cannot be read" in capsys.readouterr().err
-
-
-def test_a_summary_has_no_cells_to_choose_from():
-    summary = RESULT.drop_vars(["status", "method_used"])
-    with pytest.raises(SweepError, match="a summary keeps no cells"):
-        sweep.where(summary, "height > 1")

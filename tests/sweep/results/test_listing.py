@@ -1,8 +1,5 @@
 """The results of a folder."""
 
-import shutil
-
-import pytest
 from running import interrupted, tall
 from toy_studies import build
 
@@ -37,13 +34,6 @@ def test_an_unfinished_one_is_listed_with_its_share(tmp_path):
     assert 0 < found.done < 1
     assert found.cells == 23
     assert "PENDING" in found.statuses
-
-
-def test_a_folder_without_results_and_none(tmp_path):
-    assert str(sweep.list_results(tmp_path)) == "no results here"
-    shutil.rmtree(tmp_path)
-    with pytest.raises(sweep.SweepError, match="no such folder"):
-        sweep.list_results(tmp_path)
 
 
 def test_what_a_running_sweep_has_beside_its_output_is_listed_as_the_output(tmp_path):

@@ -217,16 +217,3 @@ def test_a_path_to_write_that_is_none_is_named():
     for write in (lambda: run(keys, 3), lambda: sweep.export(found, 3), lambda: sweep.join(found, found, 3, axis="v")):
         with pytest.raises(SweepError, match="expected a path"):
             write()
-
-
-def test_an_unfinished_summary_has_what_its_finished_rows_say(tmp_path):
-    keys = {"kernel": "toy:KERNEL", "allow_import": True, "outputs": ["fall_time"]}
-    axes = {"height": np.linspace(1.0, 2.0, 20), "v0": [0.0, 1.0, 2.0]}
-    summary = {"over": ["height"], "outputs": {"fall_time": ["min", "mean"]}}
-    study = sweep.study(**keys, axes=axes, summary=summary)
-    interrupted(study, tmp_path / "out.h5")
-    with open_result(tmp_path / "out.h5") as found, sweep.run(study) as whole:
-        assert found.sizes == whole.sizes
-        assert 0 < int(found.fall_time_count.sum()) < int(whole.fall_time_count.sum()) == 60
-        assert (found.fall_time_count <= whole.fall_time_count).all()
-        assert float(found.fall_time_min.min()) >= float(whole.fall_time_min.min())

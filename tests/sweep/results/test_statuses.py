@@ -10,15 +10,9 @@ from toy_studies import build
 import sweep
 from kernels.interface import Status
 from sweep.cli import main
-from sweep.results import statuses as module
 from sweep.results.statuses import (
-    Account,
-    StatusCount,
     account,
-    cell_values,
-    count_methods,
     count_statuses,
-    failures,
     summary_text,
 )
 from sweep.results.stored import Stored
@@ -74,36 +68,6 @@ def test_a_status_that_is_none_is_failed_with_the_exit_status_of_that(number, tm
             assert np.isnan(found.fall_time).values.tolist() == [h >= 64 or h == number for h in heights]
         assert main(["list"]) == 0
         assert "3 unsolved" in capsys.readouterr().out
-
-
-def test_an_account_adds_up_and_tells_of_cells_not_asked_where_there_are():
-    found = Account(1000, 20, 3, 7, 4, 5, 6)
-    assert found.total == 1045
-    assert str(found) == "1,045 cells: 1,000 ok, 20 remarked, 3 refused, 7 unsolved, 4 FAILED, 5 pending, 6 not asked"
-    assert str(Account(1)) == "1 cells: 1 ok, 0 remarked, 0 refused, 0 unsolved, 0 FAILED, 0 pending"
-
-
-def test_the_first_cell_of_each_status_is_its_example():
-    found = cells([[0, 64, 0], [1, 64, 1]])
-    counts = count_statuses(found)
-    assert [(c.name, c.cells, c.total) for c in counts] == [("OK", 2, 6), ("INACCURATE", 2, 6), ("BAD_INPUT", 2, 6)]
-    assert [c.example for c in counts] == [{}, {"a": "1.1", "b": "0.1"}, {"a": "0.1", "b": "1.1"}]
-    assert [c.name for c in failures(found)] == ["INACCURATE", "BAD_INPUT"]
-    assert str(counts[1]) == "2 of 6 cells: INACCURATE, e.g. a=1.1 b=0.1"
-    assert str(StatusCount("OK", 2, 6)) == "2 of 6 cells: OK"
-    assert cell_values(found, 5) == {"a": "1.1", "b": "2.1"}
-
-
-def test_a_summary_is_summed_over_all_it_keeps():
-    columns = {
-        "cells_by_status": (("a", "status_name"), [[2, 0, 1], [3, 0, 0]]),
-        "cells_by_method": (("a", "method_name"), [[1, 2], [0, 3]]),
-    }
-    found = xr.Dataset(columns, {"status_name": ["OK", "FAILED", "BAD_INPUT"], "method_name": ["none", "map"]})
-    assert module.tally(found) == {"OK": 5, "BAD_INPUT": 1}
-    assert count_methods(found) == {"map": 5}
-    assert (account(found).total, account(found).refused) == (6, 1)
-    assert [(c.name, c.cells, c.total) for c in count_statuses(found)] == [("OK", 5, 6), ("BAD_INPUT", 1, 6)]
 
 
 HEIGHTS = [1.0, -1.0, np.nan, 4.0, 9.0, 16.0]

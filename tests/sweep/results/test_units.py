@@ -1,12 +1,10 @@
 """Results in other units than the kernel's."""
 
 import numpy as np
-import pandas as pd
 import pytest
 import xarray as xr
 
 import sweep
-from sweep.cli import main
 from sweep.system.errors import StudyError
 
 
@@ -37,17 +35,3 @@ def test_all_mistakes_are_told_at_once(stones):
     assert "did you mean fall_time?" in text
     assert '"kg" is a mass; height is a length' in text
     assert "words or counts" in text
-
-
-def test_exports_and_plots_take_units(stones, tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    sweep.run(sweep.study(kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0}), "f.h5")
-    assert main(["export", "f.h5", "-o", "f.csv", "--unit", "amplitude=degree", "period=minute"]) == 0
-    table = pd.read_csv("f.csv", comment="#")
-    ds = sweep.open_result("f.h5")
-    np.testing.assert_allclose(table.amplitude, np.degrees(ds.amplitude), rtol=4e-16)
-    np.testing.assert_allclose(table.period, ds.period / 60, rtol=4e-16)
-    assert "# amplitude [degree]" in (tmp_path / "f.csv").read_text()
-    assert main(["plot", "f.h5", "--y", "amplitude", "--unit", "amplitude=degree"]) == 0
-    assert main(["export", "f.h5", "-o", "g.csv", "--unit", "amplitude"]) == 2
-    assert "NAME=UNIT" in capsys.readouterr().err

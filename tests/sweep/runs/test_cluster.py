@@ -66,11 +66,6 @@ def test_nothing_is_asked_of_a_cluster_where_nothing_is_left_to_compute(output):
         assert found.sizes["height"] == 3
 
 
-def soon():
-    """When a test is given up."""
-    return datetime.now() + timedelta(seconds=100)
-
-
 def test_a_lost_scheduler_is_one_line_and_the_run_continues(output):
     study = tall(1000, "slow:SLOW")
     with served(workers=2) as (address, process):
@@ -126,17 +121,6 @@ def test_ctrl_c_ends_a_run_on_a_cluster(client, output):
         patch.setattr("slow.CELL_SECONDS", 0.0)
         same(quiet(study, output), quiet(study))
     assert list(output.parent.iterdir()) == [output]
-
-
-@pytest.mark.parametrize("place", ["memory", "shared folder"])
-def test_the_same_bits_wherever_the_cells_are_computed(client, output, place):
-    """Blocks of a page each are written by the workers where they see the file; the summary's rows are sent."""
-    axes = {"v0": [0.0, 2.0, np.nan], "height": np.linspace(-1.0, 40.0, 2000)}
-    for turn, keys in enumerate(({}, {"summary": {"over": ["height"], "outputs": {"fall_time": ["min", "mean"]}}})):
-        study, path = toy_studies.build(axes=axes, **keys), output.with_name(f"{turn}.h5")
-        with elsewhere(study, None if place == "memory" else path, cluster=client, block_cells=1000) as found:
-            same(found, quiet(study))
-        assert place == "memory" or sweep.verify(path).whole
 
 
 def test_an_extension_on_a_cluster_has_the_same_bits(client, output):

@@ -3,7 +3,6 @@
 import errno
 import io
 import os
-import random
 import subprocess
 import sys
 import textwrap
@@ -39,15 +38,6 @@ def unfinished(output):
     return output
 
 
-def solving_fails(monkeypatch):
-    """From here on the kernel raises in every cell."""
-
-    def raises(height, kinds):
-        raise ZeroDivisionError
-
-    monkeypatch.setattr(bad, "misbehave", raises)
-
-
 # the numbers
 
 
@@ -61,13 +51,6 @@ def test_numbers_are_those_of_the_formula_in_memory_and_in_the_file(output):
     assert found.attrs.keys() == stored.attrs.keys()
     xr.testing.assert_identical(found.drop_attrs(deep=False), stored.drop_attrs(deep=False))
     assert list(output.parent.iterdir()) == [output]
-
-
-def test_threads_and_blocks_do_not_change_a_bit(tmp_path):
-    whole, rng = quiet(stone()), random.Random(1)
-    for turn in range(12):
-        path = tmp_path / f"{turn}.h5" if turn % 3 else None
-        same(quiet(stone(), path, workers=rng.randint(1, 4), block_cells=rng.randint(1, 40)), whole)
 
 
 def test_cells_that_are_cheap_beside_a_call_are_solved_by_few_calls():
@@ -98,17 +81,6 @@ def test_what_cannot_be_meant_is_refused_in_one_line(keys, word):
 
 
 # what stands there
-
-
-def test_a_complete_output_is_left_alone_and_computed_anew_by_force(output, monkeypatch):
-    quiet(tall(9, "bad:RAISING"), output).close()
-    before = output.stat()
-    with monkeypatch.context() as patch:
-        solving_fails(patch)
-        quiet(tall(9, "bad:RAISING"), output).close()
-    assert output.stat() == before
-    quiet(tall(9, "bad:RAISING"), output, force=True).close()
-    assert output.stat().st_ino != before.st_ino
 
 
 def test_the_output_of_another_study_is_kept_unless_forced(output):
@@ -206,19 +178,6 @@ def test_a_damaged_block_is_told_and_computed_again(unfinished):
     log = io.StringIO()
     same(quiet(tall(23), unfinished, progress=log), quiet(tall(23)))
     assert "cells 0 to 5 were damaged" in log.getvalue()
-
-
-def test_a_result_that_is_damaged_on_the_disk_is_repaired(output):
-    quiet(tall(23), output, block_cells=5).close()
-    whole = output.read_bytes()
-    flip(output, place(output, "fall_time", 12))
-    assert not sweep.verify(output).whole
-    with pytest.raises(SweepError, match="--repair"):
-        quiet(tall(23), output)
-    with quiet(tall(23), output, repair=True) as found:
-        same(found, quiet(tall(23)))
-    assert sweep.verify(output).whole
-    assert len(output.read_bytes()) == len(whole)
 
 
 def test_a_killed_run_continues_and_ends_with_the_same_bits(output, monkeypatch):

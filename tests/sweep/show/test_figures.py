@@ -9,7 +9,7 @@ from matplotlib.colors import LogNorm
 
 from sweep.show.charts import COLOURS, DASHES
 from sweep.show.plot import plot
-from sweep.show.view import SIDE, evened, view
+from sweep.show.view import SIDE, evened
 from sweep.system.errors import SweepError
 
 FLAGS = {"flag_values": np.array([0, 1, 64, 127], np.int8), "flag_meanings": "OK INACCURATE BAD_INPUT PENDING"}
@@ -88,16 +88,6 @@ def test_further_axes_are_held_at_their_middle_and_the_title_says_so():
     np.testing.assert_array_equal(figure.axes[0].collections[0].get_array(), ds.period.sel(R=10).transpose("a", "mu"))
 
 
-def test_a_trace_is_drawn_along_its_own_coordinate():
-    ds = dataset(mu=log(5)).rename(period="angle")
-    ds["angle"] = ds.angle * xr.DataArray(np.sin(np.arange(3.0)), dims="phase", coords={"phase": [0.0, 0.5, 1.0]})
-    shown = view(ds)
-    assert (shown.x, shown.across) == ("phase", "mu")
-    ds["status"][2] = 1
-    assert (view(ds).status[2] == 1).all()
-    assert view(ds).codes() == [1]
-
-
 def test_the_cells_of_a_zip_design_are_marks_along_the_coordinate_named():
     ds = dataset(mu=log(20)).rename_dims(mu="cell").reset_index("mu").assign_coords(a=("cell", np.arange(20.0)))
     (axes,) = plot(ds).axes
@@ -144,20 +134,6 @@ def test_a_map_hatches_refused_cells_and_outlines_remarks():
     assert [text.get_text() for text in figure.axes[0].texts] == ["INACCURATE"]
 
 
-def test_a_wide_region_is_named_where_it_is_widest():
-    ds = dataset(mu=log(), a=np.linspace(1, 2, 21))
-    wide = np.arange(ds.sizes["mu"]) < ds.sizes["mu"] // 2
-    ds["status"][wide] = 64
-    ds["period"][wide] = np.nan
-    figure = plot(ds)
-    text = figure.axes[0].texts[0]
-    assert text.get_text() == "BAD_INPUT"
-    assert words(figure) == []  # what is named in its place needs no legend
-    x, y = text.get_position()
-    assert ds.mu[0] < x < ds.mu[ds.sizes["mu"] // 2]
-    assert y == pytest.approx(1.5, abs=0.1)
-
-
 @pytest.mark.parametrize(
     "axes", [{"mu": log()}, {"mu": log(), "a": [1.0, 2.0]}, {"mu": log(), "a": np.arange(1.0, 12)}]
 )
@@ -194,21 +170,6 @@ def test_the_same_result_gives_the_same_bytes_whatever_the_readers_settings(tmp_
     assert one.startswith({"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[suffix])
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("out.gif", r'out\.gif: found "\.gif"; a picture is one of \.png, \.svg, \.pdf'),
-        ("out", "out: found no suffix"),
-        ("nowhere/out.png", r"nowhere/out\.png cannot be written: No such file or directory"),
-        (".png", "no suffix"),
-    ],
-)
-def test_a_place_that_cannot_be_written_is_one_clear_line(tmp_path, name, message):
-    with pytest.raises(SweepError, match=message):
-        plot(dataset(mu=log()), tmp_path / name)
-    assert list(tmp_path.iterdir()) == []
-
-
 # which cells are shown
 
 
@@ -217,14 +178,6 @@ def test_the_cells_of_a_map_lie_around_their_grid_points():
     places = corners.get_coordinates()
     np.testing.assert_allclose(places[0, :, 0], np.geomspace(10**-3.5, 10**3.5, 8))
     np.testing.assert_allclose(places[:5, 0, 1], [0.95, 1.05, 1.15, 1.3, 1.45])
-
-
-@pytest.mark.parametrize(("cells", "shown"), [(20_000, 20_000), (20_001, 10_001), (40_001, 13_334)])
-def test_a_line_has_at_most_twenty_thousand_points_and_a_map_two_thousand_cells_a_side(cells, shown):
-    (line,) = drawn(plot(dataset(mu=log(cells))).axes[0])
-    assert line.get_xdata().size == shown
-    mesh = plot(dataset(mu=log(cells // 10), a=np.arange(1.0, 10))).axes[0].collections[0]
-    assert mesh.get_array().shape == (9, 2000)
 
 
 @pytest.mark.parametrize(("axes", "shape"), [(2, (SIDE, SIDE)), (3, (34, 34, 34))])
@@ -334,18 +287,3 @@ def test_points_and_laws_are_drawn_the_chosen_first_and_wide():
     assert laws[0].get_linestyle() == DASHES[0]
     assert laws[1].get_linestyle() == "--"
     assert len(below.lines) == 4  # and the zero
-
-
-def test_scales_labels_and_the_verdict():
-    axes = plot(compared(units="s")).axes
-    above, below = axes
-    assert {above.get_xscale(), above.get_yscale(), below.get_xscale()} == {"log"}
-    assert below.get_yscale() == "linear"
-    assert (above.get_ylabel(), below.get_xlabel(), below.get_ylabel()) == (
-        "period [s]",
-        "mu [rad/s^2]",
-        "point / law - 1",
-    )
-    assert above.get_title() == "one law by 10"
-    (legend,) = above.figure.legends
-    assert [text.get_text() for text in legend.get_texts()][:2] == ["points", "law1, AICc +1.23, chosen"]

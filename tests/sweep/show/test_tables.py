@@ -10,7 +10,7 @@ from toy_studies import build
 import sweep
 from kernels.interface import Status
 from sweep.show.compare import comparison, comparison_text, write_comparison
-from sweep.show.follow import LOOK_SECONDS, SILENT_SECONDS, follow, reasons
+from sweep.show.follow import LOOK_SECONDS, SILENT_SECONDS, follow
 from sweep.show.laws import law_rows, laws, laws_text, pick, write_laws
 from sweep.show.text import result_text
 from sweep.system.errors import SweepError
@@ -52,13 +52,6 @@ def test_two_laws_are_told_in_a_text_a_page_and_a_table(tmp_path):
     assert [row[1][:5] for row in page[:2]] == ["x << ", "x >> "]
     (one,) = (row for row in page if "one" in row[0])
     assert float(one[2]) == pytest.approx(-0.5)
-
-
-def test_windows_are_told_in_order_with_where_their_laws_meet():
-    text = laws_text(laws(lines_of(BENT).isel(a=0), "y", "x", [(1e2, 1e4), (1e-4, 1e-2)]))
-    first = [line.split()[0] for line in text.split("\n\n")[0].splitlines()[2:]]
-    assert first == ["0.0001", "100"]
-    assert float(text.split("\n\n")[1].splitlines()[-1].split()[0]) == pytest.approx(1.0, rel=0.3)
 
 
 def test_a_second_law_needs_eight_points_and_no_straight_line():
@@ -127,28 +120,6 @@ def test_a_status_is_told_with_the_part_of_each_axis_where_it_occurs(design):
     assert "height 100 to 158.489, v0 1; e.g. height=100.0 v0=1.0" in text
 
 
-def test_the_share_that_is_done_is_told_and_never_rounded_up():
-    found = sweep.run(build(axes={"height": np.arange(1.0, 125.0)}))
-    for pending, share in ((31, "75 %"), (1, "99.1 %")):
-        found.status[:] = Status.OK
-        found.status[:pending] = Status.PENDING
-        assert f"{124 - pending} of 124 cells ({share})" in result_text("x.h5", found)
-
-
-def test_words_reductions_and_reasons_of_failed_cells_are_shown(tmp_path):
-    words = sweep.run(build(axes={"height": [1.0, 2.0], "method": ["exact", "auto"]}))
-    assert "exact, auto" in result_text("x.h5", words)
-    summary = {"over": ["v0"], "outputs": {"fall_time": ["min", "mean"]}}
-    reduced = sweep.run(build(axes={"height": [1.0, 2.0], "v0": [0.0, 1.0, -1.0]}, summary=summary))
-    assert {"fall_time_min", "fall_time_mean", "BAD_INPUT"} <= set(result_text("x.h5", reduced).split())
-    axes = {"height": [1.0, 11.0, *np.arange(20.0, 50.0)]}
-    (tmp_path / "x.h5.log").write_text("2026-01-01 00:00:00  cell 1 FAILED (height=11): eleven\n")
-    with sweep.run(build(kernel="bad:RAISING", axes=axes), tmp_path / "x.h5", progress=False) as found:
-        text = result_text(tmp_path / "x.h5", found)
-    assert "height=11.0" in text
-    assert "eleven" in text
-
-
 # logs
 
 
@@ -192,10 +163,3 @@ def test_a_log_that_is_silent_for_ten_minutes_is_given_up(log):
     assert sum(pauses) == SILENT_SECONDS == 600
     said, pauses = followed(log, *[""] * 1199, logged(1), *[""] * 1199, logged(2, "ended with 1 cells"))
     assert (len(said), len(pauses)) == (3, 2400)  # a line of the last half second begins the wait anew
-
-
-def test_reasons_are_those_of_cells_that_failed(log):
-    assert reasons(log.with_suffix("")) == {}
-    texts = ["cell 3 FAILED (mu=1): no root: twice", "cell x FAILED (mu=1): no", "cell 7 solved", "cell 12 FAILED ("]
-    log.write_text("".join(logged(k, text) for k, text in enumerate(texts)))
-    assert reasons(log.with_suffix("")) == {3: "no root: twice", 12: ""}

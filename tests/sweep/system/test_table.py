@@ -33,11 +33,6 @@ def test_a_word_is_never_torn(terminal):
     assert path in table.paragraph(f"in {path}")
 
 
-def test_a_column_that_is_empty_everywhere_takes_no_room(terminal):
-    terminal(80)
-    assert table.columns([("a", "", "b"), ("c", "", "d")]) == "  a  b\n  c  d"
-
-
 def test_what_a_terminal_would_obey_is_shown():
     assert table.printable("a\x1b[31m\x7f\x9f\xa0\n\tb\r") == "a\\x1b[31m\\x7f\\x9f\xa0\n\tb\\x0d"
     assert table.printable("\x00\x1f \udc80") == "\\x00\\x1f \\udc80"

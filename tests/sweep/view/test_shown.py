@@ -9,11 +9,10 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 import sweep
-from kernels.interface import Status
 from sweep.show.charts import COLOURS
 from sweep.show.view import view
 from sweep.view import region
-from sweep.view.slices import PLACE, Choice, nearest, row, shown
+from sweep.view.slices import Choice, nearest, shown
 
 pytestmark = pytest.mark.skipif(not find_spec("panel"), reason="the extra view is not installed")
 if find_spec("panel"):
@@ -92,27 +91,6 @@ def test_the_cell_of_a_point_beside_a_line_is_the_one_below_it(dataset):
     assert nearest(found, float(dataset.mu[9]) * 0.95, float(values[9, 0]), False, (True, True)) == {"mu": 9, "a": 0}
 
 
-def test_a_row_has_all_of_a_cell(dataset):
-    entries = {entry.name: entry for entry in row(dataset, {"mu": 3, "R": 20, "a": 0})}
-    assert float(entries["mu"].value) == float(dataset.mu[3])
-    assert entries["phi0"].value == "1"
-    assert (entries["period"].value, entries["period"].unit) == ("nan", "s")
-    assert entries["status"].value == Status.NEVER_STARTS.name
-
-
-def points(x, y):
-    """Points of a zip, along x."""
-    places = {PLACE + "cell": ("cell", np.arange(len(x)))}
-    return view(xr.Dataset({"y": ("cell", y)}, {"x": ("cell", x), **places}), x="x")
-
-
-def test_of_points_the_nearest_as_the_eye_sees_it_is_clicked():
-    found = points([1.0, 2.0, 3.0], [10.0, 30.0, 20.0])
-    assert nearest(found, 2.4, 21.0, False, (False, False)) == {"cell": 2}
-    assert nearest(found, 2.4, 29.0, False, (False, False)) == {"cell": 1}
-    assert nearest(points([1.0, 2.0], [np.nan, np.nan]), 2.0, 1.0, False, (False, False)) == {"cell": 0}
-
-
 # what is drawn
 
 FLAGS = {"flag_values": np.array([0, 1, 64], np.int8), "flag_meanings": "OK INACCURATE BAD_INPUT"}
@@ -130,16 +108,6 @@ def seen(values, x, a=None, status=None):
 
 def a_map(low=1.0, high=3.0):
     return seen(np.linspace(low, high, 36).reshape(9, 4), [1.0, 10.0, 100.0, 1000.0], np.arange(9.0))
-
-
-def test_scales_are_those_of_the_grids_and_values():
-    assert Scales.of(a_map(), AUTO) == Scales(True, False, False)
-    assert Scales.of(a_map(1, 1e3), AUTO) == Scales(True, False, True)
-    assert Scales.of(seen([1.0, 1e3], [1.0, 2.0]), AUTO) == Scales(False, True)
-    wanted = {"x": "linear", "y": "log", "values": "log"}
-    assert Scales.of(a_map(), wanted) == Scales(False, True, True)
-    assert Scales.of(seen([-1.0, 0.0], [1.0, 1000.0]), {**AUTO, "values": "log"}) == Scales(True, False)
-    assert Scales.of(seen([-1.0, 1.0], [1.0, 1000.0]), {**AUTO, "x": "linear", "values": "log"}) == Scales(False, True)
 
 
 def test_lines_are_drawn_with_their_statuses_at_the_foot_where_they_have_no_value():
@@ -195,20 +163,6 @@ def test_the_study_of_a_region_is_the_same_scene_on_a_finer_grid(dataset, tmp_pa
     assert (R.spacing, R.values[0], R.values[-1], len(R)) == ("linear", 0.5, 2.0, 101)
     assert (study.fixed["a"], study.fixed["phi0"], study.outputs) == (2.0, 1.0, ("period", "amplitude"))
     assert sweep.run(study, progress=False).status.size == 101 * 101
-
-
-def test_words_and_lists_are_kept(tmp_path):
-    study = sweep.study(
-        kernel="drivetrain",
-        axes={"method": ["direct"], "f_max": [100.0, 200.0]},
-        fixed={"J": [1.0, 2.0, 3.0], "k": [1e4, 2e4, 3e4], "reduction": "rivin"},
-    )
-    dataset = sweep.run(study, progress=False)
-    name = next(iter(dataset.data_vars))
-    found = read(tmp_path, region.study_text(dataset, Choice(name, "f_max", None, {}), None, None))
-    assert found.method == "direct"
-    assert found.fixed["reduction"] == study.fixed["reduction"] != 0
-    assert found.fixed["J"].tolist() == [1.0, 2.0, 3.0]
 
 
 def test_whole_numbers_in_the_range_are_kept_as_they_are(tmp_path):
