@@ -35,7 +35,6 @@ def test_the_cell_and_the_distance_are_told(result):
     assert (found.outputs["drop"].cells, found.outputs["drop"].example) == (1, "e.g. height=1 v0=1")
     assert not found.same
     assert sweep.diff(result, other, rtol=1e-5).outputs["fall_time"].cells == 1
-    assert sweep.diff(result, other, rtol=1.0001e-3).same
     other = result.copy(deep=True)
     other.fall_time[0, 0] *= 2
     assert [sweep.diff(result, other, rtol=rtol).same for rtol in (0.499, 0.5)] == [False, True]

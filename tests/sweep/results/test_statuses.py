@@ -1,10 +1,11 @@
-"""Accounts of cells: which status counts as what, sums of summaries, and the words of it all."""
+"""Accounts of cells: which status counts as what, in a run, in its reader and in the list of a folder."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from running import interrupted, tall
 from toy_studies import build
 
 import sweep
@@ -18,16 +19,10 @@ from sweep.results.statuses import (
 from sweep.results.stored import Stored
 from sweep.study.toml import to_toml
 
-FLAGS = {"flag_values": np.array([-1, 0, 1], np.int8), "flag_meanings": "none map closed"}
 
-
-def cells(status, methods=None):
+def cells(*status):
     """One cell of each status."""
-    status = np.array(status, np.int8)
-    used = np.zeros(status.shape, np.int8) if methods is None else np.array(methods, np.int8)
-    dims = ("a", "b")[: status.ndim]
-    coords = {name: np.arange(float(n)) + 0.1 for name, n in zip(dims, status.shape, strict=True)}
-    return xr.Dataset({"status": (dims, status), "method_used": (dims, used, FLAGS)}, coords)
+    return xr.Dataset({"status": ("cell", np.array(status, np.int8))})
 
 
 KINDS = {
@@ -42,18 +37,13 @@ KINDS = {
 }
 
 
-def test_each_status_is_of_one_kind(capsys):
-    found = {status.name: account(cells([status])).by_kind for status in Status}
+def test_each_status_is_of_one_kind():
+    found = {status.name: account(cells(status)).by_kind for status in Status}
     assert found == {name: {k: int(k == kind) for k in KINDS} for kind in KINDS for name in KINDS[kind].split()}
-    assert account(cells([99])).failed == 1  # of a later version
-    assert main(["kernels"]) == 0
-    told = capsys.readouterr().out
-    for kind, names in KINDS.items():
-        line = next(line for line in told.splitlines() if line.startswith(f"  {kind} "))
-        assert names.split()[0] in line or kind == "remarked"
+    assert account(cells(99)).failed == 1  # of a later version
 
 
-@pytest.mark.parametrize("number", [55, 60, 100, 200, 255])
+@pytest.mark.parametrize("number", [60, 200])
 def test_a_status_that_is_none_is_failed_with_the_exit_status_of_that(number, tmp_path, monkeypatch, capsys):
     """And those that a kernel may give are kept, and of them none is called FAILED."""
     monkeypatch.chdir(tmp_path)
@@ -66,8 +56,23 @@ def test_a_status_that_is_none_is_failed_with_the_exit_status_of_that(number, tm
         with sweep.open_result("s.h5") as found:
             assert found.status.values.tolist() == [Status.FAILED if h == number else h for h in heights]
             assert np.isnan(found.fall_time).values.tolist() == [h >= 64 or h == number for h in heights]
-        assert main(["list"]) == 0
-        assert "3 unsolved" in capsys.readouterr().out
+
+
+def test_the_results_of_a_folder_are_listed_with_what_became_of_them(tmp_path):
+    """And what a running sweep has beside its output, as that output."""
+    sweep.run(build(axes={"height": [1.0, -1.0]}, question="How long does it fall?"), tmp_path / "a.h5").close()
+    sweep.run(build(axes={"height": [1.0, 2.0, 3.0]}, summary={}), tmp_path / "b.h5").close()
+    interrupted(tall(23), tmp_path / "c.h5")
+    for name in ("d.h5", "e.h5.parts", "f.nc.unfinished", "g.h5.parts.old", "h.txt.parts", ".i.h5.log"):
+        (tmp_path / name).write_text("no result")
+    found = sweep.list_results(tmp_path)
+    assert [one.path.name for one in found] == ["a.h5", "b.h5", "c.h5", "d.h5", "e.h5", "f.nc"]
+    a, b, c, d, *_ = found
+    assert (a.question, a.cells, a.done, a.statuses) == ("How long does it fall?", 2, 1.0, {"OK": 1, "BAD_INPUT": 1})
+    assert (b.cells, b.statuses) == (3, {"OK": 3})
+    assert c.cells == 23
+    assert 0 < c.done < 1
+    assert "not the result of a sweep" in d.fault
 
 
 HEIGHTS = [1.0, -1.0, np.nan, 4.0, 9.0, 16.0]

@@ -11,7 +11,7 @@ import sweep
 from kernels.interface import Status
 from sweep.show.compare import comparison, comparison_text, write_comparison
 from sweep.show.follow import LOOK_SECONDS, SILENT_SECONDS, follow
-from sweep.show.laws import law_rows, laws, laws_text, pick, write_laws
+from sweep.show.laws import laws, laws_text, pick, write_laws
 from sweep.show.text import result_text
 from sweep.system.errors import SweepError
 
@@ -45,13 +45,8 @@ def test_two_laws_are_told_in_a_text_a_page_and_a_table(tmp_path):
     assert float(low["exponent"]) == pytest.approx(-1, abs=0.02)
     assert float(high["exponent"]) == pytest.approx(-0.25, abs=0.02)
     assert float(low["exponent_low"]) < float(low["exponent"]) < float(low["exponent_high"])
-    words = laws_text(found).split()
-    assert f"{float(low['crossover']):.6g}" in words
     assert float(low["crossover"]) == pytest.approx(1.0, rel=0.1)
-    page = list(law_rows(found))
-    assert [row[1][:5] for row in page[:2]] == ["x << ", "x >> "]
-    (one,) = (row for row in page if "one" in row[0])
-    assert float(one[2]) == pytest.approx(-0.5)
+    assert f"{float(low['crossover']):.6g}" in laws_text(found).split()
 
 
 def test_a_second_law_needs_eight_points_and_no_straight_line():
