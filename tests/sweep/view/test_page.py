@@ -33,14 +33,10 @@ def page(dataset):
     return made(dataset, "map.h5")
 
 
-def shown_values(page):
-    return page.picture.cells.data["image"][0]
-
-
 def test_a_page_begins_with_the_first_output_over_its_longest_axes(page, dataset):
     assert (page.choice.output, page.choice.x, page.choice.across) == ("period", "mu", "R")
     assert list(page.sliders) == ["a"]
-    image = shown_values(page)
+    image = page.picture.cells.data["image"][0]
     expected = dataset.period.isel(a=1).values
     assert image[0, 0] == expected[0, 0]
     assert image[-1, -1] == expected[-1, -1]
