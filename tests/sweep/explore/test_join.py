@@ -84,14 +84,6 @@ def test_a_new_axis_has_labels_and_a_file_that_opens(tmp_path):
         sweep.run(build(axes={"height": HEIGHTS, "v0": [0.0, 1.0]}), tmp_path / "c.h5")
 
 
-def test_a_new_axis_of_points():
-    a = of([1.0, 2.0], design="zip")
-    found = sweep.join(a, a, axis="version")
-    assert found.fall_time.dims == ("version", "point")
-    assert found.height.dims == ("point",)
-    assert np.array_equal(found.fall_time[1], a.fall_time)
-
-
 def unfinished():
     found = of()
     found.status[1, 1] = Status.PENDING
@@ -134,13 +126,6 @@ def test_results_beyond_the_memory_are_refused(monkeypatch):
     there[0] -= 1
     with pytest.raises(sweep.SweepError, match="memory"):
         sweep.join(a, b)
-
-
-@pytest.mark.parametrize("name", ["join", "diff"])
-@pytest.mark.parametrize("given", [(["a.h5"],), ("a.h5", "b.h5"), (1, None)])
-def test_what_are_not_two_results_is_named(name, given):
-    with pytest.raises(sweep.SweepError, match=rf"sweep\.{name}: .* {type(given[0]).__name__}"):
-        getattr(sweep, name)(*given)
 
 
 def killed_at(target):

@@ -19,7 +19,6 @@ def test_a_study_is_shown_with_units_method_cells_and_forecast():
     study = sweep.study(**FOLIOT, axes={"mu": [0.1, 1.0, 10.0], "R": [0.0, 0.01]}, where="R < mu", question="a < b?")
     sweep.run(study)
     html, found = shown(study)
-    assert found[:5] == ["mu", "rad/s^2", "3", "0.1 to 10", "mu"]
     rows = dict(zip(found[10::2], found[11::2], strict=True))
     assert rows["method"] == "auto"
     assert rows["cells"] == "6 = 3 x 2"

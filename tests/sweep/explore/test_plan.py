@@ -60,11 +60,6 @@ def test_the_ends_of_axes_are_in_the_sample_whose_size_is_told(tmp_path, end, is
         assert " 0 %" not in str(found)
 
 
-def test_a_plan_warns_of_a_memory_that_is_too_small(monkeypatch):
-    monkeypatch.setattr("sweep.explore.plan.memory", lambda: 1000)
-    assert "the memory is too small" in str(sweep.plan(stone(), workers=1))
-
-
 def test_a_plan_of_a_folder_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(sweep.SweepError, match="no folder"):
         sweep.plan(stone(), path=tmp_path / "nowhere" / "out.h5")

@@ -65,9 +65,7 @@ def test_errors_are_those_against_the_truth():
     assert cell.worst_cell.item() == "height=2 v0=0.001"
     assert shares(cell) == {"ok": 0.5, "inaccurate": 0.5}
     assert float(at(found, "exact").error_worst) == found.attrs["reference_error"] == 1e-14
-    assert found.attrs["open_cells"] == 0
     assert (found.seconds > 0).all()
-    assert found.attrs["omissions"] == ""
 
 
 def test_auto_is_measured_beside_the_methods_and_says_which_it_took():
@@ -225,7 +223,6 @@ def test_no_more_cells_are_taken_than_are_wanted_and_a_tenth_lies_beyond_low_and
     ("options", "word"),
     [
         ({"methods": ["exakt"]}, "did you mean exact"),
-        ({"methods": ["magic"]}, "auto, rough, exact"),
         ({"reference": "magic"}, "magic"),
         *(({"tolerances": tolerances}, "rtol") for tolerances in ([0.0], [np.nan], [np.inf], [])),
         ({"cells": 0}, "cells"),

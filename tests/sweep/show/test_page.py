@@ -23,7 +23,7 @@ class Tree(HTMLParser):
         self.attributes += attrs
 
     def handle_data(self, data):
-        self.text += data
+        self.text = " ".join(f"{self.text} {data}".split())
 
 
 def foliot(**keys):
