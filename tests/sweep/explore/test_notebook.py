@@ -31,13 +31,3 @@ def test_a_study_is_shown_with_units_method_cells_and_forecast():
 def test_the_text_of_a_study_is_no_path():
     with pytest.raises(sweep.SweepError, match=r"the text of a study, not its path; write .*tomllib\.loads"):
         sweep.study(sweep.to_toml(sweep.study(**FOLIOT, axes={"mu": [0.1, 1.0]})))
-
-
-def test_kernels_and_a_kernel_are_shown():
-    every = sweep.kernels()
-    assert "foliot" in shown(every)[1]
-    assert "polisher_wear_point: " in repr(every)
-    one = every["foliot"]
-    assert {"mu", "rad/s^2", "period", "closed", "required"} <= set(shown(one)[1])
-    assert repr(one).startswith("foliot: ")
-    assert len(every) == len(list(every))

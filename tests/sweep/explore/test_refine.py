@@ -121,14 +121,6 @@ def test_cells_that_are_inaccurate_are_on_no_border():
     assert found.added < 10
 
 
-@pytest.mark.parametrize("num", [4, 1401])
-def test_a_grid_that_is_fine_enough_stays_as_it_is(num):
-    ds = foliot(mu=(1e-3, 1e4, 1401)) if num == 1401 else foliot(mu=(1e8, 1e9, num))
-    found = sweep.refine(ds, "period", 1e-4)
-    assert (found.added, found.complete, found.error < 1e-4) == (0, True, True)
-    np.testing.assert_array_equal(found.dataset.period, ds.period)
-
-
 def test_where_too_few_cells_are_allowed_the_worst_places_get_them():
     found = sweep.refine(foliot(mu=(1e-3, 1e3, 5)), "period", 1e-6, most_cells=16)
     assert not found.complete

@@ -69,14 +69,6 @@ def test_cells_of_equal_parameters_are_compared(result):
     assert sweep.diff(result, more).missing == ("drop",)
 
 
-@pytest.mark.parametrize("apart", [{"height": [3.0]}, {"v0": [2.0]}])
-def test_results_without_a_common_cell_differ_in_none(result, apart):
-    other = sweep.run(build(axes={**AXES, **apart}, outputs=["fall_time", "drop"], along={"phase": [0.0, 0.5, 1.0]}))
-    found = sweep.diff(result, other)
-    assert (found.cells, found.only_a, found.only_b, found.same) == (0, 6, other["status"].size, False)
-    assert [distance.cells for distance in found.outputs.values()] == [0, 0]
-
-
 def test_points_are_compared_by_number():
     points = {"design": "zip", "axes": {"height": [1.0, 2.0], "v0": [0.0, 1.0]}}
     a = sweep.run(build(**points))

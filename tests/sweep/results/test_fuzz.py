@@ -61,36 +61,35 @@ def test_a_file_that_hdf5_cannot_come_to_an_end_with_is_given_up(whole, tmp_path
     assert time.monotonic() - begun < 20
 
 
-def lead_away(file, kind, secret):
-    """Makes what a result holds lie in another file."""
-    if kind == "soft link":
-        file["other"] = h5py.SoftLink("/status")
-    elif kind == "external link":
-        file["other"] = h5py.ExternalLink(str(secret), "/")
-    elif kind == "external storage":
-        del file["fall_time"]
-        file.create_dataset("fall_time", (100, 3), "f8", external=[(str(secret), 0, h5py.h5f.UNLIMITED)])
-    elif kind == "virtual":
-        source = h5py.VirtualSource(str(secret), "x", (100, 3))
-        del file["fall_time"]
-        layout = h5py.VirtualLayout((100, 3), "f8")
-        layout[...] = source
-        file.create_virtual_dataset("fall_time", layout)
-    else:
-        file["integrity/round"] = file["integrity"]
+def external_storage(file, secret):
+    del file["fall_time"]
+    file.create_dataset("fall_time", (100, 3), "f8", external=[(str(secret), 0, h5py.h5f.UNLIMITED)])
 
 
-@pytest.mark.parametrize("kind", ["soft link", "external link", "external storage", "virtual", "round"])
-def test_a_result_leads_to_no_other_file(whole, tmp_path, kind):
+def virtual(file, secret):
+    del file["fall_time"]
+    layout = h5py.VirtualLayout((100, 3), "f8")
+    layout[...] = h5py.VirtualSource(str(secret), "x", (100, 3))
+    file.create_virtual_dataset("fall_time", layout)
+
+
+def external_link(file, secret):
+    file["other"] = h5py.ExternalLink(str(secret), "/")
+
+
+def round_itself(file, secret):
+    file["integrity/round"] = file["integrity"]
+
+
+@pytest.mark.parametrize("lead_away", [external_storage, virtual, external_link, round_itself])
+def test_a_result_leads_to_no_other_file(whole, tmp_path, lead_away):
     secret = tmp_path / "secret"
     os.mkfifo(secret)  # who opened it would wait for ever
     path = shutil.copy(whole, tmp_path / "out.h5")
     with h5py.File(path, "r+") as file:
-        lead_away(file, kind, secret)
+        lead_away(file, secret)
     with pytest.raises(SweepError, match="damaged"):
         sweep.open_result(path)
-    if kind != "external link":  # which HDF5 follows as far as the pipe, until it is given up
-        assert not sweep.verify(path).whole
 
 
 def one_column_more(file):

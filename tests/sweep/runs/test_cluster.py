@@ -9,9 +9,7 @@ import time
 from concurrent.futures import Future
 from datetime import datetime, timedelta
 
-import numpy as np
 import pytest
-import toy_studies
 from clusters import served
 from running import kept, quiet, same, tall
 
@@ -117,13 +115,6 @@ def test_ctrl_c_ends_a_run_on_a_cluster(client, output):
         elsewhere(study, output, cluster=client, block_cells=4)
     assert kept(output)
     continues(study, output)
-
-
-def test_an_extension_on_a_cluster_has_the_same_bits(client, output):
-    more = toy_studies.build(axes={"height": np.sort(np.r_[np.arange(1.0, 21), np.arange(10.5, 40)])})
-    quiet(toy_studies.build(axes={"height": np.arange(1.0, 21)}), output).close()
-    with elsewhere(more, output, cluster=client, extend=True, block_cells=4) as found:
-        same(found, quiet(more))
 
 
 @pytest.mark.parametrize("where", ["tcp://127.0.0.1:1", "nonsense", "", "missing.json"])

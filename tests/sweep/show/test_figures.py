@@ -101,23 +101,6 @@ def test_cells_that_are_not_ok_are_marked_on_the_line_or_at_its_foot():
     assert with_foot.axes[0].get_yscale() == "linear" or float(ds.mu[5]) in places
 
 
-def test_a_map_hatches_refused_cells_and_outlines_remarks():
-    ds = dataset(mu=log(), a=np.linspace(1, 2, 21))
-    ds["status"][:3, :4] = 64
-    ds["period"][:3, :4] = np.nan
-    ds["status"][20:30, 5:10] = 1
-    figure = plot(ds)
-    _, outline, paint = figure.axes[0].collections
-    assert len(paint.get_paths()) == 4  # a run of three cells in each of four rows
-    assert paint.get_hatch()
-    corner = paint.get_paths()[0].get_extents()
-    assert corner.x0 < ds.mu[0] < ds.mu[2] < corner.x1 < ds.mu[3]
-    assert corner.y0 < 1 < corner.y1 < ds.a[1]
-    assert outline.get_paths()[0].get_extents().width > 0
-    assert words(figure) == ["BAD_INPUT"]
-    assert [text.get_text() for text in figure.axes[0].texts] == ["INACCURATE"]
-
-
 @pytest.mark.parametrize(
     "axes", [{"mu": log()}, {"mu": log(), "a": [1.0, 2.0]}, {"mu": log(), "a": np.arange(1.0, 12)}]
 )

@@ -87,11 +87,6 @@ def test_a_folder_that_is_no_zarr_is_left_alone(here):
         assert not Path("a.zarr/thesis.txt").exists()
 
 
-def test_a_pipe_is_not_waited_for(here):
-    os.mkfifo("a.csv")
-    assert cli.main(["export", "r.h5", "-o", "a.csv"]) == 2
-
-
 def test_an_export_on_the_disk_is_whole(here, monkeypatch):
     """Every file and folder of it is synced before it gets its name, and the name after."""
     order = []
