@@ -127,16 +127,6 @@ def test_the_output_may_be_a_link_to_another_folder(tmp_path):
 # continued
 
 
-def test_what_is_finished_survives_a_fault_and_is_not_computed_again(unfinished):
-    done = len(kept(unfinished))
-    log = io.StringIO()
-    with quiet(tall(23), unfinished, block_cells=7, workers=4, progress=log) as found:
-        same(found, quiet(tall(23)))
-        assert float(found.attrs["cells_per_second"]) > 0
-    assert 0 < done < 5
-    assert list(unfinished.parent.iterdir()) == [unfinished]
-
-
 def test_what_is_left_over_beside_a_complete_output_is_removed_if_it_is_of_its_study(unfinished):
     left = unfinished_of(unfinished)
     content = left.read_bytes()
