@@ -4,7 +4,6 @@ import dataclasses
 import io
 import json
 import time
-from pathlib import Path
 
 import numba
 import pytest
@@ -14,9 +13,6 @@ from toy_studies import build
 import sweep
 from sweep.cells import compiling
 from sweep.cells.compiling import work_clock
-
-ROOT = Path(__file__).parents[3]
-STUDY = 'kernel = "foliot"\nmethod = "closed"\n[axes]\nmu = [1.0, 2.0]\n[fixed]\na = 1.0\nphi0 = 1.0\n'
 
 
 class Dispatcher:

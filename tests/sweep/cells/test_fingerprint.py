@@ -23,6 +23,7 @@ BASE = {"axes": {"height": [1.0, 2.0], "v0": [0.0, 1.0]}}
     [
         ({"method": "exact"}, "method: was auto, now exact"),
         ({"rtol": 1e-8}, "rtol: was 1e-09, now 1e-08"),
+        ({"where": "height > 1"}, "where: "),
         ({"outputs": ["impact_speed"]}, "outputs: was fall_time, now impact_speed"),
         ({"design": "zip"}, "design: was product, now zip"),
         ({"axes": {"v0": [0.0, 1.0], "height": [1.0, 2.0]}}, "axes: was height, v0, now v0, height"),

@@ -11,26 +11,6 @@ import sweep
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.solve import NONE, STRIP, UNKNOWN, among
 
-FOLIOT = sweep.study(
-    kernel="foliot",
-    axes={"mu": np.concatenate([np.geomspace(1e-6, 1e6, 90), [-1.0, np.nan, 0.0]]), "a": [1.0, 0.0, 1e-3, 30.0]},
-    fixed={"phi0": 0.5},
-    rtol=1e-6,
-)
-
-
-@pytest.fixture(scope="module")
-def whole():
-    return solved(FOLIOT)
-
-
-def test_auto_takes_the_closed_form_of_the_foliot_outright(whole):
-    names = [m.name for m in FOLIOT.kernel.methods]
-    assert {names[u] for u in whole[2].reshape(93, 4)[:90, 0]} == {"closed"}
-    assert set(whole[1].reshape(93, 4)[90]) == {Status.BAD_INPUT}
-    assert whole[1].reshape(93, 4)[92].tolist() == [Status.NEVER_STARTS] * 4
-    assert whole[1].reshape(93, 4)[0, 1] == Status.NO_LIMIT_CYCLE
-
 
 def test_strips_join_without_a_seam():
     mu = np.geomspace(1e-3, 1e3, STRIP + 100)

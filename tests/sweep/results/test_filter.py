@@ -22,7 +22,6 @@ SPEED = np.sqrt(V**2 + 2 * 9.80665 * np.where(FALLS, H, np.nan))
     [
         ("status == 'OK'", FALLS),
         ("status != 'OK'", ~FALLS),
-        ("height > 1", H > 1),
         ("1 < height <= 3 and v0 == 0", (H > 1) & (V == 0)),
         ("not (height > 1 or v0 > 0.5)", (H <= 1) & (V <= 0.5)),
         ("v0 < 0.4*height", V < 0.4 * H),
@@ -30,7 +29,6 @@ SPEED = np.sqrt(V**2 + 2 * 9.80665 * np.where(FALLS, H, np.nan))
         ("impact_speed / 2 > -(0 - 3)", SPEED > 6),
         ("method_used == 'rough'", FALLS & (V == 0)),
         ("g > 9", H == H),
-        ("-height == 1", H == -1),
         ("2**height > 3", 2**H > 3),
         ("height > 9**9**9**9", np.inf < H),
         ("height < 1e400", np.inf > H),
@@ -63,7 +61,6 @@ def test_a_chosen_cell_keeps_all_its_values():
         ("1 < 2", "two constants"),
         ("drop > 0", "runs along phase"),
         ("height >", "cannot be read"),
-        ("height > 1/0", "cannot be read"),
         ("__import__('os').system('true')", "is not allowed"),
         ("height.real > 0", "is not allowed"),
         ("(lambda: 1)() == height", "is not allowed"),

@@ -29,15 +29,6 @@ def test_a_study_of_nonsense_is_read_or_refused(tmp_path, seed):
     assert fuzz_study(random.Random(seed), tmp_path) in ("read", "refused")
 
 
-@settings(max_examples=100, deadline=2000, suppress_health_check=SHARED)
-@given(content=st.binary(max_size=300) | st.text(max_size=300).map(lambda text: text.encode("utf-8", "replace")))
-def test_any_bytes_as_a_study_are_refused(tmp_path, content):
-    path = tmp_path / "study.toml"
-    path.write_bytes(content)
-    with pytest.raises(SweepError):
-        sweep.study(path)
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     return prepared(tmp_path_factory.mktemp("whole"))

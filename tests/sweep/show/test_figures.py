@@ -55,16 +55,6 @@ def test_one_axis_makes_one_line_on_logarithmic_scales_with_names_and_units():
     assert axes.get_xlabel() == r"$\mu$ [rad/s$^{2}$]"
 
 
-def test_few_values_of_a_second_axis_make_a_family_told_apart_without_colour():
-    ds = dataset(mu=log(), a=[1.0, 2.0, 4.0])
-    figure = plot(ds)
-    lines = drawn(figure.axes[0])
-    assert words(figure) == ["$a$ = 1 1/s", "$a$ = 2 1/s", "$a$ = 4 1/s"]
-    for i, line in enumerate(lines):
-        np.testing.assert_array_equal(line.get_ydata(), ds.period[:, i])
-    assert len({line.get_color() for line in lines}) == len({str(line._dash_pattern) for line in lines}) == 3
-
-
 def test_two_long_axes_make_a_map_with_a_logarithmic_colour_scale():
     ds = dataset(mu=log(61), a=np.linspace(1, 2, 21))
     figure = plot(ds)
