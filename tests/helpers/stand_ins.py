@@ -1,12 +1,8 @@
 """Kernels that stand in for others: what a method gives, promises and says, as a test wants it."""
 
-from dataclasses import replace
-
 import numpy as np
-from toy import KERNEL
 
 import sweep
-from kernels.interface import Kernel
 from sweep.cells.grid import Cells
 from sweep.cells.solve import Solver
 
@@ -24,16 +20,3 @@ def solved(study, start=0, stop=None):
     status, used = np.full(stop - start, 99, np.int8), np.full(stop - start, 99, np.int8)
     solver.solve(start, Cells(outputs, status, used))
     return outputs, status, used
-
-
-def stand_in(**methods):
-    """The toy kernel with other functions for some of its methods: name -> (solve, bound)."""
-    changed = tuple(
-        replace(m, solve=methods[m.name][0], bound=methods[m.name][1]) if m.name in methods else m
-        for m in KERNEL.methods
-    )
-    return replace(KERNEL, methods=changed)
-
-
-def with_kernel(study, kernel: Kernel):
-    return replace(study, kernel=kernel)

@@ -3,11 +3,7 @@
 import dataclasses
 import io
 import json
-import os
-import subprocess
-import sys
 import time
-from pathlib import Path
 
 import numba
 import pytest
@@ -17,10 +13,6 @@ from toy_studies import build
 import sweep
 from sweep.cells import compiling
 from sweep.cells.compiling import work_clock
-from sweep.explore.plan import plan
-
-ROOT = Path(__file__).parents[3]
-STUDY = 'kernel = "foliot"\nmethod = "closed"\n[axes]\nmu = [1.0, 2.0]\n[fixed]\na = 1.0\nphi0 = 1.0\n'
 
 
 class Dispatcher:
@@ -61,42 +53,6 @@ def test_compiling_is_told_with_the_name_of_the_method_while_it_lasts(table):
     assert json.loads(table.read_text())["toy:KERNEL.exact"] == pytest.approx(0.2, abs=0.15)
     sweep.run(slow_to_compile(), progress=log)
     assert "compiling toy:KERNEL.exact ... (about 0.2 s when last done)" in log.getvalue()
-
-
-@pytest.mark.parametrize("damage", ["", "[]", '{"toy:KERNEL.exact": "long"}', '{"toy:KERNEL.exact": -1}', "\xff"])
-def test_a_damaged_table_is_as_good_as_none(table, damage):
-    table.write_text(damage, "latin-1")
-    log = io.StringIO()
-    sweep.run(slow_to_compile(), progress=log)
-    assert "compiling toy:KERNEL.exact ...\n" in log.getvalue()
-
-
-def test_a_plan_tells_what_compiling_took(table):
-    told = []
-    found = plan(slow_to_compile(), note=told.append)
-    assert found.compile_seconds == pytest.approx(0.2, abs=0.15)
-    assert told == ["compiling toy:KERNEL.exact ..."]
-    assert "  compile   about 0." in str(found)
-    assert plan(slow_to_compile(0.0)).compile_seconds == 0
-    assert "compile " not in str(plan(slow_to_compile(0.0)))
-
-
-def test_a_kernel_of_ours_is_told_once_and_then_kept(tmp_path):
-    """In two processes, everything that is compiled is told, however quick."""
-    (tmp_path / "study.toml").write_text(STUDY)
-    code = (
-        "from sweep import cli\nfrom sweep.cells import compiling\ncompiling.SILENT_SECONDS = 0\n"
-        f"cli.main(['run', r'{tmp_path}/study.toml', '-o', r'{tmp_path}/out.h5', '--force'])"
-    )
-    env = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "PYTHONPATH": str(ROOT)}
-    env.pop("NUMBA_CACHE_DIR", None)
-    told = [
-        subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stderr
-        for _ in range(2)
-    ]
-    assert "compiling foliot.closed ..." in told[0]
-    assert told[1] == ""
-    assert "foliot.closed" in json.loads((tmp_path / "foliot" / compiling.TABLE).read_text())
 
 
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="plain Python compiles nothing")

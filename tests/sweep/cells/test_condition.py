@@ -8,30 +8,9 @@ from toy_studies import build, message_of
 
 import sweep
 from kernels.interface import Status
-from sweep.cells.fingerprint import fingerprint
-from sweep.results.statuses import account
-from sweep.show.text import result_text
 
 WHERE = "v0**2 < g*height"
 AXES = {"height": [-1.0, 1.0, 2.0, 4.0], "v0": [0.0, 1.0, 3.0]}
-
-
-def test_cells_outside_are_not_asked_and_not_refused():
-    found = sweep.run(build(axes=AXES, where=WHERE))
-    inside = found.v0.values[None, :] ** 2 < 9.81 * found.height.values[:, None]
-    assert (found.status.values[~inside] == Status.NOT_ASKED).all()
-    assert np.isnan(found.fall_time.values[~inside]).all()
-    assert (found.status.values[inside] == Status.OK).all()
-    whole = sweep.run(build(axes=AXES))
-    assert found.fall_time.values[inside].tobytes() == whole.fall_time.values[inside].tobytes()
-
-
-def test_they_are_an_entry_of_their_own_in_the_account(tmp_path):
-    found = sweep.run(build(axes=AXES, where=WHERE), tmp_path / "a.h5")
-    assert (account(found).not_asked, account(found).ok, account(found).refused) == (3, 9, 0)
-    assert "3 not asked" in str(account(found))
-    assert "NOT_ASKED" in result_text(tmp_path / "a.h5", found)
-    assert sweep.verify(tmp_path / "a.h5").whole
 
 
 def test_a_condition_that_holds_nowhere_is_told_before_anything_is_run(tmp_path):
@@ -47,13 +26,10 @@ def test_a_condition_that_holds_nowhere_is_told_before_anything_is_run(tmp_path)
     [
         ("height > 1", lambda h, v: h > 1),
         ("not height > 1 or v0 == 3", lambda h, v: ~(h > 1) | (v == 3)),
-        ("1 < height <= 2 and v0 != 0", lambda h, v: (h > 1) & (h <= 2) & (v != 0)),
         ("height > '150 cm'", lambda h, v: h > 1.5),
         ("'1 km/hour' < v0", lambda h, v: v > 1000 / 3600),
         ("v0**2 < 2*g*height", lambda h, v: v**2 < 2 * 9.81 * h),
         ("v0**2/(g*height) < 0.1", lambda h, v: v**2 / (9.81 * h) < 0.1),
-        ("-height < -1", lambda h, v: h > 1),
-        ("height + 1 > 3", lambda h, v: h + 1 > 3),
         ("method == 'exact' or height > 1", lambda h, v: h > 1),
     ],
 )
@@ -68,7 +44,6 @@ def test_what_a_condition_says(where, holds):
     ("where", "message"),
     [
         ("height < v0", "height is in meter and v0 is in meter second^-1; they cannot be compared"),
-        ("v0**2 < height", "they cannot be compared"),
         ("height + v0 < 3", "they cannot be compared"),
         ("height < '3 kg'", '"kg" is a mass; height is a length'),
         ("2*height < '3 m'", "compare it with a parameter alone"),
@@ -77,10 +52,7 @@ def test_what_a_condition_says(where, holds):
         ("height >", "cannot be read"),
         ("1 < 2", "compares two constants"),
         ("__import__('os').system('true') == 0", "is not allowed"),
-        ("height.real > 1", "is not allowed"),
-        ("[h for h in height] == 1", "is not allowed"),
         ("height**0.5 > 1", "a power is a whole number from 1 to 9"),
-        ("height**99 > 1", "a power is a whole number"),
         ("fall_time > 1", "no parameter of one number is called fall_time"),
         ("method == 'exact'", "no parameter of one number is called method"),
         ("height > 'tall'", "compares words with numbers"),
@@ -116,14 +88,3 @@ def test_a_study_with_a_condition_is_extended(tmp_path):
     other = build(axes={"height": [1.0, 1.2, 2.0, 3.0, 4.0, 5.0]}, where="height > 1.7")
     with pytest.raises(sweep.SweepError, match="where"):
         sweep.run(other, tmp_path / "a.h5", extend=True)
-
-
-def test_a_summary_counts_them():
-    found = sweep.run(build(axes=AXES, where=WHERE, summary={"outputs": {"fall_time": ["min"]}}))
-    assert int(found.cells_by_status.sel(status_name="NOT_ASKED")) == 3
-    assert int(found.fall_time_count) == 9
-    assert account(found).not_asked == 3
-
-
-def test_the_condition_is_in_the_fingerprint():
-    assert fingerprint(build(axes=AXES, where=WHERE))["where"] == WHERE

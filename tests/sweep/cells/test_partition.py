@@ -51,12 +51,6 @@ def test_boxes_waste_a_tenth_at_most_whatever_is_wanted(length):
         assert -(-length // cells) * cells <= 1.1 * length
 
 
-def test_short_boxes_fill_whole_lanes():
-    assert boxes((10_007,), 100, 32).cells == 96
-    assert boxes((10_007,), 100, 1).cells == 100
-    assert boxes((10_000, 3), 100, 32).cells == 96
-
-
 class Uneven:
     """A solver whose cells cost as it is told, on a clock of its own."""
 
@@ -79,16 +73,3 @@ def test_a_sample_of_a_small_grid_stays_inside_it(monkeypatch, size):
     assert max(stop for _, stop in solver.ranges) <= size
     assert sum(stop - start for start, stop in solver.ranges) <= size + 3
     assert (np.diff(found.positions) > 0).all()
-
-
-def test_lanes_are_told_from_single_cells(monkeypatch):
-    """A kernel that takes 1 ms for up to 32 cells costs 31 us a cell."""
-    solver = Uneven(lambda k: 0.0, monkeypatch)
-    real = solver.solve
-
-    def solve(start, cells):
-        real(start, cells)
-        solver.now += 1e-3 * -(-cells.number // 32)
-
-    solver.solve = solve
-    assert take_sample(solver, COLUMNS, 10**5).cost == pytest.approx(1e-3 / 32, rel=0.01)

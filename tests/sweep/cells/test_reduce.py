@@ -1,174 +1,52 @@
 """Summaries against numpy on the cells that a study without one keeps."""
 
 import itertools
-import math
 from fractions import Fraction
 
 import numpy as np
 import pytest
-import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from running import quiet, same
+from toy_studies import build
 
-import sweep
-from kernels.interface import Status
 from sweep.cells.partition import RowBlocks, row_blocks
-from sweep.cells.reduce import BY_STATUS, tree_sum
+from sweep.cells.reduce import tree_sum
 
-HEIGHTS = np.array([-1.0, 1.0, 2.0, 5.0, math.nan, 13.5, 100.0, 0.3, 0.7, 77.0])
-SPEEDS = np.array([0.0, 0.5, 3.0, 1e-9, 1e4, 2.0])
-EDGES = [1e-3, 0.1, 1.0, 2.0]
 EVERYTHING = ["min", "max", "mean", "argmin", "argmax", "histogram"]
+OVER = st.sampled_from([("height", "v0"), ("height",), ("v0",)])
 
 
-def stone(summary=None, **keys):
-    keys = {"axes": {"height": HEIGHTS, "v0": SPEEDS}, "outputs": ["fall_time"], **keys}
-    keys |= {} if summary is None else {"summary": summary}
-    return sweep.study(allow_import=True, kernel="toy:KERNEL", title="A stone", **keys)
-
-
-def whole(**keys):
-    return {"outputs": {"fall_time": EVERYTHING}, "edges": {"fall_time": EDGES}, **keys}
-
-
-def quiet(study, path=None, **keys):
-    return sweep.run(study, path, **{"progress": False, "workers": 2, **keys})
-
-
-def same(left, right):
-    """Bit for bit, NaN included."""
-    assert list(left.data_vars) == list(right.data_vars)
-    for name in left.data_vars:
-        assert left[name].dims == right[name].dims
-        assert left[name].values.tobytes() == right[name].values.tobytes(), name
-
-
-def exact_mean(values):
-    """The mean as a fraction, rounded once."""
-    return float(sum(map(Fraction, values.tolist())) / len(values))
-
-
-def agree(found, cells, over):
-    """The reductions of fall_time in `found` are those of the cells."""
-    kept = [d for d in cells.fall_time.dims if d not in over]
-    rows = cells.transpose(*kept, *over)
-    for at in np.ndindex(*(rows.sizes[d] for d in kept)):
-        one, got = rows.isel(dict(zip(kept, at, strict=True))), found.isel(dict(zip(kept, at, strict=True)))
-        values = one.fall_time.values.ravel()
-        good = values[~np.isnan(values)]
-        assert got.fall_time_count == len(good)
-        assert got[BY_STATUS].sum() == values.size
-        for status in Status:
-            assert got[BY_STATUS].sel(status_name=status.name) == (one.status == status).sum()
-        if not len(good):
-            assert np.isnan([got.fall_time_min, got.fall_time_mean, got[f"fall_time_argmin_{over[0]}"]]).all()
-            assert got.fall_time_argmax_status == Status.PENDING
-            continue
-        assert (got.fall_time_min.item(), got.fall_time_max.item()) == (good.min(), good.max())
-        assert got.fall_time_mean.item() == pytest.approx(exact_mean(good), rel=3e-16)
-        for end, place in (("argmin", np.nanargmin(values)), ("argmax", np.nanargmax(values))):
-            where = np.unravel_index(place, one.fall_time.shape)
-            for axis, index in zip(over, where, strict=True):
-                assert got[f"fall_time_{end}_{axis}"] == one[axis][index]
-            assert got[f"fall_time_{end}_status"] == one.status.values[where]
-        expected, _ = np.histogram(good, EDGES)
-        assert got.fall_time_histogram.values.tolist() == expected.tolist()
-        assert got.fall_time_below == (good < EDGES[0]).sum()
-        assert got.fall_time_above == (good > EDGES[-1]).sum()
-
-
-@pytest.mark.parametrize("over", [["height", "v0"], ["height"], ["v0"]])
-@pytest.mark.parametrize("at_once", [8 << 20, 2000])
-def test_reductions_are_those_of_the_cells(over, at_once, tmp_path, monkeypatch):
-    monkeypatch.setattr("sweep.store.frame.GATHERED_BYTES", at_once)
-    cells = quiet(stone())
-    found = quiet(stone(whole(over=over)))
-    agree(found, cells, over)
-    with quiet(stone(whole(over=over)), tmp_path / "out.h5", block_cells=4) as stored:
-        same(stored, found)
-        xr.testing.assert_identical(stored.drop_attrs(), found.drop_attrs())
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["out.h5"]
-
-
-def long_study(cells, **keys):
-    """Many cells, so that row blocks are shorter than groups."""
+def long_study(over):
+    """12,000 cells, so that row blocks are shorter than groups; a tenth of them are refused."""
     rng = np.random.default_rng(5)
-    heights = rng.lognormal(size=cells // 6)
-    heights[rng.random(cells // 6) < 0.1] *= -1
-    return stone(whole(**keys), axes={"height": heights, "v0": SPEEDS})
+    heights = rng.lognormal(size=2000)
+    heights[rng.random(2000) < 0.1] *= -1
+    outputs, edges = {"fall_time": EVERYTHING}, {"fall_time": [1e-3, 0.1, 1.0, 2.0]}
+    axes = {"height": heights, "v0": [0.0, 0.5, 3.0, 1e-9, 1e4, 2.0]}
+    return build(axes=axes, summary={"over": list(over), "outputs": outputs, "edges": edges})
 
 
 @pytest.fixture(scope="module")
 def long():
-    return {over: quiet(long_study(12_000, over=list(over))) for over in (("height", "v0"), ("height",), ("v0",))}
+    return {over: quiet(long_study(over)) for over in (("height", "v0"), ("height",), ("v0",))}
 
 
 @settings(max_examples=9, deadline=None)
-@given(
-    over=st.sampled_from([("height", "v0"), ("height",), ("v0",)]),
-    cells=st.integers(400, 12_000),
-    workers=st.integers(1, 4),
-)
+@given(over=OVER, cells=st.integers(400, 12_000), workers=st.integers(1, 4))
 def test_the_same_bits_for_any_block_shape_and_thread_count(tmp_path_factory, long, over, cells, workers):
     path = tmp_path_factory.mktemp("run") / "out.h5"
-    study = long_study(12_000, over=list(over))
-    with quiet(study, path, workers=workers, block_cells=cells) as found:
+    with quiet(long_study(over), path, workers=workers, block_cells=cells) as found:
         same(found, long[over])
 
 
-def test_many_row_blocks_agree_with_the_cells(long):
-    cells = quiet(sweep.study(allow_import=True, kernel="toy:KERNEL", outputs=["fall_time"],
-                              axes={n: a.values for n, a in long_study(12_000).axes.items()}))  # fmt: skip
-    assert row_blocks(long_study(12_000)).per_group > 1000
-    agree(long["height", "v0"], cells, ["height", "v0"])
-    assert row_blocks(long_study(12_000, over=["height"])).per_group > 100
-    agree(long["height",], cells, ["height"])
-
-
-def test_traces_are_reduced_point_by_point():
-    keys = {"outputs": ["drop"], "along": {"phase": [0.0, 0.25, 1.0]}}
-    cells = quiet(stone(**keys))["drop"]
-    found = quiet(
-        stone({"over": ["height"], "outputs": {"drop": EVERYTHING}, "edges": {"drop": [0.0, 1.0, 5.0]}}, **keys)
-    )
-    assert found.drop_max.dims == ("v0", "phase")
-    np.testing.assert_array_equal(found.drop_max, cells.max("height"))
-    assert found.drop_histogram.dims == ("v0", "phase", "drop_bin")
-    for v, p in np.ndindex(6, 3):
-        good = cells.values[:, v, p][~np.isnan(cells.values[:, v, p])]
-        assert found.drop_histogram[v, p].values.tolist() == np.histogram(good, [0, 1, 5])[0].tolist()
-        assert found.drop_argmax_height[v, p] == cells.height[np.nanargmax(cells.values[:, v, p])]
-
-
-def test_a_result_of_a_summary_can_be_shown_and_run_again(tmp_path, capsys, read):
-    read("""
-[axes]
-height = [1.0, 2.0, -1.0]
-[summary]
-outputs.fall_time = ["min", "argmin", "histogram"]
-[summary.edges.fall_time]
-spacing = "log"
-start = 100
-stop = 1e4
-num = 3
-unit = "ms"
-""")
-    from sweep.cli import main
-
-    output = str(tmp_path / "out.h5")
-    assert main(["run", str(tmp_path / "fall.toml"), "-o", output, "--allow-import"]) == 0
-    assert "3 cells: 2 ok, 0 remarked, 1 refused, 0 unsolved, 0 FAILED, 0 pending" in capsys.readouterr().out
-    assert main(["show", output]) == 0
-    told = capsys.readouterr().out
-    assert "reduced over\n  height" in told
-    assert "fall_time_argmin_height" in told
-    assert "BAD_INPUT" in told
-    with sweep.open_result(output) as found:
-        np.testing.assert_array_equal(found.fall_time_bin_lower, [0.1, 1.0])
-        np.testing.assert_array_equal(found.fall_time_bin_upper, [1.0, 10.0])
-        assert found.fall_time_histogram.values.tolist() == [2, 0]
-    assert main(["run", str(tmp_path / "fall.toml"), "-o", output, "--allow-import"]) == 0
-    assert "done before" in capsys.readouterr().out
+def test_edges_of_bins_may_be_spaced_as_axes_are_and_in_another_unit():
+    edges = {"fall_time": {"spacing": "log", "start": 100, "stop": 1e4, "num": 3, "unit": "ms"}}
+    summary = {"outputs": {"fall_time": ["histogram"]}, "edges": edges}
+    found = quiet(build(axes={"height": [1.0, 2.0, -1.0]}, summary=summary))
+    np.testing.assert_array_equal(found.fall_time_bin_lower, [0.1, 1.0])
+    np.testing.assert_array_equal(found.fall_time_bin_upper, [1.0, 10.0])
+    assert found.fall_time_histogram.values.tolist() == [2, 0]
 
 
 @given(st.lists(st.floats(allow_nan=False, width=64, min_value=-1e300, max_value=1e300), min_size=1, max_size=70))
@@ -210,20 +88,7 @@ def test_strips_cover_the_rows_and_are_cut_at_the_same_places(groups, group, len
 def test_of_equal_extremes_the_first_cell_is_told():
     """`rough` does not heed the speed: all cells of a height are equal, over many row blocks."""
     speeds = np.arange(3000.0, 0.0, -1.0)
-    found = quiet(stone({}, axes={"height": [2.0], "v0": speeds}, method="rough", rtol=0.9))
-    assert row_blocks(stone({}, axes={"height": [2.0], "v0": speeds})).per_group > 1
+    study = build(axes={"height": [2.0], "v0": speeds}, method="rough", rtol=0.9, summary={})
+    found = quiet(study)
+    assert row_blocks(study).per_group > 1
     assert (found.fall_time_argmin_v0, found.fall_time_argmax_v0) == (3000.0, 3000.0)
-
-
-def test_a_summary_exports_as_a_table_of_the_kept_axes(tmp_path):
-    found = quiet(stone(whole(over=["v0"])))
-    lines = sweep.export(found, tmp_path / "out.csv").read_text().splitlines()
-    about = {line[2:].partition(":")[0]: line for line in lines if line.startswith("#")}
-    assert "0.1 to 1: cells in each bin" in about["fall_time_histogram_2 [1]"]
-    heading, *rows = [line.split(",") for line in lines if not line.startswith("#")]
-    assert len(rows) == len(HEIGHTS)
-    table = {name: [row[i] for row in rows] for i, name in enumerate(heading)}
-    assert table["cells_OK"] == ["0", "6", "6", "6", "0", "6", "6", "6", "6", "6"]
-    assert [float(x) for x in table["fall_time_min"]] == pytest.approx(found.fall_time_min.values, nan_ok=True)
-    assert table["fall_time_argmin_status"][:2] == ["PENDING", "OK"]
-    assert "cells_NEVER_STARTS" not in table

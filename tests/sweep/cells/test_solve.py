@@ -1,37 +1,15 @@
 """Which method a cell gets, and what is said of it."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from stand_ins import solved, stand_in, toy_study, with_kernel
+from stand_ins import solved, toy_study
 from toy import KERNEL
 
 import sweep
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.solve import NONE, STRIP, UNKNOWN, among
-from sweep.results.statuses import account
-
-FOLIOT = sweep.study(
-    kernel="foliot",
-    axes={"mu": np.concatenate([np.geomspace(1e-6, 1e6, 90), [-1.0, np.nan, 0.0]]), "a": [1.0, 0.0, 1e-3, 30.0]},
-    fixed={"phi0": 0.5},
-    rtol=1e-6,
-)
-
-
-@pytest.fixture(scope="module")
-def whole():
-    return solved(FOLIOT)
-
-
-def test_auto_takes_the_closed_form_of_the_foliot_outright(whole):
-    names = [m.name for m in FOLIOT.kernel.methods]
-    assert {names[u] for u in whole[2].reshape(93, 4)[:90, 0]} == {"closed"}
-    assert set(whole[1].reshape(93, 4)[90]) == {Status.BAD_INPUT}
-    assert whole[1].reshape(93, 4)[92].tolist() == [Status.NEVER_STARTS] * 4
-    assert whole[1].reshape(93, 4)[0, 1] == Status.NO_LIMIT_CYCLE
 
 
 def test_strips_join_without_a_seam():
@@ -83,20 +61,3 @@ def test_auto_does_not_deny_what_an_impact_clock_does_where_following_it_leaves_
     assert open_.sum() > 20
     assert (status == followed).all()
     assert (used == np.where(open_, NONE, 1)).all()
-
-
-def without_a_number(number, verdict=Status.OK):
-    """A method that gives a cell of height 2 this in place of its speed, and this verdict."""
-
-    def solve(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
-        fall_time[...], drop[...], status[...] = 1.0, 1.0, Status.OK
-        impact_speed[...] = np.where(height == 2.0, number, height)
-        status[height == 2.0] = verdict
-
-    return solve, None
-
-
-def test_failures_are_in_the_account():
-    study = toy_study(axes={"height": [1.0, 2.0, -1.0]}, method="rough")
-    dataset = sweep.run(with_kernel(study, stand_in(rough=without_a_number(math.nan))), progress=False)
-    assert str(account(dataset)) == "3 cells: 1 ok, 0 remarked, 1 refused, 0 unsolved, 1 FAILED, 0 pending"

@@ -3,7 +3,7 @@
 import foliot_oracles
 import numpy as np
 import pytest
-from stand_ins import solved, toy_study, with_kernel
+from stand_ins import solved
 
 import sweep
 from kernels.foliot.cycle import FOLIOT
@@ -86,7 +86,3 @@ def test_every_method_that_takes_a_part_is_right_to_rtol(whole):
         given = np.transpose([column[[*places, both]] for column in outputs.values()])
         assert (status[[*places, both]] == Status.OK).all()
         assert (np.abs(given / np.array(truths, float) - 1.0) <= rtol).all()
-
-
-def used(kernel, **keys):
-    return solved(with_kernel(toy_study(**keys), kernel))[2].tolist()

@@ -6,7 +6,6 @@ from toy_studies import build
 
 import sweep
 from kernels.interface import Status
-from sweep.cli import main
 
 HEIGHTS = [1.0, 2.0, 4.0, 8.0]
 
@@ -23,16 +22,6 @@ def same(found, whole):
 
 def of(heights=HEIGHTS, v0=(0.0, 1.0), **keys):
     return sweep.run(build(**{"axes": {"height": heights, "v0": list(v0)}, **keys}))
-
-
-@pytest.mark.parametrize(
-    ("one", "other"),
-    [([1.0, 2.0], [4.0, 8.0]), ([4.0, 8.0], [1.0, 2.0]), ([1.0, 4.0], [2.0, 8.0]), ([1.0, 2.0, 4.0], [2.0, 4.0, 8.0])],
-)
-def test_an_axis_becomes_longer(one, other):
-    joined = sweep.join(of(one, title="First"), of(other, title="Second"))
-    same(joined, of())
-    assert joined.attrs["title"] == "First"
 
 
 @pytest.mark.parametrize(
@@ -95,14 +84,6 @@ def test_a_new_axis_has_labels_and_a_file_that_opens(tmp_path):
         sweep.run(build(axes={"height": HEIGHTS, "v0": [0.0, 1.0]}), tmp_path / "c.h5")
 
 
-def test_a_new_axis_of_points():
-    a = of([1.0, 2.0], design="zip")
-    found = sweep.join(a, a, axis="version")
-    assert found.fall_time.dims == ("version", "point")
-    assert found.height.dims == ("point",)
-    assert np.array_equal(found.fall_time[1], a.fall_time)
-
-
 def unfinished():
     found = of()
     found.status[1, 1] = Status.PENDING
@@ -145,26 +126,6 @@ def test_results_beyond_the_memory_are_refused(monkeypatch):
     there[0] -= 1
     with pytest.raises(sweep.SweepError, match="memory"):
         sweep.join(a, b)
-
-
-@pytest.mark.parametrize("name", ["join", "diff"])
-@pytest.mark.parametrize("given", [(["a.h5"],), ("a.h5", "b.h5"), (1, None)])
-def test_what_are_not_two_results_is_named(name, given):
-    with pytest.raises(sweep.SweepError, match=rf"sweep\.{name}: .* {type(given[0]).__name__}"):
-        getattr(sweep, name)(*given)
-
-
-def test_the_command(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    for name, heights in (("a.h5", [1.0, 2.0]), ("b.h5", [4.0, 8.0])):
-        sweep.run(build(axes={"height": heights, "v0": [0.0, 1.0]}), name).close()
-    assert main(["join", "a.h5", "b.h5", "-o", "c.h5"]) == 0
-    with sweep.open_result("c.h5") as found:
-        same(found, of())
-    assert main(["join", "a.h5", "a.h5", "-o", "d.h5", "--axis", "version", "--labels", "old", "new"]) == 0
-    assert main(["show", "d.h5"]) == 0
-    assert "version" in capsys.readouterr().out
-    assert main(["join", "a.h5", "b.h5", "-o", "a.h5", "--force"]) == 2
 
 
 def killed_at(target):

@@ -1,6 +1,5 @@
 """What a plan forecasts, against the run; what it says of methods, statuses, small disks and bad kernels."""
 
-import re
 import time
 
 import numpy as np
@@ -31,14 +30,6 @@ def test_a_plan_forecasts_bytes_that_a_run_then_takes(tmp_path, keys):
     assert (tmp_path / "out.h5").stat().st_size == pytest.approx(found.output_bytes, rel=0.3)
 
 
-def test_a_summary_takes_the_bytes_of_its_rows_alone():
-    axes = {"height": np.linspace(1.0, 2.0, 400), "v0": np.linspace(0.0, 1.0, 400)}
-    cells = sweep.plan(build(axes=axes), workers=1)
-    summed = sweep.plan(build(axes=axes, summary={"over": ["v0"], "outputs": {"fall_time": ["mean"]}}), workers=1)
-    assert summed.output_bytes < cells.output_bytes / 10
-    assert cells.cells == 160_000
-
-
 def test_a_plan_forecasts_the_time_of_a_run(tmp_path):
     """A cell sleeps for two milliseconds."""
     found = sweep.plan(slow(1000), workers=2, path=tmp_path / "out.h5")
@@ -67,19 +58,6 @@ def test_the_ends_of_axes_are_in_the_sample_whose_size_is_told(tmp_path, end, is
         assert found.methods.keys() == {"none", "rough"}
         assert f"{found.sampled:,} cells" in str(found)
         assert " 0 %" not in str(found)
-
-
-def test_a_plan_prints_all_that_it_knows():
-    text = str(sweep.plan(stone(), workers=2))
-    assert text.startswith("A stone\n")
-    for row in ("cells", "blocks", "output", "disk", "memory", "time", "methods", "statuses"):
-        assert re.search(rf"^  {row:9} \S", text, re.MULTILINE), row
-    assert "warning" not in text
-
-
-def test_a_plan_warns_of_a_memory_that_is_too_small(monkeypatch):
-    monkeypatch.setattr("sweep.explore.plan.memory", lambda: 1000)
-    assert "the memory is too small" in str(sweep.plan(stone(), workers=1))
 
 
 def test_a_plan_of_a_folder_that_is_not_there_is_refused(tmp_path):

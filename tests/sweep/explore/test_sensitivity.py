@@ -53,11 +53,6 @@ def test_the_same_cells_have_the_same_errors_in_every_call(kind):
     xr.testing.assert_identical(first, sweep.sensitivity(ds, "fall_time"))
 
 
-def test_an_output_may_be_named():
-    ds = cells("morris", 8)
-    assert sweep.sensitivity(ds, "fall_time").equals(sweep.sensitivity(ds, ds.fall_time))
-
-
 @pytest.mark.parametrize(
     ("make", "y", "message"),
     [

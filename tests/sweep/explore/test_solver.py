@@ -63,7 +63,6 @@ def test_what_is_refused_is_nan_and_says_why():
 @pytest.mark.parametrize(
     ("values", "named", "word"),
     [
-        ((), {}, "0 of 2"),
         ((1.0,), {}, "1 of 2"),
         ((1.0, 2.0, 3.0), {}, "3 of 2"),
         ((1.0,), {"hight": 2.0}, "did you mean height"),

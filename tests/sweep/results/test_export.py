@@ -2,11 +2,9 @@
 
 import csv
 import os
-import shutil
 import signal
 import subprocess
 import sys
-import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -16,36 +14,18 @@ import xarray as xr
 from running import environment
 
 import sweep
-from sweep.show.laws import laws, write_laws
 from sweep.system.errors import SweepError
-
-FLAGS = {"flag_values": np.array([0, 1, 64, 127], np.int8), "flag_meanings": "OK INACCURATE BAD_INPUT PENDING"}
-METHODS = {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "asymptotic closed"}
 
 
 def result():
-    """mu by a, with one refused cell, a trace along phase, fixed phi0."""
-    mu, a, phase = [0.1, 1 / 3, 3e300], [1.0, 2.0], [0.0, 0.25, 0.5, 0.75]
-    rng = np.random.default_rng(1)
-    period = rng.random((3, 2)) * np.array([[1e-300], [1.0], [1e300]])
-    status, method = np.zeros((3, 2), np.int8), np.ones((3, 2), np.int8)
-    period[1, 1], status[1, 1], method[1, 1] = np.nan, 64, -1
-    ds = xr.Dataset(
-        {
-            "period": (("mu", "a"), period, {"units": "s", "long_name": 'the "period", of\nthe cycle'}),
-            "angle": (("mu", "a", "phase"), rng.random((3, 2, 4)), {"units": "rad"}),
-            "status": (("mu", "a"), status, FLAGS),
-            "method_used": (("mu", "a"), method, METHODS),
-        },
-        coords={
-            "mu": ("mu", mu, {"units": "rad/s^2", "long_name": "drive torque per inertia"}),
-            "a": ("a", a, {"units": "1/s"}),
-            "phase": ("phase", phase, {"units": "1"}),
-            "phi0": ((), 0.5, {"units": "rad"}),
-        },
-        attrs={"title": "Foliot", "rtol": 1e-9, "study": '# Why?\nkernel = "foliot"\n'},
+    """Stones of which some are refused, with a trace."""
+    return sweep.run(
+        toy_studies.build(
+            axes={"height": [-1.0, 1.0, 3.0], "v0": [0.0, 1.0]},
+            outputs=["fall_time", "impact_speed", "drop"],
+            along={"phase": [0.0, 0.5, 1.0]},
+        )
     )
-    return ds
 
 
 def read(path):
@@ -57,47 +37,17 @@ def read(path):
 
 def test_csv_columns_do_not_depend_on_the_order_of_an_outputs_dimensions(tmp_path):
     turned = result()
-    turned["period"] = turned.period.transpose("a", "mu")
-    turned["angle"] = turned.angle.transpose("phase", "mu", "a")
+    turned["fall_time"] = turned.fall_time.transpose("v0", "height")
+    turned["drop"] = turned["drop"].transpose("phase", "height", "v0")
     plain, other = sweep.export(result(), tmp_path / "plain.csv"), sweep.export(turned, tmp_path / "other.csv")
     assert plain.read_text() == other.read_text()
 
 
-def test_no_text_of_a_csv_is_a_formula(tmp_path):
-    words = ["=cmd|'/C calc'!A0", "+1+1", "-x", "@SUM(A1)", "-1.5", "plain"]
-    ds = xr.Dataset({"=y": ("word", -np.arange(6.0))}, {"word": words})
-    ds["=y"].attrs = {"units": "m\n=1", "long_name": "a\n=2"}
-    lines = sweep.export(ds, tmp_path / "out.csv").read_text().splitlines()
-    assert lines[1:4] == ["# word", "# =y [m =1]: a =2", "word,'=y"]
-    assert lines[4:] == [
-        "'=cmd|'/C calc'!A0,-0.0",
-        "'+1+1,-1.0",
-        "'-x,-2.0",
-        "'@SUM(A1),-3.0",
-        "-1.5,-4.0",
-        "plain,-5.0",
-    ]
-
-
-def test_no_text_of_a_table_of_laws_is_a_formula(tmp_path):
-    x = np.geomspace(1, 10, 5)
-    ds = xr.Dataset({"y": (("word", "x"), [x, x])}, {"x": x, "word": ["=1+1", "plain"]})
-    write_laws(laws(ds, "y", "x"), tmp_path / "laws.csv")
-    assert ",'=1+1," in (tmp_path / "laws.csv").read_text()
-
-
-def test_a_status_without_a_name_is_written_as_its_number(tmp_path):
-    ds = result()
-    ds.status[0, 0] = 33
-    heading, rows = read(sweep.export(ds, tmp_path / "out.csv"))
-    assert rows[0][heading.index("status")] == "33"
-
-
 def test_netcdf_keeps_full_precision_however_the_source_was_packed(tmp_path):
     ds = result()
-    ds.period.encoding = {"dtype": "float32", "scale_factor": 2.0}
+    ds.fall_time.encoding = {"dtype": "float32", "scale_factor": 2.0}
     with xr.open_dataset(sweep.export(ds, tmp_path / "out.nc"), engine="h5netcdf") as back:
-        np.testing.assert_array_equal(back.period, ds.period)
+        np.testing.assert_array_equal(back.fall_time, ds.fall_time)
 
 
 @pytest.mark.parametrize(
@@ -133,45 +83,30 @@ def test_a_fault_half_way_leaves_the_old_file_and_nothing_else(tmp_path, monkeyp
     assert [p.name for p in tmp_path.iterdir()] == [target.name]
 
 
-def test_a_kind_of_file_whose_library_is_missing_is_told(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(SweepError, match="pyarrow"):
-        sweep.export(result(), tmp_path / "out.parquet")
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_compressed_export_is_smaller(tmp_path):
-    ds = sweep.run(toy_studies.build(axes={"height": np.linspace(1.0, 2.0, 5000)}))
-    plain, small = (sweep.export(ds, tmp_path / f"{k}.nc", compress=k).stat().st_size for k in (False, True))
-    assert small < plain
-
-
 def test_an_export_never_replaces_its_source(tmp_path):
     path = tmp_path / "stones.nc"
     sweep.run(toy_studies.build(axes={"height": [1.0, 2.0]}), tmp_path / "out.h5").close()
-    shutil.copy(tmp_path / "out.h5", path)
+    path.write_bytes((tmp_path / "out.h5").read_bytes())
     before = path.read_bytes()
     with sweep.open_result(path) as ds, pytest.raises(SweepError, match=r"stones\.nc"):
         sweep.export(ds, path, force=True)
     assert path.read_bytes() == before
 
 
+KILLED = """
+import os, signal, sys
+import sweep
+from sweep.system import disk
+disk.sync_tree = lambda path: os.kill(os.getpid(), signal.SIGKILL)
+sweep.export(sweep.run(kernel="foliot", axes={"mu": [1.0]}, fixed={"phi0": 1.0, "a": 1.0}), sys.argv[1])
+"""
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".nc", ".zarr"])
 def test_what_an_export_left_that_was_killed_goes_with_the_next_one(tmp_path, suffix):
     """One that lives, here or on another machine that sees the folder, keeps what is its own."""
-    target, made = (
-        tmp_path / f"out{suffix}",
-        """
-        import os, signal, sys
-        import numpy as np
-        import xarray as xr
-        import sweep
-        from sweep.system import disk
-        disk.sync_tree = lambda path: os.kill(os.getpid(), signal.SIGKILL)
-        sweep.export(xr.Dataset({"y": ("x", np.arange(3.0))}, {"x": np.arange(3.0)}), sys.argv[1])
-    """,
-    )
-    killed = subprocess.run([sys.executable, "-c", textwrap.dedent(made), target], env=environment())
+    target = tmp_path / f"out{suffix}"
+    killed = subprocess.run([sys.executable, "-c", KILLED, target], env=environment())
     left = list(tmp_path.iterdir())
     assert (killed.returncode, len(left)) == (-signal.SIGKILL, 1)
     name = left[0].name
@@ -179,7 +114,7 @@ def test_what_an_export_left_that_was_killed_goes_with_the_next_one(tmp_path, su
     others = [tmp_path / lives, tmp_path / f".out{suffix}.far.9.tmp"]
     for other in others:
         other.touch()
-    sweep.export(xr.Dataset({"y": ("x", np.arange(3.0))}, {"x": np.arange(3.0)}), target)
+    sweep.export(result(), target)
     assert sorted(tmp_path.iterdir()) == sorted([target, *others])
 
 
@@ -194,3 +129,28 @@ def test_a_summary_is_a_table_with_a_column_for_each_bin_and_status(tmp_path):
     np.testing.assert_array_equal(table["fall_time_min"], cells.min("height"))
     counts = np.stack([np.histogram(line, edges)[0] for line in cells.transpose("v0", "height").values])
     np.testing.assert_array_equal(np.stack([table["fall_time_histogram_1"], table["fall_time_histogram_2"]], 1), counts)
+
+
+# in other units
+
+
+def test_outputs_axes_and_fixed_parameters_change_their_unit():
+    stones = result()
+    ds = sweep.in_units(stones, {"fall_time": "ms", "height": "mm", "g": "cm/s^2", "impact_speed": "km/hour"})
+    np.testing.assert_allclose(ds.fall_time, 1000 * stones.fall_time, rtol=4e-16)
+    np.testing.assert_allclose(ds.impact_speed, 3.6 * stones.impact_speed, rtol=4e-16)
+    assert ds.height.values.tolist() == [-1000.0, 1000.0, 3000.0]
+    assert float(ds.g) == pytest.approx(980.665, rel=4e-16)
+    assert [ds[name].attrs["units"] for name in ("fall_time", "height", "g")] == ["ms", "mm", "cm/s^2"]
+    assert ds.fall_time.attrs["long_name"] == stones.fall_time.attrs["long_name"]
+    assert stones.height.attrs["units"] == "m"
+
+
+def test_all_mistakes_are_told_at_once():
+    with pytest.raises(sweep.StudyError) as caught:
+        sweep.in_units(result(), {"fall_tim": "s", "height": "kg", "status": "1", "g": "parsec/furlong^"})
+    text = str(caught.value)
+    assert "4 mistakes" in text
+    assert "did you mean fall_time?" in text
+    assert '"kg" is a mass; height is a length' in text
+    assert "words or counts" in text

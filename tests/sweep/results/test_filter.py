@@ -3,13 +3,11 @@
 import contextlib
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import sweep
-from sweep.cli import main
 from sweep.system.errors import SweepError
 
 AXES = {"height": [-1.0, 1.0, 2.0, 3.0], "v0": [0.0, 1.0]}
@@ -24,7 +22,6 @@ SPEED = np.sqrt(V**2 + 2 * 9.80665 * np.where(FALLS, H, np.nan))
     [
         ("status == 'OK'", FALLS),
         ("status != 'OK'", ~FALLS),
-        ("height > 1", H > 1),
         ("1 < height <= 3 and v0 == 0", (H > 1) & (V == 0)),
         ("not (height > 1 or v0 > 0.5)", (H <= 1) & (V <= 0.5)),
         ("v0 < 0.4*height", V < 0.4 * H),
@@ -32,7 +29,6 @@ SPEED = np.sqrt(V**2 + 2 * 9.80665 * np.where(FALLS, H, np.nan))
         ("impact_speed / 2 > -(0 - 3)", SPEED > 6),
         ("method_used == 'rough'", FALLS & (V == 0)),
         ("g > 9", H == H),
-        ("-height == 1", H == -1),
         ("2**height > 3", 2**H > 3),
         ("height > 9**9**9**9", np.inf < H),
         ("height < 1e400", np.inf > H),
@@ -58,19 +54,16 @@ def test_a_chosen_cell_keeps_all_its_values():
 @pytest.mark.parametrize(
     ("condition", "message"),
     [
+        ("", "cannot be read"),
         ("heigth > 1", "did you mean height?"),
         ("status == 'OKAY'", 'status is never "OKAY"; did you mean OK?'),
         ("status == 0", "compares words with numbers"),
-        ("height", "is no condition"),
         ("1 < 2", "two constants"),
         ("drop > 0", "runs along phase"),
         ("height >", "cannot be read"),
-        ("height > 1/0", "cannot be read"),
         ("__import__('os').system('true')", "is not allowed"),
         ("height.real > 0", "is not allowed"),
-        ("[h for h in height]", "is not allowed"),
         ("(lambda: 1)() == height", "is not allowed"),
-        ("height > True", "is not allowed"),
         ("height and v0", "is no condition"),
         ("'a' + 'b' == status", "is no number"),
         ("height > " + "1+" * 900 + "1", "longer than"),
@@ -86,20 +79,3 @@ def test_what_is_no_condition_is_told(condition, message):
 def test_any_text_is_a_condition_or_told(text):
     with contextlib.suppress(SweepError):
         assert sweep.where(RESULT, text).sizes["cell"] <= 8
-
-
-def test_export_takes_a_condition(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    sweep.run(sweep.study(kernel="foliot", axes={"mu": [-1.0, 1.0, 4.0]}, fixed={"phi0": 1.0, "a": 1.0}), "f.h5")
-    assert main(["export", "f.h5", "-o", "f.csv", "--where", "status == 'OK' and mu < 2"]) == 0
-    table = pd.read_csv("f.csv", comment="#")
-    assert table.mu.tolist() == [1.0]
-    for mistake in ("mu < ", ""):
-        assert main(["export", "f.h5", "-o", "g.csv", "--where", mistake]) == 2
-        assert "cannot be read" in capsys.readouterr().err
-
-
-def test_a_summary_has_no_cells_to_choose_from():
-    summary = RESULT.drop_vars(["status", "method_used"])
-    with pytest.raises(SweepError, match="a summary keeps no cells"):
-        sweep.where(summary, "height > 1")

@@ -1,39 +1,28 @@
-"""Accounts of cells: which status counts as what, sums of summaries, and the words of it all."""
+"""Accounts of cells: which status counts as what, in a run, in its reader and in the list of a folder."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from running import interrupted, tall
 from toy_studies import build
 
 import sweep
 from kernels.interface import Status
 from sweep.cli import main
-from sweep.results import statuses as module
 from sweep.results.statuses import (
-    Account,
-    StatusCount,
     account,
-    cell_values,
-    count_methods,
     count_statuses,
-    failures,
     summary_text,
 )
 from sweep.results.stored import Stored
 from sweep.study.toml import to_toml
 
-FLAGS = {"flag_values": np.array([-1, 0, 1], np.int8), "flag_meanings": "none map closed"}
 
-
-def cells(status, methods=None):
+def cells(*status):
     """One cell of each status."""
-    status = np.array(status, np.int8)
-    used = np.zeros(status.shape, np.int8) if methods is None else np.array(methods, np.int8)
-    dims = ("a", "b")[: status.ndim]
-    coords = {name: np.arange(float(n)) + 0.1 for name, n in zip(dims, status.shape, strict=True)}
-    return xr.Dataset({"status": (dims, status), "method_used": (dims, used, FLAGS)}, coords)
+    return xr.Dataset({"status": ("cell", np.array(status, np.int8))})
 
 
 KINDS = {
@@ -48,18 +37,13 @@ KINDS = {
 }
 
 
-def test_each_status_is_of_one_kind(capsys):
-    found = {status.name: account(cells([status])).by_kind for status in Status}
+def test_each_status_is_of_one_kind():
+    found = {status.name: account(cells(status)).by_kind for status in Status}
     assert found == {name: {k: int(k == kind) for k in KINDS} for kind in KINDS for name in KINDS[kind].split()}
-    assert account(cells([99])).failed == 1  # of a later version
-    assert main(["kernels"]) == 0
-    told = capsys.readouterr().out
-    for kind, names in KINDS.items():
-        line = next(line for line in told.splitlines() if line.startswith(f"  {kind} "))
-        assert names.split()[0] in line or kind == "remarked"
+    assert account(cells(99)).failed == 1  # of a later version
 
 
-@pytest.mark.parametrize("number", [55, 60, 100, 200, 255])
+@pytest.mark.parametrize("number", [60, 200])
 def test_a_status_that_is_none_is_failed_with_the_exit_status_of_that(number, tmp_path, monkeypatch, capsys):
     """And those that a kernel may give are kept, and of them none is called FAILED."""
     monkeypatch.chdir(tmp_path)
@@ -72,38 +56,23 @@ def test_a_status_that_is_none_is_failed_with_the_exit_status_of_that(number, tm
         with sweep.open_result("s.h5") as found:
             assert found.status.values.tolist() == [Status.FAILED if h == number else h for h in heights]
             assert np.isnan(found.fall_time).values.tolist() == [h >= 64 or h == number for h in heights]
-        assert main(["list"]) == 0
-        assert "3 unsolved" in capsys.readouterr().out
 
 
-def test_an_account_adds_up_and_tells_of_cells_not_asked_where_there_are():
-    found = Account(1000, 20, 3, 7, 4, 5, 6)
-    assert found.total == 1045
-    assert str(found) == "1,045 cells: 1,000 ok, 20 remarked, 3 refused, 7 unsolved, 4 FAILED, 5 pending, 6 not asked"
-    assert str(Account(1)) == "1 cells: 1 ok, 0 remarked, 0 refused, 0 unsolved, 0 FAILED, 0 pending"
-
-
-def test_the_first_cell_of_each_status_is_its_example():
-    found = cells([[0, 64, 0], [1, 64, 1]])
-    counts = count_statuses(found)
-    assert [(c.name, c.cells, c.total) for c in counts] == [("OK", 2, 6), ("INACCURATE", 2, 6), ("BAD_INPUT", 2, 6)]
-    assert [c.example for c in counts] == [{}, {"a": "1.1", "b": "0.1"}, {"a": "0.1", "b": "1.1"}]
-    assert [c.name for c in failures(found)] == ["INACCURATE", "BAD_INPUT"]
-    assert str(counts[1]) == "2 of 6 cells: INACCURATE, e.g. a=1.1 b=0.1"
-    assert str(StatusCount("OK", 2, 6)) == "2 of 6 cells: OK"
-    assert cell_values(found, 5) == {"a": "1.1", "b": "2.1"}
-
-
-def test_a_summary_is_summed_over_all_it_keeps():
-    columns = {
-        "cells_by_status": (("a", "status_name"), [[2, 0, 1], [3, 0, 0]]),
-        "cells_by_method": (("a", "method_name"), [[1, 2], [0, 3]]),
-    }
-    found = xr.Dataset(columns, {"status_name": ["OK", "FAILED", "BAD_INPUT"], "method_name": ["none", "map"]})
-    assert module.tally(found) == {"OK": 5, "BAD_INPUT": 1}
-    assert count_methods(found) == {"map": 5}
-    assert (account(found).total, account(found).refused) == (6, 1)
-    assert [(c.name, c.cells, c.total) for c in count_statuses(found)] == [("OK", 5, 6), ("BAD_INPUT", 1, 6)]
+def test_the_results_of_a_folder_are_listed_with_what_became_of_them(tmp_path):
+    """And what a running sweep has beside its output, as that output."""
+    sweep.run(build(axes={"height": [1.0, -1.0]}, question="How long does it fall?"), tmp_path / "a.h5").close()
+    sweep.run(build(axes={"height": [1.0, 2.0, 3.0]}, summary={}), tmp_path / "b.h5").close()
+    interrupted(tall(23), tmp_path / "c.h5")
+    for name in ("d.h5", "e.h5.parts", "f.nc.unfinished", "g.h5.parts.old", "h.txt.parts", ".i.h5.log"):
+        (tmp_path / name).write_text("no result")
+    found = sweep.list_results(tmp_path)
+    assert [one.path.name for one in found] == ["a.h5", "b.h5", "c.h5", "d.h5", "e.h5", "f.nc"]
+    a, b, c, d, *_ = found
+    assert (a.question, a.cells, a.done, a.statuses) == ("How long does it fall?", 2, 1.0, {"OK": 1, "BAD_INPUT": 1})
+    assert (b.cells, b.statuses) == (3, {"OK": 3})
+    assert c.cells == 23
+    assert 0 < c.done < 1
+    assert "not the result of a sweep" in d.fault
 
 
 HEIGHTS = [1.0, -1.0, np.nan, 4.0, 9.0, 16.0]

@@ -1,5 +1,6 @@
 """Runs on a real scheduler with worker processes on this machine; some of these are killed."""
 
+import contextlib
 import io
 import os
 import signal
@@ -8,9 +9,7 @@ import time
 from concurrent.futures import Future
 from datetime import datetime, timedelta
 
-import numpy as np
 import pytest
-import toy_studies
 from clusters import served
 from running import kept, quiet, same, tall
 
@@ -48,14 +47,35 @@ def elsewhere(study, path=None, **keys):
     return sweep.run(study, path, **{"progress": False, **keys})
 
 
+@contextlib.contextmanager
+def after_blocks(output, count, deed):
+    """Does something as soon as so many blocks are kept."""
+
+    def wait():
+        while len(kept(output)) < count:
+            time.sleep(0.01)
+        deed()
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    yield
+    thread.join()
+
+
+def continues(study, output):
+    """Here, to the same bits as if it had never been anywhere else."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("slow.CELL_SECONDS", 0.0)
+        same(quiet(study, output), quiet(study))
+    assert list(output.parent.iterdir()) == [output]
+
+
 def test_the_command_line_takes_an_address(address, output, read, capsys):
     read("axes.height = [1.0, 2.0, 3.0]\n")
     study = str(output.parent / "fall.toml")
     arguments = ["run", study, "-o", str(output), "--allow-import", "--cluster", address]
     assert main(arguments) == 0
     assert "3 cells: 3 ok" in capsys.readouterr().out
-    assert main([*arguments, "--workers", "2"]) == 2
-    assert "a cluster brings its own workers" in capsys.readouterr().err
     assert main([word for word in arguments if word != "--allow-import"]) == 2
     assert "allow it with --allow-import" in capsys.readouterr().err
 
@@ -66,33 +86,17 @@ def test_nothing_is_asked_of_a_cluster_where_nothing_is_left_to_compute(output):
         assert found.sizes["height"] == 3
 
 
-def soon():
-    """When a test is given up."""
-    return datetime.now() + timedelta(seconds=100)
-
-
 def test_a_lost_scheduler_is_one_line_and_the_run_continues(output):
     study = tall(1000, "slow:SLOW")
     with served(workers=2) as (address, process):
-
-        def kill():
-            while len(kept(output)) < 5:
-                time.sleep(0.01)
-            os.killpg(process.pid, signal.SIGKILL)
-
-        killer = threading.Thread(target=kill)
-        killer.start()
-        with pytest.raises(SweepError, match=r"the scheduler is lost.*run the same command again") as told:
+        lost = pytest.raises(SweepError, match=r"the scheduler is lost.*run the same command again")
+        with after_blocks(output, 5, lambda: os.killpg(process.pid, signal.SIGKILL)), lost as told:
             elsewhere(study, output, cluster=address, block_cells=4)
-        killer.join()
     assert "\n" not in str(told.value)
     assert explained(told.value).code == INCOMPLETE
     before = kept(output)
     assert len(before) >= 5
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("slow.CELL_SECONDS", 0.0)
-        same(quiet(study, output), quiet(study))
-    assert list(output.parent.iterdir()) == [output]
+    continues(study, output)
 
 
 def test_a_run_on_a_cluster_ends_at_its_time_and_continues(client, output):
@@ -102,51 +106,18 @@ def test_a_run_on_a_cluster_ends_at_its_time_and_continues(client, output):
         told = account(found)
     assert 0 < told.ok < 10_000
     assert told.ok + told.pending == 10_000
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("slow.CELL_SECONDS", 0.0)
-        same(quiet(study, output), quiet(study))
-    assert list(output.parent.iterdir()) == [output]
+    continues(study, output)
 
 
 def test_ctrl_c_ends_a_run_on_a_cluster(client, output):
     study = tall(1000, "slow:SLOW")
-
-    def press():
-        while len(kept(output)) < 3:
-            time.sleep(0.01)
-        os.kill(os.getpid(), signal.SIGINT)
-
-    thread = threading.Thread(target=press)
-    thread.start()
-    with pytest.raises(KeyboardInterrupt):
+    with after_blocks(output, 3, lambda: os.kill(os.getpid(), signal.SIGINT)), pytest.raises(KeyboardInterrupt):
         elsewhere(study, output, cluster=client, block_cells=4)
-    thread.join()
     assert kept(output)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("slow.CELL_SECONDS", 0.0)
-        same(quiet(study, output), quiet(study))
-    assert list(output.parent.iterdir()) == [output]
+    continues(study, output)
 
 
-@pytest.mark.parametrize("place", ["memory", "shared folder"])
-def test_the_same_bits_wherever_the_cells_are_computed(client, output, place):
-    """Blocks of a page each are written by the workers where they see the file; the summary's rows are sent."""
-    axes = {"v0": [0.0, 2.0, np.nan], "height": np.linspace(-1.0, 40.0, 2000)}
-    for turn, keys in enumerate(({}, {"summary": {"over": ["height"], "outputs": {"fall_time": ["min", "mean"]}}})):
-        study, path = toy_studies.build(axes=axes, **keys), output.with_name(f"{turn}.h5")
-        with elsewhere(study, None if place == "memory" else path, cluster=client, block_cells=1000) as found:
-            same(found, quiet(study))
-        assert place == "memory" or sweep.verify(path).whole
-
-
-def test_an_extension_on_a_cluster_has_the_same_bits(client, output):
-    more = toy_studies.build(axes={"height": np.sort(np.r_[np.arange(1.0, 21), np.arange(10.5, 40)])})
-    quiet(toy_studies.build(axes={"height": np.arange(1.0, 21)}), output).close()
-    with elsewhere(more, output, cluster=client, extend=True, block_cells=4) as found:
-        same(found, quiet(more))
-
-
-@pytest.mark.parametrize("where", ["tcp://127.0.0.1:1", "nonsense", "", "missing.json"])
+@pytest.mark.parametrize("where", ["tcp://127.0.0.1:1", "nonsense", "missing.json"])
 def test_an_address_where_nobody_answers_is_one_clear_line(output, where):
     with pytest.raises(SweepError, match=r"^cluster: [^\n]*$"):
         elsewhere(tall(3), output, cluster=where)
@@ -161,18 +132,14 @@ def test_a_worker_with_another_version_refuses(client, output, monkeypatch):
 
 
 def test_workers_killed_in_the_middle_cost_nothing_but_time(client, output, monkeypatch):
-    study = tall(400, "slow:SLOW")
+    study, until = tall(400, "slow:SLOW"), datetime.now() + timedelta(seconds=100)
 
     def kill():
-        while len(kept(output)) < 3:
-            time.sleep(0.01)
         os.kill(next(iter(client.run(os.getpid).values())), signal.SIGKILL)
 
-    killer = threading.Thread(target=kill)
-    killer.start()
-    until = datetime.now() + timedelta(seconds=100)
-    with elsewhere(study, output, cluster=client, block_cells=4, until=until) as found:
-        killer.join()
+    with after_blocks(output, 3, kill):
+        found = elsewhere(study, output, cluster=client, block_cells=4, until=until)
+    with found:
         monkeypatch.setattr("slow.CELL_SECONDS", 0.0)
         same(found, quiet(study))
     assert sweep.verify(output).whole

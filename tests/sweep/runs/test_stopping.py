@@ -12,13 +12,12 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-import slow
-from running import environment, quiet, same, tall, wait_for
+from running import environment, quiet, tall, wait_for
 
 import sweep
 from sweep.cli import main, parser
 from sweep.results.statuses import account
-from sweep.show.follow import follow, reasons
+from sweep.show.follow import reasons
 from sweep.store.store import unfinished_of
 from sweep.system.errors import EXIT_CODES, SweepError
 from sweep.system.log import LOG, log, log_path, logging_to, read_lines
@@ -116,24 +115,6 @@ def test_a_time_of_day_is_the_next_one_and_a_date_that_moment():
         assert deadline(text, now) == now + timedelta(hours=hours)
 
 
-@pytest.mark.parametrize("place", ["UTC", "America/Los_Angeles", "Pacific/Kiritimati"])
-def test_a_time_with_a_zone_is_less_than_a_day_ahead_wherever_it_is_read(monkeypatch, place):
-    """Its date is that of its own zone, where it may be tomorrow already, or still yesterday."""
-    monkeypatch.setenv("TZ", place)
-    time.tzset()
-    try:
-        for hours in range(0, 24, 3):
-            now = datetime.fromisoformat("2026-11-21T00:30+00:00") + timedelta(hours=hours)
-            for text in ("04:00+09:00", "04:00-08:00", "23:00+14:00", "00:10-11:00"):
-                found = deadline(text, now)
-                zone = datetime.fromisoformat(f"2026-11-21T{text}").tzinfo
-                assert timedelta(0) < found - now <= timedelta(days=1)
-                assert found.astimezone(zone).strftime("%H:%M") == text[:5]
-    finally:
-        monkeypatch.undo()
-        time.tzset()
-
-
 @pytest.mark.parametrize("text", ["7 o'clock", "", "25:00", 7])
 def test_what_is_no_time_is_told(text, tmp_path):
     with pytest.raises(SweepError, match="until"):
@@ -147,17 +128,6 @@ def test_until_goes_by_the_clock_on_the_wall_however_it_jumps(monkeypatch):
         clock = SimpleNamespace(now=lambda at=at: datetime(2027, 1, 31, *at))
         monkeypatch.setattr("sweep.system.progress.datetime", clock)
         assert passed(until) is over
-
-
-def test_a_run_ends_at_its_time_with_what_there_is_and_continues(tmp_path, monkeypatch):
-    output, study, at = tmp_path / "out.h5", tall(5000, "slow:SLOW"), datetime.now()
-    with quiet(study, output, until=at + timedelta(seconds=2), block_cells=10) as found:
-        told = account(found)
-    assert 0 < told.ok < 5000
-    assert told.ok + told.pending == told.total == 5000
-    monkeypatch.setattr(slow, "CELL_SECONDS", 0.0)
-    same(quiet(study, output, until="2999-01-01"), quiet(study))
-    assert list(tmp_path.iterdir()) == [output]
 
 
 def test_it_ends_at_its_time_although_kernels_never_do(begun):
@@ -262,7 +232,6 @@ def test_the_log_tells_of_the_run_from_its_beginning_to_its_end(command, tmp_pat
     assert all(word in lines[0] for word in ("begins: bad.h5", "bad:RAISING", "numba", "foliot", "process"))
     assert lines[-1].startswith("ended with 4: bad.h5: 20 cells: 19 ok")
     assert [line for line in lines if "FAILED (" in line] == ["cell 10 FAILED (height=11): ZeroDivisionError: eleven"]
-    assert list(follow(tmp_path / "bad.h5"))[-1].endswith(lines[-1].splitlines()[-1])
     if options:
         found = [json.loads(line) for line in text.splitlines()]
         assert {line["event"] for line in found} == {"begin", "failed", "progress", "end"}
@@ -281,25 +250,6 @@ def test_a_log_goes_on_where_an_earlier_one_ended_and_holds_its_run_alone(tmp_pa
     assert abs(datetime.fromisoformat(first["time"][:19]) - datetime.now()) < timedelta(minutes=5)
     assert last["text"] == ("two\nlines \x1b[31m 100 %s" if as_json else "two lines \\x1b[31m 100 %s")
     assert (list(LOG.handlers), LOG.level) == before
-
-
-def test_a_log_is_followed_until_its_run_ends(tmp_path):
-    output, turns = tmp_path / "out.h5", []
-    with logging_to(log_path(output)):
-        log("begins")
-        steps = {1: "half", 2: "ended with 0: whole"}
-
-        def sleep(seconds):
-            turns.append(seconds)
-            if len(turns) in steps:
-                log(steps[len(turns)])
-
-        assert [line[21:] for line in follow(output, sleep)] == ["begins", "half", "ended with 0: whole"]
-        log("begins")
-        with pytest.raises(SweepError, match="nothing new"):
-            list(follow(output, lambda seconds: None))
-    with pytest.raises(SweepError, match="no log"):
-        list(follow(tmp_path / "other.h5"))
 
 
 def test_a_pipe_in_the_place_of_the_log_is_told_and_not_waited_for(begun, tmp_path):

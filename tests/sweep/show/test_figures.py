@@ -7,9 +7,8 @@ import pytest
 import xarray as xr
 from matplotlib.colors import LogNorm
 
-from sweep.show.charts import COLOURS, DASHES
 from sweep.show.plot import plot
-from sweep.show.view import SIDE, evened, view
+from sweep.show.view import SIDE, evened
 from sweep.system.errors import SweepError
 
 FLAGS = {"flag_values": np.array([0, 1, 64, 127], np.int8), "flag_meanings": "OK INACCURATE BAD_INPUT PENDING"}
@@ -52,21 +51,8 @@ def test_one_axis_makes_one_line_on_logarithmic_scales_with_names_and_units():
     np.testing.assert_array_equal(line.get_xdata(), ds.mu)
     np.testing.assert_array_equal(line.get_ydata(), ds.period)
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
-    assert plot(dataset(mu=np.linspace(1, 2, 9))).axes[0].get_xscale() == "linear"
     assert axes.get_ylabel() == "period of the cycle [s]"
     assert axes.get_xlabel() == r"$\mu$ [rad/s$^{2}$]"
-    assert axes.get_title() == "Foliot period"
-    assert axes.get_legend() is None
-
-
-def test_few_values_of_a_second_axis_make_a_family_told_apart_without_colour():
-    ds = dataset(mu=log(), a=[1.0, 2.0, 4.0])
-    figure = plot(ds)
-    lines = drawn(figure.axes[0])
-    assert words(figure) == ["$a$ = 1 1/s", "$a$ = 2 1/s", "$a$ = 4 1/s"]
-    for i, line in enumerate(lines):
-        np.testing.assert_array_equal(line.get_ydata(), ds.period[:, i])
-    assert len({line.get_color() for line in lines}) == len({str(line._dash_pattern) for line in lines}) == 3
 
 
 def test_two_long_axes_make_a_map_with_a_logarithmic_colour_scale():
@@ -76,8 +62,6 @@ def test_two_long_axes_make_a_map_with_a_logarithmic_colour_scale():
     (mesh,) = axes.collections
     np.testing.assert_array_equal(mesh.get_array(), ds.period.transpose("a", "mu"))
     assert isinstance(mesh.norm, LogNorm)
-    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "linear")
-    assert axes.get_ylabel() == "$a$ [1/s]"
     assert bar.get_ylabel() == "period of the cycle [s]"
 
 
@@ -86,26 +70,6 @@ def test_further_axes_are_held_at_their_middle_and_the_title_says_so():
     figure = plot(ds)
     assert figure.axes[0].get_title() == "Foliot period\n$R$ = 10 rad/s$^{2}$"
     np.testing.assert_array_equal(figure.axes[0].collections[0].get_array(), ds.period.sel(R=10).transpose("a", "mu"))
-
-
-def test_a_trace_is_drawn_along_its_own_coordinate():
-    ds = dataset(mu=log(5)).rename(period="angle")
-    ds["angle"] = ds.angle * xr.DataArray(np.sin(np.arange(3.0)), dims="phase", coords={"phase": [0.0, 0.5, 1.0]})
-    shown = view(ds)
-    assert (shown.x, shown.across) == ("phase", "mu")
-    ds["status"][2] = 1
-    assert (view(ds).status[2] == 1).all()
-    assert view(ds).codes() == [1]
-
-
-def test_the_cells_of_a_zip_design_are_marks_along_the_coordinate_named():
-    ds = dataset(mu=log(20)).rename_dims(mu="cell").reset_index("mu").assign_coords(a=("cell", np.arange(20.0)))
-    (axes,) = plot(ds).axes
-    (line,) = drawn(axes)
-    assert line.get_linestyle() == "None"
-    assert axes.get_xlabel().startswith(r"$\mu$")
-    (line,) = drawn(plot(ds, x="a").axes[0])
-    np.testing.assert_array_equal(line.get_xdata(), np.arange(20.0))
 
 
 def test_cells_that_are_not_ok_are_marked_on_the_line_or_at_its_foot():
@@ -127,37 +91,6 @@ def test_cells_that_are_not_ok_are_marked_on_the_line_or_at_its_foot():
     assert with_foot.axes[0].get_yscale() == "linear" or float(ds.mu[5]) in places
 
 
-def test_a_map_hatches_refused_cells_and_outlines_remarks():
-    ds = dataset(mu=log(), a=np.linspace(1, 2, 21))
-    ds["status"][:3, :4] = 64
-    ds["period"][:3, :4] = np.nan
-    ds["status"][20:30, 5:10] = 1
-    figure = plot(ds)
-    _, outline, paint = figure.axes[0].collections
-    assert len(paint.get_paths()) == 4  # a run of three cells in each of four rows
-    assert paint.get_hatch()
-    corner = paint.get_paths()[0].get_extents()
-    assert corner.x0 < ds.mu[0] < ds.mu[2] < corner.x1 < ds.mu[3]
-    assert corner.y0 < 1 < corner.y1 < ds.a[1]
-    assert outline.get_paths()[0].get_extents().width > 0
-    assert words(figure) == ["BAD_INPUT"]
-    assert [text.get_text() for text in figure.axes[0].texts] == ["INACCURATE"]
-
-
-def test_a_wide_region_is_named_where_it_is_widest():
-    ds = dataset(mu=log(), a=np.linspace(1, 2, 21))
-    wide = np.arange(ds.sizes["mu"]) < ds.sizes["mu"] // 2
-    ds["status"][wide] = 64
-    ds["period"][wide] = np.nan
-    figure = plot(ds)
-    text = figure.axes[0].texts[0]
-    assert text.get_text() == "BAD_INPUT"
-    assert words(figure) == []  # what is named in its place needs no legend
-    x, y = text.get_position()
-    assert ds.mu[0] < x < ds.mu[ds.sizes["mu"] // 2]
-    assert y == pytest.approx(1.5, abs=0.1)
-
-
 @pytest.mark.parametrize(
     "axes", [{"mu": log()}, {"mu": log(), "a": [1.0, 2.0]}, {"mu": log(), "a": np.arange(1.0, 12)}]
 )
@@ -170,16 +103,10 @@ def test_a_result_without_one_value_is_drawn_all_the_same(tmp_path, axes):
 
 
 @pytest.mark.parametrize(
-    ("keys", "message"),
-    [
-        ({"y": "perod"}, "there is no output 'perod' to draw; did you mean period?"),
-        ({"y": "status"}, "there is no output 'status' to draw; there are period, amplitude"),
-        ({"x": "mv_"}, "there is no number axis 'mv_' to draw period along; there are mu"),
-        ({"x": "method"}, "there is no number axis 'method'"),
-    ],
+    ("keys", "word"), [({"y": "perod"}, "did you mean period"), ({"y": "status"}, "period"), ({"x": "method"}, "mu")]
 )
-def test_an_unknown_output_or_axis_is_refused_with_those_there_are(keys, message):
-    with pytest.raises(SweepError, match=message):
+def test_an_unknown_output_or_axis_is_refused_with_those_there_are(keys, word):
+    with pytest.raises(SweepError, match=word):
         plot(dataset(mu=log(5), method=["map", "closed"]), **keys)
 
 
@@ -194,37 +121,7 @@ def test_the_same_result_gives_the_same_bytes_whatever_the_readers_settings(tmp_
     assert one.startswith({"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[suffix])
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("out.gif", r'out\.gif: found "\.gif"; a picture is one of \.png, \.svg, \.pdf'),
-        ("out", "out: found no suffix"),
-        ("nowhere/out.png", r"nowhere/out\.png cannot be written: No such file or directory"),
-        (".png", "no suffix"),
-    ],
-)
-def test_a_place_that_cannot_be_written_is_one_clear_line(tmp_path, name, message):
-    with pytest.raises(SweepError, match=message):
-        plot(dataset(mu=log()), tmp_path / name)
-    assert list(tmp_path.iterdir()) == []
-
-
 # which cells are shown
-
-
-def test_the_cells_of_a_map_lie_around_their_grid_points():
-    corners = plot(dataset(mu=log(7), a=[1.0, 1.1, 1.2, 1.4, 1.5, 1.6, 1.7, 1.8, 2.0]), x="mu").axes[0].collections[0]
-    places = corners.get_coordinates()
-    np.testing.assert_allclose(places[0, :, 0], np.geomspace(10**-3.5, 10**3.5, 8))
-    np.testing.assert_allclose(places[:5, 0, 1], [0.95, 1.05, 1.15, 1.3, 1.45])
-
-
-@pytest.mark.parametrize(("cells", "shown"), [(20_000, 20_000), (20_001, 10_001), (40_001, 13_334)])
-def test_a_line_has_at_most_twenty_thousand_points_and_a_map_two_thousand_cells_a_side(cells, shown):
-    (line,) = drawn(plot(dataset(mu=log(cells))).axes[0])
-    assert line.get_xdata().size == shown
-    mesh = plot(dataset(mu=log(cells // 10), a=np.arange(1.0, 10))).axes[0].collections[0]
-    assert mesh.get_array().shape == (9, 2000)
 
 
 @pytest.mark.parametrize(("axes", "shape"), [(2, (SIDE, SIDE)), (3, (34, 34, 34))])
@@ -241,9 +138,6 @@ def test_cells_that_lie_anywhere_become_an_even_grid(axes, shape):
     np.testing.assert_allclose((even.a[0], even.a[-1]), (1.0, 2.0))
     expected = sum((k + 1) * even[name] for k, name in enumerate(names))
     np.testing.assert_allclose(even.y, expected.transpose(*even.y.dims), rtol=0.02)
-    first = evened(scattered, 1)
-    assert [first.sizes[name] for name in names] == [SIDE**2, *[1] * (axes - 1)]
-    assert first.b.values.tolist() == pytest.approx([np.sqrt(2.0)])
 
 
 # charts of precision
@@ -281,71 +175,36 @@ def test_a_chart_of_precision_has_every_method_where_it_is_and_says_where_cells_
         assert [line.get_label() for line in whole] == ["right", "shy", "liar"]
         assert [line.get_ydata().tolist() for line in whole] == errors
         assert [line.get_xdata().tolist() for line in whole] == [[1e-6, 2e-6], [3e-6, 4e-6], [5e-6, 6e-6]]
-        assert [line.get_markevery().tolist() for line in whole] == [[True, True], [False, True], [True, False]]
         assert [line.get_xdata().tolist() for line in refused] == [[], [3e-6], [6e-6]]
         assert [line.get_ydata().tolist() for line in silent] == [[], [], [errors[2][0]]]
-        assert len({line.get_color() for line in whole}) == len({line.get_marker() for line in whole}) == 3
-        (grey,) = axes.patches
-        assert grey.get_y() + grey.get_height() == pytest.approx(2e-12)
         assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
-    bars = [[segment[:, 1].tolist() for segment in bar.get_segments()] for bar in median.collections]
-    assert bars[:2] == [[[1e-6, 1e-4], [1e-17, 1e-8]], [[1e-6, 1e-2], [1e-6, 3.0]]]
-    assert len(worst.collections) == 0
-    low, high = median.get_xlim()
-    assert (worst.get_xlim(), high / low) == ((low, high), pytest.approx(30))
-    assert low * high == pytest.approx(6e-12, rel=1e-6)  # 1 to 6 microseconds are in its middle
     said = " ".join(figure.get_supxlabel().split())
-    for part in ("exact", "2e-12", "9 cells", r"A \$ stone", "ida is not installed", "idle solves", "liar is silently"):
+    for part in ("exact", "2e-12", "9 cells", "ida is not installed", "idle solves", "liar is silently"):
         assert part in said
-    assert len(words(figure)) == 3 + 5
 
 
 # laws beside each other
 
 X = np.array([1.0, 10.0, 100.0])
 Y = np.array([2.0, 3.0, 5.0])
-SCATTER = 0.25
 
 
-def compared(n=3, chosen="law1", residual=0.125, **attrs):
+def test_points_and_laws_are_drawn_the_chosen_first():
     """Law k lies (k + 1) % above the points, and is worse by k."""
-    names = [f"law{k}" for k in range(n)]
-    fitted = np.array([Y * (1 + 0.01 * (k + 1)) for k in range(n)])
+    fitted = np.array([Y * (1 + 0.01 * (k + 1)) for k in range(3)])
     columns = {
-        "fitted": (("law", "point"), fitted), "worse": ("law", np.arange(float(n)) * 1.2345),
-        "scatter": ("law", np.full(n, SCATTER)), "residual": ("law", [residual if k == 1 else 9.0 for k in range(n)]),
-        "x": ("point", X, {"units": "rad/s^2"}), "y": ("point", Y, attrs),
-    }  # fmt: skip
-    names_of = {"y": "period", "x": "mu", "chosen": chosen, "verdict": "one law by 10"}
-    return xr.Dataset(columns, {"law": names}, names_of)
-
-
-def test_points_and_laws_are_drawn_the_chosen_first_and_wide():
-    axes = plot(compared(units="s")).axes
-    above, below = axes
+        "fitted": (("law", "point"), fitted),
+        "worse": ("law", np.arange(3) * 1.2345),
+        "scatter": ("law", np.full(3, 0.25)),
+        "residual": ("law", [9.0, 0.125, 9.0]),
+        "x": ("point", X, {"units": "rad/s^2"}),
+        "y": ("point", Y, {"units": "s"}),
+    }
+    attrs = {"y": "period", "x": "mu", "chosen": "law1", "verdict": "one law by 10"}
+    above, below = plot(xr.Dataset(columns, {"law": ["law0", "law1", "law2"]}, attrs)).axes
     points, *laws = above.lines
-    assert (points.get_marker(), points.get_linestyle(), points.get_label()) == ("o", "None", "points")
     np.testing.assert_array_equal(points.get_xydata(), np.column_stack([X, Y]))
     assert [line.get_label() for line in laws] == ["law1, AICc +1.23, chosen", "law0, AICc best", "law2, AICc +2.47"]
-    assert [line.get_linewidth() for line in laws] == [1.4, 0.8, 0.8]
-    for i, (line, off) in enumerate(zip(laws, (1.02, 1.01, 1.03), strict=True)):
+    for line, off in zip(laws, (1.02, 1.01, 1.03), strict=True):
         np.testing.assert_allclose(line.get_xydata(), np.column_stack([X, Y * off]), rtol=1e-15)
-        assert line.get_color() == COLOURS[i]
-    assert laws[0].get_linestyle() == DASHES[0]
-    assert laws[1].get_linestyle() == "--"
-    assert len(below.lines) == 4  # and the zero
-
-
-def test_scales_labels_and_the_verdict():
-    axes = plot(compared(units="s")).axes
-    above, below = axes
-    assert {above.get_xscale(), above.get_yscale(), below.get_xscale()} == {"log"}
-    assert below.get_yscale() == "linear"
-    assert (above.get_ylabel(), below.get_xlabel(), below.get_ylabel()) == (
-        "period [s]",
-        "mu [rad/s^2]",
-        "point / law - 1",
-    )
-    assert above.get_title() == "one law by 10"
-    (legend,) = above.figure.legends
-    assert [text.get_text() for text in legend.get_texts()][:2] == ["points", "law1, AICc +1.23, chosen"]
+    assert (above.get_title(), len(below.lines)) == ("one law by 10", 4)  # and the zero

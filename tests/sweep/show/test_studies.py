@@ -12,16 +12,6 @@ from sweep.show import studies
 ROOT = Path(__file__).parents[3]
 
 
-def test_every_study_is_listed_with_its_question(capsys):
-    assert main(["studies"]) == 0
-    said = capsys.readouterr().out
-    for path in (ROOT / "studies").glob("*.py"):
-        if not path.stem.startswith("_"):
-            assert (f"  {path.stem} " in said) == (path.stem == "own_scene" or not path.stem.endswith("_scene"))
-    assert "three_models_denny" not in said
-    assert all(studies.question(name).endswith("?") for name in studies.names())
-
-
 @pytest.mark.parametrize("name", studies.names())
 def test_a_copy_is_all_that_the_study_needs(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

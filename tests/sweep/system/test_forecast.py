@@ -100,24 +100,6 @@ def test_every_block_comes_once_also_one_that_comes_again():
     assert list(run.forecast.order()) == [2]
 
 
-def test_dear_blocks_come_first_once_some_from_all_over_are_known():
-    forecast = Forecast(np.geomspace(1.0, 1e3, 64), range(64))
-    first = list(forecast.order())
-    assert sorted(first) == list(range(64))
-    assert np.mean(first[8:24]) > 48
-    assert np.mean(first[-16:]) < 16
-
-
-def test_what_was_measured_counts_and_not_what_was_thought():
-    """The sample takes the second half for cheap; the lead finds that it is the dear one."""
-    costs = np.repeat([1.0, 100.0], 256)
-    forecast = Forecast(costs[::-1], range(512))
-    jobs = forecast.order()
-    for job in islice(jobs, 32):
-        forecast.end(job, costs[job])
-    assert np.mean(list(islice(jobs, 12))) > 200
-
-
 def test_a_block_that_takes_far_longer_than_thought_is_not_done_at_any_moment():
     """The last one of a hundred takes a minute, not the second that the others did: it was never 0 s to its end."""
     now = 0.0

@@ -1,8 +1,6 @@
 """What is overwritten without a word, what by force, and what never."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -89,11 +87,6 @@ def test_a_folder_that_is_no_zarr_is_left_alone(here):
         assert not Path("a.zarr/thesis.txt").exists()
 
 
-def test_a_pipe_is_not_waited_for(here):
-    os.mkfifo("a.csv")
-    assert cli.main(["export", "r.h5", "-o", "a.csv"]) == 2
-
-
 def test_an_export_on_the_disk_is_whole(here, monkeypatch):
     """Every file and folder of it is synced before it gets its name, and the name after."""
     order = []
@@ -110,36 +103,3 @@ def test_an_export_on_the_disk_is_whole(here, monkeypatch):
     files = {f"/{path.relative_to('a.zarr')}" for path in Path("a.zarr").rglob("*")}
     assert set(order[:-2]) == files | {""}
     assert order[-2:] == ["rename", ""]
-
-
-def test_no_figure_is_overwritten_by_another_program(here, capsys):
-    """Of three commands and a program that imports the package."""
-    fit = ("fit", "r.h5", "--y", "fall_time", "--x", "height", "--compare", "-o")
-    for kind in (".png", ".svg", ".pdf"):
-        commands = [(*KINDS["a.png"][:-1], f"a{kind}"), (*KINDS["chart.png"][:-1], f"b{kind}"), (*fit, f"c{kind}")]
-        for command in commands:
-            assert cli.main(list(command)) == 0, capsys.readouterr().err
-        sweep.plot(sweep.open_result("r.h5"), f"d{kind}")
-        for command in commands:
-            for other in (f"{letter}{kind}" for letter in "abcd" if f"{letter}{kind}" != command[-1]):
-                before = Path(other).read_bytes()
-                assert cli.main([*command[:-1], other]) == 2
-                assert Path(other).read_bytes() == before
-
-
-def test_what_killed_exports_have_left_is_tidied_up_and_nothing_else(here):
-    with subprocess.Popen([sys.executable, "-c", ""]) as ended:
-        pass
-    mark = f".a.csv.{os.uname().nodename}."
-    left = [f"{mark}{ended.pid}.tmp"]
-    others = [
-        f"{mark}{os.getppid()}.tmp",
-        f"{mark}{ended.pid}.txt",
-        f"{mark}x.tmp",
-        f".b.csv.elsewhere.{ended.pid}.tmp",
-    ]
-    for name in left + others:
-        Path(name).write_text("half")
-    with sweep.open_result("r.h5") as ds:
-        sweep.export(ds, "a.csv")
-    assert {path.name for path in here.iterdir() if path.name.startswith(".")} == set(others)

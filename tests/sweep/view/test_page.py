@@ -33,41 +33,13 @@ def page(dataset):
     return made(dataset, "map.h5")
 
 
-def shown_values(page):
-    return page.picture.cells.data["image"][0]
-
-
 def test_a_page_begins_with_the_first_output_over_its_longest_axes(page, dataset):
     assert (page.choice.output, page.choice.x, page.choice.across) == ("period", "mu", "R")
     assert list(page.sliders) == ["a"]
-    image = shown_values(page)
+    image = page.picture.cells.data["image"][0]
     expected = dataset.period.isel(a=1).values
     assert image[0, 0] == expected[0, 0]
     assert image[-1, -1] == expected[-1, -1]
-
-
-def test_a_slider_shows_other_cells_and_keeps_the_figure(page, dataset):
-    figure = page.picture.figure
-    page.sliders["a"].value = 0
-    assert page.picture.figure is figure
-    assert shown_values(page)[0, 0] == float(dataset.period[0, 0, 0])
-
-
-def test_any_two_axes_make_a_map_or_a_line(page, dataset):
-    page.x.value = "R"
-    assert (page.choice.across, list(page.sliders)) == ("mu", ["a"])
-    page.up.value = "(one line)"
-    assert sorted(page.sliders) == ["a", "mu"]
-    page.sliders["mu"].value = 40
-    assert np.array_equal(page.picture.lines.data["ys"][0], dataset.period.isel(mu=40, a=1).values, equal_nan=True)
-
-
-def test_scales_are_those_asked_for(page):
-    assert (page.picture.scales.x, page.picture.scales.y) == (True, False)
-    page.scales["x"].value = "linear"
-    assert not page.picture.scales.x
-    page.scales["values"].value = "linear"
-    assert not page.picture.scales.colour
 
 
 def test_a_zoom_reads_the_region_and_a_slider_keeps_it(page):
@@ -145,13 +117,3 @@ def test_a_refined_cell_is_clicked_and_its_part_is_kept(refined):
     assert png.read(4)[1:] == b"PNG"
     assert len(csv.read().splitlines()) > 100
     assert page.saves["toml"].disabled  # cells that lie anywhere are no grid
-
-
-def test_a_chosen_axis_stays_and_a_held_one_keeps_its_place(page):
-    page.sliders["a"].value = 2
-    page.output.value = "amplitude"
-    assert (page.x.value, page.up.value, page.sliders["a"].value) == ("mu", "R", 2)
-    page.up.value = "a"
-    assert {name: slider.value for name, slider in page.sliders.items()} == {"R": 10}
-    page.x.value = "a"
-    assert (page.up.value, page.up.options) == ("mu", ["mu", "R", "(one line)"])

@@ -9,15 +9,14 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 import sweep
-from kernels.interface import Status
 from sweep.show.charts import COLOURS
 from sweep.show.view import view
 from sweep.view import region
-from sweep.view.slices import PLACE, Choice, nearest, row, shown
+from sweep.view.slices import Choice, nearest, shown
 
 pytestmark = pytest.mark.skipif(not find_spec("panel"), reason="the extra view is not installed")
 if find_spec("panel"):
-    from sweep.view.picture import HEIGHT, STATUS_COLOURS, WIDTH, Picture, Scales
+    from sweep.view.picture import STATUS_COLOURS, Picture, Scales
 
 MAP = Choice("period", "mu", "R", {"a": 2})
 
@@ -84,66 +83,15 @@ def test_the_cell_of_a_point_is_the_one_whose_edges_surround_it(dataset, cell):
     assert nearest(found, 1e3, R, True, (True, False)) is None
 
 
-def test_the_cell_of_a_point_beside_a_line_is_the_one_below_it(dataset):
-    found = shown(dataset, Choice("period", "mu", "a", {"R": 0}))
-    assert not found.mapped
-    values = dataset.period.isel(R=0).load()
-    assert nearest(found, float(dataset.mu[9]) * 1.05, float(values[9, 2]), False, (True, True)) == {"mu": 9, "a": 2}
-    assert nearest(found, float(dataset.mu[9]) * 0.95, float(values[9, 0]), False, (True, True)) == {"mu": 9, "a": 0}
-
-
-def test_a_row_has_all_of_a_cell(dataset):
-    entries = {entry.name: entry for entry in row(dataset, {"mu": 3, "R": 20, "a": 0})}
-    assert float(entries["mu"].value) == float(dataset.mu[3])
-    assert entries["phi0"].value == "1"
-    assert (entries["period"].value, entries["period"].unit) == ("nan", "s")
-    assert entries["status"].value == Status.NEVER_STARTS.name
-
-
-def points(x, y):
-    """Points of a zip, along x."""
-    places = {PLACE + "cell": ("cell", np.arange(len(x)))}
-    return view(xr.Dataset({"y": ("cell", y)}, {"x": ("cell", x), **places}), x="x")
-
-
-def test_of_points_the_nearest_as_the_eye_sees_it_is_clicked():
-    found = points([1.0, 2.0, 3.0], [10.0, 30.0, 20.0])
-    assert nearest(found, 2.4, 21.0, False, (False, False)) == {"cell": 2}
-    assert nearest(found, 2.4, 29.0, False, (False, False)) == {"cell": 1}
-    assert nearest(points([1.0, 2.0], [np.nan, np.nan]), 2.0, 1.0, False, (False, False)) == {"cell": 0}
-
-
 # what is drawn
 
 FLAGS = {"flag_values": np.array([0, 1, 64], np.int8), "flag_meanings": "OK INACCURATE BAD_INPUT"}
-AUTO = {"x": "auto", "y": "auto", "values": "auto"}
-
-
-def seen(values, x, a=None, status=None):
-    """A line, or lines or a map over a second axis."""
-    dims = ("x",) if a is None else ("a", "x")
-    values = np.asarray(values, float)
-    status = np.zeros(values.shape) if status is None else np.asarray(status)
-    columns = {"y": (dims, values, {"units": "s"}), "status": (dims, status.astype(np.int8), FLAGS)}
-    return view(xr.Dataset(columns, {"x": x} | ({} if a is None else {"a": a})), x="x")
-
-
-def a_map(low=1.0, high=3.0):
-    return seen(np.linspace(low, high, 36).reshape(9, 4), [1.0, 10.0, 100.0, 1000.0], np.arange(9.0))
-
-
-def test_scales_are_those_of_the_grids_and_values():
-    assert Scales.of(a_map(), AUTO) == Scales(True, False, False)
-    assert Scales.of(a_map(1, 1e3), AUTO) == Scales(True, False, True)
-    assert Scales.of(seen([1.0, 1e3], [1.0, 2.0]), AUTO) == Scales(False, True)
-    wanted = {"x": "linear", "y": "log", "values": "log"}
-    assert Scales.of(a_map(), wanted) == Scales(False, True, True)
-    assert Scales.of(seen([-1.0, 0.0], [1.0, 1000.0]), {**AUTO, "values": "log"}) == Scales(True, False)
-    assert Scales.of(seen([-1.0, 1.0], [1.0, 1000.0]), {**AUTO, "x": "linear", "values": "log"}) == Scales(False, True)
 
 
 def test_lines_are_drawn_with_their_statuses_at_the_foot_where_they_have_no_value():
-    found = seen([[1.0, 2.0, np.nan], [4.0, -5.0, 6.0]], [1.0, 2.0, 3.0], [0.5, 0.7], [[0, 1, 64], [0, 0, 0]])
+    values, status = [[1.0, 2.0, np.nan], [4.0, -5.0, 6.0]], np.array([[0, 1, 64], [0, 0, 0]], np.int8)
+    columns = {"y": (("a", "x"), values, {"units": "s"}), "status": (("a", "x"), status, FLAGS)}
+    found = view(xr.Dataset(columns, {"x": [1.0, 2.0, 3.0], "a": [0.5, 0.7]}), x="x")
     drawn = Picture(found, Scales(False, False))
     drawn.show(found, True)
     lines = drawn.lines.data
@@ -161,63 +109,18 @@ def test_lines_are_drawn_with_their_statuses_at_the_foot_where_they_have_no_valu
     assert logarithmic.marks.data["y"].tolist() == [2.0, 1.0]
 
 
-def test_a_map_is_drawn_from_edge_to_edge_in_the_colours_of_its_values():
-    found = a_map()
-    drawn = Picture(found, Scales.of(found, AUTO))
-    drawn.show(found, True)
-    cells = drawn.cells.data
-    assert cells["x"] == pytest.approx([10**-0.5])
-    assert cells["dw"] == pytest.approx([10**3.5 - 10**-0.5])
-    assert (cells["y"], cells["dh"]) == ([-0.5], [9.0])
-    image = cells["image"][0]
-    assert image.shape == (HEIGHT, WIDTH)
-    assert (image[0, 0], image[-1, -1]) == (1.0, 3.0)
-    assert (drawn.mapper.low, drawn.mapper.high) == (1.0, 3.0)
-    # a quarter of the width is a cell, a ninth of the height
-    assert (np.diff(image[0]) != 0).nonzero()[0].tolist() == [224, 449, 674]
-    assert image[560 // 9 - 1, 0] == found.y.values[0, 0]
-    assert image[560 // 9 + 1, 0] == found.y.values[1, 0]
-
-
 # what is saved
 
 
-def read(tmp_path, text):
-    path = tmp_path / "region.toml"
-    path.write_text(text)
-    return sweep.study(path)
-
-
 def test_the_study_of_a_region_is_the_same_scene_on_a_finer_grid(dataset, tmp_path):
-    study = read(tmp_path, region.study_text(dataset, MAP, (0.1, 1.0), (0.5, 3.0)))
+    path = tmp_path / "region.toml"
+    path.write_text(region.study_text(dataset, MAP, (0.1, 1.0), (0.5, 3.0)))
+    study = sweep.study(path)
     mu, R = study.axes["mu"], study.axes["R"]
     assert (mu.spacing, mu.values[0], mu.values[-1], len(mu)) == ("log", 0.1, 1.0, 101)
     assert (R.spacing, R.values[0], R.values[-1], len(R)) == ("linear", 0.5, 2.0, 101)
     assert (study.fixed["a"], study.fixed["phi0"], study.outputs) == (2.0, 1.0, ("period", "amplitude"))
     assert sweep.run(study, progress=False).status.size == 101 * 101
-
-
-def test_words_and_lists_are_kept(tmp_path):
-    study = sweep.study(
-        kernel="drivetrain",
-        axes={"method": ["direct"], "f_max": [100.0, 200.0]},
-        fixed={"J": [1.0, 2.0, 3.0], "k": [1e4, 2e4, 3e4], "reduction": "rivin"},
-    )
-    dataset = sweep.run(study, progress=False)
-    name = next(iter(dataset.data_vars))
-    found = read(tmp_path, region.study_text(dataset, Choice(name, "f_max", None, {}), None, None))
-    assert found.method == "direct"
-    assert found.fixed["reduction"] == study.fixed["reduction"] != 0
-    assert found.fixed["J"].tolist() == [1.0, 2.0, 3.0]
-
-
-def test_whole_numbers_in_the_range_are_kept_as_they_are(tmp_path):
-    keys = {"axes": {"flips": [2.0, 4.0, 6.0, 8.0], "mu": [1.0, 2.0]}, "fixed": {"a": 0.5, "phi0": 1.0, "step": 0.05}}
-    dataset = sweep.run(sweep.study(kernel="foliot_steps", **keys), progress=False)
-    name = next(iter(dataset.data_vars))
-    found = read(tmp_path, region.study_text(dataset, Choice(name, "flips", None, {"mu": 1}), (4.0, 6.0), None))
-    assert found.axes["flips"].values.tolist() == [4.0, 6.0]
-    assert found.fixed["mu"] == 2.0
 
 
 def test_a_list_of_cells_and_a_result_of_no_known_study_have_no_regions(dataset):
