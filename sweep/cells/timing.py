@@ -7,12 +7,12 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sweep.cells.partition import Partition, RowBlocks, boxes
-from sweep.cells.schema import METHOD_USED, STATUS, Column, cells_of
+from sweep.cells.schema import Column, cells_of
 from sweep.system.errors import SweepError
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ MOST_BLOCKS = 100_000
 
 @dataclass(frozen=True)
 class Sample:
-    """Timed probes: cell each starts at (ascending), its seconds per cell, and what the probed cells gave.
+    """Timed probes: cell each starts at (ascending), its seconds per cell, and how many cells each has.
 
     `lanes`: whether one cell takes as long as 32; None where that was not asked. `call`: what a call costs beside the
     share of its cells, in seconds: what one cell alone takes beyond it. Where cells are solved in lanes, that is also
@@ -57,8 +57,6 @@ class Sample:
     positions: Any
     costs: Any
     cells: int
-    status: Any
-    method_used: Any
     lanes: bool | None = None
     call: float = 0.0
 
@@ -74,7 +72,7 @@ class Sample:
         return np.interp((starts + stops) / 2, self.positions, self.costs) * (stops - starts)
 
 
-UNSAMPLED = Sample(np.zeros(1), np.ones(1), 1, np.empty(0, np.int8), np.empty(0, np.int8))
+UNSAMPLED = Sample(np.zeros(1), np.ones(1), 1)
 """Stands in where no cell is left to compute: every block weighs its cells."""
 
 
@@ -98,26 +96,25 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
     if not probes:
         raise probing.fault
     places = sorted(probes)
-    costs = np.array([probes[place].seconds / cells for place in places])
-    status, used = (np.concatenate([probes[place].arrays[name] for place in places]) for name in (STATUS, METHOD_USED))
+    costs = np.array([probes[place] / cells for place in places])
     call = max(0.0, probing.alone - float(np.min(costs)))
-    return Sample(np.array(places), costs, cells, status, used, lanes, call)
+    return Sample(np.array(places), costs, cells, lanes, call)
 
 
-def _probes(probing: _Probing, columns: Sequence[Column], size: int, cells: int) -> dict[int, Probe]:
-    """Probes of so many cells, by the cell that each begins with; a dear one that was made before is among them."""
+def _probes(probing: _Probing, columns: Sequence[Column], size: int, cells: int) -> dict[int, float]:
+    """Seconds of probes of so many cells, by their first cell; a dear one that was made before is among them."""
     count = max(1, min(POSITIONS, size // (4 * cells)))
     probes = dict(probing.dear.get(cells, {}))
-    spent = sum(probe.seconds for probe in probes.values())
+    spent = sum(probes.values())
     # where all of these fail, others are looked at until one does not
     places = [_place(index, number, cells, size) for number in (count, PLACES) for index in _scattered(number)]
     for turn, start in enumerate(places):
         if probes and (turn >= count or spent > _affordable(spent / (len(probes) * cells) * size)):
             break
-        probe = probing.probe(start, columns, cells)
-        if probe is not None:
-            probes[start] = probe
-        spent += FAILED_PROBE if probe is None else probe.seconds
+        seconds = probing.probe(start, columns, cells)
+        if seconds is not None:
+            probes[start] = seconds
+        spent += FAILED_PROBE if seconds is None else seconds
     return probes
 
 
@@ -174,19 +171,12 @@ def _probe_cells(probing: _Probing, columns: Sequence[Column], size: int) -> tup
 def _probe(probing: _Probing, columns: Sequence[Column], size: int, cells: int) -> float:
     """Seconds that some cells in the middle of the grid take together, or elsewhere, where these fail."""
     for start in [_place(0, 1, cells, size), *(_place(index, PLACES, cells, size) for index in _scattered(PLACES))]:
-        probe = probing.probe(start, columns, cells)
-        if probe is not None and cells == 1 and probe.seconds < TWICE:
-            probe = probing.probe(start, columns, cells) or probe
-        if probe is not None:
-            return probe.seconds
+        seconds = probing.probe(start, columns, cells)
+        if seconds is not None and cells == 1 and seconds < TWICE:
+            seconds = probing.probe(start, columns, cells) or seconds
+        if seconds is not None:
+            return seconds
     return math.inf
-
-
-class Probe(NamedTuple):
-    """Some cells, solved together."""
-
-    seconds: float
-    arrays: dict[str, Any]
 
 
 class _Probing:
@@ -195,7 +185,7 @@ class _Probing:
     Attributes
     ----------
     dear : dict
-        The last dear one of so many cells, by the cell that it begins with.
+        Seconds of the last dear one of so many cells, by the cell that it begins with.
     alone : float
         The least that a probe of one cell took.
     fault : Exception
@@ -205,22 +195,22 @@ class _Probing:
     def __init__(self, solver: SolveCells, clock: Clock) -> None:
         self._solver, self._clock = solver, clock
         self._good, self._failed, self.alone = False, 0, math.inf
-        self.dear: dict[int, dict[int, Probe]] = {}
+        self.dear: dict[int, dict[int, float]] = {}
         self.fault: Exception = RuntimeError("no cell was tried")
 
-    def probe(self, start: int, columns: Sequence[Column], cells: int) -> Probe | None:
-        """So many cells from one on; None where the kernel fails. Raises what it does where it always fails."""
+    def probe(self, start: int, columns: Sequence[Column], cells: int) -> float | None:
+        """Seconds of so many cells; None where the kernel fails. Raises what it does where it always fails."""
         arrays = {column.name: column.empty(cells) for column in columns}
         begun = self._clock()
         with tolerated() as faults:
             self._solver.solve(start, cells_of(arrays))
-            probe = Probe(self._clock() - begun, arrays)
+            seconds = self._clock() - begun
             self._good = True
             if cells == 1:
-                self.alone = min(self.alone, probe.seconds)
-            if probe.seconds >= DEAR:
-                self.dear[cells] = {start: probe}
-            return probe
+                self.alone = min(self.alone, seconds)
+            if seconds >= DEAR:
+                self.dear[cells] = {start: seconds}
+            return seconds
         self.fault, self._failed = faults[0], self._failed + 1
         if not self._good and self._failed >= MOST_FAILED:
             raise self.fault

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -48,6 +48,10 @@ WORTH_A_TRIAL = 1 << 28
 """where so many are to be written."""
 ADVICE_SECONDS = 10.0
 """What looking for superfluous axes may take, of a kernel that may not end."""
+DRAWN = 64
+"""Cells beside the ends of axes that are solved to see their methods and statuses,"""
+LOOK_SECONDS = 1.0
+"""or as many as can be in this time."""
 TRIAL_CELL_SECONDS = 1.0
 """A trial run does not wait longer for a cell that never ends, or ten times as long as for others."""
 
@@ -184,10 +188,11 @@ def plan(
     if isolate or cell_timeout is not None:
         return _plan_apart(study, crew, folder, limits_of(cell_timeout))
     compiling = Compiling(study.kernel, study.kernel_name, note)
-    sample = with_ends(sampled_study(study, compiling), Solver(replace(study, kernel=compiling.kernel)), study)
+    sample = sampled_study(study, compiling)
+    seen = looked_at(Solver(replace(study, kernel=compiling.kernel)), study)
     with faults_reported(f"{study.kernel_name}: the kernel failed"):
         advice = scaling(study).advice
-    forecast = _forecast(study, sample, crew, folder, None)
+    forecast = _forecast(study, sample, seen, crew, folder, None)
     compiled = sum(compiling.seconds.values())
     again = 0.0 if _is_kept(study.kernel_name) else compiled
     return replace(forecast, seconds=forecast.seconds + again, compile_seconds=compiled, scaling=advice)
@@ -201,7 +206,8 @@ def _plan_apart(study: Study, workers: int, folder: Path, limits: Limits) -> Pla
         begun = time.monotonic()
         warm(solver, study)
         starting = time.monotonic() - begun
-        sample = with_ends(sampled_by(solver, study, solver.clock), solver, study)
+        sample = sampled_by(solver, study, solver.clock)
+        seen = looked_at(solver, study)
         try:
             advice = solver.call(ADVICE_SECONDS, advice_on, study.to_json())
         except Unsolved as fault:
@@ -209,7 +215,7 @@ def _plan_apart(study: Study, workers: int, folder: Path, limits: Limits) -> Pla
     finally:
         processes.end()
     most = max(TRIAL_CELL_SECONDS, SLACK * float(sample.costs.max()))
-    found = _forecast(study, sample, workers, folder, min(limits.seconds(1), most), starting)
+    found = _forecast(study, sample, seen, workers, folder, min(limits.seconds(1), most), starting)
     return replace(found, compile_seconds=starting if starting > SILENT_SECONDS else 0.0, scaling=advice)
 
 
@@ -219,9 +225,16 @@ def _is_kept(kernel: str) -> bool:
 
 
 def _forecast(
-    study: Study, sample: Sample, workers: int, folder: Path, cell_timeout: float | None, starting: float = 0.0
+    study: Study,
+    sample: Sample,
+    seen: tuple[Any, Any],
+    workers: int,
+    folder: Path,
+    cell_timeout: float | None,
+    starting: float = 0.0,
 ) -> Plan:
     """`cell_timeout`: None: cells are solved in this process. `starting`: seconds before the first cell."""
+    status, used = seen
     rows, columns = row_blocks(study), part_columns(study)
     row_bytes = sum(c.cell_bytes for c in columns)
     blocks = row_partition(sample, rows, row_shape(study), row_bytes, workers)
@@ -244,33 +257,37 @@ def _forecast(
         folder=str(folder),
         cell_seconds=sample.cost,
         seconds=_seconds(trial, output, min(workers, blocks.count), folder, starting),
-        methods=_counted(sample.method_used, dict(enumerate(names)) | {-1: "none"}),
-        statuses=_counted(sample.status, {int(s): s.name for s in Status}),
-        sampled=len(sample.status),
+        methods=_counted(used, dict(enumerate(names)) | {-1: "none"}),
+        statuses=_counted(status, {int(s): s.name for s in Status}),
+        sampled=len(status),
     )
 
 
-def with_ends(sample: Sample, solver: SolveCells, study: Study) -> Sample:
-    """The sample with the cells at both ends of every axis, in the middle of the others, and of all axes at once.
+def looked_at(solver: SolveCells, study: Study) -> tuple[Any, Any]:
+    """Statuses and methods of cells solved one by one: at the ends of axes, and one drawn from each of equal shares.
 
-    There a scene is most often another one, and so is the method. The times of the sample stay.
+    The ends are those of every axis, in the middle of the others, and of all axes at once: there a scene is most often
+    another one, and so is the method. Of the drawn ones fewer are solved where they are dear.
     """
     shape = Grid(study).shape
     middle, last = np.array(shape) // 2, np.array(shape) - 1
     places = [np.zeros_like(last), last]
     for axis in range(len(shape)):
         places += [np.where(np.arange(len(shape)) == axis, end, middle) for end in (0 * last, last)]
-    numbers = np.unique([np.ravel_multi_index(tuple(place), shape) for place in places])
-    inside = ((sample.positions[:, None] <= numbers) & (numbers < sample.positions[:, None] + sample.cells)).any(axis=0)
-    status, used = [sample.status], [sample.method_used]
-    for number in numbers[~inside]:
+    ends = [int(np.ravel_multi_index(tuple(place), shape)) for place in places]
+    rng, size = np.random.default_rng(0), math.prod(shape)
+    drawn = (np.arange(DRAWN) + rng.random(DRAWN)) * (size / DRAWN)
+    status, used, begun = [], [], time.perf_counter()
+    for turn, number in enumerate(dict.fromkeys([*ends, *rng.permutation(drawn.astype(np.int64)).tolist()])):
+        if turn >= len(ends) and time.perf_counter() - begun > LOOK_SECONDS:
+            break
         cell = empty_cells(study, 1)
         cell.status[:], cell.used[:] = Status.PENDING, -1
         with tolerated():
-            solver.solve(int(number), cell)
+            solver.solve(number, cell)
         status.append(cell.status)
         used.append(cell.used)
-    return replace(sample, status=np.concatenate(status), method_used=np.concatenate(used))
+    return np.concatenate(status), np.concatenate(used)
 
 
 def _seconds(trial: Calibration, output: int, workers: int, folder: Path, starting: float) -> float:

@@ -15,7 +15,7 @@ COLUMNS = tuple(Column(name, "i1", (), (), {}) for name in ("status", "method_us
 def sample(costs, size, cells=LANES):
     costs = np.atleast_1d(np.asarray(costs, float))
     places = (np.arange(len(costs)) + 0.5) * size / len(costs)
-    return Sample(places, costs, cells, np.zeros(1, "i1"), np.zeros(1, "i1"))
+    return Sample(places, costs, cells)
 
 
 @given(size=st.integers(1, 10**12), cells=st.integers(1, 10**9))

@@ -41,9 +41,8 @@ def test_a_plan_forecasts_the_time_of_a_run(tmp_path):
 
 def test_a_plan_tells_what_auto_would_choose_and_what_becomes_of_cells():
     found = sweep.plan(stone(rtol=0.5))
-    assert found.methods.keys() == {"none", "rough"}
-    assert sum(found.methods.values()) == pytest.approx(1)
-    assert 0.05 < found.statuses["BAD_INPUT"] < 0.25  # a tenth of the cells, and both ends of a small sample
+    assert found.methods == pytest.approx({"rough": 0.896, "none": 0.1, "exact": 0.004}, abs=0.06)
+    assert found.statuses == pytest.approx({"OK": 0.9, "BAD_INPUT": 0.1}, abs=0.06)
 
 
 @pytest.mark.parametrize("isolate", [False, True])
@@ -68,7 +67,7 @@ def test_a_plan_of_a_folder_that_is_not_there_is_refused(tmp_path):
 def test_a_kernel_that_crashes_or_never_ends_is_planned_in_processes_of_its_own(tmp_path):
     found = sweep.plan(tall(200, "bad:WORST"), path=tmp_path / "out.h5", cell_timeout=1.0)
     assert found.cells == 200
-    assert found.methods == {"exact": 1.0}
+    assert found.methods["exact"] > 0.8
     assert 0 < found.seconds < 600
     assert list(tmp_path.iterdir()) == []
 

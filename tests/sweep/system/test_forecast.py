@@ -50,7 +50,7 @@ class Run:
         places = (2 * np.arange(64) + 1) * CELLS // 128
         noise = np.random.default_rng(seed).uniform(0.5, 1.5, 64)
         probed = noise * [costs[p : p + 32].mean() for p in places]
-        self.weights = Sample(places, probed, 32, np.zeros(1), np.zeros(1)).weights(partition)
+        self.weights = Sample(places, probed, 32).weights(partition)
         self.now, self.workers, self.slow = 0.0, workers, slow
         self.forecast = Forecast(self.weights, range(partition.count), lambda: self.now)
 
