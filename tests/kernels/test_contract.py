@@ -13,9 +13,11 @@ from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.jit import COMPILED
 
 NAMES = sorted(KERNELS)
-CELLS = 1500 if COMPILED else 6
+CELLS = 1500
 DEAR = {"foliot_ripple": 100, "foliot_steps": 60, "foliot_noise": 200, "polisher_wear": 60, "polisher_wear_point": 60}
 """Cells of all of float64 where each takes long."""
+
+compiled = pytest.mark.skipif(not COMPILED, reason="the digests hold plain Python to the bits of compiled cells")
 ENDS = [0.0, 5e-324, 2.2e-308, 1e-160, 1.0, 1e160, 1.7e308, np.inf, -np.inf, np.nan, -0.0, -1.0]
 KNOWN = [s for s in Status if s < Status.NOT_ASKED]
 
@@ -35,7 +37,6 @@ def length_of(name):
 def sound(name, columns, rtol):
     """The cells that the check lets pass."""
     rows = np.flatnonzero(golden.check_of(get(name), columns) == Status.OK)
-    rows = rows if COMPILED else rows[golden.chosen(name, rows.size)]
     return golden.taken(columns, rows), rtol[rows]
 
 
@@ -80,7 +81,7 @@ def test_bits_are_those_that_are_kept(name):
     assert not list(golden.differences([name]))
 
 
-@pytest.mark.skipif(not COMPILED, reason="cells go one by one in plain Python")
+@compiled
 @pytest.mark.parametrize("name", NAMES)
 def test_a_cell_has_the_same_bits_alone_in_lanes_and_in_tails(name):
     """Alone, in two groups of lanes in another order, and in a tail; beside cells that are refused, too."""
@@ -135,6 +136,7 @@ def test_what_lies_outside_the_declared_limits_is_bad_input(name):
     assert (golden.check_of(kernel, columns)[outside(kernel, columns)] == Status.BAD_INPUT).all()
 
 
+@compiled
 @pytest.mark.parametrize("name", NAMES)
 def test_over_the_whole_of_float64_a_cell_is_right_or_refused(name):
     """What is OK is finite, and what several methods call right is the same within what they promise."""
@@ -219,7 +221,7 @@ FREE_ANGLES = {
 but for that of `omega_n`, which is one of phase."""
 
 
-CHANGES = ((-6, 0, 0, 0), (4, 10, -8, 6)) if COMPILED else ((4, 10, -8, 6),)
+CHANGES = (-6, 0, 0, 0), (4, 10, -8, 6)
 """Powers of two by which the units of time, length, mass and angle are changed."""
 
 
@@ -233,6 +235,7 @@ def dimension(unit):
     return total
 
 
+@compiled
 @pytest.mark.parametrize("name", NAMES)
 def test_units_scale_as_the_fields_declare(name):
     """Powers of two of time, length, mass and, where any will do, angle leave all bits but those of the exponent."""
@@ -243,9 +246,7 @@ def test_units_scale_as_the_fields_declare(name):
     for field in kernel.parameters:
         column = np.abs(found.cells[field.name]).reshape(rows.size, -1)
         rows = rows & ((column == 0.0) | ((column > 1e-40) & (column < 1e40)) | (column == field.default)).all(axis=1)
-    assert rows.any() or not COMPILED  # of the few cells in plain Python there may be none
-    if not COMPILED:  # two cells: the digests hold plain Python to the bits of the rest
-        rows &= np.cumsum(rows) <= 2
+    assert rows.any()
     cells, rtol = golden.taken(found.cells, rows), found.rtol[rows]
     for units in CHANGES:
         powers = np.array(units) * (1, 1, 1, name in FREE_ANGLES)
