@@ -5,12 +5,10 @@ import inspect
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import sweep
@@ -28,50 +26,6 @@ def text(name):
 def test_every_public_name_has_its_place_in_the_reference():
     named = re.findall(r"auto(?:function|exception):: (?:[\w.]+\.)?(\w+)", text("api.md"))
     assert sorted(named) == sorted(sweep.__all__)
-
-
-@pytest.fixture
-def octave(tmp_path):
-    """Runs a script beside result.h5; gives what it prints, and the result."""
-    if not shutil.which("octave-cli"):
-        pytest.skip("octave is not installed")
-    study = sweep.study(
-        kernel="foliot",
-        axes={"mu": {"spacing": "log", "start": 0.1, "stop": 10.0, "num": 7}, "R": [0.0, 0.5, 2.0]},
-        fixed={"a": 1.0, "phi0": 1.0},
-    )
-    sweep.run(study, tmp_path / "result.h5", progress=False).close()
-
-    def run(script):
-        (tmp_path / "script.m").write_text(script)
-        command = ["octave-cli", "--norc", "script.m"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
-        if "package netcdf" in done.stderr:
-            pytest.skip("octave's package netcdf is not installed")
-        return [float(number) for number in done.stdout.split()]
-
-    with sweep.open_result(tmp_path / "result.h5") as dataset:
-        yield run, dataset.load()
-
-
-def lines_for(language):
-    """The code of the page for MATLAB or Octave."""
-    return re.search(rf"<!-- {language} -->\n```matlab\n(.*?)```", text("file_format.md"), re.DOTALL)[1]
-
-
-def test_octave_reads_a_result_as_the_page_says(octave):
-    run, dataset = octave
-    best = dataset.period.isel(dataset.period.argmin(...))
-    assert run(lines_for("octave")) == [float(best), float(best.mu), float(best.R)]
-    assert np.isnan(dataset.period.values).any()
-
-
-def test_lines_for_matlab_read_the_numbers(octave):
-    run, dataset = octave
-    lines = [line for line in lines_for("matlab").splitlines() if "h5readatt" not in line and "loglog" not in line]
-    found = run("\n".join(["pkg load netcdf", *lines, 'printf("%.17g ", mu, codes, period);']))
-    codes = dataset.status.attrs["flag_values"]
-    np.testing.assert_array_equal(found, [*dataset.mu.values, *codes, *dataset.period.values.ravel()])
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
