@@ -11,6 +11,6 @@ Others may use
     `groups`          superfluous axes, outputs free of units
     `failing`         a study without the cells at which its kernel fails
 
-Behind `refine` is `refiner` (rounds of cuts), behind `plan` `calibration` (trial runs), behind `work_precision`
+Behind `refine` is `refiner` (rounds of cuts), behind `work_precision`
 `reference` (what errors are against), behind `groups` `symmetries` (powers by which numbers may be multiplied).
 """

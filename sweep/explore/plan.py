@@ -26,10 +26,9 @@ from sweep.cells.reduce import strip_bytes
 from sweep.cells.sample import require_asked
 from sweep.cells.solve import Solver
 from sweep.cells.timing import Sample, row_partition, tolerated
-from sweep.explore.calibration import Calibration
 from sweep.explore.groups import advice_on, scaling
 from sweep.results.open import memory
-from sweep.runs.isolate import SLACK, Limits, Processes, limits_of
+from sweep.runs.isolate import Limits, Processes, limits_of
 from sweep.store.frame import cuts_of, expected_size
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
@@ -52,8 +51,8 @@ DRAWN = 64
 """Cells beside the ends of axes that are solved to see their methods and statuses,"""
 LOOK_SECONDS = 1.0
 """or as many as can be in this time."""
-TRIAL_CELL_SECONDS = 1.0
-"""A trial run does not wait longer for a cell that never ends, or ten times as long as for others."""
+RUN_SECONDS = 0.15
+"""What any run to a file takes beside its cells: opening, a sample, the end."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +153,7 @@ def plan(
     isolate: bool = False,
     cell_timeout: float | str | None = None,
 ) -> Plan:
-    """Forecast of a run, from runs of some of its cells, spread over the grid, in a folder beside the output.
+    """Forecast of a run, from some of its cells, spread over the grid.
 
     Parameters
     ----------
@@ -192,7 +191,7 @@ def plan(
     seen = looked_at(Solver(replace(study, kernel=compiling.kernel)), study)
     with faults_reported(f"{study.kernel_name}: the kernel failed"):
         advice = scaling(study).advice
-    forecast = _forecast(study, sample, seen, crew, folder, None)
+    forecast = _forecast(study, sample, seen, crew, folder)
     compiled = sum(compiling.seconds.values())
     again = 0.0 if _is_kept(study.kernel_name) else compiled
     return replace(forecast, seconds=forecast.seconds + again, compile_seconds=compiled, scaling=advice)
@@ -214,9 +213,11 @@ def _plan_apart(study: Study, workers: int, folder: Path, limits: Limits) -> Pla
             advice = f"not known; while cells were tried at random, {fault}"
     finally:
         processes.end()
-    most = max(TRIAL_CELL_SECONDS, SLACK * float(sample.costs.max()))
-    found = _forecast(study, sample, seen, workers, folder, min(limits.seconds(1), most), starting)
-    return replace(found, compile_seconds=starting if starting > SILENT_SECONDS else 0.0, scaling=advice)
+    found = _forecast(study, sample, seen, workers, folder)
+    seconds = starting + found.seconds
+    return replace(
+        found, seconds=seconds, compile_seconds=starting if starting > SILENT_SECONDS else 0.0, scaling=advice
+    )
 
 
 def _is_kept(kernel: str) -> bool:
@@ -224,23 +225,15 @@ def _is_kept(kernel: str) -> bool:
     return machine_code_folder() is not None and ":" not in kernel
 
 
-def _forecast(
-    study: Study,
-    sample: Sample,
-    seen: tuple[Any, Any],
-    workers: int,
-    folder: Path,
-    cell_timeout: float | None,
-    starting: float = 0.0,
-) -> Plan:
-    """`cell_timeout`: None: cells are solved in this process. `starting`: seconds before the first cell."""
+def _forecast(study: Study, sample: Sample, seen: tuple[Any, Any], workers: int, folder: Path) -> Plan:
     status, used = seen
     rows, columns = row_blocks(study), part_columns(study)
     row_bytes = sum(c.cell_bytes for c in columns)
     blocks = row_partition(sample, rows, row_shape(study), row_bytes, workers)
     output = _output_bytes(study, blocks)
     block = rows.cells(0, blocks.cells)[1]
-    trial = Calibration(study, rows.size, block, sample.cost, output / rows.size, workers, cell_timeout)
+    busy = min(workers, blocks.count)
+    writing = output / _disk_speed(folder) if output > WORTH_A_TRIAL else 0.0
     names = [m.name for m in study.kernel.methods]
     return Plan(
         title=study.title,
@@ -256,7 +249,8 @@ def _forecast(
         free_bytes=shutil.disk_usage(folder).free,
         folder=str(folder),
         cell_seconds=sample.cost,
-        seconds=_seconds(trial, output, min(workers, blocks.count), folder, starting),
+        # blocks are written while others are computed
+        seconds=RUN_SECONDS + max(sample.cost * rows.size / busy, writing),
         methods=_counted(used, dict(enumerate(names)) | {-1: "none"}),
         statuses=_counted(status, {int(s): s.name for s in Status}),
         sampled=len(status),
@@ -288,16 +282,6 @@ def looked_at(solver: SolveCells, study: Study) -> tuple[Any, Any]:
         status.append(cell.status)
         used.append(cell.used)
     return np.concatenate(status), np.concatenate(used)
-
-
-def _seconds(trial: Calibration, output: int, workers: int, folder: Path, starting: float) -> float:
-    """What a run takes, of some of the cells in earnest; or, where that cannot be, from the probes alone."""
-    found = trial.seconds(folder)
-    if not math.isnan(found):
-        return found
-    speed = _disk_speed(folder) if output > WORTH_A_TRIAL else math.inf
-    # blocks are written while others are computed
-    return starting + max(trial.cell_seconds * trial.cells / workers, output / speed)
 
 
 def _output_bytes(study: Study, blocks: Partition) -> int:
