@@ -135,7 +135,7 @@ class Progress:
     def line(self) -> str:
         """What is told now: `12,300/1,000,000 cells (1.2 %), 5,100 cells/s, 3 min left`."""
         left = self.left
-        return self._counts() + ("" if left is None else f", {speed(self.rate)}, {duration(left)} left")
+        return self._counts() + ("" if left is None else f", {speed(self.rate)}, {one_digit(left)} left")
 
     def _fields(self) -> dict[str, Any]:
         left = self.left
@@ -223,6 +223,15 @@ def duration(seconds: float) -> str:
     if whole < 86400:
         return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
     return f"{whole // 86400} d {whole % 86400 // 3600} h"
+
+
+def one_digit(seconds: float) -> str:
+    """A time rounded up to one digit, as one tells what is not known better: `0.3 s`, `40 s`, `4 min`, `2 h`."""
+    units = ("d", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 1.0)
+    unit, size = next((unit for unit in units if seconds >= unit[1]), units[-1])
+    count = max(seconds, SHORTEST_LEFT) / size
+    digit = 10.0 ** math.floor(math.log10(count))
+    return f"{math.ceil(count / digit - 1e-9) * digit:g} {unit}"
 
 
 def seconds_of(name: str, text: float | str) -> float:

@@ -52,11 +52,11 @@ def test_times_are_read_as_they_are_told():
 
 
 def test_a_line_says_how_much_how_fast_and_how_long(clock):
-    """By the cells so far; of an earlier run they say nothing of the speed; a forecast knows better."""
+    """By the cells so far, not of an earlier run; a forecast knows better. The time is rounded up to one digit."""
     for keys, cells, wanted in (
         ({}, 250, (250, 25.0, 30.0)),
         ({"done": 800}, 50, (850, 5.0, 30.0)),
-        ({"forecast": Left(95.0)}, 100, (100, 10.0, 95.0)),
+        ({"forecast": Left(95.0)}, 100, (100, 10.0, 120.0)),
     ):
         log = io.StringIO()
         run(log, clock, [(0, 0), (10, cells)], name="out.h5", **keys)
