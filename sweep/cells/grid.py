@@ -1,4 +1,4 @@
-"""From axes to cells: flat cell numbers, the columns a kernel takes, and the hyperslabs a block of cells fills.
+"""From axes to cells: flat cell numbers and the columns a kernel takes.
 
 Cells are numbered in C order: the last axis runs fastest.
 """
@@ -17,7 +17,6 @@ from sweep.study.condition import CellCondition
 from sweep.study.model import AUTO, SETTINGS, Axis, Study
 
 Floats = NDArray[np.float64]
-Piece = tuple[tuple[slice, ...], int, int]
 
 SHORT_RUN = 16
 """Below this many equal cells in a row, filling every n-th cell is faster than filling runs."""
@@ -36,23 +35,6 @@ class Box:
 
     def __init__(self, dims: tuple[str, ...], shape: tuple[int, ...]) -> None:
         self.dims, self.shape, self.size = dims, shape, math.prod(shape)
-
-    def pieces(self, start: int, stop: int) -> list[Piece]:
-        """Cut the places `start` to `stop` into hyperslabs of `shape`, at most 2 ndim - 1 of them.
-
-        Returns
-        -------
-        list of (slices, sub_start, sub_stop)
-            A slice per dimension; and the hyperslab's places, counted from `start`: the places
-            `block[sub_start:sub_stop]` in C order fill `dataset[slices]`.
-        """
-        found: list[Piece] = []
-        done = 0
-        for slices in _hyperslabs(self.shape, start, stop):
-            size = math.prod(s.stop - s.start for s in slices)
-            found.append((slices, done, done + size))
-            done += size
-        return found
 
 
 class Grid(Box):
@@ -213,26 +195,6 @@ def _repeat(values: Floats, run: int, skip: int, out: Floats) -> None:
     else:
         body[...] = values[1 : 1 + whole, None]
     out[head + whole * run :] = values[-1]
-
-
-def _hyperslabs(shape: tuple[int, ...], start: int, stop: int) -> list[tuple[slice, ...]]:
-    """Hyperslabs that hold the flat cells `start` to `stop` of `shape`, in order."""
-    if start == stop:
-        return []
-    if len(shape) < 2:
-        return [(slice(start, stop),)[: len(shape)]]
-    row = math.prod(shape[1:])
-    (first, head), (last, tail) = divmod(start, row), divmod(stop, row)
-
-    def within(index: int, begin: int, end: int) -> list[tuple[slice, ...]]:
-        return [(slice(index, index + 1), *rest) for rest in _hyperslabs(shape[1:], begin, end)]
-
-    if first == last:
-        return within(first, head, tail)
-    before = within(first, head, row) if head else []
-    begin = first + 1 if head else first
-    middle = [(slice(begin, last), *(slice(0, n) for n in shape[1:]))] if begin < last else []
-    return [*before, *middle, *within(last, 0, tail)]
 
 
 def _all_equal(column: NDArray[np.float64]) -> bool:

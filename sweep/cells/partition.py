@@ -101,6 +101,12 @@ def box_shape(shape: tuple[int, ...], cells: int) -> tuple[int, ...]:
     return tuple(reversed(found))
 
 
+def box_slices(shape: tuple[int, ...], start: int, stop: int) -> tuple[slice, ...]:
+    """Where the box of the cells `start` to `stop` of a grid lies."""
+    first, last = (np.unravel_index(cell, shape) for cell in (start, stop - 1))
+    return tuple(slice(int(a), int(b) + 1) for a, b in zip(first, last, strict=True))
+
+
 class RowStrip(NamedTuple):
     """Rows from `row` on, of `cells` cells each, from cell number `cell` on."""
 

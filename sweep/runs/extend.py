@@ -7,10 +7,10 @@ of every status and method, comes out with the same bits again.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from kernels.interface import Status
 from sweep.cells.block import block_solver
 from sweep.cells.fingerprint import is_of_program
 from sweep.cells.grid import Grid
+from sweep.cells.partition import box_slices
 from sweep.cells.schema import METHOD_USED, STATUS, Column, columns
 from sweep.results.open import unreadable
 from sweep.results.statuses import flat_pieces
@@ -30,21 +31,6 @@ SAMPLE = 8
 """Cells of every status and method that are computed again where another version has computed the result."""
 TAKEN_OVER = "taken_over"
 """Attribute of a result that says which of its cells another version has computed."""
-
-
-class Slab(NamedTuple):
-    """A hyperslab of the grid with cells that are known."""
-
-    slices: tuple[slice, ...]
-    known: list[Any]
-    """For each axis, which of the slab's positions the result has."""
-    begin: int
-    end: int
-
-    @property
-    def shape(self) -> list[int]:
-        """Length along each axis."""
-        return [s.stop - s.start for s in self.slices]
 
 
 def obstacle(old: Mapping[str, str], new: Mapping[str, str]) -> str:
@@ -130,23 +116,24 @@ class Reused:
 
     def missing(self, start: int, stop: int) -> Any:
         """Of the cells `start` to `stop`, which have to be computed."""
-        missing = np.ones(stop - start, bool)
-        for slab in self._slabs(start, stop):
-            missing[slab.begin : slab.end].reshape(slab.shape)[np.ix_(*slab.known)] = False
-        return missing
+        box, known = self._box(start, stop)
+        missing = np.ones(_lengths(box), bool)
+        missing[np.ix_(*known)] = False
+        return missing.ravel()
 
     def fill(self, start: int, stop: int, arrays: Mapping[str, Any]) -> None:
         """Writes the known ones among the cells `start` to `stop`. Raises SweepError where the file fails."""
-        for slab in self._slabs(start, stop):
-            # values of the result that are neighbours there have none of its values between them here
-            old = tuple(
-                slice(int(p[s][k].min()), int(p[s][k].max()) + 1)
-                for p, s, k in zip(self._positions, slab.slices, slab.known, strict=True)
-            )
-            for column in self._columns:
-                values = self._values(column.name, old)
-                place = arrays[column.name][slab.begin : slab.end].reshape(*slab.shape, *column.shape)
-                place[np.ix_(*slab.known)] = values
+        box, known = self._box(start, stop)
+        if not all(k.any() for k in known):
+            return
+        # values of the result that are neighbours there have none of its values between them here
+        old = tuple(
+            slice(int(p[s][k].min()), int(p[s][k].max()) + 1)
+            for p, s, k in zip(self._positions, box, known, strict=True)
+        )
+        for column in self._columns:
+            place = arrays[column.name].reshape(*_lengths(box), *column.shape)
+            place[np.ix_(*known)] = self._values(column.name, old)
 
     def _values(self, name: str, slices: tuple[slice, ...]) -> Any:
         """Those of a piece of the result. Raises SweepError where the file fails."""
@@ -189,12 +176,10 @@ class Reused:
         new = [np.flatnonzero(p >= 0)[place] for p, place in zip(self._positions, places, strict=True)]
         return list(map(int, np.ravel_multi_index(new, self._grid.shape)))
 
-    def _slabs(self, start: int, stop: int) -> Iterator[Slab]:
-        """Hyperslabs with known cells."""
-        for slices, begin, end in self._grid.pieces(start, stop):
-            known = [positions[s] >= 0 for positions, s in zip(self._positions, slices, strict=True)]
-            if all(k.any() for k in known):
-                yield Slab(slices, known, begin, end)
+    def _box(self, start: int, stop: int) -> tuple[tuple[slice, ...], list[Any]]:
+        """The box of some cells in the grid, and along each axis which of its positions the result has."""
+        box = box_slices(self._grid.shape, start, stop)
+        return box, [positions[s] >= 0 for positions, s in zip(self._positions, box, strict=True)]
 
 
 class Retried(Reused):
@@ -215,10 +200,7 @@ class Retried(Reused):
 
     def missing(self, start: int, stop: int) -> Any:
         """Of the cells `start` to `stop`, which FAILED."""
-        missing = np.empty(stop - start, bool)
-        for slab in self._slabs(start, stop):
-            missing[slab.begin : slab.end] = (self._values(STATUS, slab.slices) == Status.FAILED).ravel()
-        return missing
+        return np.ravel(self._values(STATUS, box_slices(self._grid.shape, start, stop)) == Status.FAILED)
 
     def fill(self, start: int, stop: int, arrays: Mapping[str, Any]) -> None:
         """Writes the others. Raises SweepError where the file fails."""
@@ -261,6 +243,10 @@ class Precomputed:
     def fill(self, start: int, stop: int, arrays: Mapping[str, Any]) -> None:
         for name, values in self._arrays.items():
             arrays[name][...] = values[start:stop]
+
+
+def _lengths(box: tuple[slice, ...]) -> list[int]:
+    return [s.stop - s.start for s in box]
 
 
 def _spread(cells: Any) -> Any:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from sweep.cells.partition import box_slices
 from sweep.store.frame import ENDINGS, UNKNOWN
 from sweep.store.layout import BYTES, DAMAGE, Layout, write_digests
 from sweep.store.reading import StoredFile, damaged
@@ -63,8 +64,7 @@ def _is_same(file: StoredFile, block: int) -> bool:
 
     table = file.layout.tables["cells"]
     start, stop = table.blocks.bounds(block)
-    first, last = (np.unravel_index(cell, table.grid) for cell in (start, stop - 1))
-    box = tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))
+    box = box_slices(table.grid, start, stop)
     with h5py.File(file.path, "r") as other:
         columns = file.columns().items()
         return all(np.asarray(other[name][box]).tobytes() == c.run(start, stop).tobytes() for name, c in columns)
