@@ -217,7 +217,8 @@ class _Trial:
             if _valued(found).sum() < self.number / 2:
                 return None
             logs.append(np.concatenate([_logs(found, output).ravel() for output in found.outputs]))
-        slope: Array = (logs[0] - 8 * logs[1] + 8 * logs[2] - logs[3]) / (12 * STEP)
+        with np.errstate(invalid="ignore"):  # of an output that is 0 there is no slope
+            slope: Array = (logs[0] - 8 * logs[1] + 8 * logs[2] - logs[3]) / (12 * STEP)
         return slope
 
 
