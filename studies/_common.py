@@ -133,8 +133,8 @@ def report(
         print(f"use: python {Path(script).name} {' '.join(inputs)}", file=sys.stderr)
         return 2
     try:
+        from sweep.file.overwriting import check_target
         from sweep.show import charts
-        from sweep.system.overwriting import check_target
 
         target = Path(arguments[0]).with_suffix(".png")
         check_target(target, ".png")

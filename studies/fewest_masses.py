@@ -208,8 +208,8 @@ def figure(ds: xr.Dataset, times: xr.Dataset) -> Any:
 
 def main(arguments: Sequence[str]) -> int:
     """Table and figure; 1 if a statement does not hold."""
+    from sweep.file.overwriting import check_target
     from sweep.show import charts
-    from sweep.system.overwriting import check_target
 
     if list(arguments) == ["points"]:
         write_points(Path(__file__).with_suffix(".csv"))

@@ -6,65 +6,65 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sweep.analysis.asymptote import fit_correction as fit_correction
-    from sweep.analysis.collapse import fit_collapse as fit_collapse
-    from sweep.analysis.compare import compare_laws as compare_laws
-    from sweep.analysis.exponents import local_exponent as local_exponent
-    from sweep.analysis.exponents import where_exponent as where_exponent
-    from sweep.analysis.lines import fit_exponent as fit_exponent
-    from sweep.analysis.maps import exponent_map as exponent_map
-    from sweep.analysis.scattered import interpolated as interpolated
-    from sweep.analysis.two_laws import fit_two_laws as fit_two_laws
+    from sweep.errors import StudyError as StudyError
+    from sweep.errors import SweepError as SweepError
     from sweep.explore.groups import scaling as scaling
     from sweep.explore.join import join as join
-    from sweep.explore.notebook import kernels as kernels
     from sweep.explore.plan import plan as plan
     from sweep.explore.refine import refine as refine
+    from sweep.explore.scattered import interpolated as interpolated
     from sweep.explore.sensitivity import sensitivity as sensitivity
     from sweep.explore.solver import solver as solver
     from sweep.explore.work_precision import work_precision as work_precision
+    from sweep.file.open import open_result as open_result
+    from sweep.file.verify import verify as verify
+    from sweep.laws.asymptote import fit_correction as fit_correction
+    from sweep.laws.collapse import fit_collapse as fit_collapse
+    from sweep.laws.compare import compare_laws as compare_laws
+    from sweep.laws.exponents import local_exponent as local_exponent
+    from sweep.laws.exponents import where_exponent as where_exponent
+    from sweep.laws.lines import fit_exponent as fit_exponent
+    from sweep.laws.maps import exponent_map as exponent_map
+    from sweep.laws.two_laws import fit_two_laws as fit_two_laws
     from sweep.results.diff import diff as diff
     from sweep.results.export import export as export
     from sweep.results.filter import where as where
     from sweep.results.listing import list_results as list_results
-    from sweep.results.open import open_result as open_result
     from sweep.results.units import in_units as in_units
-    from sweep.results.verify import verify as verify
     from sweep.runs.run import run as run
+    from sweep.show.notebook import kernels as kernels
     from sweep.show.plot import plot as plot
     from sweep.study.toml import to_toml as to_toml
-    from sweep.system.errors import StudyError as StudyError
-    from sweep.system.errors import SweepError as SweepError
 
 _PUBLIC = {
     "study.read": ("study",),
     "study.toml": ("to_toml",),
     "explore.plan": ("plan",),
     "runs.run": ("run",),
-    "results.open": ("open_result",),
-    "results.verify": ("verify",),
+    "file.open": ("open_result",),
+    "file.verify": ("verify",),
     "results.filter": ("where",),
     "results.units": ("in_units",),
     "results.export": ("export",),
     "results.diff": ("diff",),
     "results.listing": ("list_results",),
     "explore.join": ("join",),
-    "explore.notebook": ("kernels",),
+    "show.notebook": ("kernels",),
     "explore.solver": ("solver",),
     "explore.refine": ("refine",),
-    "analysis.scattered": ("interpolated",),
+    "explore.scattered": ("interpolated",),
     "explore.work_precision": ("work_precision",),
     "explore.sensitivity": ("sensitivity",),
     "explore.groups": ("scaling",),
-    "analysis.exponents": ("local_exponent", "where_exponent"),
-    "analysis.maps": ("exponent_map",),
-    "analysis.lines": ("fit_exponent",),
-    "analysis.two_laws": ("fit_two_laws",),
-    "analysis.asymptote": ("fit_correction",),
-    "analysis.compare": ("compare_laws",),
-    "analysis.collapse": ("fit_collapse",),
+    "laws.exponents": ("local_exponent", "where_exponent"),
+    "laws.maps": ("exponent_map",),
+    "laws.lines": ("fit_exponent",),
+    "laws.two_laws": ("fit_two_laws",),
+    "laws.asymptote": ("fit_correction",),
+    "laws.compare": ("compare_laws",),
+    "laws.collapse": ("fit_collapse",),
     "show.plot": ("plot",),
-    "system.errors": ("StudyError", "SweepError"),
+    "errors": ("StudyError", "SweepError"),
 }
 _HOMES = {name: home for home, names in _PUBLIC.items() for name in names}
 """Public names and the modules they live in; a module is imported when one of its names is first used."""
@@ -82,7 +82,7 @@ def __getattr__(name: str) -> Any:
 
 def _study_html(study: Any) -> str:
     """How a notebook shows a study; imported when one does."""
-    found: str = import_module("sweep.explore.notebook").study_html(study)
+    found: str = import_module("sweep.show.notebook").study_html(study)
     return found
 
 

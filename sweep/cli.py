@@ -16,7 +16,7 @@ from sweep.command.files import say
 from sweep.command.options import Command, option
 from sweep.command.outcome import Outcome, explained
 from sweep.command.running import notify
-from sweep.system.errors import COMPLETE, EXIT_CODES, missing
+from sweep.errors import COMPLETE, EXIT_CODES, missing
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     ended = _ended(arguments)
     if getattr(arguments, "notify", None):
         notify(arguments, ended)
-    pool = sys.modules.get("sweep.system.pool")
+    pool = sys.modules.get("sweep.runs.pool")
     if argv is None and pool is not None and pool.left_behind():
         # a kernel that never ends would keep Python from ending; a program that calls this is not ours to end
         for stream in (sys.stdout, sys.stderr):

@@ -26,8 +26,8 @@ import statsmodels.api as sm
 import xarray as xr
 
 import sweep
-from sweep.analysis.scatter import BEYOND_DOUBT
-from sweep.analysis.two_laws import _evidence, _fit
+from sweep.laws.scatter import BEYOND_DOUBT
+from sweep.laws.two_laws import _evidence, _fit
 
 LOW, HIGH, MEETING = -1.0, -1 / 3, 0.47
 LEAST, MOST = 0.935, 0.965

@@ -25,12 +25,12 @@ import numpy as np
 import xarray as xr
 
 from kernels.interface import Status
-from sweep.analysis.mesh import simplices
-from sweep.analysis.metric import stretch
-from sweep.analysis.scattered import heights, located
 from sweep.cells.schema import ANCILLARY
 from sweep.explore.judge import BORDER_LEVELS
+from sweep.explore.mesh import simplices
+from sweep.explore.metric import stretch
 from sweep.explore.refiner import Refiner
+from sweep.explore.scattered import heights, located
 from sweep.study.model import Axis
 
 NAMES = ("x", "y", "z")

@@ -15,10 +15,10 @@ from havoc import flip, study
 
 from sweep.cells.fingerprint import fingerprint
 from sweep.cli import main
+from sweep.errors import SweepError
 from sweep.runs.run import run
 from sweep.study.read import study as as_study
 from sweep.study.toml import to_toml
-from sweep.system.errors import SweepError
 
 STUDY = """# How fast does a stone fall?
 title = "Stones"

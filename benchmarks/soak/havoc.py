@@ -16,11 +16,11 @@ PATHS = (str(HERE.parent), str(HERE.parents[2]), str(HERE.parents[2] / "tests" /
 sys.path[:0] = [p for p in PATHS if p not in sys.path]
 
 import sweep  # noqa: E402
-from sweep.results.verify import verify  # noqa: E402
+from sweep.errors import SweepError  # noqa: E402
+from sweep.file.reading import StoredFile  # noqa: E402
+from sweep.file.store import Store, unfinished_of  # noqa: E402
+from sweep.file.verify import verify  # noqa: E402
 from sweep.runs.run import complete  # noqa: E402
-from sweep.store.reading import StoredFile  # noqa: E402
-from sweep.store.store import Store, unfinished_of  # noqa: E402
-from sweep.system.errors import SweepError  # noqa: E402
 
 CELLS = 3000
 

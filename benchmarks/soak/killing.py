@@ -23,12 +23,12 @@ import numpy as np
 from havoc import numbers, study
 
 import sweep
-from sweep.results.open import open_result
-from sweep.results.verify import verify
+from sweep.file import disk
+from sweep.file.open import open_result
+from sweep.file.reading import StoredFile
+from sweep.file.store import Store, unfinished_of
+from sweep.file.verify import verify
 from sweep.runs.run import run
-from sweep.store.reading import StoredFile
-from sweep.store.store import Store, unfinished_of
-from sweep.system import disk
 
 KINDS = ("plain", "extend", "summary", "refine")
 PATIENCE = 900.0
@@ -288,7 +288,7 @@ def _ended(child, events, aim):
 
 def _child(events, log, kind, output, workers, cells, cluster):
     """A run that notes its phases, and every block when it is acknowledged."""
-    from sweep.store import store as storing
+    from sweep.file import store as storing
 
     storing.SYNC_SECONDS = 0.005
     _note_phases(events, Path(output))

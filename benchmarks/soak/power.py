@@ -50,7 +50,7 @@ def read_arguments():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--check", action="store_true", help="only whether each patch fits today's sources")
     parser.add_argument("--only", nargs="*", metavar="NAME", help="these behaviours")
-    parser.add_argument("--room", nargs="*", metavar="ROOM", help="those of these rooms, e.g. sweep/store")
+    parser.add_argument("--room", nargs="*", metavar="ROOM", help="those of these rooms, e.g. sweep/file")
     parser.add_argument("--plain", action="store_true", help="run kernels as plain Python alone, and compile nothing")
     parser.add_argument("--limit", type=float, default=600.0, help="seconds for a file of tests")
     parser.add_argument("--checkout", type=Path, default=ROOT, help="what is tried; default: this checkout")

@@ -29,10 +29,10 @@ import psutil
 import sweep
 from sweep.cells.block import sampled_study
 from sweep.explore.plan import plan
+from sweep.runs.pool import cores
+from sweep.runs.progress import Progress
 from sweep.runs.run import complete
 from sweep.study.model import Study
-from sweep.system.pool import cores
-from sweep.system.progress import Progress
 
 STUDIES = Path(__file__).parents[2] / "studies"
 SHARES = (0.10, 0.25, 0.50, 0.75)

@@ -32,12 +32,12 @@ from sweep.cells.output_schema import output_schema
 from sweep.cells.partition import boxes
 from sweep.cells.schema import columns
 from sweep.cells.solve import Solver
-from sweep.store.frame import Frame, cuts_of
-from sweep.store.layout import write_digests
-from sweep.store.reading import READERS, StoredFile
-from sweep.store.store import opened, unfinished_of
+from sweep.file import disk
+from sweep.file.frame import Frame, cuts_of
+from sweep.file.layout import write_digests
+from sweep.file.reading import READERS, StoredFile
+from sweep.file.store import opened, unfinished_of
 from sweep.study.model import Study
-from sweep.system import disk
 
 STEPS = ("kernel", "write once", "run")
 DEAR = {"phi0": 1.0, "a": 1.0, "step": 1e-3}

@@ -15,7 +15,7 @@ from sweep.cells.partition import Partition, row_blocks
 from sweep.cells.reduce import Reducer
 from sweep.cells.schema import cells_of, columns
 from sweep.cells.timing import Sample, take_sample, tolerated
-from sweep.system.errors import SweepError
+from sweep.errors import SweepError
 
 if TYPE_CHECKING:
     from sweep.cells.guard import BadCell, SolveCells

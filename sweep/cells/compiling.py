@@ -20,7 +20,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from kernels.interface import Kernel, is_kept, machine_code_folder
-from sweep.system.progress import duration
+from sweep.words import duration
 
 SILENT_SECONDS = 1.0
 """What is compiled in less time is not told."""

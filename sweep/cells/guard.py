@@ -10,7 +10,7 @@ import numpy as np
 
 from kernels.interface import Status
 from sweep.cells.solve import NONE
-from sweep.system.errors import SweepError
+from sweep.errors import SweepError
 
 if TYPE_CHECKING:
     from sweep.cells.grid import Cells, Grid

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from sweep.cells.grid import Cells, Grid, empty_cells
+from sweep.errors import SweepError
 from sweep.study.model import Axis, Study, differs, frozen
-from sweep.system.errors import SweepError
 
 MOST_TRIED = 1 << 16
 """Cells that are looked at to find some that are asked for."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from sweep.cells.partition import Partition, RowBlocks, boxes
 from sweep.cells.schema import Column, cells_of
-from sweep.system.errors import SweepError
+from sweep.errors import SweepError
 
 if TYPE_CHECKING:
     from sweep.cells.guard import SolveCells

@@ -20,12 +20,12 @@ from sweep.command.options import (
     option,
     output,
 )
-from sweep.system.errors import SweepError
+from sweep.errors import SweepError
 
 
 def _plan(arguments: argparse.Namespace) -> None:
     from sweep.explore.plan import plan
-    from sweep.system.progress import Progress
+    from sweep.runs.progress import Progress
 
     study = study_from(arguments)
     found = plan(
@@ -64,9 +64,9 @@ def _refine(arguments: argparse.Namespace) -> None:
 
 def _chart(arguments: argparse.Namespace) -> None:
     from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
+    from sweep.runs.progress import Progress
     from sweep.show.charts import save
     from sweep.show.plot import plot
-    from sweep.system.progress import Progress
 
     study = study_of_result(arguments) if arguments.study.suffix == ".h5" else study_from(arguments)
     output = arguments.output or Path(f"{arguments.study.stem}_chart.png")

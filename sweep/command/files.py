@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
-from sweep.system.errors import SweepError
+from sweep.errors import SweepError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,7 +42,7 @@ def result_of(arguments: argparse.Namespace) -> contextlib.AbstractContextManage
 @contextlib.contextmanager
 def opened(path: Path, unfinished: bool = True) -> Iterator[xr.Dataset]:
     """A result; where another program has changed it, what goes wrong with it is told as that."""
-    from sweep.results.open import changed, open_result
+    from sweep.file.open import changed, open_result
 
     if path.suffix == ".toml":
         raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
@@ -56,7 +56,7 @@ def opened(path: Path, unfinished: bool = True) -> Iterator[xr.Dataset]:
 
 def check_target_of(arguments: argparse.Namespace, target: Path, kind: str | None = None) -> None:
     """Raises SweepError where a command is not to write there; its kind is the suffix unless it has a name."""
-    from sweep.system.overwriting import check_target
+    from sweep.file.overwriting import check_target
 
     read = [getattr(arguments, name) for name in ("result", "study") if name in arguments]
     check_target(target, kind or target.suffix.lower(), force=arguments.force, read=read, by=arguments.by)
@@ -73,6 +73,6 @@ def in_units_of(dataset: xr.Dataset, given: Sequence[str]) -> xr.Dataset:
 
 def say(text: object, file: TextIO | None = None) -> None:
     """Prints, to stdout unless said otherwise, what may hold text of other people."""
-    from sweep.system.table import printable
+    from sweep.words import printable
 
     print(printable(str(text)), file=file)

@@ -9,7 +9,7 @@ from sweep.command.options import AT, FORCE, OUTPUT_Y, RESULT, UNFINISHED, Comma
 
 
 def _fit(arguments: argparse.Namespace) -> None:
-    from sweep.analysis.scattered import on_lines
+    from sweep.explore.scattered import on_lines
     from sweep.show.laws import laws, laws_text, pick, write_laws
 
     if arguments.compare:
@@ -29,7 +29,7 @@ def _fit(arguments: argparse.Namespace) -> None:
 
 def _compare(arguments: argparse.Namespace) -> None:
     """`sweep fit --compare`: a table, and a picture or csv of it."""
-    from sweep.analysis.scattered import on_lines
+    from sweep.explore.scattered import on_lines
     from sweep.show.compare import comparison, comparison_text, write_comparison
     from sweep.show.laws import pick
 

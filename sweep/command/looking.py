@@ -22,7 +22,7 @@ from sweep.command.options import (
     switch,
 )
 from sweep.command.outcome import Outcome
-from sweep.system.errors import COMPLETE, SweepError
+from sweep.errors import COMPLETE, SweepError
 
 DIFFERENT = 1
 """As `diff` of files says it."""
@@ -41,7 +41,7 @@ def _show(arguments: argparse.Namespace) -> None:
 
 
 def _verify(arguments: argparse.Namespace) -> None:
-    from sweep.results.verify import verify
+    from sweep.file.verify import verify
 
     verdict = verify(arguments.result)
     if not verdict.whole:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sweep.command.files import say
 from sweep.command.options import ALLOW_IMPORT, Command, option
-from sweep.system.errors import SweepError
+from sweep.errors import SweepError
 
 
 def _kernels(arguments: argparse.Namespace) -> None:

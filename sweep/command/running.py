@@ -23,12 +23,12 @@ from sweep.command.options import (
     switch,
 )
 from sweep.command.outcome import Outcome, explained
-from sweep.system.errors import CELLS_FAILED, COMPLETE, EXIT_CODES, INCOMPLETE, SweepError
+from sweep.errors import CELLS_FAILED, COMPLETE, EXIT_CODES, INCOMPLETE, SweepError
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from sweep.results.stored import Stored
+    from sweep.file.stored import Stored
     from sweep.study.model import Study
 
 NOTIFY_SECONDS = 60
@@ -42,7 +42,7 @@ RUN_OPTIONS = (
 
 def _run(arguments: argparse.Namespace) -> Outcome:
     study = study_from(arguments)
-    from sweep.system.log import log, log_path, logging_to
+    from sweep.runs.log import log, log_path, logging_to
 
     output = _output(arguments)
     path = log_path(output) if output.parent.is_dir() else None
@@ -84,10 +84,10 @@ def _computed(arguments: argparse.Namespace, study: Study, output: Path) -> Outc
 def _after(study: Study, output: Path, state: str) -> xr.Dataset | Stored:
     """The result after a run; of one written just now without xarray, which takes longer to load than a small run."""
     if not state:
-        from sweep.results.stored import Stored
+        from sweep.file.stored import Stored
 
         return Stored(output, study)
-    from sweep.results.open import open_result, open_unfinished
+    from sweep.file.open import open_result, open_unfinished
 
     return open_unfinished(output) if state.startswith("unfinished") else open_result(output)
 

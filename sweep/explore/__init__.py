@@ -4,13 +4,14 @@ Others may use
     `plan`            what a study will take
     `work_precision`  error against time of every method of a kernel
     `refine`          cells where they are needed
-    `notebook`        kernels; what a notebook shows of them and of a study
+    `scattered`       values between cells that lie anywhere in a box, and those of them that lie on lines
     `join`            two results as one
     `solver`          a study's kernel as a function of its axes
     `sensitivity`     which parameters decide an output
     `groups`          superfluous axes, outputs free of units
     `failing`         a study without the cells at which its kernel fails
 
-Behind `refine` is `refiner` (rounds of cuts), behind `work_precision`
-`reference` (what errors are against), behind `groups` `symmetries` (powers by which numbers may be multiplied).
+Behind `refine` are `refiner` (rounds of cuts), `judge`, `mesh` (cells joined to simplices) and `metric` (a box
+stretched to where an output bends), behind `work_precision` is `reference` (what errors are against), behind
+`groups` is `symmetries` (powers by which numbers may be multiplied).
 """

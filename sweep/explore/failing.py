@@ -12,8 +12,8 @@ from sweep.cells.grid import Grid
 from sweep.cells.sample import with_method
 from sweep.cells.schema import STATUS
 from sweep.cells.turns import usable_methods
+from sweep.errors import SweepError
 from sweep.study.model import Study, frozen
-from sweep.system.errors import SweepError
 
 EXTREMES = (1e-3, 1e-14)
 """Values of rtol at which cells are tried."""

@@ -17,7 +17,7 @@ from sweep.explore.symmetries import Scalings, scalings
 from sweep.study.model import Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.system.expected import require_dataset
+from sweep.words import require_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -16,12 +16,12 @@ from kernels.interface import Status
 from sweep.cells.fingerprint import difference, fingerprint, is_of_program
 from sweep.cells.grid import Grid
 from sweep.cells.schema import ANCILLARY, ERROR_BOUND, STATUS, cell_schema
+from sweep.errors import SweepError
+from sweep.file.open import in_memory, memory
 from sweep.results.diff import diff, two_results
-from sweep.results.open import in_memory, memory
 from sweep.runs.run import store_cells
 from sweep.study.mistakes import listed
 from sweep.study.model import SETTINGS, Axis, Block, Study, frozen
-from sweep.system.errors import SweepError
 
 PAIR = ("first", "second")
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from sweep.analysis.mesh import (
+from sweep.explore.mesh import (
     Array,
     Indices,
     Parabolas,
@@ -21,7 +21,7 @@ from sweep.analysis.mesh import (
     renewed,
     simplices,
 )
-from sweep.analysis.metric import stretch, stretched_by
+from sweep.explore.metric import stretch, stretched_by
 
 LEVELS = {1: 20, 2: 10, 3: 6}
 """How often a step of the first grid may be cut in two, by number of axes; a jump cannot be interpolated."""

@@ -26,16 +26,15 @@ from sweep.cells.reduce import strip_bytes
 from sweep.cells.sample import require_asked
 from sweep.cells.solve import Solver
 from sweep.cells.timing import Sample, row_partition, tolerated
+from sweep.errors import SweepError
 from sweep.explore.groups import advice_on, scaling
-from sweep.results.open import memory
+from sweep.file.frame import cuts_of, expected_size
+from sweep.file.open import memory
 from sweep.runs.isolate import Limits, Processes, limits_of
-from sweep.store.frame import cuts_of, expected_size
+from sweep.runs.pool import cores, whole_number
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.system.errors import SweepError
-from sweep.system.pool import cores, whole_number
-from sweep.system.progress import duration, quantity
-from sweep.system.table import columns, paragraph
+from sweep.words import columns, duration, paragraph, quantity
 
 if TYPE_CHECKING:
     from sweep.cells.guard import SolveCells

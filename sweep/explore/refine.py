@@ -24,16 +24,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels.interface import Status
-from sweep.analysis.mesh import Array
-from sweep.analysis.scattered import MOST_AXES, axes_of
 from sweep.cells.schema import STATUS, cell_schema
+from sweep.errors import SweepError
+from sweep.explore.mesh import Array
 from sweep.explore.refiner import Refinement, Refiner
+from sweep.explore.scattered import MOST_AXES, axes_of
+from sweep.file import disk
+from sweep.file.overwriting import check_target
 from sweep.study.model import Axis, Study
 from sweep.study.read import study as as_study
-from sweep.system import disk
-from sweep.system.errors import SweepError
-from sweep.system.expected import require_dataset
-from sweep.system.overwriting import check_target
+from sweep.words import as_path, require_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -96,7 +96,7 @@ def refine(
     names = [y] if isinstance(y, str) else list(y)
     _require(dataset, study, names, tolerance)
     options = {"workers": workers, "isolate": isolate, "cell_timeout": cell_timeout}
-    output = _Output(study, None if path is None else disk.as_path(path), force, options)
+    output = _Output(study, None if path is None else as_path(path), force, options)
     output.prepare(dataset)
     found = Refiner(dataset, output, names, tolerance, most_cells).refined()
     output.tidy()
@@ -137,7 +137,7 @@ class _Output:
             raise disk.refusal(error, self.path) from None
 
     def _check_earlier(self, path: Path) -> None:
-        from sweep.results.open import open_result
+        from sweep.file.open import open_result
 
         if path.exists() and not self.force:
             with open_result(path) as there:
@@ -158,7 +158,7 @@ class _Output:
 
     def written(self, axes: dict[str, Axis], arrays: dict[str, Any], attrs: dict[str, str]) -> xr.Dataset:
         """All cells, with these values of the axes, outputs and statuses, and further attributes."""
-        from sweep.results.open import in_memory
+        from sweep.file.open import in_memory
         from sweep.runs.run import store_cells
 
         whole = dataclasses.replace(self._study(axes), design="product" if len(axes) == 1 else "zip")

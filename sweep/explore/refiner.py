@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from sweep.analysis.mesh import Array, Indices
-from sweep.analysis.scattered import REFINED_TO, Box, heights, kinds
 from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.explore.judge import Judge, Judged
+from sweep.explore.mesh import Array, Indices
+from sweep.explore.scattered import REFINED_TO, Box, heights, kinds
 from sweep.study.model import Axis, Study, frozen
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep.analysis.loglog import is_logarithmic
+from sweep.errors import SweepError
+from sweep.laws.loglog import is_logarithmic
 from sweep.study import samples
 from sweep.study.model import Study
-from sweep.system.errors import SweepError
 
 SEED = 1
 """Of the resampling that tells the errors; SALib takes 0 for none."""

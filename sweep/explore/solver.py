@@ -17,11 +17,11 @@ from sweep.cells.guard import BadCell, Guard
 from sweep.cells.solve import Solver
 from sweep.cells.timing import LANES
 from sweep.cells.turns import Turn, turns
+from sweep.errors import SweepError
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.study.model import SETTINGS, Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.system.errors import SweepError
 
 TRIES = 5
 DEAR = 1e-3

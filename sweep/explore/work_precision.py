@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.grid import Grid, empty_cells
 from sweep.cells.sample import sampled, solved, with_method
+from sweep.errors import SweepError
 from sweep.explore.failing import without_failing
 from sweep.explore.plan import small_duration
 from sweep.explore.reference import Reference, best_reference, errors, given_reference
@@ -27,8 +28,7 @@ from sweep.study.mistakes import did_you_mean
 from sweep.study.model import Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.system.errors import SweepError
-from sweep.system.table import columns, page, paragraph
+from sweep.words import columns, page, paragraph
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,4 +1,4 @@
-"""A finished or growing file as a Dataset.
+"""What a result says, and what is made of it: statuses, choices, differences, exports, lists.
 
-Others may use `open`, `stored`, `statuses`, `verify`, `filter`, `export`, `units`, `diff`, `listing`.
+Others may use `statuses`, `filter`, `export`, `units`, `diff`, `listing`.
 """

@@ -11,10 +11,10 @@ import numpy as np
 import xarray as xr
 
 from sweep.cells.schema import ANCILLARY, STATUS
+from sweep.errors import SweepError
 from sweep.results.statuses import flag_words
 from sweep.study.mistakes import listed
-from sweep.system.errors import SweepError
-from sweep.system.table import columns
+from sweep.words import columns
 
 NUMBERS_AT_ONCE = 1 << 22
 

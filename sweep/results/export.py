@@ -15,13 +15,12 @@ import numpy as np
 import xarray as xr
 
 from sweep.cells.reduce import BY_METHOD, BY_STATUS
+from sweep.errors import SweepError, missing
+from sweep.file import disk
+from sweep.file.overwriting import EXPORTED, check_target
 from sweep.results.statuses import flag_words, is_summary
 from sweep.study.mistakes import listed
-from sweep.system import disk
-from sweep.system.errors import SweepError, missing
-from sweep.system.expected import require_dataset
-from sweep.system.overwriting import EXPORTED, check_target
-from sweep.system.table import cell
+from sweep.words import as_path, cell, require_dataset
 
 ROWS = 65536
 """Rows of csv in memory at a time."""
@@ -70,7 +69,7 @@ def export(
     2.0,1.0,1.0,0.0,0.0,0.0,1.0,0.0,1.0,5.524901443102082,nan,OK,closed
     """
     require_dataset("export", dataset)
-    target = disk.as_path(path)
+    target = as_path(path)
     kind = target.suffix.lower()
     if kind not in WRITERS:
         found = f'"{target.suffix}"' if target.suffix else "no suffix"

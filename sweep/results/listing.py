@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kernels.interface import KINDS
-from sweep.results.open import changed, open_result
+from sweep.errors import SweepError
+from sweep.file.open import changed, open_result
 from sweep.results.statuses import account, kind_of, tally
-from sweep.system import disk
-from sweep.system.errors import SweepError
-from sweep.system.table import columns
+from sweep.words import as_path, columns
 
 UNFINISHED = re.compile(r"(.+\.(?:h5|nc))\.(?:parts|unfinished)")
 """What a sweep that still runs has beside its output."""
@@ -95,7 +94,7 @@ def list_results(folder: str | os.PathLike[str] = ".") -> Listing:
     >>> found.question, found.cells, found.done, found.statuses
     ('Why?', 2, 1.0, {'OK': 2})
     """
-    place = disk.as_path(folder)
+    place = as_path(folder)
     if not place.is_dir():
         raise SweepError(f"{place}: there is no such folder")
     names = {entry.name for entry in place.iterdir()}

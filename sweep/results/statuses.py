@@ -16,7 +16,7 @@ from sweep.cells.schema import METHOD_USED, STATUS
 if TYPE_CHECKING:
     import xarray as xr
 
-    from sweep.results.stored import Stored, StoredColumn
+    from sweep.file.stored import Stored, StoredColumn
 
     Cells: TypeAlias = xr.Dataset | Stored
 

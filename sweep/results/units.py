@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from sweep.study.mistakes import Mistakes, did_you_mean
 from sweep.study.units import UnitMistake, scale
-from sweep.system.expected import require_dataset
+from sweep.words import require_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

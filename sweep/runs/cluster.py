@@ -20,11 +20,11 @@ from typing import Any
 
 import distributed
 
+from sweep.errors import Incomplete, SweepError
 from sweep.runs import worker
+from sweep.runs.pool import TICK, CtrlC
+from sweep.runs.progress import passed
 from sweep.runs.worker import Answer, Assignment, Plugin
-from sweep.system.errors import Incomplete, SweepError
-from sweep.system.pool import TICK, CtrlC
-from sweep.system.progress import passed
 
 CONNECT_SECONDS = 10
 ASK_SECONDS = 2.0

@@ -17,16 +17,16 @@ import numpy as np
 from distributed import KilledWorker
 
 from sweep.cells.block import Blocks, Computed
+from sweep.errors import SweepError
+from sweep.file.store import Shared
 from sweep.runs.cluster import Cluster
 from sweep.runs.extend import Precomputed, Reused
+from sweep.runs.forecast import Forecast
 from sweep.runs.isolate import Limits, kernel_paths
+from sweep.runs.log import log
+from sweep.runs.pool import CtrlC, through
 from sweep.runs.task import Task
 from sweep.runs.worker import Answer, Assignment, Sent, digest
-from sweep.store.store import Shared
-from sweep.system.errors import SweepError
-from sweep.system.forecast import Forecast
-from sweep.system.log import log
-from sweep.system.pool import CtrlC, through
 
 TASK_SECONDS = 0.5
 """Blocks shorter than this go to a worker several at a time;"""

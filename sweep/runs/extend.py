@@ -20,12 +20,12 @@ from sweep.cells.fingerprint import is_of_program
 from sweep.cells.grid import Grid
 from sweep.cells.partition import box_slices
 from sweep.cells.schema import METHOD_USED, STATUS, Column, columns
-from sweep.results.open import unreadable
+from sweep.errors import SweepError
+from sweep.file.layout import DAMAGE
+from sweep.file.open import unreadable
+from sweep.file.reading import StoredFile
 from sweep.results.statuses import flat_pieces
-from sweep.store.layout import DAMAGE
-from sweep.store.reading import StoredFile
 from sweep.study.model import Axis, Study
-from sweep.system.errors import SweepError
 
 SAMPLE = 8
 """Cells of every status and method that are computed again where another version has computed the result."""

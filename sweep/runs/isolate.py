@@ -22,12 +22,12 @@ from typing import Any, TypeVar
 from sweep.cells.grid import Cells, Grid
 from sweep.cells.guard import Unsolved, told
 from sweep.cells.schema import STATUS, cells_of
-from sweep.results.open import memory
+from sweep.errors import SweepError
+from sweep.file.open import memory
 from sweep.runs import isolated
 from sweep.runs.isolated import Answer
 from sweep.study.model import Study
-from sweep.system.errors import SweepError
-from sweep.system.progress import seconds_of
+from sweep.words import seconds_of
 
 CELL_SECONDS = 60.0
 """What a cell may take, where nobody says otherwise;"""

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from sweep.cells.fingerprint import difference
 from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import row_blocks
-from sweep.results.open import stored_fingerprint
-from sweep.results.verify import check_whole, verify
+from sweep.errors import SweepError
+from sweep.file.layout import Layout
+from sweep.file.open import stored_fingerprint
+from sweep.file.store import Store
+from sweep.file.verify import check_whole, verify
 from sweep.runs.extend import has_failed, obstacle
 from sweep.runs.task import Task
-from sweep.store.layout import Layout
-from sweep.store.store import Store
-from sweep.system.errors import SweepError
 
 EXTENDABLE = (
     "where its axes have only got more values, --extend computes the new cells alone; those of another version it "

@@ -14,21 +14,21 @@ from sweep.cells.fingerprint import fingerprint
 from sweep.cells.output_schema import gathered
 from sweep.cells.partition import row_blocks
 from sweep.cells.sample import require_asked
-from sweep.results.open import in_memory, memory, open_result, open_unfinished
+from sweep.errors import SweepError
+from sweep.file.open import in_memory, memory, open_result, open_unfinished
+from sweep.file.store import lock_of, unfinished_of
 from sweep.runs import resume
 from sweep.runs.extend import TAKEN_OVER, Precomputed
 from sweep.runs.isolate import limits_of
+from sweep.runs.pool import cores, whole_number
+from sweep.runs.progress import TimeUp, deadline, stream_of
 from sweep.runs.session import Session, Solve, joined
 from sweep.runs.task import Task
 from sweep.runs.to_file import run_to_file
-from sweep.store.store import lock_of, unfinished_of
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.study.read import KEYS, Given
 from sweep.study.read import study as as_study
-from sweep.system import disk
-from sweep.system.errors import SweepError
-from sweep.system.pool import cores, whole_number
-from sweep.system.progress import TimeUp, deadline, stream_of
+from sweep.words import as_path
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -217,7 +217,7 @@ def _task(
 
 
 def _checked(path: str | os.PathLike[str]) -> Path:
-    output = Path(os.path.realpath(disk.as_path(path)))
+    output = Path(os.path.realpath(as_path(path)))
     if not output.parent.is_dir():
         raise SweepError(f"{path}: there is no folder {output.parent}")
     return output

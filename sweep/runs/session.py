@@ -31,15 +31,15 @@ from sweep.cells.partition import Partition, boxes, row_blocks
 from sweep.cells.schema import Schema
 from sweep.cells.solve import Solver
 from sweep.cells.timing import UNSAMPLED, Sample, row_partition
+from sweep.errors import missing
+from sweep.file.store import Shared
 from sweep.runs.extend import Precomputed, Reused
+from sweep.runs.forecast import Forecast
 from sweep.runs.isolate import Processes
+from sweep.runs.log import log
+from sweep.runs.pool import BufferPool, Stopper, cores, each
+from sweep.runs.progress import Progress, TimeUp, passed
 from sweep.runs.task import Task
-from sweep.store.store import Shared
-from sweep.system.errors import missing
-from sweep.system.forecast import Forecast
-from sweep.system.log import log
-from sweep.system.pool import BufferPool, Stopper, cores, each
-from sweep.system.progress import Progress, TimeUp, passed
 
 if TYPE_CHECKING:
     from sweep.runs.cluster import Cluster

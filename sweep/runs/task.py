@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from sweep.runs.isolate import Limits
+from sweep.runs.progress import Progress
 from sweep.study.model import Study
-from sweep.system.progress import Progress
 
 
 @dataclass(frozen=True)

@@ -8,21 +8,22 @@ from typing import TYPE_CHECKING, Any
 from sweep.cells.block import Found
 from sweep.cells.output_schema import gathered
 from sweep.cells.partition import row_blocks
-from sweep.results.open import stored_fingerprint
-from sweep.results.verify import check_whole
+from sweep.errors import SweepError
+from sweep.file import disk
+from sweep.file.ending import Gather
+from sweep.file.frame import Frame, cuts_of
+from sweep.file.open import stored_fingerprint
+from sweep.file.reading import StoredFile
+from sweep.file.store import Store, opened
+from sweep.file.verify import check_whole
 from sweep.runs import resume
 from sweep.runs.extend import Precomputed, Retried, Reused, is_of_another_version
+from sweep.runs.pool import BufferPool, CtrlC, Terminated
+from sweep.runs.progress import TimeUp
 from sweep.runs.session import Session, Solve, joined
 from sweep.runs.task import Task
-from sweep.store.ending import Gather
-from sweep.store.frame import Frame, cuts_of
-from sweep.store.reading import StoredFile
-from sweep.store.store import Store, opened
 from sweep.study.model import Study
-from sweep.system import disk
-from sweep.system.errors import SweepError
-from sweep.system.pool import BufferPool, CtrlC, Terminated
-from sweep.system.progress import TimeUp, quantity
+from sweep.words import quantity
 
 if TYPE_CHECKING:
     from sweep.runs.cluster import Cluster

@@ -26,11 +26,11 @@ from sweep.cells.guard import BadCell, Guard
 from sweep.cells.partition import Partition
 from sweep.cells.schema import Column
 from sweep.cells.solve import Solver
+from sweep.errors import SweepError
+from sweep.file import disk
+from sweep.file.store import Shared
 from sweep.runs.isolate import Limits, Processes
-from sweep.store.store import Shared
 from sweep.study.model import Study
-from sweep.system import disk
-from sweep.system.errors import SweepError
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ Others may use
     `studies`  what comes with foliot, and copies to work on
     `compare`, `law_charts`   which law: as text, csv and picture
     `kernels`  what can be swept, and a study to begin with
+    `notebook` kernels; what a notebook shows of them and of a study
 
 `view` chooses and letters what `charts` draws.
 """

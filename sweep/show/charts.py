@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep.analysis.loglog import is_logarithmic, spans_decades
+from sweep.errors import SweepError, missing
+from sweep.file import disk
+from sweep.file.overwriting import DRAWN
+from sweep.laws.loglog import is_logarithmic, spans_decades
 from sweep.show.view import View, coordinate, edges, label, setting, view
-from sweep.system import disk
-from sweep.system.errors import SweepError, missing
-from sweep.system.overwriting import DRAWN
 
 try:
     import matplotlib

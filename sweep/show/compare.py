@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sweep.errors import SweepError
+from sweep.file import disk
 from sweep.show.laws import output_of
-from sweep.system import disk
-from sweep.system.errors import SweepError
-from sweep.system.table import cell, columns, page, paragraph
+from sweep.words import cell, columns, page, paragraph
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,7 +26,7 @@ NOTE = (
 
 def comparison(dataset: xr.Dataset, y: str | None, x: str, windows: Sequence[Sequence[float]] = ()) -> xr.Dataset:
     """`compare_laws` of one line of a result. Raises SweepError, also where other axes are left."""
-    from sweep.analysis.compare import compare_laws
+    from sweep.laws.compare import compare_laws
 
     y = output_of(dataset, y)
     if len(windows) > 1:

@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from sweep.system.errors import SweepError
-from sweep.system.log import log_path, read_lines
+from sweep.errors import SweepError
+from sweep.runs.log import log_path, read_lines
 
 LOOK_SECONDS = 0.5
 SILENT_SECONDS = 600.0

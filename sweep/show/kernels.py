@@ -9,10 +9,10 @@ from typing import Any
 
 from kernels import catalogue
 from kernels.interface import KINDS, Field, Kernel, Method, Status
+from sweep.errors import SweepError
 from sweep.study.kernel_lookup import load_kernel
 from sweep.study.mistakes import limits, listed, quoted
-from sweep.system.errors import SweepError
-from sweep.system.table import columns, page, paragraph, section
+from sweep.words import columns, page, paragraph, section
 
 
 def catalogue_text() -> str:

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sweep.cells.schema import ANCILLARY, STATUS
+from sweep.errors import SweepError
+from sweep.file import disk
 from sweep.show.view import preferred
 from sweep.study.mistakes import did_you_mean, listed
-from sweep.system import disk
-from sweep.system.errors import SweepError
-from sweep.system.table import cell, columns, page
+from sweep.words import cell, columns, page
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,8 +87,8 @@ def laws(
     noise: bool | str | None = None,
 ) -> Laws:
     """What `sweep fit` finds; `y` and `noise` as of `output_of` and `fit_exponent`. Raises SweepError."""
-    from sweep.analysis.curves import stated_error
-    from sweep.analysis.lines import crossover, fit_exponent
+    from sweep.laws.curves import stated_error
+    from sweep.laws.lines import crossover, fit_exponent
 
     y = output_of(dataset, y)
     if len(windows) > 2:
@@ -132,7 +132,7 @@ def _bend(
     y: xr.DataArray, x: str, window: tuple[float, float] | None, confidence: float, noise: bool | str | None
 ) -> xr.Dataset | None:
     """Two laws, where any line has points enough for them and is not straight."""
-    from sweep.analysis.two_laws import FEWEST_POINTS, fit_two_laws
+    from sweep.laws.two_laws import FEWEST_POINTS, fit_two_laws
 
     if y.sizes[str(y[x].dims[0])] < FEWEST_POINTS:
         return None

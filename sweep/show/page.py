@@ -14,12 +14,12 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sweep.errors import SweepError
+from sweep.file import disk
+from sweep.file.overwriting import PAGE
 from sweep.results.statuses import is_summary
 from sweep.show.laws import explanation, law_rows
 from sweep.show.text import Rows, head, outputs_of, sections
-from sweep.system import disk
-from sweep.system.errors import SweepError
-from sweep.system.overwriting import PAGE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -150,7 +150,7 @@ def _picture(dataset: xr.Dataset, name: str) -> str:
 
 def _exponents(dataset: xr.Dataset) -> Iterator[str]:
     """Power laws along the first logarithmic axis, of outputs that have a unit."""
-    from sweep.analysis.loglog import is_logarithmic
+    from sweep.laws.loglog import is_logarithmic
 
     if is_summary(dataset):
         return

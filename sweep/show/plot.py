@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
+from sweep.errors import SweepError
 from sweep.show.charts import precision_figure, result_figure, save
 from sweep.show.law_charts import laws_figure
-from sweep.system.errors import SweepError
-from sweep.system.expected import require_dataset
+from sweep.words import require_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,9 +6,9 @@ import re
 import shutil
 from pathlib import Path
 
+from sweep.errors import SweepError
 from sweep.study.mistakes import did_you_mean, listed
-from sweep.system.errors import SweepError
-from sweep.system.table import columns
+from sweep.words import columns
 
 HERE = Path(__file__).parents[1]
 FOLDERS = (HERE / "_studies", HERE.parent / "studies")

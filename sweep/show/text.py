@@ -24,7 +24,7 @@ from sweep.results.statuses import (
 )
 from sweep.show.follow import reasons
 from sweep.study.model import short
-from sweep.system.table import columns, page, paragraph, section
+from sweep.words import columns, page, paragraph, section
 
 if TYPE_CHECKING:
     import xarray as xr

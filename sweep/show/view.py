@@ -12,11 +12,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from sweep.analysis.loglog import is_logarithmic
-from sweep.analysis.scattered import MOST_AXES, Box, axes_of, interpolated
+from sweep.errors import SweepError
+from sweep.explore.scattered import MOST_AXES, Box, axes_of, interpolated
+from sweep.laws.loglog import is_logarithmic
 from sweep.results.statuses import flag_words
 from sweep.study.mistakes import did_you_mean
-from sweep.system.errors import SweepError
 
 GREEK = frozenset(
     (

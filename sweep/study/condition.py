@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from kernels.interface import Field, Kernel
+from sweep.errors import SweepError
 from sweep.study.mistakes import did_you_mean, listed
 from sweep.study.model import AUTO
 from sweep.study.units import UnitMistake, exponents, scale
-from sweep.system.errors import SweepError
 
 COMPARE: dict[type, Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,

@@ -22,12 +22,12 @@ from typing import Any
 import numpy as np
 
 from kernels.interface import Field
+from sweep.errors import SweepError
 from sweep.study import samples
 from sweep.study.field_parser import EXAMPLE, SAMPLED_EXAMPLE, FieldParser
 from sweep.study.mistakes import Mistakes, listed, show
 from sweep.study.model import Axis, Block
 from sweep.study.spacing import LARGEST_AXIS
-from sweep.system.errors import SweepError
 
 PLAIN = ("product", "zip")
 DESIGNS = (*PLAIN, *samples.GENERATORS)

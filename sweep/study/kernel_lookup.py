@@ -8,8 +8,8 @@ from pathlib import Path
 
 from kernels import catalogue
 from kernels.interface import Kernel, load
+from sweep.errors import SweepError
 from sweep.study.mistakes import did_you_mean, listed, show
-from sweep.system.errors import SweepError
 
 RESERVED = ("status", "method_used", "error_bound", "method", "rtol", "cell")
 """Names that a result has in any case."""

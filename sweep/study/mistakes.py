@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from kernels.interface import Field
-from sweep.system.errors import Mistake, StudyError
+from sweep.errors import Mistake, StudyError
 
 
 class Mistakes:

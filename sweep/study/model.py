@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.interface import Field, Kernel, Method
-from sweep.system.errors import SweepError
+from sweep.errors import SweepError
 
 FORMAT = 1
 LONGEST_LIST = 1000

@@ -9,11 +9,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from sweep.errors import Mistake, StudyError, SweepError
 from sweep.study.mistakes import did_you_mean, listed, show
 from sweep.study.model import Axis, Study
 from sweep.study.study_parser import KEYS, StudyParser
-from sweep.system.disk import as_path
-from sweep.system.errors import Mistake, StudyError, SweepError
+from sweep.words import as_path
 
 __all__ = ["KEYS", "Axis", "Given", "Study", "study"]
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.system.errors import missing
+from sweep.errors import missing
 
 Points = NDArray[np.float64]
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from kernels import catalogue
 from kernels.interface import Field, Kernel
+from sweep.errors import SweepError
 from sweep.study.condition import CellCondition
 from sweep.study.designs import SMALLEST_RTOL, DesignParser, axes_named
 from sweep.study.field_parser import FieldParser
@@ -19,7 +20,6 @@ from sweep.study.kernel_lookup import load_kernel
 from sweep.study.mistakes import Mistakes, did_you_mean, limits, listed, nearest
 from sweep.study.model import AUTO, SETTINGS, Axis, Block, Study, Summary, differs, frozen
 from sweep.study.summary import SummaryParser
-from sweep.system.errors import SweepError
 
 KEYS = (
     "title", "question", "kernel", "method", "rtol", "outputs", "design", "axes", "blocks", "where", "fixed", "along",

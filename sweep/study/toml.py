@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from sweep.errors import SweepError
 from sweep.study.model import Axis, Study
-from sweep.system.errors import SweepError
-from sweep.system.expected import kind
+from sweep.words import kind
 
 BARE = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 """Letters of a key that needs no quotes."""

@@ -14,8 +14,8 @@ from bokeh.events import RangesUpdate, Tap
 
 from kernels.interface import Status
 from sweep.cells.schema import STATUS
+from sweep.errors import SweepError
 from sweep.show.view import View, coordinate, evened, preferred, setting
-from sweep.system.errors import SweepError
 from sweep.view import region
 from sweep.view.picture import Picture, Scales, status_colour
 from sweep.view.slices import Choice, Range, along, nearest, number_axes, other_axes, outputs, row, shown

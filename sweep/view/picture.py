@@ -11,7 +11,7 @@ from bokeh.palettes import Viridis256
 from bokeh.plotting import figure
 from numpy.typing import NDArray
 
-from sweep.analysis.loglog import is_logarithmic, spans_decades
+from sweep.laws.loglog import is_logarithmic, spans_decades
 from sweep.show.charts import COLOURS
 from sweep.show.view import View, coordinate, edges
 from sweep.view.slices import Range, cell_numbers

@@ -12,11 +12,11 @@ from typing import Any
 
 import xarray as xr
 
-from sweep.analysis.loglog import is_logarithmic
+from sweep.errors import SweepError
+from sweep.laws.loglog import is_logarithmic
 from sweep.results.export import export
 from sweep.study.model import SETTINGS, Axis, Study
 from sweep.study.toml import to_toml
-from sweep.system.errors import SweepError
 from sweep.view.slices import PLACE, Choice, Range, along, part, shown
 
 MOST_ROWS = 1_000_000

@@ -8,8 +8,8 @@ import socket
 from pathlib import Path
 from typing import Any
 
-from sweep.results.open import open_result
-from sweep.system.errors import SweepError, missing
+from sweep.errors import SweepError, missing
+from sweep.file.open import open_result
 
 ADDRESS = "127.0.0.1"
 """Nobody on another machine can reach it."""

@@ -10,11 +10,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from sweep.analysis.exponents import local_exponent
 from sweep.cells.schema import STATUS
+from sweep.errors import SweepError
+from sweep.laws.exponents import local_exponent
 from sweep.results.statuses import flag_words
 from sweep.show.view import ANCILLARY, View, coordinate, edges, is_number_axis, view
-from sweep.system.errors import SweepError
 
 PLACE = "place along "
 """Coordinates of a slice that say where its cells are in the result."""

@@ -13,11 +13,11 @@ import xarray as xr
 from hypothesis import strategies as st
 
 import sweep
+from sweep.errors import SweepError
+from sweep.file import disk
+from sweep.file.reading import StoredFile
+from sweep.file.store import Store, unfinished_of
 from sweep.runs.run import run
-from sweep.store.reading import StoredFile
-from sweep.store.store import Store, unfinished_of
-from sweep.system import disk
-from sweep.system.errors import SweepError
 
 HEIGHTS = [-1.0, 1.0, 2.0, 5.0, float("nan"), 13.5, 100.0]
 
@@ -60,7 +60,7 @@ def interrupted(study, output):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Store, "put", failing)
-        patch.setattr("sweep.system.forecast.Forecast.order", lambda self: iter(range(self.blocks)))
+        patch.setattr("sweep.runs.forecast.Forecast.order", lambda self: iter(range(self.blocks)))
         with pytest.raises(SweepError, match="stop here"):
             quiet(study, output, block_cells=5, workers=1)
 

@@ -20,7 +20,7 @@ import xarray as xr
 import sweep
 from sweep import cli
 from sweep.command.outcome import explained
-from sweep.system.errors import SweepError
+from sweep.errors import SweepError
 
 STUDY = """# How fast does a stone fall?
 title = "Falling stones"

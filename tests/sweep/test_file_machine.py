@@ -32,7 +32,7 @@ from study_interpreter import interpreted
 
 import sweep
 from kernels.interface import Status
-from sweep.system import disk
+from sweep.file import disk
 
 CALLS = ("open_file", "write", "reserve", "fsync", "sync_numbers", "rename", "remove")
 FAULTS = {"open_file": errno.EMFILE, "write": errno.ENOSPC, "reserve": errno.ENOSPC}

@@ -160,7 +160,7 @@ def test_a_join_of_other_cells_or_labels_is_never_taken_for_the_one_that_is_ther
         assert path.read_bytes() == whole
         joined(other, labels, force=True)
         with monkeypatch.context() as patch:
-            patch.setattr("sweep.system.disk.rename", killed_at(begun))
+            patch.setattr("sweep.file.disk.rename", killed_at(begun))
             with pytest.raises(KeyboardInterrupt):
                 joined(b, path=begun)
         with pytest.raises(sweep.SweepError, match="--force"):

@@ -16,8 +16,8 @@ from running import flip, interrupted, kept, keys, place, quiet, tall
 
 import sweep
 from sweep.cli import main
-from sweep.store.reading import StoredFile
-from sweep.store.store import unfinished_of
+from sweep.file.reading import StoredFile
+from sweep.file.store import unfinished_of
 
 BLOCK, CELLS = 11, 33
 PIECES = st.fixed_dictionaries({}, optional={"v0": keys(3), "height": keys(11), "phase": keys(3)})

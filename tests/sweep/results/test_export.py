@@ -14,7 +14,7 @@ import xarray as xr
 from running import environment
 
 import sweep
-from sweep.system.errors import SweepError
+from sweep.errors import SweepError
 
 
 def result():
@@ -96,7 +96,7 @@ def test_an_export_never_replaces_its_source(tmp_path):
 KILLED = """
 import os, signal, sys
 import sweep
-from sweep.system import disk
+from sweep.file import disk
 disk.sync_tree = lambda path: os.kill(os.getpid(), signal.SIGKILL)
 sweep.export(sweep.run(kernel="foliot", axes={"mu": [1.0]}, fixed={"phi0": 1.0, "a": 1.0}), sys.argv[1])
 """

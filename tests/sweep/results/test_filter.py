@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import sweep
-from sweep.system.errors import SweepError
+from sweep.errors import SweepError
 
 AXES = {"height": [-1.0, 1.0, 2.0, 3.0], "v0": [0.0, 1.0]}
 RESULT = sweep.run(kernel="toy:KERNEL", allow_import=True, axes=AXES, along={"phase": {"num": 3}})

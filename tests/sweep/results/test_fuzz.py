@@ -17,8 +17,8 @@ from running import quiet, tall
 
 import sweep
 from sweep.cli import main
-from sweep.store import probe
-from sweep.system.errors import StudyError, SweepError
+from sweep.errors import StudyError, SweepError
+from sweep.file import probe
 
 SHARED = [HealthCheck.function_scoped_fixture]
 

@@ -15,8 +15,8 @@ from kernels.interface import Status
 from sweep import SweepError, open_result, run
 from sweep.cells.fingerprint import fingerprint
 from sweep.cli import main
-from sweep.results.open import changed
-from sweep.store.store import unfinished_of
+from sweep.file.open import changed
+from sweep.file.store import unfinished_of
 from sweep.study.model import Study
 
 
@@ -94,7 +94,7 @@ def test_a_fault_of_the_program_is_not_told_as_a_change_of_the_result(name, requ
 
 def test_large_results_come_in_pieces_and_are_the_same(unfinished, stored, monkeypatch):
     few, whole = open_result(unfinished).load(), open_result(stored).load()
-    monkeypatch.setattr("sweep.results.open.memory", lambda: 100)
+    monkeypatch.setattr("sweep.file.open.memory", lambda: 100)
     for path, expected in ((unfinished, few), (stored, whole)):
         found = open_result(path)
         assert found["drop"].chunks is not None

@@ -11,12 +11,12 @@ from toy_studies import build
 import sweep
 from kernels.interface import Status
 from sweep.cli import main
+from sweep.file.stored import Stored
 from sweep.results.statuses import (
     account,
     count_statuses,
     summary_text,
 )
-from sweep.results.stored import Stored
 from sweep.study.toml import to_toml
 
 

@@ -17,11 +17,11 @@ import sweep
 from kernels.interface import Status
 from sweep.cells.grid import Cells
 from sweep.cells.guard import Guard
+from sweep.errors import CELLS_FAILED, MISTAKE, SweepError
+from sweep.file.store import unfinished_of
 from sweep.results.statuses import account
 from sweep.runs import isolate
 from sweep.runs.isolate import Limits, Processes
-from sweep.store.store import unfinished_of
-from sweep.system.errors import CELLS_FAILED, MISTAKE, SweepError
 
 SOUND = 100
 BAD = {"bad:RAISING": [11.0], "bad:DYING": [11.0, 22.0, 33.0], "bad:WORST": [11.0, 22.0, 33.0, 44.0, 55.0, 66.0]}

@@ -16,9 +16,9 @@ from running import kept, quiet, same, tall
 import sweep
 from sweep.cli import main
 from sweep.command.outcome import explained
+from sweep.errors import INCOMPLETE, SweepError
 from sweep.results.statuses import account
 from sweep.runs import cluster as clusters
-from sweep.system.errors import INCOMPLETE, SweepError
 
 # a lost connection is what some of these tests are about; dask leaves its sockets to the collector
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")

@@ -11,12 +11,12 @@ from running import kept, quiet, same
 
 import sweep
 from sweep.cli import main
-from sweep.results.open import open_result
-from sweep.results.verify import verify
-from sweep.store.store import Store, unfinished_of
+from sweep.errors import COMPLETE, MISTAKE
+from sweep.file import disk
+from sweep.file.open import open_result
+from sweep.file.store import Store, unfinished_of
+from sweep.file.verify import verify
 from sweep.study.toml import to_toml
-from sweep.system import disk
-from sweep.system.errors import COMPLETE, MISTAKE
 
 MEGABYTES = 4
 

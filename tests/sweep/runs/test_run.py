@@ -20,9 +20,9 @@ from running import environment, fail_on, flip, interrupted, kept, place, quiet,
 import sweep
 from kernels.interface import Status
 from sweep.cli import main
-from sweep.store.store import unfinished_of
-from sweep.system import disk
-from sweep.system.errors import SweepError
+from sweep.errors import SweepError
+from sweep.file import disk
+from sweep.file.store import unfinished_of
 
 
 @pytest.fixture

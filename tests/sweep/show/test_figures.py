@@ -7,9 +7,9 @@ import pytest
 import xarray as xr
 from matplotlib.colors import LogNorm
 
+from sweep.errors import SweepError
 from sweep.show.plot import plot
 from sweep.show.view import SIDE, evened
-from sweep.system.errors import SweepError
 
 FLAGS = {"flag_values": np.array([0, 1, 64, 127], np.int8), "flag_meanings": "OK INACCURATE BAD_INPUT PENDING"}
 UNITS = {"mu": "rad/s^2", "a": "1/s", "R": "rad/s^2", "phase": "1"}

@@ -9,11 +9,11 @@ from toy_studies import build
 
 import sweep
 from kernels.interface import Status
+from sweep.errors import SweepError
 from sweep.show.compare import comparison, comparison_text, write_comparison
 from sweep.show.follow import follow
 from sweep.show.laws import laws, laws_text, pick, write_laws
 from sweep.show.text import result_text
-from sweep.system.errors import SweepError
 
 X = np.geomspace(1e-4, 1e4, 33)
 BENT = X**-1 + X**-0.25

@@ -1,0 +1,292 @@
+"""Values between cells that lie anywhere in a box: straight lines between neighbours, as pictures draw them.
+
+Neighbours are the corners of the simplices (intervals, triangles, tetrahedra) of Delaunay's triangulation of the cells,
+in coordinates in which each axis reaches from 0 to 1, in logarithms where it reaches from a positive value to twice
+that. Outputs that are positive everywhere are taken in logarithms too. For each output the box is first stretched to
+where it bends (`metric`), so that cells are joined along what it does not depend on.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay
+
+from kernels.interface import FIRST_REFUSAL, Status
+from sweep.errors import SweepError
+from sweep.explore.mesh import (
+    Array,
+    Indices,
+    are_too_few,
+    interpolation_errors,
+    parabolas,
+    simplices,
+    tilted,
+    with_beyond,
+)
+from sweep.explore.metric import stretch
+from sweep.words import require_dataset
+
+LOGARITHMIC = 1.999
+"""Ratio of its ends from which on a positive axis is taken in logarithms; below, it makes no difference."""
+OUTSIDE = 1e-9
+"""How far out of a simplex a point may be by rounding."""
+FEWEST_ON_A_LINE = 5
+MOST_AXES = 5
+STATUS, ERROR_BOUND = "status", "error_bound"
+REFINED_TO = "refined_to"
+"""Attribute of a refined result: JSON, the tolerance of each output that was refined."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """Coordinates in which each axis of some cells reaches from 0 to 1."""
+
+    names: tuple[str, ...]
+    low: Array
+    high: Array
+    logarithmic: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, values: Mapping[str, Array]) -> Box:
+        """The box of cells with these values of their axes."""
+        low = np.array([v.min() for v in values.values()])
+        high = np.array([v.max() for v in values.values()])
+        return cls(tuple(values), low, high, (low > 0) & (high >= LOGARITHMIC * low))
+
+    def points(self, values: Mapping[str, Array]) -> Array:
+        """Places (n, axes) of axis values."""
+        columns = [self._place(k, np.asarray(values[name], dtype=np.float64)) for k, name in enumerate(self.names)]
+        return np.stack(columns, axis=1)
+
+    def _place(self, k: int, values: Array) -> Array:
+        low, high = self.low[k], self.high[k]
+        if self.logarithmic[k]:
+            with np.errstate(invalid="ignore", divide="ignore"):
+                place: Array = np.log(values / low) / math.log(high / low)
+            return place
+        found: Array = (values - low) / (high - low)
+        return found
+
+    def values(self, k: int, places: Array) -> Array:
+        """Values of axis k at places."""
+        low, high = self.low[k], self.high[k]
+        found: Array = low * (high / low) ** places if self.logarithmic[k] else low + places * (high - low)
+        return found
+
+
+def is_positive(values: Array) -> bool:
+    """Whether all finite values are positive, so that they are interpolated in logarithms."""
+    finite = values[np.isfinite(values)]
+    return bool(finite.size and finite.min() > 0)
+
+
+def heights(values: Array) -> Array:
+    """An output as it is interpolated: in logarithms where it is positive everywhere, else over its largest size."""
+    if is_positive(values):
+        with np.errstate(invalid="ignore"):
+            found: Array = np.log(values)
+        return found
+    return values / _size(values)
+
+
+def _size(values: Array) -> float:
+    return float(abs(values[np.isfinite(values)]).max(initial=0.0)) or 1.0
+
+
+def axes_of(dataset: xr.Dataset) -> list[str]:
+    """Number axes of cells that lie anywhere in a box, all corners of which are cells; [] of any other dataset."""
+    if STATUS not in dataset or dataset[STATUS].ndim != 1 or dataset[STATUS].dims[0] in dataset.coords:
+        return []
+    dim = dataset[STATUS].dims[0]
+    names = [str(n) for n, c in dataset.coords.items() if c.dims == (dim,) and c.dtype.kind == "f"]
+    names = [name for name in names if np.ptp(dataset[name].values) > 0]
+    if not 2 <= len(names) <= MOST_AXES:
+        return []
+    places = Box.of({name: dataset[name].values for name in names}).points({n: dataset[n].values for n in names})
+    corners = np.unique(places[((places == 0) | (places == 1)).all(axis=1)], axis=0)
+    return names if len(corners) == 2 ** len(names) else []
+
+
+def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array]) -> xr.Dataset:
+    """Outputs on an even or uneven grid of values, between the cells of a refined result.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        From `refine`, of two axes and more.
+    at : mapping of axis to values
+        Values of every axis.
+
+    Returns
+    -------
+    Dataset
+        Outputs of one value a cell, and the status of the nearest cell around, over the axes in the order of `at`. NaN
+        outside of the cells, and beside cells without a value. INACCURATE, with `error_bound`, where straight lines
+        miss the tolerance of the refinement as far as the cells around tell, and across borders of statuses, where
+        nothing tells how far they are off.
+
+    Raises
+    ------
+    SweepError
+        The cells do not fill a box, or an axis is missing or not there.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0}}
+    >>> ds = sweep.run(**foliot, axes={"mu": [0.1, 1.0, 10.0], "a": [0.5, 1.0, 2.0]})
+    >>> fine = sweep.refine(ds, "period", 1e-2)
+    >>> sweep.interpolated(fine.dataset, {"mu": [0.3, 3.0], "a": [0.7]}).sizes["mu"]
+    2
+    """
+    require_dataset("interpolated", dataset, "refine")
+    names = axes_of(dataset)
+    if not names:
+        raise SweepError("only cells that fill a box of two axes and more, as those of `refine`, can be interpolated")
+    if set(at) != set(names):
+        raise SweepError(f"at: expected values of {', '.join(names)}, found {', '.join(at) or 'none'}")
+    grids = {name: np.asarray(values, dtype=np.float64) for name, values in at.items()}
+    mesh = dict(zip(grids, (m.ravel() for m in np.meshgrid(*grids.values(), indexing="ij")), strict=True))
+    shape = tuple(len(values) for values in grids.values())
+    box = Box.of({name: dataset[name].values for name in names})
+    points, places = box.points({n: dataset[n].values for n in names}), box.points(mesh)
+    corners, shares = located(points, places)
+    nearest = np.take_along_axis(corners, shares.argmax(axis=1)[:, None], 1)[:, 0]  # with the largest share
+    found = xr.Dataset(coords={name: (name, values, dataset[name].attrs) for name, values in grids.items()})
+    status, error = dataset[STATUS].values, np.zeros(len(places))
+    refined, inaccurate = json.loads(dataset.attrs.get(REFINED_TO, "{}")), np.zeros(len(places), bool)
+    for name, variable in dataset.data_vars.items():
+        if variable.dims == dataset[STATUS].dims and variable.dtype.kind == "f" and name != ERROR_BOUND:
+            between, off = _between(variable.values, points, places, status)
+            values = np.where(np.isnan(variable.values[nearest]), np.nan, between)
+            found[name] = (tuple(grids), values.reshape(shape), variable.attrs)
+            if name in refined or not refined:
+                error = np.maximum(error, off)
+                inaccurate |= ~(off <= refined.get(name, sys.float_info.max))
+    inaccurate |= status[nearest] == Status.INACCURATE
+    inaccurate &= status[nearest] < FIRST_REFUSAL
+    told = np.where(inaccurate, np.int8(Status.INACCURATE), status[nearest])
+    found[STATUS] = (tuple(grids), told.reshape(shape), dataset[STATUS].attrs)
+    if ERROR_BOUND in dataset:
+        bound = np.where(inaccurate, np.fmax(error, dataset[ERROR_BOUND].values[nearest]), np.nan)
+        found[ERROR_BOUND] = (tuple(grids), bound.reshape(shape), dataset[ERROR_BOUND].attrs)
+    return found.assign_attrs(dataset.attrs)
+
+
+def kinds(status: Indices, valued: NDArray[np.bool_]) -> Indices:
+    """Statuses, with those that rounding decides alike; -1 without a value."""
+    kind = np.where(status == Status.INACCURATE, int(Status.OK), status.astype(np.intp))
+    return np.where((status < FIRST_REFUSAL) & valued, kind, -1)
+
+
+def _between(values: Array, points: Array, places: Array, status: Indices) -> tuple[Array, Array]:
+    """An output's values at places, and how far they are off."""
+    height = heights(values)
+    stretched = stretch(points, height)
+    corners, shares = located(points @ stretched, places @ stretched)
+    # a corner that takes no part need have no value
+    total: Array = np.where(shares == 0, 0.0, shares * height[corners]).sum(axis=1)
+    between = np.exp(total) if is_positive(values) else total * _size(values)
+    off = _errors(points @ stretched, height, kinds(status, np.isfinite(values)), np.sort(corners, axis=1))
+    return between, np.where(shares.max(axis=1) == 1, 0.0, off)
+
+
+def _errors(points: Array, height: Array, kind: Indices, corners: Indices) -> Array:
+    """How far straight lines are off in simplices (m, axes + 1), as the cells around tell; inf across borders."""
+    mesh, found = simplices(points), np.full(len(corners), np.inf)
+    for number in np.unique(kind[kind >= 0]):
+        members = np.flatnonzero(kind == number)
+        own = np.searchsorted(members, mesh[(kind[mesh] == number).all(axis=1)])
+        here = np.flatnonzero((kind[corners] == number).all(axis=1))
+        if len(own) and len(here) and not are_too_few(points[members]):
+            rows = np.concatenate([own, np.searchsorted(members, corners[here])])
+            _, names = np.unique(rows, axis=0, return_inverse=True)
+            asked = np.isin(names[: len(own)], names[len(own) :])
+            bends = parabolas(points[members], height[members], with_beyond(own)[asked])
+            size = np.full(names.max() + 1, np.inf)
+            size[names[: len(own)][asked]] = interpolation_errors(points[members], own[asked], bends)[0]
+            found[here] = size[names[len(own) :]]
+    return found
+
+
+def located(points: Array, at: Array) -> tuple[Indices, Array]:
+    """Corners of the simplex in which each place is, and their shares in its value; NaN outside."""
+    mesh = Delaunay(tilted(points))
+    places = tilted(at)
+    where = mesh.find_simplex(places, tol=OUTSIDE)
+    inverse = mesh.transform[where]
+    shares = np.einsum("nij,nj->ni", inverse[:, :-1], places - inverse[:, -1])
+    shares = np.column_stack([shares, 1 - shares.sum(axis=1)])
+    shares = np.where(abs(shares) < OUTSIDE, 0.0, shares)
+    shares[where < 0] = np.nan
+    return mesh.simplices[where].astype(np.intp), shares
+
+
+def on_lines(dataset: xr.Dataset, x: str) -> xr.Dataset:
+    """Outputs in cells of a refined result that lie on lines along an axis, each line a row; the rest is NaN.
+
+    Lines are those with five cells and more from one end of the axis to the other, as all of the first grid are. What
+    is computed is taken, nothing is interpolated. A dataset whose cells do not fill a box is returned as it is.
+
+    Returns
+    -------
+    Dataset
+        Over x and the other axis; where there are several others, over x and `line`, which names their values. The
+        attribute `lines` tells how many cells lie on them, and of which other line most do.
+
+    Raises
+    ------
+    SweepError
+        There is no such line.
+    """
+    names = axes_of(dataset)
+    if x not in names:
+        return dataset
+    others = [name for name in names if name != x]
+    values, places = dataset[x].values, np.stack([dataset[name].values for name in others], axis=1)
+    lines, line, count = np.unique(places, axis=0, return_inverse=True, return_counts=True)
+    line = line.ravel()
+    ends = [np.isin(np.arange(len(lines)), line[values == end]) for end in (values.min(), values.max())]
+    long = (count >= FEWEST_ON_A_LINE) & ends[0] & ends[1]
+    if not long.any():
+        raise SweepError(
+            f"{x}: no {FEWEST_ON_A_LINE} cells lie on one line from end to end of it; pick another axis, or "
+            f"{_longest(others, lines, count)}"
+        )
+    on = np.flatnonzero(long[line])
+    grid, column = np.unique(values[on], return_inverse=True)
+    row = (np.cumsum(long) - 1)[line[on]]
+    across = others[0] if len(others) == 1 else "line"
+    texts = [", ".join(f"{name} = {v:.6g}" for name, v in zip(others, place, strict=True)) for place in lines[long]]
+    labels = lines[long, 0] if len(others) == 1 else texts
+    attrs = {**dataset.attrs, "lines": _lines_told(x, others, lines, count, long)}
+    found = xr.Dataset(coords={across: (across, labels), x: (x, grid, dataset[x].attrs)}, attrs=attrs)
+    for name, variable in dataset.data_vars.items():
+        if variable.dims == dataset[STATUS].dims and variable.dtype == np.float64:
+            filled = np.full((int(long.sum()), len(grid)), np.nan)
+            filled[row, column] = variable.values[on]
+            found[name] = ((across, x), filled, variable.attrs)
+    return found
+
+
+def _lines_told(x: str, others: Sequence[str], lines: Array, count: Indices, long: NDArray[np.bool_]) -> str:
+    text = f"{count[long].sum()} of {count.sum()} cells lie on {long.sum()} lines from end to end of {x}"
+    text += f"; take one by --at, {_longest(others, lines[long], count[long])}"
+    if (count[~long] < FEWEST_ON_A_LINE).all():
+        return f"{text}; no shorter line has {FEWEST_ON_A_LINE}."
+    return f"{text}, or a shorter one, {_longest(others, lines[~long], count[~long])}."
+
+
+def _longest(names: Sequence[str], lines: Array, count: Indices) -> str:
+    """How to ask for the line with most cells."""
+    most = int(count.argmax())
+    at = " ".join(f"--at {name}={float(value)!r}" for name, value in zip(names, lines[most], strict=True))
+    return f"e.g. {at} ({count[most]} cells)"

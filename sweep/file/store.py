@@ -1,0 +1,371 @@
+"""OUT.h5.unfinished: a result that is written in place, block by block, and renamed when it is complete.
+
+    OUT.h5.unfinished      the result; its structure is whole before the first number is written, and stays as it is
+    OUT.h5.unfinished.tmp  for a moment, while that structure is written
+    OUT.h5.lock            held while a sweep runs; the system frees it when the process ends
+
+A block is acknowledged when its digests are in the file. They are written after its numbers are on the disk, for many
+blocks at a time: numbers, fdatasync, digests. The next sync brings the digests to the disk as well.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import os
+import threading
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sweep.errors import Incomplete, SweepError
+from sweep.file import disk
+from sweep.file.ending import Gather, end, gathered, reads_back
+from sweep.file.frame import PAGE, Frame
+from sweep.file.layout import DAMAGE, TAIL, Layout, Table, read_layout, write_digests
+from sweep.file.reading import StoredFile, damaged, unbroken
+
+SYNC_BYTES = 64 << 20
+"""Bytes after which blocks are brought to the disk,"""
+SYNC_SECONDS = 0.2
+"""or time, where that comes first."""
+LOOK_SECONDS = 1.0
+"""How often it is looked whether the file is still in its place."""
+
+
+def unfinished_of(output: Path) -> Path:
+    """Where a result is while its sweep runs."""
+    return output.with_name(output.name + ".unfinished")
+
+
+def lock_of(output: Path) -> Path:
+    """What is locked while a sweep runs; a killed one leaves it behind."""
+    return output.with_name(output.name + ".lock")
+
+
+@dataclass(frozen=True)
+class Shared:
+    """A file that other processes write blocks to.
+
+    Attributes
+    ----------
+    path : str
+        Where the process that has the lock sees it.
+    key : str
+        Of this file; another process that finds it in a file of this path sees the same file.
+    table : Table
+    """
+
+    path: str
+    key: str
+    table: Table
+
+    def opened(self) -> int | None:
+        """A file descriptor; None where this process does not see the file, or may not write to it."""
+        try:
+            fd = disk.open_file(self.path, os.O_RDWR)
+        except OSError:
+            return None
+        try:
+            layout = read_layout(fd, os.fstat(fd).st_size)
+        except (OSError, EOFError):
+            layout = None
+        if layout is not None and layout.key == self.key:
+            return fd
+        os.close(fd)
+        return None
+
+
+class Store:
+    """The result of one sweep while it is written, locked for this process. Made by `opened`.
+
+    Attributes
+    ----------
+    output, path : Path
+        Where the result will be, and where it is.
+    layout : Layout or None
+        None until `begin` or `resume`.
+    """
+
+    def __init__(self, output: Path) -> None:
+        self.output, self.path = output, unfinished_of(output)
+        self.layout: Layout | None = None
+        self._fd, self._size, self._tail, self._looked = -1, 0, b"", 0.0
+        self._done = np.zeros(0, bool)
+        self._waiting: dict[int, bytes] = {}
+        self._unsynced, self._synced = 0, time.monotonic()
+        self._turn, self._committing = threading.Lock(), threading.Lock()
+        self._checked: Future[list[int]] | None = None
+        self._closing = threading.Event()
+
+    @property
+    def table(self) -> Table:
+        """What is computed."""
+        assert self.layout is not None, "the sweep has not begun"
+        return self.layout.work
+
+    def found(self) -> Layout | None:
+        """What an earlier run left; None where there is nothing. Raises SweepError where it is damaged."""
+        if not self.path.exists():
+            return None
+        with disk.refusing(self.path):
+            fd = disk.open_file(self.path, os.O_RDONLY)
+        try:
+            layout = read_layout(fd, os.fstat(fd).st_size, self.path)
+            if layout is not None and unbroken(fd):
+                return layout
+        except (OSError, EOFError):
+            pass
+        finally:
+            os.close(fd)
+        raise SweepError(
+            f"{self.path}: damaged beside its numbers, or not of this version; remove it, or give it up with --force"
+        )
+
+    def begin(self, frame: Frame) -> None:
+        """Makes the file, with room on the disk for all of it. Raises SweepError."""
+        temporary = self.temporary
+        with disk.refusing(self.path):
+            try:
+                fd = disk.open_file(temporary, os.O_CREAT | os.O_TRUNC | os.O_RDWR)
+                try:
+                    frame.write(fd)
+                    disk.fsync(fd)
+                finally:
+                    os.close(fd)
+                disk.rename(temporary, self.path)
+                disk.sync_folder(self.path.parent)
+            except OSError:
+                with contextlib.suppress(OSError):
+                    disk.remove(temporary)
+                raise
+        self._open(frame.layout)
+
+    def resume(self, layout: Layout) -> None:
+        """Takes up what an earlier run left, which is compared with its digests meanwhile. Raises SweepError."""
+        self._open(layout)
+        try:
+            digests = self.table.read_digests(self._fd)
+        except (OSError, EOFError) as fault:
+            raise SweepError(f"{self.path}: cannot be read ({fault})") from fault
+        self._done = digests.any(axis=2).all(axis=1)
+        self._checked = ThreadPoolExecutor(1).submit(self._check, np.flatnonzero(self._done).tolist())
+
+    def _check(self, blocks: list[int]) -> list[int]:
+        """Which of some blocks are not what their digests tell of."""
+        try:
+            with StoredFile(self.path) as file:
+                left = itertools.takewhile(lambda block: not self._closing.is_set(), blocks)
+                return sorted({block for block, _ in damaged(file, file.layout.work_name, left)})
+        except DAMAGE:
+            return blocks
+
+    def _open(self, layout: Layout) -> None:
+        with disk.refusing(self.path):
+            self._fd = disk.open_file(self.path, os.O_RDWR)
+            self._size = os.fstat(self._fd).st_size
+            self._tail = self._read_tail()
+        self.layout, self._done = layout, np.zeros(layout.work.blocks.count, bool)
+
+    def _read_tail(self) -> bytes:
+        """The last bytes of the file, which are of it alone and are not written again; none where it was cut."""
+        tail = bytearray(TAIL)
+        try:
+            disk.read_all(self._fd, (tail,), self._size - TAIL)
+        except EOFError:
+            return b""
+        return bytes(tail)
+
+    def _check_own(self) -> None:
+        """Raises Incomplete where another program has cut the file or written to it: not a byte of ours goes there."""
+        with disk.refusing(self.path):
+            if self._read_tail() == self._tail:
+                return
+        self._waiting = {}
+        raise Incomplete(
+            f"{self.path}: was cut or overwritten by another program while the run wrote to it, and cannot be "
+            "continued; remove it and run the same command again"
+        )
+
+    def _check_there(self) -> None:
+        """Raises Incomplete where the file is not what it was, or not where it was."""
+        self._looked = time.monotonic()
+        self._check_own()
+        ours = os.fstat(self._fd)
+        try:
+            if os.path.samestat(self.path.stat(), ours):
+                return
+        except (FileNotFoundError, NotADirectoryError):
+            pass
+        except OSError:
+            return  # a network may be slow to answer
+        if not ours.st_nlink:
+            raise Incomplete(f"{self.path}: was removed while the run wrote to it; what was computed is lost")
+        raise Incomplete(
+            f"{self.path}: was moved while the run wrote to it, to {disk.place_of(self._fd) or 'another place'}; all "
+            "blocks that were computed are kept there; move it back, and the same command continues"
+        )
+
+    @property
+    def temporary(self) -> Path:
+        """Where the result is while its structure is written."""
+        return self.path.with_name(self.path.name + ".tmp")
+
+    @property
+    def count(self) -> int:
+        """Blocks that are acknowledged."""
+        return int(self._done.sum())
+
+    def missing(self) -> list[int]:
+        """Numbers of the blocks that are not done, ascending."""
+        return np.flatnonzero(~self._done).tolist()
+
+    def put(self, index: int, arrays: Mapping[str, Any]) -> None:
+        """Writes a block; it is acknowledged later, with others. Raises SweepError."""
+        with disk.refusing(self.path):
+            digests = self.table.write(self._fd, index, arrays)
+        with self._turn:
+            self._waiting[index] = digests
+            self._unsynced += sum(array.nbytes for array in arrays.values())
+        self.tick()
+
+    def take(self, index: int, digests: bytes) -> None:
+        """Acknowledges a block that another process has written and synced. Raises SweepError."""
+        if len(digests) != self.table.row_bytes:
+            raise SweepError(f"{self.path}: a worker has written something else than it was asked for")
+        with self._turn:
+            self._waiting[index] = digests
+        self.tick()
+
+    def tick(self) -> None:
+        """Acknowledges what is written, if it is time to. Raises SweepError."""
+        if time.monotonic() - self._looked >= LOOK_SECONDS:
+            self._check_there()
+        with self._turn:
+            due = self._unsynced >= SYNC_BYTES or time.monotonic() - self._synced >= SYNC_SECONDS
+        if due and self._waiting and self._committing.acquire(blocking=False):
+            try:
+                self._commit()
+            finally:
+                self._committing.release()
+
+    def commit(self) -> None:
+        """Acknowledges all that is written, and brings that to the disk too. Raises SweepError."""
+        with self._committing:
+            self._commit()
+            with disk.refusing(self.path):
+                disk.sync_numbers(self._fd)
+
+    def _commit(self) -> None:
+        self._check_own()
+        with self._turn:
+            waiting, self._waiting = self._waiting, {}
+            self._unsynced, self._synced = 0, time.monotonic()
+        with disk.refusing(self.path):
+            if waiting:
+                disk.sync_numbers(self._fd)
+                write_digests(self._fd, self.table, waiting)
+        self._done[list(waiting)] = True
+
+    def damaged(self) -> list[int]:
+        """Blocks of earlier runs that turned out to be damaged; they are not done any more. Raises SweepError."""
+        checked, self._checked = self._checked, None
+        found = checked.result() if checked is not None else []
+        self.undo(found)
+        return found
+
+    def undo(self, blocks: Iterable[int]) -> None:
+        """Takes blocks out of those that are done. Raises SweepError."""
+        nothing = bytes(self.table.row_bytes)
+        with disk.refusing(self.path):
+            write_digests(self._fd, self.table, dict.fromkeys(blocks, nothing))
+        self._done[list(blocks)] = False
+
+    def finish(self, texts: Mapping[str, str], gather: Gather | None) -> list[int]:
+        """Puts the result in its place, if it is what was written.
+
+        Parameters
+        ----------
+        texts : of `ENDINGS`
+        gather : of a summary
+
+        Returns
+        -------
+        list of int
+            Blocks that turned out to be damaged, which have to be computed again first.
+        """
+        assert self.layout is not None
+        with disk.refusing(self.output):
+            self._check_there()
+            self.commit()
+            found = self.damaged()
+            if not found and gather is not None:
+                found = gathered(self.path, self._fd, self.layout, gather)
+                self.undo(found)
+            if found:
+                return found
+            end(self._fd, self.layout, texts)
+            disk.fsync(self._fd)
+            if not reads_back(self.path):
+                raise SweepError(
+                    f"{self.output}: differs when read back from what was written; the disk may be failing"
+                )
+            disk.rename(self.path, self.output)
+            disk.sync_folder(self.output.parent)
+        return []
+
+    def reopen(self, damaged: Iterable[int]) -> None:
+        """Takes a finished result up again, some blocks of which are to be computed again. Raises SweepError."""
+        with disk.refusing(self.output):
+            disk.rename(self.output, self.path)
+            disk.sync_folder(self.output.parent)
+            layout = self.found()
+            assert layout is not None
+            self._open(layout)
+            end(self._fd, layout, None)
+        self.undo(damaged)
+        os.close(self._fd)
+        self.resume(layout)
+
+    def shared(self) -> Shared | None:
+        """What another process needs to write blocks to the file; None where blocks of two would share a page."""
+        assert self.layout is not None
+        if any((place.all_at(self.table.blocks.count) % PAGE).any() for place in self.table.places):
+            return None
+        return Shared(str(self.path), self.layout.key, self.table)
+
+    def discard(self) -> None:
+        """Removes what is there. Raises SweepError."""
+        with disk.refusing(self.path):
+            disk.remove(self.path)
+
+    def close(self) -> None:
+        """Acknowledges what is written, if that can be, and gives the file back."""
+        self._closing.set()
+        if self._checked is not None:
+            self._checked.result()
+        if self._fd >= 0:
+            with contextlib.suppress(SweepError):
+                if self._waiting:
+                    self.commit()
+            os.close(self._fd)
+            self._fd = -1
+
+
+@contextlib.contextmanager
+def opened(output: Path) -> Iterator[Store]:
+    """The store of an output, held by this process alone. Raises SweepError."""
+    lock, store = lock_of(output), Store(output)
+    with disk.refusing(output), disk.locked(lock) as ours:
+        if not ours:
+            raise SweepError(f"{output}: another run is at work on this output; wait for it, or choose another with -o")
+        disk.remove(store.temporary)
+        try:
+            yield store
+        finally:
+            store.close()

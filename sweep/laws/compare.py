@@ -1,0 +1,184 @@
+"""Which law? One, two or three power laws, a logarithm, an offset, a correction to scaling, judged by AICc and BIC."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from sweep.errors import SweepError
+from sweep.laws.correlated import corrected
+from sweep.laws.curves import Window, check_output, relative_sigma, title, window_logs, window_of
+from sweep.laws.fits import Found, curve, fitted
+from sweep.laws.loglog import EPSILON, Array
+from sweep.laws.scatter import BEYOND_DOUBT, RARE, line_deviance
+from sweep.laws.shapes import CORRECTION, LAWS, ONE
+
+FEWEST_POINTS = 8
+
+NAMES = {
+    "aicc": ("1", "Akaike's criterion, corrected for few points; of one law with the noise that suits it best"),
+    "bic": ("1", "Bayes' criterion, likewise"),
+    "worse": ("1", "AICc above that of the best law; beyond 10 a law is ruled out"),
+    "numbers": ("1", "numbers that are fitted"),
+    "scatter": ("1", "relative distance of the points from the law, root mean square"),
+    "residual": ("1", "largest relative distance of a point from the law"),
+    "runs": ("1", "chance that independent scatter has so few runs of signs; NaN of fewer than 12 points"),
+    "chi_squared": ("1", "chance that noise of the given sigma has so large a chi-squared; NaN without sigma"),
+}
+
+
+def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sigma: Any = None) -> xr.Dataset:
+    """What laws say of one line, which of them are ruled out, and the simplest that is not.
+
+    A law with more numbers is believed only where AICc prefers it by more than 10 to every law with fewer: so many
+    times e^5 more likely, and a margin that correlated, uneven or outlying noise does not bridge, which one law is
+    tried with.
+
+    Parameters
+    ----------
+    y : DataArray
+        One dimension; missing points, and those whose sigma is NaN, are left out.
+    dim : str
+        Its dimension, or 1-D coordinate along it; positive and strictly monotone.
+    window : (low, high), optional
+        Ends in the unit of `dim`.
+    sigma : number or DataArray, optional
+        Standard errors of the values, in the unit of y. Default: unknown, and the same share of y for all.
+
+    Returns
+    -------
+    Dataset
+        Along `law`, the best first: `aicc`, `bic`, `worse` (AICc above the best), `numbers`, `scatter`, `residual`,
+        `runs`, `chi_squared`, `formula`, `exponents`; `fitted` (law, point), the law at the points, whose places are
+        `x` and values `y`. Attributes `chosen`, `margin` (AICc to the next law; negative where a law with more
+        numbers is nearer) and `verdict`, a sentence.
+
+    Raises
+    ------
+    SweepError
+        y has further dimensions, or fewer than 8 points, or is not positive in the window.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> import xarray as xr
+    >>> x = np.geomspace(1, 1e4, 41)
+    >>> y = xr.DataArray(1 / x + 0.01, {"x": x}, "x", name="y")
+    >>> sweep.compare_laws(y, "x").attrs["chosen"]
+    'offset'
+    """
+    check_output(y)
+    if y.ndim != 1:
+        raise SweepError(
+            f"{title(y)} runs along {', '.join(map(str, y.dims))}; compare laws of one line, choose with .sel"
+        )
+    _, t, logs = window_logs(y, dim, window)
+    relative = relative_sigma(y, sigma).isel(window_of(y, dim, window)).values
+    present = np.flatnonzero(np.isfinite(logs.values) & (np.isfinite(relative) | (sigma is None)))
+    if present.size < FEWEST_POINTS:
+        raise SweepError(f"laws are told apart by at least {FEWEST_POINTS} points of {title(y)}, found {present.size}")
+    present = present[np.argsort(t[present])]
+    t, z = t[present], logs.values[present]
+    weights = None if sigma is None else relative[present] ** -2.0
+    tried = [fit for law in LAWS if (fit := fitted(law, t, z, weights, known=weights is not None)) is not None]
+    if weights is None:
+        tried = [_with_any_noise(t, z, fit) if fit.law is ONE else fit for fit in tried]
+    tried.sort(key=lambda fit: fit.aicc)
+    found = _table(t, z, tried, weights)
+    found.attrs = {"y": title(y), "x": dim, **_verdict(tried)}
+    if not fits(found, found.attrs["chosen"]):
+        found.attrs["verdict"] += "; but what it leaves has a shape, so that none of them is the law"
+    for name, of in (("x", y[dim]), ("y", y), ("fitted", y)):
+        found[name].attrs = {"units": str(of.attrs.get("units", "1"))}
+    return found
+
+
+def _with_any_noise(t: Array, z: Array, found: Found) -> Found:
+    deviance, k = line_deviance(t, z, (4 * EPSILON * (1 + abs(z).max())) ** 2)
+    numbers = k if deviance < found.deviance else found.law.numbers
+    deviance = min(deviance, found.deviance)
+    return found._replace(
+        deviance=deviance,
+        aicc=corrected(deviance, t.size, numbers + 1),
+        bic=deviance + (numbers + 1) * math.log(t.size),
+    )
+
+
+@np.errstate(over="ignore")
+def _table(t: Array, z: Array, tried: list[Found], weights: Array | None) -> xr.Dataset:
+    span = t[-1] - t[0]
+    columns: dict[str, list[Any]] = {
+        "aicc": [f.aicc for f in tried],
+        "bic": [f.bic for f in tried],
+        "worse": [f.aicc - tried[0].aicc for f in tried],
+        "numbers": [f.law.numbers for f in tried],
+        "scatter": [math.sqrt(float(np.mean(f.off**2))) for f in tried],
+        "residual": [math.expm1(min(float(abs(f.off).max()), 700.0)) for f in tried],
+        "runs": [_runs(f.off) for f in tried],
+        "chi_squared": [math.nan if weights is None else _chance(f, weights) for f in tried],
+        "formula": [f.law.formula for f in tried],
+        "exponents": [_exponents(f, float(span)) for f in tried],
+    }
+    found = xr.Dataset({name: ("law", values) for name, values in columns.items()})
+    for name, (units, text) in NAMES.items():
+        found[name].attrs = {"units": units, "long_name": text}
+    found["fitted"] = ("law", "point"), np.exp([curve(f, t, t[0], t[-1]) for f in tried])
+    found["x"], found["y"] = ("point", np.exp(t)), ("point", np.exp(z))
+    return found.assign_coords(law=[f.law.name for f in tried])
+
+
+def _verdict(tried: list[Found]) -> dict[str, Any]:
+    alive = [f for f in tried if f.aicc <= tried[0].aicc + BEYOND_DOUBT]
+    chosen = min(alive, key=lambda f: (f.law.numbers, f.aicc))
+    others = [f for f in tried if f is not chosen]
+    margin = min((f.aicc for f in others), default=math.inf) - chosen.aicc
+    rivals = [f.law.name for f in alive if f is not chosen]
+    text = f"{chosen.law.name} ({chosen.law.formula}): "
+    alone = f"all others are worse by {margin:.3g} and more in AICc"
+    text += f"not ruled out beside it: {', '.join(rivals)}" if rivals else alone
+    return {"chosen": chosen.law.name, "margin": margin, "verdict": text}
+
+
+def _runs(off: Array) -> float:
+    """Chance of so few runs of signs or fewer, by the normal distribution of Wald and Wolfowitz."""
+    from scipy.special import ndtr
+
+    above = int((off > 0).sum())
+    below = off.size - above
+    if off.size < 12 or not above or not below:
+        return math.nan
+    runs = 1 + int((np.diff(off > 0) != 0).sum())
+    mean = 1 + 2 * above * below / off.size
+    size = math.sqrt((mean - 1) * (mean - 2) / (off.size - 1))
+    return float(ndtr((runs + 0.5 - mean) / size))
+
+
+def _chance(found: Found, weights: Array) -> float:
+    from scipy.special import gammaincc
+
+    square = float((found.off**2 * weights).sum())
+    return float(gammaincc((found.off.size - found.law.numbers) / 2, square / 2))
+
+
+def _exponents(found: Found, span: float) -> str:
+    """The exponents with their standard errors, as of noise."""
+    if not found.law.exponents:
+        return f"p = {found.numbers[0] / span:.4g} +- {found.errors[0] / span:.1g}"
+    start = found.numbers.size - len(found.law.exponents)
+    parts = [
+        f"{name} = {p / span:.4g} +- {e / span:.1g}"
+        for name, p, e in zip(found.law.exponents, found.numbers[start:], found.errors[start:], strict=True)
+    ]
+    if found.law is CORRECTION:
+        parts.append(f"D = {found.numbers[1] / span:.3g}")
+    return ", ".join(parts)
+
+
+def fits(found: xr.Dataset, law: str) -> bool:
+    """Whether neither the runs test nor chi-squared denies a law."""
+    one = found.sel(law=law)
+    return not (one.runs.item() < RARE or one.chi_squared.item() < RARE)

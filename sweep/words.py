@@ -1,0 +1,189 @@
+"""Words for people: tables of text, times, sizes, and what was found where something else is taken."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import operator
+import os
+import re
+import shutil
+import textwrap
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from sweep.errors import SweepError
+
+CONTROL = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160)) if chr(code) not in "\n\t"}
+"""Characters that a terminal takes for commands, and what is shown of them."""
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""A spreadsheet takes a cell that begins so for a formula."""
+
+SHORTEST = 0.1
+"""Seconds that are told at least, so that no line says 0."""
+LAST = 30
+"""Characters that the last column of a table keeps as long as others can give way."""
+
+
+def printable(text: str) -> str:
+    """A text from elsewhere, which a terminal shows and does not obey."""
+    return text.translate(CONTROL).encode(errors="backslashreplace").decode()
+
+
+def cell(value: Any) -> Any:
+    """A value of a csv table; a text that a spreadsheet would run begins with an apostrophe, a number does not."""
+    if not isinstance(value, str) or not value.startswith(FORMULA):
+        return value
+    try:
+        float(value)
+    except ValueError:
+        return f"'{value}"
+    return value
+
+
+def width() -> int:
+    """Characters in a line of the terminal; 80 where there is none."""
+    return shutil.get_terminal_size((80, 24)).columns
+
+
+def columns(rows: Iterable[Sequence[str]], indent: str = "  ", wide: bool = False) -> str:
+    """Rows with their cells one below the other, no wider than the terminal where words allow it.
+
+    The last cell is wrapped, down to `LAST` characters; where that is not enough, so are the widest, unless the table
+    may be `wide`.
+    """
+    rows = [list(row) for row in rows]
+    if not rows:
+        return ""
+    texts = list(zip(*rows, strict=True))
+    widths = [max(map(len, column)) for column in texts]
+    words = [max((len(word) for text in column for word in text.split()), default=0) for column in texts]
+    # a column that is empty everywhere takes no room
+    room = width() - len(indent) - 2 * sum(map(bool, widths[:-1]))
+    widths[-1] = min(widths[-1], max(room - sum(widths[:-1]), LAST))
+    while not wide and sum(widths) > room and any(map(operator.gt, widths, words)):
+        widest = max((size, i) for i, size in enumerate(widths) if size > words[i])[1]
+        widths[widest] -= 1
+    lines = []
+    for row in rows:
+        cells = [_wrapped(text, size) for text, size in zip(row, widths, strict=True)]
+        for parts in list(itertools.zip_longest(*cells, fillvalue="")) or [()]:
+            beside = zip(parts, widths, strict=False)
+            lines.append((indent + "".join(part.ljust(size + 2 if size else 0) for part, size in beside)).rstrip())
+    return "\n".join(lines)
+
+
+def paragraph(text: str) -> str:
+    """Lines of text, each wrapped at the width of the terminal."""
+    return "\n".join("\n".join(_wrapped(line, width())) for line in text.splitlines())
+
+
+def _wrapped(text: str, size: int) -> list[str]:
+    """Words are kept whole, lest a path be torn."""
+    return textwrap.wrap(text, max(size, 1), break_on_hyphens=False, break_long_words=False)
+
+
+def section(title: str, rows: Iterable[Sequence[str]]) -> str:
+    """A title with rows below it; nothing where there are none."""
+    rows = list(rows)
+    return f"{title}\n{columns(rows)}" if rows else ""
+
+
+def page(*sections: str) -> str:
+    """Sections with an empty line between them."""
+    return "\n\n".join(text for text in sections if text)
+
+
+def speed(rate: float) -> str:
+    """`5,100 cells/s`, `0.25 cells/s`."""
+    return f"{rate:,.0f} cells/s" if rate >= 9.5 else f"{rate:.2g} cells/s"
+
+
+def duration(seconds: float) -> str:
+    """Seconds as people say them: `0.4 s`, `42 s`, `3 min 05 s`, `7 h 12 min`, `3 d 4 h`."""
+    if seconds < 9.95:
+        return f"{seconds:.1f} s"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    if whole < 86400:
+        return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+    return f"{whole // 86400} d {whole % 86400 // 3600} h"
+
+
+def one_digit(seconds: float) -> str:
+    """A time rounded up to one digit, as one tells what is not known better: `0.3 s`, `40 s`, `4 min`, `2 h`."""
+    units = ("d", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 1.0)
+    unit, size = next((unit for unit in units if seconds >= unit[1]), units[-1])
+    count = max(seconds, SHORTEST) / size
+    digit = 10.0 ** math.floor(math.log10(count))
+    return f"{math.ceil(count / digit - 1e-9) * digit:g} {unit}"
+
+
+def seconds_of(name: str, text: float | str) -> float:
+    """Seconds, from a number or from words as `duration` says them: "90", "60s", "5 min", "1 h". Raises SweepError."""
+    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([a-z]*)\s*", str(text))
+    units = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
+    try:
+        found = float(match[1]) * units[match[2]] if match else math.nan
+    except (ValueError, KeyError):
+        found = math.nan
+    if not 0.0 < found < math.inf:
+        raise SweepError(f'{name}: expected a time like "60s", "5 min" or "1 h", found {text!r}')
+    return found
+
+
+def quantity(count: float) -> str:
+    """Bytes as people say them: `812 B`, `1.3 kB`, `42 MB`."""
+    units = ["B", "kB", "MB", "GB", "TB", "PB"]
+    while count >= 999.5 and len(units) > 1:
+        count, units = count / 1000, units[1:]
+    return f"{count:.3g} {units[0]}"
+
+
+def require_dataset(name: str, given: Any, maker: str = "", attribute: str = "") -> None:
+    """Refuses what is no Dataset.
+
+    Parameters
+    ----------
+    name : str
+        The function as users call it, e.g. "export".
+    maker, attribute : str
+        Where not every Dataset will do: the function that makes those that do, and an attribute that only they have.
+
+    Raises
+    ------
+    SweepError
+        With the way from what was given to a Dataset, where there is one.
+    """
+    import xarray as xr  # most of a short run's time
+
+    if not isinstance(given, xr.Dataset):
+        cure = f"sweep.{maker} gives one" if maker else _cure(given)
+        raise SweepError(f"sweep.{name}: expected a Dataset, found {kind(given)}; {cure}")
+    if attribute and attribute not in given.attrs:
+        raise SweepError(f"sweep.{name}: expected a Dataset of sweep.{maker}, found another")
+
+
+def as_path(given: Any) -> Path:
+    """What names a file or a folder. Raises SweepError where it is no name."""
+    if isinstance(given, str | os.PathLike):
+        return Path(given)
+    raise SweepError(f'expected a path, e.g. "out.h5"; found an object of type {type(given).__name__}')
+
+
+def kind(value: Any) -> str:
+    """'a list', 'an int', 'nothing'."""
+    word = type(value).__name__
+    return "nothing" if value is None else f"{'an' if word[0].lower() in 'aeiou' else 'a'} {word}"
+
+
+def _cure(given: Any) -> str:
+    if isinstance(given, str | os.PathLike):
+        return f'open the file first: sweep.open_result("{os.fspath(given)}")'
+    if hasattr(given, "kernel_name"):
+        return "run the study first: sweep.run(study)"
+    return "sweep.run and sweep.open_result give one"

@@ -1,0 +1,290 @@
+"""What lies between cells: borders on maps, values inside a box of scattered cells, lines in it, and their errors."""
+
+import itertools
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.interpolate import LinearNDInterpolator
+
+import sweep
+from sweep.explore.mesh import are_too_few, interpolation_errors, parabolas, renewed, simplices, with_beyond
+from sweep.explore.metric import stretch
+from sweep.explore.scattered import Box, axes_of, heights, on_lines
+from sweep.laws.maps import contours, fraction
+
+MU, A = np.geomspace(1e-3, 1e3, 121), np.geomspace(0.1, 10, 41)
+
+
+def period():
+    """1/x + x^(-1/3) of x = mu/a: regimes meet along straight lines mu ~ a."""
+    x = MU[:, None] / A
+    coords = {"mu": ("mu", MU, {"units": "rad/s^2"}), "a": ("a", A, {"units": "1/s"})}
+    return xr.DataArray(1 / x + x ** (-1 / 3), coords, ("mu", "a"), name="period")
+
+
+# borders on maps
+
+
+def test_lines_of_an_exponent_are_where_theory_has_them():
+    """The exponent -(1/x + x^(-1/3)/3)/(1/x + x^(-1/3)) is -1/2 where x^(2/3) = 3; -1 and -1/3 are only tended to."""
+    found = sweep.exponent_map(period(), "mu")
+    assert found.exponent.dims == ("mu", "a")
+    np.testing.assert_allclose(np.unique(found.level), [-0.5], rtol=1e-12)
+    np.testing.assert_allclose(found.mu_on_border / found.a_on_border, 3**1.5, rtol=2e-3)
+    assert set(found.line.values) == {0}
+    assert (float(found.a_on_border.min()), float(found.a_on_border.max())) == pytest.approx((0.1, 10))
+    assert found.mu_on_border.attrs["units"] == "rad/s^2"
+
+
+@pytest.mark.parametrize("logarithmic", [(True, False), (False, False), (True, True), (False, True)])
+def test_each_axis_is_interpolated_as_its_grid_is_spaced(logarithmic):
+    grids = [np.geomspace(1, 1e4, 9) if take else np.linspace(-1, 9, 10) for take in logarithmic]
+    u, v = (np.log(g) if take else g for g, take in zip(grids, logarithmic, strict=True))
+    field = xr.DataArray(u[:, None] - 0.7 * v, dict(zip("xy", grids, strict=True)), ("x", "y"), attrs={"units": "m"})
+    found = contours(field, (0.3, -0.4, 1e9))
+    assert set(found.level.values) == {0.3, -0.4}
+    x, y = (np.log(found[n]) if take else found[n] for n, take in zip("xy", logarithmic, strict=True))
+    np.testing.assert_allclose(x - 0.7 * y, found.level, atol=1e-12)
+    np.testing.assert_array_equal(found.line == 0, found.level == 0.3)
+    assert found.level.attrs["units"] == "m"
+
+
+def test_no_line_crosses_what_has_no_value():
+    found = contours(period().where(abs(np.log(period().a)) > 0.5), (1.5,))
+    assert len(set(found.line.values)) == 2
+    assert not ((found.a > 0.7) & (found.a < 1.4)).any()
+    assert contours(period(), (1e9,)).sizes["point"] == 0
+
+
+@pytest.mark.parametrize(
+    ("level", "text"),
+    [
+        (-1 / 3, "-1/3"),
+        (0.5 + 0.9e-9, "1/2"),
+        (0.5 + 1.1e-9, "0.5"),
+        (-1.0, "-1"),
+        (0.27318, "0.273"),
+        (5 / 13, "0.385"),
+    ],
+)
+def test_levels_are_written_as_people_do(level, text):
+    assert fraction(level) == text
+
+
+def test_what_is_no_map_is_refused():
+    field = xr.DataArray([[0.0, 1.0], [2.0, 3.0]], {"x": [0, 1], "y": [0.0, 3.0]}, ("x", "y"), name="z")
+    contours(field, (1.5,))  # two values an axis are enough
+    for wrong, message in (
+        (field[:, 0], "1 dimensions"),
+        (field.expand_dims("t"), "3 dimensions"),
+        (field[:, :1], "y has no two numbers"),
+        (field.assign_coords(y=["a", "b"]), "y has no two numbers"),
+        (field.drop_vars("x"), "x has no two numbers"),
+    ):
+        with pytest.raises(sweep.SweepError, match=message):
+            contours(wrong, (1.0,))
+
+
+# values inside a box
+
+
+def cells(axes=2, inside=60, seed=0):
+    """A grid of 5 values an axis, from 1 to 100, with more cells anywhere inside; y is a power law."""
+    rng = np.random.default_rng(seed)
+    grid = [m.ravel() for m in np.meshgrid(*[np.geomspace(1, 100, 5)] * axes, indexing="ij")]
+    values = {n: np.concatenate([g, 100 ** rng.random(inside)]) for n, g in zip("abc", grid, strict=False)}
+    y = 2.0 * np.prod([v**p for v, p in zip(values.values(), (0.5, -1, 2), strict=False)], axis=0)
+    columns = {"y": ("cell", y, {"units": "s"}), "status": ("cell", np.zeros(y.size, np.int8))}
+    return xr.Dataset(columns, {n: ("cell", v, {"units": "1"}) for n, v in values.items()})
+
+
+def test_a_power_law_is_straight_and_so_interpolated_exactly():
+    at = {"a": np.geomspace(1, 100, 7), "b": [2.0, 50.0]}
+    found = sweep.interpolated(cells(), at)
+    assert found.y.dims == ("a", "b")
+    np.testing.assert_allclose(found.y, 2 * at["a"][:, None] ** 0.5 / np.array(at["b"]), rtol=1e-12)
+    assert found.y.attrs == {"units": "s"}
+
+
+def test_between_cells_values_are_those_of_scipy():
+    ds = cells(inside=200)
+    ds["y"] = ("cell", np.sin(ds.a.values) + 0.1 * ds.b.values * np.cos(ds.b.values))
+    x = {"a": np.geomspace(1.1, 90, 8), "b": np.geomspace(1.2, 95, 9)}
+    places = np.log(np.stack([ds.a, ds.b], axis=1))
+    rows = np.log(np.stack(np.meshgrid(x["a"], x["b"], indexing="ij"), axis=-1))
+    tilt = stretch(places / np.log(100), heights(ds.y.values)) @ np.array([[1.0, 0.0], [0.013, 1.0]])
+    truth = LinearNDInterpolator(places @ tilt, ds.y.values)(rows @ tilt)
+    np.testing.assert_allclose(sweep.interpolated(ds, x).y, truth, rtol=1e-9, atol=1e-9)
+
+
+def test_outside_and_beside_missing_cells_there_is_nothing_and_at_cells_their_value():
+    ds = cells()
+    assert np.isnan(sweep.interpolated(ds, {"a": [0.5], "b": [2.0]}).y).all()
+    edge = sweep.interpolated(ds, {"a": [1.0 - 1e-12, 1.0 - 1e-3], "b": [2.0]}).y  # out by rounding, and by more
+    assert np.isfinite(edge[0, 0])
+    assert np.isnan(edge[1, 0])
+    ds["y"][0] = np.nan  # at 1, 1
+    found = sweep.interpolated(ds, {"a": [1.001, 100.0], "b": [1.001, 100.0]})
+    assert np.isnan(found.y[0, 0])
+    assert float(found.y[1, 1]) == pytest.approx(float(ds.y[24]), rel=1e-12)
+
+
+@pytest.mark.parametrize(("axes", "taken"), [(1, False), (2, True), (5, True), (6, False)])
+def test_boxes_have_two_to_five_axes(axes, taken):
+    corners = np.array(list(itertools.product([1.0, 3.0], repeat=axes)))
+    names = list("abcdef"[:axes])
+    coords = {name: ("cell", column) for name, column in zip(names, corners.T, strict=True)}
+    ds = xr.Dataset({"status": ("cell", np.zeros(len(corners), np.int8))}, coords)
+    assert axes_of(ds) == (names if taken else [])
+    assert axes_of(ds.assign_coords(fixed=("cell", np.ones(len(corners))))) == (names if taken else [])
+    assert axes_of(ds.drop_vars("status")) == []
+
+
+def test_only_cells_that_fill_a_box_are_taken_for_such():
+    ds = cells()
+    without_corner, curve = ds.isel(cell=slice(1, None)), ds.assign_coords(b=("cell", ds.a.values))
+    for wrong in (without_corner, curve, ds.assign_coords(cell=np.arange(ds.sizes["cell"]))):
+        assert axes_of(wrong) == []
+        with pytest.raises(sweep.SweepError, match="fill a box"):
+            sweep.interpolated(wrong, {"a": [1.0], "b": [1.0]})
+    with pytest.raises(sweep.SweepError, match="expected values of a, b"):
+        sweep.interpolated(ds, {"a": [1.0]})
+
+
+def test_places_and_values_are_each_others_inverse_and_heights_logarithms_or_shares():
+    """An axis is logarithmic from a positive value to twice that."""
+    values = {"a": np.array([1.0, 10.0, 100.0]), "b": np.array([-1.0, 0.0, 1.0]), "c": np.array([2.0, 2.5, 3.0])}
+    values["d"] = np.array([1.0, 1.999**0.5, 1.999])
+    box = Box.of(values)
+    assert box.logarithmic.tolist() == [True, False, False, True]
+    np.testing.assert_allclose(box.points(values), np.array([[0] * 4, [0.5] * 4, [1] * 4]), atol=1e-15)
+    for k, column in enumerate(values.values()):
+        np.testing.assert_allclose(box.values(k, np.array([0.0, 0.5, 1.0])), column, rtol=1e-14, atol=1e-15)
+    np.testing.assert_allclose(heights(np.array([1.0, np.e, np.nan])), [0, 1, np.nan])
+    np.testing.assert_allclose(heights(np.array([-1.0, 4.0, 0.0])), [-0.25, 1, 0])
+    np.testing.assert_allclose(heights(np.zeros(2)), 0)
+
+
+def test_lines_hold_what_was_computed_and_say_how_to_ask_for_others():
+    ds = cells()
+    found = on_lines(ds, "a")
+    assert (found.y.dims, found.sizes["b"], found.sizes["a"]) == (("b", "a"), 5, 5)
+    np.testing.assert_array_equal(found.y.values.ravel(), ds.y.values[:25].reshape(5, 5).T.ravel())
+    assert "25 of 85 cells lie on 5 lines" in found.attrs["lines"]
+    assert "--at b=1.0 (5 cells)" in found.attrs["lines"]
+    three = on_lines(cells(3), "c")
+    assert three.y.dims == ("line", "c")
+    assert str(three.line[1].item()) == "a = 1, b = 3.16228"
+    assert on_lines(ds, "y") is ds
+    short = xr.concat(
+        [ds.isel(cell=slice(0, 25)), ds.isel(cell=slice(30, 36)).assign(b=("cell", np.full(6, 7.0)))], "cell"
+    )
+    assert "--at b=7.0 (6 cells)" in on_lines(short, "a").attrs["lines"]
+    for ends in ((1.0, 99.0), (2.0, 100.0)):  # a line that stops short of an end
+        one_end = short.assign(a=("cell", np.r_[short.a[:25], np.linspace(*ends, 6)]))
+        assert on_lines(one_end, "a").sizes["b"] == 5
+    with pytest.raises(sweep.SweepError, match=r"--at b=1.0 \(2 cells\)"):
+        on_lines(ds.isel(cell=np.r_[0, 4, 20, 24, 30:85]), "a")
+
+
+# errors of straight lines between cells
+
+
+@pytest.mark.parametrize("axes", [1, 2, 3, 4])
+def test_simplices_fill_the_box_and_overlap_nowhere(axes):
+    grid = np.meshgrid(*[np.linspace(0, 1, 4)] * axes)
+    points = np.stack([g.ravel() for g in grid], axis=1)
+    corners = points[simplices(points)]
+    volume = abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / np.prod(np.arange(1, axes + 1))
+    assert volume.sum() == pytest.approx(1.0, rel=1e-9)
+    assert volume.min() > 0.9 * volume.mean()  # no slivers where corners lie on one sphere
+
+
+def judged(points, values):
+    """Simplices, how far straight lines are off in them, and the edges to cut."""
+    corners = simplices(points)
+    return corners, *interpolation_errors(points, corners, parabolas(points, values, with_beyond(corners)))
+
+
+@pytest.mark.parametrize("axes", [1, 2, 3])
+def test_of_a_parabola_the_error_is_found_exactly_and_the_edge_that_bends_most_is_cut(axes):
+    """In the middle of an edge e straight lines are off by e H e / 8, H the matrix of second derivatives."""
+    rng = np.random.default_rng(axes)
+    points = rng.random((40 * axes, axes))
+    matrix = rng.normal(size=(axes, axes))
+    matrix = matrix + matrix.T
+
+    def parabola(at):
+        return np.einsum("ni,ij,nj->n", at, matrix, at) / 2 + at @ np.arange(axes) + 1.0
+
+    corners, size, cut = judged(points, parabola(points))
+    first, second = np.array(list(itertools.combinations(range(axes + 1), 2))).T
+    edge = points[corners[:, first]] - points[corners[:, second]]
+    middle = abs(np.einsum("nki,ij,nkj->nk", edge, matrix, edge)) / 8
+    inside = abs(parabola(points)[corners].mean(axis=1) - parabola(points[corners].mean(axis=1)))
+    expected = 1.6 * np.maximum(middle.max(axis=1), inside)  # a factor for what is no parabola
+    np.testing.assert_allclose(size, expected, rtol=1e-3, atol=1e-3 * np.median(size))
+    ends = points[cut[:, 0]] - points[cut[:, 1]]
+    of_cut = abs(np.einsum("ni,ij,nj->n", ends, matrix, ends)) / 8
+    assert (of_cut >= 0.89 * middle.max(axis=1)).all()
+
+
+def test_a_kink_is_not_taken_for_the_parabola_through_it_and_a_wave_is_cut_across():
+    """Between -1/8 and 1/8, straight lines are off abs(x) by 1/8; the parabola says a quarter of that."""
+    x = np.arange(-7, 8, 2) / 8
+    corners, size, _ = judged(x[:, None], abs(x))
+    middle = np.flatnonzero(x[corners].sum(axis=1) == 0)
+    assert 0.7 / 8 < size[middle] < 1.5 / 8
+    grid = np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9))
+    points = np.stack([g.ravel() for g in grid], axis=1)
+    _, _, ends = judged(points, np.sin(3 * points[:, 0]))
+    assert (abs(points[ends[:, 0], 0] - points[ends[:, 1], 0]) > 0.1).all()
+
+
+@pytest.mark.parametrize(("axes", "least"), [(1, 3), (2, 6), (3, 10)])
+def test_a_parabola_needs_as_many_points_as_it_has_numbers_and_new_cells_change_only_their_surroundings(axes, least):
+    assert are_too_few(np.zeros((least - 1, axes)))
+    assert not are_too_few(np.zeros((least, axes)))
+    rng = np.random.default_rng(axes)
+    points, height = rng.random((80, axes)), rng.random(80)
+    before = parabolas(points[:70], height[:70], with_beyond(simplices(points[:70])))
+    corners = simplices(points)
+    anew, whole = renewed(before, points, height, corners), parabolas(points, height, with_beyond(corners))
+    for one, other in zip(anew[:4], whole[:4], strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+# boxes stretched to where an output bends
+
+
+def places(axes, number=5):
+    """A grid, and as many cells anywhere."""
+    grid = np.stack([g.ravel() for g in np.meshgrid(*[np.linspace(0, 1, number)] * axes)], axis=1)
+    return np.concatenate([grid, np.random.default_rng(1).random(grid.shape)])
+
+
+@pytest.mark.parametrize("axes", [2, 3])
+def test_the_stretch_of_a_parabola_is_the_root_of_its_second_derivatives(axes):
+    points = places(axes)
+    matrix = np.random.default_rng(axes).normal(size=(axes, axes))
+    matrix = matrix @ matrix.T + np.eye(axes)
+    found = stretch(points, np.einsum("ni,ij,nj->n", points, matrix, points) / 2 + points[:, 0])
+    np.testing.assert_allclose(found @ found, matrix / np.linalg.eigvalsh(matrix).max(), rtol=1e-6, atol=1e-9)
+    if axes == 2:  # down and up sizes count, and cells without a value do not
+        heights = 4 * points[:, 0] ** 2 - points[:, 1] ** 2
+        heights[np.hypot(*points.T) < 0.5] = np.nan
+        np.testing.assert_allclose(stretch(points, heights), np.diag([1.0, 0.5]), atol=1e-6)
+
+
+def test_a_direction_that_matters_nothing_shrinks_and_what_is_straight_or_missing_stretches_nothing():
+    points = places(2)
+    found = stretch(points, (points[:, 0] + points[:, 1]) ** 2)
+    np.testing.assert_allclose(found @ [1, 1], [1, 1], rtol=1e-6)
+    corners = points[simplices(points @ found)]
+    along, level = np.ptp(corners.sum(axis=2), axis=1), np.ptp(corners[:, :, 0] - corners[:, :, 1], axis=1)
+    assert along.mean() < 0.3 * level.mean()
+    for straight in (np.zeros(50), points @ [1.0, 2.0], np.full(50, np.nan)):
+        np.testing.assert_array_equal(stretch(points, straight), np.eye(2))
+    np.testing.assert_array_equal(stretch(points[:5], points[:5, 0] ** 2), np.eye(2))
+    np.testing.assert_array_equal(stretch(points[:, :1], points[:, 0] ** 2), np.eye(1))

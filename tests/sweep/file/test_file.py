@@ -1,0 +1,129 @@
+"""A result on the disk: what plain readers of HDF5 find in it, of which format it is, and who may write to it."""
+
+import json
+import os
+import signal
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import toy_studies
+import xarray as xr
+import xxhash
+
+import sweep
+from sweep.cells.output_schema import output_schema
+from sweep.cells.partition import boxes
+from sweep.file import disk
+from sweep.file.frame import cuts_of, expected_size
+
+PHASE = {"outputs": ["fall_time", "drop"], "along": {"phase": [0.0, 0.5, 1.0]}}
+STUDIES = {
+    "one cell": {"axes": {"height": [2.0]}},
+    "a line": {"axes": {"height": np.arange(1.0, 26)}, **PHASE},
+    "a box": {"axes": {"height": np.arange(1.0, 7), "v0": np.arange(5.0), "method": ["exact", "rough"]}, **PHASE},
+    "a zip": {"axes": {"height": np.arange(1.0, 12), "v0": np.arange(11.0)}, "design": "zip"},
+    "a summary": {"axes": {"height": np.arange(1.0, 40), "v0": [0.0, 1.0, 2.0]}, "summary": {"over": ["height"]}},
+    "more blocks than a page of HDF5's table holds": {"axes": {"height": np.linspace(1.0, 2.0, 1100)}},
+}
+
+
+def run(path, cells=None, **keys):
+    study = toy_studies.build(**keys)
+    return sweep.run(study, path, progress=False, workers=1, block_cells=cells)
+
+
+@pytest.mark.parametrize("cells", [1, 4, None])
+@pytest.mark.parametrize("name", STUDIES)
+def test_plain_readers_find_the_numbers_and_all_that_is_said_of_them(tmp_path, name, cells):
+    path = tmp_path / "out.h5"
+    with run(path, cells, **STUDIES[name]) as found, run(None, **STUDIES[name]) as wanted:
+        for engine in ("h5netcdf", "netcdf4"):
+            with xr.open_dataset(path, engine=engine) as plain:
+                xr.testing.assert_equal(plain.astype(found.dtypes), wanted)
+                assert {n: plain[n].attrs["units"] for n in plain if "units" in plain[n].attrs} == {
+                    n: wanted[n].attrs["units"] for n in wanted if "units" in wanted[n].attrs
+                }
+        with h5py.File(path) as file:
+            for column in wanted.data_vars:
+                np.testing.assert_array_equal(file[column][()], wanted[column].values)
+
+
+@pytest.mark.parametrize("cells", [10, 1000, 50_000])
+def test_the_size_of_a_result_is_known_before_it_is_computed(tmp_path, cells):
+    keys = {"axes": {"height": np.linspace(1.0, 2.0, 50_000)}, "outputs": ["fall_time"], "method": "exact"}
+    study = toy_studies.build(**keys)
+    schema = output_schema(study, {})
+    found = expected_size(schema, cuts_of(study, schema, boxes(schema.grid.shape, cells)))
+    run(tmp_path / "out.h5", cells, **keys).close()
+    assert (tmp_path / "out.h5").stat().st_size == pytest.approx(found, rel=0.05)
+
+
+def retold(path, number):
+    """The file with another number of its format, and sealed."""
+    content = path.read_bytes()
+    mark = content[-12:]
+    (length,) = struct.unpack("<I", content[-16:-12])
+    text = json.dumps({**json.loads(content[-32 - length : -32]), "format": number}).encode()
+    seal = xxhash.xxh3_128(text).digest() + struct.pack("<I", len(text)) + mark
+    path.write_bytes(content[: -32 - length] + text + seal)
+
+
+@pytest.mark.parametrize("number", [1, 3, 4])
+def test_a_file_of_another_format_is_refused_by_its_number(tmp_path, number):
+    path = tmp_path / "out.h5"
+    run(path, axes={"height": [1.0, 2.0]}).close()
+    if number == 1:
+        path.write_bytes(path.read_bytes() + b"foliot seal\n")  # how files of formats 1 and 2 end
+    else:
+        retold(path, number)
+    for function in (sweep.open_result, sweep.verify):
+        if number == 3:
+            function(path)
+        else:
+            with pytest.raises(sweep.SweepError, match="this version of foliot reads format 3 alone"):
+                function(path)
+
+
+def test_digests_reach_the_disk_behind_their_numbers(tmp_path, monkeypatch):
+    """Between the writes of a block's numbers and that of its digests the disk is told to sync."""
+    path, calls = tmp_path / "out.h5", []
+    write, sync = disk.write, disk.sync_numbers
+    monkeypatch.setattr(disk, "write", lambda fd, pieces, at: (calls.append(at), write(fd, pieces, at))[1])
+    monkeypatch.setattr(disk, "sync_numbers", lambda fd: (calls.append("sync"), sync(fd))[1])
+    run(path, 5, **STUDIES["a line"]).close()
+    with h5py.File(path) as file:
+        table = file["integrity/cells_digests"]
+        end = table.id.get_offset() + table.size
+        begin = table.id.get_offset()
+        chunks = {file[name].id.get_chunk_info(k).byte_offset for name in ("fall_time", "status") for k in range(5)}
+    digests = [k for k, at in enumerate(calls) if at != "sync" and begin <= at < end]
+    assert digests
+    for last in digests:
+        numbers = max(k for k, at in enumerate(calls[:last]) if at in chunks)
+        assert "sync" in calls[numbers:last]
+
+
+def test_one_run_at_a_time_writes_to_an_output_and_a_killed_one_blocks_nobody(tmp_path):
+    path = tmp_path / "out.h5"
+    code = f"""
+import time
+from pathlib import Path
+from sweep.file.store import opened
+with opened(Path({str(path)!r})):
+    print("locked", flush=True)
+    time.sleep(60)
+"""
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, env=environment) as other:
+        assert other.stdout.readline() == b"locked\n"
+        with pytest.raises(sweep.SweepError, match="another run"):
+            run(path, axes={"height": [1.0]})
+        other.send_signal(signal.SIGKILL)
+        other.wait()
+        run(path, axes={"height": [1.0]}).close()
+    assert [p.name for p in tmp_path.iterdir()] == ["out.h5"]

@@ -1,0 +1,317 @@
+"""Straight lines in log-log against numpy, scipy and statsmodels: numbers, windows, kinds of scatter, two windows."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import statsmodels.api as sm
+import xarray as xr
+from scipy import stats
+from scipy.linalg import toeplitz
+
+import sweep
+from sweep.laws.lines import KIND_WORDS
+
+N = 14
+T = np.linspace(-1.0, 1.0, N) + 0.02 * np.sin(5.0 * np.arange(N)) + 2.0
+WAVE = np.sin(17.0 * np.arange(N) ** 2 + 0.3)
+"""As good as noise."""
+
+
+def curve(z, t=T, **attrs):
+    """y = e^z at x = e^t"""
+    coords = {"x": ("x", np.exp(t), {"units": "m"})}
+    return xr.DataArray(np.exp(z), coords, ("set", "x")[-np.ndim(z) :], name="y", attrs={"units": "s", **attrs})
+
+
+def kind(found):
+    return KIND_WORDS[int(found.kind)]
+
+
+# numbers of a fit
+
+
+def test_a_line_is_that_of_polyfit_with_its_covariance():
+    rng, t = np.random.default_rng(3), np.linspace(-2.0, 5.0, 31)
+    z = np.log(3) - 0.7 * t + 0.1 * rng.standard_normal(31)
+    fit = sweep.fit_exponent(curve(z, t), "x", noise="independent")
+    (slope, intercept), covariance = np.polyfit(t, z, 1, cov=True)
+    off = z - slope * t - intercept
+    expected = {
+        "exponent": slope,
+        "exponent_error": covariance[0, 0] ** 0.5,
+        "prefactor": np.exp(intercept),
+        "prefactor_error": np.exp(intercept) * covariance[1, 1] ** 0.5,
+        "residual": np.expm1(abs(off).max()),
+        "level": np.exp(z.mean()),
+        "centre": np.exp(t.mean()),
+        "level_error": (off @ off / (t.size - 2) / t.size) ** 0.5,
+        "drift": 2 * np.polyfit(t, z, 2)[0] * np.ptp(t),
+        "points": 31,
+        "low": np.exp(t[0]),
+        "high": np.exp(t[-1]),
+        "start": np.exp(z[0]),
+        "stop": np.exp(z[-1]),
+    }
+    assert {name: float(fit[name]) for name in expected} == pytest.approx(expected, rel=1e-9)
+    assert fit.points.dtype == np.int64
+
+
+def test_known_errors_weigh_the_points_and_make_all_errors_of_a_fit():
+    sigma = np.linspace(0.05, 0.2, N)
+    z = 0.3 - 0.7 * T + 0.5 * sigma * WAVE
+    fit = sweep.fit_exponent(curve(z), "x", sigma=sigma * curve(z))
+    (slope, level), covariance = np.polyfit(T, z, 1, w=1 / sigma, cov="unscaled")
+    reach = stats.norm.ppf(0.975) * covariance[0, 0] ** 0.5
+    expected = {
+        "exponent": slope,
+        "exponent_error": covariance[0, 0] ** 0.5,
+        "exponent_low": slope - reach,
+        "exponent_high": slope + reach,
+        "prefactor_error": np.exp(level) * covariance[1, 1] ** 0.5,
+        "level_error": (sigma**-2).sum() ** -0.5,
+        "centre": np.exp(np.average(T, weights=sigma**-2)),
+    }
+    assert {name: float(fit[name]) for name in expected} == pytest.approx(expected)
+    assert (kind(fit), int(fit.fits)) == ("weighted", 1)
+    assert int(sweep.fit_exponent(curve(z), "x", sigma=0.1 * sigma * curve(z)).fits) == 0
+    # signs in too few runs deny a line that chi-squared allows
+    bent = -0.5 * T[0] * np.ones(40) + 0.5 * np.cos(np.linspace(0, np.pi, 40)) ** 2
+    assert int(sweep.fit_exponent(curve(bent, np.arange(40.0)), "x", sigma=0.3 * np.exp(bent[0])).fits) == 0
+
+
+def test_errors_of_lines_and_of_where_two_meet_are_those_of_repeated_noise():
+    """600 lines at once, since a standard deviation is then known to 3 %; each takes two regressions."""
+    t = np.linspace(-6, 6, 49)
+    z = np.where(t < 0, -t, -t / 3) + 0.05 * np.random.default_rng(5).standard_normal((600, 49))
+    found = sweep.fit_two_laws(
+        curve(z, t), "x", windows=((None, np.exp(-1.0)), (np.exp(1.0), None)), noise="independent"
+    )
+    scatter = float(np.log(found.crossover).std())
+    assert scatter == pytest.approx(float((found.crossover_error / found.crossover).mean()), rel=0.1)
+    fit = sweep.fit_exponent(curve(z[:300], t), "x", (None, np.exp(-1.0)), noise="independent")
+    assert float(fit.exponent.std()) == pytest.approx(float(fit.exponent_error.mean()), rel=0.1)
+    assert float(np.log(fit.level).std()) == pytest.approx(float(fit.level_error.mean()), rel=0.1)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-3])
+def test_the_interval_within_error_bounds_is_all_that_they_can_do_to_a_slope(size):
+    bound = size * np.linspace(0.5, 1.0, N)
+    fit = sweep.fit_exponent(curve(0.3 - 0.7 * T), "x", bound=xr.DataArray(bound, dims="x"))
+    u = T - T.mean()
+    reach = (abs(u) * bound).sum() / (u**2).sum()
+    assert kind(fit) == ("bounded" if size else "exact")
+    assert float(fit.exponent_high + fit.exponent_low) == pytest.approx(-1.4)
+    assert float(fit.exponent_high - fit.exponent_low) == pytest.approx(2 * reach, rel=0.01, abs=1e-13)
+
+
+# kinds of scatter
+
+
+def by_correlation(columns, z):
+    """Errors and interval of the slope, averaged over correlations of neighbours by restricted likelihood and prior."""
+    phis = np.array([*np.arange(-4, 10) / 10, 0.93, 0.96, 0.98, 0.99, 0.995])
+    (n, k), logs, values, errors = columns.shape, [], [], []
+    for phi, width in zip(phis, np.gradient(phis), strict=True):
+        covariance = toeplitz(phi ** np.arange(n)) / (1 - phi**2)
+        fit = sm.GLS(z, columns, sigma=covariance).fit()
+        log = -0.5 * np.linalg.slogdet(covariance)[1] + 0.5 * np.linalg.slogdet(fit.normalized_cov_params)[1]
+        logs.append(log - (n - k) / 2 * np.log(fit.scale) + np.log(width / (1 - phi) ** 0.85))
+        values.append(fit.params[1])
+        errors.append(fit.bse[1])
+    values, errors = np.array(values), np.array(errors)
+    share = np.exp(np.array(logs) - max(logs)) / np.exp(np.array(logs) - max(logs)).sum()
+    mean = share @ values
+    error = (share @ (errors**2 + values**2) - mean**2) ** 0.5
+    return error, lambda slope: share @ stats.t.cdf((slope - values) / errors, n - k)
+
+
+def test_each_kind_of_scatter_that_is_asked_for_has_its_interval():
+    z = 1.0 - 0.5 * T + 0.1 * WAVE * np.exp(T - 2.0)
+    z[3] += 0.5
+    columns, student = sm.add_constant(T), stats.t.ppf(0.95, N - 2)
+    plain = sm.OLS(z, columns).fit()
+    logs = sm.OLS(np.log(np.maximum(plain.resid**2, 1e-6 * np.mean(plain.resid**2))), columns).fit().fittedvalues
+    uneven = sm.WLS(z, columns, weights=np.exp(-logs)).fit(cov_type="HC3")
+    robust = sm.RLM(z, columns, M=sm.robust.norms.TukeyBiweight()).fit()
+    for name, fit in (("independent", plain), ("uneven", uneven), ("outliers", robust)):
+        found = sweep.fit_exponent(curve(z), "x", noise=name, confidence=0.9)
+        slope, error = fit.params[1], fit.bse[1]
+        ends = (slope - student * error, slope + student * error)
+        assert float(found.exponent) == pytest.approx(slope, rel=1e-5)
+        assert float(found.exponent_error) == pytest.approx(error, rel=1e-5)
+        assert (float(found.exponent_low), float(found.exponent_high)) == pytest.approx(ends, rel=1e-5)
+        assert kind(found) == name
+    found = sweep.fit_exponent(curve(z), "x", noise="correlated", confidence=0.9)
+    error, below = by_correlation(columns, z)
+    assert float(found.exponent_error) == pytest.approx(error, rel=1e-6)
+    assert (below(float(found.exponent_low)), below(float(found.exponent_high))) == pytest.approx(
+        (0.05, 0.95), abs=1e-6
+    )
+
+
+def test_the_kind_of_scatter_is_found_and_its_interval_is_no_less_than_that_of_correlated_noise():
+    t = np.linspace(-7, 7, 40)
+    noise = 0.02 * np.random.default_rng(2).standard_normal(40)
+    outlying = noise + 0.5 * (np.arange(40) == 23)
+    for name, z in (("any", noise), ("uneven", noise * np.exp(0.3 * t)), ("outliers", outlying)):
+        found = sweep.fit_exponent(curve(z - 0.5 * t, t), "x")
+        correlated = sweep.fit_exponent(curve(z - 0.5 * t, t), "x", noise="correlated")
+        assert (kind(found), int(found.noisy), int(found.fits)) == (name, 1, 1)
+        if name != "uneven":  # there correlated noise is that of weighted points
+            assert found.exponent_low <= correlated.exponent_low
+            assert found.exponent_high >= correlated.exponent_high
+
+
+def test_without_statsmodels_the_message_names_the_extra():
+    script = (
+        "import sys; sys.modules['statsmodels'] = None; sys.modules['statsmodels.api'] = None\n"
+        "import numpy as np, xarray as xr, sweep\n"
+        "x = np.geomspace(1, 100, 30)\n"
+        "exact = xr.DataArray(x**-0.5, {'x': x}, 'x', name='y')\n"
+        "assert abs(float(sweep.fit_exponent(exact, 'x').exponent) + 0.5) < 1e-12\n"
+        "noise = np.exp(0.1 * np.random.default_rng(0).standard_normal(30))\n"
+        "try: sweep.fit_exponent(exact * noise, 'x')\n"
+        "except sweep.SweepError as error: print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert "-e '.[fit]'" in done.stdout
+
+
+# windows
+
+
+@pytest.mark.parametrize(
+    ("window", "points"),
+    [
+        ((np.nextafter(0.1, 1), np.nextafter(10.0, 0)), 21), ((None, 1.0), 21), ((1.0, None), 21), ((-1.0, None), 41),
+        (None, 41), ((1.0 + 1e-12, None), 20),
+    ],
+)  # fmt: skip
+def test_a_window_holds_its_ends_to_rounding_and_may_be_open(window, points):
+    t = np.linspace(-2, 2, 41) * np.log(10)
+    assert int(sweep.fit_exponent(curve(t, t), "x", window).points) == points
+
+
+def test_missing_points_are_left_out_and_lines_without_three_are_nan():
+    t = np.linspace(0, 1, 11)
+    y = curve(np.stack([2 * t] * 3), t)
+    y[0, ::2], y[1, 2:] = np.nan, np.nan
+    fit = sweep.fit_exponent(y, "x")
+    assert fit.points.values.tolist() == [5, 2, 11]
+    np.testing.assert_allclose(fit.exponent, [2, np.nan, 2], rtol=1e-12)
+    assert float(fit.low[0]) == pytest.approx(np.exp(t[1]))
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"window": (200, 300)}, "found 0 of y in the window"),
+        ({"window": (8, 10)}, "found 1 of y"),
+        ({"window": (5, 1)}, "is empty"),
+        ({"window": (2, 2)}, "is empty"),
+        ({"window": (1, np.nan)}, "is empty"),
+        ({"window": (1, 2, 3)}, "is a pair"),
+        ({"window": ("one", 2)}, "is a pair"),
+        ({"window": 5.0}, "is a pair"),
+        ({"noise": "pink"}, "noise: expected True, False or one of independent"),
+        ({"sigma": -1.0}, "sigma: errors are not negative"),
+        ({"sigma": xr.DataArray(np.ones(3), dims="other")}, "sigma: expected a number, or an array"),
+        ({"bound": "much"}, "bound: expected a number"),
+        ({"bound": [0.1, 0.2]}, "bound: expected a number"),
+        ({"confidence": 95}, "confidence"),
+        ({"confidence": 0.0}, "confidence"),
+        ({"confidence": np.nan}, "confidence"),
+        ({"towards": "top"}, "towards"),
+        ({"towards": "high", "window": (1, 20)}, "towards"),
+    ],
+)
+def test_what_a_line_cannot_be_fitted_with_is_refused(keys, message):
+    with pytest.raises(sweep.SweepError, match=message):
+        sweep.fit_exponent(curve(T), "x", **keys)
+
+
+def test_values_that_are_not_positive_are_shown_with_their_place():
+    y = curve(np.zeros(4), np.log([1.0, 2.0, 3.0, 4.0])).copy(data=[1.0, -0.25, 3.0, 0.0])
+    with pytest.raises(sweep.SweepError, match=r"2 of 4 of y .* -0.25 at x = 2"):
+        sweep.fit_exponent(y, "x")
+
+
+def test_a_result_states_the_errors_of_its_cells_by_cell_or_as_a_whole():
+    mu = {"spacing": "log", "start": 1e4, "stop": 1e9, "num": 13}
+    ds = sweep.run(kernel="foliot", axes={"mu": mu}, fixed={"a": 1.0, "phi0": 1.0}, rtol=1e-7, progress=False)
+    worse = ds.assign(error_bound=ds.error_bound.copy(data=np.where(np.arange(13) == 4, 1e-3, np.nan)))
+    each = ds.assign_coords(rtol=("mu", np.full(13, 1e-5)))
+    unknown = ds.assign(error_bound=ds.error_bound.copy(data=np.full(13, np.inf)))
+    told = [sweep.local_exponent(ds.period, "mu", error=True, bound=b).exponent_error for b in (0.0, 1e-7, 1e-5, 1.0)]
+    for bound, expected in ((ds, told[1]), (None, told[1]), (each, told[2]), (unknown, told[3])):
+        found = sweep.local_exponent(ds.period, "mu", error=True, bound=bound).exponent_error
+        np.testing.assert_allclose(found, expected)
+    found = sweep.local_exponent(ds.period, "mu", error=True, bound=worse).exponent_error
+    assert {2, 3, 5, 6} <= set(np.flatnonzero(found > told[1] + 1e-6)) <= {0, 1, 2, 3, 4, 5, 6}  # its neighbours
+
+
+# ever smaller windows
+
+
+@pytest.mark.parametrize("end", ["low", "high"])
+def test_windows_shrink_by_half_as_much_again_to_one_end(end):
+    """Of 41 points over four decades, eight are in 10^(0.7) and more."""
+    x = np.geomspace(1, 1e4, 41)
+    found = sweep.fit_exponent(curve(-0.5 * np.log(x), np.log(x)), "x", towards=end)
+    steps = np.floor(40 * 1.5 ** -np.arange(5.0) + 1e-9)
+    assert found.points.values.tolist() == (steps + 1).tolist()
+    lows, highs = (10 ** (4 - steps / 10), 1e4) if end == "high" else (1.0, 10 ** (steps / 10))
+    np.testing.assert_allclose(found.low, lows, rtol=1e-9)
+    np.testing.assert_allclose(found.high, highs, rtol=1e-9)
+
+
+def test_a_plateau_is_found_where_there_is_one_and_denied_where_the_exponent_goes_on():
+    x = np.geomspace(1e-3, 1e5, 161)
+    noise = 0.01 * np.random.default_rng(3).standard_normal(161)
+    low = sweep.fit_exponent(curve(np.log(1 / x + x**-0.5 * 1e-6) + noise, np.log(x)), "x", towards="low").attrs
+    assert low["plateau"] == 1
+    assert low["exponent_low"] <= -1 <= low["exponent_high"]
+    x = np.geomspace(0.8, 1e4, 41)
+    goes_on = sweep.fit_exponent(curve(np.log(x**-0.5 * np.log(2 * x)), np.log(x)), "x", towards="high")
+    assert goes_on.attrs["plateau"] == 0
+    assert "no plateau" in goes_on.attrs["verdict"]
+    for y in (curve(np.zeros((2, N))), curve(T)[:5]):
+        with pytest.raises(sweep.SweepError, match=r"one line|at least 8 points"):
+            sweep.fit_exponent(y, "x", towards="high")
+
+
+# where the lines of two windows meet
+
+
+def test_two_power_laws_meet_where_they_are_equal_in_either_order():
+    t = np.linspace(-14, 14, 481)
+    y = curve(np.where(t < 0, np.log(8) - t, np.log(5) - t / 3), t)
+    for windows in (((None, 0.1), (10, None)), ((10, None), (None, 0.1)), ((None, 0.9), (2, None))):
+        met = sweep.fit_two_laws(y, "x", windows=windows)
+        assert float(met.crossover) == pytest.approx(1.6**1.5, rel=1e-11)
+        assert float(met.level) == pytest.approx(8 / 1.6**1.5, rel=1e-11)
+        assert float(met.crossover_error) < 1e-10
+        slopes = [-1, -1 / 3] if windows[0][0] is None else [-1 / 3, -1]
+        np.testing.assert_allclose(met.exponent, slopes, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("slopes", "windows", "message"),
+    [
+        ((-0.5, -0.5), ((None, 0.5), (2, None)), "the same exponent"),
+        ((-1.0, -0.5), ((None, 1), (0.5, None)), "overlap"),
+        ((-1.0, -0.5), ((0.5, None), (None, 1)), "overlap"),
+        ((-1.0, -0.5), (1, 2, 3), "windows"),
+        ((-1.0, -0.5), ((None, 1), (1, None)), None),  # an end may be shared
+    ],
+)
+def test_laws_that_do_not_meet_and_windows_that_overlap_are_refused(slopes, windows, message):
+    t = np.linspace(-2, 2, 41)
+    y = curve(np.where(t < 0, slopes[0], slopes[1]) * t, t)
+    if message is None:
+        assert float(sweep.fit_two_laws(y, "x", windows=windows).crossover) == pytest.approx(1)
+        return
+    with pytest.raises(sweep.SweepError, match=message):
+        sweep.fit_two_laws(y, "x", windows=windows)

@@ -1,0 +1,30 @@
+"""Tables in a terminal."""
+
+import os
+
+import pytest
+
+from sweep import words as table
+
+WORDS = "one two three four five six seven eight nine ten eleven twelve thirteen fourteen"
+
+
+@pytest.mark.parametrize("wide", [20, 30, 40, 60, 80, 200])
+def test_cells_are_wrapped_until_the_table_is_no_wider_than_the_terminal(monkeypatch, wide):
+    monkeypatch.setattr("shutil.get_terminal_size", lambda fallback: os.terminal_size((wide, 24)))
+    told = table.columns([("name", WORDS[:30], WORDS), (WORDS[10:40], "n", "short")])
+    assert max(map(len, told.splitlines())) <= max(wide, len("  three  three  fourteen"))
+    assert sorted(told.split()) == sorted(f"name {WORDS[:30]} {WORDS} {WORDS[10:40]} n short".split())
+    assert len(table.columns([(WORDS, WORDS)], wide=True).splitlines()[0]) > len(WORDS) + 10
+
+
+def test_what_a_terminal_would_obey_is_shown():
+    assert table.printable("a\x1b[31m\x7f\x9f\xa0\n\tb\r") == "a\\x1b[31m\\x7f\\x9f\xa0\n\tb\\x0d"
+    assert table.printable("\x00\x1f \udc80") == "\\x00\\x1f \\udc80"
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+x", "-x", "@x", "\tx", "\rx"])
+def test_a_formula_of_a_spreadsheet_begins_with_an_apostrophe_and_no_number_does(text):
+    assert table.cell(text) == f"'{text}"
+    for value in ("-1.5", "+3e4", "-inf", "x=1", "", 3.0, None):
+        assert table.cell(value) == value
