@@ -1,7 +1,8 @@
-"""Words for people: tables of text, times, sizes, and what was found where something else is taken."""
+"""Words for people: tables, lists, the word that was meant, times, sizes, and what was found instead."""
 
 from __future__ import annotations
 
+import difflib
 import itertools
 import math
 import operator
@@ -10,6 +11,7 @@ import re
 import shutil
 import textwrap
 from collections.abc import Iterable, Sequence
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -47,31 +49,61 @@ def width() -> int:
     return shutil.get_terminal_size((80, 24)).columns
 
 
-def columns(rows: Iterable[Sequence[str]], indent: str = "  ", wide: bool = False) -> str:
-    """Rows with their cells one below the other, no wider than the terminal where words allow it.
+class Table:
+    """Rows of texts, one cell below the other; as text for a terminal, as HTML for a page. Nothing where no rows are.
 
-    The last cell is wrapped, down to `LAST` characters; where that is not enough, so are the widest, unless the table
-    may be `wide`.
+    Parameters
+    ----------
+    rows : iterable of sequences of str
+        All of one length.
+    headings : sequence of str
+        Of the columns.
+    title : str
+        Stands above the table.
     """
-    rows = [list(row) for row in rows]
-    if not rows:
-        return ""
-    texts = list(zip(*rows, strict=True))
-    widths = [max(map(len, column)) for column in texts]
-    words = [max((len(word) for text in column for word in text.split()), default=0) for column in texts]
-    # a column that is empty everywhere takes no room
-    room = width() - len(indent) - 2 * sum(map(bool, widths[:-1]))
-    widths[-1] = min(widths[-1], max(room - sum(widths[:-1]), LAST))
-    while not wide and sum(widths) > room and any(map(operator.gt, widths, words)):
-        widest = max((size, i) for i, size in enumerate(widths) if size > words[i])[1]
-        widths[widest] -= 1
-    lines = []
-    for row in rows:
-        cells = [_wrapped(text, size) for text, size in zip(row, widths, strict=True)]
-        for parts in list(itertools.zip_longest(*cells, fillvalue="")) or [()]:
-            beside = zip(parts, widths, strict=False)
-            lines.append((indent + "".join(part.ljust(size + 2 if size else 0) for part, size in beside)).rstrip())
-    return "\n".join(lines)
+
+    def __init__(self, rows: Iterable[Sequence[str]], headings: Sequence[str] = (), title: str = "") -> None:
+        self.rows, self.headings, self.title = [list(row) for row in rows], list(headings), title
+
+    def text(self, indent: str = "  ", wide: bool = False) -> str:
+        """Lines no wider than the terminal, where words allow it.
+
+        The last cell is wrapped, down to `LAST` characters; where that is not enough, so are the widest, unless the
+        table may be `wide`.
+        """
+        if not self.rows:
+            return ""
+        rows = [self.headings, *self.rows] if self.headings else self.rows
+        texts = list(zip(*rows, strict=True))
+        widths = [max(map(len, column)) for column in texts]
+        words = [max((len(word) for text in column for word in text.split()), default=0) for column in texts]
+        # a column that is empty everywhere takes no room
+        room = width() - len(indent) - 2 * sum(map(bool, widths[:-1]))
+        widths[-1] = min(widths[-1], max(room - sum(widths[:-1]), LAST))
+        while not wide and sum(widths) > room and any(map(operator.gt, widths, words)):
+            widest = max((size, i) for i, size in enumerate(widths) if size > words[i])[1]
+            widths[widest] -= 1
+        lines = [self.title] if self.title else []
+        for row in rows:
+            cells = [_wrapped(text, size) for text, size in zip(row, widths, strict=True)]
+            for parts in list(itertools.zip_longest(*cells, fillvalue="")) or [()]:
+                beside = zip(parts, widths, strict=False)
+                lines.append((indent + "".join(part.ljust(size + 2 if size else 0) for part, size in beside)).rstrip())
+        return "\n".join(lines)
+
+    def html(self) -> str:
+        """`<h2>` and `<table>`, with the texts escaped; notebooks would align cells to the right by themselves."""
+        if not self.rows:
+            return ""
+        title = f"<h2>{escape(self.title)}</h2>\n" if self.title else ""
+        lines = [("th", self.headings)] * bool(self.headings) + [("td", row) for row in self.rows]
+        body = ["".join(f"<{tag} style='text-align:left'>{escape(text)}</{tag}>" for text in row) for tag, row in lines]
+        return f"{title}<table>{''.join(f'<tr>{cells}</tr>' for cells in body)}</table>"
+
+
+def columns(rows: Iterable[Sequence[str]], indent: str = "  ", wide: bool = False) -> str:
+    """The text of a `Table`."""
+    return Table(rows).text(indent, wide)
 
 
 def paragraph(text: str) -> str:
@@ -85,14 +117,41 @@ def _wrapped(text: str, size: int) -> list[str]:
 
 
 def section(title: str, rows: Iterable[Sequence[str]]) -> str:
-    """A title with rows below it; nothing where there are none."""
-    rows = list(rows)
-    return f"{title}\n{columns(rows)}" if rows else ""
+    """The text of a `Table` with a title."""
+    return Table(rows, title=title).text()
 
 
 def page(*sections: str) -> str:
     """Sections with an empty line between them."""
     return "\n\n".join(text for text in sections if text)
+
+
+def listed(words: Iterable[str], quote: bool = False, word: str = "or") -> str:
+    """'a, b or c', at most a dozen of them."""
+    texts = [f'"{w}"' if quote else w for w in words]
+    if len(texts) > 12:
+        texts = [*texts[:11], f"{len(texts) - 11} more"]
+    return f" {word} ".join([", ".join(texts[:-1]), texts[-1]]) if len(texts) > 1 else "".join(texts)
+
+
+def quoted(words: Iterable[str]) -> str:
+    """'"a", "b"'."""
+    return ", ".join(f'"{word}"' for word in words)
+
+
+def did_you_mean(found: Any, words: Iterable[str]) -> str:
+    """'; did you mean x?', or nothing where no word is near."""
+    near = nearest(found, words)
+    return f"; did you mean {near}?" if near else ""
+
+
+def nearest(found: Any, words: Iterable[str]) -> str:
+    """The word that is most like what was found; "" where none is."""
+    if not isinstance(found, str):
+        return ""
+    by_lower = {w.lower(): w for w in words}
+    near = difflib.get_close_matches(found.lower(), by_lower, n=1, cutoff=0.5)
+    return by_lower[near[0]] if near else ""
 
 
 def speed(rate: float) -> str:

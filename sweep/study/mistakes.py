@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import numbers
 import re
@@ -11,6 +10,10 @@ from typing import Any
 
 from kernels.interface import Field
 from sweep.errors import Mistake, StudyError
+from sweep.words import did_you_mean as did_you_mean
+from sweep.words import listed as listed
+from sweep.words import nearest as nearest
+from sweep.words import quoted as quoted
 
 
 class Mistakes:
@@ -167,19 +170,6 @@ def show(value: Any) -> str:
     return f"a {type(value).__name__}"
 
 
-def listed(words: Iterable[str], quote: bool = False, word: str = "or") -> str:
-    """'a, b or c', at most a dozen of them."""
-    texts = [f'"{w}"' if quote else w for w in words]
-    if len(texts) > 12:
-        texts = [*texts[:11], f"{len(texts) - 11} more"]
-    return f" {word} ".join([", ".join(texts[:-1]), texts[-1]]) if len(texts) > 1 else "".join(texts)
-
-
-def quoted(words: Iterable[str]) -> str:
-    """'"a", "b"'."""
-    return ", ".join(f'"{word}"' for word in words)
-
-
 def limits(field: Field) -> str:
     """'> 0', '0 to 1', or the words it takes."""
     if field.choices:
@@ -189,18 +179,3 @@ def limits(field: Field) -> str:
     below = float(f"{field.upper:g}") > field.upper
     high = f"{'<' if below else '<='} {field.upper:g}" if field.upper < math.inf else ""
     return ", ".join(filter(None, [low, high]))
-
-
-def did_you_mean(found: Any, words: Iterable[str]) -> str:
-    """'; did you mean x?', or nothing where no word is near."""
-    near = nearest(found, words)
-    return f"; did you mean {near}?" if near else ""
-
-
-def nearest(found: Any, words: Iterable[str]) -> str:
-    """The word that is most like what was found; "" where none is."""
-    if not isinstance(found, str):
-        return ""
-    by_lower = {w.lower(): w for w in words}
-    near = difflib.get_close_matches(found.lower(), by_lower, n=1, cutoff=0.5)
-    return by_lower[near[0]] if near else ""

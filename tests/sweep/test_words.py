@@ -1,6 +1,7 @@
 """Tables in a terminal."""
 
 import os
+import re
 
 import pytest
 
@@ -16,6 +17,16 @@ def test_cells_are_wrapped_until_the_table_is_no_wider_than_the_terminal(monkeyp
     assert max(map(len, told.splitlines())) <= max(wide, len("  three  three  fourteen"))
     assert sorted(told.split()) == sorted(f"name {WORDS[:30]} {WORDS} {WORDS[10:40]} n short".split())
     assert len(table.columns([(WORDS, WORDS)], wide=True).splitlines()[0]) > len(WORDS) + 10
+
+
+def test_a_table_is_text_and_html_and_nothing_without_rows():
+    told = table.Table([("a<b", "1"), ("c", "22")], ("name", "count"), "Title")
+    assert told.text() == "Title\n  name  count\n  a<b   1\n  c     22"
+    assert re.sub(" style='[^']*'", "", told.html()) == (
+        "<h2>Title</h2>\n<table><tr><th>name</th><th>count</th></tr>"
+        "<tr><td>a&lt;b</td><td>1</td></tr><tr><td>c</td><td>22</td></tr></table>"
+    )
+    assert table.Table([], ("name",), "Title").text() == table.Table([], ("name",)).html() == ""
 
 
 def test_what_a_terminal_would_obey_is_shown():
