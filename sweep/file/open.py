@@ -69,16 +69,26 @@ def open_result(path: str | os.PathLike[str], strict: bool = False) -> xr.Datase
     True s
     """
     output = as_path(path)
-    for _ in range(3):
-        if output.exists():
-            return _open(output)
-        if not unfinished_of(output).exists():
+    while True:
+        place = output if output.exists() else unfinished_of(output)
+        before = _identity(place)
+        if before is None:
             raise SweepError(f"{output}: no such file, and no sweep that writes it")
         try:
-            return open_unfinished(output, strict)
-        except FileNotFoundError:
-            continue  # the sweep has ended meanwhile
-    raise SweepError(f"{output}: is vanishing while it is read; try again")
+            return _open(output) if place == output else open_unfinished(output, strict)
+        except (SweepError, FileNotFoundError):
+            # a sweep that ends, or begins anew, puts another file there meanwhile
+            if _identity(place) == before:
+                raise
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """Which file has a name at this moment; None: none has."""
+    try:
+        found = path.stat()
+    except (FileNotFoundError, NotADirectoryError, ValueError):
+        return None
+    return found.st_dev, found.st_ino
 
 
 def open_unfinished(path: str | os.PathLike[str], strict: bool = False) -> xr.Dataset:
