@@ -1,7 +1,7 @@
 """Which methods are tried on which cells, and in which order.
 
 A method that is named must do every term of its study. `auto` asks it of each cell alone: what becomes of a cell does
-not hang on the others of its study. Only where every method lacks some term of a study is the study refused whole.
+not depend on the others of its study. Only where every method lacks some term of a study is the study refused whole.
 """
 
 from __future__ import annotations
@@ -12,39 +12,26 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.interface import Kernel
 from sweep.cells.grid import Grid
 from sweep.study.model import Study
 
-Mask = NDArray[np.bool_]
-
 
 class Absent(NamedTuple):
-    """That a term is absent: a parameter has its default.
-
-    Attributes
-    ----------
-    place : int
-        Position of the parameter.
-    default : float
-    like : int or None
-        Position of the parameter whose value is the default, if it is one's.
-    """
+    """That a term is absent: the parameter at position `place` has its default, a number or that at position `like`."""
 
     place: int
     default: float
     like: int | None
 
-    def holds(self, columns: Sequence[Any] | Mapping[int, Any]) -> Mask:
+    def holds(self, columns: Sequence[Any] | Mapping[int, Any]) -> NDArray[np.bool_]:
         """In which cells."""
-        same: Mask = columns[self.place] == (self.default if self.like is None else columns[self.like])
-        return same if same.ndim == 1 else np.logical_and.reduce(same, axis=1)
+        same = columns[self.place] == (self.default if self.like is None else columns[self.like])
+        return np.asarray(same if same.ndim == 1 else same.all(axis=1))
 
     def everywhere(self, grid: Grid) -> bool | None:
-        """Whether it holds in all cells of a grid, or in none; None: that hangs on the cell."""
+        """Whether it holds in all cells of a grid, or in none; None: that depends on the cell."""
         columns = {place: grid.spread(place) for place in (self.place, self.like) if place is not None}
-        varying = [column is None or len(column) > 1 for column in columns.values()]
-        if any(column is None for column in columns.values()) or sum(varying) > 1:
+        if sum(2 if column is None else len(column) > 1 for column in columns.values()) > 1:
             return None
         found = self.holds(columns)
         return bool(found[0]) if found.all() or not found.any() else None
@@ -78,9 +65,15 @@ class Turn(NamedTuple):
 
 def turns(study: Study, grid: Grid) -> tuple[Turn, ...]:
     """Turns of the methods that give every output asked for and can do some cell of the grid."""
+    places = {field.name: place for place, field in enumerate(study.kernel.parameters)}
     found: dict[float, Turn] = {}
     for number, method in enumerate(study.kernel.methods):
-        terms = [_absent(study.kernel, name) for name in method.excludes]
+        defaults = {name: study.kernel.parameter(name).default for name in method.excludes}
+        terms = [
+            Absent(places[name], np.nan, places[d]) if isinstance(d, str)
+            else Absent(places[name], np.nan if d is None else d, None)
+            for name, d in defaults.items()
+        ]  # fmt: skip
         known = [term.everywhere(grid) for term in terms]
         if False in known or not set(study.outputs).isdisjoint(method.lacks):
             continue
@@ -91,19 +84,8 @@ def turns(study: Study, grid: Grid) -> tuple[Turn, ...]:
     return tuple(found[place] for place in sorted(found))
 
 
-def _absent(kernel: Kernel, name: str) -> Absent:
-    places = {field.name: place for place, field in enumerate(kernel.parameters)}
-    default = kernel.parameter(name).default
-    if isinstance(default, str):
-        return Absent(places[name], np.nan, places[default])
-    return Absent(places[name], np.nan if default is None else default, None)
-
-
 def usable_methods(study: Study) -> tuple[int, ...]:
     """Numbers of the methods that can do every term the study sets and give every output it asks for."""
+    terms, outputs = study.terms, set(study.outputs)
     methods = enumerate(study.kernel.methods)
-    return tuple(
-        number
-        for number, method in methods
-        if study.terms.isdisjoint(method.excludes) and set(study.outputs).isdisjoint(method.lacks)
-    )
+    return tuple(k for k, m in methods if terms.isdisjoint(m.excludes) and outputs.isdisjoint(m.lacks))

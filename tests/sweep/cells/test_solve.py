@@ -1,5 +1,6 @@
 """Which method a cell gets, and what is said of it."""
 
+import doctest
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from toy import KERNEL
 
 import sweep
 from kernels.interface import FIRST_REFUSAL, Status
+from sweep.cells import solve
 from sweep.cells.solve import NONE, STRIP, UNKNOWN, among
 
 
@@ -61,3 +63,9 @@ def test_auto_does_not_deny_what_an_impact_clock_does_where_following_it_leaves_
     assert open_.sum() > 20
     assert (status == followed).all()
     assert (used == np.where(open_, NONE, 1)).all()
+
+
+def test_the_worked_example_comes_out_as_it_stands_there():
+    found = doctest.testmod(solve)
+    assert found.attempted
+    assert not found.failed
