@@ -78,21 +78,14 @@ def refined(function, axes, tolerance):
     names = NAMES[:axes]
 
     def solved(values):
-        return dataset_of(function, [axis.values for axis in values.values()], ("cell",))
+        return dataset_of(function, list(values.values()), ("cell",))
 
-    def written(values, arrays, attributes):
-        columns = {name: ("cell", array) for name, array in arrays.items()}
-        return xr.Dataset(columns, {name: ("cell", axis.values) for name, axis in values.items()}, attributes)
-
-    study = SimpleNamespace(
-        axes={n: Axis(n, g, "values") for n, g in zip(names, grid, strict=True)}, design="product", outputs=("value",)
-    )
+    study = SimpleNamespace(axes={n: Axis(n, g, "values") for n, g in zip(names, grid, strict=True)}, design="product")
     first = dataset_of(function, np.meshgrid(*grid, indexing="ij"), names)
     first = first.assign_coords(dict(zip(names, grid, strict=True)))
-    output = SimpleNamespace(study=study, solved=solved, written=written)
-    found = Refiner(first, output, ["value"], tolerance, MOST_CELLS).refined()
-    points = np.stack([found.dataset[name].values for name in names], axis=1)
-    return points, found.dataset["value"].values, found
+    cells = Refiner(first, study, ["value"], tolerance, MOST_CELLS, solved)
+    cells.refine()
+    return cells.points, cells.column("value"), cells.report(first)
 
 
 def true_error(function, points, values):

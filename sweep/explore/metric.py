@@ -25,48 +25,37 @@ STRAIGHT = 1e-9
 
 def stretch(points: Array, heights: Array) -> Array:
     """Matrix (axes, axes) that places (n, axes) in a box are multiplied by before cells of these heights are joined."""
-    axes = points.shape[1]
+    axes, valued = points.shape[1], np.isfinite(heights)
     found = np.eye(axes)
-    if axes == 1 or are_too_few(points[np.isfinite(heights)]):
+    if axes == 1 or are_too_few(points[valued]):
         return found
     for _ in range(ROUNDS):
-        found = stretched_by(points, heights, simplices(points @ found), found)
+        corners = simplices(points @ found)
+        corners = np.searchsorted(np.flatnonzero(valued), corners[valued[corners].all(axis=1)])
+        if not len(corners):
+            return np.eye(axes)
+        around = with_beyond(corners)[:: len(corners) // MOST + 1]
+        inside = points[valued]
+        sizes, directions = np.linalg.eigh(_second_derivatives(inside @ found, heights[valued], around))
+        bends = (directions * abs(sizes)[:, None]) @ directions.transpose(0, 2, 1)
+        volumes = abs(np.linalg.det(inside[around[:, 1 : axes + 1]] - inside[around[:, :1]]))
+        # the square root of the mean, over its largest eigenvalue
+        sizes, directions = np.linalg.eigh(found @ np.average(bends, axis=0, weights=volumes) @ found.T)
+        if sizes.max() <= STRAIGHT:
+            return np.eye(axes)
+        found = (directions * np.sqrt(np.maximum(sizes / sizes.max(), FLATTEST))) @ directions.T
     return found
-
-
-def stretched_by(points: Array, heights: Array, corners: Indices, stretched: Array) -> Array:
-    """That matrix by one round, from simplices of the box multiplied by another matrix."""
-    valued = np.isfinite(heights)
-    corners = np.searchsorted(np.flatnonzero(valued), corners[valued[corners].all(axis=1)])
-    points, heights = points[valued], heights[valued]
-    if are_too_few(points) or not len(corners):
-        return np.eye(len(stretched))
-    around = with_beyond(corners)[:: len(corners) // MOST + 1]
-    corners = around[:, : corners.shape[1]]
-    sizes, directions = np.linalg.eigh(_second_derivatives(points @ stretched, heights, around))
-    bends = (directions * abs(sizes)[:, None]) @ directions.transpose(0, 2, 1)
-    volumes = abs(np.linalg.det(points[corners[:, 1:]] - points[corners[:, :1]]))
-    return _root(stretched @ np.average(bends, axis=0, weights=volumes) @ stretched.T)
 
 
 def _second_derivatives(points: Array, heights: Array, around: Indices) -> Array:
     """H (m, axes, axes) over each simplex: c_ij = -e_ij H e_ij / 2 of its edges."""
     axes = points.shape[1]
     pairs, (row, column) = edges(axes), np.triu_indices(axes)
-    bend = parabolas(points, heights, around).bend
+    bend, _ = parabolas(points, heights, around)
     edge = points[around[:, pairs[:, 0]]] - points[around[:, pairs[:, 1]]]
     products = -edge[:, :, row] * edge[:, :, column] * np.where(row == column, 0.5, 1.0)
     scale = abs(products).max(axis=(1, 2))[:, None]
     entries = np.linalg.solve(products / scale[:, :, None], (bend / scale)[:, :, None])[:, :, 0]
     found = np.empty((len(around), axes, axes))
     found[:, row, column] = found[:, column, row] = entries
-    return found
-
-
-def _root(bend: Array) -> Array:
-    """Square root of a matrix over its largest eigenvalue."""
-    sizes, directions = np.linalg.eigh(bend)
-    if sizes.max() <= STRAIGHT:
-        return np.eye(len(bend))
-    found: Array = (directions * np.sqrt(np.maximum(sizes / sizes.max(), FLATTEST))) @ directions.T
     return found

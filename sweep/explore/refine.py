@@ -1,11 +1,11 @@
 """Cells where they are needed: a finished sweep refined until straight lines between cells are right to a tolerance.
 
-Cells are joined to simplices, intervals along one axis, in a box stretched to where an output bends (see
-`analysis.metric`). What is there is judged first: the cells around a simplex tell how far straight lines are off in it
-(`analysis.mesh`). Where that is more than the tolerance, the edge that bends most is cut in the middle, and the cells
-around are judged again. So is the edge across a border between statuses, down to a fixed share of the first grid's
-step. What is judged is logarithmic where values are positive, as a scaling law wants it; elsewhere errors are relative
-to the largest value.
+Cells are joined to simplices, intervals along one axis, in a box stretched to where an output bends (see `metric`).
+What is there is judged first: the cells around a simplex tell how far straight lines are off in it (`mesh`). Where that
+is more than the tolerance, the edge that bends most is cut in the middle, and the cells around are judged again. So is
+the edge across a border between statuses, down to a fixed share of the first grid's step. Where values scatter, so that
+further cells are off as much as those before, none are added. What is judged is logarithmic where values are positive,
+as a scaling law wants it; elsewhere errors are relative to the largest value.
 
 Cells of one axis are a sweep over its values like any other. Cells of more axes lie anywhere, as those of a zip design.
 """
@@ -14,24 +14,27 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import json
 import os
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kernels.interface import Status
-from sweep.cells.schema import STATUS, cell_schema
+from sweep.cells.fingerprint import fingerprint
+from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
 from sweep.errors import SweepError
 from sweep.explore.mesh import Array
 from sweep.explore.refiner import Refinement, Refiner
-from sweep.explore.scattered import MOST_AXES, axes_of
+from sweep.explore.scattered import MOST_AXES, REFINED_TO, axes_of
 from sweep.file import disk
+from sweep.file.open import in_memory, open_result
 from sweep.file.overwriting import check_target
-from sweep.study.model import Axis, Study
+from sweep.runs.run import run, store_cells
+from sweep.study.model import Axis, Study, frozen
 from sweep.study.read import study as as_study
 from sweep.words import as_path, require_dataset
 
@@ -95,84 +98,45 @@ def refine(
     study = study or as_study(dataset)
     names = [y] if isinstance(y, str) else list(y)
     _require(dataset, study, names, tolerance)
-    options = {"workers": workers, "isolate": isolate, "cell_timeout": cell_timeout}
-    output = _Output(study, None if path is None else as_path(path), force, options)
-    output.prepare(dataset)
-    found = Refiner(dataset, output, names, tolerance, most_cells).refined()
-    output.tidy()
-    return found
-
-
-@dataclass(frozen=True)
-class _Output:
-    """Solves further cells of a study, each round into a file in a folder, and writes all cells at the end.
-
-    `path`: None: everything stays in memory. `options`: of `run`.
-    """
-
-    study: Study
-    path: Path | None
-    force: bool
-    options: Mapping[str, Any]
-
-    @property
-    def title(self) -> str:
-        return f"{self.study.title}, refined"
-
-    @property
-    def rounds(self) -> Path | None:
-        """The folder of what is computed on the way."""
-        return None if self.path is None else self.path.with_name(f"{self.path.name}.rounds")
-
-    def prepare(self, dataset: xr.Dataset) -> None:
-        """Raises SweepError, before anything is computed, where all cells are not to be written there."""
-        if self.path is None or self.rounds is None:
-            return
+    title = f"{study.title}, refined"
+    target = None if path is None else as_path(path)
+    rounds = None if target is None else target.with_name(f"{target.name}.rounds")
+    if target is not None and rounds is not None:
         source = dataset.encoding.get("source")
-        check_target(self.path, "result", read=[Path(source)] if source else [])
-        self._check_earlier(self.path)
-        try:
-            self.rounds.mkdir(exist_ok=True)
-        except OSError as error:
-            raise disk.refusal(error, self.path) from None
+        check_target(target, "result", read=[Path(source)] if source else [])
+        if target.exists() and not force:
+            with open_result(target) as there:
+                if there.attrs["title"] != title:
+                    raise SweepError(f"{target}: holds another result; name another file, or overwrite it with --force")
+        with disk.refusing(target):
+            rounds.mkdir(exist_ok=True)
 
-    def _check_earlier(self, path: Path) -> None:
-        from sweep.file.open import open_result
+    options: dict[str, Any] = {"workers": workers, "isolate": isolate, "cell_timeout": cell_timeout}
 
-        if path.exists() and not self.force:
-            with open_result(path) as there:
-                if there.attrs["title"] != self.title:
-                    raise SweepError(f"{path}: holds another result; name another file, or overwrite it with --force")
+    def of(values: Mapping[str, Array], design: str = "zip") -> Study:
+        axes = {name: Axis(name, frozen(column), "values") for name, column in values.items()}
+        return dataclasses.replace(study, design=design, blocks=(), axes=axes, title=title)
 
-    def solved(self, axes: dict[str, Axis]) -> xr.Dataset:
-        """Cells with these values."""
-        from sweep.cells.fingerprint import fingerprint
-        from sweep.runs.run import run
-
-        further = self._study(axes)
-        if self.rounds is None:
-            return run(further, progress=False, **self.options)
+    def solve(values: Mapping[str, Array]) -> xr.Dataset:
+        """A round of cells; of one that an earlier call has computed, the file is there."""
+        further = of(values)
+        if rounds is None:
+            return run(further, progress=False, **options)
         name = hashlib.sha256(repr(sorted(fingerprint(further).items())).encode()).hexdigest()[:16]
-        with run(further, self.rounds / f"{name}.h5", **self.options) as found:
+        with run(further, rounds / f"{name}.h5", **options) as found:
             return found.load()
 
-    def written(self, axes: dict[str, Axis], arrays: dict[str, Any], attrs: dict[str, str]) -> xr.Dataset:
-        """All cells, with these values of the axes, outputs and statuses, and further attributes."""
-        from sweep.file.open import in_memory
-        from sweep.runs.run import store_cells
-
-        whole = dataclasses.replace(self._study(axes), design="product" if len(axes) == 1 else "zip")
-        if self.path is None:
-            return in_memory(cell_schema(whole, {}), arrays).assign_attrs(attrs)
-        return store_cells(whole, self.path, arrays, self.force, attrs=attrs)
-
-    def _study(self, axes: dict[str, Axis]) -> Study:
-        return dataclasses.replace(self.study, design="zip", blocks=(), axes=axes, title=self.title)
-
-    def tidy(self) -> None:
-        """Removes what was computed on the way."""
-        if self.rounds is not None:
-            shutil.rmtree(self.rounds, ignore_errors=True)
+    cells = Refiner(dataset, study, names, tolerance, most_cells, solve)
+    cells.refine()
+    order = np.lexsort(cells.values.T[::-1])
+    whole = of(dict(zip(cells.axes, cells.values[order].T, strict=True)), "product" if len(cells.axes) == 1 else "zip")
+    arrays = {name: cells.column(name)[order] for name in (*study.outputs, *ANCILLARY)}
+    attrs = {REFINED_TO: json.dumps(dict.fromkeys(names, tolerance))}
+    if target is None or rounds is None:
+        return cells.report(in_memory(cell_schema(whole, {}), arrays).assign_attrs(attrs))
+    found = cells.report(store_cells(whole, target, arrays, force, attrs=attrs))
+    shutil.rmtree(rounds, ignore_errors=True)
+    return found
 
 
 def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance: float) -> None:
@@ -186,14 +150,12 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
         raise SweepError("only a product of axes can be refined, or what was refined before")
     if len(study.axes) > MOST_AXES:
         raise SweepError(f"at most {MOST_AXES} axes can be refined, found {len(study.axes)}; fix the others")
-    if study.design == "product" and any(_unordered(axis.values) for axis in study.axes.values()):
+    if study.design == "product" and any(
+        len(axis) < 2 or (np.diff(axis.values) <= 0).any() for axis in study.axes.values()
+    ):
         raise SweepError("an axis to be refined needs at least two values, in rising order")
     for name in names:
         if name not in dataset or dataset[name].dims != dataset[STATUS].dims:
             raise SweepError(f"{name}: is no output of one value a cell")
     if bool((dataset[STATUS] == Status.PENDING).any()):
         raise SweepError("the sweep is not finished; run it to its end first")
-
-
-def _unordered(values: Array) -> bool:
-    return len(values) < 2 or bool((np.diff(values) <= 0).any())

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.cells.schema import ANCILLARY, STATUS
+from sweep.cells.schema import STATUS
 from sweep.explore.judge import Judge, Judged
 from sweep.explore.mesh import Array, Indices
-from sweep.explore.scattered import REFINED_TO, Box, heights, kinds
-from sweep.study.model import Axis, Study, frozen
+from sweep.explore.scattered import Box, heights, kinds
+from sweep.study.model import Study
 
 if TYPE_CHECKING:
     import xarray as xr
 
 SAME = 2.0**-40
 """Distance of places along an axis, from 0 to 1, that are the same."""
+Solve = Callable[[Mapping[str, Array]], "xr.Dataset"]
 
 
 @dataclass(frozen=True)
@@ -40,13 +40,15 @@ class Refinement:
         of statuses, nor in `jumps` and `singular`.
     tolerance : float
     complete : bool
-        Whether the tolerance is met; not so where `most_cells` ran out or an output jumps.
+        Whether the tolerance is met; not so where `most_cells` ran out, an output jumps, or is noisy.
     jumps : int
         Places where the tolerance is not met although edges are cut as often as is allowed.
     singular : int
         Likewise, as near borders of statuses as these are known, where values go to infinity or bend without end.
     unseen : dict of str to str
         How far apart cells are along each axis, at most: nothing tells of a peak narrower than that.
+    noise : float
+        How far values scatter, relative, where more cells do not lessen that, so that none were added; 0 where they do.
     """
 
     dataset: xr.Dataset
@@ -58,6 +60,7 @@ class Refinement:
     jumps: int
     singular: int
     unseen: dict[str, str]
+    noise: float = 0.0
 
     def __str__(self) -> str:
         cells = self.dataset[STATUS].size
@@ -65,7 +68,10 @@ class Refinement:
         if len(self.unseen) == 1:
             text += f"; an even grid as fine has {self.uniform:,}"
         text += f"\ninterpolation error left: {self.error:.2g}, as the cells around tell"
-        if self.error > self.tolerance:
+        if self.noise:
+            text += f"; values scatter by {self.noise:.1g} of their size from cell to cell, or bend within less than "
+            text += "the distance of cells, and more cells do not lessen that"
+        elif self.error > self.tolerance:
             text += "; the tolerance is not met everywhere, allow more cells"
         if self.jumps:
             text += f"; not in {self.jumps:,} place{'s' * (self.jumps > 1)} where it jumps or diverges"
@@ -75,79 +81,75 @@ class Refinement:
         return f"{text}\ncells are up to {apart} apart; a peak narrower than that is not seen"
 
 
-class Output(Protocol):
-    """Solves further cells of a study, and writes all at the end."""
-
-    @property
-    def study(self) -> Study: ...
-
-    def solved(self, axes: dict[str, Axis]) -> xr.Dataset:
-        """Cells with these values."""
-
-    def written(self, axes: dict[str, Axis], arrays: dict[str, Any], attrs: dict[str, str]) -> xr.Dataset:
-        """All cells, with these values of the axes, outputs and statuses, and further attributes."""
-
-
 class Refiner:
-    """Cells joined to simplices, whose edges are cut until outputs can be interpolated."""
+    """Cells joined to simplices, whose edges are cut until outputs can be interpolated.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        The first cells.
+    names : sequence of str
+        Outputs.
+    solve : callable
+        Given values of the axes, as a zip of them: a Dataset of these cells.
+
+    Attributes
+    ----------
+    points, values : ndarray, shape (cells, axes)
+        Where the cells lie in a box from 0 to 1, and on the axes.
+    first : int
+        How many cells there were.
+    """
 
     def __init__(
-        self, dataset: xr.Dataset, output: Output, names: Sequence[str], tolerance: float, most_cells: int
+        self, dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance: float, most_cells: int, solve: Solve
     ) -> None:
-        self.output, self.names, self.tolerance, self.most = output, names, tolerance, most_cells
+        self.names, self.tolerance, self.most, self._solve = names, tolerance, most_cells, solve
         self.parts = [_flat(dataset.load())]
-        self.axes = list(output.study.axes)
+        self.axes = list(study.axes)
         first = {name: self.parts[0][name].values for name in self.axes}
         self.box = Box.of(first)
         self.values = np.stack(list(first.values()), axis=1)
         self.points = self.box.points(first)
         self.known = [dict(zip(_keys(t), v, strict=True)) for t, v in zip(self.points.T, self.values.T, strict=True)]
         self.first = len(self.points)
-        product = output.study.design == "product"
+        product = study.design == "product"
         steps = np.array([len(k) - 1 if product else self.first ** (1 / len(self.axes)) for k in self.known])
-        self.judges = [Judge(steps) for _ in names]
+        self.judges = [Judge(steps, tolerance) for _ in names]
+        self.origins = np.stack([np.arange(self.first)] * 2, axis=1)
 
-    def refined(self) -> Refinement:
+    def refine(self) -> None:
         """Rounds of cuts, each of edges that share no end, until nothing is to be cut however outputs are judged."""
-        self._give_every_axis_a_middle()
-        while True:
-            found = self._judged()
-            cuts = self._cuts(found)[: max(0, self.most - len(self.points))]
-            if len(cuts):
-                self._solve(*self._middles(cuts))
-                continue
-            again = [judge.looks_anew(self.points) for judge in self.judges]
-            if not any(again):
-                return self._joined(found, complete=not (found.size > self.tolerance).any())
-
-    def _give_every_axis_a_middle(self) -> None:
-        """Between two values nothing tells whether an output bends."""
+        # between two values nothing tells whether an output bends
         for k, known in enumerate(self.known):
             if len(known) == 2:
-                points = self.points[self.points[:, k] == 0]
-                values = self.values[self.points[:, k] == 0]
+                first = self.points[:, k] == 0
+                points, values = self.points[first], self.values[first]
                 points[:, k], values[:, k] = 0.5, self.box.values(k, np.array([0.5]))
-                self._solve(points, values)
+                self._add(points, values)
+        while True:
+            finite = np.isfinite(np.stack([self.column(name) for name in self.names])).all(axis=0)
+            kind = kinds(self.column(STATUS), finite)
+            parts = [
+                judge.judged(self.points, heights(self.column(name)), kind, self.origins)
+                for name, judge in zip(self.names, self.judges, strict=True)
+            ]
+            self.found = Judged(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+            cuts = self._cuts(self.found)[: max(0, self.most - len(self.points))]
+            if len(cuts):
+                self._add(*self._middles(cuts), cuts)
+                continue
+            again = [judge.looks_anew(len(self.points)) for judge in self.judges]
+            if not any(again):
+                return
 
-    def _judged(self) -> Judged:
-        """Errors over the simplices of each output, and borders between statuses that are to be cut."""
-        kind = self._kinds()
-        found = [
-            judge.judged(self.points, heights(self._column(name)), kind)
-            for name, judge in zip(self.names, self.judges, strict=True)
-        ]
-        return Judged(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
-
-    def _kinds(self) -> Indices:
-        finite = np.isfinite(np.stack([self._column(name) for name in self.names])).all(axis=0)
-        return kinds(self._column(STATUS), finite)
-
-    def _column(self, name: str) -> Any:
+    def column(self, name: str) -> Any:
+        """An output, or what is said of it, of all cells."""
         return np.concatenate([part[name].values for part in self.parts])
 
     def _cuts(self, found: Judged) -> Indices:
         """Edges to cut, worst first; none shares an end with one before, for a cut changes what is known there."""
-        wanted = np.flatnonzero((found.size > self.tolerance) & ~found.finest)
+        wanted = np.flatnonzero((found.size > found.limit) & ~found.finest)
         used = np.zeros(len(self.points), dtype=bool)
         cuts = []
         for first, second in found.ends[wanted[np.argsort(-found.size[wanted], kind="stable")]].tolist():
@@ -165,42 +167,38 @@ class Refiner:
             values[:, k] = [known.setdefault(t, v) for t, v in zip(_keys(points[:, k]), between, strict=True)]
         return points, values
 
-    def _solve(self, points: Array, values: Array) -> None:
-        axes = {name: Axis(name, frozen(column), "values") for name, column in zip(self.axes, values.T, strict=True)}
-        self.parts.append(_flat(self.output.solved(axes)))
+    def _add(self, points: Array, values: Array, ends: Indices | None = None) -> None:
+        """Solves further cells, maybe in the middles between two others."""
+        itself = len(self.points) + np.arange(len(points))
+        self.parts.append(_flat(self._solve(dict(zip(self.axes, values.T, strict=True)))))
         self.points, self.values = np.concatenate([self.points, points]), np.concatenate([self.values, values])
+        self.origins = np.concatenate([self.origins, np.stack([itself] * 2, axis=1) if ends is None else ends])
 
-    def _joined(self, found: Judged, complete: bool) -> Refinement:
-        order = np.lexsort(self.values.T[::-1])
-        axes = {
-            name: Axis(name, frozen(column[order]), "values")
-            for name, column in zip(self.axes, self.values.T, strict=True)
-        }
-        arrays = {name: self._column(name)[order] for name in (*self.output.study.outputs, *ANCILLARY)}
-        left = found.valued & found.finest & (found.size > self.tolerance)
-        told = {REFINED_TO: json.dumps(dict.fromkeys(self.names, self.tolerance))}
+    def report(self, dataset: xr.Dataset) -> Refinement:
+        """What came of it, with the dataset of all cells."""
+        found, axes = self.found, range(len(self.axes))
+        left = found.valued & found.finest & (found.size > found.limit)
         finest = [np.diff(np.unique(t)) for t in self.points.T]
+        width = np.ptp(self.points[found.corners[found.valued]], axis=1).max(axis=0, initial=0.0)
+        low, high = self.box.low, self.box.high
+        apart = [
+            f"a factor {(high[k] / low[k]) ** width[k]:.3g}"
+            if self.box.logarithmic[k]
+            else f"{width[k] * (high[k] - low[k]):.3g}"
+            for k in axes
+        ]
         return Refinement(
-            dataset=self.output.written(axes, arrays, told),
+            dataset=dataset,
             added=len(self.points) - self.first,
             uniform=int(math.prod(round(1 / step[step > SAME].min()) + 1 for step in finest)),
             error=float(found.size[found.valued & ~left].max(initial=0.0)),
             tolerance=self.tolerance,
-            complete=complete,
+            complete=not (found.size > self.tolerance).any(),
             jumps=int((left & ~found.beside).sum()),
             singular=int((left & found.beside).sum()),
-            unseen=self._widest(found.corners[found.valued]),
+            unseen=dict(zip(self.axes, apart, strict=True)),
+            noise=max(judge.noise for judge in self.judges),
         )
-
-    def _widest(self, corners: Indices) -> dict[str, str]:
-        """How far cells are apart, at most, along each axis; a factor where it is taken in logarithms."""
-        width = np.ptp(self.points[corners], axis=1).max(axis=0, initial=0.0)
-        ratio = (self.box.high / np.where(self.box.logarithmic, self.box.low, 1.0)) ** width
-        span = self.box.high - self.box.low
-        return {
-            name: f"a factor {ratio[k]:.3g}" if self.box.logarithmic[k] else f"{width[k] * span[k]:.3g}"
-            for k, name in enumerate(self.axes)
-        }
 
 
 def _keys(places: Array) -> list[float]:

@@ -9,7 +9,6 @@ where it bends (`metric`), so that cells are joined along what it does not depen
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,16 +20,7 @@ from scipy.spatial import Delaunay
 
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.errors import SweepError
-from sweep.explore.mesh import (
-    Array,
-    Indices,
-    are_too_few,
-    interpolation_errors,
-    parabolas,
-    simplices,
-    tilted,
-    with_beyond,
-)
+from sweep.explore.mesh import Array, Indices, are_too_few, interpolation_errors, simplices, tilted, with_beyond
 from sweep.explore.metric import stretch
 from sweep.words import require_dataset
 
@@ -63,16 +53,10 @@ class Box:
 
     def points(self, values: Mapping[str, Array]) -> Array:
         """Places (n, axes) of axis values."""
-        columns = [self._place(k, np.asarray(values[name], dtype=np.float64)) for k, name in enumerate(self.names)]
-        return np.stack(columns, axis=1)
-
-    def _place(self, k: int, values: Array) -> Array:
-        low, high = self.low[k], self.high[k]
-        if self.logarithmic[k]:
-            with np.errstate(invalid="ignore", divide="ignore"):
-                place: Array = np.log(values / low) / math.log(high / low)
-            return place
-        found: Array = (values - low) / (high - low)
+        columns = np.stack([np.asarray(values[name], dtype=np.float64) for name in self.names], axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            ratio = np.log(columns / self.low) / np.log(self.high / self.low)
+            found: Array = np.where(self.logarithmic, ratio, (columns - self.low) / (self.high - self.low))
         return found
 
     def values(self, k: int, places: Array) -> Array:
@@ -188,33 +172,29 @@ def kinds(status: Indices, valued: NDArray[np.bool_]) -> Indices:
 
 
 def _between(values: Array, points: Array, places: Array, status: Indices) -> tuple[Array, Array]:
-    """An output's values at places, and how far they are off."""
-    height = heights(values)
+    """An output's values at places, and how far they are off, as the cells around tell; inf across borders."""
+    height, kind = heights(values), kinds(status, np.isfinite(values))
     stretched = stretch(points, height)
-    corners, shares = located(points @ stretched, places @ stretched)
+    points, places = points @ stretched, places @ stretched
+    corners, shares = located(points, places)
     # a corner that takes no part need have no value
     total: Array = np.where(shares == 0, 0.0, shares * height[corners]).sum(axis=1)
-    between = np.exp(total) if is_positive(values) else total * _size(values)
-    off = _errors(points @ stretched, height, kinds(status, np.isfinite(values)), np.sort(corners, axis=1))
-    return between, np.where(shares.max(axis=1) == 1, 0.0, off)
-
-
-def _errors(points: Array, height: Array, kind: Indices, corners: Indices) -> Array:
-    """How far straight lines are off in simplices (m, axes + 1), as the cells around tell; inf across borders."""
-    mesh, found = simplices(points), np.full(len(corners), np.inf)
+    mesh, corners, off = simplices(points), np.sort(corners, axis=1), np.full(len(corners), np.inf)
     for number in np.unique(kind[kind >= 0]):
         members = np.flatnonzero(kind == number)
         own = np.searchsorted(members, mesh[(kind[mesh] == number).all(axis=1)])
         here = np.flatnonzero((kind[corners] == number).all(axis=1))
         if len(own) and len(here) and not are_too_few(points[members]):
+            # simplices that hold places are judged, by their number among those that are the same
             rows = np.concatenate([own, np.searchsorted(members, corners[here])])
-            _, names = np.unique(rows, axis=0, return_inverse=True)
-            asked = np.isin(names[: len(own)], names[len(own) :])
-            bends = parabolas(points[members], height[members], with_beyond(own)[asked])
-            size = np.full(names.max() + 1, np.inf)
-            size[names[: len(own)][asked]] = interpolation_errors(points[members], own[asked], bends)[0]
-            found[here] = size[names[len(own) :]]
-    return found
+            _, same = np.unique(rows, axis=0, return_inverse=True)
+            held = np.isin(same[: len(own)], same[len(own) :])
+            size = np.full(same.max() + 1, np.inf)
+            around = with_beyond(own)[held]
+            size[same[: len(own)][held]] = interpolation_errors(points[members], height[members], around)[0]
+            off[here] = size[same[len(own) :]]
+    off = np.where(shares.max(axis=1) == 1, 0.0, off)
+    return np.exp(total) if is_positive(values) else total * _size(values), off
 
 
 def located(points: Array, at: Array) -> tuple[Indices, Array]:
@@ -256,18 +236,29 @@ def on_lines(dataset: xr.Dataset, x: str) -> xr.Dataset:
     line = line.ravel()
     ends = [np.isin(np.arange(len(lines)), line[values == end]) for end in (values.min(), values.max())]
     long = (count >= FEWEST_ON_A_LINE) & ends[0] & ends[1]
+
+    def longest(some: NDArray[np.bool_]) -> str:
+        """How to ask for that one of some lines that has most cells."""
+        most = int(np.where(some, count, -1).argmax())
+        at = " ".join(f"--at {name}={float(value)!r}" for name, value in zip(others, lines[most], strict=True))
+        return f"e.g. {at} ({count[most]} cells)"
+
     if not long.any():
         raise SweepError(
             f"{x}: no {FEWEST_ON_A_LINE} cells lie on one line from end to end of it; pick another axis, or "
-            f"{_longest(others, lines, count)}"
+            f"{longest(count > 0)}"
         )
+    told = f"{count[long].sum()} of {count.sum()} cells lie on {long.sum()} lines from end to end of {x}; take one by "
+    told += f"--at, {longest(long)}"
+    shorter = (count[~long] >= FEWEST_ON_A_LINE).any()
+    told += f", or a shorter one, {longest(~long)}." if shorter else f"; no shorter line has {FEWEST_ON_A_LINE}."
     on = np.flatnonzero(long[line])
     grid, column = np.unique(values[on], return_inverse=True)
     row = (np.cumsum(long) - 1)[line[on]]
     across = others[0] if len(others) == 1 else "line"
     texts = [", ".join(f"{name} = {v:.6g}" for name, v in zip(others, place, strict=True)) for place in lines[long]]
     labels = lines[long, 0] if len(others) == 1 else texts
-    attrs = {**dataset.attrs, "lines": _lines_told(x, others, lines, count, long)}
+    attrs = {**dataset.attrs, "lines": told}
     found = xr.Dataset(coords={across: (across, labels), x: (x, grid, dataset[x].attrs)}, attrs=attrs)
     for name, variable in dataset.data_vars.items():
         if variable.dims == dataset[STATUS].dims and variable.dtype == np.float64:
@@ -275,18 +266,3 @@ def on_lines(dataset: xr.Dataset, x: str) -> xr.Dataset:
             filled[row, column] = variable.values[on]
             found[name] = ((across, x), filled, variable.attrs)
     return found
-
-
-def _lines_told(x: str, others: Sequence[str], lines: Array, count: Indices, long: NDArray[np.bool_]) -> str:
-    text = f"{count[long].sum()} of {count.sum()} cells lie on {long.sum()} lines from end to end of {x}"
-    text += f"; take one by --at, {_longest(others, lines[long], count[long])}"
-    if (count[~long] < FEWEST_ON_A_LINE).all():
-        return f"{text}; no shorter line has {FEWEST_ON_A_LINE}."
-    return f"{text}, or a shorter one, {_longest(others, lines[~long], count[~long])}."
-
-
-def _longest(names: Sequence[str], lines: Array, count: Indices) -> str:
-    """How to ask for the line with most cells."""
-    most = int(count.argmax())
-    at = " ".join(f"--at {name}={float(value)!r}" for name, value in zip(names, lines[most], strict=True))
-    return f"e.g. {at} ({count[most]} cells)"

@@ -97,26 +97,50 @@ def test_where_it_diverges_beside_a_border_interpolated_values_are_marked():
     assert marked.sum() < 0.05 * marked.size
 
 
-def test_a_jump_is_told_apart_and_followed_to_a_millionth_of_a_step():
-    def stepped(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
-        fall_time[...] = np.where(height < 1.37, 1.0, 2.0) + 0.1 * height**2
-        status[...] = 0
+def shaped(curve, heights, status=lambda height: Status.OK):
+    """A study of the toy whose time of fall is a curve over the height, and its sweep."""
 
-    study = own(stepped, np.linspace(1.0, 2.0, 9))
-    found = sweep.refine(sweep.run(study), "fall_time", 1e-3, study=study)
+    def solve(height, v0, g, rtol, phase, fall_time, impact_speed, drop, said):
+        fall_time[...] = curve(height)
+        said[...] = status(height)
+
+    study = own(solve, heights)
+    return {"dataset": sweep.run(study), "y": "fall_time", "study": study}
+
+
+def test_a_jump_is_told_apart_and_followed_to_a_millionth_of_a_step():
+    curve = lambda height: np.where(height < 1.37, 1.0, 2.0) + 0.1 * height**2  # noqa: E731
+    found = sweep.refine(**shaped(curve, np.linspace(1.0, 2.0, 9)), tolerance=1e-3)
     assert not found.complete
     assert 1 <= found.jumps < 10
+    assert found.added < 80
     assert found.error <= 1e-3
     assert 0.125 * 2.0**-21 < np.diff(found.dataset.height).min() < 0.125 * 2.0**-19
 
 
-def test_cells_that_are_inaccurate_are_on_no_border():
-    def rough(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
-        fall_time[...] = np.sqrt(height)
-        status[...] = np.where(height < 1.37, Status.INACCURATE, Status.OK)
+def test_where_values_scatter_no_more_cells_are_added_and_the_scatter_is_told():
+    """Noise of 1e-3 in half of the range; a wave without any is refined as before."""
+    rng = np.random.default_rng(2)
 
-    study = own(rough, np.linspace(1.0, 2.0, 9))
-    found = sweep.refine(sweep.run(study), "fall_time", 1e-3, study=study)
+    def curve(height):
+        noise = np.where(height > 1.5, 1e-3, 0.0) * rng.standard_normal(len(height))
+        return 2.0 + np.tanh(300 * (height - 1.2)) / 4 + np.sin(6 * height) / 4 + noise
+
+    found = sweep.refine(**shaped(curve, np.linspace(1.0, 2.0, 9)), tolerance=1e-4, most_cells=20_000)
+    assert not found.complete
+    assert found.added < 800
+    assert 2e-4 < found.noise < 2e-3
+    assert 1e-3 < found.error < 1e-2
+    assert "scatter" in str(found)
+    height = np.linspace(1.0, 2.0, 5000)
+    off = abs(np.interp(height, found.dataset.height, found.dataset.fall_time) - curve(height))
+    assert off.max() < 1.5e-2
+    assert sweep.refine(**shaped(lambda height: np.sin(40 * height) + 2, np.linspace(1, 2, 9)), tolerance=1e-3).complete
+
+
+def test_cells_that_are_inaccurate_are_on_no_border():
+    status = lambda height: np.where(height < 1.37, Status.INACCURATE, Status.OK)  # noqa: E731
+    found = sweep.refine(**shaped(np.sqrt, np.linspace(1.0, 2.0, 9), status), tolerance=1e-3)
     assert found.complete
     assert found.added < 10
 
