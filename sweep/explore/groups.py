@@ -8,12 +8,12 @@ unit as long as nothing in it is a sine. Scalings that units do not tell count a
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from sweep.explore.symmetries import Scalings, scalings
+from sweep.explore.symmetries import scalings
 from sweep.study.model import Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
@@ -35,10 +35,15 @@ class Group:
     powers: tuple[tuple[str, Fraction], ...]
 
     def __str__(self) -> str:
-        over = [_power(name, p) for name, p in self.powers if p > 0]
-        under = [_power(name, -p) for name, p in self.powers if p < 0]
-        below = f"({' '.join(under)})" if len(under) > 1 else "".join(under)
-        return f"{' '.join(over) or '1'}/{below}" if under else " ".join(over)
+        def product(factors: list[tuple[str, Fraction]]) -> str:
+            exponents = (f"{power}" if power.denominator == 1 else f"({power})" for _, power in factors)
+            pairs = zip(factors, exponents, strict=True)
+            return " ".join(name if power == 1 else f"{name}^{text}" for (name, power), text in pairs)
+
+        over = product([(name, power) for name, power in self.powers if power > 0])
+        under = [(name, -power) for name, power in self.powers if power < 0]
+        below = f"({product(under)})" if len(under) > 1 else product(under)
+        return f"{over or '1'}/{below}" if under else over
 
     def of(self, values: Mapping[str, xr.DataArray]) -> xr.DataArray:
         """The group's value, from those of its parameters."""
@@ -46,12 +51,6 @@ class Group:
         for name, power in self.powers:
             product = product * values[name] ** float(power)
         return product
-
-
-def _power(name: str, power: Fraction) -> str:
-    if power == 1:
-        return name
-    return f"{name}^{power}" if power.denominator == 1 else f"{name}^({power})"
 
 
 @dataclass(frozen=True)
@@ -93,22 +92,18 @@ class Scaling:
         """What `sweep plan` says of superfluous axes; "" where there are none."""
         if not self.free:
             return ""
+        basis = f"tried on {self.tried} cells at random"
+        if self.hidden:
+            basis += f"; {self.hidden} of the scalings used do not follow from declared units"
         left = len(self.axes) - self.free
-        names, varied = ", ".join(self.axes), [str(g) for g in self.groups if self._varies(g)]
+        names = ", ".join(self.axes)
         where = f" for each {', '.join(self.others)}" if self.others else ""
         if left == 0:
-            return f"every output is a power of {names} times a constant; a single cell tells all{where}; {self._basis}"
+            return f"every output is a power of {names} times a constant; a single cell tells all{where}; {basis}"
+        varied = [str(group) for group in self.groups if any(name in self.axes for name, _ in group.powers)]
         matter = f"only {', '.join(varied)} matter{'s' * (len(varied) == 1)}; " if varied else ""
         kind = "one-dimensional" if left == 1 else f"{left}-dimensional"
-        return f"{kind} in {names}{where}: {matter}{self.free} of these axes can be left out; {self._basis}"
-
-    @property
-    def _basis(self) -> str:
-        more = f"; {self.hidden} of the scalings used do not follow from declared units" if self.hidden else ""
-        return f"tried on {self.tried} cells at random{more}"
-
-    def _varies(self, group: Group) -> bool:
-        return any(name in self.axes for name, _ in group.powers)
+        return f"{kind} in {names}{where}: {matter}{self.free} of these axes can be left out; {basis}"
 
     def rescaled(self, dataset: xr.Dataset) -> xr.Dataset:
         """A result of the study with its outputs freed of units, and a coordinate for each dimensionless group.
@@ -141,7 +136,8 @@ class Scaling:
             dataset = dataset.assign_coords({f"group_{number}": coordinate})
         for name, group in self.scales.items():
             output = dataset[name] * group.of(values)
-            output.attrs = {**dataset[name].attrs, "units": "1", "long_name": _product(name, group)}
+            long_name = f"{name}{str(group)[1:]}" if str(group).startswith("1/") else f"{name} {group}".strip()
+            output.attrs = {**dataset[name].attrs, "units": "1", "long_name": long_name}
             dataset[name] = output
         return dataset
 
@@ -174,11 +170,32 @@ def scaling(study: Given) -> Scaling:
     arrays = any(field.dims for field in study.kernel.parameters)
     present = [] if arrays else [name for name in scaled if name not in study.along]
     leading = [name for name in found.leading if name in present]
+
+    def against(name: str) -> Powers:
+        """Powers of the leading parameters whose product scales against a field."""
+        weights = dict(zip(found.leading, found.weights(name), strict=True))
+        return {lead: -weights[lead] for lead in leading}
+
+    def group(powers: Powers) -> Group:
+        return Group(tuple((name, powers[name]) for name in present if powers.get(name)))
+
+    groups = []
+    for i, name in enumerate(present):
+        like = next((n for n in present[:i] if found.weights(n) == found.weights(name)), None)
+        if like is not None:  # R/mu rather than R/(a^2 phi0)
+            groups.append(group({name: Fraction(1), like: Fraction(-1)}))
+        elif name not in leading:
+            powers = {name: Fraction(1), **against(name)}
+            common = math.lcm(*(power.denominator for power in powers.values()))
+            groups.append(group({n: p * (common if common <= LARGEST_COMMON else 1) for n, p in powers.items()}))
+    # an output that scales with what does not lead cannot be freed of units
+    elsewhere = [k for k, lead in enumerate(found.leading) if lead not in leading]
+    freed = [o.name for o in study.asked if not any(found.weights(o.name)[k] for k in elsewhere)]
     axes = tuple(name for name in study.axes if name in scaled)
     fixed = [name for name in scaled if name not in axes]
     return Scaling(
-        groups=tuple(_groups(present, leading, found)),
-        scales={o.name: scale for o in study.asked if (scale := _scale(o.name, leading, found)) is not None},
+        groups=tuple(groups),
+        scales={name: group(against(name)) for name in freed},
         axes=axes,
         free=found.rank([*fixed, *axes]) - found.rank(fixed),
         others=tuple(name for name in study.axes if name in fields and name not in axes),
@@ -191,48 +208,3 @@ def scaling(study: Given) -> Scaling:
 def advice_on(study: str) -> str:
     """The advice on a study in JSON."""
     return scaling(Study.from_json(study, allow_import=True)).advice
-
-
-def _product(name: str, group: Group) -> str:
-    return f"{name}{str(group)[1:]}" if str(group).startswith("1/") else f"{name} {group}".strip()
-
-
-def _groups(names: Sequence[str], leading: Sequence[str], found: Scalings) -> list[Group]:
-    """A group for each parameter that scales and does not lead.
-
-    A parameter that scales like one before it is divided by that: R/mu rather than R/(a^2 phi0).
-    """
-    groups = []
-    for i, name in enumerate(names):
-        like = next((n for n in names[:i] if found.weights(n) == found.weights(name)), None)
-        if like is not None:
-            groups.append(_ordered({name: Fraction(1), like: Fraction(-1)}, names))
-        elif name not in leading:
-            groups.append(_ordered(_whole({name: Fraction(1)} | _against(name, leading, found)), names))
-    return groups
-
-
-def _against(name: str, leading: Sequence[str], found: Scalings) -> dict[str, Fraction]:
-    """Powers of the leading parameters whose product scales against a field."""
-    weights = dict(zip(found.leading, found.weights(name), strict=True))
-    return {lead: -weights[lead] for lead in leading}
-
-
-def _whole(powers: Powers) -> Powers:
-    """The same group in whole powers, where these are small."""
-    common = math.lcm(*(power.denominator for power in powers.values()))
-    if common > LARGEST_COMMON:
-        return powers
-    return {name: power * common for name, power in powers.items()}
-
-
-def _ordered(powers: Powers, names: Sequence[str]) -> Group:
-    return Group(tuple((name, powers[name]) for name in names if powers.get(name)))
-
-
-def _scale(output: str, leading: Sequence[str], found: Scalings) -> Group | None:
-    """Powers of the leading parameters that free an output of what it scales with; None where others take part."""
-    weights = dict(zip(found.leading, found.weights(output), strict=True))
-    if any(weight for lead, weight in weights.items() if lead not in leading):
-        return None
-    return _ordered(_against(output, leading, found), leading)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -61,49 +60,31 @@ def sensitivity(dataset: xr.Dataset, y: str | xr.DataArray) -> xr.Dataset:
     """
     text = dataset.attrs.get("study_json")
     study = None if text is None else Study.from_json(str(text), declared=True)
-    kind = "" if study is None else study.design
-    if study is None or kind not in ("saltelli", "morris"):
+    if study is None or study.design not in ("saltelli", "morris"):
         raise SweepError('the design of the result is neither "saltelli" nor "morris"; sensitivity needs one of these')
-    values = _values(dataset[y] if isinstance(y, str) and y in dataset else y, dataset)
-    problem = samples.problem(tuple(study.axes))
-    words = SOBOL if kind == "saltelli" else MORRIS
-    found = _sobol(problem, values) if kind == "saltelli" else _morris(problem, _shares(dataset, problem), values)
-    told = xr.Dataset(coords={"parameter": problem["names"]}, attrs={"design": kind})
-    for key, (name, text) in words.items():
-        told[name] = ("parameter", np.asarray(found[key], float), {"long_name": text})
-    return told
-
-
-def _values(y: Any, dataset: xr.Dataset) -> Any:
-    if not isinstance(y, xr.DataArray):
-        raise SweepError(f"there is no output {y!r}; there are {', '.join(map(str, dataset.data_vars))}")
-    if y.dims != dataset["status"].dims:
+    found = dataset[y] if isinstance(y, str) and y in dataset else y
+    if not isinstance(found, xr.DataArray):
+        raise SweepError(f"there is no output {found!r}; there are {', '.join(map(str, dataset.data_vars))}")
+    if found.dims != dataset["status"].dims:
         raise SweepError("y: expected one value a cell; choose a place along its other dimensions")
-    values = np.asarray(y.values, float)
+    values = np.asarray(found.values, float)
     lost = int((~np.isfinite(values)).sum())
     if lost:
         raise SweepError(f"{lost} of {values.size} cells have no value; make the ranges of the axes narrower")
-    return values
 
-
-def _shares(dataset: xr.Dataset, problem: dict[str, Any]) -> Any:
-    """Where the cells lie along each axis, from 0 to 1; only the order of neighbours counts."""
-    columns = [dataset[name].values for name in problem["names"]]
-    columns = [np.log(column) if is_logarithmic(np.unique(column)) else column for column in columns]
-    return np.stack([(c - c.min()) / (np.ptp(c) or 1.0) for c in columns], axis=1)
-
-
-def _sobol(problem: dict[str, Any], values: Any) -> Any:
     samples.require_salib()
-    from SALib.analyze import sobol
+    from SALib.analyze import morris, sobol
 
-    return sobol.analyze(problem, values, calc_second_order=False, seed=SEED)
-
-
-def _morris(problem: dict[str, Any], shares: Any, values: Any) -> Any:
-    samples.require_salib()
-    from SALib.analyze import morris
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return morris.analyze(problem, shares, values, num_levels=samples.LEVELS, seed=SEED)
+    problem = samples.problem(tuple(study.axes))
+    if study.design == "saltelli":
+        words, told = SOBOL, sobol.analyze(problem, values, calc_second_order=False, seed=SEED)
+    else:
+        # where cells lie along each axis, from 0 to 1; only the order of neighbours counts
+        columns = [dataset[name].values for name in study.axes]
+        columns = [np.log(column) if is_logarithmic(np.unique(column)) else column for column in columns]
+        shares = np.stack([(column - column.min()) / (np.ptp(column) or 1.0) for column in columns], axis=1)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            words, told = MORRIS, morris.analyze(problem, shares, values, num_levels=samples.LEVELS, seed=SEED)
+    indices = {name: ("parameter", np.asarray(told[key], float), {"long_name": t}) for key, (name, t) in words.items()}
+    return xr.Dataset(indices, {"parameter": problem["names"]}, {"design": study.design})

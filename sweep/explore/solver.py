@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-import timeit
 import warnings
 from collections import namedtuple
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from kernels import catalogue
-from kernels.interface import Method, Status
-from sweep.cells.grid import Cells, Grid, empty_cells
+from sweep.cells.grid import Grid, empty_cells
 from sweep.cells.guard import BadCell, Guard
 from sweep.cells.solve import Solver
-from sweep.cells.timing import LANES
-from sweep.cells.turns import Turn, turns
 from sweep.errors import SweepError
-from sweep.study.mistakes import did_you_mean, listed
 from sweep.study.model import SETTINGS, Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-
-TRIES = 5
-DEAR = 1e-3
-"""Seconds of a call beside which copying a cell costs nothing."""
+from sweep.words import did_you_mean, listed
 
 
 class PointSolver:
@@ -40,17 +31,17 @@ class PointSolver:
     """
 
     def __init__(self, study: Study) -> None:
-        _require(study)
+        for name, axis in study.axes.items():
+            if name in SETTINGS or axis.words is not None or axis.values.ndim > 1:
+                raise SweepError(
+                    f"axes.{name}: a solver takes numbers of the kernel; fix it, and make one for each value"
+                )
+        if study.summary is not None:
+            raise SweepError("summary: a solver gives cells; leave it out")
         self.names, self.fields = tuple(study.axes), (*study.outputs, "status")
         self._study, self._grid = study, _Points(study)
         self._solver = Guard(Solver(study, self._grid), _warn)
-        solved = namedtuple("solved", self.fields)  # type: ignore[misc]  # as many fields as the study asks for
-        self._solved: Callable[..., Any] = solved
-        self._one = empty_cells(study, 1)
-        self._row = np.array([axis.values[:1] for axis in study.axes.values()])
-        self._quick = _Quick(study, self._grid) if _is_simple(study) else None
-        if self._quick is not None:
-            self._quick.choose(self._row)
+        self._solved: Any = namedtuple("solved", self.fields)  # type: ignore[misc]  # as many as the study asks for
 
     def __call__(self, *values: Any, **named: Any) -> Any:
         """Outputs and status of cells.
@@ -74,29 +65,16 @@ class PointSolver:
         """
         given = self._ordered(values, named) if named or len(values) != len(self.names) else values
         try:
-            for row, value in zip(self._row, given, strict=True):
-                row[0] = value
-        except (TypeError, ValueError):
-            return self._many(given)
-        cells = None if self._quick is None else self._quick.solve(self._row)
-        if cells is None:
-            cells = self._one
-            self._grid.given = self._row
-            self._solver.solve(0, cells)
-        outputs = [cells.outputs[name][0] for name in self._study.outputs]
-        return self._solved(*(v.copy() if v.ndim else float(v) for v in outputs), int(cells.status[0]))
-
-    def _many(self, given: Sequence[Any]) -> Any:
-        try:
-            arrays = np.broadcast_arrays(*(np.asarray(value, np.float64) for value in given))
+            points = np.array(np.broadcast_arrays(*given), np.float64)
         except (TypeError, ValueError) as error:
             raise SweepError(f"{listed(self.names, word='and')}: expected numbers or arrays, found {error}") from None
-        shape = arrays[0].shape
-        self._grid.given = np.stack([array.reshape(-1) for array in arrays])
+        shape = points.shape[1:]
+        self._grid.given = points.reshape(len(self.names), -1)
         cells = empty_cells(self._study, self._grid.given.shape[1])
         self._solver.solve(0, cells)
         outputs = (cells.outputs[name].reshape(shape + cells.outputs[name].shape[1:]) for name in self._study.outputs)
-        return self._solved(*outputs, cells.status.reshape(shape))
+        found = (*outputs, cells.status.reshape(shape))
+        return self._solved(*(column if column.ndim else column.item() for column in found))
 
     def _ordered(self, values: Sequence[Any], named: dict[str, Any]) -> list[Any]:
         """One value for each name. Raises SweepError."""
@@ -108,8 +86,8 @@ class PointSolver:
             if name in found:
                 raise SweepError(f"{name} is given twice")
         found |= named
-        if len(found) < len(self.names) or len(values) > len(self.names):
-            count = len(found) if len(values) <= len(self.names) else len(values)
+        count = max(len(found), len(values))
+        if count != len(self.names):
             raise SweepError(f"expected {listed(self.names, word='and')}, found {count} of {len(self.names)} values")
         return [found[name] for name in self.names]
 
@@ -117,76 +95,6 @@ class PointSolver:
 def _warn(cell: BadCell) -> None:
     values = ", ".join(f"{name}={value}" for name, value in cell.values.items())
     warnings.warn(f"FAILED at {values}: {cell.reason}", RuntimeWarning, stacklevel=2)
-
-
-class _Quick:
-    """One cell by the first method that the engine would try, without its care for cells that it does not suit.
-
-    Where a kernel solves many cells at once it is given copies, which is quicker than having it make them.
-    """
-
-    def __init__(self, study: Study, grid: _Points) -> None:
-        self._study, self._grid, self._check = study, grid, study.kernel.check
-        self._turns = _turns(study, grid)
-        self._along = [np.array(study.along[field.name]) for field in study.kernel.along]
-        self._asked = np.array([field.name in study.outputs for field in study.kernel.outputs], np.uint8)
-        self._use(1)
-
-    def _use(self, rows: int) -> None:
-        """Columns of so many rows."""
-        study, kernel = self._study, self._study.kernel
-        self._parameters = [np.empty((rows, *study.shape(field))) for field in kernel.parameters]
-        for k, value in self._grid.constants().items():
-            self._parameters[k][:] = value
-        self._rtol, self._bound = np.full(rows, study.rtol), np.empty(rows)
-        self._cells = empty_cells(study, rows)
-        given = self._cells.outputs
-        self._outputs = [given.get(f.name, np.empty((rows, *study.shape(f)))) for f in kernel.outputs]
-
-    def choose(self, row: Any) -> None:
-        """Take as many rows as are solved soonest."""
-        seconds = {}
-        for rows in (1, LANES):
-            self._use(rows)
-            self.solve(row)  # the first call may compile
-            seconds[rows] = min(timeit.repeat(lambda: self.solve(row), number=1, repeat=TRIES))
-            if seconds[rows] > DEAR:
-                break
-        self._use(min(seconds, key=lambda rows: seconds[rows]))
-
-    def solve(self, row: Any) -> Cells | None:
-        """The cell, first of some that are the same; None where the engine has more to say of it."""
-        parameters, status = self._parameters, self._cells.status
-        self._grid.fill(row, parameters)
-        self._check(*parameters, status)
-        if status[0] != Status.OK:
-            return None
-        method = self._method()
-        if method is None or method.estimates:
-            return None
-        if method.bound is not None:
-            method.bound(*parameters, self._rtol, *self._along, self._asked, self._bound)
-            if not self._bound[0] <= self._rtol[0]:
-                return None
-        method.solve(*parameters, self._rtol, *self._along, *self._outputs, status)
-        return self._cells if status[0] == Status.OK else None
-
-    def _method(self) -> Method | None:
-        """The method that is tried first."""
-        inputs = (*self._parameters, self._rtol)
-        return next((self._study.kernel.methods[turn.number] for turn in self._turns if turn.comes(inputs)), None)
-
-
-def _turns(study: Study, grid: Grid) -> tuple[Turn, ...]:
-    """Turns of the method that is named, or of those that `auto` tries."""
-    names = [method.name for method in study.kernel.methods]
-    return turns(study, grid) if study.method == "auto" else (Turn(names.index(study.method)),)
-
-
-def _is_simple(study: Study) -> bool:
-    """Whether what one method says of a cell can be all there is to say."""
-    methods = [m for m in study.kernel.methods if study.method in ("auto", m.name)]
-    return study.kernel_name in catalogue.KERNELS and not study.where and not all(m.estimates for m in methods)
 
 
 class _Points(Grid):
@@ -198,23 +106,14 @@ class _Points(Grid):
         self.given = np.empty((len(study.axes), 0))
         places = {name: place for place, name in enumerate(study.axes)}
         self._places = {f.name: places.get(study.follows.get(f.name, f.name)) for f in study.kernel.parameters}
-        self._filled = [(k, p) for k, p in enumerate(self._places.values()) if p is not None]
-        self._setting = super().settings(0, 1)
+        self._filled = {k: place for k, place in enumerate(self._places.values()) if place is not None}
 
     def spread(self, place: int) -> Any:
-        return None if place in dict(self._filled) else super().spread(place)
+        return None if place in self._filled else super().spread(place)
 
     def columns(self, start: int, stop: int, out: Sequence[Any]) -> None:
-        for k, place in self._filled:
+        for k, place in self._filled.items():
             out[k][: stop - start] = self.given[place, start:stop]
-
-    def fill(self, row: Any, out: Sequence[Any]) -> None:
-        """Writes one cell into all rows."""
-        for k, place in self._filled:
-            out[k].fill(row[place, 0])
-
-    def settings(self, start: int, stop: int) -> Any:
-        return self._setting
 
     def cell(self, index: int) -> dict[str, str]:
         return {name: repr(float(row[index])) for name, row in zip(self.study.axes, self.given, strict=True)}
@@ -249,11 +148,3 @@ def solver(study: Given) -> PointSolver:
     26.3972
     """
     return PointSolver(as_study(study))
-
-
-def _require(study: Study) -> None:
-    for name, axis in study.axes.items():
-        if name in SETTINGS or axis.words is not None or axis.values.ndim > 1:
-            raise SweepError(f"axes.{name}: a solver takes numbers of the kernel; fix it, and make one for each value")
-    if study.summary is not None:
-        raise SweepError("summary: a solver gives cells; leave it out")

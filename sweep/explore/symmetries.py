@@ -4,9 +4,9 @@ A field i times s^w_i takes every output j to s^v_j times itself if, in every ce
 
     sum_i w_i dln y_j/dln p_i = v_j                               (1)
 
-so all scalings of a study are the null space of the matrix of these derivatives over its cells, whether they come from
-units (Buckingham), from a law whose units depend on its exponent (drag c v^n), or from neither. The null space is made
-rational, and what is found there, or among the declared units, counts only once it has been tried on other cells.
+The declared units tell some of them (Buckingham). What satisfies (1) beside these, by elimination, is a law whose units
+depend on its exponent (drag c v^n), or one that no unit tells. All are made rational, and count only once they have
+been tried on other cells.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +47,8 @@ JITTER = 0.5
 FACTORS = (1.7, 0.4)
 MOST_ELEMENTS = 16
 """Of an output with many values a cell."""
-LARGEST_SINGULAR = 1e-3
+LEAST_PIVOTS = (1e-3, 1e-5)
+"""Slopes below are taken for 0, tried in turn: with the larger one more may be found, and be none."""
 LARGEST_DENOMINATOR = 200
 NEAR = 2e-5
 """Distance of a weight from the fraction that it is taken for."""
@@ -80,36 +82,47 @@ class Scalings:
 
     def rank(self, names: Sequence[str]) -> int:
         """Dimension of what scalings do to some fields."""
-        matrix = np.array([[float(weight) for weight in self.weights(name)] for name in names])
-        return int(np.linalg.matrix_rank(matrix)) if matrix.size else 0
+        return len(_basis(self.rows, names)[1])
+
+
+def powers(field: Field) -> Weights:
+    """Of base units in a field's unit."""
+    return {base: power for base, power in exponents(field.unit).items() if power}
 
 
 def scalings(study: Study) -> Scalings:
     """Those that hold on random cells of a study. Raises SweepError where the kernel fails."""
     study = dataclasses.replace(study, rtol=min(study.rtol, RTOL))
-    fields = _scalable(study)
-    order = sorted(fields, key=lambda field: _simplicity(study, field))
-    names = [field.name for field in order] + [output.name for output in study.asked]
-    cells, affordable = _affordable(study, len(order))
-    trial = _Trial(study, cells, seed=2)
-    declared = [row for row in _declared(study, names) if trial.holds(row)]
-    basis, leading = _reduced(_matrix(declared, names), len(names))
-    by_units = len(basis)
-    if affordable:
-        for more in _Trial(study, cells, seed=1).candidates(names[: len(order)]):
-            found, leads = _reduced(np.vstack([_matrix(declared, names), _matrix(more, names)]), len(names))
-            rows = _rational(found, names)
-            if len(rows) > by_units and all(trial.holds(row) for row in rows):
-                basis, leading = found, leads
+    along = [field for field in study.kernel.along if len(study.along[field.name])]
+    fields = [*(field for field in study.kernel.parameters if _is_scalable(study, field)), *along]
+    # fields of the simplest unit lead; numbers without one, and what is no number of a cell, come last
+    order = {field.name: (field in along, bool(field.dims), not (p := powers(field)), sum(map(abs, p.values())))
+             for field in fields}  # fmt: skip
+    leading = sorted(order, key=lambda name: order[name])
+    names = [*leading, *(output.name for output in study.asked)]
+    units = {field.name: powers(field) for field in (*fields, *study.asked)}
+
+    few = drawn(study, FEWEST_CELLS, np.random.default_rng(0))
+    solved(few)
+    begun = time.perf_counter()
+    solved(few)
+    cost = (time.perf_counter() - begun) / FEWEST_CELLS
+    affordable = int(SECONDS / (cost * (4 * len(leading) + 16)))
+    cells = min(TRIED_CELLS, max(FEWEST_CELLS, affordable))
+
+    trial = _Trial(study, leading, cells, seed=2)
+    bases = sorted({base for of_one in units.values() for base in of_one})
+    declared = [{name: units[name][base] for name in names if base in units[name]} for base in bases]
+    rows, leads = _basis([row for row in declared if trial.holds(row)], names)
+    by_units = len(rows)
+    if affordable >= FEWEST_CELLS:
+        slopes = _Trial(study, leading, cells, seed=1).slopes(leading)
+        for least in LEAST_PIVOTS:
+            more, more_leads = _basis([*rows, *_null_space(slopes, leading, names, least)], names)
+            if len(more) > by_units and all(trial.holds(row) for row in more):
+                rows, leads = more, more_leads
                 break
-    rows = _rational(basis, names)
-    return Scalings(tuple(rows), tuple(names[i] for i in leading), len(rows) - by_units, trial.number)
-
-
-def _scalable(study: Study) -> list[Field]:
-    """Parameters and coordinates whose numbers may be multiplied."""
-    parameters = [field for field in study.kernel.parameters if _is_scalable(study, field)]
-    return parameters + [field for field in study.kernel.along if len(study.along[field.name])]
+    return Scalings(tuple(rows), tuple(leads), len(rows) - by_units, trial.number)
 
 
 def _is_scalable(study: Study, field: Field) -> bool:
@@ -118,54 +131,22 @@ def _is_scalable(study: Study, field: Field) -> bool:
         return False
     if field.name in study.axes:
         return True
-    as_another = isinstance(field.default, str) and not differs(field, study.fixed)
-    plain = field.default is not None and not differs(field, study.fixed) and not _powers(field)
-    return not as_another and not plain and bool(np.any(study.fixed[field.name]))
-
-
-def _powers(field: Field) -> dict[str, Fraction]:
-    return {base: power for base, power in exponents(field.unit).items() if power}
-
-
-def _simplicity(study: Study, field: Field) -> tuple[bool, bool, bool, Fraction]:
-    """Fields of the simplest unit lead; numbers without one, and what is no number of a cell, come last."""
-    powers = _powers(field)
-    shared = field in study.kernel.along
-    return shared, bool(field.dims), not powers, Fraction(sum(abs(power) for power in powers.values()))
-
-
-def _declared(study: Study, names: Sequence[str]) -> list[Weights]:
-    """A row for each base unit."""
-    fields = {f.name: f for f in (*study.kernel.parameters, *study.kernel.along, *study.asked)}
-    powers = {name: _powers(fields[name]) for name in names}
-    bases = sorted({base for of_one in powers.values() for base in of_one})
-    return [{name: powers[name][base] for name in names if base in powers[name]} for base in bases]
-
-
-def _affordable(study: Study, fields: int) -> tuple[int, bool]:
-    """How many cells to take, and whether derivatives of them can be taken in time."""
-    few = drawn(study, FEWEST_CELLS, np.random.default_rng(0))
-    solved(few)
-    begun = time.perf_counter()
-    solved(few)
-    cost = (time.perf_counter() - begun) / FEWEST_CELLS
-    cells = int(SECONDS / (cost * (4 * fields + 16)))
-    return min(TRIED_CELLS, max(FEWEST_CELLS, cells)), cells >= FEWEST_CELLS
+    at_default = field.default is not None and not differs(field, study.fixed)
+    if at_default and (isinstance(field.default, str) or not powers(field)):
+        return False
+    return bool(np.any(study.fixed[field.name]))
 
 
 class _Trial:
     """Cells of a study at random, beside its own values, solved again with some of its numbers multiplied."""
 
-    def __init__(self, study: Study, cells: int, seed: int) -> None:
+    def __init__(self, study: Study, scalable: Sequence[str], cells: int, seed: int) -> None:
         rng = np.random.default_rng(seed)
-        scalable = [field.name for field in _scalable(study)]
-        self._study = drawn(study, cells, rng)
-        jitter = {name: np.exp(rng.uniform(-JITTER, JITTER, cells)) for name in self._study.axes if name in scalable}
-        moved = multiplied(self._study, jitter)
-        refused = ~_valued(solved(moved))
-        self._study = multiplied(self._study, {name: np.where(refused, 1.0, by) for name, by in jitter.items()})
+        own = drawn(study, cells, rng)
+        jitter = {name: np.exp(rng.uniform(-JITTER, JITTER, cells)) for name in own.axes if name in scalable}
+        refused = ~_valued(solved(multiplied(own, jitter)))
+        self._study = multiplied(own, {name: np.where(refused, 1.0, by) for name, by in jitter.items()})
         self._old = solved(self._study)
-        self._tried: dict[tuple[tuple[str, Fraction], ...], bool] = {}
 
     @property
     def number(self) -> int:
@@ -173,53 +154,35 @@ class _Trial:
         return int(_valued(self._old).sum())
 
     def holds(self, row: Weights) -> bool:
-        """Whether fields and outputs may be multiplied like this."""
-        key = tuple(row.items())
-        if key not in self._tried:
-            self._tried[key] = bool(row) and self.number > 0 and all(self._holds(row, factor) for factor in FACTORS)
-        return self._tried[key]
+        """Whether fields and outputs may be multiplied like this; statuses may change as rounding decides."""
+        old, fine, rtol = self._old, _valued(self._old), AGREEMENT * self._study.rtol
+        for factor in FACTORS:
+            factors = {name: factor ** float(weight) for name, weight in row.items()}
+            new = solved(multiplied(self._study, factors))
+            was, now = (np.where(c.status == Status.INACCURATE, Status.OK, c.status) for c in (old, new))
+            if not row or not fine.any() or (was != now).any():
+                return False
+            for name, values in old.outputs.items():
+                expected = factors.get(name, 1.0) * values[fine]
+                if not np.allclose(new.outputs[name][fine], expected, rtol, 0, equal_nan=True):
+                    return False
+        return True
 
-    def _holds(self, row: Weights, factor: float) -> bool:
-        factors = {name: factor ** float(weight) for name, weight in row.items()}
-        new, old = solved(multiplied(self._study, factors)), self._old
-        if (_settled(new) != _settled(old)).any():
-            return False
-        fine, rtol = _valued(old), AGREEMENT * self._study.rtol
-        return all(
-            np.allclose(new.outputs[name][fine], factors.get(name, 1.0) * values[fine], rtol, 0, equal_nan=True)
-            for name, values in old.outputs.items()
-        )
+    def slopes(self, fields: Sequence[str]) -> dict[str, Array]:
+        """dln y/dln p of all outputs in all cells by p, and -1 of each output by itself, so that sums w s are 0.
 
-    def candidates(self, fields: Sequence[str]) -> list[list[Weights]]:
-        """Bases of what may be scalings by (1), larger ones first."""
-        slopes = {name: slope for name in fields if (slope := self._slopes(name)) is not None}
+        Fields of which a kernel does not take other numbers are left out.
+        """
+        found = {}
+        for name in fields:
+            moved = [solved(multiplied(self._study, {name: math.exp(k * STEP)})) for k in (-2, -1, 1, 2)]
+            if all(_valued(cells).sum() >= self.number / 2 for cells in moved):
+                logs = [np.concatenate([_logs(cells, output) for output in cells.outputs]) for cells in moved]
+                with np.errstate(invalid="ignore"):  # of an output that is 0 there is no slope
+                    found[name] = (logs[0] - 8 * logs[1] + 8 * logs[2] - logs[3]) / (12 * STEP)
         outputs = list(self._old.outputs)
         owner = np.concatenate([np.full(_logs(self._old, name).size, i) for i, name in enumerate(outputs)])
-        matrix = np.column_stack([*slopes.values(), -np.eye(len(outputs))[owner]])
-        matrix = matrix[np.isfinite(matrix).all(axis=1)]
-        if len(matrix) < matrix.shape[1]:
-            return []
-        there = [
-            *range(len(slopes)),
-            *(len(slopes) + i for i in range(len(outputs)) if matrix[:, len(slopes) + i].any()),
-        ]
-        matrix = matrix[:, there] / np.maximum(1.0, abs(matrix).max(axis=1))[:, None]
-        names = [[*slopes, *outputs][i] for i in there]
-        _, sizes, vectors = np.linalg.svd(matrix, full_matrices=False)
-        most = int((sizes < LARGEST_SINGULAR * math.sqrt(len(matrix))).sum())
-        return [_named(vectors[len(vectors) - n :], names) for n in range(most, 0, -1)]
-
-    def _slopes(self, name: str) -> Array | None:
-        """dln y/dln p of all outputs in all cells; None where a kernel does not take other numbers."""
-        logs = []
-        for steps in (-2, -1, 1, 2):
-            found = solved(multiplied(self._study, {name: math.exp(steps * STEP)}))
-            if _valued(found).sum() < self.number / 2:
-                return None
-            logs.append(np.concatenate([_logs(found, output).ravel() for output in found.outputs]))
-        with np.errstate(invalid="ignore"):  # of an output that is 0 there is no slope
-            slope: Array = (logs[0] - 8 * logs[1] + 8 * logs[2] - logs[3]) / (12 * STEP)
-        return slope
+        return found | {name: -1.0 * (owner == i) for i, name in enumerate(outputs)}
 
 
 def _valued(cells: Cells) -> NDArray[np.bool_]:
@@ -227,64 +190,59 @@ def _valued(cells: Cells) -> NDArray[np.bool_]:
     return found
 
 
-def _settled(cells: Cells) -> NDArray[np.int8]:
-    """Statuses, without what rounding decides."""
-    found: NDArray[np.int8] = np.where(cells.status == Status.INACCURATE, Status.OK, cells.status)
-    return found
-
-
 def _logs(cells: Cells, output: str) -> Array:
-    """Logarithms of an output's size, (cells, elements); NaN where it has none."""
+    """Logarithms of an output's size, one cell after the other; NaN where it has none."""
     values = cells.outputs[output].reshape(cells.number, -1)
     values = values[:, :: -(-values.shape[1] // MOST_ELEMENTS)]
     there = _valued(cells)[:, None] & (values != 0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        found: Array = np.where(there, np.log(abs(values)), np.nan)
+        return np.asarray(np.where(there, np.log(abs(values)), np.nan)).ravel()
+
+
+def _null_space(slopes: dict[str, Array], fields: Sequence[str], names: Sequence[str], least: float) -> list[Weights]:
+    """What satisfies (1): a row for each field that elimination leaves free; [] where weights are no fractions."""
+    finite = np.isfinite(np.column_stack(list(slopes.values()))).all(axis=1)
+    # an output that is never there is no unknown
+    known = [name for name in reversed(names) if name in slopes and (name in fields or slopes[name][finite].any())]
+    matrix = np.column_stack([slopes[name][finite] for name in known])
+    if len(matrix) < len(known):
+        return []
+    reduced, pivots = _reduced(matrix / np.maximum(1.0, abs(matrix).max(axis=1, keepdims=True)), least)
+    found = []
+    for free in set(range(len(known))) - set(pivots):
+        row = {known[free]: Fraction(1)}
+        for pivot, weight in zip(pivots, -reduced[:, free], strict=True):
+            near = (Fraction(round(weight * d), d) for d in range(1, LARGEST_DENOMINATOR + 1))
+            simplest = next((f for f in near if abs(weight - f) < NEAR), None)
+            if simplest is None:
+                return []
+            row[known[pivot]] = simplest
+        found.append(row)
     return found
 
 
-def _named(vectors: Array, names: Sequence[str]) -> list[Weights]:
-    return [{name: Fraction(float(w)) for name, w in zip(names, row, strict=True)} for row in vectors]
+def _basis(rows: Sequence[Weights], names: Sequence[str]) -> tuple[list[Weights], list[str]]:
+    """The same scalings as a reduced basis, and the fields that lead its rows."""
+    whole = np.array([[row.get(name, Fraction(0)) for name in names] for row in rows], object)
+    matrix, pivots = _reduced(whole.reshape(len(rows), len(names)))
+    return [{name: w for name, w in zip(names, row, strict=True) if w} for row in matrix], [names[k] for k in pivots]
 
 
-def _matrix(rows: Sequence[Mapping[str, Fraction]], names: Sequence[str]) -> Array:
-    return np.array([[float(row.get(name, 0)) for name in names] for row in rows]).reshape(len(rows), len(names))
-
-
-def _reduced(matrix: Array, columns: int) -> tuple[Array, list[int]]:
-    """Reduced row echelon form and its leading columns, first columns first."""
+def _reduced(matrix: Any, least: float = 0.0) -> tuple[Any, list[int]]:
+    """Reduced row echelon form, of fractions or of floats of at least some size, and its leading columns."""
     rows = matrix.copy()
     leading: list[int] = []
-    for column in range(columns):
+    for column in range(rows.shape[1]):
         done = len(leading)
         if done == len(rows):
             break
         pivot = done + int(abs(rows[done:, column]).argmax())
-        if abs(rows[pivot, column]) < 1e-4:
-            rows[done:, column] = 0.0
+        if abs(rows[pivot, column]) <= least:
+            rows[done:, column] = 0
             continue
         rows[[done, pivot]] = rows[[pivot, done]]
-        rows[done] /= rows[done, column]
+        rows[done] = rows[done] / rows[done, column]
         others = np.arange(len(rows)) != done
-        rows[others] -= rows[others, column : column + 1] * rows[done]
+        rows[others] = rows[others] - rows[others, column : column + 1] * rows[done]
         leading.append(column)
     return rows[: len(leading)], leading
-
-
-def _rational(rows: Array, names: Sequence[str]) -> list[Weights]:
-    """Rows with the simplest fractions near their numbers; [] where there are none."""
-    found = []
-    for row in rows:
-        fractions = [_simplest(float(value)) for value in row]
-        if None in fractions:
-            return []
-        found.append({name: w for name, w in zip(names, fractions, strict=True) if w})
-    return found
-
-
-def _simplest(value: float) -> Fraction | None:
-    for denominator in range(1, LARGEST_DENOMINATOR + 1):
-        near = Fraction(round(value * denominator), denominator)
-        if abs(value - near) < NEAR:
-            return near
-    return None
