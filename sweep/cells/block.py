@@ -12,7 +12,7 @@ from sweep.cells.grid import Grid, empty_cells
 from sweep.cells.guard import told
 from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import Partition, row_blocks
-from sweep.cells.reduce import Reducer
+from sweep.cells.reduce import Reducer, seconds_a_cell
 from sweep.cells.schema import cells_of, columns
 from sweep.cells.timing import Sample, take_sample, tolerated
 from sweep.errors import SweepError
@@ -126,7 +126,7 @@ def sampled_by(solver: SolveCells, study: Study, clock: Callable[[], float]) -> 
         warm(solver, study)
         sample = take_sample(solver, columns(study), row_blocks(study).size, clock)
         if study.summary is not None:
-            sample = replace(sample, costs=sample.costs + Reducer(study).seconds())
+            sample = replace(sample, costs=sample.costs + seconds_a_cell(study))
         return sample
 
 

@@ -14,12 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.study.condition import CellCondition
-from sweep.study.model import AUTO, SETTINGS, Axis, Study
+from sweep.study.model import AUTO, SETTINGS, Study
 
 Floats = NDArray[np.float64]
-
-SHORT_RUN = 16
-"""Below this many equal cells in a row, filling every n-th cell is faster than filling runs."""
 
 
 class Box:
@@ -44,11 +41,8 @@ class Grid(Box):
         super().__init__(tuple(study.grid_shape), tuple(study.grid_shape.values()))
         self.study = study
         self._runs = {name: study.run(name) for name in study.axes}
-        self._varying = [
-            (k, study.axes[source])
-            for k, field in enumerate(study.kernel.parameters)
-            if (source := study.follows.get(field.name, field.name)) in study.axes
-        ]
+        sources = enumerate(study.follows.get(field.name, field.name) for field in study.kernel.parameters)
+        self._varying = {place: name for place, name in sources if name in study.axes}
 
     def constants(self) -> dict[int, float | Floats]:
         """Column number and value of every parameter that is the same in all cells."""
@@ -57,8 +51,9 @@ class Grid(Box):
 
     def spread(self, place: int) -> Floats | None:
         """All values that the parameter at that position takes, shape (values, ...); None where that is not known."""
-        axes = dict(self._varying)
-        return axes[place].values if place in axes else np.asarray(self.constants()[place])[None]
+        if place in self._varying:
+            return self.study.axes[self._varying[place]].values
+        return np.asarray(self.constants()[place])[None]
 
     def columns(self, start: int, stop: int, out: Sequence[Floats]) -> None:
         """Write the varying parameters of the cells `start` to `stop`.
@@ -70,11 +65,25 @@ class Grid(Box):
         out : sequence of ndarray, each of shape (>= stop - start, ...)
             One column per parameter of the kernel, in its order; constant ones are left alone.
         """
-        for k, axis in self._varying:
-            if axis.values.ndim > 1:  # an array in each cell
-                out[k][: stop - start] = self.values(axis.name, np.arange(start, stop))
-            else:
-                self._fill(axis, start, out[k][: stop - start])
+        for place, name in self._varying.items():
+            out[place][: stop - start] = self.column(name, start, stop)
+
+    def column(self, name: str, start: int, stop: int) -> Floats:
+        """An axis' values in the cells `start` to `stop`: each in a run of cells, and behind the last one the first."""
+        values, run = self.study.axes[name].values, self._runs[name]
+        first, last = start // run, max(stop - 1, start) // run
+        begin, count = first % len(values), last + 1 - first
+        found: Floats = values[begin : begin + count]
+        if len(found) < count:
+            turns, rest = divmod(count - len(found), len(values))
+            whole = np.repeat(values[None], turns, axis=0).reshape(-1, *values.shape[1:])
+            found = np.concatenate([found, whole, values[:rest]])
+        if run == 1:
+            return found
+        lengths = np.full(count, run)
+        lengths[-1] = stop - last * run
+        lengths[0] -= start - first * run
+        return np.repeat(found, lengths, axis=0)
 
     def values(self, name: str, cells: NDArray[np.int64]) -> Floats:
         """An axis' values of some flat cells."""
@@ -103,43 +112,16 @@ class Grid(Box):
         return np.full(len(cells), self.study.fixed[name])
 
     def settings(self, start: int, stop: int) -> tuple[int | NDArray[np.int8], float | Floats]:
-        """Method number (-1: auto) and rtol of the cells: one for all where they agree, else one per cell."""
-        method: int | NDArray[np.int8] = self._fixed_method()
-        rtol: float | Floats = self.study.rtol
+        """Method number (-1: auto) and rtol of the cells: one for all, or where it is an axis one per cell."""
+        names = ["auto", *(method.name for method in self.study.kernel.methods)]
+        method: int | NDArray[np.int8] = AUTO + names.index(self.study.method)
         if "method" in self.study.axes:
-            codes = self.column("method", start, stop)
-            method = int(codes[0]) if _all_equal(codes) else codes.astype(np.int8)
-        if "rtol" in self.study.axes:
-            column = self.column("rtol", start, stop)
-            rtol = float(column[0]) if _all_equal(column) else column
-        return method, rtol
+            method = self.column("method", start, stop).astype(np.int8)
+        return method, self.column("rtol", start, stop) if "rtol" in self.study.axes else self.study.rtol
 
     def cell(self, index: int) -> dict[str, str]:
         """The axes' values of one cell, as people write them: {"mu": "0.9", "method": "closed"}."""
         return {name: axis.label(index // self._runs[name] % len(axis)) for name, axis in self.study.axes.items()}
-
-    def _fixed_method(self) -> int:
-        names = [m.name for m in self.study.kernel.methods]
-        return AUTO if self.study.method == "auto" else names.index(self.study.method)
-
-    def column(self, name: str, start: int, stop: int) -> Floats:
-        """An axis' numbers in the cells `start` to `stop`."""
-        column = np.empty(stop - start)
-        self._fill(self.study.axes[name], start, column)
-        return column
-
-    def _fill(self, axis: Axis, start: int, out: Floats) -> None:
-        """Write the axis' values of the cells from `start` on, one period of them; then copy that period on."""
-        run = self._runs[axis.name]
-        filled = min(len(out), run * len(axis))
-        if filled == 0:
-            return
-        first, last = start // run, (start + filled - 1) // run
-        _repeat(_cyclic(axis.values, first % len(axis), last - first + 1), run, start % run, out[:filled])
-        while filled < len(out):
-            more = min(filled, len(out) - filled)
-            out[filled : filled + more] = out[:more]
-            filled += more
 
 
 class Cells(NamedTuple):
@@ -174,28 +156,3 @@ def empty_cells(study: Study, cells: int) -> Cells:
     """Uninitialised arrays for so many cells."""
     outputs = {name: np.empty((cells, *shape)) for name, shape in study.shapes.items()}
     return Cells(outputs, np.empty(cells, np.int8), np.empty(cells, np.int8))
-
-
-def _cyclic(values: Floats, first: int, count: int) -> Floats:
-    """`count` values from number `first` on, starting over at the end; at most one turn and one value."""
-    if first + count <= len(values):
-        return values[first : first + count]
-    return np.concatenate([values[first:], values[: first + count - len(values)]])
-
-
-def _repeat(values: Floats, run: int, skip: int, out: Floats) -> None:
-    """Each of `values` `run` times, without the first `skip` cells, until `out` is full."""
-    head = min(run - skip, len(out))
-    whole = (len(out) - head) // run
-    out[:head] = values[0]
-    body = out[head : head + whole * run].reshape(whole, run)
-    if run < SHORT_RUN:
-        for offset in range(run):
-            body[:, offset] = values[1 : 1 + whole]
-    else:
-        body[...] = values[1 : 1 + whole, None]
-    out[head + whole * run :] = values[-1]
-
-
-def _all_equal(column: NDArray[np.float64]) -> bool:
-    return len(column) > 0 and bool((column == column[0]).all())
