@@ -4,14 +4,14 @@ Others may use
     `read`           study: of a file, of keys, or of a result
     `model`          Study, Axis, Summary
     `kernel_lookup`  load_kernel: a kernel by the name that a study gives it
-    `mistakes`       how found, allowed and meant words are told
+    `keys`           KEYS: what may stand at the top of a study
+    `mistakes`       Mistakes, gathered and raised together; limits: what a field allows, in words
     `units`          scale, exponents
-
     `toml`           to_toml: a study as the text of its file
     `condition`      Condition: read by Python's grammar, never run by it
     `samples`        what a sampled design is called, and its axes for SALib
 
-`study_parser` (the keys), `field_parser` (their entries), `designs`, `summary` and `spacing` are behind `read`.
+`entries` (what stands under a key), `designs`, `summary` and `spacing` are behind `read`.
 The room itself may be called: `sweep.study(...)` is `sweep.study.read.study`.
 """
 

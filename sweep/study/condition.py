@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import ast
-import itertools
 import operator
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from decimal import Decimal
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from kernels.interface import Field, Kernel
+from kernels.interface import Kernel
 from sweep.errors import SweepError
-from sweep.study.mistakes import did_you_mean, listed
-from sweep.study.model import AUTO
-from sweep.study.units import UnitMistake, exponents, scale
+from sweep.study.model import setting
+from sweep.study.units import UnitMistake, dimension, scale
+from sweep.words import did_you_mean, listed
 
 COMPARE: dict[type, Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,
@@ -39,6 +37,9 @@ LONGEST = 1000
 
 GRAMMAR = "names, numbers, 'words', + - * / **, < <= > >= == !=, and, or, not, brackets"
 
+Valued = tuple[Any, Any]
+"""What a part of a condition comes to (numbers, words or truth), and its dimension; None: it fits any."""
+
 
 def is_array(value: Any) -> bool:
     """An array of numpy or xarray, not a number or a word."""
@@ -57,6 +58,10 @@ class Condition:
         What a name of words may be; empty of others.
     says : str
         Begins every message.
+    units : mapping of str to str, optional
+        Of every name of numbers. If given, only like quantities can be compared and added, "'3 cm'" may stand beside
+        a name, and powers are whole numbers, computed by products: those of libraries differ from machine to machine
+        in the last digit.
 
     Raises
     ------
@@ -65,9 +70,14 @@ class Condition:
     """
 
     def __init__(
-        self, text: str, variable: Callable[[str], Any], words: Callable[[str], Iterable[str]], says: str = ""
+        self,
+        text: str,
+        variable: Callable[[str], Any],
+        words: Callable[[str], Iterable[str]],
+        says: str = "",
+        units: Mapping[str, str] | None = None,
     ) -> None:
-        self.text, self.says = text, says
+        self.text, self.says, self.units = text, says, units
         self.variable, self.words = variable, words
         if len(text) > LONGEST:
             self.text = text[:40] + "..."
@@ -81,92 +91,118 @@ class Condition:
         """Where it holds. Raises SweepError."""
         try:
             with np.errstate(all="ignore"):
-                found = self.value(self.tree)
+                found, _ = self.value(self.tree)
         except (ValueError, RecursionError, MemoryError, ArithmeticError, TypeError):
             raise self.refusal(f"cannot be read; it may hold {GRAMMAR}") from None
         if not is_array(found) or found.dtype != bool:
             raise self.refusal('is no condition on the cells; write e.g. "R < 0.1" or "status == \'OK\'"')
         return found
 
-    def value(self, node: ast.expr) -> Any:
+    def value(self, node: ast.expr) -> Valued:
         """What a part of it comes to."""
         match node:
             case ast.Constant(value=bool()):
                 pass
             case ast.Constant(value=int() | float() | str() as value):
-                return value
+                return value, None
             case ast.Name(id=name):
-                return self.variable(name)
+                found = self.variable(name)
+                return found, dimension(self.units[name]) if self.units is not None and name in self.units else None
             case ast.UnaryOp(op=ast.USub(), operand=operand):
-                return -self.number(operand)
+                number, unit = self.number(operand)
+                return -number, unit
             case ast.UnaryOp(op=ast.Not(), operand=operand):
-                return ~self.condition_of(operand)
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in COMPUTE:
-                return self.computed(node, COMPUTE[type(op)], self.number(left), self.number(right))
+                return ~self.holds_for(operand), None
+            case ast.BinOp(op=op) if type(op) in COMPUTE:
+                return self.computed(node)
             case ast.BoolOp(op=op, values=values):
                 join = np.logical_and if isinstance(op, ast.And) else np.logical_or
-                found = self.condition_of(values[0])
+                found = self.holds_for(values[0])
                 for part in values[1:]:
-                    found = join(found, self.condition_of(part))
-                return found
+                    found = join(found, self.holds_for(part))
+                return found, None
             case ast.Compare(left=left, ops=ops, comparators=others) if all(type(op) in COMPARE for op in ops):
-                return self.compared([left, *others], [COMPARE[type(op)] for op in ops])
+                return self.compared([left, *others], [COMPARE[type(op)] for op in ops]), None
         raise self.refusal(f'"{ast.unparse(node)[:60]}" is not allowed; it may hold {GRAMMAR}')
 
-    def computed(self, node: ast.BinOp, compute: Callable[[Any, Any], Any], left: Any, right: Any) -> Any:
-        """A sum, product or power."""
-        return compute(left, right)
-
-    def number(self, node: ast.expr) -> Any:
+    def number(self, node: ast.expr) -> Valued:
         """A part that is numbers."""
-        found = self.value(node)
+        found, unit = self.value(node)
         if isinstance(found, str) or (is_array(found) and found.dtype.kind not in "fiu"):
             raise self.refusal(f'"{ast.unparse(node)[:60]}" is no number')
-        return found
+        return found, unit
 
-    def condition_of(self, node: ast.expr) -> Any:
+    def holds_for(self, node: ast.expr) -> Any:
         """A part that is a condition."""
-        found = self.value(node)
+        found, _ = self.value(node)
         if not is_array(found) or found.dtype != bool:
             raise self.refusal(f'"{ast.unparse(node)[:60]}" is no condition')
         return found
 
+    def computed(self, node: ast.BinOp) -> Valued:
+        """A sum, product or power."""
+        (left, unit), (right, other) = self.number(node.left), self.number(node.right)
+        compute = COMPUTE[type(node.op)]
+        match node.op:
+            case ast.Add() | ast.Sub():
+                return compute(left, right), self.agreed(node.left, unit, node.right, other)
+            case ast.Pow() if self.units is not None:
+                if not isinstance(right, int) or not 1 <= right <= 9:
+                    raise self.refusal(f'"{ast.unparse(node)[:60]}": a power is a whole number from 1 to 9')
+                found = left
+                for _ in range(right - 1):
+                    found = found * left
+                return found, None if unit is None else unit**right
+            case _ if unit is None and other is None:
+                return compute(left, right), None
+        # a number alone is of no unit in a product
+        return compute(left, right), compute(other**0 if unit is None else unit, unit**0 if other is None else other)
+
     def compared(self, nodes: Sequence[ast.expr], comparisons: Sequence[Callable[[Any, Any], Any]]) -> Any:
         """A chain of comparisons."""
         found: Any = True
-        values = [self.value(node) for node in nodes]
-        for i, compare in enumerate(comparisons):
-            left, right = self.alike(nodes[i], nodes[i + 1], values[i], values[i + 1])
-            found = np.logical_and(found, compare(left, right))
+        for left, right, compare in zip(nodes, nodes[1:], comparisons, strict=False):
+            (value, unit), (other, other_unit) = self.beside(left, right), self.beside(right, left)
+            if len({isinstance(v, str) or (is_array(v) and v.dtype.kind in "UO") for v in (value, other)}) > 1:
+                raise self.refusal("compares words with numbers")
+            if not is_array(value) and not is_array(other):
+                raise self.refusal("compares two constants")
+            for node, word in ((left, other), (right, value)):
+                # a misspelt status would choose nothing, or everything, without a sign
+                words = list(self.words(node.id)) if isinstance(node, ast.Name) and isinstance(word, str) else [word]
+                if isinstance(word, str) and word not in words:
+                    hint = did_you_mean(word, words) or f"; it has {listed(words)}"
+                    raise self.refusal(f'{ast.unparse(node)} is never "{word}"{hint}')
+            self.agreed(left, unit, right, other_unit)
+            found = np.logical_and(found, compare(value, other))
         return found
 
-    def alike(self, left: ast.expr, right: ast.expr, value: Any, other: Any) -> tuple[Any, Any]:
-        """Two sides that may be compared."""
-        kinds = {isinstance(v, str) or (is_array(v) and v.dtype.kind in "UO") for v in (value, other)}
-        if len(kinds) > 1:
-            raise self.refusal("compares words with numbers")
-        if not is_array(value) and not is_array(other):
-            raise self.refusal("compares two constants")
-        self.known_word(left, other)
-        self.known_word(right, value)
-        return value, other
+    def beside(self, node: ast.expr, other: ast.expr) -> Valued:
+        """One side of a comparison; '3 cm' is a number in the unit of the name on the other side."""
+        value, unit = self.value(node)
+        match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s+(\S.*)", value) if isinstance(value, str) else None
+        if match is None or self.units is None:
+            return value, unit
+        if not isinstance(other, ast.Name) or other.id not in self.units:
+            raise self.refusal(f"'{value}' has a unit; compare it with a parameter alone")
+        try:
+            return float((scale(match[2], self.units[other.id], other.id) or 1) * Decimal(match[1])), None
+        except UnitMistake as error:
+            raise self.refusal(str(error)) from None
 
-    def known_word(self, node: ast.expr, word: Any) -> None:
-        """A misspelt status would choose nothing, or everything, without a sign."""
-        if not (isinstance(node, ast.Name) and isinstance(word, str)):
-            return
-        words = list(self.words(node.id))
-        if word not in words:
-            hint = did_you_mean(word, words) or f"; it has {listed(words)}"
-            raise self.refusal(f'{node.id} is never "{word}"{hint}')
+    def agreed(self, left: ast.expr, unit: Any, right: ast.expr, other: Any) -> Any:
+        """The dimension of two parts that are alike. Raises SweepError where they are not."""
+        if unit is not None and other is not None and unit != other:
+            texts = (
+                f"{ast.unparse(node)[:40]} is in {str(of).replace(' ** ', '^')}"
+                for node, of in ((left, unit), (right, other))
+            )
+            raise self.refusal(f"{' and '.join(texts)}; they cannot be compared")
+        return other if unit is None else unit
 
     def refusal(self, what: str) -> SweepError:
         """The mistake as the user is told."""
         return SweepError(f"{self.says}{self.text}: {what}")
-
-
-Dimension = dict[str, Fraction]
-"""Powers of base units, without the radian."""
 
 
 class CellCondition(Condition):
@@ -186,18 +222,12 @@ class CellCondition(Condition):
     """
 
     def __init__(self, text: str, kernel: Kernel, settings: Sequence[str] = ()) -> None:
-        super().__init__(text, self._column, self._words)
         self._fields = {field.name: field for field in kernel.parameters if not field.dims}
-        if "rtol" in settings:
-            self._fields["rtol"] = Field("rtol", "1", "")
-        if "method" in settings:
-            choices = {"auto": AUTO, **{m.name: i for i, m in enumerate(kernel.methods)}}
-            self._fields["method"] = Field("method", "1", "", choices=choices)
-        self._columns: Mapping[str, Any] = {name: np.zeros(0) for name in self._fields}
-        self._factors: dict[str, float] = {}
+        self._fields |= {name: setting(name, kernel) for name in settings}
+        units = {name: field.unit for name, field in self._fields.items() if not field.choices}
+        super().__init__(text, self._column, lambda name: self._fields[name].choices, units=units)
         self.names = sorted({node.id for node in ast.walk(self.tree) if isinstance(node, ast.Name)})
-        self.truth()
-        self._dimension(self.tree)
+        self.holds({name: np.zeros(0) for name in self._fields})
 
     def holds(self, columns: Mapping[str, Any]) -> Any:
         """Where it holds, of columns of the `names` that it has."""
@@ -215,78 +245,3 @@ class CellCondition(Condition):
         for word, code in choices.items():
             found[column == code] = word
         return found
-
-    def _words(self, name: str) -> Iterable[str]:
-        return self._fields[name].choices
-
-    def computed(self, node: ast.BinOp, compute: Callable[[Any, Any], Any], left: Any, right: Any) -> Any:
-        """Powers by multiplication: those of libraries differ from machine to machine in the last digit."""
-        if not isinstance(node.op, ast.Pow):
-            return compute(left, right)
-        if not isinstance(right, int) or not 1 <= right <= 9:
-            raise self.refusal(f'"{ast.unparse(node)[:60]}": a power is a whole number from 1 to 9')
-        found = left
-        for _ in range(right - 1):
-            found = found * left
-        return found
-
-    def alike(self, left: ast.expr, right: ast.expr, value: Any, other: Any) -> tuple[Any, Any]:
-        """Numbers with a unit of their own stand beside a parameter."""
-        return super().alike(left, right, self._with_unit(value, right), self._with_unit(other, left))
-
-    def _with_unit(self, value: Any, beside: ast.expr) -> Any:
-        match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s+(\S.*)", value) if isinstance(value, str) else None
-        if match is None:
-            return value
-        if not isinstance(beside, ast.Name) or self._fields[beside.id].choices:
-            raise self.refusal(f"'{value}' has a unit; compare it with a parameter alone")
-        field, (number, unit) = self._fields[beside.id], match.groups()
-        if value not in self._factors:
-            try:
-                self._factors[value] = float((scale(unit, field.unit, field.name) or 1) * Decimal(number))
-            except (UnitMistake, ValueError) as error:
-                raise self.refusal(str(error)) from None
-        return self._factors[value]
-
-    def _dimension(self, node: ast.expr) -> Dimension | None:
-        """Of a part that is numbers; None of a constant, which fits any. Raises SweepError where units do not agree."""
-        match node:
-            case ast.Name(id=name) if not self._fields[name].choices:
-                powers = exponents(self._fields[name].unit)
-                return {base: power for base, power in powers.items() if base != "radian" and power}
-            case ast.UnaryOp(operand=operand):
-                return self._dimension(operand)
-            case ast.BinOp(left=left, op=ast.Pow(), right=ast.Constant(value=int() as power)):
-                return _product(self._dimension(left), None, power)
-            case ast.BinOp(left=left, op=ast.Mult() | ast.Div() as op, right=right):
-                return _product(self._dimension(left), self._dimension(right), 1, 1 if isinstance(op, ast.Mult) else -1)
-            case ast.BinOp(left=left, right=right):
-                return self._agreed([left, right])
-            case ast.Compare(left=left, comparators=others):
-                self._agreed([left, *others])
-            case ast.BoolOp(values=values):
-                for value in values:
-                    self._dimension(value)
-        return None
-
-    def _agreed(self, nodes: Sequence[ast.expr]) -> Dimension | None:
-        """What all parts have that are no constants."""
-        found = [(node, dimension) for node in nodes if (dimension := self._dimension(node)) is not None]
-        for (first, one), (second, other) in itertools.pairwise(found):
-            if one != other:
-                texts = [f"{ast.unparse(n)[:40]} is in {_unit(d)}" for n, d in ((first, one), (second, other))]
-                raise self.refusal(f"{' and '.join(texts)}; they cannot be compared")
-        return found[0][1] if found else None
-
-
-def _product(left: Dimension | None, right: Dimension | None, power: int, other: int = 1) -> Dimension | None:
-    if left is None and right is None:
-        return None
-    found = {base: power * exponent for base, exponent in (left or {}).items()}
-    for base, exponent in (right or {}).items():
-        found[base] = found.get(base, Fraction(0)) + other * exponent
-    return {base: exponent for base, exponent in found.items() if exponent}
-
-
-def _unit(dimension: Dimension) -> str:
-    return " ".join(f"{base}^{exponent}" if exponent != 1 else base for base, exponent in dimension.items()) or "1"

@@ -16,193 +16,63 @@ axes.seed = [1, 2, 3]
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from kernels.interface import Field
-from sweep.errors import SweepError
 from sweep.study import samples
-from sweep.study.field_parser import EXAMPLE, SAMPLED_EXAMPLE, FieldParser
-from sweep.study.mistakes import Mistakes, listed, show
-from sweep.study.model import Axis, Block
+from sweep.study.entries import EXAMPLE, SAMPLED_EXAMPLE, Entries
+from sweep.study.mistakes import Mistakes, show
+from sweep.study.model import SMALLEST_RTOL, Axis, Block
 from sweep.study.spacing import LARGEST_AXIS
+from sweep.words import listed
 
 PLAIN = ("product", "zip")
 DESIGNS = (*PLAIN, *samples.GENERATORS)
-SMALLEST_RTOL = 1e-15
 LARGEST_GRID = 10**12
 LARGEST_SEED = 2**32 - 1
 
 FieldOf = Callable[[str, str], Field | None]
-Read = tuple[str, dict[str, Axis], tuple[Block, ...]]
+"""The field of an axis by its name and where that stands; None, and a mistake, where there is none."""
 
 
-class DesignParser:
-    """Reads `design`, `axes` and `blocks` of one study.
-
-    Parameters
-    ----------
-    fields : FieldParser
-    field_of : callable
-        The field of an axis by its name and where that stands; None, and a mistake, where there is none.
-    """
-
-    def __init__(self, fields: FieldParser, field_of: FieldOf) -> None:
-        self.fields, self.field_of = fields, field_of
-
-    @property
-    def mistakes(self) -> Mistakes:
-        """Where mistakes gather."""
-        return self.fields.mistakes
-
-    def read(self, keys: Mapping[str, Any]) -> Read:
-        """The study's design, all its axes, and its blocks; none of a product or zip of all axes."""
-        if "blocks" in keys:
-            design, (axes, blocks) = "blocks", self._blocks(keys)
-        else:
-            axes, block = self._block(keys, "")
-            design, blocks = block.design, () if block.design in PLAIN else (block,)
-        self._check_size(axes, blocks or (Block(design, tuple(axes)),))
-        return design, axes, blocks
-
-    def _blocks(self, keys: Mapping[str, Any]) -> tuple[dict[str, Axis], tuple[Block, ...]]:
-        for key in ("design", "axes"):
-            if key in keys:
-                self.mistakes.add(key, "does not go with blocks; write it in one of them")
+def read_designs(
+    keys: Mapping[str, Any], entries: Entries, field_of: FieldOf
+) -> tuple[str, dict[str, Axis], tuple[Block, ...]]:
+    """The study's design, all its axes, and its blocks; none of a product or zip of all axes."""
+    mistakes = entries.mistakes
+    axes: dict[str, Axis] = {}
+    blocks: list[Block] = []
+    if "blocks" not in keys:
+        axes, block = _block(keys, "", entries, field_of)
+        design, blocks = block.design, [block]
+    else:
+        design = "blocks"
+        for key in (key for key in ("design", "axes") if key in keys):
+            mistakes.add(key, "does not go with blocks; write it in one of them")
         found = keys["blocks"]
         if not isinstance(found, list | tuple) or not found:
-            self.mistakes.add("blocks", "expected a list of tables, e.g. [[blocks]] with axes.mu = [1.0, 2.0]")
-            self.mistakes.unread = True
-            found = []
-        axes: dict[str, Axis] = {}
-        blocks = []
+            mistakes.add("blocks", "expected a list of tables, e.g. [[blocks]] with axes.mu = [1.0, 2.0]")
+            found, mistakes.unread = [], True
         for i, entry in enumerate(found):
             where = f"blocks[{i}]"
-            table = self.mistakes.table(entry, where, "[[blocks]] with axes.mu = [1.0, 2.0]")
-            table = self.mistakes.keys(table, ("design", "axes"), where)
-            if not isinstance(entry, Mapping):
-                continue
-            own, block = self._block(table, f"{where}.")
-            for name in own.keys() & axes.keys():
-                self.mistakes.add(f"{where}.axes.{name}", "is an axis of another block as well; keep one of the two")
-            axes |= own
-            blocks.append(block)
-        return axes, tuple(blocks)
-
-    def _block(self, keys: Mapping[str, Any], at: str) -> tuple[dict[str, Axis], Block]:
-        entries = self.mistakes.table(keys.get("axes", {}), f"{at}axes", f"[axes.mu] with {EXAMPLE}")
-        if not keys.get("axes"):
-            self.mistakes.add(f"{at}axes", f"missing; give at least one, e.g. axes.mu = {EXAMPLE}")
-        design, options = self._design(keys.get("design", "product"), f"{at}design", len(entries))
-        fields: dict[str, Field | None] = {}
-        axes = {axis.name: axis for axis in self._axes(entries, fields, design, options, f"{at}axes")}
-        self._check_axes(axes, fields, design, f"{at}axes")
-        return axes, Block(design, tuple(axes), options)
-
-    def _axes(
-        self,
-        entries: Mapping[str, Any],
-        fields: dict[str, Field | None],
-        design: str,
-        options: Mapping[str, Any],
-        at: str,
-    ) -> Iterator[Axis]:
-        """Every axis; its field is put into `fields`."""
-        sampled = design in samples.GENERATORS
-        shares = self._shares(design, options, len(entries))
-        for i, (name, entry) in enumerate(entries.items()):
-            where = f"{at}.{name}"
-            fields[name] = self.field_of(name, where)
-            without = isinstance(entry, Mapping) and {"values", "file", "num"}.isdisjoint(entry)
-            if not sampled and (design or not without or {"start", "stop"}.isdisjoint(entry)):
-                yield self.fields.axis(name, entry, fields[name], where)
-            elif without:
-                yield self.fields.sampled(name, entry, fields[name], where, shares[i])
-            else:
-                self.mistakes.add(where, f"the design chooses the values; write e.g. {SAMPLED_EXAMPLE}")
-                yield Axis(name, np.empty(0), "values")
-
-    def _shares(self, design: str, options: Mapping[str, Any], axes: int) -> Any:
-        """Where the points lie along each axis, from 0 to 1; anywhere where the design has a mistake."""
-        if not options or not axes:
-            return np.full((axes, 1), 0.5)
-        try:
-            return samples.unit_points(design, axes, options).T
-        except SweepError as error:
-            self.mistakes.add("design", str(error))
-            return np.full((axes, 1), 0.5)
-
-    def _design(self, found: Any, where: str, axes: int) -> tuple[str, dict[str, Any]]:
-        """Name and options of a design; no options of one that has a mistake."""
-        if not isinstance(found, Mapping):
-            design = self.mistakes.word(found, where, DESIGNS) or ""
-            if design in samples.GENERATORS:
-                cure = f'{{ kind = "{design}", n = 1024, seed = 0 }}'
-                self.mistakes.add(where, f"how many points? Write design = {cure}")
-            return design, {}
-        before, kind = len(self.mistakes), found.get("kind")
-        others = [name for name in DESIGNS if name not in samples.SCRAMBLED]
-        scrambled = () if kind in others else ("scramble",)
-        found = self.mistakes.keys(found, ("kind", *(() if kind in PLAIN else ("n", "seed", *scrambled))), where)
-        design = self.mistakes.word(found.get("kind"), f"{where}.kind", DESIGNS) or ""
-        if design in PLAIN or not design:
-            return design, {}
-        options = {"n": self._count(found.get("n"), design, f"{where}.n", axes)}
-        options["seed"] = seed = found.get("seed", 0)
-        if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 0 <= seed <= LARGEST_SEED:
-            self.mistakes.add(f"{where}.seed", f"expected a whole number from 0 to {LARGEST_SEED}, found {show(seed)}")
-        else:
-            options["seed"] = int(seed)
-        if scrambled:
-            options["scramble"] = found.get("scramble", True)
-            if not isinstance(options["scramble"], bool):
-                text = f"expected true or false, found {show(options['scramble'])}"
-                self.mistakes.add(f"{where}.scramble", text)
-        return design, options if len(self.mistakes) == before else {}
-
-    def _count(self, found: Any, design: str, where: str, axes: int) -> int | None:
-        n = self.mistakes.count(found, where, LARGEST_AXIS)
-        if n is None:
-            return None
-        if design in samples.POWERS_OF_TWO and n & (n - 1):
-            lower = 1 << (n.bit_length() - 1)
-            self.mistakes.add(where, f"a Sobol' sequence needs a power of 2; write {lower} or {2 * lower}")
-        points = samples.count(design, axes, n)
-        if points > LARGEST_AXIS:
-            self.mistakes.add(where, f"makes {points:,} points; expected at most {LARGEST_AXIS:,}")
-        return n
-
-    def _check_axes(self, axes: Mapping[str, Axis], fields: Mapping[str, Field | None], design: str, at: str) -> None:
-        """What concerns several values or several axes; axes without values have been complained about."""
-        if "rtol" in axes and not all(SMALLEST_RTOL <= value < 1 for value in axes["rtol"].values):
-            self.mistakes.add(f"{at}.rtol", f"expected {SMALLEST_RTOL:g} <= rtol < 1 everywhere")
-        lengths = {name: len(axis) for name, axis in axes.items()}
-        if not all(lengths.values()):
-            return
-        if design == "zip" and len(set(lengths.values())) > 1:
-            found = listed((f"{name} has {n}" for name, n in lengths.items()), word="and")
-            self.mistakes.add(at, f'design "zip" needs axes of equal length; {found} values')
-        for name, axis in axes.items() if design == "product" else ():
-            if axis.values.ndim > 1:
-                self.mistakes.add(f"{at}.{name}", f'{name} is an array; as an axis it needs design = "zip"')
-                continue
-            _, first, counts = np.unique(axis.values, return_index=True, return_counts=True)
-            # NaN may stand once, too; but the words of a field that is not known are all NaN
-            twice = first[(counts > 1) & ((fields[name] is not None) | ~np.isnan(axis.values[first]))]
-            if len(twice):
-                text = f"{axis.label(int(twice[0]))} stands more than once; give every value once"
-                self.mistakes.add(f"{at}.{name}", text)
-
-    def _check_size(self, axes: Mapping[str, Axis], blocks: Sequence[Block]) -> None:
-        lengths = []
-        for block in blocks:
-            own = [len(axes[name]) for name in block.axes]
-            lengths += own if block.design == "product" else own[:1]
-        if math.prod(lengths) > LARGEST_GRID:
-            product = " x ".join(map(str, lengths))
-            self.mistakes.add("axes", f"{product} cells; a study may have at most {LARGEST_GRID:.0e}")
+            table = mistakes.table(entry, where, "[[blocks]] with axes.mu = [1.0, 2.0]")
+            if isinstance(entry, Mapping):
+                table = mistakes.keys(table, ("design", "axes"), where)
+                own, block = _block(table, f"{where}.", entries, field_of)
+                for name in own.keys() & axes.keys():
+                    mistakes.add(f"{where}.axes.{name}", "is an axis of another block as well; keep one of the two")
+                axes |= own
+                blocks.append(block)
+    lengths = []
+    for block in blocks:
+        own_lengths = [len(axes[name]) for name in block.axes]
+        lengths += own_lengths if block.design == "product" else own_lengths[:1]
+    if math.prod(lengths) > LARGEST_GRID:
+        mistakes.add("axes", f"{' x '.join(map(str, lengths))} cells; a study may have at most {LARGEST_GRID:.0e}")
+    return design, axes, () if design in PLAIN else tuple(blocks)
 
 
 def axes_named(keys: Mapping[str, Any]) -> set[str]:
@@ -211,3 +81,76 @@ def axes_named(keys: Mapping[str, Any]) -> set[str]:
     tables = [keys, *(blocks if isinstance(blocks, list | tuple) else ())]
     found = (table.get("axes") for table in tables if isinstance(table, Mapping))
     return {str(name) for axes in found if isinstance(axes, Mapping) for name in axes}
+
+
+def _block(keys: Mapping[str, Any], at: str, entries: Entries, field_of: FieldOf) -> tuple[dict[str, Axis], Block]:
+    """The axes of one `design` and `axes`, and how they make a grid."""
+    mistakes, at_axes = entries.mistakes, f"{at}axes"
+    given = mistakes.table(keys.get("axes", {}), at_axes, f"[axes.mu] with {EXAMPLE}")
+    if isinstance(keys.get("axes", {}), Mapping) and not given:
+        mistakes.add(at_axes, f"missing; give at least one, e.g. axes.mu = {EXAMPLE}")
+    design, options = _design(keys.get("design", "product"), f"{at}design", len(given), mistakes)
+    sampled = design in samples.GENERATORS
+    shares = np.full((len(given), 1), 0.5)  # anywhere, where the design has a mistake
+    if options and given:
+        shares = mistakes.tried("design", lambda: samples.unit_points(design, len(given), options).T, shares)
+    axes: dict[str, Axis] = {}
+    for i, (name, entry) in enumerate(given.items()):
+        where = f"{at_axes}.{name}"
+        field = field_of(name, where)
+        without = isinstance(entry, Mapping) and {"values", "file", "num"}.isdisjoint(entry)
+        if sampled and not without:
+            mistakes.add(where, f"the design chooses the values; write e.g. {SAMPLED_EXAMPLE}")
+            axes[name] = Axis(name, np.empty(0), "values")
+            continue
+        # where the design cannot be read, an axis may be meant for a sampled one
+        between = sampled or (not design and without and not {"start", "stop"}.isdisjoint(entry))
+        axes[name] = entries.axis(name, entry, field, where, shares[i] if between else None)
+        values = axes[name].values
+        if name == "rtol" and not all(SMALLEST_RTOL <= value < 1 for value in values):
+            mistakes.add(where, f"expected {SMALLEST_RTOL:g} <= rtol < 1 everywhere")
+        if design == "product" and values.ndim > 1:
+            mistakes.add(where, f'{name} is an array; as an axis it needs design = "zip"')
+        elif design == "product":
+            _, first, counts = np.unique(values, return_index=True, return_counts=True)
+            # NaN may stand once, too; but the words of a field that is not known are all NaN
+            twice = first[(counts > 1) & ((field is not None) | ~np.isnan(values[first]))]
+            if len(twice):
+                label = axes[name].label(int(twice[0]))
+                mistakes.add(where, f"{label} stands more than once; give every value once")
+    lengths = {name: len(axis) for name, axis in axes.items()}
+    if design == "zip" and all(lengths.values()) and len(set(lengths.values())) > 1:
+        counted = listed((f"{name} has {n}" for name, n in lengths.items()), word="and")
+        mistakes.add(at_axes, f'design "zip" needs axes of equal length; {counted} values')
+    return axes, Block(design, tuple(axes), options)
+
+
+def _design(found: Any, where: str, axes: int, mistakes: Mistakes) -> tuple[str, dict[str, Any]]:
+    """Name and options of a design; no options of one that has a mistake."""
+    if not isinstance(found, Mapping):
+        design = mistakes.word(found, where, DESIGNS) or ""
+        if design in samples.GENERATORS:
+            cure = f'{{ kind = "{design}", n = 1024, seed = 0 }}'
+            mistakes.add(where, f"how many points? Write design = {cure}")
+        return design, {}
+    before, kind = len(mistakes), found.get("kind")
+    allowed = ("kind",) if kind in PLAIN else ("kind", "n", "seed")
+    # scramble is no mistake where the kind is
+    scrambled = kind in samples.SCRAMBLED or kind not in DESIGNS
+    found = mistakes.keys(found, (*allowed, *["scramble"] * scrambled), where)
+    design = mistakes.word(found.get("kind"), f"{where}.kind", DESIGNS) or ""
+    if design in PLAIN or not design:
+        return design, {}
+    n, seed, scramble = mistakes.count(found.get("n"), f"{where}.n", LARGEST_AXIS), found.get("seed", 0), True
+    if n is not None and design in samples.POWERS_OF_TWO and n & (n - 1):
+        lower = 1 << (n.bit_length() - 1)
+        mistakes.add(f"{where}.n", f"a Sobol' sequence needs a power of 2; write {lower} or {2 * lower}")
+    if n is not None and (points := samples.count(design, axes, n)) > LARGEST_AXIS:
+        mistakes.add(f"{where}.n", f"makes {points:,} points; expected at most {LARGEST_AXIS:,}")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 0 <= seed <= LARGEST_SEED:
+        mistakes.add(f"{where}.seed", f"expected a whole number from 0 to {LARGEST_SEED}, found {show(seed)}")
+    if scrambled and not isinstance(scramble := found.get("scramble", True), bool):
+        mistakes.add(f"{where}.scramble", f"expected true or false, found {show(scramble)}")
+    if len(mistakes) > before:
+        return design, {}
+    return design, {"n": n, "seed": int(seed)} | ({"scramble": scramble} if scrambled else {})

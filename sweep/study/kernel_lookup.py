@@ -9,7 +9,8 @@ from pathlib import Path
 from kernels import catalogue
 from kernels.interface import Kernel, load
 from sweep.errors import SweepError
-from sweep.study.mistakes import did_you_mean, listed, show
+from sweep.study.mistakes import show
+from sweep.words import did_you_mean, listed
 
 RESERVED = ("status", "method_used", "error_bound", "method", "rtol", "cell")
 """Names that a result has in any case."""
@@ -26,7 +27,7 @@ def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path
     Raises
     ------
     SweepError
-        There is no such kernel, it may not be imported, or importing it fails.
+        There is no such kernel, it may not be imported, importing it fails, or it declares a name twice.
     """
     known = list(catalogue.KERNELS)
     if not isinstance(name, str) or not name:
@@ -46,21 +47,15 @@ def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path
         raise SweepError(f"{show(name)} cannot be loaded: {type(error).__name__}: {error}") from error
     if not isinstance(kernel, Kernel):
         raise SweepError(f"{show(name)} is a {type(kernel).__name__}, not a kernels.interface.Kernel")
-    _check_declaration(str(name), kernel)
-    return kernel
-
-
-def _check_declaration(name: str, kernel: Kernel) -> None:
-    """Raises SweepError where no result could hold what the kernel declares."""
+    # no result could hold it otherwise
     fields = [*kernel.parameters, *kernel.outputs, *kernel.along]
     names = [*RESERVED, *(field.name for field in fields)]
-    twice = sorted({n for n in names if names.count(n) > 1})
-    if twice:
+    if twice := sorted({n for n in names if names.count(n) > 1}):
         raise SweepError(f"kernel {name} declares {listed(twice)} more than once, or takes a name of the result's own")
-    known = {field.name for field in kernel.along} | set(kernel.same_length)
-    known |= {dim for field in kernel.parameters for dim in field.dims}
-    lost = sorted({d for field in kernel.outputs for d in field.dims} - known)
-    if lost:
+    dims = {field.name for field in kernel.along} | set(kernel.same_length)
+    dims |= {dim for field in kernel.parameters for dim in field.dims}
+    if lost := sorted({dim for field in kernel.outputs for dim in field.dims} - dims):
         raise SweepError(
             f"kernel {name} has outputs along {listed(lost)}, neither in `along` nor a dim of array parameters"
         )
+    return kernel

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 import numbers
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypeVar
 
 from kernels.interface import Field
-from sweep.errors import Mistake, StudyError
+from sweep.errors import Mistake, StudyError, SweepError
 from sweep.words import did_you_mean as did_you_mean
 from sweep.words import listed as listed
 from sweep.words import nearest as nearest
 from sweep.words import quoted as quoted
+
+T = TypeVar("T")
 
 
 class Mistakes:
@@ -21,6 +23,7 @@ class Mistakes:
 
     Attributes
     ----------
+    found : list of Mistake
     unread : bool
         Whether something that holds others was no table, so that what stands in it is not known to be missing.
     meant : set of str
@@ -44,21 +47,22 @@ class Mistakes:
         self.found.append(Mistake(where, message))
 
     def raise_if_any(self, source: str) -> None:
+        """Raises StudyError with all mistakes of what is called `source`."""
         if self.found:
             raise StudyError(source, self.found)
 
-    def number(self, value: Any, where: str) -> float:
-        """`value` as a float64 without loss; else a mistake, and NaN."""
+    def tried(self, where: str, action: Callable[[], T], otherwise: T) -> T:
+        """What an action gives; `otherwise` if it raises ValueError or SweepError, whose text is a mistake."""
         try:
-            return exact_float(value)
-        except ValueError as error:
+            return action()
+        except (ValueError, SweepError) as error:
             self.add(where, str(error))
-            return math.nan
+            return otherwise
 
     def finite(self, value: Any, where: str) -> float:
-        """As `number`, and neither NaN nor infinite."""
+        """A number that is neither NaN nor infinite; NaN where it is a mistake."""
         before = len(self)
-        result = self.number(value, where)
+        result = self.tried(where, lambda: exact_float(value), math.nan)
         if not math.isfinite(result) and len(self) == before:
             self.add(where, f"expected a finite number, found {result}")
         return result
@@ -77,11 +81,7 @@ class Mistakes:
 
     def word(self, value: Any, where: str, allowed: Iterable[str]) -> str | None:
         """One of the words `allowed`."""
-        words = list(allowed)
-        if isinstance(value, str) and value in words:
-            return value
-        self.add(where, f"expected {listed(words, quote=True)}, found {show(value)}{did_you_mean(value, words)}")
-        return None
+        return self.tried(where, lambda: one_of(value, list(allowed)), None)
 
     def words(self, value: Any, where: str, allowed: Iterable[str] | None, example: str, cure: str = "") -> list[str]:
         """A list of some of the words `allowed` (None: of any), none twice and not empty."""
@@ -89,12 +89,15 @@ class Mistakes:
             what = "an empty list" if isinstance(value, Sequence) and not isinstance(value, str) else show(value)
             self.add(where, f"expected {example}, found {what}{cure}")
             return []
-        words = list(value if allowed is None else allowed)
+        words = None if allowed is None else list(allowed)
+        found: list[str] = []
         for i, item in enumerate(value):
-            self.word(item, f"{where}[{i}]", words)
-            if item in list(value)[:i]:
-                self.add(f"{where}[{i}]", f"{show(item)} stands twice")
-        return [item for item in value if item in words]
+            place = f"{where}[{i}]"
+            word = self.text(item, place) if words is None else self.word(item, place, words)
+            if isinstance(item, str) and item in found:
+                self.add(place, f"{show(item)} stands twice")
+            found += [word] if word else []
+        return found
 
     def text(self, value: Any, where: str) -> str:
         if isinstance(value, str):
@@ -109,27 +112,38 @@ class Mistakes:
         self.add(where, f"expected a table, found {show(value)}; write e.g. {example}")
         return {}
 
-    def keys(
-        self, table: Mapping[str, Any], allowed: Iterable[str], where: str = "", says: str = "no such key"
-    ) -> dict[str, Any]:
+    def keys(self, table: Mapping[str, Any], allowed: Iterable[str], where: str = "") -> dict[str, Any]:
         """The table; a mistake for every key that is not `allowed`, and it stands for the one that is meant."""
         words, found = list(allowed), dict(table)
         for key in table:
             if key not in words:
-                meant = nearest(key, words)
                 hint = did_you_mean(key, words) or f"; allowed are {listed(words)}"
-                self.add(f"{where}.{key}" if where else str(key), f"{says}{hint}")
-                if meant:
+                self.add(f"{where}.{key}" if where else str(key), f"no such key{hint}")
+                if meant := nearest(key, words):
                     found.setdefault(meant, found.pop(key))
         return found
 
 
+def one_of(value: Any, words: Sequence[str]) -> str:
+    """A word of those allowed. Raises ValueError with the text for the user."""
+    if isinstance(value, str) and value in words:
+        return value
+    raise ValueError(f"expected {listed(words, quote=True)}, found {show(value)}{did_you_mean(value, words)}")
+
+
 def exact_float(value: Any) -> float:
-    """A number as float64. Raises ValueError with the text for the user."""
+    """A number as float64 without loss. Raises ValueError with the text for the user."""
     if getattr(value, "ndim", None) == 0:
         value = value.item()  # of numpy
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise ValueError(f"expected a number, found {show(value)}{_cure(value)}")
+        cure = ""
+        # a text that looks like a number
+        if isinstance(value, str) and (
+            match := re.fullmatch(r"\s*([-+]?[\d.][\d._]*(?:[eE][-+]?\d+)?)\s*(\D.*)?", value)
+        ):
+            number, unit = match.groups()
+            cure = f'; write {{ value = {number}, unit = "{unit.strip()}" }}' if unit else "; drop the quotes"
+        raise ValueError(f"expected a number, found {show(value)}{cure}")
     try:
         result = float(value)
     except OverflowError:
@@ -139,35 +153,19 @@ def exact_float(value: Any) -> float:
     return result
 
 
-def _cure(value: Any) -> str:
-    """What to do about a text that looks like a number."""
-    if not isinstance(value, str):
-        return ""
-    match = re.fullmatch(r"\s*([-+]?[\d.][\d._]*(?:[eE][-+]?\d+)?)\s*(\D.*)?", value)
-    if not match:
-        return ""
-    number, unit = match.groups()
-    return f'; write {{ value = {number}, unit = "{unit.strip()}" }}' if unit else "; drop the quotes"
-
-
 def show(value: Any) -> str:
     """A found value, as short text."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
         return f'"{value}"' if len(value) <= 60 else f'"{value[:57]}..."'
-    if isinstance(value, Mapping):
-        return "a table"
-    if isinstance(value, list | tuple):
-        return "a list"
-    if value is None:
-        return "nothing"
     if isinstance(value, numbers.Integral):
         # str() of more than 4300 digits raises
         return str(value) if abs(int(value)) < 10**40 else "an integer of more than 40 digits"
     if isinstance(value, numbers.Real):
         return repr(float(value))
-    return f"a {type(value).__name__}"
+    words = {"dict": "a table", "list": "a list", "tuple": "a list", "NoneType": "nothing"}
+    return words.get(type(value).__name__, f"a {type(value).__name__}")
 
 
 def limits(field: Field) -> str:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import base64
+import dataclasses
 import json
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,17 +14,16 @@ from numpy.typing import NDArray
 
 from kernels.interface import Field, Kernel, Method
 from sweep.errors import SweepError
+from sweep.study.kernel_lookup import load_kernel
 
-FORMAT = 1
-LONGEST_LIST = 1000
-"""Longer arrays are written as base64 of little-endian float64."""
-
+FORMAT = 2
 AUTO = -1
 """Number of the word "auto" on a method axis."""
-SHOWN: dict[str, Callable[[Any], str]] = {}
-"""How a notebook shows a study, as "html"; put here by a room above this one, which knows what a run takes."""
 SETTINGS = ("method", "rtol")
 """What may be an axis although it is no parameter of the kernel."""
+SMALLEST_RTOL = 1e-15
+SHOWN: dict[str, Callable[[Any], str]] = {}
+"""How a notebook shows a study, as "html"; put here by a room above this one, which knows what a run takes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,14 +223,8 @@ class Study:
         return SHOWN["html"](self) if SHOWN else None
 
     def to_json(self) -> str:
-        """The study on one line of JSON: floats exactly, also NaN and infinities; the kernel as it declares itself."""
-        keys = {name: getattr(self, name) for name in PLAIN}
-        keys |= {"format": FORMAT, "axes": [_axis(axis) for axis in self.axes.values()]}
-        keys |= {"kernel": _declaration(self.kernel)}
-        keys |= {} if self.summary is None else {"summary": vars(self.summary)}
-        keys |= {"blocks": [vars(block) for block in self.blocks]} if self.blocks else {}
-        keys |= {"where": self.where} if self.where else {}
-        return json.dumps(_plain(keys), allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+        """The study on one line of JSON: arrays exactly, as their bytes; the kernel as it declares itself."""
+        return json.dumps({"format": FORMAT, **vars(self)}, default=_plain, ensure_ascii=False, separators=(",", ":"))
 
     @classmethod
     def from_json(cls, text: str, *, allow_import: bool = False, declared: bool = False) -> Study:
@@ -252,47 +245,27 @@ class Study:
         """
         try:
             keys = json.loads(text, object_hook=_decode)
-            if keys["format"] != FORMAT:
-                raise SweepError(f"study of format {keys['format']}; this version of foliot reads format {FORMAT}")
-            axes = {
-                a["name"]: Axis(a["name"], frozen(a["values"]), a["spacing"], _words(a["words"]), a.get("entry"))
-                for a in keys["axes"]
-            }
-            along = {name: frozen(values) for name, values in keys["along"].items()}
-            known = {name: keys[name] for name in PLAIN} | {"axes": axes, "along": along}
-            known["outputs"] = tuple(known["outputs"])
-            known["fixed"] = {n: frozen(value) if np.ndim(value) else value for n, value in keys["fixed"].items()}
-            known["summary"] = None
-            if "summary" in keys:
-                given = keys["summary"]
-                outputs = {name: tuple(reductions) for name, reductions in given["outputs"].items()}
-                edges = {name: frozen(values) for name, values in given["edges"].items()}
-                known["summary"] = Summary(tuple(given["over"]), outputs, edges)
-            known["blocks"] = tuple(Block(b["design"], tuple(b["axes"]), b["options"]) for b in keys.get("blocks", ()))
-            known["where"] = keys.get("where", "")
-            _check_words(known)
-            kernel = _kernel_as_declared(keys["kernel"])
+            if (written := keys.pop("format")) != FORMAT:
+                raise SweepError(f"study of format {written}; this version of foliot reads format {FORMAT}")
+            keys["axes"] = {name: Axis(**axis) for name, axis in keys["axes"].items()}
+            keys["summary"] = None if keys["summary"] is None else Summary(**keys["summary"])
+            keys["blocks"] = tuple(Block(**block) for block in keys["blocks"])
+            kernel = keys.pop("kernel")
+            for group in ("parameters", "outputs", "along"):
+                kernel[group] = tuple(Field(**given) for given in kernel[group])
+            kernel["methods"] = tuple(Method(solve=_missing, **given) for given in kernel["methods"])
+            study = cls(kernel=Kernel(check=_missing, **kernel), **keys)
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise SweepError(f"not the JSON of a study: {type(error).__name__} {error}") from None
-        if not declared:
-            from sweep.study.kernel_lookup import load_kernel
-
-            kernel = load_kernel(known["kernel_name"], allow_import)
-        return cls(kernel=kernel, **known)
+        return study if declared else dataclasses.replace(study, kernel=load_kernel(study.kernel_name, allow_import))
 
 
-PLAIN = (
-    "title", "question", "kernel_name", "method", "rtol", "outputs", "design", "fixed", "follows", "along", "text",
-)  # fmt: skip
-"""Attributes that are written as they are."""
-
-
-def _check_words(known: Mapping[str, Any]) -> None:
-    """Raises TypeError, ValueError where something else stands for a word, or for rtol."""
-    words = [known[name] for name in PLAIN if name not in ("rtol", "outputs", "fixed", "follows", "along")]
-    if not all(isinstance(word, str) for word in (*words, *known["outputs"], *known["follows"].values())):
-        raise TypeError("words are expected")
-    float(known["rtol"])
+def setting(name: str, kernel: Kernel) -> Field:
+    """Method or rtol as a field: what may be an axis although it is no parameter."""
+    if name == "rtol":
+        return Field("rtol", "1", "wanted relative error", lower=SMALLEST_RTOL, upper=1.0)
+    choices = {"auto": AUTO} | {m.name: i for i, m in enumerate(kernel.methods)}
+    return Field("method", "1", "how a cell is solved", choices=choices)
 
 
 def short(value: Any) -> str:
@@ -318,66 +291,27 @@ def frozen(values: Any) -> NDArray[np.float64]:
     return array
 
 
-def _axis(axis: Axis) -> dict[str, Any]:
-    found = {"name": axis.name, "values": axis.values, "spacing": axis.spacing, "words": axis.words}
-    return found if axis.entry is None else found | {"entry": axis.entry}
-
-
-def _words(words: list[str] | None) -> tuple[str, ...] | None:
-    return None if words is None else tuple(words)
-
-
 def _plain(value: Any) -> Any:
-    """`value` as what JSON has; `_decode` undoes it."""
-    if isinstance(value, float) and not math.isfinite(value):
-        return {"float": repr(float(value))}
+    """What JSON has no word for: arrays, and the records of a study; of a kernel what it declares beyond defaults."""
     if isinstance(value, np.ndarray):
-        if value.size > LONGEST_LIST:
-            text = base64.b64encode(value.astype("<f8").tobytes()).decode("ascii")
-            return {"float64": text} | ({"shape": list(value.shape)} if value.ndim > 1 else {})
-        return _plain(value.tolist())
+        return {"float64": value.astype("<f8").tobytes().hex(), "shape": value.shape}
     if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return value
+        return dict(value)
+    if isinstance(value, Field):
+        return {f.name: said for f in dataclasses.fields(value) if (said := getattr(value, f.name)) != f.default}
+    if isinstance(value, Method):
+        return {name: getattr(value, name) for name in ("name", "doc", "excludes", "lacks")}
+    if isinstance(value, Kernel):
+        groups = ("name", "doc", "source", "parameters", "outputs", "methods", "along", "same_length")
+        return {name: getattr(value, name) for name in groups}
+    return vars(value)
 
 
 def _decode(item: dict[str, Any]) -> Any:
-    if item.keys() == {"float"} and isinstance(item["float"], str):
-        return float(item["float"])
-    if "float64" in item and item.keys() <= {"float64", "shape"} and isinstance(item["float64"], str):
-        return np.frombuffer(base64.b64decode(item["float64"]), dtype="<f8").reshape(item.get("shape", -1))
-    return item
-
-
-def _declaration(kernel: Kernel) -> dict[str, Any]:
-    """All of a kernel but its functions."""
-    fields = {group: [asdict(f) for f in getattr(kernel, group)] for group in ("parameters", "outputs", "along")}
-    methods = [{key: getattr(m, key) for key in ("name", "doc", "excludes", "lacks")} for m in kernel.methods]
-    plain = {key: getattr(kernel, key) for key in ("name", "doc", "source", "same_length")}
-    return {**plain, **fields, "methods": methods}
-
-
-def _kernel_as_declared(keys: dict[str, Any]) -> Kernel:
-    parameters, outputs, along = (
-        tuple(Field(**{**f, "dims": tuple(f["dims"])}) for f in keys[group])
-        for group in ("parameters", "outputs", "along")
-    )
-    methods = tuple(
-        Method(m["name"], m["doc"], _missing, excludes=tuple(m["excludes"]), lacks=tuple(m.get("lacks", ())))
-        for m in keys["methods"]
-    )
-    plain = {key: keys[key] for key in ("name", "doc", "source")}
-    return Kernel(
-        **plain,
-        parameters=parameters,
-        outputs=outputs,
-        check=_missing,
-        methods=methods,
-        along=along,
-        same_length=keys.get("same_length", {}),
-    )
+    """An array, or a record, in which lists were tuples."""
+    if item.keys() == {"float64", "shape"}:
+        return frozen(np.frombuffer(bytes.fromhex(item["float64"]), "<f8").reshape(item["shape"]))
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in item.items()}
 
 
 def _missing(*columns: Any) -> None:

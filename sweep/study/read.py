@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from sweep.errors import Mistake, StudyError, SweepError
-from sweep.study.mistakes import did_you_mean, listed, show
-from sweep.study.model import Axis, Study
-from sweep.study.study_parser import KEYS, StudyParser
-from sweep.words import as_path
-
-__all__ = ["KEYS", "Axis", "Given", "Study", "study"]
+from sweep.study.keys import StudyParser
+from sweep.study.mistakes import show
+from sweep.study.model import Study
+from sweep.words import as_path, did_you_mean, listed
 
 KEYWORDS = 'keywords, e.g. kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0}'
 LARGEST_TEXT = 50_000_000
@@ -70,7 +68,10 @@ def study(given: Given | None = None, /, *, allow_import: bool = False, **keys: 
     if isinstance(given, Study):
         return given
     if hasattr(given, "data_vars"):
-        return _study_of_result(given, allow_import)
+        said = getattr(given, "attrs", {}).get("study_json")
+        if said is None:
+            raise SweepError("the dataset does not say which study it came from; pass the study")
+        return Study.from_json(str(said), allow_import=allow_import)
     if given is None or isinstance(given, Mapping):
         return StudyParser("study", Path(), allow_import).study(keys if given is None else given, "")
     if not isinstance(given, str | os.PathLike):
@@ -82,60 +83,47 @@ def study(given: Given | None = None, /, *, allow_import: bool = False, **keys: 
         raise SweepError(f"{path} is a result, not a study; look at it with: sweep show {path}")
     if path.suffix == ".py":
         raise SweepError(f"{path} is a study in Python; run it with: python {path}")
-    text = _read_text(path)
-    first = next((line.strip() for line in text.splitlines() if line.strip()), "")
+    text = _text(path)
+    first = next(line.strip() for line in text.splitlines() if line.strip())
     question = {"question": first.lstrip("# ").rstrip()} if first.startswith("#") else {}
-    return StudyParser(str(path), path.parent, allow_import).study({**question, **_parse(text, str(path))}, text)
+    return StudyParser(str(path), path.parent, allow_import).study({**question, **_keys(text, str(path))}, text)
 
 
-def _study_of_result(dataset: Any, allow_import: bool) -> Study:
-    if "study_json" not in dataset.attrs:
-        raise SweepError("the dataset does not say which study it came from; pass the study")
-    return Study.from_json(str(dataset.attrs["study_json"]), allow_import=allow_import)
-
-
-def _read_text(path: Path) -> str:
-    if path.is_dir():
-        raise SweepError(f"{path} is a folder; name a study file in it, e.g. {path / 'study.toml'}")
-    if path.exists() and not path.is_file():
-        raise SweepError(f"{path} is no regular file; a pipe could be waited for without end")
+def _text(path: Path) -> str:
+    """The text of a study file. Raises SweepError where it is none."""
     try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_TEXT + 1)
+        if path.is_dir():
+            raise SweepError(f"{path} is a folder; name a study file in it, e.g. {path / 'study.toml'}")
+        if path.exists() and not path.is_file():
+            raise SweepError(f"{path} is no regular file; a pipe could be waited for without end")
+        if path.stat().st_size > LARGEST_TEXT:
+            raise SweepError(f"{path} is larger than {LARGEST_TEXT} bytes; keep long lists in a csv file")
+        text = path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
         near = did_you_mean(path.name, [p.name for p in path.parent.glob("*.toml")])
         raise SweepError(f"{path}: no such file{near}") from None
-    except (OSError, ValueError) as error:
-        raise SweepError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if len(content) > LARGEST_TEXT:
-        raise SweepError(f"{path} is larger than {LARGEST_TEXT} bytes; keep long lists in a csv file")
-    try:
-        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SweepError(f"{path} is not a text file in UTF-8 (byte {error.start})") from None
+    except (OSError, ValueError) as error:
+        raise SweepError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
     if not text.strip():
         raise SweepError(f"{path} is empty; `sweep kernels` lists what can be swept")
     return text
 
 
-def _parse(text: str, source: str) -> dict[str, Any]:
+def _keys(text: str, source: str) -> dict[str, Any]:
+    """The keys of a study file. Raises StudyError with what tomllib says, and the line as it is written."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        mistake = _syntax_mistake(str(error), text)
+        what, _, place = str(error).rpartition(" (at ")  # "... (at line 3, column 6)"
+        if what.startswith(("Cannot overwrite", "Cannot declare")):
+            what = "this key or table stands here a second time"
+        numbers, lines = re.match(r"line (\d+)", place), text.splitlines()
+        line = int(numbers[1]) if numbers else len(lines)
+        mistake = Mistake(numbers[0] if numbers else "end of file", f"{what}: {lines[line - 1].strip()[:80]}")
     except ValueError:
         mistake = Mistake("file", "an integer has thousands of digits; no float64 is that large")
     except RecursionError:
         mistake = Mistake("file", "lists or tables are nested too deeply")
     raise StudyError(source, [mistake])
-
-
-def _syntax_mistake(error: str, text: str) -> Mistake:
-    """What tomllib says ("... (at line 3, column 6)"), with the line as it is written."""
-    what, _, place = error.rpartition(" (at ")
-    if what.startswith(("Cannot overwrite", "Cannot declare")):
-        what = "this key or table stands here a second time"
-    numbers = re.fullmatch(r"line (\d+), column (\d+)\)", place)
-    lines = text.splitlines()
-    line = int(numbers[1]) if numbers else len(lines)
-    return Mistake(f"line {line}" if numbers else "end of file", f"{what}: {lines[line - 1].strip()[:80]}")

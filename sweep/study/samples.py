@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,15 +19,14 @@ from numpy.typing import NDArray
 
 from sweep.errors import missing
 
-Points = NDArray[np.float64]
-
-LEVELS = 4
-"""Values that a Morris trajectory may take along each axis."""
+GENERATORS = ("sobol", "latin", "random", "saltelli", "morris")
 SCRAMBLED = ("sobol", "latin", "saltelli")
 POWERS_OF_TWO = ("sobol", "saltelli")
+LEVELS = 4
+"""Values that a Morris trajectory may take along each axis."""
 
 
-def unit_points(design: str, axes: int, options: Mapping[str, Any]) -> Points:
+def unit_points(design: str, axes: int, options: Mapping[str, Any]) -> NDArray[np.float64]:
     """The points of a design, shape (points, axes), from 0 to 1.
 
     Parameters
@@ -40,7 +39,23 @@ def unit_points(design: str, axes: int, options: Mapping[str, Any]) -> Points:
     SweepError
         A package is missing.
     """
-    points = GENERATORS[design](axes, options["n"], options["seed"], options.get("scramble", True))
+    n, seed, scramble = options["n"], options["seed"], options.get("scramble", True)
+    if design == "random":
+        return np.random.default_rng(seed).random((n, axes))
+    if design in ("sobol", "latin"):
+        from scipy.stats import qmc
+
+        generator = qmc.Sobol if design == "sobol" else qmc.LatinHypercube
+        points = generator(axes, scramble=scramble, rng=np.random.default_rng(seed)).random(n)
+    else:
+        require_salib()
+        from SALib.sample import morris, sobol
+
+        given = problem(tuple(map(str, range(axes))))
+        if design == "saltelli":
+            points = sobol.sample(given, n, calc_second_order=False, scramble=scramble, seed=seed)
+        else:
+            points = morris.sample(given, n, num_levels=LEVELS, seed=seed)
     return np.ascontiguousarray(points, np.float64)
 
 
@@ -54,49 +69,9 @@ def problem(names: tuple[str, ...]) -> dict[str, Any]:
     return {"num_vars": len(names), "names": list(names), "bounds": [[0.0, 1.0]] * len(names)}
 
 
-def _sobol(axes: int, n: int, seed: int, scramble: bool) -> Any:
-    from scipy.stats import qmc
-
-    return qmc.Sobol(axes, scramble=scramble, rng=np.random.default_rng(seed)).random(n)
-
-
-def _latin(axes: int, n: int, seed: int, scramble: bool) -> Any:
-    from scipy.stats import qmc
-
-    return qmc.LatinHypercube(axes, scramble=scramble, rng=np.random.default_rng(seed)).random(n)
-
-
-def _random(axes: int, n: int, seed: int, scramble: bool) -> Any:
-    return np.random.default_rng(seed).random((n, axes))
-
-
-def _saltelli(axes: int, n: int, seed: int, scramble: bool) -> Any:
-    require_salib()
-    from SALib.sample import sobol
-
-    given = problem(tuple(map(str, range(axes))))
-    return sobol.sample(given, n, calc_second_order=False, scramble=scramble, seed=seed)
-
-
-def _morris(axes: int, n: int, seed: int, scramble: bool) -> Any:
-    require_salib()
-    from SALib.sample import morris
-
-    return morris.sample(problem(tuple(map(str, range(axes)))), n, num_levels=LEVELS, seed=seed)
-
-
 def require_salib() -> None:
     """Raises SweepError where SALib is missing."""
     try:
         import SALib  # noqa: F401
     except ImportError:
         raise missing("needs the package SALib", "sensitivity") from None
-
-
-GENERATORS: Mapping[str, Callable[[int, int, int, bool], Any]] = {
-    "sobol": _sobol,
-    "latin": _latin,
-    "random": _random,
-    "saltelli": _saltelli,
-    "morris": _morris,
-}

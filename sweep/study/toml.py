@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from sweep.errors import SweepError
-from sweep.study.model import Axis, Study
+from sweep.study.model import Block, Study
 from sweep.words import kind
-
-BARE = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
-"""Letters of a key that needs no quotes."""
 
 
 def to_toml(study: Study) -> str:
@@ -47,46 +45,30 @@ def study_keys(study: Study) -> dict[str, Any]:
     found |= {name: getattr(study, name) for name in ("method", "rtol") if name not in study.axes}
     found["outputs"] = list(study.outputs)
     found |= {"where": study.where} if study.where else {}
-    if study.design == "blocks":
-        found["blocks"] = [
-            {
-                "design": {"kind": block.design, **block.options} if block.options else block.design,
-                "axes": {name: _axis(study.axes[name]) for name in block.axes},
-            }
-            for block in study.blocks
-        ]
-    else:
-        design = study.blocks[0] if study.blocks else None
-        found["design"] = study.design if design is None else {"kind": design.design, **design.options}
-        found["axes"] = {name: _axis(axis) for name, axis in study.axes.items()}
-    found["fixed"] = dict(_fixed(study))
+    entries: dict[str, Any] = {}
+    for name, axis in study.axes.items():
+        entries[name] = dict(axis.entry) if axis.entry else list(axis.words or ()) or axis.values.tolist()
+    blocks = [
+        {
+            "design": {"kind": block.design, **block.options} if block.options else block.design,
+            "axes": {name: entries[name] for name in block.axes},
+        }
+        for block in study.blocks or (Block(study.design, tuple(study.axes)),)
+    ]
+    found |= {"blocks": blocks} if study.design == "blocks" else {**blocks[0], "axes": entries}
+    found["fixed"] = {}
+    for name, value in study.fixed.items():
+        field = study.kernel.parameter(name)
+        default = float(field.default) if isinstance(field.default, float | int) else field.default
+        if repr(value) != repr(default):  # -0.0 is not 0.0
+            words = {float(number): word for word, number in field.choices.items()}
+            found["fixed"][name] = words[float(value)] if words else np.asarray(value).tolist()
     found["along"] = {name: values.tolist() for name, values in study.along.items() if len(values)}
     if study.summary is not None:
         edges = {name: values.tolist() for name, values in study.summary.edges.items()}
         outputs = {name: list(reductions) for name, reductions in study.summary.outputs.items()}
         found["summary"] = {"over": list(study.summary.over), "outputs": outputs, "edges": edges}
     return found
-
-
-def _axis(axis: Axis) -> Any:
-    if axis.words is not None:
-        return list(axis.words)
-    return axis.values.tolist() if axis.entry is None else dict(axis.entry)
-
-
-def _fixed(study: Study) -> Any:
-    """Parameters that are fixed to something else than their default."""
-    for field in study.kernel.parameters:
-        value = study.fixed.get(field.name)
-        if value is None or (np.ndim(value) == 0 and _is(field.default, value)):
-            continue
-        words = {float(number): word for word, number in field.choices.items()}
-        yield field.name, words[float(value)] if words else np.asarray(value).tolist()
-
-
-def _is(default: float | str | None, value: Any) -> bool:
-    """Whether a number is the default; -0.0 is not 0.0."""
-    return isinstance(default, float | int) and (value, np.signbit(value)) == (default, np.signbit(default))
 
 
 def _value(value: Any) -> str:
@@ -102,4 +84,5 @@ def _value(value: Any) -> str:
 
 
 def _key(key: str) -> str:
-    return key if key and BARE.issuperset(key) else _value(key)
+    """A key, in quotes where it needs them."""
+    return key if re.fullmatch("[A-Za-z0-9_-]+", key) else _value(key)

@@ -5,12 +5,13 @@ Only this module imports pint, and only for units beyond a few everyday ones.
 
 from __future__ import annotations
 
-import difflib
 import re
 from decimal import Decimal
 from fractions import Fraction
 from functools import cache
 from typing import Any
+
+from sweep.words import did_you_mean
 
 DIMENSIONS = {
     "1": ("a plain number", '"1" or "percent"'),
@@ -53,10 +54,11 @@ COMMON = ("m", "mm", "cm", "kg", "g", "s", "ms", "minute", "hour", "day", "rad",
 """What a misspelt unit is likely to mean."""
 
 
-class UnitMistake(Exception):
+class UnitMistake(ValueError):
     """The unit cannot be used here; the text says why and what to write."""
 
 
+@cache
 def scale(text: str, wanted: str, name: str) -> Decimal | None:
     """Factor from the unit `text` to the unit `wanted` of the field `name`; None where no conversion is needed.
 
@@ -75,9 +77,9 @@ def scale(text: str, wanted: str, name: str) -> Decimal | None:
     wanted_factor, needed = _root(wanted)
     if "radian" not in given and "radian" in needed:
         wanted_factor, needed = _root(wanted.replace("Hz", "s^-1"))
-        needed.pop("radian", None)
+        needed = {base: power for base, power in needed.items() if base != "radian"}
     if given != needed:
-        _, example = DIMENSIONS.get(wanted, ("", f'"{wanted}"'))
+        example = DIMENSIONS[wanted][1] if wanted in DIMENSIONS else f'"{wanted}"'
         raise UnitMistake(f'"{text}" is {_describe(text)}; {name} is {_describe(wanted)}, e.g. {example}')
     return factor / wanted_factor
 
@@ -87,47 +89,49 @@ def exponents(text: str) -> dict[str, Fraction]:
     return {base: Fraction(str(power)).limit_denominator(1000) for base, power in _root(text)[1].items()}
 
 
+@cache
+def dimension(text: str) -> Any:
+    """The base units in a unit without the radian, which can be multiplied and compared. Raises UnitMistake."""
+    from pint.util import UnitsContainer
+
+    return UnitsContainer({base: power for base, power in exponents(text).items() if base != "radian"})
+
+
 def _describe(text: str) -> str:
-    root = _root(text)[1]
-    same = (words for unit, (words, _) in DIMENSIONS.items() if _root(unit)[1] == root)
-    return (
-        DIMENSIONS[text][0] if text in DIMENSIONS else next(same, f"of another kind ({_registry().parse_units(text)})")
-    )
+    """What a unit measures."""
+    if text in DIMENSIONS:
+        return DIMENSIONS[text][0]
+    same = (words for unit, (words, _) in DIMENSIONS.items() if _root(unit)[1] == _root(text)[1])
+    return next(same, f"of another kind ({_registry().parse_units(text)})")
 
 
 def _root(text: str) -> tuple[Decimal, dict[str, Decimal]]:
     """Factor and exponents of `text` in root units, radian among them; "Hz" is a turn per second."""
+    from pint.errors import UndefinedUnitError
+
     registry = _registry()
-    unit = _parse(text)
+    try:
+        if not re.fullmatch(r"[\w\s^*/().+°%-]*", text):
+            raise ValueError  # pint would read "m;m" as m^2
+        unit = registry.parse_units("dimensionless" if text.strip() == "1" else text)
+    except UndefinedUnitError as error:
+        unknown = str(error.unit_names) if isinstance(error.unit_names, str) else str(next(iter(error.unit_names)))
+        hint = did_you_mean(unknown, COMMON) or '; write it like "rad/s^2" or "kg m^2"'
+        raise UnitMistake(f'"{unknown}" is not a known unit{hint}') from None
+    except Exception:
+        # pint's parser fails on malformed text in many ways (AssertionError, TokenError, TypeError, ValueError)
+        raise UnitMistake(f'"{text}" cannot be read as a unit; write it like "rad/s^2" or "kg m^2"') from None
     if "hertz" in str(unit):
         if not re.fullmatch(r"\w*hertz", str(unit)):
             raise UnitMistake(f'"{text}" has Hz inside a longer unit; write turns or radians, e.g. "turn/s^2"')
         unit = unit / registry.parse_units("hertz") * registry.parse_units("turn/second")
     try:
-        zero = registry.Quantity(Decimal(0), unit).to_root_units()
-        one = registry.Quantity(Decimal(1), unit).to_root_units()
+        zero, one = (registry.Quantity(Decimal(number), unit).to_root_units() for number in (0, 1))
     except Exception as error:
         raise UnitMistake(f'"{text}" cannot be converted: {error}') from None
     if zero.magnitude != 0:
         raise UnitMistake(f'"{text}" has an offset; give an absolute unit, e.g. "K"')
     return Decimal(one.magnitude), dict(one.unit_items())
-
-
-def _parse(text: str) -> Any:
-    from pint.errors import UndefinedUnitError
-
-    try:
-        if not re.fullmatch(r"[\w\s^*/().+°%-]*", text):
-            raise ValueError  # pint would read "m;m" as m^2
-        return _registry().parse_units("dimensionless" if text.strip() == "1" else text)
-    except UndefinedUnitError as error:
-        unknown = str(error.unit_names) if isinstance(error.unit_names, str) else str(next(iter(error.unit_names)))
-        near = difflib.get_close_matches(unknown, COMMON, n=1)
-        hint = f"did you mean {near[0]}?" if near else 'write it like "rad/s^2" or "kg m^2"'
-        raise UnitMistake(f'"{unknown}" is not a known unit; {hint}') from None
-    except Exception:
-        # pint's parser fails on malformed text in many ways (AssertionError, TokenError, TypeError, ValueError)
-        raise UnitMistake(f'"{text}" cannot be read as a unit; write it like "rad/s^2" or "kg m^2"') from None
 
 
 @cache

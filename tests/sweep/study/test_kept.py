@@ -97,7 +97,7 @@ def test_words_and_arrays_come_back(tmp_path):
         sweep.to_toml({})
 
 
-@pytest.mark.parametrize("length", [3, 1000, 1001, 5000])
+@pytest.mark.parametrize("length", [3, 5000])
 def test_json_holds_long_arrays_exactly_and_shortly(length):
     values = np.random.default_rng(1).standard_normal(length)
     values[1] = math.nan
@@ -110,8 +110,7 @@ def test_json_holds_long_arrays_exactly_and_shortly(length):
     ):
         text = study.to_json()
         json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
-        if study.kernel_name == "toy:KERNEL" and length > 1000:
-            assert len(text) < 11 * length + 4000  # base64, which is read twenty times as fast
+        assert len(text) < 16 * 3 * length + 4000  # bytes, which are read twenty times as fast
         again = Study.from_json(text, allow_import=True)
         same(study, again)
         assert again.lengths == study.lengths == Study.from_json(text, declared=True).lengths
@@ -136,7 +135,7 @@ def test_json_suffices_to_read_a_study_whose_kernel_is_gone():
             action()
 
 
-@pytest.mark.parametrize("text", ["", "{}", "[]", "null", '{"format": 1}', '{"format": 1, "axes": [{}]}', "\x00"])
+@pytest.mark.parametrize("text", ["", "{}", "[]", "null", '{"format": 2}', '{"format": 2, "axes": [{}]}', "\x00"])
 def test_other_json_is_refused(text):
     with pytest.raises(sweep.SweepError, match="not the JSON of a study"):
         Study.from_json(text)
