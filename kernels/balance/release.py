@@ -127,22 +127,14 @@ def swinging(scene):
 
 
 @jit
-def allowed(p):
-    """Whether the parameters are numbers within their limits; NaN fails."""
-    positive = (p.zeta >= 0.0) & (p.omega_n > 0.0) & (p.r >= 0.0) & (p.r_s >= p.r)
-    finite = (p.zeta < math.inf) & (p.omega_n < math.inf) & (p.r_s < math.inf) & (magnitude(p.theta0) < math.inf)
-    return positive & finite
-
-
-@jit
 def check(p):
     """What no method is asked.
 
-    BAD_INPUT: NaN, infinite, outside its limits, or stiction below the friction of motion. NO_LIMIT_CYCLE: nothing that
-    takes energy from a balance that swings.
+    BAD_INPUT: stiction below the friction of motion. NO_LIMIT_CYCLE: nothing that takes energy from a balance that
+    swings.
     """
     lossless = not_((p.zeta > 0.0) | (p.r > 0.0)) & (magnitude(p.theta0) > p.r_s)
-    return where(allowed(p), where(lossless, NO_LIMIT_CYCLE, OK), BAD_INPUT)
+    return where(p.r_s >= p.r, where(lossless, NO_LIMIT_CYCLE, OK), BAD_INPUT)
 
 
 PARAMETERS = (

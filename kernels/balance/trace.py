@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from kernels.balance import _ringdown
-from kernels.balance.release import EXAMPLE, PARAMETERS, Balance, allowed, side, swinging
+from kernels.balance.release import EXAMPLE, PARAMETERS, Balance, side, swinging
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, GRAZING, NOT_CONVERGED, OK, OUT_OF_RANGE, OVERDAMPED
 from kernels.lanes.groups import GROUP, cells_at, write_row
@@ -65,8 +65,8 @@ def _row():
 
 @jit
 def check(p):
-    """BAD_INPUT as for `balance`; a balance that swings for ever has turning points too."""
-    return where(allowed(p), OK, BAD_INPUT)
+    """BAD_INPUT: stiction below the friction of motion; a balance that swings for ever has turning points too."""
+    return where(p.r_s >= p.r, OK, BAD_INPUT)
 
 
 BALANCE_TRACE = kernel(

@@ -67,12 +67,11 @@ def normal_spread(low, high):
 
 
 @jit_apart
-def refusal(n, J, k, h):
-    """BAD_INPUT, OUT_OF_RANGE or OK of one chain of n inertias."""
+def refusal(n, J, k):
+    """BAD_INPUT, OUT_OF_RANGE or OK of one chain of n inertias, each within its limits."""
     if not (1 <= n <= MASS_LIMIT):
         return BAD_INPUT
-    for j in range(n):
-        sound = (J[j] > 0.0) & (J[j] < math.inf) & (k[j] < math.inf) & (h[j] >= 0.0) & (h[j] < math.inf)
-        if not (sound & ((k[j] > 0.0) | ((k[j] >= 0.0) & (j == n - 1)))):
+    for j in range(n - 1):
+        if not k[j] > 0.0:
             return BAD_INPUT
     return OK if units(n, same, J, k)[2] else OUT_OF_RANGE

@@ -16,9 +16,7 @@ from kernels.foliot import _integrated_swing, _taylor_swing, _units
 from kernels.foliot.cycle import FOLIOT
 from kernels.foliot.cycle import check as check_foliot
 from kernels.interface import Field
-from kernels.lanes.codes import BAD_INPUT
 from kernels.lanes.jit import jit
-from kernels.lanes.vectors import nearest, where
 from kernels.lanes.wiring import kernel, method
 
 HIGHEST = 1000.0
@@ -35,11 +33,8 @@ def dopri5(p, rtol):
 
 @jit
 def check(p):
-    """As of `foliot`, and BAD_INPUT for a depth outside [0, 1) or a harmonic that is no whole number from 1 on."""
-    whole = (p.harmonic >= 1.0) & (p.harmonic <= HIGHEST) & (nearest(p.harmonic) >= p.harmonic)
-    whole = whole & (nearest(p.harmonic) <= p.harmonic)
-    allowed = (p.depth >= 0.0) & (p.depth < 1.0) & whole  # NaN fails
-    return where(allowed, check_foliot(_units.terms(p)), BAD_INPUT)
+    """As of `foliot`."""
+    return check_foliot(_units.terms(p))
 
 
 FOLIOT_RIPPLE = kernel(

@@ -18,7 +18,6 @@ import numpy as np
 from kernels.foliot import _linear_swing, _units
 from kernels.foliot._units import LinearFoliot
 from kernels.foliot.cycle import FOLIOT
-from kernels.foliot.cycle import check as check_foliot
 from kernels.integrate import linear_flow
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, COMES_TO_REST, GRAZING, INACCURATE, NEVER_STARTS, OK, OUT_OF_RANGE, STICKS
@@ -207,10 +206,8 @@ def _row():
 
 @jit
 def check(p):
-    """BAD_INPUT as for `foliot`, and NEVER_STARTS without torque; a clock that loses nothing may start."""
-    verdict = check_foliot(_units.terms(p))
-    bad = not_(magnitude(verdict - BAD_INPUT) > 0.0) | not_(magnitude(p.phi_start) < math.inf)
-    return where(bad, BAD_INPUT, where(p.mu > 0.0, OK, NEVER_STARTS))
+    """BAD_INPUT for stiction below the friction of motion; a clock that loses nothing may start."""
+    return where(p.R_s >= p.R, OK, BAD_INPUT)
 
 
 FOLIOT_START = kernel(

@@ -176,14 +176,10 @@ def bend(scene):
 
 @jit
 def refusal(p):
-    """The status of `check` for one cell, or for lanes; OK where a method is to decide. NaN fails."""
-    known = (p.torque >= 0.0) & (p.I_c > 0.0) & (p.I_v > 0.0) & (p.r_c > 0.0) & (p.r_v > 0.0) & (p.h >= 0.0)
-    small = (p.torque < math.inf) & (p.I_c < math.inf) & (p.I_v < math.inf) & (p.r_c < math.inf) & (p.r_v < math.inf)
-    odd = (p.teeth >= 3.0) & (p.teeth <= MOST_TEETH)
-    pairs = 0.5 * (where(odd, p.teeth, 3.0) - 1.0)
-    odd = odd & not_(magnitude(nearest(pairs) - pairs) > 0.0)
-    allowed = known & small & odd & (p.h < math.inf) & (p.e >= 0.0) & (p.e < 1.0) & (magnitude(p.nu) < math.inf)
-    _, slack = _escape(where(allowed, p.r_c, 1.0), where(allowed, p.teeth, 3.0), where(allowed, p.h, 0.0))
+    """BAD_INPUT for an even number of teeth, NEVER_STARTS without torque, NEVER_MEETS; OK where a method decides."""
+    pairs = 0.5 * (p.teeth - 1.0)
+    odd = not_(magnitude(nearest(pairs) - pairs) > 0.0)
+    _, slack = _escape(p.r_c, p.teeth, p.h)
     meets = (slack[0] > 0.0) | (not_(slack[0] < 0.0) & not_(p.e > 0.0))
     verdict = where(p.torque > 0.0, where(meets, OK, NEVER_MEETS), NEVER_STARTS)
-    return where(allowed, verdict, BAD_INPUT)
+    return where(odd, verdict, BAD_INPUT)

@@ -67,7 +67,7 @@ def events(p, rtol, total, work, history):
 def check(p):
     """What no method is asked.
 
-    BAD_INPUT: NaN, infinite, outside its limits, or an even number of teeth. NEVER_STARTS: no torque. NEVER_MEETS: a
+    BAD_INPUT: an even number of teeth. NEVER_STARTS: no torque. NEVER_MEETS: a
     tooth held until h >= p/4 is met by the other pallet before it escapes; with e = 0 h = p/4 itself is the clock
     without drop.
     """

@@ -2,7 +2,7 @@
 
 An author writes functions of one cell, the same source for numbers and for lanes, and declares them by `kernel`:
 
-    check(p) -> status                            p: a record of the parameters
+    check(p) -> status                            p: a record of the parameters, within the limits of their fields
     solve(p, rtol, *buffers) -> outputs, status   outputs: a record of those that the method gives, or a tuple in order
     solve(...) -> outputs, errors, status         of a method that estimates; `errors` as of a bound
     bound(p) -> error                             a number, or a record with one for each output that the method gives
@@ -31,9 +31,11 @@ import numpy as np
 from kernels.interface import BoundCell, CheckCell, Field, FillCells, Kernel, Method, OnColumns, SolveCell
 from kernels.lanes import columns as loops
 from kernels.lanes.cache import is_ours
+from kernels.lanes.codes import BAD_INPUT, OK
 from kernels.lanes.columns import entry_of
 from kernels.lanes.jit import jit
 from kernels.lanes.records import largest, named, read, write
+from kernels.lanes.vectors import nearest, where
 
 Buffers = Callable[[], tuple[Any, ...]]
 Loop = Callable[..., None]
@@ -128,8 +130,8 @@ def kernel(
     source: str,
     parameters: Sequence[Field],
     outputs: Sequence[Field],
-    check: CheckCell,
     methods: Sequence[Solver | Split | Method],
+    check: CheckCell | None = None,
     along: Sequence[Field] = (),
     example: Mapping[str, float | Sequence[float]] | None = None,
     same_length: Mapping[str, str] | None = None,
@@ -141,7 +143,8 @@ def kernel(
     Parameters
     ----------
     record : NamedTuple class whose fields are the parameters, in their order; None: one is made of their names
-    check : `check(p)`, the status of a cell before any method is asked
+    check : `check(p)`, OK or a refusal of a cell whose parameters are within the limits of their fields; what is NaN,
+        infinite or beyond them is BAD_INPUT without it
     methods : of `method` or `tracing`, or whole ones that loop over the columns themselves; the cheapest first
     loop : how `check` and bounds are looped, `in_lanes`; `cell_by_cell` where parameters are arrays
     The others as in `kernels.interface.Kernel`.
@@ -159,12 +162,55 @@ def kernel(
         source=source,
         parameters=tuple(parameters),
         outputs=tuple(outputs),
-        check=wiring.check(check),
+        check=wiring.check(check, within(parameters), methods[0]),
         methods=tuple(wiring.method(solver) for solver in methods),
         along=tuple(along),
         example=dict(example or {}),
         same_length=dict(same_length or {}),
     )
+
+
+@jit
+def _no_more(p: Any) -> float:
+    """The check of a kernel that has nothing to refuse within the limits of its parameters."""
+    return OK
+
+
+def within(fields: Sequence[Field]) -> Callable[[Any], Any]:
+    """A function of a record of parameters, or of lanes of them: whether each is a number within its field's limits.
+
+    NaN and infinite numbers never are; a default always is, at a limit that is open, too.
+    """
+    tests = []
+    for field in fields:
+        p, open_lower = f"p.{field.name}", field.open_lower or field.lower == -math.inf
+        limits = f"{field.lower!r}, {open_lower}, {field.upper!r}, {field.upper == math.inf}"
+        test = f"{'all_inside' if field.dims else 'inside'}({p}, {limits})"
+        if field.open_lower and field.default is not None:
+            default = f"p.{field.default}" if isinstance(field.default, str) else repr(float(field.default))
+            test = f"({test} | equal({p}, {default}))"
+        tests.append(test + (f" & equal({p}, nearest({p}))" if field.integer or field.choices else ""))
+    names = {"inside": _inside, "all_inside": _all_inside, "equal": _equal, "nearest": nearest, "inf": math.inf}
+    made: Callable[[Any], Any] = jit(eval(f"lambda p: {' & '.join(tests)}", names))
+    return made
+
+
+@jit
+def _inside(x: Any, lower: float, above: bool, upper: float, below: bool) -> Any:
+    return ((x > lower) if above else (x >= lower)) & ((x < upper) if below else (x <= upper))
+
+
+@jit
+def _all_inside(row: Any, lower: float, above: bool, upper: float, below: bool) -> Any:
+    good = True
+    for x in row:
+        good = good & _inside(x, lower, above, upper, below)
+    return good
+
+
+@jit
+def _equal(x: Any, y: Any) -> Any:
+    return (x >= y) & (x <= y)
 
 
 @jit
@@ -203,14 +249,24 @@ class _Wiring:
         self.name, self.record, self.loop = name, record or _record("Parameters", parameters), loop
         self.parameters, self.along, self.outputs = parameters, along, outputs
 
-    def check(self, check: CheckCell) -> OnColumns:
-        record = self.record
+    def check(self, check: CheckCell | None, allowed: Callable[[Any], Any], of: Solver | Split | Method) -> OnColumns:
+        """Machine code of a check is kept where that of the method `of` is."""
+        record, special = self.record, check or _no_more
 
         @jit
         def body(i: Any, columns: Any) -> None:
-            columns.status[i] = check(read(record, columns, i))
+            p = read(record, columns, i)
+            columns.status[i] = where(allowed(p), special(p), BAD_INPUT)
 
-        return self._entry("check", check, body, [*self.parameters, "status"], self.loop)
+        @jit
+        def of_a_cell(i: Any, columns: Any) -> None:
+            p = read(record, columns, i)
+            columns.status[i] = special(p) if allowed(p) else BAD_INPUT
+
+        body = of_a_cell if self.loop is loops.cell_by_cell else body
+        first = next(iter(of.solvers.values())) if isinstance(of, Split) else of
+        owner = check or (first.solve if isinstance(first, Method) else first.function)
+        return self._entry("check", owner, body, [*self.parameters, "status"], self.loop)
 
     def method(self, solver: Solver | Split | Method) -> Method:
         if isinstance(solver, Method):

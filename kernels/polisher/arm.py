@@ -18,7 +18,7 @@ rates, no derivatives). A crank e = 0 swings nothing; crank angles are those for
 from collections import namedtuple
 
 from kernels.interface import FIRST_REFUSAL, Field
-from kernels.lanes.codes import BAD_INPUT, INACCURATE, OK
+from kernels.lanes.codes import INACCURATE, OK
 from kernels.lanes.groups import cells_at
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none
@@ -27,7 +27,7 @@ from kernels.lanes.vectors import not_, where
 from kernels.lanes.wiring import kernel, method, tracing
 from kernels.polisher import _motor_waveform, extremes
 from kernels.polisher._cell import ROUNDING, Rates, judged, said, swing, turns
-from kernels.polisher.linkage import EXAMPLE, PARAMETERS, allowed
+from kernels.polisher.linkage import EXAMPLE, PARAMETERS
 
 Linkage = namedtuple("Linkage", [field.name for field in PARAMETERS])
 
@@ -64,12 +64,6 @@ def _waveform(first, columns, turn):
     columns.status[i] = where(wide & (cell.code < FIRST_REFUSAL), INACCURATE, cell.code)
 
 
-@jit
-def check(p):
-    """BAD_INPUT: NaN, infinite, a length that is not positive (the crank's may be 0), or a type that is none."""
-    return where(allowed(p), OK, BAD_INPUT)
-
-
 POLISHER = kernel(
     "polisher",
     doc="how far a polishing machine's crank swings its arm, and how well",
@@ -100,7 +94,6 @@ POLISHER = kernel(
         Field("A1_e", "rad/m", "derivative of A1 by e"),
     ),
     record=Linkage,
-    check=check,
     methods=(
         method("stable", "half-angle forms of sums without error", stable, ROUNDING, lacks=Rates._fields),
         tracing(

@@ -80,15 +80,6 @@ class Squares(NamedTuple):
 
 
 @jit
-def allowed(p):
-    """Whether the parameters of a linkage are numbers within their limits; NaN fails."""
-    positive = (p.b > 0.0) & (p.d > 0.0) & (p.f > 0.0) & (p.e >= 0.0)
-    finite = (p.b < math.inf) & (p.d < math.inf) & (p.f < math.inf) & (p.e < math.inf)
-    a_or_b = ((p.type >= 0.0) & (p.type <= 0.0)) | ((p.type >= 1.0) & (p.type <= 1.0))
-    return positive & finite & a_or_b
-
-
-@jit
 def sum4(w, x, y, z):
     """w + x + y + z within 3 ulp of the sum itself, however much cancels; 0 only where the sum is 0.
 

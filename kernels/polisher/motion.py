@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.interface import Field
-from kernels.lanes.codes import BAD_INPUT, CHANGE_POINT, INACCURATE, LOCK_UP, OK
+from kernels.lanes.codes import BAD_INPUT, CHANGE_POINT, INACCURATE, LOCK_UP
 from kernels.lanes.groups import GROUP, cells_at, write_row
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none, partly
@@ -31,7 +31,7 @@ from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import arctan, larger, sincos, smaller
 from kernels.polisher import linkage
 from kernels.polisher._cell import ROUNDING, judged, said
-from kernels.polisher.linkage import EXAMPLE, Crank, Margins, allowed, crank_at, lock_doubt, motion, side_of
+from kernels.polisher.linkage import EXAMPLE, Crank, Margins, crank_at, lock_doubt, motion, side_of
 
 FARTHEST = 1e6
 """Crank angle, beyond which a radian has lost its digits."""
@@ -129,14 +129,6 @@ def _row():
     return (np.empty(GROUP),)
 
 
-@jit
-def check(p):
-    """BAD_INPUT as for `polisher`, and angles beyond a turn."""
-    fine = allowed(p) & (magnitude(p.omega) < math.inf)
-    fine = fine & (magnitude(p.b_angle) <= math.tau) & (magnitude(p.beta) <= math.tau)
-    return where(fine & (p.L >= 0.0) & (math.inf > p.L), OK, BAD_INPUT)
-
-
 POLISHER_MOTION = kernel(
     "polisher_motion",
     doc="motion of a polishing machine's arm and tool along the crank's angle",
@@ -155,7 +147,6 @@ POLISHER_MOTION = kernel(
         Field("crank_angle", "rad", "angle of the crank, from where b_angle counts", lower=-FARTHEST, upper=FARTHEST),
     ),
     record=Machine,
-    check=check,
     # over the largest value of the trace, of x and y over L; close to a lock the status says more
     methods=(tracing("closed", "closed forms of sums without error", _follow, ROUNDING, buffers=_row),),
     example=EXAMPLE | {"omega": 6.0},

@@ -1,13 +1,12 @@
 """What the kernels of wear share: their parameters, the check of them, and the machine without units."""
 
-import math
 from collections import namedtuple
 from typing import NamedTuple
 
 from kernels.interface import FIRST_REFUSAL, Field
-from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, OK, OUT_OF_RANGE
+from kernels.lanes.codes import BAD_INPUT, CHANGE_POINT, DOUBLE_CRANK, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_apart
-from kernels.lanes.vectors import magnitude, not_, sqrt
+from kernels.lanes.vectors import magnitude, not_, sqrt, where
 from kernels.maths.elementary import in_unit, mantissa_exponent, scale
 from kernels.polisher import extremes, linkage
 from kernels.wear import _dwell, _tool
@@ -43,39 +42,11 @@ class Setup(NamedTuple):
 
 
 @jit
-def _positive(x):
-    return (x > 0.0) & (x < math.inf)
-
-
-@jit
-def _no_less_than_0(x):
-    return (x >= 0.0) & (x < math.inf)
-
-
-@jit
-def _within(x, low, high):
-    return (x >= low) & (x <= high)
-
-
-@jit
-def allowed(p):
-    """Whether the parameters are numbers within their limits; NaN fails."""
-    turns = (magnitude(p.omega) < math.inf) & (magnitude(p.Omega) < math.inf) & _positive(p.preston)
-    angles = (magnitude(p.b_angle) <= ANGLE_LIMIT) & (magnitude(p.beta) <= ANGLE_LIMIT)
-    work = _no_less_than_0(p.L) & (magnitude(p.w_x) < math.inf) & (magnitude(p.w_y) < math.inf)
-    size = _positive(p.tool_a) & _positive(p.tool_b)
-    low, high = EXPONENT_LIMITS
-    shape = _within(p.tool_n, low, high) & _within(p.tool_m, low, high)
-    return linkage.allowed(p) & turns & angles & work & size & shape & _pressed(p)
-
-
-@jit
-def _pressed(p):
-    """Whether just one of pressure and load is given, and with a load the workpiece's radius; NaN fails."""
-    numbers = _no_less_than_0(p.pressure) & _no_less_than_0(p.load) & _no_less_than_0(p.workpiece_radius)
+def check(p):
+    """BAD_INPUT unless just one of pressure and load is given, and with a load the workpiece's radius."""
     hard, loaded = p.pressure > 0.0, p.load > 0.0
     one = (hard & not_(loaded)) | (loaded & not_(hard))
-    return numbers & one & (not_(loaded) | (p.workpiece_radius > 0.0))
+    return where(one & (not_(loaded) | (p.workpiece_radius > 0.0)), OK, BAD_INPUT)
 
 
 @jit

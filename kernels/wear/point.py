@@ -15,18 +15,18 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.interface import Field
-from kernels.lanes.codes import BAD_INPUT, INACCURATE, OK, OUT_OF_RANGE, STEP_LIMIT
+from kernels.lanes.codes import INACCURATE, OUT_OF_RANGE, STEP_LIMIT
 from kernels.lanes.columns import cell_by_cell
 from kernels.lanes.jit import jit, jit_apart, jit_inline
 from kernels.lanes.records import read, write
-from kernels.lanes.vectors import magnitude, sqrt, where
+from kernels.lanes.vectors import magnitude, sqrt
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths import quadrature
 from kernels.maths.elementary import in_unit, is_normal, mantissa_exponent, scale
 from kernels.polisher import linkage
 from kernels.wear import _path, _pressure, _scene
 from kernels.wear._path import INSIDE, ONCE, OUTSIDE, STEPS, Course, Step, position
-from kernels.wear._scene import ANGLE_LIMIT, Machine, allowed, signed_in_unit
+from kernels.wear._scene import Machine, signed_in_unit
 
 _EPS = 2.0**-52
 _TURN = 2.0 * math.pi
@@ -226,13 +226,6 @@ def _buffers():
     return Room(np.empty(quadrature.POOL), quadrature.nodes(), np.empty(_DEPTH)), _pressure.memory()
 
 
-@jit
-def check(p):
-    """BAD_INPUT: NaN, infinite or outside its limits."""
-    point = (p.r0 >= 0.0) & (p.r0 < math.inf) & (magnitude(p.theta0) <= ANGLE_LIMIT)
-    return where(allowed(p) & point & (p.tau >= 0.0) & (p.tau < math.inf), OK, BAD_INPUT)
-
-
 POLISHER_WEAR_POINT = kernel(
     "polisher_wear_point",
     doc="Preston wear of one point of a turning workpiece under the tool of a polishing machine",
@@ -247,7 +240,7 @@ POLISHER_WEAR_POINT = kernel(
         Field("wear", "m", "depth worn away"),
         Field("wear_error", "m", "what it may be wrong by"),
     ),
-    check=check,
+    check=_scene.check,
     methods=(
         tracing(
             "path",

@@ -23,17 +23,16 @@ import math
 from typing import NamedTuple
 
 from kernels.interface import Field
-from kernels.lanes.codes import BAD_INPUT, INACCURATE, OK, OUT_OF_RANGE
+from kernels.lanes.codes import INACCURATE, OUT_OF_RANGE
 from kernels.lanes.columns import cell_by_cell
 from kernels.lanes.jit import jit, jit_inline
 from kernels.lanes.ranges import partly
 from kernels.lanes.records import read
-from kernels.lanes.vectors import where
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import in_unit, is_normal
 from kernels.wear import _panels, _pressure, _profile, _scene
 from kernels.wear._contour import Scene
-from kernels.wear._scene import Machine, allowed
+from kernels.wear._scene import Machine
 
 _FAINT = 2.0**-100
 _AT_RIM = 1e-8
@@ -107,12 +106,6 @@ def _buffers():
     return _panels.room(), _pressure.memory()
 
 
-@jit
-def check(p):
-    """BAD_INPUT: NaN, infinite or outside its limits."""
-    return where(allowed(p), OK, BAD_INPUT)
-
-
 POLISHER_WEAR = kernel(
     "polisher_wear",
     doc="Preston wear of a turning workpiece along its radius, under the tool of a polishing machine",
@@ -124,7 +117,7 @@ POLISHER_WEAR = kernel(
     ),
     along=(Field("radius", "m", "distance from the workpiece's centre", lower=0.0),),
     record=Machine,
-    check=check,
+    check=_scene.check,
     methods=(
         tracing(
             "contour",
