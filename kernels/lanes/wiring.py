@@ -12,7 +12,7 @@ Loops, entries with one column a parameter, copies that fill up few cells, the l
 NaN for outputs that a method lacks are made here. Names that do not fit the fields are refused: those of the
 parameters when a kernel is declared, those of outputs when a method is compiled, which is at its first call.
 
-What the engine calls is made in three steps. `_Wiring.method` lists the names of the columns as `kernels.interface`
+What the engine calls is made in three steps. `_Wiring.solved_by` lists the names of the columns as `kernels.interface`
 has them; `_Wiring._body` is the work on one cell, or on WIDTH of them; `_Wiring._entry` makes a function of columns
 that loops this body by `in_lanes`, `cell_by_cell` or `in_groups` of `columns`. Records are read and written by name
 (`records`), so the order of columns is known nowhere else.
@@ -22,7 +22,7 @@ import inspect
 import math
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from types import FunctionType
 from typing import Any
 
@@ -46,36 +46,8 @@ Sooner = Callable[[Any, Any], Any]
 
 
 @dataclass(frozen=True)
-class Solver:
-    """A method as its author writes it; `kernel` makes a `Method` of it."""
-
-    name: str
-    doc: str
-    function: SolveCell | FillCells
-    bound: BoundCell | float | None
-    excludes: tuple[str, ...]
-    lacks: tuple[str, ...]
-    buffers: Buffers | None
-    loop: Loop
-    fills: bool
-    estimates: bool
-    sooner: Sooner | None = None
-
-
-def method(
-    name: str,
-    doc: str,
-    solve: SolveCell,
-    bound: BoundCell | float | None = None,
-    *,
-    excludes: tuple[str, ...] = (),
-    lacks: tuple[str, ...] = (),
-    buffers: Buffers | None = None,
-    loop: Loop = loops.in_lanes,
-    estimates: bool = False,
-    sooner: Sooner | None = None,
-) -> Solver:
-    """A method by `solve(p, rtol, *buffers())`.
+class method:
+    """A method by `solve(p, rtol, *buffers())`, as its author writes it; `kernel` makes a `Method` of it.
 
     Parameters
     ----------
@@ -85,42 +57,40 @@ def method(
     loop : `in_lanes`; `cell_by_cell`, where every search goes its own way
     sooner : `sooner(p, rtol)` of columns, uncompiled: True where `auto` tries it ahead of the method before it
     """
-    return Solver(name, doc, solve, bound, excludes, lacks, buffers, loop, False, estimates, sooner)
 
-
-def tracing(
-    name: str,
-    doc: str,
-    fill: FillCells,
-    bound: BoundCell | float | None = None,
-    *,
-    excludes: tuple[str, ...] = (),
-    lacks: tuple[str, ...] = (),
-    buffers: Buffers | None = None,
-    loop: Loop = loops.in_groups,
-    estimates: bool = False,
-) -> Solver:
-    """A method by `fill(i, columns, *buffers())`: `i` is a cell, or by `in_groups` the first of a group."""
-    return Solver(name, doc, fill, bound, excludes, lacks, buffers, loop, True, estimates)
+    name: str
+    doc: str
+    solve: SolveCell
+    bound: BoundCell | float | None = None
+    _: KW_ONLY
+    excludes: tuple[str, ...] = ()
+    lacks: tuple[str, ...] = ()
+    buffers: Buffers | None = None
+    loop: Loop = loops.in_lanes
+    estimates: bool = False
+    sooner: Sooner | None = None
 
 
 @dataclass(frozen=True)
-class Split:
-    """A method that is several: the value of one parameter says which of them solves a cell."""
+class tracing(method):
+    """A method by `fill(i, columns, *buffers())`: `i` is a cell, or by `in_groups` the first of a group."""
+
+    solve: FillCells  # type: ignore[assignment]
+    loop: Loop = loops.in_groups
+
+
+@dataclass(frozen=True)
+class split:
+    """A method that is several: the value of one parameter says which of them solves a cell.
+
+    Each is compiled when a cell asks for it first. Values with the same solver are one entry: it is compiled once, and
+    their cells are solved together. Either all of them estimate or none does.
+    """
 
     name: str
     doc: str
     parameter: str
-    solvers: dict[float, Solver]
-
-
-def split(name: str, doc: str, parameter: str, solvers: dict[float, Solver]) -> Split:
-    """A method by {value of a parameter: `method` or `tracing`}; each is compiled when a cell asks for it first.
-
-    Values with the same solver are one entry: it is compiled once, and their cells are solved together. Either all
-    of them estimate or none does.
-    """
-    return Split(name, doc, parameter, solvers)
+    solvers: dict[float, method]
 
 
 def kernel(
@@ -130,7 +100,7 @@ def kernel(
     source: str,
     parameters: Sequence[Field],
     outputs: Sequence[Field],
-    methods: Sequence[Solver | Split | Method],
+    methods: Sequence[method | split | Method],
     check: CheckCell | None = None,
     along: Sequence[Field] = (),
     example: Mapping[str, float | Sequence[float]] | None = None,
@@ -163,7 +133,7 @@ def kernel(
         parameters=tuple(parameters),
         outputs=tuple(outputs),
         check=wiring.check(check, within(parameters), methods[0]),
-        methods=tuple(wiring.method(solver) for solver in methods),
+        methods=tuple(wiring.solved_by(solver) for solver in methods),
         along=tuple(along),
         example=dict(example or {}),
         same_length=dict(same_length or {}),
@@ -249,7 +219,7 @@ class _Wiring:
         self.name, self.record, self.loop = name, record or _record("Parameters", parameters), loop
         self.parameters, self.along, self.outputs = parameters, along, outputs
 
-    def check(self, check: CheckCell | None, allowed: Callable[[Any], Any], of: Solver | Split | Method) -> OnColumns:
+    def check(self, check: CheckCell | None, allowed: Callable[[Any], Any], of: method | split | Method) -> OnColumns:
         """Machine code of a check is kept where that of the method `of` is."""
         record, special = self.record, check or _no_more
 
@@ -264,22 +234,21 @@ class _Wiring:
             columns.status[i] = special(p) if allowed(p) else BAD_INPUT
 
         body = of_a_cell if self.loop is loops.cell_by_cell else body
-        first = next(iter(of.solvers.values())) if isinstance(of, Split) else of
-        owner = check or (first.solve if isinstance(first, Method) else first.function)
+        owner = check or (next(iter(of.solvers.values())) if isinstance(of, split) else of).solve
         return self._entry("check", owner, body, [*self.parameters, "status"], self.loop)
 
-    def method(self, solver: Solver | Split | Method) -> Method:
+    def solved_by(self, solver: method | split | Method) -> Method:
         if isinstance(solver, Method):
             return solver
-        if isinstance(solver, Split):
+        if isinstance(solver, split):
             estimates = any(each.estimates for each in solver.solvers.values())
             return Method(solver.name, solver.doc, self._split(solver, estimates), estimates=estimates)
         strange = set(solver.lacks) - set(self.outputs) | set(solver.excludes) - set(self.parameters)
         if strange:
             raise TypeError(f"{self.name}.{solver.name} lacks or excludes what there is not: {sorted(strange)}")
-        body = solver.function if solver.fills else self._body(solver)
+        body = solver.solve if isinstance(solver, tracing) else self._body(solver)
         names = self._names(solver.estimates)
-        solve = self._entry(solver.name, solver.function, body, names, solver.loop, solver.buffers or nothing)
+        solve = self._entry(solver.name, solver.solve, body, names, solver.loop, solver.buffers or nothing)
         bound, sooner = self._bound(solver), self._sooner(solver.sooner)
         return Method(solver.name, solver.doc, solve, bound, solver.excludes, solver.lacks, solver.estimates, sooner)
 
@@ -291,14 +260,14 @@ class _Wiring:
         asked, error = (["asked"], ["error"]) if estimates else ([], [])
         return [*self.parameters, "rtol", *self.along, *asked, *self.outputs, *error, "status"]
 
-    def _split(self, split: Split, estimates: bool) -> OnColumns:
-        entries = {solver: self.method(solver).solve for solver in dict.fromkeys(split.solvers.values())}
-        chosen, names = self.parameters.index(split.parameter), self._names(estimates)
+    def _split(self, several: split, estimates: bool) -> OnColumns:
+        entries = {solver: self.solved_by(solver).solve for solver in dict.fromkeys(several.solvers.values())}
+        chosen, names = self.parameters.index(several.parameter), self._names(estimates)
         shared, first_output = {*self.along, "asked"}, names.index(self.outputs[0])
 
         def solve(*columns: Any) -> None:
-            for solver in dict.fromkeys(split.solvers[value] for value in np.unique(columns[chosen])):
-                rows = np.isin(columns[chosen], [value for value, by in split.solvers.items() if by == solver])
+            for solver in dict.fromkeys(several.solvers[value] for value in np.unique(columns[chosen])):
+                rows = np.isin(columns[chosen], [value for value, by in several.solvers.items() if by == solver])
                 if rows.all():
                     return entries[solver](*columns)
                 part = [c if name in shared else c[rows] for name, c in zip(names, columns, strict=True)]
@@ -308,13 +277,13 @@ class _Wiring:
 
         return signed(solve, names)
 
-    def _given(self, solver: Solver) -> Record:
+    def _given(self, solver: method) -> Record:
         """A record of the outputs that the method gives."""
         return _record("Given", [name for name in self.outputs if name not in solver.lacks])
 
-    def _body(self, solver: Solver) -> FillCells:
+    def _body(self, solver: method) -> FillCells:
         record, given, order = self.record, self._given(solver), _record("Order", self.outputs)
-        solve: Any = solver.function
+        solve: Any = solver.solve
         none = _record("Lacking", solver.lacks)(*(math.nan for _ in solver.lacks))
 
         @jit
@@ -334,7 +303,7 @@ class _Wiring:
 
         return estimating if solver.estimates else body
 
-    def _bound(self, solver: Solver) -> OnColumns | None:
+    def _bound(self, solver: method) -> OnColumns | None:
         if solver.bound is None:
             return None
         names = [*self.parameters, "rtol", *self.along, "asked", "out"]
