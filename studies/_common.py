@@ -115,7 +115,7 @@ def report(
 ) -> int:
     """Prints what a study concludes from the results named, and saves its figure beside the first of them.
 
-    A figure that is there is replaced where a script has drawn it, and left alone otherwise.
+    A figure that is there is replaced with `--force` alone.
 
     Parameters
     ----------
@@ -129,15 +129,16 @@ def report(
     int
         Exit status: 1 if a statement does not hold, 2 if the results are not there or not of this study.
     """
+    force, arguments = "--force" in arguments, [argument for argument in arguments if argument != "--force"]
     if len(arguments) != len(inputs):
-        print(f"use: python {Path(script).name} {' '.join(inputs)}", file=sys.stderr)
+        print(f"use: python {Path(script).name} {' '.join(inputs)} [--force]", file=sys.stderr)
         return 2
     try:
         from sweep.file.overwriting import check_target
         from sweep.show import charts
 
         target = Path(arguments[0]).with_suffix(".png")
-        check_target(target, ".png")
+        check_target(target, force=force)
         groups, notes, draw = conclude(*arguments)
         page = draw()
         print("\n".join([*table(groups, source), "", *notes, ""]))

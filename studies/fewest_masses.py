@@ -214,12 +214,13 @@ def main(arguments: Sequence[str]) -> int:
     if list(arguments) == ["points"]:
         write_points(Path(__file__).with_suffix(".csv"))
         return 0
+    force, arguments = "--force" in arguments, [argument for argument in arguments if argument != "--force"]
     if len(arguments) > 1 or not all(a.isdigit() and int(a) > 0 for a in arguments):
-        print("use: python fewest_masses.py [drivetrains]", file=sys.stderr)
+        print("use: python fewest_masses.py [drivetrains] [--force]", file=sys.stderr)
         return 2
     target = Path("fewest_masses.png")
     try:
-        check_target(target, ".png")
+        check_target(target, force=force)
     except sweep.SweepError as error:
         print(error, file=sys.stderr)
         return 2

@@ -98,7 +98,7 @@ def parser() -> argparse.ArgumentParser:
     for name, command in COMMANDS.items():
         text = command.text
         made = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
-        made.set_defaults(command=command.function, by=f"sweep {name}, foliot")
+        made.set_defaults(command=command.function)
         for names, keys in command.options:
             made.add_argument(*names, **keys)
     return top

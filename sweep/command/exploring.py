@@ -44,7 +44,7 @@ def _refine(arguments: argparse.Namespace) -> None:
     from sweep.explore.refine import refine
     from sweep.study.read import study as as_study
 
-    check_target_of(arguments, arguments.output, "result")
+    check_target_of(arguments, arguments.output, force=True)
     with result_of(arguments) as dataset:
         study = as_study(dataset, allow_import=arguments.allow_import)
         found = refine(
@@ -82,7 +82,7 @@ def _chart(arguments: argparse.Namespace) -> None:
         cell_timeout=arguments.cell_timeout,
     )
     say(precision_text(found, arguments.all))
-    save(plot(found), output, arguments.by)
+    save(plot(found), output)
     say(output)
 
 

@@ -54,12 +54,12 @@ def opened(path: Path, unfinished: bool = True) -> Iterator[xr.Dataset]:
         yield found
 
 
-def check_target_of(arguments: argparse.Namespace, target: Path, kind: str | None = None) -> None:
-    """Raises SweepError where a command is not to write there; its kind is the suffix unless it has a name."""
+def check_target_of(arguments: argparse.Namespace, target: Path, force: bool = False) -> None:
+    """Raises SweepError where a command is not to write there; by `force` it may look at what is there itself."""
     from sweep.file.overwriting import check_target
 
     read = [getattr(arguments, name) for name in ("result", "study") if name in arguments]
-    check_target(target, kind or target.suffix.lower(), force=arguments.force, read=read, by=arguments.by)
+    check_target(target, force=force or arguments.force, read=read)
 
 
 def in_units_of(dataset: xr.Dataset, given: Sequence[str]) -> xr.Dataset:

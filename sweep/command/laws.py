@@ -16,7 +16,7 @@ def _fit(arguments: argparse.Namespace) -> None:
         _compare(arguments)
         return
     if arguments.output:
-        check_target_of(arguments, arguments.output, "laws")
+        check_target_of(arguments, arguments.output)
     with result_of(arguments) as dataset:
         part = on_lines(pick(dataset, arguments.at), arguments.x)
         noise = {"yes": True, "no": False}.get(arguments.noise, arguments.noise)
@@ -36,7 +36,7 @@ def _compare(arguments: argparse.Namespace) -> None:
     target = arguments.output
     drawn = target is not None and target.suffix.lower() != ".csv"
     if target:
-        check_target_of(arguments, target, None if drawn else "laws")
+        check_target_of(arguments, target)
     with result_of(arguments) as dataset:
         part = on_lines(pick(dataset, arguments.at), arguments.x)
         found = comparison(part, arguments.y, arguments.x, arguments.window or [])
@@ -45,7 +45,7 @@ def _compare(arguments: argparse.Namespace) -> None:
         from sweep.show.charts import save
         from sweep.show.plot import plot
 
-        save(plot(found), target, arguments.by)
+        save(plot(found), target)
     elif target:
         write_comparison(found, target)
     if target:

@@ -73,7 +73,7 @@ def _plot(arguments: argparse.Namespace) -> None:
     check_target_of(arguments, output)
     with result_of(arguments) as dataset:
         figure = plot(in_units_of(pick(dataset, arguments.at), arguments.unit), y=arguments.y, x=arguments.x)
-    save(figure, output, arguments.by)
+    save(figure, output)
     say(output)
 
 
@@ -88,7 +88,7 @@ def _report(arguments: argparse.Namespace) -> None:
     from sweep.show.page import write_page
 
     output = arguments.output or Path(f"{arguments.result.stem}.html")
-    check_target_of(arguments, output, "page")
+    check_target_of(arguments, output)
     with result_of(arguments) as dataset:
         say(write_page(in_units_of(dataset, arguments.unit), arguments.result, output))
 

@@ -59,7 +59,7 @@ ISOLATE = option(
 CELL_TIMEOUT = option(
     "--cell-timeout", "what a cell may take, e.g. 90s or 1h; default: 60s, longer where cells do", metavar="TIME"
 )
-FORCE = switch("--force", "overwrite what is there even if it is not from an earlier command of this kind")
+FORCE = switch("--force", "overwrite what is there")
 UNFINISHED = switch("--unfinished", "take what there is of a result that is not complete yet")
 ALL = switch("--all", "all columns of the table")
 AT = several("--at", "pick one value of another axis", "AXIS=VALUE")

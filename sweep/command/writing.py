@@ -24,7 +24,7 @@ def _join(arguments: argparse.Namespace) -> None:
     from sweep.results.statuses import summary_text
 
     paths = [arguments.result, arguments.other]
-    check_target_of(arguments, arguments.output, "result")
+    check_target_of(arguments, arguments.output, force=True)
     labels = arguments.labels or [path.stem if len({p.stem for p in paths}) > 1 else str(path) for path in paths]
     with opened(paths[0]) as a, opened(paths[1]) as b:
         found = join(a, b, arguments.output, axis=arguments.axis, labels=labels, force=arguments.force)

@@ -103,7 +103,7 @@ def refine(
     rounds = None if target is None else target.with_name(f"{target.name}.rounds")
     if target is not None and rounds is not None:
         source = dataset.encoding.get("source")
-        check_target(target, "result", read=[Path(source)] if source else [])
+        check_target(target, force=True, read=[Path(source)] if source else [])
         if target.exists() and not force:
             with open_result(target) as there:
                 if there.attrs["title"] != title:

@@ -17,11 +17,13 @@ import xarray as xr
 from sweep.cells.reduce import BY_METHOD, BY_STATUS
 from sweep.errors import SweepError, missing
 from sweep.file import disk
-from sweep.file.overwriting import EXPORTED, check_target
+from sweep.file.overwriting import check_target
 from sweep.results.statuses import flag_words, is_summary
 from sweep.study.mistakes import listed
 from sweep.words import as_path, cell, require_dataset
 
+EXPORTED = "exported by foliot"
+"""In the history of what is exported."""
 ROWS = 65536
 """Rows of csv in memory at a time."""
 
@@ -41,8 +43,7 @@ def export(
 ) -> Path:
     """Write a Dataset to `path`, as its suffix says: .csv, .parquet, .nc or .zarr.
 
-    An earlier export of the same kind is replaced once all is written; anything else that is there only by `force`,
-    and never the file that the Dataset is read from.
+    What is there already is replaced by `force` alone, once all is written; what the Dataset is read from never is.
 
     csv: one row per cell (per cell and phase, for outputs along a phase), one column per coordinate and output,
     `status` and `method_used` as words, numbers with all their digits. Lines that start with "#" name the unit of
@@ -79,7 +80,7 @@ def export(
     if (compress or float32) and kind not in PACKED:
         raise SweepError(f"{target}: compress and float32 are for {listed(PACKED, word='and')}")
     source = dataset.encoding.get("source")
-    check_target(target, kind, force=force, read=[Path(source)] if source else [])
+    check_target(target, force=force, read=[Path(source)] if source else [])
     try:
         with disk.replacing(target) as part:
             whole = _in_float32(dataset) if float32 else dataset

@@ -18,7 +18,6 @@ import xarray as xr
 
 from sweep.errors import SweepError, missing
 from sweep.file import disk
-from sweep.file.overwriting import DRAWN
 from sweep.laws.loglog import is_logarithmic, spans_decades
 from sweep.show.view import View, coordinate, edges, label, setting, view
 
@@ -217,13 +216,8 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def save(figure: Figure, path: str | os.PathLike[str], by: str = DRAWN) -> Path:
+def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
     """Save as .png, .svg or .pdf; a file that is there is replaced once all is written.
-
-    Parameters
-    ----------
-    by : str
-        What has drawn it, for its metadata.
 
     Raises
     ------
@@ -239,8 +233,8 @@ def save(figure: Figure, path: str | os.PathLike[str], by: str = DRAWN) -> Path:
         raise SweepError(f"{target} is a folder; name a file in it")
     with disk.replacing(target) as part, style():
         # without a date: the same picture has the same bytes
-        metadata = {".png": {"Software": by}, ".svg": {"Date": None, "Creator": by}}
-        figure.savefig(part, format=kind[1:], metadata=metadata.get(kind, {"CreationDate": None, "Creator": by}))
+        metadata = {".png": {"Software": "foliot"}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+        figure.savefig(part, format=kind[1:], metadata=metadata[kind])
     return target
 
 

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 
 from sweep.errors import SweepError
 from sweep.file import disk
-from sweep.file.overwriting import PAGE
 from sweep.results.statuses import is_summary
 from sweep.show.laws import explanation, law_rows
 from sweep.show.text import Rows, head, outputs_of, sections
@@ -114,7 +113,7 @@ def page(dataset: xr.Dataset, result: Path) -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"{PAGE}\n"
+        '<meta name="generator" content="foliot">\n'
         f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n{body}\n</body>\n</html>\n"
     )
 

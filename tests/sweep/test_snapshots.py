@@ -40,13 +40,16 @@ LINES = {
         "run stones.toml",
     ],
     "refine": [f"refine stones.h5 --y fall_time --tolerance {share} -o fine.h5 {OWN}" for share in (0.1, 2)],
-    "chart": [f"chart stones.toml --cells 4 --rtol 1e-3 {OWN}", f"chart stones.toml --methods exakt {OWN}"],
+    "chart": [
+        f"chart stones.toml --cells 4 --rtol 1e-3 {OWN}",
+        f"chart stones.toml -o other.png --methods exakt {OWN}",
+    ],
     "show": ["show thrown.h5", "show thrown.toml"],
     "verify": ["verify thrown.h5", "verify damaged.h5"],
     "list": ["list", "list --all", "list nowhere"],
     "diff": ["diff stones.h5 stones.h5", "diff stones.h5 damaged.h5", "diff stones.h5 no.h5"],
     "fit": [f"{FIT} --at v0=1", f"{FIT} --at v0=0.4"],
-    "plot": ["plot stones.h5", "plot stones.h5 --y fal_time"],
+    "plot": ["plot stones.h5", "plot stones.h5", "plot stones.h5 --y fal_time --force"],
     "view": ["view no.h5"],  # the page itself is looked at in view/test_browser.py
     "report": ["report thrown.h5", "report stones.h5 -o stones.toml"],
     "export": ["export thrown.h5 -o thrown.csv --where v0>0", "export thrown.h5 -o thrown.doc"],

@@ -1,4 +1,4 @@
-"""What is overwritten without a word, what by force, and what never."""
+"""What is overwritten by force, and what never."""
 
 import os
 from pathlib import Path
@@ -36,13 +36,15 @@ def here(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_what_is_foreign_is_overwritten_by_force_alone(here, name, capsys):
+def test_what_is_there_is_overwritten_by_force_alone(here, name, capsys):
     (here / name).write_text("# notes of a whole year\n1.0\n")
     assert cli.main(list(KINDS[name])) == 2
     assert "--force" in capsys.readouterr().err
     assert (here / name).read_text() == "# notes of a whole year\n1.0\n"
     assert cli.main([*KINDS[name], "--force"]) == 0
-    assert cli.main(list(KINDS[name])) == 0
+    written = (here / name).stat()
+    assert cli.main(list(KINDS[name])) == 2
+    assert (here / name).stat().st_mtime_ns == written.st_mtime_ns
 
 
 @pytest.mark.parametrize("force", [(), ("--force",)])
