@@ -83,15 +83,15 @@ def best_reference(study: Study, able: Sequence[str], asked: str | None) -> Refe
         if study.kernel.method(name).bound is None and any(t.judged == len(t.floor) for t in found):
             break  # those that state a bound suffice
         found.append(reference_by(study, name))
-    best = min(found, key=lambda t: (-t.judged, study.kernel.method(t.source).bound is None, _digits_lost(t)))
+
+    def rank(t: Reference) -> tuple[int, bool, float]:
+        lost = np.log10(t.floor[t.sound]).mean() if t.sound.any() else math.inf
+        return -t.judged, study.kernel.method(t.source).bound is None, float(lost)
+
+    best = min(found, key=rank)
     if not best.sound.any():
         raise SweepError(f"{best.source} solves none of the cells, so there is nothing to measure against")
     return best
-
-
-def _digits_lost(reference: Reference) -> float:
-    known = reference.floor[reference.sound]
-    return float(np.log10(known).mean()) if known.size else math.inf
 
 
 def reference_by(study: Study, name: str) -> Reference:

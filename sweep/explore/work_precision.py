@@ -9,29 +9,29 @@ shares of cells and counts of work are not.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import xarray as xr
 
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.grid import Grid, empty_cells
 from sweep.cells.sample import sampled, solved, with_method
+from sweep.cells.schema import STATUS
+from sweep.cells.solve import Solver
+from sweep.cells.turns import usable_methods
 from sweep.errors import SweepError
-from sweep.explore.failing import without_failing
 from sweep.explore.plan import small_duration
 from sweep.explore.reference import Reference, best_reference, errors, given_reference
-from sweep.study.mistakes import did_you_mean
-from sweep.study.model import Study
+from sweep.runs.run import run
+from sweep.study.model import Study, frozen
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.words import columns, page, paragraph
-
-if TYPE_CHECKING:
-    import xarray as xr
+from sweep.words import Table, did_you_mean, page, paragraph
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 CELLS = 1024
@@ -40,6 +40,8 @@ LEAST_SECONDS = 0.01
 UNSURE = (Status.INACCURATE, Status.GRAZING)
 """What says of itself that digits, or a count, may be wrong."""
 NAMES = {int(status): status.name for status in Status}
+EXTREMES = (1e-3, 1e-14)
+"""Values of rtol at which isolated cells are tried."""
 WORK = ("rate_calls", "steps", "events")
 """Outputs that count a method's work; where a study asks for them, their means are shown beside the time."""
 ESTIMATES = ("error", "wear_error")
@@ -128,42 +130,80 @@ def work_precision(
     ['closed', 'asymptotic']
     """
     tolerances = list(dict.fromkeys(tolerances))
-    _require(cells, tolerances)
-    part = sampled(as_study(study), cells)
-    able = _able(part)
-    names = _chosen(methods, able)
-    if isolate or cell_timeout is not None:
-        part = without_failing(part, cell_timeout, note)
-    against = best_reference(_without_work(part), able, reference) if truth is None else given_reference(part, truth)
-    found = _table(part, names, tolerances, against)
-    missing = _missing(part, able) if methods is None else []
-    return found.assign_attrs(missing="; ".join(missing), omissions="; ".join([*missing, *omissions(found)]))
-
-
-def _require(cells: int, tolerances: Sequence[float]) -> None:
     if not tolerances or not all(0 < rtol < math.inf for rtol in tolerances):
-        raise SweepError(f"rtol: expected numbers above 0, found {list(tolerances)}")
+        raise SweepError(f"rtol: expected numbers above 0, found {tolerances}")
     if cells < 1:
         raise SweepError(f"cells: expected at least 1, found {cells}")
+    part = sampled(as_study(study), cells)
+    able = [part.kernel.methods[number].name for number in usable_methods(part)]
+    if not able:
+        raise SweepError("no method of the kernel can do this study")
+    names = ["auto", *able] if methods is None else list(dict.fromkeys(methods))
+    for name in names:
+        if name not in ("auto", *able):
+            hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
+            raise SweepError(f"no method {name} that can do this study{hint}")
+    if isolate or cell_timeout is not None:
+        part = _without_failing(part, ["auto", *able], cell_timeout, note)
+    if truth is None:
+        # what a method tells of itself, its work and its error, is neither right nor wrong
+        compared = tuple(name for name in part.outputs if name not in (*WORK, *ESTIMATES))
+        against = best_reference(dataclasses.replace(part, outputs=compared or part.outputs), able, reference)
+    else:
+        against = given_reference(part, truth)
 
-
-def _table(study: Study, names: Sequence[str], tolerances: Sequence[float], against: Reference) -> xr.Dataset:
-    """What is measured of each method at each tolerance."""
-    import xarray as xr
-
-    rows = [[_measured(study, name, rtol, against) for rtol in tolerances] for name in names]
+    rows = [_measured(part, name, rtol, against) for name in names for rtol in tolerances]
+    shape = len(names), len(tolerances)
+    columns = {key: np.array([row[key] for row in rows]).reshape(shape) for key in rows[0]}
+    columns["seconds"] = _seconds(part, names, tolerances)
     found = xr.Dataset(
-        {key: (("method", "rtol"), np.array([[cell[key] for cell in row] for row in rows])) for key in rows[0][0]},
-        {"method": list(names), "rtol": list(tolerances)},
+        {
+            key: (("method", "rtol"), values, {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[key]})
+            for key, values in columns.items()
+        },
+        {"method": names, "rtol": tolerances},
     )
-    found["seconds"] = (("method", "rtol"), _seconds(study, names, tolerances))
-    for key in found.data_vars:
-        found[key].attrs = {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[str(key)]}
-    floor = float(against.floor[against.sound].max()) if against.sound.any() else math.nan
-    found.attrs = {"title": study.title, "kernel": study.kernel_name, "cells": against.judged}
-    open_cells = Grid(study).size - against.judged
-    found.attrs |= {"open_cells": open_cells, "reference": against.source, "reference_error": floor}
-    return found
+    missing = (
+        []
+        if methods is not None
+        else [
+            f"{method.name} cannot do {', '.join(terms)}"
+            if (terms := [name for name in method.excludes if name in part.terms])
+            else f"{method.name} does not give {', '.join(name for name in method.lacks if name in part.outputs)}"
+            for method in part.kernel.methods
+            if method.name not in able
+        ]
+    )
+    return found.assign_attrs(
+        title=part.title,
+        kernel=part.kernel_name,
+        cells=against.judged,
+        open_cells=Grid(part).size - against.judged,
+        reference=against.source,
+        reference_error=float(against.floor[against.sound].max(initial=0.0)) if against.sound.any() else math.nan,
+        missing="; ".join(missing),
+        omissions="; ".join([*missing, *omissions(found)]),
+    )
+
+
+def _without_failing(
+    study: Study, methods: Sequence[str], cell_timeout: float | str | None, note: Callable[[str], None]
+) -> Study:
+    """The cells at which no method fails, found in processes of their own. Raises SweepError where there is none."""
+    good = np.ones(Grid(study).size, bool)
+    for method in methods:  # auto also tries, on cells, methods that cannot do the whole study
+        for rtol in EXTREMES:
+            trial = with_method(study, method, rtol)
+            found = run(trial, progress=False, isolate=True, cell_timeout=cell_timeout)
+            good &= found[STATUS].values.ravel() != Status.FAILED
+    if good.all():
+        return study
+    text = f"the kernel fails at {(~good).sum()} of {good.size} cells, e.g. {_cell(study, int(good.argmin()))}"
+    if not good.any():
+        raise SweepError(text)
+    note(f"{text}; they are left out")
+    axes = {name: dataclasses.replace(a, values=frozen(a.values[good])) for name, a in study.axes.items()}
+    return dataclasses.replace(study, axes=axes)
 
 
 def precision_text(found: xr.Dataset, complete: bool = False) -> str:
@@ -171,34 +211,27 @@ def precision_text(found: xr.Dataset, complete: bool = False) -> str:
 
     Without them, cells that are neither OK nor unsolved carry a remark, INACCURATE among them.
     """
-    work = [name for name in WORK if name in found]
-    head = ("method", "rtol", "median", "worst", "time", *(name.replace("_", " ") for name in work))
-    rows = [(*head, "ok", "unsolved", "silent", "inaccurate", "worst cell")]
+    work = [name for name in WORK if name in found] if complete else []
+    more = ("inaccurate", "worst cell") if complete else ()
+    headings = ("method", "rtol", "median", "worst", "time", *(name.replace("_", " ") for name in work))
+    rows = []
     for name in found["method"].values:
         for rtol in found["rtol"].values:
             cell = found.sel({"method": name, "rtol": rtol})
-            off = (_error(float(cell[key]), found.attrs, name) for key in ("error_median", "error_worst"))
-            counts = (f"{float(cell[key]):.4g}" for key in work)
-            shares = (f"{100 * float(cell[key]):.3g} %" for key in ("ok", "unsolved", "silent", "inaccurate"))
-            taken = small_duration(float(cell.seconds))
-            rows.append((str(name), f"{rtol:.0e}", *off, taken, *counts, *shares, str(cell.worst_cell.item())))
-    if not complete:
-        rows = [(*row[:5], *row[-5:-2]) for row in rows]
+            # of the reference itself nothing can be said but that it is below its floor
+            floor = found.attrs["reference_error"] if name == found.attrs["reference"] else -1.0
+            off = [float(cell[key]) for key in ("error_median", "error_worst")]
+            row = [str(name), f"{rtol:.0e}", *("reference" if e <= floor else f"{e:.1e}" for e in off)]
+            row += [small_duration(float(cell.seconds)), *(f"{float(cell[key]):.4g}" for key in work)]
+            row += [f"{100 * float(cell[key]):.3g} %" for key in ("ok", "unsolved", "silent", *more[:1])]
+            rows.append([*row, str(cell.worst_cell.item())] if complete else row)
     basis = f"errors against {found.attrs['reference']}, in {found.attrs['cells']} cells"
     basis += f", itself right to {found.attrs['reference_error']:.1e}"
-    basis += f"; {found.attrs['open_cells']} cells left aside, of which it is not sure" * (
-        found.attrs["open_cells"] > 0
-    )
-    left_out = found.attrs["omissions"]
-    notes = (basis, f"Omissions: {left_out}" if left_out else "")
-    return page(columns(rows, wide=complete), *map(paragraph, notes))
-
-
-def _error(value: float, attributes: Mapping[str, Any], name: str) -> str:
-    """An error as text; of the reference itself nothing can be said but that it is below its floor."""
-    if name == attributes["reference"] and value <= attributes["reference_error"]:
-        return "reference"
-    return f"{value:.1e}"
+    if found.attrs["open_cells"]:
+        basis += f"; {found.attrs['open_cells']} cells left aside, of which it is not sure"
+    left_out = f"Omissions: {found.attrs['omissions']}" if found.attrs["omissions"] else ""
+    table = Table(rows, (*headings, "ok", "unsolved", "silent", *more)).text(wide=complete)
+    return page(table, paragraph(basis), paragraph(left_out))
 
 
 def omissions(found: xr.Dataset) -> list[str]:
@@ -217,49 +250,14 @@ def omissions(found: xr.Dataset) -> list[str]:
     return lines
 
 
-def _missing(study: Study, able: Sequence[str]) -> list[str]:
-    """Methods that cannot do the study, and why."""
-    lines = []
-    for method in study.kernel.methods:
-        if method.name not in able:
-            terms = [name for name in method.excludes if name in study.terms]
-            lacks = [name for name in method.lacks if name in study.outputs]
-            lines.append(f"{method.name} cannot do {', '.join(terms)}" if terms else "")
-            lines[-1] = lines[-1] or f"{method.name} does not give {', '.join(lacks)}"
-    return lines
-
-
-def _able(study: Study) -> list[str]:
-    from sweep.cells.turns import usable_methods
-
-    return [study.kernel.methods[i].name for i in usable_methods(study)]
-
-
-def _chosen(methods: Sequence[str] | None, able: Sequence[str]) -> list[str]:
-    if not able:
-        raise SweepError("no method of the kernel can do this study")
-    names = ["auto", *able] if methods is None else list(dict.fromkeys(methods))
-    for name in names:
-        if name not in ("auto", *able):
-            hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
-            raise SweepError(f"no method {name} that can do this study{hint}")
-    return names
-
-
-def _without_work(study: Study) -> Study:
-    """The study without what a method tells of itself, its work and its error, in which none is right or wrong."""
-    import dataclasses
-
-    left = tuple(name for name in study.outputs if name not in (*WORK, *ESTIMATES))
-    return dataclasses.replace(study, outputs=left) if left else study
-
-
 def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[str, Any]:
-    part = with_method(study, name, rtol)
-    outputs, status, used, _ = solved(part)
+    """What is measured of a method at a tolerance, but for its time."""
+    outputs, status, used, _ = solved(with_method(study, name, rtol))
     error = errors(outputs, against.values)
+    methods = [method.name for method in study.kernel.methods]
     # against itself the reference has no error; what can be said is what it is right to, also where auto took it
-    error = np.where(_solved_by(study, used, against.source), np.maximum(error, against.floor), error)
+    itself = used == methods.index(against.source) if against.source in methods else np.zeros(len(used), bool)
+    error = np.where(itself, np.maximum(error, against.floor), error)
     valued, total = against.sound & (status < FIRST_REFUSAL), against.judged
     sure = valued & ~np.isin(status, UNSURE)
     unsolved = against.sound & ~valued
@@ -267,6 +265,8 @@ def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[
     worst = int(np.where(sure, error, -1.0).argmax())
     # no number between two cells: errors may be infinite
     low, high = np.quantile(error[valued], (0.1, 0.9), method="inverted_cdf") if valued.any() else [math.nan] * 2
+    first = int(unsolved.argmax())
+    counts = {method: int((used == i).sum()) for i, method in enumerate(methods)}
     return {
         "error_median": float(np.median(error[valued])) if valued.any() else math.nan,
         "error_low": float(low),
@@ -278,52 +278,30 @@ def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[
         "unsolved": float(unsolved.sum() / total),
         "silent": float(wrong.sum() / total),
         "worst_cell": _cell(study, worst) if sure.any() else "",
-        "unsolved_as": _first(study, unsolved, status),
-        "silent_at": _first(study, wrong),
-        "methods_used": _shares(study, used),
+        "unsolved_as": f"{NAMES[int(status[first])]} at {_cell(study, first)}" if unsolved.any() else "",
+        "silent_at": _cell(study, int(wrong.argmax())) if wrong.any() else "",
+        "methods_used": ", ".join(f"{m} {100 * n / max((used >= 0).sum(), 1):.3g} %" for m, n in counts.items() if n),
         **{key: float(outputs[key][valued].mean()) if valued.any() else math.nan for key in WORK if key in outputs},
     }
 
 
-def _solved_by(study: Study, used: Any, name: str) -> Any:
-    return np.isin(used, [i for i, method in enumerate(study.kernel.methods) if method.name == name])
+def _seconds(study: Study, names: Sequence[str], tolerances: Sequence[float]) -> Any:
+    """Least time per cell of a few rounds over all methods: what slows the machine for a while slows them alike.
 
-
-def _shares(study: Study, used: Any) -> str:
-    """`closed 80 %, segments 20 %` of the cells that were solved."""
-    counts = {m.name: int((used == i).sum()) for i, m in enumerate(study.kernel.methods)}
-    solved_cells = max(sum(counts.values()), 1)
-    return ", ".join(f"{name} {100 * n / solved_cells:.3g} %" for name, n in counts.items() if n)
-
-
-def _first(study: Study, where: Any, status: Any = None) -> str:
-    """The first of the cells, with its status where that is wanted; "" where there is none."""
-    if not where.any():
-        return ""
-    index = int(where.argmax())
-    return _cell(study, index) if status is None else f"{NAMES[int(status[index])]} at {_cell(study, index)}"
-
-
-def _seconds(study: Study, names: Sequence[str], tolerances: Sequence[float]) -> NDArray[np.float64]:
-    """Least time per cell of a few rounds over all methods: what slows the machine for a while slows them alike."""
+    Time is what this thread spends: what else runs on the machine matters less.
+    """
     best = np.full((len(names), len(tolerances)), math.inf)
     for _ in range(ROUNDS):
         for i, name in enumerate(names):
             for j, rtol in enumerate(tolerances):
-                best[i, j] = min(best[i, j], _timed(with_method(study, name, rtol)))
+                trial = with_method(study, name, rtol)
+                cells, solver = empty_cells(trial, Grid(trial).size), Solver(trial)
+                count, begin = 0, time.thread_time()
+                while (spent := time.thread_time() - begin) < LEAST_SECONDS or not count:
+                    solver.solve(0, cells)
+                    count += 1
+                best[i, j] = min(best[i, j], spent / count / cells.number)
     return best
-
-
-def _timed(study: Study) -> float:
-    """Time per cell that this thread spends: what else runs on the machine matters less."""
-    from sweep.cells.solve import Solver
-
-    cells, solver = empty_cells(study, Grid(study).size), Solver(study)
-    count, begin = 0, time.thread_time()
-    while (spent := time.thread_time() - begin) < LEAST_SECONDS or not count:
-        solver.solve(0, cells)
-        count += 1
-    return spent / count / cells.number
 
 
 def _cell(study: Study, index: int) -> str:
