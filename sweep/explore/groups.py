@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from sweep.explore.symmetries import scalings
+from sweep.explore.symmetries import SECONDS, scalings
 from sweep.study.model import Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
@@ -142,12 +142,15 @@ class Scaling:
         return dataset
 
 
-def scaling(study: Given) -> Scaling:
+def scaling(study: Given, seconds: float = SECONDS) -> Scaling:
     """Groups of a study's parameters, and how many of its axes are superfluous.
 
     Parameters
     ----------
     study : Study, path, mapping of its keys, or Dataset that came from it
+    seconds : float
+        What trying scalings on cells may take; of dear kernels those of the declared units alone are tried, on four
+        cells, or none, where that takes longer.
 
     Raises
     ------
@@ -164,7 +167,7 @@ def scaling(study: Given) -> Scaling:
     one-dimensional in mu, a: only mu/(phi0 a^2) matters; 1 of these axes can be left out; tried on ... cells at random
     """
     study = as_study(study)
-    found = scalings(study)
+    found = scalings(study, seconds)
     fields = {f.name: f for f in (*study.kernel.parameters, *study.kernel.along)}
     scaled = [name for name in fields if any(found.weights(name))]
     arrays = any(field.dims for field in study.kernel.parameters)
@@ -205,6 +208,6 @@ def scaling(study: Given) -> Scaling:
     )
 
 
-def advice_on(study: str) -> str:
+def advice_on(study: str, seconds: float) -> str:
     """The advice on a study in JSON."""
-    return scaling(Study.from_json(study, allow_import=True)).advice
+    return scaling(Study.from_json(study, allow_import=True), seconds).advice

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,9 @@ from sweep.cells.block import faults_reported, row_shape, sampled_by, sampled_st
 from sweep.cells.compiling import SILENT_SECONDS, Compiling
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.grid import Grid, empty_cells
-from sweep.cells.guard import Unsolved
+from sweep.cells.guard import SolveCells, Unsolved
 from sweep.cells.output_schema import output_schema, part_columns
-from sweep.cells.partition import Partition, row_blocks
+from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import strip_bytes
 from sweep.cells.sample import require_asked
 from sweep.cells.solve import Solver
@@ -30,15 +30,12 @@ from sweep.errors import SweepError
 from sweep.explore.groups import advice_on, scaling
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import memory
-from sweep.runs.isolate import Limits, Processes, limits_of
+from sweep.runs.isolate import Processes, limits_of
 from sweep.runs.pool import cores, whole_number
+from sweep.study.model import Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.words import columns, duration, paragraph, quantity
-
-if TYPE_CHECKING:
-    from sweep.cells.guard import SolveCells
-    from sweep.study.model import Study
+from sweep.words import Table, duration, paragraph, quantity
 
 TRIAL = 32 << 20
 """Bytes written to see how fast the disk is,"""
@@ -46,10 +43,17 @@ WORTH_A_TRIAL = 1 << 28
 """where so many are to be written."""
 ADVICE_SECONDS = 10.0
 """What looking for superfluous axes may take, of a kernel that may not end."""
+NOT_TRIED = "superfluous axes are not looked for, which would take as long as the run; sweep.scaling(study) does"
 DRAWN = 64
 """Cells beside the ends of axes that are solved to see their methods and statuses,"""
 LOOK_SECONDS = 1.0
-"""or as many as can be in this time."""
+"""or as many as can be in this time,"""
+SHARE = 0.25
+"""or in this share of the run. So long may looking for superfluous axes take, too,"""
+SCALING_CELLS = 60
+"""which solves so many cells at least,"""
+SCALING_SECONDS = 0.1
+"""or this time, where cells are cheap."""
 RUN_SECONDS = 0.15
 """What any run to a file takes beside its cells: opening, a sample, the end."""
 
@@ -112,17 +116,17 @@ class Plan:
             found.append(f"the memory is too small: {quantity(self.memory_bytes)} needed, {quantity(memory())} there")
         return found
 
-    def _compile_text(self) -> str:
-        if not self.compile_seconds:
-            return ""
-        when = "just now; the machine code is kept" if _is_kept(self.kernel) else "of it, before the first cell"
-        return f"about {duration(self.compile_seconds)} {when}"
-
-    def _shares(self, shares: dict[str, float]) -> str:
-        found = ", ".join(f"{name} {_percent(share)}" for name, share in shares.items())
-        return found and f"{found} of a sample of {self.sampled:,} cell{'s' * (self.sampled > 1)}"
-
     def __str__(self) -> str:
+        def shares(found: dict[str, float]) -> str:
+            """Neither none nor all, where it is not."""
+            percent = {
+                name: "< 1 %" if share < 0.005 else "> 99 %" if 0.995 < share < 1 else f"{100 * share:.0f} %"
+                for name, share in found.items()
+            }
+            sample = f" of a sample of {self.sampled:,} cell{'s' * (self.sampled > 1)}"
+            return ", ".join(f"{name} {text}" for name, text in percent.items()) + sample if found else ""
+
+        when = "just now; the machine code is kept" if _is_kept(self.kernel) else "of it, before the first cell"
         shape = " x ".join(f"{name} {n:,}" for name, n in self.shape.items())
         rows = {
             "kernel": self.kernel,
@@ -134,13 +138,13 @@ class Plan:
             "memory": quantity(self.memory_bytes),
             "time": f"{duration(self.seconds)} on {self.workers} core{'s' * (self.workers > 1)}, "
             f"{small_duration(self.cell_seconds)} a cell",
-            "compile": self._compile_text(),
-            "methods": self._shares(self.methods),
-            "statuses": self._shares(self.statuses),
+            "compile": f"about {duration(self.compile_seconds)} {when}" if self.compile_seconds else "",
+            "methods": shares(self.methods),
+            "statuses": shares(self.statuses),
             "scaling": self.scaling,
         }
         told = [(name, text) for name, text in rows.items() if text]
-        table = columns([*told, *(("warning", text) for text in self.warnings)])
+        table = Table([*told, *(("warning", text) for text in self.warnings)]).text()
         return f"{paragraph(self.title)}\n{table}" if self.title else table
 
 
@@ -183,40 +187,40 @@ def plan(
     folder = Path(path).absolute().parent if path is not None else Path.cwd()
     if not folder.is_dir():
         raise SweepError(f"{path}: there is no folder {folder}")
-    if isolate or cell_timeout is not None:
-        return _plan_apart(study, crew, folder, limits_of(cell_timeout))
-    compiling = Compiling(study.kernel, study.kernel_name, note)
-    sample = sampled_study(study, compiling)
-    seen = looked_at(Solver(replace(study, kernel=compiling.kernel)), study)
-    with faults_reported(f"{study.kernel_name}: the kernel failed"):
-        advice = scaling(study).advice
-    forecast = _forecast(study, sample, seen, crew, folder)
-    compiled = sum(compiling.seconds.values())
-    again = 0.0 if _is_kept(study.kernel_name) else compiled
-    return replace(forecast, seconds=forecast.seconds + again, compile_seconds=compiled, scaling=advice)
+    if not isolate and cell_timeout is None:
+        compiling = Compiling(study.kernel, study.kernel_name, note)
+        sample = sampled_study(study, compiling)
+        found = _forecast(study, sample, Solver(replace(study, kernel=compiling.kernel)), crew, folder)
+        seconds = _scaling_seconds(found)
+        with faults_reported(f"{study.kernel_name}: the kernel failed"):
+            advice = scaling(study, seconds).advice if seconds else NOT_TRIED
+        compiled = sum(compiling.seconds.values())
+        again = 0.0 if _is_kept(study.kernel_name) else compiled
+        return replace(found, seconds=found.seconds + again, compile_seconds=compiled, scaling=advice)
 
-
-def _plan_apart(study: Study, workers: int, folder: Path, limits: Limits) -> Plan:
-    """The same of a kernel that may crash, or never end; every run begins processes, and compiles it, anew."""
-    processes = Processes(study, limits, 1)
+    # every run of a kernel that may crash, or never end, begins processes, and compiles it, anew
+    processes = Processes(study, limits_of(cell_timeout), 1)
     solver = processes.solver()
     try:
         begun = time.monotonic()
         warm(solver, study)
         starting = time.monotonic() - begun
-        sample = sampled_by(solver, study, solver.clock)
-        seen = looked_at(solver, study)
+        found = _forecast(study, sampled_by(solver, study, solver.clock), solver, crew, folder)
+        seconds = _scaling_seconds(found)
         try:
-            advice = solver.call(ADVICE_SECONDS, advice_on, study.to_json())
+            advice = solver.call(ADVICE_SECONDS, advice_on, study.to_json(), seconds) if seconds else NOT_TRIED
         except Unsolved as fault:
             advice = f"not known; while cells were tried at random, {fault}"
     finally:
         processes.end()
-    found = _forecast(study, sample, seen, workers, folder)
-    seconds = starting + found.seconds
-    return replace(
-        found, seconds=seconds, compile_seconds=starting if starting > SILENT_SECONDS else 0.0, scaling=advice
-    )
+    compiled = starting if starting > SILENT_SECONDS else 0.0
+    return replace(found, seconds=starting + found.seconds, compile_seconds=compiled, scaling=advice)
+
+
+def _scaling_seconds(found: Plan) -> float:
+    """What looking for superfluous axes may take; 0 where it would take too large a share of the run's time."""
+    seconds = max(SCALING_SECONDS, SHARE * found.seconds)
+    return seconds if SCALING_CELLS * found.cell_seconds < seconds else 0.0
 
 
 def _is_kept(kernel: str) -> bool:
@@ -224,43 +228,47 @@ def _is_kept(kernel: str) -> bool:
     return machine_code_folder() is not None and ":" not in kernel
 
 
-def _forecast(study: Study, sample: Sample, seen: tuple[Any, Any], workers: int, folder: Path) -> Plan:
-    status, used = seen
-    rows, columns = row_blocks(study), part_columns(study)
-    row_bytes = sum(c.cell_bytes for c in columns)
+def _forecast(study: Study, sample: Sample, solver: SolveCells, workers: int, folder: Path) -> Plan:
+    """What a timed sample says, and cells that a solver solves one by one."""
+    rows, grid, schema = row_blocks(study), Grid(study), output_schema(study, fingerprint(study))
+    row_bytes = sum(column.cell_bytes for column in part_columns(study))
     blocks = row_partition(sample, rows, row_shape(study), row_bytes, workers)
-    output = _output_bytes(study, blocks)
-    block = rows.cells(0, blocks.cells)[1]
-    busy = min(workers, blocks.count)
+    output = expected_size(schema, cuts_of(study, schema, blocks))
     writing = output / _disk_speed(folder) if output > WORTH_A_TRIAL else 0.0
-    names = [m.name for m in study.kernel.methods]
+    # blocks are written while others are computed
+    seconds = RUN_SECONDS + max(sample.cost * rows.size / min(workers, blocks.count), writing)
+    status, used = _looked_at(solver, study, min(LOOK_SECONDS, SHARE * seconds))
+
+    def counted(numbers: Any, names: dict[int, str]) -> dict[str, float]:
+        found, counts = np.unique(numbers, return_counts=True)
+        return {names[int(n)]: float(c / len(numbers)) for n, c in zip(found, counts, strict=True)}
+
     return Plan(
         title=study.title,
         kernel=study.kernel_name,
         cells=rows.size,
-        shape=dict(zip((grid := Grid(study)).dims, grid.shape, strict=True)),
+        shape=dict(zip(grid.dims, grid.shape, strict=True)),
         outputs=study.outputs,
         blocks=blocks.count,
-        cells_per_block=block,
+        cells_per_block=rows.cells(0, blocks.cells)[1],
         workers=workers,
         output_bytes=output,
         memory_bytes=2 * workers * (blocks.cells * row_bytes + strip_bytes(study)),
         free_bytes=shutil.disk_usage(folder).free,
         folder=str(folder),
         cell_seconds=sample.cost,
-        # blocks are written while others are computed
-        seconds=RUN_SECONDS + max(sample.cost * rows.size / busy, writing),
-        methods=_counted(used, dict(enumerate(names)) | {-1: "none"}),
-        statuses=_counted(status, {int(s): s.name for s in Status}),
+        seconds=seconds,
+        methods=counted(used, {-1: "none", **dict(enumerate(m.name for m in study.kernel.methods))}),
+        statuses=counted(status, {int(s): s.name for s in Status}),
         sampled=len(status),
     )
 
 
-def looked_at(solver: SolveCells, study: Study) -> tuple[Any, Any]:
+def _looked_at(solver: SolveCells, study: Study, seconds: float) -> tuple[Any, Any]:
     """Statuses and methods of cells solved one by one: at the ends of axes, and one drawn from each of equal shares.
 
     The ends are those of every axis, in the middle of the others, and of all axes at once: there a scene is most often
-    another one, and so is the method. Of the drawn ones fewer are solved where they are dear.
+    another one, and so is the method. Of the drawn ones as many are solved as can be in some seconds.
     """
     shape = Grid(study).shape
     middle, last = np.array(shape) // 2, np.array(shape) - 1
@@ -272,7 +280,7 @@ def looked_at(solver: SolveCells, study: Study) -> tuple[Any, Any]:
     drawn = (np.arange(DRAWN) + rng.random(DRAWN)) * (size / DRAWN)
     status, used, begun = [], [], time.perf_counter()
     for turn, number in enumerate(dict.fromkeys([*ends, *rng.permutation(drawn.astype(np.int64)).tolist()])):
-        if turn >= len(ends) and time.perf_counter() - begun > LOOK_SECONDS:
+        if turn >= len(ends) and time.perf_counter() - begun > seconds:
             break
         cell = empty_cells(study, 1)
         cell.status[:], cell.used[:] = Status.PENDING, -1
@@ -281,11 +289,6 @@ def looked_at(solver: SolveCells, study: Study) -> tuple[Any, Any]:
         status.append(cell.status)
         used.append(cell.used)
     return np.concatenate(status), np.concatenate(used)
-
-
-def _output_bytes(study: Study, blocks: Partition) -> int:
-    schema = output_schema(study, fingerprint(study))
-    return expected_size(schema, cuts_of(study, schema, blocks))
 
 
 def _disk_speed(folder: Path) -> float:
@@ -299,16 +302,6 @@ def _disk_speed(folder: Path) -> float:
             return TRIAL / (time.perf_counter() - begun)
     except OSError:
         return math.inf
-
-
-def _counted(numbers: np.ndarray, names: dict[int, str]) -> dict[str, float]:
-    found, counts = np.unique(numbers, return_counts=True)
-    return {names[int(n)]: float(c / len(numbers)) for n, c in zip(found, counts, strict=True)}
-
-
-def _percent(share: float) -> str:
-    """Neither none nor all, where it is not."""
-    return "< 1 %" if share < 0.005 else "> 99 %" if 0.995 < share < 1 else f"{100 * share:.0f} %"
 
 
 def small_duration(seconds: float) -> str:

@@ -90,7 +90,7 @@ def powers(field: Field) -> Weights:
     return {base: power for base, power in exponents(field.unit).items() if power}
 
 
-def scalings(study: Study) -> Scalings:
+def scalings(study: Study, seconds: float = SECONDS) -> Scalings:
     """Those that hold on random cells of a study. Raises SweepError where the kernel fails."""
     study = dataclasses.replace(study, rtol=min(study.rtol, RTOL))
     along = [field for field in study.kernel.along if len(study.along[field.name])]
@@ -107,7 +107,7 @@ def scalings(study: Study) -> Scalings:
     begun = time.perf_counter()
     solved(few)
     cost = (time.perf_counter() - begun) / FEWEST_CELLS
-    affordable = int(SECONDS / (cost * (4 * len(leading) + 16)))
+    affordable = int(seconds / (cost * (4 * len(leading) + 16)))
     cells = min(TRIED_CELLS, max(FEWEST_CELLS, affordable))
 
     trial = _Trial(study, leading, cells, seed=2)
