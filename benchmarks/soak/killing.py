@@ -82,7 +82,7 @@ def prepare(kind, output):
 def done(path):
     """Blocks of an unfinished result that are acknowledged, and how many there are."""
     with StoredFile(path) as file:
-        found = file.done(file.layout.work_name)
+        found = file.done[file.work]
         return set(np.flatnonzero(found).tolist()), len(found)
 
 
@@ -304,8 +304,8 @@ def _child(events, log, kind, output, workers, cells, cluster):
 def _note_phases(events, output):
     opened, finish, rename, sync = Store._open, Store.finish, disk.rename, disk.sync_folder
 
-    def at_work(self, layout):
-        opened(self, layout)
+    def at_work(self, file):
+        opened(self, file)
         events.note(WORK)
 
     def at_its_end(self, *words):

@@ -33,8 +33,7 @@ from sweep.cells.partition import boxes
 from sweep.cells.schema import columns
 from sweep.cells.solve import Solver
 from sweep.file import disk
-from sweep.file.frame import Frame, cuts_of
-from sweep.file.layout import write_digests
+from sweep.file.frame import cuts_of
 from sweep.file.reading import READERS, StoredFile
 from sweep.file.store import opened, unfinished_of
 from sweep.study.model import Study
@@ -134,16 +133,16 @@ def many(folder: Path, count: int) -> None:
     cuts = cuts_of(study, schema, boxes(schema.grid.shape, 100))
     begun = time.perf_counter()
     with opened(path) as store:
-        store.begin(Frame(schema, cuts, mark, "now"))
+        store.begin(schema, cuts)
         framed, table = time.perf_counter() - begun, store.table
         fd = disk.open_file(unfinished_of(path), os.O_RDWR)
-        write_digests(fd, table, dict.fromkeys(range(table.blocks.count - 1), b"x" * table.row_bytes))
+        table.write_digests(fd, dict.fromkeys(range(table.blocks.count - 1), b"x" * table.row_bytes))
         os.close(fd)
     with opened(path) as store:
         begun = time.perf_counter()
-        layout = store.found()
-        assert layout is not None
-        store.resume(layout)
+        file = store.found()
+        assert file is not None
+        store.resume(file)
         left = store.missing()
         taken = time.perf_counter() - begun
     assert left == [table.blocks.count - 1]
@@ -176,19 +175,19 @@ def reading(folder: Path, cells: int, rounds: int) -> None:
 
 def unchecked(file: StoredFile) -> None:
     """The same chunks, read into arrays by as many threads, and not looked at."""
-    table = file.layout.tables["cells"]
+    table = file.tables["cells"]
     bounds = [table.blocks.bounds(block) for block in range(table.blocks.count)]
     with ThreadPoolExecutor(READERS) as pool:
         for place in table.places:
             numbers = place.empty(table.blocks.size)
-            parts = [((numbers[slice(*found)],), place.at(block)) for block, found in enumerate(bounds)]
+            parts = [((numbers[slice(*found)],), int(place.at[block])) for block, found in enumerate(bounds)]
             list(pool.map(lambda part: disk.read_all(file.fd, *part), parts))
 
 
 PEAK = """
 import sys
 import dask
-from sweep.results import open as opening
+from sweep.file import open as opening
 
 def most():
     return next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("VmHWM"))

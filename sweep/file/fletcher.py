@@ -18,48 +18,30 @@ ROW = 4096
 """Words of a row; what is left of a chunk behind whole rows is summed word by word."""
 MOST_ROWS = 1 << 12
 """Rows summed at a time, so that 32 bits hold each sum."""
-CHECKSUM_BYTES = 4
 NUMBERS = np.arange(ROW, dtype=np.uint64)
 
 
 def checksum(piece: Any, length: int) -> bytes:
-    """What stands in a file behind a chunk of so many bytes: those of `piece`, then zeros."""
+    """The four bytes behind a chunk of so many bytes: those of `piece`, then zeros."""
     raw = np.frombuffer(as_bytes(piece), np.uint8)
     words = raw[: raw.size // 2 * 2].view("<u2")
-    low, high = _sums(words)
-    count = words.size
-    if raw.size % 2:
-        low, high, count = low + int(raw[-1]), high + low + int(raw[-1]), count + 1
-    high += (-(-length // 2) - count) * low
-    found = _folded(high) << 16 | _folded(low)
-    return found.to_bytes(CHECKSUM_BYTES, "little")
-
-
-def _folded(total: int) -> int:
-    """256 times a sum modulo 65535, as HDF5 has it: 0 stands for a sum that is zero itself."""
-    return 256 * total % MODULUS or (MODULUS if total else 0)
-
-
-def _sums(words: Any) -> tuple[int, int]:
-    """The sum of words, and their sum by how many there are from each to the end."""
-    low = high = 0
     whole = words.size // ROW
+    low = high = 0
     for first in range(0, whole, MOST_ROWS):
         rows = words[first * ROW : min(first + MOST_ROWS, whole) * ROW].reshape(-1, ROW)
-        low, high = _behind(low, high, rows.size, *_sums_of_rows(rows))
+        by_row = rows.sum(axis=1, dtype=np.uint32).astype(np.uint64)
+        by_column = rows.sum(axis=0, dtype=np.uint32).astype(np.uint64)
+        more = int(by_row.sum())
+        numbered = ROW * int(by_row @ np.arange(len(rows), dtype=np.uint64)) + int(by_column @ NUMBERS)
+        high += rows.size * (low + more) - numbered
+        low += more
     rest = words[whole * ROW :].astype(np.uint64)
-    weighted = int(rest @ (np.uint64(rest.size) - NUMBERS[: rest.size]))
-    return _behind(low, high, rest.size, int(rest.sum()), weighted)
-
-
-def _behind(low: int, high: int, count: int, low_behind: int, high_behind: int) -> tuple[int, int]:
-    """The sums of words with `count` others behind them."""
-    return low + low_behind, high + count * low + high_behind
-
-
-def _sums_of_rows(rows: Any) -> tuple[int, int]:
-    by_row = rows.sum(axis=1, dtype=np.uint32).astype(np.uint64)
-    by_column = rows.sum(axis=0, dtype=np.uint32).astype(np.uint64)
-    low = int(by_row.sum())
-    numbered = ROW * int(by_row @ np.arange(len(rows), dtype=np.uint64)) + int(by_column @ NUMBERS)
-    return low, rows.size * low - numbered
+    high += rest.size * low + int(rest @ (np.uint64(rest.size) - NUMBERS[: rest.size]))
+    low += int(rest.sum())
+    if raw.size % 2:
+        low += int(raw[-1])
+        high += low
+    high += (-(-length // 2) - -(-raw.size // 2)) * low
+    # 256 times a sum modulo 65535, as HDF5 has it: 0 stands for a sum that is zero itself
+    first, second = (256 * total % MODULUS or (MODULUS if total else 0) for total in (low, high))
+    return (second << 16 | first).to_bytes(4, "little")

@@ -1,29 +1,33 @@
-"""A result before its first number: where everything will stand, and what stands there until it is computed.
+"""A result before its first number: HDF5 makes all of it, and says of each chunk where it is.
 
-HDF5 writes the structure in memory (`structure`); chunks come behind it, column by column, and are entered in HDF5's
-tables (`chunk_index`). On the disk each chunk of statuses says PENDING, and behind each other chunk stands a checksum
-that is wrong, so that nobody takes what is not computed yet for numbers.
+First come names, attributes and coordinates, the head of the file, in which HDF5 checks every byte that it reads: texts
+have a fixed length and stand in object headers, coordinates are one chunk with a checksum each, single numbers stand in
+headers too. Then HDF5 is told to find a place for each chunk of the outputs. The zeros that it writes there are kept
+from the disk: instead, each chunk of statuses says PENDING, and behind each other chunk stands a checksum that is
+wrong, so that nobody takes what is not computed yet for numbers.
 """
 
 from __future__ import annotations
 
+import io
+import json
+import math
+import os
 import secrets
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xxhash
 
 from kernels.interface import Status
 from sweep.cells.output_schema import part_columns
-from sweep.cells.partition import Partition, boxes, row_blocks
-from sweep.cells.schema import STATUS, Column, Schema
+from sweep.cells.partition import Partition, box_shape, boxes, row_blocks
+from sweep.cells.schema import STATUS, Column, Coordinate, Schema
 from sweep.file import disk
-from sweep.file.chunk_index import chunk_indexes, seal, set_end
-from sweep.file.fletcher import CHECKSUM_BYTES, checksum
-from sweep.file.layout import BYTES, Layout, Place, Region, Table, gaps, mark_of
-from sweep.file.structure import ENDING, ROWS, Cut, column_of, digests_of, laid_out
+from sweep.file.fletcher import checksum
+from sweep.file.layout import BYTES, ENDING_BYTES, GROUP, PIECE, SEAL, Place, Seal, digest_of, gaps, tables_of
 
 if TYPE_CHECKING:
     from sweep.study.model import Study
@@ -35,16 +39,25 @@ SHARED_WORTH_A_PAGE = PAGE
 """so do shorter ones, where several machines write."""
 GATHERED_BYTES = 8 << 20
 """Bytes of the rows that are reduced to groups at a time."""
-CHUNK_ENTRY = 16
-"""Bytes that tell where a chunk is;"""
-NAMES = 32 << 10
-"""and those of all names and dimensions, about."""
-ENDINGS = {"created": 25, "end": 25, "cells_per_second": 12}
-"""Attributes that are texts of this length, known at the end."""
-UNKNOWN = {name: (b"nan" if name == "cells_per_second" else b"unfinished").ljust(n) for name, n in ENDINGS.items()}
-"""What they say until then."""
-WRONG = b"\xff" * CHECKSUM_BYTES
+LONGEST = 60_000
+"""Bytes of an attribute that HDF5 keeps in an object header; a longer text it keeps where it has no checksum."""
+COMPACT = 1 << 15
+"""Attributes up to which they are all kept there."""
+WRONG = b"\xff" * 4
 """A checksum that zeros have not."""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Columns, the grid in which their cells stand, and how it is cut."""
+
+    columns: tuple[Column, ...]
+    grid: tuple[int, ...]
+    blocks: Partition
+
+    def chunk(self, column: Column) -> tuple[int, ...]:
+        """Lengths of a chunk of a column; () of a single number."""
+        return (*box_shape(self.grid, self.blocks.cells), *column.shape)
 
 
 def cuts_of(study: Study, schema: Schema, blocks: Partition) -> dict[str, Cut]:
@@ -60,32 +73,23 @@ def cuts_of(study: Study, schema: Schema, blocks: Partition) -> dict[str, Cut]:
     rows, columns = row_blocks(study), part_columns(study)
     row_bytes = sum(column.cell_bytes for column in columns)
     groups = boxes(schema.grid.shape, GATHERED_BYTES // (row_bytes * rows.per_group))
-    return {ROWS: Cut(columns, (rows.count,), blocks), "cells": Cut(schema.columns, schema.grid.shape, groups)}
+    return {"rows": Cut(columns, (rows.count,), blocks), "cells": Cut(schema.columns, schema.grid.shape, groups)}
 
 
 def expected_size(schema: Schema, cuts: Mapping[str, Cut]) -> int:
-    """Bytes that a result will take, but for some thousands; a `Frame` knows them all."""
-    texts = sum(len(str(text)) for text in schema.attrs.values())
-    coordinates = sum(np.asarray(coordinate.values).nbytes for coordinate in schema.coordinates)
-    return NAMES + texts + coordinates + sum(_expected(cut) for cut in cuts.values())
+    """Bytes that a result will take, but for some thousands: its names, what HDF5 says of each chunk, the chunks."""
+    size = (32 << 10) + sum(len(str(text)) for text in schema.attrs.values())
+    size += sum(np.asarray(coordinate.values).nbytes for coordinate in schema.coordinates)
+    for cut in cuts.values():
+        for column in cut.columns:
+            chunk = math.prod(cut.chunk(column)) * np.dtype(column.dtype).itemsize + len(WRONG)
+            paged = -(-chunk // PAGE) * PAGE if chunk >= WORTH_A_PAGE else chunk
+            size += cut.blocks.count * (paged + BYTES + 16)
+    return size
 
 
-def _expected(cut: Cut) -> int:
-    return cut.blocks.count * sum(_step(cut.chunk_bytes(c), WORTH_A_PAGE) + CHUNK_ENTRY + BYTES for c in cut.columns)
-
-
-def _step(chunk_bytes: int, worth: int) -> int:
-    """Bytes from a chunk to the next one, where those of so many bytes are `worth` a page."""
-    stored = chunk_bytes + CHECKSUM_BYTES
-    return _paged(stored) if stored >= worth else stored
-
-
-def _paged(size: int) -> int:
-    return -(-size // PAGE) * PAGE
-
-
-class Frame:
-    """A result of which nothing is computed yet.
+def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> None:
+    """Makes a result of which nothing is computed yet, with room on the disk for all of it.
 
     Parameters
     ----------
@@ -93,98 +97,226 @@ class Frame:
         Of the output.
     cuts : mapping of str to Cut
         "cells": the output's columns; of a summary also "rows".
-    fingerprint : mapping of str to str
-    begun : str
-        The time.
     shared : bool
         Whether several machines may write.
 
+    Raises
+    ------
+    OSError
+    """
+    image, key = _Image(), secrets.token_bytes(BYTES)
+    _describe(image, schema, cuts)
+    head = image.size
+    with _opened(image, SHARED_WORTH_A_PAGE if shared else WORTH_A_PAGE) as file:
+        _allocate(file, image, cuts)
+        tables, ending = tables_of(file, key), int(file[f"{GROUP}/ending"].id.get_chunk_info(0).byte_offset)
+    fd = disk.open_file(path, os.O_CREAT | os.O_TRUNC | os.O_RDWR)
+    try:
+        disk.reserve(fd, image.size + SEAL.size)
+        for at, page in image.pages.items():
+            disk.write_all(fd, (page[: image.size - at],), at)
+        for place in (place for table in tables.values() for place in table.places if place.check):
+            _write_pending(fd, place)
+        disk.write_all(fd, (WRONG,), ending + ENDING_BYTES)
+        rest = digest_of(fd, gaps(tables.values(), ending, head, image.size))
+        disk.write_all(fd, (SEAL.pack(*Seal(head, digest_of(fd, [(0, head)]), rest, key)),), image.size)
+        disk.fsync(fd)
+    finally:
+        os.close(fd)
+
+
+def _write_pending(fd: int, place: Place) -> None:
+    """Says of each chunk of a column that it is not computed yet; of short ones behind each other at once."""
+    size, piece = place.size + place.check, WRONG
+    if place.name == STATUS:
+        words = np.full(place.size, Status.PENDING, "i1")
+        piece = words.tobytes() + checksum(words, place.size)
+    elif size < PAGE:
+        piece = bytes(place.size) + WRONG
+    starts = place.at + (size - len(piece))
+    for run in np.split(starts, np.flatnonzero(np.diff(starts) != len(piece)) + 1):
+        some = max(1, PIECE // len(piece))
+        for k in range(0, len(run), some):
+            disk.write_all(fd, (piece * len(run[k : k + some]),), int(run[k]))
+
+
+class _Image(io.RawIOBase):
+    """The file as HDF5 writes it, in memory, but for chunks of zeros.
+
     Attributes
     ----------
-    layout : Layout
+    pages : dict of int to bytearray
+        What was written, by where it begins.
+    size : int
+    chunk : int
+        Bytes of the chunks that are left out.
     """
 
-    def __init__(
-        self, schema: Schema, cuts: Mapping[str, Cut], fingerprint: Mapping[str, str], begun: str, shared: bool = False
-    ) -> None:
-        texts = {name: secrets.token_hex(length)[:length] for name, length in ENDINGS.items()}
-        self._image, self._at = laid_out(replace(schema, attrs={**schema.attrs, "start": begun, **texts}), cuts)
-        self._cuts, self._worth = cuts, SHARED_WORTH_A_PAGE if shared else WORTH_A_PAGE
-        self._image += bytes(_paged(len(self._image)) - len(self._image))
-        endings = [*(self._unknown(name, text) for name, text in texts.items()), self._span(ENDING)]
-        tables = self._tables(fingerprint)
-        regions = self._regions(tables.values())
-        structure = xxhash.xxh3_128()
-        for begin, stop in gaps([*regions, *endings], len(self._image)):
-            structure.update(self._image[begin:stop])
-        self.layout = Layout(
-            secrets.token_hex(BYTES), dict(fingerprint), begun, tables, tuple(endings), regions, structure.digest(),
-            self._end,
-        )  # fmt: skip
+    def __init__(self) -> None:
+        self.pages: dict[int, bytearray] = {}
+        self.size, self.chunk, self._at = 0, -1, 0
 
-    def write(self, fd: int) -> None:
-        """Writes it all to an empty file, which has its place on the disk then. Raises OSError."""
-        disk.reserve(fd, self.layout.size)
-        disk.write_all(fd, (self._image,), 0)
-        for name, table in self.layout.tables.items():
-            for column, place in zip(self._cuts[name].columns, table.places, strict=True):
-                for at, piece in _nothing_yet(column, place, table.blocks.count):
-                    disk.write_all(fd, (piece,), at)
-        disk.write_all(fd, (self.layout.trailer(),), self.layout.end)
+    def seek(self, offset: int, whence: int = 0) -> int:
+        self._at = offset + (self.size if whence == os.SEEK_END else 0)
+        return self._at
 
-    def _span(self, name: str) -> Region:
-        return self._at[name], self._at[name] + BYTES
+    def tell(self) -> int:
+        return self._at
 
-    def _unknown(self, name: str, text: str) -> Region:
-        """Where a text is that is known at the end; until then it says so."""
-        at = self._image.index(text.encode())
-        self._image[at : at + len(text)] = UNKNOWN[name]
-        return at, at + len(text)
+    def truncate(self, size: int | None = None) -> int:
+        self.size = self._at if size is None else size
+        return self.size
 
-    def _tables(self, fingerprint: Mapping[str, str]) -> dict[str, Table]:
-        """Gives each chunk its place, of which HDF5 is told."""
-        self._end, self._spans = len(self._image), list[Region]()
-        self._indexes = {index.first(self._image): index for index in chunk_indexes(self._image)}
-        found = {}
-        for name, cut in self._cuts.items():
-            places = tuple(self._place(cut, column, self._at[column_of(name, column)]) for column in cut.columns)
-            digests = self._at[digests_of(name)]
-            found[name] = Table(cut.grid, cut.blocks, places, digests, mark_of(fingerprint, name))
-        seal(self._image, [*self._spans, *set_end(self._image, self._end)])
-        return found
+    def readinto(self, buffer: Any) -> int:
+        for page, here, there in self._pieces(len(buffer)):
+            buffer[there] = page[here]
+        return len(buffer)
 
-    def _place(self, cut: Cut, column: Column, at: int) -> Place:
-        size, step = cut.chunk_bytes(column), 0
-        if cut.blocks.count > 1:
-            index, at, step = self._indexes[at], _paged(self._end), _step(size, self._worth)
-            self._spans += index.fill(self._image, at, step, size + CHECKSUM_BYTES)
-            self._end = at + step * (cut.blocks.count - 1) + size + CHECKSUM_BYTES
-        return Place(column.name, column.dtype, column.shape, size, ((0, at, step),))
+    def write(self, piece: Any) -> int:
+        # HDF5 writes nothing else of a chunk's length that begins with zeros: its tables begin with addresses
+        if len(piece) == self.chunk and bytes(piece[:BYTES]) == bytes(BYTES):
+            self._at += len(piece)
+        else:
+            for page, here, there in self._pieces(len(piece)):
+                page[here] = piece[there]
+        self.size = max(self.size, self._at)
+        return len(piece)
 
-    def _regions(self, tables: Iterable[Table]) -> tuple[Region, ...]:
-        """Chunks and digests within the structure, and what comes behind it."""
-        spans = np.concatenate([table.spans() for table in tables])
-        inside = sorted(spans[spans[:, 0] < len(self._image)].tolist())
-        return *((begin, end) for begin, end in inside), (len(self._image), self._end)
+    def _pieces(self, count: int) -> Iterator[tuple[bytearray, slice, slice]]:
+        """So many bytes from here on: a page, where they are in it, and which of them they are."""
+        begin, end = self._at, self._at + count
+        while self._at < end:
+            page = self._at // PAGE * PAGE
+            stop = min(end, page + PAGE)
+            yield (
+                self.pages.setdefault(page, bytearray(PAGE)),
+                slice(self._at - page, stop - page),
+                slice(self._at - begin, stop - begin),
+            )
+            self._at = stop
 
 
-def _nothing_yet(column: Column, place: Place, count: int) -> Iterator[tuple[int, bytes]]:
-    """What stands in the chunks before they are computed, and where; short ones behind each other are one piece."""
-    skip, piece = _pending(column, place)
-    ((_, at, step),) = place.runs
-    whole = bytes(skip) + piece
-    if step == len(whole) < PAGE:
-        batch = GATHERED_BYTES // step
-        yield from ((at + k * step, whole * min(batch, count - k)) for k in range(0, count, batch))
-    else:
-        yield from ((at + k * step + skip, piece) for k in range(count))
+def _opened(image: _Image, aligned: int = 0) -> Any:
+    """The file for h5py, made anew where nothing is to be aligned; objects of so many bytes begin on a page."""
+    import h5py
+    from h5py import h5f, h5fd, h5p
+
+    access, made = h5p.create(h5p.FILE_ACCESS), h5p.create(h5p.FILE_CREATE)
+    access.set_fclose_degree(h5f.CLOSE_STRONG)
+    access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
+    access.set_fileobj_driver(h5fd.fileobj_driver, image)
+    if aligned:
+        access.set_alignment(aligned, PAGE)
+        return h5py.File(h5f.open(b"result", h5f.ACC_RDWR, access))
+    made.set_attr_phase_change(COMPACT, 0)
+    made.set_attr_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
+    made.set_link_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
+    return h5py.File(h5f.create(b"result", h5f.ACC_TRUNC, made, access))
 
 
-def _pending(column: Column, place: Place) -> tuple[int, bytes]:
-    """What stands in a chunk that is not computed yet, and how far behind its beginning."""
-    if not place.chunk_bytes:
-        return 0, np.array(np.nan if np.dtype(place.dtype).kind == "f" else -1, place.dtype).tobytes()
-    if column.name != STATUS:
-        return place.chunk_bytes, WRONG
-    words = np.full(place.chunk_bytes, Status.PENDING, "i1")
-    return 0, words.tobytes() + checksum(words, place.chunk_bytes)
+def _describe(image: _Image, schema: Schema, cuts: Mapping[str, Cut]) -> None:
+    """Writes the head of the file: names, attributes, coordinates, and columns that have no place yet."""
+    import h5netcdf
+
+    with _opened(image) as plain, h5netcdf.File(plain, "r+") as file:
+        # xarray's way to mark what belongs to the coordinates of all variables
+        away = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
+        _say(file, {**schema.attrs, **({"coordinates": " ".join(away)} if away else {})})
+        file.dimensions = schema.sizes
+        for coordinate in schema.coordinates:
+            _write_coordinate(file, plain, coordinate)
+        group = file.create_group(GROUP)
+        group.dimensions.update({"byte": BYTES, "character": ENDING_BYTES})
+        for name, cut in cuts.items():
+            dims = {f"{name}_block": cut.blocks.count, f"{name}_column": len(cut.columns)}
+            group.dimensions.update(dims)
+            digests = group.create_variable(f"{name}_digests", (*dims, "byte"), "u1", dcpl=_properties())
+            columns = json.dumps([[column.name for column in cut.columns], len(cut.grid)])
+            about = "xxh3_128 of each chunk of each column, zeros where it is not computed yet"
+            _say(digests, {"long_name": about, "columns": columns})
+        ending = group.create_variable("ending", ("character",), "S1", dcpl=_properties((ENDING_BYTES,)))
+        _say(ending, {"long_name": "when the run ended, and how fast it was, as JSON"})
+        for column in schema.columns:
+            variable = _declare(file, plain, (*schema.grid.dims, *column.dims), column, cuts["cells"])
+            found = {*schema.grid.dims, *column.dims}
+            away = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= found]
+            _say(variable, {**column.attrs, **({"coordinates": " ".join(away)} if away else {})})
+        if "rows" in cuts:
+            rows, cut = file.create_group("rows"), cuts["rows"]
+            rows.dimensions = {"row": cut.blocks.size} | {
+                f"{c.name} {k}": n for c in cut.columns for k, n in enumerate(c.shape)
+            }
+            for column in cut.columns:
+                own = (f"{column.name} {k}" for k in range(len(column.shape)))
+                _declare(rows, plain["rows"], ("row", *own), column, cut)
+
+
+def _write_coordinate(file: Any, plain: Any, coordinate: Coordinate) -> None:
+    """In one chunk with a checksum; words as characters, as netCDF has them; a single number in its object header."""
+    import h5py
+
+    values, dims, attrs = np.asarray(coordinate.values), coordinate.dims, dict(coordinate.attrs)
+    if values.dtype.kind == "U":
+        words = np.array([word.encode() for word in values.ravel()])
+        values = words.view("S1").reshape(*values.shape, words.dtype.itemsize)
+        dims, attrs = (*dims, f"string{words.dtype.itemsize}"), {**attrs, "_Encoding": "utf-8"}
+        if dims[-1] not in file.dimensions:
+            file.dimensions[dims[-1]] = words.dtype.itemsize
+    if dims:
+        properties = _properties(values.shape)
+        _say(file.create_variable(coordinate.name, dims, values.dtype, data=values, dcpl=properties), attrs)
+        return
+    space, kind = h5py.h5s.create(h5py.h5s.SCALAR), h5py.h5t.py_create(values.dtype)
+    made = h5py.Dataset(h5py.h5d.create(plain.id, coordinate.name.encode(), kind, space, _properties(())))
+    made[()] = values
+    _say(made, attrs)
+
+
+def _declare(group: Any, plain: Any, dims: tuple[str, ...], column: Column, cut: Cut) -> Any:
+    """A column; a single number, which h5py gives no properties, gets its place when it is written."""
+    if dims:
+        return group.create_variable(column.name, dims, column.dtype, dcpl=_properties(cut.chunk(column)))
+    return group.create_variable(column.name, (), column.dtype)
+
+
+def _properties(chunk: tuple[int, ...] | None = None) -> Any:
+    """How HDF5 makes a dataset: in chunks with a checksum; (): in its object header; None: in one piece, without."""
+    from h5py import h5d, h5p
+
+    properties = h5p.create(h5p.DATASET_CREATE)
+    properties.set_attr_phase_change(COMPACT, 0)
+    properties.set_fill_time(h5d.FILL_TIME_NEVER)
+    if chunk == ():
+        properties.set_layout(h5d.COMPACT)
+    elif chunk:
+        properties.set_chunk(chunk)
+        properties.set_fletcher32()
+    if chunk != ():
+        properties.set_alloc_time(h5d.ALLOC_TIME_LATE)
+    return properties
+
+
+def _say(thing: Any, attrs: Mapping[str, Any]) -> None:
+    """Attributes of a variable or a group; texts of a fixed length, which netCDF4 and MATLAB know, too."""
+    import h5py
+
+    for name, value in attrs.items():
+        text = value.encode() if isinstance(value, str) else b""
+        if isinstance(value, str) and len(text) <= LONGEST:
+            value = np.array(text, h5py.string_dtype("utf-8", max(2, len(text))))
+        thing.attrs[name] = value
+
+
+def _allocate(file: Any, image: _Image, cuts: Mapping[str, Cut]) -> None:
+    """Has HDF5 find a place for each number and digest."""
+    for name, cut in cuts.items():
+        file[f"{GROUP}/{name}_digests"][0, 0, 0] = 0
+        for column in cut.columns:
+            dataset = file[column.name if name == "cells" else f"rows/{column.name}"]
+            if dataset.chunks:
+                image.chunk = math.prod(dataset.chunks) * dataset.dtype.itemsize + len(WRONG)
+                dataset.id.write_direct_chunk((0,) * dataset.ndim, bytes(image.chunk))
+            else:
+                dataset[()] = np.nan if dataset.dtype.kind == "f" else -1
+    image.chunk = ENDING_BYTES + len(WRONG)
+    file[f"{GROUP}/ending"].id.write_direct_chunk((0,), bytes(image.chunk))

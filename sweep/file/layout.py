@@ -1,25 +1,30 @@
-"""Where everything stands in a result: found out once, and kept behind the last byte that HDF5 knows of.
+"""Where the numbers of a result stand, and the seal behind its last byte.
 
-    the layout as JSON
-    xxh3 (128 bits) of it
-    its length    uint32
+The numbers of a column stand in chunks, one a block, each with HDF5's checksum behind it. Digests of all chunks are in
+a table in the file, a row of them for each block; a row of zeros is a block that is not done. The seal is
+
+    head          int64: bytes from the beginning of the file to the first chunk, in which HDF5 keeps its structure
+    head digest   xxh3 (128 bits) of these
+    rest digest   of all other bytes that are in no chunk
+    key           random: of this file alone
     MAGIC
 
-HDF5 may loop for ever, or crash, in a file whose structure is damaged, so that is found out by a digest of all bytes
-that are no numbers before HDF5 sees the file. The numbers of a column stand in chunks, one a block, each with HDF5's
-checksum behind it; `Table.digest` is of all bytes of a chunk, and of whose and which it is.
+A program that changes the file by HDF5 cuts the seal off. HDF5 is let loose on nothing but what has one, or ends where
+HDF5 left it: in a damaged structure HDF5 may loop for ever.
 """
 
 from __future__ import annotations
 
-import itertools
 import json
+import math
+import os
+import re
 import struct
-from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xxhash
@@ -27,117 +32,155 @@ import xxhash
 from sweep.cells.partition import Partition
 from sweep.errors import SweepError
 from sweep.file import disk
-from sweep.file.fletcher import CHECKSUM_BYTES, checksum
+from sweep.file.fletcher import checksum
 
-MAGIC = b"foliot file\n"
-OLD_MAGIC = b"foliot seal\n"
-"""What results of formats 1 and 2 end with."""
-FORMAT = 3
+FORMAT = 4
+MAGIC = b"foliot format %d\n" % FORMAT
+SEAL = struct.Struct(f"<q16s16s16s{len(MAGIC)}s")
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+"""How files of HDF5 begin,"""
+FILE_END = slice(28, 36)
+"""and where they say how long they are, in the versions from 2 on of their first bytes."""
 BYTES = 16
 """Of a digest."""
 PIECE = 8 << 20
 """Bytes read at a time."""
-TAIL = BYTES + 4 + len(MAGIC)
-
+ENDING_BYTES = 128
+"""Of the text that is written when all is done."""
+TABLES, GROUP = ("cells", "rows"), "integrity"
 DAMAGE = (OSError, EOFError, LookupError, ValueError, TypeError, AttributeError, RuntimeError)
 """What comes of reading a damaged file."""
 
-Region = tuple[int, int]
+
+class Seal(NamedTuple):
+    """What stands behind the last byte of HDF5."""
+
+    head: int
+    head_digest: bytes
+    rest_digest: bytes
+    key: bytes
+    magic: bytes = MAGIC
 
 
-@dataclass(frozen=True)
+def read_seal(fd: int, path: Path) -> Seal | None:
+    """The seal of a file whose head is as it was written; None where another program has changed the file.
+
+    Raises
+    ------
+    OSError, EOFError
+    ValueError
+        It is no file of HDF5, was cut, or its head is damaged.
+    SweepError
+        It is of another format.
+    """
+    size = os.fstat(fd).st_size
+    begin = read_bytes(fd, 0, min(size, FILE_END.stop))
+    tail = read_bytes(fd, size - SEAL.size, size) if size > SEAL.size else b""
+    if not begin.startswith(SIGNATURE):
+        raise ValueError("it is no file of HDF5")
+    whole = begin[8:9] < b"\2" or int.from_bytes(begin[FILE_END], "little") == size
+    if tail.endswith(MAGIC):
+        seal = Seal(*SEAL.unpack(tail))
+        if 0 < seal.head <= size and digest_of(fd, [(0, seal.head)]) == seal.head_digest:
+            return seal
+    elif re.search(rb"foliot format \d\n$", tail):
+        raise SweepError(
+            f"{path}: a result of another format; this version of foliot reads format {FORMAT} alone; open it with the "
+            "version that wrote it, or compute it again under another name"
+        )
+    elif whole:
+        return None
+    raise ValueError("its structure is damaged, or its end is missing, as in a copy that was interrupted")
+
+
+@dataclass(frozen=True, eq=False)
 class Place:
-    """Where the chunks of a column are.
+    """Where a column is.
 
     Attributes
     ----------
     name, dtype : str
     shape : tuple of int
         Of a cell.
-    chunk_bytes : int
-        Bytes of a chunk, a checksum behind them; 0 where cells follow each other and there is no checksum.
-    runs : tuple of (first, at, step)
-        From chunk number `first` on, each begins `step` bytes behind the one before, the first one `at`.
+    size, check : int
+        Bytes of a chunk, and of the checksum behind it; a single number has none.
+    at : ndarray of int64, shape (blocks,)
+        Where each chunk begins.
     """
 
     name: str
     dtype: str
     shape: tuple[int, ...]
-    chunk_bytes: int
-    runs: tuple[tuple[int, int, int], ...]
-
-    @property
-    def cell_bytes(self) -> int:
-        """Bytes of a cell."""
-        return int(np.dtype(self.dtype).itemsize * np.prod(self.shape, dtype=np.int64))
-
-    def at(self, chunk: int) -> int:
-        """Where a chunk begins."""
-        first, at, step = self.runs[bisect_right(self.runs, chunk, key=lambda run: run[0]) - 1]
-        return at + (chunk - first) * step
-
-    def all_at(self, count: int) -> Any:
-        """Where each of so many chunks begins."""
-        firsts, places, steps = np.array(self.runs, np.int64).T
-        chunks = np.arange(count, dtype=np.int64)
-        run = np.searchsorted(firsts, chunks, "right") - 1
-        return places[run] + (chunks - firsts[run]) * steps[run]
+    size: int
+    check: int
+    at: Any
 
     def empty(self, cells: int) -> Any:
         """An uninitialised array of so many cells."""
         return np.empty((cells, *self.shape), self.dtype)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
     """Columns that are cut alike, and the digests of their chunks.
 
     Attributes
     ----------
-    grid : tuple of int
-        The shape in which the cells stand.
-    blocks : Partition
+    name : str
+        "cells": the output's columns; of a summary also "rows", which they are made of.
+    grid, box : tuple of int
+        The shape in which the cells stand, and that of a block.
     places : tuple of Place
     digests : int
-        Where the digests begin: of each block those of all columns, zeros where it is not done.
-    mark : bytes
-        Of the study; what every digest begins with.
+        Where the digests begin, shape (blocks, columns, 16).
+    key : bytes
+        Of the file.
     """
 
+    name: str
     grid: tuple[int, ...]
-    blocks: Partition
+    box: tuple[int, ...]
     places: tuple[Place, ...]
     digests: int
-    mark: bytes
+    key: bytes
+
+    @cached_property
+    def blocks(self) -> Partition:
+        """How the cells are cut into blocks."""
+        inner = 1
+        for length, some in zip(reversed(self.grid), reversed(self.box), strict=True):
+            if some < length:
+                return Partition(math.prod(self.grid), inner * some, inner * length)
+            inner *= length
+        return Partition(inner, inner)
 
     @property
     def row_bytes(self) -> int:
         """Bytes of the digests of a block."""
         return BYTES * len(self.places)
 
-    def stored(self, place: Place, block: int) -> int:
-        """Bytes that a chunk takes in the file."""
-        start, stop = self.blocks.bounds(block)
-        return place.chunk_bytes + CHECKSUM_BYTES if place.chunk_bytes else (stop - start) * place.cell_bytes
+    def spans(self) -> Any:
+        """Begin and end of every chunk and of the digests, shape (n, 2)."""
+        own = np.array([[self.digests, self.digests + self.blocks.count * self.row_bytes]], np.int64)
+        return np.concatenate([own, *(np.stack([p.at, p.at + p.size + p.check], axis=1) for p in self.places)])
 
     def digest(self, number: int, block: int, *pieces: Any) -> bytes:
-        """Digest of a chunk of a column, from all of its bytes."""
-        state = xxhash.xxh3_128(self.mark and self.mark + struct.pack("<qi", block, number))
+        """Digest of a chunk of a column: of all its bytes, and of whose and which it is."""
+        state = xxhash.xxh3_128(self.key + self.name.encode() + struct.pack("<qi", block, number))
         for piece in pieces:
             state.update(disk.as_bytes(piece))
         return state.digest()
 
     def write(self, fd: int, block: int, arrays: Mapping[str, Any]) -> bytes:
         """Writes the chunks of a block, and gives their digests. Raises OSError."""
-        return b"".join(self._write(fd, number, block, arrays) for number in range(len(self.places)))
-
-    def _write(self, fd: int, number: int, block: int, arrays: Mapping[str, Any]) -> bytes:
-        place = self.places[number]
-        array, behind = np.ascontiguousarray(arrays[place.name], place.dtype), b""
-        if place.chunk_bytes:
-            behind = bytes(place.chunk_bytes - array.nbytes) + checksum(array, place.chunk_bytes)
-        disk.write_all(fd, (array, behind), place.at(block))
-        return self.digest(number, block, array, behind)
+        row = b""
+        for number, place in enumerate(self.places):
+            array, behind = np.ascontiguousarray(arrays[place.name], place.dtype), b""
+            if place.check:
+                behind = bytes(place.size - array.nbytes) + checksum(array, place.size)
+            disk.write_all(fd, (array, behind), int(place.at[block]))
+            row += self.digest(number, block, array, behind)
+        return row
 
     def read(self, fd: int, number: int, block: int, digest: bytes, out: Any = None) -> Any:
         """The cells of a block of a column, into `out` where that is given; None where they are not what was written.
@@ -146,12 +189,11 @@ class Table:
         ----------
         out : ndarray, C-contiguous, of the cells of the block
         """
-        place = self.places[number]
-        start, stop = self.blocks.bounds(block)
+        place, (start, stop) = self.places[number], self.blocks.bounds(block)
         found = place.empty(stop - start) if out is None else out
-        behind = bytearray(self.stored(place, block) - found.nbytes)
+        behind = bytearray(place.size + place.check - found.nbytes)
         try:
-            disk.read_all(fd, (found, behind), place.at(block))
+            disk.read_all(fd, (found, behind), int(place.at[block]))
         except (OSError, EOFError):
             return None
         return found if self.digest(number, block, found, behind) == digest else None
@@ -162,174 +204,61 @@ class Table:
         disk.read_all(fd, (found,), self.digests)
         return found
 
-    def spans(self) -> Any:
-        """Begin and end of every chunk and of the digests, in their order in the file, shape (n, 2)."""
-        found = [np.array([[self.digests, self.digests + self.blocks.count * self.row_bytes]], np.int64)]
-        for place in self.places:
-            at = place.all_at(self.blocks.count)
-            ends = [self.stored(place, block) for block in (0, self.blocks.count - 1)]
-            found.append(np.stack([at, at + ends[0]], axis=1))
-            found[-1][-1, 1] = at[-1] + ends[1]
-        whole = np.concatenate(found)
-        return whole[np.argsort(whole[:, 0], kind="stable")]
+    def write_digests(self, fd: int, digests: Mapping[int, bytes]) -> None:
+        """Writes those of some blocks, neighbouring ones at once. Raises OSError."""
+        blocks = np.array(sorted(digests), np.int64)
+        for some in np.split(blocks, np.flatnonzero(np.diff(blocks) > 1) + 1):
+            row = b"".join(digests[block] for block in some.tolist())
+            disk.write_all(fd, (row,), self.digests + int(some[0]) * self.row_bytes if row else 0)
 
 
-@dataclass(frozen=True)
-class Layout:
-    """All that is to be known of a result before HDF5 opens it.
-
-    Attributes
-    ----------
-    key : str
-        Of this file alone, in hex digits.
-    fingerprint : mapping of str to str
-        Of the study.
-    begun : str
-        When.
-    tables : mapping of str to Table
-        "cells": the output's columns; of a summary also "rows", which they are made of.
-    endings : tuple of Region
-        Texts that are written when all is done, and behind them their digest.
-    regions : tuple of Region
-        Digests and chunks; between those of one region there are zeros alone.
-    structure : bytes
-        Digest of all other bytes.
-    end : int
-        Where HDF5's part of the file ends.
-    """
-
-    key: str
-    fingerprint: Mapping[str, str]
-    begun: str
-    tables: Mapping[str, Table]
-    endings: tuple[Region, ...]
-    regions: tuple[Region, ...]
-    structure: bytes
-    end: int
-
-    @property
-    def work_name(self) -> str:
-        """Name of the table that is computed."""
-        return "rows" if "rows" in self.tables else "cells"
-
-    @property
-    def work(self) -> Table:
-        """What is computed."""
-        return self.tables[self.work_name]
-
-    def trailer(self) -> bytes:
-        """What stands behind the end of HDF5's part."""
-        text = json.dumps({"format": FORMAT, **asdict(self)}, default=bytes.hex).encode()
-        return text + xxhash.xxh3_128(text).digest() + struct.pack("<I", len(text)) + MAGIC
-
-    @property
-    def size(self) -> int:
-        """Bytes of the file."""
-        return self.end + len(self.trailer())
-
-    def ending_digest(self, texts: Sequence[bytes | bytearray]) -> bytes:
-        """Digest of the texts at the end."""
-        return xxhash.xxh3_128(self.key.encode() + b"".join(texts)).digest()
-
-
-def write_digests(fd: int, table: Table, digests: Mapping[int, bytes]) -> None:
-    """Writes those of some blocks, neighbouring ones at once. Raises OSError."""
-    for _, some in itertools.groupby(enumerate(sorted(digests)), lambda pair: pair[1] - pair[0]):
-        blocks = [block for _, block in some]
-        rows = b"".join(digests[block] for block in blocks)
-        disk.write_all(fd, (rows,), table.digests + blocks[0] * table.row_bytes)
-
-
-def gaps(apart: Iterable[Region], size: int) -> Iterator[Region]:
-    """What is outside of the regions, up to a place."""
-    at = 0
-    for begin, end in sorted(apart):
-        if begin > at:
-            yield at, min(begin, size)
-        at = max(at, end)
-    if at < size:
-        yield at, size
-
-
-def mark_of(fingerprint: Mapping[str, str], table: str) -> bytes:
-    """What the digests of a study's table begin with."""
-    words = json.dumps([dict(fingerprint), table], sort_keys=True)
-    return xxhash.xxh3_128(words.encode()).digest()
-
-
-def structure_digest(fd: int, apart: Iterable[Region], end: int) -> bytes:
-    """Digest of all bytes before `end` that are in none of the regions. Raises OSError, EOFError."""
-    state = xxhash.xxh3_128()
-    for begin, stop in gaps(apart, end):
-        for at in range(begin, stop, PIECE):
-            piece = bytearray(min(PIECE, stop - at))
-            disk.read_all(fd, (piece,), at)
-            state.update(piece)
-    return state.digest()
-
-
-def read_layout(fd: int, size: int, path: Path | None = None) -> Layout | None:
-    """The layout at the end of a file; None where there is none that can be.
-
-    Raises OSError, EOFError; and SweepError where the file of this name is of another format.
-    """
-    tail = bytearray(TAIL)
-    if size < TAIL:
-        return None
-    disk.read_all(fd, (tail,), size - TAIL)
-    if path is not None and tail.endswith(OLD_MAGIC):
-        raise _of_another_format(path, "an earlier format")
-    (length,) = struct.unpack_from("<I", tail, BYTES)
-    if not tail.endswith(MAGIC) or length > size - TAIL:
-        return None
-    text = bytearray(length)
-    disk.read_all(fd, (text,), size - TAIL - length)
-    if xxhash.xxh3_128(text).digest() != tail[:BYTES]:
-        return None
-    try:
-        words = json.loads(text)
-        if words["format"] == FORMAT:
-            return _layout(words, size - TAIL - length)
-    except DAMAGE:
-        return None
-    if path is not None:
-        raise _of_another_format(path, f"format {words['format']}")
-    return None
-
-
-def _of_another_format(path: Path, what: str) -> SweepError:
-    return SweepError(
-        f"{path}: a result of {what}; this version of foliot reads format {FORMAT} alone; open it with the version "
-        "that wrote it, or compute it again under another name"
-    )
-
-
-def _layout(words: dict[str, Any], end: int) -> Layout:
-    """Raises one of DAMAGE where it cannot be."""
-    if words.pop("format") != FORMAT or words["end"] != end:
-        raise ValueError("of another file")
-    tables = {name: _table(table) for name, table in words.pop("tables").items()}
-    found = Layout(
-        **{
-            **words,
-            "tables": tables,
-            "structure": bytes.fromhex(words["structure"]),
-            "endings": tuple((int(a), int(b)) for a, b in words["endings"]),
-            "regions": tuple((int(a), int(b)) for a, b in words["regions"]),
-        }
-    )
-    digests = [(t.digests, t.digests + t.blocks.count * t.row_bytes) for t in tables.values()]
-    if any(not 0 <= begin <= stop <= end for begin, stop in (*found.regions, *found.endings, *digests)):
-        raise ValueError("places outside of the file")
+def tables_of(file: Any, key: bytes) -> dict[str, Table]:
+    """The tables of a result that h5py has opened: HDF5 knows the place of every chunk."""
+    found = {}
+    for name in TABLES:
+        if f"{GROUP}/{name}_digests" not in file:
+            continue
+        digests, group = file[f"{GROUP}/{name}_digests"], file if name == "cells" else file[name]
+        names, depth = json.loads(digests.attrs["columns"])
+        places: list[Place] = []
+        columns = [group[name] for name in names]
+        for column in columns:
+            size = column.dtype.itemsize * math.prod(column.chunks or ())
+            starts = [c.byte_offset for c in chunks_of(column)] if column.chunks else [column.id.get_offset()]
+            shape, check, at = column.shape[depth:], 4 if column.chunks else 0, np.array(starts, np.int64)
+            places.append(Place(column.name.split("/")[-1], column.dtype.str, shape, size, check, at))
+        grid, box = columns[0].shape[:depth], (columns[0].chunks or ())[:depth]
+        found[name] = Table(name, grid, box, tuple(places), int(digests.id.get_offset()), key)
     return found
 
 
-def _table(words: dict[str, Any]) -> Table:
-    places = tuple(
-        Place(p["name"], p["dtype"], tuple(p["shape"]), p["chunk_bytes"], tuple(tuple(run) for run in p["runs"]))
-        for p in words["places"]
-    )
-    blocks = Partition(**words["blocks"])
-    if min(blocks.size, blocks.cells) < 1 or blocks.size != np.prod(words["grid"], dtype=np.int64):
-        raise ValueError("blocks that cannot be")
-    return Table(tuple(words["grid"]), blocks, places, words["digests"], bytes.fromhex(words["mark"]))
+def chunks_of(dataset: Any) -> list[Any]:
+    """Place and size of every chunk of a dataset, as h5py tells them."""
+    found: list[Any] = []
+    dataset.id.chunk_iter(found.append)
+    return found
+
+
+def gaps(tables: Iterable[Table], ending: int, begin: int, end: int) -> Iterator[tuple[int, int]]:
+    """What lies between two places of the file and is no chunk, no digest and no ending."""
+    spans = np.concatenate([*(table.spans() for table in tables), [[ending, ending + ENDING_BYTES + 4], [end, end]]])
+    spans = spans[np.argsort(spans[:, 0], kind="stable")]
+    starts = np.append(begin, spans[:-1, 1])
+    apart = starts < spans[:, 0]
+    return zip(starts[apart].tolist(), spans[apart, 0].tolist(), strict=True)
+
+
+def digest_of(fd: int, regions: Iterable[tuple[int, int]]) -> bytes:
+    """Digest of the bytes of some regions. Raises OSError, EOFError."""
+    state = xxhash.xxh3_128()
+    for begin, end in regions:
+        for at in range(begin, end, PIECE):
+            state.update(read_bytes(fd, at, min(at + PIECE, end)))
+    return state.digest()
+
+
+def read_bytes(fd: int, begin: int, end: int) -> bytes:
+    """The bytes of a region. Raises OSError, EOFError."""
+    found = bytearray(end - begin)
+    disk.read_all(fd, (found,), begin)
+    return bytes(found)

@@ -1,10 +1,11 @@
-"""Results as xarray Datasets: of a finished sweep, or of one that still runs."""
+"""Results as xarray Datasets: of a finished sweep, of one that still runs, or changed by another program."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
 import json
+import math
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -16,11 +17,8 @@ from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import BY_STATUS, pending
 from sweep.cells.schema import STATUS, Schema
 from sweep.errors import SweepError
-from sweep.file import disk
-from sweep.file.frame import ENDINGS
-from sweep.file.layout import DAMAGE
-from sweep.file.probe import MOST_AT_ONCE, check_own, intact, readable
-from sweep.file.reading import StoredFile, unbroken
+from sweep.file.layout import DAMAGE, chunks_of
+from sweep.file.reading import Changed, StoredFile, attrs_of
 from sweep.file.store import unfinished_of
 from sweep.study.model import Study
 from sweep.words import as_path
@@ -39,7 +37,6 @@ TEXTS = (
     *("start", "created", "end", "over", "units", "long_name", "flag_meanings"),
 )
 """Attributes that are text wherever they stand."""
-BESIDE = "damaged beside the outputs' numbers: in attributes, coordinates or its structure"
 
 
 def open_result(path: str | os.PathLike[str], strict: bool = False) -> xr.Dataset:
@@ -75,11 +72,20 @@ def open_result(path: str | os.PathLike[str], strict: bool = False) -> xr.Datase
         if before is None:
             raise SweepError(f"{output}: no such file, and no sweep that writes it")
         try:
-            return _open(output) if place == output else open_unfinished(output, strict)
-        except (SweepError, FileNotFoundError):
+            found = _open(place, strict)
+        except SweepError:
             # a sweep that ends, or begins anew, puts another file there meanwhile
             if _identity(place) == before:
                 raise
+            continue
+        if _identity(place) == before:
+            return found
+        found.close()
+
+
+def open_unfinished(path: str | os.PathLike[str]) -> xr.Dataset:
+    """What there is of an unfinished sweep, also where its output holds an earlier result. Raises SweepError."""
+    return _open(unfinished_of(Path(path)))
 
 
 def _identity(path: Path) -> tuple[int, int] | None:
@@ -91,19 +97,43 @@ def _identity(path: Path) -> tuple[int, int] | None:
     return found.st_dev, found.st_ino
 
 
-def open_unfinished(path: str | os.PathLike[str], strict: bool = False) -> xr.Dataset:
-    """What there is of an unfinished sweep, also where its output holds an earlier result.
+def _open(place: Path, strict: bool = False) -> xr.Dataset:
+    """A file, whether it is finished or not. Raises SweepError."""
+    import xarray as xr
 
-    Raises SweepError, FileNotFoundError.
-    """
-    output = unfinished_of(Path(path))
-    check_structure(output)
-    with _stored(output) as file:
-        left, count = int((~file.done(file.layout.work_name)).sum()), file.layout.work.blocks.count
-    if strict:
-        missing = f"{left} of {count} blocks are missing" if left else "all is computed but not checked yet"
-        raise SweepError(f"{path}: unfinished, {missing}; run its sweep again to continue")
-    return _open(output)
+    from sweep.file.columns import Result
+
+    try:
+        large = place.stat().st_size > MEMORY_SHARE * memory()
+        found = xr.open_dataset(os.fspath(place), engine=Result, chunks="auto" if large else None)
+        with contextlib.suppress(Changed), StoredFile(place) as file:
+            if not file.ending:
+                left, count = int((~file.done[file.work]).sum()), file.tables[file.work].blocks.count
+                missing = f"{left} of {count} blocks are missing" if left else "all is computed but not checked yet"
+                if strict:
+                    raise SweepError(f"{place}: unfinished, {missing}; run its sweep again to continue")
+                if file.work == "rows":
+                    return _of_rows(file)
+    except DAMAGE as fault:
+        raise unreadable(place, fault) from None
+    # words as fixed-width text, as in a Dataset that was never in a file
+    words = {name: c for name, c in found.coords.items() if c.dtype.kind not in "fi"}
+    plain = found.assign_coords({name: (c.dims, c.values.astype(str), c.attrs) for name, c in words.items()})
+    plain.set_close(found.close)
+    return plain
+
+
+def _of_rows(file: StoredFile) -> xr.Dataset:
+    """The Dataset of an unfinished summary: of the rows that are there."""
+    study = Study.from_json(file.attrs["study_json"], declared=True)
+    rows, blocks = pending(study, 0, row_blocks(study).count), file.tables["rows"].blocks
+    for name, column in file.columns("rows").items():
+        for block in range(blocks.count):
+            if file.is_sound("rows", block):
+                cells = slice(*blocks.bounds(block))
+                rows[name][cells] = column[cells]
+    plan = output_schema(study, file.fingerprint)
+    return in_memory(replace(plan, attrs={**plan.attrs, **file.attrs}), gathered(study, rows))
 
 
 def in_memory(plan: Schema, arrays: Mapping[str, Any]) -> xr.Dataset:
@@ -117,46 +147,64 @@ def in_memory(plan: Schema, arrays: Mapping[str, Any]) -> xr.Dataset:
     return xr.Dataset(variables, coordinates, dict(plan.attrs))
 
 
-def stored_attrs(output: Path) -> dict[str, Any]:
-    """Attributes of a result; "fingerprint" as a mapping.
-
-    Raises
-    ------
-    SweepError
-        The file cannot be read, or is none of ours.
-    """
-    import h5py
-
+def stored_fingerprint(output: Path) -> dict[str, str]:
+    """Fingerprint of a result. Raises SweepError where the file cannot be read, or is none of ours."""
     try:
-        if not output.is_file():
-            raise ValueError("it is no regular file")
-        fd = disk.open_file(output, os.O_RDONLY)
         try:
-            if not readable(output, fd):
-                raise ValueError("HDF5 cannot read it")
-        finally:
-            os.close(fd)
-        with h5py.File(output, "r") as file:
-            check_own(file)
-            attrs = dict(file.attrs)
-            attrs["study_json"], file[STATUS if STATUS in file else BY_STATUS]
-            if any(not _can_be(file, name, output.stat().st_size) for name in file):
-                raise ValueError("more numbers than the file has room for")
-        return attrs | {"fingerprint": dict(json.loads(attrs["fingerprint"]))}
+            with StoredFile(output) as file:
+                return file.fingerprint
+        except Changed:
+            return dict(json.loads(changed_attrs(output)["fingerprint"]))
     except DAMAGE as fault:
         raise unreadable(output, fault) from None
 
 
-def stored_fingerprint(output: Path) -> dict[str, str]:
-    """Fingerprint of a finished result. Raises SweepError."""
-    found: dict[str, str] = stored_attrs(output)["fingerprint"]
-    return found
+def changed_attrs(output: Path) -> dict[str, Any]:
+    """Attributes of a result that another program has changed.
+
+    Raises
+    ------
+    OSError, ValueError and their like
+        It is no result any more, or HDF5 would be led to other files, beyond the memory, or astray.
+    """
+    import h5py
+
+    with h5py.File(output, "r") as file:
+        _check_own(file, output.stat().st_size)
+        attrs = attrs_of(file)
+        attrs["study_json"], attrs["fingerprint"], file[STATUS if STATUS in file else BY_STATUS]
+        for own in (attrs, *(attrs_of(file[name]) for name in file)):
+            if not all(isinstance(own[name], str) for name in TEXTS if name in own):
+                raise TypeError("an attribute is no text")
+        float(attrs.get("rtol", 0.0))
+    return attrs
 
 
-def _can_be(file: Any, name: str, size: int) -> bool:
-    """Whether the file has room for a dataset."""
-    numbers = getattr(file[name], "nbytes", 0)
-    return bool(numbers <= size * (MOST_COMPRESSED if file[name].compression else 1)) if numbers else True
+def _check_own(group: Any, size: int, inner: bool = False) -> None:
+    """Raises ValueError where what a group of HDF5 holds is not in the file itself, has no room in it, or is odd.
+
+    Links and storage in other files would be followed; groups in groups may hold themselves.
+    """
+    import h5py
+
+    for name in group:
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            raise ValueError(f"{name} is a link")
+        thing = group[name]
+        if isinstance(thing, h5py.Group) and not inner:
+            _check_own(thing, size, inner=True)
+            continue
+        if not isinstance(thing, h5py.Dataset) or thing.external or thing.is_virtual:
+            raise ValueError(f"{name} is not in the file itself")
+        if thing.nbytes > size * (MOST_COMPRESSED if thing.compression else 1):
+            raise ValueError(f"{name} has more numbers than the file has room for")
+        # HDF5 2.0 reads beyond the end of chunks that are smaller than they say, and crashes where axes are missing
+        whole = thing.dtype.itemsize * math.prod(thing.chunks or ()) + 4 * thing.fletcher32
+        plain = thing.chunks and not thing.compression and thing.scaleoffset is None
+        if plain and any(chunk.filter_mask or chunk.size != whole for chunk in chunks_of(thing)):
+            raise ValueError(f"{name} has chunks that are too short")
+        if "DIMENSION_LIST" in thing.attrs and thing.attrs.get_id("DIMENSION_LIST").shape != (thing.ndim,):
+            raise ValueError(f"{name} has not the dimensions that it says")
 
 
 def memory() -> int:
@@ -165,85 +213,6 @@ def memory() -> int:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
         return 8 << 30
-
-
-def _open(output: Path) -> xr.Dataset:
-    """A file, whether it is finished or not. Raises SweepError, FileNotFoundError."""
-    from sweep.file.columns import open_checked
-
-    check_structure(output)
-    attrs = stored_attrs(output)
-    large = output.stat().st_size > MEMORY_SHARE * memory()
-    try:
-        found = open_checked(output, "auto" if large else None)
-        _check_kinds(found)
-        if found.attrs.get("end") == "unfinished".ljust(ENDINGS["end"]):
-            return _of_unfinished(output, found, attrs)
-        return _with_plain_text(found)
-    except DAMAGE as fault:
-        raise unreadable(output, fault) from None
-
-
-def _check_kinds(dataset: xr.Dataset) -> None:
-    """Raises one of DAMAGE where text or numbers are something else; what does not say its type was changed."""
-    for attrs in (dataset.attrs, *(v.attrs for v in dataset.variables.values())):
-        if not all(isinstance(attrs[name], str) for name in TEXTS if name in attrs):
-            raise TypeError("an attribute is no text")
-        for text in attrs.values():
-            str(text).encode()  # bytes that are no UTF-8 cannot be printed
-        float(attrs.get("rtol", 0.0)), float(attrs.get("cells_per_second", 0.0))
-    if not {v.dtype.kind for v in dataset.data_vars.values()} <= set("fiu"):
-        raise TypeError("an output is no number")
-
-
-def _of_unfinished(output: Path, found: xr.Dataset, attrs: Mapping[str, Any]) -> xr.Dataset:
-    """The Dataset without what is known at the end; of a summary, of the rows that are there."""
-    kept = {name: value for name, value in found.attrs.items() if name not in ENDINGS}
-    if "over" not in attrs:
-        plain = _with_plain_text(found)
-        plain.attrs = kept
-        return plain
-    study = Study.from_json(attrs["study_json"], declared=True)
-    with _stored(output) as file:
-        rows, blocks = pending(study, 0, row_blocks(study).count), file.layout.work.blocks
-        for name, column in file.columns("rows").items():
-            for block in range(blocks.count):
-                if file.is_sound("rows", block):
-                    start, stop = blocks.bounds(block)
-                    rows[name][start:stop] = column.run(start, stop)
-    plan = output_schema(study, attrs["fingerprint"])
-    return in_memory(replace(plan, attrs=kept), gathered(study, rows))
-
-
-def _stored(path: Path) -> StoredFile:
-    """Raises SweepError, FileNotFoundError."""
-    try:
-        return StoredFile(path)
-    except FileNotFoundError:
-        raise
-    except DAMAGE as fault:
-        raise unreadable(path, fault) from None
-
-
-def check_structure(output: Path) -> None:
-    """Raises SweepError where anything but the outputs' numbers is known not to be as it was written.
-
-    A program that changes a file by HDF5 cuts the trailer off; what it changed on purpose is opened.
-    """
-    if not output.is_file():
-        return
-    try:
-        fd = disk.open_file(output, os.O_RDONLY)
-        try:
-            sound = unbroken(fd, MOST_AT_ONCE, output)
-        finally:
-            os.close(fd)
-    except FileNotFoundError:
-        raise
-    except OSError as fault:
-        raise unreadable(output, fault) from None
-    if sound is False:
-        raise SweepError(f"{output}: {BESIDE}; sweep verify tells of all damage")
 
 
 @contextlib.contextmanager
@@ -259,6 +228,15 @@ def changed(output: Path) -> Iterator[None]:
         raise SweepError(f"{output}: was changed by another program, and is no result any more ({what})") from None
 
 
+def intact(path: Path) -> bool:
+    """Whether a file is there, and its structure is as it was written."""
+    try:
+        StoredFile(path).close()
+    except (*DAMAGE, SweepError):
+        return False
+    return True
+
+
 def unreadable(output: Path, fault: Exception) -> SweepError:
     """What a user is told of a file that is no result."""
     if output.is_dir():
@@ -266,11 +244,3 @@ def unreadable(output: Path, fault: Exception) -> SweepError:
     if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
         return SweepError(f"{output}: cannot be read ({os.strerror(fault.errno)})")
     return SweepError(f"{output}: not the result of a sweep, or damaged; move it away or choose another name")
-
-
-def _with_plain_text(dataset: xr.Dataset) -> xr.Dataset:
-    """Words as fixed-width text, as in a Dataset that was never in a file."""
-    words = {name: c for name, c in dataset.coords.items() if c.dtype.kind not in "fi"}
-    plain = dataset.assign_coords({name: (c.dims, c.values.astype(str), c.attrs) for name, c in words.items()})
-    plain.set_close(dataset.close)
-    return plain

@@ -1,16 +1,18 @@
 """Numbers of a result, finished or not, that are compared with their digests before they are handed out.
 
-No call of HDF5 is needed for them (those run one at a time): chunks are read from where they stand, by any thread.
+HDF5 is asked where they are, once; then chunks are read from their places by any thread.
 """
 
 from __future__ import annotations
 
+import itertools
+import json
 import math
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,52 +20,68 @@ from kernels.interface import Status
 from sweep.cells.schema import METHOD_USED, STATUS
 from sweep.errors import SweepError
 from sweep.file import disk
-from sweep.file.chunk_index import FILE_END
-from sweep.file.layout import Layout, Table, read_layout, structure_digest
+from sweep.file.fletcher import checksum
+from sweep.file.layout import ENDING_BYTES, GROUP, SEAL, Seal, digest_of, gaps, read_bytes, read_seal, tables_of
 
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
-"""How files of HDF5 begin."""
 READERS = 4
-"""Threads that read a long run of cells."""
-LONG_RUN = 32 << 20
-"""Bytes from which they do."""
-SHORT_RUN = 64
-"""Cells; of a selection of shorter runs each cell is looked up."""
+"""Threads that read a large piece,"""
+LARGE = 32 << 20
+"""of so many bytes."""
+
+
+class Changed(ValueError):
+    """Another program has changed a result."""
 
 
 class StoredFile:
-    """A result of this program, open for reading.
+    """A result of this program, open for reading. To be used with `with`.
 
     Attributes
     ----------
     path : Path
-    layout : Layout
-    finished : bool
-        Whether all is there; else what is missing or damaged is handed out as NaN and PENDING.
+    attrs : dict
+        Of the file; texts as str.
+    tables : dict of str to Table
+    work : str
+        Name of the table that is computed: "rows" of a summary, else "cells".
+    done : dict of str to ndarray of bool
+        Which blocks of a table have digests.
+    ending : dict of str to str
+        What is known at the end, empty before; what is missing or damaged is then handed out as NaN and PENDING.
 
     Raises
     ------
     OSError
         It cannot be read.
     ValueError
-        It is none of ours.
+        It is none of ours, or damaged beside the numbers; `Changed` where another program has changed it.
+    SweepError
+        It is of another format.
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.fd = disk.open_file(path, os.O_RDONLY)
+        import h5py
+
+        self.path, self.fd = path, disk.open_file(path, os.O_RDONLY)
         try:
-            size = os.fstat(self.fd).st_size
-            layout = read_layout(self.fd, size, path)
-            if layout is None:
-                raise ValueError("it is no result, or was changed")
-            self._digests = {name: table.read_digests(self.fd) for name, table in layout.tables.items()}
-            self.finished = has_ended(self.fd, layout)
-            self.layout: Layout = layout
+            seal = read_seal(self.fd, path)
+            if seal is None:
+                raise Changed(f"{path}: was changed by another program")
+            self.seal: Seal = seal
+            with h5py.File(path, "r") as file:
+                self.attrs = attrs_of(file)
+                self.tables = tables_of(file, seal.key)
+                self.ending_at = int(file[f"{GROUP}/ending"].id.get_chunk_info(0).byte_offset)
+            self.work = "rows" if "rows" in self.tables else "cells"
+            self._digests = {name: table.read_digests(self.fd) for name, table in self.tables.items()}
+            text = read_bytes(self.fd, self.ending_at, self.ending_at + ENDING_BYTES + 4)
+            whole = checksum(text[:ENDING_BYTES], ENDING_BYTES) == text[ENDING_BYTES:] and any(text)
+            self.ending: dict[str, str] = json.loads(text[:ENDING_BYTES]) if whole else {}
         except BaseException:
             self.close()
             raise
-        self._sound = {name: np.zeros(table.blocks.count, bool) for name, table in layout.tables.items()}
+        self._sound = {name: np.zeros(table.blocks.count, bool) for name, table in self.tables.items()}
+        self.done = {name: digests.any(axis=2).all(axis=1) for name, digests in self._digests.items()}
 
     def __enter__(self) -> StoredFile:
         return self
@@ -83,31 +101,41 @@ class StoredFile:
         if fd >= 0:
             os.close(fd)
 
-    def done(self, name: str) -> Any:
-        """Which blocks of a table have digests."""
-        return self._digests[name].any(axis=2).all(axis=1)
+    @property
+    def fingerprint(self) -> dict[str, str]:
+        """Of the study."""
+        return dict(json.loads(self.attrs["fingerprint"]))
 
-    def digest(self, name: str, block: int, number: int) -> bytes:
-        """Of a block of a column, as it stands in the file."""
-        return bytes(self._digests[name][block, number])
+    def read(self, name: str, number: int, block: int, out: Any = None) -> Any:
+        """The cells of a block of a column, into `out` where it is given; None where they are not what was written."""
+        digest = bytes(self._digests[name][block, number])
+        return self.tables[name].read(self.fd, number, block, digest, out)
 
     def is_sound(self, name: str, block: int) -> bool:
         """Whether all columns of a block are there and as they were written; looked at once."""
-        if not self._sound[name][block] and self._digests[name][block].any(axis=1).all():
-            table = self.layout.tables[name]
-            self._sound[name][block] = all(
-                table.read(self.fd, number, block, self.digest(name, block, number)) is not None
-                for number in range(len(table.places))
-            )
+        if not self._sound[name][block] and self.done[name][block]:
+            self._sound[name][block] = not any(True for _ in self.damaged(name, [block]))
         return bool(self._sound[name][block])
+
+    def damaged(self, name: str, blocks: Iterable[int]) -> Iterator[tuple[int, int]]:
+        """Block and column number of every chunk that is not what was written, of these blocks of a table."""
+        for block, number in itertools.product(blocks, range(len(self.tables[name].places))):
+            if self.read(name, number, block) is None:
+                yield block, number
+
+    def rest_is_sound(self) -> bool:
+        """Whether all that is no number, no digest and not the head is as it was written. Raises OSError, EOFError."""
+        end = os.fstat(self.fd).st_size - SEAL.size
+        rest = gaps(self.tables.values(), self.ending_at, self.seal.head, end)
+        return digest_of(self.fd, rest) == self.seal.rest_digest
 
     def columns(self, name: str = "cells") -> dict[str, Numbers]:
         """The columns of a table."""
-        return {p.name: Numbers(self, name, k) for k, p in enumerate(self.layout.tables[name].places)}
+        return {p.name: Numbers(self, name, k) for k, p in enumerate(self.tables[name].places)}
 
 
 class Numbers:
-    """A column over its grid: numbers by indices and slices, checked.
+    """A column over its grid: numbers by indices, slices and lists of indices for each dimension, checked.
 
     Attributes
     ----------
@@ -117,7 +145,7 @@ class Numbers:
 
     def __init__(self, file: StoredFile, name: str, number: int) -> None:
         self.file, self.name, self.number = file, name, number
-        self.table: Table = file.layout.tables[name]
+        self.table = file.tables[name]
         self.place = self.table.places[number]
         self.shape, self.dtype = (*self.table.grid, *self.place.shape), np.dtype(self.place.dtype)
         self._last: tuple[int, Any] = -1, None
@@ -126,51 +154,44 @@ class Numbers:
         return Numbers, (self.file, self.name, self.number)
 
     def __getitem__(self, key: Any) -> Any:
-        """By an index or a slice for each dimension, or for the first ones. Raises SweepError where damaged."""
+        """By what is given for each dimension, or for the first ones. Raises SweepError where damaged."""
         key = key if isinstance(key, tuple) else (key,)
         key = (*(k for k in key if k is not Ellipsis), *[slice(None)] * len(self.shape))[: len(self.shape)]
-        count = len(self.table.grid)
-        starts, length = runs(key[:count], self.table.grid)
-        if len(starts) == 1 or length >= SHORT_RUN:
-            found = [self.run(int(start), int(start) + length) for start in starts]
-            cells = found[0] if len(found) == 1 else np.concatenate([self.place.empty(0), *found])
-        else:
-            cells = self.cells((starts[:, None] + np.arange(length)).ravel())
-        kept = [len(range(n)[k]) for n, k in zip(self.table.grid, key, strict=False) if isinstance(k, slice)]
-        return cells.reshape((*kept, *self.place.shape))[(*[slice(None)] * len(kept), *key[count:])]
+        grid, box = self.table.grid, self.table.box
+        wanted = [np.arange(n)[k] for n, k in zip(grid, key, strict=False)]
+        out = np.empty((*(places.size for places in wanted), *self.place.shape), self.dtype)
+        parts = list(itertools.product(*(_parts(*axis) for axis in zip(wanted, grid, box, strict=True))))
+        counts = [-(-n // length) for n, length in zip(grid, box, strict=True)]
 
-    def run(self, start: int, stop: int) -> Any:
-        """The cells from one number to another."""
-        out = self.place.empty(max(0, stop - start))
-        blocks = range(self.table.blocks.index(start), self.table.blocks.index(stop - 1) + 1) if stop > start else ()
+        def fill(part: tuple[_Part, ...]) -> None:
+            number = 0
+            for axis, count in zip(part, counts, strict=True):
+                number = number * count + axis.box
+            here: Any = (*(axis.here for axis in part), ...)
+            view = out[here]
+            lengths = [axis.length for axis in part]
+            if view.flags.c_contiguous and all(axis.whole for axis in part):
+                self._read(number, view.reshape(math.prod(lengths), *self.place.shape))
+                return
+            cells = self._block(number).reshape(*lengths, *self.place.shape)
+            for k, axis in enumerate(part):
+                cells = cells[(*[slice(None)] * k, axis.there)]
+            view[...] = cells
 
-        def fill(block: int) -> None:
-            first, last = self.table.blocks.bounds(block)
-            low, high = max(first, start), min(last, stop)
-            if (low, high) == (first, last):
-                self._read(block, out[low - start : high - start])
-            else:
-                out[low - start : high - start] = self._block(block)[low - first : high - first]
-
-        if out.nbytes >= LONG_RUN and len(blocks) > 1:
+        if out.nbytes >= LARGE and len(parts) > 1:
             with ThreadPoolExecutor(READERS) as pool:
-                list(pool.map(fill, blocks))
+                list(pool.map(fill, parts))
         else:
-            for block in blocks:
-                fill(block)
-        return out
-
-    def cells(self, numbers: Any) -> Any:
-        """The cells of these numbers, in any order."""
-        out, blocks = self.place.empty(len(numbers)), self.table.blocks.index(numbers)
-        order = np.argsort(blocks, kind="stable")
-        for some in np.split(order, np.flatnonzero(np.diff(blocks[order])) + 1):
-            if len(some):
-                block = int(blocks[some[0]])
-                out[some] = self._block(block)[numbers[some] - self.table.blocks.bounds(block)[0]]
-        return out
+            for part in parts:
+                fill(part)
+        kept = [places.size for places in wanted if places.ndim]
+        found = out.reshape(*kept, *self.place.shape)
+        for k in reversed(range(len(grid), len(key))):
+            found = found[(*[slice(None)] * (len(kept) + k - len(grid)), key[k])]
+        return found
 
     def _block(self, block: int) -> Any:
+        """The cells of a block; those of the last one are kept."""
         last, cells = self._last
         if last != block:
             start, stop = self.table.blocks.bounds(block)
@@ -183,102 +204,48 @@ class Numbers:
         """Fills in the cells of a block. Raises SweepError where it is damaged, or the file is closed."""
         if self.file.fd < 0:
             raise SweepError(f"{self.file.path}: is closed; open it again to read {self.place.name}")
-        digest = self.file.digest(self.name, block, self.number)
-        wanted = self.file.finished or self.file.is_sound(self.name, block)
-        if wanted and self.table.read(self.file.fd, self.number, block, digest, out) is not None:
+        finished = bool(self.file.ending)
+        wanted = finished or self.file.is_sound(self.name, block)
+        if wanted and self.file.read(self.name, self.number, block, out) is not None:
             return
-        if self.file.finished:
+        if finished:
             start, stop = self.table.blocks.bounds(block)
             raise SweepError(
                 f"{self.file.path}: {self.place.name} is damaged between its cells {start:,} and {stop:,}; sweep "
                 "verify tells of all damage, and sweep run --repair computes the damaged cells again"
             )
-        out[...] = missing(self.place.name)
+        out[...] = {STATUS: int(Status.PENDING), METHOD_USED: -1}.get(self.place.name, math.nan)
 
 
-def missing(name: str) -> float | int:
-    """What stands for a cell of a column that is not computed yet."""
-    return {STATUS: int(Status.PENDING), METHOD_USED: -1}.get(name, math.nan)
+class _Part(NamedTuple):
+    """What is wanted of one box along an axis: its number and length, places in it, and their places in the answer."""
+
+    box: int
+    length: int
+    there: Any
+    here: slice
+    whole: bool
 
 
-def runs(key: Sequence[Any], grid: tuple[int, ...]) -> tuple[Any, int]:
-    """The flat cells of a key of indices and slices, as runs: where each starts, and their length."""
-    length, step, left = 1, 1, len(grid)
-    while left and isinstance(key[left - 1], slice) and range(grid[left - 1])[key[left - 1]] == range(grid[left - 1]):
-        left -= 1
-        length, step = length * grid[left], step * grid[left]
-    offset = 0
-    if left and isinstance(key[left - 1], slice) and (some := range(grid[left - 1])[key[left - 1]]).step == 1:
-        left -= 1
-        offset, length, step = some.start * step, length * len(some), step * grid[left]
-    starts = np.full(1, offset, np.int64)
-    for k, n in zip(reversed(key[:left]), reversed(grid[:left]), strict=True):
-        starts = (np.atleast_1d(np.arange(n, dtype=np.int64)[k])[:, None] * step + starts).ravel()
-        step *= n
-    return starts, length
+def _parts(wanted: Any, size: int, length: int) -> list[_Part]:
+    """The parts of some places along an axis of a size that is cut into boxes of a length."""
+    wanted = np.atleast_1d(wanted)
+    ends = [*(np.flatnonzero(np.diff(wanted // length)) + 1).tolist(), wanted.size]
+    found, start = [], 0
+    for stop in ends if wanted.size else ():
+        box = int(wanted[start]) // length
+        there, own = wanted[start:stop] - box * length, min(length, size - box * length)
+        straight = bool((np.diff(there) == 1).all())
+        inside = slice(int(there[0]), int(there[-1]) + 1) if straight else there
+        found.append(_Part(box, own, inside, slice(start, stop), straight and stop - start == own))
+        start = stop
+    return found
 
 
-def has_ended(fd: int, layout: Layout) -> bool:
-    """Whether the texts that are written at the end of a run are there. Raises OSError, EOFError."""
-    *texts, digest = (_bytes(fd, begin, end) for begin, end in layout.endings)
-    return layout.ending_digest(texts) == digest
-
-
-def unbroken(fd: int, most: float = math.inf, path: Path | None = None) -> bool | None:
-    """Whether all but the numbers is as it was written; None where no trailer tells, or where it is too much.
-
-    Reads no more than `most` bytes. Raises OSError, also where neither a trailer nor HDF5 tells of the last bytes; and
-    SweepError where the file of this name is of another format.
-    """
-    size = os.fstat(fd).st_size
-    try:
-        layout = read_layout(fd, size, path)
-        if layout is None:
-            _require_whole(fd, size)
-            return None
-        if layout.end - sum(stop - begin for begin, stop in layout.regions) > most:
-            return None
-        # the texts of the end may be half written when a run is killed
-        return structure_digest(fd, [*layout.regions, *layout.endings], layout.end) == layout.structure
-    except EOFError:
-        return False
-
-
-def _require_whole(fd: int, size: int) -> None:
-    """Raises OSError where a file without a trailer does not end where HDF5 left it: it is not another program's work.
-
-    The bytes that a copy was still to write may all be the same, as in a chunk of zeros with a checksum of zeros,
-    which HDF5 takes for sound. What is not of HDF5's newer kinds, one of which ours are, is left to HDF5.
-    """
-    start = _bytes(fd, 0, min(size, FILE_END.stop))
-    if start[:8] == SIGNATURE and start[8:9] >= b"\2" and int.from_bytes(start[FILE_END], "little") != size:
-        raise OSError("its end is not what was written, as in a copy that was interrupted")
-
-
-def damaged(file: StoredFile, name: str, blocks: Iterable[int]) -> Iterator[tuple[int, int]]:
-    """Block and column number of every chunk that is not what was written, of these blocks of a table."""
-    table = file.layout.tables[name]
-    for block in blocks:
-        for number in range(len(table.places)):
-            if table.read(file.fd, number, block, file.digest(name, block, number)) is None:
-                yield block, number
-
-
-def padding_is_zero(file: StoredFile) -> bool:
-    """Whether there are zeros alone between the chunks and behind the last one. Raises OSError, EOFError."""
-    known = [table.spans() for table in file.layout.tables.values()]
-    end = file.layout.end
-    spans = np.concatenate([*known, np.array([*file.layout.endings, (end, end)], np.int64)])
-    spans = spans[np.argsort(spans[:, 0], kind="stable")]
-    between = np.stack([spans[:-1, 1], spans[1:, 0]], axis=1)
-    begins, ends = np.array(file.layout.regions, np.int64).T
-    region = np.searchsorted(begins, between[:, 0], "right") - 1
-    inside = (region >= 0) & (between[:, 0] < ends[region])
-    between = between[inside & (between[:, 0] < between[:, 1])]
-    return not any(any(_bytes(file.fd, begin, end)) for begin, end in between.tolist())
-
-
-def _bytes(fd: int, begin: int, end: int) -> bytearray:
-    found = bytearray(end - begin)
-    disk.read_all(fd, (found,), begin)
+def attrs_of(thing: Any) -> dict[str, Any]:
+    """Attributes of what h5py has opened: texts as str, a single number as such."""
+    found = {}
+    for name, value in thing.attrs.items():
+        single = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
+        found[name] = single.decode() if isinstance(single, bytes) else single
     return found

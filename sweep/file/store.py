@@ -12,10 +12,11 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import json
 import os
 import threading
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,12 +24,13 @@ from typing import Any
 
 import numpy as np
 
+from sweep.cells.schema import Schema
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
-from sweep.file.ending import Gather, end, gathered, reads_back
-from sweep.file.frame import PAGE, Frame
-from sweep.file.layout import DAMAGE, TAIL, Layout, Table, read_layout, write_digests
-from sweep.file.reading import StoredFile, damaged, unbroken
+from sweep.file.fletcher import checksum
+from sweep.file.frame import PAGE, WRONG, Cut, create
+from sweep.file.layout import DAMAGE, ENDING_BYTES, SEAL, Table
+from sweep.file.reading import StoredFile
 
 SYNC_BYTES = 64 << 20
 """Bytes after which blocks are brought to the disk,"""
@@ -36,6 +38,9 @@ SYNC_SECONDS = 0.2
 """or time, where that comes first."""
 LOOK_SECONDS = 1.0
 """How often it is looked whether the file is still in its place."""
+
+Gather = Callable[[StoredFile, int], Mapping[str, Any]]
+"""Makes a block of the output of a summary from its rows."""
 
 
 def unfinished_of(output: Path) -> Path:
@@ -56,13 +61,13 @@ class Shared:
     ----------
     path : str
         Where the process that has the lock sees it.
-    key : str
+    seal : bytes
         Of this file; another process that finds it in a file of this path sees the same file.
     table : Table
     """
 
     path: str
-    key: str
+    seal: bytes
     table: Table
 
     def opened(self) -> int | None:
@@ -71,14 +76,20 @@ class Shared:
             fd = disk.open_file(self.path, os.O_RDWR)
         except OSError:
             return None
-        try:
-            layout = read_layout(fd, os.fstat(fd).st_size)
-        except (OSError, EOFError):
-            layout = None
-        if layout is not None and layout.key == self.key:
+        if _is_sealed(fd, os.fstat(fd).st_size, self.seal):
             return fd
         os.close(fd)
         return None
+
+
+def _is_sealed(fd: int, size: int, seal: bytes) -> bool:
+    """Whether a file of a size ends with a seal."""
+    tail = bytearray(SEAL.size)
+    try:
+        disk.read_all(fd, (tail,), size - SEAL.size)
+    except (OSError, EOFError):
+        return False
+    return bytes(tail) == seal
 
 
 class Store:
@@ -88,14 +99,15 @@ class Store:
     ----------
     output, path : Path
         Where the result will be, and where it is.
-    layout : Layout or None
-        None until `begin` or `resume`.
+    file : StoredFile or None
+        As it was when this run began to write to it; None until `begin` or `resume`.
     """
 
     def __init__(self, output: Path) -> None:
         self.output, self.path = output, unfinished_of(output)
-        self.layout: Layout | None = None
-        self._fd, self._size, self._tail, self._looked = -1, 0, b"", 0.0
+        self.temporary = self.path.with_name(self.path.name + ".tmp")
+        self.file: StoredFile | None = None
+        self._fd, self._size, self._seal, self._looked = -1, 0, b"", 0.0
         self._done = np.zeros(0, bool)
         self._waiting: dict[int, bytes] = {}
         self._unsynced, self._synced = 0, time.monotonic()
@@ -106,91 +118,63 @@ class Store:
     @property
     def table(self) -> Table:
         """What is computed."""
-        assert self.layout is not None, "the sweep has not begun"
-        return self.layout.work
+        assert self.file is not None, "the sweep has not begun"
+        return self.file.tables[self.file.work]
 
-    def found(self) -> Layout | None:
+    def found(self) -> StoredFile | None:
         """What an earlier run left; None where there is nothing. Raises SweepError where it is damaged."""
         if not self.path.exists():
             return None
-        with disk.refusing(self.path):
-            fd = disk.open_file(self.path, os.O_RDONLY)
         try:
-            layout = read_layout(fd, os.fstat(fd).st_size, self.path)
-            if layout is not None and unbroken(fd):
-                return layout
-        except (OSError, EOFError):
-            pass
-        finally:
-            os.close(fd)
+            file = StoredFile(self.path)
+            if file.rest_is_sound():
+                return file
+            file.close()
+        except DAMAGE as fault:
+            if isinstance(fault, OSError) and fault.errno:
+                raise disk.refusal(fault, self.path) from fault
         raise SweepError(
             f"{self.path}: damaged beside its numbers, or not of this version; remove it, or give it up with --force"
         )
 
-    def begin(self, frame: Frame) -> None:
+    def begin(self, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> None:
         """Makes the file, with room on the disk for all of it. Raises SweepError."""
-        temporary = self.temporary
         with disk.refusing(self.path):
             try:
-                fd = disk.open_file(temporary, os.O_CREAT | os.O_TRUNC | os.O_RDWR)
-                try:
-                    frame.write(fd)
-                    disk.fsync(fd)
-                finally:
-                    os.close(fd)
-                disk.rename(temporary, self.path)
+                create(self.temporary, schema, cuts, shared)
+                disk.rename(self.temporary, self.path)
                 disk.sync_folder(self.path.parent)
             except OSError:
                 with contextlib.suppress(OSError):
-                    disk.remove(temporary)
+                    disk.remove(self.temporary)
                 raise
-        self._open(frame.layout)
+            self._open(StoredFile(self.path))
 
-    def resume(self, layout: Layout) -> None:
+    def resume(self, file: StoredFile) -> None:
         """Takes up what an earlier run left, which is compared with its digests meanwhile. Raises SweepError."""
-        self._open(layout)
-        try:
-            digests = self.table.read_digests(self._fd)
-        except (OSError, EOFError) as fault:
-            raise SweepError(f"{self.path}: cannot be read ({fault})") from fault
-        self._done = digests.any(axis=2).all(axis=1)
-        self._checked = ThreadPoolExecutor(1).submit(self._check, np.flatnonzero(self._done).tolist())
+        self._open(file)
+        done = np.flatnonzero(self._done).tolist()
 
-    def _check(self, blocks: list[int]) -> list[int]:
-        """Which of some blocks are not what their digests tell of."""
-        try:
-            with StoredFile(self.path) as file:
-                left = itertools.takewhile(lambda block: not self._closing.is_set(), blocks)
-                return sorted({block for block, _ in damaged(file, file.layout.work_name, left)})
-        except DAMAGE:
-            return blocks
+        def check() -> list[int]:
+            left = itertools.takewhile(lambda block: not self._closing.is_set(), done)
+            return sorted({block for block, _ in file.damaged(file.work, left)})
 
-    def _open(self, layout: Layout) -> None:
+        self._checked = ThreadPoolExecutor(1).submit(check)
+
+    def _open(self, file: StoredFile) -> None:
         with disk.refusing(self.path):
             self._fd = disk.open_file(self.path, os.O_RDWR)
             self._size = os.fstat(self._fd).st_size
-            self._tail = self._read_tail()
-        self.layout, self._done = layout, np.zeros(layout.work.blocks.count, bool)
-
-    def _read_tail(self) -> bytes:
-        """The last bytes of the file, which are of it alone and are not written again; none where it was cut."""
-        tail = bytearray(TAIL)
-        try:
-            disk.read_all(self._fd, (tail,), self._size - TAIL)
-        except EOFError:
-            return b""
-        return bytes(tail)
+        self.file, self._done, self._seal = file, file.done[file.work].copy(), SEAL.pack(*file.seal)
 
     def _check_own(self) -> None:
         """Raises Incomplete where another program has cut the file or written to it: not a byte of ours goes there."""
-        with disk.refusing(self.path):
-            if self._read_tail() == self._tail:
-                return
-        self._waiting = {}
-        raise Incomplete(
-            f"{self.path}: was cut or overwritten by another program while the run wrote to it, and cannot be "
-            "continued; remove it and run the same command again"
-        )
+        if not _is_sealed(self._fd, self._size, self._seal):
+            self._waiting = {}
+            raise Incomplete(
+                f"{self.path}: was cut or overwritten by another program while the run wrote to it, and cannot be "
+                "continued; remove it and run the same command again"
+            )
 
     def _check_there(self) -> None:
         """Raises Incomplete where the file is not what it was, or not where it was."""
@@ -210,11 +194,6 @@ class Store:
             f"{self.path}: was moved while the run wrote to it, to {disk.place_of(self._fd) or 'another place'}; all "
             "blocks that were computed are kept there; move it back, and the same command continues"
         )
-
-    @property
-    def temporary(self) -> Path:
-        """Where the result is while its structure is written."""
-        return self.path.with_name(self.path.name + ".tmp")
 
     @property
     def count(self) -> int:
@@ -269,7 +248,7 @@ class Store:
         with disk.refusing(self.path):
             if waiting:
                 disk.sync_numbers(self._fd)
-                write_digests(self._fd, self.table, waiting)
+                self.table.write_digests(self._fd, waiting)
         self._done[list(waiting)] = True
 
     def damaged(self) -> list[int]:
@@ -281,9 +260,8 @@ class Store:
 
     def undo(self, blocks: Iterable[int]) -> None:
         """Takes blocks out of those that are done. Raises SweepError."""
-        nothing = bytes(self.table.row_bytes)
         with disk.refusing(self.path):
-            write_digests(self._fd, self.table, dict.fromkeys(blocks, nothing))
+            self.table.write_digests(self._fd, dict.fromkeys(blocks, bytes(self.table.row_bytes)))
         self._done[list(blocks)] = False
 
     def finish(self, texts: Mapping[str, str], gather: Gather | None) -> list[int]:
@@ -291,7 +269,7 @@ class Store:
 
         Parameters
         ----------
-        texts : of `ENDINGS`
+        texts : what is known at the end
         gather : of a summary
 
         Returns
@@ -299,45 +277,65 @@ class Store:
         list of int
             Blocks that turned out to be damaged, which have to be computed again first.
         """
-        assert self.layout is not None
         with disk.refusing(self.output):
             self._check_there()
             self.commit()
             found = self.damaged()
             if not found and gather is not None:
-                found = gathered(self.path, self._fd, self.layout, gather)
+                found = self._gathered(gather)
                 self.undo(found)
             if found:
                 return found
-            end(self._fd, self.layout, texts)
+            self._end(texts)
             disk.fsync(self._fd)
-            if not reads_back(self.path):
-                raise SweepError(
-                    f"{self.output}: differs when read back from what was written; the disk may be failing"
-                )
+            with StoredFile(self.path) as file:
+                last = file.tables["cells"].blocks.count - 1
+                if not file.ending or not all(file.is_sound("cells", block) for block in {0, last // 2, last}):
+                    raise SweepError(
+                        f"{self.output}: differs when read back from what was written; the disk may be failing"
+                    )
             disk.rename(self.path, self.output)
             disk.sync_folder(self.output.parent)
         return []
+
+    def _gathered(self, gather: Gather) -> list[int]:
+        """Writes the columns of a summary; gives the blocks of rows that turned out to be damaged, where some did."""
+        with StoredFile(self.path) as file:
+            found = sorted({block for block, _ in file.damaged("rows", range(self.table.blocks.count))})
+            if found:
+                return found
+            table = file.tables["cells"]
+            digests = {block: table.write(self._fd, block, gather(file, block)) for block in range(table.blocks.count)}
+        disk.sync_numbers(self._fd)
+        table.write_digests(self._fd, digests)
+        return []
+
+    def _end(self, texts: Mapping[str, str]) -> None:
+        """Writes what is known at the end; nothing: takes back that the run has ended. Raises OSError."""
+        assert self.file is not None
+        text = json.dumps(dict(texts)).encode().ljust(ENDING_BYTES) if texts else bytes(ENDING_BYTES)
+        behind = checksum(text, ENDING_BYTES) if texts else WRONG
+        disk.write_all(self._fd, (text, behind), self.file.ending_at)
 
     def reopen(self, damaged: Iterable[int]) -> None:
         """Takes a finished result up again, some blocks of which are to be computed again. Raises SweepError."""
         with disk.refusing(self.output):
             disk.rename(self.output, self.path)
             disk.sync_folder(self.output.parent)
-            layout = self.found()
-            assert layout is not None
-            self._open(layout)
-            end(self._fd, layout, None)
-        self.undo(damaged)
-        os.close(self._fd)
-        self.resume(layout)
+            file = self.found()
+            assert file is not None
+            self._open(file)
+            self._end({})
+            self.undo(damaged)
+            os.close(self._fd)
+            file.close()
+            self.resume(StoredFile(self.path))
 
     def shared(self) -> Shared | None:
         """What another process needs to write blocks to the file; None where blocks of two would share a page."""
-        assert self.layout is not None
-        if any((place.all_at(self.table.blocks.count) % PAGE).any() for place in self.table.places):
+        if any((place.at % PAGE).any() for place in self.table.places):
             return None
-        return Shared(str(self.path), self.layout.key, self.table)
+        return Shared(str(self.path), self._seal, self.table)
 
     def discard(self) -> None:
         """Removes what is there. Raises SweepError."""
@@ -355,6 +353,8 @@ class Store:
                     self.commit()
             os.close(self._fd)
             self._fd = -1
+        if self.file is not None:
+            self.file.close()
 
 
 @contextlib.contextmanager

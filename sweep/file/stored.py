@@ -13,7 +13,6 @@ from sweep.cells.output_schema import output_schema
 from sweep.file.reading import StoredFile
 
 if TYPE_CHECKING:
-    from sweep.cells.schema import Coordinate
     from sweep.study.model import Study
 
 
@@ -33,13 +32,13 @@ class StoredColumn:
     @property
     def values(self) -> Any:
         """All its numbers."""
-        return np.asarray(self.numbers[...])
+        return self[...]
 
     def __getitem__(self, key: Any) -> Any:
         return np.asarray(self.numbers[key])
 
 
-class Stored:
+class Stored(dict[str, StoredColumn]):
     """What `sweep.results.statuses` looks at in a Dataset, of a file that was written just now. To be used with `with`.
 
     Parameters
@@ -50,24 +49,15 @@ class Stored:
     """
 
     def __init__(self, output: Path, study: Study) -> None:
-        schema = self._schema = output_schema(study, {})
+        schema = output_schema(study, {})
         self._file = StoredFile(output)
-        self._numbers = self._file.columns()
-        self.coords: dict[str, Coordinate] = {c.name: c for c in schema.coordinates}
-        self._columns = {c.name: c for c in schema.columns}
+        numbers = self._file.columns()
+        self.coords = {c.name: StoredColumn(c.dims, c.attrs, np.asarray(c.values)) for c in schema.coordinates}
+        found = {c.name: StoredColumn((*schema.grid.dims, *c.dims), c.attrs, numbers[c.name]) for c in schema.columns}
+        super().__init__({**self.coords, **found})
 
     def __enter__(self) -> Stored:
         return self
 
     def __exit__(self, *fault: object) -> None:
         self._file.close()
-
-    def __contains__(self, name: str) -> bool:
-        return name in self._columns or name in self.coords
-
-    def __getitem__(self, name: str) -> StoredColumn:
-        if name in self.coords:
-            coordinate = self.coords[name]
-            return StoredColumn(coordinate.dims, coordinate.attrs, np.asarray(coordinate.values))
-        column = self._columns[name]
-        return StoredColumn((*self._schema.grid.dims, *column.dims), column.attrs, self._numbers[name])

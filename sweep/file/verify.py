@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,11 +11,9 @@ import numpy as np
 
 from sweep.cells.partition import Partition
 from sweep.errors import SweepError
-from sweep.file import disk
 from sweep.file.layout import DAMAGE
-from sweep.file.open import BESIDE, OF_DAMAGE, stored_attrs, unreadable
-from sweep.file.probe import check_own
-from sweep.file.reading import StoredFile, damaged, padding_is_zero, unbroken
+from sweep.file.open import OF_DAMAGE, changed_attrs, unreadable
+from sweep.file.reading import Changed, StoredFile
 from sweep.file.store import unfinished_of
 from sweep.words import as_path
 
@@ -69,99 +67,65 @@ def verify(path: str | os.PathLike[str]) -> Verdict:
     place = output if output.exists() else unfinished_of(output)
     if not place.exists():
         raise SweepError(f"{output}: no such file, and no sweep that writes it")
+    structure = "its structure is damaged, or it is not the result of a sweep"
     try:
         if not place.is_file():
             raise unreadable(place, ValueError("it is no regular file"))
-        return _verdict(output, place)
+        with StoredFile(place) as file:
+            return _verdict(output, file, place == output)
+    except Changed:
+        try:
+            changed_attrs(place)
+        except DAMAGE:
+            return Verdict(output, False, "", (structure,))
+        return Verdict(output, False, "", ("was changed by another program, which left its digests out",))
     except DAMAGE as fault:
         if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
             raise unreadable(place, fault) from None
         text = (str(fault).splitlines() or [type(fault).__name__])[0]
-        return Verdict(output, False, "", (f"its structure is damaged, or it is not the result of a sweep ({text})",))
+        return Verdict(output, False, "", (f"{structure} ({text})",))
 
 
-def _verdict(output: Path, place: Path) -> Verdict:
-    """Raises one of DAMAGE, SweepError."""
-    checked = f"{place.stat().st_size:,} bytes checked"
-    if (found := _structure(place)) is not None:
-        return Verdict(output, False, checked, (found,))
-    with StoredFile(place) as file:
-        if place == output and not file.finished:
-            return Verdict(output, False, checked, (BESIDE,))
-        bad = {name: list(damaged(file, name, _wanted(file, name))) for name in _tables(file)}
-        findings = [line for name, chunks in bad.items() for line in _told(file, name, chunks)]
-        if not padding_is_zero(file):
-            return Verdict(output, False, checked, (*findings, BESIDE))
-        if not file.finished:
-            return _unfinished(output, file, findings)
-        work = bad[file.layout.work_name]
-        blocks = tuple(sorted({block for block, _ in work})) if findings else None
-        return Verdict(output, not findings, checked, tuple(findings), blocks)
+def _verdict(output: Path, file: StoredFile, ended: bool) -> Verdict:
+    """Compares all digests; `ended`: the file has the name of a finished result. Raises one of DAMAGE."""
+    size, table = file.path.stat().st_size, file.tables[file.work]
+    beside = "damaged beside the outputs' numbers: in attributes, coordinates or its structure"
+    if not file.rest_is_sound() or (ended and not file.ending):
+        return Verdict(output, False, f"{size:,} bytes checked", (beside,))
+    findings: list[str] = []
+    blocks: tuple[int, ...] = ()
+    # the columns of a summary are made at its end
+    for name in file.tables if file.ending else (file.work,):
+        wanted = range(len(file.done[name])) if file.ending else np.flatnonzero(file.done[name]).tolist()
+        bad = list(file.damaged(name, wanted))
+        for number, place in enumerate(file.tables[name].places):
+            runs = _runs(file.tables[name].blocks, [block for block, column in bad if column == number])
+            told = [f"{place.name}: damaged between its cells {start:,} and {stop:,}" for start, stop in runs]
+            findings += _shortened(told, f"{place.name}: damaged in {{}} more places")
+        if name == file.work:
+            blocks = tuple(sorted({block for block, _ in bad}))
+    if file.ending:
+        checked = f"{size:,} bytes checked"
+        return Verdict(output, not findings, checked, tuple(findings), blocks if findings else None)
+    done = file.done[file.work]
+    missing = [table.blocks.bounds(block) for block in np.flatnonzero(~done).tolist()]
+    told = [f"missing: {file.work} {start:,} to {stop:,}" for start, stop in missing]
+    findings += _shortened(told, "missing: {} more")
+    findings = findings or ["all blocks are there, but it has not ended; run the sweep again to finish"]
+    checked = f"unfinished, {int(done.sum()):,} of {done.size:,} blocks there and checked"
+    return Verdict(output, False, checked, tuple(findings))
 
 
-def _structure(place: Path) -> str | None:
-    """What is wrong with all but the numbers. Raises OSError, SweepError."""
-    fd = disk.open_file(place, os.O_RDONLY)
-    try:
-        sound = unbroken(fd, path=place)
-    finally:
-        os.close(fd)
-    if sound is None:
-        try:
-            stored_attrs(place)
-        except SweepError:
-            return "its structure is damaged, or it is not the result of a sweep"
-        return "was changed by another program, which left its digests out"
-    if not sound:
-        return BESIDE
-    import h5py
-
-    with h5py.File(place, "r") as file:
-        check_own(file)
-    return None
+def _runs(blocks: Partition, bad: list[int]) -> Iterator[tuple[int, int]]:
+    """The first and the last cell but one of damaged blocks, neighbouring ones together."""
+    for some in np.split(np.array(bad, np.int64), np.flatnonzero(np.diff(bad) > 1) + 1) if bad else ():
+        yield blocks.bounds(int(some[0]))[0], blocks.bounds(int(some[-1]))[1]
 
 
-def _tables(file: StoredFile) -> Iterable[str]:
-    """Those that are there; the columns of a summary are made at its end."""
-    return file.layout.tables if file.finished else (file.layout.work_name,)
-
-
-def _wanted(file: StoredFile, name: str) -> list[int]:
-    done = file.done(name)
-    return list(range(len(done))) if file.finished else np.flatnonzero(done).tolist()
-
-
-def _told(file: StoredFile, name: str, chunks: list[tuple[int, int]]) -> Iterator[str]:
-    """Damaged cells of every column of a table."""
-    table = file.layout.tables[name]
-    for number, place in enumerate(table.places):
-        yield from _runs(place.name, table.blocks, [block for block, column in chunks if column == number])
-
-
-def _runs(name: str, blocks: Partition, bad: list[int]) -> Iterator[str]:
-    """Damaged cells of a column, neighbouring blocks together."""
-    runs: list[list[int]] = []
-    for index in bad:
-        if runs and runs[-1][1] == index:
-            runs[-1][1] += 1
-        else:
-            runs.append([index, index + 1])
-    for first, last in runs[:MOST_TOLD]:
-        yield f"{name}: damaged between its cells {blocks.bounds(first)[0]:,} and {blocks.bounds(last - 1)[1]:,}"
-    if len(runs) > MOST_TOLD:
-        yield f"{name}: damaged in {len(runs) - MOST_TOLD} more places"
-
-
-def _unfinished(output: Path, file: StoredFile, findings: list[str]) -> Verdict:
-    work, blocks = file.layout.work_name, file.layout.work.blocks
-    done = file.done(work)
-    missing = [blocks.bounds(block) for block in np.flatnonzero(~done).tolist()]
-    told = [f"missing: {work} {start:,} to {stop:,}" for start, stop in missing[:MOST_TOLD]]
-    if len(missing) > MOST_TOLD:
-        told.append(f"missing: {len(missing) - MOST_TOLD:,} more")
-    found = [*findings, *told] or ["all blocks are there, but it has not ended; run the sweep again to finish"]
-    checked = f"unfinished, {int(done.sum()):,} of {blocks.count:,} blocks there and checked"
-    return Verdict(output, False, checked, tuple(found))
+def _shortened(lines: list[str], more: str) -> list[str]:
+    """The first lines, and how many more there are."""
+    left = len(lines) - MOST_TOLD
+    return lines if left <= 0 else [*lines[:MOST_TOLD], more.format(f"{left:,}")]
 
 
 def check_whole(output: Path) -> None:

@@ -16,6 +16,7 @@ from sweep.cells.schema import METHOD_USED, STATUS
 if TYPE_CHECKING:
     import xarray as xr
 
+    from sweep.file.reading import Numbers
     from sweep.file.stored import Stored, StoredColumn
 
     Cells: TypeAlias = xr.Dataset | Stored
@@ -164,7 +165,7 @@ def _tally(column: xr.DataArray | StoredColumn, lowest: int = 0) -> tuple[Any, d
     return counts, first
 
 
-def flat_pieces(column: xr.DataArray | StoredColumn, at: tuple[int, ...] = ()) -> Iterator[Any]:
+def flat_pieces(column: xr.DataArray | StoredColumn | Numbers, at: tuple[int, ...] = ()) -> Iterator[Any]:
     """The cells in C order, some at a time; `at` are indices along the first dimensions."""
     shape = column.shape[len(at) :]
     row = math.prod(shape[1:])

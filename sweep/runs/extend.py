@@ -72,15 +72,12 @@ class Reused:
     """
 
     def __init__(self, output: Path, study: Study) -> None:
-        import h5py
-
         self._output, self._study, self._grid = output, study, Grid(study)
         self._columns: tuple[Column, ...] = columns(study)
         try:
-            self._file = h5py.File(output, "r")
             self._stored = StoredFile(output)
-            old = Study.from_json(str(self._file.attrs["study_json"]), declared=True)
-            self.taken_over = str(self._file.attrs.get(TAKEN_OVER, ""))
+            old = Study.from_json(self._stored.attrs["study_json"], declared=True)
+            self.taken_over = str(self._stored.attrs.get(TAKEN_OVER, ""))
         except DAMAGE as fault:
             raise unreadable(output, fault) from None
         self._numbers: dict[str, Any] = dict(self._stored.columns())
@@ -96,7 +93,6 @@ class Reused:
 
     def __exit__(self, *fault: object) -> None:
         self._stored.close()
-        self._file.close()
 
     @property
     def cells(self) -> int:
@@ -213,12 +209,11 @@ class Retried(Reused):
 
 def has_failed(output: Path) -> bool:
     """Whether a cell of a finished result FAILED. Raises SweepError where it keeps no cells."""
-    import h5py
-
-    with h5py.File(output, "r") as file:
-        if STATUS not in file:
+    with StoredFile(output) as file:
+        columns = file.columns()
+        if STATUS not in columns:
             raise SweepError(f"{output}: a summary does not keep the cells that FAILED; compute it anew with --force")
-        return any((piece == Status.FAILED).any() for piece in flat_pieces(file[STATUS]))
+        return any((piece == Status.FAILED).any() for piece in flat_pieces(columns[STATUS]))
 
 
 class Precomputed:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from sweep.cells.fingerprint import difference
 from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import row_blocks
 from sweep.errors import SweepError
-from sweep.file.layout import Layout
 from sweep.file.open import stored_fingerprint
+from sweep.file.reading import StoredFile
 from sweep.file.store import Store
 from sweep.file.verify import check_whole, verify
 from sweep.runs.extend import has_failed, obstacle
@@ -44,23 +46,24 @@ def is_complete(task: Task) -> bool:
 
 def take_up(store: Store, task: Task) -> None:
     """Continues what an earlier run left. Raises SweepError where that was another study, unless forced."""
-    layout = _found(store, task)
-    if layout is None and task.repair and not task.force and task.output.exists():
+    left = _found(store, task)
+    if left is None and task.repair and not task.force and task.output.exists():
         store.reopen(verify(task.output).blocks or ())
-    elif layout is None:
+    elif left is None:
         store.discard()
-    elif dict(layout.fingerprint) == dict(task.fingerprint) and _fits(layout, task):
-        store.resume(layout)
+    elif left.fingerprint == dict(task.fingerprint) and _fits(left, task):
+        store.resume(left)
     elif task.force:
+        left.close()
         store.discard()
     else:
         raise SweepError(
             f"{store.path}: the unfinished result of another study or version; finish that one first, choose another "
-            "name, or give it up with --force\n" + _listed(layout.fingerprint, task.fingerprint)
+            "name, or give it up with --force\n" + _listed(left.fingerprint, task.fingerprint)
         )
 
 
-def _found(store: Store, task: Task) -> Layout | None:
+def _found(store: Store, task: Task) -> StoredFile | None:
     """What an earlier run left; None where that is damaged and given up."""
     try:
         return store.found()
@@ -70,12 +73,12 @@ def _found(store: Store, task: Task) -> Layout | None:
         return None
 
 
-def _fits(layout: Layout, task: Task) -> bool:
+def _fits(left: StoredFile, task: Task) -> bool:
     """Whether a file has the columns and rows of a study. Raises SweepError where it has not, unless forced."""
-    columns = [(c.name, c.cell_bytes) for c in part_columns(task.study)]
-    rows = row_blocks(task.study).count
-    work = layout.work
-    if [(p.name, p.cell_bytes) for p in work.places] == columns and work.blocks.size == rows:
+    columns = [(c.name, np.dtype(c.dtype), c.shape) for c in part_columns(task.study)]
+    table = left.tables[left.work]
+    found = [(p.name, np.dtype(p.dtype), p.shape) for p in table.places]
+    if found == columns and table.blocks.size == row_blocks(task.study).count:
         return True
     if task.force:
         return False
@@ -84,8 +87,8 @@ def _fits(layout: Layout, task: Task) -> bool:
 
 def tidy(store: Store, task: Task) -> None:
     """Removes what was left over although its output is complete; not that of another study."""
-    layout = _found(store, task)
-    if layout is not None and dict(layout.fingerprint) == dict(task.fingerprint):
+    left = _found(store, task)
+    if left is not None and left.fingerprint == dict(task.fingerprint):
         store.discard()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from sweep.cells.block import Found
@@ -10,11 +11,10 @@ from sweep.cells.output_schema import gathered
 from sweep.cells.partition import row_blocks
 from sweep.errors import SweepError
 from sweep.file import disk
-from sweep.file.ending import Gather
-from sweep.file.frame import Frame, cuts_of
+from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import stored_fingerprint
 from sweep.file.reading import StoredFile
-from sweep.file.store import Store, opened
+from sweep.file.store import Gather, Store, opened
 from sweep.file.verify import check_whole
 from sweep.runs import resume
 from sweep.runs.extend import Precomputed, Retried, Reused, is_of_another_version
@@ -40,10 +40,10 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
             resume.tidy(store, task)
             return True
         resume.take_up(store, task)
-        if store.layout is not None and not store.missing():
+        if store.file is not None and not store.missing():
             return _run_session(Session(task, None, store.table.blocks, sampled=False), store, None)
         reused = precomputed or _reused(task, stack)
-        blocks = None if store.layout is None else store.table.blocks
+        blocks = None if store.file is None else store.table.blocks
         try:
             cluster = stack.enter_context(joined(task))
             session = Session(task, cluster, blocks, sampled=precomputed is None, reused=reused)
@@ -69,12 +69,12 @@ def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
 
 def _run_session(session: Session, store: Store, cluster: Cluster | None) -> bool:
     """Computes what is missing and ends the result; False where the time was up before."""
-    progress = session.begin(range(session.blocks.count) if store.layout is None else store.missing())
+    progress = session.begin(range(session.blocks.count) if store.file is None else store.missing())
     session.tick = store.tick
     session.log_begin()
     # held back wherever they would leave half a file behind
     with CtrlC():
-        if store.layout is None:
+        if store.file is None:
             _begin(session, store, shared=cluster is not None)
         try:
             _finish(session, store, cluster)
@@ -92,15 +92,15 @@ def _run_session(session: Session, store: Store, cluster: Cluster | None) -> boo
 def _begin(session: Session, store: Store, shared: bool) -> None:
     """Makes the file. Raises SweepError where it has no room on the disk."""
     task = session.task
-    cuts = cuts_of(task.study, session.schema, session.blocks.partition)
-    frame = Frame(session.schema, cuts, task.fingerprint, session.began, shared)
-    needed, free = frame.layout.size, disk.free(task.output.parent)
+    schema = replace(session.schema, attrs={**session.schema.attrs, "start": session.began})
+    cuts = cuts_of(task.study, schema, session.blocks.partition)
+    needed, free = expected_size(schema, cuts), disk.free(task.output.parent)
     if needed > free:
         raise SweepError(
             f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, choose "
             "another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
         )
-    store.begin(frame)
+    store.begin(schema, cuts, shared)
 
 
 def _kept(store: Store) -> str:
@@ -130,8 +130,8 @@ def _gather(study: Study) -> Gather:
     per_group = row_blocks(study).per_group
 
     def gather(file: StoredFile, block: int) -> dict[str, Any]:
-        first, last = file.layout.tables["cells"].blocks.bounds(block)
-        rows = {name: c.run(first * per_group, last * per_group) for name, c in file.columns("rows").items()}
+        first, last = file.tables["cells"].blocks.bounds(block)
+        rows = {name: c[first * per_group : last * per_group] for name, c in file.columns("rows").items()}
         return gathered(study, rows)
 
     return gather

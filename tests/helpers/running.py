@@ -70,7 +70,7 @@ def kept(output):
     if not unfinished_of(output).exists():
         return []
     with StoredFile(unfinished_of(output)) as file:
-        return np.flatnonzero(file.done(file.layout.work_name)).tolist()
+        return np.flatnonzero(file.done[file.work]).tolist()
 
 
 def place(output, name, cell, table="cells"):
@@ -79,7 +79,7 @@ def place(output, name, cell, table="cells"):
         column = file.columns(table)[name]
         block = column.table.blocks.index(cell)
         start = column.table.blocks.bounds(block)[0]
-        return column.place.at(block) + (cell - start) * column.place.cell_bytes
+        return int(column.place.at[block]) + (cell - start) * column.place.empty(1).nbytes
 
 
 def fail_on(monkeypatch, name, turn, number):

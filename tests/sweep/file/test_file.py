@@ -1,9 +1,7 @@
 """A result on the disk: what plain readers of HDF5 find in it, of which format it is, and who may write to it."""
 
-import json
 import os
 import signal
-import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +11,6 @@ import numpy as np
 import pytest
 import toy_studies
 import xarray as xr
-import xxhash
 
 import sweep
 from sweep.cells.output_schema import output_schema
@@ -63,30 +60,14 @@ def test_the_size_of_a_result_is_known_before_it_is_computed(tmp_path, cells):
     assert (tmp_path / "out.h5").stat().st_size == pytest.approx(found, rel=0.05)
 
 
-def retold(path, number):
-    """The file with another number of its format, and sealed."""
-    content = path.read_bytes()
-    mark = content[-12:]
-    (length,) = struct.unpack("<I", content[-16:-12])
-    text = json.dumps({**json.loads(content[-32 - length : -32]), "format": number}).encode()
-    seal = xxhash.xxh3_128(text).digest() + struct.pack("<I", len(text)) + mark
-    path.write_bytes(content[: -32 - length] + text + seal)
-
-
-@pytest.mark.parametrize("number", [1, 3, 4])
+@pytest.mark.parametrize("number", [b"3", b"5"])
 def test_a_file_of_another_format_is_refused_by_its_number(tmp_path, number):
     path = tmp_path / "out.h5"
     run(path, axes={"height": [1.0, 2.0]}).close()
-    if number == 1:
-        path.write_bytes(path.read_bytes() + b"foliot seal\n")  # how files of formats 1 and 2 end
-    else:
-        retold(path, number)
+    path.write_bytes(path.read_bytes()[:-2] + number + b"\n")
     for function in (sweep.open_result, sweep.verify):
-        if number == 3:
+        with pytest.raises(sweep.SweepError, match="this version of foliot reads format 4 alone"):
             function(path)
-        else:
-            with pytest.raises(sweep.SweepError, match="this version of foliot reads format 3 alone"):
-                function(path)
 
 
 def test_digests_reach_the_disk_behind_their_numbers(tmp_path, monkeypatch):
