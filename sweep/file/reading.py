@@ -185,7 +185,7 @@ class Numbers:
             for part in parts:
                 fill(part)
         kept = [places.size for places in wanted if places.ndim]
-        found = out.reshape(*kept, *self.place.shape)
+        found = out.reshape((*kept, *self.place.shape))
         for k in reversed(range(len(grid), len(key))):
             found = found[(*[slice(None)] * (len(kept) + k - len(grid)), key[k])]
         return found
