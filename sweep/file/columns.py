@@ -9,7 +9,7 @@ import xarray as xr
 from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.core import indexing
 
-from sweep.file.open import changed_attrs
+from sweep.file.foreign import changed_attrs
 from sweep.file.reading import Changed, Numbers, StoredFile
 
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from sweep.cells.partition import Partition
 from sweep.errors import SweepError
+from sweep.file.foreign import changed_attrs
 from sweep.file.layout import DAMAGE
-from sweep.file.open import OF_DAMAGE, changed_attrs, unreadable
+from sweep.file.open import OF_DAMAGE, unreadable
 from sweep.file.reading import Changed, StoredFile
 from sweep.file.store import unfinished_of
 from sweep.words import as_path
