@@ -75,15 +75,12 @@ __all__ = list(_HOMES)
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'sweep' has no attribute {name!r}")
-    import_module("sweep.study.model").SHOWN["html"] = _study_html
+    # what a notebook shows of a study needs to know what a run takes, which is above the study
+    import_module("sweep.study.model").Study._repr_html_ = lambda study: import_module(
+        "sweep.show.notebook"
+    ).study_html(study)
     # the room of that name is the function as well, and stays what `sweep.study.read` and its like begin with
     return import_module("sweep.study") if name == "study" else getattr(import_module(f"sweep.{_HOMES[name]}"), name)
-
-
-def _study_html(study: Any) -> str:
-    """How a notebook shows a study; imported when one does."""
-    found: str = import_module("sweep.show.notebook").study_html(study)
-    return found
 
 
 def __dir__() -> list[str]:

@@ -23,7 +23,7 @@ import numpy as np
 
 from kernels.interface import Field
 from sweep.study import samples
-from sweep.study.entries import EXAMPLE, SAMPLED_EXAMPLE, Entries
+from sweep.study.entries import EXAMPLE, NONE, SAMPLED_EXAMPLE, Entries
 from sweep.study.mistakes import Mistakes, show
 from sweep.study.model import SMALLEST_RTOL, Axis, Block
 from sweep.study.spacing import LARGEST_AXIS
@@ -99,9 +99,10 @@ def _block(keys: Mapping[str, Any], at: str, entries: Entries, field_of: FieldOf
         where = f"{at_axes}.{name}"
         field = field_of(name, where)
         without = isinstance(entry, Mapping) and {"values", "file", "num"}.isdisjoint(entry)
+        axes[name] = Axis(name, NONE, "values")
         if sampled and not without:
             mistakes.add(where, f"the design chooses the values; write e.g. {SAMPLED_EXAMPLE}")
-            axes[name] = Axis(name, np.empty(0), "values")
+        if field is None or (sampled and not without):
             continue
         # where the design cannot be read, an axis may be meant for a sampled one
         between = sampled or (not design and without and not {"start", "stop"}.isdisjoint(entry))
@@ -113,10 +114,8 @@ def _block(keys: Mapping[str, Any], at: str, entries: Entries, field_of: FieldOf
             mistakes.add(where, f'{name} is an array; as an axis it needs design = "zip"')
         elif design == "product":
             _, first, counts = np.unique(values, return_index=True, return_counts=True)
-            # NaN may stand once, too; but the words of a field that is not known are all NaN
-            twice = first[(counts > 1) & ((field is not None) | ~np.isnan(values[first]))]
-            if len(twice):
-                label = axes[name].label(int(twice[0]))
+            if (counts > 1).any():
+                label = axes[name].label(int(first[counts > 1][0]))
                 mistakes.add(where, f"{label} stands more than once; give every value once")
     lengths = {name: len(axis) for name, axis in axes.items()}
     if design == "zip" and all(lengths.values()) and len(set(lengths.values())) > 1:
@@ -141,16 +140,15 @@ def _design(found: Any, where: str, axes: int, mistakes: Mistakes) -> tuple[str,
     design = mistakes.word(found.get("kind"), f"{where}.kind", DESIGNS) or ""
     if design in PLAIN or not design:
         return design, {}
-    n, seed, scramble = mistakes.count(found.get("n"), f"{where}.n", LARGEST_AXIS), found.get("seed", 0), True
-    if n is not None and design in samples.POWERS_OF_TWO and n & (n - 1):
+    n, scramble = mistakes.whole(found.get("n"), f"{where}.n", 2, LARGEST_AXIS), True
+    if design in samples.POWERS_OF_TWO and n & (n - 1):
         lower = 1 << (n.bit_length() - 1)
         mistakes.add(f"{where}.n", f"a Sobol' sequence needs a power of 2; write {lower} or {2 * lower}")
-    if n is not None and (points := samples.count(design, axes, n)) > LARGEST_AXIS:
+    if (points := samples.count(design, axes, n)) > LARGEST_AXIS:
         mistakes.add(f"{where}.n", f"makes {points:,} points; expected at most {LARGEST_AXIS:,}")
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 0 <= seed <= LARGEST_SEED:
-        mistakes.add(f"{where}.seed", f"expected a whole number from 0 to {LARGEST_SEED}, found {show(seed)}")
+    seed = mistakes.whole(found.get("seed", 0), f"{where}.seed", 0, LARGEST_SEED)
     if scrambled and not isinstance(scramble := found.get("scramble", True), bool):
         mistakes.add(f"{where}.scramble", f"expected true or false, found {show(scramble)}")
     if len(mistakes) > before:
         return design, {}
-    return design, {"n": n, "seed": int(seed)} | ({"scramble": scramble} if scrambled else {})
+    return design, {"n": n, "seed": seed} | ({"scramble": scramble} if scrambled else {})

@@ -37,29 +37,26 @@ NONE: Floats = np.empty(0)
 class Entries:
     """Reads the entries of one study, each for a field of the kernel.
 
-    What is wrong goes to `mistakes`, and NaN or no values come back. A field of None is one that is not known: then
-    only the shape of the entry is checked. Files are named relative to `folder`.
+    What is wrong goes to `mistakes`, and NaN or no values come back. Files are named relative to `folder`.
     """
 
     mistakes: Mistakes
     folder: Path
 
-    def quantity(self, entry: Any, field: Field | None, where: str) -> float | Floats:
+    def quantity(self, entry: Any, field: Field, where: str) -> float | Floats:
         """A number, a table { value, unit }, or a word of the field, as the number in the kernel's column.
 
         Of an array parameter also a list, or a table { file, unit }; one number stands for all its values.
         """
-        array, factor, at = field is not None and bool(field.dims), None, where
+        array, factor, at = bool(field.dims), None, where
         if isinstance(entry, Mapping):
-            forms = ("value", "file") if array or field is None else ("value",)
+            forms = ("value", "file") if array else ("value",)
             table = self.mistakes.keys(entry, (*forms, "unit"), where)
             factor = self._factor(table, field, where)
             if "file" in table and "file" in forms:
                 if "value" in table:
                     self.mistakes.add(where, "value and file exclude each other; keep one")
-                return (
-                    math.nan if field is None else frozen(scaled(self._file(table, field.name, field, where), factor))
-                )
+                return frozen(scaled(self._file(table, field, where), factor))
             entry, at = table.get("value"), f"{where}.value"
         if array and hasattr(entry, "__array__"):
             entry = np.asarray(entry).tolist()
@@ -68,18 +65,16 @@ class Entries:
             return float(scaled(values, factor)[0]) if len(values) else math.nan
         if array:
             return frozen(scaled(self._list(entry, field, at), factor))
-        if field is not None:
-            cure = f"to sweep it, write it under [axes.{field.name}]"
-            self.mistakes.add(at, f"expected a number, found a list; {cure}")
+        self.mistakes.add(at, f"expected a number, found a list; to sweep it, write it under [axes.{field.name}]")
         return math.nan
 
-    def axis(self, name: str, given: Any, field: Field | None, where: str, shares: Floats | None = None) -> Axis:
+    def axis(self, name: str, given: Any, field: Field, where: str, shares: Floats | None = None) -> Axis:
         """An axis or coordinate: a list of values, or a table with `spacing`, `values` or `file`.
 
         Of an array parameter a list of lists, or a csv file with a column for each value: J_1, J_2, ... Of a sampled
         design a table with spacing, start and stop, between which the values lie at `shares` of the way.
         """
-        mistakes, before, array = self.mistakes, len(self.mistakes), field is not None and bool(field.dims)
+        mistakes, before, array = self.mistakes, len(self.mistakes), bool(field.dims)
         table, at = (given, f"{where}.values") if isinstance(given, Mapping) else ({"values": given}, where)
         allowed = (*FORMS, *SPACING_KEYS) if shares is None else ("spacing", "start", "stop")
         table = mistakes.keys(table, (*allowed, "unit"), where)
@@ -93,30 +88,30 @@ class Entries:
         for key in (key for key in SPACING_KEYS if key in table and form in ("values", "file")):
             mistakes.add(f"{where}.{key}", f"does not go with {form}; leave it out")
         factor, values, kind = self._factor(table, field, where), NONE, form
-        if field and shares is not None and (array or field.integer):
+        if shares is not None and (array or field.integer):
             kind = "an array" if array else "a whole number"
             mistakes.add(where, f"{name} is {kind}, which is not sampled; sweep it in a block of its own")
-        elif field and form == "spacing" and array:
+        elif form == "spacing" and array:
             mistakes.add(f"{where}.spacing", f"{name} has a value for each {field.dims[0]}; give values or a file")
         elif form == "spacing":
             values, kind = self._spaced(table, field, where, factor, shares), str(table.get("spacing"))
         elif form == "values":
             values = scaled((self._rows if array else self._list)(table["values"], field, at), factor)
-        elif form == "file" and field is not None:
-            values = scaled(self._file(table, name, field, where, numbered=array), factor)
-        words = {float(number): word for word, number in field.choices.items()} if field else {}
+        elif form == "file":
+            values = scaled(self._file(table, field, where, numbered=array), factor)
+        words = {float(number): word for word, number in field.choices.items()}
         entry = None
         if form == "spacing" and len(values):
             entry = {key: ENTRY[key](value) for key, value in table.items() if key in ENTRY}
         said = tuple(words[value] for value in values.tolist()) if words else None
         return Axis(name, frozen(values), kind, said, entry)
 
-    def _factor(self, table: Mapping[str, Any], field: Field | None, where: str) -> Decimal | None:
+    def _factor(self, table: Mapping[str, Any], field: Field, where: str) -> Decimal | None:
         """What the numbers of an entry are multiplied by, to be in the field's unit."""
         if "unit" not in table:
             return None
         unit, at = self.mistakes.text(table["unit"], f"{where}.unit"), f"{where}.unit"
-        if field is None or not isinstance(table["unit"], str):
+        if not isinstance(table["unit"], str):
             return None
         if field.choices:
             self.mistakes.add(at, f"{field.name} takes words, which have no unit; leave it out")
@@ -124,11 +119,11 @@ class Entries:
         return self.mistakes.tried(at, lambda: scale(unit, field.unit, field.name), None)
 
     def _spaced(
-        self, table: Mapping[str, Any], field: Field | None, where: str, factor: Decimal | None, shares: Floats | None
+        self, table: Mapping[str, Any], field: Field, where: str, factor: Decimal | None, shares: Floats | None
     ) -> Floats:
         """Values between start and stop: `num` of them, or at the shares of a sampled design."""
-        mistakes, before, spacing, num = self.mistakes, len(self.mistakes), None, None
-        if field and field.choices:
+        mistakes, before, spacing, num = self.mistakes, len(self.mistakes), None, 2
+        if field.choices:
             mistakes.add(where, f"{field.name} takes words; write e.g. values = [{quoted(field.choices)}]")
         elif "spacing" not in table:
             mistakes.add(f"{where}.spacing", 'missing; write spacing = "linear" or "log"')
@@ -144,7 +139,7 @@ class Entries:
         start, stop = ends
         if shares is None:
             cure = "; for a single value write values = [...]"
-            num = mistakes.count(table.get("num", 2), f"{where}.num", LARGEST_AXIS, cure)
+            num = mistakes.whole(table.get("num", 2), f"{where}.num", 2, LARGEST_AXIS, cure)
             if "num" not in table:
                 mistakes.add(f"{where}.num", f"missing; write e.g. {EXAMPLE}")
             if start == stop and len(mistakes) == before:
@@ -152,7 +147,7 @@ class Entries:
         if spacing is None or len(mistakes) > before:
             return NONE
         if shares is None:
-            values = spaced(spacing, start, stop, num or 2, factor)
+            values = spaced(spacing, start, stop, num, factor)
         else:
             values = spread(spacing, start, stop, shares, factor)
         if not np.isfinite(values).all() or (spacing == "log" and not values.all()):
@@ -161,11 +156,11 @@ class Entries:
             return NONE
         return values
 
-    def _list(self, found: Any, field: Field | None, where: str) -> Floats:
+    def _list(self, found: Any, field: Field, where: str) -> Floats:
         """A list of numbers or words."""
         if hasattr(found, "__array__"):
             found = np.asarray(found)
-            if found.ndim != 1 or found.dtype != np.float64 or (field and field.choices):
+            if found.ndim != 1 or found.dtype != np.float64 or field.choices:
                 found = found.tolist()
         if isinstance(found, str | bytes) or not isinstance(found, Sequence | np.ndarray):
             self.mistakes.add(where, f"expected a list, found {show(found)}; write e.g. [1.0, 2.0]")
@@ -173,10 +168,10 @@ class Entries:
         if not self._allowed_length(len(found), where):
             return NONE
         if not isinstance(found, np.ndarray) and all(type(item) is float for item in found):
-            found = np.array(found) if not (field and field.choices) else found
+            found = np.array(found) if not field.choices else found
         return found if isinstance(found, np.ndarray) else self._numbers(found, field, lambda i: (f"{where}[{i}]", ""))
 
-    def _rows(self, found: Any, field: Field | None, where: str) -> Floats:
+    def _rows(self, found: Any, field: Field, where: str) -> Floats:
         """A list of lists of equal length: a row for each value of the axis."""
         if hasattr(found, "__array__"):
             found = list(map(np.asarray, found)) if np.ndim(found) == 2 else np.asarray(found).tolist()
@@ -191,16 +186,18 @@ class Entries:
             self.mistakes.add(where, f"expected lists of equal length, found {lengths[0]} and {lengths[-1]} values")
         return np.array(rows) if len(lengths) == 1 and lengths[0] else NONE
 
-    def _file(self, table: Mapping[str, Any], name: str, field: Field, where: str, numbered: bool = False) -> Floats:
+    def _file(self, table: Mapping[str, Any], field: Field, where: str, numbered: bool = False) -> Floats:
         """A column of a csv file, or those that are `numbered`: a row for each value of the axis."""
         found, where = table["file"], f"{where}.file"
         if not isinstance(found, str | Path):
             self.mistakes.add(where, f'expected the name of a csv file, found {show(found)}; write e.g. "points.csv"')
             return NONE
         path = self.folder / found
-        nothing: list[tuple[int, list[str]]] = []
-        cells = self.mistakes.tried(where, lambda: read_columns(self._allowed(path, found), name, numbered), nothing)
-        width = len(cells[0][1]) if cells else 1
+        name = field.name
+        cells = self.mistakes.tried(where, lambda: read_columns(self._allowed(path, found), name, numbered), None)
+        if cells is None:
+            return NONE
+        width = len(cells[0][1])
         texts = [text for _, row in cells for text in row]
         values = self._numbers(
             texts, field, lambda i: (where, f"{path}, line {cells[i // width][0]}: "), from_file=True
@@ -210,6 +207,7 @@ class Entries:
     def _allowed(self, path: Path, found: str | Path) -> Path:
         """A text names a file in the study's folder or below; a `Path`, which a file cannot hold, any. ValueError."""
         try:
+            path.exists()
             inside = path.resolve().is_relative_to(self.folder.resolve())
         except (OSError, RuntimeError, ValueError) as error:
             raise ValueError(f"{show(found)} cannot be read: {getattr(error, 'strerror', None) or error}") from None
@@ -227,7 +225,7 @@ class Entries:
     def _numbers(
         self,
         items: Sequence[Any],
-        field: Field | None,
+        field: Field,
         place: Callable[[int], tuple[str, str]],
         from_file: bool = False,
     ) -> Floats:
@@ -246,13 +244,13 @@ class Entries:
         return NONE if bad else values
 
 
-def _number(found: Any, field: Field | None, from_file: bool) -> float:
+def _number(found: Any, field: Field, from_file: bool) -> float:
     """Number of a word, of a TOML value, or of a text of a csv file. Raises ValueError with the text for the user."""
-    if field and field.choices:
+    if field.choices:
         return float(field.choices[one_of(found, list(field.choices))])
     if from_file:
         if "_" not in found:  # 1_0 is 10 in Python alone
             with contextlib.suppress(ValueError):
                 return float(found)
         raise ValueError(f"expected a number, found {show(found)}")
-    return math.nan if field is None and isinstance(found, str | list | tuple) else exact_float(found)
+    return exact_float(found)

@@ -11,6 +11,7 @@ import numpy as np
 
 from kernels import catalogue
 from kernels.interface import Field, Kernel
+from sweep.errors import StudyError, SweepError
 from sweep.study.condition import CellCondition
 from sweep.study.designs import axes_named, read_designs
 from sweep.study.entries import Entries
@@ -27,9 +28,6 @@ KEYS = (
 )  # fmt: skip
 
 DEFAULT_RTOL = 1e-9
-UNKNOWN = Kernel("?", "", "", (), (), lambda *columns: None, ())
-"""Stands for a kernel that could not be found, so that the rest of a study is checked all the same."""
-
 Fixed = dict[str, float | Floats]
 
 
@@ -40,21 +38,15 @@ class StudyParser:
         self.source, self.folder, self.allow_import = source, folder, allow_import
         self.mistakes = Mistakes()
         self.entries = Entries(self.mistakes, folder)
-        self.kernel = UNKNOWN
 
     def study(self, keys: Mapping[str, Any], text: str) -> Study:
         """The study. Raises StudyError with all that is wrong with it."""
         mistakes, keys = self.mistakes, self.mistakes.keys(keys, KEYS)
-        if "kernel" in keys:
-            folders = [self.folder]
-            found = mistakes.tried("kernel", lambda: load_kernel(keys["kernel"], self.allow_import, folders), None)
-            self.kernel = found or UNKNOWN
-        else:
-            mistakes.add("kernel", f'missing; write e.g. kernel = "{next(iter(catalogue.KERNELS))}"')
+        self.kernel = self._kernel(keys)
         title, question = (mistakes.text(keys.get(key, ""), key) for key in ("title", "question"))
         method, rtol = self._settings(keys)
         outputs = self._outputs(keys)
-        design, axes, blocks = read_designs(keys, self.entries, self._axis_field)
+        design, axes, blocks = read_designs(keys, self.entries, self._field)
         given = self._fixed(keys.get("fixed", {}), axes)
         along = self._along(keys.get("along", {}), outputs)
         fixed, follows = self._complete(axes, given)
@@ -67,7 +59,7 @@ class StudyParser:
             # those that are reduced come last
             axes = dict(sorted(axes.items(), key=lambda item: item[0] in summary.over))
         where = mistakes.text(keys.get("where", ""), "where").strip()
-        if where and self.kernel is not UNKNOWN:
+        if where:
             names = [name for name in SETTINGS if name in axes]
             mistakes.tried("where", lambda: CellCondition(where, self.kernel, names), None)
         mistakes.raise_if_any(self.source)
@@ -90,16 +82,27 @@ class StudyParser:
             where=where,
         )
 
+    def _kernel(self, keys: Mapping[str, Any]) -> Kernel:
+        """The kernel, or the one that is meant. Raises StudyError where none is: nothing else can be checked then."""
+        name = keys.get("kernel")
+        try:
+            if "kernel" in keys:
+                return load_kernel(name, self.allow_import, [self.folder])
+            self.mistakes.add("kernel", f'missing; write e.g. kernel = "{next(iter(catalogue.KERNELS))}"')
+        except SweepError as error:
+            self.mistakes.add("kernel", str(error))
+            if meant := nearest(name, catalogue.KERNELS) if ":" not in str(name) else "":
+                return catalogue.get(meant)
+        raise StudyError(self.source, self.mistakes.found)
+
     def _settings(self, keys: Mapping[str, Any]) -> tuple[str, float]:
         """Method and rtol, each given once: here or as an axis."""
         mistakes, method, rtol = self.mistakes, "auto", DEFAULT_RTOL
-        known = [name for name in SETTINGS if name in keys and (name == "rtol" or self.kernel is not UNKNOWN)]
-        for name in known:
-            if name in axes_named(keys):
-                mistakes.add(name, f"{name} is an axis as well; keep one of the two")
-        if "method" in known:
+        for name in (name for name in SETTINGS if name in keys and name in axes_named(keys)):
+            mistakes.add(name, f"{name} is an axis as well; keep one of the two")
+        if "method" in keys:
             method = mistakes.word(keys["method"], "method", setting("method", self.kernel).choices) or "auto"
-        if "rtol" in known:
+        if "rtol" in keys:
             before = len(mistakes)
             rtol = mistakes.tried("rtol", lambda: exact_float(keys["rtol"]), math.nan)
             if not SMALLEST_RTOL <= rtol < 1 and len(mistakes) == before:
@@ -110,8 +113,8 @@ class StudyParser:
         """Outputs asked for, in the kernel's order; where the study names none, those of its summary, or all."""
         names = [o.name for o in self.kernel.outputs]
         if "outputs" in keys:
-            allowed, cure = None if self.kernel is UNKNOWN else names, "; leave it out to get all of them"
-            asked: Any = self.mistakes.words(keys["outputs"], "outputs", allowed, "a list of outputs", cure)
+            cure = "; leave it out to get all of them"
+            asked: Any = self.mistakes.words(keys["outputs"], "outputs", names, "a list of outputs", cure)
         else:
             summary = keys.get("summary")
             asked = summary.get("outputs") if isinstance(summary, Mapping) else None
@@ -119,21 +122,17 @@ class StudyParser:
                 asked = names
         return tuple(name for name in names if name in asked)
 
-    def _axis_field(self, name: str, where: str) -> Field | None:
-        """What may be an axis: a parameter, or rtol, or the method of a kernel that is known."""
-        if name == "rtol" or (name == "method" and self.kernel is not UNKNOWN):
-            return setting(name, self.kernel)
-        return None if name == "method" else self._field(name, where)
-
     def _field(self, name: str, where: str) -> Field | None:
-        """The kernel's parameter `name`, or a mistake."""
-        found = next((p for p in self.kernel.parameters if p.name == name), None)
-        if found is None and self.kernel is not UNKNOWN:
-            names = [p.name for p in self.kernel.parameters]
-            hint = did_you_mean(name, [*names, *SETTINGS]) or f"; it has {listed(names, word='and')}"
+        """What may be an axis: a parameter, method or rtol. A mistake where it is none, and what it is taken for."""
+        known = {p.name: p for p in self.kernel.parameters}
+        if name in SETTINGS:
+            return setting(name, self.kernel)
+        if name not in known:
+            hint = did_you_mean(name, [*known, *SETTINGS]) or f"; it has {listed(known, word='and')}"
             self.mistakes.add(where, f"kernel {self.kernel.name} has no such parameter{hint}")
-            self.mistakes.meant.add(nearest(name, names))
-        return found
+            name = nearest(name, known)
+            self.mistakes.meant.add(name)
+        return known.get(name)
 
     def _fixed(self, found: Any, axes: Mapping[str, Axis]) -> Fixed:
         """What the study fixes; a value outside of what its field declares would refuse every cell."""
@@ -144,8 +143,8 @@ class StudyParser:
                 self.mistakes.add(where, f"stands at the top of a study: {name} = ..., or under [axes.{name}]")
                 continue
             field = self._field(name, where)
-            given[name] = self.entries.quantity(entry, field, where)
-            if field is not None and len(self.mistakes) == before:
+            given[name] = self.entries.quantity(entry, field, where) if field else math.nan
+            if field and len(self.mistakes) == before:
                 values = np.atleast_1d(given[name])
                 inside = (values > field.lower if field.open_lower else values >= field.lower) & (values <= field.upper)
                 inside &= (np.round(values) == values) | (not field.integer)
@@ -163,7 +162,7 @@ class StudyParser:
         mistakes = self.mistakes
         given = mistakes.table(found, "along", "[along.phase] with num = 200")
         names = [c.name for c in self.kernel.along]
-        for name in (name for name in given if name not in names and self.kernel is not UNKNOWN):
+        for name in (name for name in given if name not in names):
             known = f"; it has {listed(names, word='and')}" if names else "; leave it out"
             hint = did_you_mean(name, names) or known
             mistakes.add(f"along.{name}", f"kernel {self.kernel.name} has no such coordinate{hint}")

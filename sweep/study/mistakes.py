@@ -16,6 +16,7 @@ from sweep.words import nearest as nearest
 from sweep.words import quoted as quoted
 
 T = TypeVar("T")
+U = TypeVar("U")
 
 
 class Mistakes:
@@ -51,7 +52,7 @@ class Mistakes:
         if self.found:
             raise StudyError(source, self.found)
 
-    def tried(self, where: str, action: Callable[[], T], otherwise: T) -> T:
+    def tried(self, where: str, action: Callable[[], T], otherwise: U) -> T | U:
         """What an action gives; `otherwise` if it raises ValueError or SweepError, whose text is a mistake."""
         try:
             return action()
@@ -67,35 +68,30 @@ class Mistakes:
             self.add(where, f"expected a finite number, found {result}")
         return result
 
-    def count(self, value: Any, where: str, largest: int, cure: str = "") -> int | None:
-        """A whole number of values, from 2 to `largest`."""
-        if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-            self.add(where, f"expected a whole number, found {show(value)}")
-        elif int(value) < 2:
-            self.add(where, f"expected at least 2, found {show(value)}{cure}")
-        elif int(value) > largest:
-            self.add(where, f"expected at most {largest}, found {show(value)}")
-        else:
-            return int(value)
-        return None
+    def whole(self, value: Any, where: str, low: int, high: int, cure: str = "") -> int:
+        """A whole number in these limits; the lower one where it is a mistake. The `cure` is for one below."""
+        number = int(value) if isinstance(value, numbers.Integral) and not isinstance(value, bool) else None
+        if number is not None and low <= number <= high:
+            return number
+        below = cure if number is not None and number < low else ""
+        self.add(where, f"expected a whole number from {low} to {high}, found {show(value)}{below}")
+        return low
 
     def word(self, value: Any, where: str, allowed: Iterable[str]) -> str | None:
         """One of the words `allowed`."""
         return self.tried(where, lambda: one_of(value, list(allowed)), None)
 
-    def words(self, value: Any, where: str, allowed: Iterable[str] | None, example: str, cure: str = "") -> list[str]:
-        """A list of some of the words `allowed` (None: of any), none twice and not empty."""
+    def words(self, value: Any, where: str, allowed: Sequence[str], example: str, cure: str = "") -> list[str]:
+        """A list of some of the words `allowed`, none twice and not empty."""
         if isinstance(value, str) or not isinstance(value, Sequence) or not value:
             what = "an empty list" if isinstance(value, Sequence) and not isinstance(value, str) else show(value)
             self.add(where, f"expected {example}, found {what}{cure}")
             return []
-        words = None if allowed is None else list(allowed)
         found: list[str] = []
         for i, item in enumerate(value):
-            place = f"{where}[{i}]"
-            word = self.text(item, place) if words is None else self.word(item, place, words)
-            if isinstance(item, str) and item in found:
-                self.add(place, f"{show(item)} stands twice")
+            word = self.word(item, f"{where}[{i}]", allowed)
+            if word in found:
+                self.add(f"{where}[{i}]", f"{show(item)} stands twice")
             found += [word] if word else []
         return found
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,8 +22,6 @@ AUTO = -1
 SETTINGS = ("method", "rtol")
 """What may be an axis although it is no parameter of the kernel."""
 SMALLEST_RTOL = 1e-15
-SHOWN: dict[str, Callable[[Any], str]] = {}
-"""How a notebook shows a study, as "html"; put here by a room above this one, which knows what a run takes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,10 +215,6 @@ class Study:
         """What is given of an array parameter: its values, or those of all cells."""
         source = self.follows.get(name, name)
         return self.axes[source].values if source in self.axes else np.asarray(self.fixed[name])
-
-    def _repr_html_(self) -> str | None:
-        """What a notebook shows."""
-        return SHOWN["html"](self) if SHOWN else None
 
     def to_json(self) -> str:
         """The study on one line of JSON: arrays exactly, as their bytes; the kernel as it declares itself."""

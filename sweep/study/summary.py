@@ -72,7 +72,7 @@ def _edges(
     mistakes, edges = entries.mistakes, {}
     given = mistakes.table(found, "summary.edges", "[summary.edges.period] with num = 61")
     wanted = [name for name, reductions in outputs.items() if "histogram" in reductions]
-    if not mistakes.good("kernel", "outputs", "summary.outputs", "summary.edges"):
+    if not mistakes.good("outputs", "summary.outputs", "summary.edges"):
         return {}
     for name, entry in given.items():
         where = f"summary.edges.{name}"

@@ -43,7 +43,7 @@ studies/fall.toml: 14 mistakes
   axes.height.unit   "kg" is a mass; height is a length, e.g. "m" or "mm"
   axes.height.start  a log axis needs start > 0, found 0
   axes.height.stop   expected a number, found "5e-3"; drop the quotes
-  axes.height.num    expected at least 2, found 0; for a single value write values = [...]
+  axes.height.num    expected a whole number from 2 to 10000000, found 0; for a single value write values = [...]
   axes.v_0           kernel toy has no such parameter; did you mean v0?
   fixed.g.units      no such key; did you mean unit?
   fixed.g.value      expected a number, found "9.81 m/s^2"; write { value = 9.81, unit = "m/s^2" }
