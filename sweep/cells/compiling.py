@@ -1,7 +1,6 @@
 """Compiling a kernel's functions takes seconds: it is told while it lasts, measured, and remembered for the next time.
 
-A function of columns is compiled when it is called first. numba's functions say by their `signatures` whether they
-have been, those of a kernel by those of their `compiled`; of other functions of `kernels` the first call counts.
+A function of columns is compiled when it is called first. How long numba compiles meanwhile, numba itself tells.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,8 +25,6 @@ SILENT_SECONDS = 1.0
 """What is compiled in less time is not told."""
 TABLE = "compile_seconds.json"
 """File beside the folders of machine code."""
-
-_called: set[int] = set()
 
 
 class WorkClock:
@@ -78,7 +75,7 @@ work_clock = WorkClock()
 
 
 class Compiling:
-    """Watches a kernel's functions.
+    """Watches the first calls of a kernel's functions.
 
     Parameters
     ----------
@@ -107,50 +104,43 @@ class Compiling:
 
     def remember(self) -> None:
         """For the next time that it is compiled, by another version or on another day."""
-        if self.seconds and (table := _table()) is not None:
-            _write(table, {**_read(table), **{f"{self._name}.{m}": round(s, 2) for m, s in self.seconds.items()}})
+        table = _table()
+        if self.seconds and table is not None:
+            seconds = _read(table) | {f"{self._name}.{m}": round(s, 2) for m, s in self.seconds.items()}
+            part = table.with_name(f"{table.name}.{os.getpid()}")
+            with contextlib.suppress(OSError):
+                part.write_text(json.dumps(seconds, indent=1, sort_keys=True), "ascii")
+                part.replace(table)
 
     def _watched(self, method: str, function: Callable[..., None]) -> Callable[..., None]:
+        called = is_kept(function)
+
         @functools.wraps(function)
         def call(*columns: Any) -> None:
-            if not _cold(function):
+            nonlocal called
+            if called:
                 function(*columns)
                 return
-            with self._timed(method):
+            timer = threading.Timer(SILENT_SECONDS, self._tell, [method])
+            timer.daemon = True
+            timer.start()
+            begun, worked = time.perf_counter(), work_clock()
+            try:
                 function(*columns)
+            finally:
+                timer.cancel()
+                called = True
+                taken = time.perf_counter() - begun - (work_clock() - worked)
+                if taken > SILENT_SECONDS:
+                    self.seconds[method] = self.seconds.get(method, 0.0) + taken
 
         return call
 
-    @contextlib.contextmanager
-    def _timed(self, method: str) -> Iterator[None]:
-        begun = time.perf_counter()
-        timer = threading.Timer(SILENT_SECONDS, self._tell, [method])
-        timer.daemon = True
-        timer.start()
-        try:
-            yield
-        finally:
-            timer.cancel()
-            taken = time.perf_counter() - begun
-            if taken > SILENT_SECONDS:
-                self.seconds[method] = self.seconds.get(method, 0.0) + taken
-
     def _tell(self, method: str) -> None:
-        if self._note is not None:
-            what = f"{self._name}.{method}"
-            table = _table()
-            known = _read(table).get(what) if table is not None else None
+        if self._note is not None and work_clock.flag.value:
+            what, table = f"{self._name}.{method}", _table()
+            known = None if table is None else _read(table).get(what)
             self._note(f"compiling {what} ..." + (f" (about {duration(known)} when last done)" if known else ""))
-
-
-def _cold(function: Any) -> bool:
-    """Whether a call will compile it."""
-    signatures = getattr(getattr(function, "compiled", function), "signatures", None)
-    if signatures is not None:
-        return not signatures and not is_kept(function)
-    first = id(function) not in _called
-    _called.add(id(function))
-    return first and str(getattr(function, "__module__", "")).startswith("kernels.")
 
 
 def _table() -> Path | None:
@@ -165,10 +155,3 @@ def _read(table: Path) -> dict[str, float]:
         return {str(what): float(seconds) for what, seconds in found.items() if 0 < float(seconds) < 1e4}
     except (OSError, ValueError, TypeError, AttributeError):
         return {}
-
-
-def _write(table: Path, seconds: dict[str, float]) -> None:
-    part = table.with_name(f"{table.name}.{os.getpid()}")
-    with contextlib.suppress(OSError):
-        part.write_text(json.dumps(seconds, indent=1, sort_keys=True), "ascii")
-        part.replace(table)
