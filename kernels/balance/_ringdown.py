@@ -54,19 +54,6 @@ class Decay(NamedTuple):
     lost: tuple
 
 
-class LastSwing(NamedTuple):
-    """The half swing after which it rests: its number, and the turning points, pairs, on both sides of r_s.
-
-    `kept` is the part a_0 E^k of the turning point at which the search began.
-    """
-
-    number: float
-    above: tuple
-    below: tuple
-    kept: float
-    unsure: bool
-
-
 class Rest(NamedTuple):
     """Half swings until rest, a_N, the least abs(a_k - r_s)/r_s, and what is known of them.
 
@@ -123,13 +110,6 @@ def turning_point(scene, decay, k):
 
 
 @jit
-def _next_turning_point(scene, decay, a):
-    """a_{k+1} of (2), as a pair."""
-    lost = pairs.scaled(pairs.shifted(decay.kept, 1.0), scene.r)
-    return pairs.add(pairs.times(decay.kept, a), pairs.negative(lost))
-
-
-@jit
 def count_by_formula(scene, decay):
     """(4) without its ceil, within 4e-15; a number above 0 where a_0 > r_s."""
     delta, lost = decay.delta[0], decay.lost[0]
@@ -151,54 +131,52 @@ def _whole(x):
 
 
 @jit
-def _last_swing(scene, decay, k, counted):
-    """The half swing that ends below r_s, next to the turning point k, where one is `counted`."""
-    above, kept = turning_point(scene, decay, k)
-    sure = above[0] - scene.r_s + above[1] > 0.0
-    below = _next_turning_point(scene, decay, above)
-    active = counted & _exceeds(below, scene.r_s)
-    k = k + 1.0
-    for _ in range(_CONFIRM_LIMIT):
-        if not any_lane(active):
-            break
-        above = choose(active, below, above)
-        below = choose(active, _next_turning_point(scene, decay, above), below)
-        k = where(active, k + 1.0, k)
-        active = active & _exceeds(below, scene.r_s)
-    return LastSwing(k, above, below, kept, counted & (active | not_(sure)))
-
-
-@jit_call
-def closed(scene):
-    """Its rest: the count by (4), confirmed by the turning points on both sides of it."""
-    moves, decay = scene.start > scene.r_s, decay_of(scene.zeta)
-    guess = where(moves, count_by_formula(scene, decay), 0.0)
-    countless = not_(guess < COUNT_LIMIT)
-    k = _whole(where(countless, 0.0, guess * (1.0 - 4e-15) - 1e-6)) - 1.0
-    swing = _last_swing(scene, decay, where(k > 0.0, k, 0.0), moves & not_(countless))
-    count = where(moves, where(countless, _whole(guess), swing.number), 0.0)
-    last = where(moves, where(countless, math.nan, swing.below[0]), scene.start)
-    over = pairs.shifted(swing.above, -scene.r_s)[0]
-    under = where(moves, -pairs.shifted(swing.below, -scene.r_s)[0], scene.r_s - scene.start)
-    blur_above, blur = _blurs(scene, decay, swing)
-    held = _TWO_ULP * scene.r_s
-    over_error, under_error = where(moves, blur_above + held, 0.0), where(moves, blur + held, 0.0)
-    margin, grazes = _margin(over, under, over_error, under_error, scene.r_s, moves)
-    doubt = where(moves & (scene.zeta > FAINT), fma(_PAIR_ERROR / _TWO_ULP, blur, _LOST), 0.0)
-    return Rest(count, last, where(countless, 0.0, margin), grazes | countless, doubt, swing.unsure)
-
-
-@jit
 def _exceeds(pair, number):
     return pairs.shifted(pair, -number)[0] > 0.0
 
 
-@jit
-def _margin(over, under, over_error, under_error, r_s, moves):
-    """The least distance from r_s, over r_s, and whether one of the distances is no more than its error or 1e-9."""
+@jit_call
+def closed(scene):
+    """Its rest: the count by (4), confirmed by the turning points on both sides of it.
+
+    The turning points k - 1, above r_s, and k, below it, are pairs; `kept` is the part a_0 E^k of the one at which the
+    search began.
+    """
+    r_s, moves, decay = scene.r_s, scene.start > scene.r_s, decay_of(scene.zeta)
+    guess = where(moves, count_by_formula(scene, decay), 0.0)
+    countless = not_(guess < COUNT_LIMIT)
+    k = _whole(where(countless, 0.0, guess * (1.0 - 4e-15) - 1e-6)) - 1.0
+    k, counted = where(k > 0.0, k, 0.0), moves & not_(countless)
+
+    # from below the count on, by (2), to the first turning point that does not exceed r_s
+    above, kept = turning_point(scene, decay, k)
+    sure = above[0] - r_s + above[1] > 0.0
+    lost = pairs.negative(pairs.scaled(pairs.shifted(decay.kept, 1.0), scene.r))
+    below = pairs.add(pairs.times(decay.kept, above), lost)
+    active, k = counted & _exceeds(below, r_s), k + 1.0
+    for _ in range(_CONFIRM_LIMIT):
+        if not any_lane(active):
+            break
+        above = choose(active, below, above)
+        below = choose(active, pairs.add(pairs.times(decay.kept, above), lost), below)
+        k = where(active, k + 1.0, k)
+        active = active & _exceeds(below, r_s)
+    unsure = counted & (active | not_(sure))
+
+    # how far both lie from r_s, and whether that is no more than its error or 1e-9
+    over = pairs.shifted(above, -r_s)[0]
+    under = where(moves, -pairs.shifted(below, -r_s)[0], r_s - scene.start)
+    blur_above, blur = _blurs(scene, decay, k, above[0], below[0], kept)
+    held = _TWO_ULP * r_s
+    over_error, under_error = where(moves, blur_above + held, 0.0), where(moves, blur + held, 0.0)
     grazes = not_(under > GRAZING * r_s) | not_(under > under_error)
     grazes = grazes | (moves & (not_(over > GRAZING * r_s) | not_(over > over_error)))
-    return where(moves & (over < under), over, under) / unit(r_s), grazes
+    margin = where(moves & (over < under), over, under) / unit(r_s)
+
+    count = where(moves, where(countless, _whole(guess), k), 0.0)
+    last = where(moves, where(countless, math.nan, below[0]), scene.start)
+    doubt = where(moves & (scene.zeta > FAINT), fma(_PAIR_ERROR / _TWO_ULP, blur, _LOST), 0.0)
+    return Rest(count, last, where(countless, 0.0, margin), grazes | countless, doubt, unsure)
 
 
 @jit
@@ -208,22 +186,18 @@ def unit(r_s):
 
 
 @jit
-def _blurs(scene, decay, swing):
-    """What two units in the last place of a_0, r and zeta are worth in the turning points above and below r_s.
+def _blurs(scene, decay, k, above, below, kept):
+    """What two units in the last place of a_0, r and zeta are worth in the turning points k - 1 and k.
 
     da/dln a_0 = a_0 E^k, da/dln r = -r (1 + E)(1 - E^k)/(1 - E), and ln zeta counts through ln delta, `steep` times:
     k delta-fold in the first, at most `drift`-fold in the second.
     """
-    delta, k = decay.delta[0], swing.number
+    delta = decay.delta[0]
     steep = 1.0 / (decay.root[0] * decay.root[0])
     felt = scene.zeta > FAINT
     drift = 2.0 * decay.kept[0] * where(felt, delta / where(felt, decay.lost[0], 1.0), 1.0)
     first, second = fma(k * delta, steep, 1.0), fma(drift, steep, 1.0)
-    above = where(k > 1.0, _blur(first, second, swing.above[0], swing.kept), _TWO_ULP * scene.start)
-    return above, _blur(first, second, swing.below[0], decay.kept[0] * swing.kept)
-
-
-@jit
-def _blur(first, second, a, kept):
-    """Two units in the last place of the terms of (3), each so many times."""
-    return _TWO_ULP * (kept * first + magnitude(kept - a) * second)
+    of_above = _TWO_ULP * (kept * first + magnitude(kept - above) * second)
+    kept = decay.kept[0] * kept
+    of_below = _TWO_ULP * (kept * first + magnitude(kept - below) * second)
+    return where(k > 1.0, of_above, _TWO_ULP * scene.start), of_below

@@ -13,7 +13,6 @@ such as the angle of rest near critical damping without friction of motion, is t
 
 import math
 from collections import namedtuple
-from typing import NamedTuple
 
 from kernels.balance import _ringdown
 from kernels.interface import Field
@@ -38,15 +37,6 @@ ROUNDING = 2e-15
 """What `closed` is right to; where the differences of (3) in `_ringdown` lose more, the status says so."""
 
 
-class Kind(NamedTuple):
-    """Whether it is overdamped, moves at all, swings for ever, and whether its motion has an end, be it the release."""
-
-    creeps: bool
-    moves: bool
-    endless: bool
-    lasts: bool
-
-
 @jit
 def side(theta0, swings):
     """+1 or -1: the sign of theta after so many half swings, for swings < 2^50."""
@@ -56,43 +46,9 @@ def side(theta0, swings):
 
 
 @jit
-def half_swing_time(zeta, omega_n):
-    """pi/(w sqrt(1 - zeta^2)) [s], untouched by solid friction."""
-    return math.pi / (omega_n * _ringdown.decrement(zeta)[1][0])
-
-
-@jit
-def _kind(scene):
-    creeps, moves = scene.zeta >= 1.0, scene.start > scene.r_s
-    endless = moves & not_(creeps) & not_((scene.r > 0.0) | (scene.r_s > 0.0))
-    return Kind(creeps, moves, endless, not_((creeps & moves) | endless))
-
-
-@jit
-def _stop_angle(p, scene, e, rest, kind):
-    """Angle of rest [rad], and whether it is too small for a float64."""
-    swings = where((rest.count < _ringdown.COUNT_LIMIT) & not_(kind.creeps), rest.count, 0.0)
-    angle = where(kind.creeps & kind.moves, scene.r, where(kind.endless, 0.0, rest.last))
-    angle = where(kind.moves, scale(side(p.theta0, swings) * angle, e), p.theta0)
-    fades = not_(scene.r > 0.0) & kind.lasts  # to a positive angle, however small
-    return angle, kind.moves & (magnitude(angle) < NORMAL_LOW) & (fades | (magnitude(angle) > 0.0))
-
-
-@jit
-def _margin(scene, rest, kind):
-    """The margin, NaN where it swings for ever."""
-    away = or_none(magnitude(scene.start - scene.r_s) / _ringdown.unit(scene.r_s), scene.r_s > 0.0)
-    return or_none(where(kind.creeps, away, where(scene.r_s > 0.0, rest.margin, 0.0)), not_(kind.endless))
-
-
-@jit
-def _verdict(scene, rest, kind, rtol, faint):
-    """The status but for the range; an angle of rest too `faint` for a float64 is not asked for its error."""
-    loose = not_(faint | (rest.doubt <= rtol * magnitude(rest.last)))
-    loose = loose | not_(rest.doubt <= rtol * rest.margin * scene.r_s)
-    verdict = where(rest.unsure, NOT_CONVERGED, where(rest.grazes, GRAZING, where(loose, INACCURATE, OK)))
-    verdict = where(scene.start > 0.0, verdict, OK)
-    return where(kind.creeps, OVERDAMPED, where(kind.endless, NEVER_ENDS, verdict))
+def swinging(scene):
+    """The scene with a tame damping where it is overdamped and nothing is counted."""
+    return _ringdown.Scene(where(scene.zeta < 1.0, scene.zeta, 0.5), scene.r, scene.r_s, scene.start)
 
 
 @jit
@@ -102,28 +58,42 @@ def closed(p, rtol):
     Overdamped and endless motions get what exists of them.
     """
     scene, e, fine = _ringdown.in_units(p.zeta, p.r, p.r_s, p.theta0)
-    rest, kind = _ringdown.closed(swinging(scene)), _kind(scene)
-    angle, faint = _stop_angle(p, scene, e, rest, kind)
-    half = half_swing_time(where(kind.creeps, 0.0, p.zeta), p.omega_n)
-    time = where(kind.moves, rest.count * half, 0.0)
+    rest = _ringdown.closed(swinging(scene))
+    creeps, moves = scene.zeta >= 1.0, scene.start > scene.r_s
+    endless = moves & not_(creeps) & not_((scene.r > 0.0) | (scene.r_s > 0.0))
+    lasts = not_((creeps & moves) | endless)  # the motion has an end, be it the release
+
+    # where it rests; without friction of motion it fades to a positive angle, which may be too faint for a float64
+    swings = where((rest.count < _ringdown.COUNT_LIMIT) & not_(creeps), rest.count, 0.0)
+    angle = where(creeps & moves, scene.r, where(endless, 0.0, rest.last))
+    angle = where(moves, scale(side(p.theta0, swings) * angle, e), p.theta0)
+    fades = not_(scene.r > 0.0) & lasts
+    faint = moves & (magnitude(angle) < NORMAL_LOW) & (fades | (magnitude(angle) > 0.0))
+
+    # a half swing takes pi/(w sqrt(1 - zeta^2)), untouched by solid friction
+    half = math.pi / (p.omega_n * _ringdown.decrement(where(creeps, 0.0, p.zeta))[1][0])
+    time = where(moves, rest.count * half, 0.0)
     timed = is_normal(half) & is_normal(2.0 * half)
     ends = timed & not_(time > NORMAL_HIGH)
+
+    away = or_none(magnitude(scene.start - scene.r_s) / _ringdown.unit(scene.r_s), scene.r_s > 0.0)
+    margin = where(creeps, away, where(scene.r_s > 0.0, rest.margin, 0.0))
     outputs = RingDown(
-        where(kind.creeps, 0.0, or_none(rest.count, not_(kind.endless) & not_(rest.count > NORMAL_HIGH))),
+        where(creeps, 0.0, or_none(rest.count, not_(endless) & not_(rest.count > NORMAL_HIGH))),
         or_none(angle, not_(faint)),
-        or_none(time, kind.lasts & (ends | not_(time > 0.0))),
-        _margin(scene, rest, kind),
-        or_none(2.0 * half, timed & not_(kind.creeps)),
+        or_none(time, lasts & (ends | not_(time > 0.0))),
+        or_none(margin, not_(endless)),
+        or_none(2.0 * half, timed & not_(creeps)),
     )
-    whole = not_(faint) & (kind.creeps | (timed & (ends | not_(kind.lasts))))
-    verdict = _verdict(scene, rest, kind, rtol, faint)
+
+    # an angle of rest too faint for a float64 is not asked for its error
+    loose = not_(faint | (rest.doubt <= rtol * magnitude(rest.last)))
+    loose = loose | not_(rest.doubt <= rtol * rest.margin * scene.r_s)
+    verdict = where(rest.unsure, NOT_CONVERGED, where(rest.grazes, GRAZING, where(loose, INACCURATE, OK)))
+    verdict = where(scene.start > 0.0, verdict, OK)
+    verdict = where(creeps, OVERDAMPED, where(endless, NEVER_ENDS, verdict))
+    whole = not_(faint) & (creeps | (timed & (ends | not_(lasts))))
     return outputs, where(fine, partly(whole, verdict), OUT_OF_RANGE)
-
-
-@jit
-def swinging(scene):
-    """The scene with a tame damping where it is overdamped and nothing is counted."""
-    return _ringdown.Scene(where(scene.zeta < 1.0, scene.zeta, 0.5), scene.r, scene.r_s, scene.start)
 
 
 @jit
