@@ -57,18 +57,16 @@ class Legs(NamedTuple):
     t3: tuple
 
 
-class Misses(NamedTuple):
-    """What (1), (2), (3) and the speeds miss by."""
+class Residuals(NamedTuple):
+    """What (1), (2), (3) and the speeds miss by, the speeds, and E, S, S' of the legs, by which the misses change."""
 
     first: float
     second: float
     third: float
     last: float
-
-
-class Slopes(NamedTuple):
-    """E, S and S' of the legs, by which the misses change."""
-
+    v1: float
+    v2: float
+    v3: float
     E1: float
     S1: float
     S2: float
@@ -114,7 +112,7 @@ def _swing(zeta, t):
 
 @jit_call
 def _residuals(scene, legs):
-    """The misses, the speeds v1, v2, v3, by what they change, and the phases squared."""
+    """The residuals, and the phases squared of the three legs."""
     zeta, r, m, beta, w = scene
     one, two, three = _swing(zeta, legs.t1), _swing(zeta, legs.t2), _swing(-zeta, legs.t3)
     near, far = two_sum(beta, -r), two_sum(beta, r)
@@ -126,69 +124,60 @@ def _residuals(scene, legs):
     third = add(times(g, three.E), negative(far))[0]
     energy = shifted(add(times(v3, v3), negative(times(v2, v2))), -2.0 * w)[0] / (2.0 * v3[0])
     last = where(beta > 0.0, add(v3, negative(v2))[0], energy)
-    slopes = Slopes(one.E[0], one.S[0], two.S[0], two.slope[0], three.E[0], three.S[0])
-    return Misses(first, second, third, last), (v1[0], v2[0], v3[0]), slopes, (one.phase, two.phase, three.phase)
+    slopes = one.E[0], one.S[0], two.S[0], two.slope[0], three.E[0], three.S[0]
+    return Residuals(first, second, third, last, v1[0], v2[0], v3[0], *slopes), (one.phase, two.phase, three.phase)
 
 
 @jit
-def _along(scene, misses, speeds, by, df):
+def _along(scene, at, df):
     """Changes of t1, t2, t3 that mend all but the last miss where f changes by df, and the last miss after that."""
     zeta, r, m, beta, _ = scene
-    v1, v2, v3 = speeds
     lifts = beta > 0.0
-    d1, d3 = (misses.first + by.E1 * df) / v1, (misses.third + by.E3 * df) / v3
-    dv1 = by.S1 * df + ((beta - r) - 2.0 * zeta * v1) * d1
-    dv3 = by.S3 * df + ((beta + r) + 2.0 * zeta * v3) * d3
-    d2 = where(lifts, (misses.second - by.S2 * dv1) / where(lifts, v2, 1.0), 0.0)
-    dv2 = by.slope2 * dv1 + (((m - r) - beta) - 2.0 * zeta * v2) * d2
-    return (d1, d2, d3), misses.last + dv3 - where(lifts, 1.0, v2 / v3) * dv2
+    d1, d3 = (at.first + at.E1 * df) / at.v1, (at.third + at.E3 * df) / at.v3
+    dv1 = at.S1 * df + ((beta - r) - 2.0 * zeta * at.v1) * d1
+    dv3 = at.S3 * df + ((beta + r) + 2.0 * zeta * at.v3) * d3
+    d2 = where(lifts, (at.second - at.S2 * dv1) / where(lifts, at.v2, 1.0), 0.0)
+    dv2 = at.slope2 * dv1 + (((m - r) - beta) - 2.0 * zeta * at.v2) * d2
+    return d1, d2, d3, at.last + dv3 - where(lifts, 1.0, at.v2 / at.v3) * dv2
 
 
 @jit_call
 def _step(scene, legs):
     """The cycle after a step of Newton, and whether it was the last and there is such a cycle."""
-    misses, speeds, slopes, (phase1, phase2, phase3) = _residuals(scene, legs)
-    (a1, a2, a3), at = _along(scene, misses, speeds, slopes, 0.0 * scene.zeta)
+    at, (phase1, phase2, phase3) = _residuals(scene, legs)
     f, t1, t2, t3 = legs
     unit = f[0]
-    (b1, b2, b3), beyond = _along(scene, misses, speeds, slopes, unit)
-    share = -at / (beyond - at)
+    a1, a2, a3, here = _along(scene, at, 0.0 * scene.zeta)
+    b1, b2, b3, beyond = _along(scene, at, unit)
+    share = -here / (beyond - here)
     d1, d2, d3 = a1 + share * (b1 - a1), a2 + share * (b2 - a2), a3 + share * (b3 - a3)
     new = Legs(shifted(f, share * unit), shifted(t1, d1), shifted(t2, d2), shifted(t3, d3))
     least = _SETTLED * (t1[0] + t2[0] + t3[0])
     settled = (magnitude(share) <= _SETTLED) & (magnitude(d1) <= least) & (magnitude(d3) <= least)
-    v1, v2, v3 = speeds
-    forwards = (v1 > 0.0) & (v2 > 0.0) & (v3 > 0.0) & (unit > 0.0)
+    forwards = (at.v1 > 0.0) & (at.v2 > 0.0) & (at.v3 > 0.0) & (unit > 0.0)
     once = (phase1 < _HALF_TURN) & (phase2 < _HALF_TURN) & (phase3 < _HALF_TURN)
     return new, settled & (magnitude(d2) <= least), forwards & once
 
 
-@jit
-def _chosen(condition, new, old):
-    """`choose`, of the pairs of two cycles."""
-    f, t1 = choose(condition, new.f, old.f), choose(condition, new.t1, old.t1)
-    return Legs(f, t1, choose(condition, new.t2, old.t2), choose(condition, new.t3, old.t3))
-
-
 @jit_call
 def refined(scene, p, guess, wanted):
-    """Amplitude, half period and multiplier of the cycle next to a half swing from beta + p, and whether it is found.
+    """(Amplitude, half period, multiplier) of the cycle next to a half swing from beta + p, and whether it is found.
 
     Looked for where `wanted`; `guess` are the times of its legs.
     """
     zeta, r, _, beta, _ = scene
-    t1, t2, t3 = guess
     none = 0.0 * p
-    legs = Legs(shifted(two_sum(beta, -r), p), (t1, none), (t2, none), (t3, none))
-    active = wanted & (zeta * (t1 + t2 + t3) < LONGEST)
+    legs = Legs(shifted(two_sum(beta, -r), p), (guess[0], none), (guess[1], none), (guess[2], none))
+    active = wanted & (zeta * (guess[0] + guess[1] + guess[2]) < LONGEST)
     found = active & not_(active)
     for _ in range(STEPS):
         if not any_lane(active):
             break
         new, settled, there = _step(scene, legs)
-        legs = _chosen(active, new, legs)
+        f, t1 = choose(active, new.f, legs.f), choose(active, new.t1, legs.t1)
+        legs = Legs(f, t1, choose(active, new.t2, legs.t2), choose(active, new.t3, legs.t3))
         found = found | (active & settled & there)
         active = active & not_(settled)
     time = add(add(legs.t1, legs.t2), legs.t3)
     kept = whole(*exponential(scaled(time, where(found, -2.0 * zeta, 0.0))))[0]
-    return shifted(legs.f, r)[0], time[0], kept * legs.f[0] / shifted(legs.f, 2.0 * r)[0], found
+    return (shifted(legs.f, r)[0], time[0], kept * legs.f[0] / shifted(legs.f, 2.0 * r)[0]), found

@@ -50,16 +50,6 @@ class Cycle(NamedTuple):
     multiplier: float
 
 
-class FirstLeg(NamedTuple):
-    """From rest to th = beta: the force at rest, the time, the response to it, and whether it comes there."""
-
-    f: float
-    t: float
-    s: float
-    c: float
-    comes: bool
-
-
 class Rise(NamedTuple):
     """Legs 2 and 3 to rest at -(beta + p), whether the lift is passed, and their share `loss` of J in (2)."""
 
@@ -108,35 +98,29 @@ def in_units(p):
 
 @jit
 def _first_leg(scene, p):
+    """Leg 1 from rest: the force there, the time, the response s and c to it, and whether it comes to th = beta."""
     f = (scene.beta - scene.r) + p
     t = linear_flow.first_crossing(scene.zeta, 1.0, 0.0 * p, f, p)
     comes = t < math.inf
     t = where(comes, t, 0.0)
     s, c, _ = linear_flow.response(scene.zeta, 1.0, t)
-    return FirstLeg(f, t, s, c, comes)
-
-
-@jit
-def _lift_time(scene, v1):
-    """Time of leg 2 from the speed v1, and whether it is passed."""
-    lifts = scene.beta > 0.0
-    t, comes = 0.0 * v1, v1 >= 0.0
-    if any_lane(lifts):
-        f, way = where(lifts, (scene.beta - scene.r) + scene.m, 1.0), where(lifts, 2.0 * scene.beta, 1.0)
-        t = linear_flow.first_crossing(scene.zeta, 1.0, where(lifts, v1, 1.0), f, way)
-        comes = not_(lifts) | (t < math.inf)
-        t = where(lifts & comes, t, 0.0)
-    return t, comes
+    return f, t, s, c, comes
 
 
 @jit_call
 def _rise(scene, v1):
     """Legs 2 and 3 from th = beta with speed v1."""
-    zeta, r, _, beta, w = scene
-    t2, comes = _lift_time(scene, v1)
+    zeta, r, m, beta, w = scene
+    f2, f3 = (beta - r) + m, beta + r
+    lifts = beta > 0.0
+    t2, comes = 0.0 * v1, v1 >= 0.0
+    if any_lane(lifts):
+        force, way = where(lifts, f2, 1.0), where(lifts, 2.0 * beta, 1.0)
+        t2 = linear_flow.first_crossing(zeta, 1.0, where(lifts, v1, 1.0), force, way)
+        comes = not_(lifts) | (t2 < math.inf)
+        t2 = where(lifts & comes, t2, 0.0)
     s2, _, slope2 = linear_flow.response(zeta, 1.0, t2)
     k2 = linear_flow.loss(zeta, 1.0, t2)
-    f2, f3 = (beta - r) + scene.m, beta + r
     v2 = fma(v1, slope2, f2 * s2)
     v3 = sqrt(fma(v2, v2, 2.0 * w))
     t3 = linear_flow.first_reversal(zeta, 1.0, where(comes, v3, 1.0), -f3)
@@ -152,73 +136,46 @@ def _rise(scene, v1):
 def half_swing(scene, p):
     """The half swing from rest at beta + p, p > 0."""
     zeta, r, m, beta, w = scene
-    a, leg = beta + p, _first_leg(scene, p)
-    v1 = leg.f * leg.s
+    f, t1, s1, c1, comes = _first_leg(scene, p)
+    v1 = f * s1
     rise = _rise(scene, v1)
-    top, time = beta + rise.p, leg.t + rise.t2 + rise.t3
-    j = rise.loss + leg.f * leg.f * linear_flow.loss(zeta, 1.0, leg.t)
+    a, top, time = beta + p, beta + rise.p, t1 + rise.t2 + rise.t3
+    j = rise.loss + f * f * linear_flow.loss(zeta, 1.0, t1)
     fade = -expm1(-2.0 * zeta * time)
-    kept = exp(-2.0 * zeta * time) * leg.f / (top + r)
+    kept = exp(-2.0 * zeta * time) * f / (top + r)
     balanced = kept > 0.5
     work = fma(2.0 * m, beta, w)
     by_energy = 2.0 * (work - r * (a + top) - 2.0 * zeta * j) / (a + top)
     gain = where(balanced, by_energy, rise.p - p)
-    lost = (fade * leg.f + gain + 2.0 * r) / (top + r)
+    lost = (fade * f + gain + 2.0 * r) / (top + r)
     noise = ROUNDING * where(balanced, 4.0 * work / (a + top), rise.p)
     blunt = ROUNDING * (time + 2.0 * p / v1 + 4.0 * beta / rise.v2)
-    return HalfSwing(gain, noise, kept, lost, time, leg.comes & rise.comes, _late(scene, leg, rise, v1, top), blunt)
-
-
-@jit
-def _late(scene, leg, rise, v1, top):
-    """Bound on dT/dp."""
-    early, later = exp(-2.0 * scene.zeta * leg.t), exp(-2.0 * scene.zeta * (leg.t + rise.t2))
-    late = magnitude(1.0 - leg.c) / v1 + rise.s2 / rise.v2 * early * leg.f / v1
-    return late + magnitude(rise.slope3) / (top + scene.r) * later * leg.f / rise.v3
-
-
-@jit
-def _least(scene):
-    """The least p from which the balance comes to the lift, or to the zero: 0, or (r - beta)(1 + 1/E) beyond r."""
-    zeta, r, _, beta, _ = scene
-    creeps = zeta >= 1.0
-    delta, _ = _ringdown.decrement(where(creeps, 0.5, zeta))
-    share = where(creeps, 0.0, exp(-delta[0]))
-    short = r > beta
-    return where(short, (r - beta) * (1.0 + 1.0 / where(share > 1e-300, share, 1e-300)), 0.0), short & not_(
-        share > 1e-300
-    )
-
-
-@jit
-def _light_losses(scene):
-    """a of 2 r a + pi zeta a^2 = work, what light losses tend to."""
-    zeta, r, m, beta, w = scene
-    work = fma(2.0 * m, beta, w)
-    return 2.0 * work / (2.0 * r + sqrt(4.0 * r * r + 4.0 * math.pi * zeta * work))
-
-
-@jit_call
-def _refined(scene, p, cycle, poor):
-    """The cycle in 32 digits where it is `poor`, and where that was possible."""
-    p = where(poor & (p < _LARGEST), p, 1.0)
-    leg = _first_leg(scene, p)
-    rise = _rise(scene, leg.f * leg.s)
-    times = leg.t, rise.t2, rise.t3
-    a, time, kept, found = _driven_refined.refined(scene, p, times, poor & leg.comes & rise.comes)
-    return choose(found, Cycle(a, time, kept), cycle), found
+    early, later = exp(-2.0 * zeta * t1), exp(-2.0 * zeta * (t1 + rise.t2))
+    late = magnitude(1.0 - c1) / v1 + rise.s2 / rise.v2 * early * f / v1
+    late = late + magnitude(rise.slope3) / (top + r) * later * f / rise.v3
+    return HalfSwing(gain, noise, kept, lost, time, comes & rise.comes, late, blunt)
 
 
 @jit
 def _start(scene):
-    """Where Newton starts, the least swing, whether the balance swings at all, and whether it does so in range."""
-    least, never = _least(scene)
+    """Where Newton starts, the least swing, whether the balance swings at all, and whether it does so in range.
+
+    The least p from which it comes to the lift, or to the zero, is 0, or (r - beta)(1 + 1/E) beyond r; the guess is the
+    a of 2 r a + pi zeta a^2 = work, what light losses tend to.
+    """
+    zeta, r, m, beta, w = scene
+    creeps, short = zeta >= 1.0, r > beta
+    delta, _ = _ringdown.decrement(where(creeps, 0.5, zeta))
+    share = where(creeps, 0.0, exp(-delta[0]))
+    never = short & not_(share > 1e-300)
+    least = where(short, (r - beta) * (1.0 + 1.0 / where(share > 1e-300, share, 1e-300)), 0.0)
     first = _rise(scene, 0.0 * least)
-    impulse_creeps = not_(scene.beta > 0.0) & (scene.zeta >= 1.0)
+    impulse_creeps = not_(beta > 0.0) & creeps
     swings = first.comes & (first.p > least) & not_(never | impulse_creeps)
-    guess = _light_losses(scene)
+    work = fma(2.0 * m, beta, w)
+    guess = 2.0 * work / (2.0 * r + sqrt(4.0 * r * r + 4.0 * math.pi * zeta * work))
     tame = guess < _LARGEST
-    guess = guess - scene.beta
+    guess = guess - beta
     p = where(guess > first.p, guess, first.p)
     return where(swings & tame, p, 1.0), where(swings, least, 0.0), swings, tame
 
@@ -246,32 +203,35 @@ def _search(scene, p, low, active):
     return p, high, active
 
 
-@jit
-def _right(scene, p, swing, rtol):
-    """Whether the cycle at p is right to rtol."""
-    a = scene.beta + p
-    error = swing.noise / swing.lost + 2.3e-16 * a
-    of_time = (error * swing.late + swing.blunt) / swing.time
-    of_multiplier = 2.0 * scene.zeta * of_time * swing.time + 2.0 * error / ((scene.beta - scene.r) + p)
-    of_multiplier = where(swing.kept > 1e-300, of_multiplier, 0.0)
-    return (error <= rtol * a) & (of_time <= rtol) & (of_multiplier <= rtol)
-
-
 @jit_call
 def newton(scene, rtol):
-    """The cycle and its verdict."""
+    """The cycle and its verdict: by (3), or in 32 digits where conditioning leaves less than rtol."""
     p, low, swings, tame = _start(scene)
     p, high, active = _search(scene, p, low, swings & tame)
     swing = half_swing(scene, p)
-    cycle, right = Cycle(scene.beta + p, swing.time, swing.kept), _right(scene, p, swing, rtol)
+    a, time, kept = scene.beta + p, swing.time, swing.kept
+
+    # whether amplitude, time and multiplier are accurate to rtol
+    error = swing.noise / swing.lost + 2.3e-16 * a
+    of_time = (error * swing.late + swing.blunt) / time
+    of_kept = 2.0 * scene.zeta * of_time * time + 2.0 * error / ((scene.beta - scene.r) + p)
+    of_kept = where(kept > 1e-300, of_kept, 0.0)
+    right = (error <= rtol * a) & (of_time <= rtol) & (of_kept <= rtol)
+
     lost = active | not_(swing.comes)
     verdict = where(lost, NOT_CONVERGED, where(right, OK, INACCURATE))
     poor = swings & tame & (lost | not_(right))
     if any_lane(poor):
-        cycle, found = _refined(scene, where(swing.comes, p, high), cycle, poor)
+        near = where(swing.comes, p, high)
+        near = where(poor & (near < _LARGEST), near, 1.0)
+        f, t1, s1, _, comes = _first_leg(scene, near)
+        rise = _rise(scene, f * s1)
+        wanted = poor & comes & rise.comes
+        new, found = _driven_refined.refined(scene, near, (t1, rise.t2, rise.t3), wanted)
+        a, time, kept = choose(found, new, (a, time, kept))
         verdict = where(found, where(rtol >= ROUNDING, OK, INACCURATE), verdict)
     verdict = where(swings, verdict, STICKS)
-    return cycle, where(tame, verdict, OUT_OF_RANGE)
+    return Cycle(a, time, kept), where(tame, verdict, OUT_OF_RANGE)
 
 
 @jit_call
