@@ -138,11 +138,11 @@ class StudyParser:
         """What the study fixes; a value outside of what its field declares would refuse every cell."""
         given: Fixed = {}
         for name, entry in self.mistakes.table(found, "fixed", "[fixed] with mu = 1.0").items():
-            where, before = f"fixed.{name}", len(self.mistakes)
+            where = f"fixed.{name}"
             if name in SETTINGS:
                 self.mistakes.add(where, f"stands at the top of a study: {name} = ..., or under [axes.{name}]")
                 continue
-            field = self._field(name, where)
+            field, before = self._field(name, where), len(self.mistakes)
             given[name] = self.entries.quantity(entry, field, where) if field else math.nan
             if field and len(self.mistakes) == before:
                 values = np.atleast_1d(given[name])

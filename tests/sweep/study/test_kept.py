@@ -148,21 +148,3 @@ def test_what_a_study_may_be_given_as(tmp_path):
     found = [sweep.run(build(**keys)), sweep.run(**keys, allow_import=True)]
     found += [sweep.run(given, allow_import=True) for given in (path, str(path), keys)]
     assert len({ds.fall_time.values.tobytes() for ds in found}) == 1
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: sweep.run(), "give one"),
-        (lambda: sweep.run(3), "found 3"),
-        (lambda: sweep.run(kernel="foliot", workes=2), "did you mean workers?"),
-        (lambda: sweep.run(build(axes={"height": [1.0]}), rtol=1e-3), "do not go with a study"),
-        (lambda: sweep.run("a.h5"), "is a result, not a study"),
-        (lambda: sweep.run("a.py"), "python a.py"),
-        (lambda: sweep.run("nowhere.toml"), "no such file"),
-    ],
-)
-def test_errors_name_the_way(call, message):
-    with pytest.raises(sweep.SweepError) as caught:
-        call()
-    assert message in str(caught.value)

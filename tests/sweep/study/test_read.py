@@ -64,31 +64,20 @@ def test_defaults_are_filled_in(read):
     assert (study.title, study.fixed) == ("toy over height", {"v0": 0.0, "g": 9.80665})
 
 
-def test_python_and_toml_give_the_same_study(read):
+def test_python_and_toml_give_the_same_study_with_numbers_of_its_own(read):
+    speeds = np.array([1e-3, 1e-6])
+    height = {"spacing": "log", "start": 0.3, "stop": 1e5, "num": 57, "unit": "ft"}
+    python = build(title="t", axes={"height": height, "rtol": speeds}, fixed={"g": {"value": 32.174, "unit": "ft/s^2"}})
+    speeds[0] = 5
     toml = read(
         """
         title = "t"
-        method = "exact"
         axes.height = { spacing = "log", start = 0.3, stop = 1e5, num = 57, unit = "ft" }
-        axes.v0 = { spacing = "linear", start = -1, stop = 1.7, num = 28, unit = "km/hour" }
         axes.rtol.values = [1e-3, 1e-6]
         fixed.g = { value = 32.174, unit = "ft/s^2" }
         """
     )
-    speeds = np.array([1e-3, 1e-6])
-    python = build(
-        title="t",
-        method="exact",
-        axes={
-            "height": {"spacing": "log", "start": 0.3, "stop": 1e5, "num": 57, "unit": "ft"},
-            "v0": {"spacing": "linear", "start": -1, "stop": 1.7, "num": 28, "unit": "km/hour"},
-            "rtol": speeds,
-        },
-        fixed={"g": {"value": 32.174, "unit": "ft/s^2"}},
-    )
-    speeds[0] = 5  # the study has numbers of its own, which cannot be written to
     assert dataclasses.replace(toml, text="") == python
-    assert all(axis.values.tobytes() == python.axes[name].values.tobytes() for name, axis in toml.axes.items())
     with pytest.raises(ValueError, match="read-only"):
         python.axes["height"].values[0] = 2
     assert python != build(axes={"height": [1.0]}) != build(axes={"height": [np.nextafter(1.0, 2)]})
