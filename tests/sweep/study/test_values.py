@@ -4,6 +4,7 @@ import math
 import subprocess
 import sys
 from decimal import Decimal
+from fractions import Fraction
 
 import mpmath
 import numpy as np
@@ -45,13 +46,15 @@ def test_values_are_the_nearest_floats_to_the_true_ones_and_end_exactly(start, s
     if abs(start - stop) < 1e-6 * start:
         return
     values = heights(spacing=spacing, start=start, stop=stop, num=num, unit=unit[0])
+    # the decimals that the user wrote, not the floats they became; fractions, as a value may lie between two floats
+    first, last = (Fraction(repr(end)) * Fraction(unit[1]) for end in (start, stop))
+    truth = [float((first * (num - 1 - i) + last * i) / (num - 1)) for i in range(num)]
     with mpmath.workdps(60):
-        # the decimals that the user wrote, not the floats they became
-        first, last, factor = mpmath.mpf(repr(start)), mpmath.mpf(repr(stop)), mpmath.mpf(str(unit[1]))
-        shares = [mpmath.mpf(i) / (num - 1) for i in range(num)]
-        way = (lambda s: first * (last / first) ** s) if spacing == "log" else (lambda s: first + (last - first) * s)
-        assert values[1:-1].tolist() == [float(factor * way(s)) for s in shares[1:-1]]
-        assert values[[0, -1]].tolist() == [float(factor * first), float(factor * last)]
+        if spacing == "log":
+            ratio = (mpmath.mpf(repr(stop)) / mpmath.mpf(repr(start))) ** (mpmath.mpf(1) / (num - 1))
+            factor = mpmath.mpf(repr(start)) * mpmath.mpf(str(unit[1]))
+            truth[1:-1] = [float(factor * ratio**i) for i in range(1, num - 1)]
+    assert values.tolist() == truth
     assert (np.diff(values) * (stop - start) > 0).all()
 
 
