@@ -20,8 +20,8 @@ from sweep.errors import SweepError
 from sweep.file.open import in_memory, memory
 from sweep.results.diff import diff, two_results
 from sweep.runs.run import store_cells
-from sweep.study.mistakes import listed
 from sweep.study.model import SETTINGS, Axis, Block, Study, frozen
+from sweep.words import listed
 
 PAIR = ("first", "second")
 

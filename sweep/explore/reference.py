@@ -14,8 +14,8 @@ from sweep.cells.grid import Grid
 from sweep.cells.sample import solved, with_method
 from sweep.cells.solve import GIVEN_UP, among
 from sweep.errors import SweepError
-from sweep.study.mistakes import did_you_mean, listed
 from sweep.study.model import Study
+from sweep.words import did_you_mean, listed
 
 FINE = tuple(10.0**-k for k in range(14, 5, -1))
 """Values of rtol that a reference is tried at: in each cell the least at which it says OK counts."""

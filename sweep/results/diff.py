@@ -13,8 +13,7 @@ import xarray as xr
 from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.errors import SweepError
 from sweep.results.statuses import flag_words
-from sweep.study.mistakes import listed
-from sweep.words import columns
+from sweep.words import columns, listed
 
 NUMBERS_AT_ONCE = 1 << 22
 

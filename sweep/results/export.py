@@ -19,8 +19,7 @@ from sweep.errors import SweepError, missing
 from sweep.file import disk
 from sweep.file.overwriting import check_target
 from sweep.results.statuses import flag_words, is_summary
-from sweep.study.mistakes import listed
-from sweep.words import as_path, cell, require_dataset
+from sweep.words import as_path, cell, listed, require_dataset
 
 EXPORTED = "exported by foliot"
 """In the history of what is exported."""

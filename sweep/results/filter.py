@@ -11,8 +11,7 @@ from sweep.cells.schema import STATUS
 from sweep.errors import SweepError
 from sweep.results.statuses import flag_words
 from sweep.study.condition import Condition
-from sweep.study.mistakes import did_you_mean, listed
-from sweep.words import require_dataset
+from sweep.words import did_you_mean, listed, require_dataset
 
 
 def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:

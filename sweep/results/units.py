@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from decimal import Decimal
 from typing import TYPE_CHECKING
 
-from sweep.study.mistakes import Mistakes, did_you_mean
+from sweep.study.mistakes import Mistakes
 from sweep.study.units import UnitMistake, scale
-from sweep.words import require_dataset
+from sweep.words import did_you_mean, require_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -26,10 +26,9 @@ from sweep.runs.session import Session, Solve, joined
 from sweep.runs.task import Task
 from sweep.runs.to_file import run_to_file
 from sweep.study.keys import KEYS
-from sweep.study.mistakes import did_you_mean, listed
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.words import as_path
+from sweep.words import as_path, did_you_mean, listed
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,8 +11,8 @@ from kernels import catalogue
 from kernels.interface import KINDS, Field, Kernel, Method, Status
 from sweep.errors import SweepError
 from sweep.study.kernel_lookup import load_kernel
-from sweep.study.mistakes import limits, listed, quoted
-from sweep.words import columns, page, paragraph, section
+from sweep.study.mistakes import limits
+from sweep.words import columns, listed, page, paragraph, quoted, section
 
 
 def catalogue_text() -> str:

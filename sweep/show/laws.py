@@ -16,8 +16,7 @@ from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.show.view import preferred
-from sweep.study.mistakes import did_you_mean, listed
-from sweep.words import cell, columns, page
+from sweep.words import cell, columns, did_you_mean, listed, page
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,8 +7,7 @@ import shutil
 from pathlib import Path
 
 from sweep.errors import SweepError
-from sweep.study.mistakes import did_you_mean, listed
-from sweep.words import columns
+from sweep.words import columns, did_you_mean, listed
 
 HERE = Path(__file__).parents[1]
 FOLDERS = (HERE / "_studies", HERE.parent / "studies")

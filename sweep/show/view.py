@@ -16,7 +16,7 @@ from sweep.errors import SweepError
 from sweep.explore.scattered import MOST_AXES, Box, axes_of, interpolated
 from sweep.laws.loglog import is_logarithmic
 from sweep.results.statuses import flag_words
-from sweep.study.mistakes import did_you_mean
+from sweep.words import did_you_mean
 
 GREEK = frozenset(
     (

@@ -10,10 +10,7 @@ from typing import Any, TypeVar
 
 from kernels.interface import Field
 from sweep.errors import Mistake, StudyError, SweepError
-from sweep.words import did_you_mean as did_you_mean
-from sweep.words import listed as listed
-from sweep.words import nearest as nearest
-from sweep.words import quoted as quoted
+from sweep.words import did_you_mean, listed, nearest
 
 T = TypeVar("T")
 U = TypeVar("U")
