@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from sweep.cells.compiling import Compiling, work_clock
@@ -18,30 +18,10 @@ from sweep.cells.timing import Sample, take_sample, tolerated
 from sweep.errors import SweepError
 
 if TYPE_CHECKING:
-    from sweep.cells.guard import BadCell, SolveCells
+    from sweep.cells.guard import SolveCells
     from sweep.study.model import Study
 
 SolveBlock = Callable[[int, int, Mapping[str, Any], Any], None]
-Found = bytes | Mapping[str, Any]
-"""A block that was computed elsewhere: the digests of what is written already, or its numbers."""
-
-
-@dataclass(frozen=True)
-class Computed:
-    """A block that an executor has computed.
-
-    Attributes
-    ----------
-    seconds : what it took
-    ago : when it was begun, with those that came together with it
-    bad : its cells that FAILED
-    """
-
-    block: int
-    found: Found
-    seconds: float
-    ago: float = 0.0
-    bad: Sequence[BadCell] = ()
 
 
 class Blocks:

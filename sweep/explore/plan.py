@@ -30,7 +30,7 @@ from sweep.errors import SweepError
 from sweep.explore.groups import advice_on, scaling
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import memory
-from sweep.runs.isolate import Processes, limits_of
+from sweep.runs.isolate import Processes, limit_of
 from sweep.runs.pool import cores, whole_number
 from sweep.study.model import Study
 from sweep.study.read import Given
@@ -199,7 +199,7 @@ def plan(
         return replace(found, seconds=found.seconds + again, compile_seconds=compiled, scaling=advice)
 
     # every run of a kernel that may crash, or never end, begins processes, and compiles it, anew
-    processes = Processes(study, limits_of(cell_timeout), 1)
+    processes = Processes(study, limit_of(cell_timeout), 1)
     solver = processes.solver()
     try:
         begun = time.monotonic()

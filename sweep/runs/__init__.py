@@ -1,8 +1,12 @@
-"""One run of a study, here or on a cluster: `run` is what others may use.
+"""One run of a study, here or on a cluster: a loop has an executor compute blocks, and puts them into a sink.
 
-A `task` is what was asked for; `to_file` keeps its blocks in a store; `resume` looks at what stands at its place
-already; a `session` computes blocks on threads, or has `dispatch` do it, which gives them to a `worker` of
-a `cluster`. `extend` reuses cells. Where cells are `isolate`d, they are solved in processes that do what
-`isolated` says. `pool` has threads and signals, `progress` and `forecast` what is told of the time, `bar` the bar of a
-notebook, `log` the log beside a result.
+Others may use
+    `run`       run, complete, is_begun, store_cells
+    `isolate`   Processes, limit_of: cells solved in processes of their own
+    `pool`      cores, whole_number, left_behind
+    `progress`  Progress: how far it is, and how long it will take
+    `log`       log, log_path, logging_to, read_lines: the log beside a result
+
+A `task` is what was asked for. `loop` times a sample, cuts the grid, and gives blocks to a `bench`: threads here, or
+one on every worker of a `cluster`. `to_file` continues and keeps what is computed; `extend` reuses cells.
 """

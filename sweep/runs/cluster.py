@@ -1,7 +1,9 @@
 """The workers of a dask scheduler: `--cluster tcp://...`, or a `Client` passed to `run`. Imports distributed.
 
-dask unpickles what its processes send each other. Whoever reaches a scheduler runs code on its workers, so let none
-but friends reach it, or use its TLS. Of files, nothing is ever unpickled.
+A worker makes a bench of its own from what it is told of the run, and computes blocks on it as a thread here would.
+Where it sees the file of the result it writes them there itself, and tells their digests; elsewhere it sends the
+numbers back. dask unpickles what its processes send each other. Whoever reaches a scheduler runs code on its workers,
+so let none but friends reach it, or use its TLS. Of files, nothing is ever unpickled.
 """
 
 from __future__ import annotations
@@ -9,29 +11,35 @@ from __future__ import annotations
 import contextlib
 import gc
 import logging
-import math
 import os
+import socket
+import sys
+import threading
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future
-from datetime import datetime
+from collections.abc import Callable, Mapping
+from concurrent.futures import CancelledError, Future
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import distributed
 
+from sweep.cells.block import Blocks, warm
+from sweep.cells.fingerprint import difference, fingerprint
+from sweep.cells.partition import Partition
+from sweep.cells.solve import Solver
 from sweep.errors import Incomplete, SweepError
-from sweep.runs import worker
-from sweep.runs.pool import TICK, CtrlC
-from sweep.runs.progress import passed
-from sweep.runs.worker import Answer, Assignment, Plugin
+from sweep.file import disk
+from sweep.file.store import Shared
+from sweep.runs.bench import POISONED, Bench, Buffers, Done, Found
+from sweep.runs.isolate import Processes
+from sweep.runs.log import log
+from sweep.study.model import Study
 
 CONNECT_SECONDS = 10
 ASK_SECONDS = 2.0
 """How often the scheduler is asked for its workers."""
-
-TRIALS = 5
-"""Times that workers are told of a run, where some leave meanwhile."""
 
 
 class Cluster:
@@ -41,6 +49,8 @@ class Cluster:
     ----------
     address : str or distributed.Client or a cluster of dask's
         An address such as "tcp://10.0.0.1:8786", or the path of a scheduler file, `*.json`; a client is not closed.
+    note : callable
+        Told where there are no workers, which is waited for; those of batch systems may take hours.
 
     Raises
     ------
@@ -48,14 +58,16 @@ class Cluster:
         No scheduler answers.
     """
 
-    def __init__(self, address: Any) -> None:
-        self._own = not isinstance(address, distributed.Client)
+    def __init__(self, address: Any, note: Callable[[str], None]) -> None:
+        self._own, self._note = not isinstance(address, distributed.Client), note
         self._client = _connected(address) if self._own else address
         if self._client.asynchronous:
             raise SweepError("cluster: the client is asynchronous; pass one that is not")
-        self._asked, self._threads, self._gone = -math.inf, 0, False
+        self.executor: Any = self._client.get_executor(pure=False)
+        self.threads, self._asked, self._gone = -1, -ASK_SECONDS, False
 
     def __enter__(self) -> Cluster:
+        self.look()
         return self
 
     def __exit__(self, *fault: object) -> None:
@@ -63,77 +75,57 @@ class Cluster:
             with contextlib.suppress(Exception):
                 self._client.close(timeout=0.1 if self._gone else CONNECT_SECONDS)
 
-    @property
-    def threads(self) -> int:
-        """Threads of all workers, as of a moment ago. Raises SweepError."""
-        if time.monotonic() - self._asked > ASK_SECONDS:
-            try:
-                self._threads = sum(self._client.nthreads().values())
-            except Exception as fault:
-                raise self.lost(fault) from fault
-            self._asked = time.monotonic()
-        return self._threads
-
-    def wait(self, note: Callable[[str], None], until: datetime | None) -> None:
-        """Returns as soon as there is a worker, or it is time to stop; those of batch systems may take hours."""
-        if self.threads:
+    def look(self) -> None:
+        """Counts the threads of all workers, now and then. Raises SweepError."""
+        if time.monotonic() - self._asked < ASK_SECONDS:
             return
-        note("the cluster has no workers yet; waiting for the first")
-        # a cluster that adapts to what there is to do makes workers only for that
-        call = self._client.submit(os.getpid, pure=False)
-        with CtrlC() as ctrl_c:
-            while not self.threads and not passed(until):
-                time.sleep(TICK)
-                ctrl_c.check()
-        call.release()
-
-    @contextlib.contextmanager
-    def introduced(self, assignment: Assignment) -> Iterator[None]:
-        """The workers, also those that come later, know of a run as long as this lasts. Raises SweepError."""
         try:
-            self._introduce(assignment)
-            yield
-        finally:
-            if not self._gone:
-                with contextlib.suppress(Exception):
-                    self._client.unregister_worker_plugin(assignment.run)
-
-    def _introduce(self, assignment: Assignment) -> None:
-        try:
-            for trial in range(1, TRIALS + 1):
-                try:
-                    self._client.register_plugin(Plugin(assignment), name=assignment.run)
-                    return
-                except OSError:
-                    # a worker may have left at that moment
-                    if trial == TRIALS:
-                        raise
-                    self._client.nthreads()
-        except OSError as fault:
-            raise self.lost(fault) from fault
+            threads = sum(self._client.nthreads().values())
         except Exception as fault:
-            raise SweepError(
-                f"cluster: a worker cannot take part ({type(fault).__name__}: {fault}); every machine of the cluster "
-                "needs the same version of foliot"
-            ) from fault
+            raise self.lost(fault) from fault
+        if threads != self.threads:
+            log(f"the cluster has {threads} threads", "workers", threads=threads)
+            if not threads:
+                self._note("the cluster has no workers; waiting for the first")
+        self.threads, self._asked = threads, time.monotonic()
 
-    def executor(self) -> Any:
-        """As of concurrent.futures."""
-        return self._client.get_executor(pure=False)
+    def remote(self, assignment: Assignment) -> Any:
+        """What stands for the bench of each worker in `submit`; dask makes it where it is needed."""
+        return self._client.submit(Remote, assignment, pure=False)
 
-    def submit(self, executor: Any, *words: Any) -> Future[Answer]:
-        """Has `worker.compute` called with the words by a worker. Raises SweepError."""
+    def submit(self, remote: Any, jobs: tuple[int, ...], masks: Mapping[int, Any]) -> Future[Answer]:
+        """A future of what `compute` gives on a worker. Raises SweepError."""
         try:
-            future: Future[Answer] = executor.submit(worker.compute, *words)
+            future: Future[Answer] = self.executor.submit(compute, remote, jobs, masks)
             return future
         except Exception as fault:
             raise self.lost(fault) from fault
 
-    def cancel(self, executor: Any) -> None:
+    def cancel(self) -> None:
         """Takes back what no worker has begun."""
         if not self._gone:
             with contextlib.suppress(Exception):
-                executor.shutdown(wait=False)
+                self.executor.shutdown(wait=False)
+
+    def outcome(self, future: Any, blocks: str) -> list[Done] | None:
+        """What a future gives; None where the answer got lost. Raises SweepError."""
+        try:
+            answer: Answer = future.result()
+            return answer.found
+        except CancelledError as fault:
+            raise self.lost(fault) from fault
+        except distributed.KilledWorker as fault:
+            raise SweepError(f"{blocks}: {POISONED}") from fault
+        except SweepError:
+            raise
+        except Exception as fault:
+            # distributed's executor trips over a task that fails with its worker and is answered at that moment
+            if isinstance(fault, TypeError) and Answer.__name__ in str(fault):
+                return None
+            raise SweepError(
+                f"cluster: a worker failed ({type(fault).__name__}: {fault}); what is finished is kept; every machine "
+                "of the cluster needs the same version of foliot"
+            ) from fault
 
     def lost(self, fault: BaseException) -> Incomplete:
         """What is reported where the scheduler does not answer any more; it is not asked again."""
@@ -168,3 +160,100 @@ def _connected(address: Any) -> Any:
 def _reason(fault: BaseException) -> str:
     """The first line of what a fault says; its kind where that is empty."""
     return str(fault).partition("\n")[0] or type(fault).__name__
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """All that a worker needs to know of a run.
+
+    Attributes
+    ----------
+    study : JSON
+    fingerprint : fingerprint of the study where the run was started; a worker with another one refuses
+    partition : how the rows are cut
+    shared : the file that blocks are to be written to; None where their numbers are to be sent
+    paths : where to look for the module of a kernel of the user's own; his study was allowed to run it
+    isolated : limit and cost of `Processes` that solve cells; None: they are solved in the worker's own process
+    """
+
+    study: str
+    fingerprint: Mapping[str, str]
+    partition: Partition
+    shared: Shared | None
+    paths: tuple[str, ...]
+    isolated: tuple[float | None, float] | None
+
+
+class Remote:
+    """The bench of a run on a worker; where dask moves it to, it is made anew. It is ready when it is first used."""
+
+    def __init__(self, assignment: Assignment) -> None:
+        self._assignment, self.turn = assignment, threading.Lock()
+        self.fd: int | None = None
+        self._processes: Processes | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Remote, (self._assignment,)
+
+    @cached_property
+    def bench(self) -> Bench:
+        """Loads and compiles the kernel. Raises SweepError where what computes here is not what was asked for."""
+        given, where = self._assignment, f"worker on {socket.gethostname()}"
+        sys.path.extend(path for path in given.paths if path not in sys.path and Path(path).is_dir())
+        try:
+            study = Study.from_json(given.study, allow_import=True)
+            changed = difference(given.fingerprint, fingerprint(study))
+        except SweepError as fault:
+            raise SweepError(f"{where}: {fault}") from None
+        if changed:
+            lines = "\n".join(f"  {line}" for line in changed)
+            raise SweepError(
+                f"{where}: what computes there is not what was asked for here; install the same versions on every "
+                f"machine\n{lines}"
+            )
+        self.fd = None if given.shared is None else given.shared.opened()
+        if given.isolated is None:
+            warm(Solver(study), study)
+        else:
+            self._processes = Processes(study, given.isolated[0], os.cpu_count() or 1, given.isolated[1])
+        self._buffers = Buffers(blocks := Blocks(study, given.partition))
+        return Bench(study, blocks, self._buffers.room, self._kept, self._processes)
+
+    def _kept(self, job: int, arrays: Mapping[str, Any]) -> Found:
+        """The digests of what is written, or the numbers. Raises SweepError."""
+        shared = self._assignment.shared
+        if shared is None or self.fd is None:
+            return arrays  # they are not used again
+        with disk.refusing(Path(shared.path)):
+            found: bytes = shared.table.write(self.fd, job, arrays)
+        self._buffers.back(job)
+        return found
+
+    def sync(self) -> None:
+        """Returns when all that was written is on the disk. Raises SweepError."""
+        if self.fd is not None and self._assignment.shared is not None:
+            with disk.refusing(Path(self._assignment.shared.path)):
+                disk.fsync(self.fd)
+
+    def __del__(self) -> None:
+        """At the end of the run, when dask lets go of it."""
+        if self._processes is not None:
+            self._processes.end()
+        if self.fd is not None:
+            os.close(self.fd)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What became of some blocks."""
+
+    found: list[Done]
+
+
+def compute(remote: Remote, jobs: tuple[int, ...], masks: Mapping[int, Any]) -> Answer:
+    """Computes blocks on a worker; of those with a mask, only the cells for which it holds. Raises SweepError."""
+    with remote.turn:
+        bench = remote.bench
+    found = [bench.block(job, masks.get(job)) for job in jobs]
+    remote.sync()
+    return Answer(found)

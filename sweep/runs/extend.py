@@ -6,9 +6,7 @@ of every status and method, comes out with the same bits again.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -99,17 +97,6 @@ class Reused:
         """How many of the cells are known."""
         return int(np.prod([(positions >= 0).sum() for positions in self._positions], dtype=np.int64))
 
-    def known_before(self, cells: Any) -> Any:
-        """How many of the cells with lower numbers are known, for each of an array of numbers."""
-        known = [np.append(positions >= 0, False) for positions in self._positions]
-        found, inside, rest = np.zeros(cells.size, np.int64), np.ones(cells.size, bool), cells
-        for axis in range(1, len(known) + 1):
-            place, rest = np.divmod(rest, math.prod(self._grid.shape[axis:]))
-            before = np.append(0, np.cumsum(known[axis - 1]))[place]
-            found += inside * before * math.prod(int(k.sum()) for k in known[axis:])
-            inside &= known[axis - 1][place]
-        return found
-
     def missing(self, start: int, stop: int) -> Any:
         """Of the cells `start` to `stop`, which have to be computed."""
         box, known = self._box(start, stop)
@@ -181,19 +168,6 @@ class Reused:
 class Retried(Reused):
     """The cells of a finished result of the same study, but for those that FAILED."""
 
-    @cached_property
-    def _failed(self) -> Any:
-        """Numbers of the cells that FAILED, ascending."""
-        found, done = [], 0
-        for piece in flat_pieces(self._numbers[STATUS]):
-            found.append(done + np.flatnonzero(piece == Status.FAILED))
-            done += len(piece)
-        return np.concatenate(found)
-
-    def known_before(self, cells: Any) -> Any:
-        """How many of the cells with lower numbers did not fail."""
-        return cells - np.searchsorted(self._failed, cells)
-
     def missing(self, start: int, stop: int) -> Any:
         """Of the cells `start` to `stop`, which FAILED."""
         return np.ravel(self._values(STATUS, box_slices(self._grid.shape, start, stop)) == Status.FAILED)
@@ -228,9 +202,6 @@ class Precomputed:
 
     def __init__(self, arrays: Mapping[str, Any], attrs: Mapping[str, str]) -> None:
         self._arrays, self.attrs = arrays, attrs
-
-    def known_before(self, cells: Any) -> Any:
-        return cells
 
     def missing(self, start: int, stop: int) -> Any:
         return np.zeros(stop - start, bool)

@@ -1,87 +1,73 @@
 """Cells solved in processes of their own, which may die of them or be killed: for kernels that crash or never end.
 
-Each solver has an executor of concurrent.futures with one process, so that it is known which cells it died of. What a
-kernel does there comes back as an exception here, and `Guard` finds the cell.
+Each solver has one process, so that it is known which cells it died of. What a kernel does there comes back as an
+exception here, and `Guard` finds the cell.
 """
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import multiprocessing
+import os
+import resource
 import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import CancelledError, Future, ProcessPoolExecutor, wait
-from dataclasses import dataclass
+from collections.abc import Callable
+from multiprocessing import forkserver
+from multiprocessing.connection import wait
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
+from sweep.cells.compiling import work_clock
 from sweep.cells.grid import Cells, Grid
 from sweep.cells.guard import Unsolved, told
-from sweep.cells.schema import STATUS, cells_of
+from sweep.cells.schema import cells_of, columns
+from sweep.cells.solve import Solver
 from sweep.errors import SweepError
 from sweep.file.open import memory
-from sweep.runs import isolated
-from sweep.runs.isolated import Answer
 from sweep.study.model import Study
 from sweep.words import seconds_of
 
-CELL_SECONDS = 60.0
-"""What a cell may take, where nobody says otherwise;"""
-DEARER = 100.0
-"""or so many times what one of the timed sample takes, where that is more."""
-SEVERAL_SECONDS = 1.0
-"""Several cells may take this and `SLACK` times what they should; then they are halved."""
-SLACK = 10.0
+CELL_SECONDS, DEARER = 60.0, 100.0
+"""What a cell may take where nobody says otherwise; or so many times what the dearest of the sample does."""
+SEVERAL_SECONDS, SLACK = 1.0, 10.0
+"""Several cells may take this and so many times what they should; then they are halved."""
 LOAD_SECONDS = 180.0
 """What loading and compiling a kernel may take."""
 MEMORY_SHARE = 0.5
 """Share of the memory that all processes may have before they are replaced."""
-TRIALS = 3
-"""Times that a cell is tried alone of which a process dies."""
+TRIALS, UNCERTAIN = 3, 0.25
+"""Times that a cell is tried alone of which a process dies; and how much one counts that others may have killed."""
 STARTS, START_SECONDS = 5, 0.5
 """Times that a process is started anew which dies before it has loaded the kernel, and the pause before that."""
-LOOK_SECONDS = 0.2
-"""How often it is looked whether time goes by, or the machine slept."""
-BURY_SECONDS = 1.0
-"""What the exit status of a process that is dead may be waited for."""
+LOOK_SECONDS, BURY_SECONDS = 0.2, 1.0
+"""How often it is looked whether time goes by, or the machine slept; and what an exit status is waited for."""
+LOST = 255
+"""Exit status of a process whose own is not known, for the one that starts all has died before it."""
+PR_SET_PDEATHSIG = 1
 
 R = TypeVar("R")
 
 
 class Died(Unsolved):
-    """The process died, or has no memory left; another one may not."""
+    """The process died, or has no memory left; another one may not. `certain`: by itself, not with others."""
+
+    def __init__(self, reason: str, certain: bool = True) -> None:
+        super().__init__(reason)
+        self.certain = certain
 
 
 class Ended(SweepError):
     """The run is being stopped."""
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What cells may take.
-
-    Attributes
-    ----------
-    cell : seconds that one cell may take; None: `CELL_SECONDS`, or longer where cells do
-    cost : seconds that one takes, as far as is known
-    """
-
-    cell: float | None = None
-    cost: float = 0.0
-
-    def seconds(self, cells: int) -> float:
-        """What some cells together may take."""
-        one = max(CELL_SECONDS, DEARER * self.cost) if self.cell is None else self.cell
-        return one if cells == 1 else min(one, SEVERAL_SECONDS) + SLACK * self.cost * cells
-
-
-def limits_of(cell_timeout: float | str | None) -> Limits:
-    """As they are asked for. Raises SweepError where that is no time."""
-    return Limits(None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout))
+def limit_of(cell_timeout: float | str | None) -> float | None:
+    """Seconds that a cell may take, as they are asked for. Raises SweepError where that is no time."""
+    return None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout)
 
 
 class Processes:
@@ -90,30 +76,38 @@ class Processes:
     Parameters
     ----------
     study : Study
-    limits : Limits
+    limit : float, optional
+        Seconds that a cell may take; None: `CELL_SECONDS`, or longer where cells do.
     count : int
         How many there will be.
+    cost : float
+        Seconds that the dearest cell of the timed sample takes; 0: not known yet.
     """
 
-    def __init__(self, study: Study, limits: Limits, count: int) -> None:
-        self.study, self.limits = study, limits
-        self.grid, self.text, self.paths = Grid(study), study.to_json(), kernel_paths(study)
+    def __init__(self, study: Study, limit: float | None, count: int, cost: float = 0.0) -> None:
+        self.study, self.limit, self.cost, self.grid = study, limit, cost, Grid(study)
+        self.words = study.to_json(), kernel_paths(study)
         self.most_bytes = MEMORY_SHARE * memory() / count
         self.good: int | None = None
-        self.dearest = 0.0
-        self.over = False
-        self._solvers: list[IsolatedSolver] = []
+        self.dearest, self.over = 0.0, False
+        self.alone = threading.Lock()
+        self.idle: list[Isolated] = []
+        self._solvers: list[Isolated] = []
 
     def seconds(self, cells: int) -> float:
         """What some cells may take. One of a sample is not waited for to its end: it is left out, but never FAILED."""
-        if self.limits.cost or self.good is None:
-            return self.limits.seconds(cells)
-        return min(self.limits.seconds(1), SEVERAL_SECONDS + SLACK * self.dearest * cells)
+        cost = self.cost or self.dearest
+        one = self.limit or max(CELL_SECONDS, DEARER * cost)
+        if cells == 1 and (self.cost or self.good is None):
+            return one
+        return min(one, SEVERAL_SECONDS) + SLACK * cost * cells
 
-    def solver(self) -> IsolatedSolver:
-        """A solver with a process of its own, for one thread at a time."""
-        self._solvers.append(IsolatedSolver(self))
-        return self._solvers[-1]
+    def solver(self) -> Isolated:
+        """A solver with a process of its own, for one thread at a time; one that is idle, if there is any."""
+        if not self.idle:
+            self._solvers.append(Isolated(self))
+            return self._solvers[-1]
+        return self.idle.pop()
 
     def end(self) -> None:
         """Kills all; solvers raise `Ended` from now on."""
@@ -122,14 +116,12 @@ class Processes:
             solver.end()
 
 
-class IsolatedSolver:
+class Isolated:
     """Does what `Solver` does in a process of its own, which is begun anew whenever it is needed."""
 
     def __init__(self, processes: Processes) -> None:
         self._all, self.grid = processes, processes.grid
-        self._pool: ProcessPoolExecutor | None = None
         self._process: Any = None
-        self._compiling: Any = None
         self._lock = threading.Lock()
         self._fresh = True
         self.seconds = 0.0
@@ -139,66 +131,72 @@ class IsolatedSolver:
         return self.seconds
 
     def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
-        """As `Solver.solve`. Raises Unsolved where the kernel raises, dies or takes too long; Ended."""
-        found = cells_of(self._asked(start, cells.number, wanted))
+        """As `Solver.solve`. Raises Unsolved where the kernel raises, dies or takes too long; Ended.
+
+        One cell alone is tried again, for a process may die of what it did before, or with others; and then no other
+        cell is tried so meanwhile, lest each be blamed for the other.
+        """
+        tried = 0.0
+        while True:
+            try:
+                with self._all.alone if tried else contextlib.nullcontext():
+                    found = cells_of(self._solved(start, cells.number, wanted))
+                break
+            except Died as fault:
+                tried += 1.0 if fault.certain else UNCERTAIN
+                if cells.number > 1 or tried >= TRIALS:
+                    raise Unsolved(str(fault)) from None
         for name, column in cells.outputs.items():
             column[...] = found.outputs[name]
         cells.status[...], cells.used[...] = found.status, found.used
         if cells.error is not None:
             cells.error[...] = found.error
 
-    def _asked(self, start: int, count: int, wanted: Any) -> Mapping[str, Any]:
-        """One cell alone is tried again, for a process may die of what it did before, or be killed by others."""
-        for _ in range(TRIALS if count == 1 else 1):
-            try:
-                limit = self._all.seconds(count)
-                return self._taken(self.call(limit, isolated.solve, start, count, wanted), start)
-            except Died as fault:
-                reason = str(fault)
-        raise Unsolved(reason)
+    def _solved(self, start: int, count: int, wanted: Any) -> Any:
+        """Columns of cells. Raises Unsolved, Died, Ended."""
+        arrays, reason, seconds, most = self.call(self._all.seconds(count), _solve, start, count, wanted)
+        fresh, self._fresh = self._fresh, False
+        short = reason.startswith(MemoryError.__name__) and not fresh
+        if short or most > self._all.most_bytes:
+            self.end()
+        if reason:
+            raise Died(reason) if short else Unsolved(reason)
+        self.seconds += seconds
+        self._all.dearest = max(self._all.dearest, seconds / count)
+        self._all.good = start if self._all.good is None else self._all.good
+        return arrays
 
     def call(self, limit: float, function: Callable[..., R], *words: Any) -> R:
         """What a function gives in the process, within so many seconds. Raises Unsolved, Died, Ended."""
-        pool = self._ready()
+        if self._process is None or self._all.over:
+            self._begin()
+        process, late = self._process, False
         try:
-            return awaited(pool.submit(function, *words), limit, lambda: bool(self._compiling.value))
-        except (RuntimeError, CancelledError, TimeoutError) as fault:
-            late, code = isinstance(fault, TimeoutError), self._bury(BURY_SECONDS)
+            return _asked(process, limit, function, *words)
+        except (OSError, EOFError, AttributeError) as fault:
+            late = isinstance(fault, TimeoutError)
+        code = self.end(BURY_SECONDS, process)
         if self._all.over:
             raise Ended("the run is being stopped")
         # one that died by itself, as late as that, is not late
         if late and code in (None, -signal.SIGKILL):
             raise Unsolved(f"took longer than {limit:.3g} s")
-        raise Died(_death(code))
+        if code is None or code >= 0:
+            raise Died("its process died" if code is None else f"its process ended with {code}", code != LOST)
+        raise Died(f"its process died of {signal.Signals(-code).name}")
 
-    def _taken(self, answer: Answer, start: int) -> Mapping[str, Any]:
-        fresh, self._fresh = self._fresh, False
-        if answer.memory > self._all.most_bytes:
-            self.end()
-        if answer.reason.startswith(MemoryError.__name__) and not fresh:
-            self.end()
-            raise Died(answer.reason)
-        if answer.reason:
-            raise Unsolved(answer.reason)
-        self.seconds += answer.seconds
-        self._all.dearest = max(self._all.dearest, answer.seconds / len(answer.arrays[STATUS]))
-        self._all.good = start if self._all.good is None else self._all.good
-        return answer.arrays
-
-    def _ready(self) -> ProcessPoolExecutor:
-        """The executor; a new one has loaded the kernel, and solved a cell that is known to end."""
-        if self._pool is not None and not self._all.over:
-            return self._pool
+    def _begin(self) -> None:
+        """Starts a process that has loaded the kernel, and solved a cell that is known to end. Raises SweepError."""
         for _ in range(STARTS):
             try:
-                pool = self._begun()
-                number = awaited(pool.submit(isolated.known), LOAD_SECONDS)
-                self._process = next((p for p in multiprocessing.active_children() if p.pid == number), None)
-                awaited(pool.submit(isolated.load, self._all.text, self._all.paths, self._all.good), LOAD_SECONDS)
+                with self._lock:
+                    if self._all.over:
+                        raise Ended("the run is being stopped")
+                    self._process = _started()
                 self._fresh = True
-                return pool
+                _asked(self._process, LOAD_SECONDS, _load, *self._all.words, self._all.good)
+                return
             except SweepError:
-                self.end()
                 raise
             except Exception as fault:
                 # a process that has not loaded the kernel is never asked for cells: they would be blamed for it
@@ -210,53 +208,34 @@ class IsolatedSolver:
             "finished is kept. The name of the folder TMPDIR must be short, and ulimit -n and -u large enough"
         )
 
-    def _begun(self) -> ProcessPoolExecutor:
-        """A new executor, whose process is being made. Raises Ended."""
+    def end(self, seconds: float = 0.0, process: Any = None) -> int | None:
+        """Kills the process; its exit status, if that is known in so many seconds."""
         with self._lock:
-            if self._all.over:
-                raise Ended("the run is being stopped")
-            context = _context()
-            self._compiling, self._process = context.RawValue("i"), None
-            self._pool = ProcessPoolExecutor(1, context, isolated.enter, (self._compiling,))
-            with _apart():
-                self._pool.submit(int)
-            return self._pool
-
-    def end(self) -> None:
-        """Kills the process."""
-        self._bury(0.0)
-
-    def _bury(self, seconds: float) -> int | None:
-        """Kills the process, if it lives; its exit status, if that is known in so many seconds."""
-        with self._lock:
-            pool, self._pool = self._pool, None
-        if pool is None:
+            process, self._process = self._process or process, None
+        if process is None:
             return None
-        if self._process is not None:
-            self._process.kill()
-        # the executor asks for the status as well, and who asks meanwhile may find none
-        burial = threading.Thread(target=pool.shutdown, kwargs={"cancel_futures": True}, daemon=True)
-        burial.start()
-        burial.join(seconds)
-        return None if burial.is_alive() or self._process is None else self._process.exitcode
+        process.kill()
+        process.join(seconds)
+        code: int | None = process.exitcode
+        return code
 
 
-def awaited(future: Future[R], seconds: float, compiling: Callable[[], bool] = lambda: False) -> R:
-    """What it gives. Raises TimeoutError after so many seconds; none count while the machine sleeps or is compiling."""
-    left = {False: seconds, True: LOAD_SECONDS}
+def _asked(process: Any, limit: float, function: Callable[..., R], *words: Any) -> R:
+    """What a function gives in a process. Raises TimeoutError, EOFError or OSError where it died, Unsolved.
+
+    No seconds count while the machine sleeps or the process compiles; compiling has a limit of its own.
+    """
+    process.pipe.send((function, words))
+    left = {False: limit, True: LOAD_SECONDS}
     while min(left.values()) > 0.0:
         begun = time.monotonic()
-        if wait([future], min(LOOK_SECONDS, left[False])).done:
-            return future.result()
-        left[compiling()] -= min(time.monotonic() - begun, 2 * LOOK_SECONDS)
+        if wait([process.pipe], min(LOOK_SECONDS, left[False])):
+            found, reason = process.pipe.recv()
+            if reason:
+                raise Unsolved(reason)
+            return found  # type: ignore[no-any-return]
+        left[bool(process.compiling.value)] -= min(time.monotonic() - begun, 2 * LOOK_SECONDS)
     raise TimeoutError
-
-
-def _death(code: int | None) -> str:
-    """What a process died of, by its exit status."""
-    if code is None:
-        return "its process died"
-    return f"its process died of {signal.Signals(-code).name}" if code < 0 else f"its process ended with {code}"
 
 
 def kernel_paths(study: Study) -> tuple[str, ...]:
@@ -266,35 +245,100 @@ def kernel_paths(study: Study) -> tuple[str, ...]:
     if file is None:
         return ()
     path = Path(file).resolve()
-    above = name.count(".") + (path.name == "__init__.py")
-    return (str(path.parents[above]),)
-
-
-def _context() -> Any:
-    """A clean process, from which others are made quickly: one with threads cannot be copied."""
-    context = multiprocessing.get_context("forkserver")
-    compiler = ["numba"] if "numba" in sys.modules else []
-    context.set_forkserver_preload(["sweep.runs.isolated", *compiler])
-    return context
+    return (str(path.parents[name.count(".") + (path.name == "__init__.py")]),)
 
 
 _starting = threading.Lock()
 
 
-@contextlib.contextmanager
-def _apart() -> Iterator[None]:
-    """A process that is made meanwhile does not run the program again that asks for it, nor has it to be a daemon's.
+def _started() -> Any:
+    """A process that serves, with its `pipe` and whether it is `compiling`.
 
-    Kernels are looked up by name, so nothing of `__main__` is needed there. Workers of dask are daemons, which
+    It is made by a clean process, for one with threads cannot be copied. It does not run the program again that asks
+    for it: kernels are looked up by name, so nothing of `__main__` is needed there. Workers of dask are daemons, which
     multiprocessing lets have no processes; ours end when their parent does.
     """
-    flags = multiprocessing.current_process()._config  # type: ignore[attr-defined]
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["sweep.runs.isolate", *({"numba"} & sys.modules.keys())])
+    flags: Any = multiprocessing.current_process()._config  # type: ignore[attr-defined]
     with _starting:
-        daemon, main = flags.pop("daemon", None), sys.modules["__main__"]
-        sys.modules["__main__"] = ModuleType("__main__")
+        main, daemon = sys.modules["__main__"], flags.get("daemon")
+        ours, theirs = context.Pipe()
         try:
-            yield
+            sys.modules["__main__"], flags["daemon"] = ModuleType("__main__"), False
+            process: Any = context.Process(target=_serve, args=(theirs, flag := context.RawValue("i")), daemon=True)
+            process.start()
         finally:
-            sys.modules["__main__"] = main
-            if daemon is not None:
-                flags["daemon"] = daemon
+            sys.modules["__main__"], flags["daemon"] = main, daemon
+            theirs.close()
+    process.pipe, process.compiling = ours, flag
+    return process
+
+
+# what follows is done in the process
+
+_here: dict[str, Any] = {}
+
+
+def _serve(pipe: Any, flag: Any) -> None:
+    """Does what it is asked for, until nobody asks any more."""
+    work_clock.flag = flag
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # to write all memory to the disk for every cell that crashes takes long; 0 would let programs have it
+    hard = resource.getrlimit(resource.RLIMIT_CORE)[1]
+    resource.setrlimit(resource.RLIMIT_CORE, (min(1, hard) if hard >= 0 else 1, hard))
+    _die_with_the_run()
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            function, words = pipe.recv()
+            try:
+                answer = function(*words), ""
+            except BaseException as fault:
+                answer = None, told(fault)
+            pipe.send(answer)
+
+
+def _die_with_the_run() -> None:
+    """The process ends with the one that asks it, and before that one where the memory is short.
+
+    Linux kills it with its fork server, also in a kernel that never lets Python run; that one ends with who asks it,
+    if nobody else holds the pipe that tells.
+    """
+    server: Any = vars(forkserver)["_forkserver"]
+    pipe, server._forkserver_alive_fd = server._forkserver_alive_fd, None
+    if pipe is not None:
+        os.close(pipe)
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError):
+            Path("/proc/self/oom_score_adj").write_text("1000")
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
+
+
+def _end_after(parent: Any) -> None:
+    parent.join()
+    os._exit(0)
+
+
+def _load(text: str, paths: tuple[str, ...], good: int | None) -> None:
+    sys.path.extend(path for path in paths if path not in sys.path)
+    study = Study.from_json(text, allow_import=True)
+    _here["study"], _here["solver"] = study, Solver(study)
+    work_clock.watch()
+    if good is not None:
+        _solve(good, 1, None)
+
+
+def _solve(start: int, count: int, wanted: Any) -> tuple[Any, str, float, float]:
+    """Columns of cells, or why there are none; seconds, and most bytes that the process ever had."""
+    arrays = {column.name: column.empty(count) for column in columns(_here["study"])}
+    begun, reason = work_clock(), ""
+    try:
+        _here["solver"].solve(start, cells_of(arrays), wanted)
+    except BaseException as fault:
+        arrays, reason = {}, told(fault)
+    seconds = work_clock() - begun
+    kilobytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1024 if sys.platform == "darwin" else 1)
+    return arrays, reason, seconds, 1024 * kilobytes

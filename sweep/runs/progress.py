@@ -1,28 +1,102 @@
-"""How far a sweep has come, one line on a terminal and plain lines in a log; and when it is to stop (`--until`)."""
+"""How far a run has come and how long it will take: a bar on a terminal or in a notebook, plain lines in a log.
+
+The time left comes from the blocks that are done. They are taken from all over the grid at any time, so they stand for
+those to come; the timed sample of the grid tells by how much these are dearer or cheaper.
+"""
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
-from datetime import datetime, timedelta
-from datetime import time as day_time
-from typing import TYPE_CHECKING, Any, TextIO
+import warnings
+from collections.abc import Callable, Iterable
+from typing import Any, TextIO
 
-from sweep.errors import SweepError
-from sweep.runs.bar import notebook_bar
+import numpy as np
+
 from sweep.runs.log import log
 from sweep.words import SHORTEST, duration, one_digit, printable, speed
 
-if TYPE_CHECKING:
-    from sweep.runs.forecast import Forecast
-
 QUIET_SECONDS = 1.0
 """A run that ends sooner says nothing."""
-LINE_SECONDS = 30.0
+REDRAW_SECONDS, LINE_SECONDS, LOG_SECONDS = 0.1, 30.0, 60.0
+"""How often a bar is drawn, a line is told elsewhere, and one is logged;"""
 LINE_SHARE = 0.05
-REDRAW_SECONDS = 0.1
-LOG_SECONDS = 60.0
+"""lines also whenever so much more is done, but not more often than every few seconds."""
+GOLDEN = 0.6180339887498949
+"""Multiples of it, modulo 1, fill an interval evenly and fall into step with the length of no axis."""
+ROUNDS = 3
+"""Tasks each core has done when its first one, in which kernels are loaded, need not count any more."""
+
+Clock = Callable[[], float]
+
+
+def from_everywhere(jobs: Iterable[int]) -> list[int]:
+    """Numbers of blocks in an order in which those of any beginning come from all over the grid."""
+    found = np.array(list(jobs), int)
+    return list(map(int, found[np.argsort(np.arange(found.size) * GOLDEN % 1.0)]))
+
+
+class Forecast:
+    """What the blocks to come will take.
+
+    Parameters
+    ----------
+    weights : ndarray
+        Seconds of every block of the grid, as the timed sample has them.
+    jobs : iterable of int
+        Blocks that are to be computed.
+    cores : int
+        Tasks, of one or several blocks, that are computed at a time.
+    clock : callable
+        Seconds.
+    """
+
+    def __init__(self, weights: Any, jobs: Iterable[int], cores: int = 1, clock: Clock = time.monotonic) -> None:
+        self.weights, self._cores, self._clock = np.maximum(weights, 1e-9), max(1, cores), clock
+        self._to_do = float(self.weights[list(jobs)].sum())
+        self._running: dict[tuple[int, ...], float] = {}
+        self._number, self._done, self._seconds = 0, 0.0, 0.0
+        self._since: tuple[float, float, float] | None = None
+        """When it began, what was done then, and the seconds of these; after the first round that is its end."""
+
+    def begin(self, jobs: tuple[int, ...]) -> None:
+        """A core has begun with a task, or did so before."""
+        self._running.setdefault(jobs, self._clock())
+        self._since = self._since or (self._clock(), 0.0, 0.0)
+
+    def end(self, jobs: tuple[int, ...]) -> None:
+        """A task is done."""
+        weight = float(self.weights[list(jobs)].sum())
+        self._to_do -= weight
+        self._done += weight
+        self._seconds += self._clock() - self._running.pop(jobs, self._clock())
+        self._number += 1
+        if self._number == self._cores:
+            self._first_round = self._clock(), self._done, self._seconds
+        if self._number == ROUNDS * self._cores:
+            self._since = self._first_round
+
+    def again(self, job: int) -> None:
+        """A block has to be computed once more."""
+        self._to_do += self.weights[job]
+
+    @property
+    def left(self) -> float | None:
+        """Seconds until all blocks are done, None before the first one is."""
+        if self._since is None or not self._number:
+            return None
+        if self._to_do < 1e-9 and not self._running:
+            return 0.0
+        now, (since, before, spent) = self._clock(), self._since
+        pace = (self._done - before) / max(self._seconds - spent, 1e-9)
+        tasks = np.array([self.weights[list(jobs)].sum() for jobs in self._running])
+        reached = pace * (now - np.array(list(self._running.values())))
+        rate = (self._done - before + np.minimum(reached, tasks).sum()) / max(now - since, 1e-9)
+        # one that has taken longer than it should takes as long again: what it should take says nothing any more
+        to_come = np.where(reached < tasks, tasks - reached, reached)
+        total = max(self._to_do - tasks.sum(), 0.0) + to_come.sum()
+        return float(max(total / max(rate, 1e-300), max(to_come, default=0.0) / pace))
 
 
 class Progress:
@@ -51,18 +125,15 @@ class Progress:
         name: str = "sweep",
         done: int = 0,
         forecast: Forecast | None = None,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Clock = time.monotonic,
     ) -> None:
         self.total, self.done, self.computed = total, done, 0
-        self._stream, self._name, self._clock = stream, printable(name), clock
-        self._forecast = forecast
-        self._bar = notebook_bar(stream, self._name, total, done)
-        self._live = stream is not None and (stream.isatty() or self._bar is not None)
-        self._pause = REDRAW_SECONDS if self._live else LINE_SECONDS
+        self._stream, self._name, self._clock, self._forecast = stream, printable(name), clock, forecast
+        self._bar: Any = None
+        self._live = stream is not None and (stream.isatty() or (stream is sys.stderr and _in_notebook()))
         self._begun = self._logged = clock()
         self._told: float | None = None
         self._told_share = 0.0
-        self._width = 0
 
     @property
     def seconds(self) -> float:
@@ -74,16 +145,6 @@ class Progress:
         """Cells per second computed here."""
         return self.computed / max(self.seconds, 1e-9)
 
-    def add(self, cells: int) -> None:
-        """Counts cells as done."""
-        self.done += cells
-        self.computed += cells
-        self.tick()
-
-    def again(self, cells: int) -> None:
-        """Takes back cells that have to be computed once more."""
-        self.done -= cells
-
     @property
     def left(self) -> float | None:
         """Seconds that are left; None where nothing is known yet."""
@@ -94,10 +155,23 @@ class Progress:
             left = self.seconds * cells / self.computed if self.computed else None
         return max(left, SHORTEST) if left is not None and cells else left
 
+    def add(self, cells: int) -> None:
+        """Counts cells as done; as many less than none have to be computed once more."""
+        self.done += cells
+        self.computed += max(cells, 0)
+        self.tick()
+
     def tick(self) -> None:
         """Says something if it is time to."""
-        self._log_line(self.line)
-        if self._stream is not None and self.seconds >= QUIET_SECONDS and self._due():
+        now = self._clock()
+        if now - self._logged >= LOG_SECONDS:
+            self._logged = now
+            log(self.line(), "progress", **self._fields())
+        if self._stream is None or self.seconds < QUIET_SECONDS:
+            return
+        quiet = float("inf") if self._told is None else now - self._told
+        more = not self._live and self.done / max(self.total, 1) - self._told_share >= LINE_SHARE
+        if quiet >= (REDRAW_SECONDS if self._live else LINE_SECONDS / 6 if more else LINE_SECONDS):
             self._say(self.line())
 
     def note(self, text: str) -> None:
@@ -107,12 +181,10 @@ class Progress:
 
     def tell(self, text: str) -> None:
         """The same, but not in the log."""
-        if self._stream is not None:
-            if self._bar is not None:
-                self._bar.note(f"{self._name}: {text}")
-                return
-            self._end_line()
-            self._write(self._stamp() + f"{self._name}: {text}\n")
+        line = f"{self._name}: {text}"
+        if self._bar is not None:
+            self._bar.clear()
+        self._write((line if self._live else f"{time.strftime('%Y-%m-%d %H:%M:%S')}  {line}") + "\n")
 
     def end(self) -> None:
         """Says how it ended, where anything was said before."""
@@ -120,13 +192,13 @@ class Progress:
         log(text, "progress", **self._fields(), seconds=round(self.seconds, 1))
         if self._told is not None:
             self._say(text)
-        self._end_line()
+        self.stop()
 
     def stop(self) -> None:
-        """Leaves the terminal's line, or the bar, as it is and begins a new one."""
-        self._end_line()
+        """Leaves the bar as it is and begins a new line."""
         if self._bar is not None:
             self._bar.close()
+            self._bar = None
 
     def line(self) -> str:
         """What is told now: `12,300/1,000,000 cells (1.2 %), 5,100 cells/s, 3 min left`."""
@@ -134,19 +206,9 @@ class Progress:
         return self._counts() + ("" if left is None else f", {speed(self.rate)}, {one_digit(left)} left")
 
     def _fields(self) -> dict[str, Any]:
-        left = self.left
-        return {
-            "cells": self.done,
-            "of": self.total,
-            "cells_per_second": round(self.rate, 3),
-            "seconds_left": None if left is None else round(left, 1),
-        }
-
-    def _log_line(self, line: Callable[[], str]) -> None:
-        """Logs how far it is, once a minute."""
-        if self._clock() - self._logged >= LOG_SECONDS:
-            self._logged = self._clock()
-            log(line(), "progress", **self._fields())
+        left, rate = self.left, round(self.rate, 3)
+        left = None if left is None else round(left, 1)
+        return {"cells": self.done, "of": self.total, "cells_per_second": rate, "seconds_left": left}
 
     def _counts(self) -> str:
         share = 100 * self.done / self.total if self.total else 100.0
@@ -154,35 +216,19 @@ class Progress:
         shown = f"{min(share, 99.9):.1f}" if self.done < self.total else "100"
         return f"{self.done:,}/{self.total:,} cells ({shown} %)"
 
-    def _due(self) -> bool:
-        now = self._clock()
-        if self._told is None:
-            return True
-        if self._live:
-            return now - self._told >= self._pause
-        share = self.done / max(self.total, 1)
-        # lines by share no oftener than every few seconds, or a short run would be all lines
-        by_share = share - self._told_share >= LINE_SHARE and now - self._told >= LINE_SECONDS / 6
-        return now - self._told >= self._pause or by_share
-
     def _say(self, text: str) -> None:
-        line = f"{self._name}: {text}"
-        if self._bar is not None:
-            self._bar.show(self.done, text)
-        elif self._live:
-            self._write("\r" + line.ljust(self._width))
-            self._width = len(line)
-        else:
-            self._write(self._stamp() + line + "\n")
         self._told, self._told_share = self._clock(), self.done / max(self.total, 1)
-
-    def _stamp(self) -> str:
-        return "" if self._live else time.strftime("%Y-%m-%d %H:%M:%S  ")
-
-    def _end_line(self) -> None:
-        if self._live and self._width and self._stream is not None:
-            self._write("\n")
-            self._width = 0
+        if not self._live:
+            self.tell(text)
+            return
+        if self._bar is None:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of a notebook without widgets, which gets a bar of text
+                from tqdm.auto import tqdm
+            form = "{percentage:3.0f} %|{bar:20}| {desc}"
+            self._bar = tqdm(total=self.total, initial=self.done, file=self._stream, bar_format=form)
+        self._bar.n = self.done
+        self._bar.set_description_str(f"{self._name}: {text}")
 
     def _write(self, text: str) -> None:
         """Tells; a reader who has gone, or a full disk behind the log, does not stop the run."""
@@ -195,55 +241,14 @@ class Progress:
             self._stream = None
 
 
+def _in_notebook() -> bool:
+    """Whether this runs in the kernel of a notebook."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return type(shell).__name__ == "ZMQInteractiveShell"
+
+
 def stream_of(progress: bool | TextIO | None) -> TextIO | None:
     """Where to tell: None or True is stderr, False nowhere."""
     if progress is None or progress is True:
         return sys.stderr
     return None if progress is False else progress
-
-
-class TimeUp(Exception):
-    """A run is to end before it is complete; the text says why."""
-
-
-def deadline(text: str | datetime | None, now: datetime | None = None) -> datetime | None:
-    """The time that is meant, with a time zone.
-
-    Parameters
-    ----------
-    text : str, datetime or None
-        "07:00" is the next time it is seven, here; "2027-01-31 07:00" is that moment.
-
-    Raises
-    ------
-    SweepError
-        It is no time.
-    """
-    if text is None:
-        return None
-    if isinstance(text, datetime):
-        return text.astimezone()
-    here = (now or datetime.now()).astimezone()
-    try:
-        clock = day_time.fromisoformat(text.strip())
-    except (ValueError, AttributeError):
-        return _moment(text)
-    if clock.tzinfo is not None:
-        here = here.astimezone(clock.tzinfo)
-    at = datetime.combine(here.date(), clock).astimezone()
-    # the next day by its date, for days of 23 and 25 hours
-    return at if at > here else datetime.combine(here.date() + timedelta(days=1), clock).astimezone()
-
-
-def _moment(text: object) -> datetime:
-    try:
-        if not isinstance(text, str):
-            raise ValueError
-        return datetime.fromisoformat(text.strip()).astimezone()
-    except ValueError:
-        raise SweepError(f'until: expected a time like "07:00" or "2027-01-31 07:00", found {text!r}') from None
-
-
-def passed(until: datetime | None) -> bool:
-    """Whether it is time to stop."""
-    return until is not None and datetime.now().astimezone() >= until

@@ -2,38 +2,37 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import datetime
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from sweep.cells.block import Found
-from sweep.cells.fingerprint import fingerprint
+import numpy as np
+
+from sweep.cells.block import Blocks
 from sweep.cells.output_schema import gathered
 from sweep.cells.partition import row_blocks
-from sweep.cells.sample import require_asked
 from sweep.errors import SweepError
 from sweep.file.open import in_memory, memory, open_result, open_unfinished
-from sweep.file.store import lock_of, unfinished_of
-from sweep.runs import resume
+from sweep.file.store import unfinished_of
+from sweep.runs.bench import Found
 from sweep.runs.extend import TAKEN_OVER, Precomputed
-from sweep.runs.isolate import limits_of
-from sweep.runs.pool import cores, whole_number
-from sweep.runs.progress import TimeUp, deadline, stream_of
-from sweep.runs.session import Session, Solve, joined
-from sweep.runs.task import Task
+from sweep.runs.loop import Loop
+from sweep.runs.pool import CtrlC
+from sweep.runs.task import Task, asked, joined
 from sweep.runs.to_file import run_to_file
 from sweep.study.keys import KEYS
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.words import as_path, did_you_mean, listed
+from sweep.words import did_you_mean, listed
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from sweep.runs.cluster import Cluster
     from sweep.study.model import Study
 
 STORED_AT_ONCE = 1 << 16
@@ -112,36 +111,28 @@ def run(
     >>> ds.period.values.round(6)
     array([44.      ,  7.844719])
     """
-    _check_keywords(keys)
-    task = _task(
+    options = [name for name in signature(run).parameters if name != "keys"]
+    for key in keys:
+        if key not in (*KEYS, "allow_import"):
+            hint = did_you_mean(key, [*options, *KEYS]) or f"; a study has {listed(KEYS, word='and')}"
+            raise SweepError(f"sweep.run: no such keyword {key}{hint}")
+    task = asked(
         as_study(study, **keys), path, workers=workers, force=force, progress=progress, block_cells=block_cells,
         extend=extend, until=until, cluster=cluster, repair=repair, isolate=isolate, cell_timeout=cell_timeout,
         retry_failed=retry_failed,
     )  # fmt: skip
     if path is None:
-        try:
-            return _run_in_memory(task)
-        except TimeUp as reason:
-            raise SweepError(f"stopped, for {reason}; give a path to keep what is computed") from None
-    if _complete(task):
+        return _run_in_memory(task)
+    if run_to_file(task):
         return open_result(task.output)
     if not is_begun(task.output):
         raise SweepError("until: the time was up before the first cell could be computed")
     return open_unfinished(task.output)
 
 
-def _check_keywords(keys: Mapping[str, Any]) -> None:
-    """Raises SweepError for one that neither `run` nor a study has."""
-    options = [name for name in signature(run).parameters if name != "keys"]
-    for key in keys:
-        if key not in (*KEYS, "allow_import"):
-            hint = did_you_mean(key, [*options, *KEYS]) or f"; a study has {listed(KEYS, word='and')}"
-            raise SweepError(f"sweep.run: no such keyword {key}{hint}")
-
-
 def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> bool:
     """Runs as `run` does, and opens nothing; False where the time was up before the end."""
-    return _complete(_task(study, path, **options))
+    return run_to_file(asked(study, path, **options))
 
 
 def is_begun(output: Path) -> bool:
@@ -176,97 +167,43 @@ def store_cells(
         As `run`.
     """
     block = max(1, min(row_blocks(study).count, STORED_AT_ONCE))
-    task = Task(study, dict(mark or fingerprint(study)), _checked(path), 1, force=force, block_cells=block)
-    _complete(task, Precomputed(arrays, {**(attrs or {}), **({TAKEN_OVER: taken_over} if taken_over else {})}))
+    task = asked(study, path, workers=1, progress=False, force=force, block_cells=block, mark=mark)
+    run_to_file(task, Precomputed(arrays, {**(attrs or {}), **({TAKEN_OVER: taken_over} if taken_over else {})}))
     return open_result(task.output)
 
 
-def _task(
-    study: Study,
-    path: str | os.PathLike[str] | None,
-    *,
-    workers: int | None = None,
-    progress: bool | TextIO | None = None,
-    block_cells: int | None = None,
-    until: str | datetime | None = None,
-    isolate: bool = False,
-    cell_timeout: float | str | None = None,
-    **options: Any,
-) -> Task:
-    """What `run` was asked for; further options are kept as they are. Raises SweepError."""
-    task = Task(
-        study,
-        fingerprint(study),
-        None if path is None else _checked(path),
-        cores() if workers is None else whole_number("workers", workers),
-        stream_of(progress),
-        block_cells=None if block_cells is None else whole_number("block_cells", block_cells),
-        until=deadline(until),
-        isolate=isolate or cell_timeout is not None,
-        limits=limits_of(cell_timeout),
-        **options,
-    )
-    if task.cluster is not None and workers is not None:
-        raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
-    require_asked(study)
-    if path is None and until is not None:
-        raise SweepError("until: give a path as well, or what is computed by then would be lost")
-    if task.extend and task.retry_failed:
-        raise SweepError("extend, retry_failed: give one of the two; each continues another result")
-    return task
+class _Memory:
+    """Where blocks of a run in memory go: all columns. Raises SweepError where the memory is too small."""
 
+    def __init__(self, blocks: Blocks) -> None:
+        self._blocks, rows = blocks, blocks.rows.count
+        if rows * blocks.row_bytes > memory():
+            needed = f"{rows * blocks.row_bytes / 1e9:.1f} GB"
+            raise SweepError(f"the result takes {needed}, more than the memory; give a path to store it")
+        self.arrays = blocks.empty(rows)
 
-def _checked(path: str | os.PathLike[str]) -> Path:
-    output = Path(os.path.realpath(as_path(path)))
-    if not output.parent.is_dir():
-        raise SweepError(f"{path}: there is no folder {output.parent}")
-    return output
+    def room(self, job: int) -> Mapping[str, Any]:
+        """Where a block lies."""
+        return {name: array[slice(*self._blocks.bounds(job))] for name, array in self.arrays.items()}
 
+    def put(self, job: int, found: Found) -> None:
+        """Takes a block, which lies there already if it was computed here."""
+        assert not isinstance(found, bytes)
+        for name, place in self.room(job).items():
+            if not np.may_share_memory(place, found[name]):
+                place[...] = found[name]
 
-def _complete(task: Task, precomputed: Precomputed | None = None) -> bool:
-    """False where the time was up before the end."""
-    left = unfinished_of(task.output).exists() or lock_of(task.output).exists()
-    return (resume.is_complete(task) and not left) or run_to_file(task, precomputed)
+    def tick(self) -> None:
+        """Nothing is to be done now and then."""
 
 
 def _run_in_memory(task: Task) -> xr.Dataset:
-    with joined(task) as cluster:
-        session = Session(task, cluster)
-        arrays = _arrays(session)
-        progress = session.begin(range(session.blocks.count))
-        try:
-            _fill(session, arrays, cluster)
+    with CtrlC() as ctrl_c, joined(task) as cluster:
+        loop = Loop(task, ctrl_c, cluster)
+        with contextlib.closing(loop):
+            sink, jobs = _Memory(loop.blocks), range(loop.blocks.count)
+            progress = loop.begin(jobs)
+            loop.compute(jobs, sink)
             progress.end()
-        finally:
-            session.close()
-    found = arrays if task.study.summary is None else gathered(task.study, arrays)
-    return in_memory(session.dated(session.began), found)
-
-
-def _fill(session: Session, arrays: Mapping[str, Any], cluster: Cluster | None) -> None:
-    """Computes all rows into their places."""
-
-    def place(job: int) -> dict[str, Any]:
-        return {name: array[slice(*session.blocks.bounds(job))] for name, array in arrays.items()}
-
-    def work(job: int, solve: Solve) -> None:
-        solve(*session.blocks.bounds(job), place(job))
-
-    def receive(job: int, found: Found) -> None:
-        assert not isinstance(found, bytes)
-        for name, column in place(job).items():
-            column[...] = found[name]
-
-    if cluster is None:
-        session.compute(work)
-    else:
-        session.compute_elsewhere(cluster, None, receive)
-
-
-def _arrays(session: Session) -> dict[str, Any]:
-    """Columns of all rows. Raises SweepError where the memory is too small."""
-    rows = session.blocks.rows.count
-    needed = rows * session.blocks.row_bytes
-    if needed > memory():
-        raise SweepError(f"the result takes {needed / 1e9:.1f} GB, more than the memory; give a path to store it")
-    return session.blocks.empty(rows)
+    found = sink.arrays if task.study.summary is None else gathered(task.study, sink.arrays)
+    return in_memory(replace(loop.schema, attrs={**loop.schema.attrs, "start": loop.began, **loop.endings()}), found)

@@ -1,28 +1,29 @@
-"""A run into a file: blocks go to a store that survives a kill, and damaged ones are computed again."""
+"""A run into a file: what stands at its place is looked at and continued; blocks go to a store that survives a kill."""
 
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from sweep.cells.block import Found
-from sweep.cells.output_schema import gathered
+import numpy as np
+
+from sweep.cells.fingerprint import difference
+from sweep.cells.output_schema import gathered, part_columns
 from sweep.cells.partition import row_blocks
 from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import stored_fingerprint
 from sweep.file.reading import StoredFile
-from sweep.file.store import Gather, Store, opened
-from sweep.file.verify import check_whole
-from sweep.runs import resume
-from sweep.runs.extend import Precomputed, Retried, Reused, is_of_another_version
-from sweep.runs.pool import BufferPool, CtrlC, Terminated
-from sweep.runs.progress import TimeUp
-from sweep.runs.session import Session, Solve, joined
-from sweep.runs.task import Task
-from sweep.study.model import Study
+from sweep.file.store import Gather, Store, lock_of, opened, unfinished_of
+from sweep.file.verify import check_whole, verify
+from sweep.runs.bench import Buffers, Found
+from sweep.runs.extend import Precomputed, Retried, Reused, has_failed, is_of_another_version, obstacle
+from sweep.runs.loop import Loop
+from sweep.runs.pool import CtrlC, Terminated, TimeUp
+from sweep.runs.task import Task, joined
 from sweep.words import quantity
 
 if TYPE_CHECKING:
@@ -30,27 +31,101 @@ if TYPE_CHECKING:
 
 MOST_ATTEMPTS = 3
 """Times that damaged blocks are computed again before the disk is given up."""
+EXTENDABLE = (
+    "where its axes have only got more values, --extend computes the new cells alone; those of another version it "
+    "keeps if a sample of them still has the same bits"
+)
 
 
 def run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
-    """False where the time was up before the end."""
+    """False where the time was up before the end. Raises SweepError, KeyboardInterrupt, Terminated."""
+    left = unfinished_of(task.output).exists() or lock_of(task.output).exists()
+    if not left and _is_complete(task):
+        return True
     with opened(task.output) as store, contextlib.ExitStack() as stack:
         # looked at again, for another run may have ended before this one had the lock
-        if resume.is_complete(task):
-            resume.tidy(store, task)
+        if _is_complete(task):
+            found = _found(store, task)
+            if found is not None and found.fingerprint == dict(task.fingerprint):
+                store.discard()
             return True
-        resume.take_up(store, task)
-        if store.file is not None and not store.missing():
-            return _run_session(Session(task, None, store.table.blocks, sampled=False), store, None)
-        reused = precomputed or _reused(task, stack)
+        _take_up(store, task)
         blocks = None if store.file is None else store.table.blocks
+        left = store.file is None or bool(store.missing())
+        reused = precomputed or (_reused(task, stack) if left else None)
+        # held back from here on, wherever they would leave half a file behind
+        ctrl_c = stack.enter_context(CtrlC())
+        cluster = stack.enter_context(joined(task)) if left else None
         try:
-            cluster = stack.enter_context(joined(task))
-            session = Session(task, cluster, blocks, sampled=precomputed is None, reused=reused)
+            loop = Loop(task, ctrl_c, cluster, blocks, left and precomputed is None, reused)
         except TimeUp as reason:
             task.note(f"stopped before the first block, for {reason}")
             return False
-        return _run_session(session, store, cluster)
+        with contextlib.closing(loop):
+            return _computed(loop, store, cluster)
+
+
+def _is_complete(task: Task) -> bool:
+    """Whether the output is complete for this study. Raises SweepError where it is something else."""
+    if not task.output.exists():
+        return False
+    stored = stored_fingerprint(task.output)
+    if task.force:
+        return False
+    if stored == dict(task.fingerprint):
+        if task.repair and verify(task.output).blocks is not None:
+            return False
+        check_whole(task.output)
+        return not (task.retry_failed and has_failed(task.output))
+    hindrance = obstacle(stored, task.fingerprint)
+    if task.extend and not hindrance:
+        return False
+    more = "" if hindrance else f"; {EXTENDABLE}"
+    what = f"cannot be extended, for {hindrance}" if task.extend else "holds the result of another study or version"
+    cure = f"choose another name, or overwrite it with --force{more}"
+    raise SweepError(f"{task.output}: {what}; {cure}\n{_listed(stored, task)}")
+
+
+def _take_up(store: Store, task: Task) -> None:
+    """Continues what an earlier run left. Raises SweepError where that was another study, unless forced."""
+    left = _found(store, task)
+    if left is None and task.repair and not task.force and task.output.exists():
+        store.reopen(verify(task.output).blocks or ())
+        return
+    if left is None:
+        store.discard()
+        return
+    table, columns = left.tables[left.work], part_columns(task.study)
+    fits = [(p.name, np.dtype(p.dtype), p.shape) for p in table.places] == [
+        (c.name, np.dtype(c.dtype), c.shape) for c in columns
+    ] and table.blocks.size == row_blocks(task.study).count
+    ours = left.fingerprint == dict(task.fingerprint)
+    if fits and ours:
+        store.resume(left)
+    elif task.force:
+        left.close()
+        store.discard()
+    elif ours:
+        raise SweepError(f"{task.output}: its unfinished result is not what its study makes; give it up with --force")
+    else:
+        raise SweepError(
+            f"{store.path}: the unfinished result of another study or version; finish that one first, choose another "
+            f"name, or give it up with --force\n{_listed(left.fingerprint, task)}"
+        )
+
+
+def _found(store: Store, task: Task) -> StoredFile | None:
+    """What an earlier run left; None where that is damaged and given up."""
+    try:
+        return store.found()
+    except SweepError:
+        if not task.force:
+            raise
+        return None
+
+
+def _listed(old: Mapping[str, str], task: Task) -> str:
+    return "\n".join(f"  {line}" for line in difference(dict(old), dict(task.fingerprint)))
 
 
 def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
@@ -58,42 +133,63 @@ def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
     if not (task.extend or task.retry_failed) or task.force or not task.output.exists():
         return None
     check_whole(task.output)
-    if task.retry_failed:
-        return stack.enter_context(Retried(task.output, task.study))
-    reused = stack.enter_context(Reused(task.output, task.study))
-    if is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
+    reused = stack.enter_context((Retried if task.retry_failed else Reused)(task.output, task.study))
+    if task.extend and is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
         task.note("another version has computed it; a sample of its cells is computed again")
         reused.check_sample()
     return reused
 
 
-def _run_session(session: Session, store: Store, cluster: Cluster | None) -> bool:
+class _Stored:
+    """Where blocks of a run to a file go."""
+
+    def __init__(self, loop: Loop, store: Store) -> None:
+        self._buffers, self._store = Buffers(loop.blocks), store
+        self.room, self.tick = self._buffers.room, store.tick
+
+    def put(self, job: int, found: Found) -> None:
+        """Stores a block, or acknowledges one that a worker has written."""
+        if isinstance(found, bytes):
+            self._store.take(job, found)
+        else:
+            self._store.put(job, found)
+            self._buffers.back(job)
+
+
+def _computed(loop: Loop, store: Store, cluster: Cluster | None) -> bool:
     """Computes what is missing and ends the result; False where the time was up before."""
-    progress = session.begin(range(session.blocks.count) if store.file is None else store.missing())
-    session.tick = store.tick
-    session.log_begin()
-    # held back wherever they would leave half a file behind
-    with CtrlC():
-        if store.file is None:
-            _begin(session, store, shared=cluster is not None)
-        try:
-            _finish(session, store, cluster)
-        except (KeyboardInterrupt, Terminated):
-            progress.note(f"stopped; {_kept(store)}")
-            raise
-        except TimeUp as reason:
-            progress.note(f"stopped, for {reason}; {_kept(store)}")
+    task, sink = loop.task, None
+    progress = loop.begin(range(loop.blocks.count) if store.file is None else store.missing())
+    loop.log_begin()
+    if store.file is None:
+        _begin(loop, store, shared=cluster is not None)
+    try:
+        for _ in range(MOST_ATTEMPTS):
+            if missing := store.missing():
+                sink = sink or _Stored(loop, store)
+                loop.compute(missing, sink, None if cluster is None else store.shared())
+            damaged = store.finish(loop.endings(), None if task.study.summary is None else _gatherer(task))
+            if not damaged:
+                progress.end()
+                return True
+            for block in damaged:
+                loop.again(block)
+    except (KeyboardInterrupt, Terminated, TimeUp) as reason:
+        store.commit()
+        why = f"stopped, for {reason}" if isinstance(reason, TimeUp) else "stopped"
+        kept = f"{store.count} of {loop.blocks.count} blocks are kept"
+        progress.note(f"{why}; {kept}, run the same command again to continue")
+        if isinstance(reason, TimeUp):
             return False
-        finally:
-            session.close()
-    return True
+        raise
+    raise SweepError(f"{store.path}: what is written there comes back damaged again and again; the disk is failing")
 
 
-def _begin(session: Session, store: Store, shared: bool) -> None:
+def _begin(loop: Loop, store: Store, shared: bool) -> None:
     """Makes the file. Raises SweepError where it has no room on the disk."""
-    task = session.task
-    schema = replace(session.schema, attrs={**session.schema.attrs, "start": session.began})
-    cuts = cuts_of(task.study, schema, session.blocks.partition)
+    task = loop.task
+    schema = replace(loop.schema, attrs={**loop.schema.attrs, "start": loop.began})
+    cuts = cuts_of(task.study, schema, loop.blocks.partition)
     needed, free = expected_size(schema, cuts), disk.free(task.output.parent)
     if needed > free:
         raise SweepError(
@@ -103,58 +199,13 @@ def _begin(session: Session, store: Store, shared: bool) -> None:
     store.begin(schema, cuts, shared)
 
 
-def _kept(store: Store) -> str:
-    store.commit()
-    kept = f"{store.count} of {store.table.blocks.count} blocks are kept"
-    return f"{kept}, run the same command again to continue"
-
-
-def _finish(session: Session, store: Store, cluster: Cluster | None) -> None:
-    """Computes what is missing and ends the result, again where a block turns out to be damaged."""
-    gather = None if session.study.summary is None else _gather(session.study)
-    for _ in range(MOST_ATTEMPTS):
-        if store.missing():
-            _store_blocks(session, store, cluster)
-        damaged = store.finish(session.endings(), gather)
-        if not damaged:
-            session.progress.end()
-            return
-        for index in damaged:
-            session.again(index)
-            session.progress.note(f"{session.blocks.label(index)} were damaged on the disk and are computed again")
-    raise SweepError(f"{store.path}: what is written there comes back damaged again and again; the disk is failing")
-
-
-def _gather(study: Study) -> Gather:
+def _gatherer(task: Task) -> Gather:
     """Makes blocks of a summary's output from its rows."""
-    per_group = row_blocks(study).per_group
+    per_group = row_blocks(task.study).per_group
 
     def gather(file: StoredFile, block: int) -> dict[str, Any]:
         first, last = file.tables["cells"].blocks.bounds(block)
         rows = {name: c[first * per_group : last * per_group] for name, c in file.columns("rows").items()}
-        return gathered(study, rows)
+        return gathered(task.study, rows)
 
     return gather
-
-
-def _store_blocks(session: Session, store: Store, cluster: Cluster | None) -> None:
-    """Blocks that threads here compute, or workers of a cluster, which write them themselves where they can."""
-    buffers = BufferPool(session.blocks.empty)
-
-    def work(job: int, solve: Solve) -> None:
-        start, stop = session.blocks.bounds(job)
-        with buffers.borrow() as columns:
-            arrays = {name: column[: stop - start] for name, column in columns.items()}
-            if solve(start, stop, arrays):
-                store.put(job, arrays)
-
-    def receive(job: int, found: Found) -> None:
-        if isinstance(found, bytes):
-            store.take(job, found)
-        else:
-            store.put(job, found)
-
-    if cluster is None:
-        session.compute(work)
-    else:
-        session.compute_elsewhere(cluster, store.shared(), receive)

@@ -60,7 +60,7 @@ def interrupted(study, output):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Store, "put", failing)
-        patch.setattr("sweep.runs.forecast.Forecast.order", lambda self: iter(range(self.blocks)))
+        patch.setattr("sweep.runs.loop.from_everywhere", list)
         with pytest.raises(SweepError, match="stop here"):
             quiet(study, output, block_cells=5, workers=1)
 

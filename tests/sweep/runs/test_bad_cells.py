@@ -5,7 +5,6 @@ import resource
 import subprocess
 import sys
 import time
-from types import SimpleNamespace
 
 import bad
 import numpy as np
@@ -21,7 +20,7 @@ from sweep.errors import CELLS_FAILED, MISTAKE, SweepError
 from sweep.file.store import unfinished_of
 from sweep.results.statuses import account
 from sweep.runs import isolate
-from sweep.runs.isolate import Limits, Processes
+from sweep.runs.isolate import Processes
 
 SOUND = 100
 BAD = {"bad:RAISING": [11.0], "bad:DYING": [11.0, 22.0, 33.0], "bad:WORST": [11.0, 22.0, 33.0, 44.0, 55.0, 66.0]}
@@ -66,13 +65,17 @@ def test_bad_cells_fail_by_name_and_all_others_have_the_bits_of_a_run_without_th
 def test_a_process_that_died_by_itself_was_not_late(monkeypatch):
     """Although it is found out only when its time is up, as where an image of its memory is written meanwhile."""
 
-    def blind(futures, seconds, real=isolate.wait):
-        done = {f for f in real(futures, max(seconds, 2.0)).done if f.exception() is None}
-        time.sleep(0.0 if done else seconds)
-        return SimpleNamespace(done=done)
+    def blind(pipes, seconds, real=isolate.wait):
+        """Sees what is answered, but no end."""
+        time.sleep(seconds)
+        return [pipe for pipe in real(pipes, 0.0) if pipe.poll() and not pipe.closed and not dead(pipe)]
+
+    def dead(pipe):
+        return any(s._process is not None and s._process.pipe is pipe and not s._process.is_alive() for s in solvers)
 
     monkeypatch.setattr(isolate, "wait", blind)
-    processes, seen = Processes(tall(40, "bad:DYING"), Limits(1.5), 1), []
+    processes, seen = Processes(tall(40, "bad:DYING"), 1.5, 1), []
+    solvers = processes._solvers
     arrays = {"fall_time": np.empty(40)}, np.empty(40, np.int8), np.empty(40, np.int8)
     Guard(processes.solver(), seen.append).solve(0, Cells(*arrays))
     processes.end()

@@ -125,8 +125,8 @@ def test_an_address_where_nobody_answers_is_one_clear_line(output, where):
 
 
 def test_a_worker_with_another_version_refuses(client, output, monkeypatch):
-    real = sweep.runs.run.fingerprint
-    monkeypatch.setattr("sweep.runs.run.fingerprint", lambda study: {**real(study), "source toy": "other"})
+    real = sweep.runs.task.fingerprint
+    monkeypatch.setattr("sweep.runs.task.fingerprint", lambda study: {**real(study), "source toy": "other"})
     with pytest.raises(SweepError, match=r"worker on .*versions(.|\n)*source toy"):
         elsewhere(tall(3), output, cluster=client)
 

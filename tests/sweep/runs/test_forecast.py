@@ -1,14 +1,13 @@
 """Forecasts of runs on a simulated clock, with blocks that take what they are told to take."""
 
 import heapq
-from itertools import islice
 
 import numpy as np
 import pytest
 
 from sweep.cells.partition import Partition
 from sweep.cells.timing import Sample
-from sweep.runs.forecast import Forecast
+from sweep.runs.progress import Forecast, from_everywhere
 
 CELLS = 2**18
 
@@ -52,27 +51,24 @@ class Run:
         probed = noise * [costs[p : p + 32].mean() for p in places]
         self.weights = Sample(places, probed, 32).weights(partition)
         self.now, self.workers, self.slow = 0.0, workers, slow
-        self.forecast = Forecast(self.weights, range(partition.count), lambda: self.now)
+        self.forecast = Forecast(self.weights, range(partition.count), workers, lambda: self.now)
 
-    def ends(self, blocks=None):
-        """The number of blocks that are done, each time it grows; as the pool does, blocks are taken ahead of time."""
-        jobs, busy = self.forecast.order(), []
-        queue = list(islice(jobs, 4 * self.workers))
-        for count in range(1, (blocks or len(self.costs)) + 1):
+    def ends(self):
+        """The number of blocks that are done, each time it grows."""
+        queue, busy = from_everywhere(range(len(self.costs))), []
+        for count in range(1, len(self.costs) + 1):
             while queue and len(busy) < self.workers:
                 job = queue.pop(0)
-                self.forecast.begin(job)
+                self.forecast.begin((job,))
                 slow = self.slow if count <= 1 else 1.0
                 heapq.heappush(busy, (self.now + slow * self.costs[job], job))
             self.now, job = heapq.heappop(busy)
-            self.forecast.end(job)
-            queue += islice(jobs, 1)
+            self.forecast.end((job,))
             yield count
 
-    def forecasts(self, blocks=None):
+    def forecasts(self):
         """Share of the blocks that are done, the time, and how much is forecast to be left, after each block."""
-        count = blocks or len(self.costs)
-        return [(done / count, self.now, self.forecast.left) for done in self.ends(blocks)]
+        return [(done / len(self.costs), self.now, self.forecast.left) for done in self.ends()]
 
 
 @pytest.mark.parametrize("workers", [1, 8])
@@ -87,23 +83,23 @@ def test_from_a_tenth_on_the_time_left_is_within_a_factor_of_two(name, slow, wor
 
 
 def test_every_block_comes_once_also_one_that_comes_again():
+    assert sorted(from_everywhere(range(7, 1000))) == list(range(7, 1000))
     run = Run(COSTS["dear last"], 100, 3)
     assert len(list(run.ends())) == len(run.costs)
-    assert (run.forecast.left, run.forecast.blocks) == (0.0, 0)
+    assert run.forecast.left == 0.0
     run.forecast.again(2)
     assert run.forecast.left > 0
-    assert list(run.forecast.order()) == [2]
 
 
 def test_a_block_that_takes_far_longer_than_thought_is_not_done_at_any_moment():
     """The last one of a hundred takes a minute, not the second that the others did: it was never 0 s to its end."""
     now = 0.0
-    forecast = Forecast(np.ones(100), range(100), lambda: now)
-    for job in sorted(forecast.order())[:99]:
-        forecast.begin(job)
+    forecast = Forecast(np.ones(100), range(100), 1, lambda: now)
+    for job in range(99):
+        forecast.begin((job,))
         now += 1.0
-        forecast.end(job)
-    forecast.begin(99)
+        forecast.end((job,))
+    forecast.begin((99,))
     before = forecast.left
     now += 0.75
     assert forecast.left == pytest.approx(before - 0.75)

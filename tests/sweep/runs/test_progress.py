@@ -81,7 +81,7 @@ def test_while_cells_remain_some_time_is_left_and_it_is_not_all_done(clock, fore
     assert seconds_in(progress.line().split("cells/s, ")[1]) > 0
     progress.add(1)
     assert "(100 %)" in progress.line()
-    progress.again(10)
+    progress.add(-10)
     assert progress.done == 10**9 - 10
     assert "(100 %)" in Progress(0, None, clock=clock).line()
     assert "left" not in Progress(100, None, clock=clock).line()
