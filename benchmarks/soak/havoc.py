@@ -9,6 +9,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import xarray as xr
 import xxhash
 
 HERE = Path(__file__)
@@ -17,6 +18,7 @@ sys.path[:0] = [p for p in PATHS if p not in sys.path]
 
 import sweep  # noqa: E402
 from sweep.errors import SweepError  # noqa: E402
+from sweep.file.layout import ENDING_BYTES  # noqa: E402
 from sweep.file.reading import StoredFile  # noqa: E402
 from sweep.file.store import Store, unfinished_of  # noqa: E402
 from sweep.file.verify import verify  # noqa: E402
@@ -70,15 +72,14 @@ def damage(rng, path, strange):
     """Damages a result, finished or not, in some way; `strange` is one of another study. Tells what it did."""
     kind, content = rng.choice(DAMAGES), bytearray(path.read_bytes())
     with StoredFile(path) as file:
-        table, endings = file.layout.work, file.layout.endings
-        finished = file.finished
+        table, ending, finished = file.tables[file.work], file.ending_at, bool(file.ending)
     block, other = rng.sample(range(table.blocks.count), 2)
     place = rng.choice(table.places)
-    chunk = slice(place.at(block), place.at(block) + table.stored(place, block))
+    chunk = span(place, block)
     if kind in ("flip", "zeroed"):
         length = 1 if kind == "flip" else 512
         at = rng.randrange(len(content) - length)
-        if not finished and any(begin - length < at < end for begin, end in endings):
+        if not finished and ending - length < at < ending + ENDING_BYTES + 4:
             return damage(rng, path, strange)  # what is written over at the end
         content[at : at + length] = bytes(length) if kind == "zeroed" else [content[at] ^ 1 << rng.randrange(8)]
     elif kind in ("cut", "empty", "missing"):
@@ -89,18 +90,89 @@ def damage(rng, path, strange):
         rows = [slice(table.digests + b * table.row_bytes, table.digests + (b + 1) * table.row_bytes)
                 for b in (block, other)]  # fmt: skip
         if kind == "swapped":
-            there = slice(place.at(other), place.at(other) + table.stored(place, other))
+            there = span(place, other)
             content[chunk], content[there] = content[there], content[chunk]
         elif kind == "swapped whole":
             for p in table.places:
-                one, two = (slice(p.at(b), p.at(b) + table.stored(p, b)) for b in (block, other))
+                one, two = span(p, block), span(p, other)
                 content[one], content[two] = content[two], content[one]
             content[rows[0]], content[rows[1]] = content[rows[1]], content[rows[0]]
         else:
-            for at in [*(slice(p.at(block), p.at(block) + table.stored(p, block)) for p in table.places), rows[0]]:
+            for at in [*(span(p, block) for p in table.places), rows[0]]:
                 content[at] = strange[at]
     path.unlink() if kind == "missing" else path.write_bytes(content)
     return kind
+
+
+def span(place, block):
+    """Where a chunk of a column is, with its checksum."""
+    return slice(int(place.at[block]), int(place.at[block]) + place.size + place.check)
+
+
+def by_h5py(path):
+    """All that h5py finds in a result: numbers and texts."""
+    with h5py.File(path, "r") as file:
+        own = dict(file.attrs)
+        found = {name: file[name] for name in file if isinstance(file[name], h5py.Dataset)}
+        texts = {
+            name: {key: repr(thing.attrs[key]) for key in thing.attrs if key not in REFERENCES}
+            for name, thing in found.items()
+        }
+        return repr(own), texts, {name: thing[()].tobytes() for name, thing in found.items()}
+
+
+def by_xarray(path, engine):
+    """All that xarray finds in a result by an engine."""
+    with xr.open_dataset(path, engine=engine, decode_times=False) as found:
+        names = {name: (repr(v.dims), repr(dict(v.attrs))) for name, v in found.variables.items()}
+        return repr(dict(found.attrs)), names, {name: repr(v.values.tolist()) for name, v in found.variables.items()}
+
+
+def by_sweep(path):
+    """All that sweep finds in a result."""
+    with sweep.open_result(path) as found:
+        names = {name: (repr(v.dims), repr(dict(v.attrs))) for name, v in found.variables.items()}
+        return repr(dict(found.attrs)), names, {name: repr(v.values.tolist()) for name, v in found.variables.items()}
+
+
+REFERENCES = ("DIMENSION_LIST", "REFERENCE_LIST")
+READERS = {
+    "sweep": by_sweep,
+    "h5py": by_h5py,
+    "xarray, h5netcdf": lambda path: by_xarray(path, "h5netcdf"),
+    "xarray, netcdf4": lambda path: by_xarray(path, "netcdf4"),
+}
+
+
+def heap(content):
+    """Where the global heap of HDF5 is, which has no checksum: in damage there HDF5 may loop for ever."""
+    at = content.index(b"GCOL")
+    return range(at, at + int.from_bytes(content[at + 8 : at + 16], "little"))
+
+
+def misread(rng, result, scratch, sound):
+    """Flips a bit of a finished result; where, and who read something else then: "" where nobody did.
+
+    Parameters
+    ----------
+    sound : mapping of str to object
+        What each reader finds without damage.
+    """
+    content, path = bytearray(result.read_bytes()), scratch / "flipped.h5"
+    at = rng.randrange(len(content))
+    content[at] ^= 1 << rng.randrange(8)
+    path.write_bytes(content)
+    in_heap = at in heap(content) if b"GCOL" in content else True
+    wrong, refused = [], 0
+    for name, read in READERS.items():
+        if in_heap and name != "sweep":
+            continue
+        try:
+            wrong += [name] if read(path) != sound[name] else []
+        except Exception:
+            refused += 1
+    wrong += ["verify"] if verify(path).whole else []
+    return f"heap, {refused} refuse" if in_heap else f"{refused} of 4 refuse", "; ".join(wrong)
 
 
 def damaged_unfinished(rng, path, strange, scratch, whole):
