@@ -33,12 +33,14 @@ class Result(BackendEntrypoint):
         path, file = Path(filename_or_obj), None
         try:
             file = StoredFile(path)
+            attrs = file.ending
         except Changed:
-            changed_attrs(path)
+            attrs = changed_attrs(path)
         plain = xr.open_dataset(
             path, engine="h5netcdf", cache=False, decode_times=False, decode_timedelta=False,
             drop_variables=drop_variables, phony_dims="access",
         )  # fmt: skip
+        plain.attrs.update({name: attrs[name] for name in ("created", "end", "cells_per_second") if name in attrs})
         if file is None:
             # h5netcdf takes the first axis, too, to be over a dimension that it makes up
             odd = any(str(dim).startswith("phony_dim") for dim in plain.sizes)
@@ -53,7 +55,6 @@ class Result(BackendEntrypoint):
             encoding = {"preferred_chunks": dict(zip(map(str, like.dims), chunks, strict=True))}
             columns[name] = xr.Variable(like.dims, indexing.LazilyIndexedArray(Column(numbers)), like.attrs, encoding)
         found = plain.assign(columns).assign_coords({name: c.load() for name, c in plain.coords.items()})
-        found.attrs.update(file.ending)
         found.encoding = dict(plain.encoding)
         plain.close()
         found.set_close(file.close)

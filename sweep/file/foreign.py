@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import math
 from pathlib import Path
 from typing import Any
 
 from sweep.cells.reduce import BY_STATUS
 from sweep.cells.schema import STATUS
-from sweep.file.layout import chunks_of
+from sweep.file.layout import ENDING, chunks_of
 from sweep.file.reading import attrs_of
 
 MOST_COMPRESSED = 1100
@@ -21,7 +23,7 @@ TEXTS = (
 
 
 def changed_attrs(output: Path) -> dict[str, Any]:
-    """Attributes of a result that another program has changed.
+    """Attributes of a result that another program has changed, and what is known at the end of its run.
 
     Raises
     ------
@@ -38,6 +40,8 @@ def changed_attrs(output: Path) -> dict[str, Any]:
             if not all(isinstance(own[name], str) for name in TEXTS if name in own):
                 raise TypeError("an attribute is no text")
         float(attrs.get("rtol", 0.0))
+        with contextlib.suppress(OSError, KeyError, ValueError):
+            attrs |= json.loads(file[ENDING][()].tobytes())
     return attrs
 
 

@@ -27,7 +27,7 @@ from sweep.cells.partition import Partition, box_shape, boxes, row_blocks
 from sweep.cells.schema import STATUS, Column, Coordinate, Schema
 from sweep.file import disk
 from sweep.file.fletcher import checksum
-from sweep.file.layout import BYTES, ENDING_BYTES, GROUP, PIECE, SEAL, Place, Seal, digest_of, gaps, tables_of
+from sweep.file.layout import BYTES, ENDING, ENDING_BYTES, GROUP, PIECE, SEAL, Place, Seal, digest_of, gaps, tables_of
 
 if TYPE_CHECKING:
     from sweep.study.model import Study
@@ -109,7 +109,7 @@ def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = F
     head = image.size
     with _opened(image, SHARED_WORTH_A_PAGE if shared else WORTH_A_PAGE) as file:
         _allocate(file, image, cuts)
-        tables, ending = tables_of(file, key), int(file[f"{GROUP}/ending"].id.get_chunk_info(0).byte_offset)
+        tables, ending = tables_of(file, key), int(file[ENDING].id.get_chunk_info(0).byte_offset)
     fd = disk.open_file(path, os.O_CREAT | os.O_TRUNC | os.O_RDWR)
     try:
         disk.reserve(fd, image.size + SEAL.size)
@@ -228,18 +228,19 @@ def _describe(image: _Image, schema: Schema, cuts: Mapping[str, Cut]) -> None:
         group = file.create_group(GROUP)
         group.dimensions.update({"byte": BYTES, "character": ENDING_BYTES})
         for name, cut in cuts.items():
-            dims = {f"{name}_block": cut.blocks.count, f"{name}_column": len(cut.columns)}
-            group.dimensions.update(dims)
-            digests = group.create_variable(f"{name}_digests", (*dims, "byte"), "u1", dcpl=_properties())
+            lengths = {f"{name}_block": cut.blocks.count, f"{name}_column": len(cut.columns)}
+            group.dimensions.update(lengths)
+            digests = group.create_variable(f"{name}_digests", (*lengths, "byte"), "u1", dcpl=_properties())
             columns = json.dumps([[column.name for column in cut.columns], len(cut.grid)])
             about = "xxh3_128 of each chunk of each column, zeros where it is not computed yet"
             _say(digests, {"long_name": about, "columns": columns})
         ending = group.create_variable("ending", ("character",), "S1", dcpl=_properties((ENDING_BYTES,)))
         _say(ending, {"long_name": "when the run ended, and how fast it was, as JSON"})
         for column in schema.columns:
-            variable = _declare(file, plain, (*schema.grid.dims, *column.dims), column, cuts["cells"])
-            found = {*schema.grid.dims, *column.dims}
-            away = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= found]
+            dims = (*schema.grid.dims, *column.dims)
+            properties = _properties(cuts["cells"].chunk(column))
+            variable = file.create_variable(column.name, dims, column.dtype, dcpl=properties)
+            away = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(dims)]
             _say(variable, {**column.attrs, **({"coordinates": " ".join(away)} if away else {})})
         if "rows" in cuts:
             rows, cut = file.create_group("rows"), cuts["rows"]
@@ -248,7 +249,7 @@ def _describe(image: _Image, schema: Schema, cuts: Mapping[str, Cut]) -> None:
             }
             for column in cut.columns:
                 own = (f"{column.name} {k}" for k in range(len(column.shape)))
-                _declare(rows, plain["rows"], ("row", *own), column, cut)
+                rows.create_variable(column.name, ("row", *own), column.dtype, dcpl=_properties(cut.chunk(column)))
 
 
 def _write_coordinate(file: Any, plain: Any, coordinate: Coordinate) -> None:
@@ -272,15 +273,11 @@ def _write_coordinate(file: Any, plain: Any, coordinate: Coordinate) -> None:
     _say(made, attrs)
 
 
-def _declare(group: Any, plain: Any, dims: tuple[str, ...], column: Column, cut: Cut) -> Any:
-    """A column; a single number, which h5py gives no properties, gets its place when it is written."""
-    if dims:
-        return group.create_variable(column.name, dims, column.dtype, dcpl=_properties(cut.chunk(column)))
-    return group.create_variable(column.name, (), column.dtype)
-
-
 def _properties(chunk: tuple[int, ...] | None = None) -> Any:
-    """How HDF5 makes a dataset: in chunks with a checksum; (): in its object header; None: in one piece, without."""
+    """How HDF5 makes a dataset: in chunks with a checksum; (): in its object header; None: in one piece, without.
+
+    An output that is a single number is in one piece in any case: h5py gives it no properties.
+    """
     from h5py import h5d, h5p
 
     properties = h5p.create(h5p.DATASET_CREATE)
@@ -319,4 +316,4 @@ def _allocate(file: Any, image: _Image, cuts: Mapping[str, Cut]) -> None:
             else:
                 dataset[()] = np.nan if dataset.dtype.kind == "f" else -1
     image.chunk = ENDING_BYTES + len(WRONG)
-    file[f"{GROUP}/ending"].id.write_direct_chunk((0,), bytes(image.chunk))
+    file[ENDING].id.write_direct_chunk((0,), bytes(image.chunk))

@@ -47,7 +47,7 @@ PIECE = 8 << 20
 """Bytes read at a time."""
 ENDING_BYTES = 128
 """Of the text that is written when all is done."""
-TABLES, GROUP = ("cells", "rows"), "integrity"
+TABLES, GROUP, ENDING = ("cells", "rows"), "integrity", "integrity/ending"
 DAMAGE = (OSError, EOFError, LookupError, ValueError, TypeError, AttributeError, RuntimeError)
 """What comes of reading a damaged file."""
 

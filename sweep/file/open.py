@@ -99,8 +99,8 @@ def _open(place: Path, strict: bool = False) -> xr.Dataset:
     try:
         large = place.stat().st_size > MEMORY_SHARE * memory()
         found = xr.open_dataset(os.fspath(place), engine=Result, chunks="auto" if large else None)
-        with contextlib.suppress(Changed), StoredFile(place) as file:
-            if not file.ending:
+        if "end" not in found.attrs:
+            with contextlib.suppress(Changed), StoredFile(place) as file:
                 left, count = int((~file.done[file.work]).sum()), file.tables[file.work].blocks.count
                 missing = f"{left} of {count} blocks are missing" if left else "all is computed but not checked yet"
                 if strict:

@@ -21,7 +21,7 @@ from sweep.cells.schema import METHOD_USED, STATUS
 from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.file.fletcher import checksum
-from sweep.file.layout import ENDING_BYTES, GROUP, SEAL, Seal, digest_of, gaps, read_bytes, read_seal, tables_of
+from sweep.file.layout import ENDING, ENDING_BYTES, SEAL, Seal, digest_of, gaps, read_bytes, read_seal, tables_of
 
 READERS = 4
 """Threads that read a large piece,"""
@@ -71,7 +71,7 @@ class StoredFile:
             with h5py.File(path, "r") as file:
                 self.attrs = attrs_of(file)
                 self.tables = tables_of(file, seal.key)
-                self.ending_at = int(file[f"{GROUP}/ending"].id.get_chunk_info(0).byte_offset)
+                self.ending_at = int(file[ENDING].id.get_chunk_info(0).byte_offset)
             self.work = "rows" if "rows" in self.tables else "cells"
             self._digests = {name: table.read_digests(self.fd) for name, table in self.tables.items()}
             text = read_bytes(self.fd, self.ending_at, self.ending_at + ENDING_BYTES + 4)

@@ -100,6 +100,7 @@ def test_what_another_program_changed_is_told_and_can_be_read(copy, what):
     assert any("another program" in text for text in found.findings)
     with sweep.open_result(copy) as changed:
         assert changed.load().attrs.get("comment") == ("mine" if what == "comment" else None)
+        assert changed.attrs["end"] > changed.attrs["start"][:10]
 
 
 @pytest.mark.parametrize("digests_too", [False, True])

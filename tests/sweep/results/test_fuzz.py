@@ -107,6 +107,11 @@ def of_another_shape(file):
             made.attrs[name] = value
 
 
+def short_chunk(file):
+    """Of fewer bytes than it says."""
+    file["fall_time"].id.write_direct_chunk((0, 0), bytes(40))
+
+
 def with_attribute(place, name, value):
     """Of another kind than it was."""
     return lambda file: file[place].attrs.create(name, value)
@@ -117,6 +122,7 @@ CHANGES = [
     (of_absurd_size, 2),
     (without_dimension, 2),
     (of_another_shape, 2),
+    (short_chunk, 2),
     (with_attribute("/", "rtol", np.arange(5.0)), 2),
     (with_attribute("/", "end", np.zeros(3)), 2),
     (with_attribute("height", "units", 5), 2),
