@@ -74,18 +74,19 @@ def test_digests_reach_the_disk_behind_their_numbers(tmp_path, monkeypatch):
     """Between the writes of a block's numbers and that of its digests the disk is told to sync."""
     path, calls = tmp_path / "out.h5", []
     write, sync = disk.write, disk.sync_numbers
-    monkeypatch.setattr(disk, "write", lambda fd, pieces, at: (calls.append(at), write(fd, pieces, at))[1])
+    monkeypatch.setattr(disk, "write", lambda fd, pieces, at: (calls.append((at, pieces)), write(fd, pieces, at))[1])
     monkeypatch.setattr(disk, "sync_numbers", lambda fd: (calls.append("sync"), sync(fd))[1])
     run(path, 5, **STUDIES["a line"]).close()
     with h5py.File(path) as file:
         table = file["integrity/cells_digests"]
-        end = table.id.get_offset() + table.size
-        begin = table.id.get_offset()
-        chunks = {file[name].id.get_chunk_info(k).byte_offset for name in ("fall_time", "status") for k in range(5)}
-    digests = [k for k, at in enumerate(calls) if at != "sync" and begin <= at < end]
-    assert digests
-    for last in digests:
-        numbers = max(k for k, at in enumerate(calls[:last]) if at in chunks)
+        begin, row, end = table.id.get_offset(), table[0].size, table.id.get_offset() + table.size
+        chunks = [file["fall_time"].id.get_chunk_info(k).byte_offset for k in range(5)]
+    written = [(k, *call) for k, call in enumerate(calls) if call != "sync"]
+    digests = [(k, (at - begin) // row, sum(map(len, pieces)) // row) for k, at, pieces in written if begin <= at < end]
+    digests = [(k, block + i) for k, block, count in digests for i in range(count)]
+    assert {block for _, block in digests} == set(range(5))
+    for last, block in digests:
+        numbers = max(k for k, at, _ in written if at == chunks[block] and k < last)
         assert "sync" in calls[numbers:last]
 
 
