@@ -71,9 +71,9 @@ COMMANDS = {
         option(
             "--noise",
             "whether the values scatter, or how; default: as tests find",
-            choices=("yes", "no", "independent", "uneven", "correlated", "outliers"),
+            choices=("yes", "no", "even", "uneven", "correlated", "outliers"),
         ),
-        switch("--compare", "which law: one, two or three, a logarithm, an offset, a correction to scaling"),
+        switch("--compare", "which law: one, two or three power laws, an offset, a correction, an exponential ..."),
         output("FILE.csv|.png", "also write the table; with --compare, .png, .svg or .pdf is a picture of all laws"),
         *(FORCE, AT, UNFINISHED),
     ),

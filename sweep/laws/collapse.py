@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from scipy.special import stdtrit
 
 from sweep.errors import SweepError
-from sweep.laws.correlated import student
 from sweep.laws.curves import check_confidence, check_output, log_of, positive_axis, title
 from sweep.laws.loglog import Array
 
@@ -104,7 +104,7 @@ def fit_collapse(
     off = points.z - fitted
     _require_determined(points, a, off, numbers)
     draws = _bootstrap(points, fitted, off * math.sqrt(off.size / (off.size - numbers)), near, bootstrap, seed)
-    reach = student(off.size - numbers, confidence) * draws.std(axis=0, ddof=1)
+    reach = float(stdtrit(off.size - numbers, (1 + confidence) / 2)) * draws.std(axis=0, ddof=1)
     result = xr.Dataset({"x_exponent": a, "y_exponent": b})
     for name, middle, wide in zip(("x_exponent", "y_exponent"), (a, b), reach, strict=True):
         result[f"{name}_low"], result[f"{name}_high"] = middle - wide, middle + wide

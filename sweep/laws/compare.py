@@ -1,4 +1,4 @@
-"""Which law? One, two or three power laws, a logarithm, an offset, a correction to scaling, judged by AICc and BIC."""
+"""Which law? Power laws with bends, offsets and corrections, exponentials and others, judged by AICc and BIC."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ import numpy as np
 import xarray as xr
 
 from sweep.errors import SweepError
-from sweep.laws.correlated import corrected
-from sweep.laws.curves import Window, check_output, relative_sigma, title, window_logs, window_of
-from sweep.laws.fits import Found, curve, fitted
-from sweep.laws.loglog import EPSILON, Array
-from sweep.laws.scatter import BEYOND_DOUBT, RARE, line_deviance
+from sweep.laws.curves import Window, check_output, relative_sigma, title, window_logs
+from sweep.laws.fits import Found, curve, errors, fitted
+from sweep.laws.loglog import Array
+from sweep.laws.noise import BEYOND_DOUBT, RARE, corrected, line_deviance, runs_chance
 from sweep.laws.shapes import CORRECTION, LAWS, ONE
 
 FEWEST_POINTS = 8
@@ -35,7 +34,8 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
 
     A law with more numbers is believed only where AICc prefers it by more than 10 to every law with fewer: so many
     times e^5 more likely, and a margin that correlated, uneven or outlying noise does not bridge, which one law is
-    tried with.
+    tried with. The laws are one, two (with bends of five shapes) and three power laws, an offset, a correction to
+    scaling; and functions that are none: logarithm, exponential, stretched exponential, cut-off, lognormal.
 
     Parameters
     ----------
@@ -76,8 +76,8 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
         raise SweepError(
             f"{title(y)} runs along {', '.join(map(str, y.dims))}; compare laws of one line, choose with .sel"
         )
-    _, t, logs = window_logs(y, dim, window)
-    relative = relative_sigma(y, sigma).isel(window_of(y, dim, window)).values
+    here, t, logs, _ = window_logs(y, dim, window)
+    relative = relative_sigma(y, sigma).isel(here).values
     present = np.flatnonzero(np.isfinite(logs.values) & (np.isfinite(relative) | (sigma is None)))
     if present.size < FEWEST_POINTS:
         raise SweepError(f"laws are told apart by at least {FEWEST_POINTS} points of {title(y)}, found {present.size}")
@@ -85,8 +85,11 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     t, z = t[present], logs.values[present]
     weights = None if sigma is None else relative[present] ** -2.0
     tried = [fit for law in LAWS if (fit := fitted(law, t, z, weights, known=weights is not None)) is not None]
-    if weights is None:
-        tried = [_with_any_noise(t, z, fit) if fit.law is ONE else fit for fit in tried]
+    if weights is None:  # one law with the noise that suits it best
+        deviance = min(line_deviance(t, z), tried[0].deviance)
+        k = ONE.numbers + 1 + (deviance < tried[0].deviance)
+        aicc, bic = float(corrected(deviance, t.size, k)), deviance + k * math.log(t.size)
+        tried[0] = tried[0]._replace(deviance=deviance, aicc=aicc, bic=bic)
     tried.sort(key=lambda fit: fit.aicc)
     found = _table(t, z, tried, weights)
     found.attrs = {"y": title(y), "x": dim, **_verdict(tried)}
@@ -95,17 +98,6 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     for name, of in (("x", y[dim]), ("y", y), ("fitted", y)):
         found[name].attrs = {"units": str(of.attrs.get("units", "1"))}
     return found
-
-
-def _with_any_noise(t: Array, z: Array, found: Found) -> Found:
-    deviance, k = line_deviance(t, z, (4 * EPSILON * (1 + abs(z).max())) ** 2)
-    numbers = k if deviance < found.deviance else found.law.numbers
-    deviance = min(deviance, found.deviance)
-    return found._replace(
-        deviance=deviance,
-        aicc=corrected(deviance, t.size, numbers + 1),
-        bic=deviance + (numbers + 1) * math.log(t.size),
-    )
 
 
 @np.errstate(over="ignore")
@@ -118,10 +110,10 @@ def _table(t: Array, z: Array, tried: list[Found], weights: Array | None) -> xr.
         "numbers": [f.law.numbers for f in tried],
         "scatter": [math.sqrt(float(np.mean(f.off**2))) for f in tried],
         "residual": [math.expm1(min(float(abs(f.off).max()), 700.0)) for f in tried],
-        "runs": [_runs(f.off) for f in tried],
+        "runs": [float(runs_chance(f.off)) for f in tried],
         "chi_squared": [math.nan if weights is None else _chance(f, weights) for f in tried],
         "formula": [f.law.formula for f in tried],
-        "exponents": [_exponents(f, float(span)) for f in tried],
+        "exponents": [_exponents(f, float(span), weights) for f in tried],
     }
     found = xr.Dataset({name: ("law", values) for name, values in columns.items()})
     for name, (units, text) in NAMES.items():
@@ -138,23 +130,11 @@ def _verdict(tried: list[Found]) -> dict[str, Any]:
     margin = min((f.aicc for f in others), default=math.inf) - chosen.aicc
     rivals = [f.law.name for f in alive if f is not chosen]
     text = f"{chosen.law.name} ({chosen.law.formula}): "
+    if not chosen.law.power:
+        text += "no power law; "
     alone = f"all others are worse by {margin:.3g} and more in AICc"
     text += f"not ruled out beside it: {', '.join(rivals)}" if rivals else alone
     return {"chosen": chosen.law.name, "margin": margin, "verdict": text}
-
-
-def _runs(off: Array) -> float:
-    """Chance of so few runs of signs or fewer, by the normal distribution of Wald and Wolfowitz."""
-    from scipy.special import ndtr
-
-    above = int((off > 0).sum())
-    below = off.size - above
-    if off.size < 12 or not above or not below:
-        return math.nan
-    runs = 1 + int((np.diff(off > 0) != 0).sum())
-    mean = 1 + 2 * above * below / off.size
-    size = math.sqrt((mean - 1) * (mean - 2) / (off.size - 1))
-    return float(ndtr((runs + 0.5 - mean) / size))
 
 
 def _chance(found: Found, weights: Array) -> float:
@@ -164,18 +144,18 @@ def _chance(found: Found, weights: Array) -> float:
     return float(gammaincc((found.off.size - found.law.numbers) / 2, square / 2))
 
 
-def _exponents(found: Found, span: float) -> str:
-    """The exponents with their standard errors, as of noise."""
-    if not found.law.exponents:
-        return f"p = {found.numbers[0] / span:.4g} +- {found.errors[0] / span:.1g}"
-    start = found.numbers.size - len(found.law.exponents)
+def _exponents(found: Found, span: float, weights: Array | None) -> str:
+    """The exponents with their standard errors, as of independent noise."""
+    names = found.law.exponents or ("p",) * (found.law.name == "offset")
+    places = range(found.numbers.size - len(names), found.numbers.size) if found.law.exponents else range(len(names))
+    doubt = errors(found, weights)
     parts = [
-        f"{name} = {p / span:.4g} +- {e / span:.1g}"
-        for name, p, e in zip(found.law.exponents, found.numbers[start:], found.errors[start:], strict=True)
+        f"{name} = {found.numbers[k] / span:.4g} +- {doubt[k] / span:.1g}"
+        for name, k in zip(names, places, strict=True)
     ]
     if found.law is CORRECTION:
         parts.append(f"D = {found.numbers[1] / span:.3g}")
-    return ", ".join(parts)
+    return ", ".join(parts) or "none"
 
 
 def fits(found: xr.Dataset, law: str) -> bool:

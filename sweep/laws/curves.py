@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from sweep.errors import SweepError
 from sweep.laws.loglog import EPSILON, FEWEST, Array
-from sweep.words import kind, require_dataset
+from sweep.words import columns, kind, require_dataset
 
 Window = tuple[float | None, float | None]
 
@@ -34,9 +35,12 @@ def check_dataset(name: str, given: Any, maker: str = "", needs: Sequence[str] =
         raise SweepError(f"sweep.{name}: this Dataset has no {', '.join(map(str, missing))}")
 
 
-def positive_axis(y: xr.DataArray, dim: str) -> tuple[str, Array]:
-    """Dimension that `dim` runs along, and its values, fit to take logarithms of."""
+def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[str, Array]:
+    """Dimension that `dim` runs along, and its values, fit to take logarithms of; some may be `repeated`."""
     dimension, values = _coordinate(y, dim)
+    if values.dtype.kind in "mM":
+        times = f"{dim} - {dim}[0]" if values.dtype.kind == "M" else dim
+        raise SweepError(f"{dim} holds times, not numbers; take seconds, ({times}) / np.timedelta64(1, 's')")
     if values.dtype.kind not in "fiu":
         raise SweepError(f"{dim} holds words, not numbers; a power law needs a number axis")
     x = values.astype(np.float64)
@@ -45,8 +49,8 @@ def positive_axis(y: xr.DataArray, dim: str) -> tuple[str, Array]:
         raise SweepError(f"{dim} must be positive and finite to take logarithms; found {x[~fit][0]:g}, select a part")
     if x.size < FEWEST:
         raise SweepError(f"{dim} has {x.size} of the at least {FEWEST} points that an exponent needs")
-    rises = np.diff(x) > 0
-    if not ((rises.all() or not rises.any()) and np.diff(x).all()):
+    steps = np.diff(x)
+    if not (((steps >= 0).all() or (steps <= 0).all()) and (repeated or steps.all())):
         raise SweepError(f"{dim} neither rises nor falls throughout; sort first, e.g. ds.sortby({dim!r})")
     return dimension, x
 
@@ -63,17 +67,25 @@ def _coordinate(y: xr.DataArray, dim: str) -> tuple[str, NDArray[Any]]:
     raise SweepError(f"{title(y)} has no axis {dim!r}; " + (f"did you mean {close[0]}?" if close else there))
 
 
-def window_logs(y: xr.DataArray, dim: str, window: Window | None) -> tuple[str, Array, xr.DataArray]:
-    """Dimension that `dim` runs along, ln dim inside the window, and ln y there. Raises SweepError."""
-    here = window_of(y, dim, window)
-    ((dimension, inside),) = here.items()
-    return dimension, np.log(positive_axis(y, dim)[1][inside]), logarithm(y.isel(here), dim)
+def window_logs(
+    y: xr.DataArray, dim: str, window: Window | None, repeated: bool = False
+) -> tuple[dict[str, NDArray[np.intp]], Array, xr.DataArray, xr.DataArray]:
+    """What `isel` takes for the window, ln dim and ln y there, and whether a line is positive; others are NaN.
 
-
-def window_of(y: xr.DataArray, dim: str, window: Window | None) -> dict[str, NDArray[np.intp]]:
-    """What `isel` takes for the window."""
-    dimension, x = positive_axis(y, dim)
-    return {dimension: np.flatnonzero(inside_window(x, window, dim))}
+    Raises SweepError where no line is.
+    """
+    dimension, x = positive_axis(y, dim, repeated)
+    here = {dimension: np.flatnonzero(inside_window(x, window, dim))}
+    part = y.isel(here).compute()
+    bad = missing_is_nan(part) <= 0
+    positive = ~bad.any(dimension)
+    if not bool(positive.any()):
+        first = part[tuple(np.argwhere(bad.values)[0])]
+        raise SweepError(
+            f"a power law needs positive values; {int(bad.sum())} of {part.size} of {title(y)} in the window are not, "
+            f"e.g. {float(first):g} at {dim} = {float(first.coords[dim]):g}; choose a window without them"
+        )
+    return here, np.log(x[here[dimension]]), log_of(part).where(positive), positive
 
 
 def check_confidence(confidence: float) -> None:
@@ -115,18 +127,6 @@ def missing_is_nan(y: xr.DataArray) -> xr.DataArray:
     return numbers.where(np.isfinite(numbers))
 
 
-def logarithm(part: xr.DataArray, dim: str) -> xr.DataArray:
-    """Natural logarithm, NaN where a point is missing. Raises SweepError where a point is not positive."""
-    cells = np.argwhere(np.asarray(part.values <= 0))
-    if count := len(cells):
-        first = part[tuple(cells[0])]
-        raise SweepError(
-            f"a power law needs positive values; {count} of {part.size} of {title(part)} in the window are not, "
-            f"e.g. {float(first):g} at {dim} = {float(first.coords[dim]):g}; choose a window without them"
-        )
-    return log_of(part)
-
-
 def log_of(y: xr.DataArray) -> xr.DataArray:
     """Natural logarithm, NaN where there is none."""
     numbers = missing_is_nan(y)
@@ -159,6 +159,20 @@ def numbers_along(
     """Numbers that a function puts in place of the points of each line, under these names."""
     numbers = along(function, y, dimension, "number", *others)
     return xr.Dataset({name: numbers.isel(number=k, drop=True) for k, name in enumerate(names)})
+
+
+def numbers_by_line(
+    names: Sequence[str], function: Callable[..., Array], y: xr.DataArray, dimension: str, *others: xr.DataArray
+) -> xr.Dataset:
+    """As `numbers_along`, of a function of one line (n,) and of the same of the others."""
+
+    def each(*parts: Array) -> Array:
+        count, n = math.prod(parts[0].shape[:-1]), parts[0].shape[-1]
+        lines = zip(*(np.broadcast_to(part, parts[0].shape).reshape(count, n) for part in parts), strict=True)
+        found = np.array([function(*line) for line in lines])
+        return found.reshape(*parts[0].shape[:-1], len(names))
+
+    return numbers_along(names, each, y, dimension, *others)
 
 
 def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:
@@ -227,25 +241,35 @@ def stated_error(dataset: xr.Dataset, name: str) -> xr.DataArray:
     return found.transpose(*dataset[name].dims)
 
 
-def scatter_is_noise(off: Array, z: Array) -> Any:
-    """Whether distances from a curve look like independent noise rather than a bend, lines along the last axis.
-
-    Neighbours of independent noise differ by sqrt(2) times its size: von Neumann's ratio is 2 +- 2/sqrt(n). Those of a
-    smooth bend differ by far less; and what rounding leaves is no noise. Missing points are passed over.
-    """
-    rows = [row[np.isfinite(row)] for row in off.reshape(-1, off.shape[-1])]
-    least = np.array([max(1.0, 2.0 - 6.0 / math.sqrt(row.size or 1)) for row in rows])  # one set of noise in 1000
-    ratio = np.array([(np.diff(row) ** 2).sum() for row in rows]) > least * np.array([(row**2).sum() for row in rows])
-    size = np.array([math.sqrt((row**2).mean()) if row.size else 0.0 for row in rows])
-    rounding = 8 * EPSILON * (1.0 + np.nanmax(abs(z), axis=-1, initial=0.0))
-    return (ratio & (size > rounding.reshape(-1))).reshape(off.shape[:-1])
+MOST_ROWS = 20
+"""Lines of a summary."""
 
 
-def noise_of(off: Array) -> float:
-    """Size of the noise on one smooth line without gaps: the least of what its differences of order 2 to 10 leave.
+def described(
+    found: xr.Dataset, names: dict[str, str], units: dict[str, str], attrs: dict[str, Any], confidence: float
+) -> xr.Dataset:
+    """A result with its variables in the order of their names, with units and long names, and a summary."""
+    found = found[list(names)]
+    for name, words in names.items():
+        found[name].attrs = {"units": units.get(name, "1"), "long_name": words}
+    found.attrs = {**attrs, "confidence": confidence}
+    found.attrs["summary"] = summary(found)
+    return found
 
-    Noise leaves the same in all orders; a bend ever less, the higher the order.
-    """
-    orders = range(2, min(10, off.size - 4) + 1)
-    sizes = [float(np.sqrt(np.mean(np.diff(off, k) ** 2) / math.comb(2 * k, k))) for k in orders]
-    return min(sizes, default=math.inf)
+
+def summary(found: xr.Dataset) -> str:
+    """A table of numbers with their intervals, and of words: a row for each line."""
+    numbers = [str(name) for name in found.data_vars if f"{name}_low" in found]
+    words = [str(name) for name, variable in found.data_vars.items() if variable.dtype.kind == "U"]
+    table = found[[*words, *(name + end for name in numbers for end in ("", "_low", "_high"))]]
+    dims, rows = list(table.sizes), []
+    for place in itertools.islice(np.ndindex(*table.sizes.values()), MOST_ROWS):
+        one = table.isel(dict(zip(dims, place, strict=True)))
+        labels = [one[dim].item() if dim in one.coords else place[i] for i, dim in enumerate(dims)]
+        values = [[float(one[name + end]) for end in ("", "_low", "_high")] for name in numbers]
+        texts = [f"{value:.6g} ({low:.6g} to {high:.6g})" for value, low, high in values]
+        rows.append((*(f"{one:.6g}" if isinstance(one, float) else str(one) for one in labels), *texts))
+        rows[-1] += tuple(str(one[word].item()) for word in words)
+    more = math.prod(table.sizes.values()) - len(rows)
+    heading = (*map(str, dims), *(f"{name} ({100 * found.attrs['confidence']:g} %)" for name in numbers), *words)
+    return columns([heading, *rows], indent="", wide=True) + f"\nand {more} more" * (more > 0)

@@ -1,4 +1,4 @@
-"""Slopes, lines and roots of curves given at the points of an uneven grid; plain arrays, the curve along the last axis.
+"""Slopes and roots of curves given at the points of an uneven grid; plain arrays, the curve along the last axis.
 
 A missing point is NaN, and no stencil reaches across one: each run of neighbours stands for itself.
 """
@@ -6,7 +6,7 @@ A missing point is NaN, and no stencil reaches across one: each run of neighbour
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,17 +172,15 @@ def _weights(nodes: Array, home: NDArray[np.intp]) -> Array:
 
 
 def interpolation_errors(t: Array, z: Array, count: int) -> Array:
-    """How far each point inside (n - count,) is off the polynomial through `count` neighbours, half on either side.
+    """How far each point inside (..., n - count) is off the polynomial through `count` neighbours, half on either side.
 
     In units that give noise of size 1 the size 1.
     """
-    first = np.arange(t.size - count)
-    nodes = first[:, None] + np.arange(count + 1)
-    at = t[nodes]
-    apart = at[:, :, None] - at[:, None, :]
+    nodes = np.arange(t.size - count)[:, None] + np.arange(count + 1)
+    apart = t[nodes][:, :, None] - t[nodes][:, None, :]
     apart[:, np.arange(count + 1), np.arange(count + 1)] = 1.0
     weights = 1.0 / apart.prod(axis=2)
-    found: Array = (weights * z[nodes]).sum(axis=1) / np.sqrt((weights**2).sum(axis=1))
+    found: Array = (weights * z[..., nodes]).sum(axis=-1) / np.sqrt((weights**2).sum(axis=1))
     return found
 
 
@@ -198,77 +196,6 @@ def tends(t: Array, local: Array, doubt: float) -> tuple[float, float]:
     last, before = first - second, second - third
     left = last * last / (before - last) if abs(last) < abs(before) and last * before > 0 else 10 * last
     return float(first), float(first + 3 * left) if abs(last) > doubt else float(first)
-
-
-class Line(NamedTuple):
-    """A straight line in log-log; `low`, `high`: first and last abscissa, `centre`, `level`: geometric means."""
-
-    exponent: Array
-    exponent_error: Array
-    prefactor: Array
-    prefactor_error: Array
-    drift: Array
-    residual: Array
-    points: Array
-    low: Array
-    high: Array
-    centre: Array
-    level: Array
-    level_error: Array
-
-
-def line(t: Array, z: Array, weights: Array | None = None) -> Line:
-    """Least-squares line z = level + exponent (t - centre) of each line (..., n) of `z`.
-
-    Sums run over deviations from the means, so a narrow window far from t = 0 costs no digits. `prefactor`,
-    `low`, `high`, `centre` and `level` are turned back from logarithms. NaN where fewer than three points are left.
-    """
-    present = np.isfinite(z)
-    n = present.sum(axis=-1)
-    share = present * (np.ones_like(z) if weights is None else np.where(present, weights, 0.0))
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
-        count = np.where(n >= FEWEST, n, np.nan)
-        share = share * (count / share.sum(axis=-1))[..., None]  # one on average
-        centre, level = _sum(share, present, t) / count, _sum(share, present, z) / count
-        u = np.where(present, t - centre[..., None], 0.0)
-        rise = np.where(present, z - level[..., None], 0.0)
-        spread = (share * u * u).sum(axis=-1)
-        slope = (share * u * rise).sum(axis=-1) / spread
-        off = rise - slope[..., None] * u
-        variance = (share * off * off).sum(axis=-1) / (count - 2)
-        prefactor = np.exp(level - slope * centre)
-        low = np.where(present, t, np.inf).min(axis=-1, initial=np.inf)
-        high = np.where(present, t, -np.inf).max(axis=-1, initial=-np.inf)
-        found = Line(
-            exponent=slope,
-            exponent_error=np.sqrt(variance / spread),
-            prefactor=prefactor,
-            prefactor_error=prefactor * np.sqrt(variance * (1 / count + centre**2 / spread)),
-            drift=_drift(u, off, share, high - low),
-            residual=np.expm1(abs(off).max(axis=-1, initial=0.0)),
-            points=n,
-            low=np.exp(low),
-            high=np.exp(high),
-            centre=np.exp(centre),
-            level=np.exp(level),
-            level_error=np.sqrt(variance / count),
-        )
-    return Line(*(np.where(n >= FEWEST, column, np.nan) for column in found))._replace(points=n)
-
-
-def _sum(share: Array, present: NDArray[np.bool_], values: Array) -> Array:
-    total: Array = np.where(present, share * values, 0.0).sum(axis=-1)
-    return total
-
-
-def _drift(u: Array, off: Array, share: Array, width: Array) -> Array:
-    """Change of slope over `width` by the parabola that fits best; `u` is centred, `off` the distance to the line."""
-    square = u * u
-    spread = (share * square).sum(axis=-1)[..., None]
-    skew = (share * square * u).sum(axis=-1)[..., None] / spread
-    bow = np.where(share > 0, square - spread / share.sum(axis=-1)[..., None] - skew * u, 0.0)
-    change: Array = 2.0 * (share * bow * off).sum(axis=-1) / (share * bow * bow).sum(axis=-1) * width
-    return change
 
 
 def brackets(c: Array, value: float) -> list[int]:

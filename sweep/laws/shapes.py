@@ -1,8 +1,8 @@
-"""Laws that data may follow, each a curve ln y(ln x) that is linear in all but a few of its numbers.
+"""The table of laws: each a curve ln y(ln x) that is linear in all but a few of its numbers.
 
-    z = shift(q) + columns(q) b                                                                     (1)
+    z = shift(q) + columns(q) b,   s = (ln x - first) / span from 0 to 1                            (1)
 
-q are those few.
+q are those few; positions and widths are parts of the window, exponents per window.
 """
 
 from __future__ import annotations
@@ -10,215 +10,280 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.special import expit
 
 from sweep.laws.loglog import Array
 
-Parts = tuple[Array | float, Array]
-"""Shift and columns of (1)."""
+
+class Parts(NamedTuple):
+    """Shift (n,) and columns (n, k) of (1), and their derivatives by each q: (n, q) and (n, q, k)."""
+
+    shift: Array | float
+    columns: Array
+    shift_by_q: Array
+    columns_by_q: Array
 
 
-@dataclass(frozen=True)
-class Law:
-    """One of the curves.
-
-    Attributes
-    ----------
-    parts : function of (q, t)
-        With t from 0 to 1 over the window: positions and widths in q are parts of it.
-    grids : sequence of sequences
-        Values of each q to start from.
-    slopes : int
-        How many of the last numbers b are exponents; they are per unit of t.
-    """
+class Law(NamedTuple):
+    """One of the curves."""
 
     name: str
     formula: str
-    parts: Callable[[Array, Array], Parts]
-    grids: Sequence[Sequence[float]]
-    numbers: int
+    parts: Callable[[Array, Array, float], Parts]
+    """Of (q, s, span), with derivatives."""
+    starts: Sequence[Sequence[float]] = ()
+    """Values of each q to start from,"""
+    limits: Sequence[tuple[float, float]] = ()
+    """and the least and largest that it may have."""
+    numbers: int = 2
     exponents: tuple[str, ...] = ()
-
-    def __str__(self) -> str:
-        return self.name
-
-
-def _line(q: Array, t: Array) -> Parts:
-    return 0.0, np.stack([np.ones_like(t), t], axis=1)
+    """Names of the exponents, which are the last numbers b."""
+    power: bool = True
+    """Whether it is a power law or several, and not another function."""
 
 
-def _logarithm(q: Array, t: Array) -> Parts:
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.log1p(q[0] * (t - 0.5)), np.stack([np.ones_like(t), t], axis=1)
+def _linear(*functions: Callable[[Array, float], Array]) -> Callable[[Array, Array, float], Parts]:
+    """A law that is linear in all its numbers: a constant and these functions of s and the span."""
 
-
-def _offset(q: Array, t: Array) -> Parts:
-    """q: exponent per window, and the arc tangent of offset over prefactor at the middle."""
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        return np.log(np.exp(q[0] * (t - 0.5)) + math.tan(q[1])), np.ones((t.size, 1))
-
-
-def _correction(q: Array, t: Array) -> Parts:
-    """q: correction at the middle, and how fast it fades."""
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        return np.log1p(q[0] * np.exp(-q[1] * (t - 0.5))), np.stack([np.ones_like(t), t], axis=1)
-
-
-def _bent(bend: Callable[[Array, Array], Array]) -> Callable[[Array, Array], Parts]:
-    """Two laws from a bend B(u) that is 0 far below and u far above 0; q: place, logarithm of the width, shape."""
-
-    def parts(q: Array, t: Array) -> Parts:
-        u, columns = t - q[0], np.ones((t.size, 3))
-        columns[:, 2] = bend(u, q[1:])
-        columns[:, 1] = u - columns[:, 2]
-        return 0.0, columns
+    def parts(q: Array, s: Array, span: float) -> Parts:
+        columns = np.stack([np.ones_like(s), *(one(s, span) for one in functions)], axis=1)
+        return Parts(0.0, columns, np.empty((s.size, 0)), np.empty((s.size, 0, columns.shape[1])))
 
     return parts
 
 
-def _softplus(u: Array, width: float) -> Array:
-    found: Array = width * np.logaddexp(0, u / width)
-    return found
+def _slope(s: Array, span: float) -> Array:
+    return s
 
 
-def _width(log_width: float) -> float:
-    return math.exp(min(max(log_width, -7.0), 1.0))
+def _beside_line(shift: Array, *by_q: Array, s: Array) -> Parts:
+    """A power law times a factor whose logarithm is the shift."""
+    columns = np.stack([np.ones_like(s), s], axis=1)
+    return Parts(shift, columns, np.stack(by_q, axis=1), np.zeros((s.size, len(by_q), 2)))
 
 
-def _exponential(u: Array, q: Array) -> Array:
-    return _softplus(u, _width(q[0]))
+def _logarithm(q: Array, s: Array, span: float) -> Parts:
+    factor = 1 + q[0] * (s - 0.5)
+    return _beside_line(np.log(factor), (s - 0.5) / factor, s=s)
 
 
-def _hyperbola(u: Array, q: Array) -> Array:
-    return 0.5 * (u + np.hypot(u, _width(q[0])))
+def _offset(q: Array, s: Array, span: float) -> Parts:
+    """q: exponent per window, and the arc tangent of offset over prefactor at the middle."""
+    power, offset = np.exp(q[0] * (s - 0.5)), math.tan(q[1])
+    both = power + offset
+    by_q = np.stack([power * (s - 0.5) / both, (1 + offset**2) / both], axis=1)
+    return Parts(np.log(both), np.ones((s.size, 1)), by_q, np.zeros((s.size, 2, 1)))
+
+
+def _correction(q: Array, s: Array, span: float) -> Parts:
+    """q: logarithm of 1 + the correction where it is largest, and how fast it fades from there."""
+    at = s - (q[1] < 0)
+    fading, strength = np.exp(-q[1] * at), math.expm1(q[0])
+    factor = 1 + strength * fading
+    return _beside_line(np.log(factor), (1 + strength) * fading / factor, -strength * at * fading / factor, s=s)
+
+
+def _log_correction(q: Array, s: Array, span: float) -> Parts:
+    """q: logarithm of B per window."""
+    rate = math.exp(q[0])
+    columns, by_q = np.stack([np.ones_like(s), np.log1p(rate * s), s], axis=1), np.zeros((s.size, 1, 3))
+    by_q[:, 0, 1] = rate * s / (1 + rate * s)
+    return Parts(0.0, columns, np.zeros((s.size, 1)), by_q)
+
+
+def _stretched_exponential(q: Array, s: Array, span: float) -> Parts:
+    """q: power per window; the exponent is of size 1 at its large end."""
+    at = s - (q[0] > 0)
+    power = np.exp(q[0] * at)
+    columns, by_q = np.stack([np.ones_like(s), power], axis=1), np.zeros((s.size, 1, 2))
+    by_q[:, 0, 1] = at * power
+    return Parts(0.0, columns, np.zeros((s.size, 1)), by_q)
+
+
+Bend = Callable[[Array, float], tuple[Array, Array, Array]]
+"""b(v; k), its slope from 0 to 1, and its derivative by k; b tends to 0 far below and to v far above."""
+
+
+def _bent(bend: Bend, shaped: bool = False) -> Callable[[Array, Array, float], Parts]:
+    """Two laws that meet at q0 with a bend of width exp(q1); `shaped`, of shape q2."""
+
+    def parts(q: Array, s: Array, span: float) -> Parts:
+        width = math.exp(q[1])
+        u = s - q[0]
+        b, share, by_shape = bend(u / width, q[2] if shaped else 0.0)
+        columns, by_q = np.ones((s.size, 3)), np.zeros((s.size, len(q), 3))
+        columns[:, 2] = width * b
+        columns[:, 1] = u - columns[:, 2]
+        by_q[:, 0, 2], by_q[:, 1, 2] = -share, columns[:, 2] - u * share
+        if shaped:
+            by_q[:, 2, 2] = width * by_shape
+        by_q[:, :, 1] = -by_q[:, :, 2]
+        by_q[:, 0, 1] -= 1.0
+        return Parts(0.0, columns, np.zeros((s.size, len(q))), by_q)
+
+    return parts
+
+
+def _exponential(v: Array, k: float) -> tuple[Array, Array, Array]:
+    return np.logaddexp(0, v), expit(v), v
+
+
+def _hyperbola(v: Array, k: float) -> tuple[Array, Array, Array]:
+    return 0.5 * (v + np.hypot(v, 1)), 0.5 * (1 + v / np.hypot(v, 1)), v
+
+
+def _uneven(v: Array, k: float) -> tuple[Array, Array, Array]:
+    """Widths exp(k) below and exp(-k) above."""
+    below, above = math.exp(k), math.exp(-k)
+    moved = v + (above - below) * math.log(2)
+    width = np.where(moved < 0, below, above)
+    x, further = moved / width, np.where(moved < 0, 0.0, (below - above) * math.log(2))
+    b, share = width * np.logaddexp(0, x), expit(x)
+    by_moved = -(above + below) * math.log(2)
+    by_width = np.where(moved < 0, b - moved * share, moved * share - b + (above + below) * math.log(2))
+    return b + further, share, by_width + share * by_moved
 
 
 GRID = np.sinh(np.linspace(-9.0, 9.0, 361))
 """Where slopes of bends without a closed form are integrated, in widths."""
-STEPS, INNER = np.diff(GRID), GRID[1:-1]
 
 
-def _integrated(slope: Callable[[Array, float], Array], power: float, u: Array, width: float) -> Array:
-    """Bend of a slope of that power that rises from 0 to 1, moved so that it tends to u."""
-    cubics, moved = _cubics(slope, power)
-    wanted = u / width + moved
-    v = np.minimum(np.maximum(wanted, GRID[0]), GRID[-1])
-    found: Array = width * (_on_grid(cubics, v) + (wanted - v))
-    found[wanted < GRID[0]] = 0.0
-    return found
+@functools.cache
+def _surface(slope: Callable[[Array, float], Array], least: float, most: float) -> Any:
+    """b - ln(1 + e^v) over asinh v and k, by trapezia of the slope, moved so that b tends to v."""
+    from scipy.interpolate import CubicHermiteSpline, RectBivariateSpline
+
+    shapes, rows = np.linspace(least, most, 41), []
+    for k in shapes:
+        steep = slope(GRID, k)
+        rise = np.concatenate([[0.0], np.cumsum(0.5 * (steep[1:] + steep[:-1]) * np.diff(GRID))])
+        moved = GRID + GRID[-1] - rise[-1]
+        inside = np.clip(moved, GRID[0], GRID[-1])
+        b = CubicHermiteSpline(GRID, rise, steep)(inside) + np.maximum(moved - inside, 0.0)
+        rows.append(b - np.logaddexp(0, GRID))
+    return RectBivariateSpline(np.arcsinh(GRID), shapes, np.array(rows).T)
 
 
-@functools.lru_cache(maxsize=256)
-def _cubics(slope: Callable[[Array, float], Array], power: float) -> tuple[Array, float]:
-    """Integral of a slope over GRID, as `_hermite` has it, and how far it is moved. Fits ask for one power many
-    times."""
-    steep = slope(GRID, power)
-    rise = np.concatenate([[0.0], np.cumsum(0.5 * (steep[1:] + steep[:-1]) * STEPS)])
-    return _hermite(rise, steep), float(GRID[-1] - rise[-1])
+def _integrated(slope: Callable[[Array, float], Array], least: float, most: float) -> Bend:
+    """The bend of a slope that rises from 0 to 1, as k says."""
+
+    def bend(v: Array, k: float) -> tuple[Array, Array, Array]:
+        table, x = _surface(slope, least, most), np.arcsinh(np.clip(v, GRID[0], GRID[-1]))
+        share = expit(v) + table.ev(x, k, dx=1) / np.hypot(v, 1)
+        return np.logaddexp(0, v) + table.ev(x, k), share, table.ev(x, k, dy=1)
+
+    return bend
 
 
-def _hermite(rise: Array, steep: Array) -> Array:
-    """Cubics (4, steps) between points of GRID, the highest power first; scipy's spline takes ten times as long to make
-    as it is used here."""
-    mean, first, last = np.diff(rise) / STEPS, steep[:-1], steep[1:]
-    return np.stack([(first + last - 2 * mean) / STEPS**2, (3 * mean - 2 * first - last) / STEPS, first, rise[:-1]])
+def _powered(v: Array, k: float) -> Array:
+    """A logistic slope to the power exp(k): it fades so many times faster below than above."""
+    return np.asarray(np.exp(-math.exp(k) * np.logaddexp(0, -v)))
 
 
-def _on_grid(cubics: Array, v: Array) -> Array:
-    k = INNER.searchsorted(v)
-    third, second, first, level = cubics[:, k]
-    x = v - GRID[k]
-    found: Array = ((third * x + second) * x + first) * x + level
-    return found
+def _stretched(v: Array, k: float) -> Array:
+    """A slope that fades as the exponential of the power exp(k) of v."""
+    return np.asarray(expit(np.sign(v) * abs(v) ** math.exp(k)))
 
 
-def _powered(v: Array, power: float) -> Array:
-    found: Array = np.exp(-power * np.logaddexp(0, -v))
-    return found
+def _three(q: Array, s: Array, span: float) -> Parts:
+    """q: where the first two laws meet, the logarithm of how much further the other two do, and of the width."""
+    width, further = math.exp(q[2]), math.exp(q[1])
+    u = [s - q[0], s - q[0] - further]
+    a, b = (width * np.logaddexp(0, one / width) for one in u)
+    share_a, share_b = expit(u[0] / width), expit(u[1] / width)
+    columns, by_q = np.stack([np.ones_like(s), s - a, a - b, b], axis=1), np.zeros((s.size, 3, 4))
+    by_a = np.stack([-share_a, np.zeros_like(s), a - u[0] * share_a], axis=1)
+    by_b = np.stack([-share_b, -further * share_b, b - u[1] * share_b], axis=1)
+    by_q[:, :, 1], by_q[:, :, 2], by_q[:, :, 3] = -by_a, by_a - by_b, by_b
+    return Parts(0.0, columns, np.zeros((s.size, 3)), by_q)
 
 
-def _stretched_slope(v: Array, power: float) -> Array:
-    found: Array = 0.5 * (1 + np.tanh(0.5 * np.sign(v) * abs(v) ** power))
-    return found
-
-
-def _asymmetric(u: Array, q: Array) -> Array:
-    """A logistic slope to the power exp(q1): it fades so many times faster below than above."""
-    power = math.exp(min(max(q[1], -2.5), 2.5))
-    return _integrated(_powered, power, u, _width(q[0]))
-
-
-def _uneven(u: Array, q: Array) -> Array:
-    """Widths exp(q0 + q1) below and exp(q0 - q1) above."""
-    below, above = _width(q[0] + q[1]), _width(q[0] - q[1])
-    v = u + (above - below) * math.log(2)
-    return np.where(v < 0, _softplus(v, below), _softplus(v, above) + (below - above) * math.log(2))
-
-
-def _stretched(u: Array, q: Array) -> Array:
-    """A slope that fades as the exponential of the power exp(q1) of u."""
-    power = math.exp(min(max(q[1], -1.2), 0.8))
-    return _integrated(_stretched_slope, power, u, _width(q[0]))
-
-
-def _three(q: Array, t: Array) -> Parts:
-    first, second, width = min(q[0], q[1]), max(q[0], q[1]), _width(q[2])
-    if not (0 < first < second < 1 and second - first > 2 * width):  # the middle law would be seen nowhere
-        return 0.0, np.full((t.size, 4), np.nan)
-    a, b = _softplus(t - first, width), _softplus(t - second, width)
-    return 0.0, np.stack([np.ones_like(t), t - a, a - b, b], axis=1)
-
-
-PLACES, WIDTHS = tuple(np.linspace(0.1, 0.9, 7)), tuple(np.log((0.01, 0.04, 0.12, 0.3)))
+PLACE, WIDTH = tuple(np.linspace(0.1, 0.9, 7)), tuple(np.log((0.01, 0.04, 0.12, 0.3)))
 FADES = (-12.0, -6.0, -2.5, 2.5, 6.0, 12.0)
+AT, WIDE = (-1.0, 2.0), (-7.0, 1.0)
 LOW_HIGH = ("p low", "p high")
 
-ONE = Law("one law", "A x^p", _line, (), 2, ("p",))
-LOGARITHM = Law("logarithm", "A x^p (1 + B ln x)", _logarithm, ((-1.9, -1.5, -0.5, 0.5, 1.5, 1.9),), 3, ("p",))
-OFFSET = Law("offset", "A x^p + C", _offset, (FADES, (-1.2, -0.3, 0.1, 0.8, 1.4)), 3)
-CORRECTION = Law(
-    "correction to scaling", "A x^p (1 + B x^-D)", _correction, ((-0.5, -0.05, 0.05, 0.5, 3.0), FADES), 4, ("p",)
+
+def _two(name: str, formula: str, bend: Bend, *shapes: float, limits: tuple[float, float] = (0.0, 0.0)) -> Law:
+    """Two power laws with a bend."""
+    parts, starts, all_limits = _bent(bend, bool(shapes)), [PLACE, WIDTH], [AT, WIDE]
+    if shapes:
+        starts, all_limits = [*starts, shapes], [*all_limits, limits]
+    return Law(name, formula, parts, tuple(starts), tuple(all_limits), 3 + len(starts), LOW_HIGH)
+
+
+ONE = Law("one law", "A x^p", _linear(_slope), exponents=("p",))
+LOGARITHM = Law(
+    "logarithm",
+    "A x^p (1 + B ln x)",
+    _logarithm,
+    ((-1.9, -1.5, -0.5, 0.5, 1.5, 1.9),),
+    ((-2.0, 2.0),),
+    3,
+    ("p",),
+    False,
 )
-TWO = Law("two laws", "bend fading exponentially", _bent(_exponential), (PLACES, WIDTHS), 5, LOW_HIGH)
-HYPERBOLA = Law("two laws, hyperbola", "bend fading as 1/ln x", _bent(_hyperbola), (PLACES, WIDTHS), 5, LOW_HIGH)
-ASYMMETRIC = Law(
+EXPONENTIAL = Law("exponential", "A exp(-x/X)", _linear(lambda s, span: np.exp(span * (s - 1))), power=False)
+STRETCHED_EXPONENTIAL = Law(
+    "stretched exponential", "A exp(-(x/X)^b)", _stretched_exponential, (FADES,), ((-60.0, 60.0),), 3, power=False
+)
+CUT_OFF = Law(
+    "cut-off",
+    "A exp(-x/X) x^p",
+    _linear(lambda s, span: np.exp(span * (s - 1)), _slope),
+    numbers=3,
+    exponents=("p",),
+    power=False,
+)
+LOGNORMAL = Law("lognormal", "A exp(-B ln(x/X)^2)", _linear(_slope, lambda s, span: s**2), numbers=3, power=False)
+OFFSET = Law("offset", "A x^p + C", _offset, (FADES, (-1.2, -0.3, 0.1, 0.8, 1.4)), ((-60.0, 60.0), (-1.57, 1.57)), 3)
+CORRECTION = Law(
+    "correction to scaling",
+    "A x^p (1 + B x^-D)",
+    _correction,
+    ((-2.5, -0.7, -0.1, 0.1, 0.7, 2.5, 6.0), FADES),
+    ((-30.0, 60.0), (-80.0, 80.0)),
+    4,
+    ("p",),
+)
+LOG_CORRECTION = Law(
+    "logarithmic correction",
+    "A x^p (1 + B ln(x/x0))^c",
+    _log_correction,
+    ((-1.0, 1.0, 3.0, 5.0),),
+    ((-3.0, 8.0),),
+    4,
+    ("p",),
+)
+TWO = _two("two laws", "bend fading exponentially", _exponential)
+HYPERBOLA = _two("two laws, hyperbola", "bend fading as 1/ln x", _hyperbola)
+ASYMMETRIC = _two(
     "two laws, asymmetric bend",
     "fading faster on one side",
-    _bent(_asymmetric),
-    (PLACES, WIDTHS, (-1.0, 1.0)),
-    6,
-    LOW_HIGH,
+    _integrated(_powered, -2.5, 2.5),
+    *(-1.0, 1.0),
+    limits=(-2.5, 2.5),
 )
-UNEVEN = Law(
-    "two laws, two widths", "one width below, another above", _bent(_uneven), (PLACES, WIDTHS, (-0.7, 0.7)), 6, LOW_HIGH
-)
-STRETCHED = Law(
+UNEVEN = _two("two laws, two widths", "one width below, another above", _uneven, -0.7, 0.7, limits=(-2.0, 2.0))
+STRETCHED = _two(
     "two laws, stretched bend",
     "fading as exp(-(ln x)^b)",
-    _bent(_stretched),
-    (PLACES, WIDTHS, (-0.5, 0.3)),
-    6,
-    LOW_HIGH,
+    _integrated(_stretched, -1.2, 0.8),
+    *(-0.5, 0.3),
+    limits=(-1.2, 0.8),
 )
-
-
-def _of_power(power: float) -> Law:
-    """That bend with one power alone."""
-    parts = _bent(lambda u, q: _stretched(u, np.array([q[0], power])))
-    return replace(STRETCHED, parts=parts, grids=STRETCHED.grids[:2], numbers=5)
-
-
-POWERS = {float(power): _of_power(power) for power in np.linspace(-1.2, 0.8, 17)}
-"""By the logarithm of the power."""
 THREE = Law(
     "three laws",
     "two bends of one width",
     _three,
-    ((0.2, 0.35, 0.5), (0.5, 0.65, 0.8), WIDTHS),
+    ((0.15, 0.3, 0.45, 0.6), tuple(np.log((0.2, 0.35, 0.5))), WIDTH[:3]),
+    ((0.02, 0.9), (-2.5, 0.0), WIDE),
     7,
     ("p low", "p middle", "p high"),
 )
 BENDS = (TWO, HYPERBOLA, ASYMMETRIC, UNEVEN, STRETCHED)
-LAWS = (ONE, LOGARITHM, OFFSET, CORRECTION, *BENDS, THREE)
+OTHER_FUNCTIONS = (LOGARITHM, EXPONENTIAL, STRETCHED_EXPONENTIAL, CUT_OFF, LOGNORMAL)
+LAWS = (ONE, *OTHER_FUNCTIONS, OFFSET, CORRECTION, *BENDS, THREE)

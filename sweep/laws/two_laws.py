@@ -13,41 +13,47 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.special import ndtri
 
 from sweep.errors import SweepError
-from sweep.laws.correlated import averaged, corrected, student
-from sweep.laws.curves import Window, along, check_confidence, noise_of, scatter_is_noise, title, window_logs
-from sweep.laws.fits import Found, fitted
-from sweep.laws.lines import check_noise, crossover, fit_exponent
-from sweep.laws.loglog import EPSILON, Array, slopes, tends
-from sweep.laws.scatter import BEYOND_DOUBT, line_deviance, noise_size, rounding
-from sweep.laws.shapes import BENDS, LOGARITHM, POWERS, STRETCHED, TWO
+from sweep.laws.curves import Window, check_confidence, described, numbers_by_line, relative_sigma, title, window_logs
+from sweep.laws.fits import Found, errors, fitted
+from sweep.laws.lines import check_noise, crossover, fit_exponent, rounding
+from sweep.laws.loglog import Array, slopes, tends
+from sweep.laws.noise import BEYOND_DOUBT, corrected, line_deviance, noise_size, regress
+from sweep.laws.shapes import BENDS, OTHER_FUNCTIONS, THREE, TWO
 
 FEWEST_POINTS = 8
 """Points for the five numbers of (1) and an error bar."""
 
 TELLING = 16
-"""Points from which independent noise is told from the misfit of a smooth truth,"""
+"""Points from which noise is told from the misfit of a smooth truth,"""
 TELLING_MEMORY, ROUGH = 40, 0.15
-"""and points and share of the distances that neighbours do not tell, from which on noise that remembers is: smooth
+"""and points and share of the distances that neighbours do not tell, from which on autocorrelated noise is: smooth
 bends have 0.08 at most, correlations of 0.95 at least 0.19."""
+SCATTERED = 0.5
+"""Share that independent noise leaves at least."""
 SMOOTH_TO = 1e-5
 """Share up to which the points are smooth, and no noise moves the limits to which local exponents tend."""
+SMALLER = 0.2
+"""Share of the distances from two laws that three must leave, where there is no noise, to be believed."""
 
 OTHER_SHAPES = 20.0
 """Difference of AICc from which on a bend of another shape is ruled out; more than for a second law, since the truth
 may be between the shapes that are tried."""
 BEYOND_SHAPES = 0.5
 """Share of what other shapes add to where the laws meet, added again: the true one may be none of them."""
-ALIKE = 1e6
-"""Condition of the five numbers of (1) beyond which points do not tell them apart, as those of a single law."""
 
 LAWS = ("low", "high")
+VERDICTS = ("one law", "two laws", "three laws", "no power law", "no meeting in the window")
+REGIMES = (1, 2, 3, 0, 0)
+"""Numbers of laws, by verdict."""
+
 EXPONENTS = ("exponent", "exponent_low", "exponent_high")
 """Numbers of each law,"""
 OTHERS = (
-    *("crossover", "crossover_low", "crossover_high", "width", "level"),
-    *("residual", "points", "regimes", "evidence", "noisy"),
+    *("crossover", "crossover_low", "crossover_high", "verdict", "regimes", "evidence"),
+    *("width", "level", "residual", "points", "noisy"),
 )
 """and those of both, which stand behind them in the result of one line."""
 
@@ -58,12 +64,13 @@ NAMES = {
     "crossover": "where the two laws meet",
     "crossover_low": "lower end of the confidence interval of the crossover",
     "crossover_high": "upper end of the confidence interval of the crossover",
+    "verdict": "how many laws are beyond doubt, or what speaks against it",
+    "regimes": "2 where two laws are beyond doubt: evidence above 10, meeting in the window; 0 where none is a law",
+    "evidence": "by how much AICc and BIC prefer two laws to one, whatever its noise, and to functions that are none",
     "width": "width of the bend, in decades",
     "level": "y where the two laws meet",
     "residual": "largest relative distance of a point from the curve",
     "points": "points in the fit",
-    "regimes": "2 where two laws are beyond doubt: evidence above 10",
-    "evidence": "by how much AICc and BIC prefer two laws to one, whatever its noise, and to a logarithm",
     "noisy": "1 where the intervals are of noise, 0 where of the curvature of noise-free values",
 }
 
@@ -75,34 +82,35 @@ def fit_two_laws(
     *,
     confidence: float = 0.95,
     noise: bool | str | None = None,
+    sigma: Any = None,
     windows: tuple[Window, Window] | None = None,
 ) -> xr.Dataset:
     """Two power laws with a smooth crossover, equation (1), and whether one law would do.
 
-    Intervals: where the points scatter about the curve (`noise`), those of least squares, by Student's t. Where they
-    do not, as in a simulation, there is no noise to speak of and the uncertainty is how far the truth is from (1):
-    the interval of an exponent then also reaches to the local exponent at its end of the window and, three times over,
-    to the limit to which that tends; that of the crossover to where the local exponent is half-way between the
-    two, and to where the tangents at the ends meet. What noise there is beneath is added.
+    Intervals: where there is noise, those of the same mixture of noises as of `fit_exponent`, and they also reach over
+    those of bends of other shapes that the points do not rule out (AICc within 20): hyperbolic, asymmetric, of two
+    widths, stretched. They are wider than 95 % for a truth like (1), and no promise for a truth like none of them.
 
-    Where there is noise, though it be far less than the truth is from (1), the intervals also reach over those of bends
-    of other shapes that the points do not rule out (AICc within 20): hyperbolic, asymmetric, of two widths, stretched.
-    They are wider than 95 % for a truth like (1), and no promise for a truth like none of them.
+    Where there is none, as in a simulation, the uncertainty is how far the truth is from (1): the interval of an
+    exponent then also reaches to the local exponent at its end of the window and, three times over, to the limit to
+    which that tends; that of the crossover to where the local exponent is half-way between the two, and to where the
+    tangents at the ends meet. What noise there is beneath is added.
 
     Parameters
     ----------
     y : DataArray
-        Any shape; missing points are left out.
+        Any shape; missing points are left out, and lines with a value that is not positive.
     dim : str
-        Dimension of `y`, or 1-D coordinate along one; positive and strictly monotone.
+        Dimension of `y`, or 1-D coordinate along one; positive and monotone.
     window : (low, high), optional
         Ends in the unit of `dim`, both included.
     confidence : float
         Of the intervals.
-    noise : bool or "independent", "uneven", "correlated", "outliers", optional
-        Whether the values scatter; intervals then hold for noise that remembers the point before, too, unless it is
-        said to be independent. Default: as the scatter of neighbours about the curve shows; with fewer than 16 points,
-        where it shows nothing, intervals are wide enough for both.
+    noise : bool or "even", "uneven", "correlated", "outliers", optional
+        Whether there is noise, or of which kind. Default: as the points show; fewer than 16 show nothing, and intervals
+        are then wide enough for both.
+    sigma : number or DataArray, optional
+        Standard errors of the values, in the unit of y; then `noise` is not given.
     windows : pair of (low, high), optional
         Fit a straight line in each of two windows, which share at most an end point, and say where the two lines
         meet; nothing is fitted between them.
@@ -111,18 +119,21 @@ def fit_two_laws(
     -------
     Dataset
         `exponent`, `exponent_low`, `exponent_high` along `law` ("low", "high"); `crossover` with its interval, in
-        the unit of `dim`; `width` [decades], `level` (y where the laws meet), `residual`, `points`, `regimes` (1 or
-        2), `evidence` (difference of BIC), `noisy`. NaN where fewer than eight points are left.
+        the unit of `dim`; `verdict`: "two laws" where they are beyond doubt, "one law" where one does as well, "three
+        laws", "no power law" where a logarithm, an exponential, stretched or not, a cut-off or a lognormal does as well
+        and one law does not, "no meeting in the window"; `regimes`, how many laws; `evidence` (difference of AICc or
+        BIC); `width` [decades], `level` (y where the laws meet), `residual`, `points`, `noisy`. There are no exponents
+        and intervals where the verdict is "three laws" or "no power law", and where fewer than eight points are left.
 
-        With `windows`: `exponent`, `exponent_low`, `exponent_high` along `law`; `crossover`, `crossover_error`,
-        `level`. Where points scatter, the error is a standard error, from those of the two lines. Where they do not, it
-        is a bound: how far the place moves if a law is not the line through its window but goes through the outer end
-        of it with the exponent to which the local one tends there.
+        With `windows`: `exponent`, `exponent_low`, `exponent_high` along `law`; `crossover`, `crossover_low`,
+        `crossover_high`, `crossover_error` (half the interval), `level`. Where there is noise, the interval follows
+        from those of the two lines. Where there is none, it is a bound: how far the place moves if a law is not the
+        line through its window but goes through the outer end of it with the exponent to which the local one tends.
 
     Raises
     ------
     SweepError
-        If `dim` is unknown or unfit, y is not positive in the window, or no line has eight points.
+        If `dim` is unknown or unfit, y is nowhere positive in the window, or no line has eight points.
 
     Examples
     --------
@@ -138,161 +149,151 @@ def fit_two_laws(
     0.6
     """
     check_confidence(confidence)
-    check_noise(noise)
+    check_noise(noise, sigma)
     if windows is not None:
         if window is not None:
             raise SweepError("window does not go with windows, which say where the two lines are")
-        return _in_windows(y, dim, windows, confidence, noise)
-    dimension, t, logs = window_logs(y, dim, window)
-
-    def each(z: Array) -> Array:
-        rows = [_one(t, row, confidence, noise) for row in z.reshape(-1, t.size)]
-        return np.array(rows).reshape(*z.shape[:-1], -1)
-
-    numbers = along(each, logs, dimension, "number")
-    if not np.isfinite(numbers.isel(number=slice(len(LAWS) * len(EXPONENTS))).values).any():
+        return _in_windows(y, dim, windows, confidence=confidence, noise=noise, sigma=sigma)
+    here, t, logs, _ = window_logs(y, dim, window, repeated=True)
+    ((dimension, _),) = here.items()
+    errors = relative_sigma(y, sigma).isel(here)
+    names = [f"{name} {law}" for law in LAWS for name in EXPONENTS] + list(OTHERS)
+    found = numbers_by_line(names, lambda z, s: _one(t, z, s, confidence, noise), logs, dimension, errors)
+    if not bool(found.points.notnull().any()):
         raise SweepError(f"two laws need at least {FEWEST_POINTS} points of {title(y)}, found fewer; widen the window")
-    return _described(numbers, y, dim, confidence)
+    axis = xr.DataArray(list(LAWS), dims="law", name="law")
+    both: dict[str, Any] = {name: xr.concat([found[f"{name} {law}"] for law in LAWS], axis) for name in EXPONENTS}
+    codes = found.verdict.fillna(-1).astype(np.int64)
+    words = np.array([*VERDICTS, "too few points"])
+    both |= {name: found[name] for name in OTHERS} | {"verdict": (codes.dims, words[codes.values])}
+    place, units = (str(c.attrs.get("units", "1")) for c in (y.coords[dim], y))
+    of = dict.fromkeys(("crossover", "crossover_low", "crossover_high"), place) | {"level": units}
+    attrs = {"y": title(y), "x": dim, "law": "equation (1) of sweep.laws.two_laws"}
+    return described(xr.Dataset(both), NAMES, of, attrs, confidence)
 
 
-def _in_windows(
-    y: xr.DataArray, dim: str, windows: tuple[Window, Window], confidence: float, noise: bool | str | None
-) -> xr.Dataset:
+def _in_windows(y: xr.DataArray, dim: str, windows: tuple[Window, Window], **keys: Any) -> xr.Dataset:
     """Two straight lines, and where they meet."""
     try:
         low, high = windows
     except (TypeError, ValueError):
         raise SweepError(f"windows: expected two, ((low, high), (low, high)); found {windows!r}") from None
-    fits = [fit_exponent(y, dim, one, confidence=confidence, noise=noise) for one in (low, high)]
+    fits = [fit_exponent(y, dim, one, **keys) for one in (low, high)]
     met = crossover(*fits)
     law = xr.DataArray(list(LAWS), dims="law", name="law")
     found = xr.concat([fit[list(EXPONENTS)] for fit in fits], dim=law, combine_attrs="override")
-    found["crossover"], found["crossover_error"], found["level"] = met.abscissa, met.abscissa_error, met.ordinate
-    found.attrs = {**met.attrs, "confidence": confidence}
-    return found
+    for end in ("", "_low", "_high", "_error"):
+        found[f"crossover{end}"] = met[f"abscissa{end}"]
+    return found.assign(level=met.ordinate).assign_attrs(met.attrs)
 
 
 @np.errstate(all="ignore")  # what overflows is infinite; a crossover that is not determined reaches there
-def _one(t: Array, z: Array, confidence: float, noise: bool | str | None) -> Array:
-    present = np.isfinite(z)
-    t, z = t[present], z[present]
-    if t.size < FEWEST_POINTS:
+def _one(t: Array, z: Array, sigma: Array, confidence: float, noise: bool | str | None) -> Array:
+    """EXPONENTS of both laws and OTHERS of one line."""
+    known = bool(np.isfinite(sigma).any())
+    present = np.flatnonzero(np.isfinite(z) & (np.isfinite(sigma) | (not known)))
+    if present.size < FEWEST_POINTS or not np.ptp(t[present]) > 0:
         return np.full(len(LAWS) * len(EXPONENTS) + len(OTHERS), np.nan)
-    order = np.argsort(t)
-    t, z = t[order], z[order]
-    best, off, jacobian = _fit(t, z)
-    noisy = _is_noise(t, z, off) if noise is None else bool(noise)
-    reach = _reach(off, jacobian, confidence)
-    low, high = best - reach, best + reach
-    if noisy or noise_size(t, off) > SMOOTH_TO * math.sqrt(float(off @ off) / off.size):
-        remembers = noisy and noise != "independent"
-        more = _by_memory(off, jacobian, confidence, reach) if remembers else np.ones(reach.size)
-        low, high = _of_other_bends(t, z, off, best, more * reach, more, confidence)
+    present = present[np.argsort(t[present], kind="stable")]
+    t, z, weights = t[present], z[present], sigma[present] ** -2.0 if known else None
+    tried = {law.name: fit for law in (*BENDS, *OTHER_FUNCTIONS, THREE) if (fit := fitted(law, t, z, weights, known))}
+    two = tried[TWO.name]
+    size = math.sqrt(float(two.off @ two.off) / (t.size - 5))
+    noisy = known or (_is_noise(t, z, two.off, size) if noise is None else bool(noise))
+    rough = noise_size(t, two.off) > SMOOTH_TO * size
+    word = noise if isinstance(noise, str) else "noise" if noisy else "even"
+    best, low, high = _intervals(two, t, word, confidence, weights)
+    if noisy or rough:
+        low, high = _of_other_bends(tried, t, word, confidence, weights, low, high)
     if not noisy:
-        low, high = _widened(t, z, off, best, low, high)
-    evidence = _evidence(t, z, off)
-    _, *exponents, places, _ = np.stack([best, low, high], axis=1)
-    places, bend = np.exp(places), [math.exp(best[WIDTH]) / math.log(10), float(np.exp(best[LEVEL]))]
+        low, high = _widened(t, z, best, low, high)
+    verdict, evidence = _verdict(t, z, tried, weights, noisy)
+    p_low, p_high, places = np.stack([best, low, high], axis=1)
+    q, level = two.numbers[:2], two.numbers[2]
+    places, bend = np.exp(places), [math.exp(q[1]) * float(t[-1] - t[0]) / math.log(10), float(np.exp(level))]
     if evidence <= 0 and not noisy:  # straight to rounding: nothing meets anywhere
         places, bend = np.array([np.nan, 0.0, np.inf]), [np.nan, np.nan]
-    rest = [float(np.expm1(abs(off).max())), t.size, 2 if evidence > BEYOND_DOUBT else 1, evidence, noisy]
-    return np.array([*np.concatenate(exponents), *places, *bend, *rest])
+    if VERDICTS[verdict] in ("three laws", "no power law"):
+        p_low, p_high, places, bend = np.full(3, np.nan), np.full(3, np.nan), np.full(3, np.nan), [np.nan, np.nan]
+    if VERDICTS[verdict] == "no meeting in the window":
+        places[0] = np.nan
+    residual = float(np.expm1(min(abs(two.off).max(), 700.0)))
+    rest = [verdict, REGIMES[verdict], evidence, *bend, residual, t.size, noisy]
+    return np.array([*p_low, *p_high, *places, *rest])
 
 
-def _is_noise(t: Array, z: Array, off: Array) -> bool:
-    """Whether the distances are noise: they scatter, and the points themselves are as rough; or, of many points,
-    neighbours differ by more than a smooth truth would.
+def _is_noise(t: Array, z: Array, off: Array, size: float) -> bool:
+    """Whether the distances are noise: neighbours do not tell the points themselves any better; or, of many points,
+    differ by more than a smooth truth would.
 
-    A curve of five numbers swings about few points of a smooth truth in a way that looks like scatter; then nothing is
+    A curve of five numbers swings about few points of a smooth truth in a way that looks like noise; then nothing is
     told, and the intervals are those of both.
     """
-    size = math.sqrt(float(off @ off) / (off.size - 5))
-    if off.size >= TELLING and bool(scatter_is_noise(off, z)) and size < 3 * noise_of(z):
-        return True
-    return off.size >= TELLING_MEMORY and size > 8 * rounding(t, z) and noise_size(t, off) > ROUGH * size
+    if off.size < TELLING or size <= 8 * rounding(t, z):
+        return False
+    share = float(noise_size(t, off)) / size
+    return bool((share > SCATTERED and size < 3 * noise_size(t, z)) or (off.size >= TELLING_MEMORY and share > ROUGH))
 
 
-LEVEL, LOW, HIGH, PLACE, WIDTH = range(5)
-"""Positions of c, p1, p2, ln x0, ln w among the five numbers of (1)."""
+def _intervals(
+    found: Found, t: Array, word: str, confidence: float, weights: Array | None
+) -> tuple[Array, Array, Array]:
+    """Exponents of both laws and ln of where they meet, and the ends of their intervals (3,) each."""
+    span, which = float(t[-1] - t[0]), [len(found.law.starts) + 1, len(found.law.starts) + 2, 0]
+    factor = np.array([1 / span, 1 / span, span])
+    best = found.numbers[which] * factor + [0.0, 0.0, t[0]]
+    doubt = errors(found, weights)[which]
+    if weights is not None:
+        reach = ndtri((1 + confidence) / 2) * doubt
+        low, high = -reach, reach
+    elif not np.isfinite(doubt).all():
+        low, high = np.where(np.isfinite(doubt), -3 * doubt, -np.inf), np.where(np.isfinite(doubt), 3 * doubt, np.inf)
+    else:
+        line = regress(t, found.jacobian, found.off[None], word)
+        low, high = np.array([line.interval(k, confidence) for k in which])[:, :, 0].T
+    return best, best + np.fmin(low, 0) * factor, best + np.fmax(high, 0) * factor
 
 
-def _curve(numbers: Array, t: Array) -> Array:
-    """(1)."""
-    level, low, high, place, log_width = numbers
-    width, u = math.exp(log_width), t - place
-    found: Array = level + low * u + (high - low) * width * np.logaddexp(0, u / width)
-    return found
+def _of_other_bends(
+    tried: dict[str, Found], t: Array, word: str, confidence: float, weights: Array | None, low: Array, high: Array
+) -> tuple[Array, Array]:
+    """Intervals that reach over those of every bend of another shape that the points do not rule out."""
+    bends = [tried[law.name] for law in BENDS if law.name in tried]
+    judged = []
+    for found in bends:
+        columns = found.jacobian[:, np.isfinite(errors(found))]
+        if weights is None and word != "even" and columns.size:
+            deviance = float(regress(t, columns, found.off[None], word).deviance[0, 0])
+            judged.append(float(corrected(deviance, t.size, found.law.numbers + 2)))
+        else:
+            judged.append(found.aicc)
+    own_low, own_high = low.copy(), high.copy()
+    for found, aicc in zip(bends, judged, strict=True):
+        if aicc <= min(judged) + OTHER_SHAPES:
+            _, below, above = _intervals(found, t, word, confidence, weights)
+            low, high = np.fmin(low, below), np.fmax(high, above)
+    further = BEYOND_SHAPES * max(own_low[2] - low[2], high[2] - own_high[2])
+    low[2], high[2] = low[2] - further, high[2] + further
+    return low, high
 
 
-def _slopes_of_curve(numbers: Array, t: Array) -> Array:
-    """Derivatives of (1) by its five numbers."""
-    _, low, high, place, log_width = numbers
-    width, u = math.exp(log_width), t - place
-    share = 0.5 * (1 + np.tanh(0.5 * u / width))
-    bend = width * np.logaddexp(0, u / width)
-    by_place = -low - (high - low) * share
-    return np.stack([np.ones_like(t), u - bend, bend, by_place, (high - low) * (bend - u * share)], axis=1)
-
-
-def _fit(t: Array, z: Array) -> tuple[Array, Array, Array]:
-    """The five numbers, the distances of the points from the curve, and the Jacobian there."""
-    from scipy.optimize import leastsq
-
-    narrowest = math.log(float(np.diff(t).min()) / 30)  # a sharper bend looks the same at these points
-
-    def held(q: Array) -> Array:
-        return np.array([*q[:WIDTH], min(max(q[WIDTH], narrowest), math.log(t[-1] - t[0]))])
-
-    found = leastsq(
-        lambda q: _curve(held(q), t) - z,
-        _start(t, z),
-        Dfun=lambda q: _slopes_of_curve(held(q), t),
-        xtol=1e-12,
-        ftol=1e-14,
-        full_output=True,
-    )
-    best = held(found[0])
-    return best, z - _curve(best, t), _slopes_of_curve(best, t)
-
-
-def _start(t: Array, z: Array) -> Array:
-    """The numbers of (1) by variable projection, turned from parts of the window."""
-    found, span = fitted(TWO, t, z), float(t[-1] - t[0])
-    assert found is not None  # FEWEST_POINTS are enough
-    place, log_width, level, low, high = found.numbers
-    return np.array([level, low / span, high / span, t[0] + place * span, log_width + math.log(span)])
-
-
-def _reach(off: Array, jacobian: Array, confidence: float) -> Array:
-    """Half the confidence interval of each number, by Student's t."""
-    from scipy.special import stdtrit
-
-    left = off.size - jacobian.shape[1]
-    size = np.sqrt((jacobian**2).sum(axis=0))
-    size[size == 0] = 1.0
-    inverse = np.linalg.pinv(jacobian / size) / size[:, None]  # of columns alike in size, and never squared
-    error = np.sqrt((inverse**2).sum(axis=1) * (off @ off) / left)
-    found: Array = stdtrit(left, (1 + confidence) / 2) * error
-    return found
-
-
-def _widened(t: Array, z: Array, off: Array, best: Array, low: Array, high: Array) -> tuple[Array, Array]:
+def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[Array, Array]:
     """Intervals that reach to where the local exponents tend; of the crossover, to where they are half-way between the
     laws and to where the tangents at the ends of the window meet."""
+    first = np.append(True, np.diff(t) > 0)
+    t, z = t[first], z[first]
     local, mirrored = slopes(t, z, 5), -t[::-1]
-    half = np.flatnonzero(np.diff(np.sign(local - (best[LOW] + best[HIGH]) / 2)))
-    place = t[half[np.argmin(abs(t[half] - best[PLACE]))]] if half.size else best[PLACE]
-    doubt = 2.5 * noise_of(off) * np.array([_amplified(t), _amplified(mirrored)])
+    half = np.flatnonzero(np.diff(np.sign(local - (best[0] + best[1]) / 2)))
+    place = t[half[np.argmin(abs(t[half] - best[2]))]] if half.size else best[2]
+    doubt = 2.5 * float(noise_size(t, z)) * np.array([_amplified(t), _amplified(mirrored)])
     ends = np.array([tends(t, local, doubt[0]), tends(mirrored, local[::-1], doubt[1])])
     low, high = low.copy(), high.copy()
-    laws = slice(LOW, HIGH + 1)
-    low[laws] = np.minimum(low[laws], ends.min(axis=1) - doubt)
-    high[laws] = np.maximum(high[laws], ends.max(axis=1) + doubt)
+    low[:2], high[:2] = np.minimum(low[:2], ends.min(axis=1) - doubt), np.maximum(high[:2], ends.max(axis=1) + doubt)
     steep = np.concatenate([ends, (ends[:, 0] - doubt)[:, None], (ends[:, 0] + doubt)[:, None]], axis=1)
     # where lines of these slopes through the first and the last point meet
     pairs = [pair for pair in itertools.product(*steep) if pair[0] != pair[1]]
     meetings = [float((z[-1] - z[0] + p * t[0] - q * t[-1]) / (p - q)) for p, q in pairs]
-    low[PLACE], high[PLACE] = min(low[PLACE], place, *meetings), max(high[PLACE], place, *meetings)
+    low[2], high[2] = min(low[2], place, *meetings), max(high[2], place, *meetings)
     return low, high
 
 
@@ -302,96 +303,36 @@ def _amplified(t: Array) -> float:
     return float(np.sqrt((slopes(near, np.eye(near.size), 5)[:, 0] ** 2).sum()))
 
 
-def _by_memory(off: Array, jacobian: Array, confidence: float, reach: Array) -> Array:
-    """How many times further each interval reaches where the noise may remember that of the point before."""
-    size = np.maximum(np.sqrt((jacobian**2).sum(axis=0)), 1e-300)
-    columns = jacobian / size
-    if np.linalg.cond(columns) > ALIKE:
-        return np.ones(reach.size)
-    memory = averaged(columns, off, confidence, np.ones(off.size))
-    found: Array = np.maximum(1.0, np.maximum(memory.high, -memory.low) / size / np.maximum(reach, 1e-300))
-    return found
+def _verdict(t: Array, z: Array, tried: dict[str, Found], weights: Array | None, noisy: bool) -> tuple[int, float]:
+    """Position in VERDICTS, and by how much two laws are better than a line and than other functions.
 
-
-def _of_other_bends(
-    t: Array, z: Array, off: Array, numbers: Array, reach: Array, more: Array, confidence: float
-) -> tuple[Array, Array]:
-    """Intervals that reach over those of every bend of another shape that the points do not rule out.
-
-    Where noise remembers, intervals reach `more` times as far, and points rule out less by the square of that.
+    By AICc, and BIC for many points. The noise of the line may be of any kind, that of all others is even.
     """
-    tried = [(found, 1.0) for law in BENDS[1:] if (found := fitted(law, t, z)) is not None]
-    own = corrected(off.size * math.log(float(off @ off) / off.size + 1e-300), off.size, 6)
-    best = min([own, *(found.aicc for found, _ in tried)])
-    stretched = [_other_powers(t, z, found, confidence) for found, _ in tried if found.law is STRETCHED]
-    low, high = numbers - reach, numbers + reach
-    own_low, own_high, span = low.copy(), high.copy(), t[-1] - t[0]
-    which = [LOW, HIGH, PLACE]
-    allowed = OTHER_SHAPES * float(more[which[:2]].max()) ** 2
-    for found, share in itertools.chain(tried, *stretched):
-        if found.aicc > best + allowed:
-            continue
-        count = len(found.law.grids)
-        q, slopes_there = found.numbers[0], found.numbers[count + 1 : count + 3]
-        wide = student(t.size - found.law.numbers, confidence) * found.errors[[count + 1, count + 2, 0]] * more[which]
-        middle = np.array([*slopes_there / span, t[0] + q * span])
-        wide = wide * share * np.array([1 / span, 1 / span, span])
-        low[which], high[which] = np.fmin(low[which], middle - wide), np.fmax(high[which], middle + wide)
-    further = BEYOND_SHAPES * np.array([own_low[PLACE] - low[PLACE], high[PLACE] - own_high[PLACE]])
-    low[PLACE], high[PLACE] = low[PLACE] - further.max(), high[PLACE] + further.max()
-    return low, high
+    n, two = t.size, tried[TWO.name]
+    line = fitted_line(t, z, weights)
+    others = [(fit.deviance, fit.law.numbers) for law in OTHER_FUNCTIONS if (fit := tried.get(law.name))]
+
+    def gain(simple: tuple[float, int], deviance: float, numbers: int) -> float:
+        by_aicc = float(corrected(simple[0], n, simple[1] + 1) - corrected(deviance, n, numbers + 1))
+        return min(by_aicc, simple[0] - deviance + (simple[1] - numbers) * math.log(n))
+
+    evidence = min(gain(one, two.deviance, 5) for one in (line, *others))
+    bends = [tried[law.name] for law in BENDS if law.name in tried]
+    if (three := tried.get(THREE.name)) is not None:
+        nearest = min(fit.aicc for fit in (*bends, *(tried[law.name] for law in OTHER_FUNCTIONS if law.name in tried)))
+        smaller = noisy or three.off @ three.off < SMALLER**2 * min(float(fit.off @ fit.off) for fit in bends)
+        if three.aicc < nearest - BEYOND_DOUBT and smaller and gain(line, three.deviance, 7) > BEYOND_DOUBT:
+            return VERDICTS.index("three laws"), evidence
+    if evidence > BEYOND_DOUBT:
+        return VERDICTS.index("two laws" if 0 <= two.numbers[0] <= 1 else "no meeting in the window"), evidence
+    if max(gain(line, *one) for one in others) > BEYOND_DOUBT:
+        return VERDICTS.index("no power law"), evidence
+    return VERDICTS.index("one law"), evidence
 
 
-def _other_powers(t: Array, z: Array, best: Found, confidence: float) -> list[tuple[Found, float]]:
-    """Bends stretched by other powers that the points allow, and the share of its interval that this leaves to each.
-
-    Errors of exponents grow as the power falls, so that those at the best one do not tell how far it may be from there:
-    the profile likelihood does.
-    """
-    left = t.size - STRETCHED.numbers
-    doubt = t.size * math.log1p(student(left, confidence) ** 2 / left)
-    allowed = []
-    for falls in (True, False):
-        powers = [power for power in POWERS if (power < best.numbers[2]) == falls]
-        for power in sorted(powers, reverse=falls):
-            found = fitted(POWERS[power], t, z)
-            if found is None or found.deviance >= best.deviance + doubt:
-                break
-            allowed.append((found, math.sqrt(min(1.0, 1 - (found.deviance - best.deviance) / doubt))))
-    return allowed
-
-
-def _evidence(t: Array, z: Array, off: Array) -> float:
-    """By how much (1) is better than a line and than a logarithm, whatever the noise of the line: AICc, and BIC for
-    many points, of even, uneven, correlated noise and of noise with outliers."""
-    floor = (4 * EPSILON * (1 + abs(z).max())) ** 2  # what rounding leaves
-    bent = off.size * math.log(float(off @ off) / off.size + floor)
-    rivals = [
-        line_deviance(t, z, floor),
-        *((found.deviance, 3) for law in (LOGARITHM,) if (found := fitted(law, t, z))),
-    ]
-    gains = [
-        min(
-            corrected(deviance, t.size, k + 1) - corrected(bent, t.size, 6),
-            deviance - bent + (k - 5) * math.log(t.size),
-        )
-        for deviance, k in rivals
-    ]
-    return float(min(gains))
-
-
-def _described(numbers: xr.DataArray, y: xr.DataArray, dim: str, confidence: float) -> xr.Dataset:
-    labels = [f"{name} {law}" for law in LAWS for name in EXPONENTS] + list(OTHERS)
-    numbers = numbers.assign_coords(number=labels)
-    found = xr.Dataset()
-    for name in EXPONENTS:
-        pair = [numbers.sel(number=f"{name} {law}", drop=True) for law in LAWS]
-        found[name] = xr.concat(pair, dim=xr.DataArray(list(LAWS), dims="law", name="law"))
-    for name in OTHERS:
-        found[name] = numbers.sel(number=name, drop=True)
-    place, units = (str(c.attrs.get("units", "1")) for c in (y.coords[dim], y))
-    of: dict[str, Any] = {"crossover": place, "crossover_low": place, "crossover_high": place, "level": units}
-    for name in (*EXPONENTS, *OTHERS):
-        found[name].attrs = {"units": of.get(name, "1"), "long_name": NAMES[name]}
-    found.attrs = {"y": title(y), "x": dim, "confidence": confidence, "law": "equation (1) of sweep.laws.two_laws"}
-    return found
+def fitted_line(t: Array, z: Array, weights: Array | None) -> tuple[float, int]:
+    """Deviance of one law, and its numbers with those of its noise but one."""
+    if weights is None:
+        return line_deviance(t, z), 3
+    fit = np.polyfit(t, z, 1, w=np.sqrt(weights))
+    return float((weights * (z - np.polyval(fit, t)) ** 2).sum()), 1

@@ -1,0 +1,242 @@
+"""The one size of noise, and the one regression: numbers of a linear law beside noise of which nothing is known.
+
+    z = X b + s(t) e,   e_i = phi e_(i-1) + sqrt(1 - phi^2) new_i,   ln s = a u + c |u|,   -1 <= u <= 1     (1)
+
+s is the size of the noise along the window: it may grow to one end (a), to both or to the middle (c). phi, a and c are
+not estimated, since from few points any estimate is off and intervals that take it for true hold 60 to 85 % instead of
+95: the points give each (phi, a, c) of a grid its weight, by restricted likelihood, and intervals are those of the
+mixture. Points far off such noise are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, stdtr, stdtrit
+
+from sweep.laws.loglog import EPSILON, Array, interpolation_errors
+
+CORRELATIONS = np.concatenate([np.linspace(-0.4, 0.9, 14), [0.93, 0.96, 0.98, 0.99, 0.995]])
+TRENDS, ENDS = np.linspace(-2.4, 2.4, 7), np.array([-1.6, 0.0, 1.6, 3.2])
+"""phi, a and c of (1) that are tried; exp(2 * 1.6) is a ratio of 25 between the sizes at both ends."""
+EVEN = np.zeros(1)
+
+NOISES = {
+    "noise": (CORRELATIONS, TRENDS, ENDS),
+    "even": (EVEN, EVEN, EVEN),
+    "uneven": (EVEN, TRENDS, ENDS),
+    "correlated": (CORRELATIONS, EVEN, EVEN),
+    "outliers": (EVEN, EVEN, EVEN),
+}
+"""What noise may be, by the word that a user says; "noise" is any."""
+
+BEYOND_DOUBT = 10.0
+"""Difference of AICc from which on a law is taken instead of a simpler one."""
+RARE = 1e-3
+"""Probability below which a test denies."""
+ROUNDING = 16 * EPSILON
+"""Relative distance of a point from a curve that is none."""
+FAR = 3.5
+"""Sizes of the noise beyond which a point is left out."""
+LINES = 250
+"""Lines that are taken at once, so that what is held stays below some 50 MB."""
+
+
+class Regression(NamedTuple):
+    """Least squares of lines (m,) on k columns under each noise of the grid: phi first, then a and c (p, s)."""
+
+    weight: Array
+    """(p, s, m), of sum 1."""
+    value: Array
+    """(p, s, k, m)"""
+    error: Array
+    """(p, s, k, m), standard errors."""
+    size: Array
+    """Of the noise at each point (m, n), up to a factor."""
+    left: int
+    """Degrees of freedom."""
+    deviance: Array
+    """Minus twice the logarithm of the likelihood on the k columns and on one more each (m, ...), under the noise that
+    suits each best; less n ln 2 pi e. What rounding leaves is no distance."""
+    evidence: Array
+    """Logarithm of the restricted likelihood of each line (m,), summed over the grid."""
+
+    def mean(self) -> tuple[Array, Array]:
+        """The numbers and their standard errors, (m, k) each."""
+        middle = np.einsum("psm,pskm->km", self.weight, self.value)
+        square = np.einsum("psm,pskm->km", self.weight, self.error**2 + (self.value - middle) ** 2)
+        return middle.T, np.sqrt(square).T
+
+    def interval(self, number: int, confidence: float) -> tuple[Array, Array]:
+        """Ends of the interval of one number (m,): quantiles of a mixture of Student's t, one for each phi."""
+        share = self.weight.sum(axis=1)
+        part = self.weight / np.maximum(share, 1e-300)[:, None]
+        middle = np.einsum("psm,psm->pm", part, self.value[:, :, number])
+        off = self.error[:, :, number] ** 2 + (self.value[:, :, number] - middle[:, None]) ** 2
+        error = np.sqrt(np.einsum("psm,psm->pm", part, off)) + 1e-300
+        ends = []
+        for chance in ((1 - confidence) / 2, (1 + confidence) / 2):
+            one = middle + error * stdtrit(self.left, chance)
+            below, above = one.min(axis=0), one.max(axis=0)
+            for _ in range(28 if len(one) > 1 else 0):
+                half = 0.5 * (below + above)
+                over = (share * stdtr(self.left, (half - middle) / error)).sum(axis=0) > chance
+                below, above = np.where(over, below, half), np.where(over, half, above)
+            ends.append(0.5 * (below + above))
+        return ends[0], ends[1]
+
+
+def regress(t: Array, columns: Array, z: Array, noise: str = "noise", used: int | None = None) -> Regression:
+    """Lines z (m, n) on the first `used` of the columns (n, k), under each noise of the word.
+
+    Sums over points are of three kinds alone: over all, over the first and the last, over pairs of neighbours.
+
+    So phi costs no sums, and the columns before any are those of the Cholesky factor before it.
+    """
+    phi, trend, ends = NOISES[noise]
+    (n, k), one = columns.shape, phi[:, None, None]
+    used = k if used is None else used
+    basis, back = np.linalg.qr(columns)
+    start = basis.T @ z.T
+    off = z.T - basis[:, :used] @ start[:used]
+    scale = abs(off).max(axis=0) + 1e-300
+    off /= scale
+    u = 2 * (t - t[0]) / (t[-1] - t[0]) - 1
+    steep, round_ = (grid.reshape(-1, 1) for grid in np.meshgrid(trend, ends, indexing="ij"))
+    log_size = steep * u + round_ * abs(u)
+    log_size -= log_size.mean(axis=1, keepdims=True)
+    x, y = (np.exp(-log_size)[:, :, None] * part for part in (basis, off))
+
+    def sums(a: Array, b: Array) -> Array:
+        over, outer = a.transpose(0, 2, 1), [0, -1]
+        whole, pairs = over @ b, over[:, :, 1:] @ b[:, :-1] + over[:, :, :-1] @ b[:, 1:]
+        first_and_last = over[:, :, outer] @ b[:, outer]
+        by_phi = phi[:, None, None, None]
+        found: Array = whole + by_phi**2 * (whole - first_and_last) - by_phi * pairs
+        return found
+
+    factor = np.linalg.cholesky(sums(x, x))
+    solved = np.linalg.solve(factor, sums(x, y))
+    whole, outer = (y**2).sum(axis=1), y[:, 0] ** 2 + y[:, -1] ** 2
+    square = whole + one**2 * (whole - outer) - 2 * one * (y[:, 1:] * y[:, :-1]).sum(axis=1)
+    squares = np.maximum(square[:, :, None] - np.cumsum(solved**2, axis=2), 1e-28)
+    rounding = (ROUNDING * (1 + abs(z).max(axis=1))) ** 2
+    own = -np.log1p(-(one**2))
+    best = [n * np.log(squares[:, :, j] * scale**2 / n + rounding) + own for j in range(used - 1, k)]
+    deviance = np.stack([one.min(axis=(0, 1)) for one in best], axis=1)
+
+    left, inverse = n - used, np.linalg.inv(factor[:, :, :used, :used])
+    inside = np.linalg.inv(back[:used, :used]) @ inverse.transpose(0, 1, 3, 2)
+    value = (inside @ solved[:, :, :used] * scale) + (np.linalg.inv(back[:used, :used]) @ start[:used])
+    spread = np.sqrt((inside**2).sum(axis=3))
+    error = spread[..., None] * np.sqrt(squares[:, :, used - 1] / max(left, 1))[:, :, None] * scale
+    determinant = np.log(np.einsum("pskk->psk", inverse)).sum(axis=2)[:, :, None]
+    log = -0.5 * own - 0.5 * left * np.log(squares[:, :, used - 1]) + determinant
+    log += (-0.5 * (steep**2 + round_**2) / 1.6**2)[None]
+    if phi.size > 1:
+        log += _prior(n)[:, None, None]
+    highest = log.max(axis=(0, 1))
+    weight = np.exp(log - highest)
+    evidence = highest + np.log(weight.sum(axis=(0, 1))) - left * np.log(scale)
+    weight /= weight.sum(axis=(0, 1))
+    size = 1 / np.einsum("psm,sn->mn", weight, np.exp(-log_size))
+    return Regression(weight, value, error, size, left, deviance, evidence)
+
+
+def _prior(points: int) -> Array:
+    """Of phi: a power of 1/(1 - phi) that few points need for intervals to hold as often as they say, by trial at
+    phi = .9 and 12 to 200 points."""
+    power = max(0.0, 0.36 * math.log(115 / points))
+    found: Array = np.log(np.gradient(CORRELATIONS)) - power * np.log(1 - CORRELATIONS)
+    return found
+
+
+def inliers(t: Array, columns: Array, z: Array) -> NDArray[np.bool_]:
+    """Points of lines z (m, n) within FAR times the size of the noise about what is fitted to the others."""
+    inside = np.ones(z.shape, dtype=bool)
+    todo = np.arange(len(z))
+    for _ in range(3):
+        again = []
+        for pattern, which in alike(inside[todo]):
+            rows = todo[which]
+            found = regress(t[pattern], columns[pattern], z[rows][:, pattern])
+            off = abs(z[rows] - found.mean()[0] @ columns.T)
+            off /= np.stack([np.interp(t, t[pattern], size) for size in found.size])
+            size = np.quantile(off[:, pattern], 0.8, axis=1, keepdims=True) / 1.2816  # a fifth may be anything
+            near = off <= FAR * size
+            changed = (near != inside[rows]).any(axis=1) & (near.sum(axis=1) >= max(4, 0.7 * t.size))
+            inside[rows[changed]] = near[changed]
+            again.append(rows[changed])
+        todo = np.concatenate(again) if again else todo[:0]
+    return inside
+
+
+def alike(present: NDArray[np.bool_], most: int = LINES) -> list[tuple[NDArray[np.bool_], NDArray[np.intp]]]:
+    """Patterns among rows (m, n), and which rows have each; at most so many at once."""
+    if not len(present):
+        return []
+    if present.all():
+        patterns, which = present[:1], np.zeros(len(present), dtype=np.intp)
+    else:
+        patterns, which = np.unique(present, axis=0, return_inverse=True)
+    parts = [(p, np.flatnonzero(which.reshape(-1) == number)) for number, p in enumerate(patterns)]
+    return [(p, rows[i : i + most]) for p, rows in parts for i in range(0, rows.size, most)]
+
+
+def noise_size(t: Array, z: Array) -> Array:
+    """Size of the noise on smooth curves (..., n) without gaps, t rising; of repeated t, that within repetitions.
+
+    The least of what points are off the polynomials through two, four, six and eight neighbours: noise leaves the same
+    in all, a bend ever less.
+    """
+    places, which, count = np.unique(t, return_inverse=True, return_counts=True)
+    if places.size < t.size:
+        off = z - ((z @ np.eye(places.size)[which]) / count)[..., which]
+        within: Array = np.sqrt((off**2).sum(axis=-1) / (t.size - places.size))
+        return within
+    counts = [count for count in (2, 4, 6, 8) if t.size > count + 2]
+    sizes = [np.sqrt(np.mean(interpolation_errors(t, z, count) ** 2, axis=-1)) for count in counts]
+    least: Array = np.min(sizes, axis=0) if sizes else np.full(z.shape[:-1], np.inf)
+    return least
+
+
+def corrected(deviance: Any, points: int, numbers: int) -> Any:
+    """AICc from minus twice the logarithm of the likelihood; inf where there are too few points for so many numbers."""
+    left = points - numbers - 1
+    return deviance + (2 * numbers + 2 * numbers * (numbers + 1) / left if left > 0 else math.inf)
+
+
+def line_deviance(t: Array, z: Array) -> float:
+    """`Regression.deviance` of the straight line through one line (n,), whatever its noise."""
+    columns = np.stack([np.ones_like(t), t - t.mean()], axis=1)
+    return min(float(regress(t, columns, z[None]).deviance[0, 0]), _outlying_deviance(columns, z))
+
+
+def _outlying_deviance(columns: Array, z: Array, freedom: float = 3.0) -> float:
+    """As `deviances` of one line (n,) under Student's t, which has outliers, by reweighting until nothing changes."""
+    weights, scale, off = np.ones(z.size), 1.0, z
+    for _ in range(50):
+        root = np.sqrt(weights)
+        off = z - columns @ np.linalg.lstsq(columns * root[:, None], z * root, rcond=None)[0]
+        scale = max(float(np.mean(weights * off**2)), 1e-300)
+        weights = (freedom + 1) / (freedom + off**2 / scale)
+    scale = max(scale, float((ROUNDING * (1 + abs(z).max())) ** 2))
+    logs = -0.5 * (freedom + 1) * np.log1p(off**2 / (freedom * scale)).sum()
+    constant = math.lgamma((freedom + 1) / 2) - math.lgamma(freedom / 2) - 0.5 * math.log(freedom * math.pi)
+    both = -2 * (logs + z.size * (constant - 0.5 * math.log(scale)))
+    return float(both - z.size * (1 + math.log(2 * math.pi)))
+
+
+def runs_chance(off: Array) -> Array:
+    """Chance that independent noise has so few runs of signs as distances (..., n), by Wald and Wolfowitz; NaN of fewer
+    than 12 points, or of one sign."""
+    above = (off > 0).sum(axis=-1)
+    both, runs = 2.0 * above * (off.shape[-1] - above), 1 + (np.diff(off > 0, axis=-1) != 0).sum(axis=-1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = 1 + both / off.shape[-1]
+        size = np.sqrt((mean - 1) * (mean - 2) / (off.shape[-1] - 1))
+        chance: Array = ndtr((runs + 0.5 - mean) / size)
+    return np.where((both > 0) & (off.shape[-1] >= 12), chance, np.nan)
