@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from sweep.results.listing import list_results as list_results
     from sweep.results.units import in_units as in_units
     from sweep.runs.run import run as run
-    from sweep.show.notebook import kernels as kernels
+    from sweep.show.kernels import kernels as kernels
     from sweep.show.plot import plot as plot
     from sweep.study.toml import to_toml as to_toml
 
@@ -49,7 +49,7 @@ _PUBLIC = {
     "results.diff": ("diff",),
     "results.listing": ("list_results",),
     "explore.join": ("join",),
-    "show.notebook": ("kernels",),
+    "show.kernels": ("kernels",),
     "explore.solver": ("solver",),
     "explore.refine": ("refine",),
     "explore.scattered": ("interpolated",),

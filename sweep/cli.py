@@ -11,11 +11,10 @@ import os
 import sys
 from collections.abc import Sequence
 
-from sweep.command import exploring, laws, looking, offered, running, writing
-from sweep.command.files import say
-from sweep.command.options import Command, option
+from sweep.command import explore, laws, look, offer, run, write
+from sweep.command.options import command, option
 from sweep.command.outcome import Outcome, explained
-from sweep.command.running import notify
+from sweep.command.reading import say
 from sweep.errors import COMPLETE, EXIT_CODES, missing
 
 
@@ -30,7 +29,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser().parse_args(argv)
     ended = _ended(arguments)
     if getattr(arguments, "notify", None):
-        notify(arguments, ended)
+        run.notify(arguments, ended)
     pool = sys.modules.get("sweep.runs.pool")
     if argv is None and pool is not None and pool.left_behind():
         # a kernel that never ends would keep Python from ending; a program that calls this is not ours to end
@@ -44,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _ended(arguments: argparse.Namespace) -> Outcome:
     """Does what is asked, and says what became of it."""
     try:
-        outcome: Outcome = arguments.command(arguments) or Outcome(COMPLETE, "")
+        outcome: Outcome = arguments.function(arguments) or Outcome(COMPLETE, "")
         if sys.stdout is not None:  # closed by whoever has started us
             sys.stdout.flush()
         return outcome
@@ -61,7 +60,9 @@ def _ended(arguments: argparse.Namespace) -> Outcome:
         return outcome
 
 
-def _completion(arguments: argparse.Namespace) -> None:
+@command('eval "$(sweep completion bash)"', option("shell", choices=("bash", "zsh", "tcsh")))
+def completion(arguments: argparse.Namespace) -> None:
+    """What makes a shell complete the command."""
     try:
         import shtab
     except ImportError:
@@ -70,18 +71,14 @@ def _completion(arguments: argparse.Namespace) -> None:
 
 
 COMMANDS = {
-    **offered.COMMANDS,
-    **exploring.COMMANDS,
-    **running.COMMANDS,
-    **looking.COMMANDS,
-    **laws.COMMANDS,
-    **writing.COMMANDS,
-    "completion": Command(
-        'what makes a shell complete the command, e.g. eval "$(sweep completion bash)"',
-        _completion,
-        option("shell", choices=("bash", "zsh", "tcsh")),
-    ),
+    made.function.__name__.strip("_"): made
+    for made in (
+        *(offer.kernels, offer.studies),
+        *(explore.plan, run.run, look.show, look.list_, look.verify, look.diff, look.plot, look.view, look.report),
+        *(laws.fit, explore.refine, explore.chart, write.export, write.join, completion),
+    )
 }
+"""In the order in which `sweep --help` names them."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -95,11 +92,12 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=_version())
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for name, command in COMMANDS.items():
-        text = command.text
-        made = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
-        made.set_defaults(command=command.function)
-        for names, keys in command.options:
+    for name, one in COMMANDS.items():
+        text = one.function.__doc__ or ""
+        short = text[0].lower() + text[1:].rstrip(".")
+        made = commands.add_parser(name, help=short, description=text, epilog=f"example: {one.example}")
+        made.set_defaults(function=one.function)
+        for names, keys in one.options:
             made.add_argument(*names, **keys)
     return top
 

@@ -1,9 +1,9 @@
-"""The commands: each with its options and the function that does it. They call all rooms below and add nothing.
+"""The commands: each a function with its help, options and an example. They call all rooms below and add nothing.
 
 Others may use
-    `options`  Command, Option: how a command is declared
-    `outcome`  Outcome, explained: how it ended
-    `offered`, `exploring`, `running`, `looking`, `laws`, `writing`   COMMANDS: those of this module, by name
+    `options`   Command: how a command is declared
+    `outcome`   Outcome, explained: how it ended
+    `offer`, `explore`, `run`, `look`, `laws`, `write`   the commands themselves
 
-`files` opens and checks what a command reads and writes. To add a command, write its function and one row of COMMANDS.
+`reading` opens and checks what commands read and write. A further command is a function that `sweep.cli` names.
 """

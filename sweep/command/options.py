@@ -1,4 +1,4 @@
-"""How a command is declared: what it is for, what may stand behind its name, how it ended."""
+"""How a command is declared: a function whose docstring is its help, what may stand behind its name, an example."""
 
 from __future__ import annotations
 
@@ -9,12 +9,27 @@ from typing import Any, NamedTuple
 
 from sweep.command.outcome import Outcome
 
+Function = Callable[[argparse.Namespace], Outcome | None]
+
 
 class Option(NamedTuple):
     """What argparse's `add_argument` takes."""
 
     names: tuple[str, ...]
     keys: dict[str, Any]
+
+
+class Command(NamedTuple):
+    """One command: what it does, an example of it, and what may stand behind its name."""
+
+    function: Function
+    example: str
+    options: tuple[Option, ...]
+
+
+def command(example: str, *options: Option) -> Callable[[Function], Command]:
+    """Make a command of a function."""
+    return lambda function: Command(function, example, options)
 
 
 def option(name: str, text: str | None = None, **keys: Any) -> Option:
@@ -37,30 +52,29 @@ def output(metavar: str, text: str | None = None, required: bool = False) -> Opt
     return option("-o --output", text, metavar=metavar, type=Path, required=required)
 
 
-class Command:
-    """One command: what it is for, what does it, and what may stand behind its name."""
-
-    def __init__(self, text: str, function: Callable[[argparse.Namespace], Outcome | None], *options: Option) -> None:
-        self.text, self.function, self.options = text, function, options
-
-
 STUDY = option("study", metavar="STUDY.toml", type=Path)
 RESULT = option("result", metavar="OUT.h5", type=Path)
 OUTPUT_Y = option("--y", "default: the first output; of a scene of one's own its interval", metavar="OUTPUT")
 OTHER = option("other", metavar="OTHER.h5", type=Path)
-WORKERS = option("--workers", "cores to use; default: all", metavar="N", type=int)
 ALLOW_IMPORT = switch("--allow-import", 'allow a kernel "module:NAME" of your own')
-ISOLATE = option(
-    "--isolate",
-    "solve cells in processes of their own, so that one that crashes or never ends costs only itself; "
-    'default: for a kernel "module:NAME"',
-    action=argparse.BooleanOptionalAction,
-)
-CELL_TIMEOUT = option(
-    "--cell-timeout", "what a cell may take, e.g. 90s or 1h; default: 60s, longer where cells do", metavar="TIME"
-)
 FORCE = switch("--force", "overwrite what is there")
 UNFINISHED = switch("--unfinished", "take what there is of a result that is not complete yet")
 ALL = switch("--all", "all columns of the table")
 AT = several("--at", "pick one value of another axis", "AXIS=VALUE")
 UNITS = several("--unit", "give a variable in another unit, e.g. A0=degree e=mm wear=mm/hour", "NAME=UNIT")
+SOLVING = (
+    option("--workers", "cores to use; default: all", metavar="N", type=int),
+    ALLOW_IMPORT,
+    option(
+        "--isolate",
+        "solve cells in processes of their own, so that one that crashes or never ends costs only itself; "
+        'default: for a kernel "module:NAME"',
+        action=argparse.BooleanOptionalAction,
+    ),
+    option(
+        "--cell-timeout",
+        "time limit of a cell, e.g. 90s or 1h; default: 60s, longer if cells take long",
+        metavar="TIME",
+    ),
+)
+"""Options of every command that solves cells."""

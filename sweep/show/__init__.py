@@ -6,11 +6,10 @@ Others may use
     `page`     write_page: a result as one page of HTML
     `text`     result_text
     `follow`   a sweep watched from its log
-    `laws`     power laws along an axis, as text and csv; pick
+    `laws`     power laws along an axis and which law, as text and csv; pick
     `studies`  what comes with foliot, and copies to work on
-    `compare`, `law_charts`   which law: as text, csv and picture
-    `kernels`  what can be swept, and a study to begin with
-    `notebook` kernels; what a notebook shows of them and of a study
+    `kernels`  what can be swept, as text and HTML, and a study to begin with
+    `notebook` study_html: what a notebook shows of a study
 
 `view` chooses and letters what `charts` draws.
 """

@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
-import textwrap
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -102,9 +101,7 @@ def result_figure(dataset: xr.Dataset, y: str | None = None, x: str | None = Non
             _draw_map(axes, shown)
         else:
             _draw_lines(axes, shown)
-        # a title is plain text; a lone dollar in it would begin a formula
-        text = str(dataset.attrs.get("title", "")).replace("$", r"\$")
-        title = "\n".join(part for part in (text, shown.held) if part)
+        title = "\n".join(part for part in (_plain(dataset.attrs.get("title", "")), shown.held) if part)
         axes.set_title(title, wrap=True)
     return figure
 
@@ -112,12 +109,12 @@ def result_figure(dataset: xr.Dataset, y: str | None = None, x: str | None = Non
 def precision_figure(found: xr.Dataset) -> Figure:
     """Error against time per cell, median and worst cell, a line for each method through its tolerances.
 
-    Bars are the middle 80 % of the cells; the grey floor is what the reference itself, named below, is right to. A
-    method that solves no cell has no line, but is named below.
+    The legend names every method, also one that solves no cell and one that is silently wrong in some.
     """
     with style():
-        lines = _note(found)
-        figure = new_figure(PAGE, 96.0 + 3.2 * len(lines))
+        names = [str(name) for name in found["method"].values]
+        rows = -(-(len(names) + 4) // 4)
+        figure = new_figure(PAGE, 90.0 + 4.0 * rows)
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         for axes, key, text in zip(panels, ("error_median", "error_worst"), ("median cell", "worst cell"), strict=True):
             draw_precision(axes, found, key)
@@ -126,31 +123,26 @@ def precision_figure(found: xr.Dataset) -> Figure:
         low, high = panels[0].get_xlim()
         wide = np.sqrt(max(LEAST_SPAN * low / high, 1.0))
         panels[0].set(ylabel="relative error [1]", xlim=(low / wide, high * wide))
-        handles, labels = panels[0].get_legend_handles_labels()
-        marks = precision_marks(found)
-        figure.legend([*handles, *marks.values()], [*labels, *marks], loc="outside upper center", ncols=4, fontsize=7)
-        figure.supxlabel("\n".join(lines), fontsize=7, ha="left", x=0.02)
+        lines = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True))
+        handles = {}
+        for name in names:
+            silent = bool((found.silent.sel({"method": name}) > 0).any())
+            handles[name + " (solves no cell)" * (name not in lines) + " (silently wrong)" * silent] = lines.get(
+                name, Line2D([], [], linestyle="")
+            )
+        handles |= precision_marks(found)
+        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=7)
+        attrs = found.attrs
+        accurate = f", accurate to {attrs['reference_error']:.1g}" if np.isfinite(attrs["reference_error"]) else ""
+        figure.suptitle(
+            f"{_plain(attrs['title'])}: {attrs['cells']} cells, errors against {attrs['reference']}{accurate}"
+        )
     return figure
 
 
-def _note(found: xr.Dataset) -> list[str]:
-    """Lines below the picture: what the errors are against, and which methods have no line."""
-    source, right, cells = (found.attrs[key] for key in ("reference", "reference_error", "cells"))
-    idle = [f"{name} solves no cell" for name in found["method"].values if not _drawn(found, name)]
-    wrong = [f"{name} is silently wrong" for name in found["method"].values if _any(found.silent, name)]
-    parts = [part for part in (found.attrs.get("missing"), *idle, *wrong) if part]
-    basis = f"Errors against {source}, itself right to {right:.1g}, in {cells} cells of: {found.attrs['title']}"
-    parts.insert(0, basis)
-    return textwrap.wrap("; ".join(parts).replace("$", r"\$") + ".", 145)
-
-
-def _any(share: xr.DataArray, name: str) -> bool:
-    return bool((share.sel({"method": name}) > 0).any())
-
-
-def _drawn(found: xr.Dataset, name: str) -> bool:
-    """Whether a method has any mark."""
-    return bool(np.isfinite(found.error_median.sel({"method": name})).any())
+def _plain(text: Any) -> str:
+    """Text that is no formula: a lone dollar would begin one."""
+    return str(text).replace("$", r"\$")
 
 
 def precision_marks(found: xr.Dataset) -> dict[str, Any]:
@@ -164,14 +156,14 @@ def precision_marks(found: xr.Dataset) -> dict[str, Any]:
     if "error_high" in found:
         marks["middle 80 % of the cells"] = Line2D([], [], color="0.3", linestyle="", marker="|", markersize=9)
     if np.isfinite(found.attrs.get("reference_error", np.nan)):
-        marks["below what the reference is right to"] = Patch(color="0.9", linewidth=0)
+        marks["below the accuracy of the reference"] = Patch(color="0.9", linewidth=0)
     return marks
 
 
 LEAST_SPAN = 30.0
 """Of the times in a chart, so that methods alike look alike."""
 FLOOR, CEILING = 1e-17, 3.0
-"""Where errors of 0, and errors beyond all sense, are drawn."""
+"""Where errors of 0, and errors beyond all sense, are drawn at the least and at the most."""
 
 
 def draw_precision(axes: Any, found: xr.Dataset, key: str, names: Sequence[str] = ()) -> None:
@@ -179,25 +171,28 @@ def draw_precision(axes: Any, found: xr.Dataset, key: str, names: Sequence[str] 
 
     Filled marks where all cells are solved, open ones where some are unsolved or said to be inaccurate, crosses where
     some are silently wrong; bars about a median are the middle 80 % of the cells; `precision_marks` says so in a
-    legend. A method that solves no cell is left out.
+    legend. Errors a decade below the accuracy of the reference mean nothing, and are drawn there. A method that solves
+    no cell is left out.
     """
-    floor = found.attrs.get("reference_error", np.nan)
+    accurate = found.attrs.get("reference_error", np.nan)
+    floor = max(FLOOR, accurate / 10) if np.isfinite(accurate) else FLOOR
     order = list(dict.fromkeys([*names, *found["method"].values.tolist()]))
-    for i, name in ((order.index(name), name) for name in found["method"].values if _drawn(found, name)):
-        row = found.sel({"method": name})
-        seconds, error = row.seconds.values, np.clip(row[key].values, FLOOR, CEILING)
-        whole = (row.unsolved + row.inaccurate).values == 0
+    for name in found["method"].values:
+        row, i = found.sel({"method": name}), order.index(name)
+        if not np.isfinite(row.error_median).any():
+            continue
+        seconds, error = row.seconds.values, np.clip(row[key].values, floor, CEILING)
+        whole, silent = (row.unsolved + row.inaccurate).values == 0, row.silent.values > 0
         look = {"color": COLOURS[i % len(COLOURS)], "marker": MARKS[i % len(MARKS)], "markersize": 4}
         axes.plot(seconds, error, linewidth=0.8, linestyle=DASHES[i % len(DASHES)], markevery=whole, label=name, **look)
         axes.plot(seconds[~whole], error[~whole], linestyle="", **{**look, "markerfacecolor": "white"})
         if key == "error_median" and "error_high" in row:
-            ends = np.clip([row.error_low.values, row.error_high.values], FLOOR, CEILING)
+            ends = np.clip([row.error_low.values, row.error_high.values], floor, CEILING)
             axes.vlines(seconds, *ends, color=look["color"], linewidth=0.7, alpha=0.7)
-        silent = row.silent.values > 0
         axes.plot(seconds[silent], error[silent], "x", color="black", markersize=7)
-    if np.isfinite(floor):
-        axes.axhspan(FLOOR / 2, max(floor, FLOOR), color="0.9", linewidth=0)
-    axes.set(xscale="log", yscale="log", xlabel="time per cell on one core [s]", ylim=(FLOOR / 2, 10))
+    if np.isfinite(accurate):
+        axes.axhspan(floor / 2, max(accurate, floor), color="0.9", linewidth=0)
+    axes.set(xscale="log", yscale="log", xlabel="time per cell on one core [s]", ylim=(floor / 2, 10))
 
 
 @contextlib.contextmanager
@@ -244,15 +239,23 @@ def letter(axes: Any, text: str) -> None:
 
 
 def _draw_lines(axes: Any, shown: View) -> None:
-    axes.set(xlabel=shown.label(shown.x, 80), ylabel=label(shown.y))
+    """A line for each value across; cells of one status: on the line where they have a value, else at its foot."""
+    axes.set(xlabel=label(coordinate(shown.y, shown.x), 80), ylabel=label(shown.y))
     axes.set_xscale("log" if is_logarithmic(shown.values(shown.x)) else "linear")
     axes.set_yscale("log" if spans_decades(shown.y) else "linear")
     x, lines = shown.values(shown.x), np.atleast_2d(shown.y.values)
     for i, y in enumerate(lines):
         name = setting(coordinate(shown.y, shown.across)[i]) if shown.across else None
-        axes.plot(x, y, color=COLOURS[i % len(COLOURS)], label=name, **_look(i, shown.joined))
+        points = {"linestyle": "", "marker": MARKS[i % len(MARKS)], "markersize": 2.5}
+        look = {"linestyle": DASHES[i % len(DASHES)]} if shown.joined else points
+        axes.plot(x, y, color=COLOURS[i % len(COLOURS)], label=name, **look)
+    drawn = (lambda y: y > 0) if axes.get_yscale() == "log" else np.isfinite
     for code, mark, colour in zip(shown.codes(), itertools.cycle(MARKS), itertools.cycle(FLAGGED), strict=False):
-        _mark(axes, x, lines, np.atleast_2d(shown.status) == code, mark, colour)
+        look = {"linestyle": "", "marker": mark, "color": colour, "markerfacecolor": "none", "clip_on": False}
+        for y, here in zip(lines, np.atleast_2d(shown.status) == code, strict=True):
+            valued, empty = here & drawn(y), here & ~drawn(y)
+            axes.plot(x[valued], y[valued], **look)
+            axes.plot(x[empty], np.zeros(empty.sum()), transform=axes.get_xaxis_transform(), **look)
         axes.plot([], [], mark, color=colour, markerfacecolor="none", label=shown.meanings.get(code, str(code)))
     if (shown.across or shown.codes()) and shown.joined:
         axes.legend()
@@ -260,56 +263,29 @@ def _draw_lines(axes: Any, shown: View) -> None:
         axes.figure.legend(loc="outside lower center", ncols=3)
 
 
-def _look(i: int, joined: bool) -> dict[str, Any]:
-    if joined:
-        return {"linestyle": DASHES[i % len(DASHES)]}
-    return {"linestyle": "", "marker": MARKS[i % len(MARKS)], "markersize": 2.5}
-
-
-def _mark(axes: Any, x: Any, lines: Any, flagged: Any, mark: str, colour: str) -> None:
-    """Cells of one status: on the line where they have a value that is drawn, at the foot where they have none."""
-    drawn = (lambda y: y > 0) if axes.get_yscale() == "log" else np.isfinite
-    open_mark = {"linestyle": "", "marker": mark, "color": colour, "markerfacecolor": "none", "clip_on": False}
-    for y, here in zip(lines, flagged, strict=True):
-        valued, empty = here & drawn(y), here & ~drawn(y)
-        axes.plot(x[valued], y[valued], **open_mark)
-        axes.plot(x[empty], np.zeros(empty.sum()), transform=axes.get_xaxis_transform(), **open_mark)
-
-
 def _draw_map(axes: Any, shown: View) -> None:
-    across = str(shown.across)
-    axes.set(xlabel=shown.label(shown.x, 80), ylabel=shown.label(across))
-    corners = []
-    for scale, grid in ((axes.set_xscale, shown.values(shown.x)), (axes.set_yscale, shown.values(across))):
-        scale("log" if is_logarithmic(grid) else "linear")
-        corners.append(edges(grid.astype(np.float64)))
+    """A colour for each cell; those of one status hatched where they have no value, outlined where they have one."""
+    grids = shown.values(shown.x), shown.values(str(shown.across))
+    axes.set(xlabel=label(coordinate(shown.y, shown.x), 80), ylabel=label(coordinate(shown.y, str(shown.across))))
+    axes.set(**{f"{k}scale": "log" if is_logarithmic(grid) else "linear" for k, grid in zip("xy", grids, strict=True)})
+    corners = [edges(grid.astype(np.float64)) for grid in grids]
     norm = LogNorm() if spans_decades(shown.y) else Normalize()
     mesh = axes.pcolormesh(*corners, np.ma.masked_invalid(shown.y.values), norm=norm, cmap="viridis", rasterized=True)
     axes.figure.colorbar(mesh, ax=axes, label=label(shown.y))
-    marks = zip(shown.codes(), itertools.cycle(HATCHES), itertools.cycle(FLAGGED), strict=False)
-    drawn = [_cover(axes, corners, shown, code, hatch, colour) for code, hatch, colour in marks]
-    keys = [key for key in drawn if key is not None]
+    keys: list[Any] = []
+    for code, hatch, colour in zip(shown.codes(), itertools.cycle(HATCHES), itertools.cycle(FLAGGED), strict=False):
+        here, name = shown.status == code, shown.meanings.get(code, str(code))
+        empty = here & ~np.isfinite(shown.y.values)
+        if (here & ~empty).any():
+            around = (np.concatenate([ends[:1], c, ends[-1:]]) for c, ends in zip(grids, corners, strict=True))
+            axes.contour(*around, np.pad(here, 1), levels=[0.5], colors=[colour])
+        look: dict[str, Any] = {"facecolor": "0.94", "edgecolor": "0.45", "linewidth": 0.0, "hatch": hatch}
+        if empty.any():
+            axes.add_collection(PolyCollection(list(_runs(corners, empty)), **look))
+        if not _name(axes, corners, here, name):
+            keys.append(Patch(label=name, **look) if empty.any() else Line2D([], [], color=colour, label=name))
     if keys:
         axes.figure.legend(handles=keys, loc="outside lower center", ncols=3)
-
-
-def _cover(axes: Any, corners: list[Any], shown: View, code: int, hatch: str, colour: str) -> Any:
-    """Cells of one status: hatched where they have no value, outlined where they have one.
-
-    Returns what explains it in the legend; None where the region has room for its name.
-    """
-    here, name = shown.status == code, shown.meanings.get(code, str(code))
-    empty = here & ~np.isfinite(shown.y.values)
-    if (here & ~empty).any():
-        centres = (shown.values(shown.x), shown.values(str(shown.across)))
-        around = (np.concatenate([ends[:1], c, ends[-1:]]) for c, ends in zip(centres, corners, strict=True))
-        axes.contour(*around, np.pad(here, 1), levels=[0.5], colors=[colour])
-    look: dict[str, Any] = {"facecolor": "0.94", "edgecolor": "0.45", "linewidth": 0.0, "hatch": hatch}
-    if empty.any():
-        axes.add_collection(PolyCollection(list(_runs(corners, empty)), **look))
-    if _name(axes, corners, here, name):
-        return None
-    return Patch(label=name, **look) if empty.any() else Line2D([], [], color=colour, label=name)
 
 
 def _runs(corners: list[Any], here: Any) -> Iterator[Any]:

@@ -1,149 +1,191 @@
-"""What `sweep kernels` prints: what can be swept."""
+"""What can be swept: kernels with parameters, outputs and methods, as text and HTML; a study to begin with."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
+from html import escape
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kernels import catalogue
-from kernels.interface import KINDS, Field, Kernel, Method, Status
+from kernels.interface import KINDS, Field, Kernel, Status
 from sweep.errors import SweepError
 from sweep.study.kernel_lookup import load_kernel
 from sweep.study.mistakes import limits
-from sweep.words import columns, listed, page, paragraph, quoted, section
+from sweep.words import Table, listed, page, paragraph, quoted
 
 
-def catalogue_text() -> str:
-    """Every kernel of the catalogue in a few lines."""
-    return page(
-        *(_short(name) for name in catalogue.KERNELS),
-        section("what becomes of a cell, in one word, and the statuses that say so", map(_kind, KINDS)),
-        "`sweep kernels NAME` tells more of one of them.",
-    )
+class KernelPage:
+    """A kernel of the catalogue, or one's own: printed it tells all about itself, in a notebook as tables.
+
+    Attributes
+    ----------
+    name : str
+        As a study names it.
+    kernel : Kernel
+        Its declaration: parameters, outputs, methods.
+    """
+
+    def __init__(self, name: str, allow_import: bool = False) -> None:
+        self.name, self.kernel = name, load_kernel(name, allow_import)
+
+    def __repr__(self) -> str:
+        example = "\n".join(f"  {line}".rstrip() for line in starter(self.name, self.kernel).splitlines()[1:])
+        return page(
+            paragraph(f"{self.name}: {self.kernel.doc}"),
+            paragraph(f"Source: {self.kernel.source}" if self.kernel.source else ""),
+            *(table.text() for table in self._tables()),
+            f"a study to begin with\n{example}",
+        )
+
+    def _repr_html_(self) -> str:
+        head = f"<p><b>{escape(self.name)}</b>: {escape(self.kernel.doc)}</p>"
+        return head + "".join(table.html() for table in self._tables())
+
+    def _tables(self) -> list[Table]:
+        kernel = self.kernel
+        parameters = [
+            (*_unit(f), limits(f), _default(f), f.doc + _along(f, ", one for each ")) for f in kernel.parameters
+        ]
+        outputs = [(*_unit(f), _along(f, "along "), f.doc) for f in kernel.outputs]
+        methods = [
+            (
+                method.name,
+                "states its error" if method.bound else "keeps rtol",
+                method.doc
+                + (f"; cannot do {listed(method.excludes)}" if method.excludes else "")
+                + (f"; does not give {listed(method.lacks)}" if method.lacks else ""),
+            )
+            for method in kernel.methods
+        ]
+        cheapest = 'methods, cheapest first; "auto" takes the first whose error bound meets rtol'
+        shared = [(*_unit(f), limits(f), f.doc) for f in kernel.along]
+        return [
+            Table(parameters, ("parameter", "unit", "allowed", "default", "meaning"), "parameters"),
+            Table(outputs, ("output", "unit", "", "meaning"), "outputs"),
+            Table(shared, ("coordinate", "unit", "allowed", "meaning"), "coordinates that all cells share"),
+            Table(methods, ("method", "error", "how"), cheapest),
+        ]
 
 
-def kernel_text(name: str, allow_import: bool = False) -> str:
-    """All about one kernel, and a study to begin with. Raises SweepError."""
-    kernel = load_kernel(name, allow_import)
-    return page(
-        paragraph(f"{name}: {kernel.doc}"),
-        paragraph(f"Source: {kernel.source}" if kernel.source else ""),
-        section("parameters", map(_parameter, kernel.parameters)),
-        section("outputs", map(_output, kernel.outputs)),
-        section("coordinates that all cells share", map(_coordinate, kernel.along)),
-        section(
-            'methods, cheapest first; "auto" takes the first whose error bound meets rtol', map(_method, kernel.methods)
-        ),
-        "a study to begin with\n" + "\n".join(f"  {line}".rstrip() for line in _example(name, kernel).splitlines()),
-    )
+class Catalogue(Mapping[str, KernelPage]):
+    """All kernels of the catalogue by name."""
+
+    def __getitem__(self, name: str) -> KernelPage:
+        if name not in catalogue.KERNELS:
+            raise KeyError(name)
+        return KernelPage(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(catalogue.KERNELS)
+
+    def __len__(self) -> int:
+        return len(catalogue.KERNELS)
+
+    def __repr__(self) -> str:
+        return catalogue_text()
+
+    def _repr_html_(self) -> str:
+        rows = [(name, _first(one.kernel), ", ".join(m.name for m in one.kernel.methods)) for name, one in self.items()]
+        return Table(rows, ("kernel", "scene", "methods")).html()
 
 
-def write_starter(name: str, path: Path, allow_import: bool = False) -> None:
-    """Write a study of a kernel to begin with. Raises SweepError; a file that is there is left alone.
+def kernels(name: str | None = None, allow_import: bool = False) -> Catalogue | KernelPage:
+    """What can be swept: all kernels of the catalogue, or one of them with parameters, units, outputs and methods.
+
+    Parameters
+    ----------
+    name : str, optional
+        Of the catalogue, or "module:NAME".
+    allow_import : bool
+        Allow "module:NAME", whose module is imported.
+
+    Raises
+    ------
+    SweepError
+        There is no such kernel.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> list(sweep.kernels())[:3]
+    ['foliot', 'foliot_motion', 'foliot_ripple']
+    >>> sweep.kernels("foliot").kernel.parameter("mu").unit
+    'rad/s^2'
+    """
+    return Catalogue() if name is None else KernelPage(name, allow_import)
+
+
+def catalogue_text(complete: bool = False) -> str:
+    """A line for each kernel; by wish its parameters, outputs and methods as well, and all statuses."""
+    if not complete:
+        rest = "`sweep kernels NAME` describes one of them, `sweep kernels --all` all of them and the statuses."
+        return page(
+            Table((name, _first(load_kernel(name))) for name in catalogue.KERNELS).text(indent=""), paragraph(rest)
+        )
+    texts = []
+    for name in catalogue.KERNELS:
+        kernel = load_kernel(name)
+        parameters = (
+            f"{f.name} [{f.unit}]" + ("" if f.default is None else f" = {_default(f, '')}") for f in kernel.parameters
+        )
+        rows = [
+            ("parameters", ", ".join(parameters)),
+            ("outputs", ", ".join(f"{f.name} [{f.unit}]{_along(f, ' along ')}" for f in kernel.outputs)),
+            ("methods", ", ".join(method.name for method in kernel.methods)),
+        ]
+        texts.append(paragraph(f"{name}: {_first(kernel)}") + "\n" + Table(rows).text())
+    kinds = {kind: ", ".join(status.name for status in Status if status.kind == kind) for kind in KINDS}
+    statuses = Table(((kind, f"{KINDS[kind]}: {names}") for kind, names in kinds.items()), title="statuses of cells")
+    return page(*texts, statuses.text())
+
+
+def write_starter(name: str, path: Path, allow_import: bool = False, force: bool = False) -> None:
+    """Write a study of a kernel to begin with. Raises SweepError, also where a file is there, unless by `force`.
 
     A kernel of one's own is looked up in the folder of the study, as it is when the study is run.
     """
-    text = starter(name, allow_import, path.parent)
+    from sweep.file.overwriting import check_target
+
+    text = starter(name, load_kernel(name, allow_import, [path.parent]))
+    check_target(path, force=force)
     try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        raise SweepError(f"{path} is there already; name another file") from None
+        path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise SweepError(f"{path} cannot be written: {error.strerror}") from None
 
 
-def starter(name: str, allow_import: bool = False, folder: Path = Path()) -> str:
-    """A study of a kernel to begin with, in TOML. Raises SweepError."""
-    kernel = load_kernel(name, allow_import, [folder])
-    question = f"{kernel.doc[0].upper()}{kernel.doc.splitlines()[0][1:]}: how does it change with its parameters?"
-    return f"# {question}\n{_example(name, kernel)}\n"
-
-
-def _short(name: str) -> str:
-    try:
-        kernel = load_kernel(name)
-    except SweepError as error:
-        return f"{name}\n  {error}"
-    rows = [
-        ("parameters", ", ".join(map(_name_and_default, kernel.parameters))),
-        ("outputs", ", ".join(f"{o.name} [{o.unit}]{_along(o)}" for o in kernel.outputs)),
-        ("methods", ", ".join(m.name for m in kernel.methods)),
-    ]
-    return paragraph(f"{name}: {kernel.doc.splitlines()[0]}") + f"\n{columns(rows)}"
-
-
-def _kind(kind: str) -> tuple[str, ...]:
-    return kind, f"{KINDS[kind]}: {', '.join(status.name for status in Status if status.kind == kind)}"
-
-
-def _name_and_default(field: Field) -> str:
-    return f"{field.name} [{field.unit}]" + ("" if field.default is None else f" = {_default(field)}")
-
-
-def _parameter(field: Field) -> tuple[str, ...]:
-    default = "required" if field.default is None else f"default {_default(field)}"
-    doc = field.doc + _along(field).replace(" along", ", one for each")
-    return field.name, f"[{field.unit}]", limits(field), default, doc
-
-
-def _output(field: Field) -> tuple[str, ...]:
-    return field.name, f"[{field.unit}]", _along(field).strip(), field.doc
-
-
-def _coordinate(field: Field) -> tuple[str, ...]:
-    return field.name, f"[{field.unit}]", limits(field), field.doc
-
-
-def _method(method: Method) -> tuple[str, ...]:
-    cannot = f"; cannot do {listed(method.excludes)}" if method.excludes else ""
-    lacks = f"; does not give {listed(method.lacks)}" if method.lacks else ""
-    return method.name, "states its error" if method.bound else "keeps rtol", method.doc + cannot + lacks
-
-
-def _along(field: Field) -> str:
-    return f" along {listed(field.dims, word='and')}" if field.dims else ""
-
-
-def _default(field: Field) -> str:
-    if field.default is None or isinstance(field.default, str):
-        return field.default or "required"
-    words = {float(number): word for word, number in field.choices.items()}
-    return words.get(field.default, f"{field.default:g}")
-
-
-def _example(name: str, kernel: Kernel) -> str:
-    """A study that sweeps the first parameter that is a number."""
+def starter(name: str, kernel: Kernel | None = None) -> str:
+    """A study of a kernel to begin with, in TOML: it sweeps the first parameter that is a number. Raises SweepError."""
+    kernel = kernel or load_kernel(name)
     first = next(p for p in kernel.parameters if not p.dims)
     values = {p.name: kernel.example.get(p.name, 1.0) for p in kernel.parameters}
+    question = f"{kernel.doc[0].upper()}{_first(kernel)[1:]}: how does it change with its parameters?"
+    lines = [f"# {question}", f'kernel = "{name}"', ""]
+    lines += [f"[axes.{first.name}]", *_axis(first, values[first.name])]
     fixed = [p for p in kernel.parameters if p is not first and (p.default is None or p.name in kernel.example)]
-    lines = [f'kernel = "{name}"', "", *_axis(first, values[first.name])]
-    if fixed:
-        lines += ["", "[fixed]", *(_entry(p, values[p.name]) for p in fixed)]
+    lines += ["", "[fixed]"] if fixed else []
+    for field in fixed:
+        value = values[field.name]
+        text = f"[{', '.join(f'{v:g}' for v in np.atleast_1d(value))}]" if field.dims else f"{value:g}"
+        entry = f'"{next(iter(field.choices))}"' if field.choices else f'{{ value = {text}, unit = "{field.unit}" }}'
+        lines.append(f"{field.name} = {entry}")
     for field in kernel.along:
         lines += ["", f"[along.{field.name}]", *_range(field)]
-    return "\n".join(lines)
+    return "\n".join(lines) + "\n"
 
 
 def _axis(field: Field, middle: Any) -> Iterable[str]:
-    yield f"[axes.{field.name}]"
     if field.choices:
-        yield f"values = [{quoted(field.choices)}]"
-    elif field.integer:
-        yield f"values = [{', '.join(f'{max(field.lower, 1) + i:g}' for i in range(3))}]"
-    elif field.unit == "m":  # machines keep their kind when a length is changed by a fifth, not by ten
-        yield from _spaced("linear", 0.8 * middle, 1.2 * middle, 41, "m")
-    else:
-        yield from _spaced("log", middle / 10, middle * 10, 41, field.unit)
-
-
-def _entry(field: Field, value: Any) -> str:
-    if field.choices:
-        return f'{field.name} = "{next(iter(field.choices))}"'
-    text = f"[{', '.join(f'{v:g}' for v in value)}]" if field.dims else f"{value:g}"
-    return f'{field.name} = {{ value = {text}, unit = "{field.unit}" }}'
+        return [f"values = [{quoted(field.choices)}]"]
+    if field.integer:
+        return [f"values = [{', '.join(f'{max(field.lower, 1) + i:g}' for i in range(3))}]"]
+    if field.unit == "m":  # machines keep their kind when a length is changed by a fifth, not by ten
+        return _spaced("linear", 0.8 * middle, 1.2 * middle, 41, "m")
+    return _spaced("log", middle / 10, middle * 10, 41, field.unit)
 
 
 def _range(field: Field) -> Iterable[str]:
@@ -158,3 +200,23 @@ def _range(field: Field) -> Iterable[str]:
 
 def _spaced(spacing: str, start: float, stop: float, num: int, unit: str) -> list[str]:
     return [f'spacing = "{spacing}"', f"start = {start:g}", f"stop = {stop:g}", f"num = {num}", f'unit = "{unit}"']
+
+
+def _first(kernel: Kernel) -> str:
+    return kernel.doc.splitlines()[0]
+
+
+def _unit(field: Field) -> tuple[str, str]:
+    return field.name, f"[{field.unit}]"
+
+
+def _along(field: Field, words: str) -> str:
+    return f"{words}{listed(field.dims, word='and')}" if field.dims else ""
+
+
+def _default(field: Field, word: str = "default ") -> str:
+    if field.default is None:
+        return "required"
+    words = {float(number): choice for choice, number in field.choices.items()}
+    value = field.default
+    return word + (value if isinstance(value, str) else words.get(value, f"{value:g}"))

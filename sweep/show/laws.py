@@ -1,11 +1,11 @@
-"""What `sweep fit` prints: power laws along one axis, one line for each combination of the other axes."""
+"""What `sweep fit` prints: power laws along one axis, a row for each line; with `--compare` all laws of one line."""
 
 from __future__ import annotations
 
 import csv
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,28 +15,36 @@ import numpy as np
 from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.errors import SweepError
 from sweep.file import disk
+from sweep.results.statuses import flag_words
 from sweep.show.view import preferred
-from sweep.words import cell, columns, did_you_mean, listed, page
+from sweep.words import Table, cell, did_you_mean, listed, page, paragraph
 
 if TYPE_CHECKING:
     import xarray as xr
 
 MOST_ROWS = 40
-
 WORST_MISFIT = 0.1
 """Relative distance of a point beyond which a report does not speak of two laws."""
-
+RULED_OUT = 10.0
+"""AICc above that of the best law from which a law is ruled out."""
+REST = "Points, drift, residual, prefactor, and what the columns mean: --all; other laws: --compare."
 EXPLANATION = (
-    "The interval is of {confidence:g} % confidence where the values scatter, and never less than for scatter that "
-    "remembers the point before; where they do not, it is what the stated errors can do. Where p runs from one value "
-    "to another, one power law does not fit, and these are the ends of the local exponent in the window. A second law "
-    "is told where AICc and BIC prefer it by more than 10; --compare tries other laws. Drift is how far the exponent "
-    "changes across the window; residual is the largest relative distance of a point from the curve."
+    "If the values scatter, the interval contains the exponent with {confidence:g} % confidence, and is never "
+    "narrower than for autocorrelated scatter; if they do not, it is what their stated error bounds allow. Where p "
+    "runs from one value to another, one power law does not fit, and these are the ends of the local exponent in the "
+    "window. A second law is reported if AICc and BIC prefer it by more than 10. Drift is the change of the exponent "
+    "across the window; residual is the largest relative distance of a point from the law."
+)
+COMPARED = (
+    "The smaller AICc, the better a law describes the points for the numbers that it fits. A law whose AICc is more "
+    "than 10 above the best is ruled out; of the others, the one that fits the fewest numbers is chosen. Errors of "
+    "exponents hold for independent scatter. A chance of runs below 0.001 says that a law misses the points "
+    "systematically."
 )
 
 
 def pick(dataset: xr.Dataset, choices: Sequence[str]) -> xr.Dataset:
-    """The part of a result where axes have the given values.
+    """The part of a result where axes have the given values, up to rounding in the sixth digit.
 
     Parameters
     ----------
@@ -56,11 +64,32 @@ def pick(dataset: xr.Dataset, choices: Sequence[str]) -> xr.Dataset:
         if name not in axes:
             hint = did_you_mean(name, axes) or f"; there are {listed(axes, word='and')}"
             raise SweepError(f"--at {choice}: no axis {name}{hint}")
-        coordinate = dataset[name]
-        found = _positions(coordinate, value, choice)
-        dim = str(coordinate.dims[0])
+        values, dim = dataset[name].values, str(dataset[name].dims[0])
+        if values.dtype.kind in "fiu":
+            try:
+                off = abs(values - float(value))
+            except ValueError:
+                raise SweepError(f"--at {choice}: expected a number after =") from None
+            # six digits are what `sweep show` and `sweep run` print
+            found = np.flatnonzero(np.isclose(values, float(value), rtol=1e-5, atol=0, equal_nan=True))
+            found = found[np.argsort(off[found], kind="stable")]
+            nearest = listed(f"{v:.6g}" for v in values[np.argsort(off)[:2]])
+        else:
+            found = np.flatnonzero(values.astype(str) == value)
+            nearest = listed(dict.fromkeys(map(str, values)), quote=True)
+        if not len(found):
+            raise SweepError(f"--at {choice}: {name} has no such value; nearest is {nearest}")
         dataset = dataset.isel({dim: found[0] if dim == name else found})
     return dataset
+
+
+def output_of(dataset: xr.Dataset, y: str | None) -> str:
+    """The output `y`, by default the one that is drawn. Raises SweepError where there is no such output."""
+    outputs = [str(name) for name in dataset.data_vars if name not in ANCILLARY]
+    if y is not None and y not in outputs:
+        hint = did_you_mean(y, outputs) or f"; there are {listed(outputs, word='and')}"
+        raise SweepError(f"--y {y}: no such output{hint}")
+    return preferred(outputs) if y is None else y
 
 
 @dataclass(frozen=True)
@@ -76,6 +105,11 @@ class Laws:
     remark: str = ""
     """What became of cells that are not OK."""
 
+    @property
+    def explanation(self) -> str:
+        """What the columns mean."""
+        return EXPLANATION.format(confidence=100 * self.confidence)
+
 
 def laws(
     dataset: xr.Dataset,
@@ -88,175 +122,143 @@ def laws(
     """What `sweep fit` finds; `y` and `noise` as of `output_of` and `fit_exponent`. Raises SweepError."""
     from sweep.laws.curves import stated_error
     from sweep.laws.lines import crossover, fit_exponent
+    from sweep.laws.two_laws import FEWEST_POINTS, fit_two_laws
 
     y = output_of(dataset, y)
     if len(windows) > 2:
         raise SweepError(f"--window: expected one or two, found {len(windows)}")
     limits: list[tuple[float, float] | None] = [*sorted((low, high) for low, high in windows)] or [None]
-    keys: dict[str, Any] = {"confidence": confidence, "noise": noise, "bound": stated_error(dataset, y)}
-    fits = tuple(fit_exponent(dataset[y], x, window, **keys) for window in limits)
+    column, keys = dataset[y], {"confidence": confidence, "noise": noise}
+    bound = stated_error(dataset, y)
+    fits = tuple(fit_exponent(column, x, window, bound=bound, **keys) for window in limits)  # type: ignore[arg-type]
+    meeting = crossover(fits[0], fits[1]) if len(fits) == 2 else None
+    bend = None
+    if meeting is None and column.sizes[str(column[x].dims[0])] >= FEWEST_POINTS:
+        try:
+            bend = fit_two_laws(column, x, limits[0], **keys)  # type: ignore[arg-type]
+        except SweepError:  # the window leaves too few points
+            pass
+        else:
+            bend = bend if bool((bend.regimes == 2).any()) else None
     remark = " ".join(filter(None, (dataset.attrs.get("lines", ""), _remark(dataset, y))))
-    if len(fits) == 2:
-        return Laws(y, x, fits, None, crossover(fits[0], fits[1]), confidence, remark)
-    return Laws(y, x, fits, _bend(dataset[y], x, limits[0], confidence, noise), None, confidence, remark)
-
-
-def output_of(dataset: xr.Dataset, y: str | None) -> str:
-    """The output `y`, by default the one that is drawn. Raises SweepError where there is no such output."""
-    outputs = [str(name) for name in dataset.data_vars if name not in ANCILLARY]
-    if y is None:
-        return preferred(outputs)
-    if y not in outputs:
-        hint = did_you_mean(y, outputs) or f"; there are {listed(outputs, word='and')}"
-        raise SweepError(f"--y {y}: no such output{hint}")
-    return y
+    return Laws(y, x, fits, bend, meeting, confidence, remark)
 
 
 def _remark(dataset: xr.Dataset, y: str) -> str:
     """Cells that are not OK, by status; those with a value are in the fit."""
-    from sweep.results.statuses import flag_words
-
     if STATUS not in dataset or dataset[y].dims != dataset[STATUS].dims:
         return ""
     status, valued, words = dataset[STATUS].values, dataset[y].notnull().values, flag_words(dataset[STATUS])
     parts = []
     for code in np.unique(status[status != 0]).tolist():
-        here = status == code
-        counts = {"in the fit": int((here & valued).sum()), "left out": int((here & ~valued).sum())}
-        parts += [f"{count} {words.get(code, code)} ({fate})" for fate, count in counts.items() if count]
+        for cells, fate in ((valued, "in the fit"), (~valued, "left out")):
+            if count := int((cells & (status == code)).sum()):
+                parts.append(f"{count} {words.get(code, code)} ({fate})")
     return f"Of {status.size} cells: {', '.join(parts)}." if parts else ""
 
 
-def _bend(
-    y: xr.DataArray, x: str, window: tuple[float, float] | None, confidence: float, noise: bool | str | None
-) -> xr.Dataset | None:
-    """Two laws, where any line has points enough for them and is not straight."""
-    from sweep.laws.two_laws import FEWEST_POINTS, fit_two_laws
-
-    if y.sizes[str(y[x].dims[0])] < FEWEST_POINTS:
-        return None
-    try:
-        found = fit_two_laws(y, x, window, confidence=confidence, noise=noise)
-    except SweepError:  # the window leaves too few points
-        return None
-    return found if bool((found.regimes == 2).any()) else None
-
-
-def laws_text(found: Laws) -> str:
-    """The laws as people read them."""
-    texts = [_table(f"{found.y} ~ {found.x}^p", _heading(found.fits[0]), found.fits, _fit_cells)]
+def laws_text(found: Laws, complete: bool = False) -> str:
+    """The laws as people read them: exponents and their intervals; by wish all columns and what they mean."""
+    keep = None if complete else 3
+    rest = ("points", "drift", "residual", f"{found.y} at {found.x} = 1")
+    rows = [(labels, _fit_cells(one)) for fit in found.fits for labels, one in _lines(fit)]
+    texts = [_table(f"{found.y} ~ {found.x}^p", found.fits[0], ("window", "p", "interval", *rest), rows, keep)]
     if found.bend is not None:
-        heading = (*_dims(found.bend, "law"), "p low", "interval", "p high", "interval", found.x, "interval", "bend")
-        texts.append(_table("two laws with a smooth bend", heading, [found.bend], _bend_cells))
+        heading = ("p low", "interval", "p high", "interval", f"{found.x} between", "interval", "bend")
+        rows = [(labels, _bend_cells(one)) for labels, one in _lines(found.bend, "law")]
+        texts.append(_table("two laws with a smooth bend", found.bend, heading, rows, None if complete else 5))
     if found.meeting is not None:
-        heading = (*_dims(found.meeting), found.x, "", found.y)
-        texts.append(_table("the two laws meet", heading, [found.meeting], _meeting_cells))
-    notes = [text for text in (found.remark, explanation(found.confidence)) if text]
-    return page(*texts, *(columns([(text,)], indent="") for text in notes))
+        rows = [(labels, _meeting_cells(one)) for labels, one in _lines(found.meeting)]
+        texts.append(_table("the two laws meet", found.meeting, (found.x, "", found.y), rows))
+    return page(*texts, *map(paragraph, (found.remark, found.explanation if complete else REST)))
+
+
+def _table(
+    title: str,
+    of: xr.Dataset,
+    heading: Sequence[str],
+    rows: Sequence[tuple[Sequence[str], Sequence[str]]],
+    keep: int | None = None,
+) -> str:
+    """At most `MOST_ROWS` rows, each of a line's place on the other axes and the first cells of what is fitted."""
+    shown = [(*labels, *cells[:keep]) for labels, cells in rows[:MOST_ROWS]]
+    text = Table(shown, (*_dims(of, "law"), *heading[:keep]), title).text()
+    more = len(rows) - MOST_ROWS
+    return text + (f"\n  and {more} more; choose with --at axis=value" if more > 0 else "")
 
 
 def law_rows(found: Laws) -> Iterator[tuple[str, ...]]:
-    """Output, where, exponent, interval and largest distance: a line for one law, two lines for two with a bend."""
-    bend = found.bend
-    for labels, fit in _points(found.fits[0]):
-        where = ", ".join(f"{dim} = {label}" for dim, label in zip(_dims(found.fits[0]), labels, strict=True))
+    """Output, where, exponent, interval and largest distance: a row for one law, two rows for two with a bend."""
+    dims, bend = _dims(found.fits[0]), found.bend
+    for labels, fit in _lines(found.fits[0]):
+        where = ", ".join(f"{dim} = {label}" for dim, label in zip(dims, labels, strict=True))
         name = f"{found.y} ({where})" if where else found.y
         both = None if bend is None else bend.sel({d: fit[d] for d in _dims(bend, "law") if d in fit.coords})
         if both is None or both.exponent.ndim != 1 or both.regimes.item() != 2 or both.residual.item() > WORST_MISFIT:
             window, exponent, interval, _, _, residual, _ = _fit_cells(fit)
             yield name, f"{found.x} {window}", exponent, interval, residual
             continue
-        for law, sign in (("low", "<<"), ("high", ">>")):
-            one = both.sel(law=law)
-            interval = _interval(one.exponent_low.item(), one.exponent_high.item())
-            place, off = f"{found.x} {sign} {one.crossover.item():.3g}", f"{one.residual.item():.1e}"
-            yield name, place, f"{one.exponent.item():.6g}", interval, off
-
-
-def explanation(confidence: float) -> str:
-    """What intervals, drift and residual mean."""
-    return EXPLANATION.format(confidence=100 * confidence)
+        cells = _bend_cells(both)
+        for sign, exponent, interval in (("<<", *cells[:2]), (">>", *cells[2:4])):
+            yield (
+                name,
+                f"{found.x} {sign} {both.crossover.item():.3g}",
+                exponent,
+                interval,
+                f"{both.residual.item():.1e}",
+            )
 
 
 def write_laws(found: Laws, path: Path) -> None:
     """The laws as csv: a row for each line and window; of two laws a row each. Raises SweepError."""
-    rows = [row for fit in found.fits for row in _table_rows(fit, "one")]
+    parts = [(fit, "one") for fit in found.fits]
     if found.bend is not None:
-        rows += [row for law in ("low", "high") for row in _table_rows(found.bend.sel(law=law), law)]
+        parts += [(found.bend.sel(law=law), law) for law in ("low", "high")]
     if found.meeting is not None:
-        rows += list(_table_rows(found.meeting, "meeting"))
-    rows = [{cell(name): cell(value) for name, value in row.items()} for row in rows]
+        parts.append((found.meeting, "meeting"))
+    rows: list[dict[str, Any]] = []
+    for fit, law in parts:
+        for labels, one in _lines(fit):
+            place = {"y": fit.attrs["y"], "x": fit.attrs["x"], "law": law, **dict(zip(_dims(fit), labels, strict=True))}
+            rows.append(place | _numbers(one))
+    _write(rows, path)
+
+
+def _write(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     names = list(dict.fromkeys(name for row in rows for name in row))
     with disk.replacing(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, names, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-
-
-def _table_rows(fit: xr.Dataset, law: str) -> Iterator[dict[str, Any]]:
-    for labels, point in _points(fit):
-        start = {"y": fit.attrs["y"], "x": fit.attrs["x"], "law": law, **dict(zip(_dims(fit), labels, strict=True))}
-        yield start | {str(name): variable.item() for name, variable in point.data_vars.items()}
-
-
-def _positions(coordinate: xr.DataArray, value: str, choice: str) -> Any:
-    """Positions along an axis that have the value, up to rounding in its sixth digit."""
-    values = coordinate.values
-    if values.dtype.kind not in "fiu":
-        found = np.flatnonzero(values.astype(str) == value)
-        shown = listed(dict.fromkeys(map(str, values)), quote=True)
-    else:
-        try:
-            wanted = float(value)
-        except ValueError:
-            raise SweepError(f"--at {choice}: expected a number after =") from None
-        # six digits are what `sweep show` and `sweep run` print
-        found = np.flatnonzero(np.isclose(values, wanted, rtol=1e-5, atol=0, equal_nan=True))
-        found = found[np.argsort(np.abs(values[found] - wanted), kind="stable")]
-        nearest = values[np.argsort(np.abs(values - wanted))[:2]]
-        shown = listed(f"{v:.6g}" for v in nearest)
-    if not len(found):
-        raise SweepError(f"--at {choice}: {coordinate.name} has no such value; nearest is {shown}")
-    return found
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(map(cell, names))
+        writer.writerows([cell(row.get(name, "")) for name in names] for row in rows)
 
 
 def _dims(dataset: xr.Dataset, *without: str) -> list[str]:
     return [str(dim) for dim in dataset.sizes if dim not in without]
 
 
-def _heading(fit: xr.Dataset) -> tuple[str, ...]:
-    at_one = f"{fit.attrs['y']} at {fit.attrs['x']} = 1"
-    return (*_dims(fit), "window", "p", "interval", "points", "drift", "residual", at_one)
+def _numbers(one: xr.Dataset) -> dict[str, Any]:
+    return {str(name): variable.item() for name, variable in one.data_vars.items()}
 
 
-def _table(title: str, heading: Sequence[str], datasets: Sequence[xr.Dataset], cells: Any) -> str:
-    """A line for each point of each Dataset, at most `MOST_ROWS` of them."""
-    points = [point for dataset in datasets for point in _points(dataset, "law")]
-    rows = [(*labels, *cells(point)) for labels, point in points[:MOST_ROWS]]
-    more = f"\n  and {len(points) - MOST_ROWS} more; choose with --at axis=value" * (len(points) > MOST_ROWS)
-    return f"{title}\n{columns([heading, *rows])}{more}"
-
-
-def _points(dataset: xr.Dataset, *without: str) -> Iterator[tuple[list[str], xr.Dataset]]:
+def _lines(dataset: xr.Dataset, *without: str) -> Iterator[tuple[list[str], xr.Dataset]]:
+    """Each line's place on the other axes, as people write it (a number where it has no name), and what is of it."""
     dims = _dims(dataset, *without)
     for position in itertools.product(*(range(dataset.sizes[dim]) for dim in dims)):
         places = dict(zip(dims, position, strict=True))
-        point = dataset.isel(places)
-        yield [_label(point, dim, i) for dim, i in places.items()], point
-
-
-def _label(point: xr.Dataset, dim: str, place: int) -> str:
-    """A value of an axis; of a dimension that has none its number."""
-    value = point[dim].item() if dim in point.coords else str(place)
-    return value if isinstance(value, str) else f"{value:.6g}"
+        one = dataset.isel(places)
+        values = (one[dim].item() if dim in one.coords else str(place) for dim, place in places.items())
+        yield [value if isinstance(value, str) else f"{value:.6g}" for value in values], one
 
 
 def _fit_cells(fit: xr.Dataset) -> tuple[str, ...]:
-    v = {str(name): variable.item() for name, variable in fit.data_vars.items()}
+    v = _numbers(fit)
+    low, high = v["exponent_low"], v["exponent_high"]
+    # of an exponent that does not fit, as many digits as the range of the local one has in common
+    digits = 8 if v["fits"] == 1 else 3 if abs(high - low) < 0.1 * abs(v["exponent"]) else 2
     return (
         f"{v['low']:.4g} to {v['high']:.4g}",
-        f"{v['exponent']:.{8 if v['fits'] == 1 else _digits(**v)}g}",
-        ("" if v["fits"] == 1 else "runs from ") + _interval(v["exponent_low"], v["exponent_high"]),
+        f"{v['exponent']:.{digits}g}",
+        ("" if v["fits"] == 1 else "runs from ") + _interval(low, high),
         f"{v['points']}",
         f"{v['drift']:.1e}",
         f"{v['residual']:.1e}",
@@ -264,24 +266,17 @@ def _fit_cells(fit: xr.Dataset) -> tuple[str, ...]:
     )
 
 
-def _digits(exponent: float, exponent_low: float, exponent_high: float, **_: float) -> int:
-    """Of an exponent that does not fit: as many as the range of the local one has in common, two or three."""
-    return 3 if abs(exponent_high - exponent_low) < 0.1 * abs(exponent) else 2
-
-
 def _interval(low: float, high: float) -> str:
     """Both ends, with as many digits as tell them apart, and two more."""
-    apart = abs(high - low)
-    digits = (
-        8 if not math.isfinite(apart) or apart == 0 else 2 - math.floor(math.log10(apart / max(abs(low), abs(high))))
-    )
-    digits = max(3, min(digits, 15))
+    apart, digits = abs(high - low), 8
+    if math.isfinite(apart) and apart > 0:
+        digits = max(3, min(2 - math.floor(math.log10(apart / max(abs(low), abs(high)))), 15))
     return f"{low:.{digits}g} to {high:.{digits}g}"
 
 
 def _bend_cells(bend: xr.Dataset) -> tuple[str, ...]:
     if bend.regimes.item() != 2:
-        return *("-",) * 6, "one law does as well"
+        return *("-",) * 4, "one law does as well", "-", "-"
     cells = []
     for law in ("low", "high"):
         one = bend.sel(law=law)
@@ -292,5 +287,49 @@ def _bend_cells(bend: xr.Dataset) -> tuple[str, ...]:
 
 
 def _meeting_cells(meeting: xr.Dataset) -> tuple[str, ...]:
-    v = {str(name): variable.item() for name, variable in meeting.data_vars.items()}
+    v = _numbers(meeting)
     return f"{v['abscissa']:.6g}", f"+- {v['abscissa_error']:.1e}", f"{v['ordinate']:.6g}"
+
+
+def comparison(dataset: xr.Dataset, y: str | None, x: str, windows: Sequence[Sequence[float]] = ()) -> xr.Dataset:
+    """`compare_laws` of one line of a result. Raises SweepError, also where other axes are left."""
+    from sweep.laws.compare import compare_laws
+
+    y = output_of(dataset, y)
+    if len(windows) > 1:
+        raise SweepError(f"--window: with --compare expected one, found {len(windows)}")
+    rest = [str(dim) for dim in dataset[y].dims if x not in dataset.coords or dim not in dataset[x].dims]
+    rest = [dim for dim in rest if dataset.sizes[dim] > 1]
+    if rest:
+        how = dataset.attrs.get("lines") or f"choose with --at {rest[0]}=value"
+        raise SweepError(f"--compare: {y} also runs along {', '.join(rest)}; {how}")
+    window = tuple(windows[0]) if windows else None
+    return compare_laws(dataset[y].squeeze(), x, window)  # type: ignore[arg-type]
+
+
+def comparison_text(found: xr.Dataset, complete: bool = False) -> str:
+    """Which laws are ruled out, and the verdict; by wish all columns and what they mean."""
+    rows = []
+    for law, one in _laws_of(found):
+        told = "ruled out" if one["worse"] > RULED_OUT else str(one["exponents"])
+        runs = "-" if np.isnan(one["runs"]) else f"{one['runs']:.2g}" if one["runs"] >= 1e-4 else "< 1e-4"
+        more = (f"{one['bic'] - float(found.bic.min()):.4g}", str(one["numbers"]), runs) if complete else ()
+        rows.append((law, f"{one['worse']:.4g}", *more, f"{one['residual']:.1e}", told))
+    heading = ("law", "AICc worse by", *(("BIC", "numbers", "chance of runs") if complete else ()), "residual")
+    title = f"{found.attrs['y']} over {found.attrs['x']}, {found.sizes['point']} points"
+    notes = (f"Chosen: {found.attrs['verdict']}.", COMPARED if complete else "BIC and more, and what it means: --all.")
+    return page(Table(rows, (*heading, "exponents"), title).text(), *map(paragraph, notes))
+
+
+def write_comparison(found: xr.Dataset, path: Path) -> None:
+    """The table as csv, a row for each law. Raises SweepError."""
+    start = {"y": found.attrs["y"], "x": found.attrs["x"]}
+    _write(
+        [start | {"law": law, "chosen": int(law == found.attrs["chosen"])} | one for law, one in _laws_of(found)], path
+    )
+
+
+def _laws_of(found: xr.Dataset) -> Iterable[tuple[str, dict[str, Any]]]:
+    names = [str(name) for name, variable in found.data_vars.items() if variable.dims == ("law",)]
+    for i, law in enumerate(found.law.values):
+        yield str(law), {name: found[name].values[i].item() for name in names}

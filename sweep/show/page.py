@@ -7,9 +7,10 @@ phone.
 from __future__ import annotations
 
 import base64
+import hashlib
 import io
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,29 +18,16 @@ from typing import TYPE_CHECKING
 from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.results.statuses import is_summary
-from sweep.show.laws import explanation, law_rows
-from sweep.show.text import Rows, head, outputs_of, sections
+from sweep.show.laws import law_rows, laws
+from sweep.show.text import head, outputs_of, sections, settings
+from sweep.words import Table
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from sweep.show.laws import Laws
-
 MOST_FIGURES = 6
 MOST_LINES = 8
 """Lines of a family whose exponents are given."""
-
-HEADINGS = {
-    "": (),
-    "axes": ("axis", "unit", "values", "from, to", "meaning"),
-    "reduced over": ("axis", "unit", "values", "from, to", "meaning"),
-    "fixed": ("parameter", "unit", "value", "meaning"),
-    "along": ("coordinate", "unit", "values", "from, to", "meaning"),
-    "outputs": ("output", "unit", "from, to", "meaning"),
-    "reductions": ("reduction", "unit", "value", "meaning"),
-    "status": ("cells", "status", "meaning, and where"),
-    "methods used": ("method", "cells", "share"),
-}
 
 STYLE = """
 :root { color-scheme: light; }
@@ -54,7 +42,7 @@ figure { margin: 0; break-inside: avoid; }
 figure img { width: 100%; height: auto; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .88rem; width: 100%; }
-th, td { text-align: left; vertical-align: top; padding: .25rem .8rem .25rem 0; border-bottom: 1px solid #e2e2e2; }
+th, td { vertical-align: top; padding: .25rem .8rem .25rem 0; border-bottom: 1px solid #e2e2e2; }
 th { font-weight: 600; border-bottom: 1px solid #888; white-space: nowrap; }
 td:first-child { white-space: nowrap; }
 td:last-child { min-width: 11rem; }
@@ -93,21 +81,19 @@ def write_page(dataset: xr.Dataset, result: Path, path: str | os.PathLike[str]) 
 def page(dataset: xr.Dataset, result: Path) -> str:
     """The page as text."""
     attrs = dataset.attrs
-    title = str(attrs.get("title") or result.stem)
-    name, *texts = head(Path(result.name), dataset)
-    tables = sections(dataset)
-    settings = tables.pop("")
+    title, study = str(attrs.get("title") or result.stem), str(attrs.get("study", ""))
+    fingerprint = hashlib.sha256(str(attrs.get("fingerprint", "")).encode()).hexdigest()[:16]
+    name, *texts, cells = head(Path(result.name), dataset)
     parts = [
         f"<h1>{escape(title)}</h1>",
-        *(f'<p class="question">{escape(text)}</p>' for text in texts[:-1] if text != title),
-        f'<p class="account">{escape(name)}. {escape(texts[-1])}.</p>',
-        *_figures(dataset),
-        *_exponents(dataset),
-        *(_section(heading, rows) for heading, rows in tables.items()),
+        *(f'<p class="question">{escape(text)}</p>' for text in texts if text != title),
+        f'<p class="account">{escape(name)}. {escape(cells)}.</p>',
+        *([] if is_summary(dataset) else [*_figures(dataset), *_exponents(dataset)]),
+        *(_wide(table) for table in sections(dataset)),
         "<h2>provenance</h2>",
-        _table((), settings),
-        *_study(attrs),
-        f'<p class="note">Fingerprint of study, sources and versions: <code>{escape(_fingerprint(attrs))}</code>.</p>',
+        _wide(settings(dataset)),
+        f"<h2>study</h2>\n<pre>{escape(study)}</pre>" if study else "",
+        f'<p class="note">Fingerprint of study, sources and versions: <code>{fingerprint}</code>.</p>',
     ]
     body = "\n".join(parts)
     return (
@@ -118,81 +104,52 @@ def page(dataset: xr.Dataset, result: Path) -> str:
     )
 
 
+def _wide(table: Table) -> str:
+    return f'<div class="wide">{table.html()}</div>'
+
+
 def _figures(dataset: xr.Dataset) -> Iterator[str]:
     """A picture of each of the first outputs that can be drawn."""
-    if is_summary(dataset):
-        return
-    names = [name for name in outputs_of(dataset) if bool(dataset[name].notnull().any())]
-    found = [picture for name in names[:MOST_FIGURES] if (picture := _picture(dataset, name))]
-    if found:
-        yield '<h2>figures</h2>\n<div class="figures">' + "\n".join(found) + "</div>"
-
-
-def _picture(dataset: xr.Dataset, name: str) -> str:
     from sweep.show.charts import style
     from sweep.show.plot import plot
 
-    try:
-        figure = plot(dataset.assign_attrs(title=""), y=name)
-    except SweepError:
-        return ""  # no axis of numbers, or no number to draw
-    store = io.BytesIO()
-    with style():
-        figure.savefig(store, format="png", dpi=220, metadata={"Software": None})
-    data = base64.b64encode(store.getvalue()).decode("ascii")
-    caption = escape(str(dataset[name].attrs.get("long_name", name)))
-    return (
-        f'<figure><img alt="{escape(name)}" src="data:image/png;base64,{data}">'
-        f"<figcaption>{escape(name)}: {caption}</figcaption></figure>"
-    )
+    found = []
+    for name in [name for name in outputs_of(dataset) if bool(dataset[name].notnull().any())][:MOST_FIGURES]:
+        store = io.BytesIO()
+        try:
+            figure = plot(dataset.assign_attrs(title=""), y=name)
+        except SweepError:
+            continue  # no axis of numbers, or no number to draw
+        with style():
+            figure.savefig(store, format="png", dpi=220, metadata={"Software": None})
+        data = base64.b64encode(store.getvalue()).decode("ascii")
+        caption = escape(f"{name}: {dataset[name].attrs.get('long_name', name)}")
+        image = f'<img alt="{escape(name)}" src="data:image/png;base64,{data}">'
+        found.append(f"<figure>{image}<figcaption>{caption}</figcaption></figure>")
+    if found:
+        yield '<h2>figures</h2>\n<div class="figures">' + "\n".join(found) + "</div>"
 
 
 def _exponents(dataset: xr.Dataset) -> Iterator[str]:
     """Power laws along the first logarithmic axis, of outputs that have a unit."""
     from sweep.laws.loglog import is_logarithmic
 
-    if is_summary(dataset):
-        return
-    axes = [str(d) for d in dataset["status"].dims if d in dataset.coords and dataset[d].dtype.kind in "fiu"]
+    status = dataset["status"]
+    axes = [str(d) for d in status.dims if d in dataset.coords and dataset[d].dtype.kind in "fiu"]
     axis = next((name for name in axes if is_logarithmic(dataset[name].values)), None)
-    if axis is None or dataset["status"].size // dataset.sizes[axis] > MOST_LINES:
+    if axis is None or status.size // dataset.sizes[axis] > MOST_LINES:
         return
-    names = [name for name in outputs_of(dataset) if dataset[name].attrs.get("units", "1") != "1"]
-    rows = [row for name in names if (found := _laws(dataset, name, axis)) for row in law_rows(found)]
+    rows, note = [], ""
+    for name in outputs_of(dataset):
+        output = dataset[name]
+        if output.attrs.get("units", "1") == "1" or output.dims != status.dims or not bool((output > 0).any()):
+            continue
+        try:
+            found = laws(dataset.where(output > 0), name, axis)
+        except SweepError:
+            continue
+        note = found.explanation
+        rows += list(law_rows(found))
     if rows:
-        head = ("output", "over", "exponent", "interval", "largest misfit")
-        note = explanation(0.95)
-        yield f"<h2>exponents in {escape(axis)}</h2>\n{_table(head, rows)}\n<p class='note'>{escape(note)}</p>"
-
-
-def _laws(dataset: xr.Dataset, name: str, axis: str) -> Laws | None:
-    from sweep.show.laws import laws
-
-    if dataset[name].dims != dataset["status"].dims or not bool((dataset[name] > 0).any()):
-        return None
-    try:
-        return laws(dataset.where(dataset[name] > 0), name, axis)
-    except SweepError:
-        return None
-
-
-def _section(title: str, rows: Rows) -> str:
-    return f"<h2>{escape(title)}</h2>\n{_table(HEADINGS.get(title, ()), rows)}"
-
-
-def _table(heading: Sequence[str], rows: Rows) -> str:
-    cells = "".join(f"<th>{escape(cell)}</th>" for cell in heading)
-    top = f"<thead><tr>{cells}</tr></thead>" if heading else ""
-    lines = ("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-    return f'<div class="wide"><table>{top}<tbody>{"".join(lines)}</tbody></table></div>'
-
-
-def _study(attrs: dict[str, object]) -> Iterator[str]:
-    if attrs.get("study"):
-        yield f"<h2>study</h2>\n<pre>{escape(str(attrs['study']))}</pre>"
-
-
-def _fingerprint(attrs: dict[str, object]) -> str:
-    import hashlib
-
-    return hashlib.sha256(str(attrs.get("fingerprint", "")).encode()).hexdigest()[:16]
+        table = Table(rows, ("output", "over", "exponent", "interval", "largest misfit"), f"exponents in {axis}")
+        yield f"{_wide(table)}\n<p class='note'>{escape(note)}</p>"

@@ -7,7 +7,8 @@ import shutil
 from pathlib import Path
 
 from sweep.errors import SweepError
-from sweep.words import columns, did_you_mean, listed
+from sweep.file.overwriting import check_target
+from sweep.words import Table, did_you_mean, listed
 
 HERE = Path(__file__).parents[1]
 FOLDERS = (HERE / "_studies", HERE.parent / "studies")
@@ -29,16 +30,13 @@ def names() -> list[str]:
     every = {path.stem for path in folder().glob("*") if path.suffix in (".toml", ".py")}
     own = {name for name in every if not name.startswith("_") and question(name).endswith("?")}
     # of several grids for one question the first one's name is the study's
-    return sorted(name for name in own if not any(name.startswith(f"{other}_") and _is_part(name) for other in own))
-
-
-def _is_part(name: str) -> bool:
-    return not (folder() / f"{name}.py").exists()
+    parts = {name for name in own if not (folder() / f"{name}.py").exists()}
+    return sorted(name for name in own if name not in parts or not any(name.startswith(f"{other}_") for other in own))
 
 
 def studies_text() -> str:
     """Every study and its question."""
-    return columns([("study", "question"), *((name, question(name)) for name in names())])
+    return Table([(name, question(name)) for name in names()], ("study", "question")).text()
 
 
 def question(name: str) -> str:
@@ -51,42 +49,31 @@ def question(name: str) -> str:
     return ""
 
 
-def copy_study(name: str, target: Path = Path()) -> list[Path]:
-    """Copy a study, its grids and its script with what that imports, and give the copies.
+def copy_study(name: str, target: Path = Path(), force: bool = False) -> list[Path]:
+    """Copy a study, its grids, and its script with those that it names, and give the copies.
 
     Raises
     ------
     SweepError
-        There is no such study, or a file of it is there already.
+        There is no such study, or another file is where one of it is to be, unless by `force`.
     """
-    if name not in names():
-        known = names()
-        raise SweepError(f'there is no study "{name}"{did_you_mean(name, known) or f"; there are {listed(known)}"}')
-    sources = _files(name)
+    place, own = folder(), names()
+    if name not in own:
+        raise SweepError(f'there is no study "{name}"{did_you_mean(name, own) or f"; there are {listed(own)}"}')
+    grids = sorted(p for p in place.glob(f"{name}_*.*") if p.suffix in (".toml", ".csv") and p.stem not in own)
+    waiting = [place / f"{name}.py", *reversed(grids), place / f"{name}.csv", place / f"{name}.toml"]
+    sources: list[Path] = []
+    while waiting:
+        path = waiting.pop()
+        if path.exists() and path not in sources:
+            sources.append(path)
+            words = NAMED.findall(path.read_text(encoding="utf-8"))
+            waiting += [path.with_name(f"{imported or kernel}.py") for imported, kernel in words]
     for source in sources:
-        if (target / source.name).exists() and not source.name.startswith("_"):
-            raise SweepError(f"{target / source.name} is there already; copy the study into another folder")
+        copy = target / source.name
+        same = copy.is_file() and copy.read_bytes() == source.read_bytes()
+        check_target(copy, force=force or same, read=[source])
     try:
         return [Path(shutil.copyfile(source, target / source.name)) for source in sources]
     except OSError as error:
         raise SweepError(f"{error.filename2 or error.filename}: {error.strerror}") from None
-
-
-def _files(name: str) -> list[Path]:
-    place, own = folder(), names()
-    found = [place / f"{name}.toml", place / f"{name}.csv"]
-    found += sorted(p for p in place.glob(f"{name}_*.*") if p.suffix in (".toml", ".csv") and p.stem not in own)
-    return _with_scripts([*found, place / f"{name}.py"])
-
-
-def _with_scripts(files: list[Path]) -> list[Path]:
-    """Those of the files that there are, and the scripts beside them that they name, and so on."""
-    found: dict[Path, None] = {}
-    waiting = list(reversed(files))
-    while waiting:
-        path = waiting.pop()
-        if path.exists() and path not in found:
-            found[path] = None
-            words = NAMED.findall(path.read_text(encoding="utf-8"))
-            waiting += [path.with_name(f"{imported or kernel}.py") for imported, kernel in words]
-    return list(found)

@@ -1,4 +1,4 @@
-"""What `sweep show` and the end of `sweep run` print: what is in a result, and what became of its cells."""
+"""What `sweep show` prints: what is in a result, and what became of its cells; as tables, which a page shows too."""
 
 from __future__ import annotations
 
@@ -24,103 +24,28 @@ from sweep.results.statuses import (
 )
 from sweep.show.follow import reasons
 from sweep.study.model import short
-from sweep.words import columns, page, paragraph, section
+from sweep.words import Table, page, paragraph
 
 if TYPE_CHECKING:
     import xarray as xr
 
 LARGEST_SCAN = 1 << 28
 """Bytes of an output up to which its smallest and largest value are looked up."""
-
 CELLS_AT_ONCE = 1 << 22
-FAILED = Status.FAILED.name
 MOST_FAILED = 20
-"""Cells that FAILED which are told one by one."""
+"""Cells that FAILED which are reported one by one."""
 
-
-Rows = list[tuple[str, ...]]
+Rows = Iterator[tuple[str, ...]]
 
 
 def result_text(path: Path, dataset: xr.Dataset) -> str:
     """All about a result."""
-    found = {**sections(dataset), f"{FAILED}, and why": list(_failed(Path(path), dataset))}
-    parts = [(title, rows) for title, rows in found.items() if rows]
     return page(
         paragraph("\n".join(head(path, dataset))),
-        *(section(title, rows) if title else columns(rows) for title, rows in parts),
+        settings(dataset).text(),
+        *(table.text() for table in sections(dataset)),
+        Table(_failed(Path(path), dataset), title="FAILED, and why").text(),
     )
-
-
-def _failed(path: Path, dataset: xr.Dataset) -> Iterator[tuple[str, ...]]:
-    """The first cells that FAILED, and what their kernel did, as the log of the run has it."""
-    if is_summary(dataset):
-        for number, reason in list(reasons(path).items())[:MOST_FAILED]:
-            yield f"cell {number}", reason
-        return
-    known = reasons(path)
-    for number in failed_cells(dataset, MOST_FAILED):
-        values = " ".join(f"{name}={value}" for name, value in cell_values(dataset, number).items())
-        yield f"cell {number}", values, known.get(number, "")
-
-
-def sections(dataset: xr.Dataset) -> dict[str, Rows]:
-    """What there is to tell of a result: titles, and rows of cells below them; the settings have no title."""
-    found = _of_summary(dataset) if is_summary(dataset) else _of_cells(dataset)
-    return {"": list(_settings(dataset))} | {title: rows for title, rows in found.items() if rows}
-
-
-def _of_cells(dataset: xr.Dataset) -> dict[str, Rows]:
-    for name in (STATUS, METHOD_USED):
-        if dataset[name].nbytes <= LARGEST_SCAN:
-            dataset[name].load()  # once, for they are looked at several times
-    complete = dataset.nbytes <= LARGEST_SCAN or "end" in dataset.attrs
-    return {
-        "axes": [_coordinate(dataset[name]) for name in _axes(dataset)],
-        "fixed": [_fixed(c) for c in _given(dataset)],
-        "along": [_coordinate(dataset[name]) for name in _along(dataset)],
-        "outputs": [_output(dataset[name], complete) for name in outputs_of(dataset)],
-        "status": _status_rows(dataset),
-        "methods used": _method_rows(dataset),
-    }
-
-
-def _of_summary(dataset: xr.Dataset) -> dict[str, Rows]:
-    over = str(dataset.attrs["over"]).split()
-    reduced = {name for name in over for dim in dataset[name].dims if dim in dataset.dims}
-    kept = {str(d) for d in dataset[BY_STATUS].dims[:-1]}
-    along = [n for n in _along_of(dataset, {*kept, *reduced, "cell"}) if n not in ("status_name", "method_name")]
-    bins = {str(d) for name, c in dataset.coords.items() if str(name).endswith("_bin_lower") for d in c.dims}
-    given = [c for c in dataset.coords.values() if not c.dims or set(map(str, c.dims)) & set(along) - {str(c.name)}]
-    return {
-        "axes": [_coordinate(c) for c in dataset.coords.values() if kept & set(map(str, c.dims))],
-        "reduced over": [_coordinate(dataset[name]) for name in over],
-        "fixed": [_fixed(c) for c in given],
-        "along": [_coordinate(dataset[name]) for name in along],
-        "reductions": [_reduction(dataset[name], bins) for name in _reductions(dataset)],
-        "status": [(f"{c.cells:,}", c.name, kind_of(c.name), _status_doc(c.name)) for c in count_statuses(dataset)],
-        "methods used": _method_rows(dataset),
-    }
-
-
-def _reductions(dataset: xr.Dataset) -> list[str]:
-    return [str(name) for name in dataset.data_vars if name not in (BY_STATUS, BY_METHOD)]
-
-
-def _reduction(variable: xr.DataArray, bins: set[str]) -> tuple[str, ...]:
-    if set(map(str, variable.dims)) & bins:
-        shown = f"{variable.sizes[variable.dims[-1]]} bins"
-    elif variable.size == 1:
-        value = variable.item()
-        shown = f"{value:,}" if isinstance(value, int) else f"{value:.10g}"
-        words = flag_words(variable)
-        shown = words.get(value, shown) if words else shown
-    else:
-        shown = _extent(variable)
-    return str(variable.name), _unit(variable), shown, _doc(variable)
-
-
-def _status_doc(name: str) -> str:
-    return Status[name].doc if name in Status.__members__ else ""
 
 
 def head(path: Path, dataset: xr.Dataset) -> list[str]:
@@ -133,47 +58,72 @@ def head(path: Path, dataset: xr.Dataset) -> list[str]:
     return list(dict.fromkeys(str(text) for text in texts if text))
 
 
-def _settings(dataset: xr.Dataset) -> Iterator[tuple[str, ...]]:
-    attrs = dataset.attrs
-    for name in ("kernel", "design", "where", "method", "rtol"):
-        if name in attrs:
-            yield name, f"{attrs[name]:g}" if name == "rtol" else str(attrs[name])
-    if "start" in attrs:
-        yield "started", str(attrs["start"])
+def settings(dataset: xr.Dataset) -> Table:
+    """Kernel, method, tolerance; when the result was computed, by which versions."""
+    attrs = {name: str(value) for name, value in dataset.attrs.items()}
+    if "rtol" in attrs:
+        attrs["rtol"] = f"{dataset.attrs['rtol']:g}"
     if "end" in attrs:
-        yield "ended", f"{attrs['end']}, {float(attrs.get('cells_per_second', math.nan)):,.0f} cells/s"
-    if "versions" in attrs:
-        yield "versions", str(attrs["versions"])
+        attrs["end"] += f", {float(attrs.get('cells_per_second', math.nan)):,.0f} cells/s"
+    names = {name: name for name in ("kernel", "design", "where", "method", "rtol")}
+    names |= {"start": "started", "end": "ended", "versions": "versions"}
+    return Table((word, attrs[name]) for name, word in names.items() if name in attrs)
 
 
-def _axes(dataset: xr.Dataset) -> list[str]:
-    """Coordinates of the cells."""
-    cells = set(dataset[STATUS].dims)
-    return [str(name) for name, c in dataset.coords.items() if set(c.dims) & cells]
-
-
-def _along(dataset: xr.Dataset) -> list[str]:
-    """Coordinates that all cells share."""
-    return _along_of(dataset, set(map(str, dataset[STATUS].dims)))
-
-
-def _along_of(dataset: xr.Dataset, cells: set[str]) -> list[str]:
-    return [str(name) for name, c in dataset.coords.items() if c.dims == (name,) and name not in cells]
-
-
-def _given(dataset: xr.Dataset) -> list[xr.DataArray]:
-    """Fixed parameters: numbers, and arrays that all cells share."""
-    cells = set(dataset[STATUS].dims)
-    return [c for name, c in dataset.coords.items() if not set(c.dims) & cells and c.dims != (name,)]
+def sections(dataset: xr.Dataset) -> list[Table]:
+    """Axes, fixed parameters, outputs, statuses and methods of a result, as far as there are any."""
+    columns = dataset.coords
+    if is_summary(dataset):
+        cells, over = set(map(str, dataset[BY_STATUS].dims[:-1])), str(dataset.attrs["over"]).split()
+        gone = {str(dim) for name in over for dim in dataset[name].dims} | {"cell", "status_name", "method_name"}
+        outputs = [str(name) for name in dataset.data_vars if name not in (BY_STATUS, BY_METHOD)]
+        kind, scanned = "reduction", True
+    else:
+        for name in (STATUS, METHOD_USED):
+            if dataset[name].nbytes <= LARGEST_SCAN:
+                dataset[name].load()  # once, for they are looked at several times
+        cells, over, gone = set(map(str, dataset[STATUS].dims)), [], set()
+        outputs, kind = outputs_of(dataset), "output"
+        scanned = dataset.nbytes <= LARGEST_SCAN or "end" in dataset.attrs
+    axes = [str(name) for name, c in columns.items() if set(map(str, c.dims)) & cells]
+    along = [str(n) for n, c in columns.items() if c.dims == (n,) and n not in cells | gone]
+    fixed = [str(n) for n, c in columns.items() if not c.dims or (set(c.dims) <= set(along) and n not in along)]
+    rest = ("unit", "values", "from, to", "meaning")
+    tables = [
+        Table((_coordinate(dataset[name]) for name in names), (word, *rest), title)
+        for title, word, names in (("axes", "axis", axes), ("reduced over", "axis", over))
+    ]
+    tables += [
+        Table(
+            (_row(columns[name], _value(columns[name])) for name in fixed),
+            ("parameter", "unit", "value", "meaning"),
+            "fixed",
+        ),
+        Table((_coordinate(columns[name]) for name in along), ("coordinate", *rest), "along"),
+        Table(
+            (_row(dataset[name], _extent(dataset[name]) if scanned else "") for name in outputs),
+            (kind, "unit", "from, to", "meaning"),
+            f"{kind}s",
+        ),
+        Table(_status_rows(dataset), ("cells", "status", "kind", "meaning, and where"), "status"),
+        Table(_method_rows(dataset), ("method", "cells", "share"), "methods used"),
+    ]
+    return [table for table in tables if table.rows]
 
 
 def outputs_of(dataset: xr.Dataset) -> list[str]:
+    """The outputs of a result, without what is said of them."""
     return [str(name) for name in dataset.data_vars if name not in ANCILLARY]
+
+
+def _row(variable: xr.DataArray, *shown: str) -> tuple[str, ...]:
+    """Name, unit, what is shown of it, and what it means."""
+    unit = f"[{variable.attrs['units']}]" if "units" in variable.attrs else ""
+    return str(variable.name), unit, *shown, str(variable.attrs.get("long_name", ""))
 
 
 def _coordinate(coordinate: xr.DataArray) -> tuple[str, ...]:
     values = coordinate.values
-    count = f"{len(values):,} value{'s' * (len(values) > 1)}"
     if values.ndim > 1:
         shown = f"{short(values[0])} to {short(values[-1])}"
     elif values.dtype.kind not in "fiu":
@@ -182,75 +132,64 @@ def _coordinate(coordinate: xr.DataArray) -> tuple[str, ...]:
         shown = ", ".join(f"{v:.6g}" for v in values)
     else:
         shown = f"{values[0]:.6g} to {values[-1]:.6g}"
-    return str(coordinate.name), _unit(coordinate), count, shown, _doc(coordinate)
+    return _row(coordinate, f"{len(values):,} value{'s' * (len(values) > 1)}", shown)
 
 
-def _fixed(coordinate: xr.DataArray) -> tuple[str, ...]:
-    shown = short(coordinate.values) if coordinate.dims else f"{coordinate.item():.10g}"
-    return str(coordinate.name), _unit(coordinate), shown, _doc(coordinate)
-
-
-def _output(output: xr.DataArray, complete: bool) -> tuple[str, ...]:
-    return str(output.name), _unit(output), _extent(output) if complete else "", _doc(output)
+def _value(variable: xr.DataArray) -> str:
+    """One value, or an array that all cells share."""
+    if variable.dims and variable.size > 1:
+        return short(variable.values)
+    value = variable.item()
+    return flag_words(variable).get(value) or (f"{value:,}" if isinstance(value, int) else f"{value:.10g}")
 
 
 def _extent(output: xr.DataArray) -> str:
     """Smallest to largest value; nothing of an output too large to read for it."""
+    if output.size == 1 and not output.dims:
+        return _value(output)
+    if str(output.dims[-1]).endswith("_bin"):
+        return f"{output.sizes[output.dims[-1]]} bins"
     if output.nbytes > LARGEST_SCAN:
         return ""
     values = output.values[np.isfinite(output.values)]
     return f"{values.min():.6g} to {values.max():.6g}" if values.size else "no values"
 
 
-def _status_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
-    """Every status that occurs: cells, kind, meaning; but for OK also an example, and where on the axes it occurs."""
-    counts = count_statuses(dataset)
-    where = _ranges(dataset)
-    rows: list[tuple[str, ...]] = []
-    for count in counts:
-        text = _status_doc(count.name)
-        if count.name != Status.OK.name:
-            text += f"; {where[count.name]}" if where.get(count.name) else ""
-            text += f"; e.g. {' '.join(f'{k}={v}' for k, v in count.example.items())}"
-        rows.append((f"{count.cells:,}", count.name, kind_of(count.name), text))
-    return rows
+def _status_rows(dataset: xr.Dataset) -> Rows:
+    """Every status that occurs: cells, kind, meaning; but for OK also where on the axes it occurs, and an example."""
+    places = {} if is_summary(dataset) else _places(dataset)
+    for count in count_statuses(dataset):
+        texts = [Status[count.name].doc if count.name in Status.__members__ else "", places.get(count.name, "")]
+        if count.example:
+            texts.append(f"e.g. {' '.join(f'{name}={value}' for name, value in count.example.items())}")
+        yield f"{count.cells:,}", count.name, kind_of(count.name), "; ".join(filter(None, texts))
 
 
-def _method_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
+def _method_rows(dataset: xr.Dataset) -> Rows:
     total = account(dataset).total
-    return [(name, f"{cells:,}", f"{100 * cells / total:.1f} %") for name, cells in count_methods(dataset).items()]
+    for name, cells in count_methods(dataset).items():
+        yield name, f"{cells:,}", f"{100 * cells / total:.1f} %"
 
 
-def _ranges(dataset: xr.Dataset) -> dict[str, str]:
-    """Where on the axes each refusal or remark occurs: 'mu 0.1 to 0.9, R 1'."""
-    hits = _hits(dataset[STATUS])
-    return {status.name: _where(dataset, hits[status]) for status in Status if status in hits}
-
-
-def _hits(column: xr.DataArray) -> dict[int, dict[str, Any]]:
-    """For each status but OK and PENDING: which positions along each dimension have it somewhere."""
-    hits: dict[int, dict[str, Any]] = {}
+def _places(dataset: xr.Dataset) -> dict[str, str]:
+    """Where on the axes each refusal or remark occurs: 'mu 0.1 to 0.9, R 1'. Reads a few million cells at a time."""
+    column = dataset[STATUS]
+    hits: dict[int, list[Any]] = {}
     rows = max(1, CELLS_AT_ONCE // max(1, math.prod(column.shape[1:])))
     for start in range(0, column.shape[0], rows):
         piece = column[start : start + rows].values
         for code in set(np.unique(piece).tolist()) - {int(Status.OK), int(Status.PENDING)}:
-            found = hits.setdefault(code, {str(d): np.zeros(n, bool) for d, n in column.sizes.items()})
+            found = hits.setdefault(code, [np.zeros(n, bool) for n in column.shape])
             first, *others = np.nonzero(piece == code)
-            for positions, array in zip((first + start, *others), found.values(), strict=True):
-                array[positions] = True
-    return hits
-
-
-def _where(dataset: xr.Dataset, found: dict[str, Any]) -> str:
-    """Axes along which it occurs in part only, with the smallest and largest value."""
-    texts = []
-    for name in _axes(dataset):
-        coordinate = dataset[name]
-        hit = found[str(coordinate.dims[0])]
-        if hit.all():
-            continue
-        texts.append(f"{name} {_span(coordinate.values[hit])}")
-    return ", ".join(texts) or "at every value of every axis"
+            for here, places in zip(found, (start + first, *others), strict=True):
+                here[places] = True
+    axes = [c for c in dataset.coords.values() if set(c.dims) & set(column.dims)]
+    texts = {}
+    for status in (status for status in Status if status in hits):
+        along = dict(zip(column.dims, hits[status], strict=True))
+        parts = [f"{c.name} {_span(c.values[along[c.dims[0]]])}" for c in axes if not along[c.dims[0]].all()]
+        texts[status.name] = ", ".join(parts) or "at every value of every axis"
+    return texts
 
 
 def _span(values: Any) -> str:
@@ -262,9 +201,9 @@ def _span(values: Any) -> str:
     return " and ".join(filter(None, [" to ".join(ends), "nan" if len(numbers) < len(values) else ""]))
 
 
-def _unit(variable: xr.DataArray) -> str:
-    return f"[{variable.attrs['units']}]" if "units" in variable.attrs else ""
-
-
-def _doc(variable: xr.DataArray) -> str:
-    return str(variable.attrs.get("long_name", ""))
+def _failed(path: Path, dataset: xr.Dataset) -> Rows:
+    """The first cells that FAILED, and what their kernel did, as the log of the run has it."""
+    known = reasons(path)
+    for number in list(known)[:MOST_FAILED] if is_summary(dataset) else failed_cells(dataset, MOST_FAILED):
+        cell = {} if is_summary(dataset) else cell_values(dataset, number)
+        yield f"cell {number}", " ".join(f"{name}={value}" for name, value in cell.items()), known.get(number, "")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from sweep.cells.schema import ANCILLARY as ANCILLARY
 from sweep.errors import SweepError
 from sweep.explore.scattered import MOST_AXES, Box, axes_of, interpolated
 from sweep.laws.loglog import is_logarithmic
@@ -24,20 +25,16 @@ GREEK = frozenset(
         *("rho", "sigma", "tau", "phi", "chi", "psi", "omega", "Gamma", "Delta", "Theta", "Phi", "Psi", "Omega"),
     )
 )
-
 FAMILY = 8
 """Most lines in one picture; more values of a number axis make a map."""
-
 POINTS, PIXELS = 20_000, 2_000
 """Points along a line and cells along the side of a map that are drawn; beyond, every second, third ... one."""
-
 HARD_SPACE = "\u00a0"
 """Where no line is broken."""
-
 SIDE = 201
 """Cells along the sides of a map of cells that lie anywhere; of more axes as many cells altogether."""
-
-ANCILLARY = ("status", "method_used", "error_bound")
+LONGEST = 50
+"""Letters of a meaning on an axis; of a longer one the name stands there."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +55,7 @@ class View:
 
     @property
     def mapped(self) -> bool:
+        """Whether it is a map, and no line or family of lines."""
         return self.across is not None and self.y.sizes[self.across] > FAMILY and is_number_axis(self.y, self.across)
 
     @property
@@ -66,10 +64,8 @@ class View:
         return self.x == self.along
 
     def values(self, name: str) -> NDArray[Any]:
+        """Those of a coordinate."""
         return coordinate(self.y, name).values
-
-    def label(self, name: str, width: int = 44) -> str:
-        return label(coordinate(self.y, name), width)
 
     def codes(self) -> list[int]:
         """Statuses other than OK that occur."""
@@ -84,28 +80,45 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
     SweepError
         If there is no such output or axis.
     """
-    name = _output(dataset, y)
+    known = [str(n) for n, v in dataset.data_vars.items() if v.ndim and n not in ANCILLARY and v.dtype.kind in "fiu"]
+    if not known:
+        raise SweepError("there is nothing to draw: no output runs along an axis")
+    name = _one_of(y or preferred(known), known, "there is no output {!r} to draw")
     if x is None:
         dataset = evened(dataset, axes=2)
-    x = _x(dataset[name], x, dataset["status"].dims if "status" in dataset else ())
-    along = str(coordinate(dataset[name], x).dims[0])
-    others = sorted((str(d) for d in dataset[name].dims if d != along), key=lambda d: -dataset.sizes[d])
+    output, cells = dataset[name], dataset["status"].dims if "status" in dataset else ()
+    known = [str(name) for name, c in output.coords.items() if c.ndim == 1 and c.dtype.kind in "fiu"]
+    if x is None:
+        traces = [str(dim) for dim in output.dims if cells and dim not in cells and dim in known]
+        axes = traces or [str(dim) for dim in output.dims if dim in known] or known
+        if not axes:
+            raise SweepError(f"{name} has no number axis to draw it along")
+        x = max(axes, key=lambda axis: output[axis].size)
+    x = _one_of(x, known, f"there is no number axis {{!r}} to draw {name} along")
+    along = str(output[x].dims[0])
+    others = sorted((str(d) for d in output.dims if d != along), key=lambda d: -dataset.sizes[d])
     across = others[0] if others else None
     held = {dim: dataset.sizes[dim] // 2 for dim in others[1:]}
     shown = dataset[[name] + (["status"] if "status" in dataset else [])].isel(held)
-    shown = _thinned(shown, along, across).compute()
+    # no more cells than a picture can show
+    mapped = across is not None and shown.sizes[across] > FAMILY
+    most = dict.fromkeys((across, along), PIXELS) if mapped else {along: POINTS}
+    shown = shown.isel({d: slice(None, None, -(-shown.sizes[d] // n)) for d, n in most.items() if d}).compute()
     for dim in (along, across):
         if dim is not None and is_number_axis(shown[name], dim) and dim in shown.coords:
             shown = shown.sortby(dim)
     values = shown[name].transpose(*([across] if across else []), along)
-    status = shown["status"].broadcast_like(values).transpose(*values.dims).values if "status" in shown else None
-    return View(
-        values,
-        np.zeros(values.shape, int) if status is None else status.astype(int),
-        {} if status is None else flag_words(shown["status"]),
-        x, along, across,
-        ", ".join(setting(coordinate(dataset[name], dim)[index]) for dim, index in held.items()),
-    )  # fmt: skip
+    status = shown["status"].broadcast_like(values).transpose(*values.dims) if "status" in shown else None
+    codes = np.zeros(values.shape, int) if status is None else status.values.astype(int)
+    words = ", ".join(setting(coordinate(output, dim)[index]) for dim, index in held.items())
+    return View(values, codes, {} if status is None else flag_words(shown["status"]), x, along, across, words)
+
+
+def _one_of(name: str, known: Sequence[str], fault: str) -> str:
+    if name not in known:
+        hint = did_you_mean(name, known) or f"; there are {', '.join(known) or 'none'}"
+        raise SweepError(fault.format(name) + hint)
+    return name
 
 
 def evened(dataset: xr.Dataset, axes: int = MOST_AXES) -> xr.Dataset:
@@ -119,43 +132,10 @@ def evened(dataset: xr.Dataset, axes: int = MOST_AXES) -> xr.Dataset:
     return interpolated(dataset, {name: box.values(k, even if k < axes else middle) for k, name in enumerate(names)})
 
 
-def _output(dataset: xr.Dataset, y: str | None) -> str:
-    known = [str(n) for n, v in dataset.data_vars.items() if v.ndim and n not in ANCILLARY and v.dtype.kind in "fiu"]
-    if not known:
-        raise SweepError("there is nothing to draw: no output runs along an axis")
-    if y is not None and y not in known:
-        raise SweepError(f"there is no output {y!r} to draw{_hint(y, known)}")
-    return preferred(known) if y is None else y
-
-
 def preferred(outputs: Sequence[str]) -> str:
     """The output that is shown where none is asked for: the first; of a scene, whose `time` is that of its last switch,
     the `interval` behind it."""
     return outputs[1] if [*outputs[:2]] == ["time", "interval"] else outputs[0]
-
-
-def _x(output: xr.DataArray, x: str | None, cell_dims: tuple[Any, ...]) -> str:
-    known = [str(name) for name, c in output.coords.items() if c.ndim == 1 and c.dtype.kind in "fiu"]
-    if x is not None:
-        if x not in known:
-            raise SweepError(f"there is no number axis {x!r} to draw {output.name} along{_hint(x, known)}")
-        return x
-    traces = [str(dim) for dim in output.dims if cell_dims and dim not in cell_dims and dim in known]
-    axes = traces or [str(dim) for dim in output.dims if dim in known] or known
-    if not axes:
-        raise SweepError(f"{output.name} has no number axis to draw it along")
-    return max(axes, key=lambda name: output[name].size)
-
-
-def _hint(name: str, known: Iterable[str]) -> str:
-    return did_you_mean(name, known) or f"; there are {', '.join(known) or 'none'}"
-
-
-def _thinned(shown: xr.Dataset, along: str, across: str | None) -> xr.Dataset:
-    """No more cells than a picture can show."""
-    mapped = across is not None and shown.sizes[across] > FAMILY
-    most = dict.fromkeys((across, along), PIXELS) if mapped else {along: POINTS}
-    return shown.isel({d: slice(None, None, -(-shown.sizes[d] // n)) for d, n in most.items() if d is not None})
 
 
 def coordinate(y: xr.DataArray, name: str) -> xr.DataArray:
@@ -164,6 +144,7 @@ def coordinate(y: xr.DataArray, name: str) -> xr.DataArray:
 
 
 def is_number_axis(y: xr.DataArray, name: str) -> bool:
+    """Whether the values of a coordinate are numbers, not words."""
     return coordinate(y, name).dtype.kind in "fiu"
 
 
@@ -194,11 +175,17 @@ def unit_text(unit: str) -> str:
     return "" if unit in ("", "1") else re.sub(r"\^(-?\d+)", r"$^{\1}$", unit)
 
 
+def meaning(variable: xr.DataArray) -> str:
+    """What a variable is: its long name up to the first break; "" where that is too long for an axis."""
+    words = re.split(r"[;:(]|, |\. ", str(variable.attrs.get("long_name", "")).strip())[0].strip(" .\n")
+    return words if len(words) <= LONGEST and "\n" not in words else ""
+
+
 def label(variable: xr.DataArray, width: int = 44) -> str:
-    """Text for an axis: long name, symbol, unit; in lines of so many letters, none of which begins with the unit."""
+    """Text for an axis: meaning, symbol, unit; in lines of so many letters, none of which begins with the unit."""
     name = str(variable.name)
     sign, unit = symbol(name), unit_text(str(variable.attrs.get("units", "")))
-    words = str(variable.attrs.get("long_name", "")) or ("" if sign else name.replace("_", " "))
+    words = meaning(variable) or ("" if sign else name.replace("_", " "))
     text = ", ".join(part for part in (words, sign) if part)
     text = f"{text}{HARD_SPACE}[{unit.replace(' ', HARD_SPACE)}]" if unit else text
     signs = re.findall(r"\$.*?\$", text)

@@ -10,9 +10,8 @@ from toy_studies import build
 import sweep
 from kernels.interface import Status
 from sweep.errors import SweepError
-from sweep.show.compare import comparison, comparison_text, write_comparison
 from sweep.show.follow import follow
-from sweep.show.laws import laws, laws_text, pick, write_laws
+from sweep.show.laws import comparison, comparison_text, laws, laws_text, pick, write_comparison, write_laws
 from sweep.show.text import result_text
 
 X = np.geomspace(1e-4, 1e4, 33)
@@ -47,6 +46,7 @@ def test_two_laws_are_told_in_a_text_a_page_and_a_table(tmp_path):
     assert float(low["exponent_low"]) < float(low["exponent"]) < float(low["exponent_high"])
     assert float(low["crossover"]) == pytest.approx(1.0, rel=0.1)
     assert f"{float(low['crossover']):.6g}" in laws_text(found).split()
+    assert "residual" in laws_text(found, complete=True)
 
 
 def test_a_second_law_needs_eight_points_and_no_straight_line():

@@ -1,4 +1,4 @@
-"""What a command reads and writes: opened, checked, and told where it cannot be."""
+"""What commands read and write: opened, checked, and reported where it cannot be."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import contextlib
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from sweep.errors import SweepError
 
@@ -18,30 +18,27 @@ if TYPE_CHECKING:
 
 
 def study_from(arguments: argparse.Namespace) -> Study:
+    """The study that is named."""
     from sweep.study.read import study
 
     return study(arguments.study, allow_import=arguments.allow_import)
 
 
-def is_isolated(arguments: argparse.Namespace, study: Study) -> bool:
-    """Whether cells are solved in processes of their own: those of a user's own kernel, unless it is said."""
-    return ":" in study.kernel_name if arguments.isolate is None else bool(arguments.isolate)
-
-
-def study_of_result(arguments: argparse.Namespace) -> Study:
-    from sweep.study.read import study
-
-    with opened(arguments.study) as dataset:
-        return study(dataset, allow_import=arguments.allow_import)
+def solving(arguments: argparse.Namespace, study: Study) -> dict[str, Any]:
+    """How cells are solved; those of a user's own kernel in processes of their own, unless it is said."""
+    isolate = ":" in study.kernel_name if arguments.isolate is None else bool(arguments.isolate)
+    workers = {"workers": arguments.workers} if "workers" in arguments else {}
+    return {**workers, "isolate": isolate, "cell_timeout": arguments.cell_timeout}
 
 
 def result_of(arguments: argparse.Namespace) -> contextlib.AbstractContextManager[xr.Dataset]:
+    """The result that is named; one that is not complete where the command takes it."""
     return opened(arguments.result, getattr(arguments, "unfinished", True))
 
 
 @contextlib.contextmanager
 def opened(path: Path, unfinished: bool = True) -> Iterator[xr.Dataset]:
-    """A result; where another program has changed it, what goes wrong with it is told as that."""
+    """A result; where another program has changed it, what goes wrong with it is reported as that."""
     from sweep.file.open import changed, open_result
 
     if path.suffix == ".toml":
@@ -55,7 +52,7 @@ def opened(path: Path, unfinished: bool = True) -> Iterator[xr.Dataset]:
 
 
 def check_target_of(arguments: argparse.Namespace, target: Path, force: bool = False) -> None:
-    """Raises SweepError where a command is not to write there; by `force` it may look at what is there itself."""
+    """Raises SweepError where a command is not to write there; by `force` it looks at what is there itself."""
     from sweep.file.overwriting import check_target
 
     read = [getattr(arguments, name) for name in ("result", "study") if name in arguments]
@@ -63,6 +60,7 @@ def check_target_of(arguments: argparse.Namespace, target: Path, force: bool = F
 
 
 def in_units_of(dataset: xr.Dataset, given: Sequence[str]) -> xr.Dataset:
+    """A result in the units of `--unit`."""
     from sweep.results.units import in_units
 
     for text in given:
