@@ -115,22 +115,19 @@ def lowest(wheel, away, W, t):
 def train_ends(scene, motion, side, t, after, gap):
     """Whether nothing comes between the bounces: no tip of a pallet is reached, and no tooth meets the other pallet.
 
-    On the holding side that tooth is met where y is in [-1/4, -1/4 + gap/2] and above -eta, on the other mirrored.
+    On the holding side that tooth is met where y is in [-1/4, -1/4 + gap/2] and above -eta, on the other mirrored. Nor
+    may y or the rim's way have an extreme between them: that of the centre is another.
     """
     eta = scene.eta
     away, W = centre(scene, motion, side)
     low, high = lowest(scene.wheel, away, W, t), side * after.y
     high = (high if high > away else away) + scene.wheel * gap
     clear = gap <= 0.5 - 2.0 * eta or low > -0.25 + 0.5 * gap or high < -eta
-    return high < eta and clear and (side > 0.0 or low > -eta) and _plain(scene, motion, W, after.V, gap)
-
-
-@jit
-def _plain(scene, motion, W, speed, gap):
-    """Whether the bounces have no extreme of y or of the rim's way between them: that of the centre is another."""
+    if not (high < eta and clear and (side > 0.0 or low > -eta)):
+        return False
     if W >= 0.0:
         return motion.V >= 0.0
-    return speed <= 0.0 and speed * speed >= 2.0 * scene.wheel * scene.pallet * gap
+    return after.V <= 0.0 and 2.0 * scene.wheel * scene.pallet * gap <= after.V * after.V
 
 
 @jit

@@ -110,58 +110,10 @@ def _past(history, i):
     return Start(history[i, 0], history[i, 1], history[i, 2])
 
 
-@jit_call
-def _repeats_after(history, n):
-    """The least number of half swings after which the motion all but repeats; 0 if it does not."""
-    for k in range(1, n + 1):
-        if distance(_past(history, n - k), _past(history, n)) < _CLOSE:
-            return k
-    return 0
-
-
-@jit_call
-def _shortest(scene, start, k, history, work):
-    """The shortest repetition of a motion that repeats after k half swings."""
-    follow(scene, start, k, history, work.tally, work.slopes)
-    for shorter in range(1, k):
-        if k % shorter == 0 and distance(_past(history, shorter), start) < _SAME:
-            return shorter
-    return k
-
-
 @jit
-def _cycles(k, way):
-    """Half swings of the whole motion, teeth that pass in it, and the cycles that this is."""
-    teeth = nearest(2.0 * way)
-    if k % 2 == 0:
-        return 1.0 * k, 0.5 * teeth, min(0.5 * teeth, 0.5 * k)
-    return 2.0 * k, teeth, min(teeth, 1.0 * k)
-
-
-@jit_call
-def _left_behind(start, cycle):
-    """A start further from an unstable cycle, the way the motion leaves it."""
-    away = distance(start, cycle)
-    more = _KICK / max(away, 1e-12) if away < _KICK else 1.0
-    way = difference(start, cycle)
-    w = cycle.w + more * way.w
-    return Start(swing.reduced(cycle.gap + more * way.gap), cycle.V + more * way.V, w) if w < 0.0 else start
-
-
-@jit
-def _ends(tally, k):
-    """Half of the way of y from end to end, and its middle, of a motion that repeats after k half swings."""
-    low, high = -tally[swing.LOWEST], -tally[swing.ACROSS]
-    if k % 2 == 1:
-        return max(low, high), 0.0
-    return 0.5 * (low + high), 0.5 * magnitude(low - high)
-
-
-@jit
-def _answer(tally, ends, halves, pace, e):
+def _answer(tally, half_way, middle, halves, pace, e):
     """The cycle as in `_units`, the middle of the swing, the share of time in contact, and impacts, from the
-    tally of half swings that are so many half periods; `ends` as `_ends` has them, or means."""
-    half_way, middle = ends
+    tally of half swings that are so many half periods; the swing's half way and middle may be means."""
     beats = tally[swing.BEATS]
     rim, pallet = (tally[swing.RIM] / beats, tally[swing.PALLET] / beats) if beats > 0.0 else (math.nan, math.nan)
     endless = e > 0.0 and tally[swing.TRAINS] > 0.0
@@ -177,30 +129,6 @@ def _none():
     return Answer(Cycle(nan, nan, nan, nan, nan, nan), nan, nan, nan)
 
 
-@jit
-def _verdict(tally, teeth, cycles, fading, worst, gap, rounding, rtol):
-    """The status of a motion that repeats, where `fading` is 1 - multiplier in units of its error."""
-    if fading < -1.0:
-        return UNSTABLE
-    if not (worst <= rtol):
-        return INACCURATE
-    if fading < 1.0 or tally[swing.MARGIN] <= 4.0 * gap + rounding:
-        return GRAZING
-    if teeth > cycles:
-        return TOOTH_JUMPED
-    return OK if teeth == 1.0 else PERIOD_2
-
-
-@jit
-def _worst(answer, gap, V, w, late):
-    """Largest relative error of the outputs but the multiplier, by the errors of gap, V and w and the relative one of
-    the time."""
-    cycle, share, back = answer.cycle, answer.held, answer.cycle.back
-    worst = max(max(late, gap / cycle.travel), max(V / magnitude(cycle.rim), w / magnitude(cycle.pallet)))
-    worst = max(worst, late + late / share if share > 0.0 else 0.0)
-    return max(worst, 6.0 * (V + w) / sqrt(2.0 * back) if back > 0.0 else 0.0)  # V^2/2, V perhaps that of both bodies
-
-
 @jit_call
 def _judged(scene, start, k, work, rtol):
     """The answer for a motion that repeats after k half swings, and its status; UNSTABLE where it leaves that."""
@@ -213,16 +141,40 @@ def _judged(scene, start, k, work, rtol):
         tally[swing.DEPTH] = deep
         image, _ = chain(scene, start, k, work)
     invert(work.chained, work.inverse)
-    half_swings, teeth, cycles = _cycles(k, tally[swing.WAY])
     modulus, blur = multiplier(work.chained)
     per_half_swing = modulus if k == 1 else power(modulus, 1.0 / k)
-    answer = _answer(tally, _ends(tally, k), 2.0 * cycles * k / half_swings, per_half_swing, scene.e)
-    rounding = _ROUNDING * (2.0 + tally[swing.EVENTS] / k) * (1.0 + answer.cycle.travel)
+
+    # half swings of the whole motion, teeth that pass in it, the cycles that this is; the ends of y, and their middle
+    teeth = nearest(2.0 * tally[swing.WAY])
+    low, high = -tally[swing.LOWEST], -tally[swing.ACROSS]
+    if k % 2 == 0:
+        half_swings, teeth, cycles = 1.0 * k, 0.5 * teeth, min(0.5 * teeth, 0.5 * k)
+        half_way, middle = 0.5 * (low + high), 0.5 * magnitude(low - high)
+    else:
+        half_swings, cycles = 2.0 * k, min(teeth, 1.0 * k)
+        half_way, middle = max(low, high), 0.0
+    answer = _answer(tally, half_way, middle, 2.0 * cycles * k / half_swings, per_half_swing, scene.e)
+
+    # the largest relative error of an output, by those of the start; thrown back is V^2/2, V perhaps that of both
+    cycle, share, back = answer.cycle, answer.held, answer.cycle.back
+    rounding = _ROUNDING * (2.0 + tally[swing.EVENTS] / k) * (1.0 + cycle.travel)
     gap, V, w, late = errors(start, difference(image, start), work, rounding, tally[swing.TIME])
+    worst = max(max(late, gap / cycle.travel), max(V / magnitude(cycle.rim), w / magnitude(cycle.pallet)))
+    worst = max(worst, late + late / share if share > 0.0 else 0.0)
+    worst = max(worst, 6.0 * (V + w) / sqrt(2.0 * back) if back > 0.0 else 0.0)
     noise = _CHAINED * blur * (rounding * k + gap)
-    worst = max(_worst(answer, gap, V, w, late), noise / (k * modulus) if modulus > 0.0 else 0.0)
-    fading = (1.0 - modulus) / max(noise, _ROUNDING)
-    return answer, _verdict(tally, teeth, cycles, fading, worst, gap, rounding, rtol)
+    worst = max(worst, noise / (k * modulus) if modulus > 0.0 else 0.0)
+
+    fading = (1.0 - modulus) / max(noise, _ROUNDING)  # in units of its error
+    if fading < -1.0:
+        return answer, UNSTABLE
+    if not (worst <= rtol):
+        return answer, INACCURATE
+    if fading < 1.0 or tally[swing.MARGIN] <= 4.0 * gap + rounding:
+        return answer, GRAZING
+    if teeth > cycles:
+        return answer, TOOTH_JUMPED
+    return answer, OK if teeth == 1.0 else PERIOD_2
 
 
 @jit_call
@@ -238,23 +190,35 @@ def attractor(scene, rtol, total, work, history):
         start, verdict = follow(scene, start, BLOCK, history, total, work.slopes)
         if verdict != swing.DONE or total[swing.EVENTS] > EVENT_LIMIT:
             return _none(), NO_METHOD if verdict == swing.BENT_CONTACT else STEP_LIMIT
-        k = _repeats_after(history, BLOCK)
+        k = 0
+        for back in range(BLOCK, 0, -1):  # the least number of half swings after which it all but repeats
+            if distance(_past(history, BLOCK - back), start) < _CLOSE:
+                k = back
         if k == 0:
             continue
         cycle, found = newton(scene, start, k, work)
         if not (found and distance(start, cycle) < _NEAR):
             continue
-        k = _shortest(scene, cycle, k, history, work)
+        follow(scene, cycle, k, history, work.tally, work.slopes)
+        whole = k
+        for shorter in range(whole - 1, 0, -1):
+            if whole % shorter == 0 and distance(_past(history, shorter), cycle) < _SAME:
+                k = shorter
         answer, status = _judged(scene, cycle, k, work, rtol)
         if status != UNSTABLE:
             return answer, status
-        if 2 * block < blocks and kicks < _KICKS:
-            start, kicks = _left_behind(start, cycle), kicks + 1
+        if 2 * block < blocks and kicks < _KICKS:  # go on further from the unstable cycle, the way the motion leaves it
+            kicks += 1
+            away, way = distance(start, cycle), difference(start, cycle)
+            more = _KICK / max(away, 1e-12) if away < _KICK else 1.0
+            w = cycle.w + more * way.w
+            if w < 0.0:
+                start = Start(swing.reduced(cycle.gap + more * way.gap), cycle.V + more * way.V, w)
     half_swings = HALF_SWINGS // 2
     cycles = max(min(total[swing.WAY], 0.5 * half_swings), 1.0)
     status = NOT_CONVERGED if k > 0 else NOT_PERIODIC
-    means = total[swing.DIPS] / half_swings, magnitude(total[swing.LEAN]) / half_swings
-    return _answer(total, means, 2.0 * cycles, math.nan, scene.e), status
+    half_way, middle = total[swing.DIPS] / half_swings, magnitude(total[swing.LEAN]) / half_swings
+    return _answer(total, half_way, middle, 2.0 * cycles, math.nan, scene.e), status
 
 
 @jit

@@ -63,24 +63,6 @@ class Start(NamedTuple):
     w: float
 
 
-class State(NamedTuple):
-    """Gaps of the holding pallet and of the one across, the motion, and whether the latter is in the way of teeth."""
-
-    gap: float
-    far: float
-    motion: Motion
-    near: bool
-
-
-class Event(NamedTuple):
-    """What comes next: when, whether it is a contact, with the pallet across, with the tooth behind."""
-
-    t: float
-    contact: bool
-    across: bool
-    behind: bool
-
-
 @jit
 def clear(tally):
     """A tally of nothing."""
@@ -103,32 +85,13 @@ def _lever(scene, y):
 
 
 @jit
-def _across(scene, gap, y):
-    """Gap of the pallet across, from that of the holding one, or the other way round with -y."""
-    return gap + 2.0 * y * (1.0 - scene.c * scene.y_i) - 0.5
-
-
-@jit
-def _count_flight(tally, V, t):
-    """Time, and the rim's way: it may be thrown back first."""
-    way = (V + 0.5 * t) * t
-    if V < 0.0:
-        back = 0.5 * V * V if t + V > 0.0 else -way
-        tally[RECOIL] = max(tally[RECOIL], tally[DEPTH] + back)
-    tally[DEPTH] = max(tally[DEPTH] - way, 0.0)
-    tally[WAY] += way
-    tally[TIME] += t
-    tally[EVENTS] += 1.0
-
-
-@jit
 def _count_joint(tally, scene, away, W, side, t, after):
-    """The same in contact, where the rim goes with `away` and the torque's share `wheel`."""
+    """Way, time and recoil in contact, where the rim goes with `away` and the torque's share `wheel`."""
     wheel = scene.wheel
     if W < 0.0:
         turn = min(-W, wheel * t)
         tally[RECOIL] = max(tally[RECOIL], tally[DEPTH] - (W + 0.5 * turn) * turn / wheel)
-        _count_low(tally, side * (away + (W + 0.5 * turn) * turn / wheel))
+        tally[DIP] = min(tally[DIP], side * (away + (W + 0.5 * turn) * turn / wheel))
     way = after - away
     tally[DEPTH] = max(tally[DEPTH] - way, 0.0)
     tally[WAY] += way
@@ -137,57 +100,8 @@ def _count_joint(tally, scene, away, W, side, t, after):
 
 
 @jit
-def _count_low(tally, y):
-    tally[DIP] = min(tally[DIP], y)
-
-
-@jit
 def _count_margin(tally, gap):
     tally[MARGIN] = min(tally[MARGIN], min(magnitude(gap), magnitude(1.0 + gap)))
-
-
-@jit
-def _count_impact(tally, scene, motion, closing, lever):
-    """An impact; `motion` is after it."""
-    tally[LOSS] += impact_loss(scene, closing, lever)
-    tally[IMPACTS] += 1.0
-    _count_low(tally, motion.y)
-
-
-@jit
-def _count_beat(tally, motion):
-    """The speeds just after the holding pallet's first impact of the half swing."""
-    if tally[STRUCK] == 0.0:
-        tally[STRUCK] = 1.0
-        tally[RIM] += motion.V
-        tally[PALLET] += motion.w
-        tally[BEATS] += 1.0
-
-
-@jit_call
-def _bounces_out(scene, motion, side, tally, slopes, follows):
-    """The motion after bounces that end in contact, and whether they do."""
-    t, after, gap = train(scene, motion, side)
-    if not train_ends(scene, motion, side, t, after, gap):
-        return motion, False
-    if follows:
-        carry_train(scene, slopes, motion, side, t)
-    away, W = centre(scene, motion, side)
-    _count_joint(tally, scene, away, W, side, t, side * after.y)
-    tally[LOSS] += scene.pallet * gap
-    tally[TRAINS] += 1.0
-    return after, True
-
-
-@jit_call
-def _slides_off(scene, motion, side, tally, slopes, follows):
-    """The motion where contact ends, and whether the half swing does."""
-    t, goal, speed, ends = slide(scene, motion, side)
-    if follows:
-        carry_slide(scene, slopes, motion, side, speed)
-    _count_joint(tally, scene, side * motion.y, side * motion.w, side, t, goal)
-    tally[HELD] += t
-    return Motion(side * goal, speed, side * speed), ends
 
 
 @jit
@@ -199,78 +113,59 @@ def _line(eta, y, w, near):
 
 
 @jit
-def _next(scene, state):
-    """The next event."""
-    y, V, w = state.motion
+def _flight(scene, gap, far, motion, near, tally, slopes, follows):
+    """Free flight until a tooth meets the holding pallet, or the one across while that is `near`, or y passes a tip.
+
+    Returns
+    -------
+    t, contact, across, behind : its time, and whether it is a contact, with the pallet across, with the tooth behind
+    gap, far, motion : at its end
+    """
+    y, V, w = motion
     bend = 1.0 - scene.c * w * w
-    t, behind = meets_either(state.gap, V - _lever(scene, y) * w, bend)
+    rate, rate_across = V - _lever(scene, y) * w, V + _lever(scene, -y) * w
+    t, behind = meets_either(gap, rate, bend)
     across = False
-    if state.near:
-        other, other_behind = meets_either(state.far, V + _lever(scene, -y) * w, bend)
+    if near:
+        other, other_behind = meets_either(far, rate_across, bend)
         if other < t:
             t, behind, across = other, other_behind, True
-    line = _line(scene.eta, y, w, state.near)
-    return Event(min(t, line), t < line, across, behind)
+    line = _line(scene.eta, y, w, near)
+    contact, t = t < line, min(t, line)
+    if t < math.inf:
+        way = (V + 0.5 * t) * t
+        if V < 0.0:  # the rim is thrown back first
+            back = 0.5 * V * V if t + V > 0.0 else -way
+            tally[RECOIL] = max(tally[RECOIL], tally[DEPTH] + back)
+        tally[DEPTH] = max(tally[DEPTH] - way, 0.0)
+        tally[WAY] += way
+        tally[TIME] += t
+        tally[EVENTS] += 1.0
+        if follows:
+            carry_flight(slopes, t)
+    gap, far = gap + (rate + 0.5 * bend * t) * t, far + (rate_across + 0.5 * bend * t) * t
+    return t, contact, across, behind, gap, far, Motion(y + w * t, V + t, w)
 
 
-@jit
-def _flown(scene, state, t, tally, slopes, follows):
-    """The state after a free flight."""
-    y, V, w = state.motion
-    _count_flight(tally, V, t)
+@jit_call
+def _held(scene, motion, side, tally, slopes, follows):
+    """Bounces that end in contact, and that until a tip: whether they do, the motion then, whether all ends there."""
+    t, after, widest = train(scene, motion, side)
+    if not train_ends(scene, motion, side, t, after, widest):
+        return False, motion, False
     if follows:
-        carry_flight(slopes, t)
-    bend = 1.0 - scene.c * w * w
-    gap = state.gap + ((V - _lever(scene, y) * w) + 0.5 * bend * t) * t
-    far = state.far + ((V + _lever(scene, -y) * w) + 0.5 * bend * t) * t
-    return State(gap, far, Motion(y + w * t, V + t, w), state.near)
+        carry_train(scene, slopes, motion, side, t)
+    away, W = centre(scene, motion, side)
+    _count_joint(tally, scene, away, W, side, t, side * after.y)
+    tally[LOSS] += scene.pallet * widest
+    tally[TRAINS] += 1.0
 
-
-@jit
-def _across_line(scene, state, tally, slopes, follows):
-    """The state where y passes -eta: the pallet across begins, or ceases, to be in the way of teeth."""
+    t, goal, speed, ends = slide(scene, after, side)
     if follows:
-        carry_line(slopes, state.motion)
-    y, w = -scene.eta, state.motion.w
-    far = reduced(_across(scene, state.gap, y))
-    _count_margin(tally, far)
-    return State(state.gap, far, Motion(y, state.motion.V, w), w > 0.0)
-
-
-@jit
-def _struck(scene, state, event, tally, slopes, follows):
-    """The state after an impact, and its speed of closing."""
-    y = state.motion.y
-    lever = -_lever(scene, -y) if event.across else _lever(scene, y)
-    if follows:
-        carry_impact(scene, slopes, state.motion, lever)
-    motion, closing = impact(scene, state.motion, lever)
-    _count_impact(tally, scene, motion, closing, lever)
-    touching = -1.0 if event.behind else 0.0
-    gap, far = (state.gap, touching) if event.across else (touching, state.far)
-    return State(gap, far, motion, state.near), closing
-
-
-@jit
-def _begun(scene, start, tally, slopes, follows):
-    """The state at a start."""
-    tally[DIP] = -scene.eta
-    tally[STRUCK] = 0.0
-    if follows:
-        for j in range(3):
-            for row in range(OF_T + 1):
-                slopes[row, j] = 0.0
-        slopes[OF_X, 0], slopes[OF_V, 1], slopes[OF_W, 2] = 1.0, 1.0, 1.0
-    return State(start.gap, 0.0, Motion(-scene.eta, start.V, start.w), False)
-
-
-@jit
-def _arrived(state, tally, slopes, follows):
-    """The start of the next half swing where y has risen through eta."""
-    if follows:
-        carry_line(slopes, state.motion)
-    _count_margin(tally, state.gap)
-    return _reflected(tally, reduced(state.far), state.motion.V, state.motion.w)
+        carry_slide(scene, slopes, after, side, speed)
+    _count_joint(tally, scene, side * after.y, side * after.w, side, t, goal)
+    tally[HELD] += t
+    return True, Motion(side * goal, speed, side * speed), ends
 
 
 @jit_call
@@ -279,35 +174,57 @@ def half_swing(scene, start, tally, slopes, follows):
 
     Adds to `tally`; where `follows`, `slopes` become the changes at the end by those at the start, without reflection.
     """
-    state = _begun(scene, start, tally, slopes, follows)
+    eta = scene.eta
+    tally[DIP], tally[STRUCK] = -eta, 0.0
+    if follows:
+        for j in range(3):
+            for row in range(OF_T + 1):
+                slopes[row, j] = 0.0
+        slopes[OF_X, 0], slopes[OF_V, 1], slopes[OF_W, 2] = 1.0, 1.0, 1.0
+    gap, far, motion, near = start.gap, 0.0, Motion(-eta, start.V, start.w), False
     for _ in range(CONTACT_LIMIT):
-        event = _next(scene, state)
-        if not (event.t < math.inf):
+        t, contact, across, behind, gap, far, motion = _flight(scene, gap, far, motion, near, tally, slopes, follows)
+        if not (t < math.inf):
             return start, TOO_MANY
-        state = _flown(scene, state, event.t, tally, slopes, follows)
-        if not event.contact:
-            if state.near and state.motion.w > 0.0:
-                return _arrived(state, tally, slopes, follows), DONE
-            state = _across_line(scene, state, tally, slopes, follows)
+        if not contact:
+            if follows:
+                carry_line(slopes, motion)
+            if near and motion.w > 0.0:  # y has risen through eta
+                _count_margin(tally, gap)
+                return _reflected(tally, reduced(far), motion.V, motion.w), DONE
+            # y passes -eta: the pallet across begins, or ceases, to be in the way of teeth
+            far = reduced(gap + 2.0 * -eta * (1.0 - scene.c * scene.y_i) - 0.5)
+            _count_margin(tally, far)
+            motion, near = Motion(-eta, motion.V, motion.w), motion.w > 0.0
             continue
-        state, closing = _struck(scene, state, event, tally, slopes, follows)
-        if event.behind:
+
+        lever = -_lever(scene, -motion.y) if across else _lever(scene, motion.y)
+        if follows:
+            carry_impact(scene, slopes, motion, lever)
+        motion, closing = impact(scene, motion, lever)
+        tally[LOSS] += impact_loss(scene, closing, lever)
+        tally[IMPACTS] += 1.0
+        tally[DIP] = min(tally[DIP], motion.y)
+        touching = -1.0 if behind else 0.0
+        gap, far = (gap, touching) if across else (touching, far)
+        if behind:
             continue
-        if not event.across:
-            _count_beat(tally, state.motion)
+        if not across and tally[STRUCK] == 0.0:
+            tally[STRUCK] = 1.0
+            tally[RIM] += motion.V
+            tally[PALLET] += motion.w
+            tally[BEATS] += 1.0
         if scene.c != 0.0:
             if magnitude(closing) * scene.e <= FAINT_BOUNCE:
                 return start, BENT_CONTACT
             continue
-        side = -1.0 if event.across else 1.0
-        motion, stays = _bounces_out(scene, state.motion, side, tally, slopes, follows)
-        if not stays:
-            continue
-        motion, ends = _slides_off(scene, motion, side, tally, slopes, follows)
-        other = reduced(2.0 * scene.eta - 0.5)
-        if ends:
-            return _reflected(tally, 0.0 if event.across else other, motion.V, motion.w), DONE
-        state = State(other, 0.0, motion, False)
+
+        stays, motion, ends = _held(scene, motion, -1.0 if across else 1.0, tally, slopes, follows)
+        if stays:
+            other = reduced(2.0 * eta - 0.5)
+            if ends:
+                return _reflected(tally, 0.0 if across else other, motion.V, motion.w), DONE
+            gap, far, near = other, 0.0, False
     return start, TOO_MANY
 
 

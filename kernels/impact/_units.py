@@ -85,26 +85,6 @@ class Sizes(NamedTuple):
 
 
 @jit
-def _masses(p):
-    """M and m in a common unit, as pairs, the larger in [1/2, 8), and whether neither is too small beside it."""
-    (m_c, e_c), (m_v, e_v) = mantissa_exponent(p.I_c), mantissa_exponent(p.I_v)
-    (s_c, f_c), (s_v, f_v) = mantissa_exponent(p.r_c), mantissa_exponent(p.r_v)
-    wheel = _pairs.times((m_c, 0.0 * m_c), _pairs.two_product(s_v, s_v))  # M/m = I_c r_v^2/(I_v r_c^2)
-    pallet = _pairs.times((m_v, 0.0 * m_v), _pairs.two_product(s_c, s_c))
-    e = (e_c + 2.0 * f_v) - (e_v + 2.0 * f_c)
-    fine = magnitude(e) < _KAPPA_LIMIT
-    e = where(fine, e, 0.0)
-    light, heavy = where(e < 0.0, e, 0.0), where(e > 0.0, -e, 0.0)
-    return _times_power(wheel, light), _times_power(pallet, heavy), fine
-
-
-@jit
-def _times_power(x, n):
-    """A pair times 2^n."""
-    return scale(x[0], n), scale(x[1], n)
-
-
-@jit
 def _escape(r_c, teeth, h):
     """eta = h teeth/(2 pi r_c) and slack = 1 - 4 eta, as pairs."""
     m, e = mantissa_exponent(r_c)
@@ -117,27 +97,31 @@ def _escape(r_c, teeth, h):
 
 @jit
 def without_dimensions(p):
-    """The scene, its units, and whether kappa is in range."""
-    wheel, pallet, fine = _masses(p)
+    """The scene, its units, and whether kappa is in range.
+
+    M/m = I_c r_v^2/(I_v r_c^2), both masses pairs in a common unit, the larger in [1/2, 8). T0^2 = p M/F =
+    2 pi I_c/(teeth torque) has no r_c in it.
+    """
+    (m_c, e_c), (m_v, e_v) = mantissa_exponent(p.I_c), mantissa_exponent(p.I_v)
+    (s_c, f_c), (s_v, f_v) = mantissa_exponent(p.r_c), mantissa_exponent(p.r_v)
+    wheel = _pairs.times((m_c, 0.0 * m_c), _pairs.two_product(s_v, s_v))
+    pallet = _pairs.times((m_v, 0.0 * m_v), _pairs.two_product(s_c, s_c))
+    e = (e_c + 2.0 * f_v) - (e_v + 2.0 * f_c)
+    fine = magnitude(e) < _KAPPA_LIMIT
+    e = where(fine, e, 0.0)
+    light, heavy = where(e < 0.0, e, 0.0), where(e > 0.0, -e, 0.0)
+    wheel, pallet = (scale(wheel[0], light), scale(wheel[1], light)), (scale(pallet[0], heavy), scale(pallet[1], heavy))
     both = _pairs.add(wheel, pallet)
     eta, slack = _escape(p.r_c, p.teeth, p.h)
     shares = _pairs.over(wheel, both), _pairs.over(pallet, both)
-    return Scene(shares[0], shares[1], _pairs.over(wheel, pallet), eta, slack, p.e, p.nu), _units(p), fine
+    scene = Scene(shares[0], shares[1], _pairs.over(wheel, pallet), eta, slack, p.e, p.nu)
 
-
-@jit
-def _units(p):
-    """The units of a clock.
-
-    T0^2 = p M/F = 2 pi I_c/(teeth torque) has no r_c in it.
-    """
-    (m_tau, e_tau), (m_c, e_c) = mantissa_exponent(p.torque), mantissa_exponent(p.I_c)
-    (s_c, f_c), (s_v, f_v) = mantissa_exponent(p.r_c), mantissa_exponent(p.r_v)
+    m_tau, e_tau = mantissa_exponent(p.torque)
     step = _TWO_PI[0] / p.teeth
     half = nearest(0.5 * (e_c - e_tau) - 0.25)
     odd = (e_c - e_tau) - 2.0 * half > 0.5
     time = sqrt(step * (m_c / m_tau) * where(odd, 2.0, 1.0))
-    return Units(time, half, step * s_c, f_c, s_c / s_v, f_c - f_v, step)
+    return scene, Units(time, half, step * s_c, f_c, s_c / s_v, f_c - f_v, step), fine
 
 
 @jit
