@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from sweep.explore.symmetries import SECONDS, scalings
+from sweep.explore.symmetries import scalings
 from sweep.study.model import Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
@@ -142,15 +142,15 @@ class Scaling:
         return dataset
 
 
-def scaling(study: Given, seconds: float = SECONDS) -> Scaling:
+def scaling(study: Given, seconds: float | None = None) -> Scaling:
     """Groups of a study's parameters, and how many of its axes are superfluous.
 
     Parameters
     ----------
     study : Study, path, mapping of its keys, or Dataset that came from it
-    seconds : float
-        What trying scalings on cells may take; of dear kernels those of the declared units alone are tried, on four
-        cells, or none, where that takes longer.
+    seconds : float, optional
+        What trying scalings on cells may take, else none is found. Default: about two, and longer for dear kernels, of
+        which those of the declared units alone are tried, on four cells.
 
     Raises
     ------
@@ -208,6 +208,9 @@ def scaling(study: Given, seconds: float = SECONDS) -> Scaling:
     )
 
 
-def advice_on(study: str, seconds: float) -> str:
-    """The advice on a study in JSON."""
-    return scaling(Study.from_json(study, allow_import=True), seconds).advice
+def advice_on(study: Study | str, seconds: float) -> str:
+    """The advice on a study, which may be JSON, as far as there is any in some seconds."""
+    given = Study.from_json(study, allow_import=True) if isinstance(study, str) else study
+    found = scaling(given, seconds)
+    late = "superfluous axes are not looked for, which would take as long as the run; sweep.scaling(study) does"
+    return found.advice if found.tried else late

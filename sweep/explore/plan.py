@@ -19,7 +19,7 @@ from sweep.cells.block import faults_reported, row_shape, sampled_by, sampled_st
 from sweep.cells.compiling import SILENT_SECONDS, Compiling
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.grid import Grid, empty_cells
-from sweep.cells.guard import SolveCells, Unsolved
+from sweep.cells.guard import Guard, SolveCells, Unsolved
 from sweep.cells.output_schema import output_schema, part_columns
 from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import strip_bytes
@@ -27,7 +27,7 @@ from sweep.cells.sample import require_asked
 from sweep.cells.solve import Solver
 from sweep.cells.timing import Sample, row_partition, tolerated
 from sweep.errors import SweepError
-from sweep.explore.groups import advice_on, scaling
+from sweep.explore.groups import advice_on
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import memory
 from sweep.runs.isolate import Processes, limit_of
@@ -43,17 +43,12 @@ WORTH_A_TRIAL = 1 << 28
 """where so many are to be written."""
 ADVICE_SECONDS = 10.0
 """What looking for superfluous axes may take, of a kernel that may not end."""
-NOT_TRIED = "superfluous axes are not looked for, which would take as long as the run; sweep.scaling(study) does"
 DRAWN = 64
 """Cells beside the ends of axes that are solved to see their methods and statuses,"""
 LOOK_SECONDS = 1.0
 """or as many as can be in this time,"""
 SHARE = 0.25
-"""or in this share of the run. So long may looking for superfluous axes take, too,"""
-SCALING_CELLS = 60
-"""which solves so many cells at least,"""
-SCALING_SECONDS = 0.1
-"""or this time, where cells are cheap."""
+"""or in this share of the run. So long may looking for superfluous axes take, too."""
 RUN_SECONDS = 0.15
 """What any run to a file takes beside its cells: opening, a sample, the end."""
 
@@ -190,10 +185,9 @@ def plan(
     if not isolate and cell_timeout is None:
         compiling = Compiling(study.kernel, study.kernel_name, note)
         sample = sampled_study(study, compiling)
-        found = _forecast(study, sample, Solver(replace(study, kernel=compiling.kernel)), crew, folder)
-        seconds = _scaling_seconds(found)
+        found = _forecast(study, sample, crew, folder)
         with faults_reported(f"{study.kernel_name}: the kernel failed"):
-            advice = scaling(study, seconds).advice if seconds else NOT_TRIED
+            advice = advice_on(study, SHARE * found.seconds)
         compiled = sum(compiling.seconds.values())
         again = 0.0 if _is_kept(study.kernel_name) else compiled
         return replace(found, seconds=found.seconds + again, compile_seconds=compiled, scaling=advice)
@@ -205,10 +199,9 @@ def plan(
         begun = time.monotonic()
         warm(solver, study)
         starting = time.monotonic() - begun
-        found = _forecast(study, sampled_by(solver, study, solver.clock), solver, crew, folder)
-        seconds = _scaling_seconds(found)
+        found = _forecast(study, sampled_by(solver, study, solver.clock), crew, folder, solver)
         try:
-            advice = solver.call(ADVICE_SECONDS, advice_on, study.to_json(), seconds) if seconds else NOT_TRIED
+            advice = solver.call(ADVICE_SECONDS, advice_on, study.to_json(), SHARE * found.seconds)
         except Unsolved as fault:
             advice = f"not known; while cells were tried at random, {fault}"
     finally:
@@ -217,19 +210,13 @@ def plan(
     return replace(found, seconds=starting + found.seconds, compile_seconds=compiled, scaling=advice)
 
 
-def _scaling_seconds(found: Plan) -> float:
-    """What looking for superfluous axes may take; 0 where it would take too large a share of the run's time."""
-    seconds = max(SCALING_SECONDS, SHARE * found.seconds)
-    return seconds if SCALING_CELLS * found.cell_seconds < seconds else 0.0
-
-
 def _is_kept(kernel: str) -> bool:
     """Whether the machine code of a kernel is there for the next run."""
     return machine_code_folder() is not None and ":" not in kernel
 
 
-def _forecast(study: Study, sample: Sample, solver: SolveCells, workers: int, folder: Path) -> Plan:
-    """What a timed sample says, and cells that a solver solves one by one."""
+def _forecast(study: Study, sample: Sample, workers: int, folder: Path, apart: SolveCells | None = None) -> Plan:
+    """What a timed sample says, and some cells, which are solved together; one by one where they are apart."""
     rows, grid, schema = row_blocks(study), Grid(study), output_schema(study, fingerprint(study))
     row_bytes = sum(column.cell_bytes for column in part_columns(study))
     blocks = row_partition(sample, rows, row_shape(study), row_bytes, workers)
@@ -237,7 +224,15 @@ def _forecast(study: Study, sample: Sample, solver: SolveCells, workers: int, fo
     writing = output / _disk_speed(folder) if output > WORTH_A_TRIAL else 0.0
     # blocks are written while others are computed
     seconds = RUN_SECONDS + max(sample.cost * rows.size / min(workers, blocks.count), writing)
-    status, used = _looked_at(solver, study, min(LOOK_SECONDS, SHARE * seconds))
+    chosen = _chosen(grid, int(min(LOOK_SECONDS, SHARE * seconds) / (sample.cost + (sample.call if apart else 0.0))))
+    cells = empty_cells(study, len(chosen))
+    cells.status[:], cells.used[:] = Status.PENDING, -1
+    if apart is None:
+        Guard(Solver(study, _Some(study, chosen)), lambda cell: None).solve(0, cells)
+    else:
+        for place, number in enumerate(chosen.tolist()):
+            with tolerated():
+                apart.solve(number, cells.rows(slice(place, place + 1)))
 
     def counted(numbers: Any, names: dict[int, str]) -> dict[str, float]:
         found, counts = np.unique(numbers, return_counts=True)
@@ -258,37 +253,40 @@ def _forecast(study: Study, sample: Sample, solver: SolveCells, workers: int, fo
         folder=str(folder),
         cell_seconds=sample.cost,
         seconds=seconds,
-        methods=counted(used, {-1: "none", **dict(enumerate(m.name for m in study.kernel.methods))}),
-        statuses=counted(status, {int(s): s.name for s in Status}),
-        sampled=len(status),
+        methods=counted(cells.used, {-1: "none", **dict(enumerate(m.name for m in study.kernel.methods))}),
+        statuses=counted(cells.status, {int(s): s.name for s in Status}),
+        sampled=len(chosen),
     )
 
 
-def _looked_at(solver: SolveCells, study: Study, seconds: float) -> tuple[Any, Any]:
-    """Statuses and methods of cells solved one by one: at the ends of axes, and one drawn from each of equal shares.
+def _chosen(grid: Grid, most: int) -> Any:
+    """Numbers of cells at the ends of axes, and of at most so many others, each drawn from one of equal shares.
 
     The ends are those of every axis, in the middle of the others, and of all axes at once: there a scene is most often
-    another one, and so is the method. Of the drawn ones as many are solved as can be in some seconds.
+    another one, and so is the method.
     """
-    shape = Grid(study).shape
-    middle, last = np.array(shape) // 2, np.array(shape) - 1
-    places = [np.zeros_like(last), last]
-    for axis in range(len(shape)):
-        places += [np.where(np.arange(len(shape)) == axis, end, middle) for end in (0 * last, last)]
-    ends = [int(np.ravel_multi_index(tuple(place), shape)) for place in places]
-    rng, size = np.random.default_rng(0), math.prod(shape)
-    drawn = (np.arange(DRAWN) + rng.random(DRAWN)) * (size / DRAWN)
-    status, used, begun = [], [], time.perf_counter()
-    for turn, number in enumerate(dict.fromkeys([*ends, *rng.permutation(drawn.astype(np.int64)).tolist()])):
-        if turn >= len(ends) and time.perf_counter() - begun > seconds:
-            break
-        cell = empty_cells(study, 1)
-        cell.status[:], cell.used[:] = Status.PENDING, -1
-        with tolerated():
-            solver.solve(number, cell)
-        status.append(cell.status)
-        used.append(cell.used)
-    return np.concatenate(status), np.concatenate(used)
+    last = np.array(grid.shape) - 1
+    places = [0 * last, last]
+    for axis in np.eye(len(last), dtype=np.int64):
+        places += [last // 2 * (1 - axis), last // 2 * (1 - axis) + last * axis]
+    ends = np.ravel_multi_index(tuple(np.transpose(places)), grid.shape)
+    rng = np.random.default_rng(0)
+    drawn = (np.arange(DRAWN) + rng.random(DRAWN)) * (grid.size / DRAWN)
+    return np.array(list(dict.fromkeys([*ends.tolist(), *rng.permutation(drawn.astype(np.int64))[:most].tolist()])))
+
+
+class _Some(Grid):
+    """Some cells of a study, by their numbers in its grid."""
+
+    def __init__(self, study: Study, numbers: Any) -> None:
+        super().__init__(study)
+        self.numbers, self.size = numbers, len(numbers)
+
+    def column(self, name: str, start: int, stop: int) -> Any:
+        return super().values(name, self.numbers[start:stop])
+
+    def values(self, name: str, cells: Any) -> Any:
+        return super().values(name, self.numbers[cells])
 
 
 def _disk_speed(folder: Path) -> float:

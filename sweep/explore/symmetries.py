@@ -36,6 +36,8 @@ TRIED_CELLS = 24
 FEWEST_CELLS = 4
 SECONDS = 2.0
 """That finding scalings may take; a dear kernel is asked for its declared units alone, in the fewest cells."""
+LEAST_SOLVED, LEAST_SECONDS = 60, 0.1
+"""Cells that are solved at least; a time that may always be taken."""
 RTOL = 1e-9
 """Cells are solved to that at least, for a loose tolerance lets pass what is none."""
 AGREEMENT = 30.0
@@ -90,8 +92,11 @@ def powers(field: Field) -> Weights:
     return {base: power for base, power in exponents(field.unit).items() if power}
 
 
-def scalings(study: Study, seconds: float = SECONDS) -> Scalings:
-    """Those that hold on random cells of a study. Raises SweepError where the kernel fails."""
+def scalings(study: Study, seconds: float | None = None) -> Scalings:
+    """Those that hold on random cells of a study; none, on no cells, where trying them takes longer than some seconds.
+
+    Raises SweepError where the kernel fails.
+    """
     study = dataclasses.replace(study, rtol=min(study.rtol, RTOL))
     along = [field for field in study.kernel.along if len(study.along[field.name])]
     fields = [*(field for field in study.kernel.parameters if _is_scalable(study, field)), *along]
@@ -107,7 +112,9 @@ def scalings(study: Study, seconds: float = SECONDS) -> Scalings:
     begun = time.perf_counter()
     solved(few)
     cost = (time.perf_counter() - begun) / FEWEST_CELLS
-    affordable = int(seconds / (cost * (4 * len(leading) + 16)))
+    if seconds is not None and LEAST_SOLVED * cost > max(seconds, LEAST_SECONDS):
+        return Scalings((), (), 0, 0)
+    affordable = int(max(seconds or SECONDS, LEAST_SECONDS) / (cost * (4 * len(leading) + 16)))
     cells = min(TRIED_CELLS, max(FEWEST_CELLS, affordable))
 
     trial = _Trial(study, leading, cells, seed=2)
