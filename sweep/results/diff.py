@@ -12,10 +12,8 @@ import xarray as xr
 
 from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.errors import SweepError
-from sweep.results.statuses import flag_words
-from sweep.words import columns, listed
-
-NUMBERS_AT_ONCE = 1 << 22
+from sweep.results.statuses import boxes, cell_values, flag_words
+from sweep.words import Table, listed
 
 
 @dataclass
@@ -78,15 +76,16 @@ class Difference:
         ]
         if self.missing:
             lines.append(f"outputs of one alone: {listed(self.missing, word='and')}")
-        rows = [(n, f"{d.cells:,} cells differ", f"by up to {d.largest:.2g}", d.example) for n, d in self._apart()]
+        rows = [
+            (name, f"{found.cells:,} cells differ", f"by up to {found.largest:.2g}", found.example)
+            for name, found in self.outputs.items()
+            if found.cells
+        ]
         rows += [(f"{a} -> {b}", f"{n:,} cells", "", self.examples[a, b]) for (a, b), n in self.statuses.items()]
         if self.same:
             within = f" to {self.rtol:g}" if self.rtol else ", bit for bit but for NaN"
             lines.append(f"the same{within}")
-        return "\n".join([*lines, columns(rows)] if rows else lines)
-
-    def _apart(self) -> Iterator[tuple[str, Distance]]:
-        return ((name, distance) for name, distance in self.outputs.items() if distance.cells)
+        return "\n".join([*lines, Table(rows).text()] if rows else lines)
 
 
 def diff(a: xr.Dataset, b: xr.Dataset | None = None, rtol: float = 0.0) -> Difference:
@@ -116,13 +115,44 @@ def diff(a: xr.Dataset, b: xr.Dataset | None = None, rtol: float = 0.0) -> Diffe
     (False, 2)
     """
     a, b = two_results("diff", a, b)
-    first, second = _shared(a, b)
+    if any(STATUS not in d for d in (a, b)):
+        raise SweepError("a summary keeps no cells to compare")
+    kernels = [str(d.attrs.get("kernel", "")) for d in (a, b)]
+    if kernels[0] != kernels[1]:
+        raise SweepError(f"the results are of different kernels, {kernels[0]} and {kernels[1]}")
+    if set(a[STATUS].dims) != set(b[STATUS].dims):
+        dims = [listed(map(str, d[STATUS].dims), word="and") for d in (a, b)]
+        raise SweepError(f"the cells run along {dims[0]} in one result and along {dims[1]} in the other")
+    for dim in a[STATUS].dims:
+        # cells without a value of their own are told apart by their number, so they must be the same ones
+        along = [name for name, c in a.coords.items() if c.dims[:1] == (dim,) and dim not in a.coords]
+        same = all(name in b.coords and a[name].equals(b[name]) for name in along)
+        if dim not in a.coords and (a.sizes[dim] != b.sizes[dim] or not same):
+            raise SweepError(f"the points along {dim} are not the same in both; compare results of one design")
+    first, second = xr.align(a, b, join="inner", copy=False)
+
+    cells = first[STATUS].dims
     total = [math.prod(d[STATUS].shape) for d in (a, b, first)]
     names = [{str(n) for n in d.data_vars} - set(ANCILLARY) for d in (a, b)]
     found = Difference(total[2], total[0] - total[2], total[1] - total[2], tuple(sorted(names[0] ^ names[1])), rtol)
     for name in (str(n) for n in a.data_vars if str(n) in names[0] & names[1]):
-        found.outputs[name] = _distance(first, second, name, rtol)
-    _compare_statuses(found, first, second)
+        distance = found.outputs[name] = Distance()
+        order = (*cells, *(d for d in first[name].dims if d not in cells))
+        for cell, x, y in _pieces(first[name].transpose(*order), second[name].transpose(*order)):
+            apart = _relative(x, y).max(axis=tuple(range(len(cells), x.ndim)), initial=0.0)
+            distance.cells += int((apart > rtol).sum())
+            if apart.size and apart.max() > distance.largest:
+                distance.largest = float(apart.max())
+                distance.example = _example(first, cell, apart.shape, int(apart.argmax()))
+    words = [flag_words(d[STATUS]) for d in (first, second)]
+    for cell, x, y in _pieces(first[STATUS], second[STATUS].transpose(*cells)):
+        codes = np.stack([x.ravel(), y.ravel()])
+        pairs, places, counts = np.unique(codes, axis=1, return_index=True, return_counts=True)
+        for one, other, place, count in zip(*pairs.tolist(), places.tolist(), counts.tolist(), strict=True):
+            if one != other:
+                pair = words[0].get(one, str(one)), words[1].get(other, str(other))
+                found.statuses[pair] = found.statuses.get(pair, 0) + count
+                found.examples.setdefault(pair, _example(first, cell, x.shape, place))
     return found
 
 
@@ -137,44 +167,6 @@ def two_results(name: str, a: Any, b: Any) -> tuple[xr.Dataset, xr.Dataset]:
     )
 
 
-def _shared(a: xr.Dataset, b: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset]:
-    """The cells that both have, in one order. Raises SweepError."""
-    if any(STATUS not in d for d in (a, b)):
-        raise SweepError("a summary keeps no cells to compare")
-    kernels = [str(d.attrs.get("kernel", "")) for d in (a, b)]
-    if kernels[0] != kernels[1]:
-        raise SweepError(f"the results are of different kernels, {kernels[0]} and {kernels[1]}")
-    if set(a[STATUS].dims) != set(b[STATUS].dims):
-        dims = [listed(map(str, d[STATUS].dims), word="and") for d in (a, b)]
-        raise SweepError(f"the cells run along {dims[0]} in one result and along {dims[1]} in the other")
-    for dim in a[STATUS].dims:
-        _require_alike(a, b, str(dim))
-    first, second = xr.align(a, b, join="inner", copy=False)
-    return first, second
-
-
-def _require_alike(a: xr.Dataset, b: xr.Dataset, dim: str) -> None:
-    """Cells without a value of their own are told apart by their number, so they must be the same ones."""
-    if dim in a.coords:
-        return
-    along = [name for name, c in a.coords.items() if c.dims[:1] == (dim,)]
-    if a.sizes[dim] != b.sizes[dim] or not all(name in b.coords and a[name].equals(b[name]) for name in along):
-        raise SweepError(f"the points along {dim} are not the same in both; compare results of one design")
-
-
-def _distance(a: xr.Dataset, b: xr.Dataset, name: str, rtol: float) -> Distance:
-    found = Distance()
-    cells = a[STATUS].dims
-    order = (*cells, *(d for d in a[name].dims if d not in cells))
-    for start, x, y in _pieces(a[name].transpose(*order), b[name].transpose(*order)):
-        apart = _relative(x, y).max(axis=tuple(range(len(cells), x.ndim)), initial=0.0)
-        found.cells += int((apart > rtol).sum())
-        if apart.size and apart.max() > found.largest:
-            found.largest = float(apart.max())
-            found.example = _cell(a, start, np.unravel_index(int(apart.argmax()), apart.shape))
-    return found
-
-
 def _relative(x: Any, y: Any) -> Any:
     """Relative distances; 0 of equal values and of two NaN, infinite where one alone is NaN."""
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
@@ -184,36 +176,14 @@ def _relative(x: Any, y: Any) -> Any:
     return found
 
 
-def _compare_statuses(found: Difference, a: xr.Dataset, b: xr.Dataset) -> None:
-    words = [flag_words(d[STATUS]) for d in (a, b)]
-    for start, x, y in _pieces(a[STATUS], b[STATUS].transpose(*a[STATUS].dims)):
-        pairs, first, counts = np.unique(
-            np.stack([x.ravel(), y.ravel()]), axis=1, return_index=True, return_counts=True
-        )
-        for one, other, place, count in zip(*pairs.tolist(), first.tolist(), counts.tolist(), strict=True):
-            if one == other:
-                continue
-            pair = words[0].get(one, str(one)), words[1].get(other, str(other))
-            found.statuses[pair] = found.statuses.get(pair, 0) + count
-            found.examples.setdefault(pair, _cell(a, start, np.unravel_index(place, x.shape)))
+def _pieces(a: xr.DataArray, b: xr.DataArray) -> Iterator[tuple[list[int], Any, Any]]:
+    """Numbers of both, a few million at a time, and where they begin."""
+    for box in boxes(a.shape):
+        yield [part.start for part in box], a[box].values, b[box].values
 
 
-def _pieces(a: xr.DataArray, b: xr.DataArray) -> Iterator[tuple[int, Any, Any]]:
-    """Numbers of both, a few million at a time, and where along the first dimension they begin."""
-    if not a.dims:
-        yield 0, a.values.reshape(1), b.values.reshape(1)
-        return
-    rows = max(1, NUMBERS_AT_ONCE // max(1, a.size // max(1, a.shape[0])))
-    for start in range(0, a.shape[0], rows):
-        yield start, a[start : start + rows].values, b[start : start + rows].values
-
-
-def _cell(dataset: xr.Dataset, start: int, place: tuple[Any, ...]) -> str:
-    """The coordinates of a cell, as people write them."""
-    at = dict(zip(map(str, dataset[STATUS].dims), (start + int(place[0]), *map(int, place[1:])), strict=True))
-    texts = []
-    for name, coordinate in dataset.coords.items():
-        if coordinate.dims and set(map(str, coordinate.dims)) <= set(at):
-            value = coordinate.values[tuple(at[str(d)] for d in coordinate.dims)].item()
-            texts.append(f"{name}={value if isinstance(value, str) else f'{value:.6g}'}")
-    return "e.g. " + " ".join(texts)
+def _example(dataset: xr.Dataset, first: list[int], shape: tuple[int, ...], place: int) -> str:
+    """A cell, by its place in a piece of a shape that begins at some cell."""
+    at = [start + int(step) for start, step in zip(first, np.unravel_index(place, shape), strict=False)]
+    number = np.ravel_multi_index(at, dataset[STATUS].shape) if at else 0
+    return "e.g. " + " ".join(f"{name}={value}" for name, value in cell_values(dataset, int(number)).items())

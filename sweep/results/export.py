@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import csv
 import functools
-import itertools
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -18,7 +17,7 @@ from sweep.cells.reduce import BY_METHOD, BY_STATUS
 from sweep.errors import SweepError, missing
 from sweep.file import disk
 from sweep.file.overwriting import check_target
-from sweep.results.statuses import flag_words, is_summary
+from sweep.results.statuses import boxes, flag_words, is_summary
 from sweep.words import as_path, cell, listed, require_dataset
 
 EXPORTED = "exported by foliot"
@@ -82,9 +81,10 @@ def export(
     check_target(target, force=force, read=[Path(source)] if source else [])
     try:
         with disk.replacing(target) as part:
+            history = [text for text in str(dataset.attrs.get("history", "")).splitlines() if text != EXPORTED]
             whole = _in_float32(dataset) if float32 else dataset
             writer = functools.partial(PACKED[kind], compress=True) if compress else WRITERS[kind]
-            writer(_marked(whole), part)
+            writer(whole.assign_attrs(history="\n".join([*history, EXPORTED])), part)
     except ImportError as error:
         raise missing(f"{target}: needs {error.name}", "export") from None
     except RuntimeError as error:  # from HDF5
@@ -94,67 +94,79 @@ def export(
 
 def _in_float32(dataset: xr.Dataset) -> xr.Dataset:
     """The Dataset with its outputs in float32. Raises SweepError, maybe as it is written, where that is too narrow."""
+
+    def single(values: Any, name: str) -> Any:
+        with np.errstate(over="ignore", under="ignore"):
+            found = np.asarray(values).astype(np.float32)
+        limits = np.finfo(np.float32)
+        lost = np.isfinite(values) & (np.isinf(found) | ((abs(found) < limits.smallest_normal) & (values != 0)))
+        if lost.any():
+            raise SweepError(f"{name}: float32 cannot hold {np.asarray(values)[lost].flat[0]!r}; export it in float64")
+        return found
+
     whole = _in_pieces(dataset)
+    options: Any = {"dask": "parallelized", "output_dtypes": [np.float32], "keep_attrs": True}
     doubles = {name: v for name, v in whole.data_vars.items() if v.dtype == np.float64}
-    return whole.assign({name: _narrowed(str(name), v) for name, v in doubles.items()})
-
-
-def _narrowed(name: str, variable: xr.DataArray) -> xr.DataArray:
-    found: xr.DataArray = xr.apply_ufunc(
-        functools.partial(_single, name), variable, dask="parallelized", output_dtypes=[np.float32], keep_attrs=True
-    )
-    return found
-
-
-def _single(name: str, values: Any) -> Any:
-    with np.errstate(over="ignore", under="ignore"):
-        found = np.asarray(values).astype(np.float32)
-    limits = np.finfo(np.float32)
-    lost = np.isfinite(values) & (np.isinf(found) | ((abs(found) < limits.smallest_normal) & (values != 0)))
-    if lost.any():
-        raise SweepError(f"{name}: float32 cannot hold {np.asarray(values)[lost].flat[0]!r}; export it in float64")
-    return found
-
-
-def _marked(dataset: xr.Dataset) -> xr.Dataset:
-    """The Dataset, whose history says what it is."""
-    history = [text for text in str(dataset.attrs.get("history", "")).splitlines() if text != EXPORTED]
-    return dataset.assign_attrs(history="\n".join([*history, EXPORTED]))
+    return whole.assign({n: xr.apply_ufunc(single, v, kwargs={"name": str(n)}, **options) for n, v in doubles.items()})
 
 
 def _write_csv(dataset: xr.Dataset, path: Path) -> None:
-    dataset = flat(dataset)
-    names = [str(name) for name in (*dataset.coords, *dataset.data_vars)]
     with path.open("w", newline="", encoding="utf-8") as file:
         file.write(f"# {EXPORTED}\n")
-        _write_units(dataset, names, file)
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(map(cell, names))
-        for block in _blocks(dataset):
-            writer.writerows(zip(*(_cells(block, name) for name in names), strict=True))
+        whole = flat(dataset)
+        for name, variable in (*whole.coords.items(), *whole.data_vars.items()):
+            unit = f" [{variable.attrs['units']}]" if "units" in variable.attrs else ""
+            # a quotation mark could open a quoted field that swallows the lines below
+            about = " ".join(str(variable.attrs.get("long_name", "")).replace('"', "'").split())
+            file.write(f"# {' '.join(f'{name}{unit}'.split())}{': ' + about if about else ''}\n")
+        writer = csv.writer(file, lineterminator="\n")  # faster than that of pandas
+        writer.writerow(map(cell, (*whole.coords, *whole.data_vars)))
+        for table in _tables(dataset):
+            columns = (column.tolist() for _, column in table.items())
+            numbers = (column.dtype.kind in "fiu" for _, column in table.items())
+            texts = (c if plain else map(cell, c) for c, plain in zip(columns, numbers, strict=True))
+            writer.writerows(zip(*texts, strict=True))
 
 
 def _write_parquet(dataset: xr.Dataset, path: Path) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    def text(attrs: Mapping[Any, Any]) -> dict[str, str]:
+        """As parquet wants attributes; flags are words in a table."""
+        return {str(name): str(value) for name, value in attrs.items() if name not in ("flag_values", "flag_meanings")}
+
+    variables, writer = flat(dataset).variables, None
+    try:
+        for table in _tables(dataset):
+            arrays = [pa.array(column.to_numpy()) for _, column in table.items()]
+            if writer is None:
+                fields = [
+                    pa.field(str(name), array.type, metadata=text(variables[name].attrs))
+                    for name, array in zip(table, arrays, strict=True)
+                ]
+                schema = pa.schema(fields, metadata=text(dataset.attrs))
+                writer = pq.ParquetWriter(path, schema)
+            writer.write_table(pa.table(arrays, schema=schema))
+    finally:
+        if writer is not None:
+            writer.close()
+
+
+def _tables(dataset: xr.Dataset) -> Iterator[Any]:
+    """pandas tables of at most about `ROWS` rows: one for each cell, and place of a trace; flags as words."""
     dataset = flat(dataset)
-    names = [str(name) for name in (*dataset.coords, *dataset.data_vars)]
-    fields = [pa.field(name, _arrow_type(dataset[name], pa), metadata=_text(dataset[name].attrs)) for name in names]
-    schema = pa.schema(fields, metadata=_text(dataset.attrs))
-    with pq.ParquetWriter(path, schema) as writer:
-        for block in _blocks(dataset):
-            writer.write_table(pa.table([_column(block, name) for name in names], schema=schema))
-
-
-def _arrow_type(variable: xr.DataArray, pa: Any) -> Any:
-    words = flag_words(variable) or variable.dtype.kind not in "fiu"
-    return pa.string() if words else pa.from_numpy_dtype(variable.dtype)
-
-
-def _text(attrs: Mapping[Any, Any]) -> dict[str, str]:
-    """Attributes as text, as parquet wants them; flags are words in a table."""
-    return {str(name): str(value) for name, value in attrs.items() if name not in ("flag_values", "flag_meanings")}
+    cells = dataset["status"].dims if "status" in dataset else ()
+    dims = list(dict.fromkeys((*cells, *dataset.sizes)))
+    for box in boxes([dataset.sizes[dim] for dim in dims], ROWS):
+        block = dataset.isel(dict(zip(dims, box, strict=True))).load()
+        # a dataset of no dimension has one row
+        frame = block.to_dataframe(dim_order=dims) if dims else block.expand_dims("cell").to_dataframe()
+        table = frame.reset_index()[[*dataset.coords, *dataset.data_vars]]
+        for name in table:
+            if words := flag_words(dataset[name]):
+                table[name] = [words.get(code, str(code)) for code in table[name].tolist()]
+        yield table
 
 
 def _write_zarr(dataset: xr.Dataset, path: Path, compress: bool = False) -> None:
@@ -171,52 +183,6 @@ def _write_zarr(dataset: xr.Dataset, path: Path, compress: bool = False) -> None
 def _in_pieces(dataset: xr.Dataset) -> xr.Dataset:
     """The same, in pieces where it is large."""
     return dataset.chunk("auto") if dataset.nbytes > LARGE and not dataset.chunks else dataset
-
-
-def _write_units(dataset: xr.Dataset, names: list[str], file: TextIO) -> None:
-    for name in names:
-        attrs = dataset[name].attrs
-        unit = f" [{attrs['units']}]" if "units" in attrs else ""
-        # a quotation mark could open a quoted field that swallows the lines below
-        about = " ".join(str(attrs.get("long_name", "")).replace('"', "'").split())
-        file.write(f"# {' '.join(f'{name}{unit}'.split())}{': ' + about if about else ''}\n")
-
-
-def _blocks(dataset: xr.Dataset) -> Iterator[xr.Dataset]:
-    """Parts of at most about `ROWS` rows, in C order of the dimensions."""
-    dims = _dimensions(dataset)
-    inner = 1
-    chunks: dict[str, int] = {}
-    for dim in reversed(dims):
-        chunks[dim] = max(1, min(dataset.sizes[dim], ROWS // inner))
-        inner *= dataset.sizes[dim]
-    starts = (range(0, dataset.sizes[dim], chunks[dim]) for dim in dims)
-    for corner in itertools.product(*starts):
-        pieces = {dim: slice(start, start + chunks[dim]) for dim, start in zip(dims, corner, strict=True)}
-        yield dataset.isel(pieces).load() if dims else dataset.load()
-
-
-def _dimensions(dataset: xr.Dataset) -> list[str]:
-    """Dimensions of the cells as the status has them, then those of traces."""
-    cells = dataset["status"].dims if "status" in dataset else ()
-    return list(dict.fromkeys(str(dim) for dim in (*cells, *dataset.sizes)))
-
-
-def _column(block: xr.Dataset, name: str) -> list[Any]:
-    """Values of one column, one for each row of the block."""
-    dims, variable = _dimensions(block), block[name]
-    values = variable.transpose(*(dim for dim in dims if dim in variable.dims)).values
-    values = values.reshape([block.sizes[dim] if dim in variable.dims else 1 for dim in dims])
-    column = np.broadcast_to(values, [block.sizes[dim] for dim in dims]).reshape(-1).tolist()
-    words = flag_words(variable)
-    return [words.get(code, code) for code in column] if words else column
-
-
-def _cells(block: xr.Dataset, name: str) -> list[Any]:
-    """The same as csv has it."""
-    column = _column(block, name)
-    text = flag_words(block[name]) or block[name].dtype.kind not in "fiu"
-    return [cell(value) for value in column] if text else column
 
 
 def flat(dataset: xr.Dataset) -> xr.Dataset:

@@ -38,25 +38,14 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
     array([1., 2.])
     """
     require_dataset("where", dataset)
-    if STATUS not in dataset:
-        raise _refusal(condition, "a summary keeps no cells to choose from")
-    truth = _condition(dataset, condition).truth()
-    dims = [str(dim) for dim in dataset[STATUS].dims]
-    if set(truth.dims) - set(dims):
-        raise _refusal(condition, f"runs along {listed(sorted(map(str, set(truth.dims) - set(dims))))}, not the cells")
-    flat = dataset if dims == ["cell"] else dataset.stack(cell=dims, create_index=False)
-    flat = flat.transpose("cell", ...)
-    mask = truth.broadcast_like(dataset[STATUS]).transpose(*dims).values.ravel()
-    return flat.isel(cell=np.flatnonzero(mask))
 
-
-def _condition(dataset: xr.Dataset, text: str) -> Condition:
-    """On the variables of a dataset, flags as words."""
+    def refused(what: str) -> SweepError:
+        return SweepError(f"--where {condition}: {what}")
 
     def variable(name: str) -> xr.DataArray:
+        """A variable with flags as words."""
         if name not in dataset.variables:
-            hint = did_you_mean(name, map(str, dataset.variables))
-            raise _refusal(text, f"the result has no {name}{hint}")
+            raise refused(f"the result has no {name}{did_you_mean(name, map(str, dataset.variables))}")
         found = dataset[name].compute()
         words = flag_words(found)
         if not words:
@@ -68,8 +57,12 @@ def _condition(dataset: xr.Dataset, text: str) -> Condition:
     def words(name: str) -> Iterable[str]:
         return flag_words(dataset[name]).values() or sorted(set(map(str, np.unique(dataset[name].values))))
 
-    return Condition(text, variable, words, "--where ")
-
-
-def _refusal(condition: str, what: str) -> SweepError:
-    return SweepError(f"--where {condition}: {what}")
+    if STATUS not in dataset:
+        raise refused("a summary keeps no cells to choose from")
+    truth = Condition(condition, variable, words, "--where ").truth()
+    dims = [str(dim) for dim in dataset[STATUS].dims]
+    if others := sorted({str(dim) for dim in truth.dims} - set(dims)):
+        raise refused(f"runs along {listed(others)}, not the cells")
+    flat = dataset if dims == ["cell"] else dataset.stack(cell=dims, create_index=False)
+    mask = truth.broadcast_like(dataset[STATUS]).transpose(*dims).values.ravel()
+    return flat.transpose("cell", ...).isel(cell=np.flatnonzero(mask))

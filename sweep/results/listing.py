@@ -11,7 +11,7 @@ from kernels.interface import KINDS
 from sweep.errors import SweepError
 from sweep.file.open import changed, open_result
 from sweep.results.statuses import account, kind_of, tally
-from sweep.words import as_path, columns
+from sweep.words import Table, as_path
 
 UNFINISHED = re.compile(r"(.+\.(?:h5|nc))\.(?:parts|unfinished)")
 """What a sweep that still runs has beside its output."""
@@ -72,7 +72,8 @@ class Listing(tuple[Listed, ...]):
         if not self:
             return "no results here"
         shown = [i for i, name in enumerate(HEADINGS) if complete or name not in LATER]
-        return columns([[row[i] for i in shown] for row in (HEADINGS, *(found.row for found in self))], "", complete)
+        rows = [[found.row[i] for i in shown] for found in self]
+        return Table(rows, [HEADINGS[i] for i in shown]).text("", complete)
 
     __repr__ = __str__
 
@@ -106,16 +107,15 @@ def list_results(folder: str | os.PathLike[str] = ".") -> Listing:
 def _listed(path: Path) -> Listed:
     try:
         with open_result(path) as dataset, changed(path):
-            cells = account(dataset)
-            attrs = {name: str(value) for name, value in dataset.attrs.items()}
+            attrs, statuses, cells = dataset.attrs, tally(dataset), account(dataset)
             return Listed(
                 path=path,
-                question=attrs.get("question") or attrs.get("title", ""),
+                question=str(attrs.get("question") or attrs.get("title", "")),
                 cells=cells.total,
                 done=(cells.total - cells.pending) / cells.total,
-                statuses=tally(dataset),
-                when=attrs.get("end", attrs.get("start", "")),
-                version=attrs.get("versions", "").partition(",")[0].removeprefix("foliot "),
+                statuses=statuses,
+                when=str(attrs.get("end", attrs.get("start", ""))),
+                version=str(attrs.get("versions", "")).partition(",")[0].removeprefix("foliot "),
             )
     except (SweepError, OSError) as fault:
         return Listed(path, fault=str(fault).removeprefix(f"{path}: "))

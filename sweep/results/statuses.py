@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     Cells: TypeAlias = xr.Dataset | Stored
 
-CELLS_AT_ONCE = 1 << 22
+NUMBERS_AT_ONCE = 1 << 22
 
 
 @dataclass(frozen=True)
@@ -119,65 +119,60 @@ def count_statuses(dataset: Cells) -> list[StatusCount]:
     if is_summary(dataset):
         found = summed(dataset, BY_STATUS)
         return [StatusCount(name, cells, sum(found.values())) for name, cells in found.items()]
-    counts, first = _tally(dataset[STATUS])
-    total = int(counts.sum())
+    counts, names = _tally(dataset[STATUS]), {int(status): status.name for status in Status}
+    total = sum(cells for cells, _ in counts.values())
     return [
-        StatusCount(_name(n), int(counts[n]), total, {} if n == Status.OK else cell_values(dataset, first[n]))
-        for n in range(len(counts))
-        if counts[n]
+        StatusCount(
+            names.get(code, f"status {code}"), cells, total, {} if code == Status.OK else cell_values(dataset, first)
+        )
+        for code, (cells, first) in sorted(counts.items())
     ]
-
-
-def failures(dataset: Cells) -> list[StatusCount]:
-    """The statuses that are not OK."""
-    return [count for count in count_statuses(dataset) if count.name != Status.OK.name]
 
 
 def count_methods(dataset: Cells) -> dict[str, int]:
     """How many cells each method solved; those that none did are left out."""
     if is_summary(dataset):
         return {name: n for name, n in summed(dataset, BY_METHOD).items() if name != "none"}
-    counts, _ = _tally(dataset[METHOD_USED], lowest=-1)
-    names = str(dataset[METHOD_USED].attrs["flag_meanings"]).split()
-    return {name: int(n) for name, n in zip(names[1:], counts[1:], strict=False) if n}
+    names = str(dataset[METHOD_USED].attrs["flag_meanings"]).split()[1:]
+    counts = _tally(dataset[METHOD_USED])
+    return {name: counts[number][0] for number, name in enumerate(names) if number in counts}
 
 
 def summary_text(dataset: Cells) -> str:
     """After a run: what the cells were solved with, and what became of those that are not OK."""
     used = ", ".join(f"{name} {cells:,}" for name, cells in count_methods(dataset).items())
-    lines = [f"{account(dataset)}" + (f"; solved by {used}" if used else "")]
-    return "\n".join([*lines, *map(str, failures(dataset))])
+    others = (str(count) for count in count_statuses(dataset) if count.name != Status.OK.name)
+    return "\n".join([f"{account(dataset)}" + (f"; solved by {used}" if used else ""), *others])
 
 
-def _tally(column: xr.DataArray | StoredColumn, lowest: int = 0) -> tuple[Any, dict[int, int]]:
-    """Cells of each number from `lowest` on, and the flat index of the first of each (both counted from `lowest`)."""
-    counts = np.zeros(256, np.int64)
-    first: dict[int, int] = {}
+def _tally(column: xr.DataArray | StoredColumn) -> dict[int, tuple[int, int]]:
+    """How many cells have each code, and the number of the first of them."""
+    found: dict[int, tuple[int, int]] = {}
     done = 0
     for piece in flat_pieces(column):
-        values = (piece.astype(np.int16) - lowest) & 255
-        found = np.bincount(values, minlength=256)
-        for number in np.flatnonzero(found):
-            if int(number) not in first:
-                first[int(number)] = done + int(np.argmax(values == number))
-        counts += found
-        done += len(values)
-    return counts, first
+        # numpy.unique would sort the cells
+        for code in np.flatnonzero(np.bincount(piece.astype(np.int16) + 128, minlength=256)) - 128:
+            here = piece == code
+            cells, first = found.get(int(code), (0, done + int(here.argmax())))
+            found[int(code)] = cells + int(here.sum()), first
+        done += len(piece)
+    return found
 
 
-def flat_pieces(column: xr.DataArray | StoredColumn | Numbers, at: tuple[int, ...] = ()) -> Iterator[Any]:
-    """The cells in C order, some at a time; `at` are indices along the first dimensions."""
-    shape = column.shape[len(at) :]
-    row = math.prod(shape[1:])
-    if not shape:
-        yield np.asarray(column[at]).reshape(1)
-    elif row > CELLS_AT_ONCE:
-        for index in range(shape[0]):
-            yield from flat_pieces(column, (*at, index))
-    else:
-        rows = max(1, CELLS_AT_ONCE // max(1, row))
-        for start in range(0, shape[0], rows):
-            yield np.asarray(column[(*at, slice(start, start + rows))]).reshape(-1)
+def boxes(shape: Sequence[int], most: int = NUMBERS_AT_ONCE) -> Iterator[tuple[slice, ...]]:
+    """Boxes of at most so many places, in C order: a run along one dimension, whole ones behind it."""
+    steps: list[int] = []
+    inner = 1
+    for length in reversed(shape):
+        steps.insert(0, max(1, min(length, most // max(1, inner))))
+        inner *= length
+    for corner in itertools.product(*(range(0, length, step) for length, step in zip(shape, steps, strict=True))):
+        yield tuple(slice(start, start + step) for start, step in zip(corner, steps, strict=True))
+
+
+def flat_pieces(column: xr.DataArray | StoredColumn | Numbers) -> Iterator[Any]:
+    """The cells in C order, a few million at a time."""
+    return (np.asarray(column[box]).reshape(-1) for box in boxes(column.shape))
 
 
 def failed_cells(dataset: Cells, most: int) -> list[int]:
@@ -190,10 +185,6 @@ def failed_cells(dataset: Cells, most: int) -> list[int]:
         found += (done + np.flatnonzero(piece == Status.FAILED)).tolist()
         done += len(piece)
     return found[:most]
-
-
-def _name(number: int) -> str:
-    return next((status.name for status in Status if status == number), f"status {number}")
 
 
 def cell_values(dataset: Cells, index: int) -> dict[str, str]:

@@ -37,23 +37,18 @@ def in_units(dataset: xr.Dataset, units: Mapping[str, str]) -> xr.Dataset:
     'degree'
     """
     require_dataset("in_units", dataset)
-    mistakes = Mistakes()
-    factors = {name: _factor(dataset, name, unit, mistakes) for name, unit in units.items()}
-    mistakes.raise_if_any("units")
+    mistakes, found = Mistakes(), {}
     for name, unit in units.items():
-        old = dataset[name]
-        dataset = dataset.assign({name: (old.dims, (old * float(factors[name])).data, {**old.attrs, "units": unit})})
-    return dataset
-
-
-def _factor(dataset: xr.Dataset, name: str, unit: str, mistakes: Mistakes) -> Decimal:
-    if name not in dataset.variables:
-        mistakes.add(name, f"the result has no such variable{did_you_mean(name, map(str, dataset.variables))}")
-    elif "units" not in dataset[name].attrs or dataset[name].dtype.kind != "f":
-        mistakes.add(name, "has words or counts, which have no unit")
-    else:
-        try:
-            return 1 / (scale(unit, dataset[name].attrs["units"], name) or Decimal(1))
-        except UnitMistake as error:
-            mistakes.add(name, str(error))
-    return Decimal(1)
+        if name not in dataset.variables:
+            mistakes.add(name, f"the result has no such variable{did_you_mean(name, map(str, dataset.variables))}")
+        elif "units" not in dataset[name].attrs or dataset[name].dtype.kind != "f":
+            mistakes.add(name, "has words or counts, which have no unit")
+        else:
+            try:
+                old = dataset[name]
+                factor = float(1 / (scale(unit, old.attrs["units"], name) or Decimal(1)))
+                found[name] = (old.dims, (old * factor).data, {**old.attrs, "units": unit})
+            except UnitMistake as error:
+                mistakes.add(name, str(error))
+    mistakes.raise_if_any("units")
+    return dataset.assign(found)

@@ -31,8 +31,8 @@ def test_the_cell_and_the_distance_are_told(result):
     found = sweep.diff(result, other)
     assert found.outputs["fall_time"].cells == 2
     assert found.outputs["fall_time"].largest == pytest.approx(1e-3, rel=1e-9)
-    assert found.outputs["fall_time"].example == "e.g. height=4 v0=1"
-    assert (found.outputs["drop"].cells, found.outputs["drop"].example) == (1, "e.g. height=1 v0=1")
+    assert found.outputs["fall_time"].example == "e.g. height=4.0 v0=1.0"
+    assert (found.outputs["drop"].cells, found.outputs["drop"].example) == (1, "e.g. height=1.0 v0=1.0")
     assert not found.same
     assert sweep.diff(result, other, rtol=1e-5).outputs["fall_time"].cells == 1
     other = result.copy(deep=True)
@@ -56,7 +56,7 @@ def test_statuses_are_compared(result):
     other.status[2, :] = Status.BAD_INPUT
     found = sweep.diff(result, other, rtol=1.0)
     assert found.statuses == {("OK", "INACCURATE"): 1, ("OK", "BAD_INPUT"): 2}
-    assert found.examples["OK", "BAD_INPUT"] == "e.g. height=4 v0=0"
+    assert found.examples["OK", "BAD_INPUT"] == "e.g. height=4.0 v0=0.0"
     assert not found.same
 
 
