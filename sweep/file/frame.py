@@ -78,7 +78,7 @@ def cuts_of(study: Study, schema: Schema, blocks: Partition) -> dict[str, Cut]:
 
 def expected_size(schema: Schema, cuts: Mapping[str, Cut]) -> int:
     """Bytes that a result will take, but for some thousands: its names, what HDF5 says of each chunk, the chunks."""
-    size = (32 << 10) + sum(len(str(text)) for text in schema.attrs.values())
+    size = (14 << 10) + sum(len(str(text)) for text in schema.attrs.values())
     size += sum(np.asarray(coordinate.values).nbytes for coordinate in schema.coordinates)
     for cut in cuts.values():
         for column in cut.columns:
