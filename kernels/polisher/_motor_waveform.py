@@ -120,15 +120,6 @@ def pace(lengths, margin, s, c):
     return Pace(turn, opened, bend, opening(lengths, squared, rz))
 
 
-@jit
-def smooth(lengths, margin):
-    """Whether all that counts of (2) is in the harmonics of (3)."""
-    b, d, f, e = lengths
-    m1, m2, m3 = margin
-    far = 2.0 * FAR * b * e
-    return (m1 * ((b + d) + (f + e)) > far) & (m2 * m3 > far) & (b > 5.3 * e)
-
-
 @jit_inline
 def scan(lengths, margin, turn):
     """Fills a `Turn`; returns its `Even`."""
@@ -179,10 +170,10 @@ def all_harmonics(lengths, ratio, even_part, openings):
 @jit_inline
 def distortion(lengths, margin, even, turn):
     """thd of (2), and its relative error; `even` is what `scan` returns."""
-    b, e = lengths.b, lengths.e
-    moves = e > 0.0
-    ratio = e / b
-    few = smooth(lengths, margin)
+    b, d, f, e = lengths
+    m1, m2, m3 = margin
+    moves, ratio, far = e > 0.0, e / b, 2.0 * FAR * b * e
+    few = (m1 * ((b + d) + (f + e)) > far) & (m2 * m3 > far) & (b > 5.3 * e)  # all that counts is in (3)
     rest, lost = 0.0 * b, 0.0 * b
     if any_lane(few):
         of_few, terms = few_harmonics(ratio, turn.bends)

@@ -15,37 +15,86 @@ rates, no derivatives). A crank e = 0 swings nothing; crank angles are those for
 (1e36) are OUT_OF_RANGE.
 """
 
+import math
 from collections import namedtuple
+from typing import NamedTuple
 
 from kernels.interface import FIRST_REFUSAL, Field
-from kernels.lanes.codes import INACCURATE, OK
+from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, INACCURATE, LOCK_UP, OK
 from kernels.lanes.groups import cells_at
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none
 from kernels.lanes.records import read, write
-from kernels.lanes.vectors import not_, where
+from kernels.lanes.vectors import any_lane, choose, magnitude, not_, pow2, where
 from kernels.lanes.wiring import kernel, method, tracing
 from kernels.polisher import _motor_waveform, extremes
-from kernels.polisher._cell import ROUNDING, Rates, judged, said, swing, turns
-from kernels.polisher.linkage import EXAMPLE, PARAMETERS
+from kernels.polisher._cell import ROUNDING, UNIT_LIMIT, judged, said
+from kernels.polisher.extremes import Angles, Locks, Slopes
+from kernels.polisher.linkage import EXAMPLE, PARAMETERS, side_of
 
 Linkage = namedtuple("Linkage", [field.name for field in PARAMETERS])
 
 
+class Swing(NamedTuple):
+    """Outputs of the closed forms."""
+
+    angles: Angles
+    locks: Locks
+    transmission_angle: float
+    slopes: Slopes
+
+
+class Rates(NamedTuple):
+    """Outputs of the motion over a turn."""
+
+    thd: float
+    rate_max: float
+    rate_min: float
+
+
 @jit
-def _stable(type, cell):
-    flat = extremes.flattened(cell.margin)
-    root = extremes.roots(cell.lengths, flat)
-    angles = extremes.extremes(cell.lengths, flat, root)
-    transmission = extremes.transmission(cell.lengths, cell.margin)
-    return swing(type, cell, angles, transmission, extremes.tolerances(cell.lengths, root))
+def _swing(p, cell):
+    """The closed forms of type A, mirrored for type B, where what they name exists."""
+    lengths, unit, margin, code = cell
+    swings, bent = said(code, OK), said(code, CHANGE_POINT)
+    rocks, locked = swings | (bent & (lengths.e <= lengths.b)), said(code, LOCK_UP)
+    side = side_of(p.type)
+    flat = extremes.flattened(margin)
+    root = extremes.roots(lengths, flat)
+
+    a = extremes.extremes(lengths, flat, root)
+    sign = or_none(side, rocks)
+    angles = Angles(
+        sign * a.A0,
+        or_none(a.A1, rocks),
+        sign * a.eta_plus,
+        sign * a.eta_minus,
+        sign * a.theta_plus,
+        sign * a.theta_minus,
+    )
+
+    none = 0.0 * code + math.nan
+    locks = Locks(none, none)
+    if any_lane(locked):
+        locks = choose(locked, extremes.locks(lengths, margin), locks)
+    moves = swings | said(code, DOUBLE_CRANK) | bent
+    transmission = where(moves, extremes.transmission(lengths, margin), or_none(0.0, locked))
+
+    s = extremes.tolerances(lengths, root)
+    swing = or_none(pow2(-where(magnitude(unit) <= UNIT_LIMIT, unit, 0.0)), swings)
+    mean = side * swing
+    slopes = Slopes(
+        mean * s.A0_b, mean * s.A0_d, mean * s.A0_f, mean * s.A0_e,
+        swing * s.A1_b, swing * s.A1_d, swing * s.A1_f, swing * s.A1_e,
+    )  # fmt: skip
+    return Swing(angles, locks, transmission, slopes)
 
 
 @jit
 def stable(p, rtol):
     """Half-angle forms of sums without error."""
     cell = judged(p)
-    return _stable(p.type, cell), cell.code
+    return _swing(p, cell), cell.code
 
 
 @jit
@@ -54,13 +103,14 @@ def _waveform(first, columns, turn):
     i = cells_at(first)
     p, rtol = read(Linkage, columns, i), columns.rtol[i]
     cell = judged(p)
-    write(columns, i, _stable(p.type, cell))
+    write(columns, i, _swing(p, cell))
     even = _motor_waveform.scan(cell.lengths, cell.margin, turn)
     thd, doubt = _motor_waveform.distortion(cell.lengths, cell.margin, even, turn)
     most, least, rate_doubt = _motor_waveform.rates(cell.lengths, cell.margin, turn)
-    swings, rates = said(cell.code, OK), turns(cell)
-    write(columns, i, Rates(or_none(thd, swings), or_none(most, rates), or_none(least, rates)))
-    wide = (rates & not_(rate_doubt <= rtol)) | (swings & not_(doubt <= rtol)) | not_(rtol >= ROUNDING)
+    swings = said(cell.code, OK)
+    turns = swings | said(cell.code, DOUBLE_CRANK)
+    write(columns, i, Rates(or_none(thd, swings), or_none(most, turns), or_none(least, turns)))
+    wide = (turns & not_(rate_doubt <= rtol)) | (swings & not_(doubt <= rtol)) | not_(rtol >= ROUNDING)
     columns.status[i] = where(wide & (cell.code < FIRST_REFUSAL), INACCURATE, cell.code)
 
 

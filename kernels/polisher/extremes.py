@@ -163,12 +163,6 @@ def transmission(lengths, margin):
 
 
 @jit
-def _half_angle(y, x):
-    """The angle whose half has the squared tangent y/x."""
-    return 2.0 * angle(sqrt(y), sqrt(x))
-
-
-@jit
 def locks(lengths, margin):
     """`Locks`: abs(theta).
 
@@ -178,9 +172,11 @@ def locks(lengths, margin):
     b, d, f, e = lengths
     m1, m2, m3 = margin
     over_d, over_f = sum4(b, e, f, -d), sum4(b, d, e, -f)
-    stretched = _half_angle(larger(-m1, 0.0) * ((b + d) + (f + e)), sum4(d, f, e, -b) * sum4(b, d, f, -e))
+    # the squared tangent of a half angle is a share of two such products
+    open_, rest = larger(-m1, 0.0) * ((b + d) + (f + e)), sum4(d, f, e, -b) * sum4(b, d, f, -e)
+    stretched = 2.0 * angle(sqrt(open_), sqrt(rest))
     opposite = (m2 < 0.0) & (m3 > 0.0) | (m2 > 0.0) & (m3 < 0.0)
-    folded = _half_angle(over_d * over_f, where(opposite, -m2 * m3, 0.0))
+    folded = 2.0 * angle(sqrt(over_d * over_f), sqrt(where(opposite, -m2 * m3, 0.0)))
     inner, outer = where(m1 < 0.0, stretched, math.nan), where(opposite, folded, math.nan)
     return Locks(where(m1 < 0.0, inner, outer), where(m1 < 0.0, outer, math.nan))
 
@@ -196,21 +192,14 @@ def _difference_of_squares(x, y):
     return high, low, rest + least
 
 
-@jit
-def _together(x, y):
+@jit_call
+def _narrow_square_sum(x, y):
     """The sum of two such sums, with the digits that are left when the two higher numbers of both cancel."""
     high, low = two_sum(x[0], y[0])
     middle, least = two_sum(x[1], y[1])
     low, rest = two_sum(low, middle)
     high, low = two_sum(high, low)
     return high + (low + (rest + (least + (x[2] + y[2]))))
-
-
-@jit_call
-def _narrow_square_sums(b, d, f, e):
-    """`square_sums`, however little is left of the squares."""
-    arm, (high, low, least) = _difference_of_squares(f, e), _difference_of_squares(d, b)
-    return _together(arm, (high, low, least)), _together(arm, (-high, -low, -least))
 
 
 @jit
@@ -231,7 +220,9 @@ def square_sums(lengths):
     hair = NARROW * ((b2 + d2) + (f2 + e2))
     narrow = not_((magnitude(z1) > hair) & (magnitude(z2) > hair))
     if any_lane(narrow):
-        return choose(narrow, _narrow_square_sums(b, d, f, e), (z1, z2))
+        of_arm, (high, low, least) = _difference_of_squares(f, e), _difference_of_squares(d, b)
+        exact = _narrow_square_sum(of_arm, (high, low, least)), _narrow_square_sum(of_arm, (-high, -low, -least))
+        return choose(narrow, exact, (z1, z2))
     return z1, z2
 
 

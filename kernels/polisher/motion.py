@@ -16,7 +16,6 @@ count more than once: INACCURATE.
 
 import math
 from collections import namedtuple
-from typing import NamedTuple
 
 import numpy as np
 
@@ -58,44 +57,6 @@ PARAMETERS = (
 Machine = namedtuple("Machine", [field.name for field in PARAMETERS])
 
 
-class State(NamedTuple):
-    """The arm's angle from b within a turn, what turns add to it, rate and acceleration at the crank's rate 1."""
-
-    alpha: float
-    turns: float
-    rate: float
-    acceleration: float
-
-
-@jit
-def _within(crank_angle):
-    """Whether every angle asked for is a number that has its digits."""
-    fine = True
-    for angle in crank_angle:
-        fine = fine and abs(angle) <= FARTHEST
-    return fine
-
-
-@jit
-def _branch(cell):
-    """The margins; those of a change point without what rounding has taken them past 0 by."""
-    m1, m2, m3 = cell.margin
-    flat, long_crank = said(cell.code, CHANGE_POINT), cell.lengths.e > cell.lengths.b
-    back = where(long_crank, smaller(m2, 0.0), larger(m2, 0.0))
-    front = where(long_crank, smaller(m3, 0.0), larger(m3, 0.0))
-    return Margins(where(flat, larger(m1, 0.0), m1), where(flat, back, m2), where(flat, front, m3))
-
-
-@jit
-def _state(lengths, margin, side, crank):
-    """The arm's `State` from b on, and the doubt close to a lock."""
-    within = 2.0 * arctan(crank.s / crank.c)  # theta in [-pi, pi]
-    alpha, rate, acceleration = motion(lengths, margin, side, Crank(within, crank.s, crank.c))
-    turns = where(lengths.e > lengths.b, crank.theta - within, 0.0)
-    doubt = where(rate - rate >= 0.0, 2.0 * lock_doubt(lengths, margin, crank), 0.0)
-    return State(alpha, turns, rate, acceleration), doubt
-
-
 @jit
 def _held(fast, limit):
     """Whether a rate is 0, or within what its power may be."""
@@ -108,20 +69,31 @@ def _follow(first, columns, row):
     i = cells_at(first)
     p = read(Machine, columns, i)
     cell, side, w = judged(p), side_of(p.type), p.omega
-    margin, worst = _branch(cell), 0.0 * cell.code
+    lengths, (m1, m2, m3) = cell.lengths, cell.margin
+    # a change point goes on smoothly: its margins without what rounding has taken them past 0 by
+    flat, long_crank = said(cell.code, CHANGE_POINT), lengths.e > lengths.b
+    back = where(long_crank, smaller(m2, 0.0), larger(m2, 0.0))
+    front = where(long_crank, smaller(m3, 0.0), larger(m3, 0.0))
+    margin = Margins(where(flat, larger(m1, 0.0), m1), where(flat, back, m2), where(flat, front, m3))
+
+    worst, within = 0.0 * cell.code, True
     rated, held = _held(magnitude(w), RATE_LIMIT * RATE_LIMIT), _held(magnitude(w), RATE_LIMIT)
     for j in range(columns.crank_angle.size):
+        within = within and abs(columns.crank_angle[j]) <= FARTHEST
         crank = crank_at(0.0 * cell.code + columns.crank_angle[j], p.b_angle)
-        arm, doubt = _state(cell.lengths, margin, side, crank)
+        theta = 2.0 * arctan(crank.s / crank.c)  # in [-pi, pi]
+        alpha, rate, acceleration = motion(lengths, margin, side, Crank(theta, crank.s, crank.c))
+        turns = where(long_crank, crank.theta - theta, 0.0)
+        doubt = where(rate - rate >= 0.0, 2.0 * lock_doubt(lengths, margin, crank), 0.0)
         worst = larger(worst, doubt)
-        write_row(first, j, p.b_angle + (arm.alpha + arm.turns), row, columns.alpha)
-        write_row(first, j, or_none(w * arm.rate, rated), row, columns.alpha_rate)
-        write_row(first, j, or_none(w * w * arm.acceleration, held), row, columns.alpha_acceleration)
-        sine, cosine = sincos(p.b_angle + (arm.alpha + p.beta))
+        write_row(first, j, p.b_angle + (alpha + turns), row, columns.alpha)
+        write_row(first, j, or_none(w * rate, rated), row, columns.alpha_rate)
+        write_row(first, j, or_none(w * w * acceleration, held), row, columns.alpha_acceleration)
+        sine, cosine = sincos(p.b_angle + (alpha + p.beta))
         write_row(first, j, p.L * cosine, row, columns.x)
         write_row(first, j, p.L * sine, row, columns.y)
     code = where(said(cell.code, LOCK_UP) & not_(worst <= columns.rtol[i]), INACCURATE, cell.code)
-    columns.status[i] = where(_within(columns.crank_angle), partly(held, code), BAD_INPUT)
+    columns.status[i] = where(within, partly(held, code), BAD_INPUT)
 
 
 @jit
