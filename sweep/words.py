@@ -220,11 +220,16 @@ def require_dataset(name: str, given: Any, maker: str = "", attribute: str = "")
     """
     import xarray as xr  # most of a short run's time
 
-    if not isinstance(given, xr.Dataset):
-        cure = f"sweep.{maker} gives one" if maker else _cure(given)
-        raise SweepError(f"sweep.{name}: expected a Dataset, found {kind(given)}; {cure}")
-    if attribute and attribute not in given.attrs:
-        raise SweepError(f"sweep.{name}: expected a Dataset of sweep.{maker}, found another")
+    if isinstance(given, xr.Dataset):
+        if attribute and attribute not in given.attrs:
+            raise SweepError(f"sweep.{name}: expected a Dataset of sweep.{maker}, found another")
+        return
+    cure = f"sweep.{maker} gives one" if maker else "sweep.run and sweep.open_result give one"
+    if not maker and isinstance(given, str | os.PathLike):
+        cure = f'open the file first: sweep.open_result("{os.fspath(given)}")'
+    elif not maker and hasattr(given, "kernel_name"):
+        cure = "run the study first: sweep.run(study)"
+    raise SweepError(f"sweep.{name}: expected a Dataset, found {kind(given)}; {cure}")
 
 
 def as_path(given: Any) -> Path:
@@ -238,11 +243,3 @@ def kind(value: Any) -> str:
     """'a list', 'an int', 'nothing'."""
     word = type(value).__name__
     return "nothing" if value is None else f"{'an' if word[0].lower() in 'aeiou' else 'a'} {word}"
-
-
-def _cure(given: Any) -> str:
-    if isinstance(given, str | os.PathLike):
-        return f'open the file first: sweep.open_result("{os.fspath(given)}")'
-    if hasattr(given, "kernel_name"):
-        return "run the study first: sweep.run(study)"
-    return "sweep.run and sweep.open_result give one"

@@ -38,7 +38,8 @@ def test_the_packages_tested_are_this_checkout():
         ("import contextlib, sweep.cli\nwith contextlib.suppress(SystemExit): sweep.cli.main(['--help'])",
          "numba xarray pint numpy h5py dask matplotlib"),
         ("import kernels.interface, kernels.catalogue", "numba"),
-        ("import sweep\nsweep.study(kernel='foliot', axes={'mu': [1.0]}, fixed={'a': 1.0, 'phi0': 1.0})", "pint"),
+        ("import sweep\nsweep.study(kernel='foliot', axes={'mu': [1.0]}, fixed={'a': 1.0, 'phi0': 1.0})",
+         "pint xarray"),
         # what says how a run ended is read from the file; their import takes longer than all else of a small run
         ("import sweep.cli\nassert sweep.cli.main(['run', 'study.toml', '-o', 'out.h5']) == 0",
          "xarray pandas pint dask"),

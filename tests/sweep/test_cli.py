@@ -95,20 +95,6 @@ def test_an_output_that_takes_no_words_changes_no_exit_status(done):
         assert (process.wait(60), process.stderr.read()) == (0, "")
 
 
-@pytest.mark.parametrize(
-    ("statement", "heavy"),
-    [
-        ("import sweep", "numpy numba xarray pint h5py matplotlib dask"),
-        ("import sweep.cli; sweep.cli.parser()", "numpy numba xarray pint h5py matplotlib dask"),
-        ("import sweep; sweep.study('stones.toml', allow_import=True)", "pint xarray"),
-    ],
-)
-def test_nothing_heavy_is_imported_before_it_is_needed(here, statement, heavy):
-    code = f"import sys; {statement}; sys.exit(str(set('{heavy}'.split()) & set(sys.modules) or ''))"
-    process = in_a_process("-c", code)
-    assert process.communicate(timeout=60)[1].strip() == ""
-
-
 SLOW = """
 import time
 from dataclasses import replace

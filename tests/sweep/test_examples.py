@@ -31,11 +31,8 @@ def test_the_example_of_a_public_name_is_right(name, tmp_path, monkeypatch):
     assert not failed, "".join(told)
 
 
-def test_the_names_that_sweep_lists_are_the_public_ones():
+def test_the_names_that_sweep_lists_are_the_public_ones_and_a_room_and_a_function_have_one_name():
     assert dir(sweep) == sorted(sweep.__all__)
     assert not [name for name in dir(sweep) if name.startswith("_")]
-
-
-def test_a_room_and_a_function_have_one_name():
     assert sweep.study.read.study is study
     assert callable(sweep.study)

@@ -50,3 +50,8 @@ def test_cells_are_those_that_plain_numpy_chooses(text, mask):
 def test_what_is_no_condition_and_unlike_quantities_are_refused(text, what):
     axes = {"height": [1.0], "v0": [1.0], "method": ["exact", "auto"]}
     assert what in message_of(lambda: build(axes=axes, where=text), "where")
+
+
+def test_an_angle_is_a_number_to_a_condition():
+    study = sweep.study(kernel="foliot", axes={"mu": [1.0, 9.0]}, fixed={"phi0": 1.0, "a": 1.0}, where="mu < 2*a*a + 1")
+    assert study.where == "mu < 2*a*a + 1"

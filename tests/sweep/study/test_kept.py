@@ -113,6 +113,8 @@ def test_json_holds_long_arrays_exactly_and_shortly(length):
         assert len(text) < 16 * 3 * length + 4000  # bytes, which are read twenty times as fast
         again = Study.from_json(text, allow_import=True)
         same(study, again)
+        declared = [again, Study.from_json(text, declared=True)]
+        assert len({repr([(m.name, m.excludes, m.lacks) for m in s.kernel.methods]) for s in (study, *declared)}) == 1
         assert again.lengths == study.lengths == Study.from_json(text, declared=True).lengths
 
 

@@ -215,6 +215,15 @@ def test_a_summary_reduces_all_axes_and_outputs_in_order_unless_told_otherwise()
     assert (study.title, list(study.axes)) == ("foliot over R and mu", ["R", "mu"])  # those that stay first
 
 
+def test_no_reduction_may_be_called_as_an_axis():
+    time, height = Field("fall_time", "s", ""), toy.KERNEL.parameters[0]
+    axis = dataclasses.replace(height, name="fall_time_min")
+    toy.OWN = dataclasses.replace(toy.KERNEL, parameters=(height, axis), outputs=(time,), along=())
+    keys = {"kernel": "toy:OWN", "axes": {"height": [1.0], "fall_time_min": [1.0]}, "summary": {}}
+    assert "fall_time_min" in message_of(lambda: build(**keys), "summary.outputs")
+    del toy.OWN
+
+
 @pytest.mark.parametrize("name", ["status", "method_used", "error_bound", "method", "rtol", "cell", "height", "phase"])
 def test_a_kernel_declares_each_name_once_and_none_of_the_results_own(name):
     wrong = {name: (Field(name, "s", ""),), "place": (*toy.KERNEL.outputs, Field("trace", "s", "", dims=("place",)))}
