@@ -18,31 +18,29 @@ from sweep.errors import SweepError
 if TYPE_CHECKING:
     from sweep.cells.guard import SolveCells
 
-POSITIONS = 64
+LANES = 32
+"""Cells that a lane kernel solves at once: it takes as long for one of them."""
+POSITIONS, PLACES = 64, 8
+"""Places of the grid where probes are made; and how many are tried in turn where one in the middle fails."""
 BUDGET = 0.003, 0.03
 """Seconds a sample may take in any run, unless one call takes longer; and in one that takes 100 times as long;"""
 SHARE = 0.005
 """or this share of the run, where that is more."""
 PROBE_SECONDS = 5e-4
 """A probe as long as this sees past the cost of a call, and 64 of them take a few hundredths of a second."""
-TWICE = 1e-3
-"""Seconds of a probe that is made once: what is met for the first time matters little in it."""
 DEAR = 2e-3
 """Seconds of a probe that counts among those of the sample, wherever it was made."""
-PLACES = 8
-"""Places that are tried in turn where a probe of the middle fails."""
-MOST_FAILED = 16
-"""A kernel that fails in so many probes, and in no other, is given up."""
-LANES = 32
-"""Cells that a lane kernel solves at once: it takes as long for one of them."""
+FAILED_PROBE, MOST_FAILED = max(BUDGET) / 16, 16
+"""Seconds that a probe counts for which fails; a kernel that fails in so many, and in no other, is given up."""
 BLOCK_SECONDS = (0.05, 1.0)
 CALLS = 400
 """Times that a block's cells cost what a call does beside them, by probes of few cells; of many, which cost less each
 and wait less for the last ones, it is enough for calls to take less than 2 % of a run,"""
 LEAST_BLOCKS = 8
 """where so many blocks are left for each of several workers."""
-BLOCK_BYTES = 8 << 20
-MOST_BLOCKS = 100_000
+BLOCK_BYTES, MOST_BLOCKS = 8 << 20, 100_000
+
+Clock = Callable[[], float]
 
 
 @dataclass(frozen=True)
@@ -76,52 +74,86 @@ UNSAMPLED = Sample(np.zeros(1), np.ones(1), 1)
 """Stands in where no cell is left to compute: every block weighs its cells."""
 
 
-Clock = Callable[[], float]
-FAILED_PROBE = max(BUDGET) / 16
-"""Seconds that a probe counts for which fails."""
-
-
 def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock: Clock | None = None) -> Sample:
     """Times a few cells at up to 64 places of the grid, in a few hundredths of a second or a hundredth of the run.
 
-    Probes that fail are left out. Raises what the kernel does where all fail.
+    A probe has few enough cells for 64 of them in the budget, and enough to see past the cost of a call. Probes that
+    fail are left out. Raises what the kernel does where all fail.
     """
-    probing = _Probing(solver, clock or time.perf_counter)
-    cells, lanes = _probe_cells(probing, columns, size)
-    probes = _probes(probing, columns, size, cells)
-    if not probes and cells > 1:
-        # a bad cell spoils a probe of many
+    probing = _Probing(solver, columns, size, clock or time.perf_counter)
+    cells, lanes = 1, None
+    alone = taken = probing.anywhere(1)
+    if taken < 2 * PROBE_SECONDS:  # what is met for the first time matters in it
+        alone = taken = min(taken, probing.anywhere(1))
+    if size > 1 and taken > PROBE_SECONDS and (taken > max(BUDGET) / 4 or size <= 50 * LANES):
+        # cells are dear, or dear and few: where two take as long as one, 32 will
+        lanes = probing.anywhere(2) < 1.5 * taken
+        cells = max(1, min(LANES, size // 4)) if lanes else 1
+    else:
+        more = LANES
+        while (cells == 1 or taken <= PROBE_SECONDS) and size >= (4 if cells == 1 else POSITIONS) * more:
+            cells, taken, more = more, probing.anywhere(more), 4 * more
+    probes = probing.everywhere(cells)
+    if not probes and cells > 1:  # a bad cell spoils a probe of many
         cells, lanes = 1, None
-        probes = _probes(probing, columns, size, cells)
+        probes = probing.everywhere(cells)
     if not probes:
         raise probing.fault
-    places = sorted(probes)
-    costs = np.array([probes[place] / cells for place in places])
-    call = max(0.0, probing.alone - float(np.min(costs)))
-    return Sample(np.array(places), costs, cells, lanes, call)
+    costs = np.array([probes[start] / cells for start in sorted(probes)])
+    return Sample(np.array(sorted(probes)), costs, cells, lanes, max(0.0, alone - float(np.min(costs))))
 
 
-def _probes(probing: _Probing, columns: Sequence[Column], size: int, cells: int) -> dict[int, float]:
-    """Seconds of probes of so many cells, by their first cell; a dear one that was made before is among them."""
-    count = max(1, min(POSITIONS, size // (4 * cells)))
-    probes = dict(probing.dear.get(cells, {}))
-    spent = sum(probes.values())
-    # where all of these fail, others are looked at until one does not
-    places = [_place(index, number, cells, size) for number in (count, PLACES) for index in _scattered(number)]
-    for turn, start in enumerate(places):
-        if probes and (turn >= count or spent > _affordable(spent / (len(probes) * cells) * size)):
-            break
-        seconds = probing.probe(start, columns, cells)
-        if seconds is not None:
-            probes[start] = seconds
-        spent += FAILED_PROBE if seconds is None else seconds
-    return probes
+class _Probing:
+    """Makes probes, and keeps their seconds by how many cells they have and where they begin."""
 
+    def __init__(self, solver: SolveCells, columns: Sequence[Column], size: int, clock: Clock) -> None:
+        self._solver, self._columns, self._size, self._clock = solver, columns, size, clock
+        self._made: dict[int, dict[int, float]] = {}
+        self._failed = 0
+        self.fault: Exception = RuntimeError("no cell was tried")
 
-def _affordable(seconds: float) -> float:
-    """Seconds that the sample of a run of so many may take."""
-    least, most = BUDGET
-    return max(least, min(most, seconds / 100), SHARE * seconds)
+    def anywhere(self, cells: int) -> float:
+        """Seconds that some cells in the middle of the grid take, or elsewhere where these fail."""
+        found = (self._probe(start, cells) for start in (*self._places(1, cells), *self._places(PLACES, cells)))
+        return next((seconds for seconds in found if seconds is not None), math.inf)
+
+    def everywhere(self, cells: int) -> dict[int, float]:
+        """Seconds of probes all over the grid, by their first cell; a dear one that was made before is among them."""
+        probes = {start: seconds for start, seconds in self._made.get(cells, {}).items() if seconds >= DEAR}
+        spent = sum(probes.values())
+        planned = self._places(max(1, min(POSITIONS, self._size // (4 * cells))), cells)
+        # where all of these fail, others are looked at until one does not
+        for turn, start in enumerate((*planned, *self._places(PLACES, cells))):
+            if probes:
+                run = spent / (len(probes) * cells) * self._size
+                if turn >= len(planned) or spent > max(BUDGET[0], min(BUDGET[1], run / 100), SHARE * run):
+                    break
+            seconds = self._probe(start, cells)
+            spent += FAILED_PROBE if seconds is None else seconds
+            if seconds is not None:
+                probes[start] = seconds
+        return probes
+
+    def _probe(self, start: int, cells: int) -> float | None:
+        """Seconds of so many cells; None where the kernel fails. Raises what it does where it always fails."""
+        arrays = {column.name: column.empty(cells) for column in self._columns}
+        begun = self._clock()
+        with tolerated() as faults:
+            self._solver.solve(start, cells_of(arrays))
+            seconds = self._clock() - begun
+            self._made.setdefault(cells, {})[start] = seconds
+            return seconds
+        self.fault, self._failed = faults[0], self._failed + 1
+        if not self._made and self._failed >= MOST_FAILED:
+            raise self.fault
+        return None
+
+    def _places(self, count: int, cells: int) -> list[int]:
+        """First cells of probes, from the middle on, so that every beginning of the list is spread over the grid."""
+        bits = max(1, (count - 1).bit_length())
+        turned = (int(f"{i:0{bits}b}"[::-1], 2) for i in range(1 << bits))
+        middles = [(2 * ((i + count // 2) % count) + 1) * self._size // (2 * count) for i in turned if i < count]
+        return [min(max(middle - cells // 2, 0), self._size - cells) for middle in middles]
 
 
 def partition(sample: Sample, size: int, cell_bytes: float, workers: int) -> Partition:
@@ -148,75 +180,6 @@ def row_partition(sample: Sample, rows: RowBlocks, shape: tuple[int, ...], row_b
     return boxes(shape, math.ceil(blocks.cells / rows.mean), LANES if rows.mean == 1 else 1)
 
 
-def _probe_cells(probing: _Probing, columns: Sequence[Column], size: int) -> tuple[int, bool | None]:
-    """Cells a probe: few enough for 64 probes in the budget, enough to see past the cost of a call.
-
-    Where single cells are dear and few, also whether two take as long as one: then 32 will.
-    """
-    cells = 1
-    while True:
-        seconds = _probe(probing, columns, size, cells)
-        more = LANES if cells == 1 else 4 * cells
-        dear = seconds > PROBE_SECONDS
-        worth_a_look = cells == 1 and (seconds < max(BUDGET) / 4 or more * 50 < size)
-        few = size < (4 if cells == 1 else POSITIONS) * more
-        if cells == 1 and dear and (few or not worth_a_look) and size > 1:
-            lanes = _probe(probing, columns, size, 2) < 1.5 * seconds
-            return (max(1, min(LANES, size // 4)), True) if lanes else (1, False)
-        if few or (dear and not worth_a_look):
-            return cells, None
-        cells = more
-
-
-def _probe(probing: _Probing, columns: Sequence[Column], size: int, cells: int) -> float:
-    """Seconds that some cells in the middle of the grid take together, or elsewhere, where these fail."""
-    for start in [_place(0, 1, cells, size), *(_place(index, PLACES, cells, size) for index in _scattered(PLACES))]:
-        seconds = probing.probe(start, columns, cells)
-        if seconds is not None and cells == 1 and seconds < TWICE:
-            seconds = probing.probe(start, columns, cells) or seconds
-        if seconds is not None:
-            return seconds
-    return math.inf
-
-
-class _Probing:
-    """Makes probes.
-
-    Attributes
-    ----------
-    dear : dict
-        Seconds of the last dear one of so many cells, by the cell that it begins with.
-    alone : float
-        The least that a probe of one cell took.
-    fault : Exception
-        Why the last one that failed did.
-    """
-
-    def __init__(self, solver: SolveCells, clock: Clock) -> None:
-        self._solver, self._clock = solver, clock
-        self._good, self._failed, self.alone = False, 0, math.inf
-        self.dear: dict[int, dict[int, float]] = {}
-        self.fault: Exception = RuntimeError("no cell was tried")
-
-    def probe(self, start: int, columns: Sequence[Column], cells: int) -> float | None:
-        """Seconds of so many cells; None where the kernel fails. Raises what it does where it always fails."""
-        arrays = {column.name: column.empty(cells) for column in columns}
-        begun = self._clock()
-        with tolerated() as faults:
-            self._solver.solve(start, cells_of(arrays))
-            seconds = self._clock() - begun
-            self._good = True
-            if cells == 1:
-                self.alone = min(self.alone, seconds)
-            if seconds >= DEAR:
-                self.dear[cells] = {start: seconds}
-            return seconds
-        self.fault, self._failed = faults[0], self._failed + 1
-        if not self._good and self._failed >= MOST_FAILED:
-            raise self.fault
-        return None
-
-
 @contextlib.contextmanager
 def tolerated() -> Iterator[list[Exception]]:
     """What a kernel raises goes no further, but into the list."""
@@ -227,15 +190,3 @@ def tolerated() -> Iterator[list[Exception]]:
         raise
     except Exception as fault:
         faults.append(fault)
-
-
-def _place(index: int, count: int, cells: int, size: int) -> int:
-    middle = (2 * index + 1) * size // (2 * count)
-    return min(max(middle - cells // 2, 0), size - cells)
-
-
-def _scattered(count: int) -> list[int]:
-    """0 .. count-1 from the middle on, so that every beginning of the list is spread over all of it (bits reversed)."""
-    bits = max(1, (count - 1).bit_length())
-    turned = (int(f"{i:0{bits}b}"[::-1], 2) for i in range(1 << bits))
-    return [(i + count // 2) % count for i in turned if i < count]
