@@ -6,6 +6,7 @@ of every status and method, comes out with the same bits again.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -54,7 +55,7 @@ def _changed(old: Mapping[str, str], new: Mapping[str, str]) -> set[str]:
 
 
 class Reused:
-    """The cells of a finished result, in the grid of an extended study. To be used in a `with` statement.
+    """The cells of a finished result, in the grid of an extended study.
 
     Parameters
     ----------
@@ -86,16 +87,9 @@ class Reused:
         """Further attributes of what is extended."""
         return {TAKEN_OVER: self.taken_over} if self.taken_over else {}
 
-    def __enter__(self) -> Reused:
-        return self
-
-    def __exit__(self, *fault: object) -> None:
+    def close(self) -> None:
+        """Gives the file back."""
         self._stored.close()
-
-    @property
-    def cells(self) -> int:
-        """How many of the cells are known."""
-        return int(np.prod([(positions >= 0).sum() for positions in self._positions], dtype=np.int64))
 
     def missing(self, start: int, stop: int) -> Any:
         """Of the cells `start` to `stop`, which have to be computed."""
@@ -116,9 +110,9 @@ class Reused:
         )
         for column in self._columns:
             place = arrays[column.name].reshape(*_lengths(box), *column.shape)
-            place[np.ix_(*known)] = self._values(column.name, old)
+            place[np.ix_(*known)] = self.values(column.name, old)
 
-    def _values(self, name: str, slices: tuple[slice, ...]) -> Any:
+    def values(self, name: str, slices: tuple[slice, ...]) -> Any:
         """Those of a piece of the result. Raises SweepError where the file fails."""
         try:
             return self._numbers[name][slices]
@@ -134,15 +128,14 @@ class Reused:
             solve(cell, cell + 1, new, None)
             for name in old:
                 if old[name].tobytes() != new[name].tobytes():
-                    raise self._refusal(f"{name} of a cell was {old[name][0]}, and comes out as {new[name][0]} now")
-        said = f"{self.cells} cells of another version, {len(cells)} of which came out with the same bits again"
+                    raise SweepError(
+                        f"{self._output}: cannot be extended, for another version has computed it: {name} of a cell "
+                        f"was {old[name][0]}, and comes out as {new[name][0]} now; choose another name, or overwrite "
+                        "it with --force"
+                    )
+        known = math.prod(int((positions >= 0).sum()) for positions in self._positions)
+        said = f"{known} cells of another version, {len(cells)} of which came out with the same bits again"
         self.taken_over = "\n".join(filter(None, [self.taken_over, said]))
-
-    def _refusal(self, why: str) -> SweepError:
-        return SweepError(
-            f"{self._output}: cannot be extended, for another version has computed it: {why}; choose another name, or "
-            "overwrite it with --force"
-        )
 
     def _sample(self) -> list[int]:
         """Some cells of every status and method, by their numbers in the grid of the extended study."""
@@ -170,7 +163,7 @@ class Retried(Reused):
 
     def missing(self, start: int, stop: int) -> Any:
         """Of the cells `start` to `stop`, which FAILED."""
-        return np.ravel(self._values(STATUS, box_slices(self._grid.shape, start, stop)) == Status.FAILED)
+        return np.ravel(self.values(STATUS, box_slices(self._grid.shape, start, stop)) == Status.FAILED)
 
     def fill(self, start: int, stop: int, arrays: Mapping[str, Any]) -> None:
         """Writes the others. Raises SweepError where the file fails."""

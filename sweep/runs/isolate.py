@@ -61,10 +61,6 @@ class Died(Unsolved):
         self.certain = certain
 
 
-class Ended(SweepError):
-    """The run is being stopped."""
-
-
 def limit_of(cell_timeout: float | str | None) -> float | None:
     """Seconds that a cell may take, as they are asked for. Raises SweepError where that is no time."""
     return None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout)
@@ -110,7 +106,7 @@ class Processes:
         return self.idle.pop()
 
     def end(self) -> None:
-        """Kills all; solvers raise `Ended` from now on."""
+        """Kills all; solvers raise SweepError from now on."""
         self.over = True
         for solver in list(self._solvers):
             solver.end()
@@ -131,7 +127,7 @@ class Isolated:
         return self.seconds
 
     def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
-        """As `Solver.solve`. Raises Unsolved where the kernel raises, dies or takes too long; Ended.
+        """As `Solver.solve`. Raises Unsolved where the kernel raises, dies or takes too long; SweepError at the end.
 
         One cell alone is tried again, for a process may die of what it did before, or with others; and then no other
         cell is tried so meanwhile, lest each be blamed for the other.
@@ -153,7 +149,7 @@ class Isolated:
             cells.error[...] = found.error
 
     def _solved(self, start: int, count: int, wanted: Any) -> Any:
-        """Columns of cells. Raises Unsolved, Died, Ended."""
+        """Columns of cells. Raises Unsolved, Died, SweepError."""
         arrays, reason, seconds, most = self.call(self._all.seconds(count), _solve, start, count, wanted)
         fresh, self._fresh = self._fresh, False
         short = reason.startswith(MemoryError.__name__) and not fresh
@@ -167,7 +163,7 @@ class Isolated:
         return arrays
 
     def call(self, limit: float, function: Callable[..., R], *words: Any) -> R:
-        """What a function gives in the process, within so many seconds. Raises Unsolved, Died, Ended."""
+        """What a function gives in the process, within so many seconds. Raises Unsolved, Died, SweepError."""
         if self._process is None or self._all.over:
             self._begin()
         process, late = self._process, False
@@ -176,8 +172,6 @@ class Isolated:
         except (OSError, EOFError, AttributeError) as fault:
             late = isinstance(fault, TimeoutError)
         code = self.end(BURY_SECONDS, process)
-        if self._all.over:
-            raise Ended("the run is being stopped")
         # one that died by itself, as late as that, is not late
         if late and code in (None, -signal.SIGKILL):
             raise Unsolved(f"took longer than {limit:.3g} s")
@@ -191,7 +185,7 @@ class Isolated:
             try:
                 with self._lock:
                     if self._all.over:
-                        raise Ended("the run is being stopped")
+                        raise SweepError("the run is being stopped")
                     self._process = _started()
                 self._fresh = True
                 _asked(self._process, LOAD_SECONDS, _load, *self._all.words, self._all.good)
@@ -216,8 +210,7 @@ class Isolated:
             return None
         process.kill()
         process.join(seconds)
-        code: int | None = process.exitcode
-        return code
+        return process.exitcode  # type: ignore[no-any-return]
 
 
 def _asked(process: Any, limit: float, function: Callable[..., R], *words: Any) -> R:
@@ -312,12 +305,12 @@ def _die_with_the_run() -> None:
         with contextlib.suppress(OSError):
             Path("/proc/self/oom_score_adj").write_text("1000")
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    threading.Thread(target=_end_after_the_run, daemon=True).start()
+
+
+def _end_after_the_run() -> None:
     parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
-
-
-def _end_after(parent: Any) -> None:
+    assert parent is not None
     parent.join()
     os._exit(0)
 

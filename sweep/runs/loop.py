@@ -56,16 +56,11 @@ Batch = tuple[int, ...]
 
 
 class Sink(Protocol):
-    """Where blocks go."""
+    """Where blocks go; called in any thread, `tick` now and then."""
 
-    def room(self, job: int) -> Mapping[str, Any]:
-        """Columns for a block; called in any thread."""
-
-    def put(self, job: int, found: Found) -> None:
-        """Takes a block; called in any thread."""
-
-    def tick(self) -> None:
-        """Called now and then."""
+    def room(self, job: int) -> Mapping[str, Any]: ...
+    def put(self, job: int, found: Found) -> None: ...
+    def tick(self) -> None: ...
 
 
 class Loop:
@@ -100,8 +95,8 @@ class Loop:
         self.task, self._ctrl_c, self._cluster, self._reused = task, ctrl_c, cluster, reused
         self.began, schema = now(), output_schema(study, task.fingerprint)
         self.schema: Schema = replace(schema, attrs={**schema.attrs, **(reused.attrs if reused else {})})
-        self._processes = Processes(study, task.cell_limit, task.workers) if task.isolate else None
-        self._threads = ThreadPoolExecutor(task.workers)
+        self._processes = Processes(study, task.limit, task.cores) if task.isolate else None
+        self._threads = ThreadPoolExecutor(task.cores)
         sample = self._sample() if sampled else UNSAMPLED
         self.blocks = Blocks(study, partition or self._cut(sample))
         self._weights = sample.weights(self.blocks.partition, self.blocks.rows.first)
@@ -143,7 +138,7 @@ class Loop:
     @property
     def _cores(self) -> int:
         """How many blocks are computed at a time."""
-        return self.task.workers if self._cluster is None else max(1, self._cluster.threads)
+        return self.task.cores if self._cluster is None else max(1, self._cluster.threads)
 
     def begin(self, jobs: Sequence[int]) -> Progress:
         """Where the run stands when the blocks `jobs` are still to do."""
@@ -176,7 +171,7 @@ class Loop:
         self._keeping: dict[Future[None], int] = {}
         self._lost: dict[Batch, int] = {}
         self._submit = self._submitting(shared)
-        self._keepers = ThreadPoolExecutor(max(2, self.task.workers))
+        self._keepers = ThreadPoolExecutor(max(2, self.task.cores))
         try:
             self.check_time()
             for batch in self._batches(from_everywhere(jobs)):
@@ -304,7 +299,7 @@ class Loop:
 
     def check_time(self) -> None:
         """Raises TimeUp when it is time to stop."""
-        if passed(self.task.until):
+        if passed(self.task.end):
             raise TimeUp(f"it is {datetime.now():%H:%M}")
 
     def _labels(self, batch: Batch) -> str:
@@ -316,10 +311,10 @@ class Loop:
         progress, machine, versions = self.progress, platform.uname(), self.schema.attrs.get("versions", "")
         log(
             f"begins: {self.task.name}, kernel {self.task.study.kernel_name}, {progress.done:,} of {progress.total:,} "
-            f"cells done before, {self.blocks.count:,} blocks, {self.task.workers} cores, process {os.getpid()} on "
+            f"cells done before, {self.blocks.count:,} blocks, {self.task.cores} cores, process {os.getpid()} on "
             f"{machine.node} ({machine.system} {machine.machine}), {versions}",
             "begin", kernel=self.task.study.kernel_name, cells=progress.done, of=progress.total,
-            cores=self.task.workers, process=os.getpid(), machine=machine.node, versions=versions,
+            cores=self.task.cores, process=os.getpid(), machine=machine.node, versions=versions,
         )  # fmt: skip
 
 

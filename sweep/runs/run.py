@@ -7,7 +7,6 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import datetime
-from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -23,7 +22,7 @@ from sweep.runs.bench import Found
 from sweep.runs.extend import TAKEN_OVER, Precomputed
 from sweep.runs.loop import Loop
 from sweep.runs.pool import CtrlC
-from sweep.runs.task import Task, asked, joined
+from sweep.runs.task import Task, joined
 from sweep.runs.to_file import run_to_file
 from sweep.study.keys import KEYS
 from sweep.study.read import Given
@@ -111,16 +110,12 @@ def run(
     >>> ds.period.values.round(6)
     array([44.      ,  7.844719])
     """
-    options = [name for name in signature(run).parameters if name != "keys"]
+    options = {name: value for name, value in locals().items() if name not in ("study", "path", "keys")}
     for key in keys:
         if key not in (*KEYS, "allow_import"):
             hint = did_you_mean(key, [*options, *KEYS]) or f"; a study has {listed(KEYS, word='and')}"
             raise SweepError(f"sweep.run: no such keyword {key}{hint}")
-    task = asked(
-        as_study(study, **keys), path, workers=workers, force=force, progress=progress, block_cells=block_cells,
-        extend=extend, until=until, cluster=cluster, repair=repair, isolate=isolate, cell_timeout=cell_timeout,
-        retry_failed=retry_failed,
-    )  # fmt: skip
+    task = Task(as_study(study, **keys), path, **options)
     if path is None:
         return _run_in_memory(task)
     if run_to_file(task):
@@ -132,7 +127,7 @@ def run(
 
 def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> bool:
     """Runs as `run` does, and opens nothing; False where the time was up before the end."""
-    return run_to_file(asked(study, path, **options))
+    return run_to_file(Task(study, path, **options))
 
 
 def is_begun(output: Path) -> bool:
@@ -167,7 +162,7 @@ def store_cells(
         As `run`.
     """
     block = max(1, min(row_blocks(study).count, STORED_AT_ONCE))
-    task = asked(study, path, workers=1, progress=False, force=force, block_cells=block, mark=mark)
+    task = Task(study, path, 1, force, progress=False, block_cells=block, fingerprint=mark or {})
     run_to_file(task, Precomputed(arrays, {**(attrs or {}), **({TAKEN_OVER: taken_over} if taken_over else {})}))
     return open_result(task.output)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -23,78 +23,66 @@ if TYPE_CHECKING:
     from sweep.runs.cluster import Cluster
 
 
-@dataclass(frozen=True)
+@dataclass
 class Task:
-    """What a run was asked for; see `run`. Made by `asked`."""
+    """What a run was asked for, as `run` was, and what is meant by it.
+
+    Attributes
+    ----------
+    output : Path
+        Where a run to a file writes, all links followed.
+    cores, stream, end, limit
+        What `workers`, `progress`, `until` and `cell_timeout` mean.
+    fingerprint : mapping of str to str
+        Of the study and of this program, or what is given instead.
+
+    Raises
+    ------
+    SweepError
+        It cannot be meant.
+    """
 
     study: Study
-    fingerprint: Mapping[str, str]
-    path: Path | None
-    workers: int
-    stream: TextIO | None
-    block_cells: int | None
-    until: datetime | None
-    isolate: bool
-    cell_limit: float | None
+    path: str | os.PathLike[str] | None = None
+    workers: int | None = None
     force: bool = False
+    progress: bool | TextIO | None = None
+    block_cells: int | None = None
     extend: bool = False
+    until: str | datetime | None = None
     cluster: Any = None
     repair: bool = False
+    isolate: bool = False
+    cell_timeout: float | str | None = None
     retry_failed: bool = False
+    fingerprint: Mapping[str, str] = field(default_factory=dict)
 
-    @property
-    def output(self) -> Path:
-        """Where a run to a file writes."""
-        assert self.path is not None, "a run in memory has no output"
-        return self.path
+    def __post_init__(self) -> None:
+        self.fingerprint = dict(self.fingerprint or fingerprint(self.study))
+        self.output = Path(os.path.realpath(as_path("." if self.path is None else self.path)))
+        if not self.output.parent.is_dir():
+            raise SweepError(f"{self.path}: there is no folder {self.output.parent}")
+        self.cores = cores() if self.workers is None else whole_number("workers", self.workers)
+        if self.block_cells is not None:
+            whole_number("block_cells", self.block_cells)
+        self.stream, self.end = stream_of(self.progress), deadline(self.until)
+        self.isolate, self.limit = self.isolate or self.cell_timeout is not None, limit_of(self.cell_timeout)
+        if self.cluster is not None and self.workers is not None:
+            raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
+        require_asked(self.study)
+        if self.path is None and self.until is not None:
+            raise SweepError("until: give a path as well, or what is computed by then would be lost")
+        if self.extend and self.retry_failed:
+            raise SweepError("extend, retry_failed: give one of the two; each continues another result")
 
     @property
     def name(self) -> str:
         """What the run is called in its messages."""
-        return self.study.title or "sweep" if self.path is None else self.path.name
+        return self.study.title or "sweep" if self.path is None else self.output.name
 
     def note(self, text: str) -> None:
         """Says something at once."""
         Progress(1, self.stream, self.name).note(text)
-
-
-def asked(
-    study: Study,
-    path: str | os.PathLike[str] | None,
-    *,
-    workers: int | None = None,
-    progress: bool | TextIO | None = None,
-    block_cells: int | None = None,
-    until: str | datetime | None = None,
-    isolate: bool = False,
-    cell_timeout: float | str | None = None,
-    mark: Mapping[str, str] | None = None,
-    **options: Any,
-) -> Task:
-    """What `run` was asked for; further options are kept as they are. Raises SweepError where it cannot be meant."""
-    output = None if path is None else Path(os.path.realpath(as_path(path)))
-    if output is not None and not output.parent.is_dir():
-        raise SweepError(f"{path}: there is no folder {output.parent}")
-    task = Task(
-        study,
-        dict(mark or fingerprint(study)),
-        output,
-        cores() if workers is None else whole_number("workers", workers),
-        stream_of(progress),
-        None if block_cells is None else whole_number("block_cells", block_cells),
-        deadline(until),
-        isolate or cell_timeout is not None,
-        limit_of(cell_timeout),
-        **options,
-    )
-    if task.cluster is not None and workers is not None:
-        raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
-    require_asked(study)
-    if path is None and until is not None:
-        raise SweepError("until: give a path as well, or what is computed by then would be lost")
-    if task.extend and task.retry_failed:
-        raise SweepError("extend, retry_failed: give one of the two; each continues another result")
-    return task
 
 
 @contextlib.contextmanager

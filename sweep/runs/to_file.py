@@ -133,7 +133,8 @@ def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
     if not (task.extend or task.retry_failed) or task.force or not task.output.exists():
         return None
     check_whole(task.output)
-    reused = stack.enter_context((Retried if task.retry_failed else Reused)(task.output, task.study))
+    reused = (Retried if task.retry_failed else Reused)(task.output, task.study)
+    stack.callback(reused.close)
     if task.extend and is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
         task.note("another version has computed it; a sample of its cells is computed again")
         reused.check_sample()
