@@ -111,9 +111,9 @@ def main() -> int:
         timed(falls(10), cluster=client)
         tasks.clear()
         seconds = timed(falls(given.blocks), cluster=client)
-        each = 1e6 * seconds / given.blocks
+        each, of_cluster = 1e6 * seconds / given.blocks, len(tasks)
         here = timed(falls(given.blocks), workers=2)
-        print(f"{given.blocks} blocks in memory: {seconds:.1f} s, {each:.0f} us a block, {len(tasks)} tasks")
+        print(f"{given.blocks} blocks in memory: {seconds:.1f} s, {each:.0f} us a block, {of_cluster} tasks")
         print(f"  by two threads here: {here:.1f} s; ratio {seconds / here:.2f}")
         tasks.clear()
         elsewhere = timed(falls(given.stored), folder / "cluster.h5", cluster=client)

@@ -16,9 +16,10 @@ import socket
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, Future
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -89,9 +90,9 @@ class Cluster:
                 self._note("the cluster has no workers; waiting for the first")
         self.threads, self._asked = threads, time.monotonic()
 
-    def remote(self, assignment: Assignment) -> Any:
-        """What stands for the bench of each worker in `submit`; dask makes it where it is needed."""
-        return self._client.submit(Remote, assignment, pure=False)
+    def remote(self, *words: Any) -> Any:
+        """What stands for the bench of each worker in `submit`; dask makes it where it is needed, of such words."""
+        return self._client.submit(Remote, *words, pure=False)
 
     def submit(self, remote: Any, jobs: tuple[int, ...], masks: Mapping[int, Any]) -> Future[Answer]:
         """A future of what `compute` gives on a worker. Raises SweepError."""
@@ -162,9 +163,9 @@ def _reason(fault: BaseException) -> str:
     return str(fault).partition("\n")[0] or type(fault).__name__
 
 
-@dataclass(frozen=True)
-class Assignment:
-    """All that a worker needs to know of a run.
+@dataclass
+class Remote:
+    """The bench of a run on a worker; where dask moves it to, it is made anew. It is ready when it is first used.
 
     Attributes
     ----------
@@ -183,26 +184,17 @@ class Assignment:
     paths: tuple[str, ...]
     isolated: tuple[float | None, float] | None
 
-
-class Remote:
-    """The bench of a run on a worker; where dask moves it to, it is made anew. It is ready when it is first used."""
-
-    def __init__(self, assignment: Assignment) -> None:
-        self._assignment, self.turn = assignment, threading.Lock()
-        self.fd: int | None = None
-        self._processes: Processes | None = None
-
     def __reduce__(self) -> tuple[Any, ...]:
-        return Remote, (self._assignment,)
+        return Remote, tuple(getattr(self, field.name) for field in fields(self))
 
     @cached_property
     def bench(self) -> Bench:
         """Loads and compiles the kernel. Raises SweepError where what computes here is not what was asked for."""
-        given, where = self._assignment, f"worker on {socket.gethostname()}"
-        sys.path.extend(path for path in given.paths if path not in sys.path and Path(path).is_dir())
+        where = f"worker on {socket.gethostname()}"
+        sys.path.extend(path for path in self.paths if path not in sys.path and Path(path).is_dir())
         try:
-            study = Study.from_json(given.study, allow_import=True)
-            changed = difference(given.fingerprint, fingerprint(study))
+            study = Study.from_json(self.study, allow_import=True)
+            changed = difference(self.fingerprint, fingerprint(study))
         except SweepError as fault:
             raise SweepError(f"{where}: {fault}") from None
         if changed:
@@ -211,36 +203,38 @@ class Remote:
                 f"{where}: what computes there is not what was asked for here; install the same versions on every "
                 f"machine\n{lines}"
             )
-        self.fd = None if given.shared is None else given.shared.opened()
-        if given.isolated is None:
+        processes = None
+        if self.isolated is None:
             warm(Solver(study), study)
         else:
-            self._processes = Processes(study, given.isolated[0], os.cpu_count() or 1, given.isolated[1])
-        self._buffers = Buffers(blocks := Blocks(study, given.partition))
-        return Bench(study, blocks, self._buffers.room, self._kept, self._processes)
+            processes = Processes(study, self.isolated[0], os.cpu_count() or 1, self.isolated[1])
+            weakref.finalize(self, processes.end)
+        shared, blocks = self.shared, Blocks(study, self.partition)
+        self._fd = fd = None if shared is None else shared.opened()
+        if fd is not None:
+            weakref.finalize(self, os.close, fd)
+        buffers = Buffers(blocks)
 
-    def _kept(self, job: int, arrays: Mapping[str, Any]) -> Found:
-        """The digests of what is written, or the numbers. Raises SweepError."""
-        shared = self._assignment.shared
-        if shared is None or self.fd is None:
-            return arrays  # they are not used again
-        with disk.refusing(Path(shared.path)):
-            found: bytes = shared.table.write(self.fd, job, arrays)
-        self._buffers.back(job)
-        return found
+        def kept(job: int, arrays: Mapping[str, Any]) -> Found:
+            """The digests of what is written, or the numbers, which lie where nothing else will."""
+            if shared is None or fd is None:
+                return arrays
+            with disk.refusing(Path(shared.path)):
+                found: bytes = shared.table.write(fd, job, arrays)
+            buffers.back(job)
+            return found
+
+        return Bench(study, blocks, buffers.room, kept, processes)
 
     def sync(self) -> None:
         """Returns when all that was written is on the disk. Raises SweepError."""
-        if self.fd is not None and self._assignment.shared is not None:
-            with disk.refusing(Path(self._assignment.shared.path)):
-                disk.fsync(self.fd)
+        if self.shared is not None and self._fd is not None:
+            with disk.refusing(Path(self.shared.path)):
+                disk.fsync(self._fd)
 
-    def __del__(self) -> None:
-        """At the end of the run, when dask lets go of it."""
-        if self._processes is not None:
-            self._processes.end()
-        if self.fd is not None:
-            os.close(self.fd)
+
+_turn = threading.Lock()
+"""What all threads of a worker need is made once."""
 
 
 @dataclass(frozen=True)
@@ -252,7 +246,7 @@ class Answer:
 
 def compute(remote: Remote, jobs: tuple[int, ...], masks: Mapping[int, Any]) -> Answer:
     """Computes blocks on a worker; of those with a mask, only the cells for which it holds. Raises SweepError."""
-    with remote.turn:
+    with _turn:
         bench = remote.bench
     found = [bench.block(job, masks.get(job)) for job in jobs]
     remote.sync()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,8 @@ class Reused:
         The finished result.
     study : Study
         Whose axes have all values of the result's, in the same order, and more.
+    retry : bool
+        It is the same study, and cells that FAILED are computed again.
 
     Raises
     ------
@@ -70,8 +73,8 @@ class Reused:
         The result cannot be read, or an axis lacks some of its values.
     """
 
-    def __init__(self, output: Path, study: Study) -> None:
-        self._output, self._study, self._grid = output, study, Grid(study)
+    def __init__(self, output: Path, study: Study, retry: bool = False) -> None:
+        self._output, self._study, self._grid, self._retry = output, study, Grid(study), retry
         self._columns: tuple[Column, ...] = columns(study)
         try:
             self._stored = StoredFile(output)
@@ -93,24 +96,26 @@ class Reused:
 
     def missing(self, start: int, stop: int) -> Any:
         """Of the cells `start` to `stop`, which have to be computed."""
-        box, known = self._box(start, stop)
-        missing = np.ones(_lengths(box), bool)
-        missing[np.ix_(*known)] = False
-        return missing.ravel()
+        return ~self._known(start, stop)[1]
 
     def fill(self, start: int, stop: int, arrays: Mapping[str, Any]) -> None:
         """Writes the known ones among the cells `start` to `stop`. Raises SweepError where the file fails."""
-        box, known = self._box(start, stop)
-        if not all(k.any() for k in known):
+        shared, known = self._known(start, stop)
+        if not known.any():
             return
         # values of the result that are neighbours there have none of its values between them here
-        old = tuple(
-            slice(int(p[s][k].min()), int(p[s][k].max()) + 1)
-            for p, s, k in zip(self._positions, box, known, strict=True)
-        )
+        parts = [p[s] for p, s in zip(self._positions, box_slices(self._grid.shape, start, stop), strict=True)]
+        old = tuple(slice(int(part[part >= 0].min()), int(part.max()) + 1) for part in parts)
         for column in self._columns:
-            place = arrays[column.name].reshape(*_lengths(box), *column.shape)
-            place[np.ix_(*known)] = self.values(column.name, old)
+            values = self.values(column.name, old)
+            arrays[column.name][known] = values.reshape(-1, *column.shape)[known[shared]]
+
+    def _known(self, start: int, stop: int) -> tuple[Any, Any]:
+        """Which of some cells the result has; and which of these did not FAIL, where those are computed again."""
+        box = box_slices(self._grid.shape, start, stop)
+        axes = [positions[s] >= 0 for positions, s in zip(self._positions, box, strict=True)]
+        shared = reduce(np.logical_and.outer, axes).ravel()
+        return shared, shared & np.ravel(self.values(STATUS, box) != Status.FAILED) if self._retry else shared
 
     def values(self, name: str, slices: tuple[slice, ...]) -> Any:
         """Those of a piece of the result. Raises SweepError where the file fails."""
@@ -152,27 +157,6 @@ class Reused:
         new = [np.flatnonzero(p >= 0)[place] for p, place in zip(self._positions, places, strict=True)]
         return list(map(int, np.ravel_multi_index(new, self._grid.shape)))
 
-    def _box(self, start: int, stop: int) -> tuple[tuple[slice, ...], list[Any]]:
-        """The box of some cells in the grid, and along each axis which of its positions the result has."""
-        box = box_slices(self._grid.shape, start, stop)
-        return box, [positions[s] >= 0 for positions, s in zip(self._positions, box, strict=True)]
-
-
-class Retried(Reused):
-    """The cells of a finished result of the same study, but for those that FAILED."""
-
-    def missing(self, start: int, stop: int) -> Any:
-        """Of the cells `start` to `stop`, which FAILED."""
-        return np.ravel(self.values(STATUS, box_slices(self._grid.shape, start, stop)) == Status.FAILED)
-
-    def fill(self, start: int, stop: int, arrays: Mapping[str, Any]) -> None:
-        """Writes the others. Raises SweepError where the file fails."""
-        again = self.missing(start, stop)
-        computed = {column.name: arrays[column.name][again] for column in self._columns}
-        super().fill(start, stop, arrays)
-        for name, values in computed.items():
-            arrays[name][again] = values
-
 
 def has_failed(output: Path) -> bool:
     """Whether a cell of a finished result FAILED. Raises SweepError where it keeps no cells."""
@@ -202,10 +186,6 @@ class Precomputed:
     def fill(self, start: int, stop: int, arrays: Mapping[str, Any]) -> None:
         for name, values in self._arrays.items():
             arrays[name][...] = values[start:stop]
-
-
-def _lengths(box: tuple[slice, ...]) -> list[int]:
-    return [s.stop - s.start for s in box]
 
 
 def _spread(cells: Any) -> Any:

@@ -197,12 +197,10 @@ class Loop:
         if self._cluster is None:
             bench = Bench(study, self.blocks, self._sink.room, processes=processes)
             return lambda batch, masks: self._threads.submit(lambda: [bench.block(j, masks.get(j)) for j in batch])
-        from sweep.runs.cluster import Assignment
-
         isolated = None if processes is None else (processes.limit, processes.cost)
         seen, partition = shared if self._reused is None else None, self.blocks.partition
         words = study.to_json(), dict(self.task.fingerprint), partition, seen, kernel_paths(study), isolated
-        return partial(self._cluster.submit, self._cluster.remote(Assignment(*words)))
+        return partial(self._cluster.submit, self._cluster.remote(*words))
 
     def _batches(self, jobs: Sequence[int]) -> Iterator[Batch]:
         """One block each here; on a cluster as many as take half a second, fewer at the beginning and at the end."""
@@ -235,8 +233,9 @@ class Loop:
             self._forecast.begin(batch)
         for future in wait([*self._computing, *self._keeping], TICK, FIRST_COMPLETED).done:
             if future in self._keeping:
-                start, stop = self.blocks.cells(self._keeping.pop(future))
+                start, stop = self.blocks.cells(job := self._keeping.pop(future))
                 future.result()
+                self._forecast.end(job)
                 self.progress.add(stop - start)
                 continue
             batch = self._computing.pop(future)
@@ -247,7 +246,6 @@ class Loop:
                     raise SweepError(f"{self._labels(batch)}: {POISONED}")
                 self._begin_task(batch)
                 continue
-            self._forecast.end(batch)
             self._answers += 1
             for done in found:
                 self._keep(done)

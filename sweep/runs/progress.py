@@ -26,7 +26,7 @@ LINE_SHARE = 0.05
 GOLDEN = 0.6180339887498949
 """Multiples of it, modulo 1, fill an interval evenly and fall into step with the length of no axis."""
 ROUNDS = 3
-"""Tasks each core has done when its first one, in which kernels are loaded, need not count any more."""
+"""Blocks each core has done when its first one, in which kernels are loaded, need not count any more."""
 
 Clock = Callable[[], float]
 
@@ -47,7 +47,7 @@ class Forecast:
     jobs : iterable of int
         Blocks that are to be computed.
     cores : int
-        Tasks, of one or several blocks, that are computed at a time.
+        Blocks that are computed at a time.
     clock : callable
         Seconds.
     """
@@ -55,27 +55,28 @@ class Forecast:
     def __init__(self, weights: Any, jobs: Iterable[int], cores: int = 1, clock: Clock = time.monotonic) -> None:
         self.weights, self._cores, self._clock = np.maximum(weights, 1e-9), max(1, cores), clock
         self._to_do = float(self.weights[list(jobs)].sum())
-        self._running: dict[tuple[int, ...], float] = {}
-        self._number, self._done, self._seconds = 0, 0.0, 0.0
-        self._since: tuple[float, float, float] | None = None
-        """When it began, what was done then, and the seconds of these; after the first round that is its end."""
+        self._running: dict[int, float] = {}
+        self._number = 0
+        self._now = clock(), 0.0, 0.0
+        """When a block ended last, the weights of all that are done, and their seconds;"""
+        self._first = self._since = self._now
+        """the same at the end of the first round, and where what is measured begins."""
 
-    def begin(self, jobs: tuple[int, ...]) -> None:
-        """A core has begun with a task, or did so before."""
-        self._running.setdefault(jobs, self._clock())
-        self._since = self._since or (self._clock(), 0.0, 0.0)
+    def begin(self, jobs: Iterable[int]) -> None:
+        """Cores have begun with some blocks, now or before."""
+        for job in jobs:
+            self._running.setdefault(job, self._clock())
 
-    def end(self, jobs: tuple[int, ...]) -> None:
-        """A task is done."""
-        weight = float(self.weights[list(jobs)].sum())
+    def end(self, job: int) -> None:
+        """A block is done."""
+        weight, now, (_, done, seconds) = float(self.weights[job]), self._clock(), self._now
         self._to_do -= weight
-        self._done += weight
-        self._seconds += self._clock() - self._running.pop(jobs, self._clock())
+        self._now = now, done + weight, seconds + now - self._running.pop(job, now)
         self._number += 1
         if self._number == self._cores:
-            self._first_round = self._clock(), self._done, self._seconds
+            self._first = self._now
         if self._number == ROUNDS * self._cores:
-            self._since = self._first_round
+            self._since = self._first
 
     def again(self, job: int) -> None:
         """A block has to be computed once more."""
@@ -84,19 +85,18 @@ class Forecast:
     @property
     def left(self) -> float | None:
         """Seconds until all blocks are done, None before the first one is."""
-        if self._since is None or not self._number:
-            return None
-        if self._to_do < 1e-9 and not self._running:
-            return 0.0
-        now, (since, before, spent) = self._clock(), self._since
-        pace = (self._done - before) / max(self._seconds - spent, 1e-9)
-        tasks = np.array([self.weights[list(jobs)].sum() for jobs in self._running])
-        reached = pace * (now - np.array(list(self._running.values())))
-        rate = (self._done - before + np.minimum(reached, tasks).sum()) / max(now - since, 1e-9)
+        if not self._number or (self._to_do < 1e-9 and not self._running):
+            return 0.0 if self._number else None
+        done, spent = self._now[1] - self._since[1], max(self._now[2] - self._since[2], 1e-9)
+        elapsed = max(self._clock() - self._since[0], 1e-9)
+        pace = min(done / spent, done / elapsed)  # of one core, which is not faster than all are
+        tasks = self.weights[list(self._running)]
+        reached = pace * (self._clock() - np.array(list(self._running.values())))
+        rate = (done + np.minimum(reached, tasks).sum()) / elapsed
         # one that has taken longer than it should takes as long again: what it should take says nothing any more
         to_come = np.where(reached < tasks, tasks - reached, reached)
         total = max(self._to_do - tasks.sum(), 0.0) + to_come.sum()
-        return float(max(total / max(rate, 1e-300), max(to_come, default=0.0) / pace))
+        return float(max(total / rate, max(to_come, default=0.0) / pace))
 
 
 class Progress:

@@ -20,7 +20,7 @@ from sweep.file.reading import StoredFile
 from sweep.file.store import Gather, Store, lock_of, opened, unfinished_of
 from sweep.file.verify import check_whole, verify
 from sweep.runs.bench import Buffers, Found
-from sweep.runs.extend import Precomputed, Retried, Reused, has_failed, is_of_another_version, obstacle
+from sweep.runs.extend import Precomputed, Reused, has_failed, is_of_another_version, obstacle
 from sweep.runs.loop import Loop
 from sweep.runs.pool import CtrlC, Terminated, TimeUp
 from sweep.runs.task import Task, joined
@@ -133,7 +133,7 @@ def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
     if not (task.extend or task.retry_failed) or task.force or not task.output.exists():
         return None
     check_whole(task.output)
-    reused = (Retried if task.retry_failed else Reused)(task.output, task.study)
+    reused = Reused(task.output, task.study, task.retry_failed)
     stack.callback(reused.close)
     if task.extend and is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
         task.note("another version has computed it; a sample of its cells is computed again")
