@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kernels.interface import Field, Kernel, Status
+from kernels.interface import Field, Status
 from sweep.cells.fingerprint import version
 from sweep.cells.grid import Box, Cells, Grid
 
 if TYPE_CHECKING:
-    from sweep.study.model import Axis, Study
+    from sweep.study.model import Study
 
 CONVENTIONS = "CF-1.11"
 STATUS, METHOD_USED, ERROR_BOUND = "status", "method_used", "error_bound"
@@ -90,7 +90,25 @@ def cell_schema(study: Study, fingerprint: Mapping[str, str]) -> Schema:
 
 def columns(study: Study) -> tuple[Column, ...]:
     """The asked outputs in kernel order, then what is said of them."""
-    return (*(_output(f, study) for f in study.asked), _error_bound(), _status(), _method_used(study.kernel))
+    # each output taken by itself says what it is right to
+    said = {"ancillary_variables": " ".join(ANCILLARY)} | ({} if "rtol" in study.axes else {"rtol": study.rtol})
+    outputs = [Column(f.name, "f8", f.dims, study.shape(f), {**_attrs(f), **said}) for f in study.asked]
+    error = {
+        "units": "1",
+        "long_name": "relative error that INACCURATE values are right to, inf where unknown; NaN where rtol holds",
+    }
+    status = {
+        "long_name": "what became of the cell",
+        "flag_values": np.array([int(s) for s in Status], "i1"),
+        "flag_meanings": " ".join(s.name for s in Status),
+    }
+    used = {
+        "long_name": "method that solved the cell",
+        "flag_values": np.arange(-1, len(study.kernel.methods), dtype="i1"),
+        "flag_meanings": " ".join(["none", *(m.name for m in study.kernel.methods)]),
+    }
+    kinds = ((ERROR_BOUND, "f4", error), (STATUS, "i1", status), (METHOD_USED, "i1", used))
+    return (*outputs, *(Column(name, dtype, (), (), attrs) for name, dtype, attrs in kinds))
 
 
 def cells_of(arrays: Mapping[str, Any]) -> Cells:
@@ -102,23 +120,32 @@ def cells_of(arrays: Mapping[str, Any]) -> Cells:
 def coordinates(study: Study) -> tuple[Coordinate, ...]:
     """Axes, fixed parameters and shared coordinates."""
     fields = {f.name: f for f in (*study.kernel.parameters, *study.kernel.along)}
-    axes = [_axis(study.axes[name], (dim,), fields) for dim, names in study.dims.items() for name in names]
-    fixed = [Coordinate(k, fields[k].dims, np.float64(v), _field_attrs(fields[k])) for k, v in study.fixed.items()]
+    settings = {
+        "method": {"long_name": "method asked for"},
+        "rtol": {"units": "1", "long_name": "relative error asked for"},
+    }
+    found = []
+    for dim, names in study.dims.items():
+        for name in names:
+            axis, field = study.axes[name], fields.get(name)
+            attrs = settings.get(name, {"long_name": name}) if field is None else _attrs(field)
+            dims = (dim,) if field is None else (dim, *field.dims)
+            found.append(Coordinate(name, dims, axis.values if axis.words is None else np.array(axis.words), attrs))
+    found += [Coordinate(k, fields[k].dims, np.float64(v), _attrs(fields[k])) for k, v in study.fixed.items()]
     used = {d for f in (*study.kernel.parameters, *study.asked) for d in f.dims}
-    along = [Coordinate(k, (k,), v, _field_attrs(fields[k])) for k, v in study.along.items() if k in used]
-    lengths = study.lengths
-    counted = [_counting(d, lengths[d]) for d in lengths if d in used and d not in study.along]
-    return (*axes, *fixed, *along, *counted)
-
-
-def _counting(dim: str, length: int) -> Coordinate:
-    """1, 2, ... along a dim of arrays."""
-    return Coordinate(dim, (dim,), np.arange(1, length + 1), {"units": "1", "long_name": f"number of the {dim}"})
+    found += [Coordinate(k, (k,), v, _attrs(fields[k])) for k, v in study.along.items() if k in used]
+    for dim, length in study.lengths.items():
+        if dim in used and dim not in study.along:
+            attrs = {"units": "1", "long_name": f"number of the {dim}"}
+            found.append(Coordinate(dim, (dim,), np.arange(1, length + 1), attrs))
+    return tuple(found)
 
 
 def attributes(study: Study, fingerprint: Mapping[str, str]) -> dict[str, Any]:
     """Global attributes; with them the file alone suffices to run the study again."""
-    attrs: dict[str, Any] = {
+    libraries = ("foliot", "numba", "llvmlite", "numpy", "xarray", "h5py", "h5netcdf")
+    versions = [f"{name} {version(name)}" for name in libraries]
+    return {
         "Conventions": CONVENTIONS,
         "title": study.title,
         "question": study.question,
@@ -126,65 +153,13 @@ def attributes(study: Study, fingerprint: Mapping[str, str]) -> dict[str, Any]:
         "source": study.kernel.source,
         "design": study.design,
         **({"where": study.where} if study.where else {}),
-    }
-    attrs |= {k: v for k, v in (("method", study.method), ("rtol", study.rtol)) if k not in study.axes}
-    return attrs | {
+        **{k: v for k, v in (("method", study.method), ("rtol", study.rtol)) if k not in study.axes},
         "study": study.text,
         "study_json": study.to_json(),
         "fingerprint": json.dumps(dict(fingerprint), sort_keys=True),
-        "versions": _versions(),
+        "versions": ", ".join([*versions, f"python {platform.python_version()}", platform.machine()]),
     }
 
 
-def _output(field: Field, study: Study) -> Column:
-    attrs = {**_field_attrs(field), "ancillary_variables": " ".join(ANCILLARY)}
-    if "rtol" not in study.axes:
-        attrs["rtol"] = study.rtol  # so that an output taken by itself says what it is right to
-    return Column(field.name, "f8", field.dims, study.shape(field), attrs)
-
-
-def _status() -> Column:
-    attrs = {
-        "long_name": "what became of the cell",
-        "flag_values": np.array([int(s) for s in Status], "i1"),
-        "flag_meanings": " ".join(s.name for s in Status),
-    }
-    return Column(STATUS, "i1", (), (), attrs)
-
-
-def _method_used(kernel: Kernel) -> Column:
-    attrs = {
-        "long_name": "method that solved the cell",
-        "flag_values": np.arange(-1, len(kernel.methods), dtype="i1"),
-        "flag_meanings": " ".join(["none", *(m.name for m in kernel.methods)]),
-    }
-    return Column(METHOD_USED, "i1", (), (), attrs)
-
-
-def _error_bound() -> Column:
-    attrs = {
-        "units": "1",
-        "long_name": "relative error that INACCURATE values are right to, inf where unknown; NaN where rtol holds",
-    }
-    return Column(ERROR_BOUND, "f4", (), (), attrs)
-
-
-def _axis(axis: Axis, dims: tuple[str, ...], fields: Mapping[str, Field]) -> Coordinate:
-    field = fields.get(axis.name)
-    settings = {
-        "method": {"long_name": "method asked for"},
-        "rtol": {"units": "1", "long_name": "relative error asked for"},
-    }
-    attrs = _field_attrs(field) if field is not None else settings.get(axis.name, {"long_name": axis.name})
-    dims = dims if field is None else (*dims, *field.dims)
-    return Coordinate(axis.name, dims, axis.values if axis.words is None else np.array(axis.words), attrs)
-
-
-def _field_attrs(field: Field) -> dict[str, Any]:
+def _attrs(field: Field) -> dict[str, Any]:
     return {"units": field.unit, "long_name": field.doc}
-
-
-def _versions() -> str:
-    names = ("foliot", "numba", "llvmlite", "numpy", "xarray", "h5py", "h5netcdf")
-    found = [f"{name} {version(name)}" for name in names]
-    return ", ".join([*found, f"python {platform.python_version()}", platform.machine()])

@@ -57,11 +57,6 @@ class Turn(NamedTuple):
     sooner: Callable[..., Any] | None = None
     early: bool = False
 
-    def comes(self, inputs: Sequence[Any]) -> bool:
-        """Whether it comes to the first of some cells, by columns of the parameters and of rtol."""
-        able = all(term.holds(inputs)[0] for term in self.absent)
-        return able and (self.sooner is None or bool(self.sooner(*inputs)[0] == self.early))
-
 
 def turns(study: Study, grid: Grid) -> tuple[Turn, ...]:
     """Turns of the methods that give every output asked for and can do some cell of the grid."""
