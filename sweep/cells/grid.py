@@ -133,7 +133,7 @@ class Cells(NamedTuple):
     status, used : ndarray of int8, shape (cells,)
         A `Status`; the position in `kernel.methods`, or -1 where the cell is refused.
     error : ndarray of float32, shape (cells,), optional
-        What INACCURATE values are right to, infinite where nobody knows; NaN for other cells.
+        What values are right to, infinite where nobody knows; NaN where there are none.
     """
 
     outputs: Mapping[str, Any]

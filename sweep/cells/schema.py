@@ -95,7 +95,9 @@ def columns(study: Study) -> tuple[Column, ...]:
     outputs = [Column(f.name, "f8", f.dims, study.shape(f), {**_attrs(f), **said}) for f in study.asked]
     error = {
         "units": "1",
-        "long_name": "relative error that INACCURATE values are right to, inf where unknown; NaN where rtol holds",
+        "long_name": "largest relative error of the outputs: as the method bounds or estimates it, else rtol; "
+        "inf where unknown",
+        "relative_to": "the output itself; of a trace, its amplitude; of a state of a scene of one's own, its size",
     }
     status = {
         "long_name": "what became of the cell",

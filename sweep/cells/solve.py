@@ -29,6 +29,8 @@ STRIP_BYTES = 16 << 20
 """Bytes that the outputs of a strip may take, where they are traces."""
 NONE = -1
 """In place of a method's number: no method solved the cell."""
+ROUNDED_UP = np.float32(1 + 2.0**-23)
+"""A float32 times this is the next larger one at least."""
 
 
 def _these(*statuses: Status) -> bytes:
@@ -151,7 +153,8 @@ class Solver:
         if self.study.where:
             self.status[~self.grid.asked(np.arange(start, start + n))] = Status.NOT_ASKED
         self.used.fill(NONE)
-        method, rtol[:] = self.grid.settings(start, start + n)
+        method, wanted_rtol = self.grid.settings(start, start + n)
+        rtol[:] = wanted_rtol
         allowed = self.status < FIRST_REFUSAL
         places = _where(self._places[:n], allowed if wanted is None else allowed & wanted)
         for code in [method] if isinstance(method, int) else np.unique(method):
@@ -165,11 +168,16 @@ class Solver:
             self.used[refused] = NONE
             for column in self.targets[:-1]:
                 column[:n][refused] = np.nan
-        if cells.error is not None:
+        if (error := cells.error) is not None:
+            with np.errstate(over="ignore", invalid="ignore"):
+                error[:] = self._error[:n]
+                np.multiply(error, ROUNDED_UP, out=error)
+            # what meets rtol meets it in single precision, too
             doubtful = self.status == INACCURATE
-            cells.error.fill(np.nan)
-            with np.errstate(over="ignore"):  # rounded up to single precision
-                cells.error[doubtful] = self._error[:n][doubtful] * (1 + 2.0**-23)
+            least = error[doubtful]
+            np.minimum(error, np.float32(wanted_rtol), out=error)
+            error[doubtful] = least
+            error[refused] = np.nan
 
     def _choose(self, cells: Places) -> None:
         """Solve each cell by the first method that can do it, whose bound meets rtol and which does not give up.
@@ -182,12 +190,12 @@ class Solver:
             able = self._fitting(turn, cells)
             bound = self._bound(turn.number, able) if len(able) else None
             if bound is not None:
-                meets = _where(able, bound <= self._inputs_of(able)[-1])
-                if meets is not able:
+                meets = bound <= self._inputs_of(able)[-1]
+                if np.count_nonzero(meets) < len(able):
                     missed.append((turn.number, able, bound))
-                able = meets
+                    able, bound = able[meets], bound[meets]
             if len(able):
-                self._better(turn.number, able)
+                self._better(turn.number, able, bound)
                 cells = _where(cells, among(self.status[_rows(cells)], GIVEN_UP))
         if not (missed and len(cells)):
             return
@@ -213,7 +221,7 @@ class Solver:
             cells = _where(cells, turn.sooner(*self._inputs_of(cells)) == turn.early)
         return cells
 
-    def _better(self, number: int, cells: Places, bound: Floats | None = None) -> None:
+    def _better(self, number: int, cells: Places, bound: Floats | None) -> None:
         """Run a method, but keep what an earlier one gave to cells where this one is not better.
 
         Where an earlier one did not learn what the scene does, and this one knows no cycle of its kind, that is open.
@@ -256,10 +264,11 @@ class Solver:
             self._cached = cells, found
         return self._cached[1]
 
-    def _run(self, number: int, cells: Places, bound: Floats | None = None) -> None:
+    def _run(self, number: int, cells: Places, bound: Floats | None) -> None:
         """Solve the cells by one method, in place where they lie side by side, else gathered and put back.
 
-        Values of which less is known than rtol are remarked; `bound` is the method's where it may exceed rtol.
+        What values are right to is the method's estimate or `bound`, where it has one, else rtol; where that exceeds
+        rtol they are remarked.
         """
         method, rows, inputs = self.study.kernel.methods[number], _rows(cells), self._inputs_of(cells)
         aside = not isinstance(rows, slice)
@@ -269,11 +278,16 @@ class Solver:
         method.solve(*inputs, *self._along, *asked, *outputs, *error, status)
         if self._promised is not None:
             self._fail(status, [outputs[k] for k in self._promised])
-        if bound is not None or error or np.count_nonzero(status):
-            known = error[0] if error else np.where(status == INACCURATE, np.inf, 0.0)
-            known = known if bound is None else np.maximum(known, bound)
+        known = error[0] if error else inputs[-1] if bound is None else bound
+        if error and bound is not None:
+            known = np.maximum(known, bound)
+        if not error and np.count_nonzero(status):
+            known = np.where(status == INACCURATE, np.inf, known)
+        self._error[rows] = known
+        meets = known <= inputs[-1]
+        if np.count_nonzero(meets) < len(cells):
             self._error[rows] = np.where(np.isnan(known), np.inf, known)
-            status[~(known <= inputs[-1]) & (status < FIRST_REFUSAL)] = INACCURATE
+            status[~meets & (status < FIRST_REFUSAL)] = INACCURATE
         if aside:
             for k in self._wanted:
                 self.targets[k][cells] = results[k]

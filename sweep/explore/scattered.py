@@ -160,7 +160,8 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     told = np.where(inaccurate, np.int8(Status.INACCURATE), status[nearest])
     found[STATUS] = (tuple(grids), told.reshape(shape), dataset[STATUS].attrs)
     if ERROR_BOUND in dataset:
-        bound = np.where(inaccurate, np.fmax(error, dataset[ERROR_BOUND].values[nearest]), np.nan)
+        known = np.fmax(error, dataset[ERROR_BOUND].values[nearest])
+        bound = np.where(status[nearest] < FIRST_REFUSAL, known, np.nan)
         found[ERROR_BOUND] = (tuple(grids), bound.reshape(shape), dataset[ERROR_BOUND].attrs)
     return found.assign_attrs(dataset.attrs)
 

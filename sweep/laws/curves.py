@@ -237,7 +237,7 @@ def stated_error(dataset: xr.Dataset, name: str) -> xr.DataArray:
     found = like(rtol, dataset[name], "rtol")
     if "error_bound" in dataset:
         stated = dataset["error_bound"].astype(np.float64)
-        found = found.where(stated.isnull(), stated)
+        found = found.where(~(stated > found), stated)
     return found.transpose(*dataset[name].dims)
 
 

@@ -61,7 +61,7 @@ class Cell:
         if status >= 64:  # a refusal
             outputs, number = unwritten(self.kernel, self.columns, self.along), -1
         columns = {name: values[0] for name, values in outputs.items()}
-        return columns | {"status": status, "method_used": number, "error_bound": error if status == 1 else nan}
+        return columns | {"status": status, "method_used": number, "error_bound": error if status < 64 else nan}
 
     def solved(self):
         """(number of the method, status, error, outputs)."""
@@ -78,9 +78,9 @@ class Cell:
                 return -1, Status.FAILED, nan, None
 
     def bound(self, method):
-        """What a method promises: 0 where it holds rtol by itself, inf where nothing is known."""
+        """What a method promises: rtol where it holds that by itself, inf where nothing is known."""
         if method.bound is None:
-            return 0.0
+            return self.rtol[0]
         words = {"asked": self.keys["outputs"], "rtol": self.rtol, "along": self.along}
         (bound,) = bounds(self.kernel, method.name, *self.columns, **words)
         return inf if isnan(bound) else bound
@@ -92,7 +92,8 @@ class Cell:
         whole = all(np.isfinite(outputs[f.name]).all() for f in self.kernel.outputs if f.name in asked and not f.gaps)
         status = Status.FAILED if status == Status.OK and not whole else allowed(status)
         error = told if method.estimates else inf if status == Status.INACCURATE else 0.0
-        error = inf if isnan(error) else max(error, self.bound(method))
+        bound = 0.0 if method.estimates and not method.bound else self.bound(method)
+        error = inf if isnan(error) else max(error, bound)
         return number, Status.INACCURATE if status < 64 and error > self.rtol else status, error, outputs
 
     def auto(self):

@@ -6,7 +6,7 @@ import pytest
 from mpmath import mp, mpf, sqrt
 
 import sweep
-from kernels.interface import Status
+from kernels.interface import FIRST_REFUSAL, Status
 from sweep.explore.refine import refine
 from sweep.show.text import outputs_of
 
@@ -50,4 +50,20 @@ def test_a_refined_grid_keeps_the_bounds():
     keys = {"kernel": "foliot", "axes": {"mu": np.geomspace(0.1, 10, 5)}, "fixed": {"phi0": 1.0, "a": 1.0}}
     study = sweep.study(**keys, rtol=1e-12, method="asymptotic")
     found = refine(sweep.run(study, progress=False), ["period"], 1e-2).dataset
-    assert ((found.status == Status.INACCURATE) == found.error_bound.notnull()).all()
+    assert ((found.status < FIRST_REFUSAL) == found.error_bound.notnull()).all()
+    assert ((found.status == Status.INACCURATE) == (found.error_bound > 1e-12)).all()
+
+
+def test_cells_that_are_ok_say_what_made_them_so():
+    """The bound or estimate of the method; rtol of one that states none."""
+    fixed = {"phi0": 1.0, "a": 1.0, "R": 0.1}
+    axes = {"method": ["coulomb", "segments", "dopri5"], "rtol": [1e-3, 1e-9], "mu": [1.0, -1.0]}
+    found = sweep.run(sweep.study(kernel="foliot", axes=axes, fixed=fixed), progress=False)
+    bound = found.error_bound.values[..., 0]
+    assert (found.status.values[..., 0] == Status.OK).all()
+    assert np.isnan(found.error_bound.values[..., 1]).all()
+    assert bound[0].tolist() == pytest.approx([4e-15, 4e-15], rel=1e-6)
+    assert ((bound[1] > 0) & (bound[1] < 1e-12)).all()
+    assert (bound[2] == np.float32([1e-3, 1e-9])).all()
+    assert (found.error_bound.isel(mu=0) <= found.rtol.astype(np.float32)).all()
+    assert "amplitude" in found.error_bound.attrs["relative_to"]
