@@ -99,7 +99,7 @@ def true_error(function, points, values):
         shares = np.stack([1 - share, share], axis=1)
     else:
         stretched = stretch(points, heights(values))
-        corners, shares = located(points @ stretched, places @ stretched)
+        corners, shares, *_ = located(points @ stretched, places @ stretched)
     if np.isnan(values).any():
         missing = np.isnan(values[corners]).sum(axis=1)
         return float(np.mean((missing > 0) & (missing < corners.shape[1])))
@@ -192,7 +192,7 @@ def holds_beside_infinity(axes):
     places = places[np.linalg.norm(places, axis=1) < POLE - 2 * wide]
     logs = heights(values)
     stretched = stretch(points, logs)
-    corners, shares = located(points @ stretched, places @ stretched)
+    corners, shares, *_ = located(points @ stretched, places @ stretched)
     error = abs(np.where(shares == 0, 0.0, shares * logs[corners]).sum(axis=1) - np.log(pole(places))).max()
     cells = f"{axes} pole      {len(points):6} cells, {1e3 * spent / len(points):.2f} ms each"
     cells += f"; {found.singular} left beside the border"

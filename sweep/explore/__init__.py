@@ -9,9 +9,8 @@ Others may use
     `solver`          a study's kernel as a function of its axes
     `sensitivity`     which parameters decide an output
     `groups`          superfluous axes, outputs free of units
-    `failing`         a study without the cells at which its kernel fails
 
-Behind `refine` are `refiner` (rounds of cuts), `judge`, `mesh` (cells joined to simplices) and `metric` (a box
-stretched to where an output bends), behind `work_precision` is `reference` (what errors are against), behind
-`groups` is `symmetries` (powers by which numbers may be multiplied).
+Behind `refine` are `refiner` (rounds of cuts), `judge` (which edge to cut, and whether values are noise), `mesh` (cells
+joined to simplices) and `metric` (a box stretched to where an output bends), behind `work_precision` is `reference`
+(what errors are against), behind `groups` is `symmetries` (powers by which numbers may be multiplied).
 """

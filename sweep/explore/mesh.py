@@ -48,11 +48,15 @@ def simplices(points: Array) -> Indices:
     if points.shape[1] == 1:
         order = np.argsort(points[:, 0], kind="stable")
         return np.column_stack([order[:-1], order[1:]])
-    found = Delaunay(tilted(points)).simplices.astype(np.intp)
-    sides = points[found[:, 1:]] - points[found[:, :1]]
-    products = np.linalg.norm(sides, axis=2).prod(axis=1)
-    kept: Indices = np.sort(found[abs(np.linalg.det(sides)) > FLAT * products], axis=1)
-    return kept
+    found = np.sort(Delaunay(tilted(points)).simplices.astype(np.intp), axis=1)
+    return found[are_solid(points, found)]
+
+
+def are_solid(points: Array, corners: Indices) -> NDArray[np.bool_]:
+    """Whether simplices have a volume."""
+    sides = points[corners[:, 1:]] - points[corners[:, :1]]
+    found: NDArray[np.bool_] = abs(np.linalg.det(sides)) > FLAT * np.linalg.norm(sides, axis=2).prod(axis=1)
+    return found
 
 
 def tilted(points: Array) -> Array:

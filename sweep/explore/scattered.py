@@ -20,7 +20,7 @@ from scipy.spatial import Delaunay
 
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.errors import SweepError
-from sweep.explore.mesh import Array, Indices, are_too_few, interpolation_errors, simplices, tilted, with_beyond
+from sweep.explore.mesh import Array, Indices, are_solid, are_too_few, interpolation_errors, tilted, with_beyond
 from sweep.explore.metric import stretch
 from sweep.words import require_dataset
 
@@ -66,23 +66,18 @@ class Box:
         return found
 
 
-def is_positive(values: Array) -> bool:
-    """Whether all finite values are positive, so that they are interpolated in logarithms."""
-    finite = values[np.isfinite(values)]
-    return bool(finite.size and finite.min() > 0)
-
-
 def heights(values: Array) -> Array:
     """An output as it is interpolated: in logarithms where it is positive everywhere, else over its largest size."""
-    if is_positive(values):
-        with np.errstate(invalid="ignore"):
-            found: Array = np.log(values)
-        return found
-    return values / _size(values)
+    size = _size(values)
+    with np.errstate(invalid="ignore"):
+        found: Array = values / size if size else np.log(values)
+    return found
 
 
 def _size(values: Array) -> float:
-    return float(abs(values[np.isfinite(values)]).max(initial=0.0)) or 1.0
+    """The largest size of values, to which errors are relative; 0 of positive ones, which are taken in logarithms."""
+    finite = values[np.isfinite(values)]
+    return 0.0 if finite.size and finite.min() > 0 else float(abs(finite).max(initial=0.0)) or 1.0
 
 
 def axes_of(dataset: xr.Dataset) -> list[str]:
@@ -142,7 +137,7 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     shape = tuple(len(values) for values in grids.values())
     box = Box.of({name: dataset[name].values for name in names})
     points, places = box.points({n: dataset[n].values for n in names}), box.points(mesh)
-    corners, shares = located(points, places)
+    corners, shares, *_ = located(points, places)
     nearest = np.take_along_axis(corners, shares.argmax(axis=1)[:, None], 1)[:, 0]  # with the largest share
     found = xr.Dataset(coords={name: (name, values, dataset[name].attrs) for name, values in grids.items()})
     status, error = dataset[STATUS].values, np.zeros(len(places))
@@ -177,38 +172,32 @@ def _between(values: Array, points: Array, places: Array, status: Indices) -> tu
     height, kind = heights(values), kinds(status, np.isfinite(values))
     stretched = stretch(points, height)
     points, places = points @ stretched, places @ stretched
-    corners, shares = located(points, places)
+    corners, shares, where, mesh = located(points, places)
     # a corner that takes no part need have no value
     total: Array = np.where(shares == 0, 0.0, shares * height[corners]).sum(axis=1)
-    mesh, corners, off = simplices(points), np.sort(corners, axis=1), np.full(len(corners), np.inf)
+    size, solid = np.full(len(mesh), np.inf), are_solid(points, mesh)
     for number in np.unique(kind[kind >= 0]):
-        members = np.flatnonzero(kind == number)
-        own = np.searchsorted(members, mesh[(kind[mesh] == number).all(axis=1)])
-        here = np.flatnonzero((kind[corners] == number).all(axis=1))
-        if len(own) and len(here) and not are_too_few(points[members]):
-            # simplices that hold places are judged, by their number among those that are the same
-            rows = np.concatenate([own, np.searchsorted(members, corners[here])])
-            _, same = np.unique(rows, axis=0, return_inverse=True)
-            held = np.isin(same[: len(own)], same[len(own) :])
-            size = np.full(same.max() + 1, np.inf)
-            around = with_beyond(own)[held]
-            size[same[: len(own)][held]] = interpolation_errors(points[members], height[members], around)[0]
-            off[here] = size[same[len(own) :]]
-    off = np.where(shares.max(axis=1) == 1, 0.0, off)
-    return np.exp(total) if is_positive(values) else total * _size(values), off
+        members, own = np.flatnonzero(kind == number), np.flatnonzero((kind[mesh] == number).all(axis=1) & solid)
+        held = np.isin(own, where)
+        if held.any() and not are_too_few(points[members]):
+            around = with_beyond(np.searchsorted(members, mesh[own]))[held]
+            size[own[held]] = interpolation_errors(points[members], height[members], around)[0]
+    off = np.where(shares.max(axis=1) == 1, 0.0, np.where(where < 0, np.inf, size[where]))
+    return total * _size(values) if _size(values) else np.exp(total), off
 
 
-def located(points: Array, at: Array) -> tuple[Indices, Array]:
-    """Corners of the simplex in which each place is, and their shares in its value; NaN outside."""
-    mesh = Delaunay(tilted(points))
-    places = tilted(at)
-    where = mesh.find_simplex(places, tol=OUTSIDE)
-    inverse = mesh.transform[where]
+def located(points: Array, at: Array) -> tuple[Indices, Array, Indices, Indices]:
+    """Corners of the simplex of each place, and their shares in its value, NaN outside; its number, -1 outside;
+    and the corners of all simplices."""
+    found = Delaunay(tilted(points))
+    mesh, places = np.sort(found.simplices.astype(np.intp), axis=1), tilted(at)
+    where = found.find_simplex(places, tol=OUTSIDE).astype(np.intp)
+    inverse = found.transform[where]
     shares = np.einsum("nij,nj->ni", inverse[:, :-1], places - inverse[:, -1])
     shares = np.column_stack([shares, 1 - shares.sum(axis=1)])
     shares = np.where(abs(shares) < OUTSIDE, 0.0, shares)
     shares[where < 0] = np.nan
-    return mesh.simplices[where].astype(np.intp), shares
+    return found.simplices[where].astype(np.intp), shares, where, mesh
 
 
 def on_lines(dataset: xr.Dataset, x: str) -> xr.Dataset:

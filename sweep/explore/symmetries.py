@@ -15,9 +15,8 @@ import dataclasses
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,25 +55,13 @@ NEAR = 2e-5
 """Distance of a weight from the fraction that it is taken for."""
 
 
-@dataclass(frozen=True)
-class Scalings:
-    """A basis of the scalings of a study that were tried and hold.
+class Scalings(NamedTuple):
+    """A basis of the scalings of a study that hold: weights of fields and outputs, each row led by one field, whose
+    weight is 1 there and 0 in the others; how many do not follow from declared units; on how many cells they were
+    tried."""
 
-    Attributes
-    ----------
-    rows : tuple of dict of field to Fraction
-        Weights of parameters, coordinates and outputs; reduced, so that each of `leading` has weight 1 in one row and
-        0 in the others.
-    leading : tuple of str
-        One field a row.
-    hidden : int
-        How many rows there are beyond what the declared units say.
-    cells : int
-        On how many cells each was tried.
-    """
-
-    rows: tuple[Weights, ...]
-    leading: tuple[str, ...]
+    rows: list[Weights]
+    leading: list[str]
     hidden: int
     cells: int
 
@@ -113,7 +100,7 @@ def scalings(study: Study, seconds: float | None = None) -> Scalings:
     solved(few)
     cost = (time.perf_counter() - begun) / FEWEST_CELLS
     if seconds is not None and LEAST_SOLVED * cost > max(seconds, LEAST_SECONDS):
-        return Scalings((), (), 0, 0)
+        return Scalings([], [], 0, 0)
     affordable = int(max(seconds or SECONDS, LEAST_SECONDS) / (cost * (4 * len(leading) + 16)))
     cells = min(TRIED_CELLS, max(FEWEST_CELLS, affordable))
 
@@ -129,7 +116,7 @@ def scalings(study: Study, seconds: float | None = None) -> Scalings:
             if len(more) > by_units and all(trial.holds(row) for row in more):
                 rows, leads = more, more_leads
                 break
-    return Scalings(tuple(rows), tuple(leads), len(rows) - by_units, trial.number)
+    return Scalings(rows, leads, len(rows) - by_units, trial.number)
 
 
 def _is_scalable(study: Study, field: Field) -> bool:
