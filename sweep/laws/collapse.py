@@ -13,15 +13,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from scipy.special import stdtrit
+from scipy.special import gammaincc, ndtri
 
 from sweep.errors import SweepError
-from sweep.laws.curves import check_confidence, check_output, log_of, positive_axis, title
+from sweep.laws.curves import check_confidence, check_output, described, log_of, positive_axis, relative_sigma, title
 from sweep.laws.loglog import Array
+from sweep.laws.noise import BEYOND_DOUBT, RARE, ROUNDING, corrected, regress
 
 
 class Points(NamedTuple):
-    """Logarithms of all points."""
+    """Logarithms of all points, one curve behind the other."""
 
     t: Array
     z: Array
@@ -29,26 +30,30 @@ class Points(NamedTuple):
     """ln L."""
     curve: Array
     """Number of the L that a point is of."""
+    root: Array
+    """One over the standard error of z; 1 where it is not known."""
 
 
-COLLAPSED = {
+NAMES = {
     "x_exponent": "a of x / L^a",
+    "x_exponent_low": "lower end of its interval",
+    "x_exponent_high": "upper end of its interval",
     "y_exponent": "b of y / L^b",
+    "y_exponent_low": "lower end of its interval",
+    "y_exponent_high": "upper end of its interval",
+    "verdict": "whether the curves fall on one another within their own scatter",
     "residual": "relative distance of the points from the common curve, root mean square",
     "points": "points that lie among those of another curve",
     "dropped": "points that are missing or not positive, or lie where no other curve has any",
     "fits": "1 where the curves fall on one another within their own scatter",
 }
-
 FEWEST_POINTS = 10
 TRIES = 41
 """Exponents that are tried near the best."""
 
 
-def fit_collapse(
-    y: xr.DataArray, dim: str, over: str, *, bootstrap: int = 200, seed: int = 0, confidence: float = 0.95
-) -> xr.Dataset:
-    """Exponents a, b for which all curves y(x; L) fall on one, equation (1), with bootstrap errors.
+def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, confidence: float = 0.95) -> xr.Dataset:
+    """Exponents a, b for which all curves y(x; L) fall on one, equation (1), and whether they do.
 
     Parameters
     ----------
@@ -56,25 +61,24 @@ def fit_collapse(
         Along `dim` and `over`.
     dim, over : str
         Dimensions of x and L; positive.
-    bootstrap : int
-        Times that residuals are drawn anew, for the intervals.
-    seed : int
-        Of these draws.
+    sigma : number or DataArray, optional
+        Standard errors of the values, in the unit of y.
     confidence : float
         Of the intervals.
 
     Returns
     -------
     Dataset
-        `x_exponent` (a), `y_exponent` (b), each with `_low`, `_high`; `residual`; `points`, `dropped`; `fits`. The
-        intervals are of independent scatter about the common curve; without scatter of how well a spline follows
-        that.
+        `x_exponent` (a), `y_exponent` (b), each with `_low`, `_high`; `verdict`, words; `residual`; `points`,
+        `dropped`; `fits`. The intervals are of noise about the common curve that may be autocorrelated along each
+        curve, or of `sigma`; without noise of how well a spline follows the curve. There are none where the curves do
+        not fall on one another: where levels, slopes and bows of their own describe them far better.
 
     Raises
     ------
     SweepError
-        An axis is unknown or unfit, there are fewer than two curves or ten points, or f is a power law or L does not
-        matter, so that a and b are not both determined.
+        An axis is unknown or unfit, there are fewer than two curves or ten points, or y does not change, f is a power
+        law or L does not matter, so that a and b are not both determined.
 
     Examples
     --------
@@ -84,11 +88,11 @@ def fit_collapse(
     >>> x, size = np.geomspace(0.01, 100, 25), np.array([1.0, 2.0, 4.0, 8.0])
     >>> u = x / size[:, None] ** 1.5
     >>> y = xr.DataArray(size[:, None] ** 0.7 / (u + u**0.2), {"L": size, "x": x}, ("L", "x"), name="y")
-    >>> print(f"{float(sweep.fit_collapse(y, 'x', 'L', bootstrap=20).x_exponent):.3f}")
+    >>> print(f"{float(sweep.fit_collapse(y, 'x', 'L').x_exponent):.3f}")
     1.500
     """
     check_confidence(confidence)
-    points, count = _points(y, dim, over)
+    points, count = _points(y, dim, over, sigma)
     # exponents that leave neighbours in L with something in common, and no more than 8
     most = min(8.0, 0.9 * float(np.ptp(points.t)) / float(np.diff(np.unique(points.size)).min()))
     a = _best(points, (-most, most))
@@ -98,44 +102,42 @@ def fit_collapse(
             f"of {count} points {among} lie among those of another curve; at least {FEWEST_POINTS} are needed"
         )
     points = Points(*(column[inside] for column in points))
-    near = (a - 0.3 * (1 + abs(a)), a + 0.3 * (1 + abs(a)))
-    a = _best(points, near, TRIES)
-    b, fitted, numbers = _spline(points, a)
-    off = points.z - fitted
-    _require_determined(points, a, off, numbers)
-    draws = _bootstrap(points, fitted, off * math.sqrt(off.size / (off.size - numbers)), near, bootstrap, seed)
-    reach = float(stdtrit(off.size - numbers, (1 + confidence) / 2)) * draws.std(axis=0, ddof=1)
-    result = xr.Dataset({"x_exponent": a, "y_exponent": b})
-    for name, middle, wide in zip(("x_exponent", "y_exponent"), (a, b), reach, strict=True):
-        result[f"{name}_low"], result[f"{name}_high"] = middle - wide, middle + wide
-    result["residual"], result["points"] = float(np.sqrt(np.mean(off**2))), points.t.size
-    result["dropped"], result["fits"] = count - points.t.size, int(_one_curve(points, a, off))
+    a = _best(points, (a - 0.3 * (1 + abs(a)), a + 0.3 * (1 + abs(a))), TRIES)
+    _require_determined(points, a)
+    columns, b, off = _jacobian(points, a)
+    low, high, fits = _intervals(points, columns, off, sigma is not None, confidence)
+    found = {"x_exponent": a, "y_exponent": b, "residual": float(np.sqrt(np.mean(off**2))), "points": points.t.size}
+    found |= {"dropped": count - points.t.size, "fits": int(fits)}
+    for k, name in enumerate(("x_exponent", "y_exponent")):
+        ends = (found[name] + low[k], found[name] + high[k]) if fits else (math.nan, math.nan)
+        found[f"{name}_low"], found[f"{name}_high"] = ends
+    result = xr.Dataset(found).assign(verdict="one curve" if fits else "not one curve")
     law = f"{title(y)} = {over}^b f({dim} / {over}^a)"
-    for key in map(str, result.data_vars):
-        text = COLLAPSED.get(key) or f"{'lower' if key.endswith('low') else 'upper'} end of its interval"
-        result[key].attrs = {"units": "1", "long_name": text}
-    return result.assign_attrs(y=title(y), x=dim, over=over, law=law)
+    return described(result, NAMES, {}, {"y": title(y), "x": dim, "over": over, "law": law}, confidence)
 
 
-def _points(y: xr.DataArray, dim: str, over: str) -> tuple[Points, int]:
+def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> tuple[Points, int]:
     check_output(y)
     if y.ndim != 2 or {dim, over} != {str(d) for d in y.dims}:
         raise SweepError(f"a collapse takes one output along {dim} and {over}, and nothing else; choose with .sel")
     t, sizes = np.log(positive_axis(y, dim)[1]), y[over].values.astype(np.float64)
     if sizes.size < 2 or not (np.isfinite(sizes) & (sizes > 0)).all():
         raise SweepError(f"{over}: a collapse needs at least two values, all positive")
-    z = log_of(y).transpose(over, dim).values
-    fine = np.isfinite(z)
-    which = np.nonzero(fine)
-    found = Points(t[which[1]], z[fine], np.log(sizes)[which[0]], which[0].astype(np.float64))
+    z, errors = (part.transpose(over, dim).values for part in (log_of(y), relative_sigma(y, sigma)))
+    order = np.argsort(t)
+    t, z, errors = t[order], z[:, order], errors[:, order]
+    fine = np.isfinite(z) & (np.isfinite(errors) | (sigma is None))
+    curve, place = np.nonzero(fine)
+    root = 1 / errors[fine] if sigma is not None else np.ones(place.size)
+    found = Points(t[place], z[fine], np.log(sizes)[curve], curve.astype(np.float64), root)
     if found.t.size < FEWEST_POINTS:
         few = f"a collapse needs at least {FEWEST_POINTS} positive points of {title(y)}, found {found.t.size}"
         raise SweepError(few)
     return found, z.size
 
 
-def _columns(points: Points, a: float) -> Array:
-    """ln L, then a cubic spline of ln x - a ln L."""
+def _spline(points: Points, a: float) -> tuple[Array, Array, Array]:
+    """Columns of b and of a cubic spline of ln x - a ln L, its knots, and the numbers that fit best."""
     from scipy.interpolate import BSpline
 
     u = points.t - a * points.size
@@ -144,36 +146,27 @@ def _columns(points: Points, a: float) -> Array:
     knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
     knots[-4:] += 1e-9 * (1 + abs(knots[-1]))
     basis = BSpline.design_matrix(u, knots, 3).toarray()
-    return np.column_stack([points.size - points.size.mean(), basis])
-
-
-def _spline(points: Points, a: float) -> tuple[float, Array, int]:
-    """b, the common curve at the points, and how many numbers it took."""
-    columns = _columns(points, a)
-    numbers, _, rank, _ = np.linalg.lstsq(columns, points.z, rcond=1e-10)
-    return float(numbers[0]), columns @ numbers, int(rank) + 1
+    columns = np.column_stack([points.size - points.size.mean(), basis])
+    numbers = np.linalg.lstsq(columns * points.root[:, None], points.z * points.root, rcond=1e-10)[0]
+    return columns, knots, numbers.astype(np.float64)
 
 
 def _square(points: Points, a: float) -> float:
-    return float(((points.z - _spline(points, a)[1]) ** 2).sum())
+    columns, _, numbers = _spline(points, a)
+    return float(((points.root * (points.z - columns @ numbers)) ** 2).sum())
 
 
 def _best(points: Points, ends: tuple[float, float], tries: int = 81) -> float:
     from scipy.optimize import minimize_scalar
 
     grid = np.linspace(*ends, tries)
-    squares = [_square(points, a) * _overlap(points, a) for a in grid]
+    # weight against exponents that pull curves apart until nothing is compared
+    squares = [_square(points, a) / max(float(_shared(points, a).mean()), 1e-3) ** 4 for a in grid]
     k = int(np.argmin(squares))
     around = float(grid[max(k - 1, 0)]), float(grid[min(k + 1, tries - 1)])
     return float(
         minimize_scalar(lambda a: _square(points, a), bounds=around, method="bounded", options={"xatol": 1e-9}).x
     )
-
-
-def _overlap(points: Points, a: float) -> float:
-    """Weight against exponents that pull curves apart until nothing is compared."""
-    share = float(_shared(points, a).mean())
-    return 1.0 / max(share, 1e-3) ** 4
 
 
 def _shared(points: Points, a: float) -> Any:
@@ -186,65 +179,57 @@ def _shared(points: Points, a: float) -> Any:
     return found
 
 
-def _require_determined(points: Points, a: float, off: Array, numbers: int) -> None:
+def _require_determined(points: Points, a: float) -> None:
     """Raises SweepError where another a, far off, does as well: of a power law f any does."""
-    least = float(off @ off) + 1e-20 * float(np.ptp(points.z)) ** 2
+    columns = _spline(points, a)[0]
+    rounding = ROUNDING * (1 + abs(points.z).max())
+    least = _square(points, a) + float((points.root**2).sum()) * (rounding**2 + 1e-20 * float(np.ptp(points.z)) ** 2)
     worst = min(_square(points, a + step) for step in (-0.25, 0.25))
-    if worst < least * (1 + 12.0 / max(1, off.size - numbers)):
+    if worst < least * (1 + 12.0 / max(1, points.z.size - columns.shape[1] - 1)):
         raise SweepError(
             "the curves collapse for any exponents of x: f is a power law, so a and b are not determined apart"
         )
 
 
-def _bootstrap(points: Points, fitted: Array, off: Array, near: tuple[float, float], times: int, seed: int) -> Array:
-    """a and b of so many sets with residuals drawn anew.
+def _jacobian(points: Points, a: float) -> tuple[Array, float, Array]:
+    """Derivatives of the curves by a, b and the spline, b, and the distances of the points."""
+    from scipy.interpolate import BSpline
 
-    All sets share the splines of a grid of a, which closes in on what they say.
+    columns, knots, numbers = _spline(points, a)
+    steep: Array = BSpline(knots, numbers[1:], 3).derivative()(points.t - a * points.size)
+    used = columns[:, 1:][:, (columns[:, 1:] != 0).any(axis=0)]
+    matrix = np.column_stack([-points.size * steep, columns[:, 0], used])
+    off: Array = points.z - columns @ numbers
+    return matrix, float(numbers[0]), off
+
+
+def _intervals(
+    points: Points, columns: Array, off: Array, known: bool, confidence: float
+) -> tuple[list[float], list[float], bool]:
+    """Ends of the intervals of a and b, about them, and whether the curves are one.
+
+    They are not where chi-squared says so, or where a level, a slope and a bow of each curve are better by far.
     """
-    z = fitted + np.random.default_rng(seed).choice(off, (times, off.size))
-    low, high = near
-    overlap = np.array([_overlap(points, a) for a in np.linspace(low, high, TRIES)])
-    for _ in range(12):
-        grid = np.linspace(low, high, TRIES)
-        step, found = grid[1] - grid[0], _least_on(points, grid, z, overlap)
-        if step < max(found[:, 0].std() / 4, 1e-9 * (1 + abs(low))):
-            break
-        low, high, overlap = found[:, 0].min() - 2 * step, found[:, 0].max() + 2 * step, np.ones(TRIES)
-    return found
-
-
-def _least_on(points: Points, grid: Array, z: Array, overlap: Array) -> Array:
-    """a and b of the least sum of squares of each set (sets, n), by the parabola through three points of a grid."""
-    squares, slopes = np.empty((2, len(z), grid.size))
-    for k, a in enumerate(grid):
-        columns = _columns(points, a)
-        numbers = z @ np.linalg.pinv(columns, rcond=1e-10).T
-        squares[:, k] = ((z - numbers @ columns.T) ** 2).sum(axis=1) * overlap[k]
-        slopes[:, k] = numbers[:, 0]
-    k, row = np.clip(squares.argmin(axis=1), 1, grid.size - 2), np.arange(len(z))
-    before, here, after = (squares[row, k + side] for side in (-1, 0, 1))
-    bow = before - 2 * here + after
-    share = np.clip(np.where(bow > 0, (before - after) / (2 * np.where(bow > 0, bow, 1.0)), 0.0), -1.0, 1.0)
-    rise = (slopes[row, k + 1] - slopes[row, k - 1]) / 2
-    return np.column_stack([grid[k] + share * (grid[1] - grid[0]), slopes[row, k] + share * rise])
-
-
-def _one_curve(points: Points, a: float, off: Array) -> bool:
-    """Whether residuals have no more to do with the curve they are of than chance has: analysis of variance of a
-    cubic along each curve."""
-    from scipy.special import fdtrc
-
-    u = points.t - a * points.size
-    columns = []
+    k, u, own = columns.shape[1], points.t - points.t.mean(), []
     for number in np.unique(points.curve)[1:]:
         here = (points.curve == number).astype(np.float64)
-        away = (u - u[here > 0].mean()) / np.ptp(u)
-        columns += [here * away**k for k in range(4)]
-    matrix = np.column_stack(columns)
-    explained = matrix @ np.linalg.lstsq(matrix, off, rcond=None)[0]
-    rest = float(((off - explained) ** 2).sum())
-    left = off.size - matrix.shape[1]
-    if left < 1 or float(off @ off) < 1e-24 * off.size or rest == 0:
-        return True
-    ratio = float(explained @ explained) / matrix.shape[1] / (rest / left)
-    return bool(fdtrc(matrix.shape[1], left, ratio) > 1e-3)
+        own += [here, here * u, here * u**2]
+    basis = np.linalg.qr(columns)[0]
+    beside = np.column_stack(own)
+    beside -= basis @ (basis.T @ beside)
+    left, moved, _ = np.linalg.svd(beside, full_matrices=False)
+    beside = left[:, moved > 1e-6 * moved.max()][:, : max(0, off.size - k - 3)]
+    root, place = points.root, np.arange(float(off.size))
+    every = np.column_stack([columns, beside]) * root[:, None]
+    found = regress(place, every, (off * root)[None], "even" if known else "correlated", k)
+    numbers = k + 1 + (not known)
+    alone = corrected(found.deviance[0, 0], off.size, numbers)
+    together = corrected(found.deviance[0, -1], off.size, numbers + beside.shape[1])
+    smooth = abs(off).max() <= 1e-6 * (1 + np.ptp(points.z))
+    fits = bool(smooth or not together < alone - BEYOND_DOUBT)
+    if known:
+        fits &= bool(gammaincc((off.size - k) / 2, float(((root * off) ** 2).sum()) / 2) > RARE)
+        reach = ndtri((1 + confidence) / 2) * np.sqrt(np.diag(np.linalg.inv(every[:, :k].T @ every[:, :k])))
+        return [-float(reach[0]), -float(reach[1])], [float(reach[0]), float(reach[1])], fits
+    low, high = zip(*(found.interval(number, confidence) for number in (0, 1)), strict=True)
+    return [min(float(one[0]), 0.0) for one in low], [max(float(one[0]), 0.0) for one in high], fits

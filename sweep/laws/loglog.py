@@ -19,6 +19,11 @@ FEWEST = 3
 BEYOND_NOISE = 4.0
 """Standard errors that noise does not reach."""
 
+MEMORY = 0.9
+"""Autocorrelation of the noise that error bars of slopes are for; of independent noise they are wider, by half."""
+NEAR, WIDEST = 6, 6
+"""Points to each side that tell the size of the noise, and over which a stencil of seven points reaches at most."""
+
 FEW = 20
 """Points below which noise is not told from a bend."""
 
@@ -42,10 +47,10 @@ def slopes(t: Array, z: Array, points: int) -> Array:
 def slope_errors(t: Array, z: Array, bound: Array | None = None) -> Array:
     """Half the 95 % interval of the slope by five points, with noise; without, more than its error.
 
-    What the polynomial through seven points says otherwise tells the error. Noise makes it alike everywhere, over the
-    weights of both: the median gives its size. Where it is far larger, the curve bends: it counts itself there, and
-    where a bend is within a step, so that more points do not tell more, the slopes of the steps beside the point. What
-    errors up to `bound` (..., n) in the values can do is added.
+    What the polynomial through seven points says otherwise tells the error. Noise makes it alike at neighbours, over
+    the weights of both: the median near a point gives its size. Where it is far larger, the curve bends: it counts
+    itself there, and where a bend is within a step, so that more points do not tell more, the slopes of the steps
+    beside the point. What errors up to `bound` (..., n) in the values can do is added.
     """
     found = _by_runs(t, z, _derivative_errors)
     if bound is None or not bound.any():
@@ -92,20 +97,18 @@ def _derivative_errors(t: Array, z: Array) -> Array:
     beside = np.maximum(
         abs(steps[..., np.r_[0, : t.size - 1]] - slope), abs(steps[..., np.r_[: t.size - 1, -1]] - slope)
     )
-    nodes, weights = _stencils(t, middle)
-    other, those = _stencils(t, fine)
-    between = -those
-    np.put_along_axis(between, nodes - other[:, :1], weights - np.take_along_axis(those, nodes - other[:, :1], 1), 1)
-    apart_by_noise = apart / _norm(between)
-    noise = 1.4826 * np.median(apart_by_noise, axis=-1, keepdims=True)
+    weights, between = _dense(t, middle), _dense(t, fine)
+    apart_by_noise = apart / _norm(between - weights)
+    noise = 1.4826 * _median_near(apart_by_noise)
+    least = np.minimum(noise, 1.4826 * np.median(apart_by_noise, axis=-1, keepdims=True))
     by_noise = noise * _norm(weights)
     few = t.size < FEW
     by_bend = _largest_near(np.where(sharp, np.maximum(apart, beside), np.maximum(apart, coarse) if few else apart))
-    bends = few | (_largest_near(apart_by_noise) > BEYOND_NOISE * noise)
+    bends = few | (_largest_near(apart_by_noise) > BEYOND_NOISE * least)
     error = np.where(bends, np.maximum(by_noise, by_bend), by_noise)
-    rounding = EPSILON * (1.0 + abs(z).max(axis=-1, keepdims=True)) * _norm(weights)
-    found: Array = 2.05 * error + rounding  # 1.96 and what the median, of few points, is too small
-    pole = _beside_pole(steps) & (_largest_near(apart_by_noise) > BEYOND_NOISE * noise)
+    rounding = EPSILON * (1.0 + abs(z).max(axis=-1, keepdims=True)) * np.sqrt((weights**2).sum(axis=1))
+    found: Array = 2.3 * error + rounding  # 1.96 and what the median, of few points, is too small
+    pole = _beside_pole(steps) & (_largest_near(apart_by_noise) > BEYOND_NOISE * least)
     return np.where(pole, np.inf, found)
 
 
@@ -145,9 +148,27 @@ def _largest_near(values: Array) -> Array:
     return found
 
 
+def _median_near(values: Array) -> Array:
+    """The median of each value and its NEAR neighbours on both sides, which a bend or a spike does not change."""
+    reach = min(NEAR, (values.shape[-1] - 1) // 2)
+    padded = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(reach, reach)], mode="reflect")
+    found: Array = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=-1), axis=-1)
+    return found
+
+
+def _dense(t: Array, points: int) -> Array:
+    """Weights of the slopes (n, 2 WIDEST + 1), the home point in the middle."""
+    nodes, weights = _stencils(t, points)
+    found, home = np.zeros((t.size, 2 * WIDEST + 1)), np.arange(t.size)[:, None]
+    np.put_along_axis(found, nodes - home + WIDEST, weights, axis=1)
+    found[:, WIDEST] = -weights.sum(axis=1)
+    return found
+
+
 def _norm(weights: Array) -> Array:
-    """Standard error of each slope for values with errors of size 1; the home point has minus the sum of the others."""
-    size: Array = np.sqrt((weights**2).sum(axis=1) + weights.sum(axis=1) ** 2)
+    """Standard error of each slope for values with autocorrelated errors of size 1."""
+    places = np.arange(weights.shape[1])
+    size: Array = np.sqrt(np.einsum("ij,jk,ik->i", weights, MEMORY ** abs(np.subtract.outer(places, places)), weights))
     return size
 
 

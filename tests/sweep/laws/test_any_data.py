@@ -104,8 +104,10 @@ def test_curves_of_any_data_collapse_or_are_refused():
         y = np.exp(z - rng.choice([0.0, 1.0]) * np.logaddexp(u, 0.2 * u) + rng.choice([0.0, 600.0, -600.0]))
         y[rng.random(y.shape) < rng.choice([0.0, 0.1, 0.6])] = rng.choice([np.nan, np.inf, 0.0, -1.0])
         curves = xr.DataArray(y, {"size": size, "speed": np.exp(t)}, ("size", "speed"), name="torque")
-        fitted = found(lambda y: sweep.fit_collapse(y, "speed", "size", bootstrap=4), curves)
-        assert fitted is None or fitted.x_exponent_low <= fitted.x_exponent <= fitted.x_exponent_high, seed
+        fitted = found(lambda y: sweep.fit_collapse(y, "speed", "size"), curves)
+        assert (
+            fitted is None or not fitted.fits or fitted.x_exponent_low <= fitted.x_exponent <= fitted.x_exponent_high
+        ), seed
 
 
 # what is no output, no result and no study

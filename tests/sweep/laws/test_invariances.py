@@ -167,7 +167,7 @@ def test_a_collapse_does_not_depend_on_units_or_order(seed):
     y = xr.DataArray(size[:, None] ** b / (u + u**0.2), {"L": size, "x": x}, ("L", "x"), name="y")
 
     def fit(y):
-        found = sweep.fit_collapse(y, "x", "L", bootstrap=10)
+        found = sweep.fit_collapse(y, "x", "L")
         return [float(found.x_exponent), float(found.y_exponent)]
 
     found = fit(y)

@@ -87,11 +87,11 @@ def curves(a, b, f=lambda u: 1 / (u + u**0.2)):
 @pytest.mark.parametrize(("a", "b"), [(1.5, 0.7), (-0.6, 1.2), (0.0, 0.5)])
 def test_the_exponents_of_a_collapse_are_found_without_a_start_and_points_without_a_partner_are_counted(a, b):
     y = curves(a, b)
-    found = sweep.fit_collapse(y, "x", "L", bootstrap=10)
+    found = sweep.fit_collapse(y, "x", "L")
     assert (float(found.x_exponent), float(found.y_exponent)) == pytest.approx((a, b), abs=1e-4)
     assert int(found.points + found.dropped) == 125
     y[0, :3], y[1, 4] = np.nan, -1.0
-    gappy = sweep.fit_collapse(y, "x", "L", bootstrap=10)
+    gappy = sweep.fit_collapse(y, "x", "L")
     assert int(gappy.points + gappy.dropped) == 125
     assert int(gappy.dropped) >= int(found.dropped) + 4
     assert float(gappy.x_exponent) == pytest.approx(a, abs=1e-3)
