@@ -99,7 +99,7 @@ def plot(arguments: argparse.Namespace) -> None:
 )
 def view(arguments: argparse.Namespace) -> None:
     """Look at a result in the browser: any two axes, sliders for the others."""
-    from sweep.view.server import serve
+    from sweep.view.page import serve
 
     with result_of(arguments):
         serve(arguments.result, arguments.port, not arguments.no_browser)

@@ -12,11 +12,11 @@ import sweep
 from sweep.show.charts import COLOURS
 from sweep.show.view import view
 from sweep.view import region
-from sweep.view.slices import Choice, nearest, shown
+from sweep.view.region import Choice, nearest, shown
 
 pytestmark = pytest.mark.skipif(not find_spec("panel"), reason="the extra view is not installed")
 if find_spec("panel"):
-    from sweep.view.picture import STATUS_COLOURS, Picture, Scales
+    from sweep.view.picture import Picture, status_colour
 
 MAP = Choice("period", "mu", "R", {"a": 2})
 
@@ -76,11 +76,11 @@ def test_the_cell_of_a_point_is_the_one_whose_edges_surround_it(dataset, cell):
     found = shown(dataset, Choice("period", "mu", "R", {"a": 1}))
     mu, R = float(dataset.mu[cell[0]]), float(dataset.R[cell[1]])
     for step in (0.99, 1.01):  # of 1.122 to the next edge
-        assert nearest(found, mu * step**10, R + 0.049 * np.sign(step - 1), True, (True, False)) == {
+        assert nearest(found, mu * step**10, R + 0.049 * np.sign(step - 1), (True, False)) == {
             "mu": cell[0],
             "R": cell[1],
         }
-    assert nearest(found, 1e3, R, True, (True, False)) is None
+    assert nearest(found, 1e3, R, (True, False)) is None
 
 
 # what is drawn
@@ -92,7 +92,8 @@ def test_lines_are_drawn_with_their_statuses_at_the_foot_where_they_have_no_valu
     values, status = [[1.0, 2.0, np.nan], [4.0, -5.0, 6.0]], np.array([[0, 1, 64], [0, 0, 0]], np.int8)
     columns = {"y": (("a", "x"), values, {"units": "s"}), "status": (("a", "x"), status, FLAGS)}
     found = view(xr.Dataset(columns, {"x": [1.0, 2.0, 3.0], "a": [0.5, 0.7]}), x="x")
-    drawn = Picture(found, Scales(False, False))
+    linear = dict.fromkeys(("x", "y", "values"), "linear")
+    drawn = Picture(found, linear)
     drawn.show(found, True)
     lines = drawn.lines.data
     np.testing.assert_array_equal(lines["ys"], [[1.0, 2.0, np.nan], [4.0, -5.0, 6.0]])
@@ -100,13 +101,21 @@ def test_lines_are_drawn_with_their_statuses_at_the_foot_where_they_have_no_valu
     assert (lines["colour"], lines["name"]) == (list(COLOURS[:2]), ["a = 0.5", "a = 0.7"])
     assert drawn.marks.data["x"].tolist() == [2.0, 3.0]
     assert drawn.marks.data["y"].tolist() == [2.0, -5.0]
-    assert drawn.marks.data["colour"] == list(STATUS_COLOURS[2:4])
+    assert drawn.marks.data["colour"] == [status_colour(found, code) for code in (1, 64)]
     drawn.show(found, False)
     assert len(drawn.marks.data["x"]) == 0
-    logarithmic = Picture(found, Scales(False, True))
+    logarithmic = Picture(found, linear | {"values": "log"})
     logarithmic.show(found, True)
     np.testing.assert_array_equal(logarithmic.lines.data["ys"], [[1.0, 2.0, np.nan], [4.0, np.nan, 6.0]])
     assert logarithmic.marks.data["y"].tolist() == [2.0, 1.0]
+
+
+def test_statuses_of_any_kernel_have_colours_of_their_own(dataset):
+    found = shown(dataset, MAP)
+    colours = [status_colour(found, code) for code in found.meanings if code > 0]
+    for name in ("INACCURATE", "NOT_CONVERGED", "FAILED", "PENDING"):
+        code = next(code for code, word in found.meanings.items() if word == name)
+        assert colours.count(status_colour(found, code)) == 1
 
 
 # what is saved
