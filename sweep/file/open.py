@@ -101,6 +101,8 @@ def _open(place: Path, strict: bool = False) -> xr.Dataset:
         found = xr.open_dataset(os.fspath(place), engine=Result, chunks="auto" if large else None)
         if "end" not in found.attrs:
             with contextlib.suppress(Changed), StoredFile(place) as file:
+                if place.suffix != unfinished_of(place).suffix:
+                    raise OSError("what was written at its end is damaged")
                 left, count = int((~file.done[file.work]).sum()), file.tables[file.work].blocks.count
                 missing = f"{left} of {count} blocks are missing" if left else "all is computed but not checked yet"
                 if strict:

@@ -187,11 +187,12 @@ def test_a_damaged_summary_is_not_handed_out(summary, tmp_path):
         found.load()
 
 
-@pytest.mark.parametrize("what", ["title", "height"])
+@pytest.mark.parametrize("what", ["title", "height", "end"])
 def test_damage_beside_the_numbers_is_told_at_once_and_cannot_be_repaired(copy, what):
     with h5py.File(copy) as file:
-        at = file["height"].id.get_chunk_info(0).byte_offset + 12
-    flip(copy, at if what == "height" else copy.read_bytes().index(b"toy:KERNEL"))
+        places = {name: file[name].id.get_chunk_info(0).byte_offset + 12 for name in ("height", "integrity/ending")}
+    places["title"] = copy.read_bytes().index(b"toy:KERNEL")
+    flip(copy, places["integrity/ending" if what == "end" else what])
     for action in (sweep.open_result, lambda path: quiet(study(), path, repair=True)):
         with pytest.raises(sweep.SweepError, match="damaged"):
             action(copy)
