@@ -101,11 +101,6 @@ class Table:
         return f"{title}<table>{''.join(f'<tr>{cells}</tr>' for cells in body)}</table>"
 
 
-def columns(rows: Iterable[Sequence[str]], indent: str = "  ", wide: bool = False) -> str:
-    """The text of a `Table`."""
-    return Table(rows).text(indent, wide)
-
-
 def paragraph(text: str) -> str:
     """Lines of text, each wrapped at the width of the terminal."""
     return "\n".join("\n".join(_wrapped(line, width())) for line in text.splitlines())
@@ -114,11 +109,6 @@ def paragraph(text: str) -> str:
 def _wrapped(text: str, size: int) -> list[str]:
     """Words are kept whole, lest a path be torn."""
     return textwrap.wrap(text, max(size, 1), break_on_hyphens=False, break_long_words=False)
-
-
-def section(title: str, rows: Iterable[Sequence[str]]) -> str:
-    """The text of a `Table` with a title."""
-    return Table(rows, title=title).text()
 
 
 def page(*sections: str) -> str:

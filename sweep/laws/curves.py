@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sweep.errors import SweepError
 from sweep.laws.loglog import EPSILON, FEWEST, Array
-from sweep.words import columns, kind, require_dataset
+from sweep.words import Table, kind, require_dataset
 
 Window = tuple[float | None, float | None]
 
@@ -272,4 +272,4 @@ def summary(found: xr.Dataset) -> str:
         rows[-1] += tuple(str(one[word].item()) for word in words)
     more = math.prod(table.sizes.values()) - len(rows)
     heading = (*map(str, dims), *(f"{name} ({100 * found.attrs['confidence']:g} %)" for name in numbers), *words)
-    return columns([heading, *rows], indent="", wide=True) + f"\nand {more} more" * (more > 0)
+    return Table(rows, heading).text(indent="", wide=True) + f"\nand {more} more" * (more > 0)

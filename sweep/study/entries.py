@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -249,8 +248,8 @@ def _number(found: Any, field: Field, from_file: bool) -> float:
     if field.choices:
         return float(field.choices[one_of(found, list(field.choices))])
     if from_file:
-        if "_" not in found:  # 1_0 is 10 in Python alone
-            with contextlib.suppress(ValueError):
-                return float(found)
-        raise ValueError(f"expected a number, found {show(found)}")
+        try:
+            return float(found if "_" not in found else "")  # 1_0 is 10 in Python alone
+        except ValueError:
+            raise ValueError(f"expected a number, found {show(found)}") from None
     return exact_float(found)

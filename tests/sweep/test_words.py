@@ -13,10 +13,10 @@ WORDS = "one two three four five six seven eight nine ten eleven twelve thirteen
 @pytest.mark.parametrize("wide", [20, 30, 40, 60, 80, 200])
 def test_cells_are_wrapped_until_the_table_is_no_wider_than_the_terminal(monkeypatch, wide):
     monkeypatch.setattr("shutil.get_terminal_size", lambda fallback: os.terminal_size((wide, 24)))
-    told = table.columns([("name", WORDS[:30], WORDS), (WORDS[10:40], "n", "short")])
+    told = table.Table([("name", WORDS[:30], WORDS), (WORDS[10:40], "n", "short")]).text()
     assert max(map(len, told.splitlines())) <= max(wide, len("  three  three  fourteen"))
     assert sorted(told.split()) == sorted(f"name {WORDS[:30]} {WORDS} {WORDS[10:40]} n short".split())
-    assert len(table.columns([(WORDS, WORDS)], wide=True).splitlines()[0]) > len(WORDS) + 10
+    assert len(table.Table([(WORDS, WORDS)]).text(wide=True).splitlines()[0]) > len(WORDS) + 10
 
 
 def test_a_table_is_text_and_html_and_nothing_without_rows():
