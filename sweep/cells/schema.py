@@ -92,7 +92,8 @@ def columns(study: Study) -> tuple[Column, ...]:
     """The asked outputs in kernel order, then what is said of them."""
     # each output taken by itself says what it is right to
     said = {"ancillary_variables": " ".join(ANCILLARY)} | ({} if "rtol" in study.axes else {"rtol": study.rtol})
-    outputs = [Column(f.name, "f8", f.dims, study.shape(f), {**_attrs(f), **said}) for f in study.asked]
+    shapes = study.shapes
+    outputs = [Column(f.name, "f8", f.dims, shapes[f.name], {**_attrs(f), **said}) for f in study.asked]
     error = {
         "units": "1",
         "long_name": "largest relative error of the outputs: as the method bounds or estimates it, else rtol; "

@@ -89,11 +89,12 @@ class Solver:
     def __init__(self, study: Study, grid: Grid | None = None) -> None:
         self.study, self.grid, kernel = study, grid or Grid(study), study.kernel
         self._turns = turns(study, self.grid)
-        cell_bytes = sum(8 * math.prod(study.shape(field)) for field in kernel.outputs)
+        shapes = {field.name: study.shape(field) for field in (*kernel.parameters, *kernel.outputs)}
+        cell_bytes = sum(8 * math.prod(shapes[field.name]) for field in kernel.outputs)
         strip = self._strip = max(1, min(STRIP, self.grid.size, STRIP_BYTES // cell_bytes))
         self._places = np.arange(strip)
         # parameters, then rtol, of a strip
-        self._buffers = [*(np.empty((strip, *study.shape(field))) for field in kernel.parameters), np.empty(strip)]
+        self._buffers = [*(np.empty((strip, *shapes[field.name])) for field in kernel.parameters), np.empty(strip)]
         constants = self.grid.constants()
         for k, value in constants.items():
             self._buffers[k][:] = value
@@ -102,7 +103,7 @@ class Solver:
         self._along = [np.array(study.along[field.name]) for field in kernel.along]
         self._asked = np.array([field.name in study.outputs for field in kernel.outputs], np.uint8)
         # outputs and status, where a method solves cells that do not lie side by side, and outputs not asked for
-        self._spare: list[NDArray[Any]] = [np.empty((strip, *study.shape(field))) for field in kernel.outputs]
+        self._spare: list[NDArray[Any]] = [np.empty((strip, *shapes[field.name])) for field in kernel.outputs]
         self._spare.append(np.empty(strip, np.int8))
         self._wanted = [*map(int, self._asked.nonzero()[0]), len(kernel.outputs)]
         self._error = np.empty(strip)

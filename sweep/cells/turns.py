@@ -28,9 +28,9 @@ class Absent(NamedTuple):
         same = columns[self.place] == (self.default if self.like is None else columns[self.like])
         return np.asarray(same if same.ndim == 1 else same.all(axis=1))
 
-    def everywhere(self, grid: Grid) -> bool | None:
+    def everywhere(self, spreads: Mapping[int, Any]) -> bool | None:
         """Whether it holds in all cells of a grid, or in none; None: that depends on the cell."""
-        columns = {place: grid.spread(place) for place in (self.place, self.like) if place is not None}
+        columns = {place: spreads[place] for place in (self.place, self.like) if place is not None}
         if sum(2 if column is None else len(column) > 1 for column in columns.values()) > 1:
             return None
         found = self.holds(columns)
@@ -61,7 +61,7 @@ class Turn(NamedTuple):
 def turns(study: Study, grid: Grid) -> tuple[Turn, ...]:
     """Turns of the methods that give every output asked for and can do some cell of the grid."""
     places = {field.name: place for place, field in enumerate(study.kernel.parameters)}
-    found: dict[float, Turn] = {}
+    spreads, found = grid.spreads(), dict[float, Turn]()
     for number, method in enumerate(study.kernel.methods):
         defaults = {name: study.kernel.parameter(name).default for name in method.excludes}
         terms = [
@@ -69,7 +69,7 @@ def turns(study: Study, grid: Grid) -> tuple[Turn, ...]:
             else Absent(places[name], np.nan if d is None else d, None)
             for name, d in defaults.items()
         ]  # fmt: skip
-        known = [term.everywhere(grid) for term in terms]
+        known = [term.everywhere(spreads) for term in terms]
         if False in known or not set(study.outputs).isdisjoint(method.lacks):
             continue
         open_ = tuple(term for term, holds in zip(terms, known, strict=True) if holds is None)

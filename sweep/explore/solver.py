@@ -108,8 +108,8 @@ class _Points(Grid):
         self._places = {f.name: places.get(study.follows.get(f.name, f.name)) for f in study.kernel.parameters}
         self._filled = {k: place for k, place in enumerate(self._places.values()) if place is not None}
 
-    def spread(self, place: int) -> Any:
-        return None if place in self._filled else super().spread(place)
+    def spreads(self) -> dict[int, Any]:
+        return super().spreads() | dict.fromkeys(self._filled)
 
     def columns(self, start: int, stop: int, out: Sequence[Any]) -> None:
         for k, place in self._filled.items():
