@@ -15,6 +15,7 @@ HDF5 left it: in a damaged structure HDF5 may loop for ever.
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import os
@@ -206,10 +207,10 @@ class Table:
 
     def write_digests(self, fd: int, digests: Mapping[int, bytes]) -> None:
         """Writes those of some blocks, neighbouring ones at once. Raises OSError."""
-        blocks = np.array(sorted(digests), np.int64)
-        for some in np.split(blocks, np.flatnonzero(np.diff(blocks) > 1) + 1):
-            row = b"".join(digests[block] for block in some.tolist())
-            disk.write_all(fd, (row,), self.digests + int(some[0]) * self.row_bytes if row else 0)
+        for _, some in itertools.groupby(enumerate(sorted(digests)), lambda pair: pair[1] - pair[0]):
+            blocks = [block for _, block in some]
+            rows = b"".join(digests[block] for block in blocks)
+            disk.write_all(fd, (rows,), self.digests + blocks[0] * self.row_bytes)
 
 
 def tables_of(file: Any, key: bytes) -> dict[str, Table]:
