@@ -134,9 +134,8 @@ def precision_figure(found: xr.Dataset) -> Figure:
         figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=7)
         attrs = found.attrs
         accurate = f", accurate to {attrs['reference_error']:.1g}" if np.isfinite(attrs["reference_error"]) else ""
-        figure.suptitle(
-            f"{_plain(attrs['title'])}: {attrs['cells']} cells, errors against {attrs['reference']}{accurate}"
-        )
+        basis = f"{attrs['cells']} cells, errors against {attrs['reference']}{accurate}"
+        figure.suptitle(f"{_plain(attrs['title'])}: {basis}", fontsize=9)
     return figure
 
 

@@ -11,11 +11,11 @@ import sweep
 pytestmark = pytest.mark.skipif(not find_spec("panel"), reason="the extra view is not installed")
 
 
-def made(dataset, name):
+def made(dataset, name, *location):
     """The page; panel is imported here, since every worker reads this file and one of them needs it."""
     from sweep.view.page import Page
 
-    return Page(dataset, name)
+    return Page(dataset, name, *location)
 
 
 def touch(page, x=None, y=None, zoom=False):
@@ -50,6 +50,18 @@ def test_a_zoom_reads_the_region_and_a_slider_keeps_it(page):
     page.sliders["a"].value = 2
     assert page.picture.figure.x_range.start == 1.0
     assert page.found.values("mu").min() > 0.4
+
+
+def test_an_address_restores_the_view_and_follows_the_controls(dataset):
+    """What it says that there is not, is left aside."""
+    from panel.io.location import Location
+
+    location = Location(search="?x=R&at_a=2&output=nothing")
+    page = made(dataset, "map.h5", location)
+    assert (page.choice.output, page.choice.x, page.choice.across, page.choice.held) == ("period", "R", "mu", {"a": 2})
+    page.sliders["a"].value = 0
+    page.output.value = "amplitude"
+    assert (location.query_params["at_a"], location.query_params["output"]) == (0, "amplitude")
 
 
 def test_the_exponent_replaces_the_value(page, dataset):
