@@ -183,9 +183,9 @@ class Loop:
                 self._settle()
         except BaseException:
             self._stop(self._computing)
-            for future in self._computing:
+            for future, batch in self._computing.items():
                 with contextlib.suppress(Exception, CancelledError):
-                    for done in future.result(0.0):
+                    for done in (future.done() and self._found(future, batch)) or ():
                         self._keep(done)
             raise
         finally:
@@ -239,7 +239,7 @@ class Loop:
                 self.progress.add(stop - start)
                 continue
             batch = self._computing.pop(future)
-            found = future.result() if cluster is None else cluster.outcome(future, self._labels(batch))
+            found = self._found(future, batch)
             if found is None:
                 self._lost[batch] = self._lost.get(batch, 0) + 1
                 if self._lost[batch] > MOST_LOST:
@@ -255,6 +255,13 @@ class Loop:
         self.progress.tick()
         self._ctrl_c.check()
         self.check_time()
+
+    def _found(self, future: Future[Any], batch: Batch) -> list[Done] | None:
+        """What a task gave; None where its answer got lost. Raises what went wrong."""
+        if self._cluster is not None:
+            return self._cluster.outcome(future, self._labels(batch))
+        found: list[Done] = future.result()
+        return found
 
     def _keep(self, done: Done) -> None:
         """Has a block put into the sink, and tells of its cells that FAILED; of too many only how many they are."""
