@@ -33,7 +33,7 @@ start = 1
 stop = 600
 num = 600
 """
-KEYS = {"bad:RAISING": {}, "bad:DYING": {"isolate": True}, "bad:WORST": {"cell_timeout": 1.5}}
+KEYS = {"bad:RAISING": {"block_cells": 10}, "bad:DYING": {"isolate": True}, "bad:WORST": {"cell_timeout": 1.5}}
 
 
 def heights_of(found, status):

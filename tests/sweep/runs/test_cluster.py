@@ -117,6 +117,12 @@ def test_ctrl_c_ends_a_run_on_a_cluster(client, output):
     continues(study, output)
 
 
+def test_an_extension_on_a_cluster_has_the_same_bits(client, output):
+    quiet(tall(18), output).close()
+    with elsewhere(tall(23), output, cluster=client, extend=True, block_cells=4) as found:
+        same(found, quiet(tall(23)))
+
+
 @pytest.mark.parametrize("where", ["tcp://127.0.0.1:1", "nonsense", "missing.json"])
 def test_an_address_where_nobody_answers_is_one_clear_line(output, where):
     with pytest.raises(SweepError, match=r"^cluster: [^\n]*$"):
