@@ -149,7 +149,7 @@ def regress(t: Array, columns: Array, z: Array, noise: str = "noise", used: int 
 def _prior(points: int) -> Array:
     """Of phi: a power of 1/(1 - phi) that few points need for intervals to hold as often as they say, by trial at
     phi = .9 and 12 to 200 points."""
-    power = max(0.0, 0.36 * math.log(115 / points))
+    power = min(0.7, max(0.0, 0.36 * math.log(115 / points)))
     found: Array = np.log(np.gradient(CORRELATIONS)) - power * np.log(1 - CORRELATIONS)
     return found
 

@@ -319,9 +319,15 @@ def _verdict(t: Array, z: Array, tried: dict[str, Found], weights: Array | None,
     evidence = min(gain(one, two.deviance, 5) for one in (line, *others))
     bends = [tried[law.name] for law in BENDS if law.name in tried]
     if (three := tried.get(THREE.name)) is not None:
-        nearest = min(fit.aicc for fit in (*bends, *(tried[law.name] for law in OTHER_FUNCTIONS if law.name in tried)))
-        smaller = noisy or three.off @ three.off < SMALLER**2 * min(float(fit.off @ fit.off) for fit in bends)
-        if three.aicc < nearest - BEYOND_DOUBT and smaller and gain(line, three.deviance, 7) > BEYOND_DOUBT:
+        nearest = min((*bends, *(tried[law.name] for law in OTHER_FUNCTIONS)), key=lambda fit: fit.aicc)
+        better = three.aicc < nearest.aicc - OTHER_SHAPES and gain(line, three.deviance, 7) > BEYOND_DOUBT
+        if better and noisy and weights is None:  # nor with noise of any kind beside two
+            columns = nearest.jacobian[:, np.isfinite(errors(nearest))]
+            deviance = float(regress(t, columns, nearest.off[None]).deviance[0, 0])
+            better = three.aicc < corrected(deviance, n, nearest.law.numbers + 2) - BEYOND_DOUBT
+        elif better and not noisy:
+            better = float(three.off @ three.off) < SMALLER**2 * min(float(fit.off @ fit.off) for fit in bends)
+        if better:
             return VERDICTS.index("three laws"), evidence
     if evidence > BEYOND_DOUBT:
         return VERDICTS.index("two laws" if 0 <= two.numbers[0] <= 1 else "no meeting in the window"), evidence

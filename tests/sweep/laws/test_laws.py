@@ -151,6 +151,57 @@ def test_the_law_that_data_were_made_of_is_not_ruled_out_and_no_simpler_one_is_l
         assert min(abs(float(one.bic - one.aicc) - apart[0]), abs(float(one.bic - one.aicc) - apart[1])) < 1e-9
 
 
+LINEAR = np.linspace(1.0, 100.0, 40)
+NO_POWER_LAWS = {
+    "exponential": -LINEAR / 20,
+    "stretched exponential": -((LINEAR / 20) ** 0.6),
+    "cut-off": -0.5 * np.log(LINEAR) - LINEAR / 20,
+    "lognormal": -0.5 * np.log(LINEAR / 10) ** 2,
+}
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("name", NO_POWER_LAWS)
+def test_other_functions_are_called_no_power_law_and_have_no_exponents(name, noise):
+    z = NO_POWER_LAWS[name] + noise * np.random.default_rng(6).standard_normal(40)
+    found = sweep.fit_two_laws(line(z, LINEAR), "x")
+    assert (str(found.verdict.values), int(found.regimes)) == ("no power law", 0)
+    assert all(np.isnan(found[key]).all() for key in ("exponent", "exponent_low", "crossover", "crossover_high"))
+    assert str(sweep.fit_exponent(line(z, LINEAR), "x").verdict.values) == "no power law"
+    compared = sweep.compare_laws(line(z, LINEAR), "x")
+    assert float(compared.worse.sel(law=name)) < 10
+    assert noise or (compared.chosen == name and "no power law" in compared.verdict)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_three_laws_are_told_and_a_meeting_outside_the_window_is_none(noise):
+    scatter = noise * np.random.default_rng(3).standard_normal(X.size)
+    assert str(sweep.fit_two_laws(line(TRUTHS["three laws"] + scatter), "x").verdict.values) == "three laws"
+    tail = sweep.fit_two_laws(line(two(T, 0.0, -1.0, -1 / 3, T[0] - 1.5, 0.3)), "x")
+    assert (str(tail.verdict.values), bool(np.isnan(tail.crossover))) == ("no meeting in the window", True)
+
+
+def test_a_correction_that_the_points_deny_has_no_interval():
+    """Twelve sets, one or two of which may be described by chance."""
+    x = np.geomspace(0.8, 1e4, 41)
+    z = -0.5 * np.log(x) - 1 / x + 0.01 * np.random.default_rng(3).standard_normal((12, 41))
+    y = xr.DataArray(np.exp(z), {"x": x}, ("set", "x"), name="y")
+    found, known = sweep.fit_correction(y, "x"), sweep.fit_correction(y[0], "x", sigma=0.003 * y[0])
+    assert float(found.fits.mean()) < 0.3
+    assert (found.exponent_low.isnull() == (found.verdict == "no power law with a correction")).all()
+    assert (int(known.fits), bool(known.exponent_high.isnull())) == (0, True)
+
+
+def test_a_collapse_of_a_constant_is_refused_and_known_errors_are_taken():
+    with pytest.raises(sweep.SweepError, match="not determined"):
+        sweep.fit_collapse(xr.ones_like(curves(1.5, 0.7)), "x", "L")
+    y = curves(1.5, 0.7) * np.exp(0.02 * np.random.default_rng(1).standard_normal((5, 25)))
+    found, small = (sweep.fit_collapse(y, "x", "L", sigma=size * y) for size in (0.02, 0.002))
+    assert (int(found.fits), int(small.fits)) == (1, 0)
+    assert float(found.x_exponent_low) < 1.5 < float(found.x_exponent_high)
+    assert np.isnan(small.x_exponent_low)
+
+
 @pytest.mark.parametrize("kind", ["even", "correlated", "outliers", "uneven"])
 def test_noise_about_one_law_leaves_one_law(kind):
     for seed in range(5):

@@ -117,7 +117,7 @@ def mixture(columns, z, phis, trends, ends):
             fit = sm.GLS(z, columns, sigma=np.outer(size, size) * toeplitz(phi ** np.arange(n)) / (1 - phi**2)).fit()
             log = -n / 2 * np.log(1 / (1 - phi**2)) + (n - 1) / -2 * np.log(1 - phi**2)
             log += 0.5 * np.linalg.slogdet(fit.normalized_cov_params)[1] - (n - k) / 2 * np.log(fit.scale)
-            prior = width[i] / (1 - phi) ** (0.36 * np.log(115 / n)) if len(phis) > 1 else 1.0
+            prior = width[i] / (1 - phi) ** min(0.7, 0.36 * np.log(115 / n)) if len(phis) > 1 else 1.0
             logs[i, j] = log + np.log(prior) - 0.5 * (a**2 + c**2) / 1.6**2
             values[i, j], errors[i, j] = fit.params[1], fit.bse[1]
     share = np.exp(logs - logs.max()) / np.exp(logs - logs.max()).sum()
