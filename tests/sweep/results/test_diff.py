@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from toy_studies import build
 
 import sweep
 from kernels.interface import Status
+from sweep.results.statuses import boxes, count_statuses
 
 AXES = {"height": [1.0, 2.0, 4.0], "v0": [0.0, 1.0]}
 
@@ -85,3 +87,22 @@ def test_what_cannot_be_compared_is_refused(result):
         sweep.diff(result, result.assign_attrs(kernel="foliot"))
     with pytest.raises(sweep.SweepError, match="run along height and v0 in one result and along height in the other"):
         sweep.diff(result, sweep.run(build(axes={"height": [1.0]})))
+
+
+def test_cells_of_large_results_are_found_wherever_they_are():
+    """More than are looked at together."""
+    status = np.zeros((3, 2_000_000), np.int8)
+    ds = xr.Dataset({"status": (("x", "y"), status)}, {"x": [1.0, 2.0, 3.0], "y": np.arange(2e6)}, {"kernel": "toy"})
+    other = ds.copy(deep=True)
+    other.status[2, 7] = Status.BAD_INPUT
+    assert sweep.diff(ds, other).examples["0", str(int(Status.BAD_INPUT))] == "e.g. x=3.0 y=7.0"
+    assert [(c.cells, c.example) for c in count_statuses(other)] == [(5_999_999, {}), (1, {"x": "3.0", "y": "7.0"})]
+
+
+@pytest.mark.parametrize("shape", [(), (7,), (3, 5), (2, 3, 4), (4, 1, 6), (0, 3)])
+@pytest.mark.parametrize("most", [1, 2, 6, 100])
+def test_boxes_hold_all_places_once_and_in_order(shape, most):
+    places = np.arange(np.prod(shape, dtype=int)).reshape(shape)
+    pieces = [places[box].ravel() for box in boxes(shape, most)]
+    assert np.concatenate([[], *pieces]).tolist() == places.ravel().tolist()
+    assert max(map(len, pieces), default=0) <= most
