@@ -63,44 +63,9 @@ class Search(NamedTuple):
     before: float
 
 
-class NewtonStep(NamedTuple):
-    """From v1 to `new` within the bracket, by the slope dF/dv1; whether it is Newton's own."""
-
-    low: float
-    high: float
-    new: float
-    change: float
-    relative: float
-    slope: float
-    own: bool
-
-
-class Verdict(NamedTuple):
-    """Of a swing: which cells are done and with which status; what tolerance is wanted, and whether it is reached.
-
-    loose : it is, but the last two swings differ by too much
-    """
-
-    done: bool
-    status: float
-    wanted: float
-    last_but_one: bool
-    loose: bool
-    at_rest: bool
-
-
 @jit
 def _relative(new, old):
     return magnitude(new - old) / (magnitude(new) + 1e-300)
-
-
-@jit
-def _difference(new, old):
-    """The largest relative difference between two cycles."""
-    worst = _relative(new[0], old[0])
-    for j in range(1, 5):
-        worst = larger(worst, _relative(new[j], old[j]))
-    return worst
 
 
 @jit
@@ -111,129 +76,58 @@ def _enough(problem, slope, decay):
 
 
 @jit
-def _slope(e, v, half):
+def first_of(problem):
+    """Where Newton's method begins, and whether stable steps are so short that a swing takes more than the limit."""
+    zero, pace = 0.0 * problem.e, problem.pace
+    slow = pace > 3.0  # friction soon balances the drive: v1 = V, and steps are short whatever the tolerance
+    v = where(slow, 1.0 / pace, 2.0 / sqrt(1.0 + 4.0 * pace * pace))
+    enough = _CHECK * _enough(problem, zero, 2.0 * problem.stiffness * pace)
+    varied = (problem.terms.kappa > 0.0) | problem.rippled
+    stiff = not_(problem.stiffness * pace < where(varied, _STIFFEST, _STIFFEST_UNIFORM))
+    return Search(v, where(slow, enough, _COARSE), zero - 1.0, zero + math.inf, zero + 1.0, zero + 1.0), stiff
+
+
+@jit
+def slope_of(e, v, half):
     """dF/dv1."""
     return where(half.end > 0.0, e * e * v / half.end * half.shrink, 0.0)
 
 
 @jit
-def _bracketed(search, end, tolerance, active):
-    """The bracket's ends, with what the sign of F - v tells."""
-    v = search.v
+def _newton(problem, search, half, tolerance, active):
+    """The bracket, with what the sign of F - v tells; the next speed, the slope dF/dv1, and whether it is Newton's own.
+
+    Newton's speed, or where that leaves the bracket one that narrows it.
+    """
+    v, end = search.v, half.end
     noise = _NOISE * tolerance * (v + end)
-    return where(active & (end - v > noise), v, search.low), where(active & (v - end > noise), v, search.high)
-
-
-@jit
-def _newton(v, end, slope, low, high):
-    """The next speed: Newton's, or where that leaves the bracket, one that narrows it."""
+    low = where(active & (end - v > noise), v, search.low)
+    high = where(active & (v - end > noise), v, search.high)
+    slope = slope_of(problem.e, v, half)
     newton = v + (end - v) / (1.0 - slope)
     newton = larger(newton, 0.0 * v)
     furthest = 8.0 * v + 8.0
-    inside = (newton > low) & (newton < high) & (newton < furthest)
+    own = (newton > low) & (newton < high) & (newton < furthest)
     other = where(high < math.inf, 0.5 * (larger(low, 0.0 * v) + high), furthest)
-    new = where(inside, newton, other)
-    return NewtonStep(low, high, new, new - v, _relative(new, v), slope, inside)
+    return low, high, where(own, newton, other), slope, own
 
 
 @jit
-def _cycle(problem, half, step):
-    """The cycle by (4) from a half swing close to it: time and amplitude follow v1 by its last step.
+def cycle_by(problem, half, new, change, slope):
+    """The cycle by (4) from a half swing close to it: time and amplitude follow v1 by its last `change`, to `new`.
 
     Also how many times larger than s the terms are that it is the sum of.
     """
-    e, swing, slope = problem.e, named(Swing, half.state), step.slope
+    e, swing = problem.e, named(Swing, half.state)
     force = accelerations(half.state, Law(half.leg, problem.terms))[0]
     time_by_mu, time_by_start = swing.x_mu / half.end, e * swing.x_start / half.end
     end_by_mu = -fma(force, time_by_mu, swing.v_mu)
     by_start = time_by_start * (end_by_mu / (1.0 - slope))
     s = -(by_start + time_by_mu) / half.time
     cancels = (magnitude(by_start) + magnitude(time_by_mu)) / magnitude(s * half.time)
-    amplitude = where(e > 0.0, fma(half.top_by_start, e * step.change, half.top), 1.0)
-    time = fma(time_by_start, step.change, half.time)
-    return (time, amplitude, step.new, s, e * e * half.shrink), cancels
-
-
-@jit
-def _next_tolerance(tolerance, wanted, relative, slope, steady):
-    """Of a swing: following the square of Newton's relative step, but not below what is wanted of the last but one."""
-    square = smaller(0.1 * relative * relative, 0.03 * (1.0 - slope))
-    return larger(_CHECK * wanted, where(steady, smaller(tolerance, square), tolerance))
-
-
-@jit
-def _too_stiff(problem):
-    """Whether a stable step would be so short that a swing takes more than the limit."""
-    varied = (problem.terms.kappa > 0.0) | problem.rippled
-    return not_(problem.stiffness * problem.pace < where(varied, _STIFFEST, _STIFFEST_UNIFORM))
-
-
-@jit
-def _first(problem):
-    """Where Newton's method begins."""
-    zero, pace = 0.0 * problem.e, problem.pace
-    slow = pace > 3.0  # friction soon balances the drive: v1 = V, and steps are short whatever the tolerance
-    v = where(slow, 1.0 / pace, 2.0 / sqrt(1.0 + 4.0 * pace * pace))
-    enough = _CHECK * _enough(problem, zero, 2.0 * problem.stiffness * pace)
-    return Search(v, where(slow, enough, _COARSE), zero - 1.0, zero + math.inf, zero + 1.0, zero + 1.0)
-
-
-@jit
-def _steepness(problem, before, steep, apart):
-    """How steeply the cycle hangs on v1, by all steps so far that tell."""
-    telling = problem.rippled & (before > _STEEP_FROM) & (before < _STEEP_TO)
-    return where(telling, larger(steep, apart / before), steep)
-
-
-@jit
-def _settled(problem, relative, apart, steep):
-    """Whether the last two swings agree."""
-    rtol = problem.rtol
-    return (relative <= 0.2 * rtol) & (apart <= 0.3 * rtol) & (steep * relative <= 0.3 * rtol)
-
-
-@jit
-def _judged(problem, search, half, step, apart, steep, cancels):
-    """The verdict on a swing."""
-    rtol, relative, free = problem.rtol, step.relative, not_(half.helped)
-    finer = where(problem.rough & free & (half.end > 0.0), larger(_CANCELS * cancels, 1.0 + 0.0 * cancels), 1.0)
-    wanted = search.tighter * _enough(problem, step.slope, named(Swing, half.state).decay) / finer
-    last_but_one, last = search.tolerance <= 1.5 * _CHECK * wanted, search.tolerance <= 1.5 * wanted
-    at_rest = (half.end <= 0.0) & (search.v <= 0.0)
-    held = (problem.e >= 0.0) & not_(1.0 + pull(half.top, problem.terms) > problem.rho_s)
-    stuck = last_but_one & ((half.helped & (relative <= 0.2 * rtol)) | at_rest)
-    settled = last & free & _settled(problem, relative, apart, steep)
-    at_floor = (wanted < _FINEST) & (search.tolerance < _FINEST) & free & (relative <= rtol)
-    blur = larger(steep, cancels) * _V_ROUNDING
-    right = settled & (wanted >= _FINEST) & (blur <= 0.3 * rtol * (1.0 - step.slope))
-    status = where(half.lost, STEP_LIMIT, where(stuck | held, STICKS, where(right, OK, INACCURATE)))
-    loose = last & free & (search.before < 0.5 * rtol) & not_(apart <= 0.3 * rtol)
-    return Verdict(settled | stuck | at_floor | half.lost, status, wanted, last_but_one, loose, at_rest)
-
-
-@jit
-def _following(problem, search, step, judged, apart, active):
-    """Speed, tolerance and the rest for the next swing of the active lanes."""
-    rtol, zero = problem.rtol, 0.0 * problem.e
-    factor = larger(smaller(0.2 * rtol / apart, 0.25 + zero), zero + 1e-3)
-    aim = where(judged.loose, 0.25 * judged.wanted, judged.wanted)
-    tolerance = _next_tolerance(search.tolerance, aim, step.relative, step.slope, step.own)
-    tolerance = where((judged.last_but_one & (step.relative < 0.5 * rtol)) | judged.at_rest, aim, tolerance)
-    return Search(
-        where(active, step.new, search.v),
-        where(active, tolerance, search.tolerance),
-        step.low,
-        step.high,
-        where(active & judged.loose, search.tighter * factor, search.tighter),
-        where(active, step.relative, search.before),
-    )
-
-
-@jit
-def _stepped(problem, search, half, tolerance, active):
-    """Newton's step after a half swing."""
-    low, high = _bracketed(search, half.end, tolerance, active)
-    return _newton(search.v, half.end, _slope(problem.e, search.v, half), low, high)
+    amplitude = where(e > 0.0, fma(half.top_by_start, e * change, half.top), 1.0)
+    time = fma(time_by_start, change, half.time)
+    return (time, amplitude, new, s, e * e * half.shrink), cancels
 
 
 @jit_inline
@@ -256,8 +150,9 @@ def dopri5(scene, ripple, rtol):
     verdict : OK, INACCURATE, STICKS, NOT_CONVERGED or STEP_LIMIT
     """
     problem = problem_of(scene, ripple, rtol)
-    zero, search = 0.0 * problem.e, _first(problem)
-    possible, stiff = problem.dry.inwards > 0.0, _too_stiff(problem)
+    e, rtol, zero = problem.e, problem.rtol, 0.0 * problem.e
+    search, stiff = first_of(problem)
+    possible = problem.dry.inwards > 0.0
     cycle, steep = (zero, zero, zero, zero, zero), zero
     verdict = where(possible, where(stiff, STEP_LIMIT, NOT_CONVERGED), STICKS)
     active = possible & not_(stiff)
@@ -265,14 +160,52 @@ def dopri5(scene, ripple, rtol):
         if not any_lane(active):
             break
         tolerance = larger(search.tolerance, _FINEST + zero)
-        half = half_swing(problem.e * search.v, problem, tolerance, active)
-        step = _stepped(problem, search, half, tolerance, active)
-        found, cancels = _cycle(problem, half, step)
-        apart = larger(_difference(found, cycle), step.relative)
+        half = half_swing(e * search.v, problem, tolerance, active)
+        low, high, new, slope, own = _newton(problem, search, half, tolerance, active)
+        relative = _relative(new, search.v)
+        found, cancels = cycle_by(problem, half, new, new - search.v, slope)
+
+        # how far this swing and the one before are apart, and how steeply the cycle hangs on v1 by all that tell
+        apart = _relative(found[0], cycle[0])
+        for j in range(1, 5):
+            apart = larger(apart, _relative(found[j], cycle[j]))
+        apart = larger(apart, relative)
         cycle = choose(active, found, cycle)
-        steep = _steepness(problem, search.before, steep, apart)
-        judged = _judged(problem, search, half, step, apart, steep, cancels)
-        done = active & judged.done
-        verdict, active = where(done, judged.status, verdict), active & not_(done)
-        search = _following(problem, search, step, judged, apart, active)
+        telling = problem.rippled & (search.before > _STEEP_FROM) & (search.before < _STEEP_TO)
+        steep = where(telling, larger(steep, apart / search.before), steep)
+
+        # the tolerance that is wanted, and whether it was that of this swing and the one before
+        free = not_(half.helped)
+        finer = where(problem.rough & free & (half.end > 0.0), larger(_CANCELS * cancels, 1.0 + 0.0 * cancels), 1.0)
+        wanted = search.tighter * _enough(problem, slope, named(Swing, half.state).decay) / finer
+        last_but_one, last = search.tolerance <= 1.5 * _CHECK * wanted, search.tolerance <= 1.5 * wanted
+
+        # what is done: both agree, it is at rest or sticks, rounding leaves no more, or the swing took too many steps
+        at_rest = (half.end <= 0.0) & (search.v <= 0.0)
+        held = (e >= 0.0) & not_(1.0 + pull(half.top, problem.terms) > problem.rho_s)
+        stuck = last_but_one & ((half.helped & (relative <= 0.2 * rtol)) | at_rest)
+        agree = (relative <= 0.2 * rtol) & (apart <= 0.3 * rtol) & (steep * relative <= 0.3 * rtol)
+        settled = last & free & agree
+        at_floor = (wanted < _FINEST) & (search.tolerance < _FINEST) & free & (relative <= rtol)
+        blur = larger(steep, cancels) * _V_ROUNDING
+        right = settled & (wanted >= _FINEST) & (blur <= 0.3 * rtol * (1.0 - slope))
+        status = where(half.lost, STEP_LIMIT, where(stuck | held, STICKS, where(right, OK, INACCURATE)))
+        done = active & (settled | stuck | at_floor | half.lost)
+        verdict, active = where(done, status, verdict), active & not_(done)
+
+        # the next swing: its tolerance follows the square of the step, but not below what is wanted of the last but one
+        loose = last & free & (search.before < 0.5 * rtol) & not_(apart <= 0.3 * rtol)
+        factor = larger(smaller(0.2 * rtol / apart, 0.25 + zero), zero + 1e-3)
+        aim = where(loose, 0.25 * wanted, wanted)
+        square = smaller(0.1 * relative * relative, 0.03 * (1.0 - slope))
+        tolerance = larger(_CHECK * aim, where(own, smaller(search.tolerance, square), search.tolerance))
+        tolerance = where((last_but_one & (relative < 0.5 * rtol)) | at_rest, aim, tolerance)
+        search = Search(
+            where(active, new, search.v),
+            where(active, tolerance, search.tolerance),
+            low,
+            high,
+            where(active & loose, search.tighter * factor, search.tighter),
+            where(active, relative, search.before),
+        )
     return cycle, verdict

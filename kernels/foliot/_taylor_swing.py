@@ -16,7 +16,7 @@ import numpy as np
 from kernels.codegen.followed_twice import FINER, off_by_roundings
 from kernels.foliot import _units
 from kernels.foliot._half_swing import Half
-from kernels.foliot._integrated_swing import NewtonStep, _cycle, _first, _slope
+from kernels.foliot._integrated_swing import cycle_by, first_of, slope_of
 from kernels.foliot._swing_law import Law, Leg, Swing, accelerations, problem_of, pull
 from kernels.foliot._swing_scenes import LINEAR, RIPPLE, RIPPLED, SEARCHED, SMOOTH, TERMS, Swung, half_swings
 from kernels.foliot._units import Foliot, Outputs
@@ -89,7 +89,7 @@ def begin(p, rtol):
     problem, _ = _problem(_units.terms(p), p.depth, p.harmonic)
     dry, terms = problem.dry, problem.terms
     friction = terms.drag, dry.outwards, dry.inwards, terms.power.gamma, terms.power.n
-    return (*friction, terms.kappa, _first(problem).v, problem.stiffness * problem.pace), OK
+    return (*friction, terms.kappa, first_of(problem)[0].v, problem.stiffness * problem.pace), OK
 
 
 @jit
@@ -98,10 +98,9 @@ def step(p, rtol):
     problem, units = _problem(_units.terms(p), p.depth, p.harmonic)
     swung = Swung(p.time, p.x, p.v, p.x_mu, p.v_mu, p.x_start, p.v_start, p.decay, p.top, p.up_mu, p.up_start)
     half = _half(problem, swung)
-    slope = _slope(problem.e, p.v1, half)
+    slope = slope_of(problem.e, p.v1, half)
     change = (half.end - p.v1) / (1.0 - slope)
-    newton = NewtonStep(p.v1, p.v1, p.v1 + change, change, change, slope, half.lost)
-    cycle, cancels = _cycle(problem, half, newton)
+    cycle, cancels = cycle_by(problem, half, p.v1 + change, change, slope)
     held = (problem.e >= 0.0) & not_(1.0 + pull(half.top, problem.terms) > problem.rho_s)
     (period, amplitude, speed, s, multiplier), status = _units.given(units, cycle, where(held, STICKS, OK))
     return (half.end, change, slope, cancels, period, amplitude, speed, s, multiplier), status

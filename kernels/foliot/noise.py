@@ -110,13 +110,6 @@ def _correlation(tau_c):
     return where(white, 0.0, exp(-1.0 / tau_c)), where(white, 1.0, sqrt(-expm1(-2.0 / tau_c)))
 
 
-@jit
-def _whole(ratio):
-    """The largest whole number that is not above a ratio >= 0."""
-    near = nearest(ratio)
-    return where(near > ratio, near - 1.0, near)
-
-
 @jit_call
 def _closed(averages, run, time, clock):
     """Closes the averaging times that end within a half swing that began at `run` and lasted `time`.
@@ -126,21 +119,15 @@ def _closed(averages, run, time, clock):
     closed, reading, rate, squares = averages
     tau = clock.tau
     slope = (clock.nominal - time) / time
-    until = _whole((run.t + time) / tau)
+    ratio = (run.t + time) / tau
+    until = nearest(ratio)
+    until = where(until > ratio, until - 1.0, until)
     at_first = fma(slope, (closed + 1.0) * tau - run.t, run.gain)
     first = (at_first - reading) / tau
     squares = where(closed > 0.0, fma(first - rate, first - rate, squares), squares)
     more = until > closed + 1.0
     squares = where(more, fma(slope - first, slope - first, squares), squares)
     return Averages(until, fma(slope, until * tau - run.t, run.gain), where(more, slope, first), squares)
-
-
-@jit
-def _rubbing(scene, friction):
-    """The scene with that many times its viscous friction, not less than the least."""
-    friction = where(friction > LEAST_FRICTION, friction, LEAST_FRICTION)
-    d, rho, rho_s, gamma, n, kappa, e, slack = scene
-    return Scene(d * friction, rho, rho_s, gamma, n, kappa, e, slack)
 
 
 @jit_call
@@ -151,7 +138,10 @@ def _beat(run, averages, z, clock):
     torque = fma(clock.sigma, x, 1.0)
     short = not_(torque > clock.floor)
     torque = where(short, clock.floor, torque)
-    scene = _rubbing(scene, fma(clock.sigma_a, x, 1.0))
+    friction = fma(clock.sigma_a, x, 1.0)
+    friction = where(friction > LEAST_FRICTION, friction, LEAST_FRICTION)
+    d, rho, rho_s, gamma, n, kappa, e, slack = scene
+    scene = Scene(d * friction, rho, rho_s, gamma, n, kappa, e, slack)
     start = scene.e * run.speed
     legs = _linear_swing.half_swing(torque, scene, start)
     goes_on = legs.comes & ((start < 0.0) | (fma(scene.kappa, legs.top, torque) > scene.rho_s))
@@ -163,14 +153,6 @@ def _beat(run, averages, z, clock):
     return Run(x, legs.speed, later, run.gain + (clock.nominal - legs.time), truncated), averages, goes_on
 
 
-@jit
-def _longest(first, half_swings):
-    most = 0.0
-    for cell in range(GROUP):
-        most = max(most, half_swings[first + cell])
-    return min(most, HALF_SWING_LIMIT)
-
-
 @jit_call
 def _run(first, seed, half_swings, clock, speed, active, radii, turns):
     """All half swings of the active cells of a group, and those of them that did not come to a switch."""
@@ -178,7 +160,10 @@ def _run(first, seed, half_swings, clock, speed, active, radii, turns):
     zero = 0.0 * speed
     run, averages = Run(zero, speed, zero, zero, zero), Averages(zero, zero, zero, zero)
     stopped = count < 0.0
-    for chunk in range(int(_longest(first, half_swings)) // (2 * PAIRS) + 1):
+    most = 0.0
+    for cell in range(GROUP):
+        most = max(most, half_swings[first + cell])
+    for chunk in range(int(min(most, HALF_SWING_LIMIT)) // (2 * PAIRS) + 1):
         philox.fill(first, seed, chunk * PAIRS, PAIRS, radii, turns)
         for j in range(PAIRS):
             row = cells_at(j * GROUP)
@@ -207,24 +192,6 @@ def _uncertainty(scene, cycle):
 
 
 @jit
-def _clock(scene, units, nominal, least, p):
-    """The clock of a scene whose half swings without noise last `nominal`, and which `least` torque keeps going."""
-    m_tau, e_tau = mantissa_exponent(p.averaging_time)
-    tau = scale(m_tau / units.t, e_tau - units.e_t)
-    remembered, fresh = _correlation(p.tau_c)
-    return Clock(scene, p.sigma, p.sigma_a, remembered, fresh, fma(HEADROOM, 1.0 - least, least), nominal, tau)
-
-
-@jit
-def _verdict(found, enough, accurate, sticks):
-    """On a run, by what was found of the cycle without noise."""
-    starts = magnitude(found - NOT_SELF_STARTING) > 0.0
-    verdict = where(enough, where(starts, OK, found), TOO_SHORT)
-    verdict = where(accurate, verdict, INACCURATE)
-    return where(found < FIRST_REFUSAL, where(sticks, STICKS, verdict), found)
-
-
-@jit
 def segments(first, columns, radii, turns):
     """Every half swing from exact pieces. `rtol` is meant of rates as fractions: 1e-9 of a day is 8.6e-5 s."""
     i = cells_at(first)
@@ -232,7 +199,10 @@ def segments(first, columns, radii, turns):
     scene, units = _units.without_dimensions(_units.without_drag(read(LinearFoliot, columns, i)))
     cycle, _, found = _linear_swing.limit_cycle(scene)
     least = _least_torque(scene)
-    clock = _clock(scene, units, cycle.half_period, least, p)
+    m_tau, e_tau = mantissa_exponent(p.averaging_time)
+    tau = scale(m_tau / units.t, e_tau - units.e_t)
+    floor = fma(HEADROOM, 1.0 - least, least)
+    clock = Clock(scene, p.sigma, p.sigma_a, *_correlation(p.tau_c), floor, cycle.half_period, tau)
     runs = units.fine & (found < FIRST_REFUSAL) & (least < 1.0)
     run, averages, stopped = _run(first, columns.seed, columns.half_swings, clock, cycle.speed, runs, radii, turns)
     t, closed = where(runs, run.t, 1.0), averages.closed
@@ -242,7 +212,9 @@ def segments(first, columns, radii, turns):
     columns.rate_scatter_s_per_day[i] = where(enough, SECONDS_PER_DAY * deviation, math.nan)
     columns.truncated[i] = run.truncated / p.half_swings
     accurate = _uncertainty(scene, cycle) <= columns.rtol[i]
-    verdict = _verdict(found, enough, accurate, stopped | not_(least < 1.0))
+    verdict = where(enough, where(magnitude(found - NOT_SELF_STARTING) > 0.0, OK, found), TOO_SHORT)
+    verdict = where(stopped | not_(least < 1.0), STICKS, where(accurate, verdict, INACCURATE))
+    verdict = where(found < FIRST_REFUSAL, verdict, found)  # of the cycle without noise
     fine = units.fine & is_normal(clock.tau) & (t < _COUNTABLE * clock.tau)
     columns.status[i] = where(fine | (verdict >= FIRST_REFUSAL), verdict, OUT_OF_RANGE)
 
