@@ -39,6 +39,7 @@ def run(path, cells=None, **keys):
 def test_plain_readers_find_the_numbers_and_all_that_is_said_of_them(tmp_path, name, cells):
     path = tmp_path / "out.h5"
     with run(path, cells, **STUDIES[name]) as found, run(None, **STUDIES[name]) as wanted:
+        xr.testing.assert_equal(found, wanted)
         for engine in ("h5netcdf", "netcdf4"):
             with xr.open_dataset(path, engine=engine) as plain:
                 xr.testing.assert_equal(plain.astype(found.dtypes), wanted)
