@@ -29,8 +29,8 @@ STRIP_BYTES = 16 << 20
 """Bytes that the outputs of a strip may take, where they are traces."""
 NONE = -1
 """In place of a method's number: no method solved the cell."""
-ROUNDED_UP = np.float32(1 + 2.0**-23)
-"""A float32 times this is the next larger one at least."""
+ROUNDED_UP = 1 + 2.0**-23
+"""A number times this is at least itself when it is rounded to a float32."""
 
 
 def _these(*statuses: Status) -> bytes:
@@ -171,14 +171,12 @@ class Solver:
                 column[:n][refused] = np.nan
         if (error := cells.error) is not None:
             with np.errstate(over="ignore", invalid="ignore"):
-                error[:] = self._error[:n]
-                np.multiply(error, ROUNDED_UP, out=error)
+                np.multiply(self._error[:n], ROUNDED_UP, out=error, casting="unsafe")
             # what meets rtol meets it in single precision, too
-            doubtful = self.status == INACCURATE
-            least = error[doubtful]
-            np.minimum(error, np.float32(wanted_rtol), out=error)
-            error[doubtful] = least
-            error[refused] = np.nan
+            meets = self.status != INACCURATE
+            np.minimum(error, np.float32(wanted_rtol), out=error, where=True if meets.all() else meets)
+            if np.count_nonzero(refused):
+                error[refused] = np.nan
 
     def _choose(self, cells: Places) -> None:
         """Solve each cell by the first method that can do it, whose bound meets rtol and which does not give up.
@@ -285,8 +283,7 @@ class Solver:
         if not error and np.count_nonzero(status):
             known = np.where(status == INACCURATE, np.inf, known)
         self._error[rows] = known
-        meets = known <= inputs[-1]
-        if np.count_nonzero(meets) < len(cells):
+        if known is not inputs[-1] and np.count_nonzero(meets := known <= inputs[-1]) < len(cells):
             self._error[rows] = np.where(np.isnan(known), np.inf, known)
             status[~meets & (status < FIRST_REFUSAL)] = INACCURATE
         if aside:
