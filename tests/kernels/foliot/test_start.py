@@ -163,7 +163,7 @@ def test_a_clock_that_loses_nothing_swings_ever_wider():
     assert np.allclose(times[0], np.cumsum(np.r_[v[0], v[1:] + v[:-1]]) / 2.0, rtol=1e-14)
     assert status[0] == Status.OK
     assert checked(FOLIOT_START, [2.0], [0.5])[0] == Status.OK  # no cycle is asked for
-    assert checked(FOLIOT_START, [0.0], [0.5])[0] == Status.NEVER_STARTS
+    assert checked(FOLIOT_START, [0.0], [0.5])[0] == Status.BAD_INPUT
     assert checked(FOLIOT_START, [2.0], [0.5], R=1.0, R_s=0.5)[0] == Status.BAD_INPUT
 
 

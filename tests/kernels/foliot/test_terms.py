@@ -167,7 +167,6 @@ def test_the_multiplier_of_viscous_and_coulomb_friction_is_as_right_as_is_promis
 
 
 REFUSED = [
-    ({"a": 1.0, "mu": [0.0]}, Status.NEVER_STARTS),
     ({"a": 1.0, "R": 1.0}, Status.NEVER_STARTS),
     ({"a": 1.0, "R": 0.5, "R_s": 1.0}, Status.NEVER_STARTS),
     ({"c": 1.0, "n": 0.0}, Status.NEVER_STARTS),
