@@ -8,6 +8,11 @@ functions for one cell and for lanes (`module`), in a file that can be read. In 
 and sqrt, exp, log, sin, cos, power, sign, maximum, minimum and where of this module. power(abs(u), n), u a state and
 n > -1 any number, has no Taylor series at u = 0; there it is followed as `power_core` says, right to the same
 tolerance. Of what is not a state, power and sqrt want something above 0 (else OUT_OF_RANGE).
+
+A cell is OK where each state is within rtol of the truth, relative to the largest size that the state had on the way,
+and each time within rtol of itself. The surface and the kinks are located, or proved absent, over every step. A motion
+that starts behind the surface, or that a switch puts there, meets no switch before it has come up and falls again; one
+that starts on the surface and falls switches at once. What rounding alone may make of a motion counts: INACCURATE.
 """
 
 import keyword
@@ -58,7 +63,7 @@ class Scene:
     most_kinks : between two switches, after which a cell is given up; None: a thousand
     slides : whether motion goes on along a kink onto which both sides press it (`sliding`), or sticks there
 
-    At a switch `side` turns from 1 to -1 or back. Where abs(u) or sign(u) occurs, u = 0 is a *kink*: the motion is
+    At a switch `side` turns from 1 to -1 or back. Behind the surface no switch fires before the motion has come up. Where abs(u) or sign(u) occurs, u = 0 is a *kink*: the motion is
     followed up to it and begun anew behind it.
     """
 

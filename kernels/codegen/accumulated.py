@@ -24,6 +24,8 @@ NEAR = 1e-3
 """Of the time of rest, what may be left to it: then the intervals are believed to go on as they do."""
 TINY = 1e-12
 """Of the time, an interval that is not worth to be followed: by less, rounding tells on what intervals shrink."""
+STILL = 1e-16
+"""Of the time, an interval that does not move it any more."""
 FINE = 1e-9
 """The tolerance at most: a wide one takes bounces for grazing that are still large."""
 AWAY = 0.9
@@ -57,7 +59,7 @@ def to_rest(how):
         those = np.flatnonzero(last >= LEAST)
         if len(those):
             early = [*(c[cells[those]] for c in columns[:-1]), np.full(len(those), 2.0)]
-            sizes = followed_twice.followed(module, early, np.full(len(those), ROUGHLY))[2 + len(module.STATES) : -1]
+            sizes = followed_twice.followed(module, early, np.full(len(those), ROUGHLY))[2 + len(module.STATES) : -2]
             rests, values, error = _limits(followed, those, last[those], sizes)
             good = cells[those[rests]]
             for column, row in zip(outputs, values, strict=True):
@@ -69,7 +71,7 @@ def to_rest(how):
 
 def _may_rest(flips, outputs, status):
     time, interval = outputs[:2]
-    faint = np.isin(status, FAINT) & ~(interval * flips > SHORT * time)
+    faint = (np.isin(status, FAINT) & ~(interval * flips > SHORT * time)) | (interval <= STILL * time)
     return (flips >= LEAST) & (np.isin(status, ENDED) | faint)
 
 

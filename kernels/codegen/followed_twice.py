@@ -2,8 +2,10 @@
 
 Each step is right to a tolerance; what many steps come to depends on the scene. So a cell is followed twice, the second
 time with a tolerance FINER times smaller: the first run's error is what they differ by, the second's is about FINER
-times less, and is what is given. The first run's parameters are some roundings off (`off_by_roundings`): so what a
-scene makes of rounding, which both runs would share, is seen too.
+times less, and is what is given. The first run's parameters are some roundings off (`off_by_roundings`), and so are
+its start and the times of its events (`shake`): so what a scene makes of rounding, which both runs would share, is
+seen too. Where the runs differ by so much that the finer one is
+right only if that is not rounding, it is followed once more, at the finer tolerance with those parameters.
 """
 
 import math
@@ -26,15 +28,22 @@ STOPS = 2.0, 4.0, math.inf
 ROUGH, FINER = 2.0, 16.0
 ROUNDINGS, GOLDEN = 8.0, 0.6180339887498949
 """By how many roundings a parameter is changed at most, and what makes that differ from one to the next."""
+MANY = 2.0
+"""Times as many are the parameters of scenes changed by, and so many is an event missed by."""
 TIGHTER, TIGHT = 1e-3, 1e-13
 """The second tolerance, over the first one, and at most: what is stiff may come to rest only in the last digits."""
-TRIED_AGAIN = Status.INACCURATE, Status.STEP_LIMIT, Status.OUT_OF_RANGE
-APART = 8.0
-"""How many rtol the two runs may differ by: the finer one is then right to rtol/2."""
+TRIED_AGAIN = Status.INACCURATE, Status.GRAZING, Status.STEP_LIMIT, Status.OUT_OF_RANGE
+APART = 4.0
+"""How many rtol the two runs may differ by: the finer one is then right to rtol/4, as far as steps go."""
+ROUNDED = 0.5
+"""How many rtol two runs of the same tolerance may differ by, whose parameters are some roundings apart. What runs of
+two tolerances differ by may be rounding, which the finer one has as well."""
+BLURRED = 0.5
+"""How many rtol rounding may make of where events are: both runs round alike, so they do not differ by it."""
 
 
-def followed(module, columns, rtol, finer=1.0, together=False):
-    """The results of a cell a column: time, interval, states, their sizes, and as the last row the status.
+def followed(module, columns, rtol, finer=1.0, together=False, shake=0.0):
+    """The results of a cell a column: time, interval, states, their sizes, what rounding of events does, the status.
 
     Parameters
     ----------
@@ -42,8 +51,9 @@ def followed(module, columns, rtol, finer=1.0, together=False):
     rtol : tolerance of each step, a column; it chooses the order
     finer : by how much the steps are to be better than that
     together : lanes in lockstep, in the order of the cells
+    shake : by how many of its roundings each event is missed, in turn early and late, and each state at the start
     """
-    return _followed(module, columns, rtol, rtol / finer, together)
+    return _followed(module, columns, rtol, rtol / finer, together, shake=shake)
 
 
 def told(module, columns, rtol, of_a_step):
@@ -52,10 +62,10 @@ def told(module, columns, rtol, of_a_step):
     return found[:-1], found[-1]
 
 
-def _followed(module, columns, rtol, of_a_step, together=False, tells=False):
+def _followed(module, columns, rtol, of_a_step, together=False, tells=False, shake=0.0):
     """The results; if the error is to be told, as a last row."""
-    inputs = [*columns, np.maximum(of_a_step, FINEST)]
-    results = np.empty((3 + 2 * len(module.STATES) + tells, len(rtol)))
+    inputs = [*columns, np.maximum(of_a_step, FINEST), np.full(len(rtol), shake)]
+    results = np.empty((4 + 2 * len(module.STATES) + tells, len(rtol)))
     high = rtol < HIGH_BELOW
     for run, of_order in ((module.run_12, ~high), (module.run_18, high)):
         cells = np.flatnonzero(of_order)
@@ -70,7 +80,7 @@ def _run(module, run, inputs, together, tells):
     row = {name: j for j, name in enumerate(module.ROWS)}
     found = [*range(row["time"], row["verdict"] + 1), *([row["error"]] if tells else [])]
     cells, places = fresh(len(row), inputs), np.arange(len(inputs[0]))
-    whole = np.where(inputs[-2] < math.inf, inputs[-2], math.nan)  # NaN is refused, without end not followed
+    whole = np.where(inputs[-3] < math.inf, inputs[-3], math.nan)  # NaN is refused, without end not followed
     cells[:, found] = np.nan
     if "told" in row:
         cells[:, row["told"]] = float(tells)
@@ -95,38 +105,49 @@ def once(module, columns, rtol, outputs, status):
     write(results, status_of(results, len(outputs)), outputs, status)
 
 
-def twice(module, columns, rtol, outputs, status, most=APART, finest=0.0):
+def twice(module, columns, rtol, outputs, status, finest=0.0):
     """Fills outputs and status by two runs; INACCURATE where they differ by more than the finer one could mend.
 
     Where they do, or a run breaks off, the cell is followed twice again with a tighter tolerance, of at least `finest`.
     """
-    results, found = _compared(module, columns, rtol, rtol, most)
+    results, found = _compared(module, columns, rtol, rtol)
     tighter = np.maximum(np.minimum(TIGHT, TIGHTER * rtol), finest)
     again = np.flatnonzero(np.isin(found, TRIED_AGAIN) & (tighter < rtol) & (rtol >= ROUNDING))
     if len(again):
-        better, verdict = _compared(module, [c[again] for c in columns], tighter[again], rtol[again], most)
+        better, verdict = _compared(module, [c[again] for c in columns], tighter[again], rtol[again])
         right = verdict == Status.OK
         results[:, again[right]], found[again[right]] = better[:, right], Status.OK
     write(results, found, outputs, status)
 
 
-def _compared(module, columns, rtol, wanted, most):
+def _compared(module, columns, rtol, wanted):
     """The results of the finer of two runs to the tolerance `rtol`, and the status where `wanted` is to be met."""
-    rough = followed(module, off_by_roundings(columns), rtol, ROUGH)
+    rough = followed(module, off_by_roundings(columns, MANY), rtol, ROUGH, shake=MANY)
     fine = followed(module, columns, rtol, ROUGH * FINER)
     states = len(module.STATES)
     status = status_of(fine, 2 + states)
-    scale = np.concatenate([abs(fine[:2]), np.maximum(abs(fine[2 : 2 + states]), fine[2 + states : -1])])
-    with np.errstate(all="ignore"):
-        near = (abs(fine[: len(scale)] - rough[: len(scale)]) <= most * wanted * scale).all(axis=0)
+    scale = np.concatenate([abs(fine[:2]), fine[2 + states : -2]])
+    near = _near(fine, rough, APART * wanted * scale)
+    doubtful = np.flatnonzero(near & ~_near(fine, rough, ROUNDED * wanted * scale))
+    if len(doubtful):
+        those = off_by_roundings([c[doubtful] for c in columns], MANY)
+        again = followed(module, those, rtol[doubtful], ROUGH * FINER, shake=MANY)
+        near[doubtful] = _near(fine[:, doubtful], again, ROUNDED * wanted[doubtful] * scale[:, doubtful])
+    near &= fine[-2] <= BLURRED * wanted
     status[((wanted < ROUNDING) | ~near) & (status == Status.OK)] = Status.INACCURATE
     worse = (rough[-1] > 0) & (status <= Status.INACCURATE)
     status[worse] = np.where(rough[-1][worse] < FIRST_REFUSAL, rough[-1][worse], Status.INACCURATE)
     return fine, status
 
 
-def off_by_roundings(columns):
-    """The parameters, each changed by a few roundings of its own; the number of switches, the last, as it is.
+def _near(fine, other, allowed):
+    """Whether times and states differ by no more than that, a row for each."""
+    with np.errstate(all="ignore"):
+        return (abs(fine[: len(allowed)] - other[: len(allowed)]) <= allowed).all(axis=0)
+
+
+def off_by_roundings(columns, many=1.0):
+    """The parameters, each changed by `many` times a few roundings of its own; the last, of switches, as it is.
 
     Numbers of eight bits, which cannot cancel so far that it matters, and those that another one repeats are kept: a
     start on the surface stays there.
@@ -134,7 +155,7 @@ def off_by_roundings(columns):
     *values, flips = columns
     changed = []
     for j, value in enumerate(values):
-        ulps = ROUNDINGS * (2.0 * ((j + 1) * GOLDEN % 1.0) - 1.0)
+        ulps = many * ROUNDINGS * (2.0 * ((j + 1) * GOLDEN % 1.0) - 1.0)
         short = np.ascontiguousarray(value).view(np.int64) & (2**44 - 1) == 0
         kept = short | np.any([abs(value) == abs(other) for k, other in enumerate(values) if k != j], axis=0)
         changed.append(np.where(kept, value, value * (1.0 + ulps * 2.0**-52)))

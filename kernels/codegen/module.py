@@ -25,10 +25,10 @@ from kernels.lanes.jit import COMPILED, cached
 from kernels.source_text.driver import BEGUN, EVENT, SETTLED, advance, shared
 from kernels.source_text.error import END, LEFT, SPREAD_AT_END, STEP
 from kernels.source_text.expression import DIV, FUNCTIONS, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, SceneError, needed
-from kernels.source_text.hidden import HIDDEN, hidden
+from kernels.source_text.hidden import BOUNDS, HIDDEN, bounds, hidden
 from kernels.source_text.lane import BEGIN
 from kernels.source_text.leg import BY_KINK, FACTS, LEG, LOOK, ROOT, START, leg
-from kernels.source_text.rounding import LOST, SIZES, lost_by_surface
+from kernels.source_text.rounding import BLURRED, LOST, PLACE, SIZES, blurred, lost_by_surface
 from kernels.source_text.series import Lines
 from kernels.source_text.sliding import ENDLESS, JUDGE, LEAVE, PRESS, PRESSED, of_sliding
 from kernels.source_text.tangent import SHORT, TANGENT, Tangents, short, tangent
@@ -48,7 +48,7 @@ import math
 
 from kernels.maths.intervals import (
     above, added, half_squared, hidden_by_exp, hidden_by_over, hidden_by_power, hidden_by_root, largest, most,
-    multiplied, of_exp, of_log, of_power, of_sqrt, of_wave, over, smallest, times, widened,
+    multiplied, of_cos, of_exp, of_log, of_power, of_sin, of_sqrt, over, smallest, times, widened,
 )
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import dot, fma, horner, not_, magnitude, any_lane, sqrt, where
@@ -95,11 +95,12 @@ def series_{order}(state, side, signs, parameters, unit{also}):
 _OF_LEG = LEG, LOOK, FACTS, START, BY_KINK, ROOT
 _OF_ERROR = TANGENT, SIZES, LEFT, STEP, END, SPREAD_AT_END
 _OF_SLIDING = PRESSED, JUDGE, ENDLESS, LEAVE, PRESS
-_TEXTS = HEAD, FUNCTION, SERIES, HIDDEN, LOST, CORE, BEGIN, EVENT, BEGUN, SETTLED, *_OF_LEG, *_OF_ERROR, *_OF_SLIDING
+_TEXTS = HEAD, FUNCTION, SERIES, HIDDEN, BOUNDS, LOST, BLURRED, PLACE, CORE, BEGIN, EVENT, BEGUN, SETTLED
+_TEXTS += (*_OF_LEG, *_OF_ERROR, *_OF_SLIDING)
 _TAKEN = set(re.findall(r"\w+", "".join(_TEXTS))) | {"n", "p", "s"}
 _PREFIXES = (
     "at|s|end|box|size|bare|full|kink|most|half|over|and_one|half_over|"
-    "off|due|delta|noise|rate|made|coarse|left|more|bent|spread|sway"
+    "off|due|reach|vague|delta|noise|rate|made|coarse|left|more|bent|spread|sway"
 )
 _NUMBERED = re.compile(rf"\w*_\d+|n\d+|({_PREFIXES})_\w*")
 
@@ -122,7 +123,7 @@ class Writer:
         self.kinks = len(recorded.graph.kinks)
         self.states, self.parameters = ([_apart(n) for n in names] for names in (scene.states, scene.parameters))
         self.names = dict(zip((*scene.states, *scene.parameters), (*self.states, *self.parameters), strict=True))
-        self.names |= {"side": "side", ".unit": "unit"}
+        self.names |= {"side": "side", ".unit": "unit", ".way": "way"}
         self.names |= {f".sign_{j}": f"sign_{j}" for j in range(self.kinks)}
         self.names |= {f".delta_{s}": f"delta_{name}" for s, name in zip(scene.states, self.states, strict=True)}
         self.all_unpacked = self.unpacked("state", "signs", "parameters")
@@ -136,7 +137,7 @@ class Writer:
         """Statements that give what the tuples hold its names."""
         held = {
             "state": self.states,
-            "signs": [f"sign_{j}" for j in range(self.kinks)],
+            "signs": [*(f"sign_{j}" for j in range(self.kinks)), "way"],
             "parameters": self.parameters,
             "changes": [f"delta_{s}" for s in self.states],
         }
@@ -158,9 +159,10 @@ class Writer:
         for j, u in enumerate(self.recorded.graph.kinks):
             lines.text.append(f"sign_{j} = where({lines.value(u)} < 0.0, -1.0, 1.0)")
         return filled(
-            FUNCTION, name="natural_signs", doc="1 or -1 for each kink: the side on which the state is; 1 on it.",
+            FUNCTION, name="natural_signs", doc="1 or -1 for each kink: the side on which the state is; 1 on it. 1.",
             arguments="state, side, parameters", unpack=self.unpacked("state", "parameters"),
-            lines="\n".join(lines.text), result=f"({listed(f'sign_{j}' for j in range(self.kinks))})",
+            lines="\n".join(lines.text),
+            result=f"({listed([*(f'sign_{j}' for j in range(self.kinks)), '0.0 * side + 1.0'])})",
         )  # fmt: skip
 
     def underflows(self):
@@ -181,7 +183,7 @@ class Writer:
 
     def offset(self):
         """The surface's offset, as text of parameters; 0 where that would be long."""
-        offset = self.recorded.events[0][0]
+        offset = self.recorded.offset
         return self.names[offset.args[0]] if offset.kind == INPUT else "0.0"
 
     def advance(self, order, tells=False):
@@ -257,6 +259,8 @@ class Writer:
             lost_by_surface(self),
             shared(self.states, self.parameters, self.kinks),
             of_hidden,
+            bounds(self),
+            blurred(self),
         ]  # fmt: skip
         if scene.slides:
             return "\n".join([*parts, of_sliding(self)])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kernels.codegen.sliding import slid
-from kernels.source_text.expression import ADD, FUNCTIONS, SCALED, Expression, Graph, SceneError
+from kernels.source_text.expression import ADD, FUNCTIONS, NUMBER, SCALED, Expression, Graph, SceneError
 
 RESERVED = ("side", "flips", "time", "interval", "rtol", "status")
 """Names that a scene's states and parameters cannot have."""
@@ -17,8 +17,9 @@ class Recorded:
     """The expressions of a scene, in one graph.
 
     `events` are (offset, factor, u): each fires where offset + factor u falls through 0; the first is the switch, the
-    others are the kinks. `timed` are the rates per unit of time, an input ".unit" in seconds. `onto` and `speeds` are
-    those of `sliding.slid`.
+    others are the kinks. The switch's has the factor ".way": -1 while the motion is behind the surface, where its event
+    is that it comes up. `timed` are the rates per unit of time, an input ".unit" in seconds. `onto` and `speeds` are
+    those of `sliding.slid`; `offset` is the surface's own.
     """
 
     graph: Graph
@@ -29,6 +30,7 @@ class Recorded:
     started: tuple[Expression, ...]
     events: tuple[tuple[Expression, Expression, Expression], ...]
     nested: int
+    offset: Expression
     onto: tuple[Expression, ...] = ()
     speeds: tuple[tuple[Expression, Expression], ...] = ()
 
@@ -49,7 +51,10 @@ def record(scene):
     timed = tuple(graph.timed(rate, unit) for rate in rates)
     started = _called(graph, scene, "start", constants, len(states))
     kinks = [(graph.of(0.0), graph.constant(f".sign_{j}"), u) for j, u in enumerate(graph.kinks)]
-    events = (_affine(graph, surface), *kinks)
+    way = graph.constant(".way")
+    offset, factor, u = _affine(graph, surface)
+    wayward = offset if offset.kind == NUMBER and not offset.args[0] else way * offset
+    events = ((wayward, way * factor, u), *kinks)
     recorded = Recorded(
         graph,
         rates,
@@ -59,6 +64,7 @@ def record(scene):
         started,
         events,
         _nested(events, dict(zip(states.values(), rates, strict=True))),
+        offset,
     )
     return slid(recorded, scene.states) if scene.slides else recorded
 

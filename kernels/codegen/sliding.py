@@ -11,7 +11,7 @@ Source: Filippov, Differential Equations with Discontinuous Righthand Sides (198
 from dataclasses import replace
 
 from kernels.source_text.expression import ADD, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED
-from kernels.source_text.tangent import Tangents
+from kernels.source_text.tangent import Tangents, along
 
 
 class Side:
@@ -84,8 +84,8 @@ def slid(recorded, states):
     )
     below, jumps = [behind.of(r) for r in recorded.rates], [_jump(r, behind, ahead) for r in recorded.rates]
     gradients = [[Tangents.along(graph, s).of(u) for s in states] for u in kinks]
-    down = sum((w * _along(graph, g, below) for w, g in zip(slides, gradients, strict=True)), graph.of(0.0))
-    rise = sum((w * _along(graph, g, jumps) for w, g in zip(slides, gradients, strict=True)), graph.of(0.0))
+    down = sum((w * along(graph, g, below) for w, g in zip(slides, gradients, strict=True)), graph.of(0.0))
+    rise = sum((w * along(graph, g, jumps) for w, g in zip(slides, gradients, strict=True)), graph.of(0.0))
     over = sum(slides, graph.of(0.0))
     share = down / (1.0 - over - rise)
     off = sum((w * u for w, u in zip(slides, kinks, strict=True)), graph.of(0.0)) / (1.0 - over - rise)
@@ -106,13 +106,7 @@ def slid(recorded, states):
     )
 
 
-def _along(graph, gradient, rates):
-    """The rate of what has that gradient."""
-    products = [slope * rate for slope, rate in zip(gradient, rates, strict=True) if slope is not None]
-    return sum(products, graph.of(0.0))
-
-
 def _speeds(graph, rates, gradient, j):
     """u'(f+) and u'(f-) of a kink."""
     sides = (Side(graph, {j: graph.of(sign)}) for sign in (1.0, -1.0))
-    return tuple(_along(graph, gradient, [side.of(rate) for rate in rates]) for side in sides)
+    return tuple(along(graph, gradient, [side.of(rate) for rate in rates]) for side in sides)

@@ -83,7 +83,8 @@ def solved(module, columns, rtol, outputs, status):
 def judged(results, error, rtol, outputs):
     """OK where the stated error is at most rtol, else INACCURATE or what the motion came to."""
     status = followed_twice.status_of(results, outputs)
-    status[~(STATED * error <= rtol) | (rtol < ROUNDING)] = Status.INACCURATE
+    blurred = ~(results[-2] <= followed_twice.BLURRED * rtol)
+    status[~(STATED * error <= rtol) | (rtol < ROUNDING) | blurred] = Status.INACCURATE
     return status
 
 

@@ -11,6 +11,7 @@ from kernels.codegen import followed_twice
 from kernels.codegen.module import Writer, build, loaded
 from kernels.codegen.record import record
 from kernels.integrate.events import METHODS
+from kernels.source_text.driver import signs_of
 from kernels.source_text.expression import INPUT
 from kernels.source_text.lane import BEGIN, begun_rows, loaded_rows, stored_rows
 from kernels.source_text.stiff import linear
@@ -19,9 +20,7 @@ from kernels.source_text.template import filled, listed
 BLUR = 1e-14
 """Of the surface's value at the start, what rounding may take from it unremarked."""
 
-APART = {"dopri5": followed_twice.APART, "dop853": 4.0, "rodas5p": followed_twice.APART}
-"""How many rtol the two runs may differ by; DOP853's weights of up to 43 make more of rounding than the others do."""
-
+NAMES = "dopri5", "dop853", "rodas5p"
 PAIRS = "DOPRI5", "DOP853", "RODAS5P_PAIR"
 
 FINEST = 1e-13
@@ -73,11 +72,14 @@ def natural_signs_of(wide, side, parameters):
 
 scene_signs = scene.natural_signs
 Swap = namedtuple("Swap", "rates natural_signs")
-Moves = namedtuple("Moves", "rates natural_signs events switched settled underflows hidden hides swap ahead behind")
+Moves = namedtuple(
+    "Moves", "rates natural_signs events switched settled underflows hidden bounds hides swap ahead behind"
+)
 M = Moves(
-    rates, scene.natural_signs, events, scene.switched, scene.settled, scene.underflows, hidden, scene.HIDES,
+    rates, scene.natural_signs, events, scene.switched, scene.settled, scene.underflows, hidden, scene.bounds,
+    scene.HIDES,
     Swap(swapped_rates, natural_signs_of),
-    (1.0,) * {kinks}, (-1.0,) * {kinks},
+    (1.0,) * ({kinks} + 1), (*(-1.0,) * {kinks}, 1.0),
 )
 
 
@@ -134,7 +136,7 @@ def _prefixed(prefix, names):
 def _text(scene, module):
     kinks = module.KINKS
     states, parameters = _prefixed("q", scene.states), _prefixed("q", scene.parameters)
-    signs, ons = _prefixed("sign", range(kinks)), _prefixed("on", range(1 + kinks))
+    signs, ons = signs_of(kinks), _prefixed("on", range(1 + kinks))
     reach, at, before = (_prefixed(kind, states) for kind in ("reach", "at", "before"))
     scheme = ["method", "location", "substeps"]
     inputs = [*parameters, "flips", "step", "graze", *scheme]
@@ -232,24 +234,24 @@ def dense_{pair}(m, state, terms, mode, h, part):
 
 
 def twice_by(method, scene):
-    """The function of columns (`followed_twice.twice`) that follows the scene by a method of `APART`."""
+    """The function of columns (`followed_twice.twice`) that follows the scene by a method of `NAMES`."""
 
     def twice(module, columns, rtol, outputs, status):
         run = getattr(adaptive(scene), f"run_{method}")
         runs = SimpleNamespace(STATES=module.STATES, ROWS=module.ROWS, run_12=run, run_18=run)
-        followed_twice.twice(runs, columns, rtol, outputs, status, APART[method], FINEST)
+        followed_twice.twice(runs, columns, rtol, outputs, status, FINEST)
 
     return twice
 
 
 @functools.cache
 def adaptive(scene):
-    """The module of the scene's legs to a tolerance, written once, with a `run_{method}` for each method of `APART`."""
+    """The module of the scene's legs to a tolerance, written once, with a `run_{method}` for each method of `NAMES`."""
     module, steps, writer = build(scene), stepped(scene), Writer(scene, record(scene))
     names = {"name": scene.name, "module": module.__name__, "steps": steps.__name__}
     kept = [KEPT.format(pair=pair) for pair in PAIRS] if scene.slides else []
     text = filled(LEGS, **names, kept="".join(kept), linear=linear(writer)).lstrip()
-    for method in APART:
+    for method in NAMES:
         text += writer.advance(method)
     return loaded("legs", scene, text)
 

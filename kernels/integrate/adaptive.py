@@ -1,16 +1,17 @@
 """Legs from event to event by an embedded pair of methods (`pairs`) to a tolerance; generic in one cell or lanes.
 
 A leg has the signature of the Taylor method's (`source_text.leg`) and drops into the same driver. Of each step the
-events are known at both ends by value and rate. One that ends below 0 is located on the dense output by Newton's
-method in a bracket; one that falls at the start and rises at the end is looked at where the cubic between is lowest,
-and a turning point closer to 0 than the tolerance tells is called grazing. A step within which the rates may hide more
+events are known at both ends by value and rate, and between them by intervals (`source_text.hidden`): each must be
+proved to stay above 0, to fall or to rise all along, or the step is halved; an event that comes so close to 0 that no
+short step proves it is called grazing. One that ends below 0 is located on the dense output by Newton's method in a
+bracket. A step within which the rates may hide more
 than the tolerance (`source_text.hidden`) is not taken: the points that an error is estimated from may miss it.
 """
 
 from typing import NamedTuple
 
 from kernels.integrate.events import cubic_root, of_event
-from kernels.integrate.fixed_step import dip, finite, first_event, near_an_event, passed_another
+from kernels.integrate.fixed_step import dip, finite, first_event, passed_another
 from kernels.integrate.nystrom import GROW, SHRINK
 from kernels.integrate.pairs import of_size
 from kernels.integrate.records import Leg, Step
@@ -29,8 +30,11 @@ CLOSE = 30.0
 """Tolerances within which a turning point of an event is too close to 0 to be told from a crossing."""
 
 
-SUNK, ROUNDED = 0.01, 1e-12
+SUNK, ROUNDED = 0.01, 1e-11
 """How far below an event that it starts on a motion may fall within a step: of the tolerance, and by rounding."""
+BENT, NARROWED = 0.5, 8.0
+"""Cuts of a step after which a motion that starts on an event may leave it by its bend, and after which one that comes
+close to an event may be called grazing."""
 HALVED = 30.0
 """Halvings after which a motion that starts on an event with no rate has not risen from it."""
 
@@ -39,6 +43,7 @@ class Course(NamedTuple):
     """A leg on its way.
 
     h : the next step, in units
+    reach : the largest magnitude of each state so far
     on, fired : 1 for each event that the motion starts on, that it has met
     start, start_rates, wide : value and rate of each event; the largest value so far
     cuts, tried : how often the step has been cut, how many have been tried
@@ -54,6 +59,7 @@ class Course(NamedTuple):
     wide: tuple
     cuts: float
     tried: float
+    reach: tuple
     moving: bool
 
 
@@ -108,6 +114,26 @@ def hides_nothing(m, step, first, last, mode, tolerance):
     for j in range(len(step.start)):
         seen = seen & (of_events[j] <= tolerance * (magnitude(step.start[j]) + magnitude(step.end[j])))
     return seen
+
+
+@jit_call
+def doubted(m, step, first, last, mode, course, tolerance):
+    """Where an event is not proved to stay above its margin, or to fall or rise all along; and where one is near 0.
+
+    A motion that starts on an event with no rate and leaves it by its bend is believed to, on a step cut short enough.
+    """
+    box = boxes(step.state, step.new, times(step.h, after(last, -1.0, ONE, (first,))))
+    low, rate_low, rate_high = m.bounds(step.state, box, mode.side, mode.signs, mode.parameters)
+    margin, doubt = margins(course, tolerance), step.h < 0.0
+    near = doubt
+    for j in range(len(low)):
+        start, end, rise = step.start_rates[j], step.end[j], 0.5 * step.h * step.end_rates[j]
+        bends = (course.on[j] > 0.5) & (course.cuts > BENT) & (end > 0.0) & (rise > 0.0) & (rise <= 2.0 * end)
+        bends = bends & (step.h * start <= 0.5 * end) & (-step.h * start <= fma(SUNK, tolerance, ROUNDED) * end)
+        unsure = not_((low[j] > margin[j]) | (rate_high[j] < 0.0) | (rate_low[j] > 0.0) | bends)
+        doubt = doubt | unsure
+        near = near | (unsure & (course.on[j] < 0.5) & (magnitude(step.end[j]) <= margin[j]))
+    return doubt, near
 
 
 @jit_call
@@ -205,26 +231,18 @@ def leaves(step, which, course, tolerance):
 
 
 @jit
-def sinks(step, on, tolerance):
-    """Whether a motion falls below an event that it starts on, and is above it again where the step ends."""
-    below = step.h < 0.0
-    for j in range(len(step.end)):
-        fall = -step.h * step.start_rates[j]
-        below = below | ((on[j] > 0.5) & (step.end[j] > 0.0) & (fall > fma(SUNK, tolerance, ROUNDED) * step.end[j]))
-    return below
-
-
-@jit
 def searched(m, pair, mode, step, trial, course, which, tolerance, ending):
     """The ending, on the event that the step meets; or again, for it may hide a root of an event."""
     fine, was_cut = course.moving & not_(ending.again), not_(course.cuts < 0.5)
     met = fine & (which > -0.5)
     pressed = met & (of_event(course.on, which) > 0.5)
     away = leaves(step, which, course, tolerance)
-    low = where(fine & not_(met | was_cut), dip(step), 0.0)
-    again = ending.again | (pressed & away) | (low > 0.0) | (fine & not_(pressed) & sinks(step, course.on, tolerance))
+    doubt, near = doubted(m, step, trial.stages[0], trial.last, mode, course, tolerance)
+    doubt = doubt & fine & not_(pressed)
+    low = where(doubt & not_(met | was_cut), dip(step), 0.0)
+    close = doubt & near & (course.cuts > NARROWED)
+    again = ending.again | (pressed & away) | (doubt & not_(close))
     shorter = where(ending.again, ending.shorter, where(low > 0.0, low * course.h, 0.5 * course.h))
-    close = was_cut & fine & not_(met) & near_an_event(step.end, course.on, margins(course, tolerance))
     stuck, nothing = pressed & not_(away), ending.loose
     ending = Ending(ending.new, ending.taken, again, shorter, nothing, stuck, close, nothing)
     seeking = met & not_(pressed | again)
@@ -252,8 +270,9 @@ def moved_on(course, step, ending, which, longer, cuts, given_up):
     """The course behind a step."""
     moved = course.moving & not_(ending.again | given_up)
     done, start = moved & (which > -0.5), choose(moved, step.end, course.start)
+    state = choose(moved, ending.new, course.state)
     return Course(
-        choose(moved, ending.new, course.state),
+        state,
         where(moved, course.t + ending.taken, course.t),
         where(ending.again, ending.shorter, where(moved & not_(done), longer, course.h)),
         choose(moved, marks(0.0 * course.h - 1.0, course.on), course.on),
@@ -263,6 +282,7 @@ def moved_on(course, step, ending, which, longer, cuts, given_up):
         reached(course.wide, start),
         cuts,
         where(course.moving, course.tried + 1.0, course.tried),
+        reached(course.reach, state),
         course.moving & not_(done | given_up),
     )
 
@@ -290,7 +310,8 @@ def to_event(m, pair, state, mode, unit, h, on, tolerance, active):
     none, zero, unmarked = active & not_(active), 0.0 * h, times(0.0, on)
     start, start_rates = events(m, state, mode)
     wide = reached(unmarked, start)
-    course = Course(state, zero, h, on, unmarked, start, start_rates, wide, zero, zero, active)
+    reach = reached(times(0.0, state), state)
+    course = Course(state, zero, h, on, unmarked, start, start_rates, wide, zero, zero, reach, active)
     troubles = Troubles(none, none, none, none, none, none)
     for _ in range(STEP_LIMIT):
         course, troubles = one_step(m, pair, mode, unit, tolerance, course, troubles)
@@ -308,4 +329,5 @@ def to_event(m, pair, state, mode, unit, h, on, tolerance, active):
         troubles.grazing,
         troubles.hangs,
         course.tried,
+        course.reach,
     )

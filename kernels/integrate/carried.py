@@ -3,7 +3,8 @@
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import where
 
-ULP = 2.0**-52
+ULP = 2.0**-50
+"""What rounding may take, four times over: as errors are carried, roundings of two states may cancel by chance."""
 DOUBT = 4.0
 """By how much an event's margin grows per unit of its error at the start of a leg."""
 ORDERLY = 8.0

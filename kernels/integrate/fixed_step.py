@@ -28,7 +28,7 @@ from kernels.integrate.steps import ONE, events, rate
 from kernels.lanes import codes
 from kernels.lanes.codes import GRAZING, INACCURATE, NOT_CONVERGED, OUT_OF_RANGE, REFUSED, STICKS
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.tuples import after, boxes, joined, marks, reached, times, turned
+from kernels.lanes.tuples import after, boxes, but_last, joined, marks, reached, times, turned, with_last
 from kernels.lanes.vectors import any_lane, choose, magnitude, not_, where
 
 STEP_LIMIT = 20_000
@@ -247,10 +247,11 @@ def tried(m, scheme, mode, step, which, motion, graze, active):
 @jit
 def arrived(motion, trial, which, moved, on):
     """The motion behind the step, of the lanes that have moved; the others' next trial is shorter."""
+    signs = with_last(turned(but_last(motion.signs), on), where(on[0] > 0.5, 1.0, motion.signs[-1]))
     return Motion(
         choose(moved, trial.new, motion.state),
         motion.side,
-        choose(moved, turned(motion.signs, on), motion.signs),
+        choose(moved, signs, motion.signs),
         on,
         where(trial.again, trial.shorter, 0.0),
         where(trial.again, motion.cuts + 1.0, 0.0),
@@ -296,9 +297,10 @@ def switch(m, parameters, motion, left, switches):
     jumped = m.switched(motion.state, motion.side, motion.signs, parameters)
     state, side = choose(switches, jumped, motion.state), where(switches, -motion.side, motion.side)
     signs, kinks_on = m.settled(state, side, parameters, 0.0 * side + 1.0, times(0.0, motion.signs))
-    signs = choose(switches, signs, motion.signs)
     behind = m.events(state, side, signs, parameters)[0][0]
     still = magnitude(behind) <= 2.0 * magnitude(left)
+    signs = with_last(but_last(signs), where((behind < 0.0) & not_(still), -1.0, signs[-1]))
+    signs = choose(switches, signs, motion.signs)
     on = choose(switches, joined(where(still, 1.0, 0.0), kinks_on), motion.on)
     return Motion(state, side, signs, on, motion.cut, motion.cuts)
 
@@ -346,10 +348,11 @@ def follow(m, scheme, parameters, limits, motion, tally, verdict, active):
     """A few steps of the active lanes: the records `motion` and `tally`, the verdict, and which are done."""
     done = active & not_(active)
     for _ in range(TOGETHER):
+        rises = motion.signs[-1] < 0.0
         motion, moved = attempt(m, scheme, parameters, limits, tally.wide, motion, active)
         verdict = where(active & (moved.verdict > verdict), moved.verdict, verdict)
         tally = counted(tally, motion.state, moved, active)
-        switches = active & (moved.which > -0.5) & (moved.which < 0.5) & (verdict < REFUSED)
+        switches = active & (moved.which > -0.5) & (moved.which < 0.5) & not_(rises) & (verdict < REFUSED)
         if any_lane(switches):
             at = motion.state
             left = m.events(at, motion.side, motion.signs, parameters)[0][0]

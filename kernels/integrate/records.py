@@ -50,6 +50,7 @@ class Leg(NamedTuple):
     stuck, lost, broken : pressed on what it started on; not there within limits; numbers that are none
     grazing, hangs : neither met nor missed for sure; met, but only just
     tried : steps
+    reach : the largest magnitude of each state on the way
     """
 
     state: tuple
@@ -62,6 +63,7 @@ class Leg(NamedTuple):
     grazing: bool
     hangs: bool
     tried: float
+    reach: tuple
 
 
 class Scheme(NamedTuple):

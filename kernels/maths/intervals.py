@@ -7,8 +7,8 @@ between two points, and by how much. NaN stays, so what is compared with it fail
 import math
 
 from kernels.lanes.jit import jit
-from kernels.lanes.vectors import magnitude, sqrt, where
-from kernels.maths.elementary import exp, log, power
+from kernels.lanes.vectors import magnitude, not_, sqrt, where
+from kernels.maths.elementary import exp, log, power, sincos
 
 CHANGE, LOG_CHANGE = 8.0, 2.0
 """Factor by which what has no polynomial (exp u, 1/u, sqrt u, ln u, u^n) may change and still be seen where a step
@@ -105,10 +105,27 @@ def of_log(u):
 
 
 @jit
-def of_wave(value, u):
-    """sin u or cos u, `value` at a point of the interval."""
-    wide = u[1] - u[0]
-    return most(value - wide, 0.0 * wide - 1.0), least(value + wide, 0.0 * wide + 1.0)
+def of_sin(u):
+    """sin u."""
+    (low, low_slope), (high, high_slope) = sincos(u[0]), sincos(u[1])
+    return _of_wave(u[1] - u[0], low, high, low_slope, high_slope)
+
+
+@jit
+def of_cos(u):
+    """cos u."""
+    (low_slope, low), (high_slope, high) = sincos(u[0]), sincos(u[1])
+    return _of_wave(u[1] - u[0], low, high, -low_slope, -high_slope)
+
+
+@jit
+def _of_wave(wide, low, high, low_slope, high_slope):
+    """From values and slopes at both ends: within half a wave it turns once at most."""
+    short = wide < 3.14
+    top = (low_slope >= 0.0) & (high_slope <= 0.0)
+    bottom = (low_slope <= 0.0) & (high_slope >= 0.0)
+    least_of, most_of = least(low, high), most(low, high)
+    return where(bottom | not_(short), 0.0 * wide - 1.0, least_of), where(top | not_(short), 0.0 * wide + 1.0, most_of)
 
 
 @jit

@@ -21,6 +21,7 @@ SETTLED = '''
 def settled(state, side, parameters, unit, near):
     """The sign of each kink's u, and whether the state is on it: there the sign is that of u in the next moment.
 
+    The last sign is 1, the motion's way over the surface.
     `near` is 1 for the kinks that the state is on but for rounding.
     """
     {signs} = natural_signs(state, side, parameters)
@@ -40,11 +41,13 @@ def begun(flips, parameters):
     signs, on = settled(state, side, parameters, one, ({zeros}))
     {unpack} = series_2(state, side, signs, parameters, one)
     e, d, dd = fma(factor_0, event_0[0], offset_0), factor_0 * event_0[1], factor_0 * event_0[2]
+    {signs} = signs
+    way = where(e < 0.0, -1.0, way)
     away = (d > 0.0) | ((d >= 0.0) & (dd > 0.0))
     at = where((e <= 0.0) & (e >= 0.0) & away, 1.0, 0.0)
     lost = lost_by_surface(state, side, signs, parameters)
-    blur = where(lost > 0.0, lost / e, 0.0)
-    return Start(state, side, signs, time_unit(e, d, dd), (at, {also_on}), not_(e >= 0.0), blur)
+    blur = where(lost > 0.0, lost / magnitude(e), 0.0)
+    return Start(state, side, ({signs}), time_unit(e, d, dd), (at, {also_on}), not_(magnitude(e) >= 0.0), blur)
 '''
 
 EVENT = '''
@@ -54,6 +57,7 @@ def advance_{order}(memory, i):
     {load}
     parameters = ({parameters})
     {begin}
+    {shake_start}
     {press_fresh}
     done = active & not_(active)
     for _ in range(EVENTS):
@@ -68,13 +72,18 @@ def advance_{order}(memory, i):
         {endless}
         moving = moving & (verdict < REFUSED) & not_(leg.grazing)
         {land}
+        {sizes}
         h = leg.h
         {ons} = leg.on
+        place = blurred(({states}), side, ({signs}), ({ons}), parameters)
+        rate = rates(({states}), side, ({signs}), parameters)
+        {shake_event}
         time = where(moving, fma(leg.t, unit, time), time)
         since = where(moving, fma(leg.t, unit, since), since)
-        switches = moving & (on_0 > 0.5)
+        switches = moving & (on_0 > 0.5) & (way > 0.0)
         kinks_met = where(switches, 0.0, where(moving, kinks_met + 1.0, kinks_met))
         {turn}
+        {come_up}
         if any_lane(switches):
             count = where(switches, count + 1.0, count)
             {largest}
@@ -82,8 +91,8 @@ def advance_{order}(memory, i):
             if any_lane(watched):
                 faint = underflows(({states}), side, ({signs}), parameters, unit)
                 verdict = where(watched & faint, OUT_OF_RANGE, verdict)
-                rate = rates(({states}), side, ({signs}), parameters)
                 {keep}
+                {blur}
                 {tell}
             since = where(switches, 0.0, since)
             left = surface(({states}), side, ({signs}), parameters)
@@ -98,7 +107,10 @@ def advance_{order}(memory, i):
             size = magnitude({offset}) + magnitude(after - {offset})
             still = magnitude(after) <= fma(1e-12, size, 2.0 * magnitude(left))
             on_0 = where(switches, where(still, 1.0, 0.0), on_0)
+            way = where(switches & (after < 0.0) & not_(still), -1.0, way)
         {press}
+        rate_behind = rates(({states}), side, ({signs}), parameters)
+        {vague}
         steps, before = where(active, leg.tried, steps), where(active, steps, before)
         verdict = where(moving & (kinks_met > {most_kinks}), STEP_LIMIT_MET, verdict)
         done = active & (leg.grazing | (verdict >= REFUSED) | (count >= flips))
@@ -138,14 +150,20 @@ _STARTS = (
 
 
 def results_of(states):
-    """Names of what a cell comes to."""
-    return ["time", "interval", *(f"at_{s}" for s in states), *(f"size_{s}" for s in states), "verdict"]
+    """Names of what a cell comes to; `blur` is what rounding of where its events are makes of them."""
+    return ["time", "interval", *(f"at_{s}" for s in states), *(f"size_{s}" for s in states), "blur", "verdict"]
 
 
 def _between_events(states, kinks):
     """Names of what a lane keeps of its cell between two events, beside results."""
-    signs, ons = [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]
-    return [*states, "side", *signs, "unit", "h", *ons, "count", "since", "kinks_met", "steps", "before"]
+    ons = [f"on_{j}" for j in range(1 + kinks)]
+    own = [*states, "side", *signs_of(kinks), "unit", "h", *ons]
+    return [*own, *(f"vague_{s}" for s in states), "count", "since", "kinks_met", "steps", "before"]
+
+
+def signs_of(kinks):
+    """Names of the kinks' signs, and of the way over the surface."""
+    return [*(f"sign_{j}" for j in range(kinks)), "way"]
 
 
 def of_error(states, spreads):
@@ -158,12 +176,12 @@ def of_error(states, spreads):
 def rows_of(states, parameters, kinks, also=()):
     """Names of all that a lane keeps; `also` are those of its error (`of_error`)."""
     moving = [*results_of(states), *_between_events(states, kinks)]
-    return ["stage", *parameters, "flips", "tolerance", *moving, *also]
+    return ["stage", *parameters, "flips", "tolerance", "shake", *moving, *also]
 
 
 def shared(states, parameters, kinks):
     """The text that does not depend on the order."""
-    signs, e = [f"sign_{j}" for j in range(kinks)], range(1, 1 + kinks)
+    signs, e = signs_of(kinks), range(1, 1 + kinks)
     unpack = ", ".join([f"s_{s}" for s in states] + [f"(offset_{j}, factor_{j}, event_{j})" for j in (0, *e)])
     turn = [
         f"""\
@@ -172,22 +190,14 @@ back = (factor_{j} * event_{j}[1] < 0.0) | ((factor_{j} * event_{j}[1] <= 0.0) &
 sign_{j - 1} = where(on_{j} & back, -sign_{j - 1}, sign_{j - 1})"""
         for j in e
     ]
-    settled = SETTLED if kinks else SETTLED_EMPTY
     return filled(
-        settled, signs=listed(signs), unpack=unpack, turn="\n".join(turn),
+        SETTLED, signs=listed(signs), unpack=unpack, turn="\n".join(turn),
         on=listed(f"where(on_{j}, 1.0, 0.0)" for j in e),
     ) + filled(
-        BEGUN, states=listed(states), lasting=listed(f"{s} + 0.0 * side" for s in states), unpack=unpack,
+        BEGUN, signs=listed(signs), states=listed(states), unpack=unpack,
+        lasting=listed(f"{s} + 0.0 * side" for s in states),
         also_on=", ".join(f"on[{j - 1}]" for j in e), zeros=listed("0.0 * side" for _ in e),
     ) + f"\n\nROWS = {tuple(rows_of(states, parameters, kinks))}\n"  # fmt: skip
-
-
-SETTLED_EMPTY = '''
-@jit
-def settled(state, side, parameters, unit, near):
-    """No kinks, no signs."""
-    return (), ()
-'''
 
 
 def advance(states, parameters, kinks, order, offset, most_kinks, tells=False, slides=False, spreads=False):
@@ -201,12 +211,14 @@ def advance(states, parameters, kinks, order, offset, most_kinks, tells=False, s
     slides : whether the motion may slide along a kink (`source_text.sliding`)
     spreads : whether the error's spread is carried along
     """
-    signs, ons = [f"sign_{j}" for j in range(kinks)], [f"on_{j}" for j in range(1 + kinks)]
+    signs, ons = signs_of(kinks), [f"on_{j}" for j in range(1 + kinks)]
     errors = of_error(states, spreads) if tells else []
     rows = rows_of(states, parameters, kinks, errors)
-    changed = ["stage", "time", "verdict", *_between_events(states, kinks), *errors[1:]]
-    results = {name: f"memory[{rows.index(name)}][i]" for name in results_of(states)[1:-1]}
+    sizes = [f"size_{s}" for s in states]
+    changed = ["stage", "shake", "time", "blur", "verdict", *sizes, *_between_events(states, kinks), *errors[1:]]
+    results = {name: f"memory[{rows.index(name)}][i]" for name in ["interval", *(f"at_{s}" for s in states)]}
     values = [*_STARTS, *((name, "0.0") for name in errors[1:])]
+    values += [(name, "0.0") for name in ["blur", *sizes, *(f"vague_{s}" for s in states)]]
     values += [(f"off_{s}", f"ULP * magnitude({s})") for s in states] if tells else []  # a start is rounded
     begin = filled(BEGIN, begin=begun_rows(states, signs, ons, values), blur="BLUR * tolerance")
     return filled(
@@ -225,8 +237,8 @@ _TELLING = "off_out", "off_in", "late", "largest", "tell", "through"
 def _telling(states, signs, spreads):
     """Statements that carry the error along, and its spread."""
     offs, spread = [f"off_{s}" for s in states], [f"spread_{s}" for s in states] if spreads else []
-    parts, size = ["latest / time", "lagged / since"], "most(magnitude({s}), PART * magnitude(rate[{j}]) * since)"
-    parts += [f"once_off_{s} / {size.format(s=s, j=j)}" for j, s in enumerate(states)]
+    parts = ["latest / time", "lagged / since"]
+    parts += [f"once_off_{s} / where(size_{s} > 0.0, size_{s}, 1.0)" for s in states]
     largest = {"latest": ["late"], "lagged": ["lag"], **{f"once_{name}": [name] for name in offs}}
     late, lags, through = (
         ["late, lag = fma(later, unit, late), fma(later, unit, lag)"],
@@ -262,7 +274,13 @@ def _landing(states, signs, ons):
     """Statements at the end of a leg."""
     return {
         "land": "\n".join(chosen("moving", states, "leg.state")),
-        "turn": "\n".join(f"{s} = where(moving & ({o} > 0.5), -{s}, {s})" for s, o in zip(signs, ons[1:], strict=True)),
+        "sizes": "\n".join(
+            f"size_{s} = where(leg.reach[{j}] > size_{s}, leg.reach[{j}], size_{s})" for j, s in enumerate(states)
+        ),
+        "turn": "\n".join(
+            f"{s} = where(moving & ({o} > 0.5), -{s}, {s})" for s, o in zip(signs[:-1], ons[1:], strict=True)
+        ),
+        "come_up": "way = where(moving & (on_0 > 0.5), 1.0, way)",
     }
 
 
@@ -270,6 +288,7 @@ def _sliding(states, signs, ons, slides):
     """Statements where a motion may slide: before its first leg, behind one, before the next."""
     if not slides:
         return {"press_fresh": "", "endless": "", "press": ""}
+    signs = signs[:-1]
     fresh = press("fresh", states, signs, ons, ["0.0 * side"] * len(signs))
     left = [f"where(switches, 0.0, left_{j})" for j in range(len(signs))]
     return {
@@ -282,14 +301,30 @@ def _sliding(states, signs, ons, slides):
 
 def _switching(states, signs, ons, results):
     """Statements at a switch; `results` are the places in memory of what is put down there."""
+    vague = "vague_{s} = where(moving, fma(magnitude(rate_behind[{j}] - rate[{j}]), place, vague_{s}), vague_{s})"
+    blurs = ["place / time", "2.0 * place / since"]
+    blurs += [
+        f"fma(magnitude(rate[{j}]), place, vague_{s}) / where(size_{s} > 0.0, size_{s}, 1.0)"
+        for j, s in enumerate(states)
+    ]
     keep = {"interval": "since"} | {f"at_{s}": s for s in states}
-    keep |= {f"size_{s}": f"fma(magnitude(rate[{j}]), since, magnitude({s}))" for j, s in enumerate(states)}
     jump = chosen("switches", states, "jumped") + chosen("switches", signs, "signs")
     near = [
         f"where(magnitude(gaps_behind[{j}]) <= 2.0 * magnitude(gaps[{j}]), {on}, 0.0)" for j, on in enumerate(ons[1:])
     ]
     places = ["time", *results.values()]
     return {
+        "shake_start": "\n".join(
+            f"{s} = where(fresh, fma({2.0**-52 * (-1) ** j!r} * shake, {s}, {s}), {s})" for j, s in enumerate(states)
+        ),
+        "shake_event": "\n".join(
+            [
+                "shaken, shake = moving & (magnitude(shake) > 0.0), -shake",
+                *(f"{s} = where(shaken, fma(shake * place, rate[{j}], {s}), {s})" for j, s in enumerate(states)),
+            ]
+        ),
+        "vague": "\n".join(vague.format(s=s, j=j) for j, s in enumerate(states)),
+        "blur": f"blur = where(watched, {folded('most({}, {})', blurs)}, blur)",
         "keep": "\n".join(f"{results[r]} = where(watched, {x}, {results[r]})" for r, x in keep.items()),
         "jump": "\n".join(jump + chosen("switches", ons[1:], "kinks_on")),
         "near": listed(near),

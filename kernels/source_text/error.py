@@ -57,6 +57,7 @@ weight = {weight} * {share}
 {of_events} = event_changes(({ends}), side, signs, parameters, ({offs}))
 {per_time} = event_changes(({ends}), side, signs, parameters, ({rates}))
 {made} = made_of_events(({ends}), side, signs, parameters)
+{cut_off}
 change, noise, slope_of, bend = change_0, noise_0 + magnitude(offset_0), slope_0, {bend_0}
 {choices}
 by = -further(change, ULP * noise) / (unit * slope_of)
@@ -255,10 +256,17 @@ def _end(source, one, core):
         left.insert(0, f"{of_rates} = rate_changes(({one['ends']}), side, signs, parameters, ({one['rates']}))")
     bends = [f"factor_{j} * {_at_end(source, j)}[2]" for j in events]
     choices = [CHOICE.format(j=j, own=source.own(j), bend=bends[j]) for j in events[1:]]
+    power = f"natural_power(end, {source.order} - 1)"
+    cut_off = [
+        f"change_{j} = further(change_{j}, magnitude(factor_{j}) * last_term(end, event_{j}) * {power})"
+        for j in events
+        if not source.seen[j]
+    ]
     doubtful = ["doubtful"]
     doubtful += [f"(beside_{j} & not_({source.own(j)}))" for j in events] if len(events) > 1 else []
     return filled(
-        END, **one, at_end="\n".join(at_end), weight=f"where({core}, end, 0.0)" if core else "end",
+        END, **one, cut_off="\n".join(cut_off), at_end="\n".join(at_end),
+        weight=f"where({core}, end, 0.0)" if core else "end",
         left="\n".join(left), per_time=listed(f"slope_{j}" for j in events), bend_0=bends[0],
         made=listed(f"noise_{j}" for j in events), choices="\n".join(choices), doubtful=" | ".join(doubtful),
         moved="\n".join(MOVED.format(s=s, off="off", late="late") for s in states),

@@ -10,6 +10,7 @@ over the box. So what is small enough may stay hidden, and what is large is come
 
 from kernels.source_text.expression import INPUT
 from kernels.source_text.series import Lines
+from kernels.source_text.tangent import Tangents, along
 from kernels.source_text.template import filled, listed
 
 HIDDEN = '''
@@ -79,10 +80,13 @@ class Enclosures:
 
     _interval_of_power_of_side = _interval_of_power
 
-    def _interval_of_wave(self, x):
-        return f"of_wave({self.lines.value(x)}, {self.interval(x.args[0])})"
+    def _interval_of_sin(self, x):
+        return f"of_{x.kind}({self.interval(x.args[0])})"
 
-    _interval_of_sin = _interval_of_cos = _interval_of_wave
+    _interval_of_cos = _interval_of_sin
+
+    def _interval_of_power_over_base(self, x):
+        return "(-math.inf, math.inf)"
 
     def _interval_of_sqrt(self, x):
         return f"of_sqrt({self.interval(x.args[0])})"
@@ -94,7 +98,8 @@ class Enclosures:
         return f"of_log({self.interval(x.args[0])})"
 
     def _excess(self, x):
-        if not x.varies or x.kind in (INPUT, "power_of_side"):  # the latter is for `power_core`, from kink to kink
+        # powers are for `power_core`, from kink to kink
+        if not x.varies or x.kind in (INPUT, "power_of_side", "power_over_base"):
             return None
         return " + ".join(filter(None, getattr(self, f"_excess_of_{x.kind}")(x))) or None
 
@@ -159,6 +164,35 @@ class Enclosures:
         return [self.excess(x.args[0])]
 
     _excess_of_sin = _excess_of_cos = _excess_of_wave
+
+
+BOUNDS = '''
+@jit_call
+def bounds(state, boxes, side, signs, parameters):
+    """The least value of each event over the box, and the least and the largest rate of each."""
+    {unpack}
+    {boxes} = boxes
+    {lines}
+    return ({least}), ({slowest}), ({fastest})
+'''
+
+
+def bounds(writer):
+    """The text of `bounds`."""
+    recorded, enclosures = writer.recorded, Enclosures(writer.names)
+    graph, states = recorded.graph, writer.scene.states
+    values = [graph.add(offset, graph.multiply(factor, u)) for offset, factor, u in recorded.events]
+    gradients = [[Tangents.along(graph, s).of(value) for s in states] for value in values]
+    rates = [along(graph, gradient, recorded.rates) for gradient in gradients]
+    found = {"least": (values, 0), "slowest": (rates, 0), "fastest": (rates, 1)}
+    texts = {
+        name: listed(f"{enclosures.interval(x)}[{end}] + 0.0 * side" for x in part)
+        for name, (part, end) in found.items()
+    }
+    return filled(
+        BOUNDS, unpack=writer.all_unpacked, boxes=listed(f"box_{s}" for s in writer.states),
+        lines="\n".join(enclosures.lines.text), **texts,
+    )  # fmt: skip
 
 
 def hidden(writer):

@@ -52,6 +52,7 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
     stuck, lost, broken, grazing = nothing, nothing, nothing, nothing
     power_h, allowed = natural_power(h, {order} - 1), SLACK * tolerance
     {longest}
+    {reach}
     {off_before}
     for step in range(STEP_LIMIT):
         {cores}
@@ -83,7 +84,8 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
             trial, unsure, {no_falls} = doubted_{order}(
                 trial, unsure, ({facts_of_all}), ({series_of_all})
             )
-        grazing = grazing | unsure
+        broken = broken | (unsure & not_(power_h < FAR))  # it goes off to where no event is
+        grazing = grazing | (unsure & not_(broken))
         moving = moving & not_(unsure)
         steps = moving & fine{and_seen}
         {ends}
@@ -93,6 +95,7 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
         steps = steps & not_(meets)
         {off_step}
         {advance}
+        {reach_on}
         t = where(steps, t + trial, t)
         {off}
         moving = moving & not_(meets)
@@ -108,7 +111,8 @@ def to_event_{order}(state, side, signs, parameters, unit, h, on, tolerance, act
     t = where(met, t + end, t)
     h = where(met & (t > 0.0) & (h > LONGEST * t), LONGEST * t, h)
     {off_end}
-    return Leg(({final}), t, h, ({fired}), stuck, lost, broken, grazing, hangs, tried){off_out}
+    {reach_end}
+    return Leg(({final}), t, h, ({fired}), stuck, lost, broken, grazing, hangs, tried, ({reaches})){off_out}
 '''
 
 
@@ -264,12 +268,14 @@ class LegSource:
     def _facts(self):
         """Series of the states and of the events, and the first coefficients of these."""
         series = [f"s_{s}" for s in self.states] + self._each("(offset_{j}, factor_{j}, event_{j})")
-        left_out = [f"(last_term(h, s_{s}), size(h, s_{s}))" for s in self.states]
+        told_of = [f"s_{s}" for s in self.states]
+        told_of += [f"event_{j}" for j in range(self.events) if not self.seen[j]]
+        left_out = [f"(last_term(h, {u}), size(h, {u}))" for u in told_of]
         return {
             "series_and_events": ", ".join(series),
             "facts": self._lines(FACTS),
             "left_out": folded("worse({}, {})", left_out),
-            "keeps": " & ".join(f"keeps(h, power_h, s_{s}, allowed)" for s in self.states),
+            "keeps": " & ".join(f"keeps(h, power_h, {u}, allowed)" for u in told_of),
         }
 
     def _start(self):
@@ -354,6 +360,15 @@ class LegSource:
             "passed": self._lines("passed_{j} = passed_{j} | (steps & falls_{j} & (end_{j} <= 0.0))"),
             "any_passed": " | ".join(self._each("passed_{j}")),
             "advance": "\n".join(f"{s} = where(steps, end_{s}, {s})" for s in self.states),
+            "reach": "\n".join(f"reach_{s} = magnitude({s})" for s in self.states),
+            "reach_on": "\n".join(
+                f"reach_{s} = where(magnitude({s}) > reach_{s}, magnitude({s}), reach_{s})" for s in self.states
+            ),
+            "reach_end": "\n".join(
+                f"reach_{s} = where(met & (magnitude(end_{s}) > reach_{s}), magnitude(end_{s}), reach_{s})"
+                for s in self.states
+            ),
+            "reaches": listed(f"reach_{s}" for s in self.states),
             "off": self._lines("now_{j} = now_{j} & meets"),
         }
 

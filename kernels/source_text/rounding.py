@@ -5,8 +5,9 @@ rounding loses nothing, and a start on the surface lies there for sure. Of a fun
 losses go on as errors do. Along a motion it is enough to know them roughly, an ulp of the terms of every sum.
 """
 
-from kernels.source_text.expression import ADD, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED
+from kernels.source_text.expression import ADD, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, needed
 from kernels.source_text.series import Lines
+from kernels.source_text.tangent import Tangents, along
 from kernels.source_text.template import filled, listed
 
 ULP = 2.0**-52
@@ -23,6 +24,22 @@ def lost_by_surface(state, side, signs, parameters):
     {lines}
     return {lost}
 '''
+
+BLURRED = '''
+@jit_call
+def blurred(state, side, signs, on, parameters):
+    """For how long, in seconds, rounding may keep the events open that fire."""
+    {unpack}
+    {ons} = on
+    {lines}
+    place = 0.0 * side
+    {places}
+    return place
+'''
+
+PLACE = """\
+open_{j} = where(on_{j} > 0.5, {ulp} * ({size}) / magnitude({rate}), 0.0)
+place = where(open_{j} > place, open_{j}, place)"""
 
 SIZES = '''
 @jit
@@ -127,9 +144,26 @@ class Sizes:
         return f"fma({slope}, {parts[0]}, magnitude({value}))"
 
 
+def blurred(writer):
+    """The text of `blurred`: an ulp of what each event's value is made of, over its rate."""
+    recorded, made, places = writer.recorded, Sizes(writer.names), []
+    graph, states = recorded.graph, writer.scene.states
+    for j, (offset, factor, u) in enumerate(recorded.events):
+        value = graph.multiply(factor, u)
+        rate = along(graph, [Tangents.along(graph, s).of(value) for s in states], recorded.rates)
+        size = f"{made.of(value)} + magnitude({made.lines.value(offset)})"
+        places.append(PLACE.format(j=j, ulp=repr(ULP), size=size, rate=made.lines.value(rate)))
+    return filled(
+        BLURRED, unpack=writer.all_unpacked, ons=listed(f"on_{j}" for j in range(len(places))),
+        lines="\n".join(made.lines.text), places="\n".join(places),
+    )  # fmt: skip
+
+
 def _whole(x):
-    """Whether an expression has no sum and no function in it: then it is right to some ulps of itself."""
+    """Whether an expression has no sum and no function in it, but of signs: then it is right to some ulps of itself."""
     if x.kind in (NUMBER, INPUT, "abs", "sign", "power_of_side"):
+        return True
+    if not x.varies and all(str(n.args[0]).startswith(".sign_") for n in needed(x) if n.kind == INPUT):
         return True
     return x.kind in (MUL, SCALED, HALF_SQUARE, DIV, "sqrt") and all(_whole(u) for u in x.args)
 

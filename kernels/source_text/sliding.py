@@ -43,7 +43,7 @@ on_{k} = where(held, 1.0, on_{k})
 sign_{j} = where(moving & (on_{k} > 0.5), -sign_{j}, sign_{j})"""
 
 PRESS = """\
-found, unsure = pressed(({states}), side, ({signs}), ({ons}), ({lefts}), parameters, BLUR * tolerance)
+found, unsure = pressed(({states}), side, ({signs} way), ({ons}), ({lefts}), parameters, BLUR * tolerance)
 {take}
 verdict = where({lanes} & unsure & (verdict < GRAZING), GRAZING, verdict)"""
 
@@ -81,6 +81,6 @@ def press(lanes, states, signs, ons, left):
     take = chosen(lanes, signs, "found")
     take += [f"{on} = where({lanes} & (magnitude({s}) < 0.5), 0.0, {on})" for s, on in zip(signs, ons[1:], strict=True)]
     return filled(
-        PRESS, states=listed(states), signs=listed(signs), ons=listed(ons[1:]), lanes=lanes, take="\n".join(take),
-        lefts=listed(left),
+        PRESS, states=listed(states), signs=", ".join([*signs, ""]), ons=listed(ons[1:]), lanes=lanes,
+        take="\n".join(take), lefts=listed(left),
     )  # fmt: skip

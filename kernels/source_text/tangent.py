@@ -113,6 +113,12 @@ class Tangents:
         return self._by(n * self._graph.over_base(x), base.args[1])
 
 
+def along(graph, gradient, rates):
+    """The rate of what has that gradient, a list whose entries may be None."""
+    products = [slope * rate for slope, rate in zip(gradient, rates, strict=True) if slope is not None]
+    return sum(products, graph.of(0.0))
+
+
 def tangent(writer, lines, order, powers, name, length):
     """The text of a tangent of the order `length`, and what it takes of `lines`, which are the series', as text."""
     changes = lines.branch()

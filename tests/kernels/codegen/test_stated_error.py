@@ -44,8 +44,8 @@ def test_where_states_feed_back_what_is_ok_is_right(rtol):
     finer, sure = solve(PENDULUM, "taylor", *columns, flips=4.0, rtol=1e-3 * rtol)
     right = (status == Status.OK) & (sure == Status.OK)
     assert right.mean() > 0.5
-    for name in ("time", "interval", "v"):
-        np.testing.assert_allclose(found[name][right], finer[name][right], rtol=1.01 * rtol)
+    for name, size in (("time", 0.0), ("interval", 0.0), ("v", 1.0)):  # a speed relative to the largest on the way
+        np.testing.assert_allclose(found[name][right], finer[name][right], rtol=1.01 * rtol, atol=size * rtol)
 
 
 @many

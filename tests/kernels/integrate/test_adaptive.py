@@ -70,7 +70,7 @@ def test_a_turning_point_on_the_switch_is_no_quiet_number(method, excess):
     [
         ({"R": 1.5}, Status.STICKS),
         ({"mu": 0.0}, Status.STICKS),
-        ({"angle0": 2.0}, Status.BAD_INPUT),
+        ({"angle0": 2.0}, Status.OUT_OF_RANGE),
         ({"mu": 1e140, "phi0": 1e140, "a": 1e-3}, Status.OK),
         ({"mu": 1e-300, "phi0": 1e-300, "a": 0.5}, Status.OUT_OF_RANGE),
         ({"mu": 1e300, "phi0": 1e300, "a": 1e-3}, Status.OUT_OF_RANGE),

@@ -63,7 +63,8 @@ def test_followed_once_it_is_right_to_some_tolerances_and_follows_the_tolerance(
         ({"mu": 1.0, "phi0": 1.0, "e": 0.0, "angle0": 0.5}, Status.OK),
         ({"mu": 0.0, "phi0": 1.0}, Status.STICKS),
         ({"mu": 1.0, "phi0": 1.0, "k": 4.0, "a": 0.1, "c": 0.1}, Status.STEP_LIMIT),  # swings below the switch for good
-        ({"mu": 1.0, "phi0": 1.0, "angle0": 2.0}, Status.BAD_INPUT),  # behind the switch
+        ({"mu": 1.0, "phi0": 1.0, "angle0": 2.0}, Status.OUT_OF_RANGE),  # behind the switch, and goes away from it
+        ({"mu": 1.0, "phi0": 1.0, "angle0": 2.0, "k": 4.0}, Status.OK),  # comes up first
         ({"mu": 1e140, "phi0": 1e140, "a": 1e-3}, Status.OK),
         ({"mu": 1e-140, "phi0": 1e-140, "a": 0.5}, Status.OK),
         ({"mu": 1.0, "phi0": 1e-80}, Status.OK),

@@ -1,0 +1,599 @@
+"""Is a scene of one's own that says OK right, over fifteen families of scenes that mislead integrators?
+
+Prints, by family and method, how many cells were OK, remarked and refused, and the largest error of an OK cell over its
+rtol; exit status 1 where one is off by more than its rtol, or where too few of those that can be solved are OK:
+
+nice python benchmarks/honesty/families.py [FAMILY ...] [--cells 200] [--seed 1] [--methods taylor dop853]
+
+A time is off relative to itself, a state relative to the largest size that it had on the way. `auto` takes, as a study
+does, the first method that does not give the cell up. Truth is a formula in 80-bit numbers, or where there is none a
+Taylor series of order 24 in such numbers (`integrated`), the errors of which the families' conditions keep below 1e-9
+of the least rtol. Each family also gives the condition of each cell: by how much a relative change of 1 of its
+parameters changes its results, roughly. A cell can be solved where 1e-15 times that is below a tenth of its rtol.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from kernels.interface import FIRST_REFUSAL, Status
+from kernels.scene import Field, cos, exp, scene_kernel, sign, sin, sqrt, where
+
+sys.path.append(str(Path(__file__).parents[2] / "tests" / "helpers"))
+from columns import solve
+
+REAL = np.longdouble
+PI = REAL("3.14159265358979323846264338327950288")
+SHARE = 0.9
+"""Of the cells that can be solved, to be OK by `auto`."""
+GIVEN_UP = (Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.NO_METHOD, Status.INACCURATE)
+"""After which `auto` goes on, as in `sweep.cells.solve`."""
+
+
+class Truth(NamedTuple):
+    """Of cells: time and states at the end, the states' largest sizes, and the condition; the motion's own status."""
+
+    time: np.ndarray
+    states: list
+    sizes: list
+    condition: np.ndarray
+    ends: Status = Status.OK
+
+
+class Family(NamedTuple):
+    """A scene, random cells {parameter: column} of it, and their truth."""
+
+    kernel: object
+    cells: object
+    truth: object
+
+
+FAMILIES = {}
+
+
+def family(kernel, truth):
+    """Enters a function of random cells by its name."""
+
+    def enter(cells):
+        FAMILIES[cells.__name__] = Family(kernel, cells, truth)
+        return cells
+
+    return enter
+
+
+def scene(name, states, parameters, rates, surface, start, switch=None):
+    fields = tuple(Field(s, "1", s) for s in states.split())
+    return scene_kernel(
+        name=f"family_{name}", doc=name, states=fields, parameters=tuple(Field(p, "1", p) for p in parameters.split()),
+        rates=rates, surface=surface, start=start, switch=switch,
+    )  # fmt: skip
+
+
+def integrated(coefficients, state, span, step):
+    """States after `span` and their largest sizes, by Taylor series: coefficients(state) -> [of each state, order 24].
+
+    Two runs whose steps differ by 4 % and agree to 1e-3 of what is asked are believed.
+    """
+    state, reach = [np.asarray(s, REAL) for s in state], [abs(np.asarray(s, REAL)) for s in state]
+    count = int(np.ceil(float(np.max(span)) / step))
+    h = np.asarray(span, REAL) / count
+    for _ in range(count):
+        series = coefficients(state)
+        state = [np.sum([c * h**k for k, c in enumerate(one)], axis=0) for one in series]
+        reach = [np.maximum(r, abs(s)) for r, s in zip(reach, state, strict=True)]
+    return state, reach
+
+
+def product(u, w, k):
+    return sum(u[j] * w[k - j] for j in range(k + 1))
+
+
+# ---- families whose truth is a formula ---------------------------------------------------------------------------
+
+
+def _blow_up_truth(x0, T):
+    x0, T = REAL(1) * x0, REAL(1) * T
+    rest = 1 - x0 * T
+    x = np.where(rest > 0, x0 / np.where(rest > 0, rest, 1), np.nan)
+    return Truth(np.where(rest > 0, T, np.nan), [x, T], [abs(x), T], 1 / np.maximum(rest, 1e-30))
+
+
+@family(
+    scene("blow_up", "x t", "x0 T", lambda x: (x * x, 1.0), lambda t, T: T - t, lambda x0: (x0, 0.0)), _blow_up_truth
+)
+def blow_up(random, n):
+    """x' = x^2, up to next to its pole and beyond."""
+    rest = 10.0 ** random.uniform(-17, 0, n) * random.choice([1.0, 1.0, 1.0, -1.0, 0.0], n)
+    T = random.choice([2.0, 1.0, 3.7], n)
+    return {"x0": (1.0 - rest) / T, "T": T}
+
+
+def _pole_truth(p, T):
+    p, T = REAL(1) * p, REAL(1) * T
+    inside = p > T
+    y = np.where(inside, np.log(np.where(inside, (p - T) / p, 1)), np.nan)
+    condition = p / np.where(inside, p - T, 1) / np.maximum(abs(y), 1e-9)
+    return Truth(np.where(inside, T, np.nan), [T, y], [T, abs(y)], condition)
+
+
+@family(
+    scene("pole", "t y", "p T", lambda t, p: (1.0, 1.0 / (t - p)), lambda t, T: T - t, lambda: (0.0, 0.0)), _pole_truth
+)
+def pole(random, n):
+    """y' = 1/(t - p), up to next to the pole, and over it."""
+    p = random.uniform(0.5, 30.0, n)
+    return {"p": p, "T": p * (1.0 - 10.0 ** random.uniform(-16, 0, n) * random.choice([1.0, 1.0, 1.0, -1.0], n))}
+
+
+def _windows_truth(w, T):
+    """y' = window - y with the windows 2 pi k +- a, a = arccos(1 - w)."""
+    w, T = REAL(1) * w, REAL(1) * T
+    a = 2 * np.arcsin(np.sqrt(w / 2))
+    y, top = 0 * T, 0 * T
+    for k in range(8):
+        start, end = np.maximum(2 * PI * k - a, 0), 2 * PI * k + a
+        start, end = np.minimum(start, T), np.minimum(end, T)
+        y = y + np.exp(end - T) - np.exp(start - T)
+        top = np.maximum(top, -np.expm1(-2 * a) if k else -np.expm1(-a))
+    return Truth(T, [T, y], [T, np.maximum(top, abs(y))], 1 / a**2 + T / a)
+
+
+@family(
+    scene(
+        "windows", "t y", "w T", lambda t, y, w: (1.0, where(cos(t) > 1.0 - w, 1.0, 0.0) - y),
+        lambda t, T: T - t, lambda: (0.0, 0.0),
+    ), _windows_truth,
+)  # fmt: skip
+def windows(random, n):
+    """A force that is on while cos(t) is above 1 - w."""
+    return {"w": 10.0 ** random.uniform(-7, -0.2, n), "T": random.uniform(7.0, 40.0, n)}
+
+
+def _stiff_windows_truth(w, T):
+    """The lag of 1e-9 takes that much from y at most, which is below the rtol of these cells."""
+    found = _windows_truth(w, T)
+    x = np.zeros(len(T))
+    return Truth(T, [T, np.nan * x, found.states[1]], [T, 1 + x, found.sizes[1]], found.condition * 1e4)
+
+
+@family(
+    scene(
+        "stiff_windows", "t x y", "w T",
+        lambda t, x, y, w: (1.0, (where(cos(t) > 1.0 - w, 1.0, 0.0) - x) / 1e-9, x - y),
+        lambda t, T: T - t, lambda: (0.0, 0.0, 0.0),
+    ), _stiff_windows_truth,
+)  # fmt: skip
+def stiff_windows(random, n):
+    """The same through a lag of 1e-9."""
+    rtol = 10.0 ** random.uniform(-5, -3, n)
+    return {"w": 10.0 ** random.uniform(-3, -0.2, n), "T": random.uniform(7.0, 13.0, n), "rtol": rtol}
+
+
+def _pulses_truth(p, w, T):
+    p, w, T = (REAL(1) * c for c in (p, w, T))
+    inside = np.clip(T - (p - w), 0, 2 * w)
+    return Truth(T, [T, inside], [T, inside], p / w)
+
+
+@family(
+    scene(
+        "pulses", "t y", "p w T", lambda t, p, w: (1.0, where(abs(t - p) < w, 1.0, 0.0)),
+        lambda t, T: T - t, lambda: (0.0, 0.0),
+    ), _pulses_truth,
+)  # fmt: skip
+def pulses(random, n):
+    """A pulse of width 2 w at t = p."""
+    p = random.uniform(5.0, 100.0, n)
+    return {"p": p, "w": 10.0 ** random.uniform(-13, 0, n), "T": p * random.uniform(1.3, 2.0, n)}
+
+
+def _two_sided_truth(p, w, T):
+    p, w, T = (REAL(1) * c for c in (p, w, T))
+    y = w / 2 * (2 - np.exp(-2 * p / w) - np.exp(-2 * (T - p) / w))
+    return Truth(T, [T, y], [T, y], p / w)
+
+
+@family(
+    scene(
+        "two_sided", "t y", "p w T", lambda t, p, w: (1.0, exp(-2.0 * abs(t - p) / w)),
+        lambda t, T: T - t, lambda: (0.0, 0.0),
+    ), _two_sided_truth,
+)  # fmt: skip
+def two_sided(random, n):
+    """A pulse that rises and falls by an exponential."""
+    p = random.uniform(1.0, 30.0, n)
+    return {"p": p, "w": 10.0 ** random.uniform(-4, 1, n), "T": p * random.uniform(1.3, 2.0, n)}
+
+
+def _behind_truth(a, v, flips):
+    """From x = 1 at rest to 0, then from -a with the speed v up and down again."""
+    a, v = REAL(1) * a, REAL(1) * v
+    first = np.sqrt(REAL(2))
+    rest = np.sqrt(v * v - 2 * a)
+    each = v + rest
+    time = first + (flips - 1) * each
+    speed = np.where(flips > 1, -rest, -first)
+    reach = np.maximum(1, np.where(flips > 1, v * v / 2 - a, 1))
+    return Truth(time, [0 * a, speed], [reach, np.maximum(v, first)], v * v / rest**2)
+
+
+@family(
+    scene(
+        "behind", "x v", "a v0", lambda v: (v, -1.0), lambda x: x, lambda: (1.0, 0.0), lambda a, v0: (-a, v0)
+    ), lambda a, v0, flips: _behind_truth(a, v0, flips),
+)  # fmt: skip
+def behind(random, n):
+    """A jump that lands behind the surface, where nothing fires before the motion has come up."""
+    a = random.uniform(0.1, 3.0, n)
+    flips = random.integers(1, 9, n).astype(float)
+    return {"a": a, "v0": np.sqrt(2 * a) * random.uniform(1.01, 3.0, n), "flips": flips}
+
+
+def _zeno_truth(h, e, flips):
+    """A ball from the height h under gravity 1."""
+    h, e = REAL(1) * h, REAL(1) * e
+    fall = np.sqrt(2 * h)
+    time = fall * (1 + 2 * np.where(e == 1, flips - 1, e * (1 - e ** (flips - 1)) / np.where(e == 1, 1, 1 - e)))
+    rests = e ** (flips - 1) < 1e-15
+    rest_time = fall * (1 + 2 * e / np.where(e == 1, 1, 1 - e))
+    speed = np.where(rests, 0, -fall * e ** (flips - 1))
+    return Truth(np.where(rests, rest_time, time), [0 * h, speed], [h, fall], 1 / np.where(e == 1, 1, 1 - e))
+
+
+@family(
+    scene("zeno", "x v", "h e", lambda v: (v, -1.0), lambda x: x, lambda h: (h, 0.0), lambda x, v, e: (x, -e * v)),
+    _zeno_truth,
+)
+def zeno(random, n):
+    """A ball that bounces on, or comes to rest."""
+    e = random.choice([0.3, 0.8, 0.9, 0.95, 0.99], n) * random.uniform(0.98, 1.0, n)
+    return {"h": random.uniform(0.5, 4.0, n), "e": e, "flips": np.floor(10.0 ** random.uniform(0, 3.5, n))}
+
+
+def _torricelli_truth(h, c, share):
+    h, c, share = (REAL(1) * v for v in (h, c, share))
+    return Truth(2 / c * (np.sqrt(h) - np.sqrt(share * h)), [share * h], [h], 1 / (1 - share) + 0 * h)
+
+
+@family(
+    scene(
+        "torricelli", "x", "h c share", lambda x, c: -c * sqrt(x), lambda x, h, share: x - share * h, lambda h: h
+    ), _torricelli_truth,
+)  # fmt: skip
+def torricelli(random, n):
+    """x' = -c sqrt(x), to next to empty."""
+    return {
+        "h": random.uniform(0.5, 4.0, n), "c": random.uniform(0.3, 2.0, n),
+        "share": 10.0 ** random.uniform(-16, -0.1, n),
+    }  # fmt: skip
+
+
+def _even_truth(p, d, T):
+    """z' = 1 and the surface (t - p)^2 + d as a kink: |.| is never met for d > 0, twice for d < 0."""
+    p, d, T = (REAL(1) * c for c in (p, d, T))
+    half = np.sqrt(np.maximum(-d, 0))
+    y = T - 4 * half
+    return Truth(T, [T, y], [T, T], 1 + np.where(d < 0, p / np.maximum(half, 1e-12), p / np.sqrt(abs(d)) * 1e-12))
+
+
+@family(
+    scene(
+        "even_roots", "t y", "p d T", lambda t, p, d: (1.0, sign((t - p) ** 2 + d)), lambda t, T: T - t,
+        lambda: (0.0, 0.0),
+    ), _even_truth,
+)  # fmt: skip
+def even_roots(random, n):
+    """A kink that is met twice close together, or nearly met."""
+    p = random.uniform(1.0, 5.0, n)
+    d = 10.0 ** random.uniform(-12, -1, n) * random.choice([-1.0, 1.0], n)
+    return {"p": p, "d": d, "T": p * random.uniform(1.5, 2.0, n)}
+
+
+def _long_truth(w, x0, T):
+    w, x0, T = (REAL(1) * c for c in (w, x0, T))
+    x, v = x0 * np.cos(w * T), -x0 * w * np.sin(w * T)
+    return Truth(T, [T, x, v], [T, abs(x0), abs(x0 * w)], w * T)
+
+
+@family(
+    scene(
+        "long", "t x v", "w x0 T", lambda v, x, w: (1.0, v, -w * w * x), lambda t, T: T - t, lambda x0: (0.0, x0, 0.0)
+    ), _long_truth,
+)  # fmt: skip
+def long_oscillation(random, n):
+    """An oscillator over up to 1,600 periods."""
+    return {"w": random.uniform(1.0, 10.0, n), "x0": random.uniform(0.5, 2.0, n), "T": 10.0 ** random.uniform(0, 3, n)}
+
+
+def _relay_truth(M, T, y0, a):
+    """Slides along y = x from the start: x' = -x + y, y' pressed; on y = s(t): see the scene. Formula below."""
+    M, T, y0, a = (REAL(1) * c for c in (M, T, y0, a))
+    # u = y - a t pressed to 0 by M: reaches it after y0/(M + a), then y = a t; z' = y
+    t0 = y0 / (M + a)
+    y = a * T
+    z = y0 * t0 - M * t0**2 / 2 + a * (T**2 - t0**2) / 2
+    return Truth(T, [T, y, z], [T, np.maximum(y, y0), abs(z)], 1 + 0 * T)
+
+
+@family(
+    scene(
+        "relay", "t y z", "M T y0 a", lambda t, y, M, a: (1.0, -M * sign(y - a * t), y), lambda t, T: T - t,
+        lambda y0: (0.0, y0, 0.0),
+    ), _relay_truth,
+)  # fmt: skip
+def sliding(random, n):
+    """A relay that follows a ramp."""
+    a = random.uniform(0.1, 0.9, n)
+    y0 = random.uniform(0.1, 1.0, n)
+    return {"M": 10.0 ** random.uniform(0, 6, n), "T": random.uniform(2.0, 9.0, n), "y0": y0, "a": a}
+
+
+# ---- families whose truth is integrated --------------------------------------------------------------------------
+
+
+def _den_hartog_one(w, f, x0, periods):
+    """x'' = -x - f sign(v) + cos(w t) from x0 at rest, stuck where |cos(w t) - x| <= f; exact between events."""
+    w, f, x, v, t = REAL(w), REAL(f), REAL(x0), REAL(0), REAL(0)
+    end, reach, reach_v, least = periods * 2 * PI / w, abs(REAL(x0)), REAL(0), REAL(1)
+
+    def place(t0, x, v, s):
+        """x and v of the free motion after t0."""
+        b = 1 / (1 - w * w)
+        c = x + s * f - b * np.cos(w * t0)
+        d = v + b * w * np.sin(w * t0)
+        return lambda t: (
+            c * np.cos(t - t0) + d * np.sin(t - t0) - s * f + b * np.cos(w * t),
+            -c * np.sin(t - t0) + d * np.cos(t - t0) - b * w * np.sin(w * t),
+        )
+
+    def first(g, t0):
+        """The first sign change of g behind t0, or the end."""
+        grid = t0 + (end - t0) * (np.arange(4001).astype(REAL) / 4000)
+        values = g(grid)
+        signs = np.flatnonzero((values[2:] > 0) != (values[1:-1] > 0))
+        if not len(signs):
+            return end
+        low, high = grid[signs[0] + 1], grid[signs[0] + 2]
+        sign_low = g(low) > 0
+        for _ in range(80):
+            middle = (low + high) / 2
+            low, high = (middle, high) if (g(middle) > 0) == sign_low else (low, middle)
+        return (low + high) / 2
+
+    for _ in range(200):
+        if t >= end:
+            break
+        force = np.cos(w * t) - x
+        if v == 0 and abs(force) < f * (1 + REAL(1e-17)) and not abs(abs(force) - f) < 1e-16:
+            t = first(lambda s, x=x: f - abs(np.cos(w * s) - x), t)
+            if t >= end:
+                break
+            force = np.cos(w * t) - x
+        s = np.sign(force)
+        motion = place(t, x, v, s)
+        stop = first(lambda u, motion=motion: motion(u)[1], t)
+        inside = motion(np.linspace(float(t), float(stop), 400).astype(REAL))
+        reach, reach_v = max(reach, abs(inside[0]).max()), max(reach_v, abs(inside[1]).max())
+        x, v = motion(stop)
+        t = stop
+        if stop < end:
+            v = REAL(0)
+            least = min(least, abs(abs(np.cos(w * t) - x) - f))
+    return end, x, v, reach, reach_v, least
+
+
+def _den_hartog_truth(w, f, x0, periods):
+    rows = [_den_hartog_one(*cell) for cell in zip(w, f, x0, periods, strict=True)]
+    end, x, v, reach, reach_v, least = (np.array(r, REAL) for r in zip(*rows, strict=True))
+    return Truth(end, [end, x, v], [end, reach, np.maximum(reach_v, 1e-300)], 100 / least)
+
+
+@family(
+    scene(
+        "den_hartog", "p x v", "w f x0 periods",
+        lambda p, x, v, w, f: (1.0, v, -x - f * sign(v) + cos(w * p)),
+        lambda p, w, periods: periods * float(2 * PI) / w - p,
+        lambda x0: (0.0, x0, 0.0),
+    ), _den_hartog_truth,
+)  # fmt: skip
+def stick_and_break_away(random, n):
+    """Den Hartog's mass, from rest within its friction."""
+    return {
+        "w": random.uniform(0.3, 0.9, n), "f": random.uniform(0.5, 0.98, n), "x0": random.uniform(0.05, 0.5, n),
+        "periods": random.integers(1, 4, n).astype(float),
+    }  # fmt: skip
+
+
+def _ball_one(h, G, W, e, flips):
+    """Ball from h on a floor G sin(W t): time, place and speed before the last bounce, sizes, condition."""
+    h, G, W, e = (REAL(v) for v in (h, G, W, e))
+    t, x, v = REAL(0), h, REAL(0)
+    reach, reach_v, growth, slow = h, REAL(0), REAL(1), REAL(1)
+    for k in range(int(flips)):
+
+        def gap(s, x=x, v=v, t=t):
+            return x + v * (s - t) - (s - t) ** 2 / 2 - G * np.sin(W * s)
+
+        step = REAL(0.02) / max(W, 1)
+        high = t + 1e-9 if k else t
+        while True:
+            grid = high + step * np.arange(400).astype(REAL)
+            below = np.flatnonzero(gap(grid)[1:] < 0)
+            if len(below):
+                break
+            high = grid[-1]
+        low, high = grid[below[0]], grid[below[0] + 1]
+        for _ in range(80):
+            middle = (low + high) / 2
+            low, high = (middle, high) if gap(middle) > 0 else (low, middle)
+        s = (low + high) / 2
+        reach = max(reach, abs(x + max(v, 0) ** 2 / 2))
+        x, v, t = x + v * (s - t) - (s - t) ** 2 / 2, v - (s - t), s
+        reach_v = max(reach_v, abs(v))
+        floor = G * W * np.cos(W * t)
+        before = (x, v, t)
+        slow = min(slow, abs(v - floor))
+        growth = growth * (1 + e + (1 + e) * abs(G * W * W * np.sin(W * t) + 1) / abs(v - floor))
+        v = floor - e * (v - floor)
+    x, v, t = before
+    return t, x, v, reach, reach_v, growth / slow**2
+
+
+def _ball_truth(h, G, W, e, flips):
+    rows = [_ball_one(*cell) for cell in zip(h, G, W, e, flips, strict=True)]
+    t, x, v, reach, reach_v, growth = (np.array(r, REAL) for r in zip(*rows, strict=True))
+    return Truth(t, [x, v, t], [reach, reach_v, t], growth)
+
+
+@family(
+    scene(
+        "ball", "x v t", "h G W e", lambda v: (v, -1.0, 1.0), lambda x, t, G, W: x - G * sin(W * t),
+        lambda h: (h, 0.0, 0.0),
+        lambda x, v, t, G, W, e: (x, G * W * cos(W * t) - e * (v - G * W * cos(W * t)), t),
+    ), _ball_truth,
+)  # fmt: skip
+def moving_surface(random, n):
+    """A ball on a table that swings."""
+    return {
+        "h": random.uniform(1.0, 3.0, n), "G": random.uniform(0.02, 0.3, n), "W": random.choice([1.0, 1.0, 10.0], n),
+        "e": random.uniform(0.5, 0.9, n), "flips": random.choice([1.0, 1.0, 2.0, 3.0, 6.0], n),
+    }  # fmt: skip
+
+
+def _grazing_truth(h, d, W):
+    """x = cos(t) + 1 + d over 0: met at arccos(-1 - d), only where d < 0."""
+    d = REAL(1) * d
+    meets = d <= 0
+    t = np.where(meets, PI - 2 * np.arcsin(np.sqrt(np.where(meets, -d, 0) / 2)), np.nan)
+    v = -np.sqrt(np.where(meets, -d * (2 + d), 0))
+    return Truth(t, [-1 - d, v], [1 + 0 * d, 1 + 0 * d], 1 / np.maximum(abs(d), 1e-30))
+
+
+@family(
+    scene(
+        "grazing", "x v", "h d W", lambda x, v: (v, -x), lambda x, d: x + 1.0 + d, lambda: (1.0, 0.0)
+    ), _grazing_truth,
+)  # fmt: skip
+def grazing(random, n):
+    """An oscillator that only just meets a level, or only just misses it for ever."""
+    d = -(10.0 ** random.uniform(-16, 0, n)) * random.choice([1.0, 1.0, 1.0, -1.0], n)
+    return {"h": np.ones(n), "d": d, "W": np.ones(n)}
+
+
+def _duffing_truth(g, T):
+    def coefficients(state):
+        t, x, v = ([s] for s in state)
+        c, s = [np.cos(t[0])], [np.sin(t[0])]
+        square = []
+        t.append(1 + 0 * t[0])
+        for k in range(24):
+            square.append(product(x, x, k))
+            cube = product(square, x, k)
+            x.append(v[k] / (k + 1))
+            v.append((x[k] - cube - REAL("0.25") * v[k] + g * c[k]) / (k + 1))
+            c.append(-s[k] / (k + 1))
+            s.append(c[k] / (k + 1))
+        return t, x, v
+
+    g, T = REAL(1) * g, REAL(1) * T
+    start = [0 * T, 1 + 0 * T, 0 * T]
+    state, reach = integrated(coefficients, start, T, 0.1)
+    other, _ = integrated(coefficients, start, T, 0.104)
+    off = np.max([abs(a - b) / r for a, b, r in zip(state, other, reach, strict=True)], axis=0)
+    return Truth(T, state, reach, np.maximum(off / 1e-19, 1))
+
+
+@family(
+    scene(
+        "duffing", "t x v", "g T", lambda t, x, v, g: (1.0, v, x - x**3 - 0.25 * v + g * cos(t)), lambda t, T: T - t,
+        lambda: (0.0, 1.0, 0.0),
+    ), _duffing_truth,
+)  # fmt: skip
+def chaos(random, n):
+    """Duffing's oscillator where errors grow by e^(0.15 t)."""
+    return {"g": random.uniform(0.3, 0.5, n), "T": random.uniform(5.0, 240.0, n)}
+
+
+# ------------------------------------------------------------------------------------------------------------------
+
+
+def judged(kernel, truth, outputs, status, rtol):
+    """The error of each cell that is OK over its rtol; inf where it should be none."""
+    with np.errstate(all="ignore"):
+        off = [abs(outputs["time"] - truth.time) / abs(truth.time)]
+        for field, value, size in zip(kernel.outputs[2:], truth.states, truth.sizes, strict=True):
+            part = abs(outputs[field.name] - value) / size
+            part = np.where((value == 0) & (size == 0), 0, part)
+            off.append(np.where(np.isnan(value) & ~np.isnan(truth.time), 0, part))
+        worst = np.max(np.nan_to_num(np.array(off, float), nan=np.inf), axis=0) / rtol
+    return np.where(np.isin(status, (Status.OK, Status.COMES_TO_REST)), worst, 0.0)
+
+
+def by_auto(found):
+    """The outputs and status of the first method that does not give a cell up; else the best that there is."""
+    names = [name for name in found if name != "taylor_once"]
+    outputs, status = ({k: v.copy() for k, v in found[names[0]][0].items()}, found[names[0]][1].copy())
+    for name in names[1:]:
+        takes = np.isin(status, GIVEN_UP)
+        better = takes & ((status != Status.INACCURATE) | (found[name][1] < Status.INACCURATE))
+        for key in outputs:
+            outputs[key][better] = found[name][0][key][better]
+        status[better] = found[name][1][better]
+    return outputs, status
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("families", nargs="*", metavar="FAMILY")
+    parser.add_argument("--cells", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--methods", nargs="*")
+    parser.add_argument("--worst", type=int, default=0, help="print so many of the worst cells")
+    options = parser.parse_args()
+    wrong = 0
+    words = "OK", "remark", "refused", "worst/rtol", "wrong", "of solvable"
+    print(f"{'family':22}{'method':10}" + "".join(f"{word:>12}" for word in words))
+    for name, (kernel, draw, truth_of) in FAMILIES.items():
+        if options.families and name not in options.families:
+            continue
+        random = np.random.default_rng([options.seed, len(name)])
+        cells = draw(random, options.cells)
+        rtol = cells.pop("rtol", 10.0 ** random.uniform(-12, -3, options.cells))
+        with np.errstate(all="ignore"):
+            truth = truth_of(**cells)
+        methods = options.methods or ["taylor", "rodas5p", "dop853", "dopri5"]
+        cells.setdefault("flips", np.ones(options.cells))
+        found, started = {}, time.process_time()
+        for method in methods:
+            found[method] = solve(kernel, method, rtol=rtol, **cells)
+        found["auto"] = by_auto(found)
+        solvable = np.asarray((truth.condition * 1e-15 < rtol / 10) & ~np.isnan(truth.time), bool)
+        for method, (outputs, status) in found.items():
+            off = judged(kernel, truth, outputs, status, rtol)
+            good = np.isin(status, (Status.OK, Status.COMES_TO_REST))
+            refused = status >= FIRST_REFUSAL
+            share = (good & solvable).sum() / max(solvable.sum(), 1)
+            wrong += int((off > 1).sum())
+            print(
+                f"{name:22}{method:10}{good.sum():12}{(~good & ~refused).sum():12}{refused.sum():12}{off.max():12.3g}"
+                f"{(off > 1).sum():12}{share:12.0%} of {solvable.sum()}", flush=True,
+            )  # fmt: skip
+            for i in np.argsort(-off)[: options.worst]:
+                if off[i] > 1:
+                    cell, given = ({k: float(v[i]) for k, v in columns.items()} for columns in (cells, outputs))
+                    true = [float(truth.time[i]), *(float(s[i]) for s in truth.states)]
+                    print(f"    {cell} rtol {rtol[i]:.3g}: off by {off[i]:.3g} rtol, {given} for {true}")
+        counts = zip(*np.unique(found["auto"][1], return_counts=True), strict=True)
+        words = ", ".join(f"{Status(status).name} {count}" for status, count in counts)
+        print(f"{'':22}{time.process_time() - started:.0f} s; auto: {words}", flush=True)
+    sys.exit(wrong > 0)
+
+
+if __name__ == "__main__":
+    main()

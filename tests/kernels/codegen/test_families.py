@@ -1,0 +1,30 @@
+"""Scenes that mislead integrators: what is OK is right, and what can be solved is OK; `benchmarks/honesty/families.py`."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+
+sys.path.append(str(Path(__file__).parents[3] / "benchmarks" / "honesty"))
+from columns import solve
+from families import FAMILIES, judged
+
+CELLS = 40 if COMPILED else 1
+
+
+@pytest.mark.parametrize("method", ["taylor", "dop853"])
+@pytest.mark.parametrize("name", ["blow_up", "windows", "behind", "stick_and_break_away", "moving_surface"])
+def test_what_is_ok_is_right_and_most_of_what_can_be_solved_is_ok(name, method):
+    kernel, draw, truth_of = FAMILIES[name]
+    random = np.random.default_rng(7)
+    cells, rtol = draw(random, CELLS), 10.0 ** random.uniform(-11, -3, CELLS)
+    with np.errstate(all="ignore"):
+        truth = truth_of(**cells)
+    outputs, status = solve(kernel, method, rtol=rtol, **{"flips": np.ones(CELLS)} | cells)
+    assert (judged(kernel, truth, outputs, status, rtol) <= 1.0).all()
+    solvable = (truth.condition * 1e-14 < rtol) & ~np.isnan(truth.time)
+    assert (status[solvable] == Status.OK).mean() > (0.6 if COMPILED else 0.0)
