@@ -63,7 +63,7 @@ class Scene:
     most_kinks : between two switches, after which a cell is given up; None: a thousand
     slides : whether motion goes on along a kink onto which both sides press it (`sliding`), or sticks there
 
-    At a switch `side` turns from 1 to -1 or back. Behind the surface no switch fires before the motion has come up. Where abs(u) or sign(u) occurs, u = 0 is a *kink*: the motion is
+    At a switch `side` turns from 1 to -1 or back. Where abs(u) or sign(u) occurs, u = 0 is a *kink*: the motion is
     followed up to it and begun anew behind it.
     """
 

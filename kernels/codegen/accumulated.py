@@ -59,7 +59,7 @@ def to_rest(how):
         those = np.flatnonzero(last >= LEAST)
         if len(those):
             early = [*(c[cells[those]] for c in columns[:-1]), np.full(len(those), 2.0)]
-            sizes = followed_twice.followed(module, early, np.full(len(those), ROUGHLY))[2 + len(module.STATES) : -2]
+            sizes = followed_twice.followed(module, early, np.full(len(those), ROUGHLY))[2 + len(module.STATES) : -1]
             rests, values, error = _limits(followed, those, last[those], sizes)
             good = cells[those[rests]]
             for column, row in zip(outputs, values, strict=True):

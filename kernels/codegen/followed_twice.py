@@ -38,12 +38,10 @@ APART = 4.0
 ROUNDED = 0.5
 """How many rtol two runs of the same tolerance may differ by, whose parameters are some roundings apart. What runs of
 two tolerances differ by may be rounding, which the finer one has as well."""
-BLURRED = 0.5
-"""How many rtol rounding may make of where events are: both runs round alike, so they do not differ by it."""
 
 
 def followed(module, columns, rtol, finer=1.0, together=False, shake=0.0):
-    """The results of a cell a column: time, interval, states, their sizes, what rounding of events does, the status.
+    """The results of a cell a column: time, interval, states, their sizes, and as the last row the status.
 
     Parameters
     ----------
@@ -65,7 +63,7 @@ def told(module, columns, rtol, of_a_step):
 def _followed(module, columns, rtol, of_a_step, together=False, tells=False, shake=0.0):
     """The results; if the error is to be told, as a last row."""
     inputs = [*columns, np.maximum(of_a_step, FINEST), np.full(len(rtol), shake)]
-    results = np.empty((4 + 2 * len(module.STATES) + tells, len(rtol)))
+    results = np.empty((3 + 2 * len(module.STATES) + tells, len(rtol)))
     high = rtol < HIGH_BELOW
     for run, of_order in ((module.run_12, ~high), (module.run_18, high)):
         cells = np.flatnonzero(of_order)
@@ -115,8 +113,8 @@ def twice(module, columns, rtol, outputs, status, finest=0.0):
     again = np.flatnonzero(np.isin(found, TRIED_AGAIN) & (tighter < rtol) & (rtol >= ROUNDING))
     if len(again):
         better, verdict = _compared(module, [c[again] for c in columns], tighter[again], rtol[again])
-        right = verdict == Status.OK
-        results[:, again[right]], found[again[right]] = better[:, right], Status.OK
+        right = verdict <= Status.INACCURATE
+        results[:, again[right]], found[again[right]] = better[:, right], verdict[right]
     write(results, found, outputs, status)
 
 
@@ -126,14 +124,13 @@ def _compared(module, columns, rtol, wanted):
     fine = followed(module, columns, rtol, ROUGH * FINER)
     states = len(module.STATES)
     status = status_of(fine, 2 + states)
-    scale = np.concatenate([abs(fine[:2]), fine[2 + states : -2]])
+    scale = np.concatenate([abs(fine[:2]), fine[2 + states : -1]])
     near = _near(fine, rough, APART * wanted * scale)
     doubtful = np.flatnonzero(near & ~_near(fine, rough, ROUNDED * wanted * scale))
     if len(doubtful):
         those = off_by_roundings([c[doubtful] for c in columns], MANY)
         again = followed(module, those, rtol[doubtful], ROUGH * FINER, shake=MANY)
         near[doubtful] = _near(fine[:, doubtful], again, ROUNDED * wanted[doubtful] * scale[:, doubtful])
-    near &= fine[-2] <= BLURRED * wanted
     status[((wanted < ROUNDING) | ~near) & (status == Status.OK)] = Status.INACCURATE
     worse = (rough[-1] > 0) & (status <= Status.INACCURATE)
     status[worse] = np.where(rough[-1][worse] < FIRST_REFUSAL, rough[-1][worse], Status.INACCURATE)

@@ -100,7 +100,7 @@ _TEXTS += (*_OF_LEG, *_OF_ERROR, *_OF_SLIDING)
 _TAKEN = set(re.findall(r"\w+", "".join(_TEXTS))) | {"n", "p", "s"}
 _PREFIXES = (
     "at|s|end|box|size|bare|full|kink|most|half|over|and_one|half_over|"
-    "off|due|reach|vague|delta|noise|rate|made|coarse|left|more|bent|spread|sway"
+    "off|due|reach|delta|noise|rate|made|coarse|left|more|bent|spread|sway"
 )
 _NUMBERED = re.compile(rf"\w*_\d+|n\d+|({_PREFIXES})_\w*")
 

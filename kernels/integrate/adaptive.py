@@ -152,7 +152,7 @@ def on_dense(m, pair, mode, step, terms, which, first, seeking):
         new = where((new >= low) & (new <= high), new, 0.5 * (low + high))
         change = magnitude(new - part)
         part = where(seeking, new, part)
-        seeking = seeking & (change > 4e-16)
+        seeking = seeking & (change > 4e-16 * part)
     return part, pair.dense(m, step.state, terms, mode, h, part), slope
 
 

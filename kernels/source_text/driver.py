@@ -92,7 +92,6 @@ def advance_{order}(memory, i):
                 faint = underflows(({states}), side, ({signs}), parameters, unit)
                 verdict = where(watched & faint, OUT_OF_RANGE, verdict)
                 {keep}
-                {blur}
                 {tell}
             since = where(switches, 0.0, since)
             left = surface(({states}), side, ({signs}), parameters)
@@ -109,8 +108,6 @@ def advance_{order}(memory, i):
             on_0 = where(switches, where(still, 1.0, 0.0), on_0)
             way = where(switches & (after < 0.0) & not_(still), -1.0, way)
         {press}
-        rate_behind = rates(({states}), side, ({signs}), parameters)
-        {vague}
         steps, before = where(active, leg.tried, steps), where(active, steps, before)
         verdict = where(moving & (kinks_met > {most_kinks}), STEP_LIMIT_MET, verdict)
         done = active & (leg.grazing | (verdict >= REFUSED) | (count >= flips))
@@ -150,15 +147,15 @@ _STARTS = (
 
 
 def results_of(states):
-    """Names of what a cell comes to; `blur` is what rounding of where its events are makes of them."""
-    return ["time", "interval", *(f"at_{s}" for s in states), *(f"size_{s}" for s in states), "blur", "verdict"]
+    """Names of what a cell comes to."""
+    return ["time", "interval", *(f"at_{s}" for s in states), *(f"size_{s}" for s in states), "verdict"]
 
 
 def _between_events(states, kinks):
     """Names of what a lane keeps of its cell between two events, beside results."""
     ons = [f"on_{j}" for j in range(1 + kinks)]
     own = [*states, "side", *signs_of(kinks), "unit", "h", *ons]
-    return [*own, *(f"vague_{s}" for s in states), "count", "since", "kinks_met", "steps", "before"]
+    return [*own, "count", "since", "kinks_met", "steps", "before"]
 
 
 def signs_of(kinks):
@@ -215,10 +212,10 @@ def advance(states, parameters, kinks, order, offset, most_kinks, tells=False, s
     errors = of_error(states, spreads) if tells else []
     rows = rows_of(states, parameters, kinks, errors)
     sizes = [f"size_{s}" for s in states]
-    changed = ["stage", "shake", "time", "blur", "verdict", *sizes, *_between_events(states, kinks), *errors[1:]]
+    changed = ["stage", "shake", "time", "verdict", *sizes, *_between_events(states, kinks), *errors[1:]]
     results = {name: f"memory[{rows.index(name)}][i]" for name in ["interval", *(f"at_{s}" for s in states)]}
     values = [*_STARTS, *((name, "0.0") for name in errors[1:])]
-    values += [(name, "0.0") for name in ["blur", *sizes, *(f"vague_{s}" for s in states)]]
+    values += [(size, "0.0") for size in sizes]
     values += [(f"off_{s}", f"ULP * magnitude({s})") for s in states] if tells else []  # a start is rounded
     begin = filled(BEGIN, begin=begun_rows(states, signs, ons, values), blur="BLUR * tolerance")
     return filled(
@@ -301,12 +298,6 @@ def _sliding(states, signs, ons, slides):
 
 def _switching(states, signs, ons, results):
     """Statements at a switch; `results` are the places in memory of what is put down there."""
-    vague = "vague_{s} = where(moving, fma(magnitude(rate_behind[{j}] - rate[{j}]), place, vague_{s}), vague_{s})"
-    blurs = ["place / time", "2.0 * place / since"]
-    blurs += [
-        f"fma(magnitude(rate[{j}]), place, vague_{s}) / where(size_{s} > 0.0, size_{s}, 1.0)"
-        for j, s in enumerate(states)
-    ]
     keep = {"interval": "since"} | {f"at_{s}": s for s in states}
     jump = chosen("switches", states, "jumped") + chosen("switches", signs, "signs")
     near = [
@@ -323,8 +314,6 @@ def _switching(states, signs, ons, results):
                 *(f"{s} = where(shaken, fma(shake * place, rate[{j}], {s}), {s})" for j, s in enumerate(states)),
             ]
         ),
-        "vague": "\n".join(vague.format(s=s, j=j) for j, s in enumerate(states)),
-        "blur": f"blur = where(watched, {folded('most({}, {})', blurs)}, blur)",
         "keep": "\n".join(f"{results[r]} = where(watched, {x}, {results[r]})" for r, x in keep.items()),
         "jump": "\n".join(jump + chosen("switches", ons[1:], "kinks_on")),
         "near": listed(near),
