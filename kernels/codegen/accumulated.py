@@ -20,7 +20,7 @@ SHORT = 0.01
 """The last interval over the mean one, below which switches may accumulate."""
 LEAST = 6
 """Switches of which the last five are looked at: the first interval is of another kind."""
-NEAR = 1e-3
+NEAR = 1e-2
 """Of the time of rest, what may be left to it: then the intervals are believed to go on as they do."""
 TINY = 1e-12
 """Of the time, an interval that is not worth to be followed: by less, rounding tells on what intervals shrink."""

@@ -3,9 +3,8 @@
 Each step is right to a tolerance; what many steps come to depends on the scene. So a cell is followed twice, the second
 time with a tolerance FINER times smaller: the first run's error is what they differ by, the second's is about FINER
 times less, and is what is given. The first run's parameters are some roundings off (`off_by_roundings`), and so are
-its start and the times of its events (`shake`): so what a scene makes of rounding, which both runs would share, is
-seen too. Where the runs differ by so much that the finer one is
-right only if that is not rounding, it is followed once more, at the finer tolerance with those parameters.
+its start and the times of its events (`shake`); a third run is like the first with the opposite roundings: so what a
+scene makes of rounding, which two runs may share, is seen too.
 """
 
 import math
@@ -35,9 +34,6 @@ TIGHTER, TIGHT = 1e-3, 1e-13
 TRIED_AGAIN = Status.INACCURATE, Status.GRAZING, Status.STEP_LIMIT, Status.OUT_OF_RANGE
 APART = 4.0
 """How many rtol the two runs may differ by: the finer one is then right to rtol/4, as far as steps go."""
-ROUNDED = 0.5
-"""How many rtol two runs of the same tolerance may differ by, whose parameters are some roundings apart. What runs of
-two tolerances differ by may be rounding, which the finer one has as well."""
 
 
 def followed(module, columns, rtol, finer=1.0, together=False, shake=0.0):
@@ -121,16 +117,12 @@ def twice(module, columns, rtol, outputs, status, finest=0.0):
 def _compared(module, columns, rtol, wanted):
     """The results of the finer of two runs to the tolerance `rtol`, and the status where `wanted` is to be met."""
     rough = followed(module, off_by_roundings(columns, MANY), rtol, ROUGH, shake=MANY)
+    other = followed(module, off_by_roundings(columns, -MANY), rtol, ROUGH, shake=-MANY)
     fine = followed(module, columns, rtol, ROUGH * FINER)
     states = len(module.STATES)
     status = status_of(fine, 2 + states)
     scale = np.concatenate([abs(fine[:2]), fine[2 + states : -1]])
-    near = _near(fine, rough, APART * wanted * scale)
-    doubtful = np.flatnonzero(near & ~_near(fine, rough, ROUNDED * wanted * scale))
-    if len(doubtful):
-        those = off_by_roundings([c[doubtful] for c in columns], MANY)
-        again = followed(module, those, rtol[doubtful], ROUGH * FINER, shake=MANY)
-        near[doubtful] = _near(fine[:, doubtful], again, ROUNDED * wanted[doubtful] * scale[:, doubtful])
+    near = _near(fine, rough, APART * wanted * scale) & _near(other, rough, wanted * scale)
     status[((wanted < ROUNDING) | ~near) & (status == Status.OK)] = Status.INACCURATE
     worse = (rough[-1] > 0) & (status <= Status.INACCURATE)
     status[worse] = np.where(rough[-1][worse] < FIRST_REFUSAL, rough[-1][worse], Status.INACCURATE)

@@ -36,8 +36,6 @@ STATED = 1.5
 """Stated error over the one carried along."""
 OF_A_STEP = 0.25
 """Tolerance of a step over the one of the whole motion: errors of some steps may add up."""
-SURE = 100.0
-"""How many rtol a stated error may be to be believed where two runs might agree: it knows of roundings they share."""
 SMALLER, SMALLEST = 4.0, 1e-5
 """By how much less than what would do a second tolerance is, and the least share of the first one that is tried."""
 
@@ -77,8 +75,7 @@ def solved(module, columns, rtol, outputs, status):
         results[:, again], error[again] = followed_twice.told(module, some, wanted, share * wanted)
         found[again] = judged(results[:, again], np.maximum(error[again], least), wanted, len(outputs))
     followed_twice.write(results, found, outputs, status)
-    sure = (results[-1] == Status.OK) & (STATED * error > rtol) & (error <= SURE * rtol)
-    left = np.flatnonzero((found != Status.OK) & ~sure)
+    left = np.flatnonzero(found != Status.OK)
     if len(left):
         _by_two(module, columns, rtol, outputs, status, left)
 

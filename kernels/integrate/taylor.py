@@ -30,7 +30,7 @@ from kernels.lanes.vectors import (
     where,
 )
 
-STEP_LIMIT = 20_000
+STEP_LIMIT = 2000
 """Steps between two events after which a cell is given up."""
 HALVINGS = 40
 ROOT_LIMIT = 60

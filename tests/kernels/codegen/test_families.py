@@ -1,4 +1,4 @@
-"""Scenes that mislead integrators: what is OK is right, and what can be solved is OK; `benchmarks/honesty/families.py`."""
+"""Scenes that mislead integrators: what is OK is right, and what can be solved is OK (benchmarks/honesty/families)."""
 
 import sys
 from pathlib import Path
