@@ -49,11 +49,10 @@ def test_a_lag_of_nine_decades_is_right_to_the_tolerance(rtol):
 
 
 @many
-def test_explicit_methods_give_up_where_stability_limits_their_steps_and_auto_goes_on():
+def test_the_series_gives_up_where_stability_limits_its_steps_and_auto_goes_on():
     eps = [1e-1, 1e-6, 1e-9]
-    for method in ("taylor", "dop853", "dopri5"):
-        _, status = solve(LAG, method, 1.0, 0.5, eps, flips=1.0)
-        assert status.tolist() == [Status.OK, Status.STEP_LIMIT, Status.STEP_LIMIT]
+    _, status = solve(LAG, "taylor", 1.0, 0.5, eps, flips=1.0)
+    assert status.tolist() == [Status.OK, Status.STEP_LIMIT, Status.STEP_LIMIT]
     study = sweep.study(
         kernel="stiff_scene:LAG", axes={"eps": eps}, fixed={"mu": 1.0, "a": 0.5, "flips": 1}, allow_import=True
     )
