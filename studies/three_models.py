@@ -214,7 +214,7 @@ def conclude(path: str, denny_path: str, viscous_path: str) -> tuple[Groups, lis
     )
     ds = together(impact, denny, viscous)
     followed = in_si(impact, denny)
-    target = sweep.export(ds, Path(path).with_name("three_models_all.nc"))
+    target = sweep.export(ds, Path(path).with_name("three_models_all.nc"), force=True)
     groups = {
         "Period against torque": laws(ds, followed),
         "Swing against torque": swings(ds, followed),

@@ -42,7 +42,7 @@ MEMORY_SHARE = 0.5
 """Share of the memory that all processes may have before they are replaced."""
 TRIALS, UNCERTAIN = 3, 0.25
 """Times that a cell is tried alone of which a process dies; and how much one counts that others may have killed."""
-STARTS, START_SECONDS = 5, 0.5
+STARTS, START_SECONDS = 10, 0.5
 """Times that a process is started anew which dies before it has loaded the kernel, and the pause before that."""
 LOOK_SECONDS, BURY_SECONDS = 0.2, 1.0
 """How often it is looked whether time goes by, or the machine slept; and what an exit status is waited for."""

@@ -291,7 +291,7 @@ def other(tmp_path_factory):
 def test_a_script_is_used_as_its_head_and_its_study_say(name, other, tmp_path, capsys):
     module = import_module(name)
     assert module.main([]) == 2
-    words = capsys.readouterr().err.removeprefix("use: python ").split()[1:]
+    words = capsys.readouterr().err.removeprefix("use: python ").removesuffix(" [--force]\n").split()[1:]
     for text in (module.__doc__, (STUDIES / f"{name}.toml").read_text(encoding="utf-8").replace("#", "")):
         used = re.search(rf"python studies/{name}\.py((?:\s+[\w./\\]+\.(?:h5|toml)|\s+\\\n)+)", text)
         assert [Path(word).name for word in used[1].replace("\\", "").split()] == words
