@@ -13,9 +13,10 @@ sys.path.append(str(Path(__file__).parents[3] / "benchmarks" / "honesty"))
 from columns import solve
 from families import FAMILIES, judged
 
-CELLS = 40 if COMPILED else 1
+CELLS = 40
 
 
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
 @pytest.mark.parametrize("method", ["taylor", "dop853"])
 @pytest.mark.parametrize("name", ["blow_up", "windows", "behind", "stick_and_break_away", "moving_surface"])
 def test_what_is_ok_is_right_and_most_of_what_can_be_solved_is_ok(name, method):
@@ -27,4 +28,4 @@ def test_what_is_ok_is_right_and_most_of_what_can_be_solved_is_ok(name, method):
     outputs, status = solve(kernel, method, rtol=rtol, **{"flips": np.ones(CELLS)} | cells)
     assert (judged(kernel, truth, outputs, status, rtol) <= 1.0).all()
     solvable = (truth.condition * 1e-14 < rtol) & ~np.isnan(truth.time)
-    assert (status[solvable] == Status.OK).mean() > (0.6 if COMPILED else 0.0)
+    assert (status[solvable] == Status.OK).mean() > 0.6

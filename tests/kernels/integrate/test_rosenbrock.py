@@ -92,7 +92,7 @@ PENDULUM = Scene(
 
 
 def one_step(scene, state, h, *parameters):
-    m, mode = adaptive(scene).M_STIFF, Mode(1.0, (), parameters, False)
+    m, mode = adaptive(scene).M_STIFF, Mode(1.0, (1.0,), parameters, False)
     return rosenbrock.tried(m, state, mode, h)
 
 
