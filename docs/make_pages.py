@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import inspect
 import itertools
 import re
 import shutil
@@ -188,7 +189,7 @@ def _entry(name: str, script: Path) -> Iterator[str]:
 def _commands() -> Iterator[str]:
     yield from ("# All commands", "", "`sweep COMMAND --help` prints the same.", "")
     for name, command in COMMANDS.items():
-        yield from (f"## sweep {name}", "", f"{_plain(command.text[0].upper() + command.text[1:])}.", "")
+        yield from (f"## sweep {name}", "", *prose(inspect.cleandoc(command.function.__doc__ or "")), "")
         yield from _table(("argument", "what it does"), map(_option, command.options))
 
 

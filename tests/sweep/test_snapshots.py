@@ -66,7 +66,7 @@ VOLATILE = {
     r"(?<=(disk  |blocks)    ).*(\n {12}.*)*": "...",
     r"\d+ %(?=.* of a sample)": "SHARE",  # of as many cells as the machine tries in time
     r"(?<=a sample of )\d+|(?<=on )\d+(?= cells)|(?<=tried\n {12}on )\d+": "N",
-    r"(?<=scaling   ).*(\n {12}.*)*": "...",  # looked for as long as the run is forecast to take allows
+    r"(?<=\n  scaling   ).*(\n {12}.*)*": "...",  # looked for as long as the run is forecast to take allows
     r"between its cells .*": "...",  # of a block, which is as large as the machine is fast
     r"\d+\.\d+\.\d+": "VERSION",
     r"-o (\S+), --output ": "-o, --output ",  # as Python 3.13 writes it
