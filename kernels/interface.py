@@ -132,6 +132,8 @@ class Field:
     ("mass",), whose length a study gives with their values; a column then has the shape `(n_cells, *dims)`.
     `choices` maps words of a study to the numbers in the column.
     `gaps`: an output that may be NaN or infinite in a cell that is OK, as what it names need not exist there.
+    `of_method`: an output that tells how a cell was solved, such as an error or a number of steps, so that another
+    method gives another value.
     """
 
     name: str
@@ -145,6 +147,7 @@ class Field:
     choices: Mapping[str, int] = field(default_factory=dict)
     integer: bool = False
     gaps: bool = False
+    of_method: bool = False
 
 
 @dataclass(frozen=True)

@@ -33,9 +33,9 @@ DOCS = {
     "moreau": "Moreau's time-stepping, order 1: dry friction without location",
 }
 COST = (
-    Field("error", "1", "estimated largest relative error"),
-    Field("steps", "1", "steps taken", integer=True),
-    Field("rate_calls", "1", "evaluations of the right-hand side", integer=True),
+    Field("error", "1", "estimated largest relative error", of_method=True),
+    Field("steps", "1", "steps taken", integer=True, of_method=True),
+    Field("rate_calls", "1", "evaluations of the right-hand side", integer=True, of_method=True),
 )
 
 

@@ -66,6 +66,8 @@ _PUBLIC = {
     "show.plot": ("plot",),
     "errors": ("StudyError", "SweepError"),
 }
+_WITHOUT_DATASETS = {"study", "to_toml", "plan", "kernels", "solver", "StudyError", "SweepError"}
+"""Names that take and give no Dataset; with any other one xarray is needed, and Datasets get `ds.sweep`."""
 _HOMES = {name: home for home, names in _PUBLIC.items() for name in names}
 """Public names and the modules they live in; a module is imported when one of its names is first used."""
 
@@ -75,6 +77,8 @@ __all__ = list(_HOMES)
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'sweep' has no attribute {name!r}")
+    if name not in _WITHOUT_DATASETS:
+        import_module("sweep.show.accessor")
     # what a notebook shows of a study needs to know what a run takes, which is above the study
     import_module("sweep.study.model").Study._repr_html_ = lambda study: import_module(
         "sweep.show.notebook"

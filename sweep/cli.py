@@ -74,7 +74,8 @@ COMMANDS = {
     made.function.__name__.strip("_"): made
     for made in (
         *(offer.kernels, offer.studies),
-        *(explore.plan, run.run, look.show, look.list_, look.verify, look.diff, look.plot, look.view, look.report),
+        *(explore.plan, run.run, look.show, look.cell, look.check, look.list_, look.verify, look.diff),
+        *(look.plot, look.view, look.report),
         *(laws.fit, explore.refine, explore.chart, write.export, write.join, completion),
     )
 }

@@ -65,6 +65,12 @@ class Table:
     def __init__(self, rows: Iterable[Sequence[str]], headings: Sequence[str] = (), title: str = "") -> None:
         self.rows, self.headings, self.title = [list(row) for row in rows], list(headings), title
 
+    def __repr__(self) -> str:
+        return self.text()
+
+    def _repr_html_(self) -> str:
+        return self.html()
+
     def text(self, indent: str = "  ", wide: bool = False) -> str:
         """Lines no wider than the terminal, where words allow it.
 

@@ -1,4 +1,4 @@
-"""Commands that look at results: show, verify, list, diff, plot, view, report."""
+"""Commands that look at results: show, cell, check, verify, list, diff, plot, view, report."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from sweep.command.options import command, option
 from sweep.command.outcome import Outcome
 from sweep.command.reading import check_target_of, in_units_of, opened, result_of, say
 from sweep.errors import COMPLETE, SweepError
+from sweep.words import paragraph
 
 DIFFERENT = 1
 """As `diff` of files says it."""
@@ -42,6 +43,36 @@ def verify(arguments: argparse.Namespace) -> None:
     if not verdict.whole:
         raise SweepError(str(verdict))
     say(verdict)
+
+
+@command(
+    "sweep check foliot.h5 --sample 200",
+    o.RESULT,
+    option("--sample", "cells at most; default: 200", metavar="N", type=int, default=200),
+    option("--seed", "draws other cells; default: 0", metavar="N", type=int, default=0),
+    *(o.UNFINISHED, o.ALLOW_IMPORT),
+)
+def check(arguments: argparse.Namespace) -> Outcome:
+    """Solve some OK cells again by another method and compare; exit status 1 if one is beyond its rtol."""
+    from sweep.explore.recheck import check
+    from sweep.study.read import study
+
+    with result_of(arguments) as dataset:
+        found = check(dataset, study(dataset, allow_import=arguments.allow_import), arguments.sample, arguments.seed)
+    say(paragraph(str(found)))
+    return Outcome(DIFFERENT if found.beyond else COMPLETE, str(found))
+
+
+@command("sweep cell foliot.h5 mu=0.1", o.RESULT, option("at", metavar="AXIS=VALUE", nargs="*"), o.ALLOW_IMPORT)
+def cell(arguments: argparse.Namespace) -> None:
+    """One cell: its values, what its status means, and what each method says of it."""
+    from sweep.explore.one_cell import report_cell
+    from sweep.show.laws import pick
+    from sweep.study.read import study
+
+    with result_of(arguments) as dataset:
+        found = report_cell(pick(dataset, arguments.at), study(dataset, allow_import=arguments.allow_import))
+    say(found)
 
 
 @command(

@@ -7,6 +7,8 @@ Others may use
     `scattered`       values between cells that lie anywhere in a box, and those of them that lie on lines
     `join`            two results as one
     `solver`          a study's kernel as a function of its axes
+    `one_cell`        what a result and each method say of one cell
+    `recheck`         a sample of OK cells solved again, to see whether they are right to rtol
     `sensitivity`     which parameters decide an output
     `groups`          superfluous axes, outputs free of units
 

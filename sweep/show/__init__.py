@@ -3,6 +3,7 @@
 Others may use
     `plot`     plot, of whatever it is given
     `charts`   for figures of one's own: style, new_figure, save and what draws panels
+    `accessor` `ds.sweep`: what a Dataset of a sweep can do by itself
     `page`     write_page: a result as one page of HTML
     `text`     result_text
     `follow`   a sweep watched from its log

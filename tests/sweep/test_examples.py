@@ -5,17 +5,18 @@ import doctest
 import pytest
 
 import sweep
+from sweep.show.accessor import SweepAccessor
 from sweep.study.read import study
 
 OPTIONS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 
 def documented(name):
-    """The object of a public name; of a room that is called, the function."""
-    return study if name == "study" else getattr(sweep, name)
+    """The object of a public name; of a room that is called, the function; of `ds.sweep` its class."""
+    return {"study": study, "accessor": SweepAccessor}.get(name) or getattr(sweep, name)
 
 
-@pytest.mark.parametrize("name", sweep.__all__)
+@pytest.mark.parametrize("name", [*sweep.__all__, "accessor"])
 def test_the_example_of_a_public_name_is_right(name, tmp_path, monkeypatch):
     if name == "sensitivity":
         pytest.importorskip("SALib")

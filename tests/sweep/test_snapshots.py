@@ -25,7 +25,8 @@ outputs = {outputs}
 axes.height = {{ spacing = "log", start = 1, stop = 1000, num = 9 }}
 axes.v0 = {{ values = {speeds} }}
 """
-OWN = "--allow-import --no-isolate"
+ALLOWED = "--allow-import"
+OWN = f"{ALLOWED} --no-isolate"
 FIT = "fit stones.h5 --x height --y fall_time"
 LINES = {
     "sweep": ["--help", "", "rum"],
@@ -45,6 +46,8 @@ LINES = {
         f"chart stones.toml -o other.png --methods exakt {OWN}",
     ],
     "show": ["show thrown.h5", "show thrown.toml"],
+    "cell": [f"cell stones.h5 height=1 v0=1 {ALLOWED}", f"cell stones.h5 height=1 {ALLOWED}", "cell stones.h5 hight=1"],
+    "check": [f"check thrown.h5 {ALLOWED}", f"check damaged.h5 {ALLOWED}", f"check stones.h5 --sample 0 {ALLOWED}"],
     "verify": ["verify thrown.h5", "verify damaged.h5"],
     "list": ["list", "list --all", "list nowhere"],
     "diff": ["diff stones.h5 stones.h5", "diff stones.h5 damaged.h5", "diff stones.h5 no.h5"],

@@ -1,0 +1,145 @@
+"""What a Dataset of a sweep can do by itself: `ds.sweep`, and results for `xarray.open_dataset`.
+
+xarray imports this module when it first looks for engines to open a file with, so that `ds.sweep` is there also where
+`sweep` was never imported.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+from xarray.backends import BackendEntrypoint
+
+if TYPE_CHECKING:
+    from sweep.explore.one_cell import CellReport
+    from sweep.explore.recheck import Checked
+    from sweep.words import Table
+
+
+@xr.register_dataset_accessor("sweep")  # type: ignore[no-untyped-call]
+class SweepAccessor:
+    """Look at a result, in one line each.
+
+    Works on a Dataset of `sweep.run` and `sweep.open_result`, on one that `xarray.open_dataset` read from such a file,
+    and on parts of these.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> ds = sweep.run(kernel="foliot", axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> ds.sweep.where("mu > 0.7").sizes["cell"]
+    2
+    >>> figure = ds.sweep.plot(y="amplitude")
+    >>> print(ds.sweep.statuses())
+      status  cells  what it says
+      OK      3      right to the wanted rtol
+    >>> ds.sweep.check().beyond
+    0
+    >>> ds.sweep.cell(mu=2.0).method
+    'closed'
+    """
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
+
+    def plot(self, path: str | os.PathLike[str] | None = None, *, y: str | None = None, x: str | None = None) -> Any:
+        """The figure of one output: as `sweep.plot`, logarithmic along axes whose grid is."""
+        from sweep.show.plot import plot
+
+        return plot(self._dataset, path, y=y, x=x)
+
+    def in_units(self, units: Mapping[str, str] | None = None, **more: str) -> xr.Dataset:
+        """The Dataset with some variables in other units: as `sweep.in_units`, e.g. `A0="degree"`."""
+        from sweep.results.units import in_units
+
+        return in_units(self._dataset, {**(units or {}), **more})
+
+    def where(self, condition: str) -> xr.Dataset:
+        """The cells for which a condition holds: as `sweep.where`."""
+        from sweep.results.filter import where
+
+        return where(self._dataset, condition)
+
+    def fit(self, y: str, x: str, **options: Any) -> xr.Dataset:
+        """The exponent of an output along an axis, of cells that have values: as `sweep.fit_exponent`.
+
+        Parameters
+        ----------
+        y, x : str
+            An output, and the axis of the power law.
+        **options
+            `window` and others of `sweep.fit_exponent`.
+
+        Raises
+        ------
+        SweepError
+            There is no such output or axis.
+        """
+        from sweep.laws.lines import fit_exponent
+        from sweep.show.laws import output_of
+
+        return fit_exponent(self._dataset[output_of(self._dataset, y)], x, **options)
+
+    def statuses(self) -> Table:
+        """How many cells have each status, what it says, and one of them."""
+        from kernels.interface import Status
+        from sweep.results.statuses import count_statuses
+        from sweep.words import Table
+
+        found = count_statuses(self._dataset)
+        rows = [
+            (one.name, f"{one.cells:,}", Status[one.name].doc, ", ".join(f"{k}={v}" for k, v in one.example.items()))
+            for one in found
+        ]
+        return Table(rows, ("status", "cells", "what it says", "e.g." if any(row[3] for row in rows) else ""))
+
+    def cell(self, *, allow_import: bool = False, **values: float | str) -> CellReport:
+        """What there is to say of one cell, named by the values of its axes: as the command `sweep cell`.
+
+        Raises
+        ------
+        SweepError
+            An axis has no such value, or the values name more than one cell.
+        """
+        from sweep.explore.one_cell import report_cell
+        from sweep.show.laws import pick
+        from sweep.study.read import study
+
+        part = pick(self._dataset, [f"{name}={value}" for name, value in values.items()])
+        return report_cell(part, study(self._dataset, allow_import=allow_import))
+
+    def check(self, sample: int = 200, seed: int = 0, *, allow_import: bool = False) -> Checked:
+        """Solve some OK cells again by another method and compare: as the command `sweep check`.
+
+        Parameters
+        ----------
+        sample, seed : int
+            How many cells at most, and which.
+        allow_import : bool
+            Allow a kernel named "module:NAME", whose module is imported.
+
+        Raises
+        ------
+        SweepError
+            The result is a summary or has no OK cell.
+        """
+        from sweep.explore.recheck import check
+        from sweep.study.read import study
+
+        return check(self._dataset, study(self._dataset, allow_import=allow_import), sample, seed)
+
+
+class SweepEngine(BackendEntrypoint):
+    """`xarray.open_dataset("foliot.h5", engine="sweep")`: as `sweep.open_result`, with its checks and dask chunks."""
+
+    description = "Results of foliot, finished or not"
+    open_dataset_parameters = ("filename_or_obj", "drop_variables")
+
+    def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = ()) -> xr.Dataset:
+        """The result, without the variables that are to be dropped."""
+        from sweep.file.open import open_result
+
+        return open_result(filename_or_obj).drop_vars(drop_variables or ())

@@ -1,0 +1,96 @@
+"""`sweep check` finds what is beyond rtol, and nothing else; `sweep cell` says of a cell what the result says."""
+
+import numpy as np
+import pytest
+from toy_studies import build
+
+import sweep
+from kernels.interface import Status
+
+FOLIOT = {
+    "kernel": "foliot",
+    "outputs": ["period", "amplitude"],
+    "rtol": 1e-7,
+    "axes": {"mu": np.geomspace(0.3, 30.0, 12), "R": [0.0, 0.1]},
+    "fixed": {"phi0": 1.0, "a": 1.0},
+}
+
+
+@pytest.fixture(scope="module")
+def clocks():
+    return sweep.run(FOLIOT)
+
+
+def test_an_honest_result_is_judged_by_other_methods_and_has_nothing_beyond(clocks):
+    found = clocks.sweep.check()
+    assert (found.cells, found.sample, found.judged, found.by_another) == (24, 24, 24, 24)
+    assert (found.beyond, found.limit) == (0, 0.0)
+    some = clocks.sweep.check(sample=10)
+    assert (some.judged, some.beyond) == (10, 0)
+    assert some.limit == pytest.approx(1 - 0.05**0.1)  # the share of which none is drawn in ten with 5 %
+    assert clocks.sweep.check(sample=10, seed=1).worst["cell"] != some.worst["cell"]
+
+
+@pytest.mark.parametrize("output", FOLIOT["outputs"])
+def test_a_cell_that_is_off_by_more_than_rtol_is_found(clocks, output):
+    wrong = clocks.copy(deep=True)
+    wrong[output][3, 1] *= 1 + 3e-7
+    wrong[output][5, 0] *= 1 + 0.5e-7
+    found = wrong.sweep.check()
+    assert found.beyond == 1
+    assert found.worst["output"] == output
+    assert found.worst["off"] == pytest.approx(3.0, rel=0.01)
+    assert float(found.worst["cell"]["mu"]) == pytest.approx(clocks.mu.values[3], rel=1e-5)
+    assert found.worst["cell"]["R"] == "0.1"
+    assert wrong.isel(mu=slice(4, None)).sweep.check().beyond == 0
+    assert wrong.sweep.where("mu < 5").sweep.check().beyond == 1
+
+
+def test_a_method_and_an_rtol_that_are_axes_are_those_of_the_cell(clocks):
+    keys = {**FOLIOT, "axes": {"mu": [1.0, 2.0], "method": ["closed", "asymptotic"], "rtol": [1e-9, 1e-3]}}
+    del keys["rtol"]
+    ds = sweep.run(keys)
+    found = ds.sweep.check()
+    assert found.beyond == 0
+    report = ds.sweep.cell(mu=1.0, method="asymptotic", rtol=1e-3)
+    assert (report.method, report.rtol) == ("asymptotic", 1e-3) if report.status == Status.OK else ("none", 1e-3)
+
+
+def test_a_cell_is_what_the_result_and_each_method_say(clocks):
+    report = clocks.sweep.cell(mu=0.3, R=0.1)
+    cell = clocks.sel(mu=0.3, R=0.1)
+    assert report.values == {name: cell[name].item() for name in FOLIOT["outputs"]}
+    assert report.status == cell.status.item()
+    assert report.error_bound == cell.error_bound.item()
+    assert "closed" not in report.methods  # which cannot do dry friction
+    status, error, values = report.methods[report.method]
+    assert (status, values) == (report.status, report.values)
+    assert error == np.float32(report.error_bound)
+    refused = sweep.run(FOLIOT | {"axes": {"mu": [1e-3], "R": [0.1]}}).sweep.cell()
+    assert refused.status == Status.NEVER_STARTS
+    assert {status for status, *_ in refused.methods.values()} == {Status.NEVER_STARTS}
+
+
+def test_what_is_no_cell_is_refused(clocks):
+    with pytest.raises(sweep.SweepError, match="mu"):
+        clocks.sweep.cell(R=0.1)
+    with pytest.raises(sweep.SweepError, match="unit"):
+        clocks.assign_coords(phi0=clocks.phi0.assign_attrs(units="degree")).sweep.check()
+    with pytest.raises(sweep.SweepError, match="phi0"):
+        clocks.drop_vars("phi0").sweep.check()
+    with pytest.raises(sweep.SweepError, match="OK"):
+        clocks.where(False, drop=False).assign(status=clocks.status * 0 + 64).sweep.check()
+    summary = sweep.run(
+        build(axes={"height": [1.0, 2.0]}, summary={"over": ["height"], "outputs": {"fall_time": ["mean"]}})
+    )
+    for look in (summary.sweep.check, summary.sweep.cell):
+        with pytest.raises(sweep.SweepError, match="summary"):
+            look(allow_import=True)
+
+
+def test_words_traces_and_arrays_are_given_back_as_the_kernel_had_them():
+    keys = {"kernel": "foliot_motion", "axes": {"mu": [0.5, 1.0]}, "fixed": {"phi0": 1.0, "a": 0.3}}
+    keys["along"] = {"phase": [0.1, 0.4]}
+    found = sweep.run(keys).sweep.check()
+    assert found.judged == found.sample == 2
+    assert found.beyond == 0
