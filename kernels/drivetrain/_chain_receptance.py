@@ -1,6 +1,6 @@
 """Receptance of a chain: the angle at one inertia for a torque at another, without loss beyond what the scene has.
 
-With K_j = k_j + i w h_j the chain is followed from either end as in `_chain_shapes`, g before an inertia:
+With K_j = k_j + i w h_j the chain is followed from either end as in `_holzer`, g before an inertia:
     g'_j = g_j - w^2 J_j x_j,  x_(j+1) = x_j + g'_j/K_j,  g_(j+1) = g'_j;  from the right x_n = 1, g_n = K_n.   (1)
 For p <= q both are known at q, and a torque at p turns q (or one at q turns p) by
     H = x_p(left) x_q(right)/W,  W = g_q(left) x_q(right) + g_q(right) x_q(left) - w^2 J_q x_q(left) x_q(right).  (2)

@@ -1,7 +1,8 @@
 """A reduced model against its chain: as few masses as are wanted, and the largest error of the spindle's receptance."""
 
+from kernels.drivetrain import _rivin
 from kernels.drivetrain._modal_masses import TURN
-from kernels.drivetrain._modal_receptance import chain_receptance, least_damping, sample_grid, sample_poles
+from kernels.drivetrain._modal_receptance import least_damping, sample_grid, sample_poles
 from kernels.drivetrain._model import CHAIN_ROUNDING, Model, Outcome, Wanted, largest_error
 from kernels.drivetrain._reductions import EXACT, chain_poles, damped, poles, receptance, reduce
 from kernels.lanes.jit import jit, jit_apart
@@ -43,7 +44,7 @@ def _reduce_enough(wanted, scene):
 def _value_at(w, of_error, model, scene, reduction):
     """abs(dH) or abs(H); 0 where it is no number: exactly on a pole of a partial system."""
     full = scene.full
-    value = chain_receptance(w, full.J, full.k, full.h, full.J.size, scene.spare.J_w, scene.spare.K_w)
+    value = _rivin.receptance_of_chain(w, full.J, full.k, full.h, full.J.size)
     if of_error > 0:
         value -= receptance(reduction, w, model, scene)
     size = sqrt(fma(value.real, value.real, value.imag * value.imag))
@@ -88,8 +89,8 @@ def _largest(count, of_error, model, scene, reduction):
 def _sample(w_max, own_poles, full, kept, at):
     """Fills `at` with frequencies of the band, rising, close to one another around the poles; how many there are."""
     count = sample_grid(at, w_max, TURN * full.f[0])
-    count = sample_poles(at, count, w_max, full.re, full.im, 2 * full.J.size)
-    count = sample_poles(at, count, w_max, kept.re, kept.im, own_poles)
+    count = sample_poles(at, count, w_max, full.s, 2 * full.J.size)
+    count = sample_poles(at, count, w_max, kept.s, own_poles)
     sort_many(at, count)
     return count
 
@@ -103,8 +104,8 @@ def _receptance_error(f_max, own_poles, model, scene, reduction):
     full, kept = scene.full, scene.kept
     n = full.J.size
     w_max = TURN * min(f_max, _BEYOND * max(full.f[n - 1], kept.f[model.p - 1]))
-    zeta = least_damping(full.re, full.im, w_max, 2 * n)
-    zeta = min(zeta, least_damping(kept.re, kept.im, w_max, 2 * model.p))
+    zeta = least_damping(full.s, w_max, 2 * n)
+    zeta = min(zeta, least_damping(kept.s, w_max, 2 * model.p))
     if not (zeta > 0.0 and full.k[n - 1] > 0.0 and w_max > 0.0):
         return float("nan"), 0.0
     count = _sample(w_max, own_poles, full, kept, scene.spare.at)
@@ -145,7 +146,7 @@ def reduced(wanted, scene):
 def whole(wanted, scene):
     """As `reduced`, of a chain that stays as it is."""
     n = scene.full.J.size
-    blur = chain_poles(scene.full, n, damped(scene.full), scene.spare.work)
+    blur = chain_poles(scene.full, n, damped(scene.full), scene.spare)
     blur = max(CHAIN_ROUNDING, _known(blur))
     off = 0.0 if blur < float("inf") else float("nan")
     return Outcome(n, n, 0.0, off, CHAIN_ROUNDING, blur, blur, 0.0, 0.0)

@@ -10,7 +10,7 @@ spindle always, then those of small (k_left + k_right)/J. Rows are as in `_ritz`
 Source: Guyan, AIAA J. 3:380 (1965); O'Callahan, Proc. 7th IMAC (1989) 17.
 """
 
-from kernels.drivetrain._rivin_merging import fastest, remove_mass
+from kernels.drivetrain._rivin import step
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import sqrt
 
@@ -25,8 +25,8 @@ def choose_masters(J, k, h, masters, n, p, order):
     for i in range(n):
         masters[i] = i
     for m in range(n, p, -1):
-        _, place = fastest(J, k, m, order, False)
-        slower = max(slower, remove_mass(J, k, h, place, m))
+        _, place, late = step(J, k, h, m, order, False)
+        slower = max(slower, late)
         for i in range(place, m - 1):
             masters[i] = masters[i + 1]
     return slower

@@ -8,9 +8,10 @@ Rows are as in `_ritz`. Source: Craig & Bampton, AIAA J. 6:1313 (1968); O'Callah
 """
 
 from kernels.drivetrain._chain_frequencies import natural_frequencies
-from kernels.drivetrain._chain_shapes import mode_shapes
+from kernels.drivetrain._holzer import SHAPE, mode, mode_rows
 from kernels.lanes.jit import jit, jit_apart
-from kernels.lanes.vectors import fma, magnitude, sqrt
+from kernels.lanes.vectors import sqrt
+from kernels.maths.small_dense import square
 
 TURN = 6.283185307179586
 HOLD = 2.0**80
@@ -18,42 +19,21 @@ HOLD = 2.0**80
 
 
 @jit_apart
-def fill_rows(W, G, J, k, angle, square, n):
-    """W and G of a mode u of squared frequency w^2.
-
-    A strain is the difference of two angles, or the torque w^2 sum J u up to there over k: whichever is rounded less.
-    """
-    torque, rough = 0.0, 0.0
-    for j in range(n):
-        torque = fma(square * J[j], angle[j], torque)
-        rough += magnitude(square * J[j] * angle[j])
-        beyond = angle[j + 1] if j + 1 < n else 0.0
-        by_torque = rough < k[j] * (magnitude(angle[j]) + magnitude(beyond))
-        W[j] = sqrt(J[j]) * angle[j]
-        G[j] = torque / sqrt(k[j]) if by_torque and j + 1 < n else sqrt(k[j]) * (angle[j] - beyond)
-
-
-@jit_apart
-def modal(modes, chain, p, shapes, angle, work):
-    """The lowest p modes as rows; what the others give way at rest [rad/(N m)] and a status.
-
-    `shapes`, `angle`, `work` : buffers of n n, n and 6 n
-    """
+def modal(modes, chain, p, room):
+    """The lowest p modes as rows; what the others give way at rest [rad/(N m)]."""
     n, residual = chain.J.size, 0.0
-    status = mode_shapes(n, chain.J, chain.k, chain.f, shapes, work)
     for i in range(n):
         modes.w[i] = TURN * chain.f[i]
         if i < p:
-            for j in range(n):
-                angle[j] = shapes[j, i]
-            fill_rows(modes.W[i], modes.G[i], chain.J, chain.k, angle, modes.w[i] * modes.w[i], n)
+            mode_rows(n, chain.J, chain.k, chain.h, modes.w[i], modes.W[i], modes.G[i], room.ways, room.e)
         else:
-            residual += (shapes[0, i] / modes.w[i]) * (shapes[0, i] / modes.w[i])
-    return residual, status
+            solid, _, _ = mode(n, chain.J, chain.k, chain.h, modes.w[i], room.ways, room.e)
+            residual += square(room.ways[SHAPE, 0] / modes.w[i]) / solid
+    return residual
 
 
 @jit_apart
-def craig_bampton(W, G, J, k, frequency, shapes, angle, p, n, work):
+def craig_bampton(W, G, J, k, h, frequency, p, n, room):
     """Basis of the spindle at rest and p - 1 modes with the spindle held, and a status."""
     at_rest(W[0], G[0], J, k, n)
     if p == 1:
@@ -62,23 +42,12 @@ def craig_bampton(W, G, J, k, frequency, shapes, angle, p, n, work):
     for j in range(n):
         largest = max(largest, J[j])
     J[0] = HOLD * largest
-    status = natural_frequencies(n, J, k, frequency, work)
-    if status == 0.0:
-        status = mode_shapes(n, J, k, frequency, shapes, work)
+    status = natural_frequencies(n, J, k, frequency, room.work)
     for i in range(1, p):
-        for j in range(n):
-            angle[j] = shapes[j, i] if j > 0 else 0.0
-        _held_rows(W[i], G[i], J, k, angle, n)
+        mode_rows(n, J, k, h, TURN * frequency[i], W[i], G[i], room.ways, room.e)
+        W[i, 0] = 0.0
     J[0] = own
     return status
-
-
-@jit
-def _held_rows(W, G, J, k, angle, n):
-    """Rows of a mode with the spindle held."""
-    for j in range(n):
-        beyond = angle[j + 1] if j + 1 < n else 0.0
-        W[j], G[j] = sqrt(J[j]) * angle[j], sqrt(k[j]) * (angle[j] - beyond)
 
 
 @jit

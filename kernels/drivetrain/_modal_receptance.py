@@ -8,7 +8,7 @@ strains d. It moves as x = sum phi_i q_i,
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import fma, sqrt
 from kernels.maths.elementary import exp, log
-from kernels.maths.small_dense import eliminate, over, substitute_back
+from kernels.maths.small_dense import eliminate, square, substitute_back
 
 AROUND = (-16.0, -8.0, -4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 """Where a resonance is looked at, in its half widths."""
@@ -47,23 +47,6 @@ def modal_receptance(w, modes, p, A, B):
     return total
 
 
-@jit
-def spindle_receptance(J, K, w_square, m):
-    """Angle of the first of m masses over a torque on it, the other end held by K_m."""
-    below = K[m - 1] - w_square * J[m - 1]
-    for j in range(m - 2, -1, -1):
-        below = K[j] * over(below, K[j] + below) - w_square * J[j]
-    return over(1.0 + 0.0j, below)
-
-
-@jit_apart
-def chain_receptance(w, J, k, h, m, J_w, K_w):
-    """Receptance of the first of m masses of a chain; `J_w` and `K_w` are complex buffers."""
-    for j in range(m):
-        J_w[j], K_w[j] = complex(J[j], 0.0), complex(k[j], w * h[j])
-    return spindle_receptance(J_w, K_w, w * w, m)
-
-
 @jit_apart
 def sample_grid(at, w_max, lowest):
     """Fills `at` with 0, w_max and frequencies between, even on a log scale; how many there are."""
@@ -77,12 +60,12 @@ def sample_grid(at, w_max, lowest):
 
 
 @jit_apart
-def sample_poles(at, filled, w_max, pole_re, pole_im, count):
+def sample_poles(at, filled, w_max, s, count):
     """Adds frequencies close around each of `count` poles; how many there are then."""
     for i in range(count):
-        if pole_im[i] > 0.0:
+        if s[i].imag > 0.0:
             for t in AROUND:
-                w = fma(-t, pole_re[i], pole_im[i])
+                w = fma(-t, s[i].real, s[i].imag)
                 if w > 0.0 and w < w_max:
                     at[filled] = w
                     filled += 1
@@ -90,11 +73,10 @@ def sample_poles(at, filled, w_max, pole_re, pole_im, count):
 
 
 @jit
-def least_damping(pole_re, pole_im, w_max, count):
+def least_damping(s, w_max, count):
     """Smallest zeta of the poles in the band; 1 where there are none."""
     least = 1.0
     for i in range(count):
-        size = sqrt(fma(pole_re[i], pole_re[i], pole_im[i] * pole_im[i]))
-        if pole_im[i] > 0.0 and pole_im[i] <= w_max:
-            least = min(least, -pole_re[i] / size)
+        if s[i].imag > 0.0 and s[i].imag <= w_max:
+            least = min(least, -s[i].real / sqrt(square(s[i])))
     return least

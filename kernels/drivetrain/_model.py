@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.drivetrain._chain import extremes, same
+from kernels.drivetrain._holzer import ROWS
 from kernels.drivetrain._modal_receptance import AROUND, GRID
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import exponent, magnitude, nearest
@@ -19,14 +20,13 @@ CHAIN_ROUNDING = 5e-14
 
 
 class Chain(NamedTuple):
-    """Inertias, stiffnesses, dampers, and the frequencies f; `re` and `im` are the parts of its poles."""
+    """Inertias, stiffnesses, dampers, and the frequencies f, and poles s."""
 
     J: np.ndarray
     k: np.ndarray
     h: np.ndarray
     f: np.ndarray
-    re: np.ndarray
-    im: np.ndarray
+    s: np.ndarray
 
 
 class Modes(NamedTuple):
@@ -40,9 +40,16 @@ class Modes(NamedTuple):
 
 
 class Spare(NamedTuple):
-    """Buffers of every reduction: 16 n numbers, the types and places of systems replaced, K and J at one frequency."""
+    """Buffers of every reduction: 3 n + 2 numbers, those of the walk and of poles, the types and places of systems
+    replaced, K and J at one frequency.
+    """
 
     work: np.ndarray
+    ways: np.ndarray
+    waves: np.ndarray
+    e: np.ndarray
+    errors: np.ndarray
+    pairs: np.ndarray
     kinds: np.ndarray
     places: np.ndarray
     J_w: np.ndarray
@@ -52,14 +59,13 @@ class Spare(NamedTuple):
 
 
 class Dense(NamedTuple):
-    """Buffers of modal models: `square` of real numbers, A and B of complex ones, s for 2 n poles."""
+    """Buffers of modal models: `square` of real numbers, A and B of complex ones."""
 
     square: np.ndarray
     angle: np.ndarray
     masters: np.ndarray
     A: np.ndarray
     B: np.ndarray
-    s: np.ndarray
 
 
 class WholeScene(NamedTuple):
@@ -122,13 +128,16 @@ class Outcome(NamedTuple):
 
 @jit_apart
 def _new_chain(n):
-    return Chain(np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(2 * n), np.empty(2 * n))
+    return Chain(np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(2 * n, np.complex128))
 
 
 @jit_apart
 def _new_spare(n):
     points, waves = 2 * len(AROUND) * n + GRID + 2, np.empty((2, n), np.complex128)
-    return Spare(np.empty(16 * n), np.empty(n), np.empty(n), waves[0], waves[1], np.empty(points), np.empty(points))
+    ways, chain_ways = np.empty((ROWS, n)), np.empty((ROWS, n), np.complex128)
+    work, e, errors, pairs = np.empty(3 * n + 2), np.empty((2, n)), np.empty(2 * n), np.empty(2 * n, np.complex128)
+    kinds, places, at, off = np.empty(n), np.empty(n), np.empty(points), np.empty(points)
+    return Spare(work, ways, chain_ways, e, errors, pairs, kinds, places, waves[0], waves[1], at, off)
 
 
 @jit_apart
@@ -138,8 +147,8 @@ def _new_modes(n):
 
 @jit_apart
 def _new_dense(n):
-    A, B, s = np.empty((n, n), np.complex128), np.empty((n, n), np.complex128), np.empty(2 * n, np.complex128)
-    return Dense(np.empty((n, n)), np.empty(n), np.empty(n), A, B, s)
+    A, B = np.empty((n, n), np.complex128), np.empty((n, n), np.complex128)
+    return Dense(np.empty((n, n)), np.empty(n), np.empty(n), A, B)
 
 
 @jit

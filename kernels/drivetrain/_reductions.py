@@ -7,13 +7,12 @@ The choice is made while a cell is solved: what reductions have in common takes 
 once for all of them.
 """
 
-from kernels.drivetrain import _guyan_masses, _modal_masses, _rivin_exact, _rivin_merging
+from kernels.drivetrain import _guyan_masses, _modal_masses, _rivin
 from kernels.drivetrain._chain_frequencies import natural_frequencies
-from kernels.drivetrain._chain_poles import damped_poles
 from kernels.drivetrain._modal_masses import TURN
-from kernels.drivetrain._modal_poles import modal_poles
-from kernels.drivetrain._modal_receptance import chain_receptance, damping_matrix, modal_receptance
+from kernels.drivetrain._modal_receptance import damping_matrix, modal_receptance
 from kernels.drivetrain._model import CHAIN_ROUNDING, Model, off_by
+from kernels.drivetrain._poles import damped_poles, modal_poles
 from kernels.drivetrain._ritz import ritz
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
@@ -41,18 +40,16 @@ def damped(chain):
 def _undamped_poles(chain):
     """Poles on the imaginary axis."""
     for i in range(chain.f.size):
-        chain.re[2 * i], chain.re[2 * i + 1] = 0.0, 0.0
-        chain.im[2 * i], chain.im[2 * i + 1] = TURN * chain.f[i], -TURN * chain.f[i]
+        chain.s[2 * i], chain.s[2 * i + 1] = complex(0.0, TURN * chain.f[i]), complex(0.0, -TURN * chain.f[i])
 
 
 @jit_apart
-def chain_poles(chain, m, is_damped, work):
+def chain_poles(chain, m, is_damped, room):
     """Poles of a chain of m masses; a bound on their relative error, inf where they did not come."""
     if not is_damped:
         _undamped_poles(chain)
         return 0.0
-    error, status = damped_poles(m, chain.J, chain.k, chain.h, chain.f, chain.re, chain.im, work)
-    return error if status == 0.0 else float("inf")
+    return damped_poles(m, chain.J, chain.k, chain.h, chain.f, chain.s[: 2 * m], room)
 
 
 @jit_apart
@@ -67,7 +64,7 @@ def _merge(p, order, full, kept, spare):
     n, slower = full.J.size, 0.0
     _copy(full, kept)
     for m in range(n, p, -1):
-        kind, place, late = _rivin_merging.step(kept.J, kept.k, kept.h, m, order)
+        kind, place, late = _rivin.step(kept.J, kept.k, kept.h, m, order, True)
         spare.kinds[n - m], spare.places[n - m], slower = kind, place, max(slower, late)
     return slower
 
@@ -82,7 +79,7 @@ def _reduce_rivin(p, order, scene):
 
 @jit_apart
 def _poles_of_both(p, scene):
-    full, kept, work = scene.full, scene.kept, scene.spare.work
+    full, kept, work = scene.full, scene.kept, scene.spare
     is_damped, error = damped(full), 0.0
     error = max(error, chain_poles(full, full.J.size, is_damped, work))
     return max(error, chain_poles(kept, p, is_damped, work)), 2 * p
@@ -90,8 +87,7 @@ def _poles_of_both(p, scene):
 
 @jit_apart
 def _chain_receptance(w, model, scene):
-    kept, spare = scene.kept, scene.spare
-    return chain_receptance(w, kept.J, kept.k, kept.h, model.p, spare.J_w, spare.K_w)
+    return _rivin.receptance_of_chain(w, scene.kept.J, scene.kept.k, scene.kept.h, model.p)
 
 
 @jit_apart
@@ -99,8 +95,8 @@ def _reduce_exactly(p, order, scene):
     """All frequencies, from p masses that depend on the frequency; how far they are from the full chain's is error."""
     full, kept, spare = scene.full, scene.kept, scene.spare
     _merge(p, order, full, kept, spare)
-    n, apart, work = full.J.size, 0.0, spare.work
-    _rivin_exact.exact_frequencies(full.J, full.k, spare.kinds, spare.places, p, kept.f, work, work[2 * n :])
+    n, apart = full.J.size, 0.0
+    _rivin.exact_frequencies(full.J, full.k, spare.kinds, spare.places, p, kept.f, spare.J_w, spare.K_w)
     for i in range(n):
         off = magnitude(off_by(kept.f[i], full.f[i]))
         apart = max(apart, off if off >= 0.0 else float("inf"))
@@ -110,16 +106,17 @@ def _reduce_exactly(p, order, scene):
 @jit_apart
 def _poles_of_full(p, scene):
     full, kept = scene.full, scene.kept
-    error = max(0.0, chain_poles(full, full.J.size, damped(full), scene.spare.work))
+    error = max(0.0, chain_poles(full, full.J.size, damped(full), scene.spare))
     for i in range(2 * full.J.size):
-        kept.re[i], kept.im[i] = full.re[i], full.im[i]
+        kept.s[i] = full.s[i]
     return error, 0
 
 
 @jit_apart
 def _exact_receptance(w, model, scene):
     full, spare = scene.full, scene.spare
-    return _rivin_exact.receptance(w, full.J, full.k, full.h, spare.kinds, spare.places, model.p, spare.J_w, spare.K_w)
+    p = model.p
+    return _rivin.exact_receptance(w, full.J, full.k, full.h, spare.kinds, spare.places, p, spare.J_w, spare.K_w)
 
 
 @jit_apart
@@ -165,20 +162,19 @@ def _reduce_irs(p, order, scene):
 
 @jit_apart
 def _reduce_craig_bampton(p, order, scene):
-    full, modes, dense = scene.full, scene.modes, scene.dense
+    full, modes = scene.full, scene.modes
     status = _modal_masses.craig_bampton(
-        modes.W, modes.G, full.J, full.k, scene.kept.f, dense.square, dense.angle, p, full.J.size, scene.spare.work
+        modes.W, modes.G, full.J, full.k, full.h, scene.kept.f, p, full.J.size, scene.spare
     )
     return Model(p, _solve_basis(p, scene), 0.0, 0.0, status)
 
 
 @jit_apart
 def _reduce_modal(p, order, scene):
-    full, dense = scene.full, scene.dense
+    full = scene.full
     for i in range(full.J.size):
         scene.kept.f[i] = full.f[i]
-    residual, status = _modal_masses.modal(scene.modes, full, p, dense.square, dense.angle, scene.spare.work)
-    return Model(p, CHAIN_ROUNDING, 0.0, residual, status)
+    return Model(p, CHAIN_ROUNDING, 0.0, _modal_masses.modal(scene.modes, full, p, scene.spare), 0.0)
 
 
 @jit_apart
@@ -197,10 +193,10 @@ def _poles_of_modes(p, scene):
     for i in range(p):
         modes.spindle[i] = modes.W[i, 0] / sqrt(full.J[0])
     damping_matrix(modes.C, modes.W, modes.G, full, p)
-    error = max(error, chain_poles(full, n, is_damped, scene.spare.work))
+    error = max(error, chain_poles(full, n, is_damped, scene.spare))
     if is_damped:
         free = not full.k[n - 1] > 0.0
-        blur = modal_poles(modes.w, modes.C, p, free, kept.re, kept.im, dense.s, dense.A, dense.B)
+        blur = modal_poles(modes.w, modes.C, p, free, kept.s[: 2 * p], scene.spare, dense.A, dense.B)
         error = max(error, blur, _ROUNDING * n / _least_gap(kept.f, p))
     else:
         _undamped_poles(kept)

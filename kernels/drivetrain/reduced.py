@@ -26,10 +26,10 @@ from collections import namedtuple
 
 from kernels.drivetrain._chain import MASS_LIMIT, refusal
 from kernels.drivetrain._chain_frequencies import natural_frequencies
-from kernels.drivetrain._chain_poles import modal_damping
 from kernels.drivetrain._error import reduced, whole
 from kernels.drivetrain._modal_masses import TURN
 from kernels.drivetrain._model import CHAIN_ROUNDING, Wanted, off_by, reduced_scene, take_units, whole_scene
+from kernels.drivetrain._poles import modal_damping
 from kernels.drivetrain._reductions import CRAIG_BAMPTON, EXACT, GUYAN, IRS, MODAL, NONE, RIVIN, leaves_chain
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, DAMPERS_OUT_OF_RANGE, OK
@@ -81,7 +81,7 @@ def _write_modes(i, columns, count, e, scene):
         columns.frequency[i, mode] = _held(kept.f[mode], e)
         columns.frequency_error[i, mode] = off_by(kept.f[mode], full.f[mode])
         fine = fine and columns.frequency[i, mode] >= 0.0
-    modal_damping(count, kept.re, kept.im, scene.spare.work, columns.damping[i])
+    modal_damping(kept.s[: 2 * count], columns.damping[i])
     return fine
 
 

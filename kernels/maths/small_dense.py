@@ -1,15 +1,7 @@
-"""A few complex linear equations, and sorting, of one cell."""
+"""Complex quotients, a few complex linear equations, and sorting, of one cell."""
 
 from kernels.lanes.jit import jit, jit_apart
-from kernels.lanes.vectors import magnitude
-
-
-@jit
-def over(x, y):
-    """x/y of complex numbers, by the square of abs(y); NaN for y = 0."""
-    square = y.real * y.real + y.imag * y.imag
-    scaled = complex(y.real / square, -y.imag / square) if square > 0.0 else complex(float("nan"), 0.0)
-    return x * scaled
+from kernels.lanes.vectors import fma, magnitude
 
 
 @jit
@@ -19,31 +11,34 @@ def size(z):
 
 
 @jit
-def _swap(rows, i, j, n):
-    for c in range(n):
-        rows[i, c], rows[j, c] = rows[j, c], rows[i, c]
+def square(z):
+    """Squared modulus."""
+    return fma(z.real, z.real, z.imag * z.imag)
 
 
 @jit
-def _pivot(A, i, p):
-    """The row from i on that has the largest entry in column i."""
-    best = i
-    for r in range(i + 1, p):
-        if size(A[r, i]) > size(A[best, i]):
-            best = r
-    return best
+def over(x, y):
+    """x/y of complex numbers, abs(y) between 1e-150 and 1e150; NaN for y = 0."""
+    inverse = 1.0 / square(y)
+    return x * complex(y.real * inverse, -y.imag * inverse)
 
 
 @jit_apart
 def eliminate(A, B, p, q):
     """Brings the (p, p) matrix A to upper triangular form, by the largest pivots, and (p, q) B along."""
     for i in range(p):
-        best = _pivot(A, i, p)
-        if best != i:
-            _swap(A, i, best, p)
-            _swap(B, i, best, q)
+        best = i
         for r in range(i + 1, p):
-            factor = over(A[r, i], A[i, i])
+            if size(A[r, i]) > size(A[best, i]):
+                best = r
+        if best != i:
+            for c in range(p):
+                A[i, c], A[best, c] = A[best, c], A[i, c]
+            for c in range(q):
+                B[i, c], B[best, c] = B[best, c], B[i, c]
+        inverse = over(1.0 + 0.0j, A[i, i])
+        for r in range(i + 1, p):
+            factor = A[r, i] * inverse
             for c in range(i + 1, p):
                 A[r, c] -= factor * A[i, c]
             for c in range(q):

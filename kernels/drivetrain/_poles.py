@@ -1,0 +1,307 @@
+"""Damped poles: all 2 n roots s of det(s^2 M + s C + K) = 0 at once, each shown to be another.
+
+Ehrlich's and Aberth's iteration takes from Newton's step N = D/D' of a root of D what draws it to the others,
+    s -= N/(1 - N sum of 1/(s - s_other)),                                                              (1)
+beginning with the roots of every undamped mode with its own damping. Without a spring to ground one root is exactly 0,
+without a damper to ground two are; these stay where they are.
+
+A chain's determinant is D of the recurrence, with K_j = k_j + s h_j and common powers of two taken out,
+    X_(j+1) = K_j X_j + s^2 U_j,  U_(j+1) = K_j U_j + J_(j+1) X_(j+1),  X_1 = 1, U_1 = J_1,  D = X_(n+1).  (2)
+Each of its roots then is followed as a shape from both ends (`_holzer`); with the torque p that is missing at the
+joint, where x = 1, Newton's step is
+    -p/(x^T (2 s J + h) x),                                                                             (3)
+and a root is off by no more than rounding in J, k and h is worth,
+    (sum of abs(s^2) J abs(x)^2 + sum of (k + abs(s) h) abs(x_j - x_(j+1))^2)/abs(x^T (2 s J + h) x).   (4)
+With light damping the real part is that of (x* J x) s^2 + (x* h x) s + x* k x = 0, which has all its digits; near
+critical damping both poles are those of this quadratic.
+
+A modal model (`_modal_receptance`) has (ln D)' = trace of (s^2 + s C + w^2)^-1 (2 s + C); a root lies within 2 p of its
+Newton steps.
+Source: Aberth, Math. Comp. 27:339 (1973); Bini & Noferini, Linear Algebra Appl. 439:1130 (2013); (4) by first-order
+perturbation of the quadratic eigenvalue problem, derived here.
+"""
+
+from kernels.drivetrain import _holzer
+from kernels.drivetrain._holzer import FLEXIBILITY, SHAPE, STRAIN
+from kernels.lanes.jit import jit, jit_apart
+from kernels.lanes.vectors import exponent, magnitude, pow2, sqrt
+from kernels.maths.small_dense import eliminate, over, size, sort, square, substitute_back
+
+SWEEP_LIMIT = 300
+"""Rounds of corrections of all roots; 4 to 10 are usual."""
+REFINEMENTS = 3
+REACH = 2.0**300
+"""Largest h without units."""
+_ROUNDING = 2.0**-50
+_MODAL_ROUNDING = 2e-16
+_SETTLED = 1e-12  # correction over root
+_NEAR = 1e-6  # step over root, above which another joint may do better
+_TWIN = 2.0**-20  # below which rounding moves a double root
+_LIGHT = 0.03
+
+
+@jit_apart
+def _start(n, j, w, half, s):
+    """Roots of mode j, s^2 + 2 half s + w^2 = 0, turned a little so that none is real and no two are equal."""
+    rest = (w - half) * (w + half)
+    far = -half - sqrt(-rest) if rest < 0.0 else -half
+    near = w * w / far if rest < 0.0 else -half
+    up = sqrt(rest) if rest > 0.0 else 0.0
+    turn = 1e-3 * (1.0 + j / n)
+    s[2 * j] = complex(near - turn * up, up - turn * near)
+    s[2 * j + 1] = complex(far - 0.7 * turn * up, 0.7 * turn * far - up)
+
+
+@jit_apart
+def _approach(newton, model, fixed, s, moved):
+    """The rounds (1) over all roots but the `fixed` first, each until it settles; whether all do."""
+    for i in range(s.size):
+        moved[i] = 0.0 if i < fixed else 1.0
+    for _ in range(SWEEP_LIMIT):
+        busy = False
+        for i in range(fixed, s.size):
+            if moved[i] > _SETTLED:
+                step, pull = newton(s[i], model), 0.0j
+                for other in range(s.size):
+                    away = s[i] - s[other]
+                    if other != i and size(away) > 0.0:
+                        pull += over(1.0 + 0.0j, away)
+                step = over(step, 1.0 - step * pull)
+                s[i] -= step
+                share = size(step) / size(s[i])
+                moved[i] = 0.0 if share >= 0.5 * moved[i] and share < 1e-6 else share
+                busy = busy or not moved[i] <= _SETTLED
+        if not busy:
+            return True
+    return False
+
+
+@jit
+def _is_larger(s, i, j):
+    return square(s[i]) > square(s[j])
+
+
+@jit
+def _swap(s, i, j):
+    s[i], s[j] = s[j], s[i]
+
+
+@jit_apart
+def _in_pairs(fixed, blur, s, pairs):
+    """Real roots, and those with Im > 0 before their conjugates, by rising size; whether these are as many.
+
+    A root is real whose Im is no more than `blur` of it; what is missing is NaN.
+    """
+    count = fixed
+    for i in range(s.size):
+        pairs[i] = 0.0j if i < fixed else complex(float("nan"), float("nan"))
+    for i in range(fixed, s.size):
+        real = magnitude(s[i].imag) <= blur * size(s[i])
+        for copy in range(1 if real else 2 if s[i].imag > 0.0 else 0):
+            if count < s.size:
+                pairs[count] = complex(s[i].real, 0.0 if real else s[i].imag * (1.0 - 2.0 * copy))
+            count += 1
+    complete = count == s.size
+    for i in range(s.size):
+        s[i] = pairs[i]
+    sort(fixed, s.size, _is_larger, _swap, s)  # of a pair +Im stays before -Im
+    return complete
+
+
+@jit_apart
+def _newton_of_chain(s, chain):
+    """D/D' of (2), by the same recurrence for the derivatives."""
+    n, J, k, h = chain
+    s_square = s * s
+    x, u, dx, du = 1.0 + 0.0j, J[0] + 0.0j, 0.0j, 0.0j
+    for j in range(n):
+        spring, inertia = k[j] + s * h[j], J[j + 1] if j < n - 1 else 0.0
+        dx = spring * dx + h[j] * x + (s_square * du + 2.0 * s * u)
+        x = spring * x + s_square * u
+        du = spring * du + h[j] * u + inertia * dx
+        u = spring * u + inertia * x
+        largest = max(size(x), size(u))
+        if not 1e-30 < largest < 1e30 and largest > 0.0:
+            unit = pow2(-exponent(largest))
+            x, u, dx, du = x * unit, u * unit, dx * unit, du * unit
+    return over(x, dx)
+
+
+@jit_apart
+def _follow(n, J, k, h, s, ways, e):
+    """The chain at s from both ends; a spring that is nought there is as good as that."""
+    for j in range(n):
+        spring = k[j] + s * h[j]
+        ways[FLEXIBILITY, j] = over(1.0 + 0.0j, spring if size(spring) > 0.0 else complex(2.0**-53 * k[j], 0.0))
+    _holzer.follow(n, J, k[n - 1] + s * h[n - 1], s * s, ways, e)
+
+
+@jit_apart
+def _look(n, J, k, h, s, r, ways, e):
+    """Newton's step (3) from the joint r, the bound (4) on the relative error; x* J x, x* h x and x* k x."""
+    left, right = over(1.0 + 0.0j, ways[0, r]), over(1.0 + 0.0j, ways[1, r])
+    solid, viscous, elastic = _holzer.join(n, r, J, k, h, ways, e, left, right)
+    slope = 0.0j
+    for j in range(n):
+        slope += 2.0 * s * (J[j] * (ways[SHAPE, j] * ways[SHAPE, j])) + h[j] * (ways[STRAIN, j] * ways[STRAIN, j])
+    missing = ways[2, r] * left + ways[3, r] * right + s * s * J[r]
+    modulus = sqrt(square(s))
+    worth = (modulus * modulus * solid + elastic + modulus * viscous) / (modulus * sqrt(square(slope)))
+    return -over(missing, slope), _ROUNDING * worth, solid, viscous, elastic
+
+
+@jit_apart
+def _best_joint(n, J, k, h, s, ways, e):
+    """The joint whose step is the shortest: the largest inertia may hardly move with what a damper lets creep."""
+    r = _holzer.joint(n, J, ways, e)
+    least = size(_look(n, J, k, h, s, r, ways, e)[0])
+    if least > _NEAR * size(s):
+        for other in range(n):
+            step = size(_look(n, J, k, h, s, other, ways, e)[0])
+            if step < least:
+                r, least = other, step
+    return r
+
+
+@jit_apart
+def _refined(n, J, k, h, s, ways, e):
+    """A pole to its last digits, and a bound on its relative error."""
+    error, solid, viscous, r = 0.0, 1.0, 0.0, -1
+    for attempt in range(2 * REFINEMENTS):
+        _follow(n, J, k, h, s, ways, e)
+        if r < 0:
+            r = _best_joint(n, J, k, h, s, ways, e)
+        step, error, solid, viscous, _ = _look(n, J, k, h, s, r, ways, e)
+        s += step
+        late = size(step) / size(s)
+        error = error if late <= 4.0 * error else error + late
+        if attempt >= REFINEMENTS - 1 and (s.imag == 0.0 or magnitude(s.imag) > 4.0 * error * size(s)):
+            break
+        if attempt == REFINEMENTS - 1:
+            s = complex(s.real, 0.0)
+    if magnitude(s.real) < _LIGHT * magnitude(s.imag):
+        s = complex(-0.5 * viscous / solid, s.imag)
+    return s, error
+
+
+@jit_apart
+def _refine_twins(n, J, k, h, s, i, j, ways, e):
+    """Puts two roots near critical damping where the quadratic of the shape between them has its own; their error."""
+    middle = complex(0.5 * (s[i].real + s[j].real), 0.0)
+    _follow(n, J, k, h, middle, ways, e)
+    _, _, solid, viscous, elastic = _look(n, J, k, h, middle, _best_joint(n, J, k, h, middle, ways, e), ways, e)
+    half, product = 0.5 * viscous / solid, elastic / solid
+    rest = half * half - product
+    root = sqrt(magnitude(rest))
+    if rest > 0.0:
+        s[i] = complex(-half - root, 0.0)
+        s[j] = complex(product / s[i].real, 0.0)
+    else:
+        s[i], s[j] = complex(-half, root), complex(-half, -root)
+    return 2.0 * _TWIN + 2.0 * magnitude(half + middle.real) / half
+
+
+@jit_apart
+def _refine(n, J, k, h, fixed, s, errors, ways, e):
+    """Every root to its last digits; a bound on their relative errors, inf where two but twins may be the same."""
+    worst = 0.0
+    for i in range(s.size):
+        errors[i] = 0.0
+    for i in range(fixed, s.size):
+        twin = -1
+        for j in range(s.size - 1, fixed - 1, -1):
+            near = j != i and size(s[i] - s[j]) < _TWIN * magnitude(s[i].real)
+            twin = j if near and errors[i] == 0.0 else twin
+        if twin >= 0 and errors[twin] == 0.0:
+            error = _refine_twins(n, J, k, h, s, i, twin, ways, e)
+            errors[i] = errors[twin] = -error
+            worst = max(worst, error)
+        elif errors[i] == 0.0:
+            s[i], errors[i] = _refined(n, J, k, h, s[i], ways, e)
+            worst = max(worst, errors[i]) if errors[i] >= 0.0 else float("inf")
+    for i in range(fixed, s.size):
+        for j in range(fixed, i):
+            twins = errors[i] < 0.0 and errors[i] == errors[j]
+            away = size(s[i] - s[j]) / size(s[i])
+            if not (twins or away > 4.0 * (magnitude(errors[i]) + magnitude(errors[j]))):
+                return float("inf")
+    return worst
+
+
+@jit_apart
+def damped_poles(n, J, k, h, f, s, room):
+    """All 2 n poles of a chain by rising size, a pair as +Im, -Im; a bound on their relative errors.
+
+    f : its natural frequencies w/2 pi
+    At critical damping two poles hang on half of the digits, as the bound says; abs(s) and damping of both together do
+    not. inf where they did not come or cannot be told apart.
+    """
+    ground, strongest = k[n - 1] > 0.0, 0.0
+    fixed = 0 if ground else 1 if h[n - 1] > 0.0 else 2
+    for j in range(n):
+        w = 6.283185307179586 * f[j]
+        solid, viscous, _ = _holzer.mode(n, J, k, h, w, room.ways, room.e)
+        _start(n, j, w, 0.5 * viscous / solid, s)
+        strongest = max(strongest, h[j])
+    for i in range(fixed):
+        s[i] = 0.0j
+    settled = _approach(_newton_of_chain, (n, J, k, h), fixed, s, room.errors)
+    error = _refine(n, J, k, h, fixed, s, room.errors, room.waves, room.e)
+    complete = _in_pairs(fixed, 0.0, s, room.pairs)
+    return error if settled and complete and strongest < REACH else float("inf")
+
+
+@jit_apart
+def _newton_of_modes(s, model):
+    """1/(ln D)' by elimination; 0 exactly on a root."""
+    p, w, C, A, B = model
+    for i in range(p):
+        for j in range(p):
+            A[i, j], B[i, j] = s * C[i, j], complex(C[i, j], 0.0)
+        A[i, i] += s * s + w[i] * w[i]
+        B[i, i] += 2.0 * s
+    eliminate(A, B, p, p)
+    slope = 0.0j
+    for column in range(p):
+        substitute_back(A, B, column, column, p)
+        slope += B[column, column]
+    return over(1.0 + 0.0j, slope) if size(slope) < float("inf") else 0.0j
+
+
+@jit_apart
+def modal_poles(w, C, p, free, s, room, A, B):
+    """All 2 p poles of a modal model, ordered as `damped_poles` has them; a bound on their relative errors.
+
+    `free` : whether mode 0 is a free motion, w = 0: one pole is 0, and a second one if nothing damps it
+    """
+    fixed = 0 if not free else 1 if C[0, 0] > 0.0 else 2
+    for i in range(p):
+        _start(p, i, w[i], 0.5 * C[i, i], s)
+    for i in range(fixed):
+        s[i] = 0.0j
+    model = p, w, C, A, B
+    settled, error = _approach(_newton_of_modes, model, fixed, s, room.errors), _MODAL_ROUNDING
+    for i in range(fixed, s.size):
+        error = max(error, size(_newton_of_modes(s[i], model)) / size(s[i]))
+    complete = _in_pairs(fixed, 2.0 * p * error, s, room.pairs)
+    return 2.0 * p * error if settled and complete else float("inf")
+
+
+@jit_apart
+def modal_damping(s, damping):
+    """Per mode the damping ratio -Re s/abs(s), from poles as `damped_poles` gives them.
+
+    Real poles are taken in pairs in the order of their size: -(s1 + s2)/(2 sqrt(s1 s2)) >= 1; with a pole 0 damping is
+    infinite beside another pole, 0 beside another 0.
+    """
+    mode, waiting, single = 0, 0.0, False
+    for i in range(s.size):
+        if s[i].imag > 0.0:
+            damping[mode] = -s[i].real / sqrt(square(s[i]))
+            mode += 1
+        elif s[i].imag == 0.0 and single:
+            one, two = magnitude(waiting), magnitude(s[i].real)
+            damping[mode] = 0.5 * (one + two) / (sqrt(one) * sqrt(two)) if s[i].real < 0.0 else 0.0
+            mode += 1
+        if s[i].imag == 0.0:
+            waiting, single = s[i].real, not single
