@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from sweep.errors import StudyError as StudyError
     from sweep.errors import SweepError as SweepError
-    from sweep.explore.groups import scaling as scaling
+    from sweep.explore.scaling import scaling as scaling
     from sweep.explore.join import join as join
     from sweep.explore.plan import plan as plan
     from sweep.explore.refine import refine as refine
@@ -55,7 +55,7 @@ _PUBLIC = {
     "explore.scattered": ("interpolated",),
     "explore.work_precision": ("work_precision",),
     "explore.sensitivity": ("sensitivity",),
-    "explore.groups": ("scaling",),
+    "explore.scaling": ("scaling",),
     "laws.exponents": ("local_exponent", "where_exponent"),
     "laws.maps": ("exponent_map",),
     "laws.lines": ("fit_exponent",),

@@ -10,9 +10,9 @@ Others may use
     `one_cell`        what a result and each method say of one cell
     `recheck`         a sample of OK cells solved again, to see whether they are right to rtol
     `sensitivity`     which parameters decide an output
-    `groups`          superfluous axes, outputs free of units
+    `scaling`         superfluous axes, outputs free of units
 
 Behind `refine` are `refiner` (rounds of cuts), `judge` (which edge to cut, and whether values are noise), `mesh` (cells
 joined to simplices) and `metric` (a box stretched to where an output bends), behind `work_precision` is `reference`
-(what errors are against), behind `groups` is `symmetries` (powers by which numbers may be multiplied).
+(what errors are against).
 """

@@ -27,7 +27,7 @@ from sweep.cells.sample import require_asked
 from sweep.cells.solve import Solver
 from sweep.cells.timing import Sample, row_partition, tolerated
 from sweep.errors import SweepError
-from sweep.explore.groups import advice_on
+from sweep.explore.scaling import advice_on
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import memory
 from sweep.runs.isolate import Processes, limit_of

@@ -9,7 +9,7 @@ from toy import KERNEL as TOY
 
 import sweep
 from kernels.interface import Field
-from sweep.explore.groups import scaling
+from sweep.explore.scaling import scaling
 
 DECADES = {"spacing": "log", "start": 0.1, "stop": 10, "num": 5}
 
