@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from sweep.errors import StudyError as StudyError
     from sweep.errors import SweepError as SweepError
-    from sweep.explore.scaling import scaling as scaling
     from sweep.explore.join import join as join
     from sweep.explore.plan import plan as plan
     from sweep.explore.refine import refine as refine
+    from sweep.explore.scaling import scaling as scaling
     from sweep.explore.scattered import interpolated as interpolated
     from sweep.explore.sensitivity import sensitivity as sensitivity
     from sweep.explore.solver import solver as solver

@@ -26,10 +26,9 @@ import xarray as xr
 
 from kernels.interface import Status
 from sweep.cells.schema import ANCILLARY
-from sweep.explore.judge import BORDER_LEVELS
-from sweep.explore.mesh import simplices
-from sweep.explore.metric import stretch
-from sweep.explore.refiner import Refiner
+from sweep.explore.refine import _report
+from sweep.explore.mesh import simplices, stretch
+from sweep.explore.refiner import LEVELS, Refiner
 from sweep.explore.scattered import heights, located
 from sweep.study.model import Axis
 
@@ -85,7 +84,7 @@ def refined(function, axes, tolerance):
     first = first.assign_coords(dict(zip(names, grid, strict=True)))
     cells = Refiner(first, study, ["value"], tolerance, MOST_CELLS, solved)
     cells.refine()
-    return cells.points, cells.column("value"), cells.report(first)
+    return cells.points, cells.column("value"), _report(cells, first)
 
 
 def true_error(function, points, values):
@@ -188,7 +187,7 @@ def holds_beside_infinity(axes):
     points, values, found = refined(pole, axes, POLE_TOLERANCE)
     spent = time.process_time() - start
     places = np.random.default_rng(5).random((PLACES[axes], axes))
-    wide = axes**0.5 * 2.0 ** -BORDER_LEVELS[axes] / (START[axes] - 1)
+    wide = axes**0.5 * 2.0 ** -LEVELS[axes][1] / (START[axes] - 1)
     places = places[np.linalg.norm(places, axis=1) < POLE - 2 * wide]
     logs = heights(values)
     stretched = stretch(points, logs)

@@ -12,7 +12,5 @@ Others may use
     `sensitivity`     which parameters decide an output
     `scaling`         superfluous axes, outputs free of units
 
-Behind `refine` are `refiner` (rounds of cuts), `judge` (which edge to cut, and whether values are noise), `mesh` (cells
-joined to simplices) and `metric` (a box stretched to where an output bends), behind `work_precision` is `reference`
-(what errors are against).
+Behind `refine` are `refiner` (rounds of cuts) and `mesh` (cells joined to simplices, and how far lines in them are off).
 """

@@ -9,6 +9,11 @@ Over a simplex with barycentric coordinates l_i a parabola is off its straight i
 so a quarter of c_ij is the error in the middle of the edge from i to j. The c_ij are fitted to how far the cells around
 are off the simplex continued to them; what such a parabola leaves of these distances tells kinks, peaks and whatever
 else is no parabola, and counts too.
+
+A box is stretched to where an output bends, so that cells are joined along what it does not depend on. Over an edge e
+straight lines are off by e |H| e / 8 at most, H the matrix of second derivatives. Multiplied by the square root of the
+mean of |H|, a box bends alike in all directions; an axis that matters nothing, or a direction along which a
+dimensionless group stays as it is, shrinks. Source: A. Loseille, F. Alauzet, SIAM J. Numer. Anal. 49 (2011) 38.
 """
 
 from __future__ import annotations
@@ -41,6 +46,12 @@ NEARLY = 0.9
 RIDGE = 1e-12
 BATCH = 2_000
 """Simplices whose parabolas are fitted at a time."""
+ROUNDS = 3
+"""Of a stretch; the first joins the cells of the box as it is, where simplices reach across more of the bends."""
+MOST = 3000
+"""Simplices whose mean a stretch takes."""
+FLATTEST, STRAIGHT = 1e-5, 1e-9
+"""Least share of the mean bend that a direction has: by 300 a box is stretched at most; what is taken for rounding."""
 
 
 def simplices(points: Array) -> Indices:
@@ -62,14 +73,40 @@ def are_solid(points: Array, corners: Indices) -> NDArray[np.bool_]:
 def tilted(points: Array) -> Array:
     """Points as they are joined."""
     axes = points.shape[1]
-    tilt = np.eye(axes) + SHEAR * np.tril(1.0 + 0.3 * np.arange(axes), -1)
-    found: Array = points @ tilt
+    found: Array = points @ (np.eye(axes) + SHEAR * np.tril(1.0 + 0.3 * np.arange(axes), -1))
     return found
 
 
 def edges(axes: int) -> Indices:
     """Pairs of corners of a simplex."""
     return np.array(list(itertools.combinations(range(axes + 1), 2)), dtype=np.intp)
+
+
+def largest(corners: Indices, of_edges: Array) -> Indices:
+    """The edges (m, 2) where something (m, pairs) is largest."""
+    return np.take_along_axis(corners, edges(corners.shape[1] - 1)[of_edges.argmax(axis=1)], 1)
+
+
+def are_too_few(points: Array) -> bool:
+    """Whether there are fewer points than tell a parabola over a simplex."""
+    number, axes = points.shape
+    return bool(number < axes + 1 + len(edges(axes)))
+
+
+def with_beyond(corners: Indices) -> Indices:
+    """Corners of each simplex, those beyond its faces, and those beyond its neighbours' there; where there are none,
+    its first one. However thin simplices are, some lie to every side."""
+    count, size = corners.shape
+    faces = np.stack([np.delete(corners, k, axis=1) for k in range(size)], axis=1).reshape(-1, size - 1)
+    faces.sort(axis=1)
+    order = np.lexsort(faces.T)
+    same = np.flatnonzero((faces[order[1:]] == faces[order[:-1]]).all(axis=1))
+    other = np.full(count * size, -1)
+    other[order[same]], other[order[same + 1]] = order[same + 1], order[same]
+    other = other.reshape(count, size)
+    opposite = np.where(other < 0, corners[:, :1], corners.ravel()[other])
+    neighbour = np.where(other < 0, np.arange(count)[:, None], other // size)
+    return np.concatenate([corners, opposite, opposite[neighbour].reshape(count, -1)], axis=1)
 
 
 def interpolation_errors(points: Array, heights: Array, around: Indices) -> tuple[Array, Indices]:
@@ -89,7 +126,7 @@ def interpolation_errors(points: Array, heights: Array, around: Indices) -> tupl
     corners = around[:, : axes + 1]
     sizes = []
     for side in (-1, 1) if axes == 1 else (0,):
-        bend, misfit = parabolas(points, heights, around, side)
+        bend, misfit = _parabolas(points, heights, around, side)
         middle = abs(bend) / 4
         inside = abs(bend.sum(axis=1)) / corners.shape[1] ** 2
         sizes.append(SAFETY * np.maximum(middle.max(axis=1, initial=0.0), inside) + MISFIT.get(axes, 2.5) * misfit)
@@ -103,13 +140,23 @@ def interpolation_errors(points: Array, heights: Array, around: Indices) -> tupl
     return size, largest(corners, np.where(nearly, -lengths, -np.inf))
 
 
-def are_too_few(points: Array) -> bool:
-    """Whether there are fewer points than tell a parabola over a simplex."""
-    number, axes = points.shape
-    return bool(number < axes + 1 + len(edges(axes)))
+def errors_inside(points: Array, heights: Array, kind: Indices, corners: Indices) -> tuple[Array, Indices]:
+    """Errors of simplices between points of one kind, as the points of that kind tell; -1 is none.
+
+    Infinite where points are of several kinds, or too few; there the longest edge is to be cut.
+    """
+    ends = points[corners[:, edges(points.shape[1])]]
+    size, cut = np.full(len(corners), np.inf), largest(corners, np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2))
+    for number in np.unique(kind[kind >= 0]):
+        members, here = np.flatnonzero(kind == number), np.flatnonzero((kind[corners] == number).all(axis=1))
+        if len(here) and not are_too_few(points[members]):
+            around = with_beyond(np.searchsorted(members, corners[here]))
+            size[here], own = interpolation_errors(points[members], heights[members], around)
+            cut[here] = members[own]
+    return size, cut
 
 
-def parabolas(points: Array, heights: Array, around: Indices, side: int = 0) -> tuple[Array, Array]:
+def _parabolas(points: Array, heights: Array, around: Indices, side: int = 0) -> tuple[Array, Array]:
     """The c_ij (m, pairs) of (1) over simplices with those beyond, and what they leave (m,), a mean square's root.
 
     They are fitted by least squares to how far the points around a simplex are off its straight continuation; of one
@@ -143,23 +190,34 @@ def parabolas(points: Array, heights: Array, around: Indices, side: int = 0) -> 
     return bends, misfits
 
 
-def with_beyond(corners: Indices) -> Indices:
-    """Corners of each simplex, those beyond its faces, and those beyond its neighbours' there; where there are none,
-    its first one. However thin simplices are, some lie to every side."""
-    count, size = corners.shape
-    faces = np.stack([np.delete(corners, k, axis=1) for k in range(size)], axis=1).reshape(-1, size - 1)
-    faces.sort(axis=1)
-    order = np.lexsort(faces.T)
-    same = np.flatnonzero((faces[order[1:]] == faces[order[:-1]]).all(axis=1))
-    other = np.full(count * size, -1)
-    other[order[same]], other[order[same + 1]] = order[same + 1], order[same]
-    other = other.reshape(count, size)
-    opposite = np.where(other < 0, corners[:, :1], corners.ravel()[other])
-    neighbour = np.where(other < 0, np.arange(count)[:, None], other // size)
-    return np.concatenate([corners, opposite, opposite[neighbour].reshape(count, -1)], axis=1)
-
-
-def largest(corners: Indices, of_edges: Array) -> Indices:
-    """The edges (m, 2) where something (m, pairs) is largest."""
-    pair = edges(corners.shape[1] - 1)[of_edges.argmax(axis=1)]
-    return np.take_along_axis(corners, pair, 1)
+def stretch(points: Array, heights: Array) -> Array:
+    """The matrix (axes, axes) by which points are multiplied before those of these heights are joined."""
+    axes, valued = points.shape[1], np.isfinite(heights)
+    inside, found = points[valued], np.eye(axes)
+    if axes == 1 or are_too_few(inside):
+        return found
+    (row, column), pairs = np.triu_indices(axes), edges(axes)
+    for _ in range(ROUNDS):
+        corners = simplices(points @ found)
+        corners = np.searchsorted(np.flatnonzero(valued), corners[valued[corners].all(axis=1)])
+        if not len(corners):
+            return np.eye(axes)
+        around = with_beyond(corners)[:: len(corners) // MOST + 1]
+        # second derivatives over each simplex, from c_ij = -e_ij H e_ij / 2 of its edges
+        places = inside @ found
+        edge = places[around[:, pairs[:, 0]]] - places[around[:, pairs[:, 1]]]
+        products = -edge[:, :, row] * edge[:, :, column] * np.where(row == column, 0.5, 1.0)
+        scale = abs(products).max(axis=(1, 2))[:, None]
+        bend = _parabolas(places, heights[valued], around)[0] / scale
+        second = np.empty((len(around), axes, axes))
+        second[:, row, column] = np.linalg.solve(products / scale[:, :, None], bend[:, :, None])[:, :, 0]
+        second[:, column, row] = second[:, row, column]
+        sizes, directions = np.linalg.eigh(second)
+        bends = (directions * abs(sizes)[:, None]) @ directions.transpose(0, 2, 1)
+        volumes = abs(np.linalg.det(inside[around[:, 1 : axes + 1]] - inside[around[:, :1]]))
+        # the square root of the mean, over its largest eigenvalue
+        sizes, directions = np.linalg.eigh(found @ np.average(bends, axis=0, weights=volumes) @ found.T)
+        if sizes.max() <= STRAIGHT:
+            return np.eye(axes)
+        found = (directions * np.sqrt(np.maximum(sizes / sizes.max(), FLATTEST))) @ directions.T
+    return found

@@ -1,9 +1,9 @@
-"""Cells where they are needed: a finished sweep refined until straight lines between cells are right to a tolerance.
+"""Cells where they are needed: a finished sweep refined until straight lines between cells are accurate to a tolerance.
 
-Cells are joined to simplices, intervals along one axis, in a box stretched to where an output bends (see `metric`).
-What is there is judged first: the cells around a simplex tell how far straight lines are off in it (`mesh`). Where that
-is more than the tolerance, the edge that bends most is cut in the middle, and the cells around are judged again. So is
-the edge across a border between statuses, down to a fixed share of the first grid's step. Where values scatter, so that
+Cells are joined to simplices, intervals along one axis, in a box stretched to where an output bends. What is there is
+judged first: the cells around a simplex tell how far straight lines are off in it (`mesh`). Where that is more than the
+tolerance, the edge that bends most is cut in the middle, and the cells around are judged again (`refiner`). So is the
+edge across a border between statuses, down to a fixed share of the first grid's step. Where values scatter, so that
 further cells are off as much as those before, none are added. What is judged is logarithmic where values are positive,
 as a scaling law wants it; elsewhere errors are relative to the largest value.
 
@@ -15,9 +15,11 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import math
 import os
 import shutil
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +30,7 @@ from sweep.cells.fingerprint import fingerprint
 from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
 from sweep.errors import SweepError
 from sweep.explore.mesh import Array
-from sweep.explore.refiner import Refinement, Refiner
+from sweep.explore.refiner import SAME, Refiner
 from sweep.explore.scattered import MOST_AXES, REFINED_TO, axes_of
 from sweep.file import disk
 from sweep.file.open import in_memory, open_result
@@ -42,6 +44,64 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MOST_CELLS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """What came of it.
+
+    Attributes
+    ----------
+    dataset : Dataset
+        All cells, the first ones and those added, in rising order: along the axis, or of several along `cell`.
+    added : int
+        Cells beyond the first ones.
+    uniform : int
+        Cells of an even grid as fine as the finest step.
+    error : float
+        Largest error left of straight lines between cells, relative, as the cells around tell it; not across borders
+        of statuses, nor in `jumps` and `singular`.
+    tolerance : float
+    complete : bool
+        Whether the tolerance is met; not so where `most_cells` ran out, an output jumps, goes to infinity or is noisy.
+    jumps : int
+        Places where the tolerance is not met although edges are cut as often as is allowed, or cuts lessen nothing.
+    singular : int
+        Likewise, as near borders of statuses as these are known, where values go to infinity or bend without end.
+    unseen : dict of str to str
+        How far apart cells are along each axis, at most: nothing tells of a peak narrower than that.
+    noise : float
+        How far values scatter, relative, where more cells do not lessen that, so that none were added; 0 where they do.
+    """
+
+    dataset: xr.Dataset
+    added: int
+    uniform: int
+    error: float
+    tolerance: float
+    complete: bool
+    jumps: int
+    singular: int
+    unseen: dict[str, str]
+    noise: float = 0.0
+
+    def __str__(self) -> str:
+        cells = self.dataset[STATUS].size
+        text = f"{cells:,} cells, {self.added:,} of them added"
+        if len(self.unseen) == 1:
+            text += f"; an even grid as fine has {self.uniform:,}"
+        text += f"\ninterpolation error left: {self.error:.2g}, as the cells around tell"
+        if self.noise:
+            text += f"; values scatter by {self.noise:.1g} of their size from cell to cell, or bend within less than "
+            text += "the distance of cells, and more cells do not lessen that"
+        elif self.error > self.tolerance:
+            text += "; the tolerance is not met everywhere, allow more cells"
+        if self.jumps:
+            text += f"; not in {self.jumps:,} place{'s' * (self.jumps > 1)} where it jumps or diverges"
+        if self.singular:
+            text += f"; not in the {self.singular:,} nearest a border of statuses, where values diverge"
+        apart = ", ".join(f"{width} in {name}" for name, width in self.unseen.items())
+        return f"{text}\ncells are up to {apart} apart; a peak narrower than that is not seen"
 
 
 def refine(
@@ -100,17 +160,7 @@ def refine(
     _require(dataset, study, names, tolerance)
     title = f"{study.title}, refined"
     target = None if path is None else as_path(path)
-    rounds = None if target is None else target.with_name(f"{target.name}.rounds")
-    if target is not None and rounds is not None:
-        source = dataset.encoding.get("source")
-        check_target(target, force=True, read=[Path(source)] if source else [])
-        if target.exists() and not force:
-            with open_result(target) as there:
-                if there.attrs["title"] != title:
-                    raise SweepError(f"{target}: holds another result; name another file, or overwrite it with --force")
-        with disk.refusing(target):
-            rounds.mkdir(exist_ok=True)
-
+    rounds = None if target is None else _folder_of_rounds(target, title, dataset.encoding.get("source"), force)
     options: dict[str, Any] = {"workers": workers, "isolate": isolate, "cell_timeout": cell_timeout}
 
     def of(values: Mapping[str, Array], design: str = "zip") -> Study:
@@ -133,29 +183,65 @@ def refine(
     arrays = {name: cells.column(name)[order] for name in (*study.outputs, *ANCILLARY)}
     attrs = {REFINED_TO: json.dumps(dict.fromkeys(names, tolerance))}
     if target is None or rounds is None:
-        return cells.report(in_memory(cell_schema(whole, {}), arrays).assign_attrs(attrs))
-    found = cells.report(store_cells(whole, target, arrays, force, attrs=attrs))
+        return _report(cells, in_memory(cell_schema(whole, {}), arrays).assign_attrs(attrs))
+    found = _report(cells, store_cells(whole, target, arrays, force, attrs=attrs))
     shutil.rmtree(rounds, ignore_errors=True)
     return found
 
 
 def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance: float) -> None:
+    """Raises SweepError for what cannot be refined."""
+    axes = study.axes.values()
     if not 0 < tolerance < 1:
         raise SweepError(f"tolerance: expected a number between 0 and 1, found {tolerance}")
     if STATUS not in dataset:
         raise SweepError("a summary keeps no cells; refine a result that has them")
-    if any(axis.words is not None or axis.values.ndim > 1 for axis in study.axes.values()):
+    if any(axis.words is not None or axis.values.ndim > 1 for axis in axes):
         raise SweepError("only number axes can be refined")
     if study.design != "product" and not axes_of(dataset):
         raise SweepError("only a product of axes can be refined, or what was refined before")
-    if len(study.axes) > MOST_AXES:
-        raise SweepError(f"at most {MOST_AXES} axes can be refined, found {len(study.axes)}; fix the others")
-    if study.design == "product" and any(
-        len(axis) < 2 or (np.diff(axis.values) <= 0).any() for axis in study.axes.values()
-    ):
+    if len(axes) > MOST_AXES:
+        raise SweepError(f"at most {MOST_AXES} axes can be refined, found {len(axes)}; fix the others")
+    if study.design == "product" and any(len(axis) < 2 or (np.diff(axis.values) <= 0).any() for axis in axes):
         raise SweepError("an axis to be refined needs at least two values, in rising order")
     for name in names:
         if name not in dataset or dataset[name].dims != dataset[STATUS].dims:
             raise SweepError(f"{name}: is no output of one value a cell")
     if bool((dataset[STATUS] == Status.PENDING).any()):
         raise SweepError("the sweep is not finished; run it to its end first")
+
+
+def _folder_of_rounds(target: Path, title: str, source: str | None, force: bool) -> Path:
+    """Where the rounds on the way to a result are kept. Raises SweepError where it is not to be written."""
+    check_target(target, force=True, read=[Path(source)] if source else [])
+    if target.exists() and not force:
+        with open_result(target) as there:
+            if there.attrs["title"] != title:
+                raise SweepError(f"{target}: holds another result; name another file, or overwrite it with --force")
+    rounds = target.with_name(f"{target.name}.rounds")
+    with disk.refusing(target):
+        rounds.mkdir(exist_ok=True)
+    return rounds
+
+
+def _report(cells: Refiner, dataset: xr.Dataset) -> Refinement:
+    """What came of it, with the dataset of all cells."""
+    found, box = cells.found, cells.box
+    left = found.valued & found.finest & found.wanted
+    steps = [np.diff(np.unique(column)) for column in cells.points.T]
+    widths = np.ptp(cells.points[found.corners[found.valued]], axis=1).max(axis=0, initial=0.0)
+    unseen = {}
+    for name, width, low, high, logarithmic in zip(cells.axes, widths, box.low, box.high, box.logarithmic, strict=True):
+        unseen[name] = f"a factor {(high / low) ** width:.3g}" if logarithmic else f"{width * (high - low):.3g}"
+    return Refinement(
+        dataset=dataset,
+        added=len(cells.points) - cells.first,
+        uniform=int(math.prod(round(1 / step[step > SAME].min()) + 1 for step in steps)),
+        error=float(found.size[found.valued & ~left].max(initial=0.0)),
+        tolerance=cells.tolerance,
+        complete=not (found.size > cells.tolerance).any(),
+        jumps=int((left & ~found.beside).sum()),
+        singular=int((left & found.beside).sum()),
+        unseen=unseen,
+        noise=max(cells.noise.values()),
+    )

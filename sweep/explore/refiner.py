@@ -1,84 +1,66 @@
-"""Rounds of cuts of edges between cells, until straight lines between them are right to a tolerance."""
+"""Rounds of cuts of edges between cells, until straight lines between them are accurate to a tolerance.
+
+In every round cells are joined to simplices, each of which is judged: inside of one status by the cells around it
+(`mesh`), across a border between statuses by how long its edges are. An edge of each that is not good enough is cut in
+the middle. Where cuts lessen nothing, more of them are of no use: an edge is left alone once it is as short as is
+allowed, or beside a pole; and where errors stay as they are all over a region, values are noisy there.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from sweep.cells.schema import STATUS
-from sweep.explore.judge import Judge, Judged
-from sweep.explore.mesh import Array, Indices
+from sweep.explore.mesh import Array, Indices, edges, errors_inside, largest, simplices, stretch
 from sweep.explore.scattered import Box, heights, kinds
 from sweep.study.model import Study
 
 if TYPE_CHECKING:
     import xarray as xr
 
+LEVELS = {1: (20, 10, 20), 2: (10, 5, 5), 3: (6, 3, 3)}
+FURTHER_LEVELS = (4, 2, 2)
+"""How often a step of the first grid may be cut in two, by number of axes: inside of a status, for a jump cannot be
+interpolated; across a border between statuses, where no value is right inside the last cut; and beside such a border,
+where values may go to infinity."""
+GROWTH, SETTLED = 1.5, 1.02
+"""Cells, as a multiple, after which boxes are stretched anew; likewise before a refinement ends, since those who read
+the result stretch it by all of its cells."""
+LESSENING = 0.5
+"""Share of how far a cell is off the line between those that it was put between, compared with the cell that it
+descends from, as many cuts ago as there are axes: of a smooth output it is a quarter."""
+CUTS, STAYS, JUMP = 6, 0.6, 0.2
+"""Cuts after which values change as much from cell to cell as before, which is so at poles: in the latter half of them
+by more than this share of what they did in the first one; and at most once less than that share of the change lies on
+one side of the cell put between two others, as at a jump."""
+LATEST = 128
+"""Cells that were added last, which tell noise: most of them are not off by less; and what is to be cut fills more than
+half of what it did with 2^axes times fewer cells, which is not so around a jump or a pole."""
+NOISE_SIZE = 8.0
+"""Error of a simplex in noise, at most, as a multiple of how far such a cell is off the line between two others."""
 SAME = 2.0**-40
 """Distance of places along an axis, from 0 to 1, that are the same."""
+
 Solve = Callable[[Mapping[str, Array]], "xr.Dataset"]
 
 
-@dataclass(frozen=True)
-class Refinement:
-    """What came of it.
+class Judged(NamedTuple):
+    """Simplices: their corners, errors, the edges (m, 2) to cut, and whether these need a cut, are not to be cut
+    although they do, lie inside of one status, lie beside a border of statuses."""
 
-    Attributes
-    ----------
-    dataset : Dataset
-        All cells, the first ones and those added, in rising order: along the axis, or of several along `cell`.
-    added : int
-        Cells beyond the first ones.
-    uniform : int
-        Cells of an even grid as fine as the finest step.
-    error : float
-        Largest error left of straight lines between cells, relative, as the cells around tell it; not across borders
-        of statuses, nor in `jumps` and `singular`.
-    tolerance : float
-    complete : bool
-        Whether the tolerance is met; not so where `most_cells` ran out, an output jumps, or is noisy.
-    jumps : int
-        Places where the tolerance is not met although edges are cut as often as is allowed.
-    singular : int
-        Likewise, as near borders of statuses as these are known, where values go to infinity or bend without end.
-    unseen : dict of str to str
-        How far apart cells are along each axis, at most: nothing tells of a peak narrower than that.
-    noise : float
-        How far values scatter, relative, where more cells do not lessen that, so that none were added; 0 where they do.
-    """
-
-    dataset: xr.Dataset
-    added: int
-    uniform: int
-    error: float
-    tolerance: float
-    complete: bool
-    jumps: int
-    singular: int
-    unseen: dict[str, str]
-    noise: float = 0.0
-
-    def __str__(self) -> str:
-        cells = self.dataset[STATUS].size
-        text = f"{cells:,} cells, {self.added:,} of them added"
-        if len(self.unseen) == 1:
-            text += f"; an even grid as fine has {self.uniform:,}"
-        text += f"\ninterpolation error left: {self.error:.2g}, as the cells around tell"
-        if self.noise:
-            text += f"; values scatter by {self.noise:.1g} of their size from cell to cell, or bend within less than "
-            text += "the distance of cells, and more cells do not lessen that"
-        elif self.error > self.tolerance:
-            text += "; the tolerance is not met everywhere, allow more cells"
-        if self.jumps:
-            text += f"; not in {self.jumps:,} place{'s' * (self.jumps > 1)} where it jumps or diverges"
-        if self.singular:
-            text += f"; not in the {self.singular:,} nearest a border of statuses, where values diverge"
-        apart = ", ".join(f"{width} in {name}" for name, width in self.unseen.items())
-        return f"{text}\ncells are up to {apart} apart; a peak narrower than that is not seen"
+    corners: Indices
+    size: Array
+    ends: Indices
+    wanted: NDArray[np.bool_]
+    finest: NDArray[np.bool_]
+    valued: NDArray[np.bool_]
+    beside: NDArray[np.bool_]
 
 
 class Refiner:
@@ -99,70 +81,158 @@ class Refiner:
         Where the cells lie in a box from 0 to 1, and on the axes.
     first : int
         How many cells there were.
+    found : Judged
+        All that is left, of every output.
+    noise : dict of str to float
+        How far values of an output scatter, which more cells do not lessen; 0 where they do.
     """
 
     def __init__(
         self, dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance: float, most_cells: int, solve: Solve
     ) -> None:
-        self.names, self.tolerance, self.most, self._solve = names, tolerance, most_cells, solve
+        self.tolerance, self.most, self._solve = tolerance, most_cells, solve
         self.parts = [_flat(dataset.load())]
         self.axes = list(study.axes)
         first = {name: self.parts[0][name].values for name in self.axes}
         self.box = Box.of(first)
         self.values = np.stack(list(first.values()), axis=1)
         self.points = self.box.points(first)
-        self.known = [dict(zip(_keys(t), v, strict=True)) for t, v in zip(self.points.T, self.values.T, strict=True)]
         self.first = len(self.points)
-        product = study.design == "product"
-        steps = np.array([len(k) - 1 if product else self.first ** (1 / len(self.axes)) for k in self.known])
-        self.judges = [Judge(steps, tolerance) for _ in names]
         self.origins = np.stack([np.arange(self.first)] * 2, axis=1)
+        known = [dict(zip(_keys(t), v, strict=True)) for t, v in zip(self.points.T, self.values.T, strict=True)]
+        self._known = known
+        even = study.design != "product"
+        self._steps = np.array([self.first ** (1 / len(known)) if even else len(k) - 1 for k in known])
+        self.noise = dict.fromkeys(names, 0.0)
+        self._stretched = {name: np.eye(len(self.axes)) for name in names}
+        self._to_cut: dict[str, list[tuple[int, float]]] = {name: [] for name in names}
 
     def refine(self) -> None:
         """Rounds of cuts, each of edges that share no end, until nothing is to be cut however outputs are judged."""
         # between two values nothing tells whether an output bends
-        for k, known in enumerate(self.known):
+        for k, known in enumerate(self._known):
             if len(known) == 2:
                 first = self.points[:, k] == 0
                 points, values = self.points[first], self.values[first]
                 points[:, k], values[:, k] = 0.5, self.box.values(k, np.array([0.5]))
                 self._add(points, values)
+        stretched_at = 0
         while True:
-            finite = np.isfinite(np.stack([self.column(name) for name in self.names])).all(axis=0)
-            kind = kinds(self.column(STATUS), finite)
-            parts = [
-                judge.judged(self.points, heights(self.column(name)), kind, self.origins)
-                for name, judge in zip(self.names, self.judges, strict=True)
-            ]
+            if len(self.points) >= GROWTH * stretched_at:
+                self._stretched = {name: stretch(self.points, heights(self.column(name))) for name in self.noise}
+                stretched_at = len(self.points)
+            parts = [self._judged(name) for name in self.noise]
             self.found = Judged(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-            cuts = self._cuts(self.found)[: max(0, self.most - len(self.points))]
-            if len(cuts):
+            if len(cuts := self._cuts()):
                 self._add(*self._middles(cuts), cuts)
-                continue
-            again = [judge.looks_anew(len(self.points)) for judge in self.judges]
-            if not any(again):
+            elif len(self.points) > SETTLED * stretched_at:
+                stretched_at = 0
+            else:
                 return
 
     def column(self, name: str) -> Any:
         """An output, or what is said of it, of all cells."""
         return np.concatenate([part[name].values for part in self.parts])
 
-    def _cuts(self, found: Judged) -> Indices:
-        """Edges to cut, worst first; none shares an end with one before, for a cut changes what is known there."""
-        wanted = np.flatnonzero((found.size > found.limit) & ~found.finest)
+    def _judged(self, name: str) -> Judged:
+        """Errors of an output's straight lines between cells, and borders between statuses that are to be cut."""
+        points, axes, height = self.points, len(self.axes), heights(self.column(name))
+        finite = np.isfinite(np.stack([self.column(each) for each in self.noise])).all(axis=0)
+        places, kind = points @ self._stretched[name], kinds(self.column(STATUS), finite)
+        corners = simplices(places)
+        of_corners, pairs = kind[corners], edges(axes)
+        alike = (of_corners == of_corners[:, :1]).all(axis=1)
+        inside, border, beside_border = (2.0**-level for level in LEVELS.get(axes, FURTHER_LEVELS))
+
+        def extent(ends: Indices) -> Array:
+            """Of edges (..., 2), in steps of the first grid along the axis where they are longest."""
+            found: Array = (abs(points[ends[..., 0]] - points[ends[..., 1]]) * self._steps).max(axis=-1)
+            return found
+
+        # inside of one status: as the cells of that status tell
+        size, ends = errors_inside(places, height, kind, corners)
+        size[~alike | (of_corners[:, 0] < 0)] = 0.0
+
+        # across a border: infinite while edges are longer than they may stay
+        mixed = np.flatnonzero(~alike & (of_corners >= 0).any(axis=1))
+        across = of_corners[mixed][:, pairs[:, 0]] != of_corners[mixed][:, pairs[:, 1]]
+        length = np.where(across, extent(corners[mixed][:, pairs]), -1.0)
+        size[mixed] = np.where(length.max(axis=1, initial=-1.0) > border, math.inf, 0.0)
+        ends[mixed] = largest(corners[mixed], length)
+
+        # beside one: as near as the simplices across it may stay wide
+        beside = np.zeros(len(corners), bool)
+        if not alike.all():
+            tree = cKDTree(points[np.unique(corners[~alike])] * self._steps)
+            apart = tree.query(points * self._steps, p=math.inf)[0]
+            beside = alike & (apart <= border)[corners].any(axis=1)
+        valued, off = alike & (of_corners[:, 0] >= 0), self._off(height)
+        finest = extent(ends) <= np.where(beside, beside_border, inside)
+        finest |= valued & np.isfinite(size) & self._is_at_pole(height)[ends.max(axis=1)]
+        limit = max(self.tolerance, NOISE_SIZE * self.noise[name])
+        wide = corners[valued & (size > limit)]
+        volume = float(abs(np.linalg.det(points[wide[:, 1:]] - points[wide[:, :1]])).sum())
+        self.noise[name] = max(self.noise[name], self._noise(off, self._to_cut[name], volume))
+        wanted = size > max(self.tolerance, NOISE_SIZE * self.noise[name])
+        return Judged(corners, size, ends, wanted, finest, valued, beside)
+
+    def _off(self, height: Array) -> Array:
+        """How far each cell is off the line between the two that it was put between; NaN of the first ones."""
+        with np.errstate(invalid="ignore"):
+            off: Array = abs(height - height[self.origins].mean(axis=1))
+        off[self.origins[:, 0] == self.origins[:, 1]] = np.nan
+        return off
+
+    def _ancestors(self, cells: Indices) -> Indices:
+        """The younger ends of the edges that were cut for cells, as many cuts ago as there are axes."""
+        for _ in self.axes:
+            cells = self.origins[cells].max(axis=1)
+        return cells
+
+    def _is_at_pole(self, height: Array) -> NDArray[np.bool_]:
+        """Whether cuts have lessened nothing on the way to a cell, although there is no jump."""
+        cells, found = np.arange(len(height)), []
+        with np.errstate(invalid="ignore"):
+            halves = np.sort(abs(height[:, None] - height[self.origins]), axis=1)
+            for _ in range(CUTS):
+                found.append(halves[cells])
+                cells = self._ancestors(cells)
+            small, large = np.moveaxis(np.array(found), 2, 0)
+            before, after = (np.median(part, axis=0) for part in (large[CUTS // 2 :], large[: CUTS // 2]))
+            stays: NDArray[np.bool_] = (after > STAYS * before) & ((small <= JUMP * large).sum(axis=0) <= 1)
+        return stays
+
+    def _noise(self, off: Array, to_cut: list[tuple[int, float]], volume: float) -> float:
+        """How far the latest cells are off, where more cells do not lessen that; `volume` is that of what is too far
+        off, and appended `to_cut`, those of earlier rounds."""
+        to_cut.append((len(off), volume))
+        earlier = [v for count, v in to_cut if count * 2 ** len(self.axes) <= len(off)]
+        if not earlier or volume <= LESSENING * earlier[-1]:
+            return 0.0
+        latest = np.arange(max(0, len(off) - LATEST), len(off))
+        before = off[self._ancestors(latest)]
+        known = np.isfinite(off[latest] + before)
+        if known.sum() <= 0.75 * LATEST or np.median((off[latest] - LESSENING * before)[known]) <= 0:
+            return 0.0
+        return float(np.median(off[latest][known]))
+
+    def _cuts(self) -> Indices:
+        """Edges to cut, worst first, as many as are allowed; none shares an end with one before, for a cut changes what
+        is known there."""
+        wanted = np.flatnonzero(self.found.wanted & ~self.found.finest)
         used = np.zeros(len(self.points), dtype=bool)
         cuts = []
-        for first, second in found.ends[wanted[np.argsort(-found.size[wanted], kind="stable")]].tolist():
+        for first, second in self.found.ends[wanted[np.argsort(-self.found.size[wanted], kind="stable")]].tolist():
             if not (used[first] or used[second]):
                 used[first] = used[second] = True
                 cuts.append((first, second))
-        return np.array(cuts, dtype=np.intp).reshape(-1, 2)
+        return np.array(cuts, dtype=np.intp).reshape(-1, 2)[: max(0, self.most - len(self.points))]
 
     def _middles(self, cuts: Indices) -> tuple[Array, Array]:
         """Places and axis values in the middles of edges; a value that an axis has already is taken again."""
         points = self.points[cuts].mean(axis=1)
         values = np.empty(points.shape)
-        for k, known in enumerate(self.known):
+        for k, known in enumerate(self._known):
             between = self.box.values(k, points[:, k])
             values[:, k] = [known.setdefault(t, v) for t, v in zip(_keys(points[:, k]), between, strict=True)]
         return points, values
@@ -173,32 +243,6 @@ class Refiner:
         self.parts.append(_flat(self._solve(dict(zip(self.axes, values.T, strict=True)))))
         self.points, self.values = np.concatenate([self.points, points]), np.concatenate([self.values, values])
         self.origins = np.concatenate([self.origins, np.stack([itself] * 2, axis=1) if ends is None else ends])
-
-    def report(self, dataset: xr.Dataset) -> Refinement:
-        """What came of it, with the dataset of all cells."""
-        found, axes = self.found, range(len(self.axes))
-        left = found.valued & found.finest & (found.size > found.limit)
-        finest = [np.diff(np.unique(t)) for t in self.points.T]
-        width = np.ptp(self.points[found.corners[found.valued]], axis=1).max(axis=0, initial=0.0)
-        low, high = self.box.low, self.box.high
-        apart = [
-            f"a factor {(high[k] / low[k]) ** width[k]:.3g}"
-            if self.box.logarithmic[k]
-            else f"{width[k] * (high[k] - low[k]):.3g}"
-            for k in axes
-        ]
-        return Refinement(
-            dataset=dataset,
-            added=len(self.points) - self.first,
-            uniform=int(math.prod(round(1 / step[step > SAME].min()) + 1 for step in finest)),
-            error=float(found.size[found.valued & ~left].max(initial=0.0)),
-            tolerance=self.tolerance,
-            complete=not (found.size > self.tolerance).any(),
-            jumps=int((left & ~found.beside).sum()),
-            singular=int((left & found.beside).sum()),
-            unseen=dict(zip(self.axes, apart, strict=True)),
-            noise=max(judge.noise for judge in self.judges),
-        )
 
 
 def _keys(places: Array) -> list[float]:

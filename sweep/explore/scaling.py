@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 TRIED_CELLS, FEWEST_CELLS = 24, 4
-"""Cells on which scalings are tried, and as many others of which slopes are taken, where they are cheap; and at least."""
+"""Cells on which scalings are tried, and as many others of which slopes are taken: where they are cheap; at least."""
 SECONDS = 2.0
 """That finding scalings may take; of a dear kernel those of the declared units alone are tried, on the fewest cells."""
 LEAST_SOLVED, LEAST_SECONDS = 60, 0.1
@@ -352,7 +352,8 @@ def _logs(cells: Cells, output: str) -> Array:
     """Logarithms of an output's size, one cell after the other; NaN where it has none."""
     values = cells.outputs[output].reshape(cells.number, -1)
     there = _valued(cells)[:, None] & (values != 0)
-    return np.log(abs(values), out=np.full(values.shape, np.nan), where=there).ravel()
+    found: Array = np.log(abs(values), out=np.full(values.shape, np.nan), where=there).ravel()
+    return found
 
 
 def _null_space(slopes: Array, fields: int) -> Array:
@@ -379,7 +380,8 @@ def _fraction(weight: float) -> Fraction:
 
 def _echelon(matrix: Array, least: float = 1e-9) -> tuple[Array, list[int]]:
     """Reduced row echelon form, of pivots of at least some size, and their columns."""
-    rows, pivots = matrix.copy(), []
+    rows = matrix.copy()
+    pivots: list[int] = []
     for column in range(rows.shape[1]):
         done = len(pivots)
         if done == len(rows):

@@ -12,6 +12,7 @@ import json
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -20,8 +21,7 @@ from scipy.spatial import Delaunay
 
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.errors import SweepError
-from sweep.explore.mesh import Array, Indices, are_solid, are_too_few, interpolation_errors, tilted, with_beyond
-from sweep.explore.metric import stretch
+from sweep.explore.mesh import Array, Indices, are_solid, errors_inside, stretch, tilted
 from sweep.words import require_dataset
 
 LOGARITHMIC = 1.999
@@ -176,12 +176,7 @@ def _between(values: Array, points: Array, places: Array, status: Indices) -> tu
     # a corner that takes no part need have no value
     total: Array = np.where(shares == 0, 0.0, shares * height[corners]).sum(axis=1)
     size, solid = np.full(len(mesh), np.inf), are_solid(points, mesh)
-    for number in np.unique(kind[kind >= 0]):
-        members, own = np.flatnonzero(kind == number), np.flatnonzero((kind[mesh] == number).all(axis=1) & solid)
-        held = np.isin(own, where)
-        if held.any() and not are_too_few(points[members]):
-            around = with_beyond(np.searchsorted(members, mesh[own]))[held]
-            size[own[held]] = interpolation_errors(points[members], height[members], around)[0]
+    size[solid] = errors_inside(points, height, kind, mesh[solid])[0]
     off = np.where(shares.max(axis=1) == 1, 0.0, np.where(where < 0, np.inf, size[where]))
     return total * _size(values) if _size(values) else np.exp(total), off
 
@@ -221,11 +216,14 @@ def on_lines(dataset: xr.Dataset, x: str) -> xr.Dataset:
     if x not in names:
         return dataset
     others = [name for name in names if name != x]
-    values, places = dataset[x].values, np.stack([dataset[name].values for name in others], axis=1)
+    values, dims = dataset[x].values, dataset[STATUS].dims
+    cell = str(dims[0])
+    places = np.stack([dataset[name].values for name in others], axis=1)
     lines, line, count = np.unique(places, axis=0, return_inverse=True, return_counts=True)
     line = line.ravel()
-    ends = [np.isin(np.arange(len(lines)), line[values == end]) for end in (values.min(), values.max())]
-    long = (count >= FEWEST_ON_A_LINE) & ends[0] & ends[1]
+    long = count >= FEWEST_ON_A_LINE
+    for end in (values.min(), values.max()):
+        long &= np.isin(np.arange(len(lines)), line[values == end])
 
     def longest(some: NDArray[np.bool_]) -> str:
         """How to ask for that one of some lines that has most cells."""
@@ -242,17 +240,14 @@ def on_lines(dataset: xr.Dataset, x: str) -> xr.Dataset:
     told += f"--at, {longest(long)}"
     shorter = (count[~long] >= FEWEST_ON_A_LINE).any()
     told += f", or a shorter one, {longest(~long)}." if shorter else f"; no shorter line has {FEWEST_ON_A_LINE}."
-    on = np.flatnonzero(long[line])
-    grid, column = np.unique(values[on], return_inverse=True)
-    row = (np.cumsum(long) - 1)[line[on]]
     across = others[0] if len(others) == 1 else "line"
-    texts = [", ".join(f"{name} = {v:.6g}" for name, v in zip(others, place, strict=True)) for place in lines[long]]
-    labels = lines[long, 0] if len(others) == 1 else texts
-    attrs = {**dataset.attrs, "lines": told}
-    found = xr.Dataset(coords={across: (across, labels), x: (x, grid, dataset[x].attrs)}, attrs=attrs)
-    for name, variable in dataset.data_vars.items():
-        if variable.dims == dataset[STATUS].dims and variable.dtype == np.float64:
-            filled = np.full((int(long.sum()), len(grid)), np.nan)
-            filled[row, column] = variable.values[on]
-            found[name] = ((across, x), filled, variable.attrs)
-    return found
+    labels = lines[:, 0]
+    if len(others) > 1:
+        labels = np.array([", ".join(f"{n} = {v:.6g}" for n, v in zip(others, place, strict=True)) for place in lines])
+    outputs = [name for name, v in dataset.data_vars.items() if v.dims == dims and v.dtype == np.float64]
+    cells = dataset[outputs].drop_vars([n for n, c in dataset.coords.items() if c.dims == dims])
+    cells = cells.assign_coords({across: (dims, np.arange(len(lines))[line]), x: (dims, values)})
+    both: Any = {cell: [across, x]}
+    found = cells.isel({cell: long[line]}).set_index(both).unstack(cell)
+    found = found.assign_coords({across: labels[long], x: found[x].assign_attrs(dataset[x].attrs)})
+    return found.assign_attrs(lines=told)

@@ -13,6 +13,7 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,21 +23,24 @@ from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.grid import Grid, empty_cells
 from sweep.cells.sample import sampled, solved, with_method
 from sweep.cells.schema import STATUS
-from sweep.cells.solve import Solver
+from sweep.cells.solve import GIVEN_UP, Solver, among
 from sweep.cells.turns import usable_methods
 from sweep.errors import SweepError
 from sweep.explore.plan import small_duration
-from sweep.explore.reference import Reference, best_reference, errors, given_reference
 from sweep.runs.run import run
 from sweep.study.model import Study, frozen
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.words import Table, did_you_mean, page, paragraph
+from sweep.words import Table, did_you_mean, listed, page, paragraph
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 CELLS = 1024
 ROUNDS = 5
 LEAST_SECONDS = 0.01
+FINE = tuple(10.0**-k for k in range(14, 5, -1))
+"""Values of rtol that a reference is tried at: in each cell the least at which it says OK counts."""
+GIVEN, ROUNDING = "the truth given", 2.0**-53
+"""The name of a reference that is given, and what it is right to."""
 UNSURE = (Status.INACCURATE, Status.GRAZING)
 """What says of itself that digits, or a count, may be wrong."""
 NAMES = {int(status): status.name for status in Status}
@@ -100,10 +104,10 @@ def work_precision(
     truth : mapping of output to ndarray, optional
         True values in the cells that `precision_cells` names; NaN in all outputs where there is nothing to give. Errors
         are then over these outputs alone.
+    note : callable, optional
+        Told how many cells are left out.
     isolate, cell_timeout
         As of `run`: cells are tried in processes of their own first, and left out where a method fails.
-    note : callable, optional
-        Told how many are left out.
 
     Returns
     -------
@@ -135,45 +139,20 @@ def work_precision(
     if cells < 1:
         raise SweepError(f"cells: expected at least 1, found {cells}")
     part = sampled(as_study(study), cells)
-    able = [part.kernel.methods[number].name for number in usable_methods(part)]
-    if not able:
-        raise SweepError("no method of the kernel can do this study")
-    names = ["auto", *able] if methods is None else list(dict.fromkeys(methods))
-    for name in names:
-        if name not in ("auto", *able):
-            hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
-            raise SweepError(f"no method {name} that can do this study{hint}")
+    able, names = _methods(part, methods, reference)
     if isolate or cell_timeout is not None:
         part = _without_failing(part, ["auto", *able], cell_timeout, note)
-    if truth is None:
-        # what a method tells of itself, its work and its error, is neither right nor wrong
-        compared = tuple(name for name in part.outputs if name not in (*WORK, *ESTIMATES))
-        against = best_reference(dataclasses.replace(part, outputs=compared or part.outputs), able, reference)
-    else:
-        against = given_reference(part, truth)
+    against = _given(part, truth) if truth is not None else _best(part, [reference] if reference else able)
 
-    rows = [_measured(part, name, rtol, against) for name in names for rtol in tolerances]
     shape = len(names), len(tolerances)
+    rows = [_measured(part, name, rtol, against) for name in names for rtol in tolerances]
     columns = {key: np.array([row[key] for row in rows]).reshape(shape) for key in rows[0]}
     columns["seconds"] = _seconds(part, names, tolerances)
-    found = xr.Dataset(
-        {
-            key: (("method", "rtol"), values, {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[key]})
-            for key, values in columns.items()
-        },
-        {"method": names, "rtol": tolerances},
-    )
-    missing = (
-        []
-        if methods is not None
-        else [
-            f"{method.name} cannot do {', '.join(terms)}"
-            if (terms := [name for name in method.excludes if name in part.terms])
-            else f"{method.name} does not give {', '.join(name for name in method.lacks if name in part.outputs)}"
-            for method in part.kernel.methods
-            if method.name not in able
-        ]
-    )
+    found = xr.Dataset(coords={"method": names, "rtol": tolerances})
+    for key, values in columns.items():
+        attrs = {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[key]}
+        found[key] = ("method", "rtol"), values, attrs
+    missing = _missing(part, able) if methods is None else []
     return found.assign_attrs(
         title=part.title,
         kernel=part.kernel_name,
@@ -184,6 +163,30 @@ def work_precision(
         missing="; ".join(missing),
         omissions="; ".join([*missing, *omissions(found)]),
     )
+
+
+def _methods(study: Study, methods: Sequence[str] | None, reference: str | None) -> tuple[list[str], list[str]]:
+    """The methods that can do a study, and those to measure. Raises SweepError."""
+    able = [study.kernel.methods[number].name for number in usable_methods(study)]
+    if not able:
+        raise SweepError("no method of the kernel can do this study")
+    names = ["auto", *able] if methods is None else list(dict.fromkeys(methods))
+    for name in names if reference is None else [*names, reference]:
+        if name not in able and (name != "auto" or name == reference):
+            hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
+            raise SweepError(f"no method {name} that can do this study{hint}")
+    return able, names
+
+
+def _missing(study: Study, able: Sequence[str]) -> list[str]:
+    """Which methods cannot do a study, and why, in words."""
+    found = []
+    for method in study.kernel.methods:
+        if method.name not in able:
+            terms = [name for name in method.excludes if name in study.terms]
+            lacks = [name for name in method.lacks if name in study.outputs]
+            found.append(f"{method.name} {'cannot do' if terms else 'does not give'} {', '.join(terms or lacks)}")
+    return found
 
 
 def _without_failing(
@@ -250,38 +253,128 @@ def omissions(found: xr.Dataset) -> list[str]:
     return lines
 
 
-def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[str, Any]:
+@dataclass(frozen=True, eq=False)
+class _Reference:
+    """Values by output; in each cell their relative error, infinite where they are not known to be right; and whether
+    it is known that there is nothing to give."""
+
+    source: str
+    values: Mapping[str, Any]
+    floor: Any
+    void: Any
+
+    @property
+    def sound(self) -> Any:
+        """Cells that have values which are right to `floor`."""
+        return np.isfinite(self.floor)
+
+    @property
+    def judged(self) -> int:
+        """Number of cells in which a method can be told right or wrong."""
+        return int((self.sound | self.void).sum())
+
+
+def _given(study: Study, values: Mapping[str, Any]) -> _Reference:
+    """Values of some outputs in all cells of a study; NaN in all of them: there is nothing to give."""
+    size = Grid(study).size
+    shapes = {name: (size, *shape) for name, shape in study.shapes.items()}
+    taken = {}
+    for name, column in values.items():
+        if name not in shapes:
+            hint = did_you_mean(name, shapes) or f"; the study asks for {listed(shapes, word='and')}"
+            raise SweepError(f"truth: the study does not ask for {name}{hint}")
+        taken[name] = np.asarray(column, np.float64)
+        if taken[name].shape != shapes[name]:
+            raise SweepError(f"truth: {name} has the shape {taken[name].shape}, its cells {shapes[name]}")
+    if not taken:
+        raise SweepError("truth: no output is given")
+    void = np.all([np.isnan(column).reshape(size, -1).all(axis=1) for column in taken.values()], axis=0)
+    return _Reference(GIVEN, taken, np.where(void, np.inf, ROUNDING), void)
+
+
+def _best(study: Study, names: Sequence[str]) -> _Reference:
+    """Of the method that leaves the fewest cells open; then: states a bound, is right to less. Raises SweepError.
+
+    In each cell its values are those at the least rtol at which it says that they are right.
+    """
+    # what a method tells of itself, its work and its error, is neither right nor wrong
+    compared = tuple(name for name in study.outputs if name not in (*WORK, *ESTIMATES))
+    study = dataclasses.replace(study, outputs=compared or study.outputs)
+    vague = {name: study.kernel.method(name).bound is None for name in names}
+    found: list[_Reference] = []
+    for name in sorted(names, key=lambda name: vague[name]):
+        if vague[name] and any(one.judged == len(one.floor) for one in found):
+            break  # those that state a bound suffice
+        floor, void = np.full(Grid(study).size, np.inf), np.zeros(Grid(study).size, bool)
+        values: dict[str, Any] = {}
+        for rtol in FINE:
+            outputs, status, *_ = solved(with_method(study, name, rtol))
+            values = values or dict(outputs)
+            refused = status >= FIRST_REFUSAL
+            void |= refused & ~among(status, GIVEN_UP)
+            now = ~refused & (status != Status.INACCURATE) & np.isinf(floor)
+            for output, column in outputs.items():
+                values[output][now] = column[now]
+            floor[now] = rtol
+            if (np.isfinite(floor) | void).all():
+                break
+        found.append(_Reference(name, values, floor, void))
+
+    def rank(one: _Reference) -> tuple[int, bool, float]:
+        return -one.judged, vague[one.source], float(np.log10(one.floor[one.sound]).mean()) if one.sound.any() else 0.0
+
+    best = min(found, key=rank)
+    if not best.sound.any():
+        raise SweepError(f"{best.source} solves none of the cells, so there is nothing to measure against")
+    return best
+
+
+def _errors(outputs: Mapping[str, Any], reference: Mapping[str, Any]) -> Any:
+    """Largest relative error of each cell over its outputs, of traces relative to their largest value."""
+    worst = np.zeros(len(next(iter(reference.values()))))
+    for name, true in reference.items():
+        values, rest = outputs[name], tuple(range(1, true.ndim))
+        size = np.nanmax(np.abs(true), axis=rest, keepdims=True, initial=0.0) if rest else np.abs(true)
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            off = np.abs(values - true) / size
+        off = np.where((values == true) | (np.isnan(values) & np.isnan(true)), 0.0, off)
+        worst = np.maximum(worst, np.where(np.isnan(off), np.inf, off).max(axis=rest, initial=0.0))
+    return worst
+
+
+def _measured(study: Study, name: str, rtol: float, against: _Reference) -> dict[str, Any]:
     """What is measured of a method at a tolerance, but for its time."""
     outputs, status, used, _ = solved(with_method(study, name, rtol))
-    error = errors(outputs, against.values)
+    error = _errors(outputs, against.values)
     methods = [method.name for method in study.kernel.methods]
     # against itself the reference has no error; what can be said is what it is right to, also where auto took it
     itself = used == methods.index(against.source) if against.source in methods else np.zeros(len(used), bool)
     error = np.where(itself, np.maximum(error, against.floor), error)
-    valued, total = against.sound & (status < FIRST_REFUSAL), against.judged
+    valued, inaccurate = against.sound & (status < FIRST_REFUSAL), status == Status.INACCURATE
     sure = valued & ~np.isin(status, UNSURE)
     unsolved = against.sound & ~valued
     wrong = sure & ~(error <= rtol + against.floor) | against.void & (status == Status.OK)
-    worst = int(np.where(sure, error, -1.0).argmax())
+    first, worst = int(unsolved.argmax()), int(np.where(sure, error, -1.0).argmax())
     # no number between two cells: errors may be infinite
     low, high = np.quantile(error[valued], (0.1, 0.9), method="inverted_cdf") if valued.any() else [math.nan] * 2
-    first = int(unsolved.argmax())
     counts = {method: int((used == i).sum()) for i, method in enumerate(methods)}
-    return {
-        "error_median": float(np.median(error[valued])) if valued.any() else math.nan,
-        "error_low": float(low),
-        "error_high": float(high),
-        "error_worst": float(error[worst]) if sure.any() else math.nan,
-        "ok": float((against.sound & (status == Status.OK)).sum() / total),
-        "remarked": float((valued & (status != Status.OK) & (status != Status.INACCURATE)).sum() / total),
-        "inaccurate": float((valued & (status == Status.INACCURATE)).sum() / total),
-        "unsolved": float(unsolved.sum() / total),
-        "silent": float(wrong.sum() / total),
+    numbers = {
+        "error_median": np.median(error[valued]) if valued.any() else math.nan,
+        "error_low": low,
+        "error_high": high,
+        "error_worst": error[worst] if sure.any() else math.nan,
+        "ok": (against.sound & (status == Status.OK)).sum() / against.judged,
+        "remarked": (valued & (status != Status.OK) & ~inaccurate).sum() / against.judged,
+        "inaccurate": (valued & inaccurate).sum() / against.judged,
+        "unsolved": unsolved.sum() / against.judged,
+        "silent": wrong.sum() / against.judged,
+        **{key: outputs[key][valued].mean() if valued.any() else math.nan for key in WORK if key in outputs},
+    }
+    return numbers | {
         "worst_cell": _cell(study, worst) if sure.any() else "",
         "unsolved_as": f"{NAMES[int(status[first])]} at {_cell(study, first)}" if unsolved.any() else "",
         "silent_at": _cell(study, int(wrong.argmax())) if wrong.any() else "",
         "methods_used": ", ".join(f"{m} {100 * n / max((used >= 0).sum(), 1):.3g} %" for m, n in counts.items() if n),
-        **{key: float(outputs[key][valued].mean()) if valued.any() else math.nan for key in WORK if key in outputs},
     }
 
 

@@ -8,8 +8,7 @@ import xarray as xr
 from scipy.interpolate import LinearNDInterpolator
 
 import sweep
-from sweep.explore.mesh import are_too_few, interpolation_errors, simplices, with_beyond
-from sweep.explore.metric import stretch
+from sweep.explore.mesh import are_too_few, interpolation_errors, simplices, stretch, with_beyond
 from sweep.explore.scattered import Box, axes_of, heights, on_lines
 from sweep.laws.maps import contours, fraction
 

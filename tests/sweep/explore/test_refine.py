@@ -135,8 +135,23 @@ def test_where_values_scatter_no_more_cells_are_added_and_the_scatter_is_told():
     height = np.linspace(1.0, 2.0, 5000)
     off = abs(np.interp(height, found.dataset.height, found.dataset.fall_time) - curve(height))
     assert off.max() < 1.5e-2
-    for quiet in (lambda height: np.sin(40 * height) + 2, lambda height: 1 / abs(height - 1.3719)):  # a wave, a pole
-        assert sweep.refine(**shaped(quiet, np.linspace(1, 2, 9)), tolerance=1e-2).noise == 0
+    quiet = sweep.refine(**shaped(lambda height: np.sin(40 * height) + 2, np.linspace(1, 2, 9)), tolerance=1e-2)
+    assert (quiet.noise, quiet.complete) == (0, True)
+
+
+@pytest.mark.parametrize("pole", [lambda x: 1 / abs(x), lambda x: 1 / x, lambda x: 1 / x**2])
+def test_beside_a_pole_cells_are_few_and_elsewhere_the_tolerance_is_met(pole):
+    found = sweep.refine(**shaped(lambda height: pole(height - 1.3719), np.linspace(1, 2, 9)), tolerance=1e-2)
+    assert found.added < 125  # of one sign 250 to 320 where edges are cut as often as at a jump
+    assert found.jumps > 0
+    assert not found.complete
+    assert (found.noise, found.error <= 1e-2) == (0, True)
+    height = np.linspace(1, 2, 4001)
+    far = abs(height - 1.3719) > 0.02
+    values = pole(found.dataset.height.values - 1.3719)
+    scale = np.log if (values > 0).all() else lambda y: y / abs(values).max()
+    off = np.interp(height, found.dataset.height, scale(found.dataset.fall_time.values)) - scale(pole(height - 1.3719))
+    assert abs(off[far]).max() < 1e-2
 
 
 def test_cells_that_are_inaccurate_are_on_no_border():
