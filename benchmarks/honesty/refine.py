@@ -26,8 +26,8 @@ import xarray as xr
 
 from kernels.interface import Status
 from sweep.cells.schema import ANCILLARY
-from sweep.explore.refine import _report
 from sweep.explore.mesh import simplices, stretch
+from sweep.explore.refine import _report
 from sweep.explore.refiner import LEVELS, Refiner
 from sweep.explore.scattered import heights, located
 from sweep.study.model import Axis

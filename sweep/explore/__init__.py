@@ -12,5 +12,5 @@ Others may use
     `sensitivity`     which parameters decide an output
     `scaling`         superfluous axes, outputs free of units
 
-Behind `refine` are `refiner` (rounds of cuts) and `mesh` (cells joined to simplices, and how far lines in them are off).
+Behind `refine` are `refiner` (rounds of cuts) and `mesh` (cells joined to simplices, how far lines in them are off).
 """
