@@ -27,7 +27,7 @@ import xarray as xr
 from kernels.interface import Status
 from sweep.cells.schema import ANCILLARY
 from sweep.explore.mesh import simplices, stretch
-from sweep.explore.refine import _report
+from sweep.explore.refine import report
 from sweep.explore.refiner import LEVELS, Refiner
 from sweep.explore.scattered import heights, located
 from sweep.study.model import Axis
@@ -84,7 +84,7 @@ def refined(function, axes, tolerance):
     first = first.assign_coords(dict(zip(names, grid, strict=True)))
     cells = Refiner(first, study, ["value"], tolerance, MOST_CELLS, solved)
     cells.refine()
-    return cells.points, cells.column("value"), _report(cells, first)
+    return cells.points, cells.column("value"), report(cells, first)
 
 
 def true_error(function, points, values):

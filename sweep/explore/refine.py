@@ -183,8 +183,8 @@ def refine(
     arrays = {name: cells.column(name)[order] for name in (*study.outputs, *ANCILLARY)}
     attrs = {REFINED_TO: json.dumps(dict.fromkeys(names, tolerance))}
     if target is None or rounds is None:
-        return _report(cells, in_memory(cell_schema(whole, {}), arrays).assign_attrs(attrs))
-    found = _report(cells, store_cells(whole, target, arrays, force, attrs=attrs))
+        return report(cells, in_memory(cell_schema(whole, {}), arrays).assign_attrs(attrs))
+    found = report(cells, store_cells(whole, target, arrays, force, attrs=attrs))
     shutil.rmtree(rounds, ignore_errors=True)
     return found
 
@@ -224,7 +224,7 @@ def _folder_of_rounds(target: Path, title: str, source: str | None, force: bool)
     return rounds
 
 
-def _report(cells: Refiner, dataset: xr.Dataset) -> Refinement:
+def report(cells: Refiner, dataset: xr.Dataset) -> Refinement:
     """What came of it, with the dataset of all cells."""
     found, box = cells.found, cells.box
     left = found.valued & found.finest & found.wanted
