@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.study.condition import CellCondition
+from sweep.study.condition import cells_where
 from sweep.study.model import AUTO, SETTINGS, Study
 
 Floats = NDArray[np.float64]
@@ -90,25 +89,18 @@ class Grid(Box):
         found: Floats = axis.values[cells // self._runs[name] % len(axis)]
         return found
 
-    @cached_property
-    def condition(self) -> CellCondition:
-        """The study's, if it has one."""
-        settings = [name for name in SETTINGS if name in self.study.axes]
-        return CellCondition(self.study.where, self.study.kernel, settings)
-
     def asked(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Which of some flat cells the study's condition holds for."""
-        if not self.study.where:
+        study, settings = self.study, [name for name in SETTINGS if name in self.study.axes]
+        if not study.where:
             return np.ones(len(cells), bool)
-        holds: NDArray[np.bool_] = self.condition.holds({name: self._of(name, cells) for name in self.condition.names})
+        holds: NDArray[np.bool_] = cells_where(study.where, study.kernel, settings, lambda name: self._of(name, cells))
         return holds
 
     def _of(self, name: str, cells: NDArray[np.int64]) -> Floats:
         """A parameter's or setting's numbers in some flat cells."""
         source = self.study.follows.get(name, name)
-        if source in self.study.axes:
-            return self.values(source, cells)
-        return np.full(len(cells), self.study.fixed[name])
+        return self.values(source, cells) if source in self.study.axes else np.full(len(cells), self.study.fixed[name])
 
     def settings(self, start: int, stop: int) -> tuple[int | NDArray[np.int8], float | Floats]:
         """Method number (-1: auto) and rtol of the cells: one for all, or where it is an axis one per cell."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from sweep.cells.grid import Cells, Grid, empty_cells
 from sweep.errors import SweepError
+from sweep.study.condition import names_in
 from sweep.study.model import Axis, Study, differs, frozen
 
 MOST_TRIED = 1 << 16
@@ -81,7 +82,7 @@ def _conditioned(study: Study) -> Study:
     """The study without those axes of a product that its condition does not name."""
     if study.design != "product":
         return study
-    named = {study.follows.get(name, name) for name in Grid(study).condition.names}
+    named = {study.follows.get(name, name) for name in names_in(study.where)}
     return dataclasses.replace(study, axes={name: axis for name, axis in study.axes.items() if name in named})
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ast
+import functools
 import operator
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
@@ -14,38 +16,24 @@ import numpy as np
 from kernels.interface import Kernel
 from sweep.errors import SweepError
 from sweep.study.model import setting
-from sweep.study.units import UnitMistake, dimension, scale
+from sweep.study.units import UnitMistake, parsed, scale
 from sweep.words import did_you_mean, listed
 
-COMPARE: dict[type, Callable[[Any, Any], Any]] = {
-    ast.Eq: operator.eq,
-    ast.NotEq: operator.ne,
-    ast.Lt: operator.lt,
-    ast.LtE: operator.le,
-    ast.Gt: operator.gt,
-    ast.GtE: operator.ge,
-}
-COMPUTE: dict[type, Callable[[Any, Any], Any]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: lambda x, y: np.float64(x) ** y if isinstance(x, int | float) else x**y,
-}
+OPERATORS: dict[type, Callable[[Any, Any], Any]] = {
+    ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt,
+    ast.GtE: operator.ge, ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
+    ast.Div: operator.truediv, ast.Pow: lambda x, y: np.float64(x) ** y if isinstance(x, int | float) else x**y,
+    ast.And: np.logical_and, ast.Or: np.logical_or,
+}  # fmt: skip
 LONGEST = 1000
 """Letters of a condition."""
-
 GRAMMAR = "names, numbers, 'words', + - * / **, < <= > >= == !=, and, or, not, brackets"
 
 Valued = tuple[Any, Any]
-"""What a part of a condition comes to (numbers, words or truth), and its dimension; None: it fits any."""
+"""What a part of a condition comes to (numbers, words or truth), and its unit; None: it fits any."""
 
 
-def is_array(value: Any) -> bool:
-    """An array of numpy or xarray, not a number or a word."""
-    return hasattr(value, "dtype") and not isinstance(value, np.generic)
-
-
+@dataclass(frozen=True)
 class Condition:
     """A condition on arrays by name.
 
@@ -62,124 +50,100 @@ class Condition:
         Of every name of numbers. If given, only like quantities can be compared and added, "'3 cm'" may stand beside
         a name, and powers are whole numbers, computed by products: those of libraries differ from machine to machine
         in the last digit.
-
-    Raises
-    ------
-    SweepError
-        It is too long or no expression.
     """
 
-    def __init__(
-        self,
-        text: str,
-        variable: Callable[[str], Any],
-        words: Callable[[str], Iterable[str]],
-        says: str = "",
-        units: Mapping[str, str] | None = None,
-    ) -> None:
-        self.text, self.says, self.units = text, says, units
-        self.variable, self.words = variable, words
-        if len(text) > LONGEST:
-            self.text = text[:40] + "..."
-            raise self.refusal(f"is longer than {LONGEST} letters")
-        try:
-            self.tree = ast.parse(text.strip(), mode="eval").body
-        except (SyntaxError, ValueError, RecursionError, MemoryError):
-            raise self.refusal(f"cannot be read; it may hold {GRAMMAR}") from None
+    text: str
+    variable: Callable[[str], Any]
+    words: Callable[[str], Iterable[str]]
+    says: str = ""
+    units: Mapping[str, str] | None = None
 
     def truth(self) -> Any:
-        """Where it holds. Raises SweepError."""
+        """Where it holds. Raises SweepError where it is too long or no expression, or compares what is unlike."""
+        if len(self.text) > LONGEST:
+            raise SweepError(f"{self.says}{self.text[:40]}...: is longer than {LONGEST} letters")
         try:
             with np.errstate(all="ignore"):
-                found, _ = self.value(self.tree)
-        except (ValueError, RecursionError, MemoryError, ArithmeticError, TypeError):
+                found, _ = self._value(ast.parse(self.text.strip(), mode="eval").body)
+        except (SyntaxError, ValueError, RecursionError, MemoryError, ArithmeticError, TypeError):
             raise self.refusal(f"cannot be read; it may hold {GRAMMAR}") from None
-        if not is_array(found) or found.dtype != bool:
+        if _kind(found) != "b":
             raise self.refusal('is no condition on the cells; write e.g. "R < 0.1" or "status == \'OK\'"')
         return found
 
-    def value(self, node: ast.expr) -> Valued:
+    def refusal(self, what: str, node: ast.expr | None = None) -> SweepError:
+        """The mistake as the user is told, of a part or of the whole."""
+        part = "" if node is None else f'"{ast.unparse(node)[:60]}" '
+        return SweepError(f"{self.says}{self.text}: {part}{what}")
+
+    def _value(self, node: ast.expr) -> Valued:
         """What a part of it comes to."""
         match node:
-            case ast.Constant(value=bool()):
-                pass
-            case ast.Constant(value=int() | float() | str() as value):
+            case ast.Constant(value=int() | float() | str() as value) if not isinstance(value, bool):
                 return value, None
             case ast.Name(id=name):
                 found = self.variable(name)
-                return found, dimension(self.units[name]) if self.units is not None and name in self.units else None
-            case ast.UnaryOp(op=ast.USub(), operand=operand):
-                number, unit = self.number(operand)
+                return found, parsed(self.units[name]) if self.units and name in self.units else None
+            case ast.UnaryOp(op=ast.USub(), operand=part):
+                number, unit = self._part(part, "fiu", "number")
                 return -number, unit
-            case ast.UnaryOp(op=ast.Not(), operand=operand):
-                return ~self.holds_for(operand), None
-            case ast.BinOp(op=op) if type(op) in COMPUTE:
-                return self.computed(node)
-            case ast.BoolOp(op=op, values=values):
-                join = np.logical_and if isinstance(op, ast.And) else np.logical_or
-                found = self.holds_for(values[0])
-                for part in values[1:]:
-                    found = join(found, self.holds_for(part))
-                return found, None
-            case ast.Compare(left=left, ops=ops, comparators=others) if all(type(op) in COMPARE for op in ops):
-                return self.compared([left, *others], [COMPARE[type(op)] for op in ops]), None
-        raise self.refusal(f'"{ast.unparse(node)[:60]}" is not allowed; it may hold {GRAMMAR}')
+            case ast.UnaryOp(op=ast.Not(), operand=part):
+                return ~self._part(part, "b", "condition")[0], None
+            case ast.BoolOp(op=op, values=parts):
+                return functools.reduce(
+                    OPERATORS[type(op)], (self._part(part, "b", "condition")[0] for part in parts)
+                ), None
+            case ast.BinOp(op=op) if type(op) in OPERATORS:
+                return self._computed(node)
+            case ast.Compare(left=left, ops=ops, comparators=others) if all(type(op) in OPERATORS for op in ops):
+                parts = [left, *others]
+                links = (
+                    self._compared(a, OPERATORS[type(op)], b) for a, op, b in zip(parts, ops, others, strict=False)
+                )
+                return functools.reduce(np.logical_and, links), None
+        raise self.refusal(f"is not allowed; it may hold {GRAMMAR}", node)
 
-    def number(self, node: ast.expr) -> Valued:
-        """A part that is numbers."""
-        found, unit = self.value(node)
-        if isinstance(found, str) or (is_array(found) and found.dtype.kind not in "fiu"):
-            raise self.refusal(f'"{ast.unparse(node)[:60]}" is no number')
+    def _part(self, node: ast.expr, kinds: str, what: str) -> Valued:
+        """A part whose values are of some kinds of numpy."""
+        found, unit = self._value(node)
+        if _kind(found) not in kinds:
+            raise self.refusal(f"is no {what}", node)
         return found, unit
 
-    def holds_for(self, node: ast.expr) -> Any:
-        """A part that is a condition."""
-        found, _ = self.value(node)
-        if not is_array(found) or found.dtype != bool:
-            raise self.refusal(f'"{ast.unparse(node)[:60]}" is no condition')
-        return found
-
-    def computed(self, node: ast.BinOp) -> Valued:
+    def _computed(self, node: ast.BinOp) -> Valued:
         """A sum, product or power."""
-        (left, unit), (right, other) = self.number(node.left), self.number(node.right)
-        compute = COMPUTE[type(node.op)]
-        match node.op:
-            case ast.Add() | ast.Sub():
-                return compute(left, right), self.agreed(node.left, unit, node.right, other)
-            case ast.Pow() if self.units is not None:
-                if not isinstance(right, int) or not 1 <= right <= 9:
-                    raise self.refusal(f'"{ast.unparse(node)[:60]}": a power is a whole number from 1 to 9')
-                found = left
-                for _ in range(right - 1):
-                    found = found * left
-                return found, None if unit is None else unit**right
-            case _ if unit is None and other is None:
-                return compute(left, right), None
+        (left, unit), (right, other) = (self._part(part, "fiu", "number") for part in (node.left, node.right))
+        compute = OPERATORS[type(node.op)]
+        if isinstance(node.op, ast.Add | ast.Sub):
+            return compute(left, right), self._agreed(node.left, unit, node.right, other)
+        if isinstance(node.op, ast.Pow) and self.units is not None:
+            if not isinstance(right, int) or not 1 <= right <= 9:
+                raise self.refusal("is not allowed; a power is a whole number from 1 to 9", node)
+            return functools.reduce(operator.mul, [left] * right), None if unit is None else unit**right
+        if unit is None and other is None:
+            return compute(left, right), None
         # a number alone is of no unit in a product
         return compute(left, right), compute(other**0 if unit is None else unit, unit**0 if other is None else other)
 
-    def compared(self, nodes: Sequence[ast.expr], comparisons: Sequence[Callable[[Any, Any], Any]]) -> Any:
-        """A chain of comparisons."""
-        found: Any = True
-        for left, right, compare in zip(nodes, nodes[1:], comparisons, strict=False):
-            (value, unit), (other, other_unit) = self.beside(left, right), self.beside(right, left)
-            if len({isinstance(v, str) or (is_array(v) and v.dtype.kind in "UO") for v in (value, other)}) > 1:
-                raise self.refusal("compares words with numbers")
-            if not is_array(value) and not is_array(other):
-                raise self.refusal("compares two constants")
-            for node, word in ((left, other), (right, value)):
-                # a misspelt status would choose nothing, or everything, without a sign
-                words = list(self.words(node.id)) if isinstance(node, ast.Name) and isinstance(word, str) else [word]
-                if isinstance(word, str) and word not in words:
-                    hint = did_you_mean(word, words) or f"; it has {listed(words)}"
-                    raise self.refusal(f'{ast.unparse(node)} is never "{word}"{hint}')
-            self.agreed(left, unit, right, other_unit)
-            found = np.logical_and(found, compare(value, other))
-        return found
+    def _compared(self, left: ast.expr, compare: Callable[[Any, Any], Any], right: ast.expr) -> Any:
+        """One link of a chain of comparisons."""
+        (value, unit), (other, other_unit) = self._beside(left, right), self._beside(right, left)
+        if (_kind(value) == "U") != (_kind(other) == "U"):
+            raise self.refusal("compares words with numbers")
+        if not _is_array(value) and not _is_array(other):
+            raise self.refusal("compares two constants")
+        for node, word in ((left, other), (right, value)):
+            # a misspelt status would choose nothing, or everything, without a sign
+            words = list(self.words(node.id)) if isinstance(node, ast.Name) and isinstance(word, str) else [word]
+            if isinstance(word, str) and word not in words:
+                hint = did_you_mean(word, words) or f"; it has {listed(words)}"
+                raise self.refusal(f'{ast.unparse(node)} is never "{word}"{hint}')
+        self._agreed(left, unit, right, other_unit)
+        return compare(value, other)
 
-    def beside(self, node: ast.expr, other: ast.expr) -> Valued:
+    def _beside(self, node: ast.expr, other: ast.expr) -> Valued:
         """One side of a comparison; '3 cm' is a number in the unit of the name on the other side."""
-        value, unit = self.value(node)
+        value, unit = self._value(node)
         match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s+(\S.*)", value) if isinstance(value, str) else None
         if match is None or self.units is None:
             return value, unit
@@ -190,58 +154,61 @@ class Condition:
         except UnitMistake as error:
             raise self.refusal(str(error)) from None
 
-    def agreed(self, left: ast.expr, unit: Any, right: ast.expr, other: Any) -> Any:
-        """The dimension of two parts that are alike. Raises SweepError where they are not."""
-        if unit is not None and other is not None and unit != other:
-            texts = (
-                f"{ast.unparse(node)[:40]} is in {str(of).replace(' ** ', '^')}"
-                for node, of in ((left, unit), (right, other))
-            )
-            raise self.refusal(f"{' and '.join(texts)}; they cannot be compared")
+    def _agreed(self, left: ast.expr, unit: Any, right: ast.expr, other: Any) -> Any:
+        """The unit of two parts that are alike. Raises SweepError where they are not."""
+        if unit is not None and other is not None and unit.dimensionality != other.dimensionality:
+            parts = (f"{ast.unparse(node)[:40]} is in {of}" for node, of in ((left, unit), (right, other)))
+            raise self.refusal(f"{' and '.join(parts)}; they cannot be compared")
         return other if unit is None else unit
 
-    def refusal(self, what: str) -> SweepError:
-        """The mistake as the user is told."""
-        return SweepError(f"{self.says}{self.text}: {what}")
+
+def _is_array(value: Any) -> bool:
+    """An array of numpy or xarray, not a number or a word."""
+    return hasattr(value, "dtype") and not isinstance(value, np.generic)
 
 
-class CellCondition(Condition):
-    """A condition on the parameters of a study's cells; the same on every machine, as its arithmetic is exact IEEE.
+def _kind(value: Any) -> str:
+    """Kind of values as numpy has it; "b" of arrays alone, "f" of any number, "U" of words."""
+    if _is_array(value):
+        return {"O": "U"}.get(value.dtype.kind, str(value.dtype.kind))
+    return "U" if isinstance(value, str) else "f"
+
+
+def cells_where(text: str, kernel: Kernel, settings: Iterable[str], column: Callable[[str], Any]) -> Any:
+    """For which cells a condition on parameters holds; the same on every machine, as its arithmetic is exact IEEE.
 
     Parameters
     ----------
     text : str
         Of numbers in SI units, or with a unit beside a parameter: "phi0 < '60 degree'".
-    kernel : Kernel
-    settings : names of the axes that are no parameters
+    settings : iterable of str
+        Axes that are no parameters.
+    column : callable
+        The numbers of a parameter or setting in all cells.
 
     Raises
     ------
     SweepError
         It cannot be read, names what is not there, or compares what has other units.
     """
+    fields = {field.name: field for field in kernel.parameters if not field.dims}
+    fields |= {name: setting(name, kernel) for name in settings}
 
-    def __init__(self, text: str, kernel: Kernel, settings: Sequence[str] = ()) -> None:
-        self._fields = {field.name: field for field in kernel.parameters if not field.dims}
-        self._fields |= {name: setting(name, kernel) for name in settings}
-        units = {name: field.unit for name, field in self._fields.items() if not field.choices}
-        super().__init__(text, self._column, lambda name: self._fields[name].choices, units=units)
-        self.names = sorted({node.id for node in ast.walk(self.tree) if isinstance(node, ast.Name)})
-        self.holds({name: np.zeros(0) for name in self._fields})
-
-    def holds(self, columns: Mapping[str, Any]) -> Any:
-        """Where it holds, of columns of the `names` that it has."""
-        self._columns = columns
-        return self.truth()
-
-    def _column(self, name: str) -> Any:
-        if name not in self._fields:
-            hint = did_you_mean(name, self._fields) or f"; there are {listed(self._fields, word='and')}"
-            raise self.refusal(f"no parameter of one number is called {name}{hint}")
-        column, choices = self._columns[name], self._fields[name].choices
-        if not choices:
-            return column
-        found = np.full(len(column), "", dtype="U32")
+    def variable(name: str) -> Any:
+        if name not in fields:
+            hint = did_you_mean(name, fields) or f"; there are {listed(fields, word='and')}"
+            raise condition.refusal(f"no parameter of one number is called {name}{hint}")
+        numbers, choices = column(name), fields[name].choices
+        found = np.full(len(numbers), "", "U32") if choices else numbers
         for word, code in choices.items():
-            found[column == code] = word
+            found[numbers == code] = word
         return found
+
+    units = {name: field.unit for name, field in fields.items() if not field.choices}
+    condition = Condition(text, variable, lambda name: fields[name].choices, units=units)
+    return condition.truth()
+
+
+def names_in(text: str) -> set[str]:
+    """The names in a condition."""
+    return {node.id for node in ast.walk(ast.parse(text.strip(), mode="eval")) if isinstance(node, ast.Name)}

@@ -29,15 +29,14 @@ def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path
     SweepError
         There is no such kernel, it may not be imported, importing it fails, or it declares a name twice.
     """
-    known = list(catalogue.KERNELS)
+    known, there = list(catalogue.KERNELS), f"there are {listed(catalogue.KERNELS)}"
     if not isinstance(name, str) or not name:
-        raise SweepError(f"expected the name of a kernel, found {show(name)}; there are {listed(known)}")
+        raise SweepError(f"expected the name of a kernel, found {show(name)}; {there}")
     if ":" not in name and name not in known:
-        raise SweepError(f"no kernel {show(name)}{did_you_mean(name, known) or ';'} there are {listed(known)}")
+        raise SweepError(f"no kernel {show(name)}{did_you_mean(name, known) or ';'} {there}")
     if ":" in name and not allow_import:
-        raise SweepError(
-            f"{show(name)} runs code of your own; allow it with --allow-import (Python: allow_import=True)"
-        )
+        cure = "allow it with --allow-import (Python: allow_import=True)"
+        raise SweepError(f"{show(name)} runs code of your own; {cure}")
     try:
         if ":" in name:
             # for good: a kernel may import modules beside it later
@@ -48,14 +47,12 @@ def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path
     if not isinstance(kernel, Kernel):
         raise SweepError(f"{show(name)} is a {type(kernel).__name__}, not a kernels.interface.Kernel")
     # no result could hold it otherwise
-    fields = [*kernel.parameters, *kernel.outputs, *kernel.along]
+    fields = (*kernel.parameters, *kernel.outputs, *kernel.along)
     names = [*RESERVED, *(field.name for field in fields)]
     if twice := sorted({n for n in names if names.count(n) > 1}):
         raise SweepError(f"kernel {name} declares {listed(twice)} more than once, or takes a name of the result's own")
-    dims = {field.name for field in kernel.along} | set(kernel.same_length)
-    dims |= {dim for field in kernel.parameters for dim in field.dims}
+    dims = {*kernel.same_length, *(f.name for f in kernel.along), *(d for p in kernel.parameters for d in p.dims)}
     if lost := sorted({dim for field in kernel.outputs for dim in field.dims} - dims):
-        raise SweepError(
-            f"kernel {name} has outputs along {listed(lost)}, neither in `along` nor a dim of array parameters"
-        )
+        cure = "neither in `along` nor a dim of array parameters"
+        raise SweepError(f"kernel {name} has outputs along {listed(lost)}, {cure}")
     return kernel

@@ -6,7 +6,11 @@ import math
 import numbers
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, TypeVar
+
+import numpy as np
 
 from kernels.interface import Field
 from sweep.errors import Mistake, StudyError, SweepError
@@ -36,104 +40,149 @@ class Mistakes:
     def __len__(self) -> int:
         return len(self.found)
 
+    def add(self, where: str, message: str) -> None:
+        self.found.append(Mistake(where, message))
+
     def good(self, *places: str) -> bool:
         """Whether nothing is wrong at these places and in what stands below them, so that they can be compared."""
         below = tuple(f"{place}{sign}" for place in places for sign in ".[")
         return not any(m.where in places or m.where.startswith(below) for m in self.found)
-
-    def add(self, where: str, message: str) -> None:
-        self.found.append(Mistake(where, message))
 
     def raise_if_any(self, source: str) -> None:
         """Raises StudyError with all mistakes of what is called `source`."""
         if self.found:
             raise StudyError(source, self.found)
 
-    def tried(self, where: str, action: Callable[[], T], otherwise: U) -> T | U:
-        """What an action gives; `otherwise` if it raises ValueError or SweepError, whose text is a mistake."""
+
+@dataclass(frozen=True)
+class Entry:
+    """What a study says at one place.
+
+    Attributes
+    ----------
+    value : object
+        None where it says nothing.
+    where : str
+        "axes.mu.values[2]"; "" for the whole study.
+    mistakes : Mistakes
+        What is wrong goes there.
+    folder : Path
+        Names of files are relative to it.
+    """
+
+    value: Any
+    where: str
+    mistakes: Mistakes
+    folder: Path = Path()
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.value
+
+    def __getitem__(self, key: str | int) -> Entry:
+        """What stands under a key of a table, or at a place of a list; arrays as lists."""
+        found = self.value[key] if isinstance(key, int) else self.value.get(key)
+        found = np.asarray(found).tolist() if hasattr(found, "__array__") else found
+        at = f"{self.where}[{key}]" if isinstance(key, int) else f"{self.where}.{key}".removeprefix(".")
+        return replace(self, value=found, where=at)
+
+    def good(self) -> bool:
+        """Whether nothing is wrong here or below."""
+        return self.mistakes.good(self.where)
+
+    def wrong(self, message: str) -> None:
+        """This place has a mistake."""
+        self.mistakes.add(self.where, message)
+
+    def unknown(self, name: Any, words: Iterable[str], what: str, cure: str) -> str:
+        """The word that a name is taken for, or ""; it is a mistake, whose cure that word is where there is one."""
+        words = list(words)
+        self.wrong(what + (did_you_mean(name, words) or cure))
+        return nearest(name, words)
+
+    def read(self, otherwise: U, reader: Callable[..., T], *given: Any) -> T | U:
+        """What a reader makes of the value; `otherwise` if it raises ValueError or SweepError, which is a mistake."""
         try:
-            return action()
+            return reader(self.value, *given)
         except (ValueError, SweepError) as error:
-            self.add(where, str(error))
+            self.wrong(str(error))
             return otherwise
 
-    def finite(self, value: Any, where: str) -> float:
-        """A number that is neither NaN nor infinite; NaN where it is a mistake."""
-        before = len(self)
-        result = self.tried(where, lambda: exact_float(value), math.nan)
-        if not math.isfinite(result) and len(self) == before:
-            self.add(where, f"expected a finite number, found {result}")
-        return result
+    def table(self, key: str | int, example: str) -> Entry:
+        """The table that stands there; an empty one where there is none, or something else, which is a mistake."""
+        found = self[key]
+        if isinstance(key, str) and key not in self:
+            return replace(found, value={})
+        if not isinstance(found.value, Mapping):
+            self.mistakes.unread = True
+            found.wrong(f"expected a table, found {show(found.value)}; write e.g. {example}")
+            return replace(found, value={})
+        return found
 
-    def whole(self, value: Any, where: str, low: int, high: int, cure: str = "") -> int:
-        """A whole number in these limits; the lower one where it is a mistake. The `cure` is for one below."""
-        number = int(value) if isinstance(value, numbers.Integral) and not isinstance(value, bool) else None
-        if number is not None and low <= number <= high:
-            return number
-        below = cure if number is not None and number < low else ""
-        self.add(where, f"expected a whole number from {low} to {high}, found {show(value)}{below}")
-        return low
+    def keys(self, *allowed: str) -> Entry:
+        """The table; a mistake for every key that is not allowed, and it stands for the one that is meant."""
+        found = dict(self.value)
+        for key in (key for key in self.value if key not in allowed):
+            if meant := self[key].unknown(key, allowed, "no such key", f"; allowed are {listed(allowed)}"):
+                found.setdefault(meant, found.pop(key))
+        return replace(self, value=found)
 
-    def word(self, value: Any, where: str, allowed: Iterable[str]) -> str | None:
-        """One of the words `allowed`."""
-        return self.tried(where, lambda: one_of(value, list(allowed)), None)
-
-    def words(self, value: Any, where: str, allowed: Sequence[str], example: str, cure: str = "") -> list[str]:
-        """A list of some of the words `allowed`, none twice and not empty."""
-        if isinstance(value, str) or not isinstance(value, Sequence) or not value:
-            what = "an empty list" if isinstance(value, Sequence) and not isinstance(value, str) else show(value)
-            self.add(where, f"expected {example}, found {what}{cure}")
+    def words(self, allowed: Sequence[str], example: str, cure: str = "") -> list[str]:
+        """A list of some of the words allowed, none twice and not empty."""
+        a_list = isinstance(self.value, Sequence) and not isinstance(self.value, str)
+        if not a_list or not self.value:
+            self.wrong(f"expected {example}, found {'an empty list' if a_list else show(self.value)}{cure}")
             return []
         found: list[str] = []
-        for i, item in enumerate(value):
-            word = self.word(item, f"{where}[{i}]", allowed)
+        for i in range(len(self.value)):
+            word = self[i].read("", one_of, allowed)
             if word in found:
-                self.add(f"{where}[{i}]", f"{show(item)} stands twice")
+                self[i].wrong(f"{show(word)} stands twice")
             found += [word] if word else []
         return found
 
-    def text(self, value: Any, where: str) -> str:
-        if isinstance(value, str):
-            return value
-        self.add(where, f"expected text in quotes, found {show(value)}")
-        return ""
 
-    def table(self, value: Any, where: str, example: str) -> Mapping[str, Any]:
-        if isinstance(value, Mapping):
-            return value
-        self.unread = True
-        self.add(where, f"expected a table, found {show(value)}; write e.g. {example}")
-        return {}
-
-    def keys(self, table: Mapping[str, Any], allowed: Iterable[str], where: str = "") -> dict[str, Any]:
-        """The table; a mistake for every key that is not `allowed`, and it stands for the one that is meant."""
-        words, found = list(allowed), dict(table)
-        for key in table:
-            if key not in words:
-                hint = did_you_mean(key, words) or f"; allowed are {listed(words)}"
-                self.add(f"{where}.{key}" if where else str(key), f"no such key{hint}")
-                if meant := nearest(key, words):
-                    found.setdefault(meant, found.pop(key))
-        return found
+# readers of a value: each raises ValueError with the text for the user
 
 
-def one_of(value: Any, words: Sequence[str]) -> str:
-    """A word of those allowed. Raises ValueError with the text for the user."""
+def text(value: Any) -> str:
+    """A text."""
+    if isinstance(value, str):
+        return value
+    raise ValueError(f"expected text in quotes, found {show(value)}")
+
+
+def one_of(value: Any, words: Iterable[str]) -> str:
+    """A word of those allowed."""
+    words = list(words)
     if isinstance(value, str) and value in words:
         return value
     raise ValueError(f"expected {listed(words, quote=True)}, found {show(value)}{did_you_mean(value, words)}")
 
 
+def whole(value: Any, low: int, high: int, cure: str = "") -> int:
+    """A whole number in these limits. The `cure` is for one below."""
+    is_whole = isinstance(value, numbers.Integral) and not isinstance(value, bool)
+    if is_whole and low <= value <= high:
+        return int(value)
+    below = cure if is_whole and value < low else ""
+    raise ValueError(f"expected a whole number from {low} to {high}, found {show(value)}{below}")
+
+
+def finite(value: Any) -> float:
+    """A number that is neither NaN nor infinite."""
+    if math.isfinite(number := exact_float(value)):
+        return number
+    raise ValueError(f"expected a finite number, found {number}")
+
+
 def exact_float(value: Any) -> float:
-    """A number as float64 without loss. Raises ValueError with the text for the user."""
-    if getattr(value, "ndim", None) == 0:
-        value = value.item()  # of numpy
+    """A number as float64 without loss."""
+    value = value.item() if getattr(value, "ndim", None) == 0 else value  # of numpy
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        cure = ""
-        # a text that looks like a number
-        if isinstance(value, str) and (
-            match := re.fullmatch(r"\s*([-+]?[\d.][\d._]*(?:[eE][-+]?\d+)?)\s*(\D.*)?", value)
-        ):
+        cure, match = "", None
+        if isinstance(value, str):  # which may look like a number, with a unit behind it
+            match = re.fullmatch(r"\s*([-+]?[\d.][\d._]*(?:[eE][-+]?\d+)?)\s*(\D.*)?", value)
+        if match:
             number, unit = match.groups()
             cure = f'; write {{ value = {number}, unit = "{unit.strip()}" }}' if unit else "; drop the quotes"
         raise ValueError(f"expected a number, found {show(value)}{cure}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 import math
 from collections.abc import Mapping
@@ -22,6 +23,11 @@ AUTO = -1
 SETTINGS = ("method", "rtol")
 """What may be an axis although it is no parameter of the kernel."""
 SMALLEST_RTOL = 1e-15
+DECLARED = {
+    Kernel: ("name", "doc", "source", "parameters", "outputs", "methods", "along", "same_length"),
+    Method: ("name", "doc", "excludes", "lacks"),
+}
+"""What a study keeps of its kernel, which can be read without it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +39,7 @@ class Axis:
     name : str
         A parameter of the kernel, "method" or "rtol".
     values : ndarray, shape (n,), of an array parameter (n, length), read-only float64
-        In the unit of the kernel's field. On a method axis: positions in `kernel.methods`, -1 for "auto".
-        Of a parameter with choices: their numbers.
+        In the unit of the kernel's field. Of words: their numbers; of methods their positions, -1 for "auto".
     spacing : str
         "linear", "log", "values" or "file".
     words : tuple of str, optional
@@ -177,9 +182,8 @@ class Study:
 
     def run(self, name: str) -> int:
         """Cells in a row that share one value of an axis."""
-        dims = list(self.dims)
-        place = next(place for place, names in enumerate(self.dims.values()) if name in names)
-        return math.prod(self.grid_shape[dim] for dim in dims[place + 1 :])
+        behind = itertools.dropwhile(lambda names: name not in names, self.dims.values())
+        return math.prod(len(self.axes[names[0]]) for names in list(behind)[1:])
 
     @property
     def asked(self) -> tuple[Field, ...]:
@@ -194,27 +198,22 @@ class Study:
     @property
     def lengths(self) -> dict[str, int]:
         """Length of every dimension that a column may have behind the cells'."""
-        arrays = {p.dims: self.array(p.name) for p in self.kernel.parameters if p.dims}
-        found = {
-            dim: n for dims, values in arrays.items() for dim, n in zip(dims, values.shape[-len(dims) :], strict=True)
-        }
+        found: dict[str, int] = {}
+        for parameter in (p for p in self.kernel.parameters if p.dims):
+            source = self.follows.get(parameter.name, parameter.name)
+            values = self.axes[source].values if source in self.axes else np.asarray(self.fixed[source])
+            found |= zip(parameter.dims, values.shape[-len(parameter.dims) :], strict=True)
         found |= {name: len(values) for name, values in self.along.items()}
         return found | {dim: found[other] for dim, other in self.kernel.same_length.items()}
 
     def shape(self, field: Field) -> tuple[int, ...]:
         """Shape of a parameter or output in one cell."""
-        lengths = self.lengths if field.dims else {}
-        return tuple(lengths[dim] for dim in field.dims)
+        return tuple(self.lengths[dim] for dim in field.dims)
 
     @property
     def shapes(self) -> dict[str, tuple[int, ...]]:
         """Shapes in one cell of the outputs asked for."""
         return {field.name: self.shape(field) for field in self.asked}
-
-    def array(self, name: str) -> NDArray[np.float64]:
-        """What is given of an array parameter: its values, or those of all cells."""
-        source = self.follows.get(name, name)
-        return self.axes[source].values if source in self.axes else np.asarray(self.fixed[name])
 
     def to_json(self) -> str:
         """The study on one line of JSON: arrays exactly, as their bytes; the kernel as it declares itself."""
@@ -242,13 +241,12 @@ class Study:
             if (written := keys.pop("format")) != FORMAT:
                 raise SweepError(f"study of format {written}; this version of foliot reads format {FORMAT}")
             keys["axes"] = {name: Axis(**axis) for name, axis in keys["axes"].items()}
-            keys["summary"] = None if keys["summary"] is None else Summary(**keys["summary"])
+            keys["summary"] = keys["summary"] and Summary(**keys["summary"])
             keys["blocks"] = tuple(Block(**block) for block in keys["blocks"])
-            kernel = keys.pop("kernel")
-            for group in ("parameters", "outputs", "along"):
-                kernel[group] = tuple(Field(**given) for given in kernel[group])
-            kernel["methods"] = tuple(Method(solve=_missing, **given) for given in kernel["methods"])
-            study = cls(kernel=Kernel(check=_missing, **kernel), **keys)
+            kernel = {"check": _missing, **keys["kernel"]}
+            kernel |= {group: tuple(Field(**f) for f in kernel[group]) for group in ("parameters", "outputs", "along")}
+            kernel["methods"] = tuple(Method(solve=_missing, **method) for method in kernel["methods"])
+            study = cls(**keys | {"kernel": Kernel(**kernel)})
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise SweepError(f"not the JSON of a study: {type(error).__name__} {error}") from None
         return study if declared else dataclasses.replace(study, kernel=load_kernel(study.kernel_name, allow_import))
@@ -289,16 +287,12 @@ def _plain(value: Any) -> Any:
     """What JSON has no word for: arrays, and the records of a study; of a kernel what it declares beyond defaults."""
     if isinstance(value, np.ndarray):
         return {"float64": value.astype("<f8").tobytes().hex(), "shape": value.shape}
-    if isinstance(value, Mapping):
-        return dict(value)
     if isinstance(value, Field):
         return {f.name: said for f in dataclasses.fields(value) if (said := getattr(value, f.name)) != f.default}
-    if isinstance(value, Method):
-        return {name: getattr(value, name) for name in ("name", "doc", "excludes", "lacks")}
-    if isinstance(value, Kernel):
-        groups = ("name", "doc", "source", "parameters", "outputs", "methods", "along", "same_length")
-        return {name: getattr(value, name) for name in groups}
-    return vars(value)
+    names = DECLARED.get(type(value))
+    return (
+        dict(value) if isinstance(value, Mapping) else {n: getattr(value, n) for n in names} if names else vars(value)
+    )
 
 
 def _decode(item: dict[str, Any]) -> Any:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sweep.errors import Mistake, StudyError, SweepError
-from sweep.study.keys import StudyParser
+from sweep.study.keys import read_keys
 from sweep.study.mistakes import show
 from sweep.study.model import Study
 from sweep.words import as_path, did_you_mean, listed
@@ -68,29 +68,30 @@ def study(given: Given | None = None, /, *, allow_import: bool = False, **keys: 
     if isinstance(given, Study):
         return given
     if hasattr(given, "data_vars"):
-        said = getattr(given, "attrs", {}).get("study_json")
-        if said is None:
+        if (said := getattr(given, "attrs", {}).get("study_json")) is None:
             raise SweepError("the dataset does not say which study it came from; pass the study")
         return Study.from_json(str(said), allow_import=allow_import)
     if given is None or isinstance(given, Mapping):
-        return StudyParser("study", Path(), allow_import).study(keys if given is None else given, "")
+        return read_keys(keys if given is None else given, "", "study", Path(), allow_import)
     if not isinstance(given, str | os.PathLike):
         raise SweepError(f"expected a study, its path, or a dict of its keys, found {show(given)}; or write {KEYWORDS}")
     if "\n" in os.fspath(given):
         raise SweepError("this is the text of a study, not its path; write sweep.study(tomllib.loads(text))")
     path = as_path(given)
-    if path.suffix in (".h5", ".nc"):
-        raise SweepError(f"{path} is a result, not a study; look at it with: sweep show {path}")
-    if path.suffix == ".py":
-        raise SweepError(f"{path} is a study in Python; run it with: python {path}")
     text = _text(path)
     first = next(line.strip() for line in text.splitlines() if line.strip())
     question = {"question": first.lstrip("# ").rstrip()} if first.startswith("#") else {}
-    return StudyParser(str(path), path.parent, allow_import).study({**question, **_keys(text, str(path))}, text)
+    return read_keys({**question, **_keys(text, str(path))}, text, str(path), path.parent, allow_import)
 
 
 def _text(path: Path) -> str:
     """The text of a study file. Raises SweepError where it is none."""
+    others = {
+        ".h5": "a result, not a study; look at it with: sweep show",
+        ".py": "a study in Python; run it with: python",
+    }
+    if other := others.get(path.suffix.replace(".nc", ".h5")):
+        raise SweepError(f"{path} is {other} {path}")
     try:
         if path.is_dir():
             raise SweepError(f"{path} is a folder; name a study file in it, e.g. {path / 'study.toml'}")
@@ -119,9 +120,9 @@ def _keys(text: str, source: str) -> dict[str, Any]:
         what, _, place = str(error).rpartition(" (at ")  # "... (at line 3, column 6)"
         if what.startswith(("Cannot overwrite", "Cannot declare")):
             what = "this key or table stands here a second time"
-        numbers, lines = re.match(r"line (\d+)", place), text.splitlines()
-        line = int(numbers[1]) if numbers else len(lines)
-        mistake = Mistake(numbers[0] if numbers else "end of file", f"{what}: {lines[line - 1].strip()[:80]}")
+        number, lines = re.match(r"line (\d+)", place), text.splitlines()
+        line = lines[int(number[1]) - 1 if number else -1].strip()[:80]
+        mistake = Mistake(number[0] if number else "end of file", f"{what}: {line}")
     except ValueError:
         mistake = Mistake("file", "an integer has thousands of digits; no float64 is that large")
     except RecursionError:

@@ -11,7 +11,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -26,20 +25,8 @@ LEVELS = 4
 """Values that a Morris trajectory may take along each axis."""
 
 
-def unit_points(design: str, axes: int, options: Mapping[str, Any]) -> NDArray[np.float64]:
-    """The points of a design, shape (points, axes), from 0 to 1.
-
-    Parameters
-    ----------
-    options : mapping
-        n, seed and scramble.
-
-    Raises
-    ------
-    SweepError
-        A package is missing.
-    """
-    n, seed, scramble = options["n"], options["seed"], options.get("scramble", True)
+def unit_points(design: str, axes: int, n: int, seed: int, scramble: bool = True) -> NDArray[np.float64]:
+    """The points of a design, shape (points, axes), from 0 to 1. Raises SweepError where a package is missing."""
     if design == "random":
         return np.random.default_rng(seed).random((n, axes))
     if design in ("sobol", "latin"):

@@ -89,14 +89,6 @@ def exponents(text: str) -> dict[str, Fraction]:
     return {base: Fraction(str(power)).limit_denominator(1000) for base, power in _root(text)[1].items()}
 
 
-@cache
-def dimension(text: str) -> Any:
-    """The base units in a unit without the radian, which can be multiplied and compared. Raises UnitMistake."""
-    from pint.util import UnitsContainer
-
-    return UnitsContainer({base: power for base, power in exponents(text).items() if base != "radian"})
-
-
 def _describe(text: str) -> str:
     """What a unit measures."""
     if text in DIMENSIONS:
@@ -107,20 +99,7 @@ def _describe(text: str) -> str:
 
 def _root(text: str) -> tuple[Decimal, dict[str, Decimal]]:
     """Factor and exponents of `text` in root units, radian among them; "Hz" is a turn per second."""
-    from pint.errors import UndefinedUnitError
-
-    registry = _registry()
-    try:
-        if not re.fullmatch(r"[\w\s^*/().+°%-]*", text):
-            raise ValueError  # pint would read "m;m" as m^2
-        unit = registry.parse_units("dimensionless" if text.strip() == "1" else text)
-    except UndefinedUnitError as error:
-        unknown = str(error.unit_names) if isinstance(error.unit_names, str) else str(next(iter(error.unit_names)))
-        hint = did_you_mean(unknown, COMMON) or '; write it like "rad/s^2" or "kg m^2"'
-        raise UnitMistake(f'"{unknown}" is not a known unit{hint}') from None
-    except Exception:
-        # pint's parser fails on malformed text in many ways (AssertionError, TokenError, TypeError, ValueError)
-        raise UnitMistake(f'"{text}" cannot be read as a unit; write it like "rad/s^2" or "kg m^2"') from None
+    unit, registry = parsed(text), _registry()
     if "hertz" in str(unit):
         if not re.fullmatch(r"\w*hertz", str(unit)):
             raise UnitMistake(f'"{text}" has Hz inside a longer unit; write turns or radians, e.g. "turn/s^2"')
@@ -132,6 +111,24 @@ def _root(text: str) -> tuple[Decimal, dict[str, Decimal]]:
     if zero.magnitude != 0:
         raise UnitMistake(f'"{text}" has an offset; give an absolute unit, e.g. "K"')
     return Decimal(one.magnitude), dict(one.unit_items())
+
+
+@cache
+def parsed(text: str) -> Any:
+    """The unit as pint has it, which can be multiplied, and compared by its dimensionality. Raises UnitMistake."""
+    from pint.errors import UndefinedUnitError
+
+    example = 'write it like "rad/s^2" or "kg m^2"'
+    try:
+        if not re.fullmatch(r"[\w\s^*/().+°%-]*", text):
+            raise ValueError  # pint would read "m;m" as m^2
+        return _registry().parse_units("dimensionless" if text.strip() == "1" else text)
+    except UndefinedUnitError as error:
+        unknown = str(error.unit_names) if isinstance(error.unit_names, str) else str(next(iter(error.unit_names)))
+        raise UnitMistake(f'"{unknown}" is not a known unit{did_you_mean(unknown, COMMON) or f"; {example}"}') from None
+    except Exception:
+        # pint's parser fails on malformed text in many ways (AssertionError, TokenError, TypeError, ValueError)
+        raise UnitMistake(f'"{text}" cannot be read as a unit; {example}') from None
 
 
 @cache
