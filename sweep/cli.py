@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if getattr(arguments, "notify", None):
         run.notify(arguments, ended)
     pool = sys.modules.get("sweep.runs.pool")
-    if argv is None and pool is not None and pool.left_behind():
+    if argv is None and pool is not None and pool.endless.is_set():
         # a kernel that never ends would keep Python from ending; a program that calls this is not ours to end
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, AttributeError):

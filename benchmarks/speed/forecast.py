@@ -111,8 +111,8 @@ class Recorder:
         """Every run within is listened to."""
         real, told = Progress.add, self.told
 
-        def add(progress: Progress, cells: int) -> None:
-            real(progress, cells)
+        def add(progress: Progress, cells: int, work: float, seconds: float) -> None:
+            real(progress, cells, work, seconds)
             left = progress.left
             if left is not None:
                 told.append(Told(progress.done / progress.total, time.perf_counter(), processors(), left))
@@ -175,8 +175,8 @@ def stopped(study: Study, path: Path) -> None:
     """A run that is stopped when a third is done."""
     real = Progress.add
 
-    def add(progress: Progress, cells: int) -> None:
-        real(progress, cells)
+    def add(progress: Progress, cells: int, work: float, seconds: float) -> None:
+        real(progress, cells, work, seconds)
         if progress.done > progress.total / 3:
             raise KeyboardInterrupt
 

@@ -30,12 +30,12 @@ from sweep.errors import SweepError
 from sweep.explore.scaling import advice_on
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import memory
-from sweep.runs.isolate import Processes, limit_of
+from sweep.runs.isolate import Processes
 from sweep.runs.pool import cores, whole_number
 from sweep.study.model import Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.words import Table, duration, paragraph, quantity
+from sweep.words import Table, duration, paragraph, quantity, seconds_of
 
 TRIAL = 32 << 20
 """Bytes written to see how fast the disk is,"""
@@ -193,7 +193,7 @@ def plan(
         return replace(found, seconds=found.seconds + again, compile_seconds=compiled, scaling=advice)
 
     # every run of a kernel that may crash, or never end, begins processes, and compiles it, anew
-    processes = Processes(study, limit_of(cell_timeout), 1)
+    processes = Processes(study, None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout), 1)
     solver = processes.solver()
     try:
         begun = time.monotonic()

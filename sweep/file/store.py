@@ -205,13 +205,12 @@ class Store:
         return np.flatnonzero(~self._done).tolist()
 
     def put(self, index: int, arrays: Mapping[str, Any]) -> None:
-        """Writes a block; it is acknowledged later, with others. Raises SweepError."""
+        """Writes a block; it is acknowledged by `tick`, with others. Raises SweepError."""
         with disk.refusing(self.path):
             digests = self.table.write(self._fd, index, arrays)
         with self._turn:
             self._waiting[index] = digests
             self._unsynced += sum(array.nbytes for array in arrays.values())
-        self.tick()
 
     def take(self, index: int, digests: bytes) -> None:
         """Acknowledges a block that another process has written and synced. Raises SweepError."""
@@ -219,7 +218,6 @@ class Store:
             raise SweepError(f"{self.path}: a worker has written something else than it was asked for")
         with self._turn:
             self._waiting[index] = digests
-        self.tick()
 
     def tick(self) -> None:
         """Acknowledges what is written, if it is time to. Raises SweepError."""

@@ -1,12 +1,12 @@
-"""One run of a study, here or on a cluster: a loop has an executor compute blocks, and puts them into a sink.
+"""One run of a study, here or on a cluster: a loop has an executor compute blocks, which go into a sink.
 
 Others may use
     `run`       run, complete, is_begun, store_cells
-    `isolate`   Processes, limit_of: cells solved in processes of their own
-    `pool`      cores, whole_number, left_behind
+    `isolate`   Processes: cells solved in processes of their own
+    `pool`      cores, whole_number, endless
     `progress`  Progress: how far it is, and how long it will take
     `log`       log, log_path, logging_to, read_lines: the log beside a result
 
-A `task` is what was asked for. `loop` times a sample, cuts the grid, and gives blocks to a `bench`: threads here, or
-one on every worker of a `cluster`. `to_file` continues and keeps what is computed; `extend` reuses cells.
+A `task` is what was asked for. `loop` times a sample, cuts the grid, and has blocks computed: by threads here, or by
+the workers of a `cluster`. `to_file` continues and keeps what is computed; `extend` reuses cells.
 """

@@ -19,7 +19,6 @@ import time
 import weakref
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, Future
-from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -33,9 +32,9 @@ from sweep.cells.solve import Solver
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
 from sweep.file.store import Shared
-from sweep.runs.bench import POISONED, Bench, Buffers, Done, Found
-from sweep.runs.isolate import Processes
+from sweep.runs.isolate import Processes, kernel_paths
 from sweep.runs.log import log
+from sweep.runs.loop import POISONED, Bench, Done, Found
 from sweep.study.model import Study
 
 CONNECT_SECONDS = 10
@@ -90,14 +89,22 @@ class Cluster:
                 self._note("the cluster has no workers; waiting for the first")
         self.threads, self._asked = threads, time.monotonic()
 
-    def remote(self, *words: Any) -> Any:
-        """What stands for the bench of each worker in `submit`; dask makes it where it is needed, of such words."""
-        return self._client.submit(Remote, *words, pure=False)
+    def begin(
+        self,
+        study: Study,
+        fingerprint: Mapping[str, str],
+        partition: Partition,
+        shared: Shared | None,
+        isolated: tuple[float | None, float] | None,
+    ) -> None:
+        """What the workers are to compute; as `Remote`, which dask makes where it is needed."""
+        words = study.to_json(), dict(fingerprint), partition, shared, kernel_paths(study), isolated
+        self._remote = self._client.submit(Remote, *words, pure=False)
 
-    def submit(self, remote: Any, jobs: tuple[int, ...], masks: Mapping[int, Any]) -> Future[Answer]:
+    def submit(self, job: int, wanted: Any) -> Future[Done]:
         """A future of what `compute` gives on a worker. Raises SweepError."""
         try:
-            future: Future[Answer] = self.executor.submit(compute, remote, jobs, masks)
+            future: Future[Done] = self.executor.submit(compute, self._remote, job, wanted)
             return future
         except Exception as fault:
             raise self.lost(fault) from fault
@@ -108,20 +115,19 @@ class Cluster:
             with contextlib.suppress(Exception):
                 self.executor.shutdown(wait=False)
 
-    def outcome(self, future: Any, blocks: str) -> list[Done] | None:
+    def outcome(self, future: Future[Done], block: str) -> Done | None:
         """What a future gives; None where the answer got lost. Raises SweepError."""
         try:
-            answer: Answer = future.result()
-            return answer.found
+            return future.result()
         except CancelledError as fault:
             raise self.lost(fault) from fault
         except distributed.KilledWorker as fault:
-            raise SweepError(f"{blocks}: {POISONED}") from fault
+            raise SweepError(f"{block}: {POISONED}") from fault
         except SweepError:
             raise
         except Exception as fault:
             # distributed's executor trips over a task that fails with its worker and is answered at that moment
-            if isinstance(fault, TypeError) and Answer.__name__ in str(fault):
+            if isinstance(fault, TypeError) and f"non-iterable {Done.__name__}" in str(fault):
                 return None
             raise SweepError(
                 f"cluster: a worker failed ({type(fault).__name__}: {fault}); what is finished is kept; every machine "
@@ -163,11 +169,10 @@ def _reason(fault: BaseException) -> str:
     return str(fault).partition("\n")[0] or type(fault).__name__
 
 
-@dataclass
 class Remote:
-    """The bench of a run on a worker; where dask moves it to, it is made anew. It is ready when it is first used.
+    """A run as a worker knows it; where dask moves it to, it is made anew.
 
-    Attributes
+    Parameters
     ----------
     study : JSON
     fingerprint : fingerprint of the study where the run was started; a worker with another one refuses
@@ -177,24 +182,21 @@ class Remote:
     isolated : limit and cost of `Processes` that solve cells; None: they are solved in the worker's own process
     """
 
-    study: str
-    fingerprint: Mapping[str, str]
-    partition: Partition
-    shared: Shared | None
-    paths: tuple[str, ...]
-    isolated: tuple[float | None, float] | None
+    def __init__(self, *words: Any) -> None:
+        self._words, self.turn = words, threading.Lock()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Remote, tuple(getattr(self, field.name) for field in fields(self))
+        return Remote, self._words
 
     @cached_property
     def bench(self) -> Bench:
         """Loads and compiles the kernel. Raises SweepError where what computes here is not what was asked for."""
+        text, mark, partition, shared, paths, isolated = self._words
         where = f"worker on {socket.gethostname()}"
-        sys.path.extend(path for path in self.paths if path not in sys.path and Path(path).is_dir())
+        sys.path.extend(path for path in paths if path not in sys.path and Path(path).is_dir())
         try:
-            study = Study.from_json(self.study, allow_import=True)
-            changed = difference(self.fingerprint, fingerprint(study))
+            study = Study.from_json(text, allow_import=True)
+            changed = difference(mark, fingerprint(study))
         except SweepError as fault:
             raise SweepError(f"{where}: {fault}") from None
         if changed:
@@ -204,50 +206,29 @@ class Remote:
                 f"machine\n{lines}"
             )
         processes = None
-        if self.isolated is None:
+        if isolated is None:
             warm(Solver(study), study)
         else:
-            processes = Processes(study, self.isolated[0], os.cpu_count() or 1, self.isolated[1])
+            processes = Processes(study, isolated[0], os.cpu_count() or 1, isolated[1])
             weakref.finalize(self, processes.end)
-        shared, blocks = self.shared, Blocks(study, self.partition)
-        self._fd = fd = None if shared is None else shared.opened()
+        fd = None if shared is None else shared.opened()
         if fd is not None:
             weakref.finalize(self, os.close, fd)
-        buffers = Buffers(blocks)
 
         def kept(job: int, arrays: Mapping[str, Any]) -> Found:
-            """The digests of what is written, or the numbers, which lie where nothing else will."""
-            if shared is None or fd is None:
-                return arrays
+            """The digests of what is written and on the disk, or the numbers, which lie where nothing else will."""
+            if fd is None:
+                return {name: column.copy() for name, column in arrays.items()}
             with disk.refusing(Path(shared.path)):
-                found: bytes = shared.table.write(fd, job, arrays)
-            buffers.back(job)
-            return found
+                digests: bytes = shared.table.write(fd, job, arrays)
+                disk.fsync(fd)
+            return digests
 
-        return Bench(study, blocks, buffers.room, kept, processes)
-
-    def sync(self) -> None:
-        """Returns when all that was written is on the disk. Raises SweepError."""
-        if self.shared is not None and self._fd is not None:
-            with disk.refusing(Path(self.shared.path)):
-                disk.fsync(self._fd)
+        return Bench(study, Blocks(study, partition), kept, processes=processes)
 
 
-_turn = threading.Lock()
-"""What all threads of a worker need is made once."""
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What became of some blocks."""
-
-    found: list[Done]
-
-
-def compute(remote: Remote, jobs: tuple[int, ...], masks: Mapping[int, Any]) -> Answer:
-    """Computes blocks on a worker; of those with a mask, only the cells for which it holds. Raises SweepError."""
-    with _turn:
+def compute(remote: Remote, job: int, wanted: Any) -> Done:
+    """Computes a block on a worker, or of its cells only those wanted. Raises SweepError."""
+    with remote.turn:
         bench = remote.bench
-    found = [bench.block(job, masks.get(job)) for job in jobs]
-    remote.sync()
-    return Answer(found)
+    return bench.block(job, wanted)

@@ -30,7 +30,6 @@ from sweep.cells.solve import Solver
 from sweep.errors import SweepError
 from sweep.file.open import memory
 from sweep.study.model import Study
-from sweep.words import seconds_of
 
 CELL_SECONDS, DEARER = 60.0, 100.0
 """What a cell may take where nobody says otherwise; or so many times what the dearest of the sample does."""
@@ -40,30 +39,19 @@ LOAD_SECONDS = 180.0
 """What loading and compiling a kernel may take."""
 MEMORY_SHARE = 0.5
 """Share of the memory that all processes may have before they are replaced."""
-TRIALS, UNCERTAIN = 3, 0.25
-"""Times that a cell is tried alone of which a process dies; and how much one counts that others may have killed."""
+TRIALS = 3
+"""Times that a cell is tried alone of which a process dies."""
 STARTS, START_SECONDS = 10, 0.5
 """Times that a process is started anew which dies before it has loaded the kernel, and the pause before that."""
 LOOK_SECONDS, BURY_SECONDS = 0.2, 1.0
 """How often it is looked whether time goes by, or the machine slept; and what an exit status is waited for."""
-LOST = 255
-"""Exit status of a process whose own is not known, for the one that starts all has died before it."""
 PR_SET_PDEATHSIG = 1
 
 R = TypeVar("R")
 
 
 class Died(Unsolved):
-    """The process died, or has no memory left; another one may not. `certain`: by itself, not with others."""
-
-    def __init__(self, reason: str, certain: bool = True) -> None:
-        super().__init__(reason)
-        self.certain = certain
-
-
-def limit_of(cell_timeout: float | str | None) -> float | None:
-    """Seconds that a cell may take, as they are asked for. Raises SweepError where that is no time."""
-    return None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout)
+    """The process died, or has no memory left; another one may not."""
 
 
 class Processes:
@@ -84,26 +72,24 @@ class Processes:
         self.study, self.limit, self.cost, self.grid = study, limit, cost, Grid(study)
         self.words = study.to_json(), kernel_paths(study)
         self.most_bytes = MEMORY_SHARE * memory() / count
-        self.good: int | None = None
-        self.dearest, self.over = 0.0, False
-        self.alone = threading.Lock()
+        self.good: int | None = None  # a cell that is known to end
+        self.over, self.alone = False, threading.Lock()
         self.idle: list[Isolated] = []
         self._solvers: list[Isolated] = []
 
     def seconds(self, cells: int) -> float:
         """What some cells may take. One of a sample is not waited for to its end: it is left out, but never FAILED."""
-        cost = self.cost or self.dearest
-        one = self.limit or max(CELL_SECONDS, DEARER * cost)
+        one = self.limit or max(CELL_SECONDS, DEARER * self.cost)
         if cells == 1 and (self.cost or self.good is None):
             return one
-        return min(one, SEVERAL_SECONDS) + SLACK * cost * cells
+        return min(one, SEVERAL_SECONDS) + SLACK * self.cost * cells
 
     def solver(self) -> Isolated:
         """A solver with a process of its own, for one thread at a time; one that is idle, if there is any."""
-        if not self.idle:
-            self._solvers.append(Isolated(self))
-            return self._solvers[-1]
-        return self.idle.pop()
+        if self.idle:
+            return self.idle.pop()
+        self._solvers.append(Isolated(self))
+        return self._solvers[-1]
 
     def end(self) -> None:
         """Kills all; solvers raise SweepError from now on."""
@@ -119,7 +105,6 @@ class Isolated:
         self._all, self.grid = processes, processes.grid
         self._process: Any = None
         self._lock = threading.Lock()
-        self._fresh = True
         self.seconds = 0.0
 
     def clock(self) -> float:
@@ -132,35 +117,30 @@ class Isolated:
         One cell alone is tried again, for a process may die of what it did before, or with others; and then no other
         cell is tried so meanwhile, lest each be blamed for the other.
         """
-        tried = 0.0
-        while True:
+        limit = self._all.seconds(cells.number)
+        for trial in range(1, TRIALS + 1):
             try:
-                with self._all.alone if tried else contextlib.nullcontext():
-                    found = cells_of(self._solved(start, cells.number, wanted))
+                with self._all.alone if trial > 1 else contextlib.nullcontext():
+                    arrays, reason, seconds, most = self.call(limit, _solve, start, cells.number, wanted)
+                    no_memory = reason.startswith(MemoryError.__name__)
+                    if no_memory or most > self._all.most_bytes:
+                        self.end()
+                    if reason:
+                        raise Died(reason) if no_memory else Unsolved(reason)
                 break
-            except Died as fault:
-                tried += 1.0 if fault.certain else UNCERTAIN
-                if cells.number > 1 or tried >= TRIALS:
-                    raise Unsolved(str(fault)) from None
-        for name, column in cells.outputs.items():
-            column[...] = found.outputs[name]
-        cells.status[...], cells.used[...] = found.status, found.used
-        if cells.error is not None:
-            cells.error[...] = found.error
-
-    def _solved(self, start: int, count: int, wanted: Any) -> Any:
-        """Columns of cells. Raises Unsolved, Died, SweepError."""
-        arrays, reason, seconds, most = self.call(self._all.seconds(count), _solve, start, count, wanted)
-        fresh, self._fresh = self._fresh, False
-        short = reason.startswith(MemoryError.__name__) and not fresh
-        if short or most > self._all.most_bytes:
-            self.end()
-        if reason:
-            raise Died(reason) if short else Unsolved(reason)
+            except Died:
+                if cells.number > 1 or trial == TRIALS:
+                    raise
         self.seconds += seconds
-        self._all.dearest = max(self._all.dearest, seconds / count)
         self._all.good = start if self._all.good is None else self._all.good
-        return arrays
+        found = cells_of(arrays)
+        for column, values in zip(
+            [*cells.outputs.values(), cells.status, cells.used, cells.error],
+            [*(found.outputs[name] for name in cells.outputs), found.status, found.used, found.error],
+            strict=True,
+        ):
+            if column is not None:
+                column[...] = values
 
     def call(self, limit: float, function: Callable[..., R], *words: Any) -> R:
         """What a function gives in the process, within so many seconds. Raises Unsolved, Died, SweepError."""
@@ -175,9 +155,9 @@ class Isolated:
         # one that died by itself, as late as that, is not late
         if late and code in (None, -signal.SIGKILL):
             raise Unsolved(f"took longer than {limit:.3g} s")
-        if code is None or code >= 0:
-            raise Died("its process died" if code is None else f"its process ended with {code}", code != LOST)
-        raise Died(f"its process died of {signal.Signals(-code).name}")
+        if code is not None and code < 0:
+            raise Died(f"its process died of {signal.Signals(-code).name}")
+        raise Died("its process died" if code is None else f"its process ended with {code}")
 
     def _begin(self) -> None:
         """Starts a process that has loaded the kernel, and solved a cell that is known to end. Raises SweepError."""
@@ -187,7 +167,6 @@ class Isolated:
                     if self._all.over:
                         raise SweepError("the run is being stopped")
                     self._process = _started()
-                self._fresh = True
                 _asked(self._process, LOAD_SECONDS, _load, *self._all.words, self._all.good)
                 return
             except SweepError:
@@ -274,13 +253,26 @@ _here: dict[str, Any] = {}
 
 
 def _serve(pipe: Any, flag: Any) -> None:
-    """Does what it is asked for, until nobody asks any more."""
+    """Does what it is asked for, until nobody asks any more.
+
+    It ends with the run, and before the run where the memory is short. Linux kills it with its fork server, also in a
+    kernel that never lets Python run; that one ends with who asks it, if nobody else holds the pipe that tells.
+    """
     work_clock.flag = flag
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # to write all memory to the disk for every cell that crashes takes long; 0 would let programs have it
     hard = resource.getrlimit(resource.RLIMIT_CORE)[1]
     resource.setrlimit(resource.RLIMIT_CORE, (min(1, hard) if hard >= 0 else 1, hard))
-    _die_with_the_run()
+    server: Any = vars(forkserver)["_forkserver"]
+    if server._forkserver_alive_fd is not None:
+        os.close(server._forkserver_alive_fd)
+        server._forkserver_alive_fd = None
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError):
+            Path("/proc/self/oom_score_adj").write_text("1000")
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    run: Any = multiprocessing.parent_process()
+    threading.Thread(target=lambda: (run.join(), os._exit(0)), daemon=True).start()
     with contextlib.suppress(EOFError, OSError):
         while True:
             function, words = pipe.recv()
@@ -289,30 +281,6 @@ def _serve(pipe: Any, flag: Any) -> None:
             except BaseException as fault:
                 answer = None, told(fault)
             pipe.send(answer)
-
-
-def _die_with_the_run() -> None:
-    """The process ends with the one that asks it, and before that one where the memory is short.
-
-    Linux kills it with its fork server, also in a kernel that never lets Python run; that one ends with who asks it,
-    if nobody else holds the pipe that tells.
-    """
-    server: Any = vars(forkserver)["_forkserver"]
-    pipe, server._forkserver_alive_fd = server._forkserver_alive_fd, None
-    if pipe is not None:
-        os.close(pipe)
-    if sys.platform == "linux":
-        with contextlib.suppress(OSError):
-            Path("/proc/self/oom_score_adj").write_text("1000")
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    threading.Thread(target=_end_after_the_run, daemon=True).start()
-
-
-def _end_after_the_run() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(0)
 
 
 def _load(text: str, paths: tuple[str, ...], good: int | None) -> None:

@@ -38,20 +38,37 @@ def log(text: str, event: str = "note", **fields: Any) -> None:
     LOG.info("%s", text, extra={FIELDS: {"event": event, **fields}})
 
 
+class _Handler(logging.FileHandler):
+    """Writes to the end of a file; a disk that is full does not end the run, neither now nor when it is closed."""
+
+    def __init__(self, path: Path, as_json: bool) -> None:
+        super().__init__(path, encoding="utf-8")
+        self._as_json = as_json
+
+    def format(self, record: logging.LogRecord) -> str:
+        text, at = record.getMessage(), time.localtime(record.created)
+        if self._as_json:
+            fields = getattr(record, FIELDS, {})
+            return json.dumps({"time": time.strftime("%Y-%m-%dT%H:%M:%S%z", at), "text": text, **fields})
+        return f"{time.strftime('%Y-%m-%d %H:%M:%S', at)}  {printable(' '.join(text.splitlines()))}"
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        pass
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError):
+            super().close()
+
+
 @contextlib.contextmanager
 def logging_to(path: Path | None, as_json: bool = False) -> Iterator[None]:
-    """All that is logged within goes to the end of a file, too; None: to none.
-
-    Raises OSError, SweepError where the file cannot be written; a disk that is full later does not end the run.
-    """
+    """All that is logged within goes to the end of a file, too; None: to none. Raises OSError, SweepError."""
     if path is None:
         yield
         return
     if path.is_fifo():  # to open it would wait for a reader
         raise SweepError(f"{path} is a pipe, where the log of the run is to be written; remove it")
-    handler = _Handler(path, encoding="utf-8")
-    handler.setFormatter(_Json() if as_json else _Plain())
-    level = LOG.level
+    handler, level = _Handler(path, as_json), LOG.level
     LOG.setLevel(logging.INFO)
     LOG.addHandler(handler)
     try:
@@ -70,25 +87,3 @@ def read_lines(text: str) -> Iterator[Mapping[str, Any]]:
             continue
         with contextlib.suppress(ValueError):
             yield json.loads(line)
-
-
-class _Handler(logging.FileHandler):
-    def handleError(self, record: logging.LogRecord) -> None:
-        """A log that cannot be written is no reason to stop,"""
-
-    def close(self) -> None:
-        """nor one whose last lines find no room."""
-        with contextlib.suppress(OSError):
-            super().close()
-
-
-class _Plain(logging.Formatter):
-    def format(self, record: logging.LogRecord) -> str:
-        stamp = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(record.created))
-        return f"{stamp}  {printable(' '.join(record.getMessage().splitlines()))}"
-
-
-class _Json(logging.Formatter):
-    def format(self, record: logging.LogRecord) -> str:
-        stamp = time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime(record.created))
-        return json.dumps({"time": stamp, "text": record.getMessage(), **getattr(record, FIELDS, {})})

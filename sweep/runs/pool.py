@@ -7,7 +7,7 @@ import signal
 import threading
 from datetime import datetime, timedelta
 from datetime import time as day_time
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -31,20 +31,16 @@ class CtrlC:
     The second one strikes at once. Other handlers than Python's own are left alone.
     """
 
-    OWN: ClassVar[dict[signal.Signals, Any]] = {
-        signal.SIGINT: signal.default_int_handler,
-        signal.SIGTERM: signal.SIG_DFL,
-    }
-
     def __init__(self) -> None:
         self._pressed: int | None = None
-        self._ours: list[signal.Signals] = []
+        own = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+        self._own: dict[signal.Signals, Any] = dict(own)
 
     def __enter__(self) -> CtrlC:
-        if threading.current_thread() is threading.main_thread():
-            self._ours = [number for number, own in self.OWN.items() if signal.getsignal(number) is own]
-            for number in self._ours:
-                signal.signal(number, self._press)
+        here = threading.current_thread() is threading.main_thread()
+        self._own = {number: own for number, own in self._own.items() if here and signal.getsignal(number) is own}
+        for number in self._own:
+            signal.signal(number, self._press)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
@@ -54,34 +50,25 @@ class CtrlC:
 
     def check(self) -> None:
         """Raises KeyboardInterrupt if Ctrl-C was pressed, Terminated after SIGTERM."""
-        if self._pressed == signal.SIGTERM:
-            raise Terminated
         if self._pressed is not None:
-            raise KeyboardInterrupt
+            raise Terminated if self._pressed == signal.SIGTERM else KeyboardInterrupt
 
     def _press(self, number: int, frame: object) -> None:
         self._pressed = number
         self._give_back()
 
     def _give_back(self) -> None:
-        for number in self._ours:
-            signal.signal(number, self.OWN[number])
+        for number, own in self._own.items():
+            signal.signal(number, own)
 
 
 endless = threading.Event()
 """Set where a thread was given up whose kernel does not end: Python would wait for it when the program ends."""
 
 
-def left_behind() -> bool:
-    """Whether there is such a thread."""
-    return endless.is_set()
-
-
 def cores() -> int:
     """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def whole_number(name: str, number: int) -> int:
@@ -92,18 +79,7 @@ def whole_number(name: str, number: int) -> int:
 
 
 def deadline(text: str | datetime | None, now: datetime | None = None) -> datetime | None:
-    """The time that is meant, with a time zone.
-
-    Parameters
-    ----------
-    text : str, datetime or None
-        "07:00" is the next time it is seven, here; "2027-01-31 07:00" is that moment.
-
-    Raises
-    ------
-    SweepError
-        It is no time.
-    """
+    """The time that is meant, with a time zone: "07:00" is the next time it is seven, here. Raises SweepError."""
     if text is None or isinstance(text, datetime):
         return text and text.astimezone()
     here = (now or datetime.now()).astimezone()
@@ -116,9 +92,9 @@ def deadline(text: str | datetime | None, now: datetime | None = None) -> dateti
             raise SweepError(f'until: expected a time like "07:00" or "2027-01-31 07:00", found {text!r}') from None
     if clock.tzinfo is not None:
         here = here.astimezone(clock.tzinfo)
-    at = datetime.combine(here.date(), clock).astimezone()
-    # the next day by its date, for days of 23 and 25 hours
-    return at if at > here else datetime.combine(here.date() + timedelta(days=1), clock).astimezone()
+    days = (here.date(), here.date() + timedelta(days=1))  # by their dates, for days of 23 and 25 hours
+    today, tomorrow = (datetime.combine(day, clock).astimezone() for day in days)
+    return today if today > here else tomorrow
 
 
 def passed(until: datetime | None) -> bool:

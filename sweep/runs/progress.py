@@ -19,84 +19,16 @@ from sweep.words import SHORTEST, duration, one_digit, printable, speed
 
 QUIET_SECONDS = 1.0
 """A run that ends sooner says nothing."""
-REDRAW_SECONDS, LINE_SECONDS, LOG_SECONDS = 0.1, 30.0, 60.0
-"""How often a bar is drawn, a line is told elsewhere, and one is logged;"""
-LINE_SHARE = 0.05
-"""lines also whenever so much more is done, but not more often than every few seconds."""
+LINE_SECONDS, LOG_SECONDS = 30.0, 60.0
+"""How often a line is told where there is no bar, the first ones sooner; and one is logged."""
 GOLDEN = 0.6180339887498949
 """Multiples of it, modulo 1, fill an interval evenly and fall into step with the length of no axis."""
-ROUNDS = 3
-"""Blocks each core has done when its first one, in which kernels are loaded, need not count any more."""
-
-Clock = Callable[[], float]
 
 
 def from_everywhere(jobs: Iterable[int]) -> list[int]:
     """Numbers of blocks in an order in which those of any beginning come from all over the grid."""
     found = np.array(list(jobs), int)
     return list(map(int, found[np.argsort(np.arange(found.size) * GOLDEN % 1.0)]))
-
-
-class Forecast:
-    """What the blocks to come will take.
-
-    Parameters
-    ----------
-    weights : ndarray
-        Seconds of every block of the grid, as the timed sample has them.
-    jobs : iterable of int
-        Blocks that are to be computed.
-    cores : int
-        Blocks that are computed at a time.
-    clock : callable
-        Seconds.
-    """
-
-    def __init__(self, weights: Any, jobs: Iterable[int], cores: int = 1, clock: Clock = time.monotonic) -> None:
-        self.weights, self._cores, self._clock = np.maximum(weights, 1e-9), max(1, cores), clock
-        self._to_do = float(self.weights[list(jobs)].sum())
-        self._running: dict[int, float] = {}
-        self._number = 0
-        self._now = clock(), 0.0, 0.0
-        """When a block ended last, the weights of all that are done, and their seconds;"""
-        self._first = self._since = self._now
-        """the same at the end of the first round, and where what is measured begins."""
-
-    def begin(self, jobs: Iterable[int]) -> None:
-        """Cores have begun with some blocks, now or before."""
-        for job in jobs:
-            self._running.setdefault(job, self._clock())
-
-    def end(self, job: int) -> None:
-        """A block is done."""
-        weight, now, (_, done, seconds) = float(self.weights[job]), self._clock(), self._now
-        self._to_do -= weight
-        self._now = now, done + weight, seconds + now - self._running.pop(job, now)
-        self._number += 1
-        if self._number == self._cores:
-            self._first = self._now
-        if self._number == ROUNDS * self._cores:
-            self._since = self._first
-
-    def again(self, job: int) -> None:
-        """A block has to be computed once more."""
-        self._to_do += self.weights[job]
-
-    @property
-    def left(self) -> float | None:
-        """Seconds until all blocks are done, None before the first one is."""
-        if not self._number or (self._to_do < 1e-9 and not self._running):
-            return 0.0 if self._number else None
-        done, spent = self._now[1] - self._since[1], max(self._now[2] - self._since[2], 1e-9)
-        elapsed = max(self._clock() - self._since[0], 1e-9)
-        pace = min(done / spent, done / elapsed)  # of one core, which is not faster than all are
-        tasks = self.weights[list(self._running)]
-        reached = pace * (self._clock() - np.array(list(self._running.values())))
-        rate = (done + np.minimum(reached, tasks).sum()) / elapsed
-        # one that has taken longer than it should takes as long again: what it should take says nothing any more
-        to_come = np.where(reached < tasks, tasks - reached, reached)
-        total = max(self._to_do - tasks.sum(), 0.0) + to_come.sum()
-        return float(max(total / rate, max(to_come, default=0.0) / pace))
 
 
 class Progress:
@@ -106,34 +38,43 @@ class Progress:
     ----------
     total : int
         Cells of the grid.
-    stream : text stream, optional
-        None: say nothing.
+    stream : text stream, bool or None
+        None and True: stderr; False: say nothing.
     name : str
         Begins every line.
     done : int
         Cells that were there before.
-    forecast : Forecast, optional
-        Of the blocks to come; None: every cell takes as long.
+    work : float
+        Seconds that the blocks to come should take altogether, or any measure of them.
     clock : callable
         Seconds.
+
+    Attributes
+    ----------
+    crew : int
+        Blocks that are computed at a time.
     """
 
     def __init__(
         self,
         total: int,
-        stream: TextIO | None,
+        stream: bool | TextIO | None,
         name: str = "sweep",
         done: int = 0,
-        forecast: Forecast | None = None,
-        clock: Clock = time.monotonic,
+        work: float = 0.0,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.total, self.done, self.computed = total, done, 0
-        self._stream, self._name, self._clock, self._forecast = stream, printable(name), clock, forecast
+        self._stream: Any = sys.stderr if stream is None or stream is True else stream or None
+        self.total, self.done, self.computed, self.crew = total, done, 0, 1
+        self._name, self._clock = printable(name), clock
         self._bar: Any = None
-        self._live = stream is not None and (stream.isatty() or (stream is sys.stderr and _in_notebook()))
-        self._begun = self._logged = clock()
+        shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+        notebook = self._stream is sys.stderr and type(shell).__name__ == "ZMQInteractiveShell"
+        self._live = self._stream is not None and (self._stream.isatty() or notebook)
+        self._begun = self._last = self._logged = clock()
         self._told: float | None = None
-        self._told_share = 0.0
+        self._work_left, self._blocks = work, 0
+        self._spent = self._first_round = np.zeros(2)  # the work of blocks that are done, and their seconds
 
     @property
     def seconds(self) -> float:
@@ -148,30 +89,40 @@ class Progress:
     @property
     def left(self) -> float | None:
         """Seconds that are left; None where nothing is known yet."""
-        cells = self.total - self.done
-        if self._forecast is not None:
-            left = self._forecast.left
-        else:
-            left = self.seconds * cells / self.computed if self.computed else None
-        return max(left, SHORTEST) if left is not None and cells else left
+        if not self._blocks or self.done >= self.total:
+            return 0.0 if self._blocks else None
+        # kernels are loaded in the first round, which does not count when there were three
+        work, seconds = self._spent - (self._first_round if self._blocks >= 3 * self.crew else 0.0)
+        block = self._spent[0] / self._blocks
+        # the blocks at work are half done
+        to_come = seconds / work * max(self._work_left / self.crew - block / 2, block / 2)
+        waited = self._clock() - self._last
+        # where none has ended for longer than all should take, it may take as long again
+        return float(max(to_come - waited if waited < to_come else waited, SHORTEST))
 
-    def add(self, cells: int) -> None:
-        """Counts cells as done; as many less than none have to be computed once more."""
-        self.done += cells
-        self.computed += max(cells, 0)
+    def add(self, cells: int, work: float, seconds: float) -> None:
+        """Counts the cells of a block as done, which was so much work and took so long."""
+        self.done, self.computed, self._blocks = self.done + cells, self.computed + cells, self._blocks + 1
+        self._work_left -= work
+        self._spent = self._spent + np.array([max(work, 1e-9), seconds])
+        if self._blocks == self.crew:
+            self._first_round = self._spent
+        self._last = self._clock()
         self.tick()
+
+    def again(self, cells: int, work: float) -> None:
+        """A block has to be computed once more."""
+        self.done -= cells
+        self._work_left += work
 
     def tick(self) -> None:
         """Says something if it is time to."""
-        now = self._clock()
-        if now - self._logged >= LOG_SECONDS:
+        if (now := self._clock()) - self._logged >= LOG_SECONDS:
             self._logged = now
             log(self.line(), "progress", **self._fields())
         if self._stream is None or self.seconds < QUIET_SECONDS:
             return
-        quiet = float("inf") if self._told is None else now - self._told
-        more = not self._live and self.done / max(self.total, 1) - self._told_share >= LINE_SHARE
-        if quiet >= (REDRAW_SECONDS if self._live else LINE_SECONDS / 6 if more else LINE_SECONDS):
+        if self._live or self._told is None or now - self._told >= min(LINE_SECONDS, self.seconds / 3):
             self._say(self.line())
 
     def note(self, text: str) -> None:
@@ -180,11 +131,16 @@ class Progress:
         self.tell(text)
 
     def tell(self, text: str) -> None:
-        """The same, but not in the log."""
-        line = f"{self._name}: {text}"
+        """The same, but not in the log. A reader who has gone, or a full disk, does not stop the run."""
         if self._bar is not None:
             self._bar.clear()
-        self._write((line if self._live else f"{time.strftime('%Y-%m-%d %H:%M:%S')}  {line}") + "\n")
+        if self._stream is not None:
+            stamp = "" if self._live else time.strftime("%Y-%m-%d %H:%M:%S  ")
+            try:
+                self._stream.write(f"{stamp}{self._name}: {text}\n")
+                self._stream.flush()
+            except (OSError, ValueError):
+                self._stream = None
 
     def end(self) -> None:
         """Says how it ended, where anything was said before."""
@@ -206,9 +162,8 @@ class Progress:
         return self._counts() + ("" if left is None else f", {speed(self.rate)}, {one_digit(left)} left")
 
     def _fields(self) -> dict[str, Any]:
-        left, rate = self.left, round(self.rate, 3)
-        left = None if left is None else round(left, 1)
-        return {"cells": self.done, "of": self.total, "cells_per_second": rate, "seconds_left": left}
+        left = None if self.left is None else round(self.left, 1)
+        return {"cells": self.done, "of": self.total, "cells_per_second": round(self.rate, 3), "seconds_left": left}
 
     def _counts(self) -> str:
         share = 100 * self.done / self.total if self.total else 100.0
@@ -217,7 +172,7 @@ class Progress:
         return f"{self.done:,}/{self.total:,} cells ({shown} %)"
 
     def _say(self, text: str) -> None:
-        self._told, self._told_share = self._clock(), self.done / max(self.total, 1)
+        self._told = self._clock()
         if not self._live:
             self.tell(text)
             return
@@ -227,28 +182,5 @@ class Progress:
                 from tqdm.auto import tqdm
             form = "{percentage:3.0f} %|{bar:20}| {desc}"
             self._bar = tqdm(total=self.total, initial=self.done, file=self._stream, bar_format=form)
-        self._bar.n = self.done
-        self._bar.set_description_str(f"{self._name}: {text}")
-
-    def _write(self, text: str) -> None:
-        """Tells; a reader who has gone, or a full disk behind the log, does not stop the run."""
-        if self._stream is None:
-            return
-        try:
-            self._stream.write(text)
-            self._stream.flush()
-        except (OSError, ValueError):
-            self._stream = None
-
-
-def _in_notebook() -> bool:
-    """Whether this runs in the kernel of a notebook."""
-    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
-    return type(shell).__name__ == "ZMQInteractiveShell"
-
-
-def stream_of(progress: bool | TextIO | None) -> TextIO | None:
-    """Where to tell: None or True is stderr, False nowhere."""
-    if progress is None or progress is True:
-        return sys.stderr
-    return None if progress is False else progress
+        self._bar.set_description_str(f"{self._name}: {text}", refresh=False)
+        self._bar.update(self.done - self._bar.n)

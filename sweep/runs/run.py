@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Mapping
-from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -18,9 +17,8 @@ from sweep.cells.partition import row_blocks
 from sweep.errors import SweepError
 from sweep.file.open import in_memory, memory, open_result, open_unfinished
 from sweep.file.store import unfinished_of
-from sweep.runs.bench import Found
 from sweep.runs.extend import TAKEN_OVER, Precomputed
-from sweep.runs.loop import Loop
+from sweep.runs.loop import Found, Loop
 from sweep.runs.pool import CtrlC
 from sweep.runs.task import Task, joined
 from sweep.runs.to_file import run_to_file
@@ -183,7 +181,7 @@ class _Memory:
 
     def put(self, job: int, found: Found) -> None:
         """Takes a block, which lies there already if it was computed here."""
-        assert not isinstance(found, bytes)
+        assert isinstance(found, Mapping)
         for name, place in self.room(job).items():
             if not np.may_share_memory(place, found[name]):
                 place[...] = found[name]
@@ -193,12 +191,10 @@ class _Memory:
 
 
 def _run_in_memory(task: Task) -> xr.Dataset:
-    with CtrlC() as ctrl_c, joined(task) as cluster:
-        loop = Loop(task, ctrl_c, cluster)
-        with contextlib.closing(loop):
-            sink, jobs = _Memory(loop.blocks), range(loop.blocks.count)
-            progress = loop.begin(jobs)
-            loop.compute(jobs, sink)
-            progress.end()
+    with CtrlC() as ctrl_c, joined(task) as cluster, contextlib.closing(Loop(task, ctrl_c, cluster)) as loop:
+        sink, jobs = _Memory(loop.blocks), range(loop.blocks.count)
+        progress = loop.begin(jobs)
+        loop.compute(jobs, sink)
+        progress.end()
     found = sink.arrays if task.study.summary is None else gathered(task.study, sink.arrays)
-    return in_memory(replace(loop.schema, attrs={**loop.schema.attrs, "start": loop.began, **loop.endings()}), found)
+    return in_memory(task.schema(start=loop.began, **loop.endings()), found)

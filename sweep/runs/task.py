@@ -5,19 +5,20 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from datetime import datetime
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from sweep.cells.fingerprint import fingerprint
+from sweep.cells.output_schema import output_schema
 from sweep.cells.sample import require_asked
+from sweep.cells.schema import Schema
 from sweep.errors import SweepError, missing
-from sweep.runs.isolate import limit_of
 from sweep.runs.pool import cores, deadline, whole_number
-from sweep.runs.progress import Progress, stream_of
+from sweep.runs.progress import Progress
 from sweep.study.model import Study
-from sweep.words import as_path
+from sweep.words import as_path, seconds_of
 
 if TYPE_CHECKING:
     from sweep.runs.cluster import Cluster
@@ -25,21 +26,16 @@ if TYPE_CHECKING:
 
 @dataclass
 class Task:
-    """What a run was asked for, as `run` was, and what is meant by it.
+    """What a run was asked for, as `run` was, and what is meant by it. Raises SweepError where it cannot be meant.
 
     Attributes
     ----------
     output : Path
         Where a run to a file writes, all links followed.
-    cores, stream, end, limit
-        What `workers`, `progress`, `until` and `cell_timeout` mean.
+    cores, end, limit
+        What `workers`, `until` and `cell_timeout` mean.
     fingerprint : mapping of str to str
         Of the study and of this program, or what is given instead.
-
-    Raises
-    ------
-    SweepError
-        It cannot be meant.
     """
 
     study: Study
@@ -65,8 +61,9 @@ class Task:
         self.cores = cores() if self.workers is None else whole_number("workers", self.workers)
         if self.block_cells is not None:
             whole_number("block_cells", self.block_cells)
-        self.stream, self.end = stream_of(self.progress), deadline(self.until)
-        self.isolate, self.limit = self.isolate or self.cell_timeout is not None, limit_of(self.cell_timeout)
+        self.end = deadline(self.until)
+        self.limit = None if self.cell_timeout is None else seconds_of("cell_timeout", self.cell_timeout)
+        self.isolate = self.isolate or self.limit is not None
         if self.cluster is not None and self.workers is not None:
             raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
         require_asked(self.study)
@@ -82,7 +79,17 @@ class Task:
 
     def note(self, text: str) -> None:
         """Says something at once."""
-        Progress(1, self.stream, self.name).note(text)
+        Progress(1, self.progress, self.name).note(text)
+
+    def schema(self, **attrs: str) -> Schema:
+        """What its result holds, with further attributes."""
+        schema = output_schema(self.study, self.fingerprint)
+        return replace(schema, attrs={**schema.attrs, **attrs})
+
+
+def now() -> str:
+    """The time as ISO 8601 in UTC."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 @contextlib.contextmanager

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 
@@ -17,17 +16,13 @@ from sweep.file import disk
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import stored_fingerprint
 from sweep.file.reading import StoredFile
-from sweep.file.store import Gather, Store, lock_of, opened, unfinished_of
+from sweep.file.store import Store, lock_of, opened, unfinished_of
 from sweep.file.verify import check_whole, verify
-from sweep.runs.bench import Buffers, Found
 from sweep.runs.extend import Precomputed, Reused, has_failed, is_of_another_version, obstacle
-from sweep.runs.loop import Loop
+from sweep.runs.loop import Found, Loop
 from sweep.runs.pool import CtrlC, Terminated, TimeUp
 from sweep.runs.task import Task, joined
 from sweep.words import quantity
-
-if TYPE_CHECKING:
-    from sweep.runs.cluster import Cluster
 
 MOST_ATTEMPTS = 3
 """Times that damaged blocks are computed again before the disk is given up."""
@@ -50,19 +45,48 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
                 store.discard()
             return True
         _take_up(store, task)
-        blocks = None if store.file is None else store.table.blocks
-        left = store.file is None or bool(store.missing())
-        reused = precomputed or (_reused(task, stack) if left else None)
+        to_do = store.file is None or bool(store.missing())
+        reused: Reused | Precomputed | None = precomputed
+        if to_do and reused is None and (task.extend or task.retry_failed) and not task.force and task.output.exists():
+            check_whole(task.output)
+            reused = stack.enter_context(contextlib.closing(Reused(task.output, task.study, task.retry_failed)))
+            if task.extend and is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
+                task.note("another version has computed it; a sample of its cells is computed again")
+                reused.check_sample()
         # held back from here on, wherever they would leave half a file behind
         ctrl_c = stack.enter_context(CtrlC())
-        cluster = stack.enter_context(joined(task)) if left else None
+        cluster = stack.enter_context(joined(task)) if to_do else None
         try:
-            loop = Loop(task, ctrl_c, cluster, blocks, left and precomputed is None, reused)
+            partition = None if store.file is None else store.table.blocks
+            loop = Loop(task, ctrl_c, cluster, partition, to_do and precomputed is None, reused)
         except TimeUp as reason:
             task.note(f"stopped before the first block, for {reason}")
             return False
-        with contextlib.closing(loop):
-            return _computed(loop, store, cluster)
+        stack.enter_context(contextlib.closing(loop))
+        progress = loop.begin(range(loop.blocks.count) if store.file is None else store.missing())
+        loop.log_begin()
+        if store.file is None:
+            _begin(store, loop, reused, cluster is not None)
+        sink = stack.enter_context(_Stored(store, loop, reused))
+        try:
+            for _ in range(MOST_ATTEMPTS):
+                if missing := store.missing():
+                    loop.compute(missing, sink, None if cluster is None else store.shared())
+                damaged = store.finish(loop.endings(), None if task.study.summary is None else sink.gathered)
+                if not damaged:
+                    progress.end()
+                    return True
+                for block in damaged:
+                    loop.again(block)
+        except (KeyboardInterrupt, Terminated, TimeUp) as reason:
+            store.commit()
+            why = f"stopped, for {reason}" if isinstance(reason, TimeUp) else "stopped"
+            kept = f"{store.count} of {loop.blocks.count} blocks are kept"
+            progress.note(f"{why}; {kept}, run the same command again to continue")
+            if isinstance(reason, TimeUp):
+                return False
+            raise
+    raise SweepError(f"{store.path}: what is written there comes back damaged again and again; the disk is failing")
 
 
 def _is_complete(task: Task) -> bool:
@@ -80,10 +104,23 @@ def _is_complete(task: Task) -> bool:
     hindrance = obstacle(stored, task.fingerprint)
     if task.extend and not hindrance:
         return False
-    more = "" if hindrance else f"; {EXTENDABLE}"
     what = f"cannot be extended, for {hindrance}" if task.extend else "holds the result of another study or version"
-    cure = f"choose another name, or overwrite it with --force{more}"
-    raise SweepError(f"{task.output}: {what}; {cure}\n{_listed(stored, task)}")
+    cure = f"choose another name, or overwrite it with --force{'' if hindrance else f'; {EXTENDABLE}'}"
+    raise SweepError(f"{task.output}: {what}; {cure}\n{_changes(stored, task)}")
+
+
+def _changes(stored: Any, task: Task) -> str:
+    return "\n".join(f"  {line}" for line in difference(dict(stored), dict(task.fingerprint)))
+
+
+def _found(store: Store, task: Task) -> StoredFile | None:
+    """What an earlier run left; None where that is damaged and given up."""
+    try:
+        return store.found()
+    except SweepError:
+        if not task.force:
+            raise
+        return None
 
 
 def _take_up(store: Store, task: Task) -> None:
@@ -110,86 +147,14 @@ def _take_up(store: Store, task: Task) -> None:
     else:
         raise SweepError(
             f"{store.path}: the unfinished result of another study or version; finish that one first, choose another "
-            f"name, or give it up with --force\n{_listed(left.fingerprint, task)}"
+            f"name, or give it up with --force\n{_changes(left.fingerprint, task)}"
         )
 
 
-def _found(store: Store, task: Task) -> StoredFile | None:
-    """What an earlier run left; None where that is damaged and given up."""
-    try:
-        return store.found()
-    except SweepError:
-        if not task.force:
-            raise
-        return None
-
-
-def _listed(old: Mapping[str, str], task: Task) -> str:
-    return "\n".join(f"  {line}" for line in difference(dict(old), dict(task.fingerprint)))
-
-
-def _reused(task: Task, stack: contextlib.ExitStack) -> Reused | None:
-    """The cells of the result that is extended. Raises SweepError where that is not possible."""
-    if not (task.extend or task.retry_failed) or task.force or not task.output.exists():
-        return None
-    check_whole(task.output)
-    reused = Reused(task.output, task.study, task.retry_failed)
-    stack.callback(reused.close)
-    if task.extend and is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
-        task.note("another version has computed it; a sample of its cells is computed again")
-        reused.check_sample()
-    return reused
-
-
-class _Stored:
-    """Where blocks of a run to a file go."""
-
-    def __init__(self, loop: Loop, store: Store) -> None:
-        self._buffers, self._store = Buffers(loop.blocks), store
-        self.room, self.tick = self._buffers.room, store.tick
-
-    def put(self, job: int, found: Found) -> None:
-        """Stores a block, or acknowledges one that a worker has written."""
-        if isinstance(found, bytes):
-            self._store.take(job, found)
-        else:
-            self._store.put(job, found)
-            self._buffers.back(job)
-
-
-def _computed(loop: Loop, store: Store, cluster: Cluster | None) -> bool:
-    """Computes what is missing and ends the result; False where the time was up before."""
-    task, sink = loop.task, None
-    progress = loop.begin(range(loop.blocks.count) if store.file is None else store.missing())
-    loop.log_begin()
-    if store.file is None:
-        _begin(loop, store, shared=cluster is not None)
-    try:
-        for _ in range(MOST_ATTEMPTS):
-            if missing := store.missing():
-                sink = sink or _Stored(loop, store)
-                loop.compute(missing, sink, None if cluster is None else store.shared())
-            damaged = store.finish(loop.endings(), None if task.study.summary is None else _gatherer(task))
-            if not damaged:
-                progress.end()
-                return True
-            for block in damaged:
-                loop.again(block)
-    except (KeyboardInterrupt, Terminated, TimeUp) as reason:
-        store.commit()
-        why = f"stopped, for {reason}" if isinstance(reason, TimeUp) else "stopped"
-        kept = f"{store.count} of {loop.blocks.count} blocks are kept"
-        progress.note(f"{why}; {kept}, run the same command again to continue")
-        if isinstance(reason, TimeUp):
-            return False
-        raise
-    raise SweepError(f"{store.path}: what is written there comes back damaged again and again; the disk is failing")
-
-
-def _begin(loop: Loop, store: Store, shared: bool) -> None:
+def _begin(store: Store, loop: Loop, reused: Reused | Precomputed | None, shared: bool) -> None:
     """Makes the file. Raises SweepError where it has no room on the disk."""
     task = loop.task
-    schema = replace(loop.schema, attrs={**loop.schema.attrs, "start": loop.began})
+    schema = task.schema(start=loop.began, **(reused.attrs if reused else {}))
     cuts = cuts_of(task.study, schema, loop.blocks.partition)
     needed, free = expected_size(schema, cuts), disk.free(task.output.parent)
     if needed > free:
@@ -200,13 +165,43 @@ def _begin(loop: Loop, store: Store, shared: bool) -> None:
     store.begin(schema, cuts, shared)
 
 
-def _gatherer(task: Task) -> Gather:
-    """Makes blocks of a summary's output from its rows."""
-    per_group = row_blocks(task.study).per_group
+class _Stored:
+    """Where blocks of a run to a file go; they are brought to the disk by a thread beside those that compute."""
 
-    def gather(file: StoredFile, block: int) -> dict[str, Any]:
+    room = None
+
+    def __init__(self, store: Store, loop: Loop, reused: Reused | Precomputed | None) -> None:
+        self._store, self._blocks, self._study, self._reused = store, loop.blocks, loop.task.study, reused
+        self._syncing = ThreadPoolExecutor(1)
+        self._last: Future[None] | None = None
+
+    def __enter__(self) -> _Stored:
+        return self
+
+    def __exit__(self, *fault: object) -> None:
+        self._syncing.shutdown()
+
+    def put(self, job: int, found: Found) -> None:
+        """Stores a block, with the cells that are known, or acknowledges one that a worker has written."""
+        if isinstance(found, bytes):
+            self._store.take(job, found)
+        elif found is not None:
+            if self._reused is not None:
+                # what came from elsewhere may be read only
+                found = {name: c if c.flags.writeable else c.copy() for name, c in found.items()}
+                self._reused.fill(*self._blocks.bounds(job), found)
+            self._store.put(job, found)
+
+    def tick(self) -> None:
+        """Acknowledges what is written, if it is time to. Raises SweepError."""
+        if self._last is None or self._last.done():
+            if self._last is not None:
+                self._last.result()
+            self._last = self._syncing.submit(self._store.tick)
+
+    def gathered(self, file: StoredFile, block: int) -> dict[str, Any]:
+        """A block of a summary's output, from its rows."""
         first, last = file.tables["cells"].blocks.bounds(block)
+        per_group = row_blocks(self._study).per_group
         rows = {name: c[first * per_group : last * per_group] for name, c in file.columns("rows").items()}
-        return gathered(task.study, rows)
-
-    return gather
+        return gathered(self._study, rows)

@@ -168,12 +168,12 @@ def test_an_answer_that_gets_lost_in_the_executor_is_asked_for_again(address, ti
             executor = super().get_executor(**keys)
             real = executor.submit
 
-            def submit(function, run, batch, masks):
-                future = real(function, run, batch, masks)
-                if 7 in batch and len(lost) < times:
-                    lost.append(batch)
+            def submit(function, run, job, wanted):
+                future = real(function, run, job, wanted)
+                if job == 7 and len(lost) < times:
+                    lost.append(job)
                     future = Future()
-                    future.set_exception(TypeError("cannot unpack non-iterable Answer object"))
+                    future.set_exception(TypeError("cannot unpack non-iterable Done object"))
                 return future
 
             executor.submit = submit

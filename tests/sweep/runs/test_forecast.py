@@ -7,7 +7,7 @@ import pytest
 
 from sweep.cells.partition import Partition
 from sweep.cells.timing import Sample
-from sweep.runs.progress import Forecast, from_everywhere
+from sweep.runs.progress import Progress, from_everywhere
 
 CELLS = 2**18
 
@@ -51,7 +51,9 @@ class Run:
         probed = noise * [costs[p : p + 32].mean() for p in places]
         self.weights = Sample(places, probed, 32).weights(partition)
         self.now, self.workers, self.slow = 0.0, workers, slow
-        self.forecast = Forecast(self.weights, range(partition.count), workers, lambda: self.now)
+        work = float(self.weights.sum())
+        self.progress = Progress(partition.count, False, work=work, clock=lambda: self.now)
+        self.progress.crew = workers
 
     def ends(self):
         """The number of blocks that are done, each time it grows."""
@@ -59,16 +61,15 @@ class Run:
         for count in range(1, len(self.costs) + 1):
             while queue and len(busy) < self.workers:
                 job = queue.pop(0)
-                self.forecast.begin([job])
-                slow = self.slow if count <= 1 else 1.0
-                heapq.heappush(busy, (self.now + slow * self.costs[job], job))
-            self.now, job = heapq.heappop(busy)
-            self.forecast.end(job)
+                seconds = self.costs[job] * (self.slow if count <= 1 else 1.0)
+                heapq.heappush(busy, (self.now + seconds, job, seconds))
+            self.now, job, seconds = heapq.heappop(busy)
+            self.progress.add(1, self.weights[job], seconds)
             yield count
 
     def forecasts(self):
         """Share of the blocks that are done, the time, and how much is forecast to be left, after each block."""
-        return [(done / len(self.costs), self.now, self.forecast.left) for done in self.ends()]
+        return [(done / len(self.costs), self.now, self.progress.left) for done in self.ends()]
 
 
 @pytest.mark.parametrize("workers", [1, 8])
@@ -86,23 +87,21 @@ def test_every_block_comes_once_also_one_that_comes_again():
     assert sorted(from_everywhere(range(7, 1000))) == list(range(7, 1000))
     run = Run(COSTS["dear last"], 100, 3)
     assert len(list(run.ends())) == len(run.costs)
-    assert run.forecast.left == 0.0
-    run.forecast.again(2)
-    assert run.forecast.left > 0
+    assert run.progress.left == 0.0
+    run.progress.again(1, run.weights[2])
+    assert run.progress.left > 0
 
 
 def test_a_block_that_takes_far_longer_than_thought_is_not_done_at_any_moment():
     """The last one of a hundred takes a minute, not the second that the others did: it was never 0 s to its end."""
     now = 0.0
-    forecast = Forecast(np.ones(100), range(100), 1, lambda: now)
-    for job in range(99):
-        forecast.begin([job])
+    progress = Progress(100, False, work=100.0, clock=lambda: now)
+    for _ in range(99):
         now += 1.0
-        forecast.end(job)
-    forecast.begin([99])
-    before = forecast.left
-    now += 0.75
-    assert forecast.left == pytest.approx(before - 0.75, rel=0.05)
+        progress.add(1, 1.0, 1.0)
+    before = progress.left
+    now += 0.2
+    assert progress.left == pytest.approx(before - 0.2, rel=0.05)
     for waited in (2.0, 10.0, 30.0, 50.0):
         now = 99.0 + waited
-        assert forecast.left > 0.5 * min(waited, 60.0 - waited)
+        assert progress.left > 0.5 * min(waited, 60.0 - waited)
