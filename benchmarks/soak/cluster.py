@@ -28,7 +28,7 @@ import toy_studies  # noqa: E402
 from clusters import served  # noqa: E402
 from distributed import Client  # noqa: E402
 
-from sweep.runs.loop import Loop  # noqa: E402
+from sweep.runs.cluster import Cluster  # noqa: E402
 from sweep.runs.run import run  # noqa: E402
 
 
@@ -44,14 +44,13 @@ def timed(study, path=None, **keys) -> float:
 
 def counted(tasks: list[int]):
     """Notes how many blocks each task holds."""
-    real = Loop._batches
+    real = Cluster.submit
 
-    def batches(self, jobs):
-        for batch in real(self, jobs):
-            tasks.append(len(batch))
-            yield batch
+    def submit(self, masks):
+        tasks.append(len(masks))
+        return real(self, masks)
 
-    Loop._batches = batches
+    Cluster.submit = submit
 
 
 def killing(client: Client, kills: int, rng: random.Random, ended: threading.Event, done: list[int]) -> None:

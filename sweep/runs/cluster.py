@@ -19,6 +19,7 @@ import time
 import weakref
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, Future
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,7 @@ from sweep.file import disk
 from sweep.file.store import Shared
 from sweep.runs.isolate import Processes, kernel_paths
 from sweep.runs.log import log
-from sweep.runs.loop import POISONED, Bench, Done, Found
+from sweep.runs.loop import POISONED, Bench, Done, Found, Masks
 from sweep.study.model import Study
 
 CONNECT_SECONDS = 10
@@ -101,10 +102,10 @@ class Cluster:
         words = study.to_json(), dict(fingerprint), partition, shared, kernel_paths(study), isolated
         self._remote = self._client.submit(Remote, *words, pure=False)
 
-    def submit(self, job: int, wanted: Any) -> Future[Done]:
+    def submit(self, masks: Masks) -> Future[Answer]:
         """A future of what `compute` gives on a worker. Raises SweepError."""
         try:
-            future: Future[Done] = self.executor.submit(compute, self._remote, job, wanted)
+            future: Future[Answer] = self.executor.submit(compute, self._remote, masks)
             return future
         except Exception as fault:
             raise self.lost(fault) from fault
@@ -115,19 +116,20 @@ class Cluster:
             with contextlib.suppress(Exception):
                 self.executor.shutdown(wait=False)
 
-    def outcome(self, future: Future[Done], block: str) -> Done | None:
-        """What a future gives; None where the answer got lost. Raises SweepError."""
+    def outcome(self, future: Future[Any], blocks: str) -> list[Done] | None:
+        """What a future gives, of blocks computed there or here; None where the answer got lost. Raises SweepError."""
         try:
-            return future.result()
+            found: Answer | list[Done] = future.result()
+            return found.found if isinstance(found, Answer) else found
         except CancelledError as fault:
             raise self.lost(fault) from fault
         except distributed.KilledWorker as fault:
-            raise SweepError(f"{block}: {POISONED}") from fault
+            raise SweepError(f"{blocks}: {POISONED}") from fault
         except SweepError:
             raise
         except Exception as fault:
             # distributed's executor trips over a task that fails with its worker and is answered at that moment
-            if isinstance(fault, TypeError) and f"non-iterable {Done.__name__}" in str(fault):
+            if isinstance(fault, TypeError) and Answer.__name__ in str(fault):
                 return None
             raise SweepError(
                 f"cluster: a worker failed ({type(fault).__name__}: {fault}); what is finished is kept; every machine "
@@ -211,24 +213,38 @@ class Remote:
         else:
             processes = Processes(study, isolated[0], os.cpu_count() or 1, isolated[1])
             weakref.finalize(self, processes.end)
-        fd = None if shared is None else shared.opened()
+        self._fd = fd = None if shared is None else shared.opened()
         if fd is not None:
             weakref.finalize(self, os.close, fd)
 
         def kept(job: int, arrays: Mapping[str, Any]) -> Found:
-            """The digests of what is written and on the disk, or the numbers, which lie where nothing else will."""
+            """The digests of what is written, or the numbers, which lie where nothing else will."""
             if fd is None:
                 return {name: column.copy() for name, column in arrays.items()}
             with disk.refusing(Path(shared.path)):
                 digests: bytes = shared.table.write(fd, job, arrays)
-                disk.fsync(fd)
             return digests
 
         return Bench(study, Blocks(study, partition), kept, processes=processes)
 
+    def sync(self) -> None:
+        """Returns when all that was written is on the disk. Raises SweepError."""
+        if self._fd is not None:
+            with disk.refusing(Path(self._words[3].path)):
+                disk.fsync(self._fd)
 
-def compute(remote: Remote, job: int, wanted: Any) -> Done:
-    """Computes a block on a worker, or of its cells only those wanted. Raises SweepError."""
+
+@dataclass(frozen=True)
+class Answer:
+    """What became of some blocks."""
+
+    found: list[Done]
+
+
+def compute(remote: Remote, masks: Masks) -> Answer:
+    """Computes some blocks on a worker; when it returns, those that are written are on the disk. Raises SweepError."""
     with remote.turn:
         bench = remote.bench
-    return bench.block(job, wanted)
+    found = bench.blocks(masks)
+    remote.sync()
+    return Answer(found)

@@ -45,6 +45,8 @@ GRACE_SECONDS, KILL_SECONDS = 1.3, 0.3
 """What blocks at work have to end in when a run stops; and then, when the processes are killed that solve cells."""
 SAMPLE_SECONDS = 1.0
 """What the timed sample may take although the time is up: it gives blocks a size by which the run is continued."""
+TASK_SECONDS, TASK_BYTES = 0.5, 32 << 20
+"""Blocks of a cluster that are shorter, and together no larger, go to a worker several at a time."""
 MOST_LOST = 3
 """Times that a block is tried again whose answer got lost."""
 MOST_TOLD = 1000
@@ -56,6 +58,9 @@ POISONED = (
 
 Found = bytes | Mapping[str, Any] | None
 """A block that is not in the sink yet: the digests of what a worker has written to the file, or its numbers."""
+
+Masks = dict[int, Any]
+"""Blocks, and of each the cells that are to be computed; None: all."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +115,10 @@ class Bench:
             here.solve(start, stop, arrays, wanted)
             found = self._kept(job, arrays)
             return Done(job, time.perf_counter() - begun, [*here.bad], found)
+
+    def blocks(self, masks: Masks) -> list[Done]:
+        """Computes some blocks."""
+        return [self.block(job, wanted) for job, wanted in masks.items()]
 
 
 class Sink(Protocol):
@@ -224,33 +233,36 @@ class Loop:
         After a fault, Ctrl-C or SIGTERM no block is begun, and those at work are put into the sink if they end.
         Raises SweepError, TimeUp, KeyboardInterrupt, Terminated.
         """
-        cluster, reused, processes = self._cluster, self._reused, self._processes
+        cluster, processes = self._cluster, self._processes
         bench = Bench(self.task.study, self.blocks, sink.put, sink.room, processes)
         if cluster is not None:
             isolated = None if processes is None else (processes.limit, processes.cost)
-            seen = shared if reused is None else None
+            seen = shared if self._reused is None else None
             cluster.begin(self.task.study, self.task.fingerprint, self.blocks.partition, seen, isolated)
         queue, lost = deque(from_everywhere(jobs)), Counter[int]()
-        under_way: dict[Future[Done], int] = {}
+        most = max(1, TASK_BYTES // max(1, self.blocks.partition.cells * self.blocks.row_bytes))
+        under_way: dict[Future[Any], Masks] = {}
         try:
             while queue or under_way:
                 self._ctrl_c.check()
                 self.check_time()
                 while queue and len(under_way) < 2 + 3 * self._cores:
-                    job = queue.popleft()
-                    mask = None if reused is None else reused.missing(*self.blocks.bounds(job))
-                    # a block of which all cells are known is put together here
-                    if cluster is None or (mask is not None and not mask.any()):
-                        under_way[self._threads.submit(bench.block, job, mask)] = job
+                    # short blocks go to a worker elsewhere several at a time, and one by one in the end
+                    known = 0.0 if cluster is None else self.progress.block_seconds
+                    count = min(TASK_SECONDS / known, most, len(queue) / (2 * self._cores)) if known else 1
+                    masks = {job: self._missing(job) for job in (queue.popleft() for _ in range(max(1, int(count))))}
+                    # those of which all cells are known are put together here
+                    if cluster is None or all(mask is not None and not mask.any() for mask in masks.values()):
+                        under_way[self._threads.submit(bench.blocks, masks)] = masks
                     else:
-                        under_way[cluster.submit(job, mask)] = job
+                        under_way[cluster.submit(masks)] = masks
                 for future in wait(under_way, TICK, FIRST_COMPLETED).done:
-                    job = under_way.pop(future)
-                    if not self._take(future, job, sink):
-                        lost[job] += 1
-                        queue.appendleft(job)
-                        if lost[job] > MOST_LOST:
-                            raise SweepError(f"{self.blocks.label(job)}: {POISONED}")
+                    masks = under_way.pop(future)
+                    if not self._take(future, masks, sink):
+                        lost.update(masks)
+                        queue.extendleft(masks)
+                        if max(lost.values()) > MOST_LOST:
+                            raise SweepError(f"{self._labels(masks)}: {POISONED}")
                 if cluster is not None:
                     cluster.look()
                 self.progress.crew = self._cores
@@ -258,31 +270,38 @@ class Loop:
                 sink.tick()
         except BaseException:
             self._stop(under_way)
-            for future, job in under_way.items():
+            for future, masks in under_way.items():
                 with contextlib.suppress(Exception, CancelledError):
                     if future.done():
-                        self._take(future, job, sink)
+                        self._take(future, masks, sink)
             raise
 
-    def _take(self, future: Future[Done], job: int, sink: Sink) -> bool:
+    def _missing(self, job: int) -> Any:
+        """Of the cells of a block, which are to be computed; None: all."""
+        return None if self._reused is None else self._reused.missing(*self.blocks.bounds(job))
+
+    def _labels(self, jobs: Iterable[int]) -> str:
+        """How blocks are called in messages."""
+        return ", ".join(map(self.blocks.label, jobs))
+
+    def _take(self, future: Future[Any], jobs: Iterable[int], sink: Sink) -> bool:
         """Has what a worker sent put into the sink, and tells of cells that FAILED; of too many only how many they are.
 
         False where the answer got lost. Raises what went wrong.
         """
-        done = future.result() if self._cluster is None else self._cluster.outcome(future, self.blocks.label(job))
-        if done is None:
-            return False
-        if done.found is not None:
-            sink.put(job, done.found)
-        for cell in done.bad:
-            self._failed += 1
-            if self._failed <= MOST_TOLD:
-                log(str(cell), "failed", cell=cell.cell, values=dict(cell.values), reason=cell.reason)
-                self.progress.tell(str(cell))
-            elif self._failed == MOST_TOLD + 1:
-                self.progress.note("more cells FAILED; from here on they are counted only")
-        self.progress.add(self._cells(job), self._weights[job], done.seconds)
-        return True
+        found = future.result() if self._cluster is None else self._cluster.outcome(future, self._labels(jobs))
+        for done in found or ():
+            if done.found is not None:
+                sink.put(done.block, done.found)
+            for cell in done.bad:
+                self._failed += 1
+                if self._failed <= MOST_TOLD:
+                    log(str(cell), "failed", cell=cell.cell, values=dict(cell.values), reason=cell.reason)
+                    self.progress.tell(str(cell))
+                elif self._failed == MOST_TOLD + 1:
+                    self.progress.note("more cells FAILED; from here on they are counted only")
+            self.progress.add(self._cells(done.block), self._weights[done.block], done.seconds)
+        return found is not None
 
     def _stop(self, computing: Iterable[Future[Any]]) -> None:
         """Lets what is computed here end; what takes too long is killed, or given up."""

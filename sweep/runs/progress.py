@@ -87,6 +87,11 @@ class Progress:
         return self.computed / max(self.seconds, 1e-9)
 
     @property
+    def block_seconds(self) -> float:
+        """What a block takes on average, 0 where none is done."""
+        return float(self._spent[1]) / max(self._blocks, 1)
+
+    @property
     def left(self) -> float | None:
         """Seconds that are left; None where nothing is known yet."""
         if not self._blocks or self.done >= self.total:

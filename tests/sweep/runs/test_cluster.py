@@ -168,12 +168,12 @@ def test_an_answer_that_gets_lost_in_the_executor_is_asked_for_again(address, ti
             executor = super().get_executor(**keys)
             real = executor.submit
 
-            def submit(function, run, job, wanted):
-                future = real(function, run, job, wanted)
-                if job == 7 and len(lost) < times:
-                    lost.append(job)
+            def submit(function, run, masks):
+                future = real(function, run, masks)
+                if 7 in masks and len(lost) < times:
+                    lost.append(masks)
                     future = Future()
-                    future.set_exception(TypeError("cannot unpack non-iterable Done object"))
+                    future.set_exception(TypeError("cannot unpack non-iterable Answer object"))
                 return future
 
             executor.submit = submit
