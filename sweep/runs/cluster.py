@@ -33,9 +33,9 @@ from sweep.cells.solve import Solver
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
 from sweep.file.store import Shared
+from sweep.runs.bench import POISONED, Bench, Done, Found, Masks
 from sweep.runs.isolate import Processes, kernel_paths
 from sweep.runs.log import log
-from sweep.runs.loop import POISONED, Bench, Done, Found, Masks
 from sweep.study.model import Study
 
 CONNECT_SECONDS = 10

@@ -1,7 +1,7 @@
 """The loop of a run: numbers of blocks go to an executor of concurrent.futures, threads here or dask's, and come back.
 
-A thread, here or of a worker, computes a block on a `Bench` and puts it into a sink: the arrays of a run in memory, or
-the file. Only a worker that does not see the file sends numbers, which the loop puts there.
+A thread computes a block on a `Bench` and puts it into a sink: the arrays of a run in memory, or the file. Only a worker
+that does not see the file sends numbers, which the loop puts there.
 """
 
 from __future__ import annotations
@@ -10,31 +10,27 @@ import contextlib
 import math
 import os
 import platform
-import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, Protocol
 
-from sweep.cells.block import Blocks, block_solver, faults_reported, row_shape, sampled_by, sampled_study
+from sweep.cells.block import Blocks, row_shape, sampled_by, sampled_study
 from sweep.cells.compiling import Compiling
-from sweep.cells.guard import BadCell, Guard
 from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import Partition, boxes, row_blocks
-from sweep.cells.solve import Solver
 from sweep.cells.timing import UNSAMPLED, Sample, row_partition
 from sweep.errors import SweepError
 from sweep.file.store import Shared
+from sweep.runs.bench import POISONED, Bench, Found, Masks
 from sweep.runs.extend import Precomputed, Reused
 from sweep.runs.isolate import Processes
 from sweep.runs.log import log
 from sweep.runs.pool import CtrlC, TimeUp, endless, passed
 from sweep.runs.progress import Progress, from_everywhere
 from sweep.runs.task import Task, now
-from sweep.study.model import Study
 
 if TYPE_CHECKING:
     from sweep.runs.cluster import Cluster
@@ -51,74 +47,6 @@ MOST_LOST = 3
 """Times that a block is tried again whose answer got lost."""
 MOST_TOLD = 1000
 """Cells that FAILED which are told one by one."""
-POISONED = (
-    "every worker that took them died; the logs of the workers may tell why, too little memory is most common; what is "
-    "finished is kept; isolated, a cell of which its process dies is found and FAILED"
-)
-
-Found = bytes | Mapping[str, Any] | None
-"""A block that is not in the sink yet: the digests of what a worker has written to the file, or its numbers."""
-
-Masks = dict[int, Any]
-"""Blocks, and of each the cells that are to be computed; None: all."""
-
-
-@dataclass(frozen=True)
-class Done:
-    """A block that is computed, the seconds it took, and its cells that FAILED."""
-
-    block: int
-    seconds: float
-    bad: Sequence[BadCell] = ()
-    found: Found = None
-
-
-class Bench:
-    """Computes blocks in any thread, each with a solver and columns of its own, which are used again.
-
-    Parameters
-    ----------
-    study : Study
-    blocks : Blocks
-    kept : callable
-        Takes the number and the columns of a block that is computed; what it gives goes back.
-    room : callable, optional
-        The columns to fill for a block, where these are not a thread's own.
-    processes : Processes, optional
-        Which solve cells; None: they are solved in this process.
-    """
-
-    def __init__(
-        self,
-        study: Study,
-        blocks: Blocks,
-        kept: Callable[[int, Mapping[str, Any]], Found],
-        room: Callable[[int], Mapping[str, Any]] | None = None,
-        processes: Processes | None = None,
-    ) -> None:
-        self._study, self._blocks, self._kept, self._room, self._processes = study, blocks, kept, room, processes
-        self._here = threading.local()
-
-    def block(self, job: int, wanted: Any = None) -> Done:
-        """Computes a block; of its cells only those wanted, by default all. Raises SweepError."""
-        here, (start, stop) = self._here, self._blocks.bounds(job)
-        with faults_reported(f"{self._blocks.label(job)} cannot be computed or kept"):
-            if not hasattr(here, "solve"):
-                here.bad = []
-                cells = Solver(self._study) if self._processes is None else self._processes.solver()
-                here.solve = block_solver(self._study, Guard(cells, here.bad.append))
-                here.columns = {} if self._room else self._blocks.empty()
-            here.bad.clear()
-            begun = time.perf_counter()
-            own = {name: column[: stop - start] for name, column in here.columns.items()}
-            arrays = self._room(job) if self._room else own
-            here.solve(start, stop, arrays, wanted)
-            found = self._kept(job, arrays)
-            return Done(job, time.perf_counter() - begun, [*here.bad], found)
-
-    def blocks(self, masks: Masks) -> list[Done]:
-        """Computes some blocks."""
-        return [self.block(job, wanted) for job, wanted in masks.items()]
 
 
 class Sink(Protocol):
@@ -259,7 +187,7 @@ class Loop:
                 for future in wait(under_way, TICK, FIRST_COMPLETED).done:
                     masks = under_way.pop(future)
                     if not self._take(future, masks, sink):
-                        lost.update(masks)
+                        lost.update([*masks])
                         queue.extendleft(masks)
                         if max(lost.values()) > MOST_LOST:
                             raise SweepError(f"{self._labels(masks)}: {POISONED}")

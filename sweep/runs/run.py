@@ -17,8 +17,9 @@ from sweep.cells.partition import row_blocks
 from sweep.errors import SweepError
 from sweep.file.open import in_memory, memory, open_result, open_unfinished
 from sweep.file.store import unfinished_of
+from sweep.runs.bench import Found
 from sweep.runs.extend import TAKEN_OVER, Precomputed
-from sweep.runs.loop import Found, Loop
+from sweep.runs.loop import Loop
 from sweep.runs.pool import CtrlC
 from sweep.runs.task import Task, joined
 from sweep.runs.to_file import run_to_file

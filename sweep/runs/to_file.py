@@ -18,8 +18,9 @@ from sweep.file.open import stored_fingerprint
 from sweep.file.reading import StoredFile
 from sweep.file.store import Store, lock_of, opened, unfinished_of
 from sweep.file.verify import check_whole, verify
+from sweep.runs.bench import Found
 from sweep.runs.extend import Precomputed, Reused, has_failed, is_of_another_version, obstacle
-from sweep.runs.loop import Found, Loop
+from sweep.runs.loop import Loop
 from sweep.runs.pool import CtrlC, Terminated, TimeUp
 from sweep.runs.task import Task, joined
 from sweep.words import quantity
