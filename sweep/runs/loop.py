@@ -1,7 +1,7 @@
 """The loop of a run: numbers of blocks go to an executor of concurrent.futures, threads here or dask's, and come back.
 
-A thread computes a block on a `Bench` and puts it into a sink: the arrays of a run in memory, or the file. Only a worker
-that does not see the file sends numbers, which the loop puts there.
+A thread computes a block on a `Bench` and puts it into a sink: the arrays of a run in memory, or the file. Only a
+worker that does not see the file sends numbers, which the loop puts there.
 """
 
 from __future__ import annotations
@@ -170,6 +170,14 @@ class Loop:
         queue, lost = deque(from_everywhere(jobs)), Counter[int]()
         most = max(1, TASK_BYTES // max(1, self.blocks.partition.cells * self.blocks.row_bytes))
         under_way: dict[Future[Any], Masks] = {}
+
+        def begin(masks: Masks) -> None:
+            """Submits blocks; those of which all cells are known are put together here."""
+            if cluster is None or all(mask is not None and not mask.any() for mask in masks.values()):
+                under_way[self._threads.submit(bench.blocks, masks)] = masks
+            else:
+                under_way[cluster.submit(masks)] = masks
+
         try:
             while queue or under_way:
                 self._ctrl_c.check()
@@ -179,18 +187,15 @@ class Loop:
                     known = 0.0 if cluster is None else self.progress.block_seconds
                     count = min(TASK_SECONDS / known, most, len(queue) / (2 * self._cores)) if known else 1
                     masks = {job: self._missing(job) for job in (queue.popleft() for _ in range(max(1, int(count))))}
-                    # those of which all cells are known are put together here
-                    if cluster is None or all(mask is not None and not mask.any() for mask in masks.values()):
-                        under_way[self._threads.submit(bench.blocks, masks)] = masks
-                    else:
-                        under_way[cluster.submit(masks)] = masks
+                    begin(masks)
                 for future in wait(under_way, TICK, FIRST_COMPLETED).done:
                     masks = under_way.pop(future)
                     if not self._take(future, masks, sink):
-                        lost.update([*masks])
-                        queue.extendleft(masks)
-                        if max(lost.values()) > MOST_LOST:
-                            raise SweepError(f"{self._labels(masks)}: {POISONED}")
+                        for job, mask in masks.items():
+                            lost[job] += 1
+                            if lost[job] > MOST_LOST:
+                                raise SweepError(f"{self.blocks.label(job)}: {POISONED}")
+                            begin({job: mask})
                 if cluster is not None:
                     cluster.look()
                 self.progress.crew = self._cores
@@ -208,16 +213,13 @@ class Loop:
         """Of the cells of a block, which are to be computed; None: all."""
         return None if self._reused is None else self._reused.missing(*self.blocks.bounds(job))
 
-    def _labels(self, jobs: Iterable[int]) -> str:
-        """How blocks are called in messages."""
-        return ", ".join(map(self.blocks.label, jobs))
-
     def _take(self, future: Future[Any], jobs: Iterable[int], sink: Sink) -> bool:
         """Has what a worker sent put into the sink, and tells of cells that FAILED; of too many only how many they are.
 
         False where the answer got lost. Raises what went wrong.
         """
-        found = future.result() if self._cluster is None else self._cluster.outcome(future, self._labels(jobs))
+        labels = ", ".join(map(self.blocks.label, jobs))
+        found = future.result() if self._cluster is None else self._cluster.outcome(future, labels)
         for done in found or ():
             if done.found is not None:
                 sink.put(done.block, done.found)
