@@ -79,9 +79,9 @@ def join(
             raise SweepError("an unfinished result cannot be joined; run its sweep to the end first")
     if 2 * sum(dataset.nbytes for dataset in results) > memory():
         raise SweepError("the two results together do not fit into the memory")
-    first, second = (Study.from_json(str(dataset.attrs["study_json"]), declared=True) for dataset in results)
-    joined, whole = _joined(first, second, results, axis, labels)
-    joined = replace(joined, text="", title=first.title)
+    studies = [Study.from_json(str(dataset.attrs["study_json"]), declared=True) for dataset in results]
+    joined, whole = _along(axis, studies, results, labels) if axis is not None else _joined(studies, results)
+    joined = replace(joined, text="", title=studies[0].title)
 
     grid = Grid(joined)
     arrays: dict[str, Any] = {}
@@ -104,46 +104,54 @@ def join(
     return store_cells(joined, path, arrays, force, mark, versions)
 
 
-def _joined(
-    first: Study, second: Study, results: Sequence[xr.Dataset], axis: str | None, labels: tuple[str, ...]
-) -> tuple[Study, xr.Dataset]:
-    """The study of both, and the numbers in its dimensions. Raises SweepError."""
+def _apart(first: Study, second: Study) -> list[str]:
+    """What two studies differ in: "axes.mu", "fixed.a", "rtol", of axes that run together "points"."""
     old, new = (
         {name: text for name, text in fingerprint(study).items() if name != "study" and not is_of_program(name)}
         for study in (first, second)
     )
     apart = sorted(name for name in {*old, *new} if old.get(name) != new.get(name))
     if first.dims == second.dims and len(first.dims) == 1 and first.design != "product":
-        # axes that run together are one thing
         apart = list(dict.fromkeys("points" if name.startswith("axes.") else name for name in apart))
-    if axis is not None:
-        if apart:
-            raise SweepError(f"along {axis} all else is to be the same; they differ in {listed(apart, word='and')}")
-        taken = (*results[0].variables, *SETTINGS, *results[0].dims)
-        if not isinstance(axis, str) or not axis.isidentifier() or axis in taken:
-            raise SweepError(f'"{axis}" cannot be the name of a new axis; choose another')
-        if len(labels) != 2 or len(set(labels)) != 2 or not all(isinstance(label, str) and label for label in labels):
-            raise SweepError("a new axis needs two labels that differ")
-        return _with_axis(first, results, Axis(axis, frozen([0.0, 1.0]), "values", labels))
+    return apart
+
+
+def _along(
+    axis: str, studies: Sequence[Study], results: Sequence[xr.Dataset], labels: tuple[str, ...]
+) -> tuple[Study, xr.Dataset]:
+    """The study of both along a new axis of words, and the numbers in its dimensions. Raises SweepError."""
+    if apart := _apart(*studies):
+        raise SweepError(f"along {axis} all else is to be the same; they differ in {listed(apart, word='and')}")
+    taken = (*results[0].variables, *SETTINGS, *results[0].dims)
+    if not isinstance(axis, str) or not axis.isidentifier() or axis in taken:
+        raise SweepError(f'"{axis}" cannot be the name of a new axis; choose another')
+    if len(labels) != 2 or len(set(labels)) != 2 or not all(isinstance(label, str) and label for label in labels):
+        raise SweepError("a new axis needs two labels that differ")
+    return _with_axis(studies[0], results, Axis(axis, frozen([0.0, 1.0]), "values", labels))
+
+
+def _joined(studies: Sequence[Study], results: Sequence[xr.Dataset]) -> tuple[Study, xr.Dataset]:
+    """The study of both along what they differ in, and the numbers in its dimensions. Raises SweepError."""
+    first, second = studies
+    apart = _apart(first, second)
     if len(apart) != 1:
         what = f"they differ in {listed(apart, word='and')}" if apart else "they do not differ; name a new axis"
         raise SweepError(f"the results do not fit together: {what}")
     group, _, name = apart[0].rpartition(".")
     if group == "axes" or apart == ["points"]:
-        product = first.design == "product"
-        return _longer(first, second, results, name if product else next(iter(first.dims)))
+        return _longer(first, second, results, name if first.design == "product" else next(iter(first.dims)))
     if group != "fixed" and name not in SETTINGS:
         raise SweepError(f"the results do not fit together: they differ in {apart[0]}")
     if name == "method":
-        codes = {"auto": -1.0} | {method.name: float(code) for code, method in enumerate(first.kernel.methods)}
         methods = first.method, second.method
+        codes = {"auto": -1.0} | {method.name: float(code) for code, method in enumerate(first.kernel.methods)}
         return _with_axis(first, results, Axis(name, frozen([codes[m] for m in methods]), "values", methods))
-    values = [first.rtol, second.rtol] if name == "rtol" else [study.fixed.get(name) for study in (first, second)]
+    values = [study.rtol if name == "rtol" else study.fixed.get(name) for study in studies]
     if any(value is None or np.ndim(value) for value in values):
         raise SweepError(f"the results do not fit together: they differ in {name}, which is not one number in both")
     choices = {} if name == "rtol" else first.kernel.parameter(name).choices
     words = {float(number): word for word, number in choices.items()}
-    said = tuple(words[float(value)] for value in values if isinstance(value, float)) if words else None
+    said = tuple(words[float(value)] for value in values) if words else None  # type: ignore[arg-type]
     return _with_axis(first, results, Axis(name, frozen(values), "values", said))
 
 

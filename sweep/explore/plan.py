@@ -114,12 +114,12 @@ class Plan:
     def __str__(self) -> str:
         def shares(found: dict[str, float]) -> str:
             """Neither none nor all, where it is not."""
-            percent = {
-                name: "< 1 %" if share < 0.005 else "> 99 %" if 0.995 < share < 1 else f"{100 * share:.0f} %"
-                for name, share in found.items()
-            }
             sample = f" of a sample of {self.sampled:,} cell{'s' * (self.sampled > 1)}"
-            return ", ".join(f"{name} {text}" for name, text in percent.items()) + sample if found else ""
+            texts = [
+                f"{name} {'< 1' if share < 0.005 else '> 99' if 0.995 < share < 1 else format(100 * share, '.0f')} %"
+                for name, share in found.items()
+            ]
+            return ", ".join(texts) + sample if found else ""
 
         when = "just now; the machine code is kept" if _is_kept(self.kernel) else "of it, before the first cell"
         shape = " x ".join(f"{name} {n:,}" for name, n in self.shape.items())
@@ -185,7 +185,7 @@ def plan(
     if not isolate and cell_timeout is None:
         compiling = Compiling(study.kernel, study.kernel_name, note)
         sample = sampled_study(study, compiling)
-        found = _forecast(study, sample, crew, folder)
+        found = _forecast(study, sample, crew, folder, Guard(Solver(study), lambda cell: None))
         with faults_reported(f"{study.kernel_name}: the kernel failed"):
             advice = advice_on(study, SHARE * found.seconds)
         compiled = sum(compiling.seconds.values())
@@ -215,8 +215,8 @@ def _is_kept(kernel: str) -> bool:
     return machine_code_folder() is not None and ":" not in kernel
 
 
-def _forecast(study: Study, sample: Sample, workers: int, folder: Path, apart: SolveCells | None = None) -> Plan:
-    """What a timed sample says, and some cells, which are solved together; one by one where they are apart."""
+def _forecast(study: Study, sample: Sample, workers: int, folder: Path, solver: SolveCells) -> Plan:
+    """What a timed sample says, and some cells, each solved by itself."""
     rows, grid, schema = row_blocks(study), Grid(study), output_schema(study, fingerprint(study))
     row_bytes = sum(column.cell_bytes for column in part_columns(study))
     blocks = row_partition(sample, rows, row_shape(study), row_bytes, workers)
@@ -224,15 +224,13 @@ def _forecast(study: Study, sample: Sample, workers: int, folder: Path, apart: S
     writing = output / _disk_speed(folder) if output > WORTH_A_TRIAL else 0.0
     # blocks are written while others are computed
     seconds = RUN_SECONDS + max(sample.cost * rows.size / min(workers, blocks.count), writing)
-    chosen = _chosen(grid, int(min(LOOK_SECONDS, SHARE * seconds) / (sample.cost + (sample.call if apart else 0.0))))
+
+    chosen = _chosen(grid, int(min(LOOK_SECONDS, SHARE * seconds) / (sample.cost + sample.call)))
     cells = empty_cells(study, len(chosen))
     cells.status[:], cells.used[:] = Status.PENDING, -1
-    if apart is None:
-        Guard(Solver(study, _Some(study, chosen)), lambda cell: None).solve(0, cells)
-    else:
-        for place, number in enumerate(chosen.tolist()):
-            with tolerated():
-                apart.solve(number, cells.rows(slice(place, place + 1)))
+    for place, number in enumerate(chosen):
+        with tolerated():
+            solver.solve(number, cells.rows(slice(place, place + 1)))
 
     def counted(numbers: Any, names: dict[int, str]) -> dict[str, float]:
         found, counts = np.unique(numbers, return_counts=True)
@@ -259,34 +257,19 @@ def _forecast(study: Study, sample: Sample, workers: int, folder: Path, apart: S
     )
 
 
-def _chosen(grid: Grid, most: int) -> Any:
+def _chosen(grid: Grid, most: int) -> list[int]:
     """Numbers of cells at the ends of axes, and of at most so many others, each drawn from one of equal shares.
 
     The ends are those of every axis, in the middle of the others, and of all axes at once: there a scene is most often
     another one, and so is the method.
     """
-    last = np.array(grid.shape) - 1
-    places = [0 * last, last]
-    for axis in np.eye(len(last), dtype=np.int64):
-        places += [last // 2 * (1 - axis), last // 2 * (1 - axis) + last * axis]
-    ends = np.ravel_multi_index(tuple(np.transpose(places)), grid.shape)
+    last, axis = np.array(grid.shape) - 1, np.eye(len(grid.shape), dtype=bool)
+    middle = last // 2
+    places = np.concatenate([[0 * last], [last], np.where(axis, 0, middle), np.where(axis, last, middle)])
+    ends = np.ravel_multi_index(tuple(places.T), grid.shape)
     rng = np.random.default_rng(0)
     drawn = (np.arange(DRAWN) + rng.random(DRAWN)) * (grid.size / DRAWN)
-    return np.array(list(dict.fromkeys([*ends.tolist(), *rng.permutation(drawn.astype(np.int64))[:most].tolist()])))
-
-
-class _Some(Grid):
-    """Some cells of a study, by their numbers in its grid."""
-
-    def __init__(self, study: Study, numbers: Any) -> None:
-        super().__init__(study)
-        self.numbers, self.size = numbers, len(numbers)
-
-    def column(self, name: str, start: int, stop: int) -> Any:
-        return super().values(name, self.numbers[start:stop])
-
-    def values(self, name: str, cells: Any) -> Any:
-        return super().values(name, self.numbers[cells])
+    return list(dict.fromkeys([*ends.tolist(), *rng.permutation(drawn.astype(np.int64))[:most].tolist()]))
 
 
 def _disk_speed(folder: Path) -> float:
